@@ -1,0 +1,41 @@
+"""Errors in one voice: what was expected, what came, what would be valid.
+
+A worker who is not seen is data (growing covariance, a flag), never one of these.
+"""
+
+import difflib
+from collections.abc import Iterable
+
+
+class HRCError(Exception):
+    """Base of every error that this package raises on purpose."""
+
+
+class ConfigError(HRCError, ValueError):
+    """A setting, name, shape or value that cannot work, with what would."""
+
+
+class WeightsError(HRCError, RuntimeError):
+    """The pose network's weights are missing or are not the official ones."""
+
+
+class RenderingError(HRCError, RuntimeError):
+    """No OpenGL context could be made on this machine."""
+
+
+class CheckpointError(HRCError, RuntimeError):
+    """A saved agent that does not fit the environment it is loaded for."""
+
+
+def unknown(what: str, got: object, valid: Iterable[str]) -> ConfigError:
+    """The error for a name that is not in a list, with the nearest valid one."""
+    names = list(valid)
+    near = difflib.get_close_matches(str(got), names, n=1)
+    hint = f" Did you mean {near[0]!r}?" if near else ""
+    return ConfigError(f"Unknown {what} {got!r}.{hint} Valid: {', '.join(map(repr, names))}.")
+
+
+def check_shape(what: str, got: tuple[int, ...], expected: tuple[int, ...], meaning: str) -> None:
+    """Raise `ConfigError` unless the shapes agree; `meaning` says what the axes are."""
+    if tuple(got) != tuple(expected):
+        raise ConfigError(f"{what} must have shape {expected} ({meaning}), got {tuple(got)}.")

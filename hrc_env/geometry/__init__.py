@@ -1,0 +1,1 @@
+"""Geometry in NumPy and numba: rotations, cameras, chains, distances, triangulation."""

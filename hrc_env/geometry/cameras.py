@@ -1,0 +1,97 @@
+"""Pinhole cameras: points to pixels and pixels to rays.
+
+Pixels are continuous from the image's top-left corner, so that pixel centres lie at
+half-integers and the principal point of a symmetric image is (W/2, H/2). Camera axes are
+OpenCV's: +X right, +Y down, +Z forward.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hrc_env.errors import ConfigError
+from hrc_env.geometry.rotations import look_at
+from hrc_env.typing import Floats, Points2, Points3, Transforms
+
+
+@dataclass(frozen=True, slots=True)
+class PinholeCamera:
+    """A camera without distortion at a known place."""
+
+    name: str
+    K: Floats
+    """(3, 3) intrinsics [px]."""
+    T_world_from_cam: Transforms
+    """(4, 4)."""
+    width_px: int
+    height_px: int
+
+    @property
+    def eye_world(self) -> Points3:
+        """(3,) the optical centre [m]."""
+        return self.T_world_from_cam[:3, 3]
+
+    @property
+    def P(self) -> Floats:
+        """(3, 4) projection: homogeneous pixels = P @ (x, y, z, 1)."""
+        R_cam_from_world = self.T_world_from_cam[:3, :3].T
+        return self.K @ np.hstack([R_cam_from_world, -R_cam_from_world @ self.eye_world[:, None]])
+
+
+def pinhole(
+    name: str,
+    eye_world: Points3,
+    target_world: Points3,
+    hfov_deg: float,
+    width_px: int,
+    height_px: int,
+) -> PinholeCamera:
+    """A camera with square pixels at `eye_world` that looks at `target_world`."""
+    if not 1.0 <= hfov_deg < 179.0:
+        raise ConfigError(
+            f"Camera {name!r}: horizontal field of view must be in [1, 179) degrees, got {hfov_deg}."
+        )
+    focal_px = width_px / 2 / np.tan(np.radians(hfov_deg) / 2)
+    K = np.array([[focal_px, 0, width_px / 2], [0, focal_px, height_px / 2], [0, 0, 1.0]])
+    T_world_from_cam = np.eye(4)
+    T_world_from_cam[:3, :3] = look_at(eye_world, target_world)
+    T_world_from_cam[:3, 3] = eye_world
+    return PinholeCamera(name, K, T_world_from_cam, width_px, height_px)
+
+
+def projections(cameras: tuple[PinholeCamera, ...]) -> Floats:
+    """(C, 3, 4) projection matrices of a rig."""
+    return np.stack([camera.P for camera in cameras])
+
+
+def project(P: Floats, points_world: Points3) -> tuple[Points2, Floats]:
+    """Points into every camera (Algorithm 1, line 11).
+
+    Args:
+        P: (C, 3, 4) projections.
+        points_world: (B, ..., 3) [m].
+
+    Returns:
+        pixels (B, C, ..., 2) and depth along the optical axis (B, C, ...) [m]. Pixels of
+        points at or behind the camera's plane (depth <= 0) mean nothing: look at the depth.
+    """
+    rotated = np.einsum("cij,b...j->bc...i", P[:, :, :3], points_world)
+    shape = (1, len(P)) + (1,) * (points_world.ndim - 2) + (3,)
+    homogeneous = rotated + P[:, :, 3].reshape(shape)
+    depth_m = homogeneous[..., 2]
+    safe = np.where(np.abs(depth_m) < 1e-9, 1e-9, depth_m)
+    return homogeneous[..., :2] / safe[..., None], depth_m
+
+
+def rays(camera: PinholeCamera, pixels: Points2) -> Points3:
+    """Unit directions in the world, (..., 3), of pixels (..., 2) of one camera."""
+    homogeneous = np.concatenate([pixels, np.ones((*pixels.shape[:-1], 1))], -1)
+    direction_cam = homogeneous @ np.linalg.inv(camera.K).T
+    direction = direction_cam @ camera.T_world_from_cam[:3, :3].T
+    return direction / np.linalg.norm(direction, axis=-1, keepdims=True)
+
+
+def inside_image(camera: PinholeCamera, pixels: Points2) -> np.ndarray:
+    """(...,) whether pixels (..., 2) lie in the image."""
+    u, v = pixels[..., 0], pixels[..., 1]
+    return (u >= 0) & (u < camera.width_px) & (v >= 0) & (v < camera.height_px)

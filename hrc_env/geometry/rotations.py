@@ -1,0 +1,70 @@
+"""Rotations as matrices and unit quaternions (scalar first), over any leading axes."""
+
+import numpy as np
+
+from hrc_env.typing import Floats, Points3, QuaternionsWxyz, Rotations
+
+
+def matrix_from_quaternion(quaternion_wxyz: QuaternionsWxyz) -> Rotations:
+    """(..., 4) unit quaternions to (..., 3, 3) matrices."""
+    w, x, y, z = np.moveaxis(quaternion_wxyz, -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.stack([np.stack(row, -1) for row in rows], -2)
+
+
+def quaternion_from_matrix(rotation: Rotations) -> QuaternionsWxyz:
+    """(..., 3, 3) matrices to (..., 4) unit quaternions with w >= 0 (Shepperd's method)."""
+    m = rotation
+    trace = m[..., 0, 0] + m[..., 1, 1] + m[..., 2, 2]
+    diagonal = np.stack([trace, m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]], -1)
+    symmetric = np.stack(
+        [
+            np.stack([trace, *_pairs(m, -1)], -1),
+            np.stack([_pairs(m, -1)[0], m[..., 0, 0], *_pairs(m, 1)[:2]], -1),
+            np.stack([_pairs(m, -1)[1], _pairs(m, 1)[0], m[..., 1, 1], _pairs(m, 1)[2]], -1),
+            np.stack([_pairs(m, -1)[2], _pairs(m, 1)[1], _pairs(m, 1)[2], m[..., 2, 2]], -1),
+        ],
+        -2,
+    )
+    identity = np.eye(4, dtype=bool)
+    symmetric = np.where(identity, 1 - trace[..., None, None] + 2 * symmetric, symmetric)
+    best = np.argmax(diagonal, -1)
+    quaternion = np.take_along_axis(symmetric, best[..., None, None], -2)[..., 0, :]
+    quaternion = quaternion / np.linalg.norm(quaternion, axis=-1, keepdims=True)
+    return np.where(quaternion[..., :1] < 0, -quaternion, quaternion)
+
+
+def _pairs(m: Rotations, sign: int) -> tuple[Floats, Floats, Floats]:
+    """Sums (+1: xy, xz, yz) or differences (-1: x, y, z) of the off-diagonal elements."""
+    if sign > 0:
+        return m[..., 0, 1] + m[..., 1, 0], m[..., 0, 2] + m[..., 2, 0], m[..., 1, 2] + m[..., 2, 1]
+    return m[..., 2, 1] - m[..., 1, 2], m[..., 0, 2] - m[..., 2, 0], m[..., 1, 0] - m[..., 0, 1]
+
+
+def about_axis(axis: str, angle_rad: Floats | float) -> Rotations:
+    """Rotation about "x", "y" or "z" by angles of any shape: (..., 3, 3)."""
+    angle = np.asarray(angle_rad, float)
+    c, s, zero, one = np.cos(angle), np.sin(angle), np.zeros_like(angle), np.ones_like(angle)
+    rows = {
+        "x": [[one, zero, zero], [zero, c, -s], [zero, s, c]],
+        "y": [[c, zero, s], [zero, one, zero], [-s, zero, c]],
+        "z": [[c, -s, zero], [s, c, zero], [zero, zero, one]],
+    }[axis]
+    return np.stack([np.stack(row, -1) for row in rows], -2)
+
+
+def look_at(eye_world: Points3, target_world: Points3) -> Rotations:
+    """R_world_from_cam (OpenCV: +X right, +Y down, +Z forward), the image upright.
+
+    Degenerate when the line of sight is vertical: then +Y of the image is world -Y.
+    """
+    forward = np.asarray(target_world, float) - np.asarray(eye_world, float)
+    forward = forward / np.linalg.norm(forward)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    length = np.linalg.norm(right)
+    right = right / length if length > 1e-9 else np.array([1.0, 0.0, 0.0])
+    return np.stack([right, np.cross(forward, right), forward], -1)
