@@ -1,0 +1,40 @@
+# make demo   a film of the robot working beside a worker it sees through four cameras
+# make test   the proof
+# make check  style, types, floors
+PYTHON ?= python3
+VENV := .venv
+RUN := $(VENV)/bin/python
+READY := $(VENV)/.ready
+
+.PHONY: demo test check bench train-quick clean
+.DEFAULT_GOAL := demo
+
+$(READY): pyproject.toml constraints.txt
+	@test -x $(RUN) || $(PYTHON) -m venv $(VENV)
+	@echo "Installing hrc_env and what it needs (a minute or two) ..."
+	@$(RUN) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[dev]"
+	@$(RUN) -m hrc_env setup
+	@touch $(READY)
+
+demo: $(READY)
+	$(RUN) -m hrc_env demo
+
+test: $(READY)
+	$(RUN) -m hrc_env setup
+	$(RUN) -m pytest -n 2
+
+check: $(READY)
+	$(VENV)/bin/ruff check .
+	$(VENV)/bin/ruff format --check .
+	$(VENV)/bin/lint-imports
+	$(VENV)/bin/pyright
+
+bench: $(READY)
+	$(RUN) benchmarks/speed.py
+	$(RUN) benchmarks/pixels.py
+
+train-quick: $(READY)
+	$(RUN) train.py
+
+clean:
+	rm -rf $(VENV) out runs

@@ -1,0 +1,105 @@
+"""The whole configuration: one frozen tree, a branch for each organ.
+
+`HRCConfig()` is the default; `dataclasses.replace` or a nested mapping changes it:
+`gymnasium.make("HRCReach-v0", config={"reward": {"proximity": 0.0}})`.
+"""
+
+import dataclasses
+import typing
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+from hrc_env.control import ControlConfig
+from hrc_env.errors import ConfigError, unknown
+from hrc_env.metrics import CostConfig
+from hrc_env.motion.generator import MotionConfig
+from hrc_env.perception.emulator import EmulatorConfig
+from hrc_env.perception.eyes import EyesConfig
+from hrc_env.rewards import RewardConfig
+from hrc_env.scene.build import SceneConfig
+from hrc_env.tasks.reach import ReachConfig
+from hrc_env.tracking.estimators import TrackerConfig
+
+ConfigT = TypeVar("ConfigT")
+
+
+@dataclass(frozen=True, slots=True)
+class HRCConfig:
+    """Everything about an environment that is not one of its keyword arguments."""
+
+    ctrl_dt: float = 0.04
+    """Time between actions [s]; a multiple of `scene.sim_dt`. 0.04 s is 25 Hz."""
+    worker: str = "worker_1"
+    """Which baked body the workers have."""
+    scene: SceneConfig = field(default_factory=SceneConfig)
+    """Room, cameras, physics."""
+    motion: MotionConfig = field(default_factory=MotionConfig)
+    """How the workers move."""
+    eyes: EyesConfig = field(default_factory=EyesConfig)
+    """The camera pipeline (`perception="pixels"`)."""
+    emulator: EmulatorConfig = field(default_factory=EmulatorConfig)
+    """Its emulator (`perception="keypoints"`)."""
+    tracker: TrackerConfig = field(default_factory=TrackerConfig)
+    """The estimators."""
+    control: ControlConfig = field(default_factory=ControlConfig)
+    """What an action means."""
+    task: ReachConfig = field(default_factory=ReachConfig)
+    """Goals."""
+    reward: RewardConfig = field(default_factory=RewardConfig)
+    """Weights of the reward's terms."""
+    cost: CostConfig = field(default_factory=CostConfig)
+    """What counts as unsafe."""
+
+    def __post_init__(self) -> None:
+        substeps = self.ctrl_dt / self.scene.sim_dt
+        if substeps < 0.5 or abs(substeps - round(substeps)) > 1e-6:
+            near = max(round(substeps), 1) * self.scene.sim_dt
+            raise ConfigError(
+                f"ctrl_dt must be a multiple of scene.sim_dt = {self.scene.sim_dt} s, "
+                f"got {self.ctrl_dt} s; the nearest valid value is {near:.6g} s."
+            )
+
+    @property
+    def n_substeps(self) -> int:
+        """Physics steps in a control step."""
+        return round(self.ctrl_dt / self.scene.sim_dt)
+
+
+def resolve(config: "HRCConfig | Mapping[str, Any] | None") -> HRCConfig:
+    """A config from what a user gave: a config, a (nested) mapping of changes, or nothing.
+
+    Raises:
+        ConfigError: a field that does not exist, with the nearest that does; a bad value.
+    """
+    if config is None:
+        return HRCConfig()
+    if isinstance(config, HRCConfig):
+        return config
+    if not isinstance(config, Mapping):
+        raise ConfigError(
+            f"config must be an HRCConfig, a mapping or None, got {type(config).__name__}."
+        )
+    return from_mapping(HRCConfig, config)
+
+
+def from_mapping(kind: type[ConfigT], mapping: Mapping[str, Any], path: str = "") -> ConfigT:
+    """A dataclass from a mapping; nested dataclasses from nested mappings."""
+    hints = typing.get_type_hints(kind)
+    names = [each.name for each in dataclasses.fields(kind)]  # type: ignore[arg-type]
+    values: dict[str, Any] = {}
+    for name, value in mapping.items():
+        where = f"{path}{name}"
+        if name not in names:
+            raise unknown("config field", where, [f"{path}{each}" for each in names])
+        nested = hints[name]
+        if dataclasses.is_dataclass(nested) and isinstance(value, Mapping):
+            value = from_mapping(typing.cast(type, nested), value, f"{where}.")
+        elif isinstance(value, list):  # JSON knows no tuples
+            value = _tuples(value)
+        values[name] = value
+    return kind(**values)
+
+
+def _tuples(value: Any) -> Any:
+    return tuple(_tuples(each) for each in value) if isinstance(value, list) else value

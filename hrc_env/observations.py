@@ -1,0 +1,217 @@
+"""What the robot sees: one declaration per observation term.
+
+The space, the environment's page, `split` and the tests all derive from `TERMS`, so that
+they cannot drift apart. Terms read the *estimate* of the worker, never the truth.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hrc_env.geometry.distances import Gap, narrowest_gap
+from hrc_env.records import PoseEstimate, RobotState
+from hrc_env.skeleton import N_JOINTS, SEGMENT_RADIUS_M, segments
+from hrc_env.typing import Bools, Floats, Points3
+
+FAR_GAP_M = 1.0
+"""A gap as wide as this or wider is reported as this: nothing near, or nobody known of."""
+
+
+@dataclass(frozen=True, slots=True)
+class Believed:
+    """Everything a robot may know in one step: itself, its task, and the estimate."""
+
+    robot: RobotState
+    estimate: PoseEstimate
+    gap: Gap
+    """(B, W) narrowest place between the robot and each *estimated* body."""
+    goal_world: Points3
+    """(B, 3) [m]."""
+    goal_time_left_s: Floats
+    """(B,)."""
+    action: Floats
+    """(B, A) the last action, in [-1, 1]."""
+
+
+@dataclass(frozen=True, slots=True)
+class ObservationTerm:
+    """One block of the flat observation: value = clip(function, -bound, bound) / scale."""
+
+    name: str
+    size: Callable[[int, int, int], int]
+    """Number of entries for (N arm joints, A actions, W workers)."""
+    unit: str
+    frame: str
+    bound: float
+    """Largest magnitude, in `unit`; larger values are clipped."""
+    scale: float
+    """What one unit of the observation stands for, in `unit`."""
+    doc: str
+    function: Callable[[Believed], Floats]
+    """Believed -> (B, ...), flattened per environment."""
+
+
+def estimated_gap(robot: RobotState, estimate: PoseEstimate) -> Gap:
+    """(B, W) narrowest place between the robot's capsules and each estimated body.
+
+    The body is made of the segments between the estimated joints with radii, the hands
+    included (`skeleton.segments`). A worker without a track is infinitely far: there is
+    nothing to keep away from that the robot knows of.
+    """
+    batch, workers = estimate.tracked.shape
+    bodies = segments(estimate.mean_world)
+    shape = (batch, workers, *robot.capsules_world.shape[1:])
+    robots = np.broadcast_to(robot.capsules_world[:, None], shape)
+    gap = narrowest_gap(robots, robot.capsule_radius_m, bodies, SEGMENT_RADIUS_M)
+    return Gap(
+        np.where(estimate.tracked, gap.distance_m, np.inf), gap.point_a_world, gap.point_b_world
+    )
+
+
+def standard_deviation_m(estimate: PoseEstimate) -> Floats:
+    """(B, W, J) root of the mean variance over the axes [m]."""
+    return np.sqrt(np.trace(estimate.cov_world, axis1=-2, axis2=-1) / 3)
+
+
+def _goal_direction(now: Believed) -> Floats:
+    offset = now.goal_world - now.robot.tool_world
+    return offset / (np.linalg.norm(offset, axis=-1, keepdims=True) + 0.05)
+
+
+def _nearest_direction(now: Believed) -> Floats:
+    offset = now.gap.point_b_world - now.gap.point_a_world
+    direction = offset / (np.linalg.norm(offset, axis=-1, keepdims=True) + 1e-3)
+    return np.where(_near(now)[..., None], direction, 0.0)
+
+
+def _near(now: Believed) -> Bools:
+    return now.gap.distance_m < FAR_GAP_M
+
+
+TERMS: tuple[ObservationTerm, ...] = (
+    ObservationTerm(
+        "joint_angle_sin", lambda n, a, w: n, "-", "base", 1.0, 1.0,
+        "Sine of each arm joint's angle.",
+        lambda now: np.sin(now.robot.q),
+    ),
+    ObservationTerm(
+        "joint_angle_cos", lambda n, a, w: n, "-", "base", 1.0, 1.0,
+        "Cosine of each arm joint's angle.",
+        lambda now: np.cos(now.robot.q),
+    ),
+    ObservationTerm(
+        "joint_velocity", lambda n, a, w: n, "rad/s", "base", 4.0, 1.0,
+        "Velocity of each arm joint.",
+        lambda now: now.robot.qd,
+    ),
+    ObservationTerm(
+        "tool_position", lambda n, a, w: 3, "m", "world", 4.0, 1.0,
+        "Position of the tool point.",
+        lambda now: now.robot.tool_world,
+    ),
+    ObservationTerm(
+        "goal_from_tool", lambda n, a, w: 3, "m", "world", 3.0, 0.5,
+        "From the tool point to the goal.",
+        lambda now: now.goal_world - now.robot.tool_world,
+    ),
+    ObservationTerm(
+        "goal_direction", lambda n, a, w: 3, "-", "world", 1.0, 1.0,
+        "The same, divided by its length plus 5 cm.",
+        _goal_direction,
+    ),
+    ObservationTerm(
+        "goal_time_left", lambda n, a, w: 1, "s", "-", 10.0, 4.0,
+        "Time until the goal is missed.",
+        lambda now: now.goal_time_left_s,
+    ),
+    ObservationTerm(
+        "last_action", lambda n, a, w: a, "-", "-", 1.0, 1.0,
+        "The action of the previous step.",
+        lambda now: now.action,
+    ),
+    ObservationTerm(
+        "worker_joints_from_tool", lambda n, a, w: w * N_JOINTS * 3, "m", "world", 6.0, 1.0,
+        "From the tool point to each estimated joint of each worker.",
+        lambda now: now.estimate.mean_world - now.robot.tool_world[:, None, None],
+    ),
+    ObservationTerm(
+        "worker_joints_std", lambda n, a, w: w * N_JOINTS, "m", "world", 1.0, 0.25,
+        "Standard deviation of each estimated joint (root mean over the axes).",
+        lambda now: standard_deviation_m(now.estimate),
+    ),
+    ObservationTerm(
+        "worker_joints_age", lambda n, a, w: w * N_JOINTS, "s", "-", 2.0, 1.0,
+        "Time since a measurement last supported each joint.",
+        lambda now: now.estimate.age_s,
+    ),
+    ObservationTerm(
+        "worker_joints_velocity", lambda n, a, w: w * N_JOINTS * 3, "m/s", "world", 4.0, 2.0,
+        "Estimated velocity of each joint.",
+        lambda now: now.estimate.velocity_world,
+    ),
+    ObservationTerm(
+        "worker_tracked", lambda n, a, w: w, "-", "-", 1.0, 1.0,
+        "1 while there is a track of the worker, 0 where the estimate is the prior or lost.",
+        lambda now: now.estimate.tracked.astype(float),
+    ),
+    ObservationTerm(
+        "worker_gap", lambda n, a, w: w, "m", "-", FAR_GAP_M, 0.5,
+        "Distance between the robot's surface and the estimated body's, at most 1 m.",
+        lambda now: np.minimum(now.gap.distance_m, FAR_GAP_M),
+    ),
+    ObservationTerm(
+        "worker_direction", lambda n, a, w: w * 3, "-", "world", 1.0, 1.0,
+        "Unit vector from the robot to the estimated body where they are nearest; 0 if far.",
+        _nearest_direction,
+    ),
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class ObservationLayout:
+    """Which entries of the flat observation belong to which term."""
+
+    slices: dict[str, slice]
+    low: NDArray[np.float32]
+    high: NDArray[np.float32]
+    scale: Floats
+    """(n,) what one unit of each entry stands for, in the term's unit."""
+
+
+def layout(n_arm_joints: int, n_actions: int, n_workers: int) -> ObservationLayout:
+    """The layout for an arm, an action space and a number of workers."""
+    slices: dict[str, slice] = {}
+    high, scale, start = [], [], 0
+    for term in TERMS:
+        size = term.size(n_arm_joints, n_actions, n_workers)
+        slices[term.name] = slice(start, start + size)
+        high.append(np.full(size, term.bound / term.scale))
+        scale.append(np.full(size, term.scale))
+        start += size
+    bound = np.concatenate(high).astype(np.float32)
+    return ObservationLayout(slices, -bound, bound, np.concatenate(scale))
+
+
+def observe(now: Believed, where: ObservationLayout) -> NDArray[np.float32]:
+    """(B, n) flat observations; cast to float32 once, here.
+
+    Raises:
+        FloatingPointError: a term is not a number; a fault of the code, never of a camera.
+    """
+    batch = len(now.goal_world)
+    flat = np.empty((batch, len(where.low)))
+    for term in TERMS:
+        flat[:, where.slices[term.name]] = term.function(now).reshape(batch, -1)
+    flat /= where.scale
+    if np.isnan(flat).any():
+        names = [name for name, part in where.slices.items() if np.isnan(flat[:, part]).any()]
+        raise FloatingPointError(f"Observation terms that are not a number: {', '.join(names)}.")
+    return np.clip(flat, where.low, where.high, dtype=np.float32, casting="unsafe")
+
+
+def split(observation: NDArray[np.float32], where: ObservationLayout) -> dict[str, Floats]:
+    """A flat observation (..., n) as named terms in their units."""
+    physical = observation * where.scale
+    return {name: physical[..., part] for name, part in where.slices.items()}

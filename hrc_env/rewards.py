@@ -1,0 +1,104 @@
+"""What the robot is rewarded for: one declaration per term. Terms read the estimate only."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from hrc_env.errors import ConfigError
+from hrc_env.observations import Believed
+from hrc_env.tasks.reach import ReachProgress
+from hrc_env.typing import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class RewardConfig:
+    """Weights of the terms; the reward of a step is their sum."""
+
+    progress_per_m: float = 10.0
+    """For every metre that the tool comes nearer to its goal."""
+    goal: float = 5.0
+    """For reaching a goal."""
+    effort: float = 0.02
+    """Taken off for the mean squared action."""
+    smoothness: float = 0.02
+    """Taken off for the mean squared change of the action."""
+    proximity: float = 2.0
+    """Taken off for closeness to the *estimated* body, times the term's shape in [0, 2.25]."""
+    proximity_reach_m: float = 0.3
+    """Closeness begins to count below this gap between the surfaces [m]."""
+
+    def __post_init__(self) -> None:
+        if self.proximity_reach_m <= 0:
+            raise ConfigError(
+                f"RewardConfig.proximity_reach_m must be positive, got {self.proximity_reach_m}."
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class RewardTerm:
+    """One summand of the reward."""
+
+    name: str
+    doc: str
+    function: Callable[[Believed, ReachProgress, Floats, RewardConfig], Floats]
+    """(believed, progress, previous action (B, A), weights) -> (B,)."""
+
+
+def closeness(gap_m: Floats, reach_m: float) -> Floats:
+    """Shape of the proximity term: 0 from `reach_m` on, 1 at touch, at most 2.25 inside."""
+    return np.clip((reach_m - gap_m) / reach_m, 0.0, 1.5) ** 2
+
+
+def _proximity(
+    now: Believed, step: ReachProgress, previous: Floats, config: RewardConfig
+) -> Floats:
+    nearest_m = now.gap.distance_m.min(axis=-1, initial=np.inf)
+    return -config.proximity * closeness(nearest_m, config.proximity_reach_m)
+
+
+TERMS: tuple[RewardTerm, ...] = (
+    RewardTerm(
+        "progress",
+        "Metres that the tool came nearer to its goal, times `progress_per_m`.",
+        lambda now, step, previous, config: config.progress_per_m * step.progress_m,
+    ),
+    RewardTerm(
+        "goal",
+        "`goal` in the step in which a goal is reached.",
+        lambda now, step, previous, config: config.goal * step.reached,
+    ),
+    RewardTerm(
+        "effort",
+        "Minus `effort` times the mean squared action.",
+        lambda now, step, previous, config: -config.effort * np.square(now.action).mean(-1),
+    ),
+    RewardTerm(
+        "smoothness",
+        "Minus `smoothness` times the mean squared change of the action.",
+        lambda now, step, previous, config: (
+            -config.smoothness * np.square(now.action - previous).mean(-1)
+        ),
+    ),
+    RewardTerm(
+        "proximity",
+        "Minus `proximity` times clip((d0 - d) / d0, 0, 1.5)^2, where d is the gap between the "
+        "robot's surface and the nearest estimated body and d0 is `proximity_reach_m`.",
+        _proximity,
+    ),
+)
+
+
+def reward(
+    now: Believed, step: ReachProgress, previous_action: Floats, config: RewardConfig
+) -> tuple[Floats, dict[str, Floats]]:
+    """The reward (B,) and its terms by name.
+
+    Raises:
+        FloatingPointError: a term is not finite; a fault of the code, never of a camera.
+    """
+    terms = {term.name: term.function(now, step, previous_action, config) for term in TERMS}
+    for name, value in terms.items():
+        if not np.isfinite(value).all():
+            raise FloatingPointError(f"Reward term {name!r} is not finite: {value}.")
+    return sum(terms.values(), np.zeros(len(now.goal_world))), terms

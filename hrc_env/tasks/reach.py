@@ -1,0 +1,131 @@
+"""Reaching: the tool has to touch goals one after another, in a volume shared with a worker."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hrc_env.errors import ConfigError
+from hrc_env.typing import Bools, Floats, Ints, Points3
+
+
+@dataclass(frozen=True, slots=True)
+class ReachConfig:
+    """Where goals appear and what counts as reaching one."""
+
+    radius_m: float = 0.05
+    """A goal is reached when the tool point is nearer than this [m]."""
+    time_limit_s: float = 4.0
+    """A goal not reached after this long [s] is missed, and the next one appears."""
+    base_xy_world: tuple[float, float] = (-0.75, 0.0)
+    """Axis of the robot's first joint [m]; goals are drawn round it."""
+    distance_m: tuple[float, float] = (0.5, 0.95)
+    """Range of the goals' horizontal distance from that axis [m]."""
+    azimuth_rad: tuple[float, float] = (-1.2, 1.2)
+    """Range of the goals' direction from world +X, seen from that axis [rad]."""
+    height_m: tuple[float, float] = (0.8, 1.45)
+    """Range of the goals' height above the floor [m]."""
+
+    def __post_init__(self) -> None:
+        for name in ("distance_m", "azimuth_rad", "height_m"):
+            low, high = getattr(self, name)
+            if not low < high:
+                raise ConfigError(f"ReachConfig.{name} must be (low, high), got {(low, high)}.")
+        if self.radius_m <= 0 or self.time_limit_s <= 0:
+            raise ConfigError("ReachConfig.radius_m and time_limit_s must be positive.")
+
+
+@dataclass(slots=True)
+class ReachState:
+    """The task of every environment; rows are environments."""
+
+    goal_world: Points3
+    """(B, 3) [m]."""
+    goal_age_s: Floats
+    """(B,) since the goal appeared."""
+    distance_m: Floats
+    """(B,) from the tool point to the goal."""
+    n_reached: Ints
+    """(B,) goals reached in this episode."""
+    n_missed: Ints
+    """(B,) goals missed in this episode."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReachProgress:
+    """What one step brought."""
+
+    progress_m: Floats
+    """(B,) by how much the tool came nearer to the goal it had [m]."""
+    reached: Bools
+    """(B,) whether that goal was reached in this step."""
+    missed: Bools
+    """(B,) whether it ran out of time in this step."""
+
+
+def make_state(batch: int) -> ReachState:
+    """A state for `batch` environments, to be filled by `reset`."""
+    return ReachState(
+        goal_world=np.zeros((batch, 3)),
+        goal_age_s=np.zeros(batch),
+        distance_m=np.zeros(batch),
+        n_reached=np.zeros(batch, np.int64),
+        n_missed=np.zeros(batch, np.int64),
+    )
+
+
+def reset(
+    state: ReachState,
+    ids: Ints,
+    rngs: Sequence[np.random.Generator],
+    tool_world: Points3,
+    config: ReachConfig,
+) -> None:
+    """Start environments `ids` anew with a first goal each; tool_world is (B, 3) [m]."""
+    state.n_reached[ids] = 0
+    state.n_missed[ids] = 0
+    _new_goals(state, ids, rngs, tool_world, config)
+
+
+def advance(
+    state: ReachState,
+    rngs: Sequence[np.random.Generator],
+    tool_world: Points3,
+    dt_s: float,
+    config: ReachConfig,
+) -> ReachProgress:
+    """Judge the tool's new place (B, 3) and replace goals that are done."""
+    before_m = state.distance_m.copy()
+    state.distance_m[:] = np.linalg.norm(state.goal_world - tool_world, axis=-1)
+    state.goal_age_s += dt_s
+    reached = state.distance_m < config.radius_m
+    missed = ~reached & (state.goal_age_s >= config.time_limit_s - 1e-9)
+    progress_m = before_m - state.distance_m
+    state.n_reached += reached
+    state.n_missed += missed
+    _new_goals(state, np.flatnonzero(reached | missed), rngs, tool_world, config)
+    return ReachProgress(progress_m, reached, missed)
+
+
+def succeeded(state: ReachState) -> Bools:
+    """(B,) whether so far every goal of the episode, and at least one, was reached in time."""
+    return (state.n_reached > 0) & (state.n_missed == 0)
+
+
+def _new_goals(
+    state: ReachState,
+    ids: Ints,
+    rngs: Sequence[np.random.Generator],
+    tool_world: Points3,
+    config: ReachConfig,
+) -> None:
+    for b in ids:
+        distance, azimuth, height = rngs[b].uniform(
+            (config.distance_m[0], config.azimuth_rad[0], config.height_m[0]),
+            (config.distance_m[1], config.azimuth_rad[1], config.height_m[1]),
+        )
+        x, y = config.base_xy_world
+        goal = (x + distance * np.cos(azimuth), y + distance * np.sin(azimuth), height)
+        state.goal_world[b] = goal
+        state.goal_age_s[b] = 0.0
+        state.distance_m[b] = np.linalg.norm(state.goal_world[b] - tool_world[b])
