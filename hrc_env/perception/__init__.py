@@ -1,0 +1,1 @@
+"""Images to `Keypoints` (`eyes`), or `Keypoints` without images (`emulator`)."""

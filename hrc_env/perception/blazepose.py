@@ -1,0 +1,210 @@
+"""What BlazePose's tensors mean: people, regions of interest, landmarks.
+
+Follows the graphs of MediaPipe 0.10.21 (pose_detection, pose_landmark) number by number;
+tests/perception compares with landmarks of the official package. Method: Bazarevsky et al.,
+BlazePose: On-device Real-time Body Pose tracking (2020), arXiv:2006.10204.
+"""
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from hrc_env.perception.network import DETECTOR_SIDE, LANDMARK_SIDE, Tensor
+from hrc_env.records import CropWindow
+from hrc_env.typing import Floats, Image, Points2
+
+MIN_SCORE = 0.5
+"""Detector score and person flag from which MediaPipe believes in a person."""
+
+MAX_OVERLAP = 0.3
+"""Boxes that overlap more (intersection over union) are one person."""
+
+ROI_MARGIN = 1.25
+"""The region of interest is this much larger than the circle round the person."""
+
+_REFINE_REACH = np.arange(-4, 5)  # a 9 x 9 neighbourhood in the 64 x 64 heatmap
+_HEAT_SIDE = 64
+_N_USED = 35  # 33 body landmarks, then the two that give the next region of interest
+
+
+@dataclass(frozen=True, slots=True)
+class Person:
+    """One person as the detector stage sees them, in units of the square image's side."""
+
+    score: float
+    box: Floats
+    """(4,) left, top, right, bottom of the face."""
+    hip: Points2
+    """(2,) midpoint of the hips."""
+    rim: Points2
+    """(2,) upright above the hips, on the circle round the whole body."""
+
+
+def _anchors() -> Floats:
+    """(2254, 2) centres of the detector's cells: strides 8, 16, 32 with 2, 2, 6 each."""
+    parts = []
+    for stride, per_cell in ((8, 2), (16, 2), (32, 6)):
+        n = DETECTOR_SIDE // stride
+        centre = (np.arange(n) + 0.5) / n
+        x, y = np.meshgrid(centre, centre)
+        parts.append(np.repeat(np.stack([x.ravel(), y.ravel()], 1), per_cell, axis=0))
+    return np.concatenate(parts)
+
+
+ANCHORS: Floats = _anchors()
+
+
+def wrap_angle(angle_rad: float) -> float:
+    """The same direction in [-pi, pi)."""
+    return angle_rad - 2 * math.pi * math.floor((angle_rad + math.pi) / (2 * math.pi))
+
+
+def window_from_points(centre_px: Points2, rim_px: Points2) -> CropWindow:
+    """BlazePose's region of interest: round mid-hip, upright towards the rim point.
+
+    Args:
+        centre_px: (2,) the middle of the hips.
+        rim_px: (2,) a point upright of it on the circle that holds the whole body.
+    """
+    dx, dy = rim_px[0] - centre_px[0], rim_px[1] - centre_px[1]
+    side_px = 2 * math.hypot(dx, dy) * ROI_MARGIN
+    rotation = wrap_angle(math.pi / 2 - math.atan2(-dy, dx))
+    return CropWindow((float(centre_px[0]), float(centre_px[1])), side_px, rotation)
+
+
+def sample_window(image: Image, window: CropWindow, side: int = LANDMARK_SIDE) -> Image:
+    """The turned square of an image as an upright (side, side, 3) picture, bilinear.
+
+    The square's corners map to the picture's corners (no half-pixel shift), and the image's
+    border is continued outside, as MediaPipe does.
+    """
+    matrix = _image_from_crop(window, side)
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    crop = cv2.warpAffine(image, matrix, (side, side), flags=flags, borderMode=cv2.BORDER_REPLICATE)
+    return crop.astype(np.uint8, copy=False)
+
+
+def to_image(points: Points2, window: CropWindow) -> Points2:
+    """Points (..., 2) in units of the window's side (0..1 from its corner) to image pixels."""
+    matrix = _image_from_crop(window, 1)
+    return points @ matrix[:, :2].T + matrix[:, 2]
+
+
+def _image_from_crop(window: CropWindow, side: int) -> Floats:
+    """(2, 3) affine map from crop pixels to image pixels."""
+    scale = window.side_px / side
+    c, s = math.cos(window.rotation_rad) * scale, math.sin(window.rotation_rad) * scale
+    turn = np.array([[c, -s], [s, c]])
+    return np.column_stack([turn, np.array(window.centre_px) - turn @ [side / 2, side / 2]])
+
+
+def detector_input(image: Image) -> tuple[Tensor, CropWindow]:
+    """An image of any shape, letterboxed for the detector, and the window that it covers."""
+    height, width = image.shape[:2]
+    window = CropWindow((width / 2, height / 2), float(max(height, width)), 0.0)
+    size = (DETECTOR_SIDE, DETECTOR_SIDE)
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    small = cv2.warpAffine(image, _image_from_crop(window, DETECTOR_SIDE), size, flags=flags)
+    return small.astype(np.float32) * np.float32(2 / 255) - np.float32(1), window
+
+
+def landmark_input(crop: Image) -> Tensor:
+    """A (256, 256, 3) crop as the landmark stage wants it."""
+    return np.multiply(crop, np.float32(1 / 255), dtype=np.float32)
+
+
+def decode_people(boxes: Tensor, logits: Tensor, min_score: float = MIN_SCORE) -> list[Person]:
+    """People from the detector's tensors, best first.
+
+    Args:
+        boxes: (2254, 12) box centre and size, then four keypoints, relative to the anchors.
+        logits: (2254,) scores.
+        min_score: from which score to believe.
+    """
+    score = _sigmoid(logits.astype(float))
+    kept = np.flatnonzero(score >= min_score)
+    raw, score, anchor = boxes[kept].astype(float) / DETECTOR_SIDE, score[kept], ANCHORS[kept]
+    centre, half = raw[:, 0:2] + anchor, raw[:, 2:4] / 2
+    corners = np.concatenate([centre - half, centre + half], axis=1)
+    keypoints = raw[:, 4:8].reshape(-1, 2, 2) + anchor[:, None]
+    return merge_people(score, corners, keypoints)
+
+
+def merge_people(score: Floats, box: Floats, keypoints: Floats) -> list[Person]:
+    """Weighted non-maximum suppression: overlapping detections become their weighted mean.
+
+    Args:
+        score: (n,).
+        box: (n, 4) left, top, right, bottom.
+        keypoints: (n, 2, 2) mid-hip and rim.
+    """
+    people = []
+    order = np.argsort(-score, kind="stable")
+    while len(order):
+        same = _overlap(box[order[0]], box[order]) > MAX_OVERLAP
+        same[0] = True  # even a box without area is itself
+        group = order[same]
+        weight = score[group] / score[group].sum()
+        hip, rim = np.einsum("n,nkd->kd", weight, keypoints[group])
+        people.append(Person(float(score[order[0]]), weight @ box[group], hip, rim))
+        order = order[~same]
+    return people
+
+
+def person_window(person: Person, window: CropWindow) -> CropWindow:
+    """The region of interest of a person found in the square `window`, in image pixels."""
+    hip, rim = to_image(np.array([person.hip, person.rim]), window)
+    return window_from_points(hip, rim)
+
+
+def decode_landmarks(points: Tensor, heat: Tensor) -> Floats:
+    """(35, 3) x, y in units of the crop's side and visibility in [0, 1].
+
+    The network's own regression is refined by the heatmap: where it is sure (above 0.5 in
+    the neighbourhood) the point becomes the neighbourhood's mean weighted by it.
+
+    Args:
+        points: (39, 5) x, y, z in crop pixels, logits of visibility and presence.
+        heat: (64, 64, 39) logits.
+
+    Returns:
+        33 body landmarks, then mid-hip and rim of the next region of interest.
+    """
+    xy = points[:_N_USED, :2].astype(float) / LANDMARK_SIDE
+    cell = np.trunc(xy * _HEAT_SIDE).astype(int)
+    columns = cell[:, 0, None] + _REFINE_REACH
+    rows = cell[:, 1, None] + _REFINE_REACH
+    inside = _on_map(rows)[:, :, None] & _on_map(columns)[:, None, :]
+    near_rows = np.clip(rows, 0, _HEAT_SIDE - 1)[:, :, None]
+    near_columns = np.clip(columns, 0, _HEAT_SIDE - 1)[:, None, :]
+    logits = heat[near_rows, near_columns, np.arange(_N_USED)[:, None, None]]
+    weight = _sigmoid(logits.astype(float)) * inside
+    total = weight.sum((1, 2))
+    sure = (weight.max((1, 2)) >= MIN_SCORE) & _on_map(cell).all(1)
+    total = np.where(total > 0, total, 1.0)
+    refined = np.stack(
+        [(weight.sum(1) * columns).sum(1) / total, (weight.sum(2) * rows).sum(1) / total], axis=1
+    )
+    out = np.empty((_N_USED, 3))
+    out[:, :2] = np.where(sure[:, None], refined / _HEAT_SIDE, xy)
+    out[:, 2] = _sigmoid(points[:_N_USED, 3].astype(float))
+    return out
+
+
+def _on_map(cell: np.ndarray) -> np.ndarray:
+    return (cell >= 0) & (cell < _HEAT_SIDE)
+
+
+def _overlap(box: Floats, boxes: Floats) -> Floats:
+    """(n,) intersection over union of one box with many."""
+    low, high = np.maximum(box[:2], boxes[:, :2]), np.minimum(box[2:], boxes[:, 2:])
+    shared = np.clip(high - low, 0, None).prod(1)
+    area = (boxes[:, 2:] - boxes[:, :2]).prod(1)
+    union = (box[2:] - box[:2]).prod() + area - shared
+    return shared / np.maximum(union, 1e-12)
+
+
+def _sigmoid(x: Floats) -> Floats:
+    return 1 / (1 + np.exp(-np.clip(x, -80, 80)))
