@@ -1,0 +1,268 @@
+"""Triangulation: pixels of one point in several cameras to a point with its covariance.
+
+A linear start (planes through the optical centres, least squares) is refined by Gauss-Newton
+on the reprojection error (Hartley and Zisserman, Multiple View Geometry, 2nd ed., chapter 12).
+`triangulate_robust` first looks for the two cameras whose point the most cameras agree with,
+so that a wrong detection in one view does no harm. The kernels work on one point; the two
+public functions run them over (B, W, J).
+"""
+
+import math
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+
+from hrc_env.errors import ConfigError, check_shape
+from hrc_env.typing import Bools, Covariances3, Floats, Ints, Points2, Points3
+
+NEAREST_DEPTH_M = 0.05
+"""Points nearer to a camera's plane than this have no usable pixel."""
+FURTHEST_PX = 1e5
+"""Pixels beyond this are no measurement of anything in a room."""
+_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
+
+
+@dataclass(frozen=True, slots=True)
+class Triangulation:
+    """Points with what is known about them; NaN where fewer than two views could be used."""
+
+    points_world: Points3
+    """(B, W, J, 3) [m]."""
+    cov_world: Covariances3
+    """(B, W, J, 3, 3) [m^2], the inverse information of the views that were used."""
+    used: Bools
+    """(B, C, W, J) the views that the point was made from."""
+
+    @property
+    def n_views(self) -> Ints:
+        """(B, W, J) number of views that were used."""
+        return self.used.sum(1)
+
+
+def triangulate(P: Floats, px: Points2, sigma_px: Floats) -> Triangulation:
+    """Weighted least-squares points from all views.
+
+    Args:
+        P: (C, 3, 4) projections.
+        px: (B, C, W, J, 2) pixels; NaN where missing.
+        sigma_px: (B, C, W, J) standard deviations [px]; a view counts with 1 / sigma^2, and
+            not at all where this is not finite and positive.
+    """
+    return _run(P, px, sigma_px, 0.0)
+
+
+def triangulate_robust(
+    P: Floats, px: Points2, sigma_px: Floats, gate_sigma: float = 5.0
+) -> Triangulation:
+    """As `triangulate`, from the views that agree within `gate_sigma` standard deviations."""
+    if not gate_sigma > 0:
+        raise ConfigError(f"gate_sigma must be positive, got {gate_sigma}.")
+    return _run(P, px, sigma_px, gate_sigma)
+
+
+def _run(P: Floats, px: Points2, sigma_px: Floats, gate_sigma: float) -> Triangulation:
+    px, sigma_px = np.asarray(px, float), np.asarray(sigma_px, float)
+    if px.ndim != 5 or px.shape[1] != len(P):
+        raise ConfigError(f"px must have shape (B, {len(P)}, W, J, 2), got {px.shape}.")
+    check_shape("sigma_px", sigma_px.shape, px.shape[:-1], "B, C, W, J")
+    n_batch, _, n_workers, n_joints, _ = px.shape
+    points = np.full((n_batch, n_workers, n_joints, 3), np.nan)
+    cov = np.full((n_batch, n_workers, n_joints, 3, 3), np.nan)
+    used = np.zeros(px.shape[:-1], bool)
+    _triangulate_all(
+        np.ascontiguousarray(P, dtype=float),
+        np.ascontiguousarray(px),
+        np.ascontiguousarray(sigma_px),
+        gate_sigma,
+        points,
+        cov,
+        used,
+    )
+    return Triangulation(points, cov, used)
+
+
+@numba.njit(**_JIT)
+def _triangulate_all(P, px, sigma_px, gate_sigma, points, cov, used):
+    n_batch, n_cameras, n_workers, n_joints, _ = px.shape
+    z, sigma = np.empty((n_cameras, 2)), np.empty(n_cameras)
+    ok, use = np.empty(n_cameras, np.bool_), np.empty(n_cameras, np.bool_)
+    point, spread = np.empty(3), np.empty((3, 3))
+    for b in range(n_batch):
+        for w in range(n_workers):
+            for j in range(n_joints):
+                for c in range(n_cameras):
+                    u, v, s = px[b, c, w, j, 0], px[b, c, w, j, 1], sigma_px[b, c, w, j]
+                    ok[c] = abs(u) < FURTHEST_PX and abs(v) < FURTHEST_PX and 0 < s < np.inf
+                    z[c, 0], z[c, 1], sigma[c] = u, v, s
+                if gate_sigma > 0:
+                    n_views = consensus_point(P, z, sigma, ok, gate_sigma, point, spread, use)
+                else:
+                    use[:] = ok
+                    n_views = point_from_views(P, z, sigma, use, point, spread)
+                if n_views >= 2:
+                    points[b, w, j], cov[b, w, j], used[b, :, w, j] = point, spread, use
+
+
+@numba.njit(**_JIT)
+def inverse3(a, out):
+    """Inverse of a symmetric 3x3 matrix into `out`; returns its determinant."""
+    m00 = a[1, 1] * a[2, 2] - a[1, 2] * a[1, 2]
+    m01 = a[0, 2] * a[1, 2] - a[0, 1] * a[2, 2]
+    m02 = a[0, 1] * a[1, 2] - a[0, 2] * a[1, 1]
+    m11 = a[0, 0] * a[2, 2] - a[0, 2] * a[0, 2]
+    m12 = a[0, 1] * a[0, 2] - a[0, 0] * a[1, 2]
+    m22 = a[0, 0] * a[1, 1] - a[0, 1] * a[0, 1]
+    determinant = a[0, 0] * m00 + a[0, 1] * m01 + a[0, 2] * m02
+    scale = 1.0 / determinant
+    out[0, 0], out[1, 1], out[2, 2] = m00 * scale, m11 * scale, m22 * scale
+    out[0, 1] = out[1, 0] = m01 * scale
+    out[0, 2] = out[2, 0] = m02 * scale
+    out[1, 2] = out[2, 1] = m12 * scale
+    return determinant
+
+
+@numba.njit(**_JIT)
+def pixel_of(camera, x, y, z):
+    """(u, v, depth) of a point in one (3, 4) camera; depth <= 0 is behind it."""
+    depth = camera[2, 0] * x + camera[2, 1] * y + camera[2, 2] * z + camera[2, 3]
+    u = (camera[0, 0] * x + camera[0, 1] * y + camera[0, 2] * z + camera[0, 3]) / depth
+    v = (camera[1, 0] * x + camera[1, 1] * y + camera[1, 2] * z + camera[1, 3]) / depth
+    return u, v, depth
+
+
+@numba.njit(**_JIT)
+def linear_point(P, z, use, out):
+    """Point nearest to the planes of constant u and v of the used views; True if it exists."""
+    information, inverse, right = np.zeros((3, 3)), np.empty((3, 3)), np.zeros(3)
+    for c in range(len(P)):
+        if not use[c]:
+            continue
+        for axis in range(2):
+            n0 = z[c, axis] * P[c, 2, 0] - P[c, axis, 0]
+            n1 = z[c, axis] * P[c, 2, 1] - P[c, axis, 1]
+            n2 = z[c, axis] * P[c, 2, 2] - P[c, axis, 2]
+            length = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2) + 1e-300
+            n0, n1, n2 = n0 / length, n1 / length, n2 / length
+            offset = (P[c, axis, 3] - z[c, axis] * P[c, 2, 3]) / length
+            add_outer(information, n0, n1, n2, 1.0)
+            right[0] += n0 * offset
+            right[1] += n1 * offset
+            right[2] += n2 * offset
+    trace = information[0, 0] + information[1, 1] + information[2, 2]
+    if not inverse3(information, inverse) > 1e-13 * trace**3:
+        return False
+    for i in range(3):
+        out[i] = inverse[i, 0] * right[0] + inverse[i, 1] * right[1] + inverse[i, 2] * right[2]
+    for c in range(len(P)):
+        if use[c] and not pixel_of(P[c], out[0], out[1], out[2])[2] > NEAREST_DEPTH_M:
+            return False
+    return True
+
+
+@numba.njit(**_JIT)
+def add_outer(a, n0, n1, n2, weight):
+    """a += weight n n' for a symmetric 3x3 matrix."""
+    a[0, 0] += weight * n0 * n0
+    a[1, 1] += weight * n1 * n1
+    a[2, 2] += weight * n2 * n2
+    a[0, 1] += weight * n0 * n1
+    a[0, 2] += weight * n0 * n2
+    a[1, 2] += weight * n1 * n2
+    a[1, 0], a[2, 0], a[2, 1] = a[0, 1], a[0, 2], a[1, 2]
+
+
+@numba.njit(**_JIT)
+def pixel_jacobian(camera, u, v, depth, jacobian):
+    """Derivatives of (u, v) by the point into `jacobian` (2, 3) [px/m]."""
+    for i in range(3):
+        jacobian[0, i] = (camera[0, i] - u * camera[2, i]) / depth
+        jacobian[1, i] = (camera[1, i] - v * camera[2, i]) / depth
+
+
+@numba.njit(**_JIT)
+def refine_point(P, z, sigma, use, point, cov, n_steps):
+    """Gauss-Newton on the reprojection error, in place; True if it ended at a proper point."""
+    information, step, jacobian = np.empty((3, 3)), np.empty(3), np.empty((2, 3))
+    for _ in range(n_steps):
+        information[:], step[:] = 0.0, 0.0
+        for c in range(len(P)):
+            if not use[c]:
+                continue
+            u, v, depth = pixel_of(P[c], point[0], point[1], point[2])
+            if not depth > NEAREST_DEPTH_M:
+                return False
+            pixel_jacobian(P[c], u, v, depth, jacobian)
+            weight = 1.0 / sigma[c] ** 2
+            for axis in range(2):
+                a, b, d = jacobian[axis, 0], jacobian[axis, 1], jacobian[axis, 2]
+                residual = weight * (z[c, axis] - (u if axis == 0 else v))
+                add_outer(information, a, b, d, weight)
+                step[0] += a * residual
+                step[1] += b * residual
+                step[2] += d * residual
+        trace = information[0, 0] + information[1, 1] + information[2, 2]
+        if not inverse3(information, cov) > 1e-13 * trace**3:
+            return False
+        for i in range(3):
+            point[i] += cov[i, 0] * step[0] + cov[i, 1] * step[1] + cov[i, 2] * step[2]
+    return math.isfinite(point[0] + point[1] + point[2])
+
+
+@numba.njit(**_JIT)
+def point_from_views(P, z, sigma, use, point, cov):
+    """Least-squares point of the views in `use`; returns how many there were, 0 if none exists."""
+    n_views = 0
+    for c in range(len(P)):
+        n_views += use[c]
+    if n_views < 2 or not linear_point(P, z, use, point):
+        return 0
+    return n_views if refine_point(P, z, sigma, use, point, cov, 4) else 0
+
+
+@numba.njit(**_JIT)
+def misfit(camera, u, v, sigma, point):
+    """Squared distance in standard deviations between a pixel and the point's image."""
+    expected_u, expected_v, depth = pixel_of(camera, point[0], point[1], point[2])
+    if not depth > NEAREST_DEPTH_M:
+        return np.inf
+    return ((u - expected_u) ** 2 + (v - expected_v) ** 2) / sigma**2
+
+
+@numba.njit(**_JIT)
+def consensus_point(P, z, sigma, ok, gate_sigma, point, cov, use):
+    """Point of the largest agreeing set of views among `ok`, found from pairs of cameras.
+
+    Fills `point`, `cov` and `use`; returns the number of agreeing views, 0 if fewer than two.
+    """
+    n_cameras, gate = len(P), gate_sigma * gate_sigma
+    best, best_cost = np.zeros(3), np.inf
+    for first in range(n_cameras):
+        for second in range(first + 1, n_cameras):
+            if not (ok[first] and ok[second]):
+                continue
+            use[:] = False
+            use[first] = use[second] = True
+            if not linear_point(P, z, use, point):
+                continue
+            cost = 0.0
+            for c in range(n_cameras):
+                if ok[c]:
+                    cost += min(misfit(P[c], z[c, 0], z[c, 1], sigma[c], point), gate)
+            if cost < best_cost:
+                best_cost = cost
+                best[:] = point
+    if best_cost == np.inf:
+        use[:] = False
+        return 0
+    point[:] = best
+    n_views = 0
+    for _ in range(2):  # the pair's point is noisy: ask again about the refined one
+        n_views = 0
+        for c in range(n_cameras):
+            use[c] = ok[c] and misfit(P[c], z[c, 0], z[c, 1], sigma[c], point) < gate
+            n_views += use[c]
+        if n_views < 2 or not refine_point(P, z, sigma, use, point, cov, 3):
+            use[:] = False
+            return 0
+    return n_views

@@ -1,0 +1,132 @@
+"""Finding a worker, and finding a joint again: always from views that agree, never from truth.
+
+The kernels work on one worker: z (J, C, 2) pixels, sigma (J, C), ok (J, C) as
+`measurements.read_worker` fills them.
+"""
+
+import math
+
+import numba
+import numpy as np
+
+from hrc_env.geometry.triangulation import consensus_point
+from hrc_env.typing import Floats
+
+STANDING_M: Floats = np.array(
+    [
+        (0.12, 0.00, 0.42),
+        (0.00, 0.18, 0.25), (0.00, -0.18, 0.25),
+        (0.00, 0.24, -0.02), (0.00, -0.24, -0.02),
+        (0.08, 0.25, -0.27), (0.08, -0.25, -0.27),
+        (0.00, 0.11, -0.25), (0.00, -0.11, -0.25),
+        (0.02, 0.11, -0.67), (0.02, -0.11, -0.67),
+        (0.00, 0.11, -1.08), (0.00, -0.11, -1.08),
+        (0.14, 0.11, -1.14), (0.14, -0.11, -1.14),
+    ]
+)  # fmt: skip
+"""Joints of a standing adult from the middle of the torso [m]: forward, left, up."""
+WIDEST_STD_M = 0.5
+"""A triangulated joint that is less certain than this is no find [m]."""
+_GUESS_STD_M, _GUESS_STD_WITHOUT_HEADING_M = 0.3, 0.6
+_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
+
+
+@numba.njit(**_JIT)
+def triangulate_body(P, z, sigma, ok, gate_sigma, radius, points, cov, found):
+    """Joints on which at least two views agree, near each other as a body is.
+
+    Fills points (J, 3), cov (J, 3, 3), found (J,) and returns how many joints were found.
+    """
+    n_joints, n_cameras = ok.shape
+    use, middle = np.empty(n_cameras, np.bool_), np.empty(3)
+    n_found = 0
+    for j in range(n_joints):
+        n_views = consensus_point(P, z[j], sigma[j], ok[j], gate_sigma, points[j], cov[j], use)
+        widest = max(cov[j, 0, 0], cov[j, 1, 1], cov[j, 2, 2])
+        found[j] = n_views >= 2 and widest < WIDEST_STD_M**2
+        n_found += found[j]
+    if n_found == 0 or not middle_of(points, found, middle):
+        return 0
+    for j in range(n_joints):
+        if found[j] and not distance(points[j], middle) < radius:
+            found[j] = False
+            n_found -= 1
+    return n_found
+
+
+@numba.njit(**_JIT)
+def middle_of(points, among, out):
+    """Median of the points `among`, axis by axis; False if there is none."""
+    values = np.empty(len(points))
+    for i in range(3):
+        n = 0
+        for j in range(len(points)):
+            if among[j]:
+                values[n] = points[j, i]
+                n += 1
+        if n == 0:
+            return False
+        out[i] = np.median(values[:n])
+    return True
+
+
+@numba.njit(**_JIT)
+def distance(a, b):
+    """Euclidean distance of two points."""
+    return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
+
+
+@numba.njit(**_JIT)
+def complete_body(standing, points, cov, found):
+    """Guess the joints that were not found, from a standing body turned as the torso is."""
+    cos, sin, known = heading(points, found)
+    root, n_found = np.zeros(3), 0
+    for j in range(len(points)):
+        if found[j]:
+            forward, left, up = standing[j, 0], standing[j, 1], standing[j, 2]
+            root[0] += points[j, 0] - (cos * forward - sin * left)
+            root[1] += points[j, 1] - (sin * forward + cos * left)
+            root[2] += points[j, 2] - up
+            n_found += 1
+    root /= n_found
+    std = _GUESS_STD_M if known else _GUESS_STD_WITHOUT_HEADING_M
+    for j in range(len(points)):
+        if not found[j]:
+            forward, left, up = standing[j, 0], standing[j, 1], standing[j, 2]
+            points[j, 0] = root[0] + cos * forward - sin * left
+            points[j, 1] = root[1] + sin * forward + cos * left
+            points[j, 2] = root[2] + up
+            cov[j] = np.eye(3) * std**2
+
+
+@numba.njit(**_JIT)
+def heading(points, found):
+    """(cos, sin, known) of the body's heading, from shoulders and hips; (0, 0, False) unknown."""
+    x, y = 0.0, 0.0
+    for left in (1, 7):
+        right = left + 1
+        if found[left] and found[right]:
+            x += points[left, 0] - points[right, 0]
+            y += points[left, 1] - points[right, 1]
+    length = math.sqrt(x * x + y * y)
+    if length < 0.05:
+        return 0.0, 0.0, False
+    return y / length, -x / length, True
+
+
+@numba.njit(**_JIT)
+def count_conflict(n_ok, n_supporting, conflict):
+    """Updates in a row in which two views were there and fewer than two supported the joint."""
+    if n_ok < 2 or n_supporting >= 2:
+        return 0 if n_supporting >= 2 or n_ok == 0 else conflict
+    return conflict + 1
+
+
+@numba.njit(**_JIT)
+def find_again(P, z, sigma, ok, gate_sigma, radius, middle, point, cov):
+    """One joint (z (C, 2), sigma, ok (C,)) on which two views agree, near the body's middle."""
+    use = np.empty(len(P), np.bool_)
+    if consensus_point(P, z, sigma, ok, gate_sigma, point, cov, use) < 2:
+        return False
+    widest = max(cov[0, 0], cov[1, 1], cov[2, 2])
+    return widest < WIDEST_STD_M**2 and distance(point, middle) < radius

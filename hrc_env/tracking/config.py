@@ -1,0 +1,105 @@
+"""Settings of the estimators: one record, read by all of them."""
+
+from dataclasses import dataclass
+
+from hrc_env.errors import ConfigError
+
+_POSITIVE = (
+    "prior_std_m",
+    "max_age_s",
+    "lost_after_s",
+    "forget_s",
+    "acquire_min_joints",
+    "body_radius_m",
+    "conflict_frames",
+    "gate_sigma",
+    "sigma_scale",
+    "min_std_m",
+    "velocity_tau_s",
+    "hold_speed_m_s",
+    "paper_particles",
+    "paper_iterations",
+    "proposal_inflation",
+    "gauss_newton_steps",
+    "image_area_px",
+    "root_acceleration",
+)
+_BETWEEN_0_AND_1 = ("outlier_weight", "damping", "swap_begins", "swap_ends", "defensive_share")
+
+
+@dataclass(frozen=True, slots=True)
+class TrackerConfig:
+    """How workers are acquired, tracked, lost and reported."""
+
+    prior_mean_world: tuple[float, float, float] = (1.3, 0.0, 1.0)
+    """Where a worker is thought to be when nothing was seen [m]: the working area's centre."""
+    prior_std_m: float = 1.5
+    """Standard deviation of that prior on each axis [m]; no estimate is reported as wider."""
+    max_age_s: float = 5.0
+    """Ages are counted up to this bound [s]."""
+    lost_after_s: float = 1.0
+    """A track is lost when no joint was supported by a measurement for this long [s]."""
+    forget_s: float = 2.0
+    """Time constant with which a lost worker's estimate relaxes to the prior [s]."""
+
+    acquire_min_joints: int = 6
+    """A worker is acquired when two cameras agree on at least this many joints."""
+    body_radius_m: float = 1.3
+    """Joints further than this from the middle of the body are not believed [m]."""
+    conflict_frames: int = 3
+    """A joint is acquired anew when two views agreed elsewhere for so many updates."""
+    gate_sigma: float = 5.0
+    """Views agree within so many standard deviations of the detector."""
+    sigma_scale: float = 1.0
+    """Factor on the detector's sigma; 1.2 suits errors that persist for half a second."""
+    min_std_m: float = 0.005
+    """Added (squared) to every reported variance, so that none is below it [m]."""
+    velocity_tau_s: float = 0.2
+    """Time constant of the difference filter for velocities (paper, triangulation) [s]."""
+    hold_speed_m_s: float = 1.0
+    """How fast a held point loses its worth in gaps (triangulation) [m/s]."""
+
+    paper_particles: int = 1000
+    """The paper's M: particles per joint."""
+    paper_sigma_m: float = 0.05
+    """The paper's Sigma: random walk per frame and axis [m]; the paper gives no number."""
+    paper_iterations: int = 1
+    """The paper's N: passes of Algorithm 1 over one set of frames."""
+
+    n_particles: int = 100
+    """Particles per joint of the default estimator."""
+    defensive_share: float = 0.16
+    """Share of its particles that are drawn from the prediction, not from the posterior mode."""
+    proposal_inflation: float = 1.2
+    """Factor on the covariance of the other particles' proposal."""
+    gauss_newton_steps: int = 4
+    """Steps of the search for the posterior mode."""
+    outlier_weight: float = 0.15
+    """Probability that a measurement is anywhere in the image instead of near its joint."""
+    image_area_px: float = 1920.0 * 1080.0
+    """Area of an image [px^2]: an outlier's density is its inverse."""
+    damping: float = 0.5
+    """Damping ratio of a joint about its place on the body; in (0, 1)."""
+    root_acceleration: float = 4.0
+    """Spectral density of the whole body's acceleration [m^2/s^3]."""
+    swap_begins: float = 0.01
+    """Probability per update that a camera begins to exchange left and right."""
+    swap_ends: float = 0.15
+    """Probability per update that it stops."""
+
+    def __post_init__(self) -> None:
+        """Raise `ConfigError` for values that cannot work."""
+        for name in _POSITIVE:
+            if not getattr(self, name) > 0:
+                raise ConfigError(f"{name} must be positive, got {getattr(self, name)}.")
+        for name in _BETWEEN_0_AND_1:
+            if not 0 < getattr(self, name) < 1:
+                raise ConfigError(f"{name} must be in (0, 1), got {getattr(self, name)}.")
+        if self.paper_sigma_m < 0:
+            raise ConfigError(f"paper_sigma_m must not be negative, got {self.paper_sigma_m}.")
+        if self.n_particles < 50:
+            raise ConfigError(f"n_particles must be at least 50, got {self.n_particles}.")
+        if self.lost_after_s > self.max_age_s:
+            raise ConfigError(
+                f"lost_after_s ({self.lost_after_s}) must not exceed max_age_s ({self.max_age_s})."
+            )

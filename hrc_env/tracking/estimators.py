@@ -1,0 +1,87 @@
+"""The door of the room: estimators by name, and what each of them can do.
+
+| name | what it is |
+|---|---|
+| `particle` | the default: a Gaussian particle filter per joint on a body motion model |
+| `paper` | the paper's Algorithm 1 as printed |
+| `triangulation` | every frame by itself, the last point held through gaps |
+
+A control step is `predict` and then `update`; `estimate` may be asked at any time.
+"""
+
+from collections.abc import Callable
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+
+from hrc_env.errors import ConfigError, unknown
+from hrc_env.records import Keypoints, PoseEstimate
+from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.triangulating import TriangulationEstimator
+from hrc_env.typing import Floats, Ints
+
+State = TypeVar("State")
+Rngs = list[np.random.Generator]
+
+
+class Estimator(Protocol[State]):
+    """From keypoints to a belief, for B environments with W workers each.
+
+    The state is a record of arrays with leading axes (B, W), changed in place: copying the
+    arrays copies it. Random numbers for environment b come from `rngs[b]` only, and nothing
+    that happens in one environment depends on the others or on how many there are.
+    """
+
+    @property
+    def config(self) -> TrackerConfig:
+        """The settings."""
+        ...
+
+    def init(self, batch: int, n_workers: int) -> State:
+        """A state in which no worker has been seen."""
+        ...
+
+    def reset(self, state: State, ids: Ints, rngs: Rngs) -> None:
+        """Start environments `ids` anew."""
+        ...
+
+    def predict(self, state: State, dt_s: float, rngs: Rngs) -> None:
+        """Let `dt_s` seconds pass (Algorithm 1, line 7)."""
+        ...
+
+    def update(self, state: State, keypoints: Keypoints, rngs: Rngs) -> None:
+        """Take one set of frames in (lines 8 to 17); whatever they show, it does not raise."""
+        ...
+
+    def estimate(self, state: State) -> PoseEstimate:
+        """What is believed now, in arrays of its own."""
+        ...
+
+
+ESTIMATORS: dict[str, Callable[[Floats, float, TrackerConfig], Estimator[Any]]] = {
+    "triangulation": TriangulationEstimator,
+}
+
+
+def make_estimator(
+    name: str, P: Floats, ctrl_dt: float, config: TrackerConfig | None = None
+) -> Estimator[Any]:
+    """The estimator called `name` for a rig.
+
+    Args:
+        name: one of `ESTIMATORS`.
+        P: (C, 3, 4) projections of the cameras.
+        ctrl_dt: the usual time between two updates [s].
+        config: settings; the defaults if None.
+
+    Raises:
+        ConfigError: unknown name, a rig of another shape, or no positive time.
+    """
+    if name not in ESTIMATORS:
+        raise unknown("estimator", name, ESTIMATORS)
+    P = np.ascontiguousarray(P, dtype=float)
+    if P.ndim != 3 or P.shape[1:] != (3, 4) or not np.isfinite(P).all():
+        raise ConfigError(f"P must be finite with shape (C, 3, 4), got {P.shape}.")
+    if not ctrl_dt > 0:
+        raise ConfigError(f"ctrl_dt must be positive, got {ctrl_dt}.")
+    return ESTIMATORS[name](P, ctrl_dt, config or TrackerConfig())

@@ -1,0 +1,72 @@
+"""Keypoints as the kernels take them: one worker's usable measurements, and their noise.
+
+Whatever a detector reports is data. Pixels that are not finite or absurdly far, confidences
+that are not in (0, 1] and standard deviations that are not finite and positive mean that
+there is no measurement; wrong pixels that look like pixels are left to the robust likelihoods.
+"""
+
+import numba
+import numpy as np
+
+from hrc_env.errors import check_shape
+from hrc_env.geometry.triangulation import FURTHEST_PX
+from hrc_env.records import Keypoints
+from hrc_env.typing import Floats
+
+MIN_SIGMA_PX = 0.25
+"""No detector is believed to be better than this [px]."""
+_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
+
+
+def arrays_of(
+    keypoints: Keypoints, shape: tuple[int, int, int, int]
+) -> tuple[Floats, Floats, Floats]:
+    """Pixels, confidence and sigma as contiguous float64; `shape` is (B, C, W, J)."""
+    check_shape("Keypoints.px", keypoints.px.shape, (*shape, 2), "B, C, W, J, 2")
+    check_shape("Keypoints.confidence", keypoints.confidence.shape, shape, "B, C, W, J")
+    check_shape("Keypoints.sigma_px", keypoints.sigma_px.shape, shape, "B, C, W, J")
+    return (
+        np.ascontiguousarray(keypoints.px, np.float64),
+        np.ascontiguousarray(keypoints.confidence, np.float64),
+        np.ascontiguousarray(keypoints.sigma_px, np.float64),
+    )
+
+
+@numba.njit(**_JIT)
+def read_worker(px, confidence, sigma_px, b, w, scale, z, sigma, ok):
+    """Worker w of environment b: pixels z (J, C, 2), sigma (J, C), ok (J, C); whether any is ok.
+
+    Missing measurements get pixel 0 and sigma 1, so that no NaN enters the arithmetic.
+    """
+    any_ok = False
+    for c in range(px.shape[1]):
+        for j in range(px.shape[3]):
+            u, v = px[b, c, w, j, 0], px[b, c, w, j, 1]
+            s, belief = sigma_px[b, c, w, j], confidence[b, c, w, j]
+            good = (
+                abs(u) < FURTHEST_PX
+                and abs(v) < FURTHEST_PX
+                and 0.0 < belief <= 1.0 + 1e-6
+                and 0.0 < s < FURTHEST_PX
+            )
+            ok[j, c] = good
+            any_ok |= good
+            z[j, c, 0] = u if good else 0.0
+            z[j, c, 1] = v if good else 0.0
+            sigma[j, c] = max(s * scale, MIN_SIGMA_PX) if good else 1.0
+    return any_ok
+
+
+@numba.njit(**_JIT)
+def variance_in_image(jacobian, cov):
+    """Mean variance of a coordinate of the pixel [px^2] of a point with covariance `cov` (3, 3)."""
+    total = 0.0
+    for axis in range(2):
+        a, b, c = jacobian[axis, 0], jacobian[axis, 1], jacobian[axis, 2]
+        total += (
+            cov[0, 0] * a * a
+            + cov[1, 1] * b * b
+            + cov[2, 2] * c * c
+            + 2.0 * (cov[0, 1] * a * b + cov[0, 2] * a * c + cov[1, 2] * b * c)
+        )
+    return 0.5 * total
