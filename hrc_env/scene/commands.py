@@ -1,0 +1,58 @@
+"""From a wanted joint velocity to what the servos are told in every substep."""
+
+import math
+
+import numba
+
+from hrc_env.geometry.chains import SerialChain
+from hrc_env.typing import Floats, JointAngles, JointVelocities
+
+END_MARGIN_RAD = 0.02
+"""Where the arm comes to rest before the end of a joint's range."""
+BRAKE_SHARE = 0.7
+"""Share of the slew limit that stopping before an end counts on."""
+
+
+def substep_commands(
+    chain: SerialChain,
+    slew_rad_s2: float,
+    sim_dt: float,
+    q: JointAngles,
+    previous: JointVelocities,
+    wanted: JointVelocities,
+    out: Floats,
+) -> None:
+    """Commands of one control step: limited in size, slew and before the joints' ends.
+
+    Args:
+        chain: for its ranges and velocity limits.
+        slew_rad_s2: fastest change of a command [rad/s^2].
+        sim_dt: length of a substep [s].
+        q: (B, N) angles now [rad].
+        previous: (B, N) last command [rad/s].
+        wanted: (B, N) wanted velocities [rad/s]; what is not finite counts as 0.
+        out: (B, T, N) commands of the substeps, written [rad/s].
+    """
+    ranges, limits = chain.range_rad, chain.velocity_limit_rad_s
+    _ramp(q, previous, wanted, ranges, limits, slew_rad_s2, sim_dt, out)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _ramp(q, previous, wanted, ranges, limits, slew, sim_dt, out):  # noqa: ANN001, ANN202
+    brake, ctrl_dt = BRAKE_SHARE * slew, sim_dt * out.shape[1]
+    for b in range(q.shape[0]):
+        for i in range(q.shape[1]):
+            target = wanted[b, i]
+            if not math.isfinite(target):
+                target = 0.0
+            target = min(limits[i], max(-limits[i], target))
+            # v ctrl_dt + v^2 / (2 brake) = room: the speed that still stops in time.
+            room_up = max(0.0, ranges[i, 1] - END_MARGIN_RAD - q[b, i])
+            room_down = max(0.0, q[b, i] - ranges[i, 0] - END_MARGIN_RAD)
+            fastest_up = brake * (math.sqrt(ctrl_dt**2 + 2 * room_up / brake) - ctrl_dt)
+            fastest_down = brake * (math.sqrt(ctrl_dt**2 + 2 * room_down / brake) - ctrl_dt)
+            target = min(fastest_up, max(-fastest_down, target))
+            command = previous[b, i]
+            for t in range(out.shape[1]):
+                command += min(slew * sim_dt, max(-slew * sim_dt, target - command))
+                out[b, t, i] = command

@@ -1,0 +1,174 @@
+"""Many copies of one scene, stepped together: the arm obeys, the workers walk.
+
+One `mujoco.batch.Batch` for every batch size, the single environment too. Everything that
+changes lives in the batch's state rows, so that copying them copies the simulation, and
+results do not depend on the number of threads or of neighbours.
+"""
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+
+from hrc_env.errors import ConfigError, HRCError, check_shape
+from hrc_env.records import WorkerMotion
+from hrc_env.scene.build import Scene
+from hrc_env.scene.commands import substep_commands
+from hrc_env.scene.primitives import ROBOT_CAPSULES, SOLID
+from hrc_env.typing import Bools, Floats, Ints, JointAngles, JointVelocities, Points3
+
+NEAR_JOINT_M = 0.08
+"""A line of sight ends this far before the joint, so that what the joint touches (the table
+under a wrist, the floor under a foot) does not hide it."""
+INPUTS = int(
+    mujoco.mjtState.mjSTATE_CTRL
+    | mujoco.mjtState.mjSTATE_MOCAP_POS
+    | mujoco.mjtState.mjSTATE_MOCAP_QUAT
+)
+"""What a substep is given: servo commands, then places, then turns of the workers' bodies."""
+
+
+class Physics:
+    """B simulations of a scene."""
+
+    def __init__(self, scene: Scene, batch: int, n_threads: int = 1) -> None:
+        if batch < 1 or n_threads < 1:
+            raise ConfigError(
+                f"Physics needs at least one environment and one thread, got {batch}, {n_threads}."
+            )
+        self.scene = scene
+        self.batch = batch
+        self._n = scene.chain.n_joints
+        self._sims = Batch(scene.model, nsim=batch, nthread=n_threads)
+        self._qpos, self._qvel = self._sims.bind("qpos"), self._sims.bind("qvel")
+        self._act, self._ctrl = self._sims.bind("act"), self._sims.bind("ctrl")
+        self._control, self._trace = np.zeros((batch, 0, 0)), {}
+        self._blocks_sight = np.zeros(mujoco.mjNGROUP, np.uint8)
+        self._blocks_sight[[SOLID, ROBOT_CAPSULES]] = 1
+        self.reset(np.arange(batch), np.tile(scene.home_q, (batch, 1)))
+
+    @property
+    def q(self) -> JointAngles:
+        """(B, N) the arm's angles [rad], a copy."""
+        return self._qpos[:, : self._n].copy()
+
+    @property
+    def qd(self) -> JointVelocities:
+        """(B, N) the arm's velocities [rad/s], a copy."""
+        return self._qvel[:, : self._n].copy()
+
+    def reset(self, ids: Ints, q: JointAngles) -> None:
+        """Put environments `ids` (sorted) to rest at angles q (len(ids), N) [rad]."""
+        ids = np.asarray(ids, int)
+        check_shape("q", np.shape(q), (len(ids), self._n), "one row per id, one angle per joint")
+        self._sims.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE.value)
+        self._qpos[ids, : self._n] = q
+        self._act[ids, : self._n] = q
+
+    def step(self, qd_command: JointVelocities, motion: WorkerMotion) -> JointAngles:
+        """One control step of every environment.
+
+        Args:
+            qd_command: (B, N) wanted joint velocities [rad/s]; limited in size and slew, and
+                braked before the joints' ends, here.
+            motion: the workers after every substep, arrays (B, T, W, S, ...); T is the number
+                of substeps. W = 0 in a scene without workers.
+
+        Returns:
+            (B, T, N) the arm's angles after every substep [rad].
+
+        Raises:
+            ConfigError: wrong shapes. HRCError: the physics broke down, with the reason.
+        """
+        check_shape("qd_command", np.shape(qd_command), (self.batch, self._n), "batch, joints")
+        self._fit(motion)
+        config, n = self.scene.config, self._n
+        commands = self._control[:, :, :n]
+        substep_commands(
+            self.scene.chain, config.slew_rad_s2, config.sim_dt,
+            self.q, self._ctrl[:, :n].copy(), np.asarray(qd_command, float), commands,
+        )  # fmt: skip
+        self._control[:, :, n : 2 * n] = commands
+        self._write_workers(motion)
+        self._sims.rollout(commands.shape[1], self._control, INPUTS, ("qpos",), out=self._trace)
+        self._check_health()
+        held, q = self._act[:, :n], self._qpos[:, :n]
+        np.clip(held, q - config.leash_rad, q + config.leash_rad, out=held)
+        return self._trace["qpos"][:, :, :n].copy()
+
+    def hidden(self, eyes_world: Points3, points_world: Points3, ids: Ints | None = None) -> Bools:
+        """Whether the room or the robot stands between each eye and each point.
+
+        Args:
+            eyes_world: (C, 3) [m].
+            points_world: (B, W, J, 3) [m]; with `ids`, B is their number.
+            ids: the environments (sorted), or None for all.
+
+        Returns:
+            (B, C, W, J).
+        """
+        eyes, points = np.asarray(eyes_world, float), np.asarray(points_world, float)
+        batch = self.batch if ids is None else len(ids)
+        check_shape("points_world", (len(points), points.shape[-1]), (batch, 3), "B, ..., xyz")
+        rays = points[:, None] - eyes[None, :, None, None]
+        shape = rays.shape[:-1]
+        if 0 in shape:
+            return np.zeros(shape, bool)
+        length = np.linalg.norm(rays, axis=-1)
+        distance, _ = self._sims.ray(
+            np.broadcast_to(eyes[None, :, None, None], rays.shape).reshape(batch, -1, 3),
+            (rays / length[..., None]).reshape(batch, -1, 3),
+            geomgroup=self._blocks_sight,
+            ids=ids,
+        )
+        distance = distance.reshape(shape)
+        return (distance >= 0) & (distance < length - NEAR_JOINT_M)
+
+    def get_state(self) -> Floats:
+        """(B, n) everything that changes; `set_state` brings it back bit for bit."""
+        return self._sims.state.copy()
+
+    def set_state(self, state: Floats) -> None:
+        """Continue from a state that `get_state` gave (same scene and batch)."""
+        check_shape("state", np.shape(state), self._sims.state.shape, "batch, state")
+        self._sims.state[:] = state
+
+    def _fit(self, motion: WorkerMotion) -> None:
+        """Check the motion's axes; make the buffers when the number of substeps is new."""
+        rows, n_substeps = self.scene.worker_mocap, motion.position_world.shape[1]
+        expected = (self.batch, max(n_substeps, 1), *rows.shape[:1])
+        meaning = "batch, substeps (at least one), workers"
+        check_shape("motion.position_world", motion.position_world.shape[:3], expected, meaning)
+        if self._control.shape[1] != n_substeps:
+            model = self.scene.model
+            width = model.nu + 7 * model.nmocap
+            self._control = np.zeros((self.batch, n_substeps, width))
+            self._trace = {"qpos": np.zeros((self.batch, n_substeps, model.nq))}
+
+    def _write_workers(self, motion: WorkerMotion) -> None:
+        """The workers' bodies into the inputs of the substeps."""
+        rows, model = self.scene.worker_mocap, self.scene.model
+        if rows.size == 0:
+            return
+        turns_from = model.nu + 3 * model.nmocap
+        for axis in range(3):
+            self._control[:, :, model.nu + 3 * rows + axis] = motion.position_world[..., axis]
+        for axis in range(4):
+            self._control[:, :, turns_from + 4 * rows + axis] = motion.quaternion_wxyz[..., axis]
+
+    def _check_health(self) -> None:
+        """MuJoCo answers an exploding state or a full memory with a warning: raise it."""
+        if self._sims.warning.any():
+            environment, kind = np.argwhere(self._sims.warning)[0]
+            raise HRCError(
+                f"The physics of environment {environment} broke down "
+                f"({mujoco.mjtWarning(int(kind)).name}): expected finite states and bounded "
+                "contacts; reset it, and look at what it was commanded."
+            )
+
+
+def no_workers(batch: int, n_substeps: int) -> WorkerMotion:
+    """The motion of nobody, for scenes without workers: arrays (B, T, 0, 22, ...)."""
+    lead = (batch, n_substeps, 0, 22)
+    return WorkerMotion(
+        np.zeros((*lead, 3)), np.zeros((*lead, 4)), np.zeros((*lead, 3)), np.zeros((*lead, 3))
+    )

@@ -1,0 +1,81 @@
+"""Short words for MuJoCo geoms: boxes, rods and shells, decorative or solid.
+
+Geom groups of every scene: 0 solid (drawn, collides, hides), 1 decoration (drawn only),
+2 the robot's looks, 3 the robot's capsules (not drawn, hide), 4 the workers' capsules
+(not drawn, do not hide), 5 what a view from above leaves out (ceiling, lamps).
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+
+SOLID, DECORATION, ROBOT_LOOKS, ROBOT_CAPSULES, WORKER_CAPSULES, OVERHEAD = range(6)
+
+SCENE_BIT, ROBOT_BIT, WORKER_BIT, OBJECT_BIT = 1, 2, 4, 16
+"""contype bits; what can touch what is written in the conaffinity of the second."""
+
+Vector = Sequence[float] | np.ndarray
+
+LOOKS_ONLY = {"contype": 0, "conaffinity": 0, "density": 0, "group": DECORATION}
+SOLID_SCENE = {"contype": SCENE_BIT, "conaffinity": 0, "density": 0, "group": SOLID}
+
+
+def rod_pose(start: Vector, end: Vector) -> tuple[np.ndarray, np.ndarray, float]:
+    """Centre, quaternion (z along the rod) and half length of a rod between two points."""
+    start, end = np.asarray(start, float), np.asarray(end, float)
+    axis = end - start
+    length = float(np.linalg.norm(axis))
+    quaternion = np.zeros(4)
+    mujoco.mju_quatZ2Vec(quaternion, axis / max(length, 1e-9))
+    return (start + end) / 2, quaternion, length / 2
+
+
+def yaw_quaternion(yaw_rad: float) -> np.ndarray:
+    """Quaternion (wxyz) of a turn about the vertical."""
+    return np.array([np.cos(yaw_rad / 2), 0.0, 0.0, np.sin(yaw_rad / 2)])
+
+
+def cylinder(body: Any, start: Vector, end: Vector, radius: float, material: str, **more: Any):  # noqa: ANN201
+    """A cylinder between two points, looks only unless `more` says otherwise."""
+    pos, quat, half = rod_pose(start, end)
+    return body.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+        size=[radius, half, 0],
+        pos=pos,
+        quat=quat,
+        material=material,
+        **(LOOKS_ONLY | more),
+    )
+
+
+def capsule(body: Any, start: Vector, end: Vector, radius: float, **more: Any):  # noqa: ANN201
+    """A capsule whose axis runs between two points."""
+    pos, quat, half = rod_pose(start, end)
+    return body.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_CAPSULE, size=[radius, half, 0], pos=pos, quat=quat, **more
+    )
+
+
+def ellipsoid(body: Any, centre: Vector, radii: Vector, material: str, **more: Any):  # noqa: ANN201
+    """An ellipsoid with its axes along the body's."""
+    return body.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_ELLIPSOID,
+        size=list(radii),
+        pos=list(centre),
+        material=material,
+        **(LOOKS_ONLY | more),
+    )
+
+
+def box(body: Any, centre: Vector, size: Vector, material: str, yaw: float = 0.0, **more: Any):  # noqa: ANN201
+    """A box of full edge lengths `size` [m] round `centre`, turned by `yaw` [rad]."""
+    return body.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        size=[edge / 2 for edge in size],
+        pos=list(centre),
+        quat=yaw_quaternion(yaw),
+        material=material,
+        **(LOOKS_ONLY | more),
+    )

@@ -1,0 +1,118 @@
+"""The camera rig: from settings to pinhole cameras and to MuJoCo's cameras.
+
+The only place that turns between OpenCV's camera axes (+X right, +Y down, +Z forward) and
+OpenGL's (+X right, +Y up, -Z forward).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hrc_env.errors import ConfigError, unknown
+from hrc_env.geometry.cameras import PinholeCamera, pinhole
+from hrc_env.geometry.rotations import quaternion_from_matrix
+from hrc_env.typing import Floats, Rotations
+
+OPENCV_FROM_OPENGL: Floats = np.diag([1.0, -1.0, -1.0])
+"""Its own inverse."""
+
+
+@dataclass(frozen=True, slots=True)
+class CameraConfig:
+    """One fixed camera."""
+
+    name: str
+    """What the camera is called; unique in its rig."""
+    eye_world: tuple[float, float, float]
+    """Where it hangs [m], world frame."""
+    target_world: tuple[float, float, float] = (0.2, 0.0, 1.0)
+    """What it looks at [m]: by default the middle of the space that robot and worker share."""
+    hfov_deg: float = 90.0
+    """Horizontal field of view [degrees]; a pinhole without distortion."""
+    width_px: int = 1920
+    """Width of its images [px]."""
+    height_px: int = 1080
+    """Height of its images [px]."""
+
+
+LAB_CAMERAS = (
+    CameraConfig("camera_1", (2.9, 2.6, 2.45)),
+    CameraConfig("camera_2", (-2.9, 2.6, 2.45)),
+    CameraConfig("camera_3", (-2.9, -2.6, 2.45)),
+    CameraConfig("camera_4", (2.9, -2.6, 2.45)),
+)
+"""Four cameras under the ceiling, one in each corner, like the paper's laboratory."""
+
+
+def select(
+    cameras: tuple[CameraConfig, ...], use: Sequence[int | str] | None = None
+) -> tuple[CameraConfig, ...]:
+    """The cameras that are switched on, in the order of `use`.
+
+    Args:
+        cameras: all that hang in the room.
+        use: names or indices from 0; None uses all.
+
+    Raises:
+        ConfigError: an unknown name, an index outside the rig, a camera twice, or none.
+    """
+    names = [camera.name for camera in cameras]
+    for name in names:
+        if names.count(name) > 1:
+            raise ConfigError(f"Camera names must be unique, got {name!r} more than once.")
+    indices = [_index(choice, names) for choice in (range(len(names)) if use is None else use)]
+    if not indices:
+        raise ConfigError(
+            f"A rig needs at least one camera, got none. Valid names: {', '.join(names)}."
+        )
+    for index in indices:
+        if indices.count(index) > 1:
+            raise ConfigError(f"Camera {names[index]!r} is chosen more than once: name it once.")
+    return tuple(cameras[index] for index in indices)
+
+
+def _index(choice: int | str, names: list[str]) -> int:
+    if isinstance(choice, str):
+        if choice not in names:
+            raise unknown("camera", choice, names)
+        return names.index(choice)
+    if not 0 <= choice < len(names):
+        raise ConfigError(
+            f"Camera index {choice} is outside the rig: valid indices are 0 to {len(names) - 1}, "
+            f"valid names {', '.join(names)}."
+        )
+    return int(choice)
+
+
+def pinholes(cameras: tuple[CameraConfig, ...]) -> tuple[PinholeCamera, ...]:
+    """The pinhole cameras of a rig."""
+    return tuple(
+        pinhole(
+            camera.name,
+            np.array(camera.eye_world, float),
+            np.array(camera.target_world, float),
+            camera.hfov_deg,
+            camera.width_px,
+            camera.height_px,
+        )
+        for camera in cameras
+    )
+
+
+def glcam_axes(camera: PinholeCamera) -> Rotations:
+    """R_world_from_glcam: columns right, up and back of a pinhole camera."""
+    return camera.T_world_from_cam[:3, :3] @ OPENCV_FROM_OPENGL
+
+
+def add_cameras(spec: Any, cameras: tuple[PinholeCamera, ...]) -> None:
+    """Hang the cameras into a MuJoCo scene, under their names."""
+    for camera in cameras:
+        spec.worldbody.add_camera(
+            name=camera.name,
+            pos=camera.eye_world,
+            quat=quaternion_from_matrix(glcam_axes(camera)),
+            fovy=np.degrees(2 * np.arctan(camera.height_px / 2 / camera.K[1, 1])),
+            resolution=[camera.width_px, camera.height_px],
+        )
