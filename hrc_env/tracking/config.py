@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from hrc_env.errors import ConfigError
+from hrc_env.errors import ConfigError, unknown
 
 _POSITIVE = (
     "prior_std_m",
@@ -24,6 +24,7 @@ _POSITIVE = (
     "image_area_px",
     "root_acceleration",
 )
+_SCHEMES = ("multinomial", "systematic")
 _BETWEEN_0_AND_1 = ("outlier_weight", "damping", "swap_begins", "swap_ends", "defensive_share")
 
 
@@ -65,6 +66,8 @@ class TrackerConfig:
     """The paper's Sigma: random walk per frame and axis [m]; the paper gives no number."""
     paper_iterations: int = 1
     """The paper's N: passes of Algorithm 1 over one set of frames."""
+    paper_resampling: str = "multinomial"
+    """"multinomial" as in the paper's line 17, or "systematic" (less noise)."""
 
     n_particles: int = 100
     """Particles per joint of the default estimator."""
@@ -95,6 +98,8 @@ class TrackerConfig:
         for name in _BETWEEN_0_AND_1:
             if not 0 < getattr(self, name) < 1:
                 raise ConfigError(f"{name} must be in (0, 1), got {getattr(self, name)}.")
+        if self.paper_resampling not in _SCHEMES:
+            raise unknown("paper_resampling", self.paper_resampling, _SCHEMES)
         if self.paper_sigma_m < 0:
             raise ConfigError(f"paper_sigma_m must not be negative, got {self.paper_sigma_m}.")
         if self.n_particles < 50:

@@ -17,6 +17,7 @@ import numpy as np
 from hrc_env.errors import ConfigError, unknown
 from hrc_env.records import Keypoints, PoseEstimate
 from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.paper import PaperEstimator
 from hrc_env.tracking.triangulating import TriangulationEstimator
 from hrc_env.typing import Floats, Ints
 
@@ -59,6 +60,7 @@ class Estimator(Protocol[State]):
 
 
 ESTIMATORS: dict[str, Callable[[Floats, float, TrackerConfig], Estimator[Any]]] = {
+    "paper": PaperEstimator,
     "triangulation": TriangulationEstimator,
 }
 

@@ -9,7 +9,12 @@ import numba
 import numpy as np
 
 from hrc_env.errors import check_shape
-from hrc_env.geometry.triangulation import FURTHEST_PX
+from hrc_env.geometry.triangulation import (
+    FURTHEST_PX,
+    NEAREST_DEPTH_M,
+    pixel_jacobian,
+    pixel_of,
+)
 from hrc_env.records import Keypoints
 from hrc_env.typing import Floats
 
@@ -70,3 +75,15 @@ def variance_in_image(jacobian, cov):
             + 2.0 * (cov[0, 1] * a * b + cov[0, 2] * a * c + cov[1, 2] * b * c)
         )
     return 0.5 * total
+
+
+@numba.njit(**_JIT)
+def supports(camera, z, sigma, gate_sigma, point, cov):
+    """Whether a pixel lies where a joint with this mean and covariance may be seen."""
+    u, v, depth = pixel_of(camera, point[0], point[1], point[2])
+    if not depth > NEAREST_DEPTH_M:
+        return False
+    jacobian = np.empty((2, 3))
+    pixel_jacobian(camera, u, v, depth, jacobian)
+    variance = sigma * sigma + variance_in_image(jacobian, cov)
+    return (z[0] - u) ** 2 + (z[1] - v) ** 2 < gate_sigma * gate_sigma * variance

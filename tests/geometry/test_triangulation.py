@@ -17,11 +17,10 @@ def rig(rng, n_cameras):
     """Cameras round a room, each turned to somewhere near its middle."""
     angle = rng.uniform(0, 2 * np.pi) + 2.4 * np.arange(n_cameras) + rng.uniform(-0.3, 0.3)
     eyes = np.stack([4 * np.cos(angle), 4 * np.sin(angle), rng.uniform(1, 4, n_cameras)], -1)
+    targets = rng.uniform([-0.3, -0.3, 0.7], [0.3, 0.3, 1.3], (n_cameras, 3))
+    fields = rng.uniform(50, 110, n_cameras)
     return tuple(
-        pinhole(
-            f"c{k}", eye, rng.uniform(-0.3, 0.3, 3) + [0, 0, 1], rng.uniform(50, 110), 1920, 1080
-        )
-        for k, eye in enumerate(eyes)
+        pinhole(f"camera_{k}", eyes[k], targets[k], fields[k], 1920, 1080) for k in range(n_cameras)
     )
 
 

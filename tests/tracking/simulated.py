@@ -52,6 +52,7 @@ def _limb(angle, length):
 def walk(seed, n_frames, centre=(0.6, 0.0), radius=0.7):
     """(T, 15, 3) joints of somebody who walks in curves about `centre` and gestures."""
     rng = np.random.default_rng(seed)
+    wanted, n_frames = n_frames, max(n_frames, 10)
     t = np.arange(n_frames) * DT
     turn = np.cumsum(0.9 + 0.5 * _smooth(rng, n_frames, 20)) * DT
     reach = radius * (0.75 + 0.25 * np.sin(0.5 * t + rng.uniform(0, 6)))
@@ -65,7 +66,7 @@ def walk(seed, n_frames, centre=(0.6, 0.0), radius=0.7):
     joints = np.einsum("tij,tkj->tki", about_axis("z", heading), body)
     joints[..., :2] += ground[:, None]
     joints[..., 2] = np.maximum(joints[..., 2] + 0.92 + 0.02 * np.cos(2 * phase)[:, None], 0.02)
-    return joints
+    return joints[:wanted]
 
 
 def _body_in_its_frame(rng, t, phase):
