@@ -14,7 +14,7 @@ from hrc_env.geometry.rotations import look_at
 from hrc_env.typing import Floats, Points2, Points3, Transforms
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class PinholeCamera:
     """A camera without distortion at a known place."""
 

@@ -80,7 +80,7 @@ def sample_window(image: Image, window: CropWindow, side: int = LANDMARK_SIDE) -
     The square's corners map to the picture's corners (no half-pixel shift), and the image's
     border is continued outside, as MediaPipe does.
     """
-    matrix = _image_from_crop(window, side)
+    matrix = image_from_crop(window, side)
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     crop = cv2.warpAffine(image, matrix, (side, side), flags=flags, borderMode=cv2.BORDER_REPLICATE)
     return crop.astype(np.uint8, copy=False)
@@ -88,11 +88,11 @@ def sample_window(image: Image, window: CropWindow, side: int = LANDMARK_SIDE) -
 
 def to_image(points: Points2, window: CropWindow) -> Points2:
     """Points (..., 2) in units of the window's side (0..1 from its corner) to image pixels."""
-    matrix = _image_from_crop(window, 1)
+    matrix = image_from_crop(window, 1)
     return points @ matrix[:, :2].T + matrix[:, 2]
 
 
-def _image_from_crop(window: CropWindow, side: int) -> Floats:
+def image_from_crop(window: CropWindow, side: int) -> Floats:
     """(2, 3) affine map from crop pixels to image pixels."""
     scale = window.side_px / side
     c, s = math.cos(window.rotation_rad) * scale, math.sin(window.rotation_rad) * scale
@@ -106,7 +106,7 @@ def detector_input(image: Image) -> tuple[Tensor, CropWindow]:
     window = CropWindow((width / 2, height / 2), float(max(height, width)), 0.0)
     size = (DETECTOR_SIDE, DETECTOR_SIDE)
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-    small = cv2.warpAffine(image, _image_from_crop(window, DETECTOR_SIDE), size, flags=flags)
+    small = cv2.warpAffine(image, image_from_crop(window, DETECTOR_SIDE), size, flags=flags)
     return small.astype(np.float32) * np.float32(2 / 255) - np.float32(1), window
 
 

@@ -1,0 +1,300 @@
+"""Pixels to keypoints: crops of every camera through BlazePose, two at a time.
+
+The calling thread draws a crop and goes on to the next while a helper thread runs the
+network on it; then both empty the queue. Each thread has its own interpreters with the same
+numbers, so that what is seen does not depend on who came first.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeVar
+
+import cv2
+import numpy as np
+
+from hrc_env.errors import ConfigError, check_shape
+from hrc_env.geometry.cameras import PinholeCamera, inside_image
+from hrc_env.perception import blazepose
+from hrc_env.perception.network import (
+    LANDMARK_SIDE,
+    Detector,
+    Landmarker,
+    load_detector,
+    load_landmarker,
+)
+from hrc_env.perception.noise import sigma_px
+from hrc_env.perception.weights import find_weights
+from hrc_env.records import CropWindow
+from hrc_env.skeleton import BLAZEPOSE_INDEX, N_JOINTS
+from hrc_env.typing import Floats, Image, Points2
+
+STATURE_OF_SIDE = 0.75
+"""Stature of an upright worker as a share of the side of BlazePose's window round them."""
+
+ResultT = TypeVar("ResultT")
+
+
+class ImageSource(Protocol):
+    """What gives pictures: a renderer, a camera, a recorded film."""
+
+    def crop(self, camera_index: int, window: CropWindow) -> Image:
+        """The window of a camera's present image, upright, (256, 256, 3) RGB."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class EyesConfig:
+    """How much the eyes believe."""
+
+    min_presence: float = 0.5
+    """Landmarks are believed from this person flag on [0..1]; MediaPipe's own default."""
+    sure_presence: float = 0.9
+    """Below this flag [0..1] the detector stage is asked as well: the flag alone passed 8 %
+    of crops without a worker, the detector stage none of 120."""
+    gate_every: int = 25
+    """The detector stage is also asked once in so many looks: a second at 25 Hz."""
+    max_offset: float = 0.25
+    """The detector stage must find the hips within this share of the window's side from its
+    middle: else it is somebody else."""
+    outside_confidence: float = 0.1
+    """Joints that the network places outside the image are guesses: at most this visible."""
+    search_step: float = 0.5
+    """Search windows follow each other by at most this share of their side."""
+
+    def __post_init__(self) -> None:
+        for name in ("min_presence", "sure_presence", "outside_confidence"):
+            if not 0 < getattr(self, name) <= 1:
+                raise ConfigError(f"{name} must be in (0, 1], got {getattr(self, name)}.")
+        if self.gate_every < 1 or self.search_step <= 0 or self.max_offset <= 0:
+            raise ConfigError("gate_every, search_step and max_offset must be positive.")
+
+
+@dataclass(frozen=True, slots=True)
+class Sight:
+    """One worker as all cameras see them; a camera without them is NaN, 0 and infinite."""
+
+    px: Points2
+    """(C, J, 2) [px] in the whole image."""
+    confidence: Floats
+    """(C, J) visibility in [0, 1]."""
+    sigma_px: Floats
+    """(C, J) standard deviation of each coordinate [px]."""
+    windows: list[CropWindow | None]
+    """Where each camera looked."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Networks:
+    """One thread's interpreters."""
+
+    detect: Detector
+    landmark: Landmarker
+
+
+class Eyes:
+    """Finds the joints of workers in the images of a rig.
+
+    Networks and the helper thread are made at the first look and left out of a pickle.
+    """
+
+    def __init__(self, cameras: Sequence[PinholeCamera], config: EyesConfig | None = None) -> None:
+        """Args are the rig and settings; raises `WeightsError` without the weights."""
+        for name in ("pose_detection", "pose_landmark_full"):
+            find_weights(name)
+        self.cameras = tuple(cameras)
+        self.config = config or EyesConfig()
+        self._looks: dict[int, list[int]] = {}
+        self._networks: tuple[_Networks, _Networks] | None = None
+        self._helper: ThreadPoolExecutor | None = None
+
+    def look(
+        self, source: ImageSource, windows: Sequence[CropWindow | None], track: int = 0
+    ) -> Sight:
+        """Look for one worker through a window a camera; search if there is no window at all.
+
+        Args:
+            source: gives crops of the cameras' present images.
+            windows: (C,) where to look; None where this camera need not.
+            track: whom the eyes are following; any number that stays the worker's own. The
+                detector stage's turns are counted for each.
+        """
+        check_shape("windows", (len(windows),), (len(self.cameras),), "one a camera")
+        looks = self._looks.setdefault(track, [0] * len(self.cameras))
+        searched = all(window is None for window in windows)
+        if searched:
+            windows = self._best(self.search(source))
+        used = [c for c, window in enumerate(windows) if window is not None]
+        asked = [not searched and self._is_turn(looks[c], c) for c in used]
+        found = self._share(self._landmark_jobs(source, windows, used, asked))
+        sight = self._nothing(list(windows))
+        for c, joints in zip(used, found, strict=True):
+            if joints is None:
+                looks[c] = 0  # ask the detector stage again before believing
+            else:
+                looks[c] += 1
+                self._write(sight, c, joints)
+        for c in set(range(len(self.cameras))).difference(used):
+            looks[c] = 0
+        return sight
+
+    def search(self, source: ImageSource) -> list[list[CropWindow]]:
+        """Regions of interest of the people in each camera's whole image, best first."""
+        places = [
+            (c, window)
+            for c, camera in enumerate(self.cameras)
+            for window in search_windows(camera, self.config.search_step)
+        ]
+        found = self._share(self._search_jobs(source, places))
+        people: list[list[tuple[float, CropWindow]]] = [[] for _ in self.cameras]
+        for (c, _), some in zip(places, found, strict=True):
+            people[c] += some
+        return [_distinct(some) for some in people]
+
+    def forget(self, track: int) -> None:
+        """Treat this track as new: the detector stage is asked at its next look."""
+        self._looks.pop(track, None)
+
+    def close(self) -> None:
+        """Stop the helper thread and free the networks; the next look makes them anew."""
+        if self._helper is not None:
+            self._helper.shutdown(wait=True, cancel_futures=True)
+        self._helper = self._networks = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_helper": None, "_networks": None}
+
+    def _is_turn(self, looks: int, camera: int) -> bool:
+        """Whether the detector stage is due; the cameras take turns to spread its cost."""
+        every = self.config.gate_every
+        return looks == 0 or (looks + camera * every // len(self.cameras)) % every == 0
+
+    def _best(self, people: list[list[CropWindow]]) -> list[CropWindow | None]:
+        return [some[0] if some else None for some in people]
+
+    def _landmark_jobs(
+        self,
+        source: ImageSource,
+        windows: Sequence[CropWindow | None],
+        used: list[int],
+        asked: list[bool],
+    ) -> Iterator[Callable[[_Networks], Floats | None]]:
+        """Draw one crop after the other; each comes with the work that is to be done on it."""
+        for c, ask in zip(used, asked, strict=True):
+            window = windows[c]
+            if window is not None:
+                crop = _seen(source.crop(c, window), window, self.cameras[c])
+                yield lambda nets, k=crop, w=window, a=ask: _joints(nets, k, w, a, self.config)
+
+    def _search_jobs(
+        self, source: ImageSource, places: list[tuple[int, CropWindow]]
+    ) -> Iterator[Callable[[_Networks], list[tuple[float, CropWindow]]]]:
+        for c, window in places:
+            crop = np.array(source.crop(c, window))
+            yield lambda nets, k=crop, w=window: [
+                (person.score, blazepose.person_window(person, w))
+                for person in _people(nets.detect, k)
+            ]
+
+    def _share(self, jobs: Iterable[Callable[[_Networks], ResultT]]) -> list[ResultT]:
+        """Results in order; the helper works from the front, this thread from the back."""
+        helper, (mine, helpers) = self._open()
+        given = []
+        try:
+            for job in jobs:
+                given.append((job, helper.submit(job, helpers)))
+        except BaseException:
+            for _, future in given:
+                future.cancel()
+            raise
+        taken = {}
+        for k in reversed(range(len(given))):
+            job, future = given[k]
+            if future.cancel():
+                taken[k] = job(mine)
+        return [taken[k] if k in taken else given[k][1].result() for k in range(len(given))]
+
+    def _open(self) -> tuple[ThreadPoolExecutor, tuple[_Networks, _Networks]]:
+        if self._networks is None:
+            self._networks = (
+                _Networks(load_detector(), load_landmarker()),
+                _Networks(load_detector(), load_landmarker()),
+            )
+        if self._helper is None:
+            self._helper = ThreadPoolExecutor(1, thread_name_prefix="hrc_env-eyes")
+        return self._helper, self._networks
+
+    def _nothing(self, windows: list[CropWindow | None]) -> Sight:
+        shape = (len(self.cameras), N_JOINTS)
+        return Sight(np.full((*shape, 2), np.nan), np.zeros(shape), np.full(shape, np.inf), windows)
+
+    def _write(self, sight: Sight, c: int, joints: Floats) -> None:
+        window = sight.windows[c]
+        outside = ~inside_image(self.cameras[c], joints[:, :2])
+        confidence = joints[:, 2].copy()
+        confidence[outside] = np.minimum(confidence[outside], self.config.outside_confidence)
+        sight.px[c], sight.confidence[c] = joints[:, :2], confidence
+        stature_px = STATURE_OF_SIDE * window.side_px if window else np.nan
+        sight.sigma_px[c] = sigma_px(confidence, stature_px)
+
+
+def search_windows(camera: PinholeCamera, step: float = 0.5) -> list[CropWindow]:
+    """Upright squares, as large as fit, that overlap and together cover a camera's image."""
+    short, long = sorted((camera.width_px, camera.height_px))
+    n = 1 + math.ceil((long / short - 1) / step)
+    middles = np.linspace(short / 2, long - short / 2, n) if n > 1 else [short / 2]
+    wide = camera.width_px >= camera.height_px
+    return [
+        CropWindow((float(m), short / 2) if wide else (short / 2, float(m)), float(short), 0.0)
+        for m in middles
+    ]
+
+
+def _joints(
+    nets: _Networks, crop: Image, window: CropWindow, ask_detector: bool, config: EyesConfig
+) -> Floats | None:
+    """(J, 3) pixels and visibility of the 15 joints, or None where there is no worker."""
+    points, presence, heat = nets.landmark(blazepose.landmark_input(crop))
+    if presence < config.min_presence:
+        return None
+    if ask_detector or presence < config.sure_presence:
+        offsets = [np.hypot(*(person.hip - 0.5)) for person in _people(nets.detect, crop)]
+        if min(offsets, default=np.inf) > config.max_offset:
+            return None
+    joints = blazepose.decode_landmarks(points, heat)[BLAZEPOSE_INDEX]
+    joints[:, :2] = blazepose.to_image(joints[:, :2], window)
+    return joints
+
+
+def _people(detect: Detector, crop: Image) -> list[blazepose.Person]:
+    image, _ = blazepose.detector_input(crop)
+    return blazepose.decode_people(*detect(image))
+
+
+def _seen(crop: Image, window: CropWindow, camera: PinholeCamera) -> Image:
+    """A copy of the crop, black where the camera does not see: renderers go on drawing."""
+    check_shape("crop", crop.shape, (LANDMARK_SIDE, LANDMARK_SIDE, 3), "rows, columns, RGB")
+    corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
+    if inside_image(camera, blazepose.to_image(corners, window)).all():
+        return np.array(crop)
+    frame = corners * [camera.width_px, camera.height_px]
+    matrix = np.eye(3)
+    matrix[:2] = blazepose.image_from_crop(window, LANDMARK_SIDE)
+    back = np.linalg.inv(matrix)[:2]
+    mask = np.zeros(crop.shape[:2], np.uint8)
+    polygon = np.round(frame @ back[:, :2].T + back[:, 2]).astype(np.int32)
+    cv2.fillConvexPoly(mask, polygon, 1)
+    return crop * mask[..., None]
+
+
+def _distinct(people: list[tuple[float, CropWindow]]) -> list[CropWindow]:
+    """One window a person, best first: overlapping search windows see the same one twice."""
+    kept: list[CropWindow] = []
+    for _, window in sorted(people, key=lambda item: -item[0]):
+        near = (
+            math.dist(window.centre_px, other.centre_px) < 0.2 * other.side_px for other in kept
+        )
+        if not any(near):
+            kept.append(window)
+    return kept
