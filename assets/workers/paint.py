@@ -40,7 +40,7 @@ class Colours:
     iris: tuple[int, int, int] = (88, 62, 40)
     vest: tuple[int, int, int] = (204, 238, 40)
     trim: tuple[int, int, int] = (250, 130, 30)
-    stripe: tuple[int, int, int] = (222, 226, 228)
+    stripe: tuple[int, int, int] = (196, 201, 204)
     shirt: tuple[int, int, int] = (70, 92, 132)
     trousers: tuple[int, int, int] = (52, 56, 70)
     belt: tuple[int, int, int] = (44, 34, 28)
@@ -162,9 +162,9 @@ def _paint_head(
     face = _Face(person, x, np.abs(y), z)
     for colour, cover in face.layers(colours, lip):
         painting.lay(colour, cover * rows)
-    dark = 1 - np.clip(fine / 0.0022, -0.10, 0.32) - np.clip(medium / 0.009, -0.10, 0.30)
-    dark -= np.clip(broad / 0.05, -0.06, 0.20)
-    dark *= 1 - 0.35 * face.under_chin()
+    dark = 1.02 - np.clip(fine / 0.0030, -0.08, 0.22) - np.clip(medium / 0.020, -0.06, 0.13)
+    dark -= np.clip(broad / 0.10, -0.05, 0.10)
+    dark *= 1 - 0.20 * face.under_chin()
     dark *= 1 + 0.012 * folds(dark.shape, 3, (2.0, 6.0))
     shade[:HEAD_ROWS] = np.clip(dark, 0.45, 1.12)[:HEAD_ROWS]
 
@@ -215,7 +215,7 @@ class _Face:
             (warm, 0.35 * ears),
             (skin * [0.80, 0.68, 0.66], 0.45 * socket * front),
             (skin * [0.72, 0.70, 0.70], 0.38 * stubble * (1 - np.clip(lip * 2, 0, 1))),
-            (skin * [0.84, 0.56, 0.55], 0.85 * above(lip, 0.4, 0.5) * front),
+            (skin * [0.84, 0.62, 0.60], 0.75 * above(lip, 0.45, 0.6) * front),
             (shaded(colours.hair, 0.75), self._lash(lid) * front),
             (shaded(colours.hair, 0.9), 0.92 * self._brow() * front),
             (np.array(colours.hair, float), self._hair()),
@@ -227,7 +227,7 @@ class _Face:
         return close * (0.35 + 0.55 * above(self.z, self.eye[2] + 0.001, 0.004))
 
     def _brow(self) -> np.ndarray:
-        along = (self.y - self.eye[1] - 0.002) / 0.025
+        along = (self.y - self.eye[1] - 0.001) / 0.021
         arch = self.eye[2] + 0.0205 + 0.0045 * (1 - along**2) - 0.003 * along
         thick = 0.0042 - 0.0014 * np.clip(along, -1, 1)
         return band(self.z, arch, thick, 0.003) * band(along, 0.0, 1.0, 0.2)
@@ -302,17 +302,12 @@ class _Outfit:
         """(colour, cover) from the trousers up."""
         soft = 0.003
         upper = above(self.z, self.hem - 0.02, soft)
-        sleeve = np.maximum(
-            above(self.arm, 0.42, 0.06), above(self.y, self.shoulder[1] - 0.004, soft)
-        )
-        sleeve = sleeve * upper
+        sleeve = self._beyond(self.shoulder[1] - 0.008) * upper
         collar = above(self.z, self.shoulder[2] + 0.052, soft)
         vee = self.front * above(self.z - self.chest - 0.05, 1.9 * self.y, 0.006)
         vest = above(self.z, self.hem, soft) * (1 - sleeve) * (1 - collar) * (1 - vee)
-        inner = above(self.z, self.hem + 0.012, soft) * (
-            1 - above(self.y, self.shoulder[1] - 0.016, soft)
-        )
-        inner = inner * vest * (1 - above(self.arm, 0.33, 0.06))
+        inner = vest * above(self.z, self.hem + 0.012, soft)
+        inner = inner * (1 - self._beyond(self.shoulder[1] - 0.022))
         return [
             *self._trousers(colours),
             (colours.shirt, upper),
@@ -325,16 +320,22 @@ class _Outfit:
             *self._pockets(colours, vest),
         ]
 
+    def _beyond(self, armhole: float) -> np.ndarray:
+        """Past the armhole: a straight edge over the shoulder, the arm itself below the armpit."""
+        armpit = self.shoulder[2] - 0.135
+        over = above(self.y, armhole, 0.003)
+        return np.where(self.z > armpit, over, above(self.arm, 0.5, 0.1))
+
     def _trousers(self, colours: Colours) -> list[tuple[np.ndarray, np.ndarray]]:
-        middle = self.knee[1]
+        middle = self.knee[1] - 0.012
         pad = np.hypot((self.y - middle) / 0.062, (self.z - self.knee[2] - 0.005) / 0.095)
         cargo = band(self.z, self.hip[2] - 0.20, 0.075, 0.003) * above(
             self.y, self.hip[1] + 0.055, 0.003
         )
         shaft = self.ankle[2] + 0.12
         welt = 0.030
-        laces = self.front * band(self.y, self.ankle[1], 0.020, 0.004)
-        laces = laces * above(np.sin(self.z / 0.0052), 0.1, 0.5) * above(self.z, 0.062, 0.006)
+        laces = self.front * band(self.y, self.ankle[1] - 0.004, 0.016, 0.004)
+        laces = laces * above(np.sin(self.z / 0.0034), 0.3, 0.5) * above(self.z, 0.062, 0.006)
         return [
             (shaded(colours.trousers, 0.72), 0.9 * self.front * above(1.0, pad, 0.06)),
             (shaded(colours.trousers, 0.80), cargo),
@@ -365,8 +366,8 @@ class _Outfit:
 
     def _pockets(self, colours: Colours, vest: np.ndarray) -> list:
         """A badge on the left of the chest, pockets with flaps below, belt with buckle."""
-        badge = self.front * band(self.left, 0.055, 0.018, 0.002)
-        badge = badge * band(self.z, self.chest + 0.065, 0.013, 0.002)
+        badge = self.front * band(self.left, 0.062, 0.022, 0.002)
+        badge = badge * band(self.z, self.chest - 0.062, 0.014, 0.002)
         pocket = self.front * band(self.y, 0.092, 0.048, 0.002) * vest
         edge = pocket * band(self.z, self.hem + 0.062, 0.0025, 0.002)
         belt = band(self.z, self.hem - 0.018, 0.018, 0.003) * above(0.22, self.y, 0.01)
@@ -384,9 +385,7 @@ class _Outfit:
 
     def shade(self) -> np.ndarray:
         """Creases, folds, the vest's shadow on the trousers."""
-        dark = (
-            1 - np.clip(self.fine / 0.012, -0.12, 0.25) - np.clip(self.broad / 0.035, -0.10, 0.28)
-        )
+        dark = 1 - np.clip(self.fine / 0.012, -0.12, 0.25) - np.clip(self.broad / 0.06, -0.08, 0.14)
         dark *= 1 + 0.035 * folds(dark.shape, 1, (5.0, 9.0)) + 0.03 * folds(dark.shape, 2, (18.0,))
         dark *= 1 - 0.22 * band(self.z, self.hem - 0.045, 0.012, 0.03)
         knee = np.exp(-(((self.z - self.knee[2]) / 0.05) ** 2)) * (1 - self.front)

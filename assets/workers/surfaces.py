@@ -114,7 +114,9 @@ def head_surface(person: Person) -> Surface:
 def hand_surface(person: Person, side: str) -> Surface:
     """One bare hand up to under the cuff."""
     triangles = person.groups["body"][0]
+    wrist = person.origins[SEGMENTS.index(f"{side}_hand")]
     hand = person.weights.argmax(1) == SEGMENTS.index(f"{side}_hand")
+    hand |= np.linalg.norm(person.vertices - wrist, axis=1) < 0.05
     everything = Surface(person.vertices, triangles, person.weights)
     return submesh(everything, hand[triangles].any(1))
 
@@ -137,7 +139,20 @@ def clothes(person: Person) -> Surface:
     offset = np.array([CLOTH_OFFSET_M[name] for name in part])
     offset = smooth(offset[:, None], tights.faces, 4)
     vertices = vertices + offset * normals(vertices, tights.faces)
-    return replace(tights, vertices=_boots(vertices, foot))
+    vertices = _collar(_boots(vertices, foot), person.origins[SEGMENTS.index("neck")])
+    return replace(tights, vertices=vertices)
+
+
+def _collar(vertices: np.ndarray, neck: np.ndarray) -> np.ndarray:
+    """Cut the neckline along a plane that rises to the back, and let the collar stand open."""
+    out = vertices.copy()
+    ahead = vertices[:, 0] - neck[0]
+    edge = neck[2] + 0.012 - 0.42 * ahead
+    out[:, 2] = np.minimum(vertices[:, 2], edge)
+    near = np.clip(1 - (edge - vertices[:, 2]) / 0.05, 0, 1) * (vertices[:, 2] > neck[2] - 0.06)
+    outward = np.stack([ahead + 0.015, vertices[:, 1], np.zeros(len(vertices))], -1)
+    outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-6)
+    return out + 0.004 * near[:, None] * outward
 
 
 def _boots(vertices: np.ndarray, foot: np.ndarray) -> np.ndarray:
@@ -162,9 +177,9 @@ def hard_hat(person: Person, head: Surface) -> tuple[np.ndarray, np.ndarray]:
     half = np.array([np.ptp(skull[:, 0]) / 2 + 0.017, np.ptp(skull[:, 1]) / 2 + 0.017])
     base = eye[2] + 0.050
     height = skull[:, 2].max() + 0.024 - base
-    rings = [_dome_ring(level, half, height) for level in np.linspace(1.0, 0.0, 9)]
-    rings += [_rim_ring(half, out, drop) for out, drop in ((0.010, 0.002), (0.022, 0.010))]
-    rings += [_rim_ring(half, 0.022, 0.014), _rim_ring(half, -0.006, 0.004)]
+    rings = [_dome_ring(level, half, height) for level in np.linspace(1.0, 0.0, 10)]
+    rim = ((0.004, 0.004), (0.012, 0.008), (0.0135, 0.0105), (0.012, 0.013), (-0.006, 0.012))
+    rings += [_rim_ring(half, out, drop) for out, drop in rim]
     points = np.vstack(rings)
     pitch = np.radians(-5.0)
     turn = np.array(
@@ -181,19 +196,19 @@ def _dome_ring(level: float, half: np.ndarray, height: float) -> np.ndarray:
     """A ring of the shell at `level` (1 top, 0 rim): superellipsoid with a raised mid ridge."""
     angle = _around()
     lift = np.sin(level * np.pi / 2)
-    radius = max((1 - lift**2.3) ** (1 / 2.3), 1e-3)
+    radius = max((1 - lift**2.5) ** (1 / 2.2), 1e-3)
     x, y = half[0] * np.cos(angle) * radius, half[1] * np.sin(angle) * radius
-    ridge = 0.007 * np.exp(-((y / 0.017) ** 2)) * np.sin(np.pi * min(level * 1.6, 1.0) / 2)
+    ridge = 0.004 * np.exp(-((y / 0.024) ** 2)) * np.sin(np.pi * min(level * 1.6, 1.0) / 2)
     return np.stack([x, y, height * lift + ridge], -1)
 
 
 def _rim_ring(half: np.ndarray, out: float, drop: float) -> np.ndarray:
     """A ring of the rim, `out` beyond the shell, longer in front (the peak)."""
     angle = _around()
-    peak = np.maximum(np.cos(angle), 0) ** 3 * max(out, 0) / 0.022
-    x = (half[0] + out + 0.030 * peak) * np.cos(angle)
+    peak = np.maximum(np.cos(angle), 0) ** 1.5 * np.clip(out / 0.012, 0, 1.1)
+    x = (half[0] + out + 0.036 * peak) * np.cos(angle)
     y = (half[1] + out) * np.sin(angle)
-    return np.stack([x, y, -drop - 0.010 * peak], -1)
+    return np.stack([x, y, -drop - 0.012 * peak], -1)
 
 
 def _grid_faces(n_rings: int, n_around: int) -> np.ndarray:

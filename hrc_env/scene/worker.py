@@ -2,7 +2,7 @@
 
 The worker is moved, not simulated: 22 mocap bodies take positions and rotations straight
 from `WorkerMotion`. Skins have no geoms, so what touches the worker are capsules that no
-camera draws (group 4).
+camera draws and that meet only geoms whose conaffinity has the workers' bit.
 """
 
 import mujoco
@@ -10,13 +10,10 @@ import numpy as np
 
 from hrc_env.body import SEGMENTS, Body, Looks, SkinLooks
 from hrc_env.errors import ConfigError
+from hrc_env.scene.primitives import LOOKS_ONLY, WORKER_BIT, WORKER_CAPSULES, capsule
 from hrc_env.typing import Ints
 
-CAPSULE_GROUP = 4
-"""Geom group of the capsules; renderers show groups 0-2 unless asked for more."""
-WORKER_CONTYPE = 4
-"""Contact type of the capsules: they meet only geoms whose conaffinity has this bit."""
-BARE_SPECULAR, BARE_SHININESS = 0.08, 0.15
+SKIN_SPECULAR, SKIN_SHININESS = 0.08, 0.15
 HAT_SPECULAR, HAT_SHININESS = 0.45, 0.55
 
 
@@ -41,16 +38,16 @@ def add_worker(spec: mujoco.MjSpec, body: Body, looks: Looks, prefix: str) -> No
     for skin in looks.skins:
         _add_skin(spec, skin, body, prefix)
     _add_hat(spec, segments["head"], looks, prefix)
-    for capsule, name in enumerate(body.capsule_names):
-        segments[SEGMENTS[body.capsule_segment[capsule]]].add_geom(
+    for row, name in enumerate(body.capsule_names):
+        capsule(
+            segments[SEGMENTS[body.capsule_segment[row]]],
+            *body.capsule_ends[row],
+            float(body.capsule_radius_m[row]),
             name=prefix + name,
-            type=mujoco.mjtGeom.mjGEOM_CAPSULE,
-            fromto=body.capsule_ends[capsule].ravel(),
-            size=[body.capsule_radius_m[capsule], 0, 0],
-            group=CAPSULE_GROUP,
-            contype=WORKER_CONTYPE,
+            group=WORKER_CAPSULES,
+            contype=WORKER_BIT,
             conaffinity=0,
-            mass=0.0,
+            density=0,
         )
 
 
@@ -83,7 +80,7 @@ def _add_skin(spec: mujoco.MjSpec, skin: SkinLooks, body: Body, prefix: str) -> 
         name=name, type=mujoco.mjtTexture.mjTEXTURE_2D, width=width, height=height, nchannel=3
     )
     texture.data = skin.texture.tobytes()
-    material = spec.add_material(name=name, specular=BARE_SPECULAR, shininess=BARE_SHININESS)
+    material = spec.add_material(name=name, specular=SKIN_SPECULAR, shininess=SKIN_SHININESS)
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
     moved = np.flatnonzero(skin.weights.any(0))
     spec.add_skin(
@@ -117,7 +114,5 @@ def _add_hat(spec: mujoco.MjSpec, head: mujoco.MjsBody, looks: Looks, prefix: st
         type=mujoco.mjtGeom.mjGEOM_MESH,
         meshname=name,
         material=name,
-        contype=0,
-        conaffinity=0,
-        mass=0.0,
+        **LOOKS_ONLY,
     )
