@@ -19,7 +19,7 @@ from hrc_env.perception.eyes import EyesConfig
 from hrc_env.rewards import RewardConfig
 from hrc_env.scene.build import SceneConfig
 from hrc_env.tasks.reach import ReachConfig
-from hrc_env.tracking.estimators import TrackerConfig
+from hrc_env.tracking.config import TrackerConfig
 
 ConfigT = TypeVar("ConfigT")
 
@@ -30,6 +30,8 @@ class HRCConfig:
 
     ctrl_dt: float = 0.04
     """Time between actions [s]; a multiple of `scene.sim_dt`. 0.04 s is 25 Hz."""
+    start_spread_rad: tuple[float, ...] = (1.3, 0.15, 0.15, 0.15, 0.15, 0.15)
+    """At reset each arm joint is drawn within so much of its home angle [rad]."""
     worker: str = "worker_1"
     """Which baked body the workers have."""
     scene: SceneConfig = field(default_factory=SceneConfig)

@@ -2,8 +2,8 @@
 
 Resolved-rate control: the damped least-squares solution of J qd = v (Wampler 1986,
 DOI 10.1109/TSMC.1986.289285; Nakamura and Hanafusa 1986, DOI 10.1115/1.3143764), with what
-is left of the joints' freedom pulled towards a rest posture. The damping keeps speeds finite near singular
-postures, where the tool then lags behind the command.
+is left of the joints' freedom pulled towards a rest posture. The damping keeps speeds finite
+near singular postures, where the tool then lags behind the command.
 """
 
 from dataclasses import dataclass
@@ -33,8 +33,7 @@ class ControlConfig:
     def __post_init__(self) -> None:
         if not 0 < self.joint_speed_share <= 1:
             raise ConfigError(
-                "ControlConfig.joint_speed_share must be in (0, 1], "
-                f"got {self.joint_speed_share}."
+                f"ControlConfig.joint_speed_share must be in (0, 1], got {self.joint_speed_share}."
             )
 
 
@@ -46,7 +45,7 @@ def n_actions(control: str, chain: SerialChain) -> int:
     """
     if control not in CONTROLS:
         raise unknown("control", control, CONTROLS)
-    return len(chain.velocity_limit) if control == "joint" else 3
+    return len(chain.velocity_limit_rad_s) if control == "joint" else 3
 
 
 def joint_command(
@@ -59,7 +58,7 @@ def joint_command(
 ) -> JointVelocities:
     """(B, N) joint velocities [rad/s] that an action (B, A) in [-1, 1] asks for."""
     if control == "joint":
-        return action * (config.joint_speed_share * chain.velocity_limit)
+        return action * (config.joint_speed_share * chain.velocity_limit_rad_s)
     return resolved_rate(chain, q, action * config.tool_speed_mps, q_rest, config)
 
 
@@ -78,5 +77,5 @@ def resolved_rate(
     gram = J @ J.swapaxes(-1, -2) + config.damping**2 * np.eye(3)
     solved = np.linalg.solve(gram, wanted[..., None])
     qd = pull + (J.swapaxes(-1, -2) @ solved)[..., 0]
-    excess = np.max(np.abs(qd) / chain.velocity_limit, axis=-1, keepdims=True)
+    excess = np.max(np.abs(qd) / chain.velocity_limit_rad_s, axis=-1, keepdims=True)
     return qd / np.maximum(excess, 1.0)

@@ -1,0 +1,19 @@
+"""Uniformly random actions: what an environment does to somebody who does not think."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.base import Situation
+
+
+class RandomAgent:
+    """Draws every action anew from its own generator."""
+
+    def __init__(self, here: Situation, seed: int = 0) -> None:
+        self.n_actions = here.n_actions
+        self.rng = np.random.default_rng(seed)
+
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Actions uniform in [-1, 1]."""
+        shape = (*observation.shape[:-1], self.n_actions)
+        return self.rng.uniform(-1, 1, shape).astype(np.float32)

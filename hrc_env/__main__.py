@@ -1,0 +1,35 @@
+"""python -m hrc_env: set up, look, play.
+
+python -m hrc_env demo     a film of a robot that yields to a worker it sees
+python -m hrc_env check    is this machine ready?
+"""
+
+import sys
+
+import tyro
+from rich.console import Console
+
+from hrc_env.cli.check import Check
+from hrc_env.cli.demo import Demo
+from hrc_env.cli.listing import List
+from hrc_env.cli.play import Play
+from hrc_env.cli.setup import Setup
+from hrc_env.errors import HRCError
+
+
+def main() -> int:
+    """Run a command; errors that explain themselves are shown without a traceback."""
+    command = tyro.extras.subcommand_cli_from_dict(
+        {"setup": Setup, "demo": Demo, "check": Check, "list": List, "play": Play},
+        prog="python -m hrc_env",
+        description="A robot, a worker, and the cameras between them.",
+    )
+    try:
+        return command.run()
+    except HRCError as error:
+        Console(stderr=True).print(f"[bold red]{type(error).__name__}[/]: {error}", highlight=False)
+        return 2
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,57 @@
+"""Some rows of a batch: states are records of arrays whose first axis is the environment.
+
+An organ that works on a few environments only (a reset of 3 of 64) works on a record of
+their rows; as no result depends on the size of the batch, that is the same computation.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import TypeVar
+
+import numpy as np
+
+from hrc_env.typing import Ints
+
+RecordT = TypeVar("RecordT")
+
+
+def rows(record: RecordT, ids: Ints) -> RecordT:
+    """A copy of rows `ids` of every array of a (nested) record."""
+    return type(record)(**{name: _rows(value, ids) for name, value in _fields(record)})
+
+
+def one(record: RecordT, b: int) -> RecordT:
+    """Environment `b` of a record, without the batch's axis; its arrays are views."""
+    return type(record)(
+        **{
+            name: value[b] if isinstance(value, np.ndarray) else value
+            for name, value in _fields(record)
+        }
+    )
+
+
+def write_rows(record: object, ids: Ints, part: object) -> None:
+    """Write a record of rows back into rows `ids` of a record, in place."""
+    for name, value in _fields(record):
+        new = getattr(part, name)
+        if isinstance(value, np.ndarray):
+            value[ids] = new
+        elif dataclasses.is_dataclass(value):
+            write_rows(value, ids, new)
+
+
+def picked(streams: Sequence[np.random.Generator], ids: Ints) -> list[np.random.Generator]:
+    """The generators of environments `ids`."""
+    return [streams[b] for b in ids]
+
+
+def _fields(record: object) -> list[tuple[str, object]]:
+    return [(each.name, getattr(record, each.name)) for each in dataclasses.fields(record)]  # type: ignore[arg-type]
+
+
+def _rows(value: object, ids: Ints) -> object:
+    if isinstance(value, np.ndarray):
+        return value[ids]
+    if dataclasses.is_dataclass(value):
+        return rows(value, ids)
+    return value

@@ -1,0 +1,35 @@
+"""python -m hrc_env list: the names that arguments take."""
+
+from dataclasses import dataclass
+
+from rich.console import Console
+from rich.table import Table
+
+from hrc_env import IDS
+from hrc_env.control import CONTROLS
+from hrc_env.scene.build import SCENES
+from hrc_env.scene.rig import RigConfig
+from hrc_env.senses import LEVELS
+from hrc_env.tracking.estimators import ESTIMATORS
+
+
+@dataclass(frozen=True)
+class List:
+    """Environments, perception levels, estimators, scenes, cameras and agents by name."""
+
+    def run(self) -> int:
+        """Print the table."""
+        table = Table("argument", "names", title="hrc_env")
+        cameras = [camera.name for camera in RigConfig().cameras]
+        for argument, names in (
+            ("id", IDS),
+            ("perception", LEVELS),
+            ("estimator", ESTIMATORS),
+            ("scene", SCENES),
+            ("cameras", cameras),
+            ("control", CONTROLS),
+            ("agent", ("random", "scripted", "scripted_slowed", "a checkpoint: PATH.zip")),
+        ):
+            table.add_row(argument, ", ".join(names))
+        Console().print(table)
+        return 0

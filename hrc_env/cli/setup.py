@@ -1,0 +1,43 @@
+"""python -m hrc_env setup: everything that pip does not bring."""
+
+import os
+import shutil
+import subprocess
+from dataclasses import dataclass
+
+from rich.console import Console
+
+from hrc_env.perception import weights
+from hrc_env.scene.gl import APT_LINE, gl_status
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Fetch the pose network's weights (once, checked) and see that headless OpenGL works."""
+
+    def run(self) -> int:
+        """Set up; 0 if everything is there at the end."""
+        console = Console()
+        with console.status("Fetching the weights of MediaPipe Pose ..."):
+            folder = weights.fetch_weights()
+        console.print(f"[green]ok[/] pose network: official weights in {folder}")
+        ready, message = gl_status()
+        if not ready and _may_install():
+            console.print(f"Installing OpenGL: {APT_LINE}")
+            subprocess.run(["apt-get", "update", "-qq"], check=False)
+            words = APT_LINE.removeprefix("sudo ").split()
+            subprocess.run([words[0], words[1], "-qq", "-y", *words[2:]], check=False)
+            ready, message = gl_status()
+        if ready:
+            console.print(f"[green]ok[/] headless OpenGL: {message}")
+            return 0
+        console.print(
+            f"[yellow]no headless OpenGL[/]: {message}\n"
+            "Without it everything works but perception='pixels' and pictures."
+        )
+        return 0
+
+
+def _may_install() -> bool:
+    """Root on a machine with apt-get (not on Windows, which has no users by number)."""
+    return shutil.which("apt-get") is not None and getattr(os, "geteuid", lambda: 1)() == 0

@@ -1,0 +1,121 @@
+"""The Gymnasium environment: a `Simulation` of one.
+
+import gymnasium, hrc_env
+env = gymnasium.make("HRCReach-v0", perception="keypoints")
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from hrc_env import observations
+from hrc_env.config import HRCConfig, resolve
+from hrc_env.errors import ConfigError, check_shape, unknown
+from hrc_env.simulation import Outcome, Simulation
+from hrc_env.typing import Floats
+
+RENDER_MODES = ("rgb_array", "depth_array")
+
+
+class HRCReachEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
+    """A robot arm reaches for goals beside a worker whom it knows through cameras only.
+
+    Args:
+        perception: "pixels" (rendered images through MediaPipe Pose), "keypoints" (an
+            emulator of that), "truth" (the worker as they are) or "none".
+        estimator: "particle" (default), "paper" (Algorithm 1) or "triangulation".
+        cameras: indices or names of the rig's cameras to use; None is all of them.
+        scene: name of the place.
+        n_workers: 0 or more workers.
+        control: "joint" (joint velocities) or "tool" (tool velocity).
+        render_mode: "rgb_array", "depth_array" or None.
+        config: an `HRCConfig` or a nested mapping of changes to the default.
+
+    Raises:
+        ConfigError: a name, index or value that is not valid, with those that are.
+    """
+
+    metadata = {"render_modes": list(RENDER_MODES), "render_fps": 25}  # noqa: RUF012
+
+    def __init__(
+        self,
+        perception: str = "pixels",
+        estimator: str = "particle",
+        cameras: Sequence[int | str] | None = None,
+        scene: str = "lab",
+        n_workers: int = 1,
+        control: str = "joint",
+        render_mode: str | None = None,
+        config: HRCConfig | Mapping[str, Any] | None = None,
+    ) -> None:
+        if render_mode is not None and render_mode not in RENDER_MODES:
+            raise unknown("render_mode", render_mode, RENDER_MODES)
+        self.config = resolve(config)
+        self.render_mode = render_mode
+        self.simulation = Simulation(
+            1, perception, estimator, cameras, scene, n_workers, control, self.config
+        )
+        where = self.simulation.layout
+        self.observation_space = gymnasium.spaces.Box(where.low, where.high, dtype=np.float32)
+        size = self.simulation.n_actions
+        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (size,), np.float32)
+        self.metadata = {**self.metadata, "render_fps": round(1 / self.config.ctrl_dt)}
+        self._begun = False
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Start an episode; without a seed the random stream goes on."""
+        super().reset(seed=seed)
+        if options:
+            raise ConfigError(
+                f"HRCReach-v0 takes no reset options yet, got {sorted(options)}; "
+                "use the keyword arguments of gymnasium.make."
+            )
+        self._begun = True
+        outcome = self.simulation.reset(np.array([0]), [self.np_random])
+        return outcome.observation[0], outcome.info_of(0)
+
+    def step(
+        self, action: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+        """Act for one control step (1 / 25 s); the walk itself is `Simulation.step`."""
+        if not self._begun:
+            raise ConfigError("Call reset() before step().")
+        outcome: Outcome = self.simulation.step(self._checked(action)[None])
+        return (
+            outcome.observation[0],
+            float(outcome.reward[0]),
+            bool(outcome.terminated[0]),
+            False,  # time limits are gymnasium's TimeLimit
+            outcome.info_of(0),
+        )
+
+    def render(self) -> NDArray[Any] | None:  # type: ignore[override]
+        """The scene from a good viewpoint, as the render mode says."""
+        if self.render_mode is None:
+            return None
+        return self.simulation.picture(0, depth=self.render_mode == "depth_array")
+
+    def mosaic(self) -> NDArray[np.uint8]:
+        """The four cameras with crops, detected keypoints and the estimated skeleton."""
+        return self.simulation.mosaic(0)
+
+    def split_observation(self, observation: NDArray[np.float32]) -> dict[str, Floats]:
+        """An observation's terms by name, in metres, seconds and radians."""
+        return observations.split(observation, self.simulation.layout)
+
+    def close(self) -> None:
+        """Release threads and graphics contexts."""
+        self.simulation.close()
+
+    def _checked(self, action: NDArray[np.float32]) -> Floats:
+        values = np.asarray(action, np.float64)
+        meaning = "joint velocities" if self.simulation.control == "joint" else "tool velocity"
+        check_shape("action", values.shape, (self.simulation.n_actions,), meaning)
+        if not np.isfinite(values).all():
+            raise ConfigError(f"action must be finite numbers in [-1, 1], got {values}.")
+        return np.clip(values, -1.0, 1.0)

@@ -1,0 +1,164 @@
+"""Pictures for people: what the cameras see and what is made of it, drawn over a render."""
+
+from functools import lru_cache
+
+import cv2
+import numpy as np
+from PIL import Image as PillowImage
+from PIL import ImageDraw, ImageFont
+
+from hrc_env.geometry.cameras import PinholeCamera, project
+from hrc_env.records import CropWindow, Keypoints, PoseEstimate
+from hrc_env.skeleton import BONES, JOINTS
+from hrc_env.typing import Floats, Image, Points2
+
+Colour = tuple[int, int, int]
+
+LEFT: Colour = (66, 165, 245)
+RIGHT: Colour = (255, 138, 60)
+MIDDLE: Colour = (235, 235, 235)
+DETECTED: Colour = (255, 64, 96)
+WINDOW: Colour = (250, 250, 120)
+INK: Colour = (236, 239, 241)
+PANEL: Colour = (24, 28, 34)
+
+
+def bone_colour(first: int, second: int) -> Colour:
+    """Blue on the worker's left, orange on the right, white across."""
+    sides = {JOINTS[first].split("_")[0], JOINTS[second].split("_")[0]}
+    if sides == {"left"}:
+        return LEFT
+    return RIGHT if sides == {"right"} else MIDDLE
+
+
+def draw_estimate(
+    image: Image, camera: PinholeCamera, estimate: PoseEstimate, row: int = 0, thickness: int = 2
+) -> None:
+    """The estimated skeletons of one environment with 2-sigma ellipses, in place.
+
+    Args:
+        image: (H, W, 3) a render of `camera`, of any size with its aspect.
+        estimate: belief; row `row` is drawn, workers without a track are not.
+    """
+    scale = image.shape[1] / camera.width_px
+    for worker in np.flatnonzero(estimate.tracked[row]):
+        joints = estimate.mean_world[row, worker]
+        px, depth_m = project(camera.P[None], joints[None])
+        if (depth_m < 0.1).any():
+            continue
+        points = px[0, 0] * scale
+        overlay = image.copy()
+        for j in range(len(JOINTS)):
+            _ellipse(overlay, camera, joints[j], estimate.cov_world[row, worker, j], scale)
+        cv2.addWeighted(overlay, 0.35, image, 0.65, 0, dst=image)
+        for first, second in BONES[:-2]:
+            _line(image, points[first], points[second], bone_colour(first, second), thickness)
+        neck = points[[1, 2]].mean(0)
+        _line(image, points[0], neck, MIDDLE, thickness)
+
+
+def draw_keypoints(
+    image: Image, camera: PinholeCamera, keypoints: Keypoints, index: int, row: int = 0
+) -> None:
+    """The joints that camera `index` detected, in place; faint where it was not sure."""
+    scale = image.shape[1] / camera.width_px
+    for worker in range(keypoints.px.shape[2]):
+        px, confidence = keypoints.px[row, index, worker], keypoints.confidence[row, index, worker]
+        for point, sure in zip(px, confidence, strict=True):
+            if np.isfinite(point).all():
+                radius = max(2, round(image.shape[1] / 200))
+                colour = _mix(PANEL, DETECTED, 0.35 + 0.65 * float(sure))
+                cv2.circle(image, _fixed(point * scale), radius * 16, colour, -1, cv2.LINE_AA, 4)
+
+
+def draw_window(image: Image, camera: PinholeCamera, window: CropWindow) -> None:
+    """The outline of a crop, in place."""
+    scale = image.shape[1] / camera.width_px
+    box = (
+        (window.centre_px[0] * scale, window.centre_px[1] * scale),
+        (window.side_px * scale, window.side_px * scale),
+        float(np.degrees(window.rotation_rad)),
+    )
+    corners = cv2.boxPoints(box)
+    cv2.polylines(image, [np.round(corners * 16).astype(np.int32)], True, WINDOW, 1, cv2.LINE_AA, 4)
+
+
+def label(
+    image: Image, text: str, at: tuple[int, int], size: int = 16, colour: Colour = INK
+) -> None:
+    """Text with its upper left corner at `at`, on a dark plate, in place."""
+    font = _font(size)
+    left, top, right, bottom = font.getbbox(text)
+    x, y = at
+    pad = max(3, size // 4)
+    y1, x1 = min(y + bottom + 2 * pad, image.shape[0]), min(x + right + 2 * pad, image.shape[1])
+    plate = image[y:y1, x:x1]
+    plate[:] = (0.35 * plate + 0.65 * np.array(PANEL)).astype(np.uint8)
+    write(image, text, (x + pad, y + pad), size, colour)
+
+
+def write(
+    image: Image, text: str, at: tuple[int, int], size: int = 16, colour: Colour = INK
+) -> None:
+    """Text with its upper left corner at `at`, in place."""
+    font = _font(size)
+    _, _, right, bottom = (round(value) for value in font.getbbox(text))
+    x, y = at
+    patch = image[y : y + bottom + 2, x : x + right + 2]
+    drawn = PillowImage.fromarray(patch)
+    ImageDraw.Draw(drawn).text((0, 0), text, fill=colour, font=font)
+    patch[:] = np.asarray(drawn)
+
+
+def tile(pictures: list[Image], columns: int, gap: int = 4) -> Image:
+    """Pictures of one size in rows, with dark seams."""
+    height, width = pictures[0].shape[:2]
+    rows = -(-len(pictures) // columns)
+    sheet = np.empty((rows * (height + gap) - gap, columns * (width + gap) - gap, 3), np.uint8)
+    sheet[:] = PANEL
+    for k, picture in enumerate(pictures):
+        y, x = (k // columns) * (height + gap), (k % columns) * (width + gap)
+        sheet[y : y + height, x : x + width] = picture
+    return sheet
+
+
+def _ellipse(
+    image: Image, camera: PinholeCamera, joint: Floats, covariance: Floats, scale: float
+) -> None:
+    """The image of a 2-sigma region, to first order."""
+    R_cam_from_world = camera.T_world_from_cam[:3, :3].T
+    x, y, z = R_cam_from_world @ (joint - camera.eye_world)
+    focal = camera.K[0, 0] * scale
+    J = focal / z * np.array([[1, 0, -x / z], [0, 1, -y / z]]) @ R_cam_from_world
+    values, vectors = np.linalg.eigh(J @ covariance @ J.T)
+    axes = 2 * np.sqrt(np.maximum(values, 0.25))
+    if axes.max() > 4 * image.shape[1]:
+        return
+    angle = np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1]))
+    px = project(camera.P[None], joint[None, None])[0][0, 0, 0] * scale
+    centre = (int(px[0]), int(px[1]))
+    size = (max(1, round(axes[1])), max(1, round(axes[0])))
+    cv2.ellipse(image, centre, size, angle, 0, 360, (90, 230, 160), -1, cv2.LINE_AA)
+
+
+def _line(image: Image, a: Points2, b: Points2, colour: Colour, thickness: int) -> None:
+    cv2.line(image, _fixed(a), _fixed(b), colour, thickness, cv2.LINE_AA, 4)
+
+
+def _fixed(point: Points2) -> tuple[int, int]:
+    """Sub-pixel coordinates for OpenCV, which counts from pixel centres: 4 binary places."""
+    limited = np.clip(point - 0.5, -30000, 30000)
+    return int(round(limited[0] * 16)), int(round(limited[1] * 16))
+
+
+def _mix(a: Colour, b: Colour, share: float) -> Colour:
+    red, green, blue = (round(p + share * (q - p)) for p, q in zip(a, b, strict=True))
+    return red, green, blue
+
+
+@lru_cache(maxsize=16)
+def _font(size: int) -> ImageFont.FreeTypeFont:
+    """DejaVu Sans, which comes with matplotlib."""
+    from matplotlib import get_data_path
+
+    return ImageFont.truetype(f"{get_data_path()}/fonts/ttf/DejaVuSans.ttf", size)

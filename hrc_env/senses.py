@@ -1,0 +1,273 @@
+"""Perception levels: how a belief about the workers comes about, behind one protocol.
+
+| level | what the estimator is given |
+|---|---|
+| `pixels` | MediaPipe Pose on crops rendered round the worker it predicts |
+| `keypoints` | an emulator of that: projected truth with the detector's errors |
+| `truth` | nothing: the estimate is the worker as they are |
+| `none` | nothing: the estimate stays the prior |
+
+The organs do not know each other; they meet here.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from hrc_env.batching import one, rows, write_rows
+from hrc_env.config import HRCConfig
+from hrc_env.errors import unknown
+from hrc_env.geometry.cameras import project, projections
+from hrc_env.perception import emulator
+from hrc_env.perception.eyes import Eyes
+from hrc_env.perception.windows import window_from_joints
+from hrc_env.records import CropWindow, Keypoints, PoseEstimate, WorkerMotion, WorkerTruth
+from hrc_env.scene.build import Scene
+from hrc_env.scene.physics import Physics
+from hrc_env.scene.render import CropRenderer
+from hrc_env.skeleton import N_JOINTS
+from hrc_env.tracking import given
+from hrc_env.tracking.estimators import Estimator, make_estimator
+from hrc_env.typing import Ints, JointAngles
+
+LEVELS = ("pixels", "keypoints", "truth", "none")
+
+Generators = Sequence[np.random.Generator]
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """The scene when the shutters open; rows are environments `ids`."""
+
+    ids: Ints
+    """(B,) environments of the batch that these rows are."""
+    q: JointAngles
+    """(B, N) the arm [rad]."""
+    motion: WorkerMotion
+    """(B, W, S, ...)."""
+    truth: WorkerTruth
+    """(B, W, ...): for the emulator and the level `truth`, and for nobody else."""
+
+
+class Senses(Protocol):
+    """One perception level with its estimator, for a batch of environments."""
+
+    def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
+        """Forget environments `ids`; the generators are rows for them."""
+        ...
+
+    def sense(self, now: Moment, sensor_rngs: Generators, tracker_rngs: Generators) -> PoseEstimate:
+        """Look at `now` and say what is believed of it, in its rows."""
+        ...
+
+    def looks(self, b: int) -> tuple[Keypoints | None, list[CropWindow | None]]:
+        """What environment `b` saw last, and through which windows (for pictures)."""
+        ...
+
+    def close(self) -> None:
+        """Release threads and graphics contexts."""
+        ...
+
+
+def make_senses(
+    level: str, estimator: str, scene: Scene, physics: Physics, config: HRCConfig
+) -> Senses:
+    """The senses of a perception level.
+
+    Raises:
+        ConfigError: `level` or `estimator` is not a name of one.
+        WeightsError: `pixels` without the network's weights.
+        RenderingError: `pixels` without OpenGL.
+    """
+    if level not in LEVELS:
+        raise unknown("perception", level, LEVELS)
+    batch = physics.batch
+    P = projections(scene.cameras)
+    tracker = make_estimator(estimator, P, config.ctrl_dt, config.tracker)
+    if level == "truth":
+        return GivenSenses(scene.n_workers)
+    if level == "none":
+        return BlindSenses(given.prior(batch, scene.n_workers, config.tracker))
+    if level == "keypoints":
+        return EmulatedSenses(scene, physics, tracker, config)
+    return CameraSenses(scene, batch, tracker, config)
+
+
+class GivenSenses:
+    """Level `truth`: the worker as they are."""
+
+    def __init__(self, n_workers: int) -> None:
+        self.n_workers = n_workers
+
+    def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
+        """Nothing to forget."""
+
+    def sense(self, now: Moment, sensor_rngs: Generators, tracker_rngs: Generators) -> PoseEstimate:
+        """The truth, as an estimate."""
+        return given.estimate_from_truth(now.truth)
+
+    def looks(self, b: int) -> tuple[Keypoints | None, list[CropWindow | None]]:
+        """No camera took part."""
+        return None, []
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+
+class BlindSenses:
+    """Level `none`: the prior, whatever happens."""
+
+    def __init__(self, prior: PoseEstimate) -> None:
+        self.prior = prior
+
+    def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
+        """Nothing to forget."""
+
+    def sense(self, now: Moment, sensor_rngs: Generators, tracker_rngs: Generators) -> PoseEstimate:
+        """The prior."""
+        return rows(self.prior, now.ids)
+
+    def looks(self, b: int) -> tuple[Keypoints | None, list[CropWindow | None]]:
+        """No camera took part."""
+        return None, []
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+
+class TrackingSenses:
+    """What the levels with cameras share: predict, get keypoints, update."""
+
+    def __init__(self, batch: int, scene: Scene, tracker: Estimator, config: HRCConfig) -> None:
+        self.scene, self.tracker, self.dt_s = scene, tracker, config.ctrl_dt
+        self.P = projections(scene.cameras)
+        self.state: Any = tracker.init(batch, scene.n_workers)
+        self.keypoints = _no_keypoints(batch, len(scene.cameras), scene.n_workers)
+
+    def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
+        """Forget the tracks of environments `ids`."""
+        part = rows(self.state, ids)
+        self.tracker.reset(part, np.arange(len(ids)), tracker_rngs)
+        write_rows(self.state, ids, part)
+
+    def sense(self, now: Moment, sensor_rngs: Generators, tracker_rngs: Generators) -> PoseEstimate:
+        """Predict the workers, look at them where they should be, and update."""
+        whole = len(now.ids) == len(self.keypoints.px)
+        state = self.state if whole else rows(self.state, now.ids)
+        self.tracker.predict(state, self.dt_s, tracker_rngs)
+        predicted = self.tracker.estimate(state)
+        keypoints = self.detect(now, predicted, sensor_rngs)
+        self.tracker.update(state, keypoints, tracker_rngs)
+        write_rows(self.keypoints, now.ids, keypoints)
+        if not whole:
+            write_rows(self.state, now.ids, state)
+        return self.tracker.estimate(state)
+
+    def detect(self, now: Moment, predicted: PoseEstimate, sensor_rngs: Generators) -> Keypoints:
+        """Keypoints of this moment, by whatever eyes the level has."""
+        raise NotImplementedError
+
+    def looks(self, b: int) -> tuple[Keypoints | None, list[CropWindow | None]]:
+        """The keypoints of environment `b`."""
+        return rows(self.keypoints, np.array([b])), []
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+
+class EmulatedSenses(TrackingSenses):
+    """Level `keypoints`: the detector's errors on the projected truth."""
+
+    def __init__(
+        self, scene: Scene, physics: Physics, tracker: Estimator, config: HRCConfig
+    ) -> None:
+        super().__init__(physics.batch, scene, tracker, config)
+        self.physics, self.config = physics, config.emulator
+        self.emulator = emulator.make_state(
+            physics.batch,
+            len(scene.cameras),
+            scene.n_workers,
+            config.ctrl_dt,
+            config.emulator,
+        )
+        self.eyes_world = np.stack([camera.eye_world for camera in scene.cameras])
+
+    def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
+        """Forget the tracks and the detector's slow errors."""
+        super().reset(ids, sensor_rngs, tracker_rngs)
+        part = rows(self.emulator, ids)
+        emulator.reset(part, np.arange(len(ids)), sensor_rngs, self.config)
+        write_rows(self.emulator, ids, part)
+
+    def detect(self, now: Moment, predicted: PoseEstimate, sensor_rngs: Generators) -> Keypoints:
+        """Emulated keypoints; lines of sight come from the physics' rays."""
+        whole = len(now.ids) == self.physics.batch
+        state = self.emulator if whole else rows(self.emulator, now.ids)
+        hidden = self.physics.hidden(self.eyes_world, now.truth.joints_world, now.ids)
+        keypoints = emulator.emulate(
+            state, sensor_rngs, now.truth, hidden, self.scene.cameras, self.config
+        )
+        if not whole:
+            write_rows(self.emulator, now.ids, state)
+        return keypoints
+
+
+class CameraSenses(TrackingSenses):
+    """Level `pixels`: rendered crops through the pose network."""
+
+    def __init__(self, scene: Scene, batch: int, tracker: Estimator, config: HRCConfig) -> None:
+        super().__init__(batch, scene, tracker, config)
+        self.renderer = CropRenderer(scene)
+        self.eyes = Eyes(scene.cameras, config.eyes)
+        self.windows: list[list[CropWindow | None]] = [[None] * len(scene.cameras)] * batch
+
+    def detect(self, now: Moment, predicted: PoseEstimate, sensor_rngs: Generators) -> Keypoints:
+        """Landmarks of crops round the predicted worker, or of a search where there is none."""
+        seen = _no_keypoints(len(now.ids), len(self.scene.cameras), self.scene.n_workers)
+        for row, b in enumerate(now.ids):
+            self.renderer.draw(now.q[row], one(now.motion, row))
+            for worker in range(self.scene.n_workers):
+                windows = self._windows(predicted, row, worker)
+                sight = self.eyes.look(self.renderer, windows, self._track(b, worker))
+                self.windows[b] = sight.windows
+                seen.px[row, :, worker] = sight.px
+                seen.confidence[row, :, worker] = sight.confidence
+                seen.sigma_px[row, :, worker] = sight.sigma_px
+        return seen
+
+    def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
+        """Forget the tracks, and whom the eyes were following."""
+        super().reset(ids, sensor_rngs, tracker_rngs)
+        for b in ids:
+            for worker in range(self.scene.n_workers):
+                self.eyes.forget(self._track(b, worker))
+
+    def _track(self, b: int, worker: int) -> int:
+        """The number by which the eyes know a worker of an environment."""
+        return int(b) * self.scene.n_workers + worker
+
+    def looks(self, b: int) -> tuple[Keypoints | None, list[CropWindow | None]]:
+        """The keypoints of environment `b` and the windows they were found in."""
+        return rows(self.keypoints, np.array([b])), self.windows[b]
+
+    def close(self) -> None:
+        """Stop the detector's thread and free the graphics context."""
+        self.eyes.close()
+        self.renderer.close()
+
+    def _windows(self, predicted: PoseEstimate, row: int, worker: int) -> list[CropWindow | None]:
+        """A window a camera; None where the worker is unknown or out of view: search."""
+        if not predicted.tracked[row, worker]:
+            return [None] * len(self.scene.cameras)
+        px, depth_m = project(self.P, predicted.mean_world[row : row + 1, worker])
+        return [
+            window_from_joints(px[0, c], depth_m[0, c], camera)
+            for c, camera in enumerate(self.scene.cameras)
+        ]
+
+
+def _no_keypoints(batch: int, n_cameras: int, n_workers: int) -> Keypoints:
+    shape = (batch, n_cameras, n_workers, N_JOINTS)
+    return Keypoints(np.full((*shape, 2), np.nan), np.zeros(shape), np.full(shape, np.inf))

@@ -1,0 +1,232 @@
+"""The closed loop for a batch of environments: act, move, see, believe, judge.
+
+`HRCReachEnv` is a simulation of one. A result of environment b depends on its own random
+streams only, never on the size of the batch.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hrc_env import metrics, observations, rewards
+from hrc_env.batching import picked, rows, write_rows
+from hrc_env.body import load_body, worker_truth
+from hrc_env.config import HRCConfig
+from hrc_env.control import joint_command, n_actions
+from hrc_env.geometry import chains
+from hrc_env.motion import generator
+from hrc_env.records import PoseEstimate, RobotState, WorkerMotion, WorkerTruth
+from hrc_env.scene.build import build
+from hrc_env.scene.physics import Physics
+from hrc_env.senses import Moment, make_senses
+from hrc_env.tasks import reach
+from hrc_env.tracking import given
+from hrc_env.typing import Bools, Floats, Ints
+
+RecordT = TypeVar("RecordT")
+
+Info = dict[str, Floats]
+"""Named values (B,); NaN means that the environment has no such value in this step."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a step or a reset gives, per environment."""
+
+    observation: NDArray[np.float32]
+    """(B, n)."""
+    reward: Floats
+    """(B,)."""
+    terminated: Bools
+    """(B,)."""
+    info: Info
+
+    def info_of(self, b: int) -> dict[str, Any]:
+        """The info of one environment: absent values are left out, flags are bool."""
+        values = {name: float(value[b]) for name, value in self.info.items()}
+        known = {name: value for name, value in values.items() if value == value}
+        known["is_success"] = bool(known["is_success"])
+        return known
+
+
+@dataclass(slots=True)
+class Streams:
+    """One random generator per environment for each organ that draws numbers."""
+
+    robot: list[np.random.Generator]
+    motion: list[np.random.Generator]
+    sensor: list[np.random.Generator]
+    tracker: list[np.random.Generator]
+    task: list[np.random.Generator]
+
+
+class Simulation:
+    """`batch` environments that step together; arguments as of `HRCReachEnv`."""
+
+    def __init__(
+        self,
+        batch: int,
+        perception: str,
+        estimator: str,
+        cameras: Sequence[int | str] | None,
+        scene: str,
+        n_workers: int,
+        control: str,
+        config: HRCConfig,
+        n_threads: int = 1,
+    ) -> None:
+        self.batch, self.config, self.control = batch, config, control
+        self.body = load_body(config.worker)
+        self.scene = build(config.scene, scene, n_workers, config.worker, cameras)
+        self.chain = self.scene.chain
+        self.n_actions = n_actions(control, self.chain)
+        self.layout = observations.layout(len(self.scene.home_q), self.n_actions, n_workers)
+        self.physics = Physics(self.scene, batch, n_threads)
+        self.senses = make_senses(perception, estimator, self.scene, self.physics, config)
+        self.motion = generator.make_state(batch, n_workers, self.body, config.motion)
+        self.task = reach.make_state(batch)
+        self._everyone = np.arange(batch)
+        self.action = np.zeros((batch, self.n_actions))
+        self.episode_cost = np.zeros(batch)
+        self.estimate = given.prior(batch, n_workers, config.tracker)
+        blank = [np.random.default_rng(0)] * batch
+        self.streams = Streams(*(list(blank) for _ in range(5)))
+
+    def reset(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> Outcome:
+        """Start environments `ids` anew, one generator each; their rows of an outcome."""
+        self._spawn(ids, rngs)
+        self.physics.reset(ids, self._starting_angles(ids))
+        generator.reset(self.motion, ids, self.streams.motion)
+        self.action[ids], self.episode_cost[ids] = 0.0, 0.0
+        robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
+        reach.reset(self.task, ids, self.streams.task, robot.tool_world, self.config.task)
+        self.senses.reset(ids, picked(self.streams.sensor, ids), picked(self.streams.tracker, ids))
+        motion = rows(generator.current(self.motion), ids)
+        truth = worker_truth(self.body, motion)
+        estimate = self._sense(ids, motion, truth)
+        observation = observations.observe(self._believed(robot), self.layout)[ids]
+        info = {**tracking_info(estimate, truth), **rows_of(self._tally(), ids)}
+        return Outcome(observation, np.zeros(len(ids)), np.zeros(len(ids), bool), info)
+
+    def step(self, action: Floats) -> Outcome:
+        """One control step of every environment; action (B, A) in [-1, 1]."""
+        config, streams = self.config, self.streams
+        previous, self.action = self.action, action
+        command = joint_command(
+            self.control, action, self.physics.q, self.chain, self.scene.home_q, config.control
+        )
+        motion = generator.advance(
+            self.motion, streams.motion, config.scene.sim_dt, config.n_substeps
+        )
+        q_trace = self.physics.step(command, motion)
+        truth = worker_truth(self.body, motion)
+        now = last(truth)
+
+        estimate = self._sense(self._everyone, last(motion), now)
+        robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
+        progress = reach.advance(
+            self.task, streams.task, robot.tool_world, config.ctrl_dt, config.task
+        )
+        believed = self._believed(robot)
+        reward, terms = rewards.reward(believed, progress, previous, config.reward)
+
+        bodies = chains.capsules(self.chain, q_trace)
+        cost = metrics.cost(bodies, self.chain.capsule_radius_m, truth, config.cost)
+        self.episode_cost += cost.total
+        info = {
+            **{f"reward/{name}": value for name, value in terms.items()},
+            **cost_info(cost),
+            **tracking_info(estimate, now),
+            **self._tally(),
+        }
+        terminated = (cost.contact > 0) & config.cost.contact_terminates
+        return Outcome(observations.observe(believed, self.layout), reward, terminated, info)
+
+    def close(self) -> None:
+        """Release threads and graphics contexts."""
+        self.senses.close()
+
+    def _spawn(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> None:
+        """Give every organ of environments `ids` a stream of its own.
+
+        Always as many and in the same order, so that the worker's walk does not depend on
+        who looks at it.
+        """
+        streams = self.streams
+        lists = (streams.robot, streams.motion, streams.sensor, streams.tracker, streams.task)
+        for b, rng in zip(ids, rngs, strict=True):
+            for stream, child in zip(lists, rng.spawn(len(lists)), strict=True):
+                stream[b] = child
+
+    def _starting_angles(self, ids: Ints) -> Floats:
+        """(len(ids), N) arm angles near home, turned anywhere in front of the base."""
+        spread = np.array(self.config.start_spread_rad)
+        angles = [
+            self.scene.home_q + self.streams.robot[b].uniform(-1, 1, len(spread)) * spread
+            for b in ids
+        ]
+        return np.array(angles).reshape(len(ids), -1)
+
+    def _sense(self, ids: Ints, motion: WorkerMotion, truth: WorkerTruth) -> PoseEstimate:
+        """Let the senses look at environments `ids`; their rows of the estimate."""
+        moment = Moment(ids, self.physics.q[ids], motion, truth)
+        streams = self.streams
+        estimate = self.senses.sense(
+            moment, picked(streams.sensor, ids), picked(streams.tracker, ids)
+        )
+        write_rows(self.estimate, ids, estimate)
+        return estimate
+
+    def _believed(self, robot: RobotState) -> observations.Believed:
+        return observations.Believed(
+            robot=robot,
+            estimate=self.estimate,
+            gap=observations.estimated_gap(robot, self.estimate),
+            goal_world=self.task.goal_world.copy(),
+            goal_time_left_s=self.config.task.time_limit_s - self.task.goal_age_s,
+            action=self.action,
+        )
+
+    def _tally(self) -> Info:
+        """What the episode has come to so far."""
+        return {
+            "episode_cost": self.episode_cost.copy(),
+            "task/goals_reached": self.task.n_reached.astype(float),
+            "task/goals_missed": self.task.n_missed.astype(float),
+            "is_success": reach.succeeded(self.task).astype(float),
+        }
+
+
+def last(record: RecordT) -> RecordT:
+    """The last moment of a record whose second axis is time."""
+    whole = {each.name: getattr(record, each.name) for each in dataclasses.fields(record)}  # type: ignore[arg-type]
+    return type(record)(
+        **{name: value[:, -1] if value.ndim > 1 else value for name, value in whole.items()}
+    )
+
+
+def rows_of(info: Info, ids: Ints) -> Info:
+    """Rows `ids` of every value of an info."""
+    return {name: value[ids] for name, value in info.items()}
+
+
+def cost_info(cost: metrics.Cost) -> Info:
+    """The cost by the names that safe-RL libraries read, and the separation."""
+    separation = np.where(np.isfinite(cost.min_separation_m), cost.min_separation_m, np.nan)
+    return {
+        "cost": cost.total,
+        "cost_sum": cost.total,
+        "cost_proximity": cost.proximity,
+        "cost_contact": cost.contact,
+        "safety/min_separation_m": separation,
+    }
+
+
+def tracking_info(estimate: PoseEstimate, truth: WorkerTruth) -> Info:
+    """How far the belief is from the truth; no error is given where nobody is tracked."""
+    error_m, lost = metrics.tracking_error(estimate, truth)
+    return {"tracking/mpjpe_m": error_m, "tracking/lost": lost.astype(float)}

@@ -1,0 +1,102 @@
+"""House rules, held by reading the source: floors, doors, belief and truth."""
+
+import ast
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGE = ROOT / "hrc_env"
+SOURCES = sorted(PACKAGE.rglob("*.py"))
+ALL_SOURCES = [*SOURCES, *sorted((ROOT / "agents").glob("*.py")), ROOT / "train.py"]
+
+TRUTH_READERS = {
+    "hrc_env/records.py": "declares it",
+    "hrc_env/body.py": "makes it from the worker's motion",
+    "hrc_env/simulation.py": "carries it to cost, metrics and senses",
+    "hrc_env/senses.py": "hands it to the emulator and to the level `truth`",
+    "hrc_env/metrics.py": "counts cost and errors",
+    "hrc_env/perception/emulator.py": "projects it into emulated cameras",
+    "hrc_env/tracking/given.py": "copies it into the belief: the one place",
+}
+
+
+def relative(path: Path) -> str:
+    return path.relative_to(ROOT).as_posix()
+
+
+def code_of(path: Path) -> str:
+    """Source without comments and docstrings."""
+    tree = ast.parse(path.read_text())
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+            node.value.value = None
+    return ast.unparse(tree)
+
+
+def test_imports_point_downward():
+    """The floors are declared in pyproject.toml; import-linter reads the real imports."""
+    done = subprocess.run(
+        [Path(sys.executable).parent / "lint-imports", "--no-cache"],
+        cwd=ROOT, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout
+
+
+def test_only_these_files_know_the_truth():
+    """Whoever is not in the list, with a reason, does not even name the record of truth."""
+    knowing = {relative(path) for path in SOURCES if "WorkerTruth" in code_of(path)}
+    assert knowing == set(TRUTH_READERS) & knowing
+    assert knowing >= {"hrc_env/metrics.py", "hrc_env/tracking/given.py"}
+
+
+@pytest.mark.parametrize("name", ["observations", "rewards", "control"])
+def test_what_the_robot_reads_does_not_mention_truth(name):
+    """Terms take `Believed`, which has no truth in it; nothing in these files names it."""
+    assert not re.search(r"truth|capsules_world_true|WorkerMotion", code_of(PACKAGE / f"{name}.py"))
+
+
+def test_agents_do_not_touch_simulator_state():
+    """An agent knows the robot and the observation: no physics, no motion, no truth."""
+    for path in (ROOT / "agents").glob("*.py"):
+        assert not re.search(r"truth|\.motion\b|\.physics\b|worker_truth", code_of(path)), path
+
+
+def test_randomness_is_an_argument():
+    """No module draws from NumPy's global generator."""
+    legacy = re.compile(r"np\.random\.(?!Generator|default_rng|SeedSequence|BitGenerator)")
+    for path in ALL_SOURCES:
+        assert not legacy.search(code_of(path)), relative(path)
+
+
+def test_the_library_does_not_print():
+    """Only the command line and train.py speak to the terminal."""
+    for path in SOURCES:
+        if "cli" not in path.parts and path.name != "__main__.py":
+            assert not re.search(r"\bprint\(", code_of(path)), relative(path)
+
+
+def test_user_input_is_not_checked_by_assert():
+    """`python -O` removes asserts; what a user gives is checked by errors that explain."""
+    for path in SOURCES:
+        if "cli" not in path.parts:
+            names = [
+                node
+                for node in ast.walk(ast.parse(path.read_text()))
+                if isinstance(node, ast.Assert)
+            ]
+            assert not names, relative(path)
+
+
+def test_every_config_field_is_explained():
+    """The sentence after a field is its documentation and the command line's help."""
+    for path in SOURCES:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ClassDef) and node.name.endswith("Config"):
+                for field, after in zip(node.body, [*node.body[1:], None], strict=True):
+                    if isinstance(field, ast.AnnAssign):
+                        said = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
+                        assert said, f"{relative(path)}: {node.name}.{ast.unparse(field.target)}"

@@ -1,0 +1,52 @@
+"""Actions to joint velocities: scaled directly, or resolved from a tool velocity."""
+
+import numpy as np
+import pytest
+
+from hrc_env.control import ControlConfig, joint_command, n_actions, resolved_rate
+from hrc_env.errors import ConfigError
+from hrc_env.geometry.chains import jacobian
+from hrc_env.scene.build import build
+
+SCENE = build(n_workers=0)
+CHAIN, HOME = SCENE.chain, SCENE.home_q
+
+
+def near_home(n: int = 20) -> np.ndarray:
+    return HOME + np.random.default_rng(0).uniform(-0.3, 0.3, (n, 6))
+
+
+def test_a_full_action_is_half_of_the_speed_limit():
+    command = joint_command("joint", np.ones((1, 6)), HOME[None], CHAIN, HOME, ControlConfig())
+    np.testing.assert_allclose(command[0], 0.5 * CHAIN.velocity_limit_rad_s)
+
+
+def test_a_tool_velocity_is_followed_away_from_singular_postures():
+    """Damping takes a few per cent off; the direction stays."""
+    q = near_home()
+    wanted = np.tile([0.1, -0.2, 0.15], (len(q), 1))
+    qd = resolved_rate(CHAIN, q, wanted, HOME, ControlConfig())
+    got = np.einsum("bij,bj->bi", jacobian(CHAIN, q), qd)
+    cosine = (got * wanted).sum(1) / np.linalg.norm(got, axis=1) / np.linalg.norm(wanted, axis=1)
+    assert cosine.min() > 0.99
+    np.testing.assert_allclose(np.linalg.norm(got, axis=1), np.linalg.norm(wanted[0]), rtol=0.1)
+
+
+def test_the_posture_pull_does_not_move_the_tool():
+    q = near_home()
+    qd = resolved_rate(CHAIN, q, np.zeros((len(q), 3)), HOME, ControlConfig(damping=1e-4))
+    moved = np.einsum("bij,bj->bi", jacobian(CHAIN, q), qd)
+    assert np.abs(moved).max() < 1e-4
+    assert np.abs(qd).max() > 1e-3
+
+
+def test_joint_limits_of_speed_hold_and_keep_the_direction():
+    q = near_home()
+    fast = resolved_rate(CHAIN, q, np.full((len(q), 3), 50.0), HOME, ControlConfig())
+    share = np.abs(fast) / CHAIN.velocity_limit_rad_s
+    np.testing.assert_allclose(share.max(1), 1.0)
+
+
+def test_an_unknown_control_names_the_valid_ones():
+    with pytest.raises(ConfigError, match="'joint', 'tool'"):
+        n_actions("torque", CHAIN)

@@ -1,0 +1,210 @@
+"""The environment's contract: both checkers, determinism, pickling, errors that help."""
+
+import pickle
+import warnings
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from stable_baselines3.common.env_checker import check_env as check_env_for_sb3
+
+import hrc_env  # registers the ids
+from hrc_env.env import HRCReachEnv
+from hrc_env.errors import ConfigError
+from hrc_env.senses import LEVELS
+
+FAST_LEVELS = ("keypoints", "truth", "none")
+
+
+def make(**kwargs) -> gymnasium.Env:
+    return gymnasium.make("HRCReach-v0", **kwargs)
+
+
+def roll(env: gymnasium.Env, n_steps: int, seed: int = 0):
+    """Observations, rewards and infos of a seeded random walk through actions."""
+    rng = np.random.default_rng(seed)
+    observation, info = env.reset(seed=seed)
+    seen = [(observation, 0.0, info)]
+    for _ in range(n_steps):
+        action = rng.uniform(-1, 1, env.action_space.shape).astype(np.float32)
+        observation, reward, terminated, truncated, info = env.step(action)
+        seen.append((observation, reward, info))
+        if terminated or truncated:
+            break
+    return seen
+
+
+def same(a, b) -> bool:
+    return all(
+        np.array_equal(x[0], y[0]) and x[1] == y[1] and x[2] == y[2]
+        for x, y in zip(a, b, strict=True)
+    )
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_both_checkers_have_nothing_to_say(level):
+    env = HRCReachEnv(perception=level, render_mode="rgb_array" if level == "truth" else None)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env_for_sb3(env)
+        # gymnasium's checker wants the spec that make() adds
+        check_env(make(perception=level).unwrapped, skip_render_check=True)
+    env.close()
+
+
+@pytest.mark.parametrize(("level", "n_steps"), [("pixels", 12), ("keypoints", 120), ("truth", 120)])
+def test_two_runs_with_the_same_seed_are_bit_identical(level, n_steps):
+    first, second = make(perception=level), make(perception=level)
+    assert same(roll(first, n_steps), roll(second, n_steps))
+    first.close(), second.close()
+
+
+def test_another_seed_is_another_episode():
+    env = make(perception="truth")
+    assert not same(roll(env, 5, seed=0), roll(env, 5, seed=1))
+
+
+def test_a_reset_without_a_seed_goes_on_with_the_stream():
+    env = make(perception="truth")
+    first, _ = env.reset(seed=3)
+    second, _ = env.reset()
+    again, _ = env.reset(seed=3)
+    np.testing.assert_array_equal(first, again)
+    assert not np.array_equal(first, second)
+
+
+@pytest.mark.parametrize("level", FAST_LEVELS)
+def test_pickled_in_the_middle_of_an_episode_it_goes_on_the_same(level):
+    env = HRCReachEnv(perception=level)
+    roll(env, 20)
+    twin = pickle.loads(pickle.dumps(env))
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        action = rng.uniform(-1, 1, 6).astype(np.float32)
+        a, b = env.step(action), twin.step(action)
+        np.testing.assert_array_equal(a[0], b[0])
+        assert a[1:] == b[1:]
+
+
+def test_the_worker_walks_the_same_whoever_looks():
+    """The level is exchanged on the same seed; true separation depends on walk and actions only."""
+    separations = []
+    for level in FAST_LEVELS:
+        env = make(perception=level)
+        separations.append([seen[2].get("safety/min_separation_m") for seen in roll(env, 100)])
+    assert separations[0] == separations[1] == separations[2]
+
+
+def test_reward_is_the_sum_of_its_terms_in_info():
+    for _, reward, info in roll(make(perception="keypoints"), 60)[1:]:
+        terms = [value for name, value in info.items() if name.startswith("reward/")]
+        assert reward == pytest.approx(sum(terms), abs=1e-12)
+
+
+def test_cost_is_in_every_step_and_adds_up():
+    total = 0.0
+    for _, _, info in roll(make(perception="truth"), 250, seed=2)[1:]:
+        assert info["cost"] == info["cost_sum"] == info["cost_proximity"] + info["cost_contact"]
+        total += info["cost"]
+        assert info["episode_cost"] == total
+
+
+def test_an_episode_is_ten_seconds():
+    assert len(roll(make(perception="none"), 1000)) == 251
+
+
+def test_observations_stay_inside_their_space_and_are_fresh_copies():
+    env = make(perception="keypoints")
+    seen = [observation for observation, _, _ in roll(env, 120)]
+    assert all(env.observation_space.contains(observation) for observation in seen)
+    kept = seen[10].copy()
+    env.step(env.action_space.sample())
+    np.testing.assert_array_equal(seen[10], kept)
+
+
+def test_nobody_there_and_tool_control():
+    env = make(perception="keypoints", n_workers=0, control="tool")
+    assert env.action_space.shape == (3,)
+    infos = [info for _, _, info in roll(env, 30)]
+    assert all("tracking/mpjpe_m" not in info for info in infos)
+    assert all(info["tracking/lost"] == 0.0 for info in infos)
+
+
+def test_without_an_estimate_the_prior_is_observed_at_its_bounds():
+    env = HRCReachEnv(perception="none")
+    observation, info = env.reset(seed=0)
+    terms = env.split_observation(observation)
+    assert terms["worker_tracked"] == [0.0]
+    assert terms["worker_gap"] == [1.0]
+    np.testing.assert_allclose(terms["worker_joints_std"], 1.0)
+    np.testing.assert_allclose(terms["worker_joints_age"], 2.0)
+    assert info["tracking/lost"] == 1.0
+    assert "tracking/mpjpe_m" not in info
+
+
+def test_contact_ends_the_episode_when_asked():
+    config = {"cost": {"contact_terminates": True, "proximity_m": 9.0}}
+    for seed in range(40):
+        seen = roll(make(perception="truth", config=config), 250, seed)
+        if seen[-1][2]["cost_contact"]:
+            assert len(seen) < 251
+            return
+    pytest.fail("no contact in 40 episodes: the test saw nothing")
+
+
+def test_a_config_survives_the_spec_as_a_mapping():
+    """`EnvSpec.to_json` turns dataclasses into mappings; both are taken."""
+    env = make(perception="truth", config={"reward": {"proximity": 0.0}})
+    again = gymnasium.make(gymnasium.envs.registration.EnvSpec.from_json(env.spec.to_json()))
+    assert again.unwrapped.config == env.unwrapped.config
+    assert again.unwrapped.config.reward.proximity == 0.0
+
+
+@pytest.mark.parametrize(
+    ("kwargs", "said"),
+    [
+        ({"perception": "pixel"}, "Did you mean 'pixels'"),
+        ({"estimator": "ekf"}, "'paper'"),
+        ({"cameras": [7]}, "valid indices are 0 to 3"),
+        ({"cameras": []}, "at least one camera"),
+        ({"cameras": ["camera_9"]}, "camera_1"),
+        ({"scene": "moon"}, "'lab'"),
+        ({"control": "torque"}, "'joint', 'tool'"),
+        ({"n_workers": -1}, "0 or more"),
+        ({"render_mode": "human"}, "'rgb_array'"),
+        ({"config": {"rewards": {}}}, "Did you mean 'reward'"),
+        ({"config": {"reward": {"proximty": 1}}}, "Did you mean 'reward.proximity'"),
+        ({"config": {"ctrl_dt": 0.043}}, "multiple of scene.sim_dt"),
+        ({"config": 3}, "must be an HRCConfig"),
+    ],
+)
+def test_bad_arguments_are_answered_with_the_valid_ones(kwargs, said):
+    with pytest.raises(ConfigError, match=said):
+        HRCReachEnv(**{"perception": "truth", **kwargs})
+
+
+@pytest.mark.parametrize(
+    ("action", "said"),
+    [
+        (np.zeros(5), r"shape \(6,\)"),
+        (np.full(6, np.nan), "finite"),
+        (np.full(6, np.inf), "finite"),
+    ],
+)
+def test_bad_actions_are_refused_in_words(action, said):
+    env = HRCReachEnv(perception="truth")
+    env.reset(seed=0)
+    with pytest.raises(ConfigError, match=said):
+        env.step(action)
+
+
+def test_an_unknown_id_names_the_package():
+    with pytest.raises(gymnasium.error.Error, match="HRCReach"):
+        gymnasium.make("HRCReach-v7")
+    assert hrc_env.IDS == ("HRCReach-v0",)
+
+
+def test_stepping_before_a_reset_is_refused():
+    with pytest.raises(ConfigError, match="reset"):
+        HRCReachEnv(perception="truth").step(np.zeros(6))

@@ -1,0 +1,69 @@
+"""Reward terms: shapes, signs, and that their sum is the reward."""
+
+import numpy as np
+import pytest
+
+from hrc_env.geometry.distances import Gap
+from hrc_env.observations import Believed
+from hrc_env.records import PoseEstimate, RobotState
+from hrc_env.rewards import TERMS, RewardConfig, closeness, reward
+from hrc_env.tasks.reach import ReachProgress
+
+
+def believed(gap_m: float, action: float = 0.0, workers: int = 1) -> Believed:
+    shape = (1, workers, 15)
+    pose = PoseEstimate(
+        np.zeros((*shape, 3)), np.zeros((*shape, 3, 3)), np.zeros((*shape, 3)), np.zeros(shape),
+        np.ones(shape[:2], bool),
+    )  # fmt: skip
+    robot = RobotState(
+        np.zeros((1, 6)), np.zeros((1, 6)), np.zeros((1, 3)), np.zeros((1, 3)),
+        np.zeros((1, 9, 2, 3)), np.zeros(9),
+    )  # fmt: skip
+    gap = Gap(np.full((1, workers), gap_m), np.zeros((1, workers, 3)), np.zeros((1, workers, 3)))
+    return Believed(robot, pose, gap, np.zeros((1, 3)), np.ones(1), np.full((1, 6), action))
+
+
+def progress(metres: float = 0.0, reached: bool = False) -> ReachProgress:
+    return ReachProgress(np.array([metres]), np.array([reached]), np.array([False]))
+
+
+@pytest.mark.parametrize(
+    ("gap_m", "expected"),
+    [(1.0, 0.0), (0.3, 0.0), (0.15, 0.25), (0.0, 1.0), (-0.15, 2.25), (-5.0, 2.25), (np.inf, 0.0)],
+)
+def test_closeness_grows_from_its_reach_to_touch_and_saturates(gap_m, expected):
+    assert closeness(np.array(gap_m), 0.3) == pytest.approx(expected)
+
+
+def test_the_reward_is_the_sum_of_its_terms():
+    total, terms = reward(
+        believed(0.1, 0.5), progress(0.02, True), np.zeros((1, 6)), RewardConfig()
+    )
+    assert set(terms) == {term.name for term in TERMS}
+    assert total[0] == sum(value[0] for value in terms.values())
+
+
+def test_each_weight_scales_its_own_term_only():
+    now, step, before = believed(0.1, 0.5), progress(0.02, True), np.zeros((1, 6))
+    base = reward(now, step, before, RewardConfig())[1]
+    fields = {"progress": "progress_per_m", "goal": "goal", "effort": "effort",
+              "smoothness": "smoothness", "proximity": "proximity"}  # fmt: skip
+    for term, field in fields.items():
+        doubled = RewardConfig(**{field: 2 * getattr(RewardConfig(), field)})
+        changed = reward(now, step, before, doubled)[1]
+        assert changed[term][0] == pytest.approx(2 * base[term][0])
+        assert base[term][0] != 0
+        assert all(changed[other][0] == base[other][0] for other in fields if other != term)
+
+
+def test_the_nearest_of_several_workers_counts_and_nobody_costs_nothing():
+    near = reward(believed(0.0, workers=2), progress(), np.zeros((1, 6)), RewardConfig())[1]
+    nobody = reward(believed(0.0, workers=0), progress(), np.zeros((1, 6)), RewardConfig())[1]
+    assert near["proximity"][0] == pytest.approx(-2.0)
+    assert nobody["proximity"][0] == 0.0
+
+
+def test_a_term_that_is_not_a_number_is_a_fault_and_raises():
+    with pytest.raises(FloatingPointError, match="progress"):
+        reward(believed(1.0), progress(np.nan), np.zeros((1, 6)), RewardConfig())

@@ -1,0 +1,147 @@
+"""Train a policy with PPO, evaluate it on fixed seeds, draw its learning curve and film it.
+
+python train.py                       # the quick preset: minutes on two cores
+python train.py --resume runs/quick   # go on where it stopped
+python train.py --proximity 0         # the same without the safety term
+tensorboard --logdir runs
+"""
+
+import json
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+import tyro
+
+from agents import ppo
+from agents.base import Situation
+from agents.evaluate import evaluate
+from agents.monitor import Curve, TrainingMonitor, plot_curve
+from hrc_env.errors import CheckpointError
+from hrc_env.provenance import provenance
+from hrc_env.sb3 import HRCVecEnv
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """Train PPO on HRCReach-v0."""
+
+    out: Path = Path("runs/quick")
+    """Folder for checkpoints, curves, TensorBoard logs and the film."""
+    timesteps: int = 1_000_000
+    """Environment steps in all (with --resume: counted from the very start)."""
+    num_envs: int = 64
+    """Environments that step together."""
+    seed: int = 0
+    """Seed of the environments and of the learner."""
+    perception: str = "keypoints"
+    """What the robot learns on: keypoints (camera emulator), truth, none; pixels is slow."""
+    estimator: str = "particle"
+    """particle, paper or triangulation."""
+    control: str = "joint"
+    """joint or tool."""
+    proximity: float = 2.0
+    """Weight of closeness to the estimated body in the reward; 0 trains without it."""
+    threads: int = 2
+    """Threads for physics and gradients."""
+    episodes: int = 128
+    """Episodes of the evaluation at the end."""
+    film: bool = True
+    """Film the trained policy at the end (needs OpenGL)."""
+    resume: Path | None = None
+    """A folder of an earlier run to go on with."""
+
+
+def main(arguments: Arguments) -> None:
+    """Train, evaluate, draw, film."""
+    torch.set_num_threads(arguments.threads)
+    folder = arguments.resume or arguments.out
+    folder.mkdir(parents=True, exist_ok=True)
+    kwargs = environment_arguments(arguments)
+    _write(folder / "run.json", {"arguments": _plain(arguments), **provenance()})
+    curve, seconds = train(arguments, folder, kwargs)
+    print(f"Evaluating {arguments.episodes} episodes on fixed seeds ...")
+    checkpoint = folder / "policy.zip"
+    score = evaluate(lambda here: ppo.load(checkpoint, here), arguments.episodes, **kwargs)
+    _write(folder / "score.json", {**score.as_dict(), "training_s": seconds})
+    title = f"PPO, {arguments.perception}, proximity weight {arguments.proximity:g}"
+    plot_curve(curve, folder / "curve.png", title)
+    for name, value in score.as_dict().items():
+        print(f"  {name:28s} {value:.3f}")
+    if arguments.film:
+        film(checkpoint, folder / "policy.mp4", arguments, kwargs)
+    print(f"Policy, curve and film are in {folder}/")
+
+
+def environment_arguments(arguments: Arguments) -> dict[str, Any]:
+    """Keyword arguments of the environment that a run learns and is judged in."""
+    return {
+        "perception": arguments.perception,
+        "estimator": arguments.estimator,
+        "control": arguments.control,
+        "config": {"reward": {"proximity": arguments.proximity}},
+        "n_threads": arguments.threads,
+    }
+
+
+def train(arguments: Arguments, folder: Path, kwargs: dict[str, Any]) -> tuple[Curve, float]:
+    """Learn; returns the curve and the seconds it took. Progress survives a kill."""
+    settings = ppo.PPOSettings()
+    env = HRCVecEnv(arguments.num_envs, seed=arguments.seed, **kwargs)
+    curve = Curve()
+    if arguments.resume is not None:
+        learner = ppo.resume(folder / "policy.zip", env, folder / "tensorboard")
+        if (folder / "curve.json").exists():
+            curve = Curve(json.loads((folder / "curve.json").read_text()))
+        if learner.num_timesteps >= arguments.timesteps:
+            raise CheckpointError(
+                f"{folder} has learnt {learner.num_timesteps} steps already; "
+                f"ask for more than that with --timesteps."
+            )
+    else:
+        learner = ppo.make_learner(env, settings, arguments.seed, folder / "tensorboard")
+    facts = {"environment": kwargs, "settings": ppo.settings_as_dict(settings)}
+    monitor = TrainingMonitor(folder, arguments.timesteps, facts, curve)
+    started_s = time.monotonic()
+    learner.learn(
+        arguments.timesteps - learner.num_timesteps,
+        callback=monitor,
+        reset_num_timesteps=arguments.resume is None,
+        tb_log_name="ppo",
+    )
+    env.close()
+    return curve, time.monotonic() - started_s
+
+
+def film(checkpoint: Path, path: Path, arguments: Arguments, kwargs: dict[str, Any]) -> None:
+    """Film one episode of the policy, if this machine can draw."""
+    from hrc_env.cli.film import film_episode
+    from hrc_env.errors import RenderingError
+
+    def make(here: Situation) -> ppo.TrainedAgent:
+        return ppo.load(checkpoint, here)
+
+    settings = {name: value for name, value in kwargs.items() if name != "n_threads"}
+    try:
+        film_episode(make, path, seed=arguments.seed, **settings)
+    except RenderingError as error:
+        print(f"No film: {error}")
+
+
+def _plain(arguments: Arguments) -> dict[str, Any]:
+    return {
+        name: str(value) if isinstance(value, Path) else value
+        for name, value in asdict(arguments).items()
+    }
+
+
+def _write(path: Path, content: dict[str, Any]) -> None:
+    draft = path.with_suffix(".draft")
+    draft.write_text(json.dumps(content, indent=1))
+    draft.replace(path)
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Arguments, description=__doc__))
