@@ -1,0 +1,83 @@
+"""A worker's bones as the kinematics want them: rest offsets, rest frames and lengths."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hrc_env.body import PARENT, Body
+from hrc_env.typing import Floats
+
+CHEST, HEAD = 3, 5
+LEFT, SIDE_STRIDE = 6, 8
+"""First segment of the left side, and how many a side has (order of `hrc_env.body`)."""
+CLAVICLE, UPPER_ARM, FOREARM, HAND, THIGH, SHANK, FOOT, TOES = range(8)
+"""Segments of one side, counted from its first."""
+
+ARM, FOREARM_GRIP, LEG, THIGH_LENGTH, SHANK_LENGTH, ANKLE_Z, STAND_Z = range(7)
+ANKLE_X, BALL_X, BALL_Z, HEEL_X, UPPER_LENGTH = range(7, 12)
+N_SIZES = 12
+"""Columns of `Anatomy.size` [m]: shoulder to grip, elbow to grip, hip to ankle, its two
+bones, height of the resting ankle, height of the standing pelvis; forward of the pelvis the
+ankle; forward of and above the ankle the ball of the foot; the heel; the upper arm."""
+
+GRIP_M = 0.08
+"""How far beyond the wrist a hand grips (half a hand's length, a judgement)."""
+HEEL_M = -0.045
+"""Heel's contact behind the ankle (a quarter of a foot, a judgement)."""
+STAND_SHARE = 0.985
+"""Standing hip height as a share of the leg's length: knees just unlocked."""
+
+
+@dataclass(frozen=True, slots=True)
+class Anatomy:
+    """Constants of one body."""
+
+    offset: Floats
+    """(22, 3) origin of each segment in its parent's frame at rest [m]."""
+    frame: Floats
+    """(22, 3, 3) of limb bones: rows bone, hinge x bone, hinge at rest (else zero)."""
+    size: Floats
+    """(12,) lengths [m], see the names above."""
+
+
+def anatomy(body: Body) -> Anatomy:
+    """Measure a body; the right side's lengths are taken to equal the left side's."""
+    rest = np.asarray(body.rest_position, float)
+    offset = rest - rest[np.maximum(PARENT, 0)]
+    offset[0] = rest[0]
+    frame = np.zeros((len(rest), 3, 3))
+    for first in (LEFT, LEFT + SIDE_STRIDE):
+        # Elbows point backwards, knees forwards: the pole each hinge is made with.
+        for bone, pole in ((UPPER_ARM, -1.0), (FOREARM, -1.0), (THIGH, 1.0), (SHANK, 1.0)):
+            along = rest[first + bone + 1] - rest[first + bone]
+            frame[first + bone] = _rest_frame(along, np.array([pole, 0.0, 0.0]))
+    return Anatomy(np.ascontiguousarray(offset), frame, _sizes(rest))
+
+
+def _rest_frame(along: Floats, pole: Floats) -> Floats:
+    """Rows bone, hinge x bone, hinge of a bone whose middle joint would bulge to `pole`."""
+    along = along / np.linalg.norm(along)
+    hinge = np.cross(pole, along)
+    hinge /= np.linalg.norm(hinge)
+    return np.stack([along, np.cross(hinge, along), hinge])
+
+
+def _sizes(rest: Floats) -> Floats:
+    """The lengths of `Anatomy.size`."""
+    at = {name: rest[LEFT + index] for index, name in enumerate(_SIDE)}
+    upper, fore, thigh, shank = (
+        float(np.linalg.norm(at[b] - at[a]))
+        for a, b in (("arm", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle"))
+    )
+    size = np.zeros(N_SIZES)
+    size[ARM], size[FOREARM_GRIP], size[UPPER_LENGTH] = upper + fore + GRIP_M, fore + GRIP_M, upper
+    size[LEG], size[THIGH_LENGTH], size[SHANK_LENGTH] = thigh + shank, thigh, shank
+    size[ANKLE_Z] = at["ankle"][2]
+    size[STAND_Z] = at["ankle"][2] + STAND_SHARE * (thigh + shank) + rest[0, 2] - at["hip"][2]
+    size[ANKLE_X] = at["ankle"][0] - rest[0, 0]
+    size[BALL_X], size[BALL_Z] = (at["ball"] - at["ankle"])[[0, 2]]
+    size[HEEL_X] = HEEL_M
+    return size
+
+
+_SIDE = ("clavicle", "arm", "elbow", "wrist", "hip", "knee", "ankle", "ball")

@@ -1,0 +1,87 @@
+"""Smooth scalar curves that every activity is made of (compiled, no allocation)."""
+
+import math
+
+import numba
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def min_jerk(u: float) -> float:
+    """0 to 1 over u in [0, 1] with zero velocity and acceleration at both ends, else held.
+
+    Flash & Hogan (1985), doi:10.1523/JNEUROSCI.05-07-01688.1985; its peak rate is 1.875.
+    """
+    if u <= 0.0:
+        return 0.0
+    if u >= 1.0:
+        return 1.0
+    return u * u * u * (10.0 - 15.0 * u + 6.0 * u * u)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def ramp(u: float) -> float:
+    """Integral of a smoothstep: distance while speed grows smoothly from 0 to 1, then stays."""
+    if u <= 0.0:
+        return 0.0
+    if u >= 1.0:
+        return u - 0.5
+    return u * u * u * (1.0 - 0.5 * u)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def cruise(u: float, share: float) -> float:
+    """0 to 1 over u in [0, 1] at constant speed but for smooth ramps of `share` at each end."""
+    if u <= 0.0:
+        return 0.0
+    if u >= 1.0:
+        return 1.0
+    top = share / (1.0 - share)
+    if u < 0.5:
+        return top * ramp(u / share)
+    return 1.0 - top * ramp((1.0 - u) / share)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def hump(u: float) -> float:
+    """0 at the ends of [0, 1], 1 in the middle, flat to second order at the ends; 0 outside."""
+    if u <= 0.0 or u >= 1.0:
+        return 0.0
+    v = 4.0 * u * (1.0 - u)
+    return v * v * v
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def soft_min(a: float, b: float, width: float) -> float:
+    """Less than both, and equal to the smaller one when they differ by more than `width`."""
+    d = a - b
+    return 0.5 * (a + b - math.sqrt(d * d + width * width))
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def saturate(d: float, knee: float, limit: float) -> float:
+    """d up to `knee`, then bending smoothly so that it never passes `limit`."""
+    if d <= knee:
+        return d
+    span = limit - knee
+    return knee + span * math.tanh((d - knee) / span)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def decay(u: float, duration: float, value: float, rate: float) -> float:
+    """Quintic from (value, rate, 0) at u = 0 to rest at zero at u = 1: inertialisation.
+
+    Bollo, "Inertialization: high-performance animation transitions", GDC 2018.
+    """
+    if u >= 1.0:
+        return 0.0
+    v = rate * duration
+    a3 = -10.0 * value - 6.0 * v
+    a4 = 15.0 * value + 8.0 * v
+    a5 = -6.0 * value - 3.0 * v
+    return value + u * (v + u * u * (a3 + u * (a4 + u * a5)))
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def wrap(angle: float) -> float:
+    """The same direction in (-pi, pi]."""
+    return math.atan2(math.sin(angle), math.cos(angle))

@@ -1,0 +1,108 @@
+"""Standing at ease, and the one way in which trunks go to where hands are wanted."""
+
+import math
+
+import numba
+
+from hrc_env.motion import controls as c
+from hrc_env.motion import plans as pl
+from hrc_env.motion.anatomy import ARM, FOREARM_GRIP, LEFT, SIDE_STRIDE, STAND_Z, UPPER_ARM
+from hrc_env.motion.kinematics import ARM_KNEE, pose
+from hrc_env.typing import Floats
+
+STANCE_HALF_WIDTH_M = 0.10
+"""Ankles' distance from the middle when standing [m]; shoulder-wide for the baked bodies."""
+TOE_OUT_RAD = 0.12
+"""Feet turn out by about 7 degrees, standing and walking."""
+SWAY_HZ = (0.11, 0.17, 0.29, 0.41, 0.23)
+"""Rates of the slow sway of a standing person, incommensurable so that it does not repeat."""
+SHIFT_M = 0.018
+"""Weight shifts from leg to leg by about this much [m]; judgement."""
+RELAXED_PITCH, RELAXED_ELBOW, RELAXED_OUT = 0.02, 0.38, 0.16
+"""Hanging arms: upper arm forward, elbow bent, upper arm away from the trunk [rad]."""
+MOST_LEAN = 1.2
+"""Lean beyond which a person would step instead."""
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def sway(clock_s: float, i: int, traits: Floats) -> float:
+    """A slow wave of the worker's own, between -1 and 1; i in 0..4."""
+    turn = 2.0 * math.pi
+    return math.sin(turn * (SWAY_HZ[i] * clock_s + traits[pl.PHASE + i]))
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def hang(side: int, pitch: float, elbow: float, size: Floats, q: Floats) -> None:
+    """Let an arm hang: upper arm `pitch` forward of the vertical, elbow bent by `elbow`."""
+    sign = 1.0 - 2.0 * side
+    fore = size[FOREARM_GRIP]
+    upper = size[ARM] - fore
+    at = c.HAND_OFFSET + 3 * side
+    cos, sin = math.cos(pitch), math.sin(pitch)
+    both_cos, both_sin = math.cos(pitch + elbow), math.sin(pitch + elbow)
+    q[at] = sin * upper + both_sin * fore
+    q[at + 1] = sign * (RELAXED_OUT * upper + 0.01)
+    q[at + 2] = -(cos * upper * (1.0 - 0.5 * RELAXED_OUT * RELAXED_OUT) + both_cos * fore)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def stand(
+    x: float, y: float, yaw: float, clock_s: float, traits: Floats, size: Floats, q: Floats
+) -> None:
+    """Fill every column but the feet: at ease at (x, y), shifting weight, looking about."""
+    side_shift = SHIFT_M * (0.7 * sway(clock_s, 0, traits) + 0.3 * sway(clock_s, 2, traits))
+    ahead = 0.006 * sway(clock_s, 3, traits)
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    q[c.ROOT_X] = x + cos * ahead - sin * side_shift
+    q[c.ROOT_Y] = y + sin * ahead + cos * side_shift
+    q[c.HEADING], q[c.PELVIS_Z] = yaw, size[STAND_Z]
+    q[c.PELVIS_PITCH] = 0.02 + 0.01 * sway(clock_s, 3, traits)
+    q[c.PELVIS_ROLL] = 1.2 * side_shift
+    q[c.PELVIS_YAW] = 0.03 * sway(clock_s, 1, traits)
+    q[c.SPINE_FLEX] = 0.04 + 0.015 * sway(clock_s, 2, traits)
+    q[c.SPINE_SIDE] = -1.5 * side_shift
+    q[c.SPINE_TWIST] = 0.04 * sway(clock_s, 4, traits)
+    q[c.HEAD_PITCH] = 0.06 + 0.05 * sway(clock_s, 1, traits)
+    q[c.HEAD_YAW] = 0.12 * sway(clock_s, 4, traits) + 0.08 * sway(clock_s, 2, traits)
+    q[c.SWIVEL], q[c.SWIVEL + 1] = 0.1, 0.1
+    for side in range(2):
+        wave = 0.04 * sway(clock_s, 3 - side, traits)
+        hang(side, RELAXED_PITCH + wave, RELAXED_ELBOW + wave, size, q)
+        q[c.HAND_SHARE + side] = 0.0
+    for i in range(6):
+        q[c.HAND_TARGET + i] = 0.0
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def lean(amount: float, squat: float, twist: float, q: Floats) -> None:
+    """Bend the trunk forward (1: a deep bow), the knees too by the share `squat`, and turn.
+
+    The pelvis goes back as the trunk goes forward, so that the feet can stay under the weight.
+    """
+    back = (0.07 + 0.10 * squat) * amount
+    q[c.ROOT_X] -= math.cos(q[c.HEADING]) * back
+    q[c.ROOT_Y] -= math.sin(q[c.HEADING]) * back
+    q[c.PELVIS_Z] -= (0.03 + 0.33 * squat) * amount
+    q[c.PELVIS_PITCH] += (0.62 - 0.12 * squat) * amount
+    q[c.SPINE_FLEX] += (0.72 - 0.25 * squat) * amount
+    q[c.HEAD_PITCH] -= 0.45 * amount
+    q[c.PELVIS_YAW] += 0.35 * twist
+    q[c.SPINE_TWIST] += 0.65 * twist
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def beyond(
+    q: Floats, used: tuple[float, float], offset: Floats, frame: Floats, size: Floats,
+    p: Floats, r: Floats, work: Floats,
+) -> float:  # fmt: skip
+    """How far the targets lie beyond what the used arms reach from this posture [m]."""
+    pose(q, offset, frame, size, p, r, work)
+    far = -1.0
+    for side in range(2):
+        upper = LEFT + SIDE_STRIDE * side + UPPER_ARM
+        d = 0.0
+        for i in range(3):
+            d += (q[c.HAND_TARGET + 3 * side + i] - p[upper, i]) ** 2
+        if used[side] > 0.0:
+            far = max(far, math.sqrt(d) - ARM_KNEE * size[ARM])
+    return far

@@ -1,0 +1,204 @@
+"""Walking: a curved path, a speed that rises and falls, footsteps laid along it.
+
+Cadence and step length follow 68 walking trials of the CMU motion-capture database at
+0.8 to 2 m/s: cadence = 96.2 v^0.468 steps/min, step length = 0.345 + 0.286 v m.
+"""
+
+import math
+
+import numba
+
+from hrc_env.motion import controls as c
+from hrc_env.motion import plans as pl
+from hrc_env.motion.anatomy import ANKLE_X
+from hrc_env.motion.curves import min_jerk, ramp, wrap
+from hrc_env.motion.posture import (
+    RELAXED_ELBOW,
+    RELAXED_PITCH,
+    STANCE_HALF_WIDTH_M,
+    TOE_OUT_RAD,
+    hang,
+    stand,
+)
+from hrc_env.typing import Floats
+
+CADENCE_PER_MIN, CADENCE_POWER, SLOWEST_M_S = 96.2, 0.468, 0.65
+"""Fit above; slower starts and turns keep the cadence of the slowest speed [m/s]."""
+SWING_SHARE = 0.76
+"""Time in the air in periods of a step: stance is 62 % of the gait cycle."""
+MID_STANCE = 0.50
+"""When the root passes over a footprint, in periods of a step after its landing."""
+WALK_HALF_WIDTH_M = 0.04
+"""Half the step width at full speed [m]; 5 to 9 cm measured."""
+SHIFT_S, TURN_S, TURN_RATE = 0.12, 0.5, 1.7
+"""Weight shift before the first step [s]; duration of a turn: TURN_S + angle / TURN_RATE."""
+NORMAL_M_S = 1.3
+"""Speed at which the amplitudes below hold."""
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def travelled(t: float, plan: Floats) -> float:
+    """Metres along the path at time t."""
+    u, rise = t - plan[pl.DEPART], plan[pl.RAMP]
+    slow = plan[pl.DURATION] - rise
+    return plan[pl.SPEED] * rise * (ramp(u / rise) - ramp((u - slow) / rise))
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def speed(t: float, plan: Floats) -> float:
+    """Rate of `travelled` [m/s]."""
+    u, rise = t - plan[pl.DEPART], plan[pl.RAMP]
+    slow = plan[pl.DURATION] - rise
+    a, b = min(max(u / rise, 0.0), 1.0), min(max((u - slow) / rise, 0.0), 1.0)
+    return plan[pl.SPEED] * (a * a * (3.0 - 2.0 * a) - b * b * (3.0 - 2.0 * b))
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def along(u: float, plan: Floats) -> tuple[float, float, float]:
+    """Point of the path (a quadratic Bezier curve) at share u, and its direction."""
+    x0, y0, x1, y1 = plan[pl.START_X], plan[pl.START_Y], plan[pl.VIA_X], plan[pl.VIA_Y]
+    x2, y2 = plan[pl.END_X], plan[pl.END_Y]
+    v = 1.0 - u
+    x = v * v * x0 + 2.0 * u * v * x1 + u * u * x2
+    y = v * v * y0 + 2.0 * u * v * y1 + u * u * y2
+    tx, ty = v * (x1 - x0) + u * (x2 - x1), v * (y1 - y0) + u * (y2 - y1)
+    return x, y, math.atan2(ty, tx)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def root(t: float, plan: Floats) -> tuple[float, float, float]:
+    """Where the walker's middle is at time t, and their heading (continuous, not wrapped)."""
+    x, y, direction = along(min(travelled(t, plan) / plan[pl.LENGTH], 1.0), plan)
+    turning = min_jerk(t / plan[pl.TURN_IN_S])
+    yaw = plan[pl.START_YAW] - plan[pl.TURN_IN] * turning
+    if plan[pl.FOLLOW] > 0.0:
+        yaw += wrap(direction - (plan[pl.START_YAW] - plan[pl.TURN_IN]))
+    turned = min_jerk((t - plan[pl.TURN_OUT_AT]) / plan[pl.TURN_OUT_S])
+    return x, y, yaw + plan[pl.TURN_OUT] * turned
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def walk(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q: Floats) -> None:
+    """The control vector of a walker but for the feet."""
+    x, y, yaw = root(t, plan)
+    stand(x, y, yaw, clock_s, traits, size, q)
+    period, last = plan[pl.STEP_PERIOD], plan[pl.STEP_COUNT] - 1.0
+    phase = (t - plan[pl.STEP_START]) / period
+    lead = 1.0 - 2.0 * plan[pl.STEP_FIRST]
+    going = min_jerk((phase + 0.4) / 0.8) - min_jerk((phase - last) / 0.9)
+    pace = speed(t, plan) / NORMAL_M_S
+    over = -lead * math.cos(math.pi * (phase - 0.5 * SWING_SHARE)) * going
+    left_ahead = lead * math.cos(math.pi * (phase - SWING_SHARE)) * pace
+    both_down = math.cos(2.0 * math.pi * (phase - 0.5 * (1.0 + SWING_SHARE)))
+    shift = (0.028 - 0.008 * min(pace, 1.0)) * over
+    q[c.ROOT_X] -= math.sin(yaw) * shift
+    q[c.ROOT_Y] += math.cos(yaw) * shift
+    q[c.PELVIS_Z] -= 0.018 * pace + 0.006 * going + 0.013 * pace * both_down
+    q[c.PELVIS_PITCH] += 0.03 * pace
+    q[c.PELVIS_ROLL] += 0.04 * over
+    q[c.PELVIS_YAW] -= 0.075 * left_ahead
+    q[c.SPINE_FLEX] += 0.03 * pace
+    q[c.SPINE_SIDE] -= 0.05 * over
+    q[c.SPINE_TWIST] += 0.19 * left_ahead
+    _, _, ahead = root(t + 0.5, plan)
+    q[c.HEAD_YAW] += 0.8 * min(max(ahead - yaw, -0.8), 0.8) - 0.5 * 0.115 * left_ahead
+    for side in range(2):
+        swing = -(1.0 - 2.0 * side) * left_ahead
+        reach = 0.19 * pace + 0.10
+        hang(
+            side,
+            RELAXED_PITCH - 0.06 * pace + reach * swing,
+            RELAXED_ELBOW + 0.10 * pace + 0.16 * swing,
+            size,
+            q,
+        )
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def plan_walk(
+    start: tuple[float, float, float], via: tuple[float, float], end: tuple[float, float, float],
+    wished_m_s: float, plan: Floats, prints: Floats, stance: Floats, size: Floats,
+) -> float:  # fmt: skip
+    """Plan to go from (x, y, yaw) to (x, y, yaw) by way of `via`; returns the duration [s]."""
+    plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW] = start
+    plan[pl.VIA_X], plan[pl.VIA_Y] = via
+    plan[pl.END_X], plan[pl.END_Y] = end[0], end[1]
+    length, x, y = 1e-6, start[0], start[1]
+    for i in range(1, 17):
+        nx, ny, _ = along(i / 16.0, plan)
+        length += math.hypot(nx - x, ny - y)
+        x, y = nx, ny
+    follow = 1.0 if length > 0.5 else 0.0
+    plan[pl.LENGTH], plan[pl.FOLLOW] = length, follow
+    wished = wished_m_s if follow > 0.0 else 0.25
+    plan[pl.RAMP] = 0.45 + 0.4 * wished
+    plan[pl.SPEED] = min(wished, length / plan[pl.RAMP])
+    plan[pl.DURATION] = length / plan[pl.SPEED] + plan[pl.RAMP]
+    _plan_turns(end[2], plan)
+    period = 60.0 / (CADENCE_PER_MIN * max(plan[pl.SPEED], SLOWEST_M_S) ** CADENCE_POWER)
+    plan[pl.STEP_PERIOD], plan[pl.STEP_SWING] = period, SWING_SHARE * period
+    plan[pl.STEP_START] = SHIFT_S
+    return _plan_steps(plan, prints, stance, size)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _plan_turns(end_yaw: float, plan: Floats) -> None:
+    """Turn into the path and out of it; who must turn far sets off when the turn is nearly done."""
+    _, _, first = along(0.0, plan)
+    _, _, final = along(1.0, plan)
+    start_yaw = plan[pl.START_YAW]
+    turn = wrap(start_yaw - first) if plan[pl.FOLLOW] > 0.0 else 0.0
+    plan[pl.TURN_IN], plan[pl.TURN_IN_S] = turn, TURN_S + abs(turn) / TURN_RATE
+    plan[pl.DEPART] = SHIFT_S + 0.15 + max(0.0, plan[pl.TURN_IN_S] - TURN_S - 0.45)
+    arrival = plan[pl.DEPART] + plan[pl.DURATION]
+    heading = start_yaw - turn
+    heading += wrap(final - heading) if plan[pl.FOLLOW] > 0.0 else 0.0
+    turn = wrap(end_yaw - heading)
+    plan[pl.TURN_OUT], plan[pl.TURN_OUT_S] = turn, TURN_S + abs(turn) / TURN_RATE
+    plan[pl.TURN_OUT_AT] = max(arrival - 0.7, SHIFT_S) if plan[pl.FOLLOW] > 0.0 else SHIFT_S
+    plan[pl.END_YAW] = heading + turn
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _plan_steps(plan: Floats, prints: Floats, stance: Floats, size: Floats) -> float:
+    """Lay footprints where the root will pass at mid-stance; the last two stand at the end."""
+    period, start = plan[pl.STEP_PERIOD], plan[pl.STEP_START]
+    done = max(plan[pl.DEPART] + plan[pl.DURATION], plan[pl.TURN_OUT_AT] + plan[pl.TURN_OUT_S])
+    over = start + (SWING_SHARE + MID_STANCE) * period
+    count = min(max(2 + math.ceil((done - 0.12 - over) / period), 2), pl.MAX_STEPS)
+    plan[pl.STEP_COUNT], plan[pl.STEP_FIRST] = count, _first_foot(plan)
+    for k in range(count):
+        side = (k + int(plan[pl.STEP_FIRST])) % 2
+        when = over + k * period if k < count - 2 else done + 1.0
+        x, y, yaw = root(when, plan)
+        narrow = min(speed(when, plan) / 0.8, 1.0)
+        half = STANCE_HALF_WIDTH_M + (WALK_HALF_WIDTH_M - STANCE_HALF_WIDTH_M) * narrow
+        footprint(side, x, y, yaw, half, size, prints[k])
+        x, y = stance[side, 0], stance[side, 1]
+        if k >= 2:
+            x, y = prints[k - 2, 0], prints[k - 2, 1]
+        prints[k, 3] = min(math.hypot(prints[k, 0] - x, prints[k, 1] - y) / NORMAL_M_S, 1.1)
+    return start + (count - 1) * period + plan[pl.STEP_SWING] + 0.05
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _first_foot(plan: Floats) -> float:
+    """Begin with the foot on the side that the walker turns or steps to."""
+    x, y, yaw = root(plan[pl.DEPART] + plan[pl.DURATION], plan)
+    dx, dy = x - plan[pl.START_X], y - plan[pl.START_Y]
+    side = -dx * math.sin(plan[pl.START_YAW]) + dy * math.cos(plan[pl.START_YAW])
+    turn = -plan[pl.TURN_IN] if plan[pl.FOLLOW] > 0.0 else side + 0.1 * (yaw - plan[pl.START_YAW])
+    return 0.0 if turn >= 0.0 else 1.0
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def footprint(
+    side: int, x: float, y: float, yaw: float, half_width: float, size: Floats, out: Floats
+) -> None:
+    """x, y, heading of a foot of someone whose middle is over (x, y)."""
+    sign = 1.0 - 2.0 * side
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    ahead, left = size[ANKLE_X], sign * half_width
+    out[0] = x + cos * ahead - sin * left
+    out[1] = y + sin * ahead + cos * left
+    out[2] = yaw + sign * TOE_OUT_RAD
