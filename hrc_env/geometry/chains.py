@@ -111,7 +111,7 @@ def _flat(chain: SerialChain, name: str, values: Floats) -> tuple[Floats, tuple[
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _forward(q, base, parent_from_joint, frames):  # noqa: ANN001, ANN202
+def _forward(q, base, parent_from_joint, frames):
     """Multiply the frames up; only the 3 x 4 part takes part."""
     for b in range(q.shape[0]):
         for i in range(q.shape[1]):
@@ -132,7 +132,7 @@ def _forward(q, base, parent_from_joint, frames):  # noqa: ANN001, ANN202
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _apply(frame, point, out):  # noqa: ANN001, ANN202
+def _apply(frame, point, out):
     """out = frame @ point."""
     for row in range(3):
         out[row] = frame[row, 3] + (
@@ -141,7 +141,7 @@ def _apply(frame, point, out):  # noqa: ANN001, ANN202
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _jacobian(frames, tool_in_link, out):  # noqa: ANN001, ANN202
+def _jacobian(frames, tool_in_link, out):
     """Column i is (axis_i x (tool - origin_i), axis_i)."""
     point = np.empty(3)
     n = frames.shape[1]
@@ -158,7 +158,7 @@ def _jacobian(frames, tool_in_link, out):  # noqa: ANN001, ANN202
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _tool_motion(frames, qd, tool_in_link, point, velocity):  # noqa: ANN001, ANN202
+def _tool_motion(frames, qd, tool_in_link, point, velocity):
     n = frames.shape[1]
     column = np.empty((1, 6, n))
     for b in range(frames.shape[0]):
@@ -172,7 +172,7 @@ def _tool_motion(frames, qd, tool_in_link, point, velocity):  # noqa: ANN001, AN
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _capsules(frames, link, ends_link, ends_world):  # noqa: ANN001, ANN202
+def _capsules(frames, link, ends_link, ends_world):
     for b in range(frames.shape[0]):
         for k in range(len(link)):
             for e in range(2):

@@ -17,7 +17,7 @@ LOOKS = {"group": ROBOT_LOOKS}
 MATERIALS: dict[str, tuple[tuple[float, float, float], float, float]] = {
     "arm_tube": ((0.83, 0.84, 0.85), 0.55, 0.55),
     "arm_joint": ((0.64, 0.66, 0.69), 0.5, 0.45),
-    "arm_cap": ((0.33, 0.60, 0.83), 0.65, 0.6),
+    "arm_cap": ((0.40, 0.66, 0.88), 0.65, 0.6),
     "arm_black": ((0.05, 0.05, 0.055), 0.35, 0.3),
     "arm_dark": ((0.20, 0.21, 0.23), 0.4, 0.3),
     "arm_steel": ((0.74, 0.75, 0.77), 0.9, 0.8),
@@ -83,7 +83,7 @@ def add_link_looks(
     cylinder(wrist_3, (0.040, 0, plug), (0.056, 0, plug), 0.008, "arm_black", **LOOKS)
 
 
-def _cap(link: Any, at: tuple[float, float, float], way: tuple[float, float, float], radius: float):  # noqa: ANN202
+def _cap(link: Any, at: tuple[float, float, float], way: tuple[float, float, float], radius: float):
     """A blue lid: black ring, short cylinder, flat dome, in direction `way` from `at`."""
 
     def along(distance: float) -> tuple[float, ...]:

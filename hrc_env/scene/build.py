@@ -137,8 +137,8 @@ def _base_transform() -> np.ndarray:
 
 def _add_worker(spec: mujoco.MjSpec, worker: int, body_name: str) -> list[str]:
     """One worker; the names of their segments' bodies in the model."""
-    from hrc_env.body import SEGMENTS, load_body, load_looks  # noqa: PLC0415
-    from hrc_env.scene.worker import add_worker  # noqa: PLC0415
+    from hrc_env.body import SEGMENTS, load_body, load_looks
+    from hrc_env.scene.worker import add_worker
 
     prefix = f"worker_{worker + 1}/"
     add_worker(spec, load_body(body_name), load_looks(body_name), prefix)

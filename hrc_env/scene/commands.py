@@ -38,7 +38,7 @@ def substep_commands(
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _ramp(q, previous, wanted, ranges, limits, slew, sim_dt, out):  # noqa: ANN001, ANN202
+def _ramp(q, previous, wanted, ranges, limits, slew, sim_dt, out):
     brake, ctrl_dt = BRAKE_SHARE * slew, sim_dt * out.shape[1]
     for b in range(q.shape[0]):
         for i in range(q.shape[1]):

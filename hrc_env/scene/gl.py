@@ -64,11 +64,11 @@ def new_context(width_px: int, height_px: int) -> Any:
 def _context_class(backend: str) -> Any:
     """The backend's class itself: mujoco.GLContext is fixed at mujoco's first import."""
     if backend == "egl":
-        from mujoco.egl import GLContext  # noqa: PLC0415
+        from mujoco.egl import GLContext
     elif backend == "osmesa":
-        from mujoco.osmesa import GLContext  # noqa: PLC0415
+        from mujoco.osmesa import GLContext
     else:
-        from mujoco import GLContext  # noqa: PLC0415
+        from mujoco import GLContext
     return GLContext
 
 

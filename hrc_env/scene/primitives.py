@@ -37,7 +37,7 @@ def yaw_quaternion(yaw_rad: float) -> np.ndarray:
     return np.array([np.cos(yaw_rad / 2), 0.0, 0.0, np.sin(yaw_rad / 2)])
 
 
-def cylinder(body: Any, start: Vector, end: Vector, radius: float, material: str, **more: Any):  # noqa: ANN201
+def cylinder(body: Any, start: Vector, end: Vector, radius: float, material: str, **more: Any):
     """A cylinder between two points, looks only unless `more` says otherwise."""
     pos, quat, half = rod_pose(start, end)
     return body.add_geom(
@@ -50,7 +50,7 @@ def cylinder(body: Any, start: Vector, end: Vector, radius: float, material: str
     )
 
 
-def capsule(body: Any, start: Vector, end: Vector, radius: float, **more: Any):  # noqa: ANN201
+def capsule(body: Any, start: Vector, end: Vector, radius: float, **more: Any):
     """A capsule whose axis runs between two points."""
     pos, quat, half = rod_pose(start, end)
     return body.add_geom(
@@ -58,7 +58,7 @@ def capsule(body: Any, start: Vector, end: Vector, radius: float, **more: Any): 
     )
 
 
-def ellipsoid(body: Any, centre: Vector, radii: Vector, material: str, **more: Any):  # noqa: ANN201
+def ellipsoid(body: Any, centre: Vector, radii: Vector, material: str, **more: Any):
     """An ellipsoid with its axes along the body's."""
     return body.add_geom(
         type=mujoco.mjtGeom.mjGEOM_ELLIPSOID,
@@ -69,7 +69,7 @@ def ellipsoid(body: Any, centre: Vector, radii: Vector, material: str, **more: A
     )
 
 
-def box(body: Any, centre: Vector, size: Vector, material: str, yaw: float = 0.0, **more: Any):  # noqa: ANN201
+def box(body: Any, centre: Vector, size: Vector, material: str, yaw: float = 0.0, **more: Any):
     """A box of full edge lengths `size` [m] round `centre`, turned by `yaw` [rad]."""
     return body.add_geom(
         type=mujoco.mjtGeom.mjGEOM_BOX,
@@ -78,4 +78,26 @@ def box(body: Any, centre: Vector, size: Vector, material: str, yaw: float = 0.0
         quat=yaw_quaternion(yaw),
         material=material,
         **(LOOKS_ONLY | more),
+    )
+
+
+def add_paint(spec: Any, name: str, paint: np.ndarray, **material: Any) -> None:
+    """A painting (H, W, 3) of 0..255 as a texture and a material of one name."""
+    image = np.clip(paint, 0, 255).astype(np.uint8)
+    texture = spec.add_texture(
+        name=name, type=mujoco.mjtTexture.mjTEXTURE_2D,
+        width=image.shape[1], height=image.shape[0], nchannel=3,
+    )  # fmt: skip
+    texture.data = np.ascontiguousarray(image).tobytes()
+    added = spec.add_material(name=name, **material)
+    added.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
+
+
+def add_mesh(spec: Any, name: str, vertices: np.ndarray, faces: np.ndarray) -> None:
+    """A closed surface for looks, (V, 3) [m] and (F, 3), counter-clockwise from outside."""
+    spec.add_mesh(
+        name=name,
+        uservert=np.asarray(vertices, float).ravel(),
+        userface=np.asarray(faces, int).ravel(),
+        inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
     )

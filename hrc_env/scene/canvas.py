@@ -1,0 +1,150 @@
+"""One OpenGL context with a scene in it: pose it, aim it, read the picture.
+
+Drawing happens on the CPU or the GPU, whatever `gl` finds. The context is made when the
+first picture is drawn, in the thread that draws it, and made current before every call,
+so that several canvases never draw into each other.
+"""
+
+import copy
+from collections.abc import Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from hrc_env.errors import RenderingError, check_shape
+from hrc_env.geometry.cameras import PinholeCamera
+from hrc_env.records import CropWindow, WorkerMotion
+from hrc_env.scene import gl
+from hrc_env.scene.build import Scene
+from hrc_env.scene.rig import glcam_axes
+from hrc_env.typing import Image, JointAngles
+
+
+class Canvas:
+    """A picture of fixed size; `quality` are fields of MuJoCo's visual.quality."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        width_px: int,
+        height_px: int,
+        quality: dict[str, int],
+        groups: Sequence[int],
+    ) -> None:
+        self.width_px, self.height_px = width_px, height_px
+        self._scene = scene
+        self._model = copy.copy(scene.model)  # its own drawing settings
+        for name, value in quality.items():
+            setattr(self._model.vis.quality, name, value)
+        view = self._model.vis.global_
+        view.offwidth, view.offheight = width_px, height_px
+        self._data = mujoco.MjData(self._model)
+        self._option = mujoco.MjvOption()
+        self._option.geomgroup[:] = 0
+        self._option.geomgroup[list(groups)] = 1
+        self._option.sitegroup[:] = 0
+        self._camera = mujoco.MjvCamera()
+        mujoco.mjv_defaultFreeCamera(self._model, self._camera)
+        self._rect = mujoco.MjrRect(0, 0, width_px, height_px)
+        self._gl: Any = None
+        self._context: Any = None
+        self._drawn: Any = None
+        self._closed = False
+
+    def pose(self, q: JointAngles, motion: WorkerMotion | None) -> None:
+        """Put the arm at q (N,) and the workers where `motion` (W, S, ...) has them."""
+        check_shape("q", np.shape(q), self._scene.home_q.shape, "one angle per joint")
+        self._data.qpos[: len(q)] = q
+        rows = self._scene.worker_mocap
+        if rows.size and motion is not None:
+            self._data.mocap_pos[rows] = np.reshape(motion.position_world, (*rows.shape, 3))
+            self._data.mocap_quat[rows] = np.reshape(motion.quaternion_wxyz, (*rows.shape, 4))
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_comPos(self._model, self._data)
+        mujoco.mj_camlight(self._model, self._data)
+
+    def refresh(self, shadows: bool, groups: Sequence[int] | None = None) -> None:
+        """Take the pose over into what is drawn (skins included)."""
+        self._open()
+        if groups is not None:
+            self._option.geomgroup[:] = 0
+            self._option.geomgroup[list(groups)] = 1
+        mujoco.mjv_updateScene(
+            self._model, self._data, self._option, None, self._camera,
+            mujoco.mjtCatBit.mjCAT_ALL.value, self._drawn,
+        )  # fmt: skip
+        self._drawn.flags[mujoco.mjtRndFlag.mjRND_SHADOW.value] = shadows
+        self._drawn.flags[mujoco.mjtRndFlag.mjRND_REFLECTION.value] = 0
+        self._drawn.flags[mujoco.mjtRndFlag.mjRND_HAZE.value] = 0
+
+    def aim(self, camera: PinholeCamera, window: CropWindow, height_px: float) -> None:
+        """Look through a turned rectangle of a camera's image, `side_px` wide.
+
+        Args:
+            camera: whose image it is.
+            window: the rectangle's centre, width and turn.
+            height_px: the rectangle's height [px of the camera's image].
+        """
+        self._open()
+        c, s = np.cos(window.rotation_rad), np.sin(window.rotation_rad)
+        dx = window.centre_px[0] - camera.K[0, 2]
+        dy = window.centre_px[1] - camera.K[1, 2]
+        u, v = c * dx + s * dy, c * dy - s * dx  # the centre in the turned camera's image
+        right, up, back = glcam_axes(camera).T
+        for eye in self._drawn.camera:
+            scale = eye.frustum_near / camera.K[0, 0]
+            eye.pos, eye.forward, eye.up = camera.eye_world, -back, s * right + c * up
+            eye.frustum_center, eye.frustum_width = u * scale, window.side_px / 2 * scale
+            eye.frustum_top = (height_px / 2 - v) * scale
+            eye.frustum_bottom = (-height_px / 2 - v) * scale
+
+    def paint(self) -> Image:
+        """The picture (H, W, 3), top row first."""
+        self._render()
+        rgb = np.empty((self.height_px, self.width_px, 3), np.uint8)
+        mujoco.mjr_readPixels(rgb, None, self._rect, self._context)
+        return np.ascontiguousarray(rgb[::-1])
+
+    def depth_m(self) -> NDArray[np.float32]:
+        """(H, W) distance along the optical axis [m], top row first; nothing there is the
+        far plane."""
+        self._render()
+        z = np.empty((self.height_px, self.width_px), np.float32)
+        mujoco.mjr_readPixels(None, z, self._rect, self._context)
+        near = float(self._drawn.camera[0].frustum_near)
+        far = float(self._drawn.camera[0].frustum_far)
+        # Reversed depth: 1 at the near plane, 0 at the far one.
+        depth = near * far / (near + z[::-1].astype(float) * (far - near))
+        return depth.astype(np.float32)
+
+    def close(self) -> None:
+        """Free the context; the canvas cannot draw any more. Twice does no harm."""
+        if self._context is not None:
+            self._gl.make_current()
+            self._context.free()
+            self._gl.free()
+        self._gl = self._context = self._drawn = None
+        self._closed = True
+
+    def __del__(self) -> None:
+        if not getattr(self, "_closed", True):
+            self.close()
+
+    def _open(self) -> None:
+        if self._closed:
+            raise RenderingError("This renderer has been closed: make a new one.")
+        if self._context is None:
+            self._gl = gl.new_context(self.width_px, self.height_px)
+            self._drawn = mujoco.MjvScene(self._model, maxgeom=self._model.ngeom + 64)
+            self._context = mujoco.MjrContext(
+                self._model, mujoco.mjtFontScale.mjFONTSCALE_100.value
+            )
+            mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
+            self._context.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
+
+    def _render(self) -> None:
+        self._open()
+        self._gl.make_current()
+        mujoco.mjr_render(self._rect, self._drawn, self._context)
