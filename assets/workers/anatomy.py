@@ -122,8 +122,8 @@ def _origin_bone(segment: str) -> str:
 def _segment_of_bone(bone: str) -> int:
     base, _, side = bone.partition(".")
     part = next(part for prefix, part in BONE_PREFIXES if base.startswith(prefix))
-    central = part in SEGMENTS
-    return SEGMENTS.index(part if central else f"{dict(L='left', R='right')[side]}_{part}")
+    side_name = {"": "", "L": "left_", "R": "right_"}[side if part not in SEGMENTS else ""]
+    return SEGMENTS.index(side_name + part)
 
 
 def _weights(raw: dict[str, np.ndarray], bones: list[str]) -> np.ndarray:

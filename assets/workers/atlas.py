@@ -70,12 +70,13 @@ def split(
         side_of_face: (F,) 0 or 1.
         uv_of: maps vertices (V, 3) and their side (V,) to uv (V, 2).
     """
-    pairs = surface.faces * 2 + side_of_face[:, None]
-    used, faces = np.unique(pairs, return_inverse=True)
-    old, side = used // 2, used % 2
-    vertices = surface.vertices[old]
-    cut = Surface(vertices, faces.reshape(-1, 3), surface.weights[old])
-    return cut, uv_of(vertices, side)
+    old, side = surface.faces.ravel(), np.repeat(side_of_face, 3)
+    corner_uv = uv_of(surface.vertices[old], side)
+    keys = np.column_stack([old, np.round(corner_uv * 65535)]).astype(int)
+    _, first, faces = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    kept = old[first]
+    cut = Surface(surface.vertices[kept], faces.reshape(-1, 3), surface.weights[kept])
+    return cut, corner_uv[first]
 
 
 def folds(shape: tuple[int, int], seed: int, scales: tuple[float, ...]) -> np.ndarray:

@@ -12,8 +12,10 @@ from pathlib import Path
 import anatomy
 import capsules
 import numpy as np
-import paint
+import paint_clothes
+import paint_skin
 import surfaces
+from colours import Colours
 
 FOLDER = Path(__file__).parent
 UNIT_M = 1 / 16000
@@ -26,13 +28,13 @@ class Recipe:
 
     stature_m: float
     phenotype: dict[str, float]
-    colours: paint.Colours
+    colours: Colours
 
 
 def _recipe(stature_m: float, *phenotype: float, **colours: tuple[int, int, int]) -> Recipe:
     names = ("gender", "age", "muscle", "weight", "proportions")
     return Recipe(
-        stature_m, dict(zip(names, phenotype, strict=True)), replace(paint.Colours(), **colours)
+        stature_m, dict(zip(names, phenotype, strict=True)), replace(Colours(), **colours)
     )
 
 
@@ -88,8 +90,8 @@ def bake(name: str, recipe: Recipe, raw: dict[str, np.ndarray]) -> dict[str, np.
         "rest_position": person.origins.astype(np.float32),
         **_joints(person, origins),
         **_capsules(fitted, origins),
-        **paint.skin_arrays(person, head, hands, eyes, recipe.colours, UNIT_M),
-        **paint.cloth_arrays(person, cloth, recipe.colours, UNIT_M),
+        **paint_skin.skin_arrays(person, head, hands, eyes, recipe.colours, UNIT_M),
+        **paint_clothes.cloth_arrays(person, cloth, recipe.colours, UNIT_M),
         "hat_vertices": np.round((hat - origins["head"]) / UNIT_M).astype(np.int16),
         "hat_faces": hat_faces.astype(np.uint16),
         "hat_rgb": np.array(recipe.colours.hat, np.uint8),

@@ -106,7 +106,7 @@ def body_capsules(
     neck_top = joints["head"][2] - 0.02
     central = [
         fit_upright("head", "head", head[head[:, 2] > neck_top - 0.03]),
-        fit_upright("neck", "neck", _between(head, joints["neck"][2] - 0.03, neck_top)),
+        fit_upright("neck", "neck", _between(head, joints["neck"][2], neck_top)),
         fit_across("chest", "chest", cloth[trunk & (z > chest - 0.01) & (z < chest + 0.16)]),
         fit_across("torso", "torso", cloth[trunk & (z > ribs + 0.01) & (z < chest + 0.02)]),
         fit_across("abdomen", "abdomen", cloth[trunk & (z > waist + 0.02) & (z < ribs + 0.04)]),

@@ -147,7 +147,7 @@ def _collar(vertices: np.ndarray, neck: np.ndarray) -> np.ndarray:
     """Cut the neckline along a plane that rises to the back, and let the collar stand open."""
     out = vertices.copy()
     ahead = vertices[:, 0] - neck[0]
-    edge = neck[2] + 0.012 - 0.42 * ahead
+    edge = neck[2] + 0.014 - 0.34 * ahead
     out[:, 2] = np.minimum(vertices[:, 2], edge)
     near = np.clip(1 - (edge - vertices[:, 2]) / 0.05, 0, 1) * (vertices[:, 2] > neck[2] - 0.06)
     outward = np.stack([ahead + 0.015, vertices[:, 1], np.zeros(len(vertices))], -1)
@@ -178,7 +178,7 @@ def hard_hat(person: Person, head: Surface) -> tuple[np.ndarray, np.ndarray]:
     base = eye[2] + 0.050
     height = skull[:, 2].max() + 0.024 - base
     rings = [_dome_ring(level, half, height) for level in np.linspace(1.0, 0.0, 10)]
-    rim = ((0.004, 0.004), (0.012, 0.008), (0.0135, 0.0105), (0.012, 0.013), (-0.006, 0.012))
+    rim = ((0.004, 0.004), (0.012, 0.008), (0.0135, 0.0105), (0.012, 0.013), (-0.020, 0.010))
     rings += [_rim_ring(half, out, drop) for out, drop in rim]
     points = np.vstack(rings)
     pitch = np.radians(-5.0)

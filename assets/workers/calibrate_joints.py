@@ -1,0 +1,209 @@
+"""Move a baked worker's joints to where BlazePose sees them, once.
+
+    python assets/workers/calibrate_joints.py worker_1 [--dry-run]
+
+The worker is drawn in known poses, BlazePose looks through the four cameras of the lab, its
+landmarks are triangulated and expressed in the segment that carries the joint. The median
+over all frames, made mirror-symmetric, becomes the joint's offset. The table measures
+honestly: with offsets from half of the frames, on the other half.
+"""
+
+import argparse
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from poses import POSES, posed
+
+from hrc_env.body import SEGMENTS, Body, assets_dir, load_body, load_looks, worker_truth
+from hrc_env.geometry.cameras import PinholeCamera, project, projections
+from hrc_env.geometry.rotations import matrix_from_quaternion
+from hrc_env.geometry.triangulation import triangulate_robust
+from hrc_env.perception.blazepose import decode_landmarks, landmark_input
+from hrc_env.perception.network import Landmarker, load_landmarker
+from hrc_env.perception.noise import sigma_px
+from hrc_env.records import WorkerMotion
+from hrc_env.scene.rig import LAB_CAMERAS, add_cameras, pinholes
+from hrc_env.scene.worker import add_worker, mocap_ids
+from hrc_env.skeleton import BLAZEPOSE_INDEX, JOINTS, MIRROR
+
+import mujoco  # isort: skip  # after hrc_env.scene has chosen an OpenGL
+
+PLACES = (((0.3, 0.0), 0.4), ((1.1, 0.6), 2.1), ((0.5, -0.7), -1.8), ((1.5, -0.2), 3.6))
+"""Where the worker stands (x, y) [m] and looks (yaw) [rad]."""
+SIDE = 256
+PERSON_SHARE = 0.74
+"""How much of the crop's side the person fills."""
+JITTER_DEG = 4.0
+MIN_CONFIDENCE = 0.5
+
+
+class Studio:
+    """A bare, evenly lit room with one worker, seen through windows of the lab's cameras."""
+
+    def __init__(self, name: str, cameras: tuple[PinholeCamera, ...]) -> None:
+        spec = mujoco.MjSpec()
+        spec.visual.headlight.ambient[:] = 0.45
+        spec.visual.headlight.diffuse[:] = 0.35
+        spec.visual.quality.offsamples = 0
+        spec.worldbody.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_PLANE, size=[4, 4, 0.1], rgba=[0.6, 0.6, 0.58, 1]
+        )
+        for axis, sign in ((0, 1), (0, -1), (1, 1), (1, -1)):
+            centre, size = np.array([0, 0, 1.5]), np.array([4, 4, 1.5])
+            centre[axis], size[axis] = 4 * sign, 0.05
+            spec.worldbody.add_geom(
+                type=mujoco.mjtGeom.mjGEOM_BOX, pos=centre, size=size, rgba=[0.75, 0.74, 0.7, 1]
+            )
+        add_cameras(spec, cameras)
+        add_worker(spec, load_body(name), load_looks(name), "worker/")
+        self.model = spec.compile()
+        self.data = mujoco.MjData(self.model)
+        self.rows = mocap_ids(self.model, "worker/")
+        self.renderer = mujoco.Renderer(self.model, SIDE, SIDE)
+
+    def pose(self, motion: WorkerMotion) -> None:
+        """Put the worker into a pose."""
+        self.data.mocap_pos[self.rows] = motion.position_world
+        self.data.mocap_quat[self.rows] = motion.quaternion_wxyz
+        mujoco.mj_forward(self.model, self.data)
+
+    def crop(self, camera: PinholeCamera, corner_px: np.ndarray, side_px: float) -> np.ndarray:
+        """An upright square of a camera's image, drawn directly with an off-centre frustum."""
+        self.renderer.update_scene(self.data, camera.name)
+        scene, focal = self.renderer.scene, camera.K[0, 0]
+        scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = False
+        for eye in scene.camera:
+            left, top = (corner_px - camera.K[:2, 2]) / focal * eye.frustum_near
+            size = side_px / focal * eye.frustum_near
+            eye.frustum_center, eye.frustum_width = left + size / 2, size / 2
+            eye.frustum_top, eye.frustum_bottom = -top, -top - size
+        return self.renderer.render()
+
+
+def observe(name: str) -> tuple[list[WorkerMotion], np.ndarray, np.ndarray]:
+    """Motions of all frames, with detected pixels (B, C, 1, J, 2) and their deviations."""
+    body, cameras = load_body(name), pinholes(LAB_CAMERAS)
+    studio, look = Studio(name, cameras), load_landmarker()
+    P, rng = projections(cameras), np.random.default_rng(0)
+    motions, px, sigma = [], [], []
+    for number, pose in enumerate(POSES):
+        for turn, (xy, yaw) in enumerate(PLACES):
+            jitter = rng.normal(0, JITTER_DEG, 12)
+            motion = posed(body, pose, xy, yaw + 0.7 * number + 0.3 * turn, jitter)
+            studio.pose(motion)
+            outline, _ = project(P, worker_truth(body, motion).capsules_world.reshape(1, -1, 3))
+            found = [
+                _detect(studio, look, camera, outline[0, c]) for c, camera in enumerate(cameras)
+            ]
+            motions.append(motion)
+            px.append([each[0] for each in found])
+            sigma.append([each[1] for each in found])
+    return motions, np.array(px)[:, :, None], np.array(sigma)[:, :, None]
+
+
+def _detect(
+    studio: Studio, look: Landmarker, camera: PinholeCamera, outline_px: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Landmarks of one view in image pixels (J, 2) and their deviations (J,)."""
+    low, high = outline_px.min(0), outline_px.max(0)
+    side_px = float((high - low).max()) / PERSON_SHARE
+    corner = (low + high) / 2 - side_px / 2
+    points, flag, heat = look(landmark_input(studio.crop(camera, corner, side_px)))
+    joints = decode_landmarks(points, heat)[BLAZEPOSE_INDEX]
+    sigma = sigma_px(joints[:, 2], PERSON_SHARE * side_px)
+    sigma[(joints[:, 2] < MIN_CONFIDENCE) | (flag < 0.5)] = np.inf
+    return corner + joints[:, :2] * side_px, sigma
+
+
+def in_segments(
+    body: Body, motions: list[WorkerMotion], points: np.ndarray, segment: np.ndarray
+) -> np.ndarray:
+    """(B, J, 3) world points in the frames of the segments (J,) that carry them."""
+    local = np.full(points.shape, np.nan)
+    for b, motion in enumerate(motions):
+        turn = matrix_from_quaternion(motion.quaternion_wxyz[segment])
+        local[b] = np.einsum("jik,ji->jk", turn, points[b] - motion.position_world[segment])
+    return local
+
+
+def symmetric_median(local: np.ndarray) -> np.ndarray:
+    """(J, 3) median offsets of (B, J, 3), each pooled with its mirrored partner's."""
+    pooled = np.concatenate([local, local[:, MIRROR] * [1.0, -1.0, 1.0]])
+    return np.nanmedian(pooled, axis=0)
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Offsets and how well they hold, per joint [m]."""
+
+    offset: np.ndarray
+    """(J, 3) in the carrying segment's frame, from all frames."""
+    moved: np.ndarray
+    """(J,) how far the calibration moved the joint from the anatomical landmark."""
+    before: np.ndarray
+    """(J,) median distance of detections to the anatomical landmark, held-out frames."""
+    after: np.ndarray
+    """(J,) the same to offsets fitted on the other frames."""
+    bias: np.ndarray
+    """(J,) distance between the offsets that the two halves of the frames give."""
+    n_frames: np.ndarray
+    """(J,) frames in which the joint could be triangulated."""
+
+
+def calibrate(name: str) -> Calibration:
+    """Look at a worker in all poses and places."""
+    body = load_body(name)
+    motions, px, sigma = observe(name)
+    points = triangulate_robust(projections(pinholes(LAB_CAMERAS)), px, sigma).points_world[:, 0]
+    local = in_segments(body, motions, points, body.joint_segment)
+    with np.load(_path(name)) as baked:
+        anatomical = baked["joint_anatomical_offset"].astype(float)
+    held_out = np.arange(len(motions)) % 2 == 1
+    offset, fitted = symmetric_median(local), symmetric_median(local[~held_out])
+    return Calibration(
+        offset=offset,
+        moved=np.linalg.norm(offset - anatomical, axis=-1),
+        before=np.nanmedian(np.linalg.norm(local - anatomical, axis=-1)[held_out], axis=0),
+        after=np.nanmedian(np.linalg.norm(local - fitted, axis=-1)[held_out], axis=0),
+        bias=np.linalg.norm(symmetric_median(local[held_out]) - fitted, axis=-1),
+        n_frames=np.isfinite(local[..., 0]).sum(0),
+    )
+
+
+def table(result: Calibration, body: Body) -> str:
+    """The README's table in mm, left and right together."""
+    rows = ["| joint | carried by | moved | before | after | bias | frames |", "|---" * 7 + "|"]
+    for j, name in enumerate(JOINTS):
+        if name.startswith("right_"):
+            continue
+        pair = sorted({j, int(MIRROR[j])})
+        columns = (result.moved, result.before, result.after, result.bias)
+        mm = " | ".join(f"{1000 * column[pair].mean():.0f}" for column in columns)
+        segment = SEGMENTS[body.joint_segment[j]].removeprefix("left_").replace("_", " ")
+        joint = name.removeprefix("left_")
+        rows.append(f"| {joint} | {segment} | {mm} | {result.n_frames[pair].sum()} |")
+    return "\n".join(rows)
+
+
+def _path(name: str) -> Path:
+    return assets_dir() / "workers" / f"{name}.npz"
+
+
+def main() -> None:
+    """Calibrate one worker and write the offsets into its file."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("name")
+    parser.add_argument("--dry-run", action="store_true", help="only print the table")
+    arguments = parser.parse_args()
+    result = calibrate(arguments.name)
+    print(table(result, load_body(arguments.name)))
+    if not arguments.dry_run:
+        with np.load(_path(arguments.name)) as baked:
+            arrays = dict(baked)
+        arrays["joint_offset"] = result.offset.astype(np.float32)
+        np.savez_compressed(_path(arguments.name), **arrays)
+
+
+if __name__ == "__main__":
+    main()
