@@ -1,0 +1,98 @@
+"""Weights are the official ones or an error says what to do."""
+
+import shutil
+import subprocess
+import sys
+import zipfile
+
+import pytest
+
+from hrc_env.errors import ConfigError, WeightsError
+from hrc_env.perception import weights as w
+
+SETUP = "python -m hrc_env setup"
+
+
+@pytest.fixture
+def empty_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("HRC_ENV_CACHE", str(tmp_path))
+    return tmp_path
+
+
+def pip_says(monkeypatch, stderr):
+    def run(command, **_):
+        return subprocess.CompletedProcess(command, 1, stdout="", stderr=stderr)
+
+    monkeypatch.setattr(w.subprocess, "run", run)
+
+
+def test_missing_weights_name_the_file_the_folder_and_the_command(empty_cache):
+    with pytest.raises(WeightsError) as error:
+        w.find_weights("pose_detection")
+    for part in ("pose_detection.tflite", str(empty_cache), SETUP):
+        assert part in str(error.value)
+
+
+def test_a_changed_byte_is_refused_with_both_checksums(empty_cache, weights):
+    content = bytearray(weights["pose_detection"].read_bytes())
+    content[1000] ^= 1
+    (empty_cache / "pose_detection.tflite").write_bytes(content)
+    with pytest.raises(WeightsError) as error:
+        w.find_weights("pose_detection")
+    assert w.WEIGHTS["pose_detection"].sha256 in str(error.value)
+    assert "2959046 bytes" in str(error.value)
+    assert SETUP in str(error.value)
+
+
+def test_a_file_that_changes_after_it_was_verified_is_verified_again(empty_cache, weights):
+    place = empty_cache / "pose_detection.tflite"
+    shutil.copy(weights["pose_detection"], place)
+    assert w.find_weights("pose_detection") == place
+    place.write_bytes(b"not a network")
+    with pytest.raises(WeightsError, match="got 13 bytes"):
+        w.find_weights("pose_detection")
+
+
+def test_weights_that_are_there_need_no_network(weights, monkeypatch):
+    pip_says(monkeypatch, "there must be no download")
+    assert w.fetch_weights() == weights
+
+
+def test_without_a_network_the_error_repeats_what_pip_said(empty_cache, monkeypatch):
+    pip_says(monkeypatch, "ERROR: No matching distribution found for mediapipe==0.10.21")
+    with pytest.raises(WeightsError, match="No matching distribution") as error:
+        w.fetch_weights()
+    assert SETUP in str(error.value)
+
+
+def test_without_pip_the_error_says_how_to_get_it(empty_cache, monkeypatch):
+    pip_says(monkeypatch, f"{sys.executable}: No module named pip")
+    with pytest.raises(WeightsError, match="python -m ensurepip"):
+        w.fetch_weights()
+
+
+def test_a_wheel_with_other_weights_leaves_nothing_in_the_cache(empty_cache, monkeypatch):
+    def run(command, **_):
+        wheel = f"{command[command.index('--dest') + 1]}/mediapipe-0.10.21-py3-none-any.whl"
+        with zipfile.ZipFile(wheel, "w") as archive:
+            for file in w.WEIGHTS.values():
+                archive.writestr(file.member, b"other weights")
+        return subprocess.CompletedProcess(command, 0, stdout="", stderr="")
+
+    monkeypatch.setattr(w.subprocess, "run", run)
+    with pytest.raises(WeightsError, match="not the official"):
+        w.fetch_weights()
+    assert list(empty_cache.iterdir()) == []
+
+
+def test_an_unknown_name_is_answered_with_the_nearest():
+    with pytest.raises(ConfigError, match="Did you mean 'pose_landmark_full'"):
+        w.find_weights("pose_landmarks_full")
+
+
+def test_the_cache_is_where_the_user_says_it_is(monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.delenv("HRC_ENV_CACHE", raising=False)
+    assert w.cache_dir() == tmp_path / "hrc_env"
+    monkeypatch.setenv("HRC_ENV_CACHE", str(tmp_path / "mine"))
+    assert w.cache_dir() == tmp_path / "mine"
