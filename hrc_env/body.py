@@ -18,10 +18,12 @@ from hrc_env.errors import check_shape, unknown
 from hrc_env.records import WorkerMotion, WorkerTruth
 from hrc_env.typing import Floats, Ints, Points3
 
-SEGMENTS: tuple[str, ...] = ("pelvis", "abdomen", "torso", "chest", "neck", "head") + tuple(
-    f"{side}_{part}"
-    for side in ("left", "right")
-    for part in ("clavicle", "upper_arm", "forearm", "hand", "thigh", "shank", "foot", "toes")
+TRUNK = ("pelvis", "abdomen", "torso", "chest", "neck", "head")
+LIMBS = ("clavicle", "upper_arm", "forearm", "hand", "thigh", "shank", "foot", "toes")
+SEGMENTS: tuple[str, ...] = (
+    *TRUNK,
+    *(f"left_{part}" for part in LIMBS),
+    *(f"right_{part}" for part in LIMBS),
 )
 N_SEGMENTS = len(SEGMENTS)
 SEGMENT: dict[str, int] = {name: index for index, name in enumerate(SEGMENTS)}

@@ -33,13 +33,15 @@ def residual_m(points: np.ndarray, ends: np.ndarray, radius_m: float) -> np.ndar
     return np.linalg.norm(points - ends[0] - along[:, None] * axis, axis=1) - radius_m
 
 
-def _fit(points: np.ndarray, start: np.ndarray, ends_of: Callable) -> np.ndarray:
+def _fit(
+    points: np.ndarray, start: np.ndarray, ends_of: Callable, outside: float = OUTSIDE_WEIGHT
+) -> np.ndarray:
     """Parameters (the last one the radius) whose capsule's surface lies closest to points."""
     hold = HOLD * np.sqrt(len(points))
 
     def residuals(values: np.ndarray) -> np.ndarray:
         distance = residual_m(points, ends_of(values), values[-1])
-        balanced = np.where(distance > 0, OUTSIDE_WEIGHT * distance, distance)
+        balanced = np.where(distance > 0, outside * distance, distance)
         return np.append(balanced, hold * (values - start)[:-1])
 
     return least_squares(residuals, start).x
@@ -57,7 +59,9 @@ def fit_across(name: str, segment: str, points: np.ndarray) -> Capsule:
     return Capsule(name, segment, ends_of(best), float(best[3]))
 
 
-def fit_upright(name: str, segment: str, points: np.ndarray) -> Capsule:
+def fit_upright(
+    name: str, segment: str, points: np.ndarray, outside: float = OUTSIDE_WEIGHT
+) -> Capsule:
     """A capsule in the plane y = 0 (head, neck)."""
 
     def ends_of(values: np.ndarray) -> np.ndarray:
@@ -65,7 +69,7 @@ def fit_upright(name: str, segment: str, points: np.ndarray) -> Capsule:
 
     middle, low, high = points[:, 0].mean(), *np.percentile(points[:, 2], [25, 75])
     start = np.array([middle, low, middle, high, 0.1])
-    best = _fit(points, start, ends_of)
+    best = _fit(points, start, ends_of, outside)
     return Capsule(name, segment, ends_of(best), float(best[4]))
 
 
@@ -105,7 +109,7 @@ def body_capsules(
     waist, ribs, chest = joints["abdomen"][2], joints["torso"][2], joints["chest"][2]
     neck_top = joints["head"][2] - 0.02
     central = [
-        fit_upright("head", "head", head[head[:, 2] > neck_top - 0.03]),
+        fit_upright("head", "head", head[head[:, 2] > neck_top - 0.03], 6.0),
         fit_upright("neck", "neck", _between(head, joints["neck"][2], neck_top)),
         fit_across("chest", "chest", cloth[trunk & (z > chest - 0.01) & (z < chest + 0.16)]),
         fit_across("torso", "torso", cloth[trunk & (z > ribs + 0.01) & (z < chest + 0.02)]),

@@ -5,6 +5,8 @@ from `WorkerMotion`. Skins have no geoms, so what touches the worker are capsule
 camera draws and that meet only geoms whose conaffinity has the workers' bit.
 """
 
+from typing import Any
+
 import mujoco
 import numpy as np
 
@@ -17,7 +19,7 @@ SKIN_SPECULAR, SKIN_SHININESS = 0.08, 0.15
 HAT_SPECULAR, HAT_SHININESS = 0.45, 0.55
 
 
-def add_worker(spec: mujoco.MjSpec, body: Body, looks: Looks, prefix: str) -> None:
+def add_worker(spec: Any, body: Body, looks: Looks, prefix: str) -> None:
     """Add a worker in its rest pose to a model that is being built.
 
     Args:
@@ -41,7 +43,8 @@ def add_worker(spec: mujoco.MjSpec, body: Body, looks: Looks, prefix: str) -> No
     for row, name in enumerate(body.capsule_names):
         capsule(
             segments[SEGMENTS[body.capsule_segment[row]]],
-            *body.capsule_ends[row],
+            body.capsule_ends[row, 0],
+            body.capsule_ends[row, 1],
             float(body.capsule_radius_m[row]),
             name=prefix + name,
             group=WORKER_CAPSULES,
@@ -51,7 +54,7 @@ def add_worker(spec: mujoco.MjSpec, body: Body, looks: Looks, prefix: str) -> No
         )
 
 
-def mocap_ids(model: mujoco.MjModel, prefix: str) -> Ints:
+def mocap_ids(model: Any, prefix: str) -> Ints:
     """(22,) rows of `data.mocap_pos` and `data.mocap_quat` that move a worker's segments.
 
     `data.mocap_pos[ids] = motion.position_world` and
@@ -65,15 +68,15 @@ def mocap_ids(model: mujoco.MjModel, prefix: str) -> Ints:
     ]
     if min(bodies) < 0:
         raise ConfigError(f"The model has no worker {prefix!r}: it was not added with add_worker.")
-    return np.asarray(model.body_mocapid[bodies], dtype=np.int64)
+    return np.array([model.body_mocapid[row] for row in bodies], dtype=np.int64)
 
 
-def capsule_geom_ids(model: mujoco.MjModel, body: Body, prefix: str) -> Ints:
+def capsule_geom_ids(model: Any, body: Body, prefix: str) -> Ints:
     """(K,) geoms of a worker's capsules, in the order of `body.capsule_names`."""
     return np.array([model.geom(prefix + name).id for name in body.capsule_names], dtype=np.int64)
 
 
-def _add_skin(spec: mujoco.MjSpec, skin: SkinLooks, body: Body, prefix: str) -> None:
+def _add_skin(spec: Any, skin: SkinLooks, body: Body, prefix: str) -> None:
     name = prefix + skin.name
     height, width = skin.texture.shape[:2]
     texture = spec.add_texture(
@@ -92,13 +95,13 @@ def _add_skin(spec: mujoco.MjSpec, skin: SkinLooks, body: Body, prefix: str) -> 
         texcoord=skin.uv.astype(np.float32).ravel(),
         bodyname=[prefix + SEGMENTS[segment] for segment in moved],
         bindpos=body.rest_position[moved].astype(np.float32).ravel(),
-        bindquat=np.tile(np.float32([1, 0, 0, 0]), len(moved)),
+        bindquat=np.tile(np.array([1, 0, 0, 0], np.float32), len(moved)),
         vertid=[np.flatnonzero(skin.weights[:, s]).astype(np.int32) for s in moved],
         vertweight=[skin.weights[skin.weights[:, s] > 0, s].astype(np.float32) for s in moved],
     )
 
 
-def _add_hat(spec: mujoco.MjSpec, head: mujoco.MjsBody, looks: Looks, prefix: str) -> None:
+def _add_hat(spec: Any, head: Any, looks: Looks, prefix: str) -> None:
     name = prefix + "hat"
     spec.add_mesh(
         name=name,
