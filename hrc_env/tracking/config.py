@@ -54,7 +54,7 @@ class TrackerConfig:
     sigma_scale: float = 1.0
     """Factor on the detector's sigma; 1.2 suits errors that persist for half a second."""
     min_std_m: float = 0.005
-    """Added (squared) to every reported variance, so that none is below it [m]."""
+    """No standard deviation, in any direction, is reported as less than this [m]."""
     velocity_tau_s: float = 0.2
     """Time constant of the difference filter for velocities (paper, triangulation) [s]."""
     hold_speed_m_s: float = 1.0

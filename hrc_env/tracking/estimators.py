@@ -18,6 +18,7 @@ from hrc_env.errors import ConfigError, unknown
 from hrc_env.records import Keypoints, PoseEstimate
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.paper import PaperEstimator
+from hrc_env.tracking.particle import ParticleEstimator
 from hrc_env.tracking.triangulating import TriangulationEstimator
 from hrc_env.typing import Floats, Ints
 
@@ -60,6 +61,7 @@ class Estimator(Protocol[State]):
 
 
 ESTIMATORS: dict[str, Callable[[Floats, float, TrackerConfig], Estimator[Any]]] = {
+    "particle": ParticleEstimator,
     "paper": PaperEstimator,
     "triangulation": TriangulationEstimator,
 }

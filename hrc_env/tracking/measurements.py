@@ -78,12 +78,18 @@ def variance_in_image(jacobian, cov):
 
 
 @numba.njit(**_JIT)
+def pixel_spread(camera, u, v, depth, cov):
+    """`variance_in_image` of a point at (u, v, depth) whose covariance is `cov` (3, 3) or more."""
+    jacobian = np.empty((2, 3))
+    pixel_jacobian(camera, u, v, depth, jacobian)
+    return variance_in_image(jacobian, cov)
+
+
+@numba.njit(**_JIT)
 def supports(camera, z, sigma, gate_sigma, point, cov):
     """Whether a pixel lies where a joint with this mean and covariance may be seen."""
     u, v, depth = pixel_of(camera, point[0], point[1], point[2])
     if not depth > NEAREST_DEPTH_M:
         return False
-    jacobian = np.empty((2, 3))
-    pixel_jacobian(camera, u, v, depth, jacobian)
-    variance = sigma * sigma + variance_in_image(jacobian, cov)
+    variance = sigma * sigma + pixel_spread(camera, u, v, depth, cov)
     return (z[0] - u) ** 2 + (z[1] - v) ** 2 < gate_sigma * gate_sigma * variance

@@ -1,5 +1,6 @@
 """What every estimator keeps of a worker, and how it ages, is lost and is reported."""
 
+import math
 from dataclasses import dataclass
 
 import numba
@@ -101,7 +102,7 @@ def _grow_older(
 
 
 def report(tracks: Tracks, config: TrackerConfig) -> PoseEstimate:
-    """The tracks as others may see them: copies, with covariances between floor and prior."""
+    """The tracks as others may see them: copies, covariances no less than the floor allows."""
     cov = np.empty(tracks.cov_world.shape)
     _bounded(tracks.cov_world, config.min_std_m**2, config.prior_std_m**2, cov)
     return PoseEstimate(
@@ -124,4 +125,20 @@ def _bounded(cov, floor, ceiling, out):
                     for k in range(i, 3):
                         out[b, w, j, i, k] = scale * cov[b, w, j, i, k]
                         out[b, w, j, k, i] = out[b, w, j, i, k]
-                    out[b, w, j, i, i] += floor
+                missing = max(floor - least_eigenvalue(out[b, w, j]), 0.0)
+                for i in range(3):
+                    out[b, w, j, i, i] += missing
+
+
+@numba.njit(**_JIT)
+def least_eigenvalue(a):
+    """Smallest eigenvalue of a symmetric 3x3 matrix (Smith, Comm. ACM 4, 1961)."""
+    mean = (a[0, 0] + a[1, 1] + a[2, 2]) / 3.0
+    x, y, z = a[0, 0] - mean, a[1, 1] - mean, a[2, 2] - mean
+    f, g, h = a[0, 1], a[0, 2], a[1, 2]
+    size = math.sqrt((x * x + y * y + z * z + 2.0 * (f * f + g * g + h * h)) / 6.0)
+    if not size > 0.0:
+        return mean
+    determinant = x * (y * z - h * h) - f * (f * z - g * h) + g * (f * h - g * y)
+    cosine = min(max(0.5 * determinant / size**3, -1.0), 1.0)
+    return mean + 2.0 * size * math.cos((math.acos(cosine) + 2.0 * math.pi) / 3.0)

@@ -1,0 +1,84 @@
+"""Cameras that exchange left and right: noticed over the whole body, and undone.
+
+A two-state hidden Markov model per camera: detections as they are, or mirrored. Its evidence
+is how much better one of the two explains all paired joints. A camera that comes back after
+having seen nothing is believed at first: the body may have been tracked mirrored in depth
+meanwhile, and then it is not the camera that is wrong.
+"""
+
+import math
+
+import numba
+
+from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
+from hrc_env.skeleton import MIRROR
+from hrc_env.tracking.measurements import pixel_spread
+
+_MIRROR = tuple(int(j) for j in MIRROR)
+_BLIND_UPDATES, _BELIEVED_UPDATES = 8, 5
+_LEAST_CHANCE, _MOST_EVIDENCE = 1e-3, 50.0
+_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
+
+
+@numba.njit(**_JIT)
+def undo_swaps(P, body, cov, z, sigma, ok, chance, blind, believed, s):
+    """Mirror z, sigma, ok (J, C) of the cameras that are probably swapped, in place.
+
+    `chance` (C,) is the probability of being swapped, `blind` and `believed` (C,) count
+    updates; `s` are the `particle.Settings`.
+    """
+    for c in range(len(P)):
+        sees = False
+        for j in range(len(_MIRROR)):
+            sees |= ok[j, c]
+        if not sees:
+            blind[c] += 1
+            continue
+        believed[c] = _BELIEVED_UPDATES if blind[c] > _BLIND_UPDATES else max(believed[c] - 1, 0)
+        blind[c] = 0
+        if believed[c] > 0:
+            chance[c] = _LEAST_CHANCE
+            continue
+        prior = chance[c] * (1.0 - s.swap_ends) + (1.0 - chance[c]) * s.swap_begins
+        evidence = swap_evidence(P[c], c, body, cov, z, sigma, ok, s)
+        odds = math.log(prior / (1.0 - prior)) + evidence
+        chance[c] = min(max(1.0 / (1.0 + math.exp(-odds)), _LEAST_CHANCE), 1.0 - _LEAST_CHANCE)
+        if chance[c] > 0.5:
+            _mirror(c, z, sigma, ok)
+
+
+@numba.njit(**_JIT)
+def swap_evidence(camera, c, body, cov, z, sigma, ok, s):
+    """Log-likelihood ratio of camera c being swapped, bounded."""
+    total = 0.0
+    for j in range(len(_MIRROR)):
+        m = _MIRROR[j]
+        if m == j or not (ok[j, c] or ok[m, c]):
+            continue
+        u, v, depth = pixel_of(camera, body[j, 0], body[j, 1], body[j, 2])
+        if not depth > NEAREST_DEPTH_M:
+            continue
+        spread = pixel_spread(camera, u, v, depth, cov[j])
+        if ok[m, c]:
+            total += _log_mixture(z[m, c, 0] - u, z[m, c, 1] - v, sigma[m, c], spread, s)
+        if ok[j, c]:
+            total -= _log_mixture(z[j, c, 0] - u, z[j, c, 1] - v, sigma[j, c], spread, s)
+    return min(max(total, -_MOST_EVIDENCE), _MOST_EVIDENCE)
+
+
+@numba.njit(**_JIT)
+def _log_mixture(du, dv, sigma, spread, s):
+    variance = sigma * sigma + spread
+    near = math.exp(-0.5 * (du * du + dv * dv) / variance) / (2.0 * math.pi * variance)
+    return math.log((1.0 - s.outlier_weight) * near + s.outlier_weight / s.image_area_px)
+
+
+@numba.njit(**_JIT)
+def _mirror(c, z, sigma, ok):
+    for j in range(len(_MIRROR)):
+        m = _MIRROR[j]
+        if m > j:
+            for i in range(2):
+                z[j, c, i], z[m, c, i] = z[m, c, i], z[j, c, i]
+            sigma[j, c], sigma[m, c] = sigma[m, c], sigma[j, c]
+            ok[j, c], ok[m, c] = ok[m, c], ok[j, c]
