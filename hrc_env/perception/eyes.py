@@ -17,6 +17,7 @@ import numpy as np
 from hrc_env.errors import ConfigError, check_shape
 from hrc_env.geometry.cameras import PinholeCamera, inside_image
 from hrc_env.perception import blazepose
+from hrc_env.perception.acquisition import agreed_windows, apart_from, same_person
 from hrc_env.perception.network import (
     LANDMARK_SIDE,
     Detector,
@@ -110,7 +111,11 @@ class Eyes:
         self._helper: ThreadPoolExecutor | None = None
 
     def look(
-        self, source: ImageSource, windows: Sequence[CropWindow | None], track: int = 0
+        self,
+        source: ImageSource,
+        windows: Sequence[CropWindow | None],
+        track: int = 0,
+        others: Sequence[Sequence[CropWindow | None]] = (),
     ) -> Sight:
         """Look for one worker through a window a camera; search if there is no window at all.
 
@@ -119,12 +124,13 @@ class Eyes:
             windows: (C,) where to look; None where this camera need not.
             track: whom the eyes are following; any number that stays the worker's own. The
                 detector stage's turns are counted for each.
+            others: windows (C,) of other workers; a search does not find these again.
         """
         check_shape("windows", (len(windows),), (len(self.cameras),), "one a camera")
         looks = self._looks.setdefault(track, [0] * len(self.cameras))
         searched = all(window is None for window in windows)
         if searched:
-            windows = self._best(self.search(source))
+            windows = agreed_windows(apart_from(self.search(source), others), self.cameras)
         used = [c for c, window in enumerate(windows) if window is not None]
         asked = [not searched and self._is_turn(looks[c], c) for c in used]
         found = self._share(self._landmark_jobs(source, windows, used, asked))
@@ -169,9 +175,6 @@ class Eyes:
         """Whether the detector stage is due; the cameras take turns to spread its cost."""
         every = self.config.gate_every
         return looks == 0 or (looks + camera * every // len(self.cameras)) % every == 0
-
-    def _best(self, people: list[list[CropWindow]]) -> list[CropWindow | None]:
-        return [some[0] if some else None for some in people]
 
     def _landmark_jobs(
         self,
@@ -292,9 +295,6 @@ def _distinct(people: list[tuple[float, CropWindow]]) -> list[CropWindow]:
     """One window a person, best first: overlapping search windows see the same one twice."""
     kept: list[CropWindow] = []
     for _, window in sorted(people, key=lambda item: -item[0]):
-        near = (
-            math.dist(window.centre_px, other.centre_px) < 0.2 * other.side_px for other in kept
-        )
-        if not any(near):
+        if not any(same_person(window, other) for other in kept):
             kept.append(window)
     return kept
