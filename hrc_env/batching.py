@@ -6,7 +6,7 @@ their rows; as no result depends on the size of the batch, that is the same comp
 
 import dataclasses
 from collections.abc import Sequence
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -36,7 +36,7 @@ def write_rows(record: object, ids: Ints, part: object) -> None:
         new = getattr(part, name)
         if isinstance(value, np.ndarray):
             value[ids] = new
-        elif dataclasses.is_dataclass(value):
+        elif _is_record(value):
             write_rows(value, ids, new)
 
 
@@ -45,13 +45,18 @@ def picked(streams: Sequence[np.random.Generator], ids: Ints) -> list[np.random.
     return [streams[b] for b in ids]
 
 
-def _fields(record: object) -> list[tuple[str, object]]:
-    return [(each.name, getattr(record, each.name)) for each in dataclasses.fields(record)]  # type: ignore[arg-type]
+def _fields(record: Any) -> list[tuple[str, Any]]:
+    """Names and values of a dataclass or a named tuple."""
+    if isinstance(record, tuple):
+        return list(zip(record._fields, record, strict=True))  # type: ignore[attr-defined]
+    return [(each.name, getattr(record, each.name)) for each in dataclasses.fields(record)]
 
 
-def _rows(value: object, ids: Ints) -> object:
+def _is_record(value: object) -> bool:
+    return dataclasses.is_dataclass(value) or hasattr(value, "_fields")
+
+
+def _rows(value: Any, ids: Ints) -> Any:
     if isinstance(value, np.ndarray):
         return value[ids]
-    if dataclasses.is_dataclass(value):
-        return rows(value, ids)
-    return value
+    return rows(value, ids) if _is_record(value) else value

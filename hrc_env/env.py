@@ -16,6 +16,7 @@ from hrc_env.config import HRCConfig, resolve
 from hrc_env.errors import ConfigError, check_shape, unknown
 from hrc_env.simulation import Outcome, Simulation
 from hrc_env.typing import Floats
+from hrc_env.views import Views
 
 RENDER_MODES = ("rgb_array", "depth_array")
 
@@ -58,6 +59,7 @@ class HRCReachEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.simulation = Simulation(
             1, perception, estimator, cameras, scene, n_workers, control, self.config
         )
+        self.views = Views(self.simulation)
         where = self.simulation.layout
         self.observation_space = gymnasium.spaces.Box(where.low, where.high, dtype=np.float32)
         size = self.simulation.n_actions
@@ -98,11 +100,11 @@ class HRCReachEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """The scene from a good viewpoint, as the render mode says."""
         if self.render_mode is None:
             return None
-        return self.simulation.picture(0, depth=self.render_mode == "depth_array")
+        return self.views.picture(depth=self.render_mode == "depth_array")
 
     def mosaic(self) -> NDArray[np.uint8]:
         """The four cameras with crops, detected keypoints and the estimated skeleton."""
-        return self.simulation.mosaic(0)
+        return self.views.mosaic()
 
     def split_observation(self, observation: NDArray[np.float32]) -> dict[str, Floats]:
         """An observation's terms by name, in metres, seconds and radians."""
@@ -110,6 +112,7 @@ class HRCReachEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def close(self) -> None:
         """Release threads and graphics contexts."""
+        self.views.close()
         self.simulation.close()
 
     def _checked(self, action: NDArray[np.float32]) -> Floats:

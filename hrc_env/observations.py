@@ -10,29 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.geometry.distances import Gap, narrowest_gap
-from hrc_env.records import PoseEstimate, RobotState
-from hrc_env.skeleton import N_JOINTS, SEGMENT_RADIUS_M, segments
-from hrc_env.typing import Bools, Floats, Points3
+from hrc_env.belief import Believed, standard_deviation_m
+from hrc_env.skeleton import N_JOINTS
+from hrc_env.typing import Bools, Floats
 
 FAR_GAP_M = 1.0
 """A gap as wide as this or wider is reported as this: nothing near, or nobody known of."""
-
-
-@dataclass(frozen=True, slots=True)
-class Believed:
-    """Everything a robot may know in one step: itself, its task, and the estimate."""
-
-    robot: RobotState
-    estimate: PoseEstimate
-    gap: Gap
-    """(B, W) narrowest place between the robot and each *estimated* body."""
-    goal_world: Points3
-    """(B, 3) [m]."""
-    goal_time_left_s: Floats
-    """(B,)."""
-    action: Floats
-    """(B, A) the last action, in [-1, 1]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,28 +34,6 @@ class ObservationTerm:
     doc: str
     function: Callable[[Believed], Floats]
     """Believed -> (B, ...), flattened per environment."""
-
-
-def estimated_gap(robot: RobotState, estimate: PoseEstimate) -> Gap:
-    """(B, W) narrowest place between the robot's capsules and each estimated body.
-
-    The body is made of the segments between the estimated joints with radii, the hands
-    included (`skeleton.segments`). A worker without a track is infinitely far: there is
-    nothing to keep away from that the robot knows of.
-    """
-    batch, workers = estimate.tracked.shape
-    bodies = segments(estimate.mean_world)
-    shape = (batch, workers, *robot.capsules_world.shape[1:])
-    robots = np.broadcast_to(robot.capsules_world[:, None], shape)
-    gap = narrowest_gap(robots, robot.capsule_radius_m, bodies, SEGMENT_RADIUS_M)
-    return Gap(
-        np.where(estimate.tracked, gap.distance_m, np.inf), gap.point_a_world, gap.point_b_world
-    )
-
-
-def standard_deviation_m(estimate: PoseEstimate) -> Floats:
-    """(B, W, J) root of the mean variance over the axes [m]."""
-    return np.sqrt(np.trace(estimate.cov_world, axis1=-2, axis2=-1) / 3)
 
 
 def _goal_direction(now: Believed) -> Floats:

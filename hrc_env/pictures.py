@@ -21,6 +21,7 @@ DETECTED: Colour = (255, 64, 96)
 WINDOW: Colour = (250, 250, 120)
 INK: Colour = (236, 239, 241)
 PANEL: Colour = (24, 28, 34)
+GOAL: Colour = (255, 214, 0)
 
 
 def bone_colour(first: int, second: int) -> Colour:
@@ -83,12 +84,39 @@ def draw_window(image: Image, camera: PinholeCamera, window: CropWindow) -> None
     cv2.polylines(image, [np.round(corners * 16).astype(np.int32)], True, WINDOW, 1, cv2.LINE_AA, 4)
 
 
+def draw_landmarks(
+    image: Image, window: CropWindow, joints_px: Points2, confidence: Floats
+) -> None:
+    """Detected joints and bones on a crop, in place; joints_px (J, 2) of the whole image."""
+    offset = (joints_px - np.array(window.centre_px)) * (image.shape[1] / window.side_px)
+    c, s = np.cos(window.rotation_rad), np.sin(window.rotation_rad)
+    points = offset @ np.array([[c, -s], [s, c]]) + image.shape[1] / 2
+    if not np.isfinite(points).all():
+        return
+    for first, second in BONES[:-2]:
+        _line(image, points[first], points[second], bone_colour(first, second), 1)
+    for point, sure in zip(points, confidence, strict=True):
+        colour = _mix(PANEL, DETECTED, 0.35 + 0.65 * float(sure))
+        cv2.circle(image, _fixed(point), 3 * 16, colour, -1, cv2.LINE_AA, 4)
+
+
+def draw_goal(image: Image, camera: PinholeCamera, goal_world: Floats) -> None:
+    """A ring round the goal, in place; drawn over whatever stands before it."""
+    px, depth_m = project(camera.P[None], goal_world[None, None])
+    if depth_m[0, 0, 0] < 0.1:
+        return
+    scale = image.shape[1] / camera.width_px
+    radius = max(4, round(0.05 * camera.K[0, 0] * scale / depth_m[0, 0, 0]))
+    cv2.circle(image, _fixed(px[0, 0, 0] * scale), radius * 16, GOAL, 2, cv2.LINE_AA, 4)
+    cv2.circle(image, _fixed(px[0, 0, 0] * scale), 2 * 16, GOAL, -1, cv2.LINE_AA, 4)
+
+
 def label(
     image: Image, text: str, at: tuple[int, int], size: int = 16, colour: Colour = INK
 ) -> None:
     """Text with its upper left corner at `at`, on a dark plate, in place."""
     font = _font(size)
-    left, top, right, bottom = font.getbbox(text)
+    _, _, right, bottom = (round(value) for value in font.getbbox(text))
     x, y = at
     pad = max(3, size // 4)
     y1, x1 = min(y + bottom + 2 * pad, image.shape[0]), min(x + right + 2 * pad, image.shape[1])
@@ -148,7 +176,7 @@ def _line(image: Image, a: Points2, b: Points2, colour: Colour, thickness: int) 
 def _fixed(point: Points2) -> tuple[int, int]:
     """Sub-pixel coordinates for OpenCV, which counts from pixel centres: 4 binary places."""
     limited = np.clip(point - 0.5, -30000, 30000)
-    return int(round(limited[0] * 16)), int(round(limited[1] * 16))
+    return round(limited[0] * 16), round(limited[1] * 16)
 
 
 def _mix(a: Colour, b: Colour, share: float) -> Colour:

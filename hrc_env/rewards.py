@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hrc_env.belief import Believed
 from hrc_env.errors import ConfigError
-from hrc_env.observations import Believed
 from hrc_env.tasks.reach import ReachProgress
 from hrc_env.typing import Floats
 

@@ -35,6 +35,8 @@ from hrc_env.typing import Ints, JointAngles
 LEVELS = ("pixels", "keypoints", "truth", "none")
 
 Generators = Sequence[np.random.Generator]
+Windows = list[list[CropWindow | None]]
+"""For each worker, a window for each camera; None where it did not look."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +64,7 @@ class Senses(Protocol):
         """Look at `now` and say what is believed of it, in its rows."""
         ...
 
-    def looks(self, b: int) -> tuple[Keypoints | None, list[CropWindow | None]]:
+    def looks(self, b: int) -> tuple[Keypoints | None, Windows]:
         """What environment `b` saw last, and through which windows (for pictures)."""
         ...
 
@@ -108,7 +110,7 @@ class GivenSenses:
         """The truth, as an estimate."""
         return given.estimate_from_truth(now.truth)
 
-    def looks(self, b: int) -> tuple[Keypoints | None, list[CropWindow | None]]:
+    def looks(self, b: int) -> tuple[Keypoints | None, Windows]:
         """No camera took part."""
         return None, []
 
@@ -129,7 +131,7 @@ class BlindSenses:
         """The prior."""
         return rows(self.prior, now.ids)
 
-    def looks(self, b: int) -> tuple[Keypoints | None, list[CropWindow | None]]:
+    def looks(self, b: int) -> tuple[Keypoints | None, Windows]:
         """No camera took part."""
         return None, []
 
@@ -169,7 +171,7 @@ class TrackingSenses:
         """Keypoints of this moment, by whatever eyes the level has."""
         raise NotImplementedError
 
-    def looks(self, b: int) -> tuple[Keypoints | None, list[CropWindow | None]]:
+    def looks(self, b: int) -> tuple[Keypoints | None, Windows]:
         """The keypoints of environment `b`."""
         return rows(self.keypoints, np.array([b])), []
 
@@ -221,7 +223,8 @@ class CameraSenses(TrackingSenses):
         super().__init__(batch, scene, tracker, config)
         self.renderer = CropRenderer(scene)
         self.eyes = Eyes(scene.cameras, config.eyes)
-        self.windows: list[list[CropWindow | None]] = [[None] * len(scene.cameras)] * batch
+        nowhere = [[None] * len(scene.cameras)] * scene.n_workers
+        self.windows: list[Windows] = [list(nowhere) for _ in range(batch)]
 
     def detect(self, now: Moment, predicted: PoseEstimate, sensor_rngs: Generators) -> Keypoints:
         """Landmarks of crops round the predicted worker, or of a search where there is none."""
@@ -231,7 +234,7 @@ class CameraSenses(TrackingSenses):
             for worker in range(self.scene.n_workers):
                 windows = self._windows(predicted, row, worker)
                 sight = self.eyes.look(self.renderer, windows, self._track(b, worker))
-                self.windows[b] = sight.windows
+                self.windows[b][worker] = sight.windows
                 seen.px[row, :, worker] = sight.px
                 seen.confidence[row, :, worker] = sight.confidence
                 seen.sigma_px[row, :, worker] = sight.sigma_px
@@ -248,7 +251,7 @@ class CameraSenses(TrackingSenses):
         """The number by which the eyes know a worker of an environment."""
         return int(b) * self.scene.n_workers + worker
 
-    def looks(self, b: int) -> tuple[Keypoints | None, list[CropWindow | None]]:
+    def looks(self, b: int) -> tuple[Keypoints | None, Windows]:
         """The keypoints of environment `b` and the windows they were found in."""
         return rows(self.keypoints, np.array([b])), self.windows[b]
 

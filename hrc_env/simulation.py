@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from hrc_env import metrics, observations, rewards
 from hrc_env.batching import picked, rows, write_rows
+from hrc_env.belief import Believed, estimated_gap
 from hrc_env.body import load_body, worker_truth
 from hrc_env.config import HRCConfig
 from hrc_env.control import joint_command, n_actions
@@ -181,11 +182,11 @@ class Simulation:
         write_rows(self.estimate, ids, estimate)
         return estimate
 
-    def _believed(self, robot: RobotState) -> observations.Believed:
-        return observations.Believed(
+    def _believed(self, robot: RobotState) -> Believed:
+        return Believed(
             robot=robot,
             estimate=self.estimate,
-            gap=observations.estimated_gap(robot, self.estimate),
+            gap=estimated_gap(robot, self.estimate),
             goal_world=self.task.goal_world.copy(),
             goal_time_left_s=self.config.task.time_limit_s - self.task.goal_age_s,
             action=self.action,

@@ -67,6 +67,27 @@ HAND_SEGMENTS: tuple[tuple[int, int, float, float], ...] = (
 """Hands, which 15 joints do not hold: (elbow, wrist, reach beyond the wrist [m], radius [m])."""
 
 
+SEGMENT_RADIUS_M: Floats = np.array(
+    [radius for *_, radius in SEGMENT_ENDS] + [radius for *_, radius in HAND_SEGMENTS]
+)
+
+
+def _end_weights() -> Floats:
+    """(2 S, 15) matrix that takes joints to the ends of segments; hands end at the wrist."""
+    weights = np.zeros((len(SEGMENT_RADIUS_M), 2, N_JOINTS))
+    for k, (first, second, _) in enumerate(SEGMENT_ENDS):
+        weights[k, 0, list(first)] = 1 / len(first)
+        weights[k, 1, list(second)] = 1 / len(second)
+    for k, (_, wrist, _, _) in enumerate(HAND_SEGMENTS, start=len(SEGMENT_ENDS)):
+        weights[k, :, wrist] = 1.0
+    return weights.reshape(-1, N_JOINTS)
+
+
+_END_WEIGHTS = _end_weights()
+_ELBOWS, _WRISTS = ([hand[k] for hand in HAND_SEGMENTS] for k in (0, 1))
+_HAND_REACH_M = np.array([[hand[2]] for hand in HAND_SEGMENTS])
+
+
 def segments(joints_world: Floats) -> Floats:
     """End points of the body's segments, the hands last.
 
@@ -76,18 +97,9 @@ def segments(joints_world: Floats) -> Floats:
     Returns:
         (..., 16, 2, 3) end points [m]; radii are `SEGMENT_RADIUS_M`.
     """
-    ends = np.empty((*joints_world.shape[:-2], len(SEGMENT_RADIUS_M), 2, 3))
-    for k, (first, second, _) in enumerate(SEGMENT_ENDS):
-        ends[..., k, 0, :] = joints_world[..., list(first), :].mean(-2)
-        ends[..., k, 1, :] = joints_world[..., list(second), :].mean(-2)
-    for k, (elbow, wrist, reach_m, _) in enumerate(HAND_SEGMENTS, start=len(SEGMENT_ENDS)):
-        forearm = joints_world[..., wrist, :] - joints_world[..., elbow, :]
-        length = np.maximum(np.linalg.norm(forearm, axis=-1, keepdims=True), 1e-6)
-        ends[..., k, 0, :] = joints_world[..., wrist, :]
-        ends[..., k, 1, :] = joints_world[..., wrist, :] + reach_m * forearm / length
+    ends = _END_WEIGHTS @ joints_world  # a reshape to -1 would not do without workers
+    ends = ends.reshape(*joints_world.shape[:-2], len(SEGMENT_RADIUS_M), 2, 3)
+    forearm = joints_world[..., _WRISTS, :] - joints_world[..., _ELBOWS, :]
+    length = np.sqrt(np.einsum("...i,...i->...", forearm, forearm))[..., None]
+    ends[..., -len(HAND_SEGMENTS) :, 1, :] += _HAND_REACH_M * forearm / np.maximum(length, 1e-6)
     return ends
-
-
-SEGMENT_RADIUS_M: Floats = np.array(
-    [radius for *_, radius in SEGMENT_ENDS] + [radius for *_, radius in HAND_SEGMENTS]
-)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from hrc_env.belief import Believed
 from hrc_env.geometry.distances import Gap
-from hrc_env.observations import Believed
 from hrc_env.records import PoseEstimate, RobotState
 from hrc_env.rewards import TERMS, RewardConfig, closeness, reward
 from hrc_env.tasks.reach import ReachProgress

@@ -18,8 +18,8 @@ from hrc_env.env import HRCReachEnv
 from hrc_env.typing import Image
 
 WIDTH, HEIGHT = 1600, 900
-ROOM = (796, 716)
-TILE = (396, 223)
+ROOM = (792, 716)
+TILE = (400, 225)
 CROP = 196
 STRIP_HEIGHT = 180
 STRIP_S = 10.0
@@ -104,13 +104,12 @@ def compose(env: HRCReachEnv, diary: Diary, info: dict[str, Any]) -> Image:
     """One frame: room, cameras, crops, strip."""
     frame = np.empty((HEIGHT, WIDTH, 3), np.uint8)
     frame[:] = pictures.PANEL
-    simulation = env.simulation
-    room = simulation.room_view(0, *ROOM)
+    room = env.views.room(*ROOM)
     pictures.label(room, "what happens", (10, 10), 18)
     _paste(frame, room, (0, 0))
-    views = simulation.camera_views(0, *TILE)
+    views = env.views.cameras(*TILE)
     _paste(frame, pictures.tile(views, 2), (WIDTH - 2 * TILE[0] - 4, 0))
-    crops = simulation.crop_views(0, CROP)
+    crops = env.views.crops(CROP)
     for k, crop in enumerate(crops[:4]):
         _paste(frame, crop, (WIDTH - 2 * TILE[0] - 4 + k * (CROP + 4), 2 * TILE[1] + 52))
     if crops:

@@ -8,7 +8,7 @@ from rich.table import Table
 from hrc_env import IDS
 from hrc_env.control import CONTROLS
 from hrc_env.scene.build import SCENES
-from hrc_env.scene.rig import RigConfig
+from hrc_env.scene.rig import LAB_CAMERAS
 from hrc_env.senses import LEVELS
 from hrc_env.tracking.estimators import ESTIMATORS
 
@@ -20,7 +20,7 @@ class List:
     def run(self) -> int:
         """Print the table."""
         table = Table("argument", "names", title="hrc_env")
-        cameras = [camera.name for camera in RigConfig().cameras]
+        cameras = [camera.name for camera in LAB_CAMERAS]
         for argument, names in (
             ("id", IDS),
             ("perception", LEVELS),

@@ -19,8 +19,8 @@ class Setup:
         """Set up; 0 if everything is there at the end."""
         console = Console()
         with console.status("Fetching the weights of MediaPipe Pose ..."):
-            folder = weights.fetch_weights()
-        console.print(f"[green]ok[/] pose network: official weights in {folder}")
+            weights.fetch_weights()
+        console.print(f"[green]ok[/] pose network: official weights in {weights.cache_dir()}")
         ready, message = gl_status()
         if not ready and _may_install():
             console.print(f"Installing OpenGL: {APT_LINE}")

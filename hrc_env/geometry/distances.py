@@ -39,8 +39,8 @@ def narrowest_gap(
     """
     lead = capsules_a.shape[:-3]
     count = math.prod(lead)
-    flat_a = np.ascontiguousarray(capsules_a).reshape(count, -1, 2, 3)
-    flat_b = np.ascontiguousarray(capsules_b).reshape(count, -1, 2, 3)
+    flat_a = np.ascontiguousarray(capsules_a).reshape(count, *capsules_a.shape[-3:])
+    flat_b = np.ascontiguousarray(capsules_b).reshape(count, *capsules_b.shape[-3:])
     gap, points = np.empty(count), np.empty((count, 2, 3))
     _narrowest(flat_a, radius_a_m, flat_b, radius_b_m, gap, points)
     points = points.reshape(*lead, 2, 3)

@@ -1,0 +1,49 @@
+"""results.json: the one form in which every benchmark and experiment writes its numbers."""
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hrc_env.provenance import provenance
+
+
+@dataclass(frozen=True, slots=True)
+class Metric:
+    """A number with its spread."""
+
+    value: float
+    low: float
+    """Lower end of a 95 % interval, or the smallest of the runs; see the benchmark."""
+    high: float
+    """Upper end, or the largest."""
+    unit: str
+    n: int
+    """How many observations it is made of."""
+
+
+def over(values: Sequence[float], unit: str) -> Metric:
+    """The median of repeated measurements, with their smallest and largest."""
+    return Metric(
+        float(np.median(values)), float(np.min(values)), float(np.max(values)), unit, len(values)
+    )
+
+
+def write_results(
+    path: Path, config: Mapping[str, Any], seeds: Sequence[int], metrics: Mapping[str, Metric]
+) -> None:
+    """Write a results file, whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    content = {
+        "config": dict(config),
+        **provenance(),
+        "seeds": list(seeds),
+        "metrics": {name: asdict(metric) for name, metric in metrics.items()},
+    }
+    draft = path.with_suffix(".draft")
+    draft.write_text(json.dumps(content, indent=1))
+    os.replace(draft, path)

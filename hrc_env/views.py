@@ -1,0 +1,114 @@
+"""Views of a simulation for people: the room, the cameras with what was made of them."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hrc_env import pictures
+from hrc_env.batching import one
+from hrc_env.motion import generator
+from hrc_env.records import CropWindow, Keypoints
+from hrc_env.scene.render import CropRenderer, PictureRenderer
+from hrc_env.simulation import Simulation
+from hrc_env.typing import Image
+
+PICTURE_SIZE = (960, 720)
+MOSAIC_TILE = (640, 360)
+
+
+class Views:
+    """Pictures of one environment of a simulation; graphics contexts are made when asked for."""
+
+    def __init__(self, simulation: Simulation, b: int = 0) -> None:
+        self.simulation, self.b = simulation, b
+        self._renderers: dict[tuple[int, int], PictureRenderer] = {}
+        self._crops: CropRenderer | None = None
+
+    def picture(self, depth: bool = False) -> NDArray[Any]:
+        """The room, (720, 960, 3) uint8, or distances (720, 960) float32 [m]."""
+        return self._renderer(*PICTURE_SIZE).picture(*self._pose(), "room", depth=depth)
+
+    def room(self, width: int, height: int) -> Image:
+        """The room with the estimated skeleton over it."""
+        renderer = self._renderer(width, height)
+        image = renderer.picture(*self._pose(), "room").astype(np.uint8, copy=False)
+        camera = renderer.camera("room")
+        pictures.draw_estimate(image, camera, self.simulation.estimate, self.b)
+        pictures.draw_goal(image, camera, self.simulation.task.goal_world[self.b])
+        return image
+
+    def cameras(self, width: int, height: int) -> list[Image]:
+        """Every camera's picture with crops, detected keypoints and the estimate."""
+        keypoints, windows = self._looks()
+        views = []
+        for c, camera in enumerate(self.simulation.scene.cameras):
+            image = self._renderer(width, height).picture(*self._pose(), camera.name)
+            image = image.astype(np.uint8, copy=False)
+            for worker_windows in windows:
+                if worker_windows[c] is not None:
+                    pictures.draw_window(image, camera, worker_windows[c])
+            pictures.draw_estimate(image, camera, self.simulation.estimate, self.b, thickness=1)
+            if keypoints is not None:
+                pictures.draw_keypoints(image, camera, keypoints, c)
+            pictures.label(image, camera.name.replace("_", " "), (6, 6), 13)
+            views.append(image)
+        return views
+
+    def crops(self, size: int) -> list[Image]:
+        """What the pose network was given: each camera's crop, with its landmarks."""
+        keypoints, windows = self._looks()
+        if keypoints is None or not windows:
+            return []
+        if self._crops is None:
+            self._crops = CropRenderer(self.simulation.scene, size)
+        self._crops.draw(*self._pose())
+        return [
+            self._crop(self._crops, c, window, keypoints, size)
+            for c, window in enumerate(windows[0])
+        ]
+
+    def mosaic(self) -> Image:
+        """The cameras in two columns."""
+        return pictures.tile(self.cameras(*MOSAIC_TILE), 2)
+
+    def close(self) -> None:
+        """Free the graphics contexts."""
+        for renderer in self._renderers.values():
+            renderer.close()
+        if self._crops is not None:
+            self._crops.close()
+        self._renderers, self._crops = {}, None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_renderers": {}, "_crops": None}
+
+    def _crop(
+        self,
+        renderer: CropRenderer,
+        c: int,
+        window: CropWindow | None,
+        keypoints: Keypoints,
+        size: int,
+    ) -> Image:
+        if window is None:
+            image = np.empty((size, size, 3), np.uint8)
+            image[:] = pictures.PANEL
+            pictures.write(image, "no worker in view", (10, size // 2 - 10), 13)
+            return image
+        image = renderer.crop(c, window)
+        pictures.draw_landmarks(image, window, keypoints.px[0, c, 0], keypoints.confidence[0, c, 0])
+        return image
+
+    def _pose(self) -> tuple[Any, Any]:
+        motion = one(generator.current(self.simulation.motion), self.b)
+        return self.simulation.physics.q[self.b], motion
+
+    def _looks(self) -> tuple[Keypoints | None, list[list[CropWindow | None]]]:
+        return self.simulation.senses.looks(self.b)
+
+    def _renderer(self, width: int, height: int) -> PictureRenderer:
+        size = (width, height)
+        if size not in self._renderers:
+            self._renderers[size] = PictureRenderer(self.simulation.scene, width, height)
+        return self._renderers[size]
