@@ -24,7 +24,7 @@ GRIP_M = 0.08
 """How far beyond the wrist a hand grips (half a hand's length, a judgement)."""
 HEEL_M = -0.045
 """Heel's contact behind the ankle (a quarter of a foot, a judgement)."""
-STAND_SHARE = 0.985
+STAND_SHARE = 0.994
 """Standing hip height as a share of the leg's length: knees just unlocked."""
 
 

@@ -25,6 +25,8 @@ PLACE_DRAWS = 16
 SPOT_X, SPOT_Y, SPOT_YAW, SPOT_NEAR, SPOT_UNTIL = range(5)
 """Columns of a worker's place: where, which way, whether at the robot, until which clock [s]."""
 N_SPOT = 5
+SWAY_M = 0.05
+"""Paths keep this further away, because bodies sway about them [m]."""
 BODY_M = 0.32
 """Hands reach no nearer to their own root than this [m]."""
 
@@ -78,7 +80,7 @@ def _via(draw: float, plan: Floats, config: MotionConfig) -> tuple[float, float]
             px, py, _ = along(i / 12.0, plan)
             nearest = min(nearest, math.hypot(px - bx, py - by))
         away = math.hypot(x - bx, y - by)
-        if nearest >= config.clearance_m or away < 1e-6:
+        if nearest >= config.clearance_m + SWAY_M or away < 1e-6:
             break
         x, y = x + 0.1 * (x - bx) / away, y + 0.1 * (y - by) / away
     return x, y

@@ -52,9 +52,11 @@ def hump(u: float) -> float:
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def soft_min(a: float, b: float, width: float) -> float:
-    """Less than both, and equal to the smaller one when they differ by more than `width`."""
-    d = a - b
-    return 0.5 * (a + b - math.sqrt(d * d + width * width))
+    """The smaller one, rounded off (downwards) where the two differ by less than `width`."""
+    closeness = 1.0 - abs(a - b) / width
+    if closeness <= 0.0:
+        return min(a, b)
+    return min(a, b) - width * closeness * closeness * closeness / 6.0
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")

@@ -20,23 +20,34 @@ STRIKE_PITCH, PUSH_PITCH = -0.35, 1.0
 57 degrees in level walking (Winter, Biomechanics and Motor Control of Human Movement)."""
 FLAT_S, ROLL_SHARE = 0.10, 0.62
 """Heel strike to foot flat [s]; heel-off to toe-off as a share of the period of a step."""
-RAMP_SHARE = 0.30
+RAMP_SHARE = 0.27
 """Share of a swing in which the foot gathers (and again loses) speed."""
 LIFT_BASE_M, LIFT_STRIDE_M = 0.025, 0.045
 """Rise of the foot above its roll: of any step, and more with the stride [m]."""
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _roll(t: float, lift: float, land: float, period: float, stride: float) -> float:
-    """Pitch of the foot that one step adds: up on the ball, through the air, down on the heel."""
+def _roll(
+    t: float, lift: float, land: float, period: float, stride: float
+) -> tuple[float, float]:
+    """Pitch that one step adds: heel up round the ball, then toes up round the heel."""
     swing = land - lift
-    up = min_jerk((t - lift + ROLL_SHARE * period) / (ROLL_SHARE * period + 0.12 * swing))
+    rising = min(ROLL_SHARE * period, lift)  # the first step's heel stays down until time 0
+    up = min_jerk((t - lift + rising) / (rising + 0.12 * swing))
     if up == 0.0:
-        return 0.0
+        return 0.0, 0.0
     down = min_jerk((t - lift - 0.10 * swing) / (0.72 * swing))
-    toe_up = min_jerk((t - lift - 0.50 * swing) / (0.50 * swing))
+    toes_up = min_jerk((t - lift - 0.50 * swing) / (0.50 * swing))
     flat = min_jerk((t - land) / FLAT_S)
-    return stride * (PUSH_PITCH * (up - down) + STRIKE_PITCH * (toe_up - flat))
+    return stride * PUSH_PITCH * (up - down), stride * STRIKE_PITCH * (toes_up - flat)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _last_step(t: float, first: int, count: int, plan: Floats) -> int:
+    """Index of the latest step of a foot that has left the floor; below `first` if none."""
+    k = math.floor((t - plan[pl.STEP_START]) / plan[pl.STEP_PERIOD])
+    k -= (k - first) % 2
+    return min(k, count - 1 - (count - 1 - first) % 2)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
@@ -44,49 +55,40 @@ def foot(
     t: float, side: int, plan: Floats, prints: Floats, stance: Floats, size: Floats, q: Floats
 ) -> None:
     """Write the ankle columns of one side at time t into the control vector."""
-    start, period, swing = plan[pl.STEP_START], plan[pl.STEP_PERIOD], plan[pl.STEP_SWING]
+    x, y, yaw = stance[side, 0], stance[side, 1], stance[side, 2]
+    heel_up, toes_up, rise, flown = 0.0, 0.0, 0.0, 0.0
     count = int(plan[pl.STEP_COUNT])
-    first = (side + int(plan[pl.STEP_FIRST])) % 2
-    x, y, yaw, pitch, rise, flown = stance[side, 0], stance[side, 1], stance[side, 2], 0.0, 0.0, 0.0
-    k = -1
-    if count > first:
-        k = math.floor((t - start) / period)
-        k = k - 1 if (k - first) % 2 else k
-        k = min(k, count - 1 if (count - 1 - first) % 2 == 0 else count - 2)
-        following = max(k + 2, first)
-        if following < count:
-            lift = start + following * period
-            pitch += _roll(t, lift, lift + swing, period, prints[following, 3])
-    if k >= first:
-        lift = start + k * period
-        w = (t - lift) / swing
-        if k >= 2 + first:
-            x, y, yaw = prints[k - 2, 0], prints[k - 2, 1], prints[k - 2, 2]
-        share, stride = cruise(w, RAMP_SHARE), prints[k, 3]
-        x, y = x + share * (prints[k, 0] - x), y + share * (prints[k, 1] - y)
-        yaw += min_jerk(w) * (prints[k, 2] - yaw)
-        pitch += _roll(t, lift, lift + swing, period, stride)
-        rise = (LIFT_BASE_M + LIFT_STRIDE_M * stride) * hump(w)
-        flown = min_jerk(2.0 * w) if w < 1.0 else 0.0
-    _place(x, y, yaw, pitch, rise, flown, c.ANKLE + 6 * side, size, q)
+    if count > 0:
+        start, period, swing = plan[pl.STEP_START], plan[pl.STEP_PERIOD], plan[pl.STEP_SWING]
+        first = (side + int(plan[pl.STEP_FIRST])) % 2
+        k = _last_step(t, first, count, plan)
+        coming = max(k + 2, first)
+        if coming < count:
+            lift = start + coming * period
+            heel_up, toes_up = _roll(t, lift, lift + swing, period, prints[coming, 3])
+        if k >= first:
+            lift = start + k * period
+            w = (t - lift) / swing
+            if k >= 2 + first:
+                x, y, yaw = prints[k - 2, 0], prints[k - 2, 1], prints[k - 2, 2]
+            share, stride = cruise(w, RAMP_SHARE), prints[k, 3]
+            x, y = x + share * (prints[k, 0] - x), y + share * (prints[k, 1] - y)
+            yaw += min_jerk(w) * (prints[k, 2] - yaw)
+            heel, toes = _roll(t, lift, lift + swing, period, stride)
+            heel_up, toes_up = heel_up + heel, toes_up + toes
+            rise = (LIFT_BASE_M + LIFT_STRIDE_M * stride) * hump(w)
+            flown = min_jerk(2.0 * w) if w < 1.0 else 0.0
+    at = c.ANKLE + 6 * side
+    ahead, above = _about(heel_up, size[BALL_X], size[BALL_Z])
+    behind, below = _about(toes_up, size[HEEL_X], -size[ANKLE_Z])
+    q[at] = x + math.cos(yaw) * (ahead + behind)
+    q[at + 1] = y + math.sin(yaw) * (ahead + behind)
+    q[at + 2] = size[ANKLE_Z] + above + below + rise
+    q[at + 3], q[at + 4], q[at + 5] = yaw, heel_up + toes_up, heel_up * flown + toes_up
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _place(
-    x: float, y: float, yaw: float, pitch: float, rise: float, flown: float,
-    at: int, size: Floats, q: Floats,
-) -> None:  # fmt: skip
-    """Turn the foot about the ball (heel up) or the heel (toes up), which stays on the floor."""
-    if pitch > 0.0:
-        pivot_x, pivot_z = size[BALL_X], size[BALL_Z]
-        toes = pitch * flown
-    else:
-        pivot_x, pivot_z = size[HEEL_X], -size[ANKLE_Z]
-        toes = pitch
+def _about(pitch: float, pivot_x: float, pivot_z: float) -> tuple[float, float]:
+    """How far forward and up the ankle goes when the foot pitches about a point of its own."""
     cos, sin = math.cos(pitch), math.sin(pitch)
-    ahead = pivot_x - pivot_x * cos - pivot_z * sin
-    above = pivot_z + pivot_x * sin - pivot_z * cos
-    q[at] = x + math.cos(yaw) * ahead
-    q[at + 1] = y + math.sin(yaw) * ahead
-    q[at + 2] = size[ANKLE_Z] + above + rise
-    q[at + 3], q[at + 4], q[at + 5] = yaw, pitch, toes
+    return pivot_x * (1.0 - cos) - pivot_z * sin, pivot_z * (1.0 - cos) + pivot_x * sin

@@ -26,9 +26,9 @@ from hrc_env.typing import Floats
 
 ARM_KNEE, ARM_LIMIT = 0.97, 0.998
 """Shares of the arm's length where stretching begins to resist, and that it never passes."""
-LEG_LIMIT = 0.992
+LEG_LIMIT = 0.998
 """Share of the leg's length that a walking or standing leg uses at most (knees never lock)."""
-LEG_SOFTNESS_M = 0.012
+LEG_SOFTNESS_M = 0.03
 """Width over which the longest possible leg takes over from the wished pelvis height."""
 
 

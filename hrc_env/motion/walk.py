@@ -12,6 +12,7 @@ from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.anatomy import ANKLE_X
 from hrc_env.motion.curves import min_jerk, ramp, wrap
+from hrc_env.motion.feet import FLAT_S
 from hrc_env.motion.posture import (
     RELAXED_ELBOW,
     RELAXED_PITCH,
@@ -24,14 +25,17 @@ from hrc_env.typing import Floats
 
 CADENCE_PER_MIN, CADENCE_POWER, SLOWEST_M_S = 96.2, 0.468, 0.65
 """Fit above; slower starts and turns keep the cadence of the slowest speed [m/s]."""
-SWING_SHARE = 0.76
-"""Time in the air in periods of a step: stance is 62 % of the gait cycle."""
-MID_STANCE = 0.50
+SWING_SHARE = 0.80
+"""Time in the air in periods of a step: stance is 60 % of the gait cycle."""
+MID_STANCE = 0.46
 """When the root passes over a footprint, in periods of a step after its landing."""
 WALK_HALF_WIDTH_M = 0.04
 """Half the step width at full speed [m]; 5 to 9 cm measured."""
-SHIFT_S, TURN_S, TURN_RATE = 0.12, 0.5, 1.7
+SHIFT_S, TURN_S, TURN_RATE = 0.28, 0.5, 1.7
 """Weight shift before the first step [s]; duration of a turn: TURN_S + angle / TURN_RATE."""
+SIDE_STEP_M_S, SIDE_STEP_PERIOD_S, SIDE_STEP_M = 0.2, 0.52, 0.5
+"""Going nowhere far (nearer than SIDE_STEP_M), people do not turn: they take small steps, slow
+enough that the feet never cross; judgement."""
 NORMAL_M_S = 1.3
 """Speed at which the amplitudes below hold."""
 
@@ -93,7 +97,7 @@ def walk(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q
     shift = (0.028 - 0.008 * min(pace, 1.0)) * over
     q[c.ROOT_X] -= math.sin(yaw) * shift
     q[c.ROOT_Y] += math.cos(yaw) * shift
-    q[c.PELVIS_Z] -= 0.018 * pace + 0.006 * going + 0.013 * pace * both_down
+    q[c.PELVIS_Z] -= 0.006 * going + pace * (0.026 + 0.015 * both_down)
     q[c.PELVIS_PITCH] += 0.03 * pace
     q[c.PELVIS_ROLL] += 0.04 * over
     q[c.PELVIS_YAW] -= 0.075 * left_ahead
@@ -104,7 +108,7 @@ def walk(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q
     q[c.HEAD_YAW] += 0.8 * min(max(ahead - yaw, -0.8), 0.8) - 0.5 * 0.115 * left_ahead
     for side in range(2):
         swing = -(1.0 - 2.0 * side) * left_ahead
-        reach = 0.19 * pace + 0.10
+        reach = 0.14 * pace + 0.08
         hang(
             side,
             RELAXED_PITCH - 0.06 * pace + reach * swing,
@@ -128,14 +132,15 @@ def plan_walk(
         nx, ny, _ = along(i / 16.0, plan)
         length += math.hypot(nx - x, ny - y)
         x, y = nx, ny
-    follow = 1.0 if length > 0.5 else 0.0
+    follow = 1.0 if length > SIDE_STEP_M else 0.0
     plan[pl.LENGTH], plan[pl.FOLLOW] = length, follow
-    wished = wished_m_s if follow > 0.0 else 0.25
+    wished = wished_m_s if follow > 0.0 else SIDE_STEP_M_S
     plan[pl.RAMP] = 0.45 + 0.4 * wished
     plan[pl.SPEED] = min(wished, length / plan[pl.RAMP])
     plan[pl.DURATION] = length / plan[pl.SPEED] + plan[pl.RAMP]
     _plan_turns(end[2], plan)
     period = 60.0 / (CADENCE_PER_MIN * max(plan[pl.SPEED], SLOWEST_M_S) ** CADENCE_POWER)
+    period = period if follow > 0.0 else SIDE_STEP_PERIOD_S
     plan[pl.STEP_PERIOD], plan[pl.STEP_SWING] = period, SWING_SHARE * period
     plan[pl.STEP_START] = SHIFT_S
     return _plan_steps(plan, prints, stance, size)
@@ -149,7 +154,7 @@ def _plan_turns(end_yaw: float, plan: Floats) -> None:
     start_yaw = plan[pl.START_YAW]
     turn = wrap(start_yaw - first) if plan[pl.FOLLOW] > 0.0 else 0.0
     plan[pl.TURN_IN], plan[pl.TURN_IN_S] = turn, TURN_S + abs(turn) / TURN_RATE
-    plan[pl.DEPART] = SHIFT_S + 0.15 + max(0.0, plan[pl.TURN_IN_S] - TURN_S - 0.45)
+    plan[pl.DEPART] = SHIFT_S + 0.10 + max(0.0, plan[pl.TURN_IN_S] - TURN_S - 0.45)
     arrival = plan[pl.DEPART] + plan[pl.DURATION]
     heading = start_yaw - turn
     heading += wrap(final - heading) if plan[pl.FOLLOW] > 0.0 else 0.0
@@ -171,14 +176,14 @@ def _plan_steps(plan: Floats, prints: Floats, stance: Floats, size: Floats) -> f
         side = (k + int(plan[pl.STEP_FIRST])) % 2
         when = over + k * period if k < count - 2 else done + 1.0
         x, y, yaw = root(when, plan)
-        narrow = min(speed(when, plan) / 0.8, 1.0)
+        narrow = min(speed(when, plan) / 0.8, 1.0) * plan[pl.FOLLOW]
         half = STANCE_HALF_WIDTH_M + (WALK_HALF_WIDTH_M - STANCE_HALF_WIDTH_M) * narrow
         footprint(side, x, y, yaw, half, size, prints[k])
         x, y = stance[side, 0], stance[side, 1]
         if k >= 2:
             x, y = prints[k - 2, 0], prints[k - 2, 1]
         prints[k, 3] = min(math.hypot(prints[k, 0] - x, prints[k, 1] - y) / NORMAL_M_S, 1.1)
-    return start + (count - 1) * period + plan[pl.STEP_SWING] + 0.05
+    return start + (count - 1) * period + plan[pl.STEP_SWING] + FLAT_S
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
