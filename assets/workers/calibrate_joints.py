@@ -9,111 +9,88 @@ honestly: with offsets from half of the frames, on the other half.
 """
 
 import argparse
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from poses import POSES, posed
 
-from hrc_env.body import SEGMENTS, Body, assets_dir, load_body, load_looks, worker_truth
-from hrc_env.geometry.cameras import PinholeCamera, project, projections
+from hrc_env.body import SEGMENTS, Body, assets_dir, load_body, worker_truth
+from hrc_env.geometry.cameras import project, projections
 from hrc_env.geometry.rotations import matrix_from_quaternion
 from hrc_env.geometry.triangulation import triangulate_robust
-from hrc_env.perception.blazepose import decode_landmarks, landmark_input
+from hrc_env.perception.blazepose import decode_landmarks, landmark_input, to_image
+from hrc_env.perception.eyes import STATURE_OF_SIDE
 from hrc_env.perception.network import Landmarker, load_landmarker
 from hrc_env.perception.noise import sigma_px
-from hrc_env.records import WorkerMotion
-from hrc_env.scene.rig import LAB_CAMERAS, add_cameras, pinholes
-from hrc_env.scene.worker import add_worker, mocap_ids
-from hrc_env.skeleton import BLAZEPOSE_INDEX, JOINTS, MIRROR
-
-import mujoco  # isort: skip  # after hrc_env.scene has chosen an OpenGL
+from hrc_env.perception.windows import window_from_joints
+from hrc_env.records import CropWindow, WorkerMotion
+from hrc_env.scene.build import SceneConfig, build
+from hrc_env.scene.render import CropRenderer
+from hrc_env.scene.rig import LAB_CAMERAS, pinholes
+from hrc_env.skeleton import BLAZEPOSE_INDEX, JOINTS, MIRROR, N_JOINTS
 
 PLACES = (((0.3, 0.0), 0.4), ((1.1, 0.6), 2.1), ((0.5, -0.7), -1.8), ((1.5, -0.2), 3.6))
 """Where the worker stands (x, y) [m] and looks (yaw) [rad]."""
-SIDE = 256
-PERSON_SHARE = 0.74
-"""How much of the crop's side the person fills."""
 JITTER_DEG = 4.0
 MIN_CONFIDENCE = 0.5
 
 
-class Studio:
-    """A bare, evenly lit room with one worker, seen through windows of the lab's cameras."""
-
-    def __init__(self, name: str, cameras: tuple[PinholeCamera, ...]) -> None:
-        spec = mujoco.MjSpec()
-        spec.visual.headlight.ambient[:] = 0.45
-        spec.visual.headlight.diffuse[:] = 0.35
-        spec.visual.quality.offsamples = 0
-        spec.worldbody.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_PLANE, size=[4, 4, 0.1], rgba=[0.6, 0.6, 0.58, 1]
-        )
-        for axis, sign in ((0, 1), (0, -1), (1, 1), (1, -1)):
-            centre, size = np.array([0, 0, 1.5]), np.array([4, 4, 1.5])
-            centre[axis], size[axis] = 4 * sign, 0.05
-            spec.worldbody.add_geom(
-                type=mujoco.mjtGeom.mjGEOM_BOX, pos=centre, size=size, rgba=[0.75, 0.74, 0.7, 1]
-            )
-        add_cameras(spec, cameras)
-        add_worker(spec, load_body(name), load_looks(name), "worker/")
-        self.model = spec.compile()
-        self.data = mujoco.MjData(self.model)
-        self.rows = mocap_ids(self.model, "worker/")
-        self.renderer = mujoco.Renderer(self.model, SIDE, SIDE)
-
-    def pose(self, motion: WorkerMotion) -> None:
-        """Put the worker into a pose."""
-        self.data.mocap_pos[self.rows] = motion.position_world
-        self.data.mocap_quat[self.rows] = motion.quaternion_wxyz
-        mujoco.mj_forward(self.model, self.data)
-
-    def crop(self, camera: PinholeCamera, corner_px: np.ndarray, side_px: float) -> np.ndarray:
-        """An upright square of a camera's image, drawn directly with an off-centre frustum."""
-        self.renderer.update_scene(self.data, camera.name)
-        scene, focal = self.renderer.scene, camera.K[0, 0]
-        scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = False
-        for eye in scene.camera:
-            left, top = (corner_px - camera.K[:2, 2]) / focal * eye.frustum_near
-            size = side_px / focal * eye.frustum_near
-            eye.frustum_center, eye.frustum_width = left + size / 2, size / 2
-            eye.frustum_top, eye.frustum_bottom = -top, -top - size
-        return self.renderer.render()
+def anatomical_offset(name: str) -> np.ndarray:
+    """(J, 3) the joints before calibration."""
+    with np.load(_path(name)) as baked:
+        return baked["joint_anatomical_offset"].astype(float)
 
 
 def observe(name: str) -> tuple[list[WorkerMotion], np.ndarray, np.ndarray]:
-    """Motions of all frames, with detected pixels (B, C, 1, J, 2) and their deviations."""
-    body, cameras = load_body(name), pinholes(LAB_CAMERAS)
-    studio, look = Studio(name, cameras), load_landmarker()
-    P, rng = projections(cameras), np.random.default_rng(0)
+    """Motions of all frames, with detected pixels (B, C, 1, J, 2) and their deviations.
+
+    Windows are laid round the anatomical joints, so that calibrating twice changes nothing.
+    """
+    scene = build(SceneConfig(clutter=False), n_workers=1, body_name=name)
+    body = replace(load_body(name), joint_offset=anatomical_offset(name))
+    P = projections(scene.cameras)
+    renderer, look = CropRenderer(scene), load_landmarker()
+    rng = np.random.default_rng(0)
     motions, px, sigma = [], [], []
     for number, pose in enumerate(POSES):
         for turn, (xy, yaw) in enumerate(PLACES):
             jitter = rng.normal(0, JITTER_DEG, 12)
             motion = posed(body, pose, xy, yaw + 0.7 * number + 0.3 * turn, jitter)
-            studio.pose(motion)
-            outline, _ = project(P, worker_truth(body, motion).capsules_world.reshape(1, -1, 3))
-            found = [
-                _detect(studio, look, camera, outline[0, c]) for c, camera in enumerate(cameras)
-            ]
+            renderer.draw(scene.home_q, _one_worker(motion))
+            joints_px, depth_m = project(P, worker_truth(body, motion).joints_world[None])
+            found = []
+            for c, camera in enumerate(scene.cameras):
+                window = window_from_joints(joints_px[0, c], depth_m[0, c], camera)
+                found.append(_detect(renderer, look, c, window))
             motions.append(motion)
             px.append([each[0] for each in found])
             sigma.append([each[1] for each in found])
+    renderer.close()
     return motions, np.array(px)[:, :, None], np.array(sigma)[:, :, None]
 
 
+def _one_worker(motion: WorkerMotion) -> WorkerMotion:
+    """A motion (S, ...) as that of all workers of an environment (1, S, ...)."""
+    return WorkerMotion(
+        motion.position_world[None],
+        motion.quaternion_wxyz[None],
+        motion.velocity_world[None],
+        motion.angular_velocity_world[None],
+    )
+
+
 def _detect(
-    studio: Studio, look: Landmarker, camera: PinholeCamera, outline_px: np.ndarray
+    renderer: CropRenderer, look: Landmarker, camera: int, window: CropWindow | None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Landmarks of one view in image pixels (J, 2) and their deviations (J,)."""
-    low, high = outline_px.min(0), outline_px.max(0)
-    side_px = float((high - low).max()) / PERSON_SHARE
-    corner = (low + high) / 2 - side_px / 2
-    points, flag, heat = look(landmark_input(studio.crop(camera, corner, side_px)))
+    if window is None:
+        return np.full((N_JOINTS, 2), np.nan), np.full(N_JOINTS, np.inf)
+    points, flag, heat = look(landmark_input(renderer.crop(camera, window)))
     joints = decode_landmarks(points, heat)[BLAZEPOSE_INDEX]
-    sigma = sigma_px(joints[:, 2], PERSON_SHARE * side_px)
+    sigma = sigma_px(joints[:, 2], STATURE_OF_SIDE * window.side_px)
     sigma[(joints[:, 2] < MIN_CONFIDENCE) | (flag < 0.5)] = np.inf
-    return corner + joints[:, :2] * side_px, sigma
+    return to_image(joints[:, :2], window), sigma
 
 
 def in_segments(
@@ -157,8 +134,7 @@ def calibrate(name: str) -> Calibration:
     motions, px, sigma = observe(name)
     points = triangulate_robust(projections(pinholes(LAB_CAMERAS)), px, sigma).points_world[:, 0]
     local = in_segments(body, motions, points, body.joint_segment)
-    with np.load(_path(name)) as baked:
-        anatomical = baked["joint_anatomical_offset"].astype(float)
+    anatomical = anatomical_offset(name)
     held_out = np.arange(len(motions)) % 2 == 1
     offset, fitted = symmetric_median(local), symmetric_median(local[~held_out])
     return Calibration(

@@ -9,6 +9,7 @@ from atlas import (
     cavity,
     folds,
     raster,
+    smooth_seam,
     split,
     stored_shade,
     stored_surface,
@@ -43,8 +44,9 @@ def cloth_arrays(
     for colour, cover in outfit.layers(colours):
         painting.lay(colour, cover)
     palette, index = painting.palette(40)
+    drawn_cut, drawn_uv = smooth_seam(cloth, (facing[:, 0] < 0).astype(int), uv_of)
     return {
-        **stored_surface("cloth", cut, uv, unit_m),
+        **stored_surface("cloth", drawn_cut, drawn_uv, unit_m),
         "cloth_palette": palette,
         "cloth_paint": index,
         "cloth_shade": stored_shade(outfit.shade(), 4),
@@ -111,7 +113,7 @@ class _Outfit:
             (shaded(colours.trousers, 1.5), cargo * band(self.z, self.hip[2] - 0.15, 0.004, 0.002)),
             (colours.boots, above(shaft, self.z, 0.003)),
             (shaded(colours.boots, 0.62), band(self.z, shaft - 0.012, 0.012, 0.003)),
-            (shaded(colours.boots, 1.75), laces * above(shaft - 0.03, self.z, 0.004)),
+            (shaded(colours.boots, 1.4), laces * above(shaft - 0.03, self.z, 0.004)),
             (colours.sole, above(welt, self.z, 0.003)),
         ]
 
@@ -154,7 +156,7 @@ class _Outfit:
 
     def shade(self) -> np.ndarray:
         """Creases, folds, the vest's shadow on the trousers."""
-        dark = 1 - np.clip(self.fine / 0.012, -0.12, 0.25) - np.clip(self.broad / 0.08, -0.07, 0.07)
+        dark = 1 - np.clip(self.fine / 0.016, -0.06, 0.10) - np.clip(self.broad / 0.08, -0.07, 0.07)
         dark *= 1 + 0.035 * folds(dark.shape, 1, (5.0, 9.0)) + 0.03 * folds(dark.shape, 2, (18.0,))
         dark *= 1 - 0.22 * band(self.z, self.hem - 0.045, 0.012, 0.03)
         knee = np.exp(-(((self.z - self.knee[2]) / 0.05) ** 2)) * (1 - self.front)

@@ -202,8 +202,8 @@ class _Face:
 
     def _brow(self) -> np.ndarray:
         along = (self.y - self.eye[1] - 0.001) / 0.021
-        arch = self.eye[2] + 0.0205 + 0.0045 * (1 - along**2) - 0.003 * along
-        thick = 0.0042 - 0.0014 * np.clip(along, -1, 1)
+        arch = self.eye[2] + 0.0180 + 0.0045 * (1 - along**2) - 0.003 * along
+        thick = 0.0036 - 0.0012 * np.clip(along, -1, 1)
         return band(self.z, arch, thick, 0.003) * band(along, 0.0, 1.0, 0.2)
 
     def _hair(self) -> np.ndarray:

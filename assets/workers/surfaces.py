@@ -104,7 +104,8 @@ def head_surface(person: Person) -> Surface:
     """Head and neck down to under the collar, without the inside of the mouth."""
     triangles, corners = person.groups["body"]
     part = PART[person.weights.argmax(1)]
-    keep = np.isin(part, ("head", "neck"))[triangles].any(1)
+    throat = np.linalg.norm(person.vertices - person.origins[SEGMENTS.index("neck")], axis=1)
+    keep = (np.isin(part, ("head", "neck")) | (throat < 0.085))[triangles].any(1)
     centre = person.corners[corners].mean(1)
     mouth = (centre[:, 0] > 0.75) & (centre[:, 0] < 0.95) & (centre[:, 1] < 0.16)
     everything = Surface(person.vertices, triangles, person.weights)

@@ -68,7 +68,9 @@ def test_capsules_of_the_model_are_the_capsules_of_the_truth(model):
     rest = rest_motion(body)
     turn = np.array([np.cos(0.4), 0.0, 0.0, np.sin(0.4)])
     motion = WorkerMotion(
-        rest.position_world + np.array([1.0, 0.5, 0.0]), np.tile(turn, (22, 1)), *[np.zeros((22, 3))] * 2
+        rest.position_world + np.array([1.0, 0.5, 0.0]),
+        np.tile(turn, (22, 1)),
+        *[np.zeros((22, 3))] * 2,
     )
     data = posed(model, motion)
     truth = worker_truth(body, motion)
