@@ -1,7 +1,7 @@
 """The laboratory: a workshop where a wall is being built. Floor, walls, ceiling, light.
 
-The room is the size of the paper's laboratory. Walls are planes: nothing slips through
-them, and they are not drawn from behind, so that one can look in from outside.
+The room is the size of the paper's laboratory. Walls are planes, which are hardly drawn
+from behind, so that one can look in from outside; the arm does not reach them.
 """
 
 from typing import Any
@@ -10,9 +10,18 @@ import mujoco
 import numpy as np
 
 from hrc_env.geometry.rotations import quaternion_from_matrix
-from hrc_env.scene import textures
-from hrc_env.scene.furniture import add_furniture
-from hrc_env.scene.primitives import LOOKS_ONLY, OVERHEAD, SOLID_SCENE, add_paint, box, cylinder
+from hrc_env.scene import furniture, textures
+from hrc_env.scene.primitives import (
+    HIDES,
+    LOOKS_ONLY,
+    OVERHEAD,
+    SOLID_SCENE,
+    Painted,
+    add_painted,
+    box,
+    cylinder,
+    paint_materials,
+)
 from hrc_env.scene.textures import Paint
 
 LENGTH_M, DEPTH_M, HEIGHT_M = 6.09, 5.48, 2.59
@@ -39,16 +48,71 @@ COLOURS: dict[str, tuple[tuple[float, float, float], float, float]] = {
 """Name: colour, specular, shininess."""
 
 
+def _floor() -> Paint:
+    """Concrete with the robot's cell, its reach and the walkway, worn by boots."""
+    paint = textures.concrete_floor((LENGTH_M, DEPTH_M), FLOOR_PX_PER_M)
+    height, width = paint.shape[:2]
+    x = (np.arange(width) + 0.5)[None] / FLOOR_PX_PER_M - LENGTH_M / 2
+    y = DEPTH_M / 2 - (np.arange(height) + 0.5)[:, None] / FLOOR_PX_PER_M
+    dx, dy = x - ROBOT_XY[0], y - ROBOT_XY[1]
+    worn = np.random.default_rng(5).random(paint.shape[:2]) < 0.9
+    patchy = textures.noise(np.random.default_rng(6), (height, width), (40, 40)) > -1.7
+    worn &= patchy
+    square = np.maximum(np.abs(dx), np.abs(dy))
+    cell = (square > 0.52) & (square < 0.62)
+    stripes = ((dx + dy) % 0.2) < 0.1
+    _blend(paint, cell & stripes & worn, YELLOW)
+    _blend(paint, cell & ~stripes & worn, BLACK)
+    circle = np.abs(np.hypot(dx, dy) - REACH_M) < 0.025
+    _blend(paint, circle & worn & (np.arctan2(dy, dx) % 0.2 < 0.14), YELLOW)
+    walkway = np.abs(y) < 2.12
+    lines = (np.abs(np.abs(y) - 2.08) < 0.03) & (np.abs(x) < 2.4)
+    ends = (np.abs(np.abs(x) - 2.40) < 0.03) & walkway
+    _blend(paint, (lines | ends) & worn, WHITE)
+    return paint
+
+
+def _blend(paint: Paint, where: np.ndarray, colour: tuple[float, ...]) -> None:
+    paint[where] = 0.22 * paint[where] + 0.78 * np.asarray(colour)
+
+
+def _blocks() -> Paint:
+    upper, lower = (204, 206, 203), (112, 130, 142)
+    return textures.blockwork((DEPTH_M, HEIGHT_M), WALL_PX_PER_M, upper, lower)
+
+
+PAINTED = {
+    "floor": Painted(_floor, specular=0.12, shininess=0.2),
+    "wall_north": Painted(
+        lambda: textures.plaster((LENGTH_M, HEIGHT_M), WALL_PX_PER_M, (206, 205, 198))
+    ),
+    "wall_south": Painted(lambda: textures.strand_board((LENGTH_M, HEIGHT_M), WALL_PX_PER_M)),
+    "wall_blocks": Painted(_blocks),
+    "ceiling": Painted(
+        lambda: textures.plaster((LENGTH_M, DEPTH_M), 60, (222, 222, 218)),
+        specular=0.0,
+        emission=0.3,
+    ),
+}
+"""Materials of the room that carry a picture."""
+
+
 def add_lab(spec: Any, clutter: bool) -> None:
     """Build the laboratory; without clutter only the room itself and its light."""
     _add_light(spec)
     for name, (colour, specular, shininess) in COLOURS.items():
         spec.add_material(name=name, rgba=[*colour, 1], specular=specular, shininess=shininess)
+    add_painted(spec, PAINTED)
     _add_floor(spec)
     _add_walls(spec)
     _add_ceiling(spec)
     if clutter:
-        add_furniture(spec)
+        furniture.add_furniture(spec)
+
+
+def paint_lab(spec: Any) -> None:
+    """Paint what `add_lab` has built."""
+    paint_materials(spec, PAINTED | furniture.PAINTED)
 
 
 def _add_light(spec: Any) -> None:
@@ -78,49 +142,13 @@ def _add_light(spec: Any) -> None:
 
 
 def _add_floor(spec: Any) -> None:
-    paint = textures.concrete_floor((LENGTH_M, DEPTH_M), FLOOR_PX_PER_M)
-    _mark_floor(paint)
-    add_paint(spec, "floor", paint, specular=0.12, shininess=0.2)
     spec.worldbody.add_geom(
         name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[LENGTH_M / 2, DEPTH_M / 2, 0.1],
-        material="floor", **SOLID_SCENE,
+        material="floor", castshadow=False, **SOLID_SCENE,
     )  # fmt: skip
 
 
-def _mark_floor(paint: Paint) -> None:
-    """The robot's reach, its cell and the walkway, worn by boots."""
-    height, width = paint.shape[:2]
-    x = (np.arange(width) + 0.5)[None] / FLOOR_PX_PER_M - LENGTH_M / 2
-    y = DEPTH_M / 2 - (np.arange(height) + 0.5)[:, None] / FLOOR_PX_PER_M
-    dx, dy = x - ROBOT_XY[0], y - ROBOT_XY[1]
-    worn = np.random.default_rng(5).random(paint.shape[:2]) < 0.9
-    patchy = textures.noise(np.random.default_rng(6), (height, width), (40, 40)) > -1.7
-    worn &= patchy
-    square = np.maximum(np.abs(dx), np.abs(dy))
-    cell = (square > 0.52) & (square < 0.62)
-    stripes = ((dx + dy) % 0.2) < 0.1
-    _blend(paint, cell & stripes & worn, YELLOW)
-    _blend(paint, cell & ~stripes & worn, BLACK)
-    circle = np.abs(np.hypot(dx, dy) - REACH_M) < 0.025
-    _blend(paint, circle & worn & (np.arctan2(dy, dx) % 0.2 < 0.14), YELLOW)
-    walkway = np.abs(y) < 2.12
-    lines = (np.abs(np.abs(y) - 2.08) < 0.03) & (np.abs(x) < 2.4)
-    ends = (np.abs(np.abs(x) - 2.40) < 0.03) & walkway
-    _blend(paint, (lines | ends) & worn, WHITE)
-
-
-def _blend(paint: Paint, where: np.ndarray, colour: tuple[float, ...]) -> None:
-    paint[where] = 0.22 * paint[where] + 0.78 * np.asarray(colour)
-
-
 def _add_walls(spec: Any) -> None:
-    north = textures.plaster((LENGTH_M, HEIGHT_M), WALL_PX_PER_M, (206, 205, 198))
-    south = textures.strand_board((LENGTH_M, HEIGHT_M), WALL_PX_PER_M)
-    blocks = textures.blockwork(
-        (DEPTH_M, HEIGHT_M), WALL_PX_PER_M, (204, 206, 203), (112, 130, 142)
-    )
-    for name, paint in (("north", north), ("south", south), ("blocks", blocks)):
-        add_paint(spec, f"wall_{name}", paint, specular=0.03)
     half_x, half_y = LENGTH_M / 2, DEPTH_M / 2
     _wall(spec, "north", "wall_north", (0, half_y), (0, -1), half_x)
     _wall(spec, "south", "wall_south", (0, -half_y), (0, 1), half_x)
@@ -146,17 +174,12 @@ def _wall(
     spec.worldbody.add_geom(
         name=f"wall_{name}", type=mujoco.mjtGeom.mjGEOM_PLANE,
         size=[half_width, HEIGHT_M / 2, 0.1], pos=[*xy, HEIGHT_M / 2],
-        quat=quaternion_from_matrix(axes), material=material, castshadow=False, **SOLID_SCENE,
+        quat=quaternion_from_matrix(axes), material=material, castshadow=False, **HIDES,
     )  # fmt: skip
 
 
 def _add_ceiling(spec: Any) -> None:
     """White, with four lamp panels, beams and a cable tray; left out when seen from above."""
-    add_paint(
-        spec, "ceiling",
-        textures.plaster((LENGTH_M, DEPTH_M), 60, (222, 222, 218)),
-        specular=0.0, emission=0.3,
-    )  # fmt: skip
     spec.add_material(name="lamp", rgba=[1.0, 0.99, 0.95, 1], emission=1.0)
     world, above = spec.worldbody, LOOKS_ONLY | {"group": OVERHEAD, "castshadow": False}
     world.add_geom(

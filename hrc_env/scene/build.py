@@ -9,19 +9,26 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from hrc_env.body import load_body, load_looks
 from hrc_env.errors import ConfigError, unknown
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.geometry.chains import SerialChain
 from hrc_env.geometry.rotations import about_axis
-from hrc_env.scene.arena import add_lab
-from hrc_env.scene.arm import HOME_Q, add_arm, arm_chain
+from hrc_env.scene.arena import add_lab, paint_lab
+from hrc_env.scene.arm import DAMPING_NMS_RAD, HOME_Q, add_arm, arm_chain
+from hrc_env.scene.primitives import DECORATION, OVERHEAD, ROBOT_LOOKS
 from hrc_env.scene.rig import LAB_CAMERAS, CameraConfig, add_cameras, pinholes, select
-from hrc_env.typing import Ints, JointAngles
+from hrc_env.scene.worker import add_worker, mocap_ids
+from hrc_env.typing import Floats, Ints, JointAngles
 
 ROBOT_BASE_WORLD = (-0.75, 0.0, 0.75)
 """The middle of the arm's foot, on the pedestal [m]."""
 ROBOT_YAW_RAD = math.pi
 """The arm reaches along its own -x, which so looks to world +x."""
+
+
+ARENA_BYTES = 2**20
+"""Memory of one simulation for contacts; the arm in a pile of them takes a tenth."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,8 +37,10 @@ class SceneConfig:
 
     clutter: bool = True
     """Whether furniture and building material stand in the room."""
-    sim_dt: float = 0.004
-    """Seconds a physics substep takes [s]."""
+    sim_dt: float = 0.008
+    """Seconds a physics substep takes [s]: the coarsest that keeps the tool clearly within 1 mm
+    (95 %) of the integral of its command, with contacts that stay shallow and calm
+    (`benchmarks/sim_dt.py`)."""
     slew_rad_s2: float = 8.0
     """Fastest change of a commanded joint velocity [rad/s^2]; keeps the overshoot below 5 %."""
     leash_rad: float = 0.05
@@ -45,23 +54,36 @@ class SceneConfig:
                 raise ConfigError(f"{name} must be positive, got {getattr(self, name)}.")
 
 
-SCENES: dict[str, Callable[[Any, bool], None]] = {"lab": add_lab}
-"""What builds each scene's room: a function of the MjSpec and of whether it is cluttered."""
+@dataclass(frozen=True, slots=True)
+class Room:
+    """How a scene's room is made."""
+
+    add: Callable[[Any, bool], None]
+    """Adds it to an MjSpec, with clutter or without."""
+    paint: Callable[[Any], None]
+    """Paints its surfaces; only done when somebody looks."""
+
+
+SCENES: dict[str, Room] = {"lab": Room(add_lab, paint_lab)}
+"""The scenes by name."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """A compiled scene: one model that every environment of a batch shares."""
+    """A scene ready for physics: one model that every environment of a batch shares."""
 
     config: SceneConfig
     name: str
     n_workers: int
     body_name: str
     model: mujoco.MjModel
+    """What moves, touches and hides; `drawing_model` has the looks."""
     chain: SerialChain
     cameras: tuple[PinholeCamera, ...]
     home_q: JointAngles
     """(N,) the arm's pose at rest [rad]."""
+    servo_lead_s: Floats
+    """(N,) inertia at rest over damping, joint by joint: the rate servos' lead [s]."""
     worker_mocap: Ints
     """(W, S) mocap row of every body segment of every worker."""
 
@@ -98,9 +120,10 @@ def _build(
     config: SceneConfig, name: str, n_workers: int, body_name: str, use: tuple | None
 ) -> Scene:
     cameras = pinholes(select(config.cameras, use))
-    spec = make_spec(config, name, cameras)
-    segments = [_add_worker(spec, worker, body_name) for worker in range(n_workers)]
+    spec = _spec(config, name, n_workers, body_name, cameras)
+    _strip(spec)
     model = spec.compile()
+    rows = [mocap_ids(model, _prefix(worker)) for worker in range(n_workers)]
     return Scene(
         config=config,
         name=name,
@@ -110,22 +133,67 @@ def _build(
         chain=arm_chain(_base_transform()),
         cameras=cameras,
         home_q=HOME_Q.copy(),
-        worker_mocap=_mocap_rows(model, segments),
+        servo_lead_s=_servo_lead_s(model),
+        worker_mocap=np.stack(rows) if rows else np.zeros((0, 0), np.int64),
     )
 
 
-def make_spec(config: SceneConfig, name: str, cameras: tuple[PinholeCamera, ...]) -> mujoco.MjSpec:
-    """The room with the arm and the cameras, before any worker walks in."""
+@lru_cache(maxsize=4)
+def drawing_model(scene: Scene) -> mujoco.MjModel:
+    """The scene with everything that only the eye needs; the same state fits both models."""
+    spec = _spec(scene.config, scene.name, scene.n_workers, scene.body_name, scene.cameras)
+    SCENES[scene.name].paint(spec)
+    return spec.compile()
+
+
+def _spec(
+    config: SceneConfig,
+    name: str,
+    n_workers: int,
+    body_name: str,
+    cameras: tuple[PinholeCamera, ...],
+) -> mujoco.MjSpec:
+    """Everything, unpainted."""
     spec = mujoco.MjSpec()
     spec.modelname = name
     spec.compiler.degree = 0
     spec.option.timestep = config.sim_dt
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    spec.memory = 2**22
-    SCENES[name](spec, config.clutter)
+    spec.memory = ARENA_BYTES
+    spec.nuserdata = len(HOME_Q)  # the velocity command in force, part of the state
+    SCENES[name].add(spec, config.clutter)
     add_arm(spec, ROBOT_BASE_WORLD, ROBOT_YAW_RAD)
     add_cameras(spec, cameras)
+    for worker in range(n_workers):
+        add_worker(spec, load_body(body_name), load_looks(body_name), _prefix(worker))
+        # A hat in group 0 would hide its own wearer's nose from the rays.
+        spec.geom(f"{_prefix(worker)}hat").group = DECORATION
     return spec
+
+
+def _strip(spec: mujoco.MjSpec) -> None:
+    """Take away what only the eye needs: geoms, skins, meshes, pictures. Twice as fast."""
+    for geom in spec.geoms:
+        if geom.group in (DECORATION, ROBOT_LOOKS, OVERHEAD):
+            spec.delete(geom)
+        else:
+            geom.material = ""
+    for unseen in (*spec.skins, *spec.meshes, *spec.materials, *spec.textures):
+        spec.delete(unseen)
+
+
+def _prefix(worker: int) -> str:
+    """What the names of a worker's bodies start with."""
+    return f"worker_{worker + 1}/"
+
+
+def _servo_lead_s(model: mujoco.MjModel) -> Floats:
+    data = mujoco.MjData(model)
+    data.qpos[: len(HOME_Q)] = HOME_Q
+    mujoco.mj_forward(model, data)
+    inertia = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, inertia)
+    return np.diag(inertia)[: len(HOME_Q)] / np.array(DAMPING_NMS_RAD)
 
 
 def _base_transform() -> np.ndarray:
@@ -133,18 +201,3 @@ def _base_transform() -> np.ndarray:
     transform[:3, :3] = about_axis("z", ROBOT_YAW_RAD)
     transform[:3, 3] = ROBOT_BASE_WORLD
     return transform
-
-
-def _add_worker(spec: mujoco.MjSpec, worker: int, body_name: str) -> list[str]:
-    """One worker; the names of their segments' bodies in the model."""
-    from hrc_env.body import SEGMENTS, load_body, load_looks
-    from hrc_env.scene.worker import add_worker
-
-    prefix = f"worker_{worker + 1}/"
-    add_worker(spec, load_body(body_name), load_looks(body_name), prefix)
-    return [prefix + name for name in SEGMENTS]
-
-
-def _mocap_rows(model: mujoco.MjModel, segments: list[list[str]]) -> Ints:
-    rows = [[model.body_mocapid[model.body(name).id] for name in names] for names in segments]
-    return np.array(rows, np.int64) if rows else np.zeros((0, 0), np.int64)

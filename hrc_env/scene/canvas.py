@@ -5,6 +5,7 @@ first picture is drawn, in the thread that draws it, and made current before eve
 so that several canvases never draw into each other.
 """
 
+import contextlib
 import copy
 from collections.abc import Sequence
 from typing import Any
@@ -17,7 +18,7 @@ from hrc_env.errors import RenderingError, check_shape
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.records import CropWindow, WorkerMotion
 from hrc_env.scene import gl
-from hrc_env.scene.build import Scene
+from hrc_env.scene.build import Scene, drawing_model
 from hrc_env.scene.rig import glcam_axes
 from hrc_env.typing import Image, JointAngles
 
@@ -35,7 +36,7 @@ class Canvas:
     ) -> None:
         self.width_px, self.height_px = width_px, height_px
         self._scene = scene
-        self._model = copy.copy(scene.model)  # its own drawing settings
+        self._model = copy.copy(drawing_model(scene))  # its own drawing settings
         for name, value in quality.items():
             setattr(self._model.vis.quality, name, value)
         view = self._model.vis.global_
@@ -129,7 +130,7 @@ class Canvas:
         self._closed = True
 
     def __del__(self) -> None:
-        if not getattr(self, "_closed", True):
+        with contextlib.suppress(Exception):  # at exit, OpenGL may be gone before us
             self.close()
 
     def _open(self) -> None:

@@ -17,10 +17,12 @@ def substep_commands(
     chain: SerialChain,
     slew_rad_s2: float,
     sim_dt: float,
+    lead_s: Floats,
     q: JointAngles,
-    previous: JointVelocities,
+    command: JointVelocities,
     wanted: JointVelocities,
-    out: Floats,
+    hold: Floats,
+    rate: Floats,
 ) -> None:
     """Commands of one control step: limited in size, slew and before the joints' ends.
 
@@ -28,18 +30,22 @@ def substep_commands(
         chain: for its ranges and velocity limits.
         slew_rad_s2: fastest change of a command [rad/s^2].
         sim_dt: length of a substep [s].
+        lead_s: (N,) how far the rate servo's command runs ahead: inertia / damping [s]. Its
+            torque then pays for the acceleration, and the holding servo need not lag.
         q: (B, N) angles now [rad].
-        previous: (B, N) last command [rad/s].
+        command: (B, N) the command in force; at the end of the step on return [rad/s].
         wanted: (B, N) wanted velocities [rad/s]; what is not finite counts as 0.
-        out: (B, T, N) commands of the substeps, written [rad/s].
+        hold: (B, T, N) written: mean velocity in each substep, so that the holding servo's
+            integral is exact however time is cut [rad/s].
+        rate: (B, T, N) written: velocity at the end of each substep, with the lead [rad/s].
     """
     ranges, limits = chain.range_rad, chain.velocity_limit_rad_s
-    _ramp(q, previous, wanted, ranges, limits, slew_rad_s2, sim_dt, out)
+    _ramp(q, command, wanted, ranges, limits, slew_rad_s2, sim_dt, lead_s, hold, rate)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _ramp(q, previous, wanted, ranges, limits, slew, sim_dt, out):
-    brake, ctrl_dt = BRAKE_SHARE * slew, sim_dt * out.shape[1]
+def _ramp(q, command, wanted, ranges, limits, slew, sim_dt, lead_s, hold, rate):
+    brake, ctrl_dt = BRAKE_SHARE * slew, sim_dt * rate.shape[1]
     for b in range(q.shape[0]):
         for i in range(q.shape[1]):
             target = wanted[b, i]
@@ -52,7 +58,12 @@ def _ramp(q, previous, wanted, ranges, limits, slew, sim_dt, out):
             fastest_up = brake * (math.sqrt(ctrl_dt**2 + 2 * room_up / brake) - ctrl_dt)
             fastest_down = brake * (math.sqrt(ctrl_dt**2 + 2 * room_down / brake) - ctrl_dt)
             target = min(fastest_up, max(-fastest_down, target))
-            command = previous[b, i]
-            for t in range(out.shape[1]):
-                command += min(slew * sim_dt, max(-slew * sim_dt, target - command))
-                out[b, t, i] = command
+            now = command[b, i]
+            for t in range(rate.shape[1]):
+                change = min(slew * sim_dt, max(-slew * sim_dt, target - now))
+                # Ramp for |change| / slew, then constant: the mean over the substep.
+                ramped = abs(change) / (slew * sim_dt)
+                hold[b, t, i] = now + change * (1.0 - 0.5 * ramped)
+                now += change
+                rate[b, t, i] = now + lead_s[i] * change / sim_dt
+            command[b, i] = now

@@ -1,9 +1,10 @@
 """What stands about in the laboratory, off the workers' way and out of the arm's goals.
 
-Solid things (group 0) stop the arm and hide the worker; there are few of them, since every
-line of sight is tested against each. The rest is decoration.
+Solid things (group 0) hide the worker, and stop the arm where it reaches them; there are few
+of them, since every line of sight is tested against each. The rest is decoration.
 """
 
+import itertools
 from typing import Any
 
 import mujoco
@@ -11,15 +12,47 @@ import numpy as np
 
 from hrc_env.scene import textures
 from hrc_env.scene.primitives import (
+    HIDES,
     LOOKS_ONLY,
     SOLID_SCENE,
+    Painted,
     add_mesh,
-    add_paint,
+    add_painted,
     box,
     capsule,
     cylinder,
     ellipsoid,
 )
+
+
+def _drawing() -> textures.Paint:
+    """A construction drawing on paper."""
+    paint = np.full((256, 362, 3), 236.0)
+    ink = np.array([60.0, 78, 120])
+    for row in (18, 90, 150, 236):
+        paint[row : row + 2, 20:342] = ink
+    for column in (20, 76, 132, 188, 244, 340):
+        paint[18:238, column : column + 2] = ink
+    paint[150:154, 20:250] = paint[90:93, 132:342] = ink
+    paint[170:230:9, 256:330] = 150
+    return paint
+
+
+PAINTED = {
+    "pine": Painted(lambda: textures.wood((206, 170, 120), 3)),
+    "pine_dark": Painted(lambda: textures.wood((176, 136, 90), 4)),
+    "beech": Painted(lambda: textures.wood((198, 160, 112), 5)),
+    "cardboard": Painted(textures.cardboard),
+    "drywall": Painted(lambda: textures.drywall((2.4, 2.4), 140)),
+    "board_edges": Painted(lambda: textures.stacked_boards(22, (212, 209, 200), (120, 118, 112))),
+    "plywood_edges": Painted(lambda: textures.stacked_boards(9, (190, 152, 102), (96, 70, 44))),
+    "insulation": Painted(
+        lambda: textures.mottled(np.random.default_rng(7), (256, 128), (214, 178, 92), 9)
+    ),
+    "plan": Painted(_drawing),
+    "glass_sky": Painted(textures.sky, specular=0.3, emission=0.55),
+}
+"""Materials of the furniture that carry a picture."""
 
 STUD = (0.038, 0.089)
 """Width and depth of a sawn stud [m]."""
@@ -27,7 +60,10 @@ STUD = (0.038, 0.089)
 
 def add_furniture(spec: Any) -> None:
     """Everything, wall by wall."""
-    _add_materials(spec)
+    add_painted(spec, PAINTED)
+    spec.add_material(name="e_stop_yellow", rgba=[0.93, 0.77, 0.10, 1], specular=0.4)
+    spec.add_material(name="led_green", rgba=[0.2, 0.9, 0.35, 1], emission=0.8)
+    spec.add_material(name="screen", rgba=[0.16, 0.32, 0.45, 1], emission=0.5, specular=0.7)
     world = spec.worldbody
     _stud_wall(world)
     _table(world)
@@ -43,38 +79,6 @@ def add_furniture(spec: Any) -> None:
     _ladder(world)
     _on_the_walls(world)
     _cones(spec)
-
-
-def _add_materials(spec: Any) -> None:
-    for name, paint in (
-        ("pine", textures.wood((206, 170, 120), 3)),
-        ("pine_dark", textures.wood((176, 136, 90), 4)),
-        ("beech", textures.wood((198, 160, 112), 5)),
-        ("cardboard", textures.cardboard()),
-        ("drywall", textures.drywall((2.4, 2.4), 140)),
-        ("board_edges", textures.stacked_boards(22, (212, 209, 200), (120, 118, 112))),
-        ("plywood_edges", textures.stacked_boards(9, (190, 152, 102), (96, 70, 44))),
-        ("insulation", textures.mottled(np.random.default_rng(7), (256, 128), (214, 178, 92), 9)),
-        ("plan", _plan()),
-    ):
-        add_paint(spec, name, paint, specular=0.05)
-    add_paint(spec, "glass_sky", textures.sky(), emission=0.55, specular=0.3)
-    spec.add_material(name="e_stop_yellow", rgba=[0.93, 0.77, 0.10, 1], specular=0.4)
-    spec.add_material(name="led_green", rgba=[0.2, 0.9, 0.35, 1], emission=0.8)
-    spec.add_material(name="screen", rgba=[0.16, 0.32, 0.45, 1], emission=0.5, specular=0.7)
-
-
-def _plan() -> textures.Paint:
-    """A construction drawing on paper."""
-    paint = np.full((256, 362, 3), 236.0)
-    ink = np.array([60.0, 78, 120])
-    for row in (18, 90, 150, 236):
-        paint[row : row + 2, 20:342] = ink
-    for column in (20, 76, 132, 188, 244, 340):
-        paint[18:238, column : column + 2] = ink
-    paint[150:154, 20:250] = paint[90:93, 132:342] = ink
-    paint[170:230:9, 256:330] = 150
-    return paint
 
 
 def _stud_wall(world: Any) -> None:
@@ -133,7 +137,7 @@ def _board_stack(world: Any) -> None:
         box(world, (x + dx, y, 0.04), (0.08, 0.6, 0.08), "pine_dark")
     box(
         world, (x, y, 0.08 + 0.15), (1.2, 0.6, 0.30), "board_edges", name="board_stack",
-        **SOLID_SCENE,
+        **HIDES,
     )  # fmt: skip
     box(world, (x, y, 0.386), (1.2, 0.6, 0.012), "drywall")
     box(world, (x + 0.06, y + 0.01, 0.40), (0.62, 0.5, 0.016), "plywood_edges", 0.12)
@@ -147,7 +151,7 @@ def _lumber(world: Any) -> None:
         box(world, (x - 0.2, y, 0.36), (0.05, 0.05, 0.72), "dark_steel")
     box(
         world, (x + 0.01, 0.0, 0.12 + 0.095), (0.36, 2.9, 0.19), "pine_dark", name="lumber",
-        **SOLID_SCENE,
+        **HIDES,
     )  # fmt: skip
     rng = np.random.default_rng(9)
     for layer in range(5):
@@ -160,7 +164,7 @@ def _lumber(world: Any) -> None:
 def _cart(world: Any) -> None:
     """A red tool cart with drawers."""
     x, y, yaw = -2.42, -2.02, 0.12
-    frame = {"name": "tool_cart"} | SOLID_SCENE
+    frame = {"name": "tool_cart"} | HIDES
     box(world, (x, y, 0.49), (0.66, 0.44, 0.74), "cart_red", yaw, **frame)
     turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
 
@@ -176,7 +180,8 @@ def _cart(world: Any) -> None:
     for dx in (-0.27, 0.27):
         for dy in (-0.17, 0.17):
             foot = np.array(at(dx, dy, 0.055))
-            cylinder(world, foot - [0.015, 0, 0], foot + [0.015, 0, 0], 0.055, "rubber")
+            axle = np.array([0.015, 0, 0])
+            cylinder(world, foot - axle, foot + axle, 0.055, "rubber")
     cylinder(world, at(-0.18, 0.05, 0.90), at(0.12, 0.0, 0.90), 0.014, "grey_steel")
     box(world, at(0.2, -0.08, 0.925), (0.16, 0.12, 0.085), "e_stop_yellow", yaw + 0.4)
 
@@ -184,9 +189,7 @@ def _cart(world: Any) -> None:
 def _controller(world: Any) -> None:
     """The robot's control box behind it, with its pendant and its cable."""
     x, y = -1.62, -0.78
-    box(
-        world, (x, y, 0.30), (0.42, 0.34, 0.52), "grey_steel", name="controller", **SOLID_SCENE
-    )
+    box(world, (x, y, 0.30), (0.42, 0.34, 0.52), "grey_steel", name="controller", **SOLID_SCENE)
     box(world, (x + 0.212, y, 0.32), (0.004, 0.26, 0.42), "dark_steel")
     for z in (0.18, 0.21, 0.24):
         box(world, (x + 0.215, y, z), (0.004, 0.2, 0.012), "rubber")
@@ -196,7 +199,7 @@ def _controller(world: Any) -> None:
     cylinder(world, (x + 0.12, y + 0.10, 0.60), (x + 0.12, y + 0.10, 0.63), 0.02, "hazard_red")
     points = [(x + 0.2, y + 0.1, 0.08), (-1.32, -0.52, 0.012), (-1.12, -0.22, 0.012)]
     points += [(-0.95, -0.06, 0.012), (-0.855, -0.03, 0.16)]
-    for start, end in zip(points[:-1], points[1:], strict=True):
+    for start, end in itertools.pairwise(points):
         capsule(world, start, end, 0.012, material="rubber", **LOOKS_ONLY)
 
 
@@ -208,7 +211,7 @@ def _cartons(world: Any) -> None:
         ("crate", (2.70, -2.30, 0.30), (0.58, 0.62, 0.60), 0.05, "pine_dark"),
         ("carton_3", (2.72, -2.32, 0.74), (0.44, 0.38, 0.28), 0.35, "cardboard"),
     ):
-        box(world, centre, size, material, yaw, name=name, **SOLID_SCENE)
+        box(world, centre, size, material, yaw, name=name, **HIDES)
     for z in (0.06, 0.20, 0.34, 0.48):
         box(world, (2.405, -2.312, z + 0.03), (0.016, 0.64, 0.09), "pine", 0.05)
         box(world, (2.686, -1.984, z + 0.03), (0.60, 0.016, 0.09), "pine", 0.05)
@@ -227,12 +230,19 @@ def _buckets(world: Any) -> None:
 def _window(world: Any, x: float) -> None:
     """A window in the north wall; the sky is a bright pane."""
     y, z, width, height = 2.735, 1.62, 1.35, 1.0
-    box(world, (x, y, z), (width, 0.008, height), "glass_sky", castshadow=False)
+    bright = {"castshadow": False}  # the light comes in here
+    box(world, (x, y, z), (width, 0.008, height), "glass_sky", **bright)
     for dx in (-width / 2, 0.0, width / 2):
-        box(world, (x + dx, y - 0.015, z), (0.05, 0.035, height + 0.05), "white_gloss")
+        box(world, (x + dx, y - 0.015, z), (0.05, 0.035, height + 0.05), "white_gloss", **bright)
     for dz in (-height / 2, height / 2):
-        box(world, (x, y - 0.015, z + dz), (width + 0.05, 0.035, 0.05), "white_gloss")
-    box(world, (x, y - 0.06, z - height / 2 - 0.03), (width + 0.16, 0.14, 0.025), "white_gloss")
+        box(world, (x, y - 0.015, z + dz), (width + 0.05, 0.035, 0.05), "white_gloss", **bright)
+    box(
+        world,
+        (x, y - 0.06, z - height / 2 - 0.03),
+        (width + 0.16, 0.14, 0.025),
+        "white_gloss",
+        **bright,
+    )
 
 
 def _door(world: Any) -> None:
@@ -282,8 +292,8 @@ def _cones(spec: Any) -> None:
     profile = np.array([(0.0, 0.46), (0.022, 0.455), (0.115, 0.03), (0.115, 0.0), (0.0, 0.0)])
     count = 20
     angles = 2 * np.pi * np.arange(count) / count
-    rings = [[(r * np.cos(a), r * np.sin(a), z) for a in angles] for r, z in profile[1:-1]]
-    vertices = np.array([(0, 0, profile[0, 1]), *sum(rings, []), (0, 0, 0)])
+    rings = [(r * np.cos(a), r * np.sin(a), z) for r, z in profile[1:-1] for a in angles]
+    vertices = np.array([(0, 0, profile[0, 1]), *rings, (0, 0, 0)])
     last, faces = len(vertices) - 1, []
     for i in range(count):
         j = (i + 1) % count

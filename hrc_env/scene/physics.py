@@ -40,7 +40,7 @@ class Physics:
         self._n = scene.chain.n_joints
         self._sims = Batch(scene.model, nsim=batch, nthread=n_threads)
         self._qpos, self._qvel = self._sims.bind("qpos"), self._sims.bind("qvel")
-        self._act, self._ctrl = self._sims.bind("act"), self._sims.bind("ctrl")
+        self._act, self._command = self._sims.bind("act"), self._sims.bind("userdata")
         self._control, self._trace = np.zeros((batch, 0, 0)), {}
         self._blocks_sight = np.zeros(mujoco.mjNGROUP, np.uint8)
         self._blocks_sight[[SOLID, ROBOT_CAPSULES]] = 1
@@ -82,14 +82,15 @@ class Physics:
         check_shape("qd_command", np.shape(qd_command), (self.batch, self._n), "batch, joints")
         self._fit(motion)
         config, n = self.scene.config, self._n
-        commands = self._control[:, :, :n]
         substep_commands(
-            self.scene.chain, config.slew_rad_s2, config.sim_dt,
-            self.q, self._ctrl[:, :n].copy(), np.asarray(qd_command, float), commands,
+            self.scene.chain, config.slew_rad_s2, config.sim_dt, self.scene.servo_lead_s,
+            self.q, self._command, np.asarray(qd_command, float),
+            hold=self._control[:, :, :n], rate=self._control[:, :, n : 2 * n],
         )  # fmt: skip
-        self._control[:, :, n : 2 * n] = commands
         self._write_workers(motion)
-        self._sims.rollout(commands.shape[1], self._control, INPUTS, ("qpos",), out=self._trace)
+        self._sims.rollout(
+            self._control.shape[1], self._control, INPUTS, ("qpos",), out=self._trace
+        )
         self._check_health()
         held, q = self._act[:, :n], self._qpos[:, :n]
         np.clip(held, q - config.leash_rad, q + config.leash_rad, out=held)

@@ -5,7 +5,8 @@ Geom groups of every scene: 0 solid (drawn, collides, hides), 1 decoration (draw
 (not drawn, do not hide), 5 what a view from above leaves out (ceiling, lamps).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import mujoco
@@ -19,6 +20,8 @@ SCENE_BIT, ROBOT_BIT, WORKER_BIT, OBJECT_BIT = 1, 2, 4, 16
 Vector = Sequence[float] | np.ndarray
 
 LOOKS_ONLY = {"contype": 0, "conaffinity": 0, "density": 0, "group": DECORATION}
+HIDES = {"contype": 0, "conaffinity": 0, "density": 0, "group": SOLID}
+"""Solid to the eye and out of the arm's reach: testing it for contacts would cost time."""
 SOLID_SCENE = {"contype": SCENE_BIT, "conaffinity": 0, "density": 0, "group": SOLID}
 
 
@@ -81,16 +84,41 @@ def box(body: Any, centre: Vector, size: Vector, material: str, yaw: float = 0.0
     )
 
 
-def add_paint(spec: Any, name: str, paint: np.ndarray, **material: Any) -> None:
-    """A painting (H, W, 3) of 0..255 as a texture and a material of one name."""
-    image = np.clip(paint, 0, 255).astype(np.uint8)
-    texture = spec.add_texture(
-        name=name, type=mujoco.mjtTexture.mjTEXTURE_2D,
-        width=image.shape[1], height=image.shape[0], nchannel=3,
-    )  # fmt: skip
-    texture.data = np.ascontiguousarray(image).tobytes()
-    added = spec.add_material(name=name, **material)
-    added.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
+@dataclass(frozen=True, slots=True)
+class Painted:
+    """A material with a picture on it, which is only painted when somebody looks."""
+
+    paint: Callable[[], np.ndarray]
+    """Makes the picture, (H, W, 3) of 0..255."""
+    specular: float = 0.05
+    shininess: float = 0.1
+    emission: float = 0.0
+
+
+def add_painted(spec: Any, materials: dict[str, Painted]) -> None:
+    """The materials, still plain."""
+    for name, painted in materials.items():
+        spec.add_material(
+            name=name,
+            specular=painted.specular,
+            shininess=painted.shininess,
+            emission=painted.emission,
+        )
+
+
+def paint_materials(spec: Any, materials: dict[str, Painted]) -> None:
+    """Paint those of the materials that the scene has."""
+    for name, painted in materials.items():
+        material = spec.material(name)
+        if material is None:
+            continue
+        image = np.clip(painted.paint(), 0, 255).astype(np.uint8)
+        texture = spec.add_texture(
+            name=name, type=mujoco.mjtTexture.mjTEXTURE_2D,
+            width=image.shape[1], height=image.shape[0], nchannel=3,
+        )  # fmt: skip
+        texture.data = np.ascontiguousarray(image).tobytes()
+        material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
 
 
 def add_mesh(spec: Any, name: str, vertices: np.ndarray, faces: np.ndarray) -> None:

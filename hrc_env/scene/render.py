@@ -32,7 +32,7 @@ VIEWPOINTS: dict[str, tuple[tuple[float, float, float], tuple[float, float, floa
     "side": ((0.45, -2.55, 1.65), (0.1, 0.3, 1.0), 84.0),
     "arm": ((0.75, -1.55, 1.60), (-0.45, 0.05, 1.10), 56.0),
     "outside": ((3.6, -3.3, 6.6), (-0.25, 0.25, 0.35), 52.0),
-    "top": ((0.0, 0.0, 9.0), (0.0, 0.0, 0.0), 44.0),
+    "top": ((0.0, 0.0, 9.0), (0.0, 0.0, 0.0), 60.0),
 }
 """Eye [m], target [m], horizontal field of view [degrees] of pictures for people."""
 OPEN_ROOF = ("outside", "top")

@@ -1,0 +1,177 @@
+"""How coarse may a physics substep be? The table behind `SceneConfig.sim_dt`.
+
+    python -m benchmarks.sim_dt            # prints the table, writes out/sim_dt.json
+
+Error: the arm follows joint velocities commanded at 25 Hz with peaks of 0.6 to 1.3 rad/s,
+smooth (sines) or jumping (to and fro at the full slew limit); the tool is compared with where
+the exact integral of the slew-limited command would have it. Contacts: the arm is driven into
+the floor and into a worker for two seconds and then away again; penetration comes from the
+capsules' geometry.
+"""
+
+import json
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hrc_env.body import load_body, rest_motion, worker_truth
+from hrc_env.geometry import chains
+from hrc_env.geometry.distances import narrowest_gap
+from hrc_env.records import WorkerMotion
+from hrc_env.scene.build import Scene, SceneConfig, build
+from hrc_env.scene.physics import Physics, no_workers
+
+CTRL_DT = 0.04
+STEPS_S = (0.004, 0.005, 0.008, 0.010)
+OUT = Path("out/sim_dt.json")
+EXCURSION = np.array([1.0, 1.0, 1.0, 1.0, 0.6, 1.0])
+"""Less for the fifth joint, so that the tool does not meet the forearm."""
+
+
+def substeps(scene: Scene) -> int:
+    """Substeps of a control step."""
+    return round(CTRL_DT / scene.config.sim_dt)
+
+
+def standing(scene: Scene, batch: int, xy: tuple[float, float]) -> WorkerMotion:
+    """A worker who stands still at `xy`, for every environment and substep."""
+    rest = rest_motion(load_body(scene.body_name))
+    lead = (batch, substeps(scene), 1)
+
+    def spread(array: np.ndarray) -> np.ndarray:
+        return np.broadcast_to(array, (*lead, *array.shape)).copy()
+
+    return WorkerMotion(
+        spread(rest.position_world + np.array([*xy, 0.0])),
+        spread(rest.quaternion_wxyz),
+        spread(rest.velocity_world),
+        spread(rest.angular_velocity_world),
+    )
+
+
+def smooth_targets(rng: np.random.Generator, n_steps: int, batch: int) -> np.ndarray:
+    """(n_steps, B, 6) sines of 0.4 to 0.8 Hz with peaks of 0.6 to 1.3 rad/s round home."""
+    time_s = CTRL_DT * np.arange(n_steps)[:, None, None]
+    peak = rng.uniform(0.6, 1.3, (batch, 6)) * rng.choice((-1, 1), (batch, 6))
+    rate = 2 * np.pi * rng.uniform(0.4, 0.8, (batch, 6))
+    return EXCURSION * peak * np.cos(rate * time_s)
+
+
+def jumping_targets(rng: np.random.Generator, n_steps: int, batch: int) -> np.ndarray:
+    """(n_steps, B, 6) square waves of 0.6 to 1.3 rad/s that turn every 0.4 to 0.8 s."""
+    step = np.arange(n_steps)[:, None, None]
+    peak = rng.uniform(0.6, 1.3, (batch, 6)) * rng.choice((-1, 1), (batch, 6))
+    half = rng.integers(10, 21, (batch, 6))
+    return EXCURSION * peak * np.where((step + half // 2) // half % 2 == 0, 1.0, -1.0)
+
+
+def tool_error_mm(scene: Scene, targets: np.ndarray) -> np.ndarray:
+    """(n,) distance of the tool from the integral of the command, at every control step."""
+    batch, slew = targets.shape[1], scene.config.slew_rad_s2
+    physics, still = Physics(scene, batch), no_workers(batch, substeps(scene))
+    command, reference, errors = np.zeros((batch, 6)), physics.q, []
+    for wanted in targets:
+        change = np.clip(wanted - command, -slew * CTRL_DT, slew * CTRL_DT)
+        ramp_s = np.abs(change) / slew
+        reference = reference + command * CTRL_DT + change * (CTRL_DT - ramp_s / 2)
+        command = command + change
+        physics.step(wanted, still)
+        here = chains.tool(scene.chain, physics.q)[:, :3, 3]
+        there = chains.tool(scene.chain, reference)[:, :3, 3]
+        errors.append(1000 * np.linalg.norm(here - there, axis=-1))
+    return np.concatenate(errors)
+
+
+def floor_contact(scene: Scene) -> dict[str, float]:
+    """Drive the arm down for two seconds, then up for one."""
+    physics, still = Physics(scene, 1), no_workers(1, substeps(scene))
+    physics.reset(np.array([0]), np.array([[0.0, -0.8, 0.6, -1.37, -1.57, 0.0]]))
+    deepest, speed = 0.0, 0.0
+    for step in range(75):
+        physics.step(np.array([[0, 0.8 if step < 50 else -0.8, 0, 0, 0, 0.0]]), still)
+        bottom = chains.capsules(scene.chain, physics.q)[..., 2].min(-1)
+        deepest = min(deepest, float((bottom - scene.chain.capsule_radius_m).min()))
+        if 40 <= step < 50:
+            speed = max(speed, float(np.abs(physics.qd).max()))
+    above = chains.capsules(scene.chain, physics.q)[..., 2].min() - 0.05
+    return {"depth_mm": -1000 * deepest, "pressed_rad_s": speed, "away_m": float(above)}
+
+
+def worker_contact(scene: Scene) -> dict[str, float]:
+    """Turn the stretched arm into a standing worker at 1 rad/s, then away."""
+    physics = Physics(scene, 1)
+    physics.reset(np.array([0]), np.array([[-1.2, -0.9, 1.2, -1.87, -1.57, 0.0]]))
+    motion = standing(scene, 1, (0.45, 0.0))
+    body = load_body(scene.body_name)
+    truth = worker_truth(body, motion)
+    person = truth.capsules_world[:, -1].reshape(1, -1, 2, 3)
+    deepest, speed, gap_m = np.inf, 0.0, np.inf
+    for step in range(75):
+        physics.step(np.array([[1.0 if step < 50 else -1.0, 0, 0, 0, 0, 0.0]]), motion)
+        arm = chains.capsules(scene.chain, physics.q)
+        gap = narrowest_gap(arm, scene.chain.capsule_radius_m, person, truth.capsule_radius_m)
+        gap_m = float(gap.distance_m[0])
+        deepest = min(deepest, gap_m)
+        if 40 <= step < 50:
+            speed = max(speed, float(np.abs(physics.qd).max()))
+    return {"depth_mm": -1000 * deepest, "pressed_rad_s": speed, "away_m": gap_m}
+
+
+def step_us(scene: Scene, batch: int) -> float:
+    """Microseconds of one control step of one environment, the worker walking along."""
+    physics, motion = Physics(scene, batch), standing(scene, batch, (1.6, 0.4))
+    command, times = np.full((batch, 6), 0.3), []
+    for step in range(300 if batch == 1 else 40):
+        begin = time.perf_counter()
+        physics.step(command * (1 if step % 20 < 10 else -1), motion)
+        times.append(time.perf_counter() - begin)
+    return 1e6 * float(np.median(times)) / batch
+
+
+def measure(sim_dt: float) -> dict[str, Any]:
+    """One row of the table."""
+    scene = build(replace(SceneConfig(), sim_dt=sim_dt), n_workers=1)
+    empty = build(replace(SceneConfig(), sim_dt=sim_dt))
+    rng = np.random.default_rng(0)
+    smooth = tool_error_mm(empty, smooth_targets(rng, 150, 32))
+    jumping = tool_error_mm(empty, jumping_targets(rng, 150, 32))
+    return {
+        "sim_dt_ms": 1000 * sim_dt,
+        "smooth_mm": [float(np.percentile(smooth, share)) for share in (50, 95, 100)],
+        "jumping_mm": [float(np.percentile(jumping, share)) for share in (50, 95, 100)],
+        "floor": floor_contact(empty),
+        "worker": worker_contact(scene),
+        "step_us_1": step_us(scene, 1),
+        "step_us_64": step_us(scene, 64),
+    }
+
+
+def main() -> None:
+    """Measure, print, write."""
+    rows = [measure(sim_dt) for sim_dt in STEPS_S]
+    print(
+        "| sim_dt ms | smooth: median / p95 / max mm | jumping | floor: depth mm, rad/s, away m "
+        "| worker: the same | us/step B=1 | B=64 |\n|---|---|---|---|---|---|---|"
+    )
+    for row in rows:
+        errors = " | ".join(
+            " / ".join(f"{value:.2f}" for value in row[what])
+            for what in ("smooth_mm", "jumping_mm")
+        )
+        contacts = " | ".join(
+            "{depth_mm:.1f}, {pressed_rad_s:.3f}, {away_m:.3f}".format(**row[what])
+            for what in ("floor", "worker")
+        )
+        print(
+            f"| {row['sim_dt_ms']:g} | {errors} | {contacts} | {row['step_us_1']:.0f} "
+            f"| {row['step_us_64']:.0f} |"
+        )
+    OUT.parent.mkdir(exist_ok=True)
+    OUT.write_text(json.dumps(rows, indent=1))
+
+
+if __name__ == "__main__":
+    main()
