@@ -14,11 +14,11 @@ from hrc_env.perception.eyes import Eyes, EyesConfig, search_windows
 from hrc_env.records import CropWindow
 from hrc_env.skeleton import BLAZEPOSE_INDEX
 
-NAMES = ["stand.png", "walk.png", "reach.png", "carry.png"]
-WINDOW = CropWindow((160.0, 165.0), 290.0, 0.0)
+NAMES = ["stand.png", "walk.png", "reach.png", "robot_in_front.png"]
+WINDOW = CropWindow((118.0, 138.0), 220.0, 0.0)
 
 
-def camera(width_px=320, height_px=320):
+def camera(width_px=256, height_px=256):
     return pinhole("still", np.array([4.0, 0, 1]), np.array([0, 0, 1.0]), 60, width_px, height_px)
 
 
@@ -48,7 +48,7 @@ def test_every_camera_reports_the_joints_of_its_picture(four, reference):
 
 def test_an_empty_room_is_nan_without_confidence_and_with_infinite_sigma(four, pictures):
     eyes, _ = four
-    room = np.full((320, 320, 3), 128, np.uint8)
+    room = np.full((256, 256, 3), 128, np.uint8)
     sight = eyes.look(Stills([pictures["stand.png"], room, room, room]), [WINDOW] * 4)
     assert np.isfinite(sight.px[0]).all()
     assert np.isnan(sight.px[1:]).all()
@@ -123,9 +123,9 @@ def test_a_source_may_use_one_buffer_for_all_crops(four):
 
 def test_what_a_camera_does_not_see_is_black_and_joints_there_are_guesses(weights, pictures):
     """The source goes on drawing beyond the image's lower border; the eyes do not look."""
-    eyes = Eyes([camera(320, 240)])
+    eyes = Eyes([camera(256, 190)])
     sight = eyes.look(Stills([pictures["stand.png"]]), [WINDOW])
-    outside = sight.px[0, :, 1] >= 240
+    outside = sight.px[0, :, 1] >= 190
     assert outside.any()
     assert np.all(sight.confidence[0, outside] <= 0.1)
     assert np.all(np.isfinite(sight.sigma_px[0]))
@@ -155,7 +155,7 @@ def test_the_detector_stage_is_asked_of_a_new_track_and_then_in_turns(four, monk
 
 def test_somebody_far_from_the_middle_of_the_window_is_somebody_else(weights, pictures):
     eyes = new_eyes(1)
-    aside = CropWindow((10.0, 165.0), 320.0, 0.0)
+    aside = CropWindow((0.0, 138.0), 240.0, 0.0)
     assert np.isnan(eyes.look(Stills([pictures["stand.png"]]), [aside]).px).all()
     eyes.close()
 

@@ -6,7 +6,7 @@ from hrc_env.perception.blazepose import detector_input, landmark_input, sample_
 from hrc_env.perception.network import load_detector, load_landmarker, prune
 from hrc_env.records import CropWindow
 
-MIDDLE = CropWindow((160.0, 160.0), 280.0, 0.1)
+MIDDLE = CropWindow((118.0, 138.0), 220.0, 0.1)
 
 
 def test_the_pruned_network_gives_the_bits_of_the_whole_one(weights, pictures):

@@ -71,12 +71,11 @@ def test_a_worker_out_of_sight_has_no_window(shift):
     assert window(STANDING + np.array(shift)) is None
 
 
-def test_the_window_of_a_picture_is_the_one_the_network_asks_for(reference):
-    """From 15 joints: nearly the square that the detector stage found in stored pictures."""
+def test_joints_of_a_picture_give_about_the_region_that_the_network_uses(reference):
+    """The worker fills two thirds of the stored pictures; only the one who lifts is bent."""
     for name, marks in reference.items():
-        joints_px = marks[BLAZEPOSE_INDEX, :2] + [800, 380]
-        depth = np.full(15, 1.75 * CAMERA.K[0, 0] / 230)
-        found = window_from_joints(joints_px, depth, CAMERA)
+        joints_px = marks[BLAZEPOSE_INDEX, :2] + [800, 400]
+        found = window_from_joints(joints_px, np.full(15, 1.75 * CAMERA.K[0, 0] / 165), CAMERA)
         assert found is not None, name
-        assert 200 < found.side_px < 420, name
-        assert abs(found.rotation_rad) < 0.6, name
+        assert 150 < found.side_px < 280, name
+        assert (abs(found.rotation_rad) < 0.4) == (name != "lift.png"), name

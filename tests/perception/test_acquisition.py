@@ -1,0 +1,58 @@
+"""A search: people whom several cameras agree on, and nobody else."""
+
+import numpy as np
+
+from hrc_env.geometry.cameras import pinhole, project, projections
+from hrc_env.perception.acquisition import agreed_windows, apart_from
+from hrc_env.records import CropWindow
+
+CAMERAS = tuple(
+    pinhole(f"camera_{k}", np.array([x, y, 2.45]), np.array([0.2, 0, 1.0]), 90, 1920, 1080)
+    for k, (x, y) in enumerate([(2.9, 2.6), (-2.9, 2.6), (-2.9, -2.6), (2.9, -2.6)])
+)
+ANNA, BEN = np.array([0.9, 0.3, 0.95]), np.array([1.2, -1.3, 0.95])
+
+
+def seen(*people):
+    """(C, people) windows round the hips of people at these places."""
+    px, _ = project(projections(CAMERAS), np.array([people]))
+    return [[CropWindow((u, v), 400.0, 0.0) for u, v in camera] for camera in px[0]]
+
+
+def test_one_person_is_found_by_all_cameras():
+    candidates = seen(ANNA)
+    assert agreed_windows(candidates, CAMERAS) == [found[0] for found in candidates]
+
+
+def test_a_mistake_of_one_camera_is_left_out():
+    candidates = seen(ANNA)
+    candidates[1] = [CropWindow((100.0, 200.0), 400.0, 0.0)]
+    windows = agreed_windows(candidates, CAMERAS)
+    assert windows[1] is None
+    assert windows[0] == candidates[0][0]
+
+
+def test_of_two_people_all_cameras_choose_the_same():
+    """Two cameras have one of them first, two the other."""
+    both = seen(ANNA, BEN)
+    candidates = [both[0], both[1][::-1], both[2], both[3][::-1]]
+    windows = agreed_windows(candidates, CAMERAS)
+    anna, ben = ([found[k] for found in both] for k in (0, 1))
+    assert windows in (anna, ben)
+
+
+def test_somebody_already_followed_is_not_found_again():
+    both = seen(ANNA, BEN)
+    anna, ben = ([found[k] for found in both] for k in (0, 1))
+    assert agreed_windows(apart_from(both, [anna]), CAMERAS) == ben
+
+
+def test_a_single_camera_is_believed_and_a_contradiction_is_not():
+    alone = [seen(ANNA)[0], [], [], []]
+    assert agreed_windows(alone, CAMERAS) == [alone[0][0], None, None, None]
+    contradiction = [seen(ANNA)[0], [CropWindow((100.0, 200.0), 400.0, 0.0)], [], []]
+    assert agreed_windows(contradiction, CAMERAS) == [None] * 4
+
+
+def test_an_empty_room_has_nobody():
+    assert agreed_windows([[]] * 4, CAMERAS) == [None] * 4
