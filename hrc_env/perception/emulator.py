@@ -28,7 +28,7 @@ class EmulatorConfig:
     """Sizes of the detector's errors; shares are of the worker's stature in the image.
 
     "Measured" refers to BlazePose `full` on rendered workers: its median error against its
-    visibility (docs/perception.md); a median of a share m means a standard deviation of
+    visibility (`perception.noise`); a median of a share m means a standard deviation of
     m / 1.177 of each coordinate.
     """
 
