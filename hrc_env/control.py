@@ -69,11 +69,11 @@ def resolved_rate(
     q_rest: JointAngles,
     config: ControlConfig,
 ) -> JointVelocities:
-    """(B, N) joint velocities for a tool velocity (B, 3), scaled together to their limits."""
+    """Joint velocities (..., N) for a tool velocity (..., 3), scaled together to their limits."""
     J = jacobian(chain, q)
     pull = config.posture_gain_hz * (q_rest - q)
     pull[..., 0] = 0.0  # the first joint points the arm at its goal: leave it free
-    wanted = tool_velocity_world - np.einsum("bij,bj->bi", J, pull)
+    wanted = tool_velocity_world - (J @ pull[..., None])[..., 0]
     gram = J @ J.swapaxes(-1, -2) + config.damping**2 * np.eye(3)
     solved = np.linalg.solve(gram, wanted[..., None])
     qd = pull + (J.swapaxes(-1, -2) @ solved)[..., 0]
