@@ -7,9 +7,8 @@ a `MotionConfig` in the form that `config.numbers` gives.
 
 import math
 
-import numba
-
 from hrc_env.motion import plans as pl
+from hrc_env.motion.compiled import compiled
 from hrc_env.motion.config import MotionConfig
 from hrc_env.motion.curves import wrap
 from hrc_env.motion.hands import plan_lift, plan_reach
@@ -31,14 +30,16 @@ BODY_M = 0.32
 """Hands reach no nearer to their own root than this [m]."""
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def between(draw: float, limits: tuple[float, float]) -> float:
     """A uniform draw in [0, 1) stretched to (low, high)."""
     return limits[0] + draw * (limits[1] - limits[0])
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def choose_place(draws: Floats, config: MotionConfig, spots: Floats, w: int, clock_s: float) -> None:
+@compiled
+def choose_place(
+    draws: Floats, config: MotionConfig, spots: Floats, w: int, clock_s: float
+) -> None:
     """Fill the worker's row of spots (W, 5), away from the other workers' places if possible."""
     near = draws[PLACE_DRAWS] < config.near_probability
     radii = config.near_radius_m if near else config.away_radius_m
@@ -64,7 +65,7 @@ def choose_place(draws: Floats, config: MotionConfig, spots: Floats, w: int, clo
     mine[SPOT_UNTIL] = clock_s + between(draws[PLACE_DRAWS + 1], config.dwell_s)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def _via(draw: float, plan: Floats, config: MotionConfig) -> tuple[float, float]:
     """Middle point of a path that keeps clear of the robot; START and END are set."""
     x0, y0, x2, y2 = plan[pl.START_X], plan[pl.START_Y], plan[pl.END_X], plan[pl.END_Y]
@@ -86,7 +87,7 @@ def _via(draw: float, plan: Floats, config: MotionConfig) -> tuple[float, float]
     return x, y
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def walk_on(
     draws: Floats, config: MotionConfig, spots: Floats, w: int, clock_s: float,
     traits: Floats, plan: Floats, prints: Floats, stance: Floats, size: Floats,
@@ -101,7 +102,7 @@ def walk_on(
     return plan_walk(start, via, end, pace, plan, prints, stance, size)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def next_work(draws: Floats, config: MotionConfig, near: bool) -> int:
     """Which activity a worker who stays at their place does next."""
     if near:
@@ -113,7 +114,7 @@ def next_work(draws: Floats, config: MotionConfig, near: bool) -> int:
     return pl.STAND
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def _target(
     draws: Floats, config: MotionConfig, near: bool, plan: Floats
 ) -> tuple[float, float, float]:
@@ -132,10 +133,10 @@ def _target(
     return bx + radius * math.cos(azimuth), by + radius * math.sin(azimuth), z
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def start_reach(
     draws: Floats, config: MotionConfig, near: bool, traits: Floats, plan: Floats,
-    offset: Floats, frame: Floats, size: Floats, q: Floats, p: Floats, r: Floats, work: Floats,
+    offset: Floats, frame: Floats, size: Floats, q: Floats, p: Floats, r: Floats,
 ) -> float:  # fmt: skip
     """Draw a reach: where to, with which hand, how fast, for how long."""
     target = _target(draws, config, near, plan)
@@ -151,19 +152,17 @@ def start_reach(
     hold = 0.15 + 0.2 * draws[8] if sudden else between(draws[8], config.hold_s)
     fidget = (0.035 * draws[9] * draws[9], 0.6 + 0.8 * draws[10])
     plan[pl.OUT_AT] = 0.05 if sudden else 0.1 + 0.5 * draws[11]
-    return plan_reach(
-        target, used, peak, hold, fidget, plan, traits, offset, frame, size, q, p, r, work
-    )
+    return plan_reach(target, used, peak, hold, fidget, plan, traits, offset, frame, size, q, p, r)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def start_lift(
     draws: Floats, config: MotionConfig, traits: Floats, plan: Floats,
-    offset: Floats, frame: Floats, size: Floats, q: Floats, p: Floats, r: Floats, work: Floats,
+    offset: Floats, frame: Floats, size: Floats, q: Floats, p: Floats, r: Floats,
 ) -> float:  # fmt: skip
     """Draw a lift: where the load stands and how long bending, raising and holding take."""
     plan[pl.OUT_AT] = 0.1 + 0.4 * draws[11]
     times = (between(draws[1], config.lift_s), between(draws[2], config.lift_s), 0.3 + draws[3])
     z = between(draws[4], config.load_z_m)
     ahead = 0.34 + 0.08 * draws[5]
-    return plan_lift(ahead, z, times, plan, traits, offset, frame, size, q, p, r, work)
+    return plan_lift(ahead, z, times, plan, traits, offset, frame, size, q, p, r)

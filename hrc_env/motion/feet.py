@@ -7,11 +7,10 @@ the share of a full stride of the step that made it, which scales its roll and i
 
 import math
 
-import numba
-
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.anatomy import ANKLE_Z, BALL_X, BALL_Z, HEEL_X
+from hrc_env.motion.compiled import compiled
 from hrc_env.motion.curves import cruise, hump, min_jerk
 from hrc_env.typing import Floats
 
@@ -26,10 +25,8 @@ LIFT_BASE_M, LIFT_STRIDE_M = 0.025, 0.045
 """Rise of the foot above its roll: of any step, and more with the stride [m]."""
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _roll(
-    t: float, lift: float, land: float, period: float, stride: float
-) -> tuple[float, float]:
+@compiled
+def _roll(t: float, lift: float, land: float, period: float, stride: float) -> tuple[float, float]:
     """Pitch that one step adds: heel up round the ball, then toes up round the heel."""
     swing = land - lift
     rising = min(ROLL_SHARE * period, lift)  # the first step's heel stays down until time 0
@@ -42,7 +39,7 @@ def _roll(
     return stride * PUSH_PITCH * (up - down), stride * STRIKE_PITCH * (toes_up - flat)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def _last_step(t: float, first: int, count: int, plan: Floats) -> int:
     """Index of the latest step of a foot that has left the floor; below `first` if none."""
     k = math.floor((t - plan[pl.STEP_START]) / plan[pl.STEP_PERIOD])
@@ -50,7 +47,7 @@ def _last_step(t: float, first: int, count: int, plan: Floats) -> int:
     return min(k, count - 1 - (count - 1 - first) % 2)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def foot(
     t: float, side: int, plan: Floats, prints: Floats, stance: Floats, size: Floats, q: Floats
 ) -> None:
@@ -87,7 +84,7 @@ def foot(
     q[at + 3], q[at + 4], q[at + 5] = yaw, heel_up + toes_up, heel_up * flown + toes_up
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def _about(pitch: float, pivot_x: float, pivot_z: float) -> tuple[float, float]:
     """How far forward and up the ankle goes when the foot pitches about a point of its own."""
     cos, sin = math.cos(pitch), math.sin(pitch)

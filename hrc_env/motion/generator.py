@@ -6,7 +6,6 @@ anywhere, nothing is precomputed, and velocities come from the closed form itsel
 
 from collections.abc import Sequence
 
-import numba
 import numpy as np
 
 from hrc_env.body import N_SEGMENTS, Body
@@ -15,8 +14,9 @@ from hrc_env.motion import behaviour as bh
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.anatomy import anatomy
+from hrc_env.motion.compiled import compiled
 from hrc_env.motion.config import MotionConfig, numbers
-from hrc_env.motion.kinematics import pose, quaternion, spin
+from hrc_env.motion.kinematics import N_FRAMES, N_POINTS, pose, quaternion, spin
 from hrc_env.motion.state import RATE_H_S, MotionState, begin, evaluate, follow_up
 from hrc_env.records import WorkerMotion
 from hrc_env.typing import Bools, Floats, Ints
@@ -134,13 +134,13 @@ def _constants(state: MotionState) -> tuple:
     return (state.numbers, state.anatomy.offset, state.anatomy.frame, state.anatomy.size)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def _body(
     b: int, w: int, clock_s: Floats, time_s: Floats, activity: Ints, plan: Floats,
     prints: Floats, stance: Floats, offset: Floats, traits: Floats,
     bones: Floats, frame: Floats, size: Floats,
     position: Floats, quaternion_: Floats, velocity: Floats, turning: Floats,
-    q: Floats, p: Floats, r: Floats, work: Floats,
+    q: Floats, p: Floats, r: Floats,
 ) -> None:  # fmt: skip
     """Pose and velocities of worker (b, w) now, into (22, ...) arrays."""
     for i in range(2):
@@ -149,25 +149,26 @@ def _body(
             activity[b, w], time_s[b, w] + h, clock_s[b, w] + h, plan[b, w], prints[b, w],
             stance[b, w], offset[b, w], traits[b, w], size, q,
         )  # fmt: skip
-        pose(q, bones, frame, size, p[i], r[i], work)
-    for s in range(p.shape[1]):
+        pose(q, bones, frame, size, p[i], r[i])
+    before, after, first, second = p[0], p[1], r[0], r[1]
+    for s in range(bones.shape[0]):
         for i in range(3):
-            position[s, i] = p[0, s, i]
-            velocity[s, i] = (p[1, s, i] - p[0, s, i]) / RATE_H_S
-        quaternion(r[0, s], quaternion_[s])
-        spin(r[0, s], r[1, s], RATE_H_S, turning[s])
+            position[s, i] = before[s, i]
+            velocity[s, i] = (after[s, i] - before[s, i]) / RATE_H_S
+        quaternion(first, s, quaternion_)
+        spin(first, second, s, RATE_H_S, turning)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def _run(
-    dt_s: float, n_steps: int, done: Ints, ticked: Bools, clock_s: Floats, time_s: Floats, duration_s: Floats,
-    activity: Ints, plan: Floats, prints: Floats, stance: Floats, offset: Floats, traits: Floats,
+    dt_s: float, n_steps: int, done: Ints, ticked: Bools,
+    clock_s: Floats, time_s: Floats, duration_s: Floats, activity: Ints, plan: Floats, prints: Floats, stance: Floats, offset: Floats, traits: Floats,
     bones: Floats, frame: Floats, size: Floats,
     position: Floats, quaternion_: Floats, velocity: Floats, turning: Floats,
 ) -> bool:  # fmt: skip
     """Move every environment on until done or someone must decide; whether anyone must."""
-    q, work = np.empty(c.N_CONTROLS), np.zeros((7, 3))
-    p, r = np.zeros((2, bones.shape[0], 3)), np.zeros((2, bones.shape[0], 3, 3))
+    q, p = np.empty(c.N_CONTROLS), np.zeros((2, N_POINTS, 3))
+    r = np.zeros((2, N_FRAMES, 3, 3))
     waiting = False
     for b in range(done.shape[0]):
         while done[b] < n_steps:
@@ -185,13 +186,13 @@ def _run(
                 _body(
                     b, w, clock_s, time_s, activity, plan, prints, stance, offset, traits,
                     bones, frame, size, position[b, t, w], quaternion_[b, t, w],
-                    velocity[b, t, w], turning[b, t, w], q, p, r, work,
+                    velocity[b, t, w], turning[b, t, w], q, p, r,
                 )  # fmt: skip
             done[b] += 1
     return waiting
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def _draw(
     clock_s: Floats, time_s: Floats, duration_s: Floats, activity: Ints, plan: Floats,
     prints: Floats, stance: Floats, offset: Floats, traits: Floats,
@@ -199,12 +200,12 @@ def _draw(
     position: Floats, quaternion_: Floats, velocity: Floats, turning: Floats,
 ) -> None:  # fmt: skip
     """Bodies as they are, into arrays (B, 1, W, ...)."""
-    q, work = np.empty(c.N_CONTROLS), np.zeros((7, 3))
-    p, r = np.zeros((2, bones.shape[0], 3)), np.zeros((2, bones.shape[0], 3, 3))
+    q, p = np.empty(c.N_CONTROLS), np.zeros((2, N_POINTS, 3))
+    r = np.zeros((2, N_FRAMES, 3, 3))
     for b in range(time_s.shape[0]):
         for w in range(time_s.shape[1]):
             _body(
                 b, w, clock_s, time_s, activity, plan, prints, stance, offset, traits,
                 bones, frame, size, position[b, 0, w], quaternion_[b, 0, w],
-                velocity[b, 0, w], turning[b, 0, w], q, p, r, work,
+                velocity[b, 0, w], turning[b, 0, w], q, p, r,
             )  # fmt: skip

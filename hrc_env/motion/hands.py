@@ -2,11 +2,10 @@
 
 import math
 
-import numba
-
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.anatomy import ARM, HAND, LEFT, SIDE_STRIDE, UPPER_ARM
+from hrc_env.motion.compiled import compiled
 from hrc_env.motion.curves import hump, min_jerk
 from hrc_env.motion.kinematics import ARM_KNEE, pose
 from hrc_env.motion.posture import MOST_LEAN, beyond, lean, stand
@@ -18,14 +17,14 @@ CARRY_FORWARD_M, CARRY_Z_M, LOAD_HALF_WIDTH_M = 0.36, 1.05, 0.17
 """A load held up: ahead of the root, its height, half its width [m]; judgement."""
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def _look(share: float, plan: Floats, q: Floats) -> None:
     """Turn the head to the work."""
     q[c.HEAD_YAW] += share * (plan[pl.GAZE_YAW] - q[c.HEAD_YAW])
     q[c.HEAD_PITCH] += share * plan[pl.GAZE_PITCH]
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def _extend(out: float, plan: Floats, q: Floats) -> None:
     """Hands and trunk at share `out` of a reach."""
     lean(plan[pl.LEAN] * out, plan[pl.SQUAT], plan[pl.TWIST] * out, q)
@@ -35,7 +34,7 @@ def _extend(out: float, plan: Floats, q: Floats) -> None:
     q[c.HAND_SHARE + 1] = out * plan[pl.USE_RIGHT]
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def reach(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q: Floats) -> None:
     """The control vector of someone who reaches out, works there, and takes the hands back."""
     stand(plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW], clock_s, traits, size, q)
@@ -55,7 +54,7 @@ def reach(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, 
             q[c.HAND_TARGET + 3 * side + 2] += 0.5 * busy * math.sin(1.3 * beat + 2.0 * side)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def lift(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q: Floats) -> None:
     """The control vector of someone who picks a load up, holds it, and puts it back."""
     stand(plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW], clock_s, traits, size, q)
@@ -71,17 +70,19 @@ def lift(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q
     bulge = 0.06 * hump(up)
     cos, sin = math.cos(plan[pl.START_YAW]), math.sin(plan[pl.START_YAW])
     for i in range(6):
-        q[c.HAND_TARGET + i] = plan[pl.TARGET + i] + up * (plan[pl.RAISED + i] - plan[pl.TARGET + i])
+        q[c.HAND_TARGET + i] = plan[pl.TARGET + i] + up * (
+            plan[pl.RAISED + i] - plan[pl.TARGET + i]
+        )
     for side in range(2):
         q[c.HAND_TARGET + 3 * side] += cos * bulge
         q[c.HAND_TARGET + 3 * side + 1] += sin * bulge
         q[c.HAND_SHARE + side] = down - away
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def _settle_lean(
     plan: Floats, traits: Floats, offset: Floats, frame: Floats, size: Floats,
-    q: Floats, p: Floats, r: Floats, work: Floats,
+    q: Floats, p: Floats, r: Floats,
 ) -> None:  # fmt: skip
     """Smallest lean that brings the targets within reach; else the targets come nearer."""
     used = (plan[pl.USE_LEFT], plan[pl.USE_RIGHT])
@@ -90,7 +91,7 @@ def _settle_lean(
     for attempt in range(12):
         stand(plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW], 0.0, traits, size, q)
         _extend(1.0, plan, q)
-        far = beyond(q, used, offset, frame, size, p, r, work)
+        far = beyond(q, used, offset, frame, size, p, r)
         if attempt == 0 and far <= 0.0:
             return
         if attempt > 0:
@@ -115,11 +116,11 @@ def _settle_lean(
             plan[at + i] = p[upper, i] + nearer * (plan[at + i] - p[upper, i])
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def plan_reach(
     target: tuple[float, float, float], used: tuple[float, float], peak_m_s: float,
     hold_s: float, fidget: tuple[float, float], plan: Floats, traits: Floats,
-    offset: Floats, frame: Floats, size: Floats, q: Floats, p: Floats, r: Floats, work: Floats,
+    offset: Floats, frame: Floats, size: Floats, q: Floats, p: Floats, r: Floats,
 ) -> float:  # fmt: skip
     """Plan to reach a world point with the used hands; returns the duration [s]."""
     yaw = plan[pl.START_YAW]
@@ -139,8 +140,8 @@ def plan_reach(
     plan[pl.SQUAT] = min(max((0.95 - target[2]) / 0.5, 0.0), 1.0)
     plan[pl.GAZE_YAW] = 0.5 * azimuth - 0.5 * plan[pl.TWIST]
     plan[pl.GAZE_PITCH] = 0.25 + 0.4 * min(max(1.4 - target[2], -0.3), 0.6)
-    _settle_lean(plan, traits, offset, frame, size, q, p, r, work)
-    way = _way(plan, traits, offset, frame, size, q, p, r, work)
+    _settle_lean(plan, traits, offset, frame, size, q, p, r)
+    way = _way(plan, traits, offset, frame, size, q, p, r)
     plan[pl.OUT_S] = max(1.875 * way / peak_m_s, 0.3)
     plan[pl.BACK_S] = max(1.875 * way / min(peak_m_s, 1.2), 0.45)
     plan[pl.HOLD_S] = hold_s
@@ -148,17 +149,17 @@ def plan_reach(
     return plan[pl.OUT_AT] + plan[pl.OUT_S] + hold_s + plan[pl.BACK_S] + 0.05
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def _way(
     plan: Floats, traits: Floats, offset: Floats, frame: Floats, size: Floats,
-    q: Floats, p: Floats, r: Floats, work: Floats,
+    q: Floats, p: Floats, r: Floats,
 ) -> float:  # fmt: skip
     """The longest way that a used hand has from hanging to its target [m]."""
     stand(plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW], 0.0, traits, size, q)
     for i in range(6):
         q[c.HAND_TARGET + i] = plan[pl.TARGET + i]
     way = 0.1
-    pose(q, offset, frame, size, p, r, work)
+    pose(q, offset, frame, size, p, r)
     for side in range(2):
         wrist = LEFT + SIDE_STRIDE * side + HAND
         d = 0.0
@@ -169,10 +170,10 @@ def _way(
     return way
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def plan_lift(
     ahead: float, z: float, times: tuple[float, float, float], plan: Floats, traits: Floats,
-    offset: Floats, frame: Floats, size: Floats, q: Floats, p: Floats, r: Floats, work: Floats,
+    offset: Floats, frame: Floats, size: Floats, q: Floats, p: Floats, r: Floats,
 ) -> float:  # fmt: skip
     """Plan to lift a load `ahead` of the feet at height z; times: bend, raise, carry [s]."""
     cos, sin = math.cos(plan[pl.START_YAW]), math.sin(plan[pl.START_YAW])
@@ -188,7 +189,7 @@ def plan_lift(
     plan[pl.TWIST], plan[pl.GAZE_YAW], plan[pl.GAZE_PITCH] = 0.0, 0.0, 0.25
     plan[pl.SQUAT] = traits[pl.SQUAT_TRAIT]
     plan[pl.USE_LEFT], plan[pl.USE_RIGHT] = 1.0, 1.0
-    _settle_lean(plan, traits, offset, frame, size, q, p, r, work)
+    _settle_lean(plan, traits, offset, frame, size, q, p, r)
     plan[pl.OUT_S], plan[pl.RAISE_S], plan[pl.CARRY_S] = times
     plan[pl.BACK_S], plan[pl.HOLD_S] = times[0], 0.3
     raising = 2.0 * (plan[pl.HOLD_S] + plan[pl.RAISE_S]) + plan[pl.CARRY_S]

@@ -2,11 +2,10 @@
 
 import math
 
-import numba
-
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.anatomy import ARM, FOREARM_GRIP, LEFT, SIDE_STRIDE, STAND_Z, UPPER_ARM
+from hrc_env.motion.compiled import compiled
 from hrc_env.motion.kinematics import ARM_KNEE, pose
 from hrc_env.typing import Floats
 
@@ -24,14 +23,13 @@ MOST_LEAN = 1.2
 """Lean beyond which a person would step instead."""
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def sway(clock_s: float, i: int, traits: Floats) -> float:
     """A slow wave of the worker's own, between -1 and 1; i in 0..4."""
-    turn = 2.0 * math.pi
-    return math.sin(turn * (SWAY_HZ[i] * clock_s + traits[pl.PHASE + i]))
+    return math.sin(2.0 * math.pi * (SWAY_HZ[i] * clock_s + traits[pl.PHASE + i]))
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def hang(side: int, pitch: float, elbow: float, size: Floats, q: Floats) -> None:
     """Let an arm hang: upper arm `pitch` forward of the vertical, elbow bent by `elbow`."""
     sign = 1.0 - 2.0 * side
@@ -45,35 +43,40 @@ def hang(side: int, pitch: float, elbow: float, size: Floats, q: Floats) -> None
     q[at + 2] = -(cos * upper * (1.0 - 0.5 * RELAXED_OUT * RELAXED_OUT) + both_cos * fore)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def stand(
     x: float, y: float, yaw: float, clock_s: float, traits: Floats, size: Floats, q: Floats
 ) -> None:
     """Fill every column but the feet: at ease at (x, y), shifting weight, looking about."""
-    side_shift = SHIFT_M * (0.7 * sway(clock_s, 0, traits) + 0.3 * sway(clock_s, 2, traits))
-    ahead = 0.006 * sway(clock_s, 3, traits)
+    first, second, third = (
+        sway(clock_s, 0, traits),
+        sway(clock_s, 1, traits),
+        sway(clock_s, 2, traits),
+    )
+    fourth, fifth = sway(clock_s, 3, traits), sway(clock_s, 4, traits)
+    side_shift, ahead = SHIFT_M * (0.7 * first + 0.3 * third), 0.006 * fourth
     cos, sin = math.cos(yaw), math.sin(yaw)
     q[c.ROOT_X] = x + cos * ahead - sin * side_shift
     q[c.ROOT_Y] = y + sin * ahead + cos * side_shift
     q[c.HEADING], q[c.PELVIS_Z] = yaw, size[STAND_Z]
-    q[c.PELVIS_PITCH] = 0.02 + 0.01 * sway(clock_s, 3, traits)
+    q[c.PELVIS_PITCH] = 0.02 + 0.01 * fourth
     q[c.PELVIS_ROLL] = 1.2 * side_shift
-    q[c.PELVIS_YAW] = 0.03 * sway(clock_s, 1, traits)
-    q[c.SPINE_FLEX] = 0.04 + 0.015 * sway(clock_s, 2, traits)
+    q[c.PELVIS_YAW] = 0.03 * second
+    q[c.SPINE_FLEX] = 0.04 + 0.015 * third
     q[c.SPINE_SIDE] = -1.5 * side_shift
-    q[c.SPINE_TWIST] = 0.04 * sway(clock_s, 4, traits)
-    q[c.HEAD_PITCH] = 0.06 + 0.05 * sway(clock_s, 1, traits)
-    q[c.HEAD_YAW] = 0.12 * sway(clock_s, 4, traits) + 0.08 * sway(clock_s, 2, traits)
+    q[c.SPINE_TWIST] = 0.04 * fifth
+    q[c.HEAD_PITCH] = 0.06 + 0.05 * second
+    q[c.HEAD_YAW] = 0.12 * fifth + 0.08 * third
     q[c.SWIVEL], q[c.SWIVEL + 1] = 0.1, 0.1
     for side in range(2):
-        wave = 0.04 * sway(clock_s, 3 - side, traits)
+        wave = 0.04 * (third if side else fourth)
         hang(side, RELAXED_PITCH + wave, RELAXED_ELBOW + wave, size, q)
         q[c.HAND_SHARE + side] = 0.0
     for i in range(6):
         q[c.HAND_TARGET + i] = 0.0
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def lean(amount: float, squat: float, twist: float, q: Floats) -> None:
     """Bend the trunk forward (1: a deep bow), the knees too by the share `squat`, and turn.
 
@@ -90,13 +93,13 @@ def lean(amount: float, squat: float, twist: float, q: Floats) -> None:
     q[c.SPINE_TWIST] += 0.65 * twist
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def beyond(
     q: Floats, used: tuple[float, float], offset: Floats, frame: Floats, size: Floats,
-    p: Floats, r: Floats, work: Floats,
+    p: Floats, r: Floats,
 ) -> float:  # fmt: skip
     """How far the targets lie beyond what the used arms reach from this posture [m]."""
-    pose(q, offset, frame, size, p, r, work)
+    pose(q, offset, frame, size, p, r)
     far = -1.0
     for side in range(2):
         upper = LEFT + SIDE_STRIDE * side + UPPER_ARM

@@ -3,20 +3,21 @@
 import math
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
 from hrc_env.motion import behaviour as bh
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.anatomy import Anatomy
+from hrc_env.motion.compiled import compiled
 from hrc_env.motion.config import MotionConfig
 from hrc_env.motion.curves import decay, wrap
 from hrc_env.motion.feet import foot
 from hrc_env.motion.hands import lift, reach
+from hrc_env.motion.kinematics import N_FRAMES, N_POINTS
 from hrc_env.motion.posture import STANCE_HALF_WIDTH_M, stand
 from hrc_env.motion.walk import footprint, walk
-from hrc_env.typing import Bools, Floats, Ints
+from hrc_env.typing import Floats, Ints
 
 BLEND_S = 0.45
 """Time in which the difference between two activities decays [s]; about a settling step."""
@@ -57,7 +58,7 @@ class MotionState:
     """Constants of the behaviour (`config.numbers`)."""
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def evaluate(
     activity: int, t: float, clock_s: float, plan: Floats, prints: Floats, stance: Floats,
     offset: Floats, traits: Floats, size: Floats, q: Floats,
@@ -79,7 +80,7 @@ def evaluate(
             q[i] += decay(t / BLEND_S, BLEND_S, offset[i, 0], offset[i, 1])
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def _stop(plan: Floats, prints: Floats, stance: Floats) -> float:
     """Begin where the last activity ended; returns by how much its heading was unwound."""
     count = int(plan[pl.STEP_COUNT])
@@ -99,43 +100,37 @@ def _stop(plan: Floats, prints: Floats, stance: Floats) -> float:
     return unwound
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def plan_next(
     w: int, clock_s: float, draws: Floats, config: MotionConfig, spots: Floats, traits: Floats,
     plan: Floats, prints: Floats, stance: Floats, offset: Floats, frame: Floats, size: Floats,
-    q: Floats, p: Floats, r: Floats, work: Floats,
+    q: Floats, p: Floats, r: Floats,
 ) -> tuple[int, float]:  # fmt: skip
     """Decide and plan what comes next; START, END and stance are set. (activity, duration)."""
     for side in range(2):
         foot(0.0, side, plan, prints, stance, size, q)
     near = spots[w, bh.SPOT_NEAR] > 0.0
     if clock_s >= spots[w, bh.SPOT_UNTIL]:
-        lasts = bh.walk_on(
-            draws, config, spots, w, clock_s, traits, plan, prints, stance, size
-        )
+        lasts = bh.walk_on(draws, config, spots, w, clock_s, traits, plan, prints, stance, size)
         spots[w, bh.SPOT_UNTIL] += lasts
         return pl.WALK, lasts
     kind = bh.next_work(draws, config, near)
     if kind == pl.REACH:
-        return kind, bh.start_reach(
-            draws, config, near, traits, plan, offset, frame, size, q, p, r, work
-        )
+        return kind, bh.start_reach(draws, config, near, traits, plan, offset, frame, size, q, p, r)
     if kind == pl.LIFT:
-        return kind, bh.start_lift(
-            draws, config, traits, plan, offset, frame, size, q, p, r, work
-        )
+        return kind, bh.start_lift(draws, config, traits, plan, offset, frame, size, q, p, r)
     return kind, bh.between(draws[1], config.near_pause_s if near else config.away_pause_s)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def follow_up(
     b: int, w: int, clock_s: Floats, time_s: Floats, duration_s: Floats, activity: Ints,
     plan: Floats, prints: Floats, stance: Floats, offset: Floats, traits: Floats, spots: Floats,
     draws: Floats, config: MotionConfig, bones: Floats, frame: Floats, size: Floats,
 ) -> None:  # fmt: skip
     """The activity of worker (b, w) is over: begin the next, smoothly."""
-    q, p, r = np.empty((4, c.N_CONTROLS)), np.zeros((22, 3)), np.zeros((22, 3, 3))
-    work, h, end = np.zeros((7, 3)), RATE_H_S, duration_s[b, w]
+    q, h, end = np.empty((4, c.N_CONTROLS)), RATE_H_S, duration_s[b, w]
+    p, r = np.zeros((N_POINTS, 3)), np.zeros((N_FRAMES, 3, 3))
     now = clock_s[b, w] - (time_s[b, w] - end)
     for i in range(2):
         evaluate(
@@ -147,7 +142,7 @@ def follow_up(
     q[1, c.HEADING] += unwound
     activity[b, w], duration_s[b, w] = plan_next(
         w, now, draws[b, w], config, spots[b], traits[b, w], plan[b, w], prints[b, w],
-        stance[b, w], bones, frame, size, q[2], p, r, work,
+        stance[b, w], bones, frame, size, q[2], p, r,
     )  # fmt: skip
     time_s[b, w] -= end
     offset[b, w] = 0.0
@@ -161,7 +156,7 @@ def follow_up(
         offset[b, w, i, 0], offset[b, w, i, 1] = gap, (later - gap) / h
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def begin(
     b: int, w: int, clock_s: Floats, time_s: Floats, duration_s: Floats, activity: Ints,
     plan: Floats, prints: Floats, stance: Floats, offset: Floats, traits: Floats, spots: Floats,
@@ -185,9 +180,10 @@ def begin(
             side, row[pl.START_X], row[pl.START_Y], row[pl.START_YAW], STANCE_HALF_WIDTH_M,
             size, stance[b, w, side],
         )  # fmt: skip
-    q, p, r = np.empty(c.N_CONTROLS), np.zeros((22, 3)), np.zeros((22, 3, 3))
+    q = np.empty(c.N_CONTROLS)
+    p, r = np.zeros((N_POINTS, 3)), np.zeros((N_FRAMES, 3, 3))
     activity[b, w], duration_s[b, w] = plan_next(
         w, 0.0, draws[b, w], config, spots[b], traits[b, w], row, prints[b, w], stance[b, w],
-        bones, frame, size, q, p, r, np.zeros((7, 3)),
+        bones, frame, size, q, p, r,
     )  # fmt: skip
     time_s[b, w] = math.floor(1e6 * d[10] * duration_s[b, w]) * 1e-6

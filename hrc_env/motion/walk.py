@@ -6,11 +6,10 @@ Cadence and step length follow 68 walking trials of the CMU motion-capture datab
 
 import math
 
-import numba
-
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.anatomy import ANKLE_X
+from hrc_env.motion.compiled import compiled
 from hrc_env.motion.curves import min_jerk, ramp, wrap
 from hrc_env.motion.feet import FLAT_S
 from hrc_env.motion.posture import (
@@ -40,7 +39,7 @@ NORMAL_M_S = 1.3
 """Speed at which the amplitudes below hold."""
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def travelled(t: float, plan: Floats) -> float:
     """Metres along the path at time t."""
     u, rise = t - plan[pl.DEPART], plan[pl.RAMP]
@@ -48,7 +47,7 @@ def travelled(t: float, plan: Floats) -> float:
     return plan[pl.SPEED] * rise * (ramp(u / rise) - ramp((u - slow) / rise))
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def speed(t: float, plan: Floats) -> float:
     """Rate of `travelled` [m/s]."""
     u, rise = t - plan[pl.DEPART], plan[pl.RAMP]
@@ -57,7 +56,7 @@ def speed(t: float, plan: Floats) -> float:
     return plan[pl.SPEED] * (a * a * (3.0 - 2.0 * a) - b * b * (3.0 - 2.0 * b))
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def along(u: float, plan: Floats) -> tuple[float, float, float]:
     """Point of the path (a quadratic Bezier curve) at share u, and its direction."""
     x0, y0, x1, y1 = plan[pl.START_X], plan[pl.START_Y], plan[pl.VIA_X], plan[pl.VIA_Y]
@@ -69,7 +68,7 @@ def along(u: float, plan: Floats) -> tuple[float, float, float]:
     return x, y, math.atan2(ty, tx)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def root(t: float, plan: Floats) -> tuple[float, float, float]:
     """Where the walker's middle is at time t, and their heading (continuous, not wrapped)."""
     x, y, direction = along(min(travelled(t, plan) / plan[pl.LENGTH], 1.0), plan)
@@ -81,7 +80,7 @@ def root(t: float, plan: Floats) -> tuple[float, float, float]:
     return x, y, yaw + plan[pl.TURN_OUT] * turned
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def walk(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q: Floats) -> None:
     """The control vector of a walker but for the feet."""
     x, y, yaw = root(t, plan)
@@ -118,7 +117,7 @@ def walk(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q
         )
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def plan_walk(
     start: tuple[float, float, float], via: tuple[float, float], end: tuple[float, float, float],
     wished_m_s: float, plan: Floats, prints: Floats, stance: Floats, size: Floats,
@@ -146,7 +145,7 @@ def plan_walk(
     return _plan_steps(plan, prints, stance, size)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def _plan_turns(end_yaw: float, plan: Floats) -> None:
     """Turn into the path and out of it; who must turn far sets off when the turn is nearly done."""
     _, _, first = along(0.0, plan)
@@ -164,7 +163,7 @@ def _plan_turns(end_yaw: float, plan: Floats) -> None:
     plan[pl.END_YAW] = heading + turn
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def _plan_steps(plan: Floats, prints: Floats, stance: Floats, size: Floats) -> float:
     """Lay footprints where the root will pass at mid-stance; the last two stand at the end."""
     period, start = plan[pl.STEP_PERIOD], plan[pl.STEP_START]
@@ -186,7 +185,7 @@ def _plan_steps(plan: Floats, prints: Floats, stance: Floats, size: Floats) -> f
     return start + (count - 1) * period + plan[pl.STEP_SWING] + FLAT_S
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def _first_foot(plan: Floats) -> float:
     """Begin with the foot on the side that the walker turns or steps to."""
     x, y, yaw = root(plan[pl.DEPART] + plan[pl.DURATION], plan)
@@ -196,7 +195,7 @@ def _first_foot(plan: Floats) -> float:
     return 0.0 if turn >= 0.0 else 1.0
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def footprint(
     side: int, x: float, y: float, yaw: float, half_width: float, size: Floats, out: Floats
 ) -> None:
