@@ -22,6 +22,10 @@ from hrc_env.scene.build import Scene, drawing_model
 from hrc_env.scene.rig import glcam_axes
 from hrc_env.typing import Image, JointAngles
 
+EVERYTHING = int(mujoco.mjtCatBit.mjCAT_ALL)
+STILL = int(mujoco.mjtCatBit.mjCAT_STATIC)
+MOVING = int(mujoco.mjtCatBit.mjCAT_DYNAMIC)
+
 
 class Canvas:
     """A picture of fixed size; `quality` are fields of MuJoCo's visual.quality."""
@@ -43,16 +47,17 @@ class Canvas:
         view.offwidth, view.offheight = width_px, height_px
         self._data = mujoco.MjData(self._model)
         self._option = mujoco.MjvOption()
-        self._option.geomgroup[:] = 0
-        self._option.geomgroup[list(groups)] = 1
         self._option.sitegroup[:] = 0
         self._camera = mujoco.MjvCamera()
         mujoco.mjv_defaultFreeCamera(self._model, self._camera)
         self._rect = mujoco.MjrRect(0, 0, width_px, height_px)
         self._gl: Any = None
         self._context: Any = None
-        self._drawn: Any = None
+        self._lists: dict[int, Any] = {}
+        self._shown: Any = None
+        self._fresh: set[int] = set()
         self._closed = False
+        self.groups(groups)
 
     def pose(self, q: JointAngles, motion: WorkerMotion | None) -> None:
         """Put the arm at q (N,) and the workers where `motion` (W, S, ...) has them."""
@@ -65,20 +70,35 @@ class Canvas:
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_comPos(self._model, self._data)
         mujoco.mj_camlight(self._model, self._data)
+        self._fresh.clear()
 
-    def refresh(self, shadows: bool, groups: Sequence[int] | None = None) -> None:
-        """Take the pose over into what is drawn (skins included)."""
+    def show(self, what: int = EVERYTHING, shadows: bool = False) -> None:
+        """Choose what the next pictures hold: everything, what stands still, what moves.
+
+        What moves is drawn on black; all else has the sky behind it. The pose is taken over
+        (skins included) when it has changed since.
+        """
         self._open()
-        if groups is not None:
-            self._option.geomgroup[:] = 0
-            self._option.geomgroup[list(groups)] = 1
+        if what not in self._lists:
+            self._lists[what] = mujoco.MjvScene(self._model, maxgeom=self._model.ngeom + 64)
+        self._shown = self._lists[what]
+        if what in self._fresh:
+            return
+        self._fresh.add(what)
         mujoco.mjv_updateScene(
-            self._model, self._data, self._option, None, self._camera,
-            mujoco.mjtCatBit.mjCAT_ALL.value, self._drawn,
-        )  # fmt: skip
-        self._drawn.flags[mujoco.mjtRndFlag.mjRND_SHADOW.value] = shadows
-        self._drawn.flags[mujoco.mjtRndFlag.mjRND_REFLECTION.value] = 0
-        self._drawn.flags[mujoco.mjtRndFlag.mjRND_HAZE.value] = 0
+            self._model, self._data, self._option, None, self._camera, what, self._shown
+        )
+        flags = self._shown.flags
+        flags[mujoco.mjtRndFlag.mjRND_SHADOW.value] = shadows
+        flags[mujoco.mjtRndFlag.mjRND_SKYBOX.value] = what != MOVING
+        flags[mujoco.mjtRndFlag.mjRND_REFLECTION.value] = 0
+        flags[mujoco.mjtRndFlag.mjRND_HAZE.value] = 0
+
+    def groups(self, groups: Sequence[int]) -> None:
+        """Draw the geoms of these groups only."""
+        self._option.geomgroup[:] = 0
+        self._option.geomgroup[list(groups)] = 1
+        self._fresh.clear()
 
     def aim(self, camera: PinholeCamera, window: CropWindow, height_px: float) -> None:
         """Look through a turned rectangle of a camera's image, `side_px` wide.
@@ -88,35 +108,41 @@ class Canvas:
             window: the rectangle's centre, width and turn.
             height_px: the rectangle's height [px of the camera's image].
         """
-        self._open()
         c, s = np.cos(window.rotation_rad), np.sin(window.rotation_rad)
         dx = window.centre_px[0] - camera.K[0, 2]
         dy = window.centre_px[1] - camera.K[1, 2]
         u, v = c * dx + s * dy, c * dy - s * dx  # the centre in the turned camera's image
         right, up, back = glcam_axes(camera).T
-        for eye in self._drawn.camera:
+        for eye in self._shown.camera:
             scale = eye.frustum_near / camera.K[0, 0]
             eye.pos, eye.forward, eye.up = camera.eye_world, -back, s * right + c * up
             eye.frustum_center, eye.frustum_width = u * scale, window.side_px / 2 * scale
             eye.frustum_top = (height_px / 2 - v) * scale
             eye.frustum_bottom = (-height_px / 2 - v) * scale
 
+    def read(self, rgb: NDArray[np.uint8] | None, z: NDArray[np.float32] | None) -> None:
+        """Draw into rgb (H, W, 3) and z (H, W), bottom row first as OpenGL has them.
+
+        z is 1 at the near plane and 0 at the far one.
+        """
+        self._open()
+        self._gl.make_current()
+        mujoco.mjr_render(self._rect, self._shown, self._context)
+        mujoco.mjr_readPixels(rgb, z, self._rect, self._context)
+
     def paint(self) -> Image:
         """The picture (H, W, 3), top row first."""
-        self._render()
         rgb = np.empty((self.height_px, self.width_px, 3), np.uint8)
-        mujoco.mjr_readPixels(rgb, None, self._rect, self._context)
+        self.read(rgb, None)
         return np.ascontiguousarray(rgb[::-1])
 
     def depth_m(self) -> NDArray[np.float32]:
         """(H, W) distance along the optical axis [m], top row first; nothing there is the
         far plane."""
-        self._render()
         z = np.empty((self.height_px, self.width_px), np.float32)
-        mujoco.mjr_readPixels(None, z, self._rect, self._context)
-        near = float(self._drawn.camera[0].frustum_near)
-        far = float(self._drawn.camera[0].frustum_far)
-        # Reversed depth: 1 at the near plane, 0 at the far one.
+        self.read(None, z)
+        near = float(self._shown.camera[0].frustum_near)
+        far = float(self._shown.camera[0].frustum_far)
         depth = near * far / (near + z[::-1].astype(float) * (far - near))
         return depth.astype(np.float32)
 
@@ -126,7 +152,8 @@ class Canvas:
             self._gl.make_current()
             self._context.free()
             self._gl.free()
-        self._gl = self._context = self._drawn = None
+        self._gl = self._context = self._shown = None
+        self._lists.clear()
         self._closed = True
 
     def __del__(self) -> None:
@@ -138,14 +165,8 @@ class Canvas:
             raise RenderingError("This renderer has been closed: make a new one.")
         if self._context is None:
             self._gl = gl.new_context(self.width_px, self.height_px)
-            self._drawn = mujoco.MjvScene(self._model, maxgeom=self._model.ngeom + 64)
             self._context = mujoco.MjrContext(
                 self._model, mujoco.mjtFontScale.mjFONTSCALE_100.value
             )
             mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
             self._context.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
-
-    def _render(self) -> None:
-        self._open()
-        self._gl.make_current()
-        mujoco.mjr_render(self._rect, self._drawn, self._context)

@@ -106,8 +106,8 @@ def _stud_wall(world: Any) -> None:
 def _table(world: Any) -> None:
     """A trestle table with work on it, beside the robot."""
     x, y, height = -1.15, 1.86, 0.80
-    top = {"name": "table_top"} | SOLID_SCENE
-    box(world, (x, y, height - 0.02), (1.5, 0.62, 0.04), "beech", **top)
+    top = (x, y, height - 0.02)
+    box(world, top, (1.5, 0.62, 0.04), "beech", name="table_top", **SOLID_SCENE)
     for sx in (-1, 1):
         legs_x = x + 0.55 * sx
         box(world, (legs_x, y, height - 0.065), (0.09, 0.58, 0.05), "pine_dark")
@@ -164,8 +164,7 @@ def _lumber(world: Any) -> None:
 def _cart(world: Any) -> None:
     """A red tool cart with drawers."""
     x, y, yaw = -2.42, -2.02, 0.12
-    frame = {"name": "tool_cart"} | HIDES
-    box(world, (x, y, 0.49), (0.66, 0.44, 0.74), "cart_red", yaw, **frame)
+    box(world, (x, y, 0.49), (0.66, 0.44, 0.74), "cart_red", yaw, name="tool_cart", **HIDES)
     turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
 
     def at(dx: float, dy: float, z: float) -> tuple[float, float, float]:

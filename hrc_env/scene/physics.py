@@ -92,8 +92,7 @@ class Physics:
             self._control.shape[1], self._control, INPUTS, ("qpos",), out=self._trace
         )
         self._check_health()
-        held, q = self._act[:, :n], self._qpos[:, :n]
-        np.clip(held, q - config.leash_rad, q + config.leash_rad, out=held)
+        self._shorten_leashes()
         return self._trace["qpos"][:, :, :n].copy()
 
     def hidden(self, eyes_world: Points3, points_world: Points3, ids: Ints | None = None) -> Bools:
@@ -155,6 +154,14 @@ class Physics:
             self._control[:, :, model.nu + 3 * rows + axis] = motion.position_world[..., axis]
         for axis in range(4):
             self._control[:, :, turns_from + 4 * rows + axis] = motion.quaternion_wxyz[..., axis]
+
+    def _shorten_leashes(self) -> None:
+        """Keep angle and velocity commands near a blocked arm, so that it leaves at once."""
+        config, n = self.scene.config, self._n
+        q, qd = self._qpos[:, :n], self._qvel[:, :n]
+        np.clip(self._act[:, :n], q - config.leash_rad, q + config.leash_rad, self._act[:, :n])
+        reach = config.slew_rad_s2 * config.sim_dt * self._control.shape[1]
+        np.clip(self._command, qd - reach, qd + reach, out=self._command)
 
     def _check_health(self) -> None:
         """MuJoCo answers an exploding state or a full memory with a warning: raise it."""

@@ -1,0 +1,83 @@
+"""The arm: what it weighs, where it ends, what it may touch."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from hrc_env.geometry import chains
+from hrc_env.geometry.distances import narrowest_gap
+from hrc_env.scene.arm import CAPSULES, HOME_Q, JOINTS, LINKS, MASS_KG, TORQUE_LIMIT_NM
+from hrc_env.scene.build import ROBOT_BASE_WORLD, build, drawing_model
+
+SCENE = build()
+
+
+def at_home() -> mujoco.MjData:
+    data = mujoco.MjData(SCENE.model)
+    data.qpos[:] = HOME_Q
+    data.act[:] = HOME_Q
+    mujoco.mj_forward(SCENE.model, data)
+    return data
+
+
+def test_at_home_the_tool_is_in_front_of_the_base_points_down_and_touches_nothing():
+    data = at_home()
+    tool = data.site("tool_point")
+    assert tool.xpos[0] - ROBOT_BASE_WORLD[0] > 0.3
+    np.testing.assert_allclose(tool.xmat.reshape(3, 3)[:, 2], [0, 0, -1], atol=1e-2)
+    assert data.ncon == 0
+
+
+def test_links_weigh_what_the_maker_says():
+    masses = [SCENE.model.body(name).mass[0] for name in LINKS]
+    np.testing.assert_allclose(masses, MASS_KG)
+
+
+def test_looks_weigh_nothing():
+    assert drawing_model(SCENE).body_mass.sum() == pytest.approx(SCENE.model.body_mass.sum())
+
+
+def test_the_arm_does_not_sag():
+    data = at_home()
+    for _ in range(250):
+        mujoco.mj_step(SCENE.model, data)
+    np.testing.assert_allclose(data.qpos, HOME_Q, atol=1e-6)
+
+
+def test_each_joint_has_a_holding_and_a_rate_servo_and_a_torque_limit():
+    names = [SCENE.model.actuator(i).name for i in range(SCENE.model.nu)]
+    assert names == [f"{j}_hold" for j in JOINTS] + [f"{j}_rate" for j in JOINTS]
+    np.testing.assert_allclose(SCENE.model.jnt_actfrcrange[:, 1], TORQUE_LIMIT_NM)
+
+
+def test_the_last_capsule_ends_at_the_tool_point():
+    ends = chains.capsules(SCENE.chain, HOME_Q)[-1]
+    tool = chains.tool(SCENE.chain, HOME_Q)[:3, 3]
+    radius = SCENE.chain.capsule_radius_m[-1]
+    assert np.linalg.norm(tool - ends[1]) == pytest.approx(radius)
+
+
+def test_a_folded_arm_touches_itself():
+    data = mujoco.MjData(SCENE.model)
+    data.qpos[:] = [0.0, -1.57, 2.9, 0.0, 0.0, 0.0]
+    mujoco.mj_forward(SCENE.model, data)
+    own = {f"arm_{name}" for name, *_ in CAPSULES}
+    touching = [
+        {SCENE.model.geom(contact.geom1).name, SCENE.model.geom(contact.geom2).name}
+        for contact in data.contact[: data.ncon]
+    ]
+    assert any(pair <= own for pair in touching)
+
+
+def test_mujoco_and_the_geometry_room_agree_on_the_gap_between_tool_and_upper_arm():
+    data = at_home()
+    ends, radius = chains.capsules(SCENE.chain, HOME_Q), SCENE.chain.capsule_radius_m
+    names = SCENE.chain.capsule_names
+    first, second = names.index("tool"), names.index("upper_arm")
+    fromto = np.zeros(6)
+    expected = mujoco.mj_geomDistance(
+        SCENE.model, data, SCENE.model.geom("arm_tool").id,
+        SCENE.model.geom("arm_upper_arm").id, 5.0, fromto,
+    )  # fmt: skip
+    gap = narrowest_gap(ends[[first]], radius[[first]], ends[[second]], radius[[second]])
+    assert float(gap.distance_m) == pytest.approx(expected, abs=1e-6)

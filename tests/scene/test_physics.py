@@ -1,0 +1,186 @@
+"""Physics of a batch: the arm obeys, results depend on nothing but their own environment."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+from hrc_env.body import load_body, rest_motion
+from hrc_env.errors import ConfigError
+from hrc_env.geometry import chains
+from hrc_env.records import WorkerMotion
+from hrc_env.scene.build import build
+from hrc_env.scene.physics import Physics, no_workers
+
+LAB = build()
+T = 5
+DT = T * LAB.config.sim_dt
+
+
+def standing(batch: int, xy: tuple[float, float], n_substeps: int = T) -> WorkerMotion:
+    rest = rest_motion(load_body())
+    lead = (batch, n_substeps, 1)
+    arrays = (
+        rest.position_world + np.array([*xy, 0.0]), rest.quaternion_wxyz,
+        rest.velocity_world, rest.angular_velocity_world,
+    )  # fmt: skip
+    return WorkerMotion(*(np.broadcast_to(array, (*lead, *array.shape)) for array in arrays))
+
+
+def commands(batch: int, n_steps: int = 12) -> np.ndarray:
+    return np.random.default_rng(3).uniform(-0.8, 0.8, (n_steps, batch, 6))
+
+
+def run(physics: Physics, sequence: np.ndarray) -> np.ndarray:
+    still = no_workers(physics.batch, T)
+    return np.stack([physics.step(command, still) for command in sequence])
+
+
+def test_the_arm_moves_as_fast_as_it_is_told():
+    physics = Physics(LAB, 1)
+    for _ in range(15):
+        physics.step(np.full((1, 6), 0.4), no_workers(1, T))
+    np.testing.assert_allclose(physics.qd, 0.4, atol=5e-3)
+
+
+def test_no_command_means_no_motion():
+    physics = Physics(LAB, 2)
+    run(physics, np.zeros((10, 2, 6)))
+    np.testing.assert_allclose(physics.q, np.tile(LAB.home_q, (2, 1)), atol=1e-6)
+
+
+def test_the_trace_ends_where_the_arm_is():
+    physics = Physics(LAB, 3)
+    trace = physics.step(commands(3)[0], no_workers(3, T))
+    assert trace.shape == (3, T, 6)
+    np.testing.assert_array_equal(trace[:, -1], physics.q)
+
+
+def test_a_sudden_command_is_slewed():
+    physics = Physics(LAB, 1)
+    physics.step(np.full((1, 6), 2.0), no_workers(1, T))
+    assert np.abs(physics.qd).max() < 1.15 * LAB.config.slew_rad_s2 * DT
+
+
+def test_the_arm_stops_before_the_end_of_a_joint():
+    physics = Physics(LAB, 1)
+    near = LAB.home_q.copy()
+    near[5] = LAB.chain.range_rad[5, 1] - 0.5
+    physics.reset(np.array([0]), near[None])
+    for _ in range(40):
+        physics.step(np.array([[0, 0, 0, 0, 0, 3.0]]), no_workers(1, T))
+    assert LAB.chain.range_rad[5, 1] - 0.05 < physics.q[0, 5] < LAB.chain.range_rad[5, 1]
+    assert abs(physics.qd[0, 5]) < 1e-3
+
+
+def test_commands_that_are_not_numbers_count_as_zero():
+    physics = Physics(LAB, 1)
+    physics.step(np.full((1, 6), np.nan), no_workers(1, T))
+    np.testing.assert_allclose(physics.q[0], LAB.home_q, atol=1e-6)
+
+
+def test_threads_change_no_bit():
+    sequence = commands(16)
+    one, two = (run(Physics(LAB, 16, n_threads=n), sequence) for n in (1, 2))
+    np.testing.assert_array_equal(one, two)
+
+
+def test_neighbours_change_no_bit():
+    sequence = commands(8)
+    whole = run(Physics(LAB, 8), sequence)
+    alone = run(Physics(LAB, 1), sequence[:, 5:6])
+    np.testing.assert_array_equal(whole[:, 5], alone[:, 0])
+
+
+def test_a_saved_state_continues_bit_for_bit_even_after_pickling():
+    first, sequence = Physics(LAB, 2), commands(2)
+    run(first, sequence[:6])
+    state = pickle.loads(pickle.dumps(first.get_state()))
+    second = Physics(LAB, 2)
+    second.set_state(state)
+    np.testing.assert_array_equal(run(first, sequence[6:]), run(second, sequence[6:]))
+    np.testing.assert_array_equal(first.get_state(), second.get_state())
+
+
+def test_a_reset_forgets_everything_and_leaves_the_others_alone():
+    physics = Physics(LAB, 3)
+    run(physics, commands(3))
+    before = physics.get_state()
+    physics.reset(np.array([1]), LAB.home_q[None])
+    after = physics.get_state()
+    np.testing.assert_array_equal(after[[0, 2]], before[[0, 2]])
+    np.testing.assert_array_equal(after[1], Physics(LAB, 1).get_state()[0])
+
+
+def test_a_worker_stops_the_arm_and_lets_it_go_again():
+    scene = build(n_workers=1)
+    physics, person = Physics(scene, 1), standing(1, (0.45, 0.0))
+    physics.reset(np.array([0]), np.array([[-1.2, -0.9, 1.2, -1.87, -1.57, 0.0]]))
+    for _ in range(40):
+        physics.step(np.array([[1.0, 0, 0, 0, 0, 0]]), person)
+    blocked = physics.q[0, 0]
+    assert blocked < 0.0
+    assert np.abs(physics.qd).max() < 0.05
+    for _ in range(6):
+        physics.step(np.array([[-1.0, 0, 0, 0, 0, 0]]), person)
+    assert physics.q[0, 0] < blocked - 0.05
+
+
+def test_workers_do_not_touch_the_floor_nor_each_other():
+    scene = build(n_workers=2)
+    one = standing(1, (1.5, 0.0))
+    both = WorkerMotion(*(np.repeat(getattr(one, name), 2, 2) for name in one.__slots__))
+    physics = Physics(scene, 1)
+    physics.step(np.zeros((1, 6)), both)
+    np.testing.assert_allclose(physics.q[0], scene.home_q, atol=1e-6)
+
+
+def test_motion_of_the_wrong_number_of_workers_is_refused():
+    with pytest.raises(ConfigError, match="workers"):
+        Physics(LAB, 1).step(np.zeros((1, 6)), standing(1, (1.5, 0.0)))
+
+
+def test_a_point_behind_the_pedestal_is_hidden_and_one_beside_it_is_not():
+    physics = Physics(LAB, 2)
+    eye = np.array([[2.0, 0.0, 0.4]])
+    points = np.array([[-1.5, 0.0, 0.4], [-1.5, 0.5, 0.4]])
+    hidden = physics.hidden(eye, np.tile(points, (2, 1, 1, 1)))
+    assert hidden.shape == (2, 1, 1, 2)
+    np.testing.assert_array_equal(hidden[:, 0, 0], [[True, False]] * 2)
+
+
+def test_the_arm_hides_what_is_behind_it():
+    physics = Physics(LAB, 1)
+    elbow = chains.capsules(LAB.chain, LAB.home_q)[2].mean(0)
+    eye = elbow + np.array([0.0, -1.0, 0.0])
+    beyond = elbow + np.array([0.0, 1.0, 0.0])
+    assert physics.hidden(eye[None], beyond[None, None, None])[0, 0, 0, 0]
+
+
+def test_what_a_joint_touches_does_not_hide_it():
+    physics = Physics(LAB, 1)
+    sole = np.array([[[[1.0, 0.5, -0.02]]]])
+    assert not physics.hidden(np.array([[2.9, 2.6, 2.45]]), sole)[0, 0, 0, 0]
+
+
+def test_workers_do_not_hide_themselves_from_the_rays():
+    scene = build(n_workers=1)
+    physics, person = Physics(scene, 1), standing(1, (1.5, 0.0))
+    physics.step(np.zeros((1, 6)), person)
+    inside = np.array([[[[1.5, 0.0, 1.2]]]])
+    assert not physics.hidden(np.array([[2.9, 2.6, 2.45]]), inside)[0, 0, 0, 0]
+
+
+def test_lines_of_sight_of_some_environments_are_those_of_all():
+    physics = Physics(LAB, 4)
+    run(physics, commands(4))
+    rng = np.random.default_rng(2)
+    eyes, points = rng.uniform(-2, 2, (4, 3)), rng.uniform(-1.5, 1.5, (4, 1, 15, 3))
+    ids = np.array([1, 3])
+    np.testing.assert_array_equal(
+        physics.hidden(eyes, points)[ids], physics.hidden(eyes, points[ids], ids)
+    )
+
+
+def test_no_worker_means_no_line_of_sight():
+    assert Physics(LAB, 2).hidden(np.zeros((4, 3)), np.zeros((2, 0, 15, 3))).shape == (2, 4, 0, 15)
