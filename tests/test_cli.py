@@ -1,0 +1,69 @@
+"""The command line as people use it."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+
+def hrc(*words: str, **env: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "hrc_env", *words],
+        capture_output=True, text=True, check=False, env={**os.environ, **env},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("command", ["setup", "demo", "check", "list", "play"])
+def test_help_explains_every_command(command):
+    done = hrc(command, "--help")
+    assert done.returncode == 0
+    assert len(done.stdout.split()) > 12
+
+
+def test_list_names_what_arguments_take():
+    said = hrc("list").stdout
+    for name in ("HRCReach-v0", "keypoints", "triangulation", "camera_4", "scripted"):
+        assert name in said
+
+
+def test_check_says_ok_line_by_line():
+    done = hrc("check")
+    assert done.returncode == 0, done.stdout
+    assert "weights" in done.stdout
+    assert "TODO" not in done.stdout
+
+
+def test_check_says_what_to_do_without_weights(tmp_path):
+    done = hrc("check", HRC_ENV_CACHE=str(tmp_path / "empty"))
+    assert done.returncode == 1
+    assert "python -m hrc_env setup" in done.stdout.replace("\n", " ")
+
+
+def test_pixels_without_opengl_says_what_to_install():
+    done = hrc("play", "--perception", "pixels", MUJOCO_GL="disabled")
+    assert done.returncode == 2
+    assert "RenderingError" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_other_levels_need_no_opengl():
+    done = hrc("play", "--perception", "keypoints", MUJOCO_GL="disabled")
+    assert done.returncode == 0, done.stderr
+    assert "goals" in done.stdout
+
+
+def test_an_unknown_id_is_answered_without_a_traceback():
+    done = hrc("play", "HRCReach-v1")
+    assert done.returncode == 2
+    assert "Did you mean 'HRCReach-v0'" in done.stderr.replace("\n", " ")
+    assert "Traceback" not in done.stderr
+
+
+def test_a_film_is_written_whole(tmp_path: Path):
+    film = tmp_path / "film.mp4"
+    done = hrc("demo", "--perception", "keypoints", "--seconds", "0.4", "--out", str(film))
+    assert done.returncode == 0, done.stderr
+    assert film.stat().st_size > 10_000
+    assert [path.name for path in tmp_path.iterdir() if "draft" in path.name] == []

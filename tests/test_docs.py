@@ -1,0 +1,39 @@
+"""README and docs stay true: snippets run, generated pages are up to date, links lead somewhere."""
+
+import importlib.util
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+def test_the_ten_lines_of_the_readme_run():
+    snippet = re.search(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S)
+    assert snippet is not None
+    exec(compile(snippet.group(1), "README.md", "exec"), {})
+
+
+def test_the_environment_page_is_what_the_code_says():
+    """If this fails: python docs/generate.py"""
+    spec = importlib.util.spec_from_file_location("generate", ROOT / "docs" / "generate.py")
+    assert spec is not None
+    assert spec.loader is not None
+    generate = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(generate)
+    assert generate.PAGE.read_text() == generate.page()
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_to_files_lead_somewhere(page):
+    for target in re.findall(r"\]\(([^)#]+)\)", page.read_text()):
+        if not target.startswith("http"):
+            assert (page.parent / target).exists(), f"{page.name} -> {target}"
+
+
+def test_commands_of_the_readme_exist():
+    text, makefile = (ROOT / "README.md").read_text(), (ROOT / "Makefile").read_text()
+    for goal in re.findall(r"^make ([\w-]+)", text, re.M):
+        assert re.search(rf"^{goal}:", makefile, re.M), goal

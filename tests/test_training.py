@@ -1,0 +1,115 @@
+"""Training through the real command line: learn a little, resume, refuse what does not fit."""
+
+import json
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from agents import ppo
+from agents.base import make_agent, situation
+from agents.evaluate import evaluate
+from hrc_env.env import HRCReachEnv
+from hrc_env.errors import CheckpointError, ConfigError
+
+ROOT = Path(__file__).resolve().parent.parent
+TINY = ["--perception", "truth", "--num-envs", "4", "--episodes", "2", "--no-film"]
+
+
+def train(*arguments: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, ROOT / "train.py", *TINY, *map(str, arguments)]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory) -> Path:
+    """A run of two rollouts: untrained, but everything written."""
+    folder = tmp_path_factory.mktemp("run") / "tiny"
+    done = train("--timesteps", 512, "--out", folder)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+def test_a_run_leaves_policy_curve_score_and_where_they_came_from(run):
+    names = {path.name for path in run.iterdir()}
+    assert names >= {
+        "policy.zip",
+        "curve.json",
+        "curve.png",
+        "score.json",
+        "run.json",
+        "tensorboard",
+    }
+    assert not [name for name in names if "draft" in name]
+    record = json.loads((run / "run.json").read_text())
+    assert record["arguments"]["timesteps"] == 512
+    assert record["versions"]["mujoco"].startswith("4")
+    assert 0 <= json.loads((run / "score.json").read_text())["success_rate"] <= 1
+
+
+def test_resuming_goes_on_where_it_stopped(run):
+    before = ppo.describe(run / "policy.zip")["num_timesteps"]
+    done = train("--timesteps", before + 256, "--resume", run)
+    assert done.returncode == 0, done.stderr
+    assert ppo.describe(run / "policy.zip")["num_timesteps"] == before + 256
+    steps = [point["steps"] for point in json.loads((run / "curve.json").read_text())]
+    assert steps == sorted(steps)
+
+
+def here(**kwargs):
+    env = HRCReachEnv(perception="truth", **kwargs)
+    return situation(env.simulation)
+
+
+def test_a_checkpoint_acts_the_same_every_time(run):
+    agent = make_agent(str(run / "policy.zip"), here())
+    observation = np.zeros((3, here().layout.low.size), np.float32)
+    np.testing.assert_array_equal(agent.act(observation), agent.act(observation))
+    assert agent.act(observation).shape == (3, 6)
+
+
+def test_a_checkpoint_of_another_version_says_so(run, tmp_path):
+    other = tmp_path / "old.zip"
+    with zipfile.ZipFile(run / "policy.zip") as old, zipfile.ZipFile(other, "w") as new:
+        for name in old.namelist():
+            content = old.read(name)
+            if name == "hrc_env.json":
+                content = json.dumps({**json.loads(content), "hrc_env": "0.0.9"}).encode()
+            new.writestr(name, content)
+    with pytest.raises(CheckpointError, match=r"made with hrc_env 0\.0\.9"):
+        make_agent(str(other), here())
+
+
+def test_a_checkpoint_for_another_environment_says_so(run):
+    with pytest.raises(CheckpointError, match=r"n_workers and\s+control"):
+        make_agent(str(run / "policy.zip"), here(n_workers=0))
+
+
+def test_what_is_no_checkpoint_is_refused(tmp_path):
+    junk = tmp_path / "junk.zip"
+    junk.write_text("not a zip")
+    with pytest.raises(CheckpointError, match="not a checkpoint"):
+        make_agent(str(junk), here())
+    with pytest.raises(CheckpointError, match="No checkpoint"):
+        make_agent(str(tmp_path / "missing.zip"), here())
+    with pytest.raises(ConfigError, match="'scripted_slowed'"):
+        make_agent("scriptd", here())
+
+
+def test_the_scripted_reacher_reaches_without_a_worker():
+    score = evaluate(lambda at: make_agent("scripted", at), 16, 16, perception="none", n_workers=0)
+    assert score.success_rate >= 0.95
+    assert score.contacts_per_episode == 0
+
+
+def test_yielding_costs_less_than_not_yielding():
+    """On the same seeds; the robot that slows down near people is nearer to nobody."""
+    reckless, yielding = (
+        evaluate(lambda at, name=name: make_agent(name, at), 24, 24, perception="keypoints")
+        for name in ("scripted", "scripted_slowed")
+    )
+    assert yielding.contacts_per_episode <= reckless.contacts_per_episode
+    assert yielding.cost_per_episode < reckless.cost_per_episode
