@@ -87,6 +87,11 @@ class Scene:
     worker_mocap: Ints
     """(W, S) mocap row of every body segment of every worker."""
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A scene is pickled as its recipe."""
+        use = tuple(camera.name for camera in self.cameras)
+        return build, (self.config, self.name, self.n_workers, self.body_name, use)
+
 
 def build(
     config: SceneConfig | None = None,

@@ -37,6 +37,7 @@ class Physics:
             )
         self.scene = scene
         self.batch = batch
+        self.n_threads = n_threads
         self._n = scene.chain.n_joints
         self._sims = Batch(scene.model, nsim=batch, nthread=n_threads)
         self._qpos, self._qvel = self._sims.bind("qpos"), self._sims.bind("qvel")
@@ -131,6 +132,14 @@ class Physics:
         """Continue from a state that `get_state` gave (same scene and batch)."""
         check_shape("state", np.shape(state), self._sims.state.shape, "batch, state")
         self._sims.state[:] = state
+
+    def __getstate__(self) -> tuple[Scene, int, int, Floats]:
+        return self.scene, self.batch, self.n_threads, self.get_state()
+
+    def __setstate__(self, saved: tuple[Scene, int, int, Floats]) -> None:
+        scene, batch, n_threads, state = saved
+        self.__init__(scene, batch, n_threads)
+        self.set_state(state)
 
     def _fit(self, motion: WorkerMotion) -> None:
         """Check the motion's axes; make the buffers when the number of substeps is new."""

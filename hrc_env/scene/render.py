@@ -7,7 +7,7 @@ antialiasing, which cost two thirds of the time and change no landmark.
 
 from collections import OrderedDict
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numba
 import numpy as np
@@ -95,6 +95,9 @@ class CropRenderer:
     def close(self) -> None:
         """Free the OpenGL context."""
         self._canvas.close()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return CropRenderer, (self.scene, self.size_px)
 
     def _show(self, what: int, camera_index: int, window: CropWindow) -> None:
         self._canvas.show(what)
@@ -197,3 +200,6 @@ class PictureRenderer:
     def close(self) -> None:
         """Free the OpenGL context."""
         self._canvas.close()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return PictureRenderer, (self.scene, self._canvas.width_px, self._canvas.height_px)

@@ -1,5 +1,7 @@
 """The laboratory: room for the worker, looks that cost physics nothing."""
 
+import pickle
+
 import mujoco
 import numpy as np
 import pytest
@@ -17,6 +19,13 @@ def test_an_unknown_scene_is_told_the_valid_ones():
 
 def test_a_scene_is_compiled_once():
     assert build(SceneConfig(), n_workers=0) is build(SceneConfig(), n_workers=0)
+
+
+def test_a_scene_is_pickled_as_its_recipe():
+    scene = build(cameras=("camera_2",))
+    text = pickle.dumps(scene)
+    assert len(text) < 2000
+    assert [camera.name for camera in pickle.loads(text).cameras] == ["camera_2"]
 
 
 def test_physics_is_spared_what_only_the_eye_needs():

@@ -102,6 +102,14 @@ def test_a_saved_state_continues_bit_for_bit_even_after_pickling():
     np.testing.assert_array_equal(first.get_state(), second.get_state())
 
 
+def test_physics_itself_can_be_pickled_in_the_middle():
+    physics, sequence = Physics(LAB, 2, n_threads=2), commands(2)
+    run(physics, sequence[:6])
+    twin = pickle.loads(pickle.dumps(physics))
+    assert twin.scene is not None
+    np.testing.assert_array_equal(run(physics, sequence[6:]), run(twin, sequence[6:]))
+
+
 def test_a_reset_forgets_everything_and_leaves_the_others_alone():
     physics = Physics(LAB, 3)
     run(physics, commands(3))

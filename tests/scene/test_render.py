@@ -1,5 +1,6 @@
 """Pictures: the renderer and the pinhole camera agree on every pixel convention."""
 
+import pickle
 from dataclasses import replace
 
 import mujoco
@@ -119,6 +120,14 @@ def test_a_kept_background_changes_no_pixel(lab, person, crops):
         for camera in range(4):
             np.testing.assert_array_equal(fresh.crop(camera, WINDOW), crops.crop(camera, WINDOW))
     fresh.close()
+
+
+def test_a_renderer_survives_pickling(lab, person, crops):
+    twin = pickle.loads(pickle.dumps(crops))
+    for renderer in (twin, crops):
+        renderer.draw(lab.home_q, person)
+    np.testing.assert_array_equal(twin.crop(1, WINDOW), crops.crop(1, WINDOW))
+    twin.close()
 
 
 def test_a_turned_window_shows_the_picture_turned(lab, person, crops):
