@@ -28,7 +28,7 @@ from hrc_env.tracking.importance import (
 )
 from hrc_env.tracking.measurements import read_worker
 from hrc_env.tracking.motion_model import is_positive_definite, predict_body
-from hrc_env.tracking.proposal import find_mode
+from hrc_env.tracking.proposal import contrast_of, find_mode
 from hrc_env.tracking.swaps import undo_swaps
 
 _LEAST_ESS = 8.0
@@ -112,18 +112,19 @@ def _follow(state, b, w, P, z, sigma, ok, noise, tables, n_mode, s):
     n_joints, n_cameras = ok.shape
     body, cov, age = state.body[b, w], state.cov[b, w], state.age_s[b, w]
     belief, n_views = np.empty(n_cameras), np.zeros(n_joints, np.int64)
-    n_particles = noise.shape[2]
-    particles = np.empty((3, n_particles), np.float32)
-    weights, work = np.empty(n_particles, np.float32), np.empty((2, n_particles), np.float32)
+    particles = np.empty((6, noise.shape[2]), np.float32)
+    scratch = (np.empty((6, 4, 3)), np.empty((6, 3)))
+    contrast, ess = contrast_of(s.outlier_weight, s.image_area_px), state.ess[b, w]
     for j in range(n_joints):
         n_supporting = 0
         for c in range(n_cameras):
             n_views[j] += ok[j, c]
-        state.ess[b, w, j] = 0.0
+        ess[j] = 0.0
         if n_views[j] > 0:
             seen = (P, z[j], sigma[j], ok[j])
-            draws = (noise[tables[j]], n_mode, particles, weights, work)
-            state.ess[b, w, j] = _update_joint(seen, draws, s, body[j], cov[j], belief)
+            draws = (noise[tables[j]], n_mode, s.proposal_inflation, particles)
+            model = (contrast, s.gauss_newton_steps)
+            ess[j] = _update_joint(seen, draws, model, body[j], cov[j], belief, scratch)
             for c in range(n_cameras):
                 n_supporting += belief[c] > 0.5
         if n_supporting > 0:
@@ -134,63 +135,79 @@ def _follow(state, b, w, P, z, sigma, ok, noise, tables, n_mode, s):
 
 
 @numba.njit(**_JIT)
-def _update_joint(seen, draws, s, body, cov, belief):
+def _update_joint(seen, draws, model, body, cov, belief, scratch):
     """One joint's importance-sampled posterior; returns the effective sample size."""
-    P, z, sigma, ok = seen
-    noise, n_mode, particles, weights, work = draws
-    prior_cov, precision, spread = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    root_mode, root_prior = np.empty((3, 3)), np.empty((3, 3))
-    mode, mean, shift = np.empty(3), np.empty(3), np.empty(3)
-    prior_cov[:] = cov[:3, :3]
+    work, gain = scratch
+    prior_cov, precision, spread, moments = work[0, :3], work[1, :3], work[2, :3], work[3, :3]
+    mode, mean = work[0, 3], work[1, 3]
+    contrast, n_steps = model
+    for i in range(3):
+        for k in range(3):
+            prior_cov[i, k] = cov[i, k]
     inverse3(prior_cov, precision)
-    find_mode(P, z, sigma, ok, body, prior_cov, precision, s, mode, spread, belief)
-    sampled = cholesky3(spread, root_mode) and cholesky3(prior_cov, root_prior)
-    ess = 0.0
-    if sampled:
-        root_mode *= math.sqrt(s.proposal_inflation)
-        shift[:] = body[:3] - mode
-        bits = work[1].view(np.int32)
-        share = n_mode / noise.shape[1]
-        draw(noise, root_mode, root_prior, shift, n_mode, particles)
-        weigh_proposal(particles, root_mode, root_prior, shift, share, weights, work, bits)
-        for c in range(len(P)):
-            if ok[c]:
-                u, v = z[c, 0], z[c, 1]
-                weigh_camera(P[c], u, v, sigma[c], mode, particles, s, weights, work, bits)
-        ess = weighted_moments(particles, weights, mean, prior_cov)
+    find_mode(seen, body, prior_cov, precision, contrast, n_steps, mode, spread, belief, work[4])
+    ess = _sample(seen, draws, contrast, body, prior_cov, mode, spread, work, mean, moments)
     if ess < _LEAST_ESS:
-        mean[:] = 0.0
-        prior_cov[:] = spread
-    mean += mode
-    _regress(body, cov, precision, mean, prior_cov)
+        _regress(body, cov, precision, mode, spread, gain)
+    else:
+        _regress(body, cov, precision, mean, moments, gain)
     return ess
 
 
 @numba.njit(**_JIT)
-def _regress(body, cov, precision, mean, spread):
-    """Give the position its new mean and covariance, and the velocity what follows from them."""
-    gain, change, middle = np.empty((6, 3)), np.empty(3), np.empty((3, 3))
-    for i in range(6):
-        for k in range(3):
-            gain[i, k] = 0.0
-            for m in range(3):
-                gain[i, k] += cov[i, m] * precision[m, k]
+def _sample(seen, draws, contrast, body, prior_cov, mode, spread, work, mean, moments):
+    """Mean (3,) and covariance (3, 3) of weighted particles; the effective sample size."""
+    P, z, sigma, ok = seen
+    noise, n_mode, inflation, space = draws
+    particles, weights, logs = space[:3], space[3], space[4:]
+    root_mode, root_prior, shift = work[4, :3], work[5, :3], work[2, 3]
+    if not (cholesky3(spread, root_mode) and cholesky3(prior_cov, root_prior)):
+        return 0.0
+    wider = math.sqrt(inflation)
     for i in range(3):
-        change[i] = mean[i] - body[i]
-        for k in range(3):
-            middle[i, k] = cov[i, k] - spread[i, k]
+        shift[i] = body[i] - mode[i]
+        for k in range(i + 1):
+            root_mode[i, k] *= wider
+    bits = logs[1].view(np.int32)
+    share = n_mode / noise.shape[1]
+    draw(noise, root_mode, root_prior, shift, n_mode, particles)
+    weigh_proposal(particles, root_mode, root_prior, shift, share, weights, logs, bits)
+    for c in range(len(P)):
+        if ok[c]:
+            u, v = z[c, 0], z[c, 1]
+            weigh_camera(P[c], u, v, sigma[c], mode, particles, contrast, weights, logs, bits)
+    ess = weighted_moments(particles, weights, mean, moments)
+    for i in range(3):
+        mean[i] += mode[i]
+    return ess
+
+
+@numba.njit(**_JIT)
+def _regress(body, cov, precision, mean, spread, gain):
+    """Give the position its new mean and covariance, and the velocity what follows from them.
+
+    With gain G = cov[:, :3] precision: body += G (mean - position) and
+    cov -= G (prior - spread) G'. `gain` (6, 3) is scratch.
+    """
+    change = (mean[0] - body[0], mean[1] - body[1], mean[2] - body[2])
+    d00, d11, d22 = cov[0, 0] - spread[0, 0], cov[1, 1] - spread[1, 1], cov[2, 2] - spread[2, 2]
+    d01, d02, d12 = cov[0, 1] - spread[0, 1], cov[0, 2] - spread[0, 2], cov[1, 2] - spread[1, 2]
     for i in range(6):
         for k in range(3):
-            body[i] += gain[i, k] * change[k]
+            gain[i, k] = (
+                cov[i, 0] * precision[0, k]
+                + cov[i, 1] * precision[1, k]
+                + cov[i, 2] * precision[2, k]
+            )
     for i in range(6):
-        a = gain[i, 0] * middle[0, 0] + gain[i, 1] * middle[1, 0] + gain[i, 2] * middle[2, 0]
-        b = gain[i, 0] * middle[0, 1] + gain[i, 1] * middle[1, 1] + gain[i, 2] * middle[2, 1]
-        c = gain[i, 0] * middle[0, 2] + gain[i, 1] * middle[1, 2] + gain[i, 2] * middle[2, 2]
+        g0, g1, g2 = gain[i, 0], gain[i, 1], gain[i, 2]
+        body[i] += g0 * change[0] + g1 * change[1] + g2 * change[2]
+        a = g0 * d00 + g1 * d01 + g2 * d02
+        b = g0 * d01 + g1 * d11 + g2 * d12
+        c = g0 * d02 + g1 * d12 + g2 * d22
         for k in range(i, 6):
             cov[i, k] -= a * gain[k, 0] + b * gain[k, 1] + c * gain[k, 2]
-    for i in range(6):
-        for k in range(i):
-            cov[i, k] = cov[k, i]
+            cov[k, i] = cov[i, k]
 
 
 @numba.njit(**_JIT)

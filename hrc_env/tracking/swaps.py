@@ -13,6 +13,7 @@ import numba
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
 from hrc_env.skeleton import MIRROR
 from hrc_env.tracking.measurements import pixel_spread
+from hrc_env.tracking.proposal import contrast_of
 
 _MIRROR = tuple(int(j) for j in MIRROR)
 _BLIND_UPDATES, _BELIEVED_UPDATES = 8, 5
@@ -27,6 +28,7 @@ def undo_swaps(P, body, cov, z, sigma, ok, chance, blind, believed, s):
     `chance` (C,) is the probability of being swapped, `blind` and `believed` (C,) count
     updates; `s` are the `particle.Settings`.
     """
+    contrast = contrast_of(s.outlier_weight, s.image_area_px)
     for c in range(len(P)):
         sees = False
         for j in range(len(_MIRROR)):
@@ -40,7 +42,7 @@ def undo_swaps(P, body, cov, z, sigma, ok, chance, blind, believed, s):
             chance[c] = _LEAST_CHANCE
             continue
         prior = chance[c] * (1.0 - s.swap_ends) + (1.0 - chance[c]) * s.swap_begins
-        evidence = swap_evidence(P[c], c, body, cov, z, sigma, ok, s)
+        evidence = swap_evidence(P[c], c, body, cov, z, sigma, ok, contrast)
         odds = math.log(prior / (1.0 - prior)) + evidence
         chance[c] = min(max(1.0 / (1.0 + math.exp(-odds)), _LEAST_CHANCE), 1.0 - _LEAST_CHANCE)
         if chance[c] > 0.5:
@@ -48,7 +50,7 @@ def undo_swaps(P, body, cov, z, sigma, ok, chance, blind, believed, s):
 
 
 @numba.njit(**_JIT)
-def swap_evidence(camera, c, body, cov, z, sigma, ok, s):
+def swap_evidence(camera, c, body, cov, z, sigma, ok, contrast):
     """Log-likelihood ratio of camera c being swapped, bounded."""
     total = 0.0
     for j in range(len(_MIRROR)):
@@ -60,17 +62,17 @@ def swap_evidence(camera, c, body, cov, z, sigma, ok, s):
             continue
         spread = pixel_spread(camera, u, v, depth, cov[j])
         if ok[m, c]:
-            total += _log_mixture(z[m, c, 0] - u, z[m, c, 1] - v, sigma[m, c], spread, s)
+            total += _log_mixture(z[m, c, 0] - u, z[m, c, 1] - v, sigma[m, c], spread, contrast)
         if ok[j, c]:
-            total -= _log_mixture(z[j, c, 0] - u, z[j, c, 1] - v, sigma[j, c], spread, s)
+            total -= _log_mixture(z[j, c, 0] - u, z[j, c, 1] - v, sigma[j, c], spread, contrast)
     return min(max(total, -_MOST_EVIDENCE), _MOST_EVIDENCE)
 
 
 @numba.njit(**_JIT)
-def _log_mixture(du, dv, sigma, spread, s):
+def _log_mixture(du, dv, sigma, spread, contrast):
+    """Log-density of a detection over that of an outlier, which cancels over a pair."""
     variance = sigma * sigma + spread
-    near = math.exp(-0.5 * (du * du + dv * dv) / variance) / (2.0 * math.pi * variance)
-    return math.log((1.0 - s.outlier_weight) * near + s.outlier_weight / s.image_area_px)
+    return math.log1p(contrast / variance * math.exp(-0.5 * (du * du + dv * dv) / variance))
 
 
 @numba.njit(**_JIT)

@@ -52,7 +52,7 @@ def _limb(angle, length):
 def walk(seed, n_frames, centre=(0.6, 0.0), radius=0.7):
     """(T, 15, 3) joints of somebody who walks in curves about `centre` and gestures."""
     rng = np.random.default_rng(seed)
-    wanted, n_frames = n_frames, max(n_frames, 10)
+    wanted, n_frames = n_frames, max(n_frames, 300)  # short noise would be wild
     t = np.arange(n_frames) * DT
     turn = np.cumsum(0.9 + 0.5 * _smooth(rng, n_frames, 20)) * DT
     reach = radius * (0.75 + 0.25 * np.sin(0.5 * t + rng.uniform(0, 6)))
