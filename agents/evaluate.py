@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from agents.base import Agent, situation
 from hrc_env.sb3 import HRCVecEnv
@@ -55,9 +56,11 @@ def evaluate(
 
 
 def _episodes(env: HRCVecEnv, agent: Agent, n_episodes: int) -> list[dict[str, float]]:
-    observation, done = env.reset(), []
+    observation: NDArray[np.float32] = env.reset()
+    done: list[dict[str, float]] = []
     while len(done) < n_episodes:
-        observation, _, _, infos = env.step(agent.act(observation))
+        env.step_async(agent.act(observation))
+        observation, _, _, infos = env.step_wait()
         done += [info["episode"] for info in infos if "episode" in info]
     return done[:n_episodes]
 

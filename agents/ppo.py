@@ -51,7 +51,7 @@ class PPOSettings:
 def make_learner(
     env: VecEnv, settings: PPOSettings, seed: int, tensorboard: Path | None = None
 ) -> PPO:
-    """A fresh PPO on `env`, its reward scaled by a running estimate, its observations as they are."""
+    """A fresh PPO on `env`; a running estimate scales rewards, observations stay as they are."""
     normalised = VecNormalize(env, norm_obs=False, norm_reward=True, gamma=settings.gamma)
     return PPO(
         "MlpPolicy",

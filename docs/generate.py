@@ -2,6 +2,7 @@
 
 import dataclasses
 import inspect
+import itertools
 import textwrap
 from pathlib import Path
 from typing import Any
@@ -140,7 +141,7 @@ def field_docs(kind: type) -> dict[str, str]:
 
     body = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0].body  # type: ignore[attr-defined]
     docs = {}
-    for field, after in zip(body, body[1:], strict=False):
+    for field, after in itertools.pairwise(body):
         if isinstance(field, ast.AnnAssign) and isinstance(after, ast.Expr):
             docs[ast.unparse(field.target)] = " ".join(ast.literal_eval(after.value).split())
     return docs

@@ -74,4 +74,5 @@ def tracking_error(estimate: PoseEstimate, truth: WorkerTruth) -> tuple[Floats, 
     n_tracked = estimate.tracked.sum(-1)
     summed = np.where(estimate.tracked, error_m, 0.0).sum(-1)
     mean = np.where(n_tracked > 0, summed / np.maximum(n_tracked, 1), np.nan)
-    return mean, (~estimate.tracked).any(-1)
+    lost: Bools = np.logical_not(estimate.tracked.all(-1))
+    return mean, lost

@@ -50,11 +50,16 @@ def closeness(gap_m: Floats, reach_m: float) -> Floats:
     return np.clip((reach_m - gap_m) / reach_m, 0.0, 1.5) ** 2
 
 
+def _mean_square(action: Floats) -> Floats:
+    return np.einsum("ba,ba->b", action, action) / action.shape[-1]
+
+
 def _proximity(
     now: Believed, step: ReachProgress, previous: Floats, config: RewardConfig
 ) -> Floats:
     nearest_m = now.gap.distance_m.min(axis=-1, initial=np.inf)
-    return -config.proximity * closeness(nearest_m, config.proximity_reach_m)
+    penalty: Floats = -config.proximity * closeness(nearest_m, config.proximity_reach_m)
+    return penalty
 
 
 TERMS: tuple[RewardTerm, ...] = (
@@ -66,18 +71,18 @@ TERMS: tuple[RewardTerm, ...] = (
     RewardTerm(
         "goal",
         "`goal` in the step in which a goal is reached.",
-        lambda now, step, previous, config: config.goal * step.reached,
+        lambda now, step, previous, config: config.goal * step.reached.astype(np.float64),
     ),
     RewardTerm(
         "effort",
         "Minus `effort` times the mean squared action.",
-        lambda now, step, previous, config: -config.effort * np.square(now.action).mean(-1),
+        lambda now, step, previous, config: -config.effort * _mean_square(now.action),
     ),
     RewardTerm(
         "smoothness",
         "Minus `smoothness` times the mean squared change of the action.",
         lambda now, step, previous, config: (
-            -config.smoothness * np.square(now.action - previous).mean(-1)
+            -config.smoothness * _mean_square(now.action - previous)
         ),
     ),
     RewardTerm(

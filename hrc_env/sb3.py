@@ -103,7 +103,7 @@ class HRCVecEnv(VecEnv):
         done = outcome.terminated | truncated
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         observation, ended = outcome.observation, np.flatnonzero(done)
-        for b in ended:
+        for b in ended.tolist():
             infos[b] = outcome.info_of(b)
             infos[b]["terminal_observation"] = observation[b].copy()
             infos[b]["TimeLimit.truncated"] = bool(truncated[b])

@@ -10,7 +10,6 @@
 The organs do not know each other; they meet here.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -34,7 +33,7 @@ from hrc_env.typing import Ints, JointAngles
 
 LEVELS = ("pixels", "keypoints", "truth", "none")
 
-Generators = Sequence[np.random.Generator]
+Generators = list[np.random.Generator]
 Windows = list[list[CropWindow | None]]
 """For each worker, a window for each camera; None where it did not look."""
 
@@ -223,8 +222,9 @@ class CameraSenses(TrackingSenses):
         super().__init__(batch, scene, tracker, config)
         self.renderer = CropRenderer(scene)
         self.eyes = Eyes(scene.cameras, config.eyes)
-        nowhere = [[None] * len(scene.cameras)] * scene.n_workers
-        self.windows: list[Windows] = [list(nowhere) for _ in range(batch)]
+        self.windows: list[Windows] = [
+            [[None] * len(scene.cameras) for _ in range(scene.n_workers)] for _ in range(batch)
+        ]
 
     def detect(self, now: Moment, predicted: PoseEstimate, sensor_rngs: Generators) -> Keypoints:
         """Landmarks of crops round the predicted worker, or of a search where there is none."""

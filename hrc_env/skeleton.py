@@ -84,8 +84,9 @@ def _end_weights() -> Floats:
 
 
 _END_WEIGHTS = _end_weights()
-_ELBOWS, _WRISTS = ([hand[k] for hand in HAND_SEGMENTS] for k in (0, 1))
-_HAND_REACH_M = np.array([[hand[2]] for hand in HAND_SEGMENTS])
+_ELBOWS = [elbow for elbow, *_ in HAND_SEGMENTS]
+_WRISTS = [wrist for _, wrist, *_ in HAND_SEGMENTS]
+_HAND_REACH_M = np.array([[reach_m] for _, _, reach_m, _ in HAND_SEGMENTS])
 
 
 def segments(joints_world: Floats) -> Floats:

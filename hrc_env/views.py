@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from hrc_env import pictures
 from hrc_env.batching import one
 from hrc_env.motion import generator
-from hrc_env.records import CropWindow, Keypoints
+from hrc_env.records import CropWindow, Keypoints, WorkerMotion
 from hrc_env.scene.render import CropRenderer, PictureRenderer
 from hrc_env.simulation import Simulation
-from hrc_env.typing import Image
+from hrc_env.typing import Image, JointAngles
 
 PICTURE_SIZE = (960, 720)
 MOSAIC_TILE = (640, 360)
@@ -27,12 +27,12 @@ class Views:
 
     def picture(self, depth: bool = False) -> NDArray[Any]:
         """The room, (720, 960, 3) uint8, or distances (720, 960) float32 [m]."""
-        return self._renderer(*PICTURE_SIZE).picture(*self._pose(), "room", depth=depth)
+        return self._renderer(*PICTURE_SIZE).picture(*self.pose(), "room", depth=depth)
 
     def room(self, width: int, height: int) -> Image:
         """The room with the estimated skeleton over it."""
         renderer = self._renderer(width, height)
-        image = renderer.picture(*self._pose(), "room").astype(np.uint8, copy=False)
+        image = renderer.picture(*self.pose(), "room").astype(np.uint8, copy=False)
         camera = renderer.camera("room")
         pictures.draw_estimate(image, camera, self.simulation.estimate, self.b)
         pictures.draw_goal(image, camera, self.simulation.task.goal_world[self.b])
@@ -43,11 +43,11 @@ class Views:
         keypoints, windows = self._looks()
         views = []
         for c, camera in enumerate(self.simulation.scene.cameras):
-            image = self._renderer(width, height).picture(*self._pose(), camera.name)
+            image = self._renderer(width, height).picture(*self.pose(), camera.name)
             image = image.astype(np.uint8, copy=False)
-            for worker_windows in windows:
-                if worker_windows[c] is not None:
-                    pictures.draw_window(image, camera, worker_windows[c])
+            for window in (of_worker[c] for of_worker in windows):
+                if window is not None:
+                    pictures.draw_window(image, camera, window)
             pictures.draw_estimate(image, camera, self.simulation.estimate, self.b, thickness=1)
             if keypoints is not None:
                 pictures.draw_keypoints(image, camera, keypoints, c)
@@ -62,7 +62,7 @@ class Views:
             return []
         if self._crops is None:
             self._crops = CropRenderer(self.simulation.scene, size)
-        self._crops.draw(*self._pose())
+        self._crops.draw(*self.pose())
         return [
             self._crop(self._crops, c, window, keypoints, size)
             for c, window in enumerate(windows[0])
@@ -100,7 +100,8 @@ class Views:
         pictures.draw_landmarks(image, window, keypoints.px[0, c, 0], keypoints.confidence[0, c, 0])
         return image
 
-    def _pose(self) -> tuple[Any, Any]:
+    def pose(self) -> tuple[JointAngles, WorkerMotion]:
+        """The arm (N,) and the workers (W, S, ...) now."""
         motion = one(generator.current(self.simulation.motion), self.b)
         return self.simulation.physics.q[self.b], motion
 

@@ -15,6 +15,7 @@ from hrc_env.agents_door import agents
 from hrc_env.cli.film import film_episode
 from hrc_env.env import HRCReachEnv
 from hrc_env.errors import unknown
+from hrc_env.scene.viewer import Viewer
 
 
 @dataclass(frozen=True)
@@ -74,13 +75,13 @@ class Play:
         assert isinstance(inner, HRCReachEnv)
         agent = base.make_agent(self.agent, base.situation(inner.simulation), seed)  # type: ignore[attr-defined]
         observation, info = env.reset(seed=seed)
-        window = inner.simulation.open_viewer() if self.viewer else None
+        window = Viewer(inner.simulation.scene) if self.viewer else None
         started_s, total, steps = time.monotonic(), 0.0, 0
         for _ in track(range(250), description=f"episode {seed}"):
             observation, reward, terminated, truncated, info = env.step(agent.act(observation))
             total, steps = total + float(reward), steps + 1
             if window is not None:
-                inner.simulation.show(window, 0)
+                window.show(*inner.views.pose())
             if terminated or truncated:
                 break
         if window is not None:

@@ -49,7 +49,8 @@ def pinhole(
     """A camera with square pixels at `eye_world` that looks at `target_world`."""
     if not 1.0 <= hfov_deg < 179.0:
         raise ConfigError(
-            f"Camera {name!r}: horizontal field of view must be in [1, 179) degrees, got {hfov_deg}."
+            f"Camera {name!r}: horizontal field of view must be in [1, 179) degrees, "
+            f"got {hfov_deg}."
         )
     focal_px = width_px / 2 / np.tan(np.radians(hfov_deg) / 2)
     K = np.array([[focal_px, 0, width_px / 2], [0, focal_px, height_px / 2], [0, 0, 1.0]])

@@ -48,7 +48,7 @@ def narrowest_gap(
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def closest_parameters(p0, p1, q0, q1):  # noqa: ANN001, ANN201
+def closest_parameters(p0, p1, q0, q1):
     """Squared distance of two segments and where along each (0..1) it is attained."""
     ux, uy, uz = p1[0] - p0[0], p1[1] - p0[1], p1[2] - p0[2]
     vx, vy, vz = q1[0] - q0[0], q1[1] - q0[1], q1[2] - q0[2]
@@ -77,7 +77,7 @@ def closest_parameters(p0, p1, q0, q1):  # noqa: ANN001, ANN201
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _spheres(capsules, radius, centre, reach):  # noqa: ANN001, ANN202
+def _spheres(capsules, radius, centre, reach):
     """Bounding spheres of capsules: they spare most of the pairs."""
     for k in range(len(radius)):
         length = 0.0
@@ -88,7 +88,7 @@ def _spheres(capsules, radius, centre, reach):  # noqa: ANN001, ANN202
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _narrowest(a, radius_a, b, radius_b, gap, points):  # noqa: ANN001, ANN202
+def _narrowest(a, radius_a, b, radius_b, gap, points):
     centre_a, reach_a = np.empty((len(radius_a), 3)), np.empty(len(radius_a))
     centre_b, reach_b = np.empty((b.shape[1], 3)), np.empty(b.shape[1])
     n_repeat = b.shape[1] // max(len(radius_b), 1)

@@ -45,16 +45,12 @@ def test_pruning_by_spheres_changes_nothing():
     a, b = rng.normal(size=(50, 9, 2, 3)), rng.normal(size=(50, 18, 2, 3)) + 1.5
     ra, rb = rng.uniform(0, 0.3, 9), rng.uniform(0, 0.3, 18)
     whole = narrowest_gap(a, ra, b, rb).distance_m
-    pairs = np.array(
-        [
-            [
-                [narrowest_gap(a[n, [i]], ra[[i]], b[n, [j]], rb[[j]]).distance_m for j in range(18)]
-                for i in range(9)
-            ]
-            for n in range(50)
-        ]
-    )
-    np.testing.assert_array_equal(whole, pairs.min((1, 2)))
+    pairs = [
+        narrowest_gap(a[:, [i]], ra[[i]], b[:, [j]], rb[[j]]).distance_m
+        for i in range(9)
+        for j in range(18)
+    ]
+    np.testing.assert_array_equal(whole, np.min(pairs, axis=0))
 
 
 def test_nobody_is_infinitely_far_away():

@@ -56,7 +56,7 @@ def test_a_goal_is_missed_after_its_time_and_not_a_step_earlier():
 
 
 def test_an_environment_draws_from_its_own_stream_only():
-    both, rngs = two_environments()
+    both, _ = two_environments()
     alone = reach.make_state(1)
     reach.reset(alone, np.array([0]), [np.random.default_rng(2)], np.zeros((1, 3)), CONFIG)
     np.testing.assert_array_equal(alone.goal_world[0], both.goal_world[1])

@@ -1,0 +1,48 @@
+"""MuJoCo's interactive window, for machines with a display."""
+
+from typing import Any
+
+import mujoco
+
+from hrc_env.errors import RenderingError
+from hrc_env.records import WorkerMotion
+from hrc_env.scene.build import Scene
+from hrc_env.typing import JointAngles
+
+
+class Viewer:
+    """A window that shows one environment; drag to look round, close it to go on without."""
+
+    def __init__(self, scene: Scene) -> None:
+        """Open the window.
+
+        Raises:
+            RenderingError: no display, or the viewer cannot run here.
+        """
+        try:
+            from mujoco import viewer
+
+            self._scene, self._data = scene, mujoco.MjData(scene.model)
+            self._window: Any = viewer.launch_passive(scene.model, self._data)
+        except Exception as error:
+            raise RenderingError(
+                f"MuJoCo's viewer could not be opened: {error}. It needs a display; without "
+                "one, film the episode instead: python -m hrc_env play --video out/play.mp4"
+            ) from error
+
+    def show(self, q: JointAngles, motion: WorkerMotion) -> None:
+        """Pose the scene: arm q (N,) and the workers of one environment (W, S, ...)."""
+        if not self._window.is_running():
+            return
+        rows = self._scene.worker_mocap
+        with self._window.lock():
+            self._data.qpos[: len(q)] = q
+            if rows.size:
+                self._data.mocap_pos[rows] = motion.position_world
+                self._data.mocap_quat[rows] = motion.quaternion_wxyz
+            mujoco.mj_forward(self._scene.model, self._data)
+        self._window.sync()
+
+    def close(self) -> None:
+        """Close the window."""
+        self._window.close()
