@@ -33,8 +33,6 @@ def choose_backend() -> str:
 def gl_status() -> tuple[bool, str]:
     """Whether pictures can be made here, and a sentence that says with what or what to do."""
     backend = choose_backend()
-    if backend in ("disable", "disabled", "off", "false", "0"):
-        return False, f"Rendering is switched off by MUJOCO_GL={backend!r}: unset it."
     try:
         context = new_context(16, 16)
     except RenderingError as error:
@@ -50,6 +48,8 @@ def new_context(width_px: int, height_px: int) -> Any:
         RenderingError: no context can be made; the message says how to get OpenGL.
     """
     backend = choose_backend()
+    if backend in ("disable", "disabled", "off", "false", "0"):
+        raise RenderingError(f"Rendering is switched off by MUJOCO_GL={backend!r}: unset it.")
     try:
         context = _context_class(backend)(width_px, height_px)
         context.make_current()

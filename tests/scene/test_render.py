@@ -221,5 +221,12 @@ def test_without_opengl_the_message_names_the_remedy(monkeypatch):
     assert "apt-get install" in sentence
 
 
+def test_rendering_that_is_switched_off_says_how_to_switch_it_on(monkeypatch):
+    monkeypatch.setenv("MUJOCO_GL", "disable")
+    works, sentence = gl.gl_status()
+    assert not works
+    assert "unset it" in sentence
+
+
 def test_looks_are_painted_once(lab):
     assert building.drawing_model(lab) is building.drawing_model(lab)
