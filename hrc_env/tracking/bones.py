@@ -35,9 +35,9 @@ def population(shape: tuple[int, ...]) -> tuple[Floats, Floats]:
 def use_bones(body, cov, n_views, length, variance):
     """Learn lengths (16,) and correct body (J, 6), cov (J, 6, 6) by them, in place."""
     shared = shared_covariance(cov)
-    share, relative = np.empty(len(body)), np.empty((6, 6))
+    share, work = np.empty(len(body)), np.empty((2, 6, 6))
     for j in range(len(body)):
-        share[j] = relative_covariance(cov[j], shared, relative)
+        share[j] = relative_covariance(cov[j], shared, work[0], work[1])
     along, gain_a, gain_b = np.empty(3), np.empty(6), np.empty(6)
     for k in range(len(_ENDS)):
         a, b = _ENDS[k]

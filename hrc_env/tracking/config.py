@@ -75,8 +75,8 @@ class TrackerConfig:
     """Share of its particles that are drawn from the prediction, not from the posterior mode."""
     proposal_inflation: float = 1.2
     """Factor on the covariance of the other particles' proposal."""
-    gauss_newton_steps: int = 4
-    """Steps of the search for the posterior mode."""
+    gauss_newton_steps: int = 2
+    """Steps of the search for the posterior mode; more make no measurable difference."""
     outlier_weight: float = 0.15
     """Probability that a measurement is anywhere in the image instead of near its joint."""
     image_area_px: float = 1920.0 * 1080.0

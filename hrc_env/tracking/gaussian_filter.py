@@ -229,8 +229,9 @@ def _find_again(state, b, w, P, z, sigma, ok, s):
 def _check(state, b, w, s):
     """Keep covariances positive definite; a body that has left the world is lost."""
     body, cov, inside = state.body[b, w], state.cov[b, w], True
+    factor = np.empty((6, 6))
     for j in range(len(body)):
-        if not is_positive_definite(cov[j]):
+        if not is_positive_definite(cov[j], factor):
             for i in range(6):
                 variance = cov[j, i, i]
                 cov[j, i, :], cov[j, :, i] = 0.0, 0.0

@@ -12,7 +12,6 @@ from hrc_env.errors import check_shape
 from hrc_env.geometry.triangulation import (
     FURTHEST_PX,
     NEAREST_DEPTH_M,
-    pixel_jacobian,
     pixel_of,
 )
 from hrc_env.records import Keypoints
@@ -63,26 +62,23 @@ def read_worker(px, confidence, sigma_px, b, w, scale, z, sigma, ok):
 
 
 @numba.njit(**_JIT)
-def variance_in_image(jacobian, cov):
-    """Mean variance of a coordinate of the pixel [px^2] of a point with covariance `cov` (3, 3)."""
-    total = 0.0
-    for axis in range(2):
-        a, b, c = jacobian[axis, 0], jacobian[axis, 1], jacobian[axis, 2]
-        total += (
-            cov[0, 0] * a * a
-            + cov[1, 1] * b * b
-            + cov[2, 2] * c * c
-            + 2.0 * (cov[0, 1] * a * b + cov[0, 2] * a * c + cov[1, 2] * b * c)
-        )
-    return 0.5 * total
+def pixel_spread(p, u, v, depth, cov):
+    """Mean variance of a coordinate of the pixel [px^2] of a point with covariance `cov` (3, 3).
 
-
-@numba.njit(**_JIT)
-def pixel_spread(camera, u, v, depth, cov):
-    """`variance_in_image` of a point at (u, v, depth) whose covariance is `cov` (3, 3) or more."""
-    jacobian = np.empty((2, 3))
-    pixel_jacobian(camera, u, v, depth, jacobian)
-    return variance_in_image(jacobian, cov)
+    `p` is the (3, 4) camera, (u, v, depth) where it sees the point; more than the first three
+    rows and columns of `cov` are not looked at.
+    """
+    near = 1.0 / depth
+    a0, b0 = (p[0, 0] - u * p[2, 0]) * near, (p[1, 0] - v * p[2, 0]) * near
+    a1, b1 = (p[0, 1] - u * p[2, 1]) * near, (p[1, 1] - v * p[2, 1]) * near
+    a2, b2 = (p[0, 2] - u * p[2, 2]) * near, (p[1, 2] - v * p[2, 2]) * near
+    own = cov[0, 0] * (a0 * a0 + b0 * b0)
+    own += cov[1, 1] * (a1 * a1 + b1 * b1)
+    own += cov[2, 2] * (a2 * a2 + b2 * b2)
+    cross = cov[0, 1] * (a0 * a1 + b0 * b1)
+    cross += cov[0, 2] * (a0 * a2 + b0 * b2)
+    cross += cov[1, 2] * (a1 * a2 + b1 * b2)
+    return 0.5 * own + cross
 
 
 @numba.njit(**_JIT)

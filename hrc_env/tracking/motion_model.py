@@ -69,7 +69,7 @@ def predict_body(body, cov, offset, offset_count, F, Q, dt):
     if known:
         _learn_offsets(body, cov, root, cos, sin, dt, offset, offset_count)
     shared = shared_covariance(cov)
-    relative = np.empty((6, 6))
+    relative, factor = np.empty((6, 6)), np.empty((6, 6))
     for j in range(len(body)):
         forward, left = offset[j, 0], offset[j, 1]
         anchor = (
@@ -81,7 +81,7 @@ def predict_body(body, cov, offset, offset_count, F, Q, dt):
             p, v = body[j, i] - anchor[i], body[j, 3 + i] - root[3 + i]
             body[j, i] = anchor[i] + dt * root[3 + i] + F[j, 0, 0] * p + F[j, 0, 1] * v
             body[j, 3 + i] = root[3 + i] + F[j, 1, 0] * p + F[j, 1, 1] * v
-        share = relative_covariance(cov[j], shared, relative)
+        share = relative_covariance(cov[j], shared, relative, factor)
         _move_covariance(relative, F[j], cov[j])
         _add_isotropic(cov[j], Q[j, 0, 0], Q[j, 0, 1], Q[j, 1, 1])
         pp, pv, vv = share * shared[0], share * shared[1], share * shared[2]
@@ -131,23 +131,24 @@ def shared_covariance(cov):
 
 
 @numba.njit(**_JIT)
-def relative_covariance(cov, shared, out):
-    """`cov` (6, 6) less the largest share of the root's that leaves it positive definite."""
+def relative_covariance(cov, shared, out, factor):
+    """`cov` (6, 6) less the largest share of the root's that leaves it positive definite.
+
+    Fills `out` (6, 6) and returns the share; `factor` (6, 6) is scratch.
+    """
     for share in _SHARES:
         out[:] = cov
         _add_isotropic(out, -share * shared[0], -share * shared[1], -share * shared[2])
-        if is_positive_definite(out):
+        if is_positive_definite(out, factor):
             return share
     out[:] = cov
     return 0.0
 
 
 @numba.njit(**_JIT)
-def is_positive_definite(a):
-    """Whether a symmetric matrix has a Cholesky factor."""
-    n = len(a)
-    factor = np.empty((n, n))
-    for i in range(n):
+def is_positive_definite(a, factor):
+    """Whether a symmetric matrix has a Cholesky factor; `factor` takes its lower part."""
+    for i in range(len(a)):
         for k in range(i + 1):
             rest = a[i, k]
             for m in range(k):
