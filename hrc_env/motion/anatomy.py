@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hrc_env.body import PARENT, Body
+from hrc_env.geometry.rotations import about_axis
 from hrc_env.typing import Floats
 
 CHEST, HEAD = 3, 5
@@ -22,6 +23,9 @@ ankle; forward of and above the ankle the ball of the foot; the heel; the upper 
 
 GRIP_M = 0.08
 """How far beyond the wrist a hand grips (half a hand's length, a judgement)."""
+FOREARM_TWIST_RAD, HAND_TWIST_RAD = 0.15, 0.35
+"""Outward turns about the forearm from the rest pose, whose palms look down: with these a
+hanging palm faces the thigh; judgement."""
 HEEL_M = -0.045
 """Heel's contact behind the ankle (a quarter of a foot, a judgement)."""
 STAND_SHARE = 0.994
@@ -51,6 +55,10 @@ def anatomy(body: Body) -> Anatomy:
         for bone, pole in ((UPPER_ARM, -1.0), (FOREARM, -1.0), (THIGH, 1.0), (SHANK, 1.0)):
             along = rest[first + bone + 1] - rest[first + bone]
             frame[first + bone] = _rest_frame(along, np.array([pole, 0.0, 0.0]))
+        outward = -1.0 if first == LEFT else 1.0
+        straight = frame[first + FOREARM].copy()
+        frame[first + FOREARM] = _turned(straight, outward * FOREARM_TWIST_RAD)
+        frame[first + HAND] = _turned(straight, outward * HAND_TWIST_RAD)
     return Anatomy(np.ascontiguousarray(offset), frame, _sizes(rest))
 
 
@@ -60,6 +68,11 @@ def _rest_frame(along: Floats, pole: Floats) -> Floats:
     hinge = np.cross(pole, along)
     hinge /= np.linalg.norm(hinge)
     return np.stack([along, np.cross(hinge, along), hinge])
+
+
+def _turned(frame: Floats, angle_rad: float) -> Floats:
+    """A rest frame that gives a bone an extra turn about itself in every pose."""
+    return about_axis("x", angle_rad) @ frame
 
 
 def _sizes(rest: Floats) -> Floats:

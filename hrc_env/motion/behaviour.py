@@ -26,7 +26,7 @@ SPOT_X, SPOT_Y, SPOT_YAW, SPOT_NEAR, SPOT_UNTIL = range(5)
 N_SPOT = 5
 SWAY_M = 0.05
 """Paths keep this further away, because bodies sway about them [m]."""
-BODY_M = 0.32
+BODY_M = 0.36
 """Hands reach no nearer to their own root than this [m]."""
 
 
@@ -41,11 +41,13 @@ def choose_place(
     draws: Floats, config: MotionConfig, spots: Floats, w: int, clock_s: float
 ) -> None:
     """Fill the worker's row of spots (W, 5), away from the other workers' places if possible."""
-    near = draws[PLACE_DRAWS] < config.near_probability
-    radii = config.near_radius_m if near else config.away_radius_m
-    widest = config.near_azimuth_rad if near else config.away_azimuth_rad
+    wished = draws[PLACE_DRAWS] < config.near_probability
+    near = wished
     mine = spots[w]
     for i in range(N_PLACES):
+        near = wished if i < N_PLACES // 2 else not wished  # crowded there: go elsewhere
+        radii = config.near_radius_m if near else config.away_radius_m
+        widest = config.near_azimuth_rad if near else config.away_azimuth_rad
         at = PLACE_DRAWS + 3 + 3 * i
         radius = between(draws[at], radii)
         azimuth = config.robot_front_rad + widest * (2.0 * draws[at + 1] - 1.0)
@@ -164,5 +166,5 @@ def start_lift(
     plan[pl.OUT_AT] = 0.1 + 0.4 * draws[11]
     times = (between(draws[1], config.lift_s), between(draws[2], config.lift_s), 0.3 + draws[3])
     z = between(draws[4], config.load_z_m)
-    ahead = 0.34 + 0.08 * draws[5]
+    ahead = 0.38 + 0.08 * draws[5]
     return plan_lift(ahead, z, times, plan, traits, offset, frame, size, q, p, r)

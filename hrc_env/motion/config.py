@@ -80,9 +80,10 @@ class MotionConfig:
         """Check ranges and probabilities."""
         for item in fields(self):
             value = getattr(self, item.name)
-            if isinstance(value, tuple) and item.name != "robot_xy_m" and value[0] > value[1]:
-                raise ConfigError(f"{item.name} must be (low, high), got {value}.")
-            if item.name.endswith("_probability") and not 0.0 <= value <= 1.0:
+            if isinstance(value, tuple):
+                if item.name != "robot_xy_m" and value[0] > value[1]:
+                    raise ConfigError(f"{item.name} must be (low, high), got {value}.")
+            elif item.name.endswith("_probability") and not 0.0 <= value <= 1.0:
                 raise ConfigError(f"{item.name} must lie in [0, 1], got {value}.")
         if self.near_radius_m[0] < self.clearance_m:
             raise ConfigError(

@@ -162,7 +162,8 @@ def _body(
 @compiled
 def _run(
     dt_s: float, n_steps: int, done: Ints, ticked: Bools,
-    clock_s: Floats, time_s: Floats, duration_s: Floats, activity: Ints, plan: Floats, prints: Floats, stance: Floats, offset: Floats, traits: Floats,
+    clock_s: Floats, time_s: Floats, duration_s: Floats, activity: Ints,
+    plan: Floats, prints: Floats, stance: Floats, offset: Floats, traits: Floats,
     bones: Floats, frame: Floats, size: Floats,
     position: Floats, quaternion_: Floats, velocity: Floats, turning: Floats,
 ) -> bool:  # fmt: skip

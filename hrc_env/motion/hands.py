@@ -13,7 +13,9 @@ from hrc_env.typing import Floats
 
 GAZE_LEAD_S = 0.25
 """Eyes and head set off before the hand (Land & Hayhoe 2001: about half a second at most)."""
-CARRY_FORWARD_M, CARRY_Z_M, LOAD_HALF_WIDTH_M = 0.36, 1.05, 0.17
+SPARE_LEAN = 0.04
+"""Lean beyond the least, because the sway of a standing body may take as much away."""
+CARRY_FORWARD_M, CARRY_Z_M, LOAD_HALF_WIDTH_M = 0.36, 1.05, 0.20
 """A load held up: ahead of the root, its height, half its width [m]; judgement."""
 
 
@@ -100,7 +102,7 @@ def _settle_lean(
             else:
                 high = plan[pl.LEAN]
         plan[pl.LEAN] = 0.5 * (low + high)
-    plan[pl.LEAN] = high
+    plan[pl.LEAN] = high + SPARE_LEAN
     if high < MOST_LEAN:
         return
     for side in range(2):

@@ -10,6 +10,7 @@ from hrc_env.motion.anatomy import (
     FOOT,
     FOREARM,
     FOREARM_GRIP,
+    GRIP_M,
     HAND,
     HEAD,
     LEFT,
@@ -201,16 +202,14 @@ def arm(
     fore, hand = upper + FOREARM - UPPER_ARM, upper + HAND - UPPER_ARM
     swivel = q[c.SWIVEL + side]
     level, out = math.cos(swivel), math.sin(swivel)
-    back, left = -0.7 * level, sign * (0.35 * level + out)
+    back, left = -0.7 * level, sign * (0.45 * level + out)
     p[POLE, 0], p[POLE, 1] = cos * back - sin * left, sin * back + cos * left
     p[POLE, 2] = -0.9 * level
     bend(upper, GRIP, size[UPPER_LENGTH], size[FOREARM_GRIP], ARM_KNEE, ARM_LIMIT, p)
     aim(upper, fore, size[UPPER_LENGTH], frame, p, r)
     aim(fore, GRIP, size[FOREARM_GRIP], frame, p, r)
     attach(hand, fore, offset, p, r)
-    for i in range(3):
-        for j in range(3):
-            r[hand, i, j] = r[fore, i, j]
+    aim(hand, GRIP, GRIP_M, frame, p, r)
 
 
 @compiled

@@ -165,7 +165,7 @@ def begin(
     """Put worker (b, w) at a place of theirs, in the middle of something, feet settled."""
     d, row = draws[b, w, bh.N_DRAWS :], plan[b, w]
     traits[b, w, pl.SPEED_TRAIT] = bh.between(d[0], config.speed_m_s)
-    traits[b, w, pl.SQUAT_TRAIT] = 0.25 + 0.75 * d[1]
+    traits[b, w, pl.SQUAT_TRAIT] = 0.4 + 0.6 * d[1]
     traits[b, w, pl.RIGHT_HANDED] = 0.9 if d[2] < 0.9 else 0.1
     traits[b, w, pl.PHASE :] = d[3 : 3 + pl.N_TRAITS - pl.PHASE]
     clock_s[b, w], offset[b, w] = 0.0, 0.0
