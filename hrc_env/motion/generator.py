@@ -96,11 +96,12 @@ def advance(
     return motion
 
 
-def current(state: MotionState) -> WorkerMotion:
-    """The bodies now: arrays (B, W, 22, ...)."""
+def current(state: MotionState, ids: Ints | None = None) -> WorkerMotion:
+    """The bodies now: arrays (B, W, 22, ...), or of environments `ids` only (len(ids), W, ...)."""
     batch, n_workers = state.activity.shape
-    motion = _blank((batch, 1, n_workers))
-    _draw(*_arrays(state)[:9], *_constants(state)[1:], *_outputs(motion))
+    rows = np.arange(batch) if ids is None else np.asarray(ids, np.int64)
+    motion = _blank((len(rows), 1, n_workers))
+    _draw(rows, *_arrays(state)[:9], *_constants(state)[1:], *_outputs(motion))
     return WorkerMotion(*(array[:, 0] for array in _outputs(motion)))
 
 
@@ -195,18 +196,18 @@ def _run(
 
 @compiled
 def _draw(
-    clock_s: Floats, time_s: Floats, duration_s: Floats, activity: Ints, plan: Floats,
+    rows: Ints, clock_s: Floats, time_s: Floats, duration_s: Floats, activity: Ints, plan: Floats,
     prints: Floats, stance: Floats, offset: Floats, traits: Floats,
     bones: Floats, frame: Floats, size: Floats,
     position: Floats, quaternion_: Floats, velocity: Floats, turning: Floats,
 ) -> None:  # fmt: skip
-    """Bodies as they are, into arrays (B, 1, W, ...)."""
+    """Bodies of some environments as they are, into arrays (rows, 1, W, ...)."""
     q, p = np.empty(c.N_CONTROLS), np.zeros((2, N_POINTS, 3))
     r = np.zeros((2, N_FRAMES, 3, 3))
-    for b in range(time_s.shape[0]):
+    for i, b in enumerate(rows):
         for w in range(time_s.shape[1]):
             _body(
                 b, w, clock_s, time_s, activity, plan, prints, stance, offset, traits,
-                bones, frame, size, position[b, 0, w], quaternion_[b, 0, w],
-                velocity[b, 0, w], turning[b, 0, w], q, p, r,
+                bones, frame, size, position[i, 0, w], quaternion_[i, 0, w],
+                velocity[i, 0, w], turning[i, 0, w], q, p, r,
             )  # fmt: skip

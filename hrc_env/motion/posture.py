@@ -85,7 +85,7 @@ def lean(amount: float, squat: float, twist: float, q: Floats) -> None:
     back = (0.07 + 0.10 * squat) * amount
     q[c.ROOT_X] -= math.cos(q[c.HEADING]) * back
     q[c.ROOT_Y] -= math.sin(q[c.HEADING]) * back
-    q[c.PELVIS_Z] -= (0.03 + 0.33 * squat) * amount
+    q[c.PELVIS_Z] -= (0.03 + 0.28 * squat) * amount
     q[c.PELVIS_PITCH] += (0.62 - 0.12 * squat) * amount
     q[c.SPINE_FLEX] += (0.72 - 0.25 * squat) * amount
     q[c.HEAD_PITCH] -= 0.45 * amount

@@ -132,6 +132,8 @@ def test_current_is_the_last_pose_of_advance():
     motion, now = generator.advance(state, rngs, 0.01, 5), generator.current(state)
     assert np.allclose(motion.position_world[:, -1], now.position_world)
     assert np.allclose(motion.velocity_world[:, -1], now.velocity_world)
+    second = generator.current(state, np.array([1]))
+    assert np.array_equal(second.position_world, now.position_world[1:])
 
 
 @pytest.mark.parametrize("n_workers", [0, 1, 3])
