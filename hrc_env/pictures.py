@@ -150,6 +150,17 @@ def tile(pictures: list[Image], columns: int, gap: int = 4) -> Image:
     return sheet
 
 
+def shrink(image: Image, width: int, height: int) -> Image:
+    """The image in another size; every pixel is the mean of those it stands for."""
+    return np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def middle_rows(image: Image, height: int) -> Image:
+    """The middle `height` rows."""
+    top = (image.shape[0] - height) // 2
+    return image[top : top + height]
+
+
 def _ellipse(
     image: Image, camera: PinholeCamera, joint: Floats, covariance: Floats, scale: float
 ) -> None:

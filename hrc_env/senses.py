@@ -21,7 +21,7 @@ from hrc_env.errors import unknown
 from hrc_env.geometry.cameras import project, projections
 from hrc_env.perception import emulator
 from hrc_env.perception.eyes import Eyes
-from hrc_env.perception.windows import window_from_joints
+from hrc_env.perception.windows import steady_window, window_from_joints
 from hrc_env.records import CropWindow, Keypoints, PoseEstimate, WorkerMotion, WorkerTruth
 from hrc_env.scene.build import Scene
 from hrc_env.scene.physics import Physics
@@ -232,7 +232,8 @@ class CameraSenses(TrackingSenses):
         for row, b in enumerate(now.ids):
             self.renderer.draw(now.q[row], one(now.motion, row))
             for worker in range(self.scene.n_workers):
-                windows = self._windows(predicted, row, worker)
+                wanted = self._windows(predicted, row, worker)
+                windows = list(map(steady_window, self.windows[b][worker], wanted))
                 sight = self.eyes.look(self.renderer, windows, self._track(b, worker))
                 self.windows[b][worker] = sight.windows
                 seen.px[row, :, worker] = sight.px
@@ -246,6 +247,7 @@ class CameraSenses(TrackingSenses):
         for b in ids:
             for worker in range(self.scene.n_workers):
                 self.eyes.forget(self._track(b, worker))
+                self.windows[b][worker] = [None] * len(self.scene.cameras)
 
     def _track(self, b: int, worker: int) -> int:
         """The number by which the eyes know a worker of an environment."""

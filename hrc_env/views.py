@@ -9,11 +9,15 @@ from hrc_env import pictures
 from hrc_env.batching import one
 from hrc_env.motion import generator
 from hrc_env.records import CropWindow, Keypoints, WorkerMotion
-from hrc_env.scene.render import CropRenderer, PictureRenderer
+from hrc_env.scene.render import CROP_PX, PICTURE_QUALITY, CropRenderer, PictureRenderer
 from hrc_env.simulation import Simulation
 from hrc_env.typing import Image, JointAngles
 
 PICTURE_SIZE = (960, 720)
+FILM_QUALITY = {**PICTURE_QUALITY, "shadowsize": 2048}
+"""Shadows a little coarser: a third of the time."""
+SMOOTHING = 2
+"""Cameras' pictures are drawn so many times as large, and shrunk, for smooth edges."""
 MOSAIC_TILE = (640, 360)
 
 
@@ -22,16 +26,16 @@ class Views:
 
     def __init__(self, simulation: Simulation, b: int = 0) -> None:
         self.simulation, self.b = simulation, b
-        self._renderers: dict[tuple[int, int], PictureRenderer] = {}
-        self._crops: CropRenderer | None = None
+        self._pictures: dict[tuple[int, int], PictureRenderer] = {}
+        self._squares: dict[int, CropRenderer] = {}
 
     def picture(self, depth: bool = False) -> NDArray[Any]:
         """The room, (720, 960, 3) uint8, or distances (720, 960) float32 [m]."""
-        return self._renderer(*PICTURE_SIZE).picture(*self.pose(), "room", depth=depth)
+        return self._picture_renderer(*PICTURE_SIZE).picture(*self.pose(), "room", depth=depth)
 
     def room(self, width: int, height: int) -> Image:
         """The room with the estimated skeleton over it."""
-        renderer = self._renderer(width, height)
+        renderer = self._picture_renderer(width, height)
         image = renderer.picture(*self.pose(), "room").astype(np.uint8, copy=False)
         camera = renderer.camera("room")
         pictures.draw_estimate(image, camera, self.simulation.estimate, self.b)
@@ -39,12 +43,18 @@ class Views:
         return image
 
     def cameras(self, width: int, height: int) -> list[Image]:
-        """Every camera's picture with crops, detected keypoints and the estimate."""
+        """Every camera's picture with crops, detected keypoints and the estimate.
+
+        Without shadows, as the detector sees the scene; what stands still is drawn once.
+        """
         keypoints, windows = self._looks()
+        renderer = self._square_renderer(SMOOTHING * width)
+        renderer.draw(*self.pose())
         views = []
         for c, camera in enumerate(self.simulation.scene.cameras):
-            image = self._renderer(width, height).picture(*self.pose(), camera.name)
-            image = image.astype(np.uint8, copy=False)
+            middle = (camera.width_px / 2, camera.height_px / 2)
+            square = renderer.crop(c, CropWindow(middle, float(camera.width_px), 0.0))
+            image = pictures.shrink(pictures.middle_rows(square, SMOOTHING * height), width, height)
             for window in (of_worker[c] for of_worker in windows):
                 if window is not None:
                     pictures.draw_window(image, camera, window)
@@ -60,12 +70,10 @@ class Views:
         keypoints, windows = self._looks()
         if keypoints is None or not windows:
             return []
-        if self._crops is None:
-            self._crops = CropRenderer(self.simulation.scene, size)
-        self._crops.draw(*self.pose())
+        renderer = self._square_renderer(CROP_PX)
+        renderer.draw(*self.pose())
         return [
-            self._crop(self._crops, c, window, keypoints, size)
-            for c, window in enumerate(windows[0])
+            self._crop(renderer, c, window, keypoints, size) for c, window in enumerate(windows[0])
         ]
 
     def mosaic(self) -> Image:
@@ -74,14 +82,12 @@ class Views:
 
     def close(self) -> None:
         """Free the graphics contexts."""
-        for renderer in self._renderers.values():
+        for renderer in (*self._pictures.values(), *self._squares.values()):
             renderer.close()
-        if self._crops is not None:
-            self._crops.close()
-        self._renderers, self._crops = {}, None
+        self._pictures, self._squares = {}, {}
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_renderers": {}, "_crops": None}
+        return {**self.__dict__, "_pictures": {}, "_squares": {}}
 
     def _crop(
         self,
@@ -96,7 +102,7 @@ class Views:
             image[:] = pictures.PANEL
             pictures.write(image, "no worker in view", (10, size // 2 - 10), 13)
             return image
-        image = renderer.crop(c, window)
+        image = pictures.shrink(renderer.crop(c, window), size, size)
         pictures.draw_landmarks(image, window, keypoints.px[0, c, 0], keypoints.confidence[0, c, 0])
         return image
 
@@ -108,8 +114,14 @@ class Views:
     def _looks(self) -> tuple[Keypoints | None, list[list[CropWindow | None]]]:
         return self.simulation.senses.looks(self.b)
 
-    def _renderer(self, width: int, height: int) -> PictureRenderer:
-        size = (width, height)
-        if size not in self._renderers:
-            self._renderers[size] = PictureRenderer(self.simulation.scene, width, height)
-        return self._renderers[size]
+    def _picture_renderer(self, width: int, height: int) -> PictureRenderer:
+        size, scene = (width, height), self.simulation.scene
+        if size not in self._pictures:
+            quality = PICTURE_QUALITY if size == PICTURE_SIZE else FILM_QUALITY
+            self._pictures[size] = PictureRenderer(scene, width, height, quality)
+        return self._pictures[size]
+
+    def _square_renderer(self, size: int) -> CropRenderer:
+        if size not in self._squares:
+            self._squares[size] = CropRenderer(self.simulation.scene, size)
+        return self._squares[size]

@@ -22,6 +22,10 @@ ROOM = (792, 716)
 TILE = (400, 225)
 CROP = 196
 STRIP_HEIGHT = 180
+STEPS_PER_FRAME = 2
+"""A film shows every second step, in real time."""
+CLOSE_M = 0.1
+"""The still shows the closest moment that is not yet closer than this [m]."""
 STRIP_S = 10.0
 """Seconds that the strip below shows."""
 FAR_M = 1.5
@@ -59,7 +63,7 @@ def film_episode(
     env = HRCReachEnv(**kwargs)
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_suffix(".draft.mp4")
-    fps = round(1 / env.config.ctrl_dt)
+    fps = 1 / env.config.ctrl_dt / STEPS_PER_FRAME
     try:
         with imageio.get_writer(draft, fps=fps, quality=8, macro_block_size=4) as writer:
             totals = _roll(env, make, seed, n_steps, writer, path.with_suffix(".png"))
@@ -77,16 +81,17 @@ def _roll(
     observation, _ = env.reset(seed=seed)
     diary, errors_m, infos = Diary(), [], []
     closest_m = np.inf
-    for _ in track(range(n_steps), description="filming"):
+    for step in track(range(n_steps), description="filming"):
         observation, _, terminated, _, info = env.step(agent.act(observation))
         infos.append(info)
         diary.note(info, float(env.split_observation(observation)["worker_gap"].min(initial=1.0)))
         errors_m.append(info.get("tracking/mpjpe_m", np.nan))
-        frame = compose(env, diary, info)
-        writer.append_data(frame)
-        if 0.05 < diary.true_m[-1] < closest_m:
-            closest_m = diary.true_m[-1]
-            imageio.imwrite(still, frame)
+        if step % STEPS_PER_FRAME == 0:
+            frame = compose(env, diary)
+            writer.append_data(frame)
+            if CLOSE_M < diary.true_m[-1] < closest_m:
+                closest_m = diary.true_m[-1]
+                imageio.imwrite(still, frame)
         if terminated:
             break
     known = [error for error in errors_m if error == error]
@@ -100,7 +105,7 @@ def _roll(
     }
 
 
-def compose(env: HRCReachEnv, diary: Diary, info: dict[str, Any]) -> Image:
+def compose(env: HRCReachEnv, diary: Diary) -> Image:
     """One frame: room, cameras, crops, strip."""
     frame = np.empty((HEIGHT, WIDTH, 3), np.uint8)
     frame[:] = pictures.PANEL

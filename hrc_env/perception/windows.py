@@ -7,10 +7,12 @@ image. The landmark stage forgives a shift of 0.2 of the side, a scale of 0.8 to
 turn of 20 degrees.
 """
 
+import math
+
 import numpy as np
 
 from hrc_env.geometry.cameras import PinholeCamera, inside_image
-from hrc_env.perception.blazepose import window_from_points
+from hrc_env.perception.blazepose import window_from_points, wrap_angle
 from hrc_env.records import CropWindow
 from hrc_env.skeleton import JOINT, TORSO
 from hrc_env.typing import Floats, Points2
@@ -32,6 +34,10 @@ CROWN = 0.8
 
 HAND = 0.6
 """Hands reach so much further beyond the wrists as the wrists are from the elbows."""
+
+STEADY_SHIFT, STEADY_SCALE, STEADY_TURN_RAD = 0.10, 0.15, 0.2
+"""A window stays while the wanted one is off by less than this share of its side, this
+logarithm of its size and this turn: half of what the landmark stage forgives."""
 
 _LEFT_RIGHT = ("left", "right")
 _HIPS = [JOINT[f"{side}_hip"] for side in _LEFT_RIGHT]
@@ -68,6 +74,23 @@ def window_from_joints(
     length = float(np.hypot(*upright))
     up = upright / length if length > 1e-9 else np.array([0.0, -1.0])
     return window_from_points(hip, hip + reach_px * up)
+
+
+def steady_window(kept: CropWindow | None, wanted: CropWindow | None) -> CropWindow | None:
+    """The window of the last look while it is still good for the wanted one, else the latter.
+
+    Steady crops make steady landmarks, and what stands still in them need not be drawn again.
+    """
+    if kept is None or wanted is None:
+        return wanted
+    shift_px = math.dist(kept.centre_px, wanted.centre_px)
+    turn_rad = wrap_angle(wanted.rotation_rad - kept.rotation_rad)
+    steady = (
+        shift_px < STEADY_SHIFT * kept.side_px
+        and abs(math.log(wanted.side_px / kept.side_px)) < STEADY_SCALE
+        and abs(turn_rad) < STEADY_TURN_RAD
+    )
+    return kept if steady else wanted
 
 
 def _outline(joints_px: Points2, ahead: np.ndarray) -> Points2:
