@@ -144,18 +144,20 @@ def _body(
     q: Floats, p: Floats, r: Floats,
 ) -> None:  # fmt: skip
     """Pose and velocities of worker (b, w) now, into (22, ...) arrays."""
-    for i in range(2):
-        h = i * RATE_H_S
-        evaluate(
-            activity[b, w], time_s[b, w] + h, clock_s[b, w] + h, plan[b, w], prints[b, w],
-            stance[b, w], offset[b, w], traits[b, w], size, q,
-        )  # fmt: skip
-        pose(q, bones, frame, size, p[i], r[i])
+    doing, t, clock = activity[b, w], time_s[b, w], clock_s[b, w]
+    row, steps, feet = plan[b, w], prints[b, w], stance[b, w]
+    left_over, own = offset[b, w], traits[b, w]
     before, after, first, second = p[0], p[1], r[0], r[1]
+    evaluate(doing, t, clock, row, steps, feet, left_over, own, size, q)
+    pose(q, bones, frame, size, before, first)
+    t, clock = t + RATE_H_S, clock + RATE_H_S
+    evaluate(doing, t, clock, row, steps, feet, left_over, own, size, q)
+    pose(q, bones, frame, size, after, second)
+    rate = 1.0 / RATE_H_S
     for s in range(bones.shape[0]):
         for i in range(3):
             position[s, i] = before[s, i]
-            velocity[s, i] = (after[s, i] - before[s, i]) / RATE_H_S
+            velocity[s, i] = (after[s, i] - before[s, i]) * rate
         quaternion(first, s, quaternion_)
         spin(first, second, s, RATE_H_S, turning)
 
