@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from hrc_env.geometry.distances import Gap, narrowest_gap
+from hrc_env.geometry.segments import segments
 from hrc_env.records import PoseEstimate, RobotState
-from hrc_env.skeleton import SEGMENT_RADIUS_M, segments
+from hrc_env.skeleton import SEGMENT_RADIUS_M
 from hrc_env.typing import Floats, Points3
 
 
@@ -30,13 +31,12 @@ def estimated_gap(robot: RobotState, estimate: PoseEstimate) -> Gap:
     """(B, W) narrowest place between the robot's capsules and each estimated body.
 
     The body is made of the segments between the estimated joints with radii, the hands
-    included (`skeleton.segments`). A worker without a track is infinitely far: there is
+    included (`geometry.segments`). A worker without a track is infinitely far: there is
     nothing to keep away from that the robot knows of.
     """
-    batch, workers = estimate.tracked.shape
+    workers = estimate.tracked.shape[1]
     bodies = segments(estimate.mean_world)
-    shape = (batch, workers, *robot.capsules_world.shape[1:])
-    robots = np.broadcast_to(robot.capsules_world[:, None], shape)
+    robots = np.repeat(robot.capsules_world[:, None], workers, axis=1)
     gap = narrowest_gap(robots, robot.capsule_radius_m, bodies, SEGMENT_RADIUS_M)
     return Gap(
         np.where(estimate.tracked, gap.distance_m, np.inf), gap.point_a_world, gap.point_b_world

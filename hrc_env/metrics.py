@@ -1,7 +1,9 @@
 """What really happened: cost, separation and tracking error, counted on the truth."""
 
+import math
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 
 from hrc_env.errors import ConfigError
@@ -70,9 +72,23 @@ def tracking_error(estimate: PoseEstimate, truth: WorkerTruth) -> tuple[Floats, 
         (B,) mean over tracked workers and joints [m], NaN where nobody is tracked, and
         (B,) whether a worker is there whom the estimator does not track.
     """
-    error_m = np.linalg.norm(estimate.mean_world - truth.joints_world, axis=-1).mean(-1)
-    n_tracked = estimate.tracked.sum(-1)
-    summed = np.where(estimate.tracked, error_m, 0.0).sum(-1)
-    mean = np.where(n_tracked > 0, summed / np.maximum(n_tracked, 1), np.nan)
-    lost: Bools = np.logical_not(estimate.tracked.all(-1))
-    return mean, lost
+    error_m, lost = np.empty(len(estimate.tracked)), np.zeros(len(estimate.tracked), np.bool_)
+    _tracking_error(estimate.mean_world, truth.joints_world, estimate.tracked, error_m, lost)
+    return error_m, lost
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _tracking_error(mean_world, joints_world, tracked, error_m, lost):
+    for b in range(tracked.shape[0]):
+        total, count = 0.0, 0
+        for w in range(tracked.shape[1]):
+            if not tracked[b, w]:
+                lost[b] = True
+                continue
+            for j in range(mean_world.shape[2]):
+                squared = 0.0
+                for i in range(3):
+                    squared += (mean_world[b, w, j, i] - joints_world[b, w, j, i]) ** 2
+                total += math.sqrt(squared)
+                count += 1
+        error_m[b] = total / count if count else np.nan

@@ -38,13 +38,18 @@ class ObservationTerm:
 
 def _goal_direction(now: Believed) -> Floats:
     offset = now.goal_world - now.robot.tool_world
-    return offset / (np.linalg.norm(offset, axis=-1, keepdims=True) + 0.05)
+    return offset / (_length(offset) + 0.05)
 
 
 def _nearest_direction(now: Believed) -> Floats:
     offset = now.gap.point_b_world - now.gap.point_a_world
-    direction = offset / (np.linalg.norm(offset, axis=-1, keepdims=True) + 1e-3)
+    direction = offset / (_length(offset) + 1e-3)
     return np.where(_near(now)[..., None], direction, 0.0)
+
+
+def _length(vectors: Floats) -> Floats:
+    """(..., 1) lengths of (..., 3)."""
+    return np.sqrt(np.einsum("...i,...i->...", vectors, vectors))[..., None]
 
 
 def _near(now: Believed) -> Bools:

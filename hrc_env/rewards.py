@@ -103,7 +103,8 @@ def reward(
         FloatingPointError: a term is not finite; a fault of the code, never of a camera.
     """
     terms = {term.name: term.function(now, step, previous_action, config) for term in TERMS}
-    for name, value in terms.items():
-        if not np.isfinite(value).all():
-            raise FloatingPointError(f"Reward term {name!r} is not finite: {value}.")
-    return sum(terms.values(), np.zeros(len(now.goal_world))), terms
+    total: Floats = sum(terms.values(), np.zeros(len(now.goal_world)))
+    if not np.isfinite(total).all():
+        wrong = [name for name, value in terms.items() if not np.isfinite(value).all()]
+        raise FloatingPointError(f"Reward terms that are not finite: {', '.join(wrong)}.")
+    return total, terms

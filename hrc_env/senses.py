@@ -158,16 +158,23 @@ class TrackingSenses:
         whole = len(now.ids) == len(self.keypoints.px)
         state = self.state if whole else rows(self.state, now.ids)
         self.tracker.predict(state, self.dt_s, tracker_rngs)
-        predicted = self.tracker.estimate(state)
-        keypoints = self.detect(now, predicted, sensor_rngs)
+        keypoints = self.detect(now, state, sensor_rngs)
         self.tracker.update(state, keypoints, tracker_rngs)
-        write_rows(self.keypoints, now.ids, keypoints)
-        if not whole:
+        if whole:
+            self.keypoints = keypoints
+        else:
+            write_rows(self.keypoints, now.ids, keypoints)
             write_rows(self.state, now.ids, state)
         return self.tracker.estimate(state)
 
-    def detect(self, now: Moment, predicted: PoseEstimate, sensor_rngs: Generators) -> Keypoints:
-        """Keypoints of this moment, by whatever eyes the level has."""
+    def detect(self, now: Moment, predicted: Any, sensor_rngs: Generators) -> Keypoints:
+        """Keypoints of this moment, by whatever eyes the level has.
+
+        Args:
+            now: the scene.
+            predicted: the tracker's state before the measurement.
+            sensor_rngs: one generator a row.
+        """
         raise NotImplementedError
 
     def looks(self, b: int) -> tuple[Keypoints | None, Windows]:
@@ -202,7 +209,7 @@ class EmulatedSenses(TrackingSenses):
         emulator.reset(part, np.arange(len(ids)), sensor_rngs, self.config)
         write_rows(self.emulator, ids, part)
 
-    def detect(self, now: Moment, predicted: PoseEstimate, sensor_rngs: Generators) -> Keypoints:
+    def detect(self, now: Moment, predicted: Any, sensor_rngs: Generators) -> Keypoints:
         """Emulated keypoints; lines of sight come from the physics' rays."""
         whole = len(now.ids) == self.physics.batch
         state = self.emulator if whole else rows(self.emulator, now.ids)
@@ -226,13 +233,14 @@ class CameraSenses(TrackingSenses):
             [[None] * len(scene.cameras) for _ in range(scene.n_workers)] for _ in range(batch)
         ]
 
-    def detect(self, now: Moment, predicted: PoseEstimate, sensor_rngs: Generators) -> Keypoints:
+    def detect(self, now: Moment, predicted: Any, sensor_rngs: Generators) -> Keypoints:
         """Landmarks of crops round the predicted worker, or of a search where there is none."""
         seen = _no_keypoints(len(now.ids), len(self.scene.cameras), self.scene.n_workers)
+        expected = self.tracker.estimate(predicted)
         for row, b in enumerate(now.ids):
             self.renderer.draw(now.q[row], one(now.motion, row))
             for worker in range(self.scene.n_workers):
-                wanted = self._windows(predicted, row, worker)
+                wanted = self._windows(expected, row, worker)
                 windows = list(map(steady_window, self.windows[b][worker], wanted))
                 sight = self.eyes.look(self.renderer, windows, self._track(b, worker))
                 self.windows[b][worker] = sight.windows

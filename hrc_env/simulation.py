@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env import metrics, observations, rewards
-from hrc_env.batching import picked, rows, write_rows
+from hrc_env.batching import picked, write_rows
 from hrc_env.belief import Believed, estimated_gap
 from hrc_env.body import load_body, worker_truth
 from hrc_env.config import HRCConfig
@@ -106,7 +106,7 @@ class Simulation:
         robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
         reach.reset(self.task, ids, self.streams.task, robot.tool_world, self.config.task)
         self.senses.reset(ids, picked(self.streams.sensor, ids), picked(self.streams.tracker, ids))
-        motion = rows(generator.current(self.motion), ids)
+        motion = generator.current(self.motion, ids)
         truth = worker_truth(self.body, motion)
         estimate = self._sense(ids, motion, truth)
         observation = observations.observe(self._believed(robot), self.layout)[ids]
@@ -179,7 +179,10 @@ class Simulation:
         estimate = self.senses.sense(
             moment, picked(streams.sensor, ids), picked(streams.tracker, ids)
         )
-        write_rows(self.estimate, ids, estimate)
+        if len(ids) == self.batch:
+            self.estimate = estimate
+        else:
+            write_rows(self.estimate, ids, estimate)
         return estimate
 
     def _believed(self, robot: RobotState) -> Believed:

@@ -70,37 +70,3 @@ HAND_SEGMENTS: tuple[tuple[int, int, float, float], ...] = (
 SEGMENT_RADIUS_M: Floats = np.array(
     [radius for *_, radius in SEGMENT_ENDS] + [radius for *_, radius in HAND_SEGMENTS]
 )
-
-
-def _end_weights() -> Floats:
-    """(2 S, 15) matrix that takes joints to the ends of segments; hands end at the wrist."""
-    weights = np.zeros((len(SEGMENT_RADIUS_M), 2, N_JOINTS))
-    for k, (first, second, _) in enumerate(SEGMENT_ENDS):
-        weights[k, 0, list(first)] = 1 / len(first)
-        weights[k, 1, list(second)] = 1 / len(second)
-    for k, (_, wrist, _, _) in enumerate(HAND_SEGMENTS, start=len(SEGMENT_ENDS)):
-        weights[k, :, wrist] = 1.0
-    return weights.reshape(-1, N_JOINTS)
-
-
-_END_WEIGHTS = _end_weights()
-_ELBOWS = [elbow for elbow, *_ in HAND_SEGMENTS]
-_WRISTS = [wrist for _, wrist, *_ in HAND_SEGMENTS]
-_HAND_REACH_M = np.array([[reach_m] for _, _, reach_m, _ in HAND_SEGMENTS])
-
-
-def segments(joints_world: Floats) -> Floats:
-    """End points of the body's segments, the hands last.
-
-    Args:
-        joints_world: (..., 15, 3) joints [m].
-
-    Returns:
-        (..., 16, 2, 3) end points [m]; radii are `SEGMENT_RADIUS_M`.
-    """
-    ends = _END_WEIGHTS @ joints_world  # a reshape to -1 would not do without workers
-    ends = ends.reshape(*joints_world.shape[:-2], len(SEGMENT_RADIUS_M), 2, 3)
-    forearm = joints_world[..., _WRISTS, :] - joints_world[..., _ELBOWS, :]
-    length = np.sqrt(np.einsum("...i,...i->...", forearm, forearm))[..., None]
-    ends[..., -len(HAND_SEGMENTS) :, 1, :] += _HAND_REACH_M * forearm / np.maximum(length, 1e-6)
-    return ends

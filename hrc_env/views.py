@@ -14,8 +14,10 @@ from hrc_env.simulation import Simulation
 from hrc_env.typing import Image, JointAngles
 
 PICTURE_SIZE = (960, 720)
-FILM_QUALITY = {**PICTURE_QUALITY, "shadowsize": 2048}
-"""Shadows a little coarser: a third of the time."""
+FILM_QUALITY = {
+    **PICTURE_QUALITY, "shadowsize": 1536, "numslices": 16, "numstacks": 8, "numquads": 1,
+}  # fmt: skip
+"""Shadows and round things a little coarser: a third of the time."""
 SMOOTHING = 2
 """Cameras' pictures are drawn so many times as large, and shrunk, for smooth edges."""
 MOSAIC_TILE = (640, 360)

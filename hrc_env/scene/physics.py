@@ -35,6 +35,12 @@ class Physics:
             raise ConfigError(
                 f"Physics needs at least one environment and one thread, got {batch}, {n_threads}."
             )
+        rows = scene.worker_mocap
+        if not np.array_equal(rows.ravel(), np.arange(scene.model.nmocap)):
+            raise HRCError(
+                "The workers' segments must be the scene's only mocap bodies, in order; "
+                f"expected rows 0 to {scene.model.nmocap - 1}, got {rows.ravel()}."
+            )
         self.scene = scene
         self.batch = batch
         self.n_threads = n_threads
@@ -114,9 +120,9 @@ class Physics:
         shape = rays.shape[:-1]
         if 0 in shape:
             return np.zeros(shape, bool)
-        length = np.linalg.norm(rays, axis=-1)
+        length = np.sqrt(np.einsum("...i,...i->...", rays, rays))
         distance, _ = self._sims.ray(
-            np.broadcast_to(eyes[None, :, None, None], rays.shape).reshape(batch, -1, 3),
+            np.repeat(eyes, shape[2] * shape[3], axis=0),
             (rays / length[..., None]).reshape(batch, -1, 3),
             geomgroup=self._blocks_sight,
             ids=ids,
@@ -155,14 +161,10 @@ class Physics:
 
     def _write_workers(self, motion: WorkerMotion) -> None:
         """The workers' bodies into the inputs of the substeps."""
-        rows, model = self.scene.worker_mocap, self.scene.model
-        if rows.size == 0:
-            return
-        turns_from = model.nu + 3 * model.nmocap
-        for axis in range(3):
-            self._control[:, :, model.nu + 3 * rows + axis] = motion.position_world[..., axis]
-        for axis in range(4):
-            self._control[:, :, turns_from + 4 * rows + axis] = motion.quaternion_wxyz[..., axis]
+        first, n_mocap = self.scene.model.nu, self.scene.model.nmocap
+        lead, turns = self._control.shape[:2], first + 3 * n_mocap
+        self._control[:, :, first:turns] = motion.position_world.reshape(*lead, 3 * n_mocap)
+        self._control[:, :, turns:] = motion.quaternion_wxyz.reshape(*lead, 4 * n_mocap)
 
     def _shorten_leashes(self) -> None:
         """Keep angle and velocity commands near a blocked arm, so that it leaves at once."""

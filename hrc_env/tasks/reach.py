@@ -96,14 +96,17 @@ def advance(
 ) -> ReachProgress:
     """Judge the tool's new place (B, 3) and replace goals that are done."""
     before_m = state.distance_m.copy()
-    state.distance_m[:] = np.linalg.norm(state.goal_world - tool_world, axis=-1)
+    offset = state.goal_world - tool_world
+    state.distance_m[:] = np.sqrt(np.einsum("bi,bi->b", offset, offset))
     state.goal_age_s += dt_s
     reached = state.distance_m < config.radius_m
     missed = ~reached & (state.goal_age_s >= config.time_limit_s - 1e-9)
     progress_m = before_m - state.distance_m
     state.n_reached += reached
     state.n_missed += missed
-    _new_goals(state, np.flatnonzero(reached | missed), rngs, tool_world, config)
+    done = reached | missed
+    if done.any():
+        _new_goals(state, np.flatnonzero(done), rngs, tool_world, config)
     return ReachProgress(progress_m, reached, missed)
 
 
@@ -128,4 +131,5 @@ def _new_goals(
         goal = (x + distance * np.cos(azimuth), y + distance * np.sin(azimuth), height)
         state.goal_world[b] = goal
         state.goal_age_s[b] = 0.0
-        state.distance_m[b] = np.linalg.norm(state.goal_world[b] - tool_world[b])
+        offset = state.goal_world[b] - tool_world[b]
+        state.distance_m[b] = np.sqrt(offset @ offset)

@@ -20,7 +20,7 @@ def estimate_from_truth(truth: WorkerTruth) -> PoseEstimate:
     shape = truth.joints_world.shape[:-1]
     return PoseEstimate(
         mean_world=truth.joints_world.copy(),
-        cov_world=np.tile(GIVEN_STD_M**2 * np.eye(3), (*shape, 1, 1)),
+        cov_world=np.full((*shape, 3, 3), GIVEN_STD_M**2 * np.eye(3)),
         velocity_world=truth.velocity_world.copy(),
         age_s=np.zeros(shape),
         tracked=np.ones(shape[:-1], bool),

@@ -6,8 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from people import STANDING
 
+from hrc_env.geometry.segments import segments
 from hrc_env.perception.self_occlusion import bounding_spheres, hidden_by_capsules
-from hrc_env.skeleton import JOINT, SEGMENT_RADIUS_M, segments
+from hrc_env.skeleton import JOINT, SEGMENT_RADIUS_M
 
 POST = np.array([[[0.0, 0, 0], [0, 0, 2.0]]])
 
