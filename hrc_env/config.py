@@ -86,7 +86,10 @@ def resolve(config: "HRCConfig | Mapping[str, Any] | None") -> HRCConfig:
 
 
 def from_mapping(kind: type[ConfigT], mapping: Mapping[str, Any], path: str = "") -> ConfigT:
-    """A dataclass from a mapping; nested dataclasses from nested mappings."""
+    """A dataclass from a mapping; what it nests may be mappings too, tuples may be lists.
+
+    This undoes what `dataclasses.asdict` and JSON do to a config.
+    """
     hints = typing.get_type_hints(kind)
     names = [each.name for each in dataclasses.fields(kind)]  # type: ignore[arg-type]
     values: dict[str, Any] = {}
@@ -94,14 +97,17 @@ def from_mapping(kind: type[ConfigT], mapping: Mapping[str, Any], path: str = ""
         where = f"{path}{name}"
         if name not in names:
             raise unknown("config field", where, [f"{path}{each}" for each in names])
-        nested = hints[name]
-        if dataclasses.is_dataclass(nested) and isinstance(value, Mapping):
-            value = from_mapping(typing.cast(type, nested), value, f"{where}.")
-        elif isinstance(value, list):  # JSON knows no tuples
-            value = _tuples(value)
-        values[name] = value
+        values[name] = _restored(hints[name], value, where)
     return kind(**values)
 
 
-def _tuples(value: Any) -> Any:
-    return tuple(_tuples(each) for each in value) if isinstance(value, list) else value
+def _restored(hint: Any, value: Any, where: str) -> Any:
+    """A field's value as its type hint wants it."""
+    if dataclasses.is_dataclass(hint) and isinstance(value, Mapping):
+        return from_mapping(typing.cast(type, hint), value, f"{where}.")
+    if isinstance(value, list | tuple) and typing.get_origin(hint) is tuple:
+        inner = typing.get_args(hint)
+        hints = [inner[0]] * len(value) if inner[-1] is Ellipsis else inner
+        parts = zip(hints, value, strict=False)
+        return tuple(_restored(each, part, f"{where}[{k}]") for k, (each, part) in enumerate(parts))
+    return value

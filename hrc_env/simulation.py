@@ -94,6 +94,8 @@ class Simulation:
         self.action = np.zeros((batch, self.n_actions))
         self.episode_cost = np.zeros(batch)
         self.estimate = given.prior(batch, n_workers, config.tracker)
+        robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
+        self.believed = self._believed(robot)
         blank = [np.random.default_rng(0)] * batch
         self.streams = Streams(*(list(blank) for _ in range(5)))
 
@@ -109,14 +111,15 @@ class Simulation:
         motion = generator.current(self.motion, ids)
         truth = worker_truth(self.body, motion)
         estimate = self._sense(ids, motion, truth)
-        observation = observations.observe(self._believed(robot), self.layout)[ids]
+        self.believed = self._believed(robot)
+        observation = observations.observe(self.believed, self.layout)[ids]
         info = {**tracking_info(estimate, truth), **rows_of(self._tally(), ids)}
         return Outcome(observation, np.zeros(len(ids)), np.zeros(len(ids), bool), info)
 
     def step(self, action: Floats) -> Outcome:
         """One control step of every environment; action (B, A) in [-1, 1]."""
         config, streams = self.config, self.streams
-        previous, self.action = self.action, action
+        previous, self.action = self.action, np.array(action, float)
         command = joint_command(
             self.control, action, self.physics.q, self.chain, self.scene.home_q, config.control
         )
@@ -132,7 +135,7 @@ class Simulation:
         progress = reach.advance(
             self.task, streams.task, robot.tool_world, config.ctrl_dt, config.task
         )
-        believed = self._believed(robot)
+        self.believed = believed = self._believed(robot)
         reward, terms = rewards.reward(believed, progress, previous, config.reward)
 
         bodies = chains.capsules(self.chain, q_trace)

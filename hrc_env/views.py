@@ -14,6 +14,8 @@ from hrc_env.simulation import Simulation
 from hrc_env.typing import Image, JointAngles
 
 PICTURE_SIZE = (960, 720)
+VIEWPOINT = "beside"
+"""From where people look on: robot and worker side by side."""
 FILM_QUALITY = {
     **PICTURE_QUALITY, "shadowsize": 1536, "numslices": 16, "numstacks": 8, "numquads": 1,
 }  # fmt: skip
@@ -32,14 +34,14 @@ class Views:
         self._squares: dict[int, CropRenderer] = {}
 
     def picture(self, depth: bool = False) -> NDArray[Any]:
-        """The room, (720, 960, 3) uint8, or distances (720, 960) float32 [m]."""
-        return self._picture_renderer(*PICTURE_SIZE).picture(*self.pose(), "room", depth=depth)
+        """Robot and worker, (720, 960, 3) uint8, or distances (720, 960) float32 [m]."""
+        return self._picture_renderer(*PICTURE_SIZE).picture(*self.pose(), VIEWPOINT, depth=depth)
 
     def room(self, width: int, height: int) -> Image:
         """The room with the estimated skeleton over it."""
         renderer = self._picture_renderer(width, height)
-        image = renderer.picture(*self.pose(), "room").astype(np.uint8, copy=False)
-        camera = renderer.camera("room")
+        image = renderer.picture(*self.pose(), VIEWPOINT).astype(np.uint8, copy=False)
+        camera = renderer.camera(VIEWPOINT)
         pictures.draw_estimate(image, camera, self.simulation.estimate, self.b)
         pictures.draw_goal(image, camera, self.simulation.task.goal_world[self.b])
         return image

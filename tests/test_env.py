@@ -10,8 +10,12 @@ from gymnasium.utils.env_checker import check_env
 from stable_baselines3.common.env_checker import check_env as check_env_for_sb3
 
 import hrc_env  # registers the ids
+from hrc_env.config import HRCConfig
 from hrc_env.env import HRCReachEnv
 from hrc_env.errors import ConfigError
+from hrc_env.records import Keypoints
+from hrc_env.rewards import RewardConfig
+from hrc_env.scene.rig import CameraConfig
 from hrc_env.senses import LEVELS
 
 FAST_LEVELS = ("keypoints", "truth", "none")
@@ -74,17 +78,20 @@ def test_a_reset_without_a_seed_goes_on_with_the_stream():
     assert not np.array_equal(first, second)
 
 
-@pytest.mark.parametrize("level", FAST_LEVELS)
-def test_pickled_in_the_middle_of_an_episode_it_goes_on_the_same(level):
+@pytest.mark.parametrize(
+    ("level", "n_steps"), [("pixels", 3), ("keypoints", 20), ("truth", 20), ("none", 20)]
+)
+def test_pickled_in_the_middle_of_an_episode_it_goes_on_the_same(level, n_steps):
     env = HRCReachEnv(perception=level)
-    roll(env, 20)
+    roll(env, n_steps)
     twin = pickle.loads(pickle.dumps(env))
     rng = np.random.default_rng(5)
-    for _ in range(20):
+    for _ in range(n_steps):
         action = rng.uniform(-1, 1, 6).astype(np.float32)
         a, b = env.step(action), twin.step(action)
         np.testing.assert_array_equal(a[0], b[0])
         assert a[1:] == b[1:]
+    env.close(), twin.close()
 
 
 def test_the_worker_walks_the_same_whoever_looks():
@@ -143,6 +150,54 @@ def test_without_an_estimate_the_prior_is_observed_at_its_bounds():
     assert "tracking/mpjpe_m" not in info
 
 
+def looking_at_the_ceiling() -> dict:
+    """A rig that no worker can walk into."""
+    eyes = ((2.0, 2.0, 1.0), (-2.0, 2.0, 1.0))
+    cameras = [
+        CameraConfig(f"up_{k}", eye, (eye[0] * 0.99, eye[1], 2.5), 40.0)
+        for k, eye in enumerate(eyes)
+    ]
+    return {"scene": {"cameras": tuple(cameras)}}
+
+
+@pytest.mark.parametrize(("level", "n_steps"), [("keypoints", 60), ("pixels", 2)])
+def test_a_worker_out_of_every_view_is_data(level, n_steps):
+    """Never acquired, never an exception: the prior, and the episode goes on."""
+    env = HRCReachEnv(perception=level, config=looking_at_the_ceiling())
+    for observation, reward, info in roll(env, n_steps):
+        assert info["tracking/lost"] == 1.0
+        assert "tracking/mpjpe_m" not in info
+        assert np.isfinite(observation).all()
+        assert np.isfinite(reward)
+    env.close()
+
+
+def test_a_worker_who_leaves_the_views_is_lost_with_growing_doubt():
+    """Twenty steps with four cameras, then none: deviation and age grow until the track ends."""
+    env = HRCReachEnv(perception="keypoints")
+    roll(env, 20)
+    hide_everything(env)
+    stds, lost = [], []
+    for _ in range(60):
+        observation, *_, info = env.step(np.zeros(6, np.float32))
+        stds.append(env.split_observation(observation)["worker_joints_std"].mean())
+        lost.append(info["tracking/lost"])
+    assert stds[5] < stds[15] < stds[25]
+    assert lost[10] == 0.0
+    assert lost[-1] == 1.0
+
+
+def hide_everything(env: HRCReachEnv) -> None:
+    """From now on the detector finds nobody."""
+    senses = env.simulation.senses
+    blank = senses.keypoints
+    nothing = Keypoints(
+        np.full_like(blank.px, np.nan), np.zeros_like(blank.confidence),
+        np.full_like(blank.sigma_px, np.inf),
+    )  # fmt: skip
+    senses.detect = lambda now, predicted, rngs: nothing
+
+
 def test_contact_ends_the_episode_when_asked():
     config = {"cost": {"contact_terminates": True, "proximity_m": 9.0}}
     for seed in range(40):
@@ -153,9 +208,12 @@ def test_contact_ends_the_episode_when_asked():
     pytest.fail("no contact in 40 episodes: the test saw nothing")
 
 
-def test_a_config_survives_the_spec_as_a_mapping():
-    """`EnvSpec.to_json` turns dataclasses into mappings; both are taken."""
-    env = make(perception="truth", config={"reward": {"proximity": 0.0}})
+@pytest.mark.parametrize(
+    "config", [{"reward": {"proximity": 0.0}}, HRCConfig(reward=RewardConfig(proximity=0.0))]
+)
+def test_a_config_survives_the_spec(config):
+    """`EnvSpec.to_json` turns dataclasses into mappings and tuples into lists."""
+    env = make(perception="truth", config=config)
     again = gymnasium.make(gymnasium.envs.registration.EnvSpec.from_json(env.spec.to_json()))
     assert again.unwrapped.config == env.unwrapped.config
     assert again.unwrapped.config.reward.proximity == 0.0
@@ -203,6 +261,24 @@ def test_an_unknown_id_names_the_package():
     with pytest.raises(gymnasium.error.Error, match="HRCReach"):
         gymnasium.make("HRCReach-v7")
     assert hrc_env.IDS == ("HRCReach-v0",)
+
+
+def test_the_id_registers_itself_when_its_package_is_named():
+    env = gymnasium.make("hrc_env:HRCReach-v0", perception="none")
+    assert isinstance(env.unwrapped, HRCReachEnv)
+
+
+def test_pictures_have_the_shape_they_promise():
+    env = HRCReachEnv(perception="keypoints", render_mode="rgb_array")
+    env.reset(seed=0)
+    assert env.render().shape == (720, 960, 3)
+    assert env.mosaic().shape == (724, 1284, 3)
+    depth = HRCReachEnv(perception="truth", render_mode="depth_array")
+    depth.reset(seed=0)
+    metres = depth.render()
+    assert metres.shape == (720, 960)
+    assert 0.3 < np.median(metres) < 9.0
+    env.close(), depth.close()
 
 
 def test_stepping_before_a_reset_is_refused():

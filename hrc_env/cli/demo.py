@@ -17,7 +17,7 @@ class Demo:
 
     out: Path = Path("out/demo.mp4")
     """The film; a still PNG is written beside it."""
-    seed: int = 4
+    seed: int = 14
     """Seed of the episode."""
     seconds: float = 10.0
     """Length of the film."""

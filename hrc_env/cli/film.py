@@ -84,7 +84,7 @@ def _roll(
     for step in track(range(n_steps), description="filming"):
         observation, _, terminated, _, info = env.step(agent.act(observation))
         infos.append(info)
-        diary.note(info, float(env.split_observation(observation)["worker_gap"].min(initial=1.0)))
+        diary.note(info, float(env.simulation.believed.gap.distance_m.min(initial=np.inf)))
         errors_m.append(info.get("tracking/mpjpe_m", np.nan))
         if step % STEPS_PER_FRAME == 0:
             frame = compose(env, diary)

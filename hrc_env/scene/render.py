@@ -35,6 +35,7 @@ Key: TypeAlias = tuple[float, ...]
 """A camera's index and the numbers of a window."""
 
 VIEWPOINTS: dict[str, tuple[tuple[float, float, float], tuple[float, float, float], float]] = {
+    "beside": ((0.45, -2.62, 1.95), (0.12, 0.0, 0.95), 68.0),
     "room": ((2.35, -2.15, 1.95), (-0.25, 0.15, 1.02), 78.0),
     "side": ((0.45, -2.55, 1.65), (0.1, 0.3, 1.0), 84.0),
     "arm": ((0.75, -1.55, 1.60), (-0.45, 0.05, 1.10), 56.0),
