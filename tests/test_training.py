@@ -105,11 +105,12 @@ def test_the_scripted_reacher_reaches_without_a_worker():
     assert score.contacts_per_episode == 0
 
 
-def test_yielding_costs_less_than_not_yielding():
-    """On the same seeds; the robot that slows down near people is nearer to nobody."""
+def test_yielding_touches_people_less_often():
+    """On the same seeds. (It does not come less *near*: a robot that stands still near a worker
+    is in their way, which only retreat would mend.)
+    """
     reckless, yielding = (
         evaluate(lambda at, name=name: make_agent(name, at), 24, 24, perception="keypoints")
         for name in ("scripted", "scripted_slowed")
     )
-    assert yielding.contacts_per_episode <= reckless.contacts_per_episode
-    assert yielding.cost_per_episode < reckless.cost_per_episode
+    assert yielding.contacts_per_episode < 0.8 * reckless.contacts_per_episode

@@ -1,0 +1,54 @@
+"""Make the pictures of README and docs: python docs/make_pictures.py
+
+loop.jpg      the still of `python -m hrc_env demo`
+room.jpg      the lab from beside and from outside
+learning.png  the curve of `make train-quick`, if runs/quick is there
+"""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import imageio.v2 as imageio
+import numpy as np
+
+from hrc_env.env import HRCReachEnv
+from hrc_env.scene.render import PictureRenderer
+
+PICTURES = Path(__file__).parent / "pictures"
+JPEG_QUALITY = 88
+
+
+def save(image: np.ndarray, name: str) -> None:
+    """A JPEG in docs/pictures."""
+    path = str(PICTURES / name)
+    cv2.imwrite(path, image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+
+
+def loop() -> None:
+    """One frame of the demo's film."""
+    subprocess.run([sys.executable, "-m", "hrc_env", "demo"], check=True)
+    save(imageio.imread("out/demo.png"), "loop.jpg")
+
+
+def room() -> None:
+    """The place."""
+    env = HRCReachEnv(perception="truth")
+    env.reset(seed=3)
+    for _ in range(60):
+        env.step(np.zeros(6))
+    renderer = PictureRenderer(env.simulation.scene, 960, 640)
+    views = [renderer.picture(*env.views.pose(), view) for view in ("room", "outside")]
+    save(np.hstack(views), "room.jpg")
+    renderer.close()
+    env.close()
+
+
+if __name__ == "__main__":
+    PICTURES.mkdir(exist_ok=True)
+    loop()
+    room()
+    if Path("runs/quick/curve.png").exists():
+        shutil.copy("runs/quick/curve.png", PICTURES / "learning.png")
