@@ -21,8 +21,8 @@ INTRODUCTION = """\
 {doc}
 
 ```python
-gymnasium.make("HRCReach-v0", perception="keypoints")   # after `import hrc_env`
-gymnasium.make("hrc_env:HRCReach-v0")                   # without it
+gymnasium.make("HRCReach-v0", perception="keypoints")  # after `import hrc_env`
+gymnasium.make("hrc_env:HRCReach-v0")  # without it
 ```
 
 ## Action space
