@@ -9,22 +9,23 @@ the floor and into a worker for two seconds and then away again; penetration com
 capsules' geometry.
 """
 
-import json
 import time
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from rich.console import Console
+from rich.table import Column, Table
 
 from hrc_env.body import load_body, rest_motion, worker_truth
 from hrc_env.geometry import chains
 from hrc_env.geometry.distances import narrowest_gap
 from hrc_env.records import WorkerMotion
+from hrc_env.results import Metric, over, write_results
 from hrc_env.scene.build import Scene, SceneConfig, build
 from hrc_env.scene.physics import Physics, no_workers
 
 CTRL_DT = 0.04
+SEEDS = range(8)
 STEPS_S = (0.004, 0.005, 0.008, 0.010)
 OUT = Path("out/sim_dt.json")
 EXCURSION = np.array([1.0, 1.0, 1.0, 1.0, 0.6, 1.0])
@@ -131,46 +132,41 @@ def step_us(scene: Scene, batch: int) -> float:
     return 1e6 * float(np.median(times)) / batch
 
 
-def measure(sim_dt: float) -> dict[str, Any]:
+def measure(sim_dt: float) -> dict[str, Metric]:
     """One row of the table."""
-    scene = build(replace(SceneConfig(), sim_dt=sim_dt), n_workers=1)
-    empty = build(replace(SceneConfig(), sim_dt=sim_dt))
-    rng = np.random.default_rng(0)
-    smooth = tool_error_mm(empty, smooth_targets(rng, 150, 32))
-    jumping = tool_error_mm(empty, jumping_targets(rng, 150, 32))
-    return {
-        "sim_dt_ms": 1000 * sim_dt,
-        "smooth_mm": [float(np.percentile(smooth, share)) for share in (50, 95, 100)],
-        "jumping_mm": [float(np.percentile(jumping, share)) for share in (50, 95, 100)],
-        "floor": floor_contact(empty),
-        "worker": worker_contact(scene),
-        "step_us_1": step_us(scene, 1),
-        "step_us_64": step_us(scene, 64),
-    }
+    name = f"{1000 * sim_dt:g}ms"
+    scene = build(SceneConfig(sim_dt=sim_dt), n_workers=1)
+    empty = build(SceneConfig(sim_dt=sim_dt))
+    metrics: dict[str, Metric] = {}
+    for kind, targets in (("smooth", smooth_targets), ("jumping", jumping_targets)):
+        errors = [
+            tool_error_mm(empty, targets(np.random.default_rng(seed), 150, 32)) for seed in SEEDS
+        ]
+        for share in (50, 95):
+            each = [float(np.percentile(error, share)) for error in errors]
+            metrics[f"tool_error_p{share}.{kind}.{name}"] = over(each, "mm")
+    for what, contact in (("floor", floor_contact(empty)), ("worker", worker_contact(scene))):
+        for key, value in contact.items():
+            key, unit = key.rsplit("_", 1) if key.endswith(("_mm", "_m")) else (key, "rad/s")
+            metrics[f"contact_{key}.{what}.{name}"] = over([value], unit)
+    for batch in (1, 64):
+        metrics[f"step_us.{batch}.{name}"] = over([step_us(scene, batch)], "us")
+    return metrics
 
 
 def main() -> None:
     """Measure, print, write."""
-    rows = [measure(sim_dt) for sim_dt in STEPS_S]
-    print(
-        "| sim_dt ms | smooth: median / p95 / max mm | jumping | floor: depth mm, rad/s, away m "
-        "| worker: the same | us/step B=1 | B=64 |\n|---|---|---|---|---|---|---|"
-    )
-    for row in rows:
-        errors = " | ".join(
-            " / ".join(f"{value:.2f}" for value in row[what])
-            for what in ("smooth_mm", "jumping_mm")
-        )
-        contacts = " | ".join(
-            "{depth_mm:.1f}, {pressed_rad_s:.3f}, {away_m:.3f}".format(**row[what])
-            for what in ("floor", "worker")
-        )
-        print(
-            f"| {row['sim_dt_ms']:g} | {errors} | {contacts} | {row['step_us_1']:.0f} "
-            f"| {row['step_us_64']:.0f} |"
-        )
-    OUT.parent.mkdir(exist_ok=True)
-    OUT.write_text(json.dumps(rows, indent=1))
+    metrics: dict[str, Metric] = {}
+    for sim_dt in STEPS_S:
+        metrics.update(measure(sim_dt))
+    names = sorted({key.rsplit(".", 1)[0] for key in metrics})
+    columns = [f"{1000 * sim_dt:g}ms" for sim_dt in STEPS_S]
+    table = Table(Column("median (largest) over seeds", no_wrap=True), *columns)
+    for name in names:
+        row = [metrics[f"{name}.{column}"] for column in columns]
+        table.add_row(name, *(f"{each.value:.3g} ({each.high:.3g}) {each.unit}" for each in row))
+    Console(width=130).print(table)
+    write_results(OUT, {"ctrl_dt": CTRL_DT}, list(SEEDS), metrics)
 
 
 if __name__ == "__main__":
