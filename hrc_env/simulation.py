@@ -81,6 +81,7 @@ class Simulation:
         n_threads: int = 1,
     ) -> None:
         self.batch, self.config, self.control = batch, config, control
+        self.perception = perception
         self.body = load_body(config.worker)
         self.scene = build(config.scene, scene, n_workers, config.worker, cameras)
         self.chain = self.scene.chain

@@ -117,10 +117,10 @@ def compose(env: HRCReachEnv, diary: Diary) -> Image:
     crops = env.views.crops(CROP)
     for k, crop in enumerate(crops[:4]):
         _paste(frame, crop, (WIDTH - 2 * TILE[0] - 4 + k * (CROP + 4), 2 * TILE[1] + 52))
-    if crops:
-        title = "what the pose network is given: crops round the predicted worker"
-        at = (WIDTH - 2 * TILE[0], 2 * TILE[1] + 22)
-        pictures.write(frame, title, at, 16)
+    title = "what the pose network is given: crops round the predicted worker"
+    if not crops:
+        title = f"perception level {env.simulation.perception}: nobody looked at these pictures"
+    pictures.write(frame, title, (WIDTH - 2 * TILE[0], 2 * TILE[1] + 22), 16)
     _paste(frame, strip(diary, env.config.ctrl_dt, env.config.cost.proximity_m), (0, 720))
     return frame
 
