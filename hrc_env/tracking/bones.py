@@ -49,7 +49,7 @@ def use_bones(body, cov, n_views, length, variance):
             for i in range(3):
                 total += cov[a, i, i] + cov[b, i, i]
             measured = now - 0.5 * (total - spread) / now  # errors across a bone lengthen it
-            _learn(measured, max(spread, _STIFFNESS[k] ** 2), k, length, variance)
+            learn_length(measured, max(spread, _STIFFNESS[k] ** 2), k, length, variance)
         miss = length[k] - now
         innovation = spread + _STIFFNESS[k] ** 2 + variance[k]
         innovation = max(innovation, miss * miss / 16.0)  # no more than four standard deviations
@@ -58,7 +58,8 @@ def use_bones(body, cov, n_views, length, variance):
 
 
 @numba.njit(**_JIT)
-def _learn(measured, spread, k, length, variance):
+def learn_length(measured, spread, k, length, variance):
+    """Kalman update of length[k] by a measurement whose errors last for several updates."""
     noise = _CORRELATED_UPDATES * spread
     miss = measured - length[k]
     if miss * miss > _GATE_SIGMA**2 * (noise + variance[k]):

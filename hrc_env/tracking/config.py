@@ -23,6 +23,7 @@ _POSITIVE = (
     "gauss_newton_steps",
     "image_area_px",
     "root_acceleration",
+    "one_view_inflation",
 )
 _SCHEMES = ("multinomial", "systematic")
 _BETWEEN_0_AND_1 = ("outlier_weight", "damping", "swap_begins", "swap_ends", "defensive_share")
@@ -85,6 +86,11 @@ class TrackerConfig:
     """Damping ratio of a joint about its place on the body; in (0, 1)."""
     root_acceleration: float = 4.0
     """Spectral density of the whole body's acceleration [m^2/s^3]."""
+    mean_correction: float = 0.8
+    """Share of Laplace's step from the mode to the mean (kalman); without it the depth that one
+    camera leaves open runs to the lens, the whole of it overshoots a little."""
+    one_view_inflation: float = 1.21
+    """Factor on the reported covariance of joints that one view carries (kalman)."""
     swap_begins: float = 0.01
     """Probability per update that a camera begins to exchange left and right."""
     swap_ends: float = 0.15
@@ -102,6 +108,8 @@ class TrackerConfig:
             raise unknown("paper_resampling", self.paper_resampling, _SCHEMES)
         if self.paper_sigma_m < 0:
             raise ConfigError(f"paper_sigma_m must not be negative, got {self.paper_sigma_m}.")
+        if self.mean_correction < 0:
+            raise ConfigError(f"mean_correction must not be negative, got {self.mean_correction}.")
         if self.n_particles < 50:
             raise ConfigError(f"n_particles must be at least 50, got {self.n_particles}.")
         if self.lost_after_s > self.max_age_s:

@@ -3,6 +3,7 @@
 | name | what it is |
 |---|---|
 | `particle` | the default: a Gaussian particle filter per joint on a body motion model |
+| `kalman` | one Gaussian on the kinematic tree: honest with one camera |
 | `paper` | the paper's Algorithm 1 as printed |
 | `triangulation` | every frame by itself, the last point held through gaps |
 
@@ -17,6 +18,7 @@ import numpy as np
 from hrc_env.errors import ConfigError, unknown
 from hrc_env.records import Keypoints, PoseEstimate
 from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.kalman import KalmanEstimator
 from hrc_env.tracking.paper import PaperEstimator
 from hrc_env.tracking.particle import ParticleEstimator
 from hrc_env.tracking.triangulating import TriangulationEstimator
@@ -62,6 +64,7 @@ class Estimator(Protocol[State]):
 
 ESTIMATORS: dict[str, Callable[[Floats, float, TrackerConfig], Estimator[Any]]] = {
     "particle": ParticleEstimator,
+    "kalman": KalmanEstimator,
     "paper": PaperEstimator,
     "triangulation": TriangulationEstimator,
 }

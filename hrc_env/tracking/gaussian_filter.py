@@ -1,6 +1,6 @@
 """The kernels of the default estimator: one loop over (B, W), one function per step of it.
 
-`state` and `s` are `particle.ParticleState` and `particle.Settings`; a worker's measurements
+`state` and `s` are `particle.ParticleState` and `settings.Settings`; a worker's measurements
 are z (J, C, 2), sigma (J, C), ok (J, C) as `measurements.read_worker` fills them.
 """
 
@@ -10,14 +10,7 @@ import numba
 import numpy as np
 
 from hrc_env.geometry.triangulation import inverse3
-from hrc_env.tracking.acquisition import (
-    complete_body,
-    count_conflict,
-    distance,
-    find_again,
-    middle_of,
-    triangulate_body,
-)
+from hrc_env.tracking.acquisition import count_conflict
 from hrc_env.tracking.bones import use_bones
 from hrc_env.tracking.importance import (
     cholesky3,
@@ -27,15 +20,13 @@ from hrc_env.tracking.importance import (
     weighted_moments,
 )
 from hrc_env.tracking.measurements import read_worker
-from hrc_env.tracking.motion_model import is_positive_definite, predict_body
+from hrc_env.tracking.motion_model import predict_body
 from hrc_env.tracking.proposal import contrast_of, find_mode
 from hrc_env.tracking.swaps import undo_swaps
+from hrc_env.tracking.upkeep import acquire, check, find_joints_again
 
 _LEAST_ESS = 8.0
 """With fewer effective particles the Gaussian at the mode is the better answer."""
-_FOUND_SPEED_STD_M_S = 1.0
-_FURTHEST_STD = 4.0
-"""A body further than this many prior deviations from the prior has been lost."""
 _JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
@@ -70,40 +61,12 @@ def update_all(state, P, px, confidence, sigma_px, standing, noise, tables, n_mo
         for w in range(n_workers):
             read_worker(px, confidence, sigma_px, b, w, s.sigma_scale, z, sigma, ok)
             if not state.tracked[b, w]:
-                _acquire(state, b, w, P, z, sigma, ok, standing, s)
+                acquire(state, b, w, P, z, sigma, ok, standing, s)
                 continue
             swaps = (state.swap_chance[b, w], state.blind[b, w], state.believed[b, w])
             undo_swaps(P, state.body[b, w], state.cov[b, w], z, sigma, ok, *swaps, s)
             _follow(state, b, w, P, z, sigma, ok, noise, tables[b, w], n_mode, s)
-            _check(state, b, w, s)
-
-
-@numba.njit(**_JIT)
-def _acquire(state, b, w, P, z, sigma, ok, standing, s):
-    """Start a track when two views agree on enough joints."""
-    n_joints = len(ok)
-    points, spread = np.empty((n_joints, 3)), np.ones((n_joints, 3, 3))
-    found = np.empty(n_joints, np.bool_)
-    gate, radius = s.gate_sigma, s.body_radius_m
-    n_found = triangulate_body(P, z, sigma, ok, gate, radius, points, spread, found)
-    if n_found < s.acquire_min_joints:
-        return
-    complete_body(standing, points, spread, found)
-    for j in range(n_joints):
-        _place(state.body[b, w, j], state.cov[b, w, j], points[j], spread[j])
-        if found[j]:
-            state.age_s[b, w, j] = 0.0
-    state.tracked[b, w] = True
-
-
-@numba.njit(**_JIT)
-def _place(body, cov, point, spread):
-    """Put a joint at rest at a point."""
-    body[:3], body[3:] = point, 0.0
-    cov[:] = 0.0
-    cov[:3, :3] = spread
-    for i in range(3):
-        cov[3 + i, 3 + i] = _FOUND_SPEED_STD_M_S**2
+            check(state, b, w, s)
 
 
 @numba.njit(**_JIT)
@@ -131,7 +94,8 @@ def _follow(state, b, w, P, z, sigma, ok, noise, tables, n_mode, s):
             age[j] = 0.0
         state.conflict[b, w, j] = count_conflict(n_views[j], n_supporting, state.conflict[b, w, j])
     use_bones(body, cov, n_views, state.bone_length[b, w], state.bone_variance[b, w])
-    _find_again(state, b, w, P, z, sigma, ok, s)
+    placed = np.zeros(n_joints, np.bool_)
+    find_joints_again(state, b, w, P, z, sigma, ok, s, placed)
 
 
 @numba.njit(**_JIT)
@@ -208,43 +172,3 @@ def _regress(body, cov, precision, mean, spread, gain):
         for k in range(i, 6):
             cov[i, k] -= a * gain[k, 0] + b * gain[k, 1] + c * gain[k, 2]
             cov[k, i] = cov[i, k]
-
-
-@numba.njit(**_JIT)
-def _find_again(state, b, w, P, z, sigma, ok, s):
-    """Joints that have been elsewhere for a while, as two views say, are put there."""
-    everyone, middle = np.ones(len(ok), np.bool_), np.empty(3)
-    point, spread = np.empty(3), np.empty((3, 3))
-    for j in range(len(ok)):
-        if state.conflict[b, w, j] < s.conflict_frames:
-            continue
-        middle_of(state.body[b, w], everyone, middle)
-        gate, radius = s.gate_sigma, s.body_radius_m
-        if find_again(P, z[j], sigma[j], ok[j], gate, radius, middle, point, spread):
-            _place(state.body[b, w, j], state.cov[b, w, j], point, spread)
-            state.age_s[b, w, j], state.conflict[b, w, j] = 0.0, 0
-
-
-@numba.njit(**_JIT)
-def _check(state, b, w, s):
-    """Keep covariances positive definite; a body that has left the world is lost."""
-    body, cov, inside = state.body[b, w], state.cov[b, w], True
-    factor = np.empty((6, 6))
-    for j in range(len(body)):
-        if not is_positive_definite(cov[j], factor):
-            for i in range(6):
-                variance = cov[j, i, i]
-                cov[j, i, :], cov[j, :, i] = 0.0, 0.0
-                cov[j, i, i] = max(variance, 1e-4)
-        away = distance(body[j], s.prior_mean_world)
-        inside &= away < _FURTHEST_STD * s.prior_std_m and math.isfinite(cov[j].sum())
-        inside &= math.isfinite(body[j].sum())
-    if inside:
-        return
-    state.tracked[b, w] = False
-    for j in range(len(body)):
-        body[j, 3:] = 0.0
-        cov[j] = np.eye(6) * s.prior_std_m**2
-        state.age_s[b, w, j] = s.max_age_s
-        for i in range(3):
-            body[j, i] = s.prior_mean_world[i]

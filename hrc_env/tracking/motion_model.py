@@ -24,6 +24,8 @@ SPEED_M_S: Floats = np.array(
     [.4, .4, .4, 1.0, 1.0, 2.0, 2.0, .4, .4, 1.0, 1.0, 1.8, 1.8, 2.0, 2.0]
 )  # fmt: skip
 """Standard deviation of its speed relative to the body [m/s]; a judgement."""
+STANDING_COUNT = 5.0
+"""Updates that the standing body's offsets are worth before any was learnt."""
 _SHARES = (0.9, 0.6, 0.3, 0.1)
 _OFFSET_TAU_S, _OFFSET_STD_M = 2.0, 0.06
 _TORSO = tuple(int(j) for j in TORSO)
@@ -57,8 +59,13 @@ def damped_joints(dt_s: float, damping: float, root_acceleration: float) -> tupl
     stationary = np.zeros_like(F)
     stationary[:, 0, 0], stationary[:, 1, 1] = SPREAD_M**2, SPEED_M_S**2
     Q = stationary - F @ stationary @ F.swapaxes(1, 2)
-    Q += root_acceleration * np.array([[dt_s**3 / 3, dt_s**2 / 2], [dt_s**2 / 2, dt_s]])
+    Q += whole_body_noise(dt_s, root_acceleration)
     return F, Q
+
+
+def whole_body_noise(dt_s: float, root_acceleration: float) -> Floats:
+    """(2, 2) noise of position and velocity that all joints share over `dt_s` [s]."""
+    return root_acceleration * np.array([[dt_s**3 / 3, dt_s**2 / 2], [dt_s**2 / 2, dt_s]])
 
 
 @numba.njit(**_JIT)
@@ -67,7 +74,7 @@ def predict_body(body, cov, offset, offset_count, F, Q, dt):
     root = root_of(body, cov)
     cos, sin, known = heading(body, np.ones(len(body), np.bool_))
     if known:
-        _learn_offsets(body, cov, root, cos, sin, dt, offset, offset_count)
+        learn_offsets(body, cov, root, cos, sin, dt, offset, offset_count)
     shared = shared_covariance(cov)
     relative, factor = np.empty((6, 6)), np.empty((6, 6))
     for j in range(len(body)):
@@ -106,7 +113,8 @@ def root_of(body, cov):
 
 
 @numba.njit(**_JIT)
-def _learn_offsets(body, cov, root, cos, sin, dt, offset, offset_count):
+def learn_offsets(body, cov, root, cos, sin, dt, offset, offset_count):
+    """Joints that are known well teach their mean places (J, 3) on the body, in place."""
     for j in range(len(body)):
         if cov[j, 0, 0] + cov[j, 1, 1] + cov[j, 2, 2] > 3.0 * _OFFSET_STD_M**2:
             continue

@@ -22,32 +22,12 @@ from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.gaussian_filter import predict_all, update_all
 from hrc_env.tracking.importance import make_noise
 from hrc_env.tracking.measurements import arrays_of
-from hrc_env.tracking.motion_model import damped_joints
-from hrc_env.tracking.tracks import Tracks, forget, grow_older, report
+from hrc_env.tracking.motion_model import STANDING_COUNT, damped_joints
+from hrc_env.tracking.settings import Settings, settings_of
+from hrc_env.tracking.tracks import forget, gaussian_tracks, grow_older, report
 from hrc_env.typing import Bools, Floats, Ints
 
 _N_TABLES = 64
-_STANDING_COUNT = 5.0
-"""Updates that the standing body's offsets are worth before any was learnt."""
-
-
-class Settings(NamedTuple):
-    """What the kernels need of `TrackerConfig`, under the same names."""
-
-    sigma_scale: float
-    gate_sigma: float
-    body_radius_m: float
-    acquire_min_joints: int
-    conflict_frames: int
-    outlier_weight: float
-    image_area_px: float
-    swap_begins: float
-    swap_ends: float
-    gauss_newton_steps: int
-    proposal_inflation: float
-    prior_mean_world: tuple[float, float, float]
-    prior_std_m: float
-    max_age_s: float
 
 
 class ParticleState(NamedTuple):
@@ -100,8 +80,7 @@ class ParticleEstimator:
         n_mode = 2 * ((self.config.n_particles - n_prior) // 2)
         object.__setattr__(self, "n_mode", n_mode)
         object.__setattr__(self, "noise", make_noise(_N_TABLES, n_mode, n_prior))
-        values = (getattr(self.config, name) for name in Settings._fields)
-        object.__setattr__(self, "settings", Settings(*values))
+        object.__setattr__(self, "settings", settings_of(self.config))
 
     def init(self, batch: int, n_workers: int) -> ParticleState:
         """Workers whom nobody has seen."""
@@ -134,7 +113,7 @@ class ParticleEstimator:
         del rngs
         F, Q = damped_joints(dt_s, self.config.damping, self.config.root_acceleration)
         predict_all(state, F, Q, dt_s)
-        grow_older(tracks_of(state), dt_s, self.config)
+        grow_older(gaussian_tracks(state), dt_s, self.config)
 
     def update(
         self, state: ParticleState, keypoints: Keypoints, rngs: list[np.random.Generator]
@@ -151,25 +130,13 @@ class ParticleEstimator:
 
     def estimate(self, state: ParticleState) -> PoseEstimate:
         """What is believed now."""
-        return report(tracks_of(state), self.config)
+        return report(gaussian_tracks(state), self.config)
 
     def _forget(self, state: ParticleState, ids: Ints) -> None:
         length, variance = population(())
         state.cov[ids] = np.eye(6)
-        state.offset[ids], state.offset_count[ids] = STANDING_M, _STANDING_COUNT
+        state.offset[ids], state.offset_count[ids] = STANDING_M, STANDING_COUNT
         state.bone_length[ids], state.bone_variance[ids] = length, variance
         state.swap_chance[ids] = self.config.swap_begins
         state.blind[ids], state.believed[ids], state.ess[ids] = 0, 0, 0.0
-        forget(tracks_of(state), ids, self.config)
-
-
-def tracks_of(state: ParticleState) -> Tracks:
-    """The part of the state that all estimators share, as views into it."""
-    return Tracks(
-        mean_world=state.body[..., :3],
-        cov_world=state.cov[..., :3, :3],
-        velocity_world=state.body[..., 3:],
-        age_s=state.age_s,
-        tracked=state.tracked,
-        conflict=state.conflict,
-    )
+        forget(gaussian_tracks(state), ids, self.config)

@@ -26,7 +26,7 @@ def undo_swaps(P, body, cov, z, sigma, ok, chance, blind, believed, s):
     """Mirror z, sigma, ok (J, C) of the cameras that are probably swapped, in place.
 
     `chance` (C,) is the probability of being swapped, `blind` and `believed` (C,) count
-    updates; `s` are the `particle.Settings`.
+    updates; `s` are the `settings.Settings`.
     """
     contrast = contrast_of(s.outlier_weight, s.image_area_px)
     for c in range(len(P)):

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 import numba
 import numpy as np
@@ -42,6 +43,47 @@ def make_tracks(batch: int, n_workers: int, config: TrackerConfig) -> Tracks:
         age_s=start.age_s,
         tracked=start.tracked,
         conflict=np.zeros(start.age_s.shape, np.int64),
+    )
+
+
+class GaussianState(Protocol):
+    """A state that holds Gaussians over positions and velocities."""
+
+    @property
+    def body(self) -> Floats:
+        """(B, W, J, 6) position [m] and velocity [m/s]."""
+        ...
+
+    @property
+    def cov(self) -> Floats:
+        """(B, W, J, 6, 6)."""
+        ...
+
+    @property
+    def age_s(self) -> Floats:
+        """(B, W, J)."""
+        ...
+
+    @property
+    def tracked(self) -> Bools:
+        """(B, W)."""
+        ...
+
+    @property
+    def conflict(self) -> Ints:
+        """(B, W, J)."""
+        ...
+
+
+def gaussian_tracks(state: GaussianState) -> Tracks:
+    """The part of a state that all estimators share, as views into it."""
+    return Tracks(
+        mean_world=state.body[..., :3],
+        cov_world=state.cov[..., :3, :3],
+        velocity_world=state.body[..., 3:],
+        age_s=state.age_s,
+        tracked=state.tracked,
+        conflict=state.conflict,
     )
 
 

@@ -1,0 +1,54 @@
+"""Bone lengths on the edges of the tree: population values to begin with, learnt for each worker.
+
+Every update measures each edge's length by what is known of it (`stiff_lengths`), so that the
+bones are always on; a scalar Kalman filter per bone learns it while two views see both ends.
+"""
+
+import math
+
+import numba
+import numpy as np
+
+from hrc_env.skeleton import BONE_LENGTH_M
+from hrc_env.tracking.bones import POPULATION_SHARE, STIFFNESS_M, learn_length
+from hrc_env.tracking.tree import EDGE_BONE, PARENT, ROOT
+from hrc_env.typing import Floats
+
+_STIFFNESS = tuple(0.0 if j == ROOT else float(STIFFNESS_M[k]) for j, k in enumerate(EDGE_BONE))
+_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
+
+
+def population_edges() -> tuple[Floats, Floats]:
+    """Lengths [m] from each joint to its parent and their variances [m^2], (J,); the root's: 1."""
+    length = np.array([1.0 if k < 0 else BONE_LENGTH_M[k] for k in EDGE_BONE])
+    return length, (POPULATION_SHARE * length) ** 2
+
+
+@numba.njit(**_JIT)
+def stiff_lengths(variance, out):
+    """Variances (J,) of the lengths as measurements: what is not known of them, and the give."""
+    for j in range(len(variance)):
+        out[j] = variance[j] + _STIFFNESS[j] ** 2
+
+
+@numba.njit(**_JIT)
+def learn_lengths(body, cov, slope, n_views, length, variance):
+    """Learn lengths (J,) and variances (J,), in place, from the joints that two views see."""
+    for j in range(len(body)):
+        q = PARENT[j]
+        if q < 0 or n_views[j] < 2 or n_views[q] < 2:
+            continue
+        x, y, z = body[j, 0] - body[q, 0], body[j, 1] - body[q, 1], body[j, 2] - body[q, 2]
+        now = math.sqrt(x * x + y * y + z * z) + 1e-6
+        along = (x / now, y / now, z / now)
+        spread, total = 0.0, 0.0
+        for i in range(3):
+            for k in range(3):
+                edge = 0.0
+                for h in range(6):
+                    edge += slope[j, i, h] * cov[q, h, k]
+                difference = cov[j, i, k] + cov[q, i, k] - 2.0 * edge
+                spread += along[i] * along[k] * difference
+                total += difference if i == k else 0.0
+        measured = now - 0.5 * (total - spread) / now  # errors across a bone lengthen it
+        learn_length(measured, max(spread, _STIFFNESS[j] ** 2), j, length, variance)

@@ -1,0 +1,151 @@
+"""One Gaussian on the kinematic tree: honest when one camera is left (docs/tracking.md).
+
+The joints of a body share their errors: with one view the depth of all of them is wrong
+together. A filter that keeps each joint for itself counts one shared uncertainty fifteen times
+over and believes what it should not. Here the whole body is one Gaussian whose dependencies
+are the kinematic tree's (`tree`): a prediction with exact moments (`tree_predict`), a robust
+search (`tree_search`), one exact update and a step from the mode to the mean (`tree_update`),
+with bones of known length on every edge (`bone_lengths`).
+"""
+
+import functools
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from hrc_env.records import Keypoints, PoseEstimate
+from hrc_env.skeleton import N_JOINTS
+from hrc_env.tracking.acquisition import STANDING_M
+from hrc_env.tracking.bone_lengths import population_edges
+from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.measurements import arrays_of
+from hrc_env.tracking.motion_model import STANDING_COUNT, damped_joints, whole_body_noise
+from hrc_env.tracking.settings import Settings, settings_of
+from hrc_env.tracking.tracks import forget, gaussian_tracks, grow_older, report
+from hrc_env.tracking.tree_filter import predict_all, update_all
+from hrc_env.typing import Bools, Floats, Ints
+
+_ONE_VIEW = (0.2, 1.5)
+"""Sums of beliefs between which one view carries a joint."""
+
+
+class KalmanState(NamedTuple):
+    """The Gaussian and what is learnt of each worker; arrays changed in place."""
+
+    body: Floats
+    """(B, W, J, 6) mean position [m] and velocity [m/s] in the world."""
+    cov: Floats
+    """(B, W, J, 6, 6) marginal covariances."""
+    slope: Floats
+    """(B, W, J, 6, 6) slopes on the parent, as in `tree`."""
+    age_s: Floats
+    """(B, W, J)."""
+    tracked: Bools
+    """(B, W)."""
+    conflict: Ints
+    """(B, W, J), as in `tracks.Tracks`."""
+    offset: Floats
+    """(B, W, J, 3) mean place of a joint on the body [m]: forward, left, up of the torso."""
+    offset_count: Floats
+    """(B, W, J) updates that went into it."""
+    bone_length: Floats
+    """(B, W, J) from each joint to its parent [m]."""
+    bone_variance: Floats
+    """(B, W, J) [m^2]."""
+    swap_chance: Floats
+    """(B, W, C) probability that the camera exchanges left and right."""
+    blind: Ints
+    """(B, W, C) updates since the camera saw the worker."""
+    believed: Ints
+    """(B, W, C) updates for which it is still not asked about swaps."""
+    carried: Floats
+    """(B, W, J) sum of the beliefs in the views of the last update."""
+
+
+@dataclass(frozen=True, slots=True)
+class KalmanEstimator:
+    """Kalman filter on the kinematic tree; see `tracking.estimators.Estimator`."""
+
+    P: Floats
+    ctrl_dt: float
+    config: TrackerConfig
+    settings: Settings = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Make the kernels' settings, a constant."""
+        object.__setattr__(self, "settings", settings_of(self.config))
+
+    def init(self, batch: int, n_workers: int) -> KalmanState:
+        """Workers whom nobody has seen."""
+        shape, n_cameras = (batch, n_workers), len(self.P)
+        state = KalmanState(
+            body=np.zeros((*shape, N_JOINTS, 6)),
+            cov=np.zeros((*shape, N_JOINTS, 6, 6)),
+            slope=np.zeros((*shape, N_JOINTS, 6, 6)),
+            age_s=np.zeros((*shape, N_JOINTS)),
+            tracked=np.zeros(shape, bool),
+            conflict=np.zeros((*shape, N_JOINTS), np.int64),
+            offset=np.zeros((*shape, N_JOINTS, 3)),
+            offset_count=np.zeros((*shape, N_JOINTS)),
+            bone_length=np.zeros((*shape, N_JOINTS)),
+            bone_variance=np.zeros((*shape, N_JOINTS)),
+            swap_chance=np.zeros((*shape, n_cameras)),
+            blind=np.zeros((*shape, n_cameras), np.int64),
+            believed=np.zeros((*shape, n_cameras), np.int64),
+            carried=np.zeros((*shape, N_JOINTS)),
+        )
+        self._forget(state, np.arange(batch))
+        return state
+
+    def reset(self, state: KalmanState, ids: Ints, rngs: list[np.random.Generator]) -> None:
+        """Forget environments `ids`; draws nothing."""
+        del rngs
+        self._forget(state, ids)
+
+    def predict(self, state: KalmanState, dt_s: float, rngs: list[np.random.Generator]) -> None:
+        """Move every tracked body by its motion model; draws nothing."""
+        del rngs
+        model = _motion(dt_s, self.config.damping, self.config.root_acceleration)
+        predict_all(state, model, dt_s)
+        grow_older(gaussian_tracks(state), dt_s, self.config)
+
+    def update(
+        self, state: KalmanState, keypoints: Keypoints, rngs: list[np.random.Generator]
+    ) -> None:
+        """Take one set of frames in; draws nothing."""
+        del rngs
+        batch, n_workers = state.tracked.shape
+        shape = (batch, len(self.P), n_workers, N_JOINTS)
+        measured = (self.P, *arrays_of(keypoints, shape))
+        update_all(state, *measured, STANDING_M, self.settings)
+
+    def estimate(self, state: KalmanState) -> PoseEstimate:
+        """What is believed now; joints that one view carries are reported as less certain.
+
+        Their errors have heavier tails than a Gaussian's: the body may be mirrored in depth.
+        """
+        tracks = gaussian_tracks(state)
+        least, most = _ONE_VIEW
+        single = (state.carried > least) & (state.carried < most) & state.tracked[..., None]
+        if single.any():
+            factor = np.where(single, self.config.one_view_inflation, 1.0)
+            tracks = replace(tracks, cov_world=tracks.cov_world * factor[..., None, None])
+        return report(tracks, self.config)
+
+    def _forget(self, state: KalmanState, ids: Ints) -> None:
+        length, variance = population_edges()
+        state.cov[ids], state.slope[ids] = np.eye(6), 0.0
+        state.offset[ids], state.offset_count[ids] = STANDING_M, STANDING_COUNT
+        state.bone_length[ids], state.bone_variance[ids] = length, variance
+        state.swap_chance[ids] = self.config.swap_begins
+        state.blind[ids], state.believed[ids], state.carried[ids] = 0, 0, 0.0
+        forget(gaussian_tracks(state), ids, self.config)
+
+
+@functools.lru_cache(maxsize=16)
+def _motion(dt_s: float, damping: float, acceleration: float) -> tuple[Floats, ...]:
+    """F, travel, Q (J, 2, 2) and shared noise (2, 2), as `tree_predict.predict_tree` takes them."""
+    F, Q = damped_joints(dt_s, damping, acceleration)
+    travel = np.array([[1.0, dt_s], [0.0, 1.0]]) - F
+    return F, travel, Q, whole_body_noise(dt_s, acceleration)

@@ -1,0 +1,30 @@
+"""The settings that the kernels of the Gaussian estimators take."""
+
+from typing import NamedTuple
+
+from hrc_env.tracking.config import TrackerConfig
+
+
+class Settings(NamedTuple):
+    """What the kernels need of `TrackerConfig`, under the same names."""
+
+    sigma_scale: float
+    gate_sigma: float
+    body_radius_m: float
+    acquire_min_joints: int
+    conflict_frames: int
+    outlier_weight: float
+    image_area_px: float
+    swap_begins: float
+    swap_ends: float
+    gauss_newton_steps: int
+    proposal_inflation: float
+    prior_mean_world: tuple[float, float, float]
+    prior_std_m: float
+    max_age_s: float
+    mean_correction: float
+
+
+def settings_of(config: TrackerConfig) -> Settings:
+    """The kernels' part of the configuration."""
+    return Settings(*(getattr(config, name) for name in Settings._fields))

@@ -1,0 +1,96 @@
+"""The kernels of `kalman`: one loop over (B, W), one function per step of it.
+
+`state` and `s` are `kalman.KalmanState` and `settings.Settings`; a worker's measurements are
+z (J, C, 2), sigma (J, C), ok (J, C) as `measurements.read_worker` fills them.
+"""
+
+import numba
+import numpy as np
+
+from hrc_env.tracking.acquisition import count_conflict
+from hrc_env.tracking.bone_lengths import learn_lengths, stiff_lengths
+from hrc_env.tracking.measurements import read_worker
+from hrc_env.tracking.proposal import contrast_of
+from hrc_env.tracking.swaps import undo_swaps
+from hrc_env.tracking.tree import PARENT, make_work
+from hrc_env.tracking.tree_predict import predict_tree
+from hrc_env.tracking.tree_search import find_pose
+from hrc_env.tracking.tree_update import correct_mean, update_tree
+from hrc_env.tracking.upkeep import acquire, check, find_joints_again
+
+_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
+
+
+@numba.njit(**_JIT)
+def predict_all(state, model, dt):
+    """Move every tracked body by dt [s]; `model` as in `tree_predict.predict_tree`."""
+    work = make_work()
+    for b in range(state.tracked.shape[0]):
+        for w in range(state.tracked.shape[1]):
+            if state.tracked[b, w]:
+                gaussian = (state.body[b, w], state.cov[b, w], state.slope[b, w])
+                places = (state.offset[b, w], state.offset_count[b, w])
+                predict_tree(*gaussian, *places, model, dt, work)
+
+
+@numba.njit(**_JIT)
+def update_all(state, P, px, confidence, sigma_px, standing, s):
+    """Take one set of frames in.
+
+    Args:
+        state: changed in place.
+        P: (C, 3, 4).
+        px, confidence, sigma_px: as in `records.Keypoints`.
+        standing: (J, 3) `acquisition.STANDING_M`.
+        s: settings.
+    """
+    n_batch, n_cameras, n_workers, n_joints = confidence.shape
+    z, sigma = np.empty((n_joints, n_cameras, 2)), np.empty((n_joints, n_cameras))
+    ok, belief = np.empty((n_joints, n_cameras), np.bool_), np.empty((n_joints, n_cameras))
+    scratch = (belief, np.empty(n_joints, np.int64), np.empty(n_joints), make_work())
+    placed = np.empty(n_joints, np.bool_)
+    for b in range(n_batch):
+        for w in range(n_workers):
+            read_worker(px, confidence, sigma_px, b, w, s.sigma_scale, z, sigma, ok)
+            if not state.tracked[b, w]:
+                if acquire(state, b, w, P, z, sigma, ok, standing, s):
+                    state.slope[b, w] = 0.0
+                continue
+            swaps = (state.swap_chance[b, w], state.blind[b, w], state.believed[b, w])
+            undo_swaps(P, state.body[b, w], state.cov[b, w], z, sigma, ok, *swaps, s)
+            _follow(state, b, w, (P, z, sigma, ok), s, scratch)
+            placed[:] = False
+            find_joints_again(state, b, w, P, z, sigma, ok, s, placed)
+            for j in range(n_joints):
+                if placed[j] or (PARENT[j] >= 0 and placed[PARENT[j]]):
+                    state.slope[b, w, j] = 0.0  # what is known of it is its own
+            if not check(state, b, w, s):
+                state.slope[b, w] = 0.0
+
+
+@numba.njit(**_JIT)
+def _follow(state, b, w, seen, s, scratch):
+    """Update a tracked worker: search, condition, correct the mean, learn the bones."""
+    belief, n_views, give, work = scratch
+    ok = seen[3]
+    body, cov, slope = state.body[b, w], state.cov[b, w], state.slope[b, w]
+    length, variance = state.bone_length[b, w], state.bone_variance[b, w]
+    contrast = contrast_of(s.outlier_weight, s.image_area_px)
+    stiff_lengths(variance, give)
+    bones = (length, give)
+    find_pose(body, cov, slope, seen, bones, contrast, s.gauss_newton_steps, belief, work)
+    update_tree(body, cov, slope, work)
+    if s.mean_correction > 0.0:
+        correct_mean(body, cov, slope, seen, belief, s.mean_correction, work)
+    for j in range(len(ok)):
+        n_views[j], n_supporting, carried = 0, 0, 0.0
+        for c in range(ok.shape[1]):
+            n_views[j] += ok[j, c]
+            n_supporting += belief[j, c] > 0.5
+            carried += belief[j, c]
+        state.carried[b, w, j] = carried
+        if n_supporting > 0:
+            state.age_s[b, w, j] = 0.0
+        conflict = state.conflict[b, w, j]
+        state.conflict[b, w, j] = count_conflict(n_views[j], n_supporting, conflict)
+    learn_lengths(body, cov, slope, n_views, length, variance)

@@ -1,0 +1,102 @@
+"""What Gaussian estimators do for a track besides filtering: begin it, repair it, give it up.
+
+`state` is any record with body (B, W, J, 6), cov (B, W, J, 6, 6), age_s, conflict (B, W, J) and
+tracked (B, W); `s` are `settings.Settings`; measurements are as `measurements.read_worker`
+fills them.
+"""
+
+import math
+
+import numba
+import numpy as np
+
+from hrc_env.tracking.acquisition import (
+    complete_body,
+    distance,
+    find_again,
+    middle_of,
+    triangulate_body,
+)
+from hrc_env.tracking.motion_model import is_positive_definite
+
+_FOUND_SPEED_STD_M_S = 1.0
+_FURTHEST_STD = 4.0
+"""A body further than this many prior deviations from the prior has been lost."""
+_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
+
+
+@numba.njit(**_JIT)
+def acquire(state, b, w, P, z, sigma, ok, standing, s):
+    """Start a track when two views agree on enough joints; whether one was started."""
+    n_joints = len(ok)
+    points, spread = np.empty((n_joints, 3)), np.ones((n_joints, 3, 3))
+    found = np.empty(n_joints, np.bool_)
+    gate, radius = s.gate_sigma, s.body_radius_m
+    n_found = triangulate_body(P, z, sigma, ok, gate, radius, points, spread, found)
+    if n_found < s.acquire_min_joints:
+        return False
+    complete_body(standing, points, spread, found)
+    for j in range(n_joints):
+        place(state.body[b, w, j], state.cov[b, w, j], points[j], spread[j])
+        if found[j]:
+            state.age_s[b, w, j] = 0.0
+    state.tracked[b, w] = True
+    return True
+
+
+@numba.njit(**_JIT)
+def place(body, cov, point, spread):
+    """Put a joint at rest at a point."""
+    body[:3], body[3:] = point, 0.0
+    cov[:] = 0.0
+    cov[:3, :3] = spread
+    for i in range(3):
+        cov[3 + i, 3 + i] = _FOUND_SPEED_STD_M_S**2
+
+
+@numba.njit(**_JIT)
+def find_joints_again(state, b, w, P, z, sigma, ok, s, placed):
+    """Joints that have been elsewhere for a while, as two views say, are put there.
+
+    Sets `placed` (J,) where that happened.
+    """
+    everyone, middle = np.ones(len(ok), np.bool_), np.empty(3)
+    point, spread = np.empty(3), np.empty((3, 3))
+    for j in range(len(ok)):
+        if state.conflict[b, w, j] < s.conflict_frames:
+            continue
+        middle_of(state.body[b, w], everyone, middle)
+        gate, radius = s.gate_sigma, s.body_radius_m
+        if find_again(P, z[j], sigma[j], ok[j], gate, radius, middle, point, spread):
+            place(state.body[b, w, j], state.cov[b, w, j], point, spread)
+            state.age_s[b, w, j], state.conflict[b, w, j], placed[j] = 0.0, 0, True
+
+
+@numba.njit(**_JIT)
+def check(state, b, w, s):
+    """Keep covariances positive definite; a body that has left the world is lost.
+
+    Returns whether all was well.
+    """
+    body, cov, inside, well = state.body[b, w], state.cov[b, w], True, True
+    factor = np.empty((6, 6))
+    for j in range(len(body)):
+        if not is_positive_definite(cov[j], factor):
+            well = False
+            for i in range(6):
+                variance = cov[j, i, i]
+                cov[j, i, :], cov[j, :, i] = 0.0, 0.0
+                cov[j, i, i] = max(variance, 1e-4)
+        away = distance(body[j], s.prior_mean_world)
+        inside &= away < _FURTHEST_STD * s.prior_std_m and math.isfinite(cov[j].sum())
+        inside &= math.isfinite(body[j].sum())
+    if inside:
+        return well
+    state.tracked[b, w] = False
+    for j in range(len(body)):
+        body[j, 3:] = 0.0
+        cov[j] = np.eye(6) * s.prior_std_m**2
+        state.age_s[b, w, j] = s.max_age_s
+        for i in range(3):
+            body[j, i] = s.prior_mean_world[i]
+    return False
