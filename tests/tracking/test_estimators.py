@@ -152,7 +152,7 @@ def test_a_copied_state_continues_as_the_original_does(name):
     np.testing.assert_array_equal(e.estimate(state).mean_world, e.estimate(other).mean_world)
 
 
-@pytest.mark.parametrize("name", ["triangulation", "particle"])
+@pytest.mark.parametrize("name", ["triangulation", "particle", "kalman"])
 def test_moving_world_and_cameras_together_moves_the_estimate(name):
     joints = walk(7, 25)
     px = detections(joints, Damage(sigma_px=1.0), 7)[:, None]

@@ -10,6 +10,9 @@ from hrc_env.tracking.importance import exp_of_negative, make_noise
 from hrc_env.tracking.motion_model import SPEED_M_S, SPREAD_M, damped_joints
 from hrc_env.tracking.tracks import least_eigenvalue
 
+gaussian = pytest.mark.parametrize("name", ["particle", "kalman"])
+"""Both estimators that keep Gaussians look after their tracks in the same way."""
+
 
 def errors(damage, seeds=range(4), n_frames=250, warm_up=25):
     """Errors (T, B, J, 3) and NEES (T, B, J) of the default on simulated walks."""
@@ -35,12 +38,13 @@ def test_four_cameras_give_a_few_centimetres_and_honest_covariances(damage, boun
     assert 0.7 < np.median(nees) / 2.366 < 1.1
 
 
-def test_swapped_views_are_undone():
+@gaussian
+def test_swapped_views_are_undone(name):
     joints = walk(0, 150)
     px = detections(joints, Damage(), 0)[:, None]
     swapped = px.copy()
     swapped[60:90, :, 1] = px[60:90, :, 1][:, :, MIRROR]
-    e = make_estimator("particle", LAB, DT)
+    e = make_estimator(name, LAB, DT)
     clean = np.stack([x.mean_world for x in track(e, px)])
     dirty = np.stack([x.mean_world for x in track(e, swapped)])
     assert np.abs(clean - dirty)[60:].max() < 0.02
@@ -54,30 +58,33 @@ def test_swapped_views_are_undone():
     assert state.swap_chance.max() < 0.1
 
 
-def test_a_phantom_in_one_camera_does_not_pull_the_estimate():
+@gaussian
+def test_a_phantom_in_one_camera_does_not_pull_the_estimate(name):
     joints = walk(1, 80)
     px = detections(joints, Damage(), 1)[:, None]
     haunted = px.copy()
     haunted[40:, :, 2] = px[40:, :, 2] + [250.0, -120.0]
-    e = make_estimator("particle", LAB, DT)
+    e = make_estimator(name, LAB, DT)
     mean = np.stack([x.mean_world[0, 0] for x in track(e, haunted)])
     assert rmse(mean[45:] - joints[45:]) < 0.03
 
 
-def test_one_camera_leaves_the_rays_variance_large():
+@gaussian
+def test_one_camera_leaves_the_rays_variance_large(name):
     joints = np.repeat(walk(2, 1), 60, axis=0)
     px = detections(joints, Damage(), 2)[:, None]
     px[40:, :, 1:] = np.nan
-    estimates = track(make_estimator("particle", LAB, DT), px)
+    estimates = track(make_estimator(name, LAB, DT), px)
     widest = [np.sqrt(np.linalg.eigvalsh(e.cov_world[0, 0])) for e in estimates]
     assert (widest[55][:, 2] > 2 * widest[39][:, 2]).all()
     assert (widest[55][:, 2] > 3 * widest[55][:, 0]).all()
 
 
-def test_a_joint_that_was_followed_wrongly_is_found_again():
+@gaussian
+def test_a_joint_that_was_followed_wrongly_is_found_again(name):
     joints = walk(3, 60)
     px = detections(joints, Damage(), 3)[:, None]
-    e, rngs = make_estimator("particle", LAB, DT), generators(1)
+    e, rngs = make_estimator(name, LAB, DT), generators(1)
     state = e.init(1, 1)
     for t, frame in enumerate(px):
         if t == 40:
