@@ -1,14 +1,17 @@
 """Train a policy with PPO, evaluate it on fixed seeds, draw its learning curve and film it.
 
-python train.py                       # the quick preset: minutes on two cores
-python train.py --resume runs/quick   # go on where it stopped
-python train.py --proximity 0         # the same without the safety term
-tensorboard --logdir runs
+    python train.py                                           # minutes on two cores
+    python train.py --resume runs/quick --timesteps 2000000   # go on where it stopped
+    python train.py --proximity 0 --out runs/reckless         # without the safety term
+    tensorboard --logdir runs
+
+What lies in a folder is never overwritten: a second run into runs/quick goes to runs/quick-2.
 """
 
 import json
+import sys
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +22,8 @@ from agents import ppo
 from agents.base import Situation
 from agents.evaluate import evaluate
 from agents.monitor import Curve, TrainingMonitor, plot_curve
-from hrc_env.errors import CheckpointError
+from hrc_env.config import resolve
+from hrc_env.errors import CheckpointError, HRCError, RenderingError
 from hrc_env.provenance import provenance
 from hrc_env.sb3 import HRCVecEnv
 
@@ -51,16 +55,23 @@ class Arguments:
     film: bool = True
     """Film the trained policy at the end (needs OpenGL)."""
     resume: Path | None = None
-    """A folder of an earlier run to go on with."""
+    """A folder of an earlier run to go on with; its environment and seed stay what they were."""
+
+
+LEARNT_WITH = ("num_envs", "seed", "perception", "estimator", "control", "proximity")
+"""Arguments that a resumed run takes from the run that it goes on with."""
 
 
 def main(arguments: Arguments) -> None:
     """Train, evaluate, draw, film."""
     torch.set_num_threads(arguments.threads)
-    folder = arguments.resume or arguments.out
+    folder = arguments.resume or unused(arguments.out)
+    if arguments.resume is not None:
+        arguments = as_before(arguments, folder)
     folder.mkdir(parents=True, exist_ok=True)
     kwargs = environment_arguments(arguments)
-    _write(folder / "run.json", {"arguments": _plain(arguments), **provenance()})
+    config = asdict(resolve(kwargs["config"]))
+    _write(folder / "run.json", {"arguments": _plain(arguments), "config": config, **provenance()})
     curve, seconds = train(arguments, folder, kwargs)
     print(f"Evaluating {arguments.episodes} episodes on fixed seeds ...")
     checkpoint = folder / "policy.zip"
@@ -73,6 +84,28 @@ def main(arguments: Arguments) -> None:
     if arguments.film:
         film(checkpoint, folder / "policy.mp4", arguments, kwargs)
     print(f"Policy, curve and film are in {folder}/")
+
+
+def unused(folder: Path) -> Path:
+    """The folder, or the next of folder-2, folder-3, ... in which nobody has learnt."""
+    candidate, number = folder, 1
+    while (candidate / "policy.zip").exists():
+        number += 1
+        candidate = folder.with_name(f"{folder.name}-{number}")
+    return candidate
+
+
+def as_before(arguments: Arguments, folder: Path) -> Arguments:
+    """The arguments of a resumed run.
+
+    Raises:
+        CheckpointError: the folder holds no run.
+    """
+    record = folder / "run.json"
+    if not record.exists():
+        raise CheckpointError(f"{folder} holds no run to resume: {record} is missing.")
+    before = json.loads(record.read_text())["arguments"]
+    return replace(arguments, **{name: before[name] for name in LEARNT_WITH})
 
 
 def environment_arguments(arguments: Arguments) -> dict[str, Any]:
@@ -95,6 +128,7 @@ def train(arguments: Arguments, folder: Path, kwargs: dict[str, Any]) -> tuple[C
         learner = ppo.resume(folder / "policy.zip", env, folder / "tensorboard")
         if (folder / "curve.json").exists():
             curve = Curve(json.loads((folder / "curve.json").read_text()))
+        env.seed(arguments.seed + learner.num_timesteps)  # other episodes than the first ones
         if learner.num_timesteps >= arguments.timesteps:
             raise CheckpointError(
                 f"{folder} has learnt {learner.num_timesteps} steps already; "
@@ -118,7 +152,6 @@ def train(arguments: Arguments, folder: Path, kwargs: dict[str, Any]) -> tuple[C
 def film(checkpoint: Path, path: Path, arguments: Arguments, kwargs: dict[str, Any]) -> None:
     """Film one episode of the policy, if this machine can draw."""
     from hrc_env.cli.film import film_episode
-    from hrc_env.errors import RenderingError
 
     def make(here: Situation) -> ppo.TrainedAgent:
         return ppo.load(checkpoint, here)
@@ -144,4 +177,7 @@ def _write(path: Path, content: dict[str, Any]) -> None:
 
 
 if __name__ == "__main__":
-    main(tyro.cli(Arguments, description=__doc__))
+    try:
+        main(tyro.cli(Arguments, description=__doc__))
+    except HRCError as error:
+        sys.exit(f"{type(error).__name__}: {error}")

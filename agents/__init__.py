@@ -1,5 +1,5 @@
 """Agents: one file each. An agent turns observations (..., n) into actions (..., A).
 
-They use only the public doors of hrc_env, and what they know of a worker is the estimate
-in the observation.
+What they know beforehand is the robot and how to read an observation (`base.Situation`); what
+they know of a worker is the estimate in the observation.
 """

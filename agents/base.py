@@ -47,6 +47,10 @@ def situation(simulation: Simulation) -> Situation:
     )
 
 
+AGENTS = ("random", "scripted", "scripted_slowed")
+"""Names of the agents that need no checkpoint."""
+
+
 def make_agent(name: str, here: Situation, seed: int = 0) -> Agent:
     """An agent by name ("random", "scripted", "scripted_slowed") or from a checkpoint file.
 
@@ -54,7 +58,7 @@ def make_agent(name: str, here: Situation, seed: int = 0) -> Agent:
         ConfigError: neither an agent nor a file.
         CheckpointError: a file that does not fit the environment.
     """
-    from agents import ppo, random, scripted  # here: torch takes seconds to import
+    from . import ppo, random, scripted  # here: torch takes seconds to import
 
     makers: dict[str, Callable[[], Any]] = {
         "random": lambda: random.RandomAgent(here, seed),

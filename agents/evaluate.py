@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.base import Agent, situation
 from hrc_env.sb3 import HRCVecEnv
+
+from .base import Agent, situation
 
 EVALUATION_SEED = 1_000_000
 """First seed of evaluations, far from those that training uses."""
@@ -69,7 +70,7 @@ def summarise(episodes: list[dict[str, float]]) -> Score:
     """The score of finished episodes."""
     column = {name: np.array([each[name] for each in episodes]) for name in episodes[0]}
     reached, missed = column["goals_reached"].sum(), column["goals_missed"].sum()
-    minutes = column["l"].sum() * 0.04 / 60
+    minutes = column["seconds"].sum() / 60
     return Score(
         episodes=len(episodes),
         success_rate=float(reached / max(reached + missed, 1)),

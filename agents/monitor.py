@@ -19,8 +19,8 @@ from rich.progress import (
 )
 from stable_baselines3.common.callbacks import BaseCallback
 
-from agents import ppo
-from agents.evaluate import summarise
+from . import ppo
+from .evaluate import summarise
 
 RECENT_EPISODES = 64
 """Curves average over so many finished episodes."""

@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
-from agents.base import Situation
 from hrc_env import __version__
 from hrc_env.errors import CheckpointError
+
+from .base import Situation
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +89,7 @@ def save(learner: PPO, path: Path, facts: dict[str, Any]) -> None:
         "observation_size": int(np.prod(learner.observation_space.shape or ())),
         "action_size": int(np.prod(learner.action_space.shape or ())),
         "num_timesteps": learner.num_timesteps,
+        "return_mean": None if scale is None else float(scale.ret_rms.mean),
         "return_variance": None if scale is None else float(scale.ret_rms.var),
         "return_count": None if scale is None else float(scale.ret_rms.count),
         **facts,
@@ -124,9 +126,11 @@ def resume(path: Path, env: VecEnv, tensorboard: Path | None = None) -> PPO:
     _check_fits(path, meta, env.observation_space.shape or (), env.action_space.shape or ())
     normalised = VecNormalize(env, norm_obs=False, norm_reward=True)
     if meta["return_variance"] is not None:
+        normalised.ret_rms.mean = np.array(meta["return_mean"])
         normalised.ret_rms.var = np.array(meta["return_variance"])
         normalised.ret_rms.count = meta["return_count"]
-    learner = PPO.load(path, env=normalised, device="cpu", tensorboard_log=str(tensorboard))
+    log = None if tensorboard is None else str(tensorboard)
+    learner = PPO.load(path, env=normalised, device="cpu", tensorboard_log=log)
     normalised.gamma = learner.gamma
     return learner
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.base import Situation
+from .base import Situation
 
 
 class RandomAgent:

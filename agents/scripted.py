@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.base import Situation
 from hrc_env.control import resolved_rate
 from hrc_env.observations import split
+
+from .base import Situation
 
 GAIN_HZ = 4.0
 """Approach speed per distance [1/s]."""

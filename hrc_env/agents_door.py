@@ -2,13 +2,11 @@
 
 import importlib
 import importlib.util
-import sys
 from types import ModuleType
 
 
 def agents(module: str) -> ModuleType:
     """The module of that name among the agents."""
-    if importlib.util.find_spec("hrc_env.agents") is not None:
-        # The wheel carries them inside the package; their own imports say `agents`.
-        sys.modules.setdefault("agents", importlib.import_module("hrc_env.agents"))
-    return importlib.import_module(f"agents.{module}")
+    installed = importlib.util.find_spec("hrc_env.agents") is not None
+    package = "hrc_env.agents" if installed else "agents"
+    return importlib.import_module(f"{package}.{module}")

@@ -4,14 +4,14 @@
 `gymnasium.make("HRCReach-v0", config={"reward": {"proximity": 0.0}})`.
 """
 
-import dataclasses
-import typing
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import Any
 
 from hrc_env.control import ControlConfig
-from hrc_env.errors import ConfigError, unknown
+from hrc_env.errors import ConfigError
+from hrc_env.mapping import from_mapping
 from hrc_env.metrics import CostConfig
 from hrc_env.motion.generator import MotionConfig
 from hrc_env.perception.emulator import EmulatorConfig
@@ -20,8 +20,6 @@ from hrc_env.rewards import RewardConfig
 from hrc_env.scene.build import SceneConfig
 from hrc_env.tasks.reach import ReachConfig
 from hrc_env.tracking.config import TrackerConfig
-
-ConfigT = TypeVar("ConfigT")
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +52,12 @@ class HRCConfig:
     """What counts as unsafe."""
 
     def __post_init__(self) -> None:
+        if not (math.isfinite(self.ctrl_dt) and self.ctrl_dt > 0):
+            raise ConfigError(f"ctrl_dt must be a positive time [s], got {self.ctrl_dt}.")
+        if not self.start_spread_rad or min(self.start_spread_rad) < 0:
+            raise ConfigError(
+                f"start_spread_rad must hold angles >= 0, one a joint, got {self.start_spread_rad}."
+            )
         substeps = self.ctrl_dt / self.scene.sim_dt
         if substeps < 0.5 or abs(substeps - round(substeps)) > 1e-6:
             near = max(round(substeps), 1) * self.scene.sim_dt
@@ -83,31 +87,3 @@ def resolve(config: "HRCConfig | Mapping[str, Any] | None") -> HRCConfig:
             f"config must be an HRCConfig, a mapping or None, got {type(config).__name__}."
         )
     return from_mapping(HRCConfig, config)
-
-
-def from_mapping(kind: type[ConfigT], mapping: Mapping[str, Any], path: str = "") -> ConfigT:
-    """A dataclass from a mapping; what it nests may be mappings too, tuples may be lists.
-
-    This undoes what `dataclasses.asdict` and JSON do to a config.
-    """
-    hints = typing.get_type_hints(kind)
-    names = [each.name for each in dataclasses.fields(kind)]  # type: ignore[arg-type]
-    values: dict[str, Any] = {}
-    for name, value in mapping.items():
-        where = f"{path}{name}"
-        if name not in names:
-            raise unknown("config field", where, [f"{path}{each}" for each in names])
-        values[name] = _restored(hints[name], value, where)
-    return kind(**values)
-
-
-def _restored(hint: Any, value: Any, where: str) -> Any:
-    """A field's value as its type hint wants it."""
-    if dataclasses.is_dataclass(hint) and isinstance(value, Mapping):
-        return from_mapping(typing.cast(type, hint), value, f"{where}.")
-    if isinstance(value, list | tuple) and typing.get_origin(hint) is tuple:
-        inner = typing.get_args(hint)
-        hints = [inner[0]] * len(value) if inner[-1] is Ellipsis else inner
-        parts = zip(hints, value, strict=False)
-        return tuple(_restored(each, part, f"{where}[{k}]") for k, (each, part) in enumerate(parts))
-    return value

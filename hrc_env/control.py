@@ -35,6 +35,9 @@ class ControlConfig:
             raise ConfigError(
                 f"ControlConfig.joint_speed_share must be in (0, 1], got {self.joint_speed_share}."
             )
+        for name in ("tool_speed_mps", "damping", "posture_gain_hz"):
+            if not getattr(self, name) > 0:
+                raise ConfigError(f"ControlConfig.{name} must be > 0, got {getattr(self, name)}.")
 
 
 def n_actions(control: str, chain: SerialChain) -> int:

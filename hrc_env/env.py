@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from hrc_env import observations
 from hrc_env.config import HRCConfig, resolve
-from hrc_env.errors import ConfigError, check_shape, unknown
-from hrc_env.simulation import Outcome, Simulation
+from hrc_env.errors import ConfigError, unknown
+from hrc_env.simulation import Simulation, checked_action
 from hrc_env.typing import Floats
 from hrc_env.views import Views
 
@@ -87,7 +87,8 @@ class HRCReachEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Act for one control step (1 / 25 s); the walk itself is `Simulation.step`."""
         if not self._begun:
             raise ConfigError("Call reset() before step().")
-        outcome: Outcome = self.simulation.step(self._checked(action)[None])
+        values = checked_action(action, (self.simulation.n_actions,))
+        outcome = self.simulation.step(values[None])
         return (
             outcome.observation[0],
             float(outcome.reward[0]),
@@ -114,11 +115,3 @@ class HRCReachEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Release threads and graphics contexts."""
         self.views.close()
         self.simulation.close()
-
-    def _checked(self, action: NDArray[np.float32]) -> Floats:
-        values = np.asarray(action, np.float64)
-        meaning = "joint velocities" if self.simulation.control == "joint" else "tool velocity"
-        check_shape("action", values.shape, (self.simulation.n_actions,), meaning)
-        if not np.isfinite(values).all():
-            raise ConfigError(f"action must be finite numbers in [-1, 1], got {values}.")
-        return np.clip(values, -1.0, 1.0)

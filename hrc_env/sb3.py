@@ -15,7 +15,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from hrc_env.config import HRCConfig, resolve
 from hrc_env.errors import ConfigError
-from hrc_env.simulation import Simulation
+from hrc_env.simulation import Simulation, checked_action
 from hrc_env.typing import Bools, Floats, Ints
 
 EPISODE_SUMS = ("cost", "cost_proximity", "cost_contact")
@@ -66,7 +66,7 @@ class HRCVecEnv(VecEnv):
         )
         self.max_episode_steps, self.stagger = max_episode_steps, stagger
         self.started_s = time.time()
-        self.first_seed = seed
+        self.first_seed, self._reseed = seed, True
         self._action = np.zeros((num_envs, self.simulation.n_actions))
         self._sums = {name: np.zeros(num_envs) for name in ("reward", "contacts", *EPISODE_SUMS)}
         self._touching = np.zeros(num_envs, bool)
@@ -75,13 +75,16 @@ class HRCVecEnv(VecEnv):
 
     def seed(self, seed: int | None = None) -> list[int | None]:  # type: ignore[override]
         """Seed environment k with seed + k at the next reset."""
-        self.first_seed = 0 if seed is None else seed
+        self.first_seed = self.first_seed if seed is None else seed
+        self._reseed = True
         return [self.first_seed + k for k in range(self.num_envs)]
 
     def reset(self) -> NDArray[np.float32]:
-        """Start every environment from its seed."""
+        """Start every environment: from its seed the first time, then on with its stream."""
         everyone = np.arange(self.num_envs)
-        self.rngs = [np.random.default_rng(self.first_seed + k) for k in everyone]
+        if self._reseed:
+            self.rngs = [np.random.default_rng(self.first_seed + k) for k in everyone]
+            self._reseed = False
         self._begin(everyone)
         self._limit[:] = self.max_episode_steps
         if self.stagger:
@@ -90,8 +93,12 @@ class HRCVecEnv(VecEnv):
         return self.simulation.reset(everyone, self.rngs).observation
 
     def step_async(self, actions: NDArray[Any]) -> None:
-        """Keep the actions for `step_wait`."""
-        self._action = np.clip(np.asarray(actions, np.float64), -1.0, 1.0)
+        """Keep the actions for `step_wait`.
+
+        Raises:
+            ConfigError: they are not finite or not (num_envs, actions).
+        """
+        self._action = checked_action(actions, (self.num_envs, self.simulation.n_actions))
 
     def step_wait(
         self,
@@ -139,6 +146,7 @@ class HRCVecEnv(VecEnv):
         return {
             "r": float(self._sums["reward"][b]),
             "l": int(self._steps[b]),
+            "seconds": float(self._steps[b] * self.simulation.config.ctrl_dt),
             "t": time.time() - self.started_s,
             "cost": float(self._sums["cost"][b]),
             "cost_steps": float(self._sums["cost_proximity"][b]),

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from hrc_env import metrics, observations, rewards
 from hrc_env.batching import picked, write_rows
@@ -18,6 +18,7 @@ from hrc_env.belief import Believed, estimated_gap
 from hrc_env.body import load_body, worker_truth
 from hrc_env.config import HRCConfig
 from hrc_env.control import joint_command, n_actions
+from hrc_env.errors import ConfigError, check_shape
 from hrc_env.geometry import chains
 from hrc_env.motion import generator
 from hrc_env.records import PoseEstimate, RobotState, WorkerMotion, WorkerTruth
@@ -85,6 +86,8 @@ class Simulation:
         self.body = load_body(config.worker)
         self.scene = build(config.scene, scene, n_workers, config.worker, cameras)
         self.chain = self.scene.chain
+        spread = config.start_spread_rad
+        check_shape("start_spread_rad", (len(spread),), (self.chain.n_joints,), "one a joint")
         self.n_actions = n_actions(control, self.chain)
         self.layout = observations.layout(len(self.scene.home_q), self.n_actions, n_workers)
         self.physics = Physics(self.scene, batch, n_threads)
@@ -183,7 +186,7 @@ class Simulation:
         estimate = self.senses.sense(
             moment, picked(streams.sensor, ids), picked(streams.tracker, ids)
         )
-        if len(ids) == self.batch:
+        if np.array_equal(ids, self._everyone):
             self.estimate = estimate
         else:
             write_rows(self.estimate, ids, estimate)
@@ -207,6 +210,22 @@ class Simulation:
             "task/goals_missed": self.task.n_missed.astype(float),
             "is_success": reach.succeeded(self.task).astype(float),
         }
+
+
+def checked_action(action: ArrayLike, shape: tuple[int, ...]) -> Floats:
+    """Actions as float64 of a shape, clipped to [-1, 1].
+
+    Raises:
+        ConfigError: another shape, or values that are no finite numbers.
+    """
+    try:
+        values = np.asarray(action, np.float64)
+    except (TypeError, ValueError) as error:
+        raise ConfigError(f"action must be numbers of shape {shape}, got {action!r}.") from error
+    check_shape("action", values.shape, shape, "(environments,) joint or tool velocities")
+    if not np.isfinite(values).all():
+        raise ConfigError(f"action must be finite numbers in [-1, 1], got {values}.")
+    return np.clip(values, -1.0, 1.0)
 
 
 def last(record: RecordT) -> RecordT:

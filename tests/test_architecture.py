@@ -53,7 +53,7 @@ def test_only_these_files_know_the_truth():
     assert knowing >= {"hrc_env/metrics.py", "hrc_env/tracking/given.py"}
 
 
-@pytest.mark.parametrize("name", ["belief", "observations", "rewards", "control"])
+@pytest.mark.parametrize("name", ["belief", "observations", "rewards", "control", "tasks/reach"])
 def test_what_the_robot_reads_does_not_mention_truth(name):
     """Terms take `Believed`, which has no truth in it; nothing in these files names it."""
     assert not re.search(r"truth|capsules_world_true|WorkerMotion", code_of(PACKAGE / f"{name}.py"))

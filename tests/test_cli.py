@@ -45,6 +45,7 @@ def test_pixels_without_opengl_says_what_to_install():
     done = hrc("play", "--perception", "pixels", MUJOCO_GL="disabled")
     assert done.returncode == 2
     assert "RenderingError" in done.stderr
+    assert "MUJOCO_GL" in done.stderr
     assert "Traceback" not in done.stderr
 
 

@@ -2,8 +2,10 @@
 
 import gymnasium
 import numpy as np
+import pytest
 
 import hrc_env  # noqa: F401  registers the ids
+from hrc_env.errors import ConfigError
 from hrc_env.sb3 import HRCVecEnv
 
 
@@ -30,6 +32,22 @@ def test_each_environment_is_the_single_one_bit_for_bit():
             np.testing.assert_array_equal(observation, batch[step][0][k])
             assert np.float32(reward) == batch[step][1][k]
             assert (terminated or truncated) == batch[step][2][k]
+
+
+def test_a_second_reset_goes_on_and_a_seed_begins_again():
+    env = HRCVecEnv(2, perception="truth", seed=3)
+    first, second = env.reset(), env.reset()
+    assert not np.array_equal(first, second)
+    env.seed(3)
+    np.testing.assert_array_equal(env.reset(), first)
+
+
+def test_bad_actions_are_refused_in_words():
+    env = HRCVecEnv(2, perception="truth")
+    env.reset()
+    for bad, said in ((np.zeros((2, 5)), r"shape \(2, 6\)"), (np.full((2, 6), np.nan), "finite")):
+        with pytest.raises(ConfigError, match=said):
+            env.step(bad)
 
 
 def test_a_time_limit_is_told_from_a_failure():

@@ -1,6 +1,7 @@
 """Training through the real command line: learn a little, resume, refuse what does not fit."""
 
 import json
+import shutil
 import subprocess
 import sys
 import zipfile
@@ -57,6 +58,32 @@ def test_resuming_goes_on_where_it_stopped(run):
     assert ppo.describe(run / "policy.zip")["num_timesteps"] == before + 256
     steps = [point["steps"] for point in json.loads((run / "curve.json").read_text())]
     assert steps == sorted(steps)
+
+
+def test_a_resumed_run_keeps_the_environment_it_learnt_in(tmp_path):
+    folder = tmp_path / "reckless"
+    train("--timesteps", 256, "--out", folder, "--proximity", 0)
+    done = train("--timesteps", 512, "--resume", folder)
+    assert done.returncode == 0, done.stderr
+    record = json.loads((folder / "run.json").read_text())
+    assert record["arguments"]["proximity"] == 0
+    assert record["config"]["reward"]["proximity"] == 0
+
+
+def test_a_second_run_leaves_the_first_alone(run, tmp_path):
+    first = tmp_path / "run"
+    shutil.copytree(run, first)
+    before = (first / "policy.zip").read_bytes()
+    assert train("--timesteps", 256, "--out", first).returncode == 0
+    assert (first / "policy.zip").read_bytes() == before
+    assert (tmp_path / "run-2" / "policy.zip").exists()
+
+
+def test_resuming_nothing_says_so_without_a_traceback(tmp_path):
+    done = train("--resume", tmp_path / "nowhere")
+    assert done.returncode != 0
+    assert "holds no run to resume" in done.stderr
+    assert "Traceback" not in done.stderr
 
 
 def here(**kwargs):

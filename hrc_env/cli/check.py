@@ -31,7 +31,10 @@ class Check:
             "environment": _environment,
         }
         for name, check in checks.items():
-            ok, message = check()
+            try:
+                ok, message = check()
+            except Exception as error:  # whatever is wrong with this machine, say it
+                ok, message = False, f"{type(error).__name__}: {error}"
             fine &= ok
             console.print(f"[{'green]ok  ' if ok else 'red]TODO'}[/] {name:12s} {message}")
         return 0 if fine else 1

@@ -9,6 +9,7 @@ from rich.table import Table
 
 from hrc_env.agents_door import agents
 from hrc_env.cli.film import film_episode
+from hrc_env.config import HRCConfig
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ class Demo:
         """Film and tell."""
         console, started_s = Console(), time.monotonic()
         base = agents("base")
-        n_steps = round(self.seconds * 25)
+        n_steps = round(self.seconds / HRCConfig().ctrl_dt)
         totals = film_episode(
             lambda here: base.make_agent("scripted_slowed", here),
             self.out, self.seed, n_steps, perception=self.perception,

@@ -54,7 +54,8 @@ def film_episode(
 
     Args:
         make: builds the agent for a `Situation`.
-        path: an .mp4 file; a still of the same name as .png is written beside it.
+        path: an .mp4 file; a still of the closest moment that is no near miss yet (or of the
+            first step) is written beside it as .png.
         kwargs: as of `HRCReachEnv`.
 
     Raises:
@@ -89,8 +90,9 @@ def _roll(
         if step % STEPS_PER_FRAME == 0:
             frame = compose(env, diary)
             writer.append_data(frame)
-            if CLOSE_M < diary.true_m[-1] < closest_m:
-                closest_m = diary.true_m[-1]
+            closer = CLOSE_M < diary.true_m[-1] < closest_m
+            closest_m = diary.true_m[-1] if closer else closest_m
+            if closer or step == 0:
                 imageio.imwrite(still, frame)
         if terminated:
             break

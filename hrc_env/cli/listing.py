@@ -6,6 +6,7 @@ from rich.console import Console
 from rich.table import Table
 
 from hrc_env import IDS
+from hrc_env.agents_door import agents
 from hrc_env.control import CONTROLS
 from hrc_env.scene.build import SCENES
 from hrc_env.scene.rig import LAB_CAMERAS
@@ -28,7 +29,7 @@ class List:
             ("scene", SCENES),
             ("cameras", cameras),
             ("control", CONTROLS),
-            ("agent", ("random", "scripted", "scripted_slowed", "a checkpoint: PATH.zip")),
+            ("agent", (*agents("base").AGENTS, "a checkpoint: PATH.zip")),
         ):
             table.add_row(argument, ", ".join(names))
         Console().print(table)

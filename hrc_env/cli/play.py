@@ -77,11 +77,14 @@ class Play:
         observation, info = env.reset(seed=seed)
         window = Viewer(inner.simulation.scene) if self.viewer else None
         started_s, total, steps = time.monotonic(), 0.0, 0
-        for _ in track(range(250), description=f"episode {seed}"):
+        limit = env.spec.max_episode_steps if env.spec else None
+        for _ in track(range(limit or 250), description=f"episode {seed}"):
             observation, reward, terminated, truncated, info = env.step(agent.act(observation))
             total, steps = total + float(reward), steps + 1
             if window is not None:
                 window.show(*inner.views.pose())
+                due_s = started_s + steps * inner.config.ctrl_dt
+                time.sleep(max(0.0, due_s - time.monotonic()))
             if terminated or truncated:
                 break
         if window is not None:

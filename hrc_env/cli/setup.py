@@ -16,7 +16,7 @@ class Setup:
     """Fetch the pose network's weights (once, checked) and see that headless OpenGL works."""
 
     def run(self) -> int:
-        """Set up; 0 if everything is there at the end."""
+        """Set up; 0 also without OpenGL, which only pictures need."""
         console = Console()
         with console.status("Fetching the weights of MediaPipe Pose ..."):
             weights.fetch_weights()

@@ -98,11 +98,6 @@ def robot_state(chain: SerialChain, q: JointAngles, qd: JointVelocities) -> Robo
     )
 
 
-def base_position(chain: SerialChain) -> Points3:
-    """(3,) where the arm stands in the world [m]."""
-    return chain.T_world_from_base[:3, 3]
-
-
 def _flat(chain: SerialChain, name: str, values: Floats) -> tuple[Floats, tuple[int, ...]]:
     """Values (..., N) as (B, N), contiguous, and the leading axes they had."""
     array = np.asarray(values, float)

@@ -114,9 +114,11 @@ def build(
     """
     if name not in SCENES:
         raise unknown("scene", name, SCENES)
-    if n_workers < 0:
-        raise ConfigError(f"n_workers must be 0 or more, got {n_workers}.")
-    use = None if cameras is None else tuple(cameras)
+    whole = isinstance(n_workers, int | np.integer) and not isinstance(n_workers, bool)
+    if not whole or n_workers < 0:
+        raise ConfigError(f"n_workers must be a whole number, 0 or more, got {n_workers!r}.")
+    chosen = select(config.cameras if config else LAB_CAMERAS, cameras)
+    use = tuple(camera.name for camera in chosen)
     return _build(config or SceneConfig(), name, n_workers, body_name, use)
 
 

@@ -4,7 +4,7 @@ The only place that turns between OpenCV's camera axes (+X right, +Y down, +Z fo
 OpenGL's (+X right, +Y up, -Z forward).
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -62,6 +62,11 @@ def select(
     for name in names:
         if names.count(name) > 1:
             raise ConfigError(f"Camera names must be unique, got {name!r} more than once.")
+    if isinstance(use, str) or not (use is None or isinstance(use, Iterable)):
+        raise ConfigError(
+            f"cameras must be a list of names or indices, got {use!r}; "
+            f"valid names: {', '.join(names)}."
+        )
     indices = [_index(choice, names) for choice in (range(len(names)) if use is None else use)]
     if not indices:
         raise ConfigError(
@@ -78,9 +83,10 @@ def _index(choice: int | str, names: list[str]) -> int:
         if choice not in names:
             raise unknown("camera", choice, names)
         return names.index(choice)
-    if not 0 <= choice < len(names):
+    whole = isinstance(choice, int | np.integer) and not isinstance(choice, bool)
+    if not whole or not 0 <= choice < len(names):
         raise ConfigError(
-            f"Camera index {choice} is outside the rig: valid indices are 0 to {len(names) - 1}, "
+            f"Camera index {choice!r} is outside the rig: valid indices are 0 to {len(names) - 1}, "
             f"valid names {', '.join(names)}."
         )
     return int(choice)

@@ -1,13 +1,23 @@
 """MuJoCo's interactive window, for machines with a display."""
 
+import copy
 from typing import Any
 
 import mujoco
 
 from hrc_env.errors import RenderingError
 from hrc_env.records import WorkerMotion
-from hrc_env.scene.build import Scene
+from hrc_env.scene.build import Scene, drawing_model
 from hrc_env.typing import JointAngles
+
+
+def viewing_model(scene: Scene) -> mujoco.MjModel:
+    """The painted model, its own copy, with everything that is drawn in groups that are shown.
+
+    MuJoCo's window shows groups 0 to 2 at first; lamps and ceiling stay hidden, so that one can
+    look in from above.
+    """
+    return copy.copy(drawing_model(scene))
 
 
 class Viewer:
@@ -19,11 +29,12 @@ class Viewer:
         Raises:
             RenderingError: no display, or the viewer cannot run here.
         """
+        self._scene, self._model = scene, viewing_model(scene)
+        self._data = mujoco.MjData(self._model)
         try:
             from mujoco import viewer
 
-            self._scene, self._data = scene, mujoco.MjData(scene.model)
-            self._window: Any = viewer.launch_passive(scene.model, self._data)
+            self._window: Any = viewer.launch_passive(self._model, self._data)
         except Exception as error:
             raise RenderingError(
                 f"MuJoCo's viewer could not be opened: {error}. It needs a display; without "
@@ -40,7 +51,7 @@ class Viewer:
             if rows.size:
                 self._data.mocap_pos[rows] = motion.position_world
                 self._data.mocap_quat[rows] = motion.quaternion_wxyz
-            mujoco.mj_forward(self._scene.model, self._data)
+            mujoco.mj_forward(self._model, self._data)
         self._window.sync()
 
     def close(self) -> None:

@@ -31,8 +31,9 @@ class ReachConfig:
             low, high = getattr(self, name)
             if not low < high:
                 raise ConfigError(f"ReachConfig.{name} must be (low, high), got {(low, high)}.")
-        if self.radius_m <= 0 or self.time_limit_s <= 0:
-            raise ConfigError("ReachConfig.radius_m and time_limit_s must be positive.")
+        for name in ("radius_m", "time_limit_s"):
+            if not getattr(self, name) > 0:
+                raise ConfigError(f"ReachConfig.{name} must be > 0, got {getattr(self, name)}.")
 
 
 @dataclass(slots=True)

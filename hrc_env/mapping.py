@@ -1,0 +1,72 @@
+"""Frozen settings from plain mappings: what JSON or a notebook gives, checked field by field."""
+
+import dataclasses
+import math
+import typing
+from collections.abc import Mapping
+from typing import Any, TypeVar
+
+from hrc_env.errors import ConfigError, unknown
+
+RecordT = TypeVar("RecordT")
+
+
+def from_mapping(kind: type[RecordT], mapping: Mapping[str, Any], path: str = "") -> RecordT:
+    """A dataclass from a mapping; what it nests may be mappings too, tuples may be lists.
+
+    This undoes what `dataclasses.asdict` and JSON do to a config.
+
+    Raises:
+        ConfigError: a field that does not exist, with the nearest that does; one that is
+            missing; a value of another type or length than the field's.
+    """
+    hints = typing.get_type_hints(kind)
+    fields = dataclasses.fields(kind)  # type: ignore[arg-type]
+    names = [f"{path}{each.name}" for each in fields]
+    values: dict[str, Any] = {}
+    for name, value in mapping.items():
+        where = f"{path}{name}"
+        if where not in names:
+            raise unknown("config field", where, names)
+        values[name] = restored(hints[name], value, where)
+    for each in fields:
+        nothing = each.default is each.default_factory is dataclasses.MISSING
+        if nothing and each.name not in values:
+            raise ConfigError(f"Config field {path}{each.name} is missing and has no default.")
+    return kind(**values)
+
+
+def restored(hint: Any, value: Any, where: str) -> Any:
+    """A field's value as its type hint wants it, or a `ConfigError` that says so."""
+    if dataclasses.is_dataclass(hint):
+        if isinstance(value, Mapping):
+            return from_mapping(typing.cast(type, hint), value, f"{where}.")
+        return _checked(isinstance(value, typing.cast(type, hint)), "a mapping", value, where)
+    if typing.get_origin(hint) is tuple:
+        return _tuple(typing.get_args(hint), value, where)
+    if hint is float:
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        return float(_checked(number and math.isfinite(value), "a finite number", value, where))
+    if hint is int:
+        whole = isinstance(value, int) and not isinstance(value, bool)
+        return _checked(whole, "a whole number", value, where)
+    if hint in (bool, str):
+        return _checked(isinstance(value, hint), f"a {hint.__name__}", value, where)
+    return value
+
+
+def _tuple(inner: tuple[Any, ...], value: Any, where: str) -> tuple[Any, ...]:
+    """Every part as its own hint wants it, and as many as there are hints."""
+    _checked(isinstance(value, list | tuple), "a list", value, where)
+    hints = [inner[0]] * len(value) if inner[-1] is Ellipsis else list(inner)
+    _checked(len(value) == len(hints), f"{len(hints)} values", value, where)
+    return tuple(
+        restored(hint, part, f"{where}[{k}]")
+        for k, (hint, part) in enumerate(zip(hints, value, strict=True))
+    )
+
+
+def _checked(good: bool, expected: str, value: Any, where: str) -> Any:
+    if not good:
+        raise ConfigError(f"Config field {where} must be {expected}, got {value!r}.")
+    return value
