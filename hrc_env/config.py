@@ -19,6 +19,7 @@ from hrc_env.perception.eyes import EyesConfig
 from hrc_env.rewards import RewardConfig
 from hrc_env.scene.build import SceneConfig
 from hrc_env.tasks.reach import ReachConfig
+from hrc_env.tracking.association import AssociationConfig
 from hrc_env.tracking.config import TrackerConfig
 
 
@@ -42,6 +43,8 @@ class HRCConfig:
     """Its emulator (`perception="keypoints"`)."""
     tracker: TrackerConfig = field(default_factory=TrackerConfig)
     """The estimators."""
+    association: AssociationConfig = field(default_factory=AssociationConfig)
+    """Which detection is of whom, where there are several workers."""
     control: ControlConfig = field(default_factory=ControlConfig)
     """What an action means."""
     task: ReachConfig = field(default_factory=ReachConfig)

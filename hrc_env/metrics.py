@@ -7,6 +7,7 @@ import numba
 import numpy as np
 
 from hrc_env.errors import ConfigError
+from hrc_env.geometry.assignment import assign_rows
 from hrc_env.geometry.distances import narrowest_gap
 from hrc_env.records import PoseEstimate, WorkerTruth
 from hrc_env.typing import Bools, Capsules, Floats
@@ -68,6 +69,9 @@ def cost(
 def tracking_error(estimate: PoseEstimate, truth: WorkerTruth) -> tuple[Floats, Bools]:
     """Mean joint position error of the tracked workers.
 
+    Nothing tells a camera who of several workers is called the first: tracks are compared
+    with the workers whom they fit best, none with two.
+
     Returns:
         (B,) mean over tracked workers and joints [m], NaN where nobody is tracked, and
         (B,) whether a worker is there whom the estimator does not track.
@@ -79,16 +83,30 @@ def tracking_error(estimate: PoseEstimate, truth: WorkerTruth) -> tuple[Floats, 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _tracking_error(mean_world, joints_world, tracked, error_m, lost):
+    n_workers, n_joints = tracked.shape[1], mean_world.shape[2]
+    error, whom = np.empty((n_workers, n_workers)), np.empty(n_workers, np.int64)
     for b in range(tracked.shape[0]):
         total, count = 0.0, 0
-        for w in range(tracked.shape[1]):
-            if not tracked[b, w]:
-                lost[b] = True
-                continue
-            for j in range(mean_world.shape[2]):
-                squared = 0.0
-                for i in range(3):
-                    squared += (mean_world[b, w, j, i] - joints_world[b, w, j, i]) ** 2
-                total += math.sqrt(squared)
+        for w in range(n_workers):
+            if tracked[b, w]:
+                for k in range(n_workers):
+                    error[count, k] = _joint_error(mean_world[b, w], joints_world[b, k])
                 count += 1
-        error_m[b] = total / count if count else np.nan
+            else:
+                lost[b] = True
+        assign_rows(error[:count], whom)
+        for row in range(count):
+            total += error[row, whom[row]]
+        error_m[b] = total / (count * n_joints) if count else np.nan
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _joint_error(mean_world, joints_world):
+    """Sum over joints of the distances between two bodies [m]."""
+    total = 0.0
+    for j in range(mean_world.shape[0]):
+        squared = 0.0
+        for i in range(3):
+            squared += (mean_world[j, i] - joints_world[j, i]) ** 2
+        total += math.sqrt(squared)
+    return total

@@ -10,6 +10,7 @@
 The organs do not know each other; they meet here.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -20,7 +21,7 @@ from hrc_env.config import HRCConfig
 from hrc_env.errors import unknown
 from hrc_env.geometry.cameras import project, projections
 from hrc_env.perception import emulator
-from hrc_env.perception.eyes import Eyes
+from hrc_env.perception.eyes import Eyes, Sight
 from hrc_env.perception.windows import steady_window, window_from_joints
 from hrc_env.records import CropWindow, Keypoints, PoseEstimate, WorkerMotion, WorkerTruth
 from hrc_env.scene.build import Scene
@@ -28,6 +29,7 @@ from hrc_env.scene.physics import Physics
 from hrc_env.scene.render import CropRenderer
 from hrc_env.skeleton import N_JOINTS
 from hrc_env.tracking import given
+from hrc_env.tracking.association import associate
 from hrc_env.tracking.estimators import Estimator, make_estimator
 from hrc_env.typing import Ints, JointAngles
 
@@ -143,6 +145,7 @@ class TrackingSenses:
 
     def __init__(self, batch: int, scene: Scene, tracker: Estimator, config: HRCConfig) -> None:
         self.scene, self.tracker, self.dt_s = scene, tracker, config.ctrl_dt
+        self.association = config.association
         self.P = projections(scene.cameras)
         self.state: Any = tracker.init(batch, scene.n_workers)
         self.keypoints = _no_keypoints(batch, len(scene.cameras), scene.n_workers)
@@ -158,7 +161,7 @@ class TrackingSenses:
         whole = len(now.ids) == len(self.keypoints.px)
         state = self.state if whole else rows(self.state, now.ids)
         self.tracker.predict(state, self.dt_s, tracker_rngs)
-        keypoints = self.detect(now, state, sensor_rngs)
+        keypoints = self._sorted(self.detect(now, state, sensor_rngs), state)
         self.tracker.update(state, keypoints, tracker_rngs)
         if whole:
             self.keypoints = keypoints
@@ -168,7 +171,7 @@ class TrackingSenses:
         return self.tracker.estimate(state)
 
     def detect(self, now: Moment, predicted: Any, sensor_rngs: Generators) -> Keypoints:
-        """Keypoints of this moment, by whatever eyes the level has.
+        """Keypoints of this moment, by whatever eyes the level has; whose they are is open.
 
         Args:
             now: the scene.
@@ -176,6 +179,13 @@ class TrackingSenses:
             sensor_rngs: one generator a row.
         """
         raise NotImplementedError
+
+    def _sorted(self, keypoints: Keypoints, predicted: Any) -> Keypoints:
+        """Keypoints by worker; where there is one worker, whatever was found is theirs."""
+        if self.scene.n_workers < 2:
+            return keypoints
+        expected = self.tracker.estimate(predicted)
+        return associate(self.P, keypoints, expected, self.association).keypoints
 
     def looks(self, b: int) -> tuple[Keypoints | None, Windows]:
         """The keypoints of environment `b`."""
@@ -219,7 +229,9 @@ class EmulatedSenses(TrackingSenses):
         )
         if not whole:
             write_rows(self.emulator, now.ids, state)
-        return keypoints
+        if self.scene.n_workers < 2:
+            return keypoints
+        return emulator.without_names(keypoints, sensor_rngs)
 
 
 class CameraSenses(TrackingSenses):
@@ -239,15 +251,29 @@ class CameraSenses(TrackingSenses):
         expected = self.tracker.estimate(predicted)
         for row, b in enumerate(now.ids):
             self.renderer.draw(now.q[row], one(now.motion, row))
-            for worker in range(self.scene.n_workers):
-                wanted = self._windows(expected, row, worker)
-                windows = list(map(steady_window, self.windows[b][worker], wanted))
-                sight = self.eyes.look(self.renderer, windows, self._track(b, worker))
+            for worker, sight in self._look(expected, row, int(b)):
                 self.windows[b][worker] = sight.windows
                 seen.px[row, :, worker] = sight.px
                 seen.confidence[row, :, worker] = sight.confidence
                 seen.sigma_px[row, :, worker] = sight.sigma_px
         return seen
+
+    def _look(self, expected: PoseEstimate, row: int, b: int) -> Iterator[tuple[int, Sight]]:
+        """Look for every worker of an environment; a search finds nobody who has been looked at.
+
+        Those with a window come first, and one search serves all the others.
+        """
+        wanted = [self._windows(expected, row, w) for w in range(self.scene.n_workers)]
+        taken: Windows = []
+        people = None
+        for worker in sorted(range(len(wanted)), key=lambda w: not any(wanted[w])):
+            windows = list(map(steady_window, self.windows[b][worker], wanted[worker]))
+            if people is None and not any(windows):
+                people = self.eyes.search(self.renderer)
+            track = self._track(b, worker)
+            sight = self.eyes.look(self.renderer, windows, track, taken, people)
+            taken.append(sight.windows)
+            yield worker, sight
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
         """Forget the tracks, and whom the eyes were following."""

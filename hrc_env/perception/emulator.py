@@ -170,6 +170,21 @@ def emulate(
     return out
 
 
+def without_names(keypoints: Keypoints, rngs: Generators) -> Keypoints:
+    """The same poses, in every camera in an order of its own: nobody wears a name.
+
+    Args:
+        keypoints: (B, C, W, J, ...).
+        rngs: one generator per environment.
+    """
+    batch, n_cameras, n_workers = keypoints.confidence.shape[:3]
+    order = np.tile(np.arange(n_workers), (batch, n_cameras, 1))
+    for b in range(batch):
+        order[b] = rngs[b].permuted(order[b], axis=-1)
+    pick = (np.arange(batch)[:, None, None], np.arange(n_cameras)[:, None], order)
+    return Keypoints(keypoints.px[pick], keypoints.confidence[pick], keypoints.sigma_px[pick])
+
+
 @functools.lru_cache(maxsize=16)
 def _rig(cameras: tuple[PinholeCamera, ...]) -> tuple[Floats, Floats, Floats]:
     """Projections (C, 3, 4), eyes (C, 3), and width, height, focal length (C, 3)."""

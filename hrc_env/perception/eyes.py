@@ -17,7 +17,12 @@ import numpy as np
 from hrc_env.errors import ConfigError, check_shape
 from hrc_env.geometry.cameras import PinholeCamera, inside_image
 from hrc_env.perception import blazepose
-from hrc_env.perception.acquisition import agreed_windows, apart_from, same_person
+from hrc_env.perception.acquisition import (
+    Candidates,
+    agreed_windows,
+    apart_from,
+    same_person,
+)
 from hrc_env.perception.network import (
     LANDMARK_SIDE,
     Detector,
@@ -116,6 +121,7 @@ class Eyes:
         windows: Sequence[CropWindow | None],
         track: int = 0,
         others: Sequence[Sequence[CropWindow | None]] = (),
+        people: Candidates | None = None,
     ) -> Sight:
         """Look for one worker through a window a camera; search if there is no window at all.
 
@@ -125,12 +131,14 @@ class Eyes:
             track: whom the eyes are following; any number that stays the worker's own. The
                 detector stage's turns are counted for each.
             others: windows (C,) of other workers; a search does not find these again.
+            people: what `search` found in these very images, if it was asked already.
         """
         check_shape("windows", (len(windows),), (len(self.cameras),), "one a camera")
         looks = self._looks.setdefault(track, [0] * len(self.cameras))
         searched = all(window is None for window in windows)
         if searched:
-            windows = agreed_windows(apart_from(self.search(source), others), self.cameras)
+            people = self.search(source) if people is None else people
+            windows = agreed_windows(apart_from(people, others), self.cameras)
         used = [c for c, window in enumerate(windows) if window is not None]
         asked = [not searched and self._is_turn(looks[c], c) for c in used]
         found = self._share(self._landmark_jobs(source, windows, used, asked))

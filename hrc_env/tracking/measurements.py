@@ -37,6 +37,17 @@ def arrays_of(
 
 
 @numba.njit(**_JIT)
+def is_measurement(u, v, belief, sigma):
+    """Whether a pixel, its confidence and its standard deviation are a measurement."""
+    return (
+        abs(u) < FURTHEST_PX
+        and abs(v) < FURTHEST_PX
+        and 0.0 < belief <= 1.0 + 1e-6
+        and 0.0 < sigma < FURTHEST_PX
+    )
+
+
+@numba.njit(**_JIT)
 def read_worker(px, confidence, sigma_px, b, w, scale, z, sigma, ok):
     """Worker w of environment b: pixels z (J, C, 2), sigma (J, C), ok (J, C); whether any is ok.
 
@@ -47,12 +58,7 @@ def read_worker(px, confidence, sigma_px, b, w, scale, z, sigma, ok):
         for j in range(px.shape[3]):
             u, v = px[b, c, w, j, 0], px[b, c, w, j, 1]
             s, belief = sigma_px[b, c, w, j], confidence[b, c, w, j]
-            good = (
-                abs(u) < FURTHEST_PX
-                and abs(v) < FURTHEST_PX
-                and 0.0 < belief <= 1.0 + 1e-6
-                and 0.0 < s < FURTHEST_PX
-            )
+            good = is_measurement(u, v, belief, s)
             ok[j, c] = good
             any_ok |= good
             z[j, c, 0] = u if good else 0.0

@@ -1,0 +1,65 @@
+"""Assignment: each row of a cost matrix gets a column of its own, at the least total cost.
+
+The shortest augmenting paths of the Hungarian method (Kuhn, Naval Research Logistics 2, 1955;
+Jonker and Volgenant, Computing 38, 1987), for matrices with a few rows, inside kernels.
+"""
+
+import numba
+import numpy as np
+
+from hrc_env.errors import ConfigError
+from hrc_env.typing import Floats, Ints
+
+_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
+
+
+def assign(cost: Floats) -> Ints:
+    """(n,) the column of each row of a finite (n, m) cost matrix, m >= n, no column twice.
+
+    Raises:
+        ConfigError: more rows than columns, or a cost that is not finite.
+    """
+    cost = np.ascontiguousarray(cost, np.float64)
+    if cost.ndim != 2 or cost.shape[0] > cost.shape[1] or not np.isfinite(cost).all():
+        raise ConfigError(f"cost must be finite (n, m) with m >= n, got shape {cost.shape}.")
+    column = np.empty(len(cost), np.int64)
+    assign_rows(cost, column)
+    return column
+
+
+@numba.njit(**_JIT)
+def assign_rows(cost, column):
+    """Kernel of `assign`: fills column (n,) for a finite cost (n, m) with m >= n."""
+    n_rows, n_columns = cost.shape
+    # Rows and columns count from 1 here; column 0 stands for "the row that is being placed".
+    row_price, column_price = np.zeros(n_rows + 1), np.zeros(n_columns + 1)
+    owner, before = np.zeros(n_columns + 1, np.int64), np.zeros(n_columns + 1, np.int64)
+    least, done = np.empty(n_columns + 1), np.empty(n_columns + 1, np.bool_)
+    for row in range(1, n_rows + 1):
+        owner[0] = row
+        least[:], done[:] = np.inf, False
+        here = 0
+        while owner[here] != 0:
+            done[here] = True
+            step, there = np.inf, 0
+            for k in range(1, n_columns + 1):
+                if done[k]:
+                    continue
+                reduced = cost[owner[here] - 1, k - 1] - row_price[owner[here]] - column_price[k]
+                if reduced < least[k]:
+                    least[k], before[k] = reduced, here
+                if least[k] < step:
+                    step, there = least[k], k
+            for k in range(n_columns + 1):
+                if done[k]:
+                    row_price[owner[k]] += step
+                    column_price[k] -= step
+                else:
+                    least[k] -= step
+            here = there
+        while here != 0:
+            owner[here] = owner[before[here]]
+            here = before[here]
+    for k in range(1, n_columns + 1):
+        if owner[k] > 0:
+            column[owner[k] - 1] = k - 1

@@ -1,0 +1,292 @@
+"""Which detection belongs to whom: 2D poses of every camera to workers who are followed.
+
+A camera that sees several people does not know who they are, and it sees people who are not
+there. Poses that fit where a worker is predicted go to that worker, in each camera so that all
+together fit best, and no pose to two workers. What is left is compared across cameras: poses of
+at least two cameras that are one body go to a worker who was lost from sight nearby, else to a
+place that nobody has; poses that no other camera confirms go to nobody. Whatever the cameras
+report is data: poses that are no measurement are left out.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from hrc_env.errors import ConfigError, check_shape
+from hrc_env.geometry.assignment import assign_rows
+from hrc_env.records import Keypoints, PoseEstimate
+from hrc_env.skeleton import BONE_LENGTH_M, BONES, MIRROR, N_JOINTS
+from hrc_env.tracking.measurements import arrays_of, is_measurement
+from hrc_env.tracking.newcomers import camera_model, fit_cameras, meeting, propose
+from hrc_env.tracking.resemblance import LEAST_JOINTS, expect, resemblance
+from hrc_env.typing import Floats, Ints
+
+_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
+
+
+@dataclass(frozen=True, slots=True)
+class AssociationConfig:
+    """When a 2D pose is believed to be of a worker."""
+
+    gate_sigma: float = 5.0
+    """A joint is near where it is expected within so many standard deviations; half of a
+    pose's joints must be."""
+    slack_m: float = 0.05
+    """Standard deviation of what predictions do not know of [m]: detectors err for half a
+    second in the same way, and people start and stop."""
+    min_joints: int = 8
+    """Two cameras must agree on so many joints (of 15) of somebody new."""
+    apart_m: float = 0.35
+    """Two people's bodies are never nearer than this [m]: nearer ones are one person."""
+    rejoin_m: float = 1.0
+    """Somebody new who appears so near [m] a worker whom no camera sees now is that worker."""
+    image_area_px: float = 1920.0 * 1080.0
+    """Area of an image [px^2]: the inverse is the density of poses that are nobody's."""
+
+    def __post_init__(self) -> None:
+        for name in ("gate_sigma", "min_joints", "image_area_px"):
+            if not getattr(self, name) > 0:
+                raise ConfigError(f"{name} must be positive, got {getattr(self, name)}.")
+        for name in ("slack_m", "apart_m", "rejoin_m"):
+            if not getattr(self, name) >= 0:
+                raise ConfigError(f"{name} must not be negative, got {getattr(self, name)}.")
+
+
+@dataclass(frozen=True, slots=True)
+class Association:
+    """Keypoints by worker, and where each of them came from."""
+
+    keypoints: Keypoints
+    """(B, C, W, J, ...): missing where a camera has no pose of a worker."""
+    pose: Ints
+    """(B, C, W) which of the camera's poses it is, -1 for none."""
+
+
+class _Settings(NamedTuple):
+    """`AssociationConfig` for the kernels, under the same names."""
+
+    gate_sigma: float
+    slack_m: float
+    min_joints: int
+    apart_m: float
+    rejoin_m: float
+    image_area_px: float
+
+
+def associate(
+    P: Floats, found: Keypoints, predicted: PoseEstimate, config: AssociationConfig | None = None
+) -> Association:
+    """Sort poses by worker.
+
+    Args:
+        P: (C, 3, 4) projections.
+        found: (B, C, D, J, ...) D poses a camera in any order; those that are not are NaN.
+        predicted: (B, W, ...) where the workers should be, before these frames were taken in.
+        config: settings; the defaults if None.
+
+    Raises:
+        ConfigError: arrays of other shapes. Never because of what they hold.
+    """
+    P = np.ascontiguousarray(P, np.float64)
+    batch, n_workers = predicted.tracked.shape
+    n_poses = found.px.shape[2] if found.px.ndim == 5 else -1
+    measured = arrays_of(found, (batch, len(P), n_poses, N_JOINTS))
+    check_shape("mean_world", predicted.mean_world.shape, (batch, n_workers, N_JOINTS, 3), "B, W")
+    config = config or AssociationConfig()
+    settings = _Settings(*(getattr(config, name) for name in _Settings._fields))
+    shape = (batch, len(P), n_workers, N_JOINTS)
+    pose = np.full(shape[:3], -1, np.int64)
+    px, confidence = np.full((*shape, 2), np.nan), np.zeros(shape)
+    sigma_px = np.full(shape, np.inf)
+    belief = (
+        np.ascontiguousarray(predicted.mean_world, np.float64),
+        np.ascontiguousarray(predicted.cov_world, np.float64),
+        np.ascontiguousarray(predicted.tracked),
+    )
+    tables = (MIRROR, BONES, BONE_LENGTH_M)
+    _associate_all(P, *measured, *belief, tables, settings, pose, px, confidence, sigma_px)
+    return Association(Keypoints(px, confidence, sigma_px), pose)
+
+
+@numba.njit(**_JIT)
+def _associate_all(
+    P, found_px, found_confidence, found_sigma, mean, cov, tracked, tables, s,
+    pose, px, confidence, sigma_px,
+):  # fmt: skip
+    n_cameras, n_poses, n_joints = found_confidence.shape[1:]
+    eye, back, focal = np.empty((n_cameras, 3)), np.empty((n_cameras, 3, 3)), np.empty(n_cameras)
+    camera_model(P, eye, back, focal)
+    rig = (P, eye, back, focal)
+    ok = np.empty((n_cameras, n_poses, n_joints), np.bool_)
+    free = np.empty((n_cameras, n_poses), np.bool_)
+    for b in range(len(pose)):
+        _read(found_px[b], found_confidence[b], found_sigma[b], ok, free)
+        poses = (found_px[b], found_sigma[b], ok)
+        _follow(P, poses, free, mean[b], cov[b], tracked[b], tables[0], s, pose[b])
+        _welcome(rig, poses, free, mean[b], tracked[b], tables, s, pose[b])
+        for c in range(n_cameras):
+            for w in range(pose.shape[2]):
+                d = pose[b, c, w]
+                if d >= 0:
+                    px[b, c, w] = found_px[b, c, d]
+                    confidence[b, c, w] = found_confidence[b, c, d]
+                    sigma_px[b, c, w] = found_sigma[b, c, d]
+
+
+@numba.njit(**_JIT)
+def _read(px, confidence, sigma_px, ok, free):
+    """Which joints are measurements, and which poses have enough of them to be somebody's."""
+    for c in range(ok.shape[0]):
+        for d in range(ok.shape[1]):
+            n = 0
+            for j in range(ok.shape[2]):
+                u, v = px[c, d, j, 0], px[c, d, j, 1]
+                ok[c, d, j] = is_measurement(u, v, confidence[c, d, j], sigma_px[c, d, j])
+                n += ok[c, d, j]
+            free[c, d] = n >= LEAST_JOINTS
+
+
+@numba.njit(**_JIT)
+def _follow(P, poses, free, mean, cov, tracked, mirror, s, pose):
+    """Give tracked workers the poses that fit their predictions best, camera by camera."""
+    (z, sigma, ok), n_workers = poses, len(tracked)
+    n_cameras, n_poses, n_joints = ok.shape
+    size = max(n_workers, n_poses)
+    fit, column = np.empty((size, size)), np.empty(size, np.int64)
+    image, known = np.empty((n_joints, 3)), np.ones(n_joints, np.bool_)
+    for c in range(n_cameras):
+        fit[:] = 0.0
+        for w in range(n_workers):
+            if not tracked[w]:
+                continue
+            expect(P[c], mean[w], cov[w], known, s.slack_m, image)
+            for d in range(n_poses):
+                if free[c, d]:
+                    fit[w, d] = -resemblance(
+                        image, z[c, d], sigma[c, d], ok[c, d], mirror,
+                        s.gate_sigma, s.image_area_px,
+                    )  # fmt: skip
+        assign_rows(fit, column)
+        for w in range(n_workers):
+            if fit[w, column[w]] < 0.0:  # 0: no pose fits, or it fits another better
+                pose[c, w] = column[w]
+                free[c, column[w]] = False
+
+
+@numba.njit(**_JIT)
+def _welcome(rig, poses, free, mean, tracked, tables, s, pose):
+    """Give poses that several cameras have of one body to whom it can be."""
+    n_cameras, n_poses = free.shape
+    n_workers = len(tracked)
+    vacant, unseen = np.empty(n_workers, np.bool_), np.empty(n_workers, np.bool_)
+    wanted = False
+    for w in range(n_workers):
+        n_views = 0
+        for c in range(n_cameras):
+            n_views += pose[c, w] >= 0
+        vacant[w], unseen[w] = not tracked[w], tracked[w] and n_views == 0
+        wanted |= vacant[w] or n_views < min(2, n_cameras)
+    if not wanted:
+        return
+    most = n_cameras * (n_cameras - 1) // 2 * n_poses * n_poses
+    seeds = np.empty((most, 4), np.int64)
+    members, scores = np.empty((most, n_cameras), np.int64), np.empty((most, n_cameras))
+    n = propose(rig, poses, free, tables, s, seeds, members, scores)
+    mean, tracked = mean.copy(), tracked.copy()  # newcomers are followed from here on
+    member, score = np.empty(n_cameras, np.int64), np.empty(n_cameras)
+    while True:
+        best = _best(seeds, members, scores, free, n)
+        if best < 0:
+            return
+        body = _body_of(rig, poses, seeds[best], s)
+        fit_cameras(rig[0], poses, free, body, tables, s, member, score)
+        w = _whose(body, mean, tracked, vacant, unseen, s)
+        for c in range(n_cameras):
+            if member[c] < 0:
+                continue
+            free[c, member[c]] = False
+            if w >= 0 and pose[c, w] < 0:
+                pose[c, w] = member[c]
+        if w >= 0:
+            if vacant[w]:
+                _place(body, mean[w])
+            tracked[w], vacant[w], unseen[w] = True, False, False
+
+
+@numba.njit(**_JIT)
+def _best(seeds, members, scores, free, n):
+    """The proposal that the cameras fit best with poses that are still free, or -1."""
+    best, best_total = -1, 0.0
+    for k in range(n):
+        if not (free[seeds[k, 0], seeds[k, 1]] and free[seeds[k, 2], seeds[k, 3]]):
+            continue
+        total, n_views = 0.0, 0
+        for c in range(free.shape[0]):
+            if members[k, c] >= 0 and free[c, members[k, c]]:
+                total += scores[k, c]
+                n_views += 1
+        if n_views >= 2 and total > best_total:
+            best, best_total = k, total
+    return best
+
+
+@numba.njit(**_JIT)
+def _body_of(rig, poses, seed, s):
+    """(points (J, 3), met (J,)) of a proposal."""
+    (P, eye, back, focal), (z, sigma, ok) = rig, poses
+    c1, d1, c2, d2 = seed
+    points, met = np.empty((ok.shape[2], 3)), np.empty(ok.shape[2], np.bool_)
+    camera_1 = (eye[c1], back[c1], focal[c1], P[c1])
+    camera_2 = (eye[c2], back[c2], focal[c2], P[c2])
+    pose_1, pose_2 = (z[c1, d1], sigma[c1, d1], ok[c1, d1]), (z[c2, d2], sigma[c2, d2], ok[c2, d2])
+    meeting(camera_1, camera_2, pose_1, pose_2, s.gate_sigma, points, met)
+    return points, met
+
+
+@numba.njit(**_JIT)
+def _whose(body, mean, tracked, vacant, unseen, s):
+    """The worker that a body is, or -1: one who is followed there, is missed near, or is nobody.
+
+    Of vacant places the one whose last belief is nearest, so that who comes back is known again.
+    """
+    distance = np.empty(len(tracked))
+    for w in range(len(tracked)):
+        distance[w] = _apart(body, mean[w])
+    near = _nearest(distance, tracked, s.apart_m)
+    if near < 0:
+        near = _nearest(distance, unseen, s.rejoin_m)
+    return near if near >= 0 else _nearest(distance, vacant, np.inf)
+
+
+@numba.njit(**_JIT)
+def _nearest(distance, among, limit):
+    best = -1
+    for w in range(len(distance)):
+        if among[w] and distance[w] < limit:
+            best, limit = w, distance[w]
+    return best
+
+
+@numba.njit(**_JIT)
+def _place(body, mean):
+    points, met = body
+    mean[:] = np.nan
+    for j in range(len(met)):
+        if met[j]:
+            mean[j] = points[j]
+
+
+@numba.njit(**_JIT)
+def _apart(body, mean):
+    """Distance [m] between a body and a worker, on average over joints known of both."""
+    points, met = body
+    n, dx, dy, dz = 0, 0.0, 0.0, 0.0
+    for j in range(len(met)):
+        if met[j] and np.isfinite(mean[j, 0]):
+            n += 1
+            dx += points[j, 0] - mean[j, 0]
+            dy += points[j, 1] - mean[j, 1]
+            dz += points[j, 2] - mean[j, 2]
+    return np.sqrt(dx * dx + dy * dy + dz * dz) / n if n else np.inf
