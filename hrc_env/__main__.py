@@ -2,6 +2,7 @@
 
 python -m hrc_env demo     a film of a robot that yields to a worker it sees
 python -m hrc_env check    is this machine ready?
+python -m hrc_env bench    how good, honest and fast are the estimators?
 """
 
 import sys
@@ -9,6 +10,7 @@ import sys
 import tyro
 from rich.console import Console
 
+from hrc_env.cli.bench import Bench
 from hrc_env.cli.check import Check
 from hrc_env.cli.demo import Demo
 from hrc_env.cli.listing import List
@@ -20,7 +22,14 @@ from hrc_env.errors import HRCError
 def main() -> int:
     """Run a command; errors that explain themselves are shown without a traceback."""
     command = tyro.extras.subcommand_cli_from_dict(
-        {"setup": Setup, "demo": Demo, "check": Check, "list": List, "play": Play},
+        {
+            "setup": Setup,
+            "demo": Demo,
+            "check": Check,
+            "list": List,
+            "play": Play,
+            "bench": Bench,
+        },
         prog="python -m hrc_env",
         description="A robot, a worker, and the cameras between them.",
     )

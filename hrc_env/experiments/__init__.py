@@ -1,0 +1,1 @@
+"""Experiments: what the package can do, measured against ground truth and theory."""

@@ -1,0 +1,28 @@
+"""The yardstick: plain direct linear transformation, frame by frame.
+
+Hartley and Zisserman, Multiple View Geometry, 2nd ed., section 12.2. No weights, no gate, no
+refinement; a joint that fewer than two cameras see stays where it was. Its error says how hard
+a set of sequences is, whoever made it.
+"""
+
+import numpy as np
+
+from hrc_env.typing import Floats, Points2, Points3
+
+
+def triangulate_frame(P: Floats, px: Points2, last: Points3) -> Points3:
+    """(S, J, 3) points of one frame of S sequences.
+
+    Args:
+        P: (C, 3, 4) projections.
+        px: (S, C, J, 2) pixels, NaN where missing.
+        last: (S, J, 3) what is held where fewer than two cameras see a joint.
+    """
+    seen = np.isfinite(px[..., 0])
+    px = np.where(seen[..., None], px, 0.0)
+    rows = px[..., None] * P[:, None, None, 2] - P[:, None, :2]
+    rows = np.where(seen[..., None, None], rows / 1e3, 0.0)
+    _, vectors = np.linalg.eigh(np.einsum("scjki,scjkl->sjil", rows, rows))
+    nearest = vectors[..., 0]
+    enough = (seen.sum(1) >= 2)[..., None]
+    return np.where(enough, nearest[..., :3] / np.where(enough, nearest[..., 3:], 1.0), last)

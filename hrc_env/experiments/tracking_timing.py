@@ -1,0 +1,55 @@
+"""How long one worker's update takes: prediction and update, everything included."""
+
+import time
+from typing import Any
+
+import numpy as np
+
+from hrc_env.experiments.tracking_cells import Sequences, Tick, keypoints_of
+from hrc_env.experiments.tracking_rigs import DT_S, Rig
+from hrc_env.tracking.estimators import make_estimator
+from hrc_env.typing import Floats
+
+BATCH = 64
+_N_FRAMES, _FIRST = 75, 25
+
+
+def time_estimator(
+    name: str, rig: Rig, clean: Sequences, hard: Sequences, n_repeats: int, tick: Tick
+) -> dict[str, list[float]]:
+    """Microseconds per worker and update, one number per repeat.
+
+    Args:
+        name: an estimator.
+        rig: of the sequences.
+        clean: at least 64 sequences; the median over frames at batch 1 and 64 ("1", "64").
+        hard: the same for the mean over frames at batch 64 ("hard_64").
+        n_repeats: how often.
+        tick: told the share that is done.
+    """
+    times: dict[str, list[float]] = {"1": [], "64": [], "hard_64": []}
+    _frame_times(name, rig, clean, 1, 2)  # compiles
+    for _ in range(n_repeats):
+        times["1"].append(float(np.median(_frame_times(name, rig, clean, 1))))
+        times["64"].append(float(np.median(_frame_times(name, rig, clean, BATCH))))
+        times["hard_64"].append(float(np.mean(_frame_times(name, rig, hard, BATCH))))
+        tick(1 / n_repeats)
+    return times
+
+
+def _frame_times(
+    name: str, rig: Rig, sequences: Sequences, batch: int, n_frames: int = _N_FRAMES
+) -> Floats:
+    """Microseconds per worker of each frame after the first second."""
+    estimator: Any = make_estimator(name, rig.P, DT_S, sequences.config)
+    rngs = [np.random.default_rng([b, 5]) for b in range(batch)]
+    state = estimator.init(batch, 1)
+    estimator.reset(state, np.arange(batch), rngs)
+    seconds = np.empty(n_frames)
+    for t in range(n_frames):
+        keypoints = keypoints_of(sequences.px[t, :batch])
+        started_s = time.perf_counter()
+        estimator.predict(state, DT_S, rngs)
+        estimator.update(state, keypoints, rngs)
+        seconds[t] = time.perf_counter() - started_s
+    return 1e6 * seconds[min(_FIRST, n_frames - 1) :] / batch

@@ -1,0 +1,133 @@
+"""The bench as a whole: every key, the shared form, and going on where it was stopped."""
+
+import json
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+from hrc_env.errors import ConfigError
+from hrc_env.experiments import tracking_bench, tracking_cells
+from hrc_env.experiments.tracking_bench import TrackingBenchConfig, run
+from hrc_env.experiments.tracking_cells import CHI2_LEVELS, DLT, Tally, make_sequences
+from hrc_env.experiments.tracking_rigs import RIGS, make_rig
+from hrc_env.experiments.tracking_timing import time_estimator
+from hrc_env.tracking.estimators import ESTIMATORS
+
+TINY = TrackingBenchConfig(n_seeds=2, n_matched=2, timing_repeats=1)
+CONDITIONS = ("clean", "occluded", "hard", "one_camera", "after_return", "matched")
+
+
+def no_time(name, rig, clean, hard, n_repeats, tick):
+    """Instead of the clock."""
+    tick(1.0)
+    return {"1": [2.0], "64": [1.0], "hard_64": [1.5]}
+
+
+@contextmanager
+def small():
+    """Few frames, no clock."""
+    short = {name: min(n, 60) for name, n in tracking_cells._FRAMES.items()}
+    windows = {
+        name: dict.fromkeys(inner, (min(10, short[name] - 2), short[name]))
+        for name, inner in tracking_cells._WINDOWS.items()
+    }
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(tracking_cells, "_FRAMES", short)
+        patch.setattr(tracking_cells, "_WINDOWS", windows)
+        patch.setattr(tracking_bench, "time_estimator", no_time)
+        yield patch
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory):
+    """The folder of a bench on a few frames of two sequences, and what it said."""
+    out, said = tmp_path_factory.mktemp("bench"), []
+    with small():
+        run(TINY, out, lambda share, label: said.append((share, label)))
+    return out, said
+
+
+def test_every_key_is_written_in_the_shared_form(bench):
+    out, _ = bench
+    results = json.loads((out / "results.json").read_text())
+    assert set(results) >= {"config", "git", "versions", "machine", "seeds", "metrics"}
+    metrics = results["metrics"]
+    for name in ESTIMATORS:
+        assert f"ratio_to_bound.{name}" in metrics
+        for batch in ("1", "64", "hard_64"):
+            assert f"update_us.{name}.{batch}" in metrics
+        for rig in RIGS:
+            for condition in CONDITIONS:
+                for kind in ("rmse_m", "median_m", "coverage95", "std_over_rmse", "nees"):
+                    assert f"{kind}.{rig}.{condition}.{name}" in metrics
+    assert f"rmse_m.lab.clean.{DLT}" in metrics
+    for metric in metrics.values():
+        assert set(metric) == {"value", "low", "high", "unit", "n"}
+        assert np.isfinite([metric["value"], metric["low"], metric["high"]]).all()
+
+
+def test_the_report_is_a_table_and_two_plots(bench):
+    out, _ = bench
+    text = (out / "tracking.md").read_text()
+    for name in (*ESTIMATORS, DLT):
+        assert name in text
+    for plot in ("error_by_views.png", "calibration.png"):
+        assert (out / plot).read_bytes().startswith(b"\x89PNG")
+
+
+def test_progress_ends_at_the_whole(bench):
+    _, said = bench
+    assert sum(share for share, _ in said) == pytest.approx(1.0)
+
+
+def test_a_second_run_makes_only_what_is_missing(bench):
+    out, _ = bench
+    missing = out / "parts" / "lab.clean.paper.json"
+    before = json.loads(missing.read_text())
+    missing.unlink()
+    made = []
+    real = tracking_bench.run_cell
+    with small() as patch:
+        patch.setattr(tracking_bench, "run_cell", lambda *a: made.append(a[0]) or real(*a))
+        run(TINY, out, lambda share, label: None)
+    assert made == ["paper"]
+    assert json.loads(missing.read_text()) == before
+    assert not list(out.rglob("*.draft"))
+
+
+def test_parts_of_other_settings_are_not_used(bench):
+    assert tracking_bench._fingerprint(TINY) != tracking_bench._fingerprint(tracking_bench.QUICK)
+
+
+def test_time_per_update_is_positive():
+    """The clock itself, on a few frames; nothing is said about how fast this machine is."""
+    rig = make_rig("lab")
+    sequences = make_sequences(rig, "one_camera", list(range(64)))
+    shares = []
+    times = time_estimator("triangulation", rig, sequences, sequences, 2, shares.append)
+    assert set(times) == {"1", "64", "hard_64"}
+    assert min(min(values) for values in times.values()) > 0
+    assert sum(shares) == pytest.approx(1.0)
+
+
+def test_sizes_that_cannot_work_are_answered():
+    with pytest.raises(ConfigError, match="n_seeds"):
+        TrackingBenchConfig(n_seeds=0)
+
+
+def test_a_right_covariance_is_found_calibrated():
+    """Errors drawn from the reported Gaussian: 95 % inside, NEES of 1, levels equally filled."""
+    rng = np.random.default_rng(0)
+    factor = rng.normal(size=(3, 3))
+    truth, px = rng.normal(size=(20, 15, 3)), np.zeros((20, 4, 15, 2))
+    tally = Tally(20)
+    for _ in range(50):
+        mean = truth + rng.standard_normal((20, 15, 3)) @ factor.T
+        tally.add(truth, mean, np.broadcast_to(factor @ factor.T, (20, 15, 3, 3)), px)
+    n = tally.n.sum()
+    assert tally.inside.sum() / n == pytest.approx(0.95, abs=0.01)
+    assert tally.nees.sum() / n / 3 == pytest.approx(1.0, abs=0.03)
+    assert np.sqrt(tally.trace.sum() / tally.squared.sum()) == pytest.approx(1.0, abs=0.03)
+    np.testing.assert_allclose(tally.levels.sum(0) / n, 0.05, atol=0.007)
+    assert CHI2_LEVELS[-1] == pytest.approx(tracking_cells.CHI2_95_3D, abs=1e-3)

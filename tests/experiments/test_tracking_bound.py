@@ -1,0 +1,164 @@
+"""The bound: what it is in the linear case, and that an estimator can reach it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hrc_env.experiments.tracking_bound import (
+    block_diagonal,
+    camera_information,
+    joint_blocks,
+    posterior_bound,
+    shrink,
+)
+from hrc_env.experiments.tracking_detections import Damage, detect
+from hrc_env.experiments.tracking_matched import (
+    N_PLACES,
+    N_STATES,
+    advance,
+    bone_gain,
+    bone_rows,
+    draw,
+    heading,
+    matched_model,
+    tilted,
+    transition,
+)
+from hrc_env.experiments.tracking_rigs import make_rig
+from hrc_env.geometry.cameras import project
+from hrc_env.skeleton import N_JOINTS
+
+MODEL = matched_model(0.5, 0.05)
+SIGMA_PX = 3.0
+
+
+def affine_rig():
+    """Cameras from infinitely far away: pixels are linear in the point."""
+    P = np.zeros((3, 3, 4))
+    P[:, 2, 3] = 1.0
+    P[0, :2, :3] = [[300, 0, 0], [0, 0, -300]]
+    P[1, :2, :3] = [[0, 300, 0], [0, 0, -300]]
+    P[2, :2, :3] = [[200, 200, 0], [-60, 60, -280]]
+    return P
+
+
+def test_the_transition_is_the_derivative_of_the_motion():
+    rng = np.random.default_rng(0)
+    place = MODEL.offset + rng.normal(0, 0.05, MODEL.offset.shape)
+    state = np.concatenate([place, rng.normal(0, 1, place.shape)]).reshape(1, -1)
+    step = 1e-6 * np.eye(N_STATES)
+    numeric = (advance(MODEL, state + step) - advance(MODEL, state - step)).T / 2e-6
+    np.testing.assert_allclose(transition(MODEL, place[None])[0], numeric, atol=1e-7)
+
+
+def test_motion_is_the_same_in_every_place_and_direction():
+    joints = draw(MODEL, [1], 2)[0]
+    body = np.concatenate([joints[0], 0 * joints[0]]).reshape(1, -1)
+    shifted = body.reshape(1, 2, N_JOINTS, 3) + np.array([[5.0, -3.0, 0.4], [0, 0, 0]])[:, None]
+    moved = advance(MODEL, shifted.reshape(1, -1)).reshape(2, N_JOINTS, 3)[0]
+    np.testing.assert_allclose(
+        moved, advance(MODEL, body).reshape(2, N_JOINTS, 3)[0] + [5.0, -3.0, 0.4], atol=1e-9
+    )
+    assert abs(heading(joints)[0]) < 1.5
+
+
+def test_matched_bodies_keep_their_bones():
+    joints = draw(MODEL, [1, 2, 3], 40)
+    length, _ = bone_rows(joints.reshape(-1, N_JOINTS, 3))
+    assert (np.abs(length.mean(0) - MODEL.length) < 3 * MODEL.stiffness).all()
+    assert (length.std(0) < 2.5 * MODEL.stiffness).all()
+
+
+def test_in_the_linear_case_the_bound_is_a_kalman_filters_covariance():
+    """Affine cameras, bones so loose that they do not matter: Kalman's covariance is exact."""
+    loose, P = replace(MODEL, stiffness=np.full(16, 1e4)), affine_rig()
+    joints = np.repeat(
+        np.tile(MODEL.offset, (1, 1, 1, 1)), 8, 0
+    )  # stands still: constant derivatives
+    seen = np.random.default_rng(1).random((8, 1, 3, N_JOINTS)) < 0.7
+    bound = posterior_bound(P, loose, joints, seen, SIGMA_PX)
+    move = transition(loose, joints[0])[0]
+    cov = np.diag(np.repeat([1.5**2, 1.0], N_PLACES))
+    for t in range(8):
+        if t:
+            cov = move @ cov @ move.T + loose.Q
+        for c, j in np.argwhere(seen[t, 0]):
+            for axis in range(2):  # one scalar measurement at a time, by Joseph's form
+                row = np.zeros(N_STATES)
+                row[3 * j : 3 * j + 3] = P[c, axis, :3]
+                gain = cov @ row / (row @ cov @ row + SIGMA_PX**2)
+                keep = np.eye(N_STATES) - np.outer(gain, row)
+                cov = keep @ cov @ keep.T + SIGMA_PX**2 * np.outer(gain, gain)
+        np.testing.assert_allclose(bound[t, 0], joint_blocks(cov[None])[0], rtol=1e-5, atol=1e-9)
+
+
+def test_more_views_lower_the_bound():
+    rig, joints = make_rig("lab"), draw(MODEL, [1], 10)
+    seen = np.ones((10, 1, 4, N_JOINTS), bool)
+    all_four = posterior_bound(rig.P, MODEL, joints, seen, SIGMA_PX)
+    seen[:, :, 2:] = False
+    two = posterior_bound(rig.P, MODEL, joints, seen, SIGMA_PX)
+    assert (np.linalg.eigvalsh(two - all_four) > -1e-12).all()
+
+
+def test_a_filter_of_the_whole_state_reaches_the_bound():
+    """The iterated Kalman filter of all 90 states with the exact model: the bound is no dream."""
+    rig, seeds = make_rig("lab"), list(range(300, 308))
+    joints = draw(MODEL, seeds, 26)
+    px = detect(rig.P, joints, Damage(), seeds)
+    bound = posterior_bound(rig.P, MODEL, joints, np.isfinite(px[..., 0]), SIGMA_PX)
+    error = filtered(rig.P, px) - joints
+    least = np.trace(bound, axis1=-2, axis2=-1)[12:].mean()
+    ratio = np.sqrt((error[12:] ** 2).sum(-1).mean() / least)
+    assert ratio == pytest.approx(1.0, abs=0.06)
+
+
+def filtered(P, px):
+    """(T, S, J, 3) means of the iterated extended Kalman filter of the matched model."""
+    n = px.shape[1]
+    place = MODEL.offset + np.array([0, 0, 1.0])
+    state = np.tile(np.concatenate([place, 0 * place]).ravel(), (n, 1))
+    cov = np.tile(np.diag(np.repeat([1.5**2, 1.0], N_PLACES)), (n, 1, 1))
+    out = []
+    for t in range(len(px)):
+        if t:
+            before, state = state, expected(state)
+            move, Q = tilted(MODEL, bodies(before), bodies(state))
+            cov = move @ cov @ move.swapaxes(1, 2) + Q
+        state, cov = measured(P, px[t], state, cov)
+        out.append(bodies(state))
+    return np.stack(out)
+
+
+def bodies(state):
+    return state[:, :N_PLACES].reshape(-1, N_JOINTS, 3)
+
+
+def expected(state):
+    """Mean of the tilted transition."""
+    free = advance(MODEL, state)
+    state = free
+    for _ in range(3):
+        length, rows = bone_rows(bodies(state))
+        moved = np.einsum("sbp,sp->sb", rows, (state - free)[:, :N_PLACES])
+        state = free + np.einsum(
+            "snb,sb->sn", bone_gain(MODEL, rows), MODEL.length - length + moved
+        )
+    return state
+
+
+def measured(P, px, prior, cov):
+    """Gauss-Newton update of (S, 90) by one frame (S, C, J, 2)."""
+    seen, state = np.isfinite(px[..., 0]), prior
+    for _ in range(3):
+        joints = bodies(state)
+        information = block_diagonal(camera_information(P, joints, seen, SIGMA_PX))
+        pixel, depth = project(P, joints)
+        rows = (P[:, None, :2, :3] - pixel[..., None] * P[:, None, 2:, :3]) / depth[..., None, None]
+        miss = np.where(seen[..., None], px - pixel, 0.0)
+        push = np.einsum("scjki,scjk->sji", rows, miss).reshape(len(px), -1) / SIGMA_PX**2
+        after = shrink(cov, information)
+        back = np.einsum("spq,sq->sp", information, (state - prior)[:, :N_PLACES])
+        state = prior + np.einsum("snp,sp->sn", after[:, :, :N_PLACES], push + back)
+    return state, after
