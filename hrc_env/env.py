@@ -27,7 +27,8 @@ class HRCReachEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     Args:
         perception: "pixels" (rendered images through MediaPipe Pose), "keypoints" (an
             emulator of that), "truth" (the worker as they are) or "none".
-        estimator: "particle" (default), "paper" (Algorithm 1) or "triangulation".
+        estimator: "particle" (default), "kalman" (one Gaussian on the body's tree), "paper"
+            (Algorithm 1) or "triangulation".
         cameras: indices or names of the rig's cameras to use; None is all of them.
         scene: name of the place.
         n_workers: 0 or more workers.

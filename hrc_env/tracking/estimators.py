@@ -3,7 +3,7 @@
 | name | what it is |
 |---|---|
 | `particle` | the default: a Gaussian particle filter per joint on a body motion model |
-| `kalman` | one Gaussian on the kinematic tree: honest with one camera |
+| `kalman` | one Gaussian on the kinematic tree: honest with one camera (docs/tracking.md) |
 | `paper` | the paper's Algorithm 1 as printed |
 | `triangulation` | every frame by itself, the last point held through gaps |
 

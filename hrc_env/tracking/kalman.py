@@ -12,6 +12,7 @@ import functools
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
+import numba
 import numpy as np
 
 from hrc_env.records import Keypoints, PoseEstimate
@@ -125,13 +126,9 @@ class KalmanEstimator:
 
         Their errors have heavier tails than a Gaussian's: the body may be mirrored in depth.
         """
-        tracks = gaussian_tracks(state)
-        least, most = _ONE_VIEW
-        single = (state.carried > least) & (state.carried < most) & state.tracked[..., None]
-        if single.any():
-            factor = np.where(single, self.config.one_view_inflation, 1.0)
-            tracks = replace(tracks, cov_world=tracks.cov_world * factor[..., None, None])
-        return report(tracks, self.config)
+        tracks, cov = gaussian_tracks(state), np.empty((*state.age_s.shape, 3, 3))
+        _widen(state.cov, state.carried, state.tracked, self.config.one_view_inflation, cov)
+        return report(replace(tracks, cov_world=cov), self.config)
 
     def _forget(self, state: KalmanState, ids: Ints) -> None:
         length, variance = population_edges()
@@ -149,3 +146,17 @@ def _motion(dt_s: float, damping: float, acceleration: float) -> tuple[Floats, .
     F, Q = damped_joints(dt_s, damping, acceleration)
     travel = np.array([[1.0, dt_s], [0.0, 1.0]]) - F
     return F, travel, Q, whole_body_noise(dt_s, acceleration)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _widen(cov, carried, tracked, inflation, out):
+    """out (B, W, J, 3, 3) = position covariances, those that one view carries times inflation."""
+    least, most = _ONE_VIEW
+    for b in range(cov.shape[0]):
+        for w in range(cov.shape[1]):
+            for j in range(cov.shape[2]):
+                single = tracked[b, w] and least < carried[b, w, j] < most
+                factor = inflation if single else 1.0
+                for i in range(3):
+                    for k in range(3):
+                        out[b, w, j, i, k] = factor * cov[b, w, j, i, k]
