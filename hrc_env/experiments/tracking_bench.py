@@ -19,6 +19,7 @@ import hrc_env
 from hrc_env.errors import ConfigError
 from hrc_env.experiments.tracking_cells import (
     DLT,
+    FULL_STATE,
     MATCHED,
     Tick,
     make_sequences,
@@ -68,12 +69,13 @@ def run(config: TrackingBenchConfig, out: Path, say: Say) -> dict[str, Metric]:
         say: hears of the progress: shares that sum to 1.
     """
     names = [*ESTIMATORS, DLT]
-    n_parts = len(RIGS) * (len(CONDITIONS) + 1) * len(names) + len(ESTIMATORS)
+    n_parts = len(RIGS) * ((len(CONDITIONS) + 1) * len(names) + 1) + len(ESTIMATORS)
     shelf = _Shelf(out / "parts", _fingerprint(config), n_parts, say)
     parts: Parts = {}
     for rig in map(make_rig, RIGS):
         for condition in (*CONDITIONS, MATCHED):
-            for name, part in _condition(config, shelf, rig, condition, names):
+            asked = [*names, FULL_STATE] if condition == MATCHED else names
+            for name, part in _condition(config, shelf, rig, condition, asked):
                 parts[rig.name, condition, name] = part
     for name, part in _timing(config, shelf):
         parts["lab", TIMING, name] = part

@@ -9,6 +9,7 @@ import numpy as np
 from hrc_env.experiments.tracking_bound import posterior_bound
 from hrc_env.experiments.tracking_detections import CONDITIONS, Damage, detect
 from hrc_env.experiments.tracking_dlt import triangulate_frame
+from hrc_env.experiments.tracking_full_state import filter_matched
 from hrc_env.experiments.tracking_matched import draw, matched_model
 from hrc_env.experiments.tracking_rigs import DT_S, SIGMA_PX, Rig
 from hrc_env.experiments.tracking_walks import walk
@@ -20,6 +21,8 @@ from hrc_env.typing import Covariances3, Floats, Points2, Points3
 
 DLT = "dlt"
 """The name under which plain per-frame triangulation appears beside the estimators."""
+FULL_STATE = "full_state"
+"""The filter that knows the matched sequences' model; runs on these only."""
 MATCHED = "matched"
 CHI2_95_3D = 7.815
 """95 % of a three-dimensional normal variable lies within this squared distance."""
@@ -78,13 +81,17 @@ def keypoints_of(px: Points2) -> Keypoints:
 def beliefs(
     name: str, rig: Rig, sequences: Sequences, seeds: list[int]
 ) -> Iterator[tuple[Points3, Covariances3 | None]]:
-    """Mean (S, J, 3) and covariance (S, J, 3, 3) after each frame; DLT has no covariance."""
+    """Mean (S, J, 3) and covariance (S, J, 3, 3) after each frame; DLT has none."""
     n_sequences = len(seeds)
     if name == DLT:
         last = np.tile(sequences.config.prior_mean_world, (n_sequences, N_JOINTS, 1))
         for px in sequences.px:
             last = triangulate_frame(rig.P, px, last)
             yield last, None
+        return
+    if name == FULL_STATE:
+        model = matched_model(sequences.config.damping, sequences.config.root_acceleration)
+        yield from filter_matched(rig.P, model, sequences.px, SIGMA_PX)
         return
     estimator = make_estimator(name, rig.P, DT_S, sequences.config)
     rngs = [np.random.default_rng([seed, 4]) for seed in seeds]

@@ -5,7 +5,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from hrc_env.experiments.tracking_cells import DLT, MATCHED
+from hrc_env.experiments.tracking_cells import DLT, FULL_STATE, MATCHED
 from hrc_env.experiments.tracking_rigs import RIGS
 from hrc_env.results import Metric, over
 from hrc_env.typing import Floats
@@ -29,7 +29,7 @@ def metrics_of(parts: Parts, estimators: list[str]) -> dict[str, Metric]:
         for window, sums in part.items():
             for kind, metric in _of_window(sums, name != DLT).items():
                 metrics[f"{kind}.{rig}.{window}.{name}"] = metric
-    for name in [*estimators, DLT]:
+    for name in [*estimators, DLT, FULL_STATE]:
         cells = {rig: parts[rig, MATCHED, name][MATCHED] for rig in RIGS}
         metrics[f"ratio_to_bound.{name}"] = _ratio(list(cells.values()))
         for rig, cell in cells.items():

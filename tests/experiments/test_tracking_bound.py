@@ -6,27 +6,22 @@ import numpy as np
 import pytest
 
 from hrc_env.experiments.tracking_bound import (
-    block_diagonal,
-    camera_information,
     joint_blocks,
     posterior_bound,
-    shrink,
 )
 from hrc_env.experiments.tracking_detections import Damage, detect
+from hrc_env.experiments.tracking_full_state import filter_matched
 from hrc_env.experiments.tracking_matched import (
     N_PLACES,
     N_STATES,
     advance,
-    bone_gain,
     bone_rows,
     draw,
     heading,
     matched_model,
-    tilted,
     transition,
 )
 from hrc_env.experiments.tracking_rigs import make_rig
-from hrc_env.geometry.cameras import project
 from hrc_env.skeleton import N_JOINTS
 
 MODEL = matched_model(0.5, 0.05)
@@ -108,57 +103,8 @@ def test_a_filter_of_the_whole_state_reaches_the_bound():
     joints = draw(MODEL, seeds, 26)
     px = detect(rig.P, joints, Damage(), seeds)
     bound = posterior_bound(rig.P, MODEL, joints, np.isfinite(px[..., 0]), SIGMA_PX)
-    error = filtered(rig.P, px) - joints
+    beliefs = filter_matched(rig.P, MODEL, px, SIGMA_PX)
+    error = np.stack([mean for mean, _ in beliefs]) - joints
     least = np.trace(bound, axis1=-2, axis2=-1)[12:].mean()
     ratio = np.sqrt((error[12:] ** 2).sum(-1).mean() / least)
     assert ratio == pytest.approx(1.0, abs=0.06)
-
-
-def filtered(P, px):
-    """(T, S, J, 3) means of the iterated extended Kalman filter of the matched model."""
-    n = px.shape[1]
-    place = MODEL.offset + np.array([0, 0, 1.0])
-    state = np.tile(np.concatenate([place, 0 * place]).ravel(), (n, 1))
-    cov = np.tile(np.diag(np.repeat([1.5**2, 1.0], N_PLACES)), (n, 1, 1))
-    out = []
-    for t in range(len(px)):
-        if t:
-            before, state = state, expected(state)
-            move, Q = tilted(MODEL, bodies(before), bodies(state))
-            cov = move @ cov @ move.swapaxes(1, 2) + Q
-        state, cov = measured(P, px[t], state, cov)
-        out.append(bodies(state))
-    return np.stack(out)
-
-
-def bodies(state):
-    return state[:, :N_PLACES].reshape(-1, N_JOINTS, 3)
-
-
-def expected(state):
-    """Mean of the tilted transition."""
-    free = advance(MODEL, state)
-    state = free
-    for _ in range(3):
-        length, rows = bone_rows(bodies(state))
-        moved = np.einsum("sbp,sp->sb", rows, (state - free)[:, :N_PLACES])
-        state = free + np.einsum(
-            "snb,sb->sn", bone_gain(MODEL, rows), MODEL.length - length + moved
-        )
-    return state
-
-
-def measured(P, px, prior, cov):
-    """Gauss-Newton update of (S, 90) by one frame (S, C, J, 2)."""
-    seen, state = np.isfinite(px[..., 0]), prior
-    for _ in range(3):
-        joints = bodies(state)
-        information = block_diagonal(camera_information(P, joints, seen, SIGMA_PX))
-        pixel, depth = project(P, joints)
-        rows = (P[:, None, :2, :3] - pixel[..., None] * P[:, None, 2:, :3]) / depth[..., None, None]
-        miss = np.where(seen[..., None], px - pixel, 0.0)
-        push = np.einsum("scjki,scjk->sji", rows, miss).reshape(len(px), -1) / SIGMA_PX**2
-        after = shrink(cov, information)
-        back = np.einsum("spq,sq->sp", information, (state - prior)[:, :N_PLACES])
-        state = prior + np.einsum("snp,sp->sn", after[:, :, :N_PLACES], push + back)
-    return state, after
