@@ -171,7 +171,7 @@ def add_moved_right(a, f, out):
             out[i, 3 + k] += p * f10 + v * f11
 
 
-@numba.njit(**_JIT)
+@numba.njit(fastmath=_REORDER, **_JIT)
 def invert(a, out, factor):
     """Inverse of a symmetric positive definite 6x6 matrix; False if it is not one.
 

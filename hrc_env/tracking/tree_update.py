@@ -53,7 +53,7 @@ def update_tree(body, cov, slope, w):
     _substitute(body, slope, w)
 
 
-@numba.njit(**_JIT)
+@numba.njit(fastmath=_REORDER, **_JIT)
 def _eliminate(j, cov, slope, w):
     """Make a joint's slope and inverse Hessian the posterior ones; tell its parent the rest."""
     q = PARENT[j]
@@ -90,7 +90,7 @@ def _eliminate(j, cov, slope, w):
             w.information[q, i, k] -= through[i, k]
 
 
-@numba.njit(**_JIT)
+@numba.njit(fastmath=_REORDER, **_JIT)
 def _marginalise(j, cov, slope, w):
     """C_j = inverse Hessian + B_j C_parent B_j'."""
     multiply(slope[j], cov[PARENT[j]], w.a)
