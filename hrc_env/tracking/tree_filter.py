@@ -16,7 +16,7 @@ from hrc_env.tracking.tree import PARENT, make_work
 from hrc_env.tracking.tree_predict import predict_tree
 from hrc_env.tracking.tree_search import find_pose
 from hrc_env.tracking.tree_update import correct_mean, update_tree
-from hrc_env.tracking.upkeep import acquire, check, find_joints_again
+from hrc_env.tracking.upkeep import acquire, acquire_anew, check, find_joints_again
 
 _JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 
@@ -59,7 +59,7 @@ def update_all(state, P, px, confidence, sigma_px, standing, s):
             swaps = (state.swap_chance[b, w], state.blind[b, w], state.believed[b, w])
             undo_swaps(P, state.body[b, w], state.cov[b, w], z, sigma, ok, *swaps, s)
             _follow(state, b, w, (P, z, sigma, ok), s, scratch)
-            placed[:] = False
+            placed[:] = acquire_anew(state, b, w, P, z, sigma, ok, standing, s)
             find_joints_again(state, b, w, P, z, sigma, ok, s, placed)
             for j in range(n_joints):
                 if placed[j] or (PARENT[j] >= 0 and placed[PARENT[j]]):

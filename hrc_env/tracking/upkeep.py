@@ -73,6 +73,22 @@ def find_joints_again(state, b, w, P, z, sigma, ok, s, placed):
 
 
 @numba.njit(**_JIT)
+def acquire_anew(state, b, w, P, z, sigma, ok, standing, s):
+    """Start over when the views have long agreed on another body; whether that happened.
+
+    Joints are found again near the body only; a body that is somewhere else altogether, as
+    after a mistaken depth, has to be given up as a whole.
+    """
+    n_wrong = 0
+    for j in range(len(ok)):
+        n_wrong += state.conflict[b, w, j] >= s.conflict_frames
+    if n_wrong < s.acquire_min_joints or not acquire(state, b, w, P, z, sigma, ok, standing, s):
+        return False
+    state.conflict[b, w] = 0
+    return True
+
+
+@numba.njit(**_JIT)
 def check(state, b, w, s):
     """Keep covariances positive definite; a body that has left the world is lost.
 

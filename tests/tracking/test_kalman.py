@@ -149,3 +149,15 @@ def test_two_predictions_without_frames_between_are_possible():
     near = np.trace(e.estimate(state).cov_world[0, 0], axis1=-2, axis2=-1)
     e.predict(state, DT, rngs)
     assert (np.trace(e.estimate(state).cov_world[0, 0], axis1=-2, axis2=-1) > near).all()
+
+
+def test_a_body_that_is_believed_elsewhere_altogether_is_acquired_anew():
+    joints, px = walks([100], 60, Damage())
+    e, rngs = make_estimator("kalman", LAB, DT), generators(1)
+    state = e.init(1, 1)
+    for t, frame in enumerate(px):
+        if t == 40:
+            state.body[0, 0, :, :3] += [1.5, -1.5, 0.0]
+        e.predict(state, DT, rngs)
+        e.update(state, keypoints(frame), rngs)
+    assert rmse(state.body[0, 0, :, :3] - joints[-1, 0]) < 0.03
