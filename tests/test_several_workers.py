@@ -7,8 +7,11 @@ import numpy as np
 import pytest
 from stable_baselines3.common.env_checker import check_env
 
+from hrc_env.body import worker_truth
 from hrc_env.env import HRCReachEnv
+from hrc_env.geometry.assignment import assign
 from hrc_env.metrics import tracking_error
+from hrc_env.motion.generator import current
 from hrc_env.records import WorkerTruth
 from hrc_env.sb3 import HRCVecEnv
 from hrc_env.tracking.given import estimate_from_truth
@@ -80,6 +83,20 @@ def test_two_workers_without_names_are_both_followed(estimator):
         infos = [info for *_, info in walk(env, 100, seed)][5:]
         assert np.median([info["tracking/mpjpe_m"] for info in infos]) < 0.08
         assert np.mean([info["tracking/lost"] for info in infos]) < 0.05
+
+
+def test_three_workers_without_names_keep_their_tracks():
+    """Eight rooms for six seconds; some of the workers walk through each other's way."""
+    env = HRCVecEnv(8, n_workers=3, stagger=False, max_episode_steps=1000, seed=100)
+    env.reset()
+    whom = []
+    for _ in range(150):
+        env.step(np.zeros((8, 6)))
+        estimate, motion = env.simulation.estimate, env.simulation.motion
+        truth = worker_truth(env.simulation.body, current(motion)).joints_world
+        apart = np.linalg.norm(estimate.mean_world[:, :, None] - truth[:, None], axis=-1).mean(-1)
+        whom.append([assign(of_room) for of_room in apart])
+    assert (np.array(whom)[5:] == whom[5]).all()
 
 
 def test_the_emulator_does_not_say_who_is_who():

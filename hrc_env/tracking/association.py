@@ -19,7 +19,13 @@ from hrc_env.geometry.assignment import assign_rows
 from hrc_env.records import Keypoints, PoseEstimate
 from hrc_env.skeleton import BONE_LENGTH_M, BONES, MIRROR, N_JOINTS
 from hrc_env.tracking.measurements import arrays_of, is_measurement
-from hrc_env.tracking.newcomers import camera_model, fit_cameras, meeting, propose
+from hrc_env.tracking.newcomers import (
+    camera_model,
+    fit_cameras,
+    lines_of_sight,
+    meeting,
+    propose,
+)
 from hrc_env.tracking.resemblance import LEAST_JOINTS, expect, resemblance
 from hrc_env.typing import Floats, Ints
 
@@ -193,14 +199,16 @@ def _welcome(rig, poses, free, mean, tracked, tables, s, pose):
     most = n_cameras * (n_cameras - 1) // 2 * n_poses * n_poses
     seeds = np.empty((most, 4), np.int64)
     members, scores = np.empty((most, n_cameras), np.int64), np.empty((most, n_cameras))
-    n = propose(rig, poses, free, tables, s, seeds, members, scores)
+    sight = np.empty((*poses[2].shape, 3))
+    lines_of_sight(rig[2], poses[0], poses[2], free, sight)
+    n = propose(rig, poses, sight, free, tables, s, seeds, members, scores)
     mean, tracked = mean.copy(), tracked.copy()  # newcomers are followed from here on
     member, score = np.empty(n_cameras, np.int64), np.empty(n_cameras)
     while True:
         best = _best(seeds, members, scores, free, n)
         if best < 0:
             return
-        body = _body_of(rig, poses, seeds[best], s)
+        body = _body_of(rig, poses, sight, seeds[best], s)
         fit_cameras(rig[0], poses, free, body, tables, s, member, score)
         w = _whose(body, mean, tracked, vacant, unseen, s)
         for c in range(n_cameras):
@@ -233,14 +241,15 @@ def _best(seeds, members, scores, free, n):
 
 
 @numba.njit(**_JIT)
-def _body_of(rig, poses, seed, s):
+def _body_of(rig, poses, sight, seed, s):
     """(points (J, 3), met (J,)) of a proposal."""
-    (P, eye, back, focal), (z, sigma, ok) = rig, poses
+    (P, eye, _, focal), (_, sigma, ok) = rig, poses
     c1, d1, c2, d2 = seed
     points, met = np.empty((ok.shape[2], 3)), np.empty(ok.shape[2], np.bool_)
-    camera_1 = (eye[c1], back[c1], focal[c1], P[c1])
-    camera_2 = (eye[c2], back[c2], focal[c2], P[c2])
-    pose_1, pose_2 = (z[c1, d1], sigma[c1, d1], ok[c1, d1]), (z[c2, d2], sigma[c2, d2], ok[c2, d2])
+    camera_1 = (eye[c1], focal[c1], P[c1])
+    camera_2 = (eye[c2], focal[c2], P[c2])
+    pose_1 = (sight[c1, d1], sigma[c1, d1], ok[c1, d1])
+    pose_2 = (sight[c2, d2], sigma[c2, d2], ok[c2, d2])
     meeting(camera_1, camera_2, pose_1, pose_2, s.gate_sigma, points, met)
     return points, met
 

@@ -51,13 +51,21 @@ def camera_model(P, eye, back, focal):
 
 
 @numba.njit(**_JIT)
-def line_of_sight(back, pixel, out):
-    """Unit direction (3,) of a pixel (2,)."""
-    length = 0.0
-    for i in range(3):
-        out[i] = back[i, 0] * pixel[0] + back[i, 1] * pixel[1] + back[i, 2]
-        length += out[i] * out[i]
-    out /= math.sqrt(length)
+def lines_of_sight(back, z, ok, free, sight):
+    """Unit directions (C, D, J, 3) of the joints of free poses, into `sight`."""
+    n_cameras, n_poses, n_joints = ok.shape
+    for c in range(n_cameras):
+        for d in range(n_poses):
+            for j in range(n_joints):
+                if not (free[c, d] and ok[c, d, j]):
+                    continue
+                u, v, length = z[c, d, j, 0], z[c, d, j, 1], 0.0
+                for i in range(3):
+                    along = back[c, i, 0] * u + back[c, i, 1] * v + back[c, i, 2]
+                    sight[c, d, j, i] = along
+                    length += along * along
+                for i in range(3):
+                    sight[c, d, j, i] /= math.sqrt(length)
 
 
 @numba.njit(**_JIT)
@@ -65,23 +73,22 @@ def meeting(camera_1, camera_2, pose_1, pose_2, gate_sigma, points, met):
     """Where the joints' lines of sight of two poses meet; how many do, 0 if too few.
 
     Args:
-        camera_1, camera_2: (eye (3,), back (3, 3), focal, P (3, 4)) of `camera_model`.
-        pose_1, pose_2: (z (J, 2), sigma (J,), ok (J,)).
+        camera_1, camera_2: (eye (3,), focal, P (3, 4)) of `camera_model`.
+        pose_1, pose_2: (lines of sight (J, 3), sigma (J,), ok (J,)).
         gate_sigma: lines meet within so many standard deviations.
         points, met: (J, 3) and (J,), filled.
     """
-    (eye_1, back_1, focal_1, P_1), (eye_2, back_2, focal_2, P_2) = camera_1, camera_2
-    (z_1, sigma_1, ok_1), (z_2, sigma_2, ok_2) = pose_1, pose_2
-    ray_1, ray_2 = np.empty(3), np.empty(3)
+    (eye_1, focal_1, P_1), (eye_2, focal_2, P_2) = camera_1, camera_2
+    (sight_1, sigma_1, ok_1), (sight_2, sigma_2, ok_2) = pose_1, pose_2
     n_common, n_met = 0, 0
     for j in range(len(points)):
         met[j] = False
         if not (ok_1[j] and ok_2[j]):
             continue
+        if n_common - n_met > (1.0 - AGREEING_SHARE) * len(points):
+            return 0  # the rest cannot make it good
         n_common += 1
-        line_of_sight(back_1, z_1[j], ray_1)
-        line_of_sight(back_2, z_2[j], ray_2)
-        far_1, far_2, gap = _nearest_places(eye_1, ray_1, eye_2, ray_2, points[j])
+        far_1, far_2, gap = _nearest_places(eye_1, sight_1[j], eye_2, sight_2[j], points[j])
         if not (far_1 > 0.0 and far_2 > 0.0):
             continue
         noise_1, noise_2 = sigma_1[j] * far_1 / focal_1, sigma_2[j] * far_2 / focal_2
@@ -164,21 +171,21 @@ def fit_cameras(P, poses, free, body, tables, s, member, score):
 
 
 @numba.njit(**_JIT)
-def propose(rig, poses, free, tables, s, seeds, members, scores):
+def propose(rig, poses, sight, free, tables, s, seeds, members, scores):
     """All bodies that two cameras propose: seeds (n, 4), members, scores (n, C); how many."""
-    (P, eye, back, focal), (z, sigma, ok) = rig, poses
+    (P, eye, _, focal), (_, sigma, ok) = rig, poses
     n_cameras, n_poses, n_joints = ok.shape
     points, met, n = np.empty((n_joints, 3)), np.empty(n_joints, np.bool_), 0
     for c1 in range(n_cameras):
         for c2 in range(c1 + 1, n_cameras):
-            camera_1 = (eye[c1], back[c1], focal[c1], P[c1])
-            camera_2 = (eye[c2], back[c2], focal[c2], P[c2])
+            camera_1 = (eye[c1], focal[c1], P[c1])
+            camera_2 = (eye[c2], focal[c2], P[c2])
             for d1 in range(n_poses):
                 for d2 in range(n_poses):
                     if not (free[c1, d1] and free[c2, d2]):
                         continue
-                    pose_1 = (z[c1, d1], sigma[c1, d1], ok[c1, d1])
-                    pose_2 = (z[c2, d2], sigma[c2, d2], ok[c2, d2])
+                    pose_1 = (sight[c1, d1], sigma[c1, d1], ok[c1, d1])
+                    pose_2 = (sight[c2, d2], sigma[c2, d2], ok[c2, d2])
                     n_met = meeting(camera_1, camera_2, pose_1, pose_2, s.gate_sigma, points, met)
                     if n_met < s.min_joints or not has_good_bones(points, met, *tables[1:]):
                         continue

@@ -18,6 +18,7 @@ LEAST_JOINTS = 3
 """A pose of fewer joints is nobody's."""
 FULL_JOINTS = 6
 """Poses of fewer joints than this count for less."""
+_ISOTROPIC = np.eye(3)
 _JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
@@ -32,7 +33,6 @@ def expect(camera, mean, cov, known, slack_m, image):
         slack_m: what a body may have done besides, a standard deviation [m].
         image: filled; the variance is -1 where nothing is expected.
     """
-    isotropic = np.eye(3) * slack_m**2
     for j in range(len(mean)):
         image[j, 2] = -1.0
         if not known[j]:
@@ -40,7 +40,7 @@ def expect(camera, mean, cov, known, slack_m, image):
         u, v, depth = pixel_of(camera, mean[j, 0], mean[j, 1], mean[j, 2])
         if depth > NEAREST_DEPTH_M:
             spread = pixel_spread(camera, u, v, depth, cov[j])
-            spread += pixel_spread(camera, u, v, depth, isotropic)
+            spread += slack_m**2 * pixel_spread(camera, u, v, depth, _ISOTROPIC)
             if math.isfinite(u + v + spread) and spread >= 0.0:
                 image[j, 0], image[j, 1], image[j, 2] = u, v, spread
 
@@ -55,16 +55,18 @@ def resemblance(image, z, sigma, ok, mirror, gate_sigma, area_px):
 
 @numba.njit(**_JIT)
 def _one_reading(image, z, sigma, ok, mirror, swapped, gate_sigma, area_px):
-    total, n, n_near, gate = 0.0, 0, 0, gate_sigma * gate_sigma
+    n, n_near, total, product, gate = 0, 0, 0.0, 1.0, gate_sigma * gate_sigma
     for j in range(len(image)):
         k = mirror[j] if swapped else j
         if not ok[k] or image[j, 2] < 0.0:
             continue
         variance = sigma[k] * sigma[k] + image[j, 2]
         misfit = ((z[k, 0] - image[j, 0]) ** 2 + (z[k, 1] - image[j, 1]) ** 2) / variance
-        total += math.log(area_px / (2.0 * math.pi * variance)) - 0.5 * min(misfit, gate)
+        product *= variance  # one logarithm for all; absurd variances overflow to "no fit"
+        total -= 0.5 * min(misfit, gate)
         n += 1
         n_near += misfit < gate
     if n < LEAST_JOINTS or 2 * n_near < n:
         return 0.0
+    total += n * math.log(area_px / (2.0 * math.pi)) - math.log(product)
     return max(total / max(n, FULL_JOINTS), 0.0)

@@ -62,13 +62,13 @@ def nobody(n_workers):
     return prior(1, n_workers, TrackerConfig())
 
 
-def blank(keypoints, cameras=slice(None), people=slice(None)):
-    """One frame (1, C, D, J, ...) in which some cameras do not see some people."""
+def blank(keypoints, cameras):
+    """One frame (1, C, D, J, ...) in which some cameras see nobody."""
     px, confidence, sigma = (
         getattr(keypoints, name).copy() for name in ("px", "confidence", "sigma_px")
     )
-    px[:, cameras, people], confidence[:, cameras, people] = np.nan, 0.0
-    sigma[:, cameras, people] = np.inf
+    px[:, cameras], confidence[:, cameras] = np.nan, 0.0
+    sigma[:, cameras] = np.inf
     return Keypoints(px, confidence, sigma)
 
 
