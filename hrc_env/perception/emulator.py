@@ -65,7 +65,7 @@ class EmulatorConfig:
     swap_share: float = 0.02
     """Share of the time that a camera exchanges left and right; a judgement, 1 to 5 %."""
     swap_s: float = 0.2
-    """Mean length of such a burst [s]; a judgement: about 6 images at 25 Hz."""
+    """Mean length of such a burst [s]; a judgement: about 5 images at 25 Hz."""
     miss_share: float = 0.01
     """Share of the time that a camera loses a visible worker; measured 1 % in the lab."""
     miss_s: float = 0.12
