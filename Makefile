@@ -32,9 +32,12 @@ check: $(READY)
 bench: $(READY)
 	$(RUN) benchmarks/speed.py
 	$(RUN) benchmarks/pixels.py
+	$(RUN) benchmarks/soak.py
+	$(RUN) -m benchmarks.sim_dt
 
 train-quick: $(READY)
 	$(RUN) train.py
 
 clean:
-	rm -rf $(VENV) out runs
+	rm -rf $(VENV) out
+	find . -name '*.nb[ic]' -delete  # compiled kernels; numba does not see changes in other files

@@ -43,7 +43,7 @@ class Arguments:
     perception: str = "keypoints"
     """What the robot learns on: keypoints (camera emulator), truth, none; pixels is slow."""
     estimator: str = "particle"
-    """particle, paper or triangulation."""
+    """particle, kalman, paper or triangulation."""
     control: str = "joint"
     """joint or tool."""
     proximity: float = 2.0

@@ -36,7 +36,7 @@ class Arguments:
     resets: int = 100
     """Resets for acquisition."""
     estimator: str = "particle"
-    """particle, paper or triangulation."""
+    """particle, kalman, paper or triangulation."""
     perception: str = "pixels"
     """pixels; or keypoints, for comparison."""
 

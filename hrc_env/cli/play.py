@@ -29,7 +29,7 @@ class Play:
     perception: str = "pixels"
     """pixels, keypoints, truth or none."""
     estimator: str = "particle"
-    """particle, paper or triangulation."""
+    """particle, kalman, paper or triangulation."""
     control: str = "joint"
     """joint or tool."""
     n_workers: int = 1
