@@ -75,6 +75,20 @@ def test_without_any_window_the_eyes_search_the_whole_image(weights, pictures, r
     eyes.close()
 
 
+def test_one_search_serves_several_workers(weights, pictures):
+    """The second look is given whom the search found, and may not take the first one's person."""
+    eyes = new_eyes(1, width_px=1920, height_px=1080)
+    room = Stills([hung_in_a_room(pictures["stand.png"], 600, 300)])
+    people = eyes.search(room)
+    searching = eyes.look(room, [None], track=0)
+    given = eyes.look(room, [None], track=1, people=people)
+    np.testing.assert_array_equal(given.px, searching.px)
+    other = eyes.look(room, [None], track=2, others=[given.windows], people=people)
+    assert np.isnan(other.px).all()
+    assert other.windows == [None]
+    eyes.close()
+
+
 def test_one_person_in_two_search_windows_is_one_person(weights, pictures):
     eyes = new_eyes(1, width_px=1920, height_px=1080)
     room = hung_in_a_room(pictures["stand.png"], 600, 300)  # in the first and second square

@@ -87,7 +87,7 @@ def test_two_people_who_pass_each_other_keep_their_identity(block):
     assert np.median(error.min(-1)) < 0.03
 
 
-@pytest.mark.parametrize("estimator", ["paper", "triangulation"])
+@pytest.mark.parametrize("estimator", ["kalman", "paper", "triangulation"])
 def test_identity_is_kept_whichever_estimator_predicts(estimator):
     people = [passing(seed) for seed in range(3)]
     seen = stack([shuffled(poses(p, s), s) for s, p in enumerate(people)])
