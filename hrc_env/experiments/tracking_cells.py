@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from math import erf, exp, pi, sqrt
 from typing import Any
 
 import numpy as np
@@ -178,8 +179,6 @@ def _chi2_levels() -> Floats:
 
     By Newton's method on the distribution erf(r / sqrt 2) - r sqrt(2 / pi) exp(-r^2 / 2).
     """
-    from math import erf, exp, pi, sqrt
-
     levels = []
     r = 1.0
     for k in range(1, N_LEVELS):
