@@ -12,7 +12,7 @@ import numpy as np
 
 from hrc_env.errors import check_shape
 from hrc_env.records import RobotState
-from hrc_env.typing import Capsules, Floats, Ints, JointAngles, JointVelocities, Points3, Transforms
+from hrc_env.typing import Capsules, Floats, Ints, JointAngles, JointVelocities, Transforms
 
 
 @dataclass(frozen=True, slots=True, eq=False)

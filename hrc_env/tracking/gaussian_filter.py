@@ -23,7 +23,7 @@ from hrc_env.tracking.measurements import read_worker
 from hrc_env.tracking.motion_model import predict_body
 from hrc_env.tracking.proposal import contrast_of, find_mode
 from hrc_env.tracking.swaps import undo_swaps
-from hrc_env.tracking.upkeep import acquire, check, find_joints_again
+from hrc_env.tracking.upkeep import acquire, acquire_anew, check, find_joints_again
 
 _LEAST_ESS = 8.0
 """With fewer effective particles the Gaussian at the mode is the better answer."""
@@ -66,6 +66,9 @@ def update_all(state, P, px, confidence, sigma_px, standing, noise, tables, n_mo
             swaps = (state.swap_chance[b, w], state.blind[b, w], state.believed[b, w])
             undo_swaps(P, state.body[b, w], state.cov[b, w], z, sigma, ok, *swaps, s)
             _follow(state, b, w, P, z, sigma, ok, noise, tables[b, w], n_mode, s)
+            placed = np.zeros(n_joints, np.bool_)
+            if not acquire_anew(state, b, w, P, z, sigma, ok, standing, s):
+                find_joints_again(state, b, w, P, z, sigma, ok, s, placed)
             check(state, b, w, s)
 
 
@@ -94,8 +97,6 @@ def _follow(state, b, w, P, z, sigma, ok, noise, tables, n_mode, s):
             age[j] = 0.0
         state.conflict[b, w, j] = count_conflict(n_views[j], n_supporting, state.conflict[b, w, j])
     use_bones(body, cov, n_views, state.bone_length[b, w], state.bone_variance[b, w])
-    placed = np.zeros(n_joints, np.bool_)
-    find_joints_again(state, b, w, P, z, sigma, ok, s, placed)
 
 
 @numba.njit(**_JIT)
