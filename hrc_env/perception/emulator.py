@@ -77,10 +77,12 @@ class EmulatorConfig:
 
     def __post_init__(self) -> None:
         for name in ("seen", "hidden_arm", "hidden_leg", "hidden_trunk"):
-            if not 0 < getattr(self, f"{name}_confidence") < 1:
-                raise ConfigError(f"{name}_confidence must lie between 0 and 1.")
-            if getattr(self, f"{name}_error") < 0:
-                raise ConfigError(f"{name}_error must not be negative.")
+            confidence = getattr(self, f"{name}_confidence")
+            error = getattr(self, f"{name}_error")
+            if not 0 < confidence < 1:
+                raise ConfigError(f"{name}_confidence must be in (0, 1), got {confidence}.")
+            if not error >= 0:
+                raise ConfigError(f"{name}_error must not be negative, got {error}.")
         for name in ("slow_share", "swap_share", "miss_share"):
             if not 0 <= getattr(self, name) <= 1:
                 raise ConfigError(f"{name} must be in [0, 1], got {getattr(self, name)}.")

@@ -73,8 +73,9 @@ class EyesConfig:
         for name in ("min_presence", "sure_presence", "outside_confidence"):
             if not 0 < getattr(self, name) <= 1:
                 raise ConfigError(f"{name} must be in (0, 1], got {getattr(self, name)}.")
-        if self.gate_every < 1 or self.search_step <= 0 or self.max_offset <= 0:
-            raise ConfigError("gate_every, search_step and max_offset must be positive.")
+        for name in ("gate_every", "search_step", "max_offset"):
+            if not getattr(self, name) > 0:
+                raise ConfigError(f"{name} must be positive, got {getattr(self, name)}.")
 
 
 @dataclass(frozen=True, slots=True)
