@@ -71,11 +71,11 @@ class TrackerConfig:
     """"multinomial" as in the paper's line 17, or "systematic" (less noise)."""
 
     n_particles: int = 100
-    """Particles per joint of the default estimator."""
+    """Particles per joint (per_joint)."""
     defensive_share: float = 0.16
-    """Share of its particles that are drawn from the prediction, not from the posterior mode."""
+    """Share of these particles that are drawn from the prediction, not from the posterior mode."""
     proposal_inflation: float = 1.2
-    """Factor on the covariance of the other particles' proposal."""
+    """Factor on the covariance of its other particles' proposal."""
     gauss_newton_steps: int = 2
     """Steps of the search for the posterior mode; more make no measurable difference."""
     outlier_weight: float = 0.15

@@ -2,7 +2,8 @@
 
 | name | what it is |
 |---|---|
-| `particle` | the default: a Gaussian particle filter per joint on a body motion model |
+| `particle` | the default |
+| `per_joint` | a Gaussian particle filter per joint on a body motion model |
 | `kalman` | one Gaussian on the kinematic tree: honest with one camera (docs/tracking.md) |
 | `paper` | the paper's Algorithm 1 as printed |
 | `triangulation` | every frame by itself, the last point held through gaps |
@@ -20,7 +21,7 @@ from hrc_env.records import Keypoints, PoseEstimate
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.kalman import KalmanEstimator
 from hrc_env.tracking.paper import PaperEstimator
-from hrc_env.tracking.particle import ParticleEstimator
+from hrc_env.tracking.per_joint import PerJointEstimator
 from hrc_env.tracking.triangulating import TriangulationEstimator
 from hrc_env.typing import Floats, Ints
 
@@ -63,7 +64,8 @@ class Estimator(Protocol[State]):
 
 
 ESTIMATORS: dict[str, Callable[[Floats, float, TrackerConfig], Estimator[Any]]] = {
-    "particle": ParticleEstimator,
+    "particle": PerJointEstimator,
+    "per_joint": PerJointEstimator,
     "kalman": KalmanEstimator,
     "paper": PaperEstimator,
     "triangulation": TriangulationEstimator,

@@ -1,6 +1,6 @@
-"""The kernels of the default estimator: one loop over (B, W), one function per step of it.
+"""The kernels of `per_joint`: one loop over (B, W), one function per step of it.
 
-`state` and `s` are `particle.ParticleState` and `settings.Settings`; a worker's measurements
+`state` and `s` are `per_joint.PerJointState` and `settings.Settings`; a worker's measurements
 are z (J, C, 2), sigma (J, C), ok (J, C) as `measurements.read_worker` fills them.
 """
 

@@ -46,7 +46,7 @@ def test_it_is_as_accurate_as_the_filter_of_single_joints(damage):
     joints, px = walks(range(100, 106), 200, damage)
     ours, theirs = (
         judged(track(make_estimator(name, LAB, DT), px)[25:], joints[25:])
-        for name in ("kalman", "particle")
+        for name in ("kalman", "per_joint")
     )
     assert ours[0] < 1.02 * theirs[0]
     assert 0.93 < ours[1] < 0.985

@@ -1,4 +1,4 @@
-"""The default estimator: a Gaussian particle filter per joint on a body motion model.
+"""The rival `per_joint`: a Gaussian particle filter per joint on a body motion model.
 
 Each joint's belief is a Gaussian over position and velocity (Kotecha and Djuric, Gaussian
 particle filtering, IEEE Trans. Signal Processing 51, 2003). An update undoes left/right swaps,
@@ -30,7 +30,7 @@ from hrc_env.typing import Bools, Floats, Ints
 _N_TABLES = 64
 
 
-class ParticleState(NamedTuple):
+class PerJointState(NamedTuple):
     """Gaussian beliefs and what is learnt of each worker; arrays changed in place."""
 
     body: Floats
@@ -62,7 +62,7 @@ class ParticleState(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class ParticleEstimator:
+class PerJointEstimator:
     """Gaussian particle filter; see `tracking.estimators.Estimator`."""
 
     P: Floats
@@ -82,10 +82,10 @@ class ParticleEstimator:
         object.__setattr__(self, "noise", make_noise(_N_TABLES, n_mode, n_prior))
         object.__setattr__(self, "settings", settings_of(self.config))
 
-    def init(self, batch: int, n_workers: int) -> ParticleState:
+    def init(self, batch: int, n_workers: int) -> PerJointState:
         """Workers whom nobody has seen."""
         shape, n_cameras = (batch, n_workers), len(self.P)
-        state = ParticleState(
+        state = PerJointState(
             body=np.zeros((*shape, N_JOINTS, 6)),
             cov=np.zeros((*shape, N_JOINTS, 6, 6)),
             age_s=np.zeros((*shape, N_JOINTS)),
@@ -103,12 +103,12 @@ class ParticleEstimator:
         self._forget(state, np.arange(batch))
         return state
 
-    def reset(self, state: ParticleState, ids: Ints, rngs: list[np.random.Generator]) -> None:
+    def reset(self, state: PerJointState, ids: Ints, rngs: list[np.random.Generator]) -> None:
         """Forget environments `ids`; draws nothing."""
         del rngs
         self._forget(state, ids)
 
-    def predict(self, state: ParticleState, dt_s: float, rngs: list[np.random.Generator]) -> None:
+    def predict(self, state: PerJointState, dt_s: float, rngs: list[np.random.Generator]) -> None:
         """Move every tracked body by its motion model; draws nothing."""
         del rngs
         F, Q = damped_joints(dt_s, self.config.damping, self.config.root_acceleration)
@@ -116,7 +116,7 @@ class ParticleEstimator:
         grow_older(gaussian_tracks(state), dt_s, self.config)
 
     def update(
-        self, state: ParticleState, keypoints: Keypoints, rngs: list[np.random.Generator]
+        self, state: PerJointState, keypoints: Keypoints, rngs: list[np.random.Generator]
     ) -> None:
         """Take one set of frames in; environment b draws which noise its joints get."""
         batch, n_workers = state.tracked.shape
@@ -128,11 +128,11 @@ class ParticleEstimator:
         measured = (self.P, px, confidence, sigma_px)
         update_all(state, *measured, STANDING_M, self.noise, tables, self.n_mode, self.settings)
 
-    def estimate(self, state: ParticleState) -> PoseEstimate:
+    def estimate(self, state: PerJointState) -> PoseEstimate:
         """What is believed now."""
         return report(gaussian_tracks(state), self.config)
 
-    def _forget(self, state: ParticleState, ids: Ints) -> None:
+    def _forget(self, state: PerJointState, ids: Ints) -> None:
         length, variance = population(())
         state.cov[ids] = np.eye(6)
         state.offset[ids], state.offset_count[ids] = STANDING_M, STANDING_COUNT

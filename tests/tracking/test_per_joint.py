@@ -1,4 +1,4 @@
-"""The default estimator: accuracy, honesty, and the parts it is made of."""
+"""The estimator `per_joint`: accuracy, honesty, and the parts it is made of."""
 
 import numpy as np
 import pytest
@@ -10,15 +10,15 @@ from hrc_env.tracking.importance import exp_of_negative, make_noise
 from hrc_env.tracking.motion_model import SPEED_M_S, SPREAD_M, damped_joints
 from hrc_env.tracking.tracks import least_eigenvalue
 
-gaussian = pytest.mark.parametrize("name", ["particle", "kalman"])
+gaussian = pytest.mark.parametrize("name", ["per_joint", "kalman"])
 """Both estimators that keep Gaussians look after their tracks in the same way."""
 
 
 def errors(damage, seeds=range(4), n_frames=250, warm_up=25):
-    """Errors (T, B, J, 3) and NEES (T, B, J) of the default on simulated walks."""
+    """Errors (T, B, J, 3) and NEES (T, B, J) of `per_joint` on simulated walks."""
     joints = np.stack([walk(s, n_frames) for s in seeds], 1)
     px = np.stack([detections(joints[:, k], damage, s) for k, s in enumerate(seeds)], 1)
-    estimates = track(make_estimator("particle", LAB, DT), px)[warm_up:]
+    estimates = track(make_estimator("per_joint", LAB, DT), px)[warm_up:]
     error = np.stack([e.mean_world[:, 0] for e in estimates]) - joints[warm_up:]
     precision = np.linalg.inv(np.stack([e.cov_world[:, 0] for e in estimates]))
     return error, np.einsum("...i,...ij,...j->...", error, precision, error)
@@ -99,7 +99,7 @@ def test_a_joint_that_was_followed_wrongly_is_found_again(name):
 def test_bone_lengths_are_learnt_from_population_values():
     joints = walk(4, 250)
     joints = joints * 1.08  # a tall worker in a room as much larger
-    e, rngs = make_estimator("particle", LAB, DT), generators(1)
+    e, rngs = make_estimator("per_joint", LAB, DT), generators(1)
     state = e.init(1, 1)
     first = state.bone_length[0, 0].copy()
     for frame in detections(joints, Damage(), 4)[:, None]:
@@ -154,7 +154,7 @@ def test_the_least_eigenvalue_is_the_least_eigenvalue():
 
 
 def test_particles_are_well_spent_when_all_cameras_agree():
-    e, rngs = make_estimator("particle", LAB, DT), generators(1)
+    e, rngs = make_estimator("per_joint", LAB, DT), generators(1)
     state = e.init(1, 1)
     for frame in detections(walk(5, 30), Damage(), 5)[:, None]:
         e.predict(state, DT, rngs)
