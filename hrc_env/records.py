@@ -37,6 +37,9 @@ class Keypoints:
     """(B, C, W, J) in [0, 1]; 0 where there is no measurement."""
     sigma_px: Floats
     """(B, C, W, J) standard deviation of each coordinate [px]; infinite where missing."""
+    time_s: Floats | None = None
+    """(B, C) when each camera's frame was taken [s], on the tracker's clock, which is 0 at the
+    reset; NaN: no frame of that camera. None: every frame is of this very update."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -184,7 +184,8 @@ def without_names(keypoints: Keypoints, rngs: Generators) -> Keypoints:
     for b in range(batch):
         order[b] = rngs[b].permuted(order[b], axis=-1)
     pick = (np.arange(batch)[:, None, None], np.arange(n_cameras)[:, None], order)
-    return Keypoints(keypoints.px[pick], keypoints.confidence[pick], keypoints.sigma_px[pick])
+    parts = (keypoints.px[pick], keypoints.confidence[pick], keypoints.sigma_px[pick])
+    return Keypoints(*parts, keypoints.time_s)
 
 
 @functools.lru_cache(maxsize=16)

@@ -113,7 +113,7 @@ def associate(
     )
     tables = (MIRROR, BONES, BONE_LENGTH_M)
     _associate_all(P, *measured, *belief, tables, settings, pose, px, confidence, sigma_px)
-    return Association(Keypoints(px, confidence, sigma_px), pose)
+    return Association(Keypoints(px, confidence, sigma_px, found.time_s), pose)
 
 
 @numba.njit(**_JIT)
