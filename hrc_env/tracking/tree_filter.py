@@ -47,7 +47,7 @@ def update_all(state, P, px, confidence, sigma_px, standing, s):
     n_batch, n_cameras, n_workers, n_joints = confidence.shape
     z, sigma = np.empty((n_joints, n_cameras, 2)), np.empty((n_joints, n_cameras))
     ok, belief = np.empty((n_joints, n_cameras), np.bool_), np.empty((n_joints, n_cameras))
-    scratch = (belief, np.empty(n_joints, np.int64), np.empty(n_joints), make_work())
+    scratch = (belief, np.empty(n_joints), make_work())
     placed = np.empty(n_joints, np.bool_)
     for b in range(n_batch):
         for w in range(n_workers):
@@ -58,30 +58,34 @@ def update_all(state, P, px, confidence, sigma_px, standing, s):
                 continue
             swaps = (state.swap_chance[b, w], state.blind[b, w], state.believed[b, w])
             undo_swaps(P, state.body[b, w], state.cov[b, w], z, sigma, ok, *swaps, s)
-            _follow(state, b, w, (P, z, sigma, ok), s, scratch)
-            placed[:] = acquire_anew(state, b, w, P, z, sigma, ok, standing, s)
-            find_joints_again(state, b, w, P, z, sigma, ok, s, placed)
-            for j in range(n_joints):
-                if placed[j] or (PARENT[j] >= 0 and placed[PARENT[j]]):
-                    state.slope[b, w, j] = 0.0  # what is known of it is its own
-            if not check(state, b, w, s):
-                state.slope[b, w] = 0.0
+            seen = (P, z, sigma, ok)
+            follow(state, b, w, seen, s, scratch)
+            look_after(state, b, w, seen, standing, s, placed)
 
 
 @numba.njit(**_JIT)
-def _follow(state, b, w, seen, s, scratch):
+def follow(state, b, w, seen, s, scratch):
     """Update a tracked worker: search, condition, correct the mean, learn the bones."""
-    belief, n_views, give, work = scratch
-    ok = seen[3]
+    belief, give, work = scratch
     body, cov, slope = state.body[b, w], state.cov[b, w], state.slope[b, w]
-    length, variance = state.bone_length[b, w], state.bone_variance[b, w]
     contrast = contrast_of(s.outlier_weight, s.image_area_px)
-    stiff_lengths(variance, give)
-    bones = (length, give)
+    stiff_lengths(state.bone_variance[b, w], give)
+    bones = (state.bone_length[b, w], give)
     find_pose(body, cov, slope, seen, bones, contrast, s.gauss_newton_steps, belief, work)
     update_tree(body, cov, slope, work)
     if s.mean_correction > 0.0:
         correct_mean(body, cov, slope, seen, belief, s.mean_correction, work)
+    keep_books(state, b, w, seen, belief)
+
+
+@numba.njit(**_JIT)
+def keep_books(state, b, w, seen, belief):
+    """Ages, conflicts and bone lengths of a worker who has been updated.
+
+    `belief` (J, C) is how far each measurement was believed.
+    """
+    ok = seen[3]
+    n_views = np.empty(len(ok), np.int64)
     for j in range(len(ok)):
         n_views[j], n_supporting, carried = 0, 0, 0.0
         for c in range(ok.shape[1]):
@@ -93,4 +97,20 @@ def _follow(state, b, w, seen, s, scratch):
             state.age_s[b, w, j] = 0.0
         conflict = state.conflict[b, w, j]
         state.conflict[b, w, j] = count_conflict(n_views[j], n_supporting, conflict)
-    learn_lengths(body, cov, slope, n_views, length, variance)
+    bones = (state.bone_length[b, w], state.bone_variance[b, w])
+    learn_lengths(state.body[b, w], state.cov[b, w], state.slope[b, w], n_views, *bones)
+
+
+@numba.njit(**_JIT)
+def look_after(state, b, w, seen, standing, s, placed):
+    """Find joints or the whole body again where the views say so; notice a body that is lost.
+
+    `placed` (J,) is scratch. What is known of a joint that was put somewhere is its own.
+    """
+    placed[:] = acquire_anew(state, b, w, *seen, standing, s)
+    find_joints_again(state, b, w, *seen, s, placed)
+    for j in range(len(placed)):
+        if placed[j] or (PARENT[j] >= 0 and placed[PARENT[j]]):
+            state.slope[b, w, j] = 0.0
+    if not check(state, b, w, s):
+        state.slope[b, w] = 0.0

@@ -34,11 +34,22 @@ def find_pose(body, cov, slope, seen, bones, contrast, n_steps, belief, w):
             and gradient of the log-likelihood as a function of the positions (of joints, and
             of joints less their parents') minus their predicted means, at 0.
     """
+    for j in range(len(body)):
+        for i in range(3):
+            w.point[j, i] = body[j, i]
+    find_pose_near(body, cov, slope, seen, bones, contrast, n_steps, 1.0, belief, w)
+
+
+@numba.njit(**_JIT)
+def find_pose_near(body, cov, slope, seen, bones, contrast, n_steps, widen, belief, w):
+    """As `find_pose`, but the search begins at w.point (J, 3) instead of the predicted means.
+
+    `widen` times the prior's own image variance is added to the detector's in the first step.
+    """
     _position_prior(cov, slope, w)
     for j in range(len(body)):
         for i in range(3):
-            w.shift[j, i], w.point[j, i] = 0.0, body[j, i]
-    widen = 1.0
+            w.shift[j, i] = w.point[j, i] - body[j, i]
     for step in range(n_steps + 1):
         widening = widen if step < n_steps - 1 else 0.0
         _linearise_cameras(cov, seen, contrast, widening, belief, w)
