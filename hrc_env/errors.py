@@ -15,7 +15,11 @@ class ConfigError(HRCError, ValueError):
     """A setting, name, shape or value that cannot work, with what would."""
 
 
-class WeightsError(HRCError, RuntimeError):
+class DownloadError(HRCError, RuntimeError):
+    """Something that is fetched once could not be fetched, or is not what it should be."""
+
+
+class WeightsError(DownloadError):
     """The pose network's weights are missing or are not the official ones."""
 
 

@@ -7,7 +7,6 @@ The two files are Google's BlazePose (Apache-2.0). They are read out of the offi
 import functools
 import hashlib
 import os
-import subprocess
 import sys
 import tempfile
 import zipfile
@@ -15,7 +14,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from hrc_env.errors import WeightsError, unknown
+from hrc_env.errors import DownloadError, WeightsError, unknown
+from hrc_env.perception.wheels import download_wheel
 
 WHEEL = "mediapipe==0.10.21"
 """The last release of mediapipe that carries both files."""
@@ -126,24 +126,10 @@ def _check(name: str, content: bytes, where: str) -> None:
 
 
 def _download(folder: Path) -> Path:
-    """The wheel, by pip, for a fixed platform: any Python on any system can unzip it."""
-    command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps"]
-    command += ["--disable-pip-version-check", "--only-binary=:all:", "--python-version", "3.11"]
-    command += ["--platform", "manylinux_2_28_x86_64", "--dest", str(folder), WHEEL]
-    result = subprocess.run(command, capture_output=True, text=True, check=False)
-    wheels = sorted(folder.glob("*.whl"))
-    if result.returncode == 0 and wheels:
-        return wheels[0]
-    if "No module named pip" in result.stderr:
-        raise WeightsError(
-            f"pip is needed to download {WHEEL}, and {sys.executable} has none. "
-            f"Add it with: python -m ensurepip, then run: {SETUP}"
-        )
-    said = result.stderr.strip().splitlines()
-    raise WeightsError(
-        f"Could not download {WHEEL} (is there a network?). pip said: "
-        f"{said[-1] if said else 'nothing'} Try again with: {SETUP}"
-    )
+    try:
+        return download_wheel(WHEEL, folder, SETUP)
+    except DownloadError as error:
+        raise WeightsError(str(error)) from error
 
 
 def _unpack(wheel: Path, name: str) -> None:

