@@ -5,7 +5,7 @@ their rows; as no result depends on the size of the batch, that is the same comp
 """
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
@@ -40,6 +40,11 @@ def write_rows(record: object, ids: Ints, part: object) -> None:
             write_rows(value, ids, new)
 
 
+def mapped(record: RecordT, change: Callable[[Any], Any]) -> RecordT:
+    """A (nested) record of the same kind with `change` applied to every array."""
+    return type(record)(**{name: _mapped(value, change) for name, value in _fields(record)})
+
+
 def picked(streams: Sequence[np.random.Generator], ids: Ints) -> list[np.random.Generator]:
     """The generators of environments `ids`."""
     return [streams[b] for b in ids]
@@ -60,3 +65,9 @@ def _rows(value: Any, ids: Ints) -> Any:
     if isinstance(value, np.ndarray):
         return value[ids]
     return rows(value, ids) if _is_record(value) else value
+
+
+def _mapped(value: Any, change: Callable[[Any], Any]) -> Any:
+    if isinstance(value, np.ndarray):
+        return change(value)
+    return mapped(value, change) if _is_record(value) else value

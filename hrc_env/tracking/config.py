@@ -44,6 +44,10 @@ class TrackerConfig:
     forget_s: float = 2.0
     """Time constant with which a lost worker's estimate relaxes to the prior [s]."""
 
+    longest_delay_s: float = 0.0
+    """Frames that arrive up to this late are used at their own time (`Keypoints.time_s`), at most
+    1 s [s]; 0: every frame is taken as of the update that brings it."""
+
     acquire_min_joints: int = 6
     """A worker is acquired when two cameras agree on at least this many joints."""
     body_radius_m: float = 1.3
@@ -104,6 +108,8 @@ class TrackerConfig:
         for name in _BETWEEN_0_AND_1:
             if not 0 < getattr(self, name) < 1:
                 raise ConfigError(f"{name} must be in (0, 1), got {getattr(self, name)}.")
+        if not 0 <= self.longest_delay_s <= 1:
+            raise ConfigError(f"longest_delay_s must be in [0, 1], got {self.longest_delay_s}.")
         if self.paper_resampling not in _SCHEMES:
             raise unknown("paper_resampling", self.paper_resampling, _SCHEMES)
         if self.paper_sigma_m < 0:

@@ -20,6 +20,7 @@ from hrc_env.errors import ConfigError, unknown
 from hrc_env.records import Keypoints, PoseEstimate
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.kalman import KalmanEstimator
+from hrc_env.tracking.late import LateEstimator
 from hrc_env.tracking.paper import PaperEstimator
 from hrc_env.tracking.per_joint import PerJointEstimator
 from hrc_env.tracking.triangulating import TriangulationEstimator
@@ -81,7 +82,8 @@ def make_estimator(
         name: one of `ESTIMATORS`.
         P: (C, 3, 4) projections of the cameras.
         ctrl_dt: the usual time between two updates [s].
-        config: settings; the defaults if None.
+        config: settings; the defaults if None. With `longest_delay_s` the estimator is wrapped
+            in a `late.LateEstimator`, which uses late frames at their own time.
 
     Raises:
         ConfigError: unknown name, a rig of another shape, or no positive time.
@@ -93,4 +95,9 @@ def make_estimator(
         raise ConfigError(f"P must be finite with shape (C, 3, 4), got {P.shape}.")
     if not ctrl_dt > 0:
         raise ConfigError(f"ctrl_dt must be positive, got {ctrl_dt}.")
-    return ESTIMATORS[name](P, ctrl_dt, config or TrackerConfig())
+    config = config or TrackerConfig()
+    estimator = ESTIMATORS[name](P, ctrl_dt, config)
+    if config.longest_delay_s > 0:
+        needs_pairs = isinstance(estimator, TriangulationEstimator)
+        return LateEstimator(estimator, len(P), ctrl_dt, config.longest_delay_s, needs_pairs)
+    return estimator
