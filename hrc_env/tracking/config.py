@@ -16,6 +16,8 @@ _POSITIVE = (
     "sigma_scale",
     "min_std_m",
     "velocity_tau_s",
+    "noise_tau_s",
+    "noise_persists_s",
     "hold_speed_m_s",
     "paper_particles",
     "paper_iterations",
@@ -57,7 +59,15 @@ class TrackerConfig:
     gate_sigma: float = 5.0
     """Views agree within so many standard deviations of the detector."""
     sigma_scale: float = 1.0
-    """Factor on the detector's sigma; 1.2 suits errors that persist for half a second."""
+    """Factor on the detector's sigma; where it is not learnt, 1.2 suits errors that persist for
+    half a second."""
+    noise_bounds: tuple[float, float] = (0.5, 6.0)
+    """Least and most of the factor on the detector's variance that is learnt for every camera
+    (kalman); equal bounds, as (1, 1), are that factor and nothing is learnt."""
+    noise_tau_s: float = 4.0
+    """Time constant with which it is learnt and forgotten [s]."""
+    noise_persists_s: float = 0.5
+    """How long errors of the detector persist where they do [s]; BlazePose's: half a second."""
     min_std_m: float = 0.005
     """No standard deviation, in any direction, is reported as less than this [m]."""
     velocity_tau_s: float = 0.2
@@ -95,6 +105,30 @@ class TrackerConfig:
     camera leaves open runs to the lens, the whole of it overshoots a little."""
     one_view_inflation: float = 1.21
     """Factor on the reported covariance of joints that one view carries (kalman)."""
+    n_hypotheses: int = 8
+    """Most hypotheses about one worker (particle); 1 is the estimator kalman."""
+    mirrored_parts: tuple[str, ...] = ("body", "limbs")
+    """Which mirror images in depth are looked for: "body", "limbs" (particle)."""
+    look_every: int = 3
+    """Updates between two searches for other hypotheses (particle)."""
+    mirror_steps: int = 4
+    """Gauss-Newton steps of such a search."""
+    least_evidence: float = 0.01
+    """Evidence below which another mode is no hypothesis, as a share of its parent's."""
+    least_weight: float = 1e-4
+    """Probability below which a hypothesis is dropped."""
+    evidence_trust: float = 0.5
+    """Share of the log-evidence of a set of frames that counts between hypotheses: the errors of
+    neighbouring frames, and of the model, are alike."""
+    gain_trust: float = 1.0
+    """The same of a new hypothesis beside its parent."""
+    walking_odds: float = 2.0
+    """Log-odds per second by which a hypothesis that walks forwards gains on one that walks
+    backwards."""
+    distinct_sigma: float = 3.0
+    """Posterior deviations from which on a mode is a hypothesis of its own."""
+    close_sigma: float = 2.0
+    """Posterior deviations below which two hypotheses are one."""
     swap_begins: float = 0.01
     """Probability per update that a camera begins to exchange left and right."""
     swap_ends: float = 0.15
@@ -108,6 +142,12 @@ class TrackerConfig:
         for name in _BETWEEN_0_AND_1:
             if not 0 < getattr(self, name) < 1:
                 raise ConfigError(f"{name} must be in (0, 1), got {getattr(self, name)}.")
+        least, most = self.noise_bounds
+        if not 0 < least <= most < float("inf"):
+            raise ConfigError(
+                "noise_bounds must be positive, finite and ordered, as (0.5, 6.0), "
+                f"got {self.noise_bounds}."
+            )
         if not 0 <= self.longest_delay_s <= 1:
             raise ConfigError(f"longest_delay_s must be in [0, 1], got {self.longest_delay_s}.")
         if self.paper_resampling not in _SCHEMES:

@@ -5,7 +5,8 @@ together. A filter that keeps each joint for itself counts one shared uncertaint
 over and believes what it should not. Here the whole body is one Gaussian whose dependencies
 are the kinematic tree's (`tree`): a prediction with exact moments (`tree_predict`), a robust
 search (`tree_search`), one exact update and a step from the mode to the mean (`tree_update`),
-with bones of known length on every edge (`bone_lengths`).
+with bones of known length on every edge (`bone_lengths`) and a noise of every camera that is
+learnt (`noise`).
 """
 
 import functools
@@ -18,10 +19,12 @@ import numpy as np
 from hrc_env.records import Keypoints, PoseEstimate
 from hrc_env.skeleton import N_JOINTS
 from hrc_env.tracking.acquisition import STANDING_M
+from hrc_env.tracking.ahead import ahead
 from hrc_env.tracking.bone_lengths import population_edges
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.measurements import arrays_of
 from hrc_env.tracking.motion_model import STANDING_COUNT, damped_joints, whole_body_noise
+from hrc_env.tracking.noise import N_SUMS, NoiseModel, first_factor, noise_model
 from hrc_env.tracking.settings import Settings, settings_of
 from hrc_env.tracking.tracks import forget, gaussian_tracks, grow_older, report
 from hrc_env.tracking.tree_filter import predict_all, update_all
@@ -62,6 +65,12 @@ class KalmanState(NamedTuple):
     """(B, W, C) updates for which it is still not asked about swaps."""
     carried: Floats
     """(B, W, J) sum of the beliefs in the views of the last update."""
+    noise_factor: Floats
+    """(B, W, C) learnt factor on the variance that the detector reports, as in `noise`."""
+    noise_sums: Floats
+    """(B, W, C, 4) what it is learnt from."""
+    noise_last: Floats
+    """(B, W, J, C, 2) residuals of the last update in reported standard deviations; 0: none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,10 +81,12 @@ class KalmanEstimator:
     ctrl_dt: float
     config: TrackerConfig
     settings: Settings = field(init=False, repr=False)
+    noise: NoiseModel = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Make the kernels' settings, a constant."""
         object.__setattr__(self, "settings", settings_of(self.config))
+        object.__setattr__(self, "noise", noise_model(self.config, self.ctrl_dt))
 
     def init(self, batch: int, n_workers: int) -> KalmanState:
         """Workers whom nobody has seen."""
@@ -95,6 +106,9 @@ class KalmanEstimator:
             blind=np.zeros((*shape, n_cameras), np.int64),
             believed=np.zeros((*shape, n_cameras), np.int64),
             carried=np.zeros((*shape, N_JOINTS)),
+            noise_factor=np.ones((*shape, n_cameras)),
+            noise_sums=np.zeros((*shape, n_cameras, N_SUMS)),
+            noise_last=np.zeros((*shape, N_JOINTS, n_cameras, 2)),
         )
         self._forget(state, np.arange(batch))
         return state
@@ -107,7 +121,7 @@ class KalmanEstimator:
     def predict(self, state: KalmanState, dt_s: float, rngs: list[np.random.Generator]) -> None:
         """Move every tracked body by its motion model; draws nothing."""
         del rngs
-        model = _motion(dt_s, self.config.damping, self.config.root_acceleration)
+        model = motion(dt_s, self.config.damping, self.config.root_acceleration)
         predict_all(state, model, dt_s)
         grow_older(gaussian_tracks(state), dt_s, self.config)
 
@@ -119,7 +133,7 @@ class KalmanEstimator:
         batch, n_workers = state.tracked.shape
         shape = (batch, len(self.P), n_workers, N_JOINTS)
         measured = (self.P, *arrays_of(keypoints, shape))
-        update_all(state, *measured, STANDING_M, self.settings)
+        update_all(state, *measured, STANDING_M, self.settings, self.noise)
 
     def estimate(self, state: KalmanState) -> PoseEstimate:
         """What is believed now; joints that one view carries are reported as less certain.
@@ -127,8 +141,12 @@ class KalmanEstimator:
         Their errors have heavier tails than a Gaussian's: the body may be mirrored in depth.
         """
         tracks, cov = gaussian_tracks(state), np.empty((*state.age_s.shape, 3, 3))
-        _widen(state.cov, state.carried, state.tracked, self.config.one_view_inflation, cov)
+        widen(state.cov, state.carried, state.tracked, self.config.one_view_inflation, cov)
         return report(replace(tracks, cov_world=cov), self.config)
+
+    def ahead(self, state: KalmanState, horizon_s: float) -> PoseEstimate:
+        """What is expected in `horizon_s`; see `tracking.ahead`."""
+        return ahead(self.estimate(state), horizon_s, self.config)
 
     def _forget(self, state: KalmanState, ids: Ints) -> None:
         length, variance = population_edges()
@@ -137,11 +155,13 @@ class KalmanEstimator:
         state.bone_length[ids], state.bone_variance[ids] = length, variance
         state.swap_chance[ids] = self.config.swap_begins
         state.blind[ids], state.believed[ids], state.carried[ids] = 0, 0, 0.0
+        state.noise_factor[ids] = first_factor(self.config)
+        state.noise_sums[ids], state.noise_last[ids] = 0.0, 0.0
         forget(gaussian_tracks(state), ids, self.config)
 
 
 @functools.lru_cache(maxsize=16)
-def _motion(dt_s: float, damping: float, acceleration: float) -> tuple[Floats, ...]:
+def motion(dt_s: float, damping: float, acceleration: float) -> tuple[Floats, ...]:
     """F, travel, Q (J, 2, 2) and shared noise (2, 2), as `tree_predict.predict_tree` takes them."""
     F, Q = damped_joints(dt_s, damping, acceleration)
     travel = np.array([[1.0, dt_s], [0.0, 1.0]]) - F
@@ -149,7 +169,7 @@ def _motion(dt_s: float, damping: float, acceleration: float) -> tuple[Floats, .
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _widen(cov, carried, tracked, inflation, out):
+def widen(cov, carried, tracked, inflation, out):
     """out (B, W, J, 3, 3) = position covariances, those that one view carries times inflation."""
     least, most = _ONE_VIEW
     for b in range(cov.shape[0]):

@@ -10,6 +10,7 @@ import numpy as np
 from hrc_env.tracking.acquisition import count_conflict
 from hrc_env.tracking.bone_lengths import learn_lengths, stiff_lengths
 from hrc_env.tracking.measurements import read_worker
+from hrc_env.tracking.noise import learn_noise, scale_sigma
 from hrc_env.tracking.proposal import contrast_of
 from hrc_env.tracking.swaps import undo_swaps
 from hrc_env.tracking.tree import PARENT, make_work
@@ -34,7 +35,7 @@ def predict_all(state, model, dt):
 
 
 @numba.njit(**_JIT)
-def update_all(state, P, px, confidence, sigma_px, standing, s):
+def update_all(state, P, px, confidence, sigma_px, standing, s, noise):
     """Take one set of frames in.
 
     Args:
@@ -43,15 +44,17 @@ def update_all(state, P, px, confidence, sigma_px, standing, s):
         px, confidence, sigma_px: as in `records.Keypoints`.
         standing: (J, 3) `acquisition.STANDING_M`.
         s: settings.
+        noise: `noise.NoiseModel`.
     """
     n_batch, n_cameras, n_workers, n_joints = confidence.shape
     z, sigma = np.empty((n_joints, n_cameras, 2)), np.empty((n_joints, n_cameras))
     ok, belief = np.empty((n_joints, n_cameras), np.bool_), np.empty((n_joints, n_cameras))
     scratch = (belief, np.empty(n_joints), make_work())
-    placed = np.empty(n_joints, np.bool_)
+    placed, predicted = np.empty(n_joints, np.bool_), np.empty((n_joints, 3, 3))
     for b in range(n_batch):
         for w in range(n_workers):
             read_worker(px, confidence, sigma_px, b, w, s.sigma_scale, z, sigma, ok)
+            scale_sigma(state.noise_factor[b, w], sigma)
             if not state.tracked[b, w]:
                 if acquire(state, b, w, P, z, sigma, ok, standing, s):
                     state.slope[b, w] = 0.0
@@ -59,13 +62,27 @@ def update_all(state, P, px, confidence, sigma_px, standing, s):
             swaps = (state.swap_chance[b, w], state.blind[b, w], state.believed[b, w])
             undo_swaps(P, state.body[b, w], state.cov[b, w], z, sigma, ok, *swaps, s)
             seen = (P, z, sigma, ok)
+            predicted[:] = state.cov[b, w, :, :3, :3]
             follow(state, b, w, seen, s, scratch)
+            known = (state.noise_factor[b, w], state.noise_sums[b, w], state.noise_last[b, w])
+            body = (state.body[b, w], state.cov[b, w], predicted)
+            learn_noise(seen, belief, body, *known, noise)
             look_after(state, b, w, seen, standing, s, placed)
 
 
 @numba.njit(**_JIT)
 def follow(state, b, w, seen, s, scratch):
     """Update a tracked worker: search, condition, correct the mean, learn the bones."""
+    condition(state, b, w, seen, s, scratch)
+    settle(state, b, w, seen, s, scratch)
+
+
+@numba.njit(**_JIT)
+def condition(state, b, w, seen, s, scratch):
+    """Search the mode and condition the tree there; belief (J, C) says what was believed.
+
+    `scratch` is belief (J, C), variances of the bones as measurements (J,), and `tree.Work`.
+    """
     belief, give, work = scratch
     body, cov, slope = state.body[b, w], state.cov[b, w], state.slope[b, w]
     contrast = contrast_of(s.outlier_weight, s.image_area_px)
@@ -73,8 +90,15 @@ def follow(state, b, w, seen, s, scratch):
     bones = (state.bone_length[b, w], give)
     find_pose(body, cov, slope, seen, bones, contrast, s.gauss_newton_steps, belief, work)
     update_tree(body, cov, slope, work)
+
+
+@numba.njit(**_JIT)
+def settle(state, b, w, seen, s, scratch):
+    """Go from the mode to the mean, and learn what is to be learnt from it."""
+    belief, _, work = scratch
     if s.mean_correction > 0.0:
-        correct_mean(body, cov, slope, seen, belief, s.mean_correction, work)
+        gaussian = (state.body[b, w], state.cov[b, w], state.slope[b, w])
+        correct_mean(*gaussian, seen, belief, s.mean_correction, work)
     keep_books(state, b, w, seen, belief)
 
 

@@ -1,0 +1,210 @@
+"""How noisy a camera's detections really are: learnt while tracking, from what views disagree on.
+
+A detector reports a standard deviation; its true errors may be larger or smaller, and they may
+persist: wrong in the same way for about half a second. A filter that takes them as white
+believes too much. Per worker and camera this learns a factor on the reported variance with
+which a filter for white noise is honest (docs/tracking.md, "Errors that persist"):
+
+    factor = V (1 - L + L (1 + a r) / (1 - a r)).
+
+V is true over reported variance: each joint is triangulated from this set of frames alone,
+without the prediction, in which a camera's persistent error is already believed; what a
+camera's pixels are off by, squared, is divided by how much of it the point could not absorb,
+its redundancy (Foerstner, Zeitschrift fuer Vermessungswesen 104, 1979). L is the share of the
+variance that persists, from the products of these residuals with those of the update before;
+r the correlation of that part over one update; a the weight of the prediction in the estimate,
+the mean over joints of tr(posterior covariance, predicted covariance^-1) / 3.
+The second bracket is how much more an average with weights a^k leaves of such noise than of
+white noise.
+"""
+
+import math
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, inverse3
+from hrc_env.tracking.config import TrackerConfig
+
+N_SUMS = 4
+"""Squares and redundancy of residuals; their products with the last ones, and what these would
+be if nothing changed."""
+_BEGINS_WEIGHT = 100.0
+"""The reported noise counts as so much redundancy, so that the first frames decide little."""
+_OPEN_M = 0.5
+"""Two views triangulate no joint along a ray that they share: it stays within this [m]."""
+_LEAST_BELIEF = 0.5
+_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
+_REORDER = {"reassoc", "contract", "arcp", "nsz"}  # NaN and infinity keep their meaning
+
+
+class NoiseModel(NamedTuple):
+    """What the kernels need to learn the factors."""
+
+    keep: float
+    """Share of what was learnt that an update leaves."""
+    persists: float
+    """Correlation r over one update of errors that persist."""
+    least: float
+    most: float
+    """Bounds of the factor on the variance; equal: nothing is learnt."""
+
+
+def noise_model(config: TrackerConfig, ctrl_dt: float) -> NoiseModel:
+    """The constants for updates that are `ctrl_dt` [s] apart."""
+    least, most = config.noise_bounds
+    keep, persists = (
+        math.exp(-ctrl_dt / tau) for tau in (config.noise_tau_s, config.noise_persists_s)
+    )
+    return NoiseModel(keep, persists, least, most)
+
+
+def first_factor(config: TrackerConfig) -> float:
+    """The factor before anything was learnt: the detector is believed."""
+    return min(max(1.0, config.noise_bounds[0]), config.noise_bounds[1])
+
+
+@numba.njit(**_JIT)
+def scale_sigma(factor, sigma):
+    """Multiply sigma (J, C) by the root of each camera's factor (C,), in place."""
+    for c in range(len(factor)):
+        scale = math.sqrt(factor[c])
+        for j in range(len(sigma)):
+            sigma[j, c] *= scale
+
+
+@numba.njit(**_JIT)
+def learn_noise(seen, belief, body, factor, sums, last, model):
+    """Learn the factors (C,) from one update, in place.
+
+    Args:
+        seen: P (C, 3, 4), z (J, C, 2), sigma (J, C) as scaled by `scale_sigma`, ok (J, C).
+        belief: (J, C) how far the update believed each measurement.
+        body: mean (J, 6) and covariance (J, 6, 6) after the update, (J, 3, 3) before it.
+        factor: (C,).
+        sums: (C, 4) see `N_SUMS`, fading.
+        last: (J, C, 2) residuals of the last update in reported standard deviations; 0: none.
+        model: constants.
+    """
+    if model.least == model.most:
+        return
+    mean, cov, predicted = body
+    view, spread = np.empty((len(factor), 9)), np.empty((3, 4))
+    for c in range(len(factor)):
+        view[c, 8] = math.sqrt(factor[c])
+        for k in range(N_SUMS):
+            sums[c, k] *= model.keep
+    memory, n_joints = 0.0, 0
+    for j in range(len(mean)):
+        if _look(seen, belief, mean[j], j, view, spread) < 2:
+            for c in range(len(factor)):
+                last[j, c, 0] = last[j, c, 1] = 0.0
+            continue
+        _compare(view, spread, sums, last[j])
+        memory += _remembered(cov[j], predicted[j], spread)
+        n_joints += 1
+    if n_joints > 0:
+        follows = min(max(memory / n_joints, 0.0), 1.0) * model.persists
+        _set_factors(factor, sums, follows, model)
+
+
+@numba.njit(fastmath=_REORDER, **_JIT)
+def _look(seen, belief, body, j, view, spread):
+    """Triangulate joint j linearly about `body`, from the cameras that are believed; how many.
+
+    Fills view (C, 8 of 9): Jacobians of u and of v and the residuals of both, all over sigma; a
+    residual of infinity says that the camera does not count. Fills spread (3, 4): covariance of
+    the triangulated point, and in the last column where it is from `body`.
+    """
+    P, px, sigma, ok = seen
+    x, y, z = body[0], body[1], body[2]
+    h00 = h11 = h22 = 1.0 / _OPEN_M**2
+    h01 = h02 = h12 = g0 = g1 = g2 = 0.0
+    n_views = 0
+    for c in range(len(P)):
+        view[c, 6] = np.inf
+        if not (ok[j, c] and belief[j, c] > _LEAST_BELIEF):
+            continue
+        p = P[c]
+        depth = p[2, 0] * x + p[2, 1] * y + p[2, 2] * z + p[2, 3]
+        if not depth > NEAREST_DEPTH_M:
+            continue
+        n_views += 1
+        near = 1.0 / (depth * sigma[j, c])  # over sigma; the only division
+        nearer, inverse = near * sigma[j, c], near * depth
+        u = (p[0, 0] * x + p[0, 1] * y + p[0, 2] * z + p[0, 3]) * nearer
+        v = (p[1, 0] * x + p[1, 1] * y + p[1, 2] * z + p[1, 3]) * nearer
+        a0, b0 = (p[0, 0] - u * p[2, 0]) * near, (p[1, 0] - v * p[2, 0]) * near
+        a1, b1 = (p[0, 1] - u * p[2, 1]) * near, (p[1, 1] - v * p[2, 1]) * near
+        a2, b2 = (p[0, 2] - u * p[2, 2]) * near, (p[1, 2] - v * p[2, 2]) * near
+        du, dv = (px[j, c, 0] - u) * inverse, (px[j, c, 1] - v) * inverse
+        view[c, 0], view[c, 1], view[c, 2] = a0, a1, a2
+        view[c, 3], view[c, 4], view[c, 5] = b0, b1, b2
+        view[c, 6], view[c, 7] = du, dv
+        h00 += a0 * a0 + b0 * b0
+        h11 += a1 * a1 + b1 * b1
+        h22 += a2 * a2 + b2 * b2
+        h01 += a0 * a1 + b0 * b1
+        h02 += a0 * a2 + b0 * b2
+        h12 += a1 * a2 + b1 * b2
+        g0 += a0 * du + b0 * dv
+        g1 += a1 * du + b1 * dv
+        g2 += a2 * du + b2 * dv
+    spread[0, 0], spread[1, 1], spread[2, 2] = h00, h11, h22
+    spread[0, 1] = spread[1, 0] = h01
+    spread[0, 2] = spread[2, 0] = h02
+    spread[1, 2] = spread[2, 1] = h12
+    inverse3(spread, spread)
+    for i in range(3):
+        spread[i, 3] = spread[i, 0] * g0 + spread[i, 1] * g1 + spread[i, 2] * g2
+    return n_views
+
+
+@numba.njit(fastmath=_REORDER, **_JIT)
+def _compare(view, spread, sums, last):
+    """Add one joint's residuals about its triangulated point to the sums (C, 4)."""
+    s00, s11, s22 = spread[0, 0], spread[1, 1], spread[2, 2]
+    s01, s02, s12 = 2.0 * spread[0, 1], 2.0 * spread[0, 2], 2.0 * spread[1, 2]
+    x, y, z = spread[0, 3], spread[1, 3], spread[2, 3]
+    for c in range(len(view)):
+        if not view[c, 6] < np.inf:
+            last[c, 0] = last[c, 1] = 0.0
+            continue
+        a0, a1, a2 = view[c, 0], view[c, 1], view[c, 2]
+        b0, b1, b2 = view[c, 3], view[c, 4], view[c, 5]
+        scale = view[c, 8]  # to reported standard deviations
+        du = scale * (view[c, 6] - a0 * x - a1 * y - a2 * z)
+        dv = scale * (view[c, 7] - b0 * x - b1 * y - b2 * z)
+        absorbed = s00 * (a0 * a0 + b0 * b0) + s11 * (a1 * a1 + b1 * b1)
+        absorbed += s22 * (a2 * a2 + b2 * b2) + s01 * (a0 * a1 + b0 * b1)
+        absorbed += s02 * (a0 * a2 + b0 * b2) + s12 * (a1 * a2 + b1 * b2)
+        square, u, v = du * du + dv * dv, last[c, 0], last[c, 1]
+        sums[c, 0] += square
+        sums[c, 1] += 2.0 - absorbed
+        before = u * u + v * v
+        if before > 0.0:
+            sums[c, 2] += du * u + dv * v
+            sums[c, 3] += 0.5 * (square + before)
+        last[c, 0], last[c, 1] = du, dv
+
+
+@numba.njit(fastmath=_REORDER, **_JIT)
+def _remembered(cov, predicted, work):
+    """tr(cov predicted^-1) / 3: how much of a position is the prediction's; `work` (3, 3+)."""
+    inverse3(predicted, work)
+    own = cov[0, 0] * work[0, 0] + cov[1, 1] * work[1, 1] + cov[2, 2] * work[2, 2]
+    cross = cov[0, 1] * work[0, 1] + cov[0, 2] * work[0, 2] + cov[1, 2] * work[1, 2]
+    return (own + 2.0 * cross) / 3.0
+
+
+@numba.njit(**_JIT)
+def _set_factors(factor, sums, follows, model):
+    """The factors (C,) that the sums ask for; `follows` is a r of the module's formula."""
+    grows = (1.0 + follows) / (1.0 - follows)
+    for c in range(len(factor)):
+        variance = (sums[c, 0] + _BEGINS_WEIGHT) / (sums[c, 1] + _BEGINS_WEIGHT)
+        alike = sums[c, 2] / (sums[c, 3] + _BEGINS_WEIGHT)
+        share = min(max(alike / model.persists, 0.0), 1.0)
+        wanted = variance * (1.0 - share + share * grows)
+        factor[c] = min(max(wanted, model.least), model.most)
