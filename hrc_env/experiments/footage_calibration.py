@@ -1,0 +1,108 @@
+"""The calibration of recorded footage: Qualisys' XML to pinhole cameras with a lens.
+
+Frames: the file's world is right-handed, +Z up, in millimetres, and becomes `world` in metres.
+Its matrix has the camera's axes in its rows (+X right, +Y up, -Z forward), so that OpenCV's
+camera (+X right, +Y down, +Z forward) is that turned half round its +X. Lengths in the image
+come in 64ths of a pixel, counted from the middle of the first pixel; here pixels count from
+the image's corner, half a pixel more. Of an image that is narrower than the calibration
+says the right margin was cut off: moving or stretching it makes the views agree less.
+"""
+
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from hrc_env.errors import ConfigError
+from hrc_env.geometry.cameras import PinholeCamera
+from hrc_env.tracking.config import TrackerConfig
+from hrc_env.typing import Floats, Points3
+
+_PER_PX = 64.0
+_HALF_TURN_ABOUT_X = np.diag([1.0, -1.0, -1.0])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FilmedCamera:
+    """A real camera."""
+
+    pinhole: PinholeCamera
+    """What it is without the lens' distortion."""
+    distortion: Floats
+    """(4,) Brown's k1, k2, p1, p2."""
+
+
+def read_calibration(path: Path, sizes_px: list[tuple[int, int]]) -> list[FilmedCamera]:
+    """The cameras of a Qualisys calibration file.
+
+    Args:
+        path: the file.
+        sizes_px: width and height of each camera's film, in the file's order.
+
+    Raises:
+        ConfigError: the file is no such calibration, or has another number of cameras.
+    """
+    try:
+        found = list(ElementTree.parse(path).getroot().iter("camera"))
+        if len(found) != len(sizes_px):
+            raise ConfigError(
+                f"{path.name} must describe as many cameras as there are films "
+                f"({len(sizes_px)}), got {len(found)}."
+            )
+        return [_camera(camera, size) for camera, size in zip(found, sizes_px, strict=True)]
+    except (ElementTree.ParseError, KeyError, ValueError, AttributeError) as error:
+        if isinstance(error, ConfigError):
+            raise
+        raise ConfigError(
+            f"{path} must be a Qualisys calibration (XML with a transform and an intrinsic for "
+            f"each camera); reading it ended with: {error!r}."
+        ) from error
+
+
+def meeting_point(cameras: list[PinholeCamera]) -> Points3:
+    """(3,) the point that is nearest to all optical axes [m]."""
+    normal, rhs = np.zeros((3, 3)), np.zeros(3)
+    for camera in cameras:
+        along = camera.T_world_from_cam[:3, 2]
+        across = np.eye(3) - np.outer(along, along)
+        normal += across
+        rhs += across @ camera.eye_world
+    return np.asarray(np.linalg.solve(normal, rhs), float)
+
+
+def tracker_config(cameras: list[PinholeCamera]) -> TrackerConfig:
+    """Where a rig expects somebody: where it looks, give or take half its mean distance."""
+    point = meeting_point(cameras)
+    distances_m = [float(np.linalg.norm(camera.eye_world - point)) for camera in cameras]
+    x, y, z = (float(value) for value in point)
+    return TrackerConfig(
+        prior_mean_world=(x, y, z),
+        prior_std_m=float(np.mean(distances_m)) / 2,
+        image_area_px=float(np.mean([c.width_px * c.height_px for c in cameras])),
+    )
+
+
+def _camera(node: ElementTree.Element, size_px: tuple[int, int]) -> FilmedCamera:
+    place, lens = _numbers(node, "transform"), _numbers(node, "intrinsic")
+    rows = np.array([[place[f"r{i}{k}"] for k in (1, 2, 3)] for i in (1, 2, 3)])
+    T_world_from_cam = np.eye(4)
+    T_world_from_cam[:3, :3] = rows.T @ _HALF_TURN_ABOUT_X
+    T_world_from_cam[:3, 3] = [place[axis] / 1000 for axis in "xyz"]
+    K = np.array(
+        [
+            [lens["focalLengthU"] / _PER_PX, 0, lens["centerPointU"] / _PER_PX + 0.5],
+            [0, lens["focalLengthV"] / _PER_PX, lens["centerPointV"] / _PER_PX + 0.5],
+            [0, 0, 1],
+        ]
+    )
+    names = [f"{kind}Distortion{k}" for kind in ("radial", "tangental") for k in (1, 2)]
+    pinhole = PinholeCamera(node.attrib["serial"], K, T_world_from_cam, *size_px)
+    return FilmedCamera(pinhole, np.array([lens[name] for name in names]))
+
+
+def _numbers(node: ElementTree.Element, tag: str) -> dict[str, float]:
+    part = node.find(tag)
+    if part is None:
+        raise KeyError(tag)
+    return {name: float(value) for name, value in part.attrib.items()}

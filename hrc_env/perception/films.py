@@ -1,0 +1,82 @@
+"""Recorded films as a source of pictures: one frame of every camera at a time."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from hrc_env.errors import ConfigError
+from hrc_env.perception.blazepose import sample_window
+from hrc_env.records import CropWindow
+from hrc_env.typing import Floats, Image, Points2
+
+
+class Films:
+    """Films of a rig, read side by side; an `ImageSource` of the frames that are open.
+
+    Only one frame a camera is kept.
+    """
+
+    def __init__(self, paths: Sequence[Path]) -> None:
+        """Open the films; raises `ConfigError` for a file that is none."""
+        self.frames: list[Image] = []
+        """The open frame of each camera, (H, W, 3) RGB; none before `advance`."""
+        self._films = [cv2.VideoCapture(str(path)) for path in paths]
+        for path, film in zip(paths, self._films, strict=True):
+            if not film.isOpened():
+                raise ConfigError(f"{path} cannot be read as a film; expected a video file.")
+
+    @property
+    def frames_per_s(self) -> float:
+        """Frame rate, the first film's [Hz]."""
+        return float(self._films[0].get(cv2.CAP_PROP_FPS))
+
+    @property
+    def sizes_px(self) -> list[tuple[int, int]]:
+        """Width and height of each camera's frames."""
+        return [
+            (int(film.get(cv2.CAP_PROP_FRAME_WIDTH)), int(film.get(cv2.CAP_PROP_FRAME_HEIGHT)))
+            for film in self._films
+        ]
+
+    @property
+    def n_frames(self) -> int:
+        """How many frames all films have, as their headers say."""
+        return min(int(film.get(cv2.CAP_PROP_FRAME_COUNT)) for film in self._films)
+
+    def advance(self) -> bool:
+        """Open the next frames; False where a film ends."""
+        read = [film.read() for film in self._films]
+        if not all(ok for ok, _ in read):
+            return False
+        self.frames = [
+            np.asarray(cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB), np.uint8) for _, bgr in read
+        ]
+        return True
+
+    def skip(self, camera_index: int, n_frames: int) -> None:
+        """Leave frames of one camera out, unseen."""
+        for _ in range(n_frames):
+            self._films[camera_index].grab()
+
+    def crop(self, camera_index: int, window: CropWindow) -> Image:
+        """The window of a camera's open frame, upright, (256, 256, 3) RGB."""
+        return sample_window(self.frames[camera_index], window)
+
+    def close(self) -> None:
+        """Close the files."""
+        for film in self._films:
+            film.release()
+
+
+def undistort(px: Points2, K: Floats, distortion: Floats) -> Points2:
+    """Pixels (..., 2) as a pinhole camera with the same K would see them.
+
+    Args:
+        px: as the lens shows them; NaN stays NaN.
+        K: (3, 3), pixels continuous from the image's corner.
+        distortion: (4,) Brown's k1, k2, p1, p2, in OpenCV's order.
+    """
+    flat = np.ascontiguousarray(px, float).reshape(-1, 1, 2)
+    return np.asarray(cv2.undistortPoints(flat, K, distortion, P=K), float).reshape(px.shape)
