@@ -140,9 +140,11 @@ class LateEstimator:
             time_s = _near_now(keypoints.time_s, time_s)
         ends_s = _ends_by_age(state)
         use = _usable(state, keypoints, time_s, ends_s, self.longest_delay_s)
-        remember(state.frames, keypoints, time_s, use)
         first_s = np.where(use, time_s, np.inf).min(1)
         late = first_s < state.clock_s - SAME_S
+        seen_now = (state.frames.newest_s >= state.clock_s[:, None] - SAME_S).any(1)
+        late |= seen_now & use.any(1) & np.isfinite(ends_s[:, 0])  # one update, not two
+        remember(state.frames, keypoints, time_s, use)
         back = np.where(late, 1 + (ends_s >= first_s[:, None] - SAME_S).sum(1), 0)
         self._take_in(state, keypoints, use & ~late[:, None], rngs)
         for age in range(int(back.max(initial=0)), 0, -1):
@@ -155,6 +157,10 @@ class LateEstimator:
     def estimate(self, state: LateState) -> PoseEstimate:
         """What is believed now."""
         return self.inner.estimate(state.now)
+
+    def ahead(self, state: LateState, horizon_s: float) -> PoseEstimate:
+        """What is expected in `horizon_s`; see `tracking.ahead`."""
+        return self.inner.ahead(state.now, horizon_s)
 
     def _take_in(self, state: LateState, keypoints: Keypoints, use: Bools, rngs: Rngs) -> None:
         """Update with frames of now, `use` (B, C); environments without one are left alone."""
