@@ -4,32 +4,25 @@ Each (rig, condition, estimator) is written to DIR/parts as soon as it is done, 
 that was stopped goes on where it was; parts made by other code or settings are made anew.
 """
 
-import hashlib
-import json
-import os
-from collections.abc import Callable, Iterator, Mapping
+import multiprocessing
+from collections import Counter
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-import hrc_env
 from hrc_env.errors import ConfigError
-from hrc_env.experiments.tracking_cells import (
-    DLT,
-    FULL_STATE,
-    MATCHED,
-    Tick,
-    make_sequences,
-    run_cell,
-)
+from hrc_env.experiments.tracking_cells import Tick, run_cell
 from hrc_env.experiments.tracking_detections import CONDITIONS
-from hrc_env.experiments.tracking_metrics import TIMING, Parts, metrics_of
+from hrc_env.experiments.tracking_metrics import ASSOCIATION, TIMING, Parts, metrics_of
+from hrc_env.experiments.tracking_names import DEFAULT, cells, names_of
+from hrc_env.experiments.tracking_own import OWN, make_own_rig
 from hrc_env.experiments.tracking_report import write_report
 from hrc_env.experiments.tracking_rigs import RIGS, SIGMA_PX, Rig, make_rig
-from hrc_env.experiments.tracking_timing import BATCH, time_estimator
+from hrc_env.experiments.tracking_sequences import BOUNDED, Sequences, make_sequences
+from hrc_env.experiments.tracking_shelf import Say, Shelf, fingerprint_of
+from hrc_env.experiments.tracking_timing import BATCH, time_association, time_estimator
 from hrc_env.results import Metric, write_results
 from hrc_env.tracking.estimators import ESTIMATORS
 
@@ -54,119 +47,116 @@ class TrackingBenchConfig:
                 raise ConfigError(f"{name} must be at least 1, got {getattr(self, name)}.")
 
 
-QUICK = TrackingBenchConfig(n_seeds=12, n_matched=40, timing_repeats=2)
+QUICK = TrackingBenchConfig(n_seeds=10, n_matched=40, timing_repeats=2)
 """Every number, from fewer sequences."""
-Say = Callable[[float, str], None]
-"""Told by how much the share that is done grew, and what is being done."""
 
 
-def run(config: TrackingBenchConfig, out: Path, say: Say) -> dict[str, Metric]:
+def run(config: TrackingBenchConfig, out: Path, say: Say, processes: int = 1) -> dict[str, Metric]:
     """Run what is not yet there; writes results.json, tracking.md and two plots into `out`.
 
     Args:
         config: how much.
         out: a folder.
         say: hears of the progress: shares that sum to 1.
+        processes: how many conditions are run at once; times are taken alone, at the end.
     """
-    names = [*ESTIMATORS, DLT]
-    n_parts = len(RIGS) * ((len(CONDITIONS) + 1) * len(names) + 1) + len(ESTIMATORS)
-    shelf = _Shelf(out / "parts", _fingerprint(config), n_parts, say)
+    asked = cells()
+    n_parts = len(asked) + len(ESTIMATORS) + 1
+    shelf = Shelf(out / "parts", fingerprint_of(asdict(config)), n_parts, say)
+    if processes > 1:
+        _run_conditions(config, shelf, processes)
+        shelf = Shelf(shelf.folder, shelf.fingerprint, n_parts, _silent)
     parts: Parts = {}
-    for rig in map(make_rig, RIGS):
-        for condition in (*CONDITIONS, MATCHED):
-            asked = [*names, FULL_STATE] if condition == MATCHED else names
-            for name, part in _condition(config, shelf, rig, condition, asked):
-                parts[rig.name, condition, name] = part
-    for name, part in _timing(config, shelf):
-        parts["lab", TIMING, name] = part
-    metrics = metrics_of(parts, list(ESTIMATORS))
+    for rig, condition in dict.fromkeys(cell[:2] for cell in asked):
+        parts |= make_condition(config, shelf, rig, condition)
+    shelf = Shelf(shelf.folder, shelf.fingerprint, n_parts, say)
+    parts |= _timing(config, shelf)
+    metrics = metrics_of(parts)
     settings = {
         "bench": asdict(config),
+        "default": DEFAULT,
         "sigma_px": SIGMA_PX,
-        "tracker": {name: asdict(make_rig(name).tracker) for name in RIGS},
+        "tracker": {name: asdict(_rig(name).tracker) for name in (*RIGS, OWN)},
         "conditions": {name: asdict(damage) for name, damage in CONDITIONS.items()},
         "fingerprint": shelf.fingerprint,
     }
     write_results(out / "results.json", settings, _seeds(config, "clean"), metrics)
-    write_report(out, parts, metrics, list(ESTIMATORS))
+    write_report(out, parts, metrics)
     return metrics
 
 
-@dataclass(frozen=True, slots=True)
-class _Shelf:
-    """Where parts are kept."""
+def make_condition(
+    config: TrackingBenchConfig, shelf: Shelf, rig_name: str, condition: str
+) -> Parts:
+    """Everybody on one rig and condition; the sequences are made if a part is missing."""
+    seeds = _seeds(config, condition)
 
-    folder: Path
-    fingerprint: str
-    n_parts: int
-    say: Say
+    @cache
+    def sequences() -> tuple[Rig, Sequences]:
+        rig = _rig(rig_name)
+        return rig, make_sequences(rig, condition, seeds)
 
-    def part(self, label: str, make: Callable[[Tick], dict[str, Any]]) -> dict[str, Any]:
-        """The part called `label`: the one that is there, or a new one."""
-        part = self._load(label)
-        if part is not None:
-            self.say(1 / self.n_parts, label)
-            return part
-        self.say(0.0, label)
-        part = make(lambda share: self.say(share / self.n_parts, label))
-        self._store(label, part)
-        return part
+    def make(name: str, tick: Tick) -> dict[str, Any]:
+        return run_cell(name, *sequences(), seeds, tick)
 
-    def _load(self, label: str) -> dict[str, Any] | None:
-        """A part that is there, whole, and made by the same code and settings."""
-        path = self.folder / f"{label}.json"
-        if not path.exists():
-            return None
-        content: Mapping[str, Any] = json.loads(path.read_text())
-        return content["part"] if content["fingerprint"] == self.fingerprint else None
+    return {
+        (rig_name, condition, name): shelf.part(
+            f"{rig_name}.{condition}.{name}", partial(make, name)
+        )
+        for name in names_of(rig_name, condition)
+    }
 
-    def _store(self, label: str, part: Mapping[str, Any]) -> None:
-        """Write a part, whole or not at all."""
-        self.folder.mkdir(parents=True, exist_ok=True)
-        draft = self.folder / f"{label}.draft"
-        draft.write_text(json.dumps({"fingerprint": self.fingerprint, "part": part}))
-        os.replace(draft, self.folder / f"{label}.json")
+
+def _run_conditions(config: TrackingBenchConfig, shelf: Shelf, processes: int) -> None:
+    """Let several processes put the parts of whole conditions on the shelf."""
+    todo = Counter((rig, condition) for rig, condition, _ in cells())
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(processes, mp_context=context) as pool:
+        running = {
+            pool.submit(_in_process, config, shelf.folder, shelf.fingerprint, *what): what
+            for what in todo
+        }
+        for done in as_completed(running):
+            done.result()
+            what = running[done]
+            shelf.say(todo[what] / shelf.n_parts, ".".join(what))
+
+
+def _in_process(
+    config: TrackingBenchConfig, folder: Path, fingerprint: str, rig: str, condition: str
+) -> None:
+    """What another process does: the parts stay on the shelf."""
+    make_condition(config, Shelf(folder, fingerprint, 1, _silent), rig, condition)
+
+
+def _silent(share: float, label: str) -> None:
+    """Say nothing."""
+
+
+def _rig(name: str) -> Rig:
+    return make_own_rig() if name == OWN else make_rig(name)
 
 
 def _seeds(config: TrackingBenchConfig, condition: str) -> list[int]:
-    n = config.n_matched if condition == MATCHED else config.n_seeds
+    n = config.n_matched if condition in BOUNDED else config.n_seeds
     return [config.first_seed + k for k in range(n)]
 
 
-def _condition(
-    config: TrackingBenchConfig, shelf: _Shelf, rig: Rig, condition: str, names: list[str]
-) -> Iterator[tuple[str, dict[str, Any]]]:
-    """All estimators on one rig and condition; the sequences are made if a part is missing."""
-    seeds = _seeds(config, condition)
-    sequences = cache(lambda: make_sequences(rig, condition, seeds))
-
-    def make(name: str, tick: Tick) -> dict[str, Any]:
-        return run_cell(name, rig, sequences(), seeds, tick)
-
-    for name in names:
-        yield name, shelf.part(f"{rig.name}.{condition}.{name}", partial(make, name))
-
-
-def _timing(config: TrackingBenchConfig, shelf: _Shelf) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Microseconds per update of every estimator, on the lab's sequences."""
+def _timing(config: TrackingBenchConfig, shelf: Shelf) -> Parts:
+    """Microseconds per update of every estimator, on the lab's sequences, and of association."""
     rig = make_rig("lab")
     frames = cache(lambda kind: make_sequences(rig, kind, list(range(BATCH))))
+    repeats = config.timing_repeats
 
     def make(name: str, tick: Tick) -> dict[str, Any]:
-        repeats = config.timing_repeats
         return time_estimator(name, rig, frames("clean"), frames("hard"), repeats, tick)
 
-    for name in ESTIMATORS:
-        yield name, shelf.part(f"{TIMING}.{name}", partial(make, name))
-
-
-def _fingerprint(config: TrackingBenchConfig) -> str:
-    """What a part depends on: the settings and the code that it comes from."""
-    digest = hashlib.sha256(json.dumps(asdict(config), sort_keys=True).encode())
-    root = Path(hrc_env.__file__).parent
-    for room in ("geometry", "tracking", "experiments"):
-        for path in sorted((root / room).glob("*.py")):
-            digest.update(path.read_bytes())
-    digest.update((root / "skeleton.py").read_bytes())
-    digest.update(np.__version__.encode())
-    return digest.hexdigest()[:16]
+    parts: Parts = {
+        ("lab", TIMING, name): shelf.part(f"{TIMING}.{name}", partial(make, name))
+        for name in ESTIMATORS
+    }
+    site = make_rig("site")
+    parts["site", TIMING, ASSOCIATION] = shelf.part(
+        f"{TIMING}.{ASSOCIATION}", partial(time_association, site, repeats)
+    )
+    return parts

@@ -65,7 +65,7 @@ def expected(model: MatchedModel, state: Floats) -> Floats:
     free = advance(model, state)
     state = free
     for _ in range(_STEPS):
-        length, rows = bone_rows(joints_of(state))
+        length, rows = bone_rows(joints_of(state), model.bones)
         moved = np.einsum("sbp,sp->sb", rows, (state - free)[:, :N_PLACES])
         miss = model.length - length + moved
         state = free + np.einsum("snb,sb->sn", bone_gain(model, rows), miss)

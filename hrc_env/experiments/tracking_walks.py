@@ -25,8 +25,8 @@ _HIP_HEIGHT_M, _GROUND_M = 0.92, 0.02
 
 
 @dataclass(frozen=True, slots=True)
-class _Path:
-    """A walk on the ground, and what the limbs make of it; all (T, S)."""
+class Path:
+    """A walk on the ground, and what the limbs make of it; all (T, S), T in frames of 0.04 s."""
 
     ground: Floats
     """(T, S, 2) [m]."""
@@ -46,17 +46,21 @@ def walk(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points
         seeds: one per sequence; a sequence depends on its own seed only.
         n_frames: how many frames.
     """
-    path = _steer(walk_m, seeds, max(n_frames, _SHORTEST))
+    return bodies_along(_steer(walk_m, seeds, max(n_frames, _SHORTEST)))[:n_frames]
+
+
+def bodies_along(path: Path) -> Points3:
+    """Joints (T, S, J, 3) [m] of walkers who go along `path`."""
     body = _body(path)
     joints = np.einsum("tsij,tskj->tski", about_axis("z", path.heading), body)
     joints[..., :2] += path.ground[:, :, None]
     joints[..., 2] += (_HIP_HEIGHT_M + 0.02 * np.cos(2 * path.stride))[..., None]
     below = _GROUND_M - joints[..., 2].min(-1)
     joints[..., 2] += np.maximum(below, 0.0)[..., None]  # the whole body, so that bones stay rigid
-    return joints[:n_frames]
+    return joints
 
 
-def _steer(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> _Path:
+def _steer(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Path:
     """Walk in substeps; returns every frame."""
     dt, n_steps = DT_S / _SUBSTEPS, n_frames * _SUBSTEPS
     rngs = [np.random.default_rng([seed, 1]) for seed in seeds]
@@ -80,7 +84,7 @@ def _steer(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> _Pat
         places[k], headings[k] = place, heading
     stride = 2 * np.pi * np.cumsum(0.9 * speed / 1.25, 0) * dt
     shown = slice(None, None, _SUBSTEPS)
-    return _Path(
+    return Path(
         ground=places[shown],
         heading=headings[shown],
         stride=stride[shown],
@@ -105,7 +109,7 @@ def _limb(angle: Floats, length_m: float) -> Points3:
     return length_m * np.stack([np.sin(angle), np.zeros_like(angle), -np.cos(angle)], -1)
 
 
-def _body(path: _Path) -> Points3:
+def _body(path: Path) -> Points3:
     """(T, S, J, 3) joints about the middle of the hips: x forward, y left, z up."""
     body = np.zeros((*path.heading.shape, N_JOINTS, 3))
     lean, upright = np.sin(path.lean), np.cos(path.lean)

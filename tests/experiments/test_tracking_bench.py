@@ -7,15 +7,17 @@ import numpy as np
 import pytest
 
 from hrc_env.errors import ConfigError
-from hrc_env.experiments import tracking_bench, tracking_cells
+from hrc_env.experiments import tracking_bench, tracking_sequences
 from hrc_env.experiments.tracking_bench import TrackingBenchConfig, run
-from hrc_env.experiments.tracking_cells import CHI2_LEVELS, DLT, Tally, make_sequences
+from hrc_env.experiments.tracking_names import DLT, rows
 from hrc_env.experiments.tracking_rigs import RIGS, make_rig
-from hrc_env.experiments.tracking_timing import time_estimator
+from hrc_env.experiments.tracking_sequences import make_sequences
+from hrc_env.experiments.tracking_shelf import fingerprint_of
+from hrc_env.experiments.tracking_tally import CHI2_95_3D, CHI2_LEVELS, tally
+from hrc_env.experiments.tracking_timing import time_association, time_estimator
 from hrc_env.tracking.estimators import ESTIMATORS
 
 TINY = TrackingBenchConfig(n_seeds=2, n_matched=2, timing_repeats=1)
-CONDITIONS = ("clean", "occluded", "hard", "one_camera", "after_return", "matched")
 
 
 def no_time(name, rig, clean, hard, n_repeats, tick):
@@ -24,19 +26,25 @@ def no_time(name, rig, clean, hard, n_repeats, tick):
     return {"1": [2.0], "64": [1.0], "hard_64": [1.5]}
 
 
+def no_association_time(rig, n_repeats, tick):
+    """The same."""
+    tick(1.0)
+    return {"us": [9.0]}
+
+
 @contextmanager
 def small():
     """Few frames, no clock, and code that nobody edits meanwhile."""
-    short = {name: min(n, 60) for name, n in tracking_cells._FRAMES.items()}
+    short = {name: min(n, 30) for name, n in tracking_sequences.N_FRAMES.items()}
     windows = {
-        name: dict.fromkeys(inner, (min(10, short[name] - 2), short[name]))
-        for name, inner in tracking_cells._WINDOWS.items()
+        name: dict.fromkeys(inner, (10, 30)) for name, inner in tracking_sequences.WINDOWS.items()
     }
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(tracking_cells, "_FRAMES", short)
-        patch.setattr(tracking_cells, "_WINDOWS", windows)
+        patch.setattr(tracking_sequences, "N_FRAMES", short)
+        patch.setattr(tracking_sequences, "WINDOWS", windows)
         patch.setattr(tracking_bench, "time_estimator", no_time)
-        patch.setattr(tracking_bench, "_fingerprint", lambda config: "the same code")
+        patch.setattr(tracking_bench, "time_association", no_association_time)
+        patch.setattr(tracking_bench, "fingerprint_of", lambda settings: "the same code")
         yield patch
 
 
@@ -56,13 +64,18 @@ def test_every_key_is_written_in_the_shared_form(bench):
     metrics = results["metrics"]
     for name in ESTIMATORS:
         assert f"ratio_to_bound.{name}" in metrics
+        assert f"ratio_to_bound_bones.{name}" in metrics
         for batch in ("1", "64", "hard_64"):
             assert f"update_us.{name}.{batch}" in metrics
         for rig in RIGS:
-            for condition in CONDITIONS:
-                for kind in ("rmse_m", "median_m", "coverage95", "std_over_rmse", "nees"):
-                    assert f"{kind}.{rig}.{condition}.{name}" in metrics
+            assert f"identity_swaps.{rig}.two_workers.{name}" in metrics
+            assert f"mirrored_returns.{rig}.one_camera.{name}" in metrics
+        for rig, _, window in rows():
+            for kind in ("rmse_m", "coverage95", "std_over_rmse", "nees", "facing_wrong"):
+                assert f"{kind}.{rig}.{window}.{name}" in metrics
+    assert "association_us" in metrics
     assert f"rmse_m.lab.clean.{DLT}" in metrics
+    assert f"default_over.own.four_cameras.{DLT}" in metrics
     for metric in metrics.values():
         assert set(metric) == {"value", "low", "high", "unit", "n"}
         assert np.isfinite([metric["value"], metric["low"], metric["high"]]).all()
@@ -98,7 +111,7 @@ def test_a_second_run_makes_only_what_is_missing(bench):
 
 
 def test_parts_of_other_settings_are_not_used(bench):
-    assert tracking_bench._fingerprint(TINY) != tracking_bench._fingerprint(tracking_bench.QUICK)
+    assert fingerprint_of({"n": 1}) != fingerprint_of({"n": 2})
 
 
 def test_time_per_update_is_positive():
@@ -121,14 +134,18 @@ def test_a_right_covariance_is_found_calibrated():
     """Errors drawn from the reported Gaussian: 95 % inside, NEES of 1, levels equally filled."""
     rng = np.random.default_rng(0)
     factor = rng.normal(size=(3, 3))
-    truth, px = rng.normal(size=(20, 15, 3)), np.zeros((20, 4, 15, 2))
-    tally = Tally(20)
-    for _ in range(50):
-        mean = truth + rng.standard_normal((20, 15, 3)) @ factor.T
-        tally.add(truth, mean, np.broadcast_to(factor @ factor.T, (20, 15, 3, 3)), px)
-    n = tally.n.sum()
-    assert tally.inside.sum() / n == pytest.approx(0.95, abs=0.01)
-    assert tally.nees.sum() / n / 3 == pytest.approx(1.0, abs=0.03)
-    assert np.sqrt(tally.trace.sum() / tally.squared.sum()) == pytest.approx(1.0, abs=0.03)
-    np.testing.assert_allclose(tally.levels.sum(0) / n, 0.05, atol=0.007)
-    assert CHI2_LEVELS[-1] == pytest.approx(tracking_cells.CHI2_95_3D, abs=1e-3)
+    truth = rng.normal(size=(50, 20, 1, 15, 3))
+    mean = truth + rng.standard_normal(truth.shape) @ factor.T
+    cov = np.broadcast_to(factor @ factor.T, (*truth.shape, 3))
+    sums = tally(truth, mean, cov, np.ones((50, 20, 4, 1, 15), bool))
+    n = np.sum(sums["n"])
+    assert np.sum(sums["inside"]) / n == pytest.approx(0.95, abs=0.01)
+    assert np.sum(sums["nees"]) / n / 3 == pytest.approx(1.0, abs=0.03)
+    assert np.sqrt(np.sum(sums["trace"]) / np.sum(sums["squared"])) == pytest.approx(1.0, abs=0.03)
+    np.testing.assert_allclose(np.sum(sums["levels"], 0) / n, 0.05, atol=0.007)
+    assert CHI2_LEVELS[-1] == pytest.approx(CHI2_95_3D, abs=1e-3)
+
+
+def test_the_association_of_four_people_takes_time():
+    times = time_association(make_rig("site"), 1, lambda share: None)
+    assert min(times["us"]) > 0

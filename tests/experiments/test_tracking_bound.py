@@ -19,12 +19,14 @@ from hrc_env.experiments.tracking_matched import (
     draw,
     heading,
     matched_model,
+    tilted,
     transition,
 )
 from hrc_env.experiments.tracking_rigs import make_rig
 from hrc_env.skeleton import N_JOINTS
 
-MODEL = matched_model(0.5, 0.05)
+MODEL = matched_model(0.5, 0.05, 16)
+BONELESS = matched_model(0.5, 0.05, 0)
 SIGMA_PX = 3.0
 
 
@@ -60,14 +62,14 @@ def test_motion_is_the_same_in_every_place_and_direction():
 
 def test_matched_bodies_keep_their_bones():
     joints = draw(MODEL, [1, 2, 3], 40)
-    length, _ = bone_rows(joints.reshape(-1, N_JOINTS, 3))
+    length, _ = bone_rows(joints.reshape(-1, N_JOINTS, 3), MODEL.bones)
     assert (np.abs(length.mean(0) - MODEL.length) < 3 * MODEL.stiffness).all()
     assert (length.std(0) < 2.5 * MODEL.stiffness).all()
 
 
 def test_in_the_linear_case_the_bound_is_a_kalman_filters_covariance():
-    """Affine cameras, bones so loose that they do not matter: Kalman's covariance is exact."""
-    loose, P = replace(MODEL, stiffness=np.full(16, 1e4)), affine_rig()
+    """Affine cameras, no bones: Kalman's covariance is exact."""
+    loose, P = BONELESS, affine_rig()
     joints = np.repeat(
         np.tile(MODEL.offset, (1, 1, 1, 1)), 8, 0
     )  # stands still: constant derivatives
@@ -108,3 +110,11 @@ def test_a_filter_of_the_whole_state_reaches_the_bound():
     least = np.trace(bound, axis1=-2, axis2=-1)[12:].mean()
     ratio = np.sqrt((error[12:] ** 2).sum(-1).mean() / least)
     assert ratio == pytest.approx(1.0, abs=0.06)
+
+
+def test_bones_so_loose_that_they_do_not_matter_are_none():
+    joints = draw(BONELESS, [1, 2], 2)
+    loose = replace(MODEL, stiffness=np.full(16, 1e4))
+    for with_loose, without in zip(tilted(loose, *joints), tilted(BONELESS, *joints), strict=True):
+        np.testing.assert_allclose(with_loose, without, atol=1e-9)
+    np.testing.assert_allclose(tilted(BONELESS, *joints)[1], np.tile(MODEL.Q, (2, 1, 1)))

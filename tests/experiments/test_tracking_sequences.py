@@ -3,10 +3,14 @@
 import numpy as np
 import pytest
 
-from hrc_env.experiments.tracking_cells import DLT, make_sequences, run_cell
+from hrc_env.experiments.tracking_cells import run_cell
+from hrc_env.experiments.tracking_couples import couples, detect_couples, identities
 from hrc_env.experiments.tracking_detections import CONDITIONS, Damage, detect
 from hrc_env.experiments.tracking_dlt import triangulate_frame
+from hrc_env.experiments.tracking_names import DLT
+from hrc_env.experiments.tracking_own import make_own_rig
 from hrc_env.experiments.tracking_rigs import RIGS, make_rig
+from hrc_env.experiments.tracking_sequences import make_sequences
 from hrc_env.experiments.tracking_walks import walk
 from hrc_env.skeleton import JOINT, TORSO
 
@@ -93,7 +97,7 @@ def test_triangulation_without_noise_is_exact_and_holds_what_it_cannot_see():
 
 def test_one_camera_stays_for_four_seconds():
     sequences = make_sequences(make_rig("site"), "one_camera", [5, 6])
-    seeing = np.isfinite(sequences.px[..., 0]).any(-1).sum(-1)
+    seeing = np.isfinite(sequences.px[..., 0, :, 0]).any(-1).sum(-1)
     assert (seeing[:25] == 4).all()
     assert (seeing[25:125] == 1).all()
     assert (seeing[125:] == 4).all()
@@ -105,3 +109,52 @@ def test_hard_sequences_lose_views_as_often_as_documented():
     views = np.isfinite(sequences.px[..., 0]).sum(2)
     share = np.bincount(views.ravel(), minlength=5) / views.size
     np.testing.assert_allclose(share, [0.02, 0.12, 0.13, 0.36, 0.37], atol=0.03)
+
+
+def test_couples_meet_at_an_arms_length_and_hide_each_other():
+    joints = couples([1, 2, 3], 125)
+    root = joints[..., TORSO, :2].mean(-2)
+    apart = np.linalg.norm(root[:, :, 0] - root[:, :, 1], axis=-1)
+    np.testing.assert_allclose(apart.min(0), 0.6, atol=0.1)
+    np.testing.assert_allclose(apart.argmin(0), 75, atol=4)
+    px = detect_couples(LAB.P, joints, [1, 2, 3])
+    seen = np.isfinite(px[..., 0]).mean((1, 2, 3, 4))
+    assert seen[70:80].mean() < seen[:50].mean() - 0.05
+    seen = np.isfinite(px[..., 0]).sum(-1)
+    assert set(np.unique(seen)) <= {0, *range(6, 16)}
+
+
+def test_a_couples_names_are_mixed_and_nothing_else():
+    sequences = make_sequences(LAB, "two_workers", [4, 5])
+    for t in (10, 75):
+        found, own = sequences.keypoints(t).px, sequences.px[t]
+        np.testing.assert_array_equal(np.sort(found, 2), np.sort(own, 2))
+    mixed = [np.array_equal(sequences.keypoints(t).px, sequences.px[t], True) for t in range(20)]
+    assert not all(mixed)
+
+
+def test_changes_of_identity_are_counted():
+    truth = couples([4, 5], 100)
+    kept, swaps = identities(truth, truth[:, :, ::-1])
+    np.testing.assert_array_equal(kept, [[1, 0], [1, 0]])
+    assert (swaps == 0).all()
+    changed = truth.copy()
+    changed[75:, 1] = truth[75:, 1, ::-1]
+    _, swaps = identities(truth, changed)
+    np.testing.assert_array_equal(swaps, [0, 1])
+
+
+def test_the_environments_own_worker_is_recorded_once_for_everybody():
+    rig, seeds = make_own_rig(), [3, 4]
+    four, two, one = (
+        make_sequences(rig, name, seeds) for name in ("four_cameras", "two_cameras", "one_camera")
+    )
+    np.testing.assert_array_equal(four.joints, two.joints)
+    np.testing.assert_array_equal(four.px[:, :, :2], two.px[:, :, :2])
+    assert np.isnan(two.px[:, :, 2:]).all()
+    seeing = np.isfinite(one.px[..., 0, :, 0]).any(-1).sum(-1)
+    assert (seeing[25:125] <= 1).all()
+    assert (seeing[:25] > 1).any()
+    hidden = make_sequences(rig, "occluded", seeds)
+    np.testing.assert_array_equal(four.joints, hidden.joints)
+    assert np.nanmean(hidden.confidence) < np.nanmean(four.confidence)
