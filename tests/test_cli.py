@@ -15,7 +15,7 @@ def hrc(*words: str, **env: str) -> subprocess.CompletedProcess[str]:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("command", ["setup", "demo", "check", "list", "play"])
+@pytest.mark.parametrize("command", ["setup", "demo", "check", "list", "play", "bench"])
 def test_help_explains_every_command(command):
     done = hrc(command, "--help")
     assert done.returncode == 0

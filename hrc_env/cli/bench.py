@@ -1,5 +1,6 @@
 """python -m hrc_env bench tracking: how good, how honest and how fast the estimators are."""
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -30,7 +31,10 @@ class Bench:
     quick: bool = False
     """Fewer sequences: every number, with wider intervals, in less than four minutes."""
     seeds: int | None = None
-    """Sequences per rig and condition, instead of 100 (12 if quick)."""
+    """Sequences per rig and condition, instead of 100 (10 if quick)."""
+    processes: int | None = None
+    """Conditions that are run at once; as many as there are cores if not given. Times are taken
+    alone, at the end."""
     real: bool = False
     """On real footage instead, which is fetched once (51 MB): four calibrated cameras."""
 
@@ -52,7 +56,10 @@ class Bench:
             config = replace(config, n_seeds=self.seeds)
         out = self.out or Path("out/bench_tracking")
         return _show(
-            partial(run, config), out, "tracking.md", "results.json, tracking.md, two plots (PNG)"
+            partial(run, config, processes=self.processes or os.cpu_count() or 1),
+            out,
+            "tracking.md",
+            "results.json, tracking.md, two plots (PNG)",
         )
 
 
