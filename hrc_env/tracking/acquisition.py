@@ -38,16 +38,27 @@ def triangulate_body(P, z, sigma, ok, gate_sigma, radius, points, cov, found):
     Fills points (J, 3), cov (J, 3, 3), found (J,) and returns how many joints were found.
     """
     n_joints, n_cameras = ok.shape
-    use, middle = np.empty(n_cameras, np.bool_), np.empty(3)
-    n_found = 0
+    use = np.empty(n_cameras, np.bool_)
     for j in range(n_joints):
         n_views = consensus_point(P, z[j], sigma[j], ok[j], gate_sigma, points[j], cov[j], use)
+        found[j] = n_views >= 2
+    return keep_one_body(points, cov, found, radius)
+
+
+@numba.njit(**_JIT)
+def keep_one_body(points, cov, found, radius):
+    """Drop points that are too uncertain, or not near the others as a body's are.
+
+    Changes found (J,) and returns how many joints are left.
+    """
+    middle, n_found = np.empty(3), 0
+    for j in range(len(points)):
         widest = max(cov[j, 0, 0], cov[j, 1, 1], cov[j, 2, 2])
-        found[j] = n_views >= 2 and widest < WIDEST_STD_M**2
+        found[j] = found[j] and widest < WIDEST_STD_M**2
         n_found += found[j]
     if n_found == 0 or not middle_of(points, found, middle):
         return 0
-    for j in range(n_joints):
+    for j in range(len(points)):
         if found[j] and not distance(points[j], middle) < radius:
             found[j] = False
             n_found -= 1

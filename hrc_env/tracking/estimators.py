@@ -6,7 +6,8 @@
 | `per_joint` | a Gaussian particle filter per joint on a body motion model |
 | `kalman` | one Gaussian on the kinematic tree: honest with one camera (docs/tracking.md) |
 | `paper` | the paper's Algorithm 1 as printed |
-| `triangulation` | every frame by itself, the last point held through gaps |
+| `triangulation` | every frame by itself, all views by weighted least squares; gaps are held |
+| `ransac` | the same from the views that agree |
 
 A control step is `predict` and then `update`; `estimate` may be asked at any time.
 """
@@ -23,7 +24,7 @@ from hrc_env.tracking.kalman import KalmanEstimator
 from hrc_env.tracking.late import LateEstimator
 from hrc_env.tracking.paper import PaperEstimator
 from hrc_env.tracking.per_joint import PerJointEstimator
-from hrc_env.tracking.triangulating import TriangulationEstimator
+from hrc_env.tracking.triangulating import TriangulationEstimator, ransac, triangulation
 from hrc_env.typing import Floats, Ints
 
 State = TypeVar("State")
@@ -69,7 +70,8 @@ ESTIMATORS: dict[str, Callable[[Floats, float, TrackerConfig], Estimator[Any]]] 
     "per_joint": PerJointEstimator,
     "kalman": KalmanEstimator,
     "paper": PaperEstimator,
-    "triangulation": TriangulationEstimator,
+    "triangulation": triangulation,
+    "ransac": ransac,
 }
 
 

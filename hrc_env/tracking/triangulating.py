@@ -1,31 +1,60 @@
-"""The estimator without memory: triangulate each frame, hold the last point through gaps.
+"""The estimators without memory: triangulate each frame, hold the last point through gaps.
 
-What Algorithm 1 has to beat. A joint moves only when at least two views agree on it.
+What Algorithm 1 has to beat. `triangulation` is weighted least squares from all views (the
+linear solution, refined on the reprojection error), whatever they show; `ransac` takes the
+views that agree, found by trying every pair of cameras, which is RANSAC without luck
+(Fischler and Bolles, Comm. ACM 24, 1981). A joint moves only when two views make a point.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numba
 import numpy as np
 
+from hrc_env.geometry.triangulation import (
+    FURTHEST_PX,
+    Triangulation,
+    triangulate,
+    triangulate_robust,
+)
 from hrc_env.records import Keypoints, PoseEstimate
 from hrc_env.skeleton import N_JOINTS
-from hrc_env.tracking.acquisition import STANDING_M, complete_body, triangulate_body
+from hrc_env.tracking.acquisition import STANDING_M, complete_body, keep_one_body
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.measurements import arrays_of, read_worker
+from hrc_env.tracking.measurements import MIN_SIGMA_PX, arrays_of
 from hrc_env.tracking.tracks import Tracks, forget, grow_older, make_tracks, report
-from hrc_env.typing import Floats, Ints
+from hrc_env.typing import Floats, Ints, Points2
 
+Solve: TypeAlias = Callable[[Floats, Points2, Floats], Triangulation]
+"""From P (C, 3, 4), px (B, C, W, J, 2) and sigma (B, C, W, J) to points."""
 _JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
+
+
+def triangulation(P: Floats, ctrl_dt: float, config: TrackerConfig) -> "TriangulationEstimator":
+    """Weighted least squares from all views."""
+    return TriangulationEstimator(P, ctrl_dt, config, triangulate)
+
+
+def ransac(P: Floats, ctrl_dt: float, config: TrackerConfig) -> "TriangulationEstimator":
+    """Least squares from the views that agree within `gate_sigma`."""
+
+    def solve(P: Floats, px: Points2, sigma_px: Floats) -> Triangulation:
+        return triangulate_robust(P, px, sigma_px, config.gate_sigma)
+
+    return TriangulationEstimator(P, ctrl_dt, config, solve)
 
 
 @dataclass(frozen=True, slots=True)
 class TriangulationEstimator:
-    """Robust triangulation of every frame; see `tracking.estimators.Estimator`."""
+    """Every frame by itself; see `tracking.estimators.Estimator`."""
 
     P: Floats
     ctrl_dt: float
     config: TrackerConfig
+    solve: Solve
+    """How points are made of pixels."""
 
     def init(self, batch: int, n_workers: int) -> Tracks:
         """Workers whom nobody has seen."""
@@ -44,22 +73,21 @@ class TriangulationEstimator:
         grow_older(state, dt_s, config)
 
     def update(self, state: Tracks, keypoints: Keypoints, rngs: list[np.random.Generator]) -> None:
-        """Put every joint on which two views agree where they see it."""
+        """Put every joint where its views see it."""
         del rngs
         config = self.config
         batch, n_workers = state.tracked.shape
         measured = arrays_of(keypoints, (batch, len(self.P), n_workers, N_JOINTS))
+        made = self.solve(self.P, *_believed(*measured, config.sigma_scale))
         _update(
-            self.P,
-            *measured,
+            np.ascontiguousarray(made.points_world),
+            np.ascontiguousarray(made.cov_world),
             state.mean_world,
             state.cov_world,
             state.velocity_world,
             state.age_s,
             state.tracked,
             STANDING_M,
-            config.sigma_scale,
-            config.gate_sigma,
             config.body_radius_m,
             config.acquire_min_joints,
             config.velocity_tau_s,
@@ -68,6 +96,17 @@ class TriangulationEstimator:
     def estimate(self, state: Tracks) -> PoseEstimate:
         """What is believed now."""
         return report(state, self.config)
+
+
+def _believed(
+    px: Points2, confidence: Floats, sigma_px: Floats, scale: float
+) -> tuple[Points2, Floats]:
+    """Pixels and sigma, NaN and infinite where a detector's word is no measurement."""
+    inside = np.all(np.abs(px) < FURTHEST_PX, axis=-1)
+    ok = inside & (confidence > 0) & (confidence <= 1 + 1e-6)
+    ok &= (sigma_px > 0) & (sigma_px < FURTHEST_PX)
+    sigma = np.maximum(np.where(ok, sigma_px * scale, np.inf), MIN_SIGMA_PX)
+    return np.where(ok[..., None], px, np.nan), sigma
 
 
 @numba.njit(**_JIT)
@@ -83,27 +122,23 @@ def _hold(cov, age, tracked, dt, speed):
 
 
 @numba.njit(**_JIT)
-def _update(
-    P, px, confidence, sigma_px, mean, cov, velocity, age, tracked,
-    standing, scale, gate_sigma, radius, min_joints, tau,
-):  # fmt: skip
-    n_batch, n_cameras, n_workers, n_joints = confidence.shape
-    z, sigma = np.empty((n_joints, n_cameras, 2)), np.empty((n_joints, n_cameras))
-    ok, found = np.empty((n_joints, n_cameras), np.bool_), np.empty(n_joints, np.bool_)
-    points, spread = np.empty((n_joints, 3)), np.ones((n_joints, 3, 3))
-    for b in range(n_batch):
-        for w in range(n_workers):
-            if not read_worker(px, confidence, sigma_px, b, w, scale, z, sigma, ok):
-                continue
-            n_found = triangulate_body(P, z, sigma, ok, gate_sigma, radius, points, spread, found)
+def _update(made, spread, mean, cov, velocity, age, tracked, standing, radius, min_joints, tau):
+    """Take in points made (B, W, J, 3) with spread (B, W, J, 3, 3), NaN where there is none."""
+    found = np.empty(made.shape[2], np.bool_)
+    for b in range(made.shape[0]):
+        for w in range(made.shape[1]):
+            points, around = made[b, w], spread[b, w]
+            for j in range(len(found)):
+                found[j] = np.isfinite(points[j, 0])
+            n_found = keep_one_body(points, around, found, radius)
             if tracked[b, w]:
                 _follow(
-                    points, spread, found, tau, mean[b, w], cov[b, w], velocity[b, w], age[b, w]
+                    points, around, found, tau, mean[b, w], cov[b, w], velocity[b, w], age[b, w]
                 )
             elif n_found >= min_joints:
-                complete_body(standing, points, spread, found)
-                mean[b, w], cov[b, w], velocity[b, w] = points, spread, 0.0
-                for j in range(n_joints):
+                complete_body(standing, points, around, found)
+                mean[b, w], cov[b, w], velocity[b, w] = points, around, 0.0
+                for j in range(len(found)):
                     age[b, w, j] = 0.0 if found[j] else age[b, w, j]
                 tracked[b, w] = True
 
