@@ -25,6 +25,8 @@ class Believed:
     """(B,)."""
     action: Floats
     """(B, A) the last action, in [-1, 1]."""
+    ahead: tuple[PoseEstimate, ...] = ()
+    """What is expected of the workers at each of `HRCConfig.horizons_s` from now."""
 
 
 def estimated_gap(robot: RobotState, estimate: PoseEstimate) -> Gap:

@@ -19,6 +19,7 @@ from hrc_env.perception.eyes import EyesConfig
 from hrc_env.rewards import RewardConfig
 from hrc_env.scene.build import SceneConfig
 from hrc_env.tasks.reach import ReachConfig
+from hrc_env.tracking.ahead import check_horizon
 from hrc_env.tracking.association import AssociationConfig
 from hrc_env.tracking.config import TrackerConfig
 
@@ -31,6 +32,9 @@ class HRCConfig:
     """Time between actions [s]; a multiple of `scene.sim_dt`. 0.04 s is 25 Hz."""
     start_spread_rad: tuple[float, ...] = (1.3, 0.15, 0.15, 0.15, 0.15, 0.15)
     """At reset each arm joint is drawn within so much of its home angle [rad]."""
+    horizons_s: tuple[float, ...] = ()
+    """Times ahead at which the observation also holds where the workers' joints are expected,
+    each in (0, 1] [s]; none by default. (0.2, 0.4) adds 120 entries a worker."""
     worker: str = "worker_1"
     """Which baked body the workers have."""
     scene: SceneConfig = field(default_factory=SceneConfig)
@@ -61,6 +65,8 @@ class HRCConfig:
             raise ConfigError(
                 f"start_spread_rad must hold angles >= 0, one a joint, got {self.start_spread_rad}."
             )
+        for horizon_s in self.horizons_s:
+            check_horizon(horizon_s)
         substeps = self.ctrl_dt / self.scene.sim_dt
         if substeps < 0.5 or abs(substeps - round(substeps)) > 1e-6:
             near = max(round(substeps), 1) * self.scene.sim_dt

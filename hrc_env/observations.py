@@ -19,12 +19,23 @@ FAR_GAP_M = 1.0
 
 
 @dataclass(frozen=True, slots=True)
+class Sizes:
+    """What the lengths of terms depend on."""
+
+    arm_joints: int
+    actions: int
+    workers: int
+    horizons: int = 0
+    """How many times ahead were asked for."""
+
+
+@dataclass(frozen=True, slots=True)
 class ObservationTerm:
     """One block of the flat observation: value = clip(function, -bound, bound) / scale."""
 
     name: str
-    size: Callable[[int, int, int], int]
-    """Number of entries for (N arm joints, A actions, W workers)."""
+    size: Callable[[Sizes], int]
+    """Number of entries."""
     unit: str
     frame: str
     bound: float
@@ -56,81 +67,108 @@ def _near(now: Believed) -> Bools:
     return now.gap.distance_m < FAR_GAP_M
 
 
+def _joints_ahead(now: Believed) -> Floats:
+    """(B, W, H, J, 3) from the tool point now."""
+    if not now.ahead:
+        return np.empty((*now.estimate.tracked.shape, 0))
+    joints = np.stack([later.mean_world for later in now.ahead], axis=2)
+    return joints - now.robot.tool_world[:, None, None, None]
+
+
+def _std_ahead(now: Believed) -> Floats:
+    """(B, W, H, J)."""
+    if not now.ahead:
+        return np.empty((*now.estimate.tracked.shape, 0))
+    return np.stack([standard_deviation_m(later) for later in now.ahead], axis=2)
+
+
 TERMS: tuple[ObservationTerm, ...] = (
     ObservationTerm(
-        "joint_angle_sin", lambda n, a, w: n, "-", "base", 1.0, 1.0,
+        "joint_angle_sin", lambda of: of.arm_joints, "-", "base", 1.0, 1.0,
         "Sine of each arm joint's angle.",
         lambda now: np.sin(now.robot.q),
     ),
     ObservationTerm(
-        "joint_angle_cos", lambda n, a, w: n, "-", "base", 1.0, 1.0,
+        "joint_angle_cos", lambda of: of.arm_joints, "-", "base", 1.0, 1.0,
         "Cosine of each arm joint's angle.",
         lambda now: np.cos(now.robot.q),
     ),
     ObservationTerm(
-        "joint_velocity", lambda n, a, w: n, "rad/s", "base", 4.0, 1.0,
+        "joint_velocity", lambda of: of.arm_joints, "rad/s", "base", 4.0, 1.0,
         "Velocity of each arm joint.",
         lambda now: now.robot.qd,
     ),
     ObservationTerm(
-        "tool_position", lambda n, a, w: 3, "m", "world", 4.0, 1.0,
+        "tool_position", lambda of: 3, "m", "world", 4.0, 1.0,
         "Position of the tool point.",
         lambda now: now.robot.tool_world,
     ),
     ObservationTerm(
-        "goal_from_tool", lambda n, a, w: 3, "m", "world", 3.0, 0.5,
+        "goal_from_tool", lambda of: 3, "m", "world", 3.0, 0.5,
         "From the tool point to the goal.",
         lambda now: now.goal_world - now.robot.tool_world,
     ),
     ObservationTerm(
-        "goal_direction", lambda n, a, w: 3, "-", "world", 1.0, 1.0,
+        "goal_direction", lambda of: 3, "-", "world", 1.0, 1.0,
         "The same, divided by its length plus 5 cm.",
         _goal_direction,
     ),
     ObservationTerm(
-        "goal_time_left", lambda n, a, w: 1, "s", "-", 10.0, 4.0,
+        "goal_time_left", lambda of: 1, "s", "-", 10.0, 4.0,
         "Time until the goal is missed.",
         lambda now: now.goal_time_left_s,
     ),
     ObservationTerm(
-        "last_action", lambda n, a, w: a, "-", "-", 1.0, 1.0,
+        "last_action", lambda of: of.actions, "-", "-", 1.0, 1.0,
         "The action of the previous step.",
         lambda now: now.action,
     ),
     ObservationTerm(
-        "worker_joints_from_tool", lambda n, a, w: w * N_JOINTS * 3, "m", "world", 6.0, 1.0,
+        "worker_joints_from_tool", lambda of: of.workers * N_JOINTS * 3, "m", "world", 6.0, 1.0,
         "From the tool point to each estimated joint of each worker.",
         lambda now: now.estimate.mean_world - now.robot.tool_world[:, None, None],
     ),
     ObservationTerm(
-        "worker_joints_std", lambda n, a, w: w * N_JOINTS, "m", "world", 1.0, 0.25,
+        "worker_joints_std", lambda of: of.workers * N_JOINTS, "m", "world", 1.0, 0.25,
         "Standard deviation of each estimated joint (root mean over the axes).",
         lambda now: standard_deviation_m(now.estimate),
     ),
     ObservationTerm(
-        "worker_joints_age", lambda n, a, w: w * N_JOINTS, "s", "-", 2.0, 1.0,
+        "worker_joints_age", lambda of: of.workers * N_JOINTS, "s", "-", 2.0, 1.0,
         "Time since a measurement last supported each joint.",
         lambda now: now.estimate.age_s,
     ),
     ObservationTerm(
-        "worker_joints_velocity", lambda n, a, w: w * N_JOINTS * 3, "m/s", "world", 4.0, 2.0,
+        "worker_joints_velocity", lambda of: of.workers * N_JOINTS * 3, "m/s", "world", 4.0, 2.0,
         "Estimated velocity of each joint.",
         lambda now: now.estimate.velocity_world,
     ),
     ObservationTerm(
-        "worker_tracked", lambda n, a, w: w, "-", "-", 1.0, 1.0,
+        "worker_tracked", lambda of: of.workers, "-", "-", 1.0, 1.0,
         "1 while there is a track of the worker, 0 where the estimate is the prior or lost.",
         lambda now: now.estimate.tracked.astype(float),
     ),
     ObservationTerm(
-        "worker_gap", lambda n, a, w: w, "m", "-", FAR_GAP_M, 0.5,
+        "worker_gap", lambda of: of.workers, "m", "-", FAR_GAP_M, 0.5,
         "Distance between the robot's surface and the estimated body's, at most 1 m.",
         lambda now: np.minimum(now.gap.distance_m, FAR_GAP_M),
     ),
     ObservationTerm(
-        "worker_direction", lambda n, a, w: w * 3, "-", "world", 1.0, 1.0,
+        "worker_direction", lambda of: of.workers * 3, "-", "world", 1.0, 1.0,
         "Unit vector from the robot to the estimated body where they are nearest; 0 if far.",
         _nearest_direction,
+    ),
+    ObservationTerm(
+        "worker_joints_ahead", lambda of: of.workers * of.horizons * N_JOINTS * 3,
+        "m", "world", 6.0, 1.0,
+        "From the tool point now to where each joint will be, for each of `horizons_s`.",
+        _joints_ahead,
+    ),
+    ObservationTerm(
+        "worker_joints_ahead_std", lambda of: of.workers * of.horizons * N_JOINTS,
+        "m", "world", 1.0, 0.25,
+        "Standard deviation of each of these (root mean over the axes).",
+        _std_ahead,
     ),
 )  # fmt: skip
 
@@ -146,12 +184,12 @@ class ObservationLayout:
     """(n,) what one unit of each entry stands for, in the term's unit."""
 
 
-def layout(n_arm_joints: int, n_actions: int, n_workers: int) -> ObservationLayout:
-    """The layout for an arm, an action space and a number of workers."""
+def layout(of: Sizes) -> ObservationLayout:
+    """The layout for an arm, an action space, a number of workers and of times ahead."""
     slices: dict[str, slice] = {}
     high, scale, start = [], [], 0
     for term in TERMS:
-        size = term.size(n_arm_joints, n_actions, n_workers)
+        size = term.size(of)
         slices[term.name] = slice(start, start + size)
         high.append(np.full(size, term.bound / term.scale))
         scale.append(np.full(size, term.scale))

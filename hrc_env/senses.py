@@ -29,7 +29,9 @@ from hrc_env.scene.physics import Physics
 from hrc_env.scene.render import CropRenderer
 from hrc_env.skeleton import N_JOINTS
 from hrc_env.tracking import given
+from hrc_env.tracking.ahead import ahead
 from hrc_env.tracking.association import associate
+from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import Estimator, make_estimator
 from hrc_env.typing import Ints, JointAngles
 
@@ -65,6 +67,10 @@ class Senses(Protocol):
         """Look at `now` and say what is believed of it, in its rows."""
         ...
 
+    def ahead(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
+        """What is expected in `horizon_s` of rows `ids`, of which `sense` has just said `now`."""
+        ...
+
     def looks(self, b: int) -> tuple[Keypoints | None, Windows]:
         """What environment `b` saw last, and through which windows (for pictures)."""
         ...
@@ -90,7 +96,7 @@ def make_senses(
     P = projections(scene.cameras)
     tracker = make_estimator(estimator, P, config.ctrl_dt, config.tracker)
     if level == "truth":
-        return GivenSenses(scene.n_workers)
+        return GivenSenses(config.tracker)
     if level == "none":
         return BlindSenses(given.prior(batch, scene.n_workers, config.tracker))
     if level == "keypoints":
@@ -101,8 +107,8 @@ def make_senses(
 class GivenSenses:
     """Level `truth`: the worker as they are."""
 
-    def __init__(self, n_workers: int) -> None:
-        self.n_workers = n_workers
+    def __init__(self, config: TrackerConfig) -> None:
+        self.config = config
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
         """Nothing to forget."""
@@ -110,6 +116,10 @@ class GivenSenses:
     def sense(self, now: Moment, sensor_rngs: Generators, tracker_rngs: Generators) -> PoseEstimate:
         """The truth, as an estimate."""
         return given.estimate_from_truth(now.truth)
+
+    def ahead(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
+        """Where a body that moves so goes: nobody is given the future."""
+        return ahead(now, horizon_s, self.config)
 
     def looks(self, b: int) -> tuple[Keypoints | None, Windows]:
         """No camera took part."""
@@ -131,6 +141,10 @@ class BlindSenses:
     def sense(self, now: Moment, sensor_rngs: Generators, tracker_rngs: Generators) -> PoseEstimate:
         """The prior."""
         return rows(self.prior, now.ids)
+
+    def ahead(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
+        """The prior, then as now."""
+        return rows(self.prior, ids)
 
     def looks(self, b: int) -> tuple[Keypoints | None, Windows]:
         """No camera took part."""
@@ -169,6 +183,11 @@ class TrackingSenses:
             write_rows(self.keypoints, now.ids, keypoints)
             write_rows(self.state, now.ids, state)
         return self.tracker.estimate(state)
+
+    def ahead(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
+        """What the estimator expects."""
+        whole = len(ids) == len(self.keypoints.px)
+        return self.tracker.ahead(self.state if whole else rows(self.state, ids), horizon_s)
 
     def detect(self, now: Moment, predicted: Any, sensor_rngs: Generators) -> Keypoints:
         """Keypoints of this moment, by whatever eyes the level has; whose they are is open.

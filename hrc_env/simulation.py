@@ -89,7 +89,11 @@ class Simulation:
         spread = config.start_spread_rad
         check_shape("start_spread_rad", (len(spread),), (self.chain.n_joints,), "one a joint")
         self.n_actions = n_actions(control, self.chain)
-        self.layout = observations.layout(len(self.scene.home_q), self.n_actions, n_workers)
+        self.layout = observations.layout(
+            observations.Sizes(
+                len(self.scene.home_q), self.n_actions, n_workers, len(config.horizons_s)
+            )
+        )
         self.physics = Physics(self.scene, batch, n_threads)
         self.senses = make_senses(perception, estimator, self.scene, self.physics, config)
         self.motion = generator.make_state(batch, n_workers, self.body, config.motion)
@@ -98,6 +102,7 @@ class Simulation:
         self.action = np.zeros((batch, self.n_actions))
         self.episode_cost = np.zeros(batch)
         self.estimate = given.prior(batch, n_workers, config.tracker)
+        self.ahead = tuple(given.prior(batch, n_workers, config.tracker) for _ in config.horizons_s)
         robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
         self.believed = self._believed(robot)
         blank = [np.random.default_rng(0)] * batch
@@ -186,10 +191,14 @@ class Simulation:
         estimate = self.senses.sense(
             moment, picked(streams.sensor, ids), picked(streams.tracker, ids)
         )
+        ahead = tuple(
+            self.senses.ahead(estimate, ids, horizon_s) for horizon_s in self.config.horizons_s
+        )
         if np.array_equal(ids, self._everyone):
-            self.estimate = estimate
+            self.estimate, self.ahead = estimate, ahead
         else:
-            write_rows(self.estimate, ids, estimate)
+            for whole, part in zip((self.estimate, *self.ahead), (estimate, *ahead), strict=True):
+                write_rows(whole, ids, part)
         return estimate
 
     def _believed(self, robot: RobotState) -> Believed:
@@ -200,6 +209,7 @@ class Simulation:
             goal_world=self.task.goal_world.copy(),
             goal_time_left_s=self.config.task.time_limit_s - self.task.goal_age_s,
             action=self.action,
+            ahead=self.ahead,
         )
 
     def _tally(self) -> Info:

@@ -64,6 +64,14 @@ class Estimator(Protocol[State]):
         """What is believed now, in arrays of its own."""
         ...
 
+    def ahead(self, state: State, horizon_s: float) -> PoseEstimate:
+        """What is expected in `horizon_s`, in (0, 1] [s], if nobody looks; the state stays.
+
+        Raises:
+            ConfigError: a horizon that is none.
+        """
+        ...
+
 
 ESTIMATORS: dict[str, Callable[[Floats, float, TrackerConfig], Estimator[Any]]] = {
     "particle": PerJointEstimator,

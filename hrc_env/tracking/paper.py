@@ -29,6 +29,7 @@ from hrc_env.tracking.acquisition import (
     middle_of,
     triangulate_body,
 )
+from hrc_env.tracking.ahead import ahead
 from hrc_env.tracking.clouds import moments, roll, scatter
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.likelihoods import add_log_likelihood, normalise
@@ -106,6 +107,10 @@ class PaperEstimator:
     def estimate(self, state: PaperState) -> PoseEstimate:
         """Line 19: what is believed now."""
         return report(state.tracks, self.config)
+
+    def ahead(self, state: PaperState, horizon_s: float) -> PoseEstimate:
+        """What is expected in `horizon_s`; see `tracking.ahead`."""
+        return ahead(self.estimate(state), horizon_s, self.config)
 
     def _initialize(
         self, state: PaperState, b: int, w: int, measured: Measured, rng: np.random.Generator

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from hrc_env.records import Keypoints, PoseEstimate
 from hrc_env.skeleton import N_JOINTS
 from hrc_env.tracking.acquisition import STANDING_M
+from hrc_env.tracking.ahead import ahead
 from hrc_env.tracking.bones import population
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.gaussian_filter import predict_all, update_all
@@ -131,6 +132,10 @@ class PerJointEstimator:
     def estimate(self, state: PerJointState) -> PoseEstimate:
         """What is believed now."""
         return report(gaussian_tracks(state), self.config)
+
+    def ahead(self, state: PerJointState, horizon_s: float) -> PoseEstimate:
+        """What is expected in `horizon_s`; see `tracking.ahead`."""
+        return ahead(self.estimate(state), horizon_s, self.config)
 
     def _forget(self, state: PerJointState, ids: Ints) -> None:
         length, variance = population(())

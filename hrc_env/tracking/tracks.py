@@ -135,12 +135,19 @@ def _grow_older(
             tracked[b, w] = False
             for j in range(mean.shape[2]):
                 conflict[b, w, j] = 0
-                for i in range(3):
-                    mean[b, w, j, i] = home[i] + keep * (mean[b, w, j, i] - home[i])
-                    velocity[b, w, j, i] *= keep
-                    for k in range(3):
-                        cov[b, w, j, i, k] *= keep * keep
-                    cov[b, w, j, i, i] += (1.0 - keep * keep) * std * std
+            relax(mean[b, w], cov[b, w], velocity[b, w], keep, home, std)
+
+
+@numba.njit(**_JIT)
+def relax(mean, cov, velocity, keep, home, std):
+    """A body (J, ...) that nobody follows keeps a share of what was known; the rest is prior."""
+    for j in range(len(mean)):
+        for i in range(3):
+            mean[j, i] = home[i] + keep * (mean[j, i] - home[i])
+            velocity[j, i] *= keep
+            for k in range(3):
+                cov[j, i, k] *= keep * keep
+            cov[j, i, i] += (1.0 - keep * keep) * std * std
 
 
 def report(tracks: Tracks, config: TrackerConfig) -> PoseEstimate:

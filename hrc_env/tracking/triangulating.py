@@ -22,6 +22,7 @@ from hrc_env.geometry.triangulation import (
 from hrc_env.records import Keypoints, PoseEstimate
 from hrc_env.skeleton import N_JOINTS
 from hrc_env.tracking.acquisition import STANDING_M, complete_body, keep_one_body
+from hrc_env.tracking.ahead import ahead
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.measurements import MIN_SIGMA_PX, arrays_of
 from hrc_env.tracking.tracks import Tracks, forget, grow_older, make_tracks, report
@@ -96,6 +97,10 @@ class TriangulationEstimator:
     def estimate(self, state: Tracks) -> PoseEstimate:
         """What is believed now."""
         return report(state, self.config)
+
+    def ahead(self, state: Tracks, horizon_s: float) -> PoseEstimate:
+        """What is expected in `horizon_s`; see `tracking.ahead`."""
+        return ahead(self.estimate(state), horizon_s, self.config)
 
 
 def _believed(

@@ -1,0 +1,102 @@
+"""The default estimator: particles that are hypotheses, each with a Gaussian of its own.
+
+Given the discrete facts (is the body, or a limb, mirrored in depth; does a camera exchange
+left and right) a whole body is well described by one Gaussian on the kinematic tree (`kalman`).
+What is left is discrete, and one Gaussian cannot hold it. This is a Rao-Blackwellised particle
+filter (Doucet, de Freitas, Murphy and Russell, UAI 2000): the particles are the discrete facts,
+the rest is integrated exactly. One particle suffices while the views agree; where one view is
+left, other modes are searched for, weighted by Laplace's evidence, merged and dropped, until
+the views decide (docs/tracking.md).
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from hrc_env.records import Keypoints, PoseEstimate
+from hrc_env.skeleton import N_JOINTS
+from hrc_env.tracking.acquisition import STANDING_M
+from hrc_env.tracking.ahead import mixed
+from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.hypotheses import Hypotheses
+from hrc_env.tracking.hypothesis_filter import predict_all, update_all
+from hrc_env.tracking.kalman import KalmanEstimator, KalmanState, motion, widen
+from hrc_env.tracking.measurements import arrays_of
+from hrc_env.tracking.mixture import MixtureSettings, mix, mixture_settings
+from hrc_env.tracking.tracks import gaussian_tracks, grow_older, report
+from hrc_env.typing import Floats, Ints
+
+
+@dataclass(frozen=True, slots=True)
+class ParticleEstimator:
+    """Rao-Blackwellised particle filter; see `tracking.estimators.Estimator`."""
+
+    P: Floats
+    ctrl_dt: float
+    config: TrackerConfig
+    single: KalmanEstimator = field(init=False, repr=False)
+    """The filter of one hypothesis."""
+    mixture: MixtureSettings = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Make what the kernels take, constants."""
+        single = KalmanEstimator(self.P, self.ctrl_dt, self.config)
+        object.__setattr__(self, "single", single)
+        object.__setattr__(self, "mixture", mixture_settings(self.config))
+
+    def init(self, batch: int, n_workers: int) -> Hypotheses:
+        """Workers whom nobody has seen."""
+        n_slots = n_workers * self.config.n_hypotheses
+        return Hypotheses(
+            slots=self.single.init(batch, n_slots),
+            log_weight=np.zeros((batch, n_slots)),
+            n_alive=np.ones((batch, n_workers), np.int64),
+            waited=np.zeros((batch, n_workers), np.int64),
+        )
+
+    def reset(self, state: Hypotheses, ids: Ints, rngs: list[np.random.Generator]) -> None:
+        """Forget environments `ids`; draws nothing."""
+        self.single.reset(state.slots, ids, rngs)
+        state.log_weight[ids], state.n_alive[ids], state.waited[ids] = 0.0, 1, 0
+
+    def predict(self, state: Hypotheses, dt_s: float, rngs: list[np.random.Generator]) -> None:
+        """Move every hypothesis by its motion model; draws nothing."""
+        del rngs
+        model = motion(dt_s, self.config.damping, self.config.root_acceleration)
+        predict_all(state, model, dt_s, self.mixture)
+        grow_older(gaussian_tracks(heaviest(state)), dt_s, self.config)
+
+    def update(
+        self, state: Hypotheses, keypoints: Keypoints, rngs: list[np.random.Generator]
+    ) -> None:
+        """Take one set of frames in; draws nothing."""
+        del rngs
+        batch, n_workers = state.n_alive.shape
+        shape = (batch, len(self.P), n_workers, N_JOINTS)
+        measured = (self.P, *arrays_of(keypoints, shape))
+        constants = (STANDING_M, self.single.settings, self.mixture, self.single.noise)
+        update_all(state, *measured, *constants)
+
+    def estimate(self, state: Hypotheses) -> PoseEstimate:
+        """Mean and covariance of the mixture; ages are the heaviest hypothesis's."""
+        best = heaviest(state)
+        mean = np.empty(best.body.shape)
+        cov = np.empty((*best.age_s.shape, 3, 3))
+        mix(state.slots, state.n_alive, state.log_weight, mean, cov)
+        widen(cov, best.carried, best.tracked, self.config.one_view_inflation, cov)
+        tracks = gaussian_tracks(best)
+        return report(
+            replace(tracks, mean_world=mean[..., :3], velocity_world=mean[..., 3:], cov_world=cov),
+            self.config,
+        )
+
+    def ahead(self, state: Hypotheses, horizon_s: float) -> PoseEstimate:
+        """What is expected in `horizon_s`: each hypothesis's future, mixed; see `tracking.ahead`."""
+        later = self.single.ahead(state.slots, horizon_s)
+        return mixed(later, state.log_weight, state.n_alive)
+
+
+def heaviest(state: Hypotheses) -> KalmanState:
+    """The heaviest hypothesis of each worker, as views (B, W, ...) into the slots."""
+    limit = state.log_weight.shape[1] // state.n_alive.shape[1]
+    return KalmanState(*(array[:, ::limit] for array in state.slots))
