@@ -1,6 +1,7 @@
 """One cell of the tracking bench: an estimator on the sequences of a rig and a condition."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,7 @@ import numpy as np
 from hrc_env.experiments.tracking_couples import identities
 from hrc_env.experiments.tracking_dlt import triangulate_frame
 from hrc_env.experiments.tracking_full_state import filter_matched
-from hrc_env.experiments.tracking_names import DLT, FULL_STATE
+from hrc_env.experiments.tracking_names import DEFAULT, DLT, FULL_STATE, UNBUFFERED
 from hrc_env.experiments.tracking_rigs import DT_S, SIGMA_PX, Rig
 from hrc_env.experiments.tracking_sequences import Sequences
 from hrc_env.experiments.tracking_tally import tally
@@ -49,6 +50,11 @@ def _estimated(
 ) -> Iterator[tuple[Points3, Covariances3]]:
     """An estimator as an environment runs it: with several people, poses are given to tracks."""
     n_sequences, n_people = sequences.joints.shape[1:3]
+    if name == UNBUFFERED:  # frames are taken as of the moment at which they arrive
+        name = DEFAULT
+        sequences = replace(
+            sequences, time_s=None, config=replace(sequences.config, longest_delay_s=0.0)
+        )
     estimator = make_estimator(name, rig.P, DT_S, sequences.config)
     rngs = [np.random.default_rng([seed, 4]) for seed in seeds]
     state = estimator.init(n_sequences, n_people)

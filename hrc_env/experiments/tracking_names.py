@@ -2,7 +2,13 @@
 
 from hrc_env.experiments.tracking_own import OWN, OWN_CONDITIONS
 from hrc_env.experiments.tracking_rigs import RIGS
-from hrc_env.experiments.tracking_sequences import BOUNDED, OWN_WINDOWS, SIMULATED, WINDOWS
+from hrc_env.experiments.tracking_sequences import (
+    BOUNDED,
+    LATE,
+    OWN_WINDOWS,
+    SIMULATED,
+    WINDOWS,
+)
 from hrc_env.tracking.estimators import ESTIMATORS
 
 DEFAULT = "particle"
@@ -11,6 +17,8 @@ DLT = "dlt"
 """Plain per-frame triangulation; where cameras do not know names, it is told them."""
 FULL_STATE = "full_state"
 """The filter that knows the matched sequences' model; runs on these only."""
+UNBUFFERED = f"{DEFAULT}_unbuffered"
+"""The default without a memory for late frames; runs on these only."""
 RIVALS = (*(name for name in ESTIMATORS if name != DEFAULT), DLT)
 """Who else there is, of those that know no more than the frames so far."""
 
@@ -27,8 +35,8 @@ def windows_of(rig: str, condition: str) -> tuple[str, ...]:
 
 def names_of(rig: str, condition: str) -> list[str]:
     """Who runs on a rig and a condition, the default first."""
-    known = [FULL_STATE] if condition in BOUNDED and rig != OWN else []
-    return [DEFAULT, *RIVALS, *known]
+    special = {LATE: [UNBUFFERED], **{name: [FULL_STATE] for name in BOUNDED}}
+    return [DEFAULT, *RIVALS, *special.get(condition, [])]
 
 
 def cells() -> list[tuple[str, str, str]]:

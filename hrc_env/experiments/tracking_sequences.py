@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hrc_env.experiments.tracking_arrivals import LONGEST_DELAY_S, delivered
 from hrc_env.experiments.tracking_bound import posterior_bound
 from hrc_env.experiments.tracking_couples import couples, detect_couples, shuffles
 from hrc_env.experiments.tracking_detections import CONDITIONS, Damage, detect
@@ -16,8 +17,9 @@ from hrc_env.skeleton import BONES
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.typing import Floats, Ints, Points2, Points3
 
-MATCHED, MATCHED_BONES, TWO_WORKERS = "matched", "matched_bones", "two_workers"
-SIMULATED = (*CONDITIONS, TWO_WORKERS)
+MATCHED, MATCHED_BONES = "matched", "matched_bones"
+TWO_WORKERS, LATE = "two_workers", "late"
+SIMULATED = (*CONDITIONS, LATE, TWO_WORKERS)
 """Conditions of the rigs lab and site, beside those that have a bound."""
 BOUNDED = (MATCHED, MATCHED_BONES)
 """Conditions for which the least mean squared error is known."""
@@ -25,7 +27,7 @@ MATCHED_ROOT_ACCELERATION = 0.05
 """Of the matched sequences and of the estimators on them, so that they stay in view [m^2/s^3]."""
 N_FRAMES = {
     **dict.fromkeys(("clean", "occluded", "hard"), 500),
-    "one_camera": 175, TWO_WORKERS: 125, MATCHED: 40, MATCHED_BONES: 40,
+    "one_camera": 175, LATE: 175, TWO_WORKERS: 125, MATCHED: 40, MATCHED_BONES: 40,
 }  # fmt: skip
 _ALONE = {
     "one_camera_half_second": (25, 38),
@@ -36,6 +38,7 @@ _ALONE = {
 WINDOWS: dict[str, dict[str, tuple[int, int]]] = {
     **{name: {name: (25, 500)} for name in ("clean", "occluded", "hard")},
     "one_camera": {**_ALONE, "after_return": (150, 175)},
+    LATE: {LATE: (25, 175)},
     TWO_WORKERS: {TWO_WORKERS: (25, 125)},
     MATCHED: {MATCHED: (15, 40)},
     MATCHED_BONES: {MATCHED_BONES: (15, 40)},
@@ -67,6 +70,9 @@ class Sequences:
     order: Ints | None = None
     """(T, S, C, W) in which order cameras report people, whose names they do not know; None:
     there is one."""
+    time_s: Floats | None = None
+    """(T, S, C) when the frame was taken that each camera delivers [s], as in `Keypoints`; None:
+    all are of now."""
     model: MatchedModel | None = None
     """What the sequences were drawn from, if an estimator can know it."""
     bound_m2: Floats | None = None
@@ -90,7 +96,8 @@ class Sequences:
             confidence = np.take_along_axis(confidence, order, 2)
             sigma_px = np.take_along_axis(sigma_px, order, 2)
             px = np.take_along_axis(px, order[..., None], 2)
-        return Keypoints(px, confidence, sigma_px)
+        time_s = None if self.time_s is None else self.time_s[t, :n]
+        return Keypoints(px, confidence, sigma_px, time_s)
 
 
 def make_sequences(rig: Rig, condition: str, seeds: list[int]) -> Sequences:
@@ -108,6 +115,10 @@ def make_sequences(rig: Rig, condition: str, seeds: list[int]) -> Sequences:
         order = shuffles(seeds, n_frames, len(rig.P), joints.shape[2])
         return Sequences(joints, px, windows, rig.tracker, order=order)
     joints = walk(rig.walk_m, seeds, n_frames)
+    if condition == LATE:
+        px, time_s = delivered(detect(rig.P, joints, Damage(), seeds), seeds)
+        config = replace(rig.tracker, longest_delay_s=LONGEST_DELAY_S)
+        return Sequences(joints[:, :, None], px[:, :, :, None], windows, config, time_s=time_s)
     px = detect(rig.P, joints, CONDITIONS[condition], seeds)
     return Sequences(joints[:, :, None], px[:, :, :, None], windows, rig.tracker)
 

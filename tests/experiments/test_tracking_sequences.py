@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from hrc_env.experiments.tracking_arrivals import delivered
 from hrc_env.experiments.tracking_cells import run_cell
 from hrc_env.experiments.tracking_couples import couples, detect_couples, identities
 from hrc_env.experiments.tracking_detections import CONDITIONS, Damage, detect
@@ -158,3 +159,18 @@ def test_the_environments_own_worker_is_recorded_once_for_everybody():
     hidden = make_sequences(rig, "occluded", seeds)
     np.testing.assert_array_equal(four.joints, hidden.joints)
     assert np.nanmean(hidden.confidence) < np.nanmean(four.confidence)
+
+
+def test_late_frames_are_those_that_were_taken_and_say_when():
+    joints = walk(LAB.walk_m, [5], 100)
+    px = detect(LAB.P, joints, Damage(), [5])
+    late, time_s = delivered(px, [5])
+    t, _, c = np.nonzero(np.isfinite(time_s))
+    taken = np.rint(time_s[t, 0, c] / 0.04).astype(int) - 1
+    np.testing.assert_array_equal(late[t, 0, c], px[taken, 0, c])
+    assert np.isnan(late[np.isnan(time_s)]).all()
+    delay_s = 0.04 * (t - taken)
+    assert 0.04 < delay_s.min() < delay_s.max() < 0.27
+    rate = np.isfinite(time_s[:, 0]).mean(0)
+    assert rate.argmin() == 5 % 4
+    assert rate.min() < 0.55 < 0.8 < np.sort(rate)[1]
