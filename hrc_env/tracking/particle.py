@@ -91,7 +91,7 @@ class ParticleEstimator:
         )
 
     def ahead(self, state: Hypotheses, horizon_s: float) -> PoseEstimate:
-        """What is expected in `horizon_s`: each hypothesis's future, mixed; see `tracking.ahead`."""
+        """What is expected in `horizon_s`: every hypothesis's future, mixed."""
         later = self.single.ahead(state.slots, horizon_s)
         return mixed(later, state.log_weight, state.n_alive)
 
