@@ -152,6 +152,11 @@ class TrackerConfig:
             raise ConfigError(f"longest_delay_s must be in [0, 1], got {self.longest_delay_s}.")
         if self.paper_resampling not in _SCHEMES:
             raise unknown("paper_resampling", self.paper_resampling, _SCHEMES)
+        if self.paper_particles < 10:
+            raise ConfigError(
+                f"paper_particles must be at least 10, got {self.paper_particles}: after a "
+                "resampling fewer have no covariance."
+            )
         if self.paper_sigma_m < 0:
             raise ConfigError(f"paper_sigma_m must not be negative, got {self.paper_sigma_m}.")
         if self.mean_correction < 0:
