@@ -12,6 +12,8 @@ from rich.console import Console
 from rich.markdown import Markdown
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from hrc_env.errors import ConfigError
+
 Say = Callable[[float, str], None]
 """Told by how much the share that is done grew, and what is being done."""
 
@@ -27,7 +29,7 @@ class Bench:
     """Which bench."""
     out: Path | None = None
     """Folder for results.json, tables, pictures and the parts that are done; one for each of
-    the three parts of the bench. Default: out/bench_tracking, or the same with _real."""
+    the three parts of the bench. Default: out/bench_tracking, the same with _real or _peers."""
     quick: bool = False
     """Fewer sequences: every number, with wider intervals, in less than four minutes."""
     seeds: int | None = None
@@ -38,8 +40,24 @@ class Bench:
     real: bool = False
     """On real footage instead, which is fetched once (51 MB): four calibrated cameras."""
 
+    peers: bool = False
+    """Other people's code instead, on the same sequences (5 per rig and condition, 1 if quick),
+    as far as it is installed."""
+
     def run(self) -> int:
         """Run, show the table."""
+        if self.real and self.peers:
+            raise ConfigError("--real and --peers are two parts of the bench; choose one.")
+        if self.peers:
+            from hrc_env.experiments import tracking_peers_bench as peers
+
+            n_seeds = self.seeds if self.seeds is not None else 1 if self.quick else 5
+            return _show(
+                partial(peers.run, peers.PeersConfig(n_seeds=n_seeds)),
+                self.out or Path("out/bench_tracking_peers"),
+                "peers.md",
+                "results.json, peers.md",
+            )
         if self.real:
             from hrc_env.experiments import footage_bench
 

@@ -63,7 +63,7 @@ def compose(frames: list[Image], cameras: list[PinholeCamera], track: Track, t: 
     tiles = []
     for frame, camera in zip(frames, cameras, strict=True):
         small = pictures.shrink(frame, *TILE).copy()
-        pictures.draw_estimate(small, camera, _estimate(track, t), thickness=3)
+        pictures.draw_estimate(small, camera, _estimate(track, t), thickness=2)
         pictures.label(small, camera.name, (10, 10), 20)
         tiles.append(small)
     views = pictures.tile(tiles, len(tiles))
@@ -72,7 +72,7 @@ def compose(frames: list[Image], cameras: list[PinholeCamera], track: Track, t: 
     sheet[HEAD:] = views[:, : sheet.shape[1]]
     pictures.write(
         sheet,
-        "blue: the man's left, orange: his right; green: where a joint may be (2 sigma)",
+        "blue: the left side, orange: the right; green: where a joint may be (2 sigma)",
         (14, 16),
         24,
     )
