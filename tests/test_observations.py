@@ -1,0 +1,83 @@
+"""What the robot sees of the future, if it is asked for."""
+
+import gymnasium
+import numpy as np
+import pytest
+
+import hrc_env  # noqa: F401  registers the ids
+from hrc_env.env import HRCReachEnv
+from hrc_env.observations import Sizes, layout
+from hrc_env.sb3 import HRCVecEnv
+from hrc_env.skeleton import N_JOINTS
+
+ASKED = {"horizons_s": (0.2, 0.6)}
+ADDED = ("worker_joints_ahead", "worker_joints_ahead_std")
+
+
+def rolled(env, n_steps=15):
+    observation, _ = env.reset(seed=4)
+    seen, rng = [observation], np.random.default_rng(1)
+    for _ in range(n_steps):
+        seen.append(env.step(rng.uniform(-1, 1, 6).astype(np.float32))[0])
+    return seen
+
+
+def test_horizons_add_their_terms_and_no_others():
+    plain, more = layout(Sizes(6, 6, 2)), layout(Sizes(6, 6, 2, horizons=2))
+    assert len(more.low) - len(plain.low) == 2 * 2 * N_JOINTS * (3 + 1)
+    for name, part in plain.slices.items():
+        assert name in ADDED or more.slices[name] == part
+    assert more.slices[ADDED[1]].stop == len(more.low)
+
+
+@pytest.mark.parametrize("level", ["keypoints", "truth", "none"])
+def test_asking_changes_nothing_else(level):
+    plain, more = HRCReachEnv(perception=level), HRCReachEnv(perception=level, config=ASKED)
+    for before, after in zip(rolled(plain), rolled(more), strict=True):
+        np.testing.assert_array_equal(after[: len(before)], before)
+
+
+@pytest.mark.parametrize("level", ["keypoints", "truth"])
+def test_a_worker_is_expected_near_and_less_surely_the_later(level):
+    env = HRCReachEnv(perception=level, config=ASKED)
+    terms = env.split_observation(rolled(env)[-1])
+    now = terms["worker_joints_from_tool"].reshape(1, N_JOINTS, 3)
+    ahead = terms["worker_joints_ahead"].reshape(2, N_JOINTS, 3)
+    std = terms["worker_joints_ahead_std"].reshape(2, N_JOINTS)
+    moved = np.linalg.norm(ahead - now, axis=-1).mean(1)
+    assert (moved < (0.5, 1.2)).all()
+    assert terms["worker_joints_std"].mean() < std[0].mean() < std[1].mean()
+    expected = env.simulation.believed.ahead[1].mean_world[0, 0]
+    tool = env.simulation.believed.robot.tool_world
+    np.testing.assert_allclose(ahead[1], expected - tool, atol=1e-5)
+
+
+def test_of_nobody_the_prior_is_expected():
+    env = HRCReachEnv(perception="none", config=ASKED)
+    terms = env.split_observation(rolled(env, 3)[-1])
+    now = terms["worker_joints_from_tool"].reshape(1, N_JOINTS, 3)
+    np.testing.assert_allclose(terms["worker_joints_ahead"].reshape(2, N_JOINTS, 3) - now, 0.0)
+
+
+def test_many_environments_expect_what_each_alone_expects():
+    """Bit for bit, and over a reset of some of them."""
+    actions = np.random.default_rng(0).uniform(-1, 1, (14, 3, 6)).astype(np.float32)
+    asked = {"perception": "keypoints", "config": ASKED, "max_episode_steps": 9}
+    many = HRCVecEnv(3, **asked, stagger=False, seed=7)
+    batch = [many.reset(), *(many.step(action)[0] for action in actions)]
+    for k in range(3):
+        one = gymnasium.make("HRCReach-v0", **asked)
+        observation, _ = one.reset(seed=7 + k)
+        np.testing.assert_array_equal(observation, batch[0][k])
+        for step, action in enumerate(actions[:, k], start=1):
+            observation, _, terminated, truncated, _ = one.step(action)
+            if terminated or truncated:
+                observation, _ = one.reset()
+            np.testing.assert_array_equal(observation, batch[step][k])
+
+
+def test_two_workers_have_their_own_futures():
+    env = HRCReachEnv(perception="truth", n_workers=2, config=ASKED)
+    ahead = env.split_observation(rolled(env, 3)[-1])["worker_joints_ahead"]
+    first, second = ahead.reshape(2, 2, N_JOINTS, 3)
+    assert np.linalg.norm(first.mean(1) - second.mean(1), axis=-1).min() > 0.3
