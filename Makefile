@@ -34,6 +34,7 @@ bench: $(READY)
 	$(RUN) benchmarks/pixels.py
 	$(RUN) benchmarks/soak.py
 	$(RUN) -m benchmarks.sim_dt
+	$(RUN) benchmarks/prediction.py
 
 train-quick: $(READY)
 	$(RUN) train.py
