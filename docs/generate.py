@@ -33,7 +33,9 @@ axes, 1 is {tool} m/s (`control="tool"`). Commands are limited in slew. 25 Hz.
 ## Observation space
 `Box({size},)` float32 for one worker, flat and finite. An entry is the value in its unit,
 clipped to the bound, divided by the scale; `env.unwrapped.split_observation` undoes this.
-Everything about a worker is the *estimate*.
+Everything about a worker is the *estimate*. With `config={{"horizons_s": (0.2, 0.4)}}` it also
+holds where each joint is expected then, one worker after the other, one horizon after the other
+([how well](tracking.md#ahead)).
 
 {observations}
 
@@ -107,8 +109,9 @@ def observation_table(env: HRCReachEnv) -> str:
     ]
     for term in observations.TERMS:
         part = env.simulation.layout.slices[term.name]
+        entries = f"{part.start}-{part.stop - 1}" if part.stop > part.start else "if asked for"
         lines.append(
-            f"| {part.start}-{part.stop - 1} | `{term.name}` | {term.unit} | {term.frame} | "
+            f"| {entries} | `{term.name}` | {term.unit} | {term.frame} | "
             f"{term.bound:g} | {term.scale:g} | {term.doc} |"
         )
     return "\n".join(lines)
