@@ -66,11 +66,11 @@ class KalmanState(NamedTuple):
     carried: Floats
     """(B, W, J) sum of the beliefs in the views of the last update."""
     noise_factor: Floats
-    """(B, W, C) learnt factor on the variance that the detector reports, as in `noise`."""
+    """(B, W, J, C) learnt factors on the variance that the detector reports, as in `noise`."""
     noise_sums: Floats
-    """(B, W, C, 4) what it is learnt from."""
+    """(B, W, J, C, 5) what they are learnt from."""
     noise_last: Floats
-    """(B, W, J, C, 2) residuals of the last update in reported standard deviations; 0: none."""
+    """(B, W, J, C, 2) last residuals in reported standard deviations, fading; 0: none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,8 +106,8 @@ class KalmanEstimator:
             blind=np.zeros((*shape, n_cameras), np.int64),
             believed=np.zeros((*shape, n_cameras), np.int64),
             carried=np.zeros((*shape, N_JOINTS)),
-            noise_factor=np.ones((*shape, n_cameras)),
-            noise_sums=np.zeros((*shape, n_cameras, N_SUMS)),
+            noise_factor=np.ones((*shape, N_JOINTS, n_cameras)),
+            noise_sums=np.zeros((*shape, N_JOINTS, n_cameras, N_SUMS)),
             noise_last=np.zeros((*shape, N_JOINTS, n_cameras, 2)),
         )
         self._forget(state, np.arange(batch))

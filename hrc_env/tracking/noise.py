@@ -27,11 +27,16 @@ import numpy as np
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, inverse3
 from hrc_env.tracking.config import TrackerConfig
 
-N_SUMS = 4
-"""Squares and redundancy of residuals; their products with the last ones, and what these would
-be if nothing changed."""
-_BEGINS_WEIGHT = 100.0
+N_SUMS = 5
+"""Fading sums of the residuals' squares, redundancy, products with the last ones and the squares
+of these; and, at the first joint and camera, whose turn it is."""
+_TURNS = 2
+"""Every update looks at every so-manieth joint, which costs less and tells as much: neighbouring
+frames are alike."""
+_CAMERA_WEIGHT = 50.0
 """The reported noise counts as so much redundancy, so that the first frames decide little."""
+_JOINT_WEIGHT = 100.0
+"""A camera's noise counts as so much redundancy of each joint's."""
 _OPEN_M = 0.5
 """Two views triangulate no joint along a ray that they share: it stays within this [m]."""
 _LEAST_BELIEF = 0.5
@@ -43,7 +48,7 @@ class NoiseModel(NamedTuple):
     """What the kernels need to learn the factors."""
 
     keep: float
-    """Share of what was learnt that an update leaves."""
+    """Share of what was learnt of a joint that its next turn leaves."""
     persists: float
     """Correlation r over one update of errors that persist."""
     least: float
@@ -57,7 +62,7 @@ def noise_model(config: TrackerConfig, ctrl_dt: float) -> NoiseModel:
     keep, persists = (
         math.exp(-ctrl_dt / tau) for tau in (config.noise_tau_s, config.noise_persists_s)
     )
-    return NoiseModel(keep, persists, least, most)
+    return NoiseModel(keep**_TURNS, persists, least, most)
 
 
 def first_factor(config: TrackerConfig) -> float:
@@ -67,53 +72,53 @@ def first_factor(config: TrackerConfig) -> float:
 
 @numba.njit(**_JIT)
 def scale_sigma(factor, sigma):
-    """Multiply sigma (J, C) by the root of each camera's factor (C,), in place."""
-    for c in range(len(factor)):
-        scale = math.sqrt(factor[c])
-        for j in range(len(sigma)):
-            sigma[j, c] *= scale
+    """Multiply sigma (J, C) by the root of the factors (J, C), in place."""
+    for j in range(len(sigma)):
+        for c in range(sigma.shape[1]):
+            sigma[j, c] *= math.sqrt(factor[j, c])
 
 
 @numba.njit(**_JIT)
 def learn_noise(seen, belief, body, factor, sums, last, model):
-    """Learn the factors (C,) from one update, in place.
+    """Learn the factors (J, C) from one update, in place.
 
     Args:
         seen: P (C, 3, 4), z (J, C, 2), sigma (J, C) as scaled by `scale_sigma`, ok (J, C).
         belief: (J, C) how far the update believed each measurement.
         body: mean (J, 6) and covariance (J, 6, 6) after the update, (J, 3, 3) before it.
-        factor: (C,).
-        sums: (C, 4) see `N_SUMS`, fading.
-        last: (J, C, 2) residuals of the last update in reported standard deviations; 0: none.
+        factor: (J, C).
+        sums: (J, C, 5) see `N_SUMS`.
+        last: (J, C, 2) last residuals in reported standard deviations, fading; 0: none.
         model: constants.
     """
     if model.least == model.most:
         return
     mean, cov, predicted = body
-    view, spread = np.empty((len(factor), 9)), np.empty((3, 4))
-    for c in range(len(factor)):
-        view[c, 8] = math.sqrt(factor[c])
-        for k in range(N_SUMS):
-            sums[c, k] *= model.keep
-    memory, n_joints = 0.0, 0
+    view, spread = np.empty((factor.shape[1], 8)), np.empty((3, 4))
+    grows = np.full(len(factor), -1.0)
+    turn = sums[0, 0, 4]
+    sums[0, 0, 4] = (turn + 1.0) % _TURNS
     for j in range(len(mean)):
-        if _look(seen, belief, mean[j], j, view, spread) < 2:
-            for c in range(len(factor)):
-                last[j, c, 0] = last[j, c, 1] = 0.0
-            continue
-        _compare(view, spread, sums, last[j])
-        memory += _remembered(cov[j], predicted[j], spread)
-        n_joints += 1
-    if n_joints > 0:
-        follows = min(max(memory / n_joints, 0.0), 1.0) * model.persists
-        _set_factors(factor, sums, follows, model)
+        n_views = 0
+        if j % _TURNS == turn:
+            n_views = _look(seen, belief, mean[j], j, view, spread)
+        if n_views < 2:
+            for c in range(factor.shape[1]):
+                last[j, c, 0] *= model.persists
+                last[j, c, 1] *= model.persists
+        else:
+            _compare(view, spread, factor[j], sums[j], last[j], model)
+        if n_views > 0:
+            follows = min(_remembered(cov[j], predicted[j], spread), 1.0) * model.persists
+            grows[j] = (1.0 + follows) / (1.0 - follows)
+    _set_factors(factor, sums, grows, model)
 
 
 @numba.njit(fastmath=_REORDER, **_JIT)
 def _look(seen, belief, body, j, view, spread):
     """Triangulate joint j linearly about `body`, from the cameras that are believed; how many.
 
-    Fills view (C, 8 of 9): Jacobians of u and of v and the residuals of both, all over sigma; a
+    Fills view (C, 8): Jacobians of u and of v and the residuals of both, all over sigma; a
     residual of infinity says that the camera does not count. Fills spread (3, 4): covariance of
     the triangulated point, and in the last column where it is from `body`.
     """
@@ -162,30 +167,34 @@ def _look(seen, belief, body, j, view, spread):
 
 
 @numba.njit(fastmath=_REORDER, **_JIT)
-def _compare(view, spread, sums, last):
-    """Add one joint's residuals about its triangulated point to the sums (C, 4)."""
+def _compare(view, spread, factor, sums, last, model):
+    """Add one joint's residuals about its triangulated point to its sums (C, 5), which fade.
+
+    What is left of the last residuals are those, faded as errors that persist would: products
+    with them over their squares tell the same however long ago they were.
+    """
+    keep, persists = model.keep, model.persists
     s00, s11, s22 = spread[0, 0], spread[1, 1], spread[2, 2]
     s01, s02, s12 = 2.0 * spread[0, 1], 2.0 * spread[0, 2], 2.0 * spread[1, 2]
     x, y, z = spread[0, 3], spread[1, 3], spread[2, 3]
     for c in range(len(view)):
         if not view[c, 6] < np.inf:
-            last[c, 0] = last[c, 1] = 0.0
+            last[c, 0] *= persists
+            last[c, 1] *= persists
             continue
         a0, a1, a2 = view[c, 0], view[c, 1], view[c, 2]
         b0, b1, b2 = view[c, 3], view[c, 4], view[c, 5]
-        scale = view[c, 8]  # to reported standard deviations
+        scale = math.sqrt(factor[c])  # to reported standard deviations
         du = scale * (view[c, 6] - a0 * x - a1 * y - a2 * z)
         dv = scale * (view[c, 7] - b0 * x - b1 * y - b2 * z)
         absorbed = s00 * (a0 * a0 + b0 * b0) + s11 * (a1 * a1 + b1 * b1)
         absorbed += s22 * (a2 * a2 + b2 * b2) + s01 * (a0 * a1 + b0 * b1)
         absorbed += s02 * (a0 * a2 + b0 * b2) + s12 * (a1 * a2 + b1 * b2)
-        square, u, v = du * du + dv * dv, last[c, 0], last[c, 1]
-        sums[c, 0] += square
-        sums[c, 1] += 2.0 - absorbed
-        before = u * u + v * v
-        if before > 0.0:
-            sums[c, 2] += du * u + dv * v
-            sums[c, 3] += 0.5 * (square + before)
+        u, v = last[c, 0], last[c, 1]
+        sums[c, 0] = keep * sums[c, 0] + du * du + dv * dv
+        sums[c, 1] = keep * sums[c, 1] + 2.0 - absorbed
+        sums[c, 2] = keep * sums[c, 2] + du * u + dv * v
+        sums[c, 3] = keep * sums[c, 3] + u * u + v * v
         last[c, 0], last[c, 1] = du, dv
 
 
@@ -198,13 +207,25 @@ def _remembered(cov, predicted, work):
     return (own + 2.0 * cross) / 3.0
 
 
-@numba.njit(**_JIT)
-def _set_factors(factor, sums, follows, model):
-    """The factors (C,) that the sums ask for; `follows` is a r of the module's formula."""
-    grows = (1.0 + follows) / (1.0 - follows)
-    for c in range(len(factor)):
-        variance = (sums[c, 0] + _BEGINS_WEIGHT) / (sums[c, 1] + _BEGINS_WEIGHT)
-        alike = sums[c, 2] / (sums[c, 3] + _BEGINS_WEIGHT)
-        share = min(max(alike / model.persists, 0.0), 1.0)
-        wanted = variance * (1.0 - share + share * grows)
-        factor[c] = min(max(wanted, model.least), model.most)
+@numba.njit(fastmath=_REORDER, **_JIT)
+def _set_factors(factor, sums, grows, model):
+    """The factors (J, C) that the sums ask for.
+
+    `grows` (J,) is the last bracket of the module's formula; less than 0: the factor stays.
+    """
+    for c in range(factor.shape[1]):
+        squares = redundancy = _CAMERA_WEIGHT
+        products, unchanged = 0.0, _CAMERA_WEIGHT
+        for j in range(len(factor)):
+            squares += sums[j, c, 0]
+            redundancy += sums[j, c, 1]
+            products += sums[j, c, 2]
+            unchanged += sums[j, c, 3]
+        of_camera = squares / redundancy
+        share = min(max(products / (unchanged * model.persists), 0.0), 1.0)
+        for j in range(len(factor)):
+            if grows[j] > 0.0:
+                own = sums[j, c, 0] + _JOINT_WEIGHT * of_camera
+                variance = own / (sums[j, c, 1] + _JOINT_WEIGHT)
+                wanted = variance * (1.0 - share + share * grows[j])
+                factor[j, c] = min(max(wanted, model.least), model.most)
