@@ -9,6 +9,8 @@
 | `triangulation` | every frame by itself, all views by weighted least squares; gaps are held |
 | `ransac` | the same from the views that agree |
 
+`smoother` is offline: `smoother.smooth` takes a whole clip (`OFFLINE`).
+
 A control step is `predict` and then `update`; `estimate` may be asked at any time.
 """
 
@@ -83,6 +85,10 @@ ESTIMATORS: dict[str, Callable[[Floats, float, TrackerConfig], Estimator[Any]]] 
 }
 
 
+OFFLINE = {"smoother": "hrc_env.tracking.smoother.smooth(P, clip, dt_s)"}
+"""What needs the future, and the function that gives it a whole clip."""
+
+
 def make_estimator(
     name: str, P: Floats, ctrl_dt: float, config: TrackerConfig | None = None
 ) -> Estimator[Any]:
@@ -96,8 +102,11 @@ def make_estimator(
             in a `late.LateEstimator`, which uses late frames at their own time.
 
     Raises:
-        ConfigError: unknown name, a rig of another shape, or no positive time.
+        ConfigError: a name that is unknown or `OFFLINE`, a rig of another shape, or no
+            positive time.
     """
+    if name in OFFLINE:
+        raise ConfigError(f"{name!r} needs the future: call {OFFLINE[name]} for a whole clip.")
     if name not in ESTIMATORS:
         raise unknown("estimator", name, ESTIMATORS)
     P = np.ascontiguousarray(P, dtype=float)

@@ -1,0 +1,259 @@
+"""What could have been known: a whole clip, smoothed after the fact.
+
+The filter on the kinematic tree (`kalman`) goes through the clip and decides who is where, which
+camera is swapped and what is an outlier; then a Rauch-Tung-Striebel pass (AIAA Journal 3, 1965)
+goes back over the filter's own linear motion, on all 90 numbers of a body at once. With P the
+covariance of the belief at t, F and Q the motion to t + 1, x- and P- = F P F' + Q the prediction:
+
+    G = P F' (P-)^-1,   x_s = x + G (x_s' - x-),   P_s = P + G (P_s' - P-) G'.
+
+Where a track was begun anew, nothing is carried back across its beginning.
+
+That would be all if the filter were linear. But with one camera it may have taken the body's
+mirror in depth, and no such pass turns a body round. The clip read backwards is as good a clip,
+and its filter comes to the same frames from the other side: the answer is the mixture of both,
+each with the certainty its filter had there, in mean and covariance. Where they disagree, the
+covariance says so.
+
+Needing the future, this is no estimator of an environment; it is offline, and in plain numpy.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from hrc_env.batching import mapped
+from hrc_env.errors import ConfigError
+from hrc_env.records import Keypoints, PoseEstimate
+from hrc_env.skeleton import N_JOINTS, TORSO
+from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.kalman import KalmanEstimator, KalmanState, motion
+from hrc_env.tracking.tracks import Tracks, report
+from hrc_env.tracking.tree import ORDER, PARENT
+from hrc_env.typing import Bools, Floats
+
+_N = 6 * N_JOINTS
+
+
+class _Passed(NamedTuple):
+    """What the filter believed in a frame; n = B W workers."""
+
+    predicted: Floats
+    """(n, 90) means before the frame."""
+    mean: Floats
+    """(n, 90) and after it."""
+    cov: Floats
+    """(n, J, 6, 6)."""
+    slope: Floats
+    """(n, J, 6, 6)."""
+    age_s: Floats
+    """(n, J)."""
+    tracked: Bools
+    """(n,)."""
+    follows: Bools
+    """(n,) whether the track is the last frame's."""
+
+
+class _Smoothed(NamedTuple):
+    """One direction's answer: T frames, n workers, in the clip's order."""
+
+    mean: Floats
+    """(T, n, J, 6)."""
+    cov: Floats
+    """(T, n, J, 3, 3) of the positions."""
+    doubt: Floats
+    """(T, n) mean variance that its filter had [m^2]."""
+    age_s: Floats
+    """(T, n, J)."""
+    tracked: Bools
+    """(T, n)."""
+
+
+def smooth(
+    P: Floats, clip: Sequence[Keypoints], dt_s: float, config: TrackerConfig | None = None
+) -> PoseEstimate:
+    """The best belief of every frame, in view of the whole clip.
+
+    Args:
+        P: (C, 3, 4) projections.
+        clip: keypoints of T frames, each (B, C, W, J, ...), in order of time; their `time_s` is
+            not looked at.
+        dt_s: time between two frames [s].
+        config: settings; the defaults if None.
+
+    Returns:
+        Arrays (T, B, W, ...). A worker whom the filter followed in neither direction is where
+        the forward one reported; `age_s` is the time to the nearest measurement of the joint.
+
+    Raises:
+        ConfigError: no frames, or a time between them that is not positive.
+    """
+    if len(clip) == 0 or not dt_s > 0:
+        raise ConfigError(f"a clip needs frames and a positive dt_s, got {len(clip)}, {dt_s}.")
+    config = config or TrackerConfig()
+    estimator = KalmanEstimator(np.ascontiguousarray(P, float), dt_s, config)
+    forth = _one_way(estimator, clip, dt_s)
+    back = _turned(_one_way(estimator, clip[::-1], dt_s))
+    batch, _, n_workers = clip[0].px.shape[:3]
+    return _reported(_mixture(forth, back), (len(clip), batch, n_workers), config)
+
+
+def rts_step(
+    belief: tuple[Floats, Floats],
+    predicted: Floats,
+    later: tuple[Floats, Floats],
+    F: Floats,
+    Q: Floats,
+) -> tuple[Floats, Floats]:
+    """One step back, for n Gaussians of d numbers.
+
+    Args:
+        belief: mean (n, d) and covariance (n, d, d) as filtered.
+        predicted: (n, d) mean of the next frame as predicted from it.
+        later: the next frame, smoothed.
+        F, Q: (d, d) motion from one to the other, and its noise.
+
+    Returns:
+        Mean and covariance, smoothed.
+    """
+    (mean, cov), (mean_later, cov_later) = belief, later
+    moved = F @ cov
+    cov_predicted = moved @ F.T + Q
+    gain = np.linalg.solve(cov_predicted, moved).swapaxes(-1, -2)
+    mean = mean + np.einsum("nij,nj->ni", gain, mean_later - predicted)
+    cov = cov + gain @ (cov_later - cov_predicted) @ gain.swapaxes(-1, -2)
+    return mean, 0.5 * (cov + cov.swapaxes(-1, -2))
+
+
+def linear_motion(dt_s: float, config: TrackerConfig) -> tuple[Floats, Floats]:
+    """F, Q (90, 90): x' = F x + constant + noise, as `tree_predict` moves the body."""
+    own, travel, noise, shared = motion(dt_s, config.damping, config.root_acceleration)
+    F = np.zeros((N_JOINTS, 2, N_JOINTS, 2))
+    Q = np.tile(shared[None, :, None, :], (N_JOINTS, 1, N_JOINTS, 1))
+    for j in range(N_JOINTS):
+        F[j, :, j] += own[j]
+        Q[j, :, j] = noise[j]
+        for k in TORSO:
+            F[j, :, int(k)] += travel[j] / len(TORSO)
+    return _on_axes(F), _on_axes(Q)
+
+
+def dense(cov: Floats, slope: Floats) -> Floats:
+    """(n, 90, 90) covariance of all joints from marginals and slopes (n, J, 6, 6)."""
+    out = np.zeros((len(cov), N_JOINTS, 6, N_JOINTS, 6))
+    for m, j in enumerate(ORDER):
+        for k in ORDER[:m]:
+            edge = slope[:, j] @ out[:, PARENT[j], :, k]
+            out[:, j, :, k], out[:, k, :, j] = edge, edge.swapaxes(1, 2)
+        out[:, j, :, j] = cov[:, j]
+    return out.reshape(-1, _N, _N)
+
+
+def _on_axes(blocks: Floats) -> Floats:
+    """(90, 90) of (J, 2, J, 2) on position and velocity, alike on each axis."""
+    full = np.einsum("jakb,cd->jackbd", blocks, np.eye(3))
+    return full.reshape(_N, _N)
+
+
+def _one_way(estimator: KalmanEstimator, clip: Sequence[Keypoints], dt_s: float) -> _Smoothed:
+    """Filter through a clip, smooth back."""
+    passed = _filtered(estimator, clip, dt_s)
+    F, Q = linear_motion(dt_s, estimator.config)
+    last = passed[-1]
+    mean, cov = last.mean, dense(last.cov, last.slope)
+    means, covs = [mean], [_own(cov)]
+    for here, later in zip(passed[-2::-1], passed[:0:-1], strict=True):
+        on = later.follows
+        x, spread = here.mean.copy(), dense(here.cov, here.slope)
+        now, then = (x[on], spread[on]), (mean[on], cov[on])
+        x[on], spread[on] = rts_step(now, later.predicted[on], then, F, Q)
+        mean, cov = x, spread
+        means.append(mean)
+        covs.append(_own(cov))
+    position = np.stack([each.cov for each in passed])[..., :3, :3]
+    return _Smoothed(
+        mean=np.stack(means[::-1]).reshape(len(passed), -1, N_JOINTS, 6),
+        cov=np.stack(covs[::-1]),
+        doubt=np.trace(position, axis1=-2, axis2=-1).mean(-1),
+        age_s=np.stack([each.age_s for each in passed]),
+        tracked=np.stack([each.tracked for each in passed]),
+    )
+
+
+def _filtered(estimator: KalmanEstimator, clip: Sequence[Keypoints], dt_s: float) -> list[_Passed]:
+    batch, _, n_workers = clip[0].px.shape[:3]
+    state, passed = estimator.init(batch, n_workers), []
+    blocks = (-1, N_JOINTS, 6, 6)
+    for keypoints in clip:
+        estimator.predict(state, dt_s, [])
+        predicted, before = state.body.reshape(-1, _N).copy(), state.tracked.ravel().copy()
+        estimator.update(state, keypoints, [])
+        tracked = state.tracked.ravel().copy()
+        passed.append(
+            _Passed(
+                predicted=predicted,
+                mean=state.body.reshape(-1, _N).copy(),
+                cov=state.cov.reshape(blocks).copy(),
+                slope=state.slope.reshape(blocks).copy(),
+                age_s=state.age_s.reshape(-1, N_JOINTS).copy(),
+                tracked=tracked,
+                follows=before & tracked & ~_began(state),
+            )
+        )
+    return passed
+
+
+def _began(state: KalmanState) -> Bools:
+    """(n,) whether a track was begun in this frame: then the body is at rest, and only then."""
+    return ~state.body[..., 3:].any((-2, -1)).ravel()
+
+
+def _own(cov: Floats) -> Floats:
+    """(n, J, 3, 3) of the positions from (n, 90, 90)."""
+    joint = np.arange(N_JOINTS)
+    blocks = cov.reshape(-1, N_JOINTS, 6, N_JOINTS, 6)
+    return np.moveaxis(blocks[:, joint, :3, joint, :3], 0, 1)
+
+
+def _turned(there: _Smoothed) -> _Smoothed:
+    """The answer for a clip that was read backwards, in the clip's order."""
+    mean = there.mean[::-1].copy()
+    mean[..., 3:] *= -1.0
+    rest = (there.cov[::-1], there.doubt[::-1], there.age_s[::-1])
+    return _Smoothed(mean, *rest, there.tracked[::-1])
+
+
+def _mixture(a: _Smoothed, b: _Smoothed) -> _Smoothed:
+    """Mean and covariance of the two answers, each weighted by how sure its filter was."""
+    share = b.doubt / (a.doubt + b.doubt)
+    share = np.where(a.tracked == b.tracked, share, a.tracked)
+    share = np.where(a.tracked | b.tracked, share, 1.0)[..., None, None]
+    apart = (a.mean - b.mean)[..., :3]
+    between = apart[..., :, None] * apart[..., None, :]
+    one, other = share[..., None], 1.0 - share[..., None]
+    return _Smoothed(
+        mean=share * a.mean + (1.0 - share) * b.mean,
+        cov=one * a.cov + other * b.cov + one * other * between,
+        doubt=np.minimum(a.doubt, b.doubt),
+        age_s=np.minimum(a.age_s, b.age_s),
+        tracked=a.tracked | b.tracked,
+    )
+
+
+def _reported(
+    smoothed: _Smoothed, shape: tuple[int, int, int], config: TrackerConfig
+) -> PoseEstimate:
+    """Arrays (T, B, W, ...) as estimators report theirs."""
+    n_frames, batch, n_workers = shape
+    tracked = smoothed.tracked.reshape(-1, n_workers)
+    joints = (*tracked.shape, N_JOINTS)
+    tracks = Tracks(
+        mean_world=smoothed.mean[..., :3].reshape(*joints, 3),
+        cov_world=smoothed.cov.reshape(*joints, 3, 3),
+        velocity_world=smoothed.mean[..., 3:].reshape(*joints, 3),
+        age_s=smoothed.age_s.reshape(joints),
+        tracked=tracked,
+        conflict=np.zeros(joints, np.int64),
+    )
+    return mapped(report(tracks, config), lambda a: a.reshape(n_frames, batch, *a.shape[1:]))
