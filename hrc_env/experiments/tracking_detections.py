@@ -1,4 +1,4 @@
-"""What a detector makes of walkers: noise, occlusion, gross errors, exchanged sides."""
+"""What a detector makes of walkers: noise, lasting errors, occlusion, gross errors, swaps."""
 
 from dataclasses import dataclass
 
@@ -10,6 +10,7 @@ from hrc_env.skeleton import MIRROR
 from hrc_env.typing import Bools, Floats, Points2, Points3
 
 _HZ = 1 / DT_S
+_DRIFT_TAU_S = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,6 +19,9 @@ class Damage:
 
     sigma_px: float = SIGMA_PX
     """White noise on each coordinate [px]."""
+    drift_px: float = 0.0
+    """Standard deviation of errors that last half a second, on each coordinate [px]; estimators
+    are not told of it."""
     occluded: bool = False
     """Each camera loses each joint for 0.5-2 s every 5 s; every 6 s a joint keeps only one
     camera for 0.5-1.5 s, or, one time in five, none for 0.4-0.8 s."""
@@ -34,6 +38,7 @@ CONDITIONS: dict[str, Damage] = {
     "occluded": Damage(occluded=True),
     "hard": Damage(occluded=True, gross=0.10, swapped=0.05),
     "one_camera": Damage(alone_s=(1.0, 5.0)),
+    "drifting": Damage(drift_px=4.0),
 }
 
 
@@ -55,8 +60,10 @@ def detect(P: Floats, joints: Points3, damage: Damage, seeds: list[int]) -> Poin
 
 def _damaged(exact: Points2, in_view: Bools, damage: Damage, seed: int) -> Points2:
     """One sequence: (T, C, J, 2) and (T, C, J) to pixels."""
-    rngs = [np.random.default_rng([seed, 2, kind]) for kind in range(4)]
+    rngs = [np.random.default_rng([seed, 2, kind]) for kind in range(5)]
     px = exact + damage.sigma_px * rngs[0].standard_normal(exact.shape)
+    if damage.drift_px:
+        px += damage.drift_px * _drift(rngs[4], exact.shape)
     seen = in_view
     if damage.occluded:
         seen = in_view & _occlusions(rngs[1], in_view.shape)
@@ -74,6 +81,15 @@ def _damaged(exact: Points2, in_view: Bools, damage: Damage, seed: int) -> Point
         error = 3 * (20 + 0.12 * size) * rngs[3].standard_normal(px.shape)
         px = np.where(wrong[..., None], px + error, px)
     return np.where(seen[..., None], px, np.nan)
+
+
+def _drift(rng: np.random.Generator, shape: tuple[int, ...]) -> Floats:
+    """(T, ...) stationary, of unit variance, with correlation exp(-t / 0.5 s) over time."""
+    keep = np.exp(-DT_S / _DRIFT_TAU_S)
+    drift = rng.standard_normal(shape)
+    for t in range(1, len(drift)):
+        drift[t] = keep * drift[t - 1] + np.sqrt(1 - keep**2) * drift[t]
+    return drift
 
 
 def _occlusions(rng: np.random.Generator, shape: tuple[int, ...]) -> Bools:

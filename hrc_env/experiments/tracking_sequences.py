@@ -26,7 +26,7 @@ BOUNDED = (MATCHED, MATCHED_BONES)
 MATCHED_ROOT_ACCELERATION = 0.05
 """Of the matched sequences and of the estimators on them, so that they stay in view [m^2/s^3]."""
 N_FRAMES = {
-    **dict.fromkeys(("clean", "occluded", "hard"), 500),
+    **dict.fromkeys(("clean", "occluded", "hard", "drifting"), 500),
     "one_camera": 175, LATE: 175, TWO_WORKERS: 125, MATCHED: 40, MATCHED_BONES: 40,
 }  # fmt: skip
 _ALONE = {
@@ -36,7 +36,7 @@ _ALONE = {
     "one_camera": (25, 125),
 }
 WINDOWS: dict[str, dict[str, tuple[int, int]]] = {
-    **{name: {name: (25, 500)} for name in ("clean", "occluded", "hard")},
+    **{name: {name: (25, 500)} for name in ("clean", "occluded", "hard", "drifting")},
     "one_camera": {**_ALONE, "after_return": (150, 175)},
     LATE: {LATE: (25, 175)},
     TWO_WORKERS: {TWO_WORKERS: (25, 125)},

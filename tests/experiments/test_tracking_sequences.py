@@ -47,6 +47,16 @@ def test_conditions_differ_by_their_damage_only():
     np.testing.assert_array_equal(hidden[seen], clean[seen])
 
 
+def test_drifting_errors_are_larger_than_told_and_last_half_a_second():
+    joints = walk(LAB.walk_m, [7, 8], 400)
+    clean, drifting = (detect(LAB.P, joints, Damage(drift_px=d), [7, 8]) for d in (0.0, 4.0))
+    drift = np.where(np.isfinite(clean), drifting - clean, np.nan)
+    assert np.nanstd(drift) == pytest.approx(4.0, rel=0.05)
+    for n_frames in (1, 12):
+        alike = np.nanmean(drift[n_frames:] * drift[:-n_frames]) / np.nanvar(drift)
+        assert alike == pytest.approx(np.exp(-n_frames * 0.04 / 0.5), abs=0.05)
+
+
 def test_limbs_are_rigid():
     joints = walk(LAB.walk_m, [0, 1], 500)
     for side in ("left", "right"):
