@@ -33,7 +33,7 @@ class Bench:
     quick: bool = False
     """Fewer sequences: every number, with wider intervals, in less than four minutes."""
     seeds: int | None = None
-    """Sequences per rig and condition, instead of 100 (10 if quick)."""
+    """Sequences per rig and condition, instead of 100 (8 if quick)."""
     processes: int | None = None
     """Conditions that are run at once; as many as there are cores if not given. Times are taken
     alone, at the end."""

@@ -37,3 +37,11 @@ def delivered(px: Points2, seeds: list[int]) -> tuple[Points2, Floats]:
             now = step[taken, c]
             out[now, s, c], time_s[now, s, c] = px[taken, s, c], (taken + 1) * DT_S
     return out, time_s
+
+
+def in_time(px: Points2, time_s: Floats) -> Points2:
+    """Delivered frames (T, S, C, ...) put back to the steps in which they were taken."""
+    out = np.full(px.shape, np.nan)
+    now, s, c = np.nonzero(np.isfinite(time_s))
+    out[np.rint(time_s[now, s, c] / DT_S).astype(int) - 1, s, c] = px[now, s, c]
+    return out

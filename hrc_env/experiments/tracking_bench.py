@@ -16,7 +16,7 @@ from hrc_env.errors import ConfigError
 from hrc_env.experiments.tracking_cells import Tick, run_cell
 from hrc_env.experiments.tracking_detections import CONDITIONS
 from hrc_env.experiments.tracking_metrics import ASSOCIATION, TIMING, Parts, metrics_of
-from hrc_env.experiments.tracking_names import DEFAULT, cells, names_of
+from hrc_env.experiments.tracking_names import DEFAULT, SMOOTHER, cells, names_of
 from hrc_env.experiments.tracking_own import OWN, make_own_rig
 from hrc_env.experiments.tracking_report import write_report
 from hrc_env.experiments.tracking_rigs import RIGS, SIGMA_PX, Rig, make_rig
@@ -37,17 +37,19 @@ class TrackingBenchConfig:
     """Seed of the first sequence; the others count up."""
     n_matched: int = 200
     """Matched sequences per rig."""
+    n_smoothed: int = 25
+    """Sequences per rig and condition for the smoother, which is slow; the first ones."""
     timing_repeats: int = 7
     """How often the time per update is taken."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for numbers that cannot work."""
-        for name in ("n_seeds", "n_matched", "timing_repeats"):
+        for name in ("n_seeds", "n_matched", "n_smoothed", "timing_repeats"):
             if getattr(self, name) < 1:
                 raise ConfigError(f"{name} must be at least 1, got {getattr(self, name)}.")
 
 
-QUICK = TrackingBenchConfig(n_seeds=10, n_matched=40, timing_repeats=2)
+QUICK = TrackingBenchConfig(n_seeds=8, n_matched=30, n_smoothed=2, timing_repeats=2)
 """Every number, from fewer sequences."""
 
 
@@ -97,7 +99,11 @@ def make_condition(
         return rig, make_sequences(rig, condition, seeds)
 
     def make(name: str, tick: Tick) -> dict[str, Any]:
-        return run_cell(name, *sequences(), seeds, tick)
+        rig, given = sequences()
+        if name == SMOOTHER:
+            n = min(config.n_smoothed, len(seeds))
+            return run_cell(name, rig, given.first(n), seeds[:n], tick)
+        return run_cell(name, rig, given, seeds, tick)
 
     return {
         (rig_name, condition, name): shelf.part(

@@ -6,19 +6,25 @@ from typing import Any
 
 import numpy as np
 
+from hrc_env.batching import rows
+from hrc_env.experiments.tracking_arrivals import in_time
 from hrc_env.experiments.tracking_couples import identities
 from hrc_env.experiments.tracking_dlt import triangulate_frame
 from hrc_env.experiments.tracking_full_state import filter_matched
-from hrc_env.experiments.tracking_names import DEFAULT, DLT, FULL_STATE, UNBUFFERED
+from hrc_env.experiments.tracking_names import DEFAULT, DLT, FULL_STATE, SMOOTHER, UNBUFFERED
 from hrc_env.experiments.tracking_rigs import DT_S, SIGMA_PX, Rig
 from hrc_env.experiments.tracking_sequences import Sequences
 from hrc_env.experiments.tracking_tally import tally
+from hrc_env.records import Keypoints, PoseEstimate
 from hrc_env.tracking.association import associate
 from hrc_env.tracking.estimators import make_estimator
+from hrc_env.tracking.smoother import smooth
 from hrc_env.typing import Covariances3, Points3
 
 UNKNOWN_M2 = 1e6
 """Variance of a bone's length of which nothing is known [m^2]."""
+_AT_ONCE = 10
+"""Sequences that are smoothed at once: it keeps 90x90 numbers of every frame."""
 Tick = Callable[[float], None]
 
 
@@ -33,8 +39,11 @@ def beliefs(
             raise ValueError(f"{FULL_STATE} runs on sequences whose model is known.")
         for mean, cov in filter_matched(rig.P, sequences.model, sequences.px[:, :, :, 0], SIGMA_PX):
             yield mean[:, None], cov[:, None]
+    elif name == SMOOTHER:
+        yield from _smoothed(rig, sequences, seeds)
     else:
-        yield from _estimated(name, rig, sequences, seeds)
+        for _, belief in _estimated(name, rig, sequences, seeds):
+            yield belief.mean_world, belief.cov_world
 
 
 def _triangulated(rig: Rig, sequences: Sequences) -> Iterator[tuple[Points3, None]]:
@@ -47,8 +56,11 @@ def _triangulated(rig: Rig, sequences: Sequences) -> Iterator[tuple[Points3, Non
 
 def _estimated(
     name: str, rig: Rig, sequences: Sequences, seeds: list[int]
-) -> Iterator[tuple[Points3, Covariances3]]:
-    """An estimator as an environment runs it: with several people, poses are given to tracks."""
+) -> Iterator[tuple[Keypoints, PoseEstimate]]:
+    """An estimator as an environment runs it: what it is given, and what it believes then.
+
+    With several people, poses are given to the tracks whose predictions they fit.
+    """
     n_sequences, n_people = sequences.joints.shape[1:3]
     if name == UNBUFFERED:  # frames are taken as of the moment at which they arrive
         name = DEFAULT
@@ -67,8 +79,34 @@ def _estimated(
         if not sequences.has_bones:
             _forget_bones(state)
         estimator.update(state, keypoints, rngs)
-        belief = estimator.estimate(state)
-        yield belief.mean_world, belief.cov_world
+        yield keypoints, estimator.estimate(state)
+
+
+def _smoothed(
+    rig: Rig, sequences: Sequences, seeds: list[int]
+) -> Iterator[tuple[Points3, Covariances3]]:
+    """The smoother, to which late frames are given at their time, some sequences at once.
+
+    Of several people it smooths the tracks to which `kalman` gave the poses.
+    """
+    if sequences.time_s is not None:
+        px = in_time(sequences.px, sequences.time_s)
+        config = replace(sequences.config, longest_delay_s=0.0)
+        sequences = replace(sequences, px=px, time_s=None, config=config)
+    if sequences.order is None:
+        clip = [sequences.keypoints(t) for t in range(len(sequences.px))]
+    else:
+        clip = [given for given, _ in _estimated("kalman", rig, sequences, seeds)]
+    parts = []
+    for begin in range(0, len(seeds), _AT_ONCE):
+        some = np.arange(begin, min(begin + _AT_ONCE, len(seeds)))
+        frames = [rows(keypoints, some) for keypoints in clip]
+        parts.append(smooth(rig.P, frames, DT_S, sequences.config))
+    for t in range(len(clip)):
+        yield (
+            np.concatenate([part.mean_world[t] for part in parts]),
+            np.concatenate([part.cov_world[t] for part in parts]),
+        )
 
 
 def _forget_bones(state: Any) -> None:

@@ -17,6 +17,8 @@ DLT = "dlt"
 """Plain per-frame triangulation; where cameras do not know names, it is told them."""
 FULL_STATE = "full_state"
 """The filter that knows the matched sequences' model; runs on these only."""
+SMOOTHER = "smoother"
+"""What could have been known in view of the whole clip; not where the bound is a filter's."""
 UNBUFFERED = f"{DEFAULT}_unbuffered"
 """The default without a memory for late frames; runs on these only."""
 RIVALS = (*(name for name in ESTIMATORS if name != DEFAULT), DLT)
@@ -35,8 +37,9 @@ def windows_of(rig: str, condition: str) -> tuple[str, ...]:
 
 def names_of(rig: str, condition: str) -> list[str]:
     """Who runs on a rig and a condition, the default first."""
-    special = {LATE: [UNBUFFERED], **{name: [FULL_STATE] for name in BOUNDED}}
-    return [DEFAULT, *RIVALS, *special.get(condition, [])]
+    if condition in BOUNDED:
+        return [DEFAULT, *RIVALS, FULL_STATE]
+    return [DEFAULT, *RIVALS, SMOOTHER, *([UNBUFFERED] if condition == LATE else [])]
 
 
 def cells() -> list[tuple[str, str, str]]:

@@ -4,10 +4,18 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from hrc_env.experiments.tracking_metrics import Parts
-from hrc_env.experiments.tracking_names import DEFAULT, DLT, RIVALS, names_of, rows
+from hrc_env.experiments.tracking_names import (
+    DEFAULT,
+    DLT,
+    RIVALS,
+    SMOOTHER,
+    UNBUFFERED,
+    names_of,
+    rows,
+)
 from hrc_env.experiments.tracking_plots import plot_calibration, plot_error
 from hrc_env.experiments.tracking_rigs import RIGS
-from hrc_env.experiments.tracking_sequences import BOUNDED, MATCHED, TWO_WORKERS
+from hrc_env.experiments.tracking_sequences import BOUNDED, LATE, MATCHED, TWO_WORKERS
 from hrc_env.results import Metric
 from hrc_env.tracking.estimators import ESTIMATORS
 
@@ -53,6 +61,8 @@ def markdown(metrics: _Metrics) -> str:
         _table(metrics, "facing_wrong", 100, 2),
         "## After one camera",
         _returns(metrics),
+        "## Late frames",
+        _late(metrics),
         "## Two workers: changes of identity per 100 sequences",
         _swaps(metrics),
     ]
@@ -64,7 +74,7 @@ Numbers in brackets are 95 % bootstrap intervals over sequences. `lab` and `site
 own walkers and white detections of 3 px; `own` is the environment's worker seen through its
 emulator of the detector. `one_camera_...` are the first half second, second and two seconds of
 the four in which one camera is left, `after_return` is what comes a second later. `{DLT}` is
-plain triangulation of every frame by itself."""
+plain triangulation of every frame by itself; `{SMOOTHER}` knows the whole clip and is no rival."""
 _ABOUT_THE_BOUND = """\
 `matched` bodies move as the estimators' motion model says, without bones; estimators are told so
 (no outliers, no exchanged sides, nothing known of bone lengths), and still learn the joints'
@@ -119,7 +129,7 @@ def _beaten(metrics: _Metrics) -> str:
 
 def _table(metrics: _Metrics, kind: str, scale: float, digits: int, interval: bool = False) -> str:
     """One row per rig and window, one column per estimator; what is not known is left empty."""
-    names = [DEFAULT, *RIVALS]
+    names = [DEFAULT, *RIVALS, SMOOTHER]
     lines = []
     for rig, _, window in rows():
         found = [metrics.get(f"{kind}.{rig}.{window}.{name}") for name in names]
@@ -174,6 +184,24 @@ def _returns(metrics: _Metrics) -> str:
             (f"{rig}: facing the wrong way, per 100", [_cell(m, 1, 1, True) for m in mirrored])
         )
     return _lines(names, lines)
+
+
+def _late(metrics: _Metrics) -> str:
+    """What a memory for late frames is worth."""
+    lines = []
+    for rig in RIGS:
+        cells = []
+        for name in (DEFAULT, UNBUFFERED):
+            key = f"{rig}.{LATE}.{name}"
+            cells.append(_cell(metrics[f"rmse_m.{key}"], 100, 2, True))
+            cells.append(_cell(metrics[f"coverage95.{key}"], 1, 3))
+        lines.append((rig, cells))
+    said = (
+        "Cameras are 40 to 220 ms late, one has half the rate, one frame in twenty is lost. "
+        f"`{UNBUFFERED}` takes frames as of the moment at which they arrive."
+    )
+    header = [f"{DEFAULT}, cm", "coverage", f"{UNBUFFERED}, cm", "coverage"]
+    return said + "\n\n" + _lines(header, lines)
 
 
 def _swaps(metrics: _Metrics) -> str:

@@ -1,6 +1,6 @@
 """The sequences of the tracking bench: what all estimators are given and held against."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -83,20 +83,29 @@ class Sequences:
         """Whether distances between neighbouring joints stay as they are."""
         return self.model is None or len(self.model.bones) > 0
 
-    def keypoints(self, t: int, n: int | None = None) -> Keypoints:
-        """What cameras report of frame t, of the first n sequences."""
-        px = self.px[t, :n]
+    def first(self, n: int) -> "Sequences":
+        """The first n sequences."""
+        arrays = {
+            each.name: getattr(self, each.name)[:, :n]
+            for each in fields(self)
+            if isinstance(getattr(self, each.name), np.ndarray)
+        }
+        return replace(self, **arrays)
+
+    def keypoints(self, t: int) -> Keypoints:
+        """What cameras report of frame t."""
+        px = self.px[t]
         seen = np.isfinite(px[..., 0])
         if self.confidence is None or self.sigma_px is None:
             confidence, sigma_px = np.where(seen, 0.9, 0.0), np.where(seen, SIGMA_PX, np.inf)
         else:
-            confidence, sigma_px = self.confidence[t, :n], self.sigma_px[t, :n]
+            confidence, sigma_px = self.confidence[t], self.sigma_px[t]
         if self.order is not None:
-            order = self.order[t, :n, :, :, None]
+            order = self.order[t][..., None]
             confidence = np.take_along_axis(confidence, order, 2)
             sigma_px = np.take_along_axis(sigma_px, order, 2)
             px = np.take_along_axis(px, order[..., None], 2)
-        time_s = None if self.time_s is None else self.time_s[t, :n]
+        time_s = None if self.time_s is None else self.time_s[t]
         return Keypoints(px, confidence, sigma_px, time_s)
 
 

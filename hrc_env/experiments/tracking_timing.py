@@ -51,9 +51,9 @@ def _frame_times(
     rngs = [np.random.default_rng([b, 5]) for b in range(batch)]
     state = estimator.init(batch, 1)
     estimator.reset(state, np.arange(batch), rngs)
-    seconds = np.empty(n_frames)
+    seconds, sequences = np.empty(n_frames), sequences.first(batch)
     for t in range(n_frames):
-        keypoints = sequences.keypoints(t, batch)
+        keypoints = sequences.keypoints(t)
         started_s = time.perf_counter()
         estimator.predict(state, DT_S, rngs)
         estimator.update(state, keypoints, rngs)

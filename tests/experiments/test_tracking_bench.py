@@ -17,7 +17,7 @@ from hrc_env.experiments.tracking_tally import CHI2_95_3D, CHI2_LEVELS, tally
 from hrc_env.experiments.tracking_timing import time_association, time_estimator
 from hrc_env.tracking.estimators import ESTIMATORS
 
-TINY = TrackingBenchConfig(n_seeds=2, n_matched=2, timing_repeats=1)
+TINY = TrackingBenchConfig(n_seeds=2, n_matched=2, n_smoothed=1, timing_repeats=1)
 
 
 def no_time(name, rig, clean, hard, n_repeats, tick):
@@ -35,9 +35,9 @@ def no_association_time(rig, n_repeats, tick):
 @contextmanager
 def small():
     """Few frames, no clock, and code that nobody edits meanwhile."""
-    short = {name: min(n, 30) for name, n in tracking_sequences.N_FRAMES.items()}
+    short = {name: min(n, 20) for name, n in tracking_sequences.N_FRAMES.items()}
     windows = {
-        name: dict.fromkeys(inner, (10, 30)) for name, inner in tracking_sequences.WINDOWS.items()
+        name: dict.fromkeys(inner, (10, 20)) for name, inner in tracking_sequences.WINDOWS.items()
     }
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(tracking_sequences, "N_FRAMES", short)
