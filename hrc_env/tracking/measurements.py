@@ -20,6 +20,7 @@ from hrc_env.typing import Floats
 MIN_SIGMA_PX = 0.25
 """No detector is believed to be better than this [px]."""
 _JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
+_REORDER = {"reassoc", "contract", "nsz"}
 
 
 def arrays_of(
@@ -67,7 +68,7 @@ def read_worker(px, confidence, sigma_px, b, w, scale, z, sigma, ok):
     return any_ok
 
 
-@numba.njit(**_JIT)
+@numba.njit(fastmath=_REORDER, **_JIT)
 def pixel_spread(p, u, v, depth, cov):
     """Mean variance of a coordinate of the pixel [px^2] of a point with covariance `cov` (3, 3).
 

@@ -19,6 +19,7 @@ _MIRROR = tuple(int(j) for j in MIRROR)
 _BLIND_UPDATES, _BELIEVED_UPDATES = 8, 5
 _LEAST_CHANCE, _MOST_EVIDENCE = 1e-3, 50.0
 _JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
+_REORDER = {"reassoc", "contract", "nsz"}
 
 
 @numba.njit(**_JIT)
@@ -61,18 +62,20 @@ def swap_evidence(camera, c, body, cov, z, sigma, ok, contrast):
         if not depth > NEAREST_DEPTH_M:
             continue
         spread = pixel_spread(camera, u, v, depth, cov[j])
+        odds = 1.0
         if ok[m, c]:
-            total += _log_mixture(z[m, c, 0] - u, z[m, c, 1] - v, sigma[m, c], spread, contrast)
+            odds = _mixture(z[m, c, 0] - u, z[m, c, 1] - v, sigma[m, c], spread, contrast)
         if ok[j, c]:
-            total -= _log_mixture(z[j, c, 0] - u, z[j, c, 1] - v, sigma[j, c], spread, contrast)
+            odds /= _mixture(z[j, c, 0] - u, z[j, c, 1] - v, sigma[j, c], spread, contrast)
+        total += math.log(odds)
     return min(max(total, -_MOST_EVIDENCE), _MOST_EVIDENCE)
 
 
-@numba.njit(**_JIT)
-def _log_mixture(du, dv, sigma, spread, contrast):
-    """Log-density of a detection over that of an outlier, which cancels over a pair."""
-    variance = sigma * sigma + spread
-    return math.log1p(contrast / variance * math.exp(-0.5 * (du * du + dv * dv) / variance))
+@numba.njit(fastmath=_REORDER, **_JIT)
+def _mixture(du, dv, sigma, spread, contrast):
+    """Density of a detection over that of an outlier, but for a factor that pairs share."""
+    near = 1.0 / (sigma * sigma + spread)
+    return 1.0 + contrast * near * math.exp(-0.5 * (du * du + dv * dv) * near)
 
 
 @numba.njit(**_JIT)

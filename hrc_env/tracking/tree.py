@@ -9,13 +9,13 @@ the root, the slope B_j (6, 6) with which it follows its parent q:
 Everything that these say is exact; a joint depends on all others through its parent only.
 """
 
-import math
 from typing import NamedTuple
 
 import numba
 import numpy as np
 
 from hrc_env.skeleton import BONES, N_JOINTS
+from hrc_env.tracking.lanes import LANES, N_SUM_ROWS, N_VIEW_ROWS
 from hrc_env.typing import Floats
 
 PARENT = (1, -1, 1, 1, 2, 3, 4, 1, 2, 7, 8, 9, 10, 11, 12)
@@ -30,6 +30,7 @@ EDGE_BONE = tuple(
     for j in range(N_JOINTS)
 )
 """Row of `skeleton.BONES` that joins a joint to its parent; -1 for the root."""
+_LEAST_PIVOT = 1e-13
 _JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 _REORDER = {"reassoc", "contract", "nsz"}  # lets sums vectorise; NaN and infinity keep meaning
 
@@ -77,6 +78,10 @@ class Work(NamedTuple):
     """(J, 3)."""
     small: Floats
     """(3, 3, 3)."""
+    seen: Floats
+    """One camera's rows of `lanes`."""
+    sums: Floats
+    """All cameras' rows of `lanes`."""
 
 
 @numba.njit(**_JIT)
@@ -105,6 +110,8 @@ def make_work():
         node=np.zeros((2, N_JOINTS, 3, 3)),
         node_gradient=np.zeros(single),
         small=np.zeros((3, 3, 3)),
+        seen=np.zeros(N_VIEW_ROWS * LANES),
+        sums=np.zeros(N_SUM_ROWS * LANES),
     )
 
 
@@ -139,66 +146,111 @@ def transposed_multiply(a, b, out):
 
 
 @numba.njit(fastmath=_REORDER, **_JIT)
-def add_moved(f, a, out):
-    """out += (f x I3) a, for f (2, 2) on (position, velocity) and a (6, 6)."""
-    f00, f01, f10, f11 = f[0, 0], f[0, 1], f[1, 0], f[1, 1]
-    for i in range(3):
-        for k in range(6):
-            p, v = a[i, k], a[3 + i, k]
-            out[i, k] += f00 * p + f01 * v
-            out[3 + i, k] += f10 * p + f11 * v
+def multiply_symmetric(a, b, out):
+    """The lower three blocks of out = a b' for 6x6 matrices whose product is symmetric."""
+    for k in range(3):
+        p0, p1, p2, p3, p4, p5 = b[k, 0], b[k, 1], b[k, 2], b[k, 3], b[k, 4], b[k, 5]
+        n = 3 + k
+        v0, v1, v2, v3, v4, v5 = b[n, 0], b[n, 1], b[n, 2], b[n, 3], b[n, 4], b[n, 5]
+        for i in range(3):
+            near = a[i, 0] * p0 + a[i, 1] * p1 + a[i, 2] * p2
+            out[i, k] = near + a[i, 3] * p3 + a[i, 4] * p4 + a[i, 5] * p5
+            m = 3 + i
+            near = a[m, 0] * p0 + a[m, 1] * p1 + a[m, 2] * p2
+            out[m, k] = near + a[m, 3] * p3 + a[m, 4] * p4 + a[m, 5] * p5
+            near = a[m, 0] * v0 + a[m, 1] * v1 + a[m, 2] * v2
+            out[m, n] = near + a[m, 3] * v3 + a[m, 4] * v4 + a[m, 5] * v5
 
 
 @numba.njit(fastmath=_REORDER, **_JIT)
-def add_moved_transpose(f, a, out):
-    """out += (f x I3) a'."""
-    f00, f01, f10, f11 = f[0, 0], f[0, 1], f[1, 0], f[1, 1]
-    for i in range(3):
-        for k in range(6):
-            p, v = a[k, i], a[k, 3 + i]
-            out[i, k] += f00 * p + f01 * v
-            out[3 + i, k] += f10 * p + f11 * v
+def transposed_multiply_symmetric(a, b, out):
+    """The lower three blocks of out = a' b for 6x6 matrices whose product is symmetric."""
+    for k in range(3):
+        p0, p1, p2, p3, p4, p5 = b[0, k], b[1, k], b[2, k], b[3, k], b[4, k], b[5, k]
+        n = 3 + k
+        v0, v1, v2, v3, v4, v5 = b[0, n], b[1, n], b[2, n], b[3, n], b[4, n], b[5, n]
+        for i in range(3):
+            near = a[0, i] * p0 + a[1, i] * p1 + a[2, i] * p2
+            out[i, k] = near + a[3, i] * p3 + a[4, i] * p4 + a[5, i] * p5
+            m = 3 + i
+            near = a[0, m] * p0 + a[1, m] * p1 + a[2, m] * p2
+            out[m, k] = near + a[3, m] * p3 + a[4, m] * p4 + a[5, m] * p5
+            near = a[0, m] * v0 + a[1, m] * v1 + a[2, m] * v2
+            out[m, n] = near + a[3, m] * v3 + a[4, m] * v4 + a[5, m] * v5
 
 
 @numba.njit(fastmath=_REORDER, **_JIT)
-def add_moved_right(a, f, out):
-    """out += a (f x I3)'."""
-    f00, f01, f10, f11 = f[0, 0], f[0, 1], f[1, 0], f[1, 1]
-    for i in range(6):
+def inverse_of(a00, a10, a11, a20, a21, a22):
+    """Inverse of a symmetric 3x3 matrix by its L D L' factors; whether it is positive definite.
+
+    Six numbers in, six and the answer out: 00, 10, 11, 20, 21, 22. Unlike by cofactors, a
+    matrix that is nearly singular (a depth known far worse than what is across it) costs no
+    digits.
+    """
+    d0 = 1.0 / a00
+    l10, l20 = a10 * d0, a20 * d0
+    p1, rest = a11 - l10 * a10, a21 - l20 * a10
+    d1 = 1.0 / p1
+    l21 = rest * d1
+    p2 = a22 - l20 * a20 - l21 * rest
+    i22 = 1.0 / p2
+    back = l10 * l21 - l20
+    i20, i21 = back * i22, -l21 * i22
+    i11, i10 = d1 - l21 * i21, -l10 * d1 - l21 * i20
+    i00 = d0 + l10 * l10 * d1 + back * i20
+    proper = a00 > _LEAST_PIVOT and p1 > _LEAST_PIVOT and p2 > _LEAST_PIVOT
+    return i00, i10, i11, i20, i21, i22, proper
+
+
+@numba.njit(fastmath=_REORDER, **_JIT)
+def halves_of(a, work):
+    """Two inverses, as `inverse_of` gives them, of blocks of a symmetric 6x6 matrix.
+
+    The first of its upper block, the second of what is left of the lower one when the upper is
+    given; `a` is positive definite if both are. Only its lower half is looked at. The first
+    three rows of `work` (6, 6) get the slope of the lower half on the upper.
+    """
+    p = inverse_of(a[0, 0], a[1, 0], a[1, 1], a[2, 0], a[2, 1], a[2, 2])
+    for i in range(3):
+        x, y, z = a[3 + i, 0], a[3 + i, 1], a[3 + i, 2]
+        work[i, 0] = x * p[0] + y * p[1] + z * p[3]
+        work[i, 1] = x * p[1] + y * p[2] + z * p[4]
+        work[i, 2] = x * p[3] + y * p[4] + z * p[5]
+    for i in range(3):
         for k in range(3):
-            p, v = a[i, k], a[i, 3 + k]
-            out[i, k] += p * f00 + v * f01
-            out[i, 3 + k] += p * f10 + v * f11
+            known = work[i, 0] * a[3 + k, 0] + work[i, 1] * a[3 + k, 1] + work[i, 2] * a[3 + k, 2]
+            work[3 + i, k] = a[3 + i, 3 + k] - known
+    v = inverse_of(work[3, 0], work[4, 0], work[4, 1], work[5, 0], work[5, 1], work[5, 2])
+    return p, v
 
 
 @numba.njit(fastmath=_REORDER, **_JIT)
-def invert(a, out, factor):
+def invert(a, out, work):
     """Inverse of a symmetric positive definite 6x6 matrix; False if it is not one.
 
-    By Cholesky: `factor` (6, 6) becomes the inverse of the lower factor.
+    Only the lower half of `a` is looked at; `work` (6, 6) is scratch.
     """
-    for i in range(6):
-        for k in range(i):
-            rest = a[i, k]
-            for m in range(k):
-                rest -= factor[i, m] * factor[k, m]
-            factor[i, k] = rest * factor[k, k]
-        rest = a[i, i]
-        for m in range(i):
-            rest -= factor[i, m] * factor[i, m]
-        if not rest > 1e-13:
-            return False
-        factor[i, i] = 1.0 / math.sqrt(rest)
-    for i in range(1, 6):
-        for k in range(i):
-            rest = 0.0
-            for m in range(k, i):
-                rest -= factor[i, m] * factor[m, k]
-            factor[i, k] = rest * factor[i, i]
-    for i in range(6):
-        for k in range(i + 1):
-            total = 0.0
-            for m in range(i, 6):
-                total += factor[m, i] * factor[m, k]
-            out[i, k] = out[k, i] = total
+    p, v = halves_of(a, work)
+    if not (p[6] and v[6]):
+        return False
+    _fill(out, 3, v)
+    _fill(out, 0, p)
+    for k in range(3):
+        x, y, z = work[0, k], work[1, k], work[2, k]
+        out[3, k] = out[k, 3] = -(v[0] * x + v[1] * y + v[3] * z)
+        out[4, k] = out[k, 4] = -(v[1] * x + v[2] * y + v[4] * z)
+        out[5, k] = out[k, 5] = -(v[3] * x + v[4] * y + v[5] * z)
+    for i in range(3):
+        x, y, z = work[0, i], work[1, i], work[2, i]
+        for k in range(3):
+            out[i, k] -= x * out[3, k] + y * out[4, k] + z * out[5, k]
     return True
+
+
+@numba.njit(**_JIT)
+def _fill(out, at, half):
+    """Put a symmetric 3x3 block, given by its lower half, on the diagonal of `out`."""
+    out[at, at], out[at + 1, at + 1], out[at + 2, at + 2] = half[0], half[2], half[5]
+    out[at + 1, at] = out[at, at + 1] = half[1]
+    out[at + 2, at] = out[at, at + 2] = half[3]
+    out[at + 2, at + 1] = out[at + 1, at + 2] = half[4]

@@ -17,9 +17,6 @@ from hrc_env.tracking.tree import (
     HAS_CHILD,
     ORDER,
     PARENT,
-    add_moved,
-    add_moved_right,
-    add_moved_transpose,
     invert,
     multiply,
     multiply_transposed,
@@ -27,6 +24,7 @@ from hrc_env.tracking.tree import (
 
 _LEFT, _RIGHT, _LEFT_HIP, _RIGHT_HIP = 1, 2, 7, 8  # shoulders: _RIGHT, _LEFT_HIP hang on _LEFT
 _JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
+_REORDER = {"reassoc", "contract", "nsz"}
 
 
 @numba.njit(**_JIT)
@@ -115,41 +113,65 @@ def _relate_to_root(cov, slope, w):
             multiply(slope[j], common[PARENT[j]], common[j])
 
 
-@numba.njit(**_JIT)
+@numba.njit(fastmath=_REORDER, **_JIT)
 def _move_covariances(cov, F, travel, Q, shared, w):
     """C' = F C F' + F Y D' + D Y' F' + D S D' + Q; edges likewise with the parent's F and D."""
     S, X, common = w.a, w.cross, w.with_root
-    with_root, moved, out = w.b, w.c, w.d
-    for m in range(len(ORDER) - 1, -1, -1):  # children first: an edge needs both ends as they were
-        j = ORDER[m]
-        q = PARENT[j]
-        with_root[:] = 0.0
-        add_moved(F[j], common[j], with_root)
-        add_moved(travel[j], S, with_root)
-        if q >= 0:
-            moved[:] = 0.0
-            add_moved(F[j], X[j], moved)
-            add_moved_transpose(travel[j], common[q], moved)
-            _start_with(shared, X[j])
-            add_moved_right(moved, F[q], X[j])
-            add_moved_right(with_root, travel[q], X[j])
-        moved[:] = 0.0
-        add_moved(F[j], cov[j], moved)
-        add_moved_transpose(travel[j], common[j], moved)
-        _start_with(Q[j], out)
-        add_moved_right(moved, F[j], out)
-        add_moved_right(with_root, travel[j], out)
-        for i in range(6):
-            for k in range(6):
-                cov[j, i, k] = 0.5 * (out[i, k] + out[k, i])
+    for j in range(len(cov)):
+        q, here = PARENT[j], (_entries(F[j], 0, 0, 1), _entries(travel[j], 0, 0, 1))
+        for i in range(3):
+            for k in range(i + 1):
+                blocks = (cov[j], common[j], common[j], S)
+                pp, pv, vp, vv = _moved(*blocks, i, k, *here, *here)
+                cov[j, i, k] = cov[j, k, i] = pp
+                cov[j, i, 3 + k] = cov[j, 3 + k, i] = pv
+                cov[j, 3 + i, k] = cov[j, k, 3 + i] = vp
+                cov[j, 3 + i, 3 + k] = cov[j, 3 + k, 3 + i] = vv
+        _add_noise(Q[j], cov[j])
+        if q < 0:
+            continue
+        there = (_entries(F[q], 0, 0, 1), _entries(travel[q], 0, 0, 1))
+        for i in range(3):
+            for k in range(3):
+                moved = _moved(X[j], common[j], common[q], S, i, k, *here, *there)
+                X[j, i, k], X[j, i, 3 + k], X[j, 3 + i, k], X[j, 3 + i, 3 + k] = moved
+        _add_noise(shared, X[j])
+
+
+@numba.njit(fastmath=_REORDER, forceinline=True, **_JIT)
+def _moved(edge, own, other, S, i, k, f, d, g, e):
+    """The (2, 2) entries of axes i, k of f edge g' + f own e' + d other' g' + d S e'."""
+    c00, c01, c10, c11 = _entries(edge, i, k, 3)
+    y00, y01, y10, y11 = _entries(own, i, k, 3)
+    t00, t10, t01, t11 = _entries(other, k, i, 3)
+    s00, s01, s10, s11 = _entries(S, i, k, 3)
+    m00 = c00 * g[0] + c01 * g[1] + y00 * e[0] + y01 * e[1]
+    m01 = c00 * g[2] + c01 * g[3] + y00 * e[2] + y01 * e[3]
+    m10 = c10 * g[0] + c11 * g[1] + y10 * e[0] + y11 * e[1]
+    m11 = c10 * g[2] + c11 * g[3] + y10 * e[2] + y11 * e[3]
+    n00 = t00 * g[0] + t01 * g[1] + s00 * e[0] + s01 * e[1]
+    n01 = t00 * g[2] + t01 * g[3] + s00 * e[2] + s01 * e[3]
+    n10 = t10 * g[0] + t11 * g[1] + s10 * e[0] + s11 * e[1]
+    n11 = t10 * g[2] + t11 * g[3] + s10 * e[2] + s11 * e[3]
+    return (
+        f[0] * m00 + f[1] * m10 + d[0] * n00 + d[1] * n10,
+        f[0] * m01 + f[1] * m11 + d[0] * n01 + d[1] * n11,
+        f[2] * m00 + f[3] * m10 + d[2] * n00 + d[3] * n10,
+        f[2] * m01 + f[3] * m11 + d[2] * n01 + d[3] * n11,
+    )
+
+
+@numba.njit(forceinline=True, **_JIT)
+def _entries(a, i, k, far):
+    """Four entries of `a` that are `far` from each other, from (i, k) on: a 2x2 matrix."""
+    return a[i, k], a[i, far + k], a[far + i, k], a[far + i, far + k]
 
 
 @numba.njit(**_JIT)
-def _start_with(noise, out):
-    """out (6, 6) = noise (2, 2) x I3."""
-    for i in range(6):
-        for k in range(6):
-            out[i, k] = 0.0
+def _add_noise(noise, out):
+    """out (6, 6) += noise (2, 2) x I3."""
     for i in range(3):
-        out[i, i], out[i, 3 + i] = noise[0, 0], noise[0, 1]
-        out[3 + i, i], out[3 + i, 3 + i] = noise[1, 0], noise[1, 1]
+        out[i, i] += noise[0, 0]
+        out[i, 3 + i] += noise[0, 1]
+        out[3 + i, i] += noise[1, 0]
+        out[3 + i, 3 + i] += noise[1, 1]

@@ -9,10 +9,9 @@ import math
 
 import numba
 
-from hrc_env.geometry.triangulation import inverse3
 from hrc_env.skeleton import JOINT
-from hrc_env.tracking.proposal import add_cameras
-from hrc_env.tracking.tree import ORDER, PARENT
+from hrc_env.tracking.lanes import add_view, lanes_of, read_sums, set_points
+from hrc_env.tracking.tree import ORDER, PARENT, inverse_of
 
 _NOSE, _RIGHT_SHOULDER = JOINT["nose"], JOINT["right_shoulder"]
 _JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
@@ -47,12 +46,13 @@ def find_pose_near(body, cov, slope, seen, bones, contrast, n_steps, widen, beli
     `widen` times the prior's own image variance is added to the detector's in the first step.
     """
     _position_prior(cov, slope, w)
+    joints, views = lanes_of(cov, seen)
     for j in range(len(body)):
         for i in range(3):
             w.shift[j, i] = w.point[j, i] - body[j, i]
     for step in range(n_steps + 1):
         widening = widen if step < n_steps - 1 else 0.0
-        _linearise_cameras(cov, seen, contrast, widening, belief, w)
+        _linearise_cameras(joints, views, seen[0], contrast, widening, belief, w)
         _linearise_bones(bones, w)
         if step < n_steps:
             _solve_positions(w)
@@ -62,7 +62,7 @@ def find_pose_near(body, cov, slope, seen, bones, contrast, n_steps, widen, beli
         widen *= 0.5
 
 
-@numba.njit(**_JIT)
+@numba.njit(fastmath=_REORDER, **_JIT)
 def _position_prior(cov, slope, w):
     precision, pull, through = w.prior[0], w.prior[1], w.prior[2]
     edge, follow, rest = w.small[0], w.small[1], w.small[2]
@@ -70,46 +70,83 @@ def _position_prior(cov, slope, w):
         j = ORDER[m]
         q = PARENT[j]
         if q < 0:
-            rest[:] = cov[j, :3, :3]
-            inverse3(rest, precision[j])
+            _put(_inverse(cov[j]), precision[j])
             continue
-        inverse3(cov[q], rest)
         for i in range(3):
             for k in range(3):
-                total = 0.0
-                for h in range(6):
-                    total += slope[j, i, h] * cov[q, h, k]
-                edge[i, k] = total
+                near = slope[j, i, 0] * cov[q, 0, k] + slope[j, i, 1] * cov[q, 1, k]
+                near += slope[j, i, 2] * cov[q, 2, k] + slope[j, i, 3] * cov[q, 3, k]
+                edge[i, k] = near + slope[j, i, 4] * cov[q, 4, k] + slope[j, i, 5] * cov[q, 5, k]
         if j == _RIGHT_SHOULDER:
             for i in range(3):
                 for k in range(3):
                     w.across[i, k] = cov[j, i, k] + cov[q, i, k] - edge[i, k] - edge[k, i]
-        _product(edge, rest, follow)
+        _multiply_transposed(_inverse(cov[q]), edge, follow)  # the slope's transpose
         for i in range(3):
             for k in range(3):
-                known = follow[i, 0] * edge[k, 0] + follow[i, 1] * edge[k, 1]
-                rest[i, k] = cov[j, i, k] - known - follow[i, 2] * edge[k, 2]
-        inverse3(rest, precision[j])
-        _product(precision[j], follow, pull[j])
-        _transposed_product(follow, pull[j], through[j])
+                known = edge[i, 0] * follow[0, k] + edge[i, 1] * follow[1, k]
+                rest[i, k] = cov[j, i, k] - known - edge[i, 2] * follow[2, k]
+        given = _inverse(rest)
+        _put(given, precision[j])
+        _multiply_transposed(given, follow, pull[j])
+        for i in range(3):
+            for k in range(3):
+                near = follow[i, 0] * pull[j, 0, k] + follow[i, 1] * pull[j, 1, k]
+                through[j, i, k] = near + follow[i, 2] * pull[j, 2, k]
+
+
+@numba.njit(forceinline=True, **_JIT)
+def _inverse(a):
+    """Of the upper left 3x3 block of a symmetric matrix, as `tree.inverse_of` gives it."""
+    return inverse_of(a[0, 0], a[1, 0], a[1, 1], a[2, 0], a[2, 1], a[2, 2])
+
+
+@numba.njit(forceinline=True, **_JIT)
+def _put(half, out):
+    out[0, 0], out[1, 1], out[2, 2] = half[0], half[2], half[5]
+    out[1, 0] = out[0, 1] = half[1]
+    out[2, 0] = out[0, 2] = half[3]
+    out[2, 1] = out[1, 2] = half[4]
+
+
+@numba.njit(fastmath=_REORDER, forceinline=True, **_JIT)
+def _multiply(half, a, out):
+    """out = s a for a symmetric s given as `inverse_of` gives it."""
+    for k in range(3):
+        x, y, z = a[0, k], a[1, k], a[2, k]
+        out[0, k] = half[0] * x + half[1] * y + half[3] * z
+        out[1, k] = half[1] * x + half[2] * y + half[4] * z
+        out[2, k] = half[3] * x + half[4] * y + half[5] * z
+
+
+@numba.njit(fastmath=_REORDER, forceinline=True, **_JIT)
+def _multiply_transposed(half, a, out):
+    """out = s a' for a symmetric s."""
+    for k in range(3):
+        x, y, z = a[k, 0], a[k, 1], a[k, 2]
+        out[0, k] = half[0] * x + half[1] * y + half[3] * z
+        out[1, k] = half[1] * x + half[2] * y + half[4] * z
+        out[2, k] = half[3] * x + half[4] * y + half[5] * z
 
 
 @numba.njit(**_JIT)
-def _linearise_cameras(cov, seen, contrast, widening, belief, w):
-    P, z, sigma, ok = seen
-    for j in range(len(ok)):
-        information, gradient = w.camera_information[j], w.camera_gradient[j]
+def _linearise_cameras(joints, views, P, contrast, widening, belief, w):
+    """Information and gradient of what the cameras say, at w.point; `joints`, `views`: `camera`."""
+    sums = w.sums
+    set_points(w.point, joints)
+    sums[:] = 0.0
+    for c in range(len(P)):
+        add_view(P[c], joints, views[c], widening, contrast, w.seen, sums)
+        for j in range(len(belief)):
+            belief[j, c] = w.seen[j]
+    for j in range(len(belief)):
+        read_sums(sums, j, w.camera_information[j], w.camera_gradient[j])
         for i in range(3):
-            gradient[i] = 0.0
-            for k in range(3):
-                information[i, k] = 0.0
-        add_cameras(
-            P, z[j], sigma[j], ok[j], w.point[j], cov[j], widening, contrast,
-            information, gradient, belief[j],
-        )  # fmt: skip
-        s0, s1, s2 = w.shift[j, 0], w.shift[j, 1], w.shift[j, 2]
-        for i in range(3):
-            gradient[i] += information[i, 0] * s0 + information[i, 1] * s1 + information[i, 2] * s2
+            w.camera_gradient[j, i] += (
+                w.camera_information[j, i, 0] * w.shift[j, 0]
+                + w.camera_information[j, i, 1] * w.shift[j, 1]
+                + w.camera_information[j, i, 2] * w.shift[j, 2]
+            )
 
 
 @numba.njit(**_JIT)
@@ -125,7 +162,7 @@ def _linearise_bones(bones, w):
     _add_bone(_NOSE, _RIGHT_SHOULDER, length[_NOSE], variance[_NOSE], True, w)
 
 
-@numba.njit(**_JIT)
+@numba.njit(fastmath=_REORDER, forceinline=True, **_JIT)
 def _add_bone(j, end, length, variance, across, w):
     """A bone from joint j to `end`, its parent or (`across`) the right shoulder.
 
@@ -136,14 +173,16 @@ def _add_bone(j, end, length, variance, across, w):
     x, y = w.point[j, 0] - w.point[end, 0], w.point[j, 1] - w.point[end, 1]
     z = w.point[j, 2] - w.point[end, 2]
     now = math.sqrt(x * x + y * y + z * z) + 1e-9
-    along = (x / now, y / now, z / now)
+    scale = 1.0 / now
+    along = (x * scale, y * scale, z * scale)
     miss, q = length - now, PARENT[j]
     for i in range(3):
         miss += along[i] * (w.shift[j, i] - w.shift[q, i])
         for k in range(3):
             variance += along[i] * w.across[i, k] * along[k] if across else 0.0
+    known = 1.0 / variance
     for i in range(3):
-        pull = along[i] / variance
+        pull = along[i] * known
         w.edge_gradient[j, i] += pull * miss
         for k in range(3):
             w.edge_information[j, i, k] += pull * along[k]
@@ -175,13 +214,16 @@ def _solve_positions(w):
                     hessian[i, k] += both
                     coupling[i, k] = pull[j, i, k] + both
                     inverse[q, i, k] += through[j, i, k] + both
-        inverse3(hessian, inverse[j])
+        half = _inverse(hessian)
+        _put(half, inverse[j])
         if q < 0:
             continue
-        _product(inverse[j], coupling, follow[j])
+        _multiply(half, coupling, follow[j])
+        g0, g1, g2 = gradient[j, 0], gradient[j, 1], gradient[j, 2]
         for i in range(3):
+            known = follow[j, 0, i] * g0 + follow[j, 1, i] * g1
+            gradient[q, i] += known + follow[j, 2, i] * g2
             for k in range(3):
-                gradient[q, i] += follow[j, k, i] * gradient[j, k]
                 known = coupling[0, i] * follow[j, 0, k] + coupling[1, i] * follow[j, 1, k]
                 inverse[q, i, k] -= known + coupling[2, i] * follow[j, 2, k]
     for m in range(len(ORDER)):
@@ -191,20 +233,7 @@ def _solve_positions(w):
             total = 0.0
             for k in range(3):
                 total += inverse[j, i, k] * gradient[j, k]
-                if q >= 0:
+            if q >= 0:
+                for k in range(3):
                     total += follow[j, i, k] * w.shift[q, k]
             w.shift[j, i] = total
-
-
-@numba.njit(**_JIT)
-def _product(a, b, out):
-    for i in range(3):
-        for k in range(3):
-            out[i, k] = a[i, 0] * b[0, k] + a[i, 1] * b[1, k] + a[i, 2] * b[2, k]
-
-
-@numba.njit(**_JIT)
-def _transposed_product(a, b, out):
-    for i in range(3):
-        for k in range(3):
-            out[i, k] = a[0, i] * b[0, k] + a[1, i] * b[1, k] + a[2, i] * b[2, k]

@@ -14,8 +14,8 @@ from hrc_env.tracking.tree import (
     PARENT,
     invert,
     multiply,
-    multiply_transposed,
-    transposed_multiply,
+    multiply_symmetric,
+    transposed_multiply_symmetric,
 )
 
 _NEAREST_M = 0.3
@@ -53,13 +53,16 @@ def update_tree(body, cov, slope, w):
     _substitute(body, slope, w)
 
 
-@numba.njit(fastmath=_REORDER, **_JIT)
+@numba.njit(fastmath=_REORDER, forceinline=True, **_JIT)
 def _eliminate(j, cov, slope, w):
-    """Make a joint's slope and inverse Hessian the posterior ones; tell its parent the rest."""
+    """Make a joint's slope and inverse Hessian the posterior ones; tell its parent the rest.
+
+    Of symmetric matrices only the lower three blocks are kept up.
+    """
     q = PARENT[j]
     conditional, coupling, through, factor = w.a, w.b, w.c, w.d
     multiply(slope[j], cov[q], through)
-    multiply_transposed(through, slope[j], coupling)
+    multiply_symmetric(through, slope[j], coupling)
     for i in range(6):
         for k in range(6):
             coupling[i, k] = cov[j, i, k] - coupling[i, k]
@@ -69,36 +72,37 @@ def _eliminate(j, cov, slope, w):
             for k in range(6):
                 conditional[i, k] = 1.0 / cov[j, i, i] if i == k else 0.0
     multiply(conditional, slope[j], coupling)
-    transposed_multiply(slope[j], coupling, through)
+    transposed_multiply_symmetric(slope[j], coupling, through)
     for i in range(3):
         w.gradient[j, i] += w.edge_gradient[j, i]
         w.gradient[q, i] -= w.edge_gradient[j, i]
         for k in range(3):
-            both = w.edge_information[j, i, k]
-            conditional[i, k] += both
-            coupling[i, k] += both
-            through[i, k] += both
+            coupling[i, k] += w.edge_information[j, i, k]
+            conditional[i, k] += w.edge_information[j, i, k]
+            through[i, k] += w.edge_information[j, i, k]
     for i in range(6):
         for k in range(6):
             conditional[i, k] += w.information[j, i, k]
             w.information[q, i, k] += through[i, k]
     invert(conditional, w.inverse[j], factor)
     multiply(w.inverse[j], coupling, slope[j])
-    transposed_multiply(coupling, slope[j], through)
+    transposed_multiply_symmetric(coupling, slope[j], through)
     for i in range(6):
         for k in range(6):
             w.information[q, i, k] -= through[i, k]
 
 
-@numba.njit(fastmath=_REORDER, **_JIT)
+@numba.njit(fastmath=_REORDER, forceinline=True, **_JIT)
 def _marginalise(j, cov, slope, w):
     """C_j = inverse Hessian + B_j C_parent B_j'."""
     multiply(slope[j], cov[PARENT[j]], w.a)
-    multiply_transposed(w.a, slope[j], w.b)
-    for i in range(6):
-        for k in range(6):
-            own = 0.5 * (w.inverse[j, i, k] + w.inverse[j, k, i])
-            cov[j, i, k] = own + 0.5 * (w.b[i, k] + w.b[k, i])
+    multiply_symmetric(w.a, slope[j], w.b)
+    for i in range(3):
+        for k in range(3):
+            m, n = 3 + i, 3 + k
+            cov[j, i, k] = w.inverse[j, i, k] + 0.5 * (w.b[i, k] + w.b[k, i])
+            cov[j, m, k] = cov[j, k, m] = w.inverse[j, m, k] + w.b[m, k]
+            cov[j, m, n] = w.inverse[j, m, n] + 0.5 * (w.b[m, n] + w.b[n, m])
 
 
 @numba.njit(fastmath=_REORDER, **_JIT)
@@ -107,10 +111,11 @@ def _substitute(body, slope, w):
     for m in range(len(ORDER) - 1, 0, -1):
         j = ORDER[m]
         q = PARENT[j]
-        for k in range(6):
-            pull = w.gradient[j, k]
-            for i in range(6):
-                w.gradient[q, i] += slope[j, k, i] * pull
+        for i in range(6):
+            pull = 0.0
+            for k in range(6):
+                pull += slope[j, k, i] * w.gradient[j, k]
+            w.gradient[q, i] += pull
     for m in range(len(ORDER)):
         j = ORDER[m]
         q = PARENT[j]
@@ -118,9 +123,13 @@ def _substitute(body, slope, w):
             total = 0.0
             for k in range(6):
                 total += w.inverse[j, i, k] * w.gradient[j, k]
-                if q >= 0:
-                    total += slope[j, i, k] * w.step[q, k]
             w.step[j, i] = total
+        if q >= 0:
+            for i in range(6):
+                total = 0.0
+                for k in range(6):
+                    total += slope[j, i, k] * w.step[q, k]
+                w.step[j, i] += total
         for i in range(6):
             body[j, i] += w.step[j, i]
 

@@ -17,7 +17,7 @@ from hrc_env.tracking.acquisition import (
     middle_of,
     triangulate_body,
 )
-from hrc_env.tracking.motion_model import is_positive_definite
+from hrc_env.tracking.tree import halves_of
 
 _FOUND_SPEED_STD_M_S = 1.0
 _FURTHEST_STD = 4.0
@@ -97,15 +97,19 @@ def check(state, b, w, s):
     body, cov, inside, well = state.body[b, w], state.cov[b, w], True, True
     factor = np.empty((6, 6))
     for j in range(len(body)):
-        if not is_positive_definite(cov[j], factor):
+        given, rest = halves_of(cov[j], factor)
+        if not (given[6] and rest[6]):
             well = False
             for i in range(6):
                 variance = cov[j, i, i]
                 cov[j, i, :], cov[j, :, i] = 0.0, 0.0
                 cov[j, i, i] = max(variance, 1e-4)
         away = distance(body[j], s.prior_mean_world)
-        inside &= away < _FURTHEST_STD * s.prior_std_m and math.isfinite(cov[j].sum())
-        inside &= math.isfinite(body[j].sum())
+        variances, numbers = 0.0, 0.0
+        for i in range(6):
+            variances += cov[j, i, i]  # where these are finite, what lies between them is
+            numbers += body[j, i]
+        inside &= away < _FURTHEST_STD * s.prior_std_m and math.isfinite(variances + numbers)
     if inside:
         return well
     state.tracked[b, w] = False
