@@ -10,6 +10,7 @@ from hrc_env.experiments.footage_fetch import WHEEL, fetch_footage
 from hrc_env.experiments.footage_film import film_track
 from hrc_env.experiments.footage_lag import lag_of
 from hrc_env.experiments.footage_metrics import (
+    NAMES,
     bone_std,
     follow,
     foretell,
@@ -21,7 +22,6 @@ from hrc_env.geometry.cameras import projections
 from hrc_env.perception.films import Films
 from hrc_env.results import Metric, write_results
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.estimators import ESTIMATORS
 from hrc_env.typing import Floats
 
 Say = Callable[[float, str], None]
@@ -58,8 +58,8 @@ def run(out: Path, say: Say) -> dict[str, Metric]:
     lags = lag_of(P, detections)
     in_step = detections.shifted(lags)
     metrics: dict[str, Metric] = {}
-    for name in ESTIMATORS:
-        say(_ESTIMATING / len(ESTIMATORS), name)
+    for name in NAMES:
+        say(_ESTIMATING / len(NAMES), name)
         metrics |= _of_estimator(name, P, config, detections, in_step)
     for camera, lag in zip(pinholes, lags, strict=True):
         metrics[f"real_lag_frames.{camera.name}"] = Metric(lag, lag, lag, "frames", 1)
@@ -70,7 +70,7 @@ def run(out: Path, say: Say) -> dict[str, Metric]:
         "tracker": asdict(config),
     }
     write_results(out / "results.json", settings, [0], dict(sorted(metrics.items())))
-    (out / "real.md").write_text(markdown(metrics, list(ESTIMATORS)))
+    (out / "real.md").write_text(markdown(metrics, NAMES))
     track = follow(FOLLOWER, P, config, in_step, list(range(len(P))))
     film_track(
         out / "real.mp4",
@@ -118,7 +118,7 @@ def markdown(metrics: Mapping[str, Metric], names: list[str]) -> str:
         "step`: frames shifted by the lags below. Coverage: share of held-out detections within "
         "the 95 % region of belief and detector. Bones and jerk with all cameras; the last "
         "column is the mean share of frames in which two cameras, any pair, kept all joints "
-        "fresh.\n\n"
+        "fresh. The smoother is offline: it sees the whole recording at once.\n\n"
         f"{table}\n\n"
         f"Lag in frames: {', '.join(lags)}.\n"
     )

@@ -20,6 +20,8 @@ from hrc_env.tracking.config import TrackerConfig
 from hrc_env.typing import Floats, Points3
 
 _PER_PX = 64.0
+_PARALLEL = 1e9
+"""Condition number from which axes count as parallel."""
 _HALF_TURN_ABOUT_X = np.diag([1.0, -1.0, -1.0])
 
 
@@ -61,13 +63,22 @@ def read_calibration(path: Path, sizes_px: list[tuple[int, int]]) -> list[Filmed
 
 
 def meeting_point(cameras: list[PinholeCamera]) -> Points3:
-    """(3,) the point that is nearest to all optical axes [m]."""
+    """(3,) the point that is nearest to all optical axes [m].
+
+    Raises:
+        ConfigError: the axes are parallel and meet nowhere.
+    """
     normal, rhs = np.zeros((3, 3)), np.zeros(3)
     for camera in cameras:
         along = camera.T_world_from_cam[:3, 2]
         across = np.eye(3) - np.outer(along, along)
         normal += across
         rhs += across @ camera.eye_world
+    if np.linalg.cond(normal) > _PARALLEL:
+        raise ConfigError(
+            "The optical axes must meet somewhere; these cameras' are parallel: is the "
+            "calibration that of another recording?"
+        )
     return np.asarray(np.linalg.solve(normal, rhs), float)
 
 

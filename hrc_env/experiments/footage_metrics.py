@@ -17,9 +17,14 @@ from hrc_env.records import PoseEstimate
 from hrc_env.results import Metric
 from hrc_env.skeleton import BONES, MIRROR
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.estimators import make_estimator
+from hrc_env.tracking.estimators import ESTIMATORS, make_estimator
+from hrc_env.tracking.smoother import smooth
 from hrc_env.typing import Bools, Covariances3, Floats, Points3
 
+SMOOTHER = "smoother"
+"""Offline: it sees the whole recording at once."""
+NAMES = [*ESTIMATORS, SMOOTHER]
+"""Who runs on real footage."""
 FRESH_S = 0.2
 """A joint counts as updated when a measurement supported it within so many seconds."""
 CHI2_95_2D = 5.991
@@ -46,7 +51,16 @@ class Track:
 def follow(
     name: str, P: Floats, config: TrackerConfig, detections: Detections, cameras: list[int]
 ) -> Track:
-    """Run an estimator on some of the cameras of a recording."""
+    """Run an estimator, or the smoother, on some of the cameras of a recording."""
+    if name == SMOOTHER:
+        clip = [detections.keypoints(t, cameras) for t in range(len(detections.px))]
+        belief = smooth(P[cameras], clip, detections.dt_s, config)
+        return Track(
+            belief.mean_world[:, 0, 0],
+            belief.cov_world[:, 0, 0],
+            belief.age_s[:, 0, 0],
+            belief.tracked[:, 0, 0],
+        )
     rows = list(_follow(name, P, config, detections, cameras))
     return Track(
         np.stack([row.mean_world[0, 0] for row in rows]),
