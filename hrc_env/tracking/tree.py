@@ -136,16 +136,6 @@ def multiply_transposed(a, b, out):
 
 
 @numba.njit(fastmath=_REORDER, **_JIT)
-def transposed_multiply(a, b, out):
-    """out = a' b for 6x6 matrices."""
-    for i in range(6):
-        a0, a1, a2, a3, a4, a5 = a[0, i], a[1, i], a[2, i], a[3, i], a[4, i], a[5, i]
-        for k in range(6):
-            near = a0 * b[0, k] + a1 * b[1, k] + a2 * b[2, k]
-            out[i, k] = near + a3 * b[3, k] + a4 * b[4, k] + a5 * b[5, k]
-
-
-@numba.njit(fastmath=_REORDER, **_JIT)
 def multiply_symmetric(a, b, out):
     """The lower three blocks of out = a b' for 6x6 matrices whose product is symmetric."""
     for k in range(3):
