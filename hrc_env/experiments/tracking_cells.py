@@ -110,9 +110,10 @@ def _smoothed(
 
 
 def _forget_bones(state: Any) -> None:
-    """Tell an estimator that nothing is known of any bone's length."""
-    if hasattr(state, "bone_variance"):
-        state.bone_variance[...] = UNKNOWN_M2
+    """Tell an estimator, or each of its hypotheses, that nothing is known of bones' lengths."""
+    for record in (state, getattr(state, "slots", state)):
+        if hasattr(record, "bone_variance"):
+            record.bone_variance[...] = UNKNOWN_M2
 
 
 def run_cell(

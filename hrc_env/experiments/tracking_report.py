@@ -72,12 +72,15 @@ def markdown(metrics: _Metrics) -> str:
 _INTRODUCTION = f"""\
 Numbers in brackets are 95 % bootstrap intervals over sequences. `lab` and `site` are the bench's
 own walkers and white detections of 3 px; `own` is the environment's worker seen through its
-emulator of the detector. `one_camera_...` are the first half second, second and two seconds of
-the four in which one camera is left, `after_return` is what comes a second later. `{DLT}` is
-plain triangulation of every frame by itself; `{SMOOTHER}` knows the whole clip and is no rival."""
+emulator of the detector. `hard` is occlusion, gross errors and exchanged sides; in `drifting`
+detections err in the same way for half a second, of which nobody is told. `one_camera_...` are
+the first half second, second and two seconds of the four in which one camera is left,
+`after_return` is what comes a second later. `{DLT}` is plain triangulation of every frame by
+itself; `{SMOOTHER}` knows the whole clip and is no rival."""
 _ABOUT_THE_BOUND = """\
 `matched` bodies move as the estimators' motion model says, without bones; estimators are told so
-(no outliers, no exchanged sides, nothing known of bone lengths), and still learn the joints'
+(no outliers, no exchanged sides, detections as good as they say, nothing known of bone lengths),
+and still learn the joints'
 places on the body. `matched_bones` have bones, to which no estimator is matched; the bound knows
 the bones' directions, which nobody else can, so that it is out of reach by a second order even
 for `full_state`, which filters all 90 states with the model the sequences were drawn from. The

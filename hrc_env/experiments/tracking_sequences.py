@@ -135,8 +135,8 @@ def make_sequences(rig: Rig, condition: str, seeds: list[int]) -> Sequences:
 def _matched(rig: Rig, condition: str, seeds: list[int]) -> Sequences:
     """Sequences from the estimators' own model, of which they are told what can be told.
 
-    That is: the shared acceleration, no outliers, no exchanged sides; and without bones, that a
-    body may be of any size.
+    That is: the shared acceleration, no outliers, no exchanged sides, detections as good as they
+    say; and without bones, that a body may be of any size.
     """
     n_bones = len(BONES) if condition == MATCHED_BONES else 0
     config = replace(
@@ -144,6 +144,7 @@ def _matched(rig: Rig, condition: str, seeds: list[int]) -> Sequences:
         root_acceleration=MATCHED_ROOT_ACCELERATION,
         outlier_weight=1e-9,
         swap_begins=1e-9,
+        noise_bounds=(1.0, 1.0),
         body_radius_m=rig.tracker.body_radius_m if n_bones else 10.0,
     )
     model = matched_model(config.damping, config.root_acceleration, n_bones)
