@@ -5,7 +5,7 @@ about, with or without cameras failing; and the tracking bench's walkers, of who
 predicts was ever told.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -21,6 +21,7 @@ from hrc_env.motion import generator
 from hrc_env.perception import emulator
 from hrc_env.records import Keypoints, PoseEstimate
 from hrc_env.simulation import Simulation
+from hrc_env.skeleton import N_JOINTS
 from hrc_env.tracking.estimators import Estimator, make_estimator
 from hrc_env.typing import Bools, Points3, Velocities3
 
@@ -89,32 +90,41 @@ def follow_own(
     config = HRCConfig()
     if lively:
         config = replace(config, motion=replace(config.motion, **LIVELY))  # type: ignore[arg-type]
-    n, everyone = len(seeds), np.arange(len(seeds))
-    scene = Simulation(n, "none", "kalman", None, "lab", 1, "joint", config)
+    scene = Simulation(len(seeds), "none", "kalman", None, "lab", 1, "joint", config)
     cameras = scene.scene.cameras
-    eyes = np.stack([camera.eye_world for camera in cameras])
-    scene.reset(everyone, [np.random.default_rng([seed, 9]) for seed in seeds])
-    pushes, sensors, own = (
-        [np.random.default_rng([seed, kind]) for seed in seeds] for kind in (10, 11, 12)
-    )
-    errors = emulator.make_state(n, len(cameras), 1, config.ctrl_dt, config.emulator)
-    emulator.reset(errors, everyone, sensors, config.emulator)
+    blind = _failures(seeds, n_frames, len(cameras), failing)[..., None, None]
     estimator = make_estimator(name, projections(cameras), config.ctrl_dt, config.tracker)
-    state = estimator.init(n, 1)
-    estimator.reset(state, everyone, own)
-    blind = _failures(seeds, n_frames, len(cameras), failing)
-    tracks, action = Tracks(*np.empty((2, n_frames, n, 15, 3))), np.zeros((n, scene.n_actions))
-    for t in range(n_frames):
+    rngs = [np.random.default_rng([seed, 12]) for seed in seeds]
+    state = estimator.init(len(seeds), 1)
+    estimator.reset(state, np.arange(len(seeds)), rngs)
+    shape = (n_frames, len(seeds), N_JOINTS, 3)
+    tracks = Tracks(np.empty(shape), np.empty(shape))
+    for t, (joints, speed, seen) in enumerate(_frames(scene, seeds, n_frames)):
+        tracks.truth[t], tracks.speed[t] = joints, speed
+        _take(tracks, estimator, state, _without(seen, blind[t]), rngs, look)
+    scene.close()
+    return tracks
+
+
+def _frames(
+    scene: Simulation, seeds: list[int], n_frames: int
+) -> Iterator[tuple[Points3, Velocities3, Keypoints]]:
+    """True joints, their velocities (S, J, 3) and what the emulated detector reports of them."""
+    config, cameras, everyone = scene.config, scene.scene.cameras, np.arange(len(seeds))
+    scene.reset(everyone, [np.random.default_rng([seed, 9]) for seed in seeds])
+    eyes = np.stack([camera.eye_world for camera in cameras])
+    pushes, sensors = ([np.random.default_rng([seed, kind]) for seed in seeds] for kind in (10, 11))
+    errors = emulator.make_state(len(seeds), len(cameras), 1, config.ctrl_dt, config.emulator)
+    emulator.reset(errors, everyone, sensors, config.emulator)
+    action = np.zeros((len(seeds), scene.n_actions))
+    for _ in range(n_frames):
         push = np.stack([rng.standard_normal(scene.n_actions) for rng in pushes])
         action = _SLOWNESS * action + np.sqrt(1 - _SLOWNESS**2) * push
         scene.step(np.clip(action, -1, 1))
         now = worker_truth(scene.body, generator.current(scene.motion))
-        tracks.truth[t], tracks.speed[t] = now.joints_world[:, 0], now.velocity_world[:, 0]
         hidden = scene.physics.hidden(eyes, now.joints_world)
         seen = emulator.emulate(errors, sensors, now, hidden, cameras, config.emulator)
-        _take(tracks, estimator, state, _without(seen, blind[t][..., None, None]), own, look)
-    scene.close()
-    return tracks
+        yield now.joints_world[:, 0], now.velocity_world[:, 0], seen
 
 
 def _take(
