@@ -37,6 +37,8 @@ _CAMERA_WEIGHT = 50.0
 """The reported noise counts as so much redundancy, so that the first frames decide little."""
 _JOINT_WEIGHT = 100.0
 """A camera's noise counts as so much redundancy of each joint's."""
+_CHANCE = 0.07
+"""Twice the standard deviation of the share that persists where nothing does."""
 _OPEN_M = 0.5
 """Two views triangulate no joint along a ray that they share: it stays within this [m]."""
 _LEAST_BELIEF = 0.5
@@ -222,7 +224,8 @@ def _set_factors(factor, sums, grows, model):
             products += sums[j, c, 2]
             unchanged += sums[j, c, 3]
         of_camera = squares / redundancy
-        share = min(max(products / (unchanged * model.persists), 0.0), 1.0)
+        share = products / (unchanged * model.persists)
+        share = min(max((share - _CHANCE) / (1.0 - _CHANCE), 0.0), 1.0)
         for j in range(len(factor)):
             if grows[j] > 0.0:
                 own = sums[j, c, 0] + _JOINT_WEIGHT * of_camera
