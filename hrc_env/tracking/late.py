@@ -199,7 +199,8 @@ class LateEstimator:
         if not moment.has.all():
             tracked = self.inner.estimate(part).tracked
             wanted = ~tracked if not self.needs_pairs else np.ones_like(tracked)
-            keypoints = beside(state.frames, ids, moment, wanted)
+            if wanted.any():
+                keypoints = beside(state.frames, ids, moment, wanted)
         self.inner.update(part, keypoints, rngs)
 
     def _part(self, state: LateState, ids: Ints) -> Any:
