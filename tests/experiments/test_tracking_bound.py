@@ -9,6 +9,7 @@ from hrc_env.experiments.tracking_bound import (
     joint_blocks,
     posterior_bound,
 )
+from hrc_env.experiments.tracking_cells import run_cell
 from hrc_env.experiments.tracking_detections import Damage, detect
 from hrc_env.experiments.tracking_full_state import filter_matched
 from hrc_env.experiments.tracking_matched import (
@@ -23,6 +24,7 @@ from hrc_env.experiments.tracking_matched import (
     transition,
 )
 from hrc_env.experiments.tracking_rigs import make_rig
+from hrc_env.experiments.tracking_sequences import make_sequences
 from hrc_env.skeleton import N_JOINTS
 
 MODEL = matched_model(0.5, 0.05, 16)
@@ -118,3 +120,12 @@ def test_bones_so_loose_that_they_do_not_matter_are_none():
     for with_loose, without in zip(tilted(loose, *joints), tilted(BONELESS, *joints), strict=True):
         np.testing.assert_allclose(with_loose, without, atol=1e-9)
     np.testing.assert_allclose(tilted(BONELESS, *joints)[1], np.tile(MODEL.Q, (2, 1, 1)))
+
+
+def test_estimators_can_be_told_what_matched_sequences_are_and_reach_the_bound():
+    """With bones switched off, nothing but linearisation and learnt places is between them."""
+    rig, seeds = make_rig("lab"), list(range(400, 412))
+    sums = run_cell("kalman", rig, make_sequences(rig, "matched", seeds), seeds, lambda share: None)
+    total = {name: np.sum(value) for name, value in sums["matched"].items()}
+    assert np.sqrt(total["squared"] / total["bound"]) == pytest.approx(1.0, abs=0.04)
+    assert 0.93 < total["inside"] / total["n"] < 0.97

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hrc_env.experiments.tracking_arrivals import delivered
+from hrc_env.experiments.tracking_arrivals import delivered, in_time
 from hrc_env.experiments.tracking_cells import run_cell
 from hrc_env.experiments.tracking_couples import couples, detect_couples, identities
 from hrc_env.experiments.tracking_detections import CONDITIONS, Damage, detect
@@ -179,8 +179,19 @@ def test_late_frames_are_those_that_were_taken_and_say_when():
     taken = np.rint(time_s[t, 0, c] / 0.04).astype(int) - 1
     np.testing.assert_array_equal(late[t, 0, c], px[taken, 0, c])
     assert np.isnan(late[np.isnan(time_s)]).all()
+    restored = in_time(late, time_s)
+    back = np.isfinite(restored)
+    np.testing.assert_array_equal(restored[back], px[back])
+    assert back.sum() == np.isfinite(late).sum()
     delay_s = 0.04 * (t - taken)
     assert 0.04 < delay_s.min() < delay_s.max() < 0.27
     rate = np.isfinite(time_s[:, 0]).mean(0)
     assert rate.argmin() == 5 % 4
     assert rate.min() < 0.55 < 0.65 < np.sort(rate)[1]
+
+
+def test_the_first_sequences_are_what_they_are_among_others():
+    many = make_sequences(LAB, "two_workers", [4, 5, 6])
+    few = many.first(2)
+    np.testing.assert_array_equal(few.joints, make_sequences(LAB, "two_workers", [4, 5]).joints)
+    np.testing.assert_array_equal(few.keypoints(9).px, many.keypoints(9).px[:2])
