@@ -61,9 +61,10 @@ class TrackerConfig:
     sigma_scale: float = 1.0
     """Factor on the detector's sigma; where it is not learnt, 1.2 suits errors that persist for
     half a second."""
-    noise_bounds: tuple[float, float] = (0.5, 6.0)
+    noise_bounds: tuple[float, float] = (1.0, 6.0)
     """Least and most of the factor on the detector's variance that is learnt for every camera
-    (kalman); equal bounds, as (1, 1), are that factor and nothing is learnt."""
+    and joint (particle, kalman). Errors that all views share do not show where views disagree:
+    never less than told is careful. Equal bounds are that factor, and nothing is learnt."""
     noise_tau_s: float = 4.0
     """Time constant with which it is learnt and forgotten [s]."""
     noise_persists_s: float = 0.5
@@ -145,7 +146,7 @@ class TrackerConfig:
         least, most = self.noise_bounds
         if not 0 < least <= most < float("inf"):
             raise ConfigError(
-                "noise_bounds must be positive, finite and ordered, as (0.5, 6.0), "
+                "noise_bounds must be positive, finite and ordered, as (1.0, 6.0), "
                 f"got {self.noise_bounds}."
             )
         if not 0 <= self.longest_delay_s <= 1:
