@@ -127,7 +127,7 @@ def mixed(later: PoseEstimate, log_weight: Floats, n_alive: Ints) -> PoseEstimat
         (B, W, J, ...); ages and tracks are the heaviest hypothesis's.
     """
     batch, n_workers = n_alive.shape
-    n_slots = log_weight.shape[1] // max(n_workers, 1)
+    n_slots = max(log_weight.shape[1] // max(n_workers, 1), 1)
     alive = np.arange(n_slots) < n_alive[..., None]
     share = np.where(alive, np.exp(log_weight.reshape(batch, n_workers, n_slots)), 0.0)
     share = (share / share.sum(-1, keepdims=True))[..., None, None]

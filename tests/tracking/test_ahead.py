@@ -179,3 +179,10 @@ def test_one_hypothesis_is_its_own_mixture_and_two_that_differ_spread():
     np.testing.assert_allclose(mixture.mean_world, one.mean_world + np.array([0.25, 0, 0]))
     expected = 0.02**2 + 0.75 * 0.25**2 + 0.25 * 0.75**2
     np.testing.assert_allclose(mixture.cov_world[..., 0, 0], expected)
+
+
+def test_where_no_workers_are_none_are_expected():
+    nobody = prior(2, 0, CONFIG)
+    assert ahead(nobody, 0.5, CONFIG).mean_world.shape == (2, 0, N_JOINTS, 3)
+    later = mixed(nobody, np.zeros((2, 0)), np.ones((2, 0), np.int64))
+    assert later.cov_world.shape == (2, 0, N_JOINTS, 3, 3)
