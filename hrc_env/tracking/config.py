@@ -26,9 +26,21 @@ _POSITIVE = (
     "image_area_px",
     "root_acceleration",
     "one_view_inflation",
+    "n_hypotheses",
+    "look_every",
+    "turn_std_rad",
+    "evidence_trust",
 )
 _SCHEMES = ("multinomial", "systematic")
-_BETWEEN_0_AND_1 = ("outlier_weight", "damping", "swap_begins", "swap_ends", "defensive_share")
+_MIRRORED = ("body", "limbs")
+_BETWEEN_0_AND_1 = (
+    "least_weight",
+    "outlier_weight",
+    "damping",
+    "swap_begins",
+    "swap_ends",
+    "defensive_share",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,29 +119,22 @@ class TrackerConfig:
     one_view_inflation: float = 1.21
     """Factor on the reported covariance of joints that one view carries (kalman)."""
     n_hypotheses: int = 8
-    """Most hypotheses about one worker (particle); 1 is the estimator kalman."""
+    """Most hypotheses about one worker (particle); with 1 it is the filter of kalman."""
     mirrored_parts: tuple[str, ...] = ("body", "limbs")
-    """Which mirror images in depth are looked for: "body", "limbs" (particle)."""
+    """What may be turned or reflected in depth when one view carries it (particle)."""
     look_every: int = 3
     """Updates between two searches for other hypotheses (particle)."""
-    mirror_steps: int = 4
-    """Gauss-Newton steps of such a search."""
-    least_evidence: float = 0.01
-    """Evidence below which another mode is no hypothesis, as a share of its parent's."""
-    least_weight: float = 1e-4
-    """Probability below which a hypothesis is dropped."""
-    evidence_trust: float = 0.5
-    """Share of the log-evidence of a set of frames that counts between hypotheses: the errors of
-    neighbouring frames, and of the model, are alike."""
-    gain_trust: float = 1.0
-    """The same of a new hypothesis beside its parent."""
+    turn_std_rad: float = 0.7
+    """A body that is turned by this much against a known hypothesis begins e^-0.5 as likely."""
+    evidence_trust: float = 0.1
+    """Share of the log-evidence of a set of frames that counts between hypotheses (particle): what
+    the model gets wrong in one frame it gets wrong in the next."""
+    anatomy_trust: float = 1.0
+    """Share of what the places of nose, toes, knees and elbows say between hypotheses."""
     walking_odds: float = 2.0
-    """Log-odds per second by which a hypothesis that walks forwards gains on one that walks
-    backwards."""
-    distinct_sigma: float = 3.0
-    """Posterior deviations from which on a mode is a hypothesis of its own."""
-    close_sigma: float = 2.0
-    """Posterior deviations below which two hypotheses are one."""
+    """Log-odds per second by which a hypothesis that walks forwards gains on one that does not."""
+    least_weight: float = 1e-3
+    """Probability below which a hypothesis is dropped (particle)."""
     swap_begins: float = 0.01
     """Probability per update that a camera begins to exchange left and right."""
     swap_ends: float = 0.15
@@ -160,8 +165,12 @@ class TrackerConfig:
             )
         if self.paper_sigma_m < 0:
             raise ConfigError(f"paper_sigma_m must not be negative, got {self.paper_sigma_m}.")
-        if self.mean_correction < 0:
-            raise ConfigError(f"mean_correction must not be negative, got {self.mean_correction}.")
+        for name in ("mean_correction", "anatomy_trust", "walking_odds"):
+            if not getattr(self, name) >= 0:
+                raise ConfigError(f"{name} must not be negative, got {getattr(self, name)}.")
+        for part in self.mirrored_parts:
+            if part not in _MIRRORED:
+                raise unknown("part in mirrored_parts", part, _MIRRORED)
         if self.n_particles < 50:
             raise ConfigError(f"n_particles must be at least 50, got {self.n_particles}.")
         if self.lost_after_s > self.max_age_s:

@@ -2,7 +2,7 @@
 
 | name | what it is |
 |---|---|
-| `particle` | the default |
+| `particle` | the default: hypotheses about what is discrete, each with one Gaussian on the body |
 | `per_joint` | a Gaussian particle filter per joint on a body motion model |
 | `kalman` | one Gaussian on the kinematic tree: honest with one camera (docs/tracking.md) |
 | `paper` | the paper's Algorithm 1 as printed |
@@ -25,6 +25,7 @@ from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.kalman import KalmanEstimator
 from hrc_env.tracking.late import LateEstimator
 from hrc_env.tracking.paper import PaperEstimator
+from hrc_env.tracking.particle import ParticleEstimator
 from hrc_env.tracking.per_joint import PerJointEstimator
 from hrc_env.tracking.triangulating import TriangulationEstimator, ransac, triangulation
 from hrc_env.typing import Floats, Ints
@@ -76,7 +77,7 @@ class Estimator(Protocol[State]):
 
 
 ESTIMATORS: dict[str, Callable[[Floats, float, TrackerConfig], Estimator[Any]]] = {
-    "particle": PerJointEstimator,
+    "particle": ParticleEstimator,
     "per_joint": PerJointEstimator,
     "kalman": KalmanEstimator,
     "paper": PaperEstimator,

@@ -16,11 +16,11 @@ import numpy as np
 from hrc_env.records import Keypoints, PoseEstimate
 from hrc_env.skeleton import N_JOINTS
 from hrc_env.tracking.acquisition import STANDING_M
-from hrc_env.tracking.ahead import mixed
+from hrc_env.tracking.ahead import ahead, mixed
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.hypotheses import Hypotheses
 from hrc_env.tracking.hypothesis_filter import predict_all, update_all
-from hrc_env.tracking.kalman import KalmanEstimator, KalmanState, motion, widen
+from hrc_env.tracking.kalman import KalmanEstimator, KalmanState, motion
 from hrc_env.tracking.measurements import arrays_of
 from hrc_env.tracking.mixture import MixtureSettings, mix, mixture_settings
 from hrc_env.tracking.tracks import gaussian_tracks, grow_older, report
@@ -50,6 +50,7 @@ class ParticleEstimator:
         return Hypotheses(
             slots=self.single.init(batch, n_slots),
             log_weight=np.zeros((batch, n_slots)),
+            form=np.zeros((batch, n_slots)),
             n_alive=np.ones((batch, n_workers), np.int64),
             waited=np.zeros((batch, n_workers), np.int64),
         )
@@ -57,7 +58,8 @@ class ParticleEstimator:
     def reset(self, state: Hypotheses, ids: Ints, rngs: list[np.random.Generator]) -> None:
         """Forget environments `ids`; draws nothing."""
         self.single.reset(state.slots, ids, rngs)
-        state.log_weight[ids], state.n_alive[ids], state.waited[ids] = 0.0, 1, 0
+        state.log_weight[ids], state.form[ids] = 0.0, 0.0
+        state.n_alive[ids], state.waited[ids] = 1, 0
 
     def predict(self, state: Hypotheses, dt_s: float, rngs: list[np.random.Generator]) -> None:
         """Move every hypothesis by its motion model; draws nothing."""
@@ -79,21 +81,17 @@ class ParticleEstimator:
 
     def estimate(self, state: Hypotheses) -> PoseEstimate:
         """Mean and covariance of the mixture; ages are the heaviest hypothesis's."""
-        best = heaviest(state)
-        mean = np.empty(best.body.shape)
-        cov = np.empty((*best.age_s.shape, 3, 3))
+        best = gaussian_tracks(heaviest(state))
+        mean, cov = np.empty((*best.age_s.shape, 6)), np.empty((*best.age_s.shape, 3, 3))
         mix(state.slots, state.n_alive, state.log_weight, mean, cov)
-        widen(cov, best.carried, best.tracked, self.config.one_view_inflation, cov)
-        tracks = gaussian_tracks(best)
-        return report(
-            replace(tracks, mean_world=mean[..., :3], velocity_world=mean[..., 3:], cov_world=cov),
-            self.config,
-        )
+        position, velocity = mean[..., :3], mean[..., 3:]
+        tracks = replace(best, mean_world=position, velocity_world=velocity, cov_world=cov)
+        return report(tracks, self.config)
 
     def ahead(self, state: Hypotheses, horizon_s: float) -> PoseEstimate:
-        """What is expected in `horizon_s`: every hypothesis's future, mixed."""
-        later = self.single.ahead(state.slots, horizon_s)
-        return mixed(later, state.log_weight, state.n_alive)
+        """What is expected in `horizon_s`, hypothesis by hypothesis; see `tracking.ahead`."""
+        each = report(gaussian_tracks(state.slots), self.config)
+        return mixed(ahead(each, horizon_s, self.config), state.log_weight, state.n_alive)
 
 
 def heaviest(state: Hypotheses) -> KalmanState:

@@ -1,0 +1,143 @@
+"""New hypotheses, where one view carries the body or a limb.
+
+A whole body may be turned the other way (`twins`). For a limb the search for the posterior's
+mode is begun again with the limb reflected in depth (`mirrors`), under the same prediction and
+frames: a mode several posterior deviations from the known ones, with evidence that is not
+negligible, becomes a hypothesis.
+"""
+
+import numba
+import numpy as np
+
+from hrc_env.tracking.anatomy import anatomy
+from hrc_env.tracking.bone_lengths import stiff_lengths
+from hrc_env.tracking.evidence import log_evidence
+from hrc_env.tracking.hypotheses import copy_slot, slot_distance
+from hrc_env.tracking.mirrors import N_MIRRORS, WHOLE_BODY, lone_camera, reflect
+from hrc_env.tracking.proposal import contrast_of
+from hrc_env.tracking.tree_filter import condition, settle
+from hrc_env.tracking.tree_search import find_pose_near
+from hrc_env.tracking.tree_update import update_tree
+from hrc_env.tracking.twins import heads_like, turn_body, turn_of
+
+_NEARER_M = 0.05
+"""A search that ends with every joint nearer than this has found nothing new [m]."""
+_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
+
+
+@numba.njit(**_JIT)
+def is_ambiguous(ok, m):
+    """Whether one view alone carries a part of the body that is asked about.
+
+    `ok` (J, C) is what is seen, `m` the `mixture.MixtureSettings`.
+    """
+    ambiguous = False
+    for part in range(N_MIRRORS):
+        ambiguous |= asked(part, m) and lone_camera(part, ok) >= 0
+    return ambiguous
+
+
+@numba.njit(**_JIT)
+def asked(part, m):
+    """Whether the settings ask about this part."""
+    return m.mirror_body if part == WHOLE_BODY else m.mirror_limbs
+
+
+@numba.njit(**_JIT)
+def branch(state, b, w, prior, evidence, seen, s, m, scratch):
+    """Look for other bodies beside the heaviest hypothesis, and keep them as hypotheses.
+
+    Args:
+        state: `hypotheses.Hypotheses`; the worker's first hypothesis has been updated.
+        b, w: environment, worker.
+        prior: its body (J, 6), cov, slope (J, 6, 6) before the update.
+        evidence: log-evidence of that update.
+        seen: P (C, 3, 4), z (J, C, 2), sigma (J, C), ok (J, C).
+        s, m: settings.
+        scratch: belief, variances of the bones, `tree.Work`.
+    """
+    limit = state.log_weight.shape[1] // state.n_alive.shape[1]
+    own = w * limit
+    for part in range(N_MIRRORS):
+        n = state.n_alive[b, w]
+        camera = lone_camera(part, seen[3]) if asked(part, m) and n < limit else -1
+        if camera < 0:
+            continue
+        new = own + n
+        copy_slot(state.slots, b, own, new)
+        if part == WHOLE_BODY:
+            penalty = _turn(state.slots, b, own, n, camera, prior, seen, s, m, scratch)
+        else:
+            where = (part, camera, prior, evidence)
+            penalty = _reflect(state.slots, b, own, n, where, seen, s, m, scratch)
+        if penalty < np.inf:
+            form = m.anatomy * anatomy(state.slots.body[b, new])
+            state.log_weight[b, new] = (
+                state.log_weight[b, own] + form - state.form[b, own] - penalty
+            )
+            state.form[b, new], state.n_alive[b, w] = form, n + 1
+
+
+@numba.njit(**_JIT)
+def _turn(slots, b, own, n, camera, prior, seen, s, m, scratch):
+    """Make slot own + n the body that is turned the other way; its penalty [nat].
+
+    It is infinite where one of the n hypotheses is turned alike.
+    """
+    new = own + n
+    turn = turn_of(seen[0][camera], prior[0])
+    penalty = 0.5 * (turn / m.turn) ** 2
+    if penalty > m.most_penalty:
+        return np.inf
+    body, cov, slope = slots.body[b, new], slots.cov[b, new], slots.slope[b, new]
+    body[:], cov[:], slope[:] = prior[0], prior[1], prior[2]
+    turn_body(seen[0][camera], turn, body, cov, slope)
+    if _turned_alike(slots, b, own, n):
+        return np.inf
+    condition(slots, b, new, seen, s, scratch)
+    settle(slots, b, new, seen, s, scratch)
+    return np.inf if _turned_alike(slots, b, own, n) else penalty
+
+
+@numba.njit(**_JIT)
+def _turned_alike(slots, b, own, n):
+    """Whether slot own + n is turned as one of the n slots before it."""
+    alike = False
+    for k in range(own, own + n):
+        alike |= heads_like(slots.body[b, own + n], slots.body[b, k])
+    return alike
+
+
+@numba.njit(**_JIT)
+def _reflect(slots, b, own, n, where, seen, s, m, scratch):
+    """Condition slot own + n at the mode next to a reflected limb; 0, or infinity for none.
+
+    There is none where the search ends at one of the n hypotheses, or where the evidence is
+    negligible beside that of the search from the prediction.
+    """
+    part, camera, prior, evidence = where
+    belief, give, work = scratch
+    new = own + n
+    body, cov, slope = slots.body[b, new], slots.cov[b, new], slots.slope[b, new]
+    if not reflect(part, seen[0][camera], body, work.point):
+        return np.inf
+    contrast = contrast_of(s.outlier_weight, s.image_area_px)
+    stiff_lengths(slots.bone_variance[b, new], give)
+    bones = (slots.bone_length[b, new], give)
+    find_pose_near(*prior, seen, bones, contrast, m.search_steps, 0.0, belief, work)
+    moved = 0.0
+    for j in range(len(body)):
+        for i in range(3):
+            moved = max(moved, abs(work.point[j, i] - body[j, i]))
+    if not moved > _NEARER_M:
+        return np.inf
+    body[:], cov[:], slope[:] = prior[0], prior[1], prior[2]
+    update_tree(body, cov, slope, work)
+    found = log_evidence(prior, (body, cov, slope), seen, bones, contrast, work)
+    if not found - evidence > m.log_least:
+        return np.inf
+    settle(slots, b, new, seen, s, scratch)
+    for k in range(own, own + n):
+        if not slot_distance(slots, b, k, new, work) > m.distinct:
+            return np.inf
+    return 0.0

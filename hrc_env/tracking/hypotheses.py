@@ -1,0 +1,142 @@
+"""Hypotheses about one body: slots with a Gaussian tree each, weighted, merged and dropped.
+
+A worker has H slots, of which the first `n_alive` are in use, the heaviest first. Every slot is
+a whole `kalman.KalmanState` of one worker: worker w's are the columns w H to (w + 1) H of its
+arrays, so that whatever works on a worker of `kalman` works on a hypothesis.
+"""
+
+import math
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from hrc_env.tracking.evidence import distance_between
+from hrc_env.tracking.kalman import KalmanState
+from hrc_env.typing import Floats, Ints
+
+_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
+
+
+class Hypotheses(NamedTuple):
+    """Hypotheses about each worker; arrays changed in place."""
+
+    slots: KalmanState
+    """Arrays (B, W H, ...), one Gaussian tree each."""
+    log_weight: Floats
+    """(B, W H) log-probabilities of the slots in use, which sum to one after an update."""
+    form: Floats
+    """(B, W H) what `anatomy` says of their poses; part of the weights."""
+    n_alive: Ints
+    """(B, W) slots in use, at least one."""
+    waited: Ints
+    """(B, W) updates since other hypotheses were looked for."""
+
+
+@numba.njit(**_JIT)
+def copy_slot(slots, b, source, target):
+    """Make slot `target` of environment b a copy of `source`."""
+    _move_slot(slots, b, source, target, False)
+
+
+@numba.njit(**_JIT)
+def exchange_slots(slots, b, one, other):
+    """Exchange two slots of environment b."""
+    _move_slot(slots, b, one, other, True)
+
+
+@numba.njit(**_JIT)
+def _move_slot(slots, b, source, target, both):
+    _move(slots.body[b], source, target, both)
+    _move(slots.cov[b], source, target, both)
+    _move(slots.slope[b], source, target, both)
+    _move(slots.age_s[b], source, target, both)
+    _move(slots.tracked[b], source, target, both)
+    _move(slots.conflict[b], source, target, both)
+    _move(slots.offset[b], source, target, both)
+    _move(slots.offset_count[b], source, target, both)
+    _move(slots.bone_length[b], source, target, both)
+    _move(slots.bone_variance[b], source, target, both)
+    _move(slots.swap_chance[b], source, target, both)
+    _move(slots.blind[b], source, target, both)
+    _move(slots.believed[b], source, target, both)
+    _move(slots.carried[b], source, target, both)
+    _move(slots.noise_factor[b], source, target, both)
+    _move(slots.noise_sums[b], source, target, both)
+    _move(slots.noise_last[b], source, target, both)
+
+
+@numba.njit(**_JIT)
+def _move(rows, source, target, both):
+    """rows[target] = rows[source], and the other way round if `both`."""
+    kept = rows[target : target + 1].copy()
+    rows[target] = rows[source]
+    if both:
+        rows[source : source + 1] = kept
+
+
+@numba.njit(**_JIT)
+def drop(state, b, w, h):
+    """Drop hypothesis h of a worker who has others; the last one takes its place."""
+    first = w * (state.log_weight.shape[1] // state.n_alive.shape[1])
+    last = state.n_alive[b, w] - 1
+    if h != last:
+        copy_slot(state.slots, b, first + last, first + h)
+        state.log_weight[b, first + h] = state.log_weight[b, first + last]
+        state.form[b, first + h] = state.form[b, first + last]
+    state.n_alive[b, w] = last
+
+
+@numba.njit(**_JIT)
+def normalise(state, b, w, log_least):
+    """Make the weights sum to one, drop what is lighter than `log_least`, the heaviest first."""
+    first = w * (state.log_weight.shape[1] // state.n_alive.shape[1])
+    log_weight = state.log_weight[b, first : first + state.n_alive[b, w]]
+    most = log_weight.max()
+    total = 0.0
+    for h in range(len(log_weight)):
+        total += math.exp(log_weight[h] - most)
+    log_weight -= most + math.log(total)
+    for h in range(state.n_alive[b, w] - 1, -1, -1):
+        if log_weight[h] < log_least and state.n_alive[b, w] > 1:
+            drop(state, b, w, h)
+    best = 0
+    for h in range(state.n_alive[b, w]):
+        best = h if log_weight[h] > log_weight[best] else best
+    if best > 0:
+        form = state.form[b, first : first + len(log_weight)]
+        exchange_slots(state.slots, b, first, first + best)
+        log_weight[0], log_weight[best] = log_weight[best], log_weight[0]
+        form[0], form[best] = form[best], form[0]
+
+
+@numba.njit(**_JIT)
+def merge(state, b, w, least_distance, work):
+    """Hypotheses that have come close are one: the heavier stays, with the weight of both.
+
+    `least_distance` is squared, in posterior deviations.
+    """
+    first = w * (state.log_weight.shape[1] // state.n_alive.shape[1])
+    log_weight = state.log_weight[b]
+    h = 0
+    while h < state.n_alive[b, w]:
+        k = state.n_alive[b, w] - 1
+        while k > h:
+            if slot_distance(state.slots, b, first + h, first + k, work) < least_distance:
+                if log_weight[first + k] > log_weight[first + h]:
+                    exchange_slots(state.slots, b, first + h, first + k)
+                    state.form[b, first + h] = state.form[b, first + k]
+                both = np.logaddexp(log_weight[first + h], log_weight[first + k])
+                log_weight[first + h] = both
+                drop(state, b, w, k)
+            k -= 1
+        h += 1
+
+
+@numba.njit(**_JIT)
+def slot_distance(slots, b, one, other, work):
+    """Squared distance of two hypotheses, in deviations of the wider."""
+    a = (slots.body[b, one], slots.cov[b, one], slots.slope[b, one])
+    return distance_between(
+        a, (slots.body[b, other], slots.cov[b, other], slots.slope[b, other]), work
+    )

@@ -1,0 +1,151 @@
+"""The kernels of `particle`: one loop over environments, workers and hypotheses.
+
+`state` is `hypotheses.Hypotheses`, `s` and `m` are `settings.Settings` and
+`mixture.MixtureSettings`; everything that happens to one hypothesis is `tree_filter`'s.
+"""
+
+import numba
+import numpy as np
+
+from hrc_env.tracking.acquisition import heading
+from hrc_env.tracking.anatomy import anatomy
+from hrc_env.tracking.branching import branch, is_ambiguous
+from hrc_env.tracking.evidence import log_evidence
+from hrc_env.tracking.hypotheses import drop, merge, normalise
+from hrc_env.tracking.measurements import read_worker
+from hrc_env.tracking.noise import learn_noise, scale_sigma
+from hrc_env.tracking.proposal import contrast_of
+from hrc_env.tracking.swaps import undo_swaps
+from hrc_env.tracking.tree import make_work
+from hrc_env.tracking.tree_filter import condition, follow, look_after, settle
+from hrc_env.tracking.tree_predict import predict_tree
+from hrc_env.tracking.upkeep import acquire
+
+_TORSO = (1, 2, 7, 8)
+_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
+
+
+@numba.njit(**_JIT)
+def predict_all(state, model, dt, m):
+    """Move every hypothesis by dt [s]; `model` as in `tree_predict.predict_tree`."""
+    work, slots = make_work(), state.slots
+    n_joints = slots.body.shape[2]
+    held, held_count = np.empty((n_joints, 3)), np.empty(n_joints)
+    limit = slots.tracked.shape[1] // state.n_alive.shape[1]
+    for b in range(state.n_alive.shape[0]):
+        for w in range(state.n_alive.shape[1]):
+            if not slots.tracked[b, w * limit]:
+                continue
+            for k in range(w * limit, w * limit + state.n_alive[b, w]):
+                gaussian = (slots.body[b, k], slots.cov[b, k], slots.slope[b, k])
+                if state.n_alive[b, w] == 1:
+                    places = (slots.offset[b, k], slots.offset_count[b, k])
+                    predict_tree(*gaussian, *places, model, dt, work)
+                else:
+                    held[:], held_count[:] = slots.offset[b, k], slots.offset_count[b, k]
+                    predict_tree(*gaussian, held, held_count, model, dt, work)
+                    state.log_weight[b, k] += m.walking_odds * dt * forwards(slots.body[b, k])
+
+
+@numba.njit(**_JIT)
+def forwards(body):
+    """How clearly a body (J, 6) walks forwards, -1 (backwards) to 1."""
+    cos, sin, known = heading(body, np.ones(len(body), np.bool_))
+    if not known:
+        return 0.0
+    speed = 0.0
+    for j in _TORSO:
+        speed += 0.25 * (cos * body[j, 3] + sin * body[j, 4])
+    return min(max(speed / 0.5, -1.0), 1.0)
+
+
+@numba.njit(**_JIT)
+def update_all(state, P, px, confidence, sigma_px, standing, s, m, noise):
+    """Take one set of frames in.
+
+    Args:
+        state: changed in place.
+        P: (C, 3, 4).
+        px, confidence, sigma_px: as in `records.Keypoints`.
+        standing: (J, 3) `acquisition.STANDING_M`.
+        s, m: settings.
+        noise: `noise.NoiseModel`.
+    """
+    n_batch, n_cameras, n_workers, n_joints = confidence.shape
+    z, sigma = np.empty((n_joints, n_cameras, 2)), np.empty((n_joints, n_cameras))
+    ok, belief = np.empty((n_joints, n_cameras), np.bool_), np.empty((n_joints, n_cameras))
+    scratch = (belief, np.empty(n_joints), make_work())
+    placed, predicted = np.empty(n_joints, np.bool_), np.empty((n_joints, 3, 3))
+    prior = (np.empty((n_joints, 6)), np.empty((n_joints, 6, 6)), np.empty((n_joints, 6, 6)))
+    slots, limit = state.slots, state.slots.tracked.shape[1] // n_workers
+    seen = (P, z, sigma, ok)
+    for b in range(n_batch):
+        for w in range(n_workers):
+            first = w * limit
+            read_worker(px, confidence, sigma_px, b, w, s.sigma_scale, z, sigma, ok)
+            if not slots.tracked[b, first]:
+                scale_sigma(slots.noise_factor[b, first], sigma)
+                if acquire(slots, b, first, *seen, standing, s):
+                    slots.slope[b, first] = 0.0
+                continue
+            several = state.n_alive[b, w] > 1
+            state.waited[b, w] += 1
+            look = limit > 1 and state.waited[b, w] >= m.look_every and is_ambiguous(ok, m)
+            for h in range(state.n_alive[b, w]):
+                k = first + h
+                if h > 0:
+                    read_worker(px, confidence, sigma_px, b, w, s.sigma_scale, z, sigma, ok)
+                scale_sigma(slots.noise_factor[b, k], sigma)
+                swaps = (slots.swap_chance[b, k], slots.blind[b, k], slots.believed[b, k])
+                undo_swaps(P, slots.body[b, k], slots.cov[b, k], z, sigma, ok, *swaps, s)
+                predicted[:] = slots.cov[b, k, :, :3, :3]
+                evidence = 0.0
+                if several or look:
+                    evidence = _weigh(slots, b, k, seen, s, prior, scratch)
+                    _weight_form(state, b, k, several, m.trust * evidence, m)
+                else:
+                    follow(slots, b, k, seen, s, scratch)
+                known = (slots.noise_factor[b, k], slots.noise_sums[b, k], slots.noise_last[b, k])
+                body = (slots.body[b, k], slots.cov[b, k], predicted)
+                learn_noise(seen, belief, body, *known, noise)
+                if look and h == 0:
+                    state.waited[b, w] = 0
+                    branch(state, b, w, prior, evidence, seen, s, m, scratch)
+                look_after(slots, b, k, seen, standing, s, placed)
+            if state.n_alive[b, w] > 1:
+                _tidy(state, b, w, m, scratch[2])
+
+
+@numba.njit(**_JIT)
+def _weight_form(state, b, k, several, gain, m):
+    """Weigh a hypothesis by its evidence, and by its pose in the place of the last one."""
+    form = m.anatomy * anatomy(state.slots.body[b, k])
+    if several:
+        state.log_weight[b, k] += gain + form - state.form[b, k]
+    state.form[b, k] = form
+
+
+@numba.njit(**_JIT)
+def _weigh(slots, b, k, seen, s, prior, scratch):
+    """Update a hypothesis, keep what it was before in `prior`; its log-evidence."""
+    body, cov, slope = slots.body[b, k], slots.cov[b, k], slots.slope[b, k]
+    prior[0][:], prior[1][:], prior[2][:] = body, cov, slope
+    condition(slots, b, k, seen, s, scratch)
+    contrast = contrast_of(s.outlier_weight, s.image_area_px)
+    bones = (slots.bone_length[b, k], scratch[1])
+    # the mean correction needs the factors that the evidence leaves alone
+    evidence = log_evidence(prior, (body, cov, slope), seen, bones, contrast, scratch[2])
+    settle(slots, b, k, seen, s, scratch)
+    return evidence
+
+
+@numba.njit(**_JIT)
+def _tidy(state, b, w, m, work):
+    """Drop hypotheses that are lost or too light, and merge those that have come close."""
+    first = w * (state.slots.tracked.shape[1] // state.n_alive.shape[1])
+    for h in range(state.n_alive[b, w] - 1, -1, -1):
+        if state.n_alive[b, w] > 1 and not state.slots.tracked[b, first + h]:
+            drop(state, b, w, h)
+    normalise(state, b, w, m.log_drop)
+    merge(state, b, w, m.close, work)
+    normalise(state, b, w, m.log_drop)

@@ -1,0 +1,107 @@
+"""Bodies that one view can hardly tell from another: reflected in depth, whole or in part.
+
+A camera sees a limb in front of its joint as it sees it behind (the bas-relief ambiguity): the
+joints keep their rays, and their depths are reflected in the depth of a pivot. These are
+starting points for a search; bones, places on the body and motion decide what becomes of them.
+"""
+
+import numba
+import numpy as np
+
+from hrc_env.geometry.triangulation import inverse3
+from hrc_env.skeleton import N_JOINTS, TORSO
+from hrc_env.typing import Bools
+
+_PARTS: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...] = (
+    (tuple(int(j) for j in TORSO), tuple(range(N_JOINTS))),  # the whole body
+    ((1,), (3, 5)), ((2,), (4, 6)),  # arms
+    ((3,), (5,)), ((4,), (6,)),  # forearms
+    ((7,), (9, 11, 13)), ((8,), (10, 12, 14)),  # legs
+    ((9,), (11, 13)), ((10,), (12, 14)),  # shanks
+    ((1, 2), (0,)),  # head
+)  # fmt: skip
+"""Joints whose mean is the pivot, and joints that are reflected."""
+
+
+def _table(which: int) -> Bools:
+    table = np.zeros((len(_PARTS), N_JOINTS), bool)
+    for row, part in enumerate(_PARTS):
+        table[row, list(part[which])] = True
+    return table
+
+
+_PIVOT, _MOVED = _table(0), _table(1)
+N_MIRRORS = len(_PARTS)
+WHOLE_BODY = 0
+"""The row that reflects the whole body; the others reflect limbs."""
+_MOST_SEEN_TWICE = 2
+"""So many joints of a whole body may be seen twice, and it may still be mirrored."""
+_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
+
+
+@numba.njit(**_JIT)
+def lone_camera(part, ok):
+    """The camera that alone sees a part of the body, or -1.
+
+    `part` is a row of the mirrors; `ok` (J, C) says what is seen.
+    """
+    n_cameras, seen_twice, best, most = ok.shape[1], 0, -1, 0
+    for c in range(n_cameras):
+        n = 0
+        for j in range(len(ok)):
+            n += _MOVED[part, j] and ok[j, c]
+        if n > most:
+            best, most = c, n
+    for j in range(len(ok)):
+        n_views = 0
+        for c in range(n_cameras):
+            n_views += ok[j, c]
+        seen_twice += _MOVED[part, j] and n_views > 1
+    return best if seen_twice <= (_MOST_SEEN_TWICE if part == WHOLE_BODY else 0) else -1
+
+
+@numba.njit(**_JIT)
+def reflect(part, camera, body, out):
+    """Positions (J, 3) of a body (J, 6) whose `part` is reflected along a camera's rays.
+
+    Returns False where that would bring a joint to the camera or behind it.
+    """
+    eye, middle, n = eye_of(camera), np.zeros(3), 0
+    for j in range(len(body)):
+        for i in range(3):
+            out[j, i] = body[j, i]
+            middle[i] += body[j, i] if _PIVOT[part, j] else 0.0
+        n += _PIVOT[part, j]
+    for i in range(3):
+        middle[i] = middle[i] / n - eye[i]
+    away = np.sqrt(middle[0] ** 2 + middle[1] ** 2 + middle[2] ** 2)
+    for j in range(len(body)):
+        if not _MOVED[part, j]:
+            continue
+        along = 0.0
+        for i in range(3):
+            along += (body[j, i] - eye[i]) * middle[i] / away
+        if not (along > 0.0 and 2.0 * away - along > 0.2):
+            return False
+        for i in range(3):
+            out[j, i] = eye[i] + (body[j, i] - eye[i]) * (2.0 * away - along) / along
+    return True
+
+
+@numba.njit(**_JIT)
+def eye_of(camera):
+    """Optical centre (3,) of a projection (3, 4)."""
+    inverse, eye = np.empty((3, 3)), np.zeros(3)
+    a, b = camera[:, :3], camera[:, 3]
+    normal = np.zeros((3, 3))
+    right = np.zeros(3)
+    for i in range(3):
+        for k in range(3):
+            right[i] -= a[k, i] * b[k]
+            for m in range(3):
+                normal[i, k] += a[m, i] * a[m, k]
+    inverse3(normal, inverse)
+    for i in range(3):
+        for k in range(3):
+            eye[i] += inverse[i, k] * right[k]
+    return eye

@@ -1,0 +1,94 @@
+"""The mixture that several hypotheses are: its settings, its mean and its covariance."""
+
+import math
+from typing import NamedTuple
+
+import numba
+
+from hrc_env.tracking.config import TrackerConfig
+
+_LEAST_EVIDENCE = 0.01
+"""A limb's other mode with less evidence than this share of the known one's is none."""
+_MOST_PENALTY = 10.0
+"""A turned body that is less likely than this is not tried [nat]."""
+_DISTINCT, _CLOSE = 3.0, 2.0
+"""Posterior deviations: a mode beyond the first is new, hypotheses within the second are one."""
+_SEARCH_STEPS = 4
+_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
+
+
+class MixtureSettings(NamedTuple):
+    """What the kernels need to keep hypotheses apart."""
+
+    mirror_body: bool
+    mirror_limbs: bool
+    look_every: int
+    """Updates between two searches for other hypotheses."""
+    log_least: float
+    """Log of the least evidence of a new hypothesis beside its parent's."""
+    log_drop: float
+    """Log-probability below which a hypothesis is dropped."""
+    trust: float
+    """Share of the log-evidence of a set of frames that counts."""
+    walking_odds: float
+    """Log-odds per second of walking forwards against backwards."""
+    anatomy: float
+    """Share of the anatomical potential that counts."""
+    turn: float
+    """Turn of the other body that costs half a nat [rad]."""
+    most_penalty: float
+    """No other body is tried that costs more [nat]."""
+    distinct: float
+    """Squared posterior deviations from which on a mode is a hypothesis of its own."""
+    close: float
+    """Squared posterior deviations below which two hypotheses are one."""
+    search_steps: int
+    """Gauss-Newton steps from a mirror image."""
+
+
+def mixture_settings(config: TrackerConfig) -> MixtureSettings:
+    """The kernels' part of the configuration."""
+    return MixtureSettings(
+        mirror_body="body" in config.mirrored_parts,
+        mirror_limbs="limbs" in config.mirrored_parts,
+        look_every=config.look_every,
+        log_least=math.log(_LEAST_EVIDENCE),
+        log_drop=math.log(config.least_weight),
+        trust=config.evidence_trust,
+        walking_odds=config.walking_odds,
+        anatomy=config.anatomy_trust,
+        turn=config.turn_std_rad,
+        most_penalty=_MOST_PENALTY,
+        distinct=_DISTINCT**2,
+        close=_CLOSE**2,
+        search_steps=_SEARCH_STEPS,
+    )
+
+
+@numba.njit(**_JIT)
+def mix(slots, n_alive, log_weight, mean, cov):
+    """Moments of the mixtures: mean (B, W, J, 6), cov (B, W, J, 3, 3) of the positions."""
+    limit = log_weight.shape[1] // n_alive.shape[1]
+    for b in range(n_alive.shape[0]):
+        for w in range(n_alive.shape[1]):
+            first, n = w * limit, n_alive[b, w]
+            if n == 1:
+                mean[b, w] = slots.body[b, first]
+                cov[b, w] = slots.cov[b, first, :, :3, :3]
+                continue
+            mean[b, w], cov[b, w] = 0.0, 0.0
+            for k in range(first, first + n):
+                share = math.exp(log_weight[b, k])
+                mean[b, w] += share * slots.body[b, k]
+            for k in range(first, first + n):
+                share = math.exp(log_weight[b, k])
+                _add_moments(share, slots.body[b, k], slots.cov[b, k], mean[b, w], cov[b, w])
+
+
+@numba.njit(**_JIT)
+def _add_moments(share, body, cov, mean, out):
+    for j in range(len(body)):
+        for i in range(3):
+            for k in range(3):
+                apart = (body[j, i] - mean[j, i]) * (body[j, k] - mean[j, k])
+                out[j, i, k] += share * (cov[j, i, k] + apart)

@@ -1,0 +1,234 @@
+"""Hypotheses with a Gaussian each: one while the views agree, the right one when they do not."""
+
+import numpy as np
+import pytest
+from simulated import DT, HARD, LAB, Damage, detections, generators, keypoints, track, walk
+
+from hrc_env.errors import ConfigError
+from hrc_env.tracking.anatomy import anatomy
+from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.estimators import make_estimator
+from hrc_env.tracking.evidence import tree_measure
+from hrc_env.tracking.hypotheses import exchange_slots, merge, normalise
+from hrc_env.tracking.mirrors import eye_of, lone_camera, reflect
+from hrc_env.tracking.tree import ORDER, PARENT, make_work
+from hrc_env.tracking.twins import heads_like, turn_body, turn_of
+
+EYES = -np.linalg.solve(LAB[:, :, :3], LAB[:, :, 3:])[..., 0]
+
+
+def one_camera(seeds, seconds=4.0, after_s=0.4):
+    """Joints (T, B, J, 3) and pixels: all cameras for 1 s, one for `seconds`, all again."""
+    n_alone = round(seconds / DT)
+    n_frames = 25 + n_alone + round(after_s / DT)
+    joints = np.stack([walk(s, n_frames) for s in seeds], 1)
+    px = np.stack([detections(joints[:, k], Damage(), s) for k, s in enumerate(seeds)], 1)
+    for k, s in enumerate(seeds):
+        px[25 : 25 + n_alone, k, [c for c in range(4) if c != s % 4]] = np.nan
+    return joints, px
+
+
+def left(joints):
+    """From right to left across the torso, on the ground."""
+    return joints[..., 1, :2] - joints[..., 2, :2] + joints[..., 7, :2] - joints[..., 8, :2]
+
+
+def followed(px, config=None):
+    """The estimator, its last state, and how many hypotheses it had after each frame."""
+    e, rngs = make_estimator("particle", LAB, DT, config), generators(px.shape[1])
+    state, n_alive = e.init(px.shape[1], 1), []
+    for frame in px:
+        e.predict(state, DT, rngs)
+        e.update(state, keypoints(frame), rngs)
+        n_alive.append(state.n_alive[:, 0].copy())
+    return e, state, np.array(n_alive)
+
+
+def standing(heading_rad=0.0, place=(0.5, 0.2, 0.0)):
+    """(J, 6) a body at rest that walks nowhere."""
+    joints = walk(0, 1)[0]
+    across = left(joints)
+    now = np.arctan2(-across[0], across[1])
+    c, s = np.cos(heading_rad - now), np.sin(heading_rad - now)
+    joints = (joints - joints[[1, 2, 7, 8]].mean(0)) @ np.array(
+        [[c, -s, 0], [s, c, 0], [0, 0, 1]]
+    ).T
+    body = np.zeros((15, 6))
+    body[:, :3] = joints + np.array([*place[:2], 1.2])
+    return body
+
+
+def test_with_one_hypothesis_it_is_the_kalman_filter_to_the_last_bit():
+    px = np.stack([detections(walk(s, 60), HARD, s) for s in (3, 4)], 1)
+    px[30:, :, 1:] = np.nan
+    config = TrackerConfig(n_hypotheses=1, one_view_inflation=1.0)
+    ours, theirs = (track(make_estimator(n, LAB, DT, config), px) for n in ("particle", "kalman"))
+    for a, b in zip(ours, theirs, strict=True):
+        np.testing.assert_array_equal(a.mean_world, b.mean_world)
+        np.testing.assert_array_equal(a.cov_world, b.cov_world)
+
+
+def test_while_all_views_agree_there_is_one_hypothesis():
+    px = detections(walk(5, 60), Damage(), 5)[:, None]
+    _, _, n_alive = followed(px)
+    assert (n_alive == 1).all()
+
+
+def test_one_camera_does_not_turn_the_body_round():
+    joints, px = one_camera(range(100, 116))
+    wrong = {}
+    for name in ("kalman", "particle"):
+        mean = np.stack([e.mean_world[:, 0] for e in track(make_estimator(name, LAB, DT), px)])
+        wrong[name] = ((left(mean) * left(joints)).sum(-1) < 0)[25:125].mean()
+    assert wrong["kalman"] > 0.05  # so that the sequences can tell
+    assert wrong["particle"] < 0.3 * wrong["kalman"]
+
+
+def test_one_camera_is_honest_without_inflation_and_its_return_leaves_one_hypothesis():
+    joints, px = one_camera(range(100, 116))
+    estimates = track(make_estimator("particle", LAB, DT), px)
+    error = np.stack([e.mean_world[:, 0] for e in estimates]) - joints
+    cov = np.stack([e.cov_world[:, 0] for e in estimates])
+    nees = np.einsum("...i,...ij,...j->...", error, np.linalg.inv(cov), error)[25:125]
+    assert (nees < 7.815).mean() > 0.90
+    reported = np.trace(cov[25:125], axis1=-2, axis2=-1).mean()
+    assert 0.8 < np.sqrt(reported / (error[25:125] ** 2).sum(-1).mean()) < 1.3
+    _, state, n_alive = followed(px)
+    assert n_alive[25:125].max() > 1
+    assert (state.n_alive == 1).all()
+    assert np.sqrt((error[-1] ** 2).sum(-1).mean()) < 0.03
+
+
+def test_results_do_not_depend_on_the_batch():
+    _, px = one_camera(range(100, 103), 1.0)
+    together = track(make_estimator("particle", LAB, DT), px)
+    for b in range(3):
+        alone = track(make_estimator("particle", LAB, DT), px[:, b : b + 1])
+        for a, t in zip(alone, together, strict=True):
+            np.testing.assert_array_equal(a.mean_world[0], t.mean_world[b])
+            np.testing.assert_array_equal(a.cov_world[0], t.cov_world[b])
+
+
+def test_the_mixtures_moments_are_those_of_its_parts():
+    _, px = one_camera([101], 3.0, 0.0)
+    e, rngs = make_estimator("particle", LAB, DT), generators(1)
+    state, most = e.init(1, 1), 1
+    for frame in px:
+        e.predict(state, DT, rngs)
+        e.update(state, keypoints(frame), rngs)
+        n = state.n_alive[0, 0]
+        most = max(most, n)
+        share = np.exp(state.log_weight[0, :n])
+        assert share.sum() == pytest.approx(1.0)
+        assert share[0] == share.max()
+        points = state.slots.body[0, :n, :, :3]
+        mean = np.einsum("h,hji->ji", share, points)
+        apart = points - mean
+        cov = np.einsum("h,hjik->jik", share, state.slots.cov[0, :n, :, :3, :3])
+        cov += np.einsum("h,hji,hjk->jik", share, apart, apart)
+        estimate = e.estimate(state)
+        np.testing.assert_allclose(estimate.mean_world[0, 0], mean, atol=1e-9)
+        big = np.trace(cov, axis1=1, axis2=2) > 0.01
+        np.testing.assert_allclose(estimate.cov_world[0, 0][big], cov[big], atol=1e-9)
+    assert most > 1
+
+
+def test_the_other_body_has_its_shoulders_reflected_and_its_nose_in_front():
+    body, camera = standing(0.4), LAB[1]
+    cov, slope = np.tile(0.01 * np.eye(6), (15, 1, 1)), np.zeros((15, 6, 6))
+    other = body.copy()
+    turn_body(camera, turn_of(camera, body), other, cov, slope)
+    assert not heads_like(body, other)
+    middle = body[[1, 2, 7, 8], :2].mean(0)
+    ray = (middle - EYES[1, :2]) / np.linalg.norm(middle - EYES[1, :2])
+    expected = left(body) - 2 * (left(body) @ ray) * ray
+    expected *= np.linalg.norm(left(other)) / np.linalg.norm(expected)
+    np.testing.assert_allclose(left(other), expected, atol=0.02)
+    assert anatomy(other) == pytest.approx(anatomy(body))
+    again = other.copy()
+    turn_body(camera, turn_of(camera, other), again, cov, slope)
+    np.testing.assert_allclose(again, body, atol=1e-9)
+
+
+def test_a_body_that_is_inside_out_is_unlikely():
+    body = standing()
+    inside_out = body.copy()
+    inside_out[:, 0] = 2 * body[[1, 2, 7, 8], 0].mean() - body[:, 0]  # its front behind
+    assert anatomy(body) - anatomy(inside_out) > 5.0
+
+
+def test_a_reflected_limb_keeps_its_pixels_nearly_and_changes_its_depth():
+    body, out = standing(0.7), np.empty((15, 3))
+    assert reflect(1, LAB[0], body, out)
+    np.testing.assert_array_equal(out[[0, 1, 2, 4]], body[[0, 1, 2, 4], :3])
+    for j in (3, 5):
+        a, b = body[j, :3] - EYES[0], out[j] - EYES[0]
+        assert np.linalg.norm(np.cross(a, b)) < 1e-9  # the same ray
+    np.testing.assert_allclose(eye_of(LAB[0]), EYES[0], atol=1e-6)
+
+
+def test_a_part_is_ambiguous_only_where_one_camera_sees_it():
+    ok = np.ones((15, 4), bool)
+    assert lone_camera(0, ok) == lone_camera(1, ok) == -1
+    ok[[3, 5], 1:] = False
+    assert lone_camera(1, ok) == 0
+    assert lone_camera(0, ok) == -1
+    ok[:, [0, 1, 3]] = False
+    assert lone_camera(0, ok) == 2
+    assert lone_camera(0, np.zeros((15, 4), bool)) == -1
+
+
+def test_the_trees_determinant_and_square_are_those_of_the_whole_matrix():
+    px = detections(walk(6, 30), HARD, 6)[:, None]
+    _, state, _ = followed(px)
+    cov, slope = state.slots.cov[0, 0], state.slots.slope[0, 0]
+    whole = np.zeros((15, 15, 6, 6))
+    for n, j in enumerate(ORDER):
+        for k in ORDER[:n]:
+            whole[j, k] = slope[j] @ whole[PARENT[j], k]
+            whole[k, j] = whole[j, k].T
+        whole[j, j] = cov[j]
+    matrix = whole.transpose(0, 2, 1, 3).reshape(90, 90)
+    change = np.random.default_rng(0).normal(0, 0.05, (15, 6))
+    square, log_det = tree_measure(cov, slope, change.copy(), make_work())
+    assert log_det == pytest.approx(np.linalg.slogdet(matrix)[1], rel=1e-6)
+    expected = change.ravel() @ np.linalg.solve(matrix, change.ravel())
+    assert square == pytest.approx(expected, rel=1e-5)
+
+
+def test_hypotheses_that_have_come_close_are_one_and_light_ones_are_dropped():
+    px = detections(walk(7, 20), Damage(), 7)[:, None]
+    _, state, _ = followed(px)
+    for array in state.slots:
+        array[:, 1:3] = array[:, :1]
+    state.slots.body[0, 2, :, 0] += 1.0
+    state.n_alive[0, 0] = 3
+    state.log_weight[0, :3] = np.log([0.3, 0.4, 0.3])
+    merge(state, 0, 0, 4.0, make_work())
+    normalise(state, 0, 0, np.log(1e-3))
+    assert state.n_alive[0, 0] == 2
+    np.testing.assert_allclose(np.exp(state.log_weight[0, :2]), [0.7, 0.3])
+    state.log_weight[0, 1] = -20.0
+    normalise(state, 0, 0, np.log(1e-3))
+    assert state.n_alive[0, 0] == 1
+
+
+def test_exchanging_slots_exchanges_every_array():
+    px = detections(walk(7, 20), Damage(), 7)[:, None]
+    _, state, _ = followed(px)
+    rng = np.random.default_rng(0)
+    for array in state.slots:
+        array[:, :2] = rng.integers(0, 2, array[:, :2].shape)
+    before = [array[0, :2].copy() for array in state.slots]
+    exchange_slots(state.slots, 0, 0, 1)
+    for was, array in zip(before, state.slots, strict=True):
+        np.testing.assert_array_equal(array[0, :2], was[::-1])
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"n_hypotheses": 0}, {"mirrored_parts": ("head",)}, {"least_weight": 0.0}, {"look_every": 0}],
+)
+def test_settings_that_cannot_work_are_refused(change):
+    with pytest.raises(ConfigError):
+        TrackerConfig(**change)
