@@ -28,7 +28,7 @@ class HRCReachEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         perception: "pixels" (rendered images through MediaPipe Pose), "keypoints" (an
             emulator of that), "truth" (the worker as they are) or "none".
         estimator: "particle" (default), "kalman" (one Gaussian on the body's tree), "paper"
-            (Algorithm 1) or "triangulation".
+            (Algorithm 1), "per_joint", "triangulation" or "ransac".
         cameras: indices or names of the rig's cameras to use; None is all of them.
         scene: name of the place.
         n_workers: 0 or more workers.
