@@ -31,7 +31,7 @@ CHI2_95_2D = 5.991
 """95 % of a two-dimensional normal variable lies within this squared distance."""
 _BLOCK = 10
 """Neighbouring frames are alike: intervals come from drawing blocks of this many."""
-_N_DRAWN = 1000
+_N_DRAWN = 300
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,7 +142,7 @@ def foretold_metrics(foretold: Foretold) -> dict[str, Metric]:
 
 
 def _drawn(values: Floats) -> Iterator[Floats]:
-    """All frames, then 1000 times as many blocks of frames, drawn with replacement."""
+    """All frames, then 300 times as many blocks of frames, drawn with replacement."""
     yield values
     blocks = np.array_split(np.arange(len(values)), max(len(values) // _BLOCK, 1))
     rng = np.random.default_rng(0)

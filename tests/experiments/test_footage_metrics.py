@@ -18,7 +18,7 @@ from hrc_env.skeleton import MIRROR
 
 
 def test_cameras_that_are_out_of_step_are_found_out():
-    rig, _, detections = recording((0, 4, -3, 0))
+    rig, _, detections = recording((0, 4, -3, 0), n_frames=50)
     assert lag_of(rig.P, detections) == [0, 4, -3, 0]
 
 
