@@ -14,7 +14,7 @@ from hrc_env.experiments.tracking_rigs import RIGS
 from hrc_env.experiments.tracking_tally import N_LEVELS
 
 _MARKS = ("o", "s", "^", "D", "v", "P", "X", "*")
-_LEAST_OBSERVATIONS = 200
+_LEAST_OBSERVATIONS = 30
 
 
 def plot_error(path: Path, parts: Parts) -> None:
