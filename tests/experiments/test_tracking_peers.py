@@ -62,6 +62,7 @@ def test_the_bench_writes_what_ran_and_names_what_did_not(tmp_path, monkeypatch)
     monkeypatch.setattr(bench, "CONDITIONS", ("one_camera",))
     monkeypatch.setattr(bench, "ROWS", ("one_camera", "after_return"))
     monkeypatch.setattr(bench, "RIGS", ("lab",))
+    monkeypatch.setattr(bench, "_OWN", ("dlt",))  # no kernels to compile
     monkeypatch.setattr(type(PEERS["particles"]), "installed", property(lambda peer: False))
     shares = []
     metrics = bench.run(
