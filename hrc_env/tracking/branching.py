@@ -124,7 +124,8 @@ def _reflect(slots, b, own, n, where, seen, s, m, scratch):
     contrast = contrast_of(s.outlier_weight, s.image_area_px)
     stiff_lengths(slots.bone_variance[b, new], give)
     bones = (slots.bone_length[b, new], give)
-    find_pose_near(*prior, seen, bones, contrast, m.search_steps, 0.0, belief, work)
+    how = (contrast, m.search_steps, 0.0)
+    find_pose_near(prior[0], prior[1], prior[2], seen, bones, *how, belief, work)
     moved = 0.0
     for j in range(len(body)):
         for i in range(3):

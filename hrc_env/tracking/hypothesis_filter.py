@@ -77,6 +77,7 @@ def update_all(state, P, px, confidence, sigma_px, standing, s, m, noise):
     scratch = (belief, np.empty(n_joints), make_work())
     placed, predicted = np.empty(n_joints, np.bool_), np.empty((n_joints, 3, 3))
     prior = (np.empty((n_joints, 6)), np.empty((n_joints, 6, 6)), np.empty((n_joints, 6, 6)))
+    kept = (scratch, prior, placed, predicted)
     slots, limit = state.slots, state.slots.tracked.shape[1] // n_workers
     seen = (P, z, sigma, ok)
     for b in range(n_batch):
@@ -92,28 +93,38 @@ def update_all(state, P, px, confidence, sigma_px, standing, s, m, noise):
             state.waited[b, w] += 1
             look = limit > 1 and state.waited[b, w] >= m.look_every and is_ambiguous(ok, m)
             for h in range(state.n_alive[b, w]):
-                k = first + h
                 if h > 0:
                     read_worker(px, confidence, sigma_px, b, w, s.sigma_scale, z, sigma, ok)
-                scale_sigma(slots.noise_factor[b, k], sigma)
-                swaps = (slots.swap_chance[b, k], slots.blind[b, k], slots.believed[b, k])
-                undo_swaps(P, slots.body[b, k], slots.cov[b, k], z, sigma, ok, *swaps, s)
-                predicted[:] = slots.cov[b, k, :, :3, :3]
-                evidence = 0.0
-                if several or look:
-                    evidence = _weigh(slots, b, k, seen, s, prior, scratch)
-                    _weight_form(state, b, k, several, m.trust * evidence, m)
-                else:
-                    follow(slots, b, k, seen, s, scratch)
-                known = (slots.noise_factor[b, k], slots.noise_sums[b, k], slots.noise_last[b, k])
-                body = (slots.body[b, k], slots.cov[b, k], predicted)
-                learn_noise(seen, belief, body, *known, noise)
-                if look and h == 0:
-                    state.waited[b, w] = 0
-                    branch(state, b, w, prior, evidence, seen, s, m, scratch)
-                look_after(slots, b, k, seen, standing, s, placed)
+                searches = look and h == 0
+                _follow(state, b, w, h, several, searches, seen, standing, s, m, noise, kept)
             if state.n_alive[b, w] > 1:
                 _tidy(state, b, w, m, scratch[2])
+
+
+@numba.njit(**_JIT)
+def _follow(state, b, w, h, several, look, seen, standing, s, m, noise, kept):
+    """What one set of frames does to one hypothesis; `look` for others beside it."""
+    scratch, prior, placed, predicted = kept
+    P, z, sigma, ok = seen
+    slots = state.slots
+    k = w * (slots.tracked.shape[1] // state.n_alive.shape[1]) + h
+    scale_sigma(slots.noise_factor[b, k], sigma)
+    swaps = (slots.swap_chance[b, k], slots.blind[b, k], slots.believed[b, k])
+    undo_swaps(P, slots.body[b, k], slots.cov[b, k], z, sigma, ok, *swaps, s)
+    predicted[:] = slots.cov[b, k, :, :3, :3]
+    evidence = 0.0
+    if several or look:
+        evidence = _weigh(slots, b, k, seen, s, prior, scratch)
+        _weight_form(state, b, k, several, m.trust * evidence, m)
+    else:
+        follow(slots, b, k, seen, s, scratch)
+    known = (slots.noise_factor[b, k], slots.noise_sums[b, k], slots.noise_last[b, k])
+    body = (slots.body[b, k], slots.cov[b, k], predicted)
+    learn_noise(seen, scratch[0], body, *known, noise)
+    if look:
+        state.waited[b, w] = 0
+        branch(state, b, w, prior, evidence, seen, s, m, scratch)
+    look_after(slots, b, k, seen, standing, s, placed)
 
 
 @numba.njit(**_JIT)

@@ -98,4 +98,4 @@ def heaviest(state: Hypotheses) -> KalmanState:
     """The heaviest hypothesis of each worker, as views (B, W, ...) into the slots."""
     n_workers = state.n_alive.shape[1]
     limit = state.log_weight.shape[1] // n_workers if n_workers else 1
-    return KalmanState(*(array[:, ::limit] for array in state.slots))
+    return KalmanState._make(array[:, ::limit] for array in state.slots)
