@@ -14,8 +14,8 @@ import tyro
 from rich.console import Console
 from rich.progress import track
 
-from hrc_env.experiments.tracking_rigs import DT_S, RIGS, Rig, make_rig
-from hrc_env.experiments.tracking_sequences import Sequences, make_sequences
+from hrc_env.experiments.tracking.rigs import DT_S, RIGS, Rig, make_rig
+from hrc_env.experiments.tracking.sequences import Sequences, make_sequences
 from hrc_env.results import Metric, write_results
 from hrc_env.tracking.estimators import make_estimator
 from hrc_env.typing import Floats

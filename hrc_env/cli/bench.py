@@ -49,7 +49,7 @@ class Bench:
         if self.real and self.peers:
             raise ConfigError("--real and --peers are two parts of the bench; choose one.")
         if self.peers:
-            from hrc_env.experiments import tracking_peers_bench as peers
+            from hrc_env.experiments.peers import bench as peers
 
             n_seeds = self.seeds if self.seeds is not None else 1 if self.quick else 5
             return _show(
@@ -59,15 +59,15 @@ class Bench:
                 "results.json, peers.md",
             )
         if self.real:
-            from hrc_env.experiments import footage_bench
+            from hrc_env.experiments.footage import bench as footage
 
             return _show(
-                footage_bench.run,
+                footage.run,
                 self.out or Path("out/bench_tracking_real"),
                 "real.md",
                 "results.json, real.md, a film (real.mp4) and its middle frame (real.png)",
             )
-        from hrc_env.experiments.tracking_bench import QUICK, TrackingBenchConfig, run
+        from hrc_env.experiments.tracking.bench import QUICK, TrackingBenchConfig, run
 
         config = QUICK if self.quick else TrackingBenchConfig()
         if self.seeds is not None:

@@ -13,9 +13,9 @@ import numpy as np
 
 from hrc_env.body import worker_truth
 from hrc_env.config import HRCConfig
-from hrc_env.experiments.tracking_detections import CONDITIONS, detect
-from hrc_env.experiments.tracking_rigs import DT_S, SIGMA_PX, make_rig
-from hrc_env.experiments.tracking_walks import walk
+from hrc_env.experiments.tracking.detections import CONDITIONS, detect
+from hrc_env.experiments.tracking.rigs import DT_S, SIGMA_PX, make_rig
+from hrc_env.experiments.tracking.walks import walk
 from hrc_env.geometry.cameras import projections
 from hrc_env.motion import generator
 from hrc_env.perception import emulator
@@ -53,7 +53,7 @@ def _nothing(estimator: Estimator[Any], state: Any) -> None:
 def follow_walkers(
     seeds: list[int], n_frames: int, condition: str, name: str = "kalman", look: Look = _nothing
 ) -> Tracks:
-    """The bench's walkers in its lab, under one of `tracking_detections.CONDITIONS`."""
+    """The bench's walkers in its lab, under one of `tracking.detections.CONDITIONS`."""
     rig = make_rig("lab")
     joints = walk(rig.walk_m, seeds, n_frames)
     pixels = detect(rig.P, joints, CONDITIONS[condition], seeds)

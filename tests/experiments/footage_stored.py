@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from hrc_env.experiments.footage_detections import Detections
-from hrc_env.experiments.tracking_rigs import make_rig
-from hrc_env.experiments.tracking_walks import walk
+from hrc_env.experiments.footage.detections import Detections
+from hrc_env.experiments.tracking.rigs import make_rig
+from hrc_env.experiments.tracking.walks import walk
 from hrc_env.geometry.cameras import project
 
 SIGMA_PX = 3.0

@@ -3,7 +3,7 @@
 import numpy as np
 
 from hrc_env.experiments.ahead_tracks import follow_own, follow_walkers
-from hrc_env.experiments.tracking_rigs import DT_S
+from hrc_env.experiments.tracking.rigs import DT_S
 
 CHI2_95_3D = 7.815
 WARM_UP, FRAMES_AHEAD = 25, 10

@@ -11,11 +11,11 @@ from footage_stored import calibration
 
 from hrc_env.errors import ConfigError, DownloadError
 from hrc_env.experiments import footage_detections, footage_fetch
-from hrc_env.experiments.footage_bench import markdown
-from hrc_env.experiments.footage_calibration import read_calibration
-from hrc_env.experiments.footage_detections import detections_of
-from hrc_env.experiments.footage_film import film_track
-from hrc_env.experiments.footage_metrics import NAMES, Track
+from hrc_env.experiments.footage.bench import markdown
+from hrc_env.experiments.footage.calibration import read_calibration
+from hrc_env.experiments.footage.detections import detections_of
+from hrc_env.experiments.footage.film import film_track
+from hrc_env.experiments.footage.metrics import NAMES, Track
 from hrc_env.perception.eyes import Sight
 from hrc_env.perception.films import Films
 from hrc_env.records import CropWindow

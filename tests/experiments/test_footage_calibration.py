@@ -5,7 +5,7 @@ import pytest
 from footage_stored import AT_FRONT, calibration
 
 from hrc_env.errors import ConfigError
-from hrc_env.experiments.footage_calibration import (
+from hrc_env.experiments.footage.calibration import (
     meeting_point,
     read_calibration,
     tracker_config,

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from footage_stored import SIGMA_PX, recording
 
-from hrc_env.experiments.footage_lag import lag_of
-from hrc_env.experiments.footage_metrics import (
+from hrc_env.experiments.footage.lag import lag_of
+from hrc_env.experiments.footage.metrics import (
     Track,
     bone_std,
     follow,

@@ -8,13 +8,13 @@ import pytest
 
 from hrc_env.errors import ConfigError
 from hrc_env.experiments import tracking_bench, tracking_sequences
-from hrc_env.experiments.tracking_bench import TrackingBenchConfig, run
-from hrc_env.experiments.tracking_names import DLT, rows
-from hrc_env.experiments.tracking_rigs import RIGS, make_rig
-from hrc_env.experiments.tracking_sequences import make_sequences
-from hrc_env.experiments.tracking_shelf import fingerprint_of
-from hrc_env.experiments.tracking_tally import CHI2_95_3D, CHI2_LEVELS, tally
-from hrc_env.experiments.tracking_timing import time_association, time_estimator
+from hrc_env.experiments.tracking.bench import TrackingBenchConfig, run
+from hrc_env.experiments.tracking.names import DLT, rows
+from hrc_env.experiments.tracking.rigs import RIGS, make_rig
+from hrc_env.experiments.tracking.sequences import make_sequences
+from hrc_env.experiments.tracking.shelf import fingerprint_of
+from hrc_env.experiments.tracking.tally import CHI2_95_3D, CHI2_LEVELS, tally
+from hrc_env.experiments.tracking.timing import time_association, time_estimator
 from hrc_env.tracking.estimators import ESTIMATORS
 
 TINY = TrackingBenchConfig(n_seeds=2, n_matched=2, n_smoothed=1, timing_repeats=1)

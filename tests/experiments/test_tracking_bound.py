@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hrc_env.experiments.tracking_bound import (
+from hrc_env.experiments.tracking.bound import (
     joint_blocks,
     posterior_bound,
 )
-from hrc_env.experiments.tracking_cells import run_cell
-from hrc_env.experiments.tracking_detections import Damage, detect
-from hrc_env.experiments.tracking_full_state import filter_matched
-from hrc_env.experiments.tracking_matched import (
+from hrc_env.experiments.tracking.cells import run_cell
+from hrc_env.experiments.tracking.detections import Damage, detect
+from hrc_env.experiments.tracking.full_state import filter_matched
+from hrc_env.experiments.tracking.matched import (
     N_PLACES,
     N_STATES,
     advance,
@@ -23,8 +23,8 @@ from hrc_env.experiments.tracking_matched import (
     tilted,
     transition,
 )
-from hrc_env.experiments.tracking_rigs import make_rig
-from hrc_env.experiments.tracking_sequences import make_sequences
+from hrc_env.experiments.tracking.rigs import make_rig
+from hrc_env.experiments.tracking.sequences import make_sequences
 from hrc_env.skeleton import N_JOINTS
 
 MODEL = matched_model(0.5, 0.05, 16)

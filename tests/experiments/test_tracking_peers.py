@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from hrc_env.experiments import tracking_peers_bench as bench
-from hrc_env.experiments.tracking_peers import PEERS, missing_sentence
-from hrc_env.experiments.tracking_peers_model import F, Q, first_joints, pixels
-from hrc_env.experiments.tracking_rigs import make_rig
-from hrc_env.experiments.tracking_sequences import make_sequences
+from hrc_env.experiments.peers.model import F, Q, first_joints, pixels
+from hrc_env.experiments.peers.registry import PEERS, missing_sentence
+from hrc_env.experiments.tracking.rigs import make_rig
+from hrc_env.experiments.tracking.sequences import make_sequences
 from hrc_env.geometry.cameras import project
 
 

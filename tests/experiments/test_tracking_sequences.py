@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from hrc_env.experiments.tracking_arrivals import delivered, in_time
-from hrc_env.experiments.tracking_cells import run_cell
-from hrc_env.experiments.tracking_couples import couples, detect_couples, identities
-from hrc_env.experiments.tracking_detections import CONDITIONS, Damage, detect
-from hrc_env.experiments.tracking_dlt import triangulate_frame
-from hrc_env.experiments.tracking_names import DLT
-from hrc_env.experiments.tracking_own import make_own_rig
-from hrc_env.experiments.tracking_rigs import RIGS, make_rig
-from hrc_env.experiments.tracking_sequences import make_sequences
-from hrc_env.experiments.tracking_walks import walk
+from hrc_env.experiments.tracking.arrivals import delivered, in_time
+from hrc_env.experiments.tracking.cells import run_cell
+from hrc_env.experiments.tracking.couples import couples, detect_couples, identities
+from hrc_env.experiments.tracking.detections import CONDITIONS, Damage, detect
+from hrc_env.experiments.tracking.dlt import triangulate_frame
+from hrc_env.experiments.tracking.names import DLT
+from hrc_env.experiments.tracking.own import make_own_rig
+from hrc_env.experiments.tracking.rigs import RIGS, make_rig
+from hrc_env.experiments.tracking.sequences import make_sequences
+from hrc_env.experiments.tracking.walks import walk
 from hrc_env.skeleton import JOINT, TORSO
 
 LIMBS = ("shoulder elbow", "elbow wrist", "hip knee", "knee ankle", "ankle foot")

@@ -43,7 +43,7 @@ class Peer:
 
 
 PEERS: dict[str, Peer] = {
-    name: Peer(name, f"hrc_env.experiments.tracking_peers_{name}")
+    name: Peer(name, f"hrc_env.experiments.peers.{name}")
     for name in ("aniposelib", "particles", "filterpy")
 }
 

@@ -5,9 +5,9 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from hrc_env.experiments.tracking_names import DEFAULT, RIVALS, names_of, rows
-from hrc_env.experiments.tracking_rigs import RIGS
-from hrc_env.experiments.tracking_sequences import MATCHED, MATCHED_BONES
+from hrc_env.experiments.tracking.names import DEFAULT, RIVALS, names_of, rows
+from hrc_env.experiments.tracking.rigs import RIGS
+from hrc_env.experiments.tracking.sequences import MATCHED, MATCHED_BONES
 from hrc_env.results import Metric, over
 from hrc_env.typing import Floats
 

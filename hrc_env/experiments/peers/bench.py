@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from hrc_env.errors import ConfigError
-from hrc_env.experiments.tracking_cells import Tick, beliefs
-from hrc_env.experiments.tracking_names import DEFAULT, DLT
-from hrc_env.experiments.tracking_peers import PEERS, missing_sentence
-from hrc_env.experiments.tracking_rigs import RIGS, Rig, make_rig
-from hrc_env.experiments.tracking_sequences import Sequences, make_sequences
-from hrc_env.experiments.tracking_shelf import Say, Shelf, fingerprint_of
+from hrc_env.experiments.peers.registry import PEERS, missing_sentence
+from hrc_env.experiments.tracking.cells import Tick, beliefs
+from hrc_env.experiments.tracking.names import DEFAULT, DLT
+from hrc_env.experiments.tracking.rigs import RIGS, Rig, make_rig
+from hrc_env.experiments.tracking.sequences import Sequences, make_sequences
+from hrc_env.experiments.tracking.shelf import Say, Shelf, fingerprint_of
 from hrc_env.results import Metric, write_results
 from hrc_env.typing import Points3
 

@@ -1,8 +1,8 @@
 """Who takes part in the tracking bench, and in which rows."""
 
-from hrc_env.experiments.tracking_own import OWN, OWN_CONDITIONS
-from hrc_env.experiments.tracking_rigs import RIGS
-from hrc_env.experiments.tracking_sequences import (
+from hrc_env.experiments.tracking.own import OWN, OWN_CONDITIONS
+from hrc_env.experiments.tracking.rigs import RIGS
+from hrc_env.experiments.tracking.sequences import (
     BOUNDED,
     LATE,
     OWN_WINDOWS,

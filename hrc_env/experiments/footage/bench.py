@@ -4,12 +4,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
 
-from hrc_env.experiments.footage_calibration import read_calibration, tracker_config
-from hrc_env.experiments.footage_detections import FOLLOWER, Detections, detections_of
-from hrc_env.experiments.footage_fetch import WHEEL, fetch_footage
-from hrc_env.experiments.footage_film import film_track
-from hrc_env.experiments.footage_lag import lag_of
-from hrc_env.experiments.footage_metrics import (
+from hrc_env.experiments.footage.calibration import read_calibration, tracker_config
+from hrc_env.experiments.footage.detections import FOLLOWER, Detections, detections_of
+from hrc_env.experiments.footage.fetch import WHEEL, fetch_footage
+from hrc_env.experiments.footage.film import film_track
+from hrc_env.experiments.footage.lag import lag_of
+from hrc_env.experiments.footage.metrics import (
     NAMES,
     bone_std,
     follow,

@@ -13,16 +13,16 @@ from pathlib import Path
 from typing import Any
 
 from hrc_env.errors import ConfigError
-from hrc_env.experiments.tracking_cells import Tick, run_cell
-from hrc_env.experiments.tracking_detections import CONDITIONS
-from hrc_env.experiments.tracking_metrics import ASSOCIATION, TIMING, Parts, metrics_of
-from hrc_env.experiments.tracking_names import DEFAULT, SMOOTHER, cells, names_of
-from hrc_env.experiments.tracking_own import OWN, make_own_rig
-from hrc_env.experiments.tracking_report import write_report
-from hrc_env.experiments.tracking_rigs import RIGS, SIGMA_PX, Rig, make_rig
-from hrc_env.experiments.tracking_sequences import BOUNDED, Sequences, make_sequences
-from hrc_env.experiments.tracking_shelf import Say, Shelf, fingerprint_of
-from hrc_env.experiments.tracking_timing import BATCH, time_association, time_estimator
+from hrc_env.experiments.tracking.cells import Tick, run_cell
+from hrc_env.experiments.tracking.detections import CONDITIONS
+from hrc_env.experiments.tracking.metrics import ASSOCIATION, TIMING, Parts, metrics_of
+from hrc_env.experiments.tracking.names import DEFAULT, SMOOTHER, cells, names_of
+from hrc_env.experiments.tracking.own import OWN, make_own_rig
+from hrc_env.experiments.tracking.report import write_report
+from hrc_env.experiments.tracking.rigs import RIGS, SIGMA_PX, Rig, make_rig
+from hrc_env.experiments.tracking.sequences import BOUNDED, Sequences, make_sequences
+from hrc_env.experiments.tracking.shelf import Say, Shelf, fingerprint_of
+from hrc_env.experiments.tracking.timing import BATCH, time_association, time_estimator
 from hrc_env.results import Metric, write_results
 from hrc_env.tracking.estimators import ESTIMATORS
 

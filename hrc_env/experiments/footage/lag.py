@@ -7,8 +7,8 @@ cameras projects there; no estimator takes part.
 
 import numpy as np
 
-from hrc_env.experiments.footage_detections import Detections
-from hrc_env.experiments.tracking_dlt import triangulate_frame
+from hrc_env.experiments.footage.detections import Detections
+from hrc_env.experiments.tracking.dlt import triangulate_frame
 from hrc_env.geometry.cameras import project
 from hrc_env.typing import Floats
 

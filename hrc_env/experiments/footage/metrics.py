@@ -10,8 +10,8 @@ from itertools import combinations
 
 import numpy as np
 
-from hrc_env.experiments.footage_detections import Detections
-from hrc_env.experiments.footage_lag import SURE
+from hrc_env.experiments.footage.detections import Detections
+from hrc_env.experiments.footage.lag import SURE
 from hrc_env.geometry.cameras import project
 from hrc_env.records import PoseEstimate
 from hrc_env.results import Metric

@@ -9,13 +9,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from hrc_env.experiments.tracking_bound import (
+from hrc_env.experiments.tracking.bound import (
     block_diagonal,
     camera_information,
     joint_blocks,
     shrink,
 )
-from hrc_env.experiments.tracking_matched import (
+from hrc_env.experiments.tracking.matched import (
     N_PLACES,
     MatchedModel,
     advance,

@@ -4,9 +4,9 @@ import itertools
 
 import numpy as np
 
-from hrc_env.experiments.tracking_detections import Damage, detect
-from hrc_env.experiments.tracking_rigs import DT_S
-from hrc_env.experiments.tracking_walks import Path, bodies_along
+from hrc_env.experiments.tracking.detections import Damage, detect
+from hrc_env.experiments.tracking.rigs import DT_S
+from hrc_env.experiments.tracking.walks import Path, bodies_along
 from hrc_env.skeleton import JOINT
 from hrc_env.typing import Bools, Floats, Ints, Points2, Points3
 

@@ -1,6 +1,6 @@
 """A second, independent source of motion: the environment's own worker and its detector.
 
-The bench's walkers (`tracking_walks`) and the environment's worker (`hrc_env.motion`) share no
+The bench's walkers (`walks`) and the environment's worker (`hrc_env.motion`) share no
 code, and neither do the bench's white detections and the environment's emulator, whose errors
 last for half a second, have heavy tails and come with honest or dishonest confidence.
 """
@@ -11,7 +11,7 @@ import numpy as np
 
 from hrc_env.body import worker_truth
 from hrc_env.config import HRCConfig
-from hrc_env.experiments.tracking_rigs import Rig
+from hrc_env.experiments.tracking.rigs import Rig
 from hrc_env.geometry.cameras import projections
 from hrc_env.motion import generator
 from hrc_env.perception import emulator

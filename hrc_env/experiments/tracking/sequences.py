@@ -4,14 +4,14 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from hrc_env.experiments.tracking_arrivals import LONGEST_DELAY_S, delivered
-from hrc_env.experiments.tracking_bound import posterior_bound
-from hrc_env.experiments.tracking_couples import couples, detect_couples, shuffles
-from hrc_env.experiments.tracking_detections import CONDITIONS, Damage, detect
-from hrc_env.experiments.tracking_matched import MatchedModel, draw, matched_model
-from hrc_env.experiments.tracking_own import OWN, OWN_CONDITIONS, OWN_FRAMES, record
-from hrc_env.experiments.tracking_rigs import SIGMA_PX, Rig
-from hrc_env.experiments.tracking_walks import walk
+from hrc_env.experiments.tracking.arrivals import LONGEST_DELAY_S, delivered
+from hrc_env.experiments.tracking.bound import posterior_bound
+from hrc_env.experiments.tracking.couples import couples, detect_couples, shuffles
+from hrc_env.experiments.tracking.detections import CONDITIONS, Damage, detect
+from hrc_env.experiments.tracking.matched import MatchedModel, draw, matched_model
+from hrc_env.experiments.tracking.own import OWN, OWN_CONDITIONS, OWN_FRAMES, record
+from hrc_env.experiments.tracking.rigs import SIGMA_PX, Rig
+from hrc_env.experiments.tracking.walks import walk
 from hrc_env.records import Keypoints
 from hrc_env.skeleton import BONES
 from hrc_env.tracking.config import TrackerConfig

@@ -9,7 +9,7 @@ import imageio.v2 as imageio
 import numpy as np
 
 from hrc_env import pictures
-from hrc_env.experiments.footage_metrics import Track
+from hrc_env.experiments.footage.metrics import Track
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.perception.films import Films
 from hrc_env.records import PoseEstimate

@@ -11,7 +11,7 @@ as is usual; written here in covariances.
 
 import numpy as np
 
-from hrc_env.experiments.tracking_matched import (
+from hrc_env.experiments.tracking.matched import (
     N_PLACES,
     MatchedModel,
     tilted,

@@ -7,11 +7,11 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from hrc_env.experiments.tracking_metrics import Parts
-from hrc_env.experiments.tracking_names import DEFAULT, DLT, RIVALS
-from hrc_env.experiments.tracking_own import OWN
-from hrc_env.experiments.tracking_rigs import RIGS
-from hrc_env.experiments.tracking_tally import N_LEVELS
+from hrc_env.experiments.tracking.metrics import Parts
+from hrc_env.experiments.tracking.names import DEFAULT, DLT, RIVALS
+from hrc_env.experiments.tracking.own import OWN
+from hrc_env.experiments.tracking.rigs import RIGS
+from hrc_env.experiments.tracking.tally import N_LEVELS
 
 _MARKS = ("o", "s", "^", "D", "v", "P", "X", "*")
 _LEAST_OBSERVATIONS = 30

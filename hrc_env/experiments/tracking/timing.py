@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.experiments.tracking_cells import Tick
-from hrc_env.experiments.tracking_couples import shuffles
-from hrc_env.experiments.tracking_detections import Damage, detect
-from hrc_env.experiments.tracking_rigs import DT_S, Rig
-from hrc_env.experiments.tracking_sequences import Sequences
-from hrc_env.experiments.tracking_walks import walk
+from hrc_env.experiments.tracking.cells import Tick
+from hrc_env.experiments.tracking.couples import shuffles
+from hrc_env.experiments.tracking.detections import Damage, detect
+from hrc_env.experiments.tracking.rigs import DT_S, Rig
+from hrc_env.experiments.tracking.sequences import Sequences
+from hrc_env.experiments.tracking.walks import walk
 from hrc_env.tracking.association import associate
 from hrc_env.tracking.estimators import make_estimator
 from hrc_env.typing import Floats

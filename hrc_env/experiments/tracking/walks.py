@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.experiments.tracking_rigs import DT_S
+from hrc_env.experiments.tracking.rigs import DT_S
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.skeleton import JOINT, N_JOINTS
 from hrc_env.typing import Floats, Points3

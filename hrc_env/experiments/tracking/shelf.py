@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 import hrc_env
-from hrc_env.experiments.tracking_cells import Tick
+from hrc_env.experiments.tracking.cells import Tick
 
 Say = Callable[[float, str], None]
 """Told by how much the share that is done grew, and what is being done."""
 _CODE = (
-    *(f"{room}/*.py" for room in ("geometry", "tracking", "experiments")),
-    *(f"{room}/*.py" for room in ("scene", "motion", "perception")),
+    *(f"{room}/**/*.py" for room in ("geometry", "tracking", "experiments/tracking")),
+    *(f"{room}/**/*.py" for room in ("scene", "motion", "perception")),
     *(f"{name}.py" for name in ("body", "config", "skeleton", "simulation", "control")),
 )
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from hrc_env.experiments.tracking_dlt import triangulate_frame
-from hrc_env.experiments.tracking_rigs import DT_S
+from hrc_env.experiments.tracking.dlt import triangulate_frame
+from hrc_env.experiments.tracking.rigs import DT_S
 from hrc_env.typing import Floats, Points2, Points3
 
 ACCELERATION = 10.0

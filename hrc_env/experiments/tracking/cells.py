@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 
 from hrc_env.batching import rows
-from hrc_env.experiments.tracking_arrivals import in_time
-from hrc_env.experiments.tracking_couples import identities
-from hrc_env.experiments.tracking_dlt import triangulate_frame
-from hrc_env.experiments.tracking_full_state import filter_matched
-from hrc_env.experiments.tracking_names import DEFAULT, DLT, FULL_STATE, SMOOTHER, UNBUFFERED
-from hrc_env.experiments.tracking_rigs import DT_S, SIGMA_PX, Rig
-from hrc_env.experiments.tracking_sequences import Sequences
-from hrc_env.experiments.tracking_tally import tally
+from hrc_env.experiments.tracking.arrivals import in_time
+from hrc_env.experiments.tracking.couples import identities
+from hrc_env.experiments.tracking.dlt import triangulate_frame
+from hrc_env.experiments.tracking.full_state import filter_matched
+from hrc_env.experiments.tracking.names import DEFAULT, DLT, FULL_STATE, SMOOTHER, UNBUFFERED
+from hrc_env.experiments.tracking.rigs import DT_S, SIGMA_PX, Rig
+from hrc_env.experiments.tracking.sequences import Sequences
+from hrc_env.experiments.tracking.tally import tally
 from hrc_env.records import Keypoints, PoseEstimate
 from hrc_env.tracking.association import associate
 from hrc_env.tracking.estimators import make_estimator

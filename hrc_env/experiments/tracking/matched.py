@@ -13,7 +13,7 @@ K = Q b' (b Q b' + stiffness^2)^-1 towards lengths drawn about the right ones (b
 derivatives). No estimator of the package is matched to that: they take bones for measurements,
 which says more than this chain does about the state before. And no estimator can reach the
 bound on it: the bound knows the bones' directions, an estimator knows them to its error over
-the bone's length. The filter that has the whole model (`tracking_full_state`) is at 1.013 of
+the bone's length. The filter that has the whole model (`full_state`) is at 1.013 of
 the bound in the lab and 1.034 on the site with detections of 3 px, at 1.000 and 1.002 with
 0.5 px, and at 1.003 and 1.001 without bones (60 sequences each): the gap is that second order.
 """
@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.experiments.tracking_rigs import DT_S
+from hrc_env.experiments.tracking.rigs import DT_S
 from hrc_env.skeleton import BONES, N_JOINTS, TORSO
 from hrc_env.tracking.acquisition import STANDING_M
 from hrc_env.tracking.bones import STIFFNESS_M

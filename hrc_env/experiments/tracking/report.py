@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from hrc_env.experiments.tracking_metrics import Parts
-from hrc_env.experiments.tracking_names import (
+from hrc_env.experiments.tracking.metrics import Parts
+from hrc_env.experiments.tracking.names import (
     DEFAULT,
     DLT,
     RIVALS,
@@ -13,9 +13,9 @@ from hrc_env.experiments.tracking_names import (
     names_of,
     rows,
 )
-from hrc_env.experiments.tracking_plots import plot_calibration, plot_error
-from hrc_env.experiments.tracking_rigs import RIGS
-from hrc_env.experiments.tracking_sequences import BOUNDED, LATE, MATCHED, TWO_WORKERS
+from hrc_env.experiments.tracking.plots import plot_calibration, plot_error
+from hrc_env.experiments.tracking.rigs import RIGS
+from hrc_env.experiments.tracking.sequences import BOUNDED, LATE, MATCHED, TWO_WORKERS
 from hrc_env.results import Metric
 from hrc_env.tracking.estimators import ESTIMATORS
 

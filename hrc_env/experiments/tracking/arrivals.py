@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hrc_env.experiments.tracking_rigs import DT_S
+from hrc_env.experiments.tracking.rigs import DT_S
 from hrc_env.typing import Floats, Points2
 
 LONGEST_DELAY_S = 0.5

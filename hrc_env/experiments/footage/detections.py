@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import hrc_env
-from hrc_env.experiments.footage_calibration import FilmedCamera, tracker_config
+from hrc_env.experiments.footage.calibration import FilmedCamera, tracker_config
 from hrc_env.geometry.cameras import PinholeCamera, project, projections
 from hrc_env.perception.eyes import Eyes, EyesConfig
 from hrc_env.perception.films import Films, undistort
@@ -137,10 +137,10 @@ def _fingerprint(films: Films) -> str:
     digest = hashlib.sha256(repr((films.sizes_px, films.n_frames, films.frames_per_s)).encode())
     root = Path(hrc_env.__file__).parent
     sources = [
-        *sorted((root / "perception").glob("*.py")),
-        *sorted((root / "tracking").glob("*.py")),
-        root / "experiments" / "footage_detections.py",
-        root / "experiments" / "footage_calibration.py",
+        *sorted((root / "perception").rglob("*.py")),
+        *sorted((root / "tracking").rglob("*.py")),
+        root / "experiments" / "footage" / "detections.py",
+        root / "experiments" / "footage" / "calibration.py",
     ]
     for path in sources:
         digest.update(path.read_bytes())

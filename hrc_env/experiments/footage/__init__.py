@@ -1,0 +1,1 @@
+"""The estimators on real films, where there is no ground truth."""

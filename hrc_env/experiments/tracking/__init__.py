@@ -1,0 +1,1 @@
+"""The tracking bench: every estimator on the same sequences, beside the bound."""
