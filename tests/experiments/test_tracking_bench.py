@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from hrc_env.errors import ConfigError
-from hrc_env.experiments import tracking_bench, tracking_sequences
+from hrc_env.experiments.tracking import bench as tracking_bench
+from hrc_env.experiments.tracking import sequences
 from hrc_env.experiments.tracking.bench import TrackingBenchConfig, run
 from hrc_env.experiments.tracking.names import DLT, rows
 from hrc_env.experiments.tracking.rigs import RIGS, make_rig
@@ -35,13 +36,11 @@ def no_association_time(rig, n_repeats, tick):
 @contextmanager
 def small():
     """Few frames, no clock, and code that nobody edits meanwhile."""
-    short = {name: min(n, 20) for name, n in tracking_sequences.N_FRAMES.items()}
-    windows = {
-        name: dict.fromkeys(inner, (10, 20)) for name, inner in tracking_sequences.WINDOWS.items()
-    }
+    short = {name: min(n, 20) for name, n in sequences.N_FRAMES.items()}
+    windows = {name: dict.fromkeys(inner, (10, 20)) for name, inner in sequences.WINDOWS.items()}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(tracking_sequences, "N_FRAMES", short)
-        patch.setattr(tracking_sequences, "WINDOWS", windows)
+        patch.setattr(sequences, "N_FRAMES", short)
+        patch.setattr(sequences, "WINDOWS", windows)
         patch.setattr(tracking_bench, "time_estimator", no_time)
         patch.setattr(tracking_bench, "time_association", no_association_time)
         patch.setattr(tracking_bench, "fingerprint_of", lambda settings: "the same code")

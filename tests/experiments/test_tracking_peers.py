@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from hrc_env.experiments import tracking_peers_bench as bench
+from hrc_env.experiments.peers import bench
 from hrc_env.experiments.peers.model import F, Q, first_joints, pixels
 from hrc_env.experiments.peers.registry import PEERS, missing_sentence
 from hrc_env.experiments.tracking.rigs import make_rig
