@@ -13,7 +13,7 @@ from hrc_env.tracking.anatomy import anatomy
 from hrc_env.tracking.bone_lengths import stiff_lengths
 from hrc_env.tracking.evidence import log_evidence
 from hrc_env.tracking.hypotheses import copy_slot, slot_distance
-from hrc_env.tracking.mirrors import N_MIRRORS, WHOLE_BODY, lone_camera, reflect
+from hrc_env.tracking.mirrors import N_MIRRORS, WHOLE_BODY, lone_camera, open_depth, reflect
 from hrc_env.tracking.proposal import contrast_of
 from hrc_env.tracking.tree_filter import condition, settle
 from hrc_env.tracking.tree_search import find_pose_near
@@ -26,21 +26,28 @@ _JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
 @numba.njit(**_JIT)
-def is_ambiguous(ok, m):
-    """Whether one view alone carries a part of the body that is asked about.
+def is_ambiguous(P, body, cov, ok, m):
+    """Whether one view alone carries a part of the body whose depth is open.
 
-    `ok` (J, C) is what is seen, `m` the `mixture.MixtureSettings`.
+    `P` (C, 3, 4); `body` (J, 6) and `cov` (J, 6, 6) are what is predicted, `ok` (J, C) is what
+    is seen, `m` the `mixture.MixtureSettings`.
     """
     ambiguous = False
     for part in range(N_MIRRORS):
-        ambiguous |= asked(part, m) and lone_camera(part, ok) >= 0
+        ambiguous = ambiguous or camera_of(part, P, body, cov, ok, m) >= 0
     return ambiguous
 
 
 @numba.njit(**_JIT)
-def asked(part, m):
-    """Whether the settings ask about this part."""
-    return m.mirror_body if part == WHOLE_BODY else m.mirror_limbs
+def camera_of(part, P, body, cov, ok, m):
+    """The camera that leaves the depth of a part open that is asked about, or -1.
+
+    One view in this update is not enough: what other views said a moment ago is still known.
+    """
+    if not (m.mirror_body if part == WHOLE_BODY else m.mirror_limbs):
+        return -1
+    camera = lone_camera(part, ok)
+    return camera if camera >= 0 and open_depth(part, P[camera], body, cov) > m.open_m else -1
 
 
 @numba.njit(**_JIT)
@@ -60,7 +67,7 @@ def branch(state, b, w, prior, evidence, seen, s, m, scratch):
     own = w * limit
     for part in range(N_MIRRORS):
         n = state.n_alive[b, w]
-        camera = lone_camera(part, seen[3]) if asked(part, m) and n < limit else -1
+        camera = camera_of(part, seen[0], prior[0], prior[1], seen[3], m) if n < limit else -1
         if camera < 0:
             continue
         new = own + n

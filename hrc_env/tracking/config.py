@@ -27,7 +27,8 @@ _POSITIVE = (
     "root_acceleration",
     "one_view_inflation",
     "n_hypotheses",
-    "look_every",
+    "look_every_s",
+    "open_depth_m",
     "turn_std_rad",
     "evidence_trust",
 )
@@ -122,8 +123,11 @@ class TrackerConfig:
     """Most hypotheses about one worker (particle); with 1 it is the filter of kalman."""
     mirrored_parts: tuple[str, ...] = ("body", "limbs")
     """What may be turned or reflected in depth when one view carries it (particle)."""
-    look_every: int = 3
-    """Updates between two searches for other hypotheses (particle)."""
+    look_every_s: float = 0.12
+    """Time between two searches for other hypotheses (particle) [s]."""
+    open_depth_m: float = 0.04
+    """They are looked for where one view carries a part whose depth has at least this standard
+    deviation [m]: what other views said a moment ago is still known."""
     turn_std_rad: float = 0.7
     """A body that is turned by this much against a known hypothesis begins e^-0.5 as likely."""
     evidence_trust: float = 0.1

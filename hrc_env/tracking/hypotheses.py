@@ -29,8 +29,8 @@ class Hypotheses(NamedTuple):
     """(B, W H) what `anatomy` says of their poses; part of the weights."""
     n_alive: Ints
     """(B, W) slots in use, at least one."""
-    waited: Ints
-    """(B, W) updates since other hypotheses were looked for."""
+    waited_s: Floats
+    """(B, W) time since other hypotheses were looked for [s]."""
 
 
 @numba.njit(**_JIT)

@@ -36,6 +36,7 @@ def predict_all(state, model, dt, m):
         for w in range(state.n_alive.shape[1]):
             if not slots.tracked[b, w * limit]:
                 continue
+            state.waited_s[b, w] += dt
             for k in range(w * limit, w * limit + state.n_alive[b, w]):
                 gaussian = (slots.body[b, k], slots.cov[b, k], slots.slope[b, k])
                 if state.n_alive[b, w] == 1:
@@ -45,6 +46,23 @@ def predict_all(state, model, dt, m):
                     held[:], held_count[:] = slots.offset[b, k], slots.offset_count[b, k]
                     predict_tree(*gaussian, held, held_count, model, dt, work)
                     state.log_weight[b, k] += m.walking_odds * dt * forwards(slots.body[b, k])
+            if state.n_alive[b, w] > 1:
+                normalise(state, b, w, m.log_drop)
+
+
+@numba.njit(**_JIT)
+def grow_older_beside(state, dt, max_age):
+    """Count the ages of all hypotheses but the heaviest up; of a lost worker forget them."""
+    limit = state.slots.tracked.shape[1] // max(state.n_alive.shape[1], 1)
+    for b in range(state.n_alive.shape[0]):
+        for w in range(state.n_alive.shape[1]):
+            first = w * limit
+            if not state.slots.tracked[b, first]:
+                state.n_alive[b, w] = 1
+                state.log_weight[b, first], state.form[b, first] = 0.0, 0.0
+            for k in range(first + 1, first + state.n_alive[b, w]):
+                for j in range(state.slots.age_s.shape[2]):
+                    state.slots.age_s[b, k, j] = min(state.slots.age_s[b, k, j] + dt, max_age)
 
 
 @numba.njit(**_JIT)
@@ -90,8 +108,8 @@ def update_all(state, P, px, confidence, sigma_px, standing, s, m, noise):
                     slots.slope[b, first] = 0.0
                 continue
             several = state.n_alive[b, w] > 1
-            state.waited[b, w] += 1
-            look = limit > 1 and state.waited[b, w] >= m.look_every and is_ambiguous(ok, m)
+            look = limit > 1 and state.waited_s[b, w] >= m.look_every_s
+            look &= is_ambiguous(P, slots.body[b, first], slots.cov[b, first], ok, m)
             for h in range(state.n_alive[b, w]):
                 if h > 0:
                     read_worker(px, confidence, sigma_px, b, w, s.sigma_scale, z, sigma, ok)
@@ -122,7 +140,7 @@ def _follow(state, b, w, h, several, look, seen, standing, s, m, noise, kept):
     body = (slots.body[b, k], slots.cov[b, k], predicted)
     learn_noise(seen, scratch[0], body, *known, noise)
     if look:
-        state.waited[b, w] = 0
+        state.waited_s[b, w] = 0.0
         branch(state, b, w, prior, evidence, seen, s, m, scratch)
     look_after(slots, b, k, seen, standing, s, placed)
 

@@ -61,6 +61,28 @@ def lone_camera(part, ok):
 
 
 @numba.njit(**_JIT)
+def open_depth(part, camera, body, cov):
+    """How little is known of a part's depth from a camera [m].
+
+    The least standard deviation along its ray of any joint of the part, whose means are `body`
+    (J, 6) and covariances `cov` (J, 6, 6). `camera` (3, 4) is a projection.
+    """
+    eye, ray, least = eye_of(camera), np.empty(3), np.inf
+    for j in range(len(body)):
+        if not _MOVED[part, j]:
+            continue
+        variance, square = 0.0, 0.0
+        for i in range(3):
+            ray[i] = body[j, i] - eye[i]
+            square += ray[i] * ray[i]
+        for i in range(3):
+            for k in range(3):
+                variance += ray[i] * cov[j, i, k] * ray[k]
+        least = min(least, variance / square)
+    return np.sqrt(max(least, 0.0))
+
+
+@numba.njit(**_JIT)
 def reflect(part, camera, body, out):
     """Positions (J, 3) of a body (J, 6) whose `part` is reflected along a camera's rays.
 

@@ -14,6 +14,8 @@ _MOST_PENALTY = 10.0
 _DISTINCT, _CLOSE = 3.0, 2.0
 """Posterior deviations: a mode beyond the first is new, hypotheses within the second are one."""
 _SEARCH_STEPS = 4
+_TICK_S = 1e-6
+"""Sums of time steps that are short by no more are whole."""
 _JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
@@ -22,8 +24,10 @@ class MixtureSettings(NamedTuple):
 
     mirror_body: bool
     mirror_limbs: bool
-    look_every: int
-    """Updates between two searches for other hypotheses."""
+    look_every_s: float
+    """Time between two searches for other hypotheses [s]."""
+    open_m: float
+    """Standard deviation of a part's depth above which it is open [m]."""
     log_least: float
     """Log of the least evidence of a new hypothesis beside its parent's."""
     log_drop: float
@@ -51,7 +55,8 @@ def mixture_settings(config: TrackerConfig) -> MixtureSettings:
     return MixtureSettings(
         mirror_body="body" in config.mirrored_parts,
         mirror_limbs="limbs" in config.mirrored_parts,
-        look_every=config.look_every,
+        look_every_s=config.look_every_s - _TICK_S,
+        open_m=config.open_depth_m,
         log_least=math.log(_LEAST_EVIDENCE),
         log_drop=math.log(config.least_weight),
         trust=config.evidence_trust,

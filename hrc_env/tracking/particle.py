@@ -19,7 +19,7 @@ from hrc_env.tracking.acquisition import STANDING_M
 from hrc_env.tracking.ahead import ahead, mixed
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.hypotheses import Hypotheses
-from hrc_env.tracking.hypothesis_filter import predict_all, update_all
+from hrc_env.tracking.hypothesis_filter import grow_older_beside, predict_all, update_all
 from hrc_env.tracking.kalman import KalmanEstimator, KalmanState, motion
 from hrc_env.tracking.measurements import arrays_of
 from hrc_env.tracking.mixture import MixtureSettings, mix, mixture_settings
@@ -52,14 +52,14 @@ class ParticleEstimator:
             log_weight=np.zeros((batch, n_slots)),
             form=np.zeros((batch, n_slots)),
             n_alive=np.ones((batch, n_workers), np.int64),
-            waited=np.zeros((batch, n_workers), np.int64),
+            waited_s=np.zeros((batch, n_workers)),
         )
 
     def reset(self, state: Hypotheses, ids: Ints, rngs: list[np.random.Generator]) -> None:
         """Forget environments `ids`; draws nothing."""
         self.single.reset(state.slots, ids, rngs)
         state.log_weight[ids], state.form[ids] = 0.0, 0.0
-        state.n_alive[ids], state.waited[ids] = 1, 0
+        state.n_alive[ids], state.waited_s[ids] = 1, 0.0
 
     def predict(self, state: Hypotheses, dt_s: float, rngs: list[np.random.Generator]) -> None:
         """Move every hypothesis by its motion model; draws nothing."""
@@ -67,6 +67,7 @@ class ParticleEstimator:
         model = motion(dt_s, self.config.damping, self.config.root_acceleration)
         predict_all(state, model, dt_s, self.mixture)
         grow_older(gaussian_tracks(heaviest(state)), dt_s, self.config)
+        grow_older_beside(state, dt_s, self.config.max_age_s)
 
     def update(
         self, state: Hypotheses, keypoints: Keypoints, rngs: list[np.random.Generator]

@@ -10,7 +10,7 @@ from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import make_estimator
 from hrc_env.tracking.evidence import tree_measure
 from hrc_env.tracking.hypotheses import exchange_slots, merge, normalise
-from hrc_env.tracking.mirrors import eye_of, lone_camera, reflect
+from hrc_env.tracking.mirrors import eye_of, lone_camera, open_depth, reflect
 from hrc_env.tracking.tree import ORDER, PARENT, make_work
 from hrc_env.tracking.twins import heads_like, turn_body, turn_of
 
@@ -72,6 +72,48 @@ def test_while_all_views_agree_there_is_one_hypothesis():
     px = detections(walk(5, 60), Damage(), 5)[:, None]
     _, _, n_alive = followed(px)
     assert (n_alive == 1).all()
+
+
+def test_cameras_that_take_turns_leave_no_second_hypothesis():
+    px = detections(walk(5, 100), Damage(), 5)[:, None]
+    for t in range(40, 100):  # one view in every update, another one each time
+        px[t, :, [c for c in range(4) if c != t % 4]] = np.nan
+    _, _, n_alive = followed(px)
+    assert (n_alive == 1).mean() > 0.97
+
+
+def test_predictions_without_frames_stay_where_those_of_one_hypothesis_are():
+    joints = np.stack([walk(s, 100) for s in range(4)], 1)
+    px = np.stack([detections(joints[:, k], Damage(), k) for k in range(4)], 1)
+    for t in range(40, 100):  # lone cameras and gaps of 0.12 s
+        px[t, :, [c for c in range(4) if t % 6 in (1, 2, 3) or c != t % 4]] = np.nan
+    error, most = {}, 1
+    for name in ("kalman", "particle"):
+        e, rngs = make_estimator(name, LAB, DT), generators(4)
+        state, mean = e.init(4, 1), []
+        for frame in px:
+            e.predict(state, DT, rngs)
+            if np.isfinite(frame).any():
+                e.update(state, keypoints(frame), rngs)
+            if name == "particle":
+                most = max(most, state.n_alive.max())
+                whole = np.exp(state.log_weight[0, : state.n_alive[0, 0]]).sum()
+                assert whole == pytest.approx(1.0)
+            mean.append(e.estimate(state).mean_world[:, 0])
+        error[name] = np.sqrt(((np.stack(mean) - joints)[40:] ** 2).sum(-1).mean())
+    assert most > 1  # so that the frames can tell
+    assert error["particle"] < 1.1 * error["kalman"]
+
+
+def test_a_worker_who_is_lost_has_one_hypothesis_which_relaxes_to_the_prior():
+    _, px = one_camera([100], 3.0, 0.0)
+    e, state, n_alive = followed(px)
+    assert n_alive[-20:].max() > 1
+    for _ in range(30):
+        e.predict(state, DT, generators(1))
+    assert not e.estimate(state).tracked.any()
+    assert (state.n_alive == 1).all()
+    assert (state.log_weight[0, 0] == 0.0).all()
 
 
 def test_one_camera_does_not_turn_the_body_round():
@@ -178,6 +220,17 @@ def test_a_part_is_ambiguous_only_where_one_camera_sees_it():
     assert lone_camera(0, np.zeros((15, 4), bool)) == -1
 
 
+def test_a_parts_depth_is_open_as_far_as_its_best_known_joint_is():
+    body, cov = standing(), np.tile(1e-4 * np.eye(6), (15, 1, 1))
+    assert open_depth(1, LAB[0], body, cov) == pytest.approx(0.01)
+    for j, std in ((3, 0.2), (5, 0.3)):  # an arm, along the camera's rays only
+        ray = (body[j, :3] - EYES[0]) / np.linalg.norm(body[j, :3] - EYES[0])
+        cov[j, :3, :3] += (std**2 - 1e-4) * np.outer(ray, ray)
+    assert open_depth(1, LAB[0], body, cov) == pytest.approx(0.2)
+    assert open_depth(3, LAB[0], body, cov) == pytest.approx(0.3)  # its forearm
+    assert open_depth(0, LAB[0], body, cov) == pytest.approx(0.01)  # the whole body
+
+
 def test_the_trees_determinant_and_square_are_those_of_the_whole_matrix():
     px = detections(walk(6, 30), HARD, 6)[:, None]
     _, state, _ = followed(px)
@@ -227,7 +280,7 @@ def test_exchanging_slots_exchanges_every_array():
 
 @pytest.mark.parametrize(
     "change",
-    [{"n_hypotheses": 0}, {"mirrored_parts": ("head",)}, {"least_weight": 0.0}, {"look_every": 0}],
+    [{"n_hypotheses": 0}, {"mirrored_parts": ("head",)}, {"least_weight": 0.0}, {"look_every_s": 0}],
 )
 def test_settings_that_cannot_work_are_refused(change):
     with pytest.raises(ConfigError):
