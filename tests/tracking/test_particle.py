@@ -280,7 +280,12 @@ def test_exchanging_slots_exchanges_every_array():
 
 @pytest.mark.parametrize(
     "change",
-    [{"n_hypotheses": 0}, {"mirrored_parts": ("head",)}, {"least_weight": 0.0}, {"look_every_s": 0}],
+    [
+        {"n_hypotheses": 0},
+        {"mirrored_parts": ("head",)},
+        {"least_weight": 0.0},
+        {"look_every_s": 0},
+    ],
 )
 def test_settings_that_cannot_work_are_refused(change):
     with pytest.raises(ConfigError):
