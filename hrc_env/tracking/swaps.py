@@ -3,7 +3,8 @@
 A two-state hidden Markov model per camera: detections as they are, or mirrored. Its evidence
 is how much better one of the two explains all paired joints. A camera that comes back after
 having seen nothing is believed at first: the body may have been tracked mirrored in depth
-meanwhile, and then it is not the camera that is wrong.
+meanwhile, and then it is not the camera that is wrong. Nor is it when all of several cameras
+seem to be wrong.
 """
 
 import math
@@ -29,7 +30,7 @@ def undo_swaps(P, body, cov, z, sigma, ok, chance, blind, believed, s):
     `chance` (C,) is the probability of being swapped, `blind` and `believed` (C,) count
     updates; `s` are the `settings.Settings`.
     """
-    contrast = contrast_of(s.outlier_weight, s.image_area_px)
+    contrast, n_seeing, n_swapped = contrast_of(s.outlier_weight, s.image_area_px), 0, 0
     for c in range(len(P)):
         sees = False
         for j in range(len(_MIRROR)):
@@ -39,6 +40,7 @@ def undo_swaps(P, body, cov, z, sigma, ok, chance, blind, believed, s):
             continue
         believed[c] = _BELIEVED_UPDATES if blind[c] > _BLIND_UPDATES else max(believed[c] - 1, 0)
         blind[c] = 0
+        n_seeing += 1
         if believed[c] > 0:
             chance[c] = _LEAST_CHANCE
             continue
@@ -46,7 +48,11 @@ def undo_swaps(P, body, cov, z, sigma, ok, chance, blind, believed, s):
         evidence = swap_evidence(P[c], c, body, cov, z, sigma, ok, contrast)
         odds = math.log(prior / (1.0 - prior)) + evidence
         chance[c] = min(max(1.0 / (1.0 + math.exp(-odds)), _LEAST_CHANCE), 1.0 - _LEAST_CHANCE)
-        if chance[c] > 0.5:
+        n_swapped += chance[c] > 0.5
+    if n_swapped == n_seeing > 1:  # it is the body that has its sides exchanged
+        chance[:] = _LEAST_CHANCE
+    for c in range(len(P)):
+        if chance[c] > 0.5 and blind[c] == 0:
             _mirror(c, z, sigma, ok)
 
 

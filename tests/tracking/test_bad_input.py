@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from simulated import DT, HARD, LAB, Damage, detections, generators, keypoints, walk
 
@@ -117,6 +117,7 @@ def _singular(rng):
 @every
 @settings(max_examples=10, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
+@example(seed=1006)  # nearly all cameras seemed to exchange left and right
 def test_a_covariance_that_is_none_any_more_is_repaired_or_the_track_given_up(name, seed):
     rng = np.random.default_rng(seed)
     joints = walk(2, 70)

@@ -43,7 +43,7 @@ def one_camera(seeds, seconds=4.0, after_s=1.4):
 
 @pytest.mark.parametrize("damage", [Damage(), Damage(occlusions=True), HARD])
 def test_it_is_as_accurate_as_the_filter_of_single_joints(damage):
-    joints, px = walks(range(100, 106), 200, damage)
+    joints, px = walks(range(100, 124), 200, damage)
     ours, theirs = (
         judged(track(make_estimator(name, LAB, DT), px)[25:], joints[25:])
         for name in ("kalman", "per_joint")
