@@ -16,10 +16,10 @@ from hrc_env.tracking.measurements import read_worker
 from hrc_env.tracking.noise import learn_noise, scale_sigma
 from hrc_env.tracking.proposal import contrast_of
 from hrc_env.tracking.swaps import undo_swaps
-from hrc_env.tracking.tree import make_work
 from hrc_env.tracking.tree_filter import condition, follow, look_after, settle
 from hrc_env.tracking.tree_predict import predict_tree
 from hrc_env.tracking.upkeep import acquire
+from hrc_env.tracking.work import make_work
 
 _TORSO = (1, 2, 7, 8)
 _JIT = {"cache": True, "nogil": True, "error_model": "numpy"}

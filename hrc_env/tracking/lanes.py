@@ -2,7 +2,7 @@
 
 The robust likelihood of `proposal.add_cameras`, laid out so that a processor's vector
 instructions take several joints at a time: a buffer is a sequence of rows of `LANES` numbers,
-one number for each joint, of which the last lanes may be empty.
+one number for each joint and one that is nobody's.
 """
 
 import math
@@ -15,6 +15,9 @@ from hrc_env.skeleton import N_JOINTS
 
 LANES = 16
 """Joints, rounded up to a whole number of vectors."""
+JOINT_OF_LANE = (14, 13, 6, 5, 12, 11, 4, 3, 10, 9, 0, -1, 8, 7, 2, 1)
+"""Joints from the leaves of the tree to its root (`quads` says why so); -1: nobody's lane."""
+LANE_OF_JOINT = tuple(JOINT_OF_LANE.index(j) for j in range(N_JOINTS))
 N_JOINT_ROWS = 9
 """x, y, z [m]; then 00, 11, 22, 01, 02, 12 of the prior's position covariance [m^2]."""
 N_VIEW_ROWS = 12
@@ -27,31 +30,29 @@ _REORDER = {"reassoc", "contract", "nsz"}  # NaN and infinity keep their meaning
 
 
 @numba.njit(**_JIT)
-def lanes_of(cov, seen):
-    """Rows of the joints (points not set) and, (C, 3 rows), of pixels and their precisions.
-
-    A precision of 0 stands for a measurement that is missing.
-    """
+def views_of(seen):
+    """(C, 3 rows) of pixels and their precisions; 0 stands for a measurement that is missing."""
     _, z, sigma, ok = seen
-    joints, views = np.ones(N_JOINT_ROWS * LANES), np.zeros((ok.shape[1], 3 * LANES))
+    views = np.zeros((ok.shape[1], 3 * LANES))
     for j in range(len(ok)):
-        for i in range(3):
-            joints[(3 + i) * LANES + j] = cov[j, i, i]
-        joints[6 * LANES + j], joints[7 * LANES + j] = cov[j, 0, 1], cov[j, 0, 2]
-        joints[8 * LANES + j] = cov[j, 1, 2]
+        lane = LANE_OF_JOINT[j]
         for c in range(ok.shape[1]):
             if ok[j, c]:
-                views[c, j], views[c, LANES + j] = z[j, c, 0], z[j, c, 1]
-                views[c, 2 * LANES + j] = 1.0 / (sigma[j, c] * sigma[j, c])
-    return joints, views
+                views[c, lane], views[c, LANES + lane] = z[j, c, 0], z[j, c, 1]
+                views[c, 2 * LANES + lane] = 1.0 / (sigma[j, c] * sigma[j, c])
+    return views
 
 
 @numba.njit(**_JIT)
-def set_points(points, joints):
-    """Put points (J, 3) into the rows of the joints."""
-    for j in range(len(points)):
+def set_joints(body, cov, joints):
+    """Put positions (J, 3+) and their covariances (J, 3+, 3+) into the rows of the joints."""
+    for j in range(len(body)):
+        lane = LANE_OF_JOINT[j]
         for i in range(3):
-            joints[i * LANES + j] = points[j, i]
+            joints[i * LANES + lane] = body[j, i]
+            joints[(3 + i) * LANES + lane] = cov[j, i, i]
+        joints[6 * LANES + lane], joints[7 * LANES + lane] = cov[j, 0, 1], cov[j, 0, 2]
+        joints[8 * LANES + lane] = cov[j, 1, 2]
 
 
 @numba.njit(fastmath=_REORDER, **_JIT)
@@ -60,13 +61,13 @@ def add_view(p, joints, view, widen, contrast, seen, sums):
 
     Args:
         p: (3, 4).
-        joints, view: rows, as `lanes_of` gives them.
+        joints, view: rows, as `set_joints` and `views_of` give them.
         widen, contrast: as in `proposal.add_cameras`.
         seen: rows filled, beliefs first.
         sums: rows added to.
     """
     _image(p, joints, view, widen, contrast, seen)
-    for j in range(N_JOINTS):
+    for j in range(LANES):
         odds = math.exp(seen[LANES + j]) * seen[2 * LANES + j]
         seen[j] = odds / (odds + 1.0)
     for j in range(LANES):
@@ -116,13 +117,3 @@ def _image(p, joints, view, widen, contrast, seen):
         seen[6 * LANES + j], seen[7 * LANES + j], seen[8 * LANES + j] = b0, b1, b2
         seen[9 * LANES + j] = precision
         seen[10 * LANES + j], seen[11 * LANES + j] = du, dv
-
-
-@numba.njit(**_JIT)
-def read_sums(sums, j, information, gradient):
-    """Joint j's information (3, 3) and gradient (3,)."""
-    for i in range(3):
-        information[i, i], gradient[i] = sums[i * LANES + j], sums[(6 + i) * LANES + j]
-    information[0, 1] = information[1, 0] = sums[3 * LANES + j]
-    information[0, 2] = information[2, 0] = sums[4 * LANES + j]
-    information[1, 2] = information[2, 1] = sums[5 * LANES + j]

@@ -13,11 +13,12 @@ from hrc_env.tracking.measurements import read_worker
 from hrc_env.tracking.noise import learn_noise, scale_sigma
 from hrc_env.tracking.proposal import contrast_of
 from hrc_env.tracking.swaps import undo_swaps
-from hrc_env.tracking.tree import PARENT, make_work
+from hrc_env.tracking.tree import PARENT
 from hrc_env.tracking.tree_predict import predict_tree
 from hrc_env.tracking.tree_search import find_pose
 from hrc_env.tracking.tree_update import correct_mean, update_tree
 from hrc_env.tracking.upkeep import acquire, acquire_anew, check, find_joints_again
+from hrc_env.tracking.work import make_work
 
 _JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 

@@ -12,17 +12,41 @@ import numba
 import numpy as np
 
 from hrc_env.tracking.acquisition import heading
+from hrc_env.tracking.lanes import JOINT_OF_LANE, LANE_OF_JOINT, LANES
 from hrc_env.tracking.motion_model import learn_offsets
-from hrc_env.tracking.tree import (
-    HAS_CHILD,
-    ORDER,
-    PARENT,
-    invert,
-    multiply,
-    multiply_transposed,
+from hrc_env.tracking.quads import (
+    ABOVE,
+    COV,
+    EDGE,
+    HESSIAN,
+    INVERSE,
+    KNOWN,
+    MESSAGE,
+    OWN,
+    POSITIONS,
+    PROPER,
+    PULL,
+    QUAD,
+    QUADS,
+    SLOPE,
+    fetch_above,
+    invert_rows,
+    load_tree,
+    multiply_rows,
+    store_tree,
 )
+from hrc_env.tracking.tree import multiply, multiply_transposed
+from hrc_env.tracking.vectors import moved
 
 _LEFT, _RIGHT, _LEFT_HIP, _RIGHT_HIP = 1, 2, 7, 8  # shoulders: _RIGHT, _LEFT_HIP hang on _LEFT
+_ROOT, _ROOT_ABOVE = OWN, PULL
+"""Covariance with the mean of the torso; the parent's."""
+_TORSO = MESSAGE
+"""Covariance of that mean, four times over, in the first quad."""
+_MOVED, _MOVED_EDGE = HESSIAN, KNOWN
+"""Covariances of a joint and with its parent, a moment later."""
+_HERE, _THERE = POSITIONS, POSITIONS + 32
+"""F and travel of a joint, of its parent: four rows each."""
 _JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 _REORDER = {"reassoc", "contract", "nsz"}
 
@@ -43,18 +67,31 @@ def predict_tree(body, cov, slope, offset, offset_count, model, dt, w):
     """
     F, travel, Q, shared = model
     _move_means(body, cov, offset, offset_count, F, travel, dt)
-    for m in range(1, len(ORDER)):
-        j = ORDER[m]
-        multiply(slope[j], cov[PARENT[j]], w.cross[j])
-    _relate_to_root(cov, slope, w)
-    _move_covariances(cov, F, travel, Q, shared, w)
-    for m in range(len(ORDER)):
-        j = ORDER[m]
-        known = not HAS_CHILD[j] or invert(cov[j], w.inverse[j], w.a)
-        if not known:
-            w.inverse[j] = 0.0
-        if m > 0:
-            multiply(w.cross[j], w.inverse[PARENT[j]], slope[j])
+    rows = w.rows
+    load_tree(cov, slope, rows)
+    for quad in range(QUADS):
+        at = quad * QUAD
+        multiply_rows(rows, at + SLOPE, at + ABOVE, at + EDGE)
+    _relate_torso(cov, slope, w)
+    for quad in range(QUADS - 1, -1, -1):
+        at = quad * QUAD
+        fetch_above(rows, quad, _ROOT, _ROOT_ABOVE, 36)
+        if quad < QUADS - 1:
+            multiply_rows(rows, at + SLOPE, at + _ROOT_ABOVE, at + _ROOT)
+    _load_model(F, travel, rows)
+    for quad in range(QUADS):
+        at = quad * QUAD
+        _move(rows, at + COV, at + _ROOT, at + _ROOT, at + _HERE, at + _HERE, at + _MOVED)
+        blocks = (at + EDGE, at + _ROOT, at + _ROOT_ABOVE)
+        _move(rows, *blocks, at + _HERE, at + _THERE, at + _MOVED_EDGE)
+    _add_noise(Q, shared, rows)
+    for quad in range(QUADS):
+        _invert(rows, quad * QUAD)
+    for quad in range(QUADS):
+        at = quad * QUAD
+        fetch_above(rows, quad, INVERSE, ABOVE, 36)
+        multiply_rows(rows, at + _MOVED_EDGE, at + ABOVE, at + SLOPE)
+    store_tree(rows, _MOVED, cov, slope)
 
 
 @numba.njit(**_JIT)
@@ -80,98 +117,85 @@ def _move_means(body, cov, offset, offset_count, F, travel, dt):
 
 
 @numba.njit(**_JIT)
-def _relate_to_root(cov, slope, w):
-    """Fill with_root (J, 6, 6) with Cov(x_j, r) and w.a with Cov(r, r); needs w.cross."""
-    X, common = w.cross, w.with_root
-    multiply(slope[_RIGHT_HIP], X[_RIGHT], w.b)  # right hip with left shoulder
-    multiply_transposed(slope[_LEFT_HIP], X[_RIGHT], w.c)  # left hip with right shoulder
-    multiply_transposed(slope[_RIGHT_HIP], w.c, w.d)  # right hip with left hip
+def _relate_torso(cov, slope, w):
+    """Cov(x_j, r) of the torso's four joints into their rows, and Cov(r, r)."""
+    X, rows = w.d, w.rows
+    multiply(slope[_RIGHT], cov[_LEFT], X)  # right shoulder with left
+    multiply(slope[_RIGHT_HIP], X, w.b)  # right hip with left shoulder
+    multiply_transposed(slope[_LEFT_HIP], X, w.c)  # left hip with right shoulder
+    multiply_transposed(slope[_RIGHT_HIP], w.c, w.a)  # right hip with left hip
+    left, right = _place(_LEFT), _place(_RIGHT)
+    left_hip, right_hip = _place(_LEFT_HIP), _place(_RIGHT_HIP)
     for i in range(6):
         for k in range(6):
-            common[_LEFT, i, k] = (
-                cov[_LEFT, i, k] + X[_RIGHT, k, i] + X[_LEFT_HIP, k, i] + w.b[k, i]
-            )
-            common[_RIGHT, i, k] = (
-                X[_RIGHT, i, k] + cov[_RIGHT, i, k] + w.c[k, i] + X[_RIGHT_HIP, k, i]
-            )
-            common[_LEFT_HIP, i, k] = (
-                X[_LEFT_HIP, i, k] + w.c[i, k] + cov[_LEFT_HIP, i, k] + w.d[k, i]
-            )
-            common[_RIGHT_HIP, i, k] = (
-                w.b[i, k] + X[_RIGHT_HIP, i, k] + w.d[i, k] + cov[_RIGHT_HIP, i, k]
-            )
+            n, m = 24 * i + 4 * k, 24 * k + 4 * i
+            own = cov[_LEFT, i, k] + X[k, i] + w.b[k, i]
+            rows[left + _ROOT + n] = 0.25 * (own + rows[left_hip + EDGE + m])
+            own = cov[_RIGHT, i, k] + X[i, k] + w.c[k, i]
+            rows[right + _ROOT + n] = 0.25 * (own + rows[right_hip + EDGE + m])
+            own = cov[_LEFT_HIP, i, k] + w.c[i, k] + w.a[k, i]
+            rows[left_hip + _ROOT + n] = 0.25 * (own + rows[left_hip + EDGE + n])
+            own = cov[_RIGHT_HIP, i, k] + w.b[i, k] + w.a[i, k]
+            rows[right_hip + _ROOT + n] = 0.25 * (own + rows[right_hip + EDGE + n])
     for i in range(6):
         for k in range(6):
-            total = 0.0
-            for j in (_LEFT, _RIGHT, _LEFT_HIP, _RIGHT_HIP):
-                common[j, i, k] *= 0.25
-                total += common[j, i, k]
-            w.a[i, k] = 0.25 * total
-    for m in range(len(ORDER)):
-        j = ORDER[m]
-        if j not in (_LEFT, _RIGHT, _LEFT_HIP, _RIGHT_HIP):
-            multiply(slope[j], common[PARENT[j]], common[j])
-
-
-@numba.njit(fastmath=_REORDER, **_JIT)
-def _move_covariances(cov, F, travel, Q, shared, w):
-    """C' = F C F' + F Y D' + D Y' F' + D S D' + Q; edges likewise with the parent's F and D."""
-    S, X, common = w.a, w.cross, w.with_root
-    for j in range(len(cov)):
-        q, here = PARENT[j], (_entries(F[j], 0, 0, 1), _entries(travel[j], 0, 0, 1))
-        for i in range(3):
-            for k in range(i + 1):
-                blocks = (cov[j], common[j], common[j], S)
-                pp, pv, vp, vv = _moved(*blocks, i, k, *here, *here)
-                cov[j, i, k] = cov[j, k, i] = pp
-                cov[j, i, 3 + k] = cov[j, 3 + k, i] = pv
-                cov[j, 3 + i, k] = cov[j, k, 3 + i] = vp
-                cov[j, 3 + i, 3 + k] = cov[j, 3 + k, 3 + i] = vv
-        _add_noise(Q[j], cov[j])
-        if q < 0:
-            continue
-        there = (_entries(F[q], 0, 0, 1), _entries(travel[q], 0, 0, 1))
-        for i in range(3):
-            for k in range(3):
-                moved = _moved(X[j], common[j], common[q], S, i, k, *here, *there)
-                X[j, i, k], X[j, i, 3 + k], X[j, 3 + i, k], X[j, 3 + i, 3 + k] = moved
-        _add_noise(shared, X[j])
-
-
-@numba.njit(fastmath=_REORDER, forceinline=True, **_JIT)
-def _moved(edge, own, other, S, i, k, f, d, g, e):
-    """The (2, 2) entries of axes i, k of f edge g' + f own e' + d other' g' + d S e'."""
-    c00, c01, c10, c11 = _entries(edge, i, k, 3)
-    y00, y01, y10, y11 = _entries(own, i, k, 3)
-    t00, t10, t01, t11 = _entries(other, k, i, 3)
-    s00, s01, s10, s11 = _entries(S, i, k, 3)
-    m00 = c00 * g[0] + c01 * g[1] + y00 * e[0] + y01 * e[1]
-    m01 = c00 * g[2] + c01 * g[3] + y00 * e[2] + y01 * e[3]
-    m10 = c10 * g[0] + c11 * g[1] + y10 * e[0] + y11 * e[1]
-    m11 = c10 * g[2] + c11 * g[3] + y10 * e[2] + y11 * e[3]
-    n00 = t00 * g[0] + t01 * g[1] + s00 * e[0] + s01 * e[1]
-    n01 = t00 * g[2] + t01 * g[3] + s00 * e[2] + s01 * e[3]
-    n10 = t10 * g[0] + t11 * g[1] + s10 * e[0] + s11 * e[1]
-    n11 = t10 * g[2] + t11 * g[3] + s10 * e[2] + s11 * e[3]
-    return (
-        f[0] * m00 + f[1] * m10 + d[0] * n00 + d[1] * n10,
-        f[0] * m01 + f[1] * m11 + d[0] * n01 + d[1] * n11,
-        f[2] * m00 + f[3] * m10 + d[2] * n00 + d[3] * n10,
-        f[2] * m01 + f[3] * m11 + d[2] * n01 + d[3] * n11,
-    )
+            n = _ROOT + 24 * i + 4 * k
+            shoulders = rows[left + n] + rows[right + n]
+            mean = 0.25 * (shoulders + rows[left_hip + n] + rows[right_hip + n])
+            for lane in range(4):
+                rows[_TORSO + 24 * i + 4 * k + lane] = mean
 
 
 @numba.njit(forceinline=True, **_JIT)
-def _entries(a, i, k, far):
-    """Four entries of `a` that are `far` from each other, from (i, k) on: a 2x2 matrix."""
-    return a[i, k], a[i, far + k], a[far + i, k], a[far + i, far + k]
+def _place(j):
+    return LANE_OF_JOINT[j] // 4 * QUAD + LANE_OF_JOINT[j] % 4
 
 
 @numba.njit(**_JIT)
-def _add_noise(noise, out):
-    """out (6, 6) += noise (2, 2) x I3."""
+def _load_model(F, travel, rows):
+    """F and travel of every joint and its parent in lanes."""
+    for lane in range(LANES):
+        j = max(JOINT_OF_LANE[lane], 0)
+        at = lane // 4 * QUAD + lane % 4 + _HERE
+        for i in range(2):
+            for k in range(2):
+                rows[at + 8 * i + 4 * k] = F[j, i, k]
+                rows[at + 16 + 8 * i + 4 * k] = travel[j, i, k]
+    for quad in range(QUADS):
+        fetch_above(rows, quad, _HERE, _THERE, 8)
+
+
+@numba.njit(**_JIT)
+def _move(rows, edge, own, other, here, there, out):
+    """f edge g' + f own e' + d other' g' + d S e' for a quad, axes of space left alone.
+
+    f, d are a joint's F and travel, which begin at `here`; g, e those at `there`.
+    """
     for i in range(3):
-        out[i, i] += noise[0, 0]
-        out[i, 3 + i] += noise[0, 1]
-        out[3 + i, i] += noise[1, 0]
-        out[3 + i, 3 + i] += noise[1, 1]
+        for k in range(3):
+            n = 24 * i + 4 * k
+            t = 24 * k + 4 * i
+            moved(rows, edge + n, own + n, other + t, _TORSO + n, here, there, out + n)
+
+
+@numba.njit(**_JIT)
+def _add_noise(Q, shared, rows):
+    """Noise (2, 2) x I3: a joint's Q, and what it shares with its parent."""
+    for j in range(len(Q)):
+        at = _place(j)
+        for i in range(3):
+            m = at + 28 * i
+            for a in range(2):
+                for b in range(2):
+                    rows[m + 72 * a + 12 * b + _MOVED] += Q[j, a, b]
+                    rows[m + 72 * a + 12 * b + _MOVED_EDGE] += shared[a, b]
+
+
+@numba.njit(**_JIT)
+def _invert(rows, at):
+    """Inverse marginals of a quad; 0 where there is none."""
+    invert_rows(rows, at)
+    for lane in range(4):
+        if rows[at + PROPER + lane] == 0.0:
+            for n in range(36):
+                rows[at + INVERSE + lane + 4 * n] = 0.0

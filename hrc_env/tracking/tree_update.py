@@ -8,15 +8,43 @@ and slopes exactly.
 import numba
 
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
+from hrc_env.tracking.lanes import JOINT_OF_LANE, LANE_OF_JOINT, LANES
 from hrc_env.tracking.measurements import pixel_spread
-from hrc_env.tracking.tree import (
-    ORDER,
-    PARENT,
-    invert,
-    multiply,
-    multiply_symmetric,
-    transposed_multiply_symmetric,
+from hrc_env.tracking.quads import (
+    ABOVE,
+    ABOVE_STEP,
+    BACK,
+    COV,
+    DESCENT,
+    EDGE,
+    GRADIENT,
+    HESSIAN,
+    INVERSE,
+    KNOWN,
+    MESSAGE,
+    OWN,
+    PASSES,
+    PROPER,
+    PULL,
+    PULLED,
+    QUAD,
+    QUADS,
+    SLOPE,
+    STEP,
+    add_rows,
+    apply_rows,
+    apply_transposed_rows,
+    fetch_above,
+    invert_rows,
+    load_tree,
+    multiply_rows,
+    multiply_transposed_rows,
+    pass_on,
+    store_tree,
+    subtract_rows,
+    transposed_multiply_rows,
 )
+from hrc_env.tracking.tree import PARENT
 
 _NEAREST_M = 0.3
 """The mean correction knows no joint nearer to a lens than this."""
@@ -31,107 +59,113 @@ def update_tree(body, cov, slope, w):
     What they say is in camera_information, camera_gradient, edge_information and edge_gradient
     of `w`, as `tree_search.find_pose` leaves it. Keeps the factors for `correct_mean`.
     """
+    rows = w.rows
+    load_tree(cov, slope, rows)
+    for quad in range(QUADS):
+        _split(rows, quad * QUAD)
+    _load_measurements(w, rows)
+    for step in range(len(PASSES)):
+        _eliminate(rows, PASSES[step][0] * QUAD)
+        pass_on(rows, step, MESSAGE, KNOWN, 36)
+    root = QUADS - 1
+    _eliminate(rows, root * QUAD)
+    for n in range(144):
+        rows[root * QUAD + COV + n] = rows[root * QUAD + INVERSE + n]
+    for n in range(1, len(DESCENT)):
+        fetch_above(rows, DESCENT[n], COV, ABOVE, 36)
+        _marginalise(rows, DESCENT[n] * QUAD)
+    store_tree(rows, COV, cov, slope)
     for j in range(len(body)):
-        for i in range(6):
-            w.gradient[j, i] = w.camera_gradient[j, i] if i < 3 else 0.0
-            for k in range(6):
-                inside = i < 3 and k < 3
-                w.information[j, i, k] = w.camera_information[j, i, k] if inside else 0.0
-    for m in range(len(ORDER) - 1, 0, -1):
-        _eliminate(ORDER[m], cov, slope, w)
-    root = ORDER[0]
-    if invert(cov[root], w.a, w.b):
-        for i in range(6):
-            for k in range(6):
-                w.a[i, k] += w.information[root, i, k]
-        invert(w.a, w.inverse[root], w.b)
-    else:
-        w.inverse[root] = cov[root]
-    cov[root] = w.inverse[root]
-    for m in range(1, len(ORDER)):
-        _marginalise(ORDER[m], cov, slope, w)
-    _substitute(body, slope, w)
-
-
-@numba.njit(fastmath=_REORDER, forceinline=True, **_JIT)
-def _eliminate(j, cov, slope, w):
-    """Make a joint's slope and inverse Hessian the posterior ones; tell its parent the rest.
-
-    Of symmetric matrices only the lower three blocks are kept up.
-    """
-    q = PARENT[j]
-    conditional, coupling, through, factor = w.a, w.b, w.c, w.d
-    multiply(slope[j], cov[q], through)
-    multiply_symmetric(through, slope[j], coupling)
-    for i in range(6):
-        for k in range(6):
-            coupling[i, k] = cov[j, i, k] - coupling[i, k]
-    if not invert(coupling, conditional, factor):  # cut the edge rather than believe it
-        slope[j] = 0.0
-        for i in range(6):
-            for k in range(6):
-                conditional[i, k] = 1.0 / cov[j, i, i] if i == k else 0.0
-    multiply(conditional, slope[j], coupling)
-    transposed_multiply_symmetric(slope[j], coupling, through)
-    for i in range(3):
-        w.gradient[j, i] += w.edge_gradient[j, i]
-        w.gradient[q, i] -= w.edge_gradient[j, i]
-        for k in range(3):
-            coupling[i, k] += w.edge_information[j, i, k]
-            conditional[i, k] += w.edge_information[j, i, k]
-            through[i, k] += w.edge_information[j, i, k]
-    for i in range(6):
-        for k in range(6):
-            conditional[i, k] += w.information[j, i, k]
-            w.information[q, i, k] += through[i, k]
-    invert(conditional, w.inverse[j], factor)
-    multiply(w.inverse[j], coupling, slope[j])
-    transposed_multiply_symmetric(coupling, slope[j], through)
-    for i in range(6):
-        for k in range(6):
-            w.information[q, i, k] -= through[i, k]
-
-
-@numba.njit(fastmath=_REORDER, forceinline=True, **_JIT)
-def _marginalise(j, cov, slope, w):
-    """C_j = inverse Hessian + B_j C_parent B_j'."""
-    multiply(slope[j], cov[PARENT[j]], w.a)
-    multiply_symmetric(w.a, slope[j], w.b)
-    for i in range(3):
-        for k in range(3):
-            m, n = 3 + i, 3 + k
-            cov[j, i, k] = w.inverse[j, i, k] + 0.5 * (w.b[i, k] + w.b[k, i])
-            cov[j, m, k] = cov[j, k, m] = w.inverse[j, m, k] + w.b[m, k]
-            cov[j, m, n] = w.inverse[j, m, n] + 0.5 * (w.b[m, n] + w.b[n, m])
-
-
-@numba.njit(fastmath=_REORDER, **_JIT)
-def _substitute(body, slope, w):
-    """Add to the means what w.gradient asks for; it becomes the gradient after elimination."""
-    for m in range(len(ORDER) - 1, 0, -1):
-        j = ORDER[m]
+        for i in range(3):
+            w.gradient[j, i] = w.camera_gradient[j, i]
+            w.gradient[j, 3 + i] = 0.0
+    for j in range(len(body)):
         q = PARENT[j]
-        for i in range(6):
-            pull = 0.0
-            for k in range(6):
-                pull += slope[j, k, i] * w.gradient[j, k]
-            w.gradient[q, i] += pull
-    for m in range(len(ORDER)):
-        j = ORDER[m]
-        q = PARENT[j]
-        for i in range(6):
-            total = 0.0
-            for k in range(6):
-                total += w.inverse[j, i, k] * w.gradient[j, k]
-            w.step[j, i] = total
         if q >= 0:
-            for i in range(6):
-                total = 0.0
-                for k in range(6):
-                    total += slope[j, i, k] * w.step[q, k]
-                w.step[j, i] += total
+            for i in range(3):
+                w.gradient[j, i] += w.edge_gradient[j, i]
+                w.gradient[q, i] -= w.edge_gradient[j, i]
+    _substitute(body, w.gradient, rows)
+
+
+@numba.njit(**_JIT)
+def _split(rows, at):
+    """What a quad's joints know by themselves, given their parents."""
+    multiply_rows(rows, at + SLOPE, at + ABOVE, at + EDGE)
+    multiply_transposed_rows(rows, at + EDGE, at + SLOPE, at + KNOWN)
+    subtract_rows(rows, at + COV, at + KNOWN, at + HESSIAN)
+    invert_rows(rows, at)
+    for n in range(144):
+        rows[at + OWN + n] = rows[at + INVERSE + n]
+    for lane in range(4):
+        if rows[at + PROPER + lane] == 0.0:  # cut the edge rather than believe it
+            for n in range(36):
+                m = at + lane + 4 * n
+                rows[m + SLOPE] = 0.0
+                rows[m + OWN] = 1.0 / rows[m + COV] if n % 7 == 0 else 0.0
+    multiply_rows(rows, at + OWN, at + SLOPE, at + PULL)
+    transposed_multiply_rows(rows, at + SLOPE, at + PULL, at + BACK)
+
+
+@numba.njit(**_JIT)
+def _load_measurements(w, rows):
+    """Cameras inform a joint; bones it, its parent and what ties the two."""
+    for quad in range(QUADS):
+        for n in range(144):
+            rows[quad * QUAD + KNOWN + n] = 0.0
+    for j in range(len(w.point)):
+        at = LANE_OF_JOINT[j] // 4 * QUAD + LANE_OF_JOINT[j] % 4
+        for i in range(3):
+            for k in range(3):
+                m = at + 24 * i + 4 * k
+                rows[m + KNOWN] = w.camera_information[j, i, k]
+                if PARENT[j] >= 0:
+                    rows[m + OWN] += w.edge_information[j, i, k]
+                    rows[m + PULL] += w.edge_information[j, i, k]
+                    rows[m + BACK] += w.edge_information[j, i, k]
+
+
+@numba.njit(**_JIT)
+def _eliminate(rows, at):
+    """Posterior slopes and inverse Hessians of a quad, and what its joints tell their parents."""
+    add_rows(rows, at + OWN, at + KNOWN, at + HESSIAN)
+    invert_rows(rows, at)
+    multiply_rows(rows, at + INVERSE, at + PULL, at + SLOPE)
+    transposed_multiply_rows(rows, at + PULL, at + SLOPE, at + EDGE)
+    subtract_rows(rows, at + BACK, at + EDGE, at + MESSAGE)
+
+
+@numba.njit(**_JIT)
+def _marginalise(rows, at):
+    """C_j = inverse Hessian + B_j C_parent B_j'."""
+    multiply_rows(rows, at + SLOPE, at + ABOVE, at + EDGE)
+    multiply_transposed_rows(rows, at + EDGE, at + SLOPE, at + MESSAGE)
+    add_rows(rows, at + MESSAGE, at + INVERSE, at + COV)
+
+
+@numba.njit(**_JIT)
+def _substitute(body, gradient, rows):
+    """Add to the means what a gradient (J, 6) asks for, by the factors of the elimination."""
+    for lane in range(LANES):
+        j = JOINT_OF_LANE[lane]
+        at = lane // 4 * QUAD + lane % 4 + GRADIENT
         for i in range(6):
-            body[j, i] += w.step[j, i]
+            rows[at + 4 * i] = gradient[j, i] if j >= 0 else 0.0
+    for step in range(len(PASSES)):
+        at = PASSES[step][0] * QUAD
+        apply_transposed_rows(rows, at + SLOPE, at + GRADIENT, at + PULLED)
+        pass_on(rows, step, PULLED, GRADIENT, 6)
+    for n in range(len(DESCENT)):
+        at = DESCENT[n] * QUAD
+        fetch_above(rows, DESCENT[n], STEP, ABOVE_STEP, 6)
+        apply_rows(rows, at + SLOPE, at + ABOVE_STEP, at + PULLED)
+        apply_rows(rows, at + INVERSE, at + GRADIENT, at + STEP)
+        for i in range(24):
+            rows[at + STEP + i] += rows[at + PULLED + i]
+    for j in range(len(body)):
+        at = LANE_OF_JOINT[j] // 4 * QUAD + LANE_OF_JOINT[j] % 4 + STEP
+        for i in range(6):
+            body[j, i] += rows[at + 4 * i]
 
 
 @numba.njit(**_JIT)
@@ -159,4 +193,4 @@ def correct_mean(body, cov, slope, seen, belief, share, w):
             pull = share * belief[j, c] * variance / sigma[j, c] ** 2 / max(depth, _NEAREST_M)
             for i in range(3):
                 w.gradient[j, i] += pull * p[2, i]
-    _substitute(body, slope, w)
+    _substitute(body, w.gradient, w.rows)

@@ -11,8 +11,9 @@ from hrc_env.tracking.estimators import make_estimator
 from hrc_env.tracking.evidence import tree_measure
 from hrc_env.tracking.hypotheses import exchange_slots, merge, normalise
 from hrc_env.tracking.mirrors import eye_of, lone_camera, open_depth, reflect
-from hrc_env.tracking.tree import ORDER, PARENT, make_work
+from hrc_env.tracking.tree import ORDER, PARENT
 from hrc_env.tracking.twins import heads_like, turn_body, turn_of
+from hrc_env.tracking.work import make_work
 
 EYES = -np.linalg.solve(LAB[:, :, :3], LAB[:, :, 3:])[..., 0]
 

@@ -9,9 +9,11 @@ from hrc_env.skeleton import BONES, N_JOINTS, TORSO
 from hrc_env.tracking.acquisition import STANDING_M
 from hrc_env.tracking.bone_lengths import learn_lengths, population_edges
 from hrc_env.tracking.motion_model import damped_joints, whole_body_noise
-from hrc_env.tracking.tree import EDGE_BONE, ORDER, PARENT, ROOT, invert, make_work
+from hrc_env.tracking.quads import HESSIAN, INVERSE, PROPER, QUAD, invert_rows
+from hrc_env.tracking.tree import EDGE_BONE, ORDER, PARENT, ROOT
 from hrc_env.tracking.tree_predict import predict_tree
 from hrc_env.tracking.tree_update import update_tree
+from hrc_env.tracking.work import make_work
 
 J = N_JOINTS
 _I3 = np.eye(3)
@@ -66,16 +68,27 @@ def test_every_edge_is_a_bone_and_parents_come_first():
             assert ORDER.index(PARENT[j]) < ORDER.index(j)
 
 
+def invert_four(matrices):
+    """Inverses of four 6x6 matrices at once, and which of them are positive definite."""
+    rows = np.zeros(QUAD)
+    rows[HESSIAN : HESSIAN + 144] = matrices.transpose(1, 2, 0).ravel()
+    invert_rows(rows, 0)
+    inverse = rows[INVERSE : INVERSE + 144].reshape(6, 6, 4).transpose(2, 0, 1)
+    return inverse, rows[PROPER : PROPER + 4]
+
+
 @settings(max_examples=20, deadline=None)
 @given(seed=seeds)
 def test_the_inverse_is_the_inverse_and_says_when_there_is_none(seed):
     rng = np.random.default_rng(seed)
-    matrix, out, factor = random_covariance(rng), np.zeros((6, 6)), np.zeros((6, 6))
-    assert invert(matrix, out, factor)
-    np.testing.assert_allclose(out @ matrix, np.eye(6), atol=1e-6)
-    matrix[2, 2] = -1e-3
-    assert not invert(matrix, out, factor)
-    assert not invert(np.full((6, 6), np.nan), out, factor)
+    matrices = np.stack([random_covariance(rng) for _ in range(4)])
+    inverse, proper = invert_four(matrices)
+    np.testing.assert_allclose(inverse @ matrices, np.tile(np.eye(6), (4, 1, 1)), atol=1e-6)
+    np.testing.assert_array_equal(proper, 1.0)
+    matrices[1, 2, 2], matrices[3] = -1e-3, np.nan
+    beside, proper = invert_four(matrices)
+    np.testing.assert_array_equal(proper, [1.0, 0.0, 1.0, 0.0])
+    np.testing.assert_array_equal(beside[::2], inverse[::2])  # nobody's neighbour matters
 
 
 @settings(max_examples=15, deadline=None)

@@ -1,0 +1,67 @@
+"""Scratch of one body's prediction and update, made once for all bodies."""
+
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from hrc_env.skeleton import N_JOINTS
+from hrc_env.tracking.lanes import LANES, N_JOINT_ROWS, N_SUM_ROWS, N_VIEW_ROWS
+from hrc_env.tracking.quads import QUAD, QUADS
+from hrc_env.typing import Floats
+
+_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
+
+
+class Work(NamedTuple):
+    """Scratch of one body's prediction and update."""
+
+    a: Floats
+    b: Floats
+    c: Floats
+    d: Floats
+    """Four times (6, 6)."""
+    step: Floats
+    """(J, 6) change of the mean."""
+    gradient: Floats
+    """(J, 6) what the means are pulled by."""
+    camera_information: Floats
+    """(J, 3, 3) [1/m^2]."""
+    camera_gradient: Floats
+    """(J, 3) [1/m]."""
+    edge_information: Floats
+    """(J, 3, 3) what bones say of x_j - x_parent [1/m^2]; 0 at the root."""
+    edge_gradient: Floats
+    """(J, 3) [1/m]."""
+    point: Floats
+    """(J, 3) where the cameras are linearised [m]."""
+    rows: Floats
+    """The joints' matrices, as in `quads`."""
+    joints: Floats
+    """Positions and their covariances in rows of `lanes`."""
+    seen: Floats
+    """One camera's rows of `lanes`."""
+    sums: Floats
+    """All cameras' rows of `lanes`."""
+
+
+@numba.njit(**_JIT)
+def make_work():
+    """Scratch with room for one body, made inside a kernel."""
+    return Work(
+        a=np.empty((6, 6)),
+        b=np.empty((6, 6)),
+        c=np.empty((6, 6)),
+        d=np.empty((6, 6)),
+        step=np.empty((N_JOINTS, 6)),
+        gradient=np.empty((N_JOINTS, 6)),
+        camera_information=np.zeros((N_JOINTS, 3, 3)),
+        camera_gradient=np.zeros((N_JOINTS, 3)),
+        edge_information=np.zeros((N_JOINTS, 3, 3)),
+        edge_gradient=np.zeros((N_JOINTS, 3)),
+        point=np.empty((N_JOINTS, 3)),
+        rows=np.zeros(QUADS * QUAD),
+        joints=np.ones(N_JOINT_ROWS * LANES),
+        seen=np.zeros(N_VIEW_ROWS * LANES),
+        sums=np.zeros(N_SUM_ROWS * LANES),
+    )
