@@ -61,7 +61,7 @@ def branch(state, b, w, prior, evidence, seen, s, m, scratch):
         evidence: log-evidence of that update.
         seen: P (C, 3, 4), z (J, C, 2), sigma (J, C), ok (J, C).
         s, m: settings.
-        scratch: belief, variances of the bones, `tree.Work`.
+        scratch: belief, variances of the bones, `work.Work`.
     """
     limit = state.log_weight.shape[1] // state.n_alive.shape[1]
     own = w * limit

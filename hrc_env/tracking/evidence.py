@@ -33,7 +33,7 @@ def log_evidence(prior, posterior, seen, bones, contrast, w):
         seen: P (C, 3, 4), z (J, C, 2), sigma (J, C), ok (J, C).
         bones: lengths (J,) [m] and their variances as measurements (J,) [m^2].
         contrast: as `proposal.contrast_of` gives.
-        w: scratch `tree.Work`; a, b, c, d and step are used.
+        w: scratch `work.Work`; a, b, c, d and step are used.
     """
     body = posterior[0]
     for j in range(len(body)):

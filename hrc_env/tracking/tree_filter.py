@@ -82,7 +82,7 @@ def follow(state, b, w, seen, s, scratch):
 def condition(state, b, w, seen, s, scratch):
     """Search the mode and condition the tree there; belief (J, C) says what was believed.
 
-    `scratch` is belief (J, C), variances of the bones as measurements (J,), and `tree.Work`.
+    `scratch` is belief (J, C), variances of the bones as measurements (J,), and `work.Work`.
     """
     belief, give, work = scratch
     body, cov, slope = state.body[b, w], state.cov[b, w], state.slope[b, w]
@@ -132,8 +132,9 @@ def look_after(state, b, w, seen, standing, s, placed):
 
     `placed` (J,) is scratch. What is known of a joint that was put somewhere is its own.
     """
-    placed[:] = acquire_anew(state, b, w, *seen, standing, s)
-    find_joints_again(state, b, w, *seen, s, placed)
+    P, z, sigma, ok = seen
+    placed[:] = acquire_anew(state, b, w, P, z, sigma, ok, standing, s)
+    find_joints_again(state, b, w, P, z, sigma, ok, s, placed)
     for j in range(len(placed)):
         if placed[j] or (PARENT[j] >= 0 and placed[PARENT[j]]):
             state.slope[b, w, j] = 0.0
