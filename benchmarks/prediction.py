@@ -30,7 +30,7 @@ from hrc_env.results import Metric, write_results
 from hrc_env.tracking.ahead import ahead
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.kalman import KalmanEstimator, KalmanState, motion
-from hrc_env.tracking.tree_filter import predict_all
+from hrc_env.tracking.tree.filter import predict_all
 
 mpl.use("Agg")
 HORIZONS_S = (0.1, 0.2, 0.4, 0.6, 1.0)

@@ -20,8 +20,8 @@ from hrc_env.rewards import RewardConfig
 from hrc_env.scene.build import SceneConfig
 from hrc_env.tasks.reach import ReachConfig
 from hrc_env.tracking.ahead import check_horizon
-from hrc_env.tracking.association import AssociationConfig
 from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.people.association import AssociationConfig
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,9 +30,9 @@ from hrc_env.scene.render import CropRenderer
 from hrc_env.skeleton import N_JOINTS
 from hrc_env.tracking import given
 from hrc_env.tracking.ahead import ahead
-from hrc_env.tracking.association import associate
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import Estimator, make_estimator
+from hrc_env.tracking.people.association import associate
 from hrc_env.typing import Ints, JointAngles
 
 LEVELS = ("pixels", "keypoints", "truth", "none")

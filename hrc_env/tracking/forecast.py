@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from hrc_env.body import assets_dir
 from hrc_env.skeleton import N_JOINTS
-from hrc_env.tracking.acquisition import heading
+from hrc_env.tracking.models.acquisition import heading
 from hrc_env.typing import Floats
 
 N_INPUTS = 7 * N_JOINTS + 4

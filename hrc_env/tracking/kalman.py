@@ -3,8 +3,8 @@
 The joints of a body share their errors: with one view the depth of all of them is wrong
 together. A filter that keeps each joint for itself counts one shared uncertainty fifteen times
 over and believes what it should not. Here the whole body is one Gaussian whose dependencies
-are the kinematic tree's (`tree`): a prediction with exact moments (`tree_predict`), a robust
-search (`tree_search`), one exact update and a step from the mode to the mean (`tree_update`),
+are the kinematic tree's (`tree`): a prediction with exact moments (`tree.predict`), a robust
+search (`tree.search`), one exact update and a step from the mode to the mean (`tree.update`),
 with bones of known length on every edge (`bone_lengths`) and a noise of every camera that is
 learnt (`noise`).
 """
@@ -18,16 +18,16 @@ import numpy as np
 
 from hrc_env.records import Keypoints, PoseEstimate
 from hrc_env.skeleton import N_JOINTS
-from hrc_env.tracking.acquisition import STANDING_M
 from hrc_env.tracking.ahead import ahead
-from hrc_env.tracking.bone_lengths import population_edges
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.measurements import arrays_of
-from hrc_env.tracking.motion_model import STANDING_COUNT, damped_joints, whole_body_noise
-from hrc_env.tracking.noise import N_SUMS, NoiseModel, first_factor, noise_model
+from hrc_env.tracking.models.acquisition import STANDING_M
+from hrc_env.tracking.models.motion import STANDING_COUNT, damped_joints, whole_body_noise
+from hrc_env.tracking.models.noise import N_SUMS, NoiseModel, first_factor, noise_model
 from hrc_env.tracking.settings import Settings, settings_of
 from hrc_env.tracking.tracks import forget, gaussian_tracks, grow_older, report
-from hrc_env.tracking.tree_filter import predict_all, update_all
+from hrc_env.tracking.tree.bone_lengths import population_edges
+from hrc_env.tracking.tree.filter import predict_all, update_all
 from hrc_env.typing import Bools, Floats, Ints
 
 _ONE_VIEW = (0.2, 1.5)
@@ -162,7 +162,7 @@ class KalmanEstimator:
 
 @functools.lru_cache(maxsize=16)
 def motion(dt_s: float, damping: float, acceleration: float) -> tuple[Floats, ...]:
-    """F, travel, Q (J, 2, 2) and shared noise (2, 2), as `tree_predict.predict_tree` takes them."""
+    """F, travel, Q (J, 2, 2) and shared noise (2, 2), as `tree.predict.predict_tree` takes them."""
     F, Q = damped_joints(dt_s, damping, acceleration)
     travel = np.array([[1.0, dt_s], [0.0, 1.0]]) - F
     return F, travel, Q, whole_body_noise(dt_s, acceleration)

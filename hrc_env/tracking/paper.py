@@ -21,7 +21,13 @@ import numpy as np
 
 from hrc_env.records import Keypoints, PoseEstimate
 from hrc_env.skeleton import N_JOINTS
-from hrc_env.tracking.acquisition import (
+from hrc_env.tracking.ahead import ahead
+from hrc_env.tracking.clouds.likelihoods import add_log_likelihood, normalise
+from hrc_env.tracking.clouds.moments import moments, roll, scatter
+from hrc_env.tracking.clouds.resampling import multinomial, systematic
+from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.measurements import arrays_of, read_worker, supports
+from hrc_env.tracking.models.acquisition import (
     STANDING_M,
     complete_body,
     count_conflict,
@@ -29,12 +35,6 @@ from hrc_env.tracking.acquisition import (
     middle_of,
     triangulate_body,
 )
-from hrc_env.tracking.ahead import ahead
-from hrc_env.tracking.clouds import moments, roll, scatter
-from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.likelihoods import add_log_likelihood, normalise
-from hrc_env.tracking.measurements import arrays_of, read_worker, supports
-from hrc_env.tracking.resampling import multinomial, systematic
 from hrc_env.tracking.tracks import Tracks, forget, grow_older, make_tracks, report
 from hrc_env.typing import Bools, Floats, Ints
 

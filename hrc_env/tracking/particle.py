@@ -15,14 +15,14 @@ import numpy as np
 
 from hrc_env.records import Keypoints, PoseEstimate
 from hrc_env.skeleton import N_JOINTS
-from hrc_env.tracking.acquisition import STANDING_M
 from hrc_env.tracking.ahead import ahead, mixed
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.hypotheses import Hypotheses
-from hrc_env.tracking.hypothesis_filter import grow_older_beside, predict_all, update_all
+from hrc_env.tracking.hypotheses.filter import grow_older_beside, predict_all, update_all
+from hrc_env.tracking.hypotheses.mixture import MixtureSettings, mix, mixture_settings
+from hrc_env.tracking.hypotheses.slots import Hypotheses
 from hrc_env.tracking.kalman import KalmanEstimator, KalmanState, motion
 from hrc_env.tracking.measurements import arrays_of
-from hrc_env.tracking.mixture import MixtureSettings, mix, mixture_settings
+from hrc_env.tracking.models.acquisition import STANDING_M
 from hrc_env.tracking.tracks import gaussian_tracks, grow_older, report
 from hrc_env.typing import Floats, Ints
 

@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 
 from hrc_env.records import Keypoints, PoseEstimate
 from hrc_env.skeleton import N_JOINTS
-from hrc_env.tracking.acquisition import STANDING_M
 from hrc_env.tracking.ahead import ahead
-from hrc_env.tracking.bones import population
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.gaussian_filter import predict_all, update_all
-from hrc_env.tracking.importance import make_noise
+from hrc_env.tracking.joints.filter import predict_all, update_all
+from hrc_env.tracking.joints.importance import make_noise
 from hrc_env.tracking.measurements import arrays_of
-from hrc_env.tracking.motion_model import STANDING_COUNT, damped_joints
+from hrc_env.tracking.models.acquisition import STANDING_M
+from hrc_env.tracking.models.bones import population
+from hrc_env.tracking.models.motion import STANDING_COUNT, damped_joints
 from hrc_env.tracking.settings import Settings, settings_of
 from hrc_env.tracking.tracks import forget, gaussian_tracks, grow_older, report
 from hrc_env.typing import Bools, Floats, Ints

@@ -30,7 +30,7 @@ from hrc_env.skeleton import N_JOINTS, TORSO
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.kalman import KalmanEstimator, KalmanState, motion
 from hrc_env.tracking.tracks import Tracks, report
-from hrc_env.tracking.tree import ORDER, PARENT
+from hrc_env.tracking.tree.gaussian import ORDER, PARENT
 from hrc_env.typing import Bools, Floats
 
 _N = 6 * N_JOINTS
@@ -127,7 +127,7 @@ def rts_step(
 
 
 def linear_motion(dt_s: float, config: TrackerConfig) -> tuple[Floats, Floats]:
-    """F, Q (90, 90): x' = F x + constant + noise, as `tree_predict` moves the body."""
+    """F, Q (90, 90): x' = F x + constant + noise, as `tree.predict` moves the body."""
     own, travel, noise, shared = motion(dt_s, config.damping, config.root_acceleration)
     F = np.zeros((N_JOINTS, 2, N_JOINTS, 2))
     Q = np.tile(shared[None, :, None, :], (N_JOINTS, 1, N_JOINTS, 1))

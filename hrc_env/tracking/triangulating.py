@@ -21,10 +21,10 @@ from hrc_env.geometry.triangulation import (
 )
 from hrc_env.records import Keypoints, PoseEstimate
 from hrc_env.skeleton import N_JOINTS
-from hrc_env.tracking.acquisition import STANDING_M, complete_body, keep_one_body
 from hrc_env.tracking.ahead import ahead
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.measurements import MIN_SIGMA_PX, arrays_of
+from hrc_env.tracking.models.acquisition import STANDING_M, complete_body, keep_one_body
 from hrc_env.tracking.tracks import Tracks, forget, grow_older, make_tracks, report
 from hrc_env.typing import Floats, Ints, Points2
 

@@ -9,11 +9,11 @@ from hrc_env.errors import ConfigError
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.records import PoseEstimate
 from hrc_env.skeleton import MIRROR, N_JOINTS
-from hrc_env.tracking.acquisition import STANDING_M
 from hrc_env.tracking.ahead import ahead, check_horizon, mixed
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import ESTIMATORS, make_estimator
 from hrc_env.tracking.given import prior
+from hrc_env.tracking.models.acquisition import STANDING_M
 
 CONFIG = TrackerConfig()
 

@@ -10,10 +10,10 @@ from simulated import DT, LAB, generators
 from hrc_env.errors import ConfigError
 from hrc_env.records import Keypoints, PoseEstimate
 from hrc_env.skeleton import N_JOINTS
-from hrc_env.tracking.association import AssociationConfig, associate
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import make_estimator
 from hrc_env.tracking.given import prior
+from hrc_env.tracking.people.association import AssociationConfig, associate
 
 PLACES = [(0.3, -1.2), (1.2, 0.9), (1.6, -0.6), (0.2, 0.7)]
 

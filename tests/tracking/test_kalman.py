@@ -6,7 +6,7 @@ from simulated import DT, HARD, LAB, Damage, detections, generators, keypoints, 
 
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import make_estimator
-from hrc_env.tracking.tree import ORDER, PARENT
+from hrc_env.tracking.tree.gaussian import ORDER, PARENT
 
 INSIDE_95 = 7.815
 """95 % of chi-squared with 3 degrees of freedom."""

@@ -3,7 +3,7 @@
 import numpy as np
 from simulated import LAB
 
-from hrc_env.tracking.likelihoods import add_log_likelihood, normalise
+from hrc_env.tracking.clouds.likelihoods import add_log_likelihood, normalise
 
 
 def test_a_flat_likelihood_leaves_the_weights_alone():

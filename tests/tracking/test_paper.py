@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from simulated import DT, LAB, Damage, detections, generators, keypoints, track, walk
 
-from hrc_env.tracking.clouds import roll
+from hrc_env.tracking.clouds.moments import roll
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import make_estimator
 

@@ -5,15 +5,15 @@ import pytest
 from simulated import DT, HARD, LAB, Damage, detections, generators, keypoints, track, walk
 
 from hrc_env.errors import ConfigError
-from hrc_env.tracking.anatomy import anatomy
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import make_estimator
-from hrc_env.tracking.evidence import tree_measure
-from hrc_env.tracking.hypotheses import exchange_slots, merge, normalise
-from hrc_env.tracking.mirrors import eye_of, lone_camera, open_depth, reflect
-from hrc_env.tracking.tree import ORDER, PARENT
-from hrc_env.tracking.twins import heads_like, turn_body, turn_of
-from hrc_env.tracking.work import make_work
+from hrc_env.tracking.hypotheses.anatomy import anatomy
+from hrc_env.tracking.hypotheses.mirrors import eye_of, lone_camera, open_depth, reflect
+from hrc_env.tracking.hypotheses.slots import exchange_slots, merge, normalise
+from hrc_env.tracking.hypotheses.twins import heads_like, turn_body, turn_of
+from hrc_env.tracking.tree.evidence import tree_measure
+from hrc_env.tracking.tree.gaussian import ORDER, PARENT
+from hrc_env.tracking.tree.work import make_work
 
 EYES = -np.linalg.solve(LAB[:, :, :3], LAB[:, :, 3:])[..., 0]
 

@@ -6,8 +6,8 @@ from simulated import DT, HARD, LAB, Damage, detections, generators, keypoints, 
 
 from hrc_env.skeleton import BONES, MIRROR
 from hrc_env.tracking.estimators import make_estimator
-from hrc_env.tracking.importance import exp_of_negative, make_noise
-from hrc_env.tracking.motion_model import SPEED_M_S, SPREAD_M, damped_joints
+from hrc_env.tracking.joints.importance import exp_of_negative, make_noise
+from hrc_env.tracking.models.motion import SPEED_M_S, SPREAD_M, damped_joints
 from hrc_env.tracking.tracks import least_eigenvalue
 
 gaussian = pytest.mark.parametrize("name", ["per_joint", "kalman"])

@@ -8,7 +8,7 @@ from hrc_env.errors import ConfigError
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import make_estimator
 from hrc_env.tracking.smoother import dense, linear_motion, rts_step, smooth
-from hrc_env.tracking.tree import ORDER, PARENT
+from hrc_env.tracking.tree.gaussian import ORDER, PARENT
 
 INSIDE_95 = 7.815
 

@@ -6,14 +6,14 @@ from hypothesis import strategies as st
 from simulated import DT
 
 from hrc_env.skeleton import BONES, N_JOINTS, TORSO
-from hrc_env.tracking.acquisition import STANDING_M
-from hrc_env.tracking.bone_lengths import learn_lengths, population_edges
-from hrc_env.tracking.motion_model import damped_joints, whole_body_noise
-from hrc_env.tracking.quads import HESSIAN, INVERSE, PROPER, QUAD, invert_rows
-from hrc_env.tracking.tree import EDGE_BONE, ORDER, PARENT, ROOT
-from hrc_env.tracking.tree_predict import predict_tree
-from hrc_env.tracking.tree_update import update_tree
-from hrc_env.tracking.work import make_work
+from hrc_env.tracking.models.acquisition import STANDING_M
+from hrc_env.tracking.models.motion import damped_joints, whole_body_noise
+from hrc_env.tracking.tree.bone_lengths import learn_lengths, population_edges
+from hrc_env.tracking.tree.gaussian import EDGE_BONE, ORDER, PARENT, ROOT
+from hrc_env.tracking.tree.predict import predict_tree
+from hrc_env.tracking.tree.quads import HESSIAN, INVERSE, PROPER, QUAD, invert_rows
+from hrc_env.tracking.tree.update import update_tree
+from hrc_env.tracking.tree.work import make_work
 
 J = N_JOINTS
 _I3 = np.eye(3)

@@ -16,8 +16,8 @@ from hrc_env.experiments.tracking.rigs import DT_S, SIGMA_PX, Rig
 from hrc_env.experiments.tracking.sequences import Sequences
 from hrc_env.experiments.tracking.tally import tally
 from hrc_env.records import Keypoints, PoseEstimate
-from hrc_env.tracking.association import associate
 from hrc_env.tracking.estimators import make_estimator
+from hrc_env.tracking.people.association import associate
 from hrc_env.tracking.smoother import smooth
 from hrc_env.typing import Covariances3, Points3
 

@@ -24,9 +24,9 @@ import numpy as np
 
 from hrc_env.experiments.tracking.rigs import DT_S
 from hrc_env.skeleton import BONES, N_JOINTS, TORSO
-from hrc_env.tracking.acquisition import STANDING_M
-from hrc_env.tracking.bones import STIFFNESS_M
-from hrc_env.tracking.motion_model import damped_joints
+from hrc_env.tracking.models.acquisition import STANDING_M
+from hrc_env.tracking.models.bones import STIFFNESS_M
+from hrc_env.tracking.models.motion import damped_joints
 from hrc_env.typing import Floats, Ints, Points3
 
 N_STATES = 6 * N_JOINTS

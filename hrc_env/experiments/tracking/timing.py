@@ -11,8 +11,8 @@ from hrc_env.experiments.tracking.detections import Damage, detect
 from hrc_env.experiments.tracking.rigs import DT_S, Rig
 from hrc_env.experiments.tracking.sequences import Sequences
 from hrc_env.experiments.tracking.walks import walk
-from hrc_env.tracking.association import associate
 from hrc_env.tracking.estimators import make_estimator
+from hrc_env.tracking.people.association import associate
 from hrc_env.typing import Floats
 
 BATCH = 64

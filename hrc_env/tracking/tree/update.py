@@ -8,9 +8,10 @@ and slopes exactly.
 import numba
 
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
-from hrc_env.tracking.lanes import JOINT_OF_LANE, LANE_OF_JOINT, LANES
 from hrc_env.tracking.measurements import pixel_spread
-from hrc_env.tracking.quads import (
+from hrc_env.tracking.tree.gaussian import PARENT
+from hrc_env.tracking.tree.lanes import JOINT_OF_LANE, LANE_OF_JOINT, LANES
+from hrc_env.tracking.tree.quads import (
     ABOVE,
     ABOVE_STEP,
     BACK,
@@ -44,7 +45,6 @@ from hrc_env.tracking.quads import (
     subtract_rows,
     transposed_multiply_rows,
 )
-from hrc_env.tracking.tree import PARENT
 
 _NEAREST_M = 0.3
 """The mean correction knows no joint nearer to a lens than this."""
@@ -57,7 +57,7 @@ def update_tree(body, cov, slope, w):
     """Condition (J, 6), (J, 6, 6), (J, 6, 6) on cameras and bones, in place.
 
     What they say is in camera_information, camera_gradient, edge_information and edge_gradient
-    of `w`, as `tree_search.find_pose` leaves it. Keeps the factors for `correct_mean`.
+    of `w`, as `tree.search.find_pose` leaves it. Keeps the factors for `correct_mean`.
     """
     rows = w.rows
     load_tree(cov, slope, rows)

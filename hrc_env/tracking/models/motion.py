@@ -13,7 +13,7 @@ import numba
 import numpy as np
 
 from hrc_env.skeleton import TORSO
-from hrc_env.tracking.acquisition import heading
+from hrc_env.tracking.models.acquisition import heading
 from hrc_env.typing import Floats
 
 SPREAD_M: Floats = np.array(

@@ -10,9 +10,7 @@ import numba
 import numpy as np
 
 from hrc_env.geometry.triangulation import inverse3
-from hrc_env.tracking.acquisition import count_conflict
-from hrc_env.tracking.bones import use_bones
-from hrc_env.tracking.importance import (
+from hrc_env.tracking.joints.importance import (
     cholesky3,
     draw,
     weigh_camera,
@@ -20,10 +18,12 @@ from hrc_env.tracking.importance import (
     weighted_moments,
 )
 from hrc_env.tracking.measurements import read_worker
-from hrc_env.tracking.motion_model import predict_body
-from hrc_env.tracking.proposal import contrast_of, find_mode
-from hrc_env.tracking.swaps import undo_swaps
-from hrc_env.tracking.upkeep import acquire, acquire_anew, check, find_joints_again
+from hrc_env.tracking.models.acquisition import count_conflict
+from hrc_env.tracking.models.bones import use_bones
+from hrc_env.tracking.models.motion import predict_body
+from hrc_env.tracking.models.proposal import contrast_of, find_mode
+from hrc_env.tracking.models.swaps import undo_swaps
+from hrc_env.tracking.models.upkeep import acquire, acquire_anew, check, find_joints_again
 
 _LEAST_ESS = 8.0
 """With fewer effective particles the Gaussian at the mode is the better answer."""
@@ -32,7 +32,7 @@ _JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 @numba.njit(**_JIT)
 def predict_all(state, F, Q, dt):
-    """Move every tracked body by dt [s]; F, Q (J, 2, 2) as `motion_model.damped_joints` gives."""
+    """Move every tracked body by dt [s]; F, Q (J, 2, 2) as `models.motion.damped_joints` gives."""
     for b in range(state.tracked.shape[0]):
         for w in range(state.tracked.shape[1]):
             if state.tracked[b, w]:

@@ -10,7 +10,8 @@ import math
 import numba
 
 from hrc_env.skeleton import JOINT
-from hrc_env.tracking.lanes import (
+from hrc_env.tracking.tree.gaussian import PARENT
+from hrc_env.tracking.tree.lanes import (
     JOINT_OF_LANE,
     LANE_OF_JOINT,
     LANES,
@@ -18,7 +19,7 @@ from hrc_env.tracking.lanes import (
     set_joints,
     views_of,
 )
-from hrc_env.tracking.positions import (
+from hrc_env.tracking.tree.positions import (
     ABOVE_SHIFT,
     BONE,
     CAMERA,
@@ -31,7 +32,7 @@ from hrc_env.tracking.positions import (
     position_prior,
     solve_positions,
 )
-from hrc_env.tracking.quads import (
+from hrc_env.tracking.tree.quads import (
     ABOVE,
     COV,
     EDGE,
@@ -43,7 +44,6 @@ from hrc_env.tracking.quads import (
     multiply_rows,
     offset,
 )
-from hrc_env.tracking.tree import PARENT
 
 _NOSE, _RIGHT_SHOULDER = JOINT["nose"], JOINT["right_shoulder"]
 _JIT = {"cache": True, "nogil": True, "error_model": "numpy"}

@@ -8,7 +8,8 @@ import math
 
 import numba
 
-from hrc_env.tracking.quads import (
+from hrc_env.tracking.tree.gaussian import inverse_of
+from hrc_env.tracking.tree.quads import (
     ABOVE,
     COV,
     DESCENT,
@@ -22,7 +23,6 @@ from hrc_env.tracking.quads import (
     offset,
     pass_on,
 )
-from hrc_env.tracking.tree import inverse_of
 
 _PRECISION = POSITIONS
 """Of a position given its parent's (6 rows); then that times the slope (9), and the slope's

@@ -1,25 +1,25 @@
 """The kernels of `particle`: one loop over environments, workers and hypotheses.
 
-`state` is `hypotheses.Hypotheses`, `s` and `m` are `settings.Settings` and
-`mixture.MixtureSettings`; everything that happens to one hypothesis is `tree_filter`'s.
+`state` is `hypotheses.slots.Hypotheses`, `s` and `m` are `settings.Settings` and
+`mixture.MixtureSettings`; everything that happens to one hypothesis is `tree.filter`'s.
 """
 
 import numba
 import numpy as np
 
-from hrc_env.tracking.acquisition import heading
-from hrc_env.tracking.anatomy import anatomy
-from hrc_env.tracking.branching import branch, is_ambiguous
-from hrc_env.tracking.evidence import log_evidence
-from hrc_env.tracking.hypotheses import drop, merge, normalise
+from hrc_env.tracking.hypotheses.anatomy import anatomy
+from hrc_env.tracking.hypotheses.branching import branch, is_ambiguous
+from hrc_env.tracking.hypotheses.slots import drop, merge, normalise
 from hrc_env.tracking.measurements import read_worker
-from hrc_env.tracking.noise import learn_noise, scale_sigma
-from hrc_env.tracking.proposal import contrast_of
-from hrc_env.tracking.swaps import undo_swaps
-from hrc_env.tracking.tree_filter import condition, follow, look_after, settle
-from hrc_env.tracking.tree_predict import predict_tree
-from hrc_env.tracking.upkeep import acquire
-from hrc_env.tracking.work import make_work
+from hrc_env.tracking.models.acquisition import heading
+from hrc_env.tracking.models.noise import learn_noise, scale_sigma
+from hrc_env.tracking.models.proposal import contrast_of
+from hrc_env.tracking.models.swaps import undo_swaps
+from hrc_env.tracking.models.upkeep import acquire
+from hrc_env.tracking.tree.evidence import log_evidence
+from hrc_env.tracking.tree.filter import condition, follow, look_after, settle
+from hrc_env.tracking.tree.predict import predict_tree
+from hrc_env.tracking.tree.work import make_work
 
 _TORSO = (1, 2, 7, 8)
 _JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
@@ -27,7 +27,7 @@ _JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 @numba.njit(**_JIT)
 def predict_all(state, model, dt, m):
-    """Move every hypothesis by dt [s]; `model` as in `tree_predict.predict_tree`."""
+    """Move every hypothesis by dt [s]; `model` as in `tree.predict.predict_tree`."""
     work, slots = make_work(), state.slots
     n_joints = slots.body.shape[2]
     held, held_count = np.empty((n_joints, 3)), np.empty(n_joints)

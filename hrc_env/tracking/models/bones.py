@@ -11,7 +11,7 @@ import numba
 import numpy as np
 
 from hrc_env.skeleton import BONE_LENGTH_M, BONES, JOINT
-from hrc_env.tracking.motion_model import relative_covariance, shared_covariance
+from hrc_env.tracking.models.motion import relative_covariance, shared_covariance
 from hrc_env.typing import Floats
 
 POPULATION_SHARE = 0.10

@@ -11,9 +11,9 @@ import math
 import numba
 import numpy as np
 
-from hrc_env.tracking.acquisition import heading
-from hrc_env.tracking.mirrors import eye_of
-from hrc_env.tracking.tree import multiply
+from hrc_env.tracking.hypotheses.mirrors import eye_of
+from hrc_env.tracking.models.acquisition import heading
+from hrc_env.tracking.tree.gaussian import multiply
 
 _TORSO = (1, 2, 7, 8)
 _LEAST_TURN = 0.35

@@ -16,7 +16,7 @@ import numba
 import numpy as np
 
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
-from hrc_env.tracking.resemblance import expect, resemblance
+from hrc_env.tracking.people.resemblance import expect, resemblance
 
 MEETING_M = 0.03
 """Lines of sight may pass each other at this distance [m] for other reasons than noise."""

@@ -11,10 +11,11 @@ divergence).
 import numba
 import numpy as np
 
-from hrc_env.tracking.acquisition import heading
-from hrc_env.tracking.lanes import JOINT_OF_LANE, LANE_OF_JOINT, LANES
-from hrc_env.tracking.motion_model import learn_offsets
-from hrc_env.tracking.quads import (
+from hrc_env.tracking.models.acquisition import heading
+from hrc_env.tracking.models.motion import learn_offsets
+from hrc_env.tracking.tree.gaussian import multiply, multiply_transposed
+from hrc_env.tracking.tree.lanes import JOINT_OF_LANE, LANE_OF_JOINT, LANES
+from hrc_env.tracking.tree.quads import (
     ABOVE,
     COV,
     EDGE,
@@ -35,8 +36,7 @@ from hrc_env.tracking.quads import (
     multiply_rows,
     store_tree,
 )
-from hrc_env.tracking.tree import multiply, multiply_transposed
-from hrc_env.tracking.vectors import moved
+from hrc_env.tracking.tree.vectors import moved
 
 _LEFT, _RIGHT, _LEFT_HIP, _RIGHT_HIP = 1, 2, 7, 8  # shoulders: _RIGHT, _LEFT_HIP hang on _LEFT
 _ROOT, _ROOT_ABOVE = OWN, PULL

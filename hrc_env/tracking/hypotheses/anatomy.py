@@ -7,7 +7,7 @@ potential of the pose that is believed now, not anew with every frame: it does n
 import numba
 import numpy as np
 
-from hrc_env.tracking.acquisition import heading
+from hrc_env.tracking.models.acquisition import heading
 
 _FEATURES = (
     (0, 1, 2, 0.12, 0.10),  # the nose before the middle of the shoulders

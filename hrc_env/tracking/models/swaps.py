@@ -14,7 +14,7 @@ import numba
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
 from hrc_env.skeleton import MIRROR
 from hrc_env.tracking.measurements import pixel_spread
-from hrc_env.tracking.proposal import contrast_of
+from hrc_env.tracking.models.proposal import contrast_of
 
 _MIRROR = tuple(int(j) for j in MIRROR)
 _BLIND_UPDATES, _BELIEVED_UPDATES = 8, 5

@@ -6,8 +6,8 @@ import numba
 import numpy as np
 
 from hrc_env.skeleton import N_JOINTS
-from hrc_env.tracking.lanes import LANES, N_JOINT_ROWS, N_SUM_ROWS, N_VIEW_ROWS
-from hrc_env.tracking.quads import QUAD, QUADS
+from hrc_env.tracking.tree.lanes import LANES, N_JOINT_ROWS, N_SUM_ROWS, N_VIEW_ROWS
+from hrc_env.tracking.tree.quads import QUAD, QUADS
 from hrc_env.typing import Floats
 
 _JIT = {"cache": True, "nogil": True, "error_model": "numpy"}

@@ -17,7 +17,7 @@ import numpy as np
 
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
 from hrc_env.skeleton import JOINT
-from hrc_env.tracking.tree import ORDER, PARENT, multiply, multiply_transposed
+from hrc_env.tracking.tree.gaussian import ORDER, PARENT, multiply, multiply_transposed
 
 _NOSE, _RIGHT_SHOULDER = JOINT["nose"], JOINT["right_shoulder"]
 _JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
@@ -29,7 +29,7 @@ def log_evidence(prior, posterior, seen, bones, contrast, w):
 
     Args:
         prior: body (J, 6), cov, slope (J, 6, 6) before the update.
-        posterior: the same after `tree_update.update_tree` and before the mean correction.
+        posterior: the same after `tree.update.update_tree` and before the mean correction.
         seen: P (C, 3, 4), z (J, C, 2), sigma (J, C), ok (J, C).
         bones: lengths (J,) [m] and their variances as measurements (J,) [m^2].
         contrast: as `proposal.contrast_of` gives.

@@ -9,16 +9,22 @@ negligible, becomes a hypothesis.
 import numba
 import numpy as np
 
-from hrc_env.tracking.anatomy import anatomy
-from hrc_env.tracking.bone_lengths import stiff_lengths
-from hrc_env.tracking.evidence import log_evidence
-from hrc_env.tracking.hypotheses import copy_slot, slot_distance
-from hrc_env.tracking.mirrors import N_MIRRORS, WHOLE_BODY, lone_camera, open_depth, reflect
-from hrc_env.tracking.proposal import contrast_of
-from hrc_env.tracking.tree_filter import condition, settle
-from hrc_env.tracking.tree_search import find_pose_near
-from hrc_env.tracking.tree_update import update_tree
-from hrc_env.tracking.twins import heads_like, turn_body, turn_of
+from hrc_env.tracking.hypotheses.anatomy import anatomy
+from hrc_env.tracking.hypotheses.mirrors import (
+    N_MIRRORS,
+    WHOLE_BODY,
+    lone_camera,
+    open_depth,
+    reflect,
+)
+from hrc_env.tracking.hypotheses.slots import copy_slot, slot_distance
+from hrc_env.tracking.hypotheses.twins import heads_like, turn_body, turn_of
+from hrc_env.tracking.models.proposal import contrast_of
+from hrc_env.tracking.tree.bone_lengths import stiff_lengths
+from hrc_env.tracking.tree.evidence import log_evidence
+from hrc_env.tracking.tree.filter import condition, settle
+from hrc_env.tracking.tree.search import find_pose_near
+from hrc_env.tracking.tree.update import update_tree
 
 _NEARER_M = 0.05
 """A search that ends with every joint nearer than this has found nothing new [m]."""
@@ -55,7 +61,7 @@ def branch(state, b, w, prior, evidence, seen, s, m, scratch):
     """Look for other bodies beside the heaviest hypothesis, and keep them as hypotheses.
 
     Args:
-        state: `hypotheses.Hypotheses`; the worker's first hypothesis has been updated.
+        state: `hypotheses.slots.Hypotheses`; the worker's first hypothesis has been updated.
         b, w: environment, worker.
         prior: its body (J, 6), cov, slope (J, 6, 6) before the update.
         evidence: log-evidence of that update.

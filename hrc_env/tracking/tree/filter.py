@@ -7,25 +7,25 @@ z (J, C, 2), sigma (J, C), ok (J, C) as `measurements.read_worker` fills them.
 import numba
 import numpy as np
 
-from hrc_env.tracking.acquisition import count_conflict
-from hrc_env.tracking.bone_lengths import learn_lengths, stiff_lengths
 from hrc_env.tracking.measurements import read_worker
-from hrc_env.tracking.noise import learn_noise, scale_sigma
-from hrc_env.tracking.proposal import contrast_of
-from hrc_env.tracking.swaps import undo_swaps
-from hrc_env.tracking.tree import PARENT
-from hrc_env.tracking.tree_predict import predict_tree
-from hrc_env.tracking.tree_search import find_pose
-from hrc_env.tracking.tree_update import correct_mean, update_tree
-from hrc_env.tracking.upkeep import acquire, acquire_anew, check, find_joints_again
-from hrc_env.tracking.work import make_work
+from hrc_env.tracking.models.acquisition import count_conflict
+from hrc_env.tracking.models.noise import learn_noise, scale_sigma
+from hrc_env.tracking.models.proposal import contrast_of
+from hrc_env.tracking.models.swaps import undo_swaps
+from hrc_env.tracking.models.upkeep import acquire, acquire_anew, check, find_joints_again
+from hrc_env.tracking.tree.bone_lengths import learn_lengths, stiff_lengths
+from hrc_env.tracking.tree.gaussian import PARENT
+from hrc_env.tracking.tree.predict import predict_tree
+from hrc_env.tracking.tree.search import find_pose
+from hrc_env.tracking.tree.update import correct_mean, update_tree
+from hrc_env.tracking.tree.work import make_work
 
 _JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
 @numba.njit(**_JIT)
 def predict_all(state, model, dt):
-    """Move every tracked body by dt [s]; `model` as in `tree_predict.predict_tree`."""
+    """Move every tracked body by dt [s]; `model` as in `tree.predict.predict_tree`."""
     work = make_work()
     for b in range(state.tracked.shape[0]):
         for w in range(state.tracked.shape[1]):

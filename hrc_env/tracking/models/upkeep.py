@@ -10,14 +10,14 @@ import math
 import numba
 import numpy as np
 
-from hrc_env.tracking.acquisition import (
+from hrc_env.tracking.models.acquisition import (
     complete_body,
     distance,
     find_again,
     middle_of,
     triangulate_body,
 )
-from hrc_env.tracking.tree import halves_of
+from hrc_env.tracking.tree.gaussian import halves_of
 
 _FOUND_SPEED_STD_M_S = 1.0
 _FURTHEST_STD = 4.0

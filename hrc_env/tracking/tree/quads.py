@@ -11,9 +11,9 @@ they begin in it.
 
 import numba
 
-from hrc_env.tracking.lanes import JOINT_OF_LANE, LANE_OF_JOINT, LANES
-from hrc_env.tracking.tree import PARENT, inverse_of
-from hrc_env.tracking.vectors import (
+from hrc_env.tracking.tree.gaussian import PARENT, inverse_of
+from hrc_env.tracking.tree.lanes import JOINT_OF_LANE, LANE_OF_JOINT, LANES
+from hrc_env.tracking.tree.vectors import (
     applied,
     product,
     product_transposed,
@@ -47,7 +47,7 @@ STEP, ABOVE_STEP, PULLED = GRADIENT + 24, GRADIENT + 48, GRADIENT + 72
 PROPER = GRADIENT + 96
 """1 where a matrix was positive definite."""
 POSITIONS = PROPER + 4
-"""Here begins what `tree_search` keeps."""
+"""Here begins what `tree.search` keeps."""
 QUAD = POSITIONS + 4 * 92
 """Numbers of a quad."""
 _JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
@@ -193,7 +193,7 @@ def add_rows(rows, a, b, out):
 def invert_rows(rows, at):
     """Inverses of a quad's symmetric `HESSIAN`, of which only the lower halves are looked at.
 
-    Blockwise, as `tree.invert`; `PROPER` gets 1 where the matrix is positive definite.
+    Blockwise, as `tree.gaussian.invert`; `PROPER` gets 1 where the matrix is positive definite.
     """
     at = offset(at)
     for lane in range(4):
@@ -248,7 +248,7 @@ def _triple(rows, m):
 
 @numba.njit(fastmath=_REORDER, forceinline=True, **_JIT)
 def along(half, x, y, z):
-    """A symmetric 3x3 matrix, as `tree.inverse_of` gives it, times (x, y, z)."""
+    """A symmetric 3x3 matrix, as `tree.gaussian.inverse_of` gives it, times (x, y, z)."""
     return (
         half[0] * x + half[1] * y + half[3] * z,
         half[1] * x + half[2] * y + half[4] * z,

@@ -19,14 +19,14 @@ from hrc_env.geometry.assignment import assign_rows
 from hrc_env.records import Keypoints, PoseEstimate
 from hrc_env.skeleton import BONE_LENGTH_M, BONES, MIRROR, N_JOINTS
 from hrc_env.tracking.measurements import arrays_of, is_measurement
-from hrc_env.tracking.newcomers import (
+from hrc_env.tracking.people.newcomers import (
     camera_model,
     fit_cameras,
     lines_of_sight,
     meeting,
     propose,
 )
-from hrc_env.tracking.resemblance import LEAST_JOINTS, expect, resemblance
+from hrc_env.tracking.people.resemblance import LEAST_JOINTS, expect, resemblance
 from hrc_env.typing import Floats, Ints
 
 _JIT = {"cache": True, "nogil": True, "error_model": "numpy"}

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from hrc_env.tracking.evidence import distance_between
 from hrc_env.tracking.kalman import KalmanState
+from hrc_env.tracking.tree.evidence import distance_between
 from hrc_env.typing import Floats, Ints
 
 _JIT = {"cache": True, "nogil": True, "error_model": "numpy"}

@@ -1,0 +1,1 @@
+"""Clouds of particles: the parts of the paper's Algorithm 1."""

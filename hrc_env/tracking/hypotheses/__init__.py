@@ -1,0 +1,1 @@
+"""Several bodies that one worker may be: each a Gaussian tree, weighted."""

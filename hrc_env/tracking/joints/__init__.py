@@ -1,0 +1,1 @@
+"""One Gaussian particle filter for each joint."""

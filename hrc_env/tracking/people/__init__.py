@@ -1,0 +1,1 @@
+"""Whose is which detection, where there are several workers."""

@@ -1,0 +1,1 @@
+"""A whole body as one Gaussian on the kinematic tree."""
