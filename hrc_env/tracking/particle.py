@@ -20,10 +20,10 @@ from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.hypotheses.filter import grow_older_beside, predict_all, update_all
 from hrc_env.tracking.hypotheses.mixture import MixtureSettings, mix, mixture_settings
 from hrc_env.tracking.hypotheses.slots import Hypotheses
-from hrc_env.tracking.kalman import KalmanEstimator, KalmanState, motion
+from hrc_env.tracking.kalman import KalmanEstimator, motion
 from hrc_env.tracking.measurements import arrays_of
 from hrc_env.tracking.models.acquisition import STANDING_M
-from hrc_env.tracking.tracks import gaussian_tracks, grow_older, report
+from hrc_env.tracking.tracks import Tracks, gaussian_tracks, grow_older, report
 from hrc_env.typing import Floats, Ints
 
 
@@ -66,8 +66,9 @@ class ParticleEstimator:
         del rngs
         model = motion(dt_s, self.config.damping, self.config.root_acceleration)
         predict_all(state, model, dt_s, self.mixture)
-        grow_older(gaussian_tracks(heaviest(state)), dt_s, self.config)
-        grow_older_beside(state, dt_s, self.config.max_age_s)
+        grow_older(heaviest(state), dt_s, self.config)
+        slots, weights = state.slots, (state.n_alive, state.log_weight, state.form)
+        grow_older_beside(slots.tracked, slots.age_s, *weights, dt_s, self.config.max_age_s)
 
     def update(
         self, state: Hypotheses, keypoints: Keypoints, rngs: list[np.random.Generator]
@@ -82,7 +83,7 @@ class ParticleEstimator:
 
     def estimate(self, state: Hypotheses) -> PoseEstimate:
         """Mean and covariance of the mixture; ages are the heaviest hypothesis's."""
-        best = gaussian_tracks(heaviest(state))
+        best = heaviest(state)
         mean, cov = np.empty((*best.age_s.shape, 6)), np.empty((*best.age_s.shape, 3, 3))
         mix(state.slots, state.n_alive, state.log_weight, mean, cov)
         position, velocity = mean[..., :3], mean[..., 3:]
@@ -95,8 +96,15 @@ class ParticleEstimator:
         return mixed(ahead(each, horizon_s, self.config), state.log_weight, state.n_alive)
 
 
-def heaviest(state: Hypotheses) -> KalmanState:
+def heaviest(state: Hypotheses) -> Tracks:
     """The heaviest hypothesis of each worker, as views (B, W, ...) into the slots."""
-    n_workers = state.n_alive.shape[1]
+    n_workers, slots = state.n_alive.shape[1], state.slots
     limit = state.log_weight.shape[1] // n_workers if n_workers else 1
-    return KalmanState._make(array[:, ::limit] for array in state.slots)
+    return Tracks(
+        mean_world=slots.body[:, ::limit, :, :3],
+        cov_world=slots.cov[:, ::limit, :, :3, :3],
+        velocity_world=slots.body[:, ::limit, :, 3:],
+        age_s=slots.age_s[:, ::limit],
+        tracked=slots.tracked[:, ::limit],
+        conflict=slots.conflict[:, ::limit],
+    )

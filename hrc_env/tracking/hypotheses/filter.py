@@ -51,18 +51,21 @@ def predict_all(state, model, dt, m):
 
 
 @numba.njit(**_JIT)
-def grow_older_beside(state, dt, max_age):
-    """Count the ages of all hypotheses but the heaviest up; of a lost worker forget them."""
-    limit = state.slots.tracked.shape[1] // max(state.n_alive.shape[1], 1)
-    for b in range(state.n_alive.shape[0]):
-        for w in range(state.n_alive.shape[1]):
+def grow_older_beside(tracked, age_s, n_alive, log_weight, form, dt, max_age):
+    """Count the ages of all hypotheses but the heaviest up; of a lost worker forget them.
+
+    tracked (B, W H), age_s (B, W H, J), the others as in `slots.Hypotheses`; arrays by name,
+    since unpacking whole records costs a single environment more than the work does.
+    """
+    limit = tracked.shape[1] // max(n_alive.shape[1], 1)
+    for b in range(n_alive.shape[0]):
+        for w in range(n_alive.shape[1]):
             first = w * limit
-            if not state.slots.tracked[b, first]:
-                state.n_alive[b, w] = 1
-                state.log_weight[b, first], state.form[b, first] = 0.0, 0.0
-            for k in range(first + 1, first + state.n_alive[b, w]):
-                for j in range(state.slots.age_s.shape[2]):
-                    state.slots.age_s[b, k, j] = min(state.slots.age_s[b, k, j] + dt, max_age)
+            if not tracked[b, first]:
+                n_alive[b, w], log_weight[b, first], form[b, first] = 1, 0.0, 0.0
+            for k in range(first + 1, first + n_alive[b, w]):
+                for j in range(age_s.shape[2]):
+                    age_s[b, k, j] = min(age_s[b, k, j] + dt, max_age)
 
 
 @numba.njit(**_JIT)
