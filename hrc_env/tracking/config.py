@@ -118,7 +118,8 @@ class TrackerConfig:
     """Share of Laplace's step from the mode to the mean (kalman); without it the depth that one
     camera leaves open runs to the lens, the whole of it overshoots a little."""
     one_view_inflation: float = 1.21
-    """Factor on the reported covariance of joints that one view carries (kalman)."""
+    """Factor on the reported covariance of a worker whom one camera alone has seen for a while
+    (kalman, particle)."""
     n_hypotheses: int = 8
     """Most hypotheses about one worker (particle); with 1 it is the filter of kalman."""
     mirrored_parts: tuple[str, ...] = ("body", "limbs")

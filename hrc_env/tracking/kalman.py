@@ -30,8 +30,8 @@ from hrc_env.tracking.tree.bone_lengths import population_edges
 from hrc_env.tracking.tree.filter import predict_all, update_all
 from hrc_env.typing import Bools, Floats, Ints
 
-_ONE_VIEW = (0.2, 1.5)
-"""Sums of beliefs between which one view carries a joint."""
+_FORGOTTEN_UPDATES = 8
+"""A camera that has not seen the worker for longer no longer counts as a view of them."""
 
 
 class KalmanState(NamedTuple):
@@ -63,8 +63,6 @@ class KalmanState(NamedTuple):
     """(B, W, C) updates since the camera saw the worker."""
     believed: Ints
     """(B, W, C) updates for which it is still not asked about swaps."""
-    carried: Floats
-    """(B, W, J) sum of the beliefs in the views of the last update."""
     noise_factor: Floats
     """(B, W, J, C) learnt factors on the variance that the detector reports, as in `noise`."""
     noise_sums: Floats
@@ -105,7 +103,6 @@ class KalmanEstimator:
             swap_chance=np.zeros((*shape, n_cameras)),
             blind=np.zeros((*shape, n_cameras), np.int64),
             believed=np.zeros((*shape, n_cameras), np.int64),
-            carried=np.zeros((*shape, N_JOINTS)),
             noise_factor=np.ones((*shape, N_JOINTS, n_cameras)),
             noise_sums=np.zeros((*shape, N_JOINTS, n_cameras, N_SUMS)),
             noise_last=np.zeros((*shape, N_JOINTS, n_cameras, 2)),
@@ -136,12 +133,12 @@ class KalmanEstimator:
         update_all(state, *measured, STANDING_M, self.settings, self.noise)
 
     def estimate(self, state: KalmanState) -> PoseEstimate:
-        """What is believed now; joints that one view carries are reported as less certain.
+        """What is believed now; of whom one camera alone is left, joints are less certain.
 
         Their errors have heavier tails than a Gaussian's: the body may be mirrored in depth.
         """
         tracks, cov = gaussian_tracks(state), np.empty((*state.age_s.shape, 3, 3))
-        widen(state.cov, state.carried, state.tracked, self.config.one_view_inflation, cov)
+        widen(state.cov, state.blind, state.tracked, self.config.one_view_inflation, cov)
         return report(replace(tracks, cov_world=cov), self.config)
 
     def ahead(self, state: KalmanState, horizon_s: float) -> PoseEstimate:
@@ -154,7 +151,7 @@ class KalmanEstimator:
         state.offset[ids], state.offset_count[ids] = STANDING_M, STANDING_COUNT
         state.bone_length[ids], state.bone_variance[ids] = length, variance
         state.swap_chance[ids] = self.config.swap_begins
-        state.blind[ids], state.believed[ids], state.carried[ids] = 0, 0, 0.0
+        state.blind[ids], state.believed[ids] = 0, 0
         state.noise_factor[ids] = first_factor(self.config)
         state.noise_sums[ids], state.noise_last[ids] = 0.0, 0.0
         forget(gaussian_tracks(state), ids, self.config)
@@ -169,14 +166,18 @@ def motion(dt_s: float, damping: float, acceleration: float) -> tuple[Floats, ..
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def widen(cov, carried, tracked, inflation, out):
-    """out (B, W, J, 3, 3) = position covariances, those that one view carries times inflation."""
-    least, most = _ONE_VIEW
+def widen(cov, blind, tracked, inflation, out):
+    """Position covariances, times `inflation` for workers whom one camera alone sees lately.
+
+    cov (B, W, J, n, n) with n >= 3, blind (B, W, C), tracked (B, W), out (B, W, J, 3, 3).
+    """
     for b in range(cov.shape[0]):
         for w in range(cov.shape[1]):
+            n_views = 0
+            for c in range(blind.shape[2]):
+                n_views += blind[b, w, c] <= _FORGOTTEN_UPDATES
+            factor = inflation if tracked[b, w] and n_views == 1 else 1.0
             for j in range(cov.shape[2]):
-                single = tracked[b, w] and least < carried[b, w, j] < most
-                factor = inflation if single else 1.0
                 for i in range(3):
                     for k in range(3):
                         out[b, w, j, i, k] = factor * cov[b, w, j, i, k]

@@ -20,7 +20,7 @@ from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.hypotheses.filter import grow_older_beside, predict_all, update_all
 from hrc_env.tracking.hypotheses.mixture import MixtureSettings, mix, mixture_settings
 from hrc_env.tracking.hypotheses.slots import Hypotheses
-from hrc_env.tracking.kalman import KalmanEstimator, motion
+from hrc_env.tracking.kalman import KalmanEstimator, motion, widen
 from hrc_env.tracking.measurements import arrays_of
 from hrc_env.tracking.models.acquisition import STANDING_M
 from hrc_env.tracking.tracks import Tracks, gaussian_tracks, grow_older, report
@@ -86,6 +86,9 @@ class ParticleEstimator:
         best = heaviest(state)
         mean, cov = np.empty((*best.age_s.shape, 6)), np.empty((*best.age_s.shape, 3, 3))
         mix(state.slots, state.n_alive, state.log_weight, mean, cov)
+        limit = max(state.log_weight.shape[1] // max(state.n_alive.shape[1], 1), 1)
+        blind = state.slots.blind[:, ::limit]
+        widen(cov, blind, best.tracked, self.config.one_view_inflation, cov)
         position, velocity = mean[..., :3], mean[..., 3:]
         tracks = replace(best, mean_world=position, velocity_world=velocity, cov_world=cov)
         return report(tracks, self.config)

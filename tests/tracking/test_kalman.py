@@ -123,19 +123,23 @@ def test_a_body_that_nobody_sees_spreads_and_is_found_where_it_went():
     assert error < 0.015
 
 
-def test_joints_that_one_view_carries_are_reported_as_wider_than_they_are_kept():
-    _, px = walks([100], 40, Damage())
-    px[30:, :, 1:, 5] = np.nan
+def test_a_worker_who_is_left_to_one_camera_is_reported_as_less_certain_than_is_kept():
+    _, px = walks([100], 60, Damage())
+    px[30:45, :, 1:] = np.nan  # one camera for the whole body
+    px[:, :, 1:, 5] = (
+        np.nan
+    )  # and for one wrist all the time, which the tree knows what to think of
     e, rngs = make_estimator("kalman", LAB, DT), generators(1)
-    state = e.init(1, 1)
+    state, ratios = e.init(1, 1), []
     for frame in px:
         e.predict(state, DT, rngs)
         e.update(state, keypoints(frame), rngs)
-    ratio = np.trace(e.estimate(state).cov_world[0, 0], axis1=-2, axis2=-1) / np.trace(
-        state.cov[0, 0, :, :3, :3], axis1=-2, axis2=-1
-    )
-    assert ratio[5] == pytest.approx(1.21, rel=0.01)
-    assert ratio[6] == pytest.approx(1.0, rel=0.25)  # the floor of a deviation may add a little
+        kept = np.trace(state.cov[0, 0, :, :3, :3], axis1=-2, axis2=-1)
+        ratios.append(np.trace(e.estimate(state).cov_world[0, 0], axis1=-2, axis2=-1) / kept)
+    assert ratios[29][5] == pytest.approx(1.0)
+    assert ratios[37][5] == pytest.approx(1.0)  # cameras may be out of step: not at once
+    assert ratios[44][5] == pytest.approx(1.21)
+    assert ratios[45][5] == pytest.approx(1.0)
 
 
 def test_two_predictions_without_frames_between_are_possible():

@@ -60,7 +60,6 @@ def _move_slot(slots, b, source, target, both):
     _move(slots.swap_chance[b], source, target, both)
     _move(slots.blind[b], source, target, both)
     _move(slots.believed[b], source, target, both)
-    _move(slots.carried[b], source, target, both)
     _move(slots.noise_factor[b], source, target, both)
     _move(slots.noise_sums[b], source, target, both)
     _move(slots.noise_last[b], source, target, both)

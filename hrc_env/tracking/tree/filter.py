@@ -112,12 +112,10 @@ def keep_books(state, b, w, seen, belief):
     ok = seen[3]
     n_views = np.empty(len(ok), np.int64)
     for j in range(len(ok)):
-        n_views[j], n_supporting, carried = 0, 0, 0.0
+        n_views[j], n_supporting = 0, 0
         for c in range(ok.shape[1]):
             n_views[j] += ok[j, c]
             n_supporting += belief[j, c] > 0.5
-            carried += belief[j, c]
-        state.carried[b, w, j] = carried
         if n_supporting > 0:
             state.age_s[b, w, j] = 0.0
         conflict = state.conflict[b, w, j]
