@@ -58,7 +58,7 @@ class MatchedModel:
 
 
 def matched_model(damping: float, root_acceleration: float, n_bones: int) -> MatchedModel:
-    """The motion model of `tracking.motion_model` as a model of the whole body at 25 Hz.
+    """The motion model of `tracking.models.motion` as a model of the whole body at 25 Hz.
 
     Args:
         damping: as `TrackerConfig.damping`.
