@@ -86,6 +86,9 @@ class TrackerConfig:
     """No standard deviation, in any direction, is reported as less than this [m]."""
     velocity_tau_s: float = 0.2
     """Time constant of the difference filter for velocities (paper, triangulation) [s]."""
+    noise_share: float = 0.9
+    """Share of the variance that is thought to persist before anything was learnt, as BlazePose's
+    does; 0 for a detector that is known to be wrong anew in every image. [0, 1)"""
     hold_speed_m_s: float = 1.0
     """How fast a held point loses its worth in gaps (triangulation) [m/s]."""
 
@@ -112,7 +115,7 @@ class TrackerConfig:
     """Area of an image [px^2]: an outlier's density is its inverse."""
     damping: float = 0.5
     """Damping ratio of a joint about its place on the body; in (0, 1)."""
-    root_acceleration: float = 4.0
+    root_acceleration: float = 3.0
     """Spectral density of the whole body's acceleration [m^2/s^3]."""
     mean_correction: float = 0.8
     """Share of Laplace's step from the mode to the mean (kalman); without it the depth that one
@@ -159,6 +162,8 @@ class TrackerConfig:
                 "noise_bounds must be positive, finite and ordered, as (1.0, 6.0), "
                 f"got {self.noise_bounds}."
             )
+        if not 0 <= self.noise_share < 1:
+            raise ConfigError(f"noise_share must be in [0, 1), got {self.noise_share}.")
         if not 0 <= self.longest_delay_s <= 1:
             raise ConfigError(f"longest_delay_s must be in [0, 1], got {self.longest_delay_s}.")
         if self.paper_resampling not in _SCHEMES:

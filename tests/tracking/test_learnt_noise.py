@@ -14,6 +14,8 @@ INSIDE_95 = 7.815
 SEEDS = range(300, 306)
 N_FRAMES = 175
 FIXED = TrackerConfig(noise_bounds=(1.0, 1.0))
+WHITE = TrackerConfig(noise_share=0.0)
+"""Told that errors are new in every image."""
 
 
 def walks(sigma_px=3.0, drift_px=0.0, tau_s=0.5):
@@ -52,7 +54,7 @@ def judged(joints, means, covs):
 
 def test_white_errors_as_large_as_told_leave_the_factor_at_one_and_the_estimate_alone():
     joints, px = walks()
-    state, *ours = follow(px)
+    state, *ours = follow(px, WHITE)
     np.testing.assert_allclose(state.noise_factor.mean((2, 3)), 1.0, atol=0.1)
     _, *fixed = follow(px, FIXED)
     assert judged(joints, *ours)[0] < 1.01 * judged(joints, *fixed)[0]
@@ -61,9 +63,16 @@ def test_white_errors_as_large_as_told_leave_the_factor_at_one_and_the_estimate_
 
 @pytest.mark.parametrize(("told_px", "factor"), [(4.0, 0.56), (2.0, 2.25)])
 def test_white_errors_of_another_size_than_told_are_measured(told_px, factor):
-    config = TrackerConfig(noise_bounds=(0.5, 6.0))
+    config = TrackerConfig(noise_bounds=(0.5, 6.0), noise_share=0.0)
     state, *_ = follow(walks()[1], config, sigma_px=told_px)
     assert state.noise_factor.mean() == pytest.approx(factor, rel=0.08)
+
+
+def test_a_share_that_is_told_too_large_is_unlearnt():
+    _, px = walks()
+    first, last = (follow(px[:n])[0].noise_factor.mean() for n in (5, N_FRAMES))
+    assert last < first
+    assert last == pytest.approx(1.0, abs=0.15)
 
 
 def test_one_camera_that_is_worse_than_the_others_is_found():

@@ -75,5 +75,6 @@ def _rig(
         prior_mean_world=(0.0, 0.0, 1.0),
         prior_std_m=prior_std_m,
         image_area_px=float(WIDTH_PX * HEIGHT_PX),
+        noise_share=0.0,
     )
     return Rig(name, projections(tuple(cameras)), walk_m, tracker)

@@ -17,13 +17,14 @@ from hrc_env.tracking.models.acquisition import heading
 from hrc_env.typing import Floats
 
 SPREAD_M: Floats = np.array(
-    [.12, .08, .08, .25, .25, .40, .40, .08, .08, .25, .25, .40, .40, .45, .45]
+    [.06, .04, .04, .12, .12, .20, .20, .04, .04, .12, .12, .20, .20, .22, .22]
 )  # fmt: skip
 """Standard deviation of a joint about its mean place on the body [m]; a judgement."""
 SPEED_M_S: Floats = np.array(
-    [.4, .4, .4, 1.0, 1.0, 2.0, 2.0, .4, .4, 1.0, 1.0, 1.8, 1.8, 2.0, 2.0]
+    [.2, .2, .2, .5, .5, .95, .95, .2, .2, .5, .5, .9, .9, .95, .95]
 )  # fmt: skip
-"""Standard deviation of its speed relative to the body [m/s]; a judgement."""
+"""Standard deviation of its speed relative to the body [m/s]; a judgement: those of people at
+work are near it, and twice as much makes every prediction twice as uncertain as it is wrong."""
 STANDING_COUNT = 5.0
 """Updates that the standing body's offsets are worth before any was learnt."""
 _SHARES = (0.9, 0.6, 0.3, 0.1)

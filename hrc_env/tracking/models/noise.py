@@ -37,6 +37,9 @@ _CAMERA_WEIGHT = 50.0
 """The reported noise counts as so much redundancy, so that the first frames decide little."""
 _JOINT_WEIGHT = 100.0
 """A camera's noise counts as so much redundancy of each joint's."""
+_SHARE_WEIGHT = 600.0
+"""The share that persists, as told, counts as so many squared residuals: two views alone show
+it late."""
 _CHANCE = 0.07
 """Twice the standard deviation of the share that persists where nothing does."""
 _OPEN_M = 0.5
@@ -53,6 +56,8 @@ class NoiseModel(NamedTuple):
     """Share of what was learnt of a joint that its next turn leaves."""
     persists: float
     """Correlation r over one update of errors that persist."""
+    share: float
+    """L before anything was learnt."""
     least: float
     most: float
     """Bounds of the factor on the variance; equal: nothing is learnt."""
@@ -64,7 +69,7 @@ def noise_model(config: TrackerConfig, ctrl_dt: float) -> NoiseModel:
     keep, persists = (
         math.exp(-ctrl_dt / tau) for tau in (config.noise_tau_s, config.noise_persists_s)
     )
-    return NoiseModel(keep**_TURNS, persists, least, most)
+    return NoiseModel(keep**_TURNS, persists, config.noise_share, least, most)
 
 
 def first_factor(config: TrackerConfig) -> float:
@@ -217,7 +222,7 @@ def _set_factors(factor, sums, grows, model):
     """
     for c in range(factor.shape[1]):
         squares = redundancy = _CAMERA_WEIGHT
-        products, unchanged = 0.0, _CAMERA_WEIGHT
+        products, unchanged = model.persists * model.share * _SHARE_WEIGHT, _SHARE_WEIGHT
         for j in range(len(factor)):
             squares += sums[j, c, 0]
             redundancy += sums[j, c, 1]
