@@ -34,8 +34,8 @@ class TrackingBenchConfig:
     n_seeds: int = 100
     """Sequences per rig and condition."""
     first_seed: int = 20_000
-    """Seed of the first sequence; the others count up. No setting was chosen on these: 1000 to 1023,
-    5000 to 5023 and 7000 to 7023 served for that."""
+    """Seed of the first sequence; the others count up. No setting was chosen on these: seeds
+    1000 to 1023, 5000 to 5023 and 7000 to 7023 served for that."""
     n_matched: int = 200
     """Matched sequences per rig."""
     n_smoothed: int = 25
