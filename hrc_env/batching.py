@@ -4,6 +4,7 @@ An organ that works on a few environments only (a reset of 3 of 64) works on a r
 their rows; as no result depends on the size of the batch, that is the same computation.
 """
 
+import copy
 import dataclasses
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
@@ -43,6 +44,17 @@ def write_rows(record: object, ids: Ints, part: object) -> None:
 def mapped(record: RecordT, change: Callable[[Any], Any]) -> RecordT:
     """A (nested) record of the same kind with `change` applied to every array."""
     return type(record)(**{name: _mapped(value, change) for name, value in _fields(record)})
+
+
+def copied(value: Any) -> Any:
+    """A deep copy of records, lists and generators; arrays that are read-only are shared."""
+    if isinstance(value, np.ndarray):
+        return value.copy() if value.flags.writeable else value
+    if _is_record(value):
+        return type(value)(**{name: copied(each) for name, each in _fields(value)})
+    if isinstance(value, (list, tuple)):
+        return type(value)(copied(each) for each in value)
+    return copy.deepcopy(value)
 
 
 def picked(streams: Sequence[np.random.Generator], ids: Ints) -> list[np.random.Generator]:

@@ -9,19 +9,21 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
 from hrc_env import observations
 from hrc_env.config import HRCConfig, resolve
 from hrc_env.errors import ConfigError, unknown
 from hrc_env.simulation import Simulation, checked_action
+from hrc_env.stateful import Stateful
 from hrc_env.typing import Floats
 from hrc_env.views import Views
 
 RENDER_MODES = ("rgb_array", "depth_array")
 
 
-class HRCReachEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
+class HRCReachEnv(Stateful, gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     """A robot arm reaches for goals beside a worker whom it knows through cameras only.
 
     Args:
@@ -40,6 +42,7 @@ class HRCReachEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         ConfigError: a name, index or value that is not valid, with those that are.
     """
 
+    CHANGES = ("simulation", "_np_random", "_np_random_seed", "_begun")
     metadata = {"render_modes": list(RENDER_MODES), "render_fps": 25}  # noqa: RUF012
 
     def __init__(
@@ -61,17 +64,15 @@ class HRCReachEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             1, perception, estimator, cameras, scene, n_workers, control, self.config
         )
         self.views = Views(self.simulation)
-        where = self.simulation.layout
-        self.observation_space = gymnasium.spaces.Box(where.low, where.high, dtype=np.float32)
-        size = self.simulation.n_actions
-        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (size,), np.float32)
+        self.observation_space, self.action_space = spaces(self.simulation)
         self.metadata = {**self.metadata, "render_fps": round(1 / self.config.ctrl_dt)}
-        self._begun = False
+        self._begun = self._closed = False
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Start an episode; without a seed the random stream goes on."""
+        self._refuse_closed()
         super().reset(seed=seed)
         if options:
             raise ConfigError(
@@ -86,6 +87,7 @@ class HRCReachEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self, action: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """Act for one control step (1 / 25 s); the walk itself is `Simulation.step`."""
+        self._refuse_closed()
         if not self._begun:
             raise ConfigError("Call reset() before step().")
         values = checked_action(action, (self.simulation.n_actions,))
@@ -116,3 +118,17 @@ class HRCReachEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Release threads and graphics contexts."""
         self.views.close()
         self.simulation.close()
+        self._closed = True
+
+    def _refuse_closed(self) -> None:
+        if self._closed:
+            raise ConfigError("This environment is closed; make a new one.")
+
+
+def spaces(simulation: Simulation) -> tuple[Box[np.float32], Box[np.float32]]:
+    """The spaces of one environment's observations and actions."""
+    where = simulation.layout
+    return (
+        Box(where.low, where.high, dtype=np.float32),
+        Box(-1.0, 1.0, (simulation.n_actions,), np.float32),
+    )

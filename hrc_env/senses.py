@@ -28,6 +28,7 @@ from hrc_env.scene.build import Scene
 from hrc_env.scene.physics import Physics
 from hrc_env.scene.render import CropRenderer
 from hrc_env.skeleton import N_JOINTS
+from hrc_env.stateful import Stateful
 from hrc_env.tracking import given
 from hrc_env.tracking.ahead import ahead
 from hrc_env.tracking.config import TrackerConfig
@@ -75,6 +76,14 @@ class Senses(Protocol):
         """What environment `b` saw last, and through which windows (for pictures)."""
         ...
 
+    def get_state(self) -> Any:
+        """A copy of what changes."""
+        ...
+
+    def set_state(self, state: Any) -> None:
+        """Continue from a state."""
+        ...
+
     def close(self) -> None:
         """Release threads and graphics contexts."""
         ...
@@ -104,7 +113,7 @@ def make_senses(
     return CameraSenses(scene, batch, tracker, config)
 
 
-class GivenSenses:
+class GivenSenses(Stateful):
     """Level `truth`: the worker as they are."""
 
     def __init__(self, config: TrackerConfig) -> None:
@@ -129,7 +138,7 @@ class GivenSenses:
         """Nothing to release."""
 
 
-class BlindSenses:
+class BlindSenses(Stateful):
     """Level `none`: the prior, whatever happens."""
 
     def __init__(self, prior: PoseEstimate) -> None:
@@ -154,8 +163,10 @@ class BlindSenses:
         """Nothing to release."""
 
 
-class TrackingSenses:
+class TrackingSenses(Stateful):
     """What the levels with cameras share: predict, get keypoints, update."""
+
+    CHANGES = ("state", "keypoints")
 
     def __init__(self, batch: int, scene: Scene, tracker: Estimator, config: HRCConfig) -> None:
         self.scene, self.tracker, self.dt_s = scene, tracker, config.ctrl_dt
@@ -217,6 +228,8 @@ class TrackingSenses:
 class EmulatedSenses(TrackingSenses):
     """Level `keypoints`: the detector's errors on the projected truth."""
 
+    CHANGES = (*TrackingSenses.CHANGES, "emulator")
+
     def __init__(
         self, scene: Scene, physics: Physics, tracker: Estimator, config: HRCConfig
     ) -> None:
@@ -255,6 +268,8 @@ class EmulatedSenses(TrackingSenses):
 
 class CameraSenses(TrackingSenses):
     """Level `pixels`: rendered crops through the pose network."""
+
+    CHANGES = (*TrackingSenses.CHANGES, "windows", "eyes")
 
     def __init__(self, scene: Scene, batch: int, tracker: Estimator, config: HRCConfig) -> None:
         super().__init__(batch, scene, tracker, config)

@@ -25,6 +25,7 @@ from hrc_env.records import PoseEstimate, RobotState, WorkerMotion, WorkerTruth
 from hrc_env.scene.build import build
 from hrc_env.scene.physics import Physics
 from hrc_env.senses import Moment, make_senses
+from hrc_env.stateful import State, Stateful
 from hrc_env.tasks import reach
 from hrc_env.tracking import given
 from hrc_env.typing import Bools, Floats, Ints
@@ -33,6 +34,8 @@ RecordT = TypeVar("RecordT")
 
 Info = dict[str, Floats]
 """Named values (B,); NaN means that the environment has no such value in this step."""
+FLAGS = ("is_success",)
+"""Values that are true or false."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +53,8 @@ class Outcome:
     def info_of(self, b: int) -> dict[str, Any]:
         """The info of one environment: absent values are left out, flags are bool."""
         values = {name: float(value[b]) for name, value in self.info.items()}
-        known = {name: value for name, value in values.items() if value == value}
-        known["is_success"] = bool(known["is_success"])
+        known: dict[str, Any] = {name: value for name, value in values.items() if value == value}
+        known.update({name: bool(known[name]) for name in FLAGS})
         return known
 
 
@@ -66,8 +69,13 @@ class Streams:
     task: list[np.random.Generator]
 
 
-class Simulation:
+class Simulation(Stateful):
     """`batch` environments that step together; arguments as of `HRCReachEnv`."""
+
+    CHANGES = (
+        "physics", "senses", "motion", "task", "streams", "action", "episode_cost",
+        "estimate", "ahead", "believed",
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -85,6 +93,11 @@ class Simulation:
         self.perception = perception
         self.body = load_body(config.worker)
         self.scene = build(config.scene, scene, n_workers, config.worker, cameras)
+        self.settings = {
+            "batch": batch, "perception": perception, "estimator": estimator, "scene": scene,
+            "cameras": tuple(camera.name for camera in self.scene.cameras),
+            "n_workers": n_workers, "control": control, "config": config,
+        }  # fmt: skip
         self.chain = self.scene.chain
         spread = config.start_spread_rad
         check_shape("start_spread_rad", (len(spread),), (self.chain.n_joints,), "one a joint")
@@ -158,6 +171,24 @@ class Simulation:
         }
         terminated = (cost.contact > 0) & config.cost.contact_terminates
         return Outcome(observations.observe(believed, self.layout), reward, terminated, info)
+
+    def get_state(self) -> State:
+        """A copy of everything that changes, generators included, and the settings."""
+        return {"settings": self.settings, **super().get_state()}
+
+    def set_state(self, state: State) -> None:
+        """Continue from a state, bit for bit.
+
+        Raises:
+            ConfigError: it was taken with other settings.
+        """
+        for name, value in self.settings.items():
+            if state["settings"][name] != value:
+                raise ConfigError(
+                    f"The state was taken with {name}={state['settings'][name]!r}; "
+                    f"here {name} is {value!r}. Make the environment with the same arguments."
+                )
+        super().set_state(state)
 
     def close(self) -> None:
         """Release threads and graphics contexts."""

@@ -33,9 +33,13 @@ class Views:
         self._pictures: dict[tuple[int, int], PictureRenderer] = {}
         self._squares: dict[int, CropRenderer] = {}
 
-    def picture(self, depth: bool = False) -> NDArray[Any]:
-        """Robot and worker, (720, 960, 3) uint8, or distances (720, 960) float32 [m]."""
-        return self._picture_renderer(*PICTURE_SIZE).picture(*self.pose(), VIEWPOINT, depth=depth)
+    def picture(self, depth: bool = False, b: int | None = None) -> NDArray[Any]:
+        """Robot and worker, (720, 960, 3) uint8, or distances (720, 960) float32 [m].
+
+        Of another environment than usual with `b`.
+        """
+        renderer = self._picture_renderer(*PICTURE_SIZE)
+        return renderer.picture(*self.pose(b), VIEWPOINT, depth=depth)
 
     def room(self, width: int, height: int) -> Image:
         """The room with the estimated skeleton over it."""
@@ -110,10 +114,11 @@ class Views:
         pictures.draw_landmarks(image, window, keypoints.px[0, c, 0], keypoints.confidence[0, c, 0])
         return image
 
-    def pose(self) -> tuple[JointAngles, WorkerMotion]:
-        """The arm (N,) and the workers (W, S, ...) now."""
-        motion = one(generator.current(self.simulation.motion), self.b)
-        return self.simulation.physics.q[self.b], motion
+    def pose(self, b: int | None = None) -> tuple[JointAngles, WorkerMotion]:
+        """The arm (N,) and the workers (W, S, ...) now, of another environment with `b`."""
+        b = self.b if b is None else b
+        motion = one(generator.current(self.simulation.motion, np.array([b])), 0)
+        return self.simulation.physics.q[b], motion
 
     def _looks(self) -> tuple[Keypoints | None, list[list[CropWindow | None]]]:
         return self.simulation.senses.looks(self.b)

@@ -34,6 +34,7 @@ from hrc_env.perception.noise import sigma_px
 from hrc_env.perception.weights import find_weights
 from hrc_env.records import CropWindow
 from hrc_env.skeleton import BLAZEPOSE_INDEX, N_JOINTS
+from hrc_env.stateful import Stateful
 from hrc_env.typing import Floats, Image, Points2
 
 STATURE_OF_SIDE = 0.75
@@ -100,11 +101,13 @@ class _Networks:
     landmark: Landmarker
 
 
-class Eyes:
+class Eyes(Stateful):
     """Finds the joints of workers in the images of a rig.
 
     Networks and the helper thread are made at the first look and left out of a pickle.
     """
+
+    CHANGES = ("_looks",)
 
     def __init__(self, cameras: Sequence[PinholeCamera], config: EyesConfig | None = None) -> None:
         """Args are the rig and settings; raises `WeightsError` without the weights."""

@@ -1,0 +1,307 @@
+"""The vector environment: many environments as one `gymnasium.vector.VectorEnv`.
+
+import gymnasium, hrc_env
+envs = gymnasium.make_vec("HRCReach-v0", num_envs=64, perception="keypoints")
+
+Environment k is `gymnasium.make("HRCReach-v0", ...)`, bit for bit, whatever the number of
+environments and of threads. What it says, and in which form, is what gymnasium's
+`SyncVectorEnv` of the same environments says.
+"""
+
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from hrc_env.config import HRCConfig, resolve
+from hrc_env.env import RENDER_MODES, spaces
+from hrc_env.errors import ConfigError, check_shape, unknown
+from hrc_env.shards import Shards, n_cores
+from hrc_env.simulation import Outcome, Simulation, checked_action
+from hrc_env.stateful import Stateful
+from hrc_env.typing import Bools, Floats, Ints
+from hrc_env.vector_infos import InfoTable, blank, table
+from hrc_env.views import Views
+
+MAX_ENVS = 16_384
+"""More would be gigabytes of filters' states, and no faster."""
+NO_LIMIT = 2**62
+
+Observations = NDArray[np.float32]
+Stream = tuple[np.random.Generator, int]
+"""An environment's generator, and what it was made from."""
+Step = tuple[Observations, NDArray[np.float64], Bools, Bools, dict[str, Any]]
+
+
+class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]):
+    """`num_envs` robots, each beside a worker of its own, stepped at once.
+
+    Args:
+        num_envs: how many.
+        perception: "keypoints", "truth" or "none"; pictures have no batched form.
+        estimator, cameras, scene, n_workers, control, config: as `HRCReachEnv`.
+        render_mode: "rgb_array", "depth_array" or None.
+        max_episode_steps: the time limit; None or -1 is none.
+        autoreset_mode: when an environment whose episode is over starts anew: at the next
+            step (default), in the same step, or not by itself ("Disabled").
+        num_threads: threads that share the environments; all cores if None.
+
+    Raises:
+        ConfigError: an argument that cannot work, with what would.
+    """
+
+    CHANGES = ("shards", "_streams", "_steps", "_ended", "_observation")
+
+    def __init__(
+        self,
+        num_envs: int,
+        *,
+        perception: str = "keypoints",
+        estimator: str = "particle",
+        cameras: Sequence[int | str] | None = None,
+        scene: str = "lab",
+        n_workers: int = 1,
+        control: str = "joint",
+        render_mode: str | None = None,
+        config: HRCConfig | Mapping[str, Any] | None = None,
+        max_episode_steps: int | None = 250,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        num_threads: int | None = None,
+    ) -> None:
+        if perception == "pixels":
+            raise ConfigError(
+                'perception="pixels" has no batched form: gymnasium.make_vec makes it with a '
+                'process for each environment. perception="keypoints" emulates it, batched.'
+            )
+        if render_mode is not None and render_mode not in RENDER_MODES:
+            raise unknown("render_mode", render_mode, RENDER_MODES)
+        self.num_envs = _whole("num_envs", num_envs, 1, MAX_ENVS)
+        self.autoreset_mode = _mode(autoreset_mode)
+        self.config, self.render_mode = resolve(config), render_mode
+        self.shards = Shards(
+            self.num_envs,
+            min(_threads(num_threads), self.num_envs),
+            lambda batch: Simulation(
+                batch, perception, estimator, cameras, scene, n_workers, control, self.config
+            ),
+        )
+        self.views = [Views(part) for part in self.shards.parts]
+        self.single_observation_space, self.single_action_space = spaces(self.shards.parts[0])
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self.metadata = {
+            "render_modes": list(RENDER_MODES),
+            "render_fps": round(1 / self.config.ctrl_dt),
+            "autoreset_mode": self.autoreset_mode,
+        }
+        self._streams: list[Stream | None] = [None] * self.num_envs
+        self._action_shape = (self.num_envs, self.shards.parts[0].n_actions)
+        no_limit = max_episode_steps is None or max_episode_steps == -1
+        self._limit = (
+            NO_LIMIT if no_limit else _whole("max_episode_steps", max_episode_steps, 1, NO_LIMIT)
+        )
+        self._steps = np.zeros(self.num_envs, int)
+        self._ended = np.zeros(self.num_envs, bool)
+        self._observation: Observations | None = None
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: Mapping[str, Any] | None = None,
+    ) -> tuple[Observations, dict[str, Any]]:
+        """Start episodes.
+
+        Args:
+            seed: environment k gets `seed + k`, or the k-th of a list; with None its random
+                stream goes on.
+            options: {"reset_mask": (num_envs,) bool}: only these environments start anew.
+
+        Returns:
+            Observations of all environments, and infos of those that started.
+        """
+        self._refuse_closed()
+        seeds, mask = self._seeds_of(seed), self._mask_of(options)
+        ids = np.flatnonzero(mask)
+        for k in ids.tolist():
+            if seeds[k] is not None:
+                self._streams[k] = seeding.np_random(seeds[k])
+        fresh = self._begin(ids)
+        if self._observation is None:
+            self._observation = fresh.observation.copy()
+        self._observation[ids] = fresh.observation
+        self._ended = self._ended & ~mask
+        info = blank(fresh.info, self.num_envs)
+        info.write(ids, fresh.info)
+        return self._observation.copy(), info.arrays(mask)
+
+    def step(self, actions: NDArray[np.float32]) -> Step:
+        """One control step of every environment.
+
+        Args:
+            actions: (num_envs, n) in [-1, 1]. In the mode NEXT_STEP those of environments
+                whose episode has just ended are ignored: these start anew instead.
+
+        Returns:
+            Observations (num_envs, m) float32; rewards, terminations and truncations
+            (num_envs,); infos as arrays (num_envs,), each with a mask "_name".
+        """
+        outcome = self.shards.step(self._checked(actions))
+        observation, info = outcome.observation.copy(), table(outcome.info)
+        reward, terminated, over = outcome.reward.copy(), outcome.terminated.copy(), self._ended
+        self._steps += 1
+        if over.any():  # only where the mode is NEXT_STEP
+            self._restart(over, observation, info)
+            reward[over], terminated[over] = 0.0, False
+        truncated = self._steps >= self._limit
+        ended, finals = terminated | truncated, {}
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and ended.any():
+            finals = _finals(observation, info, ended)
+            self._restart(ended, observation, info)
+            ended = np.zeros_like(ended)
+        self._observation, self._ended = observation, ended
+        infos = {**finals, **info.arrays(np.ones_like(ended))}
+        return observation.copy(), reward, terminated, truncated, infos
+
+    def render(self) -> tuple[NDArray[Any], ...] | None:  # type: ignore[override]
+        """A picture of every environment, one after the other (slow), as the render mode says."""
+        self._refuse_closed()
+        if self.render_mode is None:
+            return None
+        depth = self.render_mode == "depth_array"
+        return tuple(
+            view.picture(depth, b) for view in self.views for b in range(view.simulation.batch)
+        )
+
+    @property
+    def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
+        """The environments' random generators."""
+        return tuple(self._stream(k)[0] for k in range(self.num_envs))
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
+        """What the environments' random generators were made from."""
+        return tuple(self._stream(k)[1] for k in range(self.num_envs))
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Stop the threads and release graphics contexts."""
+        for view in self.views:
+            view.close()
+        self.shards.close()
+
+    def _begin(self, ids: Ints) -> Outcome:
+        """Start environments `ids` anew; their random streams go on."""
+        self._steps[ids] = 0
+        return self.shards.reset(ids, [self._stream(k)[0] for k in ids.tolist()])
+
+    def _stream(self, k: int) -> Stream:
+        """The generator of environment k; from the system's entropy if nobody gave a seed."""
+        stream = self._streams[k] or seeding.np_random()
+        self._streams[k] = stream
+        return stream
+
+    def _restart(self, who: Bools, observation: Observations, info: InfoTable) -> None:
+        """Start environments `who` (B,) anew and write what they see over what they saw."""
+        ids = np.flatnonzero(who)
+        fresh = self._begin(ids)
+        observation[ids] = fresh.observation
+        info.write(ids, fresh.info)
+
+    def _checked(self, actions: Any) -> Floats:
+        """Actions (num_envs, n) clipped to [-1, 1]; zero for environments that start anew.
+
+        Raises:
+            ConfigError: other shapes, no finite numbers, or not the time for a step.
+        """
+        self._refuse_closed()
+        if self._observation is None:
+            raise ConfigError("Call reset() before step().")
+        over = np.flatnonzero(self._ended)
+        if len(over) > 0 and self.autoreset_mode is AutoresetMode.DISABLED:
+            raise ConfigError(
+                f"The episodes of environments {over.tolist()} are over: call "
+                'reset(options={"reset_mask": terminations | truncations}) before step().'
+            )
+        if len(over) > 0 and np.shape(actions) == self.action_space.shape:
+            actions = np.array(actions)
+            actions[over] = 0.0
+        return checked_action(actions, self._action_shape)
+
+    def _refuse_closed(self) -> None:
+        if self.closed:
+            raise ConfigError("This vector environment is closed; make a new one.")
+
+    def _seeds_of(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
+        """A seed, or None, for each environment."""
+        if seed is None:
+            return [None] * self.num_envs
+        if isinstance(seed, (int, np.integer)):
+            return [int(seed) + k for k in range(self.num_envs)]
+        check_shape("seed", (len(seed),), (self.num_envs,), "an int, or a list of one each")
+        return [None if each is None else int(each) for each in seed]
+
+    def _mask_of(self, options: Mapping[str, Any] | None) -> Bools:
+        """(num_envs,) which environments a reset is for."""
+        others = sorted(set(options or {}) - {"reset_mask"})
+        if others:
+            raise unknown("reset option", others[0], ["reset_mask"])
+        everyone = np.ones(self.num_envs, bool)
+        mask = (options or {}).get("reset_mask", everyone)
+        if not isinstance(mask, np.ndarray) or mask.dtype != bool:
+            raise ConfigError(
+                'options["reset_mask"] must be a NumPy array of bool, one for each environment, '
+                f"got {mask!r}; terminations | truncations is one."
+            )
+        check_shape("reset_mask", mask.shape, (self.num_envs,), "one for each environment")
+        if not mask.any():
+            raise ConfigError('options["reset_mask"] must be True somewhere: nobody would start.')
+        if self._observation is None and not mask.all():
+            raise ConfigError("The first reset() must be for everyone: leave out the reset_mask.")
+        return mask
+
+
+def _finals(observation: Observations, info: InfoTable, who: Bools) -> dict[str, Any]:
+    """The last observations and infos of the episodes of environments `who` (B,)."""
+    last = np.full(len(who), None, dtype=object)
+    for k in np.flatnonzero(who).tolist():
+        last[k] = observation[k].copy()
+    return {
+        "final_obs": last,
+        "_final_obs": who.copy(),
+        "final_info": info.arrays(who),
+        "_final_info": who.copy(),
+    }
+
+
+def _whole(what: str, value: Any, low: int, high: int) -> int:
+    """A whole number in [low, high]."""
+    is_whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    if not is_whole or not low <= value <= high:
+        raise ConfigError(f"{what} must be a whole number from {low} to {high}, got {value!r}.")
+    return int(value)
+
+
+def _mode(mode: str | AutoresetMode) -> AutoresetMode:
+    names = [each.value for each in AutoresetMode]
+    if not isinstance(mode, AutoresetMode) and mode not in names:
+        raise unknown("autoreset_mode", mode, names)
+    return AutoresetMode(mode)
+
+
+def _threads(num_threads: int | None) -> int:
+    """How many threads to use: as many as cores, unless a number was given."""
+    cores = n_cores()
+    if num_threads is None:
+        return cores
+    n_threads = _whole("num_threads", num_threads, 1, MAX_ENVS)
+    if n_threads > cores:
+        warnings.warn(
+            f"num_threads={n_threads} on {cores} cores: results are the same, and later.",
+            stacklevel=3,
+        )
+    return n_threads
