@@ -18,6 +18,7 @@ from hrc_env.experiments.footage.metrics import (
     jerk,
     two_camera_share,
 )
+from hrc_env.experiments.tracking.names import DEFAULT
 from hrc_env.geometry.cameras import projections
 from hrc_env.perception.films import Films
 from hrc_env.results import Metric, write_results
@@ -71,7 +72,7 @@ def run(out: Path, say: Say) -> dict[str, Metric]:
     }
     write_results(out / "results.json", settings, [0], dict(sorted(metrics.items())))
     (out / "real.md").write_text(markdown(metrics, NAMES))
-    track = follow(FOLLOWER, P, config, in_step, list(range(len(P))))
+    track = follow(DEFAULT, P, config, in_step, list(range(len(P))))
     film_track(
         out / "real.mp4",
         footage.films,

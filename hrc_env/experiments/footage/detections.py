@@ -19,8 +19,9 @@ from hrc_env.skeleton import N_JOINTS
 from hrc_env.tracking.estimators import make_estimator
 from hrc_env.typing import Floats, Points2
 
-FOLLOWER = "particle"
-"""The estimator whose prediction says where to look: the default one."""
+FOLLOWER = "per_joint"
+"""The estimator whose prediction says where to look: a rival of the default one, so that nobody
+can say that the default was given windows of its own."""
 Tick = Callable[[float], None]
 
 
