@@ -6,6 +6,7 @@ their rows; as no result depends on the size of the batch, that is the same comp
 
 import copy
 import dataclasses
+import functools
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
@@ -18,40 +19,37 @@ RecordT = TypeVar("RecordT")
 
 def rows(record: RecordT, ids: Ints) -> RecordT:
     """A copy of rows `ids` of every array of a (nested) record."""
-    return type(record)(**{name: _rows(value, ids) for name, value in _fields(record)})
+    return mapped(record, lambda array: array[ids])
 
 
 def one(record: RecordT, b: int) -> RecordT:
     """Environment `b` of a record, without the batch's axis; its arrays are views."""
-    return type(record)(
-        **{
-            name: value[b] if isinstance(value, np.ndarray) else value
-            for name, value in _fields(record)
-        }
-    )
+    return mapped(record, lambda array: array[b])
 
 
 def write_rows(record: object, ids: Ints, part: object) -> None:
     """Write a record of rows back into rows `ids` of a record, in place."""
-    for name, value in _fields(record):
-        new = getattr(part, name)
+    for name in _names(type(record)):
+        value, new = getattr(record, name), getattr(part, name)
         if isinstance(value, np.ndarray):
             value[ids] = new
-        elif _is_record(value):
+        else:
             write_rows(value, ids, new)
 
 
 def mapped(record: RecordT, change: Callable[[Any], Any]) -> RecordT:
     """A (nested) record of the same kind with `change` applied to every array."""
-    return type(record)(**{name: _mapped(value, change) for name, value in _fields(record)})
+    kind = type(record)
+    values = [getattr(record, name) for name in _names(kind)]
+    return kind(*[change(v) if isinstance(v, np.ndarray) else _mapped(v, change) for v in values])
 
 
 def copied(value: Any) -> Any:
     """A deep copy of records, lists and generators; arrays that are read-only are shared."""
     if isinstance(value, np.ndarray):
         return value.copy() if value.flags.writeable else value
-    if _is_record(value):
-        return type(value)(**{name: copied(each) for name, each in _fields(value)})
+    if names := _names(type(value)):
+        return type(value)(*[copied(getattr(value, name)) for name in names])
     if isinstance(value, (list, tuple)):
         return type(value)(copied(each) for each in value)
     return copy.deepcopy(value)
@@ -62,24 +60,13 @@ def picked(streams: Sequence[np.random.Generator], ids: Ints) -> list[np.random.
     return [streams[b] for b in ids]
 
 
-def _fields(record: Any) -> list[tuple[str, Any]]:
-    """Names and values of a dataclass or a named tuple."""
-    if isinstance(record, tuple):
-        return list(zip(record._fields, record, strict=True))  # type: ignore[attr-defined]
-    return [(each.name, getattr(record, each.name)) for each in dataclasses.fields(record)]
-
-
-def _is_record(value: object) -> bool:
-    return dataclasses.is_dataclass(value) or hasattr(value, "_fields")
-
-
-def _rows(value: Any, ids: Ints) -> Any:
-    if isinstance(value, np.ndarray):
-        return value[ids]
-    return rows(value, ids) if _is_record(value) else value
+@functools.cache
+def _names(kind: type) -> tuple[str, ...]:
+    """The fields of a dataclass or a named tuple; whatever else there is has none."""
+    if dataclasses.is_dataclass(kind):
+        return tuple(each.name for each in dataclasses.fields(kind))
+    return getattr(kind, "_fields", ())
 
 
 def _mapped(value: Any, change: Callable[[Any], Any]) -> Any:
-    if isinstance(value, np.ndarray):
-        return change(value)
-    return mapped(value, change) if _is_record(value) else value
+    return mapped(value, change) if _names(type(value)) else value

@@ -47,4 +47,5 @@ def estimated_gap(robot: RobotState, estimate: PoseEstimate) -> Gap:
 
 def standard_deviation_m(estimate: PoseEstimate) -> Floats:
     """(B, W, J) root of the mean variance over the axes [m]."""
-    return np.sqrt(np.trace(estimate.cov_world, axis1=-2, axis2=-1) / 3)
+    cov = estimate.cov_world
+    return np.sqrt((cov[..., 0, 0] + cov[..., 1, 1] + cov[..., 2, 2]) / 3)

@@ -4,15 +4,17 @@ The space, the environment's page, `split` and the tests all derive from `TERMS`
 they cannot drift apart. Terms read the *estimate* of the worker, never the truth.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.belief import Believed, standard_deviation_m
 from hrc_env.skeleton import N_JOINTS
-from hrc_env.typing import Bools, Floats
+from hrc_env.typing import Floats
 
 FAR_GAP_M = 1.0
 """A gap as wide as this or wider is reported as this: nothing near, or nobody known of."""
@@ -49,22 +51,25 @@ class ObservationTerm:
 
 def _goal_direction(now: Believed) -> Floats:
     offset = now.goal_world - now.robot.tool_world
-    return offset / (_length(offset) + 0.05)
+    _shorten(offset, 0.05)
+    return offset
 
 
 def _nearest_direction(now: Believed) -> Floats:
-    offset = now.gap.point_b_world - now.gap.point_a_world
-    direction = offset / (_length(offset) + 1e-3)
-    return np.where(_near(now)[..., None], direction, 0.0)
+    direction = (now.gap.point_b_world - now.gap.point_a_world).reshape(-1, 3)
+    _shorten(direction, 1e-3)
+    near = now.gap.distance_m < FAR_GAP_M
+    return np.where(near.reshape(-1, 1), direction, 0.0)
 
 
-def _length(vectors: Floats) -> Floats:
-    """(..., 1) lengths of (..., 3)."""
-    return np.sqrt(np.einsum("...i,...i->...", vectors, vectors))[..., None]
-
-
-def _near(now: Believed) -> Bools:
-    return now.gap.distance_m < FAR_GAP_M
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _shorten(vectors: Floats, softening: float) -> None:
+    """Divide vectors (n, 3) by their length plus a little: unit vectors, but 0 stays 0."""
+    for k in range(len(vectors)):
+        x, y, z = vectors[k]
+        divisor = math.sqrt(x * x + y * y + z * z) + softening
+        for i in range(3):
+            vectors[k, i] /= divisor
 
 
 def _joints_ahead(now: Believed) -> Floats:
@@ -205,14 +210,30 @@ def observe(now: Believed, where: ObservationLayout) -> NDArray[np.float32]:
         FloatingPointError: a term is not a number; a fault of the code, never of a camera.
     """
     batch = len(now.goal_world)
-    flat = np.empty((batch, len(where.low)))
-    for term in TERMS:
-        flat[:, where.slices[term.name]] = term.function(now).reshape(batch, -1)
-    flat /= where.scale
-    if np.isnan(flat).any():
-        names = [name for name, part in where.slices.items() if np.isnan(flat[:, part]).any()]
+    physical = np.concatenate([term.function(now).reshape(batch, -1) for term in TERMS], axis=1)
+    observation = np.empty(physical.shape, np.float32)
+    if not _scale(physical, where.scale, where.low, where.high, observation):
+        names = [name for name, part in where.slices.items() if np.isnan(physical[:, part]).any()]
         raise FloatingPointError(f"Observation terms that are not a number: {', '.join(names)}.")
-    return np.clip(flat, where.low, where.high, dtype=np.float32, casting="unsafe")
+    return observation
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _scale(
+    physical: Floats,
+    scale: Floats,
+    low: NDArray[np.float32],
+    high: NDArray[np.float32],
+    observation: NDArray[np.float32],
+) -> bool:
+    """Entries (B, n) in units to clipped ones in units of `scale`; whether all are numbers."""
+    numbers = True
+    for b in range(physical.shape[0]):
+        for i in range(physical.shape[1]):
+            value = np.float32(physical[b, i] / scale[i])
+            numbers &= value == value
+            observation[b, i] = min(max(value, low[i]), high[i])
+    return numbers
 
 
 def split(observation: NDArray[np.float32], where: ObservationLayout) -> dict[str, Floats]:

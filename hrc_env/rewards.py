@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 
 from hrc_env.belief import Believed
@@ -47,11 +48,18 @@ class RewardTerm:
 
 def closeness(gap_m: Floats, reach_m: float) -> Floats:
     """Shape of the proximity term: 0 from `reach_m` on, 1 at touch, at most 2.25 inside."""
-    return np.clip((reach_m - gap_m) / reach_m, 0.0, 1.5) ** 2
+    return np.minimum(np.maximum((reach_m - gap_m) / reach_m, 0.0), 1.5) ** 2
 
 
-def _mean_square(action: Floats) -> Floats:
-    return np.einsum("ba,ba->b", action, action) / action.shape[-1]
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _mean_square(vectors: Floats) -> Floats:
+    """(B,) of (B, n)."""
+    mean = np.zeros(len(vectors))
+    for b in range(len(vectors)):
+        for value in vectors[b]:
+            mean[b] += value * value
+        mean[b] /= vectors.shape[1]
+    return mean
 
 
 def _proximity(

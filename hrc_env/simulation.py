@@ -4,7 +4,6 @@
 streams only, never on the size of the batch.
 """
 
-import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -13,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hrc_env import metrics, observations, rewards
-from hrc_env.batching import picked, write_rows
+from hrc_env.batching import mapped, picked, write_rows
 from hrc_env.belief import Believed, estimated_gap
 from hrc_env.body import load_body, worker_truth
 from hrc_env.config import HRCConfig
@@ -52,9 +51,10 @@ class Outcome:
 
     def info_of(self, b: int) -> dict[str, Any]:
         """The info of one environment: absent values are left out, flags are bool."""
-        values = {name: float(value[b]) for name, value in self.info.items()}
+        values = {name: value.item(b) for name, value in self.info.items()}
         known: dict[str, Any] = {name: value for name, value in values.items() if value == value}
-        known.update({name: bool(known[name]) for name in FLAGS})
+        for name in FLAGS:
+            known[name] = bool(known[name])
         return known
 
 
@@ -266,15 +266,12 @@ def checked_action(action: ArrayLike, shape: tuple[int, ...]) -> Floats:
     check_shape("action", values.shape, shape, "(environments,) joint or tool velocities")
     if not np.isfinite(values).all():
         raise ConfigError(f"action must be finite numbers in [-1, 1], got {values}.")
-    return np.clip(values, -1.0, 1.0)
+    return np.minimum(np.maximum(values, -1.0), 1.0)
 
 
 def last(record: RecordT) -> RecordT:
     """The last moment of a record whose second axis is time."""
-    whole = {each.name: getattr(record, each.name) for each in dataclasses.fields(record)}  # type: ignore[arg-type]
-    return type(record)(
-        **{name: value[:, -1] if value.ndim > 1 else value for name, value in whole.items()}
-    )
+    return mapped(record, lambda array: array[:, -1] if array.ndim > 1 else array)
 
 
 def rows_of(info: Info, ids: Ints) -> Info:

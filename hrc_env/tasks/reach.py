@@ -1,8 +1,10 @@
 """Reaching: the tool has to touch goals one after another, in a volume shared with a worker."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 
 from hrc_env.errors import ConfigError
@@ -96,24 +98,44 @@ def advance(
     config: ReachConfig,
 ) -> ReachProgress:
     """Judge the tool's new place (B, 3) and replace goals that are done."""
-    before_m = state.distance_m.copy()
-    offset = state.goal_world - tool_world
-    state.distance_m[:] = np.sqrt(np.einsum("bi,bi->b", offset, offset))
-    state.goal_age_s += dt_s
-    reached = state.distance_m < config.radius_m
-    missed = ~reached & (state.goal_age_s >= config.time_limit_s - 1e-9)
-    progress_m = before_m - state.distance_m
-    state.n_reached += reached
-    state.n_missed += missed
-    done = reached | missed
-    if done.any():
-        _new_goals(state, np.flatnonzero(done), rngs, tool_world, config)
-    return ReachProgress(progress_m, reached, missed)
+    batch = len(tool_world)
+    step = ReachProgress(np.empty(batch), np.empty(batch, np.bool_), np.empty(batch, np.bool_))
+    if _judge(
+        tool_world, dt_s, config.radius_m, config.time_limit_s,
+        state.goal_world, state.goal_age_s, state.distance_m, state.n_reached, state.n_missed,
+        step.progress_m, step.reached, step.missed,
+    ):  # fmt: skip
+        _new_goals(state, np.flatnonzero(step.reached | step.missed), rngs, tool_world, config)
+    return step
 
 
 def succeeded(state: ReachState) -> Bools:
     """(B,) whether so far every goal of the episode, and at least one, was reached in time."""
     return (state.n_reached > 0) & (state.n_missed == 0)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _judge(
+    tool_world: Points3, dt_s: float, radius_m: float, time_limit_s: float,
+    goal_world: Points3, goal_age_s: Floats, distance_m: Floats, n_reached: Ints, n_missed: Ints,
+    progress_m: Floats, reached: Bools, missed: Bools,
+) -> bool:  # fmt: skip
+    """Move the state on and write what it brought; whether any goal is done."""
+    done = False
+    for b in range(len(tool_world)):
+        squared = 0.0
+        for i in range(3):
+            squared += (goal_world[b, i] - tool_world[b, i]) ** 2
+        now_m = math.sqrt(squared)
+        progress_m[b] = distance_m[b] - now_m
+        distance_m[b] = now_m
+        goal_age_s[b] += dt_s
+        reached[b] = now_m < radius_m
+        missed[b] = not reached[b] and goal_age_s[b] >= time_limit_s - 1e-9
+        n_reached[b] += reached[b]
+        n_missed[b] += missed[b]
+        done |= reached[b] or missed[b]
+    return done
 
 
 def _new_goals(
