@@ -61,7 +61,7 @@ class Senses(Protocol):
     """One perception level with its estimator, for a batch of environments."""
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
-        """Forget environments `ids`; the generators are rows for them."""
+        """Forget environments `ids`; there is a generator for each environment of the batch."""
         ...
 
     def sense(self, now: Moment, sensor_rngs: Generators, tracker_rngs: Generators) -> PoseEstimate:
@@ -177,9 +177,7 @@ class TrackingSenses(Stateful):
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
         """Forget the tracks of environments `ids`."""
-        part = rows(self.state, ids)
-        self.tracker.reset(part, np.arange(len(ids)), tracker_rngs)
-        write_rows(self.state, ids, part)
+        self.tracker.reset(self.state, ids, tracker_rngs)
 
     def sense(self, now: Moment, sensor_rngs: Generators, tracker_rngs: Generators) -> PoseEstimate:
         """Predict the workers, look at them where they should be, and update."""
@@ -247,9 +245,7 @@ class EmulatedSenses(TrackingSenses):
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
         """Forget the tracks and the detector's slow errors."""
         super().reset(ids, sensor_rngs, tracker_rngs)
-        part = rows(self.emulator, ids)
-        emulator.reset(part, np.arange(len(ids)), sensor_rngs, self.config)
-        write_rows(self.emulator, ids, part)
+        emulator.reset(self.emulator, ids, sensor_rngs, self.config)
 
     def detect(self, now: Moment, predicted: Any, sensor_rngs: Generators) -> Keypoints:
         """Emulated keypoints; lines of sight come from the physics' rays."""

@@ -129,7 +129,7 @@ class Simulation(Stateful):
         self.action[ids], self.episode_cost[ids] = 0.0, 0.0
         robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
         reach.reset(self.task, ids, self.streams.task, robot.tool_world, self.config.task)
-        self.senses.reset(ids, picked(self.streams.sensor, ids), picked(self.streams.tracker, ids))
+        self.senses.reset(ids, self.streams.sensor, self.streams.tracker)
         motion = generator.current(self.motion, ids)
         truth = worker_truth(self.body, motion)
         estimate = self._sense(ids, motion, truth)

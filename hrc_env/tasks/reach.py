@@ -145,14 +145,22 @@ def _new_goals(
     tool_world: Points3,
     config: ReachConfig,
 ) -> None:
-    for b in ids:
-        distance, azimuth, height = rngs[b].uniform(
-            (config.distance_m[0], config.azimuth_rad[0], config.height_m[0]),
-            (config.distance_m[1], config.azimuth_rad[1], config.height_m[1]),
+    x, y = config.base_xy_world
+    for b in ids.tolist():
+        share = rngs[b].random(3).tolist()
+        distance = _between(config.distance_m, share[0])
+        azimuth = _between(config.azimuth_rad, share[1])
+        goal = (
+            x + distance * math.cos(azimuth),
+            y + distance * math.sin(azimuth),
+            _between(config.height_m, share[2]),
         )
-        x, y = config.base_xy_world
-        goal = (x + distance * np.cos(azimuth), y + distance * np.sin(azimuth), height)
         state.goal_world[b] = goal
         state.goal_age_s[b] = 0.0
-        offset = state.goal_world[b] - tool_world[b]
-        state.distance_m[b] = np.sqrt(offset @ offset)
+        state.distance_m[b] = math.dist(goal, tool_world[b].tolist())
+
+
+def _between(limits: tuple[float, float], share: float) -> float:
+    """The value at a share in [0, 1] of the way from the low to the high limit."""
+    low, high = limits
+    return low + (high - low) * share
