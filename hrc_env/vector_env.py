@@ -9,7 +9,7 @@ environments and of threads. What it says, and in which form, is what gymnasium'
 """
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -241,9 +241,17 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
         if seed is None:
             return [None] * self.num_envs
         if isinstance(seed, (int, np.integer)):
-            return [int(seed) + k for k in range(self.num_envs)]
-        check_shape("seed", (len(seed),), (self.num_envs,), "an int, or a list of one each")
-        return [None if each is None else int(each) for each in seed]
+            seed = [int(seed) + k for k in range(self.num_envs)]
+        given = list(seed) if isinstance(seed, Iterable) else [seed]
+        valid = [
+            each is None or (isinstance(each, (int, np.integer)) and each >= 0) for each in given
+        ]
+        if len(given) != self.num_envs or not all(valid):
+            raise ConfigError(
+                f"seed must be a whole number >= 0 or a list of {self.num_envs} of them (None "
+                f"goes on with that environment's stream), got {seed!r}."
+            )
+        return [None if each is None else int(each) for each in given]
 
     def _mask_of(self, options: Mapping[str, Any] | None) -> Bools:
         """(num_envs,) which environments a reset is for."""
