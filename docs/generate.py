@@ -23,7 +23,10 @@ INTRODUCTION = """\
 ```python
 gymnasium.make("HRCReach-v0", perception="keypoints")  # after `import hrc_env`
 gymnasium.make("hrc_env:HRCReach-v0")  # without it
+gymnasium.make_vec("HRCReach-v0", num_envs=64, perception="keypoints")  # a batch
 ```
+
+Many environments at once, and states that are saved and brought back: [vector.md](vector.md).
 
 ## Action space
 `Box(-1, 1, ({n_joint},), float32)`: joint velocities, 1 is {share:.0%} of a joint's limit
