@@ -1,7 +1,10 @@
 """What a robot believes in one step: itself, its task and the estimate. No truth in here."""
 
+import math
 from dataclasses import dataclass
+from typing import Any
 
+import numba
 import numpy as np
 
 from hrc_env.geometry.distances import Gap, narrowest_gap
@@ -48,4 +51,9 @@ def estimated_gap(robot: RobotState, estimate: PoseEstimate) -> Gap:
 def standard_deviation_m(estimate: PoseEstimate) -> Floats:
     """(B, W, J) root of the mean variance over the axes [m]."""
     cov = estimate.cov_world
-    return np.sqrt((cov[..., 0, 0] + cov[..., 1, 1] + cov[..., 2, 2]) / 3)
+    return _root_mean(cov[..., 0, 0], cov[..., 1, 1], cov[..., 2, 2])
+
+
+@numba.vectorize(["float64(float64, float64, float64)"], cache=True)
+def _root_mean(x: Any, y: Any, z: Any) -> Any:
+    return math.sqrt((x + y + z) / 3)

@@ -46,7 +46,7 @@ class ObservationTerm:
     """What one unit of the observation stands for, in `unit`."""
     doc: str
     function: Callable[[Believed], Floats]
-    """Believed -> (B, ...), flattened per environment."""
+    """Believed -> (B, ...), flattened per environment; not asked where it has no entries."""
 
 
 def _goal_direction(now: Believed) -> Floats:
@@ -74,16 +74,12 @@ def _shorten(vectors: Floats, softening: float) -> None:
 
 def _joints_ahead(now: Believed) -> Floats:
     """(B, W, H, J, 3) from the tool point now."""
-    if not now.ahead:
-        return np.empty((*now.estimate.tracked.shape, 0))
     joints = np.stack([later.mean_world for later in now.ahead], axis=2)
     return joints - now.robot.tool_world[:, None, None, None]
 
 
 def _std_ahead(now: Believed) -> Floats:
     """(B, W, H, J)."""
-    if not now.ahead:
-        return np.empty((*now.estimate.tracked.shape, 0))
     return np.stack([standard_deviation_m(later) for later in now.ahead], axis=2)
 
 
@@ -182,7 +178,10 @@ TERMS: tuple[ObservationTerm, ...] = (
 class ObservationLayout:
     """Which entries of the flat observation belong to which term."""
 
+    terms: tuple[int, ...]
+    """Indices into `TERMS` of those that have entries."""
     slices: dict[str, slice]
+    """Of every term."""
     low: NDArray[np.float32]
     high: NDArray[np.float32]
     scale: Floats
@@ -200,7 +199,8 @@ def layout(of: Sizes) -> ObservationLayout:
         scale.append(np.full(size, term.scale))
         start += size
     bound = np.concatenate(high).astype(np.float32)
-    return ObservationLayout(slices, -bound, bound, np.concatenate(scale))
+    terms = tuple(k for k, term in enumerate(TERMS) if term.size(of))
+    return ObservationLayout(terms, slices, -bound, bound, np.concatenate(scale))
 
 
 def observe(now: Believed, where: ObservationLayout) -> NDArray[np.float32]:
@@ -210,7 +210,9 @@ def observe(now: Believed, where: ObservationLayout) -> NDArray[np.float32]:
         FloatingPointError: a term is not a number; a fault of the code, never of a camera.
     """
     batch = len(now.goal_world)
-    physical = np.concatenate([term.function(now).reshape(batch, -1) for term in TERMS], axis=1)
+    physical = np.concatenate(
+        [TERMS[k].function(now).reshape(batch, -1) for k in where.terms], axis=1
+    )
     observation = np.empty(physical.shape, np.float32)
     if not _scale(physical, where.scale, where.low, where.high, observation):
         names = [name for name, part in where.slices.items() if np.isnan(physical[:, part]).any()]

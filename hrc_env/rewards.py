@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numba
 import numpy as np
@@ -46,9 +47,11 @@ class RewardTerm:
     """(believed, progress, previous action (B, A), weights) -> (B,)."""
 
 
-def closeness(gap_m: Floats, reach_m: float) -> Floats:
+@numba.vectorize(["float64(float64, float64)"], cache=True)
+def closeness(gap_m: Any, reach_m: float) -> Any:
     """Shape of the proximity term: 0 from `reach_m` on, 1 at touch, at most 2.25 inside."""
-    return np.minimum(np.maximum((reach_m - gap_m) / reach_m, 0.0), 1.5) ** 2
+    share = min(max((reach_m - gap_m) / reach_m, 0.0), 1.5)
+    return share * share
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
@@ -65,7 +68,7 @@ def _mean_square(vectors: Floats) -> Floats:
 def _proximity(
     now: Believed, step: ReachProgress, previous: Floats, config: RewardConfig
 ) -> Floats:
-    nearest_m = now.gap.distance_m.min(axis=-1, initial=np.inf)
+    nearest_m = np.minimum.reduce(now.gap.distance_m, axis=-1, initial=np.inf)
     penalty: Floats = -config.proximity * closeness(nearest_m, config.proximity_reach_m)
     return penalty
 
@@ -79,7 +82,7 @@ TERMS: tuple[RewardTerm, ...] = (
     RewardTerm(
         "goal",
         "`goal` in the step in which a goal is reached.",
-        lambda now, step, previous, config: config.goal * step.reached.astype(np.float64),
+        lambda now, step, previous, config: np.multiply(config.goal, step.reached),
     ),
     RewardTerm(
         "effort",
