@@ -30,6 +30,7 @@ from hrc_env.results import Metric, write_results
 from hrc_env.tracking.ahead import ahead
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.kalman import KalmanEstimator, KalmanState, motion
+from hrc_env.tracking.settings import settings_of
 from hrc_env.tracking.tree.filter import predict_all
 
 mpl.use("Agg")
@@ -71,7 +72,8 @@ def damped(estimator: KalmanEstimator, state: KalmanState, horizon_s: float) -> 
     copy = KalmanState(*(array.copy() for array in state))
     copy.offset_count[:] = np.inf
     config = estimator.config
-    predict_all(copy, motion(horizon_s, config.damping, config.root_acceleration), 0.0)
+    model = motion(horizon_s, config.damping, config.root_acceleration)
+    predict_all(copy, model, 0.0, settings_of(config))
     return copy.body[:, 0, :, :3], copy.cov[:, 0, :, :3, :3]
 
 

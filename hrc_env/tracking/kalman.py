@@ -10,10 +10,9 @@ learnt (`noise`).
 """
 
 import functools
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
 from hrc_env.records import Keypoints, PoseEstimate
@@ -25,13 +24,11 @@ from hrc_env.tracking.models.acquisition import STANDING_M
 from hrc_env.tracking.models.motion import STANDING_COUNT, damped_joints, whole_body_noise
 from hrc_env.tracking.models.noise import N_SUMS, NoiseModel, first_factor, noise_model
 from hrc_env.tracking.settings import Settings, settings_of
-from hrc_env.tracking.tracks import forget, gaussian_tracks, grow_older, report
+from hrc_env.tracking.tracks import blank, forget, gaussian_tracks
 from hrc_env.tracking.tree.bone_lengths import population_edges
 from hrc_env.tracking.tree.filter import predict_all, update_all
+from hrc_env.tracking.tree.reports import estimate_all
 from hrc_env.typing import Bools, Floats, Ints
-
-_FORGOTTEN_UPDATES = 8
-"""A camera that has not seen the worker for longer no longer counts as a view of them."""
 
 
 class KalmanState(NamedTuple):
@@ -119,8 +116,7 @@ class KalmanEstimator:
         """Move every tracked body by its motion model; draws nothing."""
         del rngs
         model = motion(dt_s, self.config.damping, self.config.root_acceleration)
-        predict_all(state, model, dt_s)
-        grow_older(gaussian_tracks(state), dt_s, self.config)
+        predict_all(state, model, dt_s, self.settings)
 
     def update(
         self, state: KalmanState, keypoints: Keypoints, rngs: list[np.random.Generator]
@@ -137,9 +133,9 @@ class KalmanEstimator:
 
         Their errors have heavier tails than a Gaussian's: the body may be mirrored in depth.
         """
-        tracks, cov = gaussian_tracks(state), np.empty((*state.age_s.shape, 3, 3))
-        widen(state.cov, state.blind, state.tracked, self.config.one_view_inflation, cov)
-        return report(replace(tracks, cov_world=cov), self.config)
+        told = blank(state.tracked.shape)
+        estimate_all(state, self.settings, told)
+        return PoseEstimate(*told)
 
     def ahead(self, state: KalmanState, horizon_s: float) -> PoseEstimate:
         """What is expected in `horizon_s`; see `tracking.ahead`."""
@@ -163,21 +159,3 @@ def motion(dt_s: float, damping: float, acceleration: float) -> tuple[Floats, ..
     F, Q = damped_joints(dt_s, damping, acceleration)
     travel = np.array([[1.0, dt_s], [0.0, 1.0]]) - F
     return F, travel, Q, whole_body_noise(dt_s, acceleration)
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def widen(cov, blind, tracked, inflation, out):
-    """Position covariances, times `inflation` for workers whom one camera alone sees lately.
-
-    cov (B, W, J, n, n) with n >= 3, blind (B, W, C), tracked (B, W), out (B, W, J, 3, 3).
-    """
-    for b in range(cov.shape[0]):
-        for w in range(cov.shape[1]):
-            n_views = 0
-            for c in range(blind.shape[2]):
-                n_views += blind[b, w, c] <= _FORGOTTEN_UPDATES
-            factor = inflation if tracked[b, w] and n_views == 1 else 1.0
-            for j in range(cov.shape[2]):
-                for i in range(3):
-                    for k in range(3):
-                        out[b, w, j, i, k] = factor * cov[b, w, j, i, k]

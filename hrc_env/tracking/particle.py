@@ -9,7 +9,7 @@ left, other modes are searched for, weighted by Laplace's evidence, merged and d
 the views decide (docs/tracking.md).
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -17,13 +17,13 @@ from hrc_env.records import Keypoints, PoseEstimate
 from hrc_env.skeleton import N_JOINTS
 from hrc_env.tracking.ahead import ahead, mixed
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.hypotheses.filter import grow_older_beside, predict_all, update_all
-from hrc_env.tracking.hypotheses.mixture import MixtureSettings, mix, mixture_settings
+from hrc_env.tracking.hypotheses.filter import predict_all, update_all
+from hrc_env.tracking.hypotheses.mixture import MixtureSettings, estimate_all, mixture_settings
 from hrc_env.tracking.hypotheses.slots import Hypotheses
-from hrc_env.tracking.kalman import KalmanEstimator, motion, widen
+from hrc_env.tracking.kalman import KalmanEstimator, motion
 from hrc_env.tracking.measurements import arrays_of
 from hrc_env.tracking.models.acquisition import STANDING_M
-from hrc_env.tracking.tracks import Tracks, gaussian_tracks, grow_older, report
+from hrc_env.tracking.tracks import blank, gaussian_tracks, report
 from hrc_env.typing import Floats, Ints
 
 
@@ -65,10 +65,7 @@ class ParticleEstimator:
         """Move every hypothesis by its motion model; draws nothing."""
         del rngs
         model = motion(dt_s, self.config.damping, self.config.root_acceleration)
-        predict_all(state, model, dt_s, self.mixture)
-        grow_older(heaviest(state), dt_s, self.config)
-        slots, weights = state.slots, (state.n_alive, state.log_weight, state.form)
-        grow_older_beside(slots.tracked, slots.age_s, *weights, dt_s, self.config.max_age_s)
+        predict_all(state, model, dt_s, self.single.settings, self.mixture)
 
     def update(
         self, state: Hypotheses, keypoints: Keypoints, rngs: list[np.random.Generator]
@@ -83,31 +80,11 @@ class ParticleEstimator:
 
     def estimate(self, state: Hypotheses) -> PoseEstimate:
         """Mean and covariance of the mixture; ages are the heaviest hypothesis's."""
-        best = heaviest(state)
-        mean, cov = np.empty((*best.age_s.shape, 6)), np.empty((*best.age_s.shape, 3, 3))
-        mix(state.slots, state.n_alive, state.log_weight, mean, cov)
-        limit = max(state.log_weight.shape[1] // max(state.n_alive.shape[1], 1), 1)
-        blind = state.slots.blind[:, ::limit]
-        widen(cov, blind, best.tracked, self.config.one_view_inflation, cov)
-        position, velocity = mean[..., :3], mean[..., 3:]
-        tracks = replace(best, mean_world=position, velocity_world=velocity, cov_world=cov)
-        return report(tracks, self.config)
+        told = blank(state.n_alive.shape)
+        estimate_all(state, self.single.settings, told)
+        return PoseEstimate(*told)
 
     def ahead(self, state: Hypotheses, horizon_s: float) -> PoseEstimate:
         """What is expected in `horizon_s`, hypothesis by hypothesis; see `tracking.ahead`."""
         each = report(gaussian_tracks(state.slots), self.config)
         return mixed(ahead(each, horizon_s, self.config), state.log_weight, state.n_alive)
-
-
-def heaviest(state: Hypotheses) -> Tracks:
-    """The heaviest hypothesis of each worker, as views (B, W, ...) into the slots."""
-    n_workers, slots = state.n_alive.shape[1], state.slots
-    limit = state.log_weight.shape[1] // n_workers if n_workers else 1
-    return Tracks(
-        mean_world=slots.body[:, ::limit, :, :3],
-        cov_world=slots.cov[:, ::limit, :, :3, :3],
-        velocity_world=slots.body[:, ::limit, :, 3:],
-        age_s=slots.age_s[:, ::limit],
-        tracked=slots.tracked[:, ::limit],
-        conflict=slots.conflict[:, ::limit],
-    )

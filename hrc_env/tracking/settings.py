@@ -22,7 +22,11 @@ class Settings(NamedTuple):
     prior_mean_world: tuple[float, float, float]
     prior_std_m: float
     max_age_s: float
+    lost_after_s: float
+    forget_s: float
     mean_correction: float
+    one_view_inflation: float
+    min_std_m: float
 
 
 def settings_of(config: TrackerConfig) -> Settings:

@@ -8,10 +8,14 @@ import numba
 import numpy as np
 
 from hrc_env.records import PoseEstimate
+from hrc_env.skeleton import N_JOINTS
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.given import prior
+from hrc_env.tracking.settings import settings_of
 from hrc_env.typing import Bools, Covariances3, Floats, Ints, Points3, Velocities3
 
+_ROUNDING = 1e-6
+"""Least eigenvalues may be wrong by no more than this share of the largest."""
 _JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
@@ -103,39 +107,42 @@ def grow_older(tracks: Tracks, dt_s: float, config: TrackerConfig) -> None:
     A lost worker's mean and covariance follow an Ornstein-Uhlenbeck process whose stationary
     distribution is the prior: the longer ago, the more it is the prior that is reported.
     """
-    _grow_older(
-        tracks.mean_world,
-        tracks.cov_world,
-        tracks.velocity_world,
-        tracks.age_s,
-        tracks.tracked,
-        tracks.conflict,
-        dt_s,
-        config.max_age_s,
-        config.lost_after_s,
-        config.forget_s,
-        config.prior_mean_world,
-        config.prior_std_m,
-    )
+    gaussian = (tracks.mean_world, tracks.cov_world, tracks.velocity_world)
+    _grow_older(*gaussian, tracks.age_s, tracks.conflict, tracks.tracked, dt_s, settings_of(config))
 
 
 @numba.njit(**_JIT)
-def _grow_older(
-    mean, cov, velocity, age, tracked, conflict, dt, max_age, lost_after, forget_s, home, std
-):
-    keep = np.exp(-dt / forget_s)
+def _grow_older(mean, cov, velocity, age, conflict, tracked, dt, s):
     for b in range(mean.shape[0]):
         for w in range(mean.shape[1]):
-            youngest = np.inf
-            for j in range(mean.shape[2]):
-                age[b, w, j] = min(age[b, w, j] + dt, max_age)
-                youngest = min(youngest, age[b, w, j])
-            if tracked[b, w] and youngest < lost_after - 1e-9:
-                continue
-            tracked[b, w] = False
-            for j in range(mean.shape[2]):
-                conflict[b, w, j] = 0
-            relax(mean[b, w], cov[b, w], velocity[b, w], keep, home, std)
+            gaussian = (mean[b, w], cov[b, w], velocity[b, w])
+            still = age_worker(*gaussian, age[b, w], conflict[b, w], tracked[b, w], dt, s)
+            tracked[b, w] = still
+
+
+@numba.njit(**_JIT)
+def age_worker(mean, cov, velocity, age, conflict, tracked, dt, s):
+    """A worker (J, ...) gets older by dt [s], in place; whether they are still tracked.
+
+    `s` are `settings.Settings`.
+    """
+    youngest = count_up(age, dt, s.max_age_s)
+    if tracked and youngest < s.lost_after_s - 1e-9:
+        return True
+    for j in range(len(conflict)):
+        conflict[j] = 0
+    relax(mean, cov, velocity, np.exp(-dt / s.forget_s), s.prior_mean_world, s.prior_std_m)
+    return False
+
+
+@numba.njit(**_JIT)
+def count_up(age, dt, most):
+    """Ages (J,) dt [s] later, in place; the youngest."""
+    youngest = np.inf
+    for j in range(len(age)):
+        age[j] = min(age[j] + dt, most)
+        youngest = min(youngest, age[j])
+    return youngest
 
 
 @numba.njit(**_JIT)
@@ -150,10 +157,17 @@ def relax(mean, cov, velocity, keep, home, std):
             cov[j, i, i] += (1.0 - keep * keep) * std * std
 
 
+def blank(shape: tuple[int, ...]) -> tuple[Floats, Floats, Floats, Floats, Bools]:
+    """The arrays of a `PoseEstimate` of (B, W) workers, for a kernel to fill in."""
+    joints = (*shape, N_JOINTS)
+    moments = np.empty((*joints, 3)), np.empty((*joints, 3, 3)), np.empty((*joints, 3))
+    return (*moments, np.empty(joints), np.empty(shape, bool))
+
+
 def report(tracks: Tracks, config: TrackerConfig) -> PoseEstimate:
     """The tracks as others may see them: copies, covariances no less than the floor allows."""
-    cov = np.empty(tracks.cov_world.shape)
-    _bounded(tracks.cov_world, config.min_std_m**2, config.prior_std_m**2, cov)
+    cov = tracks.cov_world.copy()
+    _bound_all(cov, config.min_std_m, config.prior_std_m)
     return PoseEstimate(
         mean_world=tracks.mean_world.copy(),
         cov_world=cov,
@@ -164,19 +178,38 @@ def report(tracks: Tracks, config: TrackerConfig) -> PoseEstimate:
 
 
 @numba.njit(**_JIT)
-def _bounded(cov, floor, ceiling, out):
+def _bound_all(cov, least_std, most_std):
     for b in range(cov.shape[0]):
         for w in range(cov.shape[1]):
-            for j in range(cov.shape[2]):
-                widest = max(cov[b, w, j, 0, 0], cov[b, w, j, 1, 1], cov[b, w, j, 2, 2])
-                scale = min(1.0, ceiling / widest)
-                for i in range(3):
-                    for k in range(i, 3):
-                        out[b, w, j, i, k] = scale * cov[b, w, j, i, k]
-                        out[b, w, j, k, i] = out[b, w, j, i, k]
-                missing = max(floor - least_eigenvalue(out[b, w, j]), 0.0)
-                for i in range(3):
-                    out[b, w, j, i, i] += missing
+            bound(cov[b, w], least_std, most_std)
+
+
+@numba.njit(**_JIT)
+def bound(cov, least_std, most_std):
+    """Make covariances (J, 3, 3) no narrower and no wider than these [m], in place.
+
+    Only their upper halves are looked at.
+    """
+    floor, ceiling = least_std * least_std, most_std * most_std
+    for j in range(len(cov)):
+        widest = max(cov[j, 0, 0], cov[j, 1, 1], cov[j, 2, 2])
+        scale = min(1.0, ceiling / widest)
+        for i in range(3):
+            for k in range(i, 3):
+                cov[j, i, k] = cov[j, k, i] = scale * cov[j, i, k]
+        if not _is_wider(cov[j], floor + _ROUNDING * widest):
+            missing = max(floor - least_eigenvalue(cov[j]), 0.0)
+            for i in range(3):
+                cov[j, i, i] += missing
+
+
+@numba.njit(**_JIT)
+def _is_wider(a, floor):
+    """Whether every eigenvalue of a symmetric 3x3 matrix is above `floor`, without any root."""
+    x, y, z = a[0, 0] - floor, a[1, 1] - floor, a[2, 2] - floor
+    f, g, h = a[0, 1], a[0, 2], a[1, 2]
+    determinant = x * (y * z - h * h) - f * (f * z - g * h) + g * (f * h - g * y)
+    return x > 0.0 and x * y - f * f > 0.0 and determinant > 0.0
 
 
 @numba.njit(**_JIT)

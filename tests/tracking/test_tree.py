@@ -11,7 +11,7 @@ from hrc_env.tracking.models.motion import damped_joints, whole_body_noise
 from hrc_env.tracking.tree.bone_lengths import learn_lengths, population_edges
 from hrc_env.tracking.tree.gaussian import EDGE_BONE, ORDER, PARENT, ROOT
 from hrc_env.tracking.tree.predict import predict_tree
-from hrc_env.tracking.tree.quads import HESSIAN, INVERSE, PROPER, QUAD, invert_rows
+from hrc_env.tracking.tree.quads import HESSIAN, INVERSE, PROPER, QUAD, invert_rows, load_tree
 from hrc_env.tracking.tree.update import update_tree
 from hrc_env.tracking.tree.work import make_work
 
@@ -110,6 +110,7 @@ def test_an_update_is_the_dense_gaussian_update(seed):
             w.edge_information[j], w.edge_gradient[j] = information, rng.normal(size=3)
             precision += difference.T @ information @ difference
             gradient += difference.T @ w.edge_gradient[j]
+    load_tree(cov, slope, w.rows)
     update_tree(body, cov, slope, w)
     posterior = np.linalg.inv(precision)
     np.testing.assert_allclose(body.ravel(), mean + posterior @ gradient, atol=1e-7)

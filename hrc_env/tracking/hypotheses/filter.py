@@ -15,7 +15,8 @@ from hrc_env.tracking.models.acquisition import heading
 from hrc_env.tracking.models.noise import learn_noise, scale_sigma
 from hrc_env.tracking.models.proposal import contrast_of
 from hrc_env.tracking.models.swaps import undo_swaps
-from hrc_env.tracking.models.upkeep import acquire
+from hrc_env.tracking.models.upkeep import acquire, grow_older
+from hrc_env.tracking.tracks import count_up
 from hrc_env.tracking.tree.evidence import log_evidence
 from hrc_env.tracking.tree.filter import condition, follow, look_after, settle
 from hrc_env.tracking.tree.predict import predict_tree
@@ -26,46 +27,48 @@ _JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
 @numba.njit(**_JIT)
-def predict_all(state, model, dt, m):
-    """Move every hypothesis by dt [s]; `model` as in `tree.predict.predict_tree`."""
+def predict_all(state, model, dt, s, m):
+    """Let dt [s] pass: hypotheses move and age; `model` as in `tree.predict.predict_tree`."""
     work, slots = make_work(), state.slots
     n_joints = slots.body.shape[2]
-    held, held_count = np.empty((n_joints, 3)), np.empty(n_joints)
+    held = (np.empty((n_joints, 3)), np.empty(n_joints))
     limit = slots.tracked.shape[1] // state.n_alive.shape[1]
     for b in range(state.n_alive.shape[0]):
         for w in range(state.n_alive.shape[1]):
-            if not slots.tracked[b, w * limit]:
-                continue
-            state.waited_s[b, w] += dt
-            for k in range(w * limit, w * limit + state.n_alive[b, w]):
-                gaussian = (slots.body[b, k], slots.cov[b, k], slots.slope[b, k])
-                if state.n_alive[b, w] == 1:
-                    places = (slots.offset[b, k], slots.offset_count[b, k])
-                    predict_tree(*gaussian, *places, model, dt, work)
-                else:
-                    held[:], held_count[:] = slots.offset[b, k], slots.offset_count[b, k]
-                    predict_tree(*gaussian, held, held_count, model, dt, work)
-                    state.log_weight[b, k] += m.walking_odds * dt * forwards(slots.body[b, k])
-            if state.n_alive[b, w] > 1:
-                normalise(state, b, w, m.log_drop)
+            if slots.tracked[b, w * limit]:
+                state.waited_s[b, w] += dt
+                _move(state, b, w, model, dt, m, held, work)
+            _grow_older(state, b, w, dt, s)
 
 
 @numba.njit(**_JIT)
-def grow_older_beside(tracked, age_s, n_alive, log_weight, form, dt, max_age):
-    """Count the ages of all hypotheses but the heaviest up; of a lost worker forget them.
+def _move(state, b, w, model, dt, m, held, work):
+    """Move a worker's hypotheses; several at once learn no places on the body (`held`)."""
+    slots = state.slots
+    first = w * (slots.tracked.shape[1] // state.n_alive.shape[1])
+    for k in range(first, first + state.n_alive[b, w]):
+        gaussian = (slots.body[b, k], slots.cov[b, k], slots.slope[b, k])
+        if state.n_alive[b, w] == 1:
+            places = (slots.offset[b, k], slots.offset_count[b, k])
+            predict_tree(*gaussian, *places, model, dt, work)
+        else:
+            held[0][:], held[1][:] = slots.offset[b, k], slots.offset_count[b, k]
+            predict_tree(*gaussian, *held, model, dt, work)
+            state.log_weight[b, k] += m.walking_odds * dt * forwards(slots.body[b, k])
+    if state.n_alive[b, w] > 1:
+        normalise(state, b, w, m.log_drop)
 
-    tracked (B, W H), age_s (B, W H, J), the others as in `slots.Hypotheses`; arrays by name,
-    since unpacking whole records costs a single environment more than the work does.
-    """
-    limit = tracked.shape[1] // max(n_alive.shape[1], 1)
-    for b in range(n_alive.shape[0]):
-        for w in range(n_alive.shape[1]):
-            first = w * limit
-            if not tracked[b, first]:
-                n_alive[b, w], log_weight[b, first], form[b, first] = 1, 0.0, 0.0
-            for k in range(first + 1, first + n_alive[b, w]):
-                for j in range(age_s.shape[2]):
-                    age_s[b, k, j] = min(age_s[b, k, j] + dt, max_age)
+
+@numba.njit(**_JIT)
+def _grow_older(state, b, w, dt, s):
+    """Count ages up; a worker who is lost has one hypothesis."""
+    slots = state.slots
+    first = w * (slots.tracked.shape[1] // state.n_alive.shape[1])
+    grow_older(slots, b, first, dt, s)
+    if not slots.tracked[b, first]:
+        state.n_alive[b, w], state.log_weight[b, first], state.form[b, first] = 1, 0.0, 0.0
+    for k in range(first + 1, first + state.n_alive[b, w]):
+        count_up(slots.age_s[b, k], dt, s.max_age_s)
 
 
 @numba.njit(**_JIT)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numba
 
 from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.tree.reports import tell_moments, tell_rest
 
 _LEAST_EVIDENCE = 0.01
 """A limb's other mode with less evidence than this share of the known one's is none."""
@@ -71,23 +72,35 @@ def mixture_settings(config: TrackerConfig) -> MixtureSettings:
 
 
 @numba.njit(**_JIT)
-def mix(slots, n_alive, log_weight, mean, cov):
-    """Moments of the mixtures: mean (B, W, J, 6), cov (B, W, J, 3, 3) of the positions."""
-    limit = log_weight.shape[1] // n_alive.shape[1]
-    for b in range(n_alive.shape[0]):
-        for w in range(n_alive.shape[1]):
-            first, n = w * limit, n_alive[b, w]
-            if n == 1:
-                mean[b, w] = slots.body[b, first]
-                cov[b, w] = slots.cov[b, first, :, :3, :3]
-                continue
-            mean[b, w], cov[b, w] = 0.0, 0.0
-            for k in range(first, first + n):
-                share = math.exp(log_weight[b, k])
-                mean[b, w] += share * slots.body[b, k]
-            for k in range(first, first + n):
-                share = math.exp(log_weight[b, k])
-                _add_moments(share, slots.body[b, k], slots.cov[b, k], mean[b, w], cov[b, w])
+def estimate_all(state, s, out):
+    """Fill the arrays of a `PoseEstimate` in; `state` and `s` as in `hypotheses.filter`."""
+    slots, limit = state.slots, state.log_weight.shape[1] // state.n_alive.shape[1]
+    for b in range(state.n_alive.shape[0]):
+        for w in range(state.n_alive.shape[1]):
+            first = w * limit
+            if state.n_alive[b, w] == 1:
+                tell_moments(slots, b, first, out, w)
+            else:
+                mean, cov, velocity = out[0][b, w], out[1][b, w], out[2][b, w]
+                mix(state, b, w, mean, cov, velocity)
+            tell_rest(slots, b, first, s, out, w)
+
+
+@numba.njit(**_JIT)
+def mix(state, b, w, mean, cov, velocity):
+    """Moments of a mixture: mean, velocity (J, 3) and cov (J, 3, 3) of the positions."""
+    slots, limit = state.slots, state.log_weight.shape[1] // state.n_alive.shape[1]
+    first, n = w * limit, state.n_alive[b, w]
+    mean[:], cov[:], velocity[:] = 0.0, 0.0, 0.0
+    for k in range(first, first + n):
+        share = math.exp(state.log_weight[b, k])
+        for j in range(len(mean)):
+            for i in range(3):
+                mean[j, i] += share * slots.body[b, k, j, i]
+                velocity[j, i] += share * slots.body[b, k, j, 3 + i]
+    for k in range(first, first + n):
+        share = math.exp(state.log_weight[b, k])
+        _add_moments(share, slots.body[b, k], slots.cov[b, k], mean, cov)
 
 
 @numba.njit(**_JIT)

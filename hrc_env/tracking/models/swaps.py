@@ -59,7 +59,7 @@ def undo_swaps(P, body, cov, z, sigma, ok, chance, blind, believed, s):
 @numba.njit(**_JIT)
 def swap_evidence(camera, c, body, cov, z, sigma, ok, contrast):
     """Log-likelihood ratio of camera c being swapped, bounded."""
-    total = 0.0
+    swapped, right = 1.0, 1.0  # products: no term is more than 1e10
     for j in range(len(_MIRROR)):
         m = _MIRROR[j]
         if m == j or not (ok[j, c] or ok[m, c]):
@@ -68,13 +68,11 @@ def swap_evidence(camera, c, body, cov, z, sigma, ok, contrast):
         if not depth > NEAREST_DEPTH_M:
             continue
         spread = pixel_spread(camera, u, v, depth, cov[j])
-        odds = 1.0
         if ok[m, c]:
-            odds = _mixture(z[m, c, 0] - u, z[m, c, 1] - v, sigma[m, c], spread, contrast)
+            swapped *= _mixture(z[m, c, 0] - u, z[m, c, 1] - v, sigma[m, c], spread, contrast)
         if ok[j, c]:
-            odds /= _mixture(z[j, c, 0] - u, z[j, c, 1] - v, sigma[j, c], spread, contrast)
-        total += math.log(odds)
-    return min(max(total, -_MOST_EVIDENCE), _MOST_EVIDENCE)
+            right *= _mixture(z[j, c, 0] - u, z[j, c, 1] - v, sigma[j, c], spread, contrast)
+    return min(max(math.log(swapped / right), -_MOST_EVIDENCE), _MOST_EVIDENCE)
 
 
 @numba.njit(fastmath=_REORDER, **_JIT)

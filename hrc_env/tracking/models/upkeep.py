@@ -17,12 +17,21 @@ from hrc_env.tracking.models.acquisition import (
     middle_of,
     triangulate_body,
 )
+from hrc_env.tracking.tracks import age_worker
 from hrc_env.tracking.tree.gaussian import halves_of
 
 _FOUND_SPEED_STD_M_S = 1.0
 _FURTHEST_STD = 4.0
 """A body further than this many prior deviations from the prior has been lost."""
 _JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
+
+
+@numba.njit(**_JIT)
+def grow_older(state, b, w, dt, s):
+    """Count ages up by dt [s]; give up a track that nothing supports, let a lost one relax."""
+    body, ages = state.body[b, w], (state.age_s[b, w], state.conflict[b, w])
+    gaussian = (body[:, :3], state.cov[b, w, :, :3, :3], body[:, 3:])
+    state.tracked[b, w] = age_worker(*gaussian, *ages, state.tracked[b, w], dt, s)
 
 
 @numba.njit(**_JIT)

@@ -12,7 +12,13 @@ from hrc_env.tracking.models.acquisition import count_conflict
 from hrc_env.tracking.models.noise import learn_noise, scale_sigma
 from hrc_env.tracking.models.proposal import contrast_of
 from hrc_env.tracking.models.swaps import undo_swaps
-from hrc_env.tracking.models.upkeep import acquire, acquire_anew, check, find_joints_again
+from hrc_env.tracking.models.upkeep import (
+    acquire,
+    acquire_anew,
+    check,
+    find_joints_again,
+    grow_older,
+)
 from hrc_env.tracking.tree.bone_lengths import learn_lengths, stiff_lengths
 from hrc_env.tracking.tree.gaussian import PARENT
 from hrc_env.tracking.tree.predict import predict_tree
@@ -24,8 +30,8 @@ _JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
 @numba.njit(**_JIT)
-def predict_all(state, model, dt):
-    """Move every tracked body by dt [s]; `model` as in `tree.predict.predict_tree`."""
+def predict_all(state, model, dt, s):
+    """Let dt [s] pass: bodies move and ages grow; `model` as in `tree.predict.predict_tree`."""
     work = make_work()
     for b in range(state.tracked.shape[0]):
         for w in range(state.tracked.shape[1]):
@@ -33,6 +39,7 @@ def predict_all(state, model, dt):
                 gaussian = (state.body[b, w], state.cov[b, w], state.slope[b, w])
                 places = (state.offset[b, w], state.offset_count[b, w])
                 predict_tree(*gaussian, *places, model, dt, work)
+            grow_older(state, b, w, dt, s)
 
 
 @numba.njit(**_JIT)

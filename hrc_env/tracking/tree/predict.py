@@ -69,9 +69,6 @@ def predict_tree(body, cov, slope, offset, offset_count, model, dt, w):
     _move_means(body, cov, offset, offset_count, F, travel, dt)
     rows = w.rows
     load_tree(cov, slope, rows)
-    for quad in range(QUADS):
-        at = quad * QUAD
-        multiply_rows(rows, at + SLOPE, at + ABOVE, at + EDGE)
     _relate_torso(cov, slope, w)
     for quad in range(QUADS - 1, -1, -1):
         at = quad * QUAD

@@ -65,7 +65,10 @@ def offset(at):
 
 @numba.njit(**_JIT)
 def load_tree(cov, slope, rows):
-    """Put marginals and slopes (J, 6, 6) into their rows, and each parent's marginal beside."""
+    """Put marginals and slopes (J, 6, 6) into their rows; beside them each parent's marginal.
+
+    `EDGE` gets the covariance with the parent.
+    """
     for lane in range(LANES):
         j = JOINT_OF_LANE[lane]
         at = lane // 4 * QUAD + lane % 4
@@ -84,7 +87,9 @@ def load_tree(cov, slope, rows):
                 for k in range(6):
                     rows[at + SLOPE + 24 * i + 4 * k] = slope[j, i, k]
     for quad in range(QUADS):
+        at = quad * QUAD
         fetch_above(rows, quad, COV, ABOVE, 36)
+        multiply_rows(rows, at + SLOPE, at + ABOVE, at + EDGE)
 
 
 @numba.njit(**_JIT)

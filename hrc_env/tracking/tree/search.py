@@ -38,10 +38,8 @@ from hrc_env.tracking.tree.quads import (
     EDGE,
     QUAD,
     QUADS,
-    SLOPE,
     fetch_above,
     load_tree,
-    multiply_rows,
     offset,
 )
 
@@ -61,9 +59,9 @@ def find_pose(body, cov, slope, seen, bones, contrast, n_steps, belief, w):
         contrast: as `proposal.contrast_of` gives.
         n_steps: Gauss-Newton steps.
         belief: (J, C) filled: how far each measurement is believed.
-        w: scratch; point stays, and so does what cameras and bones say there: information
-            and gradient of the log-likelihood as a function of the positions (of joints, and
-            of joints less their parents') minus their predicted means, at 0.
+        w: scratch; the tree stays in its rows, and so do point and what cameras and bones say
+            there: information and gradient of the log-likelihood as a function of the positions
+            (of joints, and of joints less their parents') minus their predicted means, at 0.
     """
     for j in range(len(body)):
         for i in range(3):
@@ -80,9 +78,7 @@ def find_pose_near(body, cov, slope, seen, bones, contrast, n_steps, widen, beli
     rows = w.rows
     load_tree(cov, slope, rows)
     for quad in range(QUADS):
-        at = quad * QUAD
-        multiply_rows(rows, at + SLOPE, at + ABOVE, at + EDGE)
-        position_prior(rows, at)
+        position_prior(rows, quad * QUAD)
     _load_positions(body, bones, w.point, rows)
     set_joints(body, cov, w.joints)
     views = views_of(seen)

@@ -37,7 +37,6 @@ from hrc_env.tracking.tree.quads import (
     apply_transposed_rows,
     fetch_above,
     invert_rows,
-    load_tree,
     multiply_rows,
     multiply_transposed_rows,
     pass_on,
@@ -56,11 +55,11 @@ _REORDER = {"reassoc", "contract", "nsz"}
 def update_tree(body, cov, slope, w):
     """Condition (J, 6), (J, 6, 6), (J, 6, 6) on cameras and bones, in place.
 
-    What they say is in camera_information, camera_gradient, edge_information and edge_gradient
-    of `w`, as `tree.search.find_pose` leaves it. Keeps the factors for `correct_mean`.
+    The tree is in the rows of `w`, and what they say in camera_information, camera_gradient,
+    edge_information and edge_gradient, as `tree.search.find_pose` leaves all that. Keeps the
+    factors for `correct_mean`.
     """
     rows = w.rows
-    load_tree(cov, slope, rows)
     for quad in range(QUADS):
         _split(rows, quad * QUAD)
     _load_measurements(w, rows)
@@ -91,7 +90,6 @@ def update_tree(body, cov, slope, w):
 @numba.njit(**_JIT)
 def _split(rows, at):
     """What a quad's joints know by themselves, given their parents."""
-    multiply_rows(rows, at + SLOPE, at + ABOVE, at + EDGE)
     multiply_transposed_rows(rows, at + EDGE, at + SLOPE, at + KNOWN)
     subtract_rows(rows, at + COV, at + KNOWN, at + HESSIAN)
     invert_rows(rows, at)

@@ -1,0 +1,50 @@
+"""What is told of a Gaussian on the tree: each joint for itself, no more certain than is honest."""
+
+import numba
+
+from hrc_env.tracking.tracks import bound
+
+_FORGOTTEN_UPDATES = 8
+"""A camera that has not seen the worker for longer no longer counts as a view of them."""
+_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
+
+
+@numba.njit(**_JIT)
+def estimate_all(state, s, out):
+    """Fill the arrays of a `PoseEstimate` in; `state` is `kalman.KalmanState`."""
+    for b in range(state.tracked.shape[0]):
+        for w in range(state.tracked.shape[1]):
+            tell_moments(state, b, w, out, w)
+            tell_rest(state, b, w, s, out, w)
+
+
+@numba.njit(**_JIT)
+def tell_moments(state, b, k, out, w):
+    """Mean, velocity and covariance of column k, to be those of worker w."""
+    mean, cov, velocity = out[0][b, w], out[1][b, w], out[2][b, w]
+    for j in range(len(mean)):
+        for i in range(3):
+            mean[j, i], velocity[j, i] = state.body[b, k, j, i], state.body[b, k, j, 3 + i]
+            for h in range(3):
+                cov[j, i, h] = state.cov[b, k, j, i, h]
+
+
+@numba.njit(**_JIT)
+def tell_rest(state, b, k, s, out, w):
+    """Ages and the track of column k, and how certain worker w's joints are allowed to be.
+
+    Of a worker whom one camera alone sees lately they are less certain: their errors have
+    heavier tails than a Gaussian's.
+    """
+    cov, age, n_views = out[1][b, w], out[3][b, w], 0
+    tracked = state.tracked[b, k]
+    for c in range(state.blind.shape[2]):
+        n_views += state.blind[b, k, c] <= _FORGOTTEN_UPDATES
+    factor = s.one_view_inflation if tracked and n_views == 1 else 1.0
+    for j in range(len(cov)):
+        age[j] = state.age_s[b, k, j]
+        for i in range(3):
+            for h in range(3):
+                cov[j, i, h] *= factor
+    bound(cov, s.min_std_m, s.prior_std_m)
+    out[4][b, w] = tracked
