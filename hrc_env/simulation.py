@@ -74,7 +74,7 @@ class Simulation(Stateful):
 
     CHANGES = (
         "physics", "senses", "motion", "task", "streams", "action", "episode_cost",
-        "estimate", "ahead", "believed",
+        "estimate", "ahead",
     )  # fmt: skip
 
     def __init__(
@@ -116,8 +116,6 @@ class Simulation(Stateful):
         self.episode_cost = np.zeros(batch)
         self.estimate = given.prior(batch, n_workers, config.tracker)
         self.ahead = tuple(given.prior(batch, n_workers, config.tracker) for _ in config.horizons_s)
-        robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
-        self.believed = self._believed(robot)
         blank = [np.random.default_rng(0)] * batch
         self.streams = Streams(*(list(blank) for _ in range(5)))
 
@@ -127,14 +125,14 @@ class Simulation(Stateful):
         self.physics.reset(ids, self._starting_angles(ids))
         generator.reset(self.motion, ids, self.streams.motion)
         self.action[ids], self.episode_cost[ids] = 0.0, 0.0
-        robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
+        robot = chains.robot_state(self.chain, self.physics.q[ids], self.physics.qd[ids])
         reach.reset(self.task, ids, self.streams.task, robot.tool_world, self.config.task)
         self.senses.reset(ids, self.streams.sensor, self.streams.tracker)
         motion = generator.current(self.motion, ids)
         truth = worker_truth(self.body, motion)
-        estimate = self._sense(ids, motion, truth)
-        self.believed = self._believed(robot)
-        observation = observations.observe(self.believed, self.layout)[ids]
+        estimate, ahead = self._sense(ids, motion, truth)
+        believed = self._believed(ids, robot, estimate, ahead)
+        observation = observations.observe(believed, self.layout)
         info = {**tracking_info(estimate, truth), **rows_of(self._tally(), ids)}
         return Outcome(observation, np.zeros(len(ids)), np.zeros(len(ids), bool), info)
 
@@ -152,12 +150,12 @@ class Simulation(Stateful):
         truth = worker_truth(self.body, motion)
         now = last(truth)
 
-        estimate = self._sense(self._everyone, last(motion), now)
+        estimate, ahead = self._sense(self._everyone, last(motion), now)
         robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
         progress = reach.advance(
             self.task, streams.task, robot.tool_world, config.ctrl_dt, config.task
         )
-        self.believed = believed = self._believed(robot)
+        believed = self._believed(self._everyone, robot, estimate, ahead)
         reward, terms = rewards.reward(believed, progress, previous, config.reward)
 
         bodies = chains.capsules(self.chain, q_trace)
@@ -215,8 +213,16 @@ class Simulation(Stateful):
         ]
         return np.array(angles).reshape(len(ids), -1)
 
-    def _sense(self, ids: Ints, motion: WorkerMotion, truth: WorkerTruth) -> PoseEstimate:
-        """Let the senses look at environments `ids`; their rows of the estimate."""
+    @property
+    def believed(self) -> Believed:
+        """What every robot believes now."""
+        robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
+        return self._believed(self._everyone, robot, self.estimate, self.ahead)
+
+    def _sense(
+        self, ids: Ints, motion: WorkerMotion, truth: WorkerTruth
+    ) -> tuple[PoseEstimate, tuple[PoseEstimate, ...]]:
+        """Let the senses look at environments `ids`; their rows of the estimates now and ahead."""
         moment = Moment(ids, self.physics.q[ids], motion, truth)
         streams = self.streams
         estimate = self.senses.sense(
@@ -230,17 +236,20 @@ class Simulation(Stateful):
         else:
             for whole, part in zip((self.estimate, *self.ahead), (estimate, *ahead), strict=True):
                 write_rows(whole, ids, part)
-        return estimate
+        return estimate, ahead
 
-    def _believed(self, robot: RobotState) -> Believed:
+    def _believed(
+        self, ids: Ints, robot: RobotState, estimate: PoseEstimate, ahead: tuple[PoseEstimate, ...]
+    ) -> Believed:
+        """What the robots of environments `ids` believe; the records are of them only."""
         return Believed(
             robot=robot,
-            estimate=self.estimate,
-            gap=estimated_gap(robot, self.estimate),
-            goal_world=self.task.goal_world.copy(),
-            goal_time_left_s=self.config.task.time_limit_s - self.task.goal_age_s,
-            action=self.action,
-            ahead=self.ahead,
+            estimate=estimate,
+            gap=estimated_gap(robot, estimate),
+            goal_world=self.task.goal_world[ids],
+            goal_time_left_s=self.config.task.time_limit_s - self.task.goal_age_s[ids],
+            action=self.action[ids],
+            ahead=ahead,
         )
 
     def _tally(self) -> Info:

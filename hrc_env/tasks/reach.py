@@ -84,7 +84,7 @@ def reset(
     tool_world: Points3,
     config: ReachConfig,
 ) -> None:
-    """Start environments `ids` anew with a first goal each; tool_world is (B, 3) [m]."""
+    """Start environments `ids` anew with a first goal each; tool_world is (len(ids), 3) [m]."""
     state.n_reached[ids] = 0
     state.n_missed[ids] = 0
     _new_goals(state, ids, rngs, tool_world, config)
@@ -105,7 +105,8 @@ def advance(
         state.goal_world, state.goal_age_s, state.distance_m, state.n_reached, state.n_missed,
         step.progress_m, step.reached, step.missed,
     ):  # fmt: skip
-        _new_goals(state, np.flatnonzero(step.reached | step.missed), rngs, tool_world, config)
+        done = np.flatnonzero(step.reached | step.missed)
+        _new_goals(state, done, rngs, tool_world[done], config)
     return step
 
 
@@ -146,7 +147,7 @@ def _new_goals(
     config: ReachConfig,
 ) -> None:
     x, y = config.base_xy_world
-    for b in ids.tolist():
+    for b, tool in zip(ids.tolist(), tool_world.tolist(), strict=True):
         share = rngs[b].random(3).tolist()
         distance = _between(config.distance_m, share[0])
         azimuth = _between(config.azimuth_rad, share[1])
@@ -157,7 +158,7 @@ def _new_goals(
         )
         state.goal_world[b] = goal
         state.goal_age_s[b] = 0.0
-        state.distance_m[b] = math.dist(goal, tool_world[b].tolist())
+        state.distance_m[b] = math.dist(goal, tool)
 
 
 def _between(limits: tuple[float, float], share: float) -> float:
