@@ -41,15 +41,15 @@ class Arguments:
     seed: int = 0
     """Seed of the environments and of the learner."""
     perception: str = "keypoints"
-    """What the robot learns on: keypoints (camera emulator), truth, none; pixels is slow."""
+    """What the robot learns on: keypoints (camera emulator), truth or none."""
     estimator: str = "particle"
     """particle, kalman, paper or triangulation."""
     control: str = "joint"
     """joint or tool."""
     proximity: float = 2.0
     """Weight of closeness to the estimated body in the reward; 0 trains without it."""
-    threads: int = 2
-    """Threads for physics and gradients."""
+    threads: int | None = None
+    """Threads for the environments, and for the gradients; all cores by default."""
     episodes: int = 128
     """Episodes of the evaluation at the end."""
     film: bool = True
@@ -64,7 +64,8 @@ LEARNT_WITH = ("num_envs", "seed", "perception", "estimator", "control", "proxim
 
 def main(arguments: Arguments) -> None:
     """Train, evaluate, draw, film."""
-    torch.set_num_threads(arguments.threads)
+    if arguments.threads is not None:
+        torch.set_num_threads(arguments.threads)
     folder = arguments.resume or unused(arguments.out)
     if arguments.resume is not None:
         arguments = as_before(arguments, folder)
@@ -115,7 +116,7 @@ def environment_arguments(arguments: Arguments) -> dict[str, Any]:
         "estimator": arguments.estimator,
         "control": arguments.control,
         "config": {"reward": {"proximity": arguments.proximity}},
-        "n_threads": arguments.threads,
+        "num_threads": arguments.threads,
     }
 
 
@@ -156,7 +157,7 @@ def film(checkpoint: Path, path: Path, arguments: Arguments, kwargs: dict[str, A
     def make(here: Situation) -> ppo.TrainedAgent:
         return ppo.load(checkpoint, here)
 
-    settings = {name: value for name, value in kwargs.items() if name != "n_threads"}
+    settings = {name: value for name, value in kwargs.items() if name != "num_threads"}
     try:
         film_episode(make, path, seed=arguments.seed, **settings)
     except RenderingError as error:

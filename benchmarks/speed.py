@@ -65,7 +65,7 @@ def main(arguments: Arguments) -> None:
         for level in ("keypoints", "truth", "none")
     }
     singles["gymnasium Reacher-v5"] = gymnasium.make("Reacher-v5")
-    batches = {level: HRCVecEnv(64, perception=level, n_threads=2) for level in ASKED}
+    batches = {level: HRCVecEnv(64, perception=level, num_threads=2) for level in ASKED}
     speeds: dict[str, list[float]] = {}
     for run in track(range(arguments.runs + 1), description="measuring"):
         for name, env in singles.items():

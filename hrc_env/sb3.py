@@ -1,152 +1,139 @@
-"""Stable-Baselines3 door: many environments as one `VecEnv`, without per-environment Python.
+"""Stable-Baselines3 door: the vector environment as a `VecEnv`.
 
 from hrc_env.sb3 import HRCVecEnv
 PPO("MlpPolicy", HRCVecEnv(64, perception="keypoints"))
 """
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
-import gymnasium
 import numpy as np
+from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
-from hrc_env.config import HRCConfig, resolve
 from hrc_env.errors import ConfigError
-from hrc_env.simulation import Simulation, checked_action
+from hrc_env.simulation import Simulation
 from hrc_env.typing import Bools, Floats, Ints
+from hrc_env.vector_env import HRCVectorEnv
 
 EPISODE_SUMS = ("cost", "cost_proximity", "cost_contact")
+"""Infos whose sums over an episode are kept."""
 
 
 class HRCVecEnv(VecEnv):
-    """`num_envs` environments in one simulation, with time limits and episode statistics.
+    """An `HRCVectorEnv` as SB3 expects environments, with episode statistics.
 
     Environment k of `seed(s)` and then `reset()` is `HRCReach-v0` after `reset(seed=s + k)`;
-    what follows the end of an episode continues its random stream.
+    what follows the end of an episode continues its random stream. The info of a step is
+    empty but for episodes that ended: these have the whole of it, what SB3 reads
+    ("terminal_observation", "TimeLimit.truncated") and the episode's statistics ("episode").
 
     Args:
         num_envs: how many.
-        max_episode_steps: the time limit, told from failures by "TimeLimit.truncated".
         stagger: let the first episode of each environment end early at a random time, so
             that a short rollout sees all phases of an episode and not one.
-        n_threads: threads for the physics.
-        perception, estimator, cameras, scene, n_workers, control, config: as `HRCReachEnv`.
+        seed: of the first reset.
+        kwargs: as of `HRCVectorEnv`.
     """
 
     def __init__(
-        self,
-        num_envs: int,
-        *,
-        perception: str = "keypoints",
-        estimator: str = "particle",
-        cameras: Sequence[int | str] | None = None,
-        scene: str = "lab",
-        n_workers: int = 1,
-        control: str = "joint",
-        config: HRCConfig | Mapping[str, Any] | None = None,
-        max_episode_steps: int = 250,
-        stagger: bool = True,
-        n_threads: int = 1,
-        seed: int = 0,
+        self, num_envs: int, *, stagger: bool = True, seed: int = 0, **kwargs: Any
     ) -> None:
-        if num_envs < 1:
-            raise ConfigError(f"num_envs must be at least 1, got {num_envs}.")
-        self.simulation = Simulation(
-            num_envs, perception, estimator, cameras, scene, n_workers, control,
-            resolve(config), n_threads,
-        )  # fmt: skip
-        where = self.simulation.layout
-        super().__init__(
-            num_envs,
-            gymnasium.spaces.Box(where.low, where.high, dtype=np.float32),
-            gymnasium.spaces.Box(-1.0, 1.0, (self.simulation.n_actions,), np.float32),
-        )
-        self.max_episode_steps, self.stagger = max_episode_steps, stagger
-        self.started_s = time.time()
-        self.first_seed, self._reseed = seed, True
-        self._action = np.zeros((num_envs, self.simulation.n_actions))
+        self.env = HRCVectorEnv(num_envs, autoreset_mode=AutoresetMode.SAME_STEP, **kwargs)
+        space, actions = self.env.single_observation_space, self.env.single_action_space
+        super().__init__(num_envs, space, actions)
+        self.metadata = self.env.metadata
+        self.stagger, self.started_s = stagger, time.time()
+        self.seed(seed)
+        self._action = np.zeros((num_envs, *(actions.shape or ())), np.float32)
         self._sums = {name: np.zeros(num_envs) for name in ("reward", "contacts", *EPISODE_SUMS)}
         self._touching = np.zeros(num_envs, bool)
         self._nearest_m = np.full(num_envs, np.inf)
-        self._steps, self._limit = np.zeros(num_envs, int), np.full(num_envs, max_episode_steps)
+        self._steps = np.zeros(num_envs, int)
+
+    @property
+    def simulation(self) -> Simulation:
+        """The environments' simulation; of several that threads share, the first."""
+        return self.env.shards.parts[0]
 
     def seed(self, seed: int | None = None) -> list[int | None]:  # type: ignore[override]
-        """Seed environment k with seed + k at the next reset."""
-        self.first_seed = self.first_seed if seed is None else seed
-        self._reseed = True
-        return [self.first_seed + k for k in range(self.num_envs)]
+        """Seed environment k with seed + k at the next reset; None draws a seed."""
+        seeds = list(super().seed(seed))
+        self._phases = np.random.default_rng(seeds[0])
+        return seeds
+
+    def set_options(self, options: Any = None) -> None:
+        """Not supported: environments take their settings when they are made."""
+        if options:
+            raise ConfigError(f"HRCVecEnv takes no options, got {options}; use its arguments.")
 
     def reset(self) -> NDArray[np.float32]:
         """Start every environment: from its seed the first time, then on with its stream."""
-        everyone = np.arange(self.num_envs)
-        if self._reseed:
-            self.rngs = [np.random.default_rng(self.first_seed + k) for k in everyone]
-            self._reseed = False
-        self._begin(everyone)
-        self._limit[:] = self.max_episode_steps
+        options = None
         if self.stagger:
-            rng = np.random.default_rng(self.first_seed)
-            self._limit[:] = rng.integers(1, self.max_episode_steps + 1, self.num_envs)
-        return self.simulation.reset(everyone, self.rngs).observation
+            elapsed = self._phases.integers(self.env.max_episode_steps, size=self.num_envs)
+            options = {"elapsed_steps": elapsed}
+        seeds = None if None in self._seeds else self._seeds
+        observation, infos = self.env.reset(seed=seeds, options=options)
+        self._reset_seeds()
+        self._begin(np.arange(self.num_envs))
+        self.reset_infos = [_info_of(infos, b) for b in range(self.num_envs)]
+        return observation
 
     def step_async(self, actions: NDArray[Any]) -> None:
-        """Keep the actions for `step_wait`.
-
-        Raises:
-            ConfigError: they are not finite or not (num_envs, actions).
-        """
-        self._action = checked_action(actions, (self.num_envs, self.simulation.n_actions))
+        """Keep the actions for `step_wait`."""
+        self._action = actions
 
     def step_wait(
         self,
     ) -> tuple[NDArray[np.float32], NDArray[np.float32], Bools, list[dict[str, Any]]]:
         """Step everyone; whoever is done starts anew, as SB3 expects."""
-        outcome = self.simulation.step(self._action)
-        self._count(outcome.reward, outcome.info)
-        truncated = (self._steps >= self._limit) & ~outcome.terminated
-        done = outcome.terminated | truncated
+        observation, reward, terminated, truncated, fresh = self.env.step(self._action)
+        self._count(reward, fresh)
+        done = terminated | truncated
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        observation, ended = outcome.observation, np.flatnonzero(done)
+        ended = np.flatnonzero(done)
         for b in ended.tolist():
-            infos[b] = outcome.info_of(b)
-            infos[b]["terminal_observation"] = observation[b].copy()
-            infos[b]["TimeLimit.truncated"] = bool(truncated[b])
+            infos[b] = _info_of(fresh["final_info"], b)
+            infos[b]["terminal_observation"] = fresh["final_obs"][b]
+            infos[b]["TimeLimit.truncated"] = bool(truncated[b] and not terminated[b])
             infos[b]["episode"] = self._episode(b, infos[b])
-        if len(ended):
-            self._begin(ended)
-            fresh = self.simulation.reset(ended, [self.rngs[b] for b in ended])
-            observation[ended] = fresh.observation
-        return observation, outcome.reward.astype(np.float32), done, infos
+            self.reset_infos[b] = _info_of(fresh, b)
+        self._begin(ended)
+        return observation, reward.astype(np.float32), done, infos
 
     def close(self) -> None:
         """Release threads and graphics contexts."""
-        self.simulation.close()
+        self.env.close()
+
+    def get_images(self) -> list[NDArray[np.uint8]]:
+        """A picture of every environment."""
+        return list(self.env.render() or ())
 
     def _begin(self, ids: Ints) -> None:
         for total in self._sums.values():
             total[ids] = 0.0
         self._steps[ids], self._touching[ids], self._nearest_m[ids] = 0, False, np.inf
-        self._limit[ids] = self.max_episode_steps
 
-    def _count(self, reward: Floats, info: Mapping[str, Floats]) -> None:
-        touching = info["cost_contact"] > 0
+    def _count(self, reward: Floats, infos: Mapping[str, Any]) -> None:
+        touching = _of_step(infos, "cost_contact", self.num_envs) > 0
         self._steps += 1
         self._sums["reward"] += reward
         self._sums["contacts"] += touching & ~self._touching  # a long touch is one contact
         for name in EPISODE_SUMS:
-            self._sums[name] += info[name]
+            self._sums[name] += _of_step(infos, name, self.num_envs)
         self._touching = touching
-        self._nearest_m = np.fmin(self._nearest_m, info["safety/min_separation_m"])
+        separation_m = _of_step(infos, "safety/min_separation_m", self.num_envs)
+        self._nearest_m = np.fmin(self._nearest_m, separation_m)
 
     def _episode(self, b: int, info: Mapping[str, Any]) -> dict[str, float]:
         """Statistics of an episode under the names of SB3's Monitor, and ours."""
         return {
             "r": float(self._sums["reward"][b]),
             "l": int(self._steps[b]),
-            "seconds": float(self._steps[b] * self.simulation.config.ctrl_dt),
+            "seconds": float(self._steps[b] * self.env.config.ctrl_dt),
             "t": time.time() - self.started_s,
             "cost": float(self._sums["cost"][b]),
             "cost_steps": float(self._sums["cost_proximity"][b]),
@@ -157,9 +144,8 @@ class HRCVecEnv(VecEnv):
         }
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """The same value for everyone: the environments are one object."""
-        value = getattr(self, attr_name, None)
-        return [value] * len(list(self._get_indices(indices)))
+        """An attribute of the vector environment, the same for everyone."""
+        return [getattr(self.env, attr_name)] * len(list(self._get_indices(indices)))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
         """Not supported: the environments are one object."""
@@ -172,3 +158,22 @@ class HRCVecEnv(VecEnv):
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
         """No environment is wrapped."""
         return [False] * len(list(self._get_indices(indices)))
+
+
+def _of_step(infos: Mapping[str, Any], name: str, num_envs: int) -> Floats:
+    """(B,) a value of the step itself, also where the episode ended with it; else NaN."""
+    value = np.full(num_envs, np.nan)
+    for part in (infos, infos.get("final_info", {})):
+        if name in part:
+            known = part[f"_{name}"]
+            value[known] = part[name][known]
+    return value
+
+
+def _info_of(infos: Mapping[str, Any], b: int) -> dict[str, Any]:
+    """What a vector environment's infos say about environment `b`."""
+    return {
+        name: infos[name][b].item()
+        for name in infos
+        if not name.startswith(("_", "final_")) and infos[f"_{name}"][b]
+    }

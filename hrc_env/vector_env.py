@@ -20,12 +20,13 @@ from numpy.typing import NDArray
 
 from hrc_env.config import HRCConfig, resolve
 from hrc_env.env import RENDER_MODES, spaces
-from hrc_env.errors import ConfigError, check_shape, unknown
+from hrc_env.errors import ConfigError, unknown
 from hrc_env.shards import Shards, n_cores
 from hrc_env.simulation import Outcome, Simulation, checked_action
 from hrc_env.stateful import Stateful
 from hrc_env.typing import Bools, Floats, Ints
 from hrc_env.vector_infos import InfoTable, blank, table
+from hrc_env.vector_options import read_options
 from hrc_env.views import Views
 
 MAX_ENVS = 16_384
@@ -102,7 +103,7 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
         self._streams: list[Stream | None] = [None] * self.num_envs
         self._action_shape = (self.num_envs, self.shards.parts[0].n_actions)
         no_limit = max_episode_steps is None or max_episode_steps == -1
-        self._limit = (
+        self.max_episode_steps = (
             NO_LIMIT if no_limit else _whole("max_episode_steps", max_episode_steps, 1, NO_LIMIT)
         )
         self._steps = np.zeros(self.num_envs, int)
@@ -120,18 +121,24 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
         Args:
             seed: environment k gets `seed + k`, or the k-th of a list; with None its random
                 stream goes on.
-            options: {"reset_mask": (num_envs,) bool}: only these environments start anew.
+            options: "reset_mask", (num_envs,) bool: only these environments start anew.
+                "elapsed_steps", (num_envs,) int: how much of their time limit these first
+                episodes have behind them, so that not all of them end at once.
 
         Returns:
             Observations of all environments, and infos of those that started.
         """
         self._refuse_closed()
-        seeds, mask = self._seeds_of(seed), self._mask_of(options)
+        seeds = self._seeds_of(seed)
+        mask, elapsed_steps = read_options(options, self.num_envs, self.max_episode_steps)
+        if self._observation is None and not mask.all():
+            raise ConfigError("The first reset() must be for everyone: leave out the reset_mask.")
         ids = np.flatnonzero(mask)
         for k in ids.tolist():
             if seeds[k] is not None:
                 self._streams[k] = seeding.np_random(seeds[k])
         fresh = self._begin(ids)
+        self._steps[ids] = elapsed_steps[ids]
         if self._observation is None:
             self._observation = fresh.observation.copy()
         self._observation[ids] = fresh.observation
@@ -158,7 +165,7 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
         if over.any():  # only where the mode is NEXT_STEP
             self._restart(over, observation, info)
             reward[over], terminated[over] = 0.0, False
-        truncated = self._steps >= self._limit
+        truncated = self._steps >= self.max_episode_steps
         ended, finals = terminated | truncated, {}
         if self.autoreset_mode is AutoresetMode.SAME_STEP and ended.any():
             finals = _finals(observation, info, ended)
@@ -252,25 +259,6 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
                 f"goes on with that environment's stream), got {seed!r}."
             )
         return [None if each is None else int(each) for each in given]
-
-    def _mask_of(self, options: Mapping[str, Any] | None) -> Bools:
-        """(num_envs,) which environments a reset is for."""
-        others = sorted(set(options or {}) - {"reset_mask"})
-        if others:
-            raise unknown("reset option", others[0], ["reset_mask"])
-        everyone = np.ones(self.num_envs, bool)
-        mask = (options or {}).get("reset_mask", everyone)
-        if not isinstance(mask, np.ndarray) or mask.dtype != bool:
-            raise ConfigError(
-                'options["reset_mask"] must be a NumPy array of bool, one for each environment, '
-                f"got {mask!r}; terminations | truncations is one."
-            )
-        check_shape("reset_mask", mask.shape, (self.num_envs,), "one for each environment")
-        if not mask.any():
-            raise ConfigError('options["reset_mask"] must be True somewhere: nobody would start.')
-        if self._observation is None and not mask.all():
-            raise ConfigError("The first reset() must be for everyone: leave out the reset_mask.")
-        return mask
 
 
 def _finals(observation: Observations, info: InfoTable, who: Bools) -> dict[str, Any]:

@@ -3,6 +3,9 @@
 import gymnasium
 import numpy as np
 import pytest
+from stable_baselines3 import PPO, SAC
+from stable_baselines3.common.monitor import Monitor
+from stable_baselines3.common.vec_env import VecCheckNan, VecMonitor, VecNormalize
 
 import hrc_env  # noqa: F401  registers the ids
 from hrc_env.errors import ConfigError
@@ -14,24 +17,53 @@ def actions(n_steps: int, n_envs: int) -> np.ndarray:
 
 
 def test_each_environment_is_the_single_one_bit_for_bit():
-    """Over the end of an episode: the single one resets by hand."""
+    """Over the end of an episode: the single one, in SB3's Monitor, resets by hand."""
     acts = actions(40, 3)
     many = HRCVecEnv(3, perception="keypoints", stagger=False, max_episode_steps=25, seed=7)
-    batch = [many.reset()]
-    for action in acts:
-        observation, reward, done, _ = many.step(action)
-        batch.append((observation, reward, done))
+    batch = [many.reset(), *(many.step(action) for action in acts)]
     for k in range(3):
-        one = gymnasium.make("HRCReach-v0", perception="keypoints", max_episode_steps=25)
+        made = gymnasium.make("HRCReach-v0", perception="keypoints", max_episode_steps=25)
+        one = Monitor(made)
         observation, _ = one.reset(seed=7 + k)
         np.testing.assert_array_equal(observation, batch[0][k])
         for step, action in enumerate(acts[:, k], start=1):
-            observation, reward, terminated, truncated, _ = one.step(action)
-            if terminated or truncated:
+            observation, reward, terminated, truncated, info = one.step(action)
+            seen, rewarded, done, infos = (each[k] for each in batch[step])
+            assert np.float32(reward) == rewarded
+            assert (terminated or truncated) == done
+            if done:
+                compare_ends(info, observation, infos)
                 observation, _ = one.reset()
-            np.testing.assert_array_equal(observation, batch[step][0][k])
-            assert np.float32(reward) == batch[step][1][k]
-            assert (terminated or truncated) == batch[step][2][k]
+            np.testing.assert_array_equal(observation, seen)
+
+
+def compare_ends(info, observation, ended):
+    """What the VecEnv says of an episode's end against Monitor's info and the last observation."""
+    np.testing.assert_array_equal(ended["terminal_observation"], observation)
+    assert ended["TimeLimit.truncated"]
+    monitored = info.pop("episode")
+    assert {name: ended[name] for name in info} == info
+    assert {type(ended[name]) for name in info} == {float, bool}
+    assert ended["episode"]["l"] == monitored["l"]
+    assert np.isclose(ended["episode"]["r"], monitored["r"], atol=1e-5)
+
+
+def test_infos_are_empty_until_an_episode_ends():
+    env = HRCVecEnv(2, perception="truth", stagger=False, max_episode_steps=3)
+    env.reset()
+    infos = [env.step(action)[3] for action in actions(4, 2)]
+    assert infos[0] == infos[1] == infos[3] == [{}, {}]
+    assert all("episode" in info for info in infos[2])
+
+
+def test_the_infos_of_resets_are_at_hand():
+    env = HRCVecEnv(2, perception="truth", stagger=False, max_episode_steps=2, seed=4)
+    env.reset()
+    first = env.reset_infos
+    for action in actions(2, 2):
+        env.step(action)
+    assert first[0]["tracking/mpjpe_m"] == env.reset_infos[1]["tracking/mpjpe_m"] == 0.0
+    assert "cost" not in env.reset_infos[0]
 
 
 def test_a_second_reset_goes_on_and_a_seed_begins_again():
@@ -63,6 +95,20 @@ def test_a_time_limit_is_told_from_a_failure():
         assert info["episode"]["l"] == 5
 
 
+def test_an_episode_that_fails_at_its_time_limit_has_failed(monkeypatch):
+    env = HRCVecEnv(2, perception="none", stagger=False, max_episode_steps=1)
+    env.reset()
+    step = env.env.step
+
+    def failing(action):
+        observation, reward, _, truncated, infos = step(action)
+        return observation, reward, np.array([True, False]), truncated, infos
+
+    monkeypatch.setattr(env.env, "step", failing)
+    infos = env.step(actions(1, 2)[0])[3]
+    assert [info["TimeLimit.truncated"] for info in infos] == [False, True]
+
+
 def test_staggered_starts_end_the_first_episodes_at_different_times():
     env = HRCVecEnv(8, perception="none", max_episode_steps=50, seed=1)
     env.reset()
@@ -86,11 +132,61 @@ def test_episode_statistics_add_up():
     assert episode["cost"] == infos[0]["episode_cost"]
 
 
+@pytest.mark.filterwarnings("ignore:num_threads=3")
 def test_threads_change_nothing():
     runs = []
     for n_threads in (1, 2, 3):
-        env = HRCVecEnv(5, perception="keypoints", n_threads=n_threads)
+        env = HRCVecEnv(5, perception="keypoints", num_threads=n_threads)
         env.reset()
         runs.append(np.stack([env.step(action)[0] for action in actions(15, 5)]))
     np.testing.assert_array_equal(runs[0], runs[1])
     np.testing.assert_array_equal(runs[0], runs[2])
+
+
+def test_the_same_seed_gives_the_same_phases_and_a_second_reset_others():
+    ends = []
+    for _ in range(2):
+        env = HRCVecEnv(6, perception="none", max_episode_steps=30, seed=5)
+        for _ in range(2):
+            env.reset()
+            ends.append(np.stack([env.step(action)[2] for action in actions(30, 6)]))
+    np.testing.assert_array_equal(ends[0], ends[2])
+    np.testing.assert_array_equal(ends[1], ends[3])
+    assert not np.array_equal(ends[0], ends[1])
+
+
+def test_sb3_finds_what_it_asks_a_vec_env_for():
+    env = HRCVecEnv(3, perception="truth", seed=2)
+    assert env.seed(5) == [5, 6, 7]
+    assert env.render_mode is None
+    assert env.get_attr("max_episode_steps", indices=[0, 2]) == [250, 250]
+    assert not env.has_attr("nobody_has_this")
+    assert env.env_is_wrapped(Monitor) == [False] * 3
+    env.set_options({})
+    refused = (
+        lambda: env.set_options({"start": 1}),
+        lambda: env.set_attr("config", None),
+        lambda: env.env_method("look"),
+    )
+    for refusal in refused:
+        with pytest.raises(ConfigError, match="HRCVecEnv"):
+            refusal()
+
+
+def test_pictures_of_all_environments_are_tiled():
+    env = HRCVecEnv(2, perception="none", render_mode="rgb_array")
+    env.reset()
+    tiles = env.get_images()
+    assert len(tiles) == 2
+    assert env.render().size == sum(tile.size for tile in tiles)
+    env.close()
+
+
+def test_sb3s_own_wrappers_and_learners_take_it():
+    """On policy and off; VecCheckNan raises at the first NaN."""
+    made = HRCVecEnv(4, perception="truth", max_episode_steps=20)
+    PPO("MlpPolicy", VecNormalize(VecCheckNan(made)), n_steps=32, batch_size=64).learn(256)
+    learner = SAC("MlpPolicy", VecMonitor(made), learning_starts=20, buffer_size=500)
+    learner.learn(120)
+    assert learner.replay_buffer.timeouts.any()
+    assert len(learner.ep_info_buffer) >= 4

@@ -87,7 +87,7 @@ def test_two_workers_without_names_are_both_followed(estimator):
 
 def test_three_workers_without_names_keep_their_tracks():
     """Eight rooms for six seconds; some of the workers walk through each other's way."""
-    env = HRCVecEnv(8, n_workers=3, stagger=False, max_episode_steps=1000, seed=100)
+    env = HRCVecEnv(8, n_workers=3, stagger=False, max_episode_steps=1000, seed=100, num_threads=1)
     env.reset()
     whom = []
     for _ in range(150):

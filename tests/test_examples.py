@@ -1,0 +1,71 @@
+"""The examples, run as a reader would run them, for a few thousand steps."""
+
+import importlib.util
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+ROOT = Path(__file__).resolve().parent.parent
+SMALL = ("--num-envs", "8", "--n-steps", "32", "--timesteps", "3000", "--perception", "truth")
+
+
+def run(name: str, *arguments: str) -> str:
+    command = [sys.executable, ROOT / "examples" / name, *arguments]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_the_plain_ppo_runs_and_says_how_many_goals_it_reached():
+    said = run("ppo_cleanrl_style.py", *SMALL)
+    assert re.search(r"3072 steps in \d+ s", said)
+    assert re.search(r"goals reached in the last \d+ episodes: \d+%", said)
+
+
+@pytest.mark.skipif(importlib.util.find_spec("torchrl") is None, reason="torchrl is not installed")
+def test_the_torchrl_ppo_runs():
+    assert re.search(r"3072 steps in \d+ s", run("ppo_torchrl.py", *SMALL))
+
+
+def load(name: str):
+    spec = importlib.util.spec_from_file_location(name, ROOT / "examples" / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_advantages_bootstrap_a_truncated_episode_and_not_a_failed_one():
+    """Environment 0 is truncated by its second step and 1 fails then; the third step resets."""
+    rollout = load("ppo_cleanrl_style").Rollout(4, 2, 1, 1)
+    rollout.reward[:] = torch.tensor([[1.0, 1.0], [2.0, 2.0], [0.0, 0.0], [3.0, 3.0]])
+    rollout.value[:] = torch.tensor([[10.0, 10.0], [20.0, 20.0], [30.0, 30.0], [40.0, 40.0]])
+    rollout.done[1] = True
+    rollout.terminated[1, 1] = True
+    advantage = rollout.advantages(torch.tensor([50.0, 50.0]), gamma=0.5, gae_lambda=0.5)
+    last = [3 + 0.5 * 50 - 40] * 2
+    ends = [2 + 0.5 * 30 - 20, 2 + 0.0 - 20]
+    first = [1 + 0.5 * 20 - 10 + 0.25 * end for end in ends]
+    np.testing.assert_allclose(advantage[[0, 1, 3]], [first, ends, last])
+
+
+def test_reset_steps_are_no_experience():
+    """Whatever stands in the rows of resets, the policy learns the same."""
+    ppo = load("ppo_cleanrl_style")
+    learnt = []
+    for junk in (0.0, 100.0):
+        torch.manual_seed(0)
+        policy, rollout = ppo.Policy(3, 2), ppo.Rollout(8, 4, 3, 2)
+        for column in (rollout.observation, rollout.action, rollout.reward):
+            column.normal_()
+        rollout.done[3], rollout.is_reset[4] = True, True
+        rollout.action[4], rollout.log_prob[4] = junk, junk
+        optimiser = torch.optim.Adam(policy.parameters())
+        ppo.update(policy, optimiser, rollout, torch.zeros(4), ppo.Arguments(batch_size=8))
+        learnt.append(policy.state_dict())
+    assert all(torch.equal(learnt[0][name], learnt[1][name]) for name in learnt[0])
