@@ -2,7 +2,7 @@
 
 python -m hrc_env demo     a film of a robot that yields to a worker it sees
 python -m hrc_env check    is this machine ready?
-python -m hrc_env bench    how good, honest and fast are the estimators?
+python -m hrc_env bench    how good and honest are the estimators, how fast is everything?
 """
 
 import sys
@@ -32,6 +32,7 @@ def main() -> int:
         },
         prog="python -m hrc_env",
         description="A robot, a worker, and the cameras between them.",
+        config=(tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),
     )
     try:
         return command.run()

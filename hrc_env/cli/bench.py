@@ -1,11 +1,11 @@
-"""python -m hrc_env bench tracking: how good, how honest and how fast the estimators are."""
+"""python -m hrc_env bench: how good and honest the estimators are, how fast everything is."""
 
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import tyro
 from rich.console import Console
@@ -19,14 +19,12 @@ Say = Callable[[float, str], None]
 
 
 @dataclass(frozen=True)
-class Bench:
+class TrackingBench:
     """Run every estimator on the same simulated sequences; a table, plots and results.json.
 
     A bench that was stopped goes on where it was when it is started with the same folder.
     """
 
-    what: Annotated[Literal["tracking"], tyro.conf.Positional]
-    """Which bench."""
     out: Path | None = None
     """Folder for results.json, tables, pictures and the parts that are done; one for each of
     the three parts of the bench. Default: out/bench_tracking, the same with _real or _peers."""
@@ -81,6 +79,50 @@ class Bench:
         )
 
 
+@dataclass(frozen=True)
+class SpeedBench:
+    """Steps a second, what each organ takes of a step, and resets; beside Gymnasium's Reacher.
+
+    Everybody takes turns: nothing else should run on the machine.
+    """
+
+    out: Path = Path("out/bench_speed")
+    """Folder for results.json, a table and a picture."""
+    quick: bool = False
+    """One short round: every number, in less than two minutes."""
+    rounds: int | None = None
+    """In how many rounds everybody has a turn, instead of 7 (1 if quick); medians count."""
+
+    def run(self) -> int:
+        """Run, show the table."""
+        from hrc_env.experiments.speed.bench import QUICK, SpeedBenchConfig, run
+
+        config = QUICK if self.quick else SpeedBenchConfig()
+        if self.rounds is not None:
+            config = replace(config, n_rounds=self.rounds)
+        written = "results.json, speed.md, organs.png"
+        return _show(partial(run, config), self.out, "speed.md", written)
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Measure the estimators (tracking) or the environment (speed).
+
+    Each takes --quick (minutes, not hours) and --out DIR, where it writes results.json, a table
+    and pictures; `bench tracking --help` and `bench speed --help` say the rest.
+    """
+
+    what: (
+        Annotated[TrackingBench, tyro.conf.subcommand("tracking")]
+        | Annotated[SpeedBench, tyro.conf.subcommand("speed")]
+    )
+    """Which bench."""
+
+    def run(self) -> int:
+        """Run it."""
+        return self.what.run()
+
+
 def _show(run: Callable[[Path, Say], object], out: Path, table: str, written: str) -> int:
     """Run a part of the bench under a progress bar, then show its table."""
     console = Console()
@@ -93,7 +135,7 @@ def _show(run: Callable[[Path, Say], object], out: Path, table: str, written: st
         TimeRemainingColumn(),
         console=console,
     ) as progress:
-        task = progress.add_task("bench tracking", total=1.0)
+        task = progress.add_task("bench", total=1.0)
         run(out, lambda share, label: progress.update(task, advance=share, description=label))
     console.print(Markdown((out / table).read_text()))
     console.print(f"In [bold]{out}[/]: {written}")

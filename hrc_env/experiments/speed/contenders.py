@@ -1,0 +1,108 @@
+"""Who is timed: the environment in all its sizes, and Gymnasium's Reacher, by public doors."""
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import gymnasium
+import numpy as np
+
+import hrc_env  # noqa: F401  registers the ids
+from hrc_env.typing import Bools
+
+OURS, PEER = "HRCReach-v0", "Reacher-v5"
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """What a run came to."""
+
+    env_steps: int
+    """Steps in which an action was obeyed; a step that only starts an episode is none."""
+    seconds: float
+    """From the first action to the last info, resets inside."""
+
+
+class Contender(Protocol):
+    """An environment that can be run for some episodes, again and again."""
+
+    episode_env_steps: int
+    """Environment steps when everybody runs one episode."""
+
+    def run(self, n_episodes: int) -> Pace:
+        """Random actions for whole episodes; every info is read."""
+        ...
+
+    def close(self) -> None:
+        """Release what it holds."""
+        ...
+
+
+class Single:
+    """`gymnasium.make`: one environment, reset where its episode ends."""
+
+    def __init__(self, id: str, **arguments: Any) -> None:
+        self.env = gymnasium.make(id, **arguments)
+        self.episode_env_steps = _time_limit(self.env.spec)
+        self.env.reset(seed=0)
+
+    def run(self, n_episodes: int) -> Pace:
+        """Random actions for whole episodes; every info is read."""
+        shape: tuple[int, ...] = self.env.action_space.shape  # type: ignore[assignment]
+        actions = _actions((n_episodes * self.episode_env_steps, *shape))
+        started_s = time.perf_counter()
+        for action in actions:
+            _, _, terminated, truncated, info = self.env.step(action)
+            read(info)
+            if terminated or truncated:
+                read(self.env.reset()[1])
+        return Pace(len(actions), time.perf_counter() - started_s)
+
+    def close(self) -> None:
+        """Close the environment."""
+        self.env.close()
+
+
+class Vector:
+    """`gymnasium.make_vec`: episodes start anew in the step after their end, its default."""
+
+    def __init__(self, id: str, num_envs: int, **arguments: Any) -> None:
+        self.env, self.num_envs = gymnasium.make_vec(id, num_envs, **arguments), num_envs
+        self.episode_steps = _time_limit(self.env.spec)
+        self.episode_env_steps = num_envs * self.episode_steps
+        self.env.reset(seed=0)
+        self._ended: Bools = np.zeros(num_envs, bool)
+
+    def run(self, n_episodes: int) -> Pace:
+        """Random actions for whole episodes; every info is read."""
+        shape: tuple[int, ...] = self.env.action_space.shape  # type: ignore[assignment]
+        actions = _actions((n_episodes * (self.episode_steps + 1), *shape))
+        n_starts, ended = 0, self._ended
+        started_s = time.perf_counter()
+        for action in actions:
+            n_starts += int(ended.sum())
+            _, _, terminated, truncated, info = self.env.step(action)
+            read(info)
+            ended = terminated | truncated
+        seconds, self._ended = time.perf_counter() - started_s, ended
+        return Pace(len(actions) * self.num_envs - n_starts, seconds)
+
+    def close(self) -> None:
+        """Close the environment."""
+        self.env.close()
+
+
+def read(info: Mapping[str, Any]) -> None:
+    """Ask for every value, as whoever logs infos does."""
+    for name in info:
+        _ = info[name]
+
+
+def _actions(shape: tuple[int, ...]) -> Any:
+    return np.random.default_rng(0).uniform(-1, 1, shape).astype(np.float32)
+
+
+def _time_limit(spec: Any) -> int:
+    limit: int = spec.max_episode_steps
+    return limit
