@@ -30,7 +30,7 @@ check: $(READY)
 	$(VENV)/bin/pyright
 
 bench: $(READY)
-	$(RUN) benchmarks/speed.py
+	$(RUN) -m hrc_env bench speed
 	$(RUN) benchmarks/pixels.py
 	$(RUN) benchmarks/soak.py
 	$(RUN) -m benchmarks.sim_dt

@@ -68,8 +68,8 @@ def test_files_are_written_and_the_progress_ends_at_one(done):
 def test_every_function_of_the_table_is_called_and_given_back():
     """A function that moved would have its time counted nowhere."""
     before = [vars(owner)[name] for places in organs.ORGANS.values() for owner, name in places]
-    measuring = organs.Organs()
-    for contender in (Single(OURS, perception="keypoints"), Vector(OURS, 2, perception="keypoints")):
+    measuring, level = organs.Organs(), bench.WATCHED
+    for contender in (Single(OURS, perception=level), Vector(OURS, 2, perception=level)):
         measuring.us_per_env_step(contender, 1, 1)
         contender.close()
     measuring.check_all_called()

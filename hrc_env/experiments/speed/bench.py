@@ -5,6 +5,7 @@ stopwatch round their organs, and resets. Medians over rounds count.
 """
 
 import math
+import os
 from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
@@ -82,6 +83,7 @@ def run(config: SpeedBenchConfig, out: Path, say: Say) -> dict[str, Metric]:
     Raises:
         HRCError: an organ's function is no longer called, so that its time would be missed.
     """
+    load_before = load_average()
     with ExitStack() as closing:
         turns = [*_turns(config, closing, say)]
         starts = Starts()
@@ -96,9 +98,15 @@ def run(config: SpeedBenchConfig, out: Path, say: Say) -> dict[str, Metric]:
             for name, ms in starts.run(config.n_resets).items():
                 measured.reset_ms.setdefault(name, []).append(ms)
     metrics = metrics_of(measured)
-    write_results(out / "results.json", {"bench": asdict(config)}, [0], metrics)
-    write_report(out, metrics)
+    settings = {"bench": asdict(config), "load_before": load_before}
+    write_results(out / "results.json", settings, [0], metrics)
+    write_report(out, metrics, load_before)
     return metrics
+
+
+def load_average() -> float | None:
+    """How many others want to run, over the last minute; None where nobody knows."""
+    return round(os.getloadavg()[0], 1) if hasattr(os, "getloadavg") else None
 
 
 def _take(turn: Turn, measured: Measured, organs: Organs) -> None:

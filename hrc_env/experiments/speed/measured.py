@@ -26,7 +26,7 @@ class Measured:
 
 
 def metrics_of(measured: Measured) -> dict[str, Metric]:
-    """Medians over rounds with their smallest and largest, and ratios to Reacher, round by round."""
+    """Medians over rounds with smallest and largest; ratios to Reacher, round by round."""
     peer = measured.env_steps_per_s[f"{REACHER}.{SINGLE}"]
     metrics: dict[str, Metric] = {}
     for name, values in measured.env_steps_per_s.items():

@@ -6,7 +6,15 @@ bench: no organ can become free of charge by moving elsewhere.
 
 from collections.abc import Mapping, Sequence
 
-from hrc_env import metrics, observations, rewards, senses, simulation
+from hrc_env import (
+    metrics,
+    observations,
+    rewards,
+    senses,
+    simulation,
+    vector_env,
+    vector_infos,
+)
 from hrc_env.errors import HRCError
 from hrc_env.experiments.speed.contenders import Contender
 from hrc_env.experiments.speed.measured import RESET, REST, TOTAL
@@ -36,6 +44,8 @@ ORGANS: Mapping[str, Sequence[Place]] = {
         (simulation, "cost_info"),
         (simulation.Simulation, "_tally"),
         (simulation.Outcome, "info_of"),
+        (vector_env, "table"),
+        (vector_infos.InfoTable, "arrays"),
     ),
     RESET: ((simulation.Simulation, "reset"),),
 }
@@ -53,7 +63,7 @@ class Organs:
     def us_per_env_step(
         self, contender: Contender, n_episodes: int, n_threads: int
     ) -> dict[str, float]:
-        """Microseconds per environment and step of each organ, of the rest and of all, resets apart.
+        """Microseconds per environment and step: of organs, resets, the rest, and the total.
 
         An organ's time is summed over threads and divided by their number: what it adds to the
         whole, which is the time on the wall.

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -13,7 +12,8 @@ from hrc_env.experiments.speed.measured import REST, SINGLE, TOTAL, configuratio
 from hrc_env.experiments.speed.organs import ORGANS
 from hrc_env.results import Metric
 
-_REST_COLOUR = "0.75"
+_COLOURS = (*(f"C{k}" for k in range(7)), "C8", "gold", "C9", "0.75")
+"""Of the organs, of resets and of the rest."""
 
 
 def plot_organs(path: Path, metrics: Mapping[str, Metric]) -> None:
@@ -41,10 +41,8 @@ def plot_organs(path: Path, metrics: Mapping[str, Metric]) -> None:
 def _stack(axis: Axes, group: list[str], metrics: Mapping[str, Metric]) -> None:
     """A bar for each configuration, organ upon organ, the sum above it."""
     x, foot = np.arange(len(group)), np.zeros(len(group))
-    colours = matplotlib.colormaps["tab10"].colors  # type: ignore[attr-defined]
-    for k, organ in enumerate((*ORGANS, REST)):
+    for organ, colour in zip((*ORGANS, REST), _COLOURS, strict=True):
         us = np.array([metrics[f"us_per_env_step.{organ}.{each}"].value for each in group])
-        colour = _REST_COLOUR if organ == REST else colours[k % len(colours)]
         axis.bar(x, us, 0.72, foot, label=organ, color=colour, edgecolor="white", linewidth=0.5)
         foot += us
     for place, each in zip(x, group, strict=True):
@@ -53,7 +51,7 @@ def _stack(axis: Axes, group: list[str], metrics: Mapping[str, Metric]) -> None:
             f"{total:.0f}", (place, foot[place]), (0, 3), textcoords="offset points",
             ha="center", fontsize=12,
         )  # fmt: skip
-    axis.set_xticks(x, [title(each).replace(" on ", "\n") for each in group], fontsize=11)
+    axis.set_xticks(x, [title(each).replace(" on ", " in one\n") for each in group], fontsize=11)
     axis.tick_params(axis="y", labelsize=11)
     axis.grid(True, axis="y", color="0.9")
     axis.set_axisbelow(True)

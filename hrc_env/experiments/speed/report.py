@@ -19,17 +19,17 @@ from hrc_env.results import Metric
 _Metrics = Mapping[str, Metric]
 
 
-def write_report(out: Path, metrics: _Metrics) -> None:
-    """Write speed.md and organs.png into `out`."""
-    (out / "speed.md").write_text(markdown(metrics))
+def write_report(out: Path, metrics: _Metrics, load_before: float | None) -> None:
+    """Write speed.md and organs.png into `out`; `load_before` is the machine's before it began."""
+    (out / "speed.md").write_text(markdown(metrics, load_before))
     plot_organs(out / "organs.png", metrics)
 
 
-def markdown(metrics: _Metrics) -> str:
+def markdown(metrics: _Metrics, load_before: float | None) -> str:
     """Steps a second, beside Reacher's; the organs; resets."""
     blocks = [
         "# Speed bench",
-        _introduction(metrics),
+        _introduction(metrics, load_before),
         "## Environment steps a second",
         _by_level(metrics, "env_steps_per_s", 0),
         "## The same, divided by the single Reacher's",
@@ -43,25 +43,31 @@ def markdown(metrics: _Metrics) -> str:
     return "\n\n".join(blocks) + "\n"
 
 
-def _introduction(metrics: _Metrics) -> str:
+def _introduction(metrics: _Metrics, load_before: float | None) -> str:
     made = provenance()
     n_rounds = metrics[f"env_steps_per_s.{REACHER}.{SINGLE}"].n
+    rounds = (
+        f"Medians of {n_rounds} rounds in which everybody takes turns, smallest and largest in "
+        "brackets."
+        if n_rounds > 1
+        else "A single round: nothing says how far to trust a number."
+    )
+    busy = "" if load_before is None else f", load average {load_before} before it began"
     return (
-        f"Commit {made['git']}, {made['machine']['cores']} cores. Random actions for whole "
-        "episodes, resets inside, every info read; medians of "
-        f"{n_rounds} rounds in which everybody takes turns, smallest and largest in brackets. "
-        f"`{SINGLE}` is `gymnasium.make`, the others are `gymnasium.make_vec`; `{REACHER}` is "
-        "Gymnasium's Reacher-v5 in the same rounds (64 of it: its SyncVectorEnv)."
+        f"Commit {made['git']}, {made['machine']['cores']} cores{busy}. Random actions for whole "
+        f"episodes, resets inside, every info read. {rounds} `{SINGLE}` is `gymnasium.make`, the "
+        f"others are `gymnasium.make_vec`; `{REACHER}` is Gymnasium's Reacher-v5 in the same "
+        "rounds (64 of it: its SyncVectorEnv)."
     )
 
 
 _ABOUT_THE_ORGANS = (
     "Taken in runs of their own with a stopwatch round each organ's functions, which itself costs "
     "about half a microsecond a call. With two threads an organ's time is divided by two: columns "
-    "are time on the wall, and half of the column for one thread would be perfect. Time in which a "
-    "thread waits for the other is the waiting organ's, or the rest's. `physics` has the controller "
-    "in it, `distances` the robot's own bodies, `reward` the task, `reset` all organs' work in "
-    "resets, `rest` everything else."
+    "are time on the wall, and half of the column for one thread would be perfect. Time in which "
+    "a thread waits for the other is the waiting organ's, or the rest's. `physics` includes the "
+    "controller, `distances` the robot's own bodies, `reward` the task, `reset` all organs' work "
+    "in resets, `rest` everything else."
 )
 
 
@@ -70,12 +76,16 @@ def _by_level(metrics: _Metrics, kind: str, digits: int) -> str:
     names = [name.split(".", 2)[1:] for name in metrics if name.startswith(f"{kind}.")]
     levels = dict.fromkeys(level for level, _ in names)
     lines = []
-    for configuration in dict.fromkeys(configuration for _, configuration in names):
+    for configuration in sorted({configuration for _, configuration in names}, key=_size):
         found = [metrics.get(f"{kind}.{level}.{configuration}") for level in levels]
         cells = ["" if m is None else _cell(m, digits, spread=True) for m in found]
         lines.append([title(configuration), *cells])
-    order = sorted(range(len(lines)), key=lambda k: lines[k][0] != title(SINGLE))
-    return _table(["", *levels], [lines[k] for k in order])
+    return _table(["", *levels], lines)
+
+
+def _size(configuration: str) -> list[int]:
+    """By what configurations are sorted."""
+    return [] if configuration == SINGLE else [int(each) for each in configuration.split(".")]
 
 
 def _organs(metrics: _Metrics) -> str:
@@ -99,7 +109,9 @@ def _resets(metrics: _Metrics) -> str:
 
 def _cell(metric: Metric, digits: int, spread: bool = False) -> str:
     text = f"{metric.value:,.{digits}f}"
-    return text + f" ({metric.low:,.{digits}f}-{metric.high:,.{digits}f})" if spread else text
+    if not spread or metric.n == 1:
+        return text
+    return text + f" ({metric.low:,.{digits}f}-{metric.high:,.{digits}f})"
 
 
 def _table(header: list[str], lines: list[list[str]]) -> str:

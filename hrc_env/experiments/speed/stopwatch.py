@@ -1,8 +1,8 @@
-"""A stopwatch that is put round functions from outside, so that what it times knows nothing of it."""
+"""A stopwatch that is put round functions from outside: what it times knows nothing of it."""
 
 import threading
 import time
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -16,7 +16,7 @@ Place = tuple[Any, str]
 class _Hand:
     """One thread's sums."""
 
-    seconds: Counter[str] = field(default_factory=Counter)
+    seconds: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
     calls: Counter[str] = field(default_factory=Counter)
     within: list[float] = field(default_factory=list)
     """For each timed call that is open, the seconds of the timed calls inside it."""
