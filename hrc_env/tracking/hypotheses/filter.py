@@ -49,11 +49,12 @@ def _move(state, b, w, model, dt, m, held, work):
     for k in range(first, first + state.n_alive[b, w]):
         gaussian = (slots.body[b, k], slots.cov[b, k], slots.slope[b, k])
         if state.n_alive[b, w] == 1:
-            places = (slots.offset[b, k], slots.offset_count[b, k])
-            predict_tree(*gaussian, *places, model, dt, work)
+            learnt = (slots.offset[b, k], slots.offset_count[b, k])
+            predict_tree(*gaussian, *learnt, model, dt, work)
         else:
-            held[0][:], held[1][:] = slots.offset[b, k], slots.offset_count[b, k]
-            predict_tree(*gaussian, *held, model, dt, work)
+            places, counts = held
+            places[:], counts[:] = slots.offset[b, k], slots.offset_count[b, k]
+            predict_tree(*gaussian, places, counts, model, dt, work)
             state.log_weight[b, k] += m.walking_odds * dt * forwards(slots.body[b, k])
     if state.n_alive[b, w] > 1:
         normalise(state, b, w, m.log_drop)
