@@ -16,10 +16,10 @@ import numpy as np
 from rich.console import Console
 from rich.table import Column, Table
 
-from hrc_env.body import load_body, rest_motion, worker_truth
+from hrc_env.body import load_body, rest_motion, worker_capsules
 from hrc_env.geometry import chains
 from hrc_env.geometry.distances import narrowest_gap
-from hrc_env.records import WorkerMotion
+from hrc_env.records import WorkerPath
 from hrc_env.results import Metric, over, write_results
 from hrc_env.scene.build import Scene, SceneConfig, build
 from hrc_env.scene.physics import Physics, no_workers
@@ -37,7 +37,7 @@ def substeps(scene: Scene) -> int:
     return round(CTRL_DT / scene.config.sim_dt)
 
 
-def standing(scene: Scene, batch: int, xy: tuple[float, float]) -> WorkerMotion:
+def standing(scene: Scene, batch: int, xy: tuple[float, float]) -> WorkerPath:
     """A worker who stands still at `xy`, for every environment and substep."""
     rest = rest_motion(load_body(scene.body_name))
     lead = (batch, substeps(scene), 1)
@@ -45,12 +45,8 @@ def standing(scene: Scene, batch: int, xy: tuple[float, float]) -> WorkerMotion:
     def spread(array: np.ndarray) -> np.ndarray:
         return np.broadcast_to(array, (*lead, *array.shape)).copy()
 
-    return WorkerMotion(
-        spread(rest.position_world + np.array([*xy, 0.0])),
-        spread(rest.quaternion_wxyz),
-        spread(rest.velocity_world),
-        spread(rest.angular_velocity_world),
-    )
+    position = rest.position_world + np.array([*xy, 0.0])
+    return WorkerPath(spread(position), spread(rest.quaternion_wxyz))
 
 
 def smooth_targets(rng: np.random.Generator, n_steps: int, batch: int) -> np.ndarray:
@@ -105,15 +101,14 @@ def worker_contact(scene: Scene) -> dict[str, float]:
     """Turn the stretched arm into a standing worker at 1 rad/s, then away."""
     physics = Physics(scene, 1)
     physics.reset(np.array([0]), np.array([[-1.2, -0.9, 1.2, -1.87, -1.57, 0.0]]))
-    motion = standing(scene, 1, (0.45, 0.0))
+    path = standing(scene, 1, (0.45, 0.0))
     body = load_body(scene.body_name)
-    truth = worker_truth(body, motion)
-    person = truth.capsules_world[:, -1].reshape(1, -1, 2, 3)
+    person = worker_capsules(body, path)[:, -1].reshape(1, -1, 2, 3)
     deepest, speed, gap_m = np.inf, 0.0, np.inf
     for step in range(75):
-        physics.step(np.array([[1.0 if step < 50 else -1.0, 0, 0, 0, 0, 0.0]]), motion)
+        physics.step(np.array([[1.0 if step < 50 else -1.0, 0, 0, 0, 0, 0.0]]), path)
         arm = chains.capsules(scene.chain, physics.q)
-        gap = narrowest_gap(arm, scene.chain.capsule_radius_m, person, truth.capsule_radius_m)
+        gap = narrowest_gap(arm, scene.chain.capsule_radius_m, person, body.capsule_radius_m)
         gap_m = float(gap.distance_m[0])
         deepest = min(deepest, gap_m)
         if 40 <= step < 50:
@@ -123,11 +118,11 @@ def worker_contact(scene: Scene) -> dict[str, float]:
 
 def step_us(scene: Scene, batch: int) -> float:
     """Microseconds of one control step of one environment, the worker walking along."""
-    physics, motion = Physics(scene, batch), standing(scene, batch, (1.6, 0.4))
+    physics, path = Physics(scene, batch), standing(scene, batch, (1.6, 0.4))
     command, times = np.full((batch, 6), 0.3), []
     for step in range(300 if batch == 1 else 40):
         begin = time.perf_counter()
-        physics.step(command * (1 if step % 20 < 10 else -1), motion)
+        physics.step(command * (1 if step % 20 < 10 else -1), path)
         times.append(time.perf_counter() - begin)
     return 1e6 * float(np.median(times)) / batch
 

@@ -39,10 +39,8 @@ def estimated_gap(robot: RobotState, estimate: PoseEstimate) -> Gap:
     included (`geometry.segments`). A worker without a track is infinitely far: there is
     nothing to keep away from that the robot knows of.
     """
-    workers = estimate.tracked.shape[1]
     bodies = segments(estimate.mean_world)
-    robots = np.repeat(robot.capsules_world[:, None], workers, axis=1)
-    gap = narrowest_gap(robots, robot.capsule_radius_m, bodies, SEGMENT_RADIUS_M)
+    gap = narrowest_gap(robot.capsules_world, robot.capsule_radius_m, bodies, SEGMENT_RADIUS_M)
     return Gap(
         np.where(estimate.tracked, gap.distance_m, np.inf), gap.point_a_world, gap.point_b_world
     )

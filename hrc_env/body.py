@@ -7,6 +7,7 @@ so that a pose is 22 positions and rotations and nothing else.
 """
 
 import functools
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.errors import check_shape, unknown
-from hrc_env.records import WorkerMotion, WorkerTruth
-from hrc_env.typing import Floats, Ints, Points3
+from hrc_env.records import WorkerMotion, WorkerPath, WorkerTruth
+from hrc_env.typing import Capsules, Floats, Ints, Points3, QuaternionsWxyz
 
 TRUNK = ("pelvis", "abdomen", "torso", "chest", "neck", "head")
 LIMBS = ("clavicle", "upper_arm", "forearm", "hand", "thigh", "shank", "foot", "toes")
@@ -153,70 +154,78 @@ def worker_truth(body: Body, motion: WorkerMotion) -> WorkerTruth:
         The truth with the same leading axes. A joint moves with its segment:
         v + omega x r (rigid body kinematics).
     """
-    position = np.ascontiguousarray(motion.position_world)
-    lead = position.shape[:-2]
+    position, quaternion = motion.position_world, motion.quaternion_wxyz
+    capsules = _capsules_of(body, position, quaternion)
+    lead, n_joints = position.shape[:-2], len(body.joint_segment)
+    joints, velocity = np.empty((*lead, n_joints, 3)), np.empty((*lead, n_joints, 3))
+    _joints(
+        _flat(position), _flat(quaternion),
+        _flat(motion.velocity_world), _flat(motion.angular_velocity_world),
+        body.joint_segment, body.joint_offset, _flat(joints), _flat(velocity),
+    )  # fmt: skip
+    return WorkerTruth(joints, velocity, capsules, body.capsule_radius_m)
+
+
+def worker_capsules(body: Body, path: WorkerPath) -> Capsules:
+    """(B, T, W, K, 2, 3) the body's capsules along a path [m]."""
+    return _capsules_of(body, path.position_world, path.quaternion_wxyz)
+
+
+def _capsules_of(body: Body, position: Points3, quaternion: QuaternionsWxyz) -> Capsules:
+    """Capsules (..., K, 2, 3) of bodies with any leading axes."""
     check_shape("position_world", position.shape[-2:], (N_SEGMENTS, 3), "segments, xyz")
-    flat = int(np.prod(lead))
-    n_joints, n_capsules = len(body.joint_segment), len(body.capsule_segment)
-    joints = np.empty((flat, n_joints, 3))
-    velocity = np.empty((flat, n_joints, 3))
-    capsules = np.empty((flat, n_capsules, 2, 3))
-    _attached(
-        position.reshape(flat, N_SEGMENTS, 3),
-        np.ascontiguousarray(motion.quaternion_wxyz).reshape(flat, N_SEGMENTS, 4),
-        np.ascontiguousarray(motion.velocity_world).reshape(flat, N_SEGMENTS, 3),
-        np.ascontiguousarray(motion.angular_velocity_world).reshape(flat, N_SEGMENTS, 3),
-        body.joint_segment,
-        body.joint_offset,
-        body.capsule_segment,
-        body.capsule_ends,
-        joints,
-        velocity,
-        capsules,
-    )
-    return WorkerTruth(
-        joints_world=joints.reshape(*lead, n_joints, 3),
-        velocity_world=velocity.reshape(*lead, n_joints, 3),
-        capsules_world=capsules.reshape(*lead, n_capsules, 2, 3),
-        capsule_radius_m=body.capsule_radius_m,
-    )
+    flat, shape = _flat(position), body.capsule_ends.shape
+    ends = np.empty((len(flat), *shape))
+    _capsules(flat, _flat(quaternion), body.capsule_segment, body.capsule_ends, ends)
+    return ends.reshape(*position.shape[:-2], *shape)
+
+
+def _flat(array: Floats) -> Floats:
+    """(..., n, m) as (count, n, m), contiguous."""
+    whole = np.ascontiguousarray(array)
+    return whole.reshape(math.prod(whole.shape[:-2]), *whole.shape[-2:])
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _turn(quaternion, offset, out):  # pragma: no cover - compiled
-    """out = offset turned by a unit quaternion: v + 2 w (u x v) + 2 u x (u x v)."""
+def _turned(quaternion, offset):  # pragma: no cover - compiled
+    """An offset turned by a unit quaternion: v + 2 w (u x v) + 2 u x (u x v)."""
     w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     a = 2.0 * (y * offset[2] - z * offset[1])
     b = 2.0 * (z * offset[0] - x * offset[2])
     c = 2.0 * (x * offset[1] - y * offset[0])
-    out[0] = offset[0] + w * a + y * c - z * b
-    out[1] = offset[1] + w * b + z * a - x * c
-    out[2] = offset[2] + w * c + x * b - y * a
+    return (
+        offset[0] + w * a + y * c - z * b,
+        offset[1] + w * b + z * a - x * c,
+        offset[2] + w * c + x * b - y * a,
+    )
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _attached(
-    position, quaternion, linear, angular,
-    joint_segment, joint_offset, capsule_segment, capsule_ends,
-    joints, velocity, capsules,
-):  # fmt: skip  # pragma: no cover - compiled
-    """Points that ride on segments, one body after the other."""
-    arm = np.empty(3)
+def _joints(
+    position, quaternion, linear, angular, segment, offset, joints, velocity
+):  # pragma: no cover - compiled
+    """Joints, and how fast the segments carry them, one body after the other."""
     for b in range(position.shape[0]):
-        for j in range(joint_segment.shape[0]):
-            s = joint_segment[j]
-            _turn(quaternion[b, s], joint_offset[j], arm)
-            omega = angular[b, s]
+        for j in range(len(segment)):
+            s = segment[j]
+            arm = _turned(quaternion[b, s], offset[j])
             for i in range(3):
                 k, m = (i + 1) % 3, (i + 2) % 3
                 joints[b, j, i] = position[b, s, i] + arm[i]
-                velocity[b, j, i] = linear[b, s, i] + omega[k] * arm[m] - omega[m] * arm[k]
-        for c in range(capsule_segment.shape[0]):
-            s = capsule_segment[c]
+                omega_k, omega_m = angular[b, s, k], angular[b, s, m]
+                velocity[b, j, i] = linear[b, s, i] + omega_k * arm[m] - omega_m * arm[k]
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _capsules(position, quaternion, segment, ends, capsules):  # pragma: no cover - compiled
+    """Both ends of the capsules of bodies."""
+    for b in range(position.shape[0]):
+        for k in range(len(segment)):
+            s = segment[k]
             for end in range(2):
-                _turn(quaternion[b, s], capsule_ends[c, end], arm)
+                arm = _turned(quaternion[b, s], ends[k, end])
                 for i in range(3):
-                    capsules[b, c, end, i] = position[b, s, i] + arm[i]
+                    capsules[b, k, end, i] = position[b, s, i] + arm[i]
 
 
 def _path(name: str) -> Path:

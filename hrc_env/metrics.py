@@ -43,7 +43,11 @@ class Cost:
 
 
 def cost(
-    robot_capsules_world: Capsules, radius_m: Floats, truth: WorkerTruth, config: CostConfig
+    robot_world: Capsules,
+    robot_radius_m: Floats,
+    workers_world: Capsules,
+    worker_radius_m: Floats,
+    config: CostConfig,
 ) -> Cost:
     """Cost of a step from the true bodies at every substep.
 
@@ -51,13 +55,14 @@ def cost(
     substeps of the contact solver.
 
     Args:
-        robot_capsules_world: (B, T, K, 2, 3) at every substep [m].
-        radius_m: (K,) of the robot's capsules.
-        truth: the workers at the same times, (B, T, W, ...).
+        robot_world: (B, T, K, 2, 3) the robot's capsules at every substep [m].
+        robot_radius_m: (K,).
+        workers_world: (B, T, W, L, 2, 3) the workers' true capsules at the same times [m].
+        worker_radius_m: (L,).
     """
-    batch, steps = robot_capsules_world.shape[:2]
-    bodies = truth.capsules_world.reshape(batch, steps, -1, 2, 3)
-    gap = narrowest_gap(robot_capsules_world, radius_m, bodies, truth.capsule_radius_m)
+    batch, steps = robot_world.shape[:2]
+    bodies = workers_world.reshape(batch, steps, -1, 2, 3)
+    gap = narrowest_gap(robot_world, robot_radius_m, bodies, worker_radius_m)
     nearest_m = gap.distance_m.min(axis=1)
     return Cost(
         proximity=(nearest_m < config.proximity_m).astype(float),

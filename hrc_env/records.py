@@ -69,8 +69,18 @@ class PoseEstimate:
 
 
 @dataclass(frozen=True, slots=True)
+class WorkerPath:
+    """Where the worker's body goes: what physics and cost follow from substep to substep."""
+
+    position_world: Points3
+    """(B, T, W, S, 3) origins of the 22 body segments after every substep [m]."""
+    quaternion_wxyz: QuaternionsWxyz
+    """(B, T, W, S, 4) world_from_segment."""
+
+
+@dataclass(frozen=True, slots=True)
 class WorkerMotion:
-    """Where the worker's body is: what the motion generator says."""
+    """Where the worker's body is and how it moves: what the motion generator says."""
 
     position_world: Points3
     """(B, W, S, 3) origins of the 22 body segments [m]."""

@@ -6,15 +6,15 @@ streams only, never on the size of the batch.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hrc_env import metrics, observations, rewards
-from hrc_env.batching import mapped, picked, write_rows
+from hrc_env.batching import picked, write_rows
 from hrc_env.belief import Believed, estimated_gap
-from hrc_env.body import load_body, worker_truth
+from hrc_env.body import load_body, worker_capsules, worker_truth
 from hrc_env.config import HRCConfig
 from hrc_env.control import joint_command, n_actions
 from hrc_env.errors import ConfigError, check_shape
@@ -28,8 +28,6 @@ from hrc_env.stateful import State, Stateful
 from hrc_env.tasks import reach
 from hrc_env.tracking import given
 from hrc_env.typing import Bools, Floats, Ints
-
-RecordT = TypeVar("RecordT")
 
 Info = dict[str, Floats]
 """Named values (B,); NaN means that the environment has no such value in this step."""
@@ -143,28 +141,29 @@ class Simulation(Stateful):
         command = joint_command(
             self.control, action, self.physics.q, self.chain, self.scene.home_q, config.control
         )
-        motion = generator.advance(
+        path, motion = generator.advance(
             self.motion, streams.motion, config.scene.sim_dt, config.n_substeps
         )
-        q_trace = self.physics.step(command, motion)
+        q_path = self.physics.step(command, path)
         truth = worker_truth(self.body, motion)
-        now = last(truth)
 
-        estimate, ahead = self._sense(self._everyone, last(motion), now)
-        robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
+        estimate, ahead = self._sense(self._everyone, motion, truth)
+        robot, arm = chains.robot_along(self.chain, q_path, self.physics.qd)
         progress = reach.advance(
             self.task, streams.task, robot.tool_world, config.ctrl_dt, config.task
         )
         believed = self._believed(self._everyone, robot, estimate, ahead)
         reward, terms = rewards.reward(believed, progress, previous, config.reward)
 
-        bodies = chains.capsules(self.chain, q_trace)
-        cost = metrics.cost(bodies, self.chain.capsule_radius_m, truth, config.cost)
+        workers = worker_capsules(self.body, path)
+        cost = metrics.cost(
+            arm, robot.capsule_radius_m, workers, truth.capsule_radius_m, config.cost
+        )
         self.episode_cost += cost.total
         info = {
             **{f"reward/{name}": value for name, value in terms.items()},
             **cost_info(cost),
-            **tracking_info(estimate, now),
+            **tracking_info(estimate, truth),
             **self._tally(),
         }
         terminated = (cost.contact > 0) & config.cost.contact_terminates
@@ -276,11 +275,6 @@ def checked_action(action: ArrayLike, shape: tuple[int, ...]) -> Floats:
     if not np.isfinite(values).all():
         raise ConfigError(f"action must be finite numbers in [-1, 1], got {values}.")
     return np.minimum(np.maximum(values, -1.0), 1.0)
-
-
-def last(record: RecordT) -> RecordT:
-    """The last moment of a record whose second axis is time."""
-    return mapped(record, lambda array: array[:, -1] if array.ndim > 1 else array)
 
 
 def rows_of(info: Info, ids: Ints) -> Info:

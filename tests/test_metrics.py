@@ -6,17 +6,15 @@ import pytest
 from hrc_env.metrics import CostConfig, cost, tracking_error
 from hrc_env.records import PoseEstimate, WorkerTruth
 
-RADIUS = np.array([0.05])
+ROBOT_RADIUS, WORKER_RADIUS = np.array([0.05]), np.array([0.1])
 
 
-def truth_at(distance_m: np.ndarray) -> WorkerTruth:
-    """A worker who is one upright capsule at x = distance, one a substep: (1, T, 1, ...)."""
-    steps = len(distance_m)
-    capsules = np.zeros((1, steps, 1, 1, 2, 3))
+def worker_at(distance_m: np.ndarray) -> np.ndarray:
+    """A worker who is one upright capsule at x = distance, one a substep: (1, T, 1, 1, 2, 3)."""
+    capsules = np.zeros((1, len(distance_m), 1, 1, 2, 3))
     capsules[0, :, 0, 0, :, 0] = distance_m[:, None]
     capsules[0, :, 0, 0, 1, 2] = 1.0
-    joints = np.zeros((1, steps, 1, 15, 3))
-    return WorkerTruth(joints, joints.copy(), capsules, np.array([0.1]))
+    return capsules
 
 
 def robot(steps: int) -> np.ndarray:
@@ -31,7 +29,8 @@ def robot(steps: int) -> np.ndarray:
 )
 def test_cost_by_the_gap_between_surfaces(distance_m, proximity, contact):
     """Radii 0.05 and 0.10: the gap is the distance less 0.15 m; the limit is 0.15 m."""
-    result = cost(robot(1), RADIUS, truth_at(np.array([distance_m])), CostConfig())
+    worker = worker_at(np.array([distance_m]))
+    result = cost(robot(1), ROBOT_RADIUS, worker, WORKER_RADIUS, CostConfig())
     assert (result.proximity[0], result.contact[0]) == (proximity, contact)
     assert result.total[0] == proximity + contact
     assert result.min_separation_m[0] == pytest.approx(distance_m - 0.15)
@@ -39,16 +38,13 @@ def test_cost_by_the_gap_between_surfaces(distance_m, proximity, contact):
 
 def test_a_hand_that_passes_through_between_two_steps_is_a_contact():
     """Before and after the arm, touching it at one substep only."""
-    passing = truth_at(np.array([0.6, 0.3, 0.1, -0.3, -0.6]))
-    assert cost(robot(5), RADIUS, passing, CostConfig()).contact[0] == 1
+    passing = worker_at(np.array([0.6, 0.3, 0.1, -0.3, -0.6]))
+    assert cost(robot(5), ROBOT_RADIUS, passing, WORKER_RADIUS, CostConfig()).contact[0] == 1
 
 
 def test_without_workers_nothing_costs():
-    nobody = WorkerTruth(
-        np.zeros((1, 2, 0, 15, 3)), np.zeros((1, 2, 0, 15, 3)), np.zeros((1, 2, 0, 1, 2, 3)),
-        np.array([0.1]),
-    )  # fmt: skip
-    result = cost(robot(2), RADIUS, nobody, CostConfig())
+    nobody = np.zeros((1, 2, 0, 1, 2, 3))
+    result = cost(robot(2), ROBOT_RADIUS, nobody, WORKER_RADIUS, CostConfig())
     assert result.total[0] == 0
     assert np.isinf(result.min_separation_m[0])
 

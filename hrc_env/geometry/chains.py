@@ -67,35 +67,64 @@ def twist_jacobian(chain: SerialChain, q: JointAngles) -> Floats:
     flat, lead = _flat(chain, "q", q)
     frames = forward(chain, flat)
     result = np.empty((len(flat), 6, chain.n_joints))
-    _jacobian(frames, chain.link_from_tool[:3, 3].copy(), result)
+    _jacobian(frames, chain.link_from_tool, result)
     return result.reshape(*lead, 6, chain.n_joints)
 
 
 def capsules(chain: SerialChain, q: JointAngles) -> Capsules:
     """The arm's collision capsules, (..., K, 2, 3) end points in the world [m]."""
-    flat, lead = _flat(chain, "q", q)
-    ends = np.empty((len(flat), len(chain.capsule_link), 2, 3))
-    _capsules(forward(chain, flat), chain.capsule_link, chain.capsule_ends, ends)
-    return ends.reshape(*lead, *ends.shape[1:])
+    return _carried(chain, forward(chain, q))
 
 
 def robot_state(chain: SerialChain, q: JointAngles, qd: JointVelocities) -> RobotState:
     """What the encoders tell: angles, tool and capsules of q and qd, both (..., N)."""
-    flat, lead = _flat(chain, "q", q)
-    rates, _ = _flat(chain, "qd", qd)
-    frames = forward(chain, flat)
-    tool_world, velocity = np.empty((len(flat), 3)), np.empty((len(flat), 3))
-    ends = np.empty((len(flat), len(chain.capsule_link), 2, 3))
-    _tool_motion(frames, rates, chain.link_from_tool[:3, 3].copy(), tool_world, velocity)
-    _capsules(frames, chain.capsule_link, chain.capsule_ends, ends)
+    frames = forward(chain, q)
+    return _state(chain, q, qd, frames, _carried(chain, frames))
+
+
+def robot_along(
+    chain: SerialChain, q_path: JointAngles, qd: JointVelocities
+) -> tuple[RobotState, Capsules]:
+    """The state at the end of a path, and the capsules all along it.
+
+    Args:
+        chain: the arm.
+        q_path: (B, T, N) angles.
+        qd: (B, N) velocities at the end.
+
+    Returns:
+        As `robot_state` of the last angles, and as `capsules` of all, (B, T, K, 2, 3).
+    """
+    frames = forward(chain, q_path)
+    ends = _carried(chain, frames)
+    return _state(chain, q_path[:, -1], qd, frames[:, -1], ends[:, -1]), ends
+
+
+def _state(
+    chain: SerialChain, q: JointAngles, qd: JointVelocities, frames: Transforms, ends: Capsules
+) -> RobotState:
+    """The state of an arm whose link frames and capsules are known."""
+    rates, lead = _flat(chain, "qd", qd)
+    tool_world, velocity = np.empty((len(rates), 3)), np.empty((len(rates), 3))
+    stacked = np.ascontiguousarray(frames).reshape(len(rates), *frames.shape[-3:])
+    _tool_motion(stacked, rates, chain.link_from_tool, tool_world, velocity)
     return RobotState(
         q=np.array(q, float),
         qd=np.array(qd, float),
         tool_world=tool_world.reshape(*lead, 3),
         tool_velocity_world=velocity.reshape(*lead, 3),
-        capsules_world=ends.reshape(*lead, *ends.shape[1:]),
+        capsules_world=ends,
         capsule_radius_m=chain.capsule_radius_m,
     )
+
+
+def _carried(chain: SerialChain, frames: Transforms) -> Capsules:
+    """The capsules on links whose frames (..., N, 4, 4) are known."""
+    lead, shape = frames.shape[:-3], chain.capsule_ends.shape
+    stacked = frames.reshape(math.prod(lead), *frames.shape[-3:])
+    ends = np.empty((len(stacked), *shape))
+    _capsules(stacked, chain.capsule_link, chain.capsule_ends, ends)
+    return ends.reshape(*lead, *shape)
 
 
 def _flat(chain: SerialChain, name: str, values: Floats) -> tuple[Floats, tuple[int, ...]]:
@@ -127,43 +156,49 @@ def _forward(q, base, parent_from_joint, frames):
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _apply(frame, point, out):
-    """out = frame @ point."""
-    for row in range(3):
-        out[row] = frame[row, 3] + (
-            frame[row, 0] * point[0] + frame[row, 1] * point[1] + frame[row, 2] * point[2]
-        )
+def _apply(frame, point):
+    """frame @ point."""
+    x, y, z = point[0], point[1], point[2]
+    return (
+        frame[0, 3] + (frame[0, 0] * x + frame[0, 1] * y + frame[0, 2] * z),
+        frame[1, 3] + (frame[1, 0] * x + frame[1, 1] * y + frame[1, 2] * z),
+        frame[2, 3] + (frame[2, 0] * x + frame[2, 1] * y + frame[2, 2] * z),
+    )
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _jacobian(frames, tool_in_link, out):
+def _lever(frame, point):
+    """axis x (point - origin): the point's velocity per turn rate of a frame's joint."""
+    rx, ry, rz = point[0] - frame[0, 3], point[1] - frame[1, 3], point[2] - frame[2, 3]
+    ax, ay, az = frame[0, 2], frame[1, 2], frame[2, 2]
+    return ay * rz - az * ry, az * rx - ax * rz, ax * ry - ay * rx
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _jacobian(frames, link_from_tool, out):
     """Column i is (axis_i x (tool - origin_i), axis_i)."""
-    point = np.empty(3)
     n = frames.shape[1]
     for b in range(frames.shape[0]):
-        _apply(frames[b, n - 1], tool_in_link, point)
+        point = _apply(frames[b, n - 1], link_from_tool[:, 3])
         for i in range(n):
-            frame = frames[b, i]
-            rx, ry, rz = point[0] - frame[0, 3], point[1] - frame[1, 3], point[2] - frame[2, 3]
-            ax, ay, az = frame[0, 2], frame[1, 2], frame[2, 2]
-            out[b, 0, i] = ay * rz - az * ry
-            out[b, 1, i] = az * rx - ax * rz
-            out[b, 2, i] = ax * ry - ay * rx
-            out[b, 3, i], out[b, 4, i], out[b, 5, i] = ax, ay, az
+            x, y, z = _lever(frames[b, i], point)
+            out[b, 0, i], out[b, 1, i], out[b, 2, i] = x, y, z
+            for row in range(3):
+                out[b, 3 + row, i] = frames[b, i, row, 2]
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _tool_motion(frames, qd, tool_in_link, point, velocity):
+def _tool_motion(frames, qd, link_from_tool, point, velocity):
+    """Where the tool points are, and how fast."""
     n = frames.shape[1]
-    column = np.empty((1, 6, n))
     for b in range(frames.shape[0]):
-        _apply(frames[b, n - 1], tool_in_link, point[b])
-        _jacobian(frames[b : b + 1], tool_in_link, column)
-        for row in range(3):
-            total = 0.0
-            for i in range(n):
-                total += column[0, row, i] * qd[b, i]
-            velocity[b, row] = total
+        tool = _apply(frames[b, n - 1], link_from_tool[:, 3])
+        vx, vy, vz = 0.0, 0.0, 0.0
+        for i in range(n):
+            x, y, z = _lever(frames[b, i], tool)
+            vx, vy, vz = vx + x * qd[b, i], vy + y * qd[b, i], vz + z * qd[b, i]
+        point[b, 0], point[b, 1], point[b, 2] = tool
+        velocity[b, 0], velocity[b, 1], velocity[b, 2] = vx, vy, vz
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
@@ -171,4 +206,6 @@ def _capsules(frames, link, ends_link, ends_world):
     for b in range(frames.shape[0]):
         for k in range(len(link)):
             for e in range(2):
-                _apply(frames[b, link[k]], ends_link[k, e], ends_world[b, k, e])
+                x, y, z = _apply(frames[b, link[k]], ends_link[k, e])
+                ends_world[b, k, e, 0], ends_world[b, k, e, 1] = x, y
+                ends_world[b, k, e, 2] = z

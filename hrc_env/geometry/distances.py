@@ -13,6 +13,9 @@ import numpy as np
 
 from hrc_env.typing import Capsules, Floats, Points3
 
+SLACK_M = 1e-9
+"""Far more than the rounding of a sphere's bound."""
+
 
 @dataclass(frozen=True, slots=True)
 class Gap:
@@ -34,17 +37,22 @@ def narrowest_gap(
     Args:
         capsules_a: (..., Ka, 2, 3) end points [m].
         radius_a_m: (Ka,) [m].
-        capsules_b: (..., Kb, 2, 3), the same leading axes.
-        radius_b_m: (Kb,).
+        capsules_b: (..., Kb, 2, 3), the same leading axes and perhaps more after them: then
+            each first set is held against several second ones.
+        radius_b_m: (Kb,), or those of one body where the second sets are several bodies.
     """
-    lead = capsules_a.shape[:-3]
-    count = math.prod(lead)
-    flat_a = np.ascontiguousarray(capsules_a).reshape(count, *capsules_a.shape[-3:])
-    flat_b = np.ascontiguousarray(capsules_b).reshape(count, *capsules_b.shape[-3:])
-    gap, points = np.empty(count), np.empty((count, 2, 3))
+    lead = capsules_b.shape[:-3]
+    flat_a, flat_b = _flat(capsules_a), _flat(capsules_b)
+    gap, points = np.empty(len(flat_b)), np.empty((len(flat_b), 2, 3))
     _narrowest(flat_a, radius_a_m, flat_b, radius_b_m, gap, points)
     points = points.reshape(*lead, 2, 3)
     return Gap(gap.reshape(lead), points[..., 0, :], points[..., 1, :])
+
+
+def _flat(capsules: Capsules) -> Capsules:
+    """(..., K, 2, 3) as (count, K, 2, 3), contiguous."""
+    count = math.prod(capsules.shape[:-3])
+    return np.ascontiguousarray(capsules).reshape(count, *capsules.shape[-3:])
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
@@ -77,42 +85,58 @@ def closest_parameters(p0, p1, q0, q1):
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _spheres(capsules, radius, centre, reach):
-    """Bounding spheres of capsules: they spare most of the pairs."""
-    for k in range(len(radius)):
-        length = 0.0
+def _spheres(capsules, radius, spheres):
+    """Bounding spheres (4, K) of capsules: centre, radius; radii repeat body by body."""
+    for k in range(len(capsules)):
+        squared = 0.0
         for i in range(3):
-            centre[k, i] = 0.5 * (capsules[k, 0, i] + capsules[k, 1, i])
-            length += (capsules[k, 1, i] - capsules[k, 0, i]) ** 2
-        reach[k] = 0.5 * math.sqrt(length) + radius[k]
+            spheres[i, k] = 0.5 * (capsules[k, 0, i] + capsules[k, 1, i])
+            squared += (capsules[k, 1, i] - capsules[k, 0, i]) ** 2
+        spheres[3, k] = 0.5 * math.sqrt(squared) + radius[k % len(radius)]
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _sphere_gaps(a, b, least):
+    """least[k, m] = gap of sphere k of one set and sphere m of the other."""
+    for k in range(a.shape[1]):
+        x, y, z, reach = a[0, k], a[1, k], a[2, k], a[3, k]
+        for m in range(b.shape[1]):
+            dx, dy, dz = b[0, m] - x, b[1, m] - y, b[2, m] - z
+            least[k, m] = math.sqrt(dx * dx + dy * dy + dz * dz) - reach - b[3, m]
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _narrowest(a, radius_a, b, radius_b, gap, points):
-    centre_a, reach_a = np.empty((len(radius_a), 3)), np.empty(len(radius_a))
-    centre_b, reach_b = np.empty((b.shape[1], 3)), np.empty(b.shape[1])
-    n_repeat = b.shape[1] // max(len(radius_b), 1)
-    radii_b = np.empty(b.shape[1])
-    for r in range(n_repeat):
-        radii_b[r * len(radius_b) : (r + 1) * len(radius_b)] = radius_b
-    for n in range(a.shape[0]):
-        _spheres(a[n], radius_a, centre_a, reach_a)
-        _spheres(b[n], radii_b, centre_b, reach_b)
-        best = np.inf
+    """Spheres bound the gaps from below: only pairs that they leave open are measured."""
+    n_a, n_b, per_a = a.shape[1], b.shape[1], len(b) // max(len(a), 1)
+    spheres_a, spheres_b = np.empty((4, n_a)), np.empty((4, n_b))
+    least = np.empty((n_a, n_b))
+    for n in range(len(b)):
+        first = a[n // per_a]
+        _spheres(first, radius_a, spheres_a)
+        _spheres(b[n], radius_b, spheres_b)
+        _sphere_gaps(spheres_a, spheres_b, least)
         points[n] = 0.0
-        for k in range(a.shape[1]):
-            for m in range(b.shape[1]):
-                dx = centre_a[k, 0] - centre_b[m, 0]
-                dy = centre_a[k, 1] - centre_b[m, 1]
-                dz = centre_a[k, 2] - centre_b[m, 2]
-                near = best + reach_a[k] + reach_b[m]
-                if dx * dx + dy * dy + dz * dz > near * near and near > 0.0:
-                    continue
-                squared, s, t = closest_parameters(a[n, k, 0], a[n, k, 1], b[n, m, 0], b[n, m, 1])
-                distance = math.sqrt(squared) - radius_a[k] - radii_b[m]
-                if distance < best:
-                    best = distance
-                    for i in range(3):
-                        points[n, 0, i] = a[n, k, 0, i] + s * (a[n, k, 1, i] - a[n, k, 0, i])
-                        points[n, 1, i] = b[n, m, 0, i] + t * (b[n, m, 1, i] - b[n, m, 0, i])
-        gap[n] = best
+        gap[n] = _search(first, radius_a, b[n], radius_b, least, points[n])
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _search(a, radius_a, b, radius_b, least, points):
+    """The narrowest gap, the most promising pair first; of equal ones the first pair's."""
+    best, at, bounds = np.inf, 0, least.ravel()
+    if bounds.size == 0:
+        return best
+    likely = np.argmin(bounds)
+    for i in range(-1, bounds.size):
+        pair = likely if i < 0 else i
+        if bounds[pair] > best + SLACK_M or i == likely:
+            continue
+        k, m = pair // len(b), pair % len(b)
+        squared, s, t = closest_parameters(a[k, 0], a[k, 1], b[m, 0], b[m, 1])
+        distance = math.sqrt(squared) - radius_a[k] - radius_b[m % len(radius_b)]
+        if distance < best or (distance == best and pair < at):
+            best, at = distance, pair
+            for axis in range(3):
+                points[0, axis] = a[k, 0, axis] + s * (a[k, 1, axis] - a[k, 0, axis])
+                points[1, axis] = b[m, 0, axis] + t * (b[m, 1, axis] - b[m, 0, axis])
+    return best

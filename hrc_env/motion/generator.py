@@ -18,7 +18,7 @@ from hrc_env.motion.compiled import compiled
 from hrc_env.motion.config import MotionConfig, numbers
 from hrc_env.motion.kinematics import N_FRAMES, N_POINTS, pose, quaternion, spin
 from hrc_env.motion.state import RATE_H_S, MotionState, begin, evaluate, follow_up
-from hrc_env.records import WorkerMotion
+from hrc_env.records import WorkerMotion, WorkerPath
 from hrc_env.typing import Bools, Floats, Ints
 
 __all__ = [
@@ -71,8 +71,8 @@ def reset(state: MotionState, ids: Ints, rngs: Sequence[np.random.Generator]) ->
 
 def advance(
     state: MotionState, rngs: Sequence[np.random.Generator], dt_s: float, n_steps: int
-) -> WorkerMotion:
-    """Move on by n_steps of dt_s; the bodies after each of them.
+) -> tuple[WorkerPath, WorkerMotion]:
+    """Move on by n_steps of dt_s.
 
     Args:
         state: changed in place.
@@ -81,28 +81,31 @@ def advance(
         n_steps: T >= 1.
 
     Returns:
-        Arrays (B, T, W, 22, ...): the poses at dt_s, 2 dt_s, ... after the last call.
+        The bodies' path, arrays (B, T, W, 22, ...) at dt_s, 2 dt_s, ... after the last call,
+        and their motion at its end, (B, W, 22, ...).
     """
     batch, n_workers = state.activity.shape
-    motion = _blank((batch, n_steps, n_workers))
+    path = WorkerPath(*_blank((batch, n_steps, n_workers), 3, 4))
+    velocity, turning = _blank((batch, n_workers), 3, 3)
     done, ticked = np.zeros(batch, np.int64), np.zeros(batch, np.bool_)
     arrays, constants = _arrays(state), _constants(state)
-    body, out = constants[1:], _outputs(motion)
+    body, out = constants[1:], (path.position_world, path.quaternion_wxyz, velocity, turning)
     while _run(float(dt_s), n_steps, done, ticked, *arrays[:9], *body, *out):
         for b in np.flatnonzero(ticked).tolist():
             for w in np.flatnonzero(state.time_s[b] >= state.duration_s[b]).tolist():
                 state.draws[b, w, : bh.N_DRAWS] = rngs[b].random(bh.N_DRAWS)
                 follow_up(b, w, *arrays, *constants)
-    return motion
+    position, quaternion_ = path.position_world[:, -1], path.quaternion_wxyz[:, -1]
+    return path, WorkerMotion(position, quaternion_, velocity, turning)
 
 
 def current(state: MotionState, ids: Ints | None = None) -> WorkerMotion:
     """The bodies now: arrays (B, W, 22, ...), or of environments `ids` only (len(ids), W, ...)."""
     batch, n_workers = state.activity.shape
     rows = np.arange(batch) if ids is None else np.asarray(ids, np.int64)
-    motion = _blank((len(rows), 1, n_workers))
-    _draw(rows, *_arrays(state)[:9], *_constants(state)[1:], *_outputs(motion))
-    return WorkerMotion(*(array[:, 0] for array in _outputs(motion)))
+    out = _blank((len(rows), n_workers), 3, 4, 3, 3)
+    _draw(rows, *_arrays(state)[:9], *_constants(state)[1:], *out)
+    return WorkerMotion(*out)
 
 
 def activity(state: MotionState) -> Ints:
@@ -110,17 +113,9 @@ def activity(state: MotionState) -> Ints:
     return state.activity.copy()
 
 
-def _blank(lead: tuple[int, ...]) -> WorkerMotion:
-    return WorkerMotion(*(np.empty((*lead, N_SEGMENTS, n)) for n in (3, 4, 3, 3)))
-
-
-def _outputs(motion: WorkerMotion) -> tuple[Floats, ...]:
-    return (
-        motion.position_world,
-        motion.quaternion_wxyz,
-        motion.velocity_world,
-        motion.angular_velocity_world,
-    )
+def _blank(lead: tuple[int, ...], *widths: int) -> tuple[Floats, ...]:
+    """An array (*lead, 22, n) for each width n."""
+    return tuple(np.empty((*lead, N_SEGMENTS, n)) for n in widths)
 
 
 def _arrays(state: MotionState) -> tuple:
@@ -136,30 +131,37 @@ def _constants(state: MotionState) -> tuple:
 
 
 @compiled
-def _body(
-    b: int, w: int, clock_s: Floats, time_s: Floats, activity: Ints, plan: Floats,
-    prints: Floats, stance: Floats, offset: Floats, traits: Floats,
-    bones: Floats, frame: Floats, size: Floats,
-    position: Floats, quaternion_: Floats, velocity: Floats, turning: Floats,
-    q: Floats, p: Floats, r: Floats,
+def _pose(
+    b: int, w: int, later_s: float, clock_s: Floats, time_s: Floats, activity: Ints,
+    plan: Floats, prints: Floats, stance: Floats, offset: Floats, traits: Floats,
+    bones: Floats, frame: Floats, size: Floats, q: Floats, p: Floats, r: Floats,
 ) -> None:  # fmt: skip
-    """Pose and velocities of worker (b, w) now, into (22, ...) arrays."""
-    doing, t, clock = activity[b, w], time_s[b, w], clock_s[b, w]
-    row, steps, feet = plan[b, w], prints[b, w], stance[b, w]
-    left_over, own = offset[b, w], traits[b, w]
-    before, after, first, second = p[0], p[1], r[0], r[1]
-    evaluate(doing, t, clock, row, steps, feet, left_over, own, size, q)
-    pose(q, bones, frame, size, before, first)
-    t, clock = t + RATE_H_S, clock + RATE_H_S
-    evaluate(doing, t, clock, row, steps, feet, left_over, own, size, q)
-    pose(q, bones, frame, size, after, second)
-    rate = 1.0 / RATE_H_S
-    for s in range(bones.shape[0]):
+    """Worker (b, w) a little later than now: points p and frames r of `kinematics.pose`."""
+    t, clock = time_s[b, w] + later_s, clock_s[b, w] + later_s
+    evaluate(
+        activity[b, w], t, clock, plan[b, w], prints[b, w], stance[b, w], offset[b, w],
+        traits[b, w], size, q,
+    )  # fmt: skip
+    pose(q, bones, frame, size, p, r)
+
+
+@compiled
+def _place(p: Floats, r: Floats, position: Floats, quaternion_: Floats) -> None:
+    """Write a pose into (22, ...) arrays."""
+    for s in range(position.shape[0]):
         for i in range(3):
-            position[s, i] = before[s, i]
-            velocity[s, i] = (after[s, i] - before[s, i]) * rate
-        quaternion(first, s, quaternion_)
-        spin(first, second, s, RATE_H_S, turning)
+            position[s, i] = p[s, i]
+        quaternion(r, s, quaternion_)
+
+
+@compiled
+def _rates(p: Floats, r: Floats, velocity: Floats, turning: Floats) -> None:
+    """Velocities (22, 3) from the poses now, p[0] and r[0], and RATE_H_S later, p[1] and r[1]."""
+    rate = 1.0 / RATE_H_S
+    for s in range(velocity.shape[0]):
+        for i in range(3):
+            velocity[s, i] = (p[1, s, i] - p[0, s, i]) * rate
+        spin(r[0], r[1], s, RATE_H_S, turning)
 
 
 @compiled
@@ -187,11 +189,14 @@ def _run(
                 waiting = True
                 break
             for w in range(time_s.shape[1]):
-                _body(
-                    b, w, clock_s, time_s, activity, plan, prints, stance, offset, traits,
-                    bones, frame, size, position[b, t, w], quaternion_[b, t, w],
-                    velocity[b, t, w], turning[b, t, w], q, p, r,
-                )  # fmt: skip
+                for i in range(2 if t == n_steps - 1 else 1):
+                    _pose(
+                        b, w, i * RATE_H_S, clock_s, time_s, activity, plan, prints, stance,
+                        offset, traits, bones, frame, size, q, p[i], r[i],
+                    )  # fmt: skip
+                _place(p[0], r[0], position[b, t, w], quaternion_[b, t, w])
+                if t == n_steps - 1:
+                    _rates(p, r, velocity[b, w], turning[b, w])
             done[b] += 1
     return waiting
 
@@ -203,13 +208,15 @@ def _draw(
     bones: Floats, frame: Floats, size: Floats,
     position: Floats, quaternion_: Floats, velocity: Floats, turning: Floats,
 ) -> None:  # fmt: skip
-    """Bodies of some environments as they are, into arrays (rows, 1, W, ...)."""
+    """Bodies of some environments as they are, into arrays (rows, W, ...)."""
     q, p = np.empty(c.N_CONTROLS), np.zeros((2, N_POINTS, 3))
     r = np.zeros((2, N_FRAMES, 3, 3))
-    for i, b in enumerate(rows):
+    for row, b in enumerate(rows):
         for w in range(time_s.shape[1]):
-            _body(
-                b, w, clock_s, time_s, activity, plan, prints, stance, offset, traits,
-                bones, frame, size, position[i, 0, w], quaternion_[i, 0, w],
-                velocity[i, 0, w], turning[i, 0, w], q, p, r,
-            )  # fmt: skip
+            for i in range(2):
+                _pose(
+                    b, w, i * RATE_H_S, clock_s, time_s, activity, plan, prints, stance,
+                    offset, traits, bones, frame, size, q, p[i], r[i],
+                )  # fmt: skip
+            _place(p[0], r[0], position[row, w], quaternion_[row, w])
+            _rates(p, r, velocity[row, w], turning[row, w])

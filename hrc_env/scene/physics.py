@@ -10,7 +10,7 @@ import numpy as np
 from mujoco.batch import Batch
 
 from hrc_env.errors import ConfigError, HRCError, check_shape
-from hrc_env.records import WorkerMotion
+from hrc_env.records import WorkerPath
 from hrc_env.scene.build import Scene
 from hrc_env.scene.commands import substep_commands
 from hrc_env.scene.primitives import ROBOT_CAPSULES, SOLID
@@ -71,14 +71,14 @@ class Physics:
         self._qpos[ids, : self._n] = q
         self._act[ids, : self._n] = q
 
-    def step(self, qd_command: JointVelocities, motion: WorkerMotion) -> JointAngles:
+    def step(self, qd_command: JointVelocities, workers: WorkerPath) -> JointAngles:
         """One control step of every environment.
 
         Args:
             qd_command: (B, N) wanted joint velocities [rad/s]; limited in size and slew, and
                 braked before the joints' ends, here.
-            motion: the workers after every substep, arrays (B, T, W, S, ...); T is the number
-                of substeps. W = 0 in a scene without workers.
+            workers: after every substep, arrays (B, T, W, S, ...); T is the number of substeps.
+                W = 0 in a scene without workers.
 
         Returns:
             (B, T, N) the arm's angles after every substep [rad].
@@ -87,14 +87,14 @@ class Physics:
             ConfigError: wrong shapes. HRCError: the physics broke down, with the reason.
         """
         check_shape("qd_command", np.shape(qd_command), (self.batch, self._n), "batch, joints")
-        self._fit(motion)
+        self._fit(workers)
         config, n = self.scene.config, self._n
         substep_commands(
             self.scene.chain, config.slew_rad_s2, config.sim_dt, self.scene.servo_lead_s,
             self.q, self._command, np.asarray(qd_command, float),
             hold=self._control[:, :, :n], rate=self._control[:, :, n : 2 * n],
         )  # fmt: skip
-        self._write_workers(motion)
+        self._write_workers(workers)
         self._sims.rollout(
             self._control.shape[1], self._control, INPUTS, ("qpos",), out=self._trace
         )
@@ -147,24 +147,24 @@ class Physics:
         self.__init__(scene, batch, n_threads)
         self.set_state(state)
 
-    def _fit(self, motion: WorkerMotion) -> None:
-        """Check the motion's axes; make the buffers when the number of substeps is new."""
-        rows, n_substeps = self.scene.worker_mocap, motion.position_world.shape[1]
+    def _fit(self, workers: WorkerPath) -> None:
+        """Check the path's axes; make the buffers when the number of substeps is new."""
+        rows, n_substeps = self.scene.worker_mocap, workers.position_world.shape[1]
         expected = (self.batch, max(n_substeps, 1), *rows.shape[:1])
         meaning = "batch, substeps (at least one), workers"
-        check_shape("motion.position_world", motion.position_world.shape[:3], expected, meaning)
+        check_shape("workers.position_world", workers.position_world.shape[:3], expected, meaning)
         if self._control.shape[1] != n_substeps:
             model = self.scene.model
             width = model.nu + 7 * model.nmocap
             self._control = np.zeros((self.batch, n_substeps, width))
             self._trace = {"qpos": np.zeros((self.batch, n_substeps, model.nq))}
 
-    def _write_workers(self, motion: WorkerMotion) -> None:
+    def _write_workers(self, workers: WorkerPath) -> None:
         """The workers' bodies into the inputs of the substeps."""
         first, n_mocap = self.scene.model.nu, self.scene.model.nmocap
         lead, turns = self._control.shape[:2], first + 3 * n_mocap
-        self._control[:, :, first:turns] = motion.position_world.reshape(*lead, 3 * n_mocap)
-        self._control[:, :, turns:] = motion.quaternion_wxyz.reshape(*lead, 4 * n_mocap)
+        self._control[:, :, first:turns] = workers.position_world.reshape(*lead, 3 * n_mocap)
+        self._control[:, :, turns:] = workers.quaternion_wxyz.reshape(*lead, 4 * n_mocap)
 
     def _shorten_leashes(self) -> None:
         """Keep angle and velocity commands near a blocked arm, so that it leaves at once."""
@@ -185,9 +185,7 @@ class Physics:
             )
 
 
-def no_workers(batch: int, n_substeps: int) -> WorkerMotion:
-    """The motion of nobody, for scenes without workers: arrays (B, T, 0, 22, ...)."""
+def no_workers(batch: int, n_substeps: int) -> WorkerPath:
+    """The path of nobody, for scenes without workers: arrays (B, T, 0, 22, ...)."""
     lead = (batch, n_substeps, 0, 22)
-    return WorkerMotion(
-        np.zeros((*lead, 3)), np.zeros((*lead, 4)), np.zeros((*lead, 3)), np.zeros((*lead, 3))
-    )
+    return WorkerPath(np.zeros((*lead, 3)), np.zeros((*lead, 4)))

@@ -15,6 +15,6 @@ def shift():
     state, rngs = started(8, seed=1)
     motions, doing = [], []
     for _ in range(int(200 / DT_S)):
-        motions.append(generator.advance(state, rngs, DT_S, 1))
+        motions.append(generator.advance(state, rngs, DT_S, 1)[1])
         doing.append(generator.activity(state)[:, 0])
     return SimpleNamespace(motion=joined(motions), doing=np.stack(doing, 1), dt_s=DT_S)

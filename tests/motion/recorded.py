@@ -14,11 +14,16 @@ DT_S = 0.02
 
 
 def joined(motions):
-    """Motions one after another along time."""
+    """Motions one after another along time: arrays (B, T, W, ...)."""
     names = ("position_world", "quaternion_wxyz", "velocity_world", "angular_velocity_world")
     return SimpleNamespace(
-        **{name: np.concatenate([getattr(m, name) for m in motions], 1) for name in names}
+        **{name: np.stack([getattr(m, name) for m in motions], 1) for name in names}
     )
+
+
+def watched(state, rngs, dt_s, n_steps):
+    """The motion, looked at after every step."""
+    return joined([generator.advance(state, rngs, dt_s, 1)[1] for _ in range(n_steps)])
 
 
 def started(batch, n_workers=1, seed=0, config=None):
@@ -42,5 +47,5 @@ def walk_straight(speed_m_s, length_m=6.0, dt_s=0.005):
     lasts = plan_walk(start, via, end, speed_m_s, plan, prints, stance, size)
     state.activity[:], state.time_s[:], state.duration_s[:] = pl.WALK, 0.0, lasts
     state.offset[:] = 0.0
-    motion = generator.advance(state, rngs, dt_s, int(lasts / dt_s) - 1)
+    motion = watched(state, rngs, dt_s, int(lasts / dt_s) - 1)
     return SimpleNamespace(motion=motion, plan=plan, prints=prints, dt_s=dt_s)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from recorded import started
+from recorded import started, watched
 
 from hrc_env.body import PARENT, SEGMENT, SEGMENTS, load_body, worker_truth
 from hrc_env.errors import ConfigError
@@ -72,7 +72,7 @@ def test_nothing_jumps_in_200_seconds(shift):
 
 def test_velocities_are_those_of_the_motion():
     state, rngs = started(4, seed=3)
-    motion = generator.advance(state, rngs, 1e-4, 2000)
+    motion = watched(state, rngs, 1e-4, 2000)
     position, rotation = motion.position_world, matrix_from_quaternion(motion.quaternion_wxyz)
     difference = (position[:, 2:] - position[:, :-2]) / 2e-4
     assert np.abs(difference - motion.velocity_world[:, 1:-1]).max() < 0.01
@@ -83,8 +83,8 @@ def test_velocities_are_those_of_the_motion():
 
 def test_a_poses_velocity_does_not_depend_on_the_step_between_poses():
     fine, coarse = started(2, seed=4), started(2, seed=4)
-    many = generator.advance(*fine, 0.005, 200)
-    few = generator.advance(*coarse, 0.05, 20)
+    many = watched(*fine, 0.005, 200)
+    few = watched(*coarse, 0.05, 20)
     assert np.allclose(many.position_world[:, 9::10], few.position_world, atol=1e-6)
     assert np.allclose(many.velocity_world[:, 9::10], few.velocity_world, atol=1e-3)
 
@@ -94,8 +94,8 @@ def test_a_poses_velocity_does_not_depend_on_the_step_between_poses():
 def test_a_workers_walk_does_not_depend_on_the_other_environments(seed, batch):
     together, alone = started(batch, seed=seed), started(1, seed=seed)
     for _ in range(4):
-        many = generator.advance(*together, 0.1, 20)
-        one = generator.advance(*alone, 0.1, 20)
+        many, _ = generator.advance(*together, 0.1, 20)
+        one, _ = generator.advance(*alone, 0.1, 20)
         assert np.array_equal(many.position_world[0], one.position_world[0])
 
 
@@ -103,8 +103,8 @@ def test_a_copied_state_goes_on_identically():
     state, rngs = started(3, seed=5)
     generator.advance(state, rngs, 0.1, 30)
     other, other_rngs = saved(state), copy.deepcopy(rngs)
-    first = generator.advance(state, rngs, 0.05, 400)
-    second = generator.advance(other, other_rngs, 0.05, 400)
+    first, _ = generator.advance(state, rngs, 0.05, 400)
+    second, _ = generator.advance(other, other_rngs, 0.05, 400)
     assert np.array_equal(first.position_world, second.position_world)
 
 
@@ -129,9 +129,10 @@ def test_random_numbers_are_drawn_only_when_an_activity_ends():
 
 def test_current_is_the_last_pose_of_advance():
     state, rngs = started(2, seed=8)
-    motion, now = generator.advance(state, rngs, 0.01, 5), generator.current(state)
-    assert np.allclose(motion.position_world[:, -1], now.position_world)
-    assert np.allclose(motion.velocity_world[:, -1], now.velocity_world)
+    (path, motion), now = generator.advance(state, rngs, 0.01, 5), generator.current(state)
+    assert np.array_equal(path.position_world[:, -1], now.position_world)
+    for field in dataclasses.fields(now):
+        assert np.array_equal(getattr(motion, field.name), getattr(now, field.name)), field.name
     second = generator.current(state, np.array([1]))
     assert np.array_equal(second.position_world, now.position_world[1:])
 
@@ -139,11 +140,12 @@ def test_current_is_the_last_pose_of_advance():
 @pytest.mark.parametrize("n_workers", [0, 1, 3])
 def test_any_number_of_workers_goes(n_workers):
     state, rngs = started(2, n_workers)
-    motion = generator.advance(state, rngs, 0.02, 3)
-    assert motion.position_world.shape == (2, 3, n_workers, 22, 3)
+    path, motion = generator.advance(state, rngs, 0.02, 3)
+    assert path.position_world.shape == (2, 3, n_workers, 22, 3)
+    assert motion.angular_velocity_world.shape == (2, n_workers, 22, 3)
     assert generator.current(state).quaternion_wxyz.shape == (2, n_workers, 22, 4)
     assert generator.activity(state).shape == (2, n_workers)
-    assert np.isfinite(motion.position_world).all()
+    assert np.isfinite(path.position_world).all()
 
 
 def test_workers_begin_apart_from_each_other():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from recorded import started
+from recorded import started, watched
 
 from hrc_env.body import SEGMENT
 from hrc_env.motion import controls as c
@@ -60,7 +60,7 @@ def test_a_hand_comes_to_where_it_was_sent(ahead, left, z, right):
     used = (0.0, 1.0) if right else (1.0, 0.0)
     state, plan = worker(pl.REACH, plan_reach, target, used, 1.0, 1.0, (0.0, 1.0))
     out = float(plan[pl.OUT_AT] + plan[pl.OUT_S] + 0.5)
-    motion = generator.advance(state, RNGS, out, 1)
+    motion = watched(state, RNGS, out, 1)
     assert np.linalg.norm(grips(motion)[0, 0, int(right)] - target) < 0.03
 
 
@@ -77,7 +77,7 @@ def test_the_trunk_leans_only_as_far_as_the_arm_falls_short():
 
 def test_a_target_out_of_reach_is_approached_not_torn_at():
     state, plan = worker(pl.REACH, plan_reach, (-1.5, 0.0, 1.1), (0.0, 1.0), 1.0, 1.0, (0.0, 1.0))
-    motion = generator.advance(state, RNGS, 0.02, 150)
+    motion = watched(state, RNGS, 0.02, 150)
     assert np.isfinite(motion.position_world).all()
     assert plan[pl.TARGET + 3] > -1.2
 
@@ -87,7 +87,7 @@ def test_a_hand_is_about_as_fast_as_was_drawn(peak_m_s):
     state, plan = worker(
         pl.REACH, plan_reach, (-0.2, 0.1, 1.2), (0.0, 1.0), peak_m_s, 0.5, (0.0, 1.0)
     )
-    motion = generator.advance(state, RNGS, 0.005, int((plan[pl.OUT_S] + 0.4) / 0.005))
+    motion = watched(state, RNGS, 0.005, int((plan[pl.OUT_S] + 0.4) / 0.005))
     hand = np.linalg.norm(motion.velocity_world[0, :, 0, SEGMENT["right_hand"]], axis=-1)
     assert hand.max() == pytest.approx(peak_m_s, rel=0.3)
 
@@ -95,7 +95,7 @@ def test_a_hand_is_about_as_fast_as_was_drawn(peak_m_s):
 def test_feet_stay_where_they_are_while_hands_work():
     state, _ = worker(pl.REACH, plan_reach, (-0.3, 0.0, 0.9), (1.0, 1.0), 1.2, 0.5, (0.02, 1.0))
     feet = [SEGMENT[f"{side}_{part}"] for side in ("left", "right") for part in ("foot", "toes")]
-    motion = generator.advance(state, RNGS, 0.02, 100)
+    motion = watched(state, RNGS, 0.02, 100)
     assert np.abs(motion.velocity_world[..., feet, :]).max() < 1e-6
 
 
@@ -103,7 +103,7 @@ def test_feet_stay_where_they_are_while_hands_work():
 def test_a_load_is_gripped_raised_and_put_back(squat):
     STATE.traits[..., pl.SQUAT_TRAIT] = squat
     state, plan = worker(pl.LIFT, plan_lift, 0.42, 0.3, (1.2, 1.2, 0.5))
-    motion = generator.advance(state, RNGS, 0.01, int(state.duration_s[0, 0] / 0.01) - 1)
+    motion = watched(state, RNGS, 0.01, int(state.duration_s[0, 0] / 0.01) - 1)
     hands = grips(motion)[0]
     gripping = int((plan[pl.OUT_AT] + plan[pl.OUT_S] + 0.1) / 0.01)
     assert np.abs(hands[gripping, :, 2] - 0.3).max() < 0.03

@@ -8,7 +8,7 @@ import pytest
 from hrc_env.body import load_body, rest_motion
 from hrc_env.errors import ConfigError
 from hrc_env.geometry import chains
-from hrc_env.records import WorkerMotion
+from hrc_env.records import WorkerPath
 from hrc_env.scene.build import build
 from hrc_env.scene.physics import Physics, no_workers
 
@@ -17,14 +17,11 @@ T = 5
 DT = T * LAB.config.sim_dt
 
 
-def standing(batch: int, xy: tuple[float, float], n_substeps: int = T) -> WorkerMotion:
+def standing(batch: int, xy: tuple[float, float], n_substeps: int = T) -> WorkerPath:
     rest = rest_motion(load_body())
     lead = (batch, n_substeps, 1)
-    arrays = (
-        rest.position_world + np.array([*xy, 0.0]), rest.quaternion_wxyz,
-        rest.velocity_world, rest.angular_velocity_world,
-    )  # fmt: skip
-    return WorkerMotion(*(np.broadcast_to(array, (*lead, *array.shape)) for array in arrays))
+    arrays = (rest.position_world + np.array([*xy, 0.0]), rest.quaternion_wxyz)
+    return WorkerPath(*(np.broadcast_to(array, (*lead, *array.shape)) for array in arrays))
 
 
 def commands(batch: int, n_steps: int = 12) -> np.ndarray:
@@ -137,7 +134,7 @@ def test_a_worker_stops_the_arm_and_lets_it_go_again():
 def test_workers_do_not_touch_the_floor_nor_each_other():
     scene = build(n_workers=2)
     one = standing(1, (1.5, 0.0))
-    both = WorkerMotion(*(np.repeat(getattr(one, name), 2, 2) for name in one.__slots__))
+    both = WorkerPath(*(np.repeat(getattr(one, name), 2, 2) for name in one.__slots__))
     physics = Physics(scene, 1)
     physics.step(np.zeros((1, 6)), both)
     np.testing.assert_allclose(physics.q[0], scene.home_q, atol=1e-6)

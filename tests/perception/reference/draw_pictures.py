@@ -11,6 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from hrc_env.batching import one
 from hrc_env.body import load_body, worker_truth
 from hrc_env.geometry.cameras import project, projections
 from hrc_env.motion import generator
@@ -38,7 +39,7 @@ def main() -> None:
     wanted = dict(PICTURES)
     time_s, lifting = 0.0, 0
     while wanted or lifting != 4:
-        motion = generator.advance(state, rngs, STEP_S, 1)
+        _, motion = generator.advance(state, rngs, STEP_S, 1)
         time_s += STEP_S
         for name in [name for name, (at_s, _) in wanted.items() if at_s == time_s]:
             draw(name, renderer, motion, wanted.pop(name)[1])
@@ -51,12 +52,7 @@ def main() -> None:
 def draw(name: str, renderer: CropRenderer, motion: WorkerMotion, camera: int) -> None:
     """Store what a camera sees round the worker, not quite in the middle."""
     rig = renderer.scene.cameras
-    now = WorkerMotion(
-        motion.position_world[0, -1],
-        motion.quaternion_wxyz[0, -1],
-        motion.velocity_world[0, -1],
-        motion.angular_velocity_world[0, -1],
-    )
+    now = one(motion, 0)
     joints = worker_truth(load_body(), now).joints_world
     px, depth_m = project(projections(rig), joints)
     window = window_from_joints(px[0, camera], depth_m[0, camera], rig[camera])
