@@ -85,18 +85,17 @@ def advance(
         and their motion at its end, (B, W, 22, ...).
     """
     batch, n_workers = state.activity.shape
-    path = WorkerPath(*_blank((batch, n_steps, n_workers), 3, 4))
-    velocity, turning = _blank((batch, n_workers), 3, 3)
     done, ticked = np.zeros(batch, np.int64), np.zeros(batch, np.bool_)
     arrays, constants = _arrays(state), _constants(state)
-    body, out = constants[1:], (path.position_world, path.quaternion_wxyz, velocity, turning)
-    while _run(float(dt_s), n_steps, done, ticked, *arrays[:9], *body, *out):
+    out = _blank((batch, n_steps, n_workers), 3, 4) + _blank((batch, n_workers), 3, 3)
+    position, quaternion_, velocity, turning = out
+    while _run(float(dt_s), n_steps, done, ticked, *arrays[:9], *constants[1:], *out):
         for b in np.flatnonzero(ticked).tolist():
             for w in np.flatnonzero(state.time_s[b] >= state.duration_s[b]).tolist():
                 state.draws[b, w, : bh.N_DRAWS] = rngs[b].random(bh.N_DRAWS)
                 follow_up(b, w, *arrays, *constants)
-    position, quaternion_ = path.position_world[:, -1], path.quaternion_wxyz[:, -1]
-    return path, WorkerMotion(position, quaternion_, velocity, turning)
+    last = WorkerMotion(position[:, -1], quaternion_[:, -1], velocity, turning)
+    return WorkerPath(position, quaternion_), last
 
 
 def current(state: MotionState, ids: Ints | None = None) -> WorkerMotion:
