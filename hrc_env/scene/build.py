@@ -16,7 +16,7 @@ from hrc_env.geometry.chains import SerialChain
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.scene.arena import add_lab, paint_lab
 from hrc_env.scene.arm import DAMPING_NMS_RAD, HOME_Q, add_arm, arm_chain
-from hrc_env.scene.primitives import DECORATION, OVERHEAD, ROBOT_LOOKS
+from hrc_env.scene.primitives import DECORATION, OVERHEAD, ROBOT_BIT, ROBOT_LOOKS
 from hrc_env.scene.rig import LAB_CAMERAS, CameraConfig, add_cameras, pinholes, select
 from hrc_env.scene.worker import add_worker, mocap_ids
 from hrc_env.typing import Floats, Ints, JointAngles
@@ -129,6 +129,7 @@ def _build(
     cameras = pinholes(select(config.cameras, use))
     spec = _spec(config, name, n_workers, body_name, cameras)
     _strip(spec)
+    _pair(spec)
     model = spec.compile()
     rows = [mocap_ids(model, _prefix(worker)) for worker in range(n_workers)]
     return Scene(
@@ -187,6 +188,20 @@ def _strip(spec: mujoco.MjSpec) -> None:
             geom.material = ""
     for unseen in (*spec.skins, *spec.meshes, *spec.materials, *spec.textures):
         spec.delete(unseen)
+
+
+def _pair(spec: mujoco.MjSpec) -> None:
+    """Say pair by pair what may touch the arm: quicker than to look for it in every substep."""
+    arm = [geom for geom in spec.geoms if geom.contype & ROBOT_BIT]
+    others = [geom for geom in spec.geoms if geom.contype & ~ROBOT_BIT]
+    for row, other in enumerate(others):
+        other.name = other.name or f"solid_{row}"
+    for part in arm:
+        for other in others:
+            if part.conaffinity & other.contype:
+                spec.add_pair(geomname1=part.name, geomname2=other.name)
+    for geom in (*arm, *others):
+        geom.contype = geom.conaffinity = 0
 
 
 def _prefix(worker: int) -> str:
