@@ -27,12 +27,17 @@ from hrc_env.tasks import reach
 
 ORGANS: Mapping[str, Sequence[Place]] = {
     "physics": ((simulation, "joint_command"), (Physics, "step")),
-    "motion": ((generator, "advance"), (simulation, "worker_truth")),
+    "motion": (
+        (generator, "advance"),
+        (simulation, "worker_truth"),
+        (simulation, "worker_capsules"),
+    ),
     "rays": ((Physics, "hidden"),),
     "emulator": ((emulator, "emulate"),),
     "tracking": ((senses.TrackingSenses, "sense"),),
     "distances": (
         (chains, "robot_state"),
+        (chains, "robot_along"),
         (chains, "capsules"),
         (simulation, "estimated_gap"),
         (metrics, "cost"),
