@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.errors import ConfigError
+from hrc_env.errors import ConfigError, HRCError
 from hrc_env.simulation import Outcome, Simulation
 from hrc_env.stateful import State
 from hrc_env.typing import Floats, Ints
@@ -40,7 +40,7 @@ class Shards:
         """One control step of every environment; action (B, A) in [-1, 1]."""
         spans = pairwise(self.bounds)
         return self._run(
-            partial(part.step, action[low:high])
+            partial(_step, part, low, action[low:high])
             for part, (low, high) in zip(self.parts, spans, strict=True)
         )
 
@@ -85,6 +85,15 @@ class Shards:
         finally:
             wait(futures)
         return joined([outcome, *(future.result() for future in futures)])
+
+
+def _step(part: Simulation, first: int, action: Floats) -> Outcome:
+    try:
+        return part.step(action)
+    except HRCError as error:
+        if first > 0:
+            error.add_note(f"Environments are counted from number {first} of the vector here.")
+        raise
 
 
 def joined(outcomes: list[Outcome]) -> Outcome:

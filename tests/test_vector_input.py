@@ -6,7 +6,7 @@ import pytest
 
 import hrc_env  # noqa: F401  registers the ids
 from hrc_env import shards, vector_env, vector_factory
-from hrc_env.errors import ConfigError
+from hrc_env.errors import ConfigError, HRCError
 from hrc_env.vector_env import HRCVectorEnv
 
 
@@ -146,4 +146,19 @@ def test_a_failure_in_a_thread_is_raised_when_nobody_works_any_more(monkeypatch)
     with pytest.raises(ZeroDivisionError):
         env.step(np.zeros((2, 6)))
     assert finished == [True]
+
+
+def test_a_failure_says_how_its_environments_are_counted(monkeypatch):
+    def breaks_down(action):
+        raise HRCError("The physics of environment 0 broke down.")
+
+    env = HRCVectorEnv(4, perception="none", num_threads=2)
+    env.reset(seed=0)
+    monkeypatch.setattr(env.shards.parts[1], "step", breaks_down)
+    with pytest.raises(HRCError, match="environment 0") as failure:
+        env.step(np.zeros((4, 6)))
+    assert failure.value.__notes__ == ["Environments are counted from number 2 of the vector here."]
+
+
+def test_at_least_one_core_is_counted():
     assert shards.n_cores() >= 1
