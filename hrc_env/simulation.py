@@ -85,7 +85,6 @@ class Simulation(Stateful):
         n_workers: int,
         control: str,
         config: HRCConfig,
-        n_threads: int = 1,
     ) -> None:
         self.batch, self.config, self.control = batch, config, control
         self.perception = perception
@@ -105,7 +104,7 @@ class Simulation(Stateful):
                 len(self.scene.home_q), self.n_actions, n_workers, len(config.horizons_s)
             )
         )
-        self.physics = Physics(self.scene, batch, n_threads)
+        self.physics = Physics(self.scene, batch)
         self.senses = make_senses(perception, estimator, self.scene, self.physics, config)
         self.motion = generator.make_state(batch, n_workers, self.body, config.motion)
         self.task = reach.make_state(batch)

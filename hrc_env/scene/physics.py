@@ -2,7 +2,7 @@
 
 One `mujoco.batch.Batch` for every batch size, the single environment too. Everything that
 changes lives in the batch's state rows, so that copying them copies the simulation, and
-results do not depend on the number of threads or of neighbours.
+results do not depend on neighbours; threads are a matter of `shards`.
 """
 
 import mujoco
@@ -30,11 +30,9 @@ INPUTS = int(
 class Physics:
     """B simulations of a scene."""
 
-    def __init__(self, scene: Scene, batch: int, n_threads: int = 1) -> None:
-        if batch < 1 or n_threads < 1:
-            raise ConfigError(
-                f"Physics needs at least one environment and one thread, got {batch}, {n_threads}."
-            )
+    def __init__(self, scene: Scene, batch: int) -> None:
+        if batch < 1:
+            raise ConfigError(f"Physics needs at least one environment, got {batch}.")
         rows = scene.worker_mocap
         if not np.array_equal(rows.ravel(), np.arange(scene.model.nmocap)):
             raise HRCError(
@@ -43,9 +41,8 @@ class Physics:
             )
         self.scene = scene
         self.batch = batch
-        self.n_threads = n_threads
         self._n = scene.chain.n_joints
-        self._sims = Batch(scene.model, nsim=batch, nthread=n_threads)
+        self._sims = Batch(scene.model, nsim=batch, nthread=1)
         self._qpos, self._qvel = self._sims.bind("qpos"), self._sims.bind("qvel")
         self._act, self._command = self._sims.bind("act"), self._sims.bind("userdata")
         self._control, self._trace = np.zeros((batch, 0, 0)), {}
@@ -139,12 +136,12 @@ class Physics:
         check_shape("state", np.shape(state), self._sims.state.shape, "batch, state")
         self._sims.state[:] = state
 
-    def __getstate__(self) -> tuple[Scene, int, int, Floats]:
-        return self.scene, self.batch, self.n_threads, self.get_state()
+    def __getstate__(self) -> tuple[Scene, int, Floats]:
+        return self.scene, self.batch, self.get_state()
 
-    def __setstate__(self, saved: tuple[Scene, int, int, Floats]) -> None:
-        scene, batch, n_threads, state = saved
-        self.__init__(scene, batch, n_threads)
+    def __setstate__(self, saved: tuple[Scene, int, Floats]) -> None:
+        scene, batch, state = saved
+        self.__init__(scene, batch)
         self.set_state(state)
 
     def _fit(self, workers: WorkerPath) -> None:

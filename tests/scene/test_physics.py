@@ -76,12 +76,6 @@ def test_commands_that_are_not_numbers_count_as_zero():
     np.testing.assert_allclose(physics.q[0], LAB.home_q, atol=1e-6)
 
 
-def test_threads_change_no_bit():
-    sequence = commands(16)
-    one, two = (run(Physics(LAB, 16, n_threads=n), sequence) for n in (1, 2))
-    np.testing.assert_array_equal(one, two)
-
-
 def test_neighbours_change_no_bit():
     sequence = commands(8)
     whole = run(Physics(LAB, 8), sequence)
@@ -100,7 +94,7 @@ def test_a_saved_state_continues_bit_for_bit_even_after_pickling():
 
 
 def test_physics_itself_can_be_pickled_in_the_middle():
-    physics, sequence = Physics(LAB, 2, n_threads=2), commands(2)
+    physics, sequence = Physics(LAB, 2), commands(2)
     run(physics, sequence[:6])
     twin = pickle.loads(pickle.dumps(physics))
     assert twin.scene is not None
