@@ -90,7 +90,11 @@ def main(arguments: Arguments) -> None:
     per_rollout = arguments.num_envs * arguments.n_steps
     n_updates = -(-arguments.timesteps // per_rollout)
     collector = Collector(
-        env, actor, frames_per_batch=per_rollout, total_frames=n_updates * per_rollout
+        env,
+        actor,
+        frames_per_batch=per_rollout,
+        total_frames=n_updates * per_rollout,
+        auto_register_policy_transforms=False,
     )
     advantage = GAE(gamma=0.98, lmbda=0.95, value_network=critic, average_gae=True)
     losses = ClipPPOLoss(actor, critic, entropy_coeff=1e-4)
