@@ -31,7 +31,7 @@ import hrc_env  # noqa: F401  registers the ids
 class Arguments:
     """Learn HRCReach-v0 by TorchRL's PPO."""
 
-    timesteps: int = 600_000
+    timesteps: int = 1_000_000
     """Environment steps in all."""
     num_envs: int = 64
     """Environments that step together."""
