@@ -25,7 +25,6 @@ from hrc_env.perception.eyes import Eyes, Sight
 from hrc_env.perception.windows import steady_window, window_from_joints
 from hrc_env.records import CropWindow, Keypoints, PoseEstimate, WorkerMotion, WorkerTruth
 from hrc_env.scene.build import Scene
-from hrc_env.scene.physics import Physics
 from hrc_env.scene.render import CropRenderer
 from hrc_env.skeleton import N_JOINTS
 from hrc_env.stateful import Stateful
@@ -89,9 +88,7 @@ class Senses(Protocol):
         ...
 
 
-def make_senses(
-    level: str, estimator: str, scene: Scene, physics: Physics, config: HRCConfig
-) -> Senses:
+def make_senses(level: str, estimator: str, scene: Scene, batch: int, config: HRCConfig) -> Senses:
     """The senses of a perception level.
 
     Raises:
@@ -101,7 +98,6 @@ def make_senses(
     """
     if level not in LEVELS:
         raise unknown("perception", level, LEVELS)
-    batch = physics.batch
     P = projections(scene.cameras)
     tracker = make_estimator(estimator, P, config.ctrl_dt, config.tracker)
     if level == "truth":
@@ -109,7 +105,7 @@ def make_senses(
     if level == "none":
         return BlindSenses(given.prior(batch, scene.n_workers, config.tracker))
     if level == "keypoints":
-        return EmulatedSenses(scene, physics, tracker, config)
+        return EmulatedSenses(scene, batch, tracker, config)
     return CameraSenses(scene, batch, tracker, config)
 
 
@@ -228,19 +224,12 @@ class EmulatedSenses(TrackingSenses):
 
     CHANGES = (*TrackingSenses.CHANGES, "emulator")
 
-    def __init__(
-        self, scene: Scene, physics: Physics, tracker: Estimator, config: HRCConfig
-    ) -> None:
-        super().__init__(physics.batch, scene, tracker, config)
-        self.physics, self.config = physics, config.emulator
+    def __init__(self, scene: Scene, batch: int, tracker: Estimator, config: HRCConfig) -> None:
+        super().__init__(batch, scene, tracker, config)
+        self.config = config.emulator
         self.emulator = emulator.make_state(
-            physics.batch,
-            len(scene.cameras),
-            scene.n_workers,
-            config.ctrl_dt,
-            config.emulator,
+            batch, len(scene.cameras), scene.n_workers, config.ctrl_dt, config.emulator
         )
-        self.eyes_world = np.stack([camera.eye_world for camera in scene.cameras])
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
         """Forget the tracks and the detector's slow errors."""
@@ -248,12 +237,12 @@ class EmulatedSenses(TrackingSenses):
         emulator.reset(self.emulator, ids, sensor_rngs, self.config)
 
     def detect(self, now: Moment, predicted: Any, sensor_rngs: Generators) -> Keypoints:
-        """Emulated keypoints; lines of sight come from the physics' rays."""
-        whole = len(now.ids) == self.physics.batch
+        """Emulated keypoints; room, robot and bodies stand in the lines of sight."""
+        whole = len(now.ids) == len(self.keypoints.px)
         state = self.emulator if whole else rows(self.emulator, now.ids)
-        hidden = self.physics.hidden(self.eyes_world, now.truth.joints_world, now.ids)
+        surroundings = self.scene.surroundings(now.q)
         keypoints = emulator.emulate(
-            state, sensor_rngs, now.truth, hidden, self.scene.cameras, self.config
+            state, sensor_rngs, now.truth, surroundings, self.scene.cameras, self.config
         )
         if not whole:
             write_rows(self.emulator, now.ids, state)

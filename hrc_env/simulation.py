@@ -105,7 +105,7 @@ class Simulation(Stateful):
             )
         )
         self.physics = Physics(self.scene, batch)
-        self.senses = make_senses(perception, estimator, self.scene, self.physics, config)
+        self.senses = make_senses(perception, estimator, self.scene, batch, config)
         self.motion = generator.make_state(batch, n_workers, self.body, config.motion)
         self.task = reach.make_state(batch)
         self._everyone = np.arange(batch)

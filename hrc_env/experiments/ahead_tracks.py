@@ -112,7 +112,6 @@ def _frames(
     """True joints, their velocities (S, J, 3) and what the emulated detector reports of them."""
     config, cameras, everyone = scene.config, scene.scene.cameras, np.arange(len(seeds))
     scene.reset(everyone, [np.random.default_rng([seed, 9]) for seed in seeds])
-    eyes = np.stack([camera.eye_world for camera in cameras])
     pushes, sensors = ([np.random.default_rng([seed, kind]) for seed in seeds] for kind in (10, 11))
     errors = emulator.make_state(len(seeds), len(cameras), 1, config.ctrl_dt, config.emulator)
     emulator.reset(errors, everyone, sensors, config.emulator)
@@ -122,8 +121,8 @@ def _frames(
         action = _SLOWNESS * action + np.sqrt(1 - _SLOWNESS**2) * push
         scene.step(np.clip(action, -1, 1))
         now = worker_truth(scene.body, generator.current(scene.motion))
-        hidden = scene.physics.hidden(eyes, now.joints_world)
-        seen = emulator.emulate(errors, sensors, now, hidden, cameras, config.emulator)
+        between = scene.scene.surroundings(scene.physics.q)
+        seen = emulator.emulate(errors, sensors, now, between, cameras, config.emulator)
         yield now.joints_world[:, 0], now.velocity_world[:, 0], seen
 
 

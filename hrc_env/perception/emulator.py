@@ -14,6 +14,7 @@ import numpy as np
 
 from hrc_env.errors import ConfigError, check_shape
 from hrc_env.geometry.cameras import PinholeCamera, projections
+from hrc_env.geometry.sight import Surroundings
 from hrc_env.perception.emulator_kernel import emulate_batch
 from hrc_env.perception.noise import ERROR, VISIBILITY
 from hrc_env.records import Keypoints, WorkerTruth
@@ -136,7 +137,7 @@ def emulate(
     state: EmulatorState,
     rngs: Generators,
     truth: WorkerTruth,
-    hidden: Bools,
+    surroundings: Surroundings,
     cameras: tuple[PinholeCamera, ...],
     config: EmulatorConfig,
 ) -> Keypoints:
@@ -146,7 +147,7 @@ def emulate(
         state: of the errors, advanced by one image in place.
         rngs: one generator per environment.
         truth: (B, W, ...) the workers; their capsules hide joints of their own and of others.
-        hidden: (B, C, W, J) whether scene or robot block the sight of a joint.
+        surroundings: (B, ...) the room and the robot, which hide joints too.
         cameras: the rig (C).
         config: as given to `make_state`.
 
@@ -155,19 +156,21 @@ def emulate(
     """
     batch, n_cameras, n_workers = state.swapped.shape
     shape = (batch, n_cameras, n_workers, N_JOINTS)
-    check_shape("hidden", hidden.shape, shape, "environments, cameras, workers, joints")
+    robot = surroundings.capsules_world
+    check_shape("surroundings.capsules_world", (len(robot),), (batch,), "environments")
     normals, uniforms = np.empty((*shape, 5)), np.empty((*shape[:3], 2))
-    for b in range(batch):
-        rngs[b].standard_normal(out=normals[b])
-        rngs[b].random(out=uniforms[b])
+    for rng, normal, uniform in zip(rngs, normals, uniforms, strict=True):
+        rng.standard_normal(out=normal)
+        rng.random(out=uniform)
     P, eyes_world, image = _rig(cameras)
     scalars, per_joint = _settings(config, state.dt_s)
     out = Keypoints(np.empty((*shape, 2)), np.empty(shape), np.empty(shape))
     emulate_batch(
         state.slow, state.size, state.swapped, state.missed, normals, uniforms,
         np.ascontiguousarray(truth.joints_world), np.ascontiguousarray(truth.capsules_world),
-        truth.capsule_radius_m, np.ascontiguousarray(hidden), P, eyes_world, image,
-        scalars, per_joint, MIRROR, VISIBILITY, ERROR, out.px, out.confidence, out.sigma_px,
+        truth.capsule_radius_m, surroundings.still, robot, surroundings.capsule_radius_m,
+        P, eyes_world, image, scalars, per_joint, MIRROR, VISIBILITY, ERROR,
+        out.px, out.confidence, out.sigma_px,
     )  # fmt: skip
     return out
 

@@ -5,8 +5,10 @@ import math
 import numba
 import numpy as np
 
+from hrc_env.geometry.shapes import passage, set_capsules
+from hrc_env.geometry.sight import blocks, line, look, make_table, meets
 from hrc_env.perception.noise import error_share
-from hrc_env.perception.self_occlusion import bounding_spheres, hidden_by_capsules
+from hrc_env.perception.self_occlusion import body_blocks
 
 MIN_DEPTH_M = 0.5
 """Nearer to a camera's plane there is no image of a person."""
@@ -18,30 +20,29 @@ UNSURE = 0.7
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def emulate_batch(
     slow, size, swapped, missed, normals, uniforms,
-    joints, capsules, radius, hidden, P, eyes, image,
-    scalars, per_joint, mirror, visibility, error, px, confidence, sigma,
+    joints, capsules, radius, still, robot, robot_radius,
+    P, eyes, image, scalars, per_joint, mirror, visibility, error, px, confidence, sigma,
 ):  # fmt: skip
     """Advance the errors by one image and write keypoints; arguments as in `emulate`."""
     batch, n_cameras, n_workers, n_joints = confidence.shape
-    n_body = capsules.shape[2]
-    n = n_workers * n_body
-    centre, reach, radii = np.empty((n, 3)), np.empty(n), np.empty(n)
-    for w in range(n_workers):
-        radii[w * n_body : (w + 1) * n_body] = radius
+    n_body, first_body = len(radius), len(still) + len(robot_radius)
+    table = make_table(still, len(robot_radius) + n_workers * n_body)
+    view, rows = np.empty((5, len(table))), np.empty(len(table), np.int64)
     uv, depth, state = np.empty((n_joints, 2)), np.empty(n_joints), np.empty(n_joints, np.int64)
     for b in range(batch):
-        bodies = capsules[b].reshape(n, 2, 3)
-        bounding_spheres(bodies, radii, centre, reach)
+        set_capsules(table, len(still), robot[b], robot_radius)
+        for w in range(n_workers):
+            set_capsules(table, first_body + w * n_body, capsules[b, w], radius)
         for c in range(n_cameras):
             for w in range(n_workers):
                 _project(P[c], joints[b, w], uv, depth)
-                n_seen = _sight(
-                    uv, depth, hidden[b, c, w], eyes[c], joints[b, w], bodies, radii, centre,
-                    reach, image[c], state,
-                )  # fmt: skip
                 _burst(swapped, b, c, w, uniforms[b, c, w, 0], scalars[6], scalars[7])
                 _burst(missed, b, c, w, uniforms[b, c, w, 1], scalars[8], scalars[9])
-                found = n_seen >= scalars[10] and not missed[b, c, w]
+                found = not missed[b, c, w]
+                if found:
+                    _image(uv, depth, image[c], state)
+                    n_seen = _sight(eyes[c], joints[b, w], table, first_body, view, rows, state)
+                    found = n_seen >= scalars[10]
                 _report(
                     slow[b, c, w], size[b, c, w], normals[b, c, w], uv, depth, state, image[c, 2],
                     found, swapped[b, c, w], scalars, per_joint, mirror, visibility, error,
@@ -60,22 +61,47 @@ def _project(P, joints, uv, depth):
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _sight(
-    uv, depth, hidden, eye, joints, bodies, radii, centre, reach, image, state
-):  # fmt: skip
-    """How each joint appears: 0 seen, 1 hidden, 2 outside, 3 not ahead. Counts the seen."""
-    n_seen = 0
-    for j in range(len(joints)):
+def _image(uv, depth, image, state):
+    """Where each joint appears: 0 in the image, 2 outside, 3 not ahead."""
+    for j in range(len(depth)):
         if depth[j] < MIN_DEPTH_M:
             state[j] = 3
         elif uv[j, 0] < 0 or uv[j, 0] >= image[0] or uv[j, 1] < 0 or uv[j, 1] >= image[1]:
             state[j] = 2
-        elif hidden[j] or hidden_by_capsules(eye, joints[j], bodies, radii, centre, reach):
-            state[j] = 1
         else:
             state[j] = 0
-            n_seen += 1
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _sight(eye, joints, table, first_body, view, rows, state):
+    """State 1 for joints in the image that something hides. Counts the seen.
+
+    Bodies are the table's rows from `first_body` on; the rest is as in `geometry.sight`.
+    """
+    n_view, n_seen = look(eye, joints, table, view, rows), 0
+    for j in range(len(joints)):
+        if state[j] == 0:
+            if _is_hidden(eye, joints, j, table, first_body, view, rows, n_view):
+                state[j] = 1
+            else:
+                n_seen += 1
     return n_seen
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _is_hidden(eye, joints, j, table, first_body, view, rows, n_view):
+    dx, dy, dz, length = line(eye, joints, j)
+    for i in range(n_view):
+        if meets(view, i, dx, dy, dz, length):
+            row, px, py, pz = rows[i], -view[0, i], -view[1, i], -view[2, i]
+            if row >= first_body:
+                if body_blocks(table, row, px, py, pz, dx, dy, dz, length):
+                    return True
+                continue
+            enter, leave = passage(table, row, px, py, pz, dx, dy, dz)
+            if blocks(enter, leave, length):
+                return True
+    return False
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
@@ -106,13 +132,13 @@ def _report(
             confidence[label] = 0.0
             sigma[label] = np.inf
             continue
-        seen = per_joint[0 if state[j] == 0 else 1, :, j]
-        scale = seen[0] * math.exp(seen[2] * size[j])
+        group = 0 if state[j] == 0 else 1
+        scale = per_joint[group, 0, j] * math.exp(per_joint[group, 2, j] * size[j])
         dx = scale * (share_slow * slow[j, 0] + share_new * normals[j, 3])
         dy = scale * (share_slow * slow[j, 1] + share_new * normals[j, 4])
         shrink = stature_px * min(1.0, scalars[5] / max(math.sqrt(dx * dx + dy * dy), 1e-12))
         px[label, 0] = uv[j, 0] + shrink * dx
         px[label, 1] = uv[j, 1] + shrink * dy
-        visible = 1.0 / (1.0 + math.exp(-(seen[1] - UNSURE * size[j])))
+        visible = 1.0 / (1.0 + math.exp(UNSURE * size[j] - per_joint[group, 1, j]))
         confidence[label] = min(visible, scalars[11]) if state[j] == 2 else visible
         sigma[label] = stature_px * error_share(confidence[label], visibility, error)

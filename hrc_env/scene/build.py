@@ -12,10 +12,12 @@ import numpy as np
 from hrc_env.body import load_body, load_looks
 from hrc_env.errors import ConfigError, unknown
 from hrc_env.geometry.cameras import PinholeCamera
-from hrc_env.geometry.chains import SerialChain
+from hrc_env.geometry.chains import SerialChain, capsules
 from hrc_env.geometry.rotations import about_axis
+from hrc_env.geometry.sight import Surroundings
 from hrc_env.scene.arena import add_lab, paint_lab
 from hrc_env.scene.arm import DAMPING_NMS_RAD, HOME_Q, add_arm, arm_chain
+from hrc_env.scene.obstacles import obstacles
 from hrc_env.scene.primitives import DECORATION, OVERHEAD, ROBOT_BIT, ROBOT_LOOKS
 from hrc_env.scene.rig import LAB_CAMERAS, CameraConfig, add_cameras, pinholes, select
 from hrc_env.scene.worker import add_worker, mocap_ids
@@ -86,6 +88,13 @@ class Scene:
     """(N,) inertia at rest over damping, joint by joint: the rate servos' lead [s]."""
     worker_mocap: Ints
     """(W, S) mocap row of every body segment of every worker."""
+    obstacles: Floats
+    """(G, `shapes.WIDTH`) what stands still and blocks sight."""
+
+    def surroundings(self, q: JointAngles) -> Surroundings:
+        """What can stand before cameras, the arm at angles q (B, N) [rad]."""
+        chain = self.chain
+        return Surroundings(self.obstacles, capsules(chain, q), chain.capsule_radius_m)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A scene is pickled as its recipe."""
@@ -143,6 +152,7 @@ def _build(
         home_q=HOME_Q.copy(),
         servo_lead_s=_servo_lead_s(model),
         worker_mocap=np.stack(rows) if rows else np.zeros((0, 0), np.int64),
+        obstacles=obstacles(model),
     )
 
 

@@ -13,12 +13,8 @@ from hrc_env.errors import ConfigError, HRCError, check_shape
 from hrc_env.records import WorkerPath
 from hrc_env.scene.build import Scene
 from hrc_env.scene.commands import substep_commands
-from hrc_env.scene.primitives import ROBOT_CAPSULES, SOLID
-from hrc_env.typing import Bools, Floats, Ints, JointAngles, JointVelocities, Points3
+from hrc_env.typing import Floats, Ints, JointAngles, JointVelocities
 
-NEAR_JOINT_M = 0.08
-"""A line of sight ends this far before the joint, so that what the joint touches (the table
-under a wrist, the floor under a foot) does not hide it."""
 INPUTS = int(
     mujoco.mjtState.mjSTATE_CTRL
     | mujoco.mjtState.mjSTATE_MOCAP_POS
@@ -46,8 +42,6 @@ class Physics:
         self._qpos, self._qvel = self._sims.bind("qpos"), self._sims.bind("qvel")
         self._act, self._command = self._sims.bind("act"), self._sims.bind("userdata")
         self._control, self._trace = np.zeros((batch, 0, 0)), {}
-        self._blocks_sight = np.zeros(mujoco.mjNGROUP, np.uint8)
-        self._blocks_sight[[SOLID, ROBOT_CAPSULES]] = 1
         self.reset(np.arange(batch), np.tile(scene.home_q, (batch, 1)))
 
     @property
@@ -98,34 +92,6 @@ class Physics:
         self._check_health()
         self._shorten_leashes()
         return self._trace["qpos"][:, :, :n].copy()
-
-    def hidden(self, eyes_world: Points3, points_world: Points3, ids: Ints | None = None) -> Bools:
-        """Whether the room or the robot stands between each eye and each point.
-
-        Args:
-            eyes_world: (C, 3) [m].
-            points_world: (B, W, J, 3) [m]; with `ids`, B is their number.
-            ids: the environments (sorted), or None for all.
-
-        Returns:
-            (B, C, W, J).
-        """
-        eyes, points = np.asarray(eyes_world, float), np.asarray(points_world, float)
-        batch = self.batch if ids is None else len(ids)
-        check_shape("points_world", (len(points), points.shape[-1]), (batch, 3), "B, ..., xyz")
-        rays = points[:, None] - eyes[None, :, None, None]
-        shape = rays.shape[:-1]
-        if 0 in shape:
-            return np.zeros(shape, bool)
-        length = np.sqrt(np.einsum("...i,...i->...", rays, rays))
-        distance, _ = self._sims.ray(
-            np.repeat(eyes, shape[2] * shape[3], axis=0),
-            (rays / length[..., None]).reshape(batch, -1, 3),
-            geomgroup=self._blocks_sight,
-            ids=ids,
-        )
-        distance = distance.reshape(shape)
-        return (distance >= 0) & (distance < length - NEAR_JOINT_M)
 
     def get_state(self) -> Floats:
         """(B, n) everything that changes; `set_state` brings it back bit for bit."""

@@ -9,6 +9,7 @@ from people import truth
 
 from hrc_env.errors import ConfigError
 from hrc_env.geometry.cameras import pinhole, project, projections
+from hrc_env.geometry.sight import Surroundings, nothing
 from hrc_env.perception.emulator import EmulatorConfig, emulate, make_state, reset
 from hrc_env.skeleton import JOINT, MIRROR, N_JOINTS
 
@@ -33,8 +34,13 @@ def start(batch, config, cameras=CAMERAS, n_workers=1, first_seed=0):
     return state, rngs
 
 
-def unhidden(batch, cameras=CAMERAS, n_workers=1):
-    return np.zeros((batch, len(cameras), n_workers, N_JOINTS), bool)
+def before(cameras, points, radius_m):
+    """Balls before points (B, P, 3), 0.3 m nearer to every camera's eye."""
+    eyes = np.stack([camera.eye_world for camera in cameras])[:, None]
+    ray = points[:, None] - eyes
+    centres = points[:, None] - 0.3 * ray / np.linalg.norm(ray, axis=-1, keepdims=True)
+    balls = np.repeat(centres.reshape(len(points), -1, 1, 3), 2, axis=2)
+    return Surroundings(nothing(1).still, balls, np.full(balls.shape[1], radius_m))
 
 
 def film(config, n_images, cameras=FRONT, hidden=(), batch=32):
@@ -43,11 +49,11 @@ def film(config, n_images, cameras=FRONT, hidden=(), batch=32):
     true = truth(batch)
     px, depth = project(projections(cameras), true.joints_world[:, 0])
     stature_px = 1.75 * cameras[0].K[0, 0] / depth.mean(-1)[..., None, None]
-    blocked = unhidden(batch, cameras)
-    blocked[..., [JOINT[name] for name in hidden]] = True
+    columns = [JOINT[name] for name in hidden]
+    between = before(cameras, true.joints_world[:, 0, columns], 0.02)
     errors, confidences = [], []
     for _ in range(n_images):
-        seen = emulate(state, rngs, true, blocked, cameras, config)
+        seen = emulate(state, rngs, true, between, cameras, config)
         errors.append((seen.px[:, :, 0] - px) / stature_px)
         confidences.append(seen.confidence[:, :, 0])
     return np.array(errors), np.array(confidences)
@@ -57,7 +63,7 @@ def test_without_errors_keypoints_are_the_projected_truth():
     state, rngs = start(2, EXACT)
     true = truth(2)
     px, _ = project(projections(CAMERAS), true.joints_world)
-    seen = emulate(state, rngs, true, unhidden(2), CAMERAS, EXACT)
+    seen = emulate(state, rngs, true, nothing(2), CAMERAS, EXACT)
     np.testing.assert_allclose(seen.px, px, atol=1e-9)
 
 
@@ -104,16 +110,16 @@ def test_what_it_reports_as_sigma_is_about_what_it_errs():
     px, _ = project(projections(FRONT), true.joints_world)
     whitened = []
     for _ in range(50):
-        seen = emulate(state, rngs, true, unhidden(64, FRONT), FRONT, STEADY)
+        seen = emulate(state, rngs, true, nothing(64), FRONT, STEADY)
         whitened.append((seen.px - px) / seen.sigma_px[..., None])
     assert 0.6 < np.std(whitened) < 1.2
 
 
 def test_a_blocked_camera_is_nan_without_confidence_and_with_infinite_sigma():
     state, rngs = start(1, STEADY)
-    hidden = unhidden(1)
-    hidden[:, 2] = True
-    seen = emulate(state, rngs, truth(), hidden, CAMERAS, STEADY)
+    around = CAMERAS[2].eye_world + np.zeros((1, 1, 2, 3))
+    lid = Surroundings(nothing(1).still, around, np.array([0.1]))
+    seen = emulate(state, rngs, truth(), lid, CAMERAS, STEADY)
     assert np.isnan(seen.px[0, 2]).all()
     assert np.all(seen.confidence[0, 2] == 0)
     assert np.isinf(seen.sigma_px[0, 2]).all()
@@ -122,13 +128,13 @@ def test_a_blocked_camera_is_nan_without_confidence_and_with_infinite_sigma():
 
 def test_a_worker_behind_a_camera_is_not_seen():
     state, rngs = start(1, STEADY, FRONT)
-    seen = emulate(state, rngs, truth(at=(8.0, 0, 0)), unhidden(1, FRONT), FRONT, STEADY)
+    seen = emulate(state, rngs, truth(at=(8.0, 0, 0)), nothing(1), FRONT, STEADY)
     assert np.isnan(seen.px).all()
 
 
 def test_joints_outside_the_image_are_guesses_with_a_large_sigma():
     state, rngs = start(1, EXACT, FRONT)
-    seen = emulate(state, rngs, truth(at=(3.1, 0, 0)), unhidden(1, FRONT), FRONT, EXACT)
+    seen = emulate(state, rngs, truth(at=(3.1, 0, 0)), nothing(1), FRONT, EXACT)
     v = seen.px[0, 0, 0, :, 1]
     outside = (v < 0) | (v >= 1080)
     assert outside.any()
@@ -142,7 +148,7 @@ def test_a_worker_in_front_hides_the_one_behind():
     true = truth(n_workers=2)
     true.joints_world[0, 1] += [-1.0, -1.0, 0.0]
     true.capsules_world[0, 1] += [-1.0, -1.0, 0.0]  # now behind the first, seen from x
-    seen = emulate(state, rngs, true, unhidden(1, FRONT, 2), FRONT, EXACT)
+    seen = emulate(state, rngs, true, nothing(1), FRONT, EXACT)
     wrist = JOINT["left_wrist"]
     alone = np.median(seen.confidence[0, 0, 0])
     assert alone > 0.9
@@ -154,7 +160,7 @@ def test_a_swap_exchanges_left_and_right():
     state, rngs = start(1, config)
     true = truth()
     px, _ = project(projections(CAMERAS), true.joints_world)
-    seen = emulate(state, rngs, true, unhidden(1), CAMERAS, config)
+    seen = emulate(state, rngs, true, nothing(1), CAMERAS, config)
     np.testing.assert_allclose(seen.px, px[..., MIRROR, :], atol=1e-9)
 
 
@@ -163,7 +169,7 @@ def test_swaps_and_misses_take_their_share_of_the_time_in_bursts():
     state, rngs = start(64, config)
     true, swapped, missed = truth(64), [], []
     for _ in range(300):
-        seen = emulate(state, rngs, true, unhidden(64), CAMERAS, config)
+        seen = emulate(state, rngs, true, nothing(64), CAMERAS, config)
         swapped.append(state.swapped.copy())
         missed.append(np.isnan(seen.px[..., 0]).all(-1))
     assert np.mean(swapped) == pytest.approx(0.1, abs=0.02)
@@ -178,18 +184,18 @@ def test_an_environment_sees_the_same_in_any_company(batch):
     """Environment 0 of a batch is the batch of one, bit for bit."""
     alone, crowd = start(1, CONFIG), start(batch, CONFIG)
     for _ in range(20):
-        one = emulate(*alone, truth(1), unhidden(1), CAMERAS, CONFIG)
-        many = emulate(*crowd, truth(batch), unhidden(batch), CAMERAS, CONFIG)
+        one = emulate(*alone, truth(1), nothing(1), CAMERAS, CONFIG)
+        many = emulate(*crowd, truth(batch), nothing(batch), CAMERAS, CONFIG)
         np.testing.assert_array_equal(one.px[0], many.px[0])
         np.testing.assert_array_equal(one.sigma_px[0], many.sigma_px[0])
 
 
 def test_a_copied_state_replays_the_same_errors():
     state, rngs = start(2, CONFIG)
-    emulate(state, rngs, truth(2), unhidden(2), CAMERAS, CONFIG)
+    emulate(state, rngs, truth(2), nothing(2), CAMERAS, CONFIG)
     saved = copy.deepcopy((state, rngs))
-    first = emulate(state, rngs, truth(2), unhidden(2), CAMERAS, CONFIG)
-    again = emulate(*saved, truth(2), unhidden(2), CAMERAS, CONFIG)
+    first = emulate(state, rngs, truth(2), nothing(2), CAMERAS, CONFIG)
+    again = emulate(*saved, truth(2), nothing(2), CAMERAS, CONFIG)
     np.testing.assert_array_equal(first.px, again.px)
 
 
@@ -203,7 +209,7 @@ def test_a_reset_touches_only_its_own_environments():
 
 def test_a_room_without_workers_has_no_keypoints():
     state, rngs = start(2, CONFIG, n_workers=0)
-    seen = emulate(state, rngs, truth(2, 0), unhidden(2, n_workers=0), CAMERAS, CONFIG)
+    seen = emulate(state, rngs, truth(2, 0), nothing(2), CAMERAS, CONFIG)
     assert seen.px.shape == (2, 4, 0, N_JOINTS, 2)
 
 
@@ -213,5 +219,5 @@ def test_settings_and_shapes_that_cannot_work_are_explained():
     with pytest.raises(ConfigError, match="correlation_s must be positive"):
         EmulatorConfig(correlation_s=0.0)
     state, rngs = start(1, CONFIG)
-    with pytest.raises(ConfigError, match="hidden must have shape"):
-        emulate(state, rngs, truth(), unhidden(2), CAMERAS, CONFIG)
+    with pytest.raises(ConfigError, match="capsules_world must have shape"):
+        emulate(state, rngs, truth(), nothing(2), CAMERAS, CONFIG)

@@ -7,18 +7,21 @@ from hypothesis import strategies as st
 from people import STANDING
 
 from hrc_env.geometry.segments import segments
-from hrc_env.perception.self_occlusion import bounding_spheres, hidden_by_capsules
+from hrc_env.geometry.shapes import CENTRE, WIDTH, set_capsules
+from hrc_env.geometry.sight import line
+from hrc_env.perception.self_occlusion import body_blocks
 from hrc_env.skeleton import JOINT, SEGMENT_RADIUS_M
 
 POST = np.array([[[0.0, 0, 0], [0, 0, 2.0]]])
 
 
 def hidden(eye, joint, capsules=POST, radius=(0.1,)):
-    radius = np.asarray(radius, float)
-    centre, reach = np.empty((len(radius), 3)), np.empty(len(radius))
-    bounding_spheres(capsules, radius, centre, reach)
-    eye, joint = np.asarray(eye, float), np.asarray(joint, float)
-    return hidden_by_capsules(eye, joint, capsules, radius, centre, reach)
+    table = np.empty((len(radius), WIDTH))
+    set_capsules(table, 0, capsules, np.asarray(radius, float))
+    eye, joints = np.asarray(eye, float), np.asarray(joint, float)[None]
+    *direction, length = line(eye, joints, 0)
+    p = eye - table[:, CENTRE : CENTRE + 3]
+    return any(body_blocks(table, k, *p[k], *direction, length) for k in range(len(table)))
 
 
 @pytest.mark.parametrize(

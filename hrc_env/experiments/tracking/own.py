@@ -13,6 +13,7 @@ from hrc_env.body import worker_truth
 from hrc_env.config import HRCConfig
 from hrc_env.experiments.tracking.rigs import Rig
 from hrc_env.geometry.cameras import projections
+from hrc_env.geometry.sight import nothing
 from hrc_env.motion import generator
 from hrc_env.perception import emulator
 from hrc_env.records import Keypoints
@@ -69,7 +70,6 @@ def _episodes(seeds: tuple[int, ...]) -> tuple[Points3, Keypoints, Keypoints]:
     simulation.reset(everyone, [np.random.default_rng([seed, 9]) for seed in seeds])
     rngs = [[np.random.default_rng([seed, 10, k]) for seed in seeds] for k in range(3)]
     cameras = simulation.scene.cameras
-    eyes = np.stack([camera.eye_world for camera in cameras])
     states = [
         emulator.make_state(batch, len(cameras), 1, config.ctrl_dt, config.emulator)
         for _ in range(2)
@@ -82,11 +82,11 @@ def _episodes(seeds: tuple[int, ...]) -> tuple[Points3, Keypoints, Keypoints]:
         action = _wander(action, rngs[2])
         simulation.step(np.clip(action, -1, 1))
         truth = worker_truth(simulation.body, generator.current(simulation.motion))
-        behind = simulation.physics.hidden(eyes, truth.joints_world)
+        lab = simulation.scene.surroundings(simulation.physics.q)
         joints.append(truth.joints_world.copy())
-        for k, hidden in enumerate((np.zeros_like(behind), behind)):
+        for k, between in enumerate((nothing(batch), lab)):
             seen[k].append(
-                emulator.emulate(states[k], rngs[k], truth, hidden, cameras, config.emulator)
+                emulator.emulate(states[k], rngs[k], truth, between, cameras, config.emulator)
             )
     simulation.close()
     return np.stack(joints), _stacked(seen[0]), _stacked(seen[1])

@@ -1,0 +1,198 @@
+"""Lines of sight: what stands between an eye and points.
+
+Whatever can stand in the way is a row of one table of shapes. Of these, an eye that looks at a
+group of points needs those in the cone round the group; a line then meets some of their
+bounding spheres, and only the shapes in these are asked exactly.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+
+from hrc_env.errors import check_shape
+from hrc_env.geometry.shapes import (
+    AXES,
+    CENTRE,
+    KIND,
+    PLANE,
+    REACH,
+    WIDTH,
+    on_axis,
+    passage,
+    set_capsules,
+)
+from hrc_env.typing import Bools, Capsules, Floats, Points3
+
+NEAR_POINT_M = 0.08
+"""A line of sight ends this far before the point, so that what a joint touches (the table
+under a wrist, the floor under a foot) does not hide it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Surroundings:
+    """All that can stand between cameras and workers, but the workers, in B environments."""
+
+    still: Floats
+    """(G, `shapes.WIDTH`) what never moves, a shape a row."""
+    capsules_world: Capsules
+    """(B, K, 2, 3) the robot [m]."""
+    capsule_radius_m: Floats
+    """(K,) [m]."""
+
+
+def nothing(batch: int) -> Surroundings:
+    """Free lines of sight."""
+    return Surroundings(np.zeros((0, WIDTH)), np.zeros((batch, 0, 2, 3)), np.zeros(0))
+
+
+def hidden(surroundings: Surroundings, eyes_world: Points3, points_world: Points3) -> Bools:
+    """Whether anything stands between each eye and each point.
+
+    Args:
+        surroundings: of B environments.
+        eyes_world: (C, 3) [m].
+        points_world: (B, J, 3) [m].
+
+    Returns:
+        (B, C, J).
+    """
+    batch = len(surroundings.capsules_world)
+    check_shape("points_world", points_world.shape[::2], (batch, 3), "environments, ..., xyz")
+    eyes, points = np.ascontiguousarray(eyes_world), np.ascontiguousarray(points_world)
+    result = np.empty((batch, len(eyes), points.shape[1]), bool)
+    _hidden(
+        surroundings.still, surroundings.capsules_world, surroundings.capsule_radius_m,
+        eyes, points, result,
+    )  # fmt: skip
+    return result
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def make_table(still, n_more):
+    """A table that begins with `still` and has room for more shapes."""
+    table = np.empty((len(still) + n_more, WIDTH))
+    table[: len(still)] = still
+    return table
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def look(eye, points, table, view, rows):
+    """Find the shapes that can stand between an eye and any of the points (J, 3).
+
+    Args:
+        eye: (3,) [m].
+        points: (J, 3) [m].
+        table: (n, `WIDTH`) shapes.
+        view: (5, n) out: of those found, the sphere's centre from the eye [m], the squared
+            length of a tangent [m^2], the radius.
+        rows: (n,) out: their rows.
+
+    Returns:
+        How many.
+    """
+    ux, uy, uz, radius = _ball_round(eye, points)
+    far = math.sqrt(ux * ux + uy * uy + uz * uz)
+    sine = min(radius / far, 1.0)
+    cosine = math.sqrt(1.0 - sine * sine)
+    n = 0
+    for k in range(len(table)):
+        reach = table[k, REACH]
+        x, y, z = (
+            table[k, CENTRE] - eye[0],
+            table[k, CENTRE + 1] - eye[1],
+            table[k, CENTRE + 2] - eye[2],
+        )
+        squared = x * x + y * y + z * z
+        if table[k, KIND] == PLANE:
+            if not _is_between(eye, points, table, k):
+                continue
+        elif sine < 1.0:  # the lines are in a cone; is the sphere beside or behind it?
+            along = (x * ux + y * uy + z * uz) / far
+            aside = math.sqrt(max(squared - along * along, 0.0))
+            if aside * cosine - along * sine > reach or along > far + radius + reach:
+                continue
+        rows[n] = k
+        view[0, n], view[1, n], view[2, n] = x, y, z
+        view[3, n], view[4, n] = squared - reach * reach, reach
+        n += 1
+    return n
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _ball_round(eye, points):
+    """Middle, seen from an eye, and radius of a ball that holds points (J, 3)."""
+    x, y, z, n = 0.0, 0.0, 0.0, len(points)
+    for j in range(n):
+        x, y, z = x + points[j, 0], y + points[j, 1], z + points[j, 2]
+    x, y, z = x / n, y / n, z / n
+    farthest = 0.0
+    for j in range(n):
+        dx, dy, dz = points[j, 0] - x, points[j, 1] - y, points[j, 2] - z
+        farthest = max(farthest, dx * dx + dy * dy + dz * dz)
+    return x - eye[0], y - eye[1], z - eye[2], math.sqrt(farthest)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _is_between(eye, points, table, row):
+    """Whether an eye is in front of a plane and any of the points is not."""
+    centre = table[row, CENTRE:AXES]
+    level = on_axis(table, row, 2, centre[0], centre[1], centre[2])
+    if on_axis(table, row, 2, eye[0], eye[1], eye[2]) < level:
+        return False
+    lowest = math.inf
+    for j in range(len(points)):
+        lowest = min(lowest, on_axis(table, row, 2, points[j, 0], points[j, 1], points[j, 2]))
+    return lowest < level
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def meets(view, i, dx, dy, dz, length):
+    """Whether a line of a length and unit direction d meets the i-th sphere in view."""
+    along = view[0, i] * dx + view[1, i] * dy + view[2, i] * dz
+    reach = view[4, i]
+    return along * along >= view[3, i] and along >= -reach and along <= length + reach
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def blocks(enter, leave, length):
+    """Whether a surface is passed, going in or (from inside) out, before the line has ended."""
+    if enter > leave:
+        return False
+    first = enter if enter >= 0.0 else leave
+    return 0.0 <= first < length - NEAR_POINT_M
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def line(eye, points, j):
+    """Unit direction and length [m] of the way from an eye to one of the points (J, 3)."""
+    dx, dy, dz = points[j, 0] - eye[0], points[j, 1] - eye[1], points[j, 2] - eye[2]
+    length = math.sqrt(dx * dx + dy * dy + dz * dz)
+    scale = 1.0 / max(length, 1e-9)
+    return scale * dx, scale * dy, scale * dz, length
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _hidden(still, capsules, radius, eyes, points, hidden):
+    table = make_table(still, len(radius))
+    n = len(table)
+    view, rows = np.empty((5, n)), np.empty(n, np.int64)
+    for b in range(len(points)):
+        set_capsules(table, len(still), capsules[b], radius)
+        for c in range(len(eyes)):
+            n_view = look(eyes[c], points[b], table, view, rows)
+            for j in range(points.shape[1]):
+                hidden[b, c, j] = _is_hidden(eyes[c], points[b], j, table, view, rows, n_view)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _is_hidden(eye, points, j, table, view, rows, n_view):
+    dx, dy, dz, length = line(eye, points, j)
+    for i in range(n_view):
+        if meets(view, i, dx, dy, dz, length):
+            px, py, pz = -view[0, i], -view[1, i], -view[2, i]
+            enter, leave = passage(table, rows[i], px, py, pz, dx, dy, dz)
+            if blocks(enter, leave, length):
+                return True
+    return False
