@@ -25,7 +25,8 @@ def obstacles(model: mujoco.MjModel) -> Floats:
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    rows = [_row(model, data, geom) for geom in np.flatnonzero(model.geom_group == SOLID)]
+    solid = np.flatnonzero(model.geom_group == SOLID)
+    rows = [_row(model, data, int(geom)) for geom in solid]
     return np.array(rows).reshape(-1, WIDTH)
 
 

@@ -41,13 +41,13 @@ def assert_same(surroundings, model, data, eyes, points):
 def test_a_room_and_an_arm_in_any_pose_hide_what_rays_do_not_reach(clutter):
     scene, rng = build(SceneConfig(clutter=clutter)), np.random.default_rng(4)
     data, shares = mujoco.MjData(scene.model), []
-    room = np.array([[-3.2, -2.9, -0.1], [3.2, 2.9, 2.7]])
+    low, high = [-3.2, -2.9, -0.1], [3.2, 2.9, 2.7]
     for k in range(60):
         q = rng.uniform(-3, 3, (1, 6))
         data.qpos[:6] = q
         mujoco.mj_kinematics(scene.model, data)
-        eyes = np.concatenate([EYES, rng.uniform(*room, (3, 3))])
-        worker = rng.uniform(*room) + rng.uniform(-0.8, 0.8, (15, 3))
+        eyes = np.concatenate([EYES, rng.uniform(low, high, (3, 3))])
+        worker = rng.uniform(low, high) + rng.uniform(-0.8, 0.8, (15, 3))
         points = worker if k % 2 else rng.uniform([-1.6, -1, 0], [0.8, 1, 1.8], (15, 3))
         shares.append(assert_same(scene.surroundings(q), scene.model, data, eyes, points))
     assert 0.05 < np.mean(shares) < 0.6
