@@ -7,7 +7,6 @@ import pytest
 
 from hrc_env.body import load_body, rest_motion
 from hrc_env.errors import ConfigError
-from hrc_env.geometry import chains
 from hrc_env.records import WorkerPath
 from hrc_env.scene.build import build
 from hrc_env.scene.physics import Physics, no_workers

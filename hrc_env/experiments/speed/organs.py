@@ -32,7 +32,6 @@ ORGANS: Mapping[str, Sequence[Place]] = {
         (simulation, "worker_truth"),
         (simulation, "worker_capsules"),
     ),
-    "rays": ((Physics, "hidden"),),
     "emulator": ((emulator, "emulate"),),
     "tracking": ((senses.TrackingSenses, "sense"),),
     "distances": (
@@ -54,7 +53,7 @@ ORGANS: Mapping[str, Sequence[Place]] = {
     ),
     RESET: ((simulation.Simulation, "reset"),),
 }
-"""Level `keypoints`, one worker. `physics` has the controller in it, `distances` the robot's own
+"""Level `keypoints`, one worker. Lines of sight are part of the `emulator`. `physics` has the controller in it, `distances` the robot's own
 bodies, `reward` the task, and `tracking` whatever carries keypoints to the estimator."""
 
 
