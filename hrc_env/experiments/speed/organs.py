@@ -35,9 +35,7 @@ ORGANS: Mapping[str, Sequence[Place]] = {
     "emulator": ((emulator, "emulate"),),
     "tracking": ((senses.TrackingSenses, "sense"),),
     "distances": (
-        (chains, "robot_state"),
         (chains, "robot_along"),
-        (chains, "capsules"),
         (simulation, "estimated_gap"),
         (metrics, "cost"),
     ),
@@ -53,8 +51,9 @@ ORGANS: Mapping[str, Sequence[Place]] = {
     ),
     RESET: ((simulation.Simulation, "reset"),),
 }
-"""Level `keypoints`, one worker. Lines of sight are part of the `emulator`. `physics` has the controller in it, `distances` the robot's own
-bodies, `reward` the task, and `tracking` whatever carries keypoints to the estimator."""
+"""Level `keypoints`, one worker. Lines of sight are part of the `emulator`; `physics` has the
+controller in it, `distances` the robot's own bodies, `reward` the task, and `tracking` whatever
+carries keypoints to the estimator."""
 
 
 class Organs:
