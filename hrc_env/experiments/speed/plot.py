@@ -12,7 +12,7 @@ from hrc_env.experiments.speed.measured import REST, SINGLE, TOTAL, configuratio
 from hrc_env.experiments.speed.organs import ORGANS
 from hrc_env.results import Metric
 
-_COLOURS = (*(f"C{k}" for k in range(7)), "C8", "gold", "C9", "0.75")
+_COLOURS = (*(f"C{k}" for k in range(7)), "gold", "C9", "0.75")
 """Of the organs, of resets and of the rest."""
 
 
