@@ -82,13 +82,13 @@ class TrackerConfig:
     """Time constant with which it is learnt and forgotten [s]."""
     noise_persists_s: float = 0.5
     """How long errors of the detector persist where they do [s]; BlazePose's: half a second."""
+    noise_share: float = 0.9
+    """Share of the variance that is thought to persist before anything was learnt, as BlazePose's
+    does; 0 for a detector that is known to be wrong anew in every image. [0, 1)"""
     min_std_m: float = 0.005
     """No standard deviation, in any direction, is reported as less than this [m]."""
     velocity_tau_s: float = 0.2
     """Time constant of the difference filter for velocities (paper, triangulation) [s]."""
-    noise_share: float = 0.9
-    """Share of the variance that is thought to persist before anything was learnt, as BlazePose's
-    does; 0 for a detector that is known to be wrong anew in every image. [0, 1)"""
     hold_speed_m_s: float = 1.0
     """How fast a held point loses its worth in gaps (triangulation) [m/s]."""
 
