@@ -15,6 +15,7 @@ from hrc_env.typing import (
     Capsules,
     Covariances3,
     Floats,
+    Ints,
     JointAngles,
     JointVelocities,
     Points2,
@@ -122,3 +123,58 @@ class RobotState:
     """(B, K, 2, 3) [m]."""
     capsule_radius_m: Floats
     """(K,) [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Workplace:
+    """A place where a worker stands and works."""
+
+    name: str
+    """Unique in its scene."""
+    kind: str
+    """One of `WORKPLACE_KINDS`."""
+    xy_m: tuple[float, float]
+    """Where the worker stands [m]."""
+    yaw_rad: float
+    """Which way the worker looks, from world +x [rad]."""
+    height_m: float
+    """How high above the floor the work is [m]: where hands work, a load is gripped, or how
+    high a step is; 0 where there is nothing."""
+
+
+WORKPLACE_KINDS = ("robot", "bench", "floor", "wall", "overhead", "pile", "cart", "step", "open")
+"""Beside the robot, hands in its workspace; at a table; kneeling; at a wall; above the head;
+at materials to lift; where a cart is taken or left; before a tread 0.3 m ahead; nothing there."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Grounds:
+    """Where people can stand, walk and work in a scene."""
+
+    walkable_x_m: tuple[float, float]
+    """Where workers stand and walk, least and greatest x [m]."""
+    walkable_y_m: tuple[float, float]
+    """The same along y [m]."""
+    blocked: Floats
+    """(N, 5) footprints of what stands on the floor, the robot's pedestal left out: middle x
+    and y, half length and half width [m], yaw of the length from world +x [rad]."""
+    places: tuple[Workplace, ...]
+    """Where there is work, all of them inside the walkable area and outside `blocked`."""
+    robot_xy_m: tuple[float, float]
+    """The axis of the robot's first joint [m]."""
+    robot_front_rad: float
+    """Where the robot's front looks to, from world +x [rad]."""
+    robot_clearance_m: float
+    """Paths keep so far from that axis [m]: a pedestal's radius and half a person."""
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """What the workers' hands hold, and where it is; see `props.PROPS`."""
+
+    kind: Ints
+    """(B, W) index into `props.PROPS`; 0: nothing."""
+    position_world: Points3
+    """(B, W, 3) origin of the prop's frame [m]; of no meaning where nothing is held."""
+    quaternion_wxyz: QuaternionsWxyz
+    """(B, W, 4) world_from_prop."""

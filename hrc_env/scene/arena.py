@@ -11,6 +11,7 @@ import numpy as np
 
 from hrc_env.geometry.rotations import quaternion_from_matrix
 from hrc_env.scene import furniture, textures
+from hrc_env.scene.grounds import ROBOT_XY_M
 from hrc_env.scene.primitives import (
     HIDES,
     LOOKS_ONLY,
@@ -27,7 +28,6 @@ from hrc_env.scene.textures import Paint
 LENGTH_M, DEPTH_M, HEIGHT_M = 6.09, 5.48, 2.59
 FLOOR_PX_PER_M = 220
 WALL_PX_PER_M = 180
-ROBOT_XY = (-0.75, 0.0)
 REACH_M = 1.35
 YELLOW, BLACK, WHITE = (222, 176, 20), (34, 34, 34), (226, 226, 220)
 
@@ -54,7 +54,7 @@ def _floor() -> Paint:
     height, width = paint.shape[:2]
     x = (np.arange(width) + 0.5)[None] / FLOOR_PX_PER_M - LENGTH_M / 2
     y = DEPTH_M / 2 - (np.arange(height) + 0.5)[:, None] / FLOOR_PX_PER_M
-    dx, dy = x - ROBOT_XY[0], y - ROBOT_XY[1]
+    dx, dy = x - ROBOT_XY_M[0], y - ROBOT_XY_M[1]
     worn = np.random.default_rng(5).random(paint.shape[:2]) < 0.9
     patchy = textures.noise(np.random.default_rng(6), (height, width), (40, 40)) > -1.7
     worn &= patchy

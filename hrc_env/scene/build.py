@@ -15,15 +15,17 @@ from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.geometry.chains import SerialChain, capsules
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.geometry.sight import Surroundings
+from hrc_env.records import Grounds
 from hrc_env.scene.arena import add_lab, paint_lab
 from hrc_env.scene.arm import DAMPING_NMS_RAD, HOME_Q, add_arm, arm_chain
+from hrc_env.scene.grounds import ROBOT_XY_M, lab_grounds
 from hrc_env.scene.obstacles import obstacles
 from hrc_env.scene.primitives import DECORATION, OVERHEAD, ROBOT_BIT, ROBOT_LOOKS
 from hrc_env.scene.rig import LAB_CAMERAS, CameraConfig, add_cameras, pinholes, select
 from hrc_env.scene.worker import add_worker, mocap_ids
 from hrc_env.typing import Floats, Ints, JointAngles
 
-ROBOT_BASE_WORLD = (-0.75, 0.0, 0.75)
+ROBOT_BASE_WORLD = (*ROBOT_XY_M, 0.75)
 """The middle of the arm's foot, on the pedestal [m]."""
 ROBOT_YAW_RAD = math.pi
 """The arm reaches along its own -x, which so looks to world +x."""
@@ -64,9 +66,11 @@ class Room:
     """Adds it to an MjSpec, with clutter or without."""
     paint: Callable[[Any], None]
     """Paints its surfaces; only done when somebody looks."""
+    grounds: Callable[[Floats, bool], Grounds]
+    """Where people walk and work, from what stands there, with clutter or without."""
 
 
-SCENES: dict[str, Room] = {"lab": Room(add_lab, paint_lab)}
+SCENES: dict[str, Room] = {"lab": Room(add_lab, paint_lab, lab_grounds)}
 """The scenes by name."""
 
 
@@ -90,6 +94,8 @@ class Scene:
     """(W, S) mocap row of every body segment of every worker."""
     obstacles: Floats
     """(G, `shapes.WIDTH`) what stands still and blocks sight."""
+    grounds: Grounds
+    """Where people can stand, walk and work."""
 
     def surroundings(self, q: JointAngles) -> Surroundings:
         """What can stand before cameras, the arm at angles q (B, N) [rad]."""
@@ -141,6 +147,7 @@ def _build(
     _pair(spec)
     model = spec.compile()
     rows = [mocap_ids(model, _prefix(worker)) for worker in range(n_workers)]
+    still = obstacles(model)
     return Scene(
         config=config,
         name=name,
@@ -152,7 +159,8 @@ def _build(
         home_q=HOME_Q.copy(),
         servo_lead_s=_servo_lead_s(model),
         worker_mocap=np.stack(rows) if rows else np.zeros((0, 0), np.int64),
-        obstacles=obstacles(model),
+        obstacles=still,
+        grounds=SCENES[name].grounds(still, config.clutter),
     )
 
 
