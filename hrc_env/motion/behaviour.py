@@ -7,12 +7,15 @@ a `MotionConfig` in the form that `config.numbers` gives.
 
 import math
 
+import numpy as np
+
 from hrc_env.motion import plans as pl
 from hrc_env.motion.compiled import compiled
 from hrc_env.motion.config import MotionConfig
 from hrc_env.motion.curves import wrap
 from hrc_env.motion.hands import plan_lift, plan_reach
-from hrc_env.motion.walk import along, plan_walk
+from hrc_env.motion.paths import along, lay_path
+from hrc_env.motion.walk import plan_walk
 from hrc_env.typing import Floats
 
 N_DRAWS = 40
@@ -68,25 +71,26 @@ def choose_place(
 
 
 @compiled
-def _via(draw: float, plan: Floats, config: MotionConfig) -> tuple[float, float]:
-    """Middle point of a path that keeps clear of the robot; START and END are set."""
+def _via(draw: float, plan: Floats, config: MotionConfig) -> Floats:
+    """The corner (1, 3) of a path that keeps clear of the robot; START and END are set."""
     x0, y0, x2, y2 = plan[pl.START_X], plan[pl.START_Y], plan[pl.END_X], plan[pl.END_Y]
-    bow = 0.24 * (draw - 0.5)
+    bow, via = 0.24 * (draw - 0.5), np.full((1, 3), 5.0)
     x = 0.5 * (x0 + x2) - bow * (y2 - y0)
     y = 0.5 * (y0 + y2) + bow * (x2 - x0)
     bx, by = config.robot_xy_m
     for _ in range(24):
-        plan[pl.VIA_X] = x = min(max(x, config.walkable_x_m[0]), config.walkable_x_m[1])
-        plan[pl.VIA_Y] = y = min(max(y, config.walkable_y_m[0]), config.walkable_y_m[1])
+        via[0, 0] = x = min(max(x, config.walkable_x_m[0]), config.walkable_x_m[1])
+        via[0, 1] = y = min(max(y, config.walkable_y_m[0]), config.walkable_y_m[1])
+        lay_path((x0, y0), via, (x2, y2), plan)
         nearest = 1e9
         for i in range(1, 12):
-            px, py, _ = along(i / 12.0, plan)
+            px, py = along(i / 12.0 * plan[pl.LENGTH], plan)
             nearest = min(nearest, math.hypot(px - bx, py - by))
         away = math.hypot(x - bx, y - by)
         if nearest >= config.clearance_m + SWAY_M or away < 1e-6:
             break
         x, y = x + 0.1 * (x - bx) / away, y + 0.1 * (y - by) / away
-    return x, y
+    return via
 
 
 @compiled

@@ -14,12 +14,16 @@ STEP_START, STEP_PERIOD, STEP_SWING, STEP_FIRST, STEP_COUNT = 6, 7, 8, 9, 10
 OWN = 12
 """First column of the activity's own."""
 
-VIA_X, VIA_Y, LENGTH, DEPART, RAMP, DURATION, SPEED = range(OWN, OWN + 7)
+SHARPEST, N_PIECES, LENGTH, DEPART, RAMP, DURATION, SPEED = range(OWN, OWN + 7)
 TURN_IN, TURN_IN_S, TURN_OUT, TURN_OUT_AT, TURN_OUT_S, FOLLOW = range(OWN + 7, OWN + 13)
-"""Walk. Middle point and length of the path, when the root sets off, how long it gathers
-speed, how long it travels, its top speed; how far the path's first heading is from the
-worker's, how long that turn takes; the same at the end, with its
+"""Walk. Greatest curvature of the path [1/m], number of its pieces, its length, when the root
+sets off, how long it gathers speed, how long it travels, its top speed; how far the path's first
+heading is from the worker's, how long that turn takes; the same at the end, with its
 beginning; whether they face along the path (1) or side-step (0)."""
+MAX_VIA, PIECE = 8, 6
+"""Most corners of a path; columns of a piece, see `paths`."""
+PATH = OWN + 40
+"""Walk. First of the path's pieces, a line before, between and after the corners' arcs."""
 
 LEAN, TWIST, SQUAT, OUT_AT, OUT_S, HOLD_S, BACK_S = range(OWN, OWN + 7)
 """Reach and lift. How far the trunk goes (1: as far as it can), its turn, share of squatting;
@@ -30,10 +34,10 @@ USE_LEFT, USE_RIGHT, FIDGET, FIDGET_HZ = range(OWN + 15, OWN + 19)
 """Reach. Which hands go (1) or stay (0); size [m] and rate of the work they do out there."""
 RAISED, RAISE_S, CARRY_S = OWN + 19, OWN + 25, OWN + 26
 """Lift. Where the grips are with the load held up (3 + 3), how long raising and carrying take."""
-N_PLAN = OWN + 27
+N_PLAN = PATH + PIECE * (2 * MAX_VIA + 1)
 
-MAX_STEPS = 40
-"""Most steps of one walk; a walk across the room with half a turn at each end takes 25."""
+MAX_STEPS = 72
+"""Most steps of one walk: 30 m at the pace of 0.8 m/s, and turns at its ends."""
 
 SPEED_TRAIT, SQUAT_TRAIT, RIGHT_HANDED, PHASE = 0, 1, 2, 3
 """What a worker keeps for an episode: walking speed, share of squatting when lifting,

@@ -1,4 +1,4 @@
-"""Walking: a curved path, a speed that rises and falls, footsteps laid along it.
+"""Walking: along a path, at a speed that rises and falls, footsteps laid along it.
 
 Cadence and step length follow 68 walking trials of the CMU motion-capture database at
 0.8 to 2 m/s: cadence = 96.2 v^0.468 steps/min, step length = 0.345 + 0.286 v m.
@@ -12,6 +12,7 @@ from hrc_env.motion.anatomy import ANKLE_X
 from hrc_env.motion.compiled import compiled
 from hrc_env.motion.curves import min_jerk, ramp, wrap
 from hrc_env.motion.feet import FLAT_S
+from hrc_env.motion.paths import along, facing, lay_path
 from hrc_env.motion.posture import (
     RELAXED_ELBOW,
     RELAXED_PITCH,
@@ -35,6 +36,8 @@ SHIFT_S, TURN_S, TURN_RATE = 0.28, 0.5, 1.7
 SIDE_STEP_M_S, SIDE_STEP_PERIOD_S, SIDE_STEP_M = 0.2, 0.52, 0.5
 """Going nowhere far (nearer than SIDE_STEP_M), people do not turn: they take small steps, slow
 enough that the feet never cross; judgement."""
+CORNER_M_S2 = 1.6
+"""Walkers slow down so that corners accelerate them sideways by no more [m/s^2]; judgement."""
 NORMAL_M_S = 1.3
 """Speed at which the amplitudes below hold."""
 
@@ -57,25 +60,14 @@ def speed(t: float, plan: Floats) -> float:
 
 
 @compiled
-def along(u: float, plan: Floats) -> tuple[float, float, float]:
-    """Point of the path (a quadratic Bezier curve) at share u, and its direction."""
-    x0, y0, x1, y1 = plan[pl.START_X], plan[pl.START_Y], plan[pl.VIA_X], plan[pl.VIA_Y]
-    x2, y2 = plan[pl.END_X], plan[pl.END_Y]
-    v = 1.0 - u
-    x = v * v * x0 + 2.0 * u * v * x1 + u * u * x2
-    y = v * v * y0 + 2.0 * u * v * y1 + u * u * y2
-    tx, ty = v * (x1 - x0) + u * (x2 - x1), v * (y1 - y0) + u * (y2 - y1)
-    return x, y, math.atan2(ty, tx)
-
-
-@compiled
 def root(t: float, plan: Floats) -> tuple[float, float, float]:
     """Where the walker's middle is at time t, and their heading (continuous, not wrapped)."""
-    x, y, direction = along(min(travelled(t, plan) / plan[pl.LENGTH], 1.0), plan)
+    s = travelled(t, plan)
+    x, y = along(s, plan)
     turning = min_jerk(t / plan[pl.TURN_IN_S])
     yaw = plan[pl.START_YAW] - plan[pl.TURN_IN] * turning
     if plan[pl.FOLLOW] > 0.0:
-        yaw += wrap(direction - (plan[pl.START_YAW] - plan[pl.TURN_IN]))
+        yaw += facing(min(s, plan[pl.LENGTH]), plan) - facing(0.0, plan)
     turned = min_jerk((t - plan[pl.TURN_OUT_AT]) / plan[pl.TURN_OUT_S])
     return x, y, yaw + plan[pl.TURN_OUT] * turned
 
@@ -119,21 +111,20 @@ def walk(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q
 
 @compiled
 def plan_walk(
-    start: tuple[float, float, float], via: tuple[float, float], end: tuple[float, float, float],
+    start: tuple[float, float, float], via: Floats, end: tuple[float, float, float],
     wished_m_s: float, plan: Floats, prints: Floats, stance: Floats, size: Floats,
 ) -> float:  # fmt: skip
-    """Plan to go from (x, y, yaw) to (x, y, yaw) by way of `via`; returns the duration [s]."""
+    """Plan to go from (x, y, yaw) to (x, y, yaw) past corners `via` (n, 3: `lay_path`).
+
+    Returns the duration [s].
+    """
     plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW] = start
-    plan[pl.VIA_X], plan[pl.VIA_Y] = via
     plan[pl.END_X], plan[pl.END_Y] = end[0], end[1]
-    length, x, y = 1e-6, start[0], start[1]
-    for i in range(1, 17):
-        nx, ny, _ = along(i / 16.0, plan)
-        length += math.hypot(nx - x, ny - y)
-        x, y = nx, ny
-    follow = 1.0 if length > SIDE_STEP_M else 0.0
-    plan[pl.LENGTH], plan[pl.FOLLOW] = length, follow
-    wished = wished_m_s if follow > 0.0 else SIDE_STEP_M_S
+    lay_path((start[0], start[1]), via, (end[0], end[1]), plan)
+    length = plan[pl.LENGTH]
+    plan[pl.FOLLOW] = follow = 1.0 if length > SIDE_STEP_M else 0.0
+    bend = math.sqrt(CORNER_M_S2 / max(plan[pl.SHARPEST], 1e-6))
+    wished = min(wished_m_s, max(bend, SLOWEST_M_S)) if follow > 0.0 else SIDE_STEP_M_S
     plan[pl.RAMP] = 0.45 + 0.4 * wished
     plan[pl.SPEED] = min(wished, length / plan[pl.RAMP])
     plan[pl.DURATION] = length / plan[pl.SPEED] + plan[pl.RAMP]
@@ -142,21 +133,41 @@ def plan_walk(
     period = period if follow > 0.0 else SIDE_STEP_PERIOD_S
     plan[pl.STEP_PERIOD], plan[pl.STEP_SWING] = period, SWING_SHARE * period
     plan[pl.STEP_START] = SHIFT_S
-    return _plan_steps(plan, prints, stance, size)
+    plan[pl.STEP_FIRST] = _first_foot(plan)
+    return _plan_steps(0, plan, prints, stance, size)
+
+
+@compiled
+def brake(t: float, plan: Floats, prints: Floats, stance: Floats, size: Floats) -> float:
+    """Come to a stand on the path as soon as a walker can from time t; the new duration [s].
+
+    What has happened until t stays as it was, and so do the landings of feet in the air.
+    Returns -1 for one who is about to arrive, and goes on.
+    """
+    going = max(t - plan[pl.DEPART], plan[pl.RAMP])
+    if plan[pl.FOLLOW] == 0.0 or going + plan[pl.RAMP] >= plan[pl.DURATION]:
+        return -1.0
+    plan[pl.DURATION] = going + plan[pl.RAMP]
+    plan[pl.TURN_OUT], plan[pl.TURN_OUT_S] = 0.0, 1.0
+    plan[pl.TURN_OUT_AT] = plan[pl.DEPART] + plan[pl.DURATION] - 1.0
+    plan[pl.END_X], plan[pl.END_Y], plan[pl.END_YAW] = root(
+        plan[pl.DEPART] + plan[pl.DURATION] + 1.0, plan
+    )
+    lifted = math.floor((t - plan[pl.STEP_START]) / plan[pl.STEP_PERIOD]) + 1
+    return _plan_steps(max(int(lifted), 0), plan, prints, stance, size)
 
 
 @compiled
 def _plan_turns(end_yaw: float, plan: Floats) -> None:
     """Turn into the path and out of it; who must turn far sets off when the turn is nearly done."""
-    _, _, first = along(0.0, plan)
-    _, _, final = along(1.0, plan)
+    first, final = facing(0.0, plan), facing(plan[pl.LENGTH], plan)
     start_yaw = plan[pl.START_YAW]
     turn = wrap(start_yaw - first) if plan[pl.FOLLOW] > 0.0 else 0.0
     plan[pl.TURN_IN], plan[pl.TURN_IN_S] = turn, TURN_S + abs(turn) / TURN_RATE
     plan[pl.DEPART] = SHIFT_S + 0.10 + max(0.0, plan[pl.TURN_IN_S] - TURN_S - 0.45)
     arrival = plan[pl.DEPART] + plan[pl.DURATION]
     heading = start_yaw - turn
-    heading += wrap(final - heading) if plan[pl.FOLLOW] > 0.0 else 0.0
+    heading += final - first if plan[pl.FOLLOW] > 0.0 else 0.0
     turn = wrap(end_yaw - heading)
     plan[pl.TURN_OUT], plan[pl.TURN_OUT_S] = turn, TURN_S + abs(turn) / TURN_RATE
     plan[pl.TURN_OUT_AT] = max(arrival - 0.7, SHIFT_S) if plan[pl.FOLLOW] > 0.0 else SHIFT_S
@@ -164,14 +175,17 @@ def _plan_turns(end_yaw: float, plan: Floats) -> None:
 
 
 @compiled
-def _plan_steps(plan: Floats, prints: Floats, stance: Floats, size: Floats) -> float:
-    """Lay footprints where the root will pass at mid-stance; the last two stand at the end."""
+def _plan_steps(first: int, plan: Floats, prints: Floats, stance: Floats, size: Floats) -> float:
+    """Lay footprints from a step on where the root will pass at mid-stance; when all is over [s].
+
+    The last two stand at the end. Steps before the first are taken already.
+    """
     period, start = plan[pl.STEP_PERIOD], plan[pl.STEP_START]
     done = max(plan[pl.DEPART] + plan[pl.DURATION], plan[pl.TURN_OUT_AT] + plan[pl.TURN_OUT_S])
     over = start + (SWING_SHARE + MID_STANCE) * period
-    count = min(max(2 + math.ceil((done - 0.12 - over) / period), 2), pl.MAX_STEPS)
-    plan[pl.STEP_COUNT], plan[pl.STEP_FIRST] = count, _first_foot(plan)
-    for k in range(count):
+    count = min(max(2 + math.ceil((done - 0.12 - over) / period), first + 2), pl.MAX_STEPS)
+    plan[pl.STEP_COUNT] = count
+    for k in range(first, count):
         side = (k + int(plan[pl.STEP_FIRST])) % 2
         when = over + k * period if k < count - 2 else done + 1.0
         x, y, yaw = root(when, plan)

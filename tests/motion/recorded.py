@@ -43,7 +43,7 @@ def walk_straight(speed_m_s, length_m=6.0, dt_s=0.005):
     plan[:] = 0.0
     for side in range(2):
         footprint(side, 0.0, 0.0, 0.0, STANCE_HALF_WIDTH_M, size, stance[side])
-    start, via, end = (0.0, 0.0, 0.0), (length_m / 2, 0.0), (length_m, 0.0, 0.0)
+    start, via, end = (0.0, 0.0, 0.0), np.zeros((0, 3)), (length_m, 0.0, 0.0)
     lasts = plan_walk(start, via, end, speed_m_s, plan, prints, stance, size)
     state.activity[:], state.time_s[:], state.duration_s[:] = pl.WALK, 0.0, lasts
     state.offset[:] = 0.0
