@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.geometry.rotations import about_axis
 from hrc_env.geometry.shapes import BOX, CAPSULE, WIDTH, shape
 from hrc_env.typing import Floats, Points3
 
@@ -34,9 +33,9 @@ def prop_index(name: str) -> int:
     return PROP_NAMES.index(name)
 
 
-def _box(centre: Triple, size: Triple, pitch_rad: float = 0.0) -> Floats:
-    """A box of full edge lengths, turned about y."""
-    return shape(BOX, np.array(centre, float), about_axis("y", pitch_rad), np.array(size) / 2)
+def _box(centre: Triple, size: Triple) -> Floats:
+    """A box of full edge lengths."""
+    return shape(BOX, np.array(centre, float), np.eye(3), np.array(size) / 2)
 
 
 def _rod(start: Triple, end: Triple, radius: float) -> Floats:
@@ -116,7 +115,7 @@ def _wheelbarrow() -> Prop:
     """Level on its wheel while its handles are held."""
     parts = [
         *(_rod((-0.10, y, 0.72), (1.15, 0.3 * y, 0.26), 0.018) for y in (-0.29, 0.29)),
-        _box((0.66, 0, 0.60), (0.80, 0.58, 0.28), 0.12),
+        _box((0.68, 0, 0.63), (0.80, 0.58, 0.36)),
         _box((1.20, 0, 0.19), (0.34, 0.08, 0.34)),
         *(_rod((0.42, y, 0.16), (0.40, y, 0.48), 0.016) for y in (-0.20, 0.20)),
     ]

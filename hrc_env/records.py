@@ -80,6 +80,18 @@ class WorkerPath:
 
 
 @dataclass(frozen=True, slots=True)
+class Held:
+    """What the workers' hands hold, and where it is; see `props.PROPS`."""
+
+    kind: Ints
+    """(B, W) index into `props.PROPS`; 0: nothing."""
+    position_world: Points3
+    """(B, W, 3) origin of the prop's frame [m]; of no meaning where nothing is held."""
+    quaternion_wxyz: QuaternionsWxyz
+    """(B, W, 4) world_from_prop."""
+
+
+@dataclass(frozen=True, slots=True)
 class WorkerMotion:
     """Where the worker's body is and how it moves: what the motion generator says."""
 
@@ -91,6 +103,8 @@ class WorkerMotion:
     """(B, W, S, 3) velocity of the origins [m/s], from the generator."""
     angular_velocity_world: Floats
     """(B, W, S, 3) [rad/s]."""
+    held: Held | None = None
+    """What their hands hold; None: nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,15 +180,3 @@ class Grounds:
     """Where the robot's front looks to, from world +x [rad]."""
     robot_clearance_m: float
     """Paths keep so far from that axis [m]: a pedestal's radius and half a person."""
-
-
-@dataclass(frozen=True, slots=True)
-class Held:
-    """What the workers' hands hold, and where it is; see `props.PROPS`."""
-
-    kind: Ints
-    """(B, W) index into `props.PROPS`; 0: nothing."""
-    position_world: Points3
-    """(B, W, 3) origin of the prop's frame [m]; of no meaning where nothing is held."""
-    quaternion_wxyz: QuaternionsWxyz
-    """(B, W, 4) world_from_prop."""

@@ -104,7 +104,7 @@ def current(state: MotionState, ids: Ints | None = None) -> WorkerMotion:
     rows = np.arange(batch) if ids is None else np.asarray(ids, np.int64)
     out = _blank((len(rows), n_workers), 3, 4, 3, 3)
     _draw(rows, *_arrays(state)[:9], *_constants(state)[1:], *out)
-    return WorkerMotion(*out)
+    return WorkerMotion(out[0], out[1], out[2], out[3])
 
 
 def activity(state: MotionState) -> Ints:

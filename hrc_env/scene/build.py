@@ -21,6 +21,7 @@ from hrc_env.scene.arm import DAMPING_NMS_RAD, HOME_Q, add_arm, arm_chain
 from hrc_env.scene.grounds import ROBOT_XY_M, lab_grounds
 from hrc_env.scene.obstacles import obstacles
 from hrc_env.scene.primitives import DECORATION, OVERHEAD, ROBOT_BIT, ROBOT_LOOKS
+from hrc_env.scene.props import add_props, paint_props, prop_mocap
 from hrc_env.scene.rig import LAB_CAMERAS, CameraConfig, add_cameras, pinholes, select
 from hrc_env.scene.worker import add_worker, mocap_ids
 from hrc_env.typing import Floats, Ints, JointAngles
@@ -146,7 +147,7 @@ def _build(
     _strip(spec)
     _pair(spec)
     model = spec.compile()
-    rows = [mocap_ids(model, _prefix(worker)) for worker in range(n_workers)]
+    rows = [mocap_ids(model, prefix) for prefix in _prefixes(n_workers)]
     still = obstacles(model)
     return Scene(
         config=config,
@@ -166,10 +167,20 @@ def _build(
 
 @lru_cache(maxsize=4)
 def drawing_model(scene: Scene) -> mujoco.MjModel:
-    """The scene with everything that only the eye needs; the same state fits both models."""
+    """The scene with everything that only the eye needs: looks, and what workers hold.
+
+    The physics' joints and its mocap rows come first, in the same order, so that its state fits.
+    """
     spec = _spec(scene.config, scene.name, scene.n_workers, scene.body_name, scene.cameras)
+    add_props(spec, _prefixes(scene.n_workers))
     SCENES[scene.name].paint(spec)
+    paint_props(spec)
     return spec.compile()
+
+
+def drawn_props(scene: Scene) -> Ints:
+    """(W, len(PROPS) - 1) mocap rows in the drawing model of what the workers can hold."""
+    return prop_mocap(drawing_model(scene), _prefixes(scene.n_workers))
 
 
 def _spec(
@@ -190,10 +201,10 @@ def _spec(
     SCENES[name].add(spec, config.clutter)
     add_arm(spec, ROBOT_BASE_WORLD, ROBOT_YAW_RAD)
     add_cameras(spec, cameras)
-    for worker in range(n_workers):
-        add_worker(spec, load_body(body_name), load_looks(body_name), _prefix(worker))
+    for prefix in _prefixes(n_workers):
+        add_worker(spec, load_body(body_name), load_looks(body_name), prefix)
         # A hat in group 0 would hide its own wearer's nose from the rays.
-        spec.geom(f"{_prefix(worker)}hat").group = DECORATION
+        spec.geom(f"{prefix}hat").group = DECORATION
     return spec
 
 
@@ -222,9 +233,9 @@ def _pair(spec: mujoco.MjSpec) -> None:
         geom.contype = geom.conaffinity = 0
 
 
-def _prefix(worker: int) -> str:
-    """What the names of a worker's bodies start with."""
-    return f"worker_{worker + 1}/"
+def _prefixes(n_workers: int) -> tuple[str, ...]:
+    """What the names of the workers' bodies start with."""
+    return tuple(f"worker_{worker + 1}/" for worker in range(n_workers))
 
 
 def _servo_lead_s(model: mujoco.MjModel) -> Floats:

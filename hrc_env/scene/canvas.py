@@ -18,7 +18,8 @@ from hrc_env.errors import RenderingError, check_shape
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.records import CropWindow, WorkerMotion
 from hrc_env.scene import gl
-from hrc_env.scene.build import Scene, drawing_model
+from hrc_env.scene.build import Scene, drawing_model, drawn_props
+from hrc_env.scene.props import pose_props
 from hrc_env.scene.rig import glcam_axes
 from hrc_env.typing import Image, JointAngles
 
@@ -46,6 +47,7 @@ class Canvas:
         view = self._model.vis.global_
         view.offwidth, view.offheight = width_px, height_px
         self._data = mujoco.MjData(self._model)
+        self._props = drawn_props(scene)
         self._option = mujoco.MjvOption()
         self._option.sitegroup[:] = 0
         self._camera = mujoco.MjvCamera()
@@ -60,13 +62,14 @@ class Canvas:
         self.groups(groups)
 
     def pose(self, q: JointAngles, motion: WorkerMotion | None) -> None:
-        """Put the arm at q (N,) and the workers where `motion` (W, S, ...) has them."""
+        """Put the arm at q (N,), the workers and what they hold where `motion` (W, S, ...) says."""
         check_shape("q", np.shape(q), self._scene.home_q.shape, "one angle per joint")
         self._data.qpos[: len(q)] = q
         rows = self._scene.worker_mocap
         if rows.size and motion is not None:
             self._data.mocap_pos[rows] = np.reshape(motion.position_world, (*rows.shape, 3))
             self._data.mocap_quat[rows] = np.reshape(motion.quaternion_wxyz, (*rows.shape, 4))
+            pose_props(self._model, self._data, self._props, motion.held)
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_comPos(self._model, self._data)
         mujoco.mj_camlight(self._model, self._data)

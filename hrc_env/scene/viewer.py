@@ -7,7 +7,8 @@ import mujoco
 
 from hrc_env.errors import RenderingError
 from hrc_env.records import WorkerMotion
-from hrc_env.scene.build import Scene, drawing_model
+from hrc_env.scene.build import Scene, drawing_model, drawn_props
+from hrc_env.scene.props import pose_props
 from hrc_env.typing import JointAngles
 
 
@@ -31,6 +32,7 @@ class Viewer:
         """
         self._scene, self._model = scene, viewing_model(scene)
         self._data = mujoco.MjData(self._model)
+        self._props = drawn_props(scene)
         try:
             from mujoco import viewer
 
@@ -51,6 +53,7 @@ class Viewer:
             if rows.size:
                 self._data.mocap_pos[rows] = motion.position_world
                 self._data.mocap_quat[rows] = motion.quaternion_wxyz
+                pose_props(self._model, self._data, self._props, motion.held)
             mujoco.mj_forward(self._model, self._data)
         self._window.sync()
 

@@ -8,6 +8,7 @@ import pytest
 
 from hrc_env.errors import ConfigError
 from hrc_env.geometry.sight import hidden
+from hrc_env.props import PROPS
 from hrc_env.scene.build import SceneConfig, build, drawing_model
 from hrc_env.scene.primitives import DECORATION, OVERHEAD, ROBOT_LOOKS, SOLID
 
@@ -37,7 +38,8 @@ def test_physics_is_spared_what_only_the_eye_needs():
 def test_both_models_share_one_state():
     scene = build(n_workers=1)
     drawn = drawing_model(scene)
-    assert (drawn.nq, drawn.nu, drawn.nmocap) == (scene.model.nq, scene.model.nu, 22)
+    assert (drawn.nq, drawn.nu, scene.model.nmocap) == (scene.model.nq, scene.model.nu, 22)
+    assert drawn.nmocap == 22 + len(PROPS) - 1
     for segment in ("pelvis", "head", "left_hand"):
         name = f"worker_1/{segment}"
         physics_row = scene.model.body_mocapid[scene.model.body(name).id]

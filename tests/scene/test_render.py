@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from hrc_env.batching import mapped
 from hrc_env.body import load_body, rest_motion
 from hrc_env.errors import ConfigError, RenderingError
 from hrc_env.geometry.cameras import project, projections, rays
@@ -81,7 +82,7 @@ def lab():
 def person() -> WorkerMotion:
     rest = rest_motion(load_body())
     moved = replace(rest, position_world=rest.position_world + np.array([0.9, 0.3, 0.0]))
-    return WorkerMotion(*(getattr(moved, name)[None] for name in moved.__slots__))
+    return mapped(moved, lambda array: array[None])
 
 
 @pytest.fixture(scope="module")

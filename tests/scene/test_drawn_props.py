@@ -1,0 +1,88 @@
+"""Props are drawn where hands hold them and nowhere else; physics does not know them."""
+
+import copy
+import itertools
+
+import mujoco
+import numpy as np
+import pytest
+
+from hrc_env.geometry.shapes import AXES, BOX, CENTRE, HALF_SIZE, KIND
+from hrc_env.props import PROP_NAMES, PROPS, prop_index
+from hrc_env.records import Held
+from hrc_env.scene.build import build, drawing_model, drawn_props
+from hrc_env.scene.primitives import DECORATION
+from hrc_env.scene.props import PARKED_M, pose_props
+
+SCENE = build(n_workers=2)
+
+
+@pytest.fixture
+def drawn():
+    model = copy.copy(drawing_model(SCENE))
+    return model, mujoco.MjData(model)
+
+
+def bounds_of_shapes(prop):
+    """(2, 3) least and greatest corner of a prop's shapes [m]."""
+    axes = np.abs(prop.shapes[:, AXES:HALF_SIZE].reshape(-1, 3, 3))
+    half = prop.shapes[:, HALF_SIZE : HALF_SIZE + 3]
+    boxes = np.einsum("gi,gij->gj", half, axes)
+    rods = half[:, 1:2] * axes[:, 2] + half[:, :1]
+    reach = np.where(prop.shapes[:, KIND, None] == BOX, boxes, rods)
+    centre = prop.shapes[:, CENTRE:AXES]
+    return np.stack([(centre - reach).min(0), (centre + reach).max(0)])
+
+
+def test_physics_has_the_workers_bodies_only():
+    assert SCENE.model.nmocap == SCENE.worker_mocap.size
+    assert drawn_props(SCENE).min() == SCENE.model.nmocap
+
+
+def test_what_is_not_held_is_under_the_floor(drawn):
+    model, data = drawn
+    rows = drawn_props(SCENE)
+    np.testing.assert_allclose(data.mocap_pos[rows].reshape(-1, 3), [PARKED_M] * rows.size)
+    pose_props(model, data, rows, Held(np.zeros(2, int), np.ones((2, 3)), np.ones((2, 4))))
+    assert (data.mocap_pos[rows][..., 2] < -10).all()
+
+
+def test_what_is_held_is_where_the_record_says_and_is_put_away_after(drawn):
+    model, data = drawn
+    rows, quaternion = drawn_props(SCENE), np.array([[1.0, 0, 0, 0], [0, 0, 0, 1.0]])
+    kinds = np.array([prop_index("saw"), prop_index("box")])
+    pose_props(model, data, rows, Held(kinds, np.array([[1.0, 2, 3], [4, 5, 6]]), quaternion))
+    assert (data.mocap_pos[rows][..., 2] > 0).sum() == 2
+    seen = model.geom_bodyid[model.geom_group == DECORATION]
+    assert {model.body(body).name for body in seen} >= {"worker_1/saw", "worker_2/box"}
+    assert "worker_2/saw" not in {model.body(body).name for body in seen}
+    np.testing.assert_array_equal(data.mocap_pos[rows[1, kinds[1] - 1]], [4, 5, 6])
+    np.testing.assert_array_equal(data.mocap_quat[rows[1, kinds[1] - 1]], quaternion[1])
+    pose_props(model, data, rows, None)
+    assert (data.mocap_pos[rows][..., 2] < 0).all()
+
+
+def outermost(model, geom):
+    """(n, 3) points of a geom that reach as far as it does, its own frame [m]."""
+    mesh = model.geom_dataid[geom]
+    if mesh >= 0:
+        first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+        return model.mesh_vert[first : first + count]
+    centre, half = np.split(model.geom_aabb[geom], 2)
+    return centre + half * np.array(list(itertools.product((-1, 1), repeat=3)))
+
+
+@pytest.mark.parametrize("name", PROP_NAMES[1:])
+def test_a_prop_looks_as_large_as_it_is(drawn, name):
+    """The drawn geoms fill the box round the shapes that hide: within 5 cm on every side."""
+    model, _ = drawn
+    body = model.body(f"worker_1/{name}")
+    lowest, highest = np.full(3, np.inf), np.full(3, -np.inf)
+    for geom in range(body.geomadr[0], body.geomadr[0] + body.geomnum[0]):
+        turn = np.zeros(9)
+        mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
+        corners = model.geom_pos[geom] + outermost(model, geom) @ turn.reshape(3, 3).T
+        lowest = np.minimum(lowest, corners.min(0))
+        highest = np.maximum(highest, corners.max(0))
+    expected = bounds_of_shapes(PROPS[prop_index(name)])
+    np.testing.assert_allclose([lowest, highest], expected, atol=0.05)
