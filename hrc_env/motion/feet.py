@@ -1,8 +1,9 @@
 """Feet: locked to their footprint while loaded, rolling from heel to ball, swinging between.
 
 Step k of a plan is taken by foot (first + k) % 2, leaves the floor at start + k * period and
-lands a fixed swing later. A footprint is where the ankle's shadow falls: x, y, heading; and
-the share of a full stride of the step that made it, which scales its roll and its height.
+lands a fixed swing later. A footprint is where the ankle's shadow falls: x, y, heading; the
+share of a full stride of the step that made it, which scales its roll and its height; and how
+high the ground is there. Steps may be gone back: then their time runs backwards.
 """
 
 import math
@@ -48,11 +49,18 @@ def _last_step(t: float, first: int, count: int, plan: Floats) -> int:
 
 
 @compiled
+def step_time(t: float, plan: Floats) -> float:
+    """The time that counts for feet: it turns round when the steps are gone back."""
+    undo = plan[pl.UNDO_AT]
+    return t if undo <= 0.0 or t < undo else 2.0 * undo - t
+
+
+@compiled
 def foot(
     t: float, side: int, plan: Floats, prints: Floats, stance: Floats, size: Floats, q: Floats
 ) -> None:
     """Write the ankle columns of one side at time t into the control vector."""
-    x, y, yaw = stance[side, 0], stance[side, 1], stance[side, 2]
+    x, y, yaw, ground = stance[side, 0], stance[side, 1], stance[side, 2], stance[side, 3]
     heel_up, toes_up, rise, flown = 0.0, 0.0, 0.0, 0.0
     count = int(plan[pl.STEP_COUNT])
     if count > 0:
@@ -68,11 +76,15 @@ def foot(
             w = (t - lift) / swing
             if k >= 2 + first:
                 x, y, yaw = prints[k - 2, 0], prints[k - 2, 1], prints[k - 2, 2]
+                ground = prints[k - 2, 4]
             share, stride = cruise(w, RAMP_SHARE), prints[k, 3]
             x, y = x + share * (prints[k, 0] - x), y + share * (prints[k, 1] - y)
             yaw += min_jerk(w) * (prints[k, 2] - yaw)
             heel, toes = _roll(t, lift, lift + swing, period, stride)
             heel_up, toes_up = heel_up + heel, toes_up + toes
+            step_up = prints[k, 4] - ground
+            if step_up != 0.0:
+                ground += step_up * _climbed(w, step_up)
             rise = (LIFT_BASE_M + LIFT_STRIDE_M * stride) * hump(w)
             flown = min_jerk(2.0 * w) if w < 1.0 else 0.0
     at = c.ANKLE + 6 * side
@@ -80,8 +92,25 @@ def foot(
     behind, below = _about(toes_up, size[HEEL_X], -size[ANKLE_Z])
     q[at] = x + math.cos(yaw) * (ahead + behind)
     q[at + 1] = y + math.sin(yaw) * (ahead + behind)
-    q[at + 2] = size[ANKLE_Z] + above + below + rise
+    q[at + 2] = size[ANKLE_Z] + above + below + rise + ground
     q[at + 3], q[at + 4], q[at + 5] = yaw, heel_up + toes_up, heel_up * flown + toes_up
+
+
+@compiled
+def _climbed(w: float, step_up: float) -> float:
+    """Share of a step up (early, before the foot comes over the tread) or down (late) at w."""
+    return min_jerk(w / 0.6) if step_up > 0.0 else min_jerk((w - 0.4) / 0.6)
+
+
+@compiled
+def raise_heel(side: int, pitch: float, size: Floats, q: Floats) -> None:
+    """Pitch a standing foot about its ball, where the toes stay."""
+    at = c.ANKLE + 6 * side
+    ahead, above = _about(pitch, size[BALL_X], size[BALL_Z])
+    q[at] += math.cos(q[at + 3]) * ahead
+    q[at + 1] += math.sin(q[at + 3]) * ahead
+    q[at + 2] += above
+    q[at + 4] += pitch
 
 
 @compiled

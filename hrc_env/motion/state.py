@@ -8,12 +8,18 @@ import numpy as np
 from hrc_env.motion import behaviour as bh
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
+from hrc_env.motion.activities.climb import climb
+from hrc_env.motion.activities.going import push
+from hrc_env.motion.activities.loads import pick_up
+from hrc_env.motion.activities.look_round import look_round
+from hrc_env.motion.activities.work import work
 from hrc_env.motion.anatomy import Anatomy
 from hrc_env.motion.compiled import compiled
 from hrc_env.motion.config import MotionConfig
 from hrc_env.motion.curves import decay, wrap
-from hrc_env.motion.feet import foot
+from hrc_env.motion.feet import foot, step_time
 from hrc_env.motion.hands import lift, reach
+from hrc_env.motion.holding import drop_load, hold_load
 from hrc_env.motion.kinematics import N_FRAMES, N_POINTS
 from hrc_env.motion.posture import STANCE_HALF_WIDTH_M, stand
 from hrc_env.motion.walk import footprint, walk
@@ -41,9 +47,10 @@ class MotionState:
     plan: Floats
     """(B, W, N_PLAN) the activity's numbers, see `plans`."""
     prints: Floats
-    """(B, W, MAX_STEPS, 4) footprints x, y, heading, share of a full stride."""
+    """(B, W, MAX_STEPS, 5) footprints x, y, heading, share of a full stride, height."""
     stance: Floats
-    """(B, W, 2, 3) footprints that the activity begins on: left, right."""
+    """(B, W, 2, 4) footprints that the activity begins on, left and right: x, y, heading,
+    height."""
     offset: Floats
     """(B, W, N_BLENDED, 2) what the activity before left over: value and rate at time 0."""
     traits: Floats
@@ -64,29 +71,53 @@ def evaluate(
     offset: Floats, traits: Floats, size: Floats, q: Floats,
 ) -> None:  # fmt: skip
     """The control vector q at time t of an activity: its closed form."""
-    if activity == pl.WALK:
+    feet_s = step_time(t, plan) - (plan[pl.TAKEN_S] if activity == pl.PUSH else 0.0)
+    for side in range(2):
+        foot(feet_s, side, plan, prints, stance, size, q)
+    if activity == pl.WALK or pl.TURN <= activity <= pl.STEP_BACK and activity != pl.PUSH:
         walk(t, plan, clock_s, traits, size, q)
     elif activity == pl.REACH:
         reach(t, plan, clock_s, traits, size, q)
     elif activity == pl.LIFT:
         lift(t, plan, clock_s, traits, size, q)
+    elif activity == pl.PUSH:
+        push(t, plan, clock_s, traits, size, q)
+    elif activity == pl.PICK_UP or activity == pl.RECEIVE:
+        pick_up(t, plan, clock_s, traits, size, q)
+    elif activity == pl.SET_DOWN or activity == pl.HAND_OVER:
+        pick_up(plan[pl.LASTS] - t, plan, clock_s, traits, size, q)
+    elif pl.SQUATTING <= activity <= pl.LUNGE:
+        work(t, plan, clock_s, traits, size, q)
+    elif activity == pl.CLIMB:
+        climb(t, plan, clock_s, traits, size, q)
     else:
-        x, y, yaw = plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW]
-        stand(x, y, yaw, clock_s, traits, size, q)
-    for side in range(2):
-        foot(t, side, plan, prints, stance, size, q)
+        _stay(activity, t, plan, clock_s, traits, size, q)
     if t < BLEND_S:
         for i in range(c.N_BLENDED):
             q[i] += decay(t / BLEND_S, BLEND_S, offset[i, 0], offset[i, 1])
 
 
 @compiled
+def _stay(
+    activity: int, t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q: Floats
+) -> None:
+    """The control vector of someone who stands, perhaps looking round or with a load."""
+    x, y, yaw = plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW]
+    if activity == pl.LOOK_ROUND:
+        look_round(t, plan, clock_s, traits, size, q)
+    else:
+        stand(x, y, yaw, clock_s, traits, size, q)
+    if plan[pl.LOAD_PROP] > 0.0:
+        hold_load(x, y, yaw, 0.0, plan, q)
+
+
+@compiled
 def _stop(plan: Floats, prints: Floats, stance: Floats) -> float:
     """Begin where the last activity ended; returns by how much its heading was unwound."""
-    count = int(plan[pl.STEP_COUNT])
+    count = int(plan[pl.STEP_COUNT]) if plan[pl.UNDO_AT] == 0.0 else 0
     for k in range(max(count - 2, 0), count):
         side = (k + int(plan[pl.STEP_FIRST])) % 2
-        for i in range(3):
+        for i in range(5):
             stance[side, i] = prints[k, i]
     yaw = wrap(plan[pl.END_YAW])
     unwound = yaw - plan[pl.END_YAW]
@@ -95,7 +126,7 @@ def _stop(plan: Floats, prints: Floats, stance: Floats) -> float:
     plan[pl.START_X] = plan[pl.END_X]
     plan[pl.START_Y] = plan[pl.END_Y]
     plan[pl.START_YAW] = plan[pl.END_YAW] = yaw
-    plan[pl.STEP_COUNT], plan[pl.STEP_FIRST] = 0.0, 0.0
+    plan[pl.STEP_COUNT], plan[pl.STEP_FIRST], plan[pl.UNDO_AT] = 0.0, 0.0, 0.0
     plan[pl.STEP_START], plan[pl.STEP_PERIOD], plan[pl.STEP_SWING] = 0.0, 1.0, 0.5
     return unwound
 
@@ -138,6 +169,9 @@ def follow_up(
             offset[b, w], traits[b, w], size, q[i],
         )  # fmt: skip
     unwound = _stop(plan[b, w], prints[b, w], stance[b, w])
+    kind = activity[b, w]
+    if kind == pl.SET_DOWN or kind == pl.HAND_OVER or kind == pl.PUSH:
+        drop_load(plan[b, w])
     q[0, c.HEADING] += unwound
     q[1, c.HEADING] += unwound
     activity[b, w], duration_s[b, w] = plan_next(

@@ -8,10 +8,11 @@ import math
 
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
-from hrc_env.motion.anatomy import ANKLE_X
+from hrc_env.motion.anatomy import ANKLE_X, STAND_Z
 from hrc_env.motion.compiled import compiled
-from hrc_env.motion.curves import min_jerk, ramp, wrap
+from hrc_env.motion.curves import hump, min_jerk, ramp, wrap
 from hrc_env.motion.feet import FLAT_S
+from hrc_env.motion.holding import hold_load
 from hrc_env.motion.paths import along, facing, lay_path
 from hrc_env.motion.posture import (
     RELAXED_ELBOW,
@@ -40,6 +41,10 @@ CORNER_M_S2 = 1.6
 """Walkers slow down so that corners accelerate them sideways by no more [m/s^2]; judgement."""
 NORMAL_M_S = 1.3
 """Speed at which the amplitudes below hold."""
+LOADED_TWIST = 0.4
+"""Share of the trunk's turning that is left with something in the hands; judgement."""
+LURCH_S = 1.1
+"""From a foot's catching to the walk's going on [s]; judgement."""
 
 
 @compiled
@@ -107,6 +112,29 @@ def walk(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q
             size,
             q,
         )
+    if plan[pl.TRIP] > 0.0:
+        _lurch(t - plan[pl.TRIP_AT], plan[pl.TRIP], q)
+    if plan[pl.LOAD_PROP] > 0.0:
+        q[c.SPINE_TWIST] *= LOADED_TWIST
+        x, y, yaw = root(t, plan)
+        hold_load(x, y, yaw, q[c.PELVIS_Z] - size[STAND_Z], plan, q)
+
+
+@compiled
+def _lurch(t: float, trip: float, q: Floats) -> None:
+    """Pitch forward with the arms out, `t` after a foot caught, and come up again."""
+    fall, arms = trip * hump(t / LURCH_S), trip * hump((t - 0.08) / (1.3 * LURCH_S))
+    q[c.ROOT_X] += math.cos(q[c.HEADING]) * 0.10 * fall
+    q[c.ROOT_Y] += math.sin(q[c.HEADING]) * 0.10 * fall
+    q[c.PELVIS_Z] -= 0.07 * fall
+    q[c.PELVIS_PITCH] += 0.32 * fall
+    q[c.SPINE_FLEX] += 0.38 * fall
+    q[c.HEAD_PITCH] -= 0.15 * fall
+    for side in range(2):
+        at = c.HAND_OFFSET + 3 * side
+        q[at] += (0.34 - 0.10 * side) * arms
+        q[at + 1] += (1.0 - 2.0 * side) * 0.12 * arms
+        q[at + 2] += (0.22 + 0.08 * side) * arms
 
 
 @compiled
@@ -121,16 +149,40 @@ def plan_walk(
     plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW] = start
     plan[pl.END_X], plan[pl.END_Y] = end[0], end[1]
     lay_path((start[0], start[1]), via, (end[0], end[1]), plan)
-    length = plan[pl.LENGTH]
-    plan[pl.FOLLOW] = follow = 1.0 if length > SIDE_STEP_M else 0.0
+    if plan[pl.LENGTH] <= SIDE_STEP_M:
+        pace = (0.0, SIDE_STEP_M_S, SIDE_STEP_PERIOD_S)
+        return plan_pace(pace, end[2], plan, prints, stance, size)
     bend = math.sqrt(CORNER_M_S2 / max(plan[pl.SHARPEST], 1e-6))
-    wished = min(wished_m_s, max(bend, SLOWEST_M_S)) if follow > 0.0 else SIDE_STEP_M_S
+    wished = min(wished_m_s, max(bend, SLOWEST_M_S))
+    return plan_pace((1.0, wished, 0.0), end[2], plan, prints, stance, size)
+
+
+@compiled
+def plan_pace(
+    pace: tuple[float, float, float], end_yaw: float,
+    plan: Floats, prints: Floats, stance: Floats, size: Floats,
+) -> float:  # fmt: skip
+    """Plan speed, turns and steps along the path that is laid; returns the duration [s].
+
+    Args:
+        pace: whether to face along the path (1) or keep the heading (0); top speed [m/s]; time
+            of a step [s], 0: that of people at this speed.
+        end_yaw: heading at the end [rad].
+        plan: START, END and the path stand.
+        prints: gets the footprints.
+        stance: where the feet are.
+        size: of the body.
+    """
+    follow, wished, period = pace
+    length = plan[pl.LENGTH]
+    plan[pl.FOLLOW] = follow
+    plan[pl.UNDO_AT] = plan[pl.TRIP] = plan[pl.TAKEN_S] = 0.0
     plan[pl.RAMP] = 0.45 + 0.4 * wished
     plan[pl.SPEED] = min(wished, length / plan[pl.RAMP])
     plan[pl.DURATION] = length / plan[pl.SPEED] + plan[pl.RAMP]
-    _plan_turns(end[2], plan)
-    period = 60.0 / (CADENCE_PER_MIN * max(plan[pl.SPEED], SLOWEST_M_S) ** CADENCE_POWER)
-    period = period if follow > 0.0 else SIDE_STEP_PERIOD_S
+    _plan_turns(end_yaw, plan)
+    if period == 0.0:
+        period = 60.0 / (CADENCE_PER_MIN * max(plan[pl.SPEED], SLOWEST_M_S) ** CADENCE_POWER)
     plan[pl.STEP_PERIOD], plan[pl.STEP_SWING] = period, SWING_SHARE * period
     plan[pl.STEP_START] = SHIFT_S
     plan[pl.STEP_FIRST] = _first_foot(plan)
@@ -144,6 +196,7 @@ def brake(t: float, plan: Floats, prints: Floats, stance: Floats, size: Floats) 
     What has happened until t stays as it was, and so do the landings of feet in the air.
     Returns -1 for one who is about to arrive, and goes on.
     """
+    t -= plan[pl.TAKEN_S]
     going = max(t - plan[pl.DEPART], plan[pl.RAMP])
     if plan[pl.FOLLOW] == 0.0 or going + plan[pl.RAMP] >= plan[pl.DURATION]:
         return -1.0
@@ -154,7 +207,9 @@ def brake(t: float, plan: Floats, prints: Floats, stance: Floats, size: Floats) 
         plan[pl.DEPART] + plan[pl.DURATION] + 1.0, plan
     )
     lifted = math.floor((t - plan[pl.STEP_START]) / plan[pl.STEP_PERIOD]) + 1
-    return _plan_steps(max(int(lifted), 0), plan, prints, stance, size)
+    lasts = _plan_steps(max(int(lifted), 0), plan, prints, stance, size)
+    plan[pl.LASTS] = lasts + 2.0 * plan[pl.TAKEN_S]
+    return plan[pl.LASTS]
 
 
 @compiled
@@ -220,3 +275,4 @@ def footprint(
     out[0] = x + cos * ahead - sin * left
     out[1] = y + sin * ahead + cos * left
     out[2] = yaw + sign * TOE_OUT_RAD
+    out[4] = 0.0

@@ -1,0 +1,53 @@
+"""Work at floor height with both hands: on a knee, or on the haunches."""
+
+from hrc_env.motion import plans as pl
+from hrc_env.motion.activities.planning import (
+    CALM_M_S,
+    CROUCH_S,
+    between,
+    blank,
+    dominant,
+    finish,
+    kneel_down,
+    look_to,
+    put_other,
+    put_tool,
+    strokes,
+)
+from hrc_env.motion.activities.strokes import BUSY
+from hrc_env.motion.activities.worker import Place, Worker
+from hrc_env.motion.compiled import compiled
+from hrc_env.typing import Floats
+
+
+@compiled
+def start_kneel(draws: Floats, place: Place, me: Worker) -> float:
+    """Plan to kneel and work low; returns how long it takes [s]."""
+    blank(me)
+    side = dominant(draws[0], me)
+    kneel_down(side, me)
+    return _hands_low(0.42, side, draws, place, me)
+
+
+@compiled
+def start_squat(draws: Floats, place: Place, me: Worker) -> float:
+    """Plan to work low on the haunches; returns how long it takes [s]."""
+    blank(me)
+    plan = me.plan
+    plan[pl.CROUCH], plan[pl.AHEAD] = 1.0, 0.02
+    plan[pl.SETTLE_S], plan[pl.OUT_AT] = CROUCH_S, CROUCH_S - 0.5
+    return _hands_low(0.50, dominant(draws[0], me), draws, place, me)
+
+
+@compiled
+def _hands_low(ahead: float, side: int, draws: Floats, place: Place, me: Worker) -> float:
+    """Plan what both hands do at floor height."""
+    sign = 1.0 - 2.0 * side
+    z = place[3] if place[3] > 0.0 else between(draws[1], 0.12, 0.35)
+    put_tool(0, side, (ahead, 0.10 * sign, z), (0.0, 0.0, 0.0), me)
+    put_other((ahead + 0.03, -0.14 * sign, z), me)
+    look_to((ahead + 0.03, 0.0, z), me)
+    size, rate = between(draws[2], 0.02, 0.05), between(draws[3], 0.8, 1.4)
+    strokes(BUSY, size, rate, between(draws[4], 1.5, 3.5), 1 + int(3.0 * draws[5]), me)
+    me.plan[pl.WANDER_M] = 0.10
+    return finish(CALM_M_S, me)

@@ -1,0 +1,61 @@
+"""Drilling and driving screws, at a wall or overhead: one hand leans on the drill, the other
+fetches screws from the pouch."""
+
+import math
+
+from hrc_env.motion import plans as pl
+from hrc_env.motion.activities.planning import (
+    CALM_M_S,
+    LOW_M,
+    between,
+    blank,
+    dominant,
+    finish,
+    kneel_down,
+    look_to,
+    put_other,
+    put_tool,
+    step_ahead,
+    strokes,
+)
+from hrc_env.motion.activities.strokes import BORE
+from hrc_env.motion.activities.worker import Place, Worker
+from hrc_env.motion.compiled import compiled
+from hrc_env.props import prop_index
+from hrc_env.typing import Floats
+
+DRILL = prop_index("drill")
+BIT_M, BIT_UP_M = 0.22, 0.09
+"""Tip of the bit: ahead of the fist and above it [m]; `props`."""
+THRUST_M = 0.04
+"""How far the drill goes in [m]; a screw."""
+OVERHEAD_M = 1.7
+"""From this height on people work above their head [m]."""
+
+
+@compiled
+def start_drill(draws: Floats, place: Place, me: Worker) -> float:
+    """Plan to drill at the place's height; returns how long it takes [s]."""
+    blank(me)
+    side = dominant(draws[0], me)
+    sign = 1.0 - 2.0 * side
+    z = place[3] if place[3] > 0.0 else between(draws[1], 1.1, 1.4)
+    overhead = z >= OVERHEAD_M
+    if z < LOW_M:
+        kneel_down(side, me)
+    else:
+        step_ahead(1 - side, 0.10 if overhead else 0.18, me)
+    if overhead:
+        ahead = 0.34
+        at, turn = (ahead + BIT_UP_M, 0.04 * sign, z - BIT_M - THRUST_M), (0.0, -0.5 * math.pi, 0.0)
+        put_other((ahead, -0.14 * sign, z - 0.04), me)
+    else:
+        ahead = 0.60
+        at = (ahead - BIT_M - THRUST_M, 0.05 * sign, z - BIT_UP_M)
+        turn = (0.0, 0.0, 0.0)
+        put_other((ahead - 0.04, -0.09 * sign, z - 0.02), me)
+    put_tool(DRILL, side, at, turn, me)
+    look_to((ahead, 0.0, z), me)
+    strokes(BORE, THRUST_M, 0.0, between(draws[2], 1.5, 1.8), 2 + int(3.0 * draws[3]), me)
+    me.plan[pl.WANDER_M] = 0.12 * sign
+    return finish(CALM_M_S, me)

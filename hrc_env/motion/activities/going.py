@@ -1,0 +1,129 @@
+"""Going somewhere: walking, turning, with a cart, stumbling, a few quick steps back."""
+
+import math
+
+import numpy as np
+
+from hrc_env.motion import controls as c
+from hrc_env.motion import plans as pl
+from hrc_env.motion.activities.planning import between
+from hrc_env.motion.activities.worker import Place, Worker
+from hrc_env.motion.anatomy import STAND_Z
+from hrc_env.motion.compiled import compiled
+from hrc_env.motion.curves import min_jerk
+from hrc_env.motion.holding import GRIPS, drop_load, grip_load, place_load
+from hrc_env.motion.paths import lay_path
+from hrc_env.motion.posture import lean
+from hrc_env.motion.walk import plan_pace, plan_walk, root, speed, walk
+from hrc_env.props import prop_index
+from hrc_env.typing import Floats
+
+CART, WHEELBARROW = prop_index("cart"), prop_index("wheelbarrow")
+CART_AHEAD_M, WHEELBARROW_AHEAD_M = 0.47, 0.16
+"""Handles ahead of the root [m]: arms bent before the belly, and hanging at the sides."""
+WHEEL_AHEAD_M, WHEEL_UP_M, STANDS_RAD = 1.2, 0.17, 0.2
+"""A wheelbarrow's axle in its frame [m], and how far it tips back onto its legs."""
+TAKE_S, LIFT_S = 0.7, 0.5
+"""For the hands to go to the handles; to lift a wheelbarrow by them [s]."""
+BACK_M_S, BACK_PERIOD_S = 0.62, 0.42
+"""Quick steps back: speed and time of a step; judgement."""
+CAUGHT_M = 0.16
+"""How much too short the step is in which a foot catches [m]; judgement."""
+
+
+@compiled
+def start_walk(place: Place, via: Floats, speed_m_s: float, me: Worker) -> float:
+    """Plan to walk to the place by way of a point; returns how long it takes [s]."""
+    plan = me.plan
+    start = (plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW])
+    end = (place[0], place[1], place[2])
+    return plan_walk(start, via, end, speed_m_s, plan, me.prints, me.stance, me.size)
+
+
+@compiled
+def start_turn(place: Place, me: Worker) -> float:
+    """Plan to turn on the spot to the place's yaw; returns how long it takes [s]."""
+    here = (me.plan[pl.START_X], me.plan[pl.START_Y], place[2], 0.0)
+    return start_walk(here, np.empty((0, 3)), 1.0, me)
+
+
+@compiled
+def start_step_back(draws: Floats, place: Place, me: Worker) -> float:
+    """Plan to step straight back without looking; returns how long it takes [s]."""
+    plan = me.plan
+    x, y, yaw = plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW]
+    way = between(draws[0], 0.30, 0.75)
+    plan[pl.END_X], plan[pl.END_Y] = x - math.cos(yaw) * way, y - math.sin(yaw) * way
+    lay_path((x, y), np.empty((0, 3)), (plan[pl.END_X], plan[pl.END_Y]), plan)
+    pace = (0.0, BACK_M_S, BACK_PERIOD_S)
+    return plan_pace(pace, yaw, plan, me.prints, me.stance, me.size)
+
+
+@compiled
+def start_stumble(
+    draws: Floats, place: Place, via: Floats, speed_m_s: float, me: Worker
+) -> float:
+    """Plan a walk to the place in which a foot catches; returns how long it takes [s]."""
+    lasts = start_walk(place, via, speed_m_s, me)
+    plan = me.plan
+    count = int(plan[pl.STEP_COUNT])
+    if plan[pl.FOLLOW] == 0.0 or count < 6:
+        return lasts
+    step = 2 + int(draws[0] * (count - 5))
+    plan[pl.TRIP_AT] = (
+        plan[pl.STEP_START] + step * plan[pl.STEP_PERIOD] + 0.35 * plan[pl.STEP_SWING]
+    )
+    plan[pl.TRIP] = between(draws[1], 0.7, 1.0)
+    yaw = me.prints[step, 2]
+    me.prints[step, 0] -= CAUGHT_M * math.cos(yaw)
+    me.prints[step, 1] -= CAUGHT_M * math.sin(yaw)
+    return lasts
+
+
+@compiled
+def start_push(
+    place: Place, via: Floats, speed_m_s: float, prop: int, me: Worker
+) -> float:
+    """Plan to push a cart or wheelbarrow to the place; returns how long it takes [s]."""
+    plan = me.plan
+    drop_load(plan)
+    plan[pl.LOAD_PROP] = prop
+    plan[pl.LOAD_AT] = CART_AHEAD_M if prop == CART else WHEELBARROW_AHEAD_M
+    for i in range(6):
+        plan[pl.LOAD_GRIP + i] = GRIPS[prop, i // 3, i % 3]
+    plan[pl.LOAD_USED] = plan[pl.LOAD_USED + 1] = 1.0
+    lasts = start_walk(place, via, speed_m_s, me)
+    plan[pl.TAKEN_S] = TAKE_S + (LIFT_S if prop == WHEELBARROW else 0.0)
+    plan[pl.LASTS] = lasts + 2.0 * plan[pl.TAKEN_S]
+    return plan[pl.LASTS]
+
+
+@compiled
+def push(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q: Floats) -> None:
+    """The control vector, but for the feet, of someone who takes a handle, pushes and lets go."""
+    going = t - plan[pl.TAKEN_S]
+    walk(going, plan, clock_s, traits, size, q)
+    near_end = min(t, plan[pl.LASTS] - t)
+    held, effort = min_jerk(near_end / TAKE_S), speed(going, plan)
+    q[c.PELVIS_PITCH] += 0.05 * effort
+    q[c.SPINE_FLEX] += 0.10 * effort
+    x, y, yaw = root(going, plan)
+    place_load(x, y, yaw, 0.0, plan, q)
+    if int(plan[pl.LOAD_PROP]) == WHEELBARROW:
+        low = 1.0 - min_jerk((near_end - TAKE_S) / LIFT_S)
+        lean(0.42 * low * held, 0.5, 0.0, q)
+        _tip(STANDS_RAD * low, yaw, q)
+    else:
+        lean(0.06 * held, 0.0, 0.0, q)
+    grip_load(held, plan, q)
+
+
+@compiled
+def _tip(back_rad: float, yaw: float, q: Floats) -> None:
+    """Tip the wheelbarrow back about its axle, handles down."""
+    cos, sin = math.cos(back_rad), math.sin(back_rad)
+    ahead = WHEEL_AHEAD_M * (1.0 - cos) + WHEEL_UP_M * sin
+    q[c.PROP_POSE] += math.cos(yaw) * ahead
+    q[c.PROP_POSE + 1] += math.sin(yaw) * ahead
+    q[c.PROP_POSE + 2] += WHEEL_UP_M * (1.0 - cos) - WHEEL_AHEAD_M * sin
+    q[c.PROP_POSE + 4] -= back_rad

@@ -1,0 +1,181 @@
+"""Loads: picked up and set down, taken from somebody and handed over.
+
+Setting down is picking up backwards. Boxes are held before the belly, boards before the thighs
+or on the shoulder. Recorded lifts: pelvis 0.57 to 1.01 m high, wrists at 1.3 m/s at most in the
+median trial and 2.1 in the 95th percentile, heads at 1.6.
+"""
+
+import math
+
+from hrc_env.motion import controls as c
+from hrc_env.motion import plans as pl
+from hrc_env.motion.activities.planning import (
+    between,
+    blank,
+    dominant,
+    look_to,
+    put_tool,
+    settle_lean,
+    world,
+)
+from hrc_env.motion.activities.worker import Place, Worker
+from hrc_env.motion.anatomy import LEFT, SIDE_STRIDE, STAND_Z, UPPER_ARM
+from hrc_env.motion.compiled import compiled
+from hrc_env.motion.curves import hump, min_jerk
+from hrc_env.motion.gaze import look_at
+from hrc_env.motion.holding import GRIPS, grip, place_load
+from hrc_env.motion.kinematics import pose
+from hrc_env.motion.posture import lean, stand
+from hrc_env.props import prop_index
+from hrc_env.typing import Floats
+
+BOX, BOARD = prop_index("box"), prop_index("board")
+BOX_AHEAD_M, BOX_SHARE = 0.37, 1.10
+BOARD_AHEAD_M, BOARD_SHARE = 0.27, 0.96
+"""A held load's middle: ahead of the root [m], and height in heights of the pelvis; judgement."""
+ON_SHOULDER = (0.12, 0.165, 0.075)
+"""A board on the shoulder: ahead and aside of the root, above the shoulder's joint [m]."""
+STEADY_M = 0.26
+"""The hand that steadies it: ahead of the root [m]."""
+NOSE_UP_RAD = 0.08
+"""How much its front is higher; judgement."""
+GRIP_S, SHOULDER_S = 0.3, 1.0
+"""To grip; from before the body to the shoulder [s]."""
+GIVEN_AHEAD_M, GIVEN_SHARE = 0.60, 1.14
+"""Where loads change hands: ahead of the root [m], in heights of the pelvis; judgement."""
+AWAY_M = 0.43
+"""A load on the floor or a table is this far ahead [m]."""
+
+
+@compiled
+def pick_up(
+    t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q: Floats
+) -> None:
+    """The control vector of someone who bends down to a load, grips it and comes up with it."""
+    x, y, yaw = plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW]
+    stand(x, y, yaw, clock_s, traits, size, q)
+    gripped = plan[pl.OUT_AT] + plan[pl.OUT_S]
+    rise = gripped + GRIP_S
+    down = min_jerk((t - plan[pl.OUT_AT]) / plan[pl.OUT_S])
+    up = min_jerk((t - rise) / plan[pl.RAISE_S])
+    turned = 0.0
+    if plan[pl.SHOULDER_S] > 0.0:
+        turned = min_jerk((t - rise - plan[pl.RAISE_S]) / plan[pl.SHOULDER_S])
+    lean(plan[pl.LEAN] * (down - up), plan[pl.SQUAT], 0.0, q)
+    look_at(plan[pl.GAZE_X], plan[pl.GAZE_Y], plan[pl.GAZE_Z], down - up, size, q)
+    place_load(x, y, yaw, 0.0, plan, q)
+    for i in range(6):
+        at, mid = plan[pl.TOOL_POSE + i], plan[pl.MIDWAY + i]
+        q[c.PROP_POSE + i] = at + up * (mid - at) + turned * (q[c.PROP_POSE + i] - mid)
+    bulge = 0.06 * hump(up)
+    q[c.PROP_POSE] += math.cos(yaw) * bulge
+    q[c.PROP_POSE + 1] += math.sin(yaw) * bulge
+    q[c.PROP_POSE + 2] += 0.10 * hump(turned)
+    prop = int(plan[pl.TOOL])
+    q[c.PROP] = prop if t >= gripped or plan[pl.HIDDEN] == 0.0 else 0.0
+    for side in range(2):
+        here, own = GRIPS[prop, side], pl.LOAD_GRIP + 3 * side
+        grip(
+            side,
+            here[0] + turned * (plan[own] - here[0]),
+            here[1] + turned * (plan[own + 1] - here[1]),
+            here[2] + turned * (plan[own + 2] - here[2]),
+            q,
+        )
+        used = 1.0 + turned * (plan[pl.LOAD_USED + side] - 1.0)
+        q[c.HAND_SHARE + side] = down * used
+
+
+@compiled
+def start_pick_up(
+    draws: Floats, place: Place, prop: int, on_shoulder: bool, me: Worker
+) -> float:
+    """Plan to pick a box or board up, gripped at the place's height; how long it takes [s]."""
+    _hold(prop, on_shoulder and prop == BOARD, dominant(draws[0], me), me)
+    z = place[3] if place[3] > 0.0 else between(draws[1], 0.18, 0.45)
+    return _plan_lift(prop, (AWAY_M, 0.0, z), between(draws[2], 1.0, 1.35), me)
+
+
+@compiled
+def start_receive(draws: Floats, place: Place, me: Worker) -> float:
+    """Plan to take a box that somebody ahead holds out; returns how long it takes [s]."""
+    _hold(BOX, False, 1, me)
+    lasts = _plan_lift(BOX, _given(place, me), between(draws[2], 0.9, 1.1), me)
+    me.plan[pl.HIDDEN] = 1.0
+    return lasts
+
+
+@compiled
+def start_set_down(draws: Floats, place: Place, me: Worker) -> float:
+    """Plan to set down what is held, onto the place's height; returns how long it takes [s]."""
+    z = place[3] if place[3] > 0.0 else between(draws[1], 0.18, 0.45)
+    prop = int(me.plan[pl.LOAD_PROP])
+    return _plan_lift(prop, (AWAY_M, 0.0, z), between(draws[2], 1.0, 1.35), me)
+
+
+@compiled
+def start_hand_over(draws: Floats, place: Place, me: Worker) -> float:
+    """Plan to hold out what is carried until somebody has it; returns how long it takes [s]."""
+    prop = int(me.plan[pl.LOAD_PROP])
+    lasts = _plan_lift(prop, _given(place, me), between(draws[2], 0.9, 1.1), me)
+    me.plan[pl.HIDDEN] = 1.0
+    return lasts
+
+
+@compiled
+def _given(place: Place, me: Worker) -> tuple[float, float, float]:
+    """Where loads change hands."""
+    z = place[3] if place[3] > 0.0 else GIVEN_SHARE * me.size[STAND_Z]
+    return GIVEN_AHEAD_M, 0.0, z
+
+
+@compiled
+def _hold(prop: int, on_shoulder: bool, side: int, me: Worker) -> None:
+    """Write how a load will be carried into the plan's LOAD columns."""
+    plan, at = me.plan, pl.LOAD_AT
+    plan[pl.LOAD_PROP] = prop
+    for i in range(6):
+        plan[at + i] = 0.0
+        plan[pl.LOAD_GRIP + i] = GRIPS[prop, i // 3, i % 3]
+    plan[pl.LOAD_USED] = plan[pl.LOAD_USED + 1] = 1.0
+    ahead, share = (BOX_AHEAD_M, BOX_SHARE) if prop == BOX else (BOARD_AHEAD_M, BOARD_SHARE)
+    plan[at], plan[at + 2] = ahead, share * me.size[STAND_Z]
+    if not on_shoulder:
+        return
+    stand(plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW], 0.0, me.traits, me.size, me.q)
+    pose(me.q, me.bones, me.frame, me.size, me.p, me.r)
+    upper = LEFT + SIDE_STRIDE * side + UPPER_ARM
+    plan[at], plan[at + 1] = ON_SHOULDER[0], (1.0 - 2.0 * side) * ON_SHOULDER[1]
+    plan[at + 2] = me.p[upper, 2] + ON_SHOULDER[2]
+    plan[at + 3], plan[at + 5] = -0.5 * math.pi, NOSE_UP_RAD
+    plan[pl.LOAD_USED + 1 - side] = 0.0
+    plan[pl.LOAD_GRIP + 3 * side + 1] = STEADY_M
+
+
+@compiled
+def _plan_lift(
+    prop: int, at: tuple[float, float, float], raise_s: float, me: Worker
+) -> float:
+    """Plan the way between a place (ahead, left, height) and how the load is carried."""
+    plan, size = me.plan, me.size
+    blank(me)
+    put_tool(prop, 1, at, (0.0, 0.0, 0.0), me)
+    look_to(at, me)
+    low = min(max((size[STAND_Z] - at[2]) / 0.6, 0.0), 1.0)
+    plan[pl.SQUAT] = me.traits[pl.SQUAT_TRAIT] * low
+    settle_lean(me)
+    shoulder = plan[pl.LOAD_AT + 3] != 0.0
+    mid_z = 1.15 * size[STAND_Z] if shoulder else plan[pl.LOAD_AT + 2]
+    ahead = 0.36 if shoulder else plan[pl.LOAD_AT]
+    point = world(ahead, 0.0, mid_z, me)
+    for i in range(3):
+        plan[pl.MIDWAY + i] = point[i]
+    plan[pl.MIDWAY + 3] = plan[pl.START_YAW]
+    way = abs(mid_z - at[2])
+    plan[pl.RAISE_S] = max(raise_s * (0.55 + 0.6 * way), 0.6)
+    plan[pl.OUT_S] = max(raise_s * (0.7 + 0.35 * low), 0.7)
+    plan[pl.SHOULDER_S] = SHOULDER_S if shoulder else 0.0
+    plan[pl.LASTS] = (
+        plan[pl.OUT_AT] + plan[pl.OUT_S] + GRIP_S + plan[pl.RAISE_S] + plan[pl.SHOULDER_S] + 0.1
+    )
+    return plan[pl.LASTS]

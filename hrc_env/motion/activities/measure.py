@@ -1,0 +1,39 @@
+"""Measuring: both hands pull a tape along the work, hold it still and read it."""
+
+from hrc_env.motion import plans as pl
+from hrc_env.motion.activities.planning import (
+    CALM_M_S,
+    LOW_M,
+    between,
+    blank,
+    dominant,
+    finish,
+    kneel_down,
+    look_to,
+    put_tool,
+    step_ahead,
+    strokes,
+)
+from hrc_env.motion.activities.strokes import SHIFT
+from hrc_env.motion.activities.worker import Place, Worker
+from hrc_env.motion.compiled import compiled
+from hrc_env.props import prop_index
+from hrc_env.typing import Floats
+
+TAPE = prop_index("tape_measure")
+
+
+@compiled
+def start_measure(draws: Floats, place: Place, me: Worker) -> float:
+    """Plan to measure at the place's height; returns how long it takes [s]."""
+    blank(me)
+    z = place[3] if place[3] > 0.0 else between(draws[1], 0.85, 1.3)
+    if z < LOW_M:
+        kneel_down(1, me)
+    else:
+        step_ahead(dominant(draws[0], me), 0.12, me)
+    put_tool(TAPE, 1, (0.46, 0.0, z + 0.04), (0.0, 0.0, 0.0), me)
+    look_to((0.46, 0.12, z), me)
+    strokes(SHIFT, 0.0, 0.0, between(draws[2], 0.8, 1.6), 2 + int(3.0 * draws[3]), me)
+    me.plan[pl.WANDER_M] = between(draws[4], 0.10, 0.18)
+    return finish(CALM_M_S, me)

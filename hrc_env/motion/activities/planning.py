@@ -1,0 +1,215 @@
+"""Planning of work in place: where tool and hands go, how far the trunk, for how long."""
+
+import math
+
+from hrc_env.motion import controls as c
+from hrc_env.motion import plans as pl
+from hrc_env.motion.activities.getting_down import FRONT_LEG, REAR_LEG, step_into
+from hrc_env.motion.activities.strokes import PAUSE_S, stroke
+from hrc_env.motion.activities.work import extend, hands_on
+from hrc_env.motion.activities.worker import Worker
+from hrc_env.motion.anatomy import HAND, LEFT, LEG, SIDE_STRIDE, STAND_Z
+from hrc_env.motion.compiled import compiled
+from hrc_env.motion.feet import foot
+from hrc_env.motion.kinematics import pose
+from hrc_env.motion.posture import MOST_LEAN, beyond, stand
+
+Triple = tuple[float, float, float]
+
+LOW_M = 0.6
+"""Work below this height is done kneeling [m]; judgement."""
+TAKE_S = 0.55
+"""For a hand to go to the belt [s]."""
+KNEEL_S, CROUCH_S = 1.5, 1.1
+"""To get down on a knee, on the haunches [s]; judgement."""
+STEP_S = 0.9
+"""To step into a stance [s]."""
+CALM_M_S = 1.1
+"""Peak speed of hands that go to their work [m/s]; calm manual work."""
+SPARE_M = 0.03
+"""Arms keep this much in hand when the trunk has settled [m]: bodies sway."""
+FAR = 1e3
+"""A time by which every step is done [s]."""
+
+
+@compiled
+def between(draw: float, low: float, high: float) -> float:
+    """A uniform draw in [0, 1) stretched to (low, high)."""
+    return low + draw * (high - low)
+
+
+@compiled
+def dominant(draw: float, me: Worker) -> int:
+    """The side that holds the tool: 1 right."""
+    return 1 if draw < 0.5 + (me.traits[pl.RIGHT_HANDED] - 0.5) * 1.25 else 0
+
+
+@compiled
+def blank(me: Worker) -> None:
+    """A plan without steps and work of its own; what is carried stays."""
+    plan = me.plan
+    for i in range(pl.OWN, pl.WANDER_M + 1):
+        plan[i] = 0.0
+    plan[pl.UNDO_AT] = plan[pl.STEP_COUNT] = 0.0
+    plan[pl.STEP_START], plan[pl.STEP_PERIOD], plan[pl.STEP_SWING] = 0.0, 1.0, 0.5
+    plan[pl.SETTLE_S] = 0.1
+    plan[pl.OUT_AT] = 0.1
+
+
+@compiled
+def kneel_down(side: int, me: Worker) -> None:
+    """Plan to kneel on the knee of that side."""
+    plan, leg = me.plan, me.size[LEG]
+    plan[pl.KNEEL], plan[pl.AHEAD] = 1.0, -0.08
+    plan[pl.SETTLE_S], plan[pl.OUT_AT] = KNEEL_S, KNEEL_S - 0.35
+    step_into(side, REAR_LEG * leg, FRONT_LEG * leg, 0.02, me)
+
+
+@compiled
+def step_ahead(side: int, ahead: float, me: Worker) -> None:
+    """Plan to work with the foot of that side a little ahead."""
+    plan = me.plan
+    step_into(side, ahead, 0.0, 0.02, me)
+    plan[pl.AHEAD], plan[pl.SETTLE_S] = 0.45 * ahead, STEP_S
+
+
+@compiled
+def world(ahead: float, left: float, z: float, me: Worker) -> Triple:
+    """A point of the frame in which the worker stands."""
+    plan = me.plan
+    cos, sin = math.cos(plan[pl.START_YAW]), math.sin(plan[pl.START_YAW])
+    return (
+        plan[pl.START_X] + cos * ahead - sin * left,
+        plan[pl.START_Y] + sin * ahead + cos * left,
+        z,
+    )
+
+
+@compiled
+def put_tool(tool: int, side: int, at: Triple, turn: Triple, me: Worker) -> None:
+    """Plan where the tool is at work: ahead, left [m], height; yaw, pitch, roll."""
+    plan = me.plan
+    plan[pl.TOOL], plan[pl.SIDE] = tool, side
+    plan[pl.TAKE_S] = TAKE_S if tool > 0 else 0.0
+    point = world(at[0], at[1], at[2], me)
+    for i in range(3):
+        plan[pl.TOOL_POSE + i] = point[i]
+        plan[pl.TOOL_POSE + 3 + i] = turn[i]
+    plan[pl.TOOL_POSE + 3] += plan[pl.START_YAW]
+
+
+@compiled
+def put_other(at: Triple, me: Worker) -> None:
+    """Plan where the other hand works: ahead, left [m], height."""
+    plan = me.plan
+    other = 1 - int(plan[pl.SIDE])
+    point = world(at[0], at[1], at[2], me)
+    for i in range(3):
+        plan[pl.TARGET + 3 * other + i] = point[i]
+    plan[pl.USE_LEFT + other] = 1.0
+
+
+@compiled
+def look_to(at: Triple, me: Worker) -> None:
+    """Plan where the eyes are: ahead, left [m], height."""
+    point = world(at[0], at[1], at[2], me)
+    for i in range(3):
+        me.plan[pl.GAZE_X + i] = point[i]
+
+
+@compiled
+def strokes(kind: int, size_m: float, rate_hz: float, burst_s: float, n: int, me: Worker) -> None:
+    """Plan n bursts of a stroke."""
+    plan = me.plan
+    plan[pl.STROKE], plan[pl.STROKE_M], plan[pl.STROKE_HZ] = kind, size_m, rate_hz
+    plan[pl.BURST_S], plan[pl.HOLD_S] = burst_s, n * (burst_s + PAUSE_S)
+
+
+@compiled
+def at_work(me: Worker) -> None:
+    """Fill q as it is in the middle of the work, before the first stroke."""
+    plan, q, size = me.plan, me.q, me.size
+    for side in range(2):
+        foot(FAR, side, plan, me.prints, me.stance, size, q)
+    stand(plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW], 0.0, me.traits, size, q)
+    extend(1.0, 1.0, plan, size, q)
+    stroke(0.0, plan, q)
+    hands_on(1.0, 1.0, plan, q)
+
+
+@compiled
+def finish(peak_m_s: float, me: Worker) -> float:
+    """Settle the trunk and the times of a plan whose hands, strokes and steps stand; how long."""
+    plan = me.plan
+    side = int(plan[pl.SIDE])
+    low = min(max((0.95 * me.size[STAND_Z] - plan[pl.TOOL_POSE + 2]) / 0.5, 0.0), 1.0)
+    plan[pl.SQUAT] = 0.0 if plan[pl.KNEEL] + plan[pl.CROUCH] > 0.0 else 0.8 * low
+    settle_lean(me)
+    plan[pl.OUT_S] = max(1.875 * _way(side, me) / peak_m_s, 0.35)
+    done = plan[pl.OUT_AT] + plan[pl.TAKE_S] + plan[pl.OUT_S]
+    plan[pl.LASTS] = 2.0 * done + plan[pl.HOLD_S]
+    plan[pl.UNDO_AT] = 0.5 * plan[pl.LASTS] if plan[pl.STEP_COUNT] > 0.0 else 0.0
+    return plan[pl.LASTS]
+
+
+@compiled
+def settle_lean(me: Worker) -> None:
+    """Smallest lean that brings what the hands hold within reach; else that comes nearer."""
+    plan = me.plan
+    low, high, far = 0.0, MOST_LEAN, 0.0
+    for attempt in range(10):
+        at_work(me)
+        used = (me.q[c.HAND_SHARE], me.q[c.HAND_SHARE + 1])
+        far = beyond(me.q, used, me.bones, me.frame, me.size, me.p, me.r) + SPARE_M
+        if attempt == 0 and far <= 0.0:
+            return
+        if far > 0.0:
+            low = plan[pl.LEAN]
+        else:
+            high = plan[pl.LEAN]
+        plan[pl.LEAN] = 0.5 * (low + high)
+    plan[pl.LEAN] = high
+    if far > 0.0:
+        _come_nearer(me)
+
+
+@compiled
+def _come_nearer(me: Worker) -> None:
+    """Move tool and targets towards the shoulders by what is out of reach."""
+    plan, p = me.plan, me.p
+    at_work(me)
+    used = (me.q[c.HAND_SHARE], me.q[c.HAND_SHARE + 1])
+    far = beyond(me.q, used, me.bones, me.frame, me.size, p, me.r) + SPARE_M
+    if far <= 0.0:
+        return
+    x, y, z = p[3, 0], p[3, 1], p[3, 2]
+    dx, dy, dz = plan[pl.TOOL_POSE] - x, plan[pl.TOOL_POSE + 1] - y, plan[pl.TOOL_POSE + 2] - z
+    share = 1.15 * far / math.sqrt(dx * dx + dy * dy + dz * dz)
+    other = pl.TARGET + 3 * (1 - int(plan[pl.SIDE]))
+    for at in (pl.TOOL_POSE, other):
+        plan[at] -= share * dx
+        plan[at + 1] -= share * dy
+        plan[at + 2] -= share * dz
+
+
+@compiled
+def _way(side: int, me: Worker) -> float:
+    """The longest way that a hand has from hanging, or from the belt, to its work [m]."""
+    plan, q, p = me.plan, me.q, me.p
+    at_work(me)
+    way = 0.15
+    goal = (q[c.HAND_TARGET], q[c.HAND_TARGET + 1], q[c.HAND_TARGET + 2])
+    right = (q[c.HAND_TARGET + 3], q[c.HAND_TARGET + 4], q[c.HAND_TARGET + 5])
+    used = (q[c.HAND_SHARE], q[c.HAND_SHARE + 1])
+    stand(plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW], 0.0, me.traits, me.size, q)
+    extend(1.0, 0.0, plan, me.size, q)
+    pose(q, me.bones, me.frame, me.size, p, me.r)
+    for hand in range(2):
+        wrist = LEFT + SIDE_STRIDE * hand + HAND
+        to = goal if hand == 0 else right
+        d = 0.0
+        for i in range(3):
+            d += (to[i] - p[wrist, i]) ** 2
+        if used[hand] > 0.0:
+            way = max(way, math.sqrt(d) - 0.05)
+    return way

@@ -1,0 +1,42 @@
+"""Sawing by hand: long strokes along the blade, the other hand holds the board down.
+
+Wrists at 1.25 to 2.0 m/s (95th percentile) in the recordings.
+"""
+
+from hrc_env.motion.activities.planning import (
+    CALM_M_S,
+    between,
+    blank,
+    dominant,
+    finish,
+    look_to,
+    put_other,
+    put_tool,
+    step_ahead,
+    strokes,
+)
+from hrc_env.motion.activities.strokes import SAW
+from hrc_env.motion.activities.worker import Place, Worker
+from hrc_env.motion.compiled import compiled
+from hrc_env.props import prop_index
+from hrc_env.typing import Floats
+
+HAND_SAW = prop_index("saw")
+CUT_RAD = 0.6
+"""How steeply the blade goes into the board [rad]; 45 to 60 degrees to it is usual, judgement."""
+
+
+@compiled
+def start_saw(draws: Floats, place: Place, me: Worker) -> float:
+    """Plan to saw a board at the place's height; returns how long it takes [s]."""
+    blank(me)
+    side = dominant(draws[0], me)
+    sign = 1.0 - 2.0 * side
+    z = place[3] if place[3] > 0.0 else between(draws[1], 0.75, 0.95)
+    step_ahead(1 - side, 0.26, me)
+    put_tool(HAND_SAW, side, (0.40, 0.17 * sign, z + 0.17), (0.0, CUT_RAD, 0.0), me)
+    put_other((0.50, -0.10 * sign, z + 0.03), me)
+    look_to((0.62, 0.1 * sign, z), me)
+    strokes(SAW, between(draws[2], 0.13, 0.15), between(draws[3], 1.55, 1.75),
+            between(draws[4], 3.0, 5.0), 1 + int(3.0 * draws[5]), me)  # fmt: skip
+    return finish(CALM_M_S, me)

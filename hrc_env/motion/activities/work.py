@@ -1,0 +1,85 @@
+"""Work in place: get down to it, take a tool from the belt, work, and all of it backwards.
+
+The first half of such an activity and its second half are mirror images in time.
+"""
+
+import math
+
+from hrc_env.motion import controls as c
+from hrc_env.motion import plans as pl
+from hrc_env.motion.activities.getting_down import get_down
+from hrc_env.motion.activities.strokes import stroke
+from hrc_env.motion.compiled import compiled
+from hrc_env.motion.curves import min_jerk
+from hrc_env.motion.gaze import look_at
+from hrc_env.motion.holding import GRIPS, TWO_HANDED, grip
+from hrc_env.motion.posture import lean, stand
+from hrc_env.typing import Floats
+
+GAZE_LEAD_S = 0.25
+"""Eyes and head set off before the hand (Land & Hayhoe 2001: about half a second at most)."""
+BELT_AHEAD_M, BELT_SIDE_M, BELT_UP_M, BELT_PITCH_RAD = 0.06, 0.23, -0.02, 1.3
+"""Where a tool hangs, from the pelvis [m], and how it points; judgement."""
+DRAWN_SHARE = 0.6
+"""Share of the way at which what is drawn out with both hands is out."""
+
+
+@compiled
+def extend(down: float, out: float, plan: Floats, size: Floats, q: Floats) -> None:
+    """A standing body's q at a share of getting down, and of reaching out from there."""
+    get_down(down, plan, size, q)
+    belt(int(plan[pl.SIDE]), c.PROP_POSE, q)
+    lean(plan[pl.LEAN] * out, plan[pl.SQUAT], plan[pl.TWIST] * out, q)
+    for i in range(6):
+        q[c.PROP_POSE + i] += out * (plan[pl.TOOL_POSE + i] - q[c.PROP_POSE + i])
+
+
+@compiled
+def belt(side: int, at: int, q: Floats) -> None:
+    """Write the pose of a tool on the belt, on that side, into q[at:]."""
+    cos, sin = math.cos(q[c.HEADING]), math.sin(q[c.HEADING])
+    left = (1.0 - 2.0 * side) * BELT_SIDE_M
+    q[at] = q[c.ROOT_X] + cos * BELT_AHEAD_M - sin * left
+    q[at + 1] = q[c.ROOT_Y] + sin * BELT_AHEAD_M + cos * left
+    q[at + 2] = q[c.PELVIS_Z] + BELT_UP_M
+    q[at + 3], q[at + 4], q[at + 5] = q[c.HEADING], BELT_PITCH_RAD, 0.0
+
+
+@compiled
+def hands_on(out: float, taken: float, plan: Floats, q: Floats) -> None:
+    """Send the tool's hand to the tool, the other to its own target or to the tool."""
+    side, tool = int(plan[pl.SIDE]), int(plan[pl.TOOL])
+    other = 1 - side
+    both = TWO_HANDED[tool]
+    for hand in range(2):
+        at = c.HAND_TARGET + 3 * hand
+        if hand == side or both:
+            of = hand if both else 1
+            grip(hand, GRIPS[tool, of, 0], GRIPS[tool, of, 1], GRIPS[tool, of, 2], q)
+        else:
+            for i in range(3):
+                q[at + i] += plan[pl.TARGET + 3 * other + i]
+    q[c.HAND_SHARE + side] = taken
+    q[c.HAND_SHARE + other] = out * plan[pl.USE_LEFT + other]
+
+
+@compiled
+def work(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q: Floats) -> None:
+    """The control vector of someone who works in place with a tool, or empty hands."""
+    stand(plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW], clock_s, traits, size, q)
+    near_end = min(t, plan[pl.LASTS] - t)
+    down = min_jerk(near_end / plan[pl.SETTLE_S])
+    since = near_end - plan[pl.OUT_AT] - plan[pl.TAKE_S]
+    out = min_jerk(since / plan[pl.OUT_S])
+    taken = min_jerk(1.0 + since / plan[pl.TAKE_S]) if plan[pl.TAKE_S] > 0.0 else out
+    extend(down, out, plan, size, q)
+    working = t - plan[pl.OUT_AT] - plan[pl.TAKE_S] - plan[pl.OUT_S]
+    if out >= 1.0:
+        stroke(working, plan, q)
+    else:
+        stroke(0.0 if working < 0.0 else plan[pl.HOLD_S], plan, q)
+    hands_on(out, taken, plan, q)
+    drawn = DRAWN_SHARE * plan[pl.OUT_S] if TWO_HANDED[int(plan[pl.TOOL])] else 0.0
+    q[c.PROP] = plan[pl.TOOL] if since >= drawn else 0.0
+    looking = min_jerk((since + GAZE_LEAD_S) / 0.6)
+    look_at(plan[pl.GAZE_X], plan[pl.GAZE_Y], plan[pl.GAZE_Z], looking, size, q)

@@ -1,0 +1,67 @@
+"""What hands hold: a prop's pose decides where they are."""
+
+import math
+
+import numpy as np
+
+from hrc_env.motion import controls as c
+from hrc_env.motion import plans as pl
+from hrc_env.motion.compiled import compiled
+from hrc_env.props import PROPS
+from hrc_env.typing import Floats
+
+GRIPS = np.array([np.nan_to_num(prop.grips) for prop in PROPS])
+"""(N, 2, 3) where the left and right hand hold each prop, in its frame [m]."""
+TWO_HANDED = np.array([bool(np.isfinite(prop.grips).all()) for prop in PROPS])
+"""(N,) whether both hands do; a tool for one hand is held at its origin."""
+
+
+@compiled
+def grip(side: int, gx: float, gy: float, gz: float, q: Floats) -> None:
+    """Send a hand to a point of the prop's frame; its pose stands in q."""
+    yaw, pitch, roll = q[c.PROP_POSE + 3], q[c.PROP_POSE + 4], q[c.PROP_POSE + 5]
+    cy, sy = math.cos(yaw), math.sin(yaw)
+    cp, sp = math.cos(pitch), math.sin(pitch)
+    cr, sr = math.cos(roll), math.sin(roll)
+    y, z = cr * gy - sr * gz, sr * gy + cr * gz
+    x, z = cp * gx + sp * z, cp * z - sp * gx
+    at = c.HAND_TARGET + 3 * side
+    q[at] = q[c.PROP_POSE] + cy * x - sy * y
+    q[at + 1] = q[c.PROP_POSE + 1] + sy * x + cy * y
+    q[at + 2] = q[c.PROP_POSE + 2] + z
+
+
+@compiled
+def hold_load(x: float, y: float, yaw: float, up: float, plan: Floats, q: Floats) -> None:
+    """Put the load where someone at (x, y) facing yaw holds it, and the hands on it."""
+    place_load(x, y, yaw, up, plan, q)
+    grip_load(1.0, plan, q)
+
+
+@compiled
+def place_load(x: float, y: float, yaw: float, up: float, plan: Floats, q: Floats) -> None:
+    """Put the load where it is of someone at (x, y) facing yaw, `up` higher than standing."""
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    at = pl.LOAD_AT
+    q[c.PROP] = plan[pl.LOAD_PROP]
+    q[c.PROP_POSE] = x + cos * plan[at] - sin * plan[at + 1]
+    q[c.PROP_POSE + 1] = y + sin * plan[at] + cos * plan[at + 1]
+    q[c.PROP_POSE + 2] = up + plan[at + 2]
+    q[c.PROP_POSE + 3] = yaw + plan[at + 3]
+    q[c.PROP_POSE + 4], q[c.PROP_POSE + 5] = plan[at + 4], plan[at + 5]
+
+
+@compiled
+def grip_load(share: float, plan: Floats, q: Floats) -> None:
+    """Send the hands that hold it to the load, by a share."""
+    for side in range(2):
+        held = pl.LOAD_GRIP + 3 * side
+        grip(side, plan[held], plan[held + 1], plan[held + 2], q)
+        q[c.HAND_SHARE + side] = share * plan[pl.LOAD_USED + side]
+
+
+@compiled
+def drop_load(plan: Floats) -> None:
+    """Empty hands."""
+    for i in range(pl.N_LOAD):
+        plan[pl.LOAD_PROP + i] = 0.0
