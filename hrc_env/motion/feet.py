@@ -60,7 +60,7 @@ def foot(
     t: float, side: int, plan: Floats, prints: Floats, stance: Floats, size: Floats, q: Floats
 ) -> None:
     """Write the ankle columns of one side at time t into the control vector."""
-    x, y, yaw, ground = stance[side, 0], stance[side, 1], stance[side, 2], stance[side, 3]
+    x, y, yaw, ground = stance[side, 0], stance[side, 1], stance[side, 2], stance[side, 4]
     heel_up, toes_up, rise, flown = 0.0, 0.0, 0.0, 0.0
     count = int(plan[pl.STEP_COUNT])
     if count > 0:

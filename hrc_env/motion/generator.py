@@ -51,7 +51,7 @@ def make_state(batch: int, n_workers: int, body: Body, config: MotionConfig) -> 
     state = MotionState(
         clock_s=array(), time_s=array(), duration_s=array(),
         activity=np.zeros((batch, n_workers), np.int64),
-        plan=array(pl.N_PLAN), prints=array(pl.MAX_STEPS, 5), stance=array(2, 4),
+        plan=array(pl.N_PLAN), prints=array(pl.MAX_STEPS, 5), stance=array(2, 5),
         offset=array(c.N_BLENDED, 2), traits=array(pl.N_TRAITS), spots=array(bh.N_SPOT),
         draws=array(2 * bh.N_DRAWS), anatomy=anatomy(body), numbers=numbers(config),
     )  # fmt: skip

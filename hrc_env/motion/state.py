@@ -49,8 +49,7 @@ class MotionState:
     prints: Floats
     """(B, W, MAX_STEPS, 5) footprints x, y, heading, share of a full stride, height."""
     stance: Floats
-    """(B, W, 2, 4) footprints that the activity begins on, left and right: x, y, heading,
-    height."""
+    """(B, W, 2, 5) footprints that the activity begins on: left, right; columns as `prints`."""
     offset: Floats
     """(B, W, N_BLENDED, 2) what the activity before left over: value and rate at time 0."""
     traits: Floats

@@ -28,7 +28,7 @@ def worker(activity, planner, *arguments):
     plan[pl.START_X] = plan[pl.END_X] = 0.4
     plan[pl.START_YAW] = plan[pl.END_YAW] = np.pi
     plan[pl.OUT_AT] = 0.2
-    stance[:] = [(0.4, -0.1, np.pi), (0.4, 0.1, np.pi)]
+    stance[:, :3] = [(0.4, -0.1, np.pi), (0.4, 0.1, np.pi)]
     q, p, r = np.zeros(c.N_CONTROLS), np.zeros((N_POINTS, 3)), np.zeros((N_FRAMES, 3, 3))
     for side in range(2):
         foot(0.0, side, plan, prints, stance, bones.size, q)

@@ -46,15 +46,13 @@ def start_drill(draws: Floats, place: Place, me: Worker) -> float:
     else:
         step_ahead(1 - side, 0.10 if overhead else 0.18, me)
     if overhead:
-        ahead = 0.34
-        at, turn = (ahead + BIT_UP_M, 0.04 * sign, z - BIT_M - THRUST_M), (0.0, -0.5 * math.pi, 0.0)
-        put_other((ahead, -0.14 * sign, z - 0.04), me)
+        ahead, turn = 0.34, (0.0, -0.5 * math.pi, 0.0)
+        at, beside = (ahead + BIT_UP_M, 0.04 * sign, z - BIT_M - THRUST_M), (ahead, z - 0.04)
     else:
-        ahead = 0.60
-        at = (ahead - BIT_M - THRUST_M, 0.05 * sign, z - BIT_UP_M)
-        turn = (0.0, 0.0, 0.0)
-        put_other((ahead - 0.04, -0.09 * sign, z - 0.02), me)
+        ahead, turn = 0.60, (0.0, 0.0, 0.0)
+        at, beside = (ahead - BIT_M - THRUST_M, 0.05 * sign, z - BIT_UP_M), (ahead - 0.04, z - 0.02)
     put_tool(DRILL, side, at, turn, me)
+    put_other((beside[0], -0.12 * sign, beside[1]), me)
     look_to((ahead, 0.0, z), me)
     strokes(BORE, THRUST_M, 0.0, between(draws[2], 1.5, 1.8), 2 + int(3.0 * draws[3]), me)
     me.plan[pl.WANDER_M] = 0.12 * sign

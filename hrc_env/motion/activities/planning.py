@@ -11,6 +11,7 @@ from hrc_env.motion.activities.worker import Worker
 from hrc_env.motion.anatomy import HAND, LEFT, LEG, SIDE_STRIDE, STAND_Z
 from hrc_env.motion.compiled import compiled
 from hrc_env.motion.feet import foot
+from hrc_env.motion.holding import TWO_HANDED
 from hrc_env.motion.kinematics import pose
 from hrc_env.motion.posture import MOST_LEAN, beyond, stand
 
@@ -96,6 +97,8 @@ def put_tool(tool: int, side: int, at: Triple, turn: Triple, me: Worker) -> None
         plan[pl.TOOL_POSE + i] = point[i]
         plan[pl.TOOL_POSE + 3 + i] = turn[i]
     plan[pl.TOOL_POSE + 3] += plan[pl.START_YAW]
+    if TWO_HANDED[tool]:
+        plan[pl.USE_LEFT] = plan[pl.USE_RIGHT] = 1.0
 
 
 @compiled
