@@ -16,9 +16,10 @@ from hrc_env.motion import plans as pl
 from hrc_env.motion.anatomy import anatomy
 from hrc_env.motion.compiled import compiled
 from hrc_env.motion.config import MotionConfig, numbers
+from hrc_env.motion.holding import N_HELD, prop_pose
 from hrc_env.motion.kinematics import N_FRAMES, N_POINTS, pose, quaternion, spin
 from hrc_env.motion.state import RATE_H_S, MotionState, begin, evaluate, follow_up
-from hrc_env.records import WorkerMotion, WorkerPath
+from hrc_env.records import Held, WorkerMotion, WorkerPath
 from hrc_env.typing import Bools, Floats, Ints
 
 __all__ = [
@@ -89,12 +90,13 @@ def advance(
     arrays, constants = _arrays(state), _constants(state)
     out = _blank((batch, n_steps, n_workers), 3, 4) + _blank((batch, n_workers), 3, 3)
     position, quaternion_, velocity, turning = out
-    while _run(float(dt_s), n_steps, done, ticked, *arrays[:9], *constants[1:], *out):
+    held = np.empty((batch, n_workers, N_HELD))
+    while _run(float(dt_s), n_steps, done, ticked, *arrays[:9], *constants[1:], *out, held):
         for b in np.flatnonzero(ticked).tolist():
             for w in np.flatnonzero(state.time_s[b] >= state.duration_s[b]).tolist():
                 state.draws[b, w, : bh.N_DRAWS] = rngs[b].random(bh.N_DRAWS)
                 follow_up(b, w, *arrays, *constants)
-    last = WorkerMotion(position[:, -1], quaternion_[:, -1], velocity, turning)
+    last = WorkerMotion(position[:, -1], quaternion_[:, -1], velocity, turning, _held(held))
     return WorkerPath(position, quaternion_), last
 
 
@@ -103,13 +105,19 @@ def current(state: MotionState, ids: Ints | None = None) -> WorkerMotion:
     batch, n_workers = state.activity.shape
     rows = np.arange(batch) if ids is None else np.asarray(ids, np.int64)
     out = _blank((len(rows), n_workers), 3, 4, 3, 3)
-    _draw(rows, *_arrays(state)[:9], *_constants(state)[1:], *out)
-    return WorkerMotion(out[0], out[1], out[2], out[3])
+    held = np.empty((len(rows), n_workers, N_HELD))
+    _draw(rows, *_arrays(state)[:9], *_constants(state)[1:], *out, held)
+    return WorkerMotion(out[0], out[1], out[2], out[3], _held(held))
 
 
 def activity(state: MotionState) -> Ints:
     """(B, W) what each worker does, an index into `activity_names`."""
     return state.activity.copy()
+
+
+def _held(rows: Floats) -> Held:
+    """What `prop_pose` wrote into rows (B, W, N_HELD)."""
+    return Held(rows[..., 0].astype(np.int64), rows[..., 1:4].copy(), rows[..., 4:].copy())
 
 
 def _blank(lead: tuple[int, ...], *widths: int) -> tuple[Floats, ...]:
@@ -169,7 +177,7 @@ def _run(
     clock_s: Floats, time_s: Floats, duration_s: Floats, activity: Ints,
     plan: Floats, prints: Floats, stance: Floats, offset: Floats, traits: Floats,
     bones: Floats, frame: Floats, size: Floats,
-    position: Floats, quaternion_: Floats, velocity: Floats, turning: Floats,
+    position: Floats, quaternion_: Floats, velocity: Floats, turning: Floats, held: Floats,
 ) -> bool:  # fmt: skip
     """Move every environment on until done or someone must decide; whether anyone must."""
     q, p = np.empty(c.N_CONTROLS), np.zeros((2, N_POINTS, 3))
@@ -188,7 +196,7 @@ def _run(
                 waiting = True
                 break
             for w in range(time_s.shape[1]):
-                for i in range(2 if t == n_steps - 1 else 1):
+                for i in range(1 if t == n_steps - 1 else 0, -1, -1):
                     _pose(
                         b, w, i * RATE_H_S, clock_s, time_s, activity, plan, prints, stance,
                         offset, traits, bones, frame, size, q, p[i], r[i],
@@ -196,6 +204,7 @@ def _run(
                 _place(p[0], r[0], position[b, t, w], quaternion_[b, t, w])
                 if t == n_steps - 1:
                     _rates(p, r, velocity[b, w], turning[b, w])
+                    prop_pose(q, held[b, w])
             done[b] += 1
     return waiting
 
@@ -205,17 +214,18 @@ def _draw(
     rows: Ints, clock_s: Floats, time_s: Floats, duration_s: Floats, activity: Ints, plan: Floats,
     prints: Floats, stance: Floats, offset: Floats, traits: Floats,
     bones: Floats, frame: Floats, size: Floats,
-    position: Floats, quaternion_: Floats, velocity: Floats, turning: Floats,
+    position: Floats, quaternion_: Floats, velocity: Floats, turning: Floats, held: Floats,
 ) -> None:  # fmt: skip
     """Bodies of some environments as they are, into arrays (rows, W, ...)."""
     q, p = np.empty(c.N_CONTROLS), np.zeros((2, N_POINTS, 3))
     r = np.zeros((2, N_FRAMES, 3, 3))
     for row, b in enumerate(rows):
         for w in range(time_s.shape[1]):
-            for i in range(2):
+            for i in range(1, -1, -1):
                 _pose(
                     b, w, i * RATE_H_S, clock_s, time_s, activity, plan, prints, stance,
                     offset, traits, bones, frame, size, q, p[i], r[i],
                 )  # fmt: skip
             _place(p[0], r[0], position[row, w], quaternion_[row, w])
             _rates(p, r, velocity[row, w], turning[row, w])
+            prop_pose(q, held[row, w])

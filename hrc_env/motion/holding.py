@@ -15,6 +15,27 @@ GRIPS = np.array([np.nan_to_num(prop.grips) for prop in PROPS])
 TWO_HANDED = np.array([bool(np.isfinite(prop.grips).all()) for prop in PROPS])
 """(N,) whether both hands do; a tool for one hand is held at its origin."""
 
+N_HELD = 8
+"""Numbers that say what is held: kind, position (3), quaternion (4, scalar first)."""
+
+
+@compiled
+def prop_pose(q: Floats, out: Floats) -> None:
+    """Write what q holds and where into out (N_HELD,)."""
+    out[0] = q[c.PROP]
+    for i in range(3):
+        out[1 + i] = q[c.PROP_POSE + i] if q[c.PROP] > 0.0 else 0.0
+    yaw, pitch, roll = q[c.PROP_POSE + 3], q[c.PROP_POSE + 4], q[c.PROP_POSE + 5]
+    if q[c.PROP] == 0.0:
+        yaw = pitch = roll = 0.0
+    cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)
+    cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
+    cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
+    out[4] = cy * cp * cr + sy * sp * sr
+    out[5] = cy * cp * sr - sy * sp * cr
+    out[6] = cy * sp * cr + sy * cp * sr
+    out[7] = sy * cp * cr - cy * sp * sr
+
 
 @compiled
 def grip(side: int, gx: float, gy: float, gz: float, q: Floats) -> None:

@@ -85,3 +85,6 @@ ACTIVITY_NAMES = (
     "look round", "pick up", "set down", "hand over", "receive", "squat", "kneel", "hammer",
     "drill", "drill overhead", "saw", "measure", "point", "lunge", "climb",
 )  # fmt: skip
+GOING = (WALK, TURN, CARRY, STUMBLE, STEP_BACK)
+TAKING, GIVING = (PICK_UP, RECEIVE), (SET_DOWN, HAND_OVER)
+"""Activities that share a closed form."""

@@ -73,7 +73,7 @@ def evaluate(
     feet_s = step_time(t, plan) - (plan[pl.TAKEN_S] if activity == pl.PUSH else 0.0)
     for side in range(2):
         foot(feet_s, side, plan, prints, stance, size, q)
-    if activity == pl.WALK or pl.TURN <= activity <= pl.STEP_BACK and activity != pl.PUSH:
+    if activity in pl.GOING:
         walk(t, plan, clock_s, traits, size, q)
     elif activity == pl.REACH:
         reach(t, plan, clock_s, traits, size, q)
@@ -81,9 +81,9 @@ def evaluate(
         lift(t, plan, clock_s, traits, size, q)
     elif activity == pl.PUSH:
         push(t, plan, clock_s, traits, size, q)
-    elif activity == pl.PICK_UP or activity == pl.RECEIVE:
+    elif activity in pl.TAKING:
         pick_up(t, plan, clock_s, traits, size, q)
-    elif activity == pl.SET_DOWN or activity == pl.HAND_OVER:
+    elif activity in pl.GIVING:
         pick_up(plan[pl.LASTS] - t, plan, clock_s, traits, size, q)
     elif pl.SQUATTING <= activity <= pl.LUNGE:
         work(t, plan, clock_s, traits, size, q)
@@ -168,8 +168,7 @@ def follow_up(
             offset[b, w], traits[b, w], size, q[i],
         )  # fmt: skip
     unwound = _stop(plan[b, w], prints[b, w], stance[b, w])
-    kind = activity[b, w]
-    if kind == pl.SET_DOWN or kind == pl.HAND_OVER or kind == pl.PUSH:
+    if activity[b, w] in pl.GIVING or activity[b, w] == pl.PUSH:
         drop_load(plan[b, w])
     q[0, c.HEADING] += unwound
     q[1, c.HEADING] += unwound

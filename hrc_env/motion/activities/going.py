@@ -8,7 +8,6 @@ from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import between
 from hrc_env.motion.activities.worker import Place, Worker
-from hrc_env.motion.anatomy import STAND_Z
 from hrc_env.motion.compiled import compiled
 from hrc_env.motion.curves import min_jerk
 from hrc_env.motion.holding import GRIPS, drop_load, grip_load, place_load
@@ -60,9 +59,7 @@ def start_step_back(draws: Floats, place: Place, me: Worker) -> float:
 
 
 @compiled
-def start_stumble(
-    draws: Floats, place: Place, via: Floats, speed_m_s: float, me: Worker
-) -> float:
+def start_stumble(draws: Floats, place: Place, via: Floats, speed_m_s: float, me: Worker) -> float:
     """Plan a walk to the place in which a foot catches; returns how long it takes [s]."""
     lasts = start_walk(place, via, speed_m_s, me)
     plan = me.plan
@@ -81,9 +78,7 @@ def start_stumble(
 
 
 @compiled
-def start_push(
-    place: Place, via: Floats, speed_m_s: float, prop: int, me: Worker
-) -> float:
+def start_push(place: Place, via: Floats, speed_m_s: float, prop: int, me: Worker) -> float:
     """Plan to push a cart or wheelbarrow to the place; returns how long it takes [s]."""
     plan = me.plan
     drop_load(plan)

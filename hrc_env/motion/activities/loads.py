@@ -87,9 +87,7 @@ def pick_up(
 
 
 @compiled
-def start_pick_up(
-    draws: Floats, place: Place, prop: int, on_shoulder: bool, me: Worker
-) -> float:
+def start_pick_up(draws: Floats, place: Place, prop: int, on_shoulder: bool, me: Worker) -> float:
     """Plan to pick a box or board up, gripped at the place's height; how long it takes [s]."""
     _hold(prop, on_shoulder and prop == BOARD, dominant(draws[0], me), me)
     z = place[3] if place[3] > 0.0 else between(draws[1], 0.18, 0.45)
@@ -153,9 +151,7 @@ def _hold(prop: int, on_shoulder: bool, side: int, me: Worker) -> None:
 
 
 @compiled
-def _plan_lift(
-    prop: int, at: tuple[float, float, float], raise_s: float, me: Worker
-) -> float:
+def _plan_lift(prop: int, at: tuple[float, float, float], raise_s: float, me: Worker) -> float:
     """Plan the way between a place (ahead, left, height) and how the load is carried."""
     plan, size = me.plan, me.size
     blank(me)

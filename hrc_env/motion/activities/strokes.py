@@ -43,7 +43,7 @@ def stroke(t: float, plan: Floats, q: Floats) -> None:
     elif kind == SAW:
         _along(-ease * plan[pl.STROKE_M] * math.sin(turn), plan, q)
         q[c.SPINE_TWIST] += (1.0 - 2.0 * side) * 0.10 * ease * math.sin(turn)
-    elif kind == BUSY or kind == JAB:
+    elif kind in (BUSY, JAB):
         _busy(ease, turn, other, plan, q)
 
 
