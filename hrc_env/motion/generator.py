@@ -89,9 +89,10 @@ def advance(
     done, ticked = np.zeros(batch, np.int64), np.zeros(batch, np.bool_)
     arrays, constants = _arrays(state), _constants(state)
     out = _blank((batch, n_steps, n_workers), 3, 4) + _blank((batch, n_workers), 3, 3)
-    position, quaternion_, velocity, turning = out
     held = np.empty((batch, n_workers, N_HELD))
-    while _run(float(dt_s), n_steps, done, ticked, *arrays[:9], *constants[1:], *out, held):
+    written = (*out, held)
+    position, quaternion_, velocity, turning = out
+    while _run(float(dt_s), n_steps, done, ticked, *arrays[:9], *constants[1:], *written):
         for b in np.flatnonzero(ticked).tolist():
             for w in np.flatnonzero(state.time_s[b] >= state.duration_s[b]).tolist():
                 state.draws[b, w, : bh.N_DRAWS] = rngs[b].random(bh.N_DRAWS)
@@ -106,7 +107,8 @@ def current(state: MotionState, ids: Ints | None = None) -> WorkerMotion:
     rows = np.arange(batch) if ids is None else np.asarray(ids, np.int64)
     out = _blank((len(rows), n_workers), 3, 4, 3, 3)
     held = np.empty((len(rows), n_workers, N_HELD))
-    _draw(rows, *_arrays(state)[:9], *_constants(state)[1:], *out, held)
+    written = (*out, held)
+    _draw(rows, *_arrays(state)[:9], *_constants(state)[1:], *written)
     return WorkerMotion(out[0], out[1], out[2], out[3], _held(held))
 
 
