@@ -75,15 +75,23 @@ class SkinLooks:
 
 
 @dataclass(frozen=True, slots=True)
+class HatLooks:
+    """A hard hat; it moves with the head."""
+
+    vertices: Points3
+    """(V, 3) in the head's frame [m]."""
+    faces: Ints
+    """(F, 3)."""
+    rgb: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
 class Looks:
     """What a worker looks like; the room `scene` draws it."""
 
     skins: tuple[SkinLooks, ...]
-    hat_vertices: Points3
-    """(V, 3) hard hat in the head's frame [m]."""
-    hat_faces: Ints
-    """(F, 3)."""
-    hat_rgb: tuple[float, float, float]
+    hat: HatLooks | None
+    """None for who wears none."""
 
 
 def assets_dir() -> Path:
@@ -126,13 +134,7 @@ def load_looks(name: str = "worker_1") -> Looks:
         ConfigError: no worker of that name has been baked.
     """
     with np.load(_path(name)) as baked:
-        red, green, blue = (float(value) / 255 for value in baked["hat_rgb"])
-        return Looks(
-            skins=tuple(_skin(baked, skin) for skin in ("skin", "cloth")),
-            hat_vertices=_fixed(baked["hat_vertices"] * float(baked["unit_m"]), np.float64),
-            hat_faces=_fixed(baked["hat_faces"], np.int64),
-            hat_rgb=(red, green, blue),
-        )
+        return Looks(tuple(_skin(baked, skin) for skin in ("skin", "cloth")), _hat(baked))
 
 
 def rest_motion(body: Body) -> WorkerMotion:
@@ -252,6 +254,17 @@ def _skin(baked: np.lib.npyio.NpzFile, name: str) -> SkinLooks:
         uv=_fixed(baked[f"{name}_uv"] / 65535.0, np.float64),
         weights=_fixed(weights / weights.sum(1, keepdims=True), np.float64),
         texture=_texture(baked, name),
+    )
+
+
+def _hat(baked: np.lib.npyio.NpzFile) -> HatLooks | None:
+    if "hat_vertices" not in baked:
+        return None
+    red, green, blue = (float(value) / 255 for value in baked["hat_rgb"])
+    return HatLooks(
+        vertices=_fixed(baked["hat_vertices"] * float(baked["unit_m"]), np.float64),
+        faces=_fixed(baked["hat_faces"], np.int64),
+        rgb=(red, green, blue),
     )
 
 

@@ -84,7 +84,7 @@ def test_a_worker_stands_on_the_floor_and_is_as_tall_as_a_man_with_boots_and_hat
     body, looks = load_body(), load_looks()
     cloth = next(skin for skin in looks.skins if skin.name == "cloth")
     assert abs(cloth.vertices[:, 2].min()) < 1e-3
-    crown = looks.hat_vertices[:, 2].max() + body.rest_position[SEGMENT["head"], 2]
+    crown = looks.hat.vertices[:, 2].max() + body.rest_position[SEGMENT["head"], 2]
     assert body.stature_m < crown < body.stature_m + 0.07
 
 
@@ -156,7 +156,7 @@ def test_nobody_is_a_motion_too():
 def test_capsules_hold_the_clothed_surface_closely():
     body, looks = load_body(), load_looks()
     capsules = worker_truth(body, rest_motion(body)).capsules_world
-    hat = looks.hat_vertices + body.rest_position[SEGMENT["head"]]
+    hat = looks.hat.vertices + body.rest_position[SEGMENT["head"]]
     points = np.vstack([skin.vertices for skin in looks.skins] + [hat])
     outside = distance_to_capsules(points, capsules, body.capsule_radius_m).min(1)
     assert np.quantile(outside, 0.95) < 0.02, "95 % of the surface at most 2 cm outside"

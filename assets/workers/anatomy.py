@@ -61,7 +61,8 @@ def raw_arrays(phenotype: dict[str, float], stature_m: float) -> dict[str, np.nd
     import anny
     import torch
 
-    model = anny.Anny(topology="anny-full")
+    asked = "all" if "african" in phenotype else "default"
+    model = anny.Anny(topology="anny-full", phenotypes=asked)
     data = Path(anny.__file__).parent / "data"
     still = torch.eye(4, dtype=torch.float64)[None, None].repeat(1, model.bone_count, 1, 1)
     used = np.unique(model.faces.numpy())

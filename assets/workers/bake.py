@@ -1,12 +1,12 @@
 """Bake a worker: anny phenotype -> assets/workers/<name>.npz. See README.md beside this file.
 
-    python assets/workers/bake.py worker_1
+    python assets/workers/bake.py [worker_1 ...]
 
 Everything that a run needs of a body is in that one file; torch and anny are needed here only.
 """
 
 import argparse
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import anatomy
@@ -15,37 +15,12 @@ import numpy as np
 import paint_clothes
 import paint_skin
 import surfaces
-from colours import Colours
+from recipes import RECIPES, Recipe
 
 FOLDER = Path(__file__).parent
 UNIT_M = 1 / 16000
 """Vertices are stored as int16 multiples of this (0.06 mm)."""
 
-
-@dataclass(frozen=True)
-class Recipe:
-    """A phenotype (anny's parameters in [0, 1]) with a stature, and the colours of its clothes."""
-
-    stature_m: float
-    phenotype: dict[str, float]
-    colours: Colours
-
-
-def _recipe(stature_m: float, *phenotype: float, **colours: tuple[int, int, int]) -> Recipe:
-    names = ("gender", "age", "muscle", "weight", "proportions")
-    return Recipe(
-        stature_m, dict(zip(names, phenotype, strict=True)), replace(Colours(), **colours)
-    )
-
-
-RECIPES = {
-    "worker_1": _recipe(1.78, 0.0, 0.67, 0.60, 0.50, 0.60),
-    "worker_2": _recipe(1.66, 1.0, 0.65, 0.50, 0.50, 0.70, hat=(235, 235, 232)),
-    "worker_3": _recipe(1.80, 0.0, 0.75, 0.50, 0.85, 0.40, vest=(255, 122, 30)),
-    "worker_4": _recipe(1.88, 0.0, 0.62, 0.50, 0.30, 0.70, skin=(124, 82, 60)),
-    "worker_5": _recipe(1.57, 1.0, 0.70, 0.50, 0.65, 0.50, skin=(176, 128, 98)),
-}
-"""Named bodies; gender 0 is male, age 0.67 an adult. Only worker_1 is shipped so far."""
 
 JOINTS = (
     ("nose", "head", "nose"),
@@ -72,8 +47,10 @@ def bake(name: str, recipe: Recipe, raw: dict[str, np.ndarray]) -> dict[str, np.
     lift = np.array([0.0, 0.0, -cloth.vertices[:, 2].min()])
     person = anatomy.lifted(person, lift)
     cloth = surfaces.decimated(replace(cloth, vertices=cloth.vertices + lift), N_VERTICES["cloth"])
+    if recipe.collar:
+        cloth = surfaces.joined(cloth, surfaces.collar(person))
     head = surfaces.head_surface(person)
-    hat, hat_faces = surfaces.hard_hat(person, head)
+    hat = surfaces.hard_hat(person, head) if recipe.hat else None
     head = surfaces.decimated(head, N_VERTICES["head"])
     hands = [
         surfaces.decimated(surfaces.hand_surface(person, side), N_VERTICES["hand"])
@@ -81,8 +58,11 @@ def bake(name: str, recipe: Recipe, raw: dict[str, np.ndarray]) -> dict[str, np.
     ]
     eyes = [surfaces.eye_surface(person, group) for group in anatomy.EYE_GROUPS]
     origins = dict(zip(anatomy.SEGMENTS, person.origins, strict=True))
+    hair = paint_skin.hair_pieces(person, recipe)
+    worn = [surface.vertices for surface, _ in hair] + ([] if hat is None else [hat[0]])
+    crown = np.vstack([head.vertices, *worn])
     fitted = capsules.body_capsules(
-        cloth.vertices, cloth.parts(), np.vstack([head.vertices, hat]), hands[0].vertices, origins
+        cloth.vertices, cloth.parts(), crown, hands[0].vertices, origins
     )
     return {
         "unit_m": np.array(UNIT_M),
@@ -90,10 +70,18 @@ def bake(name: str, recipe: Recipe, raw: dict[str, np.ndarray]) -> dict[str, np.
         "rest_position": person.origins.astype(np.float32),
         **_joints(person, origins),
         **_capsules(fitted, origins),
-        **paint_skin.skin_arrays(person, head, hands, eyes, recipe.colours, UNIT_M),
-        **paint_clothes.cloth_arrays(person, cloth, recipe.colours, UNIT_M),
-        "hat_vertices": np.round((hat - origins["head"]) / UNIT_M).astype(np.int16),
-        "hat_faces": hat_faces.astype(np.uint16),
+        **paint_skin.skin_arrays(person, head, hands, eyes, hair, recipe, UNIT_M),
+        **paint_clothes.cloth_arrays(person, cloth, recipe, UNIT_M),
+        **({} if hat is None else _hat(hat, origins["head"], recipe)),
+    }
+
+
+def _hat(
+    hat: tuple[np.ndarray, np.ndarray], head: np.ndarray, recipe: Recipe
+) -> dict[str, np.ndarray]:
+    return {
+        "hat_vertices": np.round((hat[0] - head) / UNIT_M).astype(np.int16),
+        "hat_faces": hat[1].astype(np.uint16),
         "hat_rgb": np.array(recipe.colours.hat, np.uint8),
     }
 
@@ -126,11 +114,11 @@ def _capsules(
 def main() -> None:
     """Bake the named workers (all recipes' names are valid)."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("names", nargs="+", choices=sorted(RECIPES))
+    parser.add_argument("names", nargs="*", help=f"{', '.join(RECIPES)}; none bakes all")
     parser.add_argument("--raw", type=Path, help="keep anny's arrays here, to bake again faster")
     parser.add_argument("--to", type=Path, default=FOLDER, help="folder to write into")
     arguments = parser.parse_args()
-    for name in arguments.names:
+    for name in arguments.names or RECIPES:
         recipe = RECIPES[name]
         kept = arguments.raw / f"{name}.npz" if arguments.raw else None
         if kept and kept.exists():

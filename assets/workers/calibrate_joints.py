@@ -1,6 +1,6 @@
 """Move a baked worker's joints to where BlazePose sees them, once.
 
-    python assets/workers/calibrate_joints.py worker_1 [--dry-run]
+    python assets/workers/calibrate_joints.py [worker_1 ...] [--dry-run]
 
 The worker is drawn in known poses, BlazePose looks through the four cameras of the lab, its
 landmarks are triangulated and expressed in the segment that carries the joint. The median
@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from poses import POSES, posed
 
-from hrc_env.body import SEGMENTS, Body, assets_dir, load_body, worker_truth
+from hrc_env.body import SEGMENTS, Body, assets_dir, load_body, worker_names, worker_truth
 from hrc_env.geometry.cameras import project, projections
 from hrc_env.geometry.rotations import matrix_from_quaternion
 from hrc_env.geometry.triangulation import triangulate_robust
@@ -167,18 +167,19 @@ def _path(name: str) -> Path:
 
 
 def main() -> None:
-    """Calibrate one worker and write the offsets into its file."""
+    """Calibrate workers and write the offsets into their files."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("name")
+    parser.add_argument("names", nargs="*", help=f"{', '.join(worker_names())}; none takes all")
     parser.add_argument("--dry-run", action="store_true", help="only print the table")
     arguments = parser.parse_args()
-    result = calibrate(arguments.name)
-    print(table(result, load_body(arguments.name)))
-    if not arguments.dry_run:
-        with np.load(_path(arguments.name)) as baked:
-            arrays = dict(baked)
-        arrays["joint_offset"] = result.offset.astype(np.float32)
-        np.savez_compressed(_path(arguments.name), **arrays)
+    for name in arguments.names or worker_names():
+        result = calibrate(name)
+        print(f"\n{name}\n{table(result, load_body(name))}", flush=True)
+        if not arguments.dry_run:
+            with np.load(_path(name)) as baked:
+                arrays = dict(baked)
+            arrays["joint_offset"] = result.offset.astype(np.float32)
+            np.savez_compressed(_path(name), **arrays)
 
 
 if __name__ == "__main__":

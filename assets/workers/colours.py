@@ -15,6 +15,7 @@ class Colours:
     vest: tuple[int, int, int] = (204, 238, 40)
     trim: tuple[int, int, int] = (250, 130, 30)
     stripe: tuple[int, int, int] = (196, 201, 204)
+    bib: tuple[int, int, int] = (44, 66, 112)
     shirt: tuple[int, int, int] = (70, 92, 132)
     trousers: tuple[int, int, int] = (52, 56, 70)
     belt: tuple[int, int, int] = (44, 34, 28)

@@ -144,11 +144,42 @@ def clothes(person: Person) -> Surface:
     return replace(tights, vertices=vertices)
 
 
+def _neckline(ahead: np.ndarray, neck: np.ndarray) -> np.ndarray:
+    """Height of the plane that cuts the clothes at the neck; it rises to the back."""
+    return neck[2] + 0.014 - 0.34 * ahead
+
+
+def collar(person: Person) -> Surface:
+    """A standing collar round the neck, over the edge of the clothes."""
+    neck = person.origins[SEGMENTS.index("neck")]
+    bare = np.unique(person.groups["body"][0])
+    body = person.vertices[bare]
+    away = body - neck
+    over = away[:, 2] + neck[2] - _neckline(away[:, 0], neck)
+    throat = np.flatnonzero((over > 0.002) & (over < 0.022) & (np.hypot(*away[:, :2].T) < 0.09))
+    middle = away[throat, 0].mean()
+    turn = np.arctan2(away[throat, 1], away[throat, 0] - middle)
+    far = np.hypot(away[throat, 1], away[throat, 0] - middle)
+    angle = _around(32)
+    near = np.abs((turn - angle[:, None] + np.pi) % (2 * np.pi) - np.pi) < 0.25
+    radius = np.where(near, far, 0.0).max(1)
+    radius = (np.roll(radius, 1) + 2 * radius + np.roll(radius, -1)) / 4
+    rings = []
+    for out, up in ((0.006, -0.026), (0.008, -0.006), (0.006, 0.010), (0.003, 0.012), (-0.01, 0.0)):
+        x = middle + (radius + out) * np.cos(angle)
+        y = (radius + out) * np.sin(angle)
+        rings.append(np.stack([neck[0] + x, y, _neckline(x, neck) + up], -1))
+    points = np.vstack(rings)
+    nearest = bare[throat[cKDTree(body[throat]).query(points)[1]]]
+    faces = grid_faces(len(rings), len(angle))[:, ::-1]
+    return Surface(points, faces, person.weights[nearest])
+
+
 def _collar(vertices: np.ndarray, neck: np.ndarray) -> np.ndarray:
-    """Cut the neckline along a plane that rises to the back, and let the collar stand open."""
+    """Cut the neckline, and let the clothes stand open there."""
     out = vertices.copy()
     ahead = vertices[:, 0] - neck[0]
-    edge = neck[2] + 0.014 - 0.34 * ahead
+    edge = _neckline(ahead, neck)
     out[:, 2] = np.minimum(vertices[:, 2], edge)
     near = np.clip(1 - (edge - vertices[:, 2]) / 0.05, 0, 1) * (vertices[:, 2] > neck[2] - 0.06)
     outward = np.stack([ahead + 0.015, vertices[:, 1], np.zeros(len(vertices))], -1)
@@ -186,7 +217,7 @@ def hard_hat(person: Person, head: Surface) -> tuple[np.ndarray, np.ndarray]:
     turn = np.array(
         [[np.cos(pitch), 0, np.sin(pitch)], [0, 1, 0], [-np.sin(pitch), 0, np.cos(pitch)]]
     )
-    return points @ turn.T + [centre_x, 0.0, base], _grid_faces(len(rings), len(rings[0]))
+    return points @ turn.T + [centre_x, 0.0, base], grid_faces(len(rings), len(rings[0]))
 
 
 def _around(count: int = 40) -> np.ndarray:
@@ -212,7 +243,8 @@ def _rim_ring(half: np.ndarray, out: float, drop: float) -> np.ndarray:
     return np.stack([x, y, -drop - 0.012 * peak], -1)
 
 
-def _grid_faces(n_rings: int, n_around: int) -> np.ndarray:
+def grid_faces(n_rings: int, n_around: int) -> np.ndarray:
+    """Triangles (F, 3) between rings of as many points, one after the other."""
     ring, column = np.meshgrid(np.arange(n_rings - 1), np.arange(n_around), indexing="ij")
     a = (ring * n_around + column).ravel()
     b = (ring * n_around + (column + 1) % n_around).ravel()

@@ -203,8 +203,6 @@ def _spec(
     add_cameras(spec, cameras)
     for prefix in _prefixes(n_workers):
         add_worker(spec, load_body(body_name), load_looks(body_name), prefix)
-        # A hat in group 0 would hide its own wearer's nose from the rays.
-        spec.geom(f"{prefix}hat").group = DECORATION
     return spec
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from hrc_env.body import SEGMENTS, Body, Looks, SkinLooks
+from hrc_env.body import SEGMENTS, Body, HatLooks, Looks, SkinLooks
 from hrc_env.errors import ConfigError
 from hrc_env.scene.primitives import LOOKS_ONLY, WORKER_BIT, WORKER_CAPSULES, capsule
 from hrc_env.typing import Ints
@@ -39,7 +39,8 @@ def add_worker(spec: Any, body: Body, looks: Looks, prefix: str) -> None:
     }
     for skin in looks.skins:
         _add_skin(spec, skin, body, prefix)
-    _add_hat(spec, segments["head"], looks, prefix)
+    if looks.hat is not None:
+        _add_hat(spec, segments["head"], looks.hat, prefix)
     for row, name in enumerate(body.capsule_names):
         capsule(
             segments[SEGMENTS[body.capsule_segment[row]]],
@@ -101,17 +102,15 @@ def _add_skin(spec: Any, skin: SkinLooks, body: Body, prefix: str) -> None:
     )
 
 
-def _add_hat(spec: Any, head: Any, looks: Looks, prefix: str) -> None:
+def _add_hat(spec: Any, head: Any, hat: HatLooks, prefix: str) -> None:
     name = prefix + "hat"
     spec.add_mesh(
         name=name,
-        uservert=looks.hat_vertices.ravel(),
-        userface=looks.hat_faces.ravel(),
+        uservert=hat.vertices.ravel(),
+        userface=hat.faces.ravel(),
         inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
     )
-    spec.add_material(
-        name=name, rgba=[*looks.hat_rgb, 1], specular=HAT_SPECULAR, shininess=HAT_SHININESS
-    )
+    spec.add_material(name=name, rgba=[*hat.rgb, 1], specular=HAT_SPECULAR, shininess=HAT_SHININESS)
     head.add_geom(
         name=name,
         type=mujoco.mjtGeom.mjGEOM_MESH,

@@ -1,0 +1,139 @@
+"""Every baked worker: as its recipe says, whole, symmetric, held by its capsules, on its feet."""
+
+import sys
+
+import numpy as np
+import pytest
+
+from hrc_env.body import (
+    N_SEGMENTS,
+    SEGMENT,
+    SkinLooks,
+    assets_dir,
+    load_body,
+    load_looks,
+    rest_motion,
+    worker_names,
+    worker_truth,
+)
+from hrc_env.geometry.rotations import matrix_from_quaternion
+from hrc_env.motion import generator
+from hrc_env.records import WorkerMotion
+from hrc_env.skeleton import MIRROR, N_JOINTS
+
+sys.path.insert(0, str(assets_dir() / "workers"))
+from recipes import RECIPES
+
+pytestmark = pytest.mark.parametrize("name", worker_names())
+MIRRORED_Y = np.array([1.0, -1.0, 1.0])
+
+
+def outside_m(points: np.ndarray, ends: np.ndarray, radius_m: np.ndarray) -> np.ndarray:
+    """(V,) signed distance of points to the nearest of capsules, positive outside."""
+    axis = ends[:, 1] - ends[:, 0]
+    away = points[:, None] - ends[:, 0]
+    along = np.clip((away * axis).sum(-1) / (axis * axis).sum(-1), 0.0, 1.0)
+    return (np.linalg.norm(away - along[..., None] * axis, axis=-1) - radius_m).min(1)
+
+
+def surface(name: str) -> np.ndarray:
+    """(V, 3) everything of a worker that can be seen, at rest."""
+    body, looks = load_body(name), load_looks(name)
+    parts = [skin.vertices for skin in looks.skins]
+    if looks.hat is not None:
+        parts.append(looks.hat.vertices + body.rest_position[SEGMENT["head"]])
+    return np.vstack(parts)
+
+
+def skinned(skin: SkinLooks, rest: np.ndarray, motion: WorkerMotion) -> np.ndarray:
+    """(V, 3) vertices moved by segments (S, ...): linear blend skinning, as MuJoCo does it."""
+    turn = matrix_from_quaternion(motion.quaternion_wxyz)
+    moved = np.einsum("sij,vsj->vsi", turn, skin.vertices[:, None] - rest) + motion.position_world
+    return np.einsum("vs,vsi->vi", skin.weights, moved)
+
+
+def spread_over(skin: SkinLooks) -> np.ndarray:
+    """Points on every triangle, at most a third of an edge apart."""
+    shares = [(a / 3, b / 3, 1 - (a + b) / 3) for a in range(4) for b in range(4 - a)]
+    corners = skin.vertices[skin.faces]
+    return np.concatenate([np.einsum("c,fci->fi", share, corners) for share in shares])
+
+
+def test_a_body_is_as_tall_as_its_recipe_says(name):
+    body, head = load_body(name), load_looks(name).skins[0]
+    assert body.stature_m == pytest.approx(RECIPES[name].stature_m, abs=0.01)
+    soles_and_hair = head.vertices[:, 2].max() - body.stature_m
+    assert 0.0 < soles_and_hair < 0.03
+    readme = (assets_dir() / "workers" / "README.md").read_text()
+    assert f"| `{name}` | {body.stature_m:.2f} m |" in readme
+
+
+def test_hat_or_none_is_as_in_the_recipe(name):
+    assert (load_looks(name).hat is not None) == RECIPES[name].hat
+
+
+def test_a_body_has_all_its_segments_joints_and_the_same_capsules_as_every_other(name):
+    body, first = load_body(name), load_body()
+    assert body.rest_position.shape == (N_SEGMENTS, 3)
+    assert body.joint_offset.shape == (N_JOINTS, 3)
+    assert body.capsule_names == first.capsule_names
+    np.testing.assert_array_equal(body.capsule_segment, first.capsule_segment)
+    np.testing.assert_array_equal(body.joint_segment, first.joint_segment)
+
+
+def test_joints_lie_inside_the_body(name):
+    body = load_body(name)
+    truth = worker_truth(body, rest_motion(body))
+    deepest = outside_m(truth.joints_world, truth.capsules_world, body.capsule_radius_m)
+    assert deepest.max() < 0.0
+
+
+def test_capsules_hold_skin_clothes_and_hat_closely(name):
+    """Signed distances of all vertices at rest to the nearest capsule."""
+    body = load_body(name)
+    capsules = worker_truth(body, rest_motion(body)).capsules_world
+    out = outside_m(surface(name), capsules, body.capsule_radius_m)
+    assert np.quantile(out, 0.95) < 0.01
+    assert out.max() < 0.04, "nothing sticks out far (the hat's peak is the furthest)"
+    assert np.median(out) > -0.03, "and the capsules are not fat"
+
+
+def test_left_and_right_measure_the_same(name):
+    body = load_body(name)
+    truth = worker_truth(body, rest_motion(body))
+    joints, capsules = truth.joints_world, truth.capsules_world
+    np.testing.assert_allclose(joints[MIRROR] * MIRRORED_Y, joints, atol=1e-6)
+    for k, capsule in enumerate(body.capsule_names):
+        twin = body.capsule_names.index(capsule.replace("left_", "right_"))
+        if capsule.startswith("left_"):
+            np.testing.assert_allclose(capsules[twin] * MIRRORED_Y, capsules[k], atol=1e-6)
+
+
+def test_what_one_sees_is_symmetric_to_some_millimetres(name):
+    for skin in load_looks(name).skins:
+        points = spread_over(skin)
+        some = np.random.default_rng(0).choice(len(points), 200, replace=False)
+        away = np.linalg.norm(points[some, None] * MIRRORED_Y - points, axis=-1).min(1)
+        assert np.quantile(away, 0.95) < 0.012, "the points lie up to 2 cm apart"
+
+
+def test_a_worker_of_this_body_has_the_soles_on_the_floor(name):
+    body = load_body(name)
+    boots = load_looks(name).skins[1]
+    state = generator.make_state(3, 1, body, generator.MotionConfig())
+    generator.reset(state, np.arange(3), [np.random.default_rng(seed) for seed in range(3)])
+    everyone = generator.current(state)
+    for b in range(3):
+        one = WorkerMotion(
+            everyone.position_world[b, 0], everyone.quaternion_wxyz[b, 0],
+            everyone.velocity_world[b, 0], everyone.angular_velocity_world[b, 0],
+        )  # fmt: skip
+        vertices = skinned(boots, body.rest_position, one)
+        feet = {side: _of_foot(boots, side) for side in ("left", "right")}
+        for foot in feet.values():
+            assert abs(vertices[foot, 2].min()) < 0.005
+
+
+def _of_foot(boots: SkinLooks, side: str) -> np.ndarray:
+    mine = [SEGMENT[f"{side}_{part}"] for part in ("foot", "toes")]
+    return boots.weights[:, mine].sum(1) > 0.5
