@@ -2,6 +2,7 @@
 
 loop.jpg      the still of `python -m hrc_env demo`
 room.jpg      the lab from beside and from outside
+clip.jpg      a film strip of a walk that was written to a BVH file and imported
 learning.png  the curve of `make train-quick`, if runs/quick is there
 """
 
@@ -46,9 +47,20 @@ def room() -> None:
     env.close()
 
 
+def clip() -> None:
+    """A recording, imported."""
+    out = Path("out/clips")
+    subprocess.run([sys.executable, "tests/motion/capture/written.py", str(out)], check=True)
+    words = ["import-motion", str(out / "traps.bvh"), "--out", str(out / "traps.npz")]
+    strip = out / "traps.png"
+    subprocess.run([sys.executable, "-m", "hrc_env", *words, "--picture", str(strip)], check=True)
+    save(imageio.imread(strip), "clip.jpg")
+
+
 if __name__ == "__main__":
     PICTURES.mkdir(exist_ok=True)
     loop()
     room()
+    clip()
     if Path("runs/quick/curve.png").exists():
         shutil.copy("runs/quick/curve.png", PICTURES / "learning.png")

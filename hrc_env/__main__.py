@@ -13,6 +13,7 @@ from rich.console import Console
 from hrc_env.cli.bench import Bench
 from hrc_env.cli.check import Check
 from hrc_env.cli.demo import Demo
+from hrc_env.cli.import_motion import ImportMotion
 from hrc_env.cli.listing import List
 from hrc_env.cli.play import Play
 from hrc_env.cli.setup import Setup
@@ -29,6 +30,7 @@ def main() -> int:
             "list": List,
             "play": Play,
             "bench": Bench,
+            "import-motion": ImportMotion,
         },
         prog="python -m hrc_env",
         description="A robot, a worker, and the cameras between them.",

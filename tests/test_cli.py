@@ -5,7 +5,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from hrc_env.body import load_body
+from hrc_env.motion.capture.clip import load_clip
 
 
 def hrc(*words: str, **env: str) -> subprocess.CompletedProcess[str]:
@@ -15,7 +19,9 @@ def hrc(*words: str, **env: str) -> subprocess.CompletedProcess[str]:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("command", ["setup", "demo", "check", "list", "play", "bench"])
+@pytest.mark.parametrize(
+    "command", ["setup", "demo", "check", "list", "play", "bench", "import-motion"]
+)
 def test_help_explains_every_command(command):
     done = hrc(command, "--help")
     assert done.returncode == 0
@@ -68,3 +74,25 @@ def test_a_film_is_written_whole(tmp_path: Path):
     assert done.returncode == 0, done.stderr
     assert film.stat().st_size > 10_000
     assert [path.name for path in tmp_path.iterdir() if "draft" in path.name] == []
+
+
+def test_a_recording_becomes_a_clip(tmp_path: Path):
+    joints = np.repeat((load_body().rest_position[None, load_body().joint_segment]), 60, axis=0)
+    joints = joints + load_body().joint_offset
+    joints[:, :7, 0] += 0.05 * np.sin(np.arange(60) / 10)[:, None]
+    np.savez(tmp_path / "bow.npz", joints=100 * joints, fps=30)
+    clip = tmp_path / "clip.npz"
+    done = hrc("import-motion", str(tmp_path / "bow.npz"), "--out", str(clip))
+    assert done.returncode == 0, done.stderr
+    assert "centimetres" in done.stdout
+    assert len(load_clip(clip).controls) == 60
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bow.npz", "clip.npz"]
+
+
+def test_a_recording_of_nobody_is_refused_without_a_traceback(tmp_path: Path):
+    np.savez(tmp_path / "dust.npz", joints=np.zeros((60, 15, 3)), fps=30)
+    done = hrc("import-motion", str(tmp_path / "dust.npz"), "--out", str(tmp_path / "clip.npz"))
+    assert done.returncode == 2
+    assert "ConfigError" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not (tmp_path / "clip.npz").exists()

@@ -88,8 +88,8 @@ def foot(
             rise = (LIFT_BASE_M + LIFT_STRIDE_M * stride) * hump(w)
             flown = min_jerk(2.0 * w) if w < 1.0 else 0.0
     at = c.ANKLE + 6 * side
-    ahead, above = _about(heel_up, size[BALL_X], size[BALL_Z])
-    behind, below = _about(toes_up, size[HEEL_X], -size[ANKLE_Z])
+    ahead, above = about(heel_up, size[BALL_X], size[BALL_Z])
+    behind, below = about(toes_up, size[HEEL_X], -size[ANKLE_Z])
     q[at] = x + math.cos(yaw) * (ahead + behind)
     q[at + 1] = y + math.sin(yaw) * (ahead + behind)
     q[at + 2] = size[ANKLE_Z] + above + below + rise + ground
@@ -106,7 +106,7 @@ def _climbed(w: float, step_up: float) -> float:
 def raise_heel(side: int, pitch: float, size: Floats, q: Floats) -> None:
     """Pitch a standing foot about its ball, where the toes stay."""
     at = c.ANKLE + 6 * side
-    ahead, above = _about(pitch, size[BALL_X], size[BALL_Z])
+    ahead, above = about(pitch, size[BALL_X], size[BALL_Z])
     q[at] += math.cos(q[at + 3]) * ahead
     q[at + 1] += math.sin(q[at + 3]) * ahead
     q[at + 2] += above
@@ -114,7 +114,7 @@ def raise_heel(side: int, pitch: float, size: Floats, q: Floats) -> None:
 
 
 @compiled
-def _about(pitch: float, pivot_x: float, pivot_z: float) -> tuple[float, float]:
+def about(pitch: float, pivot_x: float, pivot_z: float) -> tuple[float, float]:
     """How far forward and up the ankle goes when the foot pitches about a point of its own."""
     cos, sin = math.cos(pitch), math.sin(pitch)
     return pivot_x * (1.0 - cos) - pivot_z * sin, pivot_z * (1.0 - cos) + pivot_x * sin

@@ -1,0 +1,104 @@
+"""python -m hrc_env import-motion: a recording of a person becomes a clip that workers play."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import imageio.v2 as imageio
+import tyro
+from rich.console import Console
+from rich.progress import Progress
+from rich.table import Table
+
+from hrc_env.body import load_body
+from hrc_env.cli.strip import film_strip
+from hrc_env.errors import ConfigError
+from hrc_env.motion.capture.clip import Clip, save_clip
+from hrc_env.motion.capture.read import read_capture
+from hrc_env.motion.capture.record import Capture
+from hrc_env.motion.capture.retarget import RetargetError, retarget
+from hrc_env.skeleton import JOINTS
+
+USUAL_FPS = 60.0
+"""Faster recordings are thinned out to this rate: a step keeps 30 frames."""
+
+
+@dataclass(frozen=True)
+class ImportMotion:
+    """Bring your own motion capture: a BVH, ASF/AMC or npz recording becomes a clip.
+
+    Unit, upward axis, a T-pose in the first frame, short gaps and exchanged axes are found and
+    mended, and said; what cannot be mended is refused with the reason. The person's joints are
+    fitted by a worker's body, standing feet are locked, and the error is printed a joint.
+    docs/motion_capture.md has the names of joints that are understood.
+    """
+
+    file: tyro.conf.Positional[Path]
+    """The recording: .bvh, .amc (its .asf beside it), or .npz with joints (T, 15, 3) and fps."""
+    out: Path
+    """The clip to write, .npz; there whole or not at all."""
+    fps: float | None = None
+    """Frames a second of the clip; the recording's own, at most 60, if not given."""
+    source_fps: float | None = None
+    """The recording's true rate, where its file has none (AMC) or a wrong one."""
+    skeleton: Path | None = None
+    """The .asf file of an .amc file, if it is not beside it."""
+    worker: str = "worker_1"
+    """The body to fit; others play the clip, too, scaled to their legs and arms."""
+    picture: Path | None = None
+    """Also draw a film strip of the clip into this PNG file (needs OpenGL)."""
+
+    def run(self) -> int:
+        """Read, fit, tell, write."""
+        if self.out.suffix.lower() != ".npz":
+            raise ConfigError(f"--out must end in .npz, got {self.out.name!r}.")
+        if self.out.resolve() == self.file.resolve():
+            raise ConfigError("--out is the recording itself; give the clip another name.")
+        body, console = load_body(self.worker), Console()
+        capture = read_capture(self.file, self.fps, self.source_fps, self.skeleton)
+        if self.fps is None and capture.fps > USUAL_FPS:
+            capture = read_capture(self.file, USUAL_FPS, self.source_fps, self.skeleton)
+        tell_capture(console, capture)
+        with Progress(console=console, transient=True) as progress:
+            task = progress.add_task(f"fitting {self.worker}", total=1.0)
+            clip, error = retarget(capture, body, lambda share: progress.advance(task, share))
+        tell_error(console, capture, clip, error)
+        save_clip(clip, self.out)
+        console.print(f"In [bold]{self.out}[/]: play it with motions=[{str(self.out)!r}]")
+        if self.picture is not None:
+            self.picture.parent.mkdir(parents=True, exist_ok=True)
+            imageio.imwrite(self.picture, film_strip(clip, self.worker))
+            console.print(f"In [bold]{self.picture}[/]: a film strip")
+        return 0
+
+
+def tell_capture(console: Console, capture: Capture) -> None:
+    """What was found and what was mended."""
+    n_frames = len(capture.joints_world)
+    console.print(
+        f"[bold]{capture.source}[/]: {n_frames} frames at {capture.fps:g} a second, "
+        f"{(n_frames - 1) / capture.fps:.1f} s",
+        highlight=False,
+    )
+    for sentence in capture.repaired:
+        console.print(f"[yellow]Repaired:[/] {sentence}", highlight=False)
+
+
+def tell_error(console: Console, capture: Capture, clip: Clip, error: RetargetError) -> None:
+    """Which joints were found, and how near the worker comes to them."""
+    table = Table("joint", "in the file", "mean [cm]", "p95 [cm]", title="worker beside person")
+    joints = zip(JOINTS, capture.found, 100 * error.mean_m, 100 * error.p95_m, strict=True)
+    for joint, name, mean_cm, p95_cm in joints:
+        table.add_row(joint, name, f"{mean_cm:.1f}", f"{p95_cm:.1f}")
+    table.add_section()
+    overall = 100 * error.mean_m.mean(), 100 * error.p95_m.mean()
+    table.add_row("all", "", *(f"{value:.1f}" for value in overall))
+    console.print(table)
+    console.print(
+        f"Errors after one alignment of the whole clip (scale {error.scale:.2f}).", highlight=False
+    )
+    left, right = 100 * clip.contacts.mean(0)
+    console.print(
+        f"The left foot stands for {left:.0f} % of the time, the right for {right:.0f} %; "
+        f"standing feet slide by {100 * error.slip_m_s:.1f} cm/s (p95).",
+        highlight=False,
+    )
