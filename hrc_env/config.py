@@ -6,14 +6,14 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from hrc_env.control import ControlConfig
 from hrc_env.errors import ConfigError
 from hrc_env.mapping import from_mapping
 from hrc_env.metrics import CostConfig
-from hrc_env.motion.generator import MotionConfig
+from hrc_env.motion.generator import MotionConfig, PeopleConfig, people_called
 from hrc_env.perception.emulator import EmulatorConfig
 from hrc_env.perception.eyes import EyesConfig
 from hrc_env.rewards import RewardConfig
@@ -96,3 +96,16 @@ def resolve(config: "HRCConfig | Mapping[str, Any] | None") -> HRCConfig:
             f"config must be an HRCConfig, a mapping or None, got {type(config).__name__}."
         )
     return from_mapping(HRCConfig, config)
+
+
+def with_people(config: HRCConfig, people: "str | PeopleConfig | None") -> HRCConfig:
+    """A config with other people: a preset by name, settings, or None for those it has.
+
+    Raises:
+        ConfigError: a name of no preset, with those that there are.
+    """
+    if people is None:
+        return config
+    if not isinstance(people, PeopleConfig):
+        people = people_called(people)
+    return replace(config, motion=replace(config.motion, people=people))

@@ -13,8 +13,9 @@ from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
 from hrc_env import observations
-from hrc_env.config import HRCConfig, resolve
+from hrc_env.config import HRCConfig, resolve, with_people
 from hrc_env.errors import ConfigError, unknown
+from hrc_env.motion.generator import PeopleConfig
 from hrc_env.simulation import Simulation, checked_action
 from hrc_env.stateful import Stateful
 from hrc_env.typing import Floats
@@ -34,6 +35,8 @@ class HRCReachEnv(Stateful, gymnasium.Env[NDArray[np.float32], NDArray[np.float3
         cameras: indices or names of the rig's cameras to use; None is all of them.
         scene: name of the place.
         n_workers: 0 or more workers.
+        people: how the workers are with the robot: "attentive", "hurried", "unaware", a
+            `PeopleConfig`, or None for those of the config (attentive).
         control: "joint" (joint velocities) or "tool" (tool velocity).
         render_mode: "rgb_array", "depth_array" or None.
         config: an `HRCConfig` or a nested mapping of changes to the default.
@@ -52,13 +55,14 @@ class HRCReachEnv(Stateful, gymnasium.Env[NDArray[np.float32], NDArray[np.float3
         cameras: Sequence[int | str] | None = None,
         scene: str = "lab",
         n_workers: int = 1,
+        people: str | PeopleConfig | None = None,
         control: str = "joint",
         render_mode: str | None = None,
         config: HRCConfig | Mapping[str, Any] | None = None,
     ) -> None:
         if render_mode is not None and render_mode not in RENDER_MODES:
             raise unknown("render_mode", render_mode, RENDER_MODES)
-        self.config = resolve(config)
+        self.config = with_people(resolve(config), people)
         self.render_mode = render_mode
         self.simulation = Simulation(
             1, perception, estimator, cameras, scene, n_workers, control, self.config

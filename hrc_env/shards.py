@@ -104,6 +104,7 @@ def joined(outcomes: list[Outcome]) -> Outcome:
         observation=np.concatenate([each.observation for each in outcomes]),
         reward=np.concatenate([each.reward for each in outcomes]),
         terminated=np.concatenate([each.terminated for each in outcomes]),
+        activity=np.concatenate([each.activity for each in outcomes]),
         info={
             name: np.concatenate([each.info[name] for each in outcomes])
             for name in outcomes[0].info

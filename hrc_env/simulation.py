@@ -31,8 +31,13 @@ from hrc_env.typing import Bools, Floats, Ints
 
 Info = dict[str, Floats]
 """Named values (B,); NaN means that the environment has no such value in this step."""
+WATCHED_CAPSULES = (3, 8)
+"""Of the arm: elbow and tool, whose ends the workers watch."""
 FLAGS = ("is_success",)
 """Values that are true or false."""
+ACTIVITY = "worker/activity"
+"""What each worker is doing, by name."""
+ACTIVITY_NAMES = np.array(generator.activity_names)
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +51,8 @@ class Outcome:
     terminated: Bools
     """(B,)."""
     info: Info
+    activity: Ints
+    """(B, W) what each worker does, an index into `generator.activity_names`."""
 
     def info_of(self, b: int) -> dict[str, Any]:
         """The info of one environment: absent values are left out, flags are bool."""
@@ -53,7 +60,7 @@ class Outcome:
         known: dict[str, Any] = {name: value for name, value in values.items() if value == value}
         for name in FLAGS:
             known[name] = bool(known[name])
-        return known
+        return {**known, ACTIVITY: ACTIVITY_NAMES[self.activity[b]]}
 
 
 @dataclass(slots=True)
@@ -106,7 +113,9 @@ class Simulation(Stateful):
         )
         self.physics = Physics(self.scene, batch)
         self.senses = make_senses(perception, estimator, self.scene, batch, config)
-        self.motion = generator.make_state(batch, n_workers, self.body, config.motion)
+        self.motion = generator.make_state(
+            batch, n_workers, self.body, config.motion, self.scene.grounds
+        )
         self.task = reach.make_state(batch)
         self._everyone = np.arange(batch)
         self.action = np.zeros((batch, self.n_actions))
@@ -131,7 +140,8 @@ class Simulation(Stateful):
         believed = self._believed(ids, robot, estimate, ahead)
         observation = observations.observe(believed, self.layout)
         info = {**tracking_info(estimate, truth), **rows_of(self._tally(), ids)}
-        return Outcome(observation, np.zeros(len(ids)), np.zeros(len(ids), bool), info)
+        doing = generator.activity(self.motion)[ids]
+        return Outcome(observation, np.zeros(len(ids)), np.zeros(len(ids), bool), info, doing)
 
     def step(self, action: Floats) -> Outcome:
         """One control step of every environment; action (B, A) in [-1, 1]."""
@@ -148,6 +158,8 @@ class Simulation(Stateful):
 
         estimate, ahead = self._sense(self._everyone, motion, truth)
         robot, arm = chains.robot_along(self.chain, q_path, self.physics.qd)
+        seen_world = robot.capsules_world[:, WATCHED_CAPSULES, 1]
+        generator.watch(self.motion, seen_world, motion, config.ctrl_dt)
         progress = reach.advance(
             self.task, streams.task, robot.tool_world, config.ctrl_dt, config.task
         )
@@ -166,7 +178,8 @@ class Simulation(Stateful):
             **self._tally(),
         }
         terminated = (cost.contact > 0) & config.cost.contact_terminates
-        return Outcome(observations.observe(believed, self.layout), reward, terminated, info)
+        observation = observations.observe(believed, self.layout)
+        return Outcome(observation, reward, terminated, info, generator.activity(self.motion))
 
     def get_state(self) -> State:
         """A copy of everything that changes, generators included, and the settings."""

@@ -18,9 +18,10 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from hrc_env.config import HRCConfig, resolve
+from hrc_env.config import HRCConfig, resolve, with_people
 from hrc_env.env import RENDER_MODES, spaces
 from hrc_env.errors import ConfigError, unknown
+from hrc_env.motion.generator import PeopleConfig
 from hrc_env.shards import Shards, n_cores
 from hrc_env.simulation import Outcome, Simulation, checked_action
 from hrc_env.stateful import Stateful
@@ -45,7 +46,7 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
     Args:
         num_envs: how many.
         perception: "keypoints", "truth" or "none"; pictures have no batched form.
-        estimator, cameras, scene, n_workers, control, config: as `HRCReachEnv`.
+        estimator, cameras, scene, n_workers, people, control, config: as `HRCReachEnv`.
         render_mode: "rgb_array", "depth_array" or None.
         max_episode_steps: the time limit; None or -1 is none.
         autoreset_mode: when an environment whose episode is over starts anew: at the next
@@ -67,6 +68,7 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
         cameras: Sequence[int | str] | None = None,
         scene: str = "lab",
         n_workers: int = 1,
+        people: str | PeopleConfig | None = None,
         control: str = "joint",
         render_mode: str | None = None,
         config: HRCConfig | Mapping[str, Any] | None = None,
@@ -83,7 +85,7 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
             raise unknown("render_mode", render_mode, RENDER_MODES)
         self.num_envs = _whole("num_envs", num_envs, 1, MAX_ENVS)
         self.autoreset_mode = _mode(autoreset_mode)
-        self.config, self.render_mode = resolve(config), render_mode
+        self.config, self.render_mode = with_people(resolve(config), people), render_mode
         self.shards = Shards(
             self.num_envs,
             min(_threads(num_threads), self.num_envs),
@@ -143,8 +145,8 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
             self._observation = fresh.observation.copy()
         self._observation[ids] = fresh.observation
         self._ended = self._ended & ~mask
-        info = blank(fresh.info, self.num_envs)
-        info.write(ids, fresh.info)
+        info = blank(fresh, self.num_envs)
+        info.write(ids, fresh)
         return self._observation.copy(), info.arrays(mask)
 
     def step(self, actions: NDArray[np.float32]) -> Step:
@@ -159,7 +161,7 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
             (num_envs,); infos as arrays (num_envs,), each with a mask "_name".
         """
         outcome = self.shards.step(self._checked(actions))
-        observation, info = outcome.observation.copy(), table(outcome.info)
+        observation, info = outcome.observation.copy(), table(outcome)
         reward, terminated, over = outcome.reward.copy(), outcome.terminated.copy(), self._ended
         self._steps += 1
         if over.any():  # only where the mode is NEXT_STEP
@@ -217,7 +219,7 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
         ids = np.flatnonzero(who)
         fresh = self._begin(ids)
         observation[ids] = fresh.observation
-        info.write(ids, fresh.info)
+        info.write(ids, fresh)
 
     def _checked(self, actions: Any) -> Floats:
         """Actions (num_envs, n) clipped to [-1, 1]; zero for environments that start anew.

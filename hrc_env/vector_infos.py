@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.simulation import FLAGS, Info
+from hrc_env.simulation import ACTIVITY, ACTIVITY_NAMES, FLAGS, Outcome
 from hrc_env.typing import Bools, Floats, Ints
 
 
@@ -20,12 +20,15 @@ class InfoTable:
     names: tuple[str, ...]
     values: Floats
     """(len(names), B)."""
+    activity: Ints
+    """(B, W) what each worker does."""
 
-    def write(self, ids: Ints, info: Info) -> None:
-        """Give environments `ids` other values, (len(ids),) a name, and no more than these."""
+    def write(self, ids: Ints, outcome: Outcome) -> None:
+        """Give environments `ids` the values of an outcome of them, and no more than these."""
         self.values[:, ids] = np.nan
-        for name, value in info.items():
+        for name, value in outcome.info.items():
             self.values[self.names.index(name), ids] = value
+        self.activity[ids] = outcome.activity
 
     def arrays(self, who: Bools) -> dict[str, Any]:
         """Values and masks for the environments `who` (B,); the others have none."""
@@ -38,14 +41,20 @@ class InfoTable:
             if anybody:
                 infos[name] = value.astype(bool) if name in FLAGS else value
                 infos[f"_{name}"] = mask
+        if who.any():
+            infos[ACTIVITY] = np.where(who[:, None], ACTIVITY_NAMES[self.activity], "")
+            infos[f"_{ACTIVITY}"] = who.copy()
         return infos
 
 
-def table(info: Info) -> InfoTable:
-    """A copy of an info as a table."""
-    return InfoTable(tuple(info), np.array(list(info.values())))
+def table(outcome: Outcome) -> InfoTable:
+    """A copy of an outcome's info as a table."""
+    values = np.array(list(outcome.info.values()))
+    return InfoTable(tuple(outcome.info), values, outcome.activity.copy())
 
 
-def blank(info: Info, batch: int) -> InfoTable:
-    """A table of the names of an info in which nobody has a value."""
-    return InfoTable(tuple(info), np.full((len(info), batch), np.nan))
+def blank(outcome: Outcome, batch: int) -> InfoTable:
+    """A table of the names of an outcome's info in which nobody has a value."""
+    shape = (batch, outcome.activity.shape[1])
+    names = tuple(outcome.info)
+    return InfoTable(names, np.full((len(names), batch), np.nan), np.zeros(shape, np.int64))

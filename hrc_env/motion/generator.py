@@ -10,64 +10,120 @@ import numpy as np
 
 from hrc_env.body import N_SEGMENTS, Body
 from hrc_env.errors import ConfigError
-from hrc_env.motion import behaviour as bh
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
+from hrc_env.motion import state as st
 from hrc_env.motion.anatomy import anatomy
+from hrc_env.motion.behaviour import N_DRAWS, begin_episode, follow_up
 from hrc_env.motion.compiled import compiled
 from hrc_env.motion.config import MotionConfig, numbers
+from hrc_env.motion.errands import errands_at
+from hrc_env.motion.floorplan import floorplan, room_for
 from hrc_env.motion.holding import N_HELD, prop_pose
 from hrc_env.motion.kinematics import N_FRAMES, N_POINTS, pose, quaternion, spin
-from hrc_env.motion.state import RATE_H_S, MotionState, begin, evaluate, follow_up
-from hrc_env.records import Held, WorkerMotion, WorkerPath
+from hrc_env.motion.people import PEOPLE, PeopleConfig, people_called
+from hrc_env.motion.reactions import notice
+from hrc_env.motion.state import RATE_H_S, MotionState, evaluate
+from hrc_env.records import Grounds, Held, WorkerMotion, WorkerPath, Workplace
 from hrc_env.typing import Bools, Floats, Ints
 
 __all__ = [
+    "PEOPLE",
     "MotionConfig",
     "MotionState",
+    "PeopleConfig",
     "activity",
     "activity_names",
     "advance",
     "current",
     "make_state",
+    "people_called",
     "reset",
+    "watch",
 ]
 
 activity_names: tuple[str, ...] = pl.ACTIVITY_NAMES
 """Names of the values of `activity`."""
+HALT_S = 0.3
+"""Time in which hands come to a halt, and go on [s]."""
+
+OPEN_FLOOR = Grounds(
+    walkable_x_m=(-0.1, 2.4),
+    walkable_y_m=(-2.0, 2.0),
+    blocked=np.zeros((0, 5)),
+    places=(
+        Workplace("left", "floor", (1.4, 0.9), 0.6, 0.0),
+        Workplace("right", "floor", (1.6, -0.9), -0.5, 0.0),
+        Workplace("aside", "open", (1.0, -1.5), -1.2, 0.0),
+        Workplace("behind", "open", (1.9, 0.0), 0.0, 0.0),
+    ),
+    robot_xy_m=(-0.75, 0.0),
+    robot_front_rad=0.0,
+    robot_clearance_m=0.8,
+)
+"""Where workers are whom no scene holds: the laboratory's walkway without its furniture."""
 
 
-def make_state(batch: int, n_workers: int, body: Body, config: MotionConfig) -> MotionState:
+def make_state(
+    batch: int, n_workers: int, body: Body, config: MotionConfig,
+    grounds: Grounds = OPEN_FLOOR, fewest: int | None = None,
+) -> MotionState:  # fmt: skip
     """Arrays for `batch` environments of `n_workers` each; call `reset` before use.
 
+    Args:
+        batch: environments.
+        n_workers: workers whom each has room for.
+        body: of all of them.
+        config: settings.
+        grounds: where they walk and work.
+        fewest: so many workers are in an episode at least, drawn at its beginning; None: all.
+
     Raises:
-        ConfigError: negative sizes.
+        ConfigError: negative sizes, more workers than fit, a place in a wall.
     """
     if batch < 1 or n_workers < 0:
         raise ConfigError(f"Need batch >= 1 and n_workers >= 0, got {batch} and {n_workers}.")
+    fewest = n_workers if fewest is None else fewest
+    if not 0 <= fewest <= n_workers:
+        raise ConfigError(f"The fewest workers must be 0 to {n_workers}, got {fewest}.")
 
     def array(*shape: int) -> Floats:
         return np.zeros((batch, n_workers, *shape))
 
-    state = MotionState(
+    return MotionState(
         clock_s=array(), time_s=array(), duration_s=array(),
         activity=np.zeros((batch, n_workers), np.int64),
         plan=array(pl.N_PLAN), prints=array(pl.MAX_STEPS, 5), stance=array(2, 5),
-        offset=array(c.N_BLENDED, 2), traits=array(pl.N_TRAITS), spots=array(bh.N_SPOT),
-        draws=array(2 * bh.N_DRAWS), anatomy=anatomy(body), numbers=numbers(config),
+        offset=array(c.N_BLENDED, 2), traits=array(pl.N_TRAITS), pace=array(2),
+        spots=array(st.N_SPOT), errand=np.zeros((batch, n_workers, st.N_ERRAND), np.int64),
+        alert=array(st.N_ALERT), robot=np.full((batch, 2, 3), np.inf), present=array(),
+        anatomy=anatomy(body), mind=_mind(config, grounds, n_workers, fewest),
     )  # fmt: skip
-    state.stance[..., 0, 1], state.stance[..., 1, 1] = 0.1, -0.1
-    return state
+
+
+def _mind(config: MotionConfig, grounds: Grounds, n_workers: int, fewest: int) -> st.Mind:
+    """The constants of decisions."""
+    plan = floorplan(grounds)
+    fit = room_for(plan, config.spacing_m)
+    if n_workers > fit:
+        raise ConfigError(
+            f"n_workers={n_workers}: no more than {fit} fit on these grounds, "
+            f"{config.spacing_m} m from each other."
+        )
+    places: dict[str, tuple[Workplace, ...]] = {}
+    for place in plan.places:
+        places[place.kind] = (*places.get(place.kind, ()), place)
+    errands = errands_at(config.tasks, tuple(places))
+    values = numbers(config, grounds.robot_xy_m)
+    return st.Mind(config, values, plan, errands, places, fewest)
 
 
 def reset(state: MotionState, ids: Ints, rngs: Sequence[np.random.Generator]) -> None:
     """Start environments `ids` anew; rngs holds one generator for each of the B environments."""
-    arrays, constants = _arrays(state), _constants(state)
+    n_workers, fewest = state.activity.shape[1], state.mind.fewest
     for b in np.asarray(ids).tolist():
-        state.spots[b, :, : bh.SPOT_YAW] = np.inf
-        state.draws[b] = rngs[b].random(state.draws.shape[1:])
-        for w in range(state.activity.shape[1]):
-            begin(b, w, *arrays, *constants)
+        n = n_workers if fewest == n_workers else int(rngs[b].integers(fewest, n_workers + 1))
+        begin_episode(state, b, n, rngs[b].random((n_workers, 2, N_DRAWS)))
 
 
 def advance(
@@ -87,18 +143,43 @@ def advance(
     """
     batch, n_workers = state.activity.shape
     done, ticked = np.zeros(batch, np.int64), np.zeros(batch, np.bool_)
-    arrays, constants = _arrays(state), _constants(state)
+    arrays = _arrays(state)
     out = _blank((batch, n_steps, n_workers), 3, 4) + _blank((batch, n_workers), 3, 3)
+    position, quaternion_, velocity, turning = out
     held = np.empty((batch, n_workers, N_HELD))
     written = (*out, held)
-    position, quaternion_, velocity, turning = out
-    while _run(float(dt_s), n_steps, done, ticked, *arrays[:9], *constants[1:], *written):
+    while _run(float(dt_s), n_steps, done, ticked, *arrays, *written):
         for b in np.flatnonzero(ticked).tolist():
-            for w in np.flatnonzero(state.time_s[b] >= state.duration_s[b]).tolist():
-                state.draws[b, w, : bh.N_DRAWS] = rngs[b].random(bh.N_DRAWS)
-                follow_up(b, w, *arrays, *constants)
+            for w in np.flatnonzero(_over(state, b)).tolist():
+                follow_up(state, b, w, rngs[b].random(N_DRAWS))
     last = WorkerMotion(position[:, -1], quaternion_[:, -1], velocity, turning, _held(held))
     return WorkerPath(position, quaternion_), last
+
+
+def _over(state: MotionState, b: int) -> Bools:
+    """(W,) whose activity is over: done, or taken back to its beginning."""
+    time_s = state.time_s[b]
+    return (time_s >= state.duration_s[b]) | ((time_s <= 0.0) & (state.pace[b, :, 0] < 0.0))
+
+
+def watch(
+    state: MotionState, elbow_and_tool_world: Floats, motion: WorkerMotion, dt_s: float
+) -> None:
+    """Let the workers see the robot; they react in the steps to come.
+
+    Args:
+        state: changed in place.
+        elbow_and_tool_world: (B, 2, 3) where these truly are [m].
+        motion: the workers now.
+        dt_s: since they last looked [s].
+    """
+    people = state.mind.config.people
+    notice(
+        dt_s, (people.notice_m, people.fast_m_s, people.calm_s), elbow_and_tool_world,
+        state.robot, motion.position_world, state.present, state.alert, state.pace,
+        state.clock_s, state.time_s, state.duration_s, state.activity, state.plan, state.prints,
+        state.stance, state.anatomy.size,
+    )  # fmt: skip
 
 
 def current(state: MotionState, ids: Ints | None = None) -> WorkerMotion:
@@ -108,7 +189,7 @@ def current(state: MotionState, ids: Ints | None = None) -> WorkerMotion:
     out = _blank((len(rows), n_workers), 3, 4, 3, 3)
     held = np.empty((len(rows), n_workers, N_HELD))
     written = (*out, held)
-    _draw(rows, *_arrays(state)[:9], *_constants(state)[1:], *written)
+    _draw(rows, *_arrays(state), *written)
     return WorkerMotion(out[0], out[1], out[2], out[3], _held(held))
 
 
@@ -128,25 +209,22 @@ def _blank(lead: tuple[int, ...], *widths: int) -> tuple[Floats, ...]:
 
 
 def _arrays(state: MotionState) -> tuple:
-    """What changes, in the order that the compiled functions take it."""
+    """What a pose follows from, in the order that the compiled functions take it."""
     return (
-        state.clock_s, state.time_s, state.duration_s, state.activity, state.plan, state.prints,
-        state.stance, state.offset, state.traits, state.spots, state.draws,
+        state.clock_s, state.time_s, state.duration_s, state.activity, state.pace, state.plan,
+        state.prints, state.stance, state.offset, state.traits,
+        state.anatomy.offset, state.anatomy.frame, state.anatomy.size,
     )  # fmt: skip
-
-
-def _constants(state: MotionState) -> tuple:
-    return (state.numbers, state.anatomy.offset, state.anatomy.frame, state.anatomy.size)
 
 
 @compiled
 def _pose(
-    b: int, w: int, later_s: float, clock_s: Floats, time_s: Floats, activity: Ints,
+    b: int, w: int, later_s: float, clock_s: Floats, time_s: Floats, activity: Ints, pace: Floats,
     plan: Floats, prints: Floats, stance: Floats, offset: Floats, traits: Floats,
     bones: Floats, frame: Floats, size: Floats, q: Floats, p: Floats, r: Floats,
 ) -> None:  # fmt: skip
     """Worker (b, w) a little later than now: points p and frames r of `kinematics.pose`."""
-    t, clock = time_s[b, w] + later_s, clock_s[b, w] + later_s
+    t, clock = time_s[b, w] + pace[b, w, 0] * later_s, clock_s[b, w] + later_s
     evaluate(
         activity[b, w], t, clock, plan[b, w], prints[b, w], stance[b, w], offset[b, w],
         traits[b, w], size, q,
@@ -174,9 +252,16 @@ def _rates(p: Floats, r: Floats, velocity: Floats, turning: Floats) -> None:
 
 
 @compiled
+def _tick(dt_s: float, pace: Floats) -> None:
+    """Let a worker's pace (now, wished) come nearer to the wished one."""
+    most = dt_s / HALT_S
+    pace[0] += min(max(pace[1] - pace[0], -most), most)
+
+
+@compiled
 def _run(
     dt_s: float, n_steps: int, done: Ints, ticked: Bools,
-    clock_s: Floats, time_s: Floats, duration_s: Floats, activity: Ints,
+    clock_s: Floats, time_s: Floats, duration_s: Floats, activity: Ints, pace: Floats,
     plan: Floats, prints: Floats, stance: Floats, offset: Floats, traits: Floats,
     bones: Floats, frame: Floats, size: Floats,
     position: Floats, quaternion_: Floats, velocity: Floats, turning: Floats, held: Floats,
@@ -190,9 +275,11 @@ def _run(
             t, due = done[b], False
             for w in range(time_s.shape[1]):
                 if not ticked[b]:
-                    time_s[b, w] += dt_s
+                    _tick(dt_s, pace[b, w])
+                    time_s[b, w] += dt_s * pace[b, w, 0]
                     clock_s[b, w] += dt_s
-                due = due or time_s[b, w] >= duration_s[b, w]
+                back = pace[b, w, 0] < 0.0 and time_s[b, w] <= 0.0
+                due = due or back or time_s[b, w] >= duration_s[b, w]
             ticked[b] = due
             if due:
                 waiting = True
@@ -200,7 +287,7 @@ def _run(
             for w in range(time_s.shape[1]):
                 for i in range(1 if t == n_steps - 1 else 0, -1, -1):
                     _pose(
-                        b, w, i * RATE_H_S, clock_s, time_s, activity, plan, prints, stance,
+                        b, w, i * RATE_H_S, clock_s, time_s, activity, pace, plan, prints, stance,
                         offset, traits, bones, frame, size, q, p[i], r[i],
                     )  # fmt: skip
                 _place(p[0], r[0], position[b, t, w], quaternion_[b, t, w])
@@ -213,8 +300,8 @@ def _run(
 
 @compiled
 def _draw(
-    rows: Ints, clock_s: Floats, time_s: Floats, duration_s: Floats, activity: Ints, plan: Floats,
-    prints: Floats, stance: Floats, offset: Floats, traits: Floats,
+    rows: Ints, clock_s: Floats, time_s: Floats, duration_s: Floats, activity: Ints, pace: Floats,
+    plan: Floats,     prints: Floats, stance: Floats, offset: Floats, traits: Floats,
     bones: Floats, frame: Floats, size: Floats,
     position: Floats, quaternion_: Floats, velocity: Floats, turning: Floats, held: Floats,
 ) -> None:  # fmt: skip
@@ -225,7 +312,7 @@ def _draw(
         for w in range(time_s.shape[1]):
             for i in range(1, -1, -1):
                 _pose(
-                    b, w, i * RATE_H_S, clock_s, time_s, activity, plan, prints, stance,
+                    b, w, i * RATE_H_S, clock_s, time_s, activity, pace, plan, prints, stance,
                     offset, traits, bones, frame, size, q, p[i], r[i],
                 )  # fmt: skip
             _place(p[0], r[0], position[row, w], quaternion_[row, w])

@@ -1,11 +1,9 @@
 """The state of the workers' motion, and the compiled code that moves it on."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.motion import behaviour as bh
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.climb import climb
@@ -15,14 +13,16 @@ from hrc_env.motion.activities.look_round import look_round
 from hrc_env.motion.activities.work import work
 from hrc_env.motion.anatomy import Anatomy
 from hrc_env.motion.compiled import compiled
-from hrc_env.motion.config import MotionConfig
+from hrc_env.motion.config import MotionConfig, Numbers
 from hrc_env.motion.curves import decay, wrap
+from hrc_env.motion.errands import Errands
 from hrc_env.motion.feet import foot, step_time
+from hrc_env.motion.floorplan import Floorplan
 from hrc_env.motion.hands import lift, reach
 from hrc_env.motion.holding import drop_load, hold_load
-from hrc_env.motion.kinematics import N_FRAMES, N_POINTS
 from hrc_env.motion.posture import STANCE_HALF_WIDTH_M, stand
 from hrc_env.motion.walk import footprint, walk
+from hrc_env.records import Workplace
 from hrc_env.typing import Floats, Ints
 
 BLEND_S = 0.45
@@ -30,6 +30,39 @@ BLEND_S = 0.45
 RATE_H_S = 1e-4
 """Step of the difference quotient of the closed form that gives velocities [s]: at 60 m/s^2
 its error is 3 mm/s."""
+
+
+SPOT_X, SPOT_Y, SPOT_YAW, SPOT_HEIGHT, SPOT_UNTIL, SPOT_SINCE = range(6)
+"""Where the worker works or goes to, which way they look there, how high the work is, until which
+clock they stay [s], since when they want to go (0: they do not)."""
+N_SPOT = 6
+TASK, GOING, AT = range(3)
+"""Index of the task; whether they do it, are on the way to it, or want to go; kind of the place
+(index into `WORKPLACE_KINDS`; NOWHERE: they have done there what they came for)."""
+N_ERRAND, NOWHERE = 3, -1
+THERE, UNDER_WAY, WAITING = range(3)
+"""Values of `GOING`."""
+ACTS_AT, DOING, UNTIL_AT, CALM_AT, DELAY_S, KIND, LASTS_S = range(7)
+"""Clock at which the worker will react to what they noticed (infinite: noticed nothing); what
+they do about it now and until which clock; from which clock on they may be startled again; drawn
+when an activity begins: how long they take to react, how they would, for how long."""
+N_ALERT = 7
+NO_REACTION, PAUSE, BACK_AWAY = range(3)
+"""Values of `DOING` and `KIND`."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mind:
+    """What decisions are made from; constants."""
+
+    config: MotionConfig
+    numbers: Numbers
+    plan: Floorplan
+    errands: Errands
+    places: dict[str, tuple[Workplace, ...]]
+    """By kind."""
+    fewest: int
+    """Workers who are in an episode at least."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,14 +87,23 @@ class MotionState:
     """(B, W, N_BLENDED, 2) what the activity before left over: value and rate at time 0."""
     traits: Floats
     """(B, W, N_TRAITS) what the worker keeps for an episode."""
+    pace: Floats
+    """(B, W, 2) how fast the activity's time goes, and what that is going to: 1 as planned, 0
+    halted, negative: taken back."""
     spots: Floats
-    """(B, W, N_SPOT) the worker's place."""
-    draws: Floats
-    """(B, W, N_DRAWS) uniform numbers of the decision now due; scratch."""
+    """(B, W, N_SPOT) the worker's place, see below."""
+    errand: Ints
+    """(B, W, N_ERRAND) what they are about, see below."""
+    alert: Floats
+    """(B, W, N_ALERT) what they noticed of the robot, see below."""
+    robot: Floats
+    """(B, 2, 3) elbow and tool of the arm when the workers last looked [m]; infinite: not yet."""
+    present: Floats
+    """(B, W) 1 of a worker who is there, 0 of one who is not in this episode."""
     anatomy: Anatomy
     """Constants of the body."""
-    numbers: tuple
-    """Constants of the behaviour (`config.numbers`)."""
+    mind: Mind
+    """Constants of the behaviour."""
 
 
 @compiled
@@ -111,7 +153,7 @@ def _stay(
 
 
 @compiled
-def _stop(plan: Floats, prints: Floats, stance: Floats) -> float:
+def stop(plan: Floats, prints: Floats, stance: Floats) -> float:
     """Begin where the last activity ended; returns by how much its heading was unwound."""
     count = int(plan[pl.STEP_COUNT]) if plan[pl.UNDO_AT] == 0.0 else 0
     for k in range(max(count - 2, 0), count):
@@ -131,91 +173,59 @@ def _stop(plan: Floats, prints: Floats, stance: Floats) -> float:
 
 
 @compiled
-def plan_next(
-    w: int, clock_s: float, draws: Floats, config: MotionConfig, spots: Floats, traits: Floats,
-    plan: Floats, prints: Floats, stance: Floats, offset: Floats, frame: Floats, size: Floats,
-    q: Floats, p: Floats, r: Floats,
-) -> tuple[int, float]:  # fmt: skip
-    """Decide and plan what comes next; START, END and stance are set. (activity, duration)."""
-    for side in range(2):
-        foot(0.0, side, plan, prints, stance, size, q)
-    near = spots[w, bh.SPOT_NEAR] > 0.0
-    if clock_s >= spots[w, bh.SPOT_UNTIL]:
-        lasts = bh.walk_on(draws, config, spots, w, clock_s, traits, plan, prints, stance, size)
-        spots[w, bh.SPOT_UNTIL] += lasts
-        return pl.WALK, lasts
-    kind = bh.next_work(draws, config, near)
-    if kind == pl.REACH:
-        return kind, bh.start_reach(draws, config, near, traits, plan, offset, frame, size, q, p, r)
-    if kind == pl.LIFT:
-        return kind, bh.start_lift(draws, config, traits, plan, offset, frame, size, q, p, r)
-    return kind, bh.between(draws[1], config.near_pause_s if near else config.away_pause_s)
-
-
-@compiled
-def follow_up(
-    b: int, w: int, clock_s: Floats, time_s: Floats, duration_s: Floats, activity: Ints,
-    plan: Floats, prints: Floats, stance: Floats, offset: Floats, traits: Floats, spots: Floats,
-    draws: Floats, config: MotionConfig, bones: Floats, frame: Floats, size: Floats,
+def leave(
+    t: float, pace: float, clock_s: float, activity: int, plan: Floats, prints: Floats,
+    stance: Floats, offset: Floats, traits: Floats, size: Floats, q: Floats,
 ) -> None:  # fmt: skip
-    """The activity of worker (b, w) is over: begin the next, smoothly."""
-    q, h, end = np.empty((4, c.N_CONTROLS)), RATE_H_S, duration_s[b, w]
-    p, r = np.zeros((N_POINTS, 3)), np.zeros((N_FRAMES, 3, 3))
-    now = clock_s[b, w] - (time_s[b, w] - end)
+    """End an activity at its time t: fill q (2, N_CONTROLS) then and a little later, and stop.
+
+    Args:
+        t: [s].
+        pace: how fast the activity's time goes; negative where it was taken back.
+        clock_s: the clock at t.
+        activity, plan, prints, stance, offset, traits: the worker's rows; plan and stance are
+            made to begin where it ended, and what was set down is gone.
+        size: of the body.
+        q: written.
+    """
     for i in range(2):
+        later = i * RATE_H_S
         evaluate(
-            activity[b, w], end + i * h, now + i * h, plan[b, w], prints[b, w], stance[b, w],
-            offset[b, w], traits[b, w], size, q[i],
+            activity, t + pace * later, clock_s + later, plan, prints, stance, offset, traits,
+            size, q[i],
         )  # fmt: skip
-    unwound = _stop(plan[b, w], prints[b, w], stance[b, w])
-    if activity[b, w] in pl.GIVING or activity[b, w] == pl.PUSH:
-        drop_load(plan[b, w])
+    unwound = stop(plan, prints, stance)
+    if activity in pl.GIVING or activity == pl.PUSH:
+        drop_load(plan)
     q[0, c.HEADING] += unwound
     q[1, c.HEADING] += unwound
-    activity[b, w], duration_s[b, w] = plan_next(
-        w, now, draws[b, w], config, spots[b], traits[b, w], plan[b, w], prints[b, w],
-        stance[b, w], bones, frame, size, q[2], p, r,
-    )  # fmt: skip
-    time_s[b, w] -= end
-    offset[b, w] = 0.0
-    for i in range(2):
-        evaluate(
-            activity[b, w], i * h, now + i * h, plan[b, w], prints[b, w], stance[b, w],
-            offset[b, w], traits[b, w], size, q[2 + i],
-        )  # fmt: skip
-    for i in range(c.N_BLENDED):
-        gap, later = q[0, i] - q[2, i], q[1, i] - q[3, i]
-        offset[b, w, i, 0], offset[b, w, i, 1] = gap, (later - gap) / h
 
 
 @compiled
-def begin(
-    b: int, w: int, clock_s: Floats, time_s: Floats, duration_s: Floats, activity: Ints,
-    plan: Floats, prints: Floats, stance: Floats, offset: Floats, traits: Floats, spots: Floats,
-    draws: Floats, config: MotionConfig, bones: Floats, frame: Floats, size: Floats,
+def join(
+    clock_s: float, activity: int, plan: Floats, prints: Floats, stance: Floats, offset: Floats,
+    traits: Floats, size: Floats, q: Floats,
 ) -> None:  # fmt: skip
-    """Put worker (b, w) at a place of theirs, in the middle of something, feet settled."""
-    d, row = draws[b, w, bh.N_DRAWS :], plan[b, w]
-    traits[b, w, pl.SPEED_TRAIT] = bh.between(d[0], config.speed_m_s)
-    traits[b, w, pl.SQUAT_TRAIT] = 0.4 + 0.6 * d[1]
-    traits[b, w, pl.RIGHT_HANDED] = 0.9 if d[2] < 0.9 else 0.1
-    traits[b, w, pl.PHASE :] = d[3 : 3 + pl.N_TRAITS - pl.PHASE]
-    clock_s[b, w], offset[b, w] = 0.0, 0.0
-    bh.choose_place(d, config, spots[b], w, 0.0)
-    spots[b, w, bh.SPOT_UNTIL] = max(0.05, spots[b, w, bh.SPOT_UNTIL] * d[9])
-    row[:] = 0.0
-    row[pl.END_X], row[pl.END_Y] = spots[b, w, bh.SPOT_X], spots[b, w, bh.SPOT_Y]
-    row[pl.END_YAW] = wrap(spots[b, w, bh.SPOT_YAW])
-    _stop(row, prints[b, w], stance[b, w])
+    """Let an activity that begins now take over smoothly from q (2, N_CONTROLS) of `leave`."""
+    mine = np.empty((2, c.N_CONTROLS))
+    offset[:] = 0.0
+    for i in range(2):
+        later = i * RATE_H_S
+        evaluate(
+            activity, later, clock_s + later, plan, prints, stance, offset, traits, size, mine[i]
+        )
+    for i in range(c.N_BLENDED):
+        gap, then = q[0, i] - mine[0, i], q[1, i] - mine[1, i]
+        offset[i, 0], offset[i, 1] = gap, (then - gap) / RATE_H_S
+
+
+@compiled
+def settle(
+    x: float, y: float, yaw: float, plan: Floats, prints: Floats, stance: Floats, size: Floats
+) -> None:
+    """Stand somewhere, feet side by side, with nothing done yet."""
+    plan[:] = 0.0
+    plan[pl.END_X], plan[pl.END_Y], plan[pl.END_YAW] = x, y, wrap(yaw)
+    stop(plan, prints, stance)
     for side in range(2):
-        footprint(
-            side, row[pl.START_X], row[pl.START_Y], row[pl.START_YAW], STANCE_HALF_WIDTH_M,
-            size, stance[b, w, side],
-        )  # fmt: skip
-    q = np.empty(c.N_CONTROLS)
-    p, r = np.zeros((N_POINTS, 3)), np.zeros((N_FRAMES, 3, 3))
-    activity[b, w], duration_s[b, w] = plan_next(
-        w, 0.0, draws[b, w], config, spots[b], traits[b, w], row, prints[b, w], stance[b, w],
-        bones, frame, size, q, p, r,
-    )  # fmt: skip
-    time_s[b, w] = math.floor(1e6 * d[10] * duration_s[b, w]) * 1e-6
+        footprint(side, x, y, plan[pl.START_YAW], STANCE_HALF_WIDTH_M, size, stance[side])
