@@ -37,7 +37,6 @@ FLAGS = ("is_success",)
 """Values that are true or false."""
 ACTIVITY = "worker/activity"
 """What each worker is doing, by name."""
-ACTIVITY_NAMES = np.array(generator.activity_names)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +59,7 @@ class Outcome:
         known: dict[str, Any] = {name: value for name, value in values.items() if value == value}
         for name in FLAGS:
             known[name] = bool(known[name])
-        return {**known, ACTIVITY: ACTIVITY_NAMES[self.activity[b]]}
+        return {**known, ACTIVITY: named(self.activity[b])}
 
 
 @dataclass(slots=True)
@@ -271,6 +270,11 @@ class Simulation(Stateful):
             "task/goals_missed": self.task.n_missed.astype(float),
             "is_success": reach.succeeded(self.task).astype(float),
         }
+
+
+def named(activity: Ints) -> tuple[str, ...]:
+    """The names of what workers (W,) do."""
+    return tuple(generator.activity_names[k] for k in activity.tolist())
 
 
 def checked_action(action: ArrayLike, shape: tuple[int, ...]) -> Floats:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.simulation import ACTIVITY, ACTIVITY_NAMES, FLAGS, Outcome
+from hrc_env.simulation import ACTIVITY, FLAGS, Outcome, named
 from hrc_env.typing import Bools, Floats, Ints
 
 
@@ -42,7 +42,9 @@ class InfoTable:
                 infos[name] = value.astype(bool) if name in FLAGS else value
                 infos[f"_{name}"] = mask
         if who.any():
-            infos[ACTIVITY] = np.where(who[:, None], ACTIVITY_NAMES[self.activity], "")
+            infos[ACTIVITY] = np.full(len(who), None, object)
+            for b in np.flatnonzero(who).tolist():
+                infos[ACTIVITY][b] = named(self.activity[b])
             infos[f"_{ACTIVITY}"] = who.copy()
         return infos
 

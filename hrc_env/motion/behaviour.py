@@ -72,6 +72,8 @@ WITH_LOAD = (pl.STAND, pl.LOOK_ROUND, pl.SET_DOWN, pl.HAND_OVER)
 """What one does with something in one's hands; before anything else it is set down."""
 ROBOT_WORK_M = 1.1
 """Height of the work at the robot [m]."""
+CHEST_M = 1.2
+"""Loads are set down or leant against something no higher than this [m]."""
 
 
 @dataclass(slots=True)
@@ -270,6 +272,8 @@ def _work(who: Who, activity: int) -> tuple[int, float]:
     if activity == pl.STAND:
         return _stand(who, who.draw(LASTS, _pauses(who)) * mind.config.people.tempo)
     x, y, yaw, height = who.spot[: SPOT_HEIGHT + 1].tolist()
+    if activity in (pl.SET_DOWN, pl.HAND_OVER):
+        height = min(height, CHEST_M)
     near, prop = who.kind_here == "robot", prop_index(who.task.prop)
     others = state.spots[who.b, :, :SPOT_YAW][_others(who)]
     lasts = start_here(
@@ -364,7 +368,6 @@ def _wait(who: Who) -> tuple[int, float]:
     if waited_s > GIVE_UP_S:
         who.going = THERE
         who.state.errand[who.b, who.w, AT] = NOWHERE
-        who.spot[SPOT_HEIGHT] = 0.0
         return _work(who, pl.SET_DOWN if who.loaded else pl.LOOK_ROUND)
     if waited_s > CHANGE_S and not who.loaded:
         _new_errand(who)

@@ -35,6 +35,8 @@ BODY_M = 0.36
 """Hands reach no nearer to their own root than this [m]."""
 OWN_SIDE_M = 0.12
 """Hands keep so far from the middle between their worker and another [m]."""
+ABOVE_M = 0.10
+"""Hands that work on something are so far above it [m]: the thickness of a hand and a workpiece."""
 OVERHEAD_M = 1.7
 """Drilling at this height or above is overhead work [m]."""
 
@@ -77,7 +79,7 @@ def start_here(
     for side in range(2):
         foot(0.0, side, me.plan, me.prints, me.stance, me.size, me.q)
     if activity == pl.REACH:
-        return start_reach(draws, config, near, others, me)
+        return start_reach(draws, config, near, place[3], others, me)
     if activity == pl.LIFT:
         return start_lift(draws, config, me)
     if activity == pl.LOOK_ROUND:
@@ -107,7 +109,8 @@ def _start_work(activity: int, draws: Floats, place: Place, me: Worker) -> float
         high = (place[0], place[1], place[2], max(place[3], OVERHEAD_M + 0.1))
         return start_drill(draws, high, me)
     if activity == pl.SAW:
-        return start_saw(draws, place, me)
+        above = place[3] + ABOVE_M if place[3] > 0.0 else 0.0
+        return start_saw(draws, (place[0], place[1], place[2], above), me)
     if activity == pl.MEASURE:
         return start_measure(draws, place, me)
     if activity == pl.POINT:
@@ -137,11 +140,14 @@ def own_side(x: float, y: float, others: Floats, plan: Floats) -> tuple[float, f
 
 
 @compiled
-def _target(draws: Floats, config: Numbers, near: bool, plan: Floats) -> tuple[float, float, float]:
+def _target(
+    draws: Floats, config: Numbers, near: bool, height: float, plan: Floats
+) -> tuple[float, float, float]:
     """A world point for the hands: in the robot's workspace, or ahead of the worker."""
     z = between(draws[3], config.target_z_m)
     x, y = plan[pl.START_X], plan[pl.START_Y]
     if not near:
+        z = max(z, height + ABOVE_M)
         ahead, left = 0.36 + 0.3 * draws[1], 0.7 * (draws[2] - 0.5)
         cos, sin = math.cos(plan[pl.START_YAW]), math.sin(plan[pl.START_YAW])
         return x + cos * ahead - sin * left, y + sin * ahead + cos * left, z
@@ -154,10 +160,12 @@ def _target(draws: Floats, config: Numbers, near: bool, plan: Floats) -> tuple[f
 
 
 @compiled
-def start_reach(draws: Floats, config: Numbers, near: bool, others: Floats, me: Worker) -> float:
-    """Draw a reach: where to, with which hand, how fast, for how long."""
+def start_reach(
+    draws: Floats, config: Numbers, near: bool, height: float, others: Floats, me: Worker
+) -> float:
+    """Draw a reach: where to (above `height`), with which hand, how fast, for how long."""
     plan, traits = me.plan, me.traits
-    x, y, z = _target(draws, config, near, plan)
+    x, y, z = _target(draws, config, near, height, plan)
     x, y = own_side(x, y, others, plan)
     side = wrap(math.atan2(y - plan[pl.START_Y], x - plan[pl.START_X]) - plan[pl.START_YAW])
     right = 0.5 + (traits[pl.RIGHT_HANDED] - 0.5) * math.exp(-((side / 0.2) ** 2))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hrc_env.motion.config import MotionConfig
+from hrc_env.motion.generator import OPEN_FLOOR
 from hrc_env.records import WORKPLACE_KINDS
 from hrc_env.scene.build import SCENES, SceneConfig, build
 from hrc_env.scene.grounds import footprints
@@ -44,13 +44,10 @@ def test_a_scene_has_work_of_every_kind(name):
 
 
 def test_the_laboratory_is_the_one_that_the_worker_knows():
-    grounds, config = build().grounds, MotionConfig()
-    assert (grounds.walkable_x_m, grounds.walkable_y_m) == (
-        config.walkable_x_m,
-        config.walkable_y_m,
-    )
-    assert grounds.robot_xy_m == config.robot_xy_m
-    assert grounds.robot_clearance_m == config.clearance_m
+    grounds, floor = build().grounds, OPEN_FLOOR
+    assert (grounds.walkable_x_m, grounds.walkable_y_m) == (floor.walkable_x_m, floor.walkable_y_m)
+    assert grounds.robot_xy_m == floor.robot_xy_m
+    assert grounds.robot_clearance_m == floor.robot_clearance_m
 
 
 def test_without_clutter_nothing_blocks_the_way():
