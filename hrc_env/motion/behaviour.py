@@ -176,7 +176,8 @@ def begin_episode(state: MotionState, b: int, n_present: int, draws: Floats) -> 
             _take_first_place(who)
         else:
             spot[[SPOT_X, SPOT_Y]] = PARKED_M + 3.0 * who.w, PARKED_M
-        settle(*spot[:SPOT_HEIGHT], who.me.plan, who.me.prints, who.me.stance, who.me.size)
+        x, y, yaw = spot[:SPOT_HEIGHT].tolist()
+        settle(x, y, yaw, who.me.plan, who.me.prints, who.me.stance, who.me.size)
     for who in everyone[:n_present]:
         share = who.draws.item(PLACES - 1)
         who.draws = draws[who.w, 1]

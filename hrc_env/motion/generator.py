@@ -147,7 +147,7 @@ def advance(
     out = _blank((batch, n_steps, n_workers), 3, 4) + _blank((batch, n_workers), 3, 3)
     position, quaternion_, velocity, turning = out
     held = np.empty((batch, n_workers, N_HELD))
-    written = (*out, held)
+    written: tuple = (*out, held)
     while _run(float(dt_s), n_steps, done, ticked, *arrays, *written):
         for b in np.flatnonzero(ticked).tolist():
             for w in np.flatnonzero(_over(state, b)).tolist():
@@ -188,7 +188,7 @@ def current(state: MotionState, ids: Ints | None = None) -> WorkerMotion:
     rows = np.arange(batch) if ids is None else np.asarray(ids, np.int64)
     out = _blank((len(rows), n_workers), 3, 4, 3, 3)
     held = np.empty((len(rows), n_workers, N_HELD))
-    written = (*out, held)
+    written: tuple = (*out, held)
     _draw(rows, *_arrays(state), *written)
     return WorkerMotion(out[0], out[1], out[2], out[3], _held(held))
 

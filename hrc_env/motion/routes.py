@@ -137,7 +137,7 @@ def _search(
     n_y = (slack.shape[1] + STRIDE - 1) // STRIDE
     cost, parent = np.full(n_x * n_y, np.inf), np.full(n_x * n_y, -1)
     state = np.zeros(n_x * n_y, np.int8)  # 0 not looked at, 1 free, 2 not free, 3 done
-    queue = [(0.0, -1)]
+    queue: list = [(0.0, -1)]
     heapq.heappop(queue)
     si, sj = round((start[0] - origin[0]) / h), round((start[1] - origin[1]) / h)
     for i in range(max(si - 2, 0), min(si + 3, n_x)):
