@@ -15,6 +15,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from hrc_env.compiled import LEAN
 from hrc_env.errors import check_shape, unknown
 from hrc_env.records import WorkerMotion, WorkerPath, WorkerTruth
 from hrc_env.typing import Capsules, Floats, Ints, Points3, QuaternionsWxyz
@@ -188,7 +189,7 @@ def _flat(array: Floats) -> Floats:
     return whole.reshape(math.prod(whole.shape[:-2]), *whole.shape[-2:])
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LEAN)
 def _turned(quaternion, offset):  # pragma: no cover - compiled
     """An offset turned by a unit quaternion: v + 2 w (u x v) + 2 u x (u x v)."""
     w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
@@ -202,7 +203,7 @@ def _turned(quaternion, offset):  # pragma: no cover - compiled
     )
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LEAN)
 def _joints(
     position, quaternion, linear, angular, segment, offset, joints, velocity
 ):  # pragma: no cover - compiled
@@ -218,7 +219,7 @@ def _joints(
                 velocity[b, j, i] = linear[b, s, i] + omega_k * arm[m] - omega_m * arm[k]
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LEAN)
 def _capsules(position, quaternion, segment, ends, capsules):  # pragma: no cover - compiled
     """Both ends of the capsules of bodies."""
     for b in range(position.shape[0]):

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
+from hrc_env.compiled import JIT, LEAN
 from hrc_env.errors import ConfigError
 from hrc_env.geometry.assignment import assign_rows
 from hrc_env.geometry.distances import narrowest_gap
@@ -86,7 +87,7 @@ def tracking_error(estimate: PoseEstimate, truth: WorkerTruth) -> tuple[Floats, 
     return error_m, lost
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**JIT)
 def _tracking_error(mean_world, joints_world, tracked, error_m, lost):
     n_workers, n_joints = tracked.shape[1], mean_world.shape[2]
     error, whom = np.empty((n_workers, n_workers)), np.empty(n_workers, np.int64)
@@ -105,7 +106,7 @@ def _tracking_error(mean_world, joints_world, tracked, error_m, lost):
         error_m[b] = total / (count * n_joints) if count else np.nan
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LEAN)
 def _joint_error(mean_world, joints_world):
     """Sum over joints of the distances between two bodies [m]."""
     total = 0.0

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.belief import Believed, standard_deviation_m
+from hrc_env.compiled import LEAN
 from hrc_env.skeleton import N_JOINTS
 from hrc_env.typing import Floats
 
@@ -62,7 +63,7 @@ def _nearest_direction(now: Believed) -> Floats:
     return np.where(near.reshape(-1, 1), direction, 0.0)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LEAN)
 def _shorten(vectors: Floats, softening: float) -> None:
     """Divide vectors (n, 3) by their length plus a little: unit vectors, but 0 stays 0."""
     for k in range(len(vectors)):
@@ -220,7 +221,7 @@ def observe(now: Believed, where: ObservationLayout) -> NDArray[np.float32]:
     return observation
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LEAN)
 def _scale(
     physical: Floats,
     scale: Floats,

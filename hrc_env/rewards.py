@@ -8,6 +8,7 @@ import numba
 import numpy as np
 
 from hrc_env.belief import Believed
+from hrc_env.compiled import JIT
 from hrc_env.errors import ConfigError
 from hrc_env.tasks.reach import ReachProgress
 from hrc_env.typing import Floats
@@ -54,7 +55,7 @@ def closeness(gap_m: Any, reach_m: float) -> Any:
     return share * share
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**JIT)
 def _mean_square(vectors: Floats) -> Floats:
     """(B,) of (B, n)."""
     mean = np.zeros(len(vectors))

@@ -7,10 +7,9 @@ Jonker and Volgenant, Computing 38, 1987), for matrices with a few rows, inside 
 import numba
 import numpy as np
 
+from hrc_env.compiled import JIT
 from hrc_env.errors import ConfigError
 from hrc_env.typing import Floats, Ints
-
-_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
 def assign(cost: Floats) -> Ints:
@@ -27,7 +26,7 @@ def assign(cost: Floats) -> Ints:
     return column
 
 
-@numba.njit(**_JIT)
+@numba.njit(**JIT)
 def assign_rows(cost, column):
     """Kernel of `assign`: fills column (n,) for a finite cost (n, m) with m >= n."""
     n_rows, n_columns = cost.shape

@@ -11,10 +11,13 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
+from hrc_env.compiled import JIT, LEAN
 from hrc_env.typing import Capsules, Floats, Points3
 
 SLACK_M = 1e-9
 """Far more than the rounding of a sphere's bound."""
+_PARALLEL = 1e-13
+"""Squared sine of an angle between segments that are parallel: a micrometre over their length."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +58,7 @@ def _flat(capsules: Capsules) -> Capsules:
     return np.ascontiguousarray(capsules).reshape(count, *capsules.shape[-3:])
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LEAN)
 def closest_parameters(p0, p1, q0, q1):
     """Squared distance of two segments and where along each (0..1) it is attained."""
     ux, uy, uz = p1[0] - p0[0], p1[1] - p0[1], p1[2] - p0[2]
@@ -69,7 +72,7 @@ def closest_parameters(p0, p1, q0, q1):
     s, t = 0.0, 0.0
     if a > 1e-12 and e > 1e-12:
         determinant = a * e - b * b
-        if determinant > 1e-9 * a * e:  # not parallel
+        if determinant > _PARALLEL * a * e:
             s = min(1.0, max(0.0, (b * f - c * e) / determinant))
         t = (b * s + f) / e
         if t < 0.0:
@@ -84,7 +87,7 @@ def closest_parameters(p0, p1, q0, q1):
     return dx * dx + dy * dy + dz * dz, s, t
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LEAN)
 def _spheres(capsules, radius, spheres):
     """Bounding spheres (4, K) of capsules: centre, radius; radii repeat body by body."""
     for k in range(len(capsules)):
@@ -95,7 +98,7 @@ def _spheres(capsules, radius, spheres):
         spheres[3, k] = 0.5 * math.sqrt(squared) + radius[k % len(radius)]
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LEAN)
 def _sphere_gaps(a, b, least):
     """least[k, m] = gap of sphere k of one set and sphere m of the other."""
     for k in range(a.shape[1]):
@@ -105,7 +108,7 @@ def _sphere_gaps(a, b, least):
             least[k, m] = math.sqrt(dx * dx + dy * dy + dz * dz) - reach - b[3, m]
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**JIT)
 def _narrowest(a, radius_a, b, radius_b, gap, points):
     """Spheres bound the gaps from below: only pairs that they leave open are measured."""
     n_a, n_b, per_a = a.shape[1], b.shape[1], len(b) // max(len(a), 1)
@@ -120,7 +123,7 @@ def _narrowest(a, radius_a, b, radius_b, gap, points):
         gap[n] = _search(first, radius_a, b[n], radius_b, least, points[n])
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**JIT)
 def _search(a, radius_a, b, radius_b, least, points):
     """The narrowest gap, the most promising pair first; of equal ones the first pair's."""
     best, at, bounds = np.inf, 0, least.ravel()

@@ -5,6 +5,7 @@ import math
 import numba
 import numpy as np
 
+from hrc_env.compiled import LEAN
 from hrc_env.skeleton import HAND_SEGMENTS, N_JOINTS, SEGMENT_ENDS, SEGMENT_RADIUS_M
 from hrc_env.typing import Floats, Ints
 
@@ -31,7 +32,7 @@ def segments(joints_world: Floats) -> Floats:
     return ends.reshape(*lead, *ends.shape[1:])
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LEAN)
 def _segments(joints, first, second, hands, hand_reach_m, ends):
     for b in range(joints.shape[0]):
         for k in range(len(first)):

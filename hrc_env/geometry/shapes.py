@@ -10,6 +10,7 @@ import math
 import numba
 import numpy as np
 
+from hrc_env.compiled import LEAN
 from hrc_env.typing import Floats
 
 PLANE, BOX, CYLINDER, CAPSULE = range(4)
@@ -41,7 +42,7 @@ def shape(kind: int, centre: Floats, axes: Floats, half_size: Floats) -> Floats:
     return row
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LEAN)
 def set_capsules(table, first, ends, radius):
     """Capsules with ends (n, 2, 3) and radii (n,) into the rows from `first` on."""
     for k in range(len(ends)):
@@ -58,7 +59,7 @@ def set_capsules(table, first, ends, radius):
         table[row, REACH] = 0.5 * length + radius[k]
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LEAN)
 def passage(table, row, px, py, pz, dx, dy, dz):
     """Where a line enters and leaves the shape of a row."""
     kind = table[row, KIND]
@@ -71,14 +72,14 @@ def passage(table, row, px, py, pz, dx, dy, dz):
     return _through_plane(table, row, px, py, pz, dx, dy, dz)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LEAN)
 def on_axis(table, row, axis, x, y, z):
     """A vector's part along an axis of a shape."""
     at = AXES + 3 * axis
     return table[row, at] * x + table[row, at + 1] * y + table[row, at + 2] * z
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LEAN)
 def against_axis(table, row, px, py, pz, dx, dy, dz):
     """A line against a shape's z axis and radius: what the functions below are given.
 
@@ -92,7 +93,7 @@ def against_axis(table, row, px, py, pz, dx, dy, dz):
     return rise, height, ahead, px * px + py * py + pz * pz - radius * radius
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LEAN)
 def through_tube(rise, height, ahead, excess):
     """Through an endless cylinder."""
     a, b, c = 1.0 - rise * rise, ahead - height * rise, excess - height * height
@@ -105,7 +106,7 @@ def through_tube(rise, height, ahead, excess):
     return scale * (-b - root), scale * (-b + root)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LEAN)
 def rounded(enter, leave, half, rise, height, ahead, excess):
     """What is left of a passage through a tube when it ends at +-half in balls: a capsule."""
     if enter > leave:
@@ -119,14 +120,14 @@ def rounded(enter, leave, half, rise, height, ahead, excess):
     return enter, leave
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LEAN)
 def _through_capsule(table, row, px, py, pz, dx, dy, dz):
     rise, height, ahead, excess = against_axis(table, row, px, py, pz, dx, dy, dz)
     enter, leave = through_tube(rise, height, ahead, excess)
     return rounded(enter, leave, table[row, HALF_SIZE + 1], rise, height, ahead, excess)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LEAN)
 def _through_cylinder(table, row, px, py, pz, dx, dy, dz):
     rise, height, ahead, excess = against_axis(table, row, px, py, pz, dx, dy, dz)
     enter, leave = through_tube(rise, height, ahead, excess)
@@ -134,7 +135,7 @@ def _through_cylinder(table, row, px, py, pz, dx, dy, dz):
     return max(enter, low), min(leave, high)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LEAN)
 def _through_box(table, row, px, py, pz, dx, dy, dz):
     enter, leave = -math.inf, math.inf
     for i in range(3):
@@ -144,7 +145,7 @@ def _through_box(table, row, px, py, pz, dx, dy, dz):
     return enter, leave
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LEAN)
 def _through_plane(table, row, px, py, pz, dx, dy, dz):
     """A rectangle stops only what comes from its front, where its z points."""
     height, rise = on_axis(table, row, 2, px, py, pz), on_axis(table, row, 2, dx, dy, dz)
@@ -158,7 +159,7 @@ def _through_plane(table, row, px, py, pz, dx, dy, dz):
     return way, way
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LEAN)
 def _through_ball(end, rise, height, ahead, excess):
     """Through the ball at `end` [m] on the axis."""
     nearest = end * rise - ahead
@@ -169,7 +170,7 @@ def _through_ball(end, rise, height, ahead, excess):
     return nearest - root, nearest + root
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LEAN)
 def _between(height, rise, half):
     """Between two planes at -half and half."""
     if rise == 0.0:

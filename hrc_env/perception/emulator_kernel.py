@@ -5,6 +5,7 @@ import math
 import numba
 import numpy as np
 
+from hrc_env.compiled import JIT, LEAN
 from hrc_env.geometry.shapes import passage, set_capsules
 from hrc_env.geometry.sight import blocks, line, look, make_table, meets
 from hrc_env.perception.noise import error_share
@@ -17,7 +18,7 @@ UNSURE = 0.7
 """How much the logit of the reported visibility drops when errors are larger by one step."""
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**JIT)
 def emulate_batch(
     slow, size, swapped, missed, normals, uniforms,
     joints, capsules, radius, still, robot, robot_radius,
@@ -50,7 +51,7 @@ def emulate_batch(
                 )  # fmt: skip
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LEAN)
 def _project(P, joints, uv, depth):
     for j in range(len(joints)):
         x, y, z = joints[j, 0], joints[j, 1], joints[j, 2]
@@ -60,7 +61,7 @@ def _project(P, joints, uv, depth):
         uv[j, 1] = (P[1, 0] * x + P[1, 1] * y + P[1, 2] * z + P[1, 3]) / safe
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LEAN)
 def _image(uv, depth, image, state):
     """Where each joint appears: 0 in the image, 2 outside, 3 not ahead."""
     for j in range(len(depth)):
@@ -72,7 +73,7 @@ def _image(uv, depth, image, state):
             state[j] = 0
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LEAN)
 def _sight(eye, joints, table, first_body, view, rows, state):
     """State 1 for joints in the image that something hides. Counts the seen.
 
@@ -88,7 +89,7 @@ def _sight(eye, joints, table, first_body, view, rows, state):
     return n_seen
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LEAN)
 def _is_hidden(eye, joints, j, table, first_body, view, rows, n_view):
     dx, dy, dz, length = line(eye, joints, j)
     for i in range(n_view):
@@ -104,7 +105,7 @@ def _is_hidden(eye, joints, j, table, first_body, view, rows, n_view):
     return False
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LEAN)
 def _burst(active, b, c, w, uniform, begin, end):
     """A two-state Markov chain: bursts of mean length 1 / end images."""
     if active[b, c, w]:
@@ -113,7 +114,7 @@ def _burst(active, b, c, w, uniform, begin, end):
         active[b, c, w] = uniform < begin
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LEAN)
 def _report(
     slow, size, normals, uv, depth, state, focal_px,
     found, swapped, scalars, per_joint, mirror, visibility, error,

@@ -7,6 +7,7 @@ meets the same numbers in the other.
 import numba
 import numpy as np
 
+from hrc_env.compiled import LEAN
 from hrc_env.typing import Floats
 
 VISIBILITY: Floats = np.array([0.10, 0.35, 0.65, 0.875, 0.975])
@@ -35,7 +36,7 @@ def sigma_px(confidence: Floats, stature_px: Floats | float) -> Floats:
     return np.where(confidence > 0, share * stature_px, np.inf)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LEAN)
 def error_share(confidence: float, visibility: Floats, error: Floats) -> float:
     """`sigma_px` of a stature of one, for kernels: the tables are passed in."""
     if not confidence > 0.0:

@@ -8,6 +8,7 @@ capsule's axis to its surface.
 
 import numba
 
+from hrc_env.compiled import LEAN
 from hrc_env.geometry.shapes import HALF_SIZE, against_axis, rounded, through_tube
 
 BLOCKING_CHORD = 1.4
@@ -18,7 +19,7 @@ OWN_CAPSULE_M = 0.06
 """So much longer may the way out of a capsule be that the joint itself lies in [m]."""
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LEAN)
 def body_blocks(table, row, px, py, pz, dx, dy, dz, length):
     """Whether a body's capsule, a row of shapes, hides what is at `length` [m] on a line.
 

@@ -4,6 +4,7 @@ import math
 
 import numba
 
+from hrc_env.compiled import LEAN
 from hrc_env.geometry.chains import SerialChain
 from hrc_env.typing import Floats, JointAngles, JointVelocities
 
@@ -16,9 +17,12 @@ BRAKE_SHARE = 0.7
 def substep_commands(
     chain: SerialChain,
     slew_rad_s2: float,
+    leash_rad: float,
     sim_dt: float,
     lead_s: Floats,
     q: JointAngles,
+    qd: JointVelocities,
+    held: JointAngles,
     command: JointVelocities,
     wanted: JointVelocities,
     hold: Floats,
@@ -29,10 +33,13 @@ def substep_commands(
     Args:
         chain: for its ranges and velocity limits.
         slew_rad_s2: fastest change of a command [rad/s^2].
+        leash_rad: how far the holding servo's angle may be ahead of a blocked joint [rad].
         sim_dt: length of a substep [s].
         lead_s: (N,) how far the rate servo's command runs ahead: inertia / damping [s]. Its
             torque then pays for the acceleration, and the holding servo need not lag.
-        q: (B, N) angles now [rad].
+        q, qd: (B, N) angles [rad] and velocities [rad/s] now.
+        held: (B, N) angles that the holding servos hold [rad]; kept near a blocked arm, as are the
+            commands, so that it leaves at once.
         command: (B, N) the command in force; at the end of the step on return [rad/s].
         wanted: (B, N) wanted velocities [rad/s]; what is not finite counts as 0.
         hold: (B, T, N) written: mean velocity in each substep, so that the holding servo's
@@ -40,10 +47,19 @@ def substep_commands(
         rate: (B, T, N) written: velocity at the end of each substep, with the lead [rad/s].
     """
     ranges, limits = chain.range_rad, chain.velocity_limit_rad_s
+    _shorten_leashes(q, qd, held, command, leash_rad, slew_rad_s2 * sim_dt * rate.shape[1])
     _ramp(q, command, wanted, ranges, limits, slew_rad_s2, sim_dt, lead_s, hold, rate)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(**LEAN)
+def _shorten_leashes(q, qd, held, command, leash, reach):
+    for b in range(q.shape[0]):
+        for i in range(q.shape[1]):
+            held[b, i] = min(max(held[b, i], q[b, i] - leash), q[b, i] + leash)
+            command[b, i] = min(max(command[b, i], qd[b, i] - reach), qd[b, i] + reach)
+
+
+@numba.njit(**LEAN)
 def _ramp(q, command, wanted, ranges, limits, slew, sim_dt, lead_s, hold, rate):
     brake, ctrl_dt = BRAKE_SHARE * slew, sim_dt * rate.shape[1]
     for b in range(q.shape[0]):

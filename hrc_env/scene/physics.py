@@ -81,8 +81,9 @@ class Physics:
         self._fit(workers)
         config, n = self.scene.config, self._n
         substep_commands(
-            self.scene.chain, config.slew_rad_s2, config.sim_dt, self.scene.servo_lead_s,
-            self.q, self._command, np.asarray(qd_command, float),
+            self.scene.chain, config.slew_rad_s2, config.leash_rad, config.sim_dt,
+            self.scene.servo_lead_s, self._qpos[:, :n], self._qvel[:, :n], self._act[:, :n],
+            self._command, np.asarray(qd_command, float),
             hold=self._control[:, :, :n], rate=self._control[:, :, n : 2 * n],
         )  # fmt: skip
         self._write_workers(workers)
@@ -90,7 +91,6 @@ class Physics:
             self._control.shape[1], self._control, INPUTS, ("qpos",), out=self._trace
         )
         self._check_health()
-        self._shorten_leashes()
         return self._trace["qpos"][:, :, :n].copy()
 
     def get_state(self) -> Floats:
@@ -129,18 +129,10 @@ class Physics:
         self._control[:, :, first:turns] = workers.position_world.reshape(*lead, 3 * n_mocap)
         self._control[:, :, turns:] = workers.quaternion_wxyz.reshape(*lead, 4 * n_mocap)
 
-    def _shorten_leashes(self) -> None:
-        """Keep angle and velocity commands near a blocked arm, so that it leaves at once."""
-        config, n = self.scene.config, self._n
-        q, qd = self._qpos[:, :n], self._qvel[:, :n]
-        np.clip(self._act[:, :n], q - config.leash_rad, q + config.leash_rad, self._act[:, :n])
-        reach = config.slew_rad_s2 * config.sim_dt * self._control.shape[1]
-        np.clip(self._command, qd - reach, qd + reach, out=self._command)
-
     def _check_health(self) -> None:
         """MuJoCo answers an exploding state or a full memory with a warning: raise it."""
-        if self._sims.warning.any():
-            environment, kind = np.argwhere(self._sims.warning)[0]
+        if np.count_nonzero(self._sims.warning):
+            environment, kind, _ = np.argwhere(self._sims.warning)[0]
             raise HRCError(
                 f"The physics of environment {environment} broke down "
                 f"({mujoco.mjtWarning(int(kind)).name}): expected finite states and bounded "

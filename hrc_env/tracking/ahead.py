@@ -9,6 +9,7 @@ says how good this is and what it was compared with.
 import numba
 import numpy as np
 
+from hrc_env.compiled import JIT, LEAN
 from hrc_env.errors import ConfigError
 from hrc_env.records import PoseEstimate
 from hrc_env.tracking.config import TrackerConfig
@@ -18,7 +19,6 @@ from hrc_env.typing import Floats, Ints
 
 LONGEST_S = 1.0
 """No estimator looks further ahead [s]."""
-_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
 def check_horizon(horizon_s: float) -> None:
@@ -70,7 +70,7 @@ def ahead(now: PoseEstimate, horizon_s: float, config: TrackerConfig) -> PoseEst
     return report(later, config)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**JIT)
 def _look_ahead(
     network, mean, cov, velocity, tracked, horizon, unknown_heading, keep, home, home_std
 ):  # fmt: skip
@@ -92,7 +92,7 @@ def _look_ahead(
             _add(*body, cos, sin, moved, rate, std)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def _go_on(mean, cov, velocity, horizon, variance):
     """Constant velocity, and `variance` [m^2] more."""
     for j in range(len(mean)):
@@ -101,7 +101,7 @@ def _go_on(mean, cov, velocity, horizon, variance):
             cov[j, i, i] += variance
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def _add(mean, cov, velocity, cos, sin, moved, rate, std):
     """Displacements of the body's frame onto the body in the world."""
     for j in range(len(mean)):

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.body import assets_dir
+from hrc_env.compiled import JIT, LEAN
 from hrc_env.skeleton import N_JOINTS
 from hrc_env.tracking.models.acquisition import heading
 from hrc_env.typing import Floats
@@ -23,7 +24,6 @@ from hrc_env.typing import Floats
 N_INPUTS = 7 * N_JOINTS + 4
 _N_OUTPUTS = 4 * N_JOINTS
 _TORSO = (1, 2, 7, 8)
-_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 _REORDER = {"reassoc", "contract", "nsz"}
 Weights = NDArray[np.float32]
 
@@ -54,7 +54,7 @@ def load_forecast() -> Forecast:
         return Forecast(*(np.ascontiguousarray(stored[name]) for name in Forecast._fields))
 
 
-@numba.njit(**_JIT)
+@numba.njit(**JIT)
 def describe(points, velocity, cov, log_std, out):
     """What the network looks at: out (N_INPUTS,) float32; cosine, sine of the heading, known.
 
@@ -65,7 +65,7 @@ def describe(points, velocity, cov, log_std, out):
         out: filled with joints about the torso (J, 3), velocities about the torso's (J, 3), both
             forward, left, up; the torso's velocity (3,) and height; ln of deviations (J,).
     """
-    cos, sin, known = heading(points, np.ones(len(points), np.bool_))
+    cos, sin, known = heading(points)
     root, speed = np.zeros(3), np.zeros(3)
     for j in _TORSO:
         for i in range(3):
@@ -89,7 +89,7 @@ def describe(points, velocity, cov, log_std, out):
     return cos, sin, known
 
 
-@numba.njit(fastmath=_REORDER, **_JIT)
+@numba.njit(fastmath=_REORDER, **LEAN)
 def _layer(inputs, weight, bias, out):
     """out = bias + inputs weight."""
     for k in range(len(out)):
@@ -100,14 +100,14 @@ def _layer(inputs, weight, bias, out):
             out[k] += value * weight[i, k]
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def _hidden(inputs, weight, bias, out):
     _layer(inputs, weight, bias, out)
     for k in range(len(out)):
         out[k] = max(out[k], np.float32(0.0))
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def foresee(network, inputs, horizon, scratch, moved, rate, std):
     """The network's answer at `horizon` [s], interpolated between those that it knows.
 
@@ -141,7 +141,7 @@ def foresee(network, inputs, horizon, scratch, moved, rate, std):
         std[j] = last + share * (math.exp(after[3 * N_JOINTS + j]) - last)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**JIT)
 def make_scratch(network):
     """Room for one body's layers."""
     first = np.empty(network.weight_1.shape[1], np.float32)

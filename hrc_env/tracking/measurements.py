@@ -8,6 +8,7 @@ there is no measurement; wrong pixels that look like pixels are left to the robu
 import numba
 import numpy as np
 
+from hrc_env.compiled import LEAN
 from hrc_env.errors import check_shape
 from hrc_env.geometry.triangulation import (
     FURTHEST_PX,
@@ -19,7 +20,6 @@ from hrc_env.typing import Floats
 
 MIN_SIGMA_PX = 0.25
 """No detector is believed to be better than this [px]."""
-_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 _REORDER = {"reassoc", "contract", "nsz"}
 
 
@@ -37,7 +37,7 @@ def arrays_of(
     )
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def is_measurement(u, v, belief, sigma):
     """Whether a pixel, its confidence and its standard deviation are a measurement."""
     return (
@@ -48,7 +48,7 @@ def is_measurement(u, v, belief, sigma):
     )
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def read_worker(px, confidence, sigma_px, b, w, scale, z, sigma, ok):
     """Worker w of environment b: pixels z (J, C, 2), sigma (J, C), ok (J, C); whether any is ok.
 
@@ -68,7 +68,7 @@ def read_worker(px, confidence, sigma_px, b, w, scale, z, sigma, ok):
     return any_ok
 
 
-@numba.njit(fastmath=_REORDER, **_JIT)
+@numba.njit(fastmath=_REORDER, **LEAN)
 def pixel_spread(p, u, v, depth, cov):
     """Mean variance of a coordinate of the pixel [px^2] of a point with covariance `cov` (3, 3).
 
@@ -88,7 +88,7 @@ def pixel_spread(p, u, v, depth, cov):
     return 0.5 * own + cross
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def supports(camera, z, sigma, gate_sigma, point, cov):
     """Whether a pixel lies where a joint with this mean and covariance may be seen."""
     u, v, depth = pixel_of(camera, point[0], point[1], point[2])

@@ -19,6 +19,7 @@ from typing import TypeAlias
 import numba
 import numpy as np
 
+from hrc_env.compiled import JIT
 from hrc_env.records import Keypoints, PoseEstimate
 from hrc_env.skeleton import N_JOINTS
 from hrc_env.tracking.ahead import ahead
@@ -40,7 +41,6 @@ from hrc_env.typing import Bools, Floats, Ints
 
 Measured: TypeAlias = tuple[Floats, Floats, Bools]
 """One worker's pixels (J, C, 2), sigma (J, C) and whether there are any (J, C)."""
-_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,7 +175,7 @@ def _chance(by_weight: bool, n_particles: int, rng: np.random.Generator) -> Floa
     return np.repeat(rng.random((N_JOINTS, 1)), n_particles + 1, axis=1)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**JIT)
 def weigh_and_resample(P, z, sigma, ok, particles, by_weight, chance):
     """Lines 8 to 17 for the clouds (J, 3, M) of one worker, in place."""
     n_joints, n_cameras = ok.shape
@@ -200,7 +200,7 @@ def weigh_and_resample(P, z, sigma, ok, particles, by_weight, chance):
                 particles[j, i, m] = before[i, ancestors[m]]
 
 
-@numba.njit(**_JIT)
+@numba.njit(**JIT)
 def _look_after(
     P, z, sigma, ok, gate_sigma, radius, conflict_frames, mean, cov, age, conflict, again
 ):

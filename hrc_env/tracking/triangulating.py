@@ -13,6 +13,7 @@ from typing import TypeAlias
 import numba
 import numpy as np
 
+from hrc_env.compiled import JIT, LEAN
 from hrc_env.geometry.triangulation import (
     FURTHEST_PX,
     Triangulation,
@@ -30,7 +31,6 @@ from hrc_env.typing import Floats, Ints, Points2
 
 Solve: TypeAlias = Callable[[Floats, Points2, Floats], Triangulation]
 """From P (C, 3, 4), px (B, C, W, J, 2) and sigma (B, C, W, J) to points."""
-_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
 def triangulation(P: Floats, ctrl_dt: float, config: TrackerConfig) -> "TriangulationEstimator":
@@ -114,7 +114,7 @@ def _believed(
     return np.where(ok[..., None], px, np.nan), sigma
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def _hold(cov, age, tracked, dt, speed):
     for b in range(cov.shape[0]):
         for w in range(cov.shape[1]):
@@ -126,7 +126,7 @@ def _hold(cov, age, tracked, dt, speed):
                     cov[b, w, j, i, i] += grown
 
 
-@numba.njit(**_JIT)
+@numba.njit(**JIT)
 def _update(made, spread, mean, cov, velocity, age, tracked, standing, radius, min_joints, tau):
     """Take in points made (B, W, J, 3) with spread (B, W, J, 3, 3), NaN where there is none."""
     found = np.empty(made.shape[2], np.bool_)
@@ -148,7 +148,7 @@ def _update(made, spread, mean, cov, velocity, age, tracked, standing, radius, m
                 tracked[b, w] = True
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def _follow(points, spread, found, tau, mean, cov, velocity, age):
     for j in range(len(points)):
         elapsed = age[j]

@@ -136,3 +136,12 @@ def test_workers_do_not_touch_the_floor_nor_each_other():
 def test_motion_of_the_wrong_number_of_workers_is_refused():
     with pytest.raises(ConfigError, match="workers"):
         Physics(LAB, 1).step(np.zeros((1, 6)), standing(1, (1.5, 0.0)))
+
+
+def test_a_broken_simulation_is_named():
+    physics = Physics(build(), 3)
+    state = physics.get_state()
+    state[1] = 1e12
+    physics.set_state(state)
+    with pytest.raises(HRCError, match="environment 1 broke down"):
+        physics.step(np.zeros((3, 6)), no_workers(3, 5))

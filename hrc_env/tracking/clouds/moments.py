@@ -3,9 +3,8 @@
 import numba
 import numpy as np
 
+from hrc_env.compiled import LEAN
 from hrc_env.typing import Covariances3, Floats, Points3
-
-_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
 def scatter(particles: Floats, mean: Points3, cov: Covariances3, rng: np.random.Generator) -> None:
@@ -19,7 +18,7 @@ def roll(particles: Floats, sigma_m: float, rng: np.random.Generator) -> None:
     _add_scaled(particles, rng.standard_normal(particles.shape, dtype=np.float32), sigma_m)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def _add_scaled(particles, noise, scale):
     for j in range(particles.shape[0]):
         for i in range(3):
@@ -27,7 +26,7 @@ def _add_scaled(particles, noise, scale):
                 particles[j, i, m] += scale * noise[j, i, m]
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def moments(particles, mean, cov):
     """Mean (J, 3) and covariance (J, 3, 3) of unweighted clouds (J, 3, M)."""
     n = particles.shape[2]

@@ -5,10 +5,10 @@ The random numbers are arguments, so that each environment draws its own.
 
 import numba
 
-_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
+from hrc_env.compiled import JIT, LEAN
 
 
-@numba.njit(**_JIT)
+@numba.njit(**JIT)
 def multinomial(weights, waits, ancestors):
     """M independent choices, sorted.
 
@@ -28,7 +28,7 @@ def multinomial(weights, waits, ancestors):
         ancestors[m] = particle
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def systematic(weights, start, ancestors):
     """Choices at even distances (Kitagawa, 1996): the counts differ from M w_m by less than one.
 

@@ -5,8 +5,8 @@ potential of the pose that is believed now, not anew with every frame: it does n
 """
 
 import numba
-import numpy as np
 
+from hrc_env.compiled import LEAN
 from hrc_env.tracking.models.acquisition import heading
 
 _FEATURES = (
@@ -19,13 +19,12 @@ _FEATURES = (
 from common proportions, wide enough for turned heads and feet."""
 _MOST = 4.5
 """No feature counts for more than three deviations."""
-_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def anatomy(body):
     """Log-potential of a pose (J, 6): 0 at best; 0 if the heading is unknown."""
-    cos, sin, known = heading(body, np.ones(len(body), np.bool_))
+    cos, sin, known = heading(body)
     total = 0.0
     if known:
         for joint, one, other, ahead, std in _FEATURES:

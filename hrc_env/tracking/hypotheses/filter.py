@@ -7,6 +7,7 @@
 import numba
 import numpy as np
 
+from hrc_env.compiled import JIT, LEAN
 from hrc_env.tracking.hypotheses.anatomy import anatomy
 from hrc_env.tracking.hypotheses.branching import branch, is_ambiguous
 from hrc_env.tracking.hypotheses.slots import drop, merge, normalise
@@ -18,18 +19,17 @@ from hrc_env.tracking.models.swaps import undo_swaps
 from hrc_env.tracking.models.upkeep import acquire, grow_older
 from hrc_env.tracking.tracks import count_up
 from hrc_env.tracking.tree.evidence import log_evidence
-from hrc_env.tracking.tree.filter import condition, follow, look_after, settle
+from hrc_env.tracking.tree.filter import condition, follow, keep_positions, look_after, settle
 from hrc_env.tracking.tree.predict import predict_tree
 from hrc_env.tracking.tree.work import make_work
 
 _TORSO = (1, 2, 7, 8)
-_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
-@numba.njit(**_JIT)
+@numba.njit(**JIT)
 def predict_all(state, model, dt, s, m):
     """Let dt [s] pass: hypotheses move and age; `model` as in `tree.predict.predict_tree`."""
-    work, slots = make_work(), state.slots
+    work, slots = make_work(0), state.slots
     n_joints = slots.body.shape[2]
     held = (np.empty((n_joints, 3)), np.empty(n_joints))
     limit = slots.tracked.shape[1] // state.n_alive.shape[1]
@@ -41,7 +41,7 @@ def predict_all(state, model, dt, s, m):
             _grow_older(state, b, w, dt, s)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def _move(state, b, w, model, dt, m, held, work):
     """Move a worker's hypotheses; several at once learn no places on the body (`held`)."""
     slots = state.slots
@@ -53,14 +53,17 @@ def _move(state, b, w, model, dt, m, held, work):
             predict_tree(*gaussian, *learnt, model, dt, work)
         else:
             places, counts = held
-            places[:], counts[:] = slots.offset[b, k], slots.offset_count[b, k]
+            for j in range(len(counts)):
+                counts[j] = slots.offset_count[b, k, j]
+                for i in range(3):
+                    places[j, i] = slots.offset[b, k, j, i]
             predict_tree(*gaussian, places, counts, model, dt, work)
             state.log_weight[b, k] += m.walking_odds * dt * forwards(slots.body[b, k])
     if state.n_alive[b, w] > 1:
         normalise(state, b, w, m.log_drop)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def _grow_older(state, b, w, dt, s):
     """Count ages up; a worker who is lost has one hypothesis."""
     slots = state.slots
@@ -72,10 +75,10 @@ def _grow_older(state, b, w, dt, s):
         count_up(slots.age_s[b, k], dt, s.max_age_s)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def forwards(body):
     """How clearly a body (J, 6) walks forwards, -1 (backwards) to 1."""
-    cos, sin, known = heading(body, np.ones(len(body), np.bool_))
+    cos, sin, known = heading(body)
     if not known:
         return 0.0
     speed = 0.0
@@ -84,7 +87,7 @@ def forwards(body):
     return min(max(speed / 0.5, -1.0), 1.0)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**JIT)
 def update_all(state, P, px, confidence, sigma_px, standing, s, m, noise):
     """Take one set of frames in.
 
@@ -99,7 +102,7 @@ def update_all(state, P, px, confidence, sigma_px, standing, s, m, noise):
     n_batch, n_cameras, n_workers, n_joints = confidence.shape
     z, sigma = np.empty((n_joints, n_cameras, 2)), np.empty((n_joints, n_cameras))
     ok, belief = np.empty((n_joints, n_cameras), np.bool_), np.empty((n_joints, n_cameras))
-    scratch = (belief, np.empty(n_joints), make_work())
+    scratch = (belief, np.empty(n_joints), make_work(n_cameras))
     placed, predicted = np.empty(n_joints, np.bool_), np.empty((n_joints, 3, 3))
     prior = (np.empty((n_joints, 6)), np.empty((n_joints, 6, 6)), np.empty((n_joints, 6, 6)))
     kept = (scratch, prior, placed, predicted)
@@ -126,7 +129,7 @@ def update_all(state, P, px, confidence, sigma_px, standing, s, m, noise):
                 _tidy(state, b, w, m, scratch[2])
 
 
-@numba.njit(**_JIT)
+@numba.njit(**JIT)
 def _follow(state, b, w, h, several, look, seen, standing, s, m, noise, kept):
     """What one set of frames does to one hypothesis; `look` for others beside it."""
     scratch, prior, placed, predicted = kept
@@ -136,7 +139,7 @@ def _follow(state, b, w, h, several, look, seen, standing, s, m, noise, kept):
     scale_sigma(slots.noise_factor[b, k], sigma)
     swaps = (slots.swap_chance[b, k], slots.blind[b, k], slots.believed[b, k])
     undo_swaps(P, slots.body[b, k], slots.cov[b, k], z, sigma, ok, *swaps, s)
-    predicted[:] = slots.cov[b, k, :, :3, :3]
+    keep_positions(slots.cov[b, k], predicted)
     evidence = 0.0
     if several or look:
         evidence = _weigh(slots, b, k, seen, s, prior, scratch)
@@ -145,14 +148,14 @@ def _follow(state, b, w, h, several, look, seen, standing, s, m, noise, kept):
         follow(slots, b, k, seen, s, scratch)
     known = (slots.noise_factor[b, k], slots.noise_sums[b, k], slots.noise_last[b, k])
     body = (slots.body[b, k], slots.cov[b, k], predicted)
-    learn_noise(seen, scratch[0], body, *known, noise)
+    learn_noise(seen, scratch[0], body, *known, noise, scratch[2])
     if look:
         state.waited_s[b, w] = 0.0
         branch(state, b, w, prior, evidence, seen, s, m, scratch)
-    look_after(slots, b, k, seen, standing, s, placed)
+    look_after(slots, b, k, seen, standing, s, placed, scratch[2].a)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def _weight_form(state, b, k, several, gain, m):
     """Weigh a hypothesis by its evidence, and by its pose in the place of the last one."""
     form = m.anatomy * anatomy(state.slots.body[b, k])
@@ -161,7 +164,7 @@ def _weight_form(state, b, k, several, gain, m):
     state.form[b, k] = form
 
 
-@numba.njit(**_JIT)
+@numba.njit(**JIT)
 def _weigh(slots, b, k, seen, s, prior, scratch):
     """Update a hypothesis, keep what it was before in `prior`; its log-evidence."""
     body, cov, slope = slots.body[b, k], slots.cov[b, k], slots.slope[b, k]
@@ -175,7 +178,7 @@ def _weigh(slots, b, k, seen, s, prior, scratch):
     return evidence
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def _tidy(state, b, w, m, work):
     """Drop hypotheses that are lost or too light, and merge those that have come close."""
     first = w * (state.slots.tracked.shape[1] // state.n_alive.shape[1])

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numba
 
+from hrc_env.compiled import LEAN
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.tree.reports import tell_moments, tell_rest
 
@@ -17,7 +18,6 @@ _DISTINCT, _CLOSE = 3.0, 2.0
 _SEARCH_STEPS = 4
 _TICK_S = 1e-6
 """Sums of time steps that are short by no more are whole."""
-_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
 class MixtureSettings(NamedTuple):
@@ -71,7 +71,7 @@ def mixture_settings(config: TrackerConfig) -> MixtureSettings:
     )
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def estimate_all(state, s, out):
     """Fill the arrays of a `PoseEstimate` in; `state` and `s` as in `hypotheses.filter`."""
     slots, limit = state.slots, state.log_weight.shape[1] // state.n_alive.shape[1]
@@ -86,7 +86,7 @@ def estimate_all(state, s, out):
             tell_rest(slots, b, first, s, out, w)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def mix(state, b, w, mean, cov, velocity):
     """Moments of a mixture: mean, velocity (J, 3) and cov (J, 3, 3) of the positions."""
     slots, limit = state.slots, state.log_weight.shape[1] // state.n_alive.shape[1]
@@ -103,7 +103,7 @@ def mix(state, b, w, mean, cov, velocity):
         _add_moments(share, slots.body[b, k], slots.cov[b, k], mean, cov)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def _add_moments(share, body, cov, mean, out):
     for j in range(len(body)):
         for i in range(3):

@@ -11,11 +11,10 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
+from hrc_env.compiled import JIT, LEAN
 from hrc_env.tracking.kalman import KalmanState
 from hrc_env.tracking.tree.evidence import distance_between
 from hrc_env.typing import Floats, Ints
-
-_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
 class Hypotheses(NamedTuple):
@@ -33,19 +32,19 @@ class Hypotheses(NamedTuple):
     """(B, W) time since other hypotheses were looked for [s]."""
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def copy_slot(slots, b, source, target):
     """Make slot `target` of environment b a copy of `source`."""
     _move_slot(slots, b, source, target, False)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def exchange_slots(slots, b, one, other):
     """Exchange two slots of environment b."""
     _move_slot(slots, b, one, other, True)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def _move_slot(slots, b, source, target, both):
     _move(slots.body[b], source, target, both)
     _move(slots.cov[b], source, target, both)
@@ -65,7 +64,7 @@ def _move_slot(slots, b, source, target, both):
     _move(slots.noise_last[b], source, target, both)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**JIT)
 def _move(rows, source, target, both):
     """rows[target] = rows[source], and the other way round if `both`."""
     kept = rows[target : target + 1].copy()
@@ -74,7 +73,7 @@ def _move(rows, source, target, both):
         rows[source : source + 1] = kept
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def drop(state, b, w, h):
     """Drop hypothesis h of a worker who has others; the last one takes its place."""
     first = w * (state.log_weight.shape[1] // state.n_alive.shape[1])
@@ -86,7 +85,7 @@ def drop(state, b, w, h):
     state.n_alive[b, w] = last
 
 
-@numba.njit(**_JIT)
+@numba.njit(**JIT)
 def normalise(state, b, w, log_least):
     """Make the weights sum to one, drop what is lighter than `log_least`, the heaviest first."""
     first = w * (state.log_weight.shape[1] // state.n_alive.shape[1])
@@ -109,7 +108,7 @@ def normalise(state, b, w, log_least):
         form[0], form[best] = form[best], form[0]
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def merge(state, b, w, least_distance, work):
     """Hypotheses that have come close are one: the heavier stays, with the weight of both.
 
@@ -132,7 +131,7 @@ def merge(state, b, w, least_distance, work):
         h += 1
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def slot_distance(slots, b, one, other, work):
     """Squared distance of two hypotheses, in deviations of the wider."""
     a = (slots.body[b, one], slots.cov[b, one], slots.slope[b, one])

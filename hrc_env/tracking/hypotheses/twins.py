@@ -11,6 +11,7 @@ import math
 import numba
 import numpy as np
 
+from hrc_env.compiled import JIT, LEAN
 from hrc_env.tracking.hypotheses.mirrors import eye_of
 from hrc_env.tracking.models.acquisition import heading
 from hrc_env.tracking.tree.gaussian import multiply
@@ -18,13 +19,12 @@ from hrc_env.tracking.tree.gaussian import multiply
 _TORSO = (1, 2, 7, 8)
 _LEAST_TURN = 0.35
 """Bodies that are turned by less [rad] are one hypothesis."""
-_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
-@numba.njit(**_JIT)
+@numba.njit(**JIT)
 def turn_of(camera, body):
     """By how much [rad] the other body of `body` (J, 6) is turned; 0 if that is not known."""
-    cos, sin, known = heading(body, np.ones(len(body), np.bool_))
+    cos, sin, known = heading(body)
     if not known:
         return 0.0
     eye, x, y = eye_of(camera), 0.0, 0.0
@@ -37,15 +37,14 @@ def turn_of(camera, body):
     return math.atan2(math.sin(turn), math.cos(turn))
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def heads_like(one, other):
     """Whether two bodies (J, 6) are turned alike."""
-    everyone = np.ones(len(one), np.bool_)
-    a, b = heading(one, everyone), heading(other, everyone)
+    a, b = heading(one), heading(other)
     return a[0] * b[0] + a[1] * b[1] > math.cos(_LEAST_TURN)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**JIT)
 def turn_body(camera, turn, body, cov, slope):
     """Make a Gaussian (J, 6), (J, 6, 6), (J, 6, 6) the other body's, in place."""
     middle, across, speed = np.zeros(6), np.zeros(2), np.zeros(2)

@@ -9,6 +9,7 @@ import math
 import numba
 import numpy as np
 
+from hrc_env.compiled import JIT, LEAN
 from hrc_env.geometry.triangulation import inverse3
 from hrc_env.tracking.joints.importance import (
     cholesky3,
@@ -27,10 +28,9 @@ from hrc_env.tracking.models.upkeep import acquire, acquire_anew, check, find_jo
 
 _LEAST_ESS = 8.0
 """With fewer effective particles the Gaussian at the mode is the better answer."""
-_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def predict_all(state, F, Q, dt):
     """Move every tracked body by dt [s]; F, Q (J, 2, 2) as `models.motion.damped_joints` gives."""
     for b in range(state.tracked.shape[0]):
@@ -40,7 +40,7 @@ def predict_all(state, F, Q, dt):
                 predict_body(state.body[b, w], state.cov[b, w], offset, count, F, Q, dt)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**JIT)
 def update_all(state, P, px, confidence, sigma_px, standing, noise, tables, n_mode, s):
     """Take one set of frames in.
 
@@ -56,7 +56,7 @@ def update_all(state, P, px, confidence, sigma_px, standing, noise, tables, n_mo
     """
     n_batch, n_cameras, n_workers, n_joints = confidence.shape
     z, sigma = np.empty((n_joints, n_cameras, 2)), np.empty((n_joints, n_cameras))
-    ok = np.empty((n_joints, n_cameras), np.bool_)
+    ok, factor = np.empty((n_joints, n_cameras), np.bool_), np.empty((6, 6))
     for b in range(n_batch):
         for w in range(n_workers):
             read_worker(px, confidence, sigma_px, b, w, s.sigma_scale, z, sigma, ok)
@@ -69,10 +69,10 @@ def update_all(state, P, px, confidence, sigma_px, standing, noise, tables, n_mo
             placed = np.zeros(n_joints, np.bool_)
             if not acquire_anew(state, b, w, P, z, sigma, ok, standing, s):
                 find_joints_again(state, b, w, P, z, sigma, ok, s, placed)
-            check(state, b, w, s)
+            check(state, b, w, s, factor)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**JIT)
 def _follow(state, b, w, P, z, sigma, ok, noise, tables, n_mode, s):
     """Update every joint of a tracked worker, then let the bones speak."""
     n_joints, n_cameras = ok.shape
@@ -99,7 +99,7 @@ def _follow(state, b, w, P, z, sigma, ok, noise, tables, n_mode, s):
     use_bones(body, cov, n_views, state.bone_length[b, w], state.bone_variance[b, w])
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def _update_joint(seen, draws, model, body, cov, belief, scratch):
     """One joint's importance-sampled posterior; returns the effective sample size."""
     work, gain = scratch
@@ -119,7 +119,7 @@ def _update_joint(seen, draws, model, body, cov, belief, scratch):
     return ess
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def _sample(seen, draws, contrast, body, prior_cov, mode, spread, work, mean, moments):
     """Mean (3,) and covariance (3, 3) of weighted particles; the effective sample size."""
     P, z, sigma, ok = seen
@@ -147,7 +147,7 @@ def _sample(seen, draws, contrast, body, prior_cov, mode, spread, work, mean, mo
     return ess
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def _regress(body, cov, precision, mean, spread, gain):
     """Give the position its new mean and covariance, and the velocity what follows from them.
 

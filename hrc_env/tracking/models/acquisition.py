@@ -9,6 +9,7 @@ import math
 import numba
 import numpy as np
 
+from hrc_env.compiled import JIT, LEAN
 from hrc_env.geometry.triangulation import consensus_point
 from hrc_env.typing import Floats
 
@@ -28,10 +29,9 @@ STANDING_M: Floats = np.array(
 WIDEST_STD_M = 0.5
 """A triangulated joint that is less certain than this is no find [m]."""
 _GUESS_STD_M, _GUESS_STD_WITHOUT_HEADING_M = 0.3, 0.6
-_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
-@numba.njit(**_JIT)
+@numba.njit(**JIT)
 def triangulate_body(P, z, sigma, ok, gate_sigma, radius, points, cov, found):
     """Joints on which at least two views agree, near each other as a body is.
 
@@ -45,7 +45,7 @@ def triangulate_body(P, z, sigma, ok, gate_sigma, radius, points, cov, found):
     return keep_one_body(points, cov, found, radius)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**JIT)
 def keep_one_body(points, cov, found, radius):
     """Drop points that are too uncertain, or not near the others as a body's are.
 
@@ -65,7 +65,7 @@ def keep_one_body(points, cov, found, radius):
     return n_found
 
 
-@numba.njit(**_JIT)
+@numba.njit(**JIT)
 def middle_of(points, among, out):
     """Median of the points `among`, axis by axis; False if there is none."""
     values = np.empty(len(points))
@@ -81,16 +81,16 @@ def middle_of(points, among, out):
     return True
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def distance(a, b):
     """Euclidean distance of two points."""
     return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**JIT)
 def complete_body(standing, points, cov, found):
     """Guess the joints that were not found, from a standing body turned as the torso is."""
-    cos, sin, known = heading(points, found)
+    cos, sin, known = _heading_of(points, found)
     root, n_found = np.zeros(3), 0
     for j in range(len(points)):
         if found[j]:
@@ -110,22 +110,32 @@ def complete_body(standing, points, cov, found):
             cov[j] = np.eye(3) * std**2
 
 
-@numba.njit(**_JIT)
-def heading(points, found):
+@numba.njit(**LEAN)
+def heading(points):
     """(cos, sin, known) of the body's heading, from shoulders and hips; (0, 0, False) unknown."""
+    return _across(points, True, True)
+
+
+@numba.njit(**LEAN)
+def _heading_of(points, found):
+    """The same, of those joints that were found."""
+    return _across(points, found[1] and found[2], found[7] and found[8])
+
+
+@numba.njit(**LEAN)
+def _across(points, shoulders, hips):
     x, y = 0.0, 0.0
-    for left in (1, 7):
-        right = left + 1
-        if found[left] and found[right]:
-            x += points[left, 0] - points[right, 0]
-            y += points[left, 1] - points[right, 1]
+    for left, known in ((1, shoulders), (7, hips)):
+        if known:
+            x += points[left, 0] - points[left + 1, 0]
+            y += points[left, 1] - points[left + 1, 1]
     length = math.sqrt(x * x + y * y)
     if length < 0.05:
         return 0.0, 0.0, False
     return y / length, -x / length, True
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def count_conflict(n_ok, n_supporting, conflict):
     """Updates in a row in which two views were there and fewer than two supported the joint."""
     if n_ok < 2 or n_supporting >= 2:
@@ -133,7 +143,7 @@ def count_conflict(n_ok, n_supporting, conflict):
     return conflict + 1
 
 
-@numba.njit(**_JIT)
+@numba.njit(**JIT)
 def find_again(P, z, sigma, ok, gate_sigma, radius, middle, point, cov):
     """One joint (z (C, 2), sigma, ok (C,)) on which two views agree, near the body's middle."""
     use = np.empty(len(P), np.bool_)

@@ -12,6 +12,7 @@ import math
 import numba
 import numpy as np
 
+from hrc_env.compiled import JIT, LEAN
 from hrc_env.skeleton import TORSO
 from hrc_env.tracking.models.acquisition import heading
 from hrc_env.typing import Floats
@@ -30,7 +31,6 @@ STANDING_COUNT = 5.0
 _SHARES = (0.9, 0.6, 0.3, 0.1)
 _OFFSET_TAU_S, _OFFSET_STD_M = 2.0, 0.06
 _TORSO = tuple(int(j) for j in TORSO)
-_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
 @functools.lru_cache(maxsize=16)
@@ -69,11 +69,11 @@ def whole_body_noise(dt_s: float, root_acceleration: float) -> Floats:
     return root_acceleration * np.array([[dt_s**3 / 3, dt_s**2 / 2], [dt_s**2 / 2, dt_s]])
 
 
-@numba.njit(**_JIT)
+@numba.njit(**JIT)
 def predict_body(body, cov, offset, offset_count, F, Q, dt):
     """Move one worker by dt: body (J, 6), cov (J, 6, 6), in place; learns the offsets (J, 3)."""
     root = root_of(body, cov)
-    cos, sin, known = heading(body, np.ones(len(body), np.bool_))
+    cos, sin, known = heading(body)
     if known:
         learn_offsets(body, cov, root, cos, sin, dt, offset, offset_count)
     shared = shared_covariance(cov)
@@ -96,7 +96,7 @@ def predict_body(body, cov, offset, offset_count, F, Q, dt):
         _add_isotropic(cov[j], pp + dt * (2.0 * pv + dt * vv), pv + dt * vv, vv)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**JIT)
 def root_of(body, cov):
     """(6,) the torso's position and velocity, its joints weighted by what is known of them."""
     root, weight_p, weight_v = np.zeros(6), 0.0, 0.0
@@ -113,7 +113,7 @@ def root_of(body, cov):
     return root
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def learn_offsets(body, cov, root, cos, sin, dt, offset, offset_count):
     """Joints that are known well teach their mean places (J, 3) on the body, in place."""
     for j in range(len(body)):
@@ -127,7 +127,7 @@ def learn_offsets(body, cov, root, cos, sin, dt, offset, offset_count):
         offset[j, 2] += trust * (up - offset[j, 2])
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def shared_covariance(cov):
     """Variances (position, cross, velocity) per axis of the torso joint known best."""
     best, least = 0, np.inf
@@ -139,7 +139,7 @@ def shared_covariance(cov):
     return least / 3.0, cross / 3.0, (cov[best, 3, 3] + cov[best, 4, 4] + cov[best, 5, 5]) / 3.0
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def relative_covariance(cov, shared, out, factor):
     """`cov` (6, 6) less the largest share of the root's that leaves it positive definite.
 
@@ -154,7 +154,7 @@ def relative_covariance(cov, shared, out, factor):
     return 0.0
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def is_positive_definite(a, factor):
     """Whether a symmetric matrix has a Cholesky factor; `factor` takes its lower part."""
     for i in range(len(a)):
@@ -171,7 +171,7 @@ def is_positive_definite(a, factor):
     return True
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def _move_covariance(cov, f, out):
     """out = (f x I3) cov (f x I3)' for cov (6, 6) of (position, velocity)."""
     f00, f01, f10, f11 = f[0, 0], f[0, 1], f[1, 0], f[1, 1]
@@ -184,7 +184,7 @@ def _move_covariance(cov, f, out):
             out[3 + i, k], out[3 + i, 3 + k] = v_pp * f00 + v_pv * f01, v_pp * f10 + v_pv * f11
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def _add_isotropic(cov, pp, pv, vv):
     for i in range(3):
         cov[i, i] += pp

@@ -24,6 +24,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
+from hrc_env.compiled import LEAN
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, inverse3
 from hrc_env.tracking.config import TrackerConfig
 
@@ -45,7 +46,6 @@ _CHANCE = 0.07
 _OPEN_M = 0.5
 """Two views triangulate no joint along a ray that they share: it stays within this [m]."""
 _LEAST_BELIEF = 0.5
-_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 _REORDER = {"reassoc", "contract", "arcp", "nsz"}  # NaN and infinity keep their meaning
 
 
@@ -77,7 +77,7 @@ def first_factor(config: TrackerConfig) -> float:
     return min(max(1.0, config.noise_bounds[0]), config.noise_bounds[1])
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def scale_sigma(factor, sigma):
     """Multiply sigma (J, C) by the root of the factors (J, C), in place."""
     for j in range(len(sigma)):
@@ -85,8 +85,8 @@ def scale_sigma(factor, sigma):
             sigma[j, c] *= math.sqrt(factor[j, c])
 
 
-@numba.njit(**_JIT)
-def learn_noise(seen, belief, body, factor, sums, last, model):
+@numba.njit(**LEAN)
+def learn_noise(seen, belief, body, factor, sums, last, model, w):
     """Learn the factors (J, C) from one update, in place.
 
     Args:
@@ -97,16 +97,16 @@ def learn_noise(seen, belief, body, factor, sums, last, model):
         sums: (J, C, 5) see `N_SUMS`.
         last: (J, C, 2) last residuals in reported standard deviations, fading; 0: none.
         model: constants.
+        w: scratch, `tree.work.Work`.
     """
     if model.least == model.most:
         return
     mean, cov, predicted = body
-    view, spread = np.empty((factor.shape[1], 8)), np.empty((3, 4))
-    grows = np.full(len(factor), -1.0)
+    view, spread, grows = w.looks, w.spread, w.grows
     turn = sums[0, 0, 4]
     sums[0, 0, 4] = (turn + 1.0) % _TURNS
     for j in range(len(mean)):
-        n_views = 0
+        n_views, grows[j] = 0, -1.0
         if j % _TURNS == turn:
             n_views = _look(seen, belief, mean[j], j, view, spread)
         if n_views < 2:
@@ -121,7 +121,7 @@ def learn_noise(seen, belief, body, factor, sums, last, model):
     _set_factors(factor, sums, grows, model)
 
 
-@numba.njit(fastmath=_REORDER, **_JIT)
+@numba.njit(fastmath=_REORDER, **LEAN)
 def _look(seen, belief, body, j, view, spread):
     """Triangulate joint j linearly about `body`, from the cameras that are believed; how many.
 
@@ -173,7 +173,7 @@ def _look(seen, belief, body, j, view, spread):
     return n_views
 
 
-@numba.njit(fastmath=_REORDER, **_JIT)
+@numba.njit(fastmath=_REORDER, **LEAN)
 def _compare(view, spread, factor, sums, last, model):
     """Add one joint's residuals about its triangulated point to its sums (C, 5), which fade.
 
@@ -205,7 +205,7 @@ def _compare(view, spread, factor, sums, last, model):
         last[c, 0], last[c, 1] = du, dv
 
 
-@numba.njit(fastmath=_REORDER, **_JIT)
+@numba.njit(fastmath=_REORDER, **LEAN)
 def _remembered(cov, predicted, work):
     """tr(cov predicted^-1) / 3: how much of a position is the prediction's; `work` (3, 3+)."""
     inverse3(predicted, work)
@@ -214,7 +214,7 @@ def _remembered(cov, predicted, work):
     return (own + 2.0 * cross) / 3.0
 
 
-@numba.njit(fastmath=_REORDER, **_JIT)
+@numba.njit(fastmath=_REORDER, **LEAN)
 def _set_factors(factor, sums, grows, model):
     """The factors (J, C) that the sums ask for.
 

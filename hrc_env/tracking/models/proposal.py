@@ -10,19 +10,19 @@ import math
 
 import numba
 
+from hrc_env.compiled import LEAN
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, inverse3, pixel_of
 
-_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 _REORDER = {"reassoc", "contract", "arcp", "nsz"}  # NaN and infinity keep their meaning
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def contrast_of(outlier_weight, image_area_px):
     """Odds of a perfect inlier against an outlier, times the variance of its pixel [px^2]."""
     return (1.0 - outlier_weight) * image_area_px / (2.0 * math.pi * outlier_weight)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def find_mode(seen, mean, cov, precision, contrast, n_steps, mode, spread, belief, work):
     """Robust Gauss-Newton from the prior (mean, cov, precision) to the posterior's mode.
 
@@ -51,7 +51,7 @@ def find_mode(seen, mean, cov, precision, contrast, n_steps, mode, spread, belie
                 mode[i] += spread[i, k] * gradient[k]
 
 
-@numba.njit(fastmath=_REORDER, **_JIT)
+@numba.njit(fastmath=_REORDER, **LEAN)
 def add_cameras(P, z, sigma, ok, point, cov, widen, contrast, information, gradient, belief):
     """Information (3, 3) and gradient (3,) of the robust likelihood at a point, added up.
 

@@ -10,6 +10,7 @@ import math
 import numba
 import numpy as np
 
+from hrc_env.compiled import JIT, LEAN
 from hrc_env.tracking.models.acquisition import (
     complete_body,
     distance,
@@ -23,10 +24,9 @@ from hrc_env.tracking.tree.gaussian import halves_of
 _FOUND_SPEED_STD_M_S = 1.0
 _FURTHEST_STD = 4.0
 """A body further than this many prior deviations from the prior has been lost."""
-_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def grow_older(state, b, w, dt, s):
     """Count ages up by dt [s]; give up a track that nothing supports, let a lost one relax."""
     body, ages = state.body[b, w], (state.age_s[b, w], state.conflict[b, w])
@@ -34,7 +34,7 @@ def grow_older(state, b, w, dt, s):
     state.tracked[b, w] = age_worker(*gaussian, *ages, state.tracked[b, w], dt, s)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**JIT)
 def acquire(state, b, w, P, z, sigma, ok, standing, s):
     """Start a track when two views agree on enough joints; whether one was started."""
     n_joints = len(ok)
@@ -53,7 +53,7 @@ def acquire(state, b, w, P, z, sigma, ok, standing, s):
     return True
 
 
-@numba.njit(**_JIT)
+@numba.njit(**JIT)
 def place(body, cov, point, spread):
     """Put a joint at rest at a point."""
     body[:3], body[3:] = point, 0.0
@@ -63,7 +63,7 @@ def place(body, cov, point, spread):
         cov[3 + i, 3 + i] = _FOUND_SPEED_STD_M_S**2
 
 
-@numba.njit(**_JIT)
+@numba.njit(**JIT)
 def find_joints_again(state, b, w, P, z, sigma, ok, s, placed):
     """Joints that have been elsewhere for a while, as two views say, are put there.
 
@@ -81,7 +81,7 @@ def find_joints_again(state, b, w, P, z, sigma, ok, s, placed):
             state.age_s[b, w, j], state.conflict[b, w, j], placed[j] = 0.0, 0, True
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def acquire_anew(state, b, w, P, z, sigma, ok, standing, s):
     """Start over when the views have long agreed on another body; whether that happened.
 
@@ -97,14 +97,13 @@ def acquire_anew(state, b, w, P, z, sigma, ok, standing, s):
     return True
 
 
-@numba.njit(**_JIT)
-def check(state, b, w, s):
+@numba.njit(**LEAN)
+def check(state, b, w, s, factor):
     """Keep covariances positive definite; a body that has left the world is lost.
 
-    Returns whether all was well.
+    Returns whether all was well. `factor` (6, 6) is scratch.
     """
     body, cov, inside, well = state.body[b, w], state.cov[b, w], True, True
-    factor = np.empty((6, 6))
     for j in range(len(body)):
         given, rest = halves_of(cov[j], factor)
         if not (given[6] and rest[6]):
@@ -121,11 +120,18 @@ def check(state, b, w, s):
         inside &= away < _FURTHEST_STD * s.prior_std_m and math.isfinite(variances + numbers)
     if inside:
         return well
+    _lose(state, b, w, s)
+    return False
+
+
+@numba.njit(**LEAN)
+def _lose(state, b, w, s):
+    """Put a worker who has left the world back to the prior."""
+    body, cov = state.body[b, w], state.cov[b, w]
     state.tracked[b, w] = False
     for j in range(len(body)):
-        body[j, 3:] = 0.0
-        cov[j] = np.eye(6) * s.prior_std_m**2
         state.age_s[b, w, j] = s.max_age_s
-        for i in range(3):
-            body[j, i] = s.prior_mean_world[i]
-    return False
+        for i in range(6):
+            body[j, i] = s.prior_mean_world[i] if i < 3 else 0.0
+            for k in range(6):
+                cov[j, i, k] = s.prior_std_m**2 if i == k else 0.0

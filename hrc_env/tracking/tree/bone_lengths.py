@@ -9,13 +9,13 @@ import math
 import numba
 import numpy as np
 
+from hrc_env.compiled import LEAN
 from hrc_env.skeleton import BONE_LENGTH_M
 from hrc_env.tracking.models.bones import POPULATION_SHARE, STIFFNESS_M, learn_length
 from hrc_env.tracking.tree.gaussian import EDGE_BONE, PARENT, ROOT
 from hrc_env.typing import Floats
 
 _STIFFNESS = tuple(0.0 if j == ROOT else float(STIFFNESS_M[k]) for j, k in enumerate(EDGE_BONE))
-_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
 def population_edges() -> tuple[Floats, Floats]:
@@ -24,14 +24,14 @@ def population_edges() -> tuple[Floats, Floats]:
     return length, (POPULATION_SHARE * length) ** 2
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def stiff_lengths(variance, out):
     """Variances (J,) of the lengths as measurements: what is not known of them, and the give."""
     for j in range(len(variance)):
         out[j] = variance[j] + _STIFFNESS[j] ** 2
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def learn_lengths(body, cov, slope, n_views, length, variance):
     """Learn lengths (J,) and variances (J,), in place, from the joints that two views see."""
     for j in range(len(body)):

@@ -15,15 +15,15 @@ import math
 import numba
 import numpy as np
 
+from hrc_env.compiled import JIT, LEAN
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
 from hrc_env.skeleton import JOINT
 from hrc_env.tracking.tree.gaussian import ORDER, PARENT, multiply, multiply_transposed
 
 _NOSE, _RIGHT_SHOULDER = JOINT["nose"], JOINT["right_shoulder"]
-_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def log_evidence(prior, posterior, seen, bones, contrast, w):
     """Log of the evidence of one update, up to what all hypotheses share.
 
@@ -48,7 +48,7 @@ def log_evidence(prior, posterior, seen, bones, contrast, w):
     return likelihood - 0.5 * square + 0.5 * (log_det_after - log_det)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def log_likelihood(body, seen, contrast):
     """Log-likelihood of all pixels at positions (J, 6), relative to all being outliers."""
     P, z, sigma, ok = seen
@@ -65,7 +65,7 @@ def log_likelihood(body, seen, contrast):
     return total
 
 
-@numba.njit(**_JIT)
+@numba.njit(**JIT)
 def tree_measure(cov, slope, change, w):
     """Squared Mahalanobis length of `change` (J, 6) under a tree, and log det of the tree.
 
@@ -92,7 +92,7 @@ def tree_measure(cov, slope, change, w):
     return square, log_det
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def _measure(a, x, factor):
     """x' a^-1 x and log det a for a symmetric 6x6 matrix; x (6,) is used up."""
     square, product = 0.0, 1.0
@@ -115,7 +115,7 @@ def _measure(a, x, factor):
     return square, math.log(product)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def _measure_diagonal(a, x):
     square, log_det = 0.0, 0.0
     for i in range(6):
@@ -125,7 +125,7 @@ def _measure_diagonal(a, x):
     return square, log_det
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def _bones(body, bones):
     """Log-likelihood of the bones' lengths, those of the tree's edges and the nose's second."""
     length, variance = bones
@@ -136,13 +136,13 @@ def _bones(body, bones):
     return total
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def _bone(body, j, q, length, variance):
     x, y, z = body[j, 0] - body[q, 0], body[j, 1] - body[q, 1], body[j, 2] - body[q, 2]
     return -0.5 * (math.sqrt(x * x + y * y + z * z) - length) ** 2 / variance
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def distance_between(one, other, w):
     """Squared Mahalanobis distance of two bodies (body, cov, slope) under the wider of them."""
     least = np.inf

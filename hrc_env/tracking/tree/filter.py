@@ -7,6 +7,7 @@ z (J, C, 2), sigma (J, C), ok (J, C) as `measurements.read_worker` fills them.
 import numba
 import numpy as np
 
+from hrc_env.compiled import JIT, LEAN
 from hrc_env.tracking.measurements import read_worker
 from hrc_env.tracking.models.acquisition import count_conflict
 from hrc_env.tracking.models.noise import learn_noise, scale_sigma
@@ -26,13 +27,11 @@ from hrc_env.tracking.tree.search import find_pose
 from hrc_env.tracking.tree.update import correct_mean, update_tree
 from hrc_env.tracking.tree.work import make_work
 
-_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 
-
-@numba.njit(**_JIT)
+@numba.njit(**JIT)
 def predict_all(state, model, dt, s):
     """Let dt [s] pass: bodies move and ages grow; `model` as in `tree.predict.predict_tree`."""
-    work = make_work()
+    work = make_work(0)
     for b in range(state.tracked.shape[0]):
         for w in range(state.tracked.shape[1]):
             if state.tracked[b, w]:
@@ -42,7 +41,7 @@ def predict_all(state, model, dt, s):
             grow_older(state, b, w, dt, s)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**JIT)
 def update_all(state, P, px, confidence, sigma_px, standing, s, noise):
     """Take one set of frames in.
 
@@ -57,7 +56,7 @@ def update_all(state, P, px, confidence, sigma_px, standing, s, noise):
     n_batch, n_cameras, n_workers, n_joints = confidence.shape
     z, sigma = np.empty((n_joints, n_cameras, 2)), np.empty((n_joints, n_cameras))
     ok, belief = np.empty((n_joints, n_cameras), np.bool_), np.empty((n_joints, n_cameras))
-    scratch = (belief, np.empty(n_joints), make_work())
+    scratch = (belief, np.empty(n_joints), make_work(n_cameras))
     placed, predicted = np.empty(n_joints, np.bool_), np.empty((n_joints, 3, 3))
     for b in range(n_batch):
         for w in range(n_workers):
@@ -70,22 +69,31 @@ def update_all(state, P, px, confidence, sigma_px, standing, s, noise):
             swaps = (state.swap_chance[b, w], state.blind[b, w], state.believed[b, w])
             undo_swaps(P, state.body[b, w], state.cov[b, w], z, sigma, ok, *swaps, s)
             seen = (P, z, sigma, ok)
-            predicted[:] = state.cov[b, w, :, :3, :3]
+            keep_positions(state.cov[b, w], predicted)
             follow(state, b, w, seen, s, scratch)
             known = (state.noise_factor[b, w], state.noise_sums[b, w], state.noise_last[b, w])
             body = (state.body[b, w], state.cov[b, w], predicted)
-            learn_noise(seen, belief, body, *known, noise)
-            look_after(state, b, w, seen, standing, s, placed)
+            learn_noise(seen, belief, body, *known, noise, scratch[2])
+            look_after(state, b, w, seen, standing, s, placed, scratch[2].a)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
+def keep_positions(cov, out):
+    """Copy the covariances of the positions (J, 3, 3) out of those of the joints (J, 6, 6)."""
+    for j in range(len(cov)):
+        for i in range(3):
+            for k in range(3):
+                out[j, i, k] = cov[j, i, k]
+
+
+@numba.njit(**LEAN)
 def follow(state, b, w, seen, s, scratch):
     """Update a tracked worker: search, condition, correct the mean, learn the bones."""
     condition(state, b, w, seen, s, scratch)
     settle(state, b, w, seen, s, scratch)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def condition(state, b, w, seen, s, scratch):
     """Search the mode and condition the tree there; belief (J, C) says what was believed.
 
@@ -100,24 +108,23 @@ def condition(state, b, w, seen, s, scratch):
     update_tree(body, cov, slope, work)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def settle(state, b, w, seen, s, scratch):
     """Go from the mode to the mean, and learn what is to be learnt from it."""
     belief, _, work = scratch
     if s.mean_correction > 0.0:
         gaussian = (state.body[b, w], state.cov[b, w], state.slope[b, w])
         correct_mean(*gaussian, seen, belief, s.mean_correction, work)
-    keep_books(state, b, w, seen, belief)
+    keep_books(state, b, w, seen, belief, work.n_views)
 
 
-@numba.njit(**_JIT)
-def keep_books(state, b, w, seen, belief):
+@numba.njit(**LEAN)
+def keep_books(state, b, w, seen, belief, n_views):
     """Ages, conflicts and bone lengths of a worker who has been updated.
 
-    `belief` (J, C) is how far each measurement was believed.
+    `belief` (J, C) is how far each measurement was believed; `n_views` (J,) is scratch.
     """
     ok = seen[3]
-    n_views = np.empty(len(ok), np.int64)
     for j in range(len(ok)):
         n_views[j], n_supporting = 0, 0
         for c in range(ok.shape[1]):
@@ -131,11 +138,12 @@ def keep_books(state, b, w, seen, belief):
     learn_lengths(state.body[b, w], state.cov[b, w], state.slope[b, w], n_views, *bones)
 
 
-@numba.njit(**_JIT)
-def look_after(state, b, w, seen, standing, s, placed):
+@numba.njit(**LEAN)
+def look_after(state, b, w, seen, standing, s, placed, factor):
     """Find joints or the whole body again where the views say so; notice a body that is lost.
 
-    `placed` (J,) is scratch. What is known of a joint that was put somewhere is its own.
+    `placed` (J,) and `factor` (6, 6) are scratch. What is known of a joint that was put
+    somewhere is its own.
     """
     P, z, sigma, ok = seen
     placed[:] = acquire_anew(state, b, w, P, z, sigma, ok, standing, s)
@@ -143,5 +151,5 @@ def look_after(state, b, w, seen, standing, s, placed):
     for j in range(len(placed)):
         if placed[j] or (PARENT[j] >= 0 and placed[PARENT[j]]):
             state.slope[b, w, j] = 0.0
-    if not check(state, b, w, s):
+    if not check(state, b, w, s, factor):
         state.slope[b, w] = 0.0

@@ -11,6 +11,7 @@ Everything that these say is exact; a joint depends on all others through its pa
 
 import numba
 
+from hrc_env.compiled import LEAN
 from hrc_env.skeleton import BONES, N_JOINTS
 
 PARENT = (1, -1, 1, 1, 2, 3, 4, 1, 2, 7, 8, 9, 10, 11, 12)
@@ -25,11 +26,10 @@ EDGE_BONE = tuple(
 )
 """Row of `skeleton.BONES` that joins a joint to its parent; -1 for the root."""
 _LEAST_PIVOT = 1e-13
-_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 _REORDER = {"reassoc", "contract", "nsz"}  # lets sums vectorise; NaN and infinity keep meaning
 
 
-@numba.njit(fastmath=_REORDER, **_JIT)
+@numba.njit(fastmath=_REORDER, **LEAN)
 def multiply(a, b, out):
     """out = a b for 6x6 matrices."""
     for i in range(6):
@@ -39,7 +39,7 @@ def multiply(a, b, out):
             out[i, k] = near + a3 * b[3, k] + a4 * b[4, k] + a5 * b[5, k]
 
 
-@numba.njit(fastmath=_REORDER, **_JIT)
+@numba.njit(fastmath=_REORDER, **LEAN)
 def multiply_transposed(a, b, out):
     """out = a b' for 6x6 matrices."""
     for k in range(6):
@@ -49,7 +49,7 @@ def multiply_transposed(a, b, out):
             out[i, k] = near + a[i, 3] * b3 + a[i, 4] * b4 + a[i, 5] * b5
 
 
-@numba.njit(fastmath=_REORDER, forceinline=True, **_JIT)
+@numba.njit(fastmath=_REORDER, forceinline=True, **LEAN)
 def inverse_of(a00, a10, a11, a20, a21, a22):
     """Inverse of a symmetric 3x3 matrix by its L D L' factors; whether it is positive definite.
 
@@ -72,7 +72,7 @@ def inverse_of(a00, a10, a11, a20, a21, a22):
     return i00, i10, i11, i20, i21, i22, proper
 
 
-@numba.njit(fastmath=_REORDER, **_JIT)
+@numba.njit(fastmath=_REORDER, **LEAN)
 def halves_of(a, work):
     """Two inverses, as `inverse_of` gives them, of blocks of a symmetric 6x6 matrix.
 

@@ -8,8 +8,8 @@ one number for each joint and one that is nobody's.
 import math
 
 import numba
-import numpy as np
 
+from hrc_env.compiled import LEAN
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M
 from hrc_env.skeleton import N_JOINTS
 
@@ -25,25 +25,25 @@ N_VIEW_ROWS = 12
 residual of u, of v [px]."""
 N_SUM_ROWS = 9
 """Information 00, 11, 22, 01, 02, 12 [1/m^2], then gradient [1/m]."""
-_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 _REORDER = {"reassoc", "contract", "nsz"}  # NaN and infinity keep their meaning
 
 
-@numba.njit(**_JIT)
-def views_of(seen):
-    """(C, 3 rows) of pixels and their precisions; 0 stands for a measurement that is missing."""
+@numba.njit(**LEAN)
+def set_views(seen, views):
+    """Put pixels and precisions into views (C, 3 rows); 0 stands for what was not measured."""
     _, z, sigma, ok = seen
-    views = np.zeros((ok.shape[1], 3 * LANES))
+    for c in range(len(views)):
+        for n in range(3 * LANES):
+            views[c, n] = 0.0
     for j in range(len(ok)):
         lane = LANE_OF_JOINT[j]
         for c in range(ok.shape[1]):
             if ok[j, c]:
                 views[c, lane], views[c, LANES + lane] = z[j, c, 0], z[j, c, 1]
                 views[c, 2 * LANES + lane] = 1.0 / (sigma[j, c] * sigma[j, c])
-    return views
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def set_joints(body, cov, joints):
     """Put positions (J, 3+) and their covariances (J, 3+, 3+) into the rows of the joints."""
     for j in range(len(body)):
@@ -55,13 +55,13 @@ def set_joints(body, cov, joints):
         joints[8 * LANES + lane] = cov[j, 1, 2]
 
 
-@numba.njit(fastmath=_REORDER, **_JIT)
+@numba.njit(fastmath=_REORDER, **LEAN)
 def add_view(p, joints, view, widen, contrast, seen, sums):
     """Add one camera's information and gradient, of all joints, to the rows of `sums`.
 
     Args:
         p: (3, 4).
-        joints, view: rows, as `set_joints` and `views_of` give them.
+        joints, view: rows, as `set_joints` and `set_views` give them.
         widen, contrast: as in `proposal.add_cameras`.
         seen: rows filled, beliefs first.
         sums: rows added to.
@@ -86,7 +86,7 @@ def add_view(p, joints, view, widen, contrast, seen, sums):
         sums[8 * LANES + j] += a2 * du + b2 * dv
 
 
-@numba.njit(fastmath=_REORDER, **_JIT)
+@numba.njit(fastmath=_REORDER, **LEAN)
 def _image(p, joints, view, widen, contrast, seen):
     """Where the camera sees the joints, and how odd that the pixels lie where they do."""
     p00, p01, p02, p03 = p[0, 0], p[0, 1], p[0, 2], p[0, 3]

@@ -8,6 +8,7 @@ import math
 
 import numba
 
+from hrc_env.compiled import LEAN
 from hrc_env.tracking.tree.gaussian import inverse_of
 from hrc_env.tracking.tree.quads import (
     ABOVE,
@@ -38,11 +39,10 @@ SHIFT, POINT = _PRECISION + 300, _PRECISION + 312
 """From the predicted mean to the point of linearisation [m]; that point (3 each)."""
 ABOVE_SHIFT, _ABOVE_POINT = _PRECISION + 324, _PRECISION + 336
 MEAN, LENGTH, VARIANCE = _PRECISION + 348, _PRECISION + 360, _PRECISION + 364
-_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 _REORDER = {"reassoc", "contract", "nsz"}
 
 
-@numba.njit(fastmath=_REORDER, **_JIT)
+@numba.njit(fastmath=_REORDER, **LEAN)
 def position_prior(rows, at):
     """Precisions of a quad's positions given their parents'; needs the covariances with these."""
     at = offset(at)
@@ -83,7 +83,7 @@ def position_prior(rows, at):
         rows[n + 20] = f02 * p02 + f12 * p12 + f22 * p22
 
 
-@numba.njit(fastmath=_REORDER, **_JIT)
+@numba.njit(fastmath=_REORDER, **LEAN)
 def linearise_bones(rows, at):
     """What the bones from a quad's joints to their parents say, at the points."""
     at = offset(at)
@@ -107,7 +107,7 @@ def linearise_bones(rows, at):
         rows[n + 24], rows[n + 28], rows[n + 32] = px * miss, py * miss, pz * miss
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def solve_positions(rows):
     """Shifts = the minimum of the quadratic that prior, cameras and bones make."""
     for quad in range(QUADS):
@@ -122,7 +122,7 @@ def solve_positions(rows):
         _shift(rows, DESCENT[n] * QUAD)
 
 
-@numba.njit(fastmath=_REORDER, **_JIT)
+@numba.njit(fastmath=_REORDER, **LEAN)
 def _eliminate(rows, at):
     """Slopes and inverse Hessians of a quad's shifts, and what these tell the parents'."""
     at = offset(at)
@@ -169,7 +169,7 @@ def _eliminate(rows, at):
         rows[n + 32] = f02 * g0 + f12 * g1 + f22 * g2 - e2
 
 
-@numba.njit(fastmath=_REORDER, **_JIT)
+@numba.njit(fastmath=_REORDER, **LEAN)
 def _shift(rows, at):
     """A quad's shifts, given their parents'; and the points to which they lead."""
     at = offset(at)
@@ -196,19 +196,19 @@ def _shift(rows, at):
         )
 
 
-@numba.njit(forceinline=True, **_JIT)
+@numba.njit(forceinline=True, **LEAN)
 def _lower(rows, m):
     """Six numbers of the upper left 3x3 block of a symmetric 6x6 matrix."""
     near = (rows[m], rows[m + 24], rows[m + 28])
     return (*near, rows[m + 48], rows[m + 52], rows[m + 56])
 
 
-@numba.njit(forceinline=True, **_JIT)
+@numba.njit(forceinline=True, **LEAN)
 def _six(rows, m):
     return rows[m], rows[m + 4], rows[m + 8], rows[m + 12], rows[m + 16], rows[m + 20]
 
 
-@numba.njit(forceinline=True, **_JIT)
+@numba.njit(forceinline=True, **LEAN)
 def _put(rows, m, half):
     rows[m], rows[m + 4], rows[m + 8] = half[0], half[1], half[2]
     rows[m + 12], rows[m + 16], rows[m + 20] = half[3], half[4], half[5]

@@ -9,8 +9,8 @@ divergence).
 """
 
 import numba
-import numpy as np
 
+from hrc_env.compiled import LEAN
 from hrc_env.tracking.models.acquisition import heading
 from hrc_env.tracking.models.motion import learn_offsets
 from hrc_env.tracking.tree.gaussian import multiply, multiply_transposed
@@ -47,11 +47,10 @@ _MOVED, _MOVED_EDGE = HESSIAN, KNOWN
 """Covariances of a joint and with its parent, a moment later."""
 _HERE, _THERE = POSITIONS, POSITIONS + 32
 """F and travel of a joint, of its parent: four rows each."""
-_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 _REORDER = {"reassoc", "contract", "nsz"}
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def predict_tree(body, cov, slope, offset, offset_count, model, dt, w):
     """Move one worker by dt [s], in place.
 
@@ -91,14 +90,19 @@ def predict_tree(body, cov, slope, offset, offset_count, model, dt, w):
     store_tree(rows, _MOVED, cov, slope)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
+def _torso_of(body, i):
+    """Mean of the torso's four joints, component i."""
+    return 0.25 * (body[_LEFT, i] + body[_RIGHT, i] + body[_LEFT_HIP, i] + body[_RIGHT_HIP, i])
+
+
+@numba.njit(**LEAN)
 def _move_means(body, cov, offset, offset_count, F, travel, dt):
-    root = np.zeros(6)
-    for i in range(6):
-        root[i] = 0.25 * (
-            body[_LEFT, i] + body[_RIGHT, i] + body[_LEFT_HIP, i] + body[_RIGHT_HIP, i]
-        )
-    cos, sin, known = heading(body, np.ones(len(body), np.bool_))
+    root = (
+        _torso_of(body, 0), _torso_of(body, 1), _torso_of(body, 2),
+        _torso_of(body, 3), _torso_of(body, 4), _torso_of(body, 5),
+    )  # fmt: skip
+    cos, sin, known = heading(body)
     if known:
         learn_offsets(body, cov, root, cos, sin, dt, offset, offset_count)
     for j in range(len(body)):
@@ -113,7 +117,7 @@ def _move_means(body, cov, offset, offset_count, F, travel, dt):
             body[j, 3 + i] = v_new + travel[j, 1, 0] * place[i]
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def _relate_torso(cov, slope, w):
     """Cov(x_j, r) of the torso's four joints into their rows, and Cov(r, r)."""
     X, rows = w.d, w.rows
@@ -143,12 +147,12 @@ def _relate_torso(cov, slope, w):
                 rows[_TORSO + 24 * i + 4 * k + lane] = mean
 
 
-@numba.njit(forceinline=True, **_JIT)
+@numba.njit(forceinline=True, **LEAN)
 def _place(j):
     return LANE_OF_JOINT[j] // 4 * QUAD + LANE_OF_JOINT[j] % 4
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def _load_model(F, travel, rows):
     """F and travel of every joint and its parent in lanes."""
     for lane in range(LANES):
@@ -162,7 +166,7 @@ def _load_model(F, travel, rows):
         fetch_above(rows, quad, _HERE, _THERE, 8)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def _move(rows, edge, own, other, here, there, out):
     """f edge g' + f own e' + d other' g' + d S e' for a quad, axes of space left alone.
 
@@ -175,7 +179,7 @@ def _move(rows, edge, own, other, here, there, out):
             moved(rows, edge + n, own + n, other + t, _TORSO + n, here, there, out + n)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def _add_noise(Q, shared, rows):
     """Noise (2, 2) x I3: a joint's Q, and what it shares with its parent."""
     for j in range(len(Q)):
@@ -188,7 +192,7 @@ def _add_noise(Q, shared, rows):
                     rows[m + 72 * a + 12 * b + _MOVED_EDGE] += shared[a, b]
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def _invert(rows, at):
     """Inverse marginals of a quad; 0 where there is none."""
     invert_rows(rows, at)

@@ -9,6 +9,7 @@ import math
 
 import numba
 
+from hrc_env.compiled import LEAN
 from hrc_env.skeleton import JOINT
 from hrc_env.tracking.tree.gaussian import PARENT
 from hrc_env.tracking.tree.lanes import (
@@ -17,7 +18,7 @@ from hrc_env.tracking.tree.lanes import (
     LANES,
     add_view,
     set_joints,
-    views_of,
+    set_views,
 )
 from hrc_env.tracking.tree.positions import (
     ABOVE_SHIFT,
@@ -44,11 +45,10 @@ from hrc_env.tracking.tree.quads import (
 )
 
 _NOSE, _RIGHT_SHOULDER = JOINT["nose"], JOINT["right_shoulder"]
-_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
 _REORDER = {"reassoc", "contract", "nsz"}
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def find_pose(body, cov, slope, seen, bones, contrast, n_steps, belief, w):
     """Search the most probable positions and leave everything linearised there.
 
@@ -69,7 +69,7 @@ def find_pose(body, cov, slope, seen, bones, contrast, n_steps, belief, w):
     find_pose_near(body, cov, slope, seen, bones, contrast, n_steps, 1.0, belief, w)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def find_pose_near(body, cov, slope, seen, bones, contrast, n_steps, widen, belief, w):
     """As `find_pose`, but the search begins at w.point (J, 3) instead of the predicted means.
 
@@ -81,10 +81,10 @@ def find_pose_near(body, cov, slope, seen, bones, contrast, n_steps, widen, beli
         position_prior(rows, quad * QUAD)
     _load_positions(body, bones, w.point, rows)
     set_joints(body, cov, w.joints)
-    views = views_of(seen)
+    set_views(seen, w.views)
     for step in range(n_steps + 1):
         widening = widen if step < n_steps - 1 else 0.0
-        _linearise_cameras(views, seen[0], contrast, widening, belief, w)
+        _linearise_cameras(w.views, seen[0], contrast, widening, belief, w)
         for quad in range(QUADS):
             fetch_above(rows, quad, SHIFT, ABOVE_SHIFT, 6)
             linearise_bones(rows, quad * QUAD)
@@ -95,7 +95,7 @@ def find_pose_near(body, cov, slope, seen, bones, contrast, n_steps, widen, beli
     _keep(rows, w)
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def _load_positions(body, bones, point, rows):
     """Means, shifts and bones in lanes; what has no parent has a bone that says nothing."""
     length, variance = bones
@@ -113,12 +113,12 @@ def _load_positions(body, bones, point, rows):
         rows[at + VARIANCE] = variance[j] if bone else math.inf
 
 
-@numba.njit(forceinline=True, **_JIT)
+@numba.njit(forceinline=True, **LEAN)
 def _place(lane):
     return lane // 4 * QUAD + lane % 4
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def _linearise_cameras(views, P, contrast, widening, belief, w):
     """Information and gradient of what the cameras say, at the points."""
     rows, joints, sums = w.rows, w.joints, w.sums
@@ -136,7 +136,7 @@ def _linearise_cameras(views, P, contrast, widening, belief, w):
         _take_cameras(sums, 4 * quad, rows, quad * QUAD)
 
 
-@numba.njit(fastmath=_REORDER, **_JIT)
+@numba.njit(fastmath=_REORDER, **LEAN)
 def _take_cameras(sums, first, rows, at):
     """A quad's cameras out of the lanes, their gradient moved back to the predicted means."""
     first, at = offset(first), offset(at)
@@ -153,7 +153,7 @@ def _take_cameras(sums, first, rows, at):
         rows[k + 32] = sums[n + 8 * LANES] + i02 * x + i12 * y + i22 * z
 
 
-@numba.njit(fastmath=_REORDER, **_JIT)
+@numba.njit(fastmath=_REORDER, **LEAN)
 def _add_second_bone(rows, bones):
     """The bone from the nose to the right shoulder.
 
@@ -187,7 +187,7 @@ def _add_second_bone(rows, bones):
         n += 4
 
 
-@numba.njit(**_JIT)
+@numba.njit(**LEAN)
 def _keep(rows, w):
     """Points, and what cameras and bones say there, by joint."""
     for j in range(len(w.point)):

@@ -5,12 +5,11 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
+from hrc_env.compiled import JIT
 from hrc_env.skeleton import N_JOINTS
 from hrc_env.tracking.tree.lanes import LANES, N_JOINT_ROWS, N_SUM_ROWS, N_VIEW_ROWS
 from hrc_env.tracking.tree.quads import QUAD, QUADS
-from hrc_env.typing import Floats
-
-_JIT = {"cache": True, "nogil": True, "error_model": "numpy"}
+from hrc_env.typing import Floats, Ints
 
 
 class Work(NamedTuple):
@@ -43,11 +42,21 @@ class Work(NamedTuple):
     """One camera's rows of `lanes`."""
     sums: Floats
     """All cameras' rows of `lanes`."""
+    views: Floats
+    """(C, 3 rows) measurements in rows of `lanes`."""
+    looks: Floats
+    """(C, 8) what each camera says of one joint, for `models.noise`."""
+    spread: Floats
+    """(3, 4) where the cameras together see that joint, for the same."""
+    grows: Floats
+    """(J,) how errors that persist add up, for the same."""
+    n_views: Ints
+    """(J,) cameras that measured a joint."""
 
 
-@numba.njit(**_JIT)
-def make_work():
-    """Scratch with room for one body, made inside a kernel."""
+@numba.njit(**JIT)
+def make_work(n_cameras):
+    """Scratch with room for one body and its measurements, made inside a kernel."""
     return Work(
         a=np.empty((6, 6)),
         b=np.empty((6, 6)),
@@ -64,4 +73,9 @@ def make_work():
         joints=np.ones(N_JOINT_ROWS * LANES),
         seen=np.zeros(N_VIEW_ROWS * LANES),
         sums=np.zeros(N_SUM_ROWS * LANES),
+        views=np.empty((n_cameras, 3 * LANES)),
+        looks=np.empty((n_cameras, 8)),
+        spread=np.empty((3, 4)),
+        grows=np.empty(N_JOINTS),
+        n_views=np.empty(N_JOINTS, np.int64),
     )

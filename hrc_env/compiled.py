@@ -1,0 +1,15 @@
+"""How kernels are compiled: by numba, kept on disk, without Python's lock.
+
+`@numba.njit(**JIT)` is for kernels that make arrays or give them back, `@numba.njit(**LEAN)` for
+all others. In the latter arrays are not counted by reference: numba pays two locked instructions
+for every row that a kernel takes of an array, a fifth of the tracker's time. The compiler refuses
+`LEAN` where an array is made; a `LEAN` kernel must not call a kernel that gives one back, whose
+memory nobody would free.
+"""
+
+from typing import Any
+
+JIT: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": True}
+"""Compiled when first called, for ever; dividing by zero gives infinity, as with NumPy."""
+LEAN: dict[str, Any] = {**JIT, "_nrt": False}
+"""The same for kernels that only read and write arrays of others."""
