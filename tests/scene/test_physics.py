@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hrc_env.body import load_body, rest_motion
-from hrc_env.errors import ConfigError
+from hrc_env.errors import ConfigError, HRCError
 from hrc_env.records import WorkerPath
 from hrc_env.scene.build import build
 from hrc_env.scene.physics import Physics, no_workers
