@@ -33,7 +33,7 @@ class HRCReachEnv(Stateful, gymnasium.Env[NDArray[np.float32], NDArray[np.float3
         estimator: "particle" (default), "kalman" (one Gaussian on the body's tree), "paper"
             (Algorithm 1), "per_joint", "triangulation" or "ransac".
         cameras: indices or names of the rig's cameras to use; None is all of them.
-        scene: name of the place.
+        scene: name of the place: "lab", a workshop, or "site", a construction site.
         n_workers: 0 or more workers.
         people: how the workers are with the robot: "attentive", "hurried", "unaware", a
             `PeopleConfig`, or None for those of the config (attentive).

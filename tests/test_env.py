@@ -149,6 +149,14 @@ def test_observations_stay_inside_their_space_and_are_fresh_copies():
     np.testing.assert_array_equal(seen[10], kept)
 
 
+@pytest.mark.parametrize("level", ["truth", "keypoints"])
+def test_the_site_is_a_scene_like_the_laboratory(level):
+    env = HRCReachEnv(scene="site", perception=level)
+    env.reset(seed=5)
+    errors_m = [env.step(np.zeros(6))[4]["tracking/mpjpe_m"] for _ in range(30)]
+    assert np.median(errors_m) < 0.08
+
+
 def test_nobody_there_and_tool_control():
     env = make(perception="keypoints", n_workers=0, control="tool")
     assert env.action_space.shape == (3,)

@@ -12,6 +12,7 @@ import numpy as np
 from hrc_env.geometry.rotations import quaternion_from_matrix
 from hrc_env.scene import furniture, textures
 from hrc_env.scene.grounds import ROBOT_XY_M
+from hrc_env.scene.markings import WHITE, blend, mark_cell
 from hrc_env.scene.primitives import (
     HIDES,
     LOOKS_ONLY,
@@ -28,8 +29,6 @@ from hrc_env.scene.textures import Paint
 LENGTH_M, DEPTH_M, HEIGHT_M = 6.09, 5.48, 2.59
 FLOOR_PX_PER_M = 220
 WALL_PX_PER_M = 180
-REACH_M = 1.35
-YELLOW, BLACK, WHITE = (222, 176, 20), (34, 34, 34), (226, 226, 220)
 
 COLOURS: dict[str, tuple[tuple[float, float, float], float, float]] = {
     "hazard_red": ((0.72, 0.10, 0.08), 0.4, 0.4),
@@ -54,26 +53,12 @@ def _floor() -> Paint:
     height, width = paint.shape[:2]
     x = (np.arange(width) + 0.5)[None] / FLOOR_PX_PER_M - LENGTH_M / 2
     y = DEPTH_M / 2 - (np.arange(height) + 0.5)[:, None] / FLOOR_PX_PER_M
-    dx, dy = x - ROBOT_XY_M[0], y - ROBOT_XY_M[1]
-    worn = np.random.default_rng(5).random(paint.shape[:2]) < 0.9
-    patchy = textures.noise(np.random.default_rng(6), (height, width), (40, 40)) > -1.7
-    worn &= patchy
-    square = np.maximum(np.abs(dx), np.abs(dy))
-    cell = (square > 0.52) & (square < 0.62)
-    stripes = ((dx + dy) % 0.2) < 0.1
-    _blend(paint, cell & stripes & worn, YELLOW)
-    _blend(paint, cell & ~stripes & worn, BLACK)
-    circle = np.abs(np.hypot(dx, dy) - REACH_M) < 0.025
-    _blend(paint, circle & worn & (np.arctan2(dy, dx) % 0.2 < 0.14), YELLOW)
+    worn = mark_cell(paint, x - ROBOT_XY_M[0], y - ROBOT_XY_M[1], FLOOR_PX_PER_M)
     walkway = np.abs(y) < 2.12
     lines = (np.abs(np.abs(y) - 2.08) < 0.03) & (np.abs(x) < 2.4)
     ends = (np.abs(np.abs(x) - 2.40) < 0.03) & walkway
-    _blend(paint, (lines | ends) & worn, WHITE)
+    blend(paint, (lines | ends) & worn, WHITE)
     return paint
-
-
-def _blend(paint: Paint, where: np.ndarray, colour: tuple[float, ...]) -> None:
-    paint[where] = 0.22 * paint[where] + 0.78 * np.asarray(colour)
 
 
 def _blocks() -> Paint:

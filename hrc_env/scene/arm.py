@@ -32,6 +32,7 @@ from hrc_env.scene.primitives import (
     WORKER_BIT,
     capsule,
 )
+from hrc_env.typing import Floats
 
 JOINTS = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
 LINKS = ("shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3")
@@ -109,6 +110,18 @@ def arm_chain(T_world_from_base: np.ndarray, tool_length_m: float = TOOL_LENGTH_
         capsule_link=np.array([link for _, link, *_ in CAPSULES]),
         capsule_ends=np.array([(start, end) for *_, start, end, _ in CAPSULES], float),
         capsule_radius_m=np.array([radius for *_, radius in CAPSULES]),
+    )
+
+
+def capsule_reach_m() -> Floats:
+    """(K,) no point of a capsule is ever farther from the arm's foot than this [m]."""
+    steps = np.hypot(DH_A_M, DH_D_M)
+    before = np.concatenate([[0.0], np.cumsum(steps)])[: len(JOINTS)]
+    return np.array(
+        [
+            before[link] + max(np.linalg.norm(start), np.linalg.norm(end)) + radius
+            for _, link, start, end, radius in CAPSULES
+        ]
     )
 
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -17,12 +17,21 @@ from hrc_env.geometry.rotations import about_axis
 from hrc_env.geometry.sight import Surroundings
 from hrc_env.records import Grounds
 from hrc_env.scene.arena import add_lab, paint_lab
-from hrc_env.scene.arm import DAMPING_NMS_RAD, HOME_Q, add_arm, arm_chain
+from hrc_env.scene.arm import (
+    CAPSULES,
+    DAMPING_NMS_RAD,
+    HOME_Q,
+    add_arm,
+    arm_chain,
+    capsule_reach_m,
+)
 from hrc_env.scene.grounds import ROBOT_XY_M, lab_grounds
 from hrc_env.scene.obstacles import obstacles
 from hrc_env.scene.primitives import DECORATION, OVERHEAD, ROBOT_BIT, ROBOT_LOOKS
 from hrc_env.scene.props import add_props, paint_props, prop_mocap
 from hrc_env.scene.rig import LAB_CAMERAS, CameraConfig, add_cameras, pinholes, select
+from hrc_env.scene.site import SITE_CAMERAS, add_site, paint_site
+from hrc_env.scene.site_grounds import site_grounds
 from hrc_env.scene.worker import add_worker, mocap_ids
 from hrc_env.typing import Floats, Ints, JointAngles
 
@@ -50,8 +59,9 @@ class SceneConfig:
     """Fastest change of a commanded joint velocity [rad/s^2]; keeps the overshoot below 5 %."""
     leash_rad: float = 0.05
     """How far the holding servo's angle may be ahead of a blocked joint [rad]."""
-    cameras: tuple[CameraConfig, ...] = LAB_CAMERAS
-    """All cameras that hang in the room; `build` says which are switched on."""
+    cameras: tuple[CameraConfig, ...] = ()
+    """All cameras that hang in the scene, of which `build` says which are switched on; none: the
+    scene's own four."""
 
     def __post_init__(self) -> None:
         for name in ("sim_dt", "slew_rad_s2", "leash_rad"):
@@ -69,9 +79,14 @@ class Room:
     """Paints its surfaces; only done when somebody looks."""
     grounds: Callable[[Floats, bool], Grounds]
     """Where people walk and work, from what stands there, with clutter or without."""
+    cameras: tuple[CameraConfig, ...]
+    """Those that hang there unless the settings say otherwise."""
 
 
-SCENES: dict[str, Room] = {"lab": Room(add_lab, paint_lab, lab_grounds)}
+SCENES: dict[str, Room] = {
+    "lab": Room(add_lab, paint_lab, lab_grounds, LAB_CAMERAS),
+    "site": Room(add_site, paint_site, site_grounds, SITE_CAMERAS),
+}
 """The scenes by name."""
 
 
@@ -133,9 +148,11 @@ def build(
     whole = isinstance(n_workers, int | np.integer) and not isinstance(n_workers, bool)
     if not whole or n_workers < 0:
         raise ConfigError(f"n_workers must be a whole number, 0 or more, got {n_workers!r}.")
-    chosen = select(config.cameras if config else LAB_CAMERAS, cameras)
-    use = tuple(camera.name for camera in chosen)
-    return _build(config or SceneConfig(), name, n_workers, body_name, use)
+    config = config or SceneConfig()
+    if not config.cameras:
+        config = replace(config, cameras=SCENES[name].cameras)
+    use = tuple(camera.name for camera in select(config.cameras, cameras))
+    return _build(config, name, n_workers, body_name, use)
 
 
 @lru_cache(maxsize=8)
@@ -207,28 +224,56 @@ def _spec(
 
 
 def _strip(spec: mujoco.MjSpec) -> None:
-    """Take away what only the eye needs: geoms, skins, meshes, pictures. Twice as fast."""
+    """Take away what only the eye needs: geoms, skins, meshes, pictures, and bodies of nothing
+    else. Twice as fast."""
     for geom in spec.geoms:
         if geom.group in (DECORATION, ROBOT_LOOKS, OVERHEAD):
             spec.delete(geom)
         else:
             geom.material = ""
+    for body in spec.worldbody.bodies:
+        if not (body.mocap or body.geoms or body.bodies):
+            spec.delete(body)
     for unseen in (*spec.skins, *spec.meshes, *spec.materials, *spec.textures):
         spec.delete(unseen)
 
 
 def _pair(spec: mujoco.MjSpec) -> None:
-    """Say pair by pair what may touch the arm: quicker than to look for it in every substep."""
+    """Say pair by pair what may touch the arm: quicker than to look for it in every substep.
+
+    What stands still out of a link's reach is no pair of it: the physics is the same.
+    """
     arm = [geom for geom in spec.geoms if geom.contype & ROBOT_BIT]
+    reach_m = {
+        f"arm_{name}": reach for (name, *_), reach in zip(CAPSULES, capsule_reach_m(), strict=True)
+    }
     others = [geom for geom in spec.geoms if geom.contype & ~ROBOT_BIT]
     for row, other in enumerate(others):
         other.name = other.name or f"solid_{row}"
     for part in arm:
         for other in others:
-            if part.conaffinity & other.contype:
+            meets = part.conaffinity & other.contype
+            if meets and _nearest_m(other) <= reach_m[part.name]:
                 spec.add_pair(geomname1=part.name, geomname2=other.name)
     for geom in (*arm, *others):
         geom.contype = geom.conaffinity = 0
+
+
+def _nearest_m(geom: Any) -> float:
+    """How near a geom can come to the arm's foot at least [m]; 0 for what moves."""
+    if geom.parent.name != "world":
+        return 0.0
+    turn = np.zeros(9)
+    mujoco.mju_quat2Mat(turn, geom.quat)
+    foot = np.abs(turn.reshape(3, 3).T @ (np.array(ROBOT_BASE_WORLD) - geom.pos))
+    half = geom.size.copy()
+    if geom.type == mujoco.mjtGeom.mjGEOM_PLANE:
+        half[2] = 0.0
+    elif geom.type == mujoco.mjtGeom.mjGEOM_CYLINDER:
+        half = half[[0, 0, 1]]
+    elif geom.type != mujoco.mjtGeom.mjGEOM_BOX:
+        return 0.0
+    return float(np.linalg.norm(np.maximum(foot - half, 0.0)))
 
 
 def _prefixes(n_workers: int) -> tuple[str, ...]:

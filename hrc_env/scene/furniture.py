@@ -5,6 +5,7 @@ of them, since every line of sight is tested against each. The rest is decoratio
 """
 
 import itertools
+from collections.abc import Sequence
 from typing import Any
 
 import mujoco
@@ -61,9 +62,7 @@ STUD = (0.038, 0.089)
 def add_furniture(spec: Any) -> None:
     """Everything, wall by wall."""
     add_painted(spec, PAINTED)
-    spec.add_material(name="e_stop_yellow", rgba=[0.93, 0.77, 0.10, 1], specular=0.4)
-    spec.add_material(name="led_green", rgba=[0.2, 0.9, 0.35, 1], emission=0.8)
-    spec.add_material(name="screen", rgba=[0.16, 0.32, 0.45, 1], emission=0.5, specular=0.7)
+    _add_bright(spec)
     world = spec.worldbody
     _stud_wall(world)
     _table(world)
@@ -78,7 +77,21 @@ def add_furniture(spec: Any) -> None:
     _door(world)
     _ladder(world)
     _on_the_walls(world)
-    _cones(spec)
+    add_cones(spec, ((-1.62, 0.86), (-2.05, 0.0), (0.28, -2.2)))
+
+
+def add_workbench(spec: Any) -> None:
+    """What stands at the robot in other scenes too: a table beside it, its control box behind."""
+    _add_bright(spec)
+    _table(spec.worldbody)
+    _controller(spec.worldbody)
+
+
+def _add_bright(spec: Any) -> None:
+    """Materials that glow."""
+    spec.add_material(name="e_stop_yellow", rgba=[0.93, 0.77, 0.10, 1], specular=0.4)
+    spec.add_material(name="led_green", rgba=[0.2, 0.9, 0.35, 1], emission=0.8)
+    spec.add_material(name="screen", rgba=[0.16, 0.32, 0.45, 1], emission=0.5, specular=0.7)
 
 
 def _stud_wall(world: Any) -> None:
@@ -286,8 +299,8 @@ def _on_the_walls(world: Any) -> None:
     ellipsoid(world, (3.03, -1.55, 1.30), (0.02, 0.045, 0.045), "white_gloss")
 
 
-def _cones(spec: Any) -> None:
-    """Traffic cones at the back of the robot's cell: one lathe-turned mesh."""
+def add_cones(spec: Any, places: Sequence[tuple[float, float]]) -> None:
+    """Traffic cones: one lathe-turned mesh."""
     profile = np.array([(0.0, 0.46), (0.022, 0.455), (0.115, 0.03), (0.115, 0.0), (0.0, 0.0)])
     count = 20
     angles = 2 * np.pi * np.arange(count) / count
@@ -302,7 +315,7 @@ def _cones(spec: Any) -> None:
             faces += [(a + i, b + i, b + j), (a + i, b + j, a + j)]
         faces.append((last, 1 + 2 * count + j, 1 + 2 * count + i))
     add_mesh(spec, "cone", vertices, np.array(faces))
-    for x, y in ((-1.62, 0.86), (-2.05, 0.0), (0.28, -2.2)):
+    for x, y in places:
         box(spec.worldbody, (x, y, 0.012), (0.27, 0.27, 0.024), "rubber", 0.2)
         spec.worldbody.add_geom(
             type=mujoco.mjtGeom.mjGEOM_MESH, meshname="cone", material="cone_orange",

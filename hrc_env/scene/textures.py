@@ -217,3 +217,27 @@ def sky(shape: tuple[int, int] = (128, 160)) -> Paint:
     roofs = 0.84 - 0.03 * np.abs(((np.arange(shape[1]) / 34) % 2) - 1)
     paint[np.arange(shape[0])[:, None] / shape[0] > roofs] = (120, 122, 126)
     return paint
+
+
+def sky_cube(side: int) -> Paint:
+    """A bright hazy sky with soft clouds on the six faces of a cube, stacked (6 side, side, 3).
+
+    In OpenGL's order of faces and axes, its +y being up: what MuJoCo takes as a sky.
+    """
+    rng = np.random.default_rng(53)
+    s, t = np.meshgrid(*[(np.arange(side) + 0.5) / side * 2 - 1] * 2)
+    one = np.ones_like(s)
+    views = [(one, -t, -s), (-one, -t, s), (s, one, t), (s, -one, -t), (s, -t, one), (-s, -t, -one)]
+    ways = np.stack([np.stack(view, -1) for view in views])
+    ways /= np.linalg.norm(ways, axis=-1, keepdims=True)
+    up = np.clip(ways[..., 1], 0, 1)[..., None]
+    paint = np.array([206.0, 216, 222]) * (1 - up**0.5) + np.array([92.0, 146, 206]) * up**0.5
+    flat = ways[..., [0, 2]] / (0.25 + up)  # clouds lie on a level sheet
+    clouds = np.zeros(ways.shape[:-1])
+    for octave in range(6):
+        for _ in range(3):
+            wave = rng.standard_normal(2) * 1.9 * 1.8**octave
+            clouds += 0.62**octave * np.sin(flat @ wave + rng.uniform(0, 2 * np.pi))
+    share = np.clip(0.35 + 0.5 * clouds, 0, 1)[..., None] * np.clip(up * 5, 0, 1)
+    paint += (np.array([246.0, 247, 248]) - paint) * 0.8 * share
+    return paint.reshape(6 * side, side, 3)

@@ -1,0 +1,70 @@
+"""The construction site: it hides people about as often as the paper's, honestly and cheaply."""
+
+import numpy as np
+import pytest
+
+from benchmarks.occlusion import hidden_from, random_heads
+from hrc_env.geometry.cameras import project, projections
+from hrc_env.geometry.chains import capsules
+from hrc_env.scene.arm import CAPSULES, arm_chain, capsule_reach_m
+from hrc_env.scene.build import SceneConfig, build
+from hrc_env.scene.rig import CameraConfig
+
+SITE = build(name="site")
+EYES = np.stack([camera.eye_world for camera in SITE.cameras])
+
+
+@pytest.fixture(scope="module")
+def heads():
+    return random_heads(SITE.grounds, 6000, np.random.default_rng(3))
+
+
+def test_four_cameras_hang_in_the_corners_at_five_metres():
+    assert EYES.shape == (4, 3)
+    np.testing.assert_allclose(np.abs(EYES), np.tile([9.6, 9.6, 5.0], (4, 1)))
+
+
+def test_a_head_is_hidden_from_one_camera_in_a_third_of_places_and_from_two_in_a_tenth(heads):
+    """The paper has 30 % and 10 %; heads are all over the walkable area."""
+    times = hidden_from(SITE, heads).sum(0)
+    assert 0.25 < (times >= 1).mean() < 0.36
+    assert 0.07 < (times >= 2).mean() < 0.14
+
+
+def test_no_camera_is_walled_in(heads):
+    """Every camera sees most heads, and nothing stands within three metres before its lens."""
+    assert hidden_from(SITE, heads).mean(1).max() < 0.25
+    ahead = np.stack(
+        [
+            eye + 3.0 * camera.T_world_from_cam[:3, 2]
+            for eye, camera in zip(EYES, SITE.cameras, strict=True)
+        ]
+    )
+    assert hidden_from(SITE, ahead).diagonal().sum() == 0
+
+
+def test_heads_are_in_the_pictures(heads):
+    px, depth_m = project(projections(SITE.cameras), heads[None])
+    size = [SITE.cameras[0].width_px, SITE.cameras[0].height_px]
+    inside = ((px > 0) & (px < size)).all(-1) & (depth_m > 0)
+    assert inside.mean() > 0.97
+
+
+def test_without_clutter_every_head_is_seen(heads):
+    bare = build(SceneConfig(clutter=False), "site")
+    assert hidden_from(bare, heads).mean() < 0.01
+
+
+def test_other_cameras_can_hang_there():
+    config = SceneConfig(cameras=(CameraConfig("mine", (0.0, -8.0, 4.0)),))
+    assert [camera.name for camera in build(config, "site").cameras] == ["mine"]
+
+
+def test_the_arm_never_reaches_beyond_the_reach_that_its_pairs_allow_for():
+    """Contacts are only looked for within `capsule_reach_m`; no pose goes farther."""
+    chain, rng = arm_chain(np.eye(4)), np.random.default_rng(4)
+    q = rng.uniform(*chain.range_rad.T, (4000, 6))
+    ends = capsules(chain, q)
+    farthest = np.linalg.norm(ends, axis=-1).max((0, 2)) + chain.capsule_radius_m
+    assert len(farthest) == len(CAPSULES)
+    assert (farthest <= capsule_reach_m() + 1e-9).all()
