@@ -83,7 +83,7 @@ def _hoarding() -> Paint:
     """Painted plywood panels of 1.25 m with battens, weathered at the foot."""
     rng, px = np.random.default_rng(63), 56
     shape = (round(HOARDING_M * px), round(SIDE_M * px))
-    paint = textures.mottled(rng, shape, (98, 124, 138), 4.0)
+    paint = textures.mottled(rng, shape, (126, 148, 158), 4.0)
     panel = round(1.25 * px)
     for i, start in enumerate(range(0, shape[1], panel)):
         paint[:, start : start + panel] += rng.normal(0, 5) + (10 if i % 4 == 1 else 0)
@@ -144,13 +144,13 @@ def paint_site(spec: Any) -> None:
 def _add_light(spec: Any) -> None:
     """A sunny morning with light haze: one sun that casts shadows, and the sky from all sides."""
     headlight = spec.visual.headlight
-    headlight.ambient[:] = 0.46
+    headlight.ambient[:] = 0.50
     headlight.diffuse[:] = 0.10
     headlight.specular[:] = 0.02
     directional = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
     spec.worldbody.add_light(
         name="sun", type=directional, pos=[6.0, -9.0, 16.0], dir=[-0.38, 0.55, -1.0],
-        diffuse=[0.58, 0.55, 0.49], specular=[0.25] * 3, ambient=[0, 0, 0], castshadow=True,
+        diffuse=[0.62, 0.58, 0.51], specular=[0.25] * 3, ambient=[0, 0, 0], castshadow=True,
     )  # fmt: skip
     spec.worldbody.add_light(
         name="sky", type=directional, pos=[0, 0, 16.0], dir=[0.45, -0.5, -0.6],

@@ -20,9 +20,9 @@ COLOURS: dict[str, tuple[tuple[float, float, float], float, float]] = {
     "windscreen": ((0.10, 0.14, 0.18), 0.9, 0.8),
     "lamp_glass": ((0.95, 0.93, 0.85), 0.8, 0.8),
     "lamp_red": ((0.70, 0.08, 0.06), 0.6, 0.6),
-    "rust_brown": ((0.40, 0.24, 0.17), 0.15, 0.2),
+    "rust_brown": ((0.50, 0.31, 0.22), 0.15, 0.2),
     "toilet_green": ((0.24, 0.46, 0.40), 0.3, 0.3),
-    "toilet_roof": ((0.86, 0.87, 0.84), 0.3, 0.3),
+    "toilet_roof": ((0.74, 0.76, 0.74), 0.3, 0.3),
 }
 """Name: colour, specular, shininess."""
 
@@ -30,7 +30,7 @@ COLOURS: dict[str, tuple[tuple[float, float, float], float, float]] = {
 def _corrugated() -> textures.Paint:
     """A container's side: vertical ribs, a little rust at the foot."""
     rng = np.random.default_rng(71)
-    paint = textures.mottled(rng, (256, 600), (124, 74, 52), 4.0)
+    paint = textures.mottled(rng, (256, 600), (150, 96, 68), 4.0)
     phase = (np.arange(600) % 24) / 24.0
     paint *= (0.82 + 0.22 * np.clip(np.abs(2 * phase - 1) * 2 - 0.5, 0, 1))[None, :, None]
     paint[:10] *= 0.7
