@@ -1,4 +1,4 @@
-"""The worker's body: 22 segments, 15 joints, the capsules round them, and how it looks.
+"""The worker's body: 22 segments, 15 joints, the capsules round them.
 
 A body is numbers that `assets/workers/bake.py` wrote once into `assets/workers/<name>.npz`;
 the README beside them says where they come from. Rest frame: x forward, y left, z up, soles
@@ -13,10 +13,9 @@ from pathlib import Path
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from hrc_env.compiled import LEAN
-from hrc_env.errors import check_shape, unknown
+from hrc_env.errors import ConfigError, check_shape, unknown
 from hrc_env.records import WorkerMotion, WorkerPath, WorkerTruth
 from hrc_env.typing import Capsules, Floats, Ints, Points3, QuaternionsWxyz
 
@@ -59,40 +58,25 @@ class Body:
 
 
 @dataclass(frozen=True, slots=True)
-class SkinLooks:
-    """A textured surface that follows the segments (linear blend skinning)."""
+class Bodies:
+    """The measures of N workers, row by row; names and segments are the same for all."""
 
-    name: str
-    vertices: Points3
-    """(V, 3) at rest [m]."""
-    faces: Ints
-    """(F, 3) counter-clockwise seen from outside."""
-    uv: Floats
-    """(V, 2) texture coordinates in [0, 1], v = 0 at the texture's first row."""
-    weights: Floats
-    """(V, S) share of each segment; at most four a vertex, rows sum to 1."""
-    texture: NDArray[np.uint8]
-    """(H, W, 3) RGB."""
-
-
-@dataclass(frozen=True, slots=True)
-class HatLooks:
-    """A hard hat; it moves with the head."""
-
-    vertices: Points3
-    """(V, 3) in the head's frame [m]."""
-    faces: Ints
-    """(F, 3)."""
-    rgb: tuple[float, float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class Looks:
-    """What a worker looks like; the room `scene` draws it."""
-
-    skins: tuple[SkinLooks, ...]
-    hat: HatLooks | None
-    """None for who wears none."""
+    names: tuple[str, ...]
+    stature_m: Floats
+    """(N,)."""
+    rest_position: Points3
+    """(N, S, 3)."""
+    joint_segment: Ints
+    """(J,)."""
+    joint_offset: Points3
+    """(N, J, 3)."""
+    capsule_names: tuple[str, ...]
+    capsule_segment: Ints
+    """(K,)."""
+    capsule_ends: Points3
+    """(N, K, 2, 3)."""
+    capsule_radius_m: Floats
+    """(N, K)."""
 
 
 def assets_dir() -> Path:
@@ -113,29 +97,48 @@ def load_body(name: str = "worker_1") -> Body:
     Raises:
         ConfigError: no worker of that name has been baked.
     """
-    with np.load(_path(name)) as baked:
+    with np.load(baked_path(name)) as baked:
         return Body(
             name=name,
             stature_m=float(baked["stature_m"]),
-            rest_position=_fixed(baked["rest_position"], np.float64),
-            joint_segment=_fixed(baked["joint_segment"], np.int64),
-            joint_offset=_fixed(baked["joint_offset"], np.float64),
+            rest_position=fixed(baked["rest_position"], np.float64),
+            joint_segment=fixed(baked["joint_segment"], np.int64),
+            joint_offset=fixed(baked["joint_offset"], np.float64),
             capsule_names=tuple(str(capsule) for capsule in baked["capsule_names"]),
-            capsule_segment=_fixed(baked["capsule_segment"], np.int64),
-            capsule_ends=_fixed(baked["capsule_ends"], np.float64),
-            capsule_radius_m=_fixed(baked["capsule_radius_m"], np.float64),
+            capsule_segment=fixed(baked["capsule_segment"], np.int64),
+            capsule_ends=fixed(baked["capsule_ends"], np.float64),
+            capsule_radius_m=fixed(baked["capsule_radius_m"], np.float64),
         )
 
 
 @functools.cache
-def load_looks(name: str = "worker_1") -> Looks:
-    """Read a baked worker's surfaces and textures.
+def stack(names: tuple[str, ...]) -> Bodies:
+    """Read several baked workers.
 
     Raises:
-        ConfigError: no worker of that name has been baked.
+        ConfigError: no name, an unknown one, or bodies whose rows mean different things.
     """
-    with np.load(_path(name)) as baked:
-        return Looks(tuple(_skin(baked, skin) for skin in ("skin", "cloth")), _hat(baked))
+    if not names:
+        raise ConfigError(f"Expected at least one worker of {', '.join(worker_names())}; got none.")
+    bodies = [load_body(name) for name in names]
+    first = bodies[0]
+    for body in bodies:
+        if not _same_rows(body, first):
+            raise ConfigError(
+                f"{body.name} has other capsules or joints than {first.name}; expected the same "
+                "names on the same segments. Bake both with the same assets/workers/bake.py."
+            )
+    return Bodies(
+        names=names,
+        stature_m=fixed(np.array([body.stature_m for body in bodies]), np.float64),
+        rest_position=fixed(np.stack([body.rest_position for body in bodies]), np.float64),
+        joint_segment=first.joint_segment,
+        joint_offset=fixed(np.stack([body.joint_offset for body in bodies]), np.float64),
+        capsule_names=first.capsule_names,
+        capsule_segment=first.capsule_segment,
+        capsule_ends=fixed(np.stack([body.capsule_ends for body in bodies]), np.float64),
+        capsule_radius_m=fixed(np.stack([body.capsule_radius_m for body in bodies]), np.float64),
+    )
 
 
 def rest_motion(body: Body) -> WorkerMotion:
@@ -146,40 +149,79 @@ def rest_motion(body: Body) -> WorkerMotion:
     return WorkerMotion(body.rest_position.copy(), upright, still, still.copy())
 
 
-def worker_truth(body: Body, motion: WorkerMotion) -> WorkerTruth:
+def worker_truth(
+    body: Body | Bodies, motion: WorkerMotion, which: Ints | None = None
+) -> WorkerTruth:
     """Where the joints and capsules of a body in motion are, and how fast the joints.
 
     Args:
-        body: the worker's measures.
+        body: the worker's measures, or those of several.
         motion: segments (..., S, 3 or 4) with any leading axes.
+        which: row of `Bodies` that each moving body has, broadcast to the leading axes; of a
+            single `Body` there is nothing to choose.
 
     Returns:
-        The truth with the same leading axes. A joint moves with its segment:
-        v + omega x r (rigid body kinematics).
+        The truth with the same leading axes; radii are (K,) of a `Body` and (..., K) of
+        `Bodies`. A joint moves with its segment: v + omega x r (rigid body kinematics).
     """
     position, quaternion = motion.position_world, motion.quaternion_wxyz
-    capsules = _capsules_of(body, position, quaternion)
     lead, n_joints = position.shape[:-2], len(body.joint_segment)
+    rows = _rows(body, which, lead)
+    capsules = _capsules_of(body, position, quaternion, rows)
     joints, velocity = np.empty((*lead, n_joints, 3)), np.empty((*lead, n_joints, 3))
     _joints(
         _flat(position), _flat(quaternion),
-        _flat(motion.velocity_world), _flat(motion.angular_velocity_world),
-        body.joint_segment, body.joint_offset, _flat(joints), _flat(velocity),
+        _flat(motion.velocity_world), _flat(motion.angular_velocity_world), rows,
+        body.joint_segment, body.joint_offset.reshape(-1, n_joints, 3),
+        _flat(joints), _flat(velocity),
     )  # fmt: skip
-    return WorkerTruth(joints, velocity, capsules, body.capsule_radius_m)
+    radius = body.capsule_radius_m
+    if isinstance(body, Bodies):
+        radius = radius[rows].reshape(*lead, -1)
+    return WorkerTruth(joints, velocity, capsules, radius)
 
 
-def worker_capsules(body: Body, path: WorkerPath) -> Capsules:
-    """(B, T, W, K, 2, 3) the body's capsules along a path [m]."""
-    return _capsules_of(body, path.position_world, path.quaternion_wxyz)
+def worker_capsules(body: Body | Bodies, path: WorkerPath, which: Ints | None = None) -> Capsules:
+    """(B, T, W, K, 2, 3) the bodies' capsules along a path [m]; `which` (B, W) as above."""
+    position = path.position_world
+    over_time = None if which is None else np.asarray(which)[..., None, :]
+    rows = _rows(body, over_time, position.shape[:-2])
+    return _capsules_of(body, position, path.quaternion_wxyz, rows)
 
 
-def _capsules_of(body: Body, position: Points3, quaternion: QuaternionsWxyz) -> Capsules:
+def _same_rows(body: Body, other: Body) -> bool:
+    return (
+        body.capsule_names == other.capsule_names
+        and np.array_equal(body.capsule_segment, other.capsule_segment)
+        and np.array_equal(body.joint_segment, other.joint_segment)
+    )
+
+
+def _rows(body: Body | Bodies, which: Ints | None, lead: tuple[int, ...]) -> Ints:
+    """(count,) row of every body in motion."""
+    if isinstance(body, Body):
+        return _first(math.prod(lead))
+    n = len(body.names)
+    if which is None or (np.size(which) and not 0 <= np.min(which) <= np.max(which) < n):
+        raise ConfigError(f"which must say rows 0 to {n - 1} of {body.names}, got {which}.")
+    return fixed(np.broadcast_to(which, lead).reshape(-1), np.int64)
+
+
+@functools.lru_cache(maxsize=16)
+def _first(count: int) -> Ints:
+    """(count,) zeros."""
+    return fixed(np.zeros(count), np.int64)
+
+
+def _capsules_of(
+    body: Body | Bodies, position: Points3, quaternion: QuaternionsWxyz, rows: Ints
+) -> Capsules:
     """Capsules (..., K, 2, 3) of bodies with any leading axes."""
     check_shape("position_world", position.shape[-2:], (N_SEGMENTS, 3), "segments, xyz")
-    flat, shape = _flat(position), body.capsule_ends.shape
+    flat, shape = _flat(position), (len(body.capsule_segment), 2, 3)
     ends = np.empty((len(flat), *shape))
-    _capsules(flat, _flat(quaternion), body.capsule_segment, body.capsule_ends, ends)
+    known = body.capsule_ends.reshape(-1, *shape)
+    _capsules(flat, _flat(quaternion), rows, body.capsule_segment, known, ends)
     return ends.reshape(*position.shape[:-2], *shape)
 
 
@@ -205,13 +247,14 @@ def _turned(quaternion, offset):  # pragma: no cover - compiled
 
 @numba.njit(**LEAN)
 def _joints(
-    position, quaternion, linear, angular, segment, offset, joints, velocity
+    position, quaternion, linear, angular, rows, segment, offset, joints, velocity
 ):  # pragma: no cover - compiled
     """Joints, and how fast the segments carry them, one body after the other."""
     for b in range(position.shape[0]):
+        mine = offset[rows[b]]
         for j in range(len(segment)):
             s = segment[j]
-            arm = _turned(quaternion[b, s], offset[j])
+            arm = _turned(quaternion[b, s], mine[j])
             for i in range(3):
                 k, m = (i + 1) % 3, (i + 2) % 3
                 joints[b, j, i] = position[b, s, i] + arm[i]
@@ -220,68 +263,31 @@ def _joints(
 
 
 @numba.njit(**LEAN)
-def _capsules(position, quaternion, segment, ends, capsules):  # pragma: no cover - compiled
+def _capsules(position, quaternion, rows, segment, ends, capsules):  # pragma: no cover - compiled
     """Both ends of the capsules of bodies."""
     for b in range(position.shape[0]):
+        mine = ends[rows[b]]
         for k in range(len(segment)):
             s = segment[k]
             for end in range(2):
-                arm = _turned(quaternion[b, s], ends[k, end])
+                arm = _turned(quaternion[b, s], mine[k, end])
                 for i in range(3):
                     capsules[b, k, end, i] = position[b, s, i] + arm[i]
 
 
-def _path(name: str) -> Path:
+def baked_path(name: str) -> Path:
+    """The file of a worker.
+
+    Raises:
+        ConfigError: no worker of that name has been baked.
+    """
     if name not in worker_names():
         raise unknown("worker", name, worker_names())
     return assets_dir() / "workers" / f"{name}.npz"
 
 
-def _fixed(array: np.ndarray, dtype: type) -> np.ndarray:
+def fixed(array: np.ndarray, dtype: type) -> np.ndarray:
     """A read-only copy: bodies are shared, nobody may write into them."""
     copy = np.array(array, dtype=dtype)
     copy.setflags(write=False)
     return copy
-
-
-def _skin(baked: np.lib.npyio.NpzFile, name: str) -> SkinLooks:
-    segment, share = baked[f"{name}_weight_segment"], baked[f"{name}_weight"].astype(float)
-    weights = np.zeros((len(segment), N_SEGMENTS))
-    np.add.at(weights, (np.arange(len(segment))[:, None], segment), share)
-    return SkinLooks(
-        name=name,
-        vertices=_fixed(baked[f"{name}_vertices"] * float(baked["unit_m"]), np.float64),
-        faces=_fixed(baked[f"{name}_faces"], np.int64),
-        uv=_fixed(baked[f"{name}_uv"] / 65535.0, np.float64),
-        weights=_fixed(weights / weights.sum(1, keepdims=True), np.float64),
-        texture=_texture(baked, name),
-    )
-
-
-def _hat(baked: np.lib.npyio.NpzFile) -> HatLooks | None:
-    if "hat_vertices" not in baked:
-        return None
-    red, green, blue = (float(value) / 255 for value in baked["hat_rgb"])
-    return HatLooks(
-        vertices=_fixed(baked["hat_vertices"] * float(baked["unit_m"]), np.float64),
-        faces=_fixed(baked["hat_faces"], np.int64),
-        rgb=(red, green, blue),
-    )
-
-
-def _texture(baked: np.lib.npyio.NpzFile, name: str) -> NDArray[np.uint8]:
-    """Palette colours, darkened by the coarse shade map (creases, folds)."""
-    colours = baked[f"{name}_palette"][baked[f"{name}_paint"]].astype(np.float32)
-    shade = _enlarged(baked[f"{name}_shade"].astype(np.float32) / 200.0, colours.shape[:2])
-    return _fixed(np.clip(colours * shade[..., None], 0.0, 255.0), np.uint8)
-
-
-def _enlarged(image: NDArray[np.float32], shape: tuple[int, ...]) -> NDArray[np.float32]:
-    """(h, w) to a larger (H, W), bilinear, pixel centres at half-integers."""
-    for axis in (0, 1):
-        size, old = shape[axis], image.shape[axis]
-        at = np.clip((np.arange(size) + 0.5) * old / size - 0.5, 0, old - 1)
-        low = np.minimum(at.astype(int), old - 2)
-        part = (at - low).astype(np.float32).reshape((-1, 1) if axis == 0 else (1, -1))
-        image = image.take(low, axis) * (1 - part) + image.take(low + 1, axis) * part
-    return image

@@ -12,13 +12,13 @@ from hrc_env.body import (
     SEGMENTS,
     assets_dir,
     load_body,
-    load_looks,
     rest_motion,
     worker_names,
     worker_truth,
 )
 from hrc_env.errors import ConfigError
 from hrc_env.geometry.rotations import about_axis, matrix_from_quaternion, quaternion_from_matrix
+from hrc_env.looks import load_looks
 from hrc_env.records import WorkerMotion
 from hrc_env.skeleton import JOINT, MIRROR, N_JOINTS
 

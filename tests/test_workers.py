@@ -8,23 +8,25 @@ import pytest
 from hrc_env.body import (
     N_SEGMENTS,
     SEGMENT,
-    SkinLooks,
     assets_dir,
     load_body,
-    load_looks,
     rest_motion,
+    stack,
+    worker_capsules,
     worker_names,
     worker_truth,
 )
+from hrc_env.errors import ConfigError
 from hrc_env.geometry.rotations import matrix_from_quaternion
+from hrc_env.looks import SkinLooks, load_looks
 from hrc_env.motion import generator
-from hrc_env.records import WorkerMotion
+from hrc_env.motion.anatomy import anatomies, anatomy
+from hrc_env.records import WorkerMotion, WorkerPath
 from hrc_env.skeleton import MIRROR, N_JOINTS
 
 sys.path.insert(0, str(assets_dir() / "workers"))
 from recipes import RECIPES
 
-pytestmark = pytest.mark.parametrize("name", worker_names())
 MIRRORED_Y = np.array([1.0, -1.0, 1.0])
 
 
@@ -59,6 +61,7 @@ def spread_over(skin: SkinLooks) -> np.ndarray:
     return np.concatenate([np.einsum("c,fci->fi", share, corners) for share in shares])
 
 
+@pytest.mark.parametrize("name", worker_names())
 def test_a_body_is_as_tall_as_its_recipe_says(name):
     body, head = load_body(name), load_looks(name).skins[0]
     assert body.stature_m == pytest.approx(RECIPES[name].stature_m, abs=0.01)
@@ -68,10 +71,12 @@ def test_a_body_is_as_tall_as_its_recipe_says(name):
     assert f"| `{name}` | {body.stature_m:.2f} m |" in readme
 
 
+@pytest.mark.parametrize("name", worker_names())
 def test_hat_or_none_is_as_in_the_recipe(name):
     assert (load_looks(name).hat is not None) == RECIPES[name].hat
 
 
+@pytest.mark.parametrize("name", worker_names())
 def test_a_body_has_all_its_segments_joints_and_the_same_capsules_as_every_other(name):
     body, first = load_body(name), load_body()
     assert body.rest_position.shape == (N_SEGMENTS, 3)
@@ -81,6 +86,7 @@ def test_a_body_has_all_its_segments_joints_and_the_same_capsules_as_every_other
     np.testing.assert_array_equal(body.joint_segment, first.joint_segment)
 
 
+@pytest.mark.parametrize("name", worker_names())
 def test_joints_lie_inside_the_body(name):
     body = load_body(name)
     truth = worker_truth(body, rest_motion(body))
@@ -88,6 +94,7 @@ def test_joints_lie_inside_the_body(name):
     assert deepest.max() < 0.0
 
 
+@pytest.mark.parametrize("name", worker_names())
 def test_capsules_hold_skin_clothes_and_hat_closely(name):
     """Signed distances of all vertices at rest to the nearest capsule."""
     body = load_body(name)
@@ -98,6 +105,7 @@ def test_capsules_hold_skin_clothes_and_hat_closely(name):
     assert np.median(out) > -0.03, "and the capsules are not fat"
 
 
+@pytest.mark.parametrize("name", worker_names())
 def test_left_and_right_measure_the_same(name):
     body = load_body(name)
     truth = worker_truth(body, rest_motion(body))
@@ -109,6 +117,7 @@ def test_left_and_right_measure_the_same(name):
             np.testing.assert_allclose(capsules[twin] * MIRRORED_Y, capsules[k], atol=1e-6)
 
 
+@pytest.mark.parametrize("name", worker_names())
 def test_what_one_sees_is_symmetric_to_some_millimetres(name):
     for skin in load_looks(name).skins:
         points = spread_over(skin)
@@ -117,6 +126,7 @@ def test_what_one_sees_is_symmetric_to_some_millimetres(name):
         assert np.quantile(away, 0.95) < 0.012, "the points lie up to 2 cm apart"
 
 
+@pytest.mark.parametrize("name", worker_names())
 def test_a_worker_of_this_body_has_the_soles_on_the_floor(name):
     body = load_body(name)
     boots = load_looks(name).skins[1]
@@ -137,3 +147,56 @@ def test_a_worker_of_this_body_has_the_soles_on_the_floor(name):
 def _of_foot(boots: SkinLooks, side: str) -> np.ndarray:
     mine = [SEGMENT[f"{side}_{part}"] for part in ("foot", "toes")]
     return boots.weights[:, mine].sum(1) > 0.5
+
+
+def shaken(n_steps: int, seed: int) -> WorkerMotion:
+    """Two environments of three workers, segments (2, 3, S, ...) anyhow; (2, T, 3, ...) for T."""
+    rng = np.random.default_rng(seed)
+    lead = (2, n_steps, 3, N_SEGMENTS) if n_steps else (2, 3, N_SEGMENTS)
+    turn = rng.normal(size=(*lead, 4))
+    turn /= np.linalg.norm(turn, axis=-1, keepdims=True)
+    return WorkerMotion(*(turn if n == 4 else rng.normal(size=(*lead, n)) for n in (3, 4, 3, 3)))
+
+
+WHICH = np.array([[0, 2, 1], [2, 0, 0]])
+
+
+def test_in_a_stack_every_worker_is_as_if_alone():
+    bodies, motion = stack(worker_names()[:3]), shaken(0, 1)
+    truth = worker_truth(bodies, motion, WHICH)
+    for b, w in np.ndindex(WHICH.shape):
+        body = load_body(bodies.names[WHICH[b, w]])
+        alone = worker_truth(body, motion)
+        np.testing.assert_array_equal(truth.joints_world[b, w], alone.joints_world[b, w])
+        np.testing.assert_array_equal(truth.velocity_world[b, w], alone.velocity_world[b, w])
+        np.testing.assert_array_equal(truth.capsules_world[b, w], alone.capsules_world[b, w])
+        np.testing.assert_array_equal(truth.capsule_radius_m[b, w], body.capsule_radius_m)
+
+
+def test_a_path_of_a_stack_has_each_workers_own_capsules_at_all_times():
+    bodies, motion = stack(worker_names()[:3]), shaken(4, 2)
+    path = WorkerPath(motion.position_world, motion.quaternion_wxyz)
+    capsules = worker_capsules(bodies, path, WHICH)
+    for b, w in np.ndindex(WHICH.shape):
+        alone = worker_capsules(load_body(bodies.names[WHICH[b, w]]), path)
+        np.testing.assert_array_equal(capsules[b, :, w], alone[b, :, w])
+
+
+def test_anatomies_of_a_stack_are_those_of_its_bodies():
+    together = anatomies(stack(worker_names()))
+    for row, name in enumerate(worker_names()):
+        alone = anatomy(load_body(name))
+        np.testing.assert_array_equal(together.offset[row], alone.offset)
+        np.testing.assert_array_equal(together.frame[row], alone.frame)
+        np.testing.assert_array_equal(together.size[row], alone.size)
+
+
+@pytest.mark.parametrize("which", [None, np.full((2, 3), 3), np.full((2, 3), -1)])
+def test_rows_that_a_stack_does_not_have_are_refused(which):
+    with pytest.raises(ConfigError, match="rows 0 to 2"):
+        worker_truth(stack(worker_names()[:3]), shaken(0, 1), which)
+
+
+def test_a_stack_of_nobody_is_refused():
+    with pytest.raises(ConfigError, match="at least one"):
+        stack(())

@@ -70,8 +70,8 @@ RECIPES = {
     "worker_3": Recipe(
         1.80, "male", 0.74, 0.16, 0.95, 0.35,
         _colours(
-            skin=(222, 166, 138), hair=(120, 72, 40), iris=(84, 104, 96), hat=(240, 240, 236),
-            vest=ORANGE, trim=(214, 240, 60), shirt=(96, 100, 104), trousers=(88, 80, 66),
+            skin=(222, 166, 138), hair=(120, 72, 40), iris=(84, 104, 96), hat=(60, 150, 70),
+            vest=ORANGE, trim=(214, 240, 60), shirt=(44, 62, 104), trousers=(60, 56, 54),
         ),
         beard=1.0, ancestry=CAUCASIAN,
     ),

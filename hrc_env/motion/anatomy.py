@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.body import PARENT, Body
+from hrc_env.body import PARENT, Bodies, Body
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.typing import Floats
 
@@ -46,7 +46,21 @@ class Anatomy:
 
 def anatomy(body: Body) -> Anatomy:
     """Measure a body; the right side's lengths are taken to equal the left side's."""
-    rest = np.asarray(body.rest_position, float)
+    return _measured(np.asarray(body.rest_position, float))
+
+
+def anatomies(bodies: Bodies) -> Anatomy:
+    """Measure N bodies: arrays (N, ...), each row as `anatomy` of that body alone."""
+    each = [_measured(rest) for rest in bodies.rest_position]
+    return Anatomy(
+        np.stack([one.offset for one in each]),
+        np.stack([one.frame for one in each]),
+        np.stack([one.size for one in each]),
+    )
+
+
+def _measured(rest: Floats) -> Anatomy:
+    """Measure a body of which the segments' origins (22, 3) at rest are known."""
     offset = rest - rest[np.maximum(PARENT, 0)]
     offset[0] = rest[0]
     frame = np.zeros((len(rest), 3, 3))

@@ -9,12 +9,13 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from hrc_env.body import load_body, load_looks
+from hrc_env.body import load_body
 from hrc_env.errors import ConfigError, unknown
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.geometry.chains import SerialChain, capsules
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.geometry.sight import Surroundings
+from hrc_env.looks import load_looks
 from hrc_env.records import Grounds
 from hrc_env.scene.arena import add_lab, paint_lab
 from hrc_env.scene.arm import (

@@ -10,8 +10,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from hrc_env.body import SEGMENTS, Body, HatLooks, Looks, SkinLooks
+from hrc_env.body import SEGMENTS, Body
 from hrc_env.errors import ConfigError
+from hrc_env.looks import HatLooks, Looks, SkinLooks
 from hrc_env.scene.primitives import LOOKS_ONLY, WORKER_BIT, WORKER_CAPSULES, capsule
 from hrc_env.typing import Ints
 
