@@ -60,7 +60,7 @@ N_DRAWS = PLACES + 3 * N_TRIED
 """Uniform numbers of one decision."""
 WAIT_S = (0.5, 1.1)
 """Who finds no way looks again after so long [s]; judgement."""
-CHANGE_S, GIVE_UP_S = 1.5, 6.0
+CHANGE_S, GIVE_UP_S = 1.5, 4.5
 """After so long they think of something else to do, and at last give up [s]; judgement."""
 ARRIVED_M = 0.12
 """So near to a place a worker is there [m]."""
@@ -72,6 +72,8 @@ WITH_LOAD = (pl.STAND, pl.LOOK_ROUND, pl.SET_DOWN, pl.HAND_OVER)
 """What one does with something in one's hands; before anything else it is set down."""
 ROBOT_WORK_M = 1.1
 """Height of the work at the robot [m]."""
+ABOVE_M = 0.17
+"""Hands work so far above a bench [m]: a hand and a workpiece are as thick; judgement."""
 CHEST_M = 1.2
 """Loads are set down or leant against something no higher than this [m]."""
 
@@ -275,6 +277,8 @@ def _work(who: Who, activity: int) -> tuple[int, float]:
     x, y, yaw, height = who.spot[: SPOT_HEIGHT + 1].tolist()
     if activity in (pl.SET_DOWN, pl.HAND_OVER):
         height = min(height, CHEST_M)
+    if who.kind_here == "bench":
+        height += ABOVE_M
     near, prop = who.kind_here == "robot", prop_index(who.task.prop)
     others = state.spots[who.b, :, :SPOT_YAW][_others(who)]
     lasts = start_here(

@@ -33,10 +33,8 @@ from hrc_env.typing import Floats
 
 BODY_M = 0.36
 """Hands reach no nearer to their own root than this [m]."""
-OWN_SIDE_M = 0.12
+OWN_SIDE_M = 0.20
 """Hands keep so far from the middle between their worker and another [m]."""
-ABOVE_M = 0.10
-"""Hands that work on something are so far above it [m]: the thickness of a hand and a workpiece."""
 OVERHEAD_M = 1.7
 """Drilling at this height or above is overhead work [m]."""
 
@@ -109,8 +107,7 @@ def _start_work(activity: int, draws: Floats, place: Place, me: Worker) -> float
         high = (place[0], place[1], place[2], max(place[3], OVERHEAD_M + 0.1))
         return start_drill(draws, high, me)
     if activity == pl.SAW:
-        above = place[3] + ABOVE_M if place[3] > 0.0 else 0.0
-        return start_saw(draws, (place[0], place[1], place[2], above), me)
+        return start_saw(draws, place, me)
     if activity == pl.MEASURE:
         return start_measure(draws, place, me)
     if activity == pl.POINT:
@@ -147,7 +144,7 @@ def _target(
     z = between(draws[3], config.target_z_m)
     x, y = plan[pl.START_X], plan[pl.START_Y]
     if not near:
-        z = max(z, height + ABOVE_M)
+        z = max(z, height)
         ahead, left = 0.36 + 0.3 * draws[1], 0.7 * (draws[2] - 0.5)
         cos, sin = math.cos(plan[pl.START_YAW]), math.sin(plan[pl.START_YAW])
         return x + cos * ahead - sin * left, y + sin * ahead + cos * left, z
