@@ -34,7 +34,8 @@ class HRCReachEnv(Stateful, gymnasium.Env[NDArray[np.float32], NDArray[np.float3
             (Algorithm 1), "per_joint", "triangulation" or "ransac".
         cameras: indices or names of the rig's cameras to use; None is all of them.
         scene: name of the place: "lab", a workshop, or "site", a construction site.
-        n_workers: 0 or more workers.
+        n_workers: 0 or more workers; (fewest, most): each episode's number is drawn, and the
+            observation has room for the most.
         people: how the workers are with the robot: "attentive", "hurried", "unaware", a
             `PeopleConfig`, or None for those of the config (attentive).
         control: "joint" (joint velocities) or "tool" (tool velocity).
@@ -54,7 +55,7 @@ class HRCReachEnv(Stateful, gymnasium.Env[NDArray[np.float32], NDArray[np.float3
         estimator: str = "particle",
         cameras: Sequence[int | str] | None = None,
         scene: str = "lab",
-        n_workers: int = 1,
+        n_workers: int | tuple[int, int] = 1,
         people: str | PeopleConfig | None = None,
         control: str = "joint",
         render_mode: str | None = None,

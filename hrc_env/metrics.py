@@ -72,34 +72,42 @@ def cost(
     )
 
 
-def tracking_error(estimate: PoseEstimate, truth: WorkerTruth) -> tuple[Floats, Bools]:
+def tracking_error(
+    estimate: PoseEstimate, truth: WorkerTruth, present: Bools | None = None
+) -> tuple[Floats, Bools]:
     """Mean joint position error of the tracked workers.
 
     Nothing tells a camera who of several workers is called the first: tracks are compared
     with the workers whom they fit best, none with two.
+
+    Args:
+        estimate: what is believed.
+        truth: what is.
+        present: (B, W) who is in the episode; None: everybody.
 
     Returns:
         (B,) mean over tracked workers and joints [m], NaN where nobody is tracked, and
         (B,) whether a worker is there whom the estimator does not track.
     """
     error_m, lost = np.empty(len(estimate.tracked)), np.zeros(len(estimate.tracked), np.bool_)
-    _tracking_error(estimate.mean_world, truth.joints_world, estimate.tracked, error_m, lost)
+    there = np.ones_like(estimate.tracked) if present is None else present
+    _tracking_error(estimate.mean_world, truth.joints_world, estimate.tracked, there, error_m, lost)
     return error_m, lost
 
 
 @numba.njit(**JIT)
-def _tracking_error(mean_world, joints_world, tracked, error_m, lost):
+def _tracking_error(mean_world, joints_world, tracked, there, error_m, lost):
     n_workers, n_joints = tracked.shape[1], mean_world.shape[2]
     error, whom = np.empty((n_workers, n_workers)), np.empty(n_workers, np.int64)
     for b in range(tracked.shape[0]):
-        total, count = 0.0, 0
+        total, count, wanted = 0.0, 0, 0
         for w in range(n_workers):
+            wanted += there[b, w]
             if tracked[b, w]:
                 for k in range(n_workers):
                     error[count, k] = _joint_error(mean_world[b, w], joints_world[b, k])
                 count += 1
-            else:
-                lost[b] = True
+        lost[b] = count < wanted
         assign_rows(error[:count], whom)
         for row in range(count):
             total += error[row, whom[row]]

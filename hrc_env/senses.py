@@ -33,7 +33,7 @@ from hrc_env.tracking.ahead import ahead
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import Estimator, make_estimator
 from hrc_env.tracking.people.association import associate
-from hrc_env.typing import Ints, JointAngles
+from hrc_env.typing import Bools, Ints, JointAngles
 
 LEVELS = ("pixels", "keypoints", "truth", "none")
 
@@ -54,6 +54,8 @@ class Moment:
     """(B, W, S, ...)."""
     truth: WorkerTruth
     """(B, W, ...): for the emulator and the level `truth`, and for nobody else."""
+    present: Bools
+    """(B, W) who is in the episode: for the level `truth`, and for nobody else."""
 
 
 class Senses(Protocol):
@@ -101,7 +103,7 @@ def make_senses(level: str, estimator: str, scene: Scene, batch: int, config: HR
     P = projections(scene.cameras)
     tracker = make_estimator(estimator, P, config.ctrl_dt, config.tracker)
     if level == "truth":
-        return GivenSenses(config.tracker)
+        return GivenSenses(config.tracker, given.prior(batch, scene.n_workers, config.tracker))
     if level == "none":
         return BlindSenses(given.prior(batch, scene.n_workers, config.tracker))
     if level == "keypoints":
@@ -112,15 +114,18 @@ def make_senses(level: str, estimator: str, scene: Scene, batch: int, config: HR
 class GivenSenses(Stateful):
     """Level `truth`: the worker as they are."""
 
-    def __init__(self, config: TrackerConfig) -> None:
-        self.config = config
+    def __init__(self, config: TrackerConfig, prior: PoseEstimate) -> None:
+        self.config, self.prior = config, prior
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
         """Nothing to forget."""
 
     def sense(self, now: Moment, sensor_rngs: Generators, tracker_rngs: Generators) -> PoseEstimate:
-        """The truth, as an estimate."""
-        return given.estimate_from_truth(now.truth)
+        """The truth, as an estimate; of who is not there, the prior."""
+        seen = given.estimate_from_truth(now.truth)
+        if now.present.all():
+            return seen
+        return _chosen(now.present, seen, rows(self.prior, now.ids))
 
     def ahead(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
         """Where a body that moves so goes: nobody is given the future."""
@@ -324,6 +329,17 @@ class CameraSenses(TrackingSenses):
             window_from_joints(px[0, c], depth_m[0, c], camera)
             for c, camera in enumerate(self.scene.cameras)
         ]
+
+
+def _chosen(who: Bools, one: PoseEstimate, other: PoseEstimate) -> PoseEstimate:
+    """Of workers `who` (B, W) the first estimate, of the others the second."""
+    return PoseEstimate(
+        np.where(who[..., None, None], one.mean_world, other.mean_world),
+        np.where(who[..., None, None, None], one.cov_world, other.cov_world),
+        np.where(who[..., None, None], one.velocity_world, other.velocity_world),
+        np.where(who[..., None], one.age_s, other.age_s),
+        np.where(who, one.tracked, other.tracked),
+    )
 
 
 def _no_keypoints(batch: int, n_cameras: int, n_workers: int) -> Keypoints:

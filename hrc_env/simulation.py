@@ -36,7 +36,8 @@ WATCHED_CAPSULES = (3, 8)
 FLAGS = ("is_success",)
 """Values that are true or false."""
 ACTIVITY = "worker/activity"
-"""What each worker is doing, by name."""
+"""What each worker is doing, by name; `ABSENT_NAME` of who is not in the episode."""
+ABSENT_NAME = "absent"
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +52,7 @@ class Outcome:
     """(B,)."""
     info: Info
     activity: Ints
-    """(B, W) what each worker does, an index into `generator.activity_names`."""
+    """(B, W) what each worker does, an index into `generator.activity_names` or `ABSENT`."""
 
     def info_of(self, b: int) -> dict[str, Any]:
         """The info of one environment: absent values are left out, flags are bool."""
@@ -88,14 +89,15 @@ class Simulation(Stateful):
         estimator: str,
         cameras: Sequence[int | str] | None,
         scene: str,
-        n_workers: int,
+        n_workers: int | tuple[int, int],
         control: str,
         config: HRCConfig,
     ) -> None:
         self.batch, self.config, self.control = batch, config, control
         self.perception = perception
         self.body = load_body(config.worker)
-        self.scene = build(config.scene, scene, n_workers, config.worker, cameras)
+        fewest, most = worker_counts(n_workers)
+        self.scene = build(config.scene, scene, most, config.worker, cameras)
         self.settings = {
             "batch": batch, "perception": perception, "estimator": estimator, "scene": scene,
             "cameras": tuple(camera.name for camera in self.scene.cameras),
@@ -106,21 +108,19 @@ class Simulation(Stateful):
         check_shape("start_spread_rad", (len(spread),), (self.chain.n_joints,), "one a joint")
         self.n_actions = n_actions(control, self.chain)
         self.layout = observations.layout(
-            observations.Sizes(
-                len(self.scene.home_q), self.n_actions, n_workers, len(config.horizons_s)
-            )
+            observations.Sizes(len(self.scene.home_q), self.n_actions, most, len(config.horizons_s))
         )
         self.physics = Physics(self.scene, batch)
         self.senses = make_senses(perception, estimator, self.scene, batch, config)
         self.motion = generator.make_state(
-            batch, n_workers, self.body, config.motion, self.scene.grounds
+            batch, most, self.body, config.motion, self.scene.grounds, fewest
         )
         self.task = reach.make_state(batch)
         self._everyone = np.arange(batch)
         self.action = np.zeros((batch, self.n_actions))
         self.episode_cost = np.zeros(batch)
-        self.estimate = given.prior(batch, n_workers, config.tracker)
-        self.ahead = tuple(given.prior(batch, n_workers, config.tracker) for _ in config.horizons_s)
+        self.estimate = given.prior(batch, most, config.tracker)
+        self.ahead = tuple(given.prior(batch, most, config.tracker) for _ in config.horizons_s)
         blank = [np.random.default_rng(0)] * batch
         self.streams = Streams(*(list(blank) for _ in range(5)))
 
@@ -138,7 +138,8 @@ class Simulation(Stateful):
         estimate, ahead = self._sense(ids, motion, truth)
         believed = self._believed(ids, robot, estimate, ahead)
         observation = observations.observe(believed, self.layout)
-        info = {**tracking_info(estimate, truth), **rows_of(self._tally(), ids)}
+        present = self.motion.present[ids] > 0.0
+        info = {**tracking_info(estimate, truth, present), **rows_of(self._tally(), ids)}
         doing = generator.activity(self.motion)[ids]
         return Outcome(observation, np.zeros(len(ids)), np.zeros(len(ids), bool), info, doing)
 
@@ -170,10 +171,11 @@ class Simulation(Stateful):
             arm, robot.capsule_radius_m, workers, truth.capsule_radius_m, config.cost
         )
         self.episode_cost += cost.total
+        present = self.motion.present > 0.0
         info = {
             **{f"reward/{name}": value for name, value in terms.items()},
-            **cost_info(cost),
-            **tracking_info(estimate, truth),
+            **cost_info(cost, present),
+            **tracking_info(estimate, truth, present),
             **self._tally(),
         }
         terminated = (cost.contact > 0) & config.cost.contact_terminates
@@ -233,7 +235,7 @@ class Simulation(Stateful):
         self, ids: Ints, motion: WorkerMotion, truth: WorkerTruth
     ) -> tuple[PoseEstimate, tuple[PoseEstimate, ...]]:
         """Let the senses look at environments `ids`; their rows of the estimates now and ahead."""
-        moment = Moment(ids, self.physics.q[ids], motion, truth)
+        moment = Moment(ids, self.physics.q[ids], motion, truth, self.motion.present[ids] > 0.0)
         streams = self.streams
         estimate = self.senses.sense(
             moment, picked(streams.sensor, ids), picked(streams.tracker, ids)
@@ -272,9 +274,26 @@ class Simulation(Stateful):
         }
 
 
+def worker_counts(n_workers: int | tuple[int, int]) -> tuple[int, int]:
+    """The fewest and the most workers of an episode, from one number or from both.
+
+    Raises:
+        ConfigError: they are no whole numbers, 0 or more, in this order.
+    """
+    pair = tuple(n_workers) if isinstance(n_workers, Sequence) else (n_workers, n_workers)
+    whole = all(isinstance(k, int | np.integer) and not isinstance(k, bool) for k in pair)
+    if not whole or len(pair) != 2 or not 0 <= pair[0] <= pair[1]:
+        raise ConfigError(
+            "n_workers must be a whole number, 0 or more, or (fewest, most), from which each "
+            f"episode's number is drawn, got {n_workers!r}."
+        )
+    return int(pair[0]), int(pair[1])
+
+
 def named(activity: Ints) -> tuple[str, ...]:
     """The names of what workers (W,) do."""
-    return tuple(generator.activity_names[k] for k in activity.tolist())
+    names = generator.activity_names
+    return tuple(ABSENT_NAME if k == generator.ABSENT else names[k] for k in activity.tolist())
 
 
 def checked_action(action: ArrayLike, shape: tuple[int, ...]) -> Floats:
@@ -298,9 +317,9 @@ def rows_of(info: Info, ids: Ints) -> Info:
     return {name: value[ids] for name, value in info.items()}
 
 
-def cost_info(cost: metrics.Cost) -> Info:
-    """The cost by the names that safe-RL libraries read, and the separation."""
-    separation = np.where(np.isfinite(cost.min_separation_m), cost.min_separation_m, np.nan)
+def cost_info(cost: metrics.Cost, present: Bools) -> Info:
+    """The cost by the names that safe-RL libraries read, and the separation from who is there."""
+    separation = np.where(present.any(1), cost.min_separation_m, np.nan)
     return {
         "cost": cost.total,
         "cost_sum": cost.total,
@@ -310,7 +329,7 @@ def cost_info(cost: metrics.Cost) -> Info:
     }
 
 
-def tracking_info(estimate: PoseEstimate, truth: WorkerTruth) -> Info:
+def tracking_info(estimate: PoseEstimate, truth: WorkerTruth, present: Bools) -> Info:
     """How far the belief is from the truth; no error is given where nobody is tracked."""
-    error_m, lost = metrics.tracking_error(estimate, truth)
+    error_m, lost = metrics.tracking_error(estimate, truth, present)
     return {"tracking/mpjpe_m": error_m, "tracking/lost": lost.astype(float)}

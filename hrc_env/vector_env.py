@@ -67,7 +67,7 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
         estimator: str = "particle",
         cameras: Sequence[int | str] | None = None,
         scene: str = "lab",
-        n_workers: int = 1,
+        n_workers: int | tuple[int, int] = 1,
         people: str | PeopleConfig | None = None,
         control: str = "joint",
         render_mode: str | None = None,

@@ -9,9 +9,10 @@ from stable_baselines3.common.env_checker import check_env
 
 from hrc_env.body import worker_truth
 from hrc_env.env import HRCReachEnv
+from hrc_env.errors import ConfigError
 from hrc_env.geometry.assignment import assign
 from hrc_env.metrics import tracking_error
-from hrc_env.motion.generator import current
+from hrc_env.motion.generator import PeopleConfig, activity_names, current
 from hrc_env.records import WorkerTruth
 from hrc_env.sb3 import HRCVecEnv
 from hrc_env.tracking.given import estimate_from_truth
@@ -181,3 +182,38 @@ def without_the_second(motion):
     away = motion.position_world.copy()
     away[1] += 50.0
     return dataclasses.replace(motion, position_world=away)
+
+
+@pytest.mark.parametrize("level", FAST_LEVELS)
+def test_the_number_of_workers_is_drawn_anew_for_each_episode(level):
+    """Shapes stay; who is not there is not tracked, not seen and in nobody's way."""
+    env = HRCReachEnv(perception=level, n_workers=(1, 3))
+    counts = set()
+    for seed in range(8):
+        for _, _, info in walk(env, 12, seed):
+            there = [doing != "absent" for doing in info["worker/activity"]]
+            assert len(there) == 3
+            assert info.get("safety/min_separation_m", 1.0) < 20.0
+            if level == "truth":
+                assert not info["tracking/lost"]
+        counts.add(sum(there))
+        tracked = env.simulation.estimate.tracked[0]
+        assert level == "none" or tracked.sum() <= sum(there)
+        if level == "truth":
+            np.testing.assert_array_equal(tracked, there)
+    assert counts == {1, 2, 3}
+
+
+@pytest.mark.parametrize("count", [-1, 1.5, (2, 1), (1, 2, 3), True])
+def test_a_number_of_workers_that_cannot_be_is_refused(count):
+    with pytest.raises(ConfigError, match="n_workers"):
+        HRCReachEnv(perception="none", n_workers=count)
+
+
+@pytest.mark.parametrize("people", ["hurried", "unaware", PeopleConfig(tempo=0.8)])
+def test_people_are_chosen_by_name_or_made(people):
+    env = HRCReachEnv(perception="none", n_workers=2, people=people)
+    infos = [info for *_, info in walk(env, 20)]
+    assert all(set(info["worker/activity"]) <= set(activity_names) for info in infos)
+    with pytest.raises(ConfigError, match="attentive"):
+        HRCReachEnv(perception="none", people="atentive")

@@ -67,7 +67,7 @@ ARRIVED_M = 0.12
 HURRY = (1.0, 0.75)
 """Shares of their pace at which walkers try to get past each other."""
 PARKED_M = 60.0
-"""Who is not in an episode stands this far away [m]."""
+"""Who is not in an episode stands this far away along x and y [m], and deep below."""
 WITH_LOAD = (pl.STAND, pl.LOOK_ROUND, pl.SET_DOWN, pl.HAND_OVER)
 """What one does with something in one's hands; before anything else it is set down."""
 ROBOT_WORK_M = 1.1

@@ -28,6 +28,7 @@ from hrc_env.records import Grounds, Held, WorkerMotion, WorkerPath, Workplace
 from hrc_env.typing import Bools, Floats, Ints
 
 __all__ = [
+    "ABSENT",
     "PEOPLE",
     "MotionConfig",
     "MotionState",
@@ -44,6 +45,10 @@ __all__ = [
 
 activity_names: tuple[str, ...] = pl.ACTIVITY_NAMES
 """Names of the values of `activity`."""
+ABSENT = -1
+"""The activity of who is not in an episode."""
+PARKED_Z_M = -100.0
+"""They are so far below the floor, where no camera looks [m]."""
 HALT_S = 0.3
 """Time in which hands come to a halt, and go on [s]."""
 
@@ -194,8 +199,8 @@ def current(state: MotionState, ids: Ints | None = None) -> WorkerMotion:
 
 
 def activity(state: MotionState) -> Ints:
-    """(B, W) what each worker does, an index into `activity_names`."""
-    return state.activity.copy()
+    """(B, W) what each worker does: an index into `activity_names`, or `ABSENT`."""
+    return np.where(state.present > 0.0, state.activity, ABSENT)
 
 
 def _held(rows: Floats) -> Held:
@@ -212,7 +217,7 @@ def _arrays(state: MotionState) -> tuple:
     """What a pose follows from, in the order that the compiled functions take it."""
     return (
         state.clock_s, state.time_s, state.duration_s, state.activity, state.pace, state.plan,
-        state.prints, state.stance, state.offset, state.traits,
+        state.prints, state.stance, state.offset, state.traits, state.present,
         state.anatomy.offset, state.anatomy.frame, state.anatomy.size,
     )  # fmt: skip
 
@@ -233,11 +238,13 @@ def _pose(
 
 
 @compiled
-def _place(p: Floats, r: Floats, position: Floats, quaternion_: Floats) -> None:
-    """Write a pose into (22, ...) arrays."""
+def _place(present: float, p: Floats, r: Floats, position: Floats, quaternion_: Floats) -> None:
+    """Write a pose into (22, ...) arrays; far below the floor of who is not there."""
+    down = 0.0 if present > 0.0 else PARKED_Z_M
     for s in range(position.shape[0]):
         for i in range(3):
             position[s, i] = p[s, i]
+        position[s, 2] += down
         quaternion(r, s, quaternion_)
 
 
@@ -263,7 +270,7 @@ def _run(
     dt_s: float, n_steps: int, done: Ints, ticked: Bools,
     clock_s: Floats, time_s: Floats, duration_s: Floats, activity: Ints, pace: Floats,
     plan: Floats, prints: Floats, stance: Floats, offset: Floats, traits: Floats,
-    bones: Floats, frame: Floats, size: Floats,
+    present: Floats, bones: Floats, frame: Floats, size: Floats,
     position: Floats, quaternion_: Floats, velocity: Floats, turning: Floats, held: Floats,
 ) -> bool:  # fmt: skip
     """Move every environment on until done or someone must decide; whether anyone must."""
@@ -290,7 +297,7 @@ def _run(
                         b, w, i * RATE_H_S, clock_s, time_s, activity, pace, plan, prints, stance,
                         offset, traits, bones, frame, size, q, p[i], r[i],
                     )  # fmt: skip
-                _place(p[0], r[0], position[b, t, w], quaternion_[b, t, w])
+                _place(present[b, w], p[0], r[0], position[b, t, w], quaternion_[b, t, w])
                 if t == n_steps - 1:
                     _rates(p, r, velocity[b, w], turning[b, w])
                     prop_pose(q, held[b, w])
@@ -302,7 +309,7 @@ def _run(
 def _draw(
     rows: Ints, clock_s: Floats, time_s: Floats, duration_s: Floats, activity: Ints, pace: Floats,
     plan: Floats,     prints: Floats, stance: Floats, offset: Floats, traits: Floats,
-    bones: Floats, frame: Floats, size: Floats,
+    present: Floats, bones: Floats, frame: Floats, size: Floats,
     position: Floats, quaternion_: Floats, velocity: Floats, turning: Floats, held: Floats,
 ) -> None:  # fmt: skip
     """Bodies of some environments as they are, into arrays (rows, W, ...)."""
@@ -315,6 +322,6 @@ def _draw(
                     b, w, i * RATE_H_S, clock_s, time_s, activity, pace, plan, prints, stance,
                     offset, traits, bones, frame, size, q, p[i], r[i],
                 )  # fmt: skip
-            _place(p[0], r[0], position[row, w], quaternion_[row, w])
+            _place(present[b, w], p[0], r[0], position[row, w], quaternion_[row, w])
             _rates(p, r, velocity[row, w], turning[row, w])
             prop_pose(q, held[row, w])

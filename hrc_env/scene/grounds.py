@@ -77,7 +77,7 @@ LAB_CLUTTER_PLACES = (
     Workplace("top_plate", "overhead", (1.55, -2.0), -math.pi / 2, 1.9),
     Workplace("cartons", "pile", (2.15, 1.85), 0.7, 0.6),
     Workplace("crate", "pile", (2.1, -1.75), -0.75, 0.75),
-    Workplace("ladder", "step", (2.33, 0.82), 0.0, 0.22),
+    Workplace("ladder", "step", (2.23, 0.82), 0.0, 0.22),
 )
 """At the furniture: the table's end, the wall that is being built, the stacks in the corners."""
 
