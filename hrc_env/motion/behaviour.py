@@ -261,8 +261,10 @@ def _new_errand(who: Who) -> None:
 def _do_task(who: Who) -> tuple[int, float]:
     """Begin the task where the worker is; set down first what is in the way of it."""
     activity = pl.ACTIVITY_NAMES.index(who.task.activity)
+    if not who.kind_here:
+        activity = pl.LOOK_ROUND
     if who.loaded and activity not in WITH_LOAD:
-        who.going = UNDER_WAY  # that is, the task comes next
+        who.going = UNDER_WAY
         return _work(who, pl.SET_DOWN)
     if activity in pl.GIVING and not who.loaded:
         activity = pl.LOOK_ROUND
@@ -286,7 +288,8 @@ def _work(who: Who, activity: int) -> tuple[int, float]:
     )
     if _meets(who, activity, lasts)[0] >= 0.0:
         _stay(who)
-        who.going = UNDER_WAY
+        if who.kind_here:
+            who.going = UNDER_WAY  # that is, the task comes next
         return _stand(who, who.draw(LASTS, WAIT_S))
     return activity, lasts
 
@@ -351,7 +354,7 @@ def _step_back(who: Who) -> tuple[int, float] | None:
     if room < 0.0 or _meets(who, pl.STEP_BACK, lasts)[0] >= 0.0:
         _stay(who)
         return None
-    if who.going == THERE:
+    if who.going == THERE and who.kind_here:
         who.going = UNDER_WAY
     return pl.STEP_BACK, lasts
 

@@ -25,7 +25,7 @@ class MotionConfig:
     """Greatest angle from the robot's front there [rad]; judgement."""
     dwell_s: Range = (6.0, 16.0)
     """Time at one place before another errand [s]; judgement."""
-    spacing_m: float = 1.0
+    spacing_m: float = 1.1
     """Workers choose no place this near to another worker's [m]; judgement."""
     near_pause_s: Range = (0.5, 2.0)
     """Length of a pause at the robot [s]; judgement."""

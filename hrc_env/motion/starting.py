@@ -33,7 +33,7 @@ from hrc_env.typing import Floats
 
 BODY_M = 0.36
 """Hands reach no nearer to their own root than this [m]."""
-OWN_SIDE_M = 0.20
+OWN_SIDE_M = 0.30
 """Hands keep so far from the middle between their worker and another [m]."""
 OVERHEAD_M = 1.7
 """Drilling at this height or above is overhead work [m]."""

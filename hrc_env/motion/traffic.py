@@ -14,7 +14,7 @@ from hrc_env.typing import Floats, Ints
 
 APART_M = 0.80
 """Roots keep so far from each other [m]: two half widths of people with arms, and some."""
-AHEAD_M, HANDS_M = 0.45, 0.66
+AHEAD_M, HANDS_M = 0.48, 0.76
 """Who works has hands and head so far ahead [m]; others' roots keep so far from there."""
 CART_M, CART_APART_M = 1.0, 0.95
 """The same of who pushes a cart."""

@@ -71,7 +71,7 @@ LAB_PLACES = (
 )
 """In the empty room."""
 LAB_CLUTTER_PLACES = (
-    Workplace("table", "bench", (0.0, 1.75), math.pi, 0.84),
+    Workplace("table", "bench", (0.06, 1.75), math.pi, 0.84),
     Workplace("open_studs", "wall", (1.9, -2.0), -math.pi / 2, 1.2),
     Workplace("boarded_studs", "wall", (1.2, -2.0), -math.pi / 2, 1.2),
     Workplace("top_plate", "overhead", (1.55, -2.0), -math.pi / 2, 1.9),
