@@ -283,7 +283,8 @@ def _place(body, mean):
     mean[:] = np.nan
     for j in range(len(met)):
         if met[j]:
-            mean[j] = points[j]
+            for i in range(3):
+                mean[j, i] = points[j, i]
 
 
 @numba.njit(**LEAN)
