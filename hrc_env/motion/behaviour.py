@@ -74,6 +74,8 @@ ROBOT_WORK_M = 1.1
 """Height of the work at the robot [m]."""
 ABOVE_M = 0.17
 """Hands work so far above a bench [m]: a hand and a workpiece are as thick; judgement."""
+STUMBLE_TO = ("robot", "open", "floor")
+"""Kinds of places with room ahead for the arms of somebody who stumbles."""
 CHEST_M = 1.2
 """Loads are set down or leant against something no higher than this [m]."""
 
@@ -335,7 +337,10 @@ def _set_out(who: Who, place: Place, obstacles: Floats, share: float) -> tuple[i
         activity = pl.CARRY
     elif who.task.by == "push":
         activity, prop = pl.PUSH, prop_index(who.task.prop)
-    elif who.draws[EVENT] > 1.0 - mind.config.people.stumble_probability:
+    elif (
+        who.task.at in STUMBLE_TO
+        and who.draws[EVENT] > 1.0 - mind.config.people.stumble_probability
+    ):
         activity = pl.STUMBLE
     pace = share * me.traits.item(pl.SPEED_TRAIT)
     return activity, start_going(activity, who.draws, place, via[:n], pace, prop, me)

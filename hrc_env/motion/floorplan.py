@@ -15,7 +15,7 @@ from hrc_env.motion.compiled import compiled
 from hrc_env.records import Grounds, Workplace
 from hrc_env.typing import Floats
 
-BODY_M = 0.36
+BODY_M = 0.40
 """Walkers keep so far from what stands there: half their width, arms swinging included [m]."""
 STAND_M = 0.22
 """Those who stand and work keep so far: half the depth of a trunk and its sway [m]; judgement."""

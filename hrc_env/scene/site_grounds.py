@@ -32,16 +32,16 @@ PLACES = (
 )
 """On the empty ground."""
 CLUTTER_PLACES = (
-    Workplace("table", "bench", (0.0, 1.75), WEST, 0.84),
+    Workplace("table", "bench", (0.06, 1.75), WEST, 0.84),
     Workplace("west_studs_1", "wall", (-3.46, -1.0), WEST, 1.2),
     Workplace("west_studs_2", "wall", (-3.46, 0.2), WEST, 1.2),
     Workplace("north_studs_1", "wall", (0.6, 3.86), NORTH, 1.2),
     Workplace("north_studs_2", "wall", (1.4, 3.86), NORTH, 1.4),
     Workplace("lintel", "overhead", (-0.8, 4.2), NORTH, 1.95),
-    Workplace("west_top", "overhead", (-3.8, 1.7), WEST, 1.95),
+    Workplace("west_top", "overhead", (-3.64, 1.7), WEST, 1.95),
     Workplace("timber", "pile", (6.1, 2.6), EAST, 1.1),
     Workplace("timber_end", "pile", (6.1, 1.4), EAST, 0.6),
-    Workplace("blocks", "pile", (5.1, -1.2), SOUTH, 0.9),
+    Workplace("blocks", "pile", (5.1, -1.0), SOUTH, 0.9),
     Workplace("cartons", "pile", (4.2, 4.75), 0.9, 0.9),
     Workplace("hop_up", "step", (HOP_UP_XY_M[0], HOP_UP_XY_M[1] - 0.5), NORTH, HOP_UP_M[2]),
     Workplace("sand", "cart", (-4.6, -4.9), -2.7, 0.69),
