@@ -39,11 +39,11 @@ CLUTTER_PLACES = (
     Workplace("north_studs_2", "wall", (1.4, 3.86), NORTH, 1.4),
     Workplace("lintel", "overhead", (-0.8, 4.2), NORTH, 1.95),
     Workplace("west_top", "overhead", (-3.64, 1.7), WEST, 1.95),
-    Workplace("timber", "pile", (6.1, 2.6), EAST, 1.1),
-    Workplace("timber_end", "pile", (6.1, 1.4), EAST, 0.6),
+    Workplace("timber", "pile", (6.0, 2.6), EAST, 1.24),
+    Workplace("timber_end", "pile", (6.0, 1.4), EAST, 1.24),
     Workplace("blocks", "pile", (5.1, -1.0), SOUTH, 0.9),
-    Workplace("cartons", "pile", (4.2, 4.75), 0.9, 0.9),
-    Workplace("hop_up", "step", (HOP_UP_XY_M[0], HOP_UP_XY_M[1] - 0.5), NORTH, HOP_UP_M[2]),
+    Workplace("cartons", "pile", (4.1, 4.63), 0.9, 0.9),
+    Workplace("hop_up", "step", (HOP_UP_XY_M[0], HOP_UP_XY_M[1] - 0.6), NORTH, HOP_UP_M[2]),
     Workplace("sand", "cart", (-4.6, -4.9), -2.7, 0.69),
 )
 """At walls (tools work 0.7 m ahead of who stands there), table and stacks."""
