@@ -180,7 +180,8 @@ def _measure(scene, body, motion, solids, state, deepest, notes) -> None:
     names = generator.activity_names
     for doing in state.activity.ravel().tolist():
         notes.doing[names[doing]] += 1
-    depth, part, solid = _in_solids(capsules, radius, solids)
+    feet = np.array(["foot" in part or "toes" in part for part in body.capsule_names])
+    depth, part, solid = _in_solids(capsules, radius, solids, state.activity == CLIMB, feet)
     worst = depth.max(1)
     for b in np.flatnonzero(worst > DEEPEST_M):
         w = int(depth[b].argmax())
@@ -212,8 +213,11 @@ def _is_floor(solids: np.ndarray) -> np.ndarray:
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _in_solids(capsules, radius, solids):
-    """How deep each of (B, W) workers is in a solid [m], with which capsule, in which solid."""
+def _in_solids(capsules, radius, solids, climbing, feet):
+    """How deep each of (B, W) workers is in a solid [m], with which capsule, in which solid.
+
+    Feet (K,) of who is climbing stand on one, as others' on the floor, and are left out.
+    """
     n_b, n_w, n_k = capsules.shape[:3]
     depth = np.full((n_b, n_w), -np.inf)
     part, solid = np.zeros((n_b, n_w), np.int64), np.zeros((n_b, n_w), np.int64)
@@ -225,6 +229,8 @@ def _in_solids(capsules, radius, solids):
                 if solids[g, KIND] != PLANE and math.hypot(dx, dy) > solids[g, REACH] + 1.6:
                     continue
                 for k in range(n_k):
+                    if climbing[b, w] and feet[k]:
+                        continue
                     for i in range(5):
                         away = _distance(capsules[b, w, k], 0.25 * i, solids[g])
                         if radius[k] - away > depth[b, w]:
