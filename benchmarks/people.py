@@ -23,6 +23,7 @@ from hrc_env.geometry import chains
 from hrc_env.geometry.distances import narrowest_gap
 from hrc_env.geometry.shapes import AXES, BOX, CAPSULE, CENTRE, HALF_SIZE, KIND, PLANE, REACH
 from hrc_env.motion import generator
+from hrc_env.motion.plans import CLIMB
 from hrc_env.motion.state import GOING, SPOT_X, SPOT_Y, THERE
 from hrc_env.results import Metric, write_results
 from hrc_env.scene.build import Scene, build
