@@ -5,15 +5,16 @@
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 from hrc_env.control import ControlConfig
 from hrc_env.errors import ConfigError
 from hrc_env.mapping import from_mapping
 from hrc_env.metrics import CostConfig
-from hrc_env.motion.generator import MotionConfig, PeopleConfig, people_called
+from hrc_env.motion.generator import Clip, MotionConfig, PeopleConfig, people_called
 from hrc_env.perception.emulator import EmulatorConfig
 from hrc_env.perception.eyes import EyesConfig
 from hrc_env.rewards import RewardConfig
@@ -96,6 +97,20 @@ def resolve(config: "HRCConfig | Mapping[str, Any] | None") -> HRCConfig:
             f"config must be an HRCConfig, a mapping or None, got {type(config).__name__}."
         )
     return from_mapping(HRCConfig, config)
+
+
+def with_motions(config: HRCConfig, motions: "Sequence[str | Path | Clip] | None") -> HRCConfig:
+    """A config whose workers play these clips, too; None for those it has.
+
+    Raises:
+        ConfigError: something else than paths and clips.
+    """
+    if motions is None:
+        return config
+    if isinstance(motions, str | Path | Clip):
+        motions = (motions,)
+    given = tuple(str(motion) if isinstance(motion, Path) else motion for motion in motions)
+    return replace(config, motion=replace(config.motion, motions=given))
 
 
 def with_people(config: HRCConfig, people: "str | PeopleConfig | None") -> HRCConfig:

@@ -5,6 +5,7 @@ env = gymnasium.make("HRCReach-v0", perception="keypoints")
 """
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -13,9 +14,9 @@ from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
 from hrc_env import observations
-from hrc_env.config import HRCConfig, resolve, with_people
+from hrc_env.config import HRCConfig, resolve, with_motions, with_people
 from hrc_env.errors import ConfigError, unknown
-from hrc_env.motion.generator import PeopleConfig
+from hrc_env.motion.generator import Clip, PeopleConfig
 from hrc_env.simulation import Simulation, checked_action
 from hrc_env.stateful import Stateful
 from hrc_env.typing import Floats
@@ -38,6 +39,8 @@ class HRCReachEnv(Stateful, gymnasium.Env[NDArray[np.float32], NDArray[np.float3
             observation has room for the most.
         people: how the workers are with the robot: "attentive", "hurried", "unaware", a
             `PeopleConfig`, or None for those of the config (attentive).
+        motions: clips of recorded motion that the workers play, too, or paths of such
+            (docs/motion_capture.md); None for those of the config (none).
         control: "joint" (joint velocities) or "tool" (tool velocity).
         render_mode: "rgb_array", "depth_array" or None.
         config: an `HRCConfig` or a nested mapping of changes to the default.
@@ -57,13 +60,14 @@ class HRCReachEnv(Stateful, gymnasium.Env[NDArray[np.float32], NDArray[np.float3
         scene: str = "lab",
         n_workers: int | tuple[int, int] = 1,
         people: str | PeopleConfig | None = None,
+        motions: Sequence[str | Path | Clip] | None = None,
         control: str = "joint",
         render_mode: str | None = None,
         config: HRCConfig | Mapping[str, Any] | None = None,
     ) -> None:
         if render_mode is not None and render_mode not in RENDER_MODES:
             raise unknown("render_mode", render_mode, RENDER_MODES)
-        self.config = with_people(resolve(config), people)
+        self.config = with_motions(with_people(resolve(config), people), motions)
         self.render_mode = render_mode
         self.simulation = Simulation(
             1, perception, estimator, cameras, scene, n_workers, control, self.config

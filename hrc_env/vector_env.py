@@ -10,6 +10,7 @@ environments and of threads. What it says, and in which form, is what gymnasium'
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,10 +19,10 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from hrc_env.config import HRCConfig, resolve, with_people
+from hrc_env.config import HRCConfig, resolve, with_motions, with_people
 from hrc_env.env import RENDER_MODES, spaces
 from hrc_env.errors import ConfigError, unknown
-from hrc_env.motion.generator import PeopleConfig
+from hrc_env.motion.generator import Clip, PeopleConfig
 from hrc_env.shards import Shards, n_cores
 from hrc_env.simulation import Outcome, Simulation, checked_action
 from hrc_env.stateful import Stateful
@@ -46,7 +47,8 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
     Args:
         num_envs: how many.
         perception: "keypoints", "truth" or "none"; pictures have no batched form.
-        estimator, cameras, scene, n_workers, people, control, config: as `HRCReachEnv`.
+        estimator, cameras, scene, n_workers, people, motions, control, config: as
+            `HRCReachEnv`.
         render_mode: "rgb_array", "depth_array" or None.
         max_episode_steps: the time limit; None or -1 is none.
         autoreset_mode: when an environment whose episode is over starts anew: at the next
@@ -69,6 +71,7 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
         scene: str = "lab",
         n_workers: int | tuple[int, int] = 1,
         people: str | PeopleConfig | None = None,
+        motions: Sequence[str | Path | Clip] | None = None,
         control: str = "joint",
         render_mode: str | None = None,
         config: HRCConfig | Mapping[str, Any] | None = None,
@@ -85,7 +88,10 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
             raise unknown("render_mode", render_mode, RENDER_MODES)
         self.num_envs = _whole("num_envs", num_envs, 1, MAX_ENVS)
         self.autoreset_mode = _mode(autoreset_mode)
-        self.config, self.render_mode = with_people(resolve(config), people), render_mode
+        self.config, self.render_mode = (
+            with_motions(with_people(resolve(config), people), motions),
+            render_mode,
+        )
         self.shards = Shards(
             self.num_envs,
             min(_threads(num_threads), self.num_envs),

@@ -17,6 +17,7 @@ from hrc_env.motion.activities.worker import N_START, Place, Worker
 from hrc_env.motion.errands import HERE, Task, picked
 from hrc_env.motion.floorplan import CELL_M, slack_at
 from hrc_env.motion.kinematics import N_FRAMES, N_POINTS
+from hrc_env.motion.playing import TURNS_RAD, following, roots, start_clip
 from hrc_env.motion.routes import route
 from hrc_env.motion.starting import start_going, start_here
 from hrc_env.motion.state import (
@@ -58,6 +59,8 @@ PLACES, N_TRIED = N_START + 8, 5
 """First of the draws for places, three a place, and how many are tried."""
 N_DRAWS = PLACES + 3 * N_TRIED
 """Uniform numbers of one decision."""
+WISHED_CLIP, WHICH_CLIP = N_START - 2, N_START - 1
+"""Of an activity's own draws: whether to play a clip instead of it, and which."""
 WAIT_S = (0.5, 1.1)
 """Who finds no way looks again after so long [s]; judgement."""
 CHANGE_S, GIVE_UP_S = 1.5, 4.5
@@ -144,7 +147,10 @@ def follow_up(state: MotionState, b: int, w: int, draws: Floats) -> None:
     over = (state.time_s.item(b, w) - end) / pace if pace != 0.0 else 0.0
     who = _who(state, b, w, draws, state.clock_s.item(b, w) - over)
     me, q = who.me, np.empty((2, c.N_CONTROLS))
-    rows = (me.plan, me.prints, me.stance, state.offset[b, w], me.traits, me.size, q)
+    rows = (
+        me.plan, me.prints, me.stance, state.offset[b, w], me.traits, me.size,
+        state.mind.clips.frames, q,
+    )  # fmt: skip
     leave(end, pace, who.now, int(state.activity[b, w]), *rows)
     who.load = me.plan.item(pl.LOAD_PROP)
     state.pace[b, w] = 1.0
@@ -198,6 +204,9 @@ def next_activity(who: Who) -> tuple[int, float]:
         return _step_back(who) or _stand(who, alert.item(LASTS_S))
     if doing == PAUSE and who.going == UNDER_WAY and alert[UNTIL_AT] > who.now:
         return _stand(who, alert.item(UNTIL_AT) - who.now)
+    played = _play(who)
+    if played:
+        return played
     if who.going == UNDER_WAY and _arrived(who):
         who.going = THERE
         return _do_task(who)
@@ -234,6 +243,8 @@ def _begin(who: Who, activity: int, lasts: float) -> None:
     pauses = draw < people.pause_probability
     backs = draw < people.pause_probability + people.step_back_probability
     alert[KIND] = PAUSE if pauses else BACK_AWAY if backs else NO_REACTION
+    if activity == pl.CLIP and alert[KIND] == BACK_AWAY:
+        alert[KIND] = PAUSE  # what was recorded may go anywhere, but not backwards
     alert[DELAY_S] = who.draw(DELAY, people.delay_s)
     alert[LASTS_S] = who.draw(REACTION_S, people.pause_s)
 
@@ -344,6 +355,32 @@ def _set_out(who: Who, place: Place, obstacles: Floats, share: float) -> tuple[i
         activity = pl.STUMBLE
     pace = share * me.traits.item(pl.SPEED_TRAIT)
     return activity, start_going(activity, who.draws, place, via[:n], pace, prop, me)
+
+
+def _play(who: Who) -> tuple[int, float] | None:
+    """Begin to play a clip where the worker is, if it is wished and there is room for it.
+
+    Who has just played one goes on with the next, wherever they are.
+    """
+    state, mind, n_clips = who.state, who.state.mind, len(who.state.mind.clips.count)
+    was = int(state.activity[who.b, who.w])
+    idle = who.going == THERE or was == pl.CLIP
+    if n_clips == 0 or who.loaded or not idle:
+        return None
+    wished, which = who.draws[WISHED_CLIP], who.draws.item(WHICH_CLIP)
+    if wished >= mind.config.motions_probability:
+        return None
+    first = int(which * n_clips)
+    if was == pl.CLIP:
+        first = following(mind.clips, who.me.plan)
+    for turn_rad in TURNS_RAD:
+        lasts = start_clip(first, turn_rad, mind.clips, who.me)
+        room = min(slack_at(x, y, mind.plan.slack, mind.plan.origin) for x, y in roots(who.me.plan))
+        if room >= 0.0 and _meets(who, pl.CLIP, lasts)[0] < 0.0:
+            who.going = UNDER_WAY  # that is, back to the place afterwards
+            return pl.CLIP, lasts
+    _stay(who)
+    return None
 
 
 def _step_back(who: Who) -> tuple[int, float] | None:

@@ -4,6 +4,7 @@ from collections import namedtuple
 from dataclasses import dataclass, field, fields
 
 from hrc_env.errors import ConfigError
+from hrc_env.motion.capture.clip import Clip
 from hrc_env.motion.errands import TASKS, Task, check_tasks
 from hrc_env.motion.people import PeopleConfig
 
@@ -55,6 +56,10 @@ class MotionConfig:
     """How the workers are with the robot and their work; the environment's `people` by name."""
     tasks: tuple[Task, ...] = TASKS
     """What they do, and what follows what."""
+    motions: tuple[str | Clip, ...] = ()
+    """Clips of recorded motion that workers play, too: paths, or clips (docs/motion_capture.md)."""
+    motions_probability: float = 0.5
+    """Chance that a worker with empty hands plays one next, where there is room for it."""
 
     def __post_init__(self) -> None:
         """Check ranges and probabilities."""
@@ -70,6 +75,9 @@ class MotionConfig:
                 f"spacing_m must be 0.8 or more, or workers would touch: {self.spacing_m}."
             )
         check_tasks(self.tasks)
+        for motion in self.motions:
+            if not isinstance(motion, str | Clip):
+                raise ConfigError(f"motions must hold paths or clips, got {motion!r}.")
 
 
 COMPILED = (

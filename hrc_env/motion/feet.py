@@ -104,9 +104,11 @@ def _climbed(w: float, step_up: float) -> float:
 
 @compiled
 def raise_heel(side: int, pitch: float, size: Floats, q: Floats) -> None:
-    """Pitch a standing foot about its ball, where the toes stay."""
+    """Pitch a standing foot about its ball, where the toes stay (negative: about its heel)."""
     at = c.ANKLE + 6 * side
     ahead, above = about(pitch, size[BALL_X], size[BALL_Z])
+    if pitch < 0.0:
+        ahead, above = about(pitch, size[HEEL_X], -size[ANKLE_Z])
     q[at] += math.cos(q[at + 3]) * ahead
     q[at + 1] += math.sin(q[at + 3]) * ahead
     q[at + 2] += above

@@ -15,6 +15,7 @@ from hrc_env.motion import plans as pl
 from hrc_env.motion import state as st
 from hrc_env.motion.anatomy import anatomy
 from hrc_env.motion.behaviour import N_DRAWS, begin_episode, follow_up
+from hrc_env.motion.capture.clip import Clip, opened
 from hrc_env.motion.compiled import compiled
 from hrc_env.motion.config import MotionConfig, numbers
 from hrc_env.motion.errands import errands_at
@@ -22,6 +23,7 @@ from hrc_env.motion.floorplan import floorplan, room_for
 from hrc_env.motion.holding import N_HELD, prop_pose
 from hrc_env.motion.kinematics import N_FRAMES, N_POINTS, pose, quaternion, spin
 from hrc_env.motion.people import PEOPLE, PeopleConfig, people_called
+from hrc_env.motion.playing import Clips, stocked
 from hrc_env.motion.reactions import notice
 from hrc_env.motion.state import RATE_H_S, MotionState, evaluate
 from hrc_env.records import Grounds, Held, WorkerMotion, WorkerPath, Workplace
@@ -30,6 +32,7 @@ from hrc_env.typing import Bools, Floats, Ints
 __all__ = [
     "ABSENT",
     "PEOPLE",
+    "Clip",
     "MotionConfig",
     "MotionState",
     "PeopleConfig",
@@ -84,13 +87,17 @@ def make_state(
         fewest: so many workers are in an episode at least, drawn at its beginning; None: all.
 
     Raises:
-        ConfigError: negative sizes, more workers than fit, a place in a wall.
+        ConfigError: negative sizes, more workers than fit, a place in a wall, a clip that
+            cannot be played.
     """
     if batch < 1 or n_workers < 0:
         raise ConfigError(f"Need batch >= 1 and n_workers >= 0, got {batch} and {n_workers}.")
     fewest = n_workers if fewest is None else fewest
     if not 0 <= fewest <= n_workers:
         raise ConfigError(f"The fewest workers must be 0 to {n_workers}, got {fewest}.")
+
+    bones = anatomy(body)
+    clips = stocked([opened(motion) for motion in config.motions], bones.size)
 
     def array(*shape: int) -> Floats:
         return np.zeros((batch, n_workers, *shape))
@@ -102,11 +109,13 @@ def make_state(
         offset=array(c.N_BLENDED, 2), traits=array(pl.N_TRAITS), pace=array(2),
         spots=array(st.N_SPOT), errand=np.zeros((batch, n_workers, st.N_ERRAND), np.int64),
         alert=array(st.N_ALERT), robot=np.full((batch, 2, 3), np.inf), present=array(),
-        anatomy=anatomy(body), mind=_mind(config, grounds, n_workers, fewest),
+        anatomy=bones, mind=_mind(config, grounds, clips, n_workers, fewest),
     )  # fmt: skip
 
 
-def _mind(config: MotionConfig, grounds: Grounds, n_workers: int, fewest: int) -> st.Mind:
+def _mind(
+    config: MotionConfig, grounds: Grounds, clips: Clips, n_workers: int, fewest: int
+) -> st.Mind:
     """The constants of decisions."""
     plan = floorplan(grounds)
     fit = room_for(plan, config.spacing_m)
@@ -120,7 +129,7 @@ def _mind(config: MotionConfig, grounds: Grounds, n_workers: int, fewest: int) -
         places[place.kind] = (*places.get(place.kind, ()), place)
     errands = errands_at(config.tasks, tuple(places))
     values = numbers(config, grounds.robot_xy_m)
-    return st.Mind(config, values, plan, errands, places, fewest)
+    return st.Mind(config, values, plan, errands, places, clips, fewest)
 
 
 def reset(state: MotionState, ids: Ints, rngs: Sequence[np.random.Generator]) -> None:
@@ -218,7 +227,7 @@ def _arrays(state: MotionState) -> tuple:
     return (
         state.clock_s, state.time_s, state.duration_s, state.activity, state.pace, state.plan,
         state.prints, state.stance, state.offset, state.traits, state.present,
-        state.anatomy.offset, state.anatomy.frame, state.anatomy.size,
+        state.anatomy.offset, state.anatomy.frame, state.anatomy.size, state.mind.clips.frames,
     )  # fmt: skip
 
 
@@ -226,13 +235,13 @@ def _arrays(state: MotionState) -> tuple:
 def _pose(
     b: int, w: int, later_s: float, clock_s: Floats, time_s: Floats, activity: Ints, pace: Floats,
     plan: Floats, prints: Floats, stance: Floats, offset: Floats, traits: Floats,
-    bones: Floats, frame: Floats, size: Floats, q: Floats, p: Floats, r: Floats,
+    bones: Floats, frame: Floats, size: Floats, frames: Floats, q: Floats, p: Floats, r: Floats,
 ) -> None:  # fmt: skip
     """Worker (b, w) a little later than now: points p and frames r of `kinematics.pose`."""
     t, clock = time_s[b, w] + pace[b, w, 0] * later_s, clock_s[b, w] + later_s
     evaluate(
         activity[b, w], t, clock, plan[b, w], prints[b, w], stance[b, w], offset[b, w],
-        traits[b, w], size, q,
+        traits[b, w], size, frames, q,
     )  # fmt: skip
     pose(q, bones, frame, size, p, r)
 
@@ -270,7 +279,7 @@ def _run(
     dt_s: float, n_steps: int, done: Ints, ticked: Bools,
     clock_s: Floats, time_s: Floats, duration_s: Floats, activity: Ints, pace: Floats,
     plan: Floats, prints: Floats, stance: Floats, offset: Floats, traits: Floats,
-    present: Floats, bones: Floats, frame: Floats, size: Floats,
+    present: Floats, bones: Floats, frame: Floats, size: Floats, frames: Floats,
     position: Floats, quaternion_: Floats, velocity: Floats, turning: Floats, held: Floats,
 ) -> bool:  # fmt: skip
     """Move every environment on until done or someone must decide; whether anyone must."""
@@ -295,7 +304,7 @@ def _run(
                 for i in range(1 if t == n_steps - 1 else 0, -1, -1):
                     _pose(
                         b, w, i * RATE_H_S, clock_s, time_s, activity, pace, plan, prints, stance,
-                        offset, traits, bones, frame, size, q, p[i], r[i],
+                        offset, traits, bones, frame, size, frames, q, p[i], r[i],
                     )  # fmt: skip
                 _place(present[b, w], p[0], r[0], position[b, t, w], quaternion_[b, t, w])
                 if t == n_steps - 1:
@@ -308,8 +317,8 @@ def _run(
 @compiled
 def _draw(
     rows: Ints, clock_s: Floats, time_s: Floats, duration_s: Floats, activity: Ints, pace: Floats,
-    plan: Floats,     prints: Floats, stance: Floats, offset: Floats, traits: Floats,
-    present: Floats, bones: Floats, frame: Floats, size: Floats,
+    plan: Floats, prints: Floats, stance: Floats, offset: Floats, traits: Floats,
+    present: Floats, bones: Floats, frame: Floats, size: Floats, frames: Floats,
     position: Floats, quaternion_: Floats, velocity: Floats, turning: Floats, held: Floats,
 ) -> None:  # fmt: skip
     """Bodies of some environments as they are, into arrays (rows, W, ...)."""
@@ -320,7 +329,7 @@ def _draw(
             for i in range(1, -1, -1):
                 _pose(
                     b, w, i * RATE_H_S, clock_s, time_s, activity, pace, plan, prints, stance,
-                    offset, traits, bones, frame, size, q, p[i], r[i],
+                    offset, traits, bones, frame, size, frames, q, p[i], r[i],
                 )  # fmt: skip
             _place(present[b, w], p[0], r[0], position[row, w], quaternion_[row, w])
             _rates(p, r, velocity[row, w], turning[row, w])

@@ -61,6 +61,12 @@ TREADS, RISER_M, UP_S = range(OWN, OWN + 3)
 """Climb. How many treads, how high each is, how long going up takes."""
 LEFT_RAD, LEFT_S, RIGHT_RAD, RIGHT_S = range(OWN, OWN + 4)
 """Look round. How far the gaze goes to one side and the other, until when it stays there [s]."""
+CLIP_ROW, CLIP_FRAMES, CLIP_FPS, CLIP_YAW, CLIP_S = range(OWN, OWN + 5)
+"""Clip. First row of its frames among all, how many, how many a second; heading that it is turned
+to; how long it plays [s]."""
+ROOTS, N_ROOTS = OWN + 5, 48
+"""Clip. Where the root is (x, y) at so many moments, at equal intervals from its beginning to its
+end: coarse, for those who walk round it."""
 MAX_VIA, PIECE = 8, 6
 """Most corners of a path; columns of a piece, see `paths`."""
 PATH = OWN + 16
@@ -79,11 +85,11 @@ STAND, WALK, REACH, LIFT = range(4)
 TURN, CARRY, PUSH, STUMBLE, STEP_BACK = range(4, 9)
 LOOK_ROUND, PICK_UP, SET_DOWN, HAND_OVER, RECEIVE = range(9, 14)
 SQUATTING, KNEELING, HAMMER, DRILL, OVERHEAD, SAW, MEASURE, POINT = range(14, 22)
-LUNGE, CLIMB = 22, 23
+LUNGE, CLIMB, CLIP = 22, 23, 24
 ACTIVITY_NAMES = (
     "stand", "walk", "reach", "lift", "turn", "carry", "push", "stumble", "step back",
     "look round", "pick up", "set down", "hand over", "receive", "squat", "kneel", "hammer",
-    "drill", "drill overhead", "saw", "measure", "point", "lunge", "climb",
+    "drill", "drill overhead", "saw", "measure", "point", "lunge", "climb", "clip",
 )  # fmt: skip
 GOING = (WALK, TURN, CARRY, STUMBLE, STEP_BACK)
 TAKING, GIVING = (PICK_UP, RECEIVE), (SET_DOWN, HAND_OVER)

@@ -10,6 +10,7 @@ from hrc_env.motion.activities.climb import climb
 from hrc_env.motion.activities.going import push
 from hrc_env.motion.activities.loads import pick_up
 from hrc_env.motion.activities.look_round import look_round
+from hrc_env.motion.activities.recorded import play
 from hrc_env.motion.activities.work import work
 from hrc_env.motion.anatomy import Anatomy
 from hrc_env.motion.compiled import compiled
@@ -20,6 +21,7 @@ from hrc_env.motion.feet import foot, step_time
 from hrc_env.motion.floorplan import Floorplan
 from hrc_env.motion.hands import lift, reach
 from hrc_env.motion.holding import drop_load, hold_load
+from hrc_env.motion.playing import Clips
 from hrc_env.motion.posture import STANCE_HALF_WIDTH_M, stand
 from hrc_env.motion.walk import footprint, walk
 from hrc_env.records import Workplace
@@ -61,6 +63,8 @@ class Mind:
     errands: Errands
     places: dict[str, tuple[Workplace, ...]]
     """By kind."""
+    clips: Clips
+    """What there is to play."""
     fewest: int
     """Workers who are in an episode at least."""
 
@@ -109,7 +113,7 @@ class MotionState:
 @compiled
 def evaluate(
     activity: int, t: float, clock_s: float, plan: Floats, prints: Floats, stance: Floats,
-    offset: Floats, traits: Floats, size: Floats, q: Floats,
+    offset: Floats, traits: Floats, size: Floats, frames: Floats, q: Floats,
 ) -> None:  # fmt: skip
     """The control vector q at time t of an activity: its closed form."""
     feet_s = step_time(t, plan) - (plan[pl.TAKEN_S] if activity == pl.PUSH else 0.0)
@@ -131,6 +135,8 @@ def evaluate(
         work(t, plan, clock_s, traits, size, q)
     elif activity == pl.CLIMB:
         climb(t, plan, clock_s, traits, size, q)
+    elif activity == pl.CLIP:
+        play(t, plan, prints, stance, clock_s, traits, size, frames, q)
     else:
         _stay(activity, t, plan, clock_s, traits, size, q)
     if t < BLEND_S:
@@ -175,7 +181,7 @@ def stop(plan: Floats, prints: Floats, stance: Floats) -> float:
 @compiled
 def leave(
     t: float, pace: float, clock_s: float, activity: int, plan: Floats, prints: Floats,
-    stance: Floats, offset: Floats, traits: Floats, size: Floats, q: Floats,
+    stance: Floats, offset: Floats, traits: Floats, size: Floats, frames: Floats, q: Floats,
 ) -> None:  # fmt: skip
     """End an activity at its time t: fill q (2, N_CONTROLS) then and a little later, and stop.
 
@@ -186,13 +192,14 @@ def leave(
         activity, plan, prints, stance, offset, traits: the worker's rows; plan and stance are
             made to begin where it ended, and what was set down is gone.
         size: of the body.
+        frames: of the clips.
         q: written.
     """
     for i in range(2):
         later = i * RATE_H_S
         evaluate(
             activity, t + pace * later, clock_s + later, plan, prints, stance, offset, traits,
-            size, q[i],
+            size, frames, q[i],
         )  # fmt: skip
     unwound = stop(plan, prints, stance)
     if activity in pl.GIVING or activity == pl.PUSH:
@@ -204,7 +211,7 @@ def leave(
 @compiled
 def join(
     clock_s: float, activity: int, plan: Floats, prints: Floats, stance: Floats, offset: Floats,
-    traits: Floats, size: Floats, q: Floats,
+    traits: Floats, size: Floats, frames: Floats, q: Floats,
 ) -> None:  # fmt: skip
     """Let an activity that begins now take over smoothly from q (2, N_CONTROLS) of `leave`."""
     mine = np.empty((2, c.N_CONTROLS))
@@ -212,8 +219,9 @@ def join(
     for i in range(2):
         later = i * RATE_H_S
         evaluate(
-            activity, later, clock_s + later, plan, prints, stance, offset, traits, size, mine[i]
-        )
+            activity, later, clock_s + later, plan, prints, stance, offset, traits, size, frames,
+            mine[i],
+        )  # fmt: skip
     for i in range(c.N_BLENDED):
         gap, then = q[0, i] - mine[0, i], q[1, i] - mine[1, i]
         offset[i, 0], offset[i, 1] = gap, (then - gap) / RATE_H_S

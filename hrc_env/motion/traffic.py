@@ -7,6 +7,7 @@ ended; a worker who begins something makes sure to keep clear of all of that, so
 import math
 
 from hrc_env.motion import plans as pl
+from hrc_env.motion.activities.recorded import clip_root
 from hrc_env.motion.compiled import compiled
 from hrc_env.motion.paths import along
 from hrc_env.motion.walk import travelled
@@ -18,6 +19,8 @@ AHEAD_M, HANDS_M = 0.48, 0.76
 """Who works has hands and head so far ahead [m]; others' roots keep so far from there."""
 CART_M, CART_APART_M = 1.0, 0.95
 """The same of who pushes a cart."""
+CLIP_M, CLIP_APART_M = 0.01, 1.15
+"""The same of who plays a clip and may reach to any side: an arm's length more than APART_M."""
 LOOK_S = 0.12
 """Meetings are looked for in steps of this length [s]; at 2.8 m/s to each other 0.3 m."""
 
@@ -33,6 +36,8 @@ def ahead_of(activity: int) -> tuple[float, float]:
     """How far ahead of the root someone is in the way with what, and how near one may go [m]."""
     if activity == pl.PUSH:
         return CART_M, CART_APART_M
+    if activity == pl.CLIP:
+        return CLIP_M, CLIP_APART_M
     if activity == pl.STAND or activity == pl.LOOK_ROUND or goes(activity):
         return 0.0, 0.0
     return AHEAD_M, HANDS_M
@@ -43,6 +48,8 @@ def root_at(activity: int, t: float, plan: Floats) -> tuple[float, float]:
     """Where someone's root is on the floor at time t of an activity, and after it."""
     if goes(activity):
         return along(travelled(t - plan[pl.TAKEN_S], plan), plan)
+    if activity == pl.CLIP:
+        return clip_root(t, plan)
     return plan[pl.START_X], plan[pl.START_Y]
 
 

@@ -22,7 +22,7 @@ FARTHEST_M, FASTEST_M_S = 200.0, 15.0
 """Clips whose root goes beyond these are damaged; judgement."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Clip:
     """Motion of the worker whose measures are `size`, beginning at the origin, towards +x."""
 
@@ -40,6 +40,16 @@ class Clip:
 
     def __post_init__(self) -> None:
         _check(self)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether it is the same motion, number by number."""
+        return isinstance(other, Clip) and all(
+            np.array_equal(getattr(self, item.name), getattr(other, item.name))
+            for item in fields(self)
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.source, self.fps, len(self.controls)))
 
     @property
     def duration_s(self) -> float:
@@ -116,6 +126,15 @@ def load_clip(path: Path) -> Clip:
         controls, float(arrays["fps"]), np.asarray(arrays["contacts"], bool),
         np.asarray(arrays["size"], float), str(arrays["source"]),
     )  # fmt: skip
+
+
+def opened(motion: str | Path | Clip) -> Clip:
+    """A clip, or the one at a path.
+
+    Raises:
+        ConfigError: as `load_clip`.
+    """
+    return motion if isinstance(motion, Clip) else load_clip(Path(motion))
 
 
 def _check(clip: Clip) -> None:

@@ -31,8 +31,7 @@ def locked(q: Floats, fps: float, size: Floats) -> tuple[Floats, Bools]:
     out, stands = q.copy(), np.zeros((len(q), 2), bool)
     for side in range(2):
         at = c.ANKLE + 6 * side
-        roll = _roll(q[:, at + 3], q[:, at + 4], size)
-        footprint = np.concatenate([q[:, at : at + 3] - roll, q[:, at + 3 : at + 4]], axis=1)
+        footprint = footprints(q[:, at:], size)
         stances = _stances(footprint, fps)
         cleaned = footprint + _corrections(footprint, stances, fps, size[ANKLE_Z])
         cleaned[:, 2] = np.maximum(cleaned[:, 2], size[ANKLE_Z])
@@ -51,10 +50,20 @@ def slip(q: Floats, stands: Bools, fps: float, size: Floats) -> Floats:
     speeds = []
     for side in range(2):
         at = c.ANKLE + 6 * side
-        footprint = q[:, at : at + 3] - _roll(q[:, at + 3], q[:, at + 4], size)
-        speed = np.linalg.norm(np.diff(footprint, axis=0), axis=-1) * fps
+        speed = np.linalg.norm(np.diff(footprints(q[:, at:], size)[:, :3], axis=0), axis=-1) * fps
         speeds.append(speed[stands[1:, side] & stands[:-1, side]])
     return np.concatenate(speeds)
+
+
+def footprints(feet: Floats, size: Floats) -> Floats:
+    """(T, 4) where ankles x, y, z would be if their feet were flat, and the feet's headings.
+
+    Args:
+        feet: (T, 5 or more) ankle x, y, z, heading and pitch of a foot.
+        size: `Anatomy.size`.
+    """
+    flat = feet[:, :3] - _roll(feet[:, 3], feet[:, 4], size)
+    return np.concatenate([flat, feet[:, 3:4]], axis=1)
 
 
 def _roll(yaw: Floats, pitch: Floats, size: Floats) -> Floats:

@@ -1,0 +1,140 @@
+"""Recorded clips are played like procedural motion: anywhere, again and again, without a jump."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from recorded import joined, started, walk_straight, watched
+
+from hrc_env.body import SEGMENT, load_body, worker_truth
+from hrc_env.config import resolve, with_motions
+from hrc_env.errors import ConfigError
+from hrc_env.motion import controls as c
+from hrc_env.motion import generator
+from hrc_env.motion import plans as pl
+from hrc_env.motion.activities.recorded import PACE_S, SETTLE_S
+from hrc_env.motion.capture.clip import load_clip, save_clip
+from hrc_env.motion.capture.record import Capture
+from hrc_env.motion.capture.retarget import retarget
+from hrc_env.motion.capture.segments import segments_in
+from hrc_env.motion.playing import LONGEST_S, stocked
+from hrc_env.records import WorkerMotion
+from hrc_env.skeleton import JOINTS
+
+BODY = load_body()
+FPS = 50.0
+
+
+@pytest.fixture(scope="module")
+def clip():
+    """A metre's walk, recorded."""
+    motion = walk_straight(0.8, length_m=1.2, dt_s=1 / FPS).motion
+    still = np.zeros_like(motion.position_world)
+    record = WorkerMotion(motion.position_world, motion.quaternion_wxyz, still, still)
+    joints = worker_truth(BODY, record).joints_world[0, :, 0]
+    return retarget(Capture(joints, FPS, True, JOINTS, "walk"), BODY)[0]
+
+
+@pytest.fixture(scope="module")
+def played(clip):
+    """Four workers who play whenever there is room, for 60 s."""
+    config = generator.MotionConfig(motions=(clip,), motions_probability=1.0)
+    state, rngs = started(4, seed=2, config=config)
+    motions, doing = [], []
+    for _ in range(int(60 * FPS)):
+        motions.append(generator.advance(state, rngs, 1 / FPS, 1)[1])
+        doing.append(generator.activity(state)[:, 0])
+    return joined(motions), np.stack(doing, 1)
+
+
+def test_workers_play_it_again_and_again(played):
+    _, doing = played
+    playing = doing == pl.CLIP
+    assert generator.activity_names[pl.CLIP] == "clip"
+    assert 0.2 < playing.mean() < 1.0
+    begins = (playing[:, 1:] & ~playing[:, :-1]).sum()
+    assert begins > 4
+
+
+def test_nothing_jumps_where_a_clip_begins_and_ends(played):
+    motion, _ = played
+    velocity = motion.velocity_world[:, :, 0]
+    acceleration = np.linalg.norm(np.diff(velocity, axis=1), axis=-1) * FPS
+    trunk = [SEGMENT[name] for name in ("pelvis", "chest", "head")]
+    assert np.percentile(acceleration[..., trunk], 99.9) < 25.0
+    feet = [SEGMENT["left_foot"], SEGMENT["right_foot"]]
+    assert np.percentile(acceleration[..., feet], 99.9) < 62.0
+    moved = np.diff(motion.position_world[:, :, 0], axis=1) * FPS
+    mean_velocity = 0.5 * (velocity[:, 1:] + velocity[:, :-1])
+    assert np.abs(moved - mean_velocity).max() < 0.3  # a jump of 6 mm would show
+
+
+def test_feet_stand_still_while_it_is_played(played):
+    motion, doing = played
+    for side in ("left", "right"):
+        ball = motion.position_world[:, :, 0, SEGMENT[f"{side}_toes"]]
+        speed = np.linalg.norm(motion.velocity_world[:, :, 0, SEGMENT[f"{side}_toes"], :2], axis=-1)
+        loaded = ball[..., 2] < BODY.rest_position[SEGMENT[f"{side}_toes"], 2] + 5e-4
+        assert np.percentile(speed[loaded & (doing == pl.CLIP)], 95) < 0.05
+
+
+def test_the_recorded_pose_is_the_one_that_is_seen(clip):
+    config = generator.MotionConfig(motions=(clip,), motions_probability=1.0)
+    state, rngs = started(1, seed=5, config=config)
+    for _ in range(1000):
+        generator.advance(state, rngs, 0.1, 1)
+        at_s = state.time_s[0, 0] - SETTLE_S
+        if state.activity[0, 0] == pl.CLIP and PACE_S + 0.2 < at_s < PACE_S + 0.5:
+            break
+    position = generator.current(state).position_world[0, 0]
+    k = round((at_s - 0.5 * PACE_S) * FPS)
+    piece = stocked([clip], state.anatomy.size)
+    q = np.zeros((1, c.N_CONTROLS))
+    q[0, : c.HAND_SHIFT] = piece.frames[k, : c.HAND_SHIFT]
+    q[0, c.ANKLE : c.ANKLE + 12] = piece.frames[k, c.HAND_SHIFT :]
+    recorded = segments_in(q, state.anatomy)[0][0]
+    between = np.linalg.norm(position[:, None] - position[None], axis=-1)
+    assert (
+        np.abs(between - np.linalg.norm(recorded[:, None] - recorded[None], axis=-1)).max() < 0.02
+    )
+
+
+def test_a_long_clip_is_played_in_pieces_from_both_feet_to_both_feet(clip):
+    again = np.concatenate([clip.controls] * 20)
+    step = np.repeat(np.arange(20), len(clip.controls))
+    for at in (c.ROOT_X, c.ANKLE, c.ANKLE + 6):
+        again[:, at : at + 2] += step[:, None] * (clip.controls[-1, :2] - clip.controls[0, :2])
+    long = dataclasses.replace(clip, controls=again, contacts=np.concatenate([clip.contacts] * 20))
+    pieces = stocked([long], clip.size)
+    assert len(pieces.count) > 2
+    assert (pieces.count / pieces.fps <= LONGEST_S + 1 / FPS).all()
+    first = pieces.frames[pieces.row]
+    assert np.allclose(first[:, [c.ROOT_X, c.ROOT_Y, c.HEADING]], 0.0)
+
+
+def test_a_clip_that_is_never_on_both_feet_is_refused(clip):
+    hopping = dataclasses.replace(clip, contacts=np.zeros_like(clip.contacts))
+    with pytest.raises(ConfigError, match="on both feet at 0 frames"):
+        stocked([hopping], clip.size)
+
+
+def test_motions_come_as_paths_or_clips(clip, tmp_path):
+    path = tmp_path / "walk.npz"
+    save_clip(clip, path)
+    assert load_clip(path) == clip
+    by_path = resolve({"motion": {"motions": [str(path)]}})
+    assert by_path == with_motions(resolve(None), [path])
+    assert with_motions(resolve(None), [clip]).motion.motions == (clip,)
+    assert with_motions(by_path, None) is by_path
+    with pytest.raises(ConfigError, match="paths or clips"):
+        with_motions(resolve(None), [3])
+    with pytest.raises(ConfigError, match="There is no clip"):
+        generator.make_state(
+            1, 1, BODY, with_motions(resolve(None), [tmp_path / "none.npz"]).motion
+        )
+
+
+def test_the_same_seed_plays_the_same(clip):
+    config = generator.MotionConfig(motions=(clip,))
+    paths = [watched(*started(b, seed=4, config=config), 0.04, 200) for b in (1, 3)]
+    assert np.array_equal(paths[0].position_world[0], paths[1].position_world[0])
