@@ -2,6 +2,7 @@
 
 loop.jpg      the still of `python -m hrc_env demo`
 room.jpg      the lab from beside and from outside
+site.jpg      the construction site
 clip.jpg      a film strip of a walk that was written to a BVH file and imported
 learning.png  the curve of `make train-quick`, if runs/quick is there
 """
@@ -57,10 +58,23 @@ def clip() -> None:
     save(imageio.imread(strip), "clip.jpg")
 
 
+def site() -> None:
+    """The construction site."""
+    env = HRCReachEnv(perception="truth", scene="site", n_workers=3)
+    env.reset(seed=3)
+    for _ in range(200):
+        env.step(np.zeros(6))
+    renderer = PictureRenderer(env.simulation.scene, 1280, 720)
+    save(np.asarray(renderer.picture(*env.views.pose(), "overview")), "site.jpg")
+    renderer.close()
+    env.close()
+
+
 if __name__ == "__main__":
     PICTURES.mkdir(exist_ok=True)
     loop()
     room()
+    site()
     clip()
     if Path("runs/quick/curve.png").exists():
         shutil.copy("runs/quick/curve.png", PICTURES / "learning.png")
