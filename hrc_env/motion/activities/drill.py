@@ -1,5 +1,5 @@
-"""Drilling and driving screws, at a wall or overhead: one hand leans on the drill, the other
-fetches screws from the pouch."""
+"""Drilling and driving screws: one hand leans on the drill, the other fetches screws from the
+pouch; overhead it holds the work up."""
 
 import math
 
@@ -18,7 +18,7 @@ from hrc_env.motion.activities.planning import (
     step_ahead,
     strokes,
 )
-from hrc_env.motion.activities.strokes import BORE
+from hrc_env.motion.activities.strokes import BORE, PRESS
 from hrc_env.motion.activities.worker import Place, Worker
 from hrc_env.motion.compiled import compiled
 from hrc_env.props import prop_index
@@ -46,7 +46,7 @@ def start_drill(draws: Floats, place: Place, me: Worker) -> float:
     else:
         step_ahead(1 - side, 0.10 if overhead else 0.18, me)
     if overhead:
-        ahead, turn = 0.34, (0.0, -0.5 * math.pi, 0.0)
+        ahead, turn = 0.24, (0.0, -0.5 * math.pi, 0.0)
         at, beside = (ahead + BIT_UP_M, 0.04 * sign, z - BIT_M - THRUST_M), (ahead, z - 0.04)
     else:
         ahead, turn = 0.60, (0.0, 0.0, 0.0)
@@ -54,6 +54,13 @@ def start_drill(draws: Floats, place: Place, me: Worker) -> float:
     put_tool(DRILL, side, at, turn, me)
     put_other((beside[0], -0.12 * sign, beside[1]), me)
     look_to((ahead, 0.0, z), me)
-    strokes(BORE, THRUST_M, 0.0, between(draws[2], 1.5, 1.8), 2 + int(3.0 * draws[3]), me)
+    strokes(
+        PRESS if overhead else BORE,
+        THRUST_M,
+        0.0,
+        between(draws[2], 1.5, 1.8),
+        2 + int(3.0 * draws[3]),
+        me,
+    )
     me.plan[pl.WANDER_M] = 0.12 * sign
     return finish(CALM_M_S, me)

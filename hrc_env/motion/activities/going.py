@@ -8,6 +8,7 @@ from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import between
 from hrc_env.motion.activities.worker import Place, Worker
+from hrc_env.motion.anatomy import STAND_Z
 from hrc_env.motion.compiled import compiled
 from hrc_env.motion.curves import min_jerk
 from hrc_env.motion.holding import GRIPS, drop_load, grip_load, place_load
@@ -22,6 +23,9 @@ CART_AHEAD_M, WHEELBARROW_AHEAD_M = 0.47, 0.16
 """Handles ahead of the root [m]: arms bent before the belly, and hanging at the sides."""
 WHEEL_AHEAD_M, WHEEL_UP_M, STANDS_RAD = 1.2, 0.17, 0.2
 """A wheelbarrow's axle in its frame [m], and how far it tips back onto its legs."""
+KNUCKLES_SHARE, BEND = 0.86, 1.0
+"""Handles are carried as high as this share of the pelvis, by arms that hang almost straight;
+how far the trunk bends to take them; judgement."""
 TAKE_S, LIFT_S = 0.7, 0.5
 """For the hands to go to the handles; to lift a wheelbarrow by them [s]."""
 BACK_M_S, BACK_PERIOD_S = 0.62, 0.42
@@ -88,7 +92,11 @@ def start_push(place: Place, via: Floats, speed_m_s: float, prop: int, me: Worke
         plan[pl.LOAD_GRIP + i] = GRIPS[prop, i // 3, i % 3]
     plan[pl.LOAD_USED] = plan[pl.LOAD_USED + 1] = 1.0
     lasts = start_walk(place, via, speed_m_s, me)
-    plan[pl.TAKEN_S] = TAKE_S + (LIFT_S if prop == WHEELBARROW else 0.0)
+    plan[pl.TAKEN_S] = TAKE_S
+    if prop == WHEELBARROW:
+        plan[pl.TAKEN_S] += LIFT_S
+        handles = KNUCKLES_SHARE * me.size[STAND_Z] - plan[pl.LOAD_GRIP + 2]
+        plan[pl.TIPPED] = math.asin(min(max(handles / WHEEL_AHEAD_M, 0.0), 0.2))
     plan[pl.LASTS] = lasts + 2.0 * plan[pl.TAKEN_S]
     return plan[pl.LASTS]
 
@@ -106,8 +114,8 @@ def push(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q
     place_load(x, y, yaw, 0.0, plan, q)
     if int(plan[pl.LOAD_PROP]) == WHEELBARROW:
         low = 1.0 - min_jerk((near_end - TAKE_S) / LIFT_S)
-        lean(0.42 * low * held, 0.5, 0.0, q)
-        _tip(STANDS_RAD * low, yaw, q)
+        lean(BEND * low * held, 0.8, 0.0, q)
+        _tip(STANDS_RAD * low - plan[pl.TIPPED] * (1.0 - low), yaw, q)
     else:
         lean(0.06 * held, 0.0, 0.0, q)
     grip_load(held, plan, q)

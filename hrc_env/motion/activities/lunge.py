@@ -35,4 +35,4 @@ def start_lunge(draws: Floats, place: Place, me: Worker) -> float:
     me.plan[pl.SETTLE_S], me.plan[pl.OUT_AT] = 0.7, 0.12
     me.plan[pl.STEP_SWING] = 0.40
     me.plan[pl.TWIST] = -0.35 * sign
-    return finish(between(draws[6], 2.6, 3.2), me)
+    return finish(between(draws[6], 1.9, 2.3), me)

@@ -8,7 +8,7 @@ from hrc_env.motion.activities.getting_down import FRONT_LEG, REAR_LEG, step_int
 from hrc_env.motion.activities.strokes import PAUSE_S, stroke
 from hrc_env.motion.activities.work import extend, hands_on
 from hrc_env.motion.activities.worker import Worker
-from hrc_env.motion.anatomy import HAND, LEFT, LEG, SIDE_STRIDE, STAND_Z
+from hrc_env.motion.anatomy import CHEST, HAND, LEFT, LEG, SIDE_STRIDE, STAND_Z
 from hrc_env.motion.compiled import compiled
 from hrc_env.motion.feet import foot
 from hrc_env.motion.holding import TWO_HANDED
@@ -159,33 +159,39 @@ def finish(peak_m_s: float, me: Worker) -> float:
 def settle_lean(me: Worker) -> None:
     """Smallest lean that brings what the hands hold within reach; else that comes nearer."""
     plan = me.plan
-    low, high, far = 0.0, MOST_LEAN, 0.0
+    low, high, plan[pl.LEAN] = 0.0, MOST_LEAN, 0.0
+    upright = _short(me)
+    if upright <= 0.0:
+        return
+    far = upright
     for attempt in range(10):
-        at_work(me)
-        used = (me.q[c.HAND_SHARE], me.q[c.HAND_SHARE + 1])
-        far = beyond(me.q, used, me.bones, me.frame, me.size, me.p, me.r) + SPARE_M
-        if attempt == 0 and far <= 0.0:
-            return
+        if attempt > 0:
+            far = _short(me)
         if far > 0.0:
             low = plan[pl.LEAN]
         else:
             high = plan[pl.LEAN]
         plan[pl.LEAN] = 0.5 * (low + high)
     plan[pl.LEAN] = high
+    far = _short(me)
     if far > 0.0:
+        plan[pl.LEAN] = 0.0 if upright < far else high
         _come_nearer(me)
+
+
+@compiled
+def _short(me: Worker) -> float:
+    """By how much an arm is too short for the work that is planned [m]."""
+    at_work(me)
+    used = (me.q[c.HAND_SHARE], me.q[c.HAND_SHARE + 1])
+    return beyond(me.q, used, me.bones, me.frame, me.size, me.p, me.r) + SPARE_M
 
 
 @compiled
 def _come_nearer(me: Worker) -> None:
     """Move tool and targets towards the shoulders by what is out of reach."""
-    plan, p = me.plan, me.p
-    at_work(me)
-    used = (me.q[c.HAND_SHARE], me.q[c.HAND_SHARE + 1])
-    far = beyond(me.q, used, me.bones, me.frame, me.size, p, me.r) + SPARE_M
-    if far <= 0.0:
-        return
-    x, y, z = p[3, 0], p[3, 1], p[3, 2]
+    plan, p, far = me.plan, me.p, _short(me)
+    x, y, z = p[CHEST, 0], p[CHEST, 1], p[CHEST, 2]
     dx, dy, dz = plan[pl.TOOL_POSE] - x, plan[pl.TOOL_POSE + 1] - y, plan[pl.TOOL_POSE + 2] - z
     share = 1.15 * far / math.sqrt(dx * dx + dy * dy + dz * dz)
     other = pl.TARGET + 3 * (1 - int(plan[pl.SIDE]))

@@ -12,9 +12,10 @@ from hrc_env.motion.compiled import compiled
 from hrc_env.motion.curves import min_jerk
 from hrc_env.typing import Floats
 
-STILL, STRIKE, BORE, SAW, SHIFT, BUSY, JAB = range(7)
-"""Nothing; a hammer's blows; a drill's thrusts, the other hand fetching screws; a saw's strokes;
-holding still at one place after the other; the small movements of busy hands; beating the air."""
+STILL, STRIKE, BORE, PRESS, SAW, SHIFT, BUSY, JAB = range(8)
+"""Nothing; a hammer's blows; a drill's thrusts, the other hand fetching screws or not; a saw's
+strokes; holding still at one place after the other; the small movements of busy hands; beating
+the air."""
 PAUSE_S = 0.7
 """Between two bursts [s]: time to go on to the next nail; judgement."""
 EASE_S = 0.25
@@ -38,8 +39,10 @@ def stroke(t: float, plan: Floats, q: Floats) -> None:
     turn = 2.0 * math.pi * plan[pl.STROKE_HZ] * u
     if kind == STRIKE:
         _strike(ease, turn, plan, q)
-    elif kind == BORE:
-        _bore(u, other, plan, q)
+    elif kind in (BORE, PRESS):
+        _bore(u, plan, q)
+        if kind == BORE:
+            _fetch(u, other, plan, q)
     elif kind == SAW:
         _along(-ease * plan[pl.STROKE_M] * math.sin(turn), plan, q)
         q[c.SPINE_TWIST] += (1.0 - 2.0 * side) * 0.10 * ease * math.sin(turn)
@@ -81,12 +84,17 @@ def _strike(ease: float, turn: float, plan: Floats, q: Floats) -> None:
 
 
 @compiled
-def _bore(u: float, other: int, plan: Floats, q: Floats) -> None:
-    """Lean on the drill while the other hand fetches the next screw from the belt."""
-    rest = plan[pl.BURST_S]
-    push = min_jerk(u / 0.5) - min_jerk((u - rest + 0.5) / 0.5)
+def _bore(u: float, plan: Floats, q: Floats) -> None:
+    """Lean on the drill."""
+    push = min_jerk(u / 0.5) - min_jerk((u - plan[pl.BURST_S] + 0.5) / 0.5)
     _along(plan[pl.STROKE_M] * push, plan, q)
-    fetch = min_jerk((u - 0.1) / FETCH_S) - min_jerk((u - rest + 0.05 + FETCH_S) / FETCH_S)
+
+
+@compiled
+def _fetch(u: float, other: int, plan: Floats, q: Floats) -> None:
+    """Take the other hand to the belt for the next screw, and back."""
+    late = u - plan[pl.BURST_S] + 0.05 + FETCH_S
+    fetch = min_jerk((u - 0.1) / FETCH_S) - min_jerk(late / FETCH_S)
     if fetch <= 0.0:
         return
     hand = (other - c.HAND_TARGET) // 3
