@@ -18,20 +18,17 @@ SWIVEL = 12
 """12, 13: how far the left and right elbow are turned outwards from hanging."""
 HAND_OFFSET = 14
 """14-16 left, 17-19 right: grip from its shoulder, forward, left, up [m]."""
-HAND_SHIFT = 20
-"""20-22 left, 23-25 right: what a hand that held something is still away from where it should
-be, in the world [m]; no activity writes it."""
-N_BLENDED = 26
+N_BLENDED = 20
 """The columns before this one are blended when an activity follows another."""
-HAND_TARGET = 26
-"""26-28 left, 29-31 right: grip in the world [m]."""
-HAND_SHARE = 32
-"""32, 33: 0 relaxed, 1 at the target."""
-ANKLE = 34
-"""34-39 left, 40-45 right: ankle x, y, z, heading of the foot, pitch of the foot (heel up
+HAND_TARGET = 20
+"""20-22 left, 23-25 right: grip in the world [m]."""
+HAND_SHARE = 26
+"""26, 27: 0 relaxed, 1 at the target."""
+ANKLE = 28
+"""28-33 left, 34-39 right: ankle x, y, z, heading of the foot, pitch of the foot (heel up
 positive), pitch of the toes."""
-PROP = 46
+PROP = 40
 """What is held, an index into `props.PROPS`; 0 nothing."""
-PROP_POSE = 47
-"""47-52: origin of the prop's frame [m], its yaw, pitch and roll."""
-N_CONTROLS = 53
+PROP_POSE = 41
+"""41-46: origin of the prop's frame [m], its yaw, pitch and roll."""
+N_CONTROLS = 47

@@ -175,10 +175,9 @@ def shoulder(
     x = p[upper, 0] + cos * q[rel] - sin * q[rel + 1]
     y = p[upper, 1] + sin * q[rel] + cos * q[rel + 1]
     z = p[upper, 2] + q[rel + 2]
-    shift = c.HAND_SHIFT + 3 * side
-    p[TARGET, 0] = x + share * (q[tgt] - x) + q[shift]
-    p[TARGET, 1] = y + share * (q[tgt + 1] - y) + q[shift + 1]
-    p[TARGET, 2] = z + share * (q[tgt + 2] - z) + q[shift + 2]
+    p[TARGET, 0] = x + share * (q[tgt] - x)
+    p[TARGET, 1] = y + share * (q[tgt + 1] - y)
+    p[TARGET, 2] = z + share * (q[tgt + 2] - z)
     dx, dy = p[TARGET, 0] - p[upper, 0], p[TARGET, 1] - p[upper, 1]
     ahead = (cos * dx + sin * dy) / size[ARM]
     above = (p[TARGET, 2] - p[upper, 2]) / size[ARM]

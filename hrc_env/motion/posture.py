@@ -73,7 +73,7 @@ def stand(
         hang(side, RELAXED_PITCH + wave, RELAXED_ELBOW + wave, size, q)
         q[c.HAND_SHARE + side] = 0.0
     for i in range(6):
-        q[c.HAND_TARGET + i] = q[c.HAND_SHIFT + i] = 0.0
+        q[c.HAND_TARGET + i] = 0.0
     q[c.PROP] = 0.0
 
 

@@ -1,0 +1,131 @@
+"""Everything that workers can do, in scenes of one or a few activities: for reports, pictures."""
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from hrc_env.motion import plans as pl
+from hrc_env.motion.activities.climb import start_climb
+from hrc_env.motion.activities.crouching import start_kneel, start_squat
+from hrc_env.motion.activities.drill import start_drill
+from hrc_env.motion.activities.going import (
+    CART,
+    WHEELBARROW,
+    start_push,
+    start_step_back,
+    start_stumble,
+    start_turn,
+    start_walk,
+)
+from hrc_env.motion.activities.hammer import start_hammer
+from hrc_env.motion.activities.loads import (
+    BOARD,
+    BOX,
+    start_hand_over,
+    start_pick_up,
+    start_receive,
+    start_set_down,
+)
+from hrc_env.motion.activities.look_round import start_look_round
+from hrc_env.motion.activities.lunge import start_lunge
+from hrc_env.motion.activities.measure import start_measure
+from hrc_env.motion.activities.point import start_point
+from hrc_env.motion.activities.saw import start_saw
+from hrc_env.motion.activities.worker import N_START, Place, Worker
+from hrc_env.motion.solo import Film, play, rest
+from hrc_env.typing import Floats
+
+Start = Callable[[Floats, Place, Worker], float]
+"""Begins an activity, see `activities`; how long it lasts [s]."""
+Act = tuple[int, Start, float]
+"""An activity, what begins it, the height of its place [m]."""
+NO_CORNERS = np.zeros((0, 3))
+AWAY_M = 3.0
+"""How far those who go somewhere go [m]."""
+
+
+def perform(acts: Sequence[Act], me: Worker, rng: np.random.Generator, dt_s: float) -> list[Film]:
+    """Films of acts in their order, at intervals of dt_s; the worker stands where they end."""
+    films, clock_s = [], 10.0 * float(rng.random())
+    for activity, start, height_m in acts:
+        plan = me.plan
+        place = (float(plan[pl.START_X]), float(plan[pl.START_Y]), float(plan[pl.START_YAW]))
+        lasts_s = start(rng.random(N_START), (*place, height_m), me)
+        films.append(play(me, activity, np.arange(0.0, lasts_s, dt_s), clock_s))
+        rest(me, activity)
+        clock_s += lasts_s
+    return films
+
+
+def _ahead(place: Place) -> Place:
+    """A place some way ahead."""
+    x, y, yaw, height = place
+    return x + AWAY_M * math.cos(yaw), y + AWAY_M * math.sin(yaw), yaw, height
+
+
+def _walk(speed_m_s: float) -> Start:
+    return lambda draws, place, me: start_walk(_ahead(place), NO_CORNERS, speed_m_s, me)
+
+
+def _turn(draws: Floats, place: Place, me: Worker) -> float:
+    turn = (1.0 if draws[0] < 0.5 else -1.0) * (0.8 + 2.0 * draws[1])
+    return start_turn((place[0], place[1], place[2] + turn, 0.0), me)
+
+
+def _stumble(draws: Floats, place: Place, me: Worker) -> float:
+    return start_stumble(draws, _ahead(place), NO_CORNERS, 1.2, me)
+
+
+def _push(prop: int) -> Start:
+    return lambda draws, place, me: start_push(_ahead(place), NO_CORNERS, 1.1, prop, me)
+
+
+def _take(prop: int, on_shoulder: bool) -> Start:
+    return lambda draws, place, me: start_pick_up(draws, place, prop, on_shoulder, me)
+
+
+def _stand(draws: Floats, place: Place, me: Worker) -> float:
+    return 4.0
+
+
+FLOOR_M, TABLE_M = 0.2, 0.85
+_CARRY: Act = (pl.CARRY, _walk(1.1), 0.0)
+REPERTOIRE: dict[str, tuple[Act, ...]] = {
+    "stand": ((pl.STAND, _stand, 0.0),),
+    "look round": ((pl.LOOK_ROUND, start_look_round, 0.0),),
+    "point": ((pl.POINT, start_point, 0.0),),
+    "walk 0.8 m/s": ((pl.WALK, _walk(0.8), 0.0),),
+    "walk 1.1 m/s": ((pl.WALK, _walk(1.1), 0.0),),
+    "walk 1.4 m/s": ((pl.WALK, _walk(1.4), 0.0),),
+    "walk 1.8 m/s": ((pl.WALK, _walk(1.8), 0.0),),
+    "turn": ((pl.TURN, _turn, 0.0),),
+    "step back": ((pl.STEP_BACK, start_step_back, 0.0),),
+    "stumble": ((pl.STUMBLE, _stumble, 0.0),),
+    "lunge": ((pl.LUNGE, start_lunge, 1.1),),
+    "box from the floor to a table": (
+        (pl.PICK_UP, _take(BOX, False), FLOOR_M), _CARRY, (pl.SET_DOWN, start_set_down, TABLE_M)
+    ),
+    "board in both hands": (
+        (pl.PICK_UP, _take(BOARD, False), TABLE_M), _CARRY, (pl.SET_DOWN, start_set_down, FLOOR_M)
+    ),
+    "board on the shoulder": (
+        (pl.PICK_UP, _take(BOARD, True), FLOOR_M), _CARRY, (pl.SET_DOWN, start_set_down, FLOOR_M)
+    ),
+    "receive and hand over": (
+        (pl.RECEIVE, start_receive, 0.0), (pl.HAND_OVER, start_hand_over, 0.0)
+    ),
+    "cart": ((pl.PUSH, _push(CART), 0.0),),
+    "wheelbarrow": ((pl.PUSH, _push(WHEELBARROW), 0.0),),
+    "squat": ((pl.SQUATTING, start_squat, FLOOR_M),),
+    "kneel": ((pl.KNEELING, start_kneel, FLOOR_M),),
+    "hammer on a table": ((pl.HAMMER, start_hammer, TABLE_M),),
+    "hammer at a wall": ((pl.HAMMER, start_hammer, 1.4),),
+    "hammer on the floor": ((pl.HAMMER, start_hammer, FLOOR_M),),
+    "drill": ((pl.DRILL, start_drill, 1.25),),
+    "drill overhead": ((pl.OVERHEAD, start_drill, 2.0),),
+    "saw": ((pl.SAW, start_saw, TABLE_M),),
+    "measure": ((pl.MEASURE, start_measure, TABLE_M),),
+    "climb": ((pl.CLIMB, start_climb, 0.22),),
+}  # fmt: skip
+"""Scenes by name."""
