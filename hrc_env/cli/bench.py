@@ -1,4 +1,4 @@
-"""python -m hrc_env bench: how good and honest the estimators are, how fast everything is."""
+"""python -m hrc_env bench: how good the estimators are, how fast everything, how human workers."""
 
 import os
 from collections.abc import Callable
@@ -105,16 +105,40 @@ class SpeedBench:
 
 
 @dataclass(frozen=True)
+class MotionBench:
+    """Play everything that workers can do; statistics beside those of people."""
+
+    out: Path = Path("out/bench_motion")
+    """Folder for results.json, a table and a picture."""
+    quick: bool = False
+    """One body and two seeds: every number, in less than a minute."""
+    seeds: int | None = None
+    """How often each worker plays a scene, instead of 12 (2 if quick)."""
+
+    def run(self) -> int:
+        """Run, show the table."""
+        from hrc_env.experiments.motion.bench import QUICK, MotionBenchConfig, run
+
+        config = QUICK if self.quick else MotionBenchConfig()
+        if self.seeds is not None:
+            config = replace(config, n_seeds=self.seeds)
+        return _show(
+            partial(run, config), self.out, "motion.md", "results.json, motion.md, motion.png"
+        )
+
+
+@dataclass(frozen=True)
 class Bench:
-    """Measure the estimators (tracking) or the environment (speed).
+    """Measure the estimators (tracking), the environment (speed) or the workers (motion).
 
     Each takes --quick (minutes, not hours) and --out DIR, where it writes results.json, a table
-    and pictures; `bench tracking --help` and `bench speed --help` say the rest.
+    and pictures; `bench tracking --help` and so on say the rest.
     """
 
     what: (
         Annotated[TrackingBench, tyro.conf.subcommand("tracking")]
         | Annotated[SpeedBench, tyro.conf.subcommand("speed")]
+        | Annotated[MotionBench, tyro.conf.subcommand("motion")]
     )
     """Which bench."""
 

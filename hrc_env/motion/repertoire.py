@@ -41,8 +41,10 @@ Start = Callable[[Floats, Place, Worker], float]
 Act = tuple[int, Start, float]
 """An activity, what begins it, the height of its place [m]."""
 NO_CORNERS = np.zeros((0, 3))
-AWAY_M = 3.0
-"""How far those who go somewhere go [m]."""
+AWAY_M, FAR_M = 3.0, 8.0
+"""How far those who go somewhere go, and how long the walks are that are measured [m]."""
+LIGHT_DRAW = 2
+"""Which draw of `start_hammer` decides between taps and blows."""
 
 
 def perform(acts: Sequence[Act], me: Worker, rng: np.random.Generator, dt_s: float) -> list[Film]:
@@ -58,14 +60,23 @@ def perform(acts: Sequence[Act], me: Worker, rng: np.random.Generator, dt_s: flo
     return films
 
 
-def _ahead(place: Place) -> Place:
+def _ahead(place: Place, way_m: float = AWAY_M) -> Place:
     """A place some way ahead."""
     x, y, yaw, height = place
-    return x + AWAY_M * math.cos(yaw), y + AWAY_M * math.sin(yaw), yaw, height
+    return x + way_m * math.cos(yaw), y + way_m * math.sin(yaw), yaw, height
 
 
-def _walk(speed_m_s: float) -> Start:
-    return lambda draws, place, me: start_walk(_ahead(place), NO_CORNERS, speed_m_s, me)
+def _walk(speed_m_s: float, way_m: float = AWAY_M) -> Start:
+    return lambda draws, place, me: start_walk(_ahead(place, way_m), NO_CORNERS, speed_m_s, me)
+
+
+def _hammer(lightly: bool) -> Start:
+    def start(draws: Floats, place: Place, me: Worker) -> float:
+        chosen = draws.copy()
+        chosen[LIGHT_DRAW] = 0.0 if lightly else 1.0
+        return start_hammer(chosen, place, me)
+
+    return start
 
 
 def _turn(draws: Floats, place: Place, me: Worker) -> float:
@@ -95,10 +106,11 @@ REPERTOIRE: dict[str, tuple[Act, ...]] = {
     "stand": ((pl.STAND, _stand, 0.0),),
     "look round": ((pl.LOOK_ROUND, start_look_round, 0.0),),
     "point": ((pl.POINT, start_point, 0.0),),
-    "walk 0.8 m/s": ((pl.WALK, _walk(0.8), 0.0),),
-    "walk 1.1 m/s": ((pl.WALK, _walk(1.1), 0.0),),
-    "walk 1.4 m/s": ((pl.WALK, _walk(1.4), 0.0),),
-    "walk 1.8 m/s": ((pl.WALK, _walk(1.8), 0.0),),
+    "walk 0.8 m/s": ((pl.WALK, _walk(0.8, FAR_M), 0.0),),
+    "walk 1.1 m/s": ((pl.WALK, _walk(1.1, FAR_M), 0.0),),
+    "walk 1.3 m/s": ((pl.WALK, _walk(1.3, FAR_M), 0.0),),
+    "walk 1.4 m/s": ((pl.WALK, _walk(1.4, FAR_M), 0.0),),
+    "walk 1.8 m/s": ((pl.WALK, _walk(1.8, FAR_M), 0.0),),
     "turn": ((pl.TURN, _turn, 0.0),),
     "step back": ((pl.STEP_BACK, start_step_back, 0.0),),
     "stumble": ((pl.STUMBLE, _stumble, 0.0),),
@@ -119,9 +131,10 @@ REPERTOIRE: dict[str, tuple[Act, ...]] = {
     "wheelbarrow": ((pl.PUSH, _push(WHEELBARROW), 0.0),),
     "squat": ((pl.SQUATTING, start_squat, FLOOR_M),),
     "kneel": ((pl.KNEELING, start_kneel, FLOOR_M),),
-    "hammer on a table": ((pl.HAMMER, start_hammer, TABLE_M),),
-    "hammer at a wall": ((pl.HAMMER, start_hammer, 1.4),),
-    "hammer on the floor": ((pl.HAMMER, start_hammer, FLOOR_M),),
+    "hammer lightly": ((pl.HAMMER, _hammer(True), TABLE_M),),
+    "hammer on a table": ((pl.HAMMER, _hammer(False), TABLE_M),),
+    "hammer at a wall": ((pl.HAMMER, _hammer(False), 1.4),),
+    "hammer on the floor": ((pl.HAMMER, _hammer(False), FLOOR_M),),
     "drill": ((pl.DRILL, start_drill, 1.25),),
     "drill overhead": ((pl.OVERHEAD, start_drill, 2.0),),
     "saw": ((pl.SAW, start_saw, TABLE_M),),

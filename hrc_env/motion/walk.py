@@ -123,7 +123,7 @@ def walk(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q
 @compiled
 def _lurch(t: float, trip: float, q: Floats) -> None:
     """Pitch forward with the arms out, `t` after a foot caught, and come up again."""
-    fall, arms = trip * hump(t / LURCH_S), trip * hump((t - 0.08) / (1.3 * LURCH_S))
+    fall, arms = trip * hump(t / LURCH_S), trip * hump((t - 0.04) / (1.7 * LURCH_S))
     q[c.ROOT_X] += math.cos(q[c.HEADING]) * 0.10 * fall
     q[c.ROOT_Y] += math.sin(q[c.HEADING]) * 0.10 * fall
     q[c.PELVIS_Z] -= 0.07 * fall

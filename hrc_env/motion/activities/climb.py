@@ -9,7 +9,7 @@ from hrc_env.motion.activities.worker import Place, Worker
 from hrc_env.motion.compiled import compiled
 from hrc_env.motion.curves import cruise, min_jerk
 from hrc_env.motion.feet import step_time
-from hrc_env.motion.posture import stand
+from hrc_env.motion.posture import RELAXED_ELBOW, RELAXED_PITCH, hang, stand
 from hrc_env.typing import Floats
 
 HIGHEST_RISER_M = 0.32
@@ -37,6 +37,8 @@ def climb(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, 
     q[c.SPINE_FLEX] += 0.14 * going
     q[c.PELVIS_PITCH] += 0.10 * going
     q[c.HEAD_PITCH] += 0.20 * going
+    for side in range(2):
+        hang(side, RELAXED_PITCH + 0.15 * going, RELAXED_ELBOW + 0.85 * going, size, q)
 
 
 @compiled

@@ -4,6 +4,7 @@ from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import (
     CALM_M_S,
     CROUCH_S,
+    before_knee,
     between,
     blank,
     dominant,
@@ -35,7 +36,7 @@ def start_squat(draws: Floats, place: Place, me: Worker) -> float:
     blank(me)
     plan = me.plan
     plan[pl.CROUCH], plan[pl.AHEAD] = 1.0, 0.02
-    plan[pl.SETTLE_S], plan[pl.OUT_AT] = CROUCH_S, CROUCH_S - 0.5
+    plan[pl.SETTLE_S], plan[pl.OUT_AT] = CROUCH_S, 0.1
     return _hands_low(0.50, dominant(draws[0], me), draws, place, me)
 
 
@@ -44,9 +45,10 @@ def _hands_low(ahead: float, side: int, draws: Floats, place: Place, me: Worker)
     """Plan what both hands do at floor height."""
     sign = 1.0 - 2.0 * side
     z = place[3] if place[3] > 0.0 else between(draws[1], 0.12, 0.35)
-    put_tool(0, side, (ahead, 0.10 * sign, z), (0.0, 0.0, 0.0), me)
-    put_other((ahead + 0.03, -0.14 * sign, z), me)
-    look_to((ahead + 0.03, 0.0, z), me)
+    aside = before_knee(me)
+    put_tool(0, side, (ahead, aside + 0.10 * sign, z), (0.0, 0.0, 0.0), me)
+    put_other((ahead + 0.03, aside - 0.12 * sign, z), me)
+    look_to((ahead + 0.03, aside, z), me)
     size, rate = between(draws[2], 0.02, 0.05), between(draws[3], 0.8, 1.4)
     strokes(BUSY, size, rate, between(draws[4], 1.5, 3.5), 1 + int(3.0 * draws[5]), me)
     me.plan[pl.WANDER_M] = 0.10

@@ -6,7 +6,7 @@ import math
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import (
     CALM_M_S,
-    LOW_M,
+    before_knee,
     between,
     blank,
     dominant,
@@ -19,6 +19,7 @@ from hrc_env.motion.activities.planning import (
     strokes,
 )
 from hrc_env.motion.activities.strokes import BORE, PRESS
+from hrc_env.motion.activities.work import LOW_M
 from hrc_env.motion.activities.worker import Place, Worker
 from hrc_env.motion.compiled import compiled
 from hrc_env.props import prop_index
@@ -45,15 +46,17 @@ def start_drill(draws: Floats, place: Place, me: Worker) -> float:
         kneel_down(side, me)
     else:
         step_ahead(1 - side, 0.10 if overhead else 0.18, me)
+    aside = before_knee(me)
     if overhead:
-        ahead, turn = 0.24, (0.0, -0.5 * math.pi, 0.0)
-        at, beside = (ahead + BIT_UP_M, 0.04 * sign, z - BIT_M - THRUST_M), (ahead, z - 0.04)
+        ahead, turn = 0.34, (0.0, -0.5 * math.pi, 0.0)
+        at, beside = (ahead + BIT_UP_M, 0.10 * sign, z - BIT_M - THRUST_M), (ahead, z - 0.04)
     else:
-        ahead, turn = 0.60, (0.0, 0.0, 0.0)
-        at, beside = (ahead - BIT_M - THRUST_M, 0.05 * sign, z - BIT_UP_M), (ahead - 0.04, z - 0.02)
+        ahead, turn = 0.70, (0.0, 0.0, 0.0)
+        at = (ahead - BIT_M - THRUST_M, aside + 0.05 * sign, z - BIT_UP_M)
+        beside = (ahead - 0.04, z - 0.02)
     put_tool(DRILL, side, at, turn, me)
-    put_other((beside[0], -0.12 * sign, beside[1]), me)
-    look_to((ahead, 0.0, z), me)
+    put_other((beside[0], aside - (0.22 if overhead else 0.12) * sign, beside[1]), me)
+    look_to((ahead, aside, z), me)
     strokes(
         PRESS if overhead else BORE,
         THRUST_M,

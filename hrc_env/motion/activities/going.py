@@ -23,7 +23,7 @@ CART_AHEAD_M, WHEELBARROW_AHEAD_M = 0.47, 0.16
 """Handles ahead of the root [m]: arms bent before the belly, and hanging at the sides."""
 WHEEL_AHEAD_M, WHEEL_UP_M, STANDS_RAD = 1.2, 0.17, 0.2
 """A wheelbarrow's axle in its frame [m], and how far it tips back onto its legs."""
-KNUCKLES_SHARE, BEND = 0.86, 1.0
+KNUCKLES_SHARE, BEND = 0.86, 1.15
 """Handles are carried as high as this share of the pelvis, by arms that hang almost straight;
 how far the trunk bends to take them; judgement."""
 TAKE_S, LIFT_S = 0.7, 0.5
@@ -114,7 +114,7 @@ def push(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q
     place_load(x, y, yaw, 0.0, plan, q)
     if int(plan[pl.LOAD_PROP]) == WHEELBARROW:
         low = 1.0 - min_jerk((near_end - TAKE_S) / LIFT_S)
-        lean(BEND * low * held, 0.8, 0.0, q)
+        lean(BEND * low * held, 0.4, 0.0, q)
         _tip(STANDS_RAD * low - plan[pl.TIPPED] * (1.0 - low), yaw, q)
     else:
         lean(0.06 * held, 0.0, 0.0, q)

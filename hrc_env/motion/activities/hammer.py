@@ -9,7 +9,7 @@ import math
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import (
     CALM_M_S,
-    LOW_M,
+    before_knee,
     between,
     blank,
     dominant,
@@ -22,6 +22,7 @@ from hrc_env.motion.activities.planning import (
     strokes,
 )
 from hrc_env.motion.activities.strokes import STRIKE
+from hrc_env.motion.activities.work import LOW_M
 from hrc_env.motion.activities.worker import Place, Worker
 from hrc_env.motion.compiled import compiled
 from hrc_env.props import prop_index
@@ -30,8 +31,8 @@ from hrc_env.typing import Floats
 HAMMER = prop_index("hammer")
 HEAD_M, FACE_M = 0.25, 0.05
 """From the fist to the hammer's head along the handle, and to its face [m]; `props`."""
-LIGHT_HZ, LIGHT_M = 5.6, 0.040
-"""Light taps: 2 pi 5.6 0.040 is 1.4 m/s."""
+LIGHT_HZ, LIGHT_M = 5.6, 0.066
+"""Light taps: to and fro by 6.6 cm, at most 1.2 m/s and a little more on the way forward."""
 WALL_M = 1.2
 """Nails at this height or higher are driven into a wall, lower ones downwards [m]."""
 
@@ -47,14 +48,16 @@ def start_hammer(draws: Floats, place: Place, me: Worker) -> float:
         kneel_down(side, me)
     else:
         step_ahead(1 - side, 0.16, me)
-    ahead = 0.52 if z < WALL_M else 0.55
+    aside = before_knee(me)
     if z < WALL_M:
-        at, turn = (ahead - HEAD_M, 0.06 * sign, z + FACE_M + 0.02), (0.0, 0.5 * math.pi, 0.0)
+        ahead, turn = 0.72, (0.0, 0.5 * math.pi, 0.0)
+        at = (ahead - HEAD_M, aside + 0.06 * sign, z + FACE_M + 0.02)
     else:
-        at, turn = (ahead - FACE_M, 0.06 * sign, z - HEAD_M), (0.0, 0.0, 0.0)
+        ahead, turn = 0.68, (0.0, 0.0, 0.0)
+        at = (ahead - FACE_M, 0.06 * sign, z - HEAD_M)
     put_tool(HAMMER, side, at, turn, me)
-    put_other((ahead - 0.02, -0.09 * sign, z + 0.05 if z < WALL_M else z - 0.05), me)
-    look_to((ahead, 0.0, z), me)
+    put_other((ahead - 0.02, aside - 0.09 * sign, z + 0.05 if z < WALL_M else z - 0.05), me)
+    look_to((ahead, aside, z), me)
     light = draws[2] < 0.4
     size = LIGHT_M if light else between(draws[3], 0.16, 0.22)
     rate = LIGHT_HZ if light else between(draws[4], 1.9, 2.2)

@@ -68,6 +68,7 @@ def pick_up(
         at, mid = plan[pl.TOOL_POSE + i], plan[pl.MIDWAY + i]
         q[c.PROP_POSE + i] = at + up * (mid - at) + turned * (q[c.PROP_POSE + i] - mid)
     bulge = 0.06 * hump(up)
+    bulge += 0.15 * hump(turned)
     q[c.PROP_POSE] += math.cos(yaw) * bulge
     q[c.PROP_POSE + 1] += math.sin(yaw) * bulge
     q[c.PROP_POSE + 2] += 0.10 * hump(turned)
@@ -145,9 +146,10 @@ def _hold(prop: int, on_shoulder: bool, side: int, me: Worker) -> None:
     upper = LEFT + SIDE_STRIDE * side + UPPER_ARM
     plan[at], plan[at + 1] = ON_SHOULDER[0], (1.0 - 2.0 * side) * ON_SHOULDER[1]
     plan[at + 2] = me.p[upper, 2] + ON_SHOULDER[2]
-    plan[at + 3], plan[at + 5] = -0.5 * math.pi, NOSE_UP_RAD
+    sign = 1.0 - 2.0 * side  # the end of the other hand comes to the front
+    plan[at + 3], plan[at + 5] = 0.5 * math.pi * sign, -NOSE_UP_RAD * sign
     plan[pl.LOAD_USED + 1 - side] = 0.0
-    plan[pl.LOAD_GRIP + 3 * side + 1] = STEADY_M
+    plan[pl.LOAD_GRIP + 3 * side + 1] = -STEADY_M * sign
 
 
 @compiled

@@ -3,7 +3,7 @@
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import (
     CALM_M_S,
-    LOW_M,
+    before_knee,
     between,
     blank,
     dominant,
@@ -15,6 +15,7 @@ from hrc_env.motion.activities.planning import (
     strokes,
 )
 from hrc_env.motion.activities.strokes import SHIFT
+from hrc_env.motion.activities.work import LOW_M
 from hrc_env.motion.activities.worker import Place, Worker
 from hrc_env.motion.compiled import compiled
 from hrc_env.props import prop_index
@@ -32,7 +33,7 @@ def start_measure(draws: Floats, place: Place, me: Worker) -> float:
         kneel_down(1, me)
     else:
         step_ahead(dominant(draws[0], me), 0.12, me)
-    put_tool(TAPE, 1, (0.46, 0.0, z + 0.04), (0.0, 0.0, 0.0), me)
+    put_tool(TAPE, 1, (0.48, before_knee(me), z + 0.04), (0.0, 0.0, 0.0), me)
     look_to((0.46, 0.12, z), me)
     strokes(SHIFT, 0.0, 0.0, between(draws[2], 0.8, 1.6), 2 + int(3.0 * draws[3]), me)
     me.plan[pl.WANDER_M] = between(draws[4], 0.10, 0.18)

@@ -17,8 +17,6 @@ from hrc_env.motion.posture import MOST_LEAN, beyond, stand
 
 Triple = tuple[float, float, float]
 
-LOW_M = 0.6
-"""Work below this height is done kneeling [m]; judgement."""
 TAKE_S = 0.55
 """For a hand to go to the belt [s]."""
 KNEEL_S, CROUCH_S = 1.5, 1.1
@@ -27,6 +25,8 @@ STEP_S = 0.9
 """To step into a stance [s]."""
 CALM_M_S = 1.1
 """Peak speed of hands that go to their work [m/s]; calm manual work."""
+KNEE_ASIDE_M = 0.17
+"""Aside of the middle: where the other leg is not in the way [m]."""
 SPARE_M = 0.03
 """Arms keep this much in hand when the trunk has settled [m]: bodies sway."""
 FAR = 1e3
@@ -62,8 +62,15 @@ def kneel_down(side: int, me: Worker) -> None:
     """Plan to kneel on the knee of that side."""
     plan, leg = me.plan, me.size[LEG]
     plan[pl.KNEEL], plan[pl.AHEAD] = 1.0, -0.08
-    plan[pl.SETTLE_S], plan[pl.OUT_AT] = KNEEL_S, KNEEL_S - 0.35
+    plan[pl.SETTLE_S], plan[pl.OUT_AT] = KNEEL_S, 0.4
     step_into(side, REAR_LEG * leg, FRONT_LEG * leg, 0.02, me)
+
+
+@compiled
+def before_knee(me: Worker) -> float:
+    """How far to the left the hands work of one who kneels: before the knee that is down [m]."""
+    kneeling = me.plan[pl.KNEEL] > 0.0
+    return KNEE_ASIDE_M * (1.0 - 2.0 * me.plan[pl.STEP_FIRST]) if kneeling else 0.0
 
 
 @compiled
@@ -148,7 +155,11 @@ def finish(peak_m_s: float, me: Worker) -> float:
     low = min(max((0.95 * me.size[STAND_Z] - plan[pl.TOOL_POSE + 2]) / 0.5, 0.0), 1.0)
     plan[pl.SQUAT] = 0.0 if plan[pl.KNEEL] + plan[pl.CROUCH] > 0.0 else 0.8 * low
     settle_lean(me)
-    plan[pl.OUT_S] = max(1.875 * _way(side, me) / peak_m_s, 0.35)
+    down_s = plan[pl.SETTLE_S] - plan[pl.OUT_AT] - plan[pl.TAKE_S]
+    if plan[pl.KNEEL] + plan[pl.CROUCH] == 0.0:
+        down_s = 0.35
+    slowly = 1.7 if TWO_HANDED[int(plan[pl.TOOL])] else 1.0
+    plan[pl.OUT_S] = max(1.875 * slowly * _way(side, me) / peak_m_s, down_s)
     done = plan[pl.OUT_AT] + plan[pl.TAKE_S] + plan[pl.OUT_S]
     plan[pl.LASTS] = 2.0 * done + plan[pl.HOLD_S]
     plan[pl.UNDO_AT] = 0.5 * plan[pl.LASTS] if plan[pl.STEP_COUNT] > 0.0 else 0.0
@@ -184,7 +195,8 @@ def _short(me: Worker) -> float:
     """By how much an arm is too short for the work that is planned [m]."""
     at_work(me)
     used = (me.q[c.HAND_SHARE], me.q[c.HAND_SHARE + 1])
-    return beyond(me.q, used, me.bones, me.frame, me.size, me.p, me.r) + SPARE_M
+    spare = SPARE_M + 0.4 * abs(me.plan[pl.WANDER_M])
+    return beyond(me.q, used, me.bones, me.frame, me.size, me.p, me.r) + spare
 
 
 @compiled

@@ -34,9 +34,9 @@ def start_saw(draws: Floats, place: Place, me: Worker) -> float:
     sign = 1.0 - 2.0 * side
     z = place[3] if place[3] > 0.0 else between(draws[1], 0.75, 0.95)
     step_ahead(1 - side, 0.26, me)
-    put_tool(HAND_SAW, side, (0.40, 0.17 * sign, z + 0.17), (0.0, CUT_RAD, 0.0), me)
-    put_other((0.50, -0.10 * sign, z + 0.03), me)
-    look_to((0.62, 0.1 * sign, z), me)
+    put_tool(HAND_SAW, side, (0.52, 0.17 * sign, z + 0.17), (0.0, CUT_RAD, 0.0), me)
+    put_other((0.58, -0.12 * sign, z + 0.03), me)
+    look_to((0.74, 0.1 * sign, z), me)
     strokes(SAW, between(draws[2], 0.13, 0.15), between(draws[3], 1.55, 1.75),
             between(draws[4], 3.0, 5.0), 1 + int(3.0 * draws[5]), me)  # fmt: skip
     return finish(CALM_M_S, me)

@@ -77,9 +77,13 @@ def _along(way: float, plan: Floats, q: Floats) -> None:
 def _strike(ease: float, turn: float, plan: Floats, q: Floats) -> None:
     """Swing the hammer back slowly and forward faster, round the wrist and with the arm."""
     size = plan[pl.STROKE_M]
-    back = 0.5 * ease * (1.0 - math.cos(turn + 0.35 * math.sin(turn)))
+    skew = min(2.0 * size, 0.35)
+    back = 0.5 * ease * (1.0 - math.cos(turn + skew * math.sin(turn)))
     _along(-size * back, plan, q)
     q[c.PROP_POSE + 2] += 0.35 * size * back
+    out = (1.0 - 2.0 * plan[pl.SIDE]) * 0.6 * size * back  # past the shoulder
+    q[c.PROP_POSE] -= math.sin(plan[pl.START_YAW]) * out
+    q[c.PROP_POSE + 1] += math.cos(plan[pl.START_YAW]) * out
     q[c.PROP_POSE + 4] -= min(0.3 + 2.2 * size, 1.1) * back
 
 
@@ -99,17 +103,17 @@ def _fetch(u: float, other: int, plan: Floats, q: Floats) -> None:
         return
     hand = (other - c.HAND_TARGET) // 3
     cos, sin = math.cos(q[c.HEADING]), math.sin(q[c.HEADING])
-    ahead, left = 0.12, (1.0 - 2.0 * hand) * 0.19
+    ahead, left = 0.17, (1.0 - 2.0 * hand) * 0.31
     at = pl.TARGET + 3 * hand
     x = q[c.ROOT_X] + cos * ahead - sin * left
     y = q[c.ROOT_Y] + sin * ahead + cos * left
     q[other] += fetch * (x - plan[at])
     q[other + 1] += fetch * (y - plan[at + 1])
-    q[other + 2] += fetch * (q[c.PELVIS_Z] + 0.02 - plan[at + 2])
+    q[other + 2] += fetch * (q[c.PELVIS_Z] + 0.06 - plan[at + 2])
 
 
-FETCH_S = 0.62
-"""From a screw's place to the pouch [s]: at 0.5 m about 1.5 m/s at most."""
+FETCH_S = 0.55
+"""From a screw's place to the pouch [s]: at 0.4 m about 1.4 m/s at most."""
 
 
 @compiled

@@ -18,8 +18,13 @@ from hrc_env.typing import Floats
 
 GAZE_LEAD_S = 0.25
 """Eyes and head set off before the hand (Land & Hayhoe 2001: about half a second at most)."""
-BELT_AHEAD_M, BELT_SIDE_M, BELT_UP_M, BELT_PITCH_RAD = 0.06, 0.23, -0.02, 1.3
+BELT_AHEAD_M, BELT_SIDE_M, BELT_UP_M, BELT_PITCH_RAD = 0.10, 0.29, 0.06, 1.3
 """Where a tool hangs, from the pelvis [m], and how it points; judgement."""
+JOIN_AT = 0.3
+"""Share of the way from which the second hand comes to a tool for two; judgement."""
+RISE, OVER_KNEE_M, LOW_M = 0.5, 0.22, 0.6
+"""Hands go up ahead of the shoulder, by this share of the height, and down over the knees, so
+far ahead and up on the way to work below LOW_M [m]; judgement."""
 DRAWN_SHARE = 0.6
 """Share of the way at which what is drawn out with both hands is out."""
 
@@ -32,6 +37,17 @@ def extend(down: float, out: float, plan: Floats, size: Floats, q: Floats) -> No
     lean(plan[pl.LEAN] * out, plan[pl.SQUAT], plan[pl.TWIST] * out, q)
     for i in range(6):
         q[c.PROP_POSE + i] += out * (plan[pl.TOOL_POSE + i] - q[c.PROP_POSE + i])
+    _round(c.PROP_POSE, plan[pl.TOOL_POSE + 2], out, q)
+
+
+@compiled
+def _round(at: int, goal_z: float, out: float, q: Floats) -> None:
+    """Send q[at:], on its way out to a height, round shoulder or knee."""
+    high = RISE * max(goal_z - q[c.PELVIS_Z] - 0.3, 0.0)
+    bulge = max(high, OVER_KNEE_M if goal_z < LOW_M else 0.0) * 4.0 * out * (1.0 - out)
+    q[at] += math.cos(q[c.HEADING]) * bulge
+    q[at + 1] += math.sin(q[c.HEADING]) * bulge
+    q[at + 2] += bulge if goal_z < LOW_M else 0.0
 
 
 @compiled
@@ -59,8 +75,10 @@ def hands_on(out: float, taken: float, plan: Floats, q: Floats) -> None:
         else:
             for i in range(3):
                 q[at + i] += plan[pl.TARGET + 3 * other + i]
+            _round(at, plan[pl.TARGET + 3 * other + 2], out, q)
     q[c.HAND_SHARE + side] = taken
-    q[c.HAND_SHARE + other] = out * plan[pl.USE_LEFT + other]
+    joined = min_jerk((out - JOIN_AT) / (1.0 - JOIN_AT)) if both and taken != out else out
+    q[c.HAND_SHARE + other] = joined * plan[pl.USE_LEFT + other]
 
 
 @compiled

@@ -1,0 +1,60 @@
+"""Numbers of a walk in its steady part, as they were taken of recorded walks."""
+
+from itertools import pairwise
+
+import numpy as np
+
+from hrc_env.body import SEGMENT
+from hrc_env.experiments.motion.statistics import SIDES
+from hrc_env.motion.solo import Film
+from hrc_env.typing import Floats
+
+STEADY_SHARE = 0.97
+"""Of the top speed: from there on a walk is steady."""
+
+
+def gait_of(film: Film) -> dict[str, float]:
+    """Cadence, step length and width, bob and knee flexion of a straight walk."""
+    place, rate = film.motion.position_world[:, 0], film.motion.velocity_world[:, 0]
+    ahead = place[-1, 0, :2] - place[0, 0, :2]
+    ahead /= np.linalg.norm(ahead)
+    speed = _smooth(rate[:, 0, :2] @ ahead)
+    steady = np.flatnonzero(speed > STEADY_SHARE * np.percentile(speed, 90))
+    part = slice(steady[0], steady[-1] + 1)
+    left, right = (place[part, SEGMENT[f"{side}_foot"], :2] for side in SIDES)
+    apart = (left - right) @ ahead
+    steps = _extremes(apart)
+    times = film.time_s[part][steps]
+    beside = np.abs((left - right) @ np.array([-ahead[1], ahead[0]]))[steps]
+    step_s = float(np.median(np.diff(times)))
+    height = place[part, 0, 2]
+    bobs = [np.ptp(height[a:b]) for a, b in pairwise(steps)]
+    return {
+        "cadence_per_min": 60.0 / step_s,
+        "step_length_m": float(speed[part].mean()) * step_s,
+        "step_width_m": float(beside.mean()),
+        "bob_m": float(np.median(bobs)),
+        "knee_flexion_deg": max(float(knee_flexion_deg(place[part], side).max()) for side in SIDES),
+    }
+
+
+def _smooth(speed: Floats) -> Floats:
+    """Mean over about half a second of a film at 100 Hz."""
+    window = np.ones(51) / 51
+    return np.convolve(np.pad(speed, 25, "edge"), window, "valid")
+
+
+def _extremes(values: Floats) -> np.ndarray:
+    """Indices where the feet are furthest apart, one foot or the other in front."""
+    size = np.abs(values)
+    inner = (size[1:-1] >= size[:-2]) & (size[1:-1] > size[2:])
+    found = np.flatnonzero(inner) + 1
+    return found[size[found] > 0.5 * size.max()]
+
+
+def knee_flexion_deg(place: Floats, side: str) -> Floats:
+    """(T,) from segments' origins (T, 22, 3); 0 is straight."""
+    hip, knee, ankle = (place[:, SEGMENT[f"{side}_{n}"]] for n in ("thigh", "shank", "foot"))
+    thigh, shank = knee - hip, ankle - knee
+    cosine = (thigh * shank).sum(-1) / np.linalg.norm(thigh, axis=-1)
+    return np.degrees(np.arccos(np.clip(cosine / np.linalg.norm(shank, axis=-1), -1.0, 1.0)))

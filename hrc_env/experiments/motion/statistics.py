@@ -1,0 +1,125 @@
+"""Numbers of films: speeds, accelerations, slipping feet, missing hands, bodies in themselves."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hrc_env.body import SEGMENT, Body, worker_truth
+from hrc_env.motion import controls as c
+from hrc_env.motion import plans as pl
+from hrc_env.motion.anatomy import GRIP_M
+from hrc_env.motion.solo import Film
+from hrc_env.typing import Bools, Floats
+
+SIDES = ("left", "right")
+WRISTS = [SEGMENT[f"{side}_hand"] for side in SIDES]
+ANKLES = [SEGMENT[f"{side}_foot"] for side in SIDES]
+HEAD = [SEGMENT["head"]]
+MISSED_M = 0.01
+"""A hand further than this from what it holds has missed it."""
+LOADED_M = 0.001
+"""A foot whose ball is no higher than this above its ground bears weight."""
+DEEP_M = 0.05
+"""Capsules this deep in each other count: they are rounder than limbs, clothes and flesh give."""
+
+
+def statistics_of(films: Sequence[Film], body: Body) -> dict[str, float]:
+    """Statistics of films of one scene, all frames of all of them pooled."""
+    numbers: dict[str, float] = {}
+    for name, which in (("wrist", WRISTS), ("ankle", ANKLES), ("head", HEAD)):
+        speeds = np.concatenate([_speeds(film, which) for film in films])
+        alike = name == "ankle" or films[0].activity == pl.WALK
+        speeds = speeds.ravel() if alike else speeds.max(1)  # at work the busier hand counts
+        numbers[f"{name}_p50_m_s"] = float(np.percentile(speeds, 50))
+        numbers[f"{name}_p95_m_s"] = float(np.percentile(speeds, 95))
+        numbers[f"{name}_max_m_s"] = float(speeds.max())
+        rates = np.concatenate([_accelerations(film, which) for film in films])
+        numbers[f"{name}_p999_m_s2"] = float(np.percentile(rates, 99.9))
+    pelvis = np.concatenate([film.motion.position_world[:, 0, 0, 2] for film in films])
+    numbers["pelvis_low_m"], numbers["pelvis_high_m"] = float(pelvis.min()), float(pelvis.max())
+    numbers["slip_p95_m_s"] = _percentile(np.concatenate([slips(film) for film in films]), 95)
+    missed = np.concatenate([misses(film) for film in films])
+    numbers["grip_missed_share"] = float((missed > MISSED_M).mean()) if missed.size else 0.0
+    inside = np.concatenate([depths(film, body) > DEEP_M for film in films])
+    numbers["inside_itself_share"] = float(inside.mean())
+    return numbers
+
+
+def _percentile(values: Floats, share: float) -> float:
+    return float(np.percentile(values, share)) if values.size else 0.0
+
+
+def _speeds(film: Film, which: list[int]) -> Floats:
+    """(T, n) of segments' origins [m/s]."""
+    return np.linalg.norm(film.motion.velocity_world[:, 0, which], axis=-1)
+
+
+def _accelerations(film: Film, which: list[int]) -> Floats:
+    """Of segments' origins, all of them [m/s^2]."""
+    velocity = film.motion.velocity_world[:, 0, which]
+    change = np.diff(velocity, axis=0) / np.diff(film.time_s)[:, None, None]
+    return np.linalg.norm(change, axis=-1).ravel()
+
+
+def slips(film: Film) -> Floats:
+    """Speeds over the floor of balls of feet that bear weight [m/s]."""
+    grounds = np.unique(np.round([0.0, *film.worker.prints[:, 4]], 4))
+    found = []
+    for side in SIDES:
+        ball = SEGMENT[f"{side}_toes"]
+        height = film.motion.position_world[:, 0, ball, 2]
+        rest = min(height[0], height[-1])  # activities begin and end on the floor
+        above = np.abs(height[:, None] - rest - grounds).min(1)
+        speed = np.linalg.norm(film.motion.velocity_world[:, 0, ball], axis=-1)
+        found.append(speed[above < LOADED_M])
+    return np.concatenate(found)
+
+
+def grips(film: Film) -> Floats:
+    """(T, 2, 3) where the hands grip: beyond the wrist along the forearm [m]."""
+    place = film.motion.position_world[:, 0]
+    both = []
+    for side in SIDES:
+        wrist = place[:, SEGMENT[f"{side}_hand"]]
+        along = wrist - place[:, SEGMENT[f"{side}_forearm"]]
+        both.append(wrist + GRIP_M * along / np.linalg.norm(along, axis=-1, keepdims=True))
+    return np.stack(both, 1)
+
+
+def wholly_there(film: Film) -> Bools:
+    """(T, 2) when a hand is to be at its target."""
+    return film.controls[:, c.HAND_SHARE : c.HAND_SHARE + 2] > 1.0 - 1e-9
+
+
+def misses(film: Film) -> Floats:
+    """How far hands are from what they hold or work on, of all frames in which they do [m]."""
+    wished = film.controls[:, c.HAND_TARGET : c.HAND_TARGET + 6].reshape(-1, 2, 3)
+    return np.linalg.norm(grips(film) - wished, axis=-1)[wholly_there(film)]
+
+
+def depths(film: Film, body: Body) -> Floats:
+    """(T,) how deep limbs are in what they should not be in [m]; negative: how far away."""
+    truth = worker_truth(body, film.motion)
+    capsules, radius = truth.capsules_world[:, 0], truth.capsule_radius_m
+    deepest = np.full(len(film.time_s), -np.inf)
+    for limb, part in _pairs(body):
+        a, b = capsules[:, part, 0, None], capsules[:, part, 1, None]
+        shares = np.linspace(0.0, 1.0, 5)[:, None]
+        points = capsules[:, limb, 0, None] * (1 - shares) + capsules[:, limb, 1, None] * shares
+        length = np.maximum(((b - a) ** 2).sum(-1), 1e-12)
+        along = np.clip(((points - a) * (b - a)).sum(-1) / length, 0.0, 1.0)[..., None]
+        apart = np.linalg.norm(points - a - along * (b - a), axis=-1).min(1)
+        deepest = np.maximum(deepest, radius[limb] + radius[part] - apart)
+    return deepest
+
+
+def _pairs(body: Body) -> list[tuple[int, int]]:
+    """Capsules that should stay out of each other."""
+    at = {name: index for index, name in enumerate(body.capsule_names)}
+    trunk = ("pelvis", "abdomen", "torso", "chest", "head")
+    named = [(f"{side}_hand", part) for side in SIDES for part in trunk]
+    named += [(f"{side}_forearm", part) for side in SIDES for part in ("chest", "torso", "head")]
+    named += [(f"{side}_hand", f"{other}_thigh") for side in SIDES for other in SIDES]
+    named += [(f"{side}_hand", f"{other}_shank") for side in SIDES for other in SIDES]
+    named += [("left_shank", "right_shank"), ("left_foot", "right_foot")]
+    return [(at[a], at[b]) for a, b in named if a in at and b in at]
