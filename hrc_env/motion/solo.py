@@ -13,9 +13,7 @@ from hrc_env.motion.compiled import compiled
 from hrc_env.motion.feet import foot
 from hrc_env.motion.holding import N_HELD, drop_load, prop_pose
 from hrc_env.motion.kinematics import N_FRAMES, N_POINTS, pose, quaternion
-from hrc_env.motion.posture import STANCE_HALF_WIDTH_M
-from hrc_env.motion.state import RATE_H_S, _stop, evaluate
-from hrc_env.motion.walk import footprint
+from hrc_env.motion.state import RATE_H_S, evaluate, settle, stop
 from hrc_env.records import Held, WorkerMotion
 from hrc_env.typing import Floats
 
@@ -48,16 +46,14 @@ def alone(
     )  # fmt: skip
     me.traits[pl.SPEED_TRAIT], me.traits[pl.SQUAT_TRAIT] = 1.2, 0.7
     me.traits[pl.RIGHT_HANDED] = 0.9 if right else 0.1
-    me.plan[pl.END_X], me.plan[pl.END_Y], me.plan[pl.END_YAW] = *xy_m, yaw_rad
-    for side in range(2):
-        footprint(side, *xy_m, yaw_rad, STANCE_HALF_WIDTH_M, me.size, me.stance[side])
+    settle(*xy_m, yaw_rad, me.plan, me.prints, me.stance, me.size)
     rest(me)
     return me
 
 
 def rest(me: Worker, activity: int = pl.STAND) -> None:
     """End an activity: stand where it ended."""
-    _stop(me.plan, me.prints, me.stance)
+    stop(me.plan, me.prints, me.stance)
     if activity in pl.GIVING or activity == pl.PUSH:
         drop_load(me.plan)
     for side in range(2):
