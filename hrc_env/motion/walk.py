@@ -8,7 +8,7 @@ import math
 
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
-from hrc_env.motion.anatomy import ANKLE_X, STAND_Z
+from hrc_env.motion.anatomy import ANKLE_X, LEG, STAND_Z
 from hrc_env.motion.compiled import compiled
 from hrc_env.motion.curves import hump, min_jerk, ramp, wrap
 from hrc_env.motion.feet import FLAT_S
@@ -26,6 +26,9 @@ from hrc_env.typing import Floats
 
 CADENCE_PER_MIN, CADENCE_POWER, SLOWEST_M_S = 96.2, 0.468, 0.65
 """Fit above; slower starts and turns keep the cadence of the slowest speed [m/s]."""
+LEG_M = 0.8685772217237624
+"""Leg of a worker who walks just so; others step more or less often by the square root of their
+legs' ratio, as pendulums would (dynamic similarity, Alexander 1989)."""
 SWING_SHARE = 0.80
 """Time in the air in periods of a step: stance is 60 % of the gait cycle."""
 MID_STANCE = 0.46
@@ -43,7 +46,7 @@ NORMAL_M_S = 1.3
 """Speed at which the amplitudes below hold."""
 LOADED_TWIST = 0.4
 """Share of the trunk's turning that is left with something in the hands; judgement."""
-LURCH_S = 1.1
+LURCH_S = 1.4
 """From a foot's catching to the walk's going on [s]; judgement."""
 
 
@@ -123,7 +126,7 @@ def walk(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q
 @compiled
 def _lurch(t: float, trip: float, q: Floats) -> None:
     """Pitch forward with the arms out, `t` after a foot caught, and come up again."""
-    fall, arms = trip * hump(t / LURCH_S), trip * hump((t - 0.04) / (1.7 * LURCH_S))
+    fall, arms = trip * hump(t / LURCH_S), trip * hump((t - 0.04) / (1.6 * LURCH_S))
     q[c.ROOT_X] += math.cos(q[c.HEADING]) * 0.10 * fall
     q[c.ROOT_Y] += math.sin(q[c.HEADING]) * 0.10 * fall
     q[c.PELVIS_Z] -= 0.07 * fall
@@ -183,6 +186,7 @@ def plan_pace(
     _plan_turns(end_yaw, plan)
     if period == 0.0:
         period = 60.0 / (CADENCE_PER_MIN * max(plan[pl.SPEED], SLOWEST_M_S) ** CADENCE_POWER)
+        period *= math.sqrt(size[LEG] / LEG_M)
     plan[pl.STEP_PERIOD], plan[pl.STEP_SWING] = period, SWING_SHARE * period
     plan[pl.STEP_START] = SHIFT_S
     plan[pl.STEP_FIRST] = _first_foot(plan)

@@ -23,10 +23,10 @@ def gait_of(film: Film) -> dict[str, float]:
     part = slice(steady[0], steady[-1] + 1)
     left, right = (place[part, SEGMENT[f"{side}_foot"], :2] for side in SIDES)
     apart = (left - right) @ ahead
-    steps = _extremes(apart)
-    times = film.time_s[part][steps]
+    passed = np.flatnonzero(apart[1:] * apart[:-1] < 0.0)  # one foot passes the other
+    step_s = float(np.median(np.diff(film.time_s[part][passed])))
+    steps = [a + int(np.argmax(np.abs(apart[a:b]))) for a, b in pairwise(passed)]
     beside = np.abs((left - right) @ np.array([-ahead[1], ahead[0]]))[steps]
-    step_s = float(np.median(np.diff(times)))
     height = place[part, 0, 2]
     bobs = [np.ptp(height[a:b]) for a, b in pairwise(steps)]
     return {
@@ -42,14 +42,6 @@ def _smooth(speed: Floats) -> Floats:
     """Mean over about half a second of a film at 100 Hz."""
     window = np.ones(51) / 51
     return np.convolve(np.pad(speed, 25, "edge"), window, "valid")
-
-
-def _extremes(values: Floats) -> np.ndarray:
-    """Indices where the feet are furthest apart, one foot or the other in front."""
-    size = np.abs(values)
-    inner = (size[1:-1] >= size[:-2]) & (size[1:-1] > size[2:])
-    found = np.flatnonzero(inner) + 1
-    return found[size[found] > 0.5 * size.max()]
 
 
 def knee_flexion_deg(place: Floats, side: str) -> Floats:

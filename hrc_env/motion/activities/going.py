@@ -23,14 +23,16 @@ CART_AHEAD_M, WHEELBARROW_AHEAD_M = 0.47, 0.16
 """Handles ahead of the root [m]: arms bent before the belly, and hanging at the sides."""
 WHEEL_AHEAD_M, WHEEL_UP_M, STANDS_RAD = 1.2, 0.17, 0.2
 """A wheelbarrow's axle in its frame [m], and how far it tips back onto its legs."""
-KNUCKLES_SHARE, BEND = 0.86, 1.15
+KNUCKLES_SHARE, BEND = 0.90, 1.3
 """Handles are carried as high as this share of the pelvis, by arms that hang almost straight;
 how far the trunk bends to take them; judgement."""
 TAKE_S, LIFT_S = 0.7, 0.5
 """For the hands to go to the handles; to lift a wheelbarrow by them [s]."""
 BACK_M_S, BACK_PERIOD_S = 0.62, 0.42
 """Quick steps back: speed and time of a step; judgement."""
-CAUGHT_M = 0.16
+TURN_M_S, TURN_PERIOD_S = 0.2, 0.36
+"""Turning on the spot: steps so short that no foot steps on the other; judgement."""
+CAUGHT_M = 0.12
 """How much too short the step is in which a foot catches [m]; judgement."""
 
 
@@ -46,8 +48,11 @@ def start_walk(place: Place, via: Floats, speed_m_s: float, me: Worker) -> float
 @compiled
 def start_turn(place: Place, me: Worker) -> float:
     """Plan to turn on the spot to the place's yaw; returns how long it takes [s]."""
-    here = (me.plan[pl.START_X], me.plan[pl.START_Y], place[2], 0.0)
-    return start_walk(here, np.empty((0, 3)), 1.0, me)
+    plan = me.plan
+    here = (plan[pl.START_X], plan[pl.START_Y])
+    lay_path(here, np.empty((0, 3)), here, plan)
+    pace = (0.0, TURN_M_S, TURN_PERIOD_S)
+    return plan_pace(pace, place[2], plan, me.prints, me.stance, me.size)
 
 
 @compiled

@@ -31,8 +31,8 @@ from hrc_env.typing import Floats
 HAMMER = prop_index("hammer")
 HEAD_M, FACE_M = 0.25, 0.05
 """From the fist to the hammer's head along the handle, and to its face [m]; `props`."""
-LIGHT_HZ, LIGHT_M = 5.6, 0.066
-"""Light taps: to and fro by 6.6 cm, at most 1.2 m/s and a little more on the way forward."""
+LIGHT_HZ, LIGHT_M = 5.6, 0.060
+"""Light taps: to and fro by 6 cm, at most 1.1 m/s and a little more on the way forward."""
 WALL_M = 1.2
 """Nails at this height or higher are driven into a wall, lower ones downwards [m]."""
 
@@ -50,7 +50,7 @@ def start_hammer(draws: Floats, place: Place, me: Worker) -> float:
         step_ahead(1 - side, 0.16, me)
     aside = before_knee(me)
     if z < WALL_M:
-        ahead, turn = 0.72, (0.0, 0.5 * math.pi, 0.0)
+        ahead, turn = (0.54 if z < LOW_M else 0.72), (0.0, 0.5 * math.pi, 0.0)
         at = (ahead - HEAD_M, aside + 0.06 * sign, z + FACE_M + 0.02)
     else:
         ahead, turn = 0.68, (0.0, 0.0, 0.0)

@@ -170,7 +170,7 @@ def _plan_lift(prop: int, at: tuple[float, float, float], raise_s: float, me: Wo
         plan[pl.MIDWAY + i] = point[i]
     plan[pl.MIDWAY + 3] = plan[pl.START_YAW]
     way = abs(mid_z - at[2])
-    plan[pl.RAISE_S] = max(raise_s * (0.55 + 0.6 * way), 0.6)
+    plan[pl.RAISE_S] = max(raise_s * (0.50 + 0.48 * way), 0.6)
     plan[pl.OUT_S] = max(raise_s * (0.7 + 0.35 * low), 0.7)
     plan[pl.SHOULDER_S] = SHOULDER_S if shoulder else 0.0
     plan[pl.LASTS] = (

@@ -77,7 +77,7 @@ def _along(way: float, plan: Floats, q: Floats) -> None:
 def _strike(ease: float, turn: float, plan: Floats, q: Floats) -> None:
     """Swing the hammer back slowly and forward faster, round the wrist and with the arm."""
     size = plan[pl.STROKE_M]
-    skew = min(2.0 * size, 0.35)
+    skew = min(1.5 * size, 0.35)
     back = 0.5 * ease * (1.0 - math.cos(turn + skew * math.sin(turn)))
     _along(-size * back, plan, q)
     q[c.PROP_POSE + 2] += 0.35 * size * back
@@ -103,7 +103,7 @@ def _fetch(u: float, other: int, plan: Floats, q: Floats) -> None:
         return
     hand = (other - c.HAND_TARGET) // 3
     cos, sin = math.cos(q[c.HEADING]), math.sin(q[c.HEADING])
-    ahead, left = 0.17, (1.0 - 2.0 * hand) * 0.31
+    ahead, left = 0.17, (1.0 - 2.0 * hand) * 0.34
     at = pl.TARGET + 3 * hand
     x = q[c.ROOT_X] + cos * ahead - sin * left
     y = q[c.ROOT_Y] + sin * ahead + cos * left

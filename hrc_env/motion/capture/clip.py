@@ -15,7 +15,7 @@ from hrc_env.typing import Bools, Floats
 
 VERSION = 1
 """Of the file; raised when its columns or fields change."""
-RECORDED = np.array([*range(c.HAND_SHIFT), *range(c.ANKLE, c.ANKLE + 12)])
+RECORDED = np.array([*range(c.N_BLENDED), *range(c.ANKLE, c.ANKLE + 12)])
 """(32,) columns of the control vector that a recording fills, in the file's order: root, pelvis,
 spine, head, elbows, hands from their shoulders; both feet."""
 FARTHEST_M, FASTEST_M_S = 200.0, 15.0

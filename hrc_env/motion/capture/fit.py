@@ -43,7 +43,7 @@ PULL: dict[int, float] = {
 SLIGHT = 1e-3
 """The pull on every other column [m per m or rad]."""
 FITTED = np.array(
-    [c.ROOT_X, c.ROOT_Y, *range(c.PELVIS_Z, c.HAND_SHIFT)]
+    [c.ROOT_X, c.ROOT_Y, *range(c.PELVIS_Z, c.N_BLENDED)]
     + [c.ANKLE + 6 * side + k for side in range(2) for k in range(5)]
 )
 """Columns that are fitted: of those that a clip has, all but the heading and the toes."""

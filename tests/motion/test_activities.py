@@ -1,0 +1,147 @@
+"""Everything that workers can do, one scene after the other, by people small and tall."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hrc_env.body import SEGMENT, load_body
+from hrc_env.experiments.motion.gait import knee_flexion_deg
+from hrc_env.experiments.motion.statistics import (
+    ANKLES,
+    HEAD,
+    WRISTS,
+    grips,
+    misses,
+    slips,
+    wholly_there,
+)
+from hrc_env.motion import controls as c
+from hrc_env.motion import plans as pl
+from hrc_env.motion.repertoire import REPERTOIRE, perform
+from hrc_env.motion.solo import alone
+from hrc_env.props import PROP_NAMES, PROPS
+
+DT_S = 0.01
+STATURES_M = (1.55, 1.75, 1.92)
+
+
+def of_stature(stature_m):
+    """The first worker, smaller or larger (the baked ones differ in shape as well)."""
+    body = load_body()
+    scale = stature_m / body.stature_m
+    return replace(
+        body,
+        stature_m=stature_m,
+        rest_position=body.rest_position * scale,
+        joint_offset=body.joint_offset * scale,
+        capsule_ends=body.capsule_ends * scale,
+        capsule_radius_m=body.capsule_radius_m * scale,
+    )
+
+
+@pytest.fixture(scope="module", params=list(REPERTOIRE))
+def scene(request):
+    """The films of a scene by three people, right-handed but for the last."""
+    played = []
+    for k, stature_m in enumerate(STATURES_M):
+        me = alone(of_stature(stature_m), (0.3, -0.2), 0.7, right=k < 2)
+        played.append(perform(REPERTOIRE[request.param], me, np.random.default_rng(k), DT_S))
+    return request.param, played
+
+
+def each(scene):
+    """All films of a scene."""
+    return [film for films in scene[1] for film in films]
+
+
+def test_hands_are_where_they_work_and_on_what_they_hold(scene):
+    for film in each(scene):
+        missed = misses(film)
+        if missed.size:
+            assert np.percentile(missed, 99) < 0.025
+            assert (missed > 0.01).mean() < 0.1
+
+
+def test_it_begins_and_ends_standing_still(scene):
+    for film in each(scene):
+        speed = np.linalg.norm(film.motion.velocity_world[:, 0], axis=-1)
+        assert speed[[0, -1]].max() < 0.2  # swaying
+        height = film.motion.position_world[[0, -1], 0, 0, 2]
+        assert height[1] == pytest.approx(height[0], abs=0.01)
+
+
+def test_nothing_jumps(scene):
+    for film in each(scene):
+        velocity = film.motion.velocity_world[:, 0]
+        moved = np.diff(film.motion.position_world[:, 0], axis=0) / DT_S
+        assert np.abs(moved - 0.5 * (velocity[1:] + velocity[:-1])).max() < 0.25
+        rate = np.linalg.norm(np.diff(velocity, axis=0), axis=-1) / DT_S
+        assert rate[:, [0, 3, *HEAD]].max() < 90.0  # a stumble's
+        assert np.percentile(rate[:, WRISTS], 99.9) < 80.0
+        assert np.percentile(rate[:, ANKLES], 99.9) < 95.0  # the walk at 1.8 m/s
+
+
+def test_one_activity_takes_over_where_the_last_one_ended(scene):
+    for films in scene[1]:
+        for before, after in zip(films[:-1], films[1:], strict=True):
+            gap = before.controls[-1, : c.N_BLENDED] - after.controls[0, : c.N_BLENDED]
+            assert np.abs(np.delete(gap, c.HEADING)).max() < 0.35  # blended in 0.45 s
+            if before.controls[-1, c.PROP] > 0 and after.controls[0, c.PROP] > 0:
+                held = before.controls[-1, c.PROP_POSE :] - after.controls[0, c.PROP_POSE :]
+                assert np.abs(held).max() < 0.01
+
+
+def test_loaded_feet_do_not_slide_and_none_is_in_the_floor(scene):
+    for film in each(scene):
+        slip = slips(film)
+        assert np.percentile(slip, 95) < 0.05
+        toes = film.motion.position_world[:, 0, [SEGMENT["left_toes"], SEGMENT["right_toes"]], 2]
+        assert toes.min() > toes[0].min() - 0.003
+
+
+def test_joints_stay_within_what_people_can_do(scene):
+    for film in each(scene):
+        place = film.motion.position_world[:, 0]
+        for side in ("left", "right"):
+            assert -1.0 < knee_flexion_deg(place, side).min()
+            assert knee_flexion_deg(place, side).max() < 150.0
+            upper, fore, hand = (
+                place[:, SEGMENT[f"{side}_{n}"]] for n in ("upper_arm", "forearm", "hand")
+            )
+            a, b = fore - upper, hand - fore
+            cosine = (a * b).sum(-1) / np.linalg.norm(a, axis=-1) / np.linalg.norm(b, axis=-1)
+            assert np.degrees(np.arccos(cosine.clip(-1, 1))).max() < 155.0
+            knee = place[:, SEGMENT[f"{side}_shank"], 2]
+            assert knee.min() > 0.03
+        assert np.abs(film.controls[:, c.HEAD_YAW]).max() < 1.4
+        assert np.abs(film.controls[:, c.HEAD_PITCH]).max() < 1.2
+        assert np.abs(film.controls[:, c.SPINE_FLEX]).max() < 1.6
+
+
+def test_what_is_held_is_in_a_hand(scene):
+    for film in each(scene):
+        held, hands = film.motion.held, grips(film)
+        there = wholly_there(film)
+        for kind in np.unique(held.kind):
+            if kind == 0 or film.activity in (*pl.TAKING, *pl.GIVING, pl.PUSH, pl.CARRY):
+                continue  # loads stand by themselves before and after; boards lie on shoulders
+            when = (held.kind[:, 0] == kind) & there.any(1)
+            apart = np.linalg.norm(hands[when] - held.position_world[when], axis=-1).min(1)
+            reach = np.nanmax(np.linalg.norm(PROPS[kind].grips, axis=-1))
+            assert apart.max() < reach + 0.02, PROP_NAMES[kind]
+
+
+def test_nobody_falls_over(scene):
+    """The middle of pelvis and chest stays over the feet, give or take a step."""
+    for film in each(scene):
+        place = film.motion.position_world[:, 0]
+        feet = place[:, [*ANKLES, SEGMENT["left_toes"], SEGMENT["right_toes"]], :2].mean(1)
+        trunk = 0.5 * (place[:, 0, :2] + place[:, 3, :2])
+        assert np.linalg.norm(trunk - feet, axis=-1).max() < 0.45
+
+
+def test_every_activity_has_a_scene():
+    shown = {activity for acts in REPERTOIRE.values() for activity, _, _ in acts}
+    elsewhere = {pl.REACH, pl.LIFT}  # tests/motion/test_hands.py
+    assert shown | elsewhere == set(range(len(pl.ACTIVITY_NAMES)))
