@@ -118,7 +118,7 @@ def start_clip(piece: int, turn_rad: float, clips: Clips, me: Worker) -> float:
     prints[: LAST + 2, 3] = STRIDE_SHARE
     for side in range(2):
         footprint(side, x, y, heading, STANCE_HALF_WIDTH_M, me.size, prints[END + side])
-        feet = footprints(q[[0, -1], c.HAND_SHIFT + 6 * side :], me.size)
+        feet = footprints(q[[0, -1], c.N_BLENDED + 6 * side :], me.size)
         for at, foot in zip((BEGIN, LAST), feet, strict=True):
             prints[at + side, :2] = turn @ foot[:2] + origin
             prints[at + side, 2] = foot[3] + yaw

@@ -80,14 +80,14 @@ def _play(
 ) -> None:  # fmt: skip
     """Fill the arrays of a film."""
     offset = np.zeros((c.N_BLENDED, 2))
-    later = np.zeros((N_POINTS, 3))
+    later, frames = np.zeros((N_POINTS, 3)), np.zeros((1, 1))
     for k in range(len(time_s)):
         t, q, p, r = time_s[k], controls[k], me.p, me.r
         for i in range(1, -1, -1):
             h = i * RATE_H_S
             evaluate(
                 activity, t + h, clock_s + t + h, me.plan, me.prints, me.stance, offset,
-                me.traits, me.size, q,
+                me.traits, me.size, frames, q,
             )  # fmt: skip
             pose(q, me.bones, me.frame, me.size, p, r)
             if i == 1:

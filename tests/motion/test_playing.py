@@ -90,8 +90,8 @@ def test_the_recorded_pose_is_the_one_that_is_seen(clip):
     k = round((at_s - 0.5 * PACE_S) * FPS)
     piece = stocked([clip], state.anatomy.size)
     q = np.zeros((1, c.N_CONTROLS))
-    q[0, : c.HAND_SHIFT] = piece.frames[k, : c.HAND_SHIFT]
-    q[0, c.ANKLE : c.ANKLE + 12] = piece.frames[k, c.HAND_SHIFT :]
+    q[0, : c.N_BLENDED] = piece.frames[k, : c.N_BLENDED]
+    q[0, c.ANKLE : c.ANKLE + 12] = piece.frames[k, c.N_BLENDED :]
     recorded = segments_in(q, state.anatomy)[0][0]
     between = np.linalg.norm(position[:, None] - position[None], axis=-1)
     assert (

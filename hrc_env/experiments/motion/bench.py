@@ -80,6 +80,7 @@ def _measure(scene: str, config: MotionBenchConfig) -> dict[str, Metric]:
     for name in config.bodies:
         body = load_body(name)
         films, us = [], []
+        list(_play(scene, 0, body))  # compiled
         for seed in range(config.n_seeds):
             started = time.thread_time()
             played = list(_play(scene, seed, body))

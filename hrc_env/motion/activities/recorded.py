@@ -51,7 +51,7 @@ def play(
     _body(f, share, plan, frames, q)
     first = int(plan[pl.CLIP_ROW])
     for side in range(2):
-        pitch = c.HAND_SHIFT + 6 * side + 4
+        pitch = c.N_BLENDED + 6 * side + 4
         if since < 0.0:
             foot(t, side, plan, prints[BEGIN:], stance, size, q)
             tilt = min_jerk(1.0 + since / TILT_S)
@@ -87,7 +87,7 @@ def _body(f: float, share: float, plan: Floats, frames: Floats, q: Floats) -> No
     q[c.ROOT_Y] += share * (y - q[c.ROOT_Y])
     yaw = plan[pl.CLIP_YAW] + _between(f, c.HEADING, plan, frames)
     q[c.HEADING] += share * (yaw - q[c.HEADING])
-    for i in range(c.PELVIS_Z, c.HAND_SHIFT):
+    for i in range(c.PELVIS_Z, c.N_BLENDED):
         q[i] += share * (_between(f, i, plan, frames) - q[i])
 
 
@@ -95,7 +95,7 @@ def _body(f: float, share: float, plan: Floats, frames: Floats, q: Floats) -> No
 def _placed_foot(f: float, side: int, plan: Floats, frames: Floats, q: Floats) -> None:
     """The clip's foot at frame f, where the clip is placed."""
     cos, sin = math.cos(plan[pl.CLIP_YAW]), math.sin(plan[pl.CLIP_YAW])
-    at, of = c.ANKLE + 6 * side, c.HAND_SHIFT + 6 * side
+    at, of = c.ANKLE + 6 * side, c.N_BLENDED + 6 * side
     ahead, left = _between(f, of, plan, frames), _between(f, of + 1, plan, frames)
     q[at] = plan[pl.START_X] + cos * ahead - sin * left
     q[at + 1] = plan[pl.START_Y] + sin * ahead + cos * left
