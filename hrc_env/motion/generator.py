@@ -14,7 +14,7 @@ from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion import state as st
 from hrc_env.motion.anatomy import anatomy
-from hrc_env.motion.behaviour import N_DRAWS, begin_episode, follow_up
+from hrc_env.motion.behaviour import begin_episode, follow_up
 from hrc_env.motion.capture.clip import Clip, opened
 from hrc_env.motion.compiled import compiled
 from hrc_env.motion.config import MotionConfig, numbers
@@ -26,6 +26,7 @@ from hrc_env.motion.people import PEOPLE, PeopleConfig, people_called
 from hrc_env.motion.playing import Clips, stocked
 from hrc_env.motion.reactions import notice
 from hrc_env.motion.state import RATE_H_S, MotionState, evaluate
+from hrc_env.motion.who import N_DRAWS
 from hrc_env.records import Grounds, Held, WorkerMotion, WorkerPath, Workplace
 from hrc_env.typing import Bools, Floats, Ints
 
