@@ -25,7 +25,7 @@ class RetargetError:
     scale: float
     """The worker's size beside the person's."""
     slip_m_s: float
-    """95th percentile of the speed of standing feet's footprints [m/s]; NaN: none stands."""
+    """95th percentile of the speed of the balls of standing feet [m/s]; NaN: none stands."""
 
 
 def retarget(
@@ -39,7 +39,7 @@ def retarget(
     controls, contacts = locked(poses, capture.fps, size)
     done = joints_in(controls, marks)
     scale, apart = aligned_errors(capture.joints_world, done)
-    slips = slip(controls, contacts, capture.fps, size)
+    slips = slip(controls, contacts, capture.fps, marks.anatomy)
     error = RetargetError(
         apart.mean(0), np.percentile(apart, 95, axis=0), scale,
         float(np.percentile(slips, 95)) if len(slips) else float("nan"),

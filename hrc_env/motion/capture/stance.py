@@ -7,8 +7,10 @@ is set to one place then, and what that changes fades out in the swings before a
 
 import numpy as np
 
+from hrc_env.body import SEGMENT
 from hrc_env.motion import controls as c
-from hrc_env.motion.anatomy import ANKLE_Z, BALL_X, BALL_Z, HEEL_X
+from hrc_env.motion.anatomy import ANKLE_Z, BALL_X, BALL_Z, HEEL_X, Anatomy
+from hrc_env.motion.capture.segments import segments_in
 from hrc_env.motion.capture.series import runs, smoothed
 from hrc_env.motion.curves import decay
 from hrc_env.motion.feet import about
@@ -22,6 +24,8 @@ FADE_S = 0.25
 """Time in which a correction fades out in a swing [s]; a swing lasts 0.4 s."""
 FLOOR_M = 0.06
 """A foot that rests lower than this stands on the floor, else on something of its height [m]."""
+FLAT_RAD = 0.01
+"""A foot whose toes are up by more stands on its heel."""
 SMOOTH_S = 0.02
 """Smoothing of the speed, against the jitter of recordings [s]."""
 
@@ -45,13 +49,19 @@ def locked(q: Floats, fps: float, size: Floats) -> tuple[Floats, Bools]:
     return out, stands
 
 
-def slip(q: Floats, stands: Bools, fps: float, size: Floats) -> Floats:
-    """Speeds of the footprints of standing feet [m/s], one a frame and foot that stands."""
+def slip(q: Floats, stands: Bools, fps: float, anatomy: Anatomy) -> Floats:
+    """Speeds along the floor of the balls of a worker's standing feet [m/s].
+
+    One a frame and foot that stands flat or on its ball: where the legs are too short for a
+    footprint, the foot leaves it, and that shows here.
+    """
+    position, _ = segments_in(q, anatomy)
     speeds = []
-    for side in range(2):
-        at = c.ANKLE + 6 * side
-        speed = np.linalg.norm(np.diff(footprints(q[:, at:], size)[:, :3], axis=0), axis=-1) * fps
-        speeds.append(speed[stands[1:, side] & stands[:-1, side]])
+    for side, name in enumerate(("left_toes", "right_toes")):
+        on = stands[:, side] & (q[:, c.ANKLE + 6 * side + 4] > -FLAT_RAD)
+        ball = position[:, SEGMENT[name], :2]
+        speed = np.linalg.norm(np.diff(ball, axis=0), axis=-1) * fps
+        speeds.append(speed[on[1:] & on[:-1]])
     return np.concatenate(speeds)
 
 
