@@ -23,7 +23,7 @@ CART_AHEAD_M, WHEELBARROW_AHEAD_M = 0.47, 0.16
 """Handles ahead of the root [m]: arms bent before the belly, and hanging at the sides."""
 WHEEL_AHEAD_M, WHEEL_UP_M, STANDS_RAD = 1.2, 0.17, 0.2
 """A wheelbarrow's axle in its frame [m], and how far it tips back onto its legs."""
-KNUCKLES_SHARE, BEND = 0.90, 1.3
+KNUCKLES_SHARE, BEND = 0.94, 1.3
 """Handles are carried as high as this share of the pelvis, by arms that hang almost straight;
 how far the trunk bends to take them; judgement."""
 TAKE_S, LIFT_S = 0.7, 0.5
@@ -101,7 +101,7 @@ def start_push(place: Place, via: Floats, speed_m_s: float, prop: int, me: Worke
     if prop == WHEELBARROW:
         plan[pl.TAKEN_S] += LIFT_S
         handles = KNUCKLES_SHARE * me.size[STAND_Z] - plan[pl.LOAD_GRIP + 2]
-        plan[pl.TIPPED] = math.asin(min(max(handles / WHEEL_AHEAD_M, 0.0), 0.2))
+        plan[pl.TIPPED] = math.asin(min(max(handles / WHEEL_AHEAD_M, 0.0), 0.24))
     plan[pl.LASTS] = lasts + 2.0 * plan[pl.TAKEN_S]
     return plan[pl.LASTS]
 
