@@ -57,7 +57,8 @@ class Arguments:
     scenes: tuple[str, ...] = tuple(SCENES)
     """Scenes."""
     activities: tuple[str, ...] = ()
-    """Only moments of these activities, in turns; none takes every moment as it comes."""
+    """Moments of these activities, in turns, where one comes within some minutes, else as they
+    come; none takes every moment as it comes."""
     seed: int = 0
     pictures: Path | None = None
     """A PNG of the crops that were missed or are bad."""
