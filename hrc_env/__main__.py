@@ -3,6 +3,7 @@
 python -m hrc_env demo     a film of a robot that yields to a worker it sees
 python -m hrc_env check    is this machine ready?
 python -m hrc_env bench    how good and honest are the estimators, how fast is everything?
+python -m hrc_env gallery  pictures of every worker, motion and scene
 """
 
 import sys
@@ -13,6 +14,7 @@ from rich.console import Console
 from hrc_env.cli.bench import Bench
 from hrc_env.cli.check import Check
 from hrc_env.cli.demo import Demo
+from hrc_env.cli.gallery import Gallery
 from hrc_env.cli.import_motion import ImportMotion
 from hrc_env.cli.listing import List
 from hrc_env.cli.play import Play
@@ -30,6 +32,7 @@ def main() -> int:
             "list": List,
             "play": Play,
             "bench": Bench,
+            "gallery": Gallery,
             "import-motion": ImportMotion,
         },
         prog="python -m hrc_env",

@@ -10,8 +10,8 @@ from typing import Annotated
 import tyro
 from rich.console import Console
 from rich.markdown import Markdown
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from hrc_env.cli.progress import progress_bar
 from hrc_env.errors import ConfigError
 
 Say = Callable[[float, str], None]
@@ -150,17 +150,8 @@ class Bench:
 def _show(run: Callable[[Path, Say], object], out: Path, table: str, written: str) -> int:
     """Run a part of the bench under a progress bar, then show its table."""
     console = Console()
-    with Progress(
-        TextColumn("{task.description:30s}"),
-        BarColumn(),
-        TextColumn("{task.percentage:3.0f} %"),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-        console=console,
-    ) as progress:
-        task = progress.add_task("bench", total=1.0)
-        run(out, lambda share, label: progress.update(task, advance=share, description=label))
+    with progress_bar(console, "bench") as say:
+        run(out, say)
     console.print(Markdown((out / table).read_text()))
     console.print(f"In [bold]{out}[/]: {written}")
     return 0

@@ -63,7 +63,8 @@ def test_other_cameras_can_hang_there():
 def test_the_arm_never_reaches_beyond_the_reach_that_its_pairs_allow_for():
     """Contacts are only looked for within `capsule_reach_m`; no pose goes farther."""
     chain, rng = arm_chain(np.eye(4)), np.random.default_rng(4)
-    q = rng.uniform(*chain.range_rad.T, (4000, 6))
+    low, high = chain.range_rad.T
+    q = rng.uniform(low, high, (4000, 6))
     ends = capsules(chain, q)
     farthest = np.linalg.norm(ends, axis=-1).max((0, 2)) + chain.capsule_radius_m
     assert len(farthest) == len(CAPSULES)

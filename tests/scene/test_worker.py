@@ -57,7 +57,7 @@ def test_a_pose_moves_the_skin_by_linear_blending(model):
     position = rest.position_world.copy()
     arm = [SEGMENT[f"left_{part}"] for part in ("upper_arm", "forearm", "hand")]
     position[arm] += [0.0, 0.0, 0.3]
-    raised = WorkerMotion(position, rest.quaternion_wxyz, *[np.zeros((22, 3))] * 2)
+    raised = WorkerMotion(position, rest.quaternion_wxyz, np.zeros((22, 3)), np.zeros((22, 3)))
     for drawn, skin in zip(drawn_skins(model, posed(model, raised)), load_looks().skins,
                            strict=True):  # fmt: skip
         share = skin.weights[:, arm].sum(1)
@@ -71,7 +71,8 @@ def test_capsules_of_the_model_are_the_capsules_of_the_truth(model):
     motion = WorkerMotion(
         rest.position_world + np.array([1.0, 0.5, 0.0]),
         np.tile(turn, (22, 1)),
-        *[np.zeros((22, 3))] * 2,
+        np.zeros((22, 3)),
+        np.zeros((22, 3)),
     )
     data = posed(model, motion)
     truth = worker_truth(body, motion)
