@@ -16,6 +16,7 @@ import numpy as np
 
 from hrc_env.compiled import LEAN
 from hrc_env.errors import ConfigError, check_shape, unknown
+from hrc_env.geometry.rotations import turned
 from hrc_env.records import WorkerMotion, WorkerPath, WorkerTruth
 from hrc_env.typing import Capsules, Floats, Ints, Points3, QuaternionsWxyz
 
@@ -232,20 +233,6 @@ def _flat(array: Floats) -> Floats:
 
 
 @numba.njit(**LEAN)
-def _turned(quaternion, offset):  # pragma: no cover - compiled
-    """An offset turned by a unit quaternion: v + 2 w (u x v) + 2 u x (u x v)."""
-    w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
-    a = 2.0 * (y * offset[2] - z * offset[1])
-    b = 2.0 * (z * offset[0] - x * offset[2])
-    c = 2.0 * (x * offset[1] - y * offset[0])
-    return (
-        offset[0] + w * a + y * c - z * b,
-        offset[1] + w * b + z * a - x * c,
-        offset[2] + w * c + x * b - y * a,
-    )
-
-
-@numba.njit(**LEAN)
 def _joints(
     position, quaternion, linear, angular, rows, segment, offset, joints, velocity
 ):  # pragma: no cover - compiled
@@ -254,7 +241,7 @@ def _joints(
         mine = offset[rows[b]]
         for j in range(len(segment)):
             s = segment[j]
-            arm = _turned(quaternion[b, s], mine[j])
+            arm = turned(quaternion[b, s], mine[j])
             for i in range(3):
                 k, m = (i + 1) % 3, (i + 2) % 3
                 joints[b, j, i] = position[b, s, i] + arm[i]
@@ -270,7 +257,7 @@ def _capsules(position, quaternion, rows, segment, ends, capsules):  # pragma: n
         for k in range(len(segment)):
             s = segment[k]
             for end in range(2):
-                arm = _turned(quaternion[b, s], mine[k, end])
+                arm = turned(quaternion[b, s], mine[k, end])
                 for i in range(3):
                     capsules[b, k, end, i] = position[b, s, i] + arm[i]
 

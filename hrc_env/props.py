@@ -9,10 +9,14 @@ the floor below that. Sizes are of common tools, rounded; judgement.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 
-from hrc_env.geometry.shapes import BOX, CAPSULE, WIDTH, shape
-from hrc_env.typing import Floats, Points3
+from hrc_env.compiled import LEAN
+from hrc_env.geometry.rotations import turned
+from hrc_env.geometry.shapes import BOX, CAPSULE, CENTRE, HALF_SIZE, WIDTH, absent, shape
+from hrc_env.records import Held
+from hrc_env.typing import Floats, Ints, Points3
 
 Triple = Sequence[float]
 
@@ -141,3 +145,43 @@ PROPS: tuple[Prop, ...] = (
 )
 """Everything that can be held; the first is nothing."""
 PROP_NAMES: tuple[str, ...] = tuple(prop.name for prop in PROPS)
+
+
+_N_PARTS: Ints = np.array([len(prop.shapes) for prop in PROPS])
+_PARTS: Floats = np.stack(
+    [np.resize(np.vstack([prop.shapes, absent()]), (_N_PARTS.max(), WIDTH)) for prop in PROPS]
+)
+"""(P, n, `shapes.WIDTH`) the parts of every prop, `_N_PARTS` of them, then anything."""
+
+
+def held_shapes(held: Held) -> Floats:
+    """(B, W * n, `shapes.WIDTH`) the solid parts of what workers hold, in the world [m].
+
+    There are rows for the prop of most parts; those that are left over are absent.
+    """
+    batch, n_workers = held.kind.shape
+    rows = np.empty((batch, n_workers * _PARTS.shape[1], WIDTH))
+    _place(held.kind, held.position_world, held.quaternion_wxyz, _PARTS, _N_PARTS, absent(), rows)
+    return rows
+
+
+@numba.njit(**LEAN)
+def _place(kind, position, quaternion, parts, n_parts, nothing, rows):
+    """Parts of the props of B environments, of W workers each, from their frames to the world."""
+    most = parts.shape[1]
+    for b in range(len(kind)):
+        for k in range(rows.shape[1]):
+            w, part, row = k // most, k % most, rows[b, k]
+            prop = kind[b, w]
+            if part >= n_parts[prop]:
+                for i in range(WIDTH):
+                    row[i] = nothing[i]
+                continue
+            own = parts[prop, part]
+            for i in range(WIDTH):
+                row[i] = own[i]
+            for at in range(CENTRE, HALF_SIZE, 3):
+                x, y, z = turned(quaternion[b, w], own[at : at + 3])
+                row[at], row[at + 1], row[at + 2] = x, y, z
+            for i in range(3):
+                row[CENTRE + i] += position[b, w, i]

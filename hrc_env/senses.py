@@ -245,7 +245,7 @@ class EmulatedSenses(TrackingSenses):
         """Emulated keypoints; room, robot and bodies stand in the lines of sight."""
         whole = len(now.ids) == len(self.keypoints.px)
         state = self.emulator if whole else rows(self.emulator, now.ids)
-        surroundings = self.scene.surroundings(now.q)
+        surroundings = self.scene.surroundings(now.q, now.motion.held)
         keypoints = emulator.emulate(
             state, sensor_rngs, now.truth, surroundings, self.scene.cameras, self.config
         )

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from hrc_env.geometry.shapes import BOX, CAPSULE, CENTRE, KIND, REACH
-from hrc_env.props import PROP_NAMES, PROPS, prop_index
+from hrc_env.geometry.shapes import AXES, BOX, CAPSULE, CENTRE, KIND, REACH
+from hrc_env.props import PROP_NAMES, PROPS, held_shapes, prop_index
+from hrc_env.records import Held
 
 HELD = PROPS[1:]
 
@@ -43,3 +44,15 @@ def test_two_hands_hold_it_on_their_own_sides(prop):
 def test_what_is_held_cannot_be_changed_by_accident():
     with pytest.raises(ValueError, match="read-only"):
         PROPS[1].shapes[0, 0] = 1.0
+
+
+def test_what_is_held_goes_where_it_is_held():
+    """A board that is turned by a quarter lies along world x; nobody holds the other one."""
+    kind = np.array([[prop_index("board"), 0]])
+    quarter = np.array([np.cos(np.pi / 4), 0, 0, np.sin(np.pi / 4)])
+    held = Held(kind, np.full((1, 2, 3), (1.0, 2.0, 3.0)), np.tile(quarter, (1, 2, 1)))
+    rows = held_shapes(held)[0]
+    there = rows[np.isfinite(rows[:, REACH])]
+    assert len(there) == 1
+    np.testing.assert_allclose(there[0, CENTRE : CENTRE + 3], (1, 2, 3))
+    np.testing.assert_allclose(there[0, AXES + 3 : AXES + 6], (-1, 0, 0), atol=1e-12)

@@ -120,8 +120,9 @@ def _frames(
         push = np.stack([rng.standard_normal(scene.n_actions) for rng in pushes])
         action = _SLOWNESS * action + np.sqrt(1 - _SLOWNESS**2) * push
         scene.step(np.clip(action, -1, 1))
-        now = worker_truth(scene.body, generator.current(scene.motion))
-        between = scene.scene.surroundings(scene.physics.q)
+        motion = generator.current(scene.motion)
+        now = worker_truth(scene.body, motion)
+        between = scene.scene.surroundings(scene.physics.q, motion.held)
         seen = emulator.emulate(errors, sensors, now, between, cameras, config.emulator)
         yield now.joints_world[:, 0], now.velocity_world[:, 0], seen
 

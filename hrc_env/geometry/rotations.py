@@ -1,7 +1,9 @@
 """Rotations as matrices and unit quaternions (scalar first), over any leading axes."""
 
+import numba
 import numpy as np
 
+from hrc_env.compiled import LEAN
 from hrc_env.typing import Floats, Points3, QuaternionsWxyz, Rotations
 
 
@@ -68,3 +70,17 @@ def look_at(eye_world: Points3, target_world: Points3) -> Rotations:
     length = np.linalg.norm(right)
     right = right / length if length > 1e-9 else np.array([1.0, 0.0, 0.0])
     return np.stack([right, np.cross(forward, right), forward], -1)
+
+
+@numba.njit(**LEAN)
+def turned(quaternion, offset):  # pragma: no cover - compiled
+    """An offset (3,) turned by a unit quaternion: v + 2 w (u x v) + 2 u x (u x v)."""
+    w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
+    a = 2.0 * (y * offset[2] - z * offset[1])
+    b = 2.0 * (z * offset[0] - x * offset[2])
+    c = 2.0 * (x * offset[1] - y * offset[0])
+    return (
+        offset[0] + w * a + y * c - z * b,
+        offset[1] + w * b + z * a - x * c,
+        offset[2] + w * c + x * b - y * a,
+    )

@@ -42,6 +42,21 @@ def shape(kind: int, centre: Floats, axes: Floats, half_size: Floats) -> Floats:
     return row
 
 
+def absent() -> Floats:
+    """The row (`WIDTH`,) of a shape that is not there: no line meets its sphere."""
+    row = np.zeros(WIDTH)
+    row[KIND], row[REACH] = CAPSULE, -np.inf
+    return row
+
+
+@numba.njit(**LEAN)
+def set_rows(table, first, rows):
+    """Shapes into the rows of a table from `first` on."""
+    for k in range(len(rows)):
+        for i in range(WIDTH):
+            table[first + k, i] = rows[k, i]
+
+
 @numba.njit(**LEAN)
 def set_capsules(table, first, ends, radius):
     """Capsules with ends (n, 2, 3) and radii (n,) into the rows from `first` on."""

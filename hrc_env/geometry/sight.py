@@ -23,6 +23,7 @@ from hrc_env.geometry.shapes import (
     on_axis,
     passage,
     set_capsules,
+    set_rows,
 )
 from hrc_env.typing import Bools, Capsules, Floats, Points3
 
@@ -37,6 +38,8 @@ class Surroundings:
 
     still: Floats
     """(G, `shapes.WIDTH`) what never moves, a shape a row."""
+    moving: Floats
+    """(B, M, `shapes.WIDTH`) what is carried about; rows may be `shapes.absent`."""
     capsules_world: Capsules
     """(B, K, 2, 3) the robot [m]."""
     capsule_radius_m: Floats
@@ -45,7 +48,8 @@ class Surroundings:
 
 def nothing(batch: int) -> Surroundings:
     """Free lines of sight."""
-    return Surroundings(np.zeros((0, WIDTH)), np.zeros((batch, 0, 2, 3)), np.zeros(0))
+    nobody = (np.zeros((batch, 0, 2, 3)), np.zeros(0))
+    return Surroundings(np.zeros((0, WIDTH)), np.zeros((batch, 0, WIDTH)), *nobody)
 
 
 def hidden(surroundings: Surroundings, eyes_world: Points3, points_world: Points3) -> Bools:
@@ -64,8 +68,8 @@ def hidden(surroundings: Surroundings, eyes_world: Points3, points_world: Points
     eyes, points = np.ascontiguousarray(eyes_world), np.ascontiguousarray(points_world)
     result = np.empty((batch, len(eyes), points.shape[1]), bool)
     _hidden(
-        surroundings.still, surroundings.capsules_world, surroundings.capsule_radius_m,
-        eyes, points, result,
+        surroundings.still, surroundings.moving, surroundings.capsules_world,
+        surroundings.capsule_radius_m, eyes, points, result,
     )  # fmt: skip
     return result
 
@@ -175,12 +179,13 @@ def line(eye, points, j):
 
 
 @numba.njit(**JIT)
-def _hidden(still, capsules, radius, eyes, points, hidden):
-    table = make_table(still, len(radius))
+def _hidden(still, moving, capsules, radius, eyes, points, hidden):
+    table = make_table(still, len(radius) + moving.shape[1])
     n = len(table)
     view, rows = np.empty((5, n)), np.empty(n, np.int64)
     for b in range(len(points)):
         set_capsules(table, len(still), capsules[b], radius)
+        set_rows(table, len(still) + len(radius), moving[b])
         for c in range(len(eyes)):
             n_view = look(eyes[c], points[b], table, view, rows)
             for j in range(points.shape[1]):

@@ -147,7 +147,7 @@ def emulate(
         state: of the errors, advanced by one image in place.
         rngs: one generator per environment.
         truth: (B, W, ...) the workers; their capsules hide joints of their own and of others.
-        surroundings: (B, ...) the room and the robot, which hide joints too.
+        surroundings: (B, ...) the room, what is carried and the robot, which hide joints too.
         cameras: the rig (C).
         config: as given to `make_state`.
 
@@ -168,7 +168,8 @@ def emulate(
     emulate_batch(
         state.slow, state.size, state.swapped, state.missed, normals, uniforms,
         np.ascontiguousarray(truth.joints_world), np.ascontiguousarray(truth.capsules_world),
-        truth.capsule_radius_m, surroundings.still, robot, surroundings.capsule_radius_m,
+        truth.capsule_radius_m, surroundings.still, surroundings.moving, robot,
+        surroundings.capsule_radius_m,
         P, eyes_world, image, scalars, per_joint, MIRROR, VISIBILITY, ERROR,
         out.px, out.confidence, out.sigma_px,
     )  # fmt: skip

@@ -6,7 +6,7 @@ import numba
 import numpy as np
 
 from hrc_env.compiled import JIT, LEAN
-from hrc_env.geometry.shapes import passage, set_capsules
+from hrc_env.geometry.shapes import passage, set_capsules, set_rows
 from hrc_env.geometry.sight import blocks, line, look, make_table, meets
 from hrc_env.perception.noise import error_share
 from hrc_env.perception.self_occlusion import body_blocks
@@ -21,17 +21,20 @@ UNSURE = 0.7
 @numba.njit(**JIT)
 def emulate_batch(
     slow, size, swapped, missed, normals, uniforms,
-    joints, capsules, radius, still, robot, robot_radius,
+    joints, capsules, radius, still, moving, robot, robot_radius,
     P, eyes, image, scalars, per_joint, mirror, visibility, error, px, confidence, sigma,
 ):  # fmt: skip
     """Advance the errors by one image and write keypoints; arguments as in `emulate`."""
     batch, n_cameras, n_workers, n_joints = confidence.shape
-    n_body, first_body = len(radius), len(still) + len(robot_radius)
-    table = make_table(still, len(robot_radius) + n_workers * n_body)
+    n_body, n_moving = len(radius), moving.shape[1]
+    first_moving = len(still) + len(robot_radius)
+    first_body = first_moving + n_moving
+    table = make_table(still, len(robot_radius) + n_moving + n_workers * n_body)
     view, rows = np.empty((5, len(table))), np.empty(len(table), np.int64)
     uv, depth, state = np.empty((n_joints, 2)), np.empty(n_joints), np.empty(n_joints, np.int64)
     for b in range(batch):
         set_capsules(table, len(still), robot[b], robot_radius)
+        set_rows(table, first_moving, moving[b])
         for w in range(n_workers):
             set_capsules(table, first_body + w * n_body, capsules[b, w], radius)
         for c in range(n_cameras):

@@ -14,9 +14,11 @@ from hrc_env.errors import ConfigError, unknown
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.geometry.chains import SerialChain, capsules
 from hrc_env.geometry.rotations import about_axis
+from hrc_env.geometry.shapes import WIDTH
 from hrc_env.geometry.sight import Surroundings
 from hrc_env.looks import load_looks
-from hrc_env.records import Grounds
+from hrc_env.props import held_shapes
+from hrc_env.records import Grounds, Held
 from hrc_env.scene.arena import add_lab, paint_lab
 from hrc_env.scene.arm import (
     CAPSULES,
@@ -114,10 +116,11 @@ class Scene:
     grounds: Grounds
     """Where people can stand, walk and work."""
 
-    def surroundings(self, q: JointAngles) -> Surroundings:
-        """What can stand before cameras, the arm at angles q (B, N) [rad]."""
+    def surroundings(self, q: JointAngles, held: Held | None = None) -> Surroundings:
+        """What can stand before cameras; the arm is at angles q (B, N) [rad]."""
         chain = self.chain
-        return Surroundings(self.obstacles, capsules(chain, q), chain.capsule_radius_m)
+        moving = np.zeros((len(q), 0, WIDTH)) if held is None else held_shapes(held)
+        return Surroundings(self.obstacles, moving, capsules(chain, q), chain.capsule_radius_m)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A scene is pickled as its recipe."""

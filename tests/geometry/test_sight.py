@@ -6,10 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hrc_env.errors import ConfigError
-from hrc_env.geometry.shapes import BOX, CAPSULE, CYLINDER, PLANE, shape
+from hrc_env.geometry.shapes import BOX, CAPSULE, CYLINDER, PLANE, WIDTH, absent, shape
 from hrc_env.geometry.sight import Surroundings, hidden, nothing
 
 UPRIGHT = np.eye(3)
+EMPTY = (np.zeros((1, 0, WIDTH)), np.zeros((1, 0, 2, 3)), np.zeros(0))
 EYE = np.array([[3.0, 0.0, 1.0]])
 SOLIDS = {
     "box": shape(BOX, np.array([0.0, 0, 1]), UPRIGHT, np.array([0.1, 0.2, 0.5])),
@@ -23,7 +24,7 @@ SOLIDS = {
 
 
 def room(*rows):
-    return Surroundings(np.array(rows), np.zeros((1, 0, 2, 3)), np.zeros(0))
+    return Surroundings(np.array(rows), *EMPTY)
 
 
 def sees(solid, point, eye=EYE):
@@ -67,7 +68,12 @@ def test_points_are_hidden_or_not_whatever_else_is_looked_at(seed):
     """Shapes are sorted out for a whole group of points; alone a point asks all that are near."""
     rng = np.random.default_rng(seed)
     ends = rng.uniform(-2, 2, (1, 20, 1, 3)) + rng.uniform(-0.5, 0.5, (1, 20, 2, 3))
-    around = Surroundings(np.array(list(SOLIDS.values())), ends, rng.uniform(0.05, 0.3, 20))
+    around = Surroundings(
+        np.array(list(SOLIDS.values())),
+        np.zeros((len(ends), 0, WIDTH)),
+        ends,
+        rng.uniform(0.05, 0.3, 20),
+    )
     eyes = rng.uniform(-3, 3, (3, 3))
     points = rng.uniform(-2, 2, 3) + rng.uniform(-0.8, 0.8, (1, 15, 3))
     alone = [hidden(around, eyes, points[:, j : j + 1]) for j in range(15)]
@@ -77,3 +83,18 @@ def test_points_are_hidden_or_not_whatever_else_is_looked_at(seed):
 def test_points_of_another_number_of_environments_are_refused():
     with pytest.raises(ConfigError, match="points_world must have shape"):
         hidden(nothing(2), EYE, np.zeros((3, 15, 3)))
+
+
+@pytest.mark.parametrize("solid", SOLIDS)
+def test_what_is_carried_hides_as_what_stands(solid):
+    carried = Surroundings(np.zeros((0, WIDTH)), SOLIDS[solid][None, None], *EMPTY[1:])
+    points = np.random.default_rng(2).uniform((-4, -1, 0), (-0.5, 1, 2), (1, 40, 3))
+    behind = hidden(room(SOLIDS[solid]), EYE, points)
+    assert 0 < behind.sum() < behind.size
+    np.testing.assert_array_equal(hidden(carried, EYE, points), behind)
+
+
+def test_a_shape_that_is_absent_hides_nothing():
+    gone = Surroundings(absent()[None], absent()[None, None], *EMPTY[1:])
+    points = np.random.default_rng(3).uniform(-3, 3, (1, 60, 3))
+    assert not hidden(gone, EYE, points).any()

@@ -40,7 +40,9 @@ def before(cameras, points, radius_m):
     ray = points[:, None] - eyes
     centres = points[:, None] - 0.3 * ray / np.linalg.norm(ray, axis=-1, keepdims=True)
     balls = np.repeat(centres.reshape(len(points), -1, 1, 3), 2, axis=2)
-    return Surroundings(nothing(1).still, balls, np.full(balls.shape[1], radius_m))
+    return Surroundings(
+        nothing(1).still, nothing(len(balls)).moving, balls, np.full(balls.shape[1], radius_m)
+    )
 
 
 def film(config, n_images, cameras=FRONT, hidden=(), batch=32):
@@ -118,7 +120,7 @@ def test_what_it_reports_as_sigma_is_about_what_it_errs():
 def test_a_blocked_camera_is_nan_without_confidence_and_with_infinite_sigma():
     state, rngs = start(1, STEADY)
     around = CAMERAS[2].eye_world + np.zeros((1, 1, 2, 3))
-    lid = Surroundings(nothing(1).still, around, np.array([0.1]))
+    lid = Surroundings(nothing(1).still, nothing(len(around)).moving, around, np.array([0.1]))
     seen = emulate(state, rngs, truth(), lid, CAMERAS, STEADY)
     assert np.isnan(seen.px[0, 2]).all()
     assert np.all(seen.confidence[0, 2] == 0)

@@ -6,6 +6,7 @@ import pytest
 
 from hrc_env.errors import HRCError
 from hrc_env.geometry.chains import capsules
+from hrc_env.geometry.shapes import WIDTH
 from hrc_env.geometry.sight import NEAR_POINT_M, Surroundings, hidden
 from hrc_env.scene.build import SceneConfig, build
 from hrc_env.scene.obstacles import obstacles
@@ -14,6 +15,7 @@ from hrc_env.scene.primitives import ROBOT_CAPSULES, SOLID
 TIE_M = 1e-9
 LAB = build()
 EYES = np.stack([camera.eye_world for camera in LAB.cameras])
+EMPTY = (np.zeros((1, 0, WIDTH)), np.zeros((1, 0, 2, 3)), np.zeros(0))
 HIDING = np.isin(np.arange(mujoco.mjNGROUP), [SOLID, ROBOT_CAPSULES]).astype(np.uint8)
 
 
@@ -61,7 +63,7 @@ def test_every_kind_of_geom_hides_as_for_mujoco(kind):
     )
     data, rng = mujoco.MjData(model), np.random.default_rng(6)
     mujoco.mj_kinematics(model, data)
-    alone = Surroundings(obstacles(model), np.zeros((1, 0, 2, 3)), np.zeros(0))
+    alone = Surroundings(obstacles(model), *EMPTY)
     eyes, points = rng.uniform(-1, 1, (40, 3)), rng.uniform(-1, 1, (60, 3))
     assert assert_same(alone, model, data, eyes, points) > 0.03
 

@@ -81,8 +81,9 @@ def _episodes(seeds: tuple[int, ...]) -> tuple[Points3, Keypoints, Keypoints]:
     for _ in range(OWN_FRAMES):
         action = _wander(action, rngs[2])
         simulation.step(np.clip(action, -1, 1))
-        truth = worker_truth(simulation.body, generator.current(simulation.motion))
-        lab = simulation.scene.surroundings(simulation.physics.q)
+        motion = generator.current(simulation.motion)
+        truth = worker_truth(simulation.body, motion)
+        lab = simulation.scene.surroundings(simulation.physics.q, motion.held)
         joints.append(truth.joints_world.copy())
         for k, between in enumerate((nothing(batch), lab)):
             seen[k].append(
