@@ -9,7 +9,7 @@ says how good this is and what it was compared with.
 import numba
 import numpy as np
 
-from hrc_env.compiled import JIT, LEAN
+from hrc_env.compiled import JIT
 from hrc_env.errors import ConfigError
 from hrc_env.records import PoseEstimate
 from hrc_env.tracking.config import TrackerConfig
@@ -92,7 +92,7 @@ def _look_ahead(
             _add(*body, cos, sin, moved, rate, std)
 
 
-@numba.njit(**LEAN)
+@numba.njit(**JIT)
 def _go_on(mean, cov, velocity, horizon, variance):
     """Constant velocity, and `variance` [m^2] more."""
     for j in range(len(mean)):
@@ -101,7 +101,7 @@ def _go_on(mean, cov, velocity, horizon, variance):
             cov[j, i, i] += variance
 
 
-@numba.njit(**LEAN)
+@numba.njit(**JIT)
 def _add(mean, cov, velocity, cos, sin, moved, rate, std):
     """Displacements of the body's frame onto the body in the world."""
     for j in range(len(mean)):

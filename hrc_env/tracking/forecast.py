@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.body import assets_dir
-from hrc_env.compiled import JIT, LEAN
+from hrc_env.compiled import JIT
 from hrc_env.skeleton import N_JOINTS
 from hrc_env.tracking.models.acquisition import heading
 from hrc_env.typing import Floats
@@ -89,7 +89,7 @@ def describe(points, velocity, cov, log_std, out):
     return cos, sin, known
 
 
-@numba.njit(fastmath=_REORDER, **LEAN)
+@numba.njit(fastmath=_REORDER, **JIT)
 def _layer(inputs, weight, bias, out):
     """out = bias + inputs weight."""
     for k in range(len(out)):
@@ -100,14 +100,14 @@ def _layer(inputs, weight, bias, out):
             out[k] += value * weight[i, k]
 
 
-@numba.njit(**LEAN)
+@numba.njit(**JIT)
 def _hidden(inputs, weight, bias, out):
     _layer(inputs, weight, bias, out)
     for k in range(len(out)):
         out[k] = max(out[k], np.float32(0.0))
 
 
-@numba.njit(**LEAN)
+@numba.njit(**JIT)
 def foresee(network, inputs, horizon, scratch, moved, rate, std):
     """The network's answer at `horizon` [s], interpolated between those that it knows.
 

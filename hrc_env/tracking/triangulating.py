@@ -13,7 +13,7 @@ from typing import TypeAlias
 import numba
 import numpy as np
 
-from hrc_env.compiled import JIT, LEAN
+from hrc_env.compiled import JIT
 from hrc_env.geometry.triangulation import (
     FURTHEST_PX,
     Triangulation,
@@ -114,7 +114,7 @@ def _believed(
     return np.where(ok[..., None], px, np.nan), sigma
 
 
-@numba.njit(**LEAN)
+@numba.njit(**JIT)
 def _hold(cov, age, tracked, dt, speed):
     for b in range(cov.shape[0]):
         for w in range(cov.shape[1]):
@@ -148,7 +148,7 @@ def _update(made, spread, mean, cov, velocity, age, tracked, standing, radius, m
                 tracked[b, w] = True
 
 
-@numba.njit(**LEAN)
+@numba.njit(**JIT)
 def _follow(points, spread, found, tau, mean, cov, velocity, age):
     for j in range(len(points)):
         elapsed = age[j]

@@ -3,7 +3,7 @@
 import numba
 import numpy as np
 
-from hrc_env.compiled import LEAN
+from hrc_env.compiled import JIT
 from hrc_env.typing import Covariances3, Floats, Points3
 
 
@@ -18,7 +18,7 @@ def roll(particles: Floats, sigma_m: float, rng: np.random.Generator) -> None:
     _add_scaled(particles, rng.standard_normal(particles.shape, dtype=np.float32), sigma_m)
 
 
-@numba.njit(**LEAN)
+@numba.njit(**JIT)
 def _add_scaled(particles, noise, scale):
     for j in range(particles.shape[0]):
         for i in range(3):
@@ -26,7 +26,7 @@ def _add_scaled(particles, noise, scale):
                 particles[j, i, m] += scale * noise[j, i, m]
 
 
-@numba.njit(**LEAN)
+@numba.njit(**JIT)
 def moments(particles, mean, cov):
     """Mean (J, 3) and covariance (J, 3, 3) of unweighted clouds (J, 3, M)."""
     n = particles.shape[2]

@@ -5,7 +5,7 @@ The random numbers are arguments, so that each environment draws its own.
 
 import numba
 
-from hrc_env.compiled import JIT, LEAN
+from hrc_env.compiled import JIT
 
 
 @numba.njit(**JIT)
@@ -28,7 +28,7 @@ def multinomial(weights, waits, ancestors):
         ancestors[m] = particle
 
 
-@numba.njit(**LEAN)
+@numba.njit(**JIT)
 def systematic(weights, start, ancestors):
     """Choices at even distances (Kitagawa, 1996): the counts differ from M w_m by less than one.
 

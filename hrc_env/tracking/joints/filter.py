@@ -9,7 +9,7 @@ import math
 import numba
 import numpy as np
 
-from hrc_env.compiled import JIT, LEAN
+from hrc_env.compiled import JIT
 from hrc_env.geometry.triangulation import inverse3
 from hrc_env.tracking.joints.importance import (
     cholesky3,
@@ -30,7 +30,7 @@ _LEAST_ESS = 8.0
 """With fewer effective particles the Gaussian at the mode is the better answer."""
 
 
-@numba.njit(**LEAN)
+@numba.njit(**JIT)
 def predict_all(state, F, Q, dt):
     """Move every tracked body by dt [s]; F, Q (J, 2, 2) as `models.motion.damped_joints` gives."""
     for b in range(state.tracked.shape[0]):
@@ -99,7 +99,7 @@ def _follow(state, b, w, P, z, sigma, ok, noise, tables, n_mode, s):
     use_bones(body, cov, n_views, state.bone_length[b, w], state.bone_variance[b, w])
 
 
-@numba.njit(**LEAN)
+@numba.njit(**JIT)
 def _update_joint(seen, draws, model, body, cov, belief, scratch):
     """One joint's importance-sampled posterior; returns the effective sample size."""
     work, gain = scratch
@@ -119,7 +119,7 @@ def _update_joint(seen, draws, model, body, cov, belief, scratch):
     return ess
 
 
-@numba.njit(**LEAN)
+@numba.njit(**JIT)
 def _sample(seen, draws, contrast, body, prior_cov, mode, spread, work, mean, moments):
     """Mean (3,) and covariance (3, 3) of weighted particles; the effective sample size."""
     P, z, sigma, ok = seen
@@ -147,7 +147,7 @@ def _sample(seen, draws, contrast, body, prior_cov, mode, spread, work, mean, mo
     return ess
 
 
-@numba.njit(**LEAN)
+@numba.njit(**JIT)
 def _regress(body, cov, precision, mean, spread, gain):
     """Give the position its new mean and covariance, and the velocity what follows from them.
 

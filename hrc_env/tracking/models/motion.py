@@ -139,7 +139,7 @@ def shared_covariance(cov):
     return least / 3.0, cross / 3.0, (cov[best, 3, 3] + cov[best, 4, 4] + cov[best, 5, 5]) / 3.0
 
 
-@numba.njit(**LEAN)
+@numba.njit(**JIT)
 def relative_covariance(cov, shared, out, factor):
     """`cov` (6, 6) less the largest share of the root's that leaves it positive definite.
 

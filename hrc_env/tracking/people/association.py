@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from hrc_env.compiled import JIT, LEAN
+from hrc_env.compiled import JIT
 from hrc_env.errors import ConfigError, check_shape
 from hrc_env.geometry.assignment import assign_rows
 from hrc_env.records import Keypoints, PoseEstimate
@@ -140,7 +140,7 @@ def _associate_all(
                     sigma_px[b, c, w] = found_sigma[b, c, d]
 
 
-@numba.njit(**LEAN)
+@numba.njit(**JIT)
 def _read(px, confidence, sigma_px, ok, free):
     """Which joints are measurements, and which poses have enough of them to be somebody's."""
     for c in range(ok.shape[0]):
@@ -222,7 +222,7 @@ def _welcome(rig, poses, free, mean, tracked, tables, s, pose):
             tracked[w], vacant[w], unseen[w] = True, False, False
 
 
-@numba.njit(**LEAN)
+@numba.njit(**JIT)
 def _best(seeds, members, scores, free, n):
     """The proposal that the cameras fit best with poses that are still free, or -1."""
     best, best_total = -1, 0.0
@@ -268,7 +268,7 @@ def _whose(body, mean, tracked, vacant, unseen, s):
     return near if near >= 0 else _nearest(distance, vacant, np.inf)
 
 
-@numba.njit(**LEAN)
+@numba.njit(**JIT)
 def _nearest(distance, among, limit):
     best = -1
     for w in range(len(distance)):
@@ -277,7 +277,7 @@ def _nearest(distance, among, limit):
     return best
 
 
-@numba.njit(**LEAN)
+@numba.njit(**JIT)
 def _place(body, mean):
     points, met = body
     mean[:] = np.nan
@@ -287,7 +287,7 @@ def _place(body, mean):
                 mean[j, i] = points[j, i]
 
 
-@numba.njit(**LEAN)
+@numba.njit(**JIT)
 def _apart(body, mean):
     """Distance [m] between a body and a worker, on average over joints known of both."""
     points, met = body

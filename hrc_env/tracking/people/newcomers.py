@@ -15,7 +15,7 @@ import math
 import numba
 import numpy as np
 
-from hrc_env.compiled import JIT, LEAN
+from hrc_env.compiled import JIT
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
 from hrc_env.tracking.people.resemblance import expect, resemblance
 
@@ -50,7 +50,7 @@ def camera_model(P, eye, back, focal):
         focal[c] = math.sqrt(max((a[0] * a[0]).sum() - along * along, 1e-12))
 
 
-@numba.njit(**LEAN)
+@numba.njit(**JIT)
 def lines_of_sight(back, z, ok, free, sight):
     """Unit directions (C, D, J, 3) of the joints of free poses, into `sight`."""
     n_cameras, n_poses, n_joints = ok.shape
@@ -68,7 +68,7 @@ def lines_of_sight(back, z, ok, free, sight):
                     sight[c, d, j, i] /= math.sqrt(length)
 
 
-@numba.njit(**LEAN)
+@numba.njit(**JIT)
 def meeting(camera_1, camera_2, pose_1, pose_2, gate_sigma, points, met):
     """Where the joints' lines of sight of two poses meet; how many do, 0 if too few.
 
@@ -99,7 +99,7 @@ def meeting(camera_1, camera_2, pose_1, pose_2, gate_sigma, points, met):
     return n_met if n_met >= AGREEING_SHARE * n_common else 0
 
 
-@numba.njit(**LEAN)
+@numba.njit(**JIT)
 def _nearest_places(eye_1, ray_1, eye_2, ray_2, middle):
     """Distances along two lines to where they pass each other, their squared gap; the middle."""
     cosine, a, b = 0.0, 0.0, 0.0
@@ -119,7 +119,7 @@ def _nearest_places(eye_1, ray_1, eye_2, ray_2, middle):
     return far_1, far_2, gap
 
 
-@numba.njit(**LEAN)
+@numba.njit(**JIT)
 def _ahead(camera, point):
     return pixel_of(camera, point[0], point[1], point[2])[2] > NEAREST_DEPTH_M
 
