@@ -133,11 +133,19 @@ def test_the_scripted_reacher_reaches_without_a_worker():
 
 
 def test_yielding_touches_people_less_often():
-    """On the same seeds. (It does not come less *near*: a robot that stands still near a worker
-    is in their way, which only retreat would mend.)
+    """On the same seeds, where people do not yield themselves.
+
+    (It does not come less *near*: a robot that stands still near a worker is in their way, which
+    only retreat would mend.)
     """
     reckless, yielding = (
-        evaluate(lambda at, name=name: make_agent(name, at), 24, 24, perception="keypoints")
+        evaluate(
+            lambda at, name=name: make_agent(name, at),
+            24,
+            24,
+            perception="keypoints",
+            people="unaware",
+        )
         for name in ("scripted", "scripted_slowed")
     )
     assert yielding.contacts_per_episode < 0.8 * reckless.contacts_per_episode
