@@ -29,6 +29,7 @@ ORGANS: Mapping[str, Sequence[Place]] = {
     "physics": ((simulation, "joint_command"), (Physics, "step")),
     "motion": (
         (generator, "advance"),
+        (generator, "watch"),
         (simulation, "worker_truth"),
         (simulation, "worker_capsules"),
     ),
