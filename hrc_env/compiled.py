@@ -11,6 +11,9 @@ from typing import Any
 
 JIT: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": True}
 """Compiled when first called, for ever; dividing by zero gives infinity, as with NumPy.
-`_nrt` (numba's memory of arrays) is said here, too: a kernel that does not say takes its caller's."""
+
+`_nrt` (numba's memory of arrays) is said here, too: a kernel that does not say it takes its
+caller's.
+"""
 LEAN: dict[str, Any] = {**JIT, "_nrt": False}
 """The same for kernels that only read and write arrays of others."""
