@@ -1,11 +1,17 @@
-"""Smooth scalar curves that every activity is made of (compiled, no allocation)."""
+"""Smooth scalar curves that every activity is made of (compiled, no allocation).
+
+Nothing in this room is compiled with `fastmath`: what a compiler may reorder depends on what it had
+compiled before, and then the last bits of a walk would depend on that, too.
+"""
 
 import math
 
-from hrc_env.motion.compiled import compiled
+import numba
+
+from hrc_env.compiled import LEAN
 
 
-@compiled
+@numba.njit(**LEAN)
 def min_jerk(u: float) -> float:
     """0 to 1 over u in [0, 1] with zero velocity and acceleration at both ends, else held.
 
@@ -18,7 +24,7 @@ def min_jerk(u: float) -> float:
     return u * u * u * (10.0 - 15.0 * u + 6.0 * u * u)
 
 
-@compiled
+@numba.njit(**LEAN)
 def ramp(u: float) -> float:
     """Integral of a smoothstep: distance while speed grows smoothly from 0 to 1, then stays."""
     if u <= 0.0:
@@ -28,7 +34,7 @@ def ramp(u: float) -> float:
     return u * u * u * (1.0 - 0.5 * u)
 
 
-@compiled
+@numba.njit(**LEAN)
 def cruise(u: float, share: float) -> float:
     """0 to 1 over u in [0, 1] at constant speed but for smooth ramps of `share` at each end."""
     if u <= 0.0:
@@ -41,7 +47,7 @@ def cruise(u: float, share: float) -> float:
     return 1.0 - top * ramp((1.0 - u) / share)
 
 
-@compiled
+@numba.njit(**LEAN)
 def hump(u: float) -> float:
     """0 at the ends of [0, 1], 1 in the middle, flat to second order at the ends; 0 outside."""
     if u <= 0.0 or u >= 1.0:
@@ -50,7 +56,7 @@ def hump(u: float) -> float:
     return v * v * v
 
 
-@compiled
+@numba.njit(**LEAN)
 def soft_min(a: float, b: float, width: float) -> float:
     """The smaller one, rounded off (downwards) where the two differ by less than `width`."""
     closeness = 1.0 - abs(a - b) / width
@@ -59,7 +65,7 @@ def soft_min(a: float, b: float, width: float) -> float:
     return min(a, b) - width * closeness * closeness * closeness / 6.0
 
 
-@compiled
+@numba.njit(**LEAN)
 def saturate(d: float, knee: float, limit: float) -> float:
     """d up to `knee`, then bending smoothly so that it never passes `limit`."""
     if d <= knee:
@@ -68,7 +74,7 @@ def saturate(d: float, knee: float, limit: float) -> float:
     return knee + span * math.tanh((d - knee) / span)
 
 
-@compiled
+@numba.njit(**LEAN)
 def decay(u: float, duration: float, value: float, rate: float) -> float:
     """Quintic from (value, rate, 0) at u = 0 to rest at zero at u = 1: inertialisation.
 
@@ -83,7 +89,7 @@ def decay(u: float, duration: float, value: float, rate: float) -> float:
     return value + u * (v + u * u * (a3 + u * (a4 + u * a5)))
 
 
-@compiled
+@numba.njit(**LEAN)
 def wrap(angle: float) -> float:
     """The same direction in (-pi, pi]."""
     return math.atan2(math.sin(angle), math.cos(angle))

@@ -6,9 +6,11 @@ anywhere, nothing is precomputed, and velocities come from the closed form itsel
 
 from collections.abc import Sequence
 
+import numba
 import numpy as np
 
 from hrc_env.body import N_SEGMENTS, Body
+from hrc_env.compiled import LEAN
 from hrc_env.errors import ConfigError
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
@@ -16,7 +18,6 @@ from hrc_env.motion import state as st
 from hrc_env.motion.anatomy import anatomy
 from hrc_env.motion.behaviour import begin_episode, follow_up
 from hrc_env.motion.capture.clip import Clip, opened
-from hrc_env.motion.compiled import compiled
 from hrc_env.motion.config import MotionConfig, numbers
 from hrc_env.motion.errands import errands_at
 from hrc_env.motion.floorplan import floorplan, room_for
@@ -162,8 +163,8 @@ def advance(
     out = _blank((batch, n_steps, n_workers), 3, 4) + _blank((batch, n_workers), 3, 3)
     position, quaternion_, velocity, turning = out
     held = np.empty((batch, n_workers, N_HELD))
-    written: tuple = (*out, held)
-    while _run(float(dt_s), n_steps, done, ticked, *arrays, *written):
+    rest: tuple = (*out, held, *_room())
+    while _run(float(dt_s), n_steps, done, ticked, *arrays, *rest):
         for b in np.flatnonzero(ticked).tolist():
             for w in np.flatnonzero(_over(state, b)).tolist():
                 follow_up(state, b, w, rngs[b].random(N_DRAWS))
@@ -203,8 +204,8 @@ def current(state: MotionState, ids: Ints | None = None) -> WorkerMotion:
     rows = np.arange(batch) if ids is None else np.asarray(ids, np.int64)
     out = _blank((len(rows), n_workers), 3, 4, 3, 3)
     held = np.empty((len(rows), n_workers, N_HELD))
-    written: tuple = (*out, held)
-    _draw(rows, *_arrays(state), *written)
+    rest: tuple = (*out, held, *_room())
+    _draw(rows, *_arrays(state), *rest)
     return WorkerMotion(out[0], out[1], out[2], out[3], _held(held))
 
 
@@ -223,6 +224,11 @@ def _blank(lead: tuple[int, ...], *widths: int) -> tuple[Floats, ...]:
     return tuple(np.empty((*lead, N_SEGMENTS, n)) for n in widths)
 
 
+def _room() -> tuple[Floats, Floats, Floats]:
+    """Room to work in: a control vector, points and frames of two moments."""
+    return np.empty(c.N_CONTROLS), np.zeros((2, N_POINTS, 3)), np.zeros((2, N_FRAMES, 3, 3))
+
+
 def _arrays(state: MotionState) -> tuple:
     """What a pose follows from, in the order that the compiled functions take it."""
     return (
@@ -232,7 +238,7 @@ def _arrays(state: MotionState) -> tuple:
     )  # fmt: skip
 
 
-@compiled
+@numba.njit(**LEAN)
 def _pose(
     b: int, w: int, later_s: float, clock_s: Floats, time_s: Floats, activity: Ints, pace: Floats,
     plan: Floats, prints: Floats, stance: Floats, offset: Floats, traits: Floats,
@@ -247,7 +253,7 @@ def _pose(
     pose(q, bones, frame, size, p, r)
 
 
-@compiled
+@numba.njit(**LEAN)
 def _place(present: float, p: Floats, r: Floats, position: Floats, quaternion_: Floats) -> None:
     """Write a pose into (22, ...) arrays; far below the floor of who is not there."""
     down = 0.0 if present > 0.0 else PARKED_Z_M
@@ -258,7 +264,7 @@ def _place(present: float, p: Floats, r: Floats, position: Floats, quaternion_: 
         quaternion(r, s, quaternion_)
 
 
-@compiled
+@numba.njit(**LEAN)
 def _rates(p: Floats, r: Floats, velocity: Floats, turning: Floats) -> None:
     """Velocities (22, 3) from the poses now, p[0] and r[0], and RATE_H_S later, p[1] and r[1]."""
     rate = 1.0 / RATE_H_S
@@ -268,24 +274,23 @@ def _rates(p: Floats, r: Floats, velocity: Floats, turning: Floats) -> None:
         spin(r[0], r[1], s, RATE_H_S, turning)
 
 
-@compiled
+@numba.njit(**LEAN)
 def _tick(dt_s: float, pace: Floats) -> None:
     """Let a worker's pace (now, wished) come nearer to the wished one."""
     most = dt_s / HALT_S
     pace[0] += min(max(pace[1] - pace[0], -most), most)
 
 
-@compiled
+@numba.njit(**LEAN)
 def _run(
     dt_s: float, n_steps: int, done: Ints, ticked: Bools,
     clock_s: Floats, time_s: Floats, duration_s: Floats, activity: Ints, pace: Floats,
     plan: Floats, prints: Floats, stance: Floats, offset: Floats, traits: Floats,
     present: Floats, bones: Floats, frame: Floats, size: Floats, frames: Floats,
     position: Floats, quaternion_: Floats, velocity: Floats, turning: Floats, held: Floats,
+    q: Floats, p: Floats, r: Floats,
 ) -> bool:  # fmt: skip
     """Move every environment on until done or someone must decide; whether anyone must."""
-    q, p = np.empty(c.N_CONTROLS), np.zeros((2, N_POINTS, 3))
-    r = np.zeros((2, N_FRAMES, 3, 3))
     waiting = False
     for b in range(done.shape[0]):
         while done[b] < n_steps:
@@ -315,17 +320,17 @@ def _run(
     return waiting
 
 
-@compiled
+@numba.njit(**LEAN)
 def _draw(
     rows: Ints, clock_s: Floats, time_s: Floats, duration_s: Floats, activity: Ints, pace: Floats,
     plan: Floats, prints: Floats, stance: Floats, offset: Floats, traits: Floats,
     present: Floats, bones: Floats, frame: Floats, size: Floats, frames: Floats,
     position: Floats, quaternion_: Floats, velocity: Floats, turning: Floats, held: Floats,
+    q: Floats, p: Floats, r: Floats,
 ) -> None:  # fmt: skip
     """Bodies of some environments as they are, into arrays (rows, W, ...)."""
-    q, p = np.empty(c.N_CONTROLS), np.zeros((2, N_POINTS, 3))
-    r = np.zeros((2, N_FRAMES, 3, 3))
-    for row, b in enumerate(rows):
+    for row in range(rows.shape[0]):
+        b = rows[row]
         for w in range(time_s.shape[1]):
             for i in range(1, -1, -1):
                 _pose(

@@ -2,10 +2,12 @@
 
 import math
 
+import numba
+
+from hrc_env.compiled import LEAN
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.anatomy import ARM, HAND, LEFT, SIDE_STRIDE, UPPER_ARM
-from hrc_env.motion.compiled import compiled
 from hrc_env.motion.curves import hump, min_jerk
 from hrc_env.motion.kinematics import ARM_KNEE, pose
 from hrc_env.motion.posture import MOST_LEAN, beyond, lean, stand
@@ -19,14 +21,14 @@ CARRY_FORWARD_M, CARRY_Z_M, LOAD_HALF_WIDTH_M = 0.36, 1.05, 0.20
 """A load held up: ahead of the root, its height, half its width [m]; judgement."""
 
 
-@compiled
+@numba.njit(**LEAN)
 def _look(share: float, plan: Floats, q: Floats) -> None:
     """Turn the head to the work."""
     q[c.HEAD_YAW] += share * (plan[pl.GAZE_YAW] - q[c.HEAD_YAW])
     q[c.HEAD_PITCH] += share * plan[pl.GAZE_PITCH]
 
 
-@compiled
+@numba.njit(**LEAN)
 def _extend(out: float, plan: Floats, q: Floats) -> None:
     """Hands and trunk at share `out` of a reach."""
     lean(plan[pl.LEAN] * out, plan[pl.SQUAT], plan[pl.TWIST] * out, q)
@@ -36,7 +38,7 @@ def _extend(out: float, plan: Floats, q: Floats) -> None:
     q[c.HAND_SHARE + 1] = out * plan[pl.USE_RIGHT]
 
 
-@compiled
+@numba.njit(**LEAN)
 def reach(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q: Floats) -> None:
     """The control vector of someone who reaches out, works there, and takes the hands back."""
     stand(plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW], clock_s, traits, size, q)
@@ -56,7 +58,7 @@ def reach(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, 
             q[c.HAND_TARGET + 3 * side + 2] += 0.5 * busy * math.sin(1.3 * beat + 2.0 * side)
 
 
-@compiled
+@numba.njit(**LEAN)
 def lift(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q: Floats) -> None:
     """The control vector of someone who picks a load up, holds it, and puts it back."""
     stand(plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW], clock_s, traits, size, q)
@@ -81,7 +83,7 @@ def lift(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q
         q[c.HAND_SHARE + side] = down - away
 
 
-@compiled
+@numba.njit(**LEAN)
 def _settle_lean(
     plan: Floats, traits: Floats, offset: Floats, frame: Floats, size: Floats,
     q: Floats, p: Floats, r: Floats,
@@ -118,7 +120,7 @@ def _settle_lean(
             plan[at + i] = p[upper, i] + nearer * (plan[at + i] - p[upper, i])
 
 
-@compiled
+@numba.njit(**LEAN)
 def plan_reach(
     target: tuple[float, float, float], used: tuple[float, float], peak_m_s: float,
     hold_s: float, fidget: tuple[float, float], plan: Floats, traits: Floats,
@@ -151,7 +153,7 @@ def plan_reach(
     return plan[pl.OUT_AT] + plan[pl.OUT_S] + hold_s + plan[pl.BACK_S] + 0.05
 
 
-@compiled
+@numba.njit(**LEAN)
 def _way(
     plan: Floats, traits: Floats, offset: Floats, frame: Floats, size: Floats,
     q: Floats, p: Floats, r: Floats,
@@ -172,7 +174,7 @@ def _way(
     return way
 
 
-@compiled
+@numba.njit(**LEAN)
 def plan_lift(
     ahead: float, z: float, times: tuple[float, float, float], plan: Floats, traits: Floats,
     offset: Floats, frame: Floats, size: Floats, q: Floats, p: Floats, r: Floats,

@@ -2,10 +2,12 @@
 
 import math
 
+import numba
+
+from hrc_env.compiled import LEAN
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.anatomy import ARM, FOREARM_GRIP, LEFT, SIDE_STRIDE, STAND_Z, UPPER_ARM
-from hrc_env.motion.compiled import compiled
 from hrc_env.motion.kinematics import ARM_KNEE, pose
 from hrc_env.typing import Floats
 
@@ -23,13 +25,13 @@ MOST_LEAN = 1.3
 """Lean beyond which a person would step instead."""
 
 
-@compiled
+@numba.njit(**LEAN)
 def sway(clock_s: float, i: int, traits: Floats) -> float:
     """A slow wave of the worker's own, between -1 and 1; i in 0..4."""
     return math.sin(2.0 * math.pi * (SWAY_HZ[i] * clock_s + traits[pl.PHASE + i]))
 
 
-@compiled
+@numba.njit(**LEAN)
 def hang(side: int, pitch: float, elbow: float, size: Floats, q: Floats) -> None:
     """Let an arm hang: upper arm `pitch` forward of the vertical, elbow bent by `elbow`."""
     sign = 1.0 - 2.0 * side
@@ -43,7 +45,7 @@ def hang(side: int, pitch: float, elbow: float, size: Floats, q: Floats) -> None
     q[at + 2] = -(cos * upper * (1.0 - 0.5 * RELAXED_OUT * RELAXED_OUT) + both_cos * fore)
 
 
-@compiled
+@numba.njit(**LEAN)
 def stand(
     x: float, y: float, yaw: float, clock_s: float, traits: Floats, size: Floats, q: Floats
 ) -> None:
@@ -77,7 +79,7 @@ def stand(
     q[c.PROP] = 0.0
 
 
-@compiled
+@numba.njit(**LEAN)
 def lean(amount: float, squat: float, twist: float, q: Floats) -> None:
     """Bend the trunk forward (1: a deep bow), the knees too by the share `squat`, and turn.
 
@@ -94,7 +96,7 @@ def lean(amount: float, squat: float, twist: float, q: Floats) -> None:
     q[c.SPINE_TWIST] += 0.65 * twist
 
 
-@compiled
+@numba.njit(**LEAN)
 def beyond(
     q: Floats, used: tuple[float, float], offset: Floats, frame: Floats, size: Floats,
     p: Floats, r: Floats,

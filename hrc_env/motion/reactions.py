@@ -7,9 +7,11 @@ their activity's time coming to a halt, and are taken away by its going backward
 
 import math
 
+import numba
+
+from hrc_env.compiled import JIT, LEAN
 from hrc_env.motion import plans as pl
 from hrc_env.motion.anatomy import CHEST, HAND, HEAD, LEFT, SIDE_STRIDE
-from hrc_env.motion.compiled import compiled
 from hrc_env.motion.state import (
     ACTS_AT,
     BACK_AWAY,
@@ -32,7 +34,7 @@ WITHDRAW = -1.6
 """Hands come back so much faster than they went."""
 
 
-@compiled
+@numba.njit(**LEAN)
 def notice(
     dt_s: float, people: tuple[float, float, float], robot_world: Floats, seen: Floats,
     position_world: Floats, present: Floats, alert: Floats, pace: Floats, clock_s: Floats,
@@ -73,10 +75,12 @@ def notice(
                 and _startling(dt_s, people, robot_world[b], seen[b], position_world[b, w])
             ):
                 mine[ACTS_AT] = clock + mine[DELAY_S]
-    seen[:] = robot_world
+        for k in range(seen.shape[1]):
+            for i in range(3):
+                seen[b, k, i] = robot_world[b, k, i]
 
 
-@compiled
+@numba.njit(**LEAN)
 def _startling(
     dt_s: float, people: tuple[float, float, float], robot: Floats, before: Floats, body: Floats
 ) -> bool:
@@ -95,7 +99,7 @@ def _startling(
     return False
 
 
-@compiled
+@numba.njit(**LEAN)
 def _react(
     w: int, mine: Floats, pace: Floats, clock: float, time_s: Floats, duration_s: Floats,
     activity: Ints, plan: Floats, prints: Floats, stance: Floats, present: Floats, size: Floats,
@@ -118,13 +122,13 @@ def _react(
         mine[DOING], mine[UNTIL_AT], pace[w, 1] = PAUSE, clock + mine[LASTS_S], 0.0
 
 
-@compiled
+@numba.njit(**LEAN)
 def withdraws(activity: int) -> bool:
     """Whether one can step back from it: standing up, with empty hands."""
     return activity <= pl.REACH or activity == pl.LOOK_ROUND or pl.HAMMER <= activity <= pl.POINT
 
 
-@compiled
+@numba.njit(**JIT)
 def _brake(
     w: int, time_s: Floats, duration_s: Floats, activity: Ints, plan: Floats, prints: Floats,
     stance: Floats, present: Floats, size: Floats,

@@ -2,14 +2,15 @@
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 
 from hrc_env.body import N_SEGMENTS, Body
+from hrc_env.compiled import JIT
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.worker import Worker
 from hrc_env.motion.anatomy import anatomy
-from hrc_env.motion.compiled import compiled
 from hrc_env.motion.feet import foot
 from hrc_env.motion.holding import N_HELD, drop_load, prop_pose
 from hrc_env.motion.kinematics import N_FRAMES, N_POINTS, pose, quaternion
@@ -73,7 +74,7 @@ def play(me: Worker, activity: int, time_s: Floats, clock_s: float = 0.0) -> Fil
     return Film(activity, time_s, controls, motion, copy)
 
 
-@compiled
+@numba.njit(**JIT)
 def _play(
     activity: int, clock_s: float, time_s: Floats, me: Worker,
     controls: Floats, place: Floats, turn: Floats, rate: Floats, held: Floats,

@@ -2,6 +2,9 @@
 
 import math
 
+import numba
+
+from hrc_env.compiled import LEAN
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.climb import start_climb
 from hrc_env.motion.activities.crouching import start_kneel, start_squat
@@ -24,7 +27,6 @@ from hrc_env.motion.activities.measure import start_measure
 from hrc_env.motion.activities.point import start_point
 from hrc_env.motion.activities.saw import start_saw
 from hrc_env.motion.activities.worker import Place, Worker
-from hrc_env.motion.compiled import compiled
 from hrc_env.motion.config import Numbers
 from hrc_env.motion.curves import wrap
 from hrc_env.motion.feet import foot
@@ -39,13 +41,13 @@ OVERHEAD_M = 1.7
 """Drilling at this height or above is overhead work [m]."""
 
 
-@compiled
+@numba.njit(**LEAN)
 def between(draw: float, limits: tuple[float, float]) -> float:
     """A uniform draw in [0, 1) stretched to (low, high)."""
     return limits[0] + draw * (limits[1] - limits[0])
 
 
-@compiled
+@numba.njit(**LEAN)
 def start_going(
     activity: int, draws: Floats, place: Place, via: Floats, pace_m_s: float, prop: int, me: Worker
 ) -> float:
@@ -57,7 +59,7 @@ def start_going(
     return start_walk(place, via, pace_m_s, me)
 
 
-@compiled
+@numba.njit(**LEAN)
 def start_here(
     activity: int, draws: Floats, place: Place, near: bool, others: Floats, prop: int,
     config: Numbers, me: Worker,
@@ -95,7 +97,7 @@ def start_here(
     return _start_work(activity, draws, place, me)
 
 
-@compiled
+@numba.njit(**LEAN)
 def _start_work(activity: int, draws: Floats, place: Place, me: Worker) -> float:
     """Start work with a tool or on the floor; 0 of an activity that is none of these."""
     if activity == pl.HAMMER:
@@ -121,7 +123,7 @@ def _start_work(activity: int, draws: Floats, place: Place, me: Worker) -> float
     return 0.0
 
 
-@compiled
+@numba.njit(**LEAN)
 def own_side(x: float, y: float, others: Floats, plan: Floats) -> tuple[float, float]:
     """A target, moved over to the worker's own side of the middle to every other worker."""
     mx, my = plan[pl.START_X], plan[pl.START_Y]
@@ -136,7 +138,7 @@ def own_side(x: float, y: float, others: Floats, plan: Floats) -> tuple[float, f
     return x, y
 
 
-@compiled
+@numba.njit(**LEAN)
 def _target(
     draws: Floats, config: Numbers, near: bool, height: float, plan: Floats
 ) -> tuple[float, float, float]:
@@ -156,7 +158,7 @@ def _target(
     return bx + radius * math.cos(azimuth), by + radius * math.sin(azimuth), z
 
 
-@compiled
+@numba.njit(**LEAN)
 def start_reach(
     draws: Floats, config: Numbers, near: bool, height: float, others: Floats, me: Worker
 ) -> float:
@@ -181,7 +183,7 @@ def start_reach(
     )  # fmt: skip
 
 
-@compiled
+@numba.njit(**LEAN)
 def start_lift(draws: Floats, config: Numbers, me: Worker) -> float:
     """Draw a lift: where the load stands and how long bending, raising and holding take."""
     me.plan[pl.OUT_AT] = 0.1 + 0.4 * draws[11]

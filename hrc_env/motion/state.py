@@ -2,8 +2,10 @@
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 
+from hrc_env.compiled import JIT, LEAN
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.climb import climb
@@ -13,7 +15,6 @@ from hrc_env.motion.activities.look_round import look_round
 from hrc_env.motion.activities.recorded import play
 from hrc_env.motion.activities.work import work
 from hrc_env.motion.anatomy import Anatomy
-from hrc_env.motion.compiled import compiled
 from hrc_env.motion.config import MotionConfig, Numbers
 from hrc_env.motion.curves import decay, wrap
 from hrc_env.motion.errands import Errands
@@ -110,7 +111,7 @@ class MotionState:
     """Constants of the behaviour."""
 
 
-@compiled
+@numba.njit(**LEAN)
 def evaluate(
     activity: int, t: float, clock_s: float, plan: Floats, prints: Floats, stance: Floats,
     offset: Floats, traits: Floats, size: Floats, frames: Floats, q: Floats,
@@ -144,7 +145,7 @@ def evaluate(
             q[i] += decay(t / BLEND_S, BLEND_S, offset[i, 0], offset[i, 1])
 
 
-@compiled
+@numba.njit(**LEAN)
 def _stay(
     activity: int, t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q: Floats
 ) -> None:
@@ -158,7 +159,7 @@ def _stay(
         hold_load(x, y, yaw, 0.0, plan, q)
 
 
-@compiled
+@numba.njit(**LEAN)
 def stop(plan: Floats, prints: Floats, stance: Floats) -> float:
     """Begin where the last activity ended; returns by how much its heading was unwound."""
     count = int(plan[pl.STEP_COUNT]) if plan[pl.UNDO_AT] == 0.0 else 0
@@ -178,7 +179,7 @@ def stop(plan: Floats, prints: Floats, stance: Floats) -> float:
     return unwound
 
 
-@compiled
+@numba.njit(**LEAN)
 def leave(
     t: float, pace: float, clock_s: float, activity: int, plan: Floats, prints: Floats,
     stance: Floats, offset: Floats, traits: Floats, size: Floats, frames: Floats, q: Floats,
@@ -208,7 +209,7 @@ def leave(
     q[1, c.HEADING] += unwound
 
 
-@compiled
+@numba.njit(**JIT)
 def join(
     clock_s: float, activity: int, plan: Floats, prints: Floats, stance: Floats, offset: Floats,
     traits: Floats, size: Floats, frames: Floats, q: Floats,
@@ -227,12 +228,13 @@ def join(
         offset[i, 0], offset[i, 1] = gap, (then - gap) / RATE_H_S
 
 
-@compiled
+@numba.njit(**LEAN)
 def settle(
     x: float, y: float, yaw: float, plan: Floats, prints: Floats, stance: Floats, size: Floats
 ) -> None:
     """Stand somewhere, feet side by side, with nothing done yet."""
-    plan[:] = 0.0
+    for i in range(plan.shape[0]):
+        plan[i] = 0.0
     plan[pl.END_X], plan[pl.END_Y], plan[pl.END_YAW] = x, y, wrap(yaw)
     stop(plan, prints, stance)
     for side in range(2):

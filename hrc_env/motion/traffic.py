@@ -6,9 +6,11 @@ ended; a worker who begins something makes sure to keep clear of all of that, so
 
 import math
 
+import numba
+
+from hrc_env.compiled import LEAN
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.recorded import clip_root
-from hrc_env.motion.compiled import compiled
 from hrc_env.motion.paths import along
 from hrc_env.motion.walk import travelled
 from hrc_env.typing import Floats, Ints
@@ -25,13 +27,13 @@ LOOK_S = 0.12
 """Meetings are looked for in steps of this length [s]; at 2.8 m/s to each other 0.3 m."""
 
 
-@compiled
+@numba.njit(**LEAN)
 def goes(activity: int) -> bool:
     """Whether it moves along a path."""
     return activity == pl.WALK or pl.TURN <= activity <= pl.STEP_BACK
 
 
-@compiled
+@numba.njit(**LEAN)
 def ahead_of(activity: int) -> tuple[float, float]:
     """How far ahead of the root someone is in the way with what, and how near one may go [m]."""
     if activity == pl.PUSH:
@@ -43,7 +45,7 @@ def ahead_of(activity: int) -> tuple[float, float]:
     return AHEAD_M, HANDS_M
 
 
-@compiled
+@numba.njit(**LEAN)
 def root_at(activity: int, t: float, plan: Floats) -> tuple[float, float]:
     """Where someone's root is on the floor at time t of an activity, and after it."""
     if goes(activity):
@@ -53,7 +55,7 @@ def root_at(activity: int, t: float, plan: Floats) -> tuple[float, float]:
     return plan[pl.START_X], plan[pl.START_Y]
 
 
-@compiled
+@numba.njit(**LEAN)
 def gap_to(x: float, y: float, activity: int, t: float, plan: Floats) -> float:
     """How much farther a root at (x, y) is than it must be from someone's body and hands [m]."""
     ox, oy = root_at(activity, t, plan)
@@ -69,7 +71,7 @@ def gap_to(x: float, y: float, activity: int, t: float, plan: Floats) -> float:
     return gap
 
 
-@compiled
+@numba.njit(**LEAN)
 def meets(
     w: int, activity: Ints, time_s: Floats, duration_s: Floats, plan: Floats, present: Floats
 ) -> tuple[float, float, float]:

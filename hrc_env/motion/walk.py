@@ -6,10 +6,12 @@ Cadence and step length follow 68 walking trials of the CMU motion-capture datab
 
 import math
 
+import numba
+
+from hrc_env.compiled import LEAN
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.anatomy import ANKLE_X, LEG, STAND_Z
-from hrc_env.motion.compiled import compiled
 from hrc_env.motion.curves import hump, min_jerk, ramp, wrap
 from hrc_env.motion.feet import FLAT_S
 from hrc_env.motion.holding import hold_load
@@ -50,7 +52,7 @@ LURCH_S = 1.4
 """From a foot's catching to the walk's going on [s]; judgement."""
 
 
-@compiled
+@numba.njit(**LEAN)
 def travelled(t: float, plan: Floats) -> float:
     """Metres along the path at time t."""
     u, rise = t - plan[pl.DEPART], plan[pl.RAMP]
@@ -58,7 +60,7 @@ def travelled(t: float, plan: Floats) -> float:
     return plan[pl.SPEED] * rise * (ramp(u / rise) - ramp((u - slow) / rise))
 
 
-@compiled
+@numba.njit(**LEAN)
 def speed(t: float, plan: Floats) -> float:
     """Rate of `travelled` [m/s]."""
     u, rise = t - plan[pl.DEPART], plan[pl.RAMP]
@@ -67,7 +69,7 @@ def speed(t: float, plan: Floats) -> float:
     return plan[pl.SPEED] * (a * a * (3.0 - 2.0 * a) - b * b * (3.0 - 2.0 * b))
 
 
-@compiled
+@numba.njit(**LEAN)
 def root(t: float, plan: Floats) -> tuple[float, float, float]:
     """Where the walker's middle is at time t, and their heading (continuous, not wrapped)."""
     s = travelled(t, plan)
@@ -80,7 +82,7 @@ def root(t: float, plan: Floats) -> tuple[float, float, float]:
     return x, y, yaw + plan[pl.TURN_OUT] * turned
 
 
-@compiled
+@numba.njit(**LEAN)
 def walk(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q: Floats) -> None:
     """The control vector of a walker but for the feet."""
     x, y, yaw = root(t, plan)
@@ -123,7 +125,7 @@ def walk(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q
         hold_load(x, y, yaw, q[c.PELVIS_Z] - size[STAND_Z], plan, q)
 
 
-@compiled
+@numba.njit(**LEAN)
 def _lurch(t: float, trip: float, q: Floats) -> None:
     """Pitch forward with the arms out, `t` after a foot caught, and come up again."""
     fall, arms = trip * hump(t / LURCH_S), trip * hump((t - 0.04) / (1.6 * LURCH_S))
@@ -140,7 +142,7 @@ def _lurch(t: float, trip: float, q: Floats) -> None:
         q[at + 2] += (0.22 + 0.08 * side) * arms
 
 
-@compiled
+@numba.njit(**LEAN)
 def plan_walk(
     start: tuple[float, float, float], via: Floats, end: tuple[float, float, float],
     wished_m_s: float, plan: Floats, prints: Floats, stance: Floats, size: Floats,
@@ -160,7 +162,7 @@ def plan_walk(
     return plan_pace((1.0, wished, 0.0), end[2], plan, prints, stance, size)
 
 
-@compiled
+@numba.njit(**LEAN)
 def plan_pace(
     pace: tuple[float, float, float], end_yaw: float,
     plan: Floats, prints: Floats, stance: Floats, size: Floats,
@@ -193,7 +195,7 @@ def plan_pace(
     return _plan_steps(0, plan, prints, stance, size)
 
 
-@compiled
+@numba.njit(**LEAN)
 def brake(t: float, plan: Floats, prints: Floats, stance: Floats, size: Floats) -> float:
     """Come to a stand on the path as soon as a walker can from time t; the new duration [s].
 
@@ -216,7 +218,7 @@ def brake(t: float, plan: Floats, prints: Floats, stance: Floats, size: Floats) 
     return plan[pl.LASTS]
 
 
-@compiled
+@numba.njit(**LEAN)
 def _plan_turns(end_yaw: float, plan: Floats) -> None:
     """Turn into the path and out of it; who must turn far sets off when the turn is nearly done."""
     first, final = facing(0.0, plan), facing(plan[pl.LENGTH], plan)
@@ -233,7 +235,7 @@ def _plan_turns(end_yaw: float, plan: Floats) -> None:
     plan[pl.END_YAW] = heading + turn
 
 
-@compiled
+@numba.njit(**LEAN)
 def _plan_steps(first: int, plan: Floats, prints: Floats, stance: Floats, size: Floats) -> float:
     """Lay footprints from a step on where the root will pass at mid-stance; when all is over [s].
 
@@ -258,7 +260,7 @@ def _plan_steps(first: int, plan: Floats, prints: Floats, stance: Floats, size: 
     return start + (count - 1) * period + plan[pl.STEP_SWING] + FLAT_S
 
 
-@compiled
+@numba.njit(**LEAN)
 def _first_foot(plan: Floats) -> float:
     """Begin with the foot on the side that the walker turns or steps to."""
     x, y, yaw = root(plan[pl.DEPART] + plan[pl.DURATION], plan)
@@ -268,7 +270,7 @@ def _first_foot(plan: Floats) -> float:
     return 0.0 if turn >= 0.0 else 1.0
 
 
-@compiled
+@numba.njit(**LEAN)
 def footprint(
     side: int, x: float, y: float, yaw: float, half_width: float, size: Floats, out: Floats
 ) -> None:

@@ -1,5 +1,8 @@
 """Work at floor height with both hands: on a knee, or on the haunches."""
 
+import numba
+
+from hrc_env.compiled import LEAN
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import (
     CALM_M_S,
@@ -17,11 +20,10 @@ from hrc_env.motion.activities.planning import (
 )
 from hrc_env.motion.activities.strokes import BUSY
 from hrc_env.motion.activities.worker import Place, Worker
-from hrc_env.motion.compiled import compiled
 from hrc_env.typing import Floats
 
 
-@compiled
+@numba.njit(**LEAN)
 def start_kneel(draws: Floats, place: Place, me: Worker) -> float:
     """Plan to kneel and work low; returns how long it takes [s]."""
     blank(me)
@@ -30,7 +32,7 @@ def start_kneel(draws: Floats, place: Place, me: Worker) -> float:
     return _hands_low(0.42, side, draws, place, me)
 
 
-@compiled
+@numba.njit(**LEAN)
 def start_squat(draws: Floats, place: Place, me: Worker) -> float:
     """Plan to work low on the haunches; returns how long it takes [s]."""
     blank(me)
@@ -40,7 +42,7 @@ def start_squat(draws: Floats, place: Place, me: Worker) -> float:
     return _hands_low(0.50, dominant(draws[0], me), draws, place, me)
 
 
-@compiled
+@numba.njit(**LEAN)
 def _hands_low(ahead: float, side: int, draws: Floats, place: Place, me: Worker) -> float:
     """Plan what both hands do at floor height."""
     sign = 1.0 - 2.0 * side

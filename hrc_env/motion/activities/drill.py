@@ -3,6 +3,9 @@ pouch; overhead it holds the work up."""
 
 import math
 
+import numba
+
+from hrc_env.compiled import LEAN
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import (
     CALM_M_S,
@@ -21,7 +24,6 @@ from hrc_env.motion.activities.planning import (
 from hrc_env.motion.activities.strokes import BORE, PRESS
 from hrc_env.motion.activities.work import LOW_M
 from hrc_env.motion.activities.worker import Place, Worker
-from hrc_env.motion.compiled import compiled
 from hrc_env.props import prop_index
 from hrc_env.typing import Floats
 
@@ -34,7 +36,7 @@ OVERHEAD_M = 1.7
 """From this height on people work above their head [m]."""
 
 
-@compiled
+@numba.njit(**LEAN)
 def start_drill(draws: Floats, place: Place, me: Worker) -> float:
     """Plan to drill at the place's height; returns how long it takes [s]."""
     blank(me)

@@ -2,11 +2,13 @@
 
 import math
 
+import numba
+
+from hrc_env.compiled import LEAN
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.worker import Worker
 from hrc_env.motion.anatomy import ANKLE_Z, LEG, STAND_SHARE, STAND_Z, THIGH_LENGTH
-from hrc_env.motion.compiled import compiled
 from hrc_env.motion.feet import raise_heel
 from hrc_env.typing import Floats
 
@@ -22,7 +24,7 @@ STEP_AT_S, STEP_PERIOD_S, STEP_SWING_S = 0.08, 0.42, 0.38
 """First lift-off, and the two times of `plans` of the steps that widen a stance [s]."""
 
 
-@compiled
+@numba.njit(**LEAN)
 def get_down(down: float, plan: Floats, size: Floats, q: Floats) -> None:
     """Lower a standing body by the share `down`, heels included; the feet's steps are planned."""
     ahead = plan[pl.AHEAD] * down
@@ -43,7 +45,7 @@ def get_down(down: float, plan: Floats, size: Floats, q: Floats) -> None:
             raise_heel(side, HAUNCH_HEEL_RAD * crouch, size, q)
 
 
-@compiled
+@numba.njit(**LEAN)
 def step_into(first: int, ahead: float, other: float, out: float, me: Worker) -> None:
     """Plan one step of foot `first` (and one of the other, unless 0) that the end goes back.
 

@@ -2,14 +2,15 @@
 
 import math
 
+import numba
 import numpy as np
 
+from hrc_env.compiled import JIT, LEAN
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import between
 from hrc_env.motion.activities.worker import Place, Worker
 from hrc_env.motion.anatomy import STAND_Z
-from hrc_env.motion.compiled import compiled
 from hrc_env.motion.curves import min_jerk
 from hrc_env.motion.holding import GRIPS, drop_load, grip_load, place_load
 from hrc_env.motion.paths import lay_path
@@ -36,7 +37,7 @@ CAUGHT_M = 0.12
 """How much too short the step is in which a foot catches [m]; judgement."""
 
 
-@compiled
+@numba.njit(**LEAN)
 def start_walk(place: Place, via: Floats, speed_m_s: float, me: Worker) -> float:
     """Plan to walk to the place by way of a point; returns how long it takes [s]."""
     plan = me.plan
@@ -45,7 +46,7 @@ def start_walk(place: Place, via: Floats, speed_m_s: float, me: Worker) -> float
     return plan_walk(start, via, end, speed_m_s, plan, me.prints, me.stance, me.size)
 
 
-@compiled
+@numba.njit(**JIT)
 def start_turn(place: Place, me: Worker) -> float:
     """Plan to turn on the spot to the place's yaw; returns how long it takes [s]."""
     plan = me.plan
@@ -55,7 +56,7 @@ def start_turn(place: Place, me: Worker) -> float:
     return plan_pace(pace, place[2], plan, me.prints, me.stance, me.size)
 
 
-@compiled
+@numba.njit(**JIT)
 def start_step_back(draws: Floats, place: Place, me: Worker) -> float:
     """Plan to step straight back without looking; returns how long it takes [s]."""
     plan = me.plan
@@ -67,7 +68,7 @@ def start_step_back(draws: Floats, place: Place, me: Worker) -> float:
     return plan_pace(pace, yaw, plan, me.prints, me.stance, me.size)
 
 
-@compiled
+@numba.njit(**LEAN)
 def start_stumble(draws: Floats, place: Place, via: Floats, speed_m_s: float, me: Worker) -> float:
     """Plan a walk to the place in which a foot catches; returns how long it takes [s]."""
     lasts = start_walk(place, via, speed_m_s, me)
@@ -86,7 +87,7 @@ def start_stumble(draws: Floats, place: Place, via: Floats, speed_m_s: float, me
     return lasts
 
 
-@compiled
+@numba.njit(**LEAN)
 def start_push(place: Place, via: Floats, speed_m_s: float, prop: int, me: Worker) -> float:
     """Plan to push a cart or wheelbarrow to the place; returns how long it takes [s]."""
     plan = me.plan
@@ -106,7 +107,7 @@ def start_push(place: Place, via: Floats, speed_m_s: float, prop: int, me: Worke
     return plan[pl.LASTS]
 
 
-@compiled
+@numba.njit(**LEAN)
 def push(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q: Floats) -> None:
     """The control vector, but for the feet, of someone who takes a handle, pushes and lets go."""
     going = t - plan[pl.TAKEN_S]
@@ -126,7 +127,7 @@ def push(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q
     grip_load(held, plan, q)
 
 
-@compiled
+@numba.njit(**LEAN)
 def _tip(back_rad: float, yaw: float, q: Floats) -> None:
     """Tip the wheelbarrow back about its axle, handles down."""
     cos, sin = math.cos(back_rad), math.sin(back_rad)

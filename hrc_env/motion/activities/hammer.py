@@ -6,6 +6,9 @@ driving nails 1.25 to 2.0 m/s.
 
 import math
 
+import numba
+
+from hrc_env.compiled import LEAN
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import (
     CALM_M_S,
@@ -24,7 +27,6 @@ from hrc_env.motion.activities.planning import (
 from hrc_env.motion.activities.strokes import STRIKE
 from hrc_env.motion.activities.work import LOW_M
 from hrc_env.motion.activities.worker import Place, Worker
-from hrc_env.motion.compiled import compiled
 from hrc_env.props import prop_index
 from hrc_env.typing import Floats
 
@@ -37,7 +39,7 @@ WALL_M = 1.2
 """Nails at this height or higher are driven into a wall, lower ones downwards [m]."""
 
 
-@compiled
+@numba.njit(**LEAN)
 def start_hammer(draws: Floats, place: Place, me: Worker) -> float:
     """Plan to drive nails at the place's height; returns how long it takes [s]."""
     blank(me)

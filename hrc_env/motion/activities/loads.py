@@ -7,6 +7,9 @@ median trial and 2.1 in the 95th percentile, heads at 1.6.
 
 import math
 
+import numba
+
+from hrc_env.compiled import LEAN
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import (
@@ -20,7 +23,6 @@ from hrc_env.motion.activities.planning import (
 )
 from hrc_env.motion.activities.worker import Place, Worker
 from hrc_env.motion.anatomy import LEFT, SIDE_STRIDE, STAND_Z, UPPER_ARM
-from hrc_env.motion.compiled import compiled
 from hrc_env.motion.curves import hump, min_jerk
 from hrc_env.motion.gaze import look_at
 from hrc_env.motion.holding import GRIPS, grip, place_load
@@ -47,7 +49,7 @@ AWAY_M = 0.43
 """A load on the floor or a table is this far ahead [m]."""
 
 
-@compiled
+@numba.njit(**LEAN)
 def pick_up(
     t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q: Floats
 ) -> None:
@@ -87,7 +89,7 @@ def pick_up(
         q[c.HAND_SHARE + side] = down * used
 
 
-@compiled
+@numba.njit(**LEAN)
 def start_pick_up(draws: Floats, place: Place, prop: int, on_shoulder: bool, me: Worker) -> float:
     """Plan to pick a box or board up, gripped at the place's height; how long it takes [s]."""
     _hold(prop, on_shoulder and prop == BOARD, dominant(draws[0], me), me)
@@ -95,7 +97,7 @@ def start_pick_up(draws: Floats, place: Place, prop: int, on_shoulder: bool, me:
     return _plan_lift(prop, (AWAY_M, 0.0, z), between(draws[2], 1.0, 1.35), me)
 
 
-@compiled
+@numba.njit(**LEAN)
 def start_receive(draws: Floats, place: Place, me: Worker) -> float:
     """Plan to take a box that somebody ahead holds out; returns how long it takes [s]."""
     _hold(BOX, False, 1, me)
@@ -104,7 +106,7 @@ def start_receive(draws: Floats, place: Place, me: Worker) -> float:
     return lasts
 
 
-@compiled
+@numba.njit(**LEAN)
 def start_set_down(draws: Floats, place: Place, me: Worker) -> float:
     """Plan to set down what is held, onto the place's height; returns how long it takes [s]."""
     z = place[3] if place[3] > 0.0 else between(draws[1], 0.18, 0.45)
@@ -112,7 +114,7 @@ def start_set_down(draws: Floats, place: Place, me: Worker) -> float:
     return _plan_lift(prop, (AWAY_M, 0.0, z), between(draws[2], 1.0, 1.35), me)
 
 
-@compiled
+@numba.njit(**LEAN)
 def start_hand_over(draws: Floats, place: Place, me: Worker) -> float:
     """Plan to hold out what is carried until somebody has it; returns how long it takes [s]."""
     prop = int(me.plan[pl.LOAD_PROP])
@@ -121,14 +123,14 @@ def start_hand_over(draws: Floats, place: Place, me: Worker) -> float:
     return lasts
 
 
-@compiled
+@numba.njit(**LEAN)
 def _given(place: Place, me: Worker) -> tuple[float, float, float]:
     """Where loads change hands."""
     z = place[3] if place[3] > 0.0 else GIVEN_SHARE * me.size[STAND_Z]
     return GIVEN_AHEAD_M, 0.0, z
 
 
-@compiled
+@numba.njit(**LEAN)
 def _hold(prop: int, on_shoulder: bool, side: int, me: Worker) -> None:
     """Write how a load will be carried into the plan's LOAD columns."""
     plan, at = me.plan, pl.LOAD_AT
@@ -152,7 +154,7 @@ def _hold(prop: int, on_shoulder: bool, side: int, me: Worker) -> None:
     plan[pl.LOAD_GRIP + 3 * side + 1] = -STEADY_M * sign
 
 
-@compiled
+@numba.njit(**LEAN)
 def _plan_lift(prop: int, at: tuple[float, float, float], raise_s: float, me: Worker) -> float:
     """Plan the way between a place (ahead, left, height) and how the load is carried."""
     plan, size = me.plan, me.size

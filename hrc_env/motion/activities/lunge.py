@@ -3,6 +3,9 @@
 Hands at 2.5 to 3.5 m/s; assumed, near the fastest arm movements at work.
 """
 
+import numba
+
+from hrc_env.compiled import LEAN
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import (
     between,
@@ -16,11 +19,10 @@ from hrc_env.motion.activities.planning import (
 )
 from hrc_env.motion.activities.strokes import STILL
 from hrc_env.motion.activities.worker import Place, Worker
-from hrc_env.motion.compiled import compiled
 from hrc_env.typing import Floats
 
 
-@compiled
+@numba.njit(**LEAN)
 def start_lunge(draws: Floats, place: Place, me: Worker) -> float:
     """Plan to snatch at something ahead, at the place's height; returns how long it takes [s]."""
     blank(me)

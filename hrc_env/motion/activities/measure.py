@@ -1,5 +1,8 @@
 """Measuring: both hands pull a tape along the work, hold it still and read it."""
 
+import numba
+
+from hrc_env.compiled import LEAN
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import (
     CALM_M_S,
@@ -17,14 +20,13 @@ from hrc_env.motion.activities.planning import (
 from hrc_env.motion.activities.strokes import SHIFT
 from hrc_env.motion.activities.work import LOW_M
 from hrc_env.motion.activities.worker import Place, Worker
-from hrc_env.motion.compiled import compiled
 from hrc_env.props import prop_index
 from hrc_env.typing import Floats
 
 TAPE = prop_index("tape_measure")
 
 
-@compiled
+@numba.njit(**LEAN)
 def start_measure(draws: Floats, place: Place, me: Worker) -> float:
     """Plan to measure at the place's height; returns how long it takes [s]."""
     blank(me)

@@ -2,6 +2,9 @@
 
 import math
 
+import numba
+
+from hrc_env.compiled import LEAN
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.getting_down import FRONT_LEG, REAR_LEG, step_into
@@ -9,7 +12,6 @@ from hrc_env.motion.activities.strokes import PAUSE_S, stroke
 from hrc_env.motion.activities.work import extend, hands_on
 from hrc_env.motion.activities.worker import Worker
 from hrc_env.motion.anatomy import CHEST, HAND, LEFT, LEG, SIDE_STRIDE, STAND_Z
-from hrc_env.motion.compiled import compiled
 from hrc_env.motion.feet import foot
 from hrc_env.motion.holding import TWO_HANDED
 from hrc_env.motion.kinematics import pose
@@ -33,19 +35,19 @@ FAR = 1e3
 """A time by which every step is done [s]."""
 
 
-@compiled
+@numba.njit(**LEAN)
 def between(draw: float, low: float, high: float) -> float:
     """A uniform draw in [0, 1) stretched to (low, high)."""
     return low + draw * (high - low)
 
 
-@compiled
+@numba.njit(**LEAN)
 def dominant(draw: float, me: Worker) -> int:
     """The side that holds the tool: 1 right."""
     return 1 if draw < 0.5 + (me.traits[pl.RIGHT_HANDED] - 0.5) * 1.25 else 0
 
 
-@compiled
+@numba.njit(**LEAN)
 def blank(me: Worker) -> None:
     """A plan without steps and work of its own; what is carried stays."""
     plan = me.plan
@@ -57,7 +59,7 @@ def blank(me: Worker) -> None:
     plan[pl.OUT_AT] = 0.1
 
 
-@compiled
+@numba.njit(**LEAN)
 def kneel_down(side: int, me: Worker) -> None:
     """Plan to kneel on the knee of that side."""
     plan, leg = me.plan, me.size[LEG]
@@ -66,14 +68,14 @@ def kneel_down(side: int, me: Worker) -> None:
     step_into(side, REAR_LEG * leg, FRONT_LEG * leg, 0.02, me)
 
 
-@compiled
+@numba.njit(**LEAN)
 def before_knee(me: Worker) -> float:
     """How far to the left the hands work of one who kneels: before the knee that is down [m]."""
     kneeling = me.plan[pl.KNEEL] > 0.0
     return KNEE_ASIDE_M * (1.0 - 2.0 * me.plan[pl.STEP_FIRST]) if kneeling else 0.0
 
 
-@compiled
+@numba.njit(**LEAN)
 def step_ahead(side: int, ahead: float, me: Worker) -> None:
     """Plan to work with the foot of that side a little ahead."""
     plan = me.plan
@@ -81,7 +83,7 @@ def step_ahead(side: int, ahead: float, me: Worker) -> None:
     plan[pl.AHEAD], plan[pl.SETTLE_S] = 0.45 * ahead, STEP_S
 
 
-@compiled
+@numba.njit(**LEAN)
 def world(ahead: float, left: float, z: float, me: Worker) -> Triple:
     """A point of the frame in which the worker stands."""
     plan = me.plan
@@ -93,7 +95,7 @@ def world(ahead: float, left: float, z: float, me: Worker) -> Triple:
     )
 
 
-@compiled
+@numba.njit(**LEAN)
 def put_tool(tool: int, side: int, at: Triple, turn: Triple, me: Worker) -> None:
     """Plan where the tool is at work: ahead, left [m], height; yaw, pitch, roll."""
     plan = me.plan
@@ -108,7 +110,7 @@ def put_tool(tool: int, side: int, at: Triple, turn: Triple, me: Worker) -> None
         plan[pl.USE_LEFT] = plan[pl.USE_RIGHT] = 1.0
 
 
-@compiled
+@numba.njit(**LEAN)
 def put_other(at: Triple, me: Worker) -> None:
     """Plan where the other hand works: ahead, left [m], height."""
     plan = me.plan
@@ -119,7 +121,7 @@ def put_other(at: Triple, me: Worker) -> None:
     plan[pl.USE_LEFT + other] = 1.0
 
 
-@compiled
+@numba.njit(**LEAN)
 def look_to(at: Triple, me: Worker) -> None:
     """Plan where the eyes are: ahead, left [m], height."""
     point = world(at[0], at[1], at[2], me)
@@ -127,7 +129,7 @@ def look_to(at: Triple, me: Worker) -> None:
         me.plan[pl.GAZE_X + i] = point[i]
 
 
-@compiled
+@numba.njit(**LEAN)
 def strokes(kind: int, size_m: float, rate_hz: float, burst_s: float, n: int, me: Worker) -> None:
     """Plan n bursts of a stroke."""
     plan = me.plan
@@ -135,7 +137,7 @@ def strokes(kind: int, size_m: float, rate_hz: float, burst_s: float, n: int, me
     plan[pl.BURST_S], plan[pl.HOLD_S] = burst_s, n * (burst_s + PAUSE_S)
 
 
-@compiled
+@numba.njit(**LEAN)
 def at_work(me: Worker) -> None:
     """Fill q as it is in the middle of the work, before the first stroke."""
     plan, q, size = me.plan, me.q, me.size
@@ -147,7 +149,7 @@ def at_work(me: Worker) -> None:
     hands_on(1.0, 1.0, plan, q)
 
 
-@compiled
+@numba.njit(**LEAN)
 def finish(peak_m_s: float, me: Worker) -> float:
     """Settle the trunk and the times of a plan whose hands, strokes and steps stand; how long."""
     plan = me.plan
@@ -166,7 +168,7 @@ def finish(peak_m_s: float, me: Worker) -> float:
     return plan[pl.LASTS]
 
 
-@compiled
+@numba.njit(**LEAN)
 def settle_lean(me: Worker) -> None:
     """Smallest lean that brings what the hands hold within reach; else that comes nearer."""
     plan = me.plan
@@ -190,7 +192,7 @@ def settle_lean(me: Worker) -> None:
         _come_nearer(me)
 
 
-@compiled
+@numba.njit(**LEAN)
 def _short(me: Worker) -> float:
     """By how much an arm is too short for the work that is planned [m]."""
     at_work(me)
@@ -199,7 +201,7 @@ def _short(me: Worker) -> float:
     return beyond(me.q, used, me.bones, me.frame, me.size, me.p, me.r) + spare
 
 
-@compiled
+@numba.njit(**LEAN)
 def _come_nearer(me: Worker) -> None:
     """Move tool and targets towards the shoulders by what is out of reach."""
     plan, p, far = me.plan, me.p, _short(me)
@@ -213,7 +215,7 @@ def _come_nearer(me: Worker) -> None:
         plan[at + 2] -= share * dz
 
 
-@compiled
+@numba.njit(**LEAN)
 def _way(side: int, me: Worker) -> float:
     """The longest way that a hand has from hanging, or from the belt, to its work [m]."""
     plan, q, p = me.plan, me.q, me.p

@@ -2,6 +2,9 @@
 
 import math
 
+import numba
+
+from hrc_env.compiled import LEAN
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import (
     between,
@@ -15,7 +18,6 @@ from hrc_env.motion.activities.planning import (
 from hrc_env.motion.activities.strokes import JAB
 from hrc_env.motion.activities.worker import Place, Worker
 from hrc_env.motion.anatomy import ARM, STAND_Z
-from hrc_env.motion.compiled import compiled
 from hrc_env.typing import Floats
 
 SHOULDER_SHARE, SHOULDER_M = 1.50, 0.19
@@ -24,7 +26,7 @@ POINT_M_S = 1.5
 """Peak speed of the pointing hand [m/s]; a quick reach."""
 
 
-@compiled
+@numba.njit(**LEAN)
 def start_point(draws: Floats, place: Place, me: Worker) -> float:
     """Plan to point somewhere ahead, at the place's height if it has one; how long [s]."""
     blank(me)

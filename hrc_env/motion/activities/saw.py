@@ -3,6 +3,9 @@
 Wrists at 1.25 to 2.0 m/s (95th percentile) in the recordings.
 """
 
+import numba
+
+from hrc_env.compiled import LEAN
 from hrc_env.motion.activities.planning import (
     CALM_M_S,
     between,
@@ -17,7 +20,6 @@ from hrc_env.motion.activities.planning import (
 )
 from hrc_env.motion.activities.strokes import SAW
 from hrc_env.motion.activities.worker import Place, Worker
-from hrc_env.motion.compiled import compiled
 from hrc_env.props import prop_index
 from hrc_env.typing import Floats
 
@@ -26,7 +28,7 @@ CUT_RAD = 0.6
 """How steeply the blade goes into the board [rad]; 45 to 60 degrees to it is usual, judgement."""
 
 
-@compiled
+@numba.njit(**LEAN)
 def start_saw(draws: Floats, place: Place, me: Worker) -> float:
     """Plan to saw a board at the place's height; returns how long it takes [s]."""
     blank(me)

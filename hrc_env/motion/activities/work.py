@@ -5,11 +5,13 @@ The first half of such an activity and its second half are mirror images in time
 
 import math
 
+import numba
+
+from hrc_env.compiled import LEAN
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.getting_down import get_down
 from hrc_env.motion.activities.strokes import stroke
-from hrc_env.motion.compiled import compiled
 from hrc_env.motion.curves import min_jerk
 from hrc_env.motion.gaze import look_at
 from hrc_env.motion.holding import GRIPS, TWO_HANDED, grip
@@ -29,7 +31,7 @@ DRAWN_SHARE = 0.6
 """Share of the way at which what is drawn out with both hands is out."""
 
 
-@compiled
+@numba.njit(**LEAN)
 def extend(down: float, out: float, plan: Floats, size: Floats, q: Floats) -> None:
     """A standing body's q at a share of getting down, and of reaching out from there."""
     get_down(down, plan, size, q)
@@ -40,7 +42,7 @@ def extend(down: float, out: float, plan: Floats, size: Floats, q: Floats) -> No
     _round(c.PROP_POSE, plan[pl.TOOL_POSE + 2], out, q)
 
 
-@compiled
+@numba.njit(**LEAN)
 def _round(at: int, goal_z: float, out: float, q: Floats) -> None:
     """Send q[at:], on its way out to a height, round shoulder or knee."""
     high = RISE * max(goal_z - q[c.PELVIS_Z] - 0.3, 0.0)
@@ -50,7 +52,7 @@ def _round(at: int, goal_z: float, out: float, q: Floats) -> None:
     q[at + 2] += bulge if goal_z < LOW_M else 0.0
 
 
-@compiled
+@numba.njit(**LEAN)
 def belt(side: int, at: int, q: Floats) -> None:
     """Write the pose of a tool on the belt, on that side, into q[at:]."""
     cos, sin = math.cos(q[c.HEADING]), math.sin(q[c.HEADING])
@@ -61,7 +63,7 @@ def belt(side: int, at: int, q: Floats) -> None:
     q[at + 3], q[at + 4], q[at + 5] = q[c.HEADING], BELT_PITCH_RAD, 0.0
 
 
-@compiled
+@numba.njit(**LEAN)
 def hands_on(out: float, taken: float, plan: Floats, q: Floats) -> None:
     """Send the tool's hand to the tool, the other to its own target or to the tool."""
     side, tool = int(plan[pl.SIDE]), int(plan[pl.TOOL])
@@ -81,7 +83,7 @@ def hands_on(out: float, taken: float, plan: Floats, q: Floats) -> None:
     q[c.HAND_SHARE + other] = joined * plan[pl.USE_LEFT + other]
 
 
-@compiled
+@numba.njit(**LEAN)
 def work(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q: Floats) -> None:
     """The control vector of someone who works in place with a tool, or empty hands."""
     stand(plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW], clock_s, traits, size, q)

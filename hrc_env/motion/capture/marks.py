@@ -2,11 +2,12 @@
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 
 from hrc_env.body import SEGMENT, Body
+from hrc_env.compiled import JIT
 from hrc_env.motion.anatomy import Anatomy, anatomy
-from hrc_env.motion.compiled import compiled
 from hrc_env.motion.kinematics import N_FRAMES, N_POINTS, pose
 from hrc_env.skeleton import JOINTS
 from hrc_env.typing import Floats, Ints, Points3
@@ -57,7 +58,7 @@ def joints_in(q: Floats, marks: Marks) -> Points3:
     return out
 
 
-@compiled
+@numba.njit(**JIT)
 def _joints(
     q: Floats, bones: Floats, frame: Floats, size: Floats, segment: Ints, offset: Floats,
     out: Floats,
