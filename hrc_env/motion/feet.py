@@ -99,6 +99,13 @@ def foot(
 
 
 @numba.njit(**LEAN)
+def feet(t: float, plan: Floats, prints: Floats, stance: Floats, size: Floats, q: Floats) -> None:
+    """Both."""
+    for side in range(2):
+        foot(t, side, plan, prints, stance, size, q)
+
+
+@numba.njit(**LEAN)
 def _climbed(w: float, step_up: float) -> float:
     """Share of a step up (early, before the foot comes over the tread) or down (late) at w."""
     return min_jerk(w / 0.6) if step_up > 0.0 else min_jerk((w - 0.4) / 0.6)

@@ -7,8 +7,8 @@ import numpy as np
 
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.climb import start_climb
-from hrc_env.motion.activities.crouching import start_kneel, start_squat
-from hrc_env.motion.activities.drill import start_drill
+from hrc_env.motion.activities.crouching import plan_kneel, plan_squat
+from hrc_env.motion.activities.drill import plan_drill
 from hrc_env.motion.activities.going import (
     CART,
     WHEELBARROW,
@@ -18,20 +18,22 @@ from hrc_env.motion.activities.going import (
     start_turn,
     start_walk,
 )
-from hrc_env.motion.activities.hammer import start_hammer
+from hrc_env.motion.activities.hammer import plan_hammer
 from hrc_env.motion.activities.loads import (
     BOARD,
     BOX,
-    start_hand_over,
-    start_pick_up,
-    start_receive,
-    start_set_down,
+    finish_lift,
+    plan_hand_over,
+    plan_pick_up,
+    plan_receive,
+    plan_set_down,
 )
 from hrc_env.motion.activities.look_round import start_look_round
-from hrc_env.motion.activities.lunge import start_lunge
-from hrc_env.motion.activities.measure import start_measure
-from hrc_env.motion.activities.point import start_point
-from hrc_env.motion.activities.saw import start_saw
+from hrc_env.motion.activities.lunge import plan_lunge
+from hrc_env.motion.activities.measure import plan_measure
+from hrc_env.motion.activities.planning import finish
+from hrc_env.motion.activities.point import plan_point
+from hrc_env.motion.activities.saw import plan_saw
 from hrc_env.motion.activities.worker import N_START, Place, Worker
 from hrc_env.motion.solo import Film, play, rest
 from hrc_env.typing import Floats
@@ -44,7 +46,7 @@ NO_CORNERS = np.zeros((0, 3))
 AWAY_M, FAR_M = 3.0, 8.0
 """How far those who go somewhere go, and how long the walks are that are measured [m]."""
 LIGHT_DRAW = 2
-"""Which draw of `start_hammer` decides between taps and blows."""
+"""Which draw of `plan_hammer` decides between taps and blows."""
 
 
 def perform(acts: Sequence[Act], me: Worker, rng: np.random.Generator, dt_s: float) -> list[Film]:
@@ -74,7 +76,7 @@ def _hammer(lightly: bool) -> Start:
     def start(draws: Floats, place: Place, me: Worker) -> float:
         chosen = draws.copy()
         chosen[LIGHT_DRAW] = 0.0 if lightly else 1.0
-        return start_hammer(chosen, place, me)
+        return finish(plan_hammer(chosen, place, me), me)
 
     return start
 
@@ -92,8 +94,18 @@ def _push(prop: int) -> Start:
     return lambda draws, place, me: start_push(_ahead(place), NO_CORNERS, 1.1, prop, me)
 
 
+def _work(plan: Start) -> Start:
+    """Work in place that is planned so."""
+    return lambda draws, place, me: finish(plan(draws, place, me), me)
+
+
+def _load(plan: Start) -> Start:
+    """The way of a load that is planned so."""
+    return lambda draws, place, me: finish_lift(plan(draws, place, me), me)
+
+
 def _take(prop: int, on_shoulder: bool) -> Start:
-    return lambda draws, place, me: start_pick_up(draws, place, prop, on_shoulder, me)
+    return _load(lambda draws, place, me: plan_pick_up(draws, place, prop, on_shoulder, me))
 
 
 def _stand(draws: Floats, place: Place, me: Worker) -> float:
@@ -101,11 +113,12 @@ def _stand(draws: Floats, place: Place, me: Worker) -> float:
 
 
 FLOOR_M, TABLE_M = 0.2, 0.85
+_SET_DOWN: Start = _load(plan_set_down)
 _CARRY: Act = (pl.CARRY, _walk(1.1), 0.0)
 REPERTOIRE: dict[str, tuple[Act, ...]] = {
     "stand": ((pl.STAND, _stand, 0.0),),
     "look round": ((pl.LOOK_ROUND, start_look_round, 0.0),),
-    "point": ((pl.POINT, start_point, 0.0),),
+    "point": ((pl.POINT, _work(plan_point), 0.0),),
     "walk 0.8 m/s": ((pl.WALK, _walk(0.8, FAR_M), 0.0),),
     "walk 1.1 m/s": ((pl.WALK, _walk(1.1, FAR_M), 0.0),),
     "walk 1.3 m/s": ((pl.WALK, _walk(1.3, FAR_M), 0.0),),
@@ -114,31 +127,31 @@ REPERTOIRE: dict[str, tuple[Act, ...]] = {
     "turn": ((pl.TURN, _turn, 0.0),),
     "step back": ((pl.STEP_BACK, start_step_back, 0.0),),
     "stumble": ((pl.STUMBLE, _stumble, 0.0),),
-    "lunge": ((pl.LUNGE, start_lunge, 1.1),),
+    "lunge": ((pl.LUNGE, _work(plan_lunge), 1.1),),
     "box from the floor to a table": (
-        (pl.PICK_UP, _take(BOX, False), FLOOR_M), _CARRY, (pl.SET_DOWN, start_set_down, TABLE_M)
+        (pl.PICK_UP, _take(BOX, False), FLOOR_M), _CARRY, (pl.SET_DOWN, _SET_DOWN, TABLE_M)
     ),
     "board in both hands": (
-        (pl.PICK_UP, _take(BOARD, False), TABLE_M), _CARRY, (pl.SET_DOWN, start_set_down, FLOOR_M)
+        (pl.PICK_UP, _take(BOARD, False), TABLE_M), _CARRY, (pl.SET_DOWN, _SET_DOWN, FLOOR_M)
     ),
     "board on the shoulder": (
-        (pl.PICK_UP, _take(BOARD, True), FLOOR_M), _CARRY, (pl.SET_DOWN, start_set_down, FLOOR_M)
+        (pl.PICK_UP, _take(BOARD, True), FLOOR_M), _CARRY, (pl.SET_DOWN, _SET_DOWN, FLOOR_M)
     ),
     "receive and hand over": (
-        (pl.RECEIVE, start_receive, 0.0), (pl.HAND_OVER, start_hand_over, 0.0)
+        (pl.RECEIVE, _load(plan_receive), 0.0), (pl.HAND_OVER, _load(plan_hand_over), 0.0)
     ),
     "cart": ((pl.PUSH, _push(CART), 0.0),),
     "wheelbarrow": ((pl.PUSH, _push(WHEELBARROW), 0.0),),
-    "squat": ((pl.SQUATTING, start_squat, FLOOR_M),),
-    "kneel": ((pl.KNEELING, start_kneel, FLOOR_M),),
+    "squat": ((pl.SQUATTING, _work(plan_squat), FLOOR_M),),
+    "kneel": ((pl.KNEELING, _work(plan_kneel), FLOOR_M),),
     "hammer lightly": ((pl.HAMMER, _hammer(True), TABLE_M),),
     "hammer on a table": ((pl.HAMMER, _hammer(False), TABLE_M),),
     "hammer at a wall": ((pl.HAMMER, _hammer(False), 1.4),),
     "hammer on the floor": ((pl.HAMMER, _hammer(False), FLOOR_M),),
-    "drill": ((pl.DRILL, start_drill, 1.25),),
-    "drill overhead": ((pl.OVERHEAD, start_drill, 2.0),),
-    "saw": ((pl.SAW, start_saw, TABLE_M),),
-    "measure": ((pl.MEASURE, start_measure, TABLE_M),),
+    "drill": ((pl.DRILL, _work(plan_drill), 1.25),),
+    "drill overhead": ((pl.OVERHEAD, _work(plan_drill), 2.0),),
+    "saw": ((pl.SAW, _work(plan_saw), TABLE_M),),
+    "measure": ((pl.MEASURE, _work(plan_measure), TABLE_M),),
     "climb": ((pl.CLIMB, start_climb, 0.22),),
 }  # fmt: skip
 """Scenes by name."""

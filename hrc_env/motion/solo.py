@@ -11,7 +11,7 @@ from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.worker import Worker
 from hrc_env.motion.anatomy import anatomy
-from hrc_env.motion.feet import foot
+from hrc_env.motion.feet import feet
 from hrc_env.motion.holding import N_HELD, drop_load, prop_pose
 from hrc_env.motion.kinematics import N_FRAMES, N_POINTS, pose, quaternion
 from hrc_env.motion.state import RATE_H_S, evaluate, settle, stop
@@ -57,8 +57,7 @@ def rest(me: Worker, activity: int = pl.STAND) -> None:
     stop(me.plan, me.prints, me.stance)
     if activity in pl.GIVING or activity == pl.PUSH:
         drop_load(me.plan)
-    for side in range(2):
-        foot(0.0, side, me.plan, me.prints, me.stance, me.size, me.q)
+    feet(0.0, me.plan, me.prints, me.stance, me.size, me.q)
 
 
 def play(me: Worker, activity: int, time_s: Floats, clock_s: float = 0.0) -> Film:

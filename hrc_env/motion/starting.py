@@ -1,35 +1,39 @@
 """Starting an activity by its number, whatever start functions it has (`activities`)."""
 
 import math
+from collections.abc import Callable
 
 import numba
 
 from hrc_env.compiled import LEAN
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.climb import start_climb
-from hrc_env.motion.activities.crouching import start_kneel, start_squat
-from hrc_env.motion.activities.drill import start_drill
+from hrc_env.motion.activities.crouching import plan_kneel, plan_squat
+from hrc_env.motion.activities.drill import OVERHEAD_M, plan_drill
 from hrc_env.motion.activities.going import (
     start_push,
     start_step_back,
     start_stumble,
     start_walk,
 )
-from hrc_env.motion.activities.hammer import start_hammer
+from hrc_env.motion.activities.hammer import plan_hammer
 from hrc_env.motion.activities.loads import (
-    start_hand_over,
-    start_pick_up,
-    start_receive,
-    start_set_down,
+    finish_lift,
+    plan_hand_over,
+    plan_pick_up,
+    plan_receive,
+    plan_set_down,
 )
 from hrc_env.motion.activities.look_round import start_look_round
-from hrc_env.motion.activities.measure import start_measure
-from hrc_env.motion.activities.point import start_point
-from hrc_env.motion.activities.saw import start_saw
+from hrc_env.motion.activities.lunge import plan_lunge
+from hrc_env.motion.activities.measure import plan_measure
+from hrc_env.motion.activities.planning import between, finish
+from hrc_env.motion.activities.point import plan_point
+from hrc_env.motion.activities.saw import plan_saw
 from hrc_env.motion.activities.worker import Place, Worker
 from hrc_env.motion.config import Numbers
 from hrc_env.motion.curves import wrap
-from hrc_env.motion.feet import foot
+from hrc_env.motion.feet import feet
 from hrc_env.motion.hands import plan_lift, plan_reach
 from hrc_env.typing import Floats
 
@@ -37,17 +41,8 @@ BODY_M = 0.36
 """Hands reach no nearer to their own root than this [m]."""
 OWN_SIDE_M = 0.30
 """Hands keep so far from the middle between their worker and another [m]."""
-OVERHEAD_M = 1.7
-"""Drilling at this height or above is overhead work [m]."""
 
 
-@numba.njit(**LEAN)
-def between(draw: float, limits: tuple[float, float]) -> float:
-    """A uniform draw in [0, 1) stretched to (low, high)."""
-    return limits[0] + draw * (limits[1] - limits[0])
-
-
-@numba.njit(**LEAN)
 def start_going(
     activity: int, draws: Floats, place: Place, via: Floats, pace_m_s: float, prop: int, me: Worker
 ) -> float:
@@ -59,12 +54,30 @@ def start_going(
     return start_walk(place, via, pace_m_s, me)
 
 
-@numba.njit(**LEAN)
+WORK: dict[int, Callable[[Floats, Place, Worker], float]] = {
+    pl.HAMMER: plan_hammer, pl.DRILL: plan_drill, pl.OVERHEAD: plan_drill, pl.SAW: plan_saw,
+    pl.MEASURE: plan_measure, pl.POINT: plan_point, pl.SQUATTING: plan_squat,
+    pl.KNEELING: plan_kneel, pl.LUNGE: plan_lunge,
+}  # fmt: skip
+"""What plans work in place, for `finish`."""
+HERE: dict[int, Callable[[Floats, Place, Worker], float]] = {
+    pl.LOOK_ROUND: start_look_round, pl.CLIMB: start_climb, pl.STEP_BACK: start_step_back,
+}  # fmt: skip
+"""What starts the rest."""
+LIFTS: dict[int, Callable[[Floats, Place, Worker], float]] = {
+    pl.SET_DOWN: plan_set_down, pl.HAND_OVER: plan_hand_over, pl.RECEIVE: plan_receive,
+}  # fmt: skip
+"""What plans the way of a load, for `finish_lift`."""
+
+
 def start_here(
     activity: int, draws: Floats, place: Place, near: bool, others: Floats, prop: int,
     config: Numbers, me: Worker,
 ) -> float:  # fmt: skip
     """Start an activity where the worker stands; how long it takes [s], 0 of standing.
+
+    Python picks what is compiled, each by itself and when it is first wanted: a kernel that calls
+    all of them would be compiled with all of them, a minute.
 
     Args:
         activity: index into `plans.ACTIVITY_NAMES`.
@@ -76,51 +89,28 @@ def start_here(
         config: see `config.numbers`.
         me: the worker.
     """
-    for side in range(2):
-        foot(0.0, side, me.plan, me.prints, me.stance, me.size, me.q)
+    feet(0.0, me.plan, me.prints, me.stance, me.size, me.q)
     if activity == pl.REACH:
         return start_reach(draws, config, near, place[3], others, me)
     if activity == pl.LIFT:
         return start_lift(draws, config, me)
-    if activity == pl.LOOK_ROUND:
-        return start_look_round(draws, place, me)
     if activity == pl.PICK_UP:
-        return start_pick_up(draws, place, prop, draws[8] < 0.5, me)
-    if activity == pl.SET_DOWN:
-        return start_set_down(draws, place, me)
-    if activity == pl.HAND_OVER:
-        return start_hand_over(draws, place, me)
-    if activity == pl.RECEIVE:
-        return start_receive(draws, place, me)
-    if activity == pl.STEP_BACK:
-        return start_step_back(draws, place, me)
-    return _start_work(activity, draws, place, me)
+        return finish_lift(plan_pick_up(draws, place, prop, bool(draws[8] < 0.5), me), me)
+    if activity in LIFTS:
+        return finish_lift(LIFTS[activity](draws, place, me), me)
+    if activity in WORK:
+        return finish(WORK[activity](draws, _at_its_height(activity, place), me), me)
+    return HERE[activity](draws, place, me) if activity in HERE else 0.0
 
 
-@numba.njit(**LEAN)
-def _start_work(activity: int, draws: Floats, place: Place, me: Worker) -> float:
-    """Start work with a tool or on the floor; 0 of an activity that is none of these."""
-    if activity == pl.HAMMER:
-        return start_hammer(draws, place, me)
+def _at_its_height(activity: int, place: Place) -> Place:
+    """The place, below the head for drilling and above it for drilling overhead."""
+    x, y, yaw, height = place
     if activity == pl.DRILL:
-        low = (place[0], place[1], place[2], min(place[3], OVERHEAD_M - 0.1))
-        return start_drill(draws, low, me)
-    if activity == pl.OVERHEAD:
-        high = (place[0], place[1], place[2], max(place[3], OVERHEAD_M + 0.1))
-        return start_drill(draws, high, me)
-    if activity == pl.SAW:
-        return start_saw(draws, place, me)
-    if activity == pl.MEASURE:
-        return start_measure(draws, place, me)
-    if activity == pl.POINT:
-        return start_point(draws, place, me)
-    if activity == pl.SQUATTING:
-        return start_squat(draws, place, me)
-    if activity == pl.KNEELING:
-        return start_kneel(draws, place, me)
-    if activity == pl.CLIMB:
-        return start_climb(draws, place, me)
-    return 0.0
+        height = min(height, OVERHEAD_M - 0.1)
+    elif activity == pl.OVERHEAD:
+        height = max(height, OVERHEAD_M + 0.1)
+    return x, y, yaw, height
 
 
 @numba.njit(**LEAN)
@@ -143,7 +133,7 @@ def _target(
     draws: Floats, config: Numbers, near: bool, height: float, plan: Floats
 ) -> tuple[float, float, float]:
     """A world point for the hands: in the robot's workspace, or ahead of the worker."""
-    z = between(draws[3], config.target_z_m)
+    z = between(draws[3], *config.target_z_m)
     x, y = plan[pl.START_X], plan[pl.START_Y]
     if not near:
         z = max(z, height)
@@ -153,7 +143,7 @@ def _target(
     bx, by = config.robot_xy_m
     own = math.hypot(x - bx, y - by)
     low, high = config.target_radius_m
-    radius = between(draws[1], (min(low, own - BODY_M), min(high, own - BODY_M)))
+    radius = between(draws[1], min(low, own - BODY_M), min(high, own - BODY_M))
     azimuth = math.atan2(y - by, x - bx) + config.target_spread_rad * (2.0 * draws[2] - 1.0)
     return bx + radius * math.cos(azimuth), by + radius * math.sin(azimuth), z
 
@@ -173,8 +163,8 @@ def start_reach(
     if draws[5] < config.two_hands_probability and abs(side) < 0.6:
         used = (1.0, 1.0)
     sudden = draws[6] < config.sudden_probability
-    peak = config.sudden_speed_m_s if sudden else between(draws[7], config.hand_speed_m_s)
-    hold = 0.15 + 0.2 * draws[8] if sudden else between(draws[8], config.hold_s)
+    peak = config.sudden_speed_m_s if sudden else between(draws[7], *config.hand_speed_m_s)
+    hold = 0.15 + 0.2 * draws[8] if sudden else between(draws[8], *config.hold_s)
     fidget = (0.035 * draws[9] * draws[9], 0.6 + 0.8 * draws[10])
     plan[pl.OUT_AT] = 0.05 if sudden else 0.1 + 0.5 * draws[11]
     return plan_reach(
@@ -187,8 +177,8 @@ def start_reach(
 def start_lift(draws: Floats, config: Numbers, me: Worker) -> float:
     """Draw a lift: where the load stands and how long bending, raising and holding take."""
     me.plan[pl.OUT_AT] = 0.1 + 0.4 * draws[11]
-    times = (between(draws[1], config.lift_s), between(draws[2], config.lift_s), 0.3 + draws[3])
-    z = between(draws[4], config.load_z_m)
+    times = (between(draws[1], *config.lift_s), between(draws[2], *config.lift_s), 0.3 + draws[3])
+    z = between(draws[4], *config.load_z_m)
     ahead = 0.38 + 0.08 * draws[5]
     return plan_lift(
         ahead, z, times, me.plan, me.traits, me.bones, me.frame, me.size, me.q, me.p, me.r

@@ -18,7 +18,7 @@ from hrc_env.motion.anatomy import Anatomy
 from hrc_env.motion.config import MotionConfig, Numbers
 from hrc_env.motion.curves import decay, wrap
 from hrc_env.motion.errands import Errands
-from hrc_env.motion.feet import foot, step_time
+from hrc_env.motion.feet import feet, step_time
 from hrc_env.motion.floorplan import Floorplan
 from hrc_env.motion.hands import lift, reach
 from hrc_env.motion.holding import drop_load, hold_load
@@ -118,8 +118,7 @@ def evaluate(
 ) -> None:  # fmt: skip
     """The control vector q at time t of an activity: its closed form."""
     feet_s = step_time(t, plan) - (plan[pl.TAKEN_S] if activity == pl.PUSH else 0.0)
-    for side in range(2):
-        foot(feet_s, side, plan, prints, stance, size, q)
+    feet(feet_s, plan, prints, stance, size, q)
     if activity in pl.GOING:
         walk(t, plan, clock_s, traits, size, q)
     elif activity == pl.REACH:

@@ -2,21 +2,26 @@
 
 A start function is called once, when the activity begins, and returns how long it lasts [s]:
 
-    lasts = start_hammer(draws, place, me)
+    lasts = start_climb(draws, place, me)
 
     draws   at least N_START uniform numbers in [0, 1): its size, tempo, side
     place   (x, y, yaw, height): where to and facing where (activities that go somewhere), at
             what height [m] the work, the load or the tread is (the others; 0: draw one)
     me      `worker.Worker`: everything of the worker that start functions read and write
 
-Before the call `me.plan` has START and END where the worker stands (`state._stop` does it) and
+Work and loads are begun in two steps, the second of which is the same for all of them:
+
+    lasts = planning.finish(plan_hammer(draws, place, me), me)
+    lasts = loads.finish_lift(plan_set_down(draws, place, me), me)
+
+Before the call `me.plan` has START and END where the worker stands (`state.stop` does it) and
 `me.q` the feet; afterwards END says where the activity ends. The closed form, picked by
 `state.evaluate`, then writes the control vector at any time from the plan alone.
 
 In place (`place` gives the height only):
 
-    start_look_round  start_squat  start_kneel  start_hammer  start_drill  start_saw
-    start_measure     start_point  start_climb  start_lunge
+    start_look_round  start_climb
+    plan_hammer  plan_drill  plan_saw  plan_measure  plan_point  plan_squat  plan_kneel  plan_lunge
 
     drill at a height of 1.7 m or more is overhead work; hammer, drill and measure below 0.6 m
     are done kneeling.
@@ -24,9 +29,9 @@ In place (`place` gives the height only):
 Loads, which stay in the hands from one activity to the next (`plan[pl.LOAD_PROP]` > 0 says that
 one is held) while the worker walks, turns, stands, stumbles or looks round:
 
-    start_pick_up(draws, place, prop, on_shoulder, me)   a box or a board, from `height`
-    start_set_down(draws, place, me)                     onto `height`
-    start_receive(draws, place, me)  start_hand_over(draws, place, me)   from, to somebody
+    plan_pick_up(draws, place, prop, on_shoulder, me)   a box or a board, from `height`
+    plan_set_down(draws, place, me)                     onto `height`
+    plan_receive(draws, place, me)  plan_hand_over(draws, place, me)   from, to somebody
 
 Going somewhere: (x, y, yaw) of the place past corners via (n, 3: `paths.lay_path`), at a speed
 [m/s]:

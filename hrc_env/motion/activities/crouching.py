@@ -11,7 +11,6 @@ from hrc_env.motion.activities.planning import (
     between,
     blank,
     dominant,
-    finish,
     kneel_down,
     look_to,
     put_other,
@@ -24,8 +23,8 @@ from hrc_env.typing import Floats
 
 
 @numba.njit(**LEAN)
-def start_kneel(draws: Floats, place: Place, me: Worker) -> float:
-    """Plan to kneel and work low; returns how long it takes [s]."""
+def plan_kneel(draws: Floats, place: Place, me: Worker) -> float:
+    """Plan to kneel and work low; returns how fast hands may go to it [m/s]."""
     blank(me)
     side = dominant(draws[0], me)
     kneel_down(side, me)
@@ -33,8 +32,8 @@ def start_kneel(draws: Floats, place: Place, me: Worker) -> float:
 
 
 @numba.njit(**LEAN)
-def start_squat(draws: Floats, place: Place, me: Worker) -> float:
-    """Plan to work low on the haunches; returns how long it takes [s]."""
+def plan_squat(draws: Floats, place: Place, me: Worker) -> float:
+    """Plan to work low on the haunches; returns how fast hands may go to it [m/s]."""
     blank(me)
     plan = me.plan
     plan[pl.CROUCH], plan[pl.AHEAD] = 1.0, 0.02
@@ -54,4 +53,4 @@ def _hands_low(ahead: float, side: int, draws: Floats, place: Place, me: Worker)
     size, rate = between(draws[2], 0.02, 0.05), between(draws[3], 0.8, 1.4)
     strokes(BUSY, size, rate, between(draws[4], 1.5, 3.5), 1 + int(3.0 * draws[5]), me)
     me.plan[pl.WANDER_M] = 0.10
-    return finish(CALM_M_S, me)
+    return CALM_M_S

@@ -13,7 +13,6 @@ from hrc_env.motion.activities.planning import (
     between,
     blank,
     dominant,
-    finish,
     kneel_down,
     look_to,
     put_other,
@@ -37,8 +36,8 @@ OVERHEAD_M = 1.7
 
 
 @numba.njit(**LEAN)
-def start_drill(draws: Floats, place: Place, me: Worker) -> float:
-    """Plan to drill at the place's height; returns how long it takes [s]."""
+def plan_drill(draws: Floats, place: Place, me: Worker) -> float:
+    """Plan to drill at the place's height; returns how fast hands may go to it [m/s]."""
     blank(me)
     side = dominant(draws[0], me)
     sign = 1.0 - 2.0 * side
@@ -68,4 +67,4 @@ def start_drill(draws: Floats, place: Place, me: Worker) -> float:
         me,
     )
     me.plan[pl.WANDER_M] = 0.12 * sign
-    return finish(CALM_M_S, me)
+    return CALM_M_S

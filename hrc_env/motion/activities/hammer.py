@@ -16,7 +16,6 @@ from hrc_env.motion.activities.planning import (
     between,
     blank,
     dominant,
-    finish,
     kneel_down,
     look_to,
     put_other,
@@ -40,8 +39,8 @@ WALL_M = 1.2
 
 
 @numba.njit(**LEAN)
-def start_hammer(draws: Floats, place: Place, me: Worker) -> float:
-    """Plan to drive nails at the place's height; returns how long it takes [s]."""
+def plan_hammer(draws: Floats, place: Place, me: Worker) -> float:
+    """Plan to drive nails at the place's height; returns how fast hands may go to it [m/s]."""
     blank(me)
     side = dominant(draws[0], me)
     sign = 1.0 - 2.0 * side
@@ -65,4 +64,4 @@ def start_hammer(draws: Floats, place: Place, me: Worker) -> float:
     rate = LIGHT_HZ if light else between(draws[4], 1.9, 2.2)
     strokes(STRIKE, size, rate, between(draws[5], 1.6, 3.2), 2 + int(3.0 * draws[6]), me)
     me.plan[pl.WANDER_M] = 0.08 * sign
-    return finish(CALM_M_S, me)
+    return CALM_M_S

@@ -90,37 +90,39 @@ def pick_up(
 
 
 @numba.njit(**LEAN)
-def start_pick_up(draws: Floats, place: Place, prop: int, on_shoulder: bool, me: Worker) -> float:
-    """Plan to pick a box or board up, gripped at the place's height; how long it takes [s]."""
+def plan_pick_up(draws: Floats, place: Place, prop: int, on_shoulder: bool, me: Worker) -> float:
+    """Plan to pick a box or board up, gripped at the place's height; its pace [s]."""
     _hold(prop, on_shoulder and prop == BOARD, dominant(draws[0], me), me)
     z = place[3] if place[3] > 0.0 else between(draws[1], 0.18, 0.45)
-    return _plan_lift(prop, (AWAY_M, 0.0, z), between(draws[2], 1.0, 1.35), me)
+    _lay_out(prop, (AWAY_M, 0.0, z), me)
+    return between(draws[2], 1.0, 1.35)
 
 
 @numba.njit(**LEAN)
-def start_receive(draws: Floats, place: Place, me: Worker) -> float:
-    """Plan to take a box that somebody ahead holds out; returns how long it takes [s]."""
+def plan_receive(draws: Floats, place: Place, me: Worker) -> float:
+    """Plan to take a box that somebody ahead holds out; its pace [s]."""
     _hold(BOX, False, 1, me)
-    lasts = _plan_lift(BOX, _given(place, me), between(draws[2], 0.9, 1.1), me)
+    _lay_out(BOX, _given(place, me), me)
     me.plan[pl.HIDDEN] = 1.0
-    return lasts
+    return between(draws[2], 0.9, 1.1)
 
 
 @numba.njit(**LEAN)
-def start_set_down(draws: Floats, place: Place, me: Worker) -> float:
-    """Plan to set down what is held, onto the place's height; returns how long it takes [s]."""
+def plan_set_down(draws: Floats, place: Place, me: Worker) -> float:
+    """Plan to set down what is held, onto the place's height; its pace [s]."""
     z = place[3] if place[3] > 0.0 else between(draws[1], 0.18, 0.45)
     prop = int(me.plan[pl.LOAD_PROP])
-    return _plan_lift(prop, (AWAY_M, 0.0, z), between(draws[2], 1.0, 1.35), me)
+    _lay_out(prop, (AWAY_M, 0.0, z), me)
+    return between(draws[2], 1.0, 1.35)
 
 
 @numba.njit(**LEAN)
-def start_hand_over(draws: Floats, place: Place, me: Worker) -> float:
-    """Plan to hold out what is carried until somebody has it; returns how long it takes [s]."""
+def plan_hand_over(draws: Floats, place: Place, me: Worker) -> float:
+    """Plan to hold out what is carried until somebody has it; its pace [s]."""
     prop = int(me.plan[pl.LOAD_PROP])
-    lasts = _plan_lift(prop, _given(place, me), between(draws[2], 0.9, 1.1), me)
+    _lay_out(prop, _given(place, me), me)
     me.plan[pl.HIDDEN] = 1.0
-    return lasts
+    return between(draws[2], 0.9, 1.1)
 
 
 @numba.njit(**LEAN)
@@ -155,13 +157,29 @@ def _hold(prop: int, on_shoulder: bool, side: int, me: Worker) -> None:
 
 
 @numba.njit(**LEAN)
-def _plan_lift(prop: int, at: tuple[float, float, float], raise_s: float, me: Worker) -> float:
-    """Plan the way between a place (ahead, left, height) and how the load is carried."""
-    plan, size = me.plan, me.size
+def _lay_out(prop: int, at: tuple[float, float, float], me: Worker) -> None:
+    """Plan where the load stands: ahead, left [m], height."""
     blank(me)
     put_tool(prop, 1, at, (0.0, 0.0, 0.0), me)
     look_to(at, me)
-    low = min(max((size[STAND_Z] - at[2]) / 0.6, 0.0), 1.0)
+
+
+@numba.njit(**LEAN)
+def finish_lift(raise_s: float, me: Worker) -> float:
+    """Settle trunk, way and times of a load between where it stands and where it is carried.
+
+    As `planning.finish`, no plan function calls it.
+
+    Args:
+        raise_s: its pace, the time to raise it by about a metre [s].
+        me: its plan says where the load stands, and how it is carried.
+
+    Returns:
+        How long it takes [s].
+    """
+    plan, size = me.plan, me.size
+    z = plan[pl.TOOL_POSE + 2]
+    low = min(max((size[STAND_Z] - z) / 0.6, 0.0), 1.0)
     plan[pl.SQUAT] = me.traits[pl.SQUAT_TRAIT] * low
     settle_lean(me)
     shoulder = plan[pl.LOAD_AT + 3] != 0.0
@@ -171,7 +189,7 @@ def _plan_lift(prop: int, at: tuple[float, float, float], raise_s: float, me: Wo
     for i in range(3):
         plan[pl.MIDWAY + i] = point[i]
     plan[pl.MIDWAY + 3] = plan[pl.START_YAW]
-    way = abs(mid_z - at[2])
+    way = abs(mid_z - z)
     plan[pl.RAISE_S] = max(raise_s * (0.50 + 0.48 * way), 0.6)
     plan[pl.OUT_S] = max(raise_s * (0.7 + 0.35 * low), 0.7)
     plan[pl.SHOULDER_S] = SHOULDER_S if shoulder else 0.0

@@ -11,7 +11,6 @@ from hrc_env.motion.activities.planning import (
     between,
     blank,
     dominant,
-    finish,
     look_to,
     put_tool,
     step_ahead,
@@ -23,8 +22,8 @@ from hrc_env.typing import Floats
 
 
 @numba.njit(**LEAN)
-def start_lunge(draws: Floats, place: Place, me: Worker) -> float:
-    """Plan to snatch at something ahead, at the place's height; returns how long it takes [s]."""
+def plan_lunge(draws: Floats, place: Place, me: Worker) -> float:
+    """Plan to snatch at something ahead, at the place's height; the hand's speed [m/s]."""
     blank(me)
     side = dominant(draws[0], me)
     sign = 1.0 - 2.0 * side
@@ -37,4 +36,4 @@ def start_lunge(draws: Floats, place: Place, me: Worker) -> float:
     me.plan[pl.SETTLE_S], me.plan[pl.OUT_AT] = 0.7, 0.12
     me.plan[pl.STEP_SWING] = 0.40
     me.plan[pl.TWIST] = -0.35 * sign
-    return finish(between(draws[6], 1.9, 2.3), me)
+    return between(draws[6], 1.9, 2.3)

@@ -10,7 +10,6 @@ from hrc_env.motion.activities.planning import (
     between,
     blank,
     dominant,
-    finish,
     kneel_down,
     look_to,
     put_tool,
@@ -27,8 +26,8 @@ TAPE = prop_index("tape_measure")
 
 
 @numba.njit(**LEAN)
-def start_measure(draws: Floats, place: Place, me: Worker) -> float:
-    """Plan to measure at the place's height; returns how long it takes [s]."""
+def plan_measure(draws: Floats, place: Place, me: Worker) -> float:
+    """Plan to measure at the place's height; returns how fast hands may go to it [m/s]."""
     blank(me)
     z = place[3] if place[3] > 0.0 else between(draws[1], 0.85, 1.3)
     if z < LOW_M:
@@ -39,4 +38,4 @@ def start_measure(draws: Floats, place: Place, me: Worker) -> float:
     look_to((0.46, 0.12, z), me)
     strokes(SHIFT, 0.0, 0.0, between(draws[2], 0.8, 1.6), 2 + int(3.0 * draws[3]), me)
     me.plan[pl.WANDER_M] = between(draws[4], 0.10, 0.18)
-    return finish(CALM_M_S, me)
+    return CALM_M_S

@@ -12,7 +12,7 @@ from hrc_env.motion.activities.strokes import PAUSE_S, stroke
 from hrc_env.motion.activities.work import extend, hands_on
 from hrc_env.motion.activities.worker import Worker
 from hrc_env.motion.anatomy import CHEST, HAND, LEFT, LEG, SIDE_STRIDE, STAND_Z
-from hrc_env.motion.feet import foot
+from hrc_env.motion.feet import feet
 from hrc_env.motion.holding import TWO_HANDED
 from hrc_env.motion.kinematics import pose
 from hrc_env.motion.posture import MOST_LEAN, beyond, stand
@@ -141,8 +141,7 @@ def strokes(kind: int, size_m: float, rate_hz: float, burst_s: float, n: int, me
 def at_work(me: Worker) -> None:
     """Fill q as it is in the middle of the work, before the first stroke."""
     plan, q, size = me.plan, me.q, me.size
-    for side in range(2):
-        foot(FAR, side, plan, me.prints, me.stance, size, q)
+    feet(FAR, plan, me.prints, me.stance, size, q)
     stand(plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW], 0.0, me.traits, size, q)
     extend(1.0, 1.0, plan, size, q)
     stroke(0.0, plan, q)
@@ -151,7 +150,10 @@ def at_work(me: Worker) -> None:
 
 @numba.njit(**LEAN)
 def finish(peak_m_s: float, me: Worker) -> float:
-    """Settle the trunk and the times of a plan whose hands, strokes and steps stand; how long."""
+    """Settle trunk and times of work whose hands, strokes and steps are planned; how long [s].
+
+    No plan function calls it: each would be compiled with all of it once more.
+    """
     plan = me.plan
     side = int(plan[pl.SIDE])
     low = min(max((0.95 * me.size[STAND_Z] - plan[pl.TOOL_POSE + 2]) / 0.5, 0.0), 1.0)
@@ -189,7 +191,7 @@ def settle_lean(me: Worker) -> None:
     far = _short(me)
     if far > 0.0:
         plan[pl.LEAN] = 0.0 if upright < far else high
-        _come_nearer(me)
+        _come_nearer(_short(me), me)
 
 
 @numba.njit(**LEAN)
@@ -202,9 +204,9 @@ def _short(me: Worker) -> float:
 
 
 @numba.njit(**LEAN)
-def _come_nearer(me: Worker) -> None:
-    """Move tool and targets towards the shoulders by what is out of reach."""
-    plan, p, far = me.plan, me.p, _short(me)
+def _come_nearer(far: float, me: Worker) -> None:
+    """Move tool and targets towards the shoulders by what is out of reach, as `_short` says."""
+    plan, p = me.plan, me.p
     x, y, z = p[CHEST, 0], p[CHEST, 1], p[CHEST, 2]
     dx, dy, dz = plan[pl.TOOL_POSE] - x, plan[pl.TOOL_POSE + 1] - y, plan[pl.TOOL_POSE + 2] - z
     share = 1.15 * far / math.sqrt(dx * dx + dy * dy + dz * dz)

@@ -10,7 +10,6 @@ from hrc_env.motion.activities.planning import (
     between,
     blank,
     dominant,
-    finish,
     look_to,
     put_tool,
     strokes,
@@ -27,8 +26,8 @@ POINT_M_S = 1.5
 
 
 @numba.njit(**LEAN)
-def start_point(draws: Floats, place: Place, me: Worker) -> float:
-    """Plan to point somewhere ahead, at the place's height if it has one; how long [s]."""
+def plan_point(draws: Floats, place: Place, me: Worker) -> float:
+    """Plan to point somewhere ahead, at its height if it has one; the hand's speed [m/s]."""
     blank(me)
     side = dominant(draws[0], me)
     sign = 1.0 - 2.0 * side
@@ -45,4 +44,4 @@ def start_point(draws: Floats, place: Place, me: Worker) -> float:
     look_to((10.0 * math.cos(aside), 10.0 * math.sin(aside), shoulder_z + 10.0 * math.tan(up)), me)
     strokes(JAB, 0.03, between(draws[3], 1.2, 1.8), between(draws[4], 0.8, 2.2), 1, me)
     me.plan[pl.TWIST] = 0.35 * aside
-    return finish(POINT_M_S, me)
+    return POINT_M_S

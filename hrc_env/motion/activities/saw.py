@@ -11,7 +11,6 @@ from hrc_env.motion.activities.planning import (
     between,
     blank,
     dominant,
-    finish,
     look_to,
     put_other,
     put_tool,
@@ -29,8 +28,8 @@ CUT_RAD = 0.6
 
 
 @numba.njit(**LEAN)
-def start_saw(draws: Floats, place: Place, me: Worker) -> float:
-    """Plan to saw a board at the place's height; returns how long it takes [s]."""
+def plan_saw(draws: Floats, place: Place, me: Worker) -> float:
+    """Plan to saw a board at the place's height; returns how fast hands may go to it [m/s]."""
     blank(me)
     side = dominant(draws[0], me)
     sign = 1.0 - 2.0 * side
@@ -41,4 +40,4 @@ def start_saw(draws: Floats, place: Place, me: Worker) -> float:
     look_to((0.74, 0.1 * sign, z), me)
     strokes(SAW, between(draws[2], 0.13, 0.15), between(draws[3], 1.55, 1.75),
             between(draws[4], 3.0, 5.0), 1 + int(3.0 * draws[5]), me)  # fmt: skip
-    return finish(CALM_M_S, me)
+    return CALM_M_S
