@@ -3,6 +3,7 @@
 loop.jpg      the still of `python -m hrc_env demo`
 room.jpg      the lab from beside and from outside
 site.jpg      the construction site
+cameras.jpg   the laboratory through a pinhole and through the paper's GoPro
 clip.jpg      a film strip of a walk that was written to a BVH file and imported
 learning.png  the curve of `make train-quick`, if runs/quick is there
 """
@@ -17,7 +18,11 @@ import imageio.v2 as imageio
 import numpy as np
 
 from hrc_env.env import HRCReachEnv
-from hrc_env.scene.render import PictureRenderer
+from hrc_env.geometry.cameras import pinhole
+from hrc_env.perception.lensed import Lensed
+from hrc_env.pictures import label, middle_rows, shrink
+from hrc_env.records import CropWindow
+from hrc_env.scene.render import CropRenderer, PictureRenderer
 
 PICTURES = Path(__file__).parent / "pictures"
 JPEG_QUALITY = 88
@@ -44,6 +49,26 @@ def room() -> None:
     renderer = PictureRenderer(env.simulation.scene, 960, 640)
     views = [renderer.picture(*env.views.pose(), view) for view in ("room", "outside")]
     save(np.hstack(views), "room.jpg")
+    renderer.close()
+    env.close()
+
+
+def cameras() -> None:
+    """The laboratory through a pinhole and through the paper's GoPro, in one place."""
+    env = HRCReachEnv(perception="truth", cameras="lab_gopro")
+    env.reset(seed=3)
+    for _ in range(60):
+        env.step(np.zeros(6))
+    gopro = env.simulation.scene.cameras[2]
+    wide = pinhole("wide", gopro.eye_world, np.array([0.2, 0.0, 1.0]), 118.2, 1920, 1080)
+    renderer = CropRenderer(env.simulation.scene, 1920)
+    renderer.draw(*env.views.pose())
+    whole = CropWindow((960.0, 540.0), 1920.0, 0.0)
+    images = [Lensed(renderer, (gopro,)).view(each, whole) for each in (wide, gopro)]
+    shown = [shrink(middle_rows(image, 1080), 800, 450) for image in images]
+    for image, text in zip(shown, ("pinhole, 118.2 degrees", "GoPro HERO8 wide"), strict=True):
+        label(image, text, (8, 8))
+    save(np.hstack(shown), "cameras.jpg")
     renderer.close()
     env.close()
 
@@ -75,6 +100,7 @@ if __name__ == "__main__":
     loop()
     room()
     site()
+    cameras()
     clip()
     if Path("runs/quick/curve.png").exists():
         shutil.copy("runs/quick/curve.png", PICTURES / "learning.png")

@@ -10,15 +10,20 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from hrc_env.control import ControlConfig
 from hrc_env.errors import ConfigError
 from hrc_env.mapping import from_mapping
 from hrc_env.metrics import CostConfig
 from hrc_env.motion.generator import Clip, MotionConfig, PeopleConfig, people_called
+from hrc_env.optics.camera import CameraConfig
+from hrc_env.optics.rigs import read_rig
 from hrc_env.perception.emulator import EmulatorConfig
 from hrc_env.perception.eyes import EyesConfig
 from hrc_env.rewards import RewardConfig
 from hrc_env.scene.build import SceneConfig
+from hrc_env.scene.rigs import RIGS
 from hrc_env.tasks.reach import ReachConfig
 from hrc_env.tracking.ahead import check_horizon
 from hrc_env.tracking.config import TrackerConfig
@@ -97,6 +102,52 @@ def resolve(config: "HRCConfig | Mapping[str, Any] | None") -> HRCConfig:
             f"config must be an HRCConfig, a mapping or None, got {type(config).__name__}."
         )
     return from_mapping(HRCConfig, config)
+
+
+def with_cameras(
+    config: HRCConfig, cameras: "str | Path | Sequence[Any] | None"
+) -> "tuple[HRCConfig, Sequence[int | str] | None]":
+    """A config with another rig, and which of its cameras are used; see `HRCReachEnv`.
+
+    Raises:
+        ConfigError: no rig of that name, no such file, or a mixture of names and cameras.
+    """
+    if isinstance(cameras, str | Path):
+        rig = _rig(cameras)
+    elif isinstance(cameras, Sequence) and any(not isinstance(c, _CHOICE) for c in cameras):
+        rig = tuple(_camera(camera, k) for k, camera in enumerate(cameras))
+    else:
+        return config, cameras
+    return replace(config, scene=replace(config.scene, cameras=rig)), None
+
+
+_CHOICE = (int, str, np.integer)
+
+
+def _rig(named: str | Path) -> tuple[CameraConfig, ...]:
+    if isinstance(named, Path) or named.endswith(".toml"):
+        return read_rig(named)
+    if named not in RIGS:
+        raise ConfigError(
+            f"cameras={named!r} is no rig: valid are {', '.join(map(repr, RIGS))}, a path that "
+            "ends in .toml, or a list of names, indices, places or cameras."
+        )
+    return RIGS[named]
+
+
+def _camera(given: Any, index: int) -> CameraConfig:
+    if isinstance(given, CameraConfig):
+        return given
+    if isinstance(given, Mapping):
+        return from_mapping(CameraConfig, given, f"cameras[{index}].")
+    place = np.asarray(given) if isinstance(given, Sequence | np.ndarray) else np.zeros(0)
+    if place.shape != (3,) or not np.issubdtype(place.dtype, np.number):
+        raise ConfigError(
+            "cameras must be names and indices of the scene's cameras, or else places (x, y, z) "
+            f"[m] and CameraConfigs of a rig of your own; got {given!r} among them."
+        )
+    x, y, z = (float(value) for value in place)
+    return CameraConfig(f"camera_{index + 1}", (x, y, z))
 
 
 def with_motions(config: HRCConfig, motions: "Sequence[str | Path | Clip] | None") -> HRCConfig:

@@ -14,7 +14,7 @@ from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
 from hrc_env import observations
-from hrc_env.config import HRCConfig, resolve, with_motions, with_people
+from hrc_env.config import HRCConfig, resolve, with_cameras, with_motions, with_people
 from hrc_env.errors import ConfigError, unknown
 from hrc_env.motion.generator import Clip, PeopleConfig
 from hrc_env.simulation import Simulation, checked_action
@@ -33,7 +33,9 @@ class HRCReachEnv(Stateful, gymnasium.Env[NDArray[np.float32], NDArray[np.float3
             emulator of that), "truth" (the worker as they are) or "none".
         estimator: "particle" (default), "kalman" (one Gaussian on the body's tree), "paper"
             (Algorithm 1), "per_joint", "triangulation" or "ransac".
-        cameras: indices or names of the rig's cameras to use; None is all of them.
+        cameras: indices or names of the scene's cameras to use; or a rig of your own: its name
+            ("lab_gopro"), a TOML file's path, or a list of places (x, y, z) [m],
+            `CameraConfig`s or mappings. None is all cameras of the scene. docs/cameras.md
         scene: name of the place: "lab", a workshop, or "site", a construction site.
         n_workers: 0 or more workers; (fewest, most): each episode's number is drawn, and the
             observation has room for the most.
@@ -56,7 +58,7 @@ class HRCReachEnv(Stateful, gymnasium.Env[NDArray[np.float32], NDArray[np.float3
         self,
         perception: str = "pixels",
         estimator: str = "particle",
-        cameras: Sequence[int | str] | None = None,
+        cameras: str | Path | Sequence[Any] | None = None,
         scene: str = "lab",
         n_workers: int | tuple[int, int] = 1,
         people: str | PeopleConfig | None = None,
@@ -67,10 +69,11 @@ class HRCReachEnv(Stateful, gymnasium.Env[NDArray[np.float32], NDArray[np.float3
     ) -> None:
         if render_mode is not None and render_mode not in RENDER_MODES:
             raise unknown("render_mode", render_mode, RENDER_MODES)
-        self.config = with_motions(with_people(resolve(config), people), motions)
+        given = with_motions(with_people(resolve(config), people), motions)
+        self.config, used = with_cameras(given, cameras)
         self.render_mode = render_mode
         self.simulation = Simulation(
-            1, perception, estimator, cameras, scene, n_workers, control, self.config
+            1, perception, estimator, used, scene, n_workers, control, self.config
         )
         self.views = Views(self.simulation)
         self.observation_space, self.action_space = spaces(self.simulation)

@@ -7,7 +7,7 @@ import numpy as np
 from PIL import Image as PillowImage
 from PIL import ImageDraw, ImageFont
 
-from hrc_env.geometry.cameras import PinholeCamera, project
+from hrc_env.geometry.cameras import PinholeCamera, image_from_pinhole, pinhole_stretch, project
 from hrc_env.records import CropWindow, Keypoints, PoseEstimate
 from hrc_env.skeleton import BONES, JOINTS
 from hrc_env.typing import Floats, Image, Points2
@@ -47,7 +47,7 @@ def draw_estimate(
         px, depth_m = project(camera.P[None], joints[None])
         if (depth_m < 0.1).any():
             continue
-        points = px[0, 0] * scale
+        points = image_from_pinhole(camera, px[0, 0]) * scale
         overlay = image.copy()
         for j in range(len(JOINTS)):
             _ellipse(overlay, camera, joints[j], estimate.cov_world[row, worker, j], scale)
@@ -64,7 +64,8 @@ def draw_keypoints(
     """The joints that camera `index` detected, in place; faint where it was not sure."""
     scale = image.shape[1] / camera.width_px
     for worker in range(keypoints.px.shape[2]):
-        px, confidence = keypoints.px[row, index, worker], keypoints.confidence[row, index, worker]
+        px = image_from_pinhole(camera, keypoints.px[row, index, worker])
+        confidence = keypoints.confidence[row, index, worker]
         for point, sure in zip(px, confidence, strict=True):
             if np.isfinite(point).all():
                 radius = max(2, round(image.shape[1] / 200))
@@ -170,11 +171,14 @@ def _ellipse(
     focal = camera.K[0, 0] * scale
     J = focal / z * np.array([[1, 0, -x / z], [0, 1, -y / z]]) @ R_cam_from_world
     values, vectors = np.linalg.eigh(J @ covariance @ J.T)
-    axes = 2 * np.sqrt(np.maximum(values, 0.25))
+    stretch = float(
+        pinhole_stretch(camera, camera.K[:2, 2] + camera.K[0, 0] * np.array([x, y]) / z)
+    )
+    axes = 2 * np.sqrt(np.maximum(values, 0.25)) / stretch
     if axes.max() > 4 * image.shape[1]:
         return
     angle = np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1]))
-    px = project(camera.P[None], joint[None, None])[0][0, 0, 0] * scale
+    px = image_from_pinhole(camera, project(camera.P[None], joint[None, None])[0][0, 0, 0]) * scale
     centre = (int(px[0]), int(px[1]))
     size = (max(1, round(axes[1])), max(1, round(axes[0])))
     cv2.ellipse(image, centre, size, angle, 0, 360, (90, 230, 160), -1, cv2.LINE_AA)

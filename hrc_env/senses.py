@@ -22,6 +22,7 @@ from hrc_env.errors import unknown
 from hrc_env.geometry.cameras import project, projections
 from hrc_env.perception import emulator
 from hrc_env.perception.eyes import Eyes, Sight
+from hrc_env.perception.lensed import Lensed, pinhole_keypoints
 from hrc_env.perception.windows import steady_window, window_from_joints
 from hrc_env.records import CropWindow, Keypoints, PoseEstimate, WorkerMotion, WorkerTruth
 from hrc_env.scene.build import Scene
@@ -36,6 +37,8 @@ from hrc_env.tracking.people.association import associate
 from hrc_env.typing import Bools, Ints, JointAngles
 
 LEVELS = ("pixels", "keypoints", "truth", "none")
+CAMERA_LEVELS = LEVELS[:2]
+"""Those that have cameras."""
 
 Generators = list[np.random.Generator]
 Windows = list[list[CropWindow | None]]
@@ -185,7 +188,8 @@ class TrackingSenses(Stateful):
         whole = len(now.ids) == len(self.keypoints.px)
         state = self.state if whole else rows(self.state, now.ids)
         self.tracker.predict(state, self.dt_s, tracker_rngs)
-        keypoints = self._sorted(self.detect(now, state, sensor_rngs), state)
+        found = pinhole_keypoints(self.detect(now, state, sensor_rngs), self.scene.cameras)
+        keypoints = self._sorted(found, state)
         self.tracker.update(state, keypoints, tracker_rngs)
         if whole:
             self.keypoints = keypoints
@@ -201,6 +205,8 @@ class TrackingSenses(Stateful):
 
     def detect(self, now: Moment, predicted: Any, sensor_rngs: Generators) -> Keypoints:
         """Keypoints of this moment, by whatever eyes the level has; whose they are is open.
+
+        They are in pixels of the images, as the lenses bend them.
 
         Args:
             now: the scene.
@@ -264,6 +270,7 @@ class CameraSenses(TrackingSenses):
     def __init__(self, scene: Scene, batch: int, tracker: Estimator, config: HRCConfig) -> None:
         super().__init__(batch, scene, tracker, config)
         self.renderer = CropRenderer(scene)
+        self.images = Lensed(self.renderer, scene.cameras)
         self.eyes = Eyes(scene.cameras, config.eyes)
         self.windows: list[Windows] = [
             [[None] * len(scene.cameras) for _ in range(scene.n_workers)] for _ in range(batch)
@@ -293,9 +300,9 @@ class CameraSenses(TrackingSenses):
         for worker in sorted(range(len(wanted)), key=lambda w: not any(wanted[w])):
             windows = list(map(steady_window, self.windows[b][worker], wanted[worker]))
             if people is None and not any(windows):
-                people = self.eyes.search(self.renderer)
+                people = self.eyes.search(self.images)
             track = self._track(b, worker)
-            sight = self.eyes.look(self.renderer, windows, track, taken, people)
+            sight = self.eyes.look(self.images, windows, track, taken, people)
             taken.append(sight.windows)
             yield worker, sight
 

@@ -4,6 +4,7 @@
 streams only, never on the size of the batch.
 """
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -23,7 +24,8 @@ from hrc_env.motion import generator
 from hrc_env.records import PoseEstimate, RobotState, WorkerMotion, WorkerTruth
 from hrc_env.scene.build import build
 from hrc_env.scene.physics import Physics
-from hrc_env.senses import Moment, make_senses
+from hrc_env.scene.rigs import findings
+from hrc_env.senses import CAMERA_LEVELS, Moment, make_senses
 from hrc_env.stateful import State, Stateful
 from hrc_env.tasks import reach
 from hrc_env.tracking import given
@@ -98,6 +100,9 @@ class Simulation(Stateful):
         self.body = load_body(config.worker)
         fewest, most = worker_counts(n_workers)
         self.scene = build(config.scene, scene, most, config.worker, cameras)
+        if perception in CAMERA_LEVELS:
+            for finding in findings(self.scene):
+                warnings.warn(finding, stacklevel=3)
         self.settings = {
             "batch": batch, "perception": perception, "estimator": estimator, "scene": scene,
             "cameras": tuple(camera.name for camera in self.scene.cameras),

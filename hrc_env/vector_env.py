@@ -19,7 +19,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from hrc_env.config import HRCConfig, resolve, with_motions, with_people
+from hrc_env.config import HRCConfig, resolve, with_cameras, with_motions, with_people
 from hrc_env.env import RENDER_MODES, spaces
 from hrc_env.errors import ConfigError, unknown
 from hrc_env.motion.generator import Clip, PeopleConfig
@@ -67,7 +67,7 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
         *,
         perception: str = "keypoints",
         estimator: str = "particle",
-        cameras: Sequence[int | str] | None = None,
+        cameras: str | Path | Sequence[Any] | None = None,
         scene: str = "lab",
         n_workers: int | tuple[int, int] = 1,
         people: str | PeopleConfig | None = None,
@@ -88,15 +88,14 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
             raise unknown("render_mode", render_mode, RENDER_MODES)
         self.num_envs = _whole("num_envs", num_envs, 1, MAX_ENVS)
         self.autoreset_mode = _mode(autoreset_mode)
-        self.config, self.render_mode = (
-            with_motions(with_people(resolve(config), people), motions),
-            render_mode,
-        )
+        self.render_mode = render_mode
+        given = with_motions(with_people(resolve(config), people), motions)
+        self.config, used = with_cameras(given, cameras)
         self.shards = Shards(
             self.num_envs,
             min(_threads(num_threads), self.num_envs),
             lambda batch: Simulation(
-                batch, perception, estimator, cameras, scene, n_workers, control, self.config
+                batch, perception, estimator, used, scene, n_workers, control, self.config
             ),
         )
         self.views = [Views(part) for part in self.shards.parts]

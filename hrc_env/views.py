@@ -7,7 +7,9 @@ from numpy.typing import NDArray
 
 from hrc_env import pictures
 from hrc_env.batching import one
+from hrc_env.geometry.cameras import image_from_pinhole
 from hrc_env.motion import generator
+from hrc_env.perception.lensed import Lensed
 from hrc_env.records import CropWindow, Keypoints, WorkerMotion
 from hrc_env.scene.render import CROP_PX, PICTURE_QUALITY, CropRenderer, PictureRenderer
 from hrc_env.simulation import Simulation
@@ -56,12 +58,11 @@ class Views:
         Without shadows, as the detector sees the scene; what stands still is drawn once.
         """
         keypoints, windows = self._looks()
-        renderer = self._square_renderer(SMOOTHING * width)
-        renderer.draw(*self.pose())
+        images = self._square_images(SMOOTHING * width)
         views = []
         for c, camera in enumerate(self.simulation.scene.cameras):
             middle = (camera.width_px / 2, camera.height_px / 2)
-            square = renderer.crop(c, CropWindow(middle, float(camera.width_px), 0.0))
+            square = images.crop(c, CropWindow(middle, float(camera.width_px), 0.0))
             image = pictures.shrink(pictures.middle_rows(square, SMOOTHING * height), width, height)
             for window in (of_worker[c] for of_worker in windows):
                 if window is not None:
@@ -78,10 +79,9 @@ class Views:
         keypoints, windows = self._looks()
         if keypoints is None or not windows:
             return []
-        renderer = self._square_renderer(CROP_PX)
-        renderer.draw(*self.pose())
+        images = self._square_images(CROP_PX)
         return [
-            self._crop(renderer, c, window, keypoints, size) for c, window in enumerate(windows[0])
+            self._crop(images, c, window, keypoints, size) for c, window in enumerate(windows[0])
         ]
 
     def mosaic(self) -> Image:
@@ -99,7 +99,7 @@ class Views:
 
     def _crop(
         self,
-        renderer: CropRenderer,
+        images: Lensed,
         c: int,
         window: CropWindow | None,
         keypoints: Keypoints,
@@ -110,8 +110,9 @@ class Views:
             image[:] = pictures.PANEL
             pictures.write(image, "no worker in view", (10, size // 2 - 10), 13)
             return image
-        image = pictures.shrink(renderer.crop(c, window), size, size)
-        pictures.draw_landmarks(image, window, keypoints.px[0, c, 0], keypoints.confidence[0, c, 0])
+        image = pictures.shrink(images.crop(c, window), size, size)
+        joints_px = image_from_pinhole(images.cameras[c], keypoints.px[0, c, 0])
+        pictures.draw_landmarks(image, window, joints_px, keypoints.confidence[0, c, 0])
         return image
 
     def pose(self, b: int | None = None) -> tuple[JointAngles, WorkerMotion]:
@@ -130,7 +131,10 @@ class Views:
             self._pictures[size] = PictureRenderer(scene, width, height, quality)
         return self._pictures[size]
 
-    def _square_renderer(self, size: int) -> CropRenderer:
+    def _square_images(self, size: int) -> Lensed:
+        """Square windows of what the cameras see now."""
+        scene = self.simulation.scene
         if size not in self._squares:
-            self._squares[size] = CropRenderer(self.simulation.scene, size)
-        return self._squares[size]
+            self._squares[size] = CropRenderer(scene, size)
+        self._squares[size].draw(*self.pose())
+        return Lensed(self._squares[size], scene.cameras)

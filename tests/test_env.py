@@ -187,6 +187,7 @@ def looking_at_the_ceiling() -> dict:
     return {"scene": {"cameras": tuple(cameras)}}
 
 
+@pytest.mark.filterwarnings("ignore:Camera .* sees:UserWarning")
 @pytest.mark.parametrize(("level", "n_steps"), [("keypoints", 60), ("pixels", 2)])
 def test_a_worker_out_of_every_view_is_data(level, n_steps):
     """Never acquired, never an exception: the prior, and the episode goes on."""

@@ -1,4 +1,8 @@
-"""Pinhole cameras: points to pixels and pixels to rays.
+"""Cameras: points to pixels and pixels to rays.
+
+A camera projects like a pinhole; where it has a lens, its image is bent, and there are two kinds
+of pixels: `pinhole` ones, in which projection is linear and the trackers think, and those of the
+`image`, which detectors find. Without a lens they are the same.
 
 Pixels are continuous from the image's top-left corner, so that pixel centres lie at
 half-integers and the principal point of a symmetric image is (W/2, H/2). Camera axes are
@@ -11,12 +15,13 @@ import numpy as np
 
 from hrc_env.errors import ConfigError
 from hrc_env.geometry.rotations import look_at
+from hrc_env.optics.lens import Lens, bend, rays_cam, straighten, stretch
 from hrc_env.typing import Floats, Points2, Points3, Transforms
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PinholeCamera:
-    """A camera without distortion at a known place."""
+    """A camera at a known place; a pinhole unless it has a lens."""
 
     name: str
     K: Floats
@@ -24,7 +29,11 @@ class PinholeCamera:
     T_world_from_cam: Transforms
     """(4, 4)."""
     width_px: int
+    """Width of its image [px]."""
     height_px: int
+    """Height of its image [px]."""
+    lens: Lens | None = None
+    """What bends its image; None: nothing."""
 
     @property
     def eye_world(self) -> Points3:
@@ -33,7 +42,7 @@ class PinholeCamera:
 
     @property
     def P(self) -> Floats:
-        """(3, 4) projection: homogeneous pixels = P @ (x, y, z, 1)."""
+        """(3, 4) projection: homogeneous pinhole pixels = P @ (x, y, z, 1)."""
         R_cam_from_world = self.T_world_from_cam[:3, :3].T
         return self.K @ np.hstack([R_cam_from_world, -R_cam_from_world @ self.eye_world[:, None]])
 
@@ -73,7 +82,7 @@ def project(P: Floats, points_world: Points3) -> tuple[Points2, Floats]:
         points_world: (B, ..., 3) [m].
 
     Returns:
-        pixels (B, C, ..., 2) and depth along the optical axis (B, C, ...) [m]. Pixels of
+        pinhole pixels (B, C, ..., 2) and depth along the optical axis (B, C, ...) [m]. Pixels of
         points at or behind the camera's plane (depth <= 0) mean nothing: look at the depth.
     """
     rotated = np.einsum("cij,b...j->bc...i", P[:, :, :3], points_world)
@@ -85,14 +94,52 @@ def project(P: Floats, points_world: Points3) -> tuple[Points2, Floats]:
 
 
 def rays(camera: PinholeCamera, pixels: Points2) -> Points3:
-    """Unit directions in the world, (..., 3), of pixels (..., 2) of one camera."""
-    homogeneous = np.concatenate([pixels, np.ones((*pixels.shape[:-1], 1))], -1)
-    direction_cam = homogeneous @ np.linalg.inv(camera.K).T
+    """Unit directions in the world, (..., 3), of pixels (..., 2) of one camera's image.
+
+    NaN where its lens lets nothing through.
+    """
+    if camera.lens is None:
+        homogeneous = np.concatenate([pixels, np.ones((*pixels.shape[:-1], 1))], -1)
+        direction_cam = homogeneous @ np.linalg.inv(camera.K).T
+    else:
+        direction_cam = rays_cam(camera.lens, _normalised(camera, pixels))
     direction = direction_cam @ camera.T_world_from_cam[:3, :3].T
     return direction / np.linalg.norm(direction, axis=-1, keepdims=True)
 
 
+def image_from_pinhole(camera: PinholeCamera, pixels: Points2) -> Points2:
+    """Where the image shows what a pinhole would show at pixels (..., 2)."""
+    if camera.lens is None:
+        return pixels
+    return _in_pixels(camera, bend(camera.lens, _normalised(camera, pixels)))
+
+
+def pinhole_from_image(camera: PinholeCamera, pixels: Points2) -> Points2:
+    """Where a pinhole would show what the image shows at pixels (..., 2).
+
+    NaN where that is nowhere: beyond `optics.lens.STRAIGHT_RAD` from the axis.
+    """
+    if camera.lens is None:
+        return pixels
+    return _in_pixels(camera, straighten(camera.lens, _normalised(camera, pixels)))
+
+
+def pinhole_stretch(camera: PinholeCamera, pinhole_px: Points2) -> Floats | float:
+    """How many times longer a pinhole shows things at pinhole pixels (..., 2) than the image."""
+    if camera.lens is None:
+        return 1.0
+    return stretch(camera.lens, _normalised(camera, pinhole_px))
+
+
+def _normalised(camera: PinholeCamera, pixels: Points2) -> Floats:
+    return (pixels - camera.K[:2, 2]) / camera.K[[0, 1], [0, 1]]
+
+
+def _in_pixels(camera: PinholeCamera, normalised: Floats) -> Points2:
+    return normalised * camera.K[[0, 1], [0, 1]] + camera.K[:2, 2]
+
+
 def inside_image(camera: PinholeCamera, pixels: Points2) -> np.ndarray:
-    """(...,) whether pixels (..., 2) lie in the image."""
+    """(...,) whether pixels (..., 2) of the image lie in it."""
     u, v = pixels[..., 0], pixels[..., 1]
     return (u >= 0) & (u < camera.width_px) & (v >= 0) & (v < camera.height_px)

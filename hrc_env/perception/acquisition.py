@@ -9,7 +9,13 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from hrc_env.geometry.cameras import PinholeCamera, project, rays
+from hrc_env.geometry.cameras import (
+    PinholeCamera,
+    image_from_pinhole,
+    pinhole_stretch,
+    project,
+    rays,
+)
 from hrc_env.records import CropWindow
 from hrc_env.typing import Points3
 
@@ -74,7 +80,7 @@ def _crossings(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Iter
         for second, eye_2, along_2 in lines[k + 1 :]:
             cosine = float(along_1 @ along_2)
             crossing = 1 - cosine**2
-            if first == second or crossing < MIN_CROSSING**2:
+            if first == second or not crossing >= MIN_CROSSING**2:
                 continue
             between = eye_2 - eye_1
             a, b = float(between @ along_1), float(between @ along_2)
@@ -93,8 +99,9 @@ def _support(
         px, depth_m = project(camera.P[None], point_world[None])
         if not found or depth_m[0, 0] <= 0:
             continue
-        m_per_px = float(depth_m[0, 0]) / camera.K[0, 0]
-        off_m = [math.dist(window.centre_px, px[0, 0]) * m_per_px for window in found]
+        m_per_px = float(depth_m[0, 0]) / camera.K[0, 0] * float(pinhole_stretch(camera, px[0, 0]))
+        hips_px = image_from_pinhole(camera, px[0, 0])
+        off_m = [math.dist(window.centre_px, hips_px) * m_per_px for window in found]
         nearest = int(np.argmin(off_m))
         if off_m[nearest] < MEETING_M:
             windows[c] = found[nearest]

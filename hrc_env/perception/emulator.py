@@ -15,7 +15,8 @@ import numpy as np
 from hrc_env.errors import ConfigError, check_shape
 from hrc_env.geometry.cameras import PinholeCamera, projections
 from hrc_env.geometry.sight import Surroundings
-from hrc_env.perception.emulator_kernel import emulate_batch
+from hrc_env.optics.lens import lens_row
+from hrc_env.perception.emulator_kernel import CENTRE, emulate_batch
 from hrc_env.perception.noise import ERROR, VISIBILITY
 from hrc_env.records import Keypoints, WorkerTruth
 from hrc_env.skeleton import JOINT, JOINTS, MIRROR, N_JOINTS
@@ -152,7 +153,8 @@ def emulate(
         config: as given to `make_state`.
 
     Returns:
-        Keypoints with NaN, 0 and infinity where a camera does not see a worker.
+        Keypoints in pixels of the images, as lenses bend them, with NaN, 0 and infinity where a
+        camera does not see a worker.
     """
     batch, n_cameras, n_workers = state.swapped.shape
     shape = (batch, n_cameras, n_workers, N_JOINTS)
@@ -162,7 +164,7 @@ def emulate(
     for rng, normal, uniform in zip(rngs, normals, uniforms, strict=True):
         rng.standard_normal(out=normal)
         rng.random(out=uniform)
-    P, eyes_world, image = _rig(cameras)
+    P, eyes_world, image, bending = _rig(cameras)
     scalars, per_joint = _settings(config, state.dt_s)
     out = Keypoints(np.empty((*shape, 2)), np.empty(shape), np.empty(shape))
     emulate_batch(
@@ -170,7 +172,7 @@ def emulate(
         np.ascontiguousarray(truth.joints_world), np.ascontiguousarray(truth.capsules_world),
         truth.capsule_radius_m, surroundings.still, surroundings.moving, robot,
         surroundings.capsule_radius_m,
-        P, eyes_world, image, scalars, per_joint, MIRROR, VISIBILITY, ERROR,
+        P, eyes_world, image, bending, scalars, per_joint, MIRROR, VISIBILITY, ERROR,
         out.px, out.confidence, out.sigma_px,
     )  # fmt: skip
     return out
@@ -193,11 +195,20 @@ def without_names(keypoints: Keypoints, rngs: Generators) -> Keypoints:
 
 
 @functools.lru_cache(maxsize=16)
-def _rig(cameras: tuple[PinholeCamera, ...]) -> tuple[Floats, Floats, Floats]:
-    """Projections (C, 3, 4), eyes (C, 3), and width, height, focal length (C, 3)."""
+def _rig(cameras: tuple[PinholeCamera, ...]) -> tuple[Floats, Floats, Floats, Floats]:
+    """Projections (C, 3, 4), eyes (C, 3), width, height, focal length (C, 3), lenses (C, 12)."""
     image = [(camera.width_px, camera.height_px, camera.K[0, 0]) for camera in cameras]
     eyes_world = np.stack([camera.eye_world for camera in cameras])
-    return projections(cameras), np.ascontiguousarray(eyes_world), np.array(image, float)
+    bending = np.stack([_bending(camera) for camera in cameras])
+    return projections(cameras), np.ascontiguousarray(eyes_world), np.array(image, float), bending
+
+
+def _bending(camera: PinholeCamera) -> Floats:
+    """(12,) a lens with what makes pixels of its numbers; zeros for a pinhole."""
+    if camera.lens is None:
+        return np.zeros(CENTRE + 2)
+    K = camera.K
+    return np.concatenate([lens_row(camera.lens), K[[0, 1], [0, 1]], K[:2, 2]])
 
 
 @functools.lru_cache(maxsize=16)

@@ -8,11 +8,16 @@ import numpy as np
 from hrc_env.compiled import JIT, LEAN
 from hrc_env.geometry.shapes import passage, set_capsules, set_rows
 from hrc_env.geometry.sight import blocks, line, look, make_table, meets
+from hrc_env.optics.lens import FOLD, bent, stretch_at
 from hrc_env.perception.noise import error_share
 from hrc_env.perception.self_occlusion import body_blocks
 
 MIN_DEPTH_M = 0.5
 """Nearer to a camera's plane there is no image of a person."""
+
+FOCAL, CENTRE = FOLD + 1, FOLD + 3
+"""Columns of a camera's row of `bending` behind its lens: fx and fy, 0 if it has no lens; cx and
+cy."""
 
 UNSURE = 0.7
 """How much the logit of the reported visibility drops when errors are larger by one step."""
@@ -22,7 +27,7 @@ UNSURE = 0.7
 def emulate_batch(
     slow, size, swapped, missed, normals, uniforms,
     joints, capsules, radius, still, moving, robot, robot_radius,
-    P, eyes, image, scalars, per_joint, mirror, visibility, error, px, confidence, sigma,
+    P, eyes, image, bending, scalars, per_joint, mirror, visibility, error, px, confidence, sigma,
 ):  # fmt: skip
     """Advance the errors by one image and write keypoints; arguments as in `emulate`."""
     batch, n_cameras, n_workers, n_joints = confidence.shape
@@ -43,12 +48,15 @@ def emulate_batch(
                 _burst(swapped, b, c, w, uniforms[b, c, w, 0], scalars[6], scalars[7])
                 _burst(missed, b, c, w, uniforms[b, c, w, 1], scalars[8], scalars[9])
                 found = not missed[b, c, w]
+                focal_px = image[c, 2]
+                if bending[c, FOCAL] > 0.0:
+                    focal_px /= _bend(bending[c], uv, depth)
                 if found:
                     _image(uv, depth, image[c], state)
                     n_seen = _sight(eyes[c], joints[b, w], table, first_body, view, rows, state)
                     found = n_seen >= scalars[10]
                 _report(
-                    slow[b, c, w], size[b, c, w], normals[b, c, w], uv, depth, state, image[c, 2],
+                    slow[b, c, w], size[b, c, w], normals[b, c, w], uv, depth, state, focal_px,
                     found, swapped[b, c, w], scalars, per_joint, mirror, visibility, error,
                     px[b, c, w], confidence[b, c, w], sigma[b, c, w],
                 )  # fmt: skip
@@ -62,6 +70,21 @@ def _project(P, joints, uv, depth):
         safe = depth[j] if abs(depth[j]) > 1e-9 else 1e-9
         uv[j, 0] = (P[0, 0] * x + P[0, 1] * y + P[0, 2] * z + P[0, 3]) / safe
         uv[j, 1] = (P[1, 0] * x + P[1, 1] * y + P[1, 2] * z + P[1, 3]) / safe
+
+
+@numba.njit(**LEAN)
+def _bend(bending, uv, depth):
+    """Bend pinhole pixels in place. How many times longer the pinhole shows the body."""
+    fx, fy, cx, cy = bending[FOCAL], bending[FOCAL + 1], bending[CENTRE], bending[CENTRE + 1]
+    total, n = 0.0, 0
+    for j in range(len(depth)):
+        if depth[j] >= MIN_DEPTH_M:
+            x, y = (uv[j, 0] - cx) / fx, (uv[j, 1] - cy) / fy
+            total += stretch_at(bending, x, y)
+            n += 1
+            x, y = bent(bending, x, y)
+            uv[j, 0], uv[j, 1] = x * fx + cx, y * fy + cy
+    return total / n if n > 0 else 1.0
 
 
 @numba.njit(**LEAN)

@@ -40,6 +40,9 @@ from hrc_env.typing import Floats, Image, Points2
 STATURE_OF_SIDE = 0.75
 """Stature of an upright worker as a share of the side of BlazePose's window round them."""
 
+SEARCH_RAD = math.radians(75.0)
+"""In a wider search window people are too small for the detector stage."""
+
 ResultT = TypeVar("ResultT")
 
 
@@ -84,7 +87,7 @@ class Sight:
     """One worker as all cameras see them; a camera without them is NaN, 0 and infinite."""
 
     px: Points2
-    """(C, J, 2) [px] in the whole image."""
+    """(C, J, 2) [px] in the whole image, as its lens bends it."""
     confidence: Floats
     """(C, J) visibility in [0, 1]."""
     sigma_px: Floats
@@ -255,15 +258,25 @@ class Eyes(Stateful):
 
 
 def search_windows(camera: PinholeCamera, step: float = 0.5) -> list[CropWindow]:
-    """Upright squares, as large as fit, that overlap and together cover a camera's image."""
-    short, long = sorted((camera.width_px, camera.height_px))
-    n = 1 + math.ceil((long / short - 1) / step)
-    middles = np.linspace(short / 2, long - short / 2, n) if n > 1 else [short / 2]
-    wide = camera.width_px >= camera.height_px
+    """Upright squares that overlap and together cover a camera's image.
+
+    As large as fit; behind a lens that sees more than `SEARCH_RAD`, no larger than that.
+    """
+    side = float(min(camera.width_px, camera.height_px))
+    if camera.lens is not None:
+        side = min(side, SEARCH_RAD * float(camera.K[0, 0]))
+    columns = _middles(camera.width_px, side, step)
     return [
-        CropWindow((float(m), short / 2) if wide else (short / 2, float(m)), float(short), 0.0)
-        for m in middles
+        CropWindow((x, y), side, 0.0)
+        for y in _middles(camera.height_px, side, step)
+        for x in columns
     ]
+
+
+def _middles(length_px: int, side_px: float, step: float) -> list[float]:
+    """Middles of spans of a side that together cover a length, at most `step` sides apart."""
+    n = 1 + math.ceil((length_px / side_px - 1) / step)
+    return np.linspace(side_px / 2, length_px - side_px / 2, n).tolist()
 
 
 def _joints(

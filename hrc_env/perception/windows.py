@@ -11,7 +11,12 @@ import math
 
 import numpy as np
 
-from hrc_env.geometry.cameras import PinholeCamera, inside_image
+from hrc_env.geometry.cameras import (
+    PinholeCamera,
+    image_from_pinhole,
+    inside_image,
+    pinhole_stretch,
+)
 from hrc_env.perception.blazepose import window_from_points, wrap_angle
 from hrc_env.records import CropWindow
 from hrc_env.skeleton import JOINT, TORSO
@@ -52,19 +57,22 @@ def window_from_joints(
     """The region of interest round projected joints, or None where there is nothing to see.
 
     Args:
-        joints_px: (J, 2) projected joints.
+        joints_px: (J, 2) projected joints, pinhole pixels.
         depth_m: (J,) their depth along the optical axis [m].
         camera: whose image it is.
 
     Returns:
-        None if the worker is behind or very close to the camera, or outside its image.
+        In pixels of the image. None if the worker is behind or very close to the camera, or
+        outside its image.
     """
     if depth_m[TORSO].min() < MIN_DEPTH_M:
         return None
     ahead = depth_m > MIN_DEPTH_M
+    stretch = pinhole_stretch(camera, joints_px[TORSO].mean(0))
+    joints_px = image_from_pinhole(camera, joints_px)
     if np.count_nonzero(ahead & inside_image(camera, joints_px)) < MIN_JOINTS_INSIDE:
         return None
-    px_per_m = camera.K[0, 0] / depth_m[TORSO].mean()
+    px_per_m = camera.K[0, 0] / (depth_m[TORSO].mean() * stretch)
     hip = joints_px[_HIPS].mean(0)
     torso = joints_px[_SHOULDERS].mean(0) - hip
     missing = max(0.0, MIN_TORSO_M * px_per_m - float(np.hypot(*torso)))

@@ -32,7 +32,7 @@ ALL_GROUPS = (SOLID, DECORATION, ROBOT_LOOKS, OVERHEAD)
 WINDOWS_KEPT = 4
 """Windows per camera whose background is kept."""
 Key: TypeAlias = tuple[float, ...]
-"""A camera's index and the numbers of a window."""
+"""The numbers of a camera and of a window."""
 
 VIEWPOINTS: dict[str, tuple[tuple[float, float, float], tuple[float, float, float], float]] = {
     "beside": ((0.45, -2.62, 1.95), (0.12, 0.0, 0.95), 68.0),
@@ -75,6 +75,8 @@ class CropRenderer:
     def crop(self, camera_index: int, window: CropWindow) -> Image:
         """(size, size, 3) of a turned square of a camera's image, top row first.
 
+        Lenses are left out: `perception.lensed` puts them before.
+
         Raises:
             ConfigError: no such camera. RenderingError: no OpenGL here, or closed.
         """
@@ -82,13 +84,19 @@ class CropRenderer:
             raise ConfigError(
                 f"Camera index must be 0 to {len(self.scene.cameras) - 1}, got {camera_index}."
             )
-        key = (camera_index, *map(float, (*window.centre_px, window.side_px, window.rotation_rad)))
+        return self.view(self.scene.cameras[camera_index], window)
+
+    def view(self, camera: PinholeCamera, window: CropWindow) -> Image:
+        """The same of any camera, as a pinhole sees."""
+        numbers = (*camera.K.ravel(), *camera.T_world_from_cam.ravel())
+        side = (*window.centre_px, window.side_px, window.rotation_rad)
+        key = tuple(map(float, (*numbers, *side)))
         if key not in self._kept:
             self._remember(key, None)
-            self._show(EVERYTHING, camera_index, window)
+            self._show(EVERYTHING, camera, window)
             return self._canvas.paint()
-        background = self._background(key, camera_index, window)
-        self._show(MOVING, camera_index, window)
+        background = self._background(key, camera, window)
+        self._show(MOVING, camera, window)
         self._canvas.read(self._rgb, self._z)
         crop = np.empty_like(self._rgb)
         _lay_over(self._rgb, self._z, background.rgb, background.z, crop)
@@ -101,16 +109,16 @@ class CropRenderer:
     def __reduce__(self) -> tuple[Any, ...]:
         return CropRenderer, (self.scene, self.size_px)
 
-    def _show(self, what: int, camera_index: int, window: CropWindow) -> None:
+    def _show(self, what: int, camera: PinholeCamera, window: CropWindow) -> None:
         self._canvas.show(what)
-        self._canvas.aim(self.scene.cameras[camera_index], window, window.side_px)
+        self._canvas.aim(camera, window, window.side_px)
 
-    def _background(self, key: Key, camera_index: int, window: CropWindow) -> "_Background":
+    def _background(self, key: Key, camera: PinholeCamera, window: CropWindow) -> "_Background":
         """What stands still in this window, drawn at its second look."""
         background = self._kept[key]
         if background is None:
             background = _Background(np.empty_like(self._rgb), np.empty_like(self._z))
-            self._show(STILL, camera_index, window)
+            self._show(STILL, camera, window)
             self._canvas.read(background.rgb, background.z)
         self._remember(key, background)
         return background

@@ -5,36 +5,18 @@ OpenGL's (+X right, +Y up, -Z forward).
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from hrc_env.errors import ConfigError, unknown
-from hrc_env.geometry.cameras import PinholeCamera, pinhole
-from hrc_env.geometry.rotations import quaternion_from_matrix
+from hrc_env.geometry.cameras import PinholeCamera
+from hrc_env.geometry.rotations import about_axis, look_at, quaternion_from_matrix
+from hrc_env.optics.camera import MOST_CAMERAS, CameraConfig, intrinsics
 from hrc_env.typing import Floats, Rotations
 
 OPENCV_FROM_OPENGL: Floats = np.diag([1.0, -1.0, -1.0])
 """Its own inverse."""
-
-
-@dataclass(frozen=True, slots=True)
-class CameraConfig:
-    """One fixed camera."""
-
-    name: str
-    """What the camera is called; unique in its rig."""
-    eye_world: tuple[float, float, float]
-    """Where it hangs [m], world frame."""
-    target_world: tuple[float, float, float] = (0.2, 0.0, 1.0)
-    """What it looks at [m]: by default the middle of the space that robot and worker share."""
-    hfov_deg: float = 90.0
-    """Horizontal field of view [degrees]; a pinhole without distortion."""
-    width_px: int = 1920
-    """Width of its images [px]."""
-    height_px: int = 1080
-    """Height of its images [px]."""
 
 
 LAB_CAMERAS = (
@@ -70,8 +52,11 @@ def select(
     indices = [_index(choice, names) for choice in (range(len(names)) if use is None else use)]
     if not indices:
         raise ConfigError(
-            f"A rig needs at least one camera, got none. Valid names: {', '.join(names)}."
+            f"A rig needs at least one camera, got none. Valid names: {', '.join(names)}. "
+            'To see nothing at all: perception="none".'
         )
+    if len(indices) > MOST_CAMERAS:
+        raise ConfigError(f"A rig has 1 to {MOST_CAMERAS} cameras, got {len(indices)}.")
     for index in indices:
         if indices.count(index) > 1:
             raise ConfigError(f"Camera {names[index]!r} is chosen more than once: name it once.")
@@ -93,18 +78,21 @@ def _index(choice: int | str, names: list[str]) -> int:
 
 
 def pinholes(cameras: tuple[CameraConfig, ...]) -> tuple[PinholeCamera, ...]:
-    """The pinhole cameras of a rig."""
-    return tuple(
-        pinhole(
-            camera.name,
-            np.array(camera.eye_world, float),
-            np.array(camera.target_world, float),
-            camera.hfov_deg,
-            camera.width_px,
-            camera.height_px,
-        )
-        for camera in cameras
-    )
+    """The cameras of a rig."""
+    return tuple(map(_hung, cameras))
+
+
+def _hung(camera: CameraConfig) -> PinholeCamera:
+    """A camera at its place; it has a lens if a plain pinhole would show another image."""
+    K, T_world_from_cam = intrinsics(camera), np.eye(4)
+    eye = np.array(camera.eye_world, float)
+    R_world_from_cam = look_at(eye, np.array(camera.target_world, float))
+    if camera.roll_deg:
+        R_world_from_cam = R_world_from_cam @ about_axis("z", np.radians(camera.roll_deg))
+    T_world_from_cam[:3, :3], T_world_from_cam[:3, 3] = R_world_from_cam, eye
+    plain = camera.lens.model == "none" and K[0, 0] == K[1, 1]
+    size = camera.width_px, camera.height_px
+    return PinholeCamera(camera.name, K, T_world_from_cam, *size, None if plain else camera.lens)
 
 
 def glcam_axes(camera: PinholeCamera) -> Rotations:

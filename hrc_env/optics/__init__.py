@@ -1,0 +1,1 @@
+"""Cameras as they are: lenses, makes of camera, rigs in files."""

@@ -1,0 +1,151 @@
+"""Lenses before a renderer that draws like a pinhole, and behind the detector.
+
+A window of a bent image is made from a pinhole's picture: drawn from the same eye, turned to the
+window's middle and just wide enough to cover it, then resampled so that every pixel shows the
+light that the lens brings there. What was found in a bent image goes to the tracker in pinhole
+pixels.
+"""
+
+from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from hrc_env.geometry.cameras import (
+    PinholeCamera,
+    inside_image,
+    pinhole_from_image,
+    pinhole_stretch,
+    rays,
+)
+from hrc_env.perception.blazepose import to_image
+from hrc_env.records import CropWindow, Keypoints
+from hrc_env.typing import Floats, Image
+
+WIDEST = float(np.tan(np.radians(78.0)))
+"""A pinhole's picture reaches no further from its middle than this, in focal lengths; what a
+window shows beyond is black."""
+MAPS_KEPT = 4
+"""Windows per camera whose resampling is kept."""
+
+
+class Drawer(Protocol):
+    """What draws a scene through any pinhole."""
+
+    size_px: int
+
+    def view(self, camera: PinholeCamera, window: CropWindow) -> Image:
+        """The window of what a pinhole would see, (size, size, 3) RGB, top row first."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class _Cover:
+    """How a window of a bent image is made."""
+
+    camera: PinholeCamera
+    """Turned to the window's middle, in units of its focal length."""
+    window: CropWindow
+    """What of it is drawn."""
+    x: NDArray[np.float32]
+    y: NDArray[np.float32]
+    """(size, size) which of the drawn pixels every pixel shows, counted from pixel centres."""
+
+
+class Lensed:
+    """Windows of a rig's images as its lenses bend them: an `ImageSource`."""
+
+    def __init__(self, drawer: Drawer, cameras: Sequence[PinholeCamera]) -> None:
+        self.drawer, self.cameras = drawer, tuple(cameras)
+        self._covers: OrderedDict[tuple, _Cover | None] = OrderedDict()
+
+    def crop(self, camera_index: int, window: CropWindow) -> Image:
+        """The window of a camera's present image, upright, (size, size, 3) RGB."""
+        return self.view(self.cameras[camera_index], window)
+
+    def view(self, camera: PinholeCamera, window: CropWindow) -> Image:
+        """The same of any camera."""
+        if camera.lens is None:
+            return self.drawer.view(camera, window)
+        cover = self._cover(camera, window)
+        if cover is None:
+            return np.zeros((self.drawer.size_px, self.drawer.size_px, 3), np.uint8)
+        drawn = self.drawer.view(cover.camera, cover.window)
+        black = cv2.BORDER_CONSTANT
+        return np.asarray(
+            cv2.remap(drawn, cover.x, cover.y, cv2.INTER_LINEAR, borderMode=black), np.uint8
+        )
+
+    def _cover(self, camera: PinholeCamera, window: CropWindow) -> _Cover | None:
+        key = (camera.K.tobytes(), camera.T_world_from_cam.tobytes(), camera.lens, window)
+        if key not in self._covers:
+            self._covers[key] = _cover(camera, window, self.drawer.size_px)
+            while len(self._covers) > MAPS_KEPT * len(self.cameras):
+                self._covers.popitem(last=False)
+        self._covers.move_to_end(key)
+        return self._covers[key]
+
+
+def pinhole_keypoints(found: Keypoints, cameras: Sequence[PinholeCamera]) -> Keypoints:
+    """Keypoints (B, C, ...) in pixels of the images to pinhole pixels: the tracker's.
+
+    Their deviations grow as the pinhole's image is stretched. What a pinhole has no place for is
+    missing.
+    """
+    if all(camera.lens is None for camera in cameras):
+        return found
+    px, confidence = found.px.copy(), found.confidence.copy()
+    sigma_px = found.sigma_px.copy()
+    for c, camera in enumerate(cameras):
+        if camera.lens is not None:
+            px[:, c] = pinhole_from_image(camera, found.px[:, c])
+            sigma_px[:, c] *= np.nan_to_num(pinhole_stretch(camera, px[:, c]), nan=1.0)
+    missing = np.isnan(px).any(-1)
+    px[missing], confidence[missing], sigma_px[missing] = np.nan, 0.0, np.inf
+    return Keypoints(px, confidence, sigma_px, found.time_s)
+
+
+def _cover(camera: PinholeCamera, window: CropWindow, size: int) -> _Cover | None:
+    """None where the lens shows nothing in the window."""
+    middles = (np.arange(size) + 0.5) / size
+    places = np.stack(np.meshgrid(middles, middles), -1)
+    px = to_image(places, window)
+    ray = rays(camera, px)
+    ray[~inside_image(camera, px)] = np.nan
+    if np.isnan(ray).all():
+        return None
+    R_world_from_view = _axes(ray, window, camera)
+    T_world_from_view = camera.T_world_from_cam.copy()
+    T_world_from_view[:3, :3] = R_world_from_view
+    x, y, z = np.moveaxis(ray @ R_world_from_view, -1, 0)
+    ahead = z > 1.0 / np.hypot(1.0, WIDEST)
+    u, v = np.where(ahead, x / z, np.nan), np.where(ahead, y / z, np.nan)
+    left, right, top, bottom = np.nanmin(u), np.nanmax(u), np.nanmin(v), np.nanmax(v)
+    side = float(max(right - left, bottom - top)) * (1 + 2 / size)
+    middle = float(left + right) / 2, float(top + bottom) / 2
+    view = PinholeCamera(camera.name, np.diag([1.0, 1.0, 1.0]), T_world_from_view, 1, 1)
+    shift = side / 2 - np.array(middle)
+    return _Cover(
+        view, CropWindow(middle, side, 0.0), _pixels(u + shift[0], side, size),
+        _pixels(v + shift[1], side, size),
+    )  # fmt: skip
+
+
+def _axes(ray: Floats, window: CropWindow, camera: PinholeCamera) -> Floats:
+    """R_world_from_view: forward to the middle of what is seen, upright with the window."""
+    forward = np.asarray(np.nanmean(ray.reshape(-1, 3), 0), float)
+    forward /= np.linalg.norm(forward)
+    c, s = np.cos(window.rotation_rad), np.sin(window.rotation_rad)
+    down = camera.T_world_from_cam[:3, :2] @ np.array([-s, c])
+    right = np.cross(down, forward)
+    right /= np.linalg.norm(right)
+    return np.asarray(np.stack([right, np.cross(forward, right), forward], -1), float)
+
+
+def _pixels(place: Floats, side: float, size: int) -> NDArray[np.float32]:
+    """Places in [0, side] to pixels counted from pixel centres; far outside where unknown."""
+    return np.nan_to_num(place / side * size - 0.5, nan=-size).astype(np.float32)

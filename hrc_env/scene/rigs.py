@@ -1,0 +1,82 @@
+"""Rigs by name, and what a rig sees of the place where people are."""
+
+import numpy as np
+
+from hrc_env.geometry.cameras import PinholeCamera, image_from_pinhole, inside_image, project
+from hrc_env.geometry.shapes import BOX, CENTRE, HALF_SIZE, KIND, PLANE, on_axis
+from hrc_env.geometry.sight import Surroundings, hidden, nothing
+from hrc_env.optics.camera import CameraConfig, made
+from hrc_env.records import Grounds
+from hrc_env.scene.build import Scene
+from hrc_env.scene.rig import LAB_CAMERAS
+from hrc_env.scene.site import SITE_CAMERAS
+from hrc_env.typing import Bools, Floats, Points3
+
+RIGS: dict[str, tuple[CameraConfig, ...]] = {
+    "lab": LAB_CAMERAS,
+    "lab_gopro": tuple(
+        made("gopro_hero8_wide", camera.name, camera.eye_world) for camera in LAB_CAMERAS
+    ),
+    "site": SITE_CAMERAS,
+}
+"""Rigs by name: those of the scenes, and the laboratory's with the paper's lens."""
+POOR_SHARE = 0.1
+"""A camera that sees less of the workspace is hardly worth its cable."""
+HEIGHTS_M = (0.2, 0.6, 1.0, 1.4, 1.8)
+"""Bodies are between these heights above the floor."""
+SPACING_M = 0.5
+
+
+def workspace(grounds: Grounds) -> Points3:
+    """(P, 3) points all over the walkable area, from ankles to heads [m]."""
+    (x0, x1), (y0, y1) = grounds.walkable_x_m, grounds.walkable_y_m
+    n_x, n_y = (max(2, round((b - a) / SPACING_M)) for a, b in ((x0, x1), (y0, y1)))
+    grid = np.meshgrid(np.linspace(x0, x1, n_x), np.linspace(y0, y1, n_y), HEIGHTS_M)
+    return np.stack([axis.ravel() for axis in grid], -1)
+
+
+def sees(cameras: tuple[PinholeCamera, ...], still: Floats, points_world: Points3) -> Bools:
+    """(C, P) which points are in a camera's image and not behind what stands still (G, WIDTH)."""
+    eyes_world = np.stack([camera.eye_world for camera in cameras])
+    empty = nothing(1)
+    room = Surroundings(still, empty.moving, empty.capsules_world, empty.capsule_radius_m)
+    seen = ~hidden(room, eyes_world, points_world[None])[0]
+    for c, camera in enumerate(cameras):
+        px, depth_m = project(camera.P[None], points_world[None])
+        seen[c] &= inside_image(camera, image_from_pinhole(camera, px[0, 0])) & (depth_m[0, 0] > 0)
+    return seen
+
+
+def findings(scene: Scene) -> list[str]:
+    """What is poor about a scene's rig, in sentences: nothing for a good one, as its own is."""
+    if scene.config.cameras == RIGS.get(scene.name) and len(scene.cameras) > 1:
+        return []
+    seen = sees(scene.cameras, scene.obstacles, workspace(scene.grounds))
+    said = []
+    for camera, share in zip(scene.cameras, seen.mean(1), strict=True):
+        inside = _inside_something(camera, scene.obstacles)
+        if inside or share < POOR_SHARE:
+            said.append(
+                f"Camera {camera.name!r} sees {100 * share:.0f} % of the workspace: it "
+                f"{'hangs in or behind a wall or a thing' if inside else 'looks elsewhere'}."
+            )
+    if len(scene.cameras) == 1:
+        said.append(
+            f"One camera, {scene.cameras[0].name!r}, sees {100 * seen[0].mean():.0f} % of the "
+            "workspace: depth then rests on the body's known size, what it does not see is "
+            "unknown, and triangulation has nothing to work with."
+        )
+    return said
+
+
+def _inside_something(camera: PinholeCamera, still: Floats) -> bool:
+    """Whether an eye is inside a box or behind a plane that stands still."""
+    for row in range(len(still)):
+        offset = camera.eye_world - still[row, CENTRE : CENTRE + 3]
+        away = np.array([on_axis(still, row, axis, *offset) for axis in range(3)])
+        half = still[row, HALF_SIZE : HALF_SIZE + 3]
+        if still[row, KIND] == BOX and (np.abs(away) < half).all():
+            return True
+        if still[row, KIND] == PLANE and away[2] < 0 and (np.abs(away[:2]) < half[:2]).all():
+            return True
+    return False
