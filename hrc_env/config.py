@@ -121,7 +121,7 @@ def with_cameras(
     return replace(config, scene=replace(config.scene, cameras=rig)), None
 
 
-_CHOICE = (int, str, np.integer)
+_CHOICE = (str, int, float, np.number)
 
 
 def _rig(named: str | Path) -> tuple[CameraConfig, ...]:

@@ -271,7 +271,7 @@ def test_a_config_survives_the_spec(config):
         ({"config": {"scene": {"cameras": [{"name": "a"}]}}}, "eye_world is missing"),
         ({"config": {"control": {"tool_speed_mps": -1.0}}}, "tool_speed_mps must be > 0"),
         ({"config": {"start_spread_rad": [1.0, 2.0]}}, "start_spread_rad must have shape"),
-        ({"cameras": "camera_1"}, "list of names or indices"),
+        ({"cameras": "camera_1"}, "is no rig.*list of names, indices"),
         ({"cameras": [0.5]}, "Camera index 0.5"),
         ({"cameras": [True]}, "Camera index True"),
         ({"cameras": 0}, "list of names or indices"),
