@@ -7,20 +7,21 @@ streams only, never on the size of the batch.
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hrc_env import metrics, observations, rewards
-from hrc_env.batching import picked, write_rows
+from hrc_env.batching import picked, rows, write_rows
 from hrc_env.belief import Believed, estimated_gap
 from hrc_env.body import load_body, worker_capsules, worker_truth
 from hrc_env.config import HRCConfig
 from hrc_env.control import joint_command, n_actions
+from hrc_env.crew import crew_of, worker_counts
 from hrc_env.errors import ConfigError, check_shape
 from hrc_env.geometry import chains
 from hrc_env.motion import generator
+from hrc_env.outcome import Info, Outcome, cost_info, rows_of, tracking_info
 from hrc_env.records import PoseEstimate, RobotState, WorkerMotion, WorkerTruth
 from hrc_env.scene.build import build
 from hrc_env.scene.physics import Physics
@@ -29,40 +30,10 @@ from hrc_env.senses import CAMERA_LEVELS, Moment, make_senses
 from hrc_env.stateful import State, Stateful
 from hrc_env.tasks import reach
 from hrc_env.tracking import given
-from hrc_env.typing import Bools, Floats, Ints
+from hrc_env.typing import Floats, Ints
 
-Info = dict[str, Floats]
-"""Named values (B,); NaN means that the environment has no such value in this step."""
 WATCHED_CAPSULES = (3, 8)
 """Of the arm: elbow and tool, whose ends the workers watch."""
-FLAGS = ("is_success",)
-"""Values that are true or false."""
-ACTIVITY = "worker/activity"
-"""What each worker is doing, by name; `ABSENT_NAME` of who is not in the episode."""
-ABSENT_NAME = "absent"
-
-
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """What a step or a reset gives, per environment."""
-
-    observation: NDArray[np.float32]
-    """(B, n)."""
-    reward: Floats
-    """(B,)."""
-    terminated: Bools
-    """(B,)."""
-    info: Info
-    activity: Ints
-    """(B, W) what each worker does, an index into `generator.activity_names` or `ABSENT`."""
-
-    def info_of(self, b: int) -> dict[str, Any]:
-        """The info of one environment: absent values are left out, flags are bool."""
-        values = {name: value.item(b) for name, value in self.info.items()}
-        known: dict[str, Any] = {name: value for name, value in values.items() if value == value}
-        for name in FLAGS:
-            known[name] = bool(known[name])
-        return {**known, ACTIVITY: named(self.activity[b])}
 
 
 @dataclass(slots=True)
@@ -143,10 +114,9 @@ class Simulation(Stateful):
         estimate, ahead = self._sense(ids, motion, truth)
         believed = self._believed(ids, robot, estimate, ahead)
         observation = observations.observe(believed, self.layout)
-        present = self.motion.present[ids] > 0.0
-        info = {**tracking_info(estimate, truth, present), **rows_of(self._tally(), ids)}
-        doing = generator.activity(self.motion)[ids]
-        return Outcome(observation, np.zeros(len(ids)), np.zeros(len(ids), bool), info, doing)
+        crew = rows(crew_of(self.motion), ids)
+        info = {**tracking_info(estimate, truth, crew.present), **rows_of(self._tally(), ids)}
+        return Outcome(observation, np.zeros(len(ids)), np.zeros(len(ids), bool), info, crew)
 
     def step(self, action: Floats) -> Outcome:
         """One control step of every environment; action (B, A) in [-1, 1]."""
@@ -176,16 +146,16 @@ class Simulation(Stateful):
             arm, robot.capsule_radius_m, workers, truth.capsule_radius_m, config.cost
         )
         self.episode_cost += cost.total
-        present = self.motion.present > 0.0
+        crew = crew_of(self.motion)
         info = {
             **{f"reward/{name}": value for name, value in terms.items()},
-            **cost_info(cost, present),
-            **tracking_info(estimate, truth, present),
+            **cost_info(cost, crew.present),
+            **tracking_info(estimate, truth, crew.present),
             **self._tally(),
         }
         terminated = (cost.contact > 0) & config.cost.contact_terminates
         observation = observations.observe(believed, self.layout)
-        return Outcome(observation, reward, terminated, info, generator.activity(self.motion))
+        return Outcome(observation, reward, terminated, info, crew)
 
     def get_state(self) -> State:
         """A copy of everything that changes, generators included, and the settings."""
@@ -279,28 +249,6 @@ class Simulation(Stateful):
         }
 
 
-def worker_counts(n_workers: int | tuple[int, int]) -> tuple[int, int]:
-    """The fewest and the most workers of an episode, from one number or from both.
-
-    Raises:
-        ConfigError: they are no whole numbers, 0 or more, in this order.
-    """
-    pair = tuple(n_workers) if isinstance(n_workers, Sequence) else (n_workers, n_workers)
-    whole = all(isinstance(k, int | np.integer) and not isinstance(k, bool) for k in pair)
-    if not whole or len(pair) != 2 or not 0 <= pair[0] <= pair[1]:
-        raise ConfigError(
-            "n_workers must be a whole number, 0 or more, or (fewest, most), from which each "
-            f"episode's number is drawn, got {n_workers!r}."
-        )
-    return int(pair[0]), int(pair[1])
-
-
-def named(activity: Ints) -> tuple[str, ...]:
-    """The names of what workers (W,) do."""
-    names = generator.activity_names
-    return tuple(ABSENT_NAME if k == generator.ABSENT else names[k] for k in activity.tolist())
-
-
 def checked_action(action: ArrayLike, shape: tuple[int, ...]) -> Floats:
     """Actions as float64 of a shape, clipped to [-1, 1].
 
@@ -315,26 +263,3 @@ def checked_action(action: ArrayLike, shape: tuple[int, ...]) -> Floats:
     if not np.isfinite(values).all():
         raise ConfigError(f"action must be finite numbers in [-1, 1], got {values}.")
     return np.minimum(np.maximum(values, -1.0), 1.0)
-
-
-def rows_of(info: Info, ids: Ints) -> Info:
-    """Rows `ids` of every value of an info."""
-    return {name: value[ids] for name, value in info.items()}
-
-
-def cost_info(cost: metrics.Cost, present: Bools) -> Info:
-    """The cost by the names that safe-RL libraries read, and the separation from who is there."""
-    separation = np.where(present.any(1), cost.min_separation_m, np.nan)
-    return {
-        "cost": cost.total,
-        "cost_sum": cost.total,
-        "cost_proximity": cost.proximity,
-        "cost_contact": cost.contact,
-        "safety/min_separation_m": separation,
-    }
-
-
-def tracking_info(estimate: PoseEstimate, truth: WorkerTruth, present: Bools) -> Info:
-    """How far the belief is from the truth; no error is given where nobody is tracked."""
-    error_m, lost = metrics.tracking_error(estimate, truth, present)
-    return {"tracking/mpjpe_m": error_m, "tracking/lost": lost.astype(float)}

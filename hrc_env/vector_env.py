@@ -23,8 +23,9 @@ from hrc_env.config import HRCConfig, resolve, with_cameras, with_motions, with_
 from hrc_env.env import RENDER_MODES, spaces
 from hrc_env.errors import ConfigError, unknown
 from hrc_env.motion.generator import Clip, PeopleConfig
+from hrc_env.outcome import Outcome
 from hrc_env.shards import Shards, n_cores
-from hrc_env.simulation import Outcome, Simulation, checked_action
+from hrc_env.simulation import Simulation, checked_action
 from hrc_env.stateful import Stateful
 from hrc_env.typing import Bools, Floats, Ints
 from hrc_env.vector_infos import InfoTable, blank, table

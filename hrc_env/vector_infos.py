@@ -9,7 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.simulation import ACTIVITY, FLAGS, Outcome, named
+from hrc_env.batching import copied, write_rows
+from hrc_env.crew import Crew
+from hrc_env.outcome import FLAGS, Outcome
 from hrc_env.typing import Bools, Floats, Ints
 
 
@@ -20,15 +22,15 @@ class InfoTable:
     names: tuple[str, ...]
     values: Floats
     """(len(names), B)."""
-    activity: Ints
-    """(B, W) what each worker does."""
+    crew: Crew
+    """Of all B; of environments that have no values yet, without meaning."""
 
     def write(self, ids: Ints, outcome: Outcome) -> None:
         """Give environments `ids` the values of an outcome of them, and no more than these."""
         self.values[:, ids] = np.nan
         for name, value in outcome.info.items():
             self.values[self.names.index(name), ids] = value
-        self.activity[ids] = outcome.activity
+        write_rows(self.crew, ids, outcome.crew)
 
     def arrays(self, who: Bools) -> dict[str, Any]:
         """Values and masks for the environments `who` (B,); the others have none."""
@@ -42,21 +44,18 @@ class InfoTable:
                 infos[name] = value.astype(bool) if name in FLAGS else value
                 infos[f"_{name}"] = mask
         if who.any():
-            infos[ACTIVITY] = np.full(len(who), None, object)
-            for b in np.flatnonzero(who).tolist():
-                infos[ACTIVITY][b] = named(self.activity[b])
-            infos[f"_{ACTIVITY}"] = who.copy()
+            for name, said in self.crew.arrays(who).items():
+                infos[name], infos[f"_{name}"] = said, who.copy()
         return infos
 
 
 def table(outcome: Outcome) -> InfoTable:
     """A copy of an outcome's info as a table."""
     values = np.array(list(outcome.info.values()))
-    return InfoTable(tuple(outcome.info), values, outcome.activity.copy())
+    return InfoTable(tuple(outcome.info), values, copied(outcome.crew))
 
 
 def blank(outcome: Outcome, batch: int) -> InfoTable:
     """A table of the names of an outcome's info in which nobody has a value."""
-    shape = (batch, outcome.activity.shape[1])
     names = tuple(outcome.info)
-    return InfoTable(names, np.full((len(names), batch), np.nan), np.zeros(shape, np.int64))
+    return InfoTable(names, np.full((len(names), batch), np.nan), outcome.crew.blank(batch))

@@ -16,6 +16,7 @@ ALL_SOURCES = [*SOURCES, *sorted((ROOT / "agents").glob("*.py")), ROOT / "train.
 TRUTH_READERS = {
     "hrc_env/records.py": "declares it",
     "hrc_env/body.py": "makes it from the worker's motion",
+    "hrc_env/outcome.py": "gives errors against it their names",
     "hrc_env/simulation.py": "carries it to cost, metrics and senses",
     "hrc_env/senses.py": "hands it to the emulator and to the level `truth`",
     "hrc_env/metrics.py": "counts cost and errors",
