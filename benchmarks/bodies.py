@@ -88,7 +88,7 @@ def moments(
     scene: Scene, arguments: Arguments, n: int, rng: np.random.Generator
 ) -> Iterator[tuple[str, WorkerMotion]]:
     """n moments of a worker's day: the activity and the body (1, 1, S, ...)."""
-    body = load_body(scene.body_name)
+    body = load_body(scene.bodies[0])
     state = generator.make_state(1, 1, body, HRCConfig().motion, scene.grounds)
     streams = [np.random.default_rng(rng.integers(2**63))]
     generator.reset(state, np.arange(1), streams)
@@ -110,7 +110,7 @@ def judge(scene: Scene, motion: WorkerMotion, q: Floats, eyes: Eyes, source: Cro
         In view, looked at, pixels (C, J, 2), error as a share of the stature, all (C, ...), and
         what the eyes saw.
     """
-    body, cameras = load_body(scene.body_name), scene.cameras
+    body, cameras = load_body(scene.bodies[0]), scene.cameras
     joints = worker_truth(body, motion).joints_world[0]
     px, depth_m = (values[0] for values in project(projections(cameras), joints))
     windows = [window_from_joints(*view) for view in zip(px, depth_m, cameras, strict=True)]
@@ -152,7 +152,7 @@ def looks_at(
                 continue
             detected = bool(np.isfinite(error[c]))
             look = Look(
-                scene.body_name, scene.name, activity, camera.name, bool(in_view[c]), detected,
+                scene.bodies[0], scene.name, activity, camera.name, bool(in_view[c]), detected,
                 float(error[c]),
             )  # fmt: skip
             looks.append(look)

@@ -18,7 +18,7 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from hrc_env.body import load_body, worker_truth
+from hrc_env.body import pool, stack, worker_truth
 from hrc_env.geometry import chains
 from hrc_env.geometry.distances import narrowest_gap
 from hrc_env.geometry.shapes import AXES, BOX, CAPSULE, CENTRE, HALF_SIZE, KIND, PLANE, REACH
@@ -53,6 +53,8 @@ class Arguments:
     """How many there are."""
     scenes: tuple[str, ...] = ("lab", "site")
     """Where."""
+    body: str = "worker_1"
+    """Which body they have; "any": each one of their own."""
     people: str = "attentive"
     """How they are: a name of `generator.PEOPLE`."""
     seed: int = 0
@@ -133,7 +135,7 @@ def episodes(name: str, arguments: Arguments) -> Notes:
 
 def _some(scene: Scene, first: int, batch: int, arguments: Arguments, notes: Notes) -> float:
     """A batch of episodes; microseconds of a worker's control step."""
-    body = load_body(scene.body_name)
+    body = stack(pool(arguments.body))
     config = generator.MotionConfig(people=generator.people_called(arguments.people))
     state = generator.make_state(batch, arguments.workers, body, config, scene.grounds)
     rngs = [np.random.default_rng([first + b]) for b in range(batch)]
@@ -200,7 +202,9 @@ def _measure(scene, body, motion, solids, state, deepest, notes) -> None:
             near = np.flatnonzero(np.linalg.norm(root[:, i] - root[:, j], axis=-1) < 2.6)
             if not len(near):
                 continue
-            gap = -narrowest_gap(capsules[near, i], radius, capsules[near, j], radius).distance_m
+            gap = -narrowest_gap(
+                capsules[near, i], radius[near, i], capsules[near, j], radius[near, j]
+            ).distance_m
             k = int(gap.argmax())
             both = " beside ".join(names[state.activity[near[k], w]] for w in (i, j))
             if gap[k] > max(DEEPEST_M, notes.worst.get(both, (0.0, ""))[0]):
@@ -234,8 +238,9 @@ def _in_solids(capsules, radius, solids, climbing, feet):
                         continue
                     for i in range(5):
                         away = _distance(capsules[b, w, k], 0.25 * i, solids[g])
-                        if radius[k] - away > depth[b, w]:
-                            depth[b, w], part[b, w], solid[b, w] = radius[k] - away, k, g
+                        inside = radius[b, w, k] - away
+                        if inside > depth[b, w]:
+                            depth[b, w], part[b, w], solid[b, w] = inside, k, g
     return depth, part, solid
 
 

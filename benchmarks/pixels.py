@@ -77,7 +77,7 @@ def episode(env: HRCReachEnv, seed: int, notes: Notes) -> None:
 def note(env: HRCReachEnv, notes: Notes) -> None:
     """Errors of the tracked joints, and whether the reported region held them."""
     simulation = env.simulation
-    truth = worker_truth(simulation.body, generator.current(simulation.motion))
+    truth = worker_truth(simulation.bodies, generator.current(simulation.motion))
     estimate = simulation.estimate
     notes.lost.append(not bool(estimate.tracked.all()))
     if notes.lost[-1]:

@@ -39,7 +39,7 @@ def substeps(scene: Scene) -> int:
 
 def standing(scene: Scene, batch: int, xy: tuple[float, float]) -> WorkerPath:
     """A worker who stands still at `xy`, for every environment and substep."""
-    rest = rest_motion(load_body(scene.body_name))
+    rest = rest_motion(load_body(scene.bodies[0]))
     lead = (batch, substeps(scene), 1)
 
     def spread(array: np.ndarray) -> np.ndarray:
@@ -102,7 +102,7 @@ def worker_contact(scene: Scene) -> dict[str, float]:
     physics = Physics(scene, 1)
     physics.reset(np.array([0]), np.array([[-1.2, -0.9, 1.2, -1.87, -1.57, 0.0]]))
     path = standing(scene, 1, (0.45, 0.0))
-    body = load_body(scene.body_name)
+    body = load_body(scene.bodies[0])
     person = worker_capsules(body, path)[:, -1].reshape(1, -1, 2, 3)
     deepest, speed, gap_m = np.inf, 0.0, np.inf
     for step in range(75):

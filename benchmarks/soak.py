@@ -20,6 +20,7 @@ from rich.console import Console
 from rich.progress import Progress, track
 
 import hrc_env  # noqa: F401  registers the ids
+from hrc_env.crew import ACTIVITY, BODY
 from hrc_env.results import Metric, over, write_results
 from hrc_env.vector_env import HRCVectorEnv
 
@@ -27,8 +28,8 @@ WARM_UP_STEPS = 1_000_000
 """Memory is compared with what it was after so many environment steps."""
 READINGS = 40
 """How often a run reads the memory."""
-NAMES = "worker/activity"
-"""The one info that is no number."""
+NAMES = (ACTIVITY, BODY)
+"""The infos that are no numbers."""
 NOT_WHEN_LOST = "tracking/mpjpe_m"
 """The one info that a step may lack: nobody is tracked, so nobody is wrong."""
 
@@ -92,7 +93,7 @@ def episode(env: gymnasium.Env, seed: int, rng: np.random.Generator) -> int:
     while not ended:
         action = rng.uniform(-1, 1, env.action_space.shape).astype(np.float32)
         observation, reward, terminated, truncated, info = env.step(action)
-        numbers = np.array([reward, *(info[name] for name in info if name != NAMES)], float)
+        numbers = np.array([reward, *(info[name] for name in info if name not in NAMES)], float)
         if not (np.isfinite(observation).all() and np.isfinite(numbers).all()):
             raise FloatingPointError(f"Not a number in episode {seed}, step {n_steps}: {info}")
         n_steps, ended = n_steps + 1, terminated or truncated
@@ -137,7 +138,7 @@ def lacking(infos: Mapping[str, Any], stepped: np.ndarray) -> int:
     """Infos that are no numbers, or that an environment which `stepped` lacks without reason."""
     count = 0
     for name in infos:
-        if not name.startswith("_") and name != NAMES:
+        if not name.startswith("_") and name not in NAMES:
             known = infos[f"_{name}"]
             count += not_numbers(infos[name][known].astype(float))
             wanted = stepped & (infos["tracking/lost"] == 0) if name == NOT_WHEN_LOST else stepped

@@ -142,6 +142,31 @@ def stack(names: tuple[str, ...]) -> Bodies:
     )
 
 
+ANY = "any"
+"""Stands for all baked workers."""
+
+
+def pool(worker: str | tuple[str, ...]) -> tuple[str, ...]:
+    """The bodies that workers can have: of one name, of several, or all of them (`ANY`).
+
+    Raises:
+        ConfigError: no name, one twice, or one of which no worker has been baked.
+    """
+    if worker == ANY:
+        return worker_names()
+    names = (worker,) if isinstance(worker, str) else tuple(worker)
+    valid = (*worker_names(), ANY)
+    if not names or len(set(names)) < len(names):
+        raise ConfigError(
+            f"worker must be a name or several different ones of {', '.join(valid[:-1])}, "
+            f"or {ANY!r} for all of them; got {worker!r}."
+        )
+    for name in names:
+        if name not in worker_names():
+            raise unknown("worker", name, valid)
+    return names
+
+
 def rest_motion(body: Body) -> WorkerMotion:
     """The body at rest and still, without leading axes: (S, ...)."""
     upright = np.zeros((N_SEGMENTS, 4))
@@ -150,24 +175,21 @@ def rest_motion(body: Body) -> WorkerMotion:
     return WorkerMotion(body.rest_position.copy(), upright, still, still.copy())
 
 
-def worker_truth(
-    body: Body | Bodies, motion: WorkerMotion, which: Ints | None = None
-) -> WorkerTruth:
+def worker_truth(body: Body | Bodies, motion: WorkerMotion) -> WorkerTruth:
     """Where the joints and capsules of a body in motion are, and how fast the joints.
 
     Args:
         body: the worker's measures, or those of several.
-        motion: segments (..., S, 3 or 4) with any leading axes.
-        which: row of `Bodies` that each moving body has, broadcast to the leading axes; of a
-            single `Body` there is nothing to choose.
+        motion: segments (..., S, 3 or 4) with any leading axes; its `body` says rows of
+            `Bodies`, of a single `Body` there is nothing to choose.
 
     Returns:
-        The truth with the same leading axes; radii are (K,) of a `Body` and (..., K) of
-        `Bodies`. A joint moves with its segment: v + omega x r (rigid body kinematics).
+        The truth with the same leading axes. A joint moves with its segment: v + omega x r
+        (rigid body kinematics).
     """
     position, quaternion = motion.position_world, motion.quaternion_wxyz
     lead, n_joints = position.shape[:-2], len(body.joint_segment)
-    rows = _rows(body, which, lead)
+    rows = _rows(body, motion.body, lead)
     capsules = _capsules_of(body, position, quaternion, rows)
     joints, velocity = np.empty((*lead, n_joints, 3)), np.empty((*lead, n_joints, 3))
     _joints(
@@ -176,14 +198,12 @@ def worker_truth(
         body.joint_segment, body.joint_offset.reshape(-1, n_joints, 3),
         _flat(joints), _flat(velocity),
     )  # fmt: skip
-    radius = body.capsule_radius_m
-    if isinstance(body, Bodies):
-        radius = radius[rows].reshape(*lead, -1)
-    return WorkerTruth(joints, velocity, capsules, radius)
+    radius = body.capsule_radius_m.reshape(-1, len(body.capsule_names))[rows]
+    return WorkerTruth(joints, velocity, capsules, radius.reshape(*lead, radius.shape[1]))
 
 
 def worker_capsules(body: Body | Bodies, path: WorkerPath, which: Ints | None = None) -> Capsules:
-    """(B, T, W, K, 2, 3) the bodies' capsules along a path [m]; `which` (B, W) as above."""
+    """(B, T, W, K, 2, 3) the bodies' capsules along a path [m]; `which` (B, W) of `Bodies`."""
     position = path.position_world
     over_time = None if which is None else np.asarray(which)[..., None, :]
     rows = _rows(body, over_time, position.shape[:-2])
@@ -200,11 +220,11 @@ def _same_rows(body: Body, other: Body) -> bool:
 
 def _rows(body: Body | Bodies, which: Ints | None, lead: tuple[int, ...]) -> Ints:
     """(count,) row of every body in motion."""
-    if isinstance(body, Body):
+    if isinstance(body, Body) or which is None or len(body.names) == 1:
         return _first(math.prod(lead))
-    n = len(body.names)
-    if which is None or (np.size(which) and not 0 <= np.min(which) <= np.max(which) < n):
-        raise ConfigError(f"which must say rows 0 to {n - 1} of {body.names}, got {which}.")
+    last = len(body.names) - 1
+    if np.size(which) and not 0 <= np.min(which) <= np.max(which) <= last:
+        raise ConfigError(f"Bodies must be rows 0 to {last} of {body.names}, got {which}.")
     return fixed(np.broadcast_to(which, lead).reshape(-1), np.int64)
 
 

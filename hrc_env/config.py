@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from hrc_env.body import pool
 from hrc_env.control import ControlConfig
 from hrc_env.errors import ConfigError
 from hrc_env.mapping import from_mapping
@@ -41,8 +42,9 @@ class HRCConfig:
     horizons_s: tuple[float, ...] = ()
     """Times ahead at which the observation also holds where the workers' joints are expected,
     each in (0, 1] [s]; none by default. (0.2, 0.4) adds 120 entries a worker."""
-    worker: str = "worker_1"
-    """Which baked body the workers have."""
+    worker: str | tuple[str, ...] = "worker_1"
+    """Which baked body the workers have: a name; several, or "any" for all that there are: then
+    every episode gives each worker one of them, no two the same as long as there are others."""
     scene: SceneConfig = field(default_factory=SceneConfig)
     """Room, cameras, physics."""
     motion: MotionConfig = field(default_factory=MotionConfig)
@@ -71,6 +73,7 @@ class HRCConfig:
             raise ConfigError(
                 f"start_spread_rad must hold angles >= 0, one a joint, got {self.start_spread_rad}."
             )
+        pool(self.worker)
         for horizon_s in self.horizons_s:
             check_horizon(horizon_s)
         substeps = self.ctrl_dt / self.scene.sim_dt

@@ -1,4 +1,4 @@
-"""Who is there: how many workers an episode has, and what each of them is doing."""
+"""Who is there: how many workers an episode has, with which bodies, and what each is doing."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,6 +14,8 @@ from hrc_env.typing import Bools, Ints
 
 ACTIVITY = "worker/activity"
 """What each worker is doing, by name; `ABSENT_NAME` of who is not in the episode."""
+BODY = "worker/body"
+"""Which baked body each worker has in this episode; likewise."""
 ABSENT_NAME = "absent"
 
 
@@ -23,6 +25,8 @@ class Crew:
 
     activity: Ints
     """(B, W) what each worker does, an index into `generator.activity_names` or `ABSENT`."""
+    bodies: NDArray[np.object_]
+    """(B,) the names of their bodies, a tuple of W; written out once an episode."""
 
     @property
     def present(self) -> Bools:
@@ -31,23 +35,43 @@ class Crew:
 
     def info_of(self, b: int) -> dict[str, Any]:
         """What the info of environment b says of its workers, by name."""
-        return {ACTIVITY: named(self.activity[b])}
+        return {ACTIVITY: named(self.activity[b]), BODY: self.bodies[b]}
 
     def arrays(self, who: Bools) -> dict[str, NDArray[np.object_]]:
         """The same of environments `who` (B,), one array (B,) a name; the others have None."""
-        said = {ACTIVITY: np.full(len(who), None, object)}
+        doing, bodies = np.full((2, len(who)), None, object)
+        bodies[who] = self.bodies[who]
         for b in np.flatnonzero(who).tolist():
-            said[ACTIVITY][b] = named(self.activity[b])
-        return said
+            doing[b] = named(self.activity[b])
+        return {ACTIVITY: doing, BODY: bodies}
 
     def blank(self, batch: int) -> "Crew":
         """Rows for `batch` environments, to be written."""
-        return Crew(np.zeros((batch, self.activity.shape[1]), np.int64))
+        shape = (batch, self.activity.shape[1])
+        return Crew(np.zeros(shape, np.int64), np.full(batch, None, object))
 
 
-def crew_of(motion: MotionState) -> Crew:
-    """The workers of a motion."""
-    return Crew(generator.activity(motion))
+def joined(crews: Sequence[Crew]) -> Crew:
+    """Crews of ranges of a batch, one after the other."""
+    return Crew(
+        np.concatenate([crew.activity for crew in crews]),
+        np.concatenate([crew.bodies for crew in crews]),
+    )
+
+
+def bodies_of(motion: MotionState, ids: Ints, names: tuple[str, ...]) -> NDArray[np.object_]:
+    """(len(ids),) the names of the bodies in environments `ids`, a tuple of W each.
+
+    Args:
+        motion: of all environments.
+        ids: which.
+        names: of the bodies that there are, row by row.
+    """
+    said = np.full(len(ids), None, object)
+    for row, b in enumerate(ids.tolist()):
+        there = zip(motion.body[b].tolist(), motion.present[b].tolist(), strict=True)
+        said[row] = tuple(names[k] if present else ABSENT_NAME for k, present in there)
+    return said
 
 
 def named(activity: Ints) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import types
 import typing
 from collections.abc import Mapping
 from typing import Any, TypeVar
@@ -42,6 +43,8 @@ def restored(hint: Any, value: Any, where: str) -> Any:
         if isinstance(value, Mapping):
             return from_mapping(typing.cast(type, hint), value, f"{where}.")
         return _checked(isinstance(value, typing.cast(type, hint)), "a mapping", value, where)
+    if isinstance(hint, types.UnionType):
+        return _one_of(typing.get_args(hint), value, where)
     if typing.get_origin(hint) is tuple:
         return _tuple(typing.get_args(hint), value, where)
     if hint is float:
@@ -53,6 +56,21 @@ def restored(hint: Any, value: Any, where: str) -> Any:
     if hint in (bool, str):
         return _checked(isinstance(value, hint), f"a {hint.__name__}", value, where)
     return value
+
+
+def _one_of(hints: tuple[Any, ...], value: Any, where: str) -> Any:
+    """The value as the first of several hints wants it that can have it.
+
+    Raises:
+        ConfigError: none can, in the words of each.
+    """
+    refused = []
+    for hint in hints:
+        try:
+            return restored(hint, value, where)
+        except ConfigError as error:
+            refused.append(str(error))
+    raise ConfigError(" Or: ".join(refused))
 
 
 def _tuple(inner: tuple[Any, ...], value: Any, where: str) -> tuple[Any, ...]:

@@ -59,11 +59,11 @@ def cost(
         robot_world: (B, T, K, 2, 3) the robot's capsules at every substep [m].
         robot_radius_m: (K,).
         workers_world: (B, T, W, L, 2, 3) the workers' true capsules at the same times [m].
-        worker_radius_m: (L,).
+        worker_radius_m: (B, W, L) of each worker.
     """
     batch, steps = robot_world.shape[:2]
     bodies = workers_world.reshape(batch, steps, -1, 2, 3)
-    gap = narrowest_gap(robot_world, robot_radius_m, bodies, worker_radius_m)
+    gap = narrowest_gap(robot_world, robot_radius_m, bodies, worker_radius_m.reshape(batch, -1))
     nearest_m = gap.distance_m.min(axis=1)
     return Cost(
         proximity=(nearest_m < config.proximity_m).astype(float),

@@ -105,6 +105,8 @@ class WorkerMotion:
     """(B, W, S, 3) [rad/s]."""
     held: Held | None = None
     """What their hands hold; None: nothing."""
+    body: Ints | None = None
+    """(B, W) which of the scene's bodies each has; None: all have the first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +120,7 @@ class WorkerTruth:
     capsules_world: Capsules
     """(B, W, K, 2, 3) the body's capsules [m]."""
     capsule_radius_m: Floats
-    """(K,) [m]."""
+    """(B, W, K) [m]."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike
 from hrc_env import metrics, observations, rewards
 from hrc_env.batching import picked, rows, write_rows
 from hrc_env.belief import Believed, estimated_gap
-from hrc_env.body import load_body, worker_capsules, worker_truth
+from hrc_env.body import pool, stack, worker_capsules, worker_truth
 from hrc_env.config import HRCConfig
 from hrc_env.control import joint_command, n_actions
-from hrc_env.crew import crew_of, worker_counts
+from hrc_env.crew import Crew, bodies_of, worker_counts
 from hrc_env.errors import ConfigError, check_shape
 from hrc_env.geometry import chains
 from hrc_env.motion import generator
@@ -52,7 +52,7 @@ class Simulation(Stateful):
 
     CHANGES = (
         "physics", "senses", "motion", "task", "streams", "action", "episode_cost",
-        "estimate", "ahead",
+        "estimate", "ahead", "worn",
     )  # fmt: skip
 
     def __init__(
@@ -68,9 +68,9 @@ class Simulation(Stateful):
     ) -> None:
         self.batch, self.config, self.control = batch, config, control
         self.perception = perception
-        self.body = load_body(config.worker)
+        self.bodies = stack(pool(config.worker))
         fewest, most = worker_counts(n_workers)
-        self.scene = build(config.scene, scene, most, config.worker, cameras)
+        self.scene = build(config.scene, scene, most, self.bodies.names, cameras)
         if perception in CAMERA_LEVELS:
             for finding in findings(self.scene):
                 warnings.warn(finding, stacklevel=3)
@@ -89,8 +89,9 @@ class Simulation(Stateful):
         self.physics = Physics(self.scene, batch)
         self.senses = make_senses(perception, estimator, self.scene, batch, config)
         self.motion = generator.make_state(
-            batch, most, self.body, config.motion, self.scene.grounds, fewest
+            batch, most, self.bodies, config.motion, self.scene.grounds, fewest
         )
+        self.worn = np.full(batch, None, object)
         self.task = reach.make_state(batch)
         self._everyone = np.arange(batch)
         self.action = np.zeros((batch, self.n_actions))
@@ -103,18 +104,19 @@ class Simulation(Stateful):
     def reset(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> Outcome:
         """Start environments `ids` anew, one generator each; their rows of an outcome."""
         self._spawn(ids, rngs)
-        self.physics.reset(ids, self._starting_angles(ids))
         generator.reset(self.motion, ids, self.streams.motion)
+        self.worn[ids] = bodies_of(self.motion, ids, self.bodies.names)
+        self.physics.reset(ids, self._starting_angles(ids), self.motion.body[ids])
         self.action[ids], self.episode_cost[ids] = 0.0, 0.0
         robot = chains.robot_state(self.chain, self.physics.q[ids], self.physics.qd[ids])
         reach.reset(self.task, ids, self.streams.task, robot.tool_world, self.config.task)
         self.senses.reset(ids, self.streams.sensor, self.streams.tracker)
         motion = generator.current(self.motion, ids)
-        truth = worker_truth(self.body, motion)
+        truth = worker_truth(self.bodies, motion)
         estimate, ahead = self._sense(ids, motion, truth)
         believed = self._believed(ids, robot, estimate, ahead)
         observation = observations.observe(believed, self.layout)
-        crew = rows(crew_of(self.motion), ids)
+        crew = rows(self.crew, ids)
         info = {**tracking_info(estimate, truth, crew.present), **rows_of(self._tally(), ids)}
         return Outcome(observation, np.zeros(len(ids)), np.zeros(len(ids), bool), info, crew)
 
@@ -129,7 +131,7 @@ class Simulation(Stateful):
             self.motion, streams.motion, config.scene.sim_dt, config.n_substeps
         )
         q_path = self.physics.step(command, path)
-        truth = worker_truth(self.body, motion)
+        truth = worker_truth(self.bodies, motion)
 
         estimate, ahead = self._sense(self._everyone, motion, truth)
         robot, arm = chains.robot_along(self.chain, q_path, self.physics.qd)
@@ -141,12 +143,12 @@ class Simulation(Stateful):
         believed = self._believed(self._everyone, robot, estimate, ahead)
         reward, terms = rewards.reward(believed, progress, previous, config.reward)
 
-        workers = worker_capsules(self.body, path)
+        workers = worker_capsules(self.bodies, path, motion.body)
         cost = metrics.cost(
             arm, robot.capsule_radius_m, workers, truth.capsule_radius_m, config.cost
         )
         self.episode_cost += cost.total
-        crew = crew_of(self.motion)
+        crew = self.crew
         info = {
             **{f"reward/{name}": value for name, value in terms.items()},
             **cost_info(cost, crew.present),
@@ -199,6 +201,11 @@ class Simulation(Stateful):
             for b in ids
         ]
         return np.array(angles).reshape(len(ids), -1)
+
+    @property
+    def crew(self) -> Crew:
+        """Who is there now."""
+        return Crew(generator.activity(self.motion), self.worn)
 
     @property
     def believed(self) -> Believed:

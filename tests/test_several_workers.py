@@ -94,7 +94,7 @@ def test_three_workers_without_names_keep_their_tracks():
     for _ in range(150):
         env.step(np.zeros((8, 6)))
         estimate, motion = env.simulation.estimate, env.simulation.motion
-        truth = worker_truth(env.simulation.body, current(motion)).joints_world
+        truth = worker_truth(env.simulation.bodies, current(motion)).joints_world
         apart = np.linalg.norm(estimate.mean_world[:, :, None] - truth[:, None], axis=-1).mean(-1)
         whom.append([assign(of_room) for of_room in apart])
     assert (np.array(whom)[5:] == whom[5]).all()

@@ -47,7 +47,7 @@ def observe(name: str) -> tuple[list[WorkerMotion], np.ndarray, np.ndarray]:
 
     Windows are laid round the anatomical joints, so that calibrating twice changes nothing.
     """
-    scene = build(SceneConfig(clutter=False), n_workers=1, body_name=name)
+    scene = build(SceneConfig(clutter=False), n_workers=1, bodies=name)
     body = replace(load_body(name), joint_offset=anatomical_offset(name))
     P = projections(scene.cameras)
     renderer, look = CropRenderer(scene), load_landmarker()

@@ -36,7 +36,7 @@ def camera(
 
 def sheet(name: str) -> np.ndarray:
     """All views of one worker."""
-    scene = build(SceneConfig(clutter=False), n_workers=1, body_name=name)
+    scene = build(SceneConfig(clutter=False), n_workers=1, bodies=name)
     renderer = PictureRenderer(scene, WIDTH_PX, HEIGHT_PX)
     body, found = load_body(name), []
     for pose in ("stand", "reach"):

@@ -121,7 +121,7 @@ def _frames(
         action = _SLOWNESS * action + np.sqrt(1 - _SLOWNESS**2) * push
         scene.step(np.clip(action, -1, 1))
         motion = generator.current(scene.motion)
-        now = worker_truth(scene.body, motion)
+        now = worker_truth(scene.bodies, motion)
         between = scene.scene.surroundings(scene.physics.q, motion.held)
         seen = emulator.emulate(errors, sensors, now, between, cameras, config.emulator)
         yield now.joints_world[:, 0], now.velocity_world[:, 0], seen

@@ -39,15 +39,16 @@ def narrowest_gap(
 
     Args:
         capsules_a: (..., Ka, 2, 3) end points [m].
-        radius_a_m: (Ka,) [m].
+        radius_a_m: (..., Ka) with the first of its leading axes, or none [m].
         capsules_b: (..., Kb, 2, 3), the same leading axes and perhaps more after them: then
             each first set is held against several second ones.
-        radius_b_m: (Kb,), or those of one body where the second sets are several bodies.
+        radius_b_m: (..., Kb) likewise; or those of one body where the second sets are several.
     """
     lead = capsules_b.shape[:-3]
     flat_a, flat_b = _flat(capsules_a), _flat(capsules_b)
     gap, points = np.empty(len(flat_b)), np.empty((len(flat_b), 2, 3))
-    _narrowest(flat_a, radius_a_m, flat_b, radius_b_m, gap, points)
+    radius_a, radius_b = _sets(radius_a_m), _sets(radius_b_m)
+    _narrowest(flat_a, radius_a, flat_b, radius_b, gap, points)
     points = points.reshape(*lead, 2, 3)
     return Gap(gap.reshape(lead), points[..., 0, :], points[..., 1, :])
 
@@ -56,6 +57,12 @@ def _flat(capsules: Capsules) -> Capsules:
     """(..., K, 2, 3) as (count, K, 2, 3), contiguous."""
     count = math.prod(capsules.shape[:-3])
     return np.ascontiguousarray(capsules).reshape(count, *capsules.shape[-3:])
+
+
+def _sets(radius_m: Floats) -> Floats:
+    """(..., K) as (count, K), contiguous."""
+    whole = np.ascontiguousarray(radius_m)
+    return whole.reshape(math.prod(whole.shape[:-1]), whole.shape[-1])
 
 
 @numba.njit(**LEAN)
@@ -111,16 +118,18 @@ def _sphere_gaps(a, b, least):
 @numba.njit(**JIT)
 def _narrowest(a, radius_a, b, radius_b, gap, points):
     """Spheres bound the gaps from below: only pairs that they leave open are measured."""
-    n_a, n_b, per_a = a.shape[1], b.shape[1], len(b) // max(len(a), 1)
+    n_a, n_b = a.shape[1], b.shape[1]
+    per_a, per_b = len(b) // max(len(a), 1), len(b) // max(len(radius_b), 1)
+    per_first = len(b) // max(len(radius_a), 1)
     spheres_a, spheres_b = np.empty((4, n_a)), np.empty((4, n_b))
     least = np.empty((n_a, n_b))
     for n in range(len(b)):
-        first = a[n // per_a]
-        _spheres(first, radius_a, spheres_a)
-        _spheres(b[n], radius_b, spheres_b)
+        first, first_m, second_m = a[n // per_a], radius_a[n // per_first], radius_b[n // per_b]
+        _spheres(first, first_m, spheres_a)
+        _spheres(b[n], second_m, spheres_b)
         _sphere_gaps(spheres_a, spheres_b, least)
         points[n] = 0.0
-        gap[n] = _search(first, radius_a, b[n], radius_b, least, points[n])
+        gap[n] = _search(first, first_m, b[n], second_m, least, points[n])
 
 
 @numba.njit(**JIT)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.body import PARENT, Bodies, Body
+from hrc_env.body import N_SEGMENTS, PARENT, Bodies, Body
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.typing import Floats
 
@@ -34,7 +34,7 @@ STAND_SHARE = 0.994
 
 @dataclass(frozen=True, slots=True)
 class Anatomy:
-    """Constants of one body."""
+    """Constants of one body, or of N bodies: then with a first axis of N."""
 
     offset: Floats
     """(22, 3) origin of each segment in its parent's frame at rest [m]."""
@@ -49,9 +49,9 @@ def anatomy(body: Body) -> Anatomy:
     return _measured(np.asarray(body.rest_position, float))
 
 
-def anatomies(bodies: Bodies) -> Anatomy:
-    """Measure N bodies: arrays (N, ...), each row as `anatomy` of that body alone."""
-    each = [_measured(rest) for rest in bodies.rest_position]
+def anatomies(bodies: Body | Bodies) -> Anatomy:
+    """Measure N bodies, or one: arrays (N, ...), each row as `anatomy` of that body alone."""
+    each = [_measured(rest) for rest in bodies.rest_position.reshape(-1, N_SEGMENTS, 3)]
     return Anatomy(
         np.stack([one.offset for one in each]),
         np.stack([one.frame for one in each]),

@@ -9,13 +9,13 @@ from collections.abc import Sequence
 import numba
 import numpy as np
 
-from hrc_env.body import N_SEGMENTS, Body
+from hrc_env.body import N_SEGMENTS, Bodies, Body
 from hrc_env.compiled import LEAN
 from hrc_env.errors import ConfigError
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion import state as st
-from hrc_env.motion.anatomy import anatomy
+from hrc_env.motion.anatomy import anatomies
 from hrc_env.motion.behaviour import begin_episode, follow_up
 from hrc_env.motion.capture.clip import Clip, opened
 from hrc_env.motion.config import MotionConfig, numbers
@@ -75,7 +75,7 @@ OPEN_FLOOR = Grounds(
 
 
 def make_state(
-    batch: int, n_workers: int, body: Body, config: MotionConfig,
+    batch: int, n_workers: int, body: Body | Bodies, config: MotionConfig,
     grounds: Grounds = OPEN_FLOOR, fewest: int | None = None,
 ) -> MotionState:  # fmt: skip
     """Arrays for `batch` environments of `n_workers` each; call `reset` before use.
@@ -83,7 +83,7 @@ def make_state(
     Args:
         batch: environments.
         n_workers: workers whom each has room for.
-        body: of all of them.
+        body: of all of them, or those of which each episode gives each worker one.
         config: settings.
         grounds: where they walk and work.
         fewest: so many workers are in an episode at least, drawn at its beginning; None: all.
@@ -98,7 +98,7 @@ def make_state(
     if not 0 <= fewest <= n_workers:
         raise ConfigError(f"The fewest workers must be 0 to {n_workers}, got {fewest}.")
 
-    bones = anatomy(body)
+    bones = anatomies(body)
     clips = stocked([opened(motion) for motion in config.motions], bones.size)
 
     def array(*shape: int) -> Floats:
@@ -111,7 +111,8 @@ def make_state(
         offset=array(c.N_BLENDED, 2), traits=array(pl.N_TRAITS), pace=array(2),
         spots=array(st.N_SPOT), errand=np.zeros((batch, n_workers, st.N_ERRAND), np.int64),
         alert=array(st.N_ALERT), robot=np.full((batch, 2, 3), np.inf), present=array(),
-        anatomy=bones, mind=_mind(config, grounds, clips, n_workers, fewest),
+        body=np.zeros((batch, n_workers), np.int64), anatomy=bones,
+        mind=_mind(config, grounds, clips, n_workers, fewest),
     )  # fmt: skip
 
 
@@ -138,8 +139,20 @@ def reset(state: MotionState, ids: Ints, rngs: Sequence[np.random.Generator]) ->
     """Start environments `ids` anew; rngs holds one generator for each of the B environments."""
     n_workers, fewest = state.activity.shape[1], state.mind.fewest
     for b in np.asarray(ids).tolist():
+        state.body[b] = drawn_bodies(rngs[b], len(state.anatomy.size), n_workers)
         n = n_workers if fewest == n_workers else int(rngs[b].integers(fewest, n_workers + 1))
         begin_episode(state, b, n, rngs[b].random((n_workers, 2, N_DRAWS)))
+
+
+def drawn_bodies(rng: np.random.Generator, n_bodies: int, n_workers: int) -> Ints:
+    """(W,) a body for each worker, no two the same as long as there are others.
+
+    Drawn from a child of the generator: what workers do does not depend on how many bodies there
+    are.
+    """
+    if n_bodies == 1:
+        return np.zeros(n_workers, np.int64)
+    return np.resize(rng.spawn(1)[0].permutation(n_bodies), n_workers)
 
 
 def advance(
@@ -168,8 +181,8 @@ def advance(
         for b in np.flatnonzero(ticked).tolist():
             for w in np.flatnonzero(_over(state, b)).tolist():
                 follow_up(state, b, w, rngs[b].random(N_DRAWS))
-    last = WorkerMotion(position[:, -1], quaternion_[:, -1], velocity, turning, _held(held))
-    return WorkerPath(position, quaternion_), last
+    last = position[:, -1], quaternion_[:, -1], velocity, turning, _held(held)
+    return WorkerPath(position, quaternion_), WorkerMotion(*last, state.body.copy())
 
 
 def _over(state: MotionState, b: int) -> Bools:
@@ -194,7 +207,7 @@ def watch(
         dt_s, (people.notice_m, people.fast_m_s, people.calm_s), elbow_and_tool_world,
         state.robot, motion.position_world, state.present, state.alert, state.pace,
         state.clock_s, state.time_s, state.duration_s, state.activity, state.plan, state.prints,
-        state.stance, state.anatomy.size,
+        state.stance, state.body, state.anatomy.size,
     )  # fmt: skip
 
 
@@ -206,7 +219,7 @@ def current(state: MotionState, ids: Ints | None = None) -> WorkerMotion:
     held = np.empty((len(rows), n_workers, N_HELD))
     rest: tuple = (*out, held, *_room())
     _draw(rows, *_arrays(state), *rest)
-    return WorkerMotion(out[0], out[1], out[2], out[3], _held(held))
+    return WorkerMotion(out[0], out[1], out[2], out[3], _held(held), state.body[rows])
 
 
 def activity(state: MotionState) -> Ints:
@@ -233,7 +246,7 @@ def _arrays(state: MotionState) -> tuple:
     """What a pose follows from, in the order that the compiled functions take it."""
     return (
         state.clock_s, state.time_s, state.duration_s, state.activity, state.pace, state.plan,
-        state.prints, state.stance, state.offset, state.traits, state.present,
+        state.prints, state.stance, state.offset, state.traits, state.present, state.body,
         state.anatomy.offset, state.anatomy.frame, state.anatomy.size, state.mind.clips.frames,
     )  # fmt: skip
 
@@ -241,16 +254,17 @@ def _arrays(state: MotionState) -> tuple:
 @numba.njit(**LEAN)
 def _pose(
     b: int, w: int, later_s: float, clock_s: Floats, time_s: Floats, activity: Ints, pace: Floats,
-    plan: Floats, prints: Floats, stance: Floats, offset: Floats, traits: Floats,
+    plan: Floats, prints: Floats, stance: Floats, offset: Floats, traits: Floats, body: Ints,
     bones: Floats, frame: Floats, size: Floats, frames: Floats, q: Floats, p: Floats, r: Floats,
 ) -> None:  # fmt: skip
     """Worker (b, w) a little later than now: points p and frames r of `kinematics.pose`."""
+    mine = body[b, w]
     t, clock = time_s[b, w] + pace[b, w, 0] * later_s, clock_s[b, w] + later_s
     evaluate(
         activity[b, w], t, clock, plan[b, w], prints[b, w], stance[b, w], offset[b, w],
-        traits[b, w], size, frames, q,
+        traits[b, w], size[mine], frames, q,
     )  # fmt: skip
-    pose(q, bones, frame, size, p, r)
+    pose(q, bones[mine], frame[mine], size[mine], p, r)
 
 
 @numba.njit(**LEAN)
@@ -286,7 +300,7 @@ def _run(
     dt_s: float, n_steps: int, done: Ints, ticked: Bools,
     clock_s: Floats, time_s: Floats, duration_s: Floats, activity: Ints, pace: Floats,
     plan: Floats, prints: Floats, stance: Floats, offset: Floats, traits: Floats,
-    present: Floats, bones: Floats, frame: Floats, size: Floats, frames: Floats,
+    present: Floats, body: Ints, bones: Floats, frame: Floats, size: Floats, frames: Floats,
     position: Floats, quaternion_: Floats, velocity: Floats, turning: Floats, held: Floats,
     q: Floats, p: Floats, r: Floats,
 ) -> bool:  # fmt: skip
@@ -310,7 +324,7 @@ def _run(
                 for i in range(1 if t == n_steps - 1 else 0, -1, -1):
                     _pose(
                         b, w, i * RATE_H_S, clock_s, time_s, activity, pace, plan, prints, stance,
-                        offset, traits, bones, frame, size, frames, q, p[i], r[i],
+                        offset, traits, body, bones, frame, size, frames, q, p[i], r[i],
                     )  # fmt: skip
                 _place(present[b, w], p[0], r[0], position[b, t, w], quaternion_[b, t, w])
                 if t == n_steps - 1:
@@ -324,7 +338,7 @@ def _run(
 def _draw(
     rows: Ints, clock_s: Floats, time_s: Floats, duration_s: Floats, activity: Ints, pace: Floats,
     plan: Floats, prints: Floats, stance: Floats, offset: Floats, traits: Floats,
-    present: Floats, bones: Floats, frame: Floats, size: Floats, frames: Floats,
+    present: Floats, body: Ints, bones: Floats, frame: Floats, size: Floats, frames: Floats,
     position: Floats, quaternion_: Floats, velocity: Floats, turning: Floats, held: Floats,
     q: Floats, p: Floats, r: Floats,
 ) -> None:  # fmt: skip
@@ -335,7 +349,7 @@ def _draw(
             for i in range(1, -1, -1):
                 _pose(
                     b, w, i * RATE_H_S, clock_s, time_s, activity, pace, plan, prints, stance,
-                    offset, traits, bones, frame, size, frames, q, p[i], r[i],
+                    offset, traits, body, bones, frame, size, frames, q, p[i], r[i],
                 )  # fmt: skip
             _place(present[b, w], p[0], r[0], position[row, w], quaternion_[row, w])
             _rates(p, r, velocity[row, w], turning[row, w])

@@ -1,4 +1,4 @@
-"""The clips that workers of one body can play, and the beginning of one."""
+"""The clips that workers can play, fitted to every body that there is, and the beginning of one."""
 
 import itertools
 import math
@@ -42,34 +42,37 @@ class Clips:
     """Pieces of clips, each from one moment on both feet to another, one after the other."""
 
     frames: Floats
-    """(N, 32) of all pieces; each begins at the origin, towards +x."""
+    """(bodies x N, 32) of all pieces, body after body; each begins at the origin, towards +x."""
     row: Ints
-    """(n,) first row of each piece."""
+    """(n,) first row of each piece, of the first body."""
     count: Ints
     """(n,) its rows."""
     fps: Floats
     """(n,) its frames a second."""
 
+    @property
+    def n_rows(self) -> int:
+        """N: rows of one body."""
+        return int(self.count.sum())
+
 
 def stocked(clips: Sequence[Clip], size: Floats) -> Clips:
-    """The pieces of clips, for a worker of these measures (`Anatomy.size`).
+    """The pieces of clips, for workers of these measures (`Anatomy.size` of each body).
 
     Raises:
         ConfigError: a clip that is never on both feet, or only for moments of the same pose.
     """
-    pieces: list[Floats] = []
-    rates: list[float] = []
-    for clip in clips:
-        q = fitted_to(clip, size)
-        for first, last in _cuts(clip):
-            pieces.append(placed_at_origin(q[first : last + 1])[:, RECORDED])
-            rates.append(clip.fps)
-    count = np.array([len(piece) for piece in pieces], np.int64)
-    row = np.concatenate([[0], np.cumsum(count)[:-1]]).astype(np.int64) if pieces else count
-    frames = (
-        np.ascontiguousarray(np.concatenate(pieces)) if pieces else np.zeros((0, len(RECORDED)))
-    )
-    return Clips(frames, row, count, np.array(rates))
+    cuts = [(clip, cut) for clip in clips for cut in _cuts(clip)]
+    count = np.array([last - first + 1 for _, (first, last) in cuts], np.int64)
+    row = np.cumsum(count) - count
+    frames = [np.zeros((0, len(RECORDED)))]
+    for of_body in size:
+        fitted = {id(clip): fitted_to(clip, of_body) for clip in clips}
+        for clip, (first, last) in cuts:
+            piece = fitted[id(clip)][first : last + 1]
+            frames.append(placed_at_origin(piece)[:, RECORDED])
+    rates = np.array([clip.fps for clip, _ in cuts])
+    return Clips(np.ascontiguousarray(np.concatenate(frames)), row, count, rates)
 
 
 def _cuts(clip: Clip) -> list[tuple[int, int]]:
@@ -97,13 +100,15 @@ def _cuts(clip: Clip) -> list[tuple[int, int]]:
 
 def following(clips: Clips, plan: Floats) -> int:
     """The piece after the one that a plan played; after the last comes the first."""
-    return (int(np.searchsorted(clips.row, plan[pl.CLIP_ROW])) + 1) % len(clips.row)
+    row = plan[pl.CLIP_ROW] % clips.n_rows
+    return (int(np.searchsorted(clips.row, row)) + 1) % len(clips.row)
 
 
-def start_clip(piece: int, turn_rad: float, clips: Clips, me: Worker) -> float:
+def start_clip(piece: int, turn_rad: float, clips: Clips, body: int, me: Worker) -> float:
     """Plan to play a piece where the worker stands, turned from their heading; how long [s]."""
     plan, prints = me.plan, me.prints
-    row, n, fps = int(clips.row[piece]), int(clips.count[piece]), float(clips.fps[piece])
+    row = body * clips.n_rows + int(clips.row[piece])
+    n, fps = int(clips.count[piece]), float(clips.fps[piece])
     q = clips.frames[row : row + n]
     yaw = plan.item(pl.START_YAW) + turn_rad
     plan[pl.CLIP_ROW], plan[pl.CLIP_FRAMES], plan[pl.CLIP_FPS] = row, n, fps

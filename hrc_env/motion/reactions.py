@@ -39,7 +39,7 @@ def notice(
     dt_s: float, people: tuple[float, float, float], robot_world: Floats, seen: Floats,
     position_world: Floats, present: Floats, alert: Floats, pace: Floats, clock_s: Floats,
     time_s: Floats, duration_s: Floats, activity: Ints, plan: Floats, prints: Floats,
-    stance: Floats, size: Floats,
+    stance: Floats, body: Ints, size: Floats,
 ) -> None:  # fmt: skip
     """Let every worker look at the robot, and react when it is time.
 
@@ -51,7 +51,8 @@ def notice(
         position_world: (B, W, 22, 3) the workers' segments now [m].
         present, alert, pace, clock_s, time_s, duration_s, activity, plan, prints, stance: of
             `MotionState`; what a reaction changes is written.
-        size: of the body.
+        body: (B, W) which body each has.
+        size: (N, N_SIZES) of the bodies.
     """
     for b in range(clock_s.shape[0]):
         for w in range(clock_s.shape[1]):
@@ -64,7 +65,7 @@ def notice(
                 mine[ACTS_AT] = math.inf
                 _react(
                     w, mine, pace[b], clock, time_s[b], duration_s[b], activity[b], plan[b],
-                    prints[b, w], stance[b, w], present[b], size,
+                    prints[b, w], stance[b, w], present[b], size[body[b, w]],
                 )  # fmt: skip
                 mine[CALM_AT] = clock + mine[LASTS_S] + people[2]
                 continue

@@ -154,7 +154,7 @@ def play(who: Who) -> tuple[int, float] | None:
     if was == pl.CLIP:
         first = following(mind.clips, who.me.plan)
     for turn_rad in TURNS_RAD:
-        lasts = start_clip(first, turn_rad, mind.clips, who.me)
+        lasts = start_clip(first, turn_rad, mind.clips, who.body, who.me)
         room = min(slack_at(x, y, mind.plan.slack, mind.plan.origin) for x, y in roots(who.me.plan))
         if room >= 0.0 and meets_somebody(who, pl.CLIP, lasts)[0] < 0.0:
             who.going = UNDER_WAY  # that is, back to the place afterwards

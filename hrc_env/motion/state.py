@@ -105,8 +105,10 @@ class MotionState:
     """(B, 2, 3) elbow and tool of the arm when the workers last looked [m]; infinite: not yet."""
     present: Floats
     """(B, W) 1 of a worker who is there, 0 of one who is not in this episode."""
+    body: Ints
+    """(B, W) row of `anatomy`: which body each worker has in this episode."""
     anatomy: Anatomy
-    """Constants of the body."""
+    """(N, ...) constants of the bodies that there are."""
     mind: Mind
     """Constants of the behaviour."""
 

@@ -37,6 +37,11 @@ class Who:
     """What they hold when they decide (`plans.LOAD_PROP`)."""
 
     @property
+    def body(self) -> int:
+        """Row of `MotionState.anatomy`."""
+        return self.state.body.item(self.b, self.w)
+
+    @property
     def spot(self) -> Floats:
         """(N_SPOT,) row of `MotionState.spots`."""
         return self.state.spots[self.b, self.w]
@@ -79,10 +84,10 @@ class Who:
 
 
 def who_is(state: MotionState, b: int, w: int, draws: Floats, now: float) -> Who:
-    body = state.anatomy
+    bones, k = state.anatomy, state.body.item(b, w)
     me = Worker(
         state.traits[b, w], state.plan[b, w], state.prints[b, w], state.stance[b, w],
-        body.offset, body.frame, body.size,
+        bones.offset[k], bones.frame[k], bones.size[k],
         np.empty(c.N_CONTROLS), np.zeros((N_POINTS, 3)), np.zeros((N_FRAMES, 3, 3)),
     )  # fmt: skip
     return Who(state, b, w, me, draws, now, me.plan.item(pl.LOAD_PROP))

@@ -170,8 +170,8 @@ def emulate(
     emulate_batch(
         state.slow, state.size, state.swapped, state.missed, normals, uniforms,
         np.ascontiguousarray(truth.joints_world), np.ascontiguousarray(truth.capsules_world),
-        truth.capsule_radius_m, surroundings.still, surroundings.moving, robot,
-        surroundings.capsule_radius_m,
+        np.ascontiguousarray(truth.capsule_radius_m), surroundings.still, surroundings.moving,
+        robot, surroundings.capsule_radius_m,
         P, eyes_world, image, bending, scalars, per_joint, MIRROR, VISIBILITY, ERROR,
         out.px, out.confidence, out.sigma_px,
     )  # fmt: skip

@@ -31,7 +31,7 @@ def emulate_batch(
 ):  # fmt: skip
     """Advance the errors by one image and write keypoints; arguments as in `emulate`."""
     batch, n_cameras, n_workers, n_joints = confidence.shape
-    n_body, n_moving = len(radius), moving.shape[1]
+    n_body, n_moving = radius.shape[2], moving.shape[1]
     first_moving = len(still) + len(robot_radius)
     first_body = first_moving + n_moving
     table = make_table(still, len(robot_radius) + n_moving + n_workers * n_body)
@@ -41,7 +41,7 @@ def emulate_batch(
         set_capsules(table, len(still), robot[b], robot_radius)
         set_rows(table, first_moving, moving[b])
         for w in range(n_workers):
-            set_capsules(table, first_body + w * n_body, capsules[b, w], radius)
+            set_capsules(table, first_body + w * n_body, capsules[b, w], radius[b, w])
         for c in range(n_cameras):
             for w in range(n_workers):
                 _project(P[c], joints[b, w], uv, depth)

@@ -9,7 +9,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from hrc_env.body import load_body
+from hrc_env.body import load_body, pool
 from hrc_env.errors import ConfigError, unknown
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.geometry.chains import SerialChain, capsules
@@ -35,7 +35,8 @@ from hrc_env.scene.props import add_props, paint_props, prop_mocap
 from hrc_env.scene.rig import LAB_CAMERAS, CameraConfig, add_cameras, pinholes, select
 from hrc_env.scene.site import SITE_CAMERAS, add_site, paint_site
 from hrc_env.scene.site_grounds import site_grounds
-from hrc_env.scene.worker import add_worker, mocap_ids
+from hrc_env.scene.wardrobe import Wardrobe, dress, wardrobe
+from hrc_env.scene.worker import add_worker, capsule_geom_ids, mocap_ids
 from hrc_env.typing import Floats, Ints, JointAngles
 
 ROBOT_BASE_WORLD = (*ROBOT_XY_M, 0.75)
@@ -100,7 +101,8 @@ class Scene:
     config: SceneConfig
     name: str
     n_workers: int
-    body_name: str
+    bodies: tuple[str, ...]
+    """Baked bodies that the workers can have; their capsules in `model` are the first one's."""
     model: mujoco.MjModel
     """What moves, touches and hides; `drawing_model` has the looks."""
     chain: SerialChain
@@ -111,6 +113,8 @@ class Scene:
     """(N,) inertia at rest over damping, joint by joint: the rate servos' lead [s]."""
     worker_mocap: Ints
     """(W, S) mocap row of every body segment of every worker."""
+    worker_capsules: Ints
+    """(W, K) geom of every capsule of every worker."""
     obstacles: Floats
     """(G, `shapes.WIDTH`) what stands still and blocks sight."""
     grounds: Grounds
@@ -125,14 +129,14 @@ class Scene:
     def __reduce__(self) -> tuple[Any, ...]:
         """A scene is pickled as its recipe."""
         use = tuple(camera.name for camera in self.cameras)
-        return build, (self.config, self.name, self.n_workers, self.body_name, use)
+        return build, (self.config, self.name, self.n_workers, self.bodies, use)
 
 
 def build(
     config: SceneConfig | None = None,
     name: str = "lab",
     n_workers: int = 0,
-    body_name: str = "worker_1",
+    bodies: str | tuple[str, ...] = "worker_1",
     cameras: Sequence[int | str] | None = None,
 ) -> Scene:
     """The scene of these settings, compiled once and kept.
@@ -141,11 +145,11 @@ def build(
         config: settings; None takes the defaults.
         name: which scene, a key of `SCENES`.
         n_workers: how many workers it has room for, 0 or more.
-        body_name: the baked body of all of them.
+        bodies: the baked body of all of them, or those that they can have; "any": all.
         cameras: names or indices of the cameras that are used; None uses all.
 
     Raises:
-        ConfigError: an unknown scene or camera, or a negative number of workers.
+        ConfigError: an unknown scene, body or camera, or a negative number of workers.
     """
     if name not in SCENES:
         raise unknown("scene", name, SCENES)
@@ -156,31 +160,34 @@ def build(
     if not config.cameras:
         config = replace(config, cameras=SCENES[name].cameras)
     use = tuple(camera.name for camera in select(config.cameras, cameras))
-    return _build(config, name, n_workers, body_name, use)
+    return _build(config, name, n_workers, pool(bodies), use)
 
 
 @lru_cache(maxsize=8)
 def _build(
-    config: SceneConfig, name: str, n_workers: int, body_name: str, use: tuple | None
+    config: SceneConfig, name: str, n_workers: int, bodies: tuple[str, ...], use: tuple | None
 ) -> Scene:
     cameras = pinholes(select(config.cameras, use))
-    spec = _spec(config, name, n_workers, body_name, cameras)
+    spec = _spec(config, name, n_workers, bodies[0], cameras)
     _strip(spec)
     _pair(spec)
     model = spec.compile()
-    rows = [mocap_ids(model, prefix) for prefix in _prefixes(n_workers)]
+    prefixes, body = _prefixes(n_workers), load_body(bodies[0])
+    rows = [mocap_ids(model, prefix) for prefix in prefixes]
+    touched = [capsule_geom_ids(model, body, prefix) for prefix in prefixes]
     still = obstacles(model)
     return Scene(
         config=config,
         name=name,
         n_workers=n_workers,
-        body_name=body_name,
+        bodies=bodies,
         model=model,
         chain=arm_chain(_base_transform()),
         cameras=cameras,
         home_q=HOME_Q.copy(),
         servo_lead_s=_servo_lead_s(model),
         worker_mocap=np.stack(rows) if rows else np.zeros((0, 0), np.int64),
+        worker_capsules=np.array(touched, np.int64).reshape(n_workers, len(body.capsule_names)),
         obstacles=still,
         grounds=SCENES[name].grounds(still, config.clutter),
     )
@@ -192,8 +199,12 @@ def drawing_model(scene: Scene) -> mujoco.MjModel:
 
     The physics' joints and its mocap rows come first, in the same order, so that its state fits.
     """
-    spec = _spec(scene.config, scene.name, scene.n_workers, scene.body_name, scene.cameras)
-    add_props(spec, _prefixes(scene.n_workers))
+    prefixes = _prefixes(scene.n_workers)
+    spec = _spec(scene.config, scene.name, scene.n_workers, scene.bodies[0], scene.cameras)
+    for prefix in prefixes:
+        for name in scene.bodies:
+            dress(spec, load_body(name), load_looks(name), prefix)
+    add_props(spec, prefixes)
     SCENES[scene.name].paint(spec)
     paint_props(spec)
     return spec.compile()
@@ -202,6 +213,11 @@ def drawing_model(scene: Scene) -> mujoco.MjModel:
 def drawn_props(scene: Scene) -> Ints:
     """(W, len(PROPS) - 1) mocap rows in the drawing model of what the workers can hold."""
     return prop_mocap(drawing_model(scene), _prefixes(scene.n_workers))
+
+
+def drawn_looks(scene: Scene) -> Wardrobe:
+    """Where the looks of the workers' bodies are in the drawing model."""
+    return wardrobe(drawing_model(scene), _prefixes(scene.n_workers), scene.bodies)
 
 
 def _spec(
@@ -218,18 +234,19 @@ def _spec(
     spec.option.timestep = config.sim_dt
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.memory = ARENA_BYTES
-    spec.nuserdata = len(HOME_Q)  # the velocity command in force, part of the state
+    # The velocity command in force, and which body each worker has: part of the state.
+    spec.nuserdata = len(HOME_Q) + n_workers
     SCENES[name].add(spec, config.clutter)
     add_arm(spec, ROBOT_BASE_WORLD, ROBOT_YAW_RAD)
     add_cameras(spec, cameras)
     for prefix in _prefixes(n_workers):
-        add_worker(spec, load_body(body_name), load_looks(body_name), prefix)
+        add_worker(spec, load_body(body_name), prefix)
     return spec
 
 
 def _strip(spec: mujoco.MjSpec) -> None:
-    """Take away what only the eye needs: geoms, skins, meshes, pictures, and bodies of nothing
-    else. Twice as fast."""
+    """Take away what only the eye needs: geoms, meshes, pictures, and bodies of nothing else.
+    Twice as fast."""
     for geom in spec.geoms:
         if geom.group in (DECORATION, ROBOT_LOOKS, OVERHEAD):
             spec.delete(geom)
@@ -238,7 +255,7 @@ def _strip(spec: mujoco.MjSpec) -> None:
     for body in spec.worldbody.bodies:
         if not (body.mocap or body.geoms or body.bodies):
             spec.delete(body)
-    for unseen in (*spec.skins, *spec.meshes, *spec.materials, *spec.textures):
+    for unseen in (*spec.meshes, *spec.materials, *spec.textures):
         spec.delete(unseen)
 
 

@@ -18,9 +18,10 @@ from hrc_env.errors import RenderingError, check_shape
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.records import CropWindow, WorkerMotion
 from hrc_env.scene import gl
-from hrc_env.scene.build import Scene, drawing_model, drawn_props
+from hrc_env.scene.build import Scene, drawing_model, drawn_looks, drawn_props
 from hrc_env.scene.props import pose_props
 from hrc_env.scene.rig import glcam_axes
+from hrc_env.scene.wardrobe import wear
 from hrc_env.typing import Image, JointAngles
 
 EVERYTHING = int(mujoco.mjtCatBit.mjCAT_ALL)
@@ -47,7 +48,8 @@ class Canvas:
         view = self._model.vis.global_
         view.offwidth, view.offheight = width_px, height_px
         self._data = mujoco.MjData(self._model)
-        self._props = drawn_props(scene)
+        self._props, self._looks = drawn_props(scene), drawn_looks(scene)
+        wear(self._model, self._looks, None)
         self._option = mujoco.MjvOption()
         self._option.sitegroup[:] = 0
         self._camera = mujoco.MjvCamera()
@@ -70,6 +72,7 @@ class Canvas:
             self._data.mocap_pos[rows] = np.reshape(motion.position_world, (*rows.shape, 3))
             self._data.mocap_quat[rows] = np.reshape(motion.quaternion_wxyz, (*rows.shape, 4))
             pose_props(self._model, self._data, self._props, motion.held)
+            wear(self._model, self._looks, motion.body)
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_comPos(self._model, self._data)
         mujoco.mj_camlight(self._model, self._data)

@@ -13,6 +13,7 @@ from hrc_env.errors import ConfigError, HRCError, check_shape
 from hrc_env.records import WorkerPath
 from hrc_env.scene.build import Scene
 from hrc_env.scene.commands import substep_commands
+from hrc_env.scene.worker import CAPSULE_FIELDS, capsule_shapes
 from hrc_env.typing import Floats, Ints, JointAngles, JointVelocities
 
 INPUTS = int(
@@ -40,7 +41,10 @@ class Physics:
         self._n = scene.chain.n_joints
         self._sims = Batch(scene.model, nsim=batch, nthread=1)
         self._qpos, self._qvel = self._sims.bind("qpos"), self._sims.bind("qvel")
-        self._act, self._command = self._sims.bind("act"), self._sims.bind("userdata")
+        self._act, kept = self._sims.bind("act"), self._sims.bind("userdata")
+        self._command, self._body = kept[:, : self._n], kept[:, self._n :]
+        several = len(scene.bodies) > 1
+        self._shapes = {name: self._sims.expand(name) for name in CAPSULE_FIELDS if several}
         self._control, self._trace = np.zeros((batch, 0, 0)), {}
         self.reset(np.arange(batch), np.tile(scene.home_q, (batch, 1)))
 
@@ -54,13 +58,18 @@ class Physics:
         """(B, N) the arm's velocities [rad/s], a copy."""
         return self._qvel[:, : self._n].copy()
 
-    def reset(self, ids: Ints, q: JointAngles) -> None:
-        """Put environments `ids` (sorted) to rest at angles q (len(ids), N) [rad]."""
+    def reset(self, ids: Ints, q: JointAngles, body: Ints | None = None) -> None:
+        """Put environments `ids` (sorted) to rest at angles q (len(ids), N) [rad].
+
+        Their workers have bodies (len(ids), W) of the scene's; None: the first.
+        """
         ids = np.asarray(ids, int)
         check_shape("q", np.shape(q), (len(ids), self._n), "one row per id, one angle per joint")
         self._sims.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE.value)
         self._qpos[ids, : self._n] = q
         self._act[ids, : self._n] = q
+        self._body[ids] = 0 if body is None else body
+        self._dress(ids)
 
     def step(self, qd_command: JointVelocities, workers: WorkerPath) -> JointAngles:
         """One control step of every environment.
@@ -101,6 +110,7 @@ class Physics:
         """Continue from a state that `get_state` gave (same scene and batch)."""
         check_shape("state", np.shape(state), self._sims.state.shape, "batch, state")
         self._sims.state[:] = state
+        self._dress(np.arange(self.batch))
 
     def __getstate__(self) -> tuple[Scene, int, Floats]:
         return self.scene, self.batch, self.get_state()
@@ -109,6 +119,13 @@ class Physics:
         scene, batch, state = saved
         self.__init__(scene, batch)
         self.set_state(state)
+
+    def _dress(self, ids: Ints) -> None:
+        """Give the workers of environments `ids` the capsules of their bodies."""
+        body, geoms = self._body[ids].astype(np.int64), self.scene.worker_capsules
+        known = capsule_shapes(self.scene.bodies) if self._shapes else {}
+        for name, shapes in self._shapes.items():
+            shapes[ids[:, None, None], geoms] = known[name][body]
 
     def _fit(self, workers: WorkerPath) -> None:
         """Check the path's axes; make the buffers when the number of substeps is new."""

@@ -7,8 +7,9 @@ import mujoco
 
 from hrc_env.errors import RenderingError
 from hrc_env.records import WorkerMotion
-from hrc_env.scene.build import Scene, drawing_model, drawn_props
+from hrc_env.scene.build import Scene, drawing_model, drawn_looks, drawn_props
 from hrc_env.scene.props import pose_props
+from hrc_env.scene.wardrobe import wear
 from hrc_env.typing import JointAngles
 
 
@@ -32,7 +33,7 @@ class Viewer:
         """
         self._scene, self._model = scene, viewing_model(scene)
         self._data = mujoco.MjData(self._model)
-        self._props = drawn_props(scene)
+        self._props, self._looks = drawn_props(scene), drawn_looks(scene)
         try:
             from mujoco import viewer
 
@@ -54,6 +55,7 @@ class Viewer:
                 self._data.mocap_pos[rows] = motion.position_world
                 self._data.mocap_quat[rows] = motion.quaternion_wxyz
                 pose_props(self._model, self._data, self._props, motion.held)
+                wear(self._model, self._looks, motion.body)
             mujoco.mj_forward(self._model, self._data)
         self._window.sync()
 

@@ -1,32 +1,31 @@
-"""Put a baked worker into a MuJoCo model: mocap bodies, two skins, a hard hat, capsules.
+"""Put a baked worker into a MuJoCo model: mocap bodies, and capsules round them.
 
 The worker is moved, not simulated: 22 mocap bodies take positions and rotations straight
-from `WorkerMotion`. Skins have no geoms, so what touches the worker are capsules that no
-camera draws and that meet only geoms whose conaffinity has the workers' bit.
+from `WorkerMotion`. What one sees (`wardrobe`) nobody can touch; what touches the worker are
+capsules that no camera draws and that meet only geoms whose conaffinity has the workers' bit.
 """
 
+from functools import lru_cache
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from hrc_env.body import SEGMENTS, Body
+from hrc_env.body import SEGMENTS, Body, load_body
 from hrc_env.errors import ConfigError
-from hrc_env.looks import HatLooks, Looks, SkinLooks
-from hrc_env.scene.primitives import LOOKS_ONLY, WORKER_BIT, WORKER_CAPSULES, capsule
-from hrc_env.typing import Ints
+from hrc_env.scene.primitives import WORKER_BIT, WORKER_CAPSULES, capsule
+from hrc_env.typing import Floats, Ints
 
-SKIN_SPECULAR, SKIN_SHININESS = 0.08, 0.15
-HAT_SPECULAR, HAT_SHININESS = 0.45, 0.55
+CAPSULE_FIELDS = ("geom_pos", "geom_quat", "geom_size", "geom_rbound", "geom_aabb")
+"""Fields of MuJoCo's model in which the capsules of two bodies differ."""
 
 
-def add_worker(spec: Any, body: Body, looks: Looks, prefix: str) -> None:
+def add_worker(spec: Any, body: Body, prefix: str) -> None:
     """Add a worker in its rest pose to a model that is being built.
 
     Args:
         spec: the model.
         body: measures.
-        looks: surfaces and textures.
         prefix: what every name of this worker starts with, for example "worker_1/".
 
     Raises:
@@ -38,10 +37,6 @@ def add_worker(spec: Any, body: Body, looks: Looks, prefix: str) -> None:
         name: spec.worldbody.add_body(name=prefix + name, pos=position, mocap=True)
         for name, position in zip(SEGMENTS, body.rest_position, strict=True)
     }
-    for skin in looks.skins:
-        _add_skin(spec, skin, body, prefix)
-    if looks.hat is not None:
-        _add_hat(spec, segments["head"], looks.hat, prefix)
     for row, name in enumerate(body.capsule_names):
         capsule(
             segments[SEGMENTS[body.capsule_segment[row]]],
@@ -78,44 +73,15 @@ def capsule_geom_ids(model: Any, body: Body, prefix: str) -> Ints:
     return np.array([model.geom(prefix + name).id for name in body.capsule_names], dtype=np.int64)
 
 
-def _add_skin(spec: Any, skin: SkinLooks, body: Body, prefix: str) -> None:
-    name = prefix + skin.name
-    height, width = skin.texture.shape[:2]
-    texture = spec.add_texture(
-        name=name, type=mujoco.mjtTexture.mjTEXTURE_2D, width=width, height=height, nchannel=3
-    )
-    texture.data = skin.texture.tobytes()
-    material = spec.add_material(name=name, specular=SKIN_SPECULAR, shininess=SKIN_SHININESS)
-    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
-    moved = np.flatnonzero(skin.weights.any(0))
-    spec.add_skin(
-        name=name,
-        material=name,
-        rgba=[1, 1, 1, 1],
-        vert=skin.vertices.astype(np.float32).ravel(),
-        face=skin.faces.astype(np.int32).ravel(),
-        texcoord=skin.uv.astype(np.float32).ravel(),
-        bodyname=[prefix + SEGMENTS[segment] for segment in moved],
-        bindpos=body.rest_position[moved].astype(np.float32).ravel(),
-        bindquat=np.tile(np.array([1, 0, 0, 0], np.float32), len(moved)),
-        vertid=[np.flatnonzero(skin.weights[:, s]).astype(np.int32) for s in moved],
-        vertweight=[skin.weights[skin.weights[:, s] > 0, s].astype(np.float32) for s in moved],
-    )
-
-
-def _add_hat(spec: Any, head: Any, hat: HatLooks, prefix: str) -> None:
-    name = prefix + "hat"
-    spec.add_mesh(
-        name=name,
-        uservert=hat.vertices.ravel(),
-        userface=hat.faces.ravel(),
-        inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
-    )
-    spec.add_material(name=name, rgba=[*hat.rgb, 1], specular=HAT_SPECULAR, shininess=HAT_SHININESS)
-    head.add_geom(
-        name=name,
-        type=mujoco.mjtGeom.mjGEOM_MESH,
-        meshname=name,
-        material=name,
-        **LOOKS_ONLY,
-    )
+@lru_cache(maxsize=16)
+def capsule_shapes(bodies: tuple[str, ...]) -> dict[str, Floats]:
+    """The capsules of bodies as MuJoCo compiles them: (N, K, ...) by the names of its fields."""
+    shapes: dict[str, list[Floats]] = {name: [] for name in CAPSULE_FIELDS}
+    for name in bodies:
+        spec = mujoco.MjSpec()
+        add_worker(spec, load_body(name), "")
+        model = spec.compile()
+        geoms = capsule_geom_ids(model, load_body(name), "")
+        for field, values in shapes.items():
+            values.append(getattr(model, field)[geoms])
+    return {field: np.stack(values) for field, values in shapes.items()}

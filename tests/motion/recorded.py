@@ -39,7 +39,7 @@ def walk_straight(speed_m_s, length_m=6.0, dt_s=0.005):
     """A walk along +x, alone: its plan, footprints and motion."""
     state, rngs = started(1)
     plan, prints, stance = state.plan[0, 0], state.prints[0, 0], state.stance[0, 0]
-    size = state.anatomy.size
+    size = state.anatomy.size[0]
     plan[:] = 0.0
     for side in range(2):
         footprint(side, 0.0, 0.0, 0.0, STANCE_HALF_WIDTH_M, size, stance[side])

@@ -13,6 +13,7 @@ from hrc_env.body import PARENT, SEGMENT, SEGMENTS, load_body, worker_truth
 from hrc_env.errors import ConfigError
 from hrc_env.geometry.rotations import matrix_from_quaternion
 from hrc_env.motion import anatomy, generator
+from hrc_env.records import WorkerMotion
 
 HANDS = [SEGMENT["left_hand"], SEGMENT["right_hand"]]
 BASE = np.array(generator.OPEN_FLOOR.robot_xy_m)
@@ -190,9 +191,9 @@ def test_bodies_keep_clear_of_the_pedestal_and_of_the_walls(shift):
 
 def test_hands_stay_out_of_the_trunk(shift):
     body = load_body()
-    few = type("Motion", (), {k: v[:, ::20] for k, v in vars(shift.motion).items()})
-    truth = worker_truth(body, few)  # pyright: ignore[reportArgumentType]
-    capsules, radius = truth.capsules_world, truth.capsule_radius_m
+    few = WorkerMotion(**{k: v[:, ::20] for k, v in vars(shift.motion).items()})
+    truth = worker_truth(body, few)
+    capsules, radius = truth.capsules_world, body.capsule_radius_m
     for hand in ("left_hand", "right_hand"):
         middle = capsules[..., body.capsule_names.index(hand), :, :].mean(-2)
         for part in ("chest", "torso", "abdomen"):

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from recorded import started, watched
 
+from hrc_env.batching import one
 from hrc_env.body import SEGMENT
 from hrc_env.motion import controls as c
 from hrc_env.motion import generator
@@ -22,7 +23,7 @@ def worker(activity, planner, *arguments):
     """A worker at (0.4, 0) facing the robot, who has just begun to reach or lift."""
     state = STATE
     plan, prints, stance = state.plan[0, 0], state.prints[0, 0], state.stance[0, 0]
-    bones = state.anatomy
+    bones = one(state.anatomy, 0)
     plan[:] = 0.0
     plan[pl.STEP_PERIOD], plan[pl.STEP_SWING] = 1.0, 0.5
     plan[pl.START_X] = plan[pl.END_X] = 0.4

@@ -55,7 +55,7 @@ def test_corners_too_near_each_other_share_the_way_between_them():
 def test_a_walker_who_brakes_stands_soon_and_never_jumps(when_s):
     state, rngs = started(1)
     plan, prints, stance = state.plan[0, 0], state.prints[0, 0], state.stance[0, 0]
-    size = state.anatomy.size
+    size = state.anatomy.size[0]
     plan[:] = 0.0
     for side in range(2):
         footprint(side, 0.0, 0.0, 0.0, STANCE_HALF_WIDTH_M, size, stance[side])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from recorded import joined, started, walk_straight, watched
 
+from hrc_env.batching import one
 from hrc_env.body import SEGMENT, load_body, worker_truth
 from hrc_env.config import resolve, with_motions
 from hrc_env.errors import ConfigError
@@ -92,7 +93,7 @@ def test_the_recorded_pose_is_the_one_that_is_seen(clip):
     q = np.zeros((1, c.N_CONTROLS))
     q[0, : c.N_BLENDED] = piece.frames[k, : c.N_BLENDED]
     q[0, c.ANKLE : c.ANKLE + 12] = piece.frames[k, c.N_BLENDED :]
-    recorded = segments_in(q, state.anatomy)[0][0]
+    recorded = segments_in(q, one(state.anatomy, 0))[0][0]
     between = np.linalg.norm(position[:, None] - position[None], axis=-1)
     assert (
         np.abs(between - np.linalg.norm(recorded[:, None] - recorded[None], axis=-1)).max() < 0.02
@@ -105,7 +106,7 @@ def test_a_long_clip_is_played_in_pieces_from_both_feet_to_both_feet(clip):
     for at in (c.ROOT_X, c.ANKLE, c.ANKLE + 6):
         again[:, at : at + 2] += step[:, None] * (clip.controls[-1, :2] - clip.controls[0, :2])
     long = dataclasses.replace(clip, controls=again, contacts=np.concatenate([clip.contacts] * 20))
-    pieces = stocked([long], clip.size)
+    pieces = stocked([long], clip.size[None])
     assert len(pieces.count) > 2
     assert (pieces.count / pieces.fps <= LONGEST_S + 1 / FPS).all()
     first = pieces.frames[pieces.row]
@@ -115,7 +116,7 @@ def test_a_long_clip_is_played_in_pieces_from_both_feet_to_both_feet(clip):
 def test_a_clip_that_is_never_on_both_feet_is_refused(clip):
     hopping = dataclasses.replace(clip, contacts=np.zeros_like(clip.contacts))
     with pytest.raises(ConfigError, match="on both feet at 0 frames"):
-        stocked([hopping], clip.size)
+        stocked([hopping], clip.size[None])
 
 
 def test_motions_come_as_paths_or_clips(clip, tmp_path):

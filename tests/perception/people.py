@@ -24,4 +24,5 @@ def truth(batch=1, n_workers=1, at=(0.9, 0.0, 0.0)):
     """`STANDING` at a place in every environment; further workers stand 1 m aside."""
     shift = np.array(at) + np.arange(n_workers)[:, None] * [0.0, 1.0, 0.0]
     joints = np.broadcast_to(STANDING + shift[:, None], (batch, n_workers, 15, 3)).copy()
-    return WorkerTruth(joints, np.zeros_like(joints), segments(joints), SEGMENT_RADIUS_M)
+    radius_m = np.tile(SEGMENT_RADIUS_M, (batch, n_workers, 1))
+    return WorkerTruth(joints, np.zeros_like(joints), segments(joints), radius_m)

@@ -8,6 +8,7 @@ from hrc_env.body import SEGMENT, SEGMENTS, load_body, rest_motion, worker_truth
 from hrc_env.errors import ConfigError
 from hrc_env.looks import load_looks
 from hrc_env.records import WorkerMotion
+from hrc_env.scene.wardrobe import dress
 from hrc_env.scene.worker import add_worker, capsule_geom_ids, mocap_ids
 
 PREFIX = "worker_1/"
@@ -16,7 +17,8 @@ PREFIX = "worker_1/"
 @pytest.fixture(scope="module")
 def model() -> mujoco.MjModel:
     spec = mujoco.MjSpec()
-    add_worker(spec, load_body(), load_looks(), PREFIX)
+    add_worker(spec, load_body(), PREFIX)
+    dress(spec, load_body(), load_looks(), PREFIX)
     return spec.compile()
 
 
@@ -90,7 +92,7 @@ def test_capsules_are_felt_but_not_seen_and_the_hat_is_seen_but_not_felt(model):
     assert np.all(model.geom_group[capsules] == 4)
     assert np.all(model.geom_contype[capsules] == 4)
     assert np.all(model.geom_conaffinity[capsules] == 0)
-    hat = model.geom(PREFIX + "hat").id
+    hat = model.geom(PREFIX + "worker_1_hat").id
     assert model.geom_contype[hat] == model.geom_conaffinity[hat] == 0
     assert mujoco.MjvOption().geomgroup[4] == 0
 
@@ -102,18 +104,19 @@ def test_a_worker_adds_nothing_that_could_fall_or_swing(model):
 def test_two_workers_share_a_model_under_their_own_names():
     spec = mujoco.MjSpec()
     for prefix in ("worker_1/", "worker_2/"):
-        add_worker(spec, load_body(), load_looks(), prefix)
+        add_worker(spec, load_body(), prefix)
+        dress(spec, load_body(), load_looks(), prefix)
     model = spec.compile()
     first, second = mocap_ids(model, "worker_1/"), mocap_ids(model, "worker_2/")
     assert len(set(first) | set(second)) == 44
-    assert model.nskin == 4
+    assert (model.nskin, model.ntex) == (4, 2)
 
 
 def test_a_second_worker_of_the_same_name_is_refused():
     spec = mujoco.MjSpec()
-    add_worker(spec, load_body(), load_looks(), PREFIX)
+    add_worker(spec, load_body(), PREFIX)
     with pytest.raises(ConfigError, match="already"):
-        add_worker(spec, load_body(), load_looks(), PREFIX)
+        add_worker(spec, load_body(), PREFIX)
 
 
 def test_asking_for_a_worker_who_is_not_there_says_so(model):

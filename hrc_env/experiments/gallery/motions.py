@@ -63,7 +63,7 @@ def strip(name: str, body_name: str, seed: int = 0) -> Image:
         body_name: of the worker.
         seed: of what the scene leaves open.
     """
-    scene = build(name="site", n_workers=1, body_name=body_name)
+    scene = build(name="site", n_workers=1, bodies=body_name)
     stage = stage_of(name)
     me = alone(load_body(body_name), stage.xy_m, stage.yaw_rad)
     films = perform(REPERTOIRE[name], me, np.random.default_rng(seed), DT_S)

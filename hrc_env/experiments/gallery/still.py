@@ -33,7 +33,7 @@ OVERVIEW = {"lab": "room", "site": "overview"}
 
 def portrait(body_name: str, seed: int = 1) -> Image:
     """A worker on the laboratory's floor, from before and a little aside."""
-    scene = build(n_workers=1, body_name=body_name)
+    scene = build(n_workers=1, bodies=body_name)
     x, y, yaw = SITTING
     me = alone(load_body(body_name), (x, y), yaw)
     film = perform(REPERTOIRE["stand"], me, np.random.default_rng(seed), 0.1)[0]
@@ -47,7 +47,7 @@ def portrait(body_name: str, seed: int = 1) -> Image:
 def views(scene_name: str, body_name: str) -> dict[str, Image]:
     """A scene with people at work: one view for people, then what each camera sees."""
     cast = CASTS[scene_name]
-    scene = build(name=scene_name, n_workers=len(cast), body_name=body_name)
+    scene = build(name=scene_name, n_workers=len(cast), bodies=body_name)
     motion = _together([_at_work(scene, body_name, *role) for role in cast])
     renderer = PictureRenderer(scene, *PLACE_PX)
     names = (OVERVIEW[scene_name], *(camera.name for camera in scene.cameras))

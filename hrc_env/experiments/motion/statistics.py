@@ -100,7 +100,7 @@ def misses(film: Film) -> Floats:
 def depths(film: Film, body: Body) -> Floats:
     """(T,) how deep limbs are in what they should not be in [m]; negative: how far away."""
     truth = worker_truth(body, film.motion)
-    capsules, radius = truth.capsules_world[:, 0], truth.capsule_radius_m
+    capsules, radius = truth.capsules_world[:, 0], truth.capsule_radius_m[0, 0]
     deepest = np.full(len(film.time_s), -np.inf)
     for limb, part in _pairs(body):
         a, b = capsules[:, part, 0, None], capsules[:, part, 1, None]

@@ -82,7 +82,7 @@ def _episodes(seeds: tuple[int, ...]) -> tuple[Points3, Keypoints, Keypoints]:
         action = _wander(action, rngs[2])
         simulation.step(np.clip(action, -1, 1))
         motion = generator.current(simulation.motion)
-        truth = worker_truth(simulation.body, motion)
+        truth = worker_truth(simulation.bodies, motion)
         lab = simulation.scene.surroundings(simulation.physics.q, motion.held)
         joints.append(truth.joints_world.copy())
         for k, between in enumerate((nothing(batch), lab)):
