@@ -20,6 +20,7 @@ import tyro
 
 from agents import ppo
 from agents.base import Situation
+from agents.curriculum import ProximityCurriculum, Ramp
 from agents.evaluate import evaluate
 from agents.monitor import Curve, TrainingMonitor, plot_curve
 from hrc_env.config import resolve
@@ -48,6 +49,8 @@ class Arguments:
     """joint or tool."""
     proximity: float = 2.0
     """Weight of closeness to the estimated body in the reward; 0 trains without it."""
+    ramp: tuple[int, int] = (100_000, 400_000)
+    """Environment steps between which that weight grows from 0: the task first, then care."""
     threads: int | None = None
     """Threads for the environments, and for the gradients; all cores by default."""
     episodes: int = 128
@@ -58,7 +61,7 @@ class Arguments:
     """A folder of an earlier run to go on with; its environment and seed stay what they were."""
 
 
-LEARNT_WITH = ("num_envs", "seed", "perception", "estimator", "control", "proximity")
+LEARNT_WITH = ("num_envs", "seed", "perception", "estimator", "control", "proximity", "ramp")
 """Arguments that a resumed run takes from the run that it goes on with."""
 
 
@@ -106,7 +109,8 @@ def as_before(arguments: Arguments, folder: Path) -> Arguments:
     if not record.exists():
         raise CheckpointError(f"{folder} holds no run to resume: {record} is missing.")
     before = json.loads(record.read_text())["arguments"]
-    return replace(arguments, **{name: before[name] for name in LEARNT_WITH})
+    kept = {name: before[name] for name in LEARNT_WITH}
+    return replace(arguments, **{**kept, "ramp": tuple(kept["ramp"])})
 
 
 def environment_arguments(arguments: Arguments) -> dict[str, Any]:
@@ -138,11 +142,13 @@ def train(arguments: Arguments, folder: Path, kwargs: dict[str, Any]) -> tuple[C
     else:
         learner = ppo.make_learner(env, settings, arguments.seed, folder / "tensorboard")
     facts = {"environment": kwargs, "settings": ppo.settings_as_dict(settings)}
-    monitor = TrainingMonitor(folder, arguments.timesteps, facts, curve)
+    ramp = Ramp(*arguments.ramp)
+    care = ProximityCurriculum(ramp, env)
+    monitor = TrainingMonitor(folder, arguments.timesteps, facts, curve, ramp)
     started_s = time.monotonic()
     learner.learn(
         arguments.timesteps - learner.num_timesteps,
-        callback=monitor,
+        callback=[care, monitor],
         reset_num_timesteps=arguments.resume is None,
         tb_log_name="ppo",
     )

@@ -20,6 +20,7 @@ from rich.progress import (
 from stable_baselines3.common.callbacks import BaseCallback
 
 from . import ppo
+from .curriculum import Ramp
 from .evaluate import summarise
 
 RECENT_EPISODES = 64
@@ -43,10 +44,11 @@ class TrainingMonitor(BaseCallback):
     """Keeps the curve, shows the progress, saves a checkpoint every minute and at the end."""
 
     def __init__(
-        self, folder: Path, total_timesteps: int, facts: dict[str, Any], curve: Curve
+        self, folder: Path, total_timesteps: int, facts: dict[str, Any], curve: Curve, ramp: Ramp
     ) -> None:
         super().__init__()
         self.folder, self.total, self.facts, self.curve = folder, total_timesteps, facts, curve
+        self.ramp = ramp
         self.recent: deque[dict[str, float]] = deque(maxlen=RECENT_EPISODES)
         self.before_s = curve.points[-1]["wall_s"] if curve.points else 0.0
         self.bar = Progress(
@@ -86,7 +88,12 @@ class TrainingMonitor(BaseCallback):
         if self.recent:
             score = summarise(list(self.recent))
             wall_s = self.before_s + time.monotonic() - self.started_s
-            point = {"steps": float(self.num_timesteps), "wall_s": wall_s, **score.as_dict()}
+            point = {
+                "steps": float(self.num_timesteps),
+                "wall_s": wall_s,
+                "safety_share": self.ramp.at(self.num_timesteps),
+                **score.as_dict(),
+            }
             self.curve.points.append(point)
             for name, value in score.as_dict().items():
                 self.logger.record(f"episode/{name}", value)
@@ -119,6 +126,12 @@ def plot_curve(curve: Curve, path: Path, title: str) -> None:
         axis.set_ylabel(label)
         axis.set_ylim(bottom=0)
         axis.grid(alpha=0.3)
+    share = np.array([point.get("safety_share", 1.0) for point in curve.points])
+    growing = minutes[(share > 0) & (share < 1)]
+    if len(growing):
+        for axis in axes.ravel():
+            axis.axvspan(growing[0], growing[-1], color="grey", alpha=0.15, linewidth=0)
+        axes[1, 0].set_title("grey: the safety term grows", fontsize=9)
     axes[0, 0].axhline(0.8, color="grey", linestyle="--", linewidth=0.8)
     axes[0, 0].set_ylim(0, 1.05)
     for axis in axes[1]:

@@ -17,6 +17,7 @@ from hrc_env import observations
 from hrc_env.config import HRCConfig, resolve, with_cameras, with_motions, with_people
 from hrc_env.errors import ConfigError, unknown
 from hrc_env.motion.generator import Clip, PeopleConfig
+from hrc_env.rewards import RewardConfig
 from hrc_env.simulation import Simulation, checked_action
 from hrc_env.stateful import Stateful
 from hrc_env.typing import Floats
@@ -111,6 +112,10 @@ class HRCReachEnv(Stateful, gymnasium.Env[NDArray[np.float32], NDArray[np.float3
             False,  # time limits are gymnasium's TimeLimit
             outcome.info_of(0),
         )
+
+    def set_reward(self, weights: RewardConfig) -> None:
+        """Weigh the reward's terms so from the next step on."""
+        self.simulation.reward_weights = weights
 
     def render(self) -> NDArray[Any] | None:  # type: ignore[override]
         """The scene from a good viewpoint, as the render mode says."""

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
 from hrc_env.errors import ConfigError
+from hrc_env.rewards import RewardConfig
 from hrc_env.simulation import Simulation
 from hrc_env.typing import Bools, Floats, Ints
 from hrc_env.vector_env import HRCVectorEnv
@@ -103,6 +104,10 @@ class HRCVecEnv(VecEnv):
             self.reset_infos[b] = _info_of(fresh, b)
         self._begin(ended)
         return observation, reward.astype(np.float32), done, infos
+
+    def set_reward(self, weights: RewardConfig) -> None:
+        """Weigh the reward's terms so from the next step on, in every environment."""
+        self.env.set_reward(weights)
 
     def close(self) -> None:
         """Release threads and graphics contexts."""

@@ -52,7 +52,7 @@ class Simulation(Stateful):
 
     CHANGES = (
         "physics", "senses", "motion", "task", "streams", "action", "episode_cost",
-        "estimate", "ahead", "worn",
+        "estimate", "ahead", "worn", "reward_weights",
     )  # fmt: skip
 
     def __init__(
@@ -67,7 +67,7 @@ class Simulation(Stateful):
         config: HRCConfig,
     ) -> None:
         self.batch, self.config, self.control = batch, config, control
-        self.perception = perception
+        self.perception, self.reward_weights = perception, config.reward
         self.bodies = stack(pool(config.worker))
         fewest, most = worker_counts(n_workers)
         self.scene = build(config.scene, scene, most, self.bodies.names, cameras)
@@ -141,7 +141,7 @@ class Simulation(Stateful):
             self.task, streams.task, robot.tool_world, config.ctrl_dt, config.task
         )
         believed = self._believed(self._everyone, robot, estimate, ahead)
-        reward, terms = rewards.reward(believed, progress, previous, config.reward)
+        reward, terms = rewards.reward(believed, progress, previous, self.reward_weights)
 
         workers = worker_capsules(self.bodies, path, motion.body)
         cost = metrics.cost(

@@ -24,6 +24,7 @@ from hrc_env.env import RENDER_MODES, spaces
 from hrc_env.errors import ConfigError, unknown
 from hrc_env.motion.generator import Clip, PeopleConfig
 from hrc_env.outcome import Outcome
+from hrc_env.rewards import RewardConfig
 from hrc_env.shards import Shards, n_cores
 from hrc_env.simulation import Simulation, checked_action
 from hrc_env.stateful import Stateful
@@ -182,6 +183,11 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
         self._observation, self._ended = observation, ended
         infos = {**finals, **info.arrays(np.ones_like(ended))}
         return observation.copy(), reward, terminated, truncated, infos
+
+    def set_reward(self, weights: RewardConfig) -> None:
+        """Weigh the reward's terms so from the next step on, in every environment."""
+        for part in self.shards.parts:
+            part.reward_weights = weights
 
     def render(self) -> tuple[NDArray[Any], ...] | None:  # type: ignore[override]
         """A picture of every environment, one after the other (slow), as the render mode says."""

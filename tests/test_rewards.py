@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 from hrc_env.belief import Believed
+from hrc_env.env import HRCReachEnv
 from hrc_env.geometry.distances import Gap
 from hrc_env.records import PoseEstimate, RobotState
 from hrc_env.rewards import TERMS, RewardConfig, closeness, reward
 from hrc_env.tasks.reach import ReachProgress
+from hrc_env.vector_env import HRCVectorEnv
 
 
 def believed(gap_m: float, action: float = 0.0, workers: int = 1) -> Believed:
@@ -67,3 +69,21 @@ def test_the_nearest_of_several_workers_counts_and_nobody_costs_nothing():
 def test_a_term_that_is_not_a_number_is_a_fault_and_raises():
     with pytest.raises(FloatingPointError, match="progress"):
         reward(believed(1.0), progress(np.nan), np.zeros((1, 6)), RewardConfig())
+
+
+def proximity_of(env, weight):
+    """The proximity term of a first step with this weight, and a reach as wide as the room."""
+    env.reset(seed=3)
+    env.set_reward(RewardConfig(proximity=weight, proximity_reach_m=20.0))
+    action = np.zeros(env.action_space.shape, np.float32)
+    return env.step(action)[-1]["reward/proximity"]
+
+
+def test_weights_that_change_in_the_course_of_a_run_count_from_the_next_step_on():
+    single = HRCReachEnv(perception="truth")
+    several = HRCVectorEnv(2, perception="truth")
+    for env in (single, several):
+        once, thrice = proximity_of(env, 1.0), proximity_of(env, 3.0)
+        assert np.all(once < 0)
+        np.testing.assert_allclose(thrice, 3 * once)
+    assert single.simulation.get_state()["reward_weights"].proximity == 3.0

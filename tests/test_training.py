@@ -12,6 +12,7 @@ import pytest
 
 from agents import ppo
 from agents.base import make_agent, situation
+from agents.curriculum import Ramp
 from agents.evaluate import evaluate
 from hrc_env.env import HRCReachEnv
 from hrc_env.errors import CheckpointError, ConfigError
@@ -149,3 +150,19 @@ def test_yielding_touches_people_less_often():
         for name in ("scripted", "scripted_slowed")
     )
     assert yielding.contacts_per_episode < 0.8 * reckless.contacts_per_episode
+
+
+def test_the_safety_term_grows_between_the_steps_that_were_named(tmp_path):
+    folder = tmp_path / "careful"
+    done = train("--timesteps", 1024, "--out", folder, "--ramp", 300, 700)
+    assert done.returncode == 0, done.stderr
+    points = json.loads((folder / "curve.json").read_text())
+    assert [point["safety_share"] for point in points if point["steps"] <= 256] == [0.0]
+    assert all(0 < p["safety_share"] < 1 for p in points if 300 < p["steps"] < 700)
+    assert points[-1]["safety_share"] == 1.0
+
+
+@pytest.mark.parametrize("ramp", [(-1, 5), (6, 5)])
+def test_a_ramp_that_runs_backwards_is_refused(ramp):
+    with pytest.raises(ConfigError, match="0 <= start <= end"):
+        Ramp(*ramp)
