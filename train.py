@@ -49,8 +49,9 @@ class Arguments:
     """joint or tool."""
     proximity: float = 2.0
     """Weight of closeness to the estimated body in the reward; 0 trains without it."""
-    ramp: tuple[int, int] = (100_000, 400_000)
-    """Environment steps between which that weight grows from 0: the task first, then care."""
+    ramp: int = 400_000
+    """Environment steps in which that weight grows from 0: the task first, then care. 0: all of
+    it from the start; the policy learns several times slower, and is more careful in the end."""
     threads: int | None = None
     """Threads for the environments, and for the gradients; all cores by default."""
     episodes: int = 128
@@ -109,8 +110,7 @@ def as_before(arguments: Arguments, folder: Path) -> Arguments:
     if not record.exists():
         raise CheckpointError(f"{folder} holds no run to resume: {record} is missing.")
     before = json.loads(record.read_text())["arguments"]
-    kept = {name: before[name] for name in LEARNT_WITH}
-    return replace(arguments, **{**kept, "ramp": tuple(kept["ramp"])})
+    return replace(arguments, **{name: before[name] for name in LEARNT_WITH})
 
 
 def environment_arguments(arguments: Arguments) -> dict[str, Any]:
@@ -142,7 +142,7 @@ def train(arguments: Arguments, folder: Path, kwargs: dict[str, Any]) -> tuple[C
     else:
         learner = ppo.make_learner(env, settings, arguments.seed, folder / "tensorboard")
     facts = {"environment": kwargs, "settings": ppo.settings_as_dict(settings)}
-    ramp = Ramp(*arguments.ramp)
+    ramp = Ramp(arguments.ramp)
     care = ProximityCurriculum(ramp, env)
     monitor = TrainingMonitor(folder, arguments.timesteps, facts, curve, ramp)
     started_s = time.monotonic()
