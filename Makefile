@@ -41,4 +41,4 @@ train-quick: $(READY)
 
 clean:
 	rm -rf $(VENV) out
-	find . -name '*.nb[ic]' -delete  # compiled kernels; numba does not see changes in other files
+	find . -name '*.nb[ic]' -delete

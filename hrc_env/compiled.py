@@ -7,7 +7,12 @@ for every row that a kernel takes of an array, a fifth of the tracker's time. Th
 memory nobody would free.
 """
 
+from pathlib import Path
 from typing import Any
+
+from hrc_env.kernel_cache import forget_stale
+
+forget_stale(Path(__file__).resolve().parent)
 
 JIT: dict[str, Any] = {
     "cache": True,
