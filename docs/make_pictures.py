@@ -3,6 +3,7 @@
 loop.jpg      the still of `python -m hrc_env demo`
 room.jpg      the lab from beside and from outside
 site.jpg      the construction site
+workers.jpg   three workers of different bodies on it
 cameras.jpg   the laboratory through a pinhole and through the paper's GoPro
 clip.jpg      a film strip of a walk that was written to a BVH file and imported
 learning.png  the curve of `make train-quick`, if runs/quick is there
@@ -95,11 +96,26 @@ def site() -> None:
     env.close()
 
 
+def workers() -> None:
+    """Three workers of different bodies, near the robot on the site."""
+    env = HRCReachEnv(perception="truth", scene="site", n_workers=3, config={"worker": "any"})
+    env.reset(seed=11)
+    for _ in range(160):
+        env.step(np.zeros(6))
+    eye, target, size = np.array([-2.2, -3.4, 1.7]), np.array([0.5, -0.4, 0.95]), (1120, 640)
+    renderer = PictureRenderer(env.simulation.scene, *size)
+    camera = pinhole("near", eye, target, 60.0, *size)
+    save(np.asarray(renderer.picture(*env.views.pose(), camera)), "workers.jpg")
+    renderer.close()
+    env.close()
+
+
 if __name__ == "__main__":
     PICTURES.mkdir(exist_ok=True)
     loop()
     room()
     site()
+    workers()
     cameras()
     clip()
     if Path("runs/quick/curve.png").exists():
