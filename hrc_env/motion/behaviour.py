@@ -222,6 +222,9 @@ def _work(who: Who, activity: int) -> tuple[int, float]:
     if who.kind_here == "bench":
         height += ABOVE_M
     near, prop = who.kind_here == "robot", prop_index(who.task.prop)
+    if near and activity == pl.REACH:
+        lunges = who.draws[EVENT] > 1.0 - mind.config.people.lunge_probability
+        activity = pl.LUNGE if lunges else pl.REACH
     others = state.spots[who.b, :, :SPOT_YAW][others_of(who)]
     lasts = start_here(
         activity, who.draws, (x, y, yaw, height), near, others, prop, mind.numbers, who.me

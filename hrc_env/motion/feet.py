@@ -22,7 +22,7 @@ STRIKE_PITCH, PUSH_PITCH = -0.35, 1.0
 57 degrees in level walking (Winter, Biomechanics and Motor Control of Human Movement)."""
 FLAT_S, ROLL_SHARE = 0.10, 0.62
 """Heel strike to foot flat [s]; heel-off to toe-off as a share of the period of a step."""
-RAMP_SHARE = 0.27
+RAMP_SHARE = 0.29
 """Share of a swing in which the foot gathers (and again loses) speed."""
 LIFT_BASE_M, LIFT_STRIDE_M = 0.025, 0.045
 """Rise of the foot above its roll: of any step, and more with the stride [m]."""

@@ -27,7 +27,7 @@ from hrc_env.motion.anatomy import (
     UPPER_ARM,
     UPPER_LENGTH,
 )
-from hrc_env.motion.curves import saturate, soft_min
+from hrc_env.motion.curves import min_jerk, saturate, soft_min
 from hrc_env.typing import Floats
 
 ARM_KNEE, ARM_LIMIT = 0.97, 0.998
@@ -36,7 +36,7 @@ SHOULDER_RAD = 0.22
 """How far a clavicle turns forward, and up, at most."""
 LEG_LIMIT = 0.998
 """Share of the leg's length that a walking or standing leg uses at most (knees never lock)."""
-LEG_SOFTNESS_M = 0.03
+LEG_SOFTNESS_M = 0.05
 """Width over which the longest possible leg takes over from the wished pelvis height."""
 
 
@@ -197,7 +197,8 @@ def arm(
     side: int, q: Floats, cos: float, sin: float, offset: Floats, frame: Floats,
     size: Floats, p: Floats, r: Floats,
 ) -> None:  # fmt: skip
-    """Shoulder to hand; the elbow down, back and outwards."""
+    """Shoulder to hand; the elbow back and outwards, and down but where the arm hangs: there down
+    is along the arm, which leaves the elbow no side."""
     shoulder(side, q, cos, sin, offset, size, p, r)
     sign = 1.0 - 2.0 * side
     upper = LEFT + side * SIDE_STRIDE + UPPER_ARM
@@ -206,7 +207,8 @@ def arm(
     level, out = math.cos(swivel), math.sin(swivel)
     back, left = -0.7 * level, sign * (0.45 * level + out)
     p[POLE, 0], p[POLE, 1] = cos * back - sin * left, sin * back + cos * left
-    p[POLE, 2] = -0.9 * level
+    above = (p[TARGET, 2] - p[upper, 2]) / size[ARM]
+    p[POLE, 2] = -0.9 * level * (0.15 + 0.85 * min_jerk(1.2 * (above + 1.0)))
     bend(upper, GRIP, size[UPPER_LENGTH], size[FOREARM_GRIP], ARM_KNEE, ARM_LIMIT, p)
     aim(upper, fore, size[UPPER_LENGTH], frame, p, r)
     aim(fore, GRIP, size[FOREARM_GRIP], frame, p, r)

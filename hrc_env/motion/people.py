@@ -36,6 +36,8 @@ class PeopleConfig:
     """Pauses between two things to do, and stays at one place, take this much of their time."""
     sudden_probability: float = 0.05
     """Chance that a reach is sudden; ISO 13855's approach speeds are for such."""
+    lunge_probability: float = 0.01
+    """Chance that a reach to the robot is a lunge: a step, and the hand there in half a second."""
     stumble_probability: float = 0.01
     """Chance that a walker's foot catches on something."""
     careless_probability: float = 0.01
@@ -65,12 +67,13 @@ PEOPLE: dict[str, PeopleConfig] = {
     "hurried": PeopleConfig(
         notice_m=0.25, fast_m_s=1.0, pause_probability=0.2, step_back_probability=0.05,
         pause_s=(0.3, 0.8), detour_m=0.3, speed_m_s=(1.2, 1.7), tempo=0.55,
-        sudden_probability=0.12, stumble_probability=0.03, careless_probability=0.02,
+        sudden_probability=0.12, lunge_probability=0.03, stumble_probability=0.03,
+        careless_probability=0.02,
     ),
     "unaware": PeopleConfig(
         notice_m=0.0, fast_m_s=99.0, pause_probability=0.0, step_back_probability=0.0,
-        detour_m=0.0, sudden_probability=0.08, stumble_probability=0.01,
-        careless_probability=0.04,
+        detour_m=0.0, sudden_probability=0.08, lunge_probability=0.02,
+        stumble_probability=0.01, careless_probability=0.04,
     ),
 }  # fmt: skip
 """By name: who looks out for the robot, who has no time to, who does not know that it moves."""

@@ -21,6 +21,8 @@ SHIFT_M = 0.018
 """Weight shifts from leg to leg by about this much [m]; judgement."""
 RELAXED_PITCH, RELAXED_ELBOW, RELAXED_OUT = 0.02, 0.38, 0.26
 """Hanging arms: upper arm forward, elbow bent, upper arm away from the trunk [rad]."""
+HAND_OUT_M = 0.05
+"""The hand is so much farther out than the elbow [m]: beside broad hips, too; judgement."""
 MOST_LEAN = 1.3
 """Lean beyond which a person would step instead."""
 
@@ -41,7 +43,7 @@ def hang(side: int, pitch: float, elbow: float, size: Floats, q: Floats) -> None
     cos, sin = math.cos(pitch), math.sin(pitch)
     both_cos, both_sin = math.cos(pitch + elbow), math.sin(pitch + elbow)
     q[at] = sin * upper + both_sin * fore
-    q[at + 1] = sign * (RELAXED_OUT * upper + 0.03)
+    q[at + 1] = sign * (RELAXED_OUT * upper + HAND_OUT_M)
     q[at + 2] = -(cos * upper * (1.0 - 0.5 * RELAXED_OUT * RELAXED_OUT) + both_cos * fore)
 
 

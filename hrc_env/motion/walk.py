@@ -31,8 +31,9 @@ CADENCE_PER_MIN, CADENCE_POWER, SLOWEST_M_S = 96.2, 0.468, 0.65
 LEG_M = 0.8685772217237624
 """Leg of a worker who walks just so; others step more or less often by the square root of their
 legs' ratio, as pendulums would (dynamic similarity, Alexander 1989)."""
-SWING_SHARE = 0.80
-"""Time in the air in periods of a step: stance is 60 % of the gait cycle."""
+SWING_SHARE, SWING_FAST_SHARE, FASTEST_M_S = 0.80, 0.05, 1.8
+"""Time in the air in periods of a step: stance is 60 % of the gait cycle; up to so much more from
+1 m/s to FASTEST_M_S, for stance gets shorter (57.5 % at 1.8 m/s)."""
 MID_STANCE = 0.46
 """When the root passes over a footprint, in periods of a step after its landing."""
 WALK_HALF_WIDTH_M = 0.04
@@ -46,6 +47,14 @@ CORNER_M_S2 = 1.6
 """Walkers slow down so that corners accelerate them sideways by no more [m/s^2]; judgement."""
 NORMAL_M_S = 1.3
 """Speed at which the amplitudes below hold."""
+BOB_M, BOB_PACE_M = 0.0095, 0.0035
+"""Half the pelvis's rise and fall: of any walk, and more with the pace [m]; 2 to 4 cm measured."""
+BENT_M, BENT_FAST_M = 0.026, 0.10
+"""How much lower than standing people walk [m]: with the pace, and with the square of how much
+faster they go than suits their legs, or these would lift them at mid-stance; judgement."""
+SWING_SLOW_RAD, SWING_FAST_RAD, FULL_SWING, ELBOW_SWING = 0.05, 0.104, 1.1, 0.73
+"""Swing of the upper arm to each side [rad]: at any pace, and more with the cube of the pace (up to
+FULL_SWING); the elbow's share of it. Wrists so go as fast as those measured at 1.1 to 1.4 m/s."""
 LOADED_TWIST = 0.4
 """Share of the trunk's turning that is left with something in the hands; judgement."""
 LURCH_S = 1.4
@@ -90,15 +99,19 @@ def walk(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q
     period, last = plan[pl.STEP_PERIOD], plan[pl.STEP_COUNT] - 1.0
     phase = (t - plan[pl.STEP_START]) / period
     lead = 1.0 - 2.0 * plan[pl.STEP_FIRST]
+    aloft = plan[pl.STEP_SWING] / period
     going = min_jerk((phase + 0.4) / 0.8) - min_jerk((phase - last) / 0.9)
     pace = speed(t, plan) / NORMAL_M_S
-    over = -lead * math.cos(math.pi * (phase - 0.5 * SWING_SHARE)) * going
-    left_ahead = lead * math.cos(math.pi * (phase - SWING_SHARE)) * pace
-    both_down = math.cos(2.0 * math.pi * (phase - 0.5 * (1.0 + SWING_SHARE)))
+    over = -lead * math.cos(math.pi * (phase - 0.5 * aloft)) * going
+    left_ahead = lead * math.cos(math.pi * (phase - aloft)) * pace
+    both_down = math.cos(2.0 * math.pi * (phase - 0.5 * (1.0 + aloft)))
     shift = (0.028 - 0.008 * min(pace, 1.0)) * over
     q[c.ROOT_X] -= math.sin(yaw) * shift
     q[c.ROOT_Y] += math.cos(yaw) * shift
-    q[c.PELVIS_Z] -= 0.006 * going + pace * (0.026 + 0.015 * both_down)
+    bob = BOB_M * going + BOB_PACE_M * pace
+    hurry = max(pace * math.sqrt(LEG_M / size[LEG]) - 1.0, 0.0)
+    q[c.PELVIS_Z] -= 0.006 * going + BENT_M * pace + BENT_FAST_M * hurry * hurry
+    q[c.PELVIS_Z] -= bob * both_down
     q[c.PELVIS_PITCH] += 0.03 * pace
     q[c.PELVIS_ROLL] += 0.04 * over
     q[c.PELVIS_YAW] -= 0.075 * left_ahead
@@ -109,14 +122,9 @@ def walk(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q
     q[c.HEAD_YAW] += 0.8 * min(max(ahead - yaw, -0.8), 0.8) - 0.5 * 0.115 * left_ahead
     for side in range(2):
         swing = -(1.0 - 2.0 * side) * left_ahead
-        reach = 0.14 * pace + 0.08
-        hang(
-            side,
-            RELAXED_PITCH - 0.06 * pace + reach * swing,
-            RELAXED_ELBOW + 0.10 * pace + 0.16 * swing,
-            size,
-            q,
-        )
+        swing *= SWING_SLOW_RAD + SWING_FAST_RAD * min(pace, FULL_SWING) ** 3
+        upper, elbow = RELAXED_PITCH - 0.06 * pace, RELAXED_ELBOW + 0.10 * pace
+        hang(side, upper + swing, elbow + ELBOW_SWING * swing, size, q)
     if plan[pl.TRIP] > 0.0:
         _lurch(t - plan[pl.TRIP_AT], plan[pl.TRIP], q)
     if plan[pl.LOAD_PROP] > 0.0:
@@ -189,7 +197,9 @@ def plan_pace(
     if period == 0.0:
         period = 60.0 / (CADENCE_PER_MIN * max(plan[pl.SPEED], SLOWEST_M_S) ** CADENCE_POWER)
         period *= math.sqrt(size[LEG] / LEG_M)
-    plan[pl.STEP_PERIOD], plan[pl.STEP_SWING] = period, SWING_SHARE * period
+    fast = min(max((plan[pl.SPEED] - 1.0) / (FASTEST_M_S - 1.0), 0.0), 1.0)
+    plan[pl.STEP_PERIOD] = period
+    plan[pl.STEP_SWING] = (SWING_SHARE + SWING_FAST_SHARE * fast) * period
     plan[pl.STEP_START] = SHIFT_S
     plan[pl.STEP_FIRST] = _first_foot(plan)
     return _plan_steps(0, plan, prints, stance, size)
@@ -243,7 +253,7 @@ def _plan_steps(first: int, plan: Floats, prints: Floats, stance: Floats, size: 
     """
     period, start = plan[pl.STEP_PERIOD], plan[pl.STEP_START]
     done = max(plan[pl.DEPART] + plan[pl.DURATION], plan[pl.TURN_OUT_AT] + plan[pl.TURN_OUT_S])
-    over = start + (SWING_SHARE + MID_STANCE) * period
+    over = start + plan[pl.STEP_SWING] + MID_STANCE * period
     count = min(max(2 + math.ceil((done - 0.12 - over) / period), first + 2), pl.MAX_STEPS)
     plan[pl.STEP_COUNT] = count
     for k in range(first, count):

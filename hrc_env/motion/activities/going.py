@@ -10,7 +10,7 @@ from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import between
 from hrc_env.motion.activities.worker import Place, Worker
-from hrc_env.motion.anatomy import STAND_Z
+from hrc_env.motion.anatomy import LEG, STAND_Z
 from hrc_env.motion.curves import min_jerk
 from hrc_env.motion.holding import GRIPS, drop_load, grip_load, place_load
 from hrc_env.motion.paths import lay_path
@@ -20,11 +20,12 @@ from hrc_env.props import prop_index
 from hrc_env.typing import Floats
 
 CART, WHEELBARROW = prop_index("cart"), prop_index("wheelbarrow")
-CART_AHEAD_M, WHEELBARROW_AHEAD_M = 0.47, 0.16
-"""Handles ahead of the root [m]: arms bent before the belly, and hanging at the sides."""
+CART_AHEAD_M, WHEELBARROW_AHEAD_LEGS = 0.47, 0.26
+"""Handles ahead of the root: [m], arms bent before the belly; and in lengths of the leg, arms
+hanging just before the thighs, which bend between them; judgement."""
 WHEEL_AHEAD_M, WHEEL_UP_M, STANDS_RAD = 1.2, 0.17, 0.2
 """A wheelbarrow's axle in its frame [m], and how far it tips back onto its legs."""
-KNUCKLES_SHARE, BEND = 0.94, 1.3
+KNUCKLES_SHARE, BEND = 0.97, 1.3
 """Handles are carried as high as this share of the pelvis, by arms that hang almost straight;
 how far the trunk bends to take them; judgement."""
 TAKE_S, LIFT_S = 0.7, 0.5
@@ -93,7 +94,7 @@ def start_push(place: Place, via: Floats, speed_m_s: float, prop: int, me: Worke
     plan = me.plan
     drop_load(plan)
     plan[pl.LOAD_PROP] = prop
-    plan[pl.LOAD_AT] = CART_AHEAD_M if prop == CART else WHEELBARROW_AHEAD_M
+    plan[pl.LOAD_AT] = CART_AHEAD_M if prop == CART else WHEELBARROW_AHEAD_LEGS * me.size[LEG]
     for i in range(6):
         plan[pl.LOAD_GRIP + i] = GRIPS[prop, i // 3, i % 3]
     plan[pl.LOAD_USED] = plan[pl.LOAD_USED + 1] = 1.0
@@ -120,11 +121,11 @@ def push(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q
     place_load(x, y, yaw, 0.0, plan, q)
     if int(plan[pl.LOAD_PROP]) == WHEELBARROW:
         low = 1.0 - min_jerk((near_end - TAKE_S) / LIFT_S)
-        lean(BEND * low * held, 0.4, 0.0, q)
+        lean(BEND * low * held, 0.1, 0.0, q)
         _tip(STANDS_RAD * low - plan[pl.TIPPED] * (1.0 - low), yaw, q)
     else:
         lean(0.06 * held, 0.0, 0.0, q)
-    grip_load(held, plan, q)
+    grip_load(held * (2.0 - held), plan, q)  # before the bent trunk takes them to the knees
 
 
 @numba.njit(**LEAN)

@@ -34,6 +34,8 @@ HEAD_M, FACE_M = 0.25, 0.05
 """From the fist to the hammer's head along the handle, and to its face [m]; `props`."""
 LIGHT_HZ, LIGHT_M = 5.6, 0.060
 """Light taps: to and fro by 6 cm, at most 1.1 m/s and a little more on the way forward."""
+LOW_SHARE = 0.7
+"""Share of a blow's size at floor height, where the trunk is in its way; judgement."""
 WALL_M = 1.2
 """Nails at this height or higher are driven into a wall, lower ones downwards [m]."""
 
@@ -51,7 +53,7 @@ def plan_hammer(draws: Floats, place: Place, me: Worker) -> float:
         step_ahead(1 - side, 0.16, me)
     aside = before_knee(me)
     if z < WALL_M:
-        ahead, turn = (0.54 if z < LOW_M else 0.72), (0.0, 0.5 * math.pi, 0.0)
+        ahead, turn = (0.62 if z < LOW_M else 0.72), (0.0, 0.5 * math.pi, 0.0)
         at = (ahead - HEAD_M, aside + 0.06 * sign, z + FACE_M + 0.02)
     else:
         ahead, turn = 0.68, (0.0, 0.0, 0.0)
@@ -61,6 +63,8 @@ def plan_hammer(draws: Floats, place: Place, me: Worker) -> float:
     look_to((ahead, aside, z), me)
     light = draws[2] < 0.4
     size = LIGHT_M if light else between(draws[3], 0.16, 0.22)
+    if z < LOW_M:
+        size *= LOW_SHARE
     rate = LIGHT_HZ if light else between(draws[4], 1.9, 2.2)
     strokes(STRIKE, size, rate, between(draws[5], 1.6, 3.2), 2 + int(3.0 * draws[6]), me)
     me.plan[pl.WANDER_M] = 0.08 * sign

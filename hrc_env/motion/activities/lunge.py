@@ -18,7 +18,11 @@ from hrc_env.motion.activities.planning import (
 )
 from hrc_env.motion.activities.strokes import STILL
 from hrc_env.motion.activities.worker import Place, Worker
+from hrc_env.motion.anatomy import ARM
 from hrc_env.typing import Floats
+
+AHEAD_ARMS = (1.2, 1.5)
+"""How far ahead it is, in lengths of the arm: a step and a bow away; judgement."""
 
 
 @numba.njit(**LEAN)
@@ -29,7 +33,8 @@ def plan_lunge(draws: Floats, place: Place, me: Worker) -> float:
     sign = 1.0 - 2.0 * side
     z = place[3] if place[3] > 0.0 else between(draws[1], 0.9, 1.3)
     step_ahead(side, between(draws[2], 0.32, 0.42), me)
-    at = (between(draws[3], 0.85, 1.05), sign * between(draws[4], -0.1, 0.25), z)
+    ahead = me.size[ARM] * between(draws[3], *AHEAD_ARMS)
+    at = (ahead, sign * between(draws[4], -0.1, 0.25), z)
     put_tool(0, side, at, (0.0, 0.0, 0.0), me)
     look_to(at, me)
     strokes(STILL, 0.0, 0.0, between(draws[5], 0.0, 0.3), 1, me)

@@ -145,7 +145,7 @@ def at_work(me: Worker) -> None:
     stand(plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW], 0.0, me.traits, size, q)
     extend(1.0, 1.0, plan, size, q)
     stroke(0.0, plan, q)
-    hands_on(1.0, 1.0, plan, q)
+    hands_on(1.0, 1.0, 1.0, plan, q)
 
 
 @numba.njit(**LEAN)

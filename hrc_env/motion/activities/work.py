@@ -22,6 +22,12 @@ GAZE_LEAD_S = 0.25
 """Eyes and head set off before the hand (Land & Hayhoe 2001: about half a second at most)."""
 BELT_AHEAD_M, BELT_SIDE_M, BELT_UP_M, BELT_PITCH_RAD = 0.10, 0.29, 0.06, 1.3
 """Where a tool hangs, from the pelvis [m], and how it points; judgement."""
+BELLY_AHEAD_M, BELLY_SIDE_M, BELLY_UP_M = 0.34, 0.06, 0.22
+"""Where the other hand is on its way down to the floor, from the pelvis [m]; judgement."""
+EARLY_SHARE = 0.55
+"""Share of getting down in which hands come before the body."""
+ELBOWS_RAD, LOW_ELBOWS_RAD = 0.25, 0.4
+"""How far elbows are turned outwards at work, and at floor height; judgement."""
 JOIN_AT = 0.3
 """Share of the way from which the second hand comes to a tool for two; judgement."""
 RISE, OVER_KNEE_M, LOW_M = 0.5, 0.22, 0.6
@@ -64,11 +70,15 @@ def belt(side: int, at: int, q: Floats) -> None:
 
 
 @numba.njit(**LEAN)
-def hands_on(out: float, taken: float, plan: Floats, q: Floats) -> None:
-    """Send the tool's hand to the tool, the other to its own target or to the tool."""
+def hands_on(out: float, taken: float, early: float, plan: Floats, q: Floats) -> None:
+    """Send the tool's hand to the tool, the other to its own target or to the tool.
+
+    Both are before the body, by the share `early`, when thighs rise of those who get down.
+    """
     side, tool = int(plan[pl.SIDE]), int(plan[pl.TOOL])
     other = 1 - side
     both = TWO_HANDED[tool]
+    low = plan[pl.TOOL_POSE + 2] < LOW_M and not both
     for hand in range(2):
         at = c.HAND_TARGET + 3 * hand
         if hand == side or both:
@@ -77,10 +87,27 @@ def hands_on(out: float, taken: float, plan: Floats, q: Floats) -> None:
         else:
             for i in range(3):
                 q[at + i] += plan[pl.TARGET + 3 * other + i]
+            if low:
+                _from_belly(hand, at, 1.0 - out, plan, q)
             _round(at, plan[pl.TARGET + 3 * other + 2], out, q)
-    q[c.HAND_SHARE + side] = taken
-    joined = min_jerk((out - JOIN_AT) / (1.0 - JOIN_AT)) if both and taken != out else out
+    for hand in range(2):
+        q[c.SWIVEL + hand] += LOW_ELBOWS_RAD * early if low else ELBOWS_RAD * out
+    q[c.HAND_SHARE + side] = max(taken, early) if low else taken
+    joined = early if low else out
+    if both and taken != out:
+        joined = min_jerk((out - JOIN_AT) / (1.0 - JOIN_AT))
     q[c.HAND_SHARE + other] = joined * plan[pl.USE_LEFT + other]
+
+
+@numba.njit(**LEAN)
+def _from_belly(hand: int, at: int, share: float, plan: Floats, q: Floats) -> None:
+    """Bring the target q[at:] of a hand back to before the belly by a share: over the thighs."""
+    cos, sin = math.cos(q[c.HEADING]), math.sin(q[c.HEADING])
+    left = (1.0 - 2.0 * hand) * BELLY_SIDE_M
+    goal = pl.TARGET + 3 * hand
+    q[at] += share * (q[c.ROOT_X] + cos * BELLY_AHEAD_M - sin * left - plan[goal])
+    q[at + 1] += share * (q[c.ROOT_Y] + sin * BELLY_AHEAD_M + cos * left - plan[goal + 1])
+    q[at + 2] += share * (q[c.PELVIS_Z] + BELLY_UP_M - plan[goal + 2])
 
 
 @numba.njit(**LEAN)
@@ -98,7 +125,7 @@ def work(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q
         stroke(working, plan, q)
     else:
         stroke(0.0 if working < 0.0 else plan[pl.HOLD_S], plan, q)
-    hands_on(out, taken, plan, q)
+    hands_on(out, taken, min_jerk(near_end / (EARLY_SHARE * plan[pl.SETTLE_S])), plan, q)
     drawn = DRAWN_SHARE * plan[pl.OUT_S] if TWO_HANDED[int(plan[pl.TOOL])] else 0.0
     q[c.PROP] = plan[pl.TOOL] if since >= drawn else 0.0
     looking = min_jerk((since + GAZE_LEAD_S) / 0.6)
