@@ -31,9 +31,9 @@ CADENCE_PER_MIN, CADENCE_POWER, SLOWEST_M_S = 96.2, 0.468, 0.65
 LEG_M = 0.8685772217237624
 """Leg of a worker who walks just so; others step more or less often by the square root of their
 legs' ratio, as pendulums would (dynamic similarity, Alexander 1989)."""
-SWING_SHARE, SWING_FAST_SHARE, FASTEST_M_S = 0.80, 0.05, 1.8
+SWING_SHARE, SWING_FAST_SHARE, FASTEST_M_S = 0.80, 0.02, 1.8
 """Time in the air in periods of a step: stance is 60 % of the gait cycle; up to so much more from
-1 m/s to FASTEST_M_S, for stance gets shorter (57.5 % at 1.8 m/s)."""
+1 m/s to FASTEST_M_S, for stance gets shorter (59 % at 1.8 m/s)."""
 MID_STANCE = 0.46
 """When the root passes over a footprint, in periods of a step after its landing."""
 WALK_HALF_WIDTH_M = 0.04
