@@ -53,7 +53,7 @@ class Arguments:
     """Environment steps in which that weight grows from 0: the task first, then care. 0: all of
     it from the start; the policy learns several times slower, and is more careful in the end."""
     threads: int | None = None
-    """Threads for the environments, and for the gradients; all cores by default."""
+    """Threads for the environments; all cores by default."""
     episodes: int = 128
     """Episodes of the evaluation at the end."""
     film: bool = True
@@ -68,8 +68,7 @@ LEARNT_WITH = ("num_envs", "seed", "perception", "estimator", "control", "proxim
 
 def main(arguments: Arguments) -> None:
     """Train, evaluate, draw, film."""
-    if arguments.threads is not None:
-        torch.set_num_threads(arguments.threads)
+    torch.set_num_threads(1)  # two are slower in networks as small as these
     folder = arguments.resume or unused(arguments.out)
     if arguments.resume is not None:
         arguments = as_before(arguments, folder)
