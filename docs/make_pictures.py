@@ -4,6 +4,7 @@ loop.jpg      the still of `python -m hrc_env demo`
 room.jpg      the lab from beside and from outside
 site.jpg      the construction site
 workers.jpg   three workers of different bodies on it
+faults.jpg    what faults do to an image
 cameras.jpg   the laboratory through a pinhole and through the paper's GoPro
 clip.jpg      a film strip of a walk that was written to a BVH file and imported
 learning.png  the curve of `make train-quick`, if runs/quick is there
@@ -18,15 +19,22 @@ import cv2
 import imageio.v2 as imageio
 import numpy as np
 
+from hrc_env.batching import copied
 from hrc_env.env import HRCReachEnv
-from hrc_env.geometry.cameras import pinhole
+from hrc_env.faults.camera_film import CameraFilm, Shot
+from hrc_env.faults.fault import IMAGE, KINDS, FaultConfig
+from hrc_env.faults.schedule import Schedule
+from hrc_env.geometry.cameras import pinhole, project, projections
 from hrc_env.perception.lensed import Lensed
-from hrc_env.pictures import label, middle_rows, shrink
+from hrc_env.perception.windows import window_from_joints
+from hrc_env.pictures import label, middle_rows, shrink, tile
 from hrc_env.records import CropWindow
 from hrc_env.scene.render import CropRenderer, PictureRenderer
 
 PICTURES = Path(__file__).parent / "pictures"
 JPEG_QUALITY = 88
+SEED_WALK, STEPS_WALK = 3, 91
+"""An episode and a step of it at which the worker walks."""
 
 
 def save(image: np.ndarray, name: str) -> None:
@@ -74,6 +82,34 @@ def cameras() -> None:
     env.close()
 
 
+def faults() -> None:
+    """One crop of one camera with every fault that images can have."""
+    kinds = [kind for kind, each in KINDS.items() if each.group == IMAGE]
+    crops = []
+    for kind in (None, *kinds):
+        given = [] if kind is None else [FaultConfig(kind, ("camera_1",))]
+        env = HRCReachEnv(perception="truth")
+        env.reset(seed=SEED_WALK)
+        for _ in range(STEPS_WALK - 1):
+            env.step(np.zeros(6))
+        scene, before = env.simulation.scene, copied(env.views.pose())
+        env.step(np.zeros(6))
+        renderer = CropRenderer(scene)
+        schedule = Schedule(scene.rig, tuple(given), env.config.ctrl_dt)
+        film = CameraFilm(renderer, Lensed(renderer, scene.cameras), schedule)
+        shot = Shot(0, *copied(env.views.pose()), before, scene.cameras)
+        film.show([shot] * 4, seed=4)
+        joints = env.simulation.estimate.mean_world[:, 0]
+        px, depth_m = project(projections(scene.cameras[:1]), joints)
+        window = window_from_joints(px[0, 0], depth_m[0, 0], scene.cameras[0])
+        if window is not None:
+            crops.append(film.crop(0, window).copy())
+            label(crops[-1], (kind or "no fault").replace("_", " "), (6, 6), 13)
+        renderer.close()
+        env.close()
+    save(tile(crops, len(crops) // 3), "faults.jpg")
+
+
 def clip() -> None:
     """A recording, imported."""
     out = Path("out/clips")
@@ -117,6 +153,7 @@ if __name__ == "__main__":
     site()
     workers()
     cameras()
+    faults()
     clip()
     if Path("runs/quick/curve.png").exists():
         shutil.copy("runs/quick/curve.png", PICTURES / "learning.png")

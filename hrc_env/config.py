@@ -15,7 +15,8 @@ import numpy as np
 from hrc_env.body import pool
 from hrc_env.control import ControlConfig
 from hrc_env.errors import ConfigError
-from hrc_env.mapping import from_mapping
+from hrc_env.faults.fault import FaultConfig
+from hrc_env.mapping import from_mapping, restored
 from hrc_env.metrics import CostConfig
 from hrc_env.motion.generator import Clip, MotionConfig, PeopleConfig, people_called
 from hrc_env.optics.camera import CameraConfig
@@ -53,6 +54,8 @@ class HRCConfig:
     """The camera pipeline (`perception="pixels"`)."""
     emulator: EmulatorConfig = field(default_factory=EmulatorConfig)
     """Its emulator (`perception="keypoints"`)."""
+    faults: tuple[FaultConfig, ...] = ()
+    """What goes wrong with the cameras, and when (docs/cameras.md)."""
     tracker: TrackerConfig = field(default_factory=TrackerConfig)
     """The estimators."""
     association: AssociationConfig = field(default_factory=AssociationConfig)
@@ -151,6 +154,21 @@ def _camera(given: Any, index: int) -> CameraConfig:
         )
     x, y, z = (float(value) for value in place)
     return CameraConfig(f"camera_{index + 1}", (x, y, z))
+
+
+def with_faults(
+    config: HRCConfig, faults: "Sequence[FaultConfig | Mapping[str, Any]] | None"
+) -> HRCConfig:
+    """A config with these faults of cameras instead of its own; None for those it has.
+
+    Raises:
+        ConfigError: something else than a list of faults or mappings, or a fault that cannot be.
+    """
+    if faults is None:
+        return config
+    if isinstance(faults, FaultConfig | Mapping | str) or not isinstance(faults, Sequence):
+        raise ConfigError(f"faults must be a list of FaultConfigs or mappings, got {faults!r}.")
+    return replace(config, faults=restored(tuple[FaultConfig, ...], list(faults), "faults"))
 
 
 def with_motions(config: HRCConfig, motions: "Sequence[str | Path | Clip] | None") -> HRCConfig:

@@ -14,8 +14,9 @@ from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
 from hrc_env import observations
-from hrc_env.config import HRCConfig, resolve, with_cameras, with_motions, with_people
+from hrc_env.config import HRCConfig, resolve, with_cameras, with_faults, with_motions, with_people
 from hrc_env.errors import ConfigError, unknown
+from hrc_env.faults.fault import FaultConfig
 from hrc_env.motion.generator import Clip, PeopleConfig
 from hrc_env.rewards import RewardConfig
 from hrc_env.simulation import Simulation, checked_action
@@ -44,6 +45,8 @@ class HRCReachEnv(Stateful, gymnasium.Env[NDArray[np.float32], NDArray[np.float3
             `PeopleConfig`, or None for those of the config (attentive).
         motions: clips of recorded motion that the workers play, too, or paths of such
             (docs/motion_capture.md); None for those of the config (none).
+        faults: what goes wrong with cameras, `FaultConfig`s or mappings
+            (docs/cameras.md); None for those of the config (none).
         control: "joint" (joint velocities) or "tool" (tool velocity).
         render_mode: "rgb_array", "depth_array" or None.
         config: an `HRCConfig` or a nested mapping of changes to the default.
@@ -64,6 +67,7 @@ class HRCReachEnv(Stateful, gymnasium.Env[NDArray[np.float32], NDArray[np.float3
         n_workers: int | tuple[int, int] = 1,
         people: str | PeopleConfig | None = None,
         motions: Sequence[str | Path | Clip] | None = None,
+        faults: Sequence[FaultConfig | Mapping[str, Any]] | None = None,
         control: str = "joint",
         render_mode: str | None = None,
         config: HRCConfig | Mapping[str, Any] | None = None,
@@ -71,7 +75,7 @@ class HRCReachEnv(Stateful, gymnasium.Env[NDArray[np.float32], NDArray[np.float3
         if render_mode is not None and render_mode not in RENDER_MODES:
             raise unknown("render_mode", render_mode, RENDER_MODES)
         given = with_motions(with_people(resolve(config), people), motions)
-        self.config, used = with_cameras(given, cameras)
+        self.config, used = with_cameras(with_faults(given, faults), cameras)
         self.render_mode = render_mode
         self.simulation = Simulation(
             1, perception, estimator, used, scene, n_workers, control, self.config

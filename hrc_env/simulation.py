@@ -26,7 +26,8 @@ from hrc_env.records import PoseEstimate, RobotState, WorkerMotion, WorkerTruth
 from hrc_env.scene.build import build
 from hrc_env.scene.physics import Physics
 from hrc_env.scene.rigs import findings
-from hrc_env.senses import CAMERA_LEVELS, Moment, make_senses
+from hrc_env.senses import CAMERA_LEVELS, make_senses
+from hrc_env.sensing.moment import Moment
 from hrc_env.stateful import State, Stateful
 from hrc_env.tasks import reach
 from hrc_env.tracking import given

@@ -19,9 +19,10 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from hrc_env.config import HRCConfig, resolve, with_cameras, with_motions, with_people
+from hrc_env.config import HRCConfig, resolve, with_cameras, with_faults, with_motions, with_people
 from hrc_env.env import RENDER_MODES, spaces
 from hrc_env.errors import ConfigError, unknown
+from hrc_env.faults.fault import FaultConfig
 from hrc_env.motion.generator import Clip, PeopleConfig
 from hrc_env.outcome import Outcome
 from hrc_env.rewards import RewardConfig
@@ -49,7 +50,7 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
     Args:
         num_envs: how many.
         perception: "keypoints", "truth" or "none"; pictures have no batched form.
-        estimator, cameras, scene, n_workers, people, motions, control, config: as
+        estimator, cameras, scene, n_workers, people, motions, faults, control, config: as
             `HRCReachEnv`.
         render_mode: "rgb_array", "depth_array" or None.
         max_episode_steps: the time limit; None or -1 is none.
@@ -74,6 +75,7 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
         n_workers: int | tuple[int, int] = 1,
         people: str | PeopleConfig | None = None,
         motions: Sequence[str | Path | Clip] | None = None,
+        faults: Sequence[FaultConfig | Mapping[str, Any]] | None = None,
         control: str = "joint",
         render_mode: str | None = None,
         config: HRCConfig | Mapping[str, Any] | None = None,
@@ -92,7 +94,7 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
         self.autoreset_mode = _mode(autoreset_mode)
         self.render_mode = render_mode
         given = with_motions(with_people(resolve(config), people), motions)
-        self.config, used = with_cameras(given, cameras)
+        self.config, used = with_cameras(with_faults(given, faults), cameras)
         self.shards = Shards(
             self.num_envs,
             min(_threads(num_threads), self.num_envs),

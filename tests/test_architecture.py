@@ -18,7 +18,7 @@ TRUTH_READERS = {
     "hrc_env/body.py": "makes it from the worker's motion",
     "hrc_env/outcome.py": "gives errors against it their names",
     "hrc_env/simulation.py": "carries it to cost, metrics and senses",
-    "hrc_env/senses.py": "hands it to the emulator and to the level `truth`",
+    "hrc_env/sensing/moment.py": "hands it to the emulator and to the level `truth`",
     "hrc_env/metrics.py": "counts cost and errors",
     "hrc_env/perception/emulator.py": "projects it into emulated cameras",
     "hrc_env/tracking/given.py": "copies it into the belief: the one place",

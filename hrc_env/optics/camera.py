@@ -1,4 +1,4 @@
-"""What a camera is: where it hangs, and what its lens and sensor do."""
+"""What a camera is: where it hangs, what its lens and sensor do, when it takes images."""
 
 import math
 from dataclasses import dataclass, field, replace
@@ -15,6 +15,8 @@ SIZE_PX = (64, 16_384)
 """Least and greatest width and height of an image [px]."""
 FIELD_DEG = (1.0, 340.0)
 """Least and greatest horizontal field of view; without a fisheye lens less than 179 degrees."""
+LONGEST_S = 1.0
+"""Greatest latency [s]: the tracker's memory is no longer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +44,12 @@ class CameraConfig:
     """Principal point cx, cy [px]; none: the middle of the image."""
     lens: Lens = field(default_factory=Lens)
     """How the lens bends the image."""
+    rate_hz: float = 0.0
+    """Images a second; 0: one at every control step. Images are taken at control steps."""
+    latency_s: float = 0.0
+    """Time from taking an image to having it [s], up to 1; the tracker uses it at its own time."""
+    exposure_s: float = 0.0
+    """How long the shutter is open [s], up to 0.1; what moves is smeared (`pixels` only)."""
 
     def __post_init__(self) -> None:
         _check_place(self)
@@ -49,6 +57,12 @@ class CameraConfig:
             if not SIZE_PX[0] <= getattr(self, name) <= SIZE_PX[1]:
                 raise ConfigError(
                     f"Camera {self.name!r}: {name} must be from {SIZE_PX[0]} to {SIZE_PX[1]}, "
+                    f"got {getattr(self, name)}."
+                )
+        for name, most in (("rate_hz", math.inf), ("latency_s", LONGEST_S), ("exposure_s", 0.1)):
+            if not 0 <= getattr(self, name) <= most or not math.isfinite(getattr(self, name)):
+                raise ConfigError(
+                    f"Camera {self.name!r}: {name} must be from 0 to {most}, "
                     f"got {getattr(self, name)}."
                 )
         for name in ("focal_px", "centre_px"):

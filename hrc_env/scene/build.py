@@ -120,6 +120,11 @@ class Scene:
     grounds: Grounds
     """Where people can stand, walk and work."""
 
+    @property
+    def rig(self) -> tuple[CameraConfig, ...]:
+        """The settings of `cameras`."""
+        return select(self.config.cameras, tuple(camera.name for camera in self.cameras))
+
     def surroundings(self, q: JointAngles, held: Held | None = None) -> Surroundings:
         """What can stand before cameras; the arm is at angles q (B, N) [rad]."""
         chain = self.chain

@@ -10,7 +10,6 @@ from hrc_env import (
     metrics,
     observations,
     rewards,
-    senses,
     simulation,
     vector_env,
     vector_infos,
@@ -23,6 +22,7 @@ from hrc_env.geometry import chains
 from hrc_env.motion import generator
 from hrc_env.perception import emulator
 from hrc_env.scene.physics import Physics
+from hrc_env.sensing.tracking import TrackingSenses
 from hrc_env.tasks import reach
 
 ORGANS: Mapping[str, Sequence[Place]] = {
@@ -34,7 +34,7 @@ ORGANS: Mapping[str, Sequence[Place]] = {
         (simulation, "worker_capsules"),
     ),
     "emulator": ((emulator, "emulate"),),
-    "tracking": ((senses.TrackingSenses, "sense"),),
+    "tracking": ((TrackingSenses, "sense"),),
     "distances": (
         (chains, "robot_along"),
         (simulation, "estimated_gap"),

@@ -1,0 +1,1 @@
+"""What goes wrong with cameras: asked for by argument, drawn from a generator of its own."""

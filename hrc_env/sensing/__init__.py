@@ -1,0 +1,1 @@
+"""The perception levels that have cameras: predict, look, update."""

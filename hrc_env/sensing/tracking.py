@@ -1,0 +1,94 @@
+"""What the levels with cameras share: predict, get keypoints, update."""
+
+from typing import Any
+
+import numpy as np
+
+from hrc_env.batching import rows, write_rows
+from hrc_env.config import HRCConfig
+from hrc_env.faults.recent import Recent
+from hrc_env.faults.schedule import Schedule
+from hrc_env.geometry.cameras import projections
+from hrc_env.perception.lensed import pinhole_keypoints
+from hrc_env.records import Keypoints, PoseEstimate
+from hrc_env.scene.build import Scene
+from hrc_env.sensing.moment import Generators, Moment, Windows
+from hrc_env.skeleton import N_JOINTS
+from hrc_env.stateful import Stateful
+from hrc_env.tracking.estimators import Estimator
+from hrc_env.tracking.people.association import associate
+from hrc_env.typing import Ints
+
+
+class TrackingSenses(Stateful):
+    """What the levels with cameras share: predict, get keypoints, update."""
+
+    CHANGES = ("state", "keypoints", "recent")
+
+    def __init__(
+        self, batch: int, scene: Scene, tracker: Estimator, config: HRCConfig, schedule: Schedule
+    ) -> None:
+        self.scene, self.tracker, self.dt_s = scene, tracker, config.ctrl_dt
+        self.association = config.association
+        self.P = projections(scene.cameras)
+        self.state: Any = tracker.init(batch, scene.n_workers)
+        self.keypoints = no_keypoints(batch, len(scene.cameras), scene.n_workers)
+        self.recent = None if schedule.is_plain else Recent(batch, schedule)
+
+    def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
+        """Forget the tracks of environments `ids`, and what their cameras gave."""
+        self.tracker.reset(self.state, ids, tracker_rngs)
+        if self.recent is not None:
+            self.recent.reset(ids, sensor_rngs)
+
+    def sense(self, now: Moment, sensor_rngs: Generators, tracker_rngs: Generators) -> PoseEstimate:
+        """Predict the workers, look at them where they should be, and update."""
+        whole = len(now.ids) == len(self.keypoints.px)
+        state = self.state if whole else rows(self.state, now.ids)
+        self.tracker.predict(state, self.dt_s, tracker_rngs)
+        found = pinhole_keypoints(self.detect(now, state, sensor_rngs), self.scene.cameras)
+        keypoints = self._sorted(found, state)
+        self.tracker.update(state, keypoints, tracker_rngs)
+        if whole:
+            self.keypoints = keypoints
+        else:
+            write_rows(self.keypoints, now.ids, keypoints)
+            write_rows(self.state, now.ids, state)
+        return self.tracker.estimate(state)
+
+    def ahead(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
+        """What the estimator expects."""
+        whole = len(ids) == len(self.keypoints.px)
+        return self.tracker.ahead(self.state if whole else rows(self.state, ids), horizon_s)
+
+    def detect(self, now: Moment, predicted: Any, sensor_rngs: Generators) -> Keypoints:
+        """Keypoints of this moment, by whatever eyes the level has; whose they are is open.
+
+        They are in pixels of the images, as the lenses bend them.
+
+        Args:
+            now: the scene.
+            predicted: the tracker's state before the measurement.
+            sensor_rngs: one generator a row.
+        """
+        raise NotImplementedError
+
+    def _sorted(self, keypoints: Keypoints, predicted: Any) -> Keypoints:
+        """Keypoints by worker; where there is one worker, whatever was found is theirs."""
+        if self.scene.n_workers < 2:
+            return keypoints
+        expected = self.tracker.estimate(predicted)
+        return associate(self.P, keypoints, expected, self.association).keypoints
+
+    def looks(self, b: int) -> tuple[Keypoints | None, Windows]:
+        """The keypoints of environment `b`."""
+        return rows(self.keypoints, np.array([b])), []
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+
+def no_keypoints(batch: int, n_cameras: int, n_workers: int) -> Keypoints:
+    """Nobody is seen by any camera."""
+    shape = (batch, n_cameras, n_workers, N_JOINTS)
+    return Keypoints(np.full((*shape, 2), np.nan), np.zeros(shape), np.full(shape, np.inf))
