@@ -38,7 +38,7 @@ CLUTTER_PLACES = (
     Workplace("north_studs_1", "wall", (0.6, 3.86), NORTH, 1.2),
     Workplace("north_studs_2", "wall", (1.4, 3.86), NORTH, 1.4),
     Workplace("lintel", "overhead", (-0.8, 4.2), NORTH, 1.95),
-    Workplace("west_top", "overhead", (-3.6, 1.7), WEST, 1.95),
+    Workplace("west_top", "overhead", (-3.5, 1.7), WEST, 1.95),
     Workplace("timber", "pile", (6.0, 2.6), EAST, 1.24),
     Workplace("timber_end", "pile", (6.0, 1.4), EAST, 1.24),
     Workplace("blocks", "pile", (5.1, -1.0), SOUTH, 0.9),

@@ -40,7 +40,7 @@ def climb(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, 
     q[c.PELVIS_PITCH] += 0.10 * going
     q[c.HEAD_PITCH] += 0.20 * going
     for side in range(2):
-        hang(side, RELAXED_PITCH + 0.15 * going, RELAXED_ELBOW + 0.85 * going, size, q)
+        hang(side, RELAXED_PITCH - 0.05 * going, RELAXED_ELBOW + 0.25 * going, size, q)
 
 
 @numba.njit(**LEAN)

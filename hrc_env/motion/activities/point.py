@@ -31,7 +31,7 @@ def plan_point(draws: Floats, place: Place, me: Worker) -> float:
     blank(me)
     side = dominant(draws[0], me)
     sign = 1.0 - 2.0 * side
-    aside = sign * between(draws[1], -0.4, 0.9)
+    aside = sign * between(draws[1], -0.4, 0.7)
     up = between(draws[2], -0.25, 0.25)
     reach = 0.95 * me.size[ARM]
     shoulder_z = SHOULDER_SHARE * me.size[STAND_Z]
