@@ -31,9 +31,9 @@ heading is from the worker's, how long that turn takes; the same at the end, wit
 beginning; whether they face along the path (1) or side-step (0)."""
 TRIP_AT, TRIP = OWN + 13, OWN + 14
 """Walk. When the swinging foot catches something [s], and how badly (0: never)."""
-TAKEN_S, TIPPED = OWN + 15, OWN + 16
+TAKEN_S, TIPPED, STOOP = OWN + 15, OWN + 16, OWN + 17
 """Push. How long the hands take to the handle, and back from it [s]; how far a wheelbarrow is
-tipped forward by who holds it [rad]."""
+tipped forward by who holds it [rad]; how far the trunk leans to a handle, as `posture.lean`."""
 
 LEAN, TWIST, SQUAT, OUT_AT, OUT_S, HOLD_S, BACK_S = range(OWN, OWN + 7)
 """Reach and lift. How far the trunk goes (1: as far as it can), its turn, share of squatting;
@@ -70,7 +70,7 @@ ROOTS, N_ROOTS = OWN + 5, 48
 end: coarse, for those who walk round it."""
 MAX_VIA, PIECE = 8, 6
 """Most corners of a path; columns of a piece, see `paths`."""
-PATH = OWN + 17
+PATH = OWN + 18
 """Walk. First of the path's pieces, a line before, between and after the corners' arcs."""
 N_PLAN = PATH + PIECE * (2 * MAX_VIA + 1)
 

@@ -126,7 +126,7 @@ def walk(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q
         upper, elbow = RELAXED_PITCH - 0.06 * pace, RELAXED_ELBOW + 0.10 * pace
         hang(side, upper + swing, elbow + ELBOW_SWING * swing, size, q)
     if plan[pl.TRIP] > 0.0:
-        _lurch(t - plan[pl.TRIP_AT], plan[pl.TRIP], q)
+        _lurch(t - plan[pl.TRIP_AT], plan[pl.TRIP], size, q)
     if plan[pl.LOAD_PROP] > 0.0:
         q[c.SPINE_TWIST] *= LOADED_TWIST
         x, y, yaw = root(t, plan)
@@ -134,12 +134,16 @@ def walk(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q
 
 
 @numba.njit(**LEAN)
-def _lurch(t: float, trip: float, q: Floats) -> None:
-    """Pitch forward with the arms out, `t` after a foot caught, and come up again."""
-    fall, arms = trip * hump(t / LURCH_S), trip * hump((t - 0.04) / (1.6 * LURCH_S))
-    q[c.ROOT_X] += math.cos(q[c.HEADING]) * 0.10 * fall
-    q[c.ROOT_Y] += math.sin(q[c.HEADING]) * 0.10 * fall
-    q[c.PELVIS_Z] -= 0.07 * fall
+def _lurch(t: float, trip: float, size: Floats, q: Floats) -> None:
+    """Pitch forward with the arms out, `t` after a foot caught, and come up again.
+
+    Lower as well as forward, or the leg behind would come to its full stretch and jerk the body.
+    """
+    scale = size[LEG] / LEG_M
+    fall, arms = trip * hump(t / LURCH_S), trip * scale * hump((t - 0.04) / (1.6 * LURCH_S))
+    q[c.ROOT_X] += math.cos(q[c.HEADING]) * 0.08 * scale * fall
+    q[c.ROOT_Y] += math.sin(q[c.HEADING]) * 0.08 * scale * fall
+    q[c.PELVIS_Z] -= 0.09 * fall
     q[c.PELVIS_PITCH] += 0.32 * fall
     q[c.SPINE_FLEX] += 0.38 * fall
     q[c.HEAD_PITCH] -= 0.15 * fall

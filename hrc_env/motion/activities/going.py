@@ -8,7 +8,7 @@ import numpy as np
 from hrc_env.compiled import JIT, LEAN
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
-from hrc_env.motion.activities.planning import between
+from hrc_env.motion.activities.planning import between, in_reach, shoulders
 from hrc_env.motion.activities.worker import Place, Worker
 from hrc_env.motion.anatomy import LEG, STAND_Z
 from hrc_env.motion.curves import min_jerk
@@ -21,8 +21,11 @@ from hrc_env.typing import Floats
 
 CART, WHEELBARROW = prop_index("cart"), prop_index("wheelbarrow")
 CART_AHEAD_M, WHEELBARROW_AHEAD_LEGS = 0.47, 0.26
-"""Handles ahead of the root: [m], arms bent before the belly; and in lengths of the leg, arms
-hanging just before the thighs, which bend between them; judgement."""
+"""Handles ahead of the root: [m], arms bent before the belly; and in lengths of the leg while the
+wheelbarrow is level, arms hanging before the thighs, which bend between them; judgement."""
+PUSHING_SHARE, STOOPED_M, CART_LEAN = 0.99, 0.4, 0.06
+"""Arms push stretched to this share; where they are too short for that, the trunk leans: a lean of
+1 brings the shoulders so far forward [m]; how far everybody leans to a cart; judgement."""
 WHEEL_AHEAD_M, WHEEL_UP_M, STANDS_RAD = 1.2, 0.17, 0.2
 """A wheelbarrow's axle in its frame [m], and how far it tips back onto its legs."""
 KNUCKLES_SHARE, BEND = 0.97, 1.3
@@ -34,8 +37,8 @@ BACK_M_S, BACK_PERIOD_S = 0.62, 0.42
 """Quick steps back: speed and time of a step; judgement."""
 TURN_M_S, TURN_PERIOD_S = 0.2, 0.36
 """Turning on the spot: steps so short that no foot steps on the other; judgement."""
-CAUGHT_M = 0.12
-"""How much too short the step is in which a foot catches [m]; judgement."""
+CAUGHT_LEGS = 0.115
+"""How much too short the step is in which a foot catches, in lengths of the leg; judgement."""
 
 
 @numba.njit(**LEAN)
@@ -83,8 +86,9 @@ def start_stumble(draws: Floats, place: Place, via: Floats, speed_m_s: float, me
     )
     plan[pl.TRIP] = between(draws[1], 0.7, 1.0)
     yaw = me.prints[step, 2]
-    me.prints[step, 0] -= CAUGHT_M * math.cos(yaw)
-    me.prints[step, 1] -= CAUGHT_M * math.sin(yaw)
+    caught = CAUGHT_LEGS * me.size[LEG]
+    me.prints[step, 0] -= caught * math.cos(yaw)
+    me.prints[step, 1] -= caught * math.sin(yaw)
     return lasts
 
 
@@ -94,18 +98,31 @@ def start_push(place: Place, via: Floats, speed_m_s: float, prop: int, me: Worke
     plan = me.plan
     drop_load(plan)
     plan[pl.LOAD_PROP] = prop
-    plan[pl.LOAD_AT] = CART_AHEAD_M if prop == CART else WHEELBARROW_AHEAD_LEGS * me.size[LEG]
     for i in range(6):
         plan[pl.LOAD_GRIP + i] = GRIPS[prop, i // 3, i % 3]
     plan[pl.LOAD_USED] = plan[pl.LOAD_USED + 1] = 1.0
     lasts = start_walk(place, via, speed_m_s, me)
-    plan[pl.TAKEN_S] = TAKE_S
-    if prop == WHEELBARROW:
-        plan[pl.TAKEN_S] += LIFT_S
-        handles = KNUCKLES_SHARE * me.size[STAND_Z] - plan[pl.LOAD_GRIP + 2]
-        plan[pl.TIPPED] = math.asin(min(max(handles / WHEEL_AHEAD_M, 0.0), 0.24))
+    plan[pl.TAKEN_S] = TAKE_S + (LIFT_S if prop == WHEELBARROW else 0.0)
+    _to_handles(prop, me)
     plan[pl.LASTS] = lasts + 2.0 * plan[pl.TAKEN_S]
     return plan[pl.LASTS]
+
+
+@numba.njit(**LEAN)
+def _to_handles(prop: int, me: Worker) -> None:
+    """Plan how far ahead the handles are, how far they are raised, and how far the trunk leans."""
+    plan = me.plan
+    forward, aside, up = shoulders(me)
+    across, high = plan[pl.LOAD_GRIP + 1] - aside, plan[pl.LOAD_GRIP + 2]
+    if prop == WHEELBARROW:
+        handles = KNUCKLES_SHARE * me.size[STAND_Z] - high
+        plan[pl.TIPPED] = math.asin(min(max(handles / WHEEL_AHEAD_M, 0.0), 0.24))
+        plan[pl.LOAD_AT] = WHEELBARROW_AHEAD_LEGS * me.size[LEG]
+    else:
+        plan[pl.TIPPED], plan[pl.LOAD_AT] = 0.0, CART_AHEAD_M
+    ahead, raised = _tipped(-plan[pl.TIPPED], high)
+    reach = forward + in_reach(PUSHING_SHARE, across, up - high - raised, me)
+    plan[pl.STOOP] = max(plan[pl.LOAD_AT] + ahead - reach, 0.0) / STOOPED_M
 
 
 @numba.njit(**LEAN)
@@ -124,16 +141,24 @@ def push(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q
         lean(BEND * low * held, 0.1, 0.0, q)
         _tip(STANDS_RAD * low - plan[pl.TIPPED] * (1.0 - low), yaw, q)
     else:
-        lean(0.06 * held, 0.0, 0.0, q)
+        lean(CART_LEAN * held, 0.0, 0.0, q)
+    lean(plan[pl.STOOP] * held * max(1.0 - effort, 0.0), 0.0, 0.0, q)
     grip_load(held * (2.0 - held), plan, q)  # before the bent trunk takes them to the knees
 
 
 @numba.njit(**LEAN)
 def _tip(back_rad: float, yaw: float, q: Floats) -> None:
     """Tip the wheelbarrow back about its axle, handles down."""
-    cos, sin = math.cos(back_rad), math.sin(back_rad)
-    ahead = WHEEL_AHEAD_M * (1.0 - cos) + WHEEL_UP_M * sin
+    ahead, up = _tipped(back_rad, 0.0)
     q[c.PROP_POSE] += math.cos(yaw) * ahead
     q[c.PROP_POSE + 1] += math.sin(yaw) * ahead
-    q[c.PROP_POSE + 2] += WHEEL_UP_M * (1.0 - cos) - WHEEL_AHEAD_M * sin
+    q[c.PROP_POSE + 2] += up
     q[c.PROP_POSE + 4] -= back_rad
+
+
+@numba.njit(**LEAN)
+def _tipped(back_rad: float, z: float) -> tuple[float, float]:
+    """How far ahead and up a point goes at height z over the wheelbarrow's origin."""
+    cos, sin = math.cos(back_rad), math.sin(back_rad)
+    above = z - WHEEL_UP_M
+    return WHEEL_AHEAD_M * (1.0 - cos) - above * sin, -WHEEL_AHEAD_M * sin - above * (1.0 - cos)

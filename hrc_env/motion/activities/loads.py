@@ -16,9 +16,11 @@ from hrc_env.motion.activities.planning import (
     between,
     blank,
     dominant,
+    in_reach,
     look_to,
     put_tool,
     settle_lean,
+    shoulders,
     world,
 )
 from hrc_env.motion.activities.worker import Place, Worker
@@ -34,7 +36,10 @@ from hrc_env.typing import Floats
 BOX, BOARD = prop_index("box"), prop_index("board")
 BOX_AHEAD_M, BOX_SHARE = 0.37, 1.10
 BOARD_AHEAD_M, BOARD_SHARE = 0.27, 0.96
-"""A held load's middle: ahead of the root [m], and height in heights of the pelvis; judgement."""
+"""A held load's middle: ahead of the root [m], and height in heights of the pelvis, or
+as high as the arms need it; judgement."""
+CARRYING_SHARE = 0.95
+"""Arms carry stretched to this share at most: swinging trunks need the rest; judgement."""
 ON_SHOULDER = (0.12, 0.165, 0.075)
 """A board on the shoulder: ahead and aside of the root, above the shoulder's joint [m]."""
 STEADY_M = 0.26
@@ -142,7 +147,9 @@ def _hold(prop: int, on_shoulder: bool, side: int, me: Worker) -> None:
         plan[pl.LOAD_GRIP + i] = GRIPS[prop, i // 3, i % 3]
     plan[pl.LOAD_USED] = plan[pl.LOAD_USED + 1] = 1.0
     ahead, share = (BOX_AHEAD_M, BOX_SHARE) if prop == BOX else (BOARD_AHEAD_M, BOARD_SHARE)
-    plan[at], plan[at + 2] = ahead, share * me.size[STAND_Z]
+    forward, aside, up = shoulders(me)
+    lowest = up - in_reach(CARRYING_SHARE, ahead - forward, GRIPS[prop, 0, 1] - aside, me)
+    plan[at], plan[at + 2] = ahead, max(share * me.size[STAND_Z], lowest)
     if not on_shoulder:
         return
     stand(plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW], 0.0, me.traits, me.size, me.q)

@@ -11,7 +11,17 @@ from hrc_env.motion.activities.getting_down import FRONT_LEG, REAR_LEG, step_int
 from hrc_env.motion.activities.strokes import PAUSE_S, stroke
 from hrc_env.motion.activities.work import extend, hands_on
 from hrc_env.motion.activities.worker import Worker
-from hrc_env.motion.anatomy import CHEST, HAND, LEFT, LEG, SIDE_STRIDE, STAND_Z
+from hrc_env.motion.anatomy import (
+    ARM,
+    CHEST,
+    CLAVICLE,
+    HAND,
+    LEFT,
+    LEG,
+    SIDE_STRIDE,
+    STAND_Z,
+    UPPER_ARM,
+)
 from hrc_env.motion.feet import feet
 from hrc_env.motion.holding import TWO_HANDED
 from hrc_env.motion.kinematics import pose
@@ -23,6 +33,9 @@ TAKE_S = 0.55
 """For a hand to go to the belt [s]."""
 KNEEL_S, CROUCH_S = 1.5, 1.1
 """To get down on a knee, on the haunches [s]; judgement."""
+KNEEL_STEPS_S = (0.15, 0.62, 0.60)
+"""First lift-off and the two times of `plans` of the steps onto a knee [s]: slow, or a leg would be
+stretched before the body is down, and the knee would jerk; judgement."""
 STEP_S = 0.9
 """To step into a stance [s]."""
 CALM_M_S = 1.1
@@ -31,6 +44,10 @@ KNEE_ASIDE_M = 0.17
 """Aside of the middle: where the other leg is not in the way [m]."""
 SPARE_M = 0.03
 """Arms keep this much in hand when the trunk has settled [m]: bodies sway."""
+TO_SHOULDER = (*range(1, CHEST + 1), LEFT + CLAVICLE, LEFT + UPPER_ARM)
+"""The segments from the pelvis on, each the child of the one before."""
+SLUMP_M = 0.01
+"""How far a standing trunk brings the shoulders forward [m]."""
 FAR = 1e3
 """A time by which every step is done [s]."""
 
@@ -66,6 +83,7 @@ def kneel_down(side: int, me: Worker) -> None:
     plan[pl.KNEEL], plan[pl.AHEAD] = 1.0, -0.08
     plan[pl.SETTLE_S], plan[pl.OUT_AT] = KNEEL_S, 0.4
     step_into(side, REAR_LEG * leg, FRONT_LEG * leg, 0.02, me)
+    plan[pl.STEP_START], plan[pl.STEP_PERIOD], plan[pl.STEP_SWING] = KNEEL_STEPS_S
 
 
 @numba.njit(**LEAN)
@@ -93,6 +111,25 @@ def world(ahead: float, left: float, z: float, me: Worker) -> Triple:
         plan[pl.START_Y] + sin * ahead + cos * left,
         z,
     )
+
+
+@numba.njit(**LEAN)
+def shoulders(me: Worker) -> Triple:
+    """Where the shoulders' joints of one who stands are: ahead of the root, aside, height [m]."""
+    bones = me.bones
+    ahead, aside, up = SLUMP_M, 0.0, me.size[STAND_Z]
+    for segment in TO_SHOULDER:
+        ahead += bones[segment, 0]
+        aside += bones[segment, 1]
+        up += bones[segment, 2]
+    return ahead, aside, up
+
+
+@numba.njit(**LEAN)
+def in_reach(share: float, one: float, other: float, me: Worker) -> float:
+    """How far arms, stretched by a share, reach along an axis if so far along the others [m]."""
+    reach = share * me.size[ARM]
+    return math.sqrt(max(reach * reach - one * one - other * other, 0.0))
 
 
 @numba.njit(**LEAN)
