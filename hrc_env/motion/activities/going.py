@@ -132,17 +132,17 @@ def push(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q
     walk(going, plan, clock_s, traits, size, q)
     near_end = min(t, plan[pl.LASTS] - t)
     held, effort = min_jerk(near_end / TAKE_S), speed(going, plan)
+    stooped = plan[pl.STOOP] * max(1.0 - effort, 0.0)
     q[c.PELVIS_PITCH] += 0.05 * effort
     q[c.SPINE_FLEX] += 0.10 * effort
     x, y, yaw = root(going, plan)
     place_load(x, y, yaw, 0.0, plan, q)
     if int(plan[pl.LOAD_PROP]) == WHEELBARROW:
         low = 1.0 - min_jerk((near_end - TAKE_S) / LIFT_S)
-        lean(BEND * low * held, 0.1, 0.0, q)
+        lean((BEND * low + stooped * (1.0 - low)) * held, 0.1, 0.0, q)
         _tip(STANDS_RAD * low - plan[pl.TIPPED] * (1.0 - low), yaw, q)
     else:
-        lean(CART_LEAN * held, 0.0, 0.0, q)
-    lean(plan[pl.STOOP] * held * max(1.0 - effort, 0.0), 0.0, 0.0, q)
+        lean((CART_LEAN + stooped) * held, 0.0, 0.0, q)
     grip_load(held * (2.0 - held), plan, q)  # before the bent trunk takes them to the knees
 
 
