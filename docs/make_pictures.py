@@ -7,7 +7,7 @@ workers.jpg   three workers of different bodies on it
 faults.jpg    what faults do to an image
 cameras.jpg   the laboratory through a pinhole and through the paper's GoPro
 clip.jpg      a film strip of a walk that was written to a BVH file and imported
-learning.png  the curve of `make train-quick`, if runs/quick is there
+learning.png  the curves of `python benchmarks/learning.py`, if out/learning is there
 """
 
 import shutil
@@ -155,5 +155,5 @@ if __name__ == "__main__":
     cameras()
     faults()
     clip()
-    if Path("runs/quick/curve.png").exists():
-        shutil.copy("runs/quick/curve.png", PICTURES / "learning.png")
+    if Path("out/learning/curves.png").exists():
+        shutil.copy("out/learning/curves.png", PICTURES / "learning.png")
