@@ -1,7 +1,7 @@
 """The task first, then care: the weight of the safety term grows while a policy learns.
 
 With the whole weight from the start a learner first learns to stay away, and finds its goals
-five times later; it is then the more careful one (docs/learning.md has both).
+about nine times later; it is then the more careful one (docs/learning.md has both).
 """
 
 from dataclasses import dataclass, replace
