@@ -1,5 +1,6 @@
 """results.json: the one form in which every benchmark and experiment writes its numbers."""
 
+import contextlib
 import json
 import os
 from collections.abc import Mapping, Sequence
@@ -9,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from hrc_env.errors import HRCError
 from hrc_env.provenance import provenance
 
 
@@ -37,13 +39,31 @@ def write_results(
     path: Path, config: Mapping[str, Any], seeds: Sequence[int], metrics: Mapping[str, Metric]
 ) -> None:
     """Write a results file, whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
     content = {
         "config": dict(config),
         **provenance(),
         "seeds": list(seeds),
         "metrics": {name: asdict(metric) for name, metric in metrics.items()},
     }
-    draft = path.with_suffix(".draft")
-    draft.write_text(json.dumps(content, indent=1))
-    os.replace(draft, path)
+    write_whole(path, json.dumps(content, indent=1))
+
+
+def write_whole(path: Path, content: str) -> None:
+    """Write a text file, whole or not at all; its folder is made.
+
+    Raises:
+        HRCError: it cannot be written (a full disk, no permission), with what to do. What was
+            there before is as it was.
+    """
+    draft = path.with_name(path.name + ".draft")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        draft.write_text(content)
+        os.replace(draft, path)
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            draft.unlink(missing_ok=True)
+        raise HRCError(
+            f"{path} cannot be written: {error.strerror}. What is finished is kept; make room, "
+            "or choose another folder, and start the same command again."
+        ) from error

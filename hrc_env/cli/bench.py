@@ -50,7 +50,7 @@ class TrackingBench:
             from hrc_env.experiments.peers import bench as peers
 
             n_seeds = self.seeds if self.seeds is not None else 1 if self.quick else 5
-            return _show(
+            return show(
                 partial(peers.run, peers.PeersConfig(n_seeds=n_seeds)),
                 self.out or Path("out/bench_tracking_peers"),
                 "peers.md",
@@ -59,7 +59,7 @@ class TrackingBench:
         if self.real:
             from hrc_env.experiments.footage import bench as footage
 
-            return _show(
+            return show(
                 footage.run,
                 self.out or Path("out/bench_tracking_real"),
                 "real.md",
@@ -71,7 +71,7 @@ class TrackingBench:
         if self.seeds is not None:
             config = replace(config, n_seeds=self.seeds)
         out = self.out or Path("out/bench_tracking")
-        return _show(
+        return show(
             partial(run, config, processes=self.processes or os.cpu_count() or 1),
             out,
             "tracking.md",
@@ -101,7 +101,7 @@ class SpeedBench:
         if self.rounds is not None:
             config = replace(config, n_rounds=self.rounds)
         written = "results.json, speed.md, organs.png"
-        return _show(partial(run, config), self.out, "speed.md", written)
+        return show(partial(run, config), self.out, "speed.md", written)
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ class MotionBench:
         config = QUICK if self.quick else MotionBenchConfig()
         if self.seeds is not None:
             config = replace(config, n_seeds=self.seeds)
-        return _show(
+        return show(
             partial(run, config), self.out, "motion.md", "results.json, motion.md, motion.png"
         )
 
@@ -147,7 +147,7 @@ class Bench:
         return self.what.run()
 
 
-def _show(run: Callable[[Path, Say], object], out: Path, table: str, written: str) -> int:
+def show(run: Callable[[Path, Say], object], out: Path, table: str, written: str) -> int:
     """Run a part of the bench under a progress bar, then show its table."""
     console = Console()
     with progress_bar(console, "bench") as say:

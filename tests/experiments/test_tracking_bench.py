@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from hrc_env.errors import ConfigError
+from hrc_env.experiments.study.shelf import fingerprint_of
 from hrc_env.experiments.tracking import bench as tracking_bench
 from hrc_env.experiments.tracking import sequences
 from hrc_env.experiments.tracking.bench import TrackingBenchConfig, run
 from hrc_env.experiments.tracking.names import DLT, rows
 from hrc_env.experiments.tracking.rigs import RIGS, make_rig
 from hrc_env.experiments.tracking.sequences import make_sequences
-from hrc_env.experiments.tracking.shelf import fingerprint_of
 from hrc_env.experiments.tracking.tally import CHI2_95_3D, CHI2_LEVELS, tally
 from hrc_env.experiments.tracking.timing import time_association, time_estimator
 from hrc_env.tracking.estimators import ESTIMATORS
@@ -43,7 +43,7 @@ def small():
         patch.setattr(sequences, "WINDOWS", windows)
         patch.setattr(tracking_bench, "time_estimator", no_time)
         patch.setattr(tracking_bench, "time_association", no_association_time)
-        patch.setattr(tracking_bench, "fingerprint_of", lambda settings: "the same code")
+        patch.setattr(tracking_bench, "fingerprint_of", lambda settings, room: "the same code")
         yield patch
 
 
@@ -110,7 +110,7 @@ def test_a_second_run_makes_only_what_is_missing(bench):
 
 
 def test_parts_of_other_settings_are_not_used(bench):
-    assert fingerprint_of({"n": 1}) != fingerprint_of({"n": 2})
+    assert fingerprint_of({"n": 1}, "tracking") != fingerprint_of({"n": 2}, "tracking")
 
 
 def test_time_per_update_is_positive():

@@ -12,11 +12,11 @@ import numpy as np
 
 from hrc_env.errors import ConfigError
 from hrc_env.experiments.peers.registry import PEERS, missing_sentence
-from hrc_env.experiments.tracking.cells import Tick, beliefs
+from hrc_env.experiments.study.shelf import Say, Shelf, Tick, fingerprint_of
+from hrc_env.experiments.tracking.cells import beliefs
 from hrc_env.experiments.tracking.names import DEFAULT, DLT
 from hrc_env.experiments.tracking.rigs import RIGS, Rig, make_rig
 from hrc_env.experiments.tracking.sequences import Sequences, make_sequences
-from hrc_env.experiments.tracking.shelf import Say, Shelf, fingerprint_of
 from hrc_env.results import Metric, write_results
 from hrc_env.typing import Points3
 
@@ -52,7 +52,7 @@ def run(config: PeersConfig, out: Path, say: Say) -> dict[str, Metric]:
     missing = [name for name in PEERS if name not in installed]
     names = [*_OWN, *installed]
     versions = {name: version(name) for name in installed}
-    fingerprint = fingerprint_of({**asdict(config), **versions})
+    fingerprint = fingerprint_of({**asdict(config), **versions}, "tracking")
     n_parts = len(RIGS) * len(CONDITIONS) * len(names) * config.n_seeds
     shelf = Shelf(out / "parts", fingerprint, n_parts, say)
     seeds = [config.first_seed + k for k in range(config.n_seeds)]

@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from hrc_env.errors import ConfigError
-from hrc_env.experiments.tracking.cells import Tick, run_cell
+from hrc_env.experiments.study.shelf import Say, Shelf, Tick, fingerprint_of
+from hrc_env.experiments.tracking.cells import run_cell
 from hrc_env.experiments.tracking.detections import CONDITIONS
 from hrc_env.experiments.tracking.metrics import ASSOCIATION, TIMING, Parts, metrics_of
 from hrc_env.experiments.tracking.names import DEFAULT, SMOOTHER, cells, names_of
@@ -21,7 +22,6 @@ from hrc_env.experiments.tracking.own import OWN, make_own_rig
 from hrc_env.experiments.tracking.report import write_report
 from hrc_env.experiments.tracking.rigs import RIGS, SIGMA_PX, Rig, make_rig
 from hrc_env.experiments.tracking.sequences import BOUNDED, Sequences, make_sequences
-from hrc_env.experiments.tracking.shelf import Say, Shelf, fingerprint_of
 from hrc_env.experiments.tracking.timing import BATCH, time_association, time_estimator
 from hrc_env.results import Metric, write_results
 from hrc_env.tracking.estimators import ESTIMATORS
@@ -65,7 +65,7 @@ def run(config: TrackingBenchConfig, out: Path, say: Say, processes: int = 1) ->
     """
     asked = cells()
     n_parts = len(asked) + len(ESTIMATORS) + 1
-    shelf = Shelf(out / "parts", fingerprint_of(asdict(config)), n_parts, say)
+    shelf = Shelf(out / "parts", fingerprint_of(asdict(config), "tracking"), n_parts, say)
     if processes > 1:
         _run_conditions(config, shelf, processes)
         shelf = Shelf(shelf.folder, shelf.fingerprint, n_parts, _silent)

@@ -1,12 +1,13 @@
 """One cell of the tracking bench: an estimator on the sequences of a rig and a condition."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from hrc_env.batching import rows
+from hrc_env.experiments.study.shelf import Tick
 from hrc_env.experiments.tracking.arrivals import in_time
 from hrc_env.experiments.tracking.couples import identities
 from hrc_env.experiments.tracking.dlt import triangulate_frame
@@ -25,7 +26,6 @@ UNKNOWN_M2 = 1e6
 """Variance of a bone's length of which nothing is known [m^2]."""
 _AT_ONCE = 10
 """Sequences that are smoothed at once: it keeps 90x90 numbers of every frame."""
-Tick = Callable[[float], None]
 
 
 def beliefs(

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.experiments.tracking.cells import Tick
+from hrc_env.experiments.study.shelf import Tick
 from hrc_env.experiments.tracking.couples import shuffles
 from hrc_env.experiments.tracking.detections import Damage, detect
 from hrc_env.experiments.tracking.rigs import DT_S, Rig

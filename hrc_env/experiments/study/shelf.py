@@ -1,8 +1,7 @@
-"""Where the bench keeps the parts that are done, so that it can be stopped and goes on."""
+"""Where an experiment keeps the parts that are done, so that it can be stopped and goes on."""
 
 import hashlib
 import json
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,20 +10,19 @@ from typing import Any
 import numpy as np
 
 import hrc_env
-from hrc_env.experiments.tracking.cells import Tick
+from hrc_env.results import write_whole
 
 Say = Callable[[float, str], None]
 """Told by how much the share that is done grew, and what is being done."""
-_CODE = (
-    *(f"{room}/**/*.py" for room in ("geometry", "tracking", "experiments/tracking")),
-    *(f"{room}/**/*.py" for room in ("scene", "motion", "perception")),
-    *(f"{name}.py" for name in ("body", "config", "skeleton", "simulation", "control")),
-)
+Tick = Callable[[float], None]
+"""Told by how much the share of a part that is done grew."""
+_ROOMS = ("geometry", "optics", "scene", "motion", "perception", "tracking", "faults", "sensing")
+_FILES = ("body", "config", "skeleton", "simulation", "control", "senses", "metrics")
 
 
 @dataclass(frozen=True, slots=True)
 class Shelf:
-    """Parts of one bench, each a JSON file; those of other code or settings do not count."""
+    """Parts of one experiment, each a JSON file; those of other code or settings do not count."""
 
     folder: Path
     fingerprint: str
@@ -38,8 +36,16 @@ class Shelf:
             self.say(1 / self.n_parts, label)
             return part
         self.say(0.0, label)
-        part = make(lambda share: self.say(share / self.n_parts, label))
+        told = 0.0
+
+        def tick(share: float) -> None:
+            nonlocal told
+            told += share
+            self.say(share / self.n_parts, label)
+
+        part = make(tick)
         self._store(label, part)
+        self.say(max(1.0 - told, 0.0) / self.n_parts, label)
         return part
 
     def has(self, label: str) -> bool:
@@ -49,24 +55,29 @@ class Shelf:
     def _load(self, label: str) -> dict[str, Any] | None:
         """A part that is there, whole, and made by the same code and settings."""
         path = self.folder / f"{label}.json"
-        if not path.exists():
+        try:
+            content: Mapping[str, Any] = json.loads(path.read_text())
+        except (FileNotFoundError, json.JSONDecodeError):
             return None
-        content: Mapping[str, Any] = json.loads(path.read_text())
         return content["part"] if content["fingerprint"] == self.fingerprint else None
 
     def _store(self, label: str, part: Mapping[str, Any]) -> None:
         """Write a part, whole or not at all."""
-        self.folder.mkdir(parents=True, exist_ok=True)
-        draft = self.folder / f"{label}.draft"
-        draft.write_text(json.dumps({"fingerprint": self.fingerprint, "part": part}))
-        os.replace(draft, self.folder / f"{label}.json")
+        content = json.dumps({"fingerprint": self.fingerprint, "part": part})
+        write_whole(self.folder / f"{label}.json", content)
 
 
-def fingerprint_of(settings: Mapping[str, Any]) -> str:
-    """What a part depends on: the settings and the code that it comes from."""
+def fingerprint_of(settings: Mapping[str, Any], room: str) -> str:
+    """What a part depends on: the settings, and the code that it comes from.
+
+    Args:
+        settings: numbers and words.
+        room: of `hrc_env.experiments`, whose code counts beside that of the environment.
+    """
     digest = hashlib.sha256(json.dumps(settings, sort_keys=True).encode())
     root = Path(hrc_env.__file__).parent
-    for pattern in _CODE:
+    rooms = (*_ROOMS, "experiments/study", f"experiments/{room}")
+    for pattern in (*(f"{each}/**/*.py" for each in rooms), *(f"{name}.py" for name in _FILES)):
         for path in sorted(root.glob(pattern)):
             digest.update(path.read_bytes())
     digest.update(np.__version__.encode())
