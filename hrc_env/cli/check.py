@@ -9,7 +9,7 @@ from importlib.metadata import version
 from rich.console import Console
 
 from hrc_env.errors import HRCError
-from hrc_env.perception import weights
+from hrc_env.perception import vino, weights
 from hrc_env.scene.gl import gl_status
 
 Finding = tuple[bool, str]
@@ -28,6 +28,7 @@ class Check:
             "cores": _cores,
             "OpenGL": gl_status,
             "weights": _weights,
+            "OpenVINO": _openvino,
             "environment": _environment,
         }
         for name, check in checks.items():
@@ -61,6 +62,12 @@ def _weights() -> Finding:
     except HRCError as error:
         return False, str(error)
     return True, f"official, in {weights.cache_dir()}"
+
+
+def _openvino() -> Finding:
+    if not vino.installed():
+        return True, f"not installed; it makes pixels faster: {vino.INSTALL}"
+    return True, f"computes in {vino.precision()} where eyes.runtime is openvino or auto"
 
 
 def _environment() -> Finding:

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from hrc_env.perception.network import DETECTOR_SIDE, LANDMARK_SIDE, Tensor
+from hrc_env.perception.network import DETECTOR_SIDE, LANDMARK_SIDE
+from hrc_env.perception.tensors import Tensor
 from hrc_env.records import CropWindow
 from hrc_env.typing import Floats, Image, Points2
 

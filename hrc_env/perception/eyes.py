@@ -14,7 +14,7 @@ from typing import Any, Protocol, TypeVar
 import cv2
 import numpy as np
 
-from hrc_env.errors import ConfigError, check_shape
+from hrc_env.errors import ConfigError, check_shape, unknown
 from hrc_env.geometry.cameras import PinholeCamera, inside_image
 from hrc_env.perception import blazepose
 from hrc_env.perception.acquisition import (
@@ -25,8 +25,10 @@ from hrc_env.perception.acquisition import (
 )
 from hrc_env.perception.network import (
     LANDMARK_SIDE,
+    RUNTIMES,
     Detector,
     Landmarker,
+    chosen_runtime,
     load_detector,
     load_landmarker,
 )
@@ -72,8 +74,13 @@ class EyesConfig:
     """Joints that the network places outside the image are guesses: at most this visible."""
     search_step: float = 0.5
     """Search windows follow each other by at most this share of their side."""
+    runtime: str = "litert"
+    """What the networks run on: "litert", "openvino" (an extra, faster) or "auto"
+    (docs/speed.md)."""
 
     def __post_init__(self) -> None:
+        if self.runtime not in RUNTIMES:
+            raise unknown("eyes.runtime", self.runtime, RUNTIMES)
         for name in ("min_presence", "sure_presence", "outside_confidence"):
             if not 0 < getattr(self, name) <= 1:
                 raise ConfigError(f"{name} must be in (0, 1], got {getattr(self, name)}.")
@@ -113,11 +120,16 @@ class Eyes(Stateful):
     CHANGES = ("_looks",)
 
     def __init__(self, cameras: Sequence[PinholeCamera], config: EyesConfig | None = None) -> None:
-        """Args are the rig and settings; raises `WeightsError` without the weights."""
+        """Args are the rig and settings.
+
+        Raises:
+            WeightsError: without the weights. ConfigError: without the runtime.
+        """
         for name in ("pose_detection", "pose_landmark_full"):
             find_weights(name)
         self.cameras = tuple(cameras)
         self.config = config or EyesConfig()
+        chosen_runtime(self.config.runtime)
         self._looks: dict[int, list[int]] = {}
         self._networks: tuple[_Networks, _Networks] | None = None
         self._helper: ThreadPoolExecutor | None = None
@@ -235,10 +247,7 @@ class Eyes(Stateful):
 
     def _open(self) -> tuple[ThreadPoolExecutor, tuple[_Networks, _Networks]]:
         if self._networks is None:
-            self._networks = (
-                _Networks(load_detector(), load_landmarker()),
-                _Networks(load_detector(), load_landmarker()),
-            )
+            self._networks = (_networks(self.config), _networks(self.config))
         if self._helper is None:
             self._helper = ThreadPoolExecutor(1, thread_name_prefix="hrc_env-eyes")
         return self._helper, self._networks
@@ -255,6 +264,11 @@ class Eyes(Stateful):
         sight.px[c], sight.confidence[c] = joints[:, :2], confidence
         stature_px = STATURE_OF_SIDE * window.side_px if window else np.nan
         sight.sigma_px[c] = sigma_px(confidence, stature_px)
+
+
+def _networks(config: EyesConfig) -> _Networks:
+    runtime = chosen_runtime(config.runtime)
+    return _Networks(load_detector(runtime), load_landmarker("full", runtime))
 
 
 def search_windows(camera: PinholeCamera, step: float = 0.5) -> list[CropWindow]:

@@ -1,30 +1,26 @@
-"""The two BlazePose networks on LiteRT, as plain functions from an image to raw tensors.
+"""The BlazePose networks as plain functions from an image to raw tensors.
 
-Each function owns one single-threaded interpreter, so it belongs to one thread at a time;
-load one per thread. XNNPACK's results do not depend on the number of threads.
-
-The official landmark file also computes a segmentation mask and world landmarks, 40 % of
-its time. `prune` drops what the wanted outputs do not need; what is left is bit-equal.
+Each function belongs to one thread at a time; load one per thread.
 """
 
-from collections.abc import Callable, Sequence
-from typing import Any, TypeAlias
+from collections.abc import Callable
+from typing import TypeAlias
 
-import flatbuffers
-import numpy as np
-from ai_edge_litert import schema_py_generated as schema
-from ai_edge_litert.interpreter import Interpreter
-from numpy.typing import NDArray
-
+from hrc_env.errors import unknown
+from hrc_env.perception import litert, vino
+from hrc_env.perception.tensors import Network, Tensor
 from hrc_env.perception.weights import find_weights
-
-Tensor: TypeAlias = NDArray[np.float32]
 
 DETECTOR_SIDE = 224
 LANDMARK_SIDE = 256
 
-LANDMARK_OUTPUTS: tuple[str, ...] = ("Identity", "Identity_1", "Identity_3")
+DETECTOR_OUTPUTS = ("Identity", "Identity_1")
+"""Boxes (1, 2254, 12), score logits (1, 2254, 1) in the official graph."""
+LANDMARK_OUTPUTS = ("Identity", "Identity_1", "Identity_3")
 """Landmarks (1, 195), person flag (1, 1), heatmap (1, 64, 64, 39) in the official graph."""
+
+RUNTIMES = ("litert", "openvino", "auto")
+"""LiteRT, the default; OpenVINO, an extra; OpenVINO where it is installed, else LiteRT."""
 
 Detector: TypeAlias = Callable[[Tensor], tuple[Tensor, Tensor]]
 """(224, 224, 3) in [-1, 1] -> boxes (2254, 12), score logits (2254,)."""
@@ -33,9 +29,24 @@ Landmarker: TypeAlias = Callable[[Tensor], tuple[Tensor, float, Tensor]]
 """(256, 256, 3) in [0, 1] -> landmarks (39, 5), person flag, heatmap logits (64, 64, 39)."""
 
 
-def load_detector() -> Detector:
+def chosen_runtime(name: str) -> str:
+    """Which runtime `name` comes to here: "litert" or "openvino".
+
+    Raises:
+        ConfigError: no such runtime, or one that is not installed.
+    """
+    if name not in RUNTIMES:
+        raise unknown("runtime", name, RUNTIMES)
+    if name == "openvino":
+        vino.require()
+    if name == "auto":
+        return "openvino" if vino.installed() else "litert"
+    return name
+
+
+def load_detector(runtime: str = "litert") -> Detector:
     """The person detector stage. Raises `WeightsError` where the weights are missing."""
-    run = _interpreter(find_weights("pose_detection").read_bytes(), ("Identity", "Identity_1"))
+    run = _load("pose_detection", DETECTOR_OUTPUTS, runtime)
 
     def detect(image: Tensor) -> tuple[Tensor, Tensor]:
         boxes, logits = run(image)
@@ -44,14 +55,9 @@ def load_detector() -> Detector:
     return detect
 
 
-def load_landmarker(pruned: bool = True) -> Landmarker:
-    """The landmark stage (`full`). Raises `WeightsError` where the weights are missing.
-
-    Args:
-        pruned: drop what the three used outputs do not need: the same bits, 1.7 times as fast.
-    """
-    content = find_weights("pose_landmark_full").read_bytes()
-    run = _interpreter(prune(content) if pruned else content, LANDMARK_OUTPUTS)
+def load_landmarker(network: str = "full", runtime: str = "litert") -> Landmarker:
+    """The landmark stage. Raises `WeightsError` where its weights are missing."""
+    run = _load(f"pose_landmark_{network}", LANDMARK_OUTPUTS, runtime)
 
     def landmark(image: Tensor) -> tuple[Tensor, float, Tensor]:
         points, flag, heat = run(image)
@@ -60,58 +66,8 @@ def load_landmarker(pruned: bool = True) -> Landmarker:
     return landmark
 
 
-def _interpreter(content: bytes, outputs: Sequence[str]) -> Callable[[Tensor], list[Tensor]]:
-    net = Interpreter(model_content=content, num_threads=1)
-    net.allocate_tensors()
-    into = net.get_input_details()[0]["index"]
-    index = {detail["name"]: detail["index"] for detail in net.get_output_details()}
-    wanted = [index[name] for name in outputs]
-
-    def run(image: Tensor) -> list[Tensor]:
-        net.set_tensor(into, image[None])
-        net.invoke()
-        return [net.get_tensor(k) for k in wanted]
-
-    return run
-
-
-def prune(content: bytes, outputs: Sequence[str] = LANDMARK_OUTPUTS) -> bytes:
-    """A .tflite model without whatever the named outputs do not need.
-
-    Operators are stored in topological order, so that one pass from the end finds all that
-    an output depends on.
-    """
-    model: Any = schema.ModelT.InitFromPackedBuf(content, 0)  # generated code, loosely typed
-    graph = model.subgraphs[0]
-    by_name = {graph.tensors[k].name.decode(): int(k) for k in graph.outputs}
-    graph.outputs = [by_name[name] for name in outputs]
-    needed, operators = set(graph.outputs), []
-    for operator in reversed(graph.operators):
-        if needed.intersection(int(k) for k in operator.outputs):
-            operators.append(operator)
-            needed.update(int(k) for k in operator.inputs if k >= 0)
-    graph.operators = operators[::-1]
-    needed.update(int(k) for k in graph.inputs)
-    needed.update(int(k) for operator in operators for k in operator.outputs)
-    _keep_tensors(model, sorted(needed))
-    builder = flatbuffers.Builder(len(content))
-    builder.Finish(model.Pack(builder), b"TFL3")
-    return bytes(builder.Output())
-
-
-def _keep_tensors(model: Any, kept: list[int]) -> None:
-    """Renumber tensors and buffers so that only `kept` remain (-1 marks an absent input)."""
-    graph = model.subgraphs[0]
-    place = {old: new for new, old in enumerate(kept)}
-    place[-1] = -1
-    graph.tensors = [graph.tensors[k] for k in kept]
-    for item in (graph, *graph.operators):
-        item.inputs = [place[int(k)] for k in item.inputs]
-        item.outputs = [place[int(k)] for k in item.outputs]
-    buffers = [model.buffers[0]]  # the empty one, by the format's convention
-    for tensor in graph.tensors:
-        if tensor.buffer:
-            buffers.append(model.buffers[tensor.buffer])
-            tensor.buffer = len(buffers) - 1
-    model.buffers = buffers
-    model.metadata = model.metadataBuffer = model.signatureDefs = None
+def _load(weights: str, outputs: tuple[str, ...], runtime: str) -> Network:
+    path = find_weights(weights)
+    if chosen_runtime(runtime) == "openvino":
+        return vino.load(path, outputs)
+    return litert.load(litert.prune(path.read_bytes(), outputs), outputs)

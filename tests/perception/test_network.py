@@ -2,15 +2,18 @@
 
 import numpy as np
 
+from hrc_env.perception import litert
 from hrc_env.perception.blazepose import detector_input, landmark_input, sample_window
-from hrc_env.perception.network import load_detector, load_landmarker, prune
+from hrc_env.perception.network import LANDMARK_OUTPUTS, load_detector, load_landmarker
 from hrc_env.records import CropWindow
 
 MIDDLE = CropWindow((118.0, 138.0), 220.0, 0.1)
 
 
 def test_the_pruned_network_gives_the_bits_of_the_whole_one(weights, pictures):
-    pruned, whole = load_landmarker(), load_landmarker(pruned=False)
+    content = weights["pose_landmark_full"].read_bytes()
+    whole = litert.load(content, LANDMARK_OUTPUTS)
+    pruned = litert.load(litert.prune(content, LANDMARK_OUTPUTS), LANDMARK_OUTPUTS)
     for picture in pictures.values():
         image = landmark_input(sample_window(picture, MIDDLE))
         for ours, theirs in zip(pruned(image), whole(image), strict=True):
@@ -19,7 +22,7 @@ def test_the_pruned_network_gives_the_bits_of_the_whole_one(weights, pictures):
 
 def test_pruning_leaves_a_smaller_file(weights):
     content = weights["pose_landmark_full"].read_bytes()
-    assert len(prune(content)) < len(content)
+    assert len(litert.prune(content, LANDMARK_OUTPUTS)) < len(content)
 
 
 def test_two_copies_of_a_network_agree_bit_for_bit(weights, pictures):

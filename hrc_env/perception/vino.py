@@ -1,0 +1,88 @@
+"""Networks on OpenVINO, an optional extra: pip install "hrc_env[openvino]".
+
+It reads the same files and computes only what the wanted outputs need. Where the processor
+multiplies 16-bit floats (bf16: AVX512_BF16 or AMX) it takes half of LiteRT's time, and
+landmarks move by a quarter of a pixel of 256; elsewhere it computes in 32 bits.
+"""
+
+import functools
+import importlib.util
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hrc_env.errors import ConfigError
+from hrc_env.perception.tensors import Network, Tensor
+
+INSTALL = 'pip install "hrc_env[openvino]"'
+
+
+def installed() -> bool:
+    """Whether OpenVINO is there; it is not imported for that."""
+    return importlib.util.find_spec("openvino") is not None
+
+
+def require() -> None:
+    """Raise `ConfigError` where OpenVINO is missing."""
+    if not installed():
+        raise ConfigError(
+            f'runtime="openvino" needs OpenVINO, which is not installed: {INSTALL}, or choose '
+            'runtime="litert".'
+        )
+
+
+def precision() -> str:
+    """What networks are computed in here: "bf16" where the processor has it, else "f32"."""
+    return "bf16" if "BF16" in _core().get_property("CPU", "OPTIMIZATION_CAPABILITIES") else "f32"
+
+
+def load(path: Path, outputs: Sequence[str], bits: str | None = None) -> Network:
+    """A .tflite file as a function from an image to the named outputs, on one thread.
+
+    Args:
+        path: the file.
+        outputs: their names.
+        bits: "f32" or "bf16"; `precision()` unless given.
+
+    Raises:
+        ConfigError: OpenVINO is not installed.
+    """
+    openvino = _openvino()
+    whole = _core().read_model(path)
+    wanted = [out.node for name in outputs for out in whole.outputs if name in out.names]
+    compiled = _core().compile_model(
+        openvino.Model(wanted, whole.get_parameters()),
+        "CPU",
+        {
+            "INFERENCE_NUM_THREADS": 1,
+            "NUM_STREAMS": 1,
+            "ENABLE_CPU_PINNING": False,
+            "INFERENCE_PRECISION_HINT": bits or precision(),
+        },
+    )
+    request = compiled.create_infer_request()
+    image_in = request.get_input_tensor().data
+    said = [request.get_output_tensor(k).data for k in range(len(outputs))]
+
+    def run(image: Tensor) -> list[Tensor]:
+        image_in[0] = image
+        request.infer()
+        return [np.array(tensor) for tensor in said]
+
+    return run
+
+
+@functools.cache
+def _core() -> Any:
+    return _openvino().Core()
+
+
+def _openvino() -> Any:
+    """The package, without its telemetry: that would keep a client's number and usage counts in
+    the user's home."""
+    require()
+    sys.modules.setdefault("openvino_telemetry", None)  # type: ignore[arg-type]
+    return importlib.import_module("openvino")
