@@ -13,7 +13,7 @@ from hrc_env.experiments.motion.gait import gait_of
 from hrc_env.experiments.motion.plot import plot_targets
 from hrc_env.experiments.motion.report import write_report
 from hrc_env.experiments.motion.statistics import statistics_of
-from hrc_env.experiments.tracking.shelf import Say
+from hrc_env.experiments.study.shelf import Say
 from hrc_env.motion import plans as pl
 from hrc_env.motion.generator import MotionConfig, advance, make_state, reset
 from hrc_env.motion.repertoire import REPERTOIRE, perform

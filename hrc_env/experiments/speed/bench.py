@@ -17,7 +17,7 @@ from hrc_env.experiments.speed.measured import REACHER, SINGLE, Measured, metric
 from hrc_env.experiments.speed.organs import Organs
 from hrc_env.experiments.speed.report import write_report
 from hrc_env.experiments.speed.starts import Starts
-from hrc_env.experiments.tracking.shelf import Say
+from hrc_env.experiments.study.shelf import Say
 from hrc_env.results import Metric, write_results
 
 WATCHED = "keypoints"
