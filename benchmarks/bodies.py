@@ -1,10 +1,8 @@
 """Whether BlazePose sees our people as people: python benchmarks/bodies.py
 
-Every baked body moves as the motion generator has it, in every scene, and is drawn with the
-arm somewhere near home. Each camera gives a crop round the true joints, cut as the pipeline
-cuts it. What counts are crops with every joint in the image and no room or robot before one
-("in view"): how many are detected, and in how many the joints are on average nearer to the
-truth than a tenth of the stature.
+Every baked body in every scene; crops as in `hrc_env.experiments.perception.crops`. What counts are
+those in view: how many are detected, and in how many the joints are on average nearer to the truth
+than a tenth of the stature.
 """
 
 import math
@@ -20,27 +18,14 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from hrc_env.body import load_body, worker_names, worker_truth
-from hrc_env.config import HRCConfig
-from hrc_env.geometry.cameras import inside_image, project, projections
-from hrc_env.geometry.sight import hidden
-from hrc_env.motion import generator
-from hrc_env.perception.eyes import Eyes
-from hrc_env.perception.windows import window_from_joints
+from hrc_env.body import worker_names
+from hrc_env.experiments.perception.crops import GOOD_SHARE, Looker, instants
+from hrc_env.experiments.perception.measured import share
 from hrc_env.pictures import draw_landmarks, label, tile
-from hrc_env.records import Held, WorkerMotion
 from hrc_env.results import Metric, write_results
 from hrc_env.scene.build import SCENES, Scene, SceneConfig, build
-from hrc_env.scene.render import CropRenderer
-from hrc_env.typing import Floats, Image
+from hrc_env.typing import Image
 
-GOOD_SHARE = 0.10
-"""Joints that are on average this share of the stature from the truth are still good."""
-STEP_S = 0.04
-PAUSE_STEPS = (20, 80)
-"""Between two looks pass 0.8 to 3.2 s: another moment of the work, or other work."""
-PATIENCE = 200
-"""Moments that may pass without a wanted activity before that is given up."""
 N_PICTURED = 40
 
 
@@ -84,96 +69,35 @@ class Look:
         return self.detected and self.error < GOOD_SHARE
 
 
-def moments(
-    scene: Scene, arguments: Arguments, n: int, rng: np.random.Generator
-) -> Iterator[tuple[str, WorkerMotion]]:
-    """n moments of a worker's day: the activity and the body (1, 1, S, ...)."""
-    body = load_body(scene.bodies[0])
-    state = generator.make_state(1, 1, body, HRCConfig().motion, scene.grounds)
-    streams = [np.random.default_rng(rng.integers(2**63))]
-    generator.reset(state, np.arange(1), streams)
-    wanted = arguments.activities
-    for k in range(n):
-        for _ in range(PATIENCE):
-            steps = int(rng.integers(*PAUSE_STEPS))
-            generator.advance(state, streams, STEP_S, steps)
-            name = generator.activity_names[generator.activity(state)[0, 0]]
-            if not wanted or name == wanted[k % len(wanted)]:
-                break
-        yield name, generator.current(state)
-
-
-def judge(scene: Scene, motion: WorkerMotion, q: Floats, eyes: Eyes, source: CropRenderer):
-    """Look at one moment with every camera.
-
-    Returns:
-        In view, looked at, pixels (C, J, 2), error as a share of the stature, all (C, ...), and
-        what the eyes saw.
-    """
-    body, cameras = load_body(scene.bodies[0]), scene.cameras
-    joints = worker_truth(body, motion).joints_world[0]
-    px, depth_m = (values[0] for values in project(projections(cameras), joints))
-    windows = [window_from_joints(*view) for view in zip(px, depth_m, cameras, strict=True)]
-    eye_world = np.stack([camera.eye_world for camera in cameras])
-    blocked = hidden(scene.surroundings(q[None]), eye_world, joints)[0]
-    source.draw(q, alone(motion))
-    eyes.forget(0)  # as at a first look: the detector stage must agree
-    sight = eyes.look(source, windows) if any(windows) else None
-    inside = np.array([inside_image(c, p).all() for c, p in zip(cameras, px, strict=True)])
-    focal = np.array([camera.K[0, 0] for camera in cameras])
-    stature_px = focal * body.stature_m / depth_m.mean(1)
-    found = np.full(px.shape, np.nan) if sight is None else sight.px
-    error = np.linalg.norm(found - px, axis=-1).mean(1) / stature_px
-    return inside & ~blocked.any(1), windows, found, error
-
-
-def alone(motion: WorkerMotion) -> WorkerMotion:
-    """The first environment's part of a motion, as the renderer takes it: (W, S, ...)."""
-    held = motion.held
-    return WorkerMotion(
-        motion.position_world[0], motion.quaternion_wxyz[0], motion.velocity_world[0],
-        motion.angular_velocity_world[0],
-        held and Held(held.kind[0], held.position_world[0], held.quaternion_wxyz[0]),
-    )  # fmt: skip
-
-
 def looks_at(
     scene: Scene, arguments: Arguments, n: int, rng: np.random.Generator, bad: list[Image]
 ) -> Iterator[list[Look]]:
     """The looks of n moments in one scene with one body."""
-    eyes, source = Eyes(scene.cameras), CropRenderer(scene)
-    spread = np.array(HRCConfig().start_spread_rad)
-    for activity, motion in moments(scene, arguments, n, rng):
-        q = scene.home_q + rng.uniform(-1, 1, len(spread)) * spread
-        in_view, windows, found, error = judge(scene, motion, q, eyes, source)
-        looks = []
+    looker = Looker(scene)
+    for now in instants(scene, n, rng, arguments.activities):
+        looked, looks = looker.look(now), []
         for c, camera in enumerate(scene.cameras):
-            if windows[c] is None:
+            window, error = looked.windows[c], float(looked.error[c])
+            if window is None:
                 continue
-            detected = bool(np.isfinite(error[c]))
             look = Look(
-                scene.bodies[0], scene.name, activity, camera.name, bool(in_view[c]), detected,
-                float(error[c]),
+                scene.bodies[0], scene.name, now.activity, camera.name, bool(looked.in_view[c]),
+                bool(np.isfinite(error)), error,
             )  # fmt: skip
             looks.append(look)
             if look.in_view and not look.good and len(bad) < N_PICTURED:
-                picture = np.array(source.crop(c, windows[c]))
-                draw_landmarks(picture, windows[c], found[c], np.ones(len(found[c])))
-                label(picture, f"{look.body} {activity} {look.error:.2f}", (2, 2), 11)
+                picture = looker.crop(c, window)
+                found = looker.image_px(c, looked.found_px[c])
+                draw_landmarks(picture, window, found, np.ones(len(found)))
+                label(picture, f"{look.body} {now.activity} {look.error:.2f}", (2, 2), 11)
                 bad.append(picture)
         yield looks
-    eyes.close()
-    source.close()
+    looker.close()
 
 
-def share(looks: list[Look], of: Callable[[Look], bool]) -> Metric:
-    """The share of crops in view with a property, with Wilson's 95 % interval."""
-    seen = [of(look) for look in looks if look.in_view]
-    n, z = len(seen), 1.96
-    p = float(np.mean(seen)) if n else math.nan
-    middle = (p + z * z / (2 * n)) / (1 + z * z / n) if n else math.nan
-    half = z * math.sqrt(p * (1 - p) / n + (z / (2 * n)) ** 2) / (1 + z * z / n) if n else math.nan
-    return Metric(p, middle - half, middle + half, "share", n)
+def in_view(looks: list[Look], of: Callable[[Look], bool]) -> Metric:
+    """The share of crops in view with a property."""
+    return share([of(look) for look in looks if look.in_view])
 
 
 def report(looks: list[Look]) -> dict[str, Metric]:
@@ -183,7 +107,7 @@ def report(looks: list[Look]) -> dict[str, Metric]:
     for key in ("body", "activity", "scene", "all"):
         for name in sorted({getattr(look, key, "all") for look in looks}):
             mine = [look for look in looks if getattr(look, key, "all") == name]
-            detected, good = share(mine, lambda x: x.detected), share(mine, lambda x: x.good)
+            detected, good = in_view(mine, lambda x: x.detected), in_view(mine, lambda x: x.good)
             errors = [look.error for look in mine if look.in_view and look.detected]
             middle = float(np.median(errors)) if errors else math.nan
             metrics |= {f"{name}/detected": detected, f"{name}/good": good}

@@ -1,4 +1,4 @@
-"""python -m hrc_env bench: how good the estimators are, how fast everything, how human workers."""
+"""python -m hrc_env bench: how good estimators and eyes, how fast all, how human workers are."""
 
 import os
 from collections.abc import Callable
@@ -128,8 +128,31 @@ class MotionBench:
 
 
 @dataclass(frozen=True)
+class PerceptionBench:
+    """Level `pixels`: steps a second and what takes them, how well workers are seen by pose,
+    distance, view angle and lens, what every fault of a camera costs, ghosts in empty rooms.
+
+    A bench that was stopped goes on where it was when it is started with the same folder.
+    """
+
+    out: Path = Path("out/bench_perception")
+    """Folder for results.json, tables, pictures and the parts that are done."""
+    quick: bool = False
+    """Fewer episodes and crops: every number, with wider intervals, in less than four minutes."""
+
+    def run(self) -> int:
+        """Run, show the tables."""
+        from hrc_env.experiments.perception.bench import QUICK, PerceptionBenchConfig, run
+
+        config = QUICK if self.quick else PerceptionBenchConfig()
+        written = "results.json, perception.md, three plots (PNG), worst_crops.png"
+        return show(partial(run, config), self.out, "perception.md", written)
+
+
+@dataclass(frozen=True)
 class Bench:
-    """Measure the estimators (tracking), the environment (speed) or the workers (motion).
+    """Measure the estimators (tracking), the eyes (perception), the environment (speed) or the
+    workers (motion).
 
     Each takes --quick (minutes, not hours) and --out DIR, where it writes results.json, a table
     and pictures; `bench tracking --help` and so on say the rest.
@@ -137,6 +160,7 @@ class Bench:
 
     what: (
         Annotated[TrackingBench, tyro.conf.subcommand("tracking")]
+        | Annotated[PerceptionBench, tyro.conf.subcommand("perception")]
         | Annotated[SpeedBench, tyro.conf.subcommand("speed")]
         | Annotated[MotionBench, tyro.conf.subcommand("motion")]
     )

@@ -60,7 +60,7 @@ def rmse_ratio_over(
     return _boot((np.asarray(squared, float), np.asarray(other_squared, float)), ratio, unit)
 
 
-def quantile_over(values: Sequence[Sequence[float]], q: float, unit: str) -> Metric:
+def quantile_over(values: Sequence[Sequence[float] | Floats], q: float, unit: str) -> Metric:
     """A quantile of all values together; seeds are drawn with all of theirs."""
     groups = [np.asarray(each, float) for each in values]
     groups = [each[np.isfinite(each)] for each in groups]

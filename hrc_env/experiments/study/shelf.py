@@ -26,7 +26,8 @@ class Shelf:
 
     folder: Path
     fingerprint: str
-    n_parts: int
+    n_parts: float
+    """A part is one of so many in the progress that is told."""
     say: Say
 
     def part(self, label: str, make: Callable[[Tick], dict[str, Any]]) -> dict[str, Any]:

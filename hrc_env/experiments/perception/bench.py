@@ -1,0 +1,314 @@
+"""The perception bench: how fast the eyes are, how well they see, and what goes wrong.
+
+Each part is written to DIR/parts as soon as it is done, so that a bench that was stopped goes on
+where it was; parts made by other code or settings are made anew. Times are taken last.
+"""
+
+import zlib
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hrc_env.body import worker_names
+from hrc_env.errors import ConfigError
+from hrc_env.experiments.perception import loops, phantoms, sheet, speed
+from hrc_env.experiments.perception.crops import Instant, Looked, Looker, instants
+from hrc_env.experiments.perception.families import in_turns
+from hrc_env.experiments.perception.loops import Episode, episode_of
+from hrc_env.experiments.perception.measured import (
+    EMULATED,
+    NO_FAULT,
+    PIXELS,
+    Measured,
+    metrics_of,
+)
+from hrc_env.experiments.perception.report import write_report
+from hrc_env.experiments.perception.views import PLAIN, View, view_of
+from hrc_env.experiments.study.shelf import Say, Shelf, fingerprint_of
+from hrc_env.faults.fault import IMAGE, KINDS
+from hrc_env.results import Metric, write_results
+from hrc_env.scene.build import SCENES, Scene, SceneConfig, build
+from hrc_env.scene.rigs import RIGS
+
+LENSES = {"pinhole": "lab", "fisheye": "lab_gopro"}
+"""Rigs that hang in the same places, by the rows that their crops make."""
+FIRST_SEED = 500
+"""Of episodes; the others count up."""
+BLOCK = 5
+"""Episodes of a part: so many are lost at most when the bench is stopped."""
+KEPT_CROPS = sheet.N_CROPS
+"""The worst so many crops of every part are kept until all are known."""
+
+
+@dataclass(frozen=True, slots=True)
+class PerceptionBenchConfig:
+    """How much is measured."""
+
+    episodes: tuple[tuple[str, int], ...] = (("lab", 30), ("site", 15))
+    """Episodes at `pixels`, scene by scene; faults are compared with the lab's first ones."""
+    n_steps: int = 250
+    """Steps of each."""
+    n_faults: int = 8
+    """Episodes of every fault at `pixels`; the four cameras have it in turns."""
+    fault_steps: int = 150
+    """Steps of each."""
+    n_emulated: int = 40
+    """Episodes of every fault at `keypoints`, of `n_steps` each."""
+    kinds: tuple[str, ...] = tuple(KINDS)
+    """Which faults."""
+    bodies: tuple[str, ...] = worker_names()
+    """Whose crops are looked at."""
+    n_instants: int = 30
+    """Moments of each body in each scene, and of each lens; four crops each."""
+    n_empty: int = 1000
+    """Steps in each scene without anybody."""
+    cameras: tuple[int, ...] = (1, 2, 4)
+    """Numbers of cameras whose speed is taken."""
+    workers: tuple[int, ...] = (1, 2)
+    """Numbers of workers likewise."""
+    speed_steps: int = 200
+    """Steps by which it is."""
+
+    def __post_init__(self) -> None:
+        """Raise `ConfigError` for numbers that cannot work."""
+        for name in (
+            "n_steps", "n_faults", "fault_steps", "n_emulated", "n_instants", "n_empty",
+            "speed_steps",
+        ):  # fmt: skip
+            if getattr(self, name) < 1:
+                raise ConfigError(f"{name} must be at least 1, got {getattr(self, name)}.")
+        if self.n_faults > dict(self.episodes).get("lab", 0) or self.fault_steps > self.n_steps:
+            raise ConfigError(
+                "Faults are compared with the lab's first episodes: n_faults must not exceed their "
+                f"number nor fault_steps n_steps, got {self.n_faults} and {self.fault_steps}."
+            )
+        if not self.bodies:
+            raise ConfigError(f"bodies must name some of {worker_names()}.")
+
+
+QUICK = PerceptionBenchConfig(
+    episodes=(("lab", 3), ("site", 2)), n_steps=80, n_faults=2, fault_steps=40, n_emulated=8,
+    bodies=("worker_1", "worker_2"), n_instants=10, n_empty=40, speed_steps=30,
+)  # fmt: skip
+"""Every number, from little."""
+
+
+class Task(NamedTuple):
+    """One part of the bench."""
+
+    label: str
+    cost: float
+    """How long it takes beside the others, roughly [s]."""
+    make: Callable[[Callable[[float], None]], dict[str, Any]]
+    take: Callable[[dict[str, Any], Measured], None]
+    """Puts what was made where it belongs."""
+
+
+def run(config: PerceptionBenchConfig, out: Path, say: Say) -> dict[str, Metric]:
+    """Measure what is not yet there.
+
+    Writes results.json, perception.md, plots and the sheet of the worst crops into `out`.
+
+    Args:
+        config: how much.
+        out: a folder.
+        say: hears of the progress: shares that sum to 1.
+    """
+    tasks = list(_tasks(config, out))
+    fingerprint, found = fingerprint_of(asdict(config), "perception"), Measured()
+    total = sum(task.cost for task in tasks)
+    for task in tasks:
+        n_parts = total / task.cost
+        shelf = Shelf(out / "parts", fingerprint, n_parts, say)
+        task.take(shelf.part(task.label, task.make), found)
+    base = found.loops["lab"][: config.n_faults]
+    first = slice(config.fault_steps)
+    found.faults[PIXELS, NO_FAULT] = [loops.some_steps(each, first) for each in base]
+    metrics = metrics_of(found)
+    seeds = [FIRST_SEED + k for k in range(max(n for _, n in config.episodes))]
+    write_results(out / "results.json", {"bench": asdict(config)}, seeds, metrics)
+    write_report(out, metrics)
+    plain = [view for view in found.views if view.variant == PLAIN]
+    worst = sheet.worst_of([np.nan if v.error is None else v.error for v in plain])
+    kept = [plain[k].picture for k in worst]
+    sheet.write_sheet(out / "worst_crops.png", [out / name for name in kept if name])
+    return metrics
+
+
+def _tasks(config: PerceptionBenchConfig, out: Path) -> Iterator[Task]:
+    """All parts, times last."""
+    yield from _crops(config, out)
+    yield from _episodes(config)
+    yield from _faults(config)
+    for scene, _ in config.episodes:
+        make = partial(_phantoms, scene, config.n_empty)
+        yield Task(f"empty.{scene}", 0.1 * config.n_empty, make, _take_phantoms)
+    for cameras in config.cameras:
+        for workers in config.workers:
+            make = partial(_speed, cameras, workers, config.speed_steps)
+            cost = 2 + 0.02 * config.speed_steps * cameras * workers
+            take = partial(_take_speed, (cameras, workers))
+            yield Task(f"speed.{cameras}.{workers}", cost, make, take)
+
+
+def _episodes(config: PerceptionBenchConfig) -> Iterator[Task]:
+    for scene, n in config.episodes:
+        for first in range(0, n, BLOCK):
+            seeds = [FIRST_SEED + k for k in range(first, min(first + BLOCK, n))]
+            make = partial(_play, seeds, config.n_steps, scene=scene, perception=PIXELS)
+            cost = 2 + 0.05 * config.n_steps * len(seeds)
+            yield Task(f"loop.{scene}.{first}", cost, make, partial(_take_loop, scene))
+
+
+def _faults(config: PerceptionBenchConfig) -> Iterator[Task]:
+    """Every fault at the levels that know it; at `keypoints` also the same without."""
+    for kind in config.kinds:
+        make = partial(_play_fault, kind, config.n_faults, config.fault_steps, PIXELS)
+        slow = 3.0 if kind == "motion_blur" else 1.2
+        cost = 8 + slow * 0.05 * config.fault_steps * config.n_faults
+        yield Task(f"fault.{PIXELS}.{kind}", cost, make, partial(_take_fault, (PIXELS, kind)))
+        if KINDS[kind].group != IMAGE:
+            yield _emulated(kind, config)
+    yield _emulated(NO_FAULT, config)
+
+
+def _emulated(kind: str, config: PerceptionBenchConfig) -> Task:
+    make = partial(_play_fault, kind, config.n_emulated, config.n_steps, EMULATED)
+    cost = 1 + 0.0015 * config.n_steps * config.n_emulated
+    return Task(f"fault.{EMULATED}.{kind}", cost, make, partial(_take_fault, (EMULATED, kind)))
+
+
+def _play(
+    seeds: list[int], n_steps: int, tick: Callable[[float], None], **arguments: Any
+) -> dict[str, Any]:
+    episodes = loops.play(seeds, n_steps, tick, **arguments)
+    return {"episodes": [episode.to_json() for episode in episodes]}
+
+
+def _play_fault(
+    kind: str, n: int, n_steps: int, level: str, tick: Callable[[float], None]
+) -> dict[str, Any]:
+    """Episodes in which the cameras have a fault in turns."""
+    episodes: list[Episode | None] = [None] * n
+    n_cameras = len(SCENES["lab"].cameras)
+    for c in range(min(n_cameras, n)):
+        mine = list(range(c, n, n_cameras))
+        faults = [] if kind == NO_FAULT else [loops.rotated(kind, c, n_cameras)]
+        seeds = [FIRST_SEED + k for k in mine]
+        part = len(mine) / n
+        played = loops.play(
+            seeds, n_steps, lambda s, part=part: tick(part * s), perception=level, faults=faults
+        )
+        for k, episode in zip(mine, played, strict=True):
+            episodes[k] = episode
+    return {"episodes": [episode.to_json() for episode in episodes if episode]}
+
+
+def _crops(config: PerceptionBenchConfig, out: Path) -> Iterator[Task]:
+    """Crops of every body in every scene, and of one body through every lens."""
+    n = config.n_instants
+    cost = 3 + 0.12 * n
+    for name, _ in config.episodes:
+        for body in config.bodies:
+            scene = partial(build, SceneConfig(), name, 1, body)
+            label = f"crops.{PLAIN}.{name}.{body}"
+            make = partial(_look, label, PLAIN, scene, n, out)
+            yield Task(label, cost, make, _take_views)
+    for row, rig in LENSES.items():
+        scene = partial(build, SceneConfig(cameras=RIGS[rig]), "lab", 1, config.bodies[0])
+        label = f"crops.lens.{row}"
+        make = partial(_look, label, f"lens {row}", scene, 2 * n, out)
+        yield Task(label, 2 * cost, make, _take_views)
+
+
+def _look(
+    label: str, variant: str, scene: Callable[[], Scene], n: int, out: Path,
+    tick: Callable[[float], None],
+) -> dict[str, Any]:  # fmt: skip
+    """n moments; every activity has its turn. The worst crops are kept as pictures."""
+    place = scene()
+    rng = np.random.default_rng(zlib.crc32(f"{place.name} {place.bodies[0]}".encode()))
+    looker, views, kept = Looker(place), list[View](), 0
+    for now in instants(place, n, rng, in_turns()):
+        looked = looker.look(now)
+        for c in np.flatnonzero(looked.in_view).tolist():
+            view = _view(variant, place, now, looked, c)
+            if _is_bad(view, views):
+                name = f"parts/crops/{label}.{kept}.png"
+                sheet.keep(out / name, _picture(looker, looked, c, view))
+                view, kept = _view(variant, place, now, looked, c, name), kept + 1
+            views.append(view)
+        tick(1 / n)
+    looker.close()
+    return {"views": [asdict(view) for view in views]}
+
+
+def _is_bad(view: View, before: list[View]) -> bool:
+    """Whether a crop is among the worst so far of its part: of those missed, or of the others."""
+    alike = [v for v in before if v.picture and (v.error is None) == (view.error is None)]
+    return sum((v.error or 0.0) >= (view.error or 0.0) for v in alike) < KEPT_CROPS
+
+
+def _view(
+    variant: str, scene: Scene, now: Instant, looked: Looked, c: int, picture: str | None = None
+) -> View:
+    error = float(looked.error[c])
+    return View(
+        variant=variant,
+        scene=scene.name,
+        body=scene.bodies[0],
+        activity=now.activity,
+        camera=scene.cameras[c].name,
+        distance_m=float(looked.distance_m[c]),
+        angle_deg=float(looked.angle_deg[c]),
+        error=error if np.isfinite(error) else None,
+        picture=picture,
+    )
+
+
+def _picture(looker: Looker, looked: Looked, c: int, view: View) -> np.ndarray:
+    window = looked.windows[c]
+    if window is None:
+        side = looker.renderer.size_px
+        return np.zeros((round(sheet.SCALE * side),) * 2 + (3,), np.uint8)
+    said = "missed" if view.error is None else f"{100 * view.error:.0f} %"
+    text = f"{view.scene} {view.activity}: {said}"
+    places = looker.image_px(c, looked.found_px[c]), looker.image_px(c, looked.true_px[c])
+    return sheet.marked(looker.crop(c, window), window, *places, text)
+
+
+def _phantoms(scene: str, n_steps: int, tick: Callable[[float], None]) -> dict[str, Any]:
+    return phantoms.count(scene, n_steps, FIRST_SEED, tick)
+
+
+def _speed(
+    cameras: int, workers: int, n_steps: int, tick: Callable[[float], None]
+) -> dict[str, Any]:
+    return {
+        **speed.measure("lab", cameras, workers, n_steps, FIRST_SEED, tick), "n": n_steps
+    }  # fmt: skip
+
+
+def _take_views(part: dict[str, Any], found: Measured) -> None:
+    found.views += [view_of(view) for view in part["views"]]
+
+
+def _take_loop(scene: str, part: dict[str, Any], found: Measured) -> None:
+    episodes = [episode_of(episode) for episode in part["episodes"]]
+    found.loops.setdefault(scene, []).extend(episodes)
+
+
+def _take_fault(key: tuple[str, str], part: dict[str, Any], found: Measured) -> None:
+    found.faults[key] = [episode_of(episode) for episode in part["episodes"]]
+
+
+def _take_phantoms(part: dict[str, Any], found: Measured) -> None:
+    found.phantoms.append(part)
+
+
+def _take_speed(key: tuple[int, int], part: dict[str, Any], found: Measured) -> None:
+    found.speed[key] = part

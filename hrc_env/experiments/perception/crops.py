@@ -1,0 +1,189 @@
+"""Crops of workers at their work, looked at as if for the first time.
+
+A worker moves as the motion generator has it and is drawn with the arm somewhere near home. Each
+camera gives a crop round the true joints, cut as the pipeline cuts it. What counts are crops with
+every joint in the image and no room or robot before one ("in view").
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from hrc_env.body import load_body, worker_truth
+from hrc_env.config import HRCConfig
+from hrc_env.geometry.cameras import (
+    image_from_pinhole,
+    inside_image,
+    pinhole_from_image,
+    project,
+    projections,
+)
+from hrc_env.geometry.sight import hidden
+from hrc_env.motion import generator
+from hrc_env.perception.eyes import Eyes
+from hrc_env.perception.lensed import Lensed
+from hrc_env.perception.windows import window_from_joints
+from hrc_env.records import CropWindow, Held, WorkerMotion
+from hrc_env.scene.build import Scene
+from hrc_env.scene.render import CropRenderer
+from hrc_env.skeleton import JOINT
+from hrc_env.typing import Bools, Floats, Image, JointAngles, Points2, Points3
+
+GOOD_SHARE = 0.10
+"""Joints that are on average this share of the stature from the truth are still good."""
+STEP_S = 0.04
+PAUSE_STEPS = (20, 80)
+"""Between two looks pass 0.8 to 3.2 s: another moment of the work, or other work."""
+PATIENCE = 200
+"""Moments that may pass without a wanted activity before that is given up."""
+
+
+class Instant(NamedTuple):
+    """A moment of a worker's day."""
+
+    activity: str
+    q: JointAngles
+    """(N,) the arm [rad]."""
+    motion: WorkerMotion
+    """(1, 1, S, ...)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Looked:
+    """What the cameras made of one instant; arrays (C, ...)."""
+
+    in_view: Bools
+    """(C,) all joints in the image, nothing of room or robot before them."""
+    windows: list[CropWindow | None]
+    found_px: Points2
+    """(C, J, 2) pinhole pixels; NaN where nobody was found."""
+    true_px: Points2
+    """(C, J, 2) the same of the truth."""
+    error: Floats
+    """(C,) mean distance of the joints from the truth as a share of the stature; NaN: missed."""
+    distance_m: Floats
+    """(C,) from the camera to the middle of the body [m]."""
+    angle_deg: Floats
+    """(C,) between where the worker faces and the direction to the camera, seen from above: 0 from
+    the front, 180 from behind."""
+
+
+class Looker:
+    """Eyes and a renderer for the crops of one scene."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene, self.body = scene, load_body(scene.bodies[0])
+        self.renderer = CropRenderer(scene)
+        self.source = Lensed(self.renderer, scene.cameras)
+        self.eyes = Eyes(scene.cameras)
+
+    def look(self, now: Instant) -> Looked:
+        """Look at an instant with every camera."""
+        scene = self.scene
+        joints = worker_truth(self.body, now.motion).joints_world[0]
+        px, depth_m = (values[0] for values in project(projections(scene.cameras), joints))
+        views = zip(px, depth_m, scene.cameras, strict=True)
+        windows = [window_from_joints(*view) for view in views]
+        found = self._found(now, windows)
+        stature_px = np.array([camera.K[0, 0] for camera in scene.cameras]) * self.body.stature_m
+        off_px = np.linalg.norm(found - px, axis=-1).mean(1)
+        eyes = np.stack([camera.eye_world for camera in scene.cameras])
+        return Looked(
+            in_view=self._in_view(now, joints, px),
+            windows=windows,
+            found_px=found,
+            true_px=px,
+            error=off_px * depth_m.mean(1) / stature_px,
+            distance_m=np.linalg.norm(eyes - joints[0].mean(0), axis=-1),
+            angle_deg=view_angle_deg(joints[0], eyes),
+        )
+
+    def crop(self, camera: int, window: CropWindow) -> Image:
+        """A copy of a crop of the last instant."""
+        return np.array(self.source.crop(camera, window))
+
+    def image_px(self, camera: int, pinhole_px: Points2) -> Points2:
+        """Pixels of a camera's image, as its lens bends it, of pinhole ones."""
+        return image_from_pinhole(self.scene.cameras[camera], pinhole_px)
+
+    def close(self) -> None:
+        """Free threads and the graphics context."""
+        self.eyes.close()
+        self.renderer.close()
+
+    def _found(self, now: Instant, windows: list[CropWindow | None]) -> Points2:
+        """(C, J, 2) pinhole pixels."""
+        found = np.full((len(windows), len(JOINT), 2), np.nan)
+        if not any(windows):
+            return found
+        self.renderer.draw(now.q, alone(now.motion))
+        self.eyes.forget(0)  # as at a first look: the detector stage must agree
+        sight = self.eyes.look(self.source, windows)
+        for c, camera in enumerate(self.scene.cameras):
+            found[c] = pinhole_from_image(camera, sight.px[c])
+        return found
+
+    def _in_view(self, now: Instant, joints: Points3, px: Points2) -> Bools:
+        cameras = self.scene.cameras
+        eyes = np.stack([camera.eye_world for camera in cameras])
+        blocked = hidden(self.scene.surroundings(now.q[None]), eyes, joints)[0]
+        inside = [
+            inside_image(camera, self.image_px(c, px[c])).all() for c, camera in enumerate(cameras)
+        ]
+        return np.array(inside) & ~blocked.any(1)
+
+
+def instants(
+    scene: Scene, n: int, rng: np.random.Generator, wanted: Sequence[str] = ()
+) -> Iterator[Instant]:
+    """n moments of a worker's day in a scene.
+
+    Args:
+        scene: where; the worker has its first body.
+        n: how many.
+        rng: draws the day and the arm.
+        wanted: moments of these activities, in turns, where one comes within some minutes, else
+            as they come; none takes every moment as it comes.
+    """
+    body = load_body(scene.bodies[0])
+    state = generator.make_state(1, 1, body, HRCConfig().motion, scene.grounds)
+    streams = [np.random.default_rng(rng.integers(2**63))]
+    generator.reset(state, np.arange(1), streams)
+    spread, name = np.array(HRCConfig().start_spread_rad), ""
+    for k in range(n):
+        for _ in range(PATIENCE):
+            steps = int(rng.integers(*PAUSE_STEPS))
+            generator.advance(state, streams, STEP_S, steps)
+            name = generator.activity_names[generator.activity(state)[0, 0]]
+            if not wanted or name == wanted[k % len(wanted)]:
+                break
+        q = scene.home_q + rng.uniform(-1, 1, len(spread)) * spread
+        yield Instant(name, q, generator.current(state))
+
+
+def alone(motion: WorkerMotion) -> WorkerMotion:
+    """The first environment's part of a motion, as the renderer takes it: (W, S, ...)."""
+    held = motion.held
+    return WorkerMotion(
+        motion.position_world[0], motion.quaternion_wxyz[0], motion.velocity_world[0],
+        motion.angular_velocity_world[0],
+        held and Held(held.kind[0], held.position_world[0], held.quaternion_wxyz[0]),
+    )  # fmt: skip
+
+
+def view_angle_deg(joints_world: Points3, eyes_world: Points3) -> Floats:
+    """(C,) see `Looked.angle_deg`.
+
+    Args:
+        joints_world: (J, 3) of one worker.
+        eyes_world: (C, 3).
+    """
+    left = joints_world[[JOINT["left_shoulder"], JOINT["left_hip"]]].mean(0)
+    right = joints_world[[JOINT["right_shoulder"], JOINT["right_hip"]]].mean(0)
+    across = (left - right)[:2]
+    ahead = np.array([across[1], -across[0]])
+    to_eye = eyes_world[:, :2] - (left + right)[:2] / 2
+    cosine = to_eye @ ahead / (np.linalg.norm(to_eye, axis=-1) * np.linalg.norm(ahead))
+    return np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))

@@ -1,0 +1,73 @@
+"""Steps a second at level `pixels`, every camera in every step, and what takes the time."""
+
+import time
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from hrc_env.env import HRCReachEnv
+from hrc_env.experiments.speed.stopwatch import Place, Stopwatch
+from hrc_env.motion import generator
+from hrc_env.scene.physics import Physics
+from hrc_env.scene.render import CropRenderer
+from hrc_env.sensing.rendered import CameraSenses
+from hrc_env.sensing.tracking import TrackingSenses
+
+STAGES: Mapping[str, Sequence[Place]] = {
+    "draw": ((CropRenderer, "draw"), (CropRenderer, "view")),
+    "detect": ((CameraSenses, "detect"),),
+    "track": ((TrackingSenses, "sense"),),
+    "physics": ((Physics, "step"),),
+    "motion": ((generator, "advance"), (generator, "watch")),
+}
+"""Time of the thread that steps: `detect` is what is left of looking when drawing is taken out,
+most of it the network's, or waiting for it; `track` has association in it."""
+REST = "rest"
+WARM_UP = 10
+"""Steps before the clock runs."""
+
+
+def measure(
+    scene: str, n_cameras: int, n_workers: int, n_steps: int, seed: int,
+    tick: Callable[[float], None],
+) -> dict[str, Any]:  # fmt: skip
+    """Random actions for `n_steps`, then as many with the stopwatch round the stages.
+
+    Returns:
+        "steps_per_s" of the median step, "mean" of all of them, and "stages": milliseconds a step.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # that one camera is few is known
+        env = HRCReachEnv(scene=scene, cameras=list(range(n_cameras)), n_workers=n_workers)
+    try:
+        actions = np.random.default_rng(seed)
+        env.reset(seed=seed)
+        _step(env, actions, WARM_UP)
+        seconds = _step(env, actions, n_steps)
+        tick(0.5)
+        watch = Stopwatch(STAGES)
+        with watch.running():
+            total = sum(_step(env, actions, n_steps))
+        tick(0.5)
+    finally:
+        env.close()
+    stages = {name: 1e3 * s / n_steps for name, s in watch.seconds.items()}
+    stages[REST] = 1e3 * total / n_steps - sum(stages.values())
+    return {
+        "steps_per_s": float(1 / np.median(seconds)),
+        "mean": float(len(seconds) / np.sum(seconds)),
+        "stages": stages,
+    }
+
+
+def _step(env: HRCReachEnv, actions: np.random.Generator, n_steps: int) -> list[float]:
+    """Seconds of each step."""
+    seconds = []
+    for _ in range(n_steps):
+        action = actions.uniform(-1, 1, env.simulation.n_actions).astype(np.float32)
+        started_s = time.perf_counter()
+        env.step(action)
+        seconds.append(time.perf_counter() - started_s)
+    return seconds
