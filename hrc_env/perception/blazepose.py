@@ -9,8 +9,10 @@ import math
 from dataclasses import dataclass
 
 import cv2
+import numba
 import numpy as np
 
+from hrc_env.compiled import LEAN
 from hrc_env.perception.network import DETECTOR_SIDE, LANDMARK_SIDE
 from hrc_env.perception.tensors import Tensor
 from hrc_env.records import CropWindow
@@ -25,7 +27,7 @@ MAX_OVERLAP = 0.3
 ROI_MARGIN = 1.25
 """The region of interest is this much larger than the circle round the person."""
 
-_REFINE_REACH = np.arange(-4, 5)  # a 9 x 9 neighbourhood in the 64 x 64 heatmap
+_REACH = 4  # a 9 x 9 neighbourhood in the 64 x 64 heatmap
 _HEAT_SIDE = 64
 _N_USED = 35  # 33 body landmarks, then the two that give the next region of interest
 
@@ -173,29 +175,42 @@ def decode_landmarks(points: Tensor, heat: Tensor) -> Floats:
     Returns:
         33 body landmarks, then mid-hip and rim of the next region of interest.
     """
-    xy = points[:_N_USED, :2].astype(float) / LANDMARK_SIDE
-    cell = np.trunc(xy * _HEAT_SIDE).astype(int)
-    columns = cell[:, 0, None] + _REFINE_REACH
-    rows = cell[:, 1, None] + _REFINE_REACH
-    inside = _on_map(rows)[:, :, None] & _on_map(columns)[:, None, :]
-    near_rows = np.clip(rows, 0, _HEAT_SIDE - 1)[:, :, None]
-    near_columns = np.clip(columns, 0, _HEAT_SIDE - 1)[:, None, :]
-    logits = heat[near_rows, near_columns, np.arange(_N_USED)[:, None, None]]
-    weight = _sigmoid(logits.astype(float)) * inside
-    total = weight.sum((1, 2))
-    sure = (weight.max((1, 2)) >= MIN_SCORE) & _on_map(cell).all(1)
-    total = np.where(total > 0, total, 1.0)
-    refined = np.stack(
-        [(weight.sum(1) * columns).sum(1) / total, (weight.sum(2) * rows).sum(1) / total], axis=1
-    )
     out = np.empty((_N_USED, 3))
-    out[:, :2] = np.where(sure[:, None], refined / _HEAT_SIDE, xy)
-    out[:, 2] = _sigmoid(points[:_N_USED, 3].astype(float))
+    refine(np.ascontiguousarray(points), np.ascontiguousarray(heat), out)
     return out
 
 
-def _on_map(cell: np.ndarray) -> np.ndarray:
-    return (cell >= 0) & (cell < _HEAT_SIDE)
+@numba.njit(**LEAN)
+def refine(points, heat, out):
+    """`decode_landmarks` into `out`: a kernel, so that the other thread need not wait for it."""
+    for k in range(out.shape[0]):
+        x, y = points[k, 0] / np.float64(LANDMARK_SIDE), points[k, 1] / np.float64(LANDMARK_SIDE)
+        out[k, 0], out[k, 1] = x, y
+        out[k, 2] = _chance(np.float64(points[k, 3]))
+        column, row = int(x * _HEAT_SIDE), int(y * _HEAT_SIDE)
+        if not (_on_map(column) and _on_map(row)):
+            continue
+        total, at_column, at_row, surest = 0.0, 0.0, 0.0, 0.0
+        for r in range(max(row - _REACH, 0), min(row + _REACH + 1, _HEAT_SIDE)):
+            for c in range(max(column - _REACH, 0), min(column + _REACH + 1, _HEAT_SIDE)):
+                weight = _chance(np.float64(heat[r, c, k]))
+                surest = max(surest, weight)
+                total += weight
+                at_column += weight * c
+                at_row += weight * r
+        if surest >= MIN_SCORE:
+            out[k, 0] = at_column / total / _HEAT_SIDE
+            out[k, 1] = at_row / total / _HEAT_SIDE
+
+
+@numba.njit(**LEAN)
+def _on_map(cell):
+    return 0 <= cell < _HEAT_SIDE
+
+
+@numba.njit(**LEAN)
+def _chance(logit):
+    return 1.0 / (1.0 + math.exp(-min(max(logit, -80.0), 80.0)))
 
 
 def _overlap(box: Floats, boxes: Floats) -> Floats:

@@ -5,6 +5,7 @@ network on it; then both empty the queue. Each thread has its own interpreters w
 numbers, so that what is seen does not depend on who came first.
 """
 
+import functools
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -13,6 +14,7 @@ from typing import Any, Protocol, TypeVar
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from hrc_env.errors import ConfigError, check_shape, unknown
 from hrc_env.geometry.cameras import PinholeCamera, inside_image
@@ -317,17 +319,27 @@ def _people(detect: Detector, crop: Image) -> list[blazepose.Person]:
 def _seen(crop: Image, window: CropWindow, camera: PinholeCamera) -> Image:
     """A copy of the crop, black where the camera does not see: renderers go on drawing."""
     check_shape("crop", crop.shape, (LANDMARK_SIDE, LANDMARK_SIDE, 3), "rows, columns, RGB")
-    corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
-    if inside_image(camera, blazepose.to_image(corners, window)).all():
+    mask = _frame_mask(window, camera.width_px, camera.height_px)
+    if mask is None:
         return np.array(crop)
-    frame = corners * [camera.width_px, camera.height_px]
+    return np.asarray(cv2.bitwise_and(crop, crop, mask=mask), np.uint8)
+
+
+@functools.lru_cache(maxsize=64)
+def _frame_mask(window: CropWindow, width_px: int, height_px: int) -> NDArray[np.uint8] | None:
+    """Which pixels of a crop are in the image, not 0; None for all. Windows are steady."""
+    corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
+    frame = np.array([width_px, height_px])
+    square = blazepose.to_image(corners, window)
+    if ((square >= 0) & (square < frame)).all():
+        return None
     matrix = np.eye(3)
     matrix[:2] = blazepose.image_from_crop(window, LANDMARK_SIDE)
     back = np.linalg.inv(matrix)[:2]
-    mask = np.zeros(crop.shape[:2], np.uint8)
-    polygon = np.round(frame @ back[:, :2].T + back[:, 2]).astype(np.int32)
+    mask = np.zeros((LANDMARK_SIDE, LANDMARK_SIDE), np.uint8)
+    polygon = np.round(corners * frame @ back[:, :2].T + back[:, 2]).astype(np.int32)
     cv2.fillConvexPoly(mask, polygon, 1)
-    return crop * mask[..., None]
+    return mask
 
 
 def _distinct(people: list[tuple[float, CropWindow]]) -> list[CropWindow]:

@@ -13,9 +13,11 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from hrc_env.compiled import LEAN
 from hrc_env.errors import ConfigError, unknown
 from hrc_env.geometry.cameras import PinholeCamera, pinhole
 from hrc_env.records import CropWindow, WorkerMotion
+from hrc_env.scene import gl
 from hrc_env.scene.build import Scene
 from hrc_env.scene.canvas import EVERYTHING, MOVING, STILL, Canvas
 from hrc_env.scene.primitives import DECORATION, OVERHEAD, ROBOT_LOOKS, SOLID
@@ -56,6 +58,7 @@ class CropRenderer:
     """
 
     def __init__(self, scene: Scene, size_px: int = CROP_PX) -> None:
+        gl.draw_on_one_thread()
         self.scene = scene
         self.size_px = size_px
         self._canvas = Canvas(scene, size_px, size_px, CROP_QUALITY, ALL_GROUPS)
@@ -98,8 +101,8 @@ class CropRenderer:
         background = self._background(key, camera, window)
         self._show(MOVING, camera, window)
         self._canvas.read(self._rgb, self._z)
-        crop = np.empty_like(self._rgb)
-        _lay_over(self._rgb, self._z, background.rgb, background.z, crop)
+        crop = background.rgb.copy()
+        _lay_over(self._rgb, self._z, background.z, crop)
         return crop
 
     def close(self) -> None:
@@ -117,9 +120,10 @@ class CropRenderer:
         """What stands still in this window, drawn at its second look."""
         background = self._kept[key]
         if background is None:
-            background = _Background(np.empty_like(self._rgb), np.empty_like(self._z))
+            z = np.empty_like(self._z)
             self._show(STILL, camera, window)
-            self._canvas.read(background.rgb, background.z)
+            self._canvas.read(self._rgb, z)
+            background = _Background(np.ascontiguousarray(self._rgb[::-1]), z)
         self._remember(key, background)
         return background
 
@@ -132,25 +136,28 @@ class CropRenderer:
 
 @dataclass(frozen=True, slots=True)
 class _Background:
-    """What stands still in a window, bottom row first."""
+    """What stands still in a window."""
 
     rgb: NDArray[np.uint8]
+    """Top row first."""
     z: NDArray[np.float32]
+    """Bottom row first."""
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _lay_over(rgb, z, rgb_behind, z_behind, out):
-    """out = the nearer of two pictures (1 is near), turned top row first."""
+@numba.njit(**LEAN)
+def _lay_over(rgb, z, z_behind, out):
+    """What is nearer than what is behind (1 is near), laid over `out`, which is top row first."""
     height, width = z.shape
     for row in range(height):
-        source = height - 1 - row
+        n_nearer = 0
         for column in range(width):
-            front = z[source, column] > z_behind[source, column]
-            for k in range(3):
-                if front:
-                    out[row, column, k] = rgb[source, column, k]
-                else:
-                    out[row, column, k] = rgb_behind[source, column, k]
+            n_nearer += z[row, column] > z_behind[row, column]
+        if n_nearer == 0:
+            continue
+        for column in range(width):
+            if z[row, column] > z_behind[row, column]:
+                for k in range(3):
+                    out[height - 1 - row, column, k] = rgb[row, column, k]
 
 
 class PictureRenderer:

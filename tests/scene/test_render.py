@@ -1,5 +1,6 @@
 """Pictures: the renderer and the pinhole camera agree on every pixel convention."""
 
+import os
 import pickle
 from dataclasses import replace
 
@@ -111,16 +112,30 @@ def test_drawing_twice_gives_the_same_bits(lab, person, crops):
     other.close()
 
 
-def test_a_kept_background_changes_no_pixel(lab, person, crops):
-    fresh = CropRenderer(lab)
-    for turn in (0.0, 0.3, 0.6):
-        q = lab.home_q + turn
-        for renderer in (fresh, crops):
-            renderer.draw(q, person)
+@pytest.mark.parametrize("place", ["lab", "site"])
+def test_a_kept_background_changes_no_pixel(place, person):
+    """Twelve poses, four cameras, windows upright, turned, and beyond the image's border."""
+    scene = build(name=place, n_workers=1)
+    fresh, keeping = CropRenderer(scene), CropRenderer(scene)
+    windows = [
+        WINDOW,
+        CropWindow((1700.0, 800.0), 620.0, -0.7),
+        CropWindow((700.0, 300.0), 300.0, 2.0),
+    ]
+    for look, turn in enumerate(np.linspace(0.0, 1.1, 12)):
+        shift = np.array([-turn, 0.4 * turn, 0.0])
+        moved = replace(person, position_world=person.position_world + shift)
+        for renderer in (fresh, keeping):
+            renderer.draw(scene.home_q + turn, moved)
         fresh._kept.clear()
+        window = windows[look % 3]
         for camera in range(4):
-            np.testing.assert_array_equal(fresh.crop(camera, WINDOW), crops.crop(camera, WINDOW))
+            direct, laid_over = fresh.crop(camera, window), keeping.crop(camera, window)
+            np.testing.assert_array_equal(direct, laid_over)
+    assert len(keeping._kept) == 12
+    assert None not in keeping._kept.values()
     fresh.close()
+    keeping.close()
 
 
 def test_a_renderer_survives_pickling(lab, person, crops):
@@ -210,6 +225,15 @@ def test_this_machine_can_draw_and_says_with_what():
 def test_a_users_choice_of_backend_is_respected(monkeypatch):
     monkeypatch.setenv("MUJOCO_GL", "osmesa")
     assert gl.choose_backend() == "osmesa"
+
+
+def test_crops_are_drawn_on_one_thread_unless_the_user_wants_more(lab, monkeypatch):
+    monkeypatch.delenv("LP_NUM_THREADS", raising=False)
+    CropRenderer(lab)
+    assert os.environ["LP_NUM_THREADS"] == "0"
+    monkeypatch.setenv("LP_NUM_THREADS", "4")
+    CropRenderer(lab)
+    assert os.environ["LP_NUM_THREADS"] == "4"
 
 
 def test_without_opengl_the_message_names_the_remedy(monkeypatch):
