@@ -34,6 +34,10 @@ class Viewer(Protocol):
         """A window of its image."""
         ...
 
+    def empty(self, camera_index: int, window: CropWindow) -> Image:
+        """A window of the empty place, as a camera of the rig shows it."""
+        ...
+
 
 @dataclass(frozen=True, slots=True)
 class Shot:
@@ -76,6 +80,10 @@ class CameraFilm:
                 seeds = (self._seed, k, camera_index, shot.step)
                 image = spoil(image, camera, window, fault, seeds)
         return image
+
+    def empty(self, camera_index: int, window: CropWindow) -> Image:
+        """The window of the empty place, pictured when the camera was well."""
+        return self.viewer.empty(camera_index, window)
 
     def _taken(self, shot: Shot, c: int, window: CropWindow) -> Image:
         """The light that came while the shutter was open."""

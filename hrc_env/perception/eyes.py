@@ -6,11 +6,10 @@ numbers, so that what is seen does not depend on who came first.
 """
 
 import functools
-import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import cv2
 import numpy as np
@@ -19,12 +18,7 @@ from numpy.typing import NDArray
 from hrc_env.errors import ConfigError, check_shape, unknown
 from hrc_env.geometry.cameras import PinholeCamera, inside_image
 from hrc_env.perception import blazepose
-from hrc_env.perception.acquisition import (
-    Candidates,
-    agreed_windows,
-    apart_from,
-    same_person,
-)
+from hrc_env.perception.acquisition import Candidates, agreed_windows, apart_from
 from hrc_env.perception.network import (
     LANDMARK_SIDE,
     RUNTIMES,
@@ -35,6 +29,7 @@ from hrc_env.perception.network import (
     load_landmarker,
 )
 from hrc_env.perception.noise import sigma_px
+from hrc_env.perception.searching import ImageSource, distinct, people, search_jobs
 from hrc_env.perception.weights import find_weights
 from hrc_env.records import CropWindow
 from hrc_env.skeleton import BLAZEPOSE_INDEX, N_JOINTS
@@ -44,18 +39,7 @@ from hrc_env.typing import Floats, Image, Points2
 STATURE_OF_SIDE = 0.75
 """Stature of an upright worker as a share of the side of BlazePose's window round them."""
 
-SEARCH_RAD = math.radians(75.0)
-"""In a wider search window people are too small for the detector stage."""
-
 ResultT = TypeVar("ResultT")
-
-
-class ImageSource(Protocol):
-    """What gives pictures: a renderer, a camera, a recorded film."""
-
-    def crop(self, camera_index: int, window: CropWindow) -> Image:
-        """The window of a camera's present image, upright, (256, 256, 3) RGB."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,7 +126,7 @@ class Eyes(Stateful):
         windows: Sequence[CropWindow | None],
         track: int = 0,
         others: Sequence[Sequence[CropWindow | None]] = (),
-        people: Candidates | None = None,
+        found: Candidates | None = None,
     ) -> Sight:
         """Look for one worker through a window a camera; search if there is no window at all.
 
@@ -152,19 +136,19 @@ class Eyes(Stateful):
             track: whom the eyes are following; any number that stays the worker's own. The
                 detector stage's turns are counted for each.
             others: windows (C,) of other workers; a search does not find these again.
-            people: what `search` found in these very images, if it was asked already.
+            found: what `search` found in these very images, if it was asked already.
         """
         check_shape("windows", (len(windows),), (len(self.cameras),), "one a camera")
         looks = self._looks.setdefault(track, [0] * len(self.cameras))
         searched = all(window is None for window in windows)
         if searched:
-            people = self.search(source) if people is None else people
-            windows = agreed_windows(apart_from(people, others), self.cameras)
+            known = self.search(source) if found is None else found
+            windows = agreed_windows(apart_from(known, others), self.cameras)
         used = [c for c, window in enumerate(windows) if window is not None]
         asked = [not searched and self._is_turn(looks[c], c) for c in used]
-        found = self._share(self._landmark_jobs(source, windows, used, asked))
+        joints_of = self._share(self._landmark_jobs(source, windows, used, asked))
         sight = self._nothing(list(windows))
-        for c, joints in zip(used, found, strict=True):
+        for c, joints in zip(used, joints_of, strict=True):
             if joints is None:
                 looks[c] = 0  # ask the detector stage again before believing
             else:
@@ -176,16 +160,9 @@ class Eyes(Stateful):
 
     def search(self, source: ImageSource) -> list[list[CropWindow]]:
         """Regions of interest of the people in each camera's whole image, best first."""
-        places = [
-            (c, window)
-            for c, camera in enumerate(self.cameras)
-            for window in search_windows(camera, self.config.search_step)
-        ]
-        found = self._share(self._search_jobs(source, places))
-        people: list[list[tuple[float, CropWindow]]] = [[] for _ in self.cameras]
-        for (c, _), some in zip(places, found, strict=True):
-            people[c] += some
-        return [_distinct(some) for some in people]
+        jobs = search_jobs(source, self.cameras, self.config.search_step)
+        found = self._share(lambda nets, job=job: job(nets.detect) for job in jobs)
+        return distinct([one for some in found for one in some], len(self.cameras))
 
     def forget(self, track: int) -> None:
         """Treat this track as new: the detector stage is asked at its next look."""
@@ -218,16 +195,6 @@ class Eyes(Stateful):
             if window is not None:
                 crop = _seen(source.crop(c, window), window, self.cameras[c])
                 yield lambda nets, k=crop, w=window, a=ask: _joints(nets, k, w, a, self.config)
-
-    def _search_jobs(
-        self, source: ImageSource, places: list[tuple[int, CropWindow]]
-    ) -> Iterator[Callable[[_Networks], list[tuple[float, CropWindow]]]]:
-        for c, window in places:
-            crop = np.array(source.crop(c, window))
-            yield lambda nets, k=crop, w=window: [
-                (person.score, blazepose.person_window(person, w))
-                for person in _people(nets.detect, k)
-            ]
 
     def _share(self, jobs: Iterable[Callable[[_Networks], ResultT]]) -> list[ResultT]:
         """Results in order; the helper works from the front, this thread from the back."""
@@ -273,28 +240,6 @@ def _networks(config: EyesConfig) -> _Networks:
     return _Networks(load_detector(runtime), load_landmarker("full", runtime))
 
 
-def search_windows(camera: PinholeCamera, step: float = 0.5) -> list[CropWindow]:
-    """Upright squares that overlap and together cover a camera's image.
-
-    As large as fit; behind a lens that sees more than `SEARCH_RAD`, no larger than that.
-    """
-    side = float(min(camera.width_px, camera.height_px))
-    if camera.lens is not None:
-        side = min(side, SEARCH_RAD * float(camera.K[0, 0]))
-    columns = _middles(camera.width_px, side, step)
-    return [
-        CropWindow((x, y), side, 0.0)
-        for y in _middles(camera.height_px, side, step)
-        for x in columns
-    ]
-
-
-def _middles(length_px: int, side_px: float, step: float) -> list[float]:
-    """Middles of spans of a side that together cover a length, at most `step` sides apart."""
-    n = 1 + math.ceil((length_px / side_px - 1) / step)
-    return np.linspace(side_px / 2, length_px - side_px / 2, n).tolist()
-
-
 def _joints(
     nets: _Networks, crop: Image, window: CropWindow, ask_detector: bool, config: EyesConfig
 ) -> Floats | None:
@@ -303,17 +248,12 @@ def _joints(
     if presence < config.min_presence:
         return None
     if ask_detector or presence < config.sure_presence:
-        offsets = [np.hypot(*(person.hip - 0.5)) for person in _people(nets.detect, crop)]
+        offsets = [np.hypot(*(person.hip - 0.5)) for person in people(nets.detect, crop)]
         if min(offsets, default=np.inf) > config.max_offset:
             return None
     joints = blazepose.decode_landmarks(points, heat)[BLAZEPOSE_INDEX]
     joints[:, :2] = blazepose.to_image(joints[:, :2], window)
     return joints
-
-
-def _people(detect: Detector, crop: Image) -> list[blazepose.Person]:
-    image, _ = blazepose.detector_input(crop)
-    return blazepose.decode_people(*detect(image))
 
 
 def _seen(crop: Image, window: CropWindow, camera: PinholeCamera) -> Image:
@@ -340,12 +280,3 @@ def _frame_mask(window: CropWindow, width_px: int, height_px: int) -> NDArray[np
     polygon = np.round(corners * frame @ back[:, :2].T + back[:, 2]).astype(np.int32)
     cv2.fillConvexPoly(mask, polygon, 1)
     return mask
-
-
-def _distinct(people: list[tuple[float, CropWindow]]) -> list[CropWindow]:
-    """One window a person, best first: overlapping search windows see the same one twice."""
-    kept: list[CropWindow] = []
-    for _, window in sorted(people, key=lambda item: -item[0]):
-        if not any(same_person(window, other) for other in kept):
-            kept.append(window)
-    return kept

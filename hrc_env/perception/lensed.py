@@ -7,7 +7,7 @@ pixels.
 """
 
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -31,6 +31,8 @@ WIDEST = float(np.tan(np.radians(78.0)))
 window shows beyond is black."""
 MAPS_KEPT = 4
 """Windows per camera whose resampling is kept."""
+EMPTY_KEPT = 16
+"""Windows per camera whose picture of the empty place is kept: those of a search."""
 
 
 class Drawer(Protocol):
@@ -40,6 +42,10 @@ class Drawer(Protocol):
 
     def view(self, camera: PinholeCamera, window: CropWindow) -> Image:
         """The window of what a pinhole would see, (size, size, 3) RGB, top row first."""
+        ...
+
+    def still(self, camera: PinholeCamera, window: CropWindow) -> Image:
+        """The same of what never moves."""
         ...
 
 
@@ -62,6 +68,7 @@ class Lensed:
     def __init__(self, drawer: Drawer, cameras: Sequence[PinholeCamera]) -> None:
         self.drawer, self.cameras = drawer, tuple(cameras)
         self._covers: OrderedDict[tuple, _Cover | None] = OrderedDict()
+        self._empty: dict[tuple[int, CropWindow], Image] = {}
 
     def crop(self, camera_index: int, window: CropWindow) -> Image:
         """The window of a camera's present image, upright, (size, size, 3) RGB."""
@@ -69,12 +76,29 @@ class Lensed:
 
     def view(self, camera: PinholeCamera, window: CropWindow) -> Image:
         """The same of any camera."""
+        return self._bent(camera, window, self.drawer.view)
+
+    def empty(self, camera_index: int, window: CropWindow) -> Image:
+        """The window of a camera's image of the empty place; those asked for again are kept."""
+        key = (camera_index, window)
+        if key not in self._empty:
+            if len(self._empty) >= EMPTY_KEPT * len(self.cameras):
+                self._empty.clear()
+            self._empty[key] = self._bent(self.cameras[camera_index], window, self.drawer.still)
+        return self._empty[key]
+
+    def _bent(
+        self,
+        camera: PinholeCamera,
+        window: CropWindow,
+        draw: Callable[[PinholeCamera, CropWindow], Image],
+    ) -> Image:
         if camera.lens is None:
-            return self.drawer.view(camera, window)
+            return draw(camera, window)
         cover = self._cover(camera, window)
         if cover is None:
             return np.zeros((self.drawer.size_px, self.drawer.size_px, 3), np.uint8)
-        drawn = self.drawer.view(cover.camera, cover.window)
+        drawn = draw(cover.camera, cover.window)
         black = cv2.BORDER_CONSTANT
         return np.asarray(
             cv2.remap(drawn, cover.x, cover.y, cv2.INTER_LINEAR, borderMode=black), np.uint8

@@ -105,6 +105,11 @@ class CropRenderer:
         _lay_over(self._rgb, self._z, background.z, crop)
         return crop
 
+    def still(self, camera: PinholeCamera, window: CropWindow) -> Image:
+        """The same of what never moves: the place without people and robot."""
+        self._show(STILL, camera, window)
+        return self._canvas.paint()
+
     def close(self) -> None:
         """Free the OpenGL context."""
         self._canvas.close()

@@ -10,7 +10,8 @@ from stored import Stills, hung_in_a_room
 from hrc_env.errors import ConfigError, WeightsError
 from hrc_env.geometry.cameras import pinhole
 from hrc_env.perception import eyes as eyes_module
-from hrc_env.perception.eyes import Eyes, EyesConfig, search_windows
+from hrc_env.perception.eyes import Eyes, EyesConfig
+from hrc_env.perception.searching import search_windows
 from hrc_env.records import CropWindow
 from hrc_env.skeleton import BLAZEPOSE_INDEX
 
@@ -81,9 +82,9 @@ def test_one_search_serves_several_workers(weights, pictures):
     room = Stills([hung_in_a_room(pictures["stand.png"], 600, 300)])
     people = eyes.search(room)
     searching = eyes.look(room, [None], track=0)
-    given = eyes.look(room, [None], track=1, people=people)
+    given = eyes.look(room, [None], track=1, found=people)
     np.testing.assert_array_equal(given.px, searching.px)
-    other = eyes.look(room, [None], track=2, others=[given.windows], people=people)
+    other = eyes.look(room, [None], track=2, others=[given.windows], found=people)
     assert np.isnan(other.px).all()
     assert other.windows == [None]
     eyes.close()
@@ -150,8 +151,8 @@ def test_what_a_camera_does_not_see_is_black_and_joints_there_are_guesses(weight
 def test_the_detector_stage_is_asked_of_a_new_track_and_then_in_turns(four, monkeypatch):
     _, stills = four
     asked = []
-    people = eyes_module._people
-    monkeypatch.setattr(eyes_module, "_people", lambda *args: asked.append(1) or people(*args))
+    people = eyes_module.people
+    monkeypatch.setattr(eyes_module, "people", lambda *args: asked.append(1) or people(*args))
     eyes = new_eyes(4, EyesConfig(gate_every=4, sure_presence=0.5))
     counts = []
     for _ in range(9):
