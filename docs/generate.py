@@ -60,6 +60,8 @@ The sum of these terms, each in `info["reward/<name>"]`; float64. Distances are 
 | `episode_cost` | running sum of `cost` |
 | `worker/activity`, `worker/body` | what each worker does and which body they have, by name; \
 "absent" of who is not in the episode |
+| `perception/miscalibrated` | names of cameras that contradict the others as if they had been \
+moved, turned or zoomed (docs/cameras.md); at `pixels` and `keypoints` |
 | `safety/min_separation_m` | smallest true gap in this step; absent without workers |
 | `tracking/mpjpe_m` | mean joint error of the estimate; absent where nobody is tracked |
 | `tracking/lost` | 1 if a worker is there who is not tracked |

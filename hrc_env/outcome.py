@@ -1,4 +1,4 @@
-"""What a step or a reset gives: observation, reward, end, named values, the crew."""
+"""What a step or a reset gives: observation, reward, end, named values, crew, suspects."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from hrc_env import metrics
 from hrc_env.crew import Crew
 from hrc_env.records import PoseEstimate, WorkerTruth
+from hrc_env.suspects import Suspects
 from hrc_env.typing import Bools, Floats, Ints
 
 Info = dict[str, Floats]
@@ -30,6 +31,8 @@ class Outcome:
     info: Info
     crew: Crew
     """Who is there, and what they do."""
+    suspects: Suspects
+    """Which cameras are thought to be miscalibrated."""
 
     def info_of(self, b: int) -> dict[str, Any]:
         """The info of one environment: absent values are left out, flags are bool."""
@@ -37,7 +40,7 @@ class Outcome:
         known: dict[str, Any] = {name: value for name, value in values.items() if value == value}
         for name in FLAGS:
             known[name] = bool(known[name])
-        return {**known, **self.crew.info_of(b)}
+        return {**known, **self.crew.info_of(b), **self.suspects.info_of(b)}
 
 
 def rows_of(info: Info, ids: Ints) -> Info:

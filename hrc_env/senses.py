@@ -57,6 +57,10 @@ class Senses(Protocol):
         """What environment `b` saw last, and through which windows (for pictures)."""
         ...
 
+    def suspected(self, ids: Ints) -> Bools:
+        """(B, C) which cameras of environments `ids` are thought to be miscalibrated."""
+        ...
+
     def get_state(self) -> Any:
         """A copy of what changes."""
         ...
@@ -139,6 +143,10 @@ class GivenSenses(Stateful):
         """No camera took part."""
         return None, []
 
+    def suspected(self, ids: Ints) -> Bools:
+        """(B, 0): there are no cameras."""
+        return np.zeros((len(ids), 0), np.bool_)
+
     def close(self) -> None:
         """Nothing to release."""
 
@@ -163,6 +171,10 @@ class BlindSenses(Stateful):
     def looks(self, b: int) -> tuple[Keypoints | None, Windows]:
         """No camera took part."""
         return None, []
+
+    def suspected(self, ids: Ints) -> Bools:
+        """(B, 0): there are no cameras."""
+        return np.zeros((len(ids), 0), np.bool_)
 
     def close(self) -> None:
         """Nothing to release."""

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env import crew
+from hrc_env import crew, suspects
 from hrc_env.errors import ConfigError, HRCError
 from hrc_env.outcome import Outcome
 from hrc_env.simulation import Simulation
@@ -107,6 +107,7 @@ def joined(outcomes: list[Outcome]) -> Outcome:
         reward=np.concatenate([each.reward for each in outcomes]),
         terminated=np.concatenate([each.terminated for each in outcomes]),
         crew=crew.joined([each.crew for each in outcomes]),
+        suspects=suspects.joined([each.suspects for each in outcomes]),
         info={
             name: np.concatenate([each.info[name] for each in outcomes])
             for name in outcomes[0].info

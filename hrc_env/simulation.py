@@ -29,6 +29,7 @@ from hrc_env.scene.rigs import findings
 from hrc_env.senses import CAMERA_LEVELS, make_senses
 from hrc_env.sensing.moment import Moment
 from hrc_env.stateful import State, Stateful
+from hrc_env.suspects import Suspects
 from hrc_env.tasks import reach
 from hrc_env.tracking import given
 from hrc_env.typing import Floats, Ints
@@ -119,7 +120,8 @@ class Simulation(Stateful):
         observation = observations.observe(believed, self.layout)
         crew = rows(self.crew, ids)
         info = {**tracking_info(estimate, truth, crew.present), **rows_of(self._tally(), ids)}
-        return Outcome(observation, np.zeros(len(ids)), np.zeros(len(ids), bool), info, crew)
+        over = np.zeros(len(ids), bool)
+        return Outcome(observation, np.zeros(len(ids)), over, info, crew, self._suspects(ids))
 
     def step(self, action: Floats) -> Outcome:
         """One control step of every environment; action (B, A) in [-1, 1]."""
@@ -158,7 +160,8 @@ class Simulation(Stateful):
         }
         terminated = (cost.contact > 0) & config.cost.contact_terminates
         observation = observations.observe(believed, self.layout)
-        return Outcome(observation, reward, terminated, info, crew)
+        suspects = self._suspects(self._everyone)
+        return Outcome(observation, reward, terminated, info, crew, suspects)
 
     def get_state(self) -> State:
         """A copy of everything that changes, generators included, and the settings."""
@@ -246,6 +249,12 @@ class Simulation(Stateful):
             action=self.action[ids],
             ahead=ahead,
         )
+
+    def _suspects(self, ids: Ints) -> Suspects:
+        """Which cameras of environments `ids` are thought to be miscalibrated."""
+        flags = self.senses.suspected(ids)
+        names = self.settings["cameras"] if flags.shape[1] else ()
+        return Suspects(names, flags)
 
     def _tally(self) -> Info:
         """What the episode has come to so far."""

@@ -12,6 +12,7 @@ import numpy as np
 from hrc_env.batching import copied, write_rows
 from hrc_env.crew import Crew
 from hrc_env.outcome import FLAGS, Outcome
+from hrc_env.suspects import Suspects
 from hrc_env.typing import Bools, Floats, Ints
 
 
@@ -24,6 +25,8 @@ class InfoTable:
     """(len(names), B)."""
     crew: Crew
     """Of all B; of environments that have no values yet, without meaning."""
+    suspects: Suspects
+    """Likewise."""
 
     def write(self, ids: Ints, outcome: Outcome) -> None:
         """Give environments `ids` the values of an outcome of them, and no more than these."""
@@ -31,6 +34,7 @@ class InfoTable:
         for name, value in outcome.info.items():
             self.values[self.names.index(name), ids] = value
         write_rows(self.crew, ids, outcome.crew)
+        self.suspects.flags[ids] = outcome.suspects.flags
 
     def arrays(self, who: Bools) -> dict[str, Any]:
         """Values and masks for the environments `who` (B,); the others have none."""
@@ -44,7 +48,8 @@ class InfoTable:
                 infos[name] = value.astype(bool) if name in FLAGS else value
                 infos[f"_{name}"] = mask
         if who.any():
-            for name, said in self.crew.arrays(who).items():
+            named = {**self.crew.arrays(who), **self.suspects.arrays(who)}
+            for name, said in named.items():
                 infos[name], infos[f"_{name}"] = said, who.copy()
         return infos
 
@@ -52,10 +57,11 @@ class InfoTable:
 def table(outcome: Outcome) -> InfoTable:
     """A copy of an outcome's info as a table."""
     values = np.array(list(outcome.info.values()))
-    return InfoTable(tuple(outcome.info), values, copied(outcome.crew))
+    return InfoTable(tuple(outcome.info), values, copied(outcome.crew), copied(outcome.suspects))
 
 
 def blank(outcome: Outcome, batch: int) -> InfoTable:
     """A table of the names of an outcome's info in which nobody has a value."""
     names = tuple(outcome.info)
-    return InfoTable(names, np.full((len(names), batch), np.nan), outcome.crew.blank(batch))
+    values = np.full((len(names), batch), np.nan)
+    return InfoTable(names, values, outcome.crew.blank(batch), outcome.suspects.blank(batch))

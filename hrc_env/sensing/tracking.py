@@ -15,15 +15,16 @@ from hrc_env.scene.build import Scene
 from hrc_env.sensing.moment import Generators, Moment, Windows
 from hrc_env.skeleton import N_JOINTS
 from hrc_env.stateful import Stateful
+from hrc_env.tracking.calibration_watch import forget, make_watch, watch
 from hrc_env.tracking.estimators import Estimator
 from hrc_env.tracking.people.association import associate
-from hrc_env.typing import Ints
+from hrc_env.typing import Bools, Floats, Ints
 
 
 class TrackingSenses(Stateful):
     """What the levels with cameras share: predict, get keypoints, update."""
 
-    CHANGES = ("state", "keypoints", "recent")
+    CHANGES = ("state", "keypoints", "recent", "watched")
 
     def __init__(
         self, batch: int, scene: Scene, tracker: Estimator, config: HRCConfig, schedule: Schedule
@@ -34,10 +35,14 @@ class TrackingSenses(Stateful):
         self.state: Any = tracker.init(batch, scene.n_workers)
         self.keypoints = no_keypoints(batch, len(scene.cameras), scene.n_workers)
         self.recent = None if schedule.is_plain else Recent(batch, schedule)
+        self.watched = make_watch(batch, len(scene.cameras))
+        self.axes = np.array([(*camera.K[:2, 2], camera.K[0, 0]) for camera in scene.cameras])
+        """(C, 3) principal point and focal length [px]."""
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
         """Forget the tracks of environments `ids`, and what their cameras gave."""
         self.tracker.reset(self.state, ids, tracker_rngs)
+        forget(self.watched, ids)
         if self.recent is not None:
             self.recent.reset(ids, sensor_rngs)
 
@@ -54,7 +59,10 @@ class TrackingSenses(Stateful):
         else:
             write_rows(self.keypoints, now.ids, keypoints)
             write_rows(self.state, now.ids, state)
-        return self.tracker.estimate(state)
+        estimate = self.tracker.estimate(state)
+        age_s = self._age_s(now.ids, keypoints)
+        watch(self.watched, now.ids, keypoints, age_s, estimate, self.P, self.axes)
+        return estimate
 
     def ahead(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
         """What the estimator expects."""
@@ -79,6 +87,16 @@ class TrackingSenses(Stateful):
             return keypoints
         expected = self.tracker.estimate(predicted)
         return associate(self.P, keypoints, expected, self.association).keypoints
+
+    def suspected(self, ids: Ints) -> Bools:
+        """(B, C) which cameras of environments `ids` are thought to be miscalibrated."""
+        return self.watched.suspected[ids]
+
+    def _age_s(self, ids: Ints, keypoints: Keypoints) -> Floats:
+        """(B, C) how old the images of this update are, as they say [s]; NaN: none."""
+        if self.recent is None or keypoints.time_s is None:
+            return np.zeros(keypoints.px.shape[:2])
+        return (self.recent.steps[ids, None] + 1) * self.dt_s - keypoints.time_s
 
     def looks(self, b: int) -> tuple[Keypoints | None, Windows]:
         """The keypoints of environment `b`."""

@@ -25,7 +25,9 @@ def episode(error_m, n_steps=10, n_cameras=4):
     error = np.full((n_steps, 15), error_m)
     seen = np.full((n_steps, n_cameras), 2.0)
     family = np.arange(n_steps) % len(FAMILIES)
-    return Episode(error, error.copy(), np.full(n_steps, 14), seen, family)
+    named = np.zeros((n_steps, n_cameras), bool)
+    named[n_steps // 2 :, 1] = True
+    return Episode(error, error.copy(), np.full(n_steps, 14), seen, family, named)
 
 
 def found():
@@ -65,6 +67,9 @@ def test_numbers_say_what_was_found():
     assert metrics["error_ratio.lost.camera_3"].value == pytest.approx(2.0)
     assert metrics["std_over_error.fault.glare"].value == pytest.approx(1.0)
     assert metrics["detected.fault.glare"].value == 1.0
+    assert metrics["miscalibrated.lost.named"].value == 0.25
+    assert metrics["miscalibrated.lost.after_s"].value == pytest.approx(0.2)
+    assert metrics["miscalibrated.lost.others"].value == pytest.approx(3 / 8)
     assert metrics["detected.pose.fold"].value == 0.0
     assert metrics["error_share.lens.fisheye.median"].value == pytest.approx(0.04)
     assert metrics["detected.distance.6_9_m"].n == 1

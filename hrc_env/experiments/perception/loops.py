@@ -38,6 +38,8 @@ class Episode:
     """(T, C) mean distance of a camera's keypoints from the true joints; NaN: nothing found."""
     family: Ints
     """(T,) what the worker did, an index of `families.NAMES`."""
+    named: Bools
+    """(T, C) whether a camera was named in info as miscalibrated."""
 
     def to_json(self) -> dict[str, Any]:
         """Plain lists: whole tenths of millimetres and of pixels, -1 where unknown."""
@@ -47,6 +49,7 @@ class Episode:
             "inside95": self.inside95.tolist(),
             "off_px": _whole(self.off_px, 0.1),
             "family": self.family.tolist(),
+            "named": self.named.astype(int).tolist(),
         }
 
 
@@ -58,6 +61,7 @@ def episode_of(content: dict[str, Any]) -> Episode:
         inside95=np.array(content["inside95"], np.int64),
         off_px=_lengths(content["off_px"], 0.1),
         family=np.array(content["family"], np.int64),
+        named=np.array(content["named"], np.bool_),
     )
 
 
@@ -104,7 +108,7 @@ def _episode(env: HRCReachEnv, seed: int, n_steps: int) -> Episode:
     n_cameras = len(simulation.scene.cameras)
     error, std = np.full((2, n_steps, N_JOINTS), np.nan)
     inside, family = np.zeros((2, n_steps), np.int64)
-    off_px = np.full((n_steps, n_cameras), np.nan)
+    off_px, named = np.full((n_steps, n_cameras), np.nan), np.zeros((n_steps, n_cameras), bool)
     env.reset(seed=seed)
     rest = np.zeros(env.action_space.shape or (0,), np.float32)
     for t in range(n_steps):
@@ -113,13 +117,14 @@ def _episode(env: HRCReachEnv, seed: int, n_steps: int) -> Episode:
         joints, estimate = truth.joints_world[0, 0], simulation.estimate
         family[t] = family_index(int(generator.activity(simulation.motion)[0, 0]))
         off_px[t] = _off_px(env, joints)
+        named[t] = simulation.senses.suspected(np.array([0]))[0]
         if estimate.tracked[0, 0]:
             offset, cov = estimate.mean_world[0, 0] - joints, estimate.cov_world[0, 0]
             squared = np.einsum("ji,jik,jk->j", offset, np.linalg.inv(cov), offset)
             error[t] = np.linalg.norm(offset, axis=-1)
             std[t] = np.sqrt(np.trace(cov, axis1=-2, axis2=-1))
             inside[t] = np.count_nonzero(squared < CHI2_95_3D)
-    return Episode(error, std, inside, off_px, family)
+    return Episode(error, std, inside, off_px, family, named)
 
 
 def _off_px(env: HRCReachEnv, joints_world: Floats) -> Floats:

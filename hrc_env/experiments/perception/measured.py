@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from hrc_env.experiments.perception.crops import STEP_S
 from hrc_env.experiments.perception.families import NAMES
 from hrc_env.experiments.perception.loops import Episode, camera_name, some_steps
 from hrc_env.experiments.perception.views import ROWS, View, rows_of
@@ -106,11 +107,13 @@ def _faults(found: Measured) -> Metrics:
         for name, metric in _belief(f"fault.{kind}", episodes).items():
             metrics[start + name] = metric
         if kind == NO_FAULT:
+            metrics |= _named(f"{start}miscalibrated.{kind}", episodes, [-1] * len(episodes))
             continue
         metrics[f"{start}coverage95.{kind}"] = metrics.pop(f"{start}coverage95.fault.{kind}")
         metrics[f"{start}error_ratio.{kind}"] = _ratio(episodes, base)
         own = [_camera_of(k, episode) for k, episode in enumerate(episodes)]
         metrics[f"{start}detected.fault.{kind}"] = _detected(episodes, own)
+        metrics |= _named(f"{start}miscalibrated.{kind}", episodes, own)
         if kind == "lost":
             for c in sorted(set(own)):
                 mine = [k for k, camera in enumerate(own) if camera == c]
@@ -144,6 +147,22 @@ def _detected(episodes: list[Episode], cameras: list[int]) -> Metric:
     pairs = zip(episodes, cameras, strict=True)
     seen = [float(np.isfinite(each.off_px[:, c]).sum()) for each, c in pairs]
     return ratio_over(seen, [float(len(each.off_px)) for each in episodes], "share")
+
+
+def _named(start: str, episodes: list[Episode], own: list[int]) -> Metrics:
+    """How often, and how soon, the camera with the fault is named as miscalibrated, and others."""
+    cameras = [np.arange(each.named.shape[1]) for each in episodes]
+    mine = [each.named[:, c == k].any(1) for each, c, k in zip(episodes, cameras, own, strict=True)]
+    wrong = [
+        each.named[:, c != k].any(1) for each, c, k in zip(episodes, cameras, own, strict=True)
+    ]
+    first = [float(np.argmax(each)) * STEP_S for each in mine if each.any()]
+    steps = [float(len(each.family)) for each in episodes]
+    return {
+        f"{start}.named": share([bool(each.any()) for each in mine]),
+        f"{start}.after_s": quantile_over([[each] for each in first], 0.5, "s"),
+        f"{start}.others": ratio_over([float(each.sum()) for each in wrong], steps, "share"),
+    }
 
 
 def _views(found: Measured) -> Metrics:

@@ -6,11 +6,12 @@ from pathlib import Path
 from hrc_env.experiments.perception.plots import plot_faults, plot_speed, plot_views
 from hrc_env.experiments.perception.speed import REST, STAGES
 from hrc_env.experiments.perception.views import ROWS
-from hrc_env.faults.fault import IMAGE, KINDS
+from hrc_env.faults.fault import IMAGE, KINDS, PLACE
 from hrc_env.provenance import provenance
 from hrc_env.results import Metric
 
 _Metrics = Mapping[str, Metric]
+PLACE_KINDS = tuple(kind for kind, each in KINDS.items() if each.group == PLACE)
 
 
 def write_report(out: Path, metrics: _Metrics) -> None:
@@ -42,6 +43,11 @@ def markdown(metrics: _Metrics) -> str:
         "with and without it on the same seeds; p95 is the 95th percentile. `keypoints` knows no "
         "faults of images.",
         "Median error with one camera lost, over that with all of them: " + _lost(metrics) + ".",
+        "## Cameras named as miscalibrated",
+        _named(metrics),
+        "Share of episodes in which the camera with the fault is named in "
+        '`info["perception/miscalibrated"]`, after how long (the median, where it is), and the '
+        "share of steps in which another one is.",
         "## Single crops, looked at as if for the first time",
         _views(metrics),
         "Crops round the true joints with the whole worker in view. Errors are mean distances of a "
@@ -85,6 +91,28 @@ def _fault_row(metrics: _Metrics, kind: str) -> list[str]:
             seen = metrics.get(f"detected.fault.{kind}")
             cells.append("" if seen is None else _cell(seen, 100, 0) + " %")
     return cells
+
+
+def _named(metrics: _Metrics) -> str:
+    """What `perception/miscalibrated` says where there is something to say."""
+    lines = []
+    for kind in ("none", *KINDS):
+        cells, told = [], False
+        for start in ("", "keypoints."):
+            key = f"{start}miscalibrated.{kind}"
+            if f"{key}.named" not in metrics:
+                cells += ["-"] * 3
+                continue
+            named, others = metrics[f"{key}.named"], metrics[f"{key}.others"]
+            after = metrics[f"{key}.after_s"]
+            told |= named.value > 0 or others.value > 0
+            seconds = _cell(after, 1, 1) if after.n else ""
+            cells += [f"{named.value * named.n:.0f} of {named.n}", seconds]
+            cells += [_cell(others, 100, 1) + " %"]
+        if told or kind in ("none", *PLACE_KINDS):
+            lines.append([f"`{kind}`" if kind != "none" else "no fault", *cells])
+    header = ["", "named", "after [s]", "others", "`keypoints`: named", "after [s]", "others"]
+    return _table(header, [line for line in lines if set(line[1:]) != {"-"}])
 
 
 def _speed(metrics: _Metrics) -> str:

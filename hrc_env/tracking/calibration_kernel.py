@@ -1,0 +1,221 @@
+"""The sums of `calibration_watch`: what views of points say of the cameras, and the verdict."""
+
+import math
+
+import numba
+import numpy as np
+
+from hrc_env.compiled import JIT, LEAN
+from hrc_env.geometry.triangulation import pixel_of
+
+N_NUMBERS = 5
+"""Shift along u and v, growth, turn, all in radians or shares; delay [s]."""
+KEPT = 0.96
+"""Share of the evidence that is kept from sample to sample: it is forgotten within 10 s."""
+NAMED_AT, CLEARED_AT = 9.0, 5.0
+"""A camera is named when its ratio exceeds the one, and cleared when it is below the other."""
+DECIDED = 1.3
+"""And only if it is so many times every other's: what is wrong with one camera shows, less, in what
+all others say."""
+LEAST_CONFIDENCE = 0.5
+"""Of both joints of a point."""
+PERSISTENCE = 3.0
+"""Factor on the detector's variance: samples are not independent."""
+HUBER = 3.0
+"""Residuals beyond so many deviations weigh less (Huber)."""
+LEAST_VIEWS = 3
+LEAST_DEPTH_M = 0.3
+U, V, WEIGHT, DU, DV = 0, 1, 2, 3, 4
+JACOBIAN = 5
+PLACE = 11
+N_VIEW = 13
+"""One view of a point: residual (2), weight, velocity in the image (2), slope on the point
+(2 x 3), pixel (2)."""
+
+
+@numba.njit(**JIT)
+def gather(
+    information, score, last, ratio, suspected, due, ids, px, confidence, sigma_px, age_s,
+    mean, velocity, tracked, P, axes, points, prior, allowed,
+):  # fmt: skip
+    """Take a sample of rows `due`, environments `ids[due]`; arguments as of `calibration_watch`."""
+    n_cameras = len(P)
+    view, small = np.empty((n_cameras, N_VIEW)), np.empty((N_NUMBERS, N_NUMBERS))
+    seen, news = np.empty(n_cameras, np.bool_), np.empty(n_cameras, np.bool_)
+    for row in due:
+        b = ids[row]
+        for c in range(n_cameras):
+            news[c] = _is_news(last, b, c, px[row, c])
+            for i in range(N_NUMBERS):
+                score[b, c, i] *= KEPT
+                for j in range(i, N_NUMBERS):
+                    information[b, c, i, j] *= KEPT
+        for w in range(tracked.shape[1]):
+            if not tracked[row, w]:
+                continue
+            for k in range(len(points)):
+                n = 0
+                for c in range(n_cameras):
+                    seen[c] = news[c] and _view(
+                        px[row, c, w], confidence[row, c, w], sigma_px[row, c, w], age_s[row, c],
+                        mean[row, w], velocity[row, w], points[k, 0], points[k, 1], P[c], view[c],
+                    )  # fmt: skip
+                    n += seen[c]
+                if n >= LEAST_VIEWS:
+                    _triangulate(view, seen, axes, information[b], score[b], small)
+        for c in range(n_cameras):
+            ratio[b, c] = _ratio(information[b, c], score[b, c], prior, allowed, small)
+        _judge(ratio[b], suspected[b])
+
+
+@numba.njit(**LEAN)
+def _is_news(last, b, c, px):
+    """Whether a camera's keypoints differ from those of the sample before."""
+    total = 0.0
+    for w in range(px.shape[0]):
+        for j in range(px.shape[1]):
+            u, v = px[w, j, 0], px[w, j, 1]
+            if math.isfinite(u) and math.isfinite(v):
+                total += u + math.pi * v
+    news = total != last[b, c]
+    last[b, c] = total
+    return news
+
+
+@numba.njit(**LEAN)
+def _view(px, confidence, sigma_px, age_s, mean, velocity, first, second, p, out):
+    """Write one camera's view of a point; whether there is one."""
+    if not (confidence[first] >= LEAST_CONFIDENCE and confidence[second] >= LEAST_CONFIDENCE):
+        return False
+    x = 0.5 * (mean[first, 0] + mean[second, 0])
+    y = 0.5 * (mean[first, 1] + mean[second, 1])
+    z = 0.5 * (mean[first, 2] + mean[second, 2])
+    dx = 0.5 * (velocity[first, 0] + velocity[second, 0])
+    dy = 0.5 * (velocity[first, 1] + velocity[second, 1])
+    dz = 0.5 * (velocity[first, 2] + velocity[second, 2])
+    u, v, depth = pixel_of(p, x - age_s * dx, y - age_s * dy, z - age_s * dz)
+    out[U] = 0.5 * (px[first, 0] + px[second, 0]) - u
+    out[V] = 0.5 * (px[first, 1] + px[second, 1]) - v
+    variance = 0.5 * PERSISTENCE * (sigma_px[first] ** 2 + sigma_px[second] ** 2)
+    away = math.sqrt((out[U] ** 2 + out[V] ** 2) / variance)
+    if not (depth > LEAST_DEPTH_M and math.isfinite(away)):
+        return False
+    out[WEIGHT] = min(1.0, HUBER / max(away, 1e-9)) / variance
+    for i in range(3):
+        out[JACOBIAN + i] = (p[0, i] - u * p[2, i]) / depth
+        out[JACOBIAN + 3 + i] = (p[1, i] - v * p[2, i]) / depth
+    out[DU] = out[JACOBIAN] * dx + out[JACOBIAN + 1] * dy + out[JACOBIAN + 2] * dz
+    out[DV] = out[JACOBIAN + 3] * dx + out[JACOBIAN + 4] * dy + out[JACOBIAN + 5] * dz
+    out[PLACE], out[PLACE + 1] = u, v
+    return True
+
+
+@numba.njit(**LEAN)
+def _triangulate(view, seen, axes, information, score, small):
+    """Add what the views of one point say of the cameras that it is seen by.
+
+    All of them triangulate the point; the residual of each counts with the information that is left
+    when the others are asked, which is the same as to leave it out (Woodbury).
+    """
+    for i in range(3):
+        for j in range(4):
+            small[i, j] = 0.0
+    for c in range(len(seen)):
+        if seen[c]:
+            v, weight = view[c], view[c, WEIGHT]
+            for i in range(3):
+                first, second = weight * v[JACOBIAN + i], weight * v[JACOBIAN + 3 + i]
+                for j in range(3):
+                    small[i, j] += first * v[JACOBIAN + j] + second * v[JACOBIAN + 3 + j]
+                small[i, 3] += first * v[U] + second * v[V]
+    _invert(small, 3)
+    for c in range(len(seen)):
+        if seen[c]:
+            _add(view[c], axes[c], small, information[c], score[c])
+
+
+@numba.njit(**LEAN)
+def _add(v, axes, small, information, score):
+    """Add one view; `small` holds the inverse information of the point, and its score beside."""
+    b00 = b01 = b11 = 0.0
+    e0, e1, weight = v[U], v[V], v[WEIGHT]
+    for i in range(3):
+        first = second = shift = 0.0
+        for j in range(3):
+            first += small[i, j] * v[JACOBIAN + j]
+            second += small[i, j] * v[JACOBIAN + 3 + j]
+            shift += small[i, j] * small[j, 3]
+        b00 += v[JACOBIAN + i] * first
+        b01 += v[JACOBIAN + i] * second
+        b11 += v[JACOBIAN + 3 + i] * second
+        e0 -= v[JACOBIAN + i] * shift
+        e1 -= v[JACOBIAN + 3 + i] * shift
+    m00, m01, m11 = weight - weight**2 * b00, -(weight**2) * b01, weight - weight**2 * b11
+    r0, r1 = weight * e0, weight * e1
+    f, x, y = axes[2], v[PLACE] - axes[0], v[PLACE + 1] - axes[1]
+    a0 = (f, 0.0, x, -y, -v[DU])
+    a1 = (0.0, f, y, x, -v[DV])
+    for i in range(N_NUMBERS):
+        score[i] += a0[i] * r0 + a1[i] * r1
+        left, right = a0[i] * m00 + a1[i] * m01, a0[i] * m01 + a1[i] * m11
+        for j in range(i, N_NUMBERS):
+            information[i, j] += left * a0[j] + right * a1[j]
+
+
+@numba.njit(**LEAN)
+def _ratio(information, score, prior, allowed, small):
+    """The squared length of the first four numbers in units of what they may be."""
+    n, m = N_NUMBERS, N_NUMBERS - 1
+    for i in range(n):
+        for j in range(i, n):
+            small[i, j] = small[j, i] = information[i, j]
+        small[i, i] += prior[i]
+    _invert(small, n)
+    for i in range(m):
+        total = 0.0
+        for j in range(n):
+            total += small[i, j] * score[j]
+        small[m, i] = total
+    for i in range(m):
+        small[i, i] += allowed[i]
+    _invert(small, m)
+    total = 0.0
+    for i in range(m):
+        for j in range(m):
+            total += small[m, i] * small[i, j] * small[m, j]
+    return total
+
+
+@numba.njit(**LEAN)
+def _judge(ratio, suspected):
+    """Name the worst camera, keep whom one has named until others are worse or it agrees again."""
+    worst, second = 0, 0.0
+    for c in range(1, len(ratio)):
+        if ratio[c] > ratio[worst]:
+            worst = c
+    for c in range(len(ratio)):
+        if c != worst:
+            second = max(second, ratio[c])
+    for c in range(len(ratio)):
+        if c != worst:
+            suspected[c] = False
+        elif suspected[c]:
+            suspected[c] = ratio[c] > CLEARED_AT
+        else:
+            suspected[c] = ratio[c] > NAMED_AT and ratio[c] > DECIDED * second
+
+
+@numba.njit(**LEAN)
+def _invert(a, n):
+    """Invert the leading n rows and columns of a symmetric positive matrix in place."""
+    for k in range(n):
+        pivot = 1.0 / a[k, k]
+        for j in range(n):
+            a[k, j] *= pivot
+        for i in range(n):
+            if i != k:
+                factor = a[i, k]
+                for j in range(n):
+                    a[i, j] -= factor * a[k, j]
+                a[i, k] = -factor * pivot
+        a[k, k] = pivot

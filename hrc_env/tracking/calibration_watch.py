@@ -1,0 +1,107 @@
+"""Which cameras are not where they are said to be: what cameras say of each other, over seconds.
+
+A camera that is turned, moved or zoomed against its calibration sees every body displaced in the
+same way, joint after joint and second after second; a detector's errors do not last. To first order
+all of it is four numbers of its image: a shift (2), a growth and a turn about the principal point.
+For each camera they are estimated from the residuals between what it reports and what the *other*
+cameras say (the estimate serves as the point of linearisation, so that a camera does not vote for
+itself), by least squares with exponential forgetting, together with a delay in the direction in
+which joints move, so that a camera that is merely late is not taken for a displaced one. The
+squared length of the four numbers in units of their covariance, to which an allowance for the
+lasting bias of a detector is added, is a generalised likelihood ratio (Willsky and Jones, IEEE
+Transactions on Automatic Control 21, 1976; Basseville and Nikiforov, Detection of Abrupt Changes,
+1993, chapter 7): chi-squared with four degrees of freedom where nothing is wrong.
+
+Each ratio supposes that one camera alone is wrong. What is wrong with it shows, less, in what all
+others say: it is named when its ratio is clearly the largest. Of several wrong ones the worst may
+be named, or nobody. A point must be seen by three cameras: of two that contradict each other nobody
+knows which is wrong. Points are the nose and the middles of left and right joints, which stay where
+they are when a detector exchanges the sides. An image that repeats the last one is no news.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hrc_env.records import Keypoints, PoseEstimate
+from hrc_env.skeleton import JOINT
+from hrc_env.tracking.calibration_kernel import N_NUMBERS, gather
+from hrc_env.typing import Bools, Floats, Ints
+
+EVERY = 10
+"""Updates between two samples: errors of the detector last for about twelve."""
+POINTS: Ints = np.array(
+    [(JOINT["nose"],) * 2]
+    + [
+        (JOINT[f"left_{j}"], JOINT[f"right_{j}"])
+        for j in ("shoulder", "elbow", "hip", "knee", "ankle")
+    ]
+)
+"""(6, 2) joints whose means are the points."""
+PRIOR: Floats = np.array([0.3, 0.3, 0.3, 0.3, 0.3]) ** -2.0
+"""Precision of these numbers before anything was seen."""
+ALLOWED: Floats = np.array([0.002, 0.002, 0.008, 0.012]) ** 2
+"""Variance of the first four that no calibration is to blame for: the detector's lasting bias."""
+
+
+class WatchState(NamedTuple):
+    """What is remembered of B environments and C cameras; arrays changed in place."""
+
+    updates: Ints
+    """(B,) since the reset."""
+    information: Floats
+    """(B, C, 5, 5) of the five numbers; the upper triangle."""
+    score: Floats
+    """(B, C, 5) information times the numbers."""
+    last: Floats
+    """(B, C) a sum over the last image's keypoints, by which it is known again."""
+    ratio: Floats
+    """(B, C) likelihood ratios at the last sample."""
+    suspected: Bools
+    """(B, C) whether a camera is named."""
+
+
+def make_watch(batch: int, n_cameras: int) -> WatchState:
+    """A state in which nobody is suspected."""
+    lead = (batch, n_cameras)
+    return WatchState(
+        updates=np.zeros(batch, np.int64),
+        information=np.zeros((*lead, N_NUMBERS, N_NUMBERS)),
+        score=np.zeros((*lead, N_NUMBERS)),
+        last=np.zeros(lead),
+        ratio=np.zeros(lead),
+        suspected=np.zeros(lead, np.bool_),
+    )
+
+
+def forget(state: WatchState, ids: Ints) -> None:
+    """Begin environments `ids` anew."""
+    for array in state:
+        array[ids] = 0
+
+
+def watch(
+    state: WatchState, ids: Ints, keypoints: Keypoints, age_s: Floats, estimate: PoseEstimate,
+    P: Floats, axes: Floats,
+) -> None:  # fmt: skip
+    """Count an update of environments `ids`, whose rows the other arguments are.
+
+    Args:
+        state: of the whole batch.
+        ids: (B,) environments.
+        keypoints: pinhole pixels, by worker.
+        age_s: (B, C) how old each camera's frame is [s].
+        estimate: what is believed now.
+        P: (C, 3, 4) projections, as the cameras are said to be.
+        axes: (C, 3) principal point and focal length [px].
+    """
+    state.updates[ids] += 1
+    due = np.flatnonzero(state.updates[ids] % EVERY == 0)
+    if len(due) == 0:
+        return
+    gather(
+        state.information, state.score, state.last, state.ratio, state.suspected,
+        due, ids, keypoints.px, keypoints.confidence, keypoints.sigma_px, age_s,
+        estimate.mean_world, estimate.velocity_world, estimate.tracked, P, axes,
+        POINTS, PRIOR, ALLOWED,
+    )  # fmt: skip
