@@ -57,7 +57,7 @@ def _cores() -> Finding:
 
 def _weights() -> Finding:
     try:
-        for name in weights.WEIGHTS:
+        for name in weights.ALWAYS:
             weights.find_weights(name)
     except HRCError as error:
         return False, str(error)

@@ -4,6 +4,7 @@ import os
 import shutil
 import subprocess
 from dataclasses import dataclass
+from typing import Literal
 
 from rich.console import Console
 
@@ -15,11 +16,16 @@ from hrc_env.scene.gl import APT_LINE, gl_status
 class Setup:
     """Fetch the pose network's weights (once, checked) and see that headless OpenGL works."""
 
+    networks: tuple[Literal["lite", "heavy"], ...] = ()
+    """Other landmark networks that are to be fetched, too (41 MB): for eyes.folded and
+    eyes.network."""
+
     def run(self) -> int:
         """Set up; 0 also without OpenGL, which only pictures need."""
         console = Console()
         with console.status("Fetching the weights of MediaPipe Pose ..."):
-            weights.fetch_weights()
+            extra = [f"pose_landmark_{network}" for network in self.networks]
+            weights.fetch_weights(names=[*weights.ALWAYS, *extra])
         console.print(f"[green]ok[/] pose network: official weights in {weights.cache_dir()}")
         ready, message = gl_status()
         if not ready and _may_install():

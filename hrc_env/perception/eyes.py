@@ -21,6 +21,7 @@ from hrc_env.perception import blazepose
 from hrc_env.perception.acquisition import Candidates, agreed_windows, apart_from
 from hrc_env.perception.network import (
     LANDMARK_SIDE,
+    NETWORKS,
     RUNTIMES,
     Detector,
     Landmarker,
@@ -63,10 +64,19 @@ class EyesConfig:
     runtime: str = "litert"
     """What the networks run on: "litert", "openvino" (an extra, faster) or "auto"
     (docs/speed.md)."""
+    network: str = "full"
+    """The landmark network: "lite", "full" or "heavy"; all but "full" are fetched once with
+    `python -m hrc_env setup --networks lite heavy`."""
+    folded: str = "full"
+    """The landmark network for workers who are bent, squatting or kneeling; "heavy" is more exact
+    there, and three times as slow."""
 
     def __post_init__(self) -> None:
         if self.runtime not in RUNTIMES:
             raise unknown("eyes.runtime", self.runtime, RUNTIMES)
+        for name in ("network", "folded"):
+            if getattr(self, name) not in NETWORKS:
+                raise unknown(f"eyes.{name}", getattr(self, name), NETWORKS)
         for name in ("min_presence", "sure_presence", "outside_confidence"):
             if not 0 < getattr(self, name) <= 1:
                 raise ConfigError(f"{name} must be in (0, 1], got {getattr(self, name)}.")
@@ -95,6 +105,8 @@ class _Networks:
 
     detect: Detector
     landmark: Landmarker
+    folded: Landmarker
+    """For workers who are folded up."""
 
 
 class Eyes(Stateful):
@@ -111,10 +123,11 @@ class Eyes(Stateful):
         Raises:
             WeightsError: without the weights. ConfigError: without the runtime.
         """
-        for name in ("pose_detection", "pose_landmark_full"):
-            find_weights(name)
         self.cameras = tuple(cameras)
         self.config = config or EyesConfig()
+        find_weights("pose_detection")
+        for network in (self.config.network, self.config.folded):
+            find_weights(f"pose_landmark_{network}")
         chosen_runtime(self.config.runtime)
         self._looks: dict[int, list[int]] = {}
         self._networks: tuple[_Networks, _Networks] | None = None
@@ -127,6 +140,7 @@ class Eyes(Stateful):
         track: int = 0,
         others: Sequence[Sequence[CropWindow | None]] = (),
         found: Candidates | None = None,
+        folded: bool = False,
     ) -> Sight:
         """Look for one worker through a window a camera; search if there is no window at all.
 
@@ -137,6 +151,7 @@ class Eyes(Stateful):
                 detector stage's turns are counted for each.
             others: windows (C,) of other workers; a search does not find these again.
             found: what `search` found in these very images, if it was asked already.
+            folded: whether the worker is expected to be folded up (`posture.is_folded`).
         """
         check_shape("windows", (len(windows),), (len(self.cameras),), "one a camera")
         looks = self._looks.setdefault(track, [0] * len(self.cameras))
@@ -146,7 +161,7 @@ class Eyes(Stateful):
             windows = agreed_windows(apart_from(known, others), self.cameras)
         used = [c for c, window in enumerate(windows) if window is not None]
         asked = [not searched and self._is_turn(looks[c], c) for c in used]
-        joints_of = self._share(self._landmark_jobs(source, windows, used, asked))
+        joints_of = self._share(self._landmark_jobs(source, windows, used, asked, folded))
         sight = self._nothing(list(windows))
         for c, joints in zip(used, joints_of, strict=True):
             if joints is None:
@@ -188,13 +203,16 @@ class Eyes(Stateful):
         windows: Sequence[CropWindow | None],
         used: list[int],
         asked: list[bool],
+        folded: bool,
     ) -> Iterator[Callable[[_Networks], Floats | None]]:
         """Draw one crop after the other; each comes with the work that is to be done on it."""
         for c, ask in zip(used, asked, strict=True):
             window = windows[c]
             if window is not None:
                 crop = _seen(source.crop(c, window), window, self.cameras[c])
-                yield lambda nets, k=crop, w=window, a=ask: _joints(nets, k, w, a, self.config)
+                yield lambda nets, k=crop, w=window, a=ask: _joints(
+                    nets, nets.folded if folded else nets.landmark, k, w, a, self.config
+                )
 
     def _share(self, jobs: Iterable[Callable[[_Networks], ResultT]]) -> list[ResultT]:
         """Results in order; the helper works from the front, this thread from the back."""
@@ -237,14 +255,22 @@ class Eyes(Stateful):
 
 def _networks(config: EyesConfig) -> _Networks:
     runtime = chosen_runtime(config.runtime)
-    return _Networks(load_detector(runtime), load_landmarker("full", runtime))
+    landmark = load_landmarker(config.network, runtime)
+    same = config.folded == config.network
+    folded = landmark if same else load_landmarker(config.folded, runtime)
+    return _Networks(load_detector(runtime), landmark, folded)
 
 
 def _joints(
-    nets: _Networks, crop: Image, window: CropWindow, ask_detector: bool, config: EyesConfig
+    nets: _Networks,
+    landmark: Landmarker,
+    crop: Image,
+    window: CropWindow,
+    ask_detector: bool,
+    config: EyesConfig,
 ) -> Floats | None:
     """(J, 3) pixels and visibility of the 15 joints, or None where there is no worker."""
-    points, presence, heat = nets.landmark(blazepose.landmark_input(crop))
+    points, presence, heat = landmark(blazepose.landmark_input(crop))
     if presence < config.min_presence:
         return None
     if ask_detector or presence < config.sure_presence:

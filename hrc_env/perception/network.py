@@ -14,6 +14,8 @@ from hrc_env.perception.weights import find_weights
 DETECTOR_SIDE = 224
 LANDMARK_SIDE = 256
 
+NETWORKS = ("lite", "full", "heavy")
+"""Landmark networks, from quick to exact."""
 DETECTOR_OUTPUTS = ("Identity", "Identity_1")
 """Boxes (1, 2254, 12), score logits (1, 2254, 1) in the official graph."""
 LANDMARK_OUTPUTS = ("Identity", "Identity_1", "Identity_3")
@@ -56,7 +58,7 @@ def load_detector(runtime: str = "litert") -> Detector:
 
 
 def load_landmarker(network: str = "full", runtime: str = "litert") -> Landmarker:
-    """The landmark stage. Raises `WeightsError` where its weights are missing."""
+    """A landmark stage, of `NETWORKS`. Raises `WeightsError` where its weights are missing."""
     run = _load(f"pose_landmark_{network}", LANDMARK_OUTPUTS, runtime)
 
     def landmark(image: Tensor) -> tuple[Tensor, float, Tensor]:

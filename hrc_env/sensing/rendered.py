@@ -14,6 +14,7 @@ from hrc_env.faults.schedule import Schedule
 from hrc_env.geometry.cameras import project
 from hrc_env.perception.eyes import Eyes, Sight
 from hrc_env.perception.lensed import Lensed
+from hrc_env.perception.posture import is_folded
 from hrc_env.perception.windows import steady_window, window_from_joints
 from hrc_env.records import CropWindow, Keypoints, PoseEstimate
 from hrc_env.scene.build import Scene
@@ -93,7 +94,10 @@ class CameraSenses(TrackingSenses):
             if people is None and not any(windows):
                 people = self.eyes.search(self.images)
             track = self._track(b, worker)
-            sight = self.eyes.look(self.images, windows, track, taken, people)
+            folded = bool(expected.tracked[row, worker]) and is_folded(
+                expected.mean_world[row, worker]
+            )
+            sight = self.eyes.look(self.images, windows, track, taken, people, folded)
             taken.append(sight.windows)
             yield worker, sight
 

