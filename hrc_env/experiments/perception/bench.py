@@ -91,7 +91,7 @@ class PerceptionBenchConfig:
 
 
 QUICK = PerceptionBenchConfig(
-    episodes=(("lab", 3), ("site", 2)), n_steps=80, n_faults=2, fault_steps=40, n_emulated=8,
+    episodes=(("lab", 4), ("site", 2)), n_steps=80, n_faults=4, fault_steps=40, n_emulated=8,
     bodies=("worker_1", "worker_2"), n_instants=10, n_empty=40, speed_steps=30,
 )  # fmt: skip
 """Every number, from little."""
