@@ -5,6 +5,7 @@ room.jpg      the lab from beside and from outside
 site.jpg      the construction site
 workers.jpg   three workers of different bodies on it
 faults.jpg    what faults do to an image
+appearance.jpg  both scenes as they were built, and in five looks
 cameras.jpg   the laboratory through a pinhole and through the paper's GoPro
 clip.jpg      a film strip of a walk that was written to a BVH file and imported
 learning.png  the curves of `python benchmarks/learning.py`, if out/learning is there
@@ -19,6 +20,7 @@ import cv2
 import imageio.v2 as imageio
 import numpy as np
 
+from hrc_env.appearance import VARIED, draw_look
 from hrc_env.batching import copied
 from hrc_env.env import HRCReachEnv
 from hrc_env.faults.camera_film import CameraFilm, Shot
@@ -110,6 +112,26 @@ def faults() -> None:
     save(tile(crops, len(crops) // 3), "faults.jpg")
 
 
+def appearance() -> None:
+    """The lab and the site as they were built, and in five `varied` looks."""
+    for_each = []
+    for scene, view in (("lab", "room"), ("site", "camera_1")):
+        env = HRCReachEnv(perception="truth", scene=scene)
+        env.reset(seed=SEED_WALK)
+        for _ in range(STEPS_WALK):
+            env.step(np.zeros(6))
+        renderer = PictureRenderer(env.simulation.scene, 400, 300)
+        for k in range(6):
+            if k > 0:
+                renderer.dress(draw_look(VARIED, 1, np.random.default_rng(k)))
+            picture = renderer.picture(*env.views.pose(), view).astype(np.uint8).copy()
+            label(picture, f"look {k}" if k else "as built", (6, 6), 13)
+            for_each.append(picture)
+        renderer.close()
+        env.close()
+    save(tile(for_each, 3), "appearance.jpg")
+
+
 def clip() -> None:
     """A recording, imported."""
     out = Path("out/clips")
@@ -154,6 +176,7 @@ if __name__ == "__main__":
     workers()
     cameras()
     faults()
+    appearance()
     clip()
     if Path("out/learning/curves.png").exists():
         shutil.copy("out/learning/curves.png", PICTURES / "learning.png")

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from hrc_env.appearance import AppearanceConfig, appearance_called
 from hrc_env.body import pool
 from hrc_env.control import ControlConfig
 from hrc_env.errors import ConfigError
@@ -56,6 +57,8 @@ class HRCConfig:
     """Its emulator (`perception="keypoints"`)."""
     faults: tuple[FaultConfig, ...] = ()
     """What goes wrong with the cameras, and when (docs/cameras.md)."""
+    appearance: AppearanceConfig = field(default_factory=AppearanceConfig)
+    """How scene and workers look, drawn for every episode (`perception="pixels"`)."""
     tracker: TrackerConfig = field(default_factory=TrackerConfig)
     """The estimators."""
     association: AssociationConfig = field(default_factory=AssociationConfig)
@@ -169,6 +172,21 @@ def with_faults(
     if isinstance(faults, FaultConfig | Mapping | str) or not isinstance(faults, Sequence):
         raise ConfigError(f"faults must be a list of FaultConfigs or mappings, got {faults!r}.")
     return replace(config, faults=restored(tuple[FaultConfig, ...], list(faults), "faults"))
+
+
+def with_appearance(
+    config: HRCConfig, appearance: "str | AppearanceConfig | Mapping[str, Any] | None"
+) -> HRCConfig:
+    """A config with another appearance: by name, settings or a mapping; None for its own.
+
+    Raises:
+        ConfigError: a name or a field that there is not, a value that cannot be.
+    """
+    if appearance is None:
+        return config
+    if isinstance(appearance, Mapping):
+        appearance = from_mapping(AppearanceConfig, appearance, "appearance.")
+    return replace(config, appearance=appearance_called(appearance))
 
 
 def with_motions(config: HRCConfig, motions: "Sequence[str | Path | Clip] | None") -> HRCConfig:

@@ -14,7 +14,16 @@ from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
 from hrc_env import observations
-from hrc_env.config import HRCConfig, resolve, with_cameras, with_faults, with_motions, with_people
+from hrc_env.appearance import AppearanceConfig
+from hrc_env.config import (
+    HRCConfig,
+    resolve,
+    with_appearance,
+    with_cameras,
+    with_faults,
+    with_motions,
+    with_people,
+)
 from hrc_env.errors import ConfigError, unknown
 from hrc_env.faults.fault import FaultConfig
 from hrc_env.motion.generator import Clip, PeopleConfig
@@ -47,6 +56,9 @@ class HRCReachEnv(Stateful, gymnasium.Env[NDArray[np.float32], NDArray[np.float3
             (docs/motion_capture.md); None for those of the config (none).
         faults: what goes wrong with cameras, `FaultConfig`s or mappings
             (docs/cameras.md); None for those of the config (none).
+        appearance: how scene and workers look, drawn for every episode: "varied" or another of
+            `hrc_env.appearance.APPEARANCES`, an `AppearanceConfig` or a mapping; None for that
+            of the config (as built). Level "pixels" only.
         control: "joint" (joint velocities) or "tool" (tool velocity).
         render_mode: "rgb_array", "depth_array" or None.
         config: an `HRCConfig` or a nested mapping of changes to the default.
@@ -68,6 +80,7 @@ class HRCReachEnv(Stateful, gymnasium.Env[NDArray[np.float32], NDArray[np.float3
         people: str | PeopleConfig | None = None,
         motions: Sequence[str | Path | Clip] | None = None,
         faults: Sequence[FaultConfig | Mapping[str, Any]] | None = None,
+        appearance: str | AppearanceConfig | Mapping[str, Any] | None = None,
         control: str = "joint",
         render_mode: str | None = None,
         config: HRCConfig | Mapping[str, Any] | None = None,
@@ -75,6 +88,7 @@ class HRCReachEnv(Stateful, gymnasium.Env[NDArray[np.float32], NDArray[np.float3
         if render_mode is not None and render_mode not in RENDER_MODES:
             raise unknown("render_mode", render_mode, RENDER_MODES)
         given = with_motions(with_people(resolve(config), people), motions)
+        given = with_appearance(given, appearance)
         self.config, used = with_cameras(with_faults(given, faults), cameras)
         self.render_mode = render_mode
         self.simulation = Simulation(

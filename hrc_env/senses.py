@@ -15,6 +15,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from hrc_env.appearance import AS_BUILT, Look
 from hrc_env.batching import rows
 from hrc_env.config import HRCConfig
 from hrc_env.errors import ConfigError, unknown
@@ -57,6 +58,10 @@ class Senses(Protocol):
         """What environment `b` saw last, and through which windows (for pictures)."""
         ...
 
+    def look_of(self, b: int) -> Look | None:
+        """How environment `b` looks in its episode (for pictures); None: as it was built."""
+        ...
+
     def suspected(self, ids: Ints) -> Bools:
         """(B, C) which cameras of environments `ids` are thought to be miscalibrated."""
         ...
@@ -84,6 +89,11 @@ def make_senses(level: str, estimator: str, scene: Scene, batch: int, config: HR
     """
     if level not in LEVELS:
         raise unknown("perception", level, LEVELS)
+    if level != "pixels" and config.appearance != AS_BUILT:
+        raise ConfigError(
+            f"Looks are of images, and perception={level!r} has none: leave appearance out, or use "
+            "perception='pixels'."
+        )
     schedule = _schedule(scene, level, config)
     memory_s = max(config.tracker.longest_delay_s, min(schedule.longest_delay_s, 1.0))
     settings = replace(config.tracker, longest_delay_s=memory_s)
@@ -143,6 +153,10 @@ class GivenSenses(Stateful):
         """No camera took part."""
         return None, []
 
+    def look_of(self, b: int) -> Look | None:
+        """As it was built."""
+        return None
+
     def suspected(self, ids: Ints) -> Bools:
         """(B, 0): there are no cameras."""
         return np.zeros((len(ids), 0), np.bool_)
@@ -171,6 +185,10 @@ class BlindSenses(Stateful):
     def looks(self, b: int) -> tuple[Keypoints | None, Windows]:
         """No camera took part."""
         return None, []
+
+    def look_of(self, b: int) -> Look | None:
+        """As it was built."""
+        return None
 
     def suspected(self, ids: Ints) -> Bools:
         """(B, 0): there are no cameras."""

@@ -19,7 +19,16 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from hrc_env.config import HRCConfig, resolve, with_cameras, with_faults, with_motions, with_people
+from hrc_env.appearance import AppearanceConfig
+from hrc_env.config import (
+    HRCConfig,
+    resolve,
+    with_appearance,
+    with_cameras,
+    with_faults,
+    with_motions,
+    with_people,
+)
 from hrc_env.env import RENDER_MODES, spaces
 from hrc_env.errors import ConfigError, unknown
 from hrc_env.faults.fault import FaultConfig
@@ -50,8 +59,8 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
     Args:
         num_envs: how many.
         perception: "keypoints", "truth" or "none"; pictures have no batched form.
-        estimator, cameras, scene, n_workers, people, motions, faults, control, config: as
-            `HRCReachEnv`.
+        estimator, cameras, scene, n_workers, people, motions, faults, appearance, control,
+            config: as `HRCReachEnv`.
         render_mode: "rgb_array", "depth_array" or None.
         max_episode_steps: the time limit; None or -1 is none.
         autoreset_mode: when an environment whose episode is over starts anew: at the next
@@ -76,6 +85,7 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
         people: str | PeopleConfig | None = None,
         motions: Sequence[str | Path | Clip] | None = None,
         faults: Sequence[FaultConfig | Mapping[str, Any]] | None = None,
+        appearance: str | AppearanceConfig | Mapping[str, Any] | None = None,
         control: str = "joint",
         render_mode: str | None = None,
         config: HRCConfig | Mapping[str, Any] | None = None,
@@ -94,6 +104,7 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
         self.autoreset_mode = _mode(autoreset_mode)
         self.render_mode = render_mode
         given = with_motions(with_people(resolve(config), people), motions)
+        given = with_appearance(given, appearance)
         self.config, used = with_cameras(with_faults(given, faults), cameras)
         self.shards = Shards(
             self.num_envs,

@@ -129,6 +129,7 @@ class Views:
         if size not in self._pictures:
             quality = PICTURE_QUALITY if size == PICTURE_SIZE else FILM_QUALITY
             self._pictures[size] = PictureRenderer(scene, width, height, quality)
+        self._pictures[size].dress(self.simulation.senses.look_of(self.b))
         return self._pictures[size]
 
     def _square_images(self, size: int) -> Lensed:
@@ -136,5 +137,6 @@ class Views:
         scene = self.simulation.scene
         if size not in self._squares:
             self._squares[size] = CropRenderer(scene, size)
+        self._squares[size].dress(self.simulation.senses.look_of(self.b))
         self._squares[size].draw(*self.pose())
         return Lensed(self._squares[size], scene.cameras)

@@ -87,6 +87,10 @@ class Lensed:
             self._empty[key] = self._bent(self.cameras[camera_index], window, self.drawer.still)
         return self._empty[key]
 
+    def forget(self) -> None:
+        """The empty place looks otherwise from now on."""
+        self._empty.clear()
+
     def _bent(
         self,
         camera: PinholeCamera,

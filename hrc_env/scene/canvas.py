@@ -14,11 +14,13 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from hrc_env.appearance import Look
 from hrc_env.errors import RenderingError, check_shape
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.records import CropWindow, WorkerMotion
 from hrc_env.scene import gl
 from hrc_env.scene.build import Scene, drawing_model, drawn_looks, drawn_props
+from hrc_env.scene.dressing import as_built, dress, strew, take_off_hats
 from hrc_env.scene.props import pose_props
 from hrc_env.scene.rig import glcam_axes
 from hrc_env.scene.wardrobe import wear
@@ -49,6 +51,8 @@ class Canvas:
         view.offwidth, view.offheight = width_px, height_px
         self._data = mujoco.MjData(self._model)
         self._props, self._looks = drawn_props(scene), drawn_looks(scene)
+        self._built = as_built(self._model)
+        self._look: Look | None = None
         wear(self._model, self._looks, None)
         self._option = mujoco.MjvOption()
         self._option.sitegroup[:] = 0
@@ -63,6 +67,14 @@ class Canvas:
         self._closed = False
         self.groups(groups)
 
+    def dress(self, look: Look | None) -> bool:
+        """Draw with this look from the next pose on; None leaves it. Whether it is another one."""
+        if look is None or look is self._look:
+            return False
+        self._look = look
+        dress(self._model, self._built, self._looks, look)
+        return True
+
     def pose(self, q: JointAngles, motion: WorkerMotion | None) -> None:
         """Put the arm at q (N,), the workers and what they hold where `motion` (W, S, ...) says."""
         check_shape("q", np.shape(q), self._scene.home_q.shape, "one angle per joint")
@@ -73,6 +85,8 @@ class Canvas:
             self._data.mocap_quat[rows] = np.reshape(motion.quaternion_wxyz, (*rows.shape, 4))
             pose_props(self._model, self._data, self._props, motion.held)
             wear(self._model, self._looks, motion.body)
+            if self._look is not None:
+                take_off_hats(self._model, self._looks, self._look)
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_comPos(self._model, self._data)
         mujoco.mj_camlight(self._model, self._data)
@@ -94,6 +108,8 @@ class Canvas:
         mujoco.mjv_updateScene(
             self._model, self._data, self._option, None, self._camera, what, self._shown
         )
+        if self._look is not None and what != MOVING:
+            strew(self._shown, self._scene.grounds, self._look)
         flags = self._shown.flags
         flags[mujoco.mjtRndFlag.mjRND_SHADOW.value] = shadows
         flags[mujoco.mjtRndFlag.mjRND_SKYBOX.value] = what != MOVING

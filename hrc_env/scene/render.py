@@ -13,6 +13,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from hrc_env.appearance import Look
 from hrc_env.compiled import LEAN
 from hrc_env.errors import ConfigError, unknown
 from hrc_env.geometry.cameras import PinholeCamera, pinhole
@@ -65,6 +66,13 @@ class CropRenderer:
         self._rgb = np.empty((size_px, size_px, 3), np.uint8)
         self._z = np.empty((size_px, size_px), np.float32)
         self._kept: OrderedDict[Key, _Background | None] = OrderedDict()
+
+    def dress(self, look: Look | None) -> bool:
+        """Draw with an episode's look from the next pose on; whether that is another one."""
+        if not self._canvas.dress(look):
+            return False
+        self._kept.clear()
+        return True
 
     def draw(self, q: JointAngles, motion: WorkerMotion | None) -> None:
         """Pose the scene for the crops that follow.
@@ -179,6 +187,10 @@ class PictureRenderer:
         self.scene = scene
         self.quality = PICTURE_QUALITY if quality is None else quality
         self._canvas = Canvas(scene, width_px, height_px, self.quality, ALL_GROUPS)
+
+    def dress(self, look: Look | None) -> None:
+        """Draw with an episode's look from now on."""
+        self._canvas.dress(look)
 
     def viewpoints(self) -> tuple[str, ...]:
         """What `picture` takes: named views and the cameras of the rig."""

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from hrc_env.appearance import AS_BUILT, Look, draw_look
 from hrc_env.batching import copied, one, rows
 from hrc_env.config import HRCConfig
 from hrc_env.faults.camera_film import CameraFilm, Shot
@@ -28,15 +29,19 @@ from hrc_env.typing import Floats, Ints
 class CameraSenses(TrackingSenses):
     """Level `pixels`: rendered crops through the pose network."""
 
-    CHANGES = (*TrackingSenses.CHANGES, "windows", "eyes")
+    CHANGES = (*TrackingSenses.CHANGES, "windows", "eyes", "worn")
 
     def __init__(
         self, scene: Scene, batch: int, tracker: Estimator, config: HRCConfig, schedule: Schedule
     ) -> None:
         super().__init__(batch, scene, tracker, config, schedule)
         self.renderer = CropRenderer(scene)
-        lensed = Lensed(self.renderer, scene.cameras)
-        self.images = lensed if schedule.is_plain else CameraFilm(self.renderer, lensed, schedule)
+        self.lensed = Lensed(self.renderer, scene.cameras)
+        film = None if schedule.is_plain else CameraFilm(self.renderer, self.lensed, schedule)
+        self.images = film or self.lensed
+        self.appearance = config.appearance
+        self.worn: list[Look | None] = [None] * batch
+        """How each environment looks in its episode; None: as it was built."""
         self.eyes = Eyes(scene.cameras, config.eyes)
         self.windows: list[Windows] = [
             [[None] * len(scene.cameras) for _ in range(scene.n_workers)] for _ in range(batch)
@@ -48,6 +53,7 @@ class CameraSenses(TrackingSenses):
         time_s = None if self.recent is None else np.empty(seen.px.shape[:2])
         expected = self.tracker.estimate(predicted)
         for row, b in enumerate(now.ids.tolist()):
+            self._dress(b)
             if self.recent is None or time_s is None:
                 self.renderer.draw(now.q[row], one(now.motion, row))
                 has_image = [True] * len(self.scene.cameras)
@@ -61,6 +67,11 @@ class CameraSenses(TrackingSenses):
                 seen.confidence[row, :, worker] = sight.confidence
                 seen.sigma_px[row, :, worker] = sight.sigma_px
         return replace(seen, time_s=time_s)
+
+    def _dress(self, b: int) -> None:
+        """Let the renderer draw environment b as it looks."""
+        if self.renderer.dress(self.worn[b]):
+            self.lensed.forget()
 
     def _take_images(self, now: Moment, row: int, b: int, recent: Recent) -> Floats:
         """Let every camera show what has come of it. (C,) its time; NaN for nothing."""
@@ -105,6 +116,8 @@ class CameraSenses(TrackingSenses):
         """Forget the tracks, and whom the eyes were following."""
         super().reset(ids, sensor_rngs, tracker_rngs)
         for b in ids:
+            if self.appearance != AS_BUILT:
+                self.worn[b] = draw_look(self.appearance, self.scene.n_workers, sensor_rngs[b])
             for worker in range(self.scene.n_workers):
                 self.eyes.forget(self._track(b, worker))
                 self.windows[b][worker] = [None] * len(self.scene.cameras)
@@ -116,6 +129,10 @@ class CameraSenses(TrackingSenses):
     def looks(self, b: int) -> tuple[Keypoints | None, Windows]:
         """The keypoints of environment `b` and the windows they were found in."""
         return rows(self.keypoints, np.array([b])), self.windows[b]
+
+    def look_of(self, b: int) -> Look | None:
+        """How environment b looks in its episode."""
+        return self.worn[b]
 
     def close(self) -> None:
         """Stop the detector's thread and free the graphics context."""

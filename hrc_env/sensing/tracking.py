@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from hrc_env.appearance import Look
 from hrc_env.batching import rows, write_rows
 from hrc_env.config import HRCConfig
 from hrc_env.faults.recent import Recent
@@ -87,6 +88,11 @@ class TrackingSenses(Stateful):
             return keypoints
         expected = self.tracker.estimate(predicted)
         return associate(self.P, keypoints, expected, self.association).keypoints
+
+    def look_of(self, b: int) -> Look | None:
+        """How environment `b` looks in its episode; None: as it was built."""
+        del b
+        return None
 
     def suspected(self, ids: Ints) -> Bools:
         """(B, C) which cameras of environments `ids` are thought to be miscalibrated."""

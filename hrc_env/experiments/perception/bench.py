@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hrc_env.appearance import APPEARANCES, AS_BUILT, draw_look
 from hrc_env.body import worker_names
 from hrc_env.errors import ConfigError
 from hrc_env.experiments.perception import loops, phantoms, sheet, speed
@@ -209,7 +210,7 @@ def _play_fault(
 
 
 def _crops(config: PerceptionBenchConfig, out: Path) -> Iterator[Task]:
-    """Crops of every body in every scene, and of one body through every lens."""
+    """Crops of every body in every scene; of one body through every lens, in every appearance."""
     n = config.n_instants
     cost = 3 + 0.12 * n
     for name, _ in config.episodes:
@@ -223,6 +224,11 @@ def _crops(config: PerceptionBenchConfig, out: Path) -> Iterator[Task]:
         label = f"crops.lens.{row}"
         make = partial(_look, label, f"lens {row}", scene, 2 * n, out)
         yield Task(label, 2 * cost, make, _take_views)
+    for row in APPEARANCES:
+        scene = partial(build, SceneConfig(), "lab", 1, config.bodies[0])
+        label = f"crops.appearance.{row}"
+        make = partial(_look, label, f"appearance {row}", scene, n, out)
+        yield Task(label, cost, make, _take_views)
 
 
 def _look(
@@ -233,7 +239,10 @@ def _look(
     place = scene()
     rng = np.random.default_rng(zlib.crc32(f"{place.name} {place.bodies[0]}".encode()))
     looker, views, kept = Looker(place), list[View](), 0
-    for now in instants(place, n, rng, in_turns()):
+    appearance = APPEARANCES.get(variant.removeprefix("appearance "), AS_BUILT)
+    for k, now in enumerate(instants(place, n, rng, in_turns())):
+        if appearance != AS_BUILT:
+            looker.dress(draw_look(appearance, 1, np.random.default_rng([FIRST_SEED, k])))
         looked = looker.look(now)
         for c in np.flatnonzero(looked.in_view).tolist():
             view = _view(variant, place, now, looked, c)

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hrc_env.appearance import Look
 from hrc_env.body import load_body, worker_truth
 from hrc_env.config import HRCConfig
 from hrc_env.geometry.cameras import (
@@ -78,6 +79,11 @@ class Looker:
         self.renderer = CropRenderer(scene)
         self.source = Lensed(self.renderer, scene.cameras)
         self.eyes = Eyes(scene.cameras)
+
+    def dress(self, look: Look) -> None:
+        """Let everything look so from the next look on."""
+        if self.renderer.dress(look):
+            self.source.forget()
 
     def look(self, now: Instant) -> Looked:
         """Look at an instant with every camera."""

@@ -37,9 +37,10 @@ ROWS: Mapping[str, Callable[[View], str]] = {
     "distance": lambda view: _band(view.distance_m, DISTANCES_M, "m"),
     "angle": lambda view: _band(view.angle_deg, (*ANGLES_DEG, 180), "deg"),
     "lens": lambda view: view.variant.removeprefix("lens "),
+    "appearance": lambda view: view.variant.removeprefix("appearance "),
 }
 """By what crops are told apart, and the row that each is in."""
-COMPARED = ("lens",)
+COMPARED = ("lens", "appearance")
 """Kinds that compare variants "<kind> <row>" of the same moments; the others have `PLAIN` ones."""
 PLAIN = "plain"
 """The variant of the scenes as they are."""
