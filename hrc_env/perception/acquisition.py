@@ -1,7 +1,9 @@
 """Which of the people found in several images are the same one.
 
 A search gives each camera a list of people, some of them twice, some of them mistakes. The
-lines of sight to one person's hips meet; those to two people, or to a mistake, rarely do.
+lines of sight to one person's hips meet; those to two people, or to a mistake, rarely do. Where
+they meet it shows how large each of them is: an arm of a robot that looks like a person is not as
+large as one.
 """
 
 import math
@@ -22,6 +24,10 @@ from hrc_env.typing import Points3
 MEETING_M = 0.3
 """Lines of sight that pass a point within this distance [m] see the same hips there."""
 
+SIDE_M = (1.1, 3.6)
+"""A window round a person has sides of this length at their distance [m]: from somebody folded up,
+as small as `windows.MIN_REACH_M` lets them be, to somebody tall who reaches up."""
+
 MIN_CROSSING = 0.1
 """Sine of the smallest angle between two lines that fixes a point."""
 
@@ -38,11 +44,11 @@ def agreed_windows(
         cameras: (C,) the rig.
 
     Returns:
-        (C,) None where a camera has not found that person. If one camera alone has found
-        anybody, its best; if several have found people who are nowhere the same, nobody.
+        (C,) None where a camera has not found that person. A camera that is alone in the rig is
+        believed; of several, two must have found the same person, and not too small or large a
+        one: else nobody. One view of several never begins a track.
     """
-    seeing = [c for c, found in enumerate(candidates) if found]
-    if len(seeing) == 1:
+    if len(cameras) == 1:
         return [found[0] if found else None for found in candidates]
     best: list[CropWindow | None] = [None] * len(cameras)
     best_rank = (1, 0.0)
@@ -101,7 +107,12 @@ def _support(
             continue
         m_per_px = float(depth_m[0, 0]) / camera.K[0, 0] * float(pinhole_stretch(camera, px[0, 0]))
         hips_px = image_from_pinhole(camera, px[0, 0])
-        off_m = [math.dist(window.centre_px, hips_px) * m_per_px for window in found]
+        off_m = [
+            math.dist(window.centre_px, hips_px) * m_per_px
+            if SIDE_M[0] <= window.side_px * m_per_px <= SIDE_M[1]
+            else math.inf
+            for window in found
+        ]
         nearest = int(np.argmin(off_m))
         if off_m[nearest] < MEETING_M:
             windows[c] = found[nearest]

@@ -26,7 +26,7 @@ from hrc_env.typing import Image, JointAngles
 
 CROP_PX = 256
 CROP_QUALITY = {
-    "offsamples": 0, "shadowsize": 0, "numslices": 12, "numstacks": 6, "numquads": 1,
+    "offsamples": 0, "shadowsize": 0, "numslices": 12, "numstacks": 3, "numquads": 1,
 }  # fmt: skip
 PICTURE_QUALITY = {
     "offsamples": 4, "shadowsize": 8192, "numslices": 40, "numstacks": 20, "numquads": 4,

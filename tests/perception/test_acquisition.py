@@ -13,10 +13,16 @@ CAMERAS = tuple(
 ANNA, BEN = np.array([0.9, 0.3, 0.95]), np.array([1.2, -1.3, 0.95])
 
 
-def seen(*people):
-    """(C, people) windows round the hips of people at these places."""
-    px, _ = project(projections(CAMERAS), np.array([people]))
-    return [[CropWindow((u, v), 400.0, 0.0) for u, v in camera] for camera in px[0]]
+def seen(*people, side_m=2.3):
+    """(C, people) windows round the hips of people at these places, so large in the world."""
+    px, depth_m = project(projections(CAMERAS), np.array([people]))
+    return [
+        [
+            CropWindow((u, v), side_m * camera.K[0, 0] / far_m, 0.0)
+            for (u, v), far_m in zip(places, depths, strict=True)
+        ]
+        for camera, places, depths in zip(CAMERAS, px[0], depth_m[0], strict=True)
+    ]
 
 
 def test_one_person_is_found_by_all_cameras():
@@ -47,11 +53,23 @@ def test_somebody_already_followed_is_not_found_again():
     assert agreed_windows(apart_from(both, [anna]), CAMERAS) == ben
 
 
-def test_a_single_camera_is_believed_and_a_contradiction_is_not():
-    alone = [seen(ANNA)[0], [], [], []]
-    assert agreed_windows(alone, CAMERAS) == [alone[0][0], None, None, None]
+def test_a_camera_that_is_alone_is_believed_and_one_of_several_is_not():
+    alone = seen(ANNA)[:1]
+    assert agreed_windows(alone, CAMERAS[:1]) == [alone[0][0]]
+    assert agreed_windows([*alone, [], [], []], CAMERAS) == [None] * 4
+
+
+def test_a_contradiction_is_nobody():
     contradiction = [seen(ANNA)[0], [CropWindow((100.0, 200.0), 400.0, 0.0)], [], []]
     assert agreed_windows(contradiction, CAMERAS) == [None] * 4
+
+
+def test_what_is_not_as_large_as_a_person_is_nobody():
+    """A robot's wrist that all cameras take for somebody."""
+    for side_m in (0.4, 5.0):
+        assert agreed_windows(seen(ANNA, side_m=side_m), CAMERAS) == [None] * 4
+    kneeling = seen(ANNA, side_m=1.3)
+    assert agreed_windows(kneeling, CAMERAS) == [found[0] for found in kneeling]
 
 
 def test_an_empty_room_has_nobody():
