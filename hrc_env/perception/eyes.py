@@ -61,6 +61,9 @@ class EyesConfig:
     """Joints that the network places outside the image are guesses: at most this visible."""
     search_step: float = 0.5
     """Search windows follow each other by at most this share of their side."""
+    search_every: int = 5
+    """Where a search of the whole images has found nobody the next one comes so many steps later:
+    it costs as much as several steps, most of all with bad images or an empty place."""
     runtime: str = "litert"
     """What the networks run on: "litert", "openvino" (an extra, faster) or "auto"
     (docs/speed.md)."""
@@ -80,7 +83,7 @@ class EyesConfig:
         for name in ("min_presence", "sure_presence", "outside_confidence"):
             if not 0 < getattr(self, name) <= 1:
                 raise ConfigError(f"{name} must be in (0, 1], got {getattr(self, name)}.")
-        for name in ("gate_every", "search_step", "max_offset"):
+        for name in ("gate_every", "search_step", "search_every", "max_offset"):
             if not getattr(self, name) > 0:
                 raise ConfigError(f"{name} must be positive, got {getattr(self, name)}.")
 

@@ -29,7 +29,7 @@ from hrc_env.typing import Floats, Ints
 class CameraSenses(TrackingSenses):
     """Level `pixels`: rendered crops through the pose network."""
 
-    CHANGES = (*TrackingSenses.CHANGES, "windows", "eyes", "worn")
+    CHANGES = (*TrackingSenses.CHANGES, "windows", "eyes", "worn", "rests")
 
     def __init__(
         self, scene: Scene, batch: int, tracker: Estimator, config: HRCConfig, schedule: Schedule
@@ -46,6 +46,9 @@ class CameraSenses(TrackingSenses):
         self.windows: list[Windows] = [
             [[None] * len(scene.cameras) for _ in range(scene.n_workers)] for _ in range(batch)
         ]
+
+        self.rests = [0] * batch
+        """Steps for which nobody is searched for, as nobody was found."""
 
     def detect(self, now: Moment, predicted: Any, sensor_rngs: Generators) -> Keypoints:
         """Landmarks of crops round the predicted worker, or of a search where there is none."""
@@ -96,26 +99,33 @@ class CameraSenses(TrackingSenses):
         """
         wanted = [self._windows(expected, row, w) for w in range(self.scene.n_workers)]
         taken: Windows = []
-        people = None
+        people, missed = None, False
+        self.rests[b] = max(self.rests[b] - 1, 0)
         for worker in sorted(range(len(wanted)), key=lambda w: not any(wanted[w])):
             steady = list(map(steady_window, self.windows[b][worker], wanted[worker]))
             windows = [w if has else None for w, has in zip(steady, has_image, strict=True)]
             if not any(has_image) or (any(steady) and not any(windows)):
                 continue
-            if people is None and not any(windows):
-                people = self.eyes.search(self.images)
+            if not any(windows):
+                if self.rests[b] > 0:
+                    continue
+                people = self.eyes.search(self.images) if people is None else people
             track = self._track(b, worker)
             folded = bool(expected.tracked[row, worker]) and is_folded(
                 expected.mean_world[row, worker]
             )
             sight = self.eyes.look(self.images, windows, track, taken, people, folded)
             taken.append(sight.windows)
+            missed |= not any(windows) and not sight.confidence.any()
             yield worker, sight
+        if missed:
+            self.rests[b] = self.eyes.config.search_every
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
         """Forget the tracks, and whom the eyes were following."""
         super().reset(ids, sensor_rngs, tracker_rngs)
         for b in ids:
+            self.rests[b] = 0
             if self.appearance != AS_BUILT:
                 self.worn[b] = draw_look(self.appearance, self.scene.n_workers, sensor_rngs[b])
             for worker in range(self.scene.n_workers):

@@ -20,6 +20,24 @@ def rolled(n_steps, *faults, seed=3, **kwargs):
     return infos
 
 
+def test_where_nobody_is_found_a_search_comes_only_now_and_then():
+    env = HRCReachEnv(n_workers=1)
+    searched = []
+
+    def nobody(source):
+        searched.append(env.simulation.senses.rests[0])
+        return [[] for _ in env.simulation.scene.cameras]
+
+    env.simulation.senses.eyes.search = nobody
+    env.reset(seed=0)
+    for _ in range(10):
+        env.step(np.zeros(6, np.float32))
+    assert len(searched) == 3  # at the reset, and 5 and 10 steps later
+    env.reset(seed=1)
+    assert len(searched) == 4
+    env.close()
+
+
 def test_every_fault_at_once_is_data():
     rolled(1, *(FaultConfig(kind, ("camera_1",)) for kind in KINDS if kind != "lost"))
 
