@@ -29,6 +29,12 @@ def test_nobody_is_named_without_a_fault():
     assert last_info(env, 60)[MISCALIBRATED] == ()
 
 
+@pytest.mark.parametrize("kind", ["frozen", "out_of_step", "late"])
+def test_bad_cameras_in_their_right_place_are_not_named(kind):
+    env = HRCReachEnv(perception="keypoints", faults=[{"kind": kind, "cameras": ["camera_3"]}])
+    assert last_info(env, 100)[MISCALIBRATED] == ()
+
+
 @pytest.mark.parametrize("level", ["truth", "none"])
 def test_levels_without_cameras_say_nothing(level):
     env = HRCReachEnv(perception=level)

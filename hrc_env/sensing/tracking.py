@@ -19,13 +19,14 @@ from hrc_env.stateful import Stateful
 from hrc_env.tracking.calibration_watch import forget, make_watch, watch
 from hrc_env.tracking.estimators import Estimator
 from hrc_env.tracking.people.association import associate
+from hrc_env.tracking.stuck import forget_stuck, leave_out_stuck, make_stuck
 from hrc_env.typing import Bools, Floats, Ints
 
 
 class TrackingSenses(Stateful):
     """What the levels with cameras share: predict, get keypoints, update."""
 
-    CHANGES = ("state", "keypoints", "recent", "watched")
+    CHANGES = ("state", "keypoints", "recent", "stuck", "watched")
 
     def __init__(
         self, batch: int, scene: Scene, tracker: Estimator, config: HRCConfig, schedule: Schedule
@@ -36,6 +37,7 @@ class TrackingSenses(Stateful):
         self.state: Any = tracker.init(batch, scene.n_workers)
         self.keypoints = no_keypoints(batch, len(scene.cameras), scene.n_workers)
         self.recent = None if schedule.is_plain else Recent(batch, schedule)
+        self.stuck = make_stuck(batch, len(scene.cameras))
         self.watched = make_watch(batch, len(scene.cameras))
         self.axes = np.array([(*camera.K[:2, 2], camera.K[0, 0]) for camera in scene.cameras])
         """(C, 3) principal point and focal length [px]."""
@@ -46,6 +48,7 @@ class TrackingSenses(Stateful):
         forget(self.watched, ids)
         if self.recent is not None:
             self.recent.reset(ids, sensor_rngs)
+            forget_stuck(self.stuck, ids)
 
     def sense(self, now: Moment, sensor_rngs: Generators, tracker_rngs: Generators) -> PoseEstimate:
         """Predict the workers, look at them where they should be, and update."""
@@ -53,6 +56,8 @@ class TrackingSenses(Stateful):
         state = self.state if whole else rows(self.state, now.ids)
         self.tracker.predict(state, self.dt_s, tracker_rngs)
         found = pinhole_keypoints(self.detect(now, state, sensor_rngs), self.scene.cameras)
+        if self.recent is not None:
+            leave_out_stuck(self.stuck, now.ids, found)
         keypoints = self._sorted(found, state)
         self.tracker.update(state, keypoints, tracker_rngs)
         if whole:

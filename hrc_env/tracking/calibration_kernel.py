@@ -35,17 +35,16 @@ N_VIEW = 13
 
 @numba.njit(**JIT)
 def gather(
-    information, score, last, ratio, suspected, due, ids, px, confidence, sigma_px, age_s,
+    information, score, ratio, suspected, due, ids, px, confidence, sigma_px, age_s,
     mean, velocity, tracked, P, axes, points, prior, allowed,
 ):  # fmt: skip
     """Take a sample of rows `due`, environments `ids[due]`; arguments as of `calibration_watch`."""
     n_cameras = len(P)
     view, small = np.empty((n_cameras, N_VIEW)), np.empty((N_NUMBERS, N_NUMBERS))
-    seen, news = np.empty(n_cameras, np.bool_), np.empty(n_cameras, np.bool_)
+    seen = np.empty(n_cameras, np.bool_)
     for row in due:
         b = ids[row]
         for c in range(n_cameras):
-            news[c] = _is_news(last, b, c, px[row, c])
             for i in range(N_NUMBERS):
                 score[b, c, i] *= KEPT
                 for j in range(i, N_NUMBERS):
@@ -56,7 +55,7 @@ def gather(
             for k in range(len(points)):
                 n = 0
                 for c in range(n_cameras):
-                    seen[c] = news[c] and _view(
+                    seen[c] = _view(
                         px[row, c, w], confidence[row, c, w], sigma_px[row, c, w], age_s[row, c],
                         mean[row, w], velocity[row, w], points[k, 0], points[k, 1], P[c], view[c],
                     )  # fmt: skip
@@ -66,20 +65,6 @@ def gather(
         for c in range(n_cameras):
             ratio[b, c] = _ratio(information[b, c], score[b, c], prior, allowed, small)
         _judge(ratio[b], suspected[b])
-
-
-@numba.njit(**LEAN)
-def _is_news(last, b, c, px):
-    """Whether a camera's keypoints differ from those of the sample before."""
-    total = 0.0
-    for w in range(px.shape[0]):
-        for j in range(px.shape[1]):
-            u, v = px[w, j, 0], px[w, j, 1]
-            if math.isfinite(u) and math.isfinite(v):
-                total += u + math.pi * v
-    news = total != last[b, c]
-    last[b, c] = total
-    return news
 
 
 @numba.njit(**LEAN)

@@ -16,7 +16,7 @@ Each ratio supposes that one camera alone is wrong. What is wrong with it shows,
 others say: it is named when its ratio is clearly the largest. Of several wrong ones the worst may
 be named, or nobody. A point must be seen by three cameras: of two that contradict each other nobody
 knows which is wrong. Points are the nose and the middles of left and right joints, which stay where
-they are when a detector exchanges the sides. An image that repeats the last one is no news.
+they are when a detector exchanges the sides.
 """
 
 from typing import NamedTuple
@@ -53,8 +53,6 @@ class WatchState(NamedTuple):
     """(B, C, 5, 5) of the five numbers; the upper triangle."""
     score: Floats
     """(B, C, 5) information times the numbers."""
-    last: Floats
-    """(B, C) a sum over the last image's keypoints, by which it is known again."""
     ratio: Floats
     """(B, C) likelihood ratios at the last sample."""
     suspected: Bools
@@ -68,7 +66,6 @@ def make_watch(batch: int, n_cameras: int) -> WatchState:
         updates=np.zeros(batch, np.int64),
         information=np.zeros((*lead, N_NUMBERS, N_NUMBERS)),
         score=np.zeros((*lead, N_NUMBERS)),
-        last=np.zeros(lead),
         ratio=np.zeros(lead),
         suspected=np.zeros(lead, np.bool_),
     )
@@ -100,7 +97,7 @@ def watch(
     if len(due) == 0:
         return
     gather(
-        state.information, state.score, state.last, state.ratio, state.suspected,
+        state.information, state.score, state.ratio, state.suspected,
         due, ids, keypoints.px, keypoints.confidence, keypoints.sigma_px, age_s,
         estimate.mean_world, estimate.velocity_world, estimate.tracked, P, axes,
         POINTS, PRIOR, ALLOWED,

@@ -110,16 +110,6 @@ def test_a_camera_behind_its_time_is_no_displaced_one():
     assert named(run(change=behind)) == []
 
 
-def test_a_frozen_image_is_heard_once():
-    kept = {}
-
-    def frozen(t, px, rng):
-        px[3] = kept.setdefault("px", px[3].copy())
-        return px
-
-    assert named(run(change=frozen)) == []
-
-
 def test_of_two_cameras_that_contradict_each_other_nobody_is_named():
     assert named(run([turned(RIG[0], 0.1), RIG[1]], n_cameras=2)) == []
 
