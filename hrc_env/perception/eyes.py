@@ -62,8 +62,8 @@ class EyesConfig:
     search_step: float = 0.5
     """Search windows follow each other by at most this share of their side."""
     search_every: int = 5
-    """Where a search of the whole images has found nobody the next one comes so many steps later:
-    it costs as much as several steps, most of all with bad images or an empty place."""
+    """A camera whose whole image was searched for nobody is searched again so many steps later: a
+    search costs as much as several steps, most of all with bad images."""
     runtime: str = "litert"
     """What the networks run on: "litert", "openvino" (an extra, faster) or "auto"
     (docs/speed.md)."""
@@ -176,9 +176,17 @@ class Eyes(Stateful):
             looks[c] = 0
         return sight
 
-    def search(self, source: ImageSource) -> list[list[CropWindow]]:
-        """Regions of interest of the people in each camera's whole image, best first."""
-        jobs = search_jobs(source, self.cameras, self.config.search_step)
+    def search(
+        self, source: ImageSource, which: Sequence[int] | None = None
+    ) -> list[list[CropWindow]]:
+        """Regions of interest of the people in each camera's whole image, best first.
+
+        Args:
+            source: gives crops of the cameras' present images.
+            which: the cameras whose images are searched; None: all.
+        """
+        which = range(len(self.cameras)) if which is None else which
+        jobs = search_jobs(source, self.cameras, which, self.config.search_step)
         found = self._share(lambda nets, job=job: job(nets.detect) for job in jobs)
         return distinct([one for some in found for one in some], len(self.cameras))
 

@@ -50,11 +50,11 @@ class ImageSource(Protocol):
 
 
 def search_jobs(
-    source: ImageSource, cameras: Sequence[PinholeCamera], step: float
+    source: ImageSource, cameras: Sequence[PinholeCamera], which: Sequence[int], step: float
 ) -> Iterator[Callable[[Detector], list[Found]]]:
     """Draw one place after the other; each comes with the work that is to be done on it."""
-    for c, camera in enumerate(cameras):
-        for window in search_windows(camera, step):
+    for c in which:
+        for window in search_windows(cameras[c], step):
             crop = np.array(source.crop(c, window))
             empty = source.empty(c, window)
             places = [window] if empty is None else changed(crop, empty, window)

@@ -21,6 +21,7 @@ from hrc_env.records import CropWindow, Keypoints, PoseEstimate
 from hrc_env.scene.build import Scene
 from hrc_env.scene.render import CropRenderer
 from hrc_env.sensing.moment import Generators, Moment, Windows
+from hrc_env.sensing.searches import Searches
 from hrc_env.sensing.tracking import TrackingSenses, no_keypoints
 from hrc_env.tracking.estimators import Estimator
 from hrc_env.typing import Floats, Ints
@@ -29,7 +30,7 @@ from hrc_env.typing import Floats, Ints
 class CameraSenses(TrackingSenses):
     """Level `pixels`: rendered crops through the pose network."""
 
-    CHANGES = (*TrackingSenses.CHANGES, "windows", "eyes", "worn", "rests")
+    CHANGES = (*TrackingSenses.CHANGES, "windows", "eyes", "worn", "searches")
 
     def __init__(
         self, scene: Scene, batch: int, tracker: Estimator, config: HRCConfig, schedule: Schedule
@@ -47,8 +48,7 @@ class CameraSenses(TrackingSenses):
             [[None] * len(scene.cameras) for _ in range(scene.n_workers)] for _ in range(batch)
         ]
 
-        self.rests = [0] * batch
-        """Steps for which nobody is searched for, as nobody was found."""
+        self.searches = Searches(batch, len(scene.cameras), config.eyes.search_every)
 
     def detect(self, now: Moment, predicted: Any, sensor_rngs: Generators) -> Keypoints:
         """Landmarks of crops round the predicted worker, or of a search where there is none."""
@@ -100,16 +100,17 @@ class CameraSenses(TrackingSenses):
         wanted = [self._windows(expected, row, w) for w in range(self.scene.n_workers)]
         taken: Windows = []
         people, missed = None, False
-        self.rests[b] = max(self.rests[b] - 1, 0)
+        self.searches.tick(b)
         for worker in sorted(range(len(wanted)), key=lambda w: not any(wanted[w])):
             steady = list(map(steady_window, self.windows[b][worker], wanted[worker]))
             windows = [w if has else None for w, has in zip(steady, has_image, strict=True)]
             if not any(has_image) or (any(steady) and not any(windows)):
                 continue
-            if not any(windows):
-                if self.rests[b] > 0:
+            if not any(windows) and people is None:
+                due = self.searches.due(b, has_image)
+                if not due:
                     continue
-                people = self.eyes.search(self.images) if people is None else people
+                people = self.searches.remember(b, due, self.eyes.search(self.images, due))
             track = self._track(b, worker)
             folded = bool(expected.tracked[row, worker]) and is_folded(
                 expected.mean_world[row, worker]
@@ -119,13 +120,13 @@ class CameraSenses(TrackingSenses):
             missed |= not any(windows) and not sight.confidence.any()
             yield worker, sight
         if missed:
-            self.rests[b] = self.eyes.config.search_every
+            self.searches.rest(b)
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
         """Forget the tracks, and whom the eyes were following."""
         super().reset(ids, sensor_rngs, tracker_rngs)
         for b in ids:
-            self.rests[b] = 0
+            self.searches.reset(int(b))
             if self.appearance != AS_BUILT:
                 self.worn[b] = draw_look(self.appearance, self.scene.n_workers, sensor_rngs[b])
             for worker in range(self.scene.n_workers):

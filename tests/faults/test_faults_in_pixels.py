@@ -20,12 +20,26 @@ def rolled(n_steps, *faults, seed=3, **kwargs):
     return infos
 
 
+def test_cameras_that_never_look_at_once_find_a_worker_together():
+    rates = {"left": (6.0, 0.12, 2.6), "right": (5.0, 0.2, -2.6)}
+    cameras = [
+        {"name": name, "eye_world": (2.9, y, 2.45), "rate_hz": rate_hz, "latency_s": latency_s}
+        for name, (rate_hz, latency_s, y) in rates.items()
+    ]
+    env = HRCReachEnv(cameras=cameras)
+    env.reset(seed=0)
+    for _ in range(14):
+        env.step(np.zeros(6, np.float32))
+    assert env.simulation.estimate.tracked.all()
+    env.close()
+
+
 def test_where_nobody_is_found_a_search_comes_only_now_and_then():
     env = HRCReachEnv(n_workers=1)
     searched = []
 
-    def nobody(source):
-        searched.append(env.simulation.senses.rests[0])
+    def nobody(source, which):
+        searched.append(which)
         return [[] for _ in env.simulation.scene.cameras]
 
     env.simulation.senses.eyes.search = nobody
