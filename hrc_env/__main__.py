@@ -4,6 +4,7 @@ python -m hrc_env demo     a film of a robot that yields to a worker it sees
 python -m hrc_env check    is this machine ready?
 python -m hrc_env bench    how good and honest are the estimators, how fast is everything?
 python -m hrc_env gallery  pictures of every worker, motion and scene
+python -m hrc_env calibrate-keypoints  the emulator's errors, fitted to renders
 """
 
 import sys
@@ -12,6 +13,7 @@ import tyro
 from rich.console import Console
 
 from hrc_env.cli.bench import Bench
+from hrc_env.cli.calibrate import CalibrateKeypoints
 from hrc_env.cli.check import Check
 from hrc_env.cli.demo import Demo
 from hrc_env.cli.gallery import Gallery
@@ -34,6 +36,7 @@ def main() -> int:
             "bench": Bench,
             "gallery": Gallery,
             "import-motion": ImportMotion,
+            "calibrate-keypoints": CalibrateKeypoints,
         },
         prog="python -m hrc_env",
         description="A robot, a worker, and the cameras between them.",

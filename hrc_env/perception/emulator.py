@@ -1,14 +1,16 @@
 """Keypoints without pixels: the projected truth with BlazePose's errors.
 
-What is emulated, and where its size comes from, is said at every field of `EmulatorConfig`.
-Errors are correlated in time (a detector is wrong in the same way for about half a second),
-heavy-tailed, larger where a joint is hidden, and silent about it at hips, shoulders and
-head. Now and then a camera exchanges left and right, or loses the worker.
+The errors are drawn from a calibration: numbers fitted to what the network made of rendered
+workers (`perception.calibration`, docs/emulator.md). Some are the same in every camera, as they
+are of what the network takes for a hip; others depend on the view and on how folded the body is;
+they last, are larger where a joint is hidden, and the confidence tells of that as far as the
+network's does. Now and then a camera exchanges left and right, or loses the worker.
 """
 
 import functools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -16,10 +18,28 @@ from hrc_env.errors import ConfigError, check_shape
 from hrc_env.geometry.cameras import PinholeCamera, projections
 from hrc_env.geometry.sight import Surroundings
 from hrc_env.optics.lens import lens_row
-from hrc_env.perception.emulator_kernel import CENTRE, emulate_batch
-from hrc_env.perception.noise import ERROR, VISIBILITY
+from hrc_env.perception.calibration import (
+    HAND,
+    INNER,
+    KIND,
+    VISIBILITY,
+    Calibration,
+    read_calibration,
+)
+from hrc_env.perception.emulator_kernel import (
+    CENTRE,
+    N_NORMALS,
+    Errors,
+    Rig,
+    Scalars,
+    Tables,
+    World,
+    emulate_batch,
+    sight_batch,
+)
+from hrc_env.perception.eyes import STATURE_OF_SIDE
 from hrc_env.records import Keypoints, WorkerTruth
-from hrc_env.skeleton import JOINT, JOINTS, MIRROR, N_JOINTS
+from hrc_env.skeleton import MIRROR, N_JOINTS
 from hrc_env.typing import Bools, Floats, Ints
 
 Generators = Sequence[np.random.Generator]
@@ -27,82 +47,71 @@ Generators = Sequence[np.random.Generator]
 
 @dataclass(frozen=True, slots=True)
 class EmulatorConfig:
-    """Sizes of the detector's errors; shares are of the worker's stature in the image.
+    """Which calibration the detector's errors are drawn from, and what is different."""
 
-    "Measured" refers to BlazePose `full` on rendered workers: its median error against its
-    visibility (`perception.noise`); a median of a share m means a standard deviation of
-    m / 1.177 of each coordinate.
-    """
-
-    stature_m: float = 1.75
-    """Stature that makes pixels out of shares [m]; an adult's."""
-    seen_error: float = 0.011
-    """Standard deviation of a visible joint's coordinates; measured median 1.3 % of stature."""
-    hidden_arm_error: float = 0.035
-    """The same of hidden elbows and wrists; measured median 4.1 % below visibility 0.2."""
-    hidden_leg_error: float = 0.026
-    """The same of hidden knees, ankles and feet; measured median 3.1 % at 0.2 to 0.5."""
-    hidden_trunk_error: float = 0.02
-    """The same of hidden hips, shoulders and nose: a judgement, between seen and hidden limbs,
-    as the network infers them from the rest of the body."""
-    seen_confidence: float = 0.98
-    """Visibility that the network reports of visible joints [0..1]; measured 0.97."""
-    hidden_arm_confidence: float = 0.12
-    """The same of hidden elbows and wrists; measured 0.15 and 0.09."""
-    hidden_leg_confidence: float = 0.55
-    """The same of hidden knees, ankles and feet; measured 0.5 to 0.8, weakly informative."""
-    hidden_trunk_confidence: float = 0.97
-    """The same of hidden hips, shoulders and nose: it was measured never to drop."""
-    seen_tail: float = 0.5
-    """Spread of the logarithm of the error's size; measured 90th percentile / median = 2.4."""
-    hidden_tail: float = 1.1
-    """The same of hidden joints; measured 90th percentile / median = 4.6."""
-    max_error: float = 0.25
-    """No error is larger than this: the network's window holds one body."""
-    correlation_s: float = 0.5
-    """How long the slow part of an error lasts [s]; measured about half a second."""
-    slow_share: float = 0.8
-    """Share of the error's variance that is slow; the rest is new in every image. Grey-level
-    noise alone moves landmarks by 0.3 % of stature in a steady crop."""
-    swap_share: float = 0.02
-    """Share of the time that a camera exchanges left and right; a judgement, 1 to 5 %."""
-    swap_s: float = 0.2
-    """Mean length of such a burst [s]; a judgement: about 5 images at 25 Hz."""
-    miss_share: float = 0.01
-    """Share of the time that a camera loses a visible worker; measured 1 % in the lab."""
-    miss_s: float = 0.12
-    """Mean length of such a loss [s]; a judgement."""
-    min_joints: int = 6
+    calibration: str = ""
+    """A file that `python -m hrc_env calibrate-keypoints` wrote; empty: the package's own."""
+    error_scale: float = 1.0
+    """Factor on all errors of position; 0: the projected truth. What is told of them stays."""
+    max_error: float = 0.4
+    """No camera's error is larger than this share of the window's side: it holds one body."""
+    swap_share: float | None = None
+    """Share of the time that a camera exchanges left and right, whatever the view; None: as
+    calibrated."""
+    miss_share: float | None = None
+    """Share of the time that a camera loses a worker, however much of them is seen; None: as
+    calibrated."""
+    min_joints: int = 1
     """Fewer joints (of 15) in sight of a camera, and it does not see the worker."""
     outside_confidence: float = 0.1
     """Joints outside the image are guesses, at most this visible; as in `EyesConfig`."""
 
     def __post_init__(self) -> None:
-        for name in ("seen", "hidden_arm", "hidden_leg", "hidden_trunk"):
-            confidence = getattr(self, f"{name}_confidence")
-            error = getattr(self, f"{name}_error")
-            if not 0 < confidence < 1:
-                raise ConfigError(f"{name}_confidence must be in (0, 1), got {confidence}.")
-            if not error >= 0:
-                raise ConfigError(f"{name}_error must not be negative, got {error}.")
-        for name in ("slow_share", "swap_share", "miss_share"):
-            if not 0 <= getattr(self, name) <= 1:
-                raise ConfigError(f"{name} must be in [0, 1], got {getattr(self, name)}.")
-        for name in ("correlation_s", "swap_s", "miss_s", "stature_m"):
-            if not getattr(self, name) > 0:
-                raise ConfigError(f"{name} must be positive, got {getattr(self, name)}.")
+        for name in ("error_scale", "max_error"):
+            if not getattr(self, name) >= 0:
+                raise ConfigError(f"{name} must not be negative, got {getattr(self, name)}.")
+        for name in ("swap_share", "miss_share", "outside_confidence"):
+            value = getattr(self, name)
+            if value is not None and not 0 <= value <= 1:
+                raise ConfigError(f"{name} must be in [0, 1], got {value}.")
+        self.calibrated()
+
+    def calibrated(self) -> Calibration:
+        """The calibration, with what is different.
+
+        Raises:
+            ConfigError: its file cannot be read.
+        """
+        known = read_calibration(self.calibration or None)
+        if self.swap_share is not None:
+            share = np.zeros_like(known.swap_share)
+            share[:, 0] = self.swap_share
+            known = replace(known, swap_share=share)
+        if self.miss_share is not None:
+            known = replace(known, miss_share=np.full_like(known.miss_share, self.miss_share))
+        return known
 
 
 @dataclass(frozen=True, slots=True)
 class EmulatorState:
-    """What the detector's errors remember from image to image."""
+    """What the detector's errors remember from image to image, in standard deviations."""
 
+    lasting: Floats
+    """(B, C, W, J, 2, 2) of an episode: factors of cosine and sine of the view, along x and y."""
     slow: Floats
-    """(B, C, W, J, 2) slow part of the errors, in standard deviations."""
+    """(B, C, W, J, 2) what lasts for a while, along x and y."""
     size: Floats
-    """(B, C, W, J) slow logarithm of the errors' size, in standard deviations."""
+    """(B, C, W, J) logarithm of the errors' size: a joint's own part."""
+    sure: Floats
+    """(B, C, W, J) the confidence, as far as it does not follow the size."""
+    body: Floats
+    """(B, C, W) logarithm of the errors' size: the whole body's part."""
+    wander: Floats
+    """(B, W, J, 3) what is the same in every camera: ahead, to the joint's own side, up."""
     swapped: Bools
     """(B, C, W) whether left and right are exchanged now."""
+    crossed: Bools
+    """(B, C, W) whether those of the legs are."""
     missed: Bools
     """(B, C, W) whether the worker is lost now."""
     dt_s: float
@@ -117,9 +126,14 @@ def make_state(
         raise ConfigError(f"The time between images must be positive, got {dt_s} s.")
     lead = (batch, n_cameras, n_workers)
     return EmulatorState(
+        lasting=np.zeros((*lead, N_JOINTS, 2, 2)),
         slow=np.zeros((*lead, N_JOINTS, 2)),
         size=np.zeros((*lead, N_JOINTS)),
+        sure=np.zeros((*lead, N_JOINTS)),
+        body=np.zeros(lead),
+        wander=np.zeros((batch, n_workers, N_JOINTS, 3)),
         swapped=np.zeros(lead, bool),
+        crossed=np.zeros(lead, bool),
         missed=np.zeros(lead, bool),
         dt_s=dt_s,
     )
@@ -127,11 +141,16 @@ def make_state(
 
 def reset(state: EmulatorState, ids: Ints, rngs: Generators, config: EmulatorConfig) -> None:
     """Begin environments `ids` anew with errors drawn from how they are in the long run."""
+    known = config.calibrated()
+    swap, cross = known.swap_share.mean(0)
+    shares = {"swapped": swap, "crossed": cross, "missed": known.miss_share[0, -1]}
     for b in ids:
-        state.slow[b] = rngs[b].standard_normal(state.slow.shape[1:])
-        state.size[b] = rngs[b].standard_normal(state.size.shape[1:])
-        state.swapped[b] = rngs[b].random(state.swapped.shape[1:]) < config.swap_share
-        state.missed[b] = rngs[b].random(state.missed.shape[1:]) < config.miss_share
+        for name in ("lasting", "slow", "size", "sure", "body", "wander"):
+            array = getattr(state, name)
+            array[b] = rngs[b].standard_normal(array.shape[1:])
+        for name, share in shares.items():
+            array = getattr(state, name)
+            array[b] = rngs[b].random(array.shape[1:]) < share
 
 
 def emulate(
@@ -160,22 +179,48 @@ def emulate(
     shape = (batch, n_cameras, n_workers, N_JOINTS)
     robot = surroundings.capsules_world
     check_shape("surroundings.capsules_world", (len(robot),), (batch,), "environments")
-    normals, uniforms = np.empty((*shape, 5)), np.empty((*shape[:3], 2))
+    n_images = n_cameras * n_workers
+    normals = np.empty((batch, 3 * N_JOINTS * n_workers + (N_NORMALS * N_JOINTS + 1) * n_images))
+    uniforms = np.empty((*shape[:3], 3))
     for rng, normal, uniform in zip(rngs, normals, uniforms, strict=True):
         rng.standard_normal(out=normal)
         rng.random(out=uniform)
-    P, eyes_world, image, bending = _rig(cameras)
-    scalars, per_joint = _settings(config, state.dt_s)
+    tables, scalars = _settings(config, state.dt_s)
+    errors = Errors(
+        state.lasting, state.slow, state.size, state.sure, state.body, state.wander,
+        state.swapped, state.crossed, state.missed,
+    )  # fmt: skip
     out = Keypoints(np.empty((*shape, 2)), np.empty(shape), np.empty(shape))
     emulate_batch(
-        state.slow, state.size, state.swapped, state.missed, normals, uniforms,
-        np.ascontiguousarray(truth.joints_world), np.ascontiguousarray(truth.capsules_world),
-        np.ascontiguousarray(truth.capsule_radius_m), surroundings.still, surroundings.moving,
-        robot, surroundings.capsule_radius_m,
-        P, eyes_world, image, bending, scalars, per_joint, MIRROR, VISIBILITY, ERROR,
+        errors, normals, uniforms, _world(truth, surroundings), _rig(cameras), tables, scalars,
         out.px, out.confidence, out.sigma_px,
     )  # fmt: skip
     return out
+
+
+def lines_of_sight(
+    truth: WorkerTruth, surroundings: Surroundings, cameras: tuple[PinholeCamera, ...]
+) -> tuple[Ints, Floats]:
+    """How each camera sees each joint and each worker, as the emulator has it.
+
+    Returns:
+        (B, C, W, J) `emulator_kernel.SEEN`, `HIDDEN`, `OUTSIDE` or `BEHIND`; (B, C, W, 4) side
+        [px] and turn [rad] of the window, view [rad] and folding.
+    """
+    batch, n_workers, n_joints = truth.joints_world.shape[:3]
+    sight = np.empty((batch, len(cameras), n_workers, n_joints), np.int64)
+    look_of = np.empty((batch, len(cameras), n_workers, 4))
+    sight_batch(_world(truth, surroundings), _rig(cameras), sight, look_of)
+    return sight, look_of
+
+
+def _world(truth: WorkerTruth, surroundings: Surroundings) -> World:
+    return World(
+        np.ascontiguousarray(truth.joints_world), np.ascontiguousarray(truth.velocity_world),
+        np.ascontiguousarray(truth.capsules_world),
+        np.ascontiguousarray(truth.capsule_radius_m), surroundings.still, surroundings.moving,
+        surroundings.capsules_world, surroundings.capsule_radius_m,
+    )  # fmt: skip
 
 
 def without_names(keypoints: Keypoints, rngs: Generators) -> Keypoints:
@@ -195,12 +240,13 @@ def without_names(keypoints: Keypoints, rngs: Generators) -> Keypoints:
 
 
 @functools.lru_cache(maxsize=16)
-def _rig(cameras: tuple[PinholeCamera, ...]) -> tuple[Floats, Floats, Floats, Floats]:
-    """Projections (C, 3, 4), eyes (C, 3), width, height, focal length (C, 3), lenses (C, 12)."""
+def _rig(cameras: tuple[PinholeCamera, ...]) -> Rig:
     image = [(camera.width_px, camera.height_px, camera.K[0, 0]) for camera in cameras]
     eyes_world = np.stack([camera.eye_world for camera in cameras])
     bending = np.stack([_bending(camera) for camera in cameras])
-    return projections(cameras), np.ascontiguousarray(eyes_world), np.array(image, float), bending
+    return Rig(
+        projections(cameras), np.ascontiguousarray(eyes_world), np.array(image, float), bending
+    )
 
 
 def _bending(camera: PinholeCamera) -> Floats:
@@ -212,43 +258,26 @@ def _bending(camera: PinholeCamera) -> Floats:
 
 
 @functools.lru_cache(maxsize=16)
-def _settings(config: EmulatorConfig, dt_s: float) -> tuple[Floats, Floats]:
-    """Numbers for the kernel: scalars in its order, and (2 seen/hidden, 3, J) per joint."""
-    keep = np.exp(-dt_s / config.correlation_s)
-    scalars = [
-        config.stature_m,
-        keep,
-        np.sqrt(1 - keep**2),
-        np.sqrt(config.slow_share),
-        np.sqrt(1 - config.slow_share),
-        config.max_error,
-        *_burst(config.swap_share, config.swap_s, dt_s),
-        *_burst(config.miss_share, config.miss_s, dt_s),
-        config.min_joints,
-        config.outside_confidence,
-    ]
-    per_joint = np.empty((2, 3, N_JOINTS))
-    per_joint[0] = [[config.seen_error], [_logit(config.seen_confidence)], [config.seen_tail]]
-    for name in JOINTS:
-        group = _GROUP.get(name.rsplit("_", 1)[-1], "trunk")
-        per_joint[1, :, JOINT[name]] = (
-            getattr(config, f"hidden_{group}_error"),
-            _logit(getattr(config, f"hidden_{group}_confidence")),
-            config.hidden_tail if group != "trunk" else config.seen_tail,
-        )
-    return np.array(scalars, float), per_joint
-
-
-_GROUP = {"elbow": "arm", "wrist": "arm", "knee": "leg", "ankle": "leg", "foot": "leg"}
-
-
-def _burst(share: float, length_s: float, dt_s: float) -> tuple[float, float]:
-    """Chances per image that a burst begins and that it ends, for a share of the time."""
-    if share >= 1:
-        return 1.0, 0.0
-    end = min(dt_s / length_s, 1.0)
-    return min(end * share / (1 - share), 1.0), end
-
-
-def _logit(p: float) -> float:
-    return float(np.log(p / (1 - p)))
+def _settings(config: EmulatorConfig, dt_s: float) -> tuple[Tables, Scalars]:
+    """A calibration as the kernel takes it."""
+    known = config.calibrated()
+    confidence = np.clip(known.confidence, 1e-6, 1 - 1e-6)
+    numbers = (
+        known.offset_m, known.wander_m, known.bias, np.log(known.size), known.spread,
+        np.sqrt(known.shares), known.limb, np.log(confidence / (1 - confidence)), known.follows,
+        known.swap_share, known.miss_share, known.sigma, VISIBILITY, KIND, HAND, INNER, MIRROR,
+    )  # fmt: skip
+    copies: list[Any] = [np.array(each) for each in numbers]
+    tables = Tables(*copies)  # writable: one type for the kernel
+    keep_size = float(np.exp(-dt_s / known.size_s))
+    swap_end, cross_end, miss_end = (
+        min(dt_s / float(lasts_s), 1.0) for lasts_s in (*known.swap_s, known.miss_s)
+    )
+    scalars = Scalars(
+        float(dt_s / known.slow_s), float(dt_s / known.slow_m), keep_size,
+        float(np.sqrt(1 - keep_size**2)), float(np.sqrt(known.common)),
+        float(np.sqrt(1 - known.common)), config.error_scale, config.max_error,
+        swap_end, cross_end, miss_end, config.min_joints,
+        config.outside_confidence, STATURE_OF_SIDE,
+    )  # fmt: skip
+    return tables, scalars

@@ -1,4 +1,4 @@
-"""How far a joint may be off, from how visible the network says it is.
+"""How far a joint may be off, from which it is and how visible the network says it is.
 
 One mapping for the real pipeline and for its emulator, so that an estimator tuned on one
 meets the same numbers in the other.
@@ -8,37 +8,38 @@ import numba
 import numpy as np
 
 from hrc_env.compiled import LEAN
+from hrc_env.errors import check_shape
+from hrc_env.perception.calibration import KIND, VISIBILITY, read_calibration
 from hrc_env.typing import Floats
 
-VISIBILITY: Floats = np.array([0.10, 0.35, 0.65, 0.875, 0.975])
-"""Middles of the bins of visibility in which errors were measured."""
+ERROR: Floats = read_calibration().sigma
+"""(K, V) standard deviation of each image coordinate, as a share of stature, for kinds of joints
+(`calibration.KINDS`) at `VISIBILITY`; how it is fitted is said in docs/emulator.md."""
 
-ERROR: Floats = np.array([0.089, 0.058, 0.031, 0.016, 0.0144])
-"""Standard deviation of each image coordinate in those bins, as a share of stature.
-
-From errors of BlazePose `full` on rendered workers: medians 4.1, 3.1, 2.1, 1.3, 1.3 % of
-stature; 90th percentiles 19 % in the first bin and 3.1 % in the last. The tails are heavier
-than a Rayleigh distribution's, so the 90th percentile (divided by 2.146) was taken; between
-the measured ones its ratio to the median was interpolated."""
+_SLOPE: Floats = np.diff(ERROR, axis=1) / np.diff(VISIBILITY)
 
 
 def sigma_px(confidence: Floats, stature_px: Floats | float) -> Floats:
     """Standard deviation of each coordinate of a detected joint [px].
 
     Args:
-        confidence: (...,) visibility in [0, 1]; 0 means that there is no measurement.
+        confidence: (..., J) visibility in [0, 1]; 0 means that there is no measurement.
         stature_px: how long the worker's stature is at their distance [px]; broadcasts.
 
     Returns:
-        (...,) finite and positive, infinite where the confidence is 0.
+        (..., J) finite and positive, infinite where the confidence is 0.
     """
-    share = np.interp(confidence, VISIBILITY, ERROR)
+    confidence = np.asarray(confidence, float)
+    check_shape("confidence", confidence.shape[-1:], (len(KIND),), "one a joint")
+    within = np.clip(confidence, VISIBILITY[0], VISIBILITY[-1])
+    low = np.clip(np.searchsorted(VISIBILITY, within) - 1, 0, len(VISIBILITY) - 2)
+    share = ERROR[KIND, low] + (within - VISIBILITY[low]) * _SLOPE[KIND, low]
     return np.where(confidence > 0, share * stature_px, np.inf)
 
 
 @numba.njit(**LEAN)
 def error_share(confidence: float, visibility: Floats, error: Floats) -> float:
-    """`sigma_px` of a stature of one, for kernels: the tables are passed in."""
+    """`sigma_px` of one joint and a stature of one, for kernels: the tables are passed in."""
     if not confidence > 0.0:
         return np.inf
     if confidence <= visibility[0]:

@@ -1,0 +1,94 @@
+"""The whole of `python -m hrc_env calibrate-keypoints`: render, fit, write, compare."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from hrc_env.config import HRCConfig
+from hrc_env.errors import ConfigError
+from hrc_env.experiments.calibration.clips import Clip, family_of, fit_clips
+from hrc_env.experiments.calibration.fit import fit, scaled
+from hrc_env.experiments.calibration.plot import plot_comparison
+from hrc_env.experiments.calibration.samples import samples_of
+from hrc_env.experiments.calibration.shelf import kept
+from hrc_env.experiments.calibration.validate import Compared, compared, outcome
+from hrc_env.experiments.calibration.watch import Watched, watch
+from hrc_env.perception.calibration import Calibration, write_calibration
+from hrc_env.perception.emulator import EmulatorConfig
+from hrc_env.provenance import provenance
+
+Say = Callable[[float, str], None]
+"""Told by how much the share that is done grew, and what is being done."""
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationRun:
+    """How much is rendered."""
+
+    rounds: int = 2
+    """How often each motion is played in each scene; 0: once, in one of the scenes."""
+    seed: int = 0
+    """Of the clips."""
+
+    def __post_init__(self) -> None:
+        if self.rounds < 0 or self.seed < 0:
+            raise ConfigError(f"rounds and seed must be 0 or more, got {self.rounds}, {self.seed}.")
+
+
+def calibrate(run: CalibrationRun, out: Path, say: Say) -> Calibration:
+    """Render, fit, write the file; rendered clips stay in a folder beside it.
+
+    Args:
+        run: how much.
+        out: the calibration file.
+        say: hears of the progress: shares that sum to 1.
+    """
+    clips, pixels = fit_clips(run.rounds, run.seed), []
+    for clip, seen in zip(clips, kept("pixels", clips, HRCConfig(), folder_of(out)), strict=True):
+        pixels.append(seen)
+        say(0.85 / len(clips), f"{clip.scene}: {clip.motion}")
+    draft = fit(samples_of(pixels))
+    made = _made(run, out, len(clips))
+    write_calibration(out.with_suffix(".fit"), draft, made)
+    calibration = _matched(draft, clips, pixels, out.with_suffix(".fit"), say)
+    write_calibration(out, calibration, made)
+    out.with_suffix(".fit").unlink()
+    return calibration
+
+
+def _matched(
+    draft: Calibration, clips: list[Clip], pixels: list[Watched], path: Path, say: Say
+) -> Calibration:
+    """The draft with errors scaled so that the tracker's median error is that of the pixels, one
+    factor for upright motions and one for those that fold the body."""
+    config = replace(HRCConfig(), emulator=EmulatorConfig(calibration=str(path)))
+    emulated = []
+    for watched in watch("keypoints", clips, config):
+        emulated.append(watched)
+        say(0.15 / len(clips), "emulator")
+    is_folded = [family_of(clip.motion) == "fold" for clip in clips]
+    factors = []
+    for wanted in (False, True):
+        mine = [k for k, folded in enumerate(is_folded) if folded == wanted]
+        one, other = (outcome([level[k] for k in mine]) for level in (pixels, emulated))
+        factors.append(one.median_m / other.median_m)
+    return scaled(draft, *factors)
+
+
+def compare(run: CalibrationRun, out: Path, say: Say) -> Compared:
+    """Pixels beside the emulator with this file, on clips that the fit has not seen; a plot."""
+    config = replace(HRCConfig(), emulator=EmulatorConfig(calibration=str(out)))
+    seen = compared(run.rounds, run.seed, say, config, folder_of(out))
+    plot_comparison(out.with_suffix(".png"), seen)
+    return seen
+
+
+def folder_of(out: Path) -> Path:
+    """Where the rendered clips are kept."""
+    return out.with_name(f"{out.stem}_clips")
+
+
+def _made(run: CalibrationRun, out: Path, n_clips: int) -> dict[str, object]:
+    words = f"python -m hrc_env calibrate-keypoints --rounds {run.rounds} --seed {run.seed}"
+    command = f"{words} --out {out.name}"
+    return {"command": command, "seed": run.seed, "git": provenance()["git"], "clips": n_clips}

@@ -1,0 +1,37 @@
+"""Clips that were rendered stay on disk, so that whoever is stopped goes on where he was."""
+
+import hashlib
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+from hrc_env.config import HRCConfig
+from hrc_env.experiments.calibration.clips import Clip
+from hrc_env.experiments.calibration.watch import Watched, load, save, watch
+from hrc_env.experiments.study.shelf import fingerprint_of
+
+
+def kept(
+    level: str, clips: Sequence[Clip], config: HRCConfig, folder: Path | None
+) -> Iterator[Watched]:
+    """What a level saw of clips, from the folder where it is there, else played and put there.
+
+    What other code or settings saw does not count.
+    """
+    if folder is None:
+        yield from watch(level, clips, config)
+        return
+    code = fingerprint_of({"level": level, "eyes": asdict(config.eyes)}, "calibration")
+    paths = [folder / f"{_name(clip, code)}.npz" for clip in clips]
+    todo = [clip for clip, path in zip(clips, paths, strict=True) if not path.exists()]
+    fresh = watch(level, todo, config)
+    for path in paths:
+        if not path.exists():
+            save(path, next(fresh))
+        yield load(path)
+
+
+def _name(clip: Clip, code: str) -> str:
+    text = json.dumps([asdict(clip), code], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:20]

@@ -1,0 +1,202 @@
+"""What is known of the detector's errors: numbers fitted to renders, in a small JSON file.
+
+`python -m hrc_env calibrate-keypoints` writes it, docs/emulator.md says what the model is. The
+file that comes with the package is `keypoints.json`; `EmulatorConfig.calibration` names another.
+"""
+
+import dataclasses
+import functools
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hrc_env.errors import ConfigError
+from hrc_env.skeleton import JOINTS, MIRROR
+from hrc_env.typing import Floats, Ints
+
+FORMAT, VERSION = "hrc_env keypoints", 1
+"""Version: what the tables mean. A file of another one is refused."""
+PACKAGED = Path(__file__).with_name("keypoints.json")
+
+KINDS = ("nose", "shoulder", "elbow", "wrist", "hip", "knee", "ankle", "foot")
+"""Kinds of joints: left and right err alike, mirrored."""
+POSTURES = ("upright", "folded")
+SIGHTS = ("seen", "hidden", "outside")
+"""How a joint is seen: nothing before it, something before it, outside the image."""
+N_VIEWS = 8
+"""Directions from which a body is seen: front, front left, left and so on."""
+KNOTS = (-2.0, -1.0, 0.0, 1.0, 2.0)
+"""Quantiles that a confidence's distribution is given by, in standard deviations."""
+N_SEEN = len(JOINTS) + 1
+"""From none to all."""
+VISIBILITY: Floats = np.array([0.10, 0.35, 0.65, 0.875, 0.975])
+"""Where the standard deviation is given as a function of the reported visibility."""
+
+KIND: Ints = np.array([KINDS.index(name.rsplit("_", 1)[-1]) for name in JOINTS])
+"""(J,) kind of every joint."""
+HAND: Floats = np.where(np.arange(len(JOINTS)) > MIRROR, -1.0, 1.0)
+"""(J,) -1 for right joints, else 1."""
+INNER: Ints = np.array([0, 1, 2, 1, 2, 3, 4, 7, 8, 7, 8, 9, 10, 11, 12])
+"""(J,) the next joint towards the trunk; itself for those of the trunk."""
+
+_P, _K, _S, _Z = len(POSTURES), len(KINDS), len(SIGHTS), len(KNOTS)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Calibration:
+    """The model's numbers. Lengths "of side" are shares of the side of the window round the
+    worker; x is to the right in that window, y down; of right joints x is mirrored."""
+
+    offset_m: Floats
+    """(P, K, 3) where the detector means a joint to be, from where it is: ahead, to the joint's
+    own side, up [m]; the same in every camera."""
+    wander_m: Floats
+    """(P, K, 3) how far that varies, a standard deviation [m]."""
+    bias: Floats
+    """(A, K, 2) mean error in a camera by the view, of side."""
+    size: Floats
+    """(P, S, K) median over time of the standard deviation of each coordinate, of side."""
+    spread: Floats
+    """(P, S, K) standard deviation of its logarithm."""
+    size_s: Floats
+    """() for how long it lasts [s]."""
+    common: Floats
+    """() share of its variance that all of a body's joints have in common in an image."""
+    shares: Floats
+    """(K, 3) shares of a camera's variance: a function of the view that stays for an episode;
+    what lasts for `slow_s`; what is new in every image. They add up to 1."""
+    slow_s: Floats
+    """() for how long, while the worker stands still [s]."""
+    slow_m: Floats
+    """() how far the joints travel until they are other errors [m]; what varies in space lasts as
+    long."""
+    limb: Floats
+    """(K,) correlation with the error of the next joint towards the trunk."""
+    confidence: Floats
+    """(P, S, K, Z) quantiles of the reported visibility, least first, at `KNOTS`."""
+    follows: Floats
+    """(S, K) correlation of visibility and smallness of the error."""
+    swap_share: Floats
+    """(A, 2) share of the time that a camera exchanges left and right by the view: of all joints,
+    of knees, ankles and feet alone."""
+    swap_s: Floats
+    """(2,) mean length of such a burst [s]."""
+    miss_share: Floats
+    """(P, 16) share of the time that a camera does not find a worker by how many joints of it
+    are seen, 0 to 15."""
+    miss_s: Floats
+    """() mean length of that [s]."""
+    sigma: Floats
+    """(K, V) what is told of the standard deviation, a share of the stature, at `VISIBILITY`."""
+
+
+SHAPES: dict[str, tuple[int, ...]] = {
+    "offset_m": (_P, _K, 3), "wander_m": (_P, _K, 3), "bias": (N_VIEWS, _K, 2),
+    "size": (_P, _S, _K), "spread": (_P, _S, _K), "size_s": (), "common": (), "shares": (_K, 3),
+    "slow_s": (), "slow_m": (), "limb": (_K,), "confidence": (_P, _S, _K, _Z), "follows": (_S, _K),
+    "swap_share": (N_VIEWS, 2), "swap_s": (2,), "miss_share": (_P, N_SEEN), "miss_s": (),
+    "sigma": (_K, len(VISIBILITY)),
+}  # fmt: skip
+_POSITIVE = ("size", "size_s", "slow_s", "slow_m", "swap_s", "miss_s", "sigma")
+_SHARES = ("common", "shares", "confidence", "swap_share", "miss_share")
+_CORRELATIONS = ("limb", "follows")
+_RENEW = "make a new one with: python -m hrc_env calibrate-keypoints --out FILE"
+
+
+def read_calibration(path: Path | str | None = None) -> Calibration:
+    """The calibration of a file; None: the one that comes with the package.
+
+    Raises:
+        ConfigError: no such file, none of a calibration, of another version, or broken.
+    """
+    path = PACKAGED if path is None else Path(path)
+    try:
+        changed = path.stat().st_mtime_ns
+    except OSError as error:
+        raise ConfigError(
+            f"The calibration file {path} cannot be read ({error.strerror}): name one that "
+            f"exists, leave emulator.calibration empty for the package's own, or {_RENEW}."
+        ) from error
+    return _read(path, changed)
+
+
+@functools.lru_cache(maxsize=8)
+def _read(path: Path, changed: int) -> Calibration:
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise ConfigError(f"{path} is no calibration of keypoints ({error}): {_RENEW}.") from error
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise ConfigError(f'{path} is no calibration of keypoints ("format" {FORMAT!r}): {_RENEW}.')
+    if content.get("version") != VERSION:
+        raise ConfigError(
+            f"{path} is a calibration of version {content.get('version')!r}; this hrc_env reads "
+            f"version {VERSION}: {_RENEW}."
+        )
+    return calibration_from(content.get("tables"), str(path))
+
+
+def calibration_from(tables: Any, where: str) -> Calibration:
+    """A calibration from tables by name.
+
+    Raises:
+        ConfigError: a table that is missing, unknown, of another shape or with impossible numbers.
+    """
+    if not isinstance(tables, dict) or set(tables) != set(SHAPES):
+        given = set(tables) if isinstance(tables, dict) else set()
+        raise ConfigError(
+            f"{where} must have the tables {', '.join(SHAPES)}; missing: "
+            f"{', '.join(sorted(set(SHAPES) - given)) or 'none'}; unknown: "
+            f"{', '.join(sorted(given - set(SHAPES))) or 'none'}. Or {_RENEW}."
+        )
+    return Calibration(**{name: _table(name, value, where) for name, value in tables.items()})
+
+
+def _table(name: str, value: Any, where: str) -> Floats:
+    try:
+        array = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        array = np.full(1, np.nan)
+    good = array.shape == SHAPES[name] and bool(np.isfinite(array).all())
+    expected = f"finite numbers of shape {SHAPES[name]}"
+    for names, low, high in (
+        (_POSITIVE, 1e-9, np.inf), (_SHARES, 0.0, 1.0), (_CORRELATIONS, -1.0, 1.0),
+    ):  # fmt: skip
+        if good and name in names and not (low <= array.min() and array.max() <= high):
+            good, expected = False, f"numbers from {low:g} to {high:g}"
+    if not good:
+        raise ConfigError(f"{where}: table {name!r} must hold {expected}. Mend it, or {_RENEW}.")
+    array.setflags(write=False)
+    return array
+
+
+def write_calibration(path: Path | str, calibration: Calibration, made: dict[str, Any]) -> None:
+    """Write a calibration, whole or not at all.
+
+    Args:
+        path: of the file.
+        calibration: the numbers, which are rounded to four digits.
+        made: command, seed, commit and whatever else one wants to know of its making.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    tables = {
+        each.name: _rounded(getattr(calibration, each.name).tolist())
+        for each in dataclasses.fields(calibration)
+    }
+    lines = [f" {json.dumps(name)}: {json.dumps(table)}" for name, table in tables.items()]
+    head = {"format": FORMAT, "version": VERSION, "made": made}
+    text = json.dumps(head)[:-1] + ',\n"tables": {\n' + ",\n".join(lines) + "\n}}\n"
+    draft = path.with_suffix(".draft")
+    draft.write_text(text, encoding="utf-8")
+    os.replace(draft, path)
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_rounded(each) for each in value]
+    return float(f"{value:.4g}")

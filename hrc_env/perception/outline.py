@@ -1,0 +1,88 @@
+"""How a worker looks to a camera, in the few numbers on which a detector's errors depend."""
+
+import math
+
+import numba
+
+from hrc_env.compiled import LEAN
+from hrc_env.perception.blazepose import ROI_MARGIN
+from hrc_env.perception.windows import CROWN, HAND, MIN_REACH_M, MIN_TORSO_M
+
+UPRIGHT, FOLDED = 0.15, 0.50
+"""How much lower the shoulders are above the ankles than they can be, as a share, where a body
+begins to count as folded, and from where on it counts as folded up. Judgement: who walks is below
+.12, who bends, kneels or squats above .3."""
+
+# Joints: nose 0; left and right shoulder 1 2, elbow 3 4, wrist 5 6, hip 7 8, knee 9 10,
+# ankle 11 12.
+
+
+@numba.njit(**LEAN)
+def facing(joints):
+    """(x, y) horizontal unit vector to where a body's (J, 3) front is; +x where there is none."""
+    left_x = joints[1, 0] - joints[2, 0] + joints[7, 0] - joints[8, 0]
+    left_y = joints[1, 1] - joints[2, 1] + joints[7, 1] - joints[8, 1]
+    length = math.sqrt(left_x * left_x + left_y * left_y)
+    if length < 1e-9:
+        return 1.0, 0.0
+    return left_y / length, -left_x / length
+
+
+@numba.njit(**LEAN)
+def folded(joints):
+    """How folded a body (J, 3) is: 0 upright, 1 folded up."""
+    length, height = 0.0, 0.0
+    for side in range(2):
+        shoulder, hip, knee, ankle = 1 + side, 7 + side, 9 + side, 11 + side
+        length += _apart(joints, shoulder, hip)
+        length += _apart(joints, hip, knee) + _apart(joints, knee, ankle)
+        height += joints[shoulder, 2] - joints[ankle, 2]
+    share = 1.0 - height / max(length, 1e-9)
+    return min(max((share - UPRIGHT) / (FOLDED - UPRIGHT), 0.0), 1.0)
+
+
+@numba.njit(**LEAN)
+def _apart(joints, i, k):
+    x, y = joints[i, 0] - joints[k, 0], joints[i, 1] - joints[k, 1]
+    z = joints[i, 2] - joints[k, 2]
+    return math.sqrt(x * x + y * y + z * z)
+
+
+@numba.njit(**LEAN)
+def seen_from(joints, front_x, front_y, eye):
+    """From where an eye sees a body: 0 its front, pi / 2 its left [rad]."""
+    x = eye[0] - 0.25 * (joints[1, 0] + joints[2, 0] + joints[7, 0] + joints[8, 0])
+    y = eye[1] - 0.25 * (joints[1, 1] + joints[2, 1] + joints[7, 1] + joints[8, 1])
+    return math.atan2(front_x * y - front_y * x, front_x * x + front_y * y)
+
+
+@numba.njit(**LEAN)
+def window_round(uv, depth, px_per_m, nearest_m):
+    """Side [px] and turn [rad] of the window round joints (J, 2), as `window_from_joints` has it.
+
+    `px_per_m` is at the worker's distance; joints nearer than `nearest_m` do not count.
+    """
+    hip_x, hip_y = 0.5 * (uv[7, 0] + uv[8, 0]), 0.5 * (uv[7, 1] + uv[8, 1])
+    neck_x, neck_y = 0.5 * (uv[1, 0] + uv[2, 0]), 0.5 * (uv[1, 1] + uv[2, 1])
+    x, y = neck_x - hip_x, neck_y - hip_y
+    y -= max(0.0, MIN_TORSO_M * px_per_m - math.sqrt(x * x + y * y))
+    reach = MIN_REACH_M * px_per_m
+    reach *= reach
+    for j in range(len(depth)):
+        if depth[j] > nearest_m:
+            reach = max(reach, _squared(uv[j, 0] - hip_x, uv[j, 1] - hip_y))
+    for j in range(5, 7):
+        hand_x = uv[j, 0] + HAND * (uv[j, 0] - uv[j - 2, 0]) - hip_x
+        hand_y = uv[j, 1] + HAND * (uv[j, 1] - uv[j - 2, 1]) - hip_y
+        if depth[j] > nearest_m and depth[j - 2] > nearest_m:
+            reach = max(reach, _squared(hand_x, hand_y))
+    if depth[0] > nearest_m:
+        crown_x = uv[0, 0] + CROWN * (uv[0, 0] - neck_x) - hip_x
+        crown_y = uv[0, 1] + CROWN * (uv[0, 1] - neck_y) - hip_y
+        reach = max(reach, _squared(crown_x, crown_y))
+    return 2.0 * ROI_MARGIN * math.sqrt(reach), math.atan2(x, -y)
+
+
+@numba.njit(**LEAN)
+def _squared(x, y):
+    return x * x + y * y

@@ -1,0 +1,96 @@
+"""The fit finds the numbers that errors were made with."""
+
+import numpy as np
+import pytest
+
+from hrc_env.experiments.calibration.clips import FAMILIES, fit_clips, unseen_clips
+from hrc_env.experiments.calibration.fit import fit
+from hrc_env.experiments.calibration.samples import Samples
+from hrc_env.motion.repertoire import REPERTOIRE
+from hrc_env.perception.calibration import INNER, KIND, KINDS, N_VIEWS
+
+L, T, C, J = 24, 50, 4, 15
+HIP, ELBOW = KINDS.index("hip"), KINDS.index("elbow")
+
+
+def made(error, **changes):
+    """Samples of upright workers, seen from anywhere, with errors (L, T, C, J, 2)."""
+    rng = np.random.default_rng(5)
+    view = np.broadcast_to(rng.uniform(-np.pi, np.pi, (L, 1, C)), (L, T, C))
+    nowhere = np.full((L, T, J, 3), np.nan)
+    parts = {
+        "error": error, "confidence": rng.uniform(0.9, 0.99, (L, T, C, J)),
+        "sight": np.zeros((L, T, C, J), int), "view": view, "fold": np.zeros((L, T)),
+        "speed_m_s": np.full((L, T), 0.1), "missed": np.zeros((L, T, C), bool),
+        "exchanged": np.zeros((L, T, C, 2), bool), "shown": np.zeros((L, T, C, J, 2, 3)),
+        "offset_m": nowhere, "noise": nowhere, "counts": np.ones((L, T), bool),
+    }  # fmt: skip
+    return Samples(**(parts | changes))
+
+
+def white(size=0.01, seed=1):
+    return size * np.random.default_rng(seed).standard_normal((L, T, C, J, 2))
+
+
+def test_sizes_are_found():
+    known = fit(made(white(0.012)))
+    np.testing.assert_allclose(known.size[0, 0], 0.012, rtol=0.08)
+    assert known.spread[0, 0].max() < 0.15
+
+
+def test_heavy_tails_are_found():
+    rng = np.random.default_rng(2)
+    error = white() * np.exp(0.6 * rng.standard_normal((L, T, C, J, 1)))
+    np.testing.assert_allclose(fit(made(error)).spread[0, 0], 0.6, atol=0.1)
+
+
+def test_new_errors_are_known_from_lasting_ones():
+    assert fit(made(white())).shares[:, 2].min() > 0.9
+    staying = np.broadcast_to(white()[:, :1], (L, T, C, J, 2))
+    assert fit(made(staying)).shares[:, 2].max() < 0.1
+
+
+def test_biases_by_view_are_found():
+    samples = made(white(0.005))
+    front = np.cos(samples.view) > np.cos(np.pi / N_VIEWS)
+    samples.error[front] += np.where((KIND == HIP)[:, None], [0.0, 0.02], 0.0)
+    bias = fit(samples).bias
+    assert bias[0, HIP, 1] == pytest.approx(0.02, rel=0.3)
+    assert abs(bias[N_VIEWS // 2, HIP, 1]) < 0.003
+
+
+def test_offsets_in_space_are_found():
+    rng = np.random.default_rng(3)
+    offset = 0.01 * rng.standard_normal((L, T, J, 3)) + np.array([0.0, 0.0, 0.03])
+    known = fit(made(white(), offset_m=offset, noise=np.full((L, T, J, 3), 0.006**2)))
+    np.testing.assert_allclose(known.offset_m[0], [[0.0, 0.0, 0.03]] * len(KINDS), atol=0.002)
+    np.testing.assert_allclose(known.wander_m[0], 0.008, atol=0.001)
+
+
+def test_errors_along_a_limb_are_alike():
+    error = white()
+    for j in np.flatnonzero(KIND == ELBOW):
+        error[..., j, :] = 0.5 * error[..., INNER[j], :] + np.sqrt(0.75) * error[..., j, :]
+    assert fit(made(error)).limb[ELBOW] == pytest.approx(0.5, abs=0.05)
+
+
+def test_exchanged_sides_and_misses_are_counted():
+    exchanged = np.zeros((L, T, C, 2), bool)
+    exchanged[:, :5, :, 0] = True
+    missed = np.zeros((L, T, C), bool)
+    missed[:, 10:20] = True
+    known = fit(made(white(), exchanged=exchanged, missed=missed))
+    np.testing.assert_allclose(known.swap_share[:, 0], 0.125, atol=0.01)
+    assert known.swap_s[0] == pytest.approx(0.2)
+    assert known.miss_share[0, 15] == pytest.approx(0.2, abs=0.02)
+    assert known.miss_s == pytest.approx(0.4)
+
+
+def test_every_motion_has_a_family_and_unseen_clips_are_others():
+    assert sorted(sum(FAMILIES.values(), ())) == sorted(REPERTOIRE)
+    ours, others = fit_clips(2, 0), unseen_clips(2, 0)
+    assert len(ours) == len(others) == 4 * len(REPERTOIRE)
+    assert len(fit_clips(0, 0)) == len(REPERTOIRE)
+    played = {(clip.scene, clip.motion, clip.body) for clip in ours}
+    assert sum((c.scene, c.motion, c.body) in played for c in others) < len(others) / 2
+    assert not {clip.seed for clip in ours} & {clip.seed for clip in others}
