@@ -31,6 +31,7 @@ check: $(READY)
 
 bench: $(READY)
 	$(RUN) -m hrc_env bench speed
+	$(RUN) -m hrc_env bench perception
 	$(RUN) benchmarks/pixels.py
 	$(RUN) benchmarks/soak.py
 	$(RUN) -m benchmarks.sim_dt
