@@ -14,10 +14,12 @@ from hrc_env.experiments.perception.measured import EMULATED, NO_FAULT, PIXELS, 
 from hrc_env.experiments.perception.report import markdown
 from hrc_env.experiments.perception.views import View, rows_of
 from hrc_env.motion.generator import activity_names
+from hrc_env.results import Metric
 
 TINY = bench.PerceptionBenchConfig(
     episodes=(("lab", 1),), n_steps=4, n_faults=1, fault_steps=3, n_emulated=1, kinds=("lost",),
-    bodies=("worker_1",), n_instants=1, n_empty=1, cameras=(1,), workers=(1,), speed_steps=2,
+    bodies=("worker_1",), n_instants=1, n_empty=1, emulator_rounds=None, cameras=(1,),
+    workers=(1,), speed_steps=2,
 )  # fmt: skip
 
 
@@ -42,7 +44,12 @@ def found():
     faults |= {(level, "lost"): twice for level in (PIXELS, EMULATED)} | {(PIXELS, "glare"): twice}
     speed = {"steps_per_s": 50.0, "n": 9, "stages": dict.fromkeys((*bench.speed.STAGES, "rest"), 4)}
     ghosts = [{"images": 8, "phantoms": 1, "tracked": 0}] * 2
-    return Measured({(4, 1): speed}, views, {"lab": base}, faults, ghosts)
+    emulator = {
+        f"{name}.walk": Metric(1.1, 1.0, 1.2, "", 9)
+        for name in ("emulator_error_ratio", "emulator_coverage_difference")
+    }
+    emulator["emulator_error_ratio.walk.p95"] = Metric(0.9, 0.9, 1.0, "", 9)
+    return Measured({(4, 1): speed}, views, {"lab": base}, faults, emulator, ghosts)
 
 
 def test_every_activity_is_in_one_family():
@@ -83,6 +90,7 @@ def test_the_report_has_a_row_for_every_fault_that_was_played():
     assert "| `lost` | 2.00" in said
     assert "| `glare` | 2.00" in said
     assert "`defocus`" not in said
+    assert "| walk | 1.10 | 0.90 | +1.100 | 9 |" in said
 
 
 def test_distances_are_rows_in_order():

@@ -16,6 +16,7 @@ import numpy as np
 from hrc_env.appearance import APPEARANCES, AS_BUILT, draw_look
 from hrc_env.body import worker_names
 from hrc_env.errors import ConfigError
+from hrc_env.experiments.calibration.validate import error_ratios
 from hrc_env.experiments.perception import loops, phantoms, sheet, speed
 from hrc_env.experiments.perception.crops import Instant, Looked, Looker, instants
 from hrc_env.experiments.perception.families import in_turns
@@ -67,6 +68,9 @@ class PerceptionBenchConfig:
     """Moments of each body in each scene, and of each lens; four crops each."""
     n_empty: int = 1000
     """Steps in each scene without anybody."""
+    emulator_rounds: int | None = 1
+    """How often each motion is rendered in each scene to hold the emulator against pixels; 0: once,
+    in one of them; None: not at all."""
     cameras: tuple[int, ...] = (1, 2, 4)
     """Numbers of cameras whose speed is taken."""
     workers: tuple[int, ...] = (1, 2)
@@ -93,7 +97,7 @@ class PerceptionBenchConfig:
 
 QUICK = PerceptionBenchConfig(
     episodes=(("lab", 4), ("site", 2)), n_steps=80, n_faults=4, fault_steps=40, n_emulated=8,
-    bodies=("worker_1", "worker_2"), n_instants=10, n_empty=40, speed_steps=30,
+    bodies=("worker_1", "worker_2"), n_instants=10, n_empty=40, emulator_rounds=0, speed_steps=30,
 )  # fmt: skip
 """Every number, from little."""
 
@@ -148,6 +152,9 @@ def _tasks(config: PerceptionBenchConfig, out: Path) -> Iterator[Task]:
     for scene, _ in config.episodes:
         make = partial(_phantoms, scene, config.n_empty)
         yield Task(f"empty.{scene}", 0.1 * config.n_empty, make, _take_phantoms)
+    if config.emulator_rounds is not None:
+        make = partial(_emulator, config.emulator_rounds)
+        yield Task("emulator", 40.0 * max(2 * config.emulator_rounds, 1), make, _take_emulator)
     for cameras in config.cameras:
         for workers in config.workers:
             make = partial(_speed, cameras, workers, config.speed_steps)
@@ -294,6 +301,11 @@ def _phantoms(scene: str, n_steps: int, tick: Callable[[float], None]) -> dict[s
     return phantoms.count(scene, n_steps, FIRST_SEED, tick)
 
 
+def _emulator(rounds: int, tick: Callable[[float], None]) -> dict[str, Any]:
+    ratios = error_ratios(rounds, say=lambda share, label: tick(share))
+    return {name: asdict(metric) for name, metric in ratios.items()}
+
+
 def _speed(
     cameras: int, workers: int, n_steps: int, tick: Callable[[float], None]
 ) -> dict[str, Any]:
@@ -317,6 +329,10 @@ def _take_fault(key: tuple[str, str], part: dict[str, Any], found: Measured) -> 
 
 def _take_phantoms(part: dict[str, Any], found: Measured) -> None:
     found.phantoms.append(part)
+
+
+def _take_emulator(part: dict[str, Any], found: Measured) -> None:
+    found.emulator |= {name: Metric(**metric) for name, metric in part.items()}
 
 
 def _take_speed(key: tuple[int, int], part: dict[str, Any], found: Measured) -> None:

@@ -33,6 +33,8 @@ class Measured:
     faults: dict[tuple[str, str], list[Episode]] = field(default_factory=dict)
     """By level and kind; `NO_FAULT` are the same seeds without. The cameras of a rig have the
     fault in turns, from episode to episode."""
+    emulator: Metrics = field(default_factory=dict)
+    """As `calibration.validate.error_ratios` gives it."""
     phantoms: list[dict[str, int]] = field(default_factory=list)
     """As `phantoms.count` gives it."""
 
@@ -45,6 +47,7 @@ def metrics_of(found: Measured) -> Metrics:
         **_faults(found),
         **_views(found),
         **_phantoms(found),
+        **found.emulator,
     }
 
 

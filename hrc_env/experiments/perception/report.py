@@ -52,6 +52,11 @@ def markdown(metrics: _Metrics) -> str:
         _views(metrics),
         "Crops round the true joints with the whole worker in view. Errors are mean distances of a "
         "crop's joints from the truth in the image, in % of stature.",
+        "## The emulator beside the pixels",
+        _emulator(metrics),
+        "Error of the estimate at `keypoints` over that at `pixels`, on clips and viewpoints that "
+        "the emulator's calibration has not seen, by family of motions "
+        "(`hrc_env.experiments.calibration`).",
         "## Nobody there",
         f"{metrics['phantom_frames'].value:.0f} of {metrics['phantom_frames'].n} images of empty "
         f"scenes were said to show somebody; {metrics['phantom_tracks'].value:.0f} steps had a "
@@ -160,6 +165,17 @@ def _views(metrics: _Metrics) -> str:
             title = f"{kind}: {row.replace('_', ' ')}"
             lines.append([title, str(seen.n), _cell(seen, 100, 1, True), *cells])
     return _table(["", "crops", "detected [%]", "median error [%]", "p95 [%]"], lines)
+
+
+def _emulator(metrics: _Metrics) -> str:
+    lines = []
+    for family in _keys(metrics, "emulator_coverage_difference."):
+        ratio = metrics[f"emulator_error_ratio.{family}"]
+        p95 = metrics[f"emulator_error_ratio.{family}.p95"]
+        apart = metrics[f"emulator_coverage_difference.{family}"]
+        cells = (_cell(ratio, 1, 2), _cell(p95, 1, 2), f"{apart.value:+.3f}", str(ratio.n))
+        lines.append([family, *cells])
+    return _table(["", "median", "p95", "coverage less pixels'", "joints"], lines)
 
 
 def _lost(metrics: _Metrics) -> str:
