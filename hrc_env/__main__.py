@@ -3,6 +3,7 @@
 python -m hrc_env demo     a film of a robot that yields to a worker it sees
 python -m hrc_env check    is this machine ready?
 python -m hrc_env bench    how good and honest are the estimators, how fast is everything?
+python -m hrc_env experiment  the experiments, each with a report
 python -m hrc_env gallery  pictures of every worker, motion and scene
 python -m hrc_env calibrate-keypoints  the emulator's errors, fitted to renders
 """
@@ -16,6 +17,7 @@ from hrc_env.cli.bench import Bench
 from hrc_env.cli.calibrate import CalibrateKeypoints
 from hrc_env.cli.check import Check
 from hrc_env.cli.demo import Demo
+from hrc_env.cli.experiment import Experiment
 from hrc_env.cli.gallery import Gallery
 from hrc_env.cli.import_motion import ImportMotion
 from hrc_env.cli.listing import List
@@ -34,6 +36,7 @@ def main() -> int:
             "list": List,
             "play": Play,
             "bench": Bench,
+            "experiment": Experiment,
             "gallery": Gallery,
             "import-motion": ImportMotion,
             "calibrate-keypoints": CalibrateKeypoints,

@@ -1,0 +1,173 @@
+"""What an estimator is worth in safety: the experiment, part by part."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from hrc_env.errors import ConfigError, HRCError
+from hrc_env.experiments.impact.measures import Table, metrics_of
+from hrc_env.experiments.impact.report import write_pages
+from hrc_env.experiments.impact.tax import tax_metrics
+from hrc_env.experiments.impact.trial.episodes import PEOPLE, Stages
+from hrc_env.experiments.impact.trial.eyes import (
+    ALL_EYES,
+    LATE,
+    PIXELS,
+    REFERENCE,
+    Eyes,
+    eyes_called,
+)
+from hrc_env.experiments.impact.trial.policies import (
+    POLICIES,
+    PPO,
+    SLOWED,
+    Policy,
+    check_policy,
+    code_of_policies,
+    maker,
+)
+from hrc_env.experiments.study.folder import claim
+from hrc_env.experiments.study.shelf import Say, Shelf, fingerprint_of
+from hrc_env.results import Metric, write_results
+from hrc_env.shards import n_cores
+
+NAME = "impact"
+FIRST_SEED = 1_000_000
+"""Of the episodes, far from those that the policy learns in."""
+SWEPT = (REFERENCE, *(eyes.name for eyes in LATE))
+"""Eyes for which margins are compared."""
+
+
+@dataclass(frozen=True, slots=True)
+class ImpactConfig:
+    """How much is played."""
+
+    n_episodes: int = 200
+    """Episodes of every row, at level `pixels` at most `n_pixels`."""
+    n_pixels: int = 6
+    """Episodes of a row at level `pixels`, where every image is drawn."""
+    n_steps: int = 250
+    """Control steps of an episode."""
+    learning_steps: int = 300_000
+    """Environment steps in which the trained policy learns."""
+    policies: tuple[str, ...] = POLICIES
+    """Whose eyes are exchanged."""
+    eyes: tuple[str, ...] = tuple(ALL_EYES)
+    """Which eyes they get; the reference is always among them."""
+    margins_m: tuple[float, ...] = (0.05, 0.1, 0.2)
+    """What `scripted_slowed` adds to its distances where margins are compared [m]."""
+
+    def __post_init__(self) -> None:
+        """Raise `ConfigError` for what cannot work."""
+        for name in ("n_episodes", "n_pixels", "n_steps", "learning_steps"):
+            if getattr(self, name) < 1:
+                raise ConfigError(f"{name} must be at least 1, got {getattr(self, name)}.")
+        for name in self.policies:
+            check_policy(name)
+        for name in self.eyes:
+            eyes_called(name)
+        if REFERENCE not in self.eyes or not self.policies:
+            raise ConfigError(f"eyes must hold the reference {REFERENCE!r}; policies at least one.")
+        if any(margin <= 0 for margin in self.margins_m):
+            raise ConfigError(f"margins_m must be positive, got {self.margins_m}.")
+
+
+QUICK = ImpactConfig(n_episodes=16, n_pixels=1, learning_steps=65_536)
+"""Every number, from little."""
+
+
+def config_for(quick: bool = False, seeds: int | None = None) -> ImpactConfig:
+    """The settings of a run; `seeds`: episodes of a row."""
+    config = QUICK if quick else ImpactConfig()
+    return config if seeds is None else replace(config, n_episodes=seeds)
+
+
+def run(config: ImpactConfig, out: Path, say: Say, overwrite: bool = False) -> dict[str, Metric]:
+    """Play everything that is not there yet; results.json, figures, report.html into `out`.
+
+    Args:
+        config: how much.
+        out: a folder; what an earlier run with the same settings and code finished is used.
+        say: hears of the progress: shares that sum to 1.
+        overwrite: throw away what something else left there.
+
+    Raises:
+        ConfigError: the folder holds other results.
+        HRCError: workers did not walk the same way with different eyes.
+    """
+    claim(out, NAME, overwrite)
+    settings = _settings(config)
+    fingerprint = fingerprint_of(settings, f"{NAME}/trial")
+    n_parts = len(list(_rows(config))) + (PPO in config.policies)
+    shelf = Shelf(out / "parts", fingerprint, n_parts, say)
+    checkpoint = out / "parts" / "ppo.zip"
+    if PPO in config.policies:
+        from hrc_env.experiments.impact.trial.training import Learning, trained
+
+        trained(shelf, Learning(config.learning_steps, n_cores(), checkpoint))
+    table = _played(config, shelf, checkpoint)
+    _check_walks(table)
+    metrics = metrics_of(table)
+    metrics |= tax_metrics(table, metrics, config.margins_m)
+    write_results(out / "results.json", settings, _seeds(config.n_episodes), metrics)
+    write_pages(out, config.n_episodes, config.margins_m, table, metrics)
+    return metrics
+
+
+def _played(config: ImpactConfig, shelf: Shelf, checkpoint: Path) -> Table:
+    """Every row, by policy and eyes."""
+    table: dict[tuple[str, str], dict[str, list[Any]]] = {}
+    stages: Stages | None = None
+    for eyes, policy in _rows(config):
+        if stages is None or stages.eyes != eyes:
+            if stages is not None:
+                stages.close()
+            stages = Stages(eyes, _seeds(_n_episodes(config, eyes)), config.n_steps, n_cores())
+        here, make = stages, maker(policy, checkpoint)
+        table[policy.label, eyes.name] = shelf.part(
+            f"{policy.label}.{eyes.name}",
+            lambda tick, here=here, make=make, policy=policy: here.play(
+                make, policy.margin_m, tick
+            ),
+        )
+    if stages is not None:
+        stages.close()
+    return table
+
+
+def _rows(config: ImpactConfig) -> Iterator[tuple[Eyes, Policy]]:
+    """What is played, eyes by eyes."""
+    for name in config.eyes:
+        eyes = eyes_called(name)
+        yield from ((eyes, Policy(policy)) for policy in config.policies)
+        if SLOWED in config.policies and name in SWEPT:
+            yield from ((eyes, Policy(SLOWED, margin_m)) for margin_m in config.margins_m)
+
+
+def _n_episodes(config: ImpactConfig, eyes: Eyes) -> int:
+    few = min(config.n_episodes, config.n_pixels)
+    return few if eyes.name == PIXELS else config.n_episodes
+
+
+def _seeds(n: int) -> list[int]:
+    return [FIRST_SEED + k for k in range(n)]
+
+
+def _settings(config: ImpactConfig) -> dict[str, Any]:
+    """What all numbers depend on."""
+    return {"experiment": NAME, "people": PEOPLE, "policies_code": code_of_policies()} | asdict(
+        config
+    )
+
+
+def _check_walks(table: Mapping[tuple[str, str], Mapping[str, list[Any]]]) -> None:
+    """Raise unless the worker of a seed walked the same way in every row, bit for bit."""
+    walks = [row["walk"] for row in table.values()]
+    longest = max(walks, key=len)
+    for (policy, eyes), row in table.items():
+        if row["walk"] != longest[: len(row["walk"])]:
+            raise HRCError(
+                f"With {policy} and {eyes} the workers walked otherwise than in other rows: "
+                "nothing can be compared. Delete the folder's parts and start again."
+            )

@@ -1,0 +1,1 @@
+"""How one row comes about: a policy, a pair of eyes, the same seeds; what is kept of episodes."""

@@ -1,0 +1,275 @@
+"""The impact experiment: only the eyes are exchanged, and what is counted is the truth."""
+
+import hashlib
+import json
+import os
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hrc_env.errors import ConfigError, HRCError
+from hrc_env.experiments.impact import experiment, tax
+from hrc_env.experiments.impact.experiment import ImpactConfig, config_for, run
+from hrc_env.experiments.impact.report import write_pages
+from hrc_env.experiments.impact.trial import training
+from hrc_env.experiments.impact.trial.counts import GAPS_M, Bins, quantile_over
+from hrc_env.experiments.impact.trial.episodes import Stages
+from hrc_env.experiments.impact.trial.eyes import ALL_EYES, REFERENCE, eyes_called, seeing
+from hrc_env.experiments.impact.trial.judge import Step, judge, scene_of
+from hrc_env.experiments.impact.trial.policies import Policy, maker
+from hrc_env.experiments.impact.trial.tally import Tally
+from hrc_env.experiments.study.shelf import Shelf
+
+LATE = seeing(latency_s=0.12).name
+TINY = ImpactConfig(
+    n_episodes=2,
+    n_steps=12,
+    policies=("scripted", "scripted_slowed"),
+    eyes=("truth", "none", REFERENCE, seeing(n_cameras=1).name, LATE),
+    margins_m=(0.1,),
+)
+
+
+def silent(share, label):
+    """Say nothing."""
+
+
+def a_step(true_m, believed_m, robot_mps=0.0):
+    """A step of one environment."""
+    row = [np.array([value]) for value in (true_m, believed_m, robot_mps, 0.0)]
+    return Step(*row, error_m=np.zeros((1, 15)))
+
+
+def an_info(touching=0.0):
+    return {
+        "cost": np.array([touching]),
+        "cost_contact": np.array([touching]),
+        "safety/min_separation_m": np.array([0.5]),
+    }
+
+
+def tally_of(*steps, margin_m=0.0):
+    """What (step, touching) come to."""
+    tally = Tally(1, margin_m)
+    for step, touching in steps:
+        tally.add(step, np.zeros((1, 15, 3)), an_info(touching))
+    return {name: value[0] for name, value in tally.sums.items()}
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """A run from beginning to end: its folder and its numbers."""
+    out = tmp_path_factory.mktemp("impact")
+    return out, run(TINY, out, silent)
+
+
+def test_eyes_are_called_what_they_are():
+    assert seeing("paper").name == "keypoints_paper_4cam_0ms"
+    assert eyes_called("keypoints_particle_1cam_120ms").latency_s == 0.12
+    assert all(eyes.name == name for name, eyes in ALL_EYES.items())
+    with pytest.raises(ConfigError, match="Did you mean 'keypoints_paper_4cam_0ms'"):
+        eyes_called("keypoints_papers_4cam_0ms")
+
+
+def test_cameras_that_are_left_come_after_a_second_of_four():
+    eyes = seeing(n_cameras=1)
+    (lost,) = eyes.faults(eyes.rigs[1])
+    assert lost.cameras == ("camera_1", "camera_3", "camera_4")
+    assert lost.from_s == 1.0
+    assert not seeing(n_cameras=1, is_alone=True).faults((1,))
+
+
+def test_only_eyes_that_are_told_their_delay_have_cameras_that_say_it():
+    told, untold = (seeing(latency_s=0.2, is_told=told) for told in (True, False))
+    assert [camera.latency_s for camera in told.cameras(told.rigs[0])] == [0.2] * 4
+    assert [camera.latency_s for camera in untold.cameras(untold.rigs[0])] == [0.0] * 4
+    assert [(fault.kind, fault.amount) for fault in untold.faults(untold.rigs[0])] == [
+        ("out_of_step", 5.0)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"n_episodes": 0}, "n_episodes must be at least 1"),
+        ({"policies": ("scripted_slow",)}, "Unknown policy"),
+        ({"eyes": ("truth",)}, "must hold the reference"),
+        ({"eyes": (REFERENCE, "camera_9")}, "Unknown eyes"),
+        ({"margins_m": (0.0,)}, "must be positive"),
+    ],
+)
+def test_what_cannot_be_played_is_refused(change, words):
+    with pytest.raises(ConfigError, match=words):
+        replace(TINY, **change)
+
+
+def test_quick_plays_every_row_of_the_full_run():
+    full, quick = config_for(), config_for(quick=True)
+    assert (quick.eyes, quick.policies, quick.margins_m) == (
+        full.eyes, full.policies, full.margins_m,
+    )  # fmt: skip
+    assert config_for(seeds=7).n_episodes == 7
+
+
+def test_a_stop_is_missed_where_the_belief_is_too_hopeful():
+    told = tally_of((a_step(0.05, 0.2), 0), (a_step(0.2, 0.05), 0), (a_step(0.05, 0.05), 0))
+    assert (told["called_stops"], told["missed_stops"], told["false_stops"]) == (2, 1, 1)
+    assert (told["called_slowings"], told["missed_slowings"]) == (3, 0)
+
+
+def test_a_margin_makes_up_for_hope():
+    assert tally_of((a_step(0.05, 0.2), 0), margin_m=0.15)["missed_stops"] == 0
+
+
+def test_a_worker_whom_the_robot_knows_nothing_of_is_a_missed_stop():
+    assert tally_of((a_step(0.05, np.inf), 0))["missed_stops"] == 1
+
+
+def test_a_touch_counts_once_by_what_the_robot_did():
+    touched = tally_of(
+        (a_step(0.0, 0.0, 0.3), 1), (a_step(0.0, 0.0, -0.3), 1), (a_step(0.1, 0.1), 0),
+        (a_step(0.0, 0.0, -0.3), 1), (a_step(0.1, 0.1), 0), (a_step(0.0, 0.0, 0.01), 1),
+    )  # fmt: skip
+    assert [touched[f"contacts_{how}"] for how in ("towards", "fleeing", "standing")] == [1, 1, 1]
+
+
+def test_directed_speeds_add_up_to_how_the_gap_closes():
+    stages = Stages(eyes_called("truth"), [3, 4], 10, 1)
+    rigs = stages._env(stages.eyes.rigs[0], 2)
+    rigs.reset(np.arange(2), [np.random.default_rng(k) for k in range(2)])
+    (part,) = rigs.parts
+    action = np.full((2, part.n_actions), 0.5)
+    steps, before = [], scene_of(part)
+    for _ in range(5):
+        rigs.step(action)
+        now = scene_of(part)
+        steps.append(judge(part, before, now))
+        before = now
+    gaps = np.array([step.true_gap_m for step in steps])
+    closing = -np.diff(gaps, axis=0) / part.config.ctrl_dt
+    both = np.array([step.robot_mps + step.worker_mps for step in steps[1:]])
+    assert np.abs(closing).max() > 0.05
+    assert np.allclose(both, closing, atol=0.05)
+    assert np.abs(steps[-1].error_m).max() == 0.0
+    stages.close()
+
+
+def test_quantiles_of_bins_are_those_of_the_values():
+    rng = np.random.default_rng(0)
+    values = rng.normal(0.2, 0.1, (40, 500))
+    found = quantile_over(GAPS_M, GAPS_M.count(values).tolist(), 0.95, "m")
+    assert found.value == pytest.approx(np.quantile(values, 0.95), abs=0.002)
+    assert found.low < found.value < found.high
+
+
+def test_values_that_do_not_count_are_in_no_bin():
+    bins = Bins(np.array([0.0, 1.0]))
+    counts = bins.count(np.array([[-1.0, 0.5, 9.0]]), np.array([[True, True, False]]))
+    assert counts.tolist() == [[1, 1, 0]]
+
+
+def test_the_margin_is_where_no_more_stops_are_missed_than_on_time():
+    def row(missed):
+        return {"missed_stops": [missed] * 5, "called_stops": [10] * 5, "walk": [""] * 5}
+
+    margin = tax._margin([row(6), row(2), row(0)], np.array([0.0, 0.1, 0.2]), row(3))
+    assert margin.value == pytest.approx(0.075)
+    assert tax._margin([row(2), row(1)], np.array([0.0, 0.1]), row(3)).value == 0.0
+    assert tax._margin([row(6), row(5)], np.array([0.0, 0.1]), row(3)).value == 0.1
+
+
+def test_every_row_says_everything(finished):
+    out, metrics = finished
+    keys = ("separation_min_m", "contacts_towards", "contacts_fleeing", "contacts_standing",
+            "cost", "goals_per_min", "missed_stops", "false_stops", "z_d_m", "tax_m")  # fmt: skip
+    for policy in TINY.policies:
+        for eyes in TINY.eyes:
+            for key in keys:
+                assert np.isfinite(metrics[f"{policy}.{eyes}.{key}"].value), (policy, eyes, key)
+    written = json.loads((out / "results.json").read_text())
+    assert set(written["metrics"]) == set(metrics)
+    assert written["seeds"] == [1_000_000, 1_000_001]
+
+
+def test_the_report_holds_its_pictures(finished):
+    out, _ = finished
+    page = (out / "report.html").read_text()
+    assert page.count("data:image/png;base64,") == 3
+    for words in ("What was asked", "What lateness costs", "What it does not mean"):
+        assert words in page
+
+
+def test_the_truth_has_no_error_and_lateness_a_tax(finished):
+    _, metrics = finished
+    assert metrics["scripted.truth.z_d_m"].value < 1e-3
+    late, on_time = metrics[f"scripted.{LATE}.tax_m"], metrics[f"scripted.{REFERENCE}.z_d_m"]
+    assert late.value >= on_time.value + 0.12 * 1.6 - 1e-9
+
+
+def test_workers_who_walk_otherwise_are_noticed():
+    table = {("scripted", "truth"): {"walk": ["a", "b"]}, ("scripted", "none"): {"walk": ["a"]}}
+    experiment._check_walks(table)
+    with pytest.raises(HRCError, match="walked otherwise"):
+        experiment._check_walks(table | {("ppo", "none"): {"walk": ["b"]}})
+
+
+def test_an_environment_that_is_used_again_starts_afresh():
+    stages = Stages(eyes_called(LATE), [5, 6], 10, 1)
+    make = maker(Policy("scripted_slowed"), None)
+    first, again = (stages.play(make, 0.0, lambda share: None) for _ in range(2))
+    stages.close()
+    assert first == again
+
+
+def test_a_run_that_is_killed_goes_on_to_the_same_numbers(finished, tmp_path):
+    _, metrics = finished
+    script = (
+        "import os, sys; from pathlib import Path; "
+        "from hrc_env.experiments.impact.experiment import ImpactConfig, run\n"
+        f"config = {TINY!r}\n"
+        "def say(share, label):\n"
+        f"    if label == 'scripted.{REFERENCE}': os.kill(os.getpid(), 9)\n"
+        "run(config, Path(sys.argv[1]), say)"
+    )
+    killed = subprocess.run([sys.executable, "-c", script, tmp_path], env=os.environ, check=False)
+    assert killed.returncode == -signal.SIGKILL
+    kept = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "parts").iterdir()}
+    assert len(kept) == 4  # truth and none, two policies each
+    assert not (tmp_path / "results.json").exists()
+    assert run(TINY, tmp_path, silent) == metrics
+    for name, time_ns in kept.items():
+        assert (tmp_path / "parts" / name).stat().st_mtime_ns == time_ns
+
+
+def test_a_policy_is_learnt_once_and_again_only_if_its_file_is_lost(tmp_path, monkeypatch):
+    learnt = []
+
+    def learn(learning, tick):
+        learnt.append(1)
+        learning.path.write_bytes(b"policy")
+        return {"sha256": hashlib.sha256(b"policy").hexdigest()}
+
+    monkeypatch.setattr(training, "_train", learn)
+    shelf = Shelf(tmp_path, "here", 1, silent)
+    learning = training.Learning(1, 1, tmp_path / "ppo.zip")
+    for n_times in (1, 1):
+        training.trained(shelf, learning)
+        assert len(learnt) == n_times
+    learning.path.write_bytes(b"half")
+    assert training.trained(shelf, learning).read_bytes() == b"policy"
+    assert len(learnt) == 2
+
+
+def test_pages_are_written_without_the_policy_that_yields(finished, tmp_path):
+    _, metrics = finished
+    out = tmp_path / "one"
+    table = experiment._played(
+        replace(TINY, policies=("scripted",), eyes=("truth", REFERENCE)),
+        Shelf(out / "parts", "", 1, silent), out / "none.zip",
+    )  # fmt: skip
+    write_pages(out, 2, (), table, metrics)
+    assert (out / "report.html").read_text().count("data:image/png;base64,") == 1
