@@ -20,7 +20,7 @@ def hrc(*words: str, **env: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.parametrize(
-    "command", ["setup", "demo", "check", "list", "play", "bench", "import-motion"]
+    "command", ["setup", "demo", "check", "list", "play", "bench", "experiment", "import-motion"]
 )
 def test_help_explains_every_command(command):
     done = hrc(command, "--help")

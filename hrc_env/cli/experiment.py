@@ -1,9 +1,9 @@
-"""python -m hrc_env experiment: the paper's experiments, and what the eyes are worth."""
+"""python -m hrc_env experiment: what the eyes are worth."""
 
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Literal
 
 import tyro
 
@@ -33,16 +33,11 @@ class ImpactExperiment:
 
 
 @dataclass(frozen=True)
-class Experiment:
-    """The paper's experiments, and what the eyes are worth in safety (impact).
+class Experiment(ImpactExperiment):
+    """What the eyes are worth in safety (impact): report.html, results.json and figures.
 
-    Each takes --quick (minutes) and --out DIR, where it writes report.html, results.json and
-    figures; it keeps what is finished when it is stopped, and goes on there.
+    What is finished is kept when it is stopped, and it goes on there.
     """
 
-    what: Annotated[ImpactExperiment, tyro.conf.subcommand("impact")]
+    what: tyro.conf.Positional[Literal["impact"]] = "impact"
     """Which experiment."""
-
-    def run(self) -> int:
-        """Run it."""
-        return self.what.run()

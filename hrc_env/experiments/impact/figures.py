@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from hrc_env.experiments.impact.measures import Table
 from hrc_env.experiments.impact.tax import MEASURED, missed_share
 from hrc_env.experiments.impact.trial.eyes import LATE, LATE_S, REFERENCE, Eyes, eyes_called
-from hrc_env.experiments.impact.trial.policies import SLOWED, Policy
+from hrc_env.experiments.impact.trial.policies import SCRIPTED, SLOWED, Policy
 from hrc_env.experiments.impact.words import eyes_words
 from hrc_env.results import Metric
 
@@ -28,22 +28,41 @@ _LATE_MARKS = {0.0: "o", LATE_S[0]: "s", LATE_S[1]: "^"}
 def plot_tradeoff(
     path: Path, metrics: Metrics, policies: Sequence[str], eyes: Sequence[str]
 ) -> None:
-    """Goals a minute against true cost: a panel for each policy, a point for each pair of eyes."""
-    figure = Figure(figsize=(5.2 * len(policies) + 1, 8.4), layout="constrained")
-    axes = figure.subplots(1, len(policies), squeeze=False)[0]
-    for axis, policy in zip(axes, policies, strict=True):
-        for name in eyes:
-            _point(axis, metrics, policy, name)
-        axis.set_title(policy, fontsize=14)
-        axis.set_xlabel("true cost per episode of 10 s  (less is safer)", fontsize=12)
-        axis.margins(0.08)
-        axis.grid(True, color="0.9")
-        axis.set_axisbelow(True)
-    axes[0].set_ylabel("goals per minute", fontsize=12)
-    handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=11)
+    """Goals a minute against true cost: a column for each policy, a point for each pair of eyes;
+    below, nearer, without eyes that see nothing and the policy that does not look."""
+    figure = Figure(figsize=(5.4 * len(policies) + 1, 12), layout="constrained")
+    axes = figure.subplots(2, len(policies), squeeze=False)
+    seeing = [name for name in eyes if not _is_blind(eyes_called(name))]
+    for (above, below), policy in zip(axes.T, policies, strict=True):
+        _panel(above, metrics, policy, eyes)
+        above.set_title(policy, fontsize=14)
+        if policy == SCRIPTED:
+            below.set_axis_off()
+            continue
+        _panel(below, metrics, policy, seeing)
+        below.set_title(f"{policy}, nearer: without those that see nothing", fontsize=12)
+    for axis in axes[:, 0]:
+        axis.set_ylabel("goals per minute", fontsize=12)
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=12)
     figure.suptitle("What the eyes are worth: throughput against true cost", fontsize=15)
     _save(figure, path)
+
+
+def _panel(axis: Axes, metrics: Metrics, policy: str, eyes: Sequence[str]) -> None:
+    """Points of one policy."""
+    for name in eyes:
+        _point(axis, metrics, policy, name)
+    axis.set_xlabel("true cost per episode of 10 s  (less is safer)", fontsize=12)
+    axis.tick_params(labelsize=11)
+    axis.margins(0.08)
+    axis.grid(True, color="0.9")
+    axis.set_axisbelow(True)
+
+
+def _is_blind(eyes: Eyes) -> bool:
+    """Whether nobody is ever followed with them."""
+    return eyes.perception == "none" or eyes.is_alone
 
 
 def plot_stops(path: Path, metrics: Metrics, eyes: Sequence[str]) -> None:
@@ -91,25 +110,31 @@ def plot_tax(path: Path, table: Table, metrics: Metrics, margins_m: Sequence[flo
 
 
 def _point(axis: Axes, metrics: Metrics, policy: str, name: str) -> None:
-    """One pair of eyes; its bars are the intervals of the paired difference from the reference."""
+    """One pair of eyes: the reference and the paired difference from it, with its interval."""
     eyes, colour = eyes_called(name), _colour(eyes_called(name))
-    cost, goals = (metrics[f"{policy}.{name}.{what}"].value for what in ("cost", "goals_per_min"))
-    bars = [_bar(metrics, policy, name, what) for what in ("cost", "goals_per_min")]
+    (x, x_bar), (y, y_bar) = (
+        _placed(metrics, policy, name, what) for what in ("cost", "goals_per_min")
+    )
     mark = "X" if eyes.is_alone else _LATE_MARKS[eyes.latency_s]
     axis.errorbar(
-        cost, goals, xerr=bars[0], yerr=bars[1], fmt="*" if eyes.perception == "pixels" else mark,
+        x, y, xerr=x_bar, yerr=y_bar, fmt="*" if eyes.perception == "pixels" else mark,
         color=colour, markersize=14 if eyes.perception == "pixels" else 9,
         markerfacecolor=colour if eyes.is_told else "white",
         markeredgewidth=1.6, elinewidth=0.9, alpha=0.9, label=eyes_words(name),
     )  # fmt: skip
 
 
-def _bar(metrics: Metrics, policy: str, name: str, what: str) -> list[list[float]] | None:
-    """Below and above the point; None for the reference."""
-    difference = metrics.get(f"difference.{policy}.{name}.{what}")
-    if difference is None:
-        return None
-    return [[difference.value - difference.low], [difference.high - difference.value]]
+def _placed(
+    metrics: Metrics, policy: str, name: str, what: str
+) -> tuple[float, list[list[float]] | None]:
+    """Where a point is on one axis, and how far its bar goes to either side (the reference has
+    none)."""
+    reference = metrics[f"{policy}.{REFERENCE}.{what}"].value
+    if name == REFERENCE:
+        return reference, None
+    found = metrics[f"difference.{policy}.{name}.{what}"]
+    bar = [[found.value - found.low], [found.high - found.value]]
+    return reference + found.value, bar
 
 
 def _colour(eyes: Eyes) -> str:

@@ -4,8 +4,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from hrc_env.experiments.impact.figures import plot_stops, plot_tax, plot_tradeoff
+from hrc_env.experiments.impact.lateness import lateness_parts
 from hrc_env.experiments.impact.measures import NOMINAL_MPS, Table
-from hrc_env.experiments.impact.trial.eyes import LATE, REFERENCE, Eyes, eyes_called, seeing
+from hrc_env.experiments.impact.trial.eyes import REFERENCE, eyes_called, seeing
 from hrc_env.experiments.impact.trial.policies import POLICIES, SLOWED
 from hrc_env.experiments.impact.trial.tally import MOVING_MPS, SLOW_M, STOP_M
 from hrc_env.experiments.impact.words import eyes_words
@@ -16,8 +17,6 @@ from hrc_env.results import Metric
 
 Metrics = Mapping[str, Metric]
 ONE_CAMERA = seeing(n_cameras=1).name
-AGREES = 0.3
-"""The tax predicts what lateness costs if measured metres are within this share of it."""
 _ROW_COLUMNS = (
     ("goals_per_min", "goals / min", 1), ("cost", "true cost", 1),
     ("separation_min_m", "least separation [m]", 3), ("contacts_towards", "contacts towards", 2),
@@ -29,12 +28,6 @@ _DIFFERENCE_COLUMNS = (
     ("goals_per_min", "goals / min", 1), ("cost", "true cost", 1),
     ("separation_min_m", "least separation [m]", 3), ("approaches", "approaches", 1),
     ("missed_stops", "missed stops", 1), ("false_stops", "false stops", 1),
-)  # fmt: skip
-_LATENESS_COLUMNS = (
-    ("nominal_m", f"latency x ({NOMINAL_MPS} m/s + v_r)"),
-    ("speeds_here_m", "latency x (v_h + v_r)"),
-    ("squares_m", "as squares"), ("belief_m", "measured in the belief"),
-    ("margin_m", "measured as a margin"),
 )  # fmt: skip
 
 
@@ -55,7 +48,7 @@ def write_pages(
         plot_stops(figures / "stops.png", metrics, eyes)
         sections.append(Section("Wrong decisions", _stops(figures)))
     if plot_tax(figures / "tax.png", table, metrics, margins_m):
-        sections.append(Section("What lateness costs", _lateness(figures, metrics)))
+        sections.append(Section("What lateness costs", lateness_parts(figures, table, metrics)))
     sections += [
         Section(f"Beside {eyes_words(REFERENCE)}", _beside(metrics, policies, eyes)),
         Section("Every row", _every_row(metrics, policies, eyes)),
@@ -111,8 +104,9 @@ def _tradeoff(
 ) -> tuple[Part, ...]:
     shown = Picture(
         figures / "tradeoff.png",
-        "A point for each pair of eyes: up is more goals, left is safer. Bars: 95 % intervals of "
-        "the paired difference from the reference; `pixels` has few and other episodes' mean.",
+        "A point for each pair of eyes, placed by its paired difference from the reference, whose "
+        "95 % interval are the bars: up is more goals, left is safer. `scripted` does not look: "
+        "all its points are one, and only its beliefs differ.",
     )
     said_ = [_one_camera(metrics, policy) for policy in policies]
     return (shown, *(words for words in said_ if words), *_estimators(metrics, policies))
@@ -170,63 +164,6 @@ def _stops(figures: Path) -> tuple[Part, ...]:
         "`truth` is not at zero: a robot that is given the true joints still thinks of the body "
         "as segments between them with radii, and the true body has other ones. What a pair of "
         "eyes adds to that is the eyes' share.",
-    )
-
-
-def _lateness(figures: Path, metrics: Metrics) -> tuple[Part, ...]:
-    """The table of predicted and measured metres, and what follows."""
-    late = [eyes for eyes in LATE if f"lateness.{eyes.name}.margin_m" in metrics]
-    rows = tuple(
-        (
-            eyes_words(eyes.name),
-            *(
-                said(metrics[f"lateness.{eyes.name}.{how}"], digits=3)
-                for how, _ in _LATENESS_COLUMNS
-            ),
-        )
-        for eyes in late
-    )
-    return (
-        Picture(
-            figures / "tax.png",
-            "Left: the share of stops that are missed falls as distances grow. Right: metres that "
-            "lateness costs, as predicted (grey) and as measured.",
-        ),
-        "The tax of late eyes is that of the same eyes on time and latency x (v_h + v_r). The "
-        "extra metres were measured in two ways: by how much the 95th percentile of believed less "
-        f"true gap grows where the true gap is below {SLOW_M:g} m; and as the margin that "
-        f"`{SLOWED}` must add to its distances until it misses no greater share of the stops that "
-        "the truth calls for than with eyes on time.",
-        page.Table(("eyes [m]", *(words for _, words in _LATENESS_COLUMNS)), rows),
-        *(_agreement(metrics, late, how) for how in ("nominal_m", "speeds_here_m", "squares_m")),
-        _WHY_NOT,
-    )
-
-
-_WHY_NOT = (
-    "Why a sum predicts too much: (1) 1.6 m/s is a walking body that comes straight at the "
-    "robot; workers here reach and turn beside it, and their speed towards it is far lower. "
-    "(2) v_r does not count for a robot that measures the gap from its own encoders, which are not "
-    "late: only the worker's place is old. (3) Percentiles of independent errors do not add; their "
-    "squares do, nearly. (4) Eyes that are told their delay predict over it. The tax is therefore "
-    "what a standard has to demand, a bound for the worst case, and no estimate of what "
-    "lateness costs on average."
-)
-
-
-def _agreement(metrics: Metrics, late: Sequence[Eyes], how: str) -> str:
-    """Measured over predicted metres, and whether that is within `AGREES`."""
-    shares = [
-        metrics[f"lateness.{eyes.name}.{measured}"].value
-        / metrics[f"lateness.{eyes.name}.{how}"].value
-        for eyes in late
-        for measured in ("belief_m", "margin_m")
-    ]
-    agree = sum(abs(share - 1) <= AGREES for share in shares)
-    words = dict(_LATENESS_COLUMNS)[how]
-    return (
-        f"Measured over predicted, `{words}`: {min(shares):.2f} to {max(shares):.2f}; within "
-        f"{100 * AGREES:.0f} % in {agree} of {len(shares)} cases (eyes and way to measure)."
     )
 
 
