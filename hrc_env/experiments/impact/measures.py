@@ -33,7 +33,8 @@ _STOPS = (
     "called_slowings", "approaches",
 )  # fmt: skip
 COMPARED = (
-    "goals_per_min", "cost", "approaches", "missed_stops", "false_stops", "separation_min_m",
+    "goals_per_min", "cost", "contacts_towards", "approaches", "missed_stops", "false_stops",
+    "separation_min_m",
 )  # fmt: skip
 """What is compared with the reference, episode by episode."""
 
@@ -124,15 +125,19 @@ def _beside(row: Row, reference: Row) -> dict[str, Metric]:
 
 
 _UNITS = {
-    "goals_per_min": "1/min", "cost": "per episode", "missed_stops": f"per {PER} steps",
-    "false_stops": f"per {PER} steps", "approaches": f"per {PER} steps",
+    "goals_per_min": "1/min", "contacts_towards": "1/min", "cost": "per episode",
+    "missed_stops": f"per {PER} steps", "false_stops": f"per {PER} steps",
+    "approaches": f"per {PER} steps",
 }  # fmt: skip
+
+_A_MINUTE = {"goals_per_min": "goals", "contacts_towards": "contacts_towards"}
+"""What is counted a minute, and from which sum."""
 
 
 def _per_episode(row: Row, what: str) -> Sequence[float]:
     """One number an episode."""
-    if what == "goals_per_min":
-        return (np.array(row["goals"]) / np.array(row["minutes"])).tolist()
+    if what in _A_MINUTE:
+        return (np.array(row[_A_MINUTE[what]]) / np.array(row["minutes"])).tolist()
     if what in _STOPS:
         return (PER * np.array(row[what]) / np.array(_steps(row))).tolist()
     return row[what]

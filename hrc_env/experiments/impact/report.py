@@ -26,8 +26,9 @@ _ROW_COLUMNS = (
 )  # fmt: skip
 _DIFFERENCE_COLUMNS = (
     ("goals_per_min", "goals / min", 1), ("cost", "true cost", 1),
-    ("separation_min_m", "least separation [m]", 3), ("approaches", "approaches", 1),
-    ("missed_stops", "missed stops", 1), ("false_stops", "false stops", 1),
+    ("separation_min_m", "least separation [m]", 3), ("contacts_towards", "contacts towards", 2),
+    ("approaches", "approaches", 1), ("missed_stops", "missed stops", 1),
+    ("false_stops", "false stops", 1),
 )  # fmt: skip
 
 
@@ -117,13 +118,15 @@ def _one_camera(metrics: Metrics, policy: str) -> str:
     key = f"difference.{policy}.{ONE_CAMERA}"
     if f"{key}.cost" not in metrics:
         return ""
-    cost, goals, near, missed = (
-        metrics[f"{key}.{what}"] for what in ("cost", "goals_per_min", "approaches", "missed_stops")
+    cost, goals, touched, near, missed = (
+        metrics[f"{key}.{what}"]
+        for what in ("cost", "goals_per_min", "contacts_towards", "approaches", "missed_stops")
     )
     worse = [
         words
         for words, holds in (
             ("safety (true cost)", cost.low > 0),
+            ("safety (contacts towards)", touched.low > 0),
             ("safety (approaches)", near.low > 0),
             ("throughput", goals.high < 0),
         )
@@ -132,12 +135,12 @@ def _one_camera(metrics: Metrics, policy: str) -> str:
     verdict = (
         f"one camera costs {' and '.join(worse)}"
         if worse
-        else "neither cost nor throughput tells one camera from four"
+        else "neither safety nor throughput tells one camera from four"
     )
     return (
-        f"`{policy}`: {verdict}. Against four cameras, paired: cost {_signed(cost)}, approaches "
-        f"{_signed(near)} and missed stops {_signed(missed)} per 1,000 steps, goals "
-        f"{_signed(goals)} a minute."
+        f"`{policy}`: {verdict}. Against four cameras, paired: cost {_signed(cost)}, contacts "
+        f"towards {_signed(touched, 2)} a minute, approaches {_signed(near)} and missed stops "
+        f"{_signed(missed)} per 1,000 steps, goals {_signed(goals)} a minute."
     )
 
 
