@@ -22,6 +22,10 @@ _COLOURS = {
 }  # fmt: skip
 """Of perception levels, and of estimators with four cameras."""
 _CAMERA_COLOURS = {4: "C0", 3: "#5aa2d6", 2: "#e8a33d", 1: "#d1495b"}
+_ACROSS = {
+    "cost": "true cost per episode of 10 s  (less is safer)",
+    "approaches": "approaches per 1,000 steps  (less is safer)",
+}
 _LATE_MARKS = {0.0: "o", LATE_S[0]: "s", LATE_S[1]: "^"}
 
 
@@ -29,18 +33,18 @@ def plot_tradeoff(
     path: Path, metrics: Metrics, policies: Sequence[str], eyes: Sequence[str]
 ) -> None:
     """Goals a minute against true cost: a column for each policy, a point for each pair of eyes;
-    below, nearer, without eyes that see nothing and the policy that does not look."""
+    below against approaches, without eyes that see nothing and the policy that does not look."""
     figure = Figure(figsize=(5.4 * len(policies) + 1, 12), layout="constrained")
     axes = figure.subplots(2, len(policies), squeeze=False)
     seeing = [name for name in eyes if not _is_blind(eyes_called(name))]
     for (above, below), policy in zip(axes.T, policies, strict=True):
-        _panel(above, metrics, policy, eyes)
+        _panel(above, metrics, policy, eyes, "cost")
         above.set_title(policy, fontsize=14)
         if policy == SCRIPTED:
             below.set_axis_off()
             continue
-        _panel(below, metrics, policy, seeing)
-        below.set_title(f"{policy}, nearer: without those that see nothing", fontsize=12)
+        _panel(below, metrics, policy, seeing, "approaches")
+        below.set_title(f"{policy}, eyes that see something", fontsize=12)
     for axis in axes[:, 0]:
         axis.set_ylabel("goals per minute", fontsize=12)
     handles, labels = axes[0, 0].get_legend_handles_labels()
@@ -49,11 +53,11 @@ def plot_tradeoff(
     _save(figure, path)
 
 
-def _panel(axis: Axes, metrics: Metrics, policy: str, eyes: Sequence[str]) -> None:
-    """Points of one policy."""
+def _panel(axis: Axes, metrics: Metrics, policy: str, eyes: Sequence[str], across: str) -> None:
+    """Points of one policy: goals against what is `across`."""
     for name in eyes:
-        _point(axis, metrics, policy, name)
-    axis.set_xlabel("true cost per episode of 10 s  (less is safer)", fontsize=12)
+        _point(axis, metrics, policy, name, across)
+    axis.set_xlabel(_ACROSS[across], fontsize=12)
     axis.tick_params(labelsize=11)
     axis.margins(0.08)
     axis.grid(True, color="0.9")
@@ -109,11 +113,11 @@ def plot_tax(path: Path, table: Table, metrics: Metrics, margins_m: Sequence[flo
     return True
 
 
-def _point(axis: Axes, metrics: Metrics, policy: str, name: str) -> None:
+def _point(axis: Axes, metrics: Metrics, policy: str, name: str, across: str) -> None:
     """One pair of eyes: the reference and the paired difference from it, with its interval."""
     eyes, colour = eyes_called(name), _colour(eyes_called(name))
     (x, x_bar), (y, y_bar) = (
-        _placed(metrics, policy, name, what) for what in ("cost", "goals_per_min")
+        _placed(metrics, policy, name, what) for what in (across, "goals_per_min")
     )
     mark = "X" if eyes.is_alone else _LATE_MARKS[eyes.latency_s]
     axis.errorbar(

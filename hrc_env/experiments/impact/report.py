@@ -107,10 +107,17 @@ def _tradeoff(
         figures / "tradeoff.png",
         "A point for each pair of eyes, placed by its paired difference from the reference, whose "
         "95 % interval are the bars: up is more goals, left is safer. `scripted` does not look: "
-        "all its points are one, and only its beliefs differ.",
+        "all its points are one, and only its beliefs differ. Below: approaches instead of cost.",
     )
-    said_ = [_one_camera(metrics, policy) for policy in policies]
+    said_ = [_WHOSE, *(_one_camera(metrics, policy) for policy in policies)]
     return (shown, *(words for words in said_ if words), *_estimators(metrics, policies))
+
+
+_WHOSE = (
+    "Cost counts nearness, whoever brought it about: a robot that stands still in a worker's way "
+    "costs as much as one that comes nearer. Contacts towards and approaches say what the robot "
+    "did."
+)
 
 
 def _one_camera(metrics: Metrics, policy: str) -> str:
