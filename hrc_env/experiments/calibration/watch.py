@@ -103,7 +103,7 @@ def _watched(
             )
         )  # fmt: skip
     columns: list[Any] = [np.array(column) for column in zip(*frames, strict=True)]
-    return Watched(*columns, P)
+    return Watched(*[*columns, P])
 
 
 def _introduce(senses: TrackingSenses, joints_world: Points3, P: Floats, rngs: Generators) -> None:
