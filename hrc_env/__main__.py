@@ -3,7 +3,7 @@
 python -m hrc_env demo     a film of a robot that yields to a worker it sees
 python -m hrc_env check    is this machine ready?
 python -m hrc_env bench    how good and honest are the estimators, how fast is everything?
-python -m hrc_env experiment  what the eyes are worth, with a report
+python -m hrc_env experiment  the paper's experiments, again and further
 python -m hrc_env gallery  pictures of every worker, motion and scene
 python -m hrc_env calibrate-keypoints  the emulator's errors, fitted to renders
 """

@@ -94,6 +94,11 @@ def test_ratios_of_paired_rows_are_narrower_than_of_strangers():
     assert paired.high - paired.low < 1e-9 < strangers.high - strangers.low
 
 
+def test_a_ratio_to_nothing_in_some_draws_still_has_an_interval():
+    found = intervals.ratio_over([1.0, 0.0, 2.0], [2.0, 0.0, 4.0], "share")
+    assert (found.value, found.low, found.high) == (0.5, 0.5, 0.5)
+
+
 def test_a_quantile_draws_whole_seeds():
     same = [[1.0, 2.0, 3.0]] * 5
     found = intervals.quantile_over(same, 0.5, "m")

@@ -1,4 +1,4 @@
-"""Pictures of a worker and the network's weights, for this room's tests."""
+"""Pictures of a worker, for this room's tests."""
 
 import json
 
@@ -6,14 +6,6 @@ import cv2
 import numpy as np
 import pytest
 from stored import DATA, PICTURES
-
-from hrc_env.perception.weights import fetch_weights
-
-
-@pytest.fixture(scope="session")
-def weights():
-    """The official weights; downloaded at the first run, offline afterwards."""
-    return fetch_weights()
 
 
 @pytest.fixture(scope="session")

@@ -4,6 +4,7 @@ Frames of one walk depend on each other; walks do not. So what is drawn anew is 
 seed with all that belongs to it. Rows that share their seeds are compared seed by seed.
 """
 
+import warnings
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -86,19 +87,24 @@ def apart(one: Metric, other: Metric) -> bool:
 
 
 def _boot(samples: tuple[Floats, ...], statistic: Callable[..., Any], unit: str) -> Metric:
-    """A statistic of paired samples (n,) with its percentile interval; none from one seed."""
+    """A statistic of paired samples (n,) with its percentile interval; none where all are equal.
+
+    Draws without a value (a ratio to nothing) do not count.
+    """
     usable = np.all(np.isfinite(samples), axis=0)
     samples = tuple(each[usable] for each in samples)
     n = len(samples[0])
     if n == 0:
         return Metric(np.nan, np.nan, np.nan, unit, 0)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", stats.DegenerateDataWarning)  # draws that are all alike
         point = float(statistic(*samples, axis=0))
-        if n < 2:
+        if n < 2 or all(np.ptp(each) == 0 for each in samples):
             return Metric(point, point, point, unit, n)
         found = stats.bootstrap(
             samples, statistic, n_resamples=N_RESAMPLES, paired=True, method="percentile",
             vectorized=True, rng=np.random.default_rng(0), batch=200,
         )  # fmt: skip
-    low, high = found.confidence_interval
+    drawn = found.bootstrap_distribution[np.isfinite(found.bootstrap_distribution)]
+    low, high = np.quantile(drawn, [0.025, 0.975]) if drawn.size else (point, point)
     return Metric(point, float(low), float(high), unit, n)

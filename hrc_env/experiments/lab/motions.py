@@ -1,0 +1,57 @@
+"""What the worker does in the laboratory: the paper's list, with our activities."""
+
+import math
+
+import numpy as np
+
+from hrc_env.batching import rows
+from hrc_env.body import load_body, worker_names
+from hrc_env.experiments.site.walk import joined, walk
+from hrc_env.motion.repertoire import REPERTOIRE, Act, perform
+from hrc_env.motion.solo import alone
+from hrc_env.records import WorkerMotion
+from hrc_env.scene.build import Scene
+
+WALKING = "walking"
+_BOX, _BOARD = REPERTOIRE["box from the floor to a table"], REPERTOIRE["board in both hands"]
+ACTS: dict[str, tuple[Act, ...]] = {
+    "standing": (*REPERTOIRE["stand"], *REPERTOIRE["look round"]),
+    "bending": (_BOX[0], _BOARD[2], _BOX[0]),
+    "lifting": (_BOARD[0], _BOX[2]),
+    "moving_board": _BOARD,
+    "moving_wood": REPERTOIRE["board on the shoulder"],
+}
+"""Bending: down to a thing on the floor, up, and down again. Lifting: a board, in both hands,
+in place of the paper's whiteboard. The two moves take such a board some 3 m, the second on the
+shoulder."""
+MOTIONS = ("standing", WALKING, "bending", "lifting", "moving_board", "moving_wood")
+START_Y_M, START_X_M = 1.5, (0.9, 1.6)
+"""Those who go somewhere start so far aside of the robot's axis, and come past it [m]."""
+
+
+def body_of(seed: int) -> str:
+    """Whose body: the baked ones in turns."""
+    names = worker_names()
+    return names[seed % len(names)]
+
+
+def play(scene: Scene, motion: str, seed: int, n_frames: int, dt_s: float) -> WorkerMotion:
+    """(T, 1, S, ...) a motion, at most n_frames, `dt_s` apart; where and which way is drawn."""
+    if motion == WALKING:
+        return walk(scene, seed, n_frames, dt_s)
+    rng = np.random.default_rng([seed, MOTIONS.index(motion)])
+    x, side = rng.uniform(*START_X_M), rng.choice([-1.0, 1.0])
+    if motion.startswith("moving"):
+        start, yaw = (x, side * START_Y_M), -side * math.pi / 2
+    else:
+        start, yaw = (x, rng.uniform(-0.8, 0.8)), rng.uniform(-math.pi, math.pi)
+    me = alone(load_body(scene.bodies[0]), start, yaw, right=bool(rng.random() < 0.9))
+    films = perform(ACTS[motion], me, rng, dt_s)
+    whole = joined([film.motion for film in films])
+    return first(whole, n_frames)
+
+
+def first(motion: WorkerMotion, n_frames: int) -> WorkerMotion:
+    """The first frames of a motion."""
+    count = min(n_frames, len(motion.position_world))
+    return rows(motion, np.arange(count))

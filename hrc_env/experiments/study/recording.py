@@ -1,0 +1,149 @@
+"""What cameras saw of a worker, once; then every estimator on the very same detections.
+
+The arm rests. Crops follow the estimator that the film is taken with (closed loop); whoever is
+given the recording afterwards has nothing to do with where the cameras looked.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hrc_env.batching import rows
+from hrc_env.body import stack, worker_truth
+from hrc_env.config import HRCConfig
+from hrc_env.experiments.study.shelf import Tick
+from hrc_env.geometry.cameras import projections
+from hrc_env.records import Keypoints, PoseEstimate, WorkerMotion
+from hrc_env.scene.build import Scene
+from hrc_env.senses import make_senses
+from hrc_env.sensing.moment import Moment, Windows
+from hrc_env.tracking.estimators import make_estimator
+from hrc_env.typing import Bools, Covariances3, Floats, Ints, Points3
+
+
+@dataclass(frozen=True, slots=True)
+class Beliefs:
+    """What an estimator said, frame by frame."""
+
+    mean_world: Points3
+    """(T, J, 3) [m]."""
+    cov_world: Covariances3
+    """(T, J, 3, 3) [m^2]."""
+    tracked: Bools
+    """(T,)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """One worker before a rig."""
+
+    scene: Scene
+    dt_s: float
+    joints_world: Points3
+    """(T, J, 3) truth [m]."""
+    keypoints: tuple[Keypoints, ...]
+    """(T) records of arrays (1, C, 1, J, ...), in pinhole pixels of the rig's cameras."""
+    windows: tuple[Windows, ...]
+    """(T) where each camera looked."""
+    beliefs: Beliefs
+    """Of the estimator that the crops followed."""
+
+
+def record(
+    scene: Scene,
+    motions: WorkerMotion,
+    config: HRCConfig,
+    estimator: str,
+    seed: int,
+    tick: Tick,
+    perception: str = "pixels",
+) -> Recording:
+    """Film a worker with every camera of a scene.
+
+    Args:
+        scene: with one worker.
+        motions: (T, 1, S, ...) of that worker, `config.ctrl_dt` apart.
+        config: settings of eyes and tracker.
+        estimator: whose predictions the crops follow.
+        seed: of its random numbers, and of the emulator's.
+        tick: hears of the progress: shares that sum to 1.
+        perception: "pixels", or "keypoints" for an emulated film.
+    """
+    body = stack(scene.bodies)
+    senses = make_senses(perception, estimator, scene, 1, config)
+    rngs = [[np.random.default_rng([seed, k])] for k in range(2)]
+    n_frames = len(motions.position_world)
+    q, ids, present = scene.home_q[None], np.zeros(1, int), np.ones((1, 1), bool)
+    joints, keypoints, windows, said = [], [], [], []
+    try:
+        senses.reset(ids, *rngs)
+        for frame in range(n_frames):
+            motion = rows(motions, np.array([frame]))
+            truth = worker_truth(body, motion)
+            estimate = senses.sense(Moment(ids, q, motion, truth, present), *rngs)
+            seen, looked = senses.looks(0)
+            if seen is not None:
+                keypoints.append(rows(replace(seen, time_s=None), ids))
+            joints.append(truth.joints_world[0, 0].copy())
+            windows.append([list(of_worker) for of_worker in looked])
+            said.append(rows(estimate, ids))
+            tick(1.0 / n_frames)
+    finally:
+        senses.close()
+    return Recording(
+        scene, config.ctrl_dt, np.stack(joints), tuple(keypoints), tuple(windows), _beliefs(said)
+    )
+
+
+def replay(
+    recording: Recording,
+    estimator: str,
+    cameras: Sequence[int],
+    n_start: int,
+    config: HRCConfig,
+    seed: int,
+    told_projections: Floats | None = None,
+) -> Beliefs:
+    """An estimator on the detections of some of the cameras.
+
+    Args:
+        recording: what they saw.
+        estimator: name.
+        cameras: indices into the scene's rig.
+        n_start: so many frames are given of all cameras: no estimator begins a track with one.
+        config: settings of the tracker.
+        seed: of the estimator's random numbers.
+        told_projections: (C, 3, 4) of all cameras, in place of the true ones: a wrong
+            calibration.
+    """
+    true_projections = projections(recording.scene.cameras)
+    P = true_projections if told_projections is None else told_projections
+    unused = np.setdiff1d(np.arange(len(P)), cameras)
+    tracker = make_estimator(estimator, P, recording.dt_s, config.tracker)
+    state, rngs = tracker.init(1, 1), [np.random.default_rng([seed, 1])]
+    tracker.reset(state, np.zeros(1, int), rngs)
+    said = []
+    for frame, seen in enumerate(recording.keypoints):
+        tracker.predict(state, recording.dt_s, rngs)
+        tracker.update(state, seen if frame < n_start else _without(seen, unused), rngs)
+        said.append(tracker.estimate(state))
+    return _beliefs(said)
+
+
+def _without(seen: Keypoints, cameras: Ints) -> Keypoints:
+    """Keypoints without those of some cameras."""
+    px, confidence, sigma_px = (
+        np.array(each) for each in (seen.px, seen.confidence, seen.sigma_px)
+    )
+    px[:, cameras], confidence[:, cameras], sigma_px[:, cameras] = np.nan, 0.0, np.inf
+    return Keypoints(px, confidence, sigma_px)
+
+
+def _beliefs(said: Sequence[PoseEstimate]) -> Beliefs:
+    """Frame after frame of one worker."""
+    return Beliefs(
+        np.stack([each.mean_world[0, 0] for each in said]),
+        np.stack([each.cov_world[0, 0] for each in said]),
+        np.array([bool(each.tracked[0, 0]) for each in said]),
+    )

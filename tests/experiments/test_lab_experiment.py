@@ -1,0 +1,88 @@
+"""The paper's laboratory, in its smallest form."""
+
+import json
+
+import numpy as np
+import pytest
+
+from hrc_env.errors import ConfigError
+from hrc_env.experiments.lab import experiment
+from hrc_env.experiments.lab.experiment import LabConfig, config_for, laboratory, run
+from hrc_env.experiments.lab.motions import MOTIONS, play
+from hrc_env.experiments.lab.sides import LEFT, RIGHT, turned_away
+from hrc_env.skeleton import JOINT
+
+TINY = LabConfig(n_seeds=1, max_frames=26)
+CAMERAS = (*(f"camera_{k}" for k in range(1, 5)), "multi")
+
+
+@pytest.fixture(scope="module")
+def done(weights, tmp_path_factory):
+    out = tmp_path_factory.mktemp("lab")
+    return out, run(TINY, out, lambda share, label: None)
+
+
+def test_every_number_is_there(done):
+    out, metrics = done
+    written = json.loads((out / "results.json").read_text())["metrics"]
+    assert written.keys() == metrics.keys()
+    for motion in MOTIONS:
+        for camera in CAMERAS:
+            for word in ("median", "p95"):
+                assert metrics[f"error_m.particle.{camera}.{motion}.{word}"].value > 0
+            assert 0 <= metrics[f"missed.{camera}.{motion}"].value <= 1
+
+
+def test_four_cameras_know_all_joints_better_than_any_one(done):
+    _, metrics = done
+    four = metrics["error_m.particle.multi.all.median"].value
+    assert four < 0.05
+    for camera in CAMERAS[:4]:
+        assert metrics[f"error_m.particle.{camera}.all.median"].value > four
+
+
+def test_report_and_figures_are_written(done):
+    out, _ = done
+    assert {path.name for path in (out / "figures").iterdir()} == {
+        "figure_6.png", "errors.png", "far_side.png",
+    }  # fmt: skip
+    assert (out / "report.html").read_text().count("data:image/png") == 3
+
+
+def test_what_is_finished_is_used_again(done, monkeypatch):
+    out, _ = done
+
+    def never(*args):
+        raise AssertionError("made again")
+
+    monkeypatch.setattr(experiment, "film", never)
+    before = (out / "results.json").read_text()
+    run(TINY, out, lambda share, label: None)
+    assert (out / "results.json").read_text() == before
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+def test_motions_stay_in_the_walkable_area(motion):
+    scene, config = laboratory(200)
+    for seed in range(4):
+        path = play(scene, motion, seed, 250, config.ctrl_dt).position_world[:, 0, 0]
+        (x0, x1), (y0, y1) = scene.grounds.walkable_x_m, scene.grounds.walkable_y_m
+        assert x0 - 0.3 < path[:, 0].min() <= path[:, 0].max() < x1 + 0.3
+        assert y0 - 0.3 < path[:, 1].min() <= path[:, 1].max() < y1 + 0.3
+
+
+def test_the_side_turned_away_is_the_far_one():
+    joints = np.zeros((15, 3))
+    for side, y in (("left", 0.2), ("right", -0.2)):
+        for part in ("shoulder", "hip"):
+            joints[JOINT[f"{side}_{part}"], 1] = y
+    np.testing.assert_array_equal(turned_away(joints, np.array([0.0, 5.0, 0.0])), RIGHT)
+    np.testing.assert_array_equal(turned_away(joints, np.array([0.0, -5.0, 0.0])), LEFT)
+    assert not turned_away(joints, np.array([5.0, 0.0, 0.0])).any()
+
+
+def test_what_cannot_work_is_explained():
+    with pytest.raises(ConfigError, match="--seeds must be at least 1"):
+        config_for(True, 0)
+    with pytest.raises(ConfigError, match="Films need"):
+        LabConfig(max_frames=5)

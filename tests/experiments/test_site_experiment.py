@@ -1,0 +1,72 @@
+"""The paper's simulation, in its smallest form."""
+
+import json
+
+import pytest
+
+from hrc_env.errors import ConfigError
+from hrc_env.experiments.site import experiment
+from hrc_env.experiments.site.experiment import SiteConfig, config_for, run
+
+TINY = SiteConfig(n_seeds=1, seconds=2.0, estimators=("particle",))
+CAMERAS = (*(f"camera_{k}" for k in range(1, 5)), "multi")
+
+
+@pytest.fixture(scope="module")
+def done(weights, tmp_path_factory):
+    out = tmp_path_factory.mktemp("site")
+    shares: list[float] = []
+    metrics = run(TINY, out, lambda share, label: shares.append(share))
+    return out, metrics, shares
+
+
+def test_every_number_is_there(done):
+    out, metrics, _ = done
+    written = json.loads((out / "results.json").read_text())["metrics"]
+    for name in ("particle", "kalman", "per_joint"):
+        for camera in CAMERAS:
+            assert metrics[f"rmse_m.{name}.{camera}"].value > 0
+    for camera in CAMERAS:
+        assert metrics[f"closed_rmse_m.particle.{camera}"].value > 0
+    assert {"rmse_m.particle.two", "rmse_m.particle.three"} <= written.keys() == metrics.keys()
+
+
+def test_four_cameras_know_the_head_and_one_does_not(done):
+    _, metrics, _ = done
+    four = metrics["rmse_m.particle.multi"].value
+    assert four < 0.1
+    assert metrics["rmse_m.per_joint.camera_1"].value > 2 * four
+
+
+def test_report_and_figures_are_written_and_the_progress_is_complete(done):
+    out, _, shares = done
+    assert sum(shares) == pytest.approx(1.0)
+    assert {path.name for path in (out / "figures").iterdir()} == {
+        "figure_3.png", "figure_4_particle.png", "rmse.png",
+    }  # fmt: skip
+    page = (out / "report.html").read_text()
+    assert page.count("data:image/png") == 3
+    assert "6.771" in page
+
+
+def test_what_is_finished_is_used_again(done, monkeypatch):
+    out, _, _ = done
+
+    def never(*args):
+        raise AssertionError("made again")
+
+    monkeypatch.setattr(experiment, "film", never)
+    monkeypatch.setattr(experiment, "closed_loop", never)
+    before = (out / "results.json").read_text()
+    run(TINY, out, lambda share, label: None)
+    assert (out / "results.json").read_text() == before
+
+
+def test_what_cannot_work_is_explained(tmp_path):
+    with pytest.raises(ConfigError, match="Did you mean 'particle'"):
+        config_for(True, None, ("partical",))
+    with pytest.raises(ConfigError, match="--seeds must be at least 1"):
+        config_for(True, 0, ("particle",))
+    (tmp_path / "experiment.json").write_text('{"experiment": "lab"}')
+    with pytest.raises(ConfigError, match="--overwrite"):
+        run(TINY, tmp_path, lambda share, label: None)
