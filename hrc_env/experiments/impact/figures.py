@@ -190,6 +190,7 @@ def _metres(axis: Axes, metrics: Metrics, late: Sequence[Eyes]) -> None:
     ]
     axis.set_xticks(x, labels, fontsize=12)
     axis.set_ylabel("extra metres", fontsize=12)
+    axis.set_ylim(0, 1.45 * axis.get_ylim()[1])  # room for the legend
     axis.grid(True, axis="y", color="0.9")
     axis.set_axisbelow(True)
     axis.legend(fontsize=10)
