@@ -138,7 +138,7 @@ class PerceptionBench:
     out: Path = Path("out/bench_perception")
     """Folder for results.json, tables, pictures and the parts that are done."""
     quick: bool = False
-    """Fewer episodes and crops: every number, with wider intervals, in less than four minutes."""
+    """Fewer episodes and crops: every number, with wider intervals."""
 
     def run(self) -> int:
         """Run, show the tables."""

@@ -17,7 +17,7 @@ class SiteExperiment:
     out: Path = Path("out/site")
     """Folder for report.html, results.json and figures; a run that was stopped goes on there."""
     quick: bool = False
-    """Every number, from fewer seeds, in less than four minutes."""
+    """Every number, from fewer seeds."""
     seeds: int | None = None
     """Walks, instead of 10 (2 if quick)."""
     estimator: tuple[str, ...] = ("particle", "paper")
@@ -41,7 +41,7 @@ class LabExperiment:
     out: Path = Path("out/lab")
     """Folder for report.html, results.json and figures; a run that was stopped goes on there."""
     quick: bool = False
-    """Every number, from fewer seeds, in less than four minutes."""
+    """Every number, from fewer seeds."""
     seeds: int | None = None
     """Films of every motion, instead of 10 (2 if quick)."""
     overwrite: bool = False
@@ -63,7 +63,7 @@ class ImpactExperiment:
     out: Path = Path("out/impact")
     """Folder for report.html, results.json and figures; a run that was stopped goes on there."""
     quick: bool = False
-    """Every number, from fewer episodes, in less than four minutes."""
+    """Every number, from fewer episodes."""
     seeds: int | None = None
     """Episodes of every row, instead of 200 (16 if quick)."""
     overwrite: bool = False

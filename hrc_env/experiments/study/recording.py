@@ -19,7 +19,7 @@ from hrc_env.scene.build import Scene
 from hrc_env.senses import make_senses
 from hrc_env.sensing.moment import Moment, Windows
 from hrc_env.tracking.estimators import make_estimator
-from hrc_env.typing import Bools, Covariances3, Floats, Ints, Points3
+from hrc_env.typing import Bools, Covariances3, Ints, Points3
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,6 @@ def record(
     estimator: str,
     seed: int,
     tick: Tick,
-    perception: str = "pixels",
 ) -> Recording:
     """Film a worker with every camera of a scene.
 
@@ -66,12 +65,11 @@ def record(
         motions: (T, 1, S, ...) of that worker, `config.ctrl_dt` apart.
         config: settings of eyes and tracker.
         estimator: whose predictions the crops follow.
-        seed: of its random numbers, and of the emulator's.
+        seed: of its random numbers.
         tick: hears of the progress: shares that sum to 1.
-        perception: "pixels", or "keypoints" for an emulated film.
     """
     body = stack(scene.bodies)
-    senses = make_senses(perception, estimator, scene, 1, config)
+    senses = make_senses("pixels", estimator, scene, 1, config)
     rngs = [[np.random.default_rng([seed, k])] for k in range(2)]
     n_frames = len(motions.position_world)
     q, ids, present = scene.home_q[None], np.zeros(1, int), np.ones((1, 1), bool)
@@ -103,7 +101,6 @@ def replay(
     n_start: int,
     config: HRCConfig,
     seed: int,
-    told_projections: Floats | None = None,
 ) -> Beliefs:
     """An estimator on the detections of some of the cameras.
 
@@ -114,11 +111,8 @@ def replay(
         n_start: so many frames are given of all cameras: no estimator begins a track with one.
         config: settings of the tracker.
         seed: of the estimator's random numbers.
-        told_projections: (C, 3, 4) of all cameras, in place of the true ones: a wrong
-            calibration.
     """
-    true_projections = projections(recording.scene.cameras)
-    P = true_projections if told_projections is None else told_projections
+    P = projections(recording.scene.cameras)
     unused = np.setdiff1d(np.arange(len(P)), cameras)
     tracker = make_estimator(estimator, P, recording.dt_s, config.tracker)
     state, rngs = tracker.init(1, 1), [np.random.default_rng([seed, 1])]
