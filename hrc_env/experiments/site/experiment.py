@@ -42,6 +42,8 @@ class SiteConfig:
     """How long each is."""
     estimators: tuple[str, ...] = ("particle", "paper")
     """Those of the table, which also make crops of their own."""
+    n_closed: int = 3
+    """So many of the walks are filmed again for everybody's own crops, which costs most."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for what cannot work."""
@@ -52,11 +54,13 @@ class SiteConfig:
         for name in self.estimators:
             if name not in ESTIMATORS:
                 raise unknown("estimator", name, ESTIMATORS)
+        if self.n_closed < 1:
+            raise ConfigError(f"n_closed must be at least 1, got {self.n_closed}.")
         if not self.seconds >= 2.0:
             raise ConfigError(f"Walks must be at least 2 s long, got {self.seconds}.")
 
 
-QUICK = SiteConfig(n_seeds=2, seconds=6.0)
+QUICK = SiteConfig(n_seeds=2, seconds=6.0, n_closed=1)
 """Every number, from fewer and shorter walks."""
 
 
@@ -72,9 +76,9 @@ def run(config: SiteConfig, out: Path, say: Say, overwrite: bool = False) -> dic
     seeds = [config.first_seed + k for k in range(config.n_seeds)]
     closed = rows_of(config.estimators, (1, 4))
     settings = {**asdict(config), "also": ALSO, "crops": CROPS}
-    shelf = Shelf(
-        out / "parts", fingerprint_of(settings, "site"), len(seeds) * (1 + len(closed)), say
-    )
+    again = seeds[: config.n_closed]
+    n_parts = len(seeds) + len(closed) * len(again)
+    shelf = Shelf(out / "parts", fingerprint_of(settings, "site"), n_parts, say)
     parts = Parts(
         films={seed: shelf.part(f"film.{seed}", partial(film, config, seed)) for seed in seeds},
         closed={
@@ -82,7 +86,7 @@ def run(config: SiteConfig, out: Path, say: Say, overwrite: bool = False) -> dic
                 f"closed.{row.name}.{seed}", partial(closed_loop, config, row, seed)
             )
             for row in closed
-            for seed in seeds
+            for seed in again
         },
         dt_s=HRCConfig().ctrl_dt,
         estimators=config.estimators,

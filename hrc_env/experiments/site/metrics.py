@@ -22,7 +22,7 @@ class Parts:
     films: Mapping[int, Said]
     """By seed: the truth, and what everybody made of the shared film."""
     closed: Mapping[tuple[str, int], Said]
-    """By name of a row and seed: what came of crops of one's own."""
+    """By name of a row and seed, of some walks: what came of crops of one's own."""
     dt_s: float
     estimators: tuple[str, ...]
     also: tuple[str, ...]
@@ -71,8 +71,9 @@ def _rmse(parts: Parts, rows: list[Row]) -> Metric:
 def _closed(parts: Parts, row: Row) -> Metric:
     return _from(
         [
-            squared_m2(film, parts.closed[row.name, seed], parts.dt_s)
-            for seed, film in parts.films.items()
+            squared_m2(parts.films[seed], said, parts.dt_s)
+            for (name, seed), said in parts.closed.items()
+            if name == row.name
         ]
     )
 

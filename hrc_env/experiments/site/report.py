@@ -46,7 +46,7 @@ def report(out: Path, config: "SiteConfig", metrics: Metrics) -> None:
         Section("What was done", _done(config, out / "figures")),
         Section("What came out", _came_out(config, metrics, everybody, out / "figures")),
         Section("Is it fair to the single camera?", _fair(metrics, everybody)),
-        Section("Two and three cameras, and crops of one's own", _more(metrics, config.estimators)),
+        Section("Two and three cameras, and crops of one's own", _more(metrics, config)),
         Section("What it does not mean", (ASSUMED, f"Settings: {asdict(config)}.")),
     ]
     write_report(out, TITLE, _lead(config, metrics), sections)
@@ -125,11 +125,12 @@ def _fair(metrics: Metrics, everybody: tuple[str, ...]) -> tuple[Part, ...]:
     return words + ABOUT_DEPTH, Table(header, tuple(rows))
 
 
-def _more(metrics: Metrics, estimators: tuple[str, ...]) -> tuple[Part, ...]:
+def _more(metrics: Metrics, config: "SiteConfig") -> tuple[Part, ...]:
     rows = []
-    for name in estimators:
+    for name in config.estimators:
         shown = [metrics[f"rmse_m.{name}.{word}"] for word in ("two", "three")]
         shown += [metrics[f"closed_rmse_m.{name}.{column}"] for column in COLUMNS]
         rows.append((f"`{name}`", *(said(each, 1, 3) for each in shown)))
     own = tuple(f"own crops, {spoken(column)}" for column in COLUMNS)
-    return Table(("RMSE [m]", "two", "three", *own), tuple(rows)), ABOUT_MORE
+    walks = f"Own crops: the first {min(config.n_closed, config.n_seeds)} of the walks, again. "
+    return Table(("RMSE [m]", "two", "three", *own), tuple(rows)), walks + ABOUT_MORE
