@@ -15,6 +15,7 @@ _POSITIVE = (
     "gate_sigma",
     "sigma_scale",
     "min_std_m",
+    "floor_std_m",
     "velocity_tau_s",
     "noise_tau_s",
     "noise_persists_s",
@@ -87,6 +88,9 @@ class TrackerConfig:
     does; 0 for a detector that is known to be wrong anew in every image. [0, 1)"""
     min_std_m: float = 0.005
     """No standard deviation, in any direction, is reported as less than this [m]."""
+    floor_std_m: float = 0.05
+    """Nobody stands below the floor, z = 0: a joint that the views put there is measured to be on
+    it, with this standard deviation [m] (kalman, particle); infinity: no floor is known."""
     velocity_tau_s: float = 0.2
     """Time constant of the difference filter for velocities (paper, triangulation) [s]."""
     hold_speed_m_s: float = 1.0

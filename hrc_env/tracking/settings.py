@@ -27,6 +27,7 @@ class Settings(NamedTuple):
     mean_correction: float
     one_view_inflation: float
     min_std_m: float
+    floor_std_m: float
 
 
 def settings_of(config: TrackerConfig) -> Settings:

@@ -75,6 +75,20 @@ def test_while_all_views_agree_there_is_one_hypothesis():
     assert (n_alive == 1).all()
 
 
+def test_nobody_who_looks_smaller_to_one_camera_goes_through_the_floor():
+    px = detections(walk(5, 70), Damage(), 5)[:, None]
+    px[25:, :, 1:] = np.nan
+    share = np.linspace(1.0, 0.55, 45)[:, None, None]
+    middle = px[25:, 0, 0][:, [7, 8]].mean(1, keepdims=True)
+    px[25:, 0, 0] = middle + share * (px[25:, 0, 0] - middle)
+    lowest = {}
+    for std in (0.05, np.inf):
+        e = make_estimator("particle", LAB, DT, TrackerConfig(floor_std_m=std))
+        lowest[std] = min(each.mean_world[0, 0, :, 2].min() for each in track(e, px)[25:])
+    assert lowest[np.inf] < -0.3
+    assert lowest[0.05] > -0.1
+
+
 def test_cameras_that_take_turns_leave_no_second_hypothesis():
     px = detections(walk(5, 100), Damage(), 5)[:, None]
     for t in range(40, 100):  # one view in every update, another one each time

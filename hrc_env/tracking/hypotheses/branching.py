@@ -137,7 +137,7 @@ def _reflect(slots, b, own, n, where, seen, s, m, scratch):
     contrast = contrast_of(s.outlier_weight, s.image_area_px)
     stiff_lengths(slots.bone_variance[b, new], give)
     bones = (slots.bone_length[b, new], give)
-    how = (contrast, m.search_steps, 0.0)
+    how = (contrast, s.floor_std_m, m.search_steps, 0.0)
     find_pose_near(prior[0], prior[1], prior[2], seen, bones, *how, belief, work)
     moved = 0.0
     for j in range(len(body)):
@@ -147,7 +147,7 @@ def _reflect(slots, b, own, n, where, seen, s, m, scratch):
         return np.inf
     body[:], cov[:], slope[:] = prior[0], prior[1], prior[2]
     update_tree(body, cov, slope, work)
-    found = log_evidence(prior, (body, cov, slope), seen, bones, contrast, work)
+    found = log_evidence(prior, (body, cov, slope), seen, bones, contrast, s.floor_std_m, work)
     if not found - evidence > m.log_least:
         return np.inf
     settle(slots, b, new, seen, s, scratch)

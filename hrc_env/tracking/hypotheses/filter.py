@@ -173,7 +173,9 @@ def _weigh(slots, b, k, seen, s, prior, scratch):
     contrast = contrast_of(s.outlier_weight, s.image_area_px)
     bones = (slots.bone_length[b, k], scratch[1])
     # the mean correction needs the factors that the evidence leaves alone
-    evidence = log_evidence(prior, (body, cov, slope), seen, bones, contrast, scratch[2])
+    evidence = log_evidence(
+        prior, (body, cov, slope), seen, bones, contrast, s.floor_std_m, scratch[2]
+    )
     settle(slots, b, k, seen, s, scratch)
     return evidence
 

@@ -24,7 +24,7 @@ _NOSE, _RIGHT_SHOULDER = JOINT["nose"], JOINT["right_shoulder"]
 
 
 @numba.njit(**LEAN)
-def log_evidence(prior, posterior, seen, bones, contrast, w):
+def log_evidence(prior, posterior, seen, bones, contrast, floor_std_m, w):
     """Log of the evidence of one update, up to what all hypotheses share.
 
     Args:
@@ -33,6 +33,7 @@ def log_evidence(prior, posterior, seen, bones, contrast, w):
         seen: P (C, 3, 4), z (J, C, 2), sigma (J, C), ok (J, C).
         bones: lengths (J,) [m] and their variances as measurements (J,) [m^2].
         contrast: as `proposal.contrast_of` gives.
+        floor_std_m: as in `tree.search.find_pose`.
         w: scratch `work.Work`; a, b, c, d and step are used.
     """
     body = posterior[0]
@@ -45,6 +46,7 @@ def log_evidence(prior, posterior, seen, bones, contrast, w):
             w.step[j, i] = 0.0
     _, log_det_after = tree_measure(posterior[1], posterior[2], w.step, w)
     likelihood = log_likelihood(body, seen, contrast) + _bones(body, bones)
+    likelihood += _floor(body, floor_std_m)
     return likelihood - 0.5 * square + 0.5 * (log_det_after - log_det)
 
 
@@ -133,6 +135,15 @@ def _bones(body, bones):
     for m in range(1, len(ORDER)):
         j = ORDER[m]
         total += _bone(body, j, PARENT[j], length[j], variance[j])
+    return total
+
+
+@numba.njit(**LEAN)
+def _floor(body, std_m):
+    """Log-likelihood of the floor: of what is below it."""
+    total = 0.0
+    for j in range(len(body)):
+        total -= 0.5 * (min(body[j, 2], 0.0) / std_m) ** 2
     return total
 
 

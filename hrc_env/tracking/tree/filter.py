@@ -104,7 +104,8 @@ def condition(state, b, w, seen, s, scratch):
     contrast = contrast_of(s.outlier_weight, s.image_area_px)
     stiff_lengths(state.bone_variance[b, w], give)
     bones = (state.bone_length[b, w], give)
-    find_pose(body, cov, slope, seen, bones, contrast, s.gauss_newton_steps, belief, work)
+    how = (contrast, s.floor_std_m, s.gauss_newton_steps)
+    find_pose(body, cov, slope, seen, bones, *how, belief, work)
     update_tree(body, cov, slope, work)
 
 

@@ -49,7 +49,7 @@ _REORDER = {"reassoc", "contract", "nsz"}
 
 
 @numba.njit(**LEAN)
-def find_pose(body, cov, slope, seen, bones, contrast, n_steps, belief, w):
+def find_pose(body, cov, slope, seen, bones, contrast, floor_std_m, n_steps, belief, w):
     """Search the most probable positions and leave everything linearised there.
 
     Args:
@@ -57,6 +57,7 @@ def find_pose(body, cov, slope, seen, bones, contrast, n_steps, belief, w):
         seen: P (C, 3, 4), z (J, C, 2), sigma (J, C), ok (J, C).
         bones: lengths (J,) to the parent [m] and their variances as measurements (J,) [m^2].
         contrast: as `proposal.contrast_of` gives.
+        floor_std_m: of the floor, as a measurement of whatever is below it [m].
         n_steps: Gauss-Newton steps.
         belief: (J, C) filled: how far each measurement is believed.
         w: scratch; the tree stays in its rows, and so do point and what cameras and bones say
@@ -66,11 +67,14 @@ def find_pose(body, cov, slope, seen, bones, contrast, n_steps, belief, w):
     for j in range(len(body)):
         for i in range(3):
             w.point[j, i] = body[j, i]
-    find_pose_near(body, cov, slope, seen, bones, contrast, n_steps, 1.0, belief, w)
+    how = (contrast, floor_std_m, n_steps, 1.0)
+    find_pose_near(body, cov, slope, seen, bones, *how, belief, w)
 
 
 @numba.njit(**LEAN)
-def find_pose_near(body, cov, slope, seen, bones, contrast, n_steps, widen, belief, w):
+def find_pose_near(
+    body, cov, slope, seen, bones, contrast, floor_std_m, n_steps, widen, belief, w
+):  # fmt: skip
     """As `find_pose`, but the search begins at w.point (J, 3) instead of the predicted means.
 
     `widen` times the prior's own image variance is added to the detector's in the first step.
@@ -85,6 +89,7 @@ def find_pose_near(body, cov, slope, seen, bones, contrast, n_steps, widen, beli
     for step in range(n_steps + 1):
         widening = widen if step < n_steps - 1 else 0.0
         _linearise_cameras(w.views, seen[0], contrast, widening, belief, w)
+        _stand_on_the_floor(rows, 1.0 / floor_std_m**2)
         for quad in range(QUADS):
             fetch_above(rows, quad, SHIFT, ABOVE_SHIFT, 6)
             linearise_bones(rows, quad * QUAD)
@@ -151,6 +156,21 @@ def _take_cameras(sums, first, rows, at):
         rows[k + 24] = sums[n + 6 * LANES] + i00 * x + i01 * y + i02 * z
         rows[k + 28] = sums[n + 7 * LANES] + i01 * x + i11 * y + i12 * z
         rows[k + 32] = sums[n + 8 * LANES] + i02 * x + i12 * y + i22 * z
+
+
+@numba.njit(**LEAN)
+def _stand_on_the_floor(rows, information):
+    """Joints that are below the floor are measured to be on it; the others hear nothing of it.
+
+    One view leaves the depth open, and a body that looks small is as well a far one. It would go
+    through the floor for that.
+    """
+    for quad in range(QUADS):
+        for lane in range(4):
+            m = offset(quad * QUAD + lane)
+            if rows[m + POINT + 8] < 0.0:
+                rows[m + CAMERA + 20] += information
+                rows[m + CAMERA + 32] -= information * rows[m + MEAN + 8]
 
 
 @numba.njit(fastmath=_REORDER, **LEAN)
