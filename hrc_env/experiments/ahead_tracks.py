@@ -114,7 +114,7 @@ def _frames(
     scene.reset(everyone, [np.random.default_rng([seed, 9]) for seed in seeds])
     pushes, sensors = ([np.random.default_rng([seed, kind]) for seed in seeds] for kind in (10, 11))
     errors = emulator.make_state(len(seeds), len(cameras), 1, config.ctrl_dt, config.emulator)
-    emulator.reset(errors, everyone, sensors, config.emulator)
+    emulator.reset(errors, everyone, sensors)
     action = np.zeros((len(seeds), scene.n_actions))
     for _ in range(n_frames):
         push = np.stack([rng.standard_normal(scene.n_actions) for rng in pushes])

@@ -18,7 +18,7 @@ from hrc_env.errors import ConfigError
 from hrc_env.skeleton import JOINTS, MIRROR
 from hrc_env.typing import Floats, Ints
 
-FORMAT, VERSION = "hrc_env keypoints", 1
+FORMAT, VERSION = "hrc_env keypoints", 2
 """Version: what the tables mean. A file of another one is refused."""
 PACKAGED = Path(__file__).with_name("keypoints.json")
 
@@ -31,6 +31,8 @@ N_VIEWS = 8
 """Directions from which a body is seen: front, front left, left and so on."""
 KNOTS = (-2.0, -1.0, 0.0, 1.0, 2.0)
 """Quantiles that a confidence's distribution is given by, in standard deviations."""
+BODY_KNOTS = (-3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0)
+"""The same of the factor that the errors of a whole body have."""
 N_SEEN = len(JOINTS) + 1
 """From none to all."""
 VISIBILITY: Floats = np.array([0.10, 0.35, 0.65, 0.875, 0.975])
@@ -44,6 +46,7 @@ INNER: Ints = np.array([0, 1, 2, 1, 2, 3, 4, 7, 8, 7, 8, 9, 10, 11, 12])
 """(J,) the next joint towards the trunk; itself for those of the trunk."""
 
 _P, _K, _S, _Z = len(POSTURES), len(KINDS), len(SIGHTS), len(KNOTS)
+_Q = len(BODY_KNOTS)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,11 +64,14 @@ class Calibration:
     size: Floats
     """(P, S, K) median over time of the standard deviation of each coordinate, of side."""
     spread: Floats
-    """(P, S, K) standard deviation of its logarithm."""
+    """(P, S, K) standard deviation of its logarithm, joint by joint."""
+    body: Floats
+    """(P, Q) quantiles of the logarithm of a factor that all joints of a body have in common in a
+    camera, least first, at `BODY_KNOTS`: now and then a body is seen badly as a whole."""
     size_s: Floats
-    """() for how long it lasts [s]."""
+    """() for how long both last [s]."""
     common: Floats
-    """() share of its variance that all of a body's joints have in common in an image."""
+    """() share of the sizes' variance that this factor is: how far the confidence follows it."""
     shares: Floats
     """(K, 3) shares of a camera's variance: a function of the view that stays for an episode;
     what lasts for `slow_s`; what is new in every image. They add up to 1."""
@@ -81,24 +87,25 @@ class Calibration:
     follows: Floats
     """(S, K) correlation of visibility and smallness of the error."""
     swap_share: Floats
-    """(A, 2) share of the time that a camera exchanges left and right by the view: of all joints,
-    of knees, ankles and feet alone."""
+    """(P, A, 2) share of the time that a camera exchanges left and right by the view: of all
+    joints, of knees, ankles and feet alone."""
     swap_s: Floats
-    """(2,) mean length of such a burst [s]."""
+    """(2,) time constant of the slow normal variable whose lower tail that is [s]."""
     miss_share: Floats
     """(P, 16) share of the time that a camera does not find a worker by how many joints of it
     are seen, 0 to 15."""
     miss_s: Floats
-    """() mean length of that [s]."""
+    """() the same of that [s]."""
     sigma: Floats
     """(K, V) what is told of the standard deviation, a share of the stature, at `VISIBILITY`."""
 
 
 SHAPES: dict[str, tuple[int, ...]] = {
     "offset_m": (_P, _K, 3), "wander_m": (_P, _K, 3), "bias": (N_VIEWS, _K, 2),
-    "size": (_P, _S, _K), "spread": (_P, _S, _K), "size_s": (), "common": (), "shares": (_K, 3),
+    "size": (_P, _S, _K), "spread": (_P, _S, _K), "body": (_P, _Q),
+    "size_s": (), "common": (), "shares": (_K, 3),
     "slow_s": (), "slow_m": (), "limb": (_K,), "confidence": (_P, _S, _K, _Z), "follows": (_S, _K),
-    "swap_share": (N_VIEWS, 2), "swap_s": (2,), "miss_share": (_P, N_SEEN), "miss_s": (),
+    "swap_share": (_P, N_VIEWS, 2), "swap_s": (2,), "miss_share": (_P, N_SEEN), "miss_s": (),
     "sigma": (_K, len(VISIBILITY)),
 }  # fmt: skip
 _POSITIVE = ("size", "size_s", "slow_s", "slow_m", "swap_s", "miss_s", "sigma")

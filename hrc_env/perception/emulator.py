@@ -27,20 +27,18 @@ from hrc_env.perception.calibration import (
     read_calibration,
 )
 from hrc_env.perception.emulator_kernel import (
-    CENTRE,
     N_NORMALS,
+    N_OF_BODY,
     Errors,
-    Rig,
     Scalars,
     Tables,
-    World,
     emulate_batch,
-    sight_batch,
 )
 from hrc_env.perception.eyes import STATURE_OF_SIDE
+from hrc_env.perception.sightlines import CENTRE, Rig, World, sight_batch
 from hrc_env.records import Keypoints, WorkerTruth
 from hrc_env.skeleton import MIRROR, N_JOINTS
-from hrc_env.typing import Bools, Floats, Ints
+from hrc_env.typing import Floats, Ints
 
 Generators = Sequence[np.random.Generator]
 
@@ -85,7 +83,7 @@ class EmulatorConfig:
         known = read_calibration(self.calibration or None)
         if self.swap_share is not None:
             share = np.zeros_like(known.swap_share)
-            share[:, 0] = self.swap_share
+            share[..., 0] = self.swap_share
             known = replace(known, swap_share=share)
         if self.miss_share is not None:
             known = replace(known, miss_share=np.full_like(known.miss_share, self.miss_share))
@@ -105,15 +103,12 @@ class EmulatorState:
     sure: Floats
     """(B, C, W, J) the confidence, as far as it does not follow the size."""
     body: Floats
-    """(B, C, W) logarithm of the errors' size: the whole body's part."""
+    """(B, C, W) the whole body's factor on the errors' size."""
     wander: Floats
     """(B, W, J, 3) what is the same in every camera: ahead, to the joint's own side, up."""
-    swapped: Bools
-    """(B, C, W) whether left and right are exchanged now."""
-    crossed: Bools
-    """(B, C, W) whether those of the legs are."""
-    missed: Bools
-    """(B, C, W) whether the worker is lost now."""
+    happening: Floats
+    """(B, C, W, 3) the lower, the sooner left and right are exchanged, those of the legs alone,
+    nobody is found."""
     dt_s: float
     """Time between images [s]."""
 
@@ -132,25 +127,20 @@ def make_state(
         sure=np.zeros((*lead, N_JOINTS)),
         body=np.zeros(lead),
         wander=np.zeros((batch, n_workers, N_JOINTS, 3)),
-        swapped=np.zeros(lead, bool),
-        crossed=np.zeros(lead, bool),
-        missed=np.zeros(lead, bool),
+        happening=np.zeros((*lead, 3)),
         dt_s=dt_s,
     )
 
 
-def reset(state: EmulatorState, ids: Ints, rngs: Generators, config: EmulatorConfig) -> None:
+def reset(state: EmulatorState, ids: Ints, rngs: Generators) -> None:
     """Begin environments `ids` anew with errors drawn from how they are in the long run."""
-    known = config.calibrated()
-    swap, cross = known.swap_share.mean(0)
-    shares = {"swapped": swap, "crossed": cross, "missed": known.miss_share[0, -1]}
+    arrays = (
+        state.lasting, state.slow, state.size, state.sure, state.body, state.wander,
+        state.happening,
+    )  # fmt: skip
     for b in ids:
-        for name in ("lasting", "slow", "size", "sure", "body", "wander"):
-            array = getattr(state, name)
+        for array in arrays:
             array[b] = rngs[b].standard_normal(array.shape[1:])
-        for name, share in shares.items():
-            array = getattr(state, name)
-            array[b] = rngs[b].random(array.shape[1:]) < share
 
 
 def emulate(
@@ -175,24 +165,23 @@ def emulate(
         Keypoints in pixels of the images, as lenses bend them, with NaN, 0 and infinity where a
         camera does not see a worker.
     """
-    batch, n_cameras, n_workers = state.swapped.shape
+    batch, n_cameras, n_workers = state.body.shape
     shape = (batch, n_cameras, n_workers, N_JOINTS)
     robot = surroundings.capsules_world
     check_shape("surroundings.capsules_world", (len(robot),), (batch,), "environments")
     n_images = n_cameras * n_workers
-    normals = np.empty((batch, 3 * N_JOINTS * n_workers + (N_NORMALS * N_JOINTS + 1) * n_images))
-    uniforms = np.empty((*shape[:3], 3))
-    for rng, normal, uniform in zip(rngs, normals, uniforms, strict=True):
+    n_normals = 3 * N_JOINTS * n_workers + (N_NORMALS * N_JOINTS + N_OF_BODY) * n_images
+    normals = np.empty((batch, n_normals))
+    for rng, normal in zip(rngs, normals, strict=True):
         rng.standard_normal(out=normal)
-        rng.random(out=uniform)
     tables, scalars = _settings(config, state.dt_s)
     errors = Errors(
         state.lasting, state.slow, state.size, state.sure, state.body, state.wander,
-        state.swapped, state.crossed, state.missed,
+        state.happening,
     )  # fmt: skip
     out = Keypoints(np.empty((*shape, 2)), np.empty(shape), np.empty(shape))
     emulate_batch(
-        errors, normals, uniforms, _world(truth, surroundings), _rig(cameras), tables, scalars,
+        errors, normals, _world(truth, surroundings), _rig(cameras), tables, scalars,
         out.px, out.confidence, out.sigma_px,
     )  # fmt: skip
     return out
@@ -204,7 +193,7 @@ def lines_of_sight(
     """How each camera sees each joint and each worker, as the emulator has it.
 
     Returns:
-        (B, C, W, J) `emulator_kernel.SEEN`, `HIDDEN`, `OUTSIDE` or `BEHIND`; (B, C, W, 4) side
+        (B, C, W, J) `sightlines.SEEN`, `HIDDEN`, `OUTSIDE` or `BEHIND`; (B, C, W, 4) side
         [px] and turn [rad] of the window, view [rad] and folding.
     """
     batch, n_workers, n_joints = truth.joints_world.shape[:3]
@@ -264,20 +253,21 @@ def _settings(config: EmulatorConfig, dt_s: float) -> tuple[Tables, Scalars]:
     confidence = np.clip(known.confidence, 1e-6, 1 - 1e-6)
     numbers = (
         known.offset_m, known.wander_m, known.bias, np.log(known.size), known.spread,
-        np.sqrt(known.shares), known.limb, np.log(confidence / (1 - confidence)), known.follows,
+        known.body, np.sqrt(known.shares), known.limb, np.log(confidence / (1 - confidence)),
+        known.follows,
         known.swap_share, known.miss_share, known.sigma, VISIBILITY, KIND, HAND, INNER, MIRROR,
     )  # fmt: skip
     copies: list[Any] = [np.array(each) for each in numbers]
     tables = Tables(*copies)  # writable: one type for the kernel
     keep_size = float(np.exp(-dt_s / known.size_s))
-    swap_end, cross_end, miss_end = (
-        min(dt_s / float(lasts_s), 1.0) for lasts_s in (*known.swap_s, known.miss_s)
+    keep_swap, keep_cross, keep_miss = (
+        float(np.exp(-dt_s / lasts_s)) for lasts_s in (*known.swap_s, known.miss_s)
     )
     scalars = Scalars(
         float(dt_s / known.slow_s), float(dt_s / known.slow_m), keep_size,
         float(np.sqrt(1 - keep_size**2)), float(np.sqrt(known.common)),
         float(np.sqrt(1 - known.common)), config.error_scale, config.max_error,
-        swap_end, cross_end, miss_end, config.min_joints,
+        keep_swap, keep_cross, keep_miss, config.min_joints,
         config.outside_confidence, STATURE_OF_SIDE,
     )  # fmt: skip
     return tables, scalars

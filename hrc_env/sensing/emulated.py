@@ -36,7 +36,7 @@ class EmulatedSenses(TrackingSenses):
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
         """Forget the tracks and the detector's slow errors."""
         super().reset(ids, sensor_rngs, tracker_rngs)
-        emulator.reset(self.emulator, ids, sensor_rngs, self.config)
+        emulator.reset(self.emulator, ids, sensor_rngs)
 
     def detect(self, now: Moment, predicted: Any, sensor_rngs: Generators) -> Keypoints:
         """Emulated keypoints; room, robot and bodies stand in the lines of sight."""

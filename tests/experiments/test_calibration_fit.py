@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hrc_env.experiments.calibration.clips import FAMILIES, fit_clips, unseen_clips
-from hrc_env.experiments.calibration.fit import fit
+from hrc_env.experiments.calibration.fit.fit import fit
 from hrc_env.experiments.calibration.samples import Samples
 from hrc_env.motion.repertoire import REPERTOIRE
 from hrc_env.perception.calibration import INNER, KIND, KINDS, N_VIEWS

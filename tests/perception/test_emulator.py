@@ -6,11 +6,12 @@ import dataclasses
 import numpy as np
 import pytest
 from people import truth
+from scipy.stats import multivariate_normal, norm
 
 from hrc_env.errors import ConfigError
 from hrc_env.geometry.cameras import pinhole, project, projections
 from hrc_env.geometry.sight import Surroundings, nothing
-from hrc_env.perception.calibration import KINDS, read_calibration, write_calibration
+from hrc_env.perception.calibration import KINDS, N_VIEWS, read_calibration, write_calibration
 from hrc_env.perception.emulator import (
     EmulatorConfig,
     emulate,
@@ -18,7 +19,7 @@ from hrc_env.perception.emulator import (
     make_state,
     reset,
 )
-from hrc_env.perception.emulator_kernel import HIDDEN, SEEN, SIDE
+from hrc_env.perception.sightlines import HIDDEN, SEEN, SIDE
 from hrc_env.skeleton import JOINT, MIRROR, N_JOINTS
 
 DT = 0.04
@@ -104,7 +105,7 @@ def calibrated(tmp_path, **changes):
 def plain(**changes):
     """Tables of errors of one size that all cameras have for themselves."""
     known = read_calibration()
-    zeros = ("offset_m", "wander_m", "bias", "spread", "limb")
+    zeros = ("offset_m", "wander_m", "bias", "spread", "body", "limb")
     tables = {name: np.zeros_like(getattr(known, name)) for name in zeros}
     shares = np.zeros_like(known.shares)
     shares[:, 1] = 1.0
@@ -217,19 +218,25 @@ def test_a_swap_exchanges_left_and_right():
     np.testing.assert_allclose(seen.px, px[..., MIRROR, :], atol=1e-9)
 
 
-def test_swaps_and_misses_take_their_share_of_the_time_in_bursts():
-    config = dataclasses.replace(EXACT, swap_share=0.1, miss_share=0.2)
+def test_swaps_and_misses_take_their_share_of_the_time_and_last(tmp_path):
+    half = {"swap_s": np.full(2, 0.5), "miss_s": np.array(0.5)}
+    known = calibrated(tmp_path, **half, swap_share=np.zeros((2, N_VIEWS, 2)))
+    config = dataclasses.replace(EXACT, calibration=known.calibration, swap_share=0.1)
+    config = dataclasses.replace(config, miss_share=0.2)
     state, rngs = start(64, config)
     true, swapped, missed = truth(64), [], []
+    px, _ = project(projections(CAMERAS), true.joints_world)
     for _ in range(300):
-        seen = emulate(state, rngs, true, nothing(64), CAMERAS, config)
-        swapped.append(state.swapped.copy())
-        missed.append(np.isnan(seen.px[..., 0]).all(-1))
-    assert np.mean(swapped) == pytest.approx(0.1, abs=0.02)
+        seen = emulate(state, rngs, true, nothing(64), CAMERAS, config).px
+        swapped.append((np.abs(seen - px[..., MIRROR, :]) < 1e-6).all((-1, -2)))
+        missed.append(np.isnan(seen[..., 0]).all(-1))
+    looked = ~np.array(missed)
+    assert np.array(swapped)[looked].mean() == pytest.approx(0.1, abs=0.02)
     assert np.mean(missed) == pytest.approx(0.2, abs=0.03)
-    begun = np.array(swapped)[1:] & ~np.array(swapped)[:-1]
-    length_s = DT * np.sum(swapped) / max(np.sum(begun), 1)
-    assert length_s == pytest.approx(read_calibration().swap_s[0], rel=0.2)
+    lag = 5
+    both = (np.array(missed)[lag:] & np.array(missed)[:-lag]).mean() / np.mean(missed)
+    again = multivariate_normal([0, 0], [[1, r := np.exp(-lag * DT / 0.5)], [r, 1]])
+    assert both == pytest.approx(again.cdf([norm.ppf(0.2)] * 2) / 0.2, abs=0.05)
 
 
 @pytest.mark.parametrize("batch", [1, 3, 7])
@@ -255,7 +262,7 @@ def test_a_copied_state_replays_the_same_errors():
 def test_a_reset_touches_only_its_own_environments():
     state, rngs = start(3, CONFIG)
     before = copy.deepcopy(state)
-    reset(state, np.array([1]), rngs, CONFIG)
+    reset(state, np.array([1]), rngs)
     np.testing.assert_array_equal(state.slow[[0, 2]], before.slow[[0, 2]])
     assert not np.array_equal(state.slow[1], before.slow[1])
 

@@ -2,17 +2,18 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from hrc_env.config import HRCConfig
 from hrc_env.errors import ConfigError
-from hrc_env.experiments.calibration.clips import Clip, family_of, fit_clips
-from hrc_env.experiments.calibration.fit import fit, scaled
+from hrc_env.experiments.calibration.clips import fit_clips
+from hrc_env.experiments.calibration.fit.fit import fit
+from hrc_env.experiments.calibration.matching import matched
 from hrc_env.experiments.calibration.plot import plot_comparison
 from hrc_env.experiments.calibration.samples import samples_of
 from hrc_env.experiments.calibration.shelf import kept
-from hrc_env.experiments.calibration.validate import Compared, compared, outcome
-from hrc_env.experiments.calibration.watch import Watched, watch
+from hrc_env.experiments.calibration.validate import Compared, compared
 from hrc_env.perception.calibration import Calibration, write_calibration
 from hrc_env.perception.emulator import EmulatorConfig
 from hrc_env.provenance import provenance
@@ -47,32 +48,15 @@ def calibrate(run: CalibrationRun, out: Path, say: Say) -> Calibration:
     for clip, seen in zip(clips, kept("pixels", clips, HRCConfig(), folder_of(out)), strict=True):
         pixels.append(seen)
         say(0.85 / len(clips), f"{clip.scene}: {clip.motion}")
-    draft = fit(samples_of(pixels))
-    made = _made(run, out, len(clips))
-    write_calibration(out.with_suffix(".fit"), draft, made)
-    calibration = _matched(draft, clips, pixels, out.with_suffix(".fit"), say)
-    write_calibration(out, calibration, made)
-    out.with_suffix(".fit").unlink()
+    rest = partial(_part, say, 0.15)
+    calibration = matched(fit(samples_of(pixels)), clips, pixels, out.with_suffix(".fit"), rest)
+    write_calibration(out, calibration, _made(run, out, len(clips)))
     return calibration
 
 
-def _matched(
-    draft: Calibration, clips: list[Clip], pixels: list[Watched], path: Path, say: Say
-) -> Calibration:
-    """The draft with errors scaled so that the tracker's median error is that of the pixels, one
-    factor for upright motions and one for those that fold the body."""
-    config = replace(HRCConfig(), emulator=EmulatorConfig(calibration=str(path)))
-    emulated = []
-    for watched in watch("keypoints", clips, config):
-        emulated.append(watched)
-        say(0.15 / len(clips), "emulator")
-    is_folded = [family_of(clip.motion) == "fold" for clip in clips]
-    factors = []
-    for wanted in (False, True):
-        mine = [k for k, folded in enumerate(is_folded) if folded == wanted]
-        one, other = (outcome([level[k] for k in mine]) for level in (pixels, emulated))
-        factors.append(one.median_m / other.median_m)
-    return scaled(draft, *factors)
+def _part(say: Say, part: float, share: float, label: str) -> None:
+    """Tell of progress in a part of the whole."""
+    say(part * share, label)
 
 
 def compare(run: CalibrationRun, out: Path, say: Say) -> Compared:

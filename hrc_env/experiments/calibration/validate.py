@@ -14,7 +14,7 @@ from hrc_env.config import HRCConfig
 from hrc_env.experiments.calibration.clips import FAMILIES, WARM_UP, Clip, family_of, unseen_clips
 from hrc_env.experiments.calibration.shelf import kept
 from hrc_env.experiments.calibration.watch import Watched, watch
-from hrc_env.perception.emulator_kernel import SEEN
+from hrc_env.perception.sightlines import SEEN
 from hrc_env.results import Metric
 from hrc_env.typing import Floats
 

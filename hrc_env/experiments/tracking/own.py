@@ -75,7 +75,7 @@ def _episodes(seeds: tuple[int, ...]) -> tuple[Points3, Keypoints, Keypoints]:
         for _ in range(2)
     ]
     for state, own in zip(states, rngs, strict=False):
-        emulator.reset(state, everyone, own, config.emulator)
+        emulator.reset(state, everyone, own)
     joints, seen = [], ([], [])  # type: ignore[var-annotated]
     action = np.zeros((batch, simulation.n_actions))
     for _ in range(OWN_FRAMES):

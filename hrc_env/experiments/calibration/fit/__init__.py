@@ -1,0 +1,1 @@
+"""The fit of the emulator: tables of errors from samples, one after the other."""

@@ -1,0 +1,115 @@
+"""The last touch of a calibration: play the same clips with the emulator, and close what is open.
+
+The fit takes one table after the other, and what is drawn from all of them together is not quite
+what was measured: sizes, whole bodies that are seen badly, and the error in space are compared
+with those of the pixels, and corrected by what they are off.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from hrc_env.config import HRCConfig
+from hrc_env.experiments.calibration.clips import Clip, family_of
+from hrc_env.experiments.calibration.fit.body import body_spread
+from hrc_env.experiments.calibration.fit.cells import FEW, N_K, N_P, N_S, Cells
+from hrc_env.experiments.calibration.samples import Samples, samples_of
+from hrc_env.experiments.calibration.validate import outcome
+from hrc_env.experiments.calibration.watch import Watched, watch
+from hrc_env.perception.calibration import Calibration, write_calibration
+from hrc_env.perception.emulator import EmulatorConfig
+from hrc_env.typing import Floats
+
+IN_THE_IMAGE, IN_SPACE = 2, 2
+"""Rounds: first errors in the image are matched, then those in space."""
+STEP = (0.75, 1.3)
+"""No number changes by more than such a factor in a round."""
+DRAWS = 2
+"""How often the emulator plays every clip in a round."""
+DAMPED = 0.7
+"""Power of the factors in space: what the emulator draws by chance is not to be fitted."""
+Say = Callable[[float, str], None]
+"""Told by how much the share that is done grew, and what is being done."""
+
+
+def matched(
+    draft: Calibration, clips: list[Clip], pixels: list[Watched], path: Path, say: Say
+) -> Calibration:
+    """A draft, corrected so that the emulator does to these clips what the pixels did.
+
+    Args:
+        draft: what the fit gave.
+        clips: K of them.
+        pixels: (K) what was seen of them.
+        path: a file that may be written while this runs.
+        say: hears of the progress: shares that sum to 1.
+    """
+    wanted, n_rounds = samples_of(pixels), IN_THE_IMAGE + IN_SPACE
+    for k in range(n_rounds):
+        write_calibration(path, draft, {})
+        part = 1 / n_rounds / DRAWS / len(clips)
+        emulated = _emulated(clips, path, lambda part=part: say(part, "emulator"))
+        if k < IN_THE_IMAGE:
+            draft = _as_in_the_image(draft, wanted, samples_of(emulated))
+        else:
+            draft = _as_in_space(draft, clips, pixels, emulated)
+    path.unlink()
+    return draft
+
+
+def _emulated(clips: list[Clip], path: Path, tick: Callable[[], None]) -> list[Watched]:
+    """Every clip `DRAWS` times."""
+    config = replace(HRCConfig(), emulator=EmulatorConfig(calibration=str(path)))
+    seen = []
+    for draw in range(DRAWS):
+        for watched in watch("keypoints", [replace(clip, draw=draw) for clip in clips], config):
+            seen.append(watched)
+            tick()
+    return seen
+
+
+def _as_in_the_image(draft: Calibration, wanted: Samples, drawn: Samples) -> Calibration:
+    """Sizes by cell, and how badly whole bodies are seen, moved by what they are off."""
+    cells, others = Cells(wanted), Cells(drawn)
+    body = draft.body * _limited(body_spread(cells) / body_spread(others))[:, None]
+    size = draft.size * _limited(_medians(cells) / _medians(others), _trust(cells))
+    return replace(draft, size=size, body=body)
+
+
+def _medians(cells: Cells) -> Floats:
+    """(P, S, K) median length of the errors; 1 where there are hardly any."""
+    length, table = np.linalg.norm(cells.mirrored, axis=-1), np.ones((N_P, N_S, N_K))
+    for cell in np.ndindex(*table.shape):
+        mine = cells.pick(*cell)
+        if mine.sum() >= 30:
+            table[cell] = np.median(length[mine])
+    return table
+
+
+def _trust(cells: Cells) -> Floats:
+    """(P, S, K) how far a cell has enough samples to speak for itself."""
+    count = np.zeros((N_P, N_S, N_K))
+    for cell in np.ndindex(*count.shape):
+        count[cell] = cells.pick(*cell).sum()
+    return np.where(count >= 30, count / (count + FEW), 0.0)
+
+
+def _limited(factor: Floats, trust: Floats | float = 1.0) -> Floats:
+    return np.clip(factor, *STEP) ** trust
+
+
+def _as_in_space(
+    draft: Calibration, clips: list[Clip], pixels: list[Watched], emulated: list[Watched]
+) -> Calibration:
+    """Errors scaled by what the tracker's median error is off: one factor for upright motions, one
+    for those that fold the body."""
+    is_folded = [family_of(clip.motion) == "fold" for clip in clips]
+    factors = []
+    for wanted in (False, True):
+        mine = [k for k, folded in enumerate(is_folded) if folded == wanted]
+        drawn = [emulated[k + draw * len(clips)] for k in mine for draw in range(DRAWS)]
+        factors.append(outcome([pixels[k] for k in mine]).median_m / outcome(drawn).median_m)
+    factor = _limited(np.array(factors) ** DAMPED)[:, None, None]
+    return replace(draft, size=draft.size * factor, wander_m=draft.wander_m * factor)
