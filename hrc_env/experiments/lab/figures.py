@@ -97,11 +97,17 @@ def draw_errors(path: Path, metrics: Mapping[str, Metric]) -> None:
             )  # fmt: skip
         axis.set_yscale("log")
         axis.set_title(f"{title}, all joints, particle", fontsize=13)
-        axis.set_xticks(np.arange(len(MOTIONS)), [SPOKEN_MOTIONS[m] for m in MOTIONS], rotation=20)
+        _name_motions(axis)
         axis.grid(axis="y", which="both", alpha=0.25)
     figure.axes[0].set_ylabel("error [mm], log scale", fontsize=12)
     figure.axes[0].legend(fontsize=10)
     _save(figure, path)
+
+
+def _name_motions(axis: Any) -> None:
+    """Write the motions under an axis."""
+    names = [SPOKEN_MOTIONS[motion] for motion in MOTIONS]
+    axis.set_xticks(np.arange(len(MOTIONS)), names, rotation=25, ha="right")
 
 
 def draw_far_side(path: Path, metrics: Mapping[str, Metric]) -> None:
@@ -116,7 +122,7 @@ def draw_far_side(path: Path, metrics: Mapping[str, Metric]) -> None:
             found = [metrics[f"{key}.{column}.{motion}"].value for motion in MOTIONS]
             axis.bar(np.arange(len(MOTIONS)) + 0.2 * (k - 1.5), found, 0.2, label=SPOKEN[column])
         axis.set_title(f"Far-side joints {title}", fontsize=13)
-        axis.set_xticks(np.arange(len(MOTIONS)), [SPOKEN_MOTIONS[m] for m in MOTIONS], rotation=20)
+        _name_motions(axis)
         axis.set_ylim(0, 1)
     axes[0].set_ylabel("share", fontsize=12)
     axes[0].legend(fontsize=10)
