@@ -16,6 +16,7 @@ _POSITIVE = (
     "sigma_scale",
     "min_std_m",
     "floor_std_m",
+    "bone_give",
     "velocity_tau_s",
     "noise_tau_s",
     "noise_persists_s",
@@ -91,6 +92,9 @@ class TrackerConfig:
     floor_std_m: float = 0.05
     """Nobody stands below the floor, z = 0: a joint that the views put there is measured to be on
     it, with this standard deviation [m] (kalman, particle); infinity: no floor is known."""
+    bone_give: float = 1.5
+    """Factor on how much bones give (kalman, particle): what a detector takes for a joint wanders
+    on the body, so that even a rigid bone seems to change its length; 1 for points that do not."""
     velocity_tau_s: float = 0.2
     """Time constant of the difference filter for velocities (paper, triangulation) [s]."""
     hold_speed_m_s: float = 1.0

@@ -28,6 +28,7 @@ class Settings(NamedTuple):
     one_view_inflation: float
     min_std_m: float
     floor_std_m: float
+    bone_give: float
 
 
 def settings_of(config: TrackerConfig) -> Settings:

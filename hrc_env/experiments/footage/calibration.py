@@ -83,7 +83,8 @@ def meeting_point(cameras: list[PinholeCamera]) -> Points3:
 
 
 def tracker_config(cameras: list[PinholeCamera]) -> TrackerConfig:
-    """Where a rig expects somebody: where it looks, give or take half its mean distance."""
+    """Where a rig expects somebody: where it looks, give or take half its mean distance; where the
+    floor is, the file does not say."""
     point = meeting_point(cameras)
     distances_m = [float(np.linalg.norm(camera.eye_world - point)) for camera in cameras]
     x, y, z = (float(value) for value in point)
@@ -91,6 +92,7 @@ def tracker_config(cameras: list[PinholeCamera]) -> TrackerConfig:
         prior_mean_world=(x, y, z),
         prior_std_m=float(np.mean(distances_m)) / 2,
         image_area_px=float(np.mean([c.width_px * c.height_px for c in cameras])),
+        floor_std_m=float("inf"),
     )
 
 

@@ -135,7 +135,7 @@ def _reflect(slots, b, own, n, where, seen, s, m, scratch):
     if not reflect(part, seen[0][camera], body, work.point):
         return np.inf
     contrast = contrast_of(s.outlier_weight, s.image_area_px)
-    stiff_lengths(slots.bone_variance[b, new], give)
+    stiff_lengths(slots.bone_variance[b, new], s.bone_give, give)
     bones = (slots.bone_length[b, new], give)
     how = (contrast, s.floor_std_m, m.search_steps, 0.0)
     find_pose_near(prior[0], prior[1], prior[2], seen, bones, *how, belief, work)

@@ -25,10 +25,10 @@ def population_edges() -> tuple[Floats, Floats]:
 
 
 @numba.njit(**LEAN)
-def stiff_lengths(variance, out):
+def stiff_lengths(variance, give, out):
     """Variances (J,) of the lengths as measurements: what is not known of them, and the give."""
     for j in range(len(variance)):
-        out[j] = variance[j] + _STIFFNESS[j] ** 2
+        out[j] = variance[j] + (give * _STIFFNESS[j]) ** 2
 
 
 @numba.njit(**LEAN)

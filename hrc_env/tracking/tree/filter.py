@@ -102,7 +102,7 @@ def condition(state, b, w, seen, s, scratch):
     belief, give, work = scratch
     body, cov, slope = state.body[b, w], state.cov[b, w], state.slope[b, w]
     contrast = contrast_of(s.outlier_weight, s.image_area_px)
-    stiff_lengths(state.bone_variance[b, w], give)
+    stiff_lengths(state.bone_variance[b, w], s.bone_give, give)
     bones = (state.bone_length[b, w], give)
     how = (contrast, s.floor_std_m, s.gauss_newton_steps)
     find_pose(body, cov, slope, seen, bones, *how, belief, work)
