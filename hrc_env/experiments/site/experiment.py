@@ -38,11 +38,11 @@ class SiteConfig:
     """Walks."""
     first_seed: int = 100
     """Seed of the first walk; the others count up."""
-    seconds: float = 30.0
+    seconds: float = 20.0
     """How long each is."""
     estimators: tuple[str, ...] = ("particle", "paper")
     """Those of the table, which also make crops of their own."""
-    n_closed: int = 3
+    n_closed: int = 2
     """So many of the walks are filmed again for everybody's own crops, which costs most."""
 
     def __post_init__(self) -> None:
