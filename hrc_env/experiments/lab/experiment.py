@@ -18,6 +18,7 @@ from hrc_env.experiments.lab.sides import missed_by_camera, turned_away
 from hrc_env.experiments.study.folder import claim
 from hrc_env.experiments.study.recording import Recording, record, replay
 from hrc_env.experiments.study.shelf import Say, Shelf, Tick, fingerprint_of
+from hrc_env.perception.eyes import EyesConfig
 from hrc_env.results import Metric, write_results
 from hrc_env.scene.build import Scene, build
 
@@ -40,6 +41,9 @@ class LabConfig:
     """Films of every motion."""
     max_frames: int = 250
     """No film is longer."""
+    folded: str = "full"
+    """The landmark network for workers who are folded up; "heavy" is fetched once with
+    `python -m hrc_env setup --networks heavy`."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for what cannot work."""
@@ -47,15 +51,16 @@ class LabConfig:
             raise ConfigError(f"--seeds must be at least 1, got {self.n_seeds}.")
         if self.max_frames < 2 * WARM_UP:
             raise ConfigError(f"Films need at least {2 * WARM_UP} frames, got {self.max_frames}.")
+        EyesConfig(folded=self.folded)
 
 
 QUICK = LabConfig(n_seeds=2, max_frames=100)
 """Every number, from fewer and shorter films."""
 
 
-def config_for(quick: bool, seeds: int | None) -> LabConfig:
+def config_for(quick: bool, seeds: int | None, folded: str = "full") -> LabConfig:
     """The settings that the command line asks for."""
-    config = QUICK if quick else LabConfig()
+    config = replace(QUICK if quick else LabConfig(), folded=folded)
     return config if seeds is None else replace(config, n_seeds=seeds)
 
 
@@ -80,15 +85,16 @@ def run(config: LabConfig, out: Path, say: Say, overwrite: bool = False) -> dict
     return metrics
 
 
-def laboratory(seed: int) -> tuple[Scene, HRCConfig]:
+def laboratory(seed: int, folded: str = "full") -> tuple[Scene, HRCConfig]:
     """The room with the paper's four cameras, and whose body is in it."""
-    config, use = with_cameras(HRCConfig(worker=body_of(seed)), RIG)
+    eyes = EyesConfig(folded=folded)
+    config, use = with_cameras(HRCConfig(worker=body_of(seed), eyes=eyes), RIG)
     return build(config.scene, "lab", 1, config.worker, use), config
 
 
 def taken(config: LabConfig, motion: str, seed: int, tick: Tick) -> Recording:
     """One film of one motion."""
-    scene, settings = laboratory(seed)
+    scene, settings = laboratory(seed, config.folded)
     motions = play(scene, motion, seed, config.max_frames, settings.ctrl_dt)
     return record(scene, motions, settings, CROPS, seed, tick)
 
@@ -96,7 +102,7 @@ def taken(config: LabConfig, motion: str, seed: int, tick: Tick) -> Recording:
 def film(config: LabConfig, motion: str, seed: int, tick: Tick) -> dict[str, Any]:
     """What everybody made of one film, after the warm-up."""
     recording = taken(config, motion, seed, lambda share: tick(0.8 * share))
-    _, settings = laboratory(seed)
+    _, settings = laboratory(seed, config.folded)
     truth = recording.joints_world[WARM_UP:]
     errors: dict[str, Any] = {}
     for name in ESTIMATORS:

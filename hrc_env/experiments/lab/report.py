@@ -57,7 +57,8 @@ def _done(config: "LabConfig", seeds: Sequence[int]) -> str:
     return (
         f"{len(seeds)} films of each of {len(MOTIONS)} motions (seeds {seeds[0]} to {seeds[-1]}, "
         f"at most {config.max_frames} images at 25 Hz), rendered through lenses of 118.2 x 69.5 "
-        "degrees; MediaPipe Pose on crops that follow the four-camera track. Every estimator is "
+        f"degrees; MediaPipe Pose on crops that follow the four-camera track (network full, of "
+        f"workers who are folded up {config.folded}). Every estimator is "
         "given the same detections: half a second of all cameras, which is not judged, and then "
         "those of one camera or of all."
     )
