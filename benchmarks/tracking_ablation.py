@@ -16,23 +16,11 @@ from rich.progress import track
 
 from hrc_env.experiments.tracking.rigs import DT_S, RIGS, Rig, make_rig
 from hrc_env.experiments.tracking.sequences import Sequences, make_sequences
+from hrc_env.experiments.tracking.variants import VARIANTS, estimator_of
 from hrc_env.results import Metric, write_results
 from hrc_env.tracking.estimators import make_estimator
 from hrc_env.typing import Floats
 
-VARIANTS: dict[str, dict[str, Any]] = {
-    "kalman": {},
-    "one hypothesis": {"n_hypotheses": 1},
-    "all": {},
-    "no turned body": {"mirrored_parts": ("limbs",)},
-    "no limbs": {"mirrored_parts": ("body",)},
-    "no anatomy": {"anatomy_trust": 0.0},
-    "no walking direction": {"walking_odds": 0.0},
-    "evidence in full": {"evidence_trust": 1.0},
-    "4 hypotheses": {"n_hypotheses": 4},
-    "16 hypotheses": {"n_hypotheses": 16},
-}
-"""Changes of the tracker's settings; `kalman` is that estimator."""
 PLAIN = {"one_view_inflation": 1.0}
 """What all have in common: the report is not widened, so that it is theirs."""
 WINDOWS = {
@@ -141,7 +129,7 @@ def main() -> None:
         sequences = make_sequences(rig, condition, seeds)
         windows += [(rig_name, window) for window in WINDOWS[condition]]
         for variant, change in VARIANTS.items():
-            name = "kalman" if variant == "kalman" else "particle"
+            name = estimator_of(variant)
             changed = replace(sequences, config=replace(sequences.config, **PLAIN, **change))
             for window, values in measure(name, rig, changed).items():
                 for kind, value in values.items():
