@@ -54,12 +54,15 @@ class LabExperiment(AnyExperiment):
     out: Path = Path("out/lab")
     seeds: int | None = None
     """Films of every motion, instead of 10 (2 if quick)."""
+    folded: str = "full"
+    """The landmark network for workers who are folded up: full, or heavy, which is fetched once
+    with `python -m hrc_env setup --networks heavy`."""
 
     def run(self) -> int:
         """Run, show the tables."""
         from hrc_env.experiments.lab.experiment import config_for, run
 
-        return self.shown(partial(run, config_for(self.quick, self.seeds)))
+        return self.shown(partial(run, config_for(self.quick, self.seeds, self.folded)))
 
 
 @dataclass(frozen=True)

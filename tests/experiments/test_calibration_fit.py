@@ -1,5 +1,7 @@
 """The fit finds the numbers that errors were made with."""
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 
@@ -80,10 +82,21 @@ def test_exchanged_sides_and_misses_are_counted():
     missed = np.zeros((L, T, C), bool)
     missed[:, 10:20] = True
     known = fit(made(white(), exchanged=exchanged, missed=missed))
-    np.testing.assert_allclose(known.swap_share[:, 0], 0.125, atol=0.01)
-    assert known.swap_s[0] == pytest.approx(0.2)
+    np.testing.assert_allclose(known.swap_share[..., 0], 0.125, atol=0.01)
     assert known.miss_share[0, 15] == pytest.approx(0.2, abs=0.02)
-    assert known.miss_s == pytest.approx(0.4)
+    np.testing.assert_allclose(known.swap_share[..., 1], 0.0)
+
+
+def test_how_long_mishaps_last_is_found():
+    rng = np.random.default_rng(6)
+    latent, keep = rng.standard_normal((L, 1, C)), np.exp(-0.04 / 0.8)
+    slow = [latent]
+    for _ in range(T * 4 - 1):
+        slow.append(keep * slow[-1] + np.sqrt(1 - keep**2) * rng.standard_normal((L, 1, C)))
+    missed = np.concatenate(slow, 1).reshape(L, 4, T, C).reshape(4 * L, T, C) < -0.5
+    one = made(white())
+    four = {f.name: np.concatenate([getattr(one, f.name)] * 4) for f in fields(Samples)}
+    assert fit(Samples(**{**four, "missed": missed})).miss_s == pytest.approx(0.8, rel=0.35)
 
 
 def test_every_motion_has_a_family_and_unseen_clips_are_others():

@@ -36,7 +36,7 @@ FRONT = (pinhole("front", np.array([4.5, 0, 1.2]), np.array([0, 0, 1.0]), 60, 19
 def start(batch, config, cameras=CAMERAS, n_workers=1, first_seed=0):
     rngs = [np.random.default_rng(first_seed + b) for b in range(batch)]
     state = make_state(batch, len(cameras), n_workers, DT, config)
-    reset(state, np.arange(batch), rngs, config)
+    reset(state, np.arange(batch), rngs)
     return state, rngs
 
 

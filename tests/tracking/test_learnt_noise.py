@@ -80,7 +80,7 @@ def test_one_camera_that_is_worse_than_the_others_is_found():
     px[:, :, 2] += 6.0 * np.random.default_rng(1).standard_normal(px[:, :, 2].shape)
     factor = follow(px)[0].noise_factor.mean((0, 1, 2))
     assert factor[2] == pytest.approx(5.0, rel=0.15)
-    np.testing.assert_allclose(factor[[0, 1, 3]], 1.0, atol=0.2)
+    np.testing.assert_allclose(factor[[0, 1, 3]], 1.0, atol=0.25)
 
 
 def test_errors_that_last_are_taken_for_more_than_their_size_and_reported_honestly():

@@ -23,9 +23,11 @@ def swaps_of(samples: Samples) -> tuple[Floats, Floats]:
     looked = ~samples.missed & samples.counts[..., None]
     share, length = np.zeros((N_P, N_VIEWS, 2)), np.zeros(2)
     for what in range(2):
-        now = samples.exchanged[..., what] & looked
+        now, overall = samples.exchanged[..., what] & looked, 0.0
         for posture, chosen in enumerate(_postures(samples)):
-            overall = now[chosen & looked].sum() / max((chosen & looked).sum(), 1)
+            known = chosen & looked
+            if known.any() or posture == 0:
+                overall = now[known].sum() / max(known.sum(), 1)
             for bin_ in range(N_VIEWS // 2 + 1):
                 mine = chosen & looked & (view == bin_)
                 value = (now[mine].sum() + FEW * overall) / (mine.sum() + FEW)
