@@ -21,11 +21,15 @@ from hrc_env.experiments.study.shelf import Say, Shelf, Tick, fingerprint_of
 from hrc_env.faults.fault import FaultConfig
 from hrc_env.results import Metric, write_results
 from hrc_env.scene.build import Scene, build
+from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import ESTIMATORS
 
 SCENE = "site"
 CROPS = "particle"
 """The estimator that the crops of the shared film follow."""
+PRIOR_STD_M = 3.0
+"""Nobody is followed who is further than four of these from the middle of the work [m]: the walks
+go all over the place."""
 ALSO = ("kalman", "per_joint")
 """Everybody's best must be known for a fair comparison: these are given the film, too."""
 
@@ -104,9 +108,14 @@ def site() -> Scene:
     return build(HRCConfig().scene, SCENE, 1)
 
 
+def settings_for(faults: tuple[FaultConfig, ...] = ()) -> HRCConfig:
+    """Settings under which workers are expected anywhere on the site."""
+    return HRCConfig(faults=faults, tracker=TrackerConfig(prior_std_m=PRIOR_STD_M))
+
+
 def film(config: SiteConfig, seed: int, tick: Tick) -> dict[str, Any]:
     """One walk, filmed with the crops of the four-camera track, and everybody's word on it."""
-    settings = HRCConfig()
+    settings = settings_for()
     n_frames = round(config.seconds / settings.ctrl_dt)
     motions = walk(site(), seed, n_frames, settings.ctrl_dt)
     taken = record(site(), motions, settings, CROPS, seed, lambda share: tick(0.7 * share))
@@ -132,7 +141,7 @@ def closed_loop(config: SiteConfig, row: Row, seed: int, tick: Tick) -> dict[str
     """The same walk with eyes that make their own crops; after a second some cameras are lost."""
     others = tuple(f"camera_{c + 1}" for c in range(4) if c not in row.cameras)
     lost = (FaultConfig("lost", others, from_s=WARM_UP_S),) if others else ()
-    settings = HRCConfig(faults=lost)
+    settings = settings_for(lost)
     n_frames = round(config.seconds / settings.ctrl_dt)
     motions = walk(site(), seed, n_frames, settings.ctrl_dt)
     return head_path(record(site(), motions, settings, row.estimator, seed, tick).beliefs)
