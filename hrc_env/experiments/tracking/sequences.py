@@ -136,7 +136,8 @@ def _matched(rig: Rig, condition: str, seeds: list[int]) -> Sequences:
     """Sequences from the estimators' own model, of which they are told what can be told.
 
     That is: the shared acceleration, no outliers, no exchanged sides, detections as good as they
-    say; and without bones, that a body may be of any size.
+    say, bones that give what they are drawn with, no floor; and without bones, that a body may be
+    of any size.
     """
     n_bones = len(BONES) if condition == MATCHED_BONES else 0
     config = replace(
@@ -145,6 +146,8 @@ def _matched(rig: Rig, condition: str, seeds: list[int]) -> Sequences:
         outlier_weight=1e-9,
         swap_begins=1e-9,
         noise_bounds=(1.0, 1.0),
+        bone_give=1.0,
+        floor_std_m=np.inf,
         body_radius_m=rig.tracker.body_radius_m if n_bones else 10.0,
     )
     model = matched_model(config.damping, config.root_acceleration, n_bones)
