@@ -102,5 +102,5 @@ _LIMITS = (
     "A laboratory and a site, nobody but workers, an arm that rests, workers whom nobody pushes "
     "to move fast: lateness costs more where people run.",
     "Settings are compared one at a time, with everything else at its default: what two parts "
-    "do together is not known. Times an update are of one thread on the machine as it was.",
+    "do together is not known. Times an update are processor time of one thread.",
 )

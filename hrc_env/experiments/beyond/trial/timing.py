@@ -20,7 +20,8 @@ N_REPEATS = 3
 
 def update_us(setting: Setting, walks: Walks, seeds: tuple[int, ...], n_frames: int) -> list[float]:
     """Microseconds per worker and update after the warm-up, the median over frames, a number for
-    each repetition; one thread, a few workers at once.
+    each repetition; processor time of one thread, a few workers at once, so that a busy machine
+    changes little.
 
     Args:
         setting: whose estimator; its first turn.
@@ -42,10 +43,10 @@ def update_us(setting: Setting, walks: Walks, seeds: tuple[int, ...], n_frames: 
         spent_s = []
         for keypoints in shown:
             seen = rows(keypoints, ids)
-            begun_s = time.perf_counter()
+            begun_s = time.thread_time()
             tracker.predict(state, DT_S, rngs)
             tracker.update(state, seen, rngs)
-            spent_s.append(time.perf_counter() - begun_s)
+            spent_s.append(time.thread_time() - begun_s)
         median_s = float(np.median(spent_s[N_WARM_UP:]))
         found.append(1e6 * median_s / (len(ids) * setting.n_workers))
     return found
