@@ -42,10 +42,11 @@ BONES: Ints = np.array(
 """Pairs of joints whose distance hardly changes."""
 
 BONE_LENGTH_M: Floats = np.array(
-    [.36, .22, .50, .50, .29, .26, .29, .26, .43, .42, .15, .43, .42, .15, .30, .30]
+    [.34, .20, .55, .55, .28, .26, .28, .26, .37, .40, .20, .37, .40, .20, .28, .28]
 )  # fmt: skip
-"""Lengths for an adult of unknown stature [m], standard deviation about 10 %; a judgement
-from common anthropometric proportions, refined per worker by the trackers that learn it."""
+"""Lengths for an adult of unknown stature [m], standard deviation about 10 %: the mean of the
+baked bodies' joints, which lie where BlazePose puts them (its hips are higher and its toes
+farther out than anatomy's); refined per worker by the trackers that learn it."""
 
 SEGMENT_ENDS: tuple[tuple[tuple[int, ...], tuple[int, ...], float], ...] = (
     ((0,), (0,), 0.13),  # head, a sphere round the nose that reaches over the hat's front

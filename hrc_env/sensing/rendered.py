@@ -22,6 +22,7 @@ from hrc_env.scene.build import Scene
 from hrc_env.scene.render import CropRenderer
 from hrc_env.sensing.moment import Generators, Moment, Windows
 from hrc_env.sensing.searches import Searches
+from hrc_env.sensing.strays import Strays
 from hrc_env.sensing.tracking import TrackingSenses, no_keypoints
 from hrc_env.tracking.estimators import Estimator
 from hrc_env.typing import Floats, Ints
@@ -30,7 +31,7 @@ from hrc_env.typing import Floats, Ints
 class CameraSenses(TrackingSenses):
     """Level `pixels`: rendered crops through the pose network."""
 
-    CHANGES = (*TrackingSenses.CHANGES, "windows", "eyes", "worn", "searches")
+    CHANGES = (*TrackingSenses.CHANGES, "windows", "eyes", "worn", "searches", "strays")
 
     def __init__(
         self, scene: Scene, batch: int, tracker: Estimator, config: HRCConfig, schedule: Schedule
@@ -49,6 +50,7 @@ class CameraSenses(TrackingSenses):
         ]
 
         self.searches = Searches(batch, len(scene.cameras), config.eyes.search_every)
+        self.strays = Strays(batch, scene.n_workers, len(scene.cameras))
 
     def detect(self, now: Moment, predicted: Any, sensor_rngs: Generators) -> Keypoints:
         """Landmarks of crops round the predicted worker, or of a search where there is none."""
@@ -111,16 +113,35 @@ class CameraSenses(TrackingSenses):
                 if not due:
                     continue
                 people = self.searches.remember(b, due, self.eyes.search(self.images, due))
+            if any(windows):
+                windows = self._followed(b, worker, windows, taken, has_image)
             track = self._track(b, worker)
             folded = bool(expected.tracked[row, worker]) and is_folded(
                 expected.mean_world[row, worker]
             )
             sight = self.eyes.look(self.images, windows, track, taken, people, folded)
             taken.append(sight.windows)
+            self.strays.saw(b, worker, sight.confidence.max(-1) > 0.0)
             missed |= not any(windows) and not sight.confidence.any()
             yield worker, sight
         if missed:
             self.searches.rest(b)
+
+    def _followed(
+        self,
+        b: int,
+        worker: int,
+        windows: list[CropWindow | None],
+        taken: Windows,
+        has_image: list[bool],
+    ) -> list[CropWindow | None]:
+        """Where to look for a worker with a track: elsewhere if most cameras have missed them."""
+        blind = self.strays.blind(b, worker, has_image)
+        if blind:
+            people = self.eyes.search(self.images, blind)
+            self.strays.found(b, worker, people, windows, taken, self.scene.cameras)
+        there = self.strays.windows(b, worker, windows)
+        return [window if has else None for window, has in zip(there, has_image, strict=True)]
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
         """Forget the tracks, and whom the eyes were following."""
@@ -131,6 +152,7 @@ class CameraSenses(TrackingSenses):
                 self.worn[b] = draw_look(self.appearance, self.scene.n_workers, sensor_rngs[b])
             for worker in range(self.scene.n_workers):
                 self.eyes.forget(self._track(b, worker))
+                self.strays.reset(int(b), worker)
                 self.windows[b][worker] = [None] * len(self.scene.cameras)
 
     def _track(self, b: int, worker: int) -> int:

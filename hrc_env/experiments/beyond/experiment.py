@@ -1,6 +1,5 @@
 """Beyond the paper: the experiment, setting by setting."""
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -19,8 +18,7 @@ from hrc_env.experiments.beyond.trial.tally import Rows
 from hrc_env.experiments.beyond.trial.timing import update_us
 from hrc_env.experiments.beyond.trial.walks import walks_of
 from hrc_env.experiments.study.folder import claim
-from hrc_env.experiments.study.shelf import Say, Shelf, Tick, fingerprint_of
-from hrc_env.perception.calibration import PACKAGED
+from hrc_env.experiments.study.shelf import Say, Shelf, Tick, emulator_mark, fingerprint_of
 from hrc_env.results import Metric, write_results
 from hrc_env.shards import n_cores
 
@@ -134,5 +132,4 @@ def _settings(config: BeyondConfig) -> dict[str, Any]:
     """What all numbers depend on; which studies are asked for changes none of them."""
     values = asdict(config)
     del values["studies"]
-    emulator = hashlib.sha256(PACKAGED.read_bytes()).hexdigest()[:16]
-    return {"experiment": NAME, "emulator": emulator, **values}
+    return {"experiment": NAME, "emulator": emulator_mark(), **values}

@@ -28,7 +28,7 @@ from hrc_env.experiments.impact.trial.policies import (
     maker,
 )
 from hrc_env.experiments.study.folder import claim
-from hrc_env.experiments.study.shelf import Say, Shelf, fingerprint_of
+from hrc_env.experiments.study.shelf import Say, Shelf, emulator_mark, fingerprint_of
 from hrc_env.results import Metric, write_results
 from hrc_env.shards import n_cores
 
@@ -156,9 +156,13 @@ def _seeds(n: int) -> list[int]:
 
 def _settings(config: ImpactConfig) -> dict[str, Any]:
     """What all numbers depend on."""
-    return {"experiment": NAME, "people": PEOPLE, "policies_code": code_of_policies()} | asdict(
-        config
-    )
+    return {
+        "experiment": NAME,
+        "people": PEOPLE,
+        "emulator": emulator_mark(),
+        "policies_code": code_of_policies(),
+        **asdict(config),
+    }
 
 
 def _check_walks(table: Mapping[tuple[str, str], Mapping[str, list[Any]]]) -> None:

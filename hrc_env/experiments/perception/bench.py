@@ -30,7 +30,7 @@ from hrc_env.experiments.perception.measured import (
 )
 from hrc_env.experiments.perception.report import write_report
 from hrc_env.experiments.perception.views import PLAIN, View, view_of
-from hrc_env.experiments.study.shelf import Say, Shelf, fingerprint_of
+from hrc_env.experiments.study.shelf import Say, Shelf, emulator_mark, fingerprint_of
 from hrc_env.faults.fault import IMAGE, KINDS
 from hrc_env.results import Metric, write_results
 from hrc_env.scene.build import SCENES, Scene, SceneConfig, build
@@ -124,7 +124,8 @@ def run(config: PerceptionBenchConfig, out: Path, say: Say) -> dict[str, Metric]
         say: hears of the progress: shares that sum to 1.
     """
     tasks = list(_tasks(config, out))
-    fingerprint, found = fingerprint_of(asdict(config), "perception"), Measured()
+    settings, found = {**asdict(config), "emulator": emulator_mark()}, Measured()
+    fingerprint = fingerprint_of(settings, "perception")
     total = sum(task.cost for task in tasks)
     for task in tasks:
         n_parts = total / task.cost

@@ -17,7 +17,8 @@ figcaption { color: #556; font-size: .92rem; }
 .wide { overflow-x: auto; }
 table { border-collapse: collapse; margin: 1.2rem 0; font-variant-numeric: tabular-nums; }
 th, td { padding: .3rem .8rem; border-bottom: 1px solid #d8dde6; text-align: right; }
-th:first-child, td:first-child { text-align: left; } thead th { border-bottom: 2px solid #889; }
+th:first-child, td:first-child { text-align: left; } td + td { white-space: nowrap; }
+thead th { border-bottom: 2px solid #889; }
 code { background: #f0f2f6; padding: .1rem .3rem; border-radius: 3px; }
 .lead { font-size: 1.15rem; }
 """
