@@ -133,7 +133,7 @@ class HRCReachEnv(Stateful, gymnasium.Env[NDArray[np.float32], NDArray[np.float3
 
     def set_reward(self, weights: RewardConfig) -> None:
         """Weigh the reward's terms so from the next step on."""
-        self.simulation.reward_weights = weights
+        self.simulation.set_reward(weights)
 
     def render(self) -> NDArray[Any] | None:  # type: ignore[override]
         """The scene from a good viewpoint, as the render mode says."""

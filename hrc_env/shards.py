@@ -1,6 +1,7 @@
 """A batch of environments in contiguous ranges, each a `Simulation` stepped by its own thread.
 
-As no result depends on the size of a batch, none depends on the number of ranges either.
+A range's simulation may live in a process of its own; then its thread only waits for it. As no
+result depends on the size of a batch, none depends on the number of ranges either.
 """
 
 import os
@@ -8,25 +9,68 @@ from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from functools import partial
 from itertools import pairwise
-from typing import Any
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
 from hrc_env import crew, suspects
 from hrc_env.errors import ConfigError, HRCError
 from hrc_env.outcome import Outcome
-from hrc_env.simulation import Simulation
 from hrc_env.stateful import State
 from hrc_env.typing import Floats, Ints
 
 
-class Shards:
+class Part(Protocol):
+    """A range of environments: a `Simulation`, or what stands for one in another process."""
+
+    batch: int
+
+    def reset(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> Outcome:
+        """As `Simulation.reset`."""
+        ...
+
+    def step(self, action: Floats) -> Outcome:
+        """As `Simulation.step`."""
+        ...
+
+    def get_state(self) -> State:
+        """A copy of everything that changes."""
+        ...
+
+    def set_state(self, state: State) -> None:
+        """Continue from a state."""
+        ...
+
+    def close(self) -> None:
+        """Release what it holds."""
+        ...
+
+
+PartT = TypeVar("PartT", bound=Part)
+
+
+class Shards(Generic[PartT]):
     """`batch` environments in `n_shards` simulations; the calling thread works on the first."""
 
-    def __init__(self, batch: int, n_shards: int, make: Callable[[int], Simulation]) -> None:
-        """`make` gives a simulation of so many environments; all of them of the same kind."""
+    def __init__(
+        self,
+        batch: int,
+        n_shards: int,
+        make: Callable[[int], PartT],
+        make_other: Callable[[int], PartT] | None = None,
+    ) -> None:
+        """Make them.
+
+        Args:
+            batch: how many environments.
+            n_shards: in how many ranges.
+            make: gives a simulation of so many environments, always of the same kind.
+            make_other: gives those beside the first, which starts while these do; None: `make`.
+        """
         self.bounds = [batch * k // n_shards for k in range(n_shards + 1)]
-        self.parts = [make(high - low) for low, high in pairwise(self.bounds)]
+        here, *others = (high - low for low, high in pairwise(self.bounds))
+        rest = [(make_other or make)(size) for size in others]
+        self.parts = [make(here), *rest]
         self._pool: ThreadPoolExecutor | None = None
 
     def reset(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> Outcome:
@@ -89,7 +133,7 @@ class Shards:
         return joined([outcome, *(future.result() for future in futures)])
 
 
-def _step(part: Simulation, first: int, action: Floats) -> Outcome:
+def _step(part: Part, first: int, action: Floats) -> Outcome:
     try:
         return part.step(action)
     except HRCError as error:

@@ -6,7 +6,7 @@ streams only, never on the size of the batch.
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,6 +23,7 @@ from hrc_env.geometry import chains
 from hrc_env.motion import generator
 from hrc_env.outcome import Info, Outcome, cost_info, rows_of, tracking_info
 from hrc_env.records import PoseEstimate, RobotState, WorkerMotion, WorkerTruth
+from hrc_env.rewards import RewardConfig
 from hrc_env.scene.build import build
 from hrc_env.scene.physics import Physics
 from hrc_env.scene.rigs import findings
@@ -47,6 +48,13 @@ class Streams:
     sensor: list[np.random.Generator]
     tracker: list[np.random.Generator]
     task: list[np.random.Generator]
+
+    def organs(self) -> tuple[list[np.random.Generator], ...]:
+        """Them all, in the order in which streams are handed out."""
+        return self.robot, self.motion, self.sensor, self.tracker, self.task
+
+
+N_STREAMS = len(fields(Streams))
 
 
 class Simulation(Stateful):
@@ -105,7 +113,17 @@ class Simulation(Stateful):
 
     def reset(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> Outcome:
         """Start environments `ids` anew, one generator each; their rows of an outcome."""
-        self._spawn(ids, rngs)
+        return self.begin(ids, [rng.spawn(N_STREAMS) for rng in rngs])
+
+    def begin(self, ids: Ints, streams: Sequence[Sequence[np.random.Generator]]) -> Outcome:
+        """Start environments `ids` anew with a stream for every organ.
+
+        Always as many and in the same order, so that the worker's walk does not depend on
+        who looks at it.
+        """
+        for b, mine in zip(ids, streams, strict=True):
+            for organ, stream in zip(self.streams.organs(), mine, strict=True):
+                organ[b] = stream
         generator.reset(self.motion, ids, self.streams.motion)
         self.worn[ids] = bodies_of(self.motion, ids, self.bodies.names)
         self.physics.reset(ids, self._starting_angles(ids), self.motion.body[ids])
@@ -163,6 +181,10 @@ class Simulation(Stateful):
         suspects = self._suspects(self._everyone)
         return Outcome(observation, reward, terminated, info, crew, suspects)
 
+    def set_reward(self, weights: RewardConfig) -> None:
+        """Weigh the reward's terms so from the next step on."""
+        self.reward_weights = weights
+
     def get_state(self) -> State:
         """A copy of everything that changes, generators included, and the settings."""
         return {"settings": self.settings, **super().get_state()}
@@ -184,18 +206,6 @@ class Simulation(Stateful):
     def close(self) -> None:
         """Release threads and graphics contexts."""
         self.senses.close()
-
-    def _spawn(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> None:
-        """Give every organ of environments `ids` a stream of its own.
-
-        Always as many and in the same order, so that the worker's walk does not depend on
-        who looks at it.
-        """
-        streams = self.streams
-        lists = (streams.robot, streams.motion, streams.sensor, streams.tracker, streams.task)
-        for b, rng in zip(ids, rngs, strict=True):
-            for stream, child in zip(lists, rng.spawn(len(lists)), strict=True):
-                stream[b] = child
 
     def _starting_angles(self, ids: Ints) -> Floats:
         """(len(ids), N) arm angles near home, turned anywhere in front of the base."""

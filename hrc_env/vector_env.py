@@ -9,7 +9,8 @@ environments and of threads. What it says, and in which form, is what gymnasium'
 """
 
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,7 @@ from hrc_env.errors import ConfigError, unknown
 from hrc_env.faults.fault import FaultConfig
 from hrc_env.motion.generator import Clip, PeopleConfig
 from hrc_env.outcome import Outcome
+from hrc_env.remote import Remote
 from hrc_env.rewards import RewardConfig
 from hrc_env.shards import Shards, n_cores
 from hrc_env.simulation import Simulation, checked_action
@@ -46,6 +48,7 @@ from hrc_env.views import Views
 MAX_ENVS = 16_384
 """More would be gigabytes of filters' states, and no faster."""
 NO_LIMIT = 2**62
+THREADS, PROCESSES = BACKENDS = ("threads", "processes")
 
 Observations = NDArray[np.float32]
 Stream = tuple[np.random.Generator, int]
@@ -66,6 +69,9 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
         autoreset_mode: when an environment whose episode is over starts anew: at the next
             step (default), in the same step, or not by itself ("Disabled").
         num_threads: threads that share the environments; all cores if None.
+        backend: "threads", or "processes": all of them but the first in a process of its own,
+            where no lock is shared: faster by a third, with the memory of as many more
+            programs, and some seconds later to start. Results are the same.
 
     Raises:
         ConfigError: an argument that cannot work, with what would.
@@ -92,6 +98,7 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
         max_episode_steps: int | None = 250,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         num_threads: int | None = None,
+        backend: str = THREADS,
     ) -> None:
         if perception == "pixels":
             raise ConfigError(
@@ -106,15 +113,21 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
         given = with_motions(with_people(resolve(config), people), motions)
         given = with_appearance(given, appearance)
         self.config, used = with_cameras(with_faults(given, faults), cameras)
-        self.shards = Shards(
-            self.num_envs,
-            min(_threads(num_threads), self.num_envs),
-            lambda batch: Simulation(
-                batch, perception, estimator, used, scene, n_workers, control, self.config
-            ),
+        make = partial(
+            Simulation,
+            perception=perception,
+            estimator=estimator,
+            cameras=used,
+            scene=scene,
+            n_workers=n_workers,
+            control=control,
+            config=self.config,
         )
-        self.views = [Views(part) for part in self.shards.parts]
-        self.single_observation_space, self.single_action_space = spaces(self.shards.parts[0])
+        self.shards = _shards(
+            self.num_envs, min(_threads(num_threads), self.num_envs), make, backend
+        )
+        self.views = [_views_of(part) for part in self.shards.parts]
+        self.single_observation_space, self.single_action_space = spaces(self.first)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.metadata = {
@@ -123,7 +136,7 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
             "autoreset_mode": self.autoreset_mode,
         }
         self._streams: list[Stream | None] = [None] * self.num_envs
-        self._action_shape = (self.num_envs, self.shards.parts[0].n_actions)
+        self._action_shape = (self.num_envs, self.first.n_actions)
         no_limit = max_episode_steps is None or max_episode_steps == -1
         self.max_episode_steps = (
             NO_LIMIT if no_limit else _whole("max_episode_steps", max_episode_steps, 1, NO_LIMIT)
@@ -197,10 +210,17 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
         infos = {**finals, **info.arrays(np.ones_like(ended))}
         return observation.copy(), reward, terminated, truncated, infos
 
+    @property
+    def first(self) -> Simulation:
+        """The simulation of the first environments, which lives in this process."""
+        part = self.shards.parts[0]
+        assert isinstance(part, Simulation)
+        return part
+
     def set_reward(self, weights: RewardConfig) -> None:
         """Weigh the reward's terms so from the next step on, in every environment."""
         for part in self.shards.parts:
-            part.reward_weights = weights
+            part.set_reward(weights)
 
     def render(self) -> tuple[NDArray[Any], ...] | None:  # type: ignore[override]
         """A picture of every environment, one after the other (slow), as the render mode says."""
@@ -209,7 +229,9 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
             return None
         depth = self.render_mode == "depth_array"
         return tuple(
-            view.picture(depth, b) for view in self.views for b in range(view.simulation.batch)
+            view.picture(depth, b)
+            for view, part in zip(self.views, self.shards.parts, strict=True)
+            for b in range(part.batch)
         )
 
     @property
@@ -314,6 +336,19 @@ def _mode(mode: str | AutoresetMode) -> AutoresetMode:
     if not isinstance(mode, AutoresetMode) and mode not in names:
         raise unknown("autoreset_mode", mode, names)
     return AutoresetMode(mode)
+
+
+def _shards(
+    num_envs: int, n_shards: int, make: Callable[[int], Simulation], backend: str
+) -> Shards[Simulation | Remote]:
+    """The environments, in as many ranges as work at once."""
+    if backend not in BACKENDS:
+        raise unknown("backend", backend, BACKENDS)
+    return Shards(num_envs, n_shards, make, partial(Remote, make) if backend == PROCESSES else make)
+
+
+def _views_of(part: Simulation | Remote) -> Views | Remote:
+    return part if isinstance(part, Remote) else Views(part)
 
 
 def _threads(num_threads: int | None) -> int:

@@ -13,12 +13,19 @@ from pathlib import Path
 
 from hrc_env.errors import ConfigError
 from hrc_env.experiments.speed.contenders import OURS, PEER, Contender, Single, Vector
-from hrc_env.experiments.speed.measured import REACHER, SINGLE, Measured, metrics_of
+from hrc_env.experiments.speed.measured import (
+    IN_PROCESSES,
+    REACHER,
+    SINGLE,
+    Measured,
+    metrics_of,
+)
 from hrc_env.experiments.speed.organs import Organs
 from hrc_env.experiments.speed.report import write_report
 from hrc_env.experiments.speed.starts import Starts
 from hrc_env.experiments.study.shelf import Say
 from hrc_env.results import Metric, write_results
+from hrc_env.vector_env import PROCESSES, THREADS
 
 WATCHED = "keypoints"
 """The level whose organs are timed."""
@@ -64,12 +71,17 @@ class Turn:
 
     level: str
     configuration: str
-    """"single" or "<num_envs>.<threads>"."""
+    """"single", "<num_envs>.<threads>", or with processes "<num_envs>.<processes>p"."""
     n_threads: int
     contender: Contender
     n_episodes: int
     cost: float
     """What share of a round it takes, roughly and in any unit."""
+
+    @property
+    def is_watched(self) -> bool:
+        """Whether its organs are timed: all of them are in this process."""
+        return self.level == WATCHED and not self.configuration.endswith(IN_PROCESSES)
 
 
 def run(config: SpeedBenchConfig, out: Path, say: Say) -> dict[str, Metric]:
@@ -114,7 +126,7 @@ def _take(turn: Turn, measured: Measured, organs: Organs) -> None:
     pace = turn.contender.run(turn.n_episodes)
     name = f"{turn.level}.{turn.configuration}"
     measured.env_steps_per_s.setdefault(name, []).append(pace.env_steps / pace.seconds)
-    if turn.level == WATCHED:
+    if turn.is_watched:
         shares = organs.us_per_env_step(turn.contender, turn.n_episodes, turn.n_threads)
         for organ, us in shares.items():
             name = f"{organ}.{turn.configuration}"
@@ -123,8 +135,14 @@ def _take(turn: Turn, measured: Measured, organs: Organs) -> None:
 
 def _turns(config: SpeedBenchConfig, closing: ExitStack, say: Say) -> Iterator[Turn]:
     """Make everybody, ready to run, to be closed in the end."""
-    known = [(size, threads) for size in config.sizes for threads in config.threads]
-    known = [(size, threads) for size, threads in known if threads <= size]
+    backends = {"": THREADS, IN_PROCESSES: PROCESSES}
+    known = [
+        (size, threads, kind)
+        for size in config.sizes
+        for threads in config.threads
+        for kind in backends
+        if threads <= size and (threads > 1 or not kind)
+    ]
     n_contenders = len(config.levels) * (1 + len(known)) + 2
 
     def turn(level: str, configuration: str, threads: int, contender: Contender) -> Turn:
@@ -139,6 +157,7 @@ def _turns(config: SpeedBenchConfig, closing: ExitStack, say: Say) -> Iterator[T
     yield turn(REACHER, f"{_PEERS}.1", 1, Vector(PEER, _PEERS))
     for level in config.levels:
         yield turn(level, SINGLE, 1, Single(OURS, perception=level))
-        for size, threads in known:
-            contender = Vector(OURS, size, perception=level, num_threads=threads)
-            yield turn(level, f"{size}.{threads}", threads, contender)
+        for size, threads, kind in known:
+            how = {"num_threads": threads, "backend": backends[kind]}
+            contender = Vector(OURS, size, perception=level, **how)
+            yield turn(level, f"{size}.{threads}{kind}", threads, contender)

@@ -83,9 +83,10 @@ def _by_level(metrics: _Metrics, kind: str, digits: int) -> str:
     return _table(["", *levels], lines)
 
 
-def _size(configuration: str) -> list[int]:
+def _size(configuration: str) -> tuple[int, str]:
     """By what configurations are sorted."""
-    return [] if configuration == SINGLE else [int(each) for each in configuration.split(".")]
+    size, _, how = configuration.partition(".")
+    return (0, "") if configuration == SINGLE else (int(size), how)
 
 
 def _organs(metrics: _Metrics) -> str:
