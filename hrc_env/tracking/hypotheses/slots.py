@@ -87,17 +87,14 @@ def drop(state, b, w, h):
 
 @numba.njit(**JIT)
 def normalise(state, b, w, log_least):
-    """Make the weights sum to one, drop what is lighter than `log_least`, the heaviest first."""
+    """Drop what is lighter than `log_least`; the weights of the others sum to one, best first."""
     first = w * (state.log_weight.shape[1] // state.n_alive.shape[1])
     log_weight = state.log_weight[b, first : first + state.n_alive[b, w]]
-    most = log_weight.max()
-    total = 0.0
-    for h in range(len(log_weight)):
-        total += math.exp(log_weight[h] - most)
-    log_weight -= most + math.log(total)
+    _share_out(log_weight)
     for h in range(state.n_alive[b, w] - 1, -1, -1):
         if log_weight[h] < log_least and state.n_alive[b, w] > 1:
             drop(state, b, w, h)
+    _share_out(log_weight[: state.n_alive[b, w]])
     best = 0
     for h in range(state.n_alive[b, w]):
         best = h if log_weight[h] > log_weight[best] else best
@@ -106,6 +103,15 @@ def normalise(state, b, w, log_least):
         exchange_slots(state.slots, b, first, first + best)
         log_weight[0], log_weight[best] = log_weight[best], log_weight[0]
         form[0], form[best] = form[best], form[0]
+
+
+@numba.njit(**JIT)
+def _share_out(log_weight):
+    """Make weights sum to one."""
+    most, total = log_weight.max(), 0.0
+    for h in range(len(log_weight)):
+        total += math.exp(log_weight[h] - most)
+    log_weight -= most + math.log(total)
 
 
 @numba.njit(**LEAN)
