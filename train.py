@@ -53,7 +53,10 @@ class Arguments:
     """Environment steps in which that weight grows from 0: the task first, then care. 0: all of
     it from the start; the policy learns several times slower, and is more careful in the end."""
     threads: int | None = None
-    """Threads for the environments; all cores by default."""
+    """How many ranges the environments are stepped in at once; all cores by default."""
+    backend: str = "processes"
+    """Where those beside the first live: processes of their own, or threads. The policy is the
+    same; processes are faster and take more memory."""
     episodes: int = 128
     """Episodes of the evaluation at the end."""
     film: bool = True
@@ -126,7 +129,7 @@ def environment_arguments(arguments: Arguments) -> dict[str, Any]:
 def train(arguments: Arguments, folder: Path, kwargs: dict[str, Any]) -> tuple[Curve, float]:
     """Learn; returns the curve and the seconds it took. Progress survives a kill."""
     settings = ppo.PPOSettings()
-    env = HRCVecEnv(arguments.num_envs, seed=arguments.seed, **kwargs)
+    env = HRCVecEnv(arguments.num_envs, seed=arguments.seed, backend=arguments.backend, **kwargs)
     curve = Curve()
     if arguments.resume is not None:
         learner = ppo.resume(folder / "policy.zip", env, folder / "tensorboard")
