@@ -64,7 +64,7 @@ def _done(config: "BeyondConfig") -> tuple[Part, ...]:
 
 
 def _section(figures: Path, study: Study, found: Found) -> Section:
-    picture = Picture(figures / f"{study.name}.png", f"{study.title} Errors of single joints.")
+    picture = Picture(figures / f"{study.name}.png", f"Errors of single joints: {study.title}")
     return Section(study.title, (study.asked, study.says(found), picture, _table(study, found)))
 
 

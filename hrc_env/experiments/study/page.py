@@ -2,6 +2,7 @@
 
 import base64
 import html
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,15 +10,17 @@ from pathlib import Path
 from hrc_env.results import Metric, write_whole
 
 _STYLE = """
-body { font: 17px/1.55 system-ui, sans-serif; color: #1c2430; max-width: 62rem;
+body { font: 17px/1.55 system-ui, sans-serif; color: #1c2430; max-width: 66rem;
        margin: 2.5rem auto; padding: 0 1.2rem; }
 h1 { font-size: 2rem; line-height: 1.2; } h2 { margin-top: 2.6rem; }
 figure { margin: 1.6rem 0; } img { max-width: 100%; height: auto; }
 figcaption { color: #556; font-size: .92rem; }
 .wide { overflow-x: auto; }
-table { border-collapse: collapse; margin: 1.2rem 0; font-variant-numeric: tabular-nums; }
-th, td { padding: .3rem .8rem; border-bottom: 1px solid #d8dde6; text-align: right; }
-th:first-child, td:first-child { text-align: left; } td + td { white-space: nowrap; }
+table { border-collapse: collapse; margin: 1.2rem 0; font-size: .92rem;
+        font-variant-numeric: tabular-nums; }
+th, td { padding: .25rem .55rem; border-bottom: 1px solid #d8dde6; text-align: right; }
+th:first-child, td:first-child { text-align: left; }
+td:first-child { min-width: 12rem; } .whole { white-space: nowrap; }
 thead th { border-bottom: 2px solid #889; }
 code { background: #f0f2f6; padding: .1rem .3rem; border-radius: 3px; }
 .lead { font-size: 1.15rem; }
@@ -92,10 +95,15 @@ def _part(part: Part) -> str:
         )
     head = "".join(f"<th>{_text(cell)}</th>" for cell in part.header)
     rows = "".join(
-        "<tr>" + "".join(f"<td>{_text(cell)}</td>" for cell in row) + "</tr>" for row in part.rows
+        "<tr>" + "".join(f"<td>{_cell(cell)}</td>" for cell in row) + "</tr>" for row in part.rows
     )
     table = f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
     return f"<div class='wide'>{table}</div>"
+
+
+def _cell(words: str) -> str:
+    """What stands in brackets, as intervals do, is not torn apart."""
+    return re.sub(r"\([^()]*\)", r"<span class='whole'>\g<0></span>", _text(words))
 
 
 def _text(words: str) -> str:
