@@ -22,7 +22,7 @@ from hrc_env.tracking.tracks import age_worker
 from hrc_env.tracking.tree.gaussian import halves_of
 
 _FOUND_SPEED_STD_M_S = 1.0
-_FURTHEST_STD = 4.0
+_FURTHEST_STD = 8.0
 """A body further than this many prior deviations from the prior has been lost."""
 
 
