@@ -114,6 +114,6 @@ def test_the_page_holds_its_pictures_and_escapes_words(tmp_path):
     page = (tmp_path / "report.html").read_text()
     assert "data:image/png;base64," in page
     assert "a &lt; b" in page
-    assert "12.3 (10.0-20.0)" in page
+    assert "12.3 <span class='whole'>(10.0-20.0)</span>" in page
     assert "<code>make</code>" in page
     assert "| a < b | 12.3 (10.0-20.0) |" in (tmp_path / "report.md").read_text()
