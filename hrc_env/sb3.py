@@ -57,7 +57,7 @@ class HRCVecEnv(VecEnv):
     @property
     def simulation(self) -> Simulation:
         """The environments' simulation; of several, the first."""
-        return self.env.first
+        return self.env.shards.first
 
     def seed(self, seed: int | None = None) -> list[int | None]:  # type: ignore[override]
         """Seed environment k with seed + k at the next reset; None draws a seed."""

@@ -16,6 +16,7 @@ import numpy as np
 from hrc_env import crew, suspects
 from hrc_env.errors import ConfigError, HRCError
 from hrc_env.outcome import Outcome
+from hrc_env.simulation import Simulation
 from hrc_env.stateful import State
 from hrc_env.typing import Floats, Ints
 
@@ -56,8 +57,8 @@ class Shards(Generic[PartT]):
         self,
         batch: int,
         n_shards: int,
-        make: Callable[[int], PartT],
-        make_other: Callable[[int], PartT] | None = None,
+        make: Callable[[int], Simulation],
+        make_other: Callable[[int], PartT],
     ) -> None:
         """Make them.
 
@@ -65,12 +66,13 @@ class Shards(Generic[PartT]):
             batch: how many environments.
             n_shards: in how many ranges.
             make: gives a simulation of so many environments, always of the same kind.
-            make_other: gives those beside the first, which starts while these do; None: `make`.
+            make_other: gives those beside the first, which is made while these come about.
         """
         self.bounds = [batch * k // n_shards for k in range(n_shards + 1)]
         here, *others = (high - low for low, high in pairwise(self.bounds))
-        rest = [(make_other or make)(size) for size in others]
-        self.parts = [make(here), *rest]
+        rest = [make_other(size) for size in others]
+        self.first = make(here)
+        self.parts: list[Simulation | PartT] = [self.first, *rest]
         self._pool: ThreadPoolExecutor | None = None
 
     def reset(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> Outcome:

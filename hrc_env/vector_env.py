@@ -127,7 +127,7 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
             self.num_envs, min(_threads(num_threads), self.num_envs), make, backend
         )
         self.views = [_views_of(part) for part in self.shards.parts]
-        self.single_observation_space, self.single_action_space = spaces(self.first)
+        self.single_observation_space, self.single_action_space = spaces(self.shards.first)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.metadata = {
@@ -136,7 +136,7 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
             "autoreset_mode": self.autoreset_mode,
         }
         self._streams: list[Stream | None] = [None] * self.num_envs
-        self._action_shape = (self.num_envs, self.first.n_actions)
+        self._action_shape = (self.num_envs, self.shards.first.n_actions)
         no_limit = max_episode_steps is None or max_episode_steps == -1
         self.max_episode_steps = (
             NO_LIMIT if no_limit else _whole("max_episode_steps", max_episode_steps, 1, NO_LIMIT)
@@ -209,13 +209,6 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
         self._observation, self._ended = observation, ended
         infos = {**finals, **info.arrays(np.ones_like(ended))}
         return observation.copy(), reward, terminated, truncated, infos
-
-    @property
-    def first(self) -> Simulation:
-        """The simulation of the first environments, which lives in this process."""
-        part = self.shards.parts[0]
-        assert isinstance(part, Simulation)
-        return part
 
     def set_reward(self, weights: RewardConfig) -> None:
         """Weigh the reward's terms so from the next step on, in every environment."""

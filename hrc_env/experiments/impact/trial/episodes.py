@@ -76,15 +76,13 @@ def _build(eyes: Eyes, rig: Rig, n_episodes: int, n_threads: int) -> Shards[Simu
     config = with_faults(with_people(resolve(None), PEOPLE), eyes.faults(rig))
     config, used = with_cameras(config, list(eyes.cameras(rig)))
     threads = 1 if eyes.perception == "pixels" else min(n_threads, n_episodes)
+
+    def make(batch: int) -> Simulation:
+        return Simulation(batch, eyes.perception, eyes.estimator, used, "lab", 1, "joint", config)
+
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # that one camera is a poor rig is what we ask about
-        return Shards(
-            n_episodes,
-            threads,
-            lambda batch: Simulation(
-                batch, eyes.perception, eyes.estimator, used, "lab", 1, "joint", config
-            ),
-        )
+        return Shards(n_episodes, threads, make, make)
 
 
 def _run(
