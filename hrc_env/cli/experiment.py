@@ -71,7 +71,7 @@ class ImpactExperiment(AnyExperiment):
 
     out: Path = Path("out/impact")
     seeds: int | None = None
-    """Episodes of every row, instead of 200 (16 if quick)."""
+    """Episodes of every row, instead of 200 (8 if quick)."""
 
     def run(self) -> int:
         """Run, show the tables."""

@@ -73,7 +73,7 @@ class ImpactConfig:
             raise ConfigError(f"margins_m must be positive, got {self.margins_m}.")
 
 
-QUICK = ImpactConfig(n_episodes=16, n_pixels=1, learning_steps=65_536)
+QUICK = ImpactConfig(n_episodes=8, n_pixels=1, learning_steps=65_536)
 """Every number, from little."""
 
 
