@@ -73,8 +73,8 @@ class ImpactConfig:
             raise ConfigError(f"margins_m must be positive, got {self.margins_m}.")
 
 
-QUICK = ImpactConfig(n_episodes=8, n_pixels=1, learning_steps=65_536)
-"""Every number, from little."""
+QUICK = ImpactConfig(n_episodes=8, n_pixels=1, n_steps=100, learning_steps=65_536)
+"""Every number, from little, and for 4 s: what takes the time is the number of steps."""
 
 
 def config_for(quick: bool = False, seeds: int | None = None) -> ImpactConfig:

@@ -23,7 +23,7 @@ _COLOURS = {
 """Of perception levels, and of estimators with four cameras."""
 _CAMERA_COLOURS = {4: "C0", 3: "#5aa2d6", 2: "#e8a33d", 1: "#d1495b"}
 _ACROSS = {
-    "cost": "true cost per episode of 10 s  (less is safer)",
+    "cost": "true cost per episode  (less is safer)",
     "approaches": "approaches per 1,000 steps  (less is safer)",
 }
 _LATE_MARKS = {0.0: "o", LATE_S[0]: "s", LATE_S[1]: "^"}

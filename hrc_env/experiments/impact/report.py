@@ -67,9 +67,10 @@ _ASKED = (
 
 def _done(n_episodes: int, table: Table, policies: Sequence[str]) -> tuple[Part, ...]:
     rows = sum(1 for policy, _ in table if policy in policies)
+    seconds = 60 * table[policies[0], REFERENCE]["minutes"][0]
     return (
-        f"{rows} rows (a policy with a pair of eyes) of {n_episodes} episodes of 10 s each, fewer "
-        "where pixels are drawn, on the same seeds; commit "
+        f"{rows} rows (a policy with a pair of eyes) of {n_episodes} episodes of {seconds:.3g} s "
+        "each, fewer where pixels are drawn, on the same seeds; commit "
         f'{provenance()["git"]}. Workers take no notice of the robot (`people="unaware"`), so '
         "that a seed's worker walks the same way in every row; this was checked, bit for bit. "
         "`scripted` drives straight to its goals at full speed whoever is near; `scripted_slowed` "
