@@ -54,9 +54,9 @@ class Arguments:
     it from the start; the policy learns several times slower, and is more careful in the end."""
     threads: int | None = None
     """How many ranges the environments are stepped in at once; all cores by default."""
-    backend: str = "processes"
-    """Where those beside the first live: processes of their own, or threads. The policy is the
-    same; processes are faster and take more memory."""
+    backend: str = "threads"
+    """Where those beside the first live: threads, or processes of their own. The policy is the
+    same."""
     episodes: int = 128
     """Episodes of the evaluation at the end."""
     film: bool = True

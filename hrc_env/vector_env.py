@@ -70,8 +70,8 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
             step (default), in the same step, or not by itself ("Disabled").
         num_threads: threads that share the environments; all cores if None.
         backend: "threads", or "processes": all of them but the first in a process of its own,
-            where no lock is shared: faster by a third, with the memory of as many more
-            programs, and some seconds later to start. Results are the same.
+            where no lock is shared, with the memory of as many more programs and some seconds
+            later to start. Results are the same; which is faster, docs/speed.md says.
 
     Raises:
         ConfigError: an argument that cannot work, with what would.
