@@ -26,6 +26,9 @@ from hrc_env.stateful import State
 from hrc_env.typing import Floats, Ints
 from hrc_env.views import Views
 
+_LAST_WORDS_S = 5.0
+"""How long a process that no longer answers has to end by itself."""
+
 
 class Remote:
     """As far as a vector environment asks, a `Simulation` and its `Views`."""
@@ -103,7 +106,11 @@ class Remote:
         raise answer
 
     def _ended(self) -> HRCError:
-        code = self._child.wait()
+        try:
+            code = self._child.wait(_LAST_WORDS_S)
+        except subprocess.TimeoutExpired:  # it lives, but what it says makes no sense any more
+            self._child.kill()
+            code = self._child.wait()
         return HRCError(
             f"The process of {self.batch} environments has ended (exit status {code}): killed, or "
             "out of memory? What it wrote stands above. Make a new environment."
@@ -148,14 +155,13 @@ class _Desk:
 def _serve(calls: IO[bytes], answers: IO[bytes]) -> None:
     """Answer until nobody asks any more."""
 
-    def attempt(job: Callable[[], Any]) -> Any:
+    def attempt(job: Callable[[], Any]) -> None:
         try:
             answer = (True, job())
         except Exception as error:
             answer = (False, error)
         pickle.dump(answer, answers, pickle.HIGHEST_PROTOCOL)
         answers.flush()
-        return answer
 
     make, batch = pickle.load(calls)
     desk: list[_Desk] = []

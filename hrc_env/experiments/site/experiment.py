@@ -28,8 +28,8 @@ SCENE = "site"
 CROPS = "particle"
 """The estimator that the crops of the shared film follow."""
 PRIOR_STD_M = 3.0
-"""Nobody is followed who is further than four of these from the middle of the work [m]: the walks
-go all over the place."""
+"""How far people may be from the middle of the work when nothing is known of them [m]: the walks go
+all over the place."""
 ALSO = ("kalman", "per_joint")
 """Everybody's best must be known for a fair comparison: these are given the film, too."""
 
