@@ -43,15 +43,23 @@ class Remote:
             env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
         )
         self._send((make, batch))
-        self._is_made = False
+        self._owed = 1
+
+    def start(self, name: str, arguments: tuple[Any, ...]) -> Callable[[], Outcome]:
+        """Have `reset` or `step` done; what to call for its result."""
+        if name == "reset":
+            ids, rngs = arguments
+            name, arguments = "begin", (ids, [rng.spawn(N_STREAMS) for rng in rngs])
+        self._call(name, arguments)
+        return lambda: _unpacked(self._answer())
 
     def reset(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> Outcome:
         """As `Simulation.reset`."""
-        return _unpacked(self._ask("begin", ids, [rng.spawn(N_STREAMS) for rng in rngs]))
+        return self.start("reset", (ids, rngs))()
 
     def step(self, action: Floats) -> Outcome:
         """As `Simulation.step`."""
-        return _unpacked(self._ask("step", action))
+        return self.start("step", (action,))()
 
     def set_reward(self, weights: RewardConfig) -> None:
         """As `Simulation.set_reward`."""
@@ -82,11 +90,15 @@ class Remote:
         )
 
     def _ask(self, name: str, *arguments: Any) -> Any:
-        if not self._is_made:
-            self._answer()
-            self._is_made = True
-        self._send((name, arguments))
+        self._call(name, arguments)
         return self._answer()
+
+    def _call(self, name: str, arguments: tuple[Any, ...]) -> None:
+        """Ask for something; what nobody has waited for before (who was interrupted) is left."""
+        while self._owed > 0:
+            self._answer()
+        self._send((name, arguments))
+        self._owed += 1
 
     def _send(self, what: Any) -> None:
         pipe = self._pipe(self._child.stdin)
@@ -101,6 +113,7 @@ class Remote:
             is_result, answer = pickle.load(self._pipe(self._child.stdout))
         except (EOFError, pickle.UnpicklingError, ValueError) as error:
             raise self._ended() from error
+        self._owed -= 1
         if is_result:
             return answer
         raise answer

@@ -1,15 +1,15 @@
 """A batch of environments in contiguous ranges, each a `Simulation` stepped by its own thread.
 
-A range's simulation may live in a process of its own; then its thread only waits for it. As no
-result depends on the size of a batch, none depends on the number of ranges either.
+A range's simulation may live in a process of its own instead. As no result depends on the size
+of a batch, none depends on the number of ranges either.
 """
 
 import os
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from itertools import pairwise
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -48,6 +48,8 @@ class Part(Protocol):
 
 
 PartT = TypeVar("PartT", bound=Part)
+Start: TypeAlias = Callable[[PartT, str, tuple[Any, ...]], Callable[[], Outcome]]
+"""Sets a part to work on a method with arguments; what it gives is called for the result."""
 
 
 class Shards(Generic[PartT]):
@@ -59,6 +61,7 @@ class Shards(Generic[PartT]):
         n_shards: int,
         make: Callable[[int], Simulation],
         make_other: Callable[[int], PartT],
+        start: Start[PartT] | None = None,
     ) -> None:
         """Make them.
 
@@ -67,30 +70,30 @@ class Shards(Generic[PartT]):
             n_shards: in how many ranges.
             make: gives a simulation of so many environments, always of the same kind.
             make_other: gives those beside the first, which is made while these come about.
+            start: sets one of those to work; with None a thread works on it.
         """
         self.bounds = [batch * k // n_shards for k in range(n_shards + 1)]
         here, *others = (high - low for low, high in pairwise(self.bounds))
-        rest = [make_other(size) for size in others]
+        self._others = [make_other(size) for size in others]
         self.first = make(here)
-        self.parts: list[Simulation | PartT] = [self.first, *rest]
+        self._start = start or self._submit
         self._pool: ThreadPoolExecutor | None = None
+
+    @property
+    def parts(self) -> list[Simulation | PartT]:
+        """Them all."""
+        return [self.first, *self._others]
 
     def reset(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> Outcome:
         """Start environments `ids` (sorted) anew, one generator each; their rows."""
         rows = pairwise(np.searchsorted(ids, self.bounds).tolist())
-        return self._run(
-            partial(part.reset, ids[low:high] - first, rngs[low:high])
-            for part, first, (low, high) in zip(self.parts, self.bounds[:-1], rows, strict=True)
-            if high > low
-        )
+        given = zip(self.bounds[:-1], rows, strict=True)
+        arguments = ((ids[low:high] - first, rngs[low:high]) for first, (low, high) in given)
+        return self._run("reset", [each if len(each[0]) > 0 else None for each in arguments])
 
     def step(self, action: Floats) -> Outcome:
         """One control step of every environment; action (B, A) in [-1, 1]."""
-        spans = pairwise(self.bounds)
-        return self._run(
-            partial(_step, part, low, action[low:high])
-            for part, (low, high) in zip(self.parts, spans, strict=True)
-        )
+        return self._run("step", [(action[low:high],) for low, high in pairwise(self.bounds)])
 
     def get_state(self) -> list[State]:
         """A copy of everything that changes, part by part."""
@@ -121,27 +124,42 @@ class Shards(Generic[PartT]):
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_pool": None}
 
-    def _run(self, jobs: Iterable[Callable[[], Outcome]]) -> Outcome:
-        """What all jobs together give; nobody works on any more when this returns or raises."""
-        first, *others = jobs
-        if others and self._pool is None:
-            n_helpers = len(self.parts) - 1
+    def _run(self, name: str, arguments: Sequence[tuple[Any, ...] | None]) -> Outcome:
+        """What a method of all parts gives, of those but for which the arguments are None.
+
+        The others are set to work first. Nobody works on any more when this returns or raises.
+        """
+        others = [
+            (first, self._start(part, name, each))
+            for part, first, each in zip(self._others, self.bounds[1:], arguments[1:], strict=False)
+            if each is not None
+        ]
+        mine = arguments[0]
+        own = [] if mine is None else [(0, partial(getattr(self.first, name), *mine))]
+        return joined(_all_done([*own, *others]))
+
+    def _submit(self, part: Part, name: str, arguments: tuple[Any, ...]) -> Callable[[], Outcome]:
+        """Have a thread work on a part."""
+        if self._pool is None:
+            n_helpers = len(self._others)
             self._pool = ThreadPoolExecutor(n_helpers, thread_name_prefix="hrc_env-shard")
-        futures = [self._pool.submit(job) for job in others] if self._pool else []
+        return self._pool.submit(getattr(part, name), *arguments).result
+
+
+def _all_done(jobs: Iterable[tuple[int, Callable[[], Outcome]]]) -> list[Outcome]:
+    """What jobs give, each with the number of its first environment; or, once all are done, the
+    first error."""
+    outcomes, errors = [], []
+    for first, job in jobs:
         try:
-            outcome = first()
-        finally:
-            wait(futures)
-        return joined([outcome, *(future.result() for future in futures)])
-
-
-def _step(part: Part, first: int, action: Floats) -> Outcome:
-    try:
-        return part.step(action)
-    except HRCError as error:
-        if first > 0:
-            error.add_note(f"Environments are counted from number {first} of the vector here.")
-        raise
+            outcomes.append(job())
+        except BaseException as error:
+            errors.append(error)
+            if isinstance(error, HRCError) and first > 0:
+                error.add_note(f"Environments are counted from number {first} of the vector here.")
+    if errors:
+        raise errors[0]
+    return outcomes
 
 
 def joined(outcomes: list[Outcome]) -> Outcome:

@@ -333,11 +333,13 @@ def _mode(mode: str | AutoresetMode) -> AutoresetMode:
 
 def _shards(
     num_envs: int, n_shards: int, make: Callable[[int], Simulation], backend: str
-) -> Shards[Simulation | Remote]:
+) -> Shards[Simulation] | Shards[Remote]:
     """The environments, in as many ranges as work at once."""
     if backend not in BACKENDS:
         raise unknown("backend", backend, BACKENDS)
-    return Shards(num_envs, n_shards, make, partial(Remote, make) if backend == PROCESSES else make)
+    if backend == PROCESSES:
+        return Shards(num_envs, n_shards, make, partial(Remote, make), Remote.start)
+    return Shards(num_envs, n_shards, make, make)
 
 
 def _views_of(part: Simulation | Remote) -> Views | Remote:

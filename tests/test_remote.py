@@ -104,6 +104,15 @@ def test_errors_come_back_as_they_were():
         make("process")
 
 
+def test_an_answer_nobody_waited_for_is_not_taken_for_the_next():
+    env = make("processes")
+    env.reset(seed=0)
+    part = env.shards.parts[1]
+    part.start("step", (np.zeros((2, 6)),))  # and interrupted
+    assert part.get_state()["settings"]["batch"] == 2
+    env.close()
+
+
 def test_a_process_that_is_killed_is_named():
     env = make("processes")
     env.reset(seed=0)

@@ -198,6 +198,12 @@ def _build(
     )
 
 
+def without_workers(scene: Scene) -> Scene:
+    """The same scene with nobody in it."""
+    names = tuple(camera.name for camera in scene.cameras)
+    return _build(scene.config, scene.name, 0, scene.bodies, names)
+
+
 @lru_cache(maxsize=4)
 def drawing_model(scene: Scene) -> mujoco.MjModel:
     """The scene with everything that only the eye needs: looks, and what workers hold.

@@ -145,3 +145,19 @@ def test_a_broken_simulation_is_named():
     physics.set_state(state)
     with pytest.raises(HRCError, match="environment 1 broke down"):
         physics.step(np.zeros((3, 6)), no_workers(3, 5))
+
+
+def test_an_arm_out_of_reach_moves_as_it_would_alone():
+    """Bit for bit, whichever of its neighbours are near, and however that changes."""
+    scene = build(n_workers=2, bodies="any")
+    away = standing(4, (2.5, 0.0))
+    both = WorkerPath(*(np.concatenate([part, part], 2) for part in (
+        away.position_world, away.quaternion_wxyz)))  # fmt: skip
+    sequence, draw = commands(4), np.random.default_rng(1)
+    whole, parted = Physics(scene, 4), Physics(scene, 4)
+    for command in sequence:
+        apart = draw.random(4) < draw.choice([0.0, 0.5, 1.0])
+        expected = whole.step(command, both)
+        np.testing.assert_array_equal(parted.step(command, both, apart), expected)
+    for name in ("q", "qd"):
+        np.testing.assert_array_equal(getattr(parted, name), getattr(whole, name))
