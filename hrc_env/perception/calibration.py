@@ -18,13 +18,14 @@ from hrc_env.errors import ConfigError
 from hrc_env.skeleton import JOINTS, MIRROR
 from hrc_env.typing import Floats, Ints
 
-FORMAT, VERSION = "hrc_env keypoints", 2
+FORMAT, VERSION = "hrc_env keypoints", 3
 """Version: what the tables mean. A file of another one is refused."""
 PACKAGED = Path(__file__).with_name("keypoints.json")
 
 KINDS = ("nose", "shoulder", "elbow", "wrist", "hip", "knee", "ankle", "foot")
 """Kinds of joints: left and right err alike, mirrored."""
-POSTURES = ("upright", "folded")
+POSTURES = ("standing", "walking", "folded")
+"""Bodies count as each of these by a share (`emulator_kernel.weigh`)."""
 SIGHTS = ("seen", "hidden", "outside")
 """How a joint is seen: nothing before it, something before it, outside the image."""
 N_VIEWS = 8
@@ -59,6 +60,9 @@ class Calibration:
     own side, up [m]; the same in every camera."""
     wander_m: Floats
     """(P, K, 3) how far that varies, a standard deviation [m]."""
+    tail: Floats
+    """(P,) how much further it goes now and then: a standard normal vector n is lengthened by
+    1 + tail n.n / 3."""
     bias: Floats
     """(A, K, 2) mean error in a camera by the view, of side."""
     size: Floats
@@ -101,7 +105,7 @@ class Calibration:
 
 
 SHAPES: dict[str, tuple[int, ...]] = {
-    "offset_m": (_P, _K, 3), "wander_m": (_P, _K, 3), "bias": (N_VIEWS, _K, 2),
+    "offset_m": (_P, _K, 3), "wander_m": (_P, _K, 3), "tail": (_P,), "bias": (N_VIEWS, _K, 2),
     "size": (_P, _S, _K), "spread": (_P, _S, _K), "body": (_P, _Q),
     "size_s": (), "common": (), "shares": (_K, 3),
     "slow_s": (), "slow_m": (), "limb": (_K,), "confidence": (_P, _S, _K, _Z), "follows": (_S, _K),
@@ -109,7 +113,7 @@ SHAPES: dict[str, tuple[int, ...]] = {
     "sigma": (_K, len(VISIBILITY)),
 }  # fmt: skip
 _POSITIVE = ("size", "size_s", "slow_s", "slow_m", "swap_s", "miss_s", "sigma")
-_SHARES = ("common", "shares", "confidence", "swap_share", "miss_share")
+_SHARES = ("tail", "common", "shares", "confidence", "swap_share", "miss_share")
 _CORRELATIONS = ("limb", "follows")
 _RENEW = "make a new one with: python -m hrc_env calibrate-keypoints --out FILE"
 
@@ -120,15 +124,22 @@ def read_calibration(path: Path | str | None = None) -> Calibration:
     Raises:
         ConfigError: no such file, none of a calibration, of another version, or broken.
     """
-    path = PACKAGED if path is None else Path(path)
+    return _read(PACKAGED, 0) if path is None else _read(Path(path), changed_ns(path))
+
+
+def changed_ns(path: Path | str) -> int:
+    """When a calibration file was last written [ns].
+
+    Raises:
+        ConfigError: no such file.
+    """
     try:
-        changed = path.stat().st_mtime_ns
+        return os.stat(path).st_mtime_ns
     except OSError as error:
         raise ConfigError(
             f"The calibration file {path} cannot be read ({error.strerror}): name one that "
             f"exists, leave emulator.calibration empty for the package's own, or {_RENEW}."
         ) from error
-    return _read(path, changed)
 
 
 @functools.lru_cache(maxsize=8)

@@ -24,6 +24,7 @@ from hrc_env.perception.calibration import (
     KIND,
     VISIBILITY,
     Calibration,
+    changed_ns,
     read_calibration,
 )
 from hrc_env.perception.emulator_kernel import (
@@ -174,7 +175,8 @@ def emulate(
     normals = np.empty((batch, n_normals))
     for rng, normal in zip(rngs, normals, strict=True):
         rng.standard_normal(out=normal)
-    tables, scalars = _settings(config, state.dt_s)
+    written_ns = changed_ns(config.calibration) if config.calibration else 0
+    tables, scalars = _settings(config, state.dt_s, written_ns)
     errors = Errors(
         state.lasting, state.slow, state.size, state.sure, state.body, state.wander,
         state.happening,
@@ -193,12 +195,12 @@ def lines_of_sight(
     """How each camera sees each joint and each worker, as the emulator has it.
 
     Returns:
-        (B, C, W, J) `sightlines.SEEN`, `HIDDEN`, `OUTSIDE` or `BEHIND`; (B, C, W, 4) side
-        [px] and turn [rad] of the window, view [rad] and folding.
+        (B, C, W, J) `sightlines.SEEN`, `HIDDEN`, `OUTSIDE` or `BEHIND`; (B, C, W, 5) side
+        [px] and turn [rad] of the window, view [rad], folding and stepping.
     """
     batch, n_workers, n_joints = truth.joints_world.shape[:3]
     sight = np.empty((batch, len(cameras), n_workers, n_joints), np.int64)
-    look_of = np.empty((batch, len(cameras), n_workers, 4))
+    look_of = np.empty((batch, len(cameras), n_workers, 5))
     sight_batch(_world(truth, surroundings), _rig(cameras), sight, look_of)
     return sight, look_of
 
@@ -247,12 +249,12 @@ def _bending(camera: PinholeCamera) -> Floats:
 
 
 @functools.lru_cache(maxsize=16)
-def _settings(config: EmulatorConfig, dt_s: float) -> tuple[Tables, Scalars]:
-    """A calibration as the kernel takes it."""
+def _settings(config: EmulatorConfig, dt_s: float, written_ns: int) -> tuple[Tables, Scalars]:
+    """A calibration as the kernel takes it; read again if its file has been written anew."""
     known = config.calibrated()
     confidence = np.clip(known.confidence, 1e-6, 1 - 1e-6)
     numbers = (
-        known.offset_m, known.wander_m, known.bias, np.log(known.size), known.spread,
+        known.offset_m, known.wander_m, known.tail, known.bias, np.log(known.size), known.spread,
         known.body, np.sqrt(known.shares), known.limb, np.log(confidence / (1 - confidence)),
         known.follows,
         known.swap_share, known.miss_share, known.sigma, VISIBILITY, KIND, HAND, INNER, MIRROR,

@@ -9,8 +9,8 @@ import numpy as np
 from hrc_env.compiled import JIT, LEAN
 from hrc_env.geometry.sight import make_table
 from hrc_env.perception.noise import error_share
-from hrc_env.perception.outline import facing, folded, seen_from
-from hrc_env.perception.sightlines import BEHIND, FOLDING, OUTSIDE, SIDE, TURN, VIEW, fill, see
+from hrc_env.perception.outline import facing, folded, seen_from, speed, stepping
+from hrc_env.perception.sightlines import BEHIND, OUTSIDE, SIDE, TURN, VIEW, fill, see
 from hrc_env.skeleton import JOINT
 from hrc_env.typing import Floats, Ints
 
@@ -42,13 +42,15 @@ class Errors(NamedTuple):
 
 
 class Tables(NamedTuple):
-    """A calibration for the kernel: P = 2 upright and folded, K kinds of joints, A views,
+    """A calibration for the kernel: P = 3 standing, walking and folded, K kinds of joints, A views,
     S = 3 sights, Z knots."""
 
     offset: Floats
     """(P, K, 3) [m]."""
     wander: Floats
     """(P, K, 3) [m]."""
+    tail: Floats
+    """(P,)."""
     bias: Floats
     """(A, K, 2) share of the window's side."""
     size: Floats
@@ -119,18 +121,19 @@ def emulate_batch(errors, normals, world, rig, tables, scalars, px, confidence, 
     table = make_table(world.still, first_body - len(world.still) + n_workers * n_body)
     view, rows = np.empty((5, len(table))), np.empty(len(table), np.int64)
     uv, depth, state = np.empty((n_joints, 2)), np.empty(n_joints), np.empty(n_joints, np.int64)
-    meant, off, look_of = np.empty((n_joints, 3)), np.zeros((n_joints, 2)), np.empty(4)
+    meant, off, look_of = np.empty((n_joints, 3)), np.zeros((n_joints, 2)), np.empty(5)
     n_bodies = 3 * n_joints * n_workers
     for b in range(batch):
         fill(table, world, b)
         for w in range(n_workers):
             joints, next_normal = world.joints[b, w], 3 * n_joints * w
-            keep = math.exp(-scalars.at_rest - scalars.per_speed * _speed(world.velocity[b, w]))
+            pace = speed(world.velocity[b, w])
+            keep = math.exp(-scalars.at_rest - scalars.per_speed * pace)
             front_x, front_y = facing(joints)
-            look_of[FOLDING] = folded(joints)
+            posture = weigh(folded(joints), stepping(pace))
             _wander(
                 errors.wander[b, w], normals[b, next_normal:], joints, front_x, front_y,
-                look_of[FOLDING], keep, tables, scalars, meant,
+                posture, keep, tables, scalars, meant,
             )  # fmt: skip
             for c in range(n_cameras):
                 n_seen = see(
@@ -141,27 +144,30 @@ def emulate_batch(errors, normals, world, rig, tables, scalars, px, confidence, 
                 mine = normals[b, first:]
                 swapped, crossed, found = _happen(
                     errors.happening[b, c, w], mine[N_NORMALS * n_joints + 1 :], n_seen, look_of,
-                    tables, scalars,
+                    posture, tables, scalars,
                 )  # fmt: skip
                 _report(
                     errors.lasting[b, c, w], errors.slow[b, c, w], errors.size[b, c, w],
                     errors.sure[b, c, w], errors.body[b, c], w, mine, keep, uv, state, look_of,
-                    found, swapped, crossed, tables, scalars, off, px[b, c, w],
+                    posture, found, swapped, crossed, tables, scalars, off, px[b, c, w],
                     confidence[b, c, w], sigma[b, c, w],
                 )  # fmt: skip
 
 
 @numba.njit(**LEAN)
-def _wander(wander, normals, joints, front_x, front_y, fold, keep, tables, scalars, meant):
+def _wander(wander, normals, joints, front_x, front_y, posture, keep, tables, scalars, meant):
     """Write where in space the detector means the joints to be, whatever the camera."""
     renew = math.sqrt(1.0 - keep * keep)
+    tail = _mixed(posture, tables.tail[0], tables.tail[1], tables.tail[2]) / 3.0
     for j in range(len(joints)):
         kind, hand = tables.kind[j], tables.hand[j]
         for i in range(3):
             wander[j, i] = keep * wander[j, i] + renew * normals[3 * j + i]
-        ahead = _away(tables, fold, kind, 0, wander[j, 0])
-        left = hand * _away(tables, fold, kind, 1, wander[j, 1])
-        up = _away(tables, fold, kind, 2, wander[j, 2])
+        n = wander[j]
+        far = 1.0 + tail * (n[0] * n[0] + n[1] * n[1] + n[2] * n[2])
+        ahead = _away(tables, posture, kind, 0, far * n[0])
+        left = hand * _away(tables, posture, kind, 1, far * n[1])
+        up = _away(tables, posture, kind, 2, far * n[2])
         scale = scalars.error_scale
         meant[j, 0] = joints[j, 0] + scale * (front_x * ahead - front_y * left)
         meant[j, 1] = joints[j, 1] + scale * (front_y * ahead + front_x * left)
@@ -169,24 +175,15 @@ def _wander(wander, normals, joints, front_x, front_y, fold, keep, tables, scala
 
 
 @numba.njit(**LEAN)
-def _speed(velocity):
-    """Mean speed of joints (J, 3) [m/s]."""
-    total = 0.0
-    for j in range(len(velocity)):
-        x, y, z = velocity[j, 0], velocity[j, 1], velocity[j, 2]
-        total += math.sqrt(x * x + y * y + z * z)
-    return total / len(velocity)
+def _away(tables, posture, kind, axis, normal):
+    at, wide = tables.offset, tables.wander
+    middle = _mixed(posture, at[0, kind, axis], at[1, kind, axis], at[2, kind, axis])
+    std = _mixed(posture, wide[0, kind, axis], wide[1, kind, axis], wide[2, kind, axis])
+    return middle + std * normal
 
 
 @numba.njit(**LEAN)
-def _away(tables, fold, kind, axis, normal):
-    upright = tables.offset[0, kind, axis] + tables.wander[0, kind, axis] * normal
-    folded_up = tables.offset[1, kind, axis] + tables.wander[1, kind, axis] * normal
-    return upright + fold * (folded_up - upright)
-
-
-@numba.njit(**LEAN)
-def _happen(happening, normals, n_seen, look_of, tables, scalars):
+def _happen(happening, normals, n_seen, look_of, posture, tables, scalars):
     """Whether left and right are exchanged now, of all joints and of the legs; whether the worker
     is found.
 
@@ -194,20 +191,22 @@ def _happen(happening, normals, n_seen, look_of, tables, scalars):
     large as the share of the time that it happens when so many joints are seen from here.
     """
     low, high, part = _between(look_of[VIEW], tables.swap.shape[1])
-    upright, folded_up, fold = tables.swap[0], tables.swap[1], look_of[FOLDING]
-    swap = _lerp(
-        _lerp(upright[low, 0], upright[high, 0], part),
-        _lerp(folded_up[low, 0], folded_up[high, 0], part), fold,
-    )  # fmt: skip
-    cross = _lerp(
-        _lerp(upright[low, 1], upright[high, 1], part),
-        _lerp(folded_up[low, 1], folded_up[high, 1], part), fold,
-    )  # fmt: skip
-    miss = _lerp(tables.miss[0, n_seen], tables.miss[1, n_seen], fold)
+    swap = _swap_share(tables.swap, posture, low, high, part, 0)
+    cross = _swap_share(tables.swap, posture, low, high, part, 1)
+    missing = tables.miss
+    miss = _mixed(posture, missing[0, n_seen], missing[1, n_seen], missing[2, n_seen])
     swapped = _goes_on(happening, SWAPPED, normals, scalars.keep_swap) < swap
     crossed = _goes_on(happening, CROSSED, normals, scalars.keep_cross) < cross
     missed = _goes_on(happening, MISSED, normals, scalars.keep_miss) < miss
     return swapped, crossed, n_seen >= scalars.min_joints and not missed
+
+
+@numba.njit(**LEAN)
+def _swap_share(swap, posture, low, high, part, which):
+    """Of two neighbouring views."""
+    a = _mixed(posture, swap[0, low, which], swap[1, low, which], swap[2, low, which])
+    b = _mixed(posture, swap[0, high, which], swap[1, high, which], swap[2, high, which])
+    return _lerp(a, b, part)
 
 
 @numba.njit(**LEAN)
@@ -229,18 +228,18 @@ def _between(angle, n):
 
 @numba.njit(**LEAN)
 def _report(
-    lasting, slow, size, sure, body, w, normals, keep, uv, state, look_of, found, swapped, crossed,
-    tables, scalars, off, px, confidence, sigma,
+    lasting, slow, size, sure, body, w, normals, keep, uv, state, look_of, posture, found,
+    swapped, crossed, tables, scalars, off, px, confidence, sigma,
 ):  # fmt: skip
     """Errors of one worker in one image, and what is then reported of each joint."""
-    n_joints, side, fold = len(uv), look_of[SIDE], look_of[FOLDING]
+    n_joints, side = len(uv), look_of[SIDE]
     renew = math.sqrt(1.0 - keep * keep)
     turn_cos, turn_sin = math.cos(look_of[TURN]), math.sin(look_of[TURN])
     view_cos, view_sin = math.cos(look_of[VIEW]), math.sin(look_of[VIEW])
     from_left = _between(look_of[VIEW], len(tables.bias))
     from_right = _between(-look_of[VIEW], len(tables.bias))
     body[w] = scalars.keep_size * body[w] + scalars.renew_size * normals[N_NORMALS * n_joints]
-    badly = _quantile(tables.body[0], tables.body[1], fold, body[w])
+    badly = _quantile(tables.body[0], tables.body[1], tables.body[2], posture, body[w])
     for j in range(n_joints):
         kind, first = tables.kind[j], N_NORMALS * j
         size[j] = scalars.keep_size * size[j] + scalars.renew_size * normals[first + 4]
@@ -261,8 +260,13 @@ def _report(
             sigma[label] = np.inf
             continue
         z = scalars.common * body[w] + scalars.own * size[j]
-        scale = _lerp(tables.size[0, state[j], kind], tables.size[1, state[j], kind], fold)
-        wide = _lerp(tables.spread[0, state[j], kind], tables.spread[1, state[j], kind], fold)
+        sight, size_of, spread_of = state[j], tables.size, tables.spread
+        scale = _mixed(
+            posture, size_of[0, sight, kind], size_of[1, sight, kind], size_of[2, sight, kind]
+        )
+        wide = _mixed(
+            posture, spread_of[0, sight, kind], spread_of[1, sight, kind], spread_of[2, sight, kind]
+        )
         scale = math.exp(scale + badly + wide * size[j])
         low, high, part = from_left if tables.hand[j] > 0.0 else from_right
         bias, x, y = tables.bias, scale * off[j, 0], scale * off[j, 1]
@@ -274,7 +278,8 @@ def _report(
         px[label, 1] = uv[j, 1] + shrink * (turn_sin * x + turn_cos * y)
         follows = tables.follows[state[j], kind]
         logit = _quantile(
-            tables.doubt[0, state[j], kind], tables.doubt[1, state[j], kind], fold,
+            tables.doubt[0, sight, kind], tables.doubt[1, sight, kind],
+            tables.doubt[2, sight, kind], posture,
             math.sqrt(1.0 - follows * follows) * sure[j] - follows * z,
         )  # fmt: skip
         visible = 1.0 / (1.0 + math.exp(-logit))
@@ -291,11 +296,23 @@ def _lerp(a, b, part):
 
 
 @numba.njit(**LEAN)
-def _quantile(upright, folded_up, fold, normal):
+def weigh(folding, stepping_):
+    """How far a body counts as standing, as walking and as folded; together 1."""
+    up = 1.0 - folding
+    return up * (1.0 - stepping_), up * stepping_, folding
+
+
+@numba.njit(**LEAN)
+def _mixed(posture, standing, walking, folded_up):
+    return posture[0] * standing + posture[1] * walking + posture[2] * folded_up
+
+
+@numba.njit(**LEAN)
+def _quantile(standing, walking, folded_up, posture, normal):
     """Of a distribution given by its quantiles at whole standard deviations, 0 in the middle."""
-    last = len(upright) - 1
+    last = len(standing) - 1
     place = min(max(normal + 0.5 * last, 0.0), float(last))
     low = min(int(place), last - 1)
-    a = _lerp(upright[low], folded_up[low], fold)
-    b = _lerp(upright[low + 1], folded_up[low + 1], fold)
+    a = _mixed(posture, standing[low], walking[low], folded_up[low])
+    b = _mixed(posture, standing[low + 1], walking[low + 1], folded_up[low + 1])
     return a + (place - low) * (b - a)

@@ -13,6 +13,10 @@ UPRIGHT, FOLDED = 0.15, 0.50
 begins to count as folded, and from where on it counts as folded up. Judgement: who walks is below
 .12, who bends, kneels or squats above .3."""
 
+STANDS_M_S, WALKS_M_S = 0.3, 0.7
+"""Mean speeds of the joints from where a body begins to count as walking, and does [m/s]: hands
+that hammer are at the first, people who walk slowly above the second."""
+
 # Joints: nose 0; left and right shoulder 1 2, elbow 3 4, wrist 5 6, hip 7 8, knee 9 10,
 # ankle 11 12.
 
@@ -39,6 +43,22 @@ def folded(joints):
         height += joints[shoulder, 2] - joints[ankle, 2]
     share = 1.0 - height / max(length, 1e-9)
     return min(max((share - UPRIGHT) / (FOLDED - UPRIGHT), 0.0), 1.0)
+
+
+@numba.njit(**LEAN)
+def speed(velocity):
+    """Mean speed of joints (J, 3) [m/s]."""
+    total = 0.0
+    for j in range(len(velocity)):
+        x, y, z = velocity[j, 0], velocity[j, 1], velocity[j, 2]
+        total += math.sqrt(x * x + y * y + z * z)
+    return total / len(velocity)
+
+
+@numba.njit(**LEAN)
+def stepping(mean_speed_m_s):
+    """Whether a body walks, by its joints' mean speed: 0 stands, 1 walks."""
+    return min(max((mean_speed_m_s - STANDS_M_S) / (WALKS_M_S - STANDS_M_S), 0.0), 1.0)
 
 
 @numba.njit(**LEAN)

@@ -22,7 +22,8 @@ def made(error, **changes):
     nowhere = np.full((L, T, J, 3), np.nan)
     parts = {
         "error": error, "confidence": rng.uniform(0.9, 0.99, (L, T, C, J)),
-        "sight": np.zeros((L, T, C, J), int), "view": view, "fold": np.zeros((L, T)),
+        "sight": np.zeros((L, T, C, J), int), "view": view,
+        "posture": np.tile([1.0, 0.0, 0.0], (L, T, 1)),
         "speed_m_s": np.full((L, T), 0.1), "missed": np.zeros((L, T, C), bool),
         "exchanged": np.zeros((L, T, C, 2), bool), "shown": np.zeros((L, T, C, J, 2, 3)),
         "offset_m": nowhere, "noise": nowhere, "counts": np.ones((L, T), bool),

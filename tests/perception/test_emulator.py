@@ -2,6 +2,7 @@
 
 import copy
 import dataclasses
+import math
 
 import numpy as np
 import pytest
@@ -105,7 +106,7 @@ def calibrated(tmp_path, **changes):
 def plain(**changes):
     """Tables of errors of one size that all cameras have for themselves."""
     known = read_calibration()
-    zeros = ("offset_m", "wander_m", "bias", "spread", "body", "limb")
+    zeros = ("offset_m", "wander_m", "bias", "spread", "body", "limb", "tail")
     tables = {name: np.zeros_like(getattr(known, name)) for name in zeros}
     shares = np.zeros_like(known.shares)
     shares[:, 1] = 1.0
@@ -142,7 +143,7 @@ def test_who_moves_gets_new_errors_sooner(tmp_path):
 def test_offsets_in_space_are_the_same_in_every_camera(tmp_path):
     hips = np.zeros_like(read_calibration().offset_m)
     hips[:, KINDS.index("hip"), 2] = 0.03  # up
-    config = calibrated(tmp_path, **plain(offset_m=hips, size=np.full((2, 3, 8), 1e-6)))
+    config = calibrated(tmp_path, **plain(offset_m=hips, size=np.full((3, 3, 8), 1e-6)))
     state, rngs = start(1, config)
     true = truth(1)
     raised = true.joints_world.copy()
@@ -150,6 +151,36 @@ def test_offsets_in_space_are_the_same_in_every_camera(tmp_path):
     px, _ = project(projections(CAMERAS), raised)
     seen = emulate(state, rngs, true, nothing(1), CAMERAS, config)
     np.testing.assert_allclose(seen.px, px, atol=0.05)
+
+
+def test_what_cameras_share_can_go_far_now_and_then(tmp_path):
+    """A vector n of normal variables is lengthened by 1 + tail n.n / 3."""
+    wander = np.full_like(read_calibration().wander_m, 0.01)
+    still = {"wander_m": wander, "size": np.full((3, 3, 8), 1e-9), "slow_s": np.array(1e-3)}
+    plain_tail, long_tail = (
+        film(calibrated(tmp_path, **plain(**still, tail=np.full(3, tail))), 2, batch=300)[0]
+        for tail in (0.0, 0.5)
+    )
+    usual, farther = (np.linalg.norm(each, axis=-1).ravel() for each in (plain_tail, long_tail))
+    n2 = np.random.default_rng(0).chisquare(3, 100_000)
+    expected = np.sqrt((n2 * (1 + 0.5 * n2 / 3) ** 2).mean() / n2.mean())
+    ratio = np.sqrt((farther**2).mean() / (usual**2).mean())
+    assert ratio == pytest.approx(expected, rel=0.08)
+
+
+def test_who_walks_errs_as_the_file_says_of_who_walks(tmp_path):
+    size = np.full((3, 3, 8), 0.01)
+    size[1] = 0.03
+    config = calibrated(tmp_path, **plain(size=size))
+    spread = []
+    for speed_m_s in (0.1, 0.5, 1.2):
+        state, rngs = start(200, config, FRONT)
+        true = truth(200)
+        true.velocity_world[...] = (speed_m_s, 0.0, 0.0)
+        px, _ = project(projections(FRONT), true.joints_world)
+        errors = emulate(state, rngs, true, nothing(200), FRONT, config).px - px
+        spread.append(np.std(errors))
+    np.testing.assert_allclose(np.array(spread) / spread[0], [1.0, math.sqrt(3.0), 3.0], rtol=0.1)
 
 
 def test_confidences_have_the_quantiles_of_the_file():
@@ -220,7 +251,7 @@ def test_a_swap_exchanges_left_and_right():
 
 def test_swaps_and_misses_take_their_share_of_the_time_and_last(tmp_path):
     half = {"swap_s": np.full(2, 0.5), "miss_s": np.array(0.5)}
-    known = calibrated(tmp_path, **half, swap_share=np.zeros((2, N_VIEWS, 2)))
+    known = calibrated(tmp_path, **half, swap_share=np.zeros((3, N_VIEWS, 2)))
     config = dataclasses.replace(EXACT, calibration=known.calibration, swap_share=0.1)
     config = dataclasses.replace(config, miss_share=0.2)
     state, rngs = start(64, config)

@@ -125,10 +125,15 @@ def moved(rig: tuple[CameraConfig, ...]) -> tuple[CameraConfig, ...]:
     )
 
 
+def number_of(clip: Clip) -> int:
+    """A number of its own, however often it is drawn."""
+    words = f"{clip.seed} {clip.scene} {clip.motion} {clip.body} {clip.moved_rig}"
+    return zlib.crc32(words.encode())
+
+
 def stage(clip: Clip, scene: Scene) -> Staged:
     """The worker at a place with room, at a moment of the motion that the seed chooses."""
-    number = zlib.crc32(f"{clip.scene} {clip.motion} {clip.body} {clip.moved_rig}".encode())
-    rng = np.random.default_rng([clip.seed, number])
+    rng = np.random.default_rng(number_of(clip))
     seed, body = int(rng.integers(2**31)), load_body(clip.body)
     path = _played(clip.motion, body, seed).position_world[:, 0, 0, :2]
     xy_m, yaw_rad, first = _place(path, scene, rng)

@@ -12,21 +12,20 @@ from pathlib import Path
 import numpy as np
 
 from hrc_env.config import HRCConfig
-from hrc_env.experiments.calibration.clips import Clip, family_of
+from hrc_env.experiments.calibration.clips import WARM_UP, Clip
 from hrc_env.experiments.calibration.fit.body import body_spread
-from hrc_env.experiments.calibration.fit.cells import FEW, N_K, N_P, N_S, Cells
-from hrc_env.experiments.calibration.samples import Samples, samples_of
-from hrc_env.experiments.calibration.validate import outcome
+from hrc_env.experiments.calibration.fit.cells import FEW, N_K, N_P, N_S, Cells, class_of
+from hrc_env.experiments.calibration.samples import Samples, postures_of, samples_of
 from hrc_env.experiments.calibration.watch import Watched, watch
 from hrc_env.perception.calibration import Calibration, write_calibration
 from hrc_env.perception.emulator import EmulatorConfig
 from hrc_env.typing import Floats
 
-IN_THE_IMAGE, IN_SPACE = 2, 2
+IN_THE_IMAGE, IN_SPACE = 2, 4
 """Rounds: first errors in the image are matched, then those in space."""
 STEP = (0.75, 1.3)
 """No number changes by more than such a factor in a round."""
-DRAWS = 2
+DRAWS = 3
 """How often the emulator plays every clip in a round."""
 DAMPED = 0.7
 """Power of the factors in space: what the emulator draws by chance is not to be fitted."""
@@ -54,7 +53,7 @@ def matched(
         if k < IN_THE_IMAGE:
             draft = _as_in_the_image(draft, wanted, samples_of(emulated))
         else:
-            draft = _as_in_space(draft, clips, pixels, emulated)
+            draft = _as_in_space(draft, pixels, emulated)
     path.unlink()
     return draft
 
@@ -100,16 +99,27 @@ def _limited(factor: Floats, trust: Floats | float = 1.0) -> Floats:
     return np.clip(factor, *STEP) ** trust
 
 
-def _as_in_space(
-    draft: Calibration, clips: list[Clip], pixels: list[Watched], emulated: list[Watched]
-) -> Calibration:
-    """Errors scaled by what the tracker's median error is off: one factor for upright motions, one
-    for those that fold the body."""
-    is_folded = [family_of(clip.motion) == "fold" for clip in clips]
-    factors = []
-    for wanted in (False, True):
-        mine = [k for k, folded in enumerate(is_folded) if folded == wanted]
-        drawn = [emulated[k + draw * len(clips)] for k in mine for draw in range(DRAWS)]
-        factors.append(outcome([pixels[k] for k in mine]).median_m / outcome(drawn).median_m)
-    factor = _limited(np.array(factors) ** DAMPED)[:, None, None]
-    return replace(draft, size=draft.size * factor, wander_m=draft.wander_m * factor)
+def _as_in_space(draft: Calibration, pixels: list[Watched], emulated: list[Watched]) -> Calibration:
+    """All errors scaled by what the tracker's median error is off, posture by posture; tails of
+    what cameras share by what is then left of its 95th percentile's."""
+    size, wander, tail = draft.size.copy(), draft.wander_m.copy(), draft.tail.copy()
+    for posture in range(N_P):
+        wanted, drawn = _errors_in(pixels, posture), _errors_in(emulated, posture)
+        if min(wanted.size, drawn.size) < FEW:
+            continue
+        middle, most = np.percentile(wanted, [50, 95]) / np.percentile(drawn, [50, 95])
+        factor, longer = (_limited(np.array(each**DAMPED)) for each in (middle, most / middle))
+        size[posture] *= factor
+        wander[posture] *= factor
+        tail[posture] = np.clip(((1 + 3 * tail[posture]) * longer - 1) / 3, 0.0, 1.0)
+    return replace(draft, size=size, wander_m=wander, tail=tail)
+
+
+def _errors_in(watched: list[Watched], posture: int) -> Floats:
+    """(N,) errors of the tracked joints while the body was of a posture [m]."""
+    errors = []
+    for each in watched:
+        mine = each.tracked & (class_of(postures_of(each)) == posture)
+        mine[:WARM_UP] = False
+        errors.append(np.linalg.norm((each.mean_world - each.joints_world)[mine], axis=-1).ravel())
+    return np.concatenate(errors)

@@ -8,8 +8,8 @@ import numpy as np
 from hrc_env.experiments.calibration.clips import DT_S, WARM_UP
 from hrc_env.experiments.calibration.watch import Watched
 from hrc_env.perception.calibration import HAND
-from hrc_env.perception.emulator_kernel import FIRST_OF_LEGS
-from hrc_env.perception.sightlines import FOLDING, SEEN, SIDE, TURN, VIEW
+from hrc_env.perception.emulator_kernel import FIRST_OF_LEGS, weigh
+from hrc_env.perception.sightlines import FOLDING, SEEN, SIDE, STEPPING, TURN, VIEW
 from hrc_env.skeleton import MIRROR
 from hrc_env.typing import Bools, Floats, Ints
 
@@ -36,8 +36,8 @@ class Samples:
     """(L, T, C, J)."""
     view: Floats
     """(L, T, C) [rad]."""
-    fold: Floats
-    """(L, T)."""
+    posture: Floats
+    """(L, T, P) how far the body counts as each of `POSTURES`."""
     speed_m_s: Floats
     """(L, T) mean over the joints."""
     missed: Bools
@@ -74,10 +74,16 @@ def _samples(clip: Watched) -> Samples:
     offset, noise = _agreed(error, shown, sight, look_of[:, 0, FOLDING])
     pace_m = np.linalg.norm(np.diff(clip.joints_world, axis=0), axis=-1).mean(-1)
     return Samples(
-        error, clip.confidence[late], sight, look_of[..., VIEW], look_of[:, 0, FOLDING],
+        error, clip.confidence[late], sight, look_of[..., VIEW], postures_of(clip)[late],
         pace_m[WARM_UP - 1 :] / DT_S, np.isnan(clip.px[late, :, 0, 0]), exchanged, shown,
         offset, noise, clip.tracked[late],
     )  # fmt: skip
+
+
+def postures_of(clip: Watched) -> Floats:
+    """(T, P) how far the body counts as each of `POSTURES`."""
+    look_of = clip.look_of[:, 0]
+    return np.stack(weigh(look_of[:, FOLDING], look_of[:, STEPPING]), -1)
 
 
 def _in_window(vectors: Floats, look_of: Floats) -> Floats:

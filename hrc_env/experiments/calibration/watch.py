@@ -11,7 +11,7 @@ from hrc_env.batching import rows
 from hrc_env.body import worker_truth
 from hrc_env.config import HRCConfig
 from hrc_env.errors import ConfigError
-from hrc_env.experiments.calibration.clips import DT_S, Clip, Staged, scene_of, stage
+from hrc_env.experiments.calibration.clips import DT_S, Clip, Staged, number_of, scene_of, stage
 from hrc_env.geometry.cameras import project, projections
 from hrc_env.perception.emulator import lines_of_sight
 from hrc_env.records import CropWindow, Keypoints
@@ -44,7 +44,7 @@ class Watched:
     sight: Ints
     """(T, C, J) as `perception.emulator.lines_of_sight`."""
     look_of: Floats
-    """(T, C, 4) the same."""
+    """(T, C, 5) the same."""
     joints_world: Points3
     """(T, J, 3) [m]."""
     mean_world: Points3
@@ -71,7 +71,7 @@ def watch(
                 senses, known = make_senses(level, estimator, scene, 1, config), scene
             if not isinstance(senses, TrackingSenses):
                 raise ConfigError(f"Clips are for levels with cameras, not for {level!r}.")
-            yield _watched(senses, scene, stage(clip, scene), (clip.seed, clip.draw))
+            yield _watched(senses, scene, stage(clip, scene), (number_of(clip), clip.draw))
     finally:
         if senses is not None:
             senses.close()

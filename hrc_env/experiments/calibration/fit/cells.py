@@ -4,13 +4,22 @@ import numpy as np
 
 from hrc_env.experiments.calibration.samples import Samples
 from hrc_env.perception.calibration import HAND, KIND, KINDS, N_VIEWS, POSTURES, SIGHTS
-from hrc_env.typing import Bools
+from hrc_env.typing import Bools, Floats, Ints
 
 N_K, N_P, N_S = len(KINDS), len(POSTURES), len(SIGHTS)
 FEW = 300
 """A cell of a table with fewer samples is drawn towards the cell that stands for it."""
 SHARP = 0.06
 """Errors below this share of the side are no gross ones: means and correlations are theirs."""
+
+
+CLEAR = 0.5
+"""A body counts as of a class from this share on."""
+
+
+def class_of(posture: Floats) -> Ints:
+    """(...) which of `POSTURES` shares (..., P) clearly are; -1: none."""
+    return np.where(posture.max(-1) >= CLEAR, posture.argmax(-1), -1)
 
 
 class Cells:
@@ -20,8 +29,8 @@ class Cells:
         self.mirrored = samples.error * np.stack([HAND, np.ones_like(HAND)], -1)
         self.found = np.isfinite(samples.error[..., 0]) & samples.counts[..., None, None]
         self.sight, self.confidence = samples.sight, samples.confidence
-        fold = np.broadcast_to(samples.fold[..., None, None], self.found.shape)
-        self.posture = np.where(fold < 0.3, 0, np.where(fold >= 0.5, 1, -1))
+        class_ = class_of(samples.posture)[..., None, None]
+        self.posture = np.broadcast_to(class_, self.found.shape)
         view = samples.view[..., None] * HAND
         self.view_bin = np.round(view * N_VIEWS / (2 * np.pi)).astype(int) % N_VIEWS
 

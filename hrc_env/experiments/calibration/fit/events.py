@@ -5,7 +5,7 @@ from scipy.optimize import isotonic_regression
 from scipy.special import ndtri, owens_t
 
 from hrc_env.experiments.calibration.clips import DT_S
-from hrc_env.experiments.calibration.fit.cells import FEW, N_P
+from hrc_env.experiments.calibration.fit.cells import FEW, N_P, class_of
 from hrc_env.experiments.calibration.samples import Samples
 from hrc_env.perception.calibration import N_SEEN, N_VIEWS
 from hrc_env.perception.sightlines import SEEN
@@ -24,7 +24,8 @@ def swaps_of(samples: Samples) -> tuple[Floats, Floats]:
     share, length = np.zeros((N_P, N_VIEWS, 2)), np.zeros(2)
     for what in range(2):
         now, overall = samples.exchanged[..., what] & looked, 0.0
-        for posture, chosen in enumerate(_postures(samples)):
+        for posture in range(N_P):
+            chosen = _are(samples, posture)
             known = chosen & looked
             if known.any() or posture == 0:
                 overall = now[known].sum() / max(known.sum(), 1)
@@ -41,7 +42,8 @@ def misses_of(samples: Samples) -> tuple[Floats, Floats]:
     n_seen = (samples.sight == SEEN).sum(-1)
     looked = np.broadcast_to(samples.counts[..., None], n_seen.shape)
     share = np.zeros((N_P, N_SEEN))
-    for posture, chosen in enumerate(_postures(samples)):
+    for posture in range(N_P):
+        chosen = _are(samples, posture)
         mine = [looked & chosen & (n_seen == n) for n in range(N_SEEN)]
         count = np.array([each.sum() for each in mine]) + FEW_MISSES
         guess = share[0] if posture else np.maximum(0.0, 1 - np.arange(N_SEEN) / 6)
@@ -51,10 +53,9 @@ def misses_of(samples: Samples) -> tuple[Floats, Floats]:
     return np.clip(share, 0, 1), np.array(_lasts_s(samples.missed, looked & (n_seen >= 7)))
 
 
-def _postures(samples: Samples) -> tuple[Bools, Bools]:
-    """(L, T, C) which samples are of upright, and of folded bodies."""
-    fold = np.broadcast_to(samples.fold[..., None], samples.missed.shape)
-    return fold < 0.3, fold >= 0.5
+def _are(samples: Samples, posture: int) -> Bools:
+    """(L, T, C) which samples are of such bodies."""
+    return np.broadcast_to(class_of(samples.posture)[..., None] == posture, samples.missed.shape)
 
 
 def _lasts_s(now: Bools, looked: Bools) -> float:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hrc_env.experiments.calibration.fit.cells import FEW, N_K, N_P
+from hrc_env.experiments.calibration.fit.cells import FEW, N_K, N_P, class_of
 from hrc_env.experiments.calibration.samples import Samples
 from hrc_env.perception.calibration import HAND, KIND
 from hrc_env.typing import Floats
@@ -12,10 +12,10 @@ def offsets_of(samples: Samples) -> tuple[Floats, Floats]:
     """Offsets in space, and how far they vary."""
     offset, wander = np.zeros((N_P, N_K, 3)), np.full((N_P, N_K, 3), 0.003)
     ok = np.isfinite(samples.offset_m[..., 0]) & samples.counts[..., None]
-    fold = np.broadcast_to(samples.fold[..., None], ok.shape)
+    class_ = np.broadcast_to(class_of(samples.posture)[..., None], ok.shape)
     for kind in range(N_K):
-        for posture, chosen in enumerate((fold < 0.3, fold >= 0.5)):
-            mine = ok & chosen & (kind == KIND)
+        for posture in range(N_P):
+            mine = ok & (class_ == posture) & (kind == KIND)
             values, n = samples.offset_m[mine], int(mine.sum())
             if n < 30:
                 offset[posture, kind], wander[posture, kind] = offset[0, kind], wander[0, kind]
@@ -36,14 +36,12 @@ def _robust_std(values: Floats) -> Floats:
 
 def projected(samples: Samples, offset: Floats) -> Floats:
     """(L, T, C, J, 2) what offsets in space (P, K, 3) look like."""
-    upright, folded = offset[0][KIND], offset[1][KIND]
-    at = upright + samples.fold[..., None, None] * (folded - upright)
+    at = np.einsum("ltp,pja->ltja", samples.posture, offset[:, KIND])
     shown = np.einsum("ltcjka,ltja->ltcjk", samples.shown, at)
     return shown * np.stack([HAND, np.ones_like(HAND)], -1)
 
 
 def space_variance(samples: Samples, wander: Floats) -> Floats:
     """(L, T, C, J) mean variance of a coordinate by what varies in space."""
-    upright, folded = wander[0][KIND], wander[1][KIND]
-    at = (upright + samples.fold[..., None, None] * (folded - upright)) ** 2
+    at = np.einsum("ltp,pja->ltja", samples.posture, wander[:, KIND]) ** 2
     return 0.5 * np.einsum("ltcjka,ltja->ltcj", samples.shown**2, at)
