@@ -142,7 +142,8 @@ class PerceptionBench:
 
     def run(self) -> int:
         """Run, show the tables."""
-        from hrc_env.experiments.perception.bench import QUICK, PerceptionBenchConfig, run
+        from hrc_env.experiments.perception.bench import run
+        from hrc_env.experiments.perception.settings import QUICK, PerceptionBenchConfig
 
         config = QUICK if self.quick else PerceptionBenchConfig()
         written = "results.json, perception.md, three plots (PNG), worst_crops.png"

@@ -7,16 +7,17 @@ import numpy as np
 import pytest
 
 from hrc_env.errors import ConfigError
-from hrc_env.experiments.perception import bench, sheet
+from hrc_env.experiments.perception import bench, sheet, speed
 from hrc_env.experiments.perception.families import FAMILIES, FAMILY_OF
 from hrc_env.experiments.perception.loops import Episode, episode_of, rotated, some_steps
 from hrc_env.experiments.perception.measured import EMULATED, NO_FAULT, PIXELS, Measured, metrics_of
 from hrc_env.experiments.perception.report import markdown
+from hrc_env.experiments.perception.settings import PerceptionBenchConfig
 from hrc_env.experiments.perception.views import View, rows_of
 from hrc_env.motion.generator import activity_names
 from hrc_env.results import Metric
 
-TINY = bench.PerceptionBenchConfig(
+TINY = PerceptionBenchConfig(
     episodes=(("lab", 1),), n_steps=4, n_faults=1, fault_steps=3, n_emulated=1, kinds=("lost",),
     bodies=("worker_1",), n_instants=1, n_empty=1, emulator_rounds=None, cameras=(1,),
     workers=(1,), speed_steps=2,
@@ -42,14 +43,20 @@ def found():
     base, twice = [episode(0.02)] * 4, [episode(0.04)] * 4
     faults = {(level, NO_FAULT): base for level in (PIXELS, EMULATED)}
     faults |= {(level, "lost"): twice for level in (PIXELS, EMULATED)} | {(PIXELS, "glare"): twice}
-    speed = {"steps_per_s": 50.0, "n": 9, "stages": dict.fromkeys((*bench.speed.STAGES, "rest"), 4)}
+    pace = {"steps_per_s": 50.0, "n": 9, "stages": dict.fromkeys((*speed.STAGES, "rest"), 4)}
     ghosts = [{"images": 8, "phantoms": 1, "tracked": 0}] * 2
     emulator = {
         f"{name}.walk": Metric(1.1, 1.0, 1.2, "", 9)
         for name in ("emulator_error_ratio", "emulator_coverage_difference")
     }
     emulator["emulator_error_ratio.walk.p95"] = Metric(0.9, 0.9, 1.0, "", 9)
-    return Measured({(4, 1): speed}, views, {"lab": base}, faults, emulator, ghosts)
+    return Measured({"4.1": pace}, {"litert": 20.0}, views, {"lab": base}, faults, emulator, ghosts)
+
+
+def test_what_is_not_usual_is_named():
+    setting = speed.Setting
+    names = [setting(4, 1), setting(4, 1, scene="site"), setting(4, 1, runtime="openvino")]
+    assert [each.name for each in names] == ["4.1", "4.1.site", "4.1.openvino"]
 
 
 def test_every_activity_is_in_one_family():
@@ -83,6 +90,7 @@ def test_numbers_say_what_was_found():
     assert metrics["phantom_frames"].value == 2
     assert metrics["phantom_frames"].n == 16
     assert metrics["steps_per_s.4.1"].value == 50.0
+    assert metrics["network_ms.litert"].value == 20.0
 
 
 def test_the_report_has_a_row_for_every_fault_that_was_played():
@@ -114,7 +122,7 @@ def test_cameras_have_a_fault_in_turns():
 
 def test_more_faulty_episodes_than_faultless_ones_are_refused():
     with pytest.raises(ConfigError, match="lab's first episodes"):
-        bench.PerceptionBenchConfig(n_faults=31)
+        PerceptionBenchConfig(n_faults=31)
 
 
 def test_a_bench_writes_everything_and_goes_on_where_it_was(tmp_path):

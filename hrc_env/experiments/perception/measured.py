@@ -10,6 +10,7 @@ import numpy as np
 from hrc_env.experiments.perception.crops import STEP_S
 from hrc_env.experiments.perception.families import NAMES
 from hrc_env.experiments.perception.loops import Episode, camera_name, some_steps
+from hrc_env.experiments.perception.speed import ROUNDS
 from hrc_env.experiments.perception.views import ROWS, View, rows_of
 from hrc_env.experiments.study.intervals import quantile_over, ratio_over, rmse_ratio_over
 from hrc_env.results import Metric
@@ -25,8 +26,10 @@ Metrics = dict[str, Metric]
 class Measured:
     """Everything, part by part."""
 
-    speed: dict[tuple[int, int], dict[str, Any]] = field(default_factory=dict)
-    """By numbers of cameras and workers, as `speed.measure` gives it."""
+    speed: dict[str, dict[str, Any]] = field(default_factory=dict)
+    """By `speed.Setting.name`, as `speed.measure` gives it."""
+    network_ms: dict[str, float] = field(default_factory=dict)
+    """By runtime, as `speed.network_ms` gives it."""
     views: list[View] = field(default_factory=list)
     loops: dict[str, list[Episode]] = field(default_factory=dict)
     """By scene, at `pixels`, without faults."""
@@ -64,8 +67,10 @@ def share(seen: Sequence[bool]) -> Metric:
 
 def _speed(found: Measured) -> Metrics:
     metrics: Metrics = {}
-    for (cameras, workers), each in found.speed.items():
-        key, value = f"{cameras}.{workers}", each["steps_per_s"]
+    for runtime, ms in found.network_ms.items():
+        metrics[f"network_ms.{runtime}"] = Metric(ms, ms, ms, "ms", ROUNDS)
+    for key, each in found.speed.items():
+        value = each["steps_per_s"]
         metrics[f"steps_per_s.{key}"] = Metric(value, value, value, "1/s", each["n"])
         for stage, ms in each["stages"].items():
             metrics[f"stage_ms.{stage}.{key}"] = Metric(ms, ms, ms, "ms", each["n"])

@@ -108,9 +108,10 @@ def _bars(
 
 
 def _title(key: str) -> str:
-    cameras, workers = key.split(".")
+    cameras, workers, *special = key.split(".")
     plural = "s" if cameras != "1" else "", "s" if workers != "1" else ""
-    return f"{cameras} camera{plural[0]}\n{workers} worker{plural[1]}"
+    lines = (f"{cameras} camera{plural[0]}", f"{workers} worker{plural[1]}", *special)
+    return "\n".join(lines)
 
 
 def _finish(figure: Figure, path: Path, title: str) -> None:
