@@ -23,6 +23,7 @@ from hrc_env.outcome import Outcome
 from hrc_env.rewards import RewardConfig
 from hrc_env.simulation import N_STREAMS, Simulation
 from hrc_env.stateful import State
+from hrc_env.streams import children
 from hrc_env.typing import Floats, Ints
 from hrc_env.views import Views
 
@@ -49,7 +50,7 @@ class Remote:
         """Have `reset` or `step` done; what to call for its result."""
         if name == "reset":
             ids, rngs = arguments
-            name, arguments = "begin", (ids, [rng.spawn(N_STREAMS) for rng in rngs])
+            name, arguments = "begin", (ids, [children(rng, N_STREAMS) for rng in rngs])
         self._call(name, arguments)
         return lambda: _unpacked(self._answer())
 

@@ -30,6 +30,7 @@ from hrc_env.scene.rigs import findings
 from hrc_env.senses import CAMERA_LEVELS, make_senses
 from hrc_env.sensing.moment import Moment
 from hrc_env.stateful import State, Stateful
+from hrc_env.streams import children
 from hrc_env.suspects import Suspects
 from hrc_env.tasks import reach
 from hrc_env.tracking import given
@@ -117,7 +118,7 @@ class Simulation(Stateful):
 
     def reset(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> Outcome:
         """Start environments `ids` anew, one generator each; their rows of an outcome."""
-        return self.begin(ids, [rng.spawn(N_STREAMS) for rng in rngs])
+        return self.begin(ids, [children(rng, N_STREAMS) for rng in rngs])
 
     def begin(self, ids: Ints, streams: Sequence[Sequence[np.random.Generator]]) -> Outcome:
         """Start environments `ids` anew with a stream for every organ.

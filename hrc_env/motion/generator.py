@@ -139,20 +139,19 @@ def reset(state: MotionState, ids: Ints, rngs: Sequence[np.random.Generator]) ->
     """Start environments `ids` anew; rngs holds one generator for each of the B environments."""
     n_workers, fewest = state.activity.shape[1], state.mind.fewest
     for b in np.asarray(ids).tolist():
-        state.body[b] = drawn_bodies(rngs[b], len(state.anatomy.size), n_workers)
+        state.body[b] = drawn_bodies(rngs[b].random(n_workers), len(state.anatomy.size))
         n = n_workers if fewest == n_workers else int(rngs[b].integers(fewest, n_workers + 1))
         begin_episode(state, b, n, rngs[b].random((n_workers, 2, N_DRAWS)))
 
 
-def drawn_bodies(rng: np.random.Generator, n_bodies: int, n_workers: int) -> Ints:
-    """(W,) a body for each worker, no two the same as long as there are others.
-
-    Drawn from a child of the generator: what workers do does not depend on how many bodies there
-    are.
-    """
-    if n_bodies == 1:
-        return np.zeros(n_workers, np.int64)
-    return np.resize(rng.spawn(1)[0].permutation(n_bodies), n_workers)
+def drawn_bodies(draws: Floats, n_bodies: int) -> Ints:
+    """(W,) a body for each worker by draws (W,) in [0, 1), no two the same as long as there are
+    others."""
+    bodies, left = np.zeros(len(draws), np.int64), list[int]()
+    for w, draw in enumerate(draws.tolist()):
+        left = left or list(range(n_bodies))
+        bodies[w] = left.pop(int(draw * len(left)))
+    return bodies
 
 
 def advance(

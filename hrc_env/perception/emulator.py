@@ -8,6 +8,7 @@ network's does. Now and then a camera exchanges left and right, or loses the wor
 """
 
 import functools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -139,9 +140,10 @@ def reset(state: EmulatorState, ids: Ints, rngs: Generators) -> None:
         state.lasting, state.slow, state.size, state.sure, state.body, state.wander,
         state.happening,
     )  # fmt: skip
-    for b in ids:
-        for array in arrays:
-            array[b] = rngs[b].standard_normal(array.shape[1:])
+    sizes = [math.prod(array.shape[1:]) for array in arrays]
+    drawn = np.array([rngs[b].standard_normal(sum(sizes)) for b in ids]).reshape(len(ids), -1)
+    for array, part in zip(arrays, np.split(drawn, np.cumsum(sizes)[:-1], 1), strict=True):
+        array[ids] = part.reshape(len(ids), *array.shape[1:])
 
 
 def emulate(
