@@ -83,7 +83,8 @@ def _samples(clip: Watched) -> Samples:
 def postures_of(clip: Watched) -> Floats:
     """(T, P) how far the body counts as each of `POSTURES`."""
     look_of = clip.look_of[:, 0]
-    return np.stack(weigh(look_of[:, FOLDING], look_of[:, STEPPING]), -1)
+    shares = weigh.py_func(look_of[:, FOLDING], look_of[:, STEPPING])  # of arrays, not compiled
+    return np.stack(shares, -1)
 
 
 def _in_window(vectors: Floats, look_of: Floats) -> Floats:

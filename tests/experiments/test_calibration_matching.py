@@ -1,0 +1,73 @@
+"""The emulator plays clips, and what it is off is closed; no pixels are needed for that."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hrc_env.config import HRCConfig
+from hrc_env.experiments.calibration.clips import fit_clips
+from hrc_env.experiments.calibration.matching import matched
+from hrc_env.experiments.calibration.samples import postures_of, samples_of
+from hrc_env.experiments.calibration.validate import errors_in_image, outcome
+from hrc_env.experiments.calibration.watch import watch
+from hrc_env.perception.calibration import POSTURES, read_calibration, write_calibration
+from hrc_env.perception.emulator import EmulatorConfig
+
+CLIPS = [clip for clip in fit_clips(0, 3) if clip.motion in ("stand", "walk 1.3 m/s", "squat")]
+
+
+@pytest.fixture(scope="module")
+def played():
+    """The clips as the package's own emulator plays them."""
+    return list(watch("keypoints", CLIPS, HRCConfig()))
+
+
+def played_with(path, calibration):
+    write_calibration(path, calibration, {})
+    config = replace(HRCConfig(), emulator=EmulatorConfig(calibration=str(path)))
+    return list(watch("keypoints", CLIPS, config))
+
+
+def test_every_clip_draws_errors_of_its_own(played):
+    errors = [np.nan_to_num(errors_in_image(each)).ravel() for each in played]
+    for k in range(1, len(errors)):
+        assert abs(np.corrcoef(errors[0], errors[k])[0, 1]) < 0.5
+    (again,) = watch("keypoints", CLIPS[:1], HRCConfig())
+    np.testing.assert_array_equal(again.px, played[0].px)
+    (other,) = watch("keypoints", [replace(CLIPS[0], draw=1)], HRCConfig())
+    assert not np.array_equal(other.px, played[0].px, equal_nan=True)
+
+
+def test_postures_are_shares_and_the_clips_have_them_all(played):
+    shares = np.concatenate([postures_of(each) for each in played])
+    assert shares.shape[1] == len(POSTURES)
+    np.testing.assert_allclose(shares.sum(1), 1.0)
+    assert (shares.max(0) > 0.8).all()
+    np.testing.assert_array_equal(samples_of(played).posture[0], postures_of(played[0])[10:])
+
+
+def test_a_file_that_is_written_anew_is_read_anew(tmp_path):
+    known, path = read_calibration(), tmp_path / "one.json"
+    small, large = (
+        np.nanmedian([errors_in_image(each) for each in played_with(path, calibration)])
+        for calibration in (known, replace(known, size=3.0 * known.size))
+    )
+    assert large > 1.8 * small
+
+
+def test_an_emulator_that_errs_too_little_is_mended(played, tmp_path):
+    known = read_calibration()
+    draft = replace(known, size=0.6 * known.size, wander_m=0.6 * known.wander_m)
+    told: list[float] = []
+    mended = matched(
+        draft, CLIPS, played, tmp_path / "draft.json", lambda share, label: told.append(share)
+    )
+    before, after = (
+        outcome(played_with(tmp_path / "one.json", each)).px_median / outcome(played).px_median
+        for each in (draft, mended)
+    )
+    assert before < 0.8
+    assert after == pytest.approx(1.0, abs=0.15)
+    assert sum(told) == pytest.approx(1.0)
+    assert not (tmp_path / "draft.json").exists()
