@@ -25,7 +25,7 @@ PACKAGED = Path(__file__).with_name("keypoints.json")
 KINDS = ("nose", "shoulder", "elbow", "wrist", "hip", "knee", "ankle", "foot")
 """Kinds of joints: left and right err alike, mirrored."""
 POSTURES = ("standing", "walking", "folded")
-"""Bodies count as each of these by a share (`emulator_kernel.weigh`)."""
+"""Bodies count as each of these by a share (`outline.weigh`)."""
 SIGHTS = ("seen", "hidden", "outside")
 """How a joint is seen: nothing before it, something before it, outside the image."""
 N_VIEWS = 8
@@ -101,7 +101,7 @@ class Calibration:
     miss_s: Floats
     """() the same of that [s]."""
     sigma: Floats
-    """(K, V) what is told of the standard deviation, a share of the stature, at `VISIBILITY`."""
+    """(P, K, V) what is told of the standard deviation, a share of the stature, at `VISIBILITY`."""
 
 
 SHAPES: dict[str, tuple[int, ...]] = {
@@ -110,7 +110,7 @@ SHAPES: dict[str, tuple[int, ...]] = {
     "size_s": (), "common": (), "shares": (_K, 3),
     "slow_s": (), "slow_m": (), "limb": (_K,), "confidence": (_P, _S, _K, _Z), "follows": (_S, _K),
     "swap_share": (_P, N_VIEWS, 2), "swap_s": (2,), "miss_share": (_P, N_SEEN), "miss_s": (),
-    "sigma": (_K, len(VISIBILITY)),
+    "sigma": (_P, _K, len(VISIBILITY)),
 }  # fmt: skip
 _POSITIVE = ("size", "size_s", "slow_s", "slow_m", "swap_s", "miss_s", "sigma")
 _SHARES = ("tail", "common", "shares", "confidence", "swap_share", "miss_share")

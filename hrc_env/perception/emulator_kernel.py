@@ -9,7 +9,15 @@ import numpy as np
 from hrc_env.compiled import JIT, LEAN
 from hrc_env.geometry.sight import make_table
 from hrc_env.perception.noise import error_share
-from hrc_env.perception.outline import facing, folded, seen_from, speed, stepping
+from hrc_env.perception.outline import (
+    facing,
+    folded,
+    mixed,
+    seen_from,
+    speed,
+    stepping,
+    weigh,
+)
 from hrc_env.perception.sightlines import BEHIND, OUTSIDE, SIDE, TURN, VIEW, fill, see
 from hrc_env.skeleton import JOINT
 from hrc_env.typing import Floats, Ints
@@ -72,7 +80,7 @@ class Tables(NamedTuple):
     miss: Floats
     """(P, 16) share of time by number of joints seen."""
     sigma: Floats
-    """(K, V) as `noise.ERROR`."""
+    """(P, K, V) as `noise.ERROR`."""
     visibility: Floats
     """(V,)."""
     kind: Ints
@@ -158,7 +166,7 @@ def emulate_batch(errors, normals, world, rig, tables, scalars, px, confidence, 
 def _wander(wander, normals, joints, front_x, front_y, posture, keep, tables, scalars, meant):
     """Write where in space the detector means the joints to be, whatever the camera."""
     renew = math.sqrt(1.0 - keep * keep)
-    tail = _mixed(posture, tables.tail[0], tables.tail[1], tables.tail[2]) / 3.0
+    tail = mixed(posture, tables.tail[0], tables.tail[1], tables.tail[2]) / 3.0
     for j in range(len(joints)):
         kind, hand = tables.kind[j], tables.hand[j]
         for i in range(3):
@@ -177,8 +185,8 @@ def _wander(wander, normals, joints, front_x, front_y, posture, keep, tables, sc
 @numba.njit(**LEAN)
 def _away(tables, posture, kind, axis, normal):
     at, wide = tables.offset, tables.wander
-    middle = _mixed(posture, at[0, kind, axis], at[1, kind, axis], at[2, kind, axis])
-    std = _mixed(posture, wide[0, kind, axis], wide[1, kind, axis], wide[2, kind, axis])
+    middle = mixed(posture, at[0, kind, axis], at[1, kind, axis], at[2, kind, axis])
+    std = mixed(posture, wide[0, kind, axis], wide[1, kind, axis], wide[2, kind, axis])
     return middle + std * normal
 
 
@@ -194,7 +202,7 @@ def _happen(happening, normals, n_seen, look_of, posture, tables, scalars):
     swap = _swap_share(tables.swap, posture, low, high, part, 0)
     cross = _swap_share(tables.swap, posture, low, high, part, 1)
     missing = tables.miss
-    miss = _mixed(posture, missing[0, n_seen], missing[1, n_seen], missing[2, n_seen])
+    miss = mixed(posture, missing[0, n_seen], missing[1, n_seen], missing[2, n_seen])
     swapped = _goes_on(happening, SWAPPED, normals, scalars.keep_swap) < swap
     crossed = _goes_on(happening, CROSSED, normals, scalars.keep_cross) < cross
     missed = _goes_on(happening, MISSED, normals, scalars.keep_miss) < miss
@@ -204,8 +212,8 @@ def _happen(happening, normals, n_seen, look_of, posture, tables, scalars):
 @numba.njit(**LEAN)
 def _swap_share(swap, posture, low, high, part, which):
     """Of two neighbouring views."""
-    a = _mixed(posture, swap[0, low, which], swap[1, low, which], swap[2, low, which])
-    b = _mixed(posture, swap[0, high, which], swap[1, high, which], swap[2, high, which])
+    a = mixed(posture, swap[0, low, which], swap[1, low, which], swap[2, low, which])
+    b = mixed(posture, swap[0, high, which], swap[1, high, which], swap[2, high, which])
     return _lerp(a, b, part)
 
 
@@ -261,10 +269,10 @@ def _report(
             continue
         z = scalars.common * body[w] + scalars.own * size[j]
         sight, size_of, spread_of = state[j], tables.size, tables.spread
-        scale = _mixed(
+        scale = mixed(
             posture, size_of[0, sight, kind], size_of[1, sight, kind], size_of[2, sight, kind]
         )
-        wide = _mixed(
+        wide = mixed(
             posture, spread_of[0, sight, kind], spread_of[1, sight, kind], spread_of[2, sight, kind]
         )
         scale = math.exp(scale + badly + wide * size[j])
@@ -286,7 +294,11 @@ def _report(
         if state[j] == OUTSIDE:
             visible = min(visible, scalars.outside_confidence)
         confidence[label] = visible
-        share = error_share(visible, tables.visibility, tables.sigma[kind])
+        share = 0.0
+        for p in range(len(posture)):
+            if posture[p] > 0.0:
+                error = tables.sigma[p, kind]
+                share += posture[p] * error_share(visible, tables.visibility, error)
         sigma[label] = scalars.stature_of_side * side * share
 
 
@@ -296,23 +308,11 @@ def _lerp(a, b, part):
 
 
 @numba.njit(**LEAN)
-def weigh(folding, stepping_):
-    """How far a body counts as standing, as walking and as folded; together 1."""
-    up = 1.0 - folding
-    return up * (1.0 - stepping_), up * stepping_, folding
-
-
-@numba.njit(**LEAN)
-def _mixed(posture, standing, walking, folded_up):
-    return posture[0] * standing + posture[1] * walking + posture[2] * folded_up
-
-
-@numba.njit(**LEAN)
 def _quantile(standing, walking, folded_up, posture, normal):
     """Of a distribution given by its quantiles at whole standard deviations, 0 in the middle."""
     last = len(standing) - 1
     place = min(max(normal + 0.5 * last, 0.0), float(last))
     low = min(int(place), last - 1)
-    a = _mixed(posture, standing[low], walking[low], folded_up[low])
-    b = _mixed(posture, standing[low + 1], walking[low + 1], folded_up[low + 1])
+    a = mixed(posture, standing[low], walking[low], folded_up[low])
+    b = mixed(posture, standing[low + 1], walking[low + 1], folded_up[low + 1])
     return a + (place - low) * (b - a)

@@ -29,7 +29,7 @@ from hrc_env.perception.network import (
     load_detector,
     load_landmarker,
 )
-from hrc_env.perception.noise import sigma_px
+from hrc_env.perception.noise import STANDING, sigma_px
 from hrc_env.perception.searching import ImageSource, distinct, people, search_jobs
 from hrc_env.perception.weights import find_weights
 from hrc_env.records import CropWindow
@@ -144,6 +144,7 @@ class Eyes(Stateful):
         others: Sequence[Sequence[CropWindow | None]] = (),
         found: Candidates | None = None,
         folded: bool = False,
+        posture: Sequence[float] = STANDING,
     ) -> Sight:
         """Look for one worker through a window a camera; search if there is no window at all.
 
@@ -155,6 +156,8 @@ class Eyes(Stateful):
             others: windows (C,) of other workers; a search does not find these again.
             found: what `search` found in these very images, if it was asked already.
             folded: whether the worker is expected to be folded up (`posture.is_folded`).
+            posture: how far they are expected to stand, walk and be folded (`outline.posture_of`):
+                folded bodies are seen less exactly.
         """
         check_shape("windows", (len(windows),), (len(self.cameras),), "one a camera")
         looks = self._looks.setdefault(track, [0] * len(self.cameras))
@@ -171,7 +174,7 @@ class Eyes(Stateful):
                 looks[c] = 0  # ask the detector stage again before believing
             else:
                 looks[c] += 1
-                self._write(sight, c, joints)
+                self._write(sight, c, joints, posture)
         for c in set(range(len(self.cameras))).difference(used):
             looks[c] = 0
         return sight
@@ -254,14 +257,14 @@ class Eyes(Stateful):
         shape = (len(self.cameras), N_JOINTS)
         return Sight(np.full((*shape, 2), np.nan), np.zeros(shape), np.full(shape, np.inf), windows)
 
-    def _write(self, sight: Sight, c: int, joints: Floats) -> None:
+    def _write(self, sight: Sight, c: int, joints: Floats, posture: Sequence[float]) -> None:
         window = sight.windows[c]
         outside = ~inside_image(self.cameras[c], joints[:, :2])
         confidence = joints[:, 2].copy()
         confidence[outside] = np.minimum(confidence[outside], self.config.outside_confidence)
         sight.px[c], sight.confidence[c] = joints[:, :2], confidence
         stature_px = STATURE_OF_SIDE * window.side_px if window else np.nan
-        sight.sigma_px[c] = sigma_px(confidence, stature_px)
+        sight.sigma_px[c] = sigma_px(confidence, stature_px, posture)
 
 
 def _networks(config: EyesConfig) -> _Networks:

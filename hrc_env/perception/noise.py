@@ -4,6 +4,8 @@ One mapping for the real pipeline and for its emulator, so that an estimator tun
 meets the same numbers in the other.
 """
 
+from collections.abc import Sequence
+
 import numba
 import numpy as np
 
@@ -13,27 +15,32 @@ from hrc_env.perception.calibration import KIND, VISIBILITY, read_calibration
 from hrc_env.typing import Floats
 
 ERROR: Floats = read_calibration().sigma
-"""(K, V) standard deviation of each image coordinate, as a share of stature, for kinds of joints
-(`calibration.KINDS`) at `VISIBILITY`; how it is fitted is said in docs/emulator.md."""
+"""(P, K, V) standard deviation of each image coordinate, as a share of stature, for bodies that
+stand, walk and are folded, and kinds of joints (`calibration.KINDS`) at `VISIBILITY`; how it is
+fitted is said in docs/emulator.md."""
+STANDING = (1.0, 0.0, 0.0)
 
-_SLOPE: Floats = np.diff(ERROR, axis=1) / np.diff(VISIBILITY)
 
-
-def sigma_px(confidence: Floats, stature_px: Floats | float) -> Floats:
+def sigma_px(
+    confidence: Floats, stature_px: Floats | float, posture: Sequence[float] = STANDING
+) -> Floats:
     """Standard deviation of each coordinate of a detected joint [px].
 
     Args:
         confidence: (..., J) visibility in [0, 1]; 0 means that there is no measurement.
         stature_px: how long the worker's stature is at their distance [px]; broadcasts.
+        posture: how far the body counts as each of `calibration.POSTURES` (`outline.posture_of`).
 
     Returns:
         (..., J) finite and positive, infinite where the confidence is 0.
     """
     confidence = np.asarray(confidence, float)
     check_shape("confidence", confidence.shape[-1:], (len(KIND),), "one a joint")
+    error = np.tensordot(np.asarray(posture, float), ERROR, 1)
     within = np.clip(confidence, VISIBILITY[0], VISIBILITY[-1])
     low = np.clip(np.searchsorted(VISIBILITY, within) - 1, 0, len(VISIBILITY) - 2)
-    share = ERROR[KIND, low] + (within - VISIBILITY[low]) * _SLOPE[KIND, low]
+    slope = np.diff(error, axis=1) / np.diff(VISIBILITY)
+    share = error[KIND, low] + (within - VISIBILITY[low]) * slope[KIND, low]
     return np.where(confidence > 0, share * stature_px, np.inf)
 
 

@@ -7,6 +7,7 @@ import numba
 from hrc_env.compiled import LEAN
 from hrc_env.perception.blazepose import ROI_MARGIN
 from hrc_env.perception.windows import CROWN, HAND, MIN_REACH_M, MIN_TORSO_M
+from hrc_env.typing import Points3, Velocities3
 
 UPRIGHT, FOLDED = 0.15, 0.50
 """How much lower the shoulders are above the ankles than they can be, as a share, where a body
@@ -59,6 +60,24 @@ def speed(velocity):
 def stepping(mean_speed_m_s):
     """Whether a body walks, by its joints' mean speed: 0 stands, 1 walks."""
     return min(max((mean_speed_m_s - STANDS_M_S) / (WALKS_M_S - STANDS_M_S), 0.0), 1.0)
+
+
+@numba.njit(**LEAN)
+def weigh(folding, steps):
+    """How far a body counts as standing, as walking and as folded; together 1."""
+    up = 1.0 - folding
+    return up * (1.0 - steps), up * steps, folding
+
+
+def posture_of(joints: Points3, velocity: Velocities3) -> tuple[float, float, float]:
+    """`weigh` of a body's joints (J, 3) [m] and their velocities (J, 3) [m/s]."""
+    return weigh(folded(joints), stepping(speed(velocity)))
+
+
+@numba.njit(**LEAN)
+def mixed(posture, standing, walking, folded_up):
+    """A number that is given for bodies that stand, walk and are folded."""
+    return posture[0] * standing + posture[1] * walking + posture[2] * folded_up
 
 
 @numba.njit(**LEAN)

@@ -1,6 +1,6 @@
 """Level `pixels`: rendered crops through the pose network."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -15,6 +15,8 @@ from hrc_env.faults.schedule import Schedule
 from hrc_env.geometry.cameras import project
 from hrc_env.perception.eyes import Eyes, Sight
 from hrc_env.perception.lensed import Lensed
+from hrc_env.perception.noise import STANDING
+from hrc_env.perception.outline import posture_of
 from hrc_env.perception.posture import is_folded
 from hrc_env.perception.windows import steady_window, window_from_joints
 from hrc_env.records import CropWindow, Keypoints, PoseEstimate
@@ -116,10 +118,8 @@ class CameraSenses(TrackingSenses):
             if any(windows):
                 windows = self._followed(b, worker, windows, taken, has_image)
             track = self._track(b, worker)
-            folded = bool(expected.tracked[row, worker]) and is_folded(
-                expected.mean_world[row, worker]
-            )
-            sight = self.eyes.look(self.images, windows, track, taken, people, folded)
+            folded, posture = _expected_posture(expected, row, worker)
+            sight = self.eyes.look(self.images, windows, track, taken, people, folded, posture)
             taken.append(sight.windows)
             self.strays.saw(b, worker, sight.confidence.max(-1) > 0.0)
             missed |= not any(windows) and not sight.confidence.any()
@@ -181,3 +181,13 @@ class CameraSenses(TrackingSenses):
             window_from_joints(px[0, c], depth_m[0, c], camera)
             for c, camera in enumerate(self.scene.cameras)
         ]
+
+
+def _expected_posture(
+    expected: PoseEstimate, row: int, worker: int
+) -> tuple[bool, Sequence[float]]:
+    """Whether a worker is expected to be folded up; how far to stand, walk and be folded."""
+    if not expected.tracked[row, worker]:
+        return False, STANDING
+    joints = expected.mean_world[row, worker]
+    return is_folded(joints), posture_of(joints, expected.velocity_world[row, worker])

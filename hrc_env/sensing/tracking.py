@@ -11,6 +11,7 @@ from hrc_env.faults.recent import Recent
 from hrc_env.faults.schedule import Schedule
 from hrc_env.geometry.cameras import projections
 from hrc_env.perception.lensed import pinhole_keypoints
+from hrc_env.perception.offsets import our_joints
 from hrc_env.records import Keypoints, PoseEstimate
 from hrc_env.scene.build import Scene
 from hrc_env.sensing.moment import Generators, Moment, Windows
@@ -68,12 +69,13 @@ class TrackingSenses(Stateful):
         estimate = self.tracker.estimate(state)
         age_s = self._age_s(now.ids, keypoints)
         watch(self.watched, now.ids, keypoints, age_s, estimate, self.P, self.axes)
-        return estimate
+        return our_joints(estimate)
 
     def ahead(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
         """What the estimator expects."""
         whole = len(ids) == len(self.keypoints.px)
-        return self.tracker.ahead(self.state if whole else rows(self.state, ids), horizon_s)
+        state = self.state if whole else rows(self.state, ids)
+        return our_joints(self.tracker.ahead(state, horizon_s))
 
     def detect(self, now: Moment, predicted: Any, sensor_rngs: Generators) -> Keypoints:
         """Keypoints of this moment, by whatever eyes the level has; whose they are is open.

@@ -13,6 +13,13 @@ def test_more_visible_joints_are_surer_and_larger_people_cost_more_pixels():
     np.testing.assert_allclose(sigma_px(confidence, 800.0), 2 * sigma_px(confidence, 400.0))
 
 
+def test_a_posture_mixes_the_tables():
+    seen = np.full(N_JOINTS, 0.9)
+    each = [sigma_px(seen, 1.0, posture) for posture in np.eye(3)]
+    mixed = sigma_px(seen, 1.0, (0.2, 0.3, 0.5))
+    np.testing.assert_allclose(mixed, 0.2 * each[0] + 0.3 * each[1] + 0.5 * each[2])
+
+
 def test_a_missing_joint_is_no_measurement():
     assert np.isinf(sigma_px(np.zeros(N_JOINTS), 400.0)).all()
 
@@ -20,6 +27,6 @@ def test_a_missing_joint_is_no_measurement():
 @pytest.mark.parametrize("confidence", [0.02, 0.2, 0.5, 0.8, 0.9, 0.99])
 @pytest.mark.parametrize(("joint", "kind"), [("nose", 0), ("right_hip", 4), ("left_foot", 7)])
 def test_the_kernel_uses_the_same_mapping(confidence, joint, kind):
-    ours = error_share(confidence, VISIBILITY, np.ascontiguousarray(ERROR[kind]))
+    ours = error_share(confidence, VISIBILITY, np.ascontiguousarray(ERROR[0, kind]))
     theirs = sigma_px(np.full(N_JOINTS, confidence), 1.0)[JOINT[joint]]
     assert ours == pytest.approx(theirs)

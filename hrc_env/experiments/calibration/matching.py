@@ -5,14 +5,14 @@ what was measured: sizes, whole bodies that are seen badly, and the error in spa
 with those of the pixels, and corrected by what they are off.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from hrc_env.config import HRCConfig
-from hrc_env.experiments.calibration.clips import WARM_UP, Clip
+from hrc_env.experiments.calibration.clips import FAMILIES, WARM_UP, Clip, family_of
 from hrc_env.experiments.calibration.fit.body import body_spread
 from hrc_env.experiments.calibration.fit.cells import FEW, N_K, N_P, N_S, Cells, class_of
 from hrc_env.experiments.calibration.samples import Samples, postures_of, samples_of
@@ -29,6 +29,8 @@ DRAWS = 3
 """How often the emulator plays every clip in a round."""
 DAMPED = 0.7
 """Power of the factors in space: what the emulator draws by chance is not to be fitted."""
+OFTEN = 2000
+"""So many joints of a family must have been of a posture to tell of it: some three clips."""
 Say = Callable[[float, str], None]
 """Told by how much the share that is done grew, and what is being done."""
 
@@ -53,7 +55,7 @@ def matched(
         if k < IN_THE_IMAGE:
             draft = _as_in_the_image(draft, wanted, samples_of(emulated))
         else:
-            draft = _as_in_space(draft, pixels, emulated)
+            draft = _as_in_space(draft, clips, pixels, emulated)
     path.unlink()
     return draft
 
@@ -99,15 +101,20 @@ def _limited(factor: Floats, trust: Floats | float = 1.0) -> Floats:
     return np.clip(factor, *STEP) ** trust
 
 
-def _as_in_space(draft: Calibration, pixels: list[Watched], emulated: list[Watched]) -> Calibration:
+def _as_in_space(
+    draft: Calibration, clips: list[Clip], pixels: list[Watched], emulated: list[Watched]
+) -> Calibration:
     """All errors scaled by what the tracker's median error is off, posture by posture; tails of
     what cameras share by what is then left of its 95th percentile's."""
     size, wander, tail = draft.size.copy(), draft.wander_m.copy(), draft.tail.copy()
     for posture in range(N_P):
-        wanted, drawn = _errors_in(pixels, posture), _errors_in(emulated, posture)
-        if min(wanted.size, drawn.size) < FEW:
+        off = [
+            np.log(np.percentile(wanted, [50, 95]) / np.percentile(drawn, [50, 95]))
+            for wanted, drawn in _by_family(clips, pixels, emulated, posture)
+        ]
+        if not off:
             continue
-        middle, most = np.percentile(wanted, [50, 95]) / np.percentile(drawn, [50, 95])
+        middle, most = np.exp(np.mean(off, 0))  # every family counts the same
         factor, longer = (_limited(np.array(each**DAMPED)) for each in (middle, most / middle))
         size[posture] *= factor
         wander[posture] *= factor
@@ -115,9 +122,21 @@ def _as_in_space(draft: Calibration, pixels: list[Watched], emulated: list[Watch
     return replace(draft, size=size, wander_m=wander, tail=tail)
 
 
+def _by_family(
+    clips: list[Clip], pixels: list[Watched], emulated: list[Watched], posture: int
+) -> Iterator[tuple[Floats, Floats]]:
+    """Errors of pixels and emulator while bodies were of a posture, in families that often are."""
+    for family in FAMILIES:
+        mine = [k for k, clip in enumerate(clips) if family_of(clip.motion) == family]
+        draws = [emulated[k + draw * len(clips)] for k in mine for draw in range(DRAWS)]
+        wanted, drawn = _errors_in([pixels[k] for k in mine], posture), _errors_in(draws, posture)
+        if min(wanted.size, drawn.size) >= OFTEN:
+            yield wanted, drawn
+
+
 def _errors_in(watched: list[Watched], posture: int) -> Floats:
     """(N,) errors of the tracked joints while the body was of a posture [m]."""
-    errors = []
+    errors = [np.zeros(0)]
     for each in watched:
         mine = each.tracked & (class_of(postures_of(each)) == posture)
         mine[:WARM_UP] = False

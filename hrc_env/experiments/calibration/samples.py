@@ -8,7 +8,8 @@ import numpy as np
 from hrc_env.experiments.calibration.clips import DT_S, WARM_UP
 from hrc_env.experiments.calibration.watch import Watched
 from hrc_env.perception.calibration import HAND
-from hrc_env.perception.emulator_kernel import FIRST_OF_LEGS, weigh
+from hrc_env.perception.emulator_kernel import FIRST_OF_LEGS
+from hrc_env.perception.outline import weigh
 from hrc_env.perception.sightlines import FOLDING, SEEN, SIDE, STEPPING, TURN, VIEW
 from hrc_env.skeleton import MIRROR
 from hrc_env.typing import Bools, Floats, Ints

@@ -73,19 +73,25 @@ def _ranks(values: Floats) -> Floats:
     return np.argsort(np.argsort(values)).astype(float)
 
 
-def sigma_table(samples: Samples) -> Floats:
-    """(K, V) what to tell of a standard deviation by the visibility, a share of the stature."""
+def sigma_table(s: Cells, samples: Samples) -> Floats:
+    """(P, K, V) what to tell of a standard deviation by the visibility, a share of the stature; of
+    few samples that of all joints of such bodies, and theirs that of all bodies."""
     edges = np.r_[0.0, 0.5 * (VISIBILITY[1:] + VISIBILITY[:-1]), 1.01]
     length = np.linalg.norm(samples.error, axis=-1) / STATURE_OF_SIDE
     found = np.isfinite(length) & samples.counts[..., None, None] & (samples.sight < OUTSIDE)
-    table = np.zeros((N_K, len(VISIBILITY)))
+    table = np.zeros((N_P, N_K, len(VISIBILITY)))
     for v in range(len(VISIBILITY))[::-1]:
         inside = found & (samples.confidence >= edges[v]) & (samples.confidence < edges[v + 1])
-        overall = np.percentile(length[inside], 90) / 2.146 if inside.any() else 0.05
-        for kind in range(N_K):
-            mine = inside & (kind == KIND)
-            own = np.percentile(length[mine], 90) / 2.146 if mine.sum() >= 30 else overall
-            table[kind, v] = mix(overall, own, mine.sum() / (mine.sum() + FEW))
-            if v + 1 < len(VISIBILITY):
-                table[kind, v] = max(table[kind, v], table[kind, v + 1])
-    return TOLD * table
+        anybody = _told(length[inside], 0.05)
+        for posture, kind in np.ndindex(N_P, N_K):
+            such = inside & (s.posture == posture)
+            overall = _told(length[such], anybody)
+            table[posture, kind, v] = _told(length[such & (kind == KIND)], overall)
+    return TOLD * np.maximum.accumulate(table[..., ::-1], -1)[..., ::-1]
+
+
+def _told(length: Floats, otherwise: float) -> float:
+    """A standard deviation from the 90th percentile of lengths; of few, nearly `otherwise`."""
+    n = length.size
+    own = float(np.percentile(length, 90)) / 2.146 if n >= 30 else otherwise
+    return mix(otherwise, own, n / (n + FEW))

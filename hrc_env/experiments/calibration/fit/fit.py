@@ -36,5 +36,5 @@ def fit(samples: Samples) -> Calibration:
         offset, wander, np.zeros(N_P), bias, size, spread, body, confidence_s(s),
         np.array(common), shares, slow_s, slow_m, limbs_of(s, unit), confidences_of(s),
         follows_of(s, left_over, spread, common), swap_share, swap_s, miss_share, miss_s,
-        sigma_table(samples),
+        sigma_table(s, samples),
     )  # fmt: skip

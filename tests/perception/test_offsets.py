@@ -1,0 +1,67 @@
+"""What the network means by a joint becomes the joint, whichever way the worker faces."""
+
+import numpy as np
+import pytest
+from people import truth
+
+from hrc_env.perception.calibration import HAND, KIND
+from hrc_env.perception.offsets import OFFSET_M, our_joints
+from hrc_env.records import PoseEstimate
+from hrc_env.skeleton import JOINT, N_JOINTS
+
+
+def turned(joints, yaw_rad):
+    cos, sin = np.cos(yaw_rad), np.sin(yaw_rad)
+    return joints @ np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]]).T
+
+
+def estimate_of(joints, speed_m_s=0.0):
+    shape = joints.shape[:-1]
+    velocity = np.zeros_like(joints)
+    velocity[..., 0] = speed_m_s
+    cov = np.broadcast_to(1e-4 * np.eye(3), (*shape, 3, 3)).copy()
+    return PoseEstimate(joints, cov, velocity, np.zeros(shape), np.ones(shape[:-1], bool))
+
+
+def meant(joints, yaw_rad, posture):
+    """Where the network means joints (J, 3) of a body that faces +x, turned by yaw, to be."""
+    ahead, side, up = OFFSET_M[posture, KIND].T
+    return turned(joints + np.stack([ahead, HAND * side, up], -1), yaw_rad)
+
+
+@pytest.mark.parametrize("yaw_rad", [0.0, 1.0, -2.5])
+@pytest.mark.parametrize(("posture", "speed_m_s"), [(0, 0.0), (1, 1.2)])
+def test_who_is_upright_is_put_right(yaw_rad, posture, speed_m_s):
+    body = facing_x()
+    said = meant(body, yaw_rad, posture)[None, None]
+    told = our_joints(estimate_of(said, speed_m_s)).mean_world[0, 0]
+    np.testing.assert_allclose(told, turned(body, yaw_rad), atol=0.002)
+    assert np.abs(said[0, 0] - turned(body, yaw_rad)).max() > 0.01
+
+
+def test_who_is_folded_up_is_moved_by_what_was_found_of_folded_bodies():
+    body = facing_x()
+    upper = [j for j in range(N_JOINTS) if j < JOINT["left_knee"]]
+    body[upper, 2] -= 0.8  # shoulders are no higher than the ankles any more
+    told = our_joints(estimate_of(body[None, None])).mean_world[0, 0]
+    moved = (body - told)[JOINT["left_hip"]]
+    np.testing.assert_allclose(
+        moved[[0, 2]], OFFSET_M[2, KIND[JOINT["left_hip"]], [0, 2]], atol=1e-3
+    )
+
+
+def test_nothing_else_changes():
+    said = estimate_of(np.tile(facing_x(), (2, 1, 1, 1)))
+    said.tracked[1] = False
+    before = said.mean_world.copy()
+    told = our_joints(said)
+    np.testing.assert_array_equal(told.mean_world[1], before[1])
+    np.testing.assert_array_equal(said.mean_world, before)
+    assert told.cov_world is said.cov_world
+
+
+def facing_x():
+    """A body at rest (J, 3) that faces +x."""
+    joints = truth(1).joints_world[0, 0]
+    left = joints[JOINT["left_shoulder"]] - joints[JOINT["right_shoulder"]]
+    return turned(joints, np.pi / 2 - np.arctan2(left[1], left[0]))
