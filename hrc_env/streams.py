@@ -12,10 +12,10 @@ WORDS = 4
 
 class _Words(ISpawnableSeedSequence):
     """What a generator starts from, drawn: to have `SeedSequence` hash it takes five times as long
-    as everything else."""
+    as everything else. Has its attributes, of which other streams are made (`appearance`)."""
 
     def __init__(self, words: NDArray[np.uint64]) -> None:
-        self.words = words
+        self.words, self.entropy, self.spawn_key = words, words.tolist(), ()
         self.hashed: SeedSequence | None = None
 
     def generate_state(self, n_words: int, dtype: Any = np.uint64) -> NDArray[Any]:
@@ -29,7 +29,7 @@ class _Words(ISpawnableSeedSequence):
         return self._sequence().spawn(n_children)
 
     def _sequence(self) -> SeedSequence:
-        self.hashed = self.hashed or SeedSequence(self.words.tolist())
+        self.hashed = self.hashed or SeedSequence(self.entropy)
         return self.hashed
 
 

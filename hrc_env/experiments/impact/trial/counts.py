@@ -36,11 +36,11 @@ class Bins:
         """(...,) quantiles of counts (..., n + 1), linear inside a bin; NaN without any value,
         infinite in the last bin."""
         totals = counts.sum(-1, keepdims=True)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            share = np.cumsum(counts, -1) / totals
+        some = np.maximum(totals, 1)
+        share = np.cumsum(counts, -1) / some
         bin_ = np.minimum((share < q).sum(-1), counts.shape[-1] - 1)
         above = np.take_along_axis(share, bin_[..., None], -1)[..., 0]
-        own = np.take_along_axis(counts, bin_[..., None], -1)[..., 0] / totals[..., 0]
+        own = np.take_along_axis(counts, bin_[..., None], -1)[..., 0] / some[..., 0]
         low = np.concatenate([self.edges[:1], self.edges])[bin_]
         high = np.concatenate([self.edges, [np.inf]])[bin_]
         into = 1 - (above - q) / np.maximum(own, 1e-12)
@@ -56,6 +56,7 @@ def quantile_over(bins: Bins, counts: Sequence[Sequence[int]], q: float, unit: s
     n = len(rows)
     drawn = np.random.default_rng(0).multinomial(n, np.full(n, 1 / n), N_DRAWS)
     found = bins.quantile(drawn @ rows, q)
+    found = found[~np.isnan(found)]  # episodes without any value were drawn alone
     if np.isnan(point) or not np.isfinite(found).all():
         return Metric(point, point, point, unit, n)
     low, high = np.quantile(found, [0.025, 0.975])
