@@ -12,7 +12,7 @@ N_NUMBERS = 5
 """Shift along u and v, growth, turn, all in radians or shares; delay [s]."""
 KEPT = 0.96
 """Share of the evidence that is kept from sample to sample: it is forgotten within 10 s."""
-NAMED_AT, CLEARED_AT = 9.0, 5.0
+NAMED_AT, CLEARED_AT = 12.0, 6.0
 """A camera is named when its ratio exceeds the one, and cleared when it is below the other."""
 DECIDED = 1.3
 """And only if it is so many times every other's: what is wrong with one camera shows, less, in what
