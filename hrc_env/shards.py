@@ -129,12 +129,12 @@ class Shards(Generic[PartT]):
 
         The others are set to work first. Nobody works on any more when this returns or raises.
         """
+        mine, *theirs = arguments
         others = [
             (first, self._start(part, name, each))
-            for part, first, each in zip(self._others, self.bounds[1:], arguments[1:], strict=False)
+            for part, first, each in zip(self._others, self.bounds[1:-1], theirs, strict=True)
             if each is not None
         ]
-        mine = arguments[0]
         own = [] if mine is None else [(0, partial(getattr(self.first, name), *mine))]
         return joined(_all_done([*own, *others]))
 
