@@ -18,7 +18,7 @@ class Demo:
 
     out: Path = Path("out/demo.mp4")
     """The film; a still PNG is written beside it."""
-    seed: int = 40
+    seed: int = 7
     """Seed of the episode."""
     seconds: float = 10.0
     """Length of the film."""
