@@ -37,8 +37,8 @@ from hrc_env.tracking import given
 from hrc_env.typing import Floats, Ints
 
 CLOSING_M_S = 8.0
-"""Arm and worker never come nearer to each other than so fast [m/s]; 3.4 was the most in 300,000
-steps of arms that were driven to and fro as hard as they can be."""
+"""Arm and worker never come nearer to each other than so fast [m/s]; 3.4 was the most in some
+290,000 steps of arms that were driven to and fro as hard as they can be."""
 WATCHED_CAPSULES = (3, 8)
 """Of the arm: elbow and tool, whose ends the workers watch."""
 

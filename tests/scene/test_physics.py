@@ -151,8 +151,8 @@ def test_an_arm_out_of_reach_moves_as_it_would_alone():
     """Bit for bit, whichever of its neighbours are near, and however that changes."""
     scene = build(n_workers=2, bodies="any")
     away = standing(4, (2.5, 0.0))
-    both = WorkerPath(*(np.concatenate([part, part], 2) for part in (
-        away.position_world, away.quaternion_wxyz)))  # fmt: skip
+    parts = (away.position_world, away.quaternion_wxyz)
+    both = WorkerPath(*(np.concatenate([part, part], 2) for part in parts))
     sequence, draw = commands(4), np.random.default_rng(1)
     whole, parted = Physics(scene, 4), Physics(scene, 4)
     for command in sequence:
