@@ -35,7 +35,7 @@ class Viewer(Protocol):
         ...
 
     def empty(self, camera_index: int, window: CropWindow) -> Image:
-        """A window of the empty place, as a camera of the rig shows it."""
+        """A window of the posed scene without people, as a camera of the rig shows it."""
         ...
 
 
@@ -82,7 +82,10 @@ class CameraFilm:
         return image
 
     def empty(self, camera_index: int, window: CropWindow) -> Image:
-        """The window of the empty place, pictured when the camera was well."""
+        """What the window would show if the camera were well and nobody there."""
+        shot = self._shots[camera_index]
+        if shot is not None:
+            self._pose(shot, 0.0)
         return self.viewer.empty(camera_index, window)
 
     def _taken(self, shot: Shot, c: int, window: CropWindow) -> Image:

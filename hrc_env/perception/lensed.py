@@ -31,8 +31,6 @@ WIDEST = float(np.tan(np.radians(78.0)))
 window shows beyond is black."""
 MAPS_KEPT = 4
 """Windows per camera whose resampling is kept."""
-EMPTY_KEPT = 16
-"""Windows per camera whose picture of the empty place is kept: those of a search."""
 
 
 class Drawer(Protocol):
@@ -44,8 +42,8 @@ class Drawer(Protocol):
         """The window of what a pinhole would see, (size, size, 3) RGB, top row first."""
         ...
 
-    def still(self, camera: PinholeCamera, window: CropWindow) -> Image:
-        """The same of what never moves."""
+    def unpeopled(self, camera: PinholeCamera, window: CropWindow) -> Image:
+        """The same without people."""
         ...
 
 
@@ -68,7 +66,6 @@ class Lensed:
     def __init__(self, drawer: Drawer, cameras: Sequence[PinholeCamera]) -> None:
         self.drawer, self.cameras = drawer, tuple(cameras)
         self._covers: OrderedDict[tuple, _Cover | None] = OrderedDict()
-        self._empty: dict[tuple[int, CropWindow], Image] = {}
 
     def crop(self, camera_index: int, window: CropWindow) -> Image:
         """The window of a camera's present image, upright, (size, size, 3) RGB."""
@@ -79,17 +76,8 @@ class Lensed:
         return self._bent(camera, window, self.drawer.view)
 
     def empty(self, camera_index: int, window: CropWindow) -> Image:
-        """The window of a camera's image of the empty place; those asked for again are kept."""
-        key = (camera_index, window)
-        if key not in self._empty:
-            if len(self._empty) >= EMPTY_KEPT * len(self.cameras):
-                self._empty.clear()
-            self._empty[key] = self._bent(self.cameras[camera_index], window, self.drawer.still)
-        return self._empty[key]
-
-    def forget(self) -> None:
-        """The empty place looks otherwise from now on."""
-        self._empty.clear()
+        """The window of a camera's image, were nobody there: the robot knows where it is itself."""
+        return self._bent(self.cameras[camera_index], window, self.drawer.unpeopled)
 
     def _bent(
         self,

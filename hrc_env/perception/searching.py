@@ -45,7 +45,7 @@ class ImageSource(Protocol):
         ...
 
     def empty(self, camera_index: int, window: CropWindow) -> Image | None:
-        """The same when neither people nor robot were there; None where that is not known."""
+        """The same if nobody were there, robot and all; None where that is not known."""
         ...
 
 

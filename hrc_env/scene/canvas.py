@@ -8,6 +8,7 @@ so that several canvases never draw into each other.
 import contextlib
 import copy
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import mujoco
@@ -21,14 +22,29 @@ from hrc_env.records import CropWindow, WorkerMotion
 from hrc_env.scene import gl
 from hrc_env.scene.build import Scene, drawing_model, drawn_looks, drawn_props
 from hrc_env.scene.dressing import as_built, dress, strew, take_off_hats
+from hrc_env.scene.primitives import ROBOT_LOOKS
 from hrc_env.scene.props import pose_props
 from hrc_env.scene.rig import glcam_axes
 from hrc_env.scene.wardrobe import wear
 from hrc_env.typing import Image, JointAngles
 
-EVERYTHING = int(mujoco.mjtCatBit.mjCAT_ALL)
-STILL = int(mujoco.mjtCatBit.mjCAT_STATIC)
-MOVING = int(mujoco.mjtCatBit.mjCAT_DYNAMIC)
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Which things a picture holds."""
+
+    category: mujoco.mjtCatBit
+    sky: bool
+    """Behind all else; False: black."""
+    group: int | None = None
+    """Geoms of this group only, and no skins."""
+
+
+EVERYTHING = Part(mujoco.mjtCatBit.mjCAT_ALL, True)
+STILL = Part(mujoco.mjtCatBit.mjCAT_STATIC, True)
+MOVING = Part(mujoco.mjtCatBit.mjCAT_DYNAMIC, False)
+ROBOT = Part(mujoco.mjtCatBit.mjCAT_DYNAMIC, False, ROBOT_LOOKS)
+"""The arm alone: the part that needs no camera to be known."""
 
 
 class Canvas:
@@ -61,9 +77,9 @@ class Canvas:
         self._rect = mujoco.MjrRect(0, 0, width_px, height_px)
         self._gl: Any = None
         self._context: Any = None
-        self._lists: dict[int, Any] = {}
+        self._lists: dict[Part, Any] = {}
         self._shown: Any = None
-        self._fresh: set[int] = set()
+        self._fresh: set[Part] = set()
         self._closed = False
         self.groups(groups)
 
@@ -92,11 +108,10 @@ class Canvas:
         mujoco.mj_camlight(self._model, self._data)
         self._fresh.clear()
 
-    def show(self, what: int = EVERYTHING, shadows: bool = False) -> None:
-        """Choose what the next pictures hold: everything, what stands still, what moves.
+    def show(self, what: Part = EVERYTHING, shadows: bool = False) -> None:
+        """Choose what the next pictures hold.
 
-        What moves is drawn on black; all else has the sky behind it. The pose is taken over
-        (skins included) when it has changed since.
+        The pose is taken over (skins included) when it has changed since.
         """
         self._open()
         if what not in self._lists:
@@ -106,13 +121,14 @@ class Canvas:
             return
         self._fresh.add(what)
         mujoco.mjv_updateScene(
-            self._model, self._data, self._option, None, self._camera, what, self._shown
-        )
-        if self._look is not None and what != MOVING:
+            self._model, self._data, self._chosen(what), None, self._camera,
+            int(what.category), self._shown,
+        )  # fmt: skip
+        if self._look is not None and what.sky:
             strew(self._shown, self._scene.grounds, self._look)
         flags = self._shown.flags
         flags[mujoco.mjtRndFlag.mjRND_SHADOW.value] = shadows
-        flags[mujoco.mjtRndFlag.mjRND_SKYBOX.value] = what != MOVING
+        flags[mujoco.mjtRndFlag.mjRND_SKYBOX.value] = what.sky
         flags[mujoco.mjtRndFlag.mjRND_REFLECTION.value] = 0
         flags[mujoco.mjtRndFlag.mjRND_HAZE.value] = 0
 
@@ -121,6 +137,15 @@ class Canvas:
         self._option.geomgroup[:] = 0
         self._option.geomgroup[list(groups)] = 1
         self._fresh.clear()
+
+    def _chosen(self, what: Part) -> mujoco.MjvOption:
+        if what.group is None:
+            return self._option
+        option = copy.copy(self._option)
+        option.geomgroup[:] = 0
+        option.geomgroup[what.group] = 1
+        option.flags[mujoco.mjtVisFlag.mjVIS_SKIN.value] = 0
+        return option
 
     def aim(self, camera: PinholeCamera, window: CropWindow, height_px: float) -> None:
         """Look through a turned rectangle of a camera's image, `side_px` wide.

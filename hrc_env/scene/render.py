@@ -20,7 +20,7 @@ from hrc_env.geometry.cameras import PinholeCamera, pinhole
 from hrc_env.records import CropWindow, WorkerMotion
 from hrc_env.scene import gl
 from hrc_env.scene.build import Scene
-from hrc_env.scene.canvas import EVERYTHING, MOVING, STILL, Canvas
+from hrc_env.scene.canvas import EVERYTHING, MOVING, ROBOT, STILL, Canvas, Part
 from hrc_env.scene.primitives import DECORATION, OVERHEAD, ROBOT_LOOKS, SOLID
 from hrc_env.typing import Image, JointAngles
 
@@ -99,24 +99,19 @@ class CropRenderer:
 
     def view(self, camera: PinholeCamera, window: CropWindow) -> Image:
         """The same of any camera, as a pinhole sees."""
-        numbers = (*camera.K.ravel(), *camera.T_world_from_cam.ravel())
-        side = (*window.centre_px, window.side_px, window.rotation_rad)
-        key = tuple(map(float, (*numbers, *side)))
+        key = _key(camera, window)
         if key not in self._kept:
             self._remember(key, None)
             self._show(EVERYTHING, camera, window)
             return self._canvas.paint()
-        background = self._background(key, camera, window)
-        self._show(MOVING, camera, window)
-        self._canvas.read(self._rgb, self._z)
-        crop = background.rgb.copy()
-        _lay_over(self._rgb, self._z, background.z, crop)
-        return crop
+        return self._laid_over(MOVING, self._background(key, camera, window), camera, window)
 
-    def still(self, camera: PinholeCamera, window: CropWindow) -> Image:
-        """The same of what never moves: the place without people and robot."""
-        self._show(STILL, camera, window)
-        return self._canvas.paint()
+    def unpeopled(self, camera: PinholeCamera, window: CropWindow) -> Image:
+        """The same without people and what they hold: the place, and the robot as it stands."""
+        key = _key(camera, window)
+        if key not in self._kept:
+            self._remember(key, None)
+        return self._laid_over(ROBOT, self._background(key, camera, window), camera, window)
 
     def close(self) -> None:
         """Free the OpenGL context."""
@@ -125,12 +120,22 @@ class CropRenderer:
     def __reduce__(self) -> tuple[Any, ...]:
         return CropRenderer, (self.scene, self.size_px)
 
-    def _show(self, what: int, camera: PinholeCamera, window: CropWindow) -> None:
+    def _laid_over(
+        self, part: Part, background: "_Background", camera: PinholeCamera, window: CropWindow
+    ) -> Image:
+        """A part of what moves before what stands still."""
+        self._show(part, camera, window)
+        self._canvas.read(self._rgb, self._z)
+        crop = background.rgb.copy()
+        _lay_over(self._rgb, self._z, background.z, crop)
+        return crop
+
+    def _show(self, what: Part, camera: PinholeCamera, window: CropWindow) -> None:
         self._canvas.show(what)
         self._canvas.aim(camera, window, window.side_px)
 
     def _background(self, key: Key, camera: PinholeCamera, window: CropWindow) -> "_Background":
-        """What stands still in this window, drawn at its second look."""
+        """What stands still in this window, drawn when it is first asked for."""
         background = self._kept[key]
         if background is None:
             z = np.empty_like(self._z)
@@ -155,6 +160,12 @@ class _Background:
     """Top row first."""
     z: NDArray[np.float32]
     """Bottom row first."""
+
+
+def _key(camera: PinholeCamera, window: CropWindow) -> Key:
+    numbers = (*camera.K.ravel(), *camera.T_world_from_cam.ravel())
+    side = (*window.centre_px, window.side_px, window.rotation_rad)
+    return tuple(map(float, (*numbers, *side)))
 
 
 @numba.njit(**LEAN)

@@ -60,7 +60,7 @@ class CameraSenses(TrackingSenses):
         time_s = None if self.recent is None else np.empty(seen.px.shape[:2])
         expected = self.tracker.estimate(predicted)
         for row, b in enumerate(now.ids.tolist()):
-            self._dress(b)
+            self.renderer.dress(self.worn[b])
             if self.recent is None or time_s is None:
                 self.renderer.draw(now.q[row], one(now.motion, row))
                 has_image = [True] * len(self.scene.cameras)
@@ -74,11 +74,6 @@ class CameraSenses(TrackingSenses):
                 seen.confidence[row, :, worker] = sight.confidence
                 seen.sigma_px[row, :, worker] = sight.sigma_px
         return replace(seen, time_s=time_s)
-
-    def _dress(self, b: int) -> None:
-        """Let the renderer draw environment b as it looks."""
-        if self.renderer.dress(self.worn[b]):
-            self.lensed.forget()
 
     def _take_images(self, now: Moment, row: int, b: int, recent: Recent) -> Floats:
         """Let every camera show what has come of it. (C,) its time; NaN for nothing."""

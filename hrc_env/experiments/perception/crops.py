@@ -82,8 +82,7 @@ class Looker:
 
     def dress(self, look: Look) -> None:
         """Let everything look so from the next look on."""
-        if self.renderer.dress(look):
-            self.source.forget()
+        self.renderer.dress(look)
 
     def look(self, now: Instant) -> Looked:
         """Look at an instant with every camera."""
