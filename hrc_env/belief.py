@@ -2,11 +2,11 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numba
 import numpy as np
 
+from hrc_env.compiled import LEAN
 from hrc_env.geometry.distances import Gap, narrowest_gap
 from hrc_env.geometry.segments import segments
 from hrc_env.records import PoseEstimate, RobotState
@@ -48,10 +48,13 @@ def estimated_gap(robot: RobotState, estimate: PoseEstimate) -> Gap:
 
 def standard_deviation_m(estimate: PoseEstimate) -> Floats:
     """(B, W, J) root of the mean variance over the axes [m]."""
-    cov = estimate.cov_world
-    return _root_mean(cov[..., 0, 0], cov[..., 1, 1], cov[..., 2, 2])
+    cov = np.ascontiguousarray(estimate.cov_world)
+    std = np.empty(cov.shape[:-2])
+    _root_mean(cov.reshape(-1, 3, 3), std.reshape(-1))
+    return std
 
 
-@numba.vectorize(["float64(float64, float64, float64)"], cache=True)
-def _root_mean(x: Any, y: Any, z: Any) -> Any:
-    return math.sqrt((x + y + z) / 3)
+@numba.njit(**LEAN)
+def _root_mean(cov: Floats, std: Floats) -> None:
+    for k in range(len(std)):
+        std[k] = math.sqrt((cov[k, 0, 0] + cov[k, 1, 1] + cov[k, 2, 2]) / 3.0)

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numba
 import numpy as np
@@ -48,10 +47,9 @@ class RewardTerm:
     """(believed, progress, previous action (B, A), weights) -> (B,)."""
 
 
-@numba.vectorize(["float64(float64, float64)"], cache=True)
-def closeness(gap_m: Any, reach_m: float) -> Any:
+def closeness(gap_m: Floats, reach_m: float) -> Floats:
     """Shape of the proximity term: 0 from `reach_m` on, 1 at touch, at most 2.25 inside."""
-    share = min(max((reach_m - gap_m) / reach_m, 0.0), 1.5)
+    share = np.minimum(np.maximum((reach_m - gap_m) / reach_m, 0.0), 1.5)
     return share * share
 
 

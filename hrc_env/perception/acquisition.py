@@ -25,8 +25,8 @@ MEETING_M = 0.3
 """Lines of sight that pass a point within this distance [m] see the same hips there."""
 
 SIDE_M = (1.1, 3.6)
-"""A window round a person has sides of this length at their distance [m]: from somebody folded up,
-as small as `windows.MIN_REACH_M` lets them be, to somebody tall who reaches up."""
+"""The detector stage's window round a person has sides of this length at their distance [m]: from
+somebody folded up to somebody tall who reaches up."""
 
 MIN_CROSSING = 0.1
 """Sine of the smallest angle between two lines that fixes a point."""

@@ -18,13 +18,13 @@ from hrc_env.errors import ConfigError
 from hrc_env.skeleton import JOINTS, MIRROR
 from hrc_env.typing import Floats, Ints
 
-FORMAT, VERSION = "hrc_env keypoints", 3
+FORMAT, VERSION = "hrc_env keypoints", 4
 """Version: what the tables mean. A file of another one is refused."""
 PACKAGED = Path(__file__).with_name("keypoints.json")
 
 KINDS = ("nose", "shoulder", "elbow", "wrist", "hip", "knee", "ankle", "foot")
 """Kinds of joints: left and right err alike, mirrored."""
-POSTURES = ("standing", "walking", "folded")
+POSTURES = ("standing", "walking", "handling", "folded")
 """Bodies count as each of these by a share (`outline.weigh`)."""
 SIGHTS = ("seen", "hidden", "outside")
 """How a joint is seen: nothing before it, something before it, outside the image."""
@@ -45,6 +45,8 @@ HAND: Floats = np.where(np.arange(len(JOINTS)) > MIRROR, -1.0, 1.0)
 """(J,) -1 for right joints, else 1."""
 INNER: Ints = np.array([0, 1, 2, 1, 2, 3, 4, 7, 8, 7, 8, 9, 10, 11, 12])
 """(J,) the next joint towards the trunk; itself for those of the trunk."""
+NEXT: Ints = np.where(np.arange(len(JOINTS)) == INNER, np.minimum(MIRROR, INNER), INNER)
+"""(J,) the same, and of the trunk's right joints the left one."""
 
 _P, _K, _S, _Z = len(POSTURES), len(KINDS), len(SIGHTS), len(KNOTS)
 _Q = len(BODY_KNOTS)
@@ -60,6 +62,8 @@ class Calibration:
     own side, up [m]; the same in every camera."""
     wander_m: Floats
     """(P, K, 3) how far that varies, a standard deviation [m]."""
+    space_limb: Floats
+    """(K, 3) its correlation with what varies of the `NEXT` joint, axis by axis."""
     tail: Floats
     """(P,) how much further it goes now and then: a standard normal vector n is lengthened by
     1 + tail n.n / 3."""
@@ -105,16 +109,22 @@ class Calibration:
 
 
 SHAPES: dict[str, tuple[int, ...]] = {
-    "offset_m": (_P, _K, 3), "wander_m": (_P, _K, 3), "tail": (_P,), "bias": (N_VIEWS, _K, 2),
+    "offset_m": (_P, _K, 3), "wander_m": (_P, _K, 3), "space_limb": (_K, 3),
+    "tail": (_P,), "bias": (N_VIEWS, _K, 2),
     "size": (_P, _S, _K), "spread": (_P, _S, _K), "body": (_P, _Q),
     "size_s": (), "common": (), "shares": (_K, 3),
     "slow_s": (), "slow_m": (), "limb": (_K,), "confidence": (_P, _S, _K, _Z), "follows": (_S, _K),
     "swap_share": (_P, N_VIEWS, 2), "swap_s": (2,), "miss_share": (_P, N_SEEN), "miss_s": (),
     "sigma": (_P, _K, len(VISIBILITY)),
 }  # fmt: skip
+POSTURED = (
+    "offset_m", "wander_m", "tail", "size", "spread", "body", "confidence", "swap_share",
+    "miss_share", "sigma",
+)  # fmt: skip
+"""Tables that are given for each posture."""
 _POSITIVE = ("size", "size_s", "slow_s", "slow_m", "swap_s", "miss_s", "sigma")
 _SHARES = ("tail", "common", "shares", "confidence", "swap_share", "miss_share")
-_CORRELATIONS = ("limb", "follows")
+_CORRELATIONS = ("limb", "space_limb", "follows")
 _RENEW = "make a new one with: python -m hrc_env calibrate-keypoints --out FILE"
 
 

@@ -23,6 +23,7 @@ from hrc_env.perception.calibration import (
     HAND,
     INNER,
     KIND,
+    NEXT,
     VISIBILITY,
     Calibration,
     changed_ns,
@@ -107,7 +108,8 @@ class EmulatorState:
     body: Floats
     """(B, C, W) the whole body's factor on the errors' size."""
     wander: Floats
-    """(B, W, J, 3) what is the same in every camera: ahead, to the joint's own side, up."""
+    """(B, W, J, 3) what is the same in every camera, as far as it is the joint's own: ahead, to
+    its side, up."""
     happening: Floats
     """(B, C, W, 3) the lower, the sooner left and right are exchanged, those of the legs alone,
     nobody is found."""
@@ -197,12 +199,12 @@ def lines_of_sight(
     """How each camera sees each joint and each worker, as the emulator has it.
 
     Returns:
-        (B, C, W, J) `sightlines.SEEN`, `HIDDEN`, `OUTSIDE` or `BEHIND`; (B, C, W, 5) side
-        [px] and turn [rad] of the window, view [rad], folding and stepping.
+        (B, C, W, J) `sightlines.SEEN`, `HIDDEN`, `OUTSIDE` or `BEHIND`; (B, C, W, 6) side
+        [px] and turn [rad] of the window, view [rad], folding, handling and stepping.
     """
     batch, n_workers, n_joints = truth.joints_world.shape[:3]
     sight = np.empty((batch, len(cameras), n_workers, n_joints), np.int64)
-    look_of = np.empty((batch, len(cameras), n_workers, 5))
+    look_of = np.empty((batch, len(cameras), n_workers, 6))
     sight_batch(_world(truth, surroundings), _rig(cameras), sight, look_of)
     return sight, look_of
 
@@ -255,14 +257,17 @@ def _settings(config: EmulatorConfig, dt_s: float, written_ns: int) -> tuple[Tab
     """A calibration as the kernel takes it; read again if its file has been written anew."""
     known = config.calibrated()
     confidence = np.clip(known.confidence, 1e-6, 1 - 1e-6)
-    numbers = (
-        known.offset_m, known.wander_m, known.tail, known.bias, np.log(known.size), known.spread,
-        known.body, np.sqrt(known.shares), known.limb, np.log(confidence / (1 - confidence)),
-        known.follows,
-        known.swap_share, known.miss_share, known.sigma, VISIBILITY, KIND, HAND, INNER, MIRROR,
+    postured = (
+        known.offset_m, known.wander_m, known.tail, np.log(known.size), known.spread, known.body,
+        np.log(confidence / (1 - confidence)), known.swap_share, known.miss_share, known.sigma,
     )  # fmt: skip
-    copies: list[Any] = [np.array(each) for each in numbers]
-    tables = Tables(*copies)  # writable: one type for the kernel
+    others = (
+        known.space_limb, known.bias, np.sqrt(known.shares), known.limb, known.follows,
+        VISIBILITY, KIND, HAND, INNER, NEXT, MIRROR,
+    )  # fmt: skip
+    copies: list[Any] = [np.array(each) for each in others]  # writable: one type for the kernel
+    by_posture = np.concatenate([each.reshape(len(each), -1) for each in postured], 1)
+    tables = Tables(by_posture, *copies)
     keep_size = float(np.exp(-dt_s / known.size_s))
     keep_swap, keep_cross, keep_miss = (
         float(np.exp(-dt_s / lasts_s)) for lasts_s in (*known.swap_s, known.miss_s)

@@ -1,5 +1,6 @@
 """The emulator's inner loop: one environment after the other, on plain arrays."""
 
+import itertools
 import math
 from typing import NamedTuple
 
@@ -8,16 +9,9 @@ import numpy as np
 
 from hrc_env.compiled import JIT, LEAN
 from hrc_env.geometry.sight import make_table
+from hrc_env.perception.calibration import POSTURED, SHAPES
 from hrc_env.perception.noise import error_share
-from hrc_env.perception.outline import (
-    facing,
-    folded,
-    mixed,
-    seen_from,
-    speed,
-    stepping,
-    weigh,
-)
+from hrc_env.perception.outline import facing, mix, posture_of, seen_from, speed
 from hrc_env.perception.sightlines import BEHIND, OUTSIDE, SIDE, TURN, VIEW, fill, see
 from hrc_env.skeleton import JOINT
 from hrc_env.typing import Floats, Ints
@@ -32,6 +26,10 @@ alone, nobody found."""
 
 N_OF_BODY = 4
 """Normal variables of a worker in an image: one for the errors' size, one for each happening."""
+
+SHAPE = tuple(SHAPES[name][1:] or (1,) for name in POSTURED)
+FROM = (0, *itertools.accumulate(math.prod(shape) for shape in SHAPE))
+"""What a calibration has for each posture, and where it begins in a row of all of it."""
 
 FIRST_OF_LEGS = JOINT["left_knee"]
 """From this joint on left and right are exchanged where the legs are."""
@@ -49,38 +47,47 @@ class Errors(NamedTuple):
     happening: Floats
 
 
-class Tables(NamedTuple):
-    """A calibration for the kernel: P = 3 standing, walking and folded, K kinds of joints, A views,
-    S = 3 sights, Z knots."""
+class Postured(NamedTuple):
+    """What a calibration says of a body as it stands: K kinds of joints, A views, S = 3 sights, Z
+    knots. Parts of one row, in this order."""
 
     offset: Floats
-    """(P, K, 3) [m]."""
+    """(K, 3) [m]."""
     wander: Floats
-    """(P, K, 3) [m]."""
+    """(K, 3) [m]."""
     tail: Floats
-    """(P,)."""
+    """(1,)."""
+    size: Floats
+    """(S, K) logarithm of the standard deviation, a share of the window's side."""
+    spread: Floats
+    """(S, K) of that logarithm, joint by joint."""
+    body: Floats
+    """(Q,) quantiles of the whole body's part of it, least first."""
+    doubt: Floats
+    """(S, K, Z) quantiles of the confidence's logit, least first."""
+    swap: Floats
+    """(A, 2) shares of time, whole body and legs."""
+    miss: Floats
+    """(16,) share of time by number of joints seen."""
+    sigma: Floats
+    """(K, V) as `noise.ERROR`."""
+
+
+class Tables(NamedTuple):
+    """A calibration for the kernel."""
+
+    by_posture: Floats
+    """(P, N) a row of `Postured` for each posture."""
+    space_limb: Floats
+    """(K, 3) correlation of what varies in space with the `next` joint's."""
     bias: Floats
     """(A, K, 2) share of the window's side."""
-    size: Floats
-    """(P, S, K) logarithm of the standard deviation, a share of the window's side."""
-    spread: Floats
-    """(P, S, K) of that logarithm, joint by joint."""
-    body: Floats
-    """(P, Q) quantiles of the whole body's part of it, least first."""
     shares: Floats
     """(K, 3) roots of the shares of lasting, slow and new errors."""
     limb: Floats
     """(K,) correlation with the joint that is next towards the trunk."""
-    doubt: Floats
-    """(P, S, K, Z) quantiles of the confidence's logit, least first."""
     follows: Floats
     """(S, K) correlation of confidence and smallness of the error."""
-    swap: Floats
-    """(P, A, 2) shares of time, whole body and legs."""
-    miss: Floats
-    """(P, 16) share of time by number of joints seen."""
-    sigma: Floats
-    """(P, K, V) as `noise.ERROR`."""
     visibility: Floats
     """(V,)."""
     kind: Ints
@@ -89,6 +96,8 @@ class Tables(NamedTuple):
     """(J,) 1 left and in the middle, -1 right."""
     inner: Ints
     """(J,) next joint towards the trunk; itself if there is none."""
+    next: Ints
+    """(J,) `calibration.NEXT`."""
     mirror: Ints
     """(J,)."""
 
@@ -129,7 +138,9 @@ def emulate_batch(errors, normals, world, rig, tables, scalars, px, confidence, 
     table = make_table(world.still, first_body - len(world.still) + n_workers * n_body)
     view, rows = np.empty((5, len(table))), np.empty(len(table), np.int64)
     uv, depth, state = np.empty((n_joints, 2)), np.empty(n_joints), np.empty(n_joints, np.int64)
-    meant, off, look_of = np.empty((n_joints, 3)), np.zeros((n_joints, 2)), np.empty(5)
+    meant, off, look_of = np.zeros((n_joints, 3)), np.zeros((n_joints, 2)), np.empty(6)
+    row = np.empty(tables.by_posture.shape[1])
+    here = _parts(row)
     n_bodies = 3 * n_joints * n_workers
     for b in range(batch):
         fill(table, world, b)
@@ -138,10 +149,10 @@ def emulate_batch(errors, normals, world, rig, tables, scalars, px, confidence, 
             pace = speed(world.velocity[b, w])
             keep = math.exp(-scalars.at_rest - scalars.per_speed * pace)
             front_x, front_y = facing(joints)
-            posture = weigh(folded(joints), stepping(pace))
+            mix(posture_of(joints, world.velocity[b, w]), tables.by_posture, row)
             _wander(
                 errors.wander[b, w], normals[b, next_normal:], joints, front_x, front_y,
-                posture, keep, tables, scalars, meant,
+                keep, here, tables, scalars, meant,
             )  # fmt: skip
             for c in range(n_cameras):
                 n_seen = see(
@@ -152,30 +163,33 @@ def emulate_batch(errors, normals, world, rig, tables, scalars, px, confidence, 
                 mine = normals[b, first:]
                 swapped, crossed, found = _happen(
                     errors.happening[b, c, w], mine[N_NORMALS * n_joints + 1 :], n_seen, look_of,
-                    posture, tables, scalars,
+                    here, scalars,
                 )  # fmt: skip
                 _report(
                     errors.lasting[b, c, w], errors.slow[b, c, w], errors.size[b, c, w],
                     errors.sure[b, c, w], errors.body[b, c], w, mine, keep, uv, state, look_of,
-                    posture, found, swapped, crossed, tables, scalars, off, px[b, c, w],
+                    found, swapped, crossed, here, tables, scalars, off, px[b, c, w],
                     confidence[b, c, w], sigma[b, c, w],
                 )  # fmt: skip
 
 
 @numba.njit(**LEAN)
-def _wander(wander, normals, joints, front_x, front_y, posture, keep, tables, scalars, meant):
+def _wander(wander, normals, joints, front_x, front_y, keep, here, tables, scalars, meant):
     """Write where in space the detector means the joints to be, whatever the camera."""
     renew = math.sqrt(1.0 - keep * keep)
-    tail = mixed(posture, tables.tail[0], tables.tail[1], tables.tail[2]) / 3.0
+    tail = here.tail[0] / 3.0
     for j in range(len(joints)):
-        kind, hand = tables.kind[j], tables.hand[j]
+        before = tables.next[j]
         for i in range(3):
             wander[j, i] = keep * wander[j, i] + renew * normals[3 * j + i]
-        n = wander[j]
+            limb = tables.space_limb[tables.kind[j], i] if before != j else 0.0
+            meant[j, i] = limb * meant[before, i] + math.sqrt(1.0 - limb * limb) * wander[j, i]
+    for j in range(len(joints)):
+        kind, hand, n = tables.kind[j], tables.hand[j], meant[j]
         far = 1.0 + tail * (n[0] * n[0] + n[1] * n[1] + n[2] * n[2])
-        ahead = _away(tables, posture, kind, 0, far * n[0])
-        left = hand * _away(tables, posture, kind, 1, far * n[1])
-        up = _away(tables, posture, kind, 2, far * n[2])
+        ahead = here.offset[kind, 0] + here.wander[kind, 0] * far * n[0]
+        left = hand * (here.offset[kind, 1] + here.wander[kind, 1] * far * n[1])
+        up = here.offset[kind, 2] + here.wander[kind, 2] * far * n[2]
         scale = scalars.error_scale
         meant[j, 0] = joints[j, 0] + scale * (front_x * ahead - front_y * left)
         meant[j, 1] = joints[j, 1] + scale * (front_y * ahead + front_x * left)
@@ -183,38 +197,20 @@ def _wander(wander, normals, joints, front_x, front_y, posture, keep, tables, sc
 
 
 @numba.njit(**LEAN)
-def _away(tables, posture, kind, axis, normal):
-    at, wide = tables.offset, tables.wander
-    middle = mixed(posture, at[0, kind, axis], at[1, kind, axis], at[2, kind, axis])
-    std = mixed(posture, wide[0, kind, axis], wide[1, kind, axis], wide[2, kind, axis])
-    return middle + std * normal
-
-
-@numba.njit(**LEAN)
-def _happen(happening, normals, n_seen, look_of, posture, tables, scalars):
+def _happen(happening, normals, n_seen, look_of, here, scalars):
     """Whether left and right are exchanged now, of all joints and of the legs; whether the worker
     is found.
 
     Each happens while a normal variable that changes slowly is in its lower tail, which is as
     large as the share of the time that it happens when so many joints are seen from here.
     """
-    low, high, part = _between(look_of[VIEW], tables.swap.shape[1])
-    swap = _swap_share(tables.swap, posture, low, high, part, 0)
-    cross = _swap_share(tables.swap, posture, low, high, part, 1)
-    missing = tables.miss
-    miss = mixed(posture, missing[0, n_seen], missing[1, n_seen], missing[2, n_seen])
+    low, high, part = _between(look_of[VIEW], len(here.swap))
+    swap = _lerp(here.swap[low, 0], here.swap[high, 0], part)
+    cross = _lerp(here.swap[low, 1], here.swap[high, 1], part)
     swapped = _goes_on(happening, SWAPPED, normals, scalars.keep_swap) < swap
     crossed = _goes_on(happening, CROSSED, normals, scalars.keep_cross) < cross
-    missed = _goes_on(happening, MISSED, normals, scalars.keep_miss) < miss
+    missed = _goes_on(happening, MISSED, normals, scalars.keep_miss) < here.miss[n_seen]
     return swapped, crossed, n_seen >= scalars.min_joints and not missed
-
-
-@numba.njit(**LEAN)
-def _swap_share(swap, posture, low, high, part, which):
-    """Of two neighbouring views."""
-    a = mixed(posture, swap[0, low, which], swap[1, low, which], swap[2, low, which])
-    b = mixed(posture, swap[0, high, which], swap[1, high, which], swap[2, high, which])
-    return _lerp(a, b, part)
 
 
 @numba.njit(**LEAN)
@@ -236,8 +232,8 @@ def _between(angle, n):
 
 @numba.njit(**LEAN)
 def _report(
-    lasting, slow, size, sure, body, w, normals, keep, uv, state, look_of, posture, found,
-    swapped, crossed, tables, scalars, off, px, confidence, sigma,
+    lasting, slow, size, sure, body, w, normals, keep, uv, state, look_of, found, swapped,
+    crossed, here, tables, scalars, off, px, confidence, sigma,
 ):  # fmt: skip
     """Errors of one worker in one image, and what is then reported of each joint."""
     n_joints, side = len(uv), look_of[SIDE]
@@ -247,7 +243,7 @@ def _report(
     from_left = _between(look_of[VIEW], len(tables.bias))
     from_right = _between(-look_of[VIEW], len(tables.bias))
     body[w] = scalars.keep_size * body[w] + scalars.renew_size * normals[N_NORMALS * n_joints]
-    badly = _quantile(tables.body[0], tables.body[1], tables.body[2], posture, body[w])
+    badly = _quantile(here.body, body[w])
     for j in range(n_joints):
         kind, first = tables.kind[j], N_NORMALS * j
         size[j] = scalars.keep_size * size[j] + scalars.renew_size * normals[first + 4]
@@ -268,14 +264,8 @@ def _report(
             sigma[label] = np.inf
             continue
         z = scalars.common * body[w] + scalars.own * size[j]
-        sight, size_of, spread_of = state[j], tables.size, tables.spread
-        scale = mixed(
-            posture, size_of[0, sight, kind], size_of[1, sight, kind], size_of[2, sight, kind]
-        )
-        wide = mixed(
-            posture, spread_of[0, sight, kind], spread_of[1, sight, kind], spread_of[2, sight, kind]
-        )
-        scale = math.exp(scale + badly + wide * size[j])
+        sight = state[j]
+        scale = math.exp(here.size[sight, kind] + badly + here.spread[sight, kind] * size[j])
         low, high, part = from_left if tables.hand[j] > 0.0 else from_right
         bias, x, y = tables.bias, scale * off[j, 0], scale * off[j, 1]
         x += tables.hand[j] * _lerp(bias[low, kind, 0], bias[high, kind, 0], part)
@@ -284,21 +274,14 @@ def _report(
         shrink = side * scalars.error_scale * min(1.0, scalars.max_error / length)
         px[label, 0] = uv[j, 0] + shrink * (turn_cos * x - turn_sin * y)
         px[label, 1] = uv[j, 1] + shrink * (turn_sin * x + turn_cos * y)
-        follows = tables.follows[state[j], kind]
-        logit = _quantile(
-            tables.doubt[0, sight, kind], tables.doubt[1, sight, kind],
-            tables.doubt[2, sight, kind], posture,
-            math.sqrt(1.0 - follows * follows) * sure[j] - follows * z,
-        )  # fmt: skip
+        follows = tables.follows[sight, kind]
+        doubt = math.sqrt(1.0 - follows * follows) * sure[j] - follows * z
+        logit = _quantile(here.doubt[sight, kind], doubt)
         visible = 1.0 / (1.0 + math.exp(-logit))
-        if state[j] == OUTSIDE:
+        if sight == OUTSIDE:
             visible = min(visible, scalars.outside_confidence)
         confidence[label] = visible
-        share = 0.0
-        for p in range(len(posture)):
-            if posture[p] > 0.0:
-                error = tables.sigma[p, kind]
-                share += posture[p] * error_share(visible, tables.visibility, error)
+        share = error_share(visible, tables.visibility, here.sigma[kind])
         sigma[label] = scalars.stature_of_side * side * share
 
 
@@ -308,11 +291,21 @@ def _lerp(a, b, part):
 
 
 @numba.njit(**LEAN)
-def _quantile(standing, walking, folded_up, posture, normal):
+def _quantile(known, normal):
     """Of a distribution given by its quantiles at whole standard deviations, 0 in the middle."""
-    last = len(standing) - 1
+    last = len(known) - 1
     place = min(max(normal + 0.5 * last, 0.0), float(last))
     low = min(int(place), last - 1)
-    a = mixed(posture, standing[low], walking[low], folded_up[low])
-    b = mixed(posture, standing[low + 1], walking[low + 1], folded_up[low + 1])
-    return a + (place - low) * (b - a)
+    return _lerp(known[low], known[low + 1], place - low)
+
+
+@numba.njit(**JIT)
+def _parts(row):
+    """A row of numbers as what they are."""
+    return Postured(
+        row[FROM[0] : FROM[1]].reshape(SHAPE[0]), row[FROM[1] : FROM[2]].reshape(SHAPE[1]),
+        row[FROM[2] : FROM[3]], row[FROM[3] : FROM[4]].reshape(SHAPE[3]),
+        row[FROM[4] : FROM[5]].reshape(SHAPE[4]), row[FROM[5] : FROM[6]],
+        row[FROM[6] : FROM[7]].reshape(SHAPE[6]), row[FROM[7] : FROM[8]].reshape(SHAPE[7]),
+        row[FROM[8] : FROM[9]], row[FROM[9] : FROM[10]].reshape(SHAPE[9]),
+    )  # fmt: skip

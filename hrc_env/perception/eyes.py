@@ -156,8 +156,8 @@ class Eyes(Stateful):
             others: windows (C,) of other workers; a search does not find these again.
             found: what `search` found in these very images, if it was asked already.
             folded: whether the worker is expected to be folded up (`posture.is_folded`).
-            posture: how far they are expected to stand, walk and be folded (`outline.posture_of`):
-                folded bodies are seen less exactly.
+            posture: how far they are expected to count as each of `calibration.POSTURES`
+                (`outline.posture_of`): folded bodies are seen less exactly.
         """
         check_shape("windows", (len(windows),), (len(self.cameras),), "one a camera")
         looks = self._looks.setdefault(track, [0] * len(self.cameras))

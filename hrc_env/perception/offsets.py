@@ -9,10 +9,11 @@ much they differ was measured on renders, with the numbers that the emulator dra
 from dataclasses import replace
 
 import numba
+import numpy as np
 
-from hrc_env.compiled import LEAN
+from hrc_env.compiled import JIT
 from hrc_env.perception.calibration import HAND, KIND, read_calibration
-from hrc_env.perception.outline import facing, folded, mixed, speed, stepping, weigh
+from hrc_env.perception.outline import facing, mix, posture_of
 from hrc_env.records import PoseEstimate
 from hrc_env.typing import Floats
 
@@ -23,29 +24,29 @@ OFFSET_M: Floats = read_calibration().offset_m
 def our_joints(estimate: PoseEstimate) -> PoseEstimate:
     """An estimate (B, W, ...) of what the network means, as one of joints.
 
-    Which way a body faces, how folded it is and whether it walks are the estimate's own; the prior
+    Which way a body faces and what its posture is are the estimate's own; the prior
     of who is not tracked stays. Covariances and velocities are the same.
     """
     mean_world = estimate.mean_world.copy()
-    _put_right(mean_world, estimate.velocity_world, estimate.tracked, OFFSET_M, KIND, HAND)
+    offset_of = OFFSET_M.reshape(len(OFFSET_M), -1)
+    _put_right(mean_world, estimate.velocity_world, estimate.tracked, offset_of, KIND, HAND)
     return replace(estimate, mean_world=mean_world)
 
 
-@numba.njit(**LEAN)
-def _put_right(mean, velocity, tracked, offset, kinds, hands):
+@numba.njit(**JIT)
+def _put_right(mean, velocity, tracked, offset_of, kinds, hands):
+    row = np.empty(offset_of.shape[1])
+    offset = row.reshape(-1, 3)
     for b in range(len(mean)):
         for w in range(mean.shape[1]):
             if not tracked[b, w]:
                 continue
             joints = mean[b, w]
             front_x, front_y = facing(joints)
-            posture = weigh(folded(joints), stepping(speed(velocity[b, w])))
+            mix(posture_of(joints, velocity[b, w]), offset_of, row)
             for j in range(len(joints)):
-                k = kinds[j]
-                ahead = mixed(posture, offset[0, k, 0], offset[1, k, 0], offset[2, k, 0])
-                side = mixed(posture, offset[0, k, 1], offset[1, k, 1], offset[2, k, 1])
-                up = mixed(posture, offset[0, k, 2], offset[1, k, 2], offset[2, k, 2])
-                left = hands[j] * side
+                ahead, up = offset[kinds[j], 0], offset[kinds[j], 2]
+                left = hands[j] * offset[kinds[j], 1]
                 joints[j, 0] -= front_x * ahead - front_y * left
                 joints[j, 1] -= front_y * ahead + front_x * left
                 joints[j, 2] -= up

@@ -7,7 +7,6 @@ import numba
 from hrc_env.compiled import LEAN
 from hrc_env.perception.blazepose import ROI_MARGIN
 from hrc_env.perception.windows import CROWN, HAND, MIN_REACH_M, MIN_TORSO_M
-from hrc_env.typing import Points3, Velocities3
 
 UPRIGHT, FOLDED = 0.15, 0.50
 """How much lower the shoulders are above the ankles than they can be, as a share, where a body
@@ -17,6 +16,11 @@ begins to count as folded, and from where on it counts as folded up. Judgement: 
 STANDS_M_S, WALKS_M_S = 0.3, 0.7
 """Mean speeds of the joints from where a body begins to count as walking, and does [m/s]: hands
 that hammer are at the first, people who walk slowly above the second."""
+
+HANGS, RAISED = 0.10, 0.25
+"""How much nearer in height a wrist is to its shoulder than when it hangs, as a share of the arm's
+length, from where on hands begin to count as busy, and do. Judgement: arms that swing are at the
+first, those that push a barrow between the two, those that carry, work or point above."""
 
 # Joints: nose 0; left and right shoulder 1 2, elbow 3 4, wrist 5 6, hip 7 8, knee 9 10,
 # ankle 11 12.
@@ -63,21 +67,39 @@ def stepping(mean_speed_m_s):
 
 
 @numba.njit(**LEAN)
-def weigh(folding, steps):
-    """How far a body counts as standing, as walking and as folded; together 1."""
-    up = 1.0 - folding
-    return up * (1.0 - steps), up * steps, folding
-
-
-def posture_of(joints: Points3, velocity: Velocities3) -> tuple[float, float, float]:
-    """`weigh` of a body's joints (J, 3) [m] and their velocities (J, 3) [m/s]."""
-    return weigh(folded(joints), stepping(speed(velocity)))
+def handling(joints):
+    """Whether a body (J, 3) has something in its hands or to do with them: 0 not, 1 certainly."""
+    most = 0.0
+    for side in range(2):
+        shoulder, elbow, wrist = 1 + side, 3 + side, 5 + side
+        arm = _apart(joints, shoulder, elbow) + _apart(joints, elbow, wrist)
+        drop = joints[shoulder, 2] - joints[wrist, 2]
+        most = max(most, 1.0 - drop / max(arm, 1e-9))
+    return min(max((most - HANGS) / (RAISED - HANGS), 0.0), 1.0)
 
 
 @numba.njit(**LEAN)
-def mixed(posture, standing, walking, folded_up):
-    """A number that is given for bodies that stand, walk and are folded."""
-    return posture[0] * standing + posture[1] * walking + posture[2] * folded_up
+def weigh(folding, hands, steps):
+    """How far a body counts as standing, walking, handling something and folded; together 1."""
+    up = 1.0 - folding
+    free = up * (1.0 - hands)
+    return free * (1.0 - steps), free * steps, up * hands, folding
+
+
+@numba.njit(**LEAN)
+def posture_of(joints, velocity):
+    """`weigh` of a body's joints (J, 3) [m] and their velocities (J, 3) [m/s]."""
+    return weigh(folded(joints), handling(joints), stepping(speed(velocity)))
+
+
+@numba.njit(**LEAN)
+def mix(posture, tables, out):
+    """Write what tables (P, N), one for each posture, are for a body: (N,)."""
+    out[:] = 0.0
+    for p in range(len(posture)):
+        if posture[p] > 0.0:
+            for k in range(len(out)):
+                out[k] += posture[p] * tables[p, k]
 
 
 @numba.njit(**LEAN)

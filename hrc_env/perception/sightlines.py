@@ -9,7 +9,15 @@ from hrc_env.compiled import JIT, LEAN
 from hrc_env.geometry.shapes import passage, set_capsules, set_rows
 from hrc_env.geometry.sight import blocks, line, look, make_table, meets
 from hrc_env.optics.lens import FOLD, bent, stretch_at
-from hrc_env.perception.outline import facing, folded, seen_from, speed, stepping, window_round
+from hrc_env.perception.outline import (
+    facing,
+    folded,
+    handling,
+    seen_from,
+    speed,
+    stepping,
+    window_round,
+)
 from hrc_env.perception.self_occlusion import body_blocks
 from hrc_env.typing import Floats
 
@@ -24,9 +32,10 @@ SEEN, HIDDEN, OUTSIDE, BEHIND = range(4)
 """How a camera sees a joint: nothing before it, something before it, outside the image, behind
 the camera."""
 
-SIDE, TURN, VIEW, FOLDING, STEPPING = range(5)
+SIDE, TURN, VIEW, FOLDING, HANDLING, STEPPING = range(6)
 """How a camera sees a worker: side [px] and turn [rad] of the window round them, from where
-(`outline.seen_from`) [rad], how folded they are, whether they walk."""
+(`outline.seen_from`) [rad], how folded they are, whether their hands are busy, whether they
+walk."""
 
 
 class World(NamedTuple):
@@ -65,7 +74,7 @@ class Rig(NamedTuple):
 
 @numba.njit(**JIT)
 def sight_batch(world, rig, sight, look_of):
-    """Write how joints (B, C, W, J) and workers (B, C, W, 5) are seen; nothing errs."""
+    """Write how joints (B, C, W, J) and workers (B, C, W, 6) are seen; nothing errs."""
     n_workers, n_joints = world.joints.shape[1:3]
     n_body = world.radius.shape[2]
     first_body = len(world.still) + len(world.robot_radius) + world.moving.shape[1]
@@ -85,6 +94,7 @@ def sight_batch(world, rig, sight, look_of):
                 )  # fmt: skip
                 mine[VIEW] = seen_from(joints, front_x, front_y, rig.eyes[c])
                 mine[FOLDING] = folded(joints)
+                mine[HANDLING] = handling(joints)
                 mine[STEPPING] = stepping(speed(world.velocity[b, w]))
 
 

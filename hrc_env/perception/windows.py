@@ -28,8 +28,9 @@ MIN_DEPTH_M = 0.5
 MIN_JOINTS_INSIDE = 6
 """Fewer joints in the image, of 15, are not worth a look."""
 
-MIN_REACH_M = 0.45
-"""A body seen from above or folded up still fills a circle of this radius."""
+MIN_REACH_M = 0.85
+"""A window is never tighter than round somebody upright: whoever is folded up may rise, and a tight
+window round a wrong estimate shows too little to put it right."""
 
 MIN_TORSO_M = 0.15
 """A torso that looks shorter is seen end on and gives no direction; then up is the image's."""

@@ -108,8 +108,8 @@ class Physics:
             hold=self._control[:, :, :n], rate=self._control[:, :, n : 2 * n],
         )  # fmt: skip
         alone = np.zeros(self.batch, bool) if apart is None else apart
-        self._roll_beside(np.flatnonzero(~alone), workers)
-        self._roll_alone(np.flatnonzero(alone))
+        self._roll_beside(~alone, workers)
+        self._roll_alone(alone)
         self._check_health()
         return self._trace[:, :, :n].copy()
 
@@ -149,27 +149,29 @@ class Physics:
             self._control = np.zeros((self.batch, n_substeps, model.nu))
             self._trace = np.zeros((self.batch, n_substeps, model.nq))
 
-    def _roll_beside(self, ids: Ints, workers: WorkerPath) -> None:
-        """The substeps of environments `ids`, beside workers."""
-        if len(ids) == 0:
+    def _roll_beside(self, which: Bools, workers: WorkerPath) -> None:
+        """The substeps of some environments (B,), beside workers."""
+        rows, ids = _chosen(which)
+        if ids is not None and len(ids) == 0:
             return
-        lead = (len(ids), self._control.shape[1], -1)
-        places, turns = workers.position_world[ids], workers.quaternion_wxyz[ids]
-        parts = (self._control[ids], places.reshape(lead), turns.reshape(lead))
+        places, turns = workers.position_world[rows], workers.quaternion_wxyz[rows]
+        lead = (*places.shape[:2], -1)
+        parts = (self._control[rows], places.reshape(lead), turns.reshape(lead))
         control = np.concatenate(parts, axis=2)
-        self._trace[ids] = self._sims.rollout(lead[1], control, INPUTS, ("qpos",), ids)["qpos"]
+        self._trace[rows] = self._sims.rollout(lead[1], control, INPUTS, ("qpos",), ids)["qpos"]
 
-    def _roll_alone(self, ids: Ints) -> None:
-        """The substeps of environments `ids`, with nobody there."""
-        if len(ids) == 0:
+    def _roll_alone(self, which: Bools) -> None:
+        """The substeps of some environments (B,), with nobody there."""
+        rows, ids = _chosen(which)
+        if ids is not None and len(ids) == 0:
             return
         for alone, beside in self._shared:
-            alone[ids] = beside[ids]
-        control = self._control[ids]
+            alone[rows] = beside[rows]
+        control = self._control[rows]
         trace = self._alone.rollout(control.shape[1], control, COMMANDS, ("qpos",), ids)
-        self._trace[ids] = trace["qpos"]
+        self._trace[rows] = trace["qpos"]
         for alone, beside in self._shared:
-            beside[ids] = alone[ids]
+            beside[rows] = alone[rows]
 
     def _check_health(self) -> None:
         """MuJoCo answers an exploding state or a full memory with a warning: raise it."""
@@ -181,6 +183,14 @@ class Physics:
                     f"({mujoco.mjtWarning(int(kind)).name}): expected finite states and bounded "
                     "contacts; reset it, and look at what it was commanded."
                 )
+
+
+def _chosen(which: Bools) -> tuple[slice | Ints, Ints | None]:
+    """Rows of some environments (B,), and their numbers as MuJoCo has them; all need no copy."""
+    if np.count_nonzero(which) == len(which):
+        return slice(None), None
+    ids = np.flatnonzero(which)
+    return ids, ids
 
 
 def no_workers(batch: int, n_substeps: int) -> WorkerPath:

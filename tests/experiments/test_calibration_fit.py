@@ -9,9 +9,10 @@ from hrc_env.experiments.calibration.clips import FAMILIES, fit_clips, unseen_cl
 from hrc_env.experiments.calibration.fit.fit import fit
 from hrc_env.experiments.calibration.samples import Samples
 from hrc_env.motion.repertoire import REPERTOIRE
-from hrc_env.perception.calibration import INNER, KIND, KINDS, N_VIEWS
+from hrc_env.perception.calibration import INNER, KIND, KINDS, N_VIEWS, NEXT, POSTURES
 
 L, T, C, J = 24, 50, 4, 15
+STANDING, FOLDED = np.eye(len(POSTURES))[[0, -1]]
 HIP, ELBOW = KINDS.index("hip"), KINDS.index("elbow")
 
 
@@ -23,10 +24,10 @@ def made(error, **changes):
     parts = {
         "error": error, "confidence": rng.uniform(0.9, 0.99, (L, T, C, J)),
         "sight": np.zeros((L, T, C, J), int), "view": view,
-        "posture": np.tile([1.0, 0.0, 0.0], (L, T, 1)),
+        "posture": np.tile(STANDING, (L, T, 1)),
         "speed_m_s": np.full((L, T), 0.1), "missed": np.zeros((L, T, C), bool),
         "exchanged": np.zeros((L, T, C, 2), bool), "shown": np.zeros((L, T, C, J, 2, 3)),
-        "offset_m": nowhere, "noise": nowhere, "counts": np.ones((L, T), bool),
+        "offset_m": nowhere, "counts": np.ones((L, T), bool),
     }  # fmt: skip
     return Samples(**(parts | changes))
 
@@ -65,9 +66,41 @@ def test_biases_by_view_are_found():
 def test_offsets_in_space_are_found():
     rng = np.random.default_rng(3)
     offset = 0.01 * rng.standard_normal((L, T, J, 3)) + np.array([0.0, 0.0, 0.03])
-    known = fit(made(white(), offset_m=offset, noise=np.full((L, T, J, 3), 0.006**2)))
+    known = fit(made(white(), offset_m=offset))
     np.testing.assert_allclose(known.offset_m[0], [[0.0, 0.0, 0.03]] * len(KINDS), atol=0.002)
-    np.testing.assert_allclose(known.wander_m[0], 0.008, atol=0.001)
+
+
+def in_space(offset_m):
+    """Errors (L, T, C, J, 2) as cameras all round show offsets (L, T, J, 3), and how they do."""
+    azimuth = np.linspace(0.3, 2 * np.pi, C, endpoint=False)
+    right = np.stack([-np.sin(azimuth), np.cos(azimuth), 0 * azimuth], -1)
+    down = np.tile([0.0, 0.0, -1.0], (C, 1))
+    shown = np.broadcast_to(np.stack([right, down], 1)[:, None], (L, T, C, J, 2, 3)) / 2.0
+    return np.einsum("ltcjka,ltja->ltcjk", shown, offset_m), shown
+
+
+def test_what_varies_in_space_is_told_from_what_cameras_err_on_their_own():
+    rng = np.random.default_rng(3)
+    std = np.array([0.03, 0.02, 0.0])
+    error, shown = in_space(std * rng.standard_normal((L, T, J, 3)))
+    wander = fit(made(error + white(0.01), shown=shown)).wander_m[0]
+    np.testing.assert_allclose(wander, np.tile(np.maximum(std, 0.002), (len(KINDS), 1)), atol=0.003)
+    assert fit(made(white(0.01), shown=shown)).wander_m[0].max() < 0.004
+
+
+def test_what_varies_in_space_together_is_found():
+    """Elbows with their shoulders, and the right hip with the left one."""
+    rng = np.random.default_rng(3)
+    normal = rng.standard_normal((L, T, J, 3))
+    for j in range(J):
+        if KIND[j] == ELBOW or (KIND[j] == HIP and NEXT[j] != j):
+            normal[:, :, j] = 0.8 * normal[:, :, NEXT[j]] + 0.6 * normal[:, :, j]
+    error, shown = in_space(0.03 * normal)
+    posture = np.tile(STANDING, (L, T, 1))
+    posture[L // 3 :] = FOLDED
+    limb = fit(made(error + white(0.01), shown=shown, posture=posture)).space_limb
+    np.testing.assert_allclose(limb[[ELBOW, HIP]], 0.8, atol=0.1)
+    assert np.abs(np.delete(limb, [ELBOW, HIP], 0)).max() < 0.2
 
 
 def test_errors_along_a_limb_are_alike():

@@ -106,7 +106,7 @@ def calibrated(tmp_path, **changes):
 def plain(**changes):
     """Tables of errors of one size that all cameras have for themselves."""
     known = read_calibration()
-    zeros = ("offset_m", "wander_m", "bias", "spread", "body", "limb", "tail")
+    zeros = ("offset_m", "wander_m", "space_limb", "bias", "spread", "body", "limb", "tail")
     tables = {name: np.zeros_like(getattr(known, name)) for name in zeros}
     shares = np.zeros_like(known.shares)
     shares[:, 1] = 1.0
@@ -143,7 +143,7 @@ def test_who_moves_gets_new_errors_sooner(tmp_path):
 def test_offsets_in_space_are_the_same_in_every_camera(tmp_path):
     hips = np.zeros_like(read_calibration().offset_m)
     hips[:, KINDS.index("hip"), 2] = 0.03  # up
-    config = calibrated(tmp_path, **plain(offset_m=hips, size=np.full((3, 3, 8), 1e-6)))
+    config = calibrated(tmp_path, **plain(offset_m=hips, size=np.full((4, 3, 8), 1e-6)))
     state, rngs = start(1, config)
     true = truth(1)
     raised = true.joints_world.copy()
@@ -153,12 +153,24 @@ def test_offsets_in_space_are_the_same_in_every_camera(tmp_path):
     np.testing.assert_allclose(seen.px, px, atol=0.05)
 
 
+def test_what_cameras_share_goes_along_limbs(tmp_path):
+    known = read_calibration()
+    limb = np.zeros_like(known.space_limb)
+    limb[KINDS.index("knee")] = 0.8
+    still = {"wander_m": np.full_like(known.wander_m, 0.02), "size": np.full((4, 3, 8), 1e-9)}
+    errors, _ = film(calibrated(tmp_path, **plain(**still, space_limb=limb)), 2, batch=600)
+    knee, hip, ankle = (errors[..., JOINT[f"left_{name}"], :] for name in ("knee", "hip", "ankle"))
+    together, apart = ((knee * each).mean() / (knee**2).mean() for each in (hip, ankle))
+    assert together == pytest.approx(0.8, abs=0.1)
+    assert abs(apart) < 0.1
+
+
 def test_what_cameras_share_can_go_far_now_and_then(tmp_path):
     """A vector n of normal variables is lengthened by 1 + tail n.n / 3."""
     wander = np.full_like(read_calibration().wander_m, 0.01)
-    still = {"wander_m": wander, "size": np.full((3, 3, 8), 1e-9), "slow_s": np.array(1e-3)}
+    still = {"wander_m": wander, "size": np.full((4, 3, 8), 1e-9), "slow_s": np.array(1e-3)}
     plain_tail, long_tail = (
-        film(calibrated(tmp_path, **plain(**still, tail=np.full(3, tail))), 2, batch=300)[0]
+        film(calibrated(tmp_path, **plain(**still, tail=np.full(4, tail))), 2, batch=300)[0]
         for tail in (0.0, 0.5)
     )
     usual, farther = (np.linalg.norm(each, axis=-1).ravel() for each in (plain_tail, long_tail))
@@ -169,7 +181,7 @@ def test_what_cameras_share_can_go_far_now_and_then(tmp_path):
 
 
 def test_who_walks_errs_as_the_file_says_of_who_walks(tmp_path):
-    size = np.full((3, 3, 8), 0.01)
+    size = np.full((4, 3, 8), 0.01)
     size[1] = 0.03
     config = calibrated(tmp_path, **plain(size=size))
     spread = []
@@ -251,7 +263,7 @@ def test_a_swap_exchanges_left_and_right():
 
 def test_swaps_and_misses_take_their_share_of_the_time_and_last(tmp_path):
     half = {"swap_s": np.full(2, 0.5), "miss_s": np.array(0.5)}
-    known = calibrated(tmp_path, **half, swap_share=np.zeros((3, N_VIEWS, 2)))
+    known = calibrated(tmp_path, **half, swap_share=np.zeros((4, N_VIEWS, 2)))
     config = dataclasses.replace(EXACT, calibration=known.calibration, swap_share=0.1)
     config = dataclasses.replace(config, miss_share=0.2)
     state, rngs = start(64, config)

@@ -46,7 +46,7 @@ def test_who_is_folded_up_is_moved_by_what_was_found_of_folded_bodies():
     told = our_joints(estimate_of(body[None, None])).mean_world[0, 0]
     moved = (body - told)[JOINT["left_hip"]]
     np.testing.assert_allclose(
-        moved[[0, 2]], OFFSET_M[2, KIND[JOINT["left_hip"]], [0, 2]], atol=1e-3
+        moved[[0, 2]], OFFSET_M[-1, KIND[JOINT["left_hip"]], [0, 2]], atol=1e-3
     )
 
 

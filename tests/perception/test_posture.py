@@ -5,6 +5,7 @@ import pytest
 from people import STANDING
 
 from hrc_env.geometry.rotations import about_axis
+from hrc_env.perception.outline import posture_of
 from hrc_env.perception.posture import is_folded
 from hrc_env.skeleton import JOINT
 
@@ -59,3 +60,35 @@ def test_place_turn_and_size_do_not_matter():
 
 def test_an_unknown_body_is_not_folded():
     assert not is_folded(np.full_like(STANDING, np.nan))
+
+
+@pytest.mark.parametrize(("speed_m_s", "posture"), [(0.0, 0), (1.2, 1)])
+def test_who_has_nothing_in_their_hands_stands_or_walks(speed_m_s, posture):
+    np.testing.assert_allclose(posture_of(hanging(), moving(speed_m_s)), np.eye(4)[posture])
+
+
+@pytest.mark.parametrize("speed_m_s", [0.0, 1.2])
+def test_a_raised_hand_has_something_to_do(speed_m_s):
+    body = hanging()
+    body[JOINT["right_wrist"], 2] = body[JOINT["right_shoulder"], 2] - 0.2
+    np.testing.assert_allclose(posture_of(body, moving(speed_m_s)), np.eye(4)[2])
+
+
+def test_who_is_folded_up_is_that_whatever_the_hands_do():
+    body = hanging()
+    body[UPPER, 2] -= 0.9
+    body[JOINT["right_wrist"], 2] += 0.6
+    np.testing.assert_allclose(posture_of(body, moving(1.0)), np.eye(4)[3])
+
+
+def hanging():
+    """`STANDING` with its arms down."""
+    body = STANDING.copy()
+    for side in ("left", "right"):
+        body[JOINT[f"{side}_elbow"]] = body[JOINT[f"{side}_shoulder"]] - [0.0, 0.0, 0.3]
+        body[JOINT[f"{side}_wrist"]] = body[JOINT[f"{side}_elbow"]] - [0.0, 0.0, 0.25]
+    return body
+
+
+def moving(speed_m_s):
+    return np.tile([speed_m_s, 0.0, 0.0], (len(STANDING), 1))

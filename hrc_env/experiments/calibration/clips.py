@@ -2,6 +2,7 @@
 
 import zlib
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
@@ -48,6 +49,18 @@ FAMILIES: dict[str, tuple[str, ...]] = {
 """The scenes of the repertoire by family: what folds the body is hardest to see."""
 
 
+Moved: TypeAlias = tuple[float, float]
+"""A rig whose cameras hang elsewhere: this share of the way along the walls to the next one, and so
+much lower [m]."""
+AS_BUILT: Moved = (0.0, 0.0)
+FIT_RIGS: tuple[Moved, ...] = (AS_BUILT, (0.5, 0.2), (0.75, 0.6))
+"""Of the fit's clips, in turns: errors depend on from where one looks."""
+UNSEEN_RIG: Moved = (0.25, 0.4)
+UNSEEN_SEEDS = 1003
+"""Of clips that no fit has seen: rig, and how much higher their seeds are (which also pairs motions
+and bodies otherwise)."""
+
+
 @dataclass(frozen=True, slots=True)
 class Clip:
     """What is played where."""
@@ -60,8 +73,8 @@ class Clip:
     """A baked worker."""
     seed: int
     """Of the motion's details, the place and the arm."""
-    moved_rig: bool = False
-    """Whether the cameras hang where those of the fit never were."""
+    rig: Moved = AS_BUILT
+    """Where the cameras hang."""
     draw: int = 0
     """Number of the errors' draw, where they are drawn."""
 
@@ -84,39 +97,41 @@ def family_of(motion: str) -> str:
 
 
 def fit_clips(rounds: int, seed: int) -> list[Clip]:
-    """Every motion, `rounds` times in each scene, or (0 rounds) in one; bodies in turn."""
-    return _clips(rounds, seed, moved_rig=False)
+    """Every motion, `rounds` times in each scene, or (0 rounds) in one; bodies and rigs in turn."""
+    return _clips(rounds, seed, FIT_RIGS)
 
 
 def unseen_clips(rounds: int, seed: int) -> list[Clip]:
     """As many others: other seeds and pairs of motion and body, cameras elsewhere."""
-    return _clips(rounds, seed + 1000, moved_rig=True)
+    return _clips(rounds, seed + UNSEEN_SEEDS, (UNSEEN_RIG,))
 
 
-def _clips(rounds: int, seed: int, moved_rig: bool) -> list[Clip]:
+def _clips(rounds: int, seed: int, rigs: tuple[Moved, ...]) -> list[Clip]:
     names, clips = worker_names(), []
     for round_ in range(max(rounds, 1)):
         for k, motion in enumerate(REPERTOIRE):
             for i, scene in enumerate(SCENES):
                 if rounds == 0 and i != k % len(SCENES):
                     continue
-                body = names[(3 * k + 5 * i + 2 * round_ + seed + 3 * moved_rig) % len(names)]
-                clips.append(Clip(scene, motion, body, seed + round_, moved_rig))
-    return sorted(clips, key=lambda clip: (clip.scene, clip.body))
+                body = names[(3 * k + 5 * i + 2 * round_ + seed) % len(names)]
+                rig = rigs[(round_ + k) % len(rigs)]
+                clips.append(Clip(scene, motion, body, seed + round_, rig))
+    return sorted(clips, key=lambda clip: (clip.scene, clip.body, clip.rig))
 
 
 def scene_of(clip: Clip) -> Scene:
     """The compiled scene of a clip."""
-    rig = moved(SCENES[clip.scene].cameras) if clip.moved_rig else ()
+    rig = () if clip.rig == AS_BUILT else moved(SCENES[clip.scene].cameras, clip.rig)
     return build(SceneConfig(cameras=rig), clip.scene, 1, clip.body)
 
 
-def moved(rig: tuple[CameraConfig, ...]) -> tuple[CameraConfig, ...]:
-    """The same cameras 0.4 m lower, a quarter of the way along the walls to the next one."""
+def moved(rig: tuple[CameraConfig, ...], how: Moved) -> tuple[CameraConfig, ...]:
+    """The same cameras elsewhere."""
+    along, lower_m = how
     eyes = [camera.eye_world for camera in rig]
     following = eyes[1:] + eyes[:1]
     places = [
-        (0.75 * a[0] + 0.25 * b[0], 0.75 * a[1] + 0.25 * b[1], a[2] - 0.4)
+        (a[0] + along * (b[0] - a[0]), a[1] + along * (b[1] - a[1]), a[2] - lower_m)
         for a, b in zip(eyes, following, strict=True)
     ]
     return tuple(
@@ -127,7 +142,7 @@ def moved(rig: tuple[CameraConfig, ...]) -> tuple[CameraConfig, ...]:
 
 def number_of(clip: Clip) -> int:
     """A number of its own, however often it is drawn."""
-    words = f"{clip.seed} {clip.scene} {clip.motion} {clip.body} {clip.moved_rig}"
+    words = f"{clip.seed} {clip.scene} {clip.motion} {clip.body} {clip.rig}"
     return zlib.crc32(words.encode())
 
 

@@ -21,7 +21,7 @@ from hrc_env.perception.calibration import Calibration, write_calibration
 from hrc_env.perception.emulator import EmulatorConfig
 from hrc_env.typing import Floats
 
-IN_THE_IMAGE, IN_SPACE = 2, 4
+IN_THE_IMAGE, IN_SPACE = 3, 4
 """Rounds: first errors in the image are matched, then those in space."""
 STEP = (0.75, 1.3)
 """No number changes by more than such a factor in a round."""
@@ -72,21 +72,27 @@ def _emulated(clips: list[Clip], path: Path, tick: Callable[[], None]) -> list[W
 
 
 def _as_in_the_image(draft: Calibration, wanted: Samples, drawn: Samples) -> Calibration:
-    """Sizes by cell, and how badly whole bodies are seen, moved by what they are off."""
+    """Sizes by cell and how they spread, and how badly whole bodies are seen, moved by what they
+    are off."""
     cells, others = Cells(wanted), Cells(drawn)
     body = draft.body * _limited(body_spread(cells) / body_spread(others))[:, None]
-    size = draft.size * _limited(_medians(cells) / _medians(others), _trust(cells))
-    return replace(draft, size=size, body=body)
+    (middle, wide), (middle_drawn, wide_drawn) = _lengths(cells), _lengths(others)
+    size = draft.size * _limited(middle / middle_drawn, _trust(cells))
+    spread = draft.spread * _limited(wide / wide_drawn, _trust(cells))
+    return replace(draft, size=size, spread=spread, body=body)
 
 
-def _medians(cells: Cells) -> Floats:
-    """(P, S, K) median length of the errors; 1 where there are hardly any."""
-    length, table = np.linalg.norm(cells.mirrored, axis=-1), np.ones((N_P, N_S, N_K))
-    for cell in np.ndindex(*table.shape):
+def _lengths(cells: Cells) -> tuple[Floats, Floats]:
+    """(P, S, K) each: median length of the errors, and the logarithm of what their 95th percentile
+    is over it; 1 where there are hardly any."""
+    length = np.linalg.norm(cells.mirrored, axis=-1)
+    middle, wide = np.ones((N_P, N_S, N_K)), np.ones((N_P, N_S, N_K))
+    for cell in np.ndindex(*middle.shape):
         mine = cells.pick(*cell)
         if mine.sum() >= 30:
-            table[cell] = np.median(length[mine])
-    return table
+            half, most = np.percentile(length[mine], [50, 95])
+            middle[cell], wide[cell] = half, np.log(most / half)
+    return middle, wide
 
 
 def _trust(cells: Cells) -> Floats:

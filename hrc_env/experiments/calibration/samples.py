@@ -10,7 +10,7 @@ from hrc_env.experiments.calibration.watch import Watched
 from hrc_env.perception.calibration import HAND
 from hrc_env.perception.emulator_kernel import FIRST_OF_LEGS
 from hrc_env.perception.outline import weigh
-from hrc_env.perception.sightlines import FOLDING, SEEN, SIDE, STEPPING, TURN, VIEW
+from hrc_env.perception.sightlines import FOLDING, HANDLING, SEEN, SIDE, STEPPING, TURN, VIEW
 from hrc_env.skeleton import MIRROR
 from hrc_env.typing import Bools, Floats, Ints
 
@@ -50,8 +50,6 @@ class Samples:
     [1/m]."""
     offset_m: Floats
     """(L, T, J, 3) offset in space on which three cameras or more agree; NaN: fewer."""
-    noise: Floats
-    """(L, T, J, 3) variance that it has by the cameras' own errors [m^2]."""
     counts: Bools
     """(L, T) whether the worker was tracked, so that the windows were in place."""
 
@@ -72,19 +70,20 @@ def _samples(clip: Watched) -> Samples:
     px = np.where(legs, px[..., MIRROR, :], px)
     error = _in_window(px - true_px, look_of)
     shown = _shown(clip, late, look_of)
-    offset, noise = _agreed(error, shown, sight, look_of[:, 0, FOLDING])
+    offset = _agreed(error, shown, sight, look_of[:, 0, FOLDING])
     pace_m = np.linalg.norm(np.diff(clip.joints_world, axis=0), axis=-1).mean(-1)
     return Samples(
         error, clip.confidence[late], sight, look_of[..., VIEW], postures_of(clip)[late],
         pace_m[WARM_UP - 1 :] / DT_S, np.isnan(clip.px[late, :, 0, 0]), exchanged, shown,
-        offset, noise, clip.tracked[late],
+        offset, clip.tracked[late],
     )  # fmt: skip
 
 
 def postures_of(clip: Watched) -> Floats:
     """(T, P) how far the body counts as each of `POSTURES`."""
     look_of = clip.look_of[:, 0]
-    shares = weigh.py_func(look_of[:, FOLDING], look_of[:, STEPPING])  # of arrays, not compiled
+    columns = look_of[:, [FOLDING, HANDLING, STEPPING]].T
+    shares = weigh.py_func(*columns)  # of arrays, not compiled
     return np.stack(shares, -1)
 
 
@@ -125,19 +124,12 @@ def _shown(clip: Watched, late: slice, look_of: Floats) -> Floats:
     return _in_window(slope @ axes[:, None], look_of)
 
 
-def _agreed(error: Floats, shown: Floats, sight: Ints, fold: Floats) -> tuple[Floats, Floats]:
-    """Least squares over cameras: offset (T, J, 3) and its variance by the cameras' own errors."""
+def _agreed(error: Floats, shown: Floats, sight: Ints, fold: Floats) -> Floats:
+    """(T, J, 3) least squares over the cameras that are not far off; NaN: fewer than three."""
     most = AGREED * np.where(fold > 0.5, 3.0, 1.0)[:, None, None]
     good = (sight == SEEN) & (np.linalg.norm(np.nan_to_num(error, nan=9.0), axis=-1) < most)
-    weight = good[..., None, None].astype(float)
-    rows, e = shown * weight, np.where(good[..., None], error, 0.0)
+    rows, e = shown * good[..., None, None], np.where(good[..., None], error, 0.0)
     normal = np.einsum("tcjka,tcjkb->tjab", rows, shown)
-    n = good.sum(1)
-    enough = n >= 3
-    safe = np.where(enough[..., None, None], normal, np.eye(3))
-    inverse = np.linalg.inv(safe)
-    offset = np.einsum("tjab,tcjkb,tcjk->tja", inverse, rows, e)
-    left_over = e - np.einsum("tcjka,tja->tcjk", rows, offset)
-    variance = (left_over**2).sum((1, 3)) / np.maximum(2 * n - 3, 1)
-    noise = variance[..., None] * np.einsum("tjaa->tja", inverse)
-    return np.where(enough[..., None], offset, np.nan), np.where(enough[..., None], noise, np.nan)
+    enough = (good.sum(1) >= 3)[..., None]
+    inverse = np.linalg.inv(np.where(enough[..., None], normal, np.eye(3)))
+    return np.where(enough, np.einsum("tjab,tcjkb,tcjk->tja", inverse, rows, e), np.nan)

@@ -13,7 +13,12 @@ from hrc_env.experiments.calibration.fit.confidence import (
 from hrc_env.experiments.calibration.fit.events import misses_of, swaps_of
 from hrc_env.experiments.calibration.fit.lasting import limbs_of, times_of
 from hrc_env.experiments.calibration.fit.sizes import bias_at, bias_of, relative, sizes_of
-from hrc_env.experiments.calibration.fit.space import offsets_of, projected, space_variance
+from hrc_env.experiments.calibration.fit.space import (
+    offsets_of,
+    projected,
+    space_variance,
+    wander_of,
+)
 from hrc_env.experiments.calibration.samples import Samples
 from hrc_env.perception.calibration import Calibration
 
@@ -21,7 +26,8 @@ from hrc_env.perception.calibration import Calibration
 def fit(samples: Samples) -> Calibration:
     """A calibration that draws errors like these."""
     s = Cells(samples)
-    offset, wander = offsets_of(samples)
+    offset = offsets_of(samples)
+    wander, space_limb = wander_of(samples, offset)
     in_space = space_variance(samples, wander)
     left_over = s.mirrored - projected(samples, offset)
     bias = bias_of(s, left_over)
@@ -33,7 +39,7 @@ def fit(samples: Samples) -> Calibration:
     swap_share, swap_s = swaps_of(samples)
     miss_share, miss_s = misses_of(samples)
     return Calibration(
-        offset, wander, np.zeros(N_P), bias, size, spread, body, confidence_s(s),
+        offset, wander, space_limb, np.zeros(N_P), bias, size, spread, body, confidence_s(s),
         np.array(common), shares, slow_s, slow_m, limbs_of(s, unit), confidences_of(s),
         follows_of(s, left_over, spread, common), swap_share, swap_s, miss_share, miss_s,
         sigma_table(s, samples),
