@@ -76,8 +76,6 @@ class Calibration:
     body: Floats
     """(P, Q) quantiles of the logarithm of a factor that all joints of a body have in common in a
     camera, least first, at `BODY_KNOTS`: now and then a body is seen badly as a whole."""
-    size_s: Floats
-    """() for how long both last [s]."""
     common: Floats
     """() share of the sizes' variance that this factor is: how far the confidence follows it."""
     shares: Floats
@@ -86,8 +84,8 @@ class Calibration:
     slow_s: Floats
     """() for how long, while the worker stands still [s]."""
     slow_m: Floats
-    """() how far the joints travel until they are other errors [m]; what varies in space lasts as
-    long."""
+    """() how far the joints travel until they are other errors [m]; their sizes, the confidence and
+    what varies in space last as long."""
     limb: Floats
     """(K,) correlation with the error of the next joint towards the trunk."""
     confidence: Floats
@@ -112,7 +110,7 @@ SHAPES: dict[str, tuple[int, ...]] = {
     "offset_m": (_P, _K, 3), "wander_m": (_P, _K, 3), "space_limb": (_K, 3),
     "tail": (_P,), "bias": (N_VIEWS, _K, 2),
     "size": (_P, _S, _K), "spread": (_P, _S, _K), "body": (_P, _Q),
-    "size_s": (), "common": (), "shares": (_K, 3),
+    "common": (), "shares": (_K, 3),
     "slow_s": (), "slow_m": (), "limb": (_K,), "confidence": (_P, _S, _K, _Z), "follows": (_S, _K),
     "swap_share": (_P, N_VIEWS, 2), "swap_s": (2,), "miss_share": (_P, N_SEEN), "miss_s": (),
     "sigma": (_P, _K, len(VISIBILITY)),
@@ -122,7 +120,7 @@ POSTURED = (
     "miss_share", "sigma",
 )  # fmt: skip
 """Tables that are given for each posture."""
-_POSITIVE = ("size", "size_s", "slow_s", "slow_m", "swap_s", "miss_s", "sigma")
+_POSITIVE = ("size", "slow_s", "slow_m", "swap_s", "miss_s", "sigma")
 _SHARES = ("tail", "common", "shares", "confidence", "swap_share", "miss_share")
 _CORRELATIONS = ("limb", "space_limb", "follows")
 _RENEW = "make a new one with: python -m hrc_env calibrate-keypoints --out FILE"

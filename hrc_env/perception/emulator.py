@@ -268,13 +268,11 @@ def _settings(config: EmulatorConfig, dt_s: float, written_ns: int) -> tuple[Tab
     copies: list[Any] = [np.array(each) for each in others]  # writable: one type for the kernel
     by_posture = np.concatenate([each.reshape(len(each), -1) for each in postured], 1)
     tables = Tables(by_posture, *copies)
-    keep_size = float(np.exp(-dt_s / known.size_s))
     keep_swap, keep_cross, keep_miss = (
         float(np.exp(-dt_s / lasts_s)) for lasts_s in (*known.swap_s, known.miss_s)
     )
     scalars = Scalars(
-        float(dt_s / known.slow_s), float(dt_s / known.slow_m), keep_size,
-        float(np.sqrt(1 - keep_size**2)), float(np.sqrt(known.common)),
+        float(dt_s / known.slow_s), float(dt_s / known.slow_m), float(np.sqrt(known.common)),
         float(np.sqrt(1 - known.common)), config.error_scale, config.max_error,
         keep_swap, keep_cross, keep_miss, config.min_joints,
         config.outside_confidence, STATURE_OF_SIDE,

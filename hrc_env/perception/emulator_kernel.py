@@ -109,8 +109,6 @@ class Scalars(NamedTuple):
     """Share of a time constant that an image is, while the worker stands still."""
     per_speed: float
     """How much more for every m/s."""
-    keep_size: float
-    renew_size: float
     common: float
     """Root of the share of the sizes' variance that is the whole body's; the confidence's."""
     own: float
@@ -242,12 +240,12 @@ def _report(
     view_cos, view_sin = math.cos(look_of[VIEW]), math.sin(look_of[VIEW])
     from_left = _between(look_of[VIEW], len(tables.bias))
     from_right = _between(-look_of[VIEW], len(tables.bias))
-    body[w] = scalars.keep_size * body[w] + scalars.renew_size * normals[N_NORMALS * n_joints]
+    body[w] = keep * body[w] + renew * normals[N_NORMALS * n_joints]
     badly = _quantile(here.body, body[w])
     for j in range(n_joints):
         kind, first = tables.kind[j], N_NORMALS * j
-        size[j] = scalars.keep_size * size[j] + scalars.renew_size * normals[first + 4]
-        sure[j] = scalars.keep_size * sure[j] + scalars.renew_size * normals[first + 5]
+        size[j] = keep * size[j] + renew * normals[first + 4]
+        sure[j] = keep * sure[j] + renew * normals[first + 5]
         for i in range(2):
             slow[j, i] = keep * slow[j, i] + renew * normals[first + i]
             stays = view_cos * lasting[j, i, 0] + view_sin * lasting[j, i, 1]

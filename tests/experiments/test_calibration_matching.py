@@ -9,7 +9,7 @@ from hrc_env.config import HRCConfig
 from hrc_env.experiments.calibration.clips import family_of, fit_clips
 from hrc_env.experiments.calibration.matching import matched
 from hrc_env.experiments.calibration.samples import postures_of, samples_of
-from hrc_env.experiments.calibration.validate import errors_in_image, outcome
+from hrc_env.experiments.calibration.validate import errors_in_image, lasting, outcome
 from hrc_env.experiments.calibration.watch import watch
 from hrc_env.perception.calibration import POSTURES, read_calibration, write_calibration
 from hrc_env.perception.emulator import EmulatorConfig
@@ -56,18 +56,21 @@ def test_a_file_that_is_written_anew_is_read_anew(tmp_path):
     assert large > 1.8 * small
 
 
-def test_an_emulator_that_errs_too_little_is_mended(played, tmp_path):
+def test_errors_that_are_too_small_and_too_short_are_mended(played, tmp_path):
     known = read_calibration()
-    draft = replace(known, size=0.6 * known.size, wander_m=0.6 * known.wander_m)
+    draft = replace(
+        known, size=0.6 * known.size, wander_m=0.6 * known.wander_m,
+        slow_s=0.4 * known.slow_s, slow_m=0.4 * known.slow_m,
+    )  # fmt: skip
     told: list[float] = []
     mended = matched(
         draft, CLIPS, played, tmp_path / "draft.json", lambda share, label: told.append(share)
     )
-    before, after = (
-        outcome(played_with(tmp_path / "one.json", each)).px_median / outcome(played).px_median
-        for each in (draft, mended)
-    )
-    assert before < 0.8
-    assert after == pytest.approx(1.0, abs=0.15)
+    wrong, right = (played_with(tmp_path / "one.json", each) for each in (draft, mended))
+    median = outcome(played).px_median
+    assert outcome(wrong).px_median < 0.8 * median
+    assert outcome(right).px_median == pytest.approx(median, rel=0.15)
+    assert lasting(wrong) < lasting(played) - 0.1
+    assert lasting(right) == pytest.approx(lasting(played), abs=0.08)
     assert sum(told) == pytest.approx(1.0)
     assert not (tmp_path / "draft.json").exists()

@@ -14,14 +14,23 @@ import numpy as np
 from hrc_env.config import HRCConfig
 from hrc_env.experiments.calibration.clips import FAMILIES, WARM_UP, Clip, family_of
 from hrc_env.experiments.calibration.fit.body import body_spread
-from hrc_env.experiments.calibration.fit.cells import FEW, N_K, N_P, N_S, Cells, class_of
+from hrc_env.experiments.calibration.fit.cells import (
+    FEW,
+    N_K,
+    N_P,
+    N_S,
+    SHARP,
+    Cells,
+    class_of,
+)
+from hrc_env.experiments.calibration.fit.lasting import LAGS, add_lagged
 from hrc_env.experiments.calibration.samples import Samples, postures_of, samples_of
 from hrc_env.experiments.calibration.watch import Watched, watch
 from hrc_env.perception.calibration import Calibration, write_calibration
 from hrc_env.perception.emulator import EmulatorConfig
 from hrc_env.typing import Floats
 
-IN_THE_IMAGE, IN_SPACE = 3, 4
+IN_THE_IMAGE, IN_SPACE = 3, 6
 """Rounds: first errors in the image are matched, then those in space."""
 STEP = (0.75, 1.3)
 """No number changes by more than such a factor in a round."""
@@ -31,6 +40,8 @@ DAMPED = 0.7
 """Power of the factors in space: what the emulator draws by chance is not to be fitted."""
 OFTEN = 2000
 """So many joints of a family must have been of a posture to tell of it: some three clips."""
+TOLD_LAGS = (2, 5, 12)
+"""Of `LAGS`, in frames: by these it is told how long errors last."""
 Say = Callable[[float, str], None]
 """Told by how much the share that is done grew, and what is being done."""
 
@@ -72,14 +83,30 @@ def _emulated(clips: list[Clip], path: Path, tick: Callable[[], None]) -> list[W
 
 
 def _as_in_the_image(draft: Calibration, wanted: Samples, drawn: Samples) -> Calibration:
-    """Sizes by cell and how they spread, and how badly whole bodies are seen, moved by what they
-    are off."""
+    """Sizes by cell and how they spread, how badly whole bodies are seen, and how long errors last,
+    moved by what they are off."""
     cells, others = Cells(wanted), Cells(drawn)
     body = draft.body * _limited(body_spread(cells) / body_spread(others))[:, None]
     (middle, wide), (middle_drawn, wide_drawn) = _lengths(cells), _lengths(others)
     size = draft.size * _limited(middle / middle_drawn, _trust(cells))
     spread = draft.spread * _limited(wide / wide_drawn, _trust(cells))
-    return replace(draft, size=size, spread=spread, body=body)
+    longer = _limited(float(np.mean(_fading(drawn) / _fading(wanted))))
+    slow_s, slow_m = draft.slow_s * longer, draft.slow_m * longer
+    return replace(draft, size=size, spread=spread, body=body, slow_s=slow_s, slow_m=slow_m)
+
+
+def _fading(samples: Samples) -> Floats:
+    """(P, n) logarithm of the correlation of errors with those `TOLD_LAGS` later, by posture."""
+    class_ = class_of(samples.posture)[..., None, None, None]
+    small = np.linalg.norm(samples.error, axis=-1, keepdims=True) < SHARP
+    fading = []
+    for posture in range(N_P):
+        mine = np.where(small & (class_ == posture), samples.error, np.nan)
+        sums = [np.zeros(len(LAGS)), np.full(len(LAGS), 1e-12)]
+        add_lagged(sums, mine)
+        told = (sums[0] / sums[1])[[LAGS.index(lag) for lag in TOLD_LAGS]]
+        fading.append(np.log(np.clip(told, 0.01, 0.99)))
+    return np.array(fading)
 
 
 def _lengths(cells: Cells) -> tuple[Floats, Floats]:
@@ -103,7 +130,7 @@ def _trust(cells: Cells) -> Floats:
     return np.where(count >= 30, count / (count + FEW), 0.0)
 
 
-def _limited(factor: Floats, trust: Floats | float = 1.0) -> Floats:
+def _limited(factor: Floats | float, trust: Floats | float = 1.0) -> Floats:
     return np.clip(factor, *STEP) ** trust
 
 

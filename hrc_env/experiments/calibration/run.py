@@ -26,7 +26,7 @@ Say = Callable[[float, str], None]
 class CalibrationRun:
     """How much is rendered."""
 
-    rounds: int = 2
+    rounds: int = 4
     """How often each motion is played in each scene; 0: once, in one of the scenes."""
     seed: int = 0
     """Of the clips."""

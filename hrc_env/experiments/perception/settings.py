@@ -29,7 +29,7 @@ class PerceptionBenchConfig:
     """Moments of each body in each scene, and of each lens; four crops each."""
     n_empty: int = 1000
     """Steps in each scene without anybody."""
-    emulator_rounds: int | None = 2
+    emulator_rounds: int | None = 4
     """How often each motion is rendered in each scene to hold the emulator against pixels; 0: once,
     in one of them; None: not at all."""
     cameras: tuple[int, ...] = (1, 2, 4)

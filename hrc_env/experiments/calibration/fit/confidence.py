@@ -6,7 +6,6 @@ import numpy as np
 
 from hrc_env.experiments.calibration.fit.body import LOG_RAYLEIGH_VAR
 from hrc_env.experiments.calibration.fit.cells import FEW, N_K, N_P, N_S, Cells, mix
-from hrc_env.experiments.calibration.fit.lasting import LAGS, add_lagged, decay_s
 from hrc_env.experiments.calibration.samples import Samples
 from hrc_env.perception.calibration import KIND, KNOTS, VISIBILITY
 from hrc_env.perception.eyes import STATURE_OF_SIDE
@@ -17,19 +16,6 @@ TOLD = 1.2
 """What is told is larger than what is measured by this, as errors that last and that cameras share
 do not average. Chosen on half of the clips: 1 covers .88, 1.2 .90, 1.4 .91 (upright bodies), and
 the tracker's median error is 20.4, 21.1 and 22.0 mm."""
-
-
-def confidence_s(s: Cells) -> Floats:
-    """How long the confidence lasts [s]."""
-    logit = np.where(s.found, _logit(s.confidence), np.nan)
-    for kind in range(N_K):
-        for sight in range(N_S):
-            mine = s.pick(None, sight, kind)
-            if mine.any():
-                logit[mine] -= np.mean(logit[mine])
-    sums = [np.zeros(len(LAGS)), np.zeros(len(LAGS))]
-    add_lagged(sums, logit)
-    return np.array(decay_s(sums[0] / np.maximum(sums[1], 1e-9)))
 
 
 def _logit(p: Floats) -> Floats:

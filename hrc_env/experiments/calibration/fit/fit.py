@@ -5,7 +5,6 @@ import numpy as np
 from hrc_env.experiments.calibration.fit.body import bodies_of
 from hrc_env.experiments.calibration.fit.cells import N_P, Cells
 from hrc_env.experiments.calibration.fit.confidence import (
-    confidence_s,
     confidences_of,
     follows_of,
     sigma_table,
@@ -39,7 +38,7 @@ def fit(samples: Samples) -> Calibration:
     swap_share, swap_s = swaps_of(samples)
     miss_share, miss_s = misses_of(samples)
     return Calibration(
-        offset, wander, space_limb, np.zeros(N_P), bias, size, spread, body, confidence_s(s),
+        offset, wander, space_limb, np.zeros(N_P), bias, size, spread, body,
         np.array(common), shares, slow_s, slow_m, limbs_of(s, unit), confidences_of(s),
         follows_of(s, left_over, spread, common), swap_share, swap_s, miss_share, miss_s,
         sigma_table(s, samples),

@@ -90,13 +90,3 @@ def add_lagged(sums: list[Floats], values: Floats) -> None:
         both = np.isfinite(now) & np.isfinite(then)
         sums[0][i] += (now[both] * then[both]).sum()
         sums[1][i] += 0.5 * ((now[both] ** 2).sum() + (then[both] ** 2).sum())
-
-
-def decay_s(correlation: Floats) -> float:
-    """Time constant of an exponential through correlations at `LAGS` [s]."""
-    times, best = np.array(LAGS) * DT_S, (np.inf, 1.0)
-    for tau in np.geomspace(0.1, 8.0, 60):
-        shape = np.exp(-times / tau)
-        share = np.clip((shape @ correlation) / (shape @ shape), 0, 1)
-        best = min(best, (float(((share * shape - correlation) ** 2).sum()), float(tau)))
-    return best[1]
