@@ -70,7 +70,7 @@ def test_errors_that_are_too_small_and_too_short_are_mended(played, tmp_path):
     median = outcome(played).px_median
     assert outcome(wrong).px_median < 0.8 * median
     assert outcome(right).px_median == pytest.approx(median, rel=0.15)
-    assert lasting(wrong) < lasting(played) - 0.1
-    assert lasting(right) == pytest.approx(lasting(played), abs=0.08)
+    assert lasting(wrong) < lasting(played) - 0.04
+    assert lasting(right) == pytest.approx(lasting(played), abs=0.04)
     assert sum(told) == pytest.approx(1.0)
     assert not (tmp_path / "draft.json").exists()
