@@ -24,6 +24,7 @@ from hrc_env.perception.calibration import (
     INNER,
     KIND,
     NEXT,
+    POSTURED,
     VISIBILITY,
     Calibration,
     changed_ns,
@@ -257,17 +258,16 @@ def _settings(config: EmulatorConfig, dt_s: float, written_ns: int) -> tuple[Tab
     """A calibration as the kernel takes it; read again if its file has been written anew."""
     known = config.calibrated()
     confidence = np.clip(known.confidence, 1e-6, 1 - 1e-6)
-    postured = (
-        known.offset_m, known.wander_m, known.tail, np.log(known.size), known.spread, known.body,
-        np.log(confidence / (1 - confidence)), known.swap_share, known.miss_share, known.sigma,
-    )  # fmt: skip
+    of_posture = {name: getattr(known, name) for name in POSTURED}
+    of_posture["size"] = np.log(known.size)
+    of_posture["confidence"] = np.log(confidence / (1 - confidence))
     others = (
         known.space_limb, known.bias, np.sqrt(known.shares), known.limb, known.follows,
         VISIBILITY, KIND, HAND, INNER, NEXT, MIRROR,
     )  # fmt: skip
     copies: list[Any] = [np.array(each) for each in others]  # writable: one type for the kernel
-    by_posture = np.concatenate([each.reshape(len(each), -1) for each in postured], 1)
-    tables = Tables(by_posture, *copies)
+    rows = [table.reshape(len(table), -1) for table in of_posture.values()]
+    tables = Tables(np.concatenate(rows, 1), *copies)
     keep_swap, keep_cross, keep_miss = (
         float(np.exp(-dt_s / lasts_s)) for lasts_s in (*known.swap_s, known.miss_s)
     )

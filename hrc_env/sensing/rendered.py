@@ -181,7 +181,7 @@ class CameraSenses(TrackingSenses):
 def _expected_posture(
     expected: PoseEstimate, row: int, worker: int
 ) -> tuple[bool, Sequence[float]]:
-    """Whether a worker is expected to be folded up; how far to stand, walk and be folded."""
+    """Whether a worker is expected to be folded up; how far they count as each posture."""
     if not expected.tracked[row, worker]:
         return False, STANDING
     joints = expected.mean_world[row, worker]
