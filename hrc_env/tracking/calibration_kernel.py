@@ -19,10 +19,12 @@ DECIDED = 1.3
 all others say."""
 LEAST_CONFIDENCE = 0.5
 """Of both joints of a point."""
-PERSISTENCE = 3.0
+PERSISTENCE = 2.0
 """Factor on the detector's variance: samples are not independent."""
-HUBER = 3.0
-"""Residuals beyond so many deviations weigh less (Huber)."""
+CAUCHY = 1.4
+"""Deviations at which a residual has half its weight (Cauchy): no view, however far off, says more
+than a bounded amount, and many have to agree. A detector that sees a whole body badly is far off
+in all directions."""
 LEAST_VIEWS = 3
 LEAST_DEPTH_M = 0.3
 U, V, WEIGHT, DU, DV = 0, 1, 2, 3, 4
@@ -82,10 +84,10 @@ def _view(px, confidence, sigma_px, age_s, mean, velocity, first, second, p, out
     out[U] = 0.5 * (px[first, 0] + px[second, 0]) - u
     out[V] = 0.5 * (px[first, 1] + px[second, 1]) - v
     variance = 0.5 * PERSISTENCE * (sigma_px[first] ** 2 + sigma_px[second] ** 2)
-    away = math.sqrt((out[U] ** 2 + out[V] ** 2) / variance)
-    if not (depth > LEAST_DEPTH_M and math.isfinite(away)):
+    squares = (out[U] ** 2 + out[V] ** 2) / variance
+    if not (depth > LEAST_DEPTH_M and math.isfinite(squares)):
         return False
-    out[WEIGHT] = min(1.0, HUBER / max(away, 1e-9)) / variance
+    out[WEIGHT] = 1.0 / (variance * (1.0 + squares / CAUCHY**2))
     for i in range(3):
         out[JACOBIAN + i] = (p[0, i] - u * p[2, i]) / depth
         out[JACOBIAN + 3 + i] = (p[1, i] - v * p[2, i]) / depth
