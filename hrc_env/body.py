@@ -223,9 +223,12 @@ def _rows(body: Body | Bodies, which: Ints | None, lead: tuple[int, ...]) -> Int
     if isinstance(body, Body) or which is None or len(body.names) == 1:
         return _first(math.prod(lead))
     last = len(body.names) - 1
-    if np.size(which) and not 0 <= np.min(which) <= np.max(which) <= last:
+    if which.size and not 0 <= which.min() <= which.max() <= last:
         raise ConfigError(f"Bodies must be rows 0 to {last} of {body.names}, got {which}.")
-    return fixed(np.broadcast_to(which, lead).reshape(-1), np.int64)
+    rows = np.empty(lead, np.int64)
+    rows[...] = which
+    rows.setflags(write=False)  # as `_first`'s: one compiled function takes both
+    return rows.reshape(-1)
 
 
 @functools.lru_cache(maxsize=16)

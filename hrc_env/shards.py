@@ -139,7 +139,10 @@ class Shards(Generic[PartT]):
         return joined(_all_done([*own, *others]))
 
     def _submit(self, part: Part, name: str, arguments: tuple[Any, ...]) -> Callable[[], Outcome]:
-        """Have a thread work on a part."""
+        """Have a thread work on a part; but a reset is Python for the most part, in which threads
+        would only wait for each other."""
+        if name == "reset":
+            return partial(getattr(part, name), *arguments)
         if self._pool is None:
             n_helpers = len(self._others)
             self._pool = ThreadPoolExecutor(n_helpers, thread_name_prefix="hrc_env-shard")

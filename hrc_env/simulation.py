@@ -246,7 +246,7 @@ class Simulation(Stateful):
         ahead = tuple(
             self.senses.ahead(estimate, ids, horizon_s) for horizon_s in self.config.horizons_s
         )
-        if np.array_equal(ids, self._everyone):
+        if ids is self._everyone:
             self.estimate, self.ahead = estimate, ahead
         else:
             for whole, part in zip((self.estimate, *self.ahead), (estimate, *ahead), strict=True):

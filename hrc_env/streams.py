@@ -14,9 +14,16 @@ class _Words(ISpawnableSeedSequence):
     """What a generator starts from, drawn: to have `SeedSequence` hash it takes five times as long
     as everything else. Has its attributes, of which other streams are made (`appearance`)."""
 
+    spawn_key = ()
+    hashed: SeedSequence | None = None
+
     def __init__(self, words: NDArray[np.uint64]) -> None:
-        self.words, self.entropy, self.spawn_key = words, words.tolist(), ()
-        self.hashed: SeedSequence | None = None
+        self.words = words
+
+    @property
+    def entropy(self) -> list[int]:
+        """What a `SeedSequence` is made from."""
+        return self.words.tolist()
 
     def generate_state(self, n_words: int, dtype: Any = np.uint64) -> NDArray[Any]:
         """The words, as they are, to the generator they were drawn for."""

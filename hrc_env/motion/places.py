@@ -80,9 +80,9 @@ def _candidates(who: Who, kind: str) -> Iterator[Place]:
 
 def _is_free(who: Who, place: Place) -> bool:
     """Whether no other worker has a place near this one."""
-    spots = who.state.spots[who.b, :, :SPOT_YAW][others_of(who)]
-    away = np.hypot(spots[:, 0] - place[0], spots[:, 1] - place[1])
-    return not len(away) or bool(away.min() >= who.state.mind.config.spacing_m)
+    apart_m, spots = who.state.mind.config.spacing_m, who.state.spots[who.b, :, :SPOT_YAW]
+    there = zip(others_of(who).tolist(), spots.tolist(), strict=True)
+    return all(math.dist(spot, place[:2]) >= apart_m for other, spot in there if other)
 
 
 def take_first_place(who: Who) -> None:
