@@ -22,13 +22,14 @@ from rich.progress import Progress, track
 import hrc_env  # noqa: F401  registers the ids
 from hrc_env.crew import ACTIVITY, BODY
 from hrc_env.results import Metric, over, write_results
+from hrc_env.suspects import MISCALIBRATED
 from hrc_env.vector_env import HRCVectorEnv
 
 WARM_UP_STEPS = 1_000_000
 """Memory is compared with what it was after so many environment steps."""
 READINGS = 40
 """How often a run reads the memory."""
-NAMES = (ACTIVITY, BODY)
+NAMES = (ACTIVITY, BODY, MISCALIBRATED)
 """The infos that are no numbers."""
 NOT_WHEN_LOST = "tracking/mpjpe_m"
 """The one info that a step may lack: nobody is tracked, so nobody is wrong."""

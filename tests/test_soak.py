@@ -5,6 +5,7 @@ import json
 import numpy as np
 
 from benchmarks import soak
+from hrc_env.suspects import MISCALIBRATED
 
 
 def test_a_short_soak_counts_nothing_wrong(tmp_path):
@@ -25,6 +26,8 @@ def test_what_is_no_number_and_what_is_lacking_is_counted():
         "_tracking/lost": everyone,
         "tracking/mpjpe_m": np.zeros(3),
         "_tracking/mpjpe_m": np.array([True, False, False]),
+        MISCALIBRATED: np.array([("camera_1",), (), ()], object),
+        f"_{MISCALIBRATED}": np.array([True, False, False]),
     }
     assert soak.lacking(infos, everyone) == 3
     assert soak.lacking(infos, np.array([True, True, False])) == 2
