@@ -1,5 +1,6 @@
 """Who is there: how many workers an episode has, with which bodies, and what each is doing."""
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -41,8 +42,9 @@ class Crew:
         """The same of environments `who` (B,), one array (B,) a name; the others have None."""
         doing, bodies = np.full((2, len(who)), None, object)
         bodies[who] = self.bodies[who]
-        for b in np.flatnonzero(who).tolist():
-            doing[b] = named(self.activity[b])
+        ids, activities = np.flatnonzero(who).tolist(), self.activity[who].tolist()
+        for b, activity in zip(ids, activities, strict=True):
+            doing[b] = _names_of(tuple(activity))
         return {ACTIVITY: doing, BODY: bodies}
 
     def blank(self, batch: int) -> "Crew":
@@ -76,8 +78,13 @@ def bodies_of(motion: MotionState, ids: Ints, names: tuple[str, ...]) -> NDArray
 
 def named(activity: Ints) -> tuple[str, ...]:
     """The names of what workers (W,) do."""
+    return _names_of(tuple(activity.tolist()))
+
+
+@functools.lru_cache(maxsize=4096)
+def _names_of(activity: tuple[int, ...]) -> tuple[str, ...]:
     names = generator.activity_names
-    return tuple(ABSENT_NAME if k == generator.ABSENT else names[k] for k in activity.tolist())
+    return tuple(ABSENT_NAME if k == generator.ABSENT else names[k] for k in activity)
 
 
 def worker_counts(n_workers: int | tuple[int, int]) -> tuple[int, int]:

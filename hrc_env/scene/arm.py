@@ -90,6 +90,13 @@ SELF_COLLISIONS = (
 )  # fmt: skip
 """The pairs of the arm's own capsules that can meet in its joint ranges."""
 
+OUT_OF_REACH = frozenset({
+    ("shoulder", "pedestal_column"), ("shoulder", "pedestal_head"),
+    ("shoulder_lift", "pedestal_column"), ("shoulder_lift", "pedestal_head"),
+    ("upper_arm", "pedestal_foot"), ("elbow", "pedestal_foot"), ("elbow", "pedestal_head"),
+})  # fmt: skip
+"""Capsules and parts of what the arm stands on that never meet, near as some always are."""
+
 
 def arm_chain(T_world_from_base: np.ndarray, tool_length_m: float = TOOL_LENGTH_M) -> SerialChain:
     """The arm's numbers as a chain; a tool length of 0 puts the tool point on the flange."""

@@ -32,7 +32,7 @@ def test_a_scene_is_pickled_as_its_recipe():
 def test_physics_is_spared_what_only_the_eye_needs():
     groups = build().model.geom_group
     assert not np.isin(groups, [DECORATION, ROBOT_LOOKS, OVERHEAD]).any()
-    assert build().model.ntex == 0
+    assert build().model.ntex == build().model.ncam == build().model.nlight == 0
 
 
 def test_both_models_share_one_state():

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from hrc_env.errors import ConfigError
-from hrc_env.scene.build import build
+from hrc_env.scene.build import build, drawing_model
 from hrc_env.scene.rig import LAB_CAMERAS, CameraConfig, glcam_axes, pinholes, select
 
 NAMES = [camera.name for camera in LAB_CAMERAS]
@@ -50,8 +50,9 @@ def test_two_cameras_of_one_name_are_refused():
 
 def test_mujocos_camera_has_the_axes_of_the_pinhole_turned_to_opengl():
     scene = build(cameras=("camera_2", "camera_4"))
-    data = mujoco.MjData(scene.model)
-    mujoco.mj_forward(scene.model, data)
+    model = drawing_model(scene)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
     for camera in scene.cameras:
         axes = data.camera(camera.name).xmat.reshape(3, 3)
         np.testing.assert_allclose(axes, glcam_axes(camera), atol=1e-9)

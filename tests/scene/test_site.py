@@ -1,13 +1,14 @@
 """The construction site: it hides people about as often as the paper's, honestly and cheaply."""
 
+import mujoco
 import numpy as np
 import pytest
 
 from benchmarks.occlusion import hidden_from, random_heads
 from hrc_env.geometry.cameras import project, projections
 from hrc_env.geometry.chains import capsules
-from hrc_env.scene.arm import CAPSULES, arm_chain, capsule_reach_m
-from hrc_env.scene.build import SceneConfig, build
+from hrc_env.scene.arm import CAPSULES, OUT_OF_REACH, arm_chain, capsule_reach_m
+from hrc_env.scene.build import SCENES, SceneConfig, build, drawing_model
 from hrc_env.scene.rig import CameraConfig
 
 SITE = build(name="site")
@@ -69,3 +70,15 @@ def test_the_arm_never_reaches_beyond_the_reach_that_its_pairs_allow_for():
     farthest = np.linalg.norm(ends, axis=-1).max((0, 2)) + chain.capsule_radius_m
     assert len(farthest) == len(CAPSULES)
     assert (farthest <= capsule_reach_m() + 1e-9).all()
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_what_is_said_to_be_out_of_reach_is_met_in_no_pose(scene):
+    model = drawing_model(build(name=scene, n_workers=0))
+    data, rng = mujoco.MjData(model), np.random.default_rng(5)
+    pairs = [(model.geom(f"arm_{a}").id, model.geom(b).id) for a, b in sorted(OUT_OF_REACH)]
+    for q in rng.uniform(*arm_chain(np.eye(4)).range_rad.T, (4000, 6)):
+        data.qpos[:6] = q
+        mujoco.mj_kinematics(model, data)
+        gaps_m = [mujoco.mj_geomDistance(model, data, *pair, 1.0, None) for pair in pairs]
+        assert min(gaps_m) > 0.01
