@@ -33,7 +33,6 @@ from hrc_env.perception.calibration import (
 from hrc_env.perception.emulator_kernel import (
     N_NORMALS,
     N_OF_BODY,
-    Errors,
     Scalars,
     Tables,
     emulate_batch,
@@ -182,13 +181,13 @@ def emulate(
         rng.standard_normal(out=normal)
     written_ns = changed_ns(config.calibration) if config.calibration else 0
     tables, scalars = _settings(config, state.dt_s, written_ns)
-    errors = Errors(
+    errors = (
         state.lasting, state.slow, state.size, state.sure, state.body, state.wander,
         state.happening,
     )  # fmt: skip
     out = Keypoints(np.empty((*shape, 2)), np.empty(shape), np.empty(shape))
     emulate_batch(
-        errors, normals, _world(truth, surroundings), _rig(cameras), tables, scalars,
+        errors, normals, tuple(_world(truth, surroundings)), tuple(_rig(cameras)), tables, scalars,
         out.px, out.confidence, out.sigma_px,
     )  # fmt: skip
     return out
@@ -254,8 +253,11 @@ def _bending(camera: PinholeCamera) -> Floats:
 
 
 @functools.lru_cache(maxsize=16)
-def _settings(config: EmulatorConfig, dt_s: float, written_ns: int) -> tuple[Tables, Scalars]:
-    """A calibration as the kernel takes it; read again if its file has been written anew."""
+def _settings(
+    config: EmulatorConfig, dt_s: float, written_ns: int
+) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+    """A calibration as the kernel takes it: plain tuples of `Tables` and `Scalars`; read again if
+    its file has been written anew."""
     known = config.calibrated()
     confidence = np.clip(known.confidence, 1e-6, 1 - 1e-6)
     of_posture = {name: getattr(known, name) for name in POSTURED}
@@ -277,4 +279,4 @@ def _settings(config: EmulatorConfig, dt_s: float, written_ns: int) -> tuple[Tab
         keep_swap, keep_cross, keep_miss, config.min_joints,
         config.outside_confidence, STATURE_OF_SIDE,
     )  # fmt: skip
-    return tables, scalars
+    return tuple(tables), tuple(scalars)

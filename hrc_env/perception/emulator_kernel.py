@@ -12,7 +12,17 @@ from hrc_env.geometry.sight import make_table
 from hrc_env.perception.calibration import POSTURED, SHAPES
 from hrc_env.perception.noise import error_share
 from hrc_env.perception.outline import facing, mix, posture_of, seen_from, speed
-from hrc_env.perception.sightlines import BEHIND, OUTSIDE, SIDE, TURN, VIEW, fill, see
+from hrc_env.perception.sightlines import (
+    BEHIND,
+    OUTSIDE,
+    SIDE,
+    TURN,
+    VIEW,
+    Rig,
+    World,
+    fill,
+    see,
+)
 from hrc_env.skeleton import JOINT
 from hrc_env.typing import Floats, Ints
 
@@ -128,8 +138,11 @@ class Scalars(NamedTuple):
 def emulate_batch(errors, normals, world, rig, tables, scalars, px, confidence, sigma):
     """Advance the errors by one image and write keypoints.
 
-    `normals` (B, N) are used in the order bodies, then images.
+    `normals` (B, N) are used in the order bodies, then images. `errors`, `world`, `rig`, `tables`
+    and `scalars` are plain tuples of what `Errors` to `Scalars` hold.
     """
+    errors, world, rig = Errors(*errors), World(*world), Rig(*rig)
+    tables, scalars = Tables(*tables), Scalars(*scalars)
     batch, n_cameras, n_workers, n_joints = confidence.shape
     n_body = world.radius.shape[2]
     first_body = len(world.still) + len(world.robot_radius) + world.moving.shape[1]

@@ -10,6 +10,7 @@ the views decide (docs/tracking.md).
 """
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -18,8 +19,8 @@ from hrc_env.skeleton import N_JOINTS
 from hrc_env.tracking.ahead import ahead, mixed
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.hypotheses.filter import predict_all, update_all
-from hrc_env.tracking.hypotheses.mixture import MixtureSettings, estimate_all, mixture_settings
-from hrc_env.tracking.hypotheses.slots import Hypotheses
+from hrc_env.tracking.hypotheses.mixture import estimate_all, mixture_settings
+from hrc_env.tracking.hypotheses.slots import Hypotheses, plain
 from hrc_env.tracking.kalman import KalmanEstimator, motion
 from hrc_env.tracking.measurements import arrays_of
 from hrc_env.tracking.models.acquisition import STANDING_M
@@ -36,13 +37,15 @@ class ParticleEstimator:
     config: TrackerConfig
     single: KalmanEstimator = field(init=False, repr=False)
     """The filter of one hypothesis."""
-    mixture: MixtureSettings = field(init=False, repr=False)
+    constants: tuple[tuple[Any, ...], ...] = field(init=False, repr=False)
+    """Settings of one hypothesis, of the mixture, and its model of noise, as kernels take them."""
 
     def __post_init__(self) -> None:
         """Make what the kernels take, constants."""
         single = KalmanEstimator(self.P, self.ctrl_dt, self.config)
         object.__setattr__(self, "single", single)
-        object.__setattr__(self, "mixture", mixture_settings(self.config))
+        records = (single.settings, mixture_settings(self.config), single.noise)
+        object.__setattr__(self, "constants", tuple(tuple(each) for each in records))
 
     def init(self, batch: int, n_workers: int) -> Hypotheses:
         """Workers whom nobody has seen."""
@@ -65,7 +68,7 @@ class ParticleEstimator:
         """Move every hypothesis by its motion model; draws nothing."""
         del rngs
         model = motion(dt_s, self.config.damping, self.config.root_acceleration)
-        predict_all(state, model, dt_s, self.single.settings, self.mixture)
+        predict_all(plain(state), model, dt_s, *self.constants[:2])
 
     def update(
         self, state: Hypotheses, keypoints: Keypoints, rngs: list[np.random.Generator]
@@ -75,13 +78,12 @@ class ParticleEstimator:
         batch, n_workers = state.n_alive.shape
         shape = (batch, len(self.P), n_workers, N_JOINTS)
         measured = (self.P, *arrays_of(keypoints, shape))
-        constants = (STANDING_M, self.single.settings, self.mixture, self.single.noise)
-        update_all(state, *measured, *constants)
+        update_all(plain(state), *measured, STANDING_M, *self.constants)
 
     def estimate(self, state: Hypotheses) -> PoseEstimate:
         """Mean and covariance of the mixture; ages are the heaviest hypothesis's."""
         told = blank(state.n_alive.shape)
-        estimate_all(state, self.single.settings, told)
+        estimate_all(plain(state), self.constants[0], told)
         return PoseEstimate(*told)
 
     def ahead(self, state: Hypotheses, horizon_s: float) -> PoseEstimate:

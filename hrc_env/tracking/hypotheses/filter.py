@@ -10,13 +10,15 @@ import numpy as np
 from hrc_env.compiled import JIT, LEAN
 from hrc_env.tracking.hypotheses.anatomy import anatomy
 from hrc_env.tracking.hypotheses.branching import branch, is_ambiguous
-from hrc_env.tracking.hypotheses.slots import drop, merge, normalise
+from hrc_env.tracking.hypotheses.mixture import MixtureSettings
+from hrc_env.tracking.hypotheses.slots import drop, hypotheses, merge, normalise
 from hrc_env.tracking.measurements import read_worker
 from hrc_env.tracking.models.acquisition import heading
-from hrc_env.tracking.models.noise import learn_noise, scale_sigma
+from hrc_env.tracking.models.noise import NoiseModel, learn_noise, scale_sigma
 from hrc_env.tracking.models.proposal import contrast_of
 from hrc_env.tracking.models.swaps import undo_swaps
 from hrc_env.tracking.models.upkeep import acquire, grow_older
+from hrc_env.tracking.settings import Settings
 from hrc_env.tracking.tracks import count_up
 from hrc_env.tracking.tree.evidence import log_evidence
 from hrc_env.tracking.tree.filter import condition, follow, keep_positions, look_after, settle
@@ -28,7 +30,9 @@ _TORSO = (1, 2, 7, 8)
 
 @numba.njit(**JIT)
 def predict_all(state, model, dt, s, m):
-    """Let dt [s] pass: hypotheses move and age; `model` as in `tree.predict.predict_tree`."""
+    """Let dt [s] pass: hypotheses move and age; `model` as in `tree.predict.predict_tree`, the rest
+    as in `update_all`."""
+    state, s, m = hypotheses(state), Settings(*s), MixtureSettings(*m)
     work, slots = make_work(0), state.slots
     n_joints = slots.body.shape[2]
     held = (np.empty((n_joints, 3)), np.empty(n_joints))
@@ -92,13 +96,14 @@ def update_all(state, P, px, confidence, sigma_px, standing, s, m, noise):
     """Take one set of frames in.
 
     Args:
-        state: changed in place.
+        state: `slots.plain` of `Hypotheses`, which are changed in place.
         P: (C, 3, 4).
         px, confidence, sigma_px: as in `records.Keypoints`.
         standing: (J, 3) `acquisition.STANDING_M`.
-        s, m: settings.
-        noise: `noise.NoiseModel`.
+        s, m: plain tuples of `Settings` and `MixtureSettings`.
+        noise: of `noise.NoiseModel`.
     """
+    state, s, m, noise = hypotheses(state), Settings(*s), MixtureSettings(*m), NoiseModel(*noise)
     n_batch, n_cameras, n_workers, n_joints = confidence.shape
     z, sigma = np.empty((n_joints, n_cameras, 2)), np.empty((n_joints, n_cameras))
     ok, belief = np.empty((n_joints, n_cameras), np.bool_), np.empty((n_joints, n_cameras))

@@ -5,8 +5,10 @@ from typing import NamedTuple
 
 import numba
 
-from hrc_env.compiled import LEAN
+from hrc_env.compiled import JIT, LEAN
 from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.hypotheses.slots import hypotheses
+from hrc_env.tracking.settings import Settings
 from hrc_env.tracking.tree.reports import tell_moments, tell_rest
 
 _LEAST_EVIDENCE = 0.01
@@ -71,9 +73,10 @@ def mixture_settings(config: TrackerConfig) -> MixtureSettings:
     )
 
 
-@numba.njit(**LEAN)
+@numba.njit(**JIT)
 def estimate_all(state, s, out):
     """Fill the arrays of a `PoseEstimate` in; `state` and `s` as in `hypotheses.filter`."""
+    state, s = hypotheses(state), Settings(*s)
     slots, limit = state.slots, state.log_weight.shape[1] // state.n_alive.shape[1]
     for b in range(state.n_alive.shape[0]):
         for w in range(state.n_alive.shape[1]):

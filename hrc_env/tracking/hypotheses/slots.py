@@ -6,7 +6,7 @@ arrays, so that whatever works on a worker of `kalman` works on a hypothesis.
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -30,6 +30,18 @@ class Hypotheses(NamedTuple):
     """(B, W) slots in use, at least one."""
     waited_s: Floats
     """(B, W) time since other hypotheses were looked for [s]."""
+
+
+def plain(state: Hypotheses) -> tuple[Any, ...]:
+    """Hypotheses as kernels take them."""
+    return tuple(state.slots), *state[1:]
+
+
+@numba.njit(**JIT)
+def hypotheses(state):
+    """The hypotheses that `plain` gave."""
+    slots, log_weight, form, n_alive, waited_s = state
+    return Hypotheses(KalmanState(*slots), log_weight, form, n_alive, waited_s)
 
 
 @numba.njit(**LEAN)
