@@ -22,9 +22,10 @@ class CalibrateKeypoints:
     out: Path = Path("out/keypoints.json")
     """The calibration file; there whole or not at all."""
     quick: bool = False
-    """Each motion once, in one of the scenes: 29 clips instead of 116."""
+    """Each motion in one of the scenes, once (folded bodies four times): 41 clips, not 328."""
     rounds: int | None = None
-    """How often each motion is played in each scene, instead of 2 (0, in one scene, if quick)."""
+    """How often each motion is played in each scene, instead of 4 (0, in one scene, if quick);
+    folded bodies four times as often."""
     seed: int = 0
     """Of places, people and details of the motions."""
     validate: bool = False
@@ -36,7 +37,7 @@ class CalibrateKeypoints:
         from hrc_env.experiments.calibration.run import CalibrationRun, calibrate, compare
         from hrc_env.experiments.calibration.validate import COLUMNS, table_of
 
-        usual = 0 if self.quick else 2
+        usual = 0 if self.quick else 4
         rounds = usual if self.rounds is None else self.rounds
         run = CalibrationRun(rounds=rounds, seed=self.seed)
         console = Console()

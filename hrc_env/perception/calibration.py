@@ -18,13 +18,13 @@ from hrc_env.errors import ConfigError
 from hrc_env.skeleton import JOINTS, MIRROR
 from hrc_env.typing import Floats, Ints
 
-FORMAT, VERSION = "hrc_env keypoints", 4
+FORMAT, VERSION = "hrc_env keypoints", 5
 """Version: what the tables mean. A file of another one is refused."""
 PACKAGED = Path(__file__).with_name("keypoints.json")
 
 KINDS = ("nose", "shoulder", "elbow", "wrist", "hip", "knee", "ankle", "foot")
 """Kinds of joints: left and right err alike, mirrored."""
-POSTURES = ("standing", "walking", "handling", "folded")
+POSTURES = ("standing", "walking", "handling", "folded", "kneeling")
 """Bodies count as each of these by a share (`outline.weigh`)."""
 SIGHTS = ("seen", "hidden", "outside")
 """How a joint is seen: nothing before it, something before it, outside the image."""

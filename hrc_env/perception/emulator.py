@@ -38,7 +38,7 @@ from hrc_env.perception.emulator_kernel import (
     emulate_batch,
 )
 from hrc_env.perception.eyes import STATURE_OF_SIDE
-from hrc_env.perception.sightlines import CENTRE, Rig, World, sight_batch
+from hrc_env.perception.sightlines import CENTRE, N_LOOK, Rig, World, sight_batch
 from hrc_env.records import Keypoints, WorkerTruth
 from hrc_env.skeleton import MIRROR, N_JOINTS
 from hrc_env.typing import Floats, Ints
@@ -199,12 +199,12 @@ def lines_of_sight(
     """How each camera sees each joint and each worker, as the emulator has it.
 
     Returns:
-        (B, C, W, J) `sightlines.SEEN`, `HIDDEN`, `OUTSIDE` or `BEHIND`; (B, C, W, 6) side
-        [px] and turn [rad] of the window, view [rad], folding, handling and stepping.
+        (B, C, W, J) `sightlines.SEEN`, `HIDDEN`, `OUTSIDE` or `BEHIND`; (B, C, W, `N_LOOK`)
+        side [px] and turn [rad] of the window, view [rad], folding, kneeling, handling, stepping.
     """
     batch, n_workers, n_joints = truth.joints_world.shape[:3]
     sight = np.empty((batch, len(cameras), n_workers, n_joints), np.int64)
-    look_of = np.empty((batch, len(cameras), n_workers, 6))
+    look_of = np.empty((batch, len(cameras), n_workers, N_LOOK))
     sight_batch(_world(truth, surroundings), _rig(cameras), sight, look_of)
     return sight, look_of
 

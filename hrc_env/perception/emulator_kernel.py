@@ -14,6 +14,7 @@ from hrc_env.perception.noise import error_share
 from hrc_env.perception.outline import facing, mix, posture_of, seen_from, speed
 from hrc_env.perception.sightlines import (
     BEHIND,
+    N_LOOK,
     OUTSIDE,
     SIDE,
     TURN,
@@ -149,7 +150,7 @@ def emulate_batch(errors, normals, world, rig, tables, scalars, px, confidence, 
     table = make_table(world.still, first_body - len(world.still) + n_workers * n_body)
     view, rows = np.empty((5, len(table))), np.empty(len(table), np.int64)
     uv, depth, state = np.empty((n_joints, 2)), np.empty(n_joints), np.empty(n_joints, np.int64)
-    meant, off, look_of = np.zeros((n_joints, 3)), np.zeros((n_joints, 2)), np.empty(6)
+    meant, off, look_of = np.zeros((n_joints, 3)), np.zeros((n_joints, 2)), np.empty(N_LOOK)
     row = np.empty(tables.by_posture.shape[1])
     here = _parts(row)
     n_bodies = 3 * n_joints * n_workers

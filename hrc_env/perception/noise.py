@@ -11,14 +11,14 @@ import numpy as np
 
 from hrc_env.compiled import LEAN
 from hrc_env.errors import check_shape
-from hrc_env.perception.calibration import KIND, VISIBILITY, read_calibration
+from hrc_env.perception.calibration import KIND, POSTURES, VISIBILITY, read_calibration
 from hrc_env.typing import Floats
 
 ERROR: Floats = read_calibration().sigma
 """(P, K, V) standard deviation of each image coordinate, as a share of stature, for each
 posture and kind of joints (`calibration.KINDS`) at `VISIBILITY`; how it is
 fitted is said in docs/emulator.md."""
-STANDING = (1.0, 0.0, 0.0, 0.0)
+STANDING = (1.0, *(0.0,) * (len(POSTURES) - 1))
 
 
 def sigma_px(

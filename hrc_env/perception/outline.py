@@ -13,6 +13,11 @@ UPRIGHT, FOLDED = 0.15, 0.50
 begins to count as folded, and from where on it counts as folded up. Judgement: who walks is below
 .12, who bends, kneels or squats above .3."""
 
+SQUATS, KNEELS = 0.40, 0.10
+"""How much higher the lower knee is than its ankle, as a share of the shank's length, where a
+folded body begins to count as kneeling, and from where on it does. Judgement: who squats or bends
+is above .5, who has a knee on the ground at 0."""
+
 STANDS_M_S, WALKS_M_S = 0.3, 0.7
 """Mean speeds of the joints from where a body begins to count as walking, and does [m/s]: hands
 that hammer are at the first, people who walk slowly above the second."""
@@ -51,6 +56,17 @@ def folded(joints):
 
 
 @numba.njit(**LEAN)
+def kneeling(joints):
+    """Whether a body (J, 3), if it is folded, has a knee on the ground: 0 not, 1 certainly."""
+    least = 1.0
+    for side in range(2):
+        knee, ankle = 9 + side, 11 + side
+        rise = joints[knee, 2] - joints[ankle, 2]
+        least = min(least, rise / max(_apart(joints, knee, ankle), 1e-9))
+    return min(max((SQUATS - least) / (SQUATS - KNEELS), 0.0), 1.0)
+
+
+@numba.njit(**LEAN)
 def speed(velocity):
     """Mean speed of joints (J, 3) [m/s]."""
     total = 0.0
@@ -79,17 +95,20 @@ def handling(joints):
 
 
 @numba.njit(**LEAN)
-def weigh(folding, hands, steps):
-    """How far a body counts as standing, walking, handling something and folded; together 1."""
+def weigh(folding, kneels, hands, steps):
+    """How far a body counts as standing, walking, handling something, folded over its feet and
+    kneeling; together 1."""
     up = 1.0 - folding
     free = up * (1.0 - hands)
-    return free * (1.0 - steps), free * steps, up * hands, folding
+    folded_up = folding * (1.0 - kneels), folding * kneels
+    return free * (1.0 - steps), free * steps, up * hands, folded_up[0], folded_up[1]
 
 
 @numba.njit(**LEAN)
 def posture_of(joints, velocity):
     """`weigh` of a body's joints (J, 3) [m] and their velocities (J, 3) [m/s]."""
-    return weigh(folded(joints), handling(joints), stepping(speed(velocity)))
+    steps = stepping(speed(velocity))
+    return weigh(folded(joints), kneeling(joints), handling(joints), steps)
 
 
 @numba.njit(**LEAN)

@@ -13,6 +13,7 @@ from hrc_env.perception.outline import (
     facing,
     folded,
     handling,
+    kneeling,
     seen_from,
     speed,
     stepping,
@@ -32,10 +33,10 @@ SEEN, HIDDEN, OUTSIDE, BEHIND = range(4)
 """How a camera sees a joint: nothing before it, something before it, outside the image, behind
 the camera."""
 
-SIDE, TURN, VIEW, FOLDING, HANDLING, STEPPING = range(6)
+SIDE, TURN, VIEW, FOLDING, KNEELING, HANDLING, STEPPING = range(N_LOOK := 7)
 """How a camera sees a worker: side [px] and turn [rad] of the window round them, from where
-(`outline.seen_from`) [rad], how folded they are, whether their hands are busy, whether they
-walk."""
+(`outline.seen_from`) [rad], how folded they are, whether they then kneel, whether their hands are
+busy, whether they walk."""
 
 
 class World(NamedTuple):
@@ -74,7 +75,7 @@ class Rig(NamedTuple):
 
 @numba.njit(**JIT)
 def sight_batch(world, rig, sight, look_of):
-    """Write how joints (B, C, W, J) and workers (B, C, W, 6) are seen; nothing errs."""
+    """Write how joints (B, C, W, J) and workers (B, C, W, `N_LOOK`) are seen; nothing errs."""
     n_workers, n_joints = world.joints.shape[1:3]
     n_body = world.radius.shape[2]
     first_body = len(world.still) + len(world.robot_radius) + world.moving.shape[1]
@@ -94,6 +95,7 @@ def sight_batch(world, rig, sight, look_of):
                 )  # fmt: skip
                 mine[VIEW] = seen_from(joints, front_x, front_y, rig.eyes[c])
                 mine[FOLDING] = folded(joints)
+                mine[KNEELING] = kneeling(joints)
                 mine[HANDLING] = handling(joints)
                 mine[STEPPING] = stepping(speed(world.velocity[b, w]))
 

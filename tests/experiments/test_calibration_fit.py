@@ -5,14 +5,16 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from hrc_env.experiments.calibration.clips import FAMILIES, fit_clips, unseen_clips
+from hrc_env.experiments.calibration.clips import FAMILIES, TIMES, fit_clips, unseen_clips
 from hrc_env.experiments.calibration.fit.fit import fit
 from hrc_env.experiments.calibration.samples import Samples
 from hrc_env.motion.repertoire import REPERTOIRE
 from hrc_env.perception.calibration import INNER, KIND, KINDS, N_VIEWS, NEXT, POSTURES
 
 L, T, C, J = 24, 50, 4, 15
-STANDING, FOLDED = np.eye(len(POSTURES))[[0, -1]]
+STANDING, FOLDED, KNEELING = (
+    np.eye(len(POSTURES))[POSTURES.index(name)] for name in ("standing", "folded", "kneeling")
+)
 HIP, ELBOW = KINDS.index("hip"), KINDS.index("elbow")
 
 
@@ -97,7 +99,7 @@ def test_what_varies_in_space_together_is_found():
             normal[:, :, j] = 0.8 * normal[:, :, NEXT[j]] + 0.6 * normal[:, :, j]
     error, shown = in_space(0.03 * normal)
     posture = np.tile(STANDING, (L, T, 1))
-    posture[L // 3 :] = FOLDED
+    posture[L // 3 :], posture[2 * L // 3 :] = FOLDED, KNEELING
     limb = fit(made(error + white(0.01), shown=shown, posture=posture)).space_limb
     np.testing.assert_allclose(limb[[ELBOW, HIP]], 0.8, atol=0.1)
     assert np.abs(np.delete(limb, [ELBOW, HIP], 0)).max() < 0.2
@@ -136,8 +138,10 @@ def test_how_long_mishaps_last_is_found():
 def test_every_motion_has_a_family_and_unseen_clips_are_others():
     assert sorted(sum(FAMILIES.values(), ())) == sorted(REPERTOIRE)
     ours, others = fit_clips(2, 0), unseen_clips(2, 0)
-    assert len(ours) == len(others) == 4 * len(REPERTOIRE)
-    assert len(fit_clips(0, 0)) == len(REPERTOIRE)
+    once = sum(TIMES.get(family, 1) * len(motions) for family, motions in FAMILIES.items())
+    assert len(ours) == len(others) == 4 * once
+    assert len(fit_clips(0, 0)) == once
+    assert {clip.motion for clip in fit_clips(0, 0)} == set(REPERTOIRE)
     played = {(clip.scene, clip.motion, clip.body) for clip in ours}
     assert sum((c.scene, c.motion, c.body) in played for c in others) < len(others) / 2
     assert not {clip.seed for clip in ours} & {clip.seed for clip in others}

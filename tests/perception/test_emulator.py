@@ -12,7 +12,7 @@ from scipy.stats import multivariate_normal, norm
 from hrc_env.errors import ConfigError
 from hrc_env.geometry.cameras import pinhole, project, projections
 from hrc_env.geometry.sight import Surroundings, nothing
-from hrc_env.perception.calibration import KINDS, N_VIEWS, read_calibration, write_calibration
+from hrc_env.perception.calibration import KINDS, SHAPES, read_calibration, write_calibration
 from hrc_env.perception.emulator import (
     EmulatorConfig,
     emulate,
@@ -143,7 +143,7 @@ def test_who_moves_gets_new_errors_sooner(tmp_path):
 def test_offsets_in_space_are_the_same_in_every_camera(tmp_path):
     hips = np.zeros_like(read_calibration().offset_m)
     hips[:, KINDS.index("hip"), 2] = 0.03  # up
-    config = calibrated(tmp_path, **plain(offset_m=hips, size=np.full((4, 3, 8), 1e-6)))
+    config = calibrated(tmp_path, **plain(offset_m=hips, size=np.full(SHAPES["size"], 1e-6)))
     state, rngs = start(1, config)
     true = truth(1)
     raised = true.joints_world.copy()
@@ -157,7 +157,7 @@ def test_what_cameras_share_goes_along_limbs(tmp_path):
     known = read_calibration()
     limb = np.zeros_like(known.space_limb)
     limb[KINDS.index("knee")] = 0.8
-    still = {"wander_m": np.full_like(known.wander_m, 0.02), "size": np.full((4, 3, 8), 1e-9)}
+    still = {"wander_m": np.full_like(known.wander_m, 0.02), "size": np.full(SHAPES["size"], 1e-9)}
     errors, _ = film(calibrated(tmp_path, **plain(**still, space_limb=limb)), 2, batch=600)
     knee, hip, ankle = (errors[..., JOINT[f"left_{name}"], :] for name in ("knee", "hip", "ankle"))
     together, apart = ((knee * each).mean() / (knee**2).mean() for each in (hip, ankle))
@@ -168,10 +168,10 @@ def test_what_cameras_share_goes_along_limbs(tmp_path):
 def test_what_cameras_share_can_go_far_now_and_then(tmp_path):
     """A vector n of normal variables is lengthened by 1 + tail n.n / 3."""
     wander = np.full_like(read_calibration().wander_m, 0.01)
-    still = {"wander_m": wander, "size": np.full((4, 3, 8), 1e-9), "slow_s": np.array(1e-3)}
+    still = {"wander_m": wander, "size": np.full(SHAPES["size"], 1e-9), "slow_s": np.array(1e-3)}
+    tails = [np.full(SHAPES["tail"], tail) for tail in (0.0, 0.5)]
     plain_tail, long_tail = (
-        film(calibrated(tmp_path, **plain(**still, tail=np.full(4, tail))), 2, batch=300)[0]
-        for tail in (0.0, 0.5)
+        film(calibrated(tmp_path, **plain(**still, tail=tail)), 2, batch=300)[0] for tail in tails
     )
     usual, farther = (np.linalg.norm(each, axis=-1).ravel() for each in (plain_tail, long_tail))
     n2 = np.random.default_rng(0).chisquare(3, 100_000)
@@ -181,7 +181,7 @@ def test_what_cameras_share_can_go_far_now_and_then(tmp_path):
 
 
 def test_who_walks_errs_as_the_file_says_of_who_walks(tmp_path):
-    size = np.full((4, 3, 8), 0.01)
+    size = np.full(SHAPES["size"], 0.01)
     size[1] = 0.03
     config = calibrated(tmp_path, **plain(size=size))
     spread = []
@@ -263,7 +263,7 @@ def test_a_swap_exchanges_left_and_right():
 
 def test_swaps_and_misses_take_their_share_of_the_time_and_last(tmp_path):
     half = {"swap_s": np.full(2, 0.5), "miss_s": np.array(0.5)}
-    known = calibrated(tmp_path, **half, swap_share=np.zeros((4, N_VIEWS, 2)))
+    known = calibrated(tmp_path, **half, swap_share=np.zeros(SHAPES["swap_share"]))
     config = dataclasses.replace(EXACT, calibration=known.calibration, swap_share=0.1)
     config = dataclasses.replace(config, miss_share=0.2)
     state, rngs = start(64, config)

@@ -15,9 +15,9 @@ def test_more_visible_joints_are_surer_and_larger_people_cost_more_pixels():
 
 def test_a_posture_mixes_the_tables():
     seen = np.full(N_JOINTS, 0.9)
-    each = [sigma_px(seen, 1.0, posture) for posture in np.eye(4)]
-    mixed = sigma_px(seen, 1.0, (0.2, 0.3, 0.1, 0.4))
-    np.testing.assert_allclose(mixed, np.dot([0.2, 0.3, 0.1, 0.4], each))
+    each = [sigma_px(seen, 1.0, posture) for posture in np.eye(5)]
+    mixed = sigma_px(seen, 1.0, (0.2, 0.3, 0.1, 0.15, 0.25))
+    np.testing.assert_allclose(mixed, np.dot([0.2, 0.3, 0.1, 0.15, 0.25], each))
 
 
 def test_a_missing_joint_is_no_measurement():

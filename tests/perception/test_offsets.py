@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from people import truth
 
-from hrc_env.perception.calibration import HAND, KIND
+from hrc_env.perception.calibration import HAND, KIND, POSTURES
 from hrc_env.perception.offsets import OFFSET_M, our_joints
 from hrc_env.records import PoseEstimate
 from hrc_env.skeleton import JOINT, N_JOINTS
@@ -39,14 +39,19 @@ def test_who_is_upright_is_put_right(yaw_rad, posture, speed_m_s):
     assert np.abs(said[0, 0] - turned(body, yaw_rad)).max() > 0.01
 
 
-def test_who_is_folded_up_is_moved_by_what_was_found_of_folded_bodies():
+@pytest.mark.parametrize("posture", ["folded", "kneeling"])
+def test_who_is_folded_up_is_moved_by_what_was_found_of_such_bodies(posture):
     body = facing_x()
     upper = [j for j in range(N_JOINTS) if j < JOINT["left_knee"]]
-    body[upper, 2] -= 0.8  # shoulders are no higher than the ankles any more
+    body[upper, 2] -= 1.4  # shoulders are no higher than the ankles any more
+    if posture == "kneeling":
+        body[JOINT["left_knee"], 2] = body[JOINT["left_ankle"], 2]
     told = our_joints(estimate_of(body[None, None])).mean_world[0, 0]
     moved = (body - told)[JOINT["left_hip"]]
     np.testing.assert_allclose(
-        moved[[0, 2]], OFFSET_M[-1, KIND[JOINT["left_hip"]], [0, 2]], atol=1e-3
+        moved[[0, 2]],
+        OFFSET_M[POSTURES.index(posture), KIND[JOINT["left_hip"]], [0, 2]],
+        atol=1e-3,
     )
 
 

@@ -5,10 +5,12 @@ import pytest
 from people import STANDING
 
 from hrc_env.geometry.rotations import about_axis
+from hrc_env.perception.calibration import POSTURES
 from hrc_env.perception.outline import posture_of
 from hrc_env.perception.posture import is_folded
 from hrc_env.skeleton import JOINT
 
+ONLY = np.eye(len(POSTURES))
 UPPER = [JOINT["nose"]] + [
     JOINT[f"{side}_{name}"] for side in ("left", "right") for name in ("shoulder", "elbow", "wrist")
 ]
@@ -64,21 +66,40 @@ def test_an_unknown_body_is_not_folded():
 
 @pytest.mark.parametrize(("speed_m_s", "posture"), [(0.0, 0), (1.2, 1)])
 def test_who_has_nothing_in_their_hands_stands_or_walks(speed_m_s, posture):
-    np.testing.assert_allclose(posture_of(hanging(), moving(speed_m_s)), np.eye(4)[posture])
+    np.testing.assert_allclose(posture_of(hanging(), moving(speed_m_s)), ONLY[posture])
 
 
 @pytest.mark.parametrize("speed_m_s", [0.0, 1.2])
 def test_a_raised_hand_has_something_to_do(speed_m_s):
     body = hanging()
     body[JOINT["right_wrist"], 2] = body[JOINT["right_shoulder"], 2] - 0.2
-    np.testing.assert_allclose(posture_of(body, moving(speed_m_s)), np.eye(4)[2])
+    np.testing.assert_allclose(posture_of(body, moving(speed_m_s)), ONLY[2])
 
 
 def test_who_is_folded_up_is_that_whatever_the_hands_do():
     body = hanging()
     body[UPPER, 2] -= 0.9
     body[JOINT["right_wrist"], 2] += 0.6
-    np.testing.assert_allclose(posture_of(body, moving(1.0)), np.eye(4)[3])
+    np.testing.assert_allclose(posture_of(body, moving(1.0)), ONLY[3])
+
+
+@pytest.mark.parametrize("sides", [("left",), ("right",), ("left", "right")])
+def test_who_is_folded_with_a_knee_on_the_ground_kneels(sides):
+    body = squatting(0.75)
+    for side in sides:
+        knee, ankle = JOINT[f"{side}_knee"], JOINT[f"{side}_ankle"]
+        body[knee, 2] = body[ankle, 2]
+    np.testing.assert_allclose(posture_of(body, moving(0.0)), ONLY[4])
+
+
+def test_who_bends_to_the_floor_with_straight_legs_does_not_kneel():
+    np.testing.assert_allclose(posture_of(bent(120), moving(0.0)), ONLY[3])
+
+
+def test_who_stands_with_a_foot_raised_behind_does_not_kneel():
+    body = hanging()
+    body[JOINT["left_ankle"], 2] = body[JOINT["left_knee"], 2]
+    assert posture_of(body, moving(0.0))[4] < 0.1
 
 
 def hanging():

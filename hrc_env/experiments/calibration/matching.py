@@ -5,14 +5,14 @@ what was measured: sizes, whole bodies that are seen badly, and the error in spa
 with those of the pixels, and corrected by what they are off.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from hrc_env.config import HRCConfig
-from hrc_env.experiments.calibration.clips import FAMILIES, WARM_UP, Clip, family_of
+from hrc_env.experiments.calibration.clips import WARM_UP, Clip
 from hrc_env.experiments.calibration.fit.body import body_spread
 from hrc_env.experiments.calibration.fit.cells import (
     FEW,
@@ -30,7 +30,7 @@ from hrc_env.perception.calibration import Calibration, write_calibration
 from hrc_env.perception.emulator import EmulatorConfig
 from hrc_env.typing import Floats
 
-IN_THE_IMAGE, IN_SPACE = 3, 6
+IN_THE_IMAGE, IN_SPACE = 3, 8
 """Rounds: first errors in the image are matched, then those in space."""
 STEP = (0.75, 1.3)
 """No number changes by more than such a factor in a round."""
@@ -39,7 +39,7 @@ DRAWS = 3
 DAMPED = 0.7
 """Power of the factors in space: what the emulator draws by chance is not to be fitted."""
 OFTEN = 2000
-"""So many joints of a family must have been of a posture to tell of it: some three clips."""
+"""So many joints must have been of a posture to tell of it: some three clips."""
 TOLD_LAGS = (2, 5, 12)
 """Of `LAGS`, in frames: by these it is told how long errors last."""
 Say = Callable[[float, str], None]
@@ -66,7 +66,7 @@ def matched(
         if k < IN_THE_IMAGE:
             draft = _as_in_the_image(draft, wanted, samples_of(emulated))
         else:
-            draft = _as_in_space(draft, clips, pixels, emulated)
+            draft = _as_in_space(draft, pixels, emulated)
     path.unlink()
     return draft
 
@@ -134,37 +134,20 @@ def _limited(factor: Floats | float, trust: Floats | float = 1.0) -> Floats:
     return np.clip(factor, *STEP) ** trust
 
 
-def _as_in_space(
-    draft: Calibration, clips: list[Clip], pixels: list[Watched], emulated: list[Watched]
-) -> Calibration:
+def _as_in_space(draft: Calibration, pixels: list[Watched], emulated: list[Watched]) -> Calibration:
     """All errors scaled by what the tracker's median error is off, posture by posture; tails of
     what cameras share by what is then left of its 95th percentile's."""
     size, wander, tail = draft.size.copy(), draft.wander_m.copy(), draft.tail.copy()
     for posture in range(N_P):
-        off = [
-            np.log(np.percentile(wanted, [50, 95]) / np.percentile(drawn, [50, 95]))
-            for wanted, drawn in _by_family(clips, pixels, emulated, posture)
-        ]
-        if not off:
+        wanted, drawn = _errors_in(pixels, posture), _errors_in(emulated, posture)
+        if min(wanted.size, drawn.size) < OFTEN:
             continue
-        middle, most = np.exp(np.mean(off, 0))  # every family counts the same
-        factor, longer = (_limited(np.array(each**DAMPED)) for each in (middle, most / middle))
+        middle, most = np.percentile(wanted, [50, 95]) / np.percentile(drawn, [50, 95])
+        factor, longer = (_limited(float(each**DAMPED)) for each in (middle, most / middle))
         size[posture] *= factor
         wander[posture] *= factor
         tail[posture] = np.clip(((1 + 3 * tail[posture]) * longer - 1) / 3, 0.0, 1.0)
     return replace(draft, size=size, wander_m=wander, tail=tail)
-
-
-def _by_family(
-    clips: list[Clip], pixels: list[Watched], emulated: list[Watched], posture: int
-) -> Iterator[tuple[Floats, Floats]]:
-    """Errors of pixels and emulator while bodies were of a posture, in families that often are."""
-    for family in FAMILIES:
-        mine = [k for k, clip in enumerate(clips) if family_of(clip.motion) == family]
-        draws = [emulated[k + draw * len(clips)] for k in mine for draw in range(DRAWS)]
-        wanted, drawn = _errors_in([pixels[k] for k in mine], posture), _errors_in(draws, posture)
-        if min(wanted.size, drawn.size) >= OFTEN:
-            yield wanted, drawn
 
 
 def _errors_in(watched: list[Watched], posture: int) -> Floats:

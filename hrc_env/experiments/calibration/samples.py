@@ -10,7 +10,16 @@ from hrc_env.experiments.calibration.watch import Watched
 from hrc_env.perception.calibration import HAND
 from hrc_env.perception.emulator_kernel import FIRST_OF_LEGS
 from hrc_env.perception.outline import weigh
-from hrc_env.perception.sightlines import FOLDING, HANDLING, SEEN, SIDE, STEPPING, TURN, VIEW
+from hrc_env.perception.sightlines import (
+    FOLDING,
+    HANDLING,
+    KNEELING,
+    SEEN,
+    SIDE,
+    STEPPING,
+    TURN,
+    VIEW,
+)
 from hrc_env.skeleton import MIRROR
 from hrc_env.typing import Bools, Floats, Ints
 
@@ -82,7 +91,7 @@ def _samples(clip: Watched) -> Samples:
 def postures_of(clip: Watched) -> Floats:
     """(T, P) how far the body counts as each of `POSTURES`."""
     look_of = clip.look_of[:, 0]
-    columns = look_of[:, [FOLDING, HANDLING, STEPPING]].T
+    columns = look_of[:, [FOLDING, KNEELING, HANDLING, STEPPING]].T
     shares = weigh.py_func(*columns)  # of arrays, not compiled
     return np.stack(shares, -1)
 

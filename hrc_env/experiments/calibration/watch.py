@@ -44,7 +44,7 @@ class Watched:
     sight: Ints
     """(T, C, J) as `perception.emulator.lines_of_sight`."""
     look_of: Floats
-    """(T, C, 5) the same."""
+    """(T, C, `sightlines.N_LOOK`) the same."""
     joints_world: Points3
     """(T, J, 3) [m]."""
     mean_world: Points3

@@ -14,7 +14,7 @@ GROSS = 6.0
 LEAST_M, TOLD_M = 0.002, 0.005
 """What varies in space has at least the first standard deviation; from the second on it can be
 told whether it varies together with the next joint's [m]."""
-FOLDED = POSTURES.index("folded")
+FOLDED_UP = [POSTURES.index(name) for name in ("folded", "kneeling")]
 MOST = 0.95
 """No correlation is closer to 1 or -1."""
 
@@ -41,25 +41,33 @@ def wander_of(samples: Samples, offset: Floats) -> tuple[Floats, Floats]:
     have in common.
 
     Returns:
-        (P, K, 3) standard deviations [m]; (K, 3) correlations with the `NEXT` joint, of folded
-        bodies: others hardly vary in space.
+        (P, K, 3) standard deviations [m]; (K, 3) correlations with the `NEXT` joint, of bodies
+        that are folded up: others hardly vary in space.
     """
     error = samples.error - np.einsum("ltcjka,ltja->ltcjk", samples.shown, _at(samples, offset))
     length, class_ = np.linalg.norm(error, axis=-1), class_of(samples.posture)
-    wander, limb = np.full((N_P, N_K, 3), LEAST_M), np.zeros((N_K, 3))
+    wander, everyone = np.full((N_P, N_K, 3), LEAST_M), np.arange(len(KIND))
     for posture in range(N_P):
         mine = samples.counts & (class_ == posture)
         if mine.sum() < 30:
             wander[posture] = wander[0]
             continue
-        part = np.where(mine[..., None, None], length, np.nan)
-        told = part < GROSS * np.nanmedian(part, axis=(0, 1, 2))
-        everyone = np.arange(len(KIND))
-        variance = _in_common(error, samples.shown, told, everyone, everyone)
+        variance = _in_common(error, samples.shown, _told(length, mine), everyone, everyone)
         wander[posture] = np.maximum(np.sqrt(np.maximum(_by_kind(variance), 0.0)), LEAST_M)
-        if posture == FOLDED:
-            limb = _along_limbs(variance, _in_common(error, samples.shown, told, everyone, NEXT))
-    return wander, limb
+    mine = samples.counts & np.isin(class_, FOLDED_UP)
+    if mine.sum() < 30:
+        return wander, np.zeros((N_K, 3))
+    told = _told(length, mine)
+    own, together = (
+        _in_common(error, samples.shown, told, everyone, other) for other in (everyone, NEXT)
+    )
+    return wander, _along_limbs(own, together)
+
+
+def _told(length: Floats, mine: Bools) -> Bools:
+    """(L, T, C, J) which errors of some samples (L, T) are no gross ones."""
+    part = np.where(mine[..., None, None], length, np.nan)
+    return part < GROSS * np.nanmedian(part, axis=(0, 1, 2))
 
 
 def _in_common(error: Floats, shown: Floats, told: Bools, first: Ints, second: Ints) -> Floats:
