@@ -40,6 +40,11 @@ DAMPED = 0.7
 """Power of the factors in space: what the emulator draws by chance is not to be fitted."""
 OFTEN = 2000
 """So many joints must have been of a posture to tell of it: some three clips."""
+USUAL = 2.366
+"""Median of the square of three normal variables: so much a longer tail adds to the median."""
+TAKEN_BACK = 0.5
+"""How much of what a longer tail adds to the median is taken off at once: by all of it a folded
+body's 95th percentile stays a seventh short, by none of it its median a seventh too large."""
 TOLD_LAGS = (2, 5, 12)
 """Of `LAGS`, in frames: by these it is told how long errors last."""
 Say = Callable[[float, str], None]
@@ -144,9 +149,11 @@ def _as_in_space(draft: Calibration, pixels: list[Watched], emulated: list[Watch
             continue
         middle, most = np.percentile(wanted, [50, 95]) / np.percentile(drawn, [50, 95])
         factor, longer = (_limited(float(each**DAMPED)) for each in (middle, most / middle))
+        grown = np.clip(((1 + 3 * tail[posture]) * longer - 1) / 3, 0.0, 1.0)
+        added = (3 + USUAL * grown) / (3 + USUAL * tail[posture])
         size[posture] *= factor
-        wander[posture] *= factor
-        tail[posture] = np.clip(((1 + 3 * tail[posture]) * longer - 1) / 3, 0.0, 1.0)
+        wander[posture] *= factor / added**TAKEN_BACK
+        tail[posture] = grown
     return replace(draft, size=size, wander_m=wander, tail=tail)
 
 
