@@ -35,10 +35,12 @@ def plot_comparison(path: Path, seen: Compared) -> None:
     sizes.set(
         xscale="log",
         xlim=(0.1, 40),
+        xticks=(0.1, 1, 10),
+        xticklabels=("0.1", "1", "10"),
         xlabel="2D error [% of the window's side]",
         ylabel="share of joints",
     )
-    sizes.legend(fontsize=8)
+    sizes.legend(fontsize=8, loc="upper left")
     for family, style in (("stand", "-"), ("walk", "--")):
         mine = [k for k, clip in enumerate(seen.clips) if family_of(clip.motion) == family]
         for level, colour, name in (
@@ -48,7 +50,7 @@ def plot_comparison(path: Path, seen: Compared) -> None:
             curve = [lasting(level, lag) for lag in LAGS]
             times.plot(np.array(LAGS) * DT_S, curve, style, color=colour, label=f"{name}, {family}")
     times.set(ylim=(0, 1), xlabel="time between [s]", ylabel="correlation of errors (2D)")
-    times.legend(fontsize=8)
+    times.legend(fontsize=8, loc="upper right")
     _bars(space, seen)
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=110)
@@ -65,7 +67,10 @@ def _bars(axis: Any, seen: Compared) -> None:
         axis.bar(at + shift, [1e3 * o.median_m for o in outcomes], 0.36, color=colour, label=name)
         axis.plot(at + shift, [1e3 * o.p95_m for o in outcomes], "_", color=colour, ms=14, mew=3)
     axis.set_xticks(at, names)
-    axis.set(yscale="log", ylabel="3D error after tracking [mm]")
+    marks = (10, 20, 50, 100, 200, 500)
+    axis.set(yscale="log", ylim=(10, 600), ylabel="3D error after tracking [mm]")
+    axis.set_yticks(marks, [str(each) for each in marks])
+    axis.minorticks_off()
     axis.set_title("bars: median; dashes: 95th percentile", fontsize=9)
     axis.legend(fontsize=8)
 
