@@ -8,8 +8,7 @@ environments and of threads. What it says, and in which form, is what gymnasium'
 `SyncVectorEnv` of the same environments says.
 """
 
-import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -37,17 +36,21 @@ from hrc_env.motion.generator import Clip, PeopleConfig
 from hrc_env.outcome import Outcome
 from hrc_env.remote import Remote
 from hrc_env.rewards import RewardConfig
-from hrc_env.shards import Shards, n_cores
+from hrc_env.shards import Shards
 from hrc_env.simulation import Simulation, checked_action
 from hrc_env.stateful import Stateful
 from hrc_env.typing import Bools, Floats, Ints
 from hrc_env.vector_infos import InfoTable, blank, table
-from hrc_env.vector_options import read_options
+from hrc_env.vector_options import (
+    autoreset_of,
+    count_of,
+    read_options,
+    seeds_of,
+    threads_of,
+    time_limit,
+)
 from hrc_env.views import Views
 
-MAX_ENVS = 16_384
-"""More would be gigabytes of filters' states, and no faster."""
-NO_LIMIT = 2**62
 THREADS, PROCESSES = BACKENDS = ("threads", "processes")
 
 Observations = NDArray[np.float32]
@@ -107,8 +110,8 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
             )
         if render_mode is not None and render_mode not in RENDER_MODES:
             raise unknown("render_mode", render_mode, RENDER_MODES)
-        self.num_envs = _whole("num_envs", num_envs, 1, MAX_ENVS)
-        self.autoreset_mode = _mode(autoreset_mode)
+        self.num_envs = count_of(num_envs)
+        self.autoreset_mode = autoreset_of(autoreset_mode)
         self.render_mode = render_mode
         given = with_motions(with_people(resolve(config), people), motions)
         given = with_appearance(given, appearance)
@@ -124,7 +127,7 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
             config=self.config,
         )
         self.shards = _shards(
-            self.num_envs, min(_threads(num_threads), self.num_envs), make, backend
+            self.num_envs, min(threads_of(num_threads), self.num_envs), make, backend
         )
         self.views = [_views_of(part) for part in self.shards.parts]
         self.single_observation_space, self.single_action_space = spaces(self.shards.first)
@@ -137,10 +140,7 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
         }
         self._streams: list[Stream | None] = [None] * self.num_envs
         self._action_shape = (self.num_envs, self.shards.first.n_actions)
-        no_limit = max_episode_steps is None or max_episode_steps == -1
-        self.max_episode_steps = (
-            NO_LIMIT if no_limit else _whole("max_episode_steps", max_episode_steps, 1, NO_LIMIT)
-        )
+        self.max_episode_steps = time_limit(max_episode_steps)
         self._steps = np.zeros(self.num_envs, int)
         self._ended = np.zeros(self.num_envs, bool)
         self._observation: Observations | None = None
@@ -164,7 +164,7 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
             Observations of all environments, and infos of those that started.
         """
         self._refuse_closed()
-        seeds = self._seeds_of(seed)
+        seeds = seeds_of(seed, self.num_envs)
         mask, elapsed_steps = read_options(options, self.num_envs, self.max_episode_steps)
         if self._observation is None and not mask.all():
             raise ConfigError("The first reset() must be for everyone: leave out the reset_mask.")
@@ -285,23 +285,6 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
         if self.closed:
             raise ConfigError("This vector environment is closed; make a new one.")
 
-    def _seeds_of(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
-        """A seed, or None, for each environment."""
-        if seed is None:
-            return [None] * self.num_envs
-        if isinstance(seed, (int, np.integer)):
-            seed = [int(seed) + k for k in range(self.num_envs)]
-        given = list(seed) if isinstance(seed, Iterable) else [seed]
-        valid = [
-            each is None or (isinstance(each, (int, np.integer)) and each >= 0) for each in given
-        ]
-        if len(given) != self.num_envs or not all(valid):
-            raise ConfigError(
-                f"seed must be a whole number >= 0 or a list of {self.num_envs} of them (None "
-                f"goes on with that environment's stream), got {seed!r}."
-            )
-        return [None if each is None else int(each) for each in given]
-
 
 def _finals(observation: Observations, info: InfoTable, who: Bools) -> dict[str, Any]:
     """The last observations and infos of the episodes of environments `who` (B,)."""
@@ -314,21 +297,6 @@ def _finals(observation: Observations, info: InfoTable, who: Bools) -> dict[str,
         "final_info": info.arrays(who),
         "_final_info": who.copy(),
     }
-
-
-def _whole(what: str, value: Any, low: int, high: int) -> int:
-    """A whole number in [low, high]."""
-    is_whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
-    if not is_whole or not low <= value <= high:
-        raise ConfigError(f"{what} must be a whole number from {low} to {high}, got {value!r}.")
-    return int(value)
-
-
-def _mode(mode: str | AutoresetMode) -> AutoresetMode:
-    names = [each.value for each in AutoresetMode]
-    if not isinstance(mode, AutoresetMode) and mode not in names:
-        raise unknown("autoreset_mode", mode, names)
-    return AutoresetMode(mode)
 
 
 def _shards(
@@ -344,17 +312,3 @@ def _shards(
 
 def _views_of(part: Simulation | Remote) -> Views | Remote:
     return part if isinstance(part, Remote) else Views(part)
-
-
-def _threads(num_threads: int | None) -> int:
-    """How many threads to use: as many as cores, unless a number was given."""
-    cores = n_cores()
-    if num_threads is None:
-        return cores
-    n_threads = _whole("num_threads", num_threads, 1, MAX_ENVS)
-    if n_threads > cores:
-        warnings.warn(
-            f"num_threads={n_threads} on {cores} cores: results are the same, and later.",
-            stacklevel=3,
-        )
-    return n_threads

@@ -1,14 +1,70 @@
-"""What `reset(options=...)` of the vector environment understands."""
+"""What the vector environment's arguments, and those of its `reset`, mean."""
 
-from collections.abc import Mapping
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from gymnasium.vector import AutoresetMode
 
 from hrc_env.errors import ConfigError, check_shape, unknown
+from hrc_env.shards import n_cores
 from hrc_env.typing import Bools, Ints
 
+MAX_ENVS = 16_384
+"""More would be gigabytes of filters' states, and no faster."""
+NO_LIMIT = 2**62
 RESET_OPTIONS = ("reset_mask", "elapsed_steps")
+
+
+def count_of(num_envs: Any) -> int:
+    """How many environments."""
+    return _whole("num_envs", num_envs, 1, MAX_ENVS)
+
+
+def time_limit(max_episode_steps: int | None) -> int:
+    """Steps of an episode; None and -1 are as good as infinitely many."""
+    if max_episode_steps is None or max_episode_steps == -1:
+        return NO_LIMIT
+    return _whole("max_episode_steps", max_episode_steps, 1, NO_LIMIT)
+
+
+def autoreset_of(mode: str | AutoresetMode) -> AutoresetMode:
+    """When environments start anew."""
+    names = [each.value for each in AutoresetMode]
+    if not isinstance(mode, AutoresetMode) and mode not in names:
+        raise unknown("autoreset_mode", mode, names)
+    return AutoresetMode(mode)
+
+
+def threads_of(num_threads: int | None) -> int:
+    """How many threads to use: as many as cores, unless a number was given."""
+    cores = n_cores()
+    if num_threads is None:
+        return cores
+    n_threads = _whole("num_threads", num_threads, 1, MAX_ENVS)
+    if n_threads > cores:
+        warnings.warn(
+            f"num_threads={n_threads} on {cores} cores: results are the same, and later.",
+            stacklevel=3,
+        )
+    return n_threads
+
+
+def seeds_of(seed: int | Sequence[int | None] | None, num_envs: int) -> list[int | None]:
+    """A seed, or None, for each environment."""
+    if seed is None:
+        return [None] * num_envs
+    if isinstance(seed, (int, np.integer)):
+        seed = [int(seed) + k for k in range(num_envs)]
+    given = list(seed) if isinstance(seed, Iterable) else [seed]
+    valid = [each is None or (isinstance(each, (int, np.integer)) and each >= 0) for each in given]
+    if len(given) != num_envs or not all(valid):
+        raise ConfigError(
+            f"seed must be a whole number >= 0 or a list of {num_envs} of them (None "
+            f"goes on with that environment's stream), got {seed!r}."
+        )
+    return [None if each is None else int(each) for each in given]
 
 
 def read_options(
@@ -49,3 +105,11 @@ def _elapsed(elapsed_steps: Any, num_envs: int, max_episode_steps: int) -> Ints:
             f"{max_episode_steps - 1}, got {elapsed_steps!r}."
         )
     return steps
+
+
+def _whole(what: str, value: Any, low: int, high: int) -> int:
+    """A whole number in [low, high]."""
+    is_whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    if not is_whole or not low <= value <= high:
+        raise ConfigError(f"{what} must be a whole number from {low} to {high}, got {value!r}.")
+    return int(value)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import hrc_env  # noqa: F401  registers the ids
-from hrc_env import shards, vector_env, vector_factory
+from hrc_env import shards, vector_factory, vector_options
 from hrc_env.errors import ConfigError, HRCError
 from hrc_env.vector_env import HRCVectorEnv
 
@@ -34,7 +34,7 @@ def test_bad_arguments(kwargs, said):
 
 
 def test_more_threads_than_cores_or_environments_warn_and_work(monkeypatch):
-    monkeypatch.setattr(vector_env, "n_cores", lambda: 2)
+    monkeypatch.setattr(vector_options, "n_cores", lambda: 2)
     with pytest.warns(UserWarning, match="num_threads=5 on 2 cores"):
         env = HRCVectorEnv(3, perception="none", num_threads=5)
     assert len(env.shards.parts) == 3
