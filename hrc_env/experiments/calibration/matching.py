@@ -5,7 +5,7 @@ what was measured: sizes, whole bodies that are seen badly, and the error in spa
 with those of the pixels, and corrected by what they are off.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -30,21 +30,22 @@ from hrc_env.perception.calibration import Calibration, write_calibration
 from hrc_env.perception.emulator import EmulatorConfig
 from hrc_env.typing import Floats
 
-IN_THE_IMAGE, IN_SPACE = 3, 8
-"""Rounds: first errors in the image are matched, then those in space."""
+IN_THE_IMAGE, IN_SPACE = 3, 7
+"""Rounds: first errors in the image are matched, then those in space; in one more their scale."""
 STEP = (0.75, 1.3)
 """No number changes by more than such a factor in a round."""
 DRAWS = 3
 """How often the emulator plays every clip in a round."""
 DAMPED = 0.7
 """Power of the factors in space: what the emulator draws by chance is not to be fitted."""
+THROUGH_THE_TRACKER = 1.5
+"""Power of the factors of tails: of a longer tail no more than a half gets past the tracker."""
 OFTEN = 2000
 """So many joints must have been of a posture to tell of it: some three clips."""
 USUAL = 2.366
 """Median of the square of three normal variables: so much a longer tail adds to the median."""
 TAKEN_BACK = 0.5
-"""How much of what a longer tail adds to the median is taken off at once: by all of it a folded
-body's 95th percentile stays a seventh short, by none of it its median a seventh too large."""
+"""How much of what a longer tail adds to the median is taken off at once, before it is measured."""
 TOLD_LAGS = (2, 5, 12)
 """Of `LAGS`, in frames: by these it is told how long errors last."""
 Say = Callable[[float, str], None]
@@ -63,15 +64,17 @@ def matched(
         path: a file that may be written while this runs.
         say: hears of the progress: shares that sum to 1.
     """
-    wanted, n_rounds = samples_of(pixels), IN_THE_IMAGE + IN_SPACE
+    wanted, n_rounds = samples_of(pixels), IN_THE_IMAGE + IN_SPACE + 1
     for k in range(n_rounds):
         write_calibration(path, draft, {})
         part = 1 / n_rounds / DRAWS / len(clips)
         emulated = _emulated(clips, path, lambda part=part: say(part, "emulator"))
         if k < IN_THE_IMAGE:
             draft = _as_in_the_image(draft, wanted, samples_of(emulated))
-        else:
+        elif k < IN_THE_IMAGE + IN_SPACE:
             draft = _as_in_space(draft, pixels, emulated)
+        else:
+            draft = _scaled(draft, pixels, emulated)
     path.unlink()
     return draft
 
@@ -143,18 +146,34 @@ def _as_in_space(draft: Calibration, pixels: list[Watched], emulated: list[Watch
     """All errors scaled by what the tracker's median error is off, posture by posture; tails of
     what cameras share by what is then left of its 95th percentile's."""
     size, wander, tail = draft.size.copy(), draft.wander_m.copy(), draft.tail.copy()
-    for posture in range(N_P):
-        wanted, drawn = _errors_in(pixels, posture), _errors_in(emulated, posture)
-        if min(wanted.size, drawn.size) < OFTEN:
-            continue
-        middle, most = np.percentile(wanted, [50, 95]) / np.percentile(drawn, [50, 95])
-        factor, longer = (_limited(float(each**DAMPED)) for each in (middle, most / middle))
+    for posture, middle, most in _off(pixels, emulated):
+        factor = _limited(middle**DAMPED)
+        longer = float(_limited((most / middle) ** THROUGH_THE_TRACKER))
         grown = np.clip(((1 + 3 * tail[posture]) * longer - 1) / 3, 0.0, 1.0)
         added = (3 + USUAL * grown) / (3 + USUAL * tail[posture])
         size[posture] *= factor
         wander[posture] *= factor / added**TAKEN_BACK
         tail[posture] = grown
     return replace(draft, size=size, wander_m=wander, tail=tail)
+
+
+def _scaled(draft: Calibration, pixels: list[Watched], emulated: list[Watched]) -> Calibration:
+    """All errors scaled by what the growing tails have left of the medians' difference."""
+    size, wander = draft.size.copy(), draft.wander_m.copy()
+    for posture, middle, _ in _off(pixels, emulated):
+        size[posture] *= middle
+        wander[posture] *= middle
+    return replace(draft, size=size, wander_m=wander)
+
+
+def _off(pixels: list[Watched], emulated: list[Watched]) -> Iterator[tuple[int, float, float]]:
+    """For each posture of which there is enough: it, and factors by which median and 95th
+    percentile of the tracker's errors would have to grow."""
+    for posture in range(N_P):
+        wanted, drawn = _errors_in(pixels, posture), _errors_in(emulated, posture)
+        if min(wanted.size, drawn.size) >= OFTEN:
+            middle, most = np.percentile(wanted, [50, 95]) / np.percentile(drawn, [50, 95])
+            yield posture, float(middle), float(most)
 
 
 def _errors_in(watched: list[Watched], posture: int) -> Floats:

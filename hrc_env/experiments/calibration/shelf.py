@@ -10,6 +10,8 @@ from hrc_env.config import HRCConfig
 from hrc_env.experiments.calibration.clips import Clip
 from hrc_env.experiments.calibration.watch import Watched, load, save, watch
 from hrc_env.experiments.study.shelf import fingerprint_of
+from hrc_env.perception.noise import ERROR
+from hrc_env.perception.offsets import OFFSET_M
 
 
 def kept(
@@ -17,12 +19,15 @@ def kept(
 ) -> Iterator[Watched]:
     """What a level saw of clips, from the folder where it is there, else played and put there.
 
-    What other code or settings saw does not count.
+    What other code or settings saw does not count, nor what was seen when the tracker was told
+    other deviations or offsets of joints.
     """
     if folder is None:
         yield from watch(level, clips, config)
         return
-    code = fingerprint_of({"level": level, "eyes": asdict(config.eyes)}, "calibration")
+    told = hashlib.sha256(ERROR.tobytes() + OFFSET_M.tobytes()).hexdigest()
+    settings = {"level": level, "eyes": asdict(config.eyes), "told": told}
+    code = fingerprint_of(settings, "calibration")
     paths = [folder / f"{_name(clip, code)}.npz" for clip in clips]
     todo = [clip for clip, path in zip(clips, paths, strict=True) if not path.exists()]
     fresh = watch(level, todo, config)
