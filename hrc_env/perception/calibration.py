@@ -121,8 +121,10 @@ POSTURED = (
 )  # fmt: skip
 """Tables that are given for each posture."""
 _POSITIVE = ("size", "slow_s", "slow_m", "swap_s", "miss_s", "sigma")
-_SHARES = ("tail", "common", "shares", "confidence", "swap_share", "miss_share")
+_SHARES = ("common", "shares", "confidence", "swap_share", "miss_share")
 _CORRELATIONS = ("limb", "space_limb", "follows")
+LONGEST_TAIL = 3.0
+"""A vector of normal variables n grows by 1 + n.n then, to almost n's cube."""
 _RENEW = "make a new one with: python -m hrc_env calibrate-keypoints --out FILE"
 
 
@@ -191,6 +193,7 @@ def _table(name: str, value: Any, where: str) -> Floats:
     expected = f"finite numbers of shape {SHAPES[name]}"
     for names, low, high in (
         (_POSITIVE, 1e-9, np.inf), (_SHARES, 0.0, 1.0), (_CORRELATIONS, -1.0, 1.0),
+        (("tail",), 0.0, LONGEST_TAIL),
     ):  # fmt: skip
         if good and name in names and not (low <= array.min() and array.max() <= high):
             good, expected = False, f"numbers from {low:g} to {high:g}"

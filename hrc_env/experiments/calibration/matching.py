@@ -26,7 +26,7 @@ from hrc_env.experiments.calibration.fit.cells import (
 from hrc_env.experiments.calibration.fit.lasting import LAGS, add_lagged
 from hrc_env.experiments.calibration.samples import Samples, postures_of, samples_of
 from hrc_env.experiments.calibration.watch import Watched, watch
-from hrc_env.perception.calibration import Calibration, write_calibration
+from hrc_env.perception.calibration import LONGEST_TAIL, Calibration, write_calibration
 from hrc_env.perception.emulator import EmulatorConfig
 from hrc_env.typing import Floats
 
@@ -149,7 +149,7 @@ def _as_in_space(draft: Calibration, pixels: list[Watched], emulated: list[Watch
     for posture, middle, most in _off(pixels, emulated):
         factor = _limited(middle**DAMPED)
         longer = float(_limited((most / middle) ** THROUGH_THE_TRACKER))
-        grown = np.clip(((1 + 3 * tail[posture]) * longer - 1) / 3, 0.0, 1.0)
+        grown = np.clip(((1 + 3 * tail[posture]) * longer - 1) / 3, 0.0, LONGEST_TAIL)
         added = (3 + USUAL * grown) / (3 + USUAL * tail[posture])
         size[posture] *= factor
         wander[posture] *= factor / added**TAKEN_BACK
