@@ -6,10 +6,18 @@ import numpy as np
 import pytest
 
 from hrc_env.config import HRCConfig
+from hrc_env.experiments.calibration import validate
 from hrc_env.experiments.calibration.clips import family_of, fit_clips
 from hrc_env.experiments.calibration.matching import matched
 from hrc_env.experiments.calibration.samples import postures_of, samples_of
-from hrc_env.experiments.calibration.validate import errors_in_image, lasting, outcome
+from hrc_env.experiments.calibration.validate import (
+    Compared,
+    by_family,
+    error_ratios,
+    errors_in_image,
+    lasting,
+    outcome,
+)
 from hrc_env.experiments.calibration.watch import watch
 from hrc_env.perception.calibration import POSTURES, read_calibration, write_calibration
 from hrc_env.perception.emulator import EmulatorConfig
@@ -54,6 +62,24 @@ def test_a_file_that_is_written_anew_is_read_anew(tmp_path):
         for calibration in (known, replace(known, size=3.0 * known.size))
     )
     assert large > 1.8 * small
+
+
+def test_ratios_of_errors_have_intervals_over_clips(played, monkeypatch):
+    twice = [
+        [replace(each, mean_world=2.0 * each.mean_world - each.joints_world)] * 2 for each in played
+    ]
+    families = by_family(CLIPS, [[each] for each in played], twice)
+    seen = Compared(CLIPS, played, twice, families)
+    monkeypatch.setattr(validate, "compared", lambda *_: seen)
+    metrics = error_ratios()
+    for family in families:
+        for name in (f"emulator_error_ratio.{family}", f"emulator_error_ratio.{family}.p95"):
+            exact = [metrics[name].value, metrics[name].low, metrics[name].high]
+            np.testing.assert_allclose(exact, 2.0, rtol=0.05)
+        less = metrics[f"emulator_coverage_difference.{family}"]
+        pixels, emulated = families[family]
+        assert less.value == pytest.approx(emulated.coverage - pixels.coverage)
+        assert less.low <= less.value <= less.high < 0.0
 
 
 def test_errors_that_are_too_small_and_too_short_are_mended(played, tmp_path):

@@ -98,7 +98,7 @@ def test_the_report_has_a_row_for_every_fault_that_was_played():
     assert "| `lost` | 2.00" in said
     assert "| `glare` | 2.00" in said
     assert "`defocus`" not in said
-    assert "| walk | 1.10 | 0.90 | +1.100 | 9 |" in said
+    assert "| walk | 1.10 (1.00-1.20) | 0.90 (0.90-1.00) | +1.100 (+1.000 to +1.200) | 9 |" in said
 
 
 def test_distances_are_rows_in_order():

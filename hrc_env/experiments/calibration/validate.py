@@ -16,7 +16,7 @@ from hrc_env.experiments.calibration.shelf import kept
 from hrc_env.experiments.calibration.watch import Watched, watch
 from hrc_env.perception.sightlines import SEEN
 from hrc_env.results import Metric
-from hrc_env.typing import Floats
+from hrc_env.typing import Bools, Floats, Ints
 
 CHI2_95_3D = 7.815
 """95 % of a three-dimensional normal variable lies within this squared distance."""
@@ -24,8 +24,12 @@ HALF_SEEN = 8
 """So many joints of 15."""
 DRAWS = 4
 """How often the emulator plays a clip."""
+RESAMPLES = 200
+"""Draws of clips for an interval."""
 Say = Callable[[float, str], None]
 """Told by how much the share that is done grew, and what is being done."""
+InSpace = tuple[Floats, Bools]
+"""(N,) errors of joints [m], and whether they are within the reported region."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,20 +89,41 @@ def error_ratios(
 
     Returns:
         `emulator_error_ratio.<family>` for medians, `.<family>.p95`, and
-        `emulator_coverage_difference.<family>`: low and high are the two levels' own numbers.
+        `emulator_coverage_difference.<family>`; their 95 % intervals draw clips anew.
     """
     seen = compared(rounds, seed, say, config or HRCConfig(), store)
+    pixels = [_in_space([each]) for each in seen.pixels]
+    emulated = [_in_space(each) for each in seen.emulated]
     metrics: dict[str, Metric] = {}
-    for family, (pixels, emulated) in seen.outcomes.items():
-        for key, a, b in (
-            (f"emulator_error_ratio.{family}", pixels.median_m, emulated.median_m),
-            (f"emulator_error_ratio.{family}.p95", pixels.p95_m, emulated.p95_m),
-        ):
-            metrics[key] = Metric(b / a, min(a, b), max(a, b), "", pixels.n)
-        a, b = pixels.coverage, emulated.coverage
-        key = f"emulator_coverage_difference.{family}"
-        metrics[key] = Metric(b - a, min(a, b), max(a, b), "", pixels.n)
+    for family in seen.outcomes:
+        mine = _of_family(seen.clips, family)
+        metrics |= _apart(family, [pixels[k] for k in mine], [emulated[k] for k in mine])
     return metrics
+
+
+def _apart(
+    family: str, pixels: Sequence[InSpace], emulated: Sequence[InSpace]
+) -> dict[str, Metric]:
+    """How far both levels are apart on K clips of a family."""
+    draws, n = np.random.default_rng(0), len(pixels)
+
+    def apart(ks: Ints) -> list[float]:
+        (a, a_inside), (b, b_inside) = (
+            [np.concatenate(part) for part in zip(*(level[k] for k in ks.tolist()), strict=True)]
+            for level in (pixels, emulated)
+        )
+        ratios = np.percentile(b, [50, 95]) / np.percentile(a, [50, 95])
+        return [*ratios.tolist(), float(b_inside.mean() - a_inside.mean())]
+
+    again = [apart(draws.integers(0, n, n)) for _ in range(RESAMPLES)]
+    lows, highs = np.percentile(again, [2.5, 97.5], axis=0).tolist()
+    ratio = f"emulator_error_ratio.{family}"
+    names = (ratio, f"{ratio}.p95", f"emulator_coverage_difference.{family}")
+    n_joints = sum(error.size for error, _ in pixels)
+    return {
+        name: Metric(value, low, high, "", n_joints)
+        for name, value, low, high in zip(names, apart(np.arange(n)), lows, highs, strict=True)
+    }
 
 
 def compared(rounds: int, seed: int, say: Say, config: HRCConfig, store: Path | None) -> Compared:
@@ -124,16 +149,21 @@ def by_family(
     """Outcomes of both levels for each family that occurs, and for "all"."""
     result = {}
     for family in (*FAMILIES, "all"):
-        mine = [k for k, clip in enumerate(clips) if family in ("all", family_of(clip.motion))]
+        mine = _of_family(clips, family)
         if mine:
             parts = [[each for k in mine for each in level[k]] for level in (pixels, emulated)]
             result[family] = (outcome(parts[0]), outcome(parts[1]))
     return result
 
 
+def _of_family(clips: Sequence[Clip], family: str) -> list[int]:
+    """Which of the clips are of a family; of "all" every one is."""
+    return [k for k, clip in enumerate(clips) if family in ("all", family_of(clip.motion))]
+
+
 def outcome(watched: Sequence[Watched]) -> Outcome:
     """Numbers of some clips."""
-    error, inside = (np.concatenate(part) for part in zip(*map(_in_space, watched), strict=True))
+    error, inside = _in_space(watched)
     px = np.concatenate([errors_in_image(each).ravel() for each in watched])
     px = px[np.isfinite(px)]
     looked = np.concatenate(
@@ -148,14 +178,18 @@ def outcome(watched: Sequence[Watched]) -> Outcome:
     )  # fmt: skip
 
 
-def _in_space(watched: Watched) -> tuple[Floats, Floats]:
+def _in_space(watched: Sequence[Watched]) -> InSpace:
     """Errors of the tracked joints [m], and whether the reported region held them."""
-    tracked = np.flatnonzero(watched.tracked[WARM_UP:]) + WARM_UP
-    offset = (watched.mean_world - watched.joints_world)[tracked]
-    squared = np.einsum(
-        "tji,tjik,tjk->tj", offset, np.linalg.inv(watched.cov_world[tracked]), offset
-    )
-    return np.linalg.norm(offset, axis=-1).ravel(), (squared < CHI2_95_3D).ravel()
+    errors, inside = [], []
+    for each in watched:
+        tracked = np.flatnonzero(each.tracked[WARM_UP:]) + WARM_UP
+        offset = (each.mean_world - each.joints_world)[tracked]
+        squared = np.einsum(
+            "tji,tjik,tjk->tj", offset, np.linalg.inv(each.cov_world[tracked]), offset
+        )
+        errors.append(np.linalg.norm(offset, axis=-1).ravel())
+        inside.append((squared < CHI2_95_3D).ravel())
+    return np.concatenate(errors), np.concatenate(inside)
 
 
 def errors_in_image(watched: Watched) -> Floats:

@@ -158,7 +158,7 @@ def _loops(metrics: _Metrics) -> str:
                 str(metrics[f"error_m.{name}.median"].n),
             ]
         )
-    header = ["", "median [mm]", "p95 [mm]", "coverage", "std/error", "steps lost", "episodes"]
+    header = ["", "median [mm]", "p95 [mm]", "coverage", "std/error", "steps lost", "joints"]
     return _table(header, lines)
 
 
@@ -180,8 +180,10 @@ def _emulator(metrics: _Metrics) -> str:
         ratio = metrics[f"emulator_error_ratio.{family}"]
         p95 = metrics[f"emulator_error_ratio.{family}.p95"]
         apart = metrics[f"emulator_coverage_difference.{family}"]
-        cells = (_cell(ratio, 1, 2), _cell(p95, 1, 2), f"{apart.value:+.3f}", str(ratio.n))
-        lines.append([family, *cells])
+        coverage = f"{apart.value:+.3f} ({apart.low:+.3f} to {apart.high:+.3f})"
+        lines.append(
+            [family, _cell(ratio, 1, 2, True), _cell(p95, 1, 2, True), coverage, str(ratio.n)]
+        )
     return _table(["", "median", "p95", "coverage less pixels'", "joints"], lines)
 
 
