@@ -39,7 +39,7 @@ DRAWS = 3
 DAMPED = 0.7
 """Power of the factors in space: what the emulator draws by chance is not to be fitted."""
 THROUGH_THE_TRACKER = 1.5
-"""Power of the factors of tails, chosen by trial: with `DAMPED` they were still short at the end."""
+"""Power of the factors of tails, chosen by trial: with `DAMPED` they were short at the end."""
 OFTEN = 2000
 """So many joints must have been of a posture to tell of it: some three clips."""
 USUAL = 2.366
