@@ -12,33 +12,33 @@ N_NUMBERS = 5
 """Shift along u and v, growth, turn, all in radians or shares; delay [s]."""
 KEPT = 0.96
 """Share of the evidence that is kept from sample to sample: it is forgotten within 10 s."""
-NAMED_AT, CLEARED_AT = 12.0, 6.0
+NAMED_AT, CLEARED_AT = 7.0, 3.5
 """A camera is named when its ratio exceeds the one, and cleared when it is below the other."""
 DECIDED = 1.3
 """And only if it is so many times every other's: what is wrong with one camera shows, less, in what
 all others say."""
+SHIFT_COSTS, TURN_COSTS = 3.0, 7.0
+"""So much more than growth alone, shift and growth have to explain, and all with the turn: more
+numbers explain more where nothing is wrong, and a body that leans looks like a turn."""
 LEAST_CONFIDENCE = 0.5
-"""Of both joints of a point."""
-PERSISTENCE = 2.0
-"""Factor on the detector's variance: samples are not independent."""
-CAUCHY = 1.4
+CAUCHY = 0.7
 """Deviations at which a residual has half its weight (Cauchy): no view, however far off, says more
 than a bounded amount, and many have to agree. A detector that sees a whole body badly is far off
-in all directions."""
+in all directions, one that exchanges left and right in two that cancel."""
 LEAST_VIEWS = 3
 LEAST_DEPTH_M = 0.3
 U, V, WEIGHT, DU, DV = 0, 1, 2, 3, 4
 JACOBIAN = 5
 PLACE = 11
 N_VIEW = 13
-"""One view of a point: residual (2), weight, velocity in the image (2), slope on the point
+"""One view of a joint: residual (2), weight, velocity in the image (2), slope on the joint
 (2 x 3), pixel (2)."""
 
 
 @numba.njit(**JIT)
 def gather(
     information, score, ratio, suspected, due, ids, px, confidence, sigma_px, age_s,
-    mean, velocity, tracked, P, axes, points, prior, allowed,
+    mean, velocity, tracked, P, axes, prior, allowed,
 ):  # fmt: skip
     """Take a sample of rows `due`, environments `ids[due]`; arguments as of `calibration_watch`."""
     n_cameras = len(P)
@@ -54,12 +54,12 @@ def gather(
         for w in range(tracked.shape[1]):
             if not tracked[row, w]:
                 continue
-            for k in range(len(points)):
+            for j in range(mean.shape[2]):
                 n = 0
                 for c in range(n_cameras):
                     seen[c] = _view(
-                        px[row, c, w], confidence[row, c, w], sigma_px[row, c, w], age_s[row, c],
-                        mean[row, w], velocity[row, w], points[k, 0], points[k, 1], P[c], view[c],
+                        px[row, c, w, j], confidence[row, c, w, j], sigma_px[row, c, w, j],
+                        age_s[row, c], mean[row, w, j], velocity[row, w, j], P[c], view[c],
                     )  # fmt: skip
                     n += seen[c]
                 if n >= LEAST_VIEWS:
@@ -70,24 +70,17 @@ def gather(
 
 
 @numba.njit(**LEAN)
-def _view(px, confidence, sigma_px, age_s, mean, velocity, first, second, p, out):
-    """Write one camera's view of a point; whether there is one."""
-    if not (confidence[first] >= LEAST_CONFIDENCE and confidence[second] >= LEAST_CONFIDENCE):
+def _view(px, confidence, sigma_px, age_s, mean, velocity, p, out):
+    """Write one camera's view of a joint; whether there is one."""
+    if not confidence >= LEAST_CONFIDENCE:
         return False
-    x = 0.5 * (mean[first, 0] + mean[second, 0])
-    y = 0.5 * (mean[first, 1] + mean[second, 1])
-    z = 0.5 * (mean[first, 2] + mean[second, 2])
-    dx = 0.5 * (velocity[first, 0] + velocity[second, 0])
-    dy = 0.5 * (velocity[first, 1] + velocity[second, 1])
-    dz = 0.5 * (velocity[first, 2] + velocity[second, 2])
-    u, v, depth = pixel_of(p, x - age_s * dx, y - age_s * dy, z - age_s * dz)
-    out[U] = 0.5 * (px[first, 0] + px[second, 0]) - u
-    out[V] = 0.5 * (px[first, 1] + px[second, 1]) - v
-    variance = 0.5 * PERSISTENCE * (sigma_px[first] ** 2 + sigma_px[second] ** 2)
-    squares = (out[U] ** 2 + out[V] ** 2) / variance
+    dx, dy, dz = velocity
+    u, v, depth = pixel_of(p, mean[0] - age_s * dx, mean[1] - age_s * dy, mean[2] - age_s * dz)
+    out[U], out[V] = px[0] - u, px[1] - v
+    squares = (out[U] ** 2 + out[V] ** 2) / sigma_px**2
     if not (depth > LEAST_DEPTH_M and math.isfinite(squares)):
         return False
-    out[WEIGHT] = 1.0 / (variance * (1.0 + squares / CAUCHY**2))
+    out[WEIGHT] = 1.0 / (sigma_px**2 * (1.0 + squares / CAUCHY**2))
     for i in range(3):
         out[JACOBIAN + i] = (p[0, i] - u * p[2, i]) / depth
         out[JACOBIAN + 3 + i] = (p[1, i] - v * p[2, i]) / depth
@@ -99,9 +92,9 @@ def _view(px, confidence, sigma_px, age_s, mean, velocity, first, second, p, out
 
 @numba.njit(**LEAN)
 def _triangulate(view, seen, axes, information, score, small):
-    """Add what the views of one point say of the cameras that it is seen by.
+    """Add what the views of one joint say of the cameras that it is seen by.
 
-    All of them triangulate the point; the residual of each counts with the information that is left
+    All of them triangulate the joint; the residual of each counts with the information that is left
     when the others are asked, which is the same as to leave it out (Woodbury).
     """
     for i in range(3):
@@ -123,7 +116,7 @@ def _triangulate(view, seen, axes, information, score, small):
 
 @numba.njit(**LEAN)
 def _add(v, axes, small, information, score):
-    """Add one view; `small` holds the inverse information of the point, and its score beside."""
+    """Add one view; `small` holds the inverse information of the joint, and its score beside."""
     b00 = b01 = b11 = 0.0
     e0, e1, weight = v[U], v[V], v[WEIGHT]
     for i in range(3):
@@ -151,26 +144,36 @@ def _add(v, axes, small, information, score):
 
 @numba.njit(**LEAN)
 def _ratio(information, score, prior, allowed, small):
-    """The squared length of the first four numbers in units of what they may be."""
-    n, m = N_NUMBERS, N_NUMBERS - 1
+    """What growth alone explains, or shift and growth, or all four numbers, at their costs."""
+    n, growth, turn = N_NUMBERS, N_NUMBERS - 3, N_NUMBERS - 2
     for i in range(n):
         for j in range(i, n):
             small[i, j] = small[j, i] = information[i, j]
         small[i, i] += prior[i]
     _invert(small, n)
-    for i in range(m):
+    for i in range(turn + 1):
         total = 0.0
         for j in range(n):
             total += small[i, j] * score[j]
-        small[m, i] = total
-    for i in range(m):
+        small[turn + 1, i] = total
+    for i in range(turn + 1):
         small[i, i] += allowed[i]
-    _invert(small, m)
-    total = 0.0
-    for i in range(m):
-        for j in range(m):
-            total += small[m, i] * small[i, j] * small[m, j]
-    return total
+    _invert(small, turn + 1)
+    for i in range(turn + 1):
+        total = 0.0
+        for j in range(turn + 1):
+            total += small[i, j] * small[turn + 1, j]
+        small[i, turn + 1] = total
+    grown = small[growth, turn + 1] ** 2 / small[growth, growth]
+    turned = 0.0
+    for i in range(turn + 1):
+        turned += small[i, turn + 1] * small[turn + 1, i]
+    _invert(small, turn)
+    shifted = 0.0
+    for i in range(turn):
+        for j in range(turn):
+            shifted += small[i, turn + 1] * small[i, j] * small[j, turn + 1]
+    return max(grown, shifted - SHIFT_COSTS, turned - TURN_COSTS)
 
 
 @numba.njit(**LEAN)

@@ -6,17 +6,18 @@ all of it is four numbers of its image: a shift (2), a growth and a turn about t
 For each camera they are estimated from the residuals between what it reports and what the *other*
 cameras say (the estimate serves as the point of linearisation, so that a camera does not vote for
 itself), by least squares with exponential forgetting, together with a delay in the direction in
-which joints move, so that a camera that is merely late is not taken for a displaced one. The
-squared length of the four numbers in units of their covariance, to which an allowance for the
-lasting bias of a detector is added, is a generalised likelihood ratio (Willsky and Jones, IEEE
-Transactions on Automatic Control 21, 1976; Basseville and Nikiforov, Detection of Abrupt Changes,
-1993, chapter 7): chi-squared with four degrees of freedom where nothing is wrong.
+which joints move, so that a camera that is merely late is not taken for a displaced one. What they
+explain, in units of their covariance, to which an allowance for the lasting bias of a detector is
+added, is a generalised likelihood ratio (Willsky and Jones, IEEE Transactions on Automatic Control
+21, 1976; Basseville and Nikiforov, Detection of Abrupt Changes, 1993, chapter 7). The fewer numbers
+are needed, the less has to be there to be noticed: growth alone (another focal length), shift and
+growth (a camera that was moved or turned aside), and the turn as well are three hypotheses; each
+pays for its numbers, and the best counts.
 
 Each ratio supposes that one camera alone is wrong. What is wrong with it shows, less, in what all
 others say: it is named when its ratio is clearly the largest. Of several wrong ones the worst may
-be named, or nobody. A point must be seen by three cameras: of two that contradict each other nobody
-knows which is wrong. Points are the nose and the middles of left and right joints, which stay where
-they are when a detector exchanges the sides.
+be named, or nobody. A joint must be seen by three cameras: of two that contradict each other nobody
+knows which is wrong.
 """
 
 from typing import NamedTuple
@@ -24,23 +25,14 @@ from typing import NamedTuple
 import numpy as np
 
 from hrc_env.records import Keypoints, PoseEstimate
-from hrc_env.skeleton import JOINT
 from hrc_env.tracking.calibration_kernel import N_NUMBERS, gather
 from hrc_env.typing import Bools, Floats, Ints
 
 EVERY = 10
 """Updates between two samples: errors of the detector last for about twelve."""
-POINTS: Ints = np.array(
-    [(JOINT["nose"],) * 2]
-    + [
-        (JOINT[f"left_{j}"], JOINT[f"right_{j}"])
-        for j in ("shoulder", "elbow", "hip", "knee", "ankle")
-    ]
-)
-"""(6, 2) joints whose means are the points."""
 PRIOR: Floats = np.array([0.3, 0.3, 0.3, 0.3, 0.3]) ** -2.0
 """Precision of these numbers before anything was seen."""
-ALLOWED: Floats = np.array([0.0014, 0.0014, 0.0056, 0.0084]) ** 2
+ALLOWED: Floats = np.array([0.00084, 0.00084, 0.0034, 0.005]) ** 2
 """Variance of the first four that no calibration is to blame for: the detector's lasting bias."""
 
 
@@ -54,7 +46,7 @@ class WatchState(NamedTuple):
     score: Floats
     """(B, C, 5) information times the numbers."""
     ratio: Floats
-    """(B, C) likelihood ratios at the last sample."""
+    """(B, C) likelihood ratios, less their costs, at the last sample."""
     suspected: Bools
     """(B, C) whether a camera is named."""
 
@@ -100,5 +92,5 @@ def watch(
         state.information, state.score, state.ratio, state.suspected,
         due, ids, keypoints.px, keypoints.confidence, keypoints.sigma_px, age_s,
         estimate.mean_world, estimate.velocity_world, estimate.tracked, P, axes,
-        POINTS, PRIOR, ALLOWED,
+        PRIOR, ALLOWED,
     )  # fmt: skip

@@ -1,6 +1,7 @@
 """Cameras that are not where they are said to be: named; those that are merely bad: not."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -60,10 +61,22 @@ def run(
     return state
 
 
-def turned(camera, angle_rad):
+def turned(camera, angle_rad, axis="y"):
     T_world_from_cam = camera.T_world_from_cam.copy()
-    T_world_from_cam[:3, :3] @= about_axis("y", angle_rad)
+    T_world_from_cam[:3, :3] @= about_axis(axis, angle_rad)
     return replace(camera, T_world_from_cam=T_world_from_cam)
+
+
+def moved(camera, to_the_right_m):
+    T_world_from_cam = camera.T_world_from_cam.copy()
+    T_world_from_cam[:3, 3] += T_world_from_cam[:3, 0] * to_the_right_m
+    return replace(camera, T_world_from_cam=T_world_from_cam)
+
+
+def zoomed(camera, share):
+    K = camera.K.copy()
+    K[[0, 1], [0, 1]] *= 1 + share
+    return replace(camera, K=K)
 
 
 def named(state):
@@ -80,6 +93,14 @@ def test_nobody_is_named_where_cameras_are_where_they_are_said_to_be(seed):
 def test_a_turned_camera_is_named_and_no_other(c, angle_rad):
     actual = [turned(camera, angle_rad) if k == c else camera for k, camera in enumerate(RIG)]
     assert named(run(actual)) == [c]
+
+
+@pytest.mark.parametrize(
+    "displaced", [partial(moved, to_the_right_m=0.05), partial(zoomed, share=0.05),
+    partial(turned, angle_rad=0.1, axis="z")], ids=["moved", "zoomed", "rolled"],
+)  # fmt: skip
+def test_a_camera_that_was_displaced_otherwise_is_named_too(displaced):
+    assert named(run([RIG[0], displaced(RIG[1]), *RIG[2:]])) == [1]
 
 
 @pytest.mark.parametrize("c", range(3))
