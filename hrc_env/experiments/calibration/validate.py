@@ -80,8 +80,8 @@ def error_ratios(
     """Error of the emulator over that of the pixels, by family of motions.
 
     Args:
-        rounds: how often each motion is rendered in each scene: 58 clips, 3,480 frames a round; 0:
-            once, in one of them.
+        rounds: how often each motion is rendered in each scene: 82 clips a round; 0: once, in
+            one of them.
         seed: of the clips.
         say: hears of the progress: shares that sum to 1.
         config: settings; its `emulator` is judged.
