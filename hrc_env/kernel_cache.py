@@ -39,11 +39,13 @@ def forget_stale(package: Path) -> bool:
 
 
 def _digest(package: Path, sources: list[Path]) -> str:
-    """Of names, sizes and times of the sources: what numba goes by, for all of them at once."""
+    """Of names and contents of the sources that hold kernels."""
     digest = hashlib.sha256()
     for source in sources:
-        about = source.stat()
-        digest.update(f"{source.relative_to(package)} {about.st_size} {about.st_mtime_ns}".encode())
+        text = source.read_bytes()
+        if b"numba.njit" in text:
+            digest.update(str(source.relative_to(package)).encode())
+            digest.update(text)
     return digest.hexdigest()
 
 
