@@ -3,12 +3,11 @@
 import math
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import LEAN
 from hrc_env.geometry.distances import Gap, narrowest_gap
 from hrc_env.geometry.segments import segments
+from hrc_env.kernels import kernel
 from hrc_env.records import PoseEstimate, RobotState
 from hrc_env.skeleton import SEGMENT_RADIUS_M
 from hrc_env.typing import Floats, Points3
@@ -54,7 +53,7 @@ def standard_deviation_m(estimate: PoseEstimate) -> Floats:
     return std
 
 
-@numba.njit(**LEAN)
+@kernel
 def _root_mean(cov: Floats, std: Floats) -> None:
     for k in range(len(std)):
         std[k] = math.sqrt((cov[k, 0, 0] + cov[k, 1, 1] + cov[k, 2, 2]) / 3.0)

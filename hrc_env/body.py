@@ -11,12 +11,11 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import LEAN
 from hrc_env.errors import ConfigError, check_shape, unknown
 from hrc_env.geometry.rotations import turned
+from hrc_env.kernels import kernel
 from hrc_env.records import WorkerMotion, WorkerPath, WorkerTruth
 from hrc_env.typing import Capsules, Floats, Ints, Points3, QuaternionsWxyz
 
@@ -255,7 +254,7 @@ def _flat(array: Floats) -> Floats:
     return whole.reshape(math.prod(whole.shape[:-2]), *whole.shape[-2:])
 
 
-@numba.njit(**LEAN)
+@kernel
 def _joints(
     position, quaternion, linear, angular, rows, segment, offset, joints, velocity
 ):  # pragma: no cover - compiled
@@ -272,7 +271,7 @@ def _joints(
                 velocity[b, j, i] = linear[b, s, i] + omega_k * arm[m] - omega_m * arm[k]
 
 
-@numba.njit(**LEAN)
+@kernel
 def _capsules(position, quaternion, rows, segment, ends, capsules):  # pragma: no cover - compiled
     """Both ends of the capsules of bodies."""
     for b in range(position.shape[0]):

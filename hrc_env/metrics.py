@@ -3,13 +3,12 @@
 import math
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT, LEAN
 from hrc_env.errors import ConfigError
 from hrc_env.geometry.assignment import assign_rows
 from hrc_env.geometry.distances import narrowest_gap
+from hrc_env.kernels import kernel
 from hrc_env.records import PoseEstimate, WorkerTruth
 from hrc_env.typing import Bools, Capsules, Floats
 
@@ -95,7 +94,7 @@ def tracking_error(
     return error_m, lost
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _tracking_error(mean_world, joints_world, tracked, there, error_m, lost):
     n_workers, n_joints = tracked.shape[1], mean_world.shape[2]
     error, whom = np.empty((n_workers, n_workers)), np.empty(n_workers, np.int64)
@@ -114,7 +113,7 @@ def _tracking_error(mean_world, joints_world, tracked, there, error_m, lost):
         error_m[b] = total / (count * n_joints) if count else np.nan
 
 
-@numba.njit(**LEAN)
+@kernel
 def _joint_error(mean_world, joints_world):
     """Sum over joints of the distances between two bodies [m]."""
     total = 0.0

@@ -8,12 +8,11 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.belief import Believed, standard_deviation_m
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.skeleton import N_JOINTS
 from hrc_env.typing import Floats
 
@@ -63,7 +62,7 @@ def _nearest_direction(now: Believed) -> Floats:
     return np.where(near.reshape(-1, 1), direction, 0.0)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _shorten(vectors: Floats, softening: float) -> None:
     """Divide vectors (n, 3) by their length plus a little: unit vectors, but 0 stays 0."""
     for k in range(len(vectors)):
@@ -221,7 +220,7 @@ def observe(now: Believed, where: ObservationLayout) -> NDArray[np.float32]:
     return observation
 
 
-@numba.njit(**LEAN)
+@kernel
 def _scale(
     physical: Floats,
     scale: Floats,

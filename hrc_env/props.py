@@ -9,12 +9,11 @@ the floor below that. Sizes are of common tools, rounded; judgement.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import LEAN
 from hrc_env.geometry.rotations import turned
 from hrc_env.geometry.shapes import BOX, CAPSULE, CENTRE, HALF_SIZE, WIDTH, absent, shape
+from hrc_env.kernels import kernel
 from hrc_env.records import Held
 from hrc_env.typing import Floats, Ints, Points3
 
@@ -165,7 +164,7 @@ def held_shapes(held: Held) -> Floats:
     return rows
 
 
-@numba.njit(**LEAN)
+@kernel
 def _place(kind, position, quaternion, parts, n_parts, nothing, rows):
     """Parts of the props of B environments, of W workers each, from their frames to the world."""
     most = parts.shape[1]

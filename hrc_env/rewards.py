@@ -3,12 +3,11 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
 from hrc_env.belief import Believed
-from hrc_env.compiled import JIT
 from hrc_env.errors import ConfigError
+from hrc_env.kernels import kernel
 from hrc_env.tasks.reach import ReachProgress
 from hrc_env.typing import Floats
 
@@ -53,7 +52,7 @@ def closeness(gap_m: Floats, reach_m: float) -> Floats:
     return share * share
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _mean_square(vectors: Floats) -> Floats:
     """(B,) of (B, n)."""
     mean = np.zeros(len(vectors))

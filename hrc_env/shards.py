@@ -4,7 +4,6 @@ A range's simulation may live in a process of its own instead. As no result depe
 of a batch, none depends on the number of ranges either.
 """
 
-import os
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
@@ -180,10 +179,3 @@ def joined(outcomes: list[Outcome]) -> Outcome:
             for name in outcomes[0].info
         },
     )
-
-
-def n_cores() -> int:
-    """Cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

@@ -20,6 +20,7 @@ from hrc_env.control import joint_command, n_actions
 from hrc_env.crew import Crew, bodies_of, worker_counts
 from hrc_env.errors import ConfigError, check_shape
 from hrc_env.geometry import chains
+from hrc_env.kernels import ahead
 from hrc_env.motion import generator
 from hrc_env.outcome import Info, Outcome, cost_info, rows_of, tracking_info
 from hrc_env.records import PoseEstimate, RobotState, WorkerMotion, WorkerTruth
@@ -80,6 +81,7 @@ class Simulation(Stateful):
         control: str,
         config: HRCConfig,
     ) -> None:
+        ahead.ensure(perception)
         self.batch, self.config, self.control = batch, config, control
         self.perception, self.reward_weights = perception, config.reward
         self.bodies = stack(pool(config.worker))

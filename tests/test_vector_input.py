@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 import hrc_env  # noqa: F401  registers the ids
-from hrc_env import shards, vector_factory, vector_options
+from hrc_env import vector_factory, vector_options
 from hrc_env.errors import ConfigError, HRCError
+from hrc_env.kernels import ahead
 from hrc_env.vector_env import HRCVectorEnv
 
 
@@ -161,4 +162,4 @@ def test_a_failure_says_how_its_environments_are_counted(monkeypatch):
 
 
 def test_at_least_one_core_is_counted():
-    assert shards.n_cores() >= 1
+    assert ahead.n_cores() >= 1

@@ -4,11 +4,10 @@ The shortest augmenting paths of the Hungarian method (Kuhn, Naval Research Logi
 Jonker and Volgenant, Computing 38, 1987), for matrices with a few rows, inside kernels.
 """
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT
 from hrc_env.errors import ConfigError
+from hrc_env.kernels import kernel
 from hrc_env.typing import Floats, Ints
 
 
@@ -26,7 +25,7 @@ def assign(cost: Floats) -> Ints:
     return column
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def assign_rows(cost, column):
     """Kernel of `assign`: fills column (n,) for a finite cost (n, m) with m >= n."""
     n_rows, n_columns = cost.shape

@@ -7,11 +7,10 @@ by q_i, so T_world_from_link_i = T_world_from_base @ prod_{j <= i} (parent_from_
 import math
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import LEAN
 from hrc_env.errors import check_shape
+from hrc_env.kernels import kernel
 from hrc_env.records import RobotState
 from hrc_env.typing import Capsules, Floats, Ints, JointAngles, JointVelocities, Transforms
 
@@ -135,7 +134,7 @@ def _flat(chain: SerialChain, name: str, values: Floats) -> tuple[Floats, tuple[
     return np.ascontiguousarray(array.reshape(-1, chain.n_joints)), array.shape[:-1]
 
 
-@numba.njit(**LEAN)
+@kernel
 def _forward(q, base, parent_from_joint, frames):
     """Multiply the frames up; only the 3 x 4 part takes part."""
     for b in range(q.shape[0]):
@@ -156,7 +155,7 @@ def _forward(q, base, parent_from_joint, frames):
             frame[3, 3] = 1.0
 
 
-@numba.njit(**LEAN)
+@kernel
 def _apply(frame, point):
     """frame @ point."""
     x, y, z = point[0], point[1], point[2]
@@ -167,7 +166,7 @@ def _apply(frame, point):
     )
 
 
-@numba.njit(**LEAN)
+@kernel
 def _lever(frame, point):
     """axis x (point - origin): the point's velocity per turn rate of a frame's joint."""
     rx, ry, rz = point[0] - frame[0, 3], point[1] - frame[1, 3], point[2] - frame[2, 3]
@@ -175,7 +174,7 @@ def _lever(frame, point):
     return ay * rz - az * ry, az * rx - ax * rz, ax * ry - ay * rx
 
 
-@numba.njit(**LEAN)
+@kernel
 def _jacobian(frames, link_from_tool, out):
     """Column i is (axis_i x (tool - origin_i), axis_i)."""
     n = frames.shape[1]
@@ -188,7 +187,7 @@ def _jacobian(frames, link_from_tool, out):
                 out[b, 3 + row, i] = frames[b, i, row, 2]
 
 
-@numba.njit(**LEAN)
+@kernel
 def _tool_motion(frames, qd, link_from_tool, point, velocity):
     """Where the tool points are, and how fast."""
     n = frames.shape[1]
@@ -202,7 +201,7 @@ def _tool_motion(frames, qd, link_from_tool, point, velocity):
         velocity[b, 0], velocity[b, 1], velocity[b, 2] = vx, vy, vz
 
 
-@numba.njit(**LEAN)
+@kernel
 def _capsules(frames, link, ends_link, ends_world):
     for b in range(frames.shape[0]):
         for k in range(len(link)):

@@ -8,10 +8,9 @@ segments less both radii, negative when the surfaces overlap.
 import math
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT, LEAN
+from hrc_env.kernels import kernel
 from hrc_env.typing import Capsules, Floats, Points3
 
 SLACK_M = 1e-9
@@ -65,7 +64,7 @@ def _sets(radius_m: Floats) -> Floats:
     return whole.reshape(math.prod(whole.shape[:-1]), whole.shape[-1])
 
 
-@numba.njit(**LEAN)
+@kernel
 def closest_parameters(p0, p1, q0, q1):
     """Squared distance of two segments and where along each (0..1) it is attained."""
     ux, uy, uz = p1[0] - p0[0], p1[1] - p0[1], p1[2] - p0[2]
@@ -94,7 +93,7 @@ def closest_parameters(p0, p1, q0, q1):
     return dx * dx + dy * dy + dz * dz, s, t
 
 
-@numba.njit(**LEAN)
+@kernel
 def _spheres(capsules, radius, spheres):
     """Bounding spheres (4, K) of capsules: centre, radius; radii repeat body by body."""
     for k in range(len(capsules)):
@@ -105,7 +104,7 @@ def _spheres(capsules, radius, spheres):
         spheres[3, k] = 0.5 * math.sqrt(squared) + radius[k % len(radius)]
 
 
-@numba.njit(**LEAN)
+@kernel
 def _sphere_gaps(a, b, least):
     """least[k, m] = gap of sphere k of one set and sphere m of the other."""
     for k in range(a.shape[1]):
@@ -115,7 +114,7 @@ def _sphere_gaps(a, b, least):
             least[k, m] = math.sqrt(dx * dx + dy * dy + dz * dz) - reach - b[3, m]
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _narrowest(a, radius_a, b, radius_b, gap, points):
     """Spheres bound the gaps from below: only pairs that they leave open are measured."""
     n_a, n_b = a.shape[1], b.shape[1]
@@ -132,7 +131,7 @@ def _narrowest(a, radius_a, b, radius_b, gap, points):
         gap[n] = _search(first, first_m, b[n], second_m, least, points[n])
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _search(a, radius_a, b, radius_b, least, points):
     """The narrowest gap, the most promising pair first; of equal ones the first pair's."""
     best, at, bounds = np.inf, 0, least.ravel()

@@ -1,9 +1,8 @@
 """Rotations as matrices and unit quaternions (scalar first), over any leading axes."""
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.typing import Floats, Points3, QuaternionsWxyz, Rotations
 
 
@@ -72,7 +71,7 @@ def look_at(eye_world: Points3, target_world: Points3) -> Rotations:
     return np.stack([right, np.cross(forward, right), forward], -1)
 
 
-@numba.njit(**LEAN)
+@kernel
 def turned(quaternion, offset):  # pragma: no cover - compiled
     """An offset (3,) turned by a unit quaternion: v + 2 w (u x v) + 2 u x (u x v)."""
     w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]

@@ -2,10 +2,9 @@
 
 import math
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.skeleton import HAND_SEGMENTS, N_JOINTS, SEGMENT_ENDS, SEGMENT_RADIUS_M
 from hrc_env.typing import Floats, Ints
 
@@ -32,7 +31,7 @@ def segments(joints_world: Floats) -> Floats:
     return ends.reshape(*lead, *ends.shape[1:])
 
 
-@numba.njit(**LEAN)
+@kernel
 def _segments(joints, first, second, hands, hand_reach_m, ends):
     for b in range(joints.shape[0]):
         for k in range(len(first)):

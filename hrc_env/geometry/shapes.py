@@ -7,10 +7,9 @@ eye; `NEVER` has its entry after its exit. p is the eye less the shape's centre.
 
 import math
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.typing import Floats
 
 PLANE, BOX, CYLINDER, CAPSULE = range(4)
@@ -49,7 +48,7 @@ def absent() -> Floats:
     return row
 
 
-@numba.njit(**LEAN)
+@kernel
 def set_rows(table, first, rows):
     """Shapes into the rows of a table from `first` on."""
     for k in range(len(rows)):
@@ -57,7 +56,7 @@ def set_rows(table, first, rows):
             table[first + k, i] = rows[k, i]
 
 
-@numba.njit(**LEAN)
+@kernel
 def set_capsules(table, first, ends, radius):
     """Capsules with ends (n, 2, 3) and radii (n,) into the rows from `first` on."""
     for k in range(len(ends)):
@@ -74,7 +73,7 @@ def set_capsules(table, first, ends, radius):
         table[row, REACH] = 0.5 * length + radius[k]
 
 
-@numba.njit(**LEAN)
+@kernel
 def passage(table, row, px, py, pz, dx, dy, dz):
     """Where a line enters and leaves the shape of a row."""
     kind = table[row, KIND]
@@ -87,14 +86,14 @@ def passage(table, row, px, py, pz, dx, dy, dz):
     return _through_plane(table, row, px, py, pz, dx, dy, dz)
 
 
-@numba.njit(**LEAN)
+@kernel
 def on_axis(table, row, axis, x, y, z):
     """A vector's part along an axis of a shape."""
     at = AXES + 3 * axis
     return table[row, at] * x + table[row, at + 1] * y + table[row, at + 2] * z
 
 
-@numba.njit(**LEAN)
+@kernel
 def against_axis(table, row, px, py, pz, dx, dy, dz):
     """A line against a shape's z axis and radius: what the functions below are given.
 
@@ -108,7 +107,7 @@ def against_axis(table, row, px, py, pz, dx, dy, dz):
     return rise, height, ahead, px * px + py * py + pz * pz - radius * radius
 
 
-@numba.njit(**LEAN)
+@kernel
 def through_tube(rise, height, ahead, excess):
     """Through an endless cylinder."""
     a, b, c = 1.0 - rise * rise, ahead - height * rise, excess - height * height
@@ -121,7 +120,7 @@ def through_tube(rise, height, ahead, excess):
     return scale * (-b - root), scale * (-b + root)
 
 
-@numba.njit(**LEAN)
+@kernel
 def rounded(enter, leave, half, rise, height, ahead, excess):
     """What is left of a passage through a tube when it ends at +-half in balls: a capsule."""
     if enter > leave:
@@ -135,14 +134,14 @@ def rounded(enter, leave, half, rise, height, ahead, excess):
     return enter, leave
 
 
-@numba.njit(**LEAN)
+@kernel
 def _through_capsule(table, row, px, py, pz, dx, dy, dz):
     rise, height, ahead, excess = against_axis(table, row, px, py, pz, dx, dy, dz)
     enter, leave = through_tube(rise, height, ahead, excess)
     return rounded(enter, leave, table[row, HALF_SIZE + 1], rise, height, ahead, excess)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _through_cylinder(table, row, px, py, pz, dx, dy, dz):
     rise, height, ahead, excess = against_axis(table, row, px, py, pz, dx, dy, dz)
     enter, leave = through_tube(rise, height, ahead, excess)
@@ -150,7 +149,7 @@ def _through_cylinder(table, row, px, py, pz, dx, dy, dz):
     return max(enter, low), min(leave, high)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _through_box(table, row, px, py, pz, dx, dy, dz):
     enter, leave = -math.inf, math.inf
     for i in range(3):
@@ -160,7 +159,7 @@ def _through_box(table, row, px, py, pz, dx, dy, dz):
     return enter, leave
 
 
-@numba.njit(**LEAN)
+@kernel
 def _through_plane(table, row, px, py, pz, dx, dy, dz):
     """A rectangle stops only what comes from its front, where its z points."""
     height, rise = on_axis(table, row, 2, px, py, pz), on_axis(table, row, 2, dx, dy, dz)
@@ -174,7 +173,7 @@ def _through_plane(table, row, px, py, pz, dx, dy, dz):
     return way, way
 
 
-@numba.njit(**LEAN)
+@kernel
 def _through_ball(end, rise, height, ahead, excess):
     """Through the ball at `end` [m] on the axis."""
     nearest = end * rise - ahead
@@ -185,7 +184,7 @@ def _through_ball(end, rise, height, ahead, excess):
     return nearest - root, nearest + root
 
 
-@numba.njit(**LEAN)
+@kernel
 def _between(height, rise, half):
     """Between two planes at -half and half."""
     if rise == 0.0:

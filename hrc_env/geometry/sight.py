@@ -8,10 +8,8 @@ bounding spheres, and only the shapes in these are asked exactly.
 import math
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT, LEAN
 from hrc_env.errors import check_shape
 from hrc_env.geometry.shapes import (
     AXES,
@@ -25,6 +23,7 @@ from hrc_env.geometry.shapes import (
     set_capsules,
     set_rows,
 )
+from hrc_env.kernels import kernel
 from hrc_env.typing import Bools, Capsules, Floats, Points3
 
 NEAR_POINT_M = 0.08
@@ -74,7 +73,7 @@ def hidden(surroundings: Surroundings, eyes_world: Points3, points_world: Points
     return result
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def make_table(still, n_more):
     """A table that begins with `still` and has room for more shapes."""
     table = np.empty((len(still) + n_more, WIDTH))
@@ -82,7 +81,7 @@ def make_table(still, n_more):
     return table
 
 
-@numba.njit(**LEAN)
+@kernel
 def look(eye, points, table, view, rows):
     """Find the shapes that can stand between an eye and any of the points (J, 3).
 
@@ -125,7 +124,7 @@ def look(eye, points, table, view, rows):
     return n
 
 
-@numba.njit(**LEAN)
+@kernel
 def _ball_round(eye, points):
     """Middle, seen from an eye, and radius of a ball that holds points (J, 3)."""
     x, y, z, n = 0.0, 0.0, 0.0, len(points)
@@ -139,7 +138,7 @@ def _ball_round(eye, points):
     return x - eye[0], y - eye[1], z - eye[2], math.sqrt(farthest)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _is_between(eye, points, table, row):
     """Whether an eye is in front of a plane and any of the points is not."""
     centre = table[row, CENTRE:AXES]
@@ -152,7 +151,7 @@ def _is_between(eye, points, table, row):
     return lowest < level
 
 
-@numba.njit(**LEAN)
+@kernel
 def meets(view, i, dx, dy, dz, length):
     """Whether a line of a length and unit direction d meets the i-th sphere in view."""
     along = view[0, i] * dx + view[1, i] * dy + view[2, i] * dz
@@ -160,7 +159,7 @@ def meets(view, i, dx, dy, dz, length):
     return along * along >= view[3, i] and along >= -reach and along <= length + reach
 
 
-@numba.njit(**LEAN)
+@kernel
 def blocks(enter, leave, length):
     """Whether a surface is passed, going in or (from inside) out, before the line has ended."""
     if enter > leave:
@@ -169,7 +168,7 @@ def blocks(enter, leave, length):
     return 0.0 <= first < length - NEAR_POINT_M
 
 
-@numba.njit(**LEAN)
+@kernel
 def line(eye, points, j):
     """Unit direction and length [m] of the way from an eye to one of the points (J, 3)."""
     dx, dy, dz = points[j, 0] - eye[0], points[j, 1] - eye[1], points[j, 2] - eye[2]
@@ -178,7 +177,7 @@ def line(eye, points, j):
     return scale * dx, scale * dy, scale * dz, length
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _hidden(still, moving, capsules, radius, eyes, points, hidden):
     table = make_table(still, len(radius) + moving.shape[1])
     n = len(table)
@@ -192,7 +191,7 @@ def _hidden(still, moving, capsules, radius, eyes, points, hidden):
                 hidden[b, c, j] = _is_hidden(eyes[c], points[b], j, table, view, rows, n_view)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _is_hidden(eye, points, j, table, view, rows, n_view):
     dx, dy, dz, length = line(eye, points, j)
     for i in range(n_view):

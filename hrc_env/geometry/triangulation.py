@@ -10,11 +10,10 @@ public functions run them over (B, W, J).
 import math
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT, LEAN
 from hrc_env.errors import ConfigError, check_shape
+from hrc_env.kernels import kernel
 from hrc_env.typing import Bools, Covariances3, Floats, Ints, Points2, Points3
 
 NEAREST_DEPTH_M = 0.05
@@ -82,7 +81,7 @@ def _run(P: Floats, px: Points2, sigma_px: Floats, gate_sigma: float) -> Triangu
     return Triangulation(points, cov, used)
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _triangulate_all(P, px, sigma_px, gate_sigma, points, cov, used):
     n_batch, n_cameras, n_workers, n_joints, _ = px.shape
     z, sigma = np.empty((n_cameras, 2)), np.empty(n_cameras)
@@ -104,7 +103,7 @@ def _triangulate_all(P, px, sigma_px, gate_sigma, points, cov, used):
                     points[b, w, j], cov[b, w, j], used[b, :, w, j] = point, spread, use
 
 
-@numba.njit(**LEAN)
+@kernel
 def inverse3(a, out):
     """Inverse of a symmetric 3x3 matrix into `out`; returns its determinant."""
     m00 = a[1, 1] * a[2, 2] - a[1, 2] * a[1, 2]
@@ -122,7 +121,7 @@ def inverse3(a, out):
     return determinant
 
 
-@numba.njit(**LEAN)
+@kernel
 def pixel_of(camera, x, y, z):
     """(u, v, depth) of a point in one (3, 4) camera; depth <= 0 is behind it."""
     depth = camera[2, 0] * x + camera[2, 1] * y + camera[2, 2] * z + camera[2, 3]
@@ -131,7 +130,7 @@ def pixel_of(camera, x, y, z):
     return u, v, depth
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def linear_point(P, z, use, out):
     """Point nearest to the planes of constant u and v of the used views; True if it exists."""
     information, inverse, right = np.zeros((3, 3)), np.empty((3, 3)), np.zeros(3)
@@ -160,7 +159,7 @@ def linear_point(P, z, use, out):
     return True
 
 
-@numba.njit(**LEAN)
+@kernel
 def add_outer(a, n0, n1, n2, weight):
     """a += weight n n' for a symmetric 3x3 matrix."""
     a[0, 0] += weight * n0 * n0
@@ -172,7 +171,7 @@ def add_outer(a, n0, n1, n2, weight):
     a[1, 0], a[2, 0], a[2, 1] = a[0, 1], a[0, 2], a[1, 2]
 
 
-@numba.njit(**LEAN)
+@kernel
 def pixel_jacobian(camera, u, v, depth, jacobian):
     """Derivatives of (u, v) by the point into `jacobian` (2, 3) [px/m]."""
     for i in range(3):
@@ -180,7 +179,7 @@ def pixel_jacobian(camera, u, v, depth, jacobian):
         jacobian[1, i] = (camera[1, i] - v * camera[2, i]) / depth
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def refine_point(P, z, sigma, use, point, cov, n_steps):
     """Gauss-Newton on the reprojection error, in place; True if it ended at a proper point."""
     information, step, jacobian = np.empty((3, 3)), np.empty(3), np.empty((2, 3))
@@ -209,7 +208,7 @@ def refine_point(P, z, sigma, use, point, cov, n_steps):
     return math.isfinite(point[0] + point[1] + point[2])
 
 
-@numba.njit(**LEAN)
+@kernel
 def point_from_views(P, z, sigma, use, point, cov):
     """Least-squares point of the views in `use`; returns how many there were, 0 if none exists."""
     n_views = 0
@@ -220,7 +219,7 @@ def point_from_views(P, z, sigma, use, point, cov):
     return n_views if refine_point(P, z, sigma, use, point, cov, 4) else 0
 
 
-@numba.njit(**LEAN)
+@kernel
 def misfit(camera, u, v, sigma, point):
     """Squared distance in standard deviations between a pixel and the point's image."""
     expected_u, expected_v, depth = pixel_of(camera, point[0], point[1], point[2])
@@ -229,7 +228,7 @@ def misfit(camera, u, v, sigma, point):
     return ((u - expected_u) ** 2 + (v - expected_v) ** 2) / sigma**2
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def consensus_point(P, z, sigma, ok, gate_sigma, point, cov, use):
     """Point of the largest agreeing set of views among `ok`, found from pairs of cameras.
 

@@ -6,12 +6,10 @@ compiled before, and then the last bits of a walk would depend on that, too.
 
 import math
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 
 
-@numba.njit(**LEAN)
+@kernel
 def min_jerk(u: float) -> float:
     """0 to 1 over u in [0, 1] with zero velocity and acceleration at both ends, else held.
 
@@ -24,7 +22,7 @@ def min_jerk(u: float) -> float:
     return u * u * u * (10.0 - 15.0 * u + 6.0 * u * u)
 
 
-@numba.njit(**LEAN)
+@kernel
 def ramp(u: float) -> float:
     """Integral of a smoothstep: distance while speed grows smoothly from 0 to 1, then stays."""
     if u <= 0.0:
@@ -34,7 +32,7 @@ def ramp(u: float) -> float:
     return u * u * u * (1.0 - 0.5 * u)
 
 
-@numba.njit(**LEAN)
+@kernel
 def cruise(u: float, share: float) -> float:
     """0 to 1 over u in [0, 1] at constant speed but for smooth ramps of `share` at each end."""
     if u <= 0.0:
@@ -47,7 +45,7 @@ def cruise(u: float, share: float) -> float:
     return 1.0 - top * ramp((1.0 - u) / share)
 
 
-@numba.njit(**LEAN)
+@kernel
 def hump(u: float) -> float:
     """0 at the ends of [0, 1], 1 in the middle, flat to second order at the ends; 0 outside."""
     if u <= 0.0 or u >= 1.0:
@@ -56,7 +54,7 @@ def hump(u: float) -> float:
     return v * v * v
 
 
-@numba.njit(**LEAN)
+@kernel
 def soft_min(a: float, b: float, width: float) -> float:
     """The smaller one, rounded off (downwards) where the two differ by less than `width`."""
     closeness = 1.0 - abs(a - b) / width
@@ -65,7 +63,7 @@ def soft_min(a: float, b: float, width: float) -> float:
     return min(a, b) - width * closeness * closeness * closeness / 6.0
 
 
-@numba.njit(**LEAN)
+@kernel
 def saturate(d: float, knee: float, limit: float) -> float:
     """d up to `knee`, then bending smoothly so that it never passes `limit`."""
     if d <= knee:
@@ -74,7 +72,7 @@ def saturate(d: float, knee: float, limit: float) -> float:
     return knee + span * math.tanh((d - knee) / span)
 
 
-@numba.njit(**LEAN)
+@kernel
 def decay(u: float, duration: float, value: float, rate: float) -> float:
     """Quintic from (value, rate, 0) at u = 0 to rest at zero at u = 1: inertialisation.
 
@@ -89,7 +87,7 @@ def decay(u: float, duration: float, value: float, rate: float) -> float:
     return value + u * (v + u * u * (a3 + u * (a4 + u * a5)))
 
 
-@numba.njit(**LEAN)
+@kernel
 def wrap(angle: float) -> float:
     """The same direction in (-pi, pi]."""
     return math.atan2(math.sin(angle), math.cos(angle))

@@ -8,9 +8,7 @@ high the ground is there. Steps may be gone back: then their time runs backwards
 
 import math
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.anatomy import ANKLE_Z, BALL_X, BALL_Z, HEEL_X
@@ -28,7 +26,7 @@ LIFT_BASE_M, LIFT_STRIDE_M = 0.025, 0.045
 """Rise of the foot above its roll: of any step, and more with the stride [m]."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def _roll(t: float, lift: float, land: float, period: float, stride: float) -> tuple[float, float]:
     """Pitch that one step adds: heel up round the ball, then toes up round the heel."""
     swing = land - lift
@@ -42,7 +40,7 @@ def _roll(t: float, lift: float, land: float, period: float, stride: float) -> t
     return stride * PUSH_PITCH * (up - down), stride * STRIKE_PITCH * (toes_up - flat)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _last_step(t: float, first: int, count: int, plan: Floats) -> int:
     """Index of the latest step of a foot that has left the floor; below `first` if none."""
     k = math.floor((t - plan[pl.STEP_START]) / plan[pl.STEP_PERIOD])
@@ -50,14 +48,14 @@ def _last_step(t: float, first: int, count: int, plan: Floats) -> int:
     return min(k, count - 1 - (count - 1 - first) % 2)
 
 
-@numba.njit(**LEAN)
+@kernel
 def step_time(t: float, plan: Floats) -> float:
     """The time that counts for feet: it turns round when the steps are gone back."""
     undo = plan[pl.UNDO_AT]
     return t if undo <= 0.0 or t < undo else 2.0 * undo - t
 
 
-@numba.njit(**LEAN)
+@kernel
 def foot(
     t: float, side: int, plan: Floats, prints: Floats, stance: Floats, size: Floats, q: Floats
 ) -> None:
@@ -98,20 +96,20 @@ def foot(
     q[at + 3], q[at + 4], q[at + 5] = yaw, heel_up + toes_up, heel_up * flown + toes_up
 
 
-@numba.njit(**LEAN)
+@kernel
 def feet(t: float, plan: Floats, prints: Floats, stance: Floats, size: Floats, q: Floats) -> None:
     """Both."""
     for side in range(2):
         foot(t, side, plan, prints, stance, size, q)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _climbed(w: float, step_up: float) -> float:
     """Share of a step up (early, before the foot comes over the tread) or down (late) at w."""
     return min_jerk(w / 0.6) if step_up > 0.0 else min_jerk((w - 0.4) / 0.6)
 
 
-@numba.njit(**LEAN)
+@kernel
 def raise_heel(side: int, pitch: float, size: Floats, q: Floats) -> None:
     """Pitch a standing foot about its ball, where the toes stay (negative: about its heel)."""
     at = c.ANKLE + 6 * side
@@ -124,7 +122,7 @@ def raise_heel(side: int, pitch: float, size: Floats, q: Floats) -> None:
     q[at + 4] += pitch
 
 
-@numba.njit(**LEAN)
+@kernel
 def about(pitch: float, pivot_x: float, pivot_z: float) -> tuple[float, float]:
     """How far forward and up the ankle goes when the foot pitches about a point of its own."""
     cos, sin = math.cos(pitch), math.sin(pitch)

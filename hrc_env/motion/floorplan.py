@@ -8,11 +8,10 @@ things, for who works at a wall stands before it.
 import warnings
 from dataclasses import dataclass, replace
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import LEAN
 from hrc_env.errors import ConfigError
+from hrc_env.kernels import kernel
 from hrc_env.records import Grounds, Workplace
 from hrc_env.typing import Floats
 
@@ -105,7 +104,7 @@ def room_for(plan: Floorplan, apart_m: float) -> int:
     return len(taken)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _measure(xs: Floats, ys: Floats, blocked: Floats, robot: Floats, slack: Floats) -> None:
     """Fill the field: the distance from footprints (N, 5), the robot (x, y, radius) and edges."""
     n_x, n_y = slack.shape
@@ -124,7 +123,7 @@ def _measure(xs: Floats, ys: Floats, blocked: Floats, robot: Floats, slack: Floa
                 slack[i, j] = min(slack[i, j], away - BODY_M)
 
 
-@numba.njit(**LEAN)
+@kernel
 def slack_at(x: float, y: float, slack: Floats, origin: Floats) -> float:
     """The field at a point, between grid points; negative beyond the walkable area [m]."""
     u, v = (x - origin[0]) / CELL_M, (y - origin[1]) / CELL_M

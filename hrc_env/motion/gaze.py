@@ -2,9 +2,7 @@
 
 import math
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import STAND_Z
 from hrc_env.motion.curves import wrap
@@ -18,7 +16,7 @@ MOST_YAW_RAD, MOST_DOWN_RAD, MOST_UP_RAD = 1.2, 0.75, 0.75
 """How far neck and head turn from the chest; comfortable ranges, judgement."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def look_at(x: float, y: float, z: float, share: float, size: Floats, q: Floats) -> None:
     """Turn the head to a point of the world, by a share; everything but the head stands in q."""
     if share <= 0.0:

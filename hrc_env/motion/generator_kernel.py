@@ -1,8 +1,6 @@
 """The compiled part of the worker: from what workers do to where their bodies are, one by one."""
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.motion.holding import prop_pose
 from hrc_env.motion.kinematics import pose, quaternion, spin
 from hrc_env.motion.state import RATE_H_S, evaluate
@@ -14,7 +12,7 @@ HALT_S = 0.3
 """Time in which hands come to a halt, and go on [s]."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def _pose(
     b: int, w: int, later_s: float, clock_s: Floats, time_s: Floats, activity: Ints, pace: Floats,
     plan: Floats, prints: Floats, stance: Floats, offset: Floats, traits: Floats, body: Ints,
@@ -30,7 +28,7 @@ def _pose(
     pose(q, bones[mine], frame[mine], size[mine], p, r)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _place(present: float, p: Floats, r: Floats, position: Floats, quaternion_: Floats) -> None:
     """Write a pose into (22, ...) arrays; far below the floor of who is not there."""
     down = 0.0 if present > 0.0 else PARKED_Z_M
@@ -41,7 +39,7 @@ def _place(present: float, p: Floats, r: Floats, position: Floats, quaternion_: 
         quaternion(r, s, quaternion_)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _rates(p: Floats, r: Floats, velocity: Floats, turning: Floats) -> None:
     """Velocities (22, 3) from the poses now, p[0] and r[0], and RATE_H_S later, p[1] and r[1]."""
     rate = 1.0 / RATE_H_S
@@ -51,14 +49,14 @@ def _rates(p: Floats, r: Floats, velocity: Floats, turning: Floats) -> None:
         spin(r[0], r[1], s, RATE_H_S, turning)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _tick(dt_s: float, pace: Floats) -> None:
     """Let a worker's pace (now, wished) come nearer to the wished one."""
     most = dt_s / HALT_S
     pace[0] += min(max(pace[1] - pace[0], -most), most)
 
 
-@numba.njit(**LEAN)
+@kernel
 def move_on(
     dt_s: float, n_steps: int, done: Ints, ticked: Bools,
     clock_s: Floats, time_s: Floats, duration_s: Floats, activity: Ints, pace: Floats,
@@ -97,7 +95,7 @@ def move_on(
     return waiting
 
 
-@numba.njit(**LEAN)
+@kernel
 def bodies_now(
     rows: Ints, clock_s: Floats, time_s: Floats, duration_s: Floats, activity: Ints, pace: Floats,
     plan: Floats, prints: Floats, stance: Floats, offset: Floats, traits: Floats,

@@ -2,9 +2,7 @@
 
 import math
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.anatomy import ARM, HAND, LEFT, SIDE_STRIDE, UPPER_ARM
@@ -21,14 +19,14 @@ CARRY_FORWARD_M, CARRY_Z_M, LOAD_HALF_WIDTH_M = 0.36, 1.05, 0.20
 """A load held up: ahead of the root, its height, half its width [m]; judgement."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def _look(share: float, plan: Floats, q: Floats) -> None:
     """Turn the head to the work."""
     q[c.HEAD_YAW] += share * (plan[pl.GAZE_YAW] - q[c.HEAD_YAW])
     q[c.HEAD_PITCH] += share * plan[pl.GAZE_PITCH]
 
 
-@numba.njit(**LEAN)
+@kernel
 def _extend(out: float, plan: Floats, q: Floats) -> None:
     """Hands and trunk at share `out` of a reach."""
     lean(plan[pl.LEAN] * out, plan[pl.SQUAT], plan[pl.TWIST] * out, q)
@@ -38,7 +36,7 @@ def _extend(out: float, plan: Floats, q: Floats) -> None:
     q[c.HAND_SHARE + 1] = out * plan[pl.USE_RIGHT]
 
 
-@numba.njit(**LEAN)
+@kernel
 def reach(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q: Floats) -> None:
     """The control vector of someone who reaches out, works there, and takes the hands back."""
     stand(plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW], clock_s, traits, size, q)
@@ -58,7 +56,7 @@ def reach(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, 
             q[c.HAND_TARGET + 3 * side + 2] += 0.5 * busy * math.sin(1.3 * beat + 2.0 * side)
 
 
-@numba.njit(**LEAN)
+@kernel
 def lift(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q: Floats) -> None:
     """The control vector of someone who picks a load up, holds it, and puts it back."""
     stand(plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW], clock_s, traits, size, q)
@@ -83,7 +81,7 @@ def lift(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q
         q[c.HAND_SHARE + side] = down - away
 
 
-@numba.njit(**LEAN)
+@kernel
 def _settle_lean(
     plan: Floats, traits: Floats, offset: Floats, frame: Floats, size: Floats,
     q: Floats, p: Floats, r: Floats,
@@ -120,7 +118,7 @@ def _settle_lean(
             plan[at + i] = p[upper, i] + nearer * (plan[at + i] - p[upper, i])
 
 
-@numba.njit(**LEAN)
+@kernel
 def plan_reach(
     target: tuple[float, float, float], used: tuple[float, float], peak_m_s: float,
     hold_s: float, fidget: tuple[float, float], plan: Floats, traits: Floats,
@@ -153,7 +151,7 @@ def plan_reach(
     return plan[pl.OUT_AT] + plan[pl.OUT_S] + hold_s + plan[pl.BACK_S] + 0.05
 
 
-@numba.njit(**LEAN)
+@kernel
 def _way(
     plan: Floats, traits: Floats, offset: Floats, frame: Floats, size: Floats,
     q: Floats, p: Floats, r: Floats,
@@ -174,7 +172,7 @@ def _way(
     return way
 
 
-@numba.njit(**LEAN)
+@kernel
 def plan_lift(
     ahead: float, z: float, times: tuple[float, float, float], plan: Floats, traits: Floats,
     offset: Floats, frame: Floats, size: Floats, q: Floats, p: Floats, r: Floats,

@@ -2,10 +2,9 @@
 
 import math
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.props import PROPS
@@ -20,7 +19,7 @@ N_HELD = 8
 """Numbers that say what is held: kind, position (3), quaternion (4, scalar first)."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def prop_pose(q: Floats, out: Floats) -> None:
     """Write what q holds and where into out (N_HELD,)."""
     out[0] = q[c.PROP]
@@ -38,7 +37,7 @@ def prop_pose(q: Floats, out: Floats) -> None:
     out[7] = sy * cp * cr - cy * sp * sr
 
 
-@numba.njit(**LEAN)
+@kernel
 def grip(side: int, gx: float, gy: float, gz: float, q: Floats) -> None:
     """Send a hand to a point of the prop's frame; its pose stands in q."""
     yaw, pitch, roll = q[c.PROP_POSE + 3], q[c.PROP_POSE + 4], q[c.PROP_POSE + 5]
@@ -53,14 +52,14 @@ def grip(side: int, gx: float, gy: float, gz: float, q: Floats) -> None:
     q[at + 2] = q[c.PROP_POSE + 2] + z
 
 
-@numba.njit(**LEAN)
+@kernel
 def hold_load(x: float, y: float, yaw: float, up: float, plan: Floats, q: Floats) -> None:
     """Put the load where someone at (x, y) facing yaw holds it, and the hands on it."""
     place_load(x, y, yaw, up, plan, q)
     grip_load(1.0, plan, q)
 
 
-@numba.njit(**LEAN)
+@kernel
 def place_load(x: float, y: float, yaw: float, up: float, plan: Floats, q: Floats) -> None:
     """Put the load where it is of someone at (x, y) facing yaw, `up` higher than standing."""
     cos, sin = math.cos(yaw), math.sin(yaw)
@@ -73,7 +72,7 @@ def place_load(x: float, y: float, yaw: float, up: float, plan: Floats, q: Float
     q[c.PROP_POSE + 4], q[c.PROP_POSE + 5] = plan[at + 4], plan[at + 5]
 
 
-@numba.njit(**LEAN)
+@kernel
 def grip_load(share: float, plan: Floats, q: Floats) -> None:
     """Send the hands that hold it to the load, by a share."""
     for side in range(2):
@@ -82,7 +81,7 @@ def grip_load(share: float, plan: Floats, q: Floats) -> None:
         q[c.HAND_SHARE + side] = share * plan[pl.LOAD_USED + side]
 
 
-@numba.njit(**LEAN)
+@kernel
 def drop_load(plan: Floats) -> None:
     """Empty hands."""
     for i in range(pl.N_LOAD):

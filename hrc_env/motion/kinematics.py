@@ -2,9 +2,7 @@
 
 import math
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import (
     ARM,
@@ -45,7 +43,7 @@ TURN, N_FRAMES = 22, 23
 """Rows after the 22 segments that the kinematics work in: points and vectors, a rotation."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def yaw_pitch_roll(yaw: float, pitch: float, roll: float, r: Floats, s: int) -> None:
     """r[s] = Rz(yaw) Ry(pitch) Rx(roll)."""
     cy, sy = math.cos(yaw), math.sin(yaw)
@@ -62,7 +60,7 @@ def yaw_pitch_roll(yaw: float, pitch: float, roll: float, r: Floats, s: int) -> 
     r[s, 2, 2] = cp * cr
 
 
-@numba.njit(**LEAN)
+@kernel
 def product(a: int, b: int, out: int, r: Floats) -> None:
     """r[out] = r[a] r[b]."""
     for i in range(3):
@@ -72,7 +70,7 @@ def product(a: int, b: int, out: int, r: Floats) -> None:
         r[out, i, 2] = x * r[b, 0, 2] + y * r[b, 1, 2] + z * r[b, 2, 2]
 
 
-@numba.njit(**LEAN)
+@kernel
 def attach(child: int, parent: int, offset: Floats, p: Floats, r: Floats) -> None:
     """Put the child's origin where its rest offset lies in the parent's frame."""
     x, y, z = offset[child, 0], offset[child, 1], offset[child, 2]
@@ -81,7 +79,7 @@ def attach(child: int, parent: int, offset: Floats, p: Floats, r: Floats) -> Non
         p[child, i] = p[parent, i] + turned
 
 
-@numba.njit(**LEAN)
+@kernel
 def aim(bone: int, end: int, length: float, frame: Floats, p: Floats, r: Floats) -> None:
     """Turn a bone so that it points from its origin to p[end], its hinge along p[HINGE].
 
@@ -100,7 +98,7 @@ def aim(bone: int, end: int, length: float, frame: Floats, p: Floats, r: Floats)
         r[bone, 2, j] = bz * b + mz * m + hz * h
 
 
-@numba.njit(**LEAN)
+@kernel
 def bend(
     start: int, end: int, first: float, second: float, knee: float, limit: float, p: Floats
 ) -> None:
@@ -129,7 +127,7 @@ def bend(
     p[HINGE, 2] = px * uy - py * ux
 
 
-@numba.njit(**LEAN)
+@kernel
 def trunk(q: Floats, offset: Floats, size: Floats, p: Floats, r: Floats) -> None:
     """Pelvis (as high as wished and as the legs allow), spine, neck and head."""
     yaw = q[c.HEADING] + q[c.PELVIS_YAW]
@@ -156,7 +154,7 @@ def trunk(q: Floats, offset: Floats, size: Floats, p: Floats, r: Floats) -> None
         product(s - 1, TURN, s, r)
 
 
-@numba.njit(**LEAN)
+@kernel
 def shoulder(
     side: int, q: Floats, cos: float, sin: float, offset: Floats, size: Floats,
     p: Floats, r: Floats,
@@ -192,7 +190,7 @@ def shoulder(
         attach(upper, clavicle, offset, p, r)
 
 
-@numba.njit(**LEAN)
+@kernel
 def arm(
     side: int, q: Floats, cos: float, sin: float, offset: Floats, frame: Floats,
     size: Floats, p: Floats, r: Floats,
@@ -216,7 +214,7 @@ def arm(
     aim(hand, GRIP, GRIP_M, frame, p, r)
 
 
-@numba.njit(**LEAN)
+@kernel
 def leg(
     side: int, q: Floats, offset: Floats, frame: Floats, size: Floats, p: Floats, r: Floats
 ) -> None:
@@ -237,7 +235,7 @@ def leg(
     attach(toes, foot, offset, p, r)
 
 
-@numba.njit(**LEAN)
+@kernel
 def pitched(cos: float, sin: float, pitch: float, r: Floats, s: int) -> None:
     """r[s] = Rz Ry(pitch), the cosine and sine of the first angle given."""
     cp, sp = 1.0, 0.0
@@ -248,7 +246,7 @@ def pitched(cos: float, sin: float, pitch: float, r: Floats, s: int) -> None:
     r[s, 2, 0], r[s, 2, 1], r[s, 2, 2] = -sp, 0.0, cp
 
 
-@numba.njit(**LEAN)
+@kernel
 def pose(q: Floats, offset: Floats, frame: Floats, size: Floats, p: Floats, r: Floats) -> None:
     """Fill the first 22 rows of p (N_POINTS, 3) and r (N_FRAMES, 3, 3) from q."""
     trunk(q, offset, size, p, r)
@@ -259,7 +257,7 @@ def pose(q: Floats, offset: Floats, frame: Floats, size: Floats, p: Floats, r: F
         leg(side, q, offset, frame, size, p, r)
 
 
-@numba.njit(**LEAN)
+@kernel
 def quaternion(r: Floats, s: int, out: Floats) -> None:
     """Unit quaternion (scalar first, w >= 0) of r[s] into out[s], by Shepperd's method."""
     trace = r[s, 0, 0] + r[s, 1, 1] + r[s, 2, 2]
@@ -284,7 +282,7 @@ def quaternion(r: Floats, s: int, out: Floats) -> None:
     out[s, 1 + k] = sign * (r[s, i, k] + r[s, k, i]) * n
 
 
-@numba.njit(**LEAN)
+@kernel
 def spin(before: Floats, after: Floats, s: int, duration: float, out: Floats) -> None:
     """Angular velocity (world) that takes before[s] to a close later after[s], into out[s]."""
     x = y = z = 0.0

@@ -7,9 +7,7 @@ Directions run on and are not wrapped.
 
 import math
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.motion import plans as pl
 from hrc_env.motion.curves import wrap
 from hrc_env.typing import Floats
@@ -21,7 +19,7 @@ OWN_EDGE, SHARED_EDGE = 0.9, 0.5
 """Most of an edge that the arc of a corner takes: of the first or last, of one between two."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def lay_path(
     start: tuple[float, float], via: Floats, end: tuple[float, float], plan: Floats
 ) -> None:
@@ -64,7 +62,7 @@ def lay_path(
     plan[pl.LENGTH], plan[pl.N_PIECES] = max(s, 1e-6), count
 
 
-@numba.njit(**LEAN)
+@kernel
 def _piece(
     plan: Floats, count: int, s: float, x: float, y: float, heading: float, curvature: float,
     total: float,
@@ -76,7 +74,7 @@ def _piece(
     return count + 1
 
 
-@numba.njit(**LEAN)
+@kernel
 def _find(s: float, plan: Floats) -> int:
     """First column of the piece that s [m] along the path lies on."""
     k = int(plan[pl.N_PIECES]) - 1
@@ -85,7 +83,7 @@ def _find(s: float, plan: Floats) -> int:
     return pl.PATH + pl.PIECE * k
 
 
-@numba.njit(**LEAN)
+@kernel
 def along(s: float, plan: Floats) -> tuple[float, float]:
     """Point of the path after s metres, held at its ends."""
     s = min(max(s, 0.0), plan[pl.LENGTH])
@@ -100,14 +98,14 @@ def along(s: float, plan: Floats) -> tuple[float, float]:
     )
 
 
-@numba.njit(**LEAN)
+@kernel
 def facing(s: float, plan: Floats) -> float:
     """Mean direction of the path round s metres [rad], continuous and so is its rate."""
     behind, ahead = s - HEADING_WINDOW_M, s + HEADING_WINDOW_M
     return (_turned(ahead, plan) - _turned(behind, plan)) / (2.0 * HEADING_WINDOW_M)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _turned(s: float, plan: Floats) -> float:
     """Integral of the direction from 0 to s [rad m]; straight on beyond the ends."""
     within = min(max(s, 0.0), plan[pl.LENGTH])

@@ -2,9 +2,7 @@
 
 import math
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.anatomy import ARM, FOREARM_GRIP, LEFT, SIDE_STRIDE, STAND_Z, UPPER_ARM
@@ -27,13 +25,13 @@ MOST_LEAN = 1.3
 """Lean beyond which a person would step instead."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def sway(clock_s: float, i: int, traits: Floats) -> float:
     """A slow wave of the worker's own, between -1 and 1; i in 0..4."""
     return math.sin(2.0 * math.pi * (SWAY_HZ[i] * clock_s + traits[pl.PHASE + i]))
 
 
-@numba.njit(**LEAN)
+@kernel
 def hang(side: int, pitch: float, elbow: float, size: Floats, q: Floats) -> None:
     """Let an arm hang: upper arm `pitch` forward of the vertical, elbow bent by `elbow`."""
     sign = 1.0 - 2.0 * side
@@ -47,7 +45,7 @@ def hang(side: int, pitch: float, elbow: float, size: Floats, q: Floats) -> None
     q[at + 2] = -(cos * upper * (1.0 - 0.5 * RELAXED_OUT * RELAXED_OUT) + both_cos * fore)
 
 
-@numba.njit(**LEAN)
+@kernel
 def stand(
     x: float, y: float, yaw: float, clock_s: float, traits: Floats, size: Floats, q: Floats
 ) -> None:
@@ -81,7 +79,7 @@ def stand(
     q[c.PROP] = 0.0
 
 
-@numba.njit(**LEAN)
+@kernel
 def lean(amount: float, squat: float, twist: float, q: Floats) -> None:
     """Bend the trunk forward (1: a deep bow), the knees too by the share `squat`, and turn.
 
@@ -98,7 +96,7 @@ def lean(amount: float, squat: float, twist: float, q: Floats) -> None:
     q[c.SPINE_TWIST] += 0.65 * twist
 
 
-@numba.njit(**LEAN)
+@kernel
 def beyond(
     q: Floats, used: tuple[float, float], offset: Floats, frame: Floats, size: Floats,
     p: Floats, r: Floats,

@@ -7,9 +7,7 @@ their activity's time coming to a halt, and are taken away by its going backward
 
 import math
 
-import numba
-
-from hrc_env.compiled import JIT, LEAN
+from hrc_env.kernels import kernel
 from hrc_env.motion import plans as pl
 from hrc_env.motion.anatomy import CHEST, HAND, HEAD, LEFT, SIDE_STRIDE
 from hrc_env.motion.state import (
@@ -34,7 +32,7 @@ WITHDRAW = -1.6
 """Hands come back so much faster than they went."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def notice(
     dt_s: float, people: tuple[float, float, float], robot_world: Floats, seen: Floats,
     position_world: Floats, present: Floats, alert: Floats, pace: Floats, clock_s: Floats,
@@ -81,7 +79,7 @@ def notice(
                 seen[b, k, i] = robot_world[b, k, i]
 
 
-@numba.njit(**LEAN)
+@kernel
 def _startling(
     dt_s: float, people: tuple[float, float, float], robot: Floats, before: Floats, body: Floats
 ) -> bool:
@@ -100,7 +98,7 @@ def _startling(
     return False
 
 
-@numba.njit(**LEAN)
+@kernel
 def _react(
     w: int, mine: Floats, pace: Floats, clock: float, time_s: Floats, duration_s: Floats,
     activity: Ints, plan: Floats, prints: Floats, stance: Floats, present: Floats, size: Floats,
@@ -123,13 +121,13 @@ def _react(
         mine[DOING], mine[UNTIL_AT], pace[w, 1] = PAUSE, clock + mine[LASTS_S], 0.0
 
 
-@numba.njit(**LEAN)
+@kernel
 def withdraws(activity: int) -> bool:
     """Whether one can step back from it: standing up, with empty hands."""
     return activity <= pl.REACH or activity == pl.LOOK_ROUND or pl.HAMMER <= activity <= pl.POINT
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _brake(
     w: int, time_s: Floats, duration_s: Floats, activity: Ints, plan: Floats, prints: Floats,
     stance: Floats, present: Floats, size: Floats,

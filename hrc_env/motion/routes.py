@@ -7,10 +7,9 @@ string would touch, and arcs round them (`paths`).
 import heapq
 import math
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT, LEAN
+from hrc_env.kernels import kernel
 from hrc_env.motion import plans as pl
 from hrc_env.motion.floorplan import CELL_M, slack_at
 from hrc_env.motion.paths import along, lay_path
@@ -31,7 +30,7 @@ BOW_SHARE = 0.12
 """People do not walk dead straight: sideways bow of a free way as a share of it; judgement."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def roomy(
     x: float, y: float, margin: float, ends: Floats, discs: Floats, slack: Floats, origin: Floats
 ) -> bool:
@@ -57,7 +56,7 @@ def roomy(
     return True
 
 
-@numba.njit(**LEAN)
+@kernel
 def clear(
     x0: float, y0: float, x1: float, y1: float, margin: float, ends: Floats, discs: Floats,
     slack: Floats, origin: Floats,
@@ -72,7 +71,7 @@ def clear(
     return True
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def route(
     start: tuple[float, float], end: tuple[float, float], bow: float, discs: Floats,
     slack: Floats, origin: Floats, plan: Floats, via: Floats,
@@ -116,7 +115,7 @@ def route(
     return -1
 
 
-@numba.njit(**LEAN)
+@kernel
 def walkable(plan: Floats, ends: Floats, discs: Floats, slack: Floats, origin: Floats) -> bool:
     """Whether the path of a plan is free."""
     n = int(plan[pl.LENGTH] / SAMPLE_M) + 1
@@ -127,7 +126,7 @@ def walkable(plan: Floats, ends: Floats, discs: Floats, slack: Floats, origin: F
     return True
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _search(
     start: tuple[float, float], end: tuple[float, float], ends: Floats, discs: Floats,
     slack: Floats, origin: Floats, via: Floats,
@@ -180,7 +179,7 @@ def _search(
     return _pull(goal, parent, n_y, h, start, end, ends, discs, slack, origin, via)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _pull(
     goal: int, parent: Floats, n_y: int, h: float, start: tuple[float, float],
     end: tuple[float, float], ends: Floats, discs: Floats, slack: Floats, origin: Floats,

@@ -2,11 +2,10 @@
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
 from hrc_env.body import N_SEGMENTS, Body
-from hrc_env.compiled import JIT
+from hrc_env.kernels import kernel
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.worker import Worker
@@ -73,7 +72,7 @@ def play(me: Worker, activity: int, time_s: Floats, clock_s: float = 0.0) -> Fil
     return Film(activity, time_s, controls, motion, copy)
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _play(
     activity: int, clock_s: float, time_s: Floats, me: Worker,
     controls: Floats, place: Floats, turn: Floats, rate: Floats, held: Floats,

@@ -3,9 +3,7 @@
 import math
 from collections.abc import Callable
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.climb import start_climb
 from hrc_env.motion.activities.crouching import plan_kneel, plan_squat
@@ -113,7 +111,7 @@ def _at_its_height(activity: int, place: Place) -> Place:
     return x, y, yaw, height
 
 
-@numba.njit(**LEAN)
+@kernel
 def own_side(x: float, y: float, others: Floats, plan: Floats) -> tuple[float, float]:
     """A target, moved over to the worker's own side of the middle to every other worker."""
     mx, my = plan[pl.START_X], plan[pl.START_Y]
@@ -128,7 +126,7 @@ def own_side(x: float, y: float, others: Floats, plan: Floats) -> tuple[float, f
     return x, y
 
 
-@numba.njit(**LEAN)
+@kernel
 def _target(
     draws: Floats, config: Numbers, near: bool, height: float, plan: Floats
 ) -> tuple[float, float, float]:
@@ -148,7 +146,7 @@ def _target(
     return bx + radius * math.cos(azimuth), by + radius * math.sin(azimuth), z
 
 
-@numba.njit(**LEAN)
+@kernel
 def start_reach(
     draws: Floats, config: Numbers, near: bool, height: float, others: Floats, me: Worker
 ) -> float:
@@ -173,7 +171,7 @@ def start_reach(
     )  # fmt: skip
 
 
-@numba.njit(**LEAN)
+@kernel
 def start_lift(draws: Floats, config: Numbers, me: Worker) -> float:
     """Draw a lift: where the load stands and how long bending, raising and holding take."""
     me.plan[pl.OUT_AT] = 0.1 + 0.4 * draws[11]

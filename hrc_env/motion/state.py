@@ -2,10 +2,9 @@
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT, LEAN
+from hrc_env.kernels import kernel
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.climb import climb
@@ -113,7 +112,7 @@ class MotionState:
     """Constants of the behaviour."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def evaluate(
     activity: int, t: float, clock_s: float, plan: Floats, prints: Floats, stance: Floats,
     offset: Floats, traits: Floats, size: Floats, frames: Floats, q: Floats,
@@ -146,7 +145,7 @@ def evaluate(
             q[i] += decay(t / BLEND_S, BLEND_S, offset[i, 0], offset[i, 1])
 
 
-@numba.njit(**LEAN)
+@kernel
 def _stay(
     activity: int, t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q: Floats
 ) -> None:
@@ -160,7 +159,7 @@ def _stay(
         hold_load(x, y, yaw, 0.0, plan, q)
 
 
-@numba.njit(**LEAN)
+@kernel
 def stop(plan: Floats, prints: Floats, stance: Floats) -> float:
     """Begin where the last activity ended; returns by how much its heading was unwound."""
     count = int(plan[pl.STEP_COUNT]) if plan[pl.UNDO_AT] == 0.0 else 0
@@ -180,7 +179,7 @@ def stop(plan: Floats, prints: Floats, stance: Floats) -> float:
     return unwound
 
 
-@numba.njit(**LEAN)
+@kernel
 def leave(
     t: float, pace: float, clock_s: float, activity: int, plan: Floats, prints: Floats,
     stance: Floats, offset: Floats, traits: Floats, size: Floats, frames: Floats, q: Floats,
@@ -210,7 +209,7 @@ def leave(
     q[1, c.HEADING] += unwound
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def join(
     clock_s: float, activity: int, plan: Floats, prints: Floats, stance: Floats, offset: Floats,
     traits: Floats, size: Floats, frames: Floats, q: Floats,
@@ -229,7 +228,7 @@ def join(
         offset[i, 0], offset[i, 1] = gap, (then - gap) / RATE_H_S
 
 
-@numba.njit(**LEAN)
+@kernel
 def settle(
     x: float, y: float, yaw: float, plan: Floats, prints: Floats, stance: Floats, size: Floats
 ) -> None:

@@ -6,9 +6,7 @@ ended; a worker who begins something makes sure to keep clear of all of that, so
 
 import math
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.recorded import clip_root
 from hrc_env.motion.paths import along
@@ -27,13 +25,13 @@ LOOK_S = 0.12
 """Meetings are looked for in steps of this length [s]; at 2.8 m/s to each other 0.3 m."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def goes(activity: int) -> bool:
     """Whether it moves along a path."""
     return activity == pl.WALK or pl.TURN <= activity <= pl.STEP_BACK
 
 
-@numba.njit(**LEAN)
+@kernel
 def ahead_of(activity: int) -> tuple[float, float]:
     """How far ahead of the root someone is in the way with what, and how near one may go [m]."""
     if activity == pl.PUSH:
@@ -45,7 +43,7 @@ def ahead_of(activity: int) -> tuple[float, float]:
     return AHEAD_M, HANDS_M
 
 
-@numba.njit(**LEAN)
+@kernel
 def root_at(activity: int, t: float, plan: Floats) -> tuple[float, float]:
     """Where someone's root is on the floor at time t of an activity, and after it."""
     if goes(activity):
@@ -55,7 +53,7 @@ def root_at(activity: int, t: float, plan: Floats) -> tuple[float, float]:
     return plan[pl.START_X], plan[pl.START_Y]
 
 
-@numba.njit(**LEAN)
+@kernel
 def gap_to(x: float, y: float, activity: int, t: float, plan: Floats) -> float:
     """How much farther a root at (x, y) is than it must be from someone's body and hands [m]."""
     ox, oy = root_at(activity, t, plan)
@@ -71,7 +69,7 @@ def gap_to(x: float, y: float, activity: int, t: float, plan: Floats) -> float:
     return gap
 
 
-@numba.njit(**LEAN)
+@kernel
 def meets(
     w: int, activity: Ints, time_s: Floats, duration_s: Floats, plan: Floats, present: Floats
 ) -> tuple[float, float, float]:

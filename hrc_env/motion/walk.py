@@ -6,9 +6,7 @@ Cadence and step length follow 68 walking trials of the CMU motion-capture datab
 
 import math
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.anatomy import ANKLE_X, LEG, STAND_Z
@@ -61,7 +59,7 @@ LURCH_S = 1.4
 """From a foot's catching to the walk's going on [s]; judgement."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def travelled(t: float, plan: Floats) -> float:
     """Metres along the path at time t."""
     u, rise = t - plan[pl.DEPART], plan[pl.RAMP]
@@ -69,7 +67,7 @@ def travelled(t: float, plan: Floats) -> float:
     return plan[pl.SPEED] * rise * (ramp(u / rise) - ramp((u - slow) / rise))
 
 
-@numba.njit(**LEAN)
+@kernel
 def speed(t: float, plan: Floats) -> float:
     """Rate of `travelled` [m/s]."""
     u, rise = t - plan[pl.DEPART], plan[pl.RAMP]
@@ -78,7 +76,7 @@ def speed(t: float, plan: Floats) -> float:
     return plan[pl.SPEED] * (a * a * (3.0 - 2.0 * a) - b * b * (3.0 - 2.0 * b))
 
 
-@numba.njit(**LEAN)
+@kernel
 def root(t: float, plan: Floats) -> tuple[float, float, float]:
     """Where the walker's middle is at time t, and their heading (continuous, not wrapped)."""
     s = travelled(t, plan)
@@ -91,7 +89,7 @@ def root(t: float, plan: Floats) -> tuple[float, float, float]:
     return x, y, yaw + plan[pl.TURN_OUT] * turned
 
 
-@numba.njit(**LEAN)
+@kernel
 def walk(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q: Floats) -> None:
     """The control vector of a walker but for the feet."""
     x, y, yaw = root(t, plan)
@@ -133,7 +131,7 @@ def walk(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q
         hold_load(x, y, yaw, q[c.PELVIS_Z] - size[STAND_Z], plan, q)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _lurch(t: float, trip: float, size: Floats, q: Floats) -> None:
     """Pitch forward with the arms out, `t` after a foot caught, and come up again.
 
@@ -154,7 +152,7 @@ def _lurch(t: float, trip: float, size: Floats, q: Floats) -> None:
         q[at + 2] += (0.22 + 0.08 * side) * arms
 
 
-@numba.njit(**LEAN)
+@kernel
 def plan_walk(
     start: tuple[float, float, float], via: Floats, end: tuple[float, float, float],
     wished_m_s: float, plan: Floats, prints: Floats, stance: Floats, size: Floats,
@@ -174,7 +172,7 @@ def plan_walk(
     return plan_pace((1.0, wished, 0.0), end[2], plan, prints, stance, size)
 
 
-@numba.njit(**LEAN)
+@kernel
 def plan_pace(
     pace: tuple[float, float, float], end_yaw: float,
     plan: Floats, prints: Floats, stance: Floats, size: Floats,
@@ -209,7 +207,7 @@ def plan_pace(
     return _plan_steps(0, plan, prints, stance, size)
 
 
-@numba.njit(**LEAN)
+@kernel
 def brake(t: float, plan: Floats, prints: Floats, stance: Floats, size: Floats) -> float:
     """Come to a stand on the path as soon as a walker can from time t; the new duration [s].
 
@@ -232,7 +230,7 @@ def brake(t: float, plan: Floats, prints: Floats, stance: Floats, size: Floats) 
     return plan[pl.LASTS]
 
 
-@numba.njit(**LEAN)
+@kernel
 def _plan_turns(end_yaw: float, plan: Floats) -> None:
     """Turn into the path and out of it; who must turn far sets off when the turn is nearly done."""
     first, final = facing(0.0, plan), facing(plan[pl.LENGTH], plan)
@@ -249,7 +247,7 @@ def _plan_turns(end_yaw: float, plan: Floats) -> None:
     plan[pl.END_YAW] = heading + turn
 
 
-@numba.njit(**LEAN)
+@kernel
 def _plan_steps(first: int, plan: Floats, prints: Floats, stance: Floats, size: Floats) -> float:
     """Lay footprints from a step on where the root will pass at mid-stance; when all is over [s].
 
@@ -274,7 +272,7 @@ def _plan_steps(first: int, plan: Floats, prints: Floats, stance: Floats, size: 
     return start + (count - 1) * period + plan[pl.STEP_SWING] + FLAT_S
 
 
-@numba.njit(**LEAN)
+@kernel
 def _first_foot(plan: Floats) -> float:
     """Begin with the foot on the side that the walker turns or steps to."""
     x, y, yaw = root(plan[pl.DEPART] + plan[pl.DURATION], plan)
@@ -284,7 +282,7 @@ def _first_foot(plan: Floats) -> float:
     return 0.0 if turn >= 0.0 else 1.0
 
 
-@numba.njit(**LEAN)
+@kernel
 def footprint(
     side: int, x: float, y: float, yaw: float, half_width: float, size: Floats, out: Floats
 ) -> None:

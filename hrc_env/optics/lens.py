@@ -17,11 +17,10 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT, LEAN
 from hrc_env.errors import ConfigError, unknown
+from hrc_env.kernels import kernel
 from hrc_env.typing import Floats
 
 COEFFICIENTS = {
@@ -123,25 +122,25 @@ def _each(kernel: Callable[..., None], lens: Lens, places: Floats, width: int) -
     return out.reshape(*np.shape(places)[:-1], width)
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _bend_all(row, straight, out):
     for i in range(len(straight)):
         out[i, 0], out[i, 1] = bent(row, straight[i, 0], straight[i, 1])
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _stretch_all(row, straight, out):
     for i in range(len(straight)):
         out[i] = stretch_at(row, straight[i, 0], straight[i, 1])
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _rays_all(row, places, out):
     for i in range(len(places)):
         out[i, 0], out[i, 1], out[i, 2] = _ray(row, places[i, 0], places[i, 1])
 
 
-@numba.njit(**LEAN)
+@kernel
 def bent(row, x, y):
     """Where the lens of a row shows what a pinhole shows at x, y; far away what it does not see."""
     squared = x * x + y * y
@@ -161,7 +160,7 @@ def bent(row, x, y):
     return x, y
 
 
-@numba.njit(**LEAN)
+@kernel
 def stretch_at(row, x, y):
     """`stretch` at one straight place."""
     if row[0] == NONE:
@@ -173,7 +172,7 @@ def stretch_at(row, x, y):
     return 2.0 * _STEP / math.sqrt(max(abs(area), 1e-18))
 
 
-@numba.njit(**LEAN)
+@kernel
 def _bent_radius(row, angle):
     """How far from the middle light arrives that comes at an angle [rad] to the axis."""
     if row[0] == KANNALA_BRANDT:
@@ -186,7 +185,7 @@ def _bent_radius(row, angle):
     return radius
 
 
-@numba.njit(**LEAN)
+@kernel
 def _ray(row, x, y):
     """Unit direction of a bent place; NaN where nothing is seen."""
     far = math.sqrt(x * x + y * y)
@@ -206,7 +205,7 @@ def _ray(row, x, y):
     return u / length, v / length, 1.0 / length
 
 
-@numba.njit(**LEAN)
+@kernel
 def _angle_of(row, far):
     """The angle [rad] whose light arrives at a radius below the limit: Newton's steps, halving
     where these leave the bracket."""
@@ -226,7 +225,7 @@ def _angle_of(row, far):
     return angle
 
 
-@numba.njit(**LEAN)
+@kernel
 def _without_decentring(row, x, y, u, v):
     """Newton's steps from a first guess to the straight place that is bent to x, y."""
     for _ in range(_NEWTON_STEPS):

@@ -9,10 +9,9 @@ import math
 from dataclasses import dataclass
 
 import cv2
-import numba
 import numpy as np
 
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.perception.network import DETECTOR_SIDE, LANDMARK_SIDE
 from hrc_env.perception.tensors import Tensor
 from hrc_env.records import CropWindow
@@ -180,7 +179,7 @@ def decode_landmarks(points: Tensor, heat: Tensor) -> Floats:
     return out
 
 
-@numba.njit(**LEAN)
+@kernel
 def refine(points, heat, out):
     """`decode_landmarks` into `out`: a kernel, so that the other thread need not wait for it."""
     for k in range(out.shape[0]):
@@ -203,12 +202,12 @@ def refine(points, heat, out):
             out[k, 1] = at_row / total / _HEAT_SIDE
 
 
-@numba.njit(**LEAN)
+@kernel
 def _on_map(cell):
     return 0 <= cell < _HEAT_SIDE
 
 
-@numba.njit(**LEAN)
+@kernel
 def _chance(logit):
     return 1.0 / (1.0 + math.exp(-min(max(logit, -80.0), 80.0)))
 

@@ -4,11 +4,10 @@ import itertools
 import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT, LEAN
 from hrc_env.geometry.sight import make_table
+from hrc_env.kernels import kernel
 from hrc_env.perception.calibration import POSTURED, SHAPES
 from hrc_env.perception.noise import error_share
 from hrc_env.perception.outline import facing, mix, posture_of, seen_from, speed
@@ -135,7 +134,7 @@ class Scalars(NamedTuple):
     stature_of_side: float
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def emulate_batch(errors, normals, world, rig, tables, scalars, px, confidence, sigma):
     """Advance the errors by one image and write keypoints.
 
@@ -185,7 +184,7 @@ def emulate_batch(errors, normals, world, rig, tables, scalars, px, confidence, 
                 )  # fmt: skip
 
 
-@numba.njit(**LEAN)
+@kernel
 def _wander(wander, normals, joints, front_x, front_y, keep, here, tables, scalars, meant):
     """Write where in space the detector means the joints to be, whatever the camera."""
     renew = math.sqrt(1.0 - keep * keep)
@@ -208,7 +207,7 @@ def _wander(wander, normals, joints, front_x, front_y, keep, here, tables, scala
         meant[j, 2] = joints[j, 2] + scale * up
 
 
-@numba.njit(**LEAN)
+@kernel
 def _happen(happening, normals, n_seen, look_of, here, scalars):
     """Whether left and right are exchanged now, of all joints and of the legs; whether the worker
     is found.
@@ -225,7 +224,7 @@ def _happen(happening, normals, n_seen, look_of, here, scalars):
     return swapped, crossed, n_seen >= scalars.min_joints and not missed
 
 
-@numba.njit(**LEAN)
+@kernel
 def _goes_on(happening, which, normals, keep):
     """Advance a normal variable; the share of its distribution that is below it."""
     renew = math.sqrt(1.0 - keep * keep)
@@ -233,7 +232,7 @@ def _goes_on(happening, which, normals, keep):
     return 0.5 * math.erfc(-happening[which] / math.sqrt(2.0))
 
 
-@numba.njit(**LEAN)
+@kernel
 def _between(angle, n):
     """Of n directions round the circle the two on either side of an angle [rad], and how far it
     is from the first to the second."""
@@ -242,7 +241,7 @@ def _between(angle, n):
     return int(low) % n, (int(low) + 1) % n, place - low
 
 
-@numba.njit(**LEAN)
+@kernel
 def _report(
     lasting, slow, size, sure, body, w, normals, keep, uv, state, look_of, found, swapped,
     crossed, here, tables, scalars, off, px, confidence, sigma,
@@ -297,12 +296,12 @@ def _report(
         sigma[label] = scalars.stature_of_side * side * share
 
 
-@numba.njit(**LEAN)
+@kernel
 def _lerp(a, b, part):
     return a + part * (b - a)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _quantile(known, normal):
     """Of a distribution given by its quantiles at whole standard deviations, 0 in the middle."""
     last = len(known) - 1
@@ -311,7 +310,7 @@ def _quantile(known, normal):
     return _lerp(known[low], known[low + 1], place - low)
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _parts(row):
     """A row of numbers as what they are."""
     return Postured(

@@ -6,11 +6,10 @@ meets the same numbers in the other.
 
 from collections.abc import Sequence
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import LEAN
 from hrc_env.errors import check_shape
+from hrc_env.kernels import kernel
 from hrc_env.perception.calibration import KIND, POSTURES, VISIBILITY, read_calibration
 from hrc_env.typing import Floats
 
@@ -44,7 +43,7 @@ def sigma_px(
     return np.where(confidence > 0, share * stature_px, np.inf)
 
 
-@numba.njit(**LEAN)
+@kernel
 def error_share(confidence: float, visibility: Floats, error: Floats) -> float:
     """`sigma_px` of one joint and a stature of one, for kernels: the tables are passed in."""
     if not confidence > 0.0:

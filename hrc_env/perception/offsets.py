@@ -8,10 +8,9 @@ much they differ was measured on renders, with the numbers that the emulator dra
 
 from dataclasses import replace
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT
+from hrc_env.kernels import kernel
 from hrc_env.perception.calibration import HAND, KIND, read_calibration
 from hrc_env.perception.outline import facing, mix, posture_of
 from hrc_env.records import PoseEstimate
@@ -33,7 +32,7 @@ def our_joints(estimate: PoseEstimate) -> PoseEstimate:
     return replace(estimate, mean_world=mean_world)
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _put_right(mean, velocity, tracked, offset_of, kinds, hands):
     row = np.empty(offset_of.shape[1])
     offset = row.reshape(-1, 3)

@@ -2,9 +2,7 @@
 
 import math
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.perception.blazepose import ROI_MARGIN
 from hrc_env.perception.windows import CROWN, HAND, MIN_REACH_M, MIN_TORSO_M
 
@@ -31,7 +29,7 @@ first, those that push a barrow between the two, those that carry, work or point
 # ankle 11 12.
 
 
-@numba.njit(**LEAN)
+@kernel
 def facing(joints):
     """(x, y) horizontal unit vector to where a body's (J, 3) front is; +x where there is none."""
     left_x = joints[1, 0] - joints[2, 0] + joints[7, 0] - joints[8, 0]
@@ -42,7 +40,7 @@ def facing(joints):
     return left_y / length, -left_x / length
 
 
-@numba.njit(**LEAN)
+@kernel
 def folded(joints):
     """How folded a body (J, 3) is: 0 upright, 1 folded up."""
     length, height = 0.0, 0.0
@@ -55,7 +53,7 @@ def folded(joints):
     return min(max((share - UPRIGHT) / (FOLDED - UPRIGHT), 0.0), 1.0)
 
 
-@numba.njit(**LEAN)
+@kernel
 def kneeling(joints):
     """Whether a body (J, 3), if it is folded, has a knee on the ground: 0 not, 1 certainly."""
     least = 1.0
@@ -66,7 +64,7 @@ def kneeling(joints):
     return min(max((SQUATS - least) / (SQUATS - KNEELS), 0.0), 1.0)
 
 
-@numba.njit(**LEAN)
+@kernel
 def speed(velocity):
     """Mean speed of joints (J, 3) [m/s]."""
     total = 0.0
@@ -76,13 +74,13 @@ def speed(velocity):
     return total / len(velocity)
 
 
-@numba.njit(**LEAN)
+@kernel
 def stepping(mean_speed_m_s):
     """Whether a body walks, by its joints' mean speed: 0 stands, 1 walks."""
     return min(max((mean_speed_m_s - STANDS_M_S) / (WALKS_M_S - STANDS_M_S), 0.0), 1.0)
 
 
-@numba.njit(**LEAN)
+@kernel
 def handling(joints):
     """Whether a body (J, 3) has something in its hands or to do with them: 0 not, 1 certainly."""
     most = 0.0
@@ -94,7 +92,7 @@ def handling(joints):
     return min(max((most - HANGS) / (RAISED - HANGS), 0.0), 1.0)
 
 
-@numba.njit(**LEAN)
+@kernel
 def weigh(folding, kneels, hands, steps):
     """How far a body counts as standing, walking, handling something, folded over its feet and
     kneeling; together 1."""
@@ -104,14 +102,14 @@ def weigh(folding, kneels, hands, steps):
     return free * (1.0 - steps), free * steps, up * hands, folded_up[0], folded_up[1]
 
 
-@numba.njit(**LEAN)
+@kernel
 def posture_of(joints, velocity):
     """`weigh` of a body's joints (J, 3) [m] and their velocities (J, 3) [m/s]."""
     steps = stepping(speed(velocity))
     return weigh(folded(joints), kneeling(joints), handling(joints), steps)
 
 
-@numba.njit(**LEAN)
+@kernel
 def mix(posture, tables, out):
     """Write what tables (P, N), one for each posture, are for a body: (N,)."""
     out[:] = 0.0
@@ -121,14 +119,14 @@ def mix(posture, tables, out):
                 out[k] += posture[p] * tables[p, k]
 
 
-@numba.njit(**LEAN)
+@kernel
 def _apart(joints, i, k):
     x, y = joints[i, 0] - joints[k, 0], joints[i, 1] - joints[k, 1]
     z = joints[i, 2] - joints[k, 2]
     return math.sqrt(x * x + y * y + z * z)
 
 
-@numba.njit(**LEAN)
+@kernel
 def seen_from(joints, front_x, front_y, eye):
     """From where an eye sees a body: 0 its front, pi / 2 its left [rad]."""
     x = eye[0] - 0.25 * (joints[1, 0] + joints[2, 0] + joints[7, 0] + joints[8, 0])
@@ -136,7 +134,7 @@ def seen_from(joints, front_x, front_y, eye):
     return math.atan2(front_x * y - front_y * x, front_x * x + front_y * y)
 
 
-@numba.njit(**LEAN)
+@kernel
 def window_round(uv, depth, px_per_m, nearest_m):
     """Side [px] and turn [rad] of the window round joints (J, 2), as `window_from_joints` has it.
 
@@ -163,6 +161,6 @@ def window_round(uv, depth, px_per_m, nearest_m):
     return 2.0 * ROI_MARGIN * math.sqrt(reach), math.atan2(x, -y)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _squared(x, y):
     return x * x + y * y

@@ -6,10 +6,8 @@ line passes through: a joint is hidden where that is much more than the way from
 capsule's axis to its surface.
 """
 
-import numba
-
-from hrc_env.compiled import LEAN
 from hrc_env.geometry.shapes import HALF_SIZE, against_axis, rounded, through_tube
+from hrc_env.kernels import kernel
 
 BLOCKING_CHORD = 1.4
 """A line that runs through a capsule for more than this many of its radii is blocked: it
@@ -19,7 +17,7 @@ OWN_CAPSULE_M = 0.06
 """So much longer may the way out of a capsule be that the joint itself lies in [m]."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def body_blocks(table, row, px, py, pz, dx, dy, dz, length):
     """Whether a body's capsule, a row of shapes, hides what is at `length` [m] on a line.
 

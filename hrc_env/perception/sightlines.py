@@ -2,12 +2,11 @@
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT, LEAN
 from hrc_env.geometry.shapes import passage, set_capsules, set_rows
 from hrc_env.geometry.sight import blocks, line, look, make_table, meets
+from hrc_env.kernels import kernel
 from hrc_env.optics.lens import FOLD, bent, stretch_at
 from hrc_env.perception.outline import (
     facing,
@@ -73,7 +72,7 @@ class Rig(NamedTuple):
     """(C, `CENTRE` + 2) lenses; zeros for pinholes."""
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def sight_batch(world, rig, sight, look_of):
     """Write how joints (B, C, W, J) and workers (B, C, W, `N_LOOK`) are seen; nothing errs."""
     n_workers, n_joints = world.joints.shape[1:3]
@@ -100,7 +99,7 @@ def sight_batch(world, rig, sight, look_of):
                 mine[STEPPING] = stepping(speed(world.velocity[b, w]))
 
 
-@numba.njit(**LEAN)
+@kernel
 def fill(table, world, b):
     """Write everything that moves in environment b behind what never does."""
     row, n_body = len(world.still), world.radius.shape[2]
@@ -112,7 +111,7 @@ def fill(table, world, b):
         set_capsules(table, row + w * n_body, world.capsules[b, w], world.radius[b, w])
 
 
-@numba.njit(**LEAN)
+@kernel
 def see(rig, c, joints, meant, table, first_body, view, rows, uv, depth, state, look_of):
     """Project what is meant, find out what hides the joints. How many of these are seen."""
     _project(rig.P[c], meant, uv, depth)
@@ -127,7 +126,7 @@ def see(rig, c, joints, meant, table, first_body, view, rows, uv, depth, state, 
     return _sight(rig.eyes[c], joints, table, first_body, view, rows, state)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _project(P, joints, uv, depth):
     for j in range(len(joints)):
         x, y, z = joints[j, 0], joints[j, 1], joints[j, 2]
@@ -137,7 +136,7 @@ def _project(P, joints, uv, depth):
         uv[j, 1] = (P[1, 0] * x + P[1, 1] * y + P[1, 2] * z + P[1, 3]) / safe
 
 
-@numba.njit(**LEAN)
+@kernel
 def _bend(bending, uv, depth):
     """Bend pinhole pixels in place. How many times longer the pinhole shows the body."""
     fx, fy, cx, cy = bending[FOCAL], bending[FOCAL + 1], bending[CENTRE], bending[CENTRE + 1]
@@ -152,7 +151,7 @@ def _bend(bending, uv, depth):
     return total / n if n > 0 else 1.0
 
 
-@numba.njit(**LEAN)
+@kernel
 def _image(uv, depth, image, state):
     """Which joints are in the image."""
     for j in range(len(depth)):
@@ -164,7 +163,7 @@ def _image(uv, depth, image, state):
             state[j] = SEEN
 
 
-@numba.njit(**LEAN)
+@kernel
 def _sight(eye, joints, table, first_body, view, rows, state):
     """Mark the joints in the image that something hides. Counts the seen.
 
@@ -180,7 +179,7 @@ def _sight(eye, joints, table, first_body, view, rows, state):
     return n_seen
 
 
-@numba.njit(**LEAN)
+@kernel
 def _is_hidden(eye, joints, j, table, first_body, view, rows, n_view):
     dx, dy, dz, length = line(eye, joints, j)
     for i in range(n_view):

@@ -2,10 +2,8 @@
 
 import math
 
-import numba
-
-from hrc_env.compiled import LEAN
 from hrc_env.geometry.chains import SerialChain
+from hrc_env.kernels import kernel
 from hrc_env.typing import Floats, JointAngles, JointVelocities
 
 END_MARGIN_RAD = 0.02
@@ -51,7 +49,7 @@ def substep_commands(
     _ramp(q, command, wanted, ranges, limits, slew_rad_s2, sim_dt, lead_s, hold, rate)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _shorten_leashes(q, qd, held, command, leash, reach):
     for b in range(q.shape[0]):
         for i in range(q.shape[1]):
@@ -59,7 +57,7 @@ def _shorten_leashes(q, qd, held, command, leash, reach):
             command[b, i] = min(max(command[b, i], qd[b, i] - reach), qd[b, i] + reach)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _ramp(q, command, wanted, ranges, limits, slew, sim_dt, lead_s, hold, rate):
     brake, ctrl_dt = BRAKE_SHARE * slew, sim_dt * rate.shape[1]
     for b in range(q.shape[0]):

@@ -9,14 +9,13 @@ from collections import OrderedDict
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.appearance import Look
-from hrc_env.compiled import LEAN
 from hrc_env.errors import ConfigError, unknown
 from hrc_env.geometry.cameras import PinholeCamera, pinhole
+from hrc_env.kernels import kernel
 from hrc_env.records import CropWindow, WorkerMotion
 from hrc_env.scene import gl
 from hrc_env.scene.build import Scene
@@ -168,7 +167,7 @@ def _key(camera: PinholeCamera, window: CropWindow) -> Key:
     return tuple(map(float, (*numbers, *side)))
 
 
-@numba.njit(**LEAN)
+@kernel
 def _lay_over(rgb, z, z_behind, out):
     """What is nearer than what is behind (1 is near), laid over `out`, which is top row first."""
     height, width = z.shape

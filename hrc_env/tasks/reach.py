@@ -4,11 +4,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import LEAN
 from hrc_env.errors import ConfigError
+from hrc_env.kernels import kernel
 from hrc_env.typing import Bools, Floats, Ints, Points3
 
 
@@ -116,7 +115,7 @@ def succeeded(state: ReachState) -> Bools:
     return (state.n_reached > 0) & (state.n_missed == 0)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _judge(
     tool_world: Points3, dt_s: float, radius_m: float, time_limit_s: float,
     goal_world: Points3, goal_age_s: Floats, distance_m: Floats, n_reached: Ints, n_missed: Ints,

@@ -6,11 +6,10 @@ whole body's random acceleration; nobody's body relaxes to the prior. docs/track
 says how good this is and what it was compared with.
 """
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT
 from hrc_env.errors import ConfigError
+from hrc_env.kernels import kernel
 from hrc_env.records import PoseEstimate
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.forecast import N_INPUTS, describe, foresee, load_forecast, make_scratch
@@ -70,7 +69,7 @@ def ahead(now: PoseEstimate, horizon_s: float, config: TrackerConfig) -> PoseEst
     return report(later, config)
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _look_ahead(
     network, mean, cov, velocity, tracked, horizon, unknown_heading, keep, home, home_std
 ):  # fmt: skip
@@ -92,7 +91,7 @@ def _look_ahead(
             _add(*body, cos, sin, moved, rate, std)
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _go_on(mean, cov, velocity, horizon, variance):
     """Constant velocity, and `variance` [m^2] more."""
     for j in range(len(mean)):
@@ -101,7 +100,7 @@ def _go_on(mean, cov, velocity, horizon, variance):
             cov[j, i, i] += variance
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _add(mean, cov, velocity, cos, sin, moved, rate, std):
     """Displacements of the body's frame onto the body in the world."""
     for j in range(len(mean)):

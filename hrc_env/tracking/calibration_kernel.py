@@ -2,11 +2,10 @@
 
 import math
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT, LEAN
 from hrc_env.geometry.triangulation import pixel_of
+from hrc_env.kernels import kernel
 
 N_NUMBERS = 5
 """Shift along u and v, growth, turn, all in radians or shares; delay [s]."""
@@ -35,7 +34,7 @@ N_VIEW = 13
 (2 x 3), pixel (2)."""
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def gather(
     information, score, ratio, suspected, due, ids, px, confidence, sigma_px, age_s,
     mean, velocity, tracked, P, axes, prior, allowed,
@@ -69,7 +68,7 @@ def gather(
         _judge(ratio[b], suspected[b])
 
 
-@numba.njit(**LEAN)
+@kernel
 def _view(px, confidence, sigma_px, age_s, mean, velocity, p, out):
     """Write one camera's view of a joint; whether there is one."""
     if not confidence >= LEAST_CONFIDENCE:
@@ -90,7 +89,7 @@ def _view(px, confidence, sigma_px, age_s, mean, velocity, p, out):
     return True
 
 
-@numba.njit(**LEAN)
+@kernel
 def _triangulate(view, seen, axes, information, score, small):
     """Add what the views of one joint say of the cameras that it is seen by.
 
@@ -114,7 +113,7 @@ def _triangulate(view, seen, axes, information, score, small):
             _add(view[c], axes[c], small, information[c], score[c])
 
 
-@numba.njit(**LEAN)
+@kernel
 def _add(v, axes, small, information, score):
     """Add one view; `small` holds the inverse information of the joint, and its score beside."""
     b00 = b01 = b11 = 0.0
@@ -142,7 +141,7 @@ def _add(v, axes, small, information, score):
             information[i, j] += left * a0[j] + right * a1[j]
 
 
-@numba.njit(**LEAN)
+@kernel
 def _ratio(information, score, prior, allowed, small):
     """What growth alone explains, or shift and growth, or all four numbers, at their costs."""
     n, growth, turn = N_NUMBERS, N_NUMBERS - 3, N_NUMBERS - 2
@@ -176,7 +175,7 @@ def _ratio(information, score, prior, allowed, small):
     return max(grown, shifted - SHIFT_COSTS, turned - TURN_COSTS)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _judge(ratio, suspected):
     """Name the worst camera, keep whom one has named until others are worse or it agrees again."""
     worst, second = 0, 0.0
@@ -195,7 +194,7 @@ def _judge(ratio, suspected):
             suspected[c] = ratio[c] > NAMED_AT and ratio[c] > DECIDED * second
 
 
-@numba.njit(**LEAN)
+@kernel
 def _invert(a, n):
     """Invert the leading n rows and columns of a symmetric positive matrix in place."""
     for k in range(n):

@@ -11,12 +11,11 @@ import functools
 import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.body import assets_dir
-from hrc_env.compiled import JIT
+from hrc_env.kernels import kernel
 from hrc_env.skeleton import N_JOINTS
 from hrc_env.tracking.models.acquisition import heading
 from hrc_env.typing import Floats
@@ -54,7 +53,7 @@ def load_forecast() -> Forecast:
         return Forecast(*(np.ascontiguousarray(stored[name]) for name in Forecast._fields))
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def describe(points, velocity, cov, log_std, out):
     """What the network looks at: out (N_INPUTS,) float32; cosine, sine of the heading, known.
 
@@ -89,7 +88,7 @@ def describe(points, velocity, cov, log_std, out):
     return cos, sin, known
 
 
-@numba.njit(fastmath=_REORDER, **JIT)
+@kernel(makes_arrays=True, fastmath=_REORDER)
 def _layer(inputs, weight, bias, out):
     """out = bias + inputs weight."""
     for k in range(len(out)):
@@ -100,14 +99,14 @@ def _layer(inputs, weight, bias, out):
             out[k] += value * weight[i, k]
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _hidden(inputs, weight, bias, out):
     _layer(inputs, weight, bias, out)
     for k in range(len(out)):
         out[k] = max(out[k], np.float32(0.0))
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def foresee(network, inputs, horizon, scratch, moved, rate, std):
     """The network's answer at `horizon` [s], interpolated between those that it knows.
 
@@ -141,7 +140,7 @@ def foresee(network, inputs, horizon, scratch, moved, rate, std):
         std[j] = last + share * (math.exp(after[3 * N_JOINTS + j]) - last)
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def make_scratch(network):
     """Room for one body's layers."""
     first = np.empty(network.weight_1.shape[1], np.float32)

@@ -5,16 +5,15 @@ that are not in (0, 1] and standard deviations that are not finite and positive 
 there is no measurement; wrong pixels that look like pixels are left to the robust likelihoods.
 """
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import LEAN
 from hrc_env.errors import check_shape
 from hrc_env.geometry.triangulation import (
     FURTHEST_PX,
     NEAREST_DEPTH_M,
     pixel_of,
 )
+from hrc_env.kernels import kernel
 from hrc_env.records import Keypoints
 from hrc_env.typing import Floats
 
@@ -37,7 +36,7 @@ def arrays_of(
     )
 
 
-@numba.njit(**LEAN)
+@kernel
 def is_measurement(u, v, belief, sigma):
     """Whether a pixel, its confidence and its standard deviation are a measurement."""
     return (
@@ -48,7 +47,7 @@ def is_measurement(u, v, belief, sigma):
     )
 
 
-@numba.njit(**LEAN)
+@kernel
 def read_worker(px, confidence, sigma_px, b, w, scale, z, sigma, ok):
     """Worker w of environment b: pixels z (J, C, 2), sigma (J, C), ok (J, C); whether any is ok.
 
@@ -68,7 +67,7 @@ def read_worker(px, confidence, sigma_px, b, w, scale, z, sigma, ok):
     return any_ok
 
 
-@numba.njit(fastmath=_REORDER, **LEAN)
+@kernel(fastmath=_REORDER)
 def pixel_spread(p, u, v, depth, cov):
     """Mean variance of a coordinate of the pixel [px^2] of a point with covariance `cov` (3, 3).
 
@@ -88,7 +87,7 @@ def pixel_spread(p, u, v, depth, cov):
     return 0.5 * own + cross
 
 
-@numba.njit(**LEAN)
+@kernel
 def supports(camera, z, sigma, gate_sigma, point, cov):
     """Whether a pixel lies where a joint with this mean and covariance may be seen."""
     u, v, depth = pixel_of(camera, point[0], point[1], point[2])

@@ -16,10 +16,9 @@
 from dataclasses import dataclass
 from typing import TypeAlias
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT
+from hrc_env.kernels import kernel
 from hrc_env.records import Keypoints, PoseEstimate
 from hrc_env.skeleton import N_JOINTS
 from hrc_env.tracking.ahead import ahead
@@ -175,7 +174,7 @@ def _chance(by_weight: bool, n_particles: int, rng: np.random.Generator) -> Floa
     return np.repeat(rng.random((N_JOINTS, 1)), n_particles + 1, axis=1)
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def weigh_and_resample(P, z, sigma, ok, particles, by_weight, chance):
     """Lines 8 to 17 for the clouds (J, 3, M) of one worker, in place."""
     n_joints, n_cameras = ok.shape
@@ -200,7 +199,7 @@ def weigh_and_resample(P, z, sigma, ok, particles, by_weight, chance):
                 particles[j, i, m] = before[i, ancestors[m]]
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _look_after(
     P, z, sigma, ok, gate_sigma, radius, conflict_frames, mean, cov, age, conflict, again
 ):

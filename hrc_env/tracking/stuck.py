@@ -8,10 +8,9 @@ a frozen image makes single new ones.
 import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.records import Keypoints
 from hrc_env.typing import Floats, Ints
 
@@ -51,7 +50,7 @@ def leave_out_stuck(state: StuckState, ids: Ints, keypoints: Keypoints) -> None:
     _leave_out(state.last, state.new, ids, keypoints.px, keypoints.confidence, keypoints.sigma_px)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _leave_out(last, new, ids, px, confidence, sigma_px):
     for row in range(len(ids)):
         b = ids[row]
@@ -68,7 +67,7 @@ def _leave_out(last, new, ids, px, confidence, sigma_px):
                         confidence[row, c, w, j], sigma_px[row, c, w, j] = 0.0, math.inf
 
 
-@numba.njit(**LEAN)
+@kernel
 def _sum(px):
     """Of all pixels of one camera; 0 where there are none."""
     total = 0.0

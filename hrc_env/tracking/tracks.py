@@ -4,10 +4,9 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.records import PoseEstimate
 from hrc_env.skeleton import N_JOINTS
 from hrc_env.tracking.config import TrackerConfig
@@ -111,7 +110,7 @@ def grow_older(tracks: Tracks, dt_s: float, config: TrackerConfig) -> None:
     _grow_older(*gaussian, tracks.age_s, tracks.conflict, tracks.tracked, dt_s, settings_of(config))
 
 
-@numba.njit(**LEAN)
+@kernel
 def _grow_older(mean, cov, velocity, age, conflict, tracked, dt, s):
     for b in range(mean.shape[0]):
         for w in range(mean.shape[1]):
@@ -120,7 +119,7 @@ def _grow_older(mean, cov, velocity, age, conflict, tracked, dt, s):
             tracked[b, w] = still
 
 
-@numba.njit(**LEAN)
+@kernel
 def age_worker(mean, cov, velocity, age, conflict, tracked, dt, s):
     """A worker (J, ...) gets older by dt [s], in place; whether they are still tracked.
 
@@ -135,7 +134,7 @@ def age_worker(mean, cov, velocity, age, conflict, tracked, dt, s):
     return False
 
 
-@numba.njit(**LEAN)
+@kernel
 def count_up(age, dt, most):
     """Ages (J,) dt [s] later, in place; the youngest."""
     youngest = np.inf
@@ -145,7 +144,7 @@ def count_up(age, dt, most):
     return youngest
 
 
-@numba.njit(**LEAN)
+@kernel
 def relax(mean, cov, velocity, keep, home, std):
     """A body (J, ...) that nobody follows keeps a share of what was known; the rest is prior."""
     for j in range(len(mean)):
@@ -177,14 +176,14 @@ def report(tracks: Tracks, config: TrackerConfig) -> PoseEstimate:
     )
 
 
-@numba.njit(**LEAN)
+@kernel
 def _bound_all(cov, least_std, most_std):
     for b in range(cov.shape[0]):
         for w in range(cov.shape[1]):
             bound(cov[b, w], least_std, most_std)
 
 
-@numba.njit(**LEAN)
+@kernel
 def bound(cov, least_std, most_std):
     """Make covariances (J, 3, 3) no narrower and no wider than these [m], in place.
 
@@ -203,7 +202,7 @@ def bound(cov, least_std, most_std):
                 cov[j, i, i] += missing
 
 
-@numba.njit(**LEAN)
+@kernel
 def _is_wider(a, floor):
     """Whether every eigenvalue of a symmetric 3x3 matrix is above `floor`, without any root."""
     x, y, z = a[0, 0] - floor, a[1, 1] - floor, a[2, 2] - floor
@@ -212,7 +211,7 @@ def _is_wider(a, floor):
     return x > 0.0 and x * y - f * f > 0.0 and determinant > 0.0
 
 
-@numba.njit(**LEAN)
+@kernel
 def least_eigenvalue(a):
     """Smallest eigenvalue of a symmetric 3x3 matrix (Smith, Comm. ACM 4, 1961)."""
     mean = (a[0, 0] + a[1, 1] + a[2, 2]) / 3.0

@@ -10,16 +10,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeAlias
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT
 from hrc_env.geometry.triangulation import (
     FURTHEST_PX,
     Triangulation,
     triangulate,
     triangulate_robust,
 )
+from hrc_env.kernels import kernel
 from hrc_env.records import Keypoints, PoseEstimate
 from hrc_env.skeleton import N_JOINTS
 from hrc_env.tracking.ahead import ahead
@@ -114,7 +113,7 @@ def _believed(
     return np.where(ok[..., None], px, np.nan), sigma
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _hold(cov, age, tracked, dt, speed):
     for b in range(cov.shape[0]):
         for w in range(cov.shape[1]):
@@ -126,7 +125,7 @@ def _hold(cov, age, tracked, dt, speed):
                     cov[b, w, j, i, i] += grown
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _update(made, spread, mean, cov, velocity, age, tracked, standing, radius, min_joints, tau):
     """Take in points made (B, W, J, 3) with spread (B, W, J, 3, 3), NaN where there is none."""
     found = np.empty(made.shape[2], np.bool_)
@@ -148,7 +147,7 @@ def _update(made, spread, mean, cov, velocity, age, tracked, standing, radius, m
                 tracked[b, w] = True
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _follow(points, spread, found, tau, mean, cov, velocity, age):
     for j in range(len(points)):
         elapsed = age[j]

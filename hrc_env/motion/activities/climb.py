@@ -2,9 +2,7 @@
 
 import math
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import between, blank
@@ -22,7 +20,7 @@ STEP_AT_S, PERIOD_S, SWING_S = 0.12, 0.72, 0.56
 """First lift-off, then the times of `plans` of a climber's steps [s]; judgement."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def climb(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q: Floats) -> None:
     """The control vector of someone who climbs, stays, and comes down as they went up."""
     x, y, yaw = plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW]
@@ -43,7 +41,7 @@ def climb(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, 
         hang(side, RELAXED_PITCH - 0.05 * going, RELAXED_ELBOW + 0.25 * going, size, q)
 
 
-@numba.njit(**LEAN)
+@kernel
 def start_climb(draws: Floats, place: Place, me: Worker) -> float:
     """Plan to climb to the place's height; returns how long it takes [s]."""
     blank(me)

@@ -1,8 +1,6 @@
 """Work at floor height with both hands: on a knee, or on the haunches."""
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import (
     CALM_M_S,
@@ -22,7 +20,7 @@ from hrc_env.motion.activities.worker import Place, Worker
 from hrc_env.typing import Floats
 
 
-@numba.njit(**LEAN)
+@kernel
 def plan_kneel(draws: Floats, place: Place, me: Worker) -> float:
     """Plan to kneel and work low; returns how fast hands may go to it [m/s]."""
     blank(me)
@@ -31,7 +29,7 @@ def plan_kneel(draws: Floats, place: Place, me: Worker) -> float:
     return _hands_low(0.42, side, draws, place, me)
 
 
-@numba.njit(**LEAN)
+@kernel
 def plan_squat(draws: Floats, place: Place, me: Worker) -> float:
     """Plan to work low on the haunches; returns how fast hands may go to it [m/s]."""
     blank(me)
@@ -41,7 +39,7 @@ def plan_squat(draws: Floats, place: Place, me: Worker) -> float:
     return _hands_low(0.50, dominant(draws[0], me), draws, place, me)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _hands_low(ahead: float, side: int, draws: Floats, place: Place, me: Worker) -> float:
     """Plan what both hands do at floor height."""
     sign = 1.0 - 2.0 * side

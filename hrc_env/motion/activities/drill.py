@@ -3,9 +3,7 @@ pouch; overhead it holds the work up."""
 
 import math
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import (
     CALM_M_S,
@@ -35,7 +33,7 @@ OVERHEAD_M = 1.7
 """From this height on people work above their head [m]."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def plan_drill(draws: Floats, place: Place, me: Worker) -> float:
     """Plan to drill at the place's height; returns how fast hands may go to it [m/s]."""
     blank(me)

@@ -2,9 +2,7 @@
 
 import math
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.worker import Worker
@@ -24,7 +22,7 @@ STEP_AT_S, STEP_PERIOD_S, STEP_SWING_S = 0.08, 0.42, 0.38
 """First lift-off, and the two times of `plans` of the steps that widen a stance [s]."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def get_down(down: float, plan: Floats, size: Floats, q: Floats) -> None:
     """Lower a standing body by the share `down`, heels included; the feet's steps are planned."""
     ahead = plan[pl.AHEAD] * down
@@ -45,7 +43,7 @@ def get_down(down: float, plan: Floats, size: Floats, q: Floats) -> None:
             raise_heel(side, HAUNCH_HEEL_RAD * crouch, size, q)
 
 
-@numba.njit(**LEAN)
+@kernel
 def step_into(first: int, ahead: float, other: float, out: float, me: Worker) -> None:
     """Plan one step of foot `first` (and one of the other, unless 0) that the end goes back.
 

@@ -2,10 +2,9 @@
 
 import math
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT, LEAN
+from hrc_env.kernels import kernel
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import between, in_reach, shoulders
@@ -41,7 +40,7 @@ CAUGHT_LEGS = 0.115
 """How much too short the step is in which a foot catches, in lengths of the leg; judgement."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def start_walk(place: Place, via: Floats, speed_m_s: float, me: Worker) -> float:
     """Plan to walk to the place by way of a point; returns how long it takes [s]."""
     plan = me.plan
@@ -50,7 +49,7 @@ def start_walk(place: Place, via: Floats, speed_m_s: float, me: Worker) -> float
     return plan_walk(start, via, end, speed_m_s, plan, me.prints, me.stance, me.size)
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def start_turn(place: Place, me: Worker) -> float:
     """Plan to turn on the spot to the place's yaw; returns how long it takes [s]."""
     plan = me.plan
@@ -60,7 +59,7 @@ def start_turn(place: Place, me: Worker) -> float:
     return plan_pace(pace, place[2], plan, me.prints, me.stance, me.size)
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def start_step_back(draws: Floats, place: Place, me: Worker) -> float:
     """Plan to step straight back without looking; returns how long it takes [s]."""
     plan = me.plan
@@ -72,7 +71,7 @@ def start_step_back(draws: Floats, place: Place, me: Worker) -> float:
     return plan_pace(pace, yaw, plan, me.prints, me.stance, me.size)
 
 
-@numba.njit(**LEAN)
+@kernel
 def start_stumble(draws: Floats, place: Place, via: Floats, speed_m_s: float, me: Worker) -> float:
     """Plan a walk to the place in which a foot catches; returns how long it takes [s]."""
     lasts = start_walk(place, via, speed_m_s, me)
@@ -92,7 +91,7 @@ def start_stumble(draws: Floats, place: Place, via: Floats, speed_m_s: float, me
     return lasts
 
 
-@numba.njit(**LEAN)
+@kernel
 def start_push(place: Place, via: Floats, speed_m_s: float, prop: int, me: Worker) -> float:
     """Plan to push a cart or wheelbarrow to the place; returns how long it takes [s]."""
     plan = me.plan
@@ -108,7 +107,7 @@ def start_push(place: Place, via: Floats, speed_m_s: float, prop: int, me: Worke
     return plan[pl.LASTS]
 
 
-@numba.njit(**LEAN)
+@kernel
 def _to_handles(prop: int, me: Worker) -> None:
     """Plan how far ahead the handles are, how far they are raised, and how far the trunk leans."""
     plan = me.plan
@@ -125,7 +124,7 @@ def _to_handles(prop: int, me: Worker) -> None:
     plan[pl.STOOP] = max(plan[pl.LOAD_AT] + ahead - reach, 0.0) / STOOPED_M
 
 
-@numba.njit(**LEAN)
+@kernel
 def push(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q: Floats) -> None:
     """The control vector, but for the feet, of someone who takes a handle, pushes and lets go."""
     going = t - plan[pl.TAKEN_S]
@@ -146,7 +145,7 @@ def push(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q
     grip_load(held * (2.0 - held), plan, q)  # before the bent trunk takes them to the knees
 
 
-@numba.njit(**LEAN)
+@kernel
 def _tip(back_rad: float, yaw: float, q: Floats) -> None:
     """Tip the wheelbarrow back about its axle, handles down."""
     ahead, up = _tipped(back_rad, 0.0)
@@ -156,7 +155,7 @@ def _tip(back_rad: float, yaw: float, q: Floats) -> None:
     q[c.PROP_POSE + 4] -= back_rad
 
 
-@numba.njit(**LEAN)
+@kernel
 def _tipped(back_rad: float, z: float) -> tuple[float, float]:
     """How far ahead and up a point goes at height z over the wheelbarrow's origin."""
     cos, sin = math.cos(back_rad), math.sin(back_rad)

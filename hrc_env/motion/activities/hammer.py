@@ -6,9 +6,7 @@ driving nails 1.25 to 2.0 m/s.
 
 import math
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import (
     CALM_M_S,
@@ -40,7 +38,7 @@ WALL_M = 1.2
 """Nails at this height or higher are driven into a wall, lower ones downwards [m]."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def plan_hammer(draws: Floats, place: Place, me: Worker) -> float:
     """Plan to drive nails at the place's height; returns how fast hands may go to it [m/s]."""
     blank(me)

@@ -7,9 +7,7 @@ median trial and 2.1 in the 95th percentile, heads at 1.6.
 
 import math
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import (
@@ -54,7 +52,7 @@ AWAY_M = 0.43
 """A load on the floor or a table is this far ahead [m]."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def pick_up(
     t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q: Floats
 ) -> None:
@@ -94,7 +92,7 @@ def pick_up(
         q[c.HAND_SHARE + side] = down * used
 
 
-@numba.njit(**LEAN)
+@kernel
 def plan_pick_up(draws: Floats, place: Place, prop: int, on_shoulder: bool, me: Worker) -> float:
     """Plan to pick a box or board up, gripped at the place's height; its pace [s]."""
     _hold(prop, on_shoulder and prop == BOARD, dominant(draws[0], me), me)
@@ -103,7 +101,7 @@ def plan_pick_up(draws: Floats, place: Place, prop: int, on_shoulder: bool, me: 
     return between(draws[2], 1.0, 1.35)
 
 
-@numba.njit(**LEAN)
+@kernel
 def plan_receive(draws: Floats, place: Place, me: Worker) -> float:
     """Plan to take a box that somebody ahead holds out; its pace [s]."""
     _hold(BOX, False, 1, me)
@@ -112,7 +110,7 @@ def plan_receive(draws: Floats, place: Place, me: Worker) -> float:
     return between(draws[2], 0.9, 1.1)
 
 
-@numba.njit(**LEAN)
+@kernel
 def plan_set_down(draws: Floats, place: Place, me: Worker) -> float:
     """Plan to set down what is held, onto the place's height; its pace [s]."""
     z = place[3] if place[3] > 0.0 else between(draws[1], 0.18, 0.45)
@@ -121,7 +119,7 @@ def plan_set_down(draws: Floats, place: Place, me: Worker) -> float:
     return between(draws[2], 1.0, 1.35)
 
 
-@numba.njit(**LEAN)
+@kernel
 def plan_hand_over(draws: Floats, place: Place, me: Worker) -> float:
     """Plan to hold out what is carried until somebody has it; its pace [s]."""
     prop = int(me.plan[pl.LOAD_PROP])
@@ -130,14 +128,14 @@ def plan_hand_over(draws: Floats, place: Place, me: Worker) -> float:
     return between(draws[2], 0.9, 1.1)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _given(place: Place, me: Worker) -> tuple[float, float, float]:
     """Where loads change hands."""
     z = place[3] if place[3] > 0.0 else GIVEN_SHARE * me.size[STAND_Z]
     return GIVEN_AHEAD_M, 0.0, z
 
 
-@numba.njit(**LEAN)
+@kernel
 def _hold(prop: int, on_shoulder: bool, side: int, me: Worker) -> None:
     """Write how a load will be carried into the plan's LOAD columns."""
     plan, at = me.plan, pl.LOAD_AT
@@ -163,7 +161,7 @@ def _hold(prop: int, on_shoulder: bool, side: int, me: Worker) -> None:
     plan[pl.LOAD_GRIP + 3 * side + 1] = -STEADY_M * sign
 
 
-@numba.njit(**LEAN)
+@kernel
 def _lay_out(prop: int, at: tuple[float, float, float], me: Worker) -> None:
     """Plan where the load stands: ahead, left [m], height."""
     blank(me)
@@ -171,7 +169,7 @@ def _lay_out(prop: int, at: tuple[float, float, float], me: Worker) -> None:
     look_to(at, me)
 
 
-@numba.njit(**LEAN)
+@kernel
 def finish_lift(raise_s: float, me: Worker) -> float:
     """Settle trunk, way and times of a load between where it stands and where it is carried.
 

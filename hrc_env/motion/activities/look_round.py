@@ -1,8 +1,6 @@
 """Looking round: the head to one side and the other, the trunk a little with it."""
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import between, blank
@@ -15,7 +13,7 @@ TURN_S = 0.75
 """To turn the head across [s]; about 1.5 rad/s."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def look_round(
     t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q: Floats
 ) -> None:
@@ -29,7 +27,7 @@ def look_round(
     q[c.PELVIS_YAW] += 0.12 * gaze
 
 
-@numba.njit(**LEAN)
+@kernel
 def start_look_round(draws: Floats, place: Place, me: Worker) -> float:
     """Plan to look round; returns how long it takes [s]."""
     blank(me)

@@ -3,9 +3,7 @@
 Hands at 2.5 to 3.5 m/s; assumed, near the fastest arm movements at work.
 """
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import (
     between,
@@ -25,7 +23,7 @@ AHEAD_ARMS = (1.2, 1.5)
 """How far ahead it is, in lengths of the arm: a step and a bow away; judgement."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def plan_lunge(draws: Floats, place: Place, me: Worker) -> float:
     """Plan to snatch at something ahead, at the place's height; the hand's speed [m/s]."""
     blank(me)

@@ -1,8 +1,6 @@
 """Measuring: both hands pull a tape along the work, hold it still and read it."""
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import (
     CALM_M_S,
@@ -25,7 +23,7 @@ from hrc_env.typing import Floats
 TAPE = prop_index("tape_measure")
 
 
-@numba.njit(**LEAN)
+@kernel
 def plan_measure(draws: Floats, place: Place, me: Worker) -> float:
     """Plan to measure at the place's height; returns how fast hands may go to it [m/s]."""
     blank(me)

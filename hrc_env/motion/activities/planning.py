@@ -2,9 +2,7 @@
 
 import math
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.getting_down import FRONT_LEG, REAR_LEG, step_into
@@ -52,19 +50,19 @@ FAR = 1e3
 """A time by which every step is done [s]."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def between(draw: float, low: float, high: float) -> float:
     """A uniform draw in [0, 1) stretched to (low, high)."""
     return low + draw * (high - low)
 
 
-@numba.njit(**LEAN)
+@kernel
 def dominant(draw: float, me: Worker) -> int:
     """The side that holds the tool: 1 right."""
     return 1 if draw < 0.5 + (me.traits[pl.RIGHT_HANDED] - 0.5) * 1.25 else 0
 
 
-@numba.njit(**LEAN)
+@kernel
 def blank(me: Worker) -> None:
     """A plan without steps and work of its own; what is carried stays."""
     plan = me.plan
@@ -76,7 +74,7 @@ def blank(me: Worker) -> None:
     plan[pl.OUT_AT] = 0.1
 
 
-@numba.njit(**LEAN)
+@kernel
 def kneel_down(side: int, me: Worker) -> None:
     """Plan to kneel on the knee of that side."""
     plan, leg = me.plan, me.size[LEG]
@@ -86,14 +84,14 @@ def kneel_down(side: int, me: Worker) -> None:
     plan[pl.STEP_START], plan[pl.STEP_PERIOD], plan[pl.STEP_SWING] = KNEEL_STEPS_S
 
 
-@numba.njit(**LEAN)
+@kernel
 def before_knee(me: Worker) -> float:
     """How far to the left the hands work of one who kneels: before the knee that is down [m]."""
     kneeling = me.plan[pl.KNEEL] > 0.0
     return KNEE_ASIDE_M * (1.0 - 2.0 * me.plan[pl.STEP_FIRST]) if kneeling else 0.0
 
 
-@numba.njit(**LEAN)
+@kernel
 def step_ahead(side: int, ahead: float, me: Worker) -> None:
     """Plan to work with the foot of that side a little ahead."""
     plan = me.plan
@@ -101,7 +99,7 @@ def step_ahead(side: int, ahead: float, me: Worker) -> None:
     plan[pl.AHEAD], plan[pl.SETTLE_S] = 0.45 * ahead, STEP_S
 
 
-@numba.njit(**LEAN)
+@kernel
 def world(ahead: float, left: float, z: float, me: Worker) -> Triple:
     """A point of the frame in which the worker stands."""
     plan = me.plan
@@ -113,7 +111,7 @@ def world(ahead: float, left: float, z: float, me: Worker) -> Triple:
     )
 
 
-@numba.njit(**LEAN)
+@kernel
 def shoulders(me: Worker) -> Triple:
     """Where the shoulders' joints of one who stands are: ahead of the root, aside, height [m]."""
     bones = me.bones
@@ -125,14 +123,14 @@ def shoulders(me: Worker) -> Triple:
     return ahead, aside, up
 
 
-@numba.njit(**LEAN)
+@kernel
 def in_reach(share: float, one: float, other: float, me: Worker) -> float:
     """How far arms, stretched by a share, reach along an axis if so far along the others [m]."""
     reach = share * me.size[ARM]
     return math.sqrt(max(reach * reach - one * one - other * other, 0.0))
 
 
-@numba.njit(**LEAN)
+@kernel
 def put_tool(tool: int, side: int, at: Triple, turn: Triple, me: Worker) -> None:
     """Plan where the tool is at work: ahead, left [m], height; yaw, pitch, roll."""
     plan = me.plan
@@ -147,7 +145,7 @@ def put_tool(tool: int, side: int, at: Triple, turn: Triple, me: Worker) -> None
         plan[pl.USE_LEFT] = plan[pl.USE_RIGHT] = 1.0
 
 
-@numba.njit(**LEAN)
+@kernel
 def put_other(at: Triple, me: Worker) -> None:
     """Plan where the other hand works: ahead, left [m], height."""
     plan = me.plan
@@ -158,7 +156,7 @@ def put_other(at: Triple, me: Worker) -> None:
     plan[pl.USE_LEFT + other] = 1.0
 
 
-@numba.njit(**LEAN)
+@kernel
 def look_to(at: Triple, me: Worker) -> None:
     """Plan where the eyes are: ahead, left [m], height."""
     point = world(at[0], at[1], at[2], me)
@@ -166,7 +164,7 @@ def look_to(at: Triple, me: Worker) -> None:
         me.plan[pl.GAZE_X + i] = point[i]
 
 
-@numba.njit(**LEAN)
+@kernel
 def strokes(kind: int, size_m: float, rate_hz: float, burst_s: float, n: int, me: Worker) -> None:
     """Plan n bursts of a stroke."""
     plan = me.plan
@@ -174,7 +172,7 @@ def strokes(kind: int, size_m: float, rate_hz: float, burst_s: float, n: int, me
     plan[pl.BURST_S], plan[pl.HOLD_S] = burst_s, n * (burst_s + PAUSE_S)
 
 
-@numba.njit(**LEAN)
+@kernel
 def at_work(me: Worker) -> None:
     """Fill q as it is in the middle of the work, before the first stroke."""
     plan, q, size = me.plan, me.q, me.size
@@ -185,7 +183,7 @@ def at_work(me: Worker) -> None:
     hands_on(1.0, 1.0, 1.0, plan, q)
 
 
-@numba.njit(**LEAN)
+@kernel
 def finish(peak_m_s: float, me: Worker) -> float:
     """Settle trunk and times of work whose hands, strokes and steps are planned; how long [s].
 
@@ -207,7 +205,7 @@ def finish(peak_m_s: float, me: Worker) -> float:
     return plan[pl.LASTS]
 
 
-@numba.njit(**LEAN)
+@kernel
 def settle_lean(me: Worker) -> None:
     """Smallest lean that brings what the hands hold within reach; else that comes nearer."""
     plan = me.plan
@@ -231,7 +229,7 @@ def settle_lean(me: Worker) -> None:
         _come_nearer(_short(me), me)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _short(me: Worker) -> float:
     """By how much an arm is too short for the work that is planned [m]."""
     at_work(me)
@@ -240,7 +238,7 @@ def _short(me: Worker) -> float:
     return beyond(me.q, used, me.bones, me.frame, me.size, me.p, me.r) + spare
 
 
-@numba.njit(**LEAN)
+@kernel
 def _come_nearer(far: float, me: Worker) -> None:
     """Move tool and targets towards the shoulders by what is out of reach, as `_short` says."""
     plan, p = me.plan, me.p
@@ -254,7 +252,7 @@ def _come_nearer(far: float, me: Worker) -> None:
         plan[at + 2] -= share * dz
 
 
-@numba.njit(**LEAN)
+@kernel
 def _way(side: int, me: Worker) -> float:
     """The longest way that a hand has from hanging, or from the belt, to its work [m]."""
     plan, q, p = me.plan, me.q, me.p

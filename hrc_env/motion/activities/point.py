@@ -2,9 +2,7 @@
 
 import math
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import (
     between,
@@ -25,7 +23,7 @@ POINT_M_S = 1.5
 """Peak speed of the pointing hand [m/s]; a quick reach."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def plan_point(draws: Floats, place: Place, me: Worker) -> float:
     """Plan to point somewhere ahead, at its height if it has one; the hand's speed [m/s]."""
     blank(me)

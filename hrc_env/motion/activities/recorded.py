@@ -7,9 +7,7 @@ then both feet.
 
 import math
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.curves import min_jerk, ramp
@@ -29,13 +27,13 @@ END, BEGIN, LAST = 0, 2, 4
 """First of the two footprints where the activity ends, where the clip begins, where it ends."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def clip_lasts(frames_s: float) -> float:
     """How long it takes to play so much of a recording [s]."""
     return frames_s + PACE_S
 
 
-@numba.njit(**LEAN)
+@kernel
 def play(
     t: float, plan: Floats, prints: Floats, stance: Floats, clock_s: float, traits: Floats,
     size: Floats, frames: Floats, q: Floats,
@@ -66,7 +64,7 @@ def play(
             _placed_foot(f, side, plan, frames, q)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _between(f: float, column: int, plan: Floats, frames: Floats) -> float:
     """A column of a clip between its frames: Catmull-Rom, its ends held."""
     first, last = int(plan[pl.CLIP_ROW]), int(plan[pl.CLIP_ROW] + plan[pl.CLIP_FRAMES]) - 1
@@ -78,7 +76,7 @@ def _between(f: float, column: int, plan: Floats, frames: Floats) -> float:
     return b + 0.5 * u * (p - a + u * curve)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _body(f: float, share: float, plan: Floats, frames: Floats, q: Floats) -> None:
     """Let a share of a standing q become the clip's root, trunk, head and arms at frame f."""
     cos, sin = math.cos(plan[pl.CLIP_YAW]), math.sin(plan[pl.CLIP_YAW])
@@ -93,7 +91,7 @@ def _body(f: float, share: float, plan: Floats, frames: Floats, q: Floats) -> No
         q[i] += share * (_between(f, i, plan, frames) - q[i])
 
 
-@numba.njit(**LEAN)
+@kernel
 def _placed_foot(f: float, side: int, plan: Floats, frames: Floats, q: Floats) -> None:
     """The clip's foot at frame f, where the clip is placed."""
     cos, sin = math.cos(plan[pl.CLIP_YAW]), math.sin(plan[pl.CLIP_YAW])
@@ -106,7 +104,7 @@ def _placed_foot(f: float, side: int, plan: Floats, frames: Floats, q: Floats) -
         q[at + i] = _between(f, of + i, plan, frames)
 
 
-@numba.njit(**LEAN)
+@kernel
 def clip_root(t: float, plan: Floats) -> tuple[float, float]:
     """About where the root of someone who plays a clip is on the floor at time t, and after."""
     lasts = plan[pl.CLIP_S] + 2.0 * SETTLE_S

@@ -3,9 +3,7 @@
 Wrists at 1.25 to 2.0 m/s (95th percentile) in the recordings.
 """
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.motion.activities.planning import (
     CALM_M_S,
     between,
@@ -27,7 +25,7 @@ CUT_RAD = 0.6
 """How steeply the blade goes into the board [rad]; 45 to 60 degrees to it is usual, judgement."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def plan_saw(draws: Floats, place: Place, me: Worker) -> float:
     """Plan to saw a board at the place's height; returns how fast hands may go to it [m/s]."""
     blank(me)

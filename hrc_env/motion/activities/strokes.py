@@ -6,9 +6,7 @@ that hand's target (to which `work.hands_on` adds the target itself).
 
 import math
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.curves import min_jerk
@@ -24,7 +22,7 @@ EASE_S = 0.25
 """In which strokes begin and end [s]."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def stroke(t: float, plan: Floats, q: Floats) -> None:
     """Add what the stroke does at time t of the work (0 to HOLD_S)."""
     kind, side = int(plan[pl.STROKE]), int(plan[pl.SIDE])
@@ -52,7 +50,7 @@ def stroke(t: float, plan: Floats, q: Floats) -> None:
         _busy(ease, turn, other, plan, q)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _wander(n: int, u: float, other: int, plan: Floats, q: Floats) -> None:
     """Go to and fro along the work, a place a burst."""
     on = min_jerk((u - plan[pl.BURST_S]) / PAUSE_S)
@@ -66,7 +64,7 @@ def _wander(n: int, u: float, other: int, plan: Floats, q: Floats) -> None:
     q[other + 1] += y
 
 
-@numba.njit(**LEAN)
+@kernel
 def _along(way: float, plan: Floats, q: Floats) -> None:
     """Move the tool where it points."""
     pitch, yaw = plan[pl.TOOL_POSE + 4], plan[pl.TOOL_POSE + 3]
@@ -75,7 +73,7 @@ def _along(way: float, plan: Floats, q: Floats) -> None:
     q[c.PROP_POSE + 2] -= math.sin(pitch) * way
 
 
-@numba.njit(**LEAN)
+@kernel
 def _strike(ease: float, turn: float, plan: Floats, q: Floats) -> None:
     """Swing the hammer back slowly and forward faster, round the wrist and with the arm."""
     size = plan[pl.STROKE_M]
@@ -89,14 +87,14 @@ def _strike(ease: float, turn: float, plan: Floats, q: Floats) -> None:
     q[c.PROP_POSE + 4] -= min(0.3 + 2.2 * size, 1.1) * back
 
 
-@numba.njit(**LEAN)
+@kernel
 def _bore(u: float, plan: Floats, q: Floats) -> None:
     """Lean on the drill."""
     push = min_jerk(u / 0.5) - min_jerk((u - plan[pl.BURST_S] + 0.5) / 0.5)
     _along(plan[pl.STROKE_M] * push, plan, q)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _fetch(u: float, other: int, plan: Floats, q: Floats) -> None:
     """Take the other hand to the belt for the next screw, and back."""
     late = u - plan[pl.BURST_S] + 0.05 + FETCH_S
@@ -118,7 +116,7 @@ FETCH_S = 0.55
 """From a screw's place to the pouch [s]: at 0.4 m about 1.4 m/s at most."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def _busy(ease: float, turn: float, other: int, plan: Floats, q: Floats) -> None:
     """Small movements of both hands, or of the pointing one alone."""
     size = ease * plan[pl.STROKE_M]

@@ -5,9 +5,7 @@ The first half of such an activity and its second half are mirror images in time
 
 import math
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.getting_down import get_down
@@ -37,7 +35,7 @@ DRAWN_SHARE = 0.6
 """Share of the way at which what is drawn out with both hands is out."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def extend(down: float, out: float, plan: Floats, size: Floats, q: Floats) -> None:
     """A standing body's q at a share of getting down, and of reaching out from there."""
     get_down(down, plan, size, q)
@@ -48,7 +46,7 @@ def extend(down: float, out: float, plan: Floats, size: Floats, q: Floats) -> No
     _round(c.PROP_POSE, plan[pl.TOOL_POSE + 2], out, q)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _round(at: int, goal_z: float, out: float, q: Floats) -> None:
     """Send q[at:], on its way out to a height, round shoulder or knee."""
     high = RISE * max(goal_z - q[c.PELVIS_Z] - 0.3, 0.0)
@@ -58,7 +56,7 @@ def _round(at: int, goal_z: float, out: float, q: Floats) -> None:
     q[at + 2] += bulge if goal_z < LOW_M else 0.0
 
 
-@numba.njit(**LEAN)
+@kernel
 def belt(side: int, at: int, q: Floats) -> None:
     """Write the pose of a tool on the belt, on that side, into q[at:]."""
     cos, sin = math.cos(q[c.HEADING]), math.sin(q[c.HEADING])
@@ -69,7 +67,7 @@ def belt(side: int, at: int, q: Floats) -> None:
     q[at + 3], q[at + 4], q[at + 5] = q[c.HEADING], BELT_PITCH_RAD, 0.0
 
 
-@numba.njit(**LEAN)
+@kernel
 def hands_on(out: float, taken: float, early: float, plan: Floats, q: Floats) -> None:
     """Send the tool's hand to the tool, the other to its own target or to the tool.
 
@@ -99,7 +97,7 @@ def hands_on(out: float, taken: float, early: float, plan: Floats, q: Floats) ->
     q[c.HAND_SHARE + other] = joined * plan[pl.USE_LEFT + other]
 
 
-@numba.njit(**LEAN)
+@kernel
 def _from_belly(hand: int, at: int, share: float, plan: Floats, q: Floats) -> None:
     """Bring the target q[at:] of a hand back to before the belly by a share: over the thighs."""
     cos, sin = math.cos(q[c.HEADING]), math.sin(q[c.HEADING])
@@ -110,7 +108,7 @@ def _from_belly(hand: int, at: int, share: float, plan: Floats, q: Floats) -> No
     q[at + 2] += share * (q[c.PELVIS_Z] + BELLY_UP_M - plan[goal + 2])
 
 
-@numba.njit(**LEAN)
+@kernel
 def work(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q: Floats) -> None:
     """The control vector of someone who works in place with a tool, or empty hands."""
     stand(plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW], clock_s, traits, size, q)

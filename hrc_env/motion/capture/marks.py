@@ -2,11 +2,10 @@
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
 from hrc_env.body import SEGMENT, Body
-from hrc_env.compiled import JIT
+from hrc_env.kernels import kernel
 from hrc_env.motion.anatomy import Anatomy, anatomy
 from hrc_env.motion.kinematics import N_FRAMES, N_POINTS, pose
 from hrc_env.skeleton import JOINTS
@@ -58,7 +57,7 @@ def joints_in(q: Floats, marks: Marks) -> Points3:
     return out
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _joints(
     q: Floats, bones: Floats, frame: Floats, size: Floats, segment: Ints, offset: Floats,
     out: Floats,

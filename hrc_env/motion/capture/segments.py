@@ -1,10 +1,9 @@
 """The 22 segments of a body in given control vectors, for pictures and checks."""
 
-import numba
 import numpy as np
 
 from hrc_env.body import N_SEGMENTS
-from hrc_env.compiled import JIT
+from hrc_env.kernels import kernel
 from hrc_env.motion.anatomy import Anatomy
 from hrc_env.motion.kinematics import N_FRAMES, N_POINTS, pose, quaternion
 from hrc_env.typing import Floats, Points3, QuaternionsWxyz
@@ -19,7 +18,7 @@ def segments_in(controls: Floats, anatomy: Anatomy) -> tuple[Points3, Quaternion
     return position, turn
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _segments(
     q: Floats, bones: Floats, frame: Floats, size: Floats, position: Floats, turn: Floats
 ) -> None:

@@ -6,22 +6,20 @@ a few pixels underflows long before the particles are bad.
 
 import math
 
-import numba
-
-from hrc_env.compiled import JIT
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
+from hrc_env.kernels import kernel
 
 BEHIND = -1e12
 """Log-likelihood of a particle behind the camera that saw the joint: the last to be chosen."""
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def log_gaussian(distance_squared, sigma):
     """Log-density of a planar Gaussian at a distance, up to its constant."""
     return -0.5 * distance_squared / (sigma * sigma)
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def add_log_likelihood(camera, u, v, sigma, particles, log_weights):
     """Add one camera's log-likelihood of pixel (u, v) to the log-weights of particles (3, M)."""
     for m in range(particles.shape[1]):
@@ -35,7 +33,7 @@ def add_log_likelihood(camera, u, v, sigma, particles, log_weights):
             log_weights[m] += BEHIND
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def normalise(log_weights, weights):
     """Weights that sum to one; returns the effective sample size 1 / sum w^2 (Kong, 1994)."""
     largest = log_weights.max()

@@ -1,9 +1,8 @@
 """Clouds of particles, (J, 3, M) for one worker: made, moved, measured."""
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT
+from hrc_env.kernels import kernel
 from hrc_env.typing import Covariances3, Floats, Points3
 
 
@@ -18,7 +17,7 @@ def roll(particles: Floats, sigma_m: float, rng: np.random.Generator) -> None:
     _add_scaled(particles, rng.standard_normal(particles.shape, dtype=np.float32), sigma_m)
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _add_scaled(particles, noise, scale):
     for j in range(particles.shape[0]):
         for i in range(3):
@@ -26,7 +25,7 @@ def _add_scaled(particles, noise, scale):
                 particles[j, i, m] += scale * noise[j, i, m]
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def moments(particles, mean, cov):
     """Mean (J, 3) and covariance (J, 3, 3) of unweighted clouds (J, 3, M)."""
     n = particles.shape[2]

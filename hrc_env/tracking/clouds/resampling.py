@@ -3,12 +3,10 @@
 The random numbers are arguments, so that each environment draws its own.
 """
 
-import numba
-
-from hrc_env.compiled import JIT
+from hrc_env.kernels import kernel
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def multinomial(weights, waits, ancestors):
     """M independent choices, sorted.
 
@@ -28,7 +26,7 @@ def multinomial(weights, waits, ancestors):
         ancestors[m] = particle
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def systematic(weights, start, ancestors):
     """Choices at even distances (Kitagawa, 1996): the counts differ from M w_m by less than one.
 

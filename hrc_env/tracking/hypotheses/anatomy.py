@@ -4,9 +4,7 @@ A body that is tracked mirrored in depth has them behind. That is told between h
 potential of the pose that is believed now, not anew with every frame: it does not add up.
 """
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.tracking.models.acquisition import heading
 
 _FEATURES = (
@@ -21,7 +19,7 @@ _MOST = 4.5
 """No feature counts for more than three deviations."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def anatomy(body):
     """Log-potential of a pose (J, 6): 0 at best; 0 if the heading is unknown."""
     cos, sin, known = heading(body)

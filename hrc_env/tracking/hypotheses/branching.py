@@ -6,10 +6,9 @@ frames: a mode several posterior deviations from the known ones, with evidence t
 negligible, becomes a hypothesis.
 """
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT, LEAN
+from hrc_env.kernels import kernel
 from hrc_env.tracking.hypotheses.anatomy import anatomy
 from hrc_env.tracking.hypotheses.mirrors import (
     N_MIRRORS,
@@ -31,7 +30,7 @@ _NEARER_M = 0.05
 """A search that ends with every joint nearer than this has found nothing new [m]."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def is_ambiguous(P, body, cov, ok, m):
     """Whether one view alone carries a part of the body whose depth is open.
 
@@ -44,7 +43,7 @@ def is_ambiguous(P, body, cov, ok, m):
     return ambiguous
 
 
-@numba.njit(**LEAN)
+@kernel
 def camera_of(part, P, body, cov, ok, m):
     """The camera that leaves the depth of a part open that is asked about, or -1.
 
@@ -56,7 +55,7 @@ def camera_of(part, P, body, cov, ok, m):
     return camera if camera >= 0 and open_depth(part, P[camera], body, cov) > m.open_m else -1
 
 
-@numba.njit(**LEAN)
+@kernel
 def branch(state, b, w, prior, evidence, seen, s, m, scratch):
     """Look for other bodies beside the heaviest hypothesis, and keep them as hypotheses.
 
@@ -91,7 +90,7 @@ def branch(state, b, w, prior, evidence, seen, s, m, scratch):
             state.form[b, new], state.n_alive[b, w] = form, n + 1
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _turn(slots, b, own, n, camera, prior, seen, s, m, scratch):
     """Make slot own + n the body that is turned the other way; its penalty [nat].
 
@@ -112,7 +111,7 @@ def _turn(slots, b, own, n, camera, prior, seen, s, m, scratch):
     return np.inf if _turned_alike(slots, b, own, n) else penalty
 
 
-@numba.njit(**LEAN)
+@kernel
 def _turned_alike(slots, b, own, n):
     """Whether slot own + n is turned as one of the n slots before it."""
     alike = False
@@ -121,7 +120,7 @@ def _turned_alike(slots, b, own, n):
     return alike
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _reflect(slots, b, own, n, where, seen, s, m, scratch):
     """Condition slot own + n at the mode next to a reflected limb; 0, or infinity for none.
 

@@ -4,10 +4,9 @@
 `mixture.MixtureSettings`; everything that happens to one hypothesis is `tree.filter`'s.
 """
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT, LEAN
+from hrc_env.kernels import kernel
 from hrc_env.tracking.hypotheses.anatomy import anatomy
 from hrc_env.tracking.hypotheses.branching import branch, is_ambiguous
 from hrc_env.tracking.hypotheses.mixture import MixtureSettings
@@ -28,7 +27,7 @@ from hrc_env.tracking.tree.work import make_work
 _TORSO = (1, 2, 7, 8)
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def predict_all(state, model, dt, s, m):
     """Let dt [s] pass: hypotheses move and age; `model` as in `tree.predict.predict_tree`, the rest
     as in `update_all`."""
@@ -45,7 +44,7 @@ def predict_all(state, model, dt, s, m):
             _grow_older(state, b, w, dt, s)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _move(state, b, w, model, dt, m, held, work):
     """Move a worker's hypotheses; several at once learn no places on the body (`held`)."""
     slots = state.slots
@@ -67,7 +66,7 @@ def _move(state, b, w, model, dt, m, held, work):
         normalise(state, b, w, m.log_drop)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _grow_older(state, b, w, dt, s):
     """Count ages up; a worker who is lost has one hypothesis."""
     slots = state.slots
@@ -79,7 +78,7 @@ def _grow_older(state, b, w, dt, s):
         count_up(slots.age_s[b, k], dt, s.max_age_s)
 
 
-@numba.njit(**LEAN)
+@kernel
 def forwards(body):
     """How clearly a body (J, 6) walks forwards, -1 (backwards) to 1."""
     cos, sin, known = heading(body)
@@ -91,7 +90,7 @@ def forwards(body):
     return min(max(speed / 0.5, -1.0), 1.0)
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def update_all(state, P, px, confidence, sigma_px, standing, s, m, noise):
     """Take one set of frames in.
 
@@ -134,7 +133,7 @@ def update_all(state, P, px, confidence, sigma_px, standing, s, m, noise):
                 _tidy(state, b, w, m, scratch[2])
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _follow(state, b, w, h, several, look, seen, standing, s, m, noise, kept):
     """What one set of frames does to one hypothesis; `look` for others beside it."""
     scratch, prior, placed, predicted = kept
@@ -160,7 +159,7 @@ def _follow(state, b, w, h, several, look, seen, standing, s, m, noise, kept):
     look_after(slots, b, k, seen, standing, s, placed, scratch[2].a)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _weight_form(state, b, k, several, gain, m):
     """Weigh a hypothesis by its evidence, and by its pose in the place of the last one."""
     form = m.anatomy * anatomy(state.slots.body[b, k])
@@ -169,7 +168,7 @@ def _weight_form(state, b, k, several, gain, m):
     state.form[b, k] = form
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _weigh(slots, b, k, seen, s, prior, scratch):
     """Update a hypothesis, keep what it was before in `prior`; its log-evidence."""
     body, cov, slope = slots.body[b, k], slots.cov[b, k], slots.slope[b, k]
@@ -185,7 +184,7 @@ def _weigh(slots, b, k, seen, s, prior, scratch):
     return evidence
 
 
-@numba.njit(**LEAN)
+@kernel
 def _tidy(state, b, w, m, work):
     """Drop hypotheses that are lost or too light, and merge those that have come close."""
     first = w * (state.slots.tracked.shape[1] // state.n_alive.shape[1])

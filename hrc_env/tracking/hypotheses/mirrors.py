@@ -5,11 +5,10 @@ joints keep their rays, and their depths are reflected in the depth of a pivot. 
 starting points for a search; bones, places on the body and motion decide what becomes of them.
 """
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT, LEAN
 from hrc_env.geometry.triangulation import inverse3
+from hrc_env.kernels import kernel
 from hrc_env.skeleton import N_JOINTS, TORSO
 from hrc_env.typing import Bools
 
@@ -39,7 +38,7 @@ _MOST_SEEN_TWICE = 2
 """So many joints of a whole body may be seen twice, and it may still be mirrored."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def lone_camera(part, ok):
     """The camera that alone sees a part of the body, or -1.
 
@@ -60,7 +59,7 @@ def lone_camera(part, ok):
     return best if seen_twice <= (_MOST_SEEN_TWICE if part == WHOLE_BODY else 0) else -1
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def open_depth(part, camera, body, cov):
     """How little is known of a part's depth from a camera [m].
 
@@ -82,7 +81,7 @@ def open_depth(part, camera, body, cov):
     return np.sqrt(max(least, 0.0))
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def reflect(part, camera, body, out):
     """Positions (J, 3) of a body (J, 6) whose `part` is reflected along a camera's rays.
 
@@ -110,7 +109,7 @@ def reflect(part, camera, body, out):
     return True
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def eye_of(camera):
     """Optical centre (3,) of a projection (3, 4)."""
     inverse, eye = np.empty((3, 3)), np.zeros(3)

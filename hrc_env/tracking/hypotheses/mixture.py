@@ -3,9 +3,7 @@
 import math
 from typing import NamedTuple
 
-import numba
-
-from hrc_env.compiled import JIT, LEAN
+from hrc_env.kernels import kernel
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.hypotheses.slots import hypotheses
 from hrc_env.tracking.settings import Settings
@@ -73,7 +71,7 @@ def mixture_settings(config: TrackerConfig) -> MixtureSettings:
     )
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def estimate_all(state, s, out):
     """Fill the arrays of a `PoseEstimate` in; `state` and `s` as in `hypotheses.filter`."""
     state, s = hypotheses(state), Settings(*s)
@@ -89,7 +87,7 @@ def estimate_all(state, s, out):
             tell_rest(slots, b, first, s, out, w)
 
 
-@numba.njit(**LEAN)
+@kernel
 def mix(state, b, w, mean, cov, velocity):
     """Moments of a mixture: mean, velocity (J, 3) and cov (J, 3, 3) of the positions."""
     slots, limit = state.slots, state.log_weight.shape[1] // state.n_alive.shape[1]
@@ -106,7 +104,7 @@ def mix(state, b, w, mean, cov, velocity):
         _add_moments(share, slots.body[b, k], slots.cov[b, k], mean, cov)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _add_moments(share, body, cov, mean, out):
     for j in range(len(body)):
         for i in range(3):

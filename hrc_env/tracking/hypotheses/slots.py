@@ -8,10 +8,9 @@ arrays, so that whatever works on a worker of `kalman` works on a hypothesis.
 import math
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT, LEAN
+from hrc_env.kernels import kernel
 from hrc_env.tracking.kalman import KalmanState
 from hrc_env.tracking.tree.evidence import distance_between
 from hrc_env.typing import Floats, Ints
@@ -37,26 +36,26 @@ def plain(state: Hypotheses) -> tuple[Any, ...]:
     return tuple(state.slots), *state[1:]
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def hypotheses(state):
     """The hypotheses that `plain` gave."""
     slots, log_weight, form, n_alive, waited_s = state
     return Hypotheses(KalmanState(*slots), log_weight, form, n_alive, waited_s)
 
 
-@numba.njit(**LEAN)
+@kernel
 def copy_slot(slots, b, source, target):
     """Make slot `target` of environment b a copy of `source`."""
     _move_slot(slots, b, source, target, False)
 
 
-@numba.njit(**LEAN)
+@kernel
 def exchange_slots(slots, b, one, other):
     """Exchange two slots of environment b."""
     _move_slot(slots, b, one, other, True)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _move_slot(slots, b, source, target, both):
     _move(slots.body[b], source, target, both)
     _move(slots.cov[b], source, target, both)
@@ -76,7 +75,7 @@ def _move_slot(slots, b, source, target, both):
     _move(slots.noise_last[b], source, target, both)
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _move(rows, source, target, both):
     """rows[target] = rows[source], and the other way round if `both`."""
     kept = rows[target : target + 1].copy()
@@ -85,7 +84,7 @@ def _move(rows, source, target, both):
         rows[source : source + 1] = kept
 
 
-@numba.njit(**LEAN)
+@kernel
 def drop(state, b, w, h):
     """Drop hypothesis h of a worker who has others; the last one takes its place."""
     first = w * (state.log_weight.shape[1] // state.n_alive.shape[1])
@@ -97,7 +96,7 @@ def drop(state, b, w, h):
     state.n_alive[b, w] = last
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def normalise(state, b, w, log_least):
     """Drop what is lighter than `log_least`; the weights of the others sum to one, best first."""
     first = w * (state.log_weight.shape[1] // state.n_alive.shape[1])
@@ -117,7 +116,7 @@ def normalise(state, b, w, log_least):
         form[0], form[best] = form[best], form[0]
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _share_out(log_weight):
     """Make weights sum to one."""
     most, total = log_weight.max(), 0.0
@@ -126,7 +125,7 @@ def _share_out(log_weight):
     log_weight -= most + math.log(total)
 
 
-@numba.njit(**LEAN)
+@kernel
 def merge(state, b, w, least_distance, work):
     """Hypotheses that have come close are one: the heavier stays, with the weight of both.
 
@@ -149,7 +148,7 @@ def merge(state, b, w, least_distance, work):
         h += 1
 
 
-@numba.njit(**LEAN)
+@kernel
 def slot_distance(slots, b, one, other, work):
     """Squared distance of two hypotheses, in deviations of the wider."""
     a = (slots.body[b, one], slots.cov[b, one], slots.slope[b, one])

@@ -8,10 +8,9 @@ uncertainty is the reflected one, because what is not known lies along the same 
 
 import math
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT, LEAN
+from hrc_env.kernels import kernel
 from hrc_env.tracking.hypotheses.mirrors import eye_of
 from hrc_env.tracking.models.acquisition import heading
 from hrc_env.tracking.tree.gaussian import multiply
@@ -21,7 +20,7 @@ _LEAST_TURN = 0.35
 """Bodies that are turned by less [rad] are one hypothesis."""
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def turn_of(camera, body):
     """By how much [rad] the other body of `body` (J, 6) is turned; 0 if that is not known."""
     cos, sin, known = heading(body)
@@ -37,14 +36,14 @@ def turn_of(camera, body):
     return math.atan2(math.sin(turn), math.cos(turn))
 
 
-@numba.njit(**LEAN)
+@kernel
 def heads_like(one, other):
     """Whether two bodies (J, 6) are turned alike."""
     a, b = heading(one), heading(other)
     return a[0] * b[0] + a[1] * b[1] > math.cos(_LEAST_TURN)
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def turn_body(camera, turn, body, cov, slope):
     """Make a Gaussian (J, 6), (J, 6, 6), (J, 6, 6) the other body's, in place."""
     middle, across, speed = np.zeros(6), np.zeros(2), np.zeros(2)

@@ -6,11 +6,10 @@ are z (J, C, 2), sigma (J, C), ok (J, C) as `measurements.read_worker` fills the
 
 import math
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT
 from hrc_env.geometry.triangulation import inverse3
+from hrc_env.kernels import kernel
 from hrc_env.tracking.joints.importance import (
     cholesky3,
     draw,
@@ -30,7 +29,7 @@ _LEAST_ESS = 8.0
 """With fewer effective particles the Gaussian at the mode is the better answer."""
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def predict_all(state, F, Q, dt):
     """Move every tracked body by dt [s]; F, Q (J, 2, 2) as `models.motion.damped_joints` gives."""
     for b in range(state.tracked.shape[0]):
@@ -40,7 +39,7 @@ def predict_all(state, F, Q, dt):
                 predict_body(state.body[b, w], state.cov[b, w], offset, count, F, Q, dt)
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def update_all(state, P, px, confidence, sigma_px, standing, noise, tables, n_mode, s):
     """Take one set of frames in.
 
@@ -72,7 +71,7 @@ def update_all(state, P, px, confidence, sigma_px, standing, noise, tables, n_mo
             check(state, b, w, s, factor)
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _follow(state, b, w, P, z, sigma, ok, noise, tables, n_mode, s):
     """Update every joint of a tracked worker, then let the bones speak."""
     n_joints, n_cameras = ok.shape
@@ -99,7 +98,7 @@ def _follow(state, b, w, P, z, sigma, ok, noise, tables, n_mode, s):
     use_bones(body, cov, n_views, state.bone_length[b, w], state.bone_variance[b, w])
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _update_joint(seen, draws, model, body, cov, belief, scratch):
     """One joint's importance-sampled posterior; returns the effective sample size."""
     work, gain = scratch
@@ -119,7 +118,7 @@ def _update_joint(seen, draws, model, body, cov, belief, scratch):
     return ess
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _sample(seen, draws, contrast, body, prior_cov, mode, spread, work, mean, moments):
     """Mean (3,) and covariance (3, 3) of weighted particles; the effective sample size."""
     P, z, sigma, ok = seen
@@ -147,7 +146,7 @@ def _sample(seen, draws, contrast, body, prior_cov, mode, spread, work, mean, mo
     return ess
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _regress(body, cov, precision, mean, spread, gain):
     """Give the position its new mean and covariance, and the velocity what follows from them.
 

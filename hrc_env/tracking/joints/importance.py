@@ -7,11 +7,10 @@ exact enough and lets it run in vector registers.
 
 import math
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.compiled import JIT
+from hrc_env.kernels import kernel
 
 _f = np.float32
 _LOG2_E, _LN_2 = np.float32(math.log2(math.e)), np.float32(math.log(2.0))
@@ -36,7 +35,7 @@ def make_noise(n_tables: int, n_mode: int, n_prior: int) -> NDArray[np.float32]:
     return np.concatenate(parts, -1).astype(np.float32)
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def cholesky3(a, out):
     """Lower Cholesky factor of a positive definite 3x3 matrix; False if it is not."""
     out[0, 0] = math.sqrt(a[0, 0])
@@ -48,7 +47,7 @@ def cholesky3(a, out):
     return out[0, 0] > 0 and out[1, 1] > 0 and out[2, 2] > 0
 
 
-@numba.njit(fastmath=_REORDER, **JIT)
+@kernel(makes_arrays=True, fastmath=_REORDER)
 def exp_of_negative(x, out, out_bits):
     """out = exp(x) for float32 x <= 0; `out_bits` is `out` seen as int32. Vectorises.
 
@@ -71,7 +70,7 @@ def exp_of_negative(x, out, out_bits):
         out[m] *= x[m]
 
 
-@numba.njit(fastmath=_REORDER, **JIT)
+@kernel(makes_arrays=True, fastmath=_REORDER)
 def draw(noise, root_mode, root_prior, shift, n_mode, particles):
     """Particles (3, M) about the mode: the first n_mode from it, the rest from the prior.
 
@@ -92,7 +91,7 @@ def draw(noise, root_mode, root_prior, shift, n_mode, particles):
             particles[2, m] = z + l20 * a + l21 * b + l22 * c
 
 
-@numba.njit(fastmath=_REORDER, **JIT)
+@kernel(makes_arrays=True, fastmath=_REORDER)
 def weigh_proposal(particles, root_mode, root_prior, shift, share_mode, weights, work, bits):
     """weights = prior / proposal, where the proposal mixes both Gaussians."""
     volume = root_mode[0, 0] * root_mode[1, 1] * root_mode[2, 2]
@@ -122,7 +121,7 @@ def weigh_proposal(particles, root_mode, root_prior, shift, share_mode, weights,
         weights[m] = _f(1.0) / (from_mode * ratio + from_prior)
 
 
-@numba.njit(fastmath=_REORDER, **JIT)
+@kernel(makes_arrays=True, fastmath=_REORDER)
 def weigh_camera(camera, u, v, sigma, mode, particles, contrast, weights, work, bits):
     """Multiply the weights by one camera's mixture likelihood, at most 1."""
     x0, y0, z0 = mode[0], mode[1], mode[2]
@@ -146,7 +145,7 @@ def weigh_camera(camera, u, v, sigma, mode, particles, contrast, weights, work, 
         weights[m] *= far + near * work[1, m]
 
 
-@numba.njit(fastmath=_REORDER, **JIT)
+@kernel(makes_arrays=True, fastmath=_REORDER)
 def weighted_moments(particles, weights, mean, cov):
     """Mean (3,), covariance (3, 3) of weighted particles; returns the effective sample size."""
     largest = _f(0.0)

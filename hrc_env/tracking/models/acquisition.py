@@ -6,11 +6,10 @@ The kernels work on one worker: z (J, C, 2) pixels, sigma (J, C), ok (J, C) as
 
 import math
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT, LEAN
 from hrc_env.geometry.triangulation import consensus_point
+from hrc_env.kernels import kernel
 from hrc_env.typing import Floats
 
 STANDING_M: Floats = np.array(
@@ -31,7 +30,7 @@ WIDEST_STD_M = 0.5
 _GUESS_STD_M, _GUESS_STD_WITHOUT_HEADING_M = 0.3, 0.6
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def triangulate_body(P, z, sigma, ok, gate_sigma, radius, points, cov, found):
     """Joints on which at least two views agree, near each other as a body is.
 
@@ -45,7 +44,7 @@ def triangulate_body(P, z, sigma, ok, gate_sigma, radius, points, cov, found):
     return keep_one_body(points, cov, found, radius)
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def keep_one_body(points, cov, found, radius):
     """Drop points that are too uncertain, or not near the others as a body's are.
 
@@ -65,7 +64,7 @@ def keep_one_body(points, cov, found, radius):
     return n_found
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def middle_of(points, among, out):
     """Median of the points `among`, axis by axis; False if there is none."""
     values = np.empty(len(points))
@@ -81,13 +80,13 @@ def middle_of(points, among, out):
     return True
 
 
-@numba.njit(**LEAN)
+@kernel
 def distance(a, b):
     """Euclidean distance of two points."""
     return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def complete_body(standing, points, cov, found):
     """Guess the joints that were not found, from a standing body turned as the torso is."""
     cos, sin, known = _heading_of(points, found)
@@ -110,19 +109,19 @@ def complete_body(standing, points, cov, found):
             cov[j] = np.eye(3) * std**2
 
 
-@numba.njit(**LEAN)
+@kernel
 def heading(points):
     """(cos, sin, known) of the body's heading, from shoulders and hips; (0, 0, False) unknown."""
     return _across(points, True, True)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _heading_of(points, found):
     """The same, of those joints that were found."""
     return _across(points, found[1] and found[2], found[7] and found[8])
 
 
-@numba.njit(**LEAN)
+@kernel
 def _across(points, shoulders, hips):
     x, y = 0.0, 0.0
     for left, known in ((1, shoulders), (7, hips)):
@@ -135,7 +134,7 @@ def _across(points, shoulders, hips):
     return y / length, -x / length, True
 
 
-@numba.njit(**LEAN)
+@kernel
 def count_conflict(n_ok, n_supporting, conflict):
     """Updates in a row in which two views were there and fewer than two supported the joint."""
     if n_ok < 2 or n_supporting >= 2:
@@ -143,7 +142,7 @@ def count_conflict(n_ok, n_supporting, conflict):
     return conflict + 1
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def find_again(P, z, sigma, ok, gate_sigma, radius, middle, point, cov):
     """One joint (z (C, 2), sigma, ok (C,)) on which two views agree, near the body's middle."""
     use = np.empty(len(P), np.bool_)

@@ -7,10 +7,9 @@ no bone can make smaller, so that only what they do not share is corrected.
 
 import math
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT, LEAN
+from hrc_env.kernels import kernel
 from hrc_env.skeleton import BONE_LENGTH_M, BONES, JOINT
 from hrc_env.tracking.models.motion import relative_covariance, shared_covariance
 from hrc_env.typing import Floats
@@ -31,7 +30,7 @@ def population(shape: tuple[int, ...]) -> tuple[Floats, Floats]:
     return length, (POPULATION_SHARE * length) ** 2
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def use_bones(body, cov, n_views, length, variance):
     """Learn lengths (16,) and correct body (J, 6), cov (J, 6, 6) by them, in place."""
     shared = shared_covariance(cov)
@@ -57,7 +56,7 @@ def use_bones(body, cov, n_views, length, variance):
         _correct(body[b], cov[b], gain_b, -miss, innovation)
 
 
-@numba.njit(**LEAN)
+@kernel
 def learn_length(measured, spread, k, length, variance):
     """Kalman update of length[k] by a measurement whose errors last for several updates."""
     noise = _CORRELATED_UPDATES * spread
@@ -69,7 +68,7 @@ def learn_length(measured, spread, k, length, variance):
     variance[k] = max((1.0 - gain) * variance[k], _LEAST_VARIANCE)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _direction(a, b, out):
     x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
     length = math.sqrt(x * x + y * y + z * z) + 1e-6
@@ -77,7 +76,7 @@ def _direction(a, b, out):
     return length
 
 
-@numba.njit(**LEAN)
+@kernel
 def _gain(cov, share, shared, along, out):
     """Covariance of a joint's own part of (position, velocity) with its place along the bone.
 
@@ -91,7 +90,7 @@ def _gain(cov, share, shared, along, out):
     return out[0] * along[0] + out[1] * along[1] + out[2] * along[2]
 
 
-@numba.njit(**LEAN)
+@kernel
 def _correct(body, cov, gain, miss, innovation):
     for i in range(6):
         body[i] += gain[i] * miss / innovation

@@ -9,10 +9,9 @@ joint knows, and damping towards the anchor must not make it smaller.
 import functools
 import math
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT, LEAN
+from hrc_env.kernels import kernel
 from hrc_env.skeleton import TORSO
 from hrc_env.tracking.models.acquisition import heading
 from hrc_env.typing import Floats
@@ -69,7 +68,7 @@ def whole_body_noise(dt_s: float, root_acceleration: float) -> Floats:
     return root_acceleration * np.array([[dt_s**3 / 3, dt_s**2 / 2], [dt_s**2 / 2, dt_s]])
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def predict_body(body, cov, offset, offset_count, F, Q, dt):
     """Move one worker by dt: body (J, 6), cov (J, 6, 6), in place; learns the offsets (J, 3)."""
     root = root_of(body, cov)
@@ -96,7 +95,7 @@ def predict_body(body, cov, offset, offset_count, F, Q, dt):
         _add_isotropic(cov[j], pp + dt * (2.0 * pv + dt * vv), pv + dt * vv, vv)
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def root_of(body, cov):
     """(6,) the torso's position and velocity, its joints weighted by what is known of them."""
     root, weight_p, weight_v = np.zeros(6), 0.0, 0.0
@@ -113,7 +112,7 @@ def root_of(body, cov):
     return root
 
 
-@numba.njit(**LEAN)
+@kernel
 def learn_offsets(body, cov, root, cos, sin, dt, offset, offset_count):
     """Joints that are known well teach their mean places (J, 3) on the body, in place."""
     for j in range(len(body)):
@@ -127,7 +126,7 @@ def learn_offsets(body, cov, root, cos, sin, dt, offset, offset_count):
         offset[j, 2] += trust * (up - offset[j, 2])
 
 
-@numba.njit(**LEAN)
+@kernel
 def shared_covariance(cov):
     """Variances (position, cross, velocity) per axis of the torso joint known best."""
     best, least = 0, np.inf
@@ -139,7 +138,7 @@ def shared_covariance(cov):
     return least / 3.0, cross / 3.0, (cov[best, 3, 3] + cov[best, 4, 4] + cov[best, 5, 5]) / 3.0
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def relative_covariance(cov, shared, out, factor):
     """`cov` (6, 6) less the largest share of the root's that leaves it positive definite.
 
@@ -154,7 +153,7 @@ def relative_covariance(cov, shared, out, factor):
     return 0.0
 
 
-@numba.njit(**LEAN)
+@kernel
 def is_positive_definite(a, factor):
     """Whether a symmetric matrix has a Cholesky factor; `factor` takes its lower part."""
     for i in range(len(a)):
@@ -171,7 +170,7 @@ def is_positive_definite(a, factor):
     return True
 
 
-@numba.njit(**LEAN)
+@kernel
 def _move_covariance(cov, f, out):
     """out = (f x I3) cov (f x I3)' for cov (6, 6) of (position, velocity)."""
     f00, f01, f10, f11 = f[0, 0], f[0, 1], f[1, 0], f[1, 1]
@@ -184,7 +183,7 @@ def _move_covariance(cov, f, out):
             out[3 + i, k], out[3 + i, 3 + k] = v_pp * f00 + v_pv * f01, v_pp * f10 + v_pv * f11
 
 
-@numba.njit(**LEAN)
+@kernel
 def _add_isotropic(cov, pp, pv, vv):
     for i in range(3):
         cov[i, i] += pp

@@ -21,11 +21,10 @@ white noise.
 import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import LEAN
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, inverse3
+from hrc_env.kernels import kernel
 from hrc_env.tracking.config import TrackerConfig
 
 N_SUMS = 5
@@ -77,7 +76,7 @@ def first_factor(config: TrackerConfig) -> float:
     return min(max(1.0, config.noise_bounds[0]), config.noise_bounds[1])
 
 
-@numba.njit(**LEAN)
+@kernel
 def scale_sigma(factor, sigma):
     """Multiply sigma (J, C) by the root of the factors (J, C), in place."""
     for j in range(len(sigma)):
@@ -85,7 +84,7 @@ def scale_sigma(factor, sigma):
             sigma[j, c] *= math.sqrt(factor[j, c])
 
 
-@numba.njit(**LEAN)
+@kernel
 def learn_noise(seen, belief, body, factor, sums, last, model, w):
     """Learn the factors (J, C) from one update, in place.
 
@@ -121,7 +120,7 @@ def learn_noise(seen, belief, body, factor, sums, last, model, w):
     _set_factors(factor, sums, grows, model)
 
 
-@numba.njit(fastmath=_REORDER, **LEAN)
+@kernel(fastmath=_REORDER)
 def _look(seen, belief, body, j, view, spread):
     """Triangulate joint j linearly about `body`, from the cameras that are believed; how many.
 
@@ -173,7 +172,7 @@ def _look(seen, belief, body, j, view, spread):
     return n_views
 
 
-@numba.njit(fastmath=_REORDER, **LEAN)
+@kernel(fastmath=_REORDER)
 def _compare(view, spread, factor, sums, last, model):
     """Add one joint's residuals about its triangulated point to its sums (C, 5), which fade.
 
@@ -205,7 +204,7 @@ def _compare(view, spread, factor, sums, last, model):
         last[c, 0], last[c, 1] = du, dv
 
 
-@numba.njit(fastmath=_REORDER, **LEAN)
+@kernel(fastmath=_REORDER)
 def _remembered(cov, predicted, work):
     """tr(cov predicted^-1) / 3: how much of a position is the prediction's; `work` (3, 3+)."""
     inverse3(predicted, work)
@@ -214,7 +213,7 @@ def _remembered(cov, predicted, work):
     return (own + 2.0 * cross) / 3.0
 
 
-@numba.njit(fastmath=_REORDER, **LEAN)
+@kernel(fastmath=_REORDER)
 def _set_factors(factor, sums, grows, model):
     """The factors (J, C) that the sums ask for.
 

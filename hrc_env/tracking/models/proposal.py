@@ -8,21 +8,19 @@ taken for outliers (graduated non-convexity), and ends with the likelihood as it
 
 import math
 
-import numba
-
-from hrc_env.compiled import LEAN
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, inverse3, pixel_of
+from hrc_env.kernels import kernel
 
 _REORDER = {"reassoc", "contract", "arcp", "nsz"}  # NaN and infinity keep their meaning
 
 
-@numba.njit(**LEAN)
+@kernel
 def contrast_of(outlier_weight, image_area_px):
     """Odds of a perfect inlier against an outlier, times the variance of its pixel [px^2]."""
     return (1.0 - outlier_weight) * image_area_px / (2.0 * math.pi * outlier_weight)
 
 
-@numba.njit(**LEAN)
+@kernel
 def find_mode(seen, mean, cov, precision, contrast, n_steps, mode, spread, belief, work):
     """Robust Gauss-Newton from the prior (mean, cov, precision) to the posterior's mode.
 
@@ -51,7 +49,7 @@ def find_mode(seen, mean, cov, precision, contrast, n_steps, mode, spread, belie
                 mode[i] += spread[i, k] * gradient[k]
 
 
-@numba.njit(fastmath=_REORDER, **LEAN)
+@kernel(fastmath=_REORDER)
 def add_cameras(P, z, sigma, ok, point, cov, widen, contrast, information, gradient, belief):
     """Information (3, 3) and gradient (3,) of the robust likelihood at a point, added up.
 

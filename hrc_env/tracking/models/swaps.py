@@ -9,10 +9,8 @@ seem to be wrong.
 
 import math
 
-import numba
-
-from hrc_env.compiled import LEAN
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
+from hrc_env.kernels import kernel
 from hrc_env.skeleton import MIRROR
 from hrc_env.tracking.measurements import pixel_spread
 from hrc_env.tracking.models.proposal import contrast_of
@@ -23,7 +21,7 @@ _LEAST_CHANCE, _MOST_EVIDENCE = 1e-3, 50.0
 _REORDER = {"reassoc", "contract", "nsz"}
 
 
-@numba.njit(**LEAN)
+@kernel
 def undo_swaps(P, body, cov, z, sigma, ok, chance, blind, believed, s):
     """Mirror z, sigma, ok (J, C) of the cameras that are probably swapped, in place.
 
@@ -56,7 +54,7 @@ def undo_swaps(P, body, cov, z, sigma, ok, chance, blind, believed, s):
             _mirror(c, z, sigma, ok)
 
 
-@numba.njit(**LEAN)
+@kernel
 def swap_evidence(camera, c, body, cov, z, sigma, ok, contrast):
     """Log-likelihood ratio of camera c being swapped, bounded."""
     swapped, right = 1.0, 1.0  # products: no term is more than 1e10
@@ -75,14 +73,14 @@ def swap_evidence(camera, c, body, cov, z, sigma, ok, contrast):
     return min(max(math.log(swapped / right), -_MOST_EVIDENCE), _MOST_EVIDENCE)
 
 
-@numba.njit(fastmath=_REORDER, **LEAN)
+@kernel(fastmath=_REORDER)
 def _mixture(du, dv, sigma, spread, contrast):
     """Density of a detection over that of an outlier, but for a factor that pairs share."""
     near = 1.0 / (sigma * sigma + spread)
     return 1.0 + contrast * near * math.exp(-0.5 * (du * du + dv * dv) * near)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _mirror(c, z, sigma, ok):
     for j in range(len(_MIRROR)):
         m = _MIRROR[j]

@@ -7,10 +7,9 @@ fills them.
 
 import math
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT, LEAN
+from hrc_env.kernels import kernel
 from hrc_env.tracking.models.acquisition import (
     complete_body,
     distance,
@@ -26,7 +25,7 @@ _FURTHEST_STD = 8.0
 """A body further than this many prior deviations from the prior has been lost."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def grow_older(state, b, w, dt, s):
     """Count ages up by dt [s]; give up a track that nothing supports, let a lost one relax."""
     body, ages = state.body[b, w], (state.age_s[b, w], state.conflict[b, w])
@@ -34,7 +33,7 @@ def grow_older(state, b, w, dt, s):
     state.tracked[b, w] = age_worker(*gaussian, *ages, state.tracked[b, w], dt, s)
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def acquire(state, b, w, P, z, sigma, ok, standing, s):
     """Start a track when two views agree on enough joints; whether one was started."""
     n_joints = len(ok)
@@ -53,7 +52,7 @@ def acquire(state, b, w, P, z, sigma, ok, standing, s):
     return True
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def place(body, cov, point, spread):
     """Put a joint at rest at a point."""
     body[:3], body[3:] = point, 0.0
@@ -63,7 +62,7 @@ def place(body, cov, point, spread):
         cov[3 + i, 3 + i] = _FOUND_SPEED_STD_M_S**2
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def find_joints_again(state, b, w, P, z, sigma, ok, s, placed):
     """Joints that have been elsewhere for a while, as two views say, are put there.
 
@@ -81,7 +80,7 @@ def find_joints_again(state, b, w, P, z, sigma, ok, s, placed):
             state.age_s[b, w, j], state.conflict[b, w, j], placed[j] = 0.0, 0, True
 
 
-@numba.njit(**LEAN)
+@kernel
 def acquire_anew(state, b, w, P, z, sigma, ok, standing, s):
     """Start over when the views have long agreed on another body; whether that happened.
 
@@ -97,7 +96,7 @@ def acquire_anew(state, b, w, P, z, sigma, ok, standing, s):
     return True
 
 
-@numba.njit(**LEAN)
+@kernel
 def check(state, b, w, s, factor):
     """Keep covariances positive definite; a body that has left the world is lost.
 
@@ -124,7 +123,7 @@ def check(state, b, w, s, factor):
     return False
 
 
-@numba.njit(**LEAN)
+@kernel
 def _lose(state, b, w, s):
     """Put a worker who has left the world back to the prior."""
     body, cov = state.body[b, w], state.cov[b, w]

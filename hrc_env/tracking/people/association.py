@@ -11,12 +11,11 @@ report is data: poses that are no measurement are left out.
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT
 from hrc_env.errors import ConfigError, check_shape
 from hrc_env.geometry.assignment import assign_rows
+from hrc_env.kernels import kernel
 from hrc_env.records import Keypoints, PoseEstimate
 from hrc_env.skeleton import BONE_LENGTH_M, BONES, MIRROR, N_JOINTS
 from hrc_env.tracking.measurements import arrays_of, is_measurement
@@ -115,7 +114,7 @@ def associate(
     return Association(Keypoints(px, confidence, sigma_px, found.time_s), pose)
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _associate_all(
     P, found_px, found_confidence, found_sigma, mean, cov, tracked, tables, s,
     pose, px, confidence, sigma_px,
@@ -140,7 +139,7 @@ def _associate_all(
                     sigma_px[b, c, w] = found_sigma[b, c, d]
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _read(px, confidence, sigma_px, ok, free):
     """Which joints are measurements, and which poses have enough of them to be somebody's."""
     for c in range(ok.shape[0]):
@@ -153,7 +152,7 @@ def _read(px, confidence, sigma_px, ok, free):
             free[c, d] = n >= LEAST_JOINTS
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _follow(P, poses, free, mean, cov, tracked, mirror, s, pose):
     """Give tracked workers the poses that fit their predictions best, camera by camera."""
     (z, sigma, ok), n_workers = poses, len(tracked)
@@ -180,7 +179,7 @@ def _follow(P, poses, free, mean, cov, tracked, mirror, s, pose):
                 free[c, column[w]] = False
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _welcome(rig, poses, free, mean, tracked, tables, s, pose):
     """Give poses that several cameras have of one body to whom it can be."""
     n_cameras, n_poses = free.shape
@@ -222,7 +221,7 @@ def _welcome(rig, poses, free, mean, tracked, tables, s, pose):
             tracked[w], vacant[w], unseen[w] = True, False, False
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _best(seeds, members, scores, free, n):
     """The proposal that the cameras fit best with poses that are still free, or -1."""
     best, best_total = -1, 0.0
@@ -239,7 +238,7 @@ def _best(seeds, members, scores, free, n):
     return best
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _body_of(rig, poses, sight, seed, s):
     """(points (J, 3), met (J,)) of a proposal."""
     (P, eye, _, focal), (_, sigma, ok) = rig, poses
@@ -253,7 +252,7 @@ def _body_of(rig, poses, sight, seed, s):
     return points, met
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _whose(body, mean, tracked, vacant, unseen, s):
     """The worker that a body is, or -1: one who is followed there, is missed near, or is nobody.
 
@@ -268,7 +267,7 @@ def _whose(body, mean, tracked, vacant, unseen, s):
     return near if near >= 0 else _nearest(distance, vacant, np.inf)
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _nearest(distance, among, limit):
     best = -1
     for w in range(len(distance)):
@@ -277,7 +276,7 @@ def _nearest(distance, among, limit):
     return best
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _place(body, mean):
     points, met = body
     mean[:] = np.nan
@@ -287,7 +286,7 @@ def _place(body, mean):
                 mean[j, i] = points[j, i]
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _apart(body, mean):
     """Distance [m] between a body and a worker, on average over joints known of both."""
     points, met = body

@@ -12,11 +12,10 @@ pose is still nobody's.
 
 import math
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
+from hrc_env.kernels import kernel
 from hrc_env.tracking.people.resemblance import expect, resemblance
 
 MEETING_M = 0.03
@@ -31,7 +30,7 @@ BODY_SLACK_M = 0.1
 """How far the body of two lines of sight may be from what other cameras see [m]."""
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def camera_model(P, eye, back, focal):
     """Optical centres (C, 3), rays from pixels (C, 3, 3) and focal lengths (C,) of P (C, 3, 4)."""
     for c in range(len(P)):
@@ -50,7 +49,7 @@ def camera_model(P, eye, back, focal):
         focal[c] = math.sqrt(max((a[0] * a[0]).sum() - along * along, 1e-12))
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def lines_of_sight(back, z, ok, free, sight):
     """Unit directions (C, D, J, 3) of the joints of free poses, into `sight`."""
     n_cameras, n_poses, n_joints = ok.shape
@@ -68,7 +67,7 @@ def lines_of_sight(back, z, ok, free, sight):
                     sight[c, d, j, i] /= math.sqrt(length)
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def meeting(camera_1, camera_2, pose_1, pose_2, gate_sigma, points, met):
     """Where the joints' lines of sight of two poses meet; how many do, 0 if too few.
 
@@ -99,7 +98,7 @@ def meeting(camera_1, camera_2, pose_1, pose_2, gate_sigma, points, met):
     return n_met if n_met >= AGREEING_SHARE * n_common else 0
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _nearest_places(eye_1, ray_1, eye_2, ray_2, middle):
     """Distances along two lines to where they pass each other, their squared gap; the middle."""
     cosine, a, b = 0.0, 0.0, 0.0
@@ -119,12 +118,12 @@ def _nearest_places(eye_1, ray_1, eye_2, ray_2, middle):
     return far_1, far_2, gap
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _ahead(camera, point):
     return pixel_of(camera, point[0], point[1], point[2])[2] > NEAREST_DEPTH_M
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def has_good_bones(points, met, bones, length_m):
     """Whether most bones between joints that met are as long as a person's."""
     n, good = 0, 0
@@ -141,7 +140,7 @@ def has_good_bones(points, met, bones, length_m):
     return n > 0 and good >= GOOD_BONES * n
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def fit_cameras(P, poses, free, body, tables, s, member, score):
     """Which free pose of each camera fits a body best, and how well; their total.
 
@@ -170,7 +169,7 @@ def fit_cameras(P, poses, free, body, tables, s, member, score):
     return total
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def propose(rig, poses, sight, free, tables, s, seeds, members, scores):
     """All bodies that two cameras propose: seeds (n, 4), members, scores (n, C); how many."""
     (P, eye, _, focal), (_, sigma, ok) = rig, poses

@@ -8,11 +8,10 @@ right may be exchanged: the better reading counts.
 
 import math
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
+from hrc_env.kernels import kernel
 from hrc_env.tracking.measurements import pixel_spread
 
 LEAST_JOINTS = 3
@@ -22,7 +21,7 @@ FULL_JOINTS = 6
 _ISOTROPIC = np.eye(3)
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def expect(camera, mean, cov, known, slack_m, image):
     """Where a camera should see a body's joints: image (J, 3) of u, v and variance [px^2].
 
@@ -45,7 +44,7 @@ def expect(camera, mean, cov, known, slack_m, image):
                 image[j, 0], image[j, 1], image[j, 2] = u, v, spread
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def resemblance(image, z, sigma, ok, mirror, gate_sigma, area_px):
     """Mean log likelihood ratio of a pose z (J, 2), sigma, ok (J,); 0 where it does not fit."""
     plain = _one_reading(image, z, sigma, ok, mirror, False, gate_sigma, area_px)
@@ -53,7 +52,7 @@ def resemblance(image, z, sigma, ok, mirror, gate_sigma, area_px):
     return max(plain, swapped)
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def _one_reading(image, z, sigma, ok, mirror, swapped, gate_sigma, area_px):
     n, n_near, total, product, gate = 0, 0, 0.0, 1.0, gate_sigma * gate_sigma
     for j in range(len(image)):

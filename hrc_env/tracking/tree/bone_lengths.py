@@ -6,10 +6,9 @@ bones are always on; a scalar Kalman filter per bone learns it while two views s
 
 import math
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.skeleton import BONE_LENGTH_M
 from hrc_env.tracking.models.bones import POPULATION_SHARE, STIFFNESS_M, learn_length
 from hrc_env.tracking.tree.gaussian import EDGE_BONE, PARENT, ROOT
@@ -24,14 +23,14 @@ def population_edges() -> tuple[Floats, Floats]:
     return length, (POPULATION_SHARE * length) ** 2
 
 
-@numba.njit(**LEAN)
+@kernel
 def stiff_lengths(variance, give, out):
     """Variances (J,) of the lengths as measurements: what is not known of them, and the give."""
     for j in range(len(variance)):
         out[j] = variance[j] + (give * _STIFFNESS[j]) ** 2
 
 
-@numba.njit(**LEAN)
+@kernel
 def learn_lengths(body, cov, slope, n_views, length, variance):
     """Learn lengths (J,) and variances (J,), in place, from the joints that two views see."""
     for j in range(len(body)):

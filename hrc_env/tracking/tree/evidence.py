@@ -12,18 +12,17 @@ det R_j. What all hypotheses have in common is left out.
 
 import math
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT, LEAN
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
+from hrc_env.kernels import kernel
 from hrc_env.skeleton import JOINT
 from hrc_env.tracking.tree.gaussian import ORDER, PARENT, multiply, multiply_transposed
 
 _NOSE, _RIGHT_SHOULDER = JOINT["nose"], JOINT["right_shoulder"]
 
 
-@numba.njit(**LEAN)
+@kernel
 def log_evidence(prior, posterior, seen, bones, contrast, floor_std_m, w):
     """Log of the evidence of one update, up to what all hypotheses share.
 
@@ -50,7 +49,7 @@ def log_evidence(prior, posterior, seen, bones, contrast, floor_std_m, w):
     return likelihood - 0.5 * square + 0.5 * (log_det_after - log_det)
 
 
-@numba.njit(**LEAN)
+@kernel
 def log_likelihood(body, seen, contrast):
     """Log-likelihood of all pixels at positions (J, 6), relative to all being outliers."""
     P, z, sigma, ok = seen
@@ -67,7 +66,7 @@ def log_likelihood(body, seen, contrast):
     return total
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def tree_measure(cov, slope, change, w):
     """Squared Mahalanobis length of `change` (J, 6) under a tree, and log det of the tree.
 
@@ -94,7 +93,7 @@ def tree_measure(cov, slope, change, w):
     return square, log_det
 
 
-@numba.njit(**LEAN)
+@kernel
 def _measure(a, x, factor):
     """x' a^-1 x and log det a for a symmetric 6x6 matrix; x (6,) is used up."""
     square, product = 0.0, 1.0
@@ -117,7 +116,7 @@ def _measure(a, x, factor):
     return square, math.log(product)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _measure_diagonal(a, x):
     square, log_det = 0.0, 0.0
     for i in range(6):
@@ -127,7 +126,7 @@ def _measure_diagonal(a, x):
     return square, log_det
 
 
-@numba.njit(**LEAN)
+@kernel
 def _bones(body, bones):
     """Log-likelihood of the bones' lengths, those of the tree's edges and the nose's second."""
     length, variance = bones
@@ -138,7 +137,7 @@ def _bones(body, bones):
     return total
 
 
-@numba.njit(**LEAN)
+@kernel
 def _floor(body, std_m):
     """Log-likelihood of the floor: of what is below it."""
     total = 0.0
@@ -147,13 +146,13 @@ def _floor(body, std_m):
     return total
 
 
-@numba.njit(**LEAN)
+@kernel
 def _bone(body, j, q, length, variance):
     x, y, z = body[j, 0] - body[q, 0], body[j, 1] - body[q, 1], body[j, 2] - body[q, 2]
     return -0.5 * (math.sqrt(x * x + y * y + z * z) - length) ** 2 / variance
 
 
-@numba.njit(**LEAN)
+@kernel
 def distance_between(one, other, w):
     """Squared Mahalanobis distance of two bodies (body, cov, slope) under the wider of them."""
     least = np.inf

@@ -4,10 +4,9 @@
 z (J, C, 2), sigma (J, C), ok (J, C) as `measurements.read_worker` fills them.
 """
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT, LEAN
+from hrc_env.kernels import kernel
 from hrc_env.tracking.measurements import read_worker
 from hrc_env.tracking.models.acquisition import count_conflict
 from hrc_env.tracking.models.noise import learn_noise, scale_sigma
@@ -28,7 +27,7 @@ from hrc_env.tracking.tree.update import correct_mean, update_tree
 from hrc_env.tracking.tree.work import make_work
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def predict_all(state, model, dt, s):
     """Let dt [s] pass: bodies move and ages grow; `model` as in `tree.predict.predict_tree`."""
     work = make_work(0)
@@ -41,7 +40,7 @@ def predict_all(state, model, dt, s):
             grow_older(state, b, w, dt, s)
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def update_all(state, P, px, confidence, sigma_px, standing, s, noise):
     """Take one set of frames in.
 
@@ -77,7 +76,7 @@ def update_all(state, P, px, confidence, sigma_px, standing, s, noise):
             look_after(state, b, w, seen, standing, s, placed, scratch[2].a)
 
 
-@numba.njit(**LEAN)
+@kernel
 def keep_positions(cov, out):
     """Copy the covariances of the positions (J, 3, 3) out of those of the joints (J, 6, 6)."""
     for j in range(len(cov)):
@@ -86,14 +85,14 @@ def keep_positions(cov, out):
                 out[j, i, k] = cov[j, i, k]
 
 
-@numba.njit(**LEAN)
+@kernel
 def follow(state, b, w, seen, s, scratch):
     """Update a tracked worker: search, condition, correct the mean, learn the bones."""
     condition(state, b, w, seen, s, scratch)
     settle(state, b, w, seen, s, scratch)
 
 
-@numba.njit(**LEAN)
+@kernel
 def condition(state, b, w, seen, s, scratch):
     """Search the mode and condition the tree there; belief (J, C) says what was believed.
 
@@ -109,7 +108,7 @@ def condition(state, b, w, seen, s, scratch):
     update_tree(body, cov, slope, work)
 
 
-@numba.njit(**LEAN)
+@kernel
 def settle(state, b, w, seen, s, scratch):
     """Go from the mode to the mean, and learn what is to be learnt from it."""
     belief, _, work = scratch
@@ -119,7 +118,7 @@ def settle(state, b, w, seen, s, scratch):
     keep_books(state, b, w, seen, belief, work.n_views)
 
 
-@numba.njit(**LEAN)
+@kernel
 def keep_books(state, b, w, seen, belief, n_views):
     """Ages, conflicts and bone lengths of a worker who has been updated.
 
@@ -139,7 +138,7 @@ def keep_books(state, b, w, seen, belief, n_views):
     learn_lengths(state.body[b, w], state.cov[b, w], state.slope[b, w], n_views, *bones)
 
 
-@numba.njit(**LEAN)
+@kernel
 def look_after(state, b, w, seen, standing, s, placed, factor):
     """Find joints or the whole body again where the views say so; notice a body that is lost.
 

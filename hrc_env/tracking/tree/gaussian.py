@@ -9,9 +9,7 @@ the root, the slope B_j (6, 6) with which it follows its parent q:
 Everything that these say is exact; a joint depends on all others through its parent only.
 """
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.skeleton import BONES, N_JOINTS
 
 PARENT = (1, -1, 1, 1, 2, 3, 4, 1, 2, 7, 8, 9, 10, 11, 12)
@@ -29,7 +27,7 @@ _LEAST_PIVOT = 1e-13
 _REORDER = {"reassoc", "contract", "nsz"}  # lets sums vectorise; NaN and infinity keep meaning
 
 
-@numba.njit(fastmath=_REORDER, **LEAN)
+@kernel(fastmath=_REORDER)
 def multiply(a, b, out):
     """out = a b for 6x6 matrices."""
     for i in range(6):
@@ -39,7 +37,7 @@ def multiply(a, b, out):
             out[i, k] = near + a3 * b[3, k] + a4 * b[4, k] + a5 * b[5, k]
 
 
-@numba.njit(fastmath=_REORDER, **LEAN)
+@kernel(fastmath=_REORDER)
 def multiply_transposed(a, b, out):
     """out = a b' for 6x6 matrices."""
     for k in range(6):
@@ -49,7 +47,7 @@ def multiply_transposed(a, b, out):
             out[i, k] = near + a[i, 3] * b3 + a[i, 4] * b4 + a[i, 5] * b5
 
 
-@numba.njit(fastmath=_REORDER, forceinline=True, **LEAN)
+@kernel(fastmath=_REORDER, forceinline=True)
 def inverse_of(a00, a10, a11, a20, a21, a22):
     """Inverse of a symmetric 3x3 matrix by its L D L' factors; whether it is positive definite.
 
@@ -72,7 +70,7 @@ def inverse_of(a00, a10, a11, a20, a21, a22):
     return i00, i10, i11, i20, i21, i22, proper
 
 
-@numba.njit(fastmath=_REORDER, **LEAN)
+@kernel(fastmath=_REORDER)
 def halves_of(a, work):
     """Two inverses, as `inverse_of` gives them, of blocks of a symmetric 6x6 matrix.
 

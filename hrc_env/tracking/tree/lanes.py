@@ -7,10 +7,8 @@ one number for each joint and one that is nobody's.
 
 import math
 
-import numba
-
-from hrc_env.compiled import LEAN
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M
+from hrc_env.kernels import kernel
 from hrc_env.skeleton import N_JOINTS
 
 LANES = 16
@@ -28,7 +26,7 @@ N_SUM_ROWS = 9
 _REORDER = {"reassoc", "contract", "nsz"}  # NaN and infinity keep their meaning
 
 
-@numba.njit(**LEAN)
+@kernel
 def set_views(seen, views):
     """Put pixels and precisions into views (C, 3 rows); 0 stands for what was not measured."""
     _, z, sigma, ok = seen
@@ -43,7 +41,7 @@ def set_views(seen, views):
                 views[c, 2 * LANES + lane] = 1.0 / (sigma[j, c] * sigma[j, c])
 
 
-@numba.njit(**LEAN)
+@kernel
 def set_joints(body, cov, joints):
     """Put positions (J, 3+) and their covariances (J, 3+, 3+) into the rows of the joints."""
     for j in range(len(body)):
@@ -55,7 +53,7 @@ def set_joints(body, cov, joints):
         joints[8 * LANES + lane] = cov[j, 1, 2]
 
 
-@numba.njit(fastmath=_REORDER, **LEAN)
+@kernel(fastmath=_REORDER)
 def add_view(p, joints, view, widen, contrast, seen, sums):
     """Add one camera's information and gradient, of all joints, to the rows of `sums`.
 
@@ -86,7 +84,7 @@ def add_view(p, joints, view, widen, contrast, seen, sums):
         sums[8 * LANES + j] += a2 * du + b2 * dv
 
 
-@numba.njit(fastmath=_REORDER, **LEAN)
+@kernel(fastmath=_REORDER)
 def _image(p, joints, view, widen, contrast, seen):
     """Where the camera sees the joints, and how odd that the pixels lie where they do."""
     p00, p01, p02, p03 = p[0, 0], p[0, 1], p[0, 2], p[0, 3]

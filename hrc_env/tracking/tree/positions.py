@@ -6,9 +6,7 @@ The prior of the positions alone is taken as a tree of 3-vectors; rows and quads
 
 import math
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.tracking.tree.gaussian import inverse_of
 from hrc_env.tracking.tree.quads import (
     ABOVE,
@@ -42,7 +40,7 @@ MEAN, LENGTH, VARIANCE = _PRECISION + 348, _PRECISION + 360, _PRECISION + 364
 _REORDER = {"reassoc", "contract", "nsz"}
 
 
-@numba.njit(fastmath=_REORDER, **LEAN)
+@kernel(fastmath=_REORDER)
 def position_prior(rows, at):
     """Precisions of a quad's positions given their parents'; needs the covariances with these."""
     at = offset(at)
@@ -83,7 +81,7 @@ def position_prior(rows, at):
         rows[n + 20] = f02 * p02 + f12 * p12 + f22 * p22
 
 
-@numba.njit(fastmath=_REORDER, **LEAN)
+@kernel(fastmath=_REORDER)
 def linearise_bones(rows, at):
     """What the bones from a quad's joints to their parents say, at the points."""
     at = offset(at)
@@ -107,7 +105,7 @@ def linearise_bones(rows, at):
         rows[n + 24], rows[n + 28], rows[n + 32] = px * miss, py * miss, pz * miss
 
 
-@numba.njit(**LEAN)
+@kernel
 def solve_positions(rows):
     """Shifts = the minimum of the quadratic that prior, cameras and bones make."""
     for quad in range(QUADS):
@@ -122,7 +120,7 @@ def solve_positions(rows):
         _shift(rows, DESCENT[n] * QUAD)
 
 
-@numba.njit(fastmath=_REORDER, **LEAN)
+@kernel(fastmath=_REORDER)
 def _eliminate(rows, at):
     """Slopes and inverse Hessians of a quad's shifts, and what these tell the parents'."""
     at = offset(at)
@@ -169,7 +167,7 @@ def _eliminate(rows, at):
         rows[n + 32] = f02 * g0 + f12 * g1 + f22 * g2 - e2
 
 
-@numba.njit(fastmath=_REORDER, **LEAN)
+@kernel(fastmath=_REORDER)
 def _shift(rows, at):
     """A quad's shifts, given their parents'; and the points to which they lead."""
     at = offset(at)
@@ -196,19 +194,19 @@ def _shift(rows, at):
         )
 
 
-@numba.njit(forceinline=True, **LEAN)
+@kernel(forceinline=True)
 def _lower(rows, m):
     """Six numbers of the upper left 3x3 block of a symmetric 6x6 matrix."""
     near = (rows[m], rows[m + 24], rows[m + 28])
     return (*near, rows[m + 48], rows[m + 52], rows[m + 56])
 
 
-@numba.njit(forceinline=True, **LEAN)
+@kernel(forceinline=True)
 def _six(rows, m):
     return rows[m], rows[m + 4], rows[m + 8], rows[m + 12], rows[m + 16], rows[m + 20]
 
 
-@numba.njit(forceinline=True, **LEAN)
+@kernel(forceinline=True)
 def _put(rows, m, half):
     rows[m], rows[m + 4], rows[m + 8] = half[0], half[1], half[2]
     rows[m + 12], rows[m + 16], rows[m + 20] = half[3], half[4], half[5]

@@ -8,9 +8,7 @@ forgetting all other covariances is the nearest Gaussian on the tree (least Kull
 divergence).
 """
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.tracking.models.acquisition import heading
 from hrc_env.tracking.models.motion import learn_offsets
 from hrc_env.tracking.tree.gaussian import multiply, multiply_transposed
@@ -50,7 +48,7 @@ _HERE, _THERE = POSITIONS, POSITIONS + 32
 _REORDER = {"reassoc", "contract", "nsz"}
 
 
-@numba.njit(**LEAN)
+@kernel
 def predict_tree(body, cov, slope, offset, offset_count, model, dt, w):
     """Move one worker by dt [s], in place.
 
@@ -90,13 +88,13 @@ def predict_tree(body, cov, slope, offset, offset_count, model, dt, w):
     store_tree(rows, _MOVED, cov, slope)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _torso_of(body, i):
     """Mean of the torso's four joints, component i."""
     return 0.25 * (body[_LEFT, i] + body[_RIGHT, i] + body[_LEFT_HIP, i] + body[_RIGHT_HIP, i])
 
 
-@numba.njit(**LEAN)
+@kernel
 def _move_means(body, cov, offset, offset_count, F, travel, dt):
     root = (
         _torso_of(body, 0), _torso_of(body, 1), _torso_of(body, 2),
@@ -117,7 +115,7 @@ def _move_means(body, cov, offset, offset_count, F, travel, dt):
             body[j, 3 + i] = v_new + travel[j, 1, 0] * place[i]
 
 
-@numba.njit(**LEAN)
+@kernel
 def _relate_torso(cov, slope, w):
     """Cov(x_j, r) of the torso's four joints into their rows, and Cov(r, r)."""
     X, rows = w.d, w.rows
@@ -147,12 +145,12 @@ def _relate_torso(cov, slope, w):
                 rows[_TORSO + 24 * i + 4 * k + lane] = mean
 
 
-@numba.njit(forceinline=True, **LEAN)
+@kernel(forceinline=True)
 def _place(j):
     return LANE_OF_JOINT[j] // 4 * QUAD + LANE_OF_JOINT[j] % 4
 
 
-@numba.njit(**LEAN)
+@kernel
 def _load_model(F, travel, rows):
     """F and travel of every joint and its parent in lanes."""
     for lane in range(LANES):
@@ -166,7 +164,7 @@ def _load_model(F, travel, rows):
         fetch_above(rows, quad, _HERE, _THERE, 8)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _move(rows, edge, own, other, here, there, out):
     """f edge g' + f own e' + d other' g' + d S e' for a quad, axes of space left alone.
 
@@ -179,7 +177,7 @@ def _move(rows, edge, own, other, here, there, out):
             moved(rows, edge + n, own + n, other + t, _TORSO + n, here, there, out + n)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _add_noise(Q, shared, rows):
     """Noise (2, 2) x I3: a joint's Q, and what it shares with its parent."""
     for j in range(len(Q)):
@@ -192,7 +190,7 @@ def _add_noise(Q, shared, rows):
                     rows[m + 72 * a + 12 * b + _MOVED_EDGE] += shared[a, b]
 
 
-@numba.njit(**LEAN)
+@kernel
 def _invert(rows, at):
     """Inverse marginals of a quad; 0 where there is none."""
     invert_rows(rows, at)

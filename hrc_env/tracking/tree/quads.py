@@ -9,9 +9,7 @@ A matrix of 6x6 is 36 rows, row by row; `rows` is one flat array, and matrices a
 they begin in it.
 """
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.tracking.tree.gaussian import PARENT, inverse_of
 from hrc_env.tracking.tree.lanes import JOINT_OF_LANE, LANE_OF_JOINT, LANES
 from hrc_env.tracking.tree.vectors import (
@@ -54,7 +52,7 @@ QUAD = POSITIONS + 4 * 92
 _REORDER = {"reassoc", "contract", "nsz"}  # lets sums vectorise; NaN and infinity keep meaning
 
 
-@numba.njit(forceinline=True, **LEAN)
+@kernel(forceinline=True)
 def offset(at):
     """The same number, of which the compiler then knows that it is not negative.
 
@@ -63,7 +61,7 @@ def offset(at):
     return max(at, 0)
 
 
-@numba.njit(**LEAN)
+@kernel
 def load_tree(cov, slope, rows):
     """Put marginals and slopes (J, 6, 6) into their rows; beside them each parent's marginal.
 
@@ -92,7 +90,7 @@ def load_tree(cov, slope, rows):
         multiply_rows(rows, at + SLOPE, at + ABOVE, at + EDGE)
 
 
-@numba.njit(**LEAN)
+@kernel
 def store_tree(rows, marginals, cov, slope):
     """Marginals, of which only the lower halves are looked at, and slopes out of their rows.
 
@@ -112,7 +110,7 @@ def store_tree(rows, marginals, cov, slope):
                     slope[j, i, k] = rows[at + SLOPE + 24 * i + 4 * k]
 
 
-@numba.njit(**LEAN)
+@kernel
 def fetch_above(rows, quad, source, target, n_rows):
     """Copy rows of the parents beside a quad's own; where there is no parent, they stay."""
     source, target = offset(source), offset(target)
@@ -131,7 +129,7 @@ def fetch_above(rows, quad, source, target, n_rows):
             rows[to + 4 * n] = rows[where + 4 * n]
 
 
-@numba.njit(**LEAN)
+@kernel
 def pass_on(rows, step, source, target, n_rows):
     """Add rows of the lanes of a step of `PASSES` to those of their parents."""
     source, target = offset(source), offset(target)
@@ -148,37 +146,37 @@ def pass_on(rows, step, source, target, n_rows):
             rows[to + 4 * n] += rows[here + 4 * n]
 
 
-@numba.njit(**LEAN)
+@kernel
 def multiply_rows(rows, a, b, out):
     """out = a b for 6x6 matrices."""
     product(rows, a, b, out)
 
 
-@numba.njit(**LEAN)
+@kernel
 def multiply_transposed_rows(rows, a, b, out):
     """out = a b' for 6x6 matrices."""
     product_transposed(rows, a, b, out)
 
 
-@numba.njit(**LEAN)
+@kernel
 def transposed_multiply_rows(rows, a, b, out):
     """out = a' b for 6x6 matrices."""
     transposed_product(rows, a, b, out)
 
 
-@numba.njit(**LEAN)
+@kernel
 def apply_rows(rows, a, x, out):
     """out = a x for a 6x6 matrix and 6 numbers."""
     applied(rows, a, x, out)
 
 
-@numba.njit(**LEAN)
+@kernel
 def apply_transposed_rows(rows, a, x, out):
     """out = a' x for a 6x6 matrix and 6 numbers."""
     transposed_applied(rows, a, x, out)
 
 
-@numba.njit(**LEAN)
+@kernel
 def subtract_rows(rows, a, b, out):
     """out = a - b for 6x6 matrices."""
     a, b, out = offset(a), offset(b), offset(out)
@@ -186,7 +184,7 @@ def subtract_rows(rows, a, b, out):
         rows[out + n] = rows[a + n] - rows[b + n]
 
 
-@numba.njit(**LEAN)
+@kernel
 def add_rows(rows, a, b, out):
     """out = a + b for 6x6 matrices."""
     a, b, out = offset(a), offset(b), offset(out)
@@ -194,7 +192,7 @@ def add_rows(rows, a, b, out):
         rows[out + n] = rows[a + n] + rows[b + n]
 
 
-@numba.njit(fastmath=_REORDER, **LEAN)
+@kernel(fastmath=_REORDER)
 def invert_rows(rows, at):
     """Inverses of a quad's symmetric `HESSIAN`, of which only the lower halves are looked at.
 
@@ -241,17 +239,17 @@ def invert_rows(rows, at):
         rows[at + PROPER + lane] = 1.0 if p[6] and v[6] else 0.0
 
 
-@numba.njit(forceinline=True, **LEAN)
+@kernel(forceinline=True)
 def _pair(rows, m):
     return rows[m], rows[m + 4]
 
 
-@numba.njit(forceinline=True, **LEAN)
+@kernel(forceinline=True)
 def _triple(rows, m):
     return rows[m], rows[m + 4], rows[m + 8]
 
 
-@numba.njit(fastmath=_REORDER, forceinline=True, **LEAN)
+@kernel(fastmath=_REORDER, forceinline=True)
 def along(half, x, y, z):
     """A symmetric 3x3 matrix, as `tree.gaussian.inverse_of` gives it, times (x, y, z)."""
     return (

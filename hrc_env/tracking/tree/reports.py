@@ -1,15 +1,13 @@
 """What is told of a Gaussian on the tree: each joint for itself, no more certain than is honest."""
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.tracking.tracks import bound
 
 _FORGOTTEN_UPDATES = 8
 """A camera that has not seen the worker for longer no longer counts as a view of them."""
 
 
-@numba.njit(**LEAN)
+@kernel
 def estimate_all(state, s, out):
     """Fill the arrays of a `PoseEstimate` in; `state` is `kalman.KalmanState`."""
     for b in range(state.tracked.shape[0]):
@@ -18,7 +16,7 @@ def estimate_all(state, s, out):
             tell_rest(state, b, w, s, out, w)
 
 
-@numba.njit(**LEAN)
+@kernel
 def tell_moments(state, b, k, out, w):
     """Mean, velocity and covariance of column k, to be those of worker w."""
     mean, cov, velocity = out[0][b, w], out[1][b, w], out[2][b, w]
@@ -29,7 +27,7 @@ def tell_moments(state, b, k, out, w):
                 cov[j, i, h] = state.cov[b, k, j, i, h]
 
 
-@numba.njit(**LEAN)
+@kernel
 def tell_rest(state, b, k, s, out, w):
     """Ages and the track of column k, and how certain worker w's joints are allowed to be.
 

@@ -7,9 +7,7 @@ The prior of the positions alone is taken as a tree of 3-vectors; cameras inform
 
 import math
 
-import numba
-
-from hrc_env.compiled import LEAN
+from hrc_env.kernels import kernel
 from hrc_env.skeleton import JOINT
 from hrc_env.tracking.tree.gaussian import PARENT
 from hrc_env.tracking.tree.lanes import (
@@ -48,7 +46,7 @@ _NOSE, _RIGHT_SHOULDER = JOINT["nose"], JOINT["right_shoulder"]
 _REORDER = {"reassoc", "contract", "nsz"}
 
 
-@numba.njit(**LEAN)
+@kernel
 def find_pose(body, cov, slope, seen, bones, contrast, floor_std_m, n_steps, belief, w):
     """Search the most probable positions and leave everything linearised there.
 
@@ -71,7 +69,7 @@ def find_pose(body, cov, slope, seen, bones, contrast, floor_std_m, n_steps, bel
     find_pose_near(body, cov, slope, seen, bones, *how, belief, w)
 
 
-@numba.njit(**LEAN)
+@kernel
 def find_pose_near(
     body, cov, slope, seen, bones, contrast, floor_std_m, n_steps, widen, belief, w
 ):  # fmt: skip
@@ -100,7 +98,7 @@ def find_pose_near(
     _keep(rows, w)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _load_positions(body, bones, point, rows):
     """Means, shifts and bones in lanes; what has no parent has a bone that says nothing."""
     length, variance = bones
@@ -118,12 +116,12 @@ def _load_positions(body, bones, point, rows):
         rows[at + VARIANCE] = variance[j] if bone else math.inf
 
 
-@numba.njit(forceinline=True, **LEAN)
+@kernel(forceinline=True)
 def _place(lane):
     return lane // 4 * QUAD + lane % 4
 
 
-@numba.njit(**LEAN)
+@kernel
 def _linearise_cameras(views, P, contrast, widening, belief, w):
     """Information and gradient of what the cameras say, at the points."""
     rows, joints, sums = w.rows, w.joints, w.sums
@@ -141,7 +139,7 @@ def _linearise_cameras(views, P, contrast, widening, belief, w):
         _take_cameras(sums, 4 * quad, rows, quad * QUAD)
 
 
-@numba.njit(fastmath=_REORDER, **LEAN)
+@kernel(fastmath=_REORDER)
 def _take_cameras(sums, first, rows, at):
     """A quad's cameras out of the lanes, their gradient moved back to the predicted means."""
     first, at = offset(first), offset(at)
@@ -158,7 +156,7 @@ def _take_cameras(sums, first, rows, at):
         rows[k + 32] = sums[n + 8 * LANES] + i02 * x + i12 * y + i22 * z
 
 
-@numba.njit(**LEAN)
+@kernel
 def _stand_on_the_floor(rows, information):
     """Joints that are below the floor are measured to be on it; the others hear nothing of it.
 
@@ -173,7 +171,7 @@ def _stand_on_the_floor(rows, information):
                 rows[m + CAMERA + 32] -= information * rows[m + MEAN + 8]
 
 
-@numba.njit(fastmath=_REORDER, **LEAN)
+@kernel(fastmath=_REORDER)
 def _add_second_bone(rows, bones):
     """The bone from the nose to the right shoulder.
 
@@ -207,7 +205,7 @@ def _add_second_bone(rows, bones):
         n += 4
 
 
-@numba.njit(**LEAN)
+@kernel
 def _keep(rows, w):
     """Points, and what cameras and bones say there, by joint."""
     for j in range(len(w.point)):

@@ -5,10 +5,8 @@ the same tree: elimination from the leaves to the root and substitution back giv
 and slopes exactly.
 """
 
-import numba
-
-from hrc_env.compiled import LEAN
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
+from hrc_env.kernels import kernel
 from hrc_env.tracking.measurements import pixel_spread
 from hrc_env.tracking.tree.gaussian import PARENT
 from hrc_env.tracking.tree.lanes import JOINT_OF_LANE, LANE_OF_JOINT, LANES
@@ -51,7 +49,7 @@ _NEAREST_M = 0.3
 _REORDER = {"reassoc", "contract", "nsz"}
 
 
-@numba.njit(**LEAN)
+@kernel
 def update_tree(body, cov, slope, w):
     """Condition (J, 6), (J, 6, 6), (J, 6, 6) on cameras and bones, in place.
 
@@ -87,7 +85,7 @@ def update_tree(body, cov, slope, w):
     _substitute(body, w.gradient, rows)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _split(rows, at):
     """What a quad's joints know by themselves, given their parents."""
     multiply_transposed_rows(rows, at + EDGE, at + SLOPE, at + KNOWN)
@@ -105,7 +103,7 @@ def _split(rows, at):
     transposed_multiply_rows(rows, at + SLOPE, at + PULL, at + BACK)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _load_measurements(w, rows):
     """Cameras inform a joint; bones it, its parent and what ties the two."""
     for quad in range(QUADS):
@@ -123,7 +121,7 @@ def _load_measurements(w, rows):
                     rows[m + BACK] += w.edge_information[j, i, k]
 
 
-@numba.njit(**LEAN)
+@kernel
 def _eliminate(rows, at):
     """Posterior slopes and inverse Hessians of a quad, and what its joints tell their parents."""
     add_rows(rows, at + OWN, at + KNOWN, at + HESSIAN)
@@ -133,7 +131,7 @@ def _eliminate(rows, at):
     subtract_rows(rows, at + BACK, at + EDGE, at + MESSAGE)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _marginalise(rows, at):
     """C_j = inverse Hessian + B_j C_parent B_j'."""
     multiply_rows(rows, at + SLOPE, at + ABOVE, at + EDGE)
@@ -141,7 +139,7 @@ def _marginalise(rows, at):
     add_rows(rows, at + MESSAGE, at + INVERSE, at + COV)
 
 
-@numba.njit(**LEAN)
+@kernel
 def _substitute(body, gradient, rows):
     """Add to the means what a gradient (J, 6) asks for, by the factors of the elimination."""
     for lane in range(LANES):
@@ -166,7 +164,7 @@ def _substitute(body, gradient, rows):
             body[j, i] += rows[at + 4 * i]
 
 
-@numba.njit(**LEAN)
+@kernel
 def correct_mean(body, cov, slope, seen, belief, share, w):
     """Lead the means from the mode towards the mean of the posterior (Laplace's next term).
 

@@ -2,10 +2,9 @@
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
-from hrc_env.compiled import JIT
+from hrc_env.kernels import kernel
 from hrc_env.skeleton import N_JOINTS
 from hrc_env.tracking.tree.lanes import LANES, N_JOINT_ROWS, N_SUM_ROWS, N_VIEW_ROWS
 from hrc_env.tracking.tree.quads import QUAD, QUADS
@@ -54,7 +53,7 @@ class Work(NamedTuple):
     """(J,) cameras that measured a joint."""
 
 
-@numba.njit(**JIT)
+@kernel(makes_arrays=True)
 def make_work(n_cameras):
     """Scratch with room for one body and its measurements, made inside a kernel."""
     return Work(

@@ -1,0 +1,119 @@
+"""python -m assets.kernels.record: writes hrc_env/kernels/signatures.json.
+
+Plays every perception level, single and batched, and notes which kernels Python called with which
+types. What was not on disk is compiled meanwhile, and how long that took is noted, too; with an
+empty folder as NUMBA_CACHE_DIR that is everything. To be run when a test says that a level compiles
+something that is not recorded.
+"""
+
+import subprocess
+import sys
+import time
+import warnings
+from collections.abc import Iterator
+from typing import Any
+
+import gymnasium
+from numba.core import event
+
+from agents.base import make_agent, situation
+from hrc_env.kernels import KERNELS, ahead, signatures
+from hrc_env.kernels.lean import KernelDispatcher
+from hrc_env.kernels.signatures import Signature
+
+LEVELS = {"truth": 250, "keypoints": 250, "none": 250, "pixels": 40}
+"""Steps of each level that are played."""
+VARIANTS: dict[str, dict[str, Any]] = {"": {}, " and more": {"scene": "site", "n_workers": 2}}
+"""What else is played; what only this calls is compiled by `setup`, not by the first `make`."""
+NUM_ENVS = 8
+
+
+class Stopwatch(event.Listener):
+    """Processor time that it takes to compile each kernel for Python, callees included."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[tuple[str, str], float] = {}
+
+    def on_start(self, event: event.Event) -> None:
+        """Remember when."""
+        event.data["dispatcher"]._started_s = time.process_time()
+
+    def on_end(self, event: event.Event) -> None:
+        """Note how long it took."""
+        kernel = event.data["dispatcher"]
+        if isinstance(kernel, KernelDispatcher):
+            name = f"{kernel.py_func.__module__}:{kernel.py_func.__qualname__}"
+            taken_s = time.process_time() - kernel._started_s
+            self.seconds[name, str(event.data["args"])] = taken_s
+
+
+def main() -> None:
+    """Each level in a process of its own."""
+    before = {(each.kernel, str(each.args)): each.seconds for each in signatures.recorded()}
+    signatures.write([])
+    for level in LEVELS:
+        print(f"{level} ...", flush=True)
+        subprocess.run([sys.executable, "-m", "assets.kernels.record", level], check=True)
+    found = signatures.recorded()
+    signatures.write(
+        [
+            Signature(
+                each.kernel,
+                each.args,
+                each.levels,
+                each.seconds or before.get((each.kernel, str(each.args)), 1.0),
+            )
+            for each in found
+        ]
+    )
+    print(f"{len(found)} signatures, {sum(each.seconds for each in found):.0f} s to compile")
+
+
+def record(level: str) -> None:
+    """Play a level, and add the kernels that Python called to the file."""
+    watch = Stopwatch()
+    event.register("numba:compile", watch)
+    known = {(each.kernel, str(each.args)): each for each in signatures.recorded()}
+    noted: set[tuple[str, str]] = set()
+    for suffix, variant in VARIANTS.items():
+        play(level, variant)
+        for name, types in called():
+            args = [signatures.encode(each) for each in types]
+            key = name, str(args)
+            if key not in noted:
+                noted.add(key)
+                other = known.get(key, Signature(name, args, [], 0.0))
+                seconds = watch.seconds.get((name, str(types)), other.seconds)
+                levels = [*other.levels, level + suffix]
+                known[key] = Signature(name, args, levels, round(seconds, 2))
+    signatures.write(list(known.values()))
+
+
+def called() -> Iterator[tuple[str, tuple[Any, ...]]]:
+    """Which kernels Python has called, with which types."""
+    for name, kernel in KERNELS.items():
+        for types in kernel.overloads:
+            yield name, types
+
+
+def play(level: str, variant: dict[str, Any]) -> None:
+    """An episode of one environment, and where there are such of several at once."""
+    env = gymnasium.make("HRCReach-v0", perception=level, **variant)
+    agent = make_agent("scripted_slowed", situation(env.unwrapped.simulation))
+    observation, _ = env.reset(seed=0)
+    for _ in range(LEVELS[level]):
+        observation, *_ = env.step(agent.act(observation))
+    env.close()
+    if level == "pixels":
+        return
+    envs = gymnasium.make_vec("HRCReach-v0", NUM_ENVS, perception=level, **variant)
+    envs.reset(seed=0)
+    for _ in range(LEVELS[level] + 1):
+        envs.step(envs.action_space.sample())
+    envs.close()
+
+
+if __name__ == "__main__":
+    ahead.ensure = lambda level: None  # nothing is compiled before it is called
+    warnings.simplefilter("ignore", UserWarning)
+    record(sys.argv[1]) if len(sys.argv) > 1 else main()

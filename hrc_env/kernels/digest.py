@@ -1,0 +1,61 @@
+"""What a kernel is made of, as a digest: its bytecode, its options, the values of the constants it
+names, and the same of every kernel that it calls."""
+
+import hashlib
+import types
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numba.core.dispatcher import Dispatcher
+from numba.core.extending import _Intrinsic
+
+
+def digest_of(dispatcher: Dispatcher) -> str:
+    """The digest of a kernel; of values as they are when it is first asked for."""
+    known: dict[str, Any] = vars(dispatcher)
+    if "_digest" not in known:
+        known["_digest"] = "itself"  # where a kernel calls itself
+        options = sorted(dispatcher.targetoptions.items())
+        parts = [_value(options, set()), *_function(dispatcher.py_func)]
+        known["_digest"] = hashlib.sha256("\n".join(parts).encode()).hexdigest()
+    return known["_digest"]
+
+
+def _function(function: Any) -> list[str]:
+    """Code and what it names."""
+    codes, names = [function.__code__], set()
+    parts = [repr(function.__defaults__)]
+    for code in codes:
+        codes += [each for each in code.co_consts if isinstance(each, types.CodeType)]
+        names |= set(code.co_names)
+        constants = [_value(each, names) for each in code.co_consts if each != function.__doc__]
+        parts.append(f"{code.co_code.hex()} {code.co_varnames} {code.co_names} {constants}")
+    scope = function.__globals__
+    cells = dict(zip(function.__code__.co_freevars, function.__closure__ or (), strict=True))
+    parts += [f"{name}={_value(cell.cell_contents, names)}" for name, cell in cells.items()]
+    return parts + [f"{name}={_value(scope[name], names)}" for name in sorted(names & set(scope))]
+
+
+def _value(value: Any, names: set[str]) -> str:
+    """A digest or a text of what a name stands for."""
+    if isinstance(value, Dispatcher):
+        return digest_of(value)
+    if isinstance(value, types.ModuleType):
+        own = value.__name__.startswith("hrc_env")
+        inside = sorted(names & set(vars(value))) if own else []
+        return f"{value.__name__} {[f'{n}={_value(vars(value)[n], names)}' for n in inside]}"
+    if isinstance(value, np.ndarray):
+        return f"{value.dtype} {value.shape} {hashlib.sha256(value.tobytes()).hexdigest()}"
+    if isinstance(value, types.CodeType):
+        return value.co_name
+    if isinstance(value, set | frozenset):
+        return f"{{{', '.join(sorted(map(repr, value)))}}}"
+    if isinstance(value, tuple | list):
+        return f"{type(value).__name__} {[_value(each, names) for each in value]}"
+    if isinstance(value, type):
+        return f"{value.__module__}.{value.__qualname__} {getattr(value, '_fields', '')}"
+    if isinstance(value, _Intrinsic | types.FunctionType):
+        function: Any = getattr(value, "_defn", value)
+        return hashlib.sha256(Path(function.__code__.co_filename).read_bytes()).hexdigest()
+    return f"{type(value).__name__} {value!r}"
