@@ -46,7 +46,7 @@ def kernel(
         return lambda each: kernel(
             each, makes_arrays=makes_arrays, fastmath=fastmath, forceinline=forceinline
         )
-    if config.DISABLE_JIT:
+    if getattr(config, "DISABLE_JIT", False):
         return function
     options = {
         "nopython": True, "nogil": True, "error_model": "numpy", "_nrt": makes_arrays,
