@@ -79,8 +79,8 @@ def main(words: Sequence[str] | None = None) -> int:
         from rich.markup import escape
 
         name = type(error).__name__
-        console = Console(stderr=True)
-        console.print(f"[bold red]{name}[/]: {escape(str(error))}", highlight=False)
+        said = f"[bold red]{name}[/]: {escape(str(error))}"
+        Console(stderr=True).print(said, highlight=False, soft_wrap=True)
         return 2
     except KeyboardInterrupt:
         print("Stopped.", file=sys.stderr)

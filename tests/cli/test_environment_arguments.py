@@ -36,7 +36,7 @@ def test_nothing_said_is_the_environments_own_default():
 def test_everything_said_reaches_the_environment():
     arguments = EnvironmentArguments(
         perception="keypoints", estimator="kalman", cameras=("camera_2", "0"), scene="site",
-        n_workers=(1, 2), people="hurried", appearance="varied", control="tool",
+        n_workers=(1, 2), people="hurried", control="tool",
         faults=('{"kind": "late", "cameras": ["camera_2"], "amount": 0.2}',),
         config=("reward.proximity=0.5", "worker=any"),
     )  # fmt: skip
@@ -50,10 +50,14 @@ def test_everything_said_reaches_the_environment():
     assert (simulation.scene.name, simulation.control) == ("site", "tool")
     assert list(simulation.settings["n_workers"]) == [1, 2]
     assert config.motion.people != resolve({}).motion.people
-    assert config.appearance != resolve({}).appearance
     assert [(fault.kind, fault.how_much) for fault in config.faults] == [("late", 0.2)]
     assert (config.reward.proximity, config.worker) == (0.5, "any")
     env.close()
+
+
+def test_looks_and_clips_are_passed_on():
+    keywords = EnvironmentArguments(appearance="varied", motions=(Path("a.npz"),)).keywords()
+    assert (keywords["appearance"], keywords["motions"]) == ("varied", ["a.npz"])
 
 
 def test_cameras_are_a_rig_a_file_or_names_and_numbers():
@@ -65,11 +69,11 @@ def test_cameras_are_a_rig_a_file_or_names_and_numbers():
 
 
 def test_changes_come_from_words_and_files_and_later_ones_win(tmp_path: Path):
-    (tmp_path / "a.toml").write_text("ctrl_dt = 0.02\n[reward]\ngoal = 1.0\neffort = 0.1\n")
+    (tmp_path / "a.toml").write_text("ctrl_dt = 0.08\n[reward]\ngoal = 1.0\neffort = 0.1\n")
     (tmp_path / "b.json").write_text('{"reward": {"goal": 2.0}}')
     words = [str(tmp_path / "a.toml"), str(tmp_path / "b.json"), "reward.effort=0.3", "worker=any"]
     config = read_config(words)
-    assert config == {"ctrl_dt": 0.02, "reward": {"goal": 2.0, "effort": 0.3}, "worker": "any"}
+    assert config == {"ctrl_dt": 0.08, "reward": {"goal": 2.0, "effort": 0.3}, "worker": "any"}
     assert resolve(config).reward.goal == 2.0
 
 
