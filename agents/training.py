@@ -53,9 +53,10 @@ def run(arguments: Train) -> int:
     proximity = resolve(arguments.keywords()["config"]).reward.proximity
     title = f"PPO, {arguments.perception}, proximity weight {proximity:g}"
     plot_curve(curve, folder / "curve.png", title)
-    if arguments.film:
-        film(folder / "policy.zip", folder / "policy.mp4", arguments, console)
-    console.print(f"Policy, curve and film are in {folder}/")
+    written = "policy.zip, curve.png, score.json"
+    if arguments.film and film(folder, arguments, console):
+        written += ", policy.mp4"
+    console.print(f"In {folder}/: {written}", highlight=False, soft_wrap=True)
     return 0
 
 
@@ -147,19 +148,21 @@ def _learner(
     return learner, Curve(json.loads(path.read_text()) if path.exists() else [])
 
 
-def film(checkpoint: Path, path: Path, arguments: Train, console: Console) -> None:
-    """Film one episode of the policy, if this machine can draw."""
+def film(folder: Path, arguments: Train, console: Console) -> bool:
+    """Film one episode of the policy; whether this machine can draw."""
     from hrc_env.cli.film import film_episode
 
     def make(here: Situation) -> ppo.TrainedAgent:
-        return ppo.load(checkpoint, here)
+        return ppo.load(folder / "policy.zip", here)
 
     kwargs = arguments.keywords()
     del kwargs["num_threads"]
     try:
-        film_episode(make, path, seed=arguments.seed, **kwargs)
+        film_episode(make, folder / "policy.mp4", seed=arguments.seed, **kwargs)
     except RenderingError as error:
         console.print(f"No film: {error}", markup=False)
+        return False
+    return True
 
 
 def _plain(arguments: Train) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import torch
 import tyro
 from rich.console import Console
 from rich.markdown import Markdown
@@ -77,6 +78,7 @@ def main(arguments: Arguments) -> None:
     for option in ("episodes", "pixel_episodes", "timesteps"):
         at_least(f"--{option.replace('_', '-')}", getattr(arguments, option), 1)
     writable_folder(arguments.out)
+    torch.set_num_threads(1)  # two are slower in networks as small as these
     settings = {name: value for name, value in asdict(arguments).items() if name != "out"}
     policies = {(level, agent): learnt(arguments, level, agent) for level in ORDER for agent in PPO}
     console, metrics = Console(), dict[str, Metric]()
@@ -167,9 +169,10 @@ def table(config: Mapping[str, Any], metrics: Mapping[str, Mapping[str, Any]]) -
             lines.append(f"| `{level}` | {name} | " + " | ".join(cells) + " |")
     lines += [
         "",
-        f"Per episode of 10 s, on the truth: {config['episodes']} episodes a row "
-        f"({config['pixel_episodes']} at `pixels`), in brackets 95 % bootstrap intervals over "
-        f"episodes. PPO: one policy each, {config['timesteps']:,} steps. Made by "
+        f"Means of {config['episodes']} episodes of 10 s ({config['pixel_episodes']} at `pixels`), "
+        "in brackets 95 % bootstrap intervals over episodes. Cost and contacts are an episode's, on "
+        "the truth. The return is what the robot is rewarded for, by its estimate: compare it "
+        f"within a level only. PPO: one policy each, {config['timesteps']:,} steps. Made by "
         f"`python -m benchmarks.baselines{' --quick' if config['quick'] else ''}`.",
     ]
     return "\n".join(lines) + "\n"
