@@ -170,8 +170,8 @@ def table(config: Mapping[str, Any], metrics: Mapping[str, Mapping[str, Any]]) -
     lines += [
         "",
         f"Means of {config['episodes']} episodes of 10 s ({config['pixel_episodes']} at `pixels`), "
-        "in brackets 95 % bootstrap intervals over episodes. Cost and contacts are an episode's, on "
-        "the truth. The return is what the robot is rewarded for, by its estimate: compare it "
+        "in brackets 95 % bootstrap intervals over episodes. Cost and contacts are counted on "
+        "the truth; the return is what the robot is rewarded for, by its estimate: compare it "
         f"within a level only. PPO: one policy each, {config['timesteps']:,} steps. Made by "
         f"`python -m benchmarks.baselines{' --quick' if config['quick'] else ''}`.",
     ]
