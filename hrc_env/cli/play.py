@@ -65,7 +65,7 @@ class Play(EnvironmentArguments):
             video, self.seed, **self.keywords(),
         )  # fmt: skip
         for name, value in totals.items():
-            Console().print(f"{name:28s} {value:.2f}")
+            Console().print(f"{name:28s} {value:.2f}", markup=False)  # units stand in []
         return 0
 
     def _play(self, env: "gymnasium.Env[Any, Any]", base: Any, seed: int) -> None:

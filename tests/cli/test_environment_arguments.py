@@ -121,6 +121,24 @@ def test_play_plays_what_it_was_asked(capsys):
     assert "seed 4: return" in said
 
 
+def test_a_film_is_told_with_its_units(tmp_path: Path, monkeypatch, capsys):
+    """Square brackets are no markup; and the film is of what was asked."""
+    asked: list[dict[str, object]] = []
+
+    def film_episode(make: object, path: Path, seed: int, **kwargs: object) -> dict[str, float]:
+        asked.append({"path": path, "seed": seed, **kwargs})
+        return {"median tracking error [mm]": 21.3}
+
+    monkeypatch.setattr("hrc_env.cli.film.film_episode", film_episode)
+    video = tmp_path / "site.mp4"
+    words = ["play", "--perception", "none", "--scene", "site", "--control", "tool"]
+    assert main([*words, "--config", "ctrl_dt=0.08", "--video", str(video)]) == 0
+    assert "median tracking error [mm]" in capsys.readouterr().out
+    (film,) = asked
+    assert (film["path"], film["scene"], film["control"]) == (video, "site", "tool")
+    assert film["config"] == {"ctrl_dt": 0.08}
+
+
 def test_training_weighs_safety_as_config_says_where_both_say():
     assert Train(proximity=0.5).keywords()["config"] == {"reward": {"proximity": 0.5}}
     both = Train(proximity=0.5, config=("reward.proximity=1", "reward.goal=3")).keywords()
