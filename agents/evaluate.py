@@ -4,9 +4,10 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
 
+import gymnasium
 import numpy as np
-from numpy.typing import NDArray
 
+from hrc_env.env import HRCReachEnv
 from hrc_env.sb3 import HRCVecEnv
 
 from .base import Agent, situation
@@ -39,31 +40,92 @@ class Score:
 def evaluate(
     make: Callable[[Any], Agent],
     n_episodes: int = 64,
-    num_envs: int = 32,
     seed: int = EVALUATION_SEED,
     **kwargs: Any,
 ) -> Score:
-    """Score of an agent over `n_episodes` whole episodes; kwargs as of `HRCVecEnv`.
+    """Score of an agent; arguments as of `judged`."""
+    return summarise(judged(make, n_episodes, seed, **kwargs))
+
+
+def judged(
+    make: Callable[[Any], Agent],
+    n_episodes: int,
+    seed: int = EVALUATION_SEED,
+    tick: Callable[[float], None] = lambda share: None,
+    **kwargs: Any,
+) -> list[dict[str, float]]:
+    """The statistics of whole episodes, the k-th after `reset(seed=seed + k)` whatever the agent:
+    agents and perception levels can be compared episode by episode.
 
     Args:
         make: builds the agent for a `Situation`.
+        n_episodes: how many.
+        seed: of the first.
+        tick: told by how much the share that is done grew.
+        kwargs: as of `HRCVecEnv`; with perception="pixels", which has no batched form, as of
+            `HRCReachEnv`.
     """
-    env = HRCVecEnv(min(num_envs, n_episodes), stagger=False, seed=seed, **kwargs)
+    if kwargs.get("perception") == "pixels":
+        return one_by_one(make, n_episodes, seed, tick, **kwargs)
+    env = HRCVecEnv(n_episodes, stagger=False, seed=seed, **kwargs)
     try:
-        agent = make(situation(env.simulation))
-        return summarise(_episodes(env, agent, n_episodes))
+        agent, observation = make(situation(env.simulation)), env.reset()
+        first: dict[int, dict[str, float]] = {}
+        while len(first) < n_episodes:
+            env.step_async(agent.act(observation))
+            observation, _, _, infos = env.step_wait()
+            for k, info in enumerate(infos):
+                if "episode" in info:
+                    first.setdefault(k, info["episode"])
+            tick(1 / env.env.max_episode_steps)
+        return [first[k] for k in range(n_episodes)]
     finally:
         env.close()
 
 
-def _episodes(env: HRCVecEnv, agent: Agent, n_episodes: int) -> list[dict[str, float]]:
-    observation: NDArray[np.float32] = env.reset()
-    done: list[dict[str, float]] = []
-    while len(done) < n_episodes:
-        env.step_async(agent.act(observation))
-        observation, _, _, infos = env.step_wait()
-        done += [info["episode"] for info in infos if "episode" in info]
-    return done[:n_episodes]
+def one_by_one(
+    make: Callable[[Any], Agent],
+    n_episodes: int,
+    seed: int,
+    tick: Callable[[float], None] = lambda share: None,
+    **kwargs: Any,
+) -> list[dict[str, float]]:
+    """As `judged`, in the single environment."""
+    env = gymnasium.make("HRCReach-v0", **kwargs)
+    inner = env.unwrapped
+    assert isinstance(inner, HRCReachEnv)
+    try:
+        agent, done = make(situation(inner.simulation)), []
+        for k in range(n_episodes):
+            done.append(_one(env, agent, seed + k, inner.config.ctrl_dt))
+            tick(1 / n_episodes)
+        return done
+    finally:
+        env.close()
+
+
+def _one(env: gymnasium.Env[Any, Any], agent: Agent, seed: int, ctrl_dt: float) -> dict[str, float]:
+    """Statistics of one episode, by the names that `HRCVecEnv` gives them."""
+    observation, info = env.reset(seed=seed)
+    rewards, infos, over = [], [], False
+    while not over:
+        observation, reward, terminated, truncated, info = env.step(agent.act(observation))
+        rewards.append(float(reward))
+        infos.append(info)
+        over = terminated or truncated
+    touching = np.array([each["cost_contact"] > 0 for each in infos])
+    gaps_m = [each.get("safety/min_separation_m", np.inf) for each in infos]
+    return {
+        "r": sum(rewards),
+        "l": len(infos),
+        "seconds": len(infos) * ctrl_dt,
+        "cost": float(sum(each["cost"] for each in infos)),
+        "cost_steps": float(sum(each["cost_proximity"] for each in infos)),
+        "contacts": float((touching & ~np.append(False, touching[:-1])).sum()),
+        "goals_reached": info["task/goals_reached"],
+        "goals_missed": info["task/goals_missed"],
+        "min_separation_m": float(np.min(gaps_m)),
+    }
 
 
 def summarise(episodes: list[dict[str, float]]) -> Score:

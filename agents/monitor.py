@@ -1,7 +1,6 @@
 """What happens while PPO learns: progress with the time left, curves, checkpoints."""
 
 import json
-import os
 import time
 from collections import deque
 from dataclasses import dataclass, field
@@ -9,19 +8,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
 from stable_baselines3.common.callbacks import BaseCallback
+
+from hrc_env.cli.progress import Meter
+from hrc_env.results import write_whole
 
 from . import ppo
 from .curriculum import Ramp
 from .evaluate import summarise
+from .interrupt import Interrupt
 
 RECENT_EPISODES = 64
 """Curves average over so many finished episodes."""
@@ -35,27 +30,29 @@ class Curve:
 
     def write(self, path: Path) -> None:
         """As JSON, whole or not at all."""
-        draft = path.with_suffix(".draft")
-        draft.write_text(json.dumps(self.points, indent=1))
-        os.replace(draft, path)
+        write_whole(path, json.dumps(self.points, indent=1))
 
 
 class TrainingMonitor(BaseCallback):
-    """Keeps the curve, shows the progress, saves a checkpoint every minute and at the end."""
+    """Keeps the curve, shows the progress, saves a checkpoint every minute and at the end.
+
+    Where it is interrupted it ends the training at the next step, as if that had been the last.
+    """
 
     def __init__(
-        self, folder: Path, total_timesteps: int, facts: dict[str, Any], curve: Curve, ramp: Ramp
+        self,
+        folder: Path,
+        facts: dict[str, Any],
+        curve: Curve,
+        ramp: Ramp,
+        interrupt: Interrupt,
+        meter: Meter,
     ) -> None:
         super().__init__()
-        self.folder, self.total, self.facts, self.curve = folder, total_timesteps, facts, curve
-        self.ramp = ramp
+        self.folder, self.facts, self.curve, self.ramp = folder, facts, curve, ramp
+        self.interrupt, self.meter = interrupt, meter
         self.recent: deque[dict[str, float]] = deque(maxlen=RECENT_EPISODES)
         self.before_s = curve.points[-1]["wall_s"] if curve.points else 0.0
-        self.bar = Progress(
-            TextColumn("training"), BarColumn(), MofNCompleteColumn(), TextColumn("steps"),
-            TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn(),
-            TextColumn("{task.fields[note]}"),
-        )  # fmt: skip
 
     @property
     def checkpoint(self) -> Path:
@@ -64,14 +61,13 @@ class TrainingMonitor(BaseCallback):
 
     def _on_training_start(self) -> None:
         self.started_s = self.saved_s = time.monotonic()
-        self.bar.start()
-        self.task = self.bar.add_task("", total=self.total, completed=self.num_timesteps, note="")
+        self.interrupt.listen()
 
     def _on_step(self) -> bool:
         for info in self.locals["infos"]:
             if "episode" in info:
                 self.recent.append(info["episode"])
-        return True
+        return not self.interrupt.asked
 
     def _on_rollout_end(self) -> None:
         self._note()
@@ -80,7 +76,6 @@ class TrainingMonitor(BaseCallback):
 
     def _on_training_end(self) -> None:
         self._note()
-        self.bar.stop()
         self._save()
 
     def _note(self) -> None:
@@ -98,7 +93,7 @@ class TrainingMonitor(BaseCallback):
             for name, value in score.as_dict().items():
                 self.logger.record(f"episode/{name}", value)
             note = f"goals {score.success_rate:.0%}, contacts {score.contacts_per_episode:.2f}"
-        self.bar.update(self.task, completed=self.num_timesteps, note=note)
+        self.meter.show(self.num_timesteps, note=note)
 
     def _save(self) -> None:
         self.saved_s = time.monotonic()
@@ -107,13 +102,14 @@ class TrainingMonitor(BaseCallback):
 
 
 def plot_curve(curve: Curve, path: Path, title: str) -> None:
-    """Goals, contacts and cost over wall-clock time as a PNG."""
+    """Goals, contacts and cost over environment steps as a PNG."""
     import matplotlib
 
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
+    from matplotlib.ticker import EngFormatter
 
-    minutes = np.array([point["wall_s"] for point in curve.points]) / 60
+    steps = np.array([point["steps"] for point in curve.points])
     panels = (
         ("success_rate", "goals reached (share)", "tab:green"),
         ("goals_per_minute", "goals per minute", "tab:blue"),
@@ -122,12 +118,12 @@ def plot_curve(curve: Curve, path: Path, title: str) -> None:
     )
     figure, axes = plt.subplots(2, 2, figsize=(9, 6), sharex=True, layout="constrained")
     for axis, (name, label, colour) in zip(axes.ravel(), panels, strict=True):
-        axis.plot(minutes, [point[name] for point in curve.points], color=colour)
+        axis.plot(steps, [point[name] for point in curve.points], color=colour)
         axis.set_ylabel(label)
         axis.set_ylim(bottom=0)
         axis.grid(alpha=0.3)
     share = np.array([point.get("safety_share", 1.0) for point in curve.points])
-    growing = minutes[(share > 0) & (share < 1)]
+    growing = steps[(share > 0) & (share < 1)]
     if len(growing):
         for axis in axes.ravel():
             axis.axvspan(growing[0], growing[-1], color="grey", alpha=0.15, linewidth=0)
@@ -135,7 +131,8 @@ def plot_curve(curve: Curve, path: Path, title: str) -> None:
     axes[0, 0].axhline(0.8, color="grey", linestyle="--", linewidth=0.8)
     axes[0, 0].set_ylim(0, 1.05)
     for axis in axes[1]:
-        axis.set_xlabel("wall-clock minutes")
+        axis.set_xlabel("environment steps")
+        axis.xaxis.set_major_formatter(EngFormatter(sep=" "))
     figure.suptitle(title)
     figure.savefig(path, dpi=120)
     plt.close(figure)

@@ -24,6 +24,8 @@ from hrc_env.errors import CheckpointError
 
 from .base import Situation
 
+TRAIN = "python -m hrc_env train"
+
 
 @dataclass(frozen=True, slots=True)
 class PPOSettings:
@@ -106,13 +108,13 @@ def describe(path: Path) -> dict[str, Any]:
         CheckpointError: no file, or not one of ours.
     """
     if not path.exists():
-        raise CheckpointError(f"No checkpoint at {path}. Train one with: python train.py")
+        raise CheckpointError(f"No checkpoint at {path}. Train one with: {TRAIN}")
     try:
         with zipfile.ZipFile(path) as archive:
             return json.loads(archive.read("hrc_env.json"))
     except (zipfile.BadZipFile, KeyError) as error:
         raise CheckpointError(
-            f"{path} is not a checkpoint of hrc_env ({error}). Train one with: python train.py"
+            f"{path} is not a checkpoint of hrc_env ({error}). Train one with: {TRAIN}"
         ) from error
 
 
@@ -163,7 +165,7 @@ def _check_fits(
     if made_with.split(".")[:2] != here.split(".")[:2]:
         raise CheckpointError(
             f"{path} was made with hrc_env {made_with}, this is {here}; checkpoints fit the same "
-            f"minor version. Install hrc_env {made_with} or train anew: python train.py"
+            f"minor version. Install hrc_env {made_with} or train anew: {TRAIN}"
         )
     sizes = (meta["observation_size"],), (meta["action_size"],)
     if sizes != (tuple(observation), tuple(action)):

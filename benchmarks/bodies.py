@@ -15,10 +15,10 @@ import cv2
 import numpy as np
 import tyro
 from rich.console import Console
-from rich.progress import track
 from rich.table import Table
 
 from hrc_env.body import worker_names
+from hrc_env.cli.progress import track
 from hrc_env.experiments.perception.crops import GOOD_SHARE, Looker, instants
 from hrc_env.experiments.perception.measured import share
 from hrc_env.pictures import draw_landmarks, label, tile

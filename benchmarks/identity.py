@@ -16,9 +16,9 @@ import numpy as np
 import tyro
 from gymnasium.vector import AutoresetMode, VectorEnv
 from rich.console import Console
-from rich.progress import track
 
 import hrc_env  # noqa: F401  registers the ids
+from hrc_env.cli.progress import track
 from hrc_env.results import Metric, write_results
 
 RESET_SHARE = 0.01
@@ -62,7 +62,7 @@ def compare(envs: list[VectorEnv], n_steps: int, seed: int) -> list[int]:
     rng = np.random.default_rng(seed)
     said = [env.reset(seed=seed) for env in envs]
     counts = [differences(said[0], other) for other in said[1:]]
-    for _ in track(range(n_steps), description="comparing", transient=True):
+    for _ in track(range(n_steps), description="comparing"):
         actions = rng.uniform(-1, 1, envs[0].action_space.shape).astype(np.float32)
         chosen = rng.random(envs[0].num_envs) < RESET_SHARE
         said = [step(env, actions, chosen) for env in envs]

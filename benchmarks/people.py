@@ -15,10 +15,10 @@ import numba
 import numpy as np
 import tyro
 from rich.console import Console
-from rich.progress import track
 from rich.table import Table
 
 from hrc_env.body import pool, stack, worker_truth
+from hrc_env.cli.progress import track
 from hrc_env.geometry import chains
 from hrc_env.geometry.distances import narrowest_gap
 from hrc_env.geometry.shapes import AXES, BOX, CAPSULE, CENTRE, HALF_SIZE, KIND, PLANE, REACH

@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 import tyro
 from rich.console import Console
-from rich.progress import track
 from rich.table import Table
 
 from agents.base import make_agent, situation
 from hrc_env.body import worker_truth
+from hrc_env.cli.progress import track
 from hrc_env.env import HRCReachEnv
 from hrc_env.motion import generator
 from hrc_env.results import Metric, write_results

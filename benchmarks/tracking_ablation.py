@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import tyro
 from rich.console import Console
-from rich.progress import track
 
+from hrc_env.cli.progress import track
 from hrc_env.experiments.tracking.rigs import DT_S, RIGS, Rig, make_rig
 from hrc_env.experiments.tracking.sequences import Sequences, make_sequences
 from hrc_env.experiments.tracking.variants import VARIANTS, estimator_of

@@ -1,17 +1,27 @@
-"""Write docs/environment.md from the declarations in the code: python docs/generate.py"""
+"""Write docs/environment.md from the declarations in the code, and the table of baselines in
+README.md and docs/learning.md from docs/baselines.json: python docs/generate.py"""
 
 import dataclasses
 import inspect
 import itertools
+import json
+import re
+import sys
 import textwrap
 from pathlib import Path
 from typing import Any
 
+sys.path.append(str(Path(__file__).resolve().parent.parent))  # where benchmarks/ is
+
+from benchmarks import baselines
 from hrc_env import observations, rewards
 from hrc_env.config import HRCConfig
 from hrc_env.env import HRCReachEnv
 
 PAGE = Path(__file__).parent / "environment.md"
+WITH_BASELINES = (PAGE.parent.parent / "README.md", PAGE.parent / "learning.md")
+RESULTS = PAGE.parent / "baselines.json"
+"""A copy of what `python -m benchmarks.baselines` wrote."""
 
 INTRODUCTION = """\
 # HRCReach-v0
@@ -145,6 +155,15 @@ def config_tables(config: Any, path: str) -> list[str]:
     return [title + "\n".join(["| field | default | meaning |", "|---|---|---|", *rows]), *branches]
 
 
+def with_baselines(text: str) -> str:
+    """A page with the table of the committed results between its marks."""
+    results = json.loads(RESULTS.read_text())
+    said = baselines.table(results["config"], results["metrics"])
+    begin, end = "<!-- baselines: python docs/generate.py -->\n", "<!-- end of baselines -->"
+    said = f"{begin}{said.rstrip()} At `{results['git']}`.\n{end}"
+    return re.sub(f"{re.escape(begin)}.*?{re.escape(end)}", lambda _: said, text, flags=re.S)
+
+
 def field_docs(kind: type) -> dict[str, str]:
     """The sentence after each field of a dataclass."""
     import ast
@@ -159,3 +178,5 @@ def field_docs(kind: type) -> dict[str, str]:
 
 if __name__ == "__main__":
     PAGE.write_text(page())
+    for path in WITH_BASELINES:
+        path.write_text(with_baselines(path.read_text()))

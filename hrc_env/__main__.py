@@ -1,55 +1,131 @@
-"""python -m hrc_env: set up, look, play.
+"""python -m hrc_env: set up, look, play, learn, measure.
 
-python -m hrc_env demo     a film of a robot that yields to a worker it sees
-python -m hrc_env check    is this machine ready?
-python -m hrc_env bench    how good and honest are the estimators, how fast is everything?
-python -m hrc_env experiment  the paper's experiments, again and further
-python -m hrc_env gallery  pictures of every worker, motion and scene
-python -m hrc_env calibrate-keypoints  the emulator's errors, fitted to renders
+A command's own file is imported when it is called, so that this one answers at once.
 """
 
+import platform
 import sys
+import textwrap
+from collections.abc import Sequence
+from importlib import import_module
+from importlib.metadata import version
 
-import tyro
-from rich.console import Console
+from hrc_env import __version__
+from hrc_env.errors import HRCError, unknown
 
-from hrc_env.cli.bench import Bench
-from hrc_env.cli.calibrate import CalibrateKeypoints
-from hrc_env.cli.check import Check
-from hrc_env.cli.demo import Demo
-from hrc_env.cli.experiment import Experiment
-from hrc_env.cli.gallery import Gallery
-from hrc_env.cli.import_motion import ImportMotion
-from hrc_env.cli.listing import List
-from hrc_env.cli.play import Play
-from hrc_env.cli.setup import Setup
-from hrc_env.errors import HRCError
+PROGRAM = "python -m hrc_env"
+COMMANDS: dict[str, tuple[str, str, str]] = {
+    "setup": (
+        "setup", "Setup",
+        "Fetch the pose network's weights (once, checked) and see that headless OpenGL works.",
+    ),
+    "demo": (
+        "demo", "Demo",
+        "Film the scripted reacher, slowed by the separation that it estimates from pixels.",
+    ),
+    "check": ("check", "Check", "Versions, OpenGL, weights, cores: each line ok, or what to do."),
+    "list": (
+        "listing", "List",
+        "Environments, perception levels, estimators, scenes, cameras and agents by name.",
+    ),
+    "play": ("play", "Play", "Play episodes of an environment with an agent; say how they went."),
+    "train": ("train", "Train", "Train PPO, evaluate it on fixed seeds, draw its curve, film it."),
+    "bench": (
+        "bench", "Bench",
+        "Measure the estimators (tracking), the eyes (perception), the environment (speed) or the "
+        "workers (motion).",
+    ),
+    "experiment": (
+        "experiment", "Experiment",
+        "The paper's two experiments (site, lab), what the eyes are worth in safety (impact), and "
+        "ablations of rigs and estimators (beyond).",
+    ),
+    "gallery": (
+        "gallery", "Gallery",
+        "Draw every worker, a film strip of every motion, and both scenes from all cameras.",
+    ),
+    "import-motion": (
+        "import_motion", "ImportMotion",
+        "Bring your own motion capture: a BVH, ASF/AMC or npz recording becomes a clip.",
+    ),
+    "calibrate-keypoints": (
+        "calibrate", "CalibrateKeypoints",
+        "Fit the emulator of keypoints to what the pose network says of rendered workers.",
+    ),
+}  # fmt: skip
+"""Each command: its module in `hrc_env.cli`, its class, and the class's first sentence."""
 
 
-def main() -> int:
-    """Run a command; errors that explain themselves are shown without a traceback."""
-    command = tyro.extras.subcommand_cli_from_dict(
-        {
-            "setup": Setup,
-            "demo": Demo,
-            "check": Check,
-            "list": List,
-            "play": Play,
-            "bench": Bench,
-            "experiment": Experiment,
-            "gallery": Gallery,
-            "import-motion": ImportMotion,
-            "calibrate-keypoints": CalibrateKeypoints,
-        },
-        prog="python -m hrc_env",
-        description="A robot, a worker, and the cameras between them.",
+def main(words: Sequence[str] | None = None) -> int:
+    """Run a command; errors that explain themselves are shown without a traceback.
+
+    Args:
+        words: the command and its arguments; those of the process if None.
+
+    Returns:
+        The exit status: 2 for what was asked wrongly, 130 for what was stopped by Ctrl-C.
+    """
+    given = list(sys.argv[1:] if words is None else words)
+    if not given or given[0] in ("-h", "--help"):
+        print(overview())
+        return 0 if given else 2
+    if given[0] == "--version":
+        print(versions())
+        return 0
+    try:
+        return _run(given[0], given[1:])
+    except HRCError as error:
+        from rich.console import Console
+        from rich.markup import escape
+
+        name = type(error).__name__
+        said = f"[bold red]{name}[/]: {escape(str(error))}"
+        Console(stderr=True).print(said, highlight=False, soft_wrap=True)
+        return 2
+    except KeyboardInterrupt:
+        print("Stopped.", file=sys.stderr)
+        return 130
+
+
+def overview() -> str:
+    """What there is to call."""
+    lines = [
+        textwrap.fill(f"  {name:21s}{says}", 80, subsequent_indent=" " * 23)
+        for name, (_, _, says) in COMMANDS.items()
+    ]
+    return "\n".join(
+        (
+            f"usage: {PROGRAM} [--help] [--version] COMMAND ...",
+            "",
+            "A robot, a worker, and the cameras between them.",
+            "",
+            *lines,
+            "",
+            f"{PROGRAM} COMMAND --help says what a command takes.",
+        )
+    )
+
+
+def versions() -> str:
+    """Which versions of what matters are installed."""
+    named = {"hrc_env": __version__, "Python": platform.python_version()}
+    named |= {package: version(package) for package in ("mujoco", "gymnasium")}
+    return ", ".join(f"{name} {number}" for name, number in named.items())
+
+
+def _run(name: str, words: list[str]) -> int:
+    if name not in COMMANDS:
+        raise unknown("command", name, COMMANDS)
+    import tyro
+
+    module, kind, _ = COMMANDS[name]
+    command = tyro.cli(
+        getattr(import_module(f"hrc_env.cli.{module}"), kind),
+        prog=f"{PROGRAM} {name}",
+        args=words,
         config=(tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),
     )
-    try:
-        return command.run()
-    except HRCError as error:
-        Console(stderr=True).print(f"[bold red]{type(error).__name__}[/]: {error}", highlight=False)
-        return 2
+    return command.run()
 
 
 if __name__ == "__main__":

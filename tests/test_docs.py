@@ -16,14 +16,30 @@ def test_the_ten_lines_of_the_readme_run():
     exec(compile(snippet.group(1), "README.md", "exec"), {})
 
 
-def test_the_environment_page_is_what_the_code_says():
-    """If this fails: python docs/generate.py"""
+def generator():
+    """docs/generate.py"""
     spec = importlib.util.spec_from_file_location("generate", ROOT / "docs" / "generate.py")
     assert spec is not None
     assert spec.loader is not None
     generate = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(generate)
+    return generate
+
+
+def test_the_environment_page_is_what_the_code_says():
+    """If this fails: python docs/generate.py"""
+    generate = generator()
     assert generate.PAGE.read_text() == generate.page()
+
+
+@pytest.mark.parametrize("name", ["README.md", "docs/learning.md"])
+def test_the_baselines_are_those_of_the_committed_results(name):
+    """If this fails: python docs/generate.py"""
+    generate, text = generator(), (ROOT / name).read_text()
+    assert ROOT / name in generate.WITH_BASELINES
+    assert "| `pixels` | PPO with it |" in text
+    assert generate.with_baselines(text) == text
+    assert generate.with_baselines(text.replace("| `random` |", "| `other` |")) == text
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)

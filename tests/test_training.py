@@ -1,29 +1,42 @@
 """Training through the real command line: learn a little, resume, refuse what does not fit."""
 
+import io
 import json
+import shlex
 import shutil
+import signal
 import subprocess
 import sys
 import zipfile
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from agents import ppo
-from agents.base import make_agent, situation
+from agents.base import make_agent, require_training, situation
 from agents.curriculum import Ramp
-from agents.evaluate import evaluate
+from agents.evaluate import evaluate, judged, one_by_one
+from agents.interrupt import Interrupt
+from agents.monitor import Curve, TrainingMonitor, plot_curve
+from agents.training import as_before
+from hrc_env.__main__ import main
+from hrc_env.cli.train import Train
 from hrc_env.env import HRCReachEnv
-from hrc_env.errors import CheckpointError, ConfigError
+from hrc_env.errors import CheckpointError, ConfigError, HRCError
 
 ROOT = Path(__file__).resolve().parent.parent
 TINY = ["--perception", "truth", "--num-envs", "4", "--episodes", "2", "--no-film"]
 
 
-def train(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, ROOT / "train.py", *TINY, *map(str, arguments)]
-    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+def train(*arguments: object) -> SimpleNamespace:
+    """`python -m hrc_env train` in this process: its exit status and what it said."""
+    with redirect_stdout(io.StringIO()) as out, redirect_stderr(io.StringIO()) as err:
+        status = main(["train", *TINY, *map(str, arguments)])
+    return SimpleNamespace(returncode=status, stdout=out.getvalue(), stderr=err.getvalue())
 
 
 @pytest.fixture(scope="module")
@@ -81,8 +94,10 @@ def test_a_second_run_leaves_the_first_alone(run, tmp_path):
 
 
 def test_resuming_nothing_says_so_without_a_traceback(tmp_path):
-    done = train("--resume", tmp_path / "nowhere")
-    assert done.returncode != 0
+    """And `python train.py` is the same command."""
+    command = [sys.executable, ROOT / "train.py", "--resume", tmp_path / "nowhere"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
     assert "holds no run to resume" in done.stderr
     assert "Traceback" not in done.stderr
 
@@ -128,7 +143,7 @@ def test_what_is_no_checkpoint_is_refused(tmp_path):
 
 
 def test_the_scripted_reacher_reaches_without_a_worker():
-    score = evaluate(lambda at: make_agent("scripted", at), 16, 16, perception="none", n_workers=0)
+    score = evaluate(lambda at: make_agent("scripted", at), 16, perception="none", n_workers=0)
     assert score.success_rate >= 0.95
     assert score.contacts_per_episode == 0
 
@@ -142,7 +157,6 @@ def test_yielding_touches_people_less_often():
     reckless, yielding = (
         evaluate(
             lambda at, name=name: make_agent(name, at),
-            24,
             24,
             perception="keypoints",
             people="unaware",
@@ -166,3 +180,83 @@ def test_no_ramp_is_the_whole_weight_and_one_backwards_is_refused():
     assert Ramp(0).at(0) == 1.0
     with pytest.raises(ConfigError, match="0 or more"):
         Ramp(-1)
+
+
+def test_ctrl_c_saves_and_says_how_to_go_on(tmp_path, monkeypatch, capsys):
+    """The signal comes after the first rollout; the line that is printed then goes on."""
+    folder, before = tmp_path / "stopped", signal.getsignal(signal.SIGINT)
+    with monkeypatch.context() as patched:
+        patched.setattr(
+            TrainingMonitor, "_on_rollout_end", lambda self: signal.raise_signal(signal.SIGINT)
+        )
+        assert main(["train", *TINY, "--timesteps", "768", "--out", str(folder)]) == 130
+    assert signal.getsignal(signal.SIGINT) is before
+    said = capsys.readouterr().out.splitlines()[-1]
+    assert said.startswith("Stopped at 260 steps, which are saved. Go on with: python -m hrc_env")
+    words = shlex.split(said.split("python -m hrc_env ")[1])
+    assert words == ["train", "--resume", str(folder), "--timesteps", "768"]
+    assert ppo.describe(folder / "policy.zip")["num_timesteps"] == 260
+    assert not (folder / "score.json").exists()
+    assert main([*words, "--episodes", "2", "--no-film"]) == 0
+    assert ppo.describe(folder / "policy.zip")["num_timesteps"] >= 768
+    assert (folder / "score.json").exists()
+
+
+def test_a_second_ctrl_c_stops_at_once():
+    with Interrupt() as interrupt:
+        interrupt.listen()
+        signal.raise_signal(signal.SIGINT)
+        assert interrupt.asked
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+
+
+def test_a_run_of_an_older_version_resumes_with_defaults_for_what_it_lacks(run, tmp_path):
+    old = tmp_path / "old"
+    shutil.copytree(run, old)
+    record = json.loads((old / "run.json").read_text())
+    del record["arguments"]["scene"]
+    record["arguments"]["n_workers"] = [1, 2]
+    (old / "run.json").write_text(json.dumps(record))
+    again = as_before(Train(scene="site", timesteps=10_000, resume=old), old)
+    assert (again.scene, again.n_workers, again.perception) == ("lab", (1, 2), "truth")
+    assert (again.timesteps, again.resume) == (10_000, old)
+
+
+def test_a_run_that_has_learnt_enough_says_so(run, capsys):
+    assert main(["train", *TINY, "--resume", str(run), "--timesteps", "256"]) == 2
+    assert "ask for more than that with --timesteps" in " ".join(capsys.readouterr().err.split())
+
+
+def test_the_learning_curve_is_drawn_over_environment_steps(run, tmp_path, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: drawn.append(figure))
+    scores = dict.fromkeys(("success_rate", "goals_per_minute"), 0.5)
+    scores |= dict.fromkeys(("contacts_per_episode", "close_steps_per_episode"), 1.0)
+    steps = [100_000.0, 200_000.0]
+    points = [{"steps": each, "wall_s": 7.0, "safety_share": 1.0, **scores} for each in steps]
+    plot_curve(Curve(points), tmp_path / "curve.png", "PPO")
+    (figure,) = drawn
+    assert all(list(axis.lines[0].get_xdata()) == steps for axis in figure.axes)
+    assert figure.axes[-1].get_xlabel() == "environment steps"
+
+
+def test_without_the_extra_training_says_what_to_install(monkeypatch, tmp_path, run, capsys):
+    monkeypatch.setitem(sys.modules, "stable_baselines3", None)
+    with pytest.raises(HRCError, match=r'pip install "hrc_env\[train\]" \(stable_baselines3'):
+        require_training()
+    assert main(["train", *TINY, "--out", str(tmp_path / "run")]) == 2
+    assert 'pip install "hrc_env[train]"' in " ".join(capsys.readouterr().err.split())
+    with pytest.raises(HRCError, match="Training needs the extra"):
+        make_agent(str(run / "policy.zip"), here())
+    assert make_agent("scripted", here()) is not None
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_one_by_one_or_all_at_once_episodes_are_the_same():
+    """What pixels are judged by is what the vector environment counts."""
+    alone = one_by_one(lambda at: make_agent("scripted", at), 3, 5, perception="truth")
+    together = judged(lambda at: make_agent("scripted", at), 3, 5, perception="truth")
+    for one, other in zip(alone, together, strict=True):
+        assert one == pytest.approx({name: other[name] for name in one}, abs=1e-9)
+    assert sum(each["contacts"] for each in together) > 0

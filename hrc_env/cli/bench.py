@@ -11,6 +11,7 @@ import tyro
 from rich.console import Console
 from rich.markdown import Markdown
 
+from hrc_env.cli.checks import at_least, writable_folder
 from hrc_env.cli.progress import progress_bar
 from hrc_env.errors import ConfigError
 
@@ -44,6 +45,8 @@ class TrackingBench:
 
     def run(self) -> int:
         """Run, show the table."""
+        at_least("--seeds", self.seeds, 1)
+        at_least("--processes", self.processes, 1)
         if self.real and self.peers:
             raise ConfigError("--real and --peers are two parts of the bench; choose one.")
         if self.peers:
@@ -95,6 +98,7 @@ class SpeedBench:
 
     def run(self) -> int:
         """Run, show the table."""
+        at_least("--rounds", self.rounds, 1)
         from hrc_env.experiments.speed.bench import QUICK, SpeedBenchConfig, run
 
         config = QUICK if self.quick else SpeedBenchConfig()
@@ -117,6 +121,7 @@ class MotionBench:
 
     def run(self) -> int:
         """Run, show the table."""
+        at_least("--seeds", self.seeds, 1)
         from hrc_env.experiments.motion.bench import QUICK, MotionBenchConfig, run
 
         config = QUICK if self.quick else MotionBenchConfig()
@@ -174,6 +179,7 @@ class Bench:
 
 def show(run: Callable[[Path, Say], object], out: Path, table: str, written: str) -> int:
     """Run a part of the bench under a progress bar, then show its table."""
+    writable_folder(out)
     console = Console()
     with progress_bar(console, "bench") as say:
         run(out, say)

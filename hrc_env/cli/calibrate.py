@@ -6,6 +6,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
+from hrc_env.cli.checks import at_least, writable_file
 from hrc_env.cli.progress import progress_bar
 
 
@@ -34,6 +35,9 @@ class CalibrateKeypoints:
 
     def run(self) -> int:
         """Fit; show what came of it."""
+        at_least("--rounds", self.rounds, 0)
+        at_least("--seed", self.seed, 0)
+        writable_file(self.out)
         from hrc_env.experiments.calibration.run import CalibrationRun, calibrate, compare
         from hrc_env.experiments.calibration.validate import COLUMNS, table_of
 

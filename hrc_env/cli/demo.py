@@ -8,12 +8,12 @@ from rich.console import Console
 from rich.table import Table
 
 from hrc_env.agents_door import agents
-from hrc_env.cli.film import film_episode
-from hrc_env.config import HRCConfig
+from hrc_env.cli.checks import at_least, writable_file
+from hrc_env.cli.environment import EnvironmentArguments
 
 
-@dataclass(frozen=True)
-class Demo:
+@dataclass(frozen=True, kw_only=True)
+class Demo(EnvironmentArguments):
     """Film the scripted reacher, slowed by the separation that it estimates from pixels."""
 
     out: Path = Path("out/demo.mp4")
@@ -22,17 +22,23 @@ class Demo:
     """Seed of the episode."""
     seconds: float = 10.0
     """Length of the film."""
-    perception: str = "pixels"
-    """pixels, keypoints, truth or none."""
 
     def run(self) -> int:
         """Film and tell."""
+        at_least("--seed", self.seed, 0)
+        writable_file(self.out, ".mp4")
+        from hrc_env.cli.film import film_episode  # here: --help imports no simulator
+        from hrc_env.config import resolve
+
+        keywords = self.keywords()
+        ctrl_dt = resolve(keywords.get("config")).ctrl_dt
+        at_least("--seconds", self.seconds, ctrl_dt)
         console, started_s = Console(), time.monotonic()
         base = agents("base")
-        n_steps = round(self.seconds / HRCConfig().ctrl_dt)
+        n_steps = round(self.seconds / ctrl_dt)
         totals = film_episode(
             lambda here: base.make_agent("scripted_slowed", here),
-            self.out, self.seed, n_steps, perception=self.perception,
+            self.out, self.seed, n_steps, **keywords,
         )  # fmt: skip
         table = Table("", "", title="the worker is known through four cameras only")
         for name, value in totals.items():

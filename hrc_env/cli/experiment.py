@@ -9,6 +9,7 @@ from typing import Annotated
 import tyro
 
 from hrc_env.cli.bench import show
+from hrc_env.cli.checks import at_least
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,7 @@ class AnyExperiment:
 
     def shown(self, run: Callable[..., object]) -> int:
         """Run `run(folder, say, overwrite=...)`, show the tables."""
+        at_least("--seeds", self.seeds, 1)
         written = "report.html, results.json, figures/"
         return show(partial(run, overwrite=self.overwrite), self.out, "report.md", written)
 

@@ -10,10 +10,10 @@ import cv2
 import imageio.v2 as imageio
 import numpy as np
 from numpy.typing import NDArray
-from rich.progress import track
 
 from hrc_env import pictures
 from hrc_env.agents_door import agents
+from hrc_env.cli.progress import track
 from hrc_env.env import HRCReachEnv
 from hrc_env.typing import Image
 

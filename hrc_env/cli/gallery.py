@@ -5,6 +5,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from hrc_env.cli.checks import writable_folder
 from hrc_env.cli.progress import progress_bar
 
 
@@ -17,6 +18,7 @@ class Gallery:
 
     def run(self) -> int:
         """Draw, tell where."""
+        writable_folder(self.out)
         from hrc_env.experiments.gallery.gallery import GalleryConfig, run
 
         console = Console()

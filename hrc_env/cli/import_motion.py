@@ -2,21 +2,21 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import imageio.v2 as imageio
 import tyro
 from rich.console import Console
-from rich.progress import Progress
 from rich.table import Table
 
-from hrc_env.body import load_body
-from hrc_env.cli.strip import film_strip
+from hrc_env.cli.checks import writable_file
+from hrc_env.cli.progress import progress_bar
 from hrc_env.errors import ConfigError
-from hrc_env.motion.capture.clip import Clip, save_clip
-from hrc_env.motion.capture.read import read_capture
-from hrc_env.motion.capture.record import Capture
-from hrc_env.motion.capture.retarget import RetargetError, retarget
 from hrc_env.skeleton import JOINTS
+
+if TYPE_CHECKING:  # --help imports no simulator
+    from hrc_env.motion.capture.clip import Clip
+    from hrc_env.motion.capture.record import Capture
+    from hrc_env.motion.capture.retarget import RetargetError
 
 USUAL_FPS = 60.0
 """Faster recordings are thinned out to this rate: a step keeps 30 frames."""
@@ -49,29 +49,42 @@ class ImportMotion:
 
     def run(self) -> int:
         """Read, fit, tell, write."""
-        if self.out.suffix.lower() != ".npz":
-            raise ConfigError(f"--out must end in .npz, got {self.out.name!r}.")
+        writable_file(self.out, ".npz")
         if self.out.resolve() == self.file.resolve():
             raise ConfigError("--out is the recording itself; give the clip another name.")
+        if self.picture is not None:
+            writable_file(self.picture, ".png", "--picture")
+        from hrc_env.body import load_body
+        from hrc_env.motion.capture.clip import save_clip
+        from hrc_env.motion.capture.read import read_capture
+        from hrc_env.motion.capture.retarget import retarget
+
         body, console = load_body(self.worker), Console()
         capture = read_capture(self.file, self.fps, self.source_fps, self.skeleton)
         if self.fps is None and capture.fps > USUAL_FPS:
             capture = read_capture(self.file, USUAL_FPS, self.source_fps, self.skeleton)
         tell_capture(console, capture)
-        with Progress(console=console, transient=True) as progress:
-            task = progress.add_task(f"fitting {self.worker}", total=1.0)
-            clip, error = retarget(capture, body, lambda share: progress.advance(task, share))
+        name = f"fitting {self.worker}"
+        with progress_bar(console, name) as say:
+            clip, error = retarget(capture, body, lambda share: say(share, name))
         tell_error(console, capture, clip, error)
         save_clip(clip, self.out)
         console.print(f"In [bold]{self.out}[/]: play it with motions=[{str(self.out)!r}]")
         if self.picture is not None:
-            self.picture.parent.mkdir(parents=True, exist_ok=True)
-            imageio.imwrite(self.picture, film_strip(clip, self.worker))
+            self._draw(clip, self.picture)
             console.print(f"In [bold]{self.picture}[/]: a film strip")
         return 0
 
+    def _draw(self, clip: "Clip", picture: Path) -> None:
+        import imageio.v2 as imageio
 
-def tell_capture(console: Console, capture: Capture) -> None:
+        from hrc_env.cli.strip import film_strip
+
+        picture.parent.mkdir(parents=True, exist_ok=True)
+        imageio.imwrite(picture, film_strip(clip, self.worker))
+
+
+def tell_capture(console: Console, capture: "Capture") -> None:
     """What was found and what was mended."""
     n_frames = len(capture.joints_world)
     console.print(
@@ -83,7 +96,7 @@ def tell_capture(console: Console, capture: Capture) -> None:
         console.print(f"[yellow]Repaired:[/] {sentence}", highlight=False)
 
 
-def tell_error(console: Console, capture: Capture, clip: Clip, error: RetargetError) -> None:
+def tell_error(console: Console, capture: "Capture", clip: "Clip", error: "RetargetError") -> None:
     """Which joints were found, and how near the worker comes to them."""
     table = Table("joint", "in the file", "mean [cm]", "p95 [cm]", title="worker beside person")
     joints = zip(JOINTS, capture.found, 100 * error.mean_m, 100 * error.p95_m, strict=True)

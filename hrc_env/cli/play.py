@@ -3,43 +3,36 @@
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
-import gymnasium
 import tyro
 from rich.console import Console
-from rich.progress import track
 
 import hrc_env
 from hrc_env.agents_door import agents
-from hrc_env.cli.film import film_episode
-from hrc_env.env import HRCReachEnv
+from hrc_env.cli.checks import at_least, writable_file
+from hrc_env.cli.environment import EnvironmentArguments
+from hrc_env.cli.progress import track
 from hrc_env.errors import unknown
-from hrc_env.scene.viewer import Viewer
+
+if TYPE_CHECKING:
+    import gymnasium
 
 
-@dataclass(frozen=True)
-class Play:
-    """Play episodes of an environment with an agent and say how they went."""
+@dataclass(frozen=True, kw_only=True)
+class Play(EnvironmentArguments):
+    """Play episodes of an environment with an agent; say how they went."""
 
     id: Annotated[str, tyro.conf.Positional] = "HRCReach-v0"
     """Which environment."""
     agent: str = "scripted_slowed"
-    """random, scripted, scripted_slowed, or the path of a checkpoint of train.py."""
-    perception: str = "pixels"
-    """pixels, keypoints, truth or none."""
-    estimator: str = "particle"
-    """particle, kalman, paper or triangulation."""
-    control: str = "joint"
-    """joint or tool."""
-    n_workers: int = 1
-    """Number of workers."""
+    """random, scripted, scripted_slowed, or the path of a checkpoint of `train` (.zip)."""
     episodes: int = 1
     """How many episodes to play."""
     seed: int = 0
     """Seed of the first episode; the next ones count up."""
     video: Path | None = None
-    """Film the first episode into this .mp4 file."""
+    """Film the first episode, and play no other, into this .mp4 file."""
     viewer: bool = False
     """Show the scene in MuJoCo's interactive viewer (needs a display)."""
 
@@ -47,22 +40,15 @@ class Play:
         """Play."""
         if self.id not in hrc_env.IDS:
             raise unknown("environment", self.id, hrc_env.IDS)
-        base = agents("base")
-        kwargs = {
-            "perception": self.perception,
-            "estimator": self.estimator,
-            "control": self.control,
-            "n_workers": self.n_workers,
-        }
+        at_least("--episodes", self.episodes, 1)
+        at_least("--seed", self.seed, 0)
         if self.video is not None:
-            totals = film_episode(
-                lambda here: base.make_agent(self.agent, here, self.seed),
-                self.video, self.seed, **kwargs,
-            )  # fmt: skip
-            for name, value in totals.items():
-                Console().print(f"{name:28s} {value:.2f}")
-            return 0
-        env = gymnasium.make(self.id, **kwargs)
+            writable_file(self.video, ".mp4", "--video")
+            return self._film(self.video)
+        import gymnasium  # here and below: --help imports no simulator
+
+        base = agents("base")
+        env = gymnasium.make(self.id, **self.keywords())
         try:
             for episode in range(self.episodes):
                 self._play(env, base, self.seed + episode)
@@ -70,10 +56,25 @@ class Play:
             env.close()
         return 0
 
-    def _play(self, env: gymnasium.Env, base: object, seed: int) -> None:
+    def _film(self, video: Path) -> int:
+        from hrc_env.cli.film import film_episode
+
+        base = agents("base")
+        totals = film_episode(
+            lambda here: base.make_agent(self.agent, here, self.seed),
+            video, self.seed, **self.keywords(),
+        )  # fmt: skip
+        for name, value in totals.items():
+            Console().print(f"{name:28s} {value:.2f}", markup=False)  # units stand in []
+        return 0
+
+    def _play(self, env: "gymnasium.Env[Any, Any]", base: Any, seed: int) -> None:
+        from hrc_env.env import HRCReachEnv
+        from hrc_env.scene.viewer import Viewer
+
         inner = env.unwrapped
         assert isinstance(inner, HRCReachEnv)
-        agent = base.make_agent(self.agent, base.situation(inner.simulation), seed)  # type: ignore[attr-defined]
+        agent = base.make_agent(self.agent, base.situation(inner.simulation), seed)
         observation, info = env.reset(seed=seed)
         window = Viewer(inner.simulation.scene) if self.viewer else None
         started_s, total, steps = time.monotonic(), 0.0, 0

@@ -1,7 +1,10 @@
-"""The progress bar that long commands show."""
+"""How far a long command is: a bar in a terminal, a line every ten seconds anywhere else."""
 
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Callable, Iterable, Iterator, Sized
 from contextlib import contextmanager
+from datetime import timedelta
+from typing import Any, Self, TypeVar
 
 from rich.console import Console
 from rich.progress import (
@@ -12,18 +15,116 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+EVERY_S = 10.0
+"""Between two lines in a log file [s]."""
+T = TypeVar("T")
+
+
+class Meter:
+    """Shows how much of something is done, of how much, and how long the rest will take.
+
+    Args:
+        console: where to; what is no terminal gets plain lines.
+        name: what is being done.
+        total: when it is done.
+        unit: of what is counted; nothing is counted aloud without one.
+        done: how much is done already.
+        clock: seconds that have passed since some moment.
+    """
+
+    def __init__(
+        self,
+        console: Console,
+        name: str,
+        total: float = 1.0,
+        unit: str = "",
+        done: float = 0.0,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.console, self.name, self.total, self.unit = console, name, total, unit
+        self.done = self._before = done
+        self.note, self._clock, self._said = "", clock, False
+        self._bar = _bar(console) if console.is_terminal else None
+
+    def __enter__(self) -> Self:
+        self._began_s = self._line_s = self._clock()
+        if self._bar is not None:
+            self._bar.start()
+            self._task = self._bar.add_task(self.name, total=self.total, counted="", note="")
+            self.show(self.done)
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+        elif self._said:
+            self._say()
+
+    def show(self, done: float, name: str | None = None, note: str = "") -> None:
+        """So much is done; `name` is what is being done now, `note` how it goes."""
+        self.done, self.name, self.note = done, name or self.name, note
+        if self._bar is not None:
+            self._bar.update(
+                self._task, completed=done, description=self.name, counted=self._counted(),
+                note=note,
+            )  # fmt: skip
+        elif self._clock() - self._line_s >= EVERY_S:
+            self._say()
+
+    def _say(self) -> None:
+        """One line: share, count, time that has passed and that is left."""
+        self._said, self._line_s = True, self._clock()
+        passed_s, since = self._line_s - self._began_s, self.done - self._before
+        left = "?"
+        if since > 0:
+            left = _time(max(self.total - self.done, 0.0) / since * passed_s)
+        share = 100 * self.done / self.total if self.total else 100.0
+        parts = [f"{share:.0f} %", self._counted(), f"{_time(passed_s)} passed, {left} left"]
+        said = ", ".join(part for part in (*parts, self.note) if part)
+        self.console.print(f"{self.name}: {said}", markup=False, highlight=False, soft_wrap=True)
+
+    def _counted(self) -> str:
+        return f"{self.done:,.0f} of {self.total:,.0f} {self.unit}" if self.unit else ""
+
 
 @contextmanager
 def progress_bar(console: Console, name: str) -> Iterator[Callable[[float, str], None]]:
-    """A bar; tell it by how much the share that is done grew, and what is being done."""
-    with Progress(
+    """Tell it by how much the share that is done grew, and what is being done."""
+    with Meter(console, name) as meter:
+        yield lambda share, label: meter.show(meter.done + share, label)
+
+
+def track(
+    values: Iterable[T], description: str, total: int | None = None, console: Console | None = None
+) -> Iterator[T]:
+    """The values, one after the other, while it is shown how many of them are done.
+
+    Args:
+        values: what to go through.
+        description: what is being done with them.
+        total: how many there are, where they cannot be counted.
+        console: where to; the standard output if None.
+    """
+    n = len(values) if total is None and isinstance(values, Sized) else total or 0
+    with Meter(console or Console(), description, n) as meter:
+        for k, value in enumerate(values, 1):
+            yield value
+            meter.show(k)
+
+
+def _bar(console: Console) -> Progress:
+    return Progress(
         TextColumn("{task.description:30s}"),
         BarColumn(),
         TextColumn("{task.percentage:3.0f} %"),
+        TextColumn("{task.fields[counted]}"),
         TimeElapsedColumn(),
         TextColumn("left"),
         TimeRemainingColumn(),
+        TextColumn("{task.fields[note]}"),
         console=console,
-    ) as progress:
-        task = progress.add_task(name, total=1.0)
-        yield lambda share, label: progress.update(task, advance=share, description=label)
+    )
+
+
+def _time(seconds: float) -> str:
+    return str(timedelta(seconds=round(seconds)))

@@ -1,0 +1,173 @@
+"""A training run: learn, evaluate on fixed seeds, draw the curve, film; go on where it stopped."""
+
+import json
+import shlex
+import time
+from contextlib import closing
+from dataclasses import asdict, fields, replace
+from pathlib import Path
+from typing import Any, get_type_hints
+
+import torch
+from rich.console import Console
+
+from hrc_env.cli.progress import Meter
+from hrc_env.cli.train import Train
+from hrc_env.config import resolve
+from hrc_env.errors import CheckpointError, RenderingError
+from hrc_env.mapping import restored
+from hrc_env.provenance import provenance
+from hrc_env.results import write_whole
+from hrc_env.sb3 import HRCVecEnv
+
+from . import ppo
+from .base import Situation
+from .curriculum import ProximityCurriculum, Ramp
+from .evaluate import Score, evaluate
+from .interrupt import Interrupt
+from .monitor import Curve, TrainingMonitor, plot_curve
+
+ONLY_OF_A_RUN = ("out", "timesteps", "threads", "backend", "episodes", "film", "resume")
+"""Arguments that a resumed run does not take from the run that it goes on with."""
+STOPPED = 130
+"""Exit status of what Ctrl-C stopped."""
+
+
+def run(arguments: Train) -> int:
+    """Train, evaluate, draw, film; returns the exit status.
+
+    Raises:
+        CheckpointError: a run cannot be resumed.
+        ConfigError: an environment that cannot be.
+    """
+    torch.set_num_threads(1)  # two are slower in networks as small as these
+    console = Console()
+    folder = arguments.resume or unused(arguments.out)
+    if arguments.resume is not None:
+        arguments = as_before(arguments, folder)
+    curve, seconds = train(arguments, folder, console)
+    if seconds is None:
+        return STOPPED
+    score = judge(arguments, folder, console)
+    _write(folder / "score.json", {**score.as_dict(), "training_s": seconds})
+    proximity = resolve(arguments.keywords()["config"]).reward.proximity
+    title = f"PPO, {arguments.perception}, proximity weight {proximity:g}"
+    plot_curve(curve, folder / "curve.png", title)
+    written = "policy.zip, curve.png, score.json"
+    if arguments.film and film(folder, arguments, console):
+        written += ", policy.mp4"
+    console.print(f"In {folder}/: {written}", highlight=False, soft_wrap=True)
+    return 0
+
+
+def judge(arguments: Train, folder: Path, console: Console) -> Score:
+    """What the policy is worth, also printed."""
+    checkpoint = folder / "policy.zip"
+    console.print(f"Evaluating {arguments.episodes} episodes on fixed seeds ...")
+    score = evaluate(
+        lambda here: ppo.load(checkpoint, here), arguments.episodes, **arguments.keywords()
+    )
+    for name, value in score.as_dict().items():
+        console.print(f"  {name:28s} {value:.3f}", highlight=False)
+    return score
+
+
+def unused(folder: Path) -> Path:
+    """The folder, or the next of folder-2, folder-3, ... in which nobody has learnt."""
+    candidate, number = folder, 1
+    while (candidate / "policy.zip").exists():
+        number += 1
+        candidate = folder.with_name(f"{folder.name}-{number}")
+    return candidate
+
+
+def as_before(arguments: Train, folder: Path) -> Train:
+    """The arguments of a resumed run: the environment and the seed are those of its beginning.
+
+    Raises:
+        CheckpointError: the folder holds no run, or one that has learnt all that is asked.
+    """
+    record = folder / "run.json"
+    if not record.exists():
+        raise CheckpointError(f"{folder} holds no run to resume: {record} is missing.")
+    learnt = ppo.describe(folder / "policy.zip")["num_timesteps"]
+    if learnt >= arguments.timesteps:
+        raise CheckpointError(
+            f"{folder} has learnt {learnt} steps already; ask for more than that with --timesteps."
+        )
+    before, hints = json.loads(record.read_text())["arguments"], get_type_hints(Train)
+    kept = {each.name: each.default for each in fields(Train) if each.name not in ONLY_OF_A_RUN}
+    for name in kept.keys() & before.keys():  # what an older run lacks had its default
+        kept[name] = restored(hints[name], before[name], name)
+    return replace(arguments, **kept)
+
+
+def train(arguments: Train, folder: Path, console: Console) -> tuple[Curve, float | None]:
+    """Learn; returns the curve and the seconds it took, None if it was stopped before the end.
+
+    Progress survives a kill.
+    """
+    kwargs, settings = arguments.keywords(), ppo.PPOSettings()
+    vector = HRCVecEnv(
+        arguments.num_envs, stagger=True, seed=arguments.seed, backend=arguments.backend, **kwargs
+    )
+    with closing(vector) as env, Interrupt() as interrupt:
+        config = asdict(resolve(kwargs["config"]))
+        record = {"arguments": _plain(arguments), "config": config, **provenance()}
+        _write(folder / "run.json", record)
+        learner, curve = _learner(arguments, folder, env, settings)
+        facts = {"environment": kwargs, "settings": ppo.settings_as_dict(settings)}
+        ramp, total = Ramp(arguments.ramp), arguments.timesteps
+        started_s = time.monotonic()
+        with Meter(console, "training", total, "steps", learner.num_timesteps) as meter:
+            monitor = TrainingMonitor(folder, facts, curve, ramp, interrupt, meter)
+            learner.learn(
+                total - learner.num_timesteps,
+                callback=[ProximityCurriculum(ramp, env), monitor],
+                reset_num_timesteps=arguments.resume is None,
+                tb_log_name="ppo",
+            )
+    if not interrupt.asked:
+        return curve, time.monotonic() - started_s
+    words = ["python", "-m", "hrc_env", "train", "--resume", str(folder)]
+    words += ["--timesteps", str(total)]
+    said = f"Stopped at {learner.num_timesteps:,} steps, which are saved. Go on with: "
+    console.print(said + shlex.join(words), markup=False, highlight=False, soft_wrap=True)
+    return curve, None
+
+
+def _learner(
+    arguments: Train, folder: Path, env: HRCVecEnv, settings: ppo.PPOSettings
+) -> tuple[Any, Curve]:
+    """A learner and its curve: new ones, or those of the run that is resumed."""
+    if arguments.resume is None:
+        return ppo.make_learner(env, settings, arguments.seed, folder / "tensorboard"), Curve()
+    learner = ppo.resume(folder / "policy.zip", env, folder / "tensorboard")
+    env.seed(arguments.seed + learner.num_timesteps)  # other episodes than the first ones
+    path = folder / "curve.json"
+    return learner, Curve(json.loads(path.read_text()) if path.exists() else [])
+
+
+def film(folder: Path, arguments: Train, console: Console) -> bool:
+    """Film one episode of the policy; whether this machine can draw."""
+    from hrc_env.cli.film import film_episode
+
+    def make(here: Situation) -> ppo.TrainedAgent:
+        return ppo.load(folder / "policy.zip", here)
+
+    kwargs = arguments.keywords()
+    del kwargs["num_threads"]
+    try:
+        film_episode(make, folder / "policy.mp4", seed=arguments.seed, **kwargs)
+    except RenderingError as error:
+        console.print(f"No film: {error}", markup=False)
+        return False
+    return True
+
+
+def _plain(arguments: Train) -> dict[str, Any]:
+    return json.loads(json.dumps(asdict(arguments), default=str))
+
+
+def _write(path: Path, content: dict[str, Any]) -> None:
+    write_whole(path, json.dumps(content, indent=1))

@@ -1,0 +1,46 @@
+"""Whether a command can do what it was asked, found out before it begins."""
+
+import math
+import tempfile
+from pathlib import Path
+
+from hrc_env.errors import ConfigError, HRCError
+
+
+def at_least(option: str, value: float | None, low: float) -> None:
+    """Raise `ConfigError` unless the number is `low` or more; None is a default, and fine."""
+    if value is not None and not (math.isfinite(value) and value >= low):
+        raise ConfigError(f"{option} must be {low:g} or more, got {value:g}.")
+
+
+def writable_folder(path: Path, option: str = "--out") -> None:
+    """Raise `HRCError` unless files can be written into the folder; it need not exist yet."""
+    if path.exists() and not path.is_dir():
+        raise _refusal(option, path, "a file of that name is there, and a folder is needed")
+    _try(path, path, option)
+
+
+def writable_file(path: Path, suffix: str = "", option: str = "--out") -> None:
+    """Raise `HRCError` unless a file of that name and ending can be written."""
+    if suffix and path.suffix.lower() != suffix:
+        raise ConfigError(f"{option} must end in {suffix}, got {path.name!r}.")
+    if path.is_dir():
+        raise _refusal(option, path, "it is a folder, and a file is needed")
+    _try(path, path.parent, option)
+
+
+def _try(path: Path, folder: Path, option: str) -> None:
+    """Write something where the folder is, or into the nearest one above it that exists."""
+    there = folder.absolute()
+    while not there.exists() and there != there.parent:
+        there = there.parent
+    try:
+        with tempfile.TemporaryFile(dir=there) as file:
+            file.write(b"hrc_env")
+    except OSError as error:
+        reason = f"{there}: {error.strerror}" if there.is_dir() else f"{there} is no folder"
+        raise _refusal(option, path, reason) from error
+
+
+def _refusal(option: str, path: Path, reason: str) -> HRCError:
+    return HRCError(f"{path} cannot be written ({reason}). Name another place with {option}.")

@@ -1,0 +1,81 @@
+"""python -m hrc_env train: learn, evaluate, draw, film. `agents/training.py` does the work."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from hrc_env.agents_door import agents
+from hrc_env.cli.checks import at_least, writable_folder
+from hrc_env.cli.environment import EnvironmentArguments, merged
+from hrc_env.errors import ConfigError, unknown
+
+
+@dataclass(frozen=True, kw_only=True)
+class Train(EnvironmentArguments):
+    """Train PPO, evaluate it on fixed seeds, draw its curve, film it.
+
+    Ctrl-C saves what has been learnt and says how to go on. What lies in a folder is never
+    overwritten: a second run into runs/quick goes to runs/quick-2. Curves: tensorboard --logdir
+    runs.
+    """
+
+    out: Path = Path("runs/quick")
+    """Folder for checkpoints, curves, TensorBoard logs and the film."""
+    timesteps: int = 1_000_000
+    """Environment steps in all (with --resume: counted from the very start)."""
+    num_envs: int = 64
+    """Environments that step together."""
+    seed: int = 0
+    """Seed of the environments and of the learner."""
+    perception: str = "keypoints"
+    """What the robot learns on: keypoints (camera emulator), truth or none."""
+    proximity: float = 2.0
+    """Weight of closeness to the estimated body in the reward; 0 trains without it."""
+    ramp: int = 400_000
+    """Environment steps in which that weight grows from 0: the task first, then care. 0: all of
+    it from the start; the policy learns several times slower, and is more careful in the end."""
+    threads: int | None = None
+    """How many ranges the environments are stepped in at once; all cores by default."""
+    backend: str = "threads"
+    """Where those beside the first live: threads, or processes of their own. The policy is the
+    same."""
+    episodes: int = 128
+    """Episodes of the evaluation at the end."""
+    film: bool = True
+    """Film the trained policy at the end (needs OpenGL)."""
+    resume: Path | None = None
+    """A folder of an earlier run to go on with; its environment and seed stay what they were."""
+
+    def run(self) -> int:
+        """Check, then train."""
+        self.check()
+        agents("base").require_training()
+        writable_folder(self.resume or self.out, "--out" if self.resume is None else "--resume")
+        return agents("training").run(self)
+
+    def check(self) -> None:
+        """Raise `ConfigError` for a number or a name that cannot be learnt with."""
+        for option, value, low in (
+            ("--timesteps", self.timesteps, 1),
+            ("--num-envs", self.num_envs, 1),
+            ("--seed", self.seed, 0),
+            ("--proximity", self.proximity, 0),
+            ("--ramp", self.ramp, 0),
+            ("--threads", self.threads, 1),
+            ("--episodes", self.episodes, 1),
+        ):
+            at_least(option, value, low)
+        if self.backend not in ("threads", "processes"):
+            raise unknown("backend", self.backend, ("threads", "processes"))
+        if self.perception == "pixels":
+            raise ConfigError(
+                "--perception pixels is too slow to learn on: learn on keypoints, which emulates "
+                "it, and play the policy on pixels."
+            )
+
+    def keywords(self) -> dict[str, Any]:
+        """Keyword arguments of the environment that a run learns and is judged in."""
+        given = super().keywords()
+        safety = {"reward": {"proximity": self.proximity}}
+        config = merged(safety, given.get("config", {}))
+        return {**given, "config": config, "num_threads": self.threads}

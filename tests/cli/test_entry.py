@@ -1,0 +1,137 @@
+"""`python -m hrc_env` itself: what it says of its commands, and how it refuses."""
+
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+from hrc_env import __version__
+from hrc_env.__main__ import COMMANDS, main
+
+
+def in_a_process_of_its_own(code: str) -> str:
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_the_overview_names_every_command_and_imports_none():
+    said = in_a_process_of_its_own(
+        "import sys\n"
+        "from hrc_env.__main__ import main\n"
+        "assert main(['--help']) == 0 and main(['--version']) == 0\n"
+        "heavy = {'tyro', 'rich', 'mujoco', 'numba', 'torch', 'hrc_env.cli'}\n"
+        "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n"
+    )
+    for name in COMMANDS:
+        assert f"\n  {name} " in said
+
+
+def test_the_help_of_a_command_imports_no_simulator():
+    in_a_process_of_its_own(
+        "import sys\n"
+        "from hrc_env.__main__ import COMMANDS, main\n"
+        "for name in COMMANDS:\n"
+        "    try:\n"
+        "        main([name, '--help'])\n"
+        "        raise AssertionError(name)\n"
+        "    except SystemExit as end:\n"
+        "        assert end.code == 0\n"
+        "heavy = {'mujoco', 'numba', 'torch', 'stable_baselines3', 'cv2'}\n"
+        "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n"
+    )
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_overview_says_of_a_command_what_it_says_of_itself(name: str):
+    module, kind, says = COMMANDS[name]
+    doc = getattr(import_module(f"hrc_env.cli.{module}"), kind).__doc__ or ""
+    assert " ".join(doc.split("\n\n")[0].split()) == says
+
+
+def test_versions_are_named(capsys):
+    assert main(["--version"]) == 0
+    said = capsys.readouterr().out
+    assert f"hrc_env {__version__}, Python 3." in said
+    for name in ("mujoco 4", "gymnasium 1."):
+        assert name in said
+
+
+def test_a_word_that_is_no_command_is_answered_with_the_nearest(capsys):
+    assert main(["plya"]) == 2
+    assert "Did you mean 'play'?" in " ".join(capsys.readouterr().err.split())
+    assert main([]) == 2
+    assert "usage" in capsys.readouterr().out
+
+
+def test_an_error_is_printed_as_it_is_written(capsys):
+    """Square brackets are no markup: names in them would vanish."""
+    assert main(["play", "[bold]"]) == 2
+    assert "[bold]" in capsys.readouterr().err
+
+
+WRITING = {
+    "demo": ["demo", "--perception", "none", "--out", "{}/film.mp4"],
+    "play": ["play", "--perception", "none", "--video", "{}/film.mp4"],
+    "train": ["train", "--out", "{}/run"],
+    "resume": ["train", "--resume", "{}/run"],
+    "bench tracking": ["bench", "tracking", "--quick", "--out", "{}"],
+    "bench perception": ["bench", "perception", "--quick", "--out", "{}"],
+    "bench speed": ["bench", "speed", "--quick", "--out", "{}"],
+    "bench motion": ["bench", "motion", "--quick", "--out", "{}/x/y"],
+    "experiment": ["experiment", "site", "--quick", "--out", "{}/x"],
+    "gallery": ["gallery", "--out", "{}"],
+    "import-motion": ["import-motion", "walk.bvh", "--out", "{}/walk.npz"],
+    "its picture": ["import-motion", "walk.bvh", "--out", "w.npz", "--picture", "{}/walk.png"],
+    "calibrate": ["calibrate-keypoints", "--quick", "--out", "{}/keypoints.json"],
+}
+
+
+@pytest.mark.parametrize("name", WRITING)
+def test_a_place_that_cannot_be_written_is_refused_before_the_work(name, tmp_path: Path, capsys):
+    blocked = tmp_path / "notes.txt"
+    blocked.write_text("a file, and no folder")
+    assert main([word.format(blocked) for word in WRITING[name]]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert "cannot be written" in said
+    assert "Name another place with --" in said
+    assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
+
+
+NUMBERS = {
+    "--timesteps": "-5", "--num-envs": "0", "--seed": "-1", "--proximity": "nan", "--ramp": "-1",
+    "--threads": "0", "--episodes": "0",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("option", NUMBERS)
+def test_training_refuses_numbers_that_mean_nothing(option, tmp_path: Path, capsys):
+    words = ["train", "--perception", "truth", "--out", str(tmp_path / "run")]
+    assert main([*words, option, NUMBERS[option]]) == 2
+    assert f"ConfigError: {option} must be" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["play", "--episodes", "0"],
+        ["play", "--seed", "-1"],
+        ["demo", "--seconds", "0"],
+        ["demo", "--seed", "-1"],
+        ["bench", "motion", "--seeds", "0"],
+        ["bench", "tracking", "--processes", "0"],
+        ["bench", "speed", "--rounds", "0"],
+        ["experiment", "impact", "--seeds", "0"],
+        ["calibrate-keypoints", "--rounds", "-1"],
+        ["train", "--perception", "pixels"],
+        ["train", "--backend", "proceses"],
+    ],
+)
+def test_other_values_that_mean_nothing_are_refused(words, capsys):
+    assert main(words) == 2
+    said = capsys.readouterr().err
+    assert "ConfigError" in said
+    assert "Traceback" not in said

@@ -1,0 +1,145 @@
+"""The arguments of an environment on the command line."""
+
+import inspect
+import json
+from dataclasses import fields
+from pathlib import Path
+
+import gymnasium
+import pytest
+
+from hrc_env.__main__ import main
+from hrc_env.cli.demo import Demo
+from hrc_env.cli.environment import EnvironmentArguments, cameras_named, read_config
+from hrc_env.cli.play import Play
+from hrc_env.cli.train import Train
+from hrc_env.config import resolve
+from hrc_env.env import HRCReachEnv
+from hrc_env.errors import ConfigError
+
+OF_RENDER = {"render_mode", "width", "height"}
+"""What only `render` reads, which no command calls: films have a form of their own."""
+
+
+def test_commands_take_what_the_environment_takes():
+    taken = set(inspect.signature(HRCReachEnv).parameters) - OF_RENDER
+    assert {field.name for field in fields(EnvironmentArguments)} == taken
+    for command in (Play, Demo, Train):
+        assert issubclass(command, EnvironmentArguments)
+
+
+def test_nothing_said_is_the_environments_own_default():
+    parameters = inspect.signature(HRCReachEnv).parameters
+    assert all(parameters[name].default == value for name, value in Play().keywords().items())
+
+
+def test_everything_said_reaches_the_environment():
+    arguments = EnvironmentArguments(
+        perception="keypoints", estimator="kalman", cameras=("camera_2", "0"), scene="site",
+        n_workers=(1, 2), people="hurried", control="tool",
+        faults=('{"kind": "late", "cameras": ["camera_2"], "amount": 0.2}',),
+        config=("reward.proximity=0.5", "worker=any"),
+    )  # fmt: skip
+    keywords = json.loads(json.dumps(arguments.keywords()))  # as a checkpoint keeps them
+    env = gymnasium.make("HRCReach-v0", **keywords)
+    inner = env.unwrapped
+    assert isinstance(inner, HRCReachEnv)
+    simulation, config = inner.simulation, inner.config
+    assert [camera.name for camera in simulation.scene.cameras] == ["camera_2", "camera_1"]
+    assert (simulation.perception, simulation.settings["estimator"]) == ("keypoints", "kalman")
+    assert (simulation.scene.name, simulation.control) == ("site", "tool")
+    assert list(simulation.settings["n_workers"]) == [1, 2]
+    assert config.motion.people != resolve({}).motion.people
+    assert [(fault.kind, fault.how_much) for fault in config.faults] == [("late", 0.2)]
+    assert (config.reward.proximity, config.worker) == (0.5, "any")
+    env.close()
+
+
+def test_looks_and_clips_are_passed_on():
+    keywords = EnvironmentArguments(appearance="varied", motions=(Path("a.npz"),)).keywords()
+    assert (keywords["appearance"], keywords["motions"]) == ("varied", ["a.npz"])
+
+
+def test_cameras_are_a_rig_a_file_or_names_and_numbers():
+    assert cameras_named(["lab_gopro"]) == "lab_gopro"
+    assert cameras_named(["rig.toml"]) == "rig.toml"
+    assert cameras_named(["camera_1"]) == ["camera_1"]
+    assert cameras_named(["0", "camera_4"]) == [0, "camera_4"]
+    assert cameras_named([]) == []
+
+
+def test_changes_come_from_words_and_files_and_later_ones_win(tmp_path: Path):
+    (tmp_path / "a.toml").write_text("ctrl_dt = 0.08\n[reward]\ngoal = 1.0\neffort = 0.1\n")
+    (tmp_path / "b.json").write_text('{"reward": {"goal": 2.0}}')
+    words = [str(tmp_path / "a.toml"), str(tmp_path / "b.json"), "reward.effort=0.3", "worker=any"]
+    config = read_config(words)
+    assert config == {"ctrl_dt": 0.08, "reward": {"goal": 2.0, "effort": 0.3}, "worker": "any"}
+    assert resolve(config).reward.goal == 2.0
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["reward.proximity"], "FIELD=VALUE"),
+        (["nowhere.json"], "cannot be read"),
+        (["{}/broken.toml"], "cannot be read"),
+        (["{}/list.json"], "names and values"),
+    ],
+)
+def test_what_is_no_change_is_refused(words, says, tmp_path: Path):
+    (tmp_path / "broken.toml").write_text("reward = [")
+    (tmp_path / "list.json").write_text("[1]")
+    with pytest.raises(ConfigError, match=says):
+        read_config([word.format(tmp_path) for word in words])
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--scene", "sit"], "'site'"),
+        (["--people", "hurrid"], "'hurried'"),
+        (["--estimator", "kalmann"], "'kalman'"),
+        (["--control", "tol"], "'tool'"),
+        (["--cameras", "camera_9"], "'camera_1'"),
+        (["--n-workers", "3", "1"], "(fewest, most)"),
+        (["--config", "reward.proximty=0"], "'reward.proximity'"),
+        (["--faults", "late"], "JSON objects"),
+        (["--motions", "nowhere.npz"], "nowhere.npz"),
+        (["--appearance", "varid"], "'varied'"),
+    ],
+)
+def test_a_wrong_word_is_answered_with_what_would_do(words, says, capsys):
+    assert main(["play", "--perception", "keypoints", *words]) == 2
+    assert says in " ".join(capsys.readouterr().err.split())
+
+
+def test_play_plays_what_it_was_asked(capsys):
+    words = ["play", "--perception", "truth", "--scene", "site", "--n-workers", "2"]
+    assert main([*words, "--config", "ctrl_dt=0.08", "--episodes", "2", "--seed", "3"]) == 0
+    said = capsys.readouterr().out
+    assert "seed 3: return" in said
+    assert "seed 4: return" in said
+
+
+def test_a_film_is_told_with_its_units(tmp_path: Path, monkeypatch, capsys):
+    """Square brackets are no markup; and the film is of what was asked."""
+    asked: list[dict[str, object]] = []
+
+    def film_episode(make: object, path: Path, seed: int, **kwargs: object) -> dict[str, float]:
+        asked.append({"path": path, "seed": seed, **kwargs})
+        return {"median tracking error [mm]": 21.3}
+
+    monkeypatch.setattr("hrc_env.cli.film.film_episode", film_episode)
+    video = tmp_path / "site.mp4"
+    words = ["play", "--perception", "none", "--scene", "site", "--control", "tool"]
+    assert main([*words, "--config", "ctrl_dt=0.08", "--video", str(video)]) == 0
+    assert "median tracking error [mm]" in capsys.readouterr().out
+    (film,) = asked
+    assert (film["path"], film["scene"], film["control"]) == (video, "site", "tool")
+    assert film["config"] == {"ctrl_dt": 0.08}
+
+
+def test_training_weighs_safety_as_config_says_where_both_say():
+    assert Train(proximity=0.5).keywords()["config"] == {"reward": {"proximity": 0.5}}
+    both = Train(proximity=0.5, config=("reward.proximity=1", "reward.goal=3")).keywords()
+    assert both["config"] == {"reward": {"proximity": 1, "goal": 3}}
