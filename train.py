@@ -15,18 +15,23 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import torch
 import tyro
 
-from agents import ppo
-from agents.base import Situation
-from agents.curriculum import ProximityCurriculum, Ramp
-from agents.evaluate import evaluate
-from agents.monitor import Curve, TrainingMonitor, plot_curve
 from hrc_env.config import resolve
-from hrc_env.errors import CheckpointError, HRCError, RenderingError
+from hrc_env.errors import CheckpointError, HRCError, MissingExtraError, RenderingError
 from hrc_env.provenance import provenance
-from hrc_env.sb3 import HRCVecEnv
+
+try:
+    import torch
+
+    from agents import ppo
+    from agents.base import Situation
+    from agents.curriculum import ProximityCurriculum, Ramp
+    from agents.evaluate import evaluate
+    from agents.monitor import Curve, TrainingMonitor, plot_curve
+    from hrc_env.sb3 import HRCVecEnv
+except MissingExtraError as error:
+    sys.exit(f"{type(error).__name__}: {error}")
 
 
 @dataclass(frozen=True)

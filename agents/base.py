@@ -57,8 +57,9 @@ def make_agent(name: str, here: Situation, seed: int = 0) -> Agent:
     Raises:
         ConfigError: neither an agent nor a file.
         CheckpointError: a file that does not fit the environment.
+        MissingExtraError: a checkpoint, where the learner that reads it is not installed.
     """
-    from . import ppo, random, scripted  # here: torch takes seconds to import
+    from . import random, scripted  # here: they import this file
 
     makers: dict[str, Callable[[], Any]] = {
         "random": lambda: random.RandomAgent(here, seed),
@@ -68,6 +69,8 @@ def make_agent(name: str, here: Situation, seed: int = 0) -> Agent:
     if name in makers:
         return makers[name]()
     if Path(name).suffix == ".zip" or Path(name).exists():
+        from . import ppo  # here: torch takes seconds to import, and need not be there
+
         return ppo.load(Path(name), here)
     error = unknown("agent", name, makers)
     raise ConfigError(f"{error} Or the path of a checkpoint that train.py wrote (.zip).")

@@ -12,6 +12,7 @@ import sys
 
 import tyro
 from rich.console import Console
+from rich.markup import escape
 
 from hrc_env.cli.bench import Bench
 from hrc_env.cli.calibrate import CalibrateKeypoints
@@ -48,7 +49,8 @@ def main() -> int:
     try:
         return command.run()
     except HRCError as error:
-        Console(stderr=True).print(f"[bold red]{type(error).__name__}[/]: {error}", highlight=False)
+        said = f"[bold red]{type(error).__name__}[/]: {escape(str(error))}"
+        Console(stderr=True).print(said, highlight=False, soft_wrap=True)
         return 2
 
 
