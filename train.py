@@ -22,8 +22,6 @@ from hrc_env.errors import CheckpointError, HRCError, MissingExtraError, Renderi
 from hrc_env.provenance import provenance
 
 try:
-    import torch
-
     from agents import ppo
     from agents.base import Situation
     from agents.curriculum import ProximityCurriculum, Ramp
@@ -76,6 +74,8 @@ LEARNT_WITH = ("num_envs", "seed", "perception", "estimator", "control", "proxim
 
 def main(arguments: Arguments) -> None:
     """Train, evaluate, draw, film."""
+    import torch
+
     torch.set_num_threads(1)  # two are slower in networks as small as these
     folder = arguments.resume or unused(arguments.out)
     if arguments.resume is not None:
