@@ -20,8 +20,8 @@ from rich.markup import escape
 
 Finding = tuple[bool, str]
 
-PACKAGES = ("hrc_env", "mujoco", "gymnasium", "numpy", "numba")
-DRAW = "from hrc_env.scene import gl; ok, said = gl.gl_status(); print(said, flush=True); ok or exit(1)"
+PACKAGES = ("mujoco", "gymnasium", "numpy", "numba")
+DRAW = "from hrc_env.scene import gl; ok, said = gl.gl_status(); print(said); ok or exit(1)"
 """Draws a pixel; says with what, or what to do."""
 CGROUP = Path("/sys/fs/cgroup")
 """Where a container's limits are."""
@@ -64,7 +64,10 @@ def _python() -> Finding:
 
 
 def _packages() -> Finding:
-    return True, ", ".join(f"{name} {version(name)}" for name in PACKAGES)
+    from hrc_env import __version__
+
+    others = [f"{name} {version(name)}" for name in PACKAGES]
+    return True, ", ".join([f"hrc_env {__version__}", *others])
 
 
 def _torch() -> Finding:

@@ -168,7 +168,8 @@ def _renderer() -> str:
     try:
         from OpenGL.GL import GL_RENDERER, glGetString
 
-        return glGetString(GL_RENDERER).decode()
+        name: Any = glGetString(GL_RENDERER)
+        return name.decode()
     except Exception as error:  # a name to print, no reason to fail
         return f"which does not tell its name: {error}"
 

@@ -7,7 +7,8 @@ import pytest
 
 from hrc_env.cli import check
 
-NAMES = "python packages torch machine OpenGL triton kernels weights OpenVINO environment".split()
+NAMES = ["python", "packages", "torch", "machine", "OpenGL", "triton"]
+NAMES += ["kernels", "weights", "OpenVINO", "environment"]
 
 
 @pytest.fixture
