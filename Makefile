@@ -1,35 +1,53 @@
-# make demo   a film of the robot working beside a worker it sees through four cameras
-# make test   the proof
-# make check  style, types, floors
+# make demo         a film of the robot working beside a worker it sees through four cameras
+# make test         the proof
+# make test-stock   the same in a fresh environment with the packages that everybody gets
+# make train-quick  a policy
+# make check        style, types, floors
 PYTHON ?= python3
-VENV := .venv
+VENV ?= .venv
+STOCK := out/stock
 RUN := $(VENV)/bin/python
-READY := $(VENV)/.ready
+# What is installed: the environment; with its learner; with what develops it. Each has the former.
+CORE := $(VENV)/.core
+TRAIN := $(VENV)/.train
+DEV := $(VENV)/.dev
 
-.PHONY: demo test check bench train-quick clean
+.PHONY: demo test test-stock check bench train-quick clean
 .DEFAULT_GOAL := demo
 
-$(READY): pyproject.toml constraints.txt
+$(CORE): NEEDED := .
+$(TRAIN): NEEDED := .[train]
+$(TRAIN): HAS := $(CORE)
+$(DEV): NEEDED := .[dev]
+$(DEV): HAS := $(CORE) $(TRAIN)
+$(CORE) $(TRAIN) $(DEV): pyproject.toml constraints.txt
 	@test -x $(RUN) || $(PYTHON) -m venv $(VENV)
-	@echo "Installing hrc_env and what it needs (a minute or two) ..."
-	@$(RUN) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[dev]"
+	@echo "Installing hrc_env and what it needs into $(VENV) (a minute or two) ..."
+	@$(RUN) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e "$(NEEDED)"
 	@$(RUN) -m hrc_env setup
-	@touch $(READY)
+	@touch $(HAS) $@
 
-demo: $(READY)
+demo: $(CORE)
 	$(RUN) -m hrc_env demo
 
-test: $(READY)
+test: $(DEV)
 	$(RUN) -m hrc_env setup
 	$(RUN) -m pytest -n 2
 
-check: $(READY)
+# No settings of pip, nothing cached: on Linux torch is its CUDA build, with triton, 6 GB.
+test-stock:
+	rm -rf $(STOCK)
+	mkdir -p $(STOCK)/home
+	env -i HOME="$(CURDIR)/$(STOCK)/home" PATH="$$PATH" MAKEFLAGS="$(MAKEFLAGS)" \
+		$(MAKE) test VENV="$(STOCK)/venv" PYTHON="$(PYTHON)"
+
+check: $(DEV)
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/lint-imports
 	$(VENV)/bin/pyright
 
-bench: $(READY)
+bench: $(DEV)
 	$(RUN) -m hrc_env bench speed
 	$(RUN) -m hrc_env bench perception
 	$(RUN) benchmarks/pixels.py
@@ -37,7 +55,7 @@ bench: $(READY)
 	$(RUN) -m benchmarks.sim_dt
 	$(RUN) benchmarks/prediction.py
 
-train-quick: $(READY)
+train-quick: $(TRAIN)
 	$(RUN) train.py
 
 clean:

@@ -1,6 +1,5 @@
 """What an agent is, what it is told about its environment, and the list of agents."""
 
-import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.control import ControlConfig
-from hrc_env.errors import ConfigError, HRCError, unknown
+from hrc_env.errors import ConfigError, unknown
 from hrc_env.geometry.chains import SerialChain
 from hrc_env.observations import ObservationLayout
 from hrc_env.simulation import Simulation
@@ -52,19 +51,15 @@ AGENTS = ("random", "scripted", "scripted_slowed")
 """Names of the agents that need no checkpoint."""
 
 
-LEARNERS = ("torch", "stable_baselines3", "tensorboard")
-"""What the extra `train` brings."""
-
-
 def make_agent(name: str, here: Situation, seed: int = 0) -> Agent:
     """An agent by name ("random", "scripted", "scripted_slowed") or from a checkpoint file.
 
     Raises:
         ConfigError: neither an agent nor a file.
         CheckpointError: a file that does not fit the environment.
-        HRCError: a checkpoint where nothing that could load it is installed.
+        MissingExtraError: a checkpoint, where the learner that reads it is not installed.
     """
-    from . import random, scripted
+    from . import random, scripted  # here: they import this file
 
     makers: dict[str, Callable[[], Any]] = {
         "random": lambda: random.RandomAgent(here, seed),
@@ -74,21 +69,10 @@ def make_agent(name: str, here: Situation, seed: int = 0) -> Agent:
     if name in makers:
         return makers[name]()
     if Path(name).suffix == ".zip" or Path(name).exists():
-        require_training()
-        from . import ppo  # here: torch takes seconds to import
+        from . import ppo  # here: torch takes seconds to import, and need not be there
 
         return ppo.load(Path(name), here)
     error = unknown("agent", name, makers)
     raise ConfigError(
         f"{error} Or the path of a checkpoint that python -m hrc_env train wrote (.zip)."
     )
-
-
-def require_training() -> None:
-    """Raise `HRCError` unless what learns, and loads what has learnt, is installed."""
-    missing = [name for name in LEARNERS if importlib.util.find_spec(name) is None]
-    if missing:
-        raise HRCError(
-            f'Training needs the extra: pip install "hrc_env[train]" ({", ".join(missing)} is '
-            "not installed)."
-        )

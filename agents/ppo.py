@@ -14,15 +14,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from stable_baselines3 import PPO
-from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 from hrc_env import __version__
-from hrc_env.errors import CheckpointError
+from hrc_env.errors import CheckpointError, learner
 
 from .base import Situation
+
+with learner():
+    import torch
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 TRAIN = "python -m hrc_env train"
 

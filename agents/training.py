@@ -8,13 +8,12 @@ from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any, get_type_hints
 
-import torch
 from rich.console import Console
 
 from hrc_env.cli.progress import Meter
 from hrc_env.cli.train import Train
 from hrc_env.config import resolve
-from hrc_env.errors import CheckpointError, RenderingError
+from hrc_env.errors import CheckpointError, RenderingError, learner
 from hrc_env.mapping import restored
 from hrc_env.provenance import provenance
 from hrc_env.results import write_whole
@@ -26,6 +25,9 @@ from .curriculum import ProximityCurriculum, Ramp
 from .evaluate import Score, evaluate
 from .interrupt import Interrupt
 from .monitor import Curve, TrainingMonitor, plot_curve
+
+with learner():
+    import torch
 
 ONLY_OF_A_RUN = ("out", "timesteps", "threads", "backend", "episodes", "film", "resume")
 """Arguments that a resumed run does not take from the run that it goes on with."""

@@ -3,8 +3,9 @@
 A worker who is not seen is data (growing covariance, a flag), never one of these.
 """
 
+import contextlib
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 
 class HRCError(Exception):
@@ -29,6 +30,27 @@ class RenderingError(HRCError, RuntimeError):
 
 class CheckpointError(HRCError, RuntimeError):
     """A saved agent that does not fit the environment it is loaded for."""
+
+
+class MissingExtraError(HRCError, ImportError):
+    """Something is wanted whose libraries are an extra that is not installed."""
+
+
+@contextlib.contextmanager
+def learner() -> Iterator[None]:
+    """Round imports of the learner's libraries, which the extra `train` brings.
+
+    Raises:
+        MissingExtraError: one is not installed; the message has the line to type.
+    """
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        raise MissingExtraError(
+            f"Learning and trained policies need {error.name}, which is not installed. Type: "
+            'pip install "hrc_env[train]"  (in a checkout: make train-quick, or '
+            'pip install -c constraints.txt -e ".[train]")'
+        ) from error
 
 
 def unknown(what: str, got: object, valid: Iterable[str]) -> ConfigError:

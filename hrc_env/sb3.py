@@ -11,13 +11,15 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
-from stable_baselines3.common.vec_env import VecEnv
 
-from hrc_env.errors import ConfigError
+from hrc_env.errors import ConfigError, learner
 from hrc_env.rewards import RewardConfig
 from hrc_env.simulation import Simulation
 from hrc_env.typing import Bools, Floats, Ints
 from hrc_env.vector_env import HRCVectorEnv
+
+with learner():
+    from stable_baselines3.common.vec_env import VecEnv
 
 EPISODE_SUMS = ("cost", "cost_proximity", "cost_contact")
 """Infos whose sums over an episode are kept."""

@@ -7,7 +7,7 @@ import gymnasium
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, VectorEnv
 
 from hrc_env.errors import ConfigError
-from hrc_env.kernels.ahead import n_cores
+from hrc_env.machine import n_cores
 from hrc_env.vector_env import HRCVectorEnv
 
 PROCESSES_PER_CORE = 2

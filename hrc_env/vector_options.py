@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 
 from hrc_env.errors import ConfigError, check_shape, unknown
-from hrc_env.kernels.ahead import n_cores
+from hrc_env.machine import n_cores
 from hrc_env.typing import Bools, Ints
 
 MAX_ENVS = 16_384

@@ -17,7 +17,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from agents import ppo
-from agents.base import make_agent, require_training, situation
+from agents.base import make_agent, situation
 from agents.curriculum import Ramp
 from agents.evaluate import evaluate, judged, one_by_one
 from agents.interrupt import Interrupt
@@ -26,7 +26,7 @@ from agents.training import as_before
 from hrc_env.__main__ import main
 from hrc_env.cli.train import Train
 from hrc_env.env import HRCReachEnv
-from hrc_env.errors import CheckpointError, ConfigError, HRCError
+from hrc_env.errors import CheckpointError, ConfigError
 
 ROOT = Path(__file__).resolve().parent.parent
 TINY = ["--perception", "truth", "--num-envs", "4", "--episodes", "2", "--no-film"]
@@ -239,18 +239,6 @@ def test_the_learning_curve_is_drawn_over_environment_steps(run, tmp_path, monke
     (figure,) = drawn
     assert all(list(axis.lines[0].get_xdata()) == steps for axis in figure.axes)
     assert figure.axes[-1].get_xlabel() == "environment steps"
-
-
-def test_without_the_extra_training_says_what_to_install(monkeypatch, tmp_path, run, capsys):
-    monkeypatch.setitem(sys.modules, "stable_baselines3", None)
-    with pytest.raises(HRCError, match=r'pip install "hrc_env\[train\]" \(stable_baselines3'):
-        require_training()
-    assert main(["train", *TINY, "--out", str(tmp_path / "run")]) == 2
-    assert 'pip install "hrc_env[train]"' in " ".join(capsys.readouterr().err.split())
-    with pytest.raises(HRCError, match="Training needs the extra"):
-        make_agent(str(run / "policy.zip"), here())
-    assert make_agent("scripted", here()) is not None
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_one_by_one_or_all_at_once_episodes_are_the_same():

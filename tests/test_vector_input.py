@@ -7,7 +7,6 @@ import pytest
 import hrc_env  # noqa: F401  registers the ids
 from hrc_env import vector_factory, vector_options
 from hrc_env.errors import ConfigError, HRCError
-from hrc_env.kernels import ahead
 from hrc_env.vector_env import HRCVectorEnv
 
 
@@ -159,7 +158,3 @@ def test_a_failure_says_how_its_environments_are_counted(monkeypatch):
     with pytest.raises(HRCError, match="environment 0") as failure:
         env.step(np.zeros((4, 6)))
     assert failure.value.__notes__ == ["Environments are counted from number 2 of the vector here."]
-
-
-def test_at_least_one_core_is_counted():
-    assert ahead.n_cores() >= 1

@@ -1,6 +1,5 @@
 """python -m hrc_env bench: how good estimators and eyes, how fast all, how human workers are."""
 
-import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -14,6 +13,7 @@ from rich.markdown import Markdown
 from hrc_env.cli.checks import at_least, writable_folder
 from hrc_env.cli.progress import progress_bar
 from hrc_env.errors import ConfigError
+from hrc_env.machine import n_cores
 
 Say = Callable[[float, str], None]
 """Told by how much the share that is done grew, and what is being done."""
@@ -75,7 +75,7 @@ class TrackingBench:
             config = replace(config, n_seeds=self.seeds)
         out = self.out or Path("out/bench_tracking")
         return show(
-            partial(run, config, processes=self.processes or os.cpu_count() or 1),
+            partial(run, config, processes=self.processes or n_cores()),
             out,
             "tracking.md",
             "results.json, tracking.md, two plots (PNG)",

@@ -1,23 +1,33 @@
-"""python -m hrc_env check: is this machine ready? Each line is ok or says what to do."""
+"""python -m hrc_env check: is this machine ready? Each line is ok or says what to do.
 
-import os
+Whatever is wrong must end up in its line. So what it asks about is imported inside the check,
+and what may take a process with it (drivers, libraries that clash) is tried in one of its own.
+"""
+
+import importlib.util
+import signal
+import subprocess
 import sys
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import version
 
 from rich.console import Console
-
-from hrc_env.errors import HRCError
-from hrc_env.perception import vino, weights
-from hrc_env.scene.gl import gl_status
+from rich.markup import escape
 
 Finding = tuple[bool, str]
+
+PACKAGES = ("mujoco", "gymnasium", "numpy", "numba")
+DRAW = "from hrc_env.scene import gl; ok, said = gl.gl_status(); print(said); ok or exit(1)"
+"""Draws a pixel; says with what, or what to do."""
+LITTLE_GB = 2.0
+"""Level `pixels` and a film do not fit into much less [GB]."""
 
 
 @dataclass(frozen=True)
 class Check:
-    """Versions, OpenGL, weights, cores: each line ok, or what to do."""
+    """Versions, machine, OpenGL, kernels, weights, one step: each line ok, or what to do."""
 
     def run(self) -> int:
         """Print the findings; 0 if all are ok."""
@@ -25,8 +35,11 @@ class Check:
         checks: dict[str, Callable[[], Finding]] = {
             "python": _python,
             "packages": _packages,
-            "cores": _cores,
-            "OpenGL": gl_status,
+            "torch": _torch,
+            "machine": _machine,
+            "OpenGL": _opengl,
+            "triton": _triton,
+            "kernels": _kernels,
             "weights": _weights,
             "OpenVINO": _openvino,
             "environment": _environment,
@@ -37,7 +50,8 @@ class Check:
             except Exception as error:  # whatever is wrong with this machine, say it
                 ok, message = False, f"{type(error).__name__}: {error}"
             fine &= ok
-            console.print(f"[{'green]ok  ' if ok else 'red]TODO'}[/] {name:12s} {message}")
+            mark = "[green]ok  [/]" if ok else "[red]TODO[/]"
+            console.print(f"{mark} {name:12s} {escape(message)}", soft_wrap=True)
         return 0 if fine else 1
 
 
@@ -46,16 +60,82 @@ def _python() -> Finding:
 
 
 def _packages() -> Finding:
-    names = ("mujoco", "gymnasium", "numpy", "numba", "torch", "stable-baselines3")
-    return True, ", ".join(f"{name} {version(name)}" for name in names)
+    from hrc_env import __version__
+
+    others = [f"{name} {version(name)}" for name in PACKAGES]
+    return True, ", ".join([f"hrc_env {__version__}", *others])
 
 
-def _cores() -> Finding:
-    cores = os.cpu_count() or 1
-    return True, f"{cores}" + ("" if cores > 1 else ": pixels will be slow on a single core")
+def _torch() -> Finding:
+    from hrc_env.errors import MissingExtraError, learner
+
+    try:
+        with learner():
+            import stable_baselines3
+            import torch
+    except MissingExtraError as error:
+        return True, f"not installed, the environment does without. {error}"
+    gpus = {"CUDA": torch.version.cuda, "ROCm": torch.version.hip}
+    builds = [f"{name} {number} build" for name, number in gpus.items() if number] or ["CPU build"]
+    return True, (
+        f"{torch.__version__} ({builds[0]}), stable-baselines3 {stable_baselines3.__version__}"
+    )
+
+
+def _machine() -> Finding:
+    from hrc_env.machine import usable_cores, usable_memory_gb
+
+    cores, memory_gb = usable_cores(), usable_memory_gb()
+    said = f"{cores:g} cores" if cores > 1 else f"{cores:g} core: pixels will be slow"
+    said += f", {memory_gb:.1f} GB of memory"
+    return True, said + (": too little for pixels and films" if memory_gb < LITTLE_GB else "")
+
+
+def _opengl() -> Finding:
+    return _in_a_process(DRAW)
+
+
+def _triton() -> Finding:
+    if importlib.util.find_spec("triton") is None:
+        return True, "not installed (torch's CPU build has none): nothing that clashes with Mesa"
+    if not _in_a_process(DRAW)[0]:
+        return True, f"{version('triton')}; OpenGL does not draw, so that they cannot clash"
+    ok, said = _in_a_process(f"{DRAW}; import triton")
+    if ok:
+        return True, f"{version('triton')} can be imported after OpenGL has drawn"
+    return False, f"{version('triton')} after OpenGL has drawn: {said}"
+
+
+def _in_a_process(code: str) -> Finding:
+    """Whether Python code ends well, and the last line that it prints."""
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=120
+    )
+    if done.returncode < 0:
+        return False, f"the process was ended by {signal.Signals(-done.returncode).name}"
+    lines = (done.stdout if done.stdout.strip() else done.stderr).strip().splitlines()
+    return done.returncode == 0, lines[-1] if lines else f"exit status {done.returncode}"
+
+
+def _kernels() -> Finding:
+    from hrc_env.kernels import ahead
+    from hrc_env.kernels.cache import folder
+    from hrc_env.machine import n_cores
+
+    todo = ahead.missing()
+    if not todo:
+        return True, f"compiled, in {folder()}"
+    wait_s = sum(each.seconds for each in todo) / n_cores()
+    return True, (
+        f"{len(todo)} are not compiled yet: whoever first needs them waits, about {wait_s:.0f} s "
+        "for all; or do it now: python -m hrc_env setup"
+    )
 
 
 def _weights() -> Finding:
+    from hrc_env.errors import HRCError
+    from hrc_env.perception import weights
+
     try:
         for name in weights.ALWAYS:
             weights.find_weights(name)
@@ -65,6 +145,8 @@ def _weights() -> Finding:
 
 
 def _openvino() -> Finding:
+    from hrc_env.perception import vino
+
     if not vino.installed():
         return True, f"not installed; it makes pixels faster: {vino.INSTALL}"
     return True, f"computes in {vino.precision()} where eyes.runtime is openvino or auto"
@@ -73,8 +155,10 @@ def _openvino() -> Finding:
 def _environment() -> Finding:
     import gymnasium
 
-    env = gymnasium.make("HRCReach-v0", perception="keypoints")
+    started_s = time.monotonic()
+    env = gymnasium.make("hrc_env:HRCReach-v0", perception="keypoints")
     env.reset(seed=0)
     env.step(env.action_space.sample() * 0)
     env.close()
-    return True, "HRCReach-v0 steps"
+    taken_s = time.monotonic() - started_s
+    return True, f"HRCReach-v0 at level keypoints: made, reset and stepped in {taken_s:.1f} s"

@@ -49,9 +49,9 @@ class Train(EnvironmentArguments):
     def run(self) -> int:
         """Check, then train."""
         self.check()
-        agents("base").require_training()
+        training = agents("training")
         writable_folder(self.resume or self.out, "--out" if self.resume is None else "--resume")
-        return agents("training").run(self)
+        return training.run(self)
 
     def check(self) -> None:
         """Raise `ConfigError` for a number or a name that cannot be learnt with."""

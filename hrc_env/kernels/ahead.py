@@ -3,7 +3,6 @@
 import contextlib
 import json
 import logging
-import os
 import subprocess
 import sys
 import time
@@ -15,6 +14,7 @@ from typing import IO, cast
 
 from hrc_env.kernels.cache import folder
 from hrc_env.kernels.signatures import Signature, recorded
+from hrc_env.machine import n_cores
 
 log = logging.getLogger("hrc_env.kernels")
 Say = Callable[[float, str], None]
@@ -22,13 +22,6 @@ Say = Callable[[float, str], None]
 AT_ONCE_S = 3.0
 """What takes less is compiled when it is called [s]: a process takes as long to start."""
 LOG_EVERY_S = 10.0
-
-
-def n_cores() -> int:
-    """Cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def missing(level: str | None = None) -> list[Signature]:

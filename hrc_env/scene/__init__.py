@@ -2,4 +2,4 @@
 
 from hrc_env.scene import gl
 
-gl.choose_backend()  # before mujoco's first import, which reads MUJOCO_GL
+gl.import_mujoco()  # chooses its OpenGL, which it reads at its first import

@@ -211,9 +211,6 @@ class Canvas:
         if self._closed:
             raise RenderingError("This renderer has been closed: make a new one.")
         if self._context is None:
-            self._gl = gl.new_context(self.width_px, self.height_px)
-            self._context = mujoco.MjrContext(
-                self._model, mujoco.mjtFontScale.mjFONTSCALE_100.value
-            )
+            self._gl, self._context = gl.new_context(self.width_px, self.height_px, self._model)
             mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
             self._context.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR

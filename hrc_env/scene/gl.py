@@ -1,19 +1,51 @@
-"""Which OpenGL this machine has: chosen before mujoco's first import, explained when missing.
+"""The one door to OpenGL: which there is, contexts of it, and what to do where there is none.
 
-mujoco reads MUJOCO_GL when it is imported. Unless the user has set it, a machine without a
-display gets EGL when its library is there (with or without a GPU), otherwise OSMesa.
+mujoco reads MUJOCO_GL when it is imported. Unless the user has set it, Linux draws through EGL
+where its library is (with or without a GPU, a display is not needed), otherwise through OSMesa,
+otherwise in a hidden window.
 """
 
+import contextlib
 import ctypes
 import ctypes.util
+import functools
+import importlib.util
 import os
 import sys
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from hrc_env.errors import RenderingError
+import numpy as np
+
+from hrc_env.errors import RenderingError, unknown
+
+if TYPE_CHECKING:
+    import mujoco
 
 APT_LINE = "sudo apt-get install -y libegl1 libgl1 libglx-mesa0 libegl-mesa0"
 """What gives a bare Debian or Ubuntu a software OpenGL."""
+LIBRARIES = {"egl": "EGL", "osmesa": "OSMesa"}
+"""Shared library of a backend that needs no window system, best first."""
+WINDOWS = ("", "glfw", "glx", "enable", "enabled", "on", "true", "1")
+"""Values of MUJOCO_GL with which mujoco on Linux draws in a hidden window."""
+OFF = ("disable", "disabled", "off", "false", "0")
+"""Values of MUJOCO_GL that switch rendering off."""
+
+
+def import_mujoco() -> None:
+    """Import mujoco, also where MUJOCO_GL names what it cannot load: only pictures need that."""
+    choose_backend()
+    try:
+        importlib.import_module("mujoco")
+    except Exception:  # what PyOpenGL says of a missing library is any of several errors
+        chosen = os.environ.get("MUJOCO_GL")
+        os.environ["MUJOCO_GL"] = OFF[0]
+        try:
+            importlib.import_module("mujoco")
+        finally:
+            del os.environ["MUJOCO_GL"]
+            if chosen is not None:
+                os.environ["MUJOCO_GL"] = chosen
 
 
 def choose_backend() -> str:
@@ -21,9 +53,7 @@ def choose_backend() -> str:
     chosen = os.environ.get("MUJOCO_GL", "").lower().strip()
     if chosen or not sys.platform.startswith("linux"):
         return chosen
-    if os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"):
-        return "glfw"
-    for backend, library in (("egl", "EGL"), ("osmesa", "OSMesa")):
+    for backend, library in LIBRARIES.items():
         if _has_library(library):
             os.environ["MUJOCO_GL"] = backend
             return backend
@@ -40,46 +70,108 @@ def draw_on_one_thread() -> None:
     os.environ.setdefault("LP_NUM_THREADS", "0")
 
 
+@functools.cache
+def load_triton_first() -> None:
+    """Load the library of triton, if it is installed, before Mesa's first context or window.
+
+    Mesa opens its drivers, and libLLVM with them, for all to see; triton's library, loaded after
+    that (`torch.optim` does it), takes that LLVM for its own and crashes. The library alone costs
+    0.06 s and 70 MB, importing triton 0.25 s.
+    """
+    with contextlib.suppress(OSError, ValueError):  # no triton that anybody could load later
+        triton = importlib.util.find_spec("triton")
+        late = "libLLVM" in Path("/proc/self/maps").read_text()  # somebody has drawn already
+        mode = ctypes.DEFAULT_MODE | (os.RTLD_DEEPBIND if late else 0)
+        for folder in (triton and triton.submodule_search_locations) or ():
+            for library in (Path(folder) / "_C").glob("libtriton*.so"):
+                ctypes.CDLL(str(library), mode)
+
+
+def require_display() -> None:
+    """Raise `RenderingError` unless a window system answers."""
+    import glfw
+
+    if not glfw.init():
+        raise RenderingError(
+            f"No window system answers (DISPLAY={os.environ.get('DISPLAY', '')!r}, "
+            f"WAYLAND_DISPLAY={os.environ.get('WAYLAND_DISPLAY', '')!r})"
+        )
+
+
 def gl_status() -> tuple[bool, str]:
-    """Whether pictures can be made here, and a sentence that says with what or what to do."""
-    backend = choose_backend()
+    """Whether a pixel can be drawn here, and a sentence that says with what or what to do."""
+    import mujoco
+
     try:
-        context = new_context(16, 16)
+        context, drawing = new_context(16, 16, mujoco.MjModel.from_xml_string("<mujoco/>"))
+        rectangle, seen = mujoco.MjrRect(0, 0, 16, 16), np.zeros((16, 16, 3), np.uint8)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, drawing)
+        mujoco.mjr_rectangle(rectangle, 1.0, 0.0, 1.0, 1.0)
+        mujoco.mjr_readPixels(seen, None, rectangle, drawing)
     except RenderingError as error:
         return False, str(error)
+    renderer = _renderer()
+    drawing.free()
     context.free()
-    return True, f"OpenGL works (MUJOCO_GL={backend or 'the default'})."
+    backend = os.environ.get("MUJOCO_GL") or "the default"
+    if tuple(seen[8, 8]) != (255, 0, 255):
+        return False, f"OpenGL (MUJOCO_GL={backend}, {renderer}) does not draw what it is told."
+    return True, f"OpenGL works (MUJOCO_GL={backend}, {renderer})."
 
 
-def new_context(width_px: int, height_px: int) -> Any:
-    """A GL context of the chosen backend, current on this thread.
+def new_context(
+    width_px: int, height_px: int, model: "mujoco.MjModel"
+) -> tuple[Any, "mujoco.MjrContext"]:
+    """A GL context of the chosen backend, current on this thread, with the model's looks in it.
 
     Raises:
         RenderingError: no context can be made; the message says how to get OpenGL.
     """
+    import mujoco
+
     backend = choose_backend()
-    if backend in ("disable", "disabled", "off", "false", "0"):
+    if backend in OFF:
         raise RenderingError(f"Rendering is switched off by MUJOCO_GL={backend!r}: unset it.")
+    load_triton_first()
     try:
         context = _context_class(backend)(width_px, height_px)
         context.make_current()
+        return context, mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
     except Exception as error:
         raise RenderingError(
-            f"No OpenGL context could be made (MUJOCO_GL={backend or 'not set'!r}): {error}. "
-            f"On Debian or Ubuntu: {APT_LINE}"
+            f"No OpenGL context could be made (MUJOCO_GL={backend or 'not set'!r}): "
+            f"{str(error).strip().rstrip('.')}. EGL, which needs no display, is taken where "
+            f"MUJOCO_GL is not set; on Debian or Ubuntu it comes with: {APT_LINE}"
         ) from error
-    return context
 
 
 def _context_class(backend: str) -> Any:
     """The backend's class itself: mujoco.GLContext is fixed at mujoco's first import."""
-    if backend == "egl":
-        from mujoco.egl import GLContext
-    elif backend == "osmesa":
-        from mujoco.osmesa import GLContext
-    else:
+    if not sys.platform.startswith("linux"):
         from mujoco import GLContext
+    elif backend in WINDOWS:
+        require_display()
+        from mujoco.glfw import GLContext
+    elif backend not in LIBRARIES:
+        raise unknown("MUJOCO_GL", backend, [*LIBRARIES, "glfw"])
+    elif not _has_library(LIBRARIES[backend]):
+        raise OSError(f"there is no library lib{LIBRARIES[backend]}")
+    elif backend == "egl":
+        from mujoco.egl import GLContext
+    else:
+        from mujoco.osmesa import GLContext
     return GLContext
+
+
+def _renderer() -> str:
+    """What OpenGL calls itself in the context that is current."""
+    try:
+        from OpenGL.GL import GL_RENDERER, glGetString
+
+        name: Any = glGetString(GL_RENDERER)
+        return name.decode()
+    except Exception as error:  # a name to print, no reason to fail
+        return f"which does not tell its name: {error}"
 
 
 def _has_library(name: str) -> bool:

@@ -7,6 +7,7 @@ import mujoco
 
 from hrc_env.errors import RenderingError
 from hrc_env.records import WorkerMotion
+from hrc_env.scene import gl
 from hrc_env.scene.build import Scene, drawing_model, drawn_looks, drawn_props
 from hrc_env.scene.props import pose_props
 from hrc_env.scene.wardrobe import wear
@@ -35,6 +36,8 @@ class Viewer:
         self._data = mujoco.MjData(self._model)
         self._props, self._looks = drawn_props(scene), drawn_looks(scene)
         try:
+            gl.require_display()  # without one launch_passive would wait for ever
+            gl.load_triton_first()
             from mujoco import viewer
 
             self._window: Any = viewer.launch_passive(self._model, self._data)

@@ -19,7 +19,7 @@ from hrc_env.experiments.beyond.trial.timing import update_us
 from hrc_env.experiments.beyond.trial.walks import walks_of
 from hrc_env.experiments.study.folder import claim
 from hrc_env.experiments.study.shelf import Say, Shelf, Tick, emulator_mark, fingerprint_of
-from hrc_env.kernels.ahead import n_cores
+from hrc_env.machine import n_cores
 from hrc_env.results import Metric, write_results
 
 NAME = "beyond"

@@ -29,7 +29,7 @@ from hrc_env.experiments.impact.trial.policies import (
 )
 from hrc_env.experiments.study.folder import claim
 from hrc_env.experiments.study.shelf import Say, Shelf, emulator_mark, fingerprint_of
-from hrc_env.kernels.ahead import n_cores
+from hrc_env.machine import n_cores
 from hrc_env.results import Metric, write_results
 
 NAME = "impact"

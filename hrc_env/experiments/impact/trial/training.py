@@ -1,6 +1,6 @@
 """The learnt policy of the experiment: PPO, always from the same seed, kept in the folder.
 
-Imported only where somebody learns: the learner's libraries take seconds.
+The learner's libraries, which take seconds, are imported where somebody learns.
 """
 
 import hashlib
@@ -8,13 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import torch
-from stable_baselines3.common.callbacks import BaseCallback
-
 from hrc_env.agents_door import agents
 from hrc_env.experiments.impact.trial.episodes import PEOPLE
 from hrc_env.experiments.study.shelf import Shelf, Tick
-from hrc_env.sb3 import HRCVecEnv
 
 SEED = 0
 """Of the learner and of the environments that it learns in."""
@@ -35,18 +31,6 @@ class Learning:
     path: Path
 
 
-class _Progress(BaseCallback):
-    """Tells how far the learner is."""
-
-    def __init__(self, n_steps: int, tick: Tick) -> None:
-        super().__init__()
-        self.n_steps, self.tick = n_steps, tick
-
-    def _on_step(self) -> bool:
-        self.tick(N_ENVS / self.n_steps)
-        return True
-
-
 def trained(shelf: Shelf, learning: Learning) -> Path:
     """The checkpoint: the one that is there, or a new one if it is not what the part says."""
     path = learning.path
@@ -60,6 +44,15 @@ def trained(shelf: Shelf, learning: Learning) -> Path:
 def _train(learning: Learning, tick: Tick) -> dict[str, Any]:
     """Learn on the camera emulator with the default estimator; write the checkpoint."""
     ppo, curriculum = agents("ppo"), agents("curriculum")
+    import torch
+    from stable_baselines3.common.callbacks import ConvertCallback
+
+    from hrc_env.sb3 import HRCVecEnv
+
+    def advance(*_: Any) -> bool:
+        tick(N_ENVS / learning.n_steps)
+        return True
+
     threads = torch.get_num_threads()
     torch.set_num_threads(1)  # more are slower in networks as small as these
     env = HRCVecEnv(
@@ -69,10 +62,8 @@ def _train(learning: Learning, tick: Tick) -> dict[str, Any]:
     try:
         learner = ppo.make_learner(env, ppo.PPOSettings(), SEED)
         ramp = curriculum.Ramp(round(RAMP_SHARE * learning.n_steps))
-        progress = _Progress(learning.n_steps, tick)
-        learner.learn(
-            learning.n_steps, callback=[curriculum.ProximityCurriculum(ramp, env), progress]
-        )
+        care = curriculum.ProximityCurriculum(ramp, env)
+        learner.learn(learning.n_steps, callback=[care, ConvertCallback(advance)])
         ppo.save(learner, learning.path, {"people": PEOPLE, "seed": SEED})
     finally:
         env.close()

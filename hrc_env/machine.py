@@ -1,0 +1,36 @@
+"""What of this machine the process may use."""
+
+import math
+import os
+from pathlib import Path
+
+CGROUP = Path("/sys/fs/cgroup")
+"""Where a container's limits are."""
+
+
+def n_cores() -> int:
+    """How many threads or processes can compute at once."""
+    return math.ceil(usable_cores())
+
+
+def usable_cores() -> float:
+    """Cores that this process may use: by affinity, and by its container's share."""
+    cores = float(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 0)
+    cores = cores or float(os.cpu_count() or 1)
+    quota, *period = _limit("cpu.max").split() or ["max"]
+    return min(cores, int(quota) / int(period[0])) if quota.isdigit() and period else cores
+
+
+def usable_memory_gb() -> float:
+    """Memory that this process may use [GB]: the machine's, or its container's share."""
+    machine_bytes = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    shares = [_limit("memory.max"), _limit("memory/memory.limit_in_bytes")]
+    return min([machine_bytes, *(int(share) for share in shares if share.isdigit())]) / 1e9
+
+
+def _limit(name: str) -> str:
+    """What a file of the container's limits says; "" where there is none."""
+    try:
+        return (CGROUP / name).read_text().strip()
+    except OSError:
+        return ""

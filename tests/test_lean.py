@@ -1,0 +1,74 @@
+"""The environment without the learner's libraries: nothing imports them before somebody learns."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+LINE = 'pip install "hrc_env[train]"'
+WITHOUT = """
+import sys
+from importlib.machinery import PathFinder
+
+class Without(PathFinder):
+    @classmethod
+    def find_spec(cls, name, path=None, target=None):
+        gone = name.split(".")[0] in ("torch", "stable_baselines3", "tensorboard", "triton")
+        return None if gone else super().find_spec(name, path, target)
+
+sys.meta_path = [Without if finder is PathFinder else finder for finder in sys.meta_path]
+"""
+"""From here on it is as if they were not installed."""
+
+
+def without_learner(code: str, *words: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", WITHOUT + code, *words],
+        cwd=ROOT, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+
+def test_no_module_imports_a_learner_but_the_door_to_one():
+    done = without_learner("""
+import importlib, pkgutil, hrc_env, agents.base, agents.random, agents.scripted
+refused = []
+for module in pkgutil.walk_packages(hrc_env.__path__, "hrc_env.", onerror=refused.append):
+    try:
+        importlib.import_module(module.name)
+    except ModuleNotFoundError:  # of another extra
+        pass
+    except ImportError as error:
+        refused.append(f"{module.name}: {error}")
+print(len(refused), *refused)
+""")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("1 hrc_env.sb3: "), done.stdout
+    assert LINE in done.stdout
+
+
+def test_the_scripted_film_needs_no_learner(tmp_path: Path):
+    film = tmp_path / "film.mp4"
+    done = without_learner(
+        "from hrc_env.__main__ import main; sys.exit(main())",
+        "demo", "--perception", "keypoints", "--seconds", "0.2", "--out", str(film),
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert film.exists()
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import runpy; sys.argv[0] = 'train.py'; runpy.run_path('train.py', run_name='__main__')",
+        "from hrc_env.__main__ import main; sys.argv[1:] = "
+        "['play', '--perception', 'truth', '--agent', 'policy.zip']; sys.exit(main())",
+    ],
+    ids=["train.py", "a checkpoint"],
+)
+def test_who_wants_to_learn_is_told_the_line_to_type(code):
+    done = without_learner(code)
+    assert done.returncode != 0
+    assert LINE in done.stderr
+    assert "Traceback" not in done.stderr
