@@ -129,7 +129,9 @@ def environment_arguments(arguments: Arguments) -> dict[str, Any]:
 def train(arguments: Arguments, folder: Path, kwargs: dict[str, Any]) -> tuple[Curve, float]:
     """Learn; returns the curve and the seconds it took. Progress survives a kill."""
     settings = ppo.PPOSettings()
-    env = HRCVecEnv(arguments.num_envs, seed=arguments.seed, backend=arguments.backend, **kwargs)
+    env = HRCVecEnv(
+        arguments.num_envs, stagger=True, seed=arguments.seed, backend=arguments.backend, **kwargs
+    )
     curve = Curve()
     if arguments.resume is not None:
         learner = ppo.resume(folder / "policy.zip", env, folder / "tensorboard")
