@@ -124,14 +124,13 @@ def with_cameras(
     Raises:
         ConfigError: no rig of that name, no such file, or a mixture of names and cameras.
     """
-    if isinstance(cameras, np.ndarray):
-        cameras = cameras.tolist()
-    if isinstance(cameras, str | Path):
-        rig = _rig(cameras)
-    elif isinstance(cameras, Sequence) and any(not isinstance(c, _CHOICE) for c in cameras):
-        rig = tuple(_camera(camera, k) for k, camera in enumerate(cameras))
+    given: Any = cameras.tolist() if isinstance(cameras, np.ndarray) else cameras
+    if isinstance(given, str | Path):
+        rig = _rig(given)
+    elif isinstance(given, Sequence) and any(not isinstance(c, _CHOICE) for c in given):
+        rig = tuple(_camera(camera, k) for k, camera in enumerate(given))
     else:
-        return config, cameras
+        return config, given
     return replace(config, scene=replace(config.scene, cameras=rig)), None
 
 

@@ -57,7 +57,9 @@ class PlainSpec:
         self._spec = spec and replace(spec, kwargs=plain(spec.kwargs))
 
 
-class HRCReachEnv(PlainSpec, Stateful, gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
+class HRCReachEnv(  # type: ignore[override]  # a property is `spec`, too
+    PlainSpec, Stateful, gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]
+):
     """A robot arm reaches for goals beside a worker whom it knows through cameras only.
 
     Args:

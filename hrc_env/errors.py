@@ -50,6 +50,6 @@ def check_shape(what: str, got: tuple[int, ...], expected: tuple[int, ...], mean
 def whole(what: str, value: Any, low: int, high: int) -> int:
     """A whole number in [low, high], or a `ConfigError`."""
     is_whole = isinstance(value, numbers.Integral) and not isinstance(value, bool)
-    if not is_whole or not low <= value <= high:
+    if not is_whole or not low <= int(value) <= high:
         raise ConfigError(f"{what} must be a whole number from {low} to {high}, got {value!r}.")
     return int(value)

@@ -1,7 +1,7 @@
 """Stable-Baselines3 door: the vector environment as a `VecEnv`.
 
 from hrc_env.sb3 import HRCVecEnv
-PPO("MlpPolicy", HRCVecEnv(64, perception="keypoints"))
+PPO("MlpPolicy", HRCVecEnv(64, stagger=True, perception="keypoints"))
 """
 
 import time

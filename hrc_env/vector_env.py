@@ -59,7 +59,9 @@ Stream = tuple[np.random.Generator, int]
 Step = tuple[Observations, NDArray[np.float64], Bools, Bools, dict[str, Any]]
 
 
-class HRCVectorEnv(PlainSpec, Stateful, VectorEnv[Observations, Observations, NDArray[Any]]):
+class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
+    PlainSpec, Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
+):
     """`num_envs` robots, each beside a worker of its own, stepped at once.
 
     Args:
