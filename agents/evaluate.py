@@ -67,7 +67,7 @@ def judged(
     """
     if kwargs.get("perception") == "pixels":
         return one_by_one(make, n_episodes, seed, tick, **kwargs)
-    env = HRCVecEnv(n_episodes, stagger=False, seed=seed, **kwargs)
+    env = HRCVecEnv(n_episodes, seed=seed, **kwargs)
     try:
         agent, observation = make(situation(env.simulation)), env.reset()
         first: dict[int, dict[str, float]] = {}

@@ -66,7 +66,7 @@ The sum of these terms, each in `info["reward/<name>"]`; float64. Distances are 
 |---|---|
 | `cost_proximity` | 1 if the true surfaces came nearer than {proximity} m in this step |
 | `cost_contact` | 1 if they touched at any physics substep (by distance) |
-| `cost`, `cost_sum` | their sum |
+| `cost`, `cost_sum` | their sum; after a reset these four are 0 |
 | `episode_cost` | running sum of `cost` |
 | `worker/activity`, `worker/body` | what each worker does and which body they have, by name; \
 "absent" of who is not in the episode |
@@ -84,12 +84,15 @@ plan, at a random phase; a first goal appears. The estimator starts from nothing
 look.
 
 ## Episode end
-Truncated after 250 steps (10 s) by `TimeLimit`. Terminated by contact only with
+Truncated after 250 steps (10 s) by `TimeLimit`, or after n steps where the episode began with
+`reset(options={{"steps_left": n}})`. Terminated by contact only with
 `config={{"cost": {{"contact_terminates": True}}}}`.
 
 ## Configuration
 `config=` takes an `HRCConfig` or a nested mapping of changes, as in
-`config={{"reward": {{"proximity": 0.0}}}}`.
+`config={{"reward": {{"proximity": 0.0}}}}`. `EnvSpec.to_json` writes every argument, and
+`gymnasium.make(EnvSpec.from_json(text))` makes the same environment again; only a recorded clip in
+memory has no such form (give its file).
 
 {config}
 

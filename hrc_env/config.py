@@ -19,7 +19,7 @@ from hrc_env.errors import ConfigError
 from hrc_env.faults.fault import FaultConfig
 from hrc_env.mapping import from_mapping, restored
 from hrc_env.metrics import CostConfig
-from hrc_env.motion.generator import Clip, MotionConfig, PeopleConfig, people_called
+from hrc_env.motion.generator import PEOPLE, Clip, MotionConfig, PeopleConfig, people_called
 from hrc_env.optics.camera import CameraConfig
 from hrc_env.optics.rigs import read_rig
 from hrc_env.perception.emulator import EmulatorConfig
@@ -28,7 +28,7 @@ from hrc_env.rewards import RewardConfig
 from hrc_env.scene.build import SceneConfig
 from hrc_env.scene.rigs import RIGS
 from hrc_env.tasks.reach import ReachConfig
-from hrc_env.tracking.ahead import check_horizon
+from hrc_env.tracking.ahead import LONGEST_S
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.people.association import AssociationConfig
 
@@ -81,7 +81,10 @@ class HRCConfig:
             )
         pool(self.worker)
         for horizon_s in self.horizons_s:
-            check_horizon(horizon_s)
+            if not 0 < horizon_s <= LONGEST_S:
+                raise ConfigError(
+                    f"horizons_s must be in (0, {LONGEST_S:g}] s each, got {self.horizons_s}."
+                )
         substeps = self.ctrl_dt / self.scene.sim_dt
         if substeps < 0.5 or abs(substeps - round(substeps)) > 1e-6:
             near = max(round(substeps), 1) * self.scene.sim_dt
@@ -114,19 +117,20 @@ def resolve(config: "HRCConfig | Mapping[str, Any] | None") -> HRCConfig:
 
 
 def with_cameras(
-    config: HRCConfig, cameras: "str | Path | Sequence[Any] | None"
+    config: HRCConfig, cameras: "str | Path | Sequence[Any] | np.ndarray | None"
 ) -> "tuple[HRCConfig, Sequence[int | str] | None]":
     """A config with another rig, and which of its cameras are used; see `HRCReachEnv`.
 
     Raises:
         ConfigError: no rig of that name, no such file, or a mixture of names and cameras.
     """
-    if isinstance(cameras, str | Path):
-        rig = _rig(cameras)
-    elif isinstance(cameras, Sequence) and any(not isinstance(c, _CHOICE) for c in cameras):
-        rig = tuple(_camera(camera, k) for k, camera in enumerate(cameras))
+    given: Any = cameras.tolist() if isinstance(cameras, np.ndarray) else cameras
+    if isinstance(given, str | Path):
+        rig = _rig(given)
+    elif isinstance(given, Sequence) and any(not isinstance(c, _CHOICE) for c in given):
+        rig = tuple(_camera(camera, k) for k, camera in enumerate(given))
     else:
-        return config, cameras
+        return config, given
     return replace(config, scene=replace(config.scene, cameras=rig)), None
 
 
@@ -199,18 +203,30 @@ def with_motions(config: HRCConfig, motions: "Sequence[str | Path | Clip] | None
         return config
     if isinstance(motions, str | Path | Clip):
         motions = (motions,)
+    if not isinstance(motions, Sequence):
+        raise ConfigError(f"motions must be a list of paths or clips, got {motions!r}.")
     given = tuple(str(motion) if isinstance(motion, Path) else motion for motion in motions)
     return replace(config, motion=replace(config.motion, motions=given))
 
 
-def with_people(config: HRCConfig, people: "str | PeopleConfig | None") -> HRCConfig:
-    """A config with other people: a preset by name, settings, or None for those it has.
+def with_people(
+    config: HRCConfig, people: "str | PeopleConfig | Mapping[str, Any] | None"
+) -> HRCConfig:
+    """A config with other people: by name, settings or a mapping; None for those it has.
 
     Raises:
-        ConfigError: a name of no preset, with those that there are.
+        ConfigError: a name of no preset, with those that there are; a field that there is not, a
+            value that cannot be.
     """
     if people is None:
         return config
-    if not isinstance(people, PeopleConfig):
+    if isinstance(people, Mapping):
+        people = from_mapping(PeopleConfig, people, "people.")
+    elif isinstance(people, str):
         people = people_called(people)
+    elif not isinstance(people, PeopleConfig):
+        raise ConfigError(
+            f"people must be a name ({', '.join(map(repr, PEOPLE))}), a PeopleConfig or a mapping "
+            f"of its fields, got {people!r}."
+        )
     return replace(config, motion=replace(config.motion, people=people))

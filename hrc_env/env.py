@@ -5,11 +5,13 @@ env = gymnasium.make("HRCReach-v0", perception="keypoints")
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import gymnasium
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
@@ -24,8 +26,9 @@ from hrc_env.config import (
     with_motions,
     with_people,
 )
-from hrc_env.errors import ConfigError, unknown
+from hrc_env.errors import ConfigError, unknown, whole
 from hrc_env.faults.fault import FaultConfig
+from hrc_env.mapping import plain
 from hrc_env.motion.generator import Clip, PeopleConfig
 from hrc_env.rewards import RewardConfig
 from hrc_env.simulation import Simulation, checked_action
@@ -34,9 +37,29 @@ from hrc_env.typing import Floats
 from hrc_env.views import Views
 
 RENDER_MODES = ("rgb_array", "depth_array")
+RESET_OPTIONS = ("steps_left",)
+ENDLESS = 2**62
+"""Steps that are left where nobody said otherwise; time limits are gymnasium's `TimeLimit`."""
 
 
-class HRCReachEnv(Stateful, gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
+class PlainSpec:
+    """An environment whose `spec`, which gymnasium writes, holds its arguments as JSON has them."""
+
+    _spec: EnvSpec | None = None
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """What `gymnasium.make` made this from; `EnvSpec.to_json` writes it."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = spec and replace(spec, kwargs=plain(spec.kwargs))
+
+
+class HRCReachEnv(  # type: ignore[override]  # a property is `spec`, too
+    PlainSpec, Stateful, gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]
+):
     """A robot arm reaches for goals beside a worker whom it knows through cameras only.
 
     Args:
@@ -51,7 +74,7 @@ class HRCReachEnv(Stateful, gymnasium.Env[NDArray[np.float32], NDArray[np.float3
         n_workers: 0 or more workers; (fewest, most): each episode's number is drawn, and the
             observation has room for the most.
         people: how the workers are with the robot: "attentive", "hurried", "unaware", a
-            `PeopleConfig`, or None for those of the config (attentive).
+            `PeopleConfig` or a mapping; None for those of the config (attentive).
         motions: clips of recorded motion that the workers play, too, or paths of such
             (docs/motion_capture.md); None for those of the config (none).
         faults: what goes wrong with cameras, `FaultConfig`s or mappings
@@ -67,17 +90,17 @@ class HRCReachEnv(Stateful, gymnasium.Env[NDArray[np.float32], NDArray[np.float3
         ConfigError: a name, index or value that is not valid, with those that are.
     """
 
-    CHANGES = ("simulation", "_np_random", "_np_random_seed", "_begun")
+    CHANGES = ("simulation", "_np_random", "_np_random_seed", "_begun", "_steps_left")
     metadata = {"render_modes": list(RENDER_MODES), "render_fps": 25}  # noqa: RUF012
 
     def __init__(
         self,
         perception: str = "pixels",
         estimator: str = "particle",
-        cameras: str | Path | Sequence[Any] | None = None,
+        cameras: str | Path | Sequence[Any] | NDArray[Any] | None = None,
         scene: str = "lab",
         n_workers: int | tuple[int, int] = 1,
-        people: str | PeopleConfig | None = None,
+        people: str | PeopleConfig | Mapping[str, Any] | None = None,
         motions: Sequence[str | Path | Clip] | None = None,
         faults: Sequence[FaultConfig | Mapping[str, Any]] | None = None,
         appearance: str | AppearanceConfig | Mapping[str, Any] | None = None,
@@ -98,19 +121,25 @@ class HRCReachEnv(Stateful, gymnasium.Env[NDArray[np.float32], NDArray[np.float3
         self.observation_space, self.action_space = spaces(self.simulation)
         self.metadata = {**self.metadata, "render_fps": round(1 / self.config.ctrl_dt)}
         self._begun = self._closed = False
+        self._steps_left = ENDLESS
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Start an episode; without a seed the random stream goes on."""
+        """Start an episode.
+
+        Args:
+            seed: of its random stream; with None the stream goes on.
+            options: "steps_left": after so many steps this episode is truncated, if its time
+                limit does not end it before.
+
+        Raises:
+            ConfigError: an option that there is not, or a value that cannot work.
+        """
         self._refuse_closed()
+        steps_left = _steps_left(options or {})
         super().reset(seed=seed)
-        if options:
-            raise ConfigError(
-                f"HRCReach-v0 takes no reset options yet, got {sorted(options)}; "
-                "use the keyword arguments of gymnasium.make."
-            )
-        self._begun = True
+        self._begun, self._steps_left = True, steps_left
         outcome = self.simulation.reset(np.array([0]), [self.np_random])
         return outcome.observation[0], outcome.info_of(0)
 
@@ -123,11 +152,12 @@ class HRCReachEnv(Stateful, gymnasium.Env[NDArray[np.float32], NDArray[np.float3
             raise ConfigError("Call reset() before step().")
         values = checked_action(action, (self.simulation.n_actions,))
         outcome = self.simulation.step(values[None])
+        self._steps_left -= 1
         return (
             outcome.observation[0],
             float(outcome.reward[0]),
             bool(outcome.terminated[0]),
-            False,  # time limits are gymnasium's TimeLimit
+            self._steps_left <= 0,  # the time limit itself is gymnasium's TimeLimit
             outcome.info_of(0),
         )
 
@@ -158,6 +188,20 @@ class HRCReachEnv(Stateful, gymnasium.Env[NDArray[np.float32], NDArray[np.float3
     def _refuse_closed(self) -> None:
         if self._closed:
             raise ConfigError("This environment is closed; make a new one.")
+
+
+def _steps_left(options: Mapping[str, Any]) -> int:
+    """What the options of a reset say."""
+    if "elapsed_steps" in options:
+        raise ConfigError(
+            "elapsed_steps is an option of vector environments: one environment does not know "
+            'its time limit, which is a wrapper of gymnasium. Say options={"steps_left": n} '
+            "(time limit minus elapsed steps), which both take."
+        )
+    for name in options:
+        if name not in RESET_OPTIONS:
+            raise unknown("reset option", name, RESET_OPTIONS)
+    return whole('options["steps_left"]', options.get("steps_left", ENDLESS), 1, ENDLESS)
 
 
 def spaces(simulation: Simulation) -> tuple[Box[np.float32], Box[np.float32]]:

@@ -5,7 +5,9 @@ A worker who is not seen is data (growing covariance, a flag), never one of thes
 
 import contextlib
 import difflib
+import numbers
 from collections.abc import Iterable, Iterator
+from typing import Any
 
 
 class HRCError(Exception):
@@ -65,3 +67,11 @@ def check_shape(what: str, got: tuple[int, ...], expected: tuple[int, ...], mean
     """Raise `ConfigError` unless the shapes agree; `meaning` says what the axes are."""
     if tuple(got) != tuple(expected):
         raise ConfigError(f"{what} must have shape {expected} ({meaning}), got {tuple(got)}.")
+
+
+def whole(what: str, value: Any, low: int, high: int) -> int:
+    """A whole number in [low, high], or a `ConfigError`."""
+    is_whole = isinstance(value, numbers.Integral) and not isinstance(value, bool)
+    if not is_whole or not low <= int(value) <= high:
+        raise ConfigError(f"{what} must be a whole number from {low} to {high}, got {value!r}.")
+    return int(value)

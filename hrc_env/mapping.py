@@ -1,11 +1,16 @@
-"""Frozen settings from plain mappings: what JSON or a notebook gives, checked field by field."""
+"""Frozen settings from plain mappings and back: what JSON or a notebook gives, field by field."""
 
 import dataclasses
+import enum
 import math
+import re
 import types
 import typing
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, TypeVar
+
+import numpy as np
 
 from hrc_env.errors import ConfigError, unknown
 
@@ -19,7 +24,8 @@ def from_mapping(kind: type[RecordT], mapping: Mapping[str, Any], path: str = ""
 
     Raises:
         ConfigError: a field that does not exist, with the nearest that does; one that is
-            missing; a value of another type or length than the field's.
+            missing; a value of another type or length than the field's, or one that the
+            dataclass refuses. Fields are called by their path, as in `scene.cameras[0].name`.
     """
     hints = typing.get_type_hints(kind)
     fields = dataclasses.fields(kind)  # type: ignore[arg-type]
@@ -34,7 +40,10 @@ def from_mapping(kind: type[RecordT], mapping: Mapping[str, Any], path: str = ""
         nothing = each.default is each.default_factory is dataclasses.MISSING
         if nothing and each.name not in values:
             raise ConfigError(f"Config field {path}{each.name} is missing and has no default.")
-    return kind(**values)
+    try:
+        return kind(**values)
+    except ConfigError as error:
+        raise _located(error, kind, path) from error
 
 
 def restored(hint: Any, value: Any, where: str) -> Any:
@@ -47,6 +56,8 @@ def restored(hint: Any, value: Any, where: str) -> Any:
         return _one_of(typing.get_args(hint), value, where)
     if typing.get_origin(hint) is tuple:
         return _tuple(typing.get_args(hint), value, where)
+    if isinstance(value, np.generic):
+        value = value.item()
     if hint is float:
         number = isinstance(value, int | float) and not isinstance(value, bool)
         return float(_checked(number and math.isfinite(value), "a finite number", value, where))
@@ -82,6 +93,39 @@ def _tuple(inner: tuple[Any, ...], value: Any, where: str) -> tuple[Any, ...]:
         restored(hint, part, f"{where}[{k}]")
         for k, (hint, part) in enumerate(zip(hints, value, strict=True))
     )
+
+
+def plain(value: Any) -> Any:
+    """A value as JSON has it: paths are text, NumPy's numbers and enumerations what they hold.
+
+    What has no such form (a recorded clip, a function) stays, and JSON's writer refuses it.
+    """
+    if isinstance(value, Mapping):
+        return {name: plain(each) for name, each in value.items()}
+    if isinstance(value, list | tuple):
+        return type(value)(map(plain, value))
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, enum.Enum):
+        return value.value
+    return str(value) if isinstance(value, Path) else value
+
+
+def _located(error: ConfigError, kind: type, path: str) -> ConfigError:
+    """What a dataclass says about its fields, with the fields called by their path.
+
+    Fields are found by name: any with an underscore, others where the sentence begins with them.
+    """
+    if not path:
+        return error
+    said = str(error).removeprefix(f"{kind.__name__}.")
+    names = [each.name for each in dataclasses.fields(kind)]
+    long = "|".join(name for name in names if "_" in name) or "(?!)"
+    pattern = rf"^(?:{'|'.join(names)})\b|(?<![\w.'\"])(?:{long})\b(?!['\"])"
+    located = re.sub(pattern, lambda found: f"{path}{found[0]}", said)
+    if path not in located:
+        located = f"{path.rstrip('.')}: {located}"
+    return type(error)(located)
 
 
 def _checked(good: bool, expected: str, value: Any, where: str) -> Any:

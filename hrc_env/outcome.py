@@ -60,6 +60,11 @@ def cost_info(cost: metrics.Cost, present: Bools) -> Info:
     }
 
 
+def no_cost(n: int) -> Info:
+    """What `n` resets cost: nothing, under the names of `cost_info`; a separation has no such 0."""
+    return {name: np.zeros(n) for name in ("cost", "cost_sum", "cost_proximity", "cost_contact")}
+
+
 def tracking_info(estimate: PoseEstimate, truth: WorkerTruth, present: Bools) -> Info:
     """How far the belief is from the truth; no error is given where nobody is tracked."""
     error_m, lost = metrics.tracking_error(estimate, truth, present)

@@ -1,7 +1,7 @@
 """Stable-Baselines3 door: the vector environment as a `VecEnv`.
 
 from hrc_env.sb3 import HRCVecEnv
-PPO("MlpPolicy", HRCVecEnv(64, perception="keypoints"))
+PPO("MlpPolicy", HRCVecEnv(64, stagger=True, perception="keypoints"))
 """
 
 import time
@@ -29,20 +29,22 @@ class HRCVecEnv(VecEnv):
     """An `HRCVectorEnv` as SB3 expects environments, with episode statistics.
 
     Environment k of `seed(s)` and then `reset()` is `HRCReach-v0` after `reset(seed=s + k)`;
-    what follows the end of an episode continues its random stream. The info of a step is
-    empty but for episodes that ended: these have the whole of it, what SB3 reads
-    ("terminal_observation", "TimeLimit.truncated") and the episode's statistics ("episode").
+    what follows the end of an episode continues its random stream. The info of a step holds its
+    "cost", of which `costs` is the array, and nothing else but where an episode ended: there it is
+    the whole, with what SB3 reads ("terminal_observation", "TimeLimit.truncated") and the
+    episode's statistics ("episode").
 
     Args:
         num_envs: how many.
-        stagger: let the first episode of each environment end early at a random time, so
-            that a short rollout sees all phases of an episode and not one.
+        stagger: after the first `reset()` and after those that follow a `seed()`, let each
+            environment's first episode end early at a random time, so that a short rollout of a
+            learner sees all phases of an episode and not one. Not for evaluation.
         seed: of the first reset.
         kwargs: as of `HRCVectorEnv`.
     """
 
     def __init__(
-        self, num_envs: int, *, stagger: bool = True, seed: int = 0, **kwargs: Any
+        self, num_envs: int, *, stagger: bool = False, seed: int = 0, **kwargs: Any
     ) -> None:
         self.env = HRCVectorEnv(num_envs, autoreset_mode=AutoresetMode.SAME_STEP, **kwargs)
         space, actions = self.env.single_observation_space, self.env.single_action_space
@@ -50,6 +52,8 @@ class HRCVecEnv(VecEnv):
         self.metadata = self.env.metadata
         self.stagger, self.started_s = stagger, time.time()
         self.seed(seed)
+        self.costs: Floats = np.zeros(num_envs)
+        """(num_envs,) the cost of the last step; 0 after a reset."""
         self._action = np.zeros((num_envs, *(actions.shape or ())), np.float32)
         self._sums = {name: np.zeros(num_envs) for name in ("reward", "contacts", *EPISODE_SUMS)}
         self._touching = np.zeros(num_envs, bool)
@@ -64,7 +68,7 @@ class HRCVecEnv(VecEnv):
     def seed(self, seed: int | None = None) -> list[int | None]:  # type: ignore[override]
         """Seed environment k with seed + k at the next reset; None draws a seed."""
         seeds = list(super().seed(seed))
-        self._phases = np.random.default_rng(seeds[0])
+        self._phases = np.random.default_rng(seeds[0]) if self.stagger else None
         return seeds
 
     def set_options(self, options: Any = None) -> None:
@@ -74,13 +78,14 @@ class HRCVecEnv(VecEnv):
 
     def reset(self) -> NDArray[np.float32]:
         """Start every environment: from its seed the first time, then on with its stream."""
-        options = None
-        if self.stagger:
-            elapsed = self._phases.integers(self.env.max_episode_steps, size=self.num_envs)
-            options = {"elapsed_steps": elapsed}
+        options, phases = None, self._phases
+        if phases is not None:
+            elapsed = phases.integers(self.env.max_episode_steps, size=self.num_envs)
+            options, self._phases = {"elapsed_steps": elapsed}, None
         seeds = None if None in self._seeds else self._seeds
         observation, infos = self.env.reset(seed=seeds, options=options)
         self._reset_seeds()
+        self.costs = np.zeros(self.num_envs)
         self._begin(np.arange(self.num_envs))
         self.reset_infos = [_info_of(infos, b) for b in range(self.num_envs)]
         return observation
@@ -96,7 +101,7 @@ class HRCVecEnv(VecEnv):
         observation, reward, terminated, truncated, fresh = self.env.step(self._action)
         self._count(reward, fresh)
         done = terminated | truncated
-        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        infos: list[dict[str, Any]] = [{"cost": cost} for cost in self.costs.tolist()]
         ended = np.flatnonzero(done)
         for b in ended.tolist():
             infos[b] = _info_of(fresh["final_info"], b)
@@ -125,12 +130,14 @@ class HRCVecEnv(VecEnv):
         self._steps[ids], self._touching[ids], self._nearest_m[ids] = 0, False, np.inf
 
     def _count(self, reward: Floats, infos: Mapping[str, Any]) -> None:
-        touching = _of_step(infos, "cost_contact", self.num_envs) > 0
         self._steps += 1
         self._sums["reward"] += reward
+        costs = {name: _of_step(infos, name, self.num_envs) for name in EPISODE_SUMS}
+        for name, cost in costs.items():
+            self._sums[name] += cost
+        self.costs = costs["cost"]
+        touching = costs["cost_contact"] > 0
         self._sums["contacts"] += touching & ~self._touching  # a long touch is one contact
-        for name in EPISODE_SUMS:
-            self._sums[name] += _of_step(infos, name, self.num_envs)
         self._touching = touching
         separation_m = _of_step(infos, "safety/min_separation_m", self.num_envs)
         self._nearest_m = np.fmin(self._nearest_m, separation_m)

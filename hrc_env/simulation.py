@@ -22,7 +22,7 @@ from hrc_env.errors import ConfigError, check_shape
 from hrc_env.geometry import chains
 from hrc_env.kernels import ahead
 from hrc_env.motion import generator
-from hrc_env.outcome import Info, Outcome, cost_info, rows_of, tracking_info
+from hrc_env.outcome import Info, Outcome, cost_info, no_cost, rows_of, tracking_info
 from hrc_env.records import PoseEstimate, RobotState, WorkerMotion, WorkerTruth
 from hrc_env.rewards import RewardConfig
 from hrc_env.scene.build import build
@@ -86,6 +86,10 @@ class Simulation(Stateful):
         self.perception, self.reward_weights = perception, config.reward
         self.bodies = stack(pool(config.worker))
         fewest, most = worker_counts(n_workers)
+        empty = build(config.scene, scene, 0, self.bodies.names, cameras)
+        self.motion = generator.make_state(
+            batch, most, self.bodies, config.motion, empty.grounds, fewest
+        )  # first, as it knows how many workers there is room for
         self.scene = build(config.scene, scene, most, self.bodies.names, cameras)
         if perception in CAMERA_LEVELS:
             for finding in findings(self.scene):
@@ -93,7 +97,8 @@ class Simulation(Stateful):
         self.settings = {
             "batch": batch, "perception": perception, "estimator": estimator, "scene": scene,
             "cameras": tuple(camera.name for camera in self.scene.cameras),
-            "n_workers": n_workers, "control": control, "config": config,
+            "n_workers": (fewest, most) if fewest < most else most, "control": control,
+            "config": config,
         }  # fmt: skip
         self.chain = self.scene.chain
         spread = config.start_spread_rad
@@ -104,9 +109,6 @@ class Simulation(Stateful):
         )
         self.physics = Physics(self.scene, batch)
         self.senses = make_senses(perception, estimator, self.scene, batch, config)
-        self.motion = generator.make_state(
-            batch, most, self.bodies, config.motion, self.scene.grounds, fewest
-        )
         self.worn = np.full(batch, None, object)
         self.task = reach.make_state(batch)
         self._everyone = np.arange(batch)
@@ -144,7 +146,11 @@ class Simulation(Stateful):
         believed = self._believed(ids, robot, estimate, ahead)
         observation = observations.observe(believed, self.layout)
         crew = rows(self.crew, ids)
-        info = {**tracking_info(estimate, truth, crew.present), **rows_of(self._tally(), ids)}
+        info = {
+            **no_cost(len(ids)),
+            **tracking_info(estimate, truth, crew.present),
+            **rows_of(self._tally(), ids),
+        }
         over = np.zeros(len(ids), bool)
         return Outcome(observation, np.zeros(len(ids)), over, info, crew, self._suspects(ids))
 

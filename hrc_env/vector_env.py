@@ -29,7 +29,7 @@ from hrc_env.config import (
     with_motions,
     with_people,
 )
-from hrc_env.env import RENDER_MODES, spaces
+from hrc_env.env import RENDER_MODES, PlainSpec, spaces
 from hrc_env.errors import ConfigError, unknown
 from hrc_env.faults.fault import FaultConfig
 from hrc_env.motion.generator import Clip, PeopleConfig
@@ -59,7 +59,9 @@ Stream = tuple[np.random.Generator, int]
 Step = tuple[Observations, NDArray[np.float64], Bools, Bools, dict[str, Any]]
 
 
-class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]):
+class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
+    PlainSpec, Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
+):
     """`num_envs` robots, each beside a worker of its own, stepped at once.
 
     Args:
@@ -88,10 +90,10 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
         *,
         perception: str = "keypoints",
         estimator: str = "particle",
-        cameras: str | Path | Sequence[Any] | None = None,
+        cameras: str | Path | Sequence[Any] | NDArray[Any] | None = None,
         scene: str = "lab",
         n_workers: int | tuple[int, int] = 1,
-        people: str | PeopleConfig | None = None,
+        people: str | PeopleConfig | Mapping[str, Any] | None = None,
         motions: Sequence[str | Path | Clip] | None = None,
         faults: Sequence[FaultConfig | Mapping[str, Any]] | None = None,
         appearance: str | AppearanceConfig | Mapping[str, Any] | None = None,
@@ -157,8 +159,10 @@ class HRCVectorEnv(Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
             seed: environment k gets `seed + k`, or the k-th of a list; with None its random
                 stream goes on.
             options: "reset_mask", (num_envs,) bool: only these environments start anew.
-                "elapsed_steps", (num_envs,) int: how much of their time limit these first
-                episodes have behind them, so that not all of them end at once.
+                "steps_left", a whole number or (num_envs,) of them: after so many steps these
+                first episodes are truncated, if their time limit does not end them before, so
+                that not all of them end at once. Or "elapsed_steps", (num_envs,) int: how much of
+                the time limit they have behind them.
 
         Returns:
             Observations of all environments, and infos of those that started.

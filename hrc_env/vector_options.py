@@ -7,26 +7,26 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from hrc_env.errors import ConfigError, check_shape, unknown
+from hrc_env.errors import ConfigError, check_shape, unknown, whole
 from hrc_env.machine import n_cores
 from hrc_env.typing import Bools, Ints
 
 MAX_ENVS = 16_384
 """More would be gigabytes of filters' states, and no faster."""
 NO_LIMIT = 2**62
-RESET_OPTIONS = ("reset_mask", "elapsed_steps")
+RESET_OPTIONS = ("reset_mask", "steps_left", "elapsed_steps")
 
 
 def count_of(num_envs: Any) -> int:
     """How many environments."""
-    return _whole("num_envs", num_envs, 1, MAX_ENVS)
+    return whole("num_envs", num_envs, 1, MAX_ENVS)
 
 
 def time_limit(max_episode_steps: int | None) -> int:
     """Steps of an episode; None and -1 are as good as infinitely many."""
     if max_episode_steps is None or max_episode_steps == -1:
         return NO_LIMIT
-    return _whole("max_episode_steps", max_episode_steps, 1, NO_LIMIT)
+    return whole("max_episode_steps", max_episode_steps, 1, NO_LIMIT)
 
 
 def autoreset_of(mode: str | AutoresetMode) -> AutoresetMode:
@@ -42,7 +42,7 @@ def threads_of(num_threads: int | None) -> int:
     cores = n_cores()
     if num_threads is None:
         return cores
-    n_threads = _whole("num_threads", num_threads, 1, MAX_ENVS)
+    n_threads = whole("num_threads", num_threads, 1, MAX_ENVS)
     if n_threads > cores:
         warnings.warn(
             f"num_threads={n_threads} on {cores} cores: results are the same, and later.",
@@ -78,9 +78,16 @@ def read_options(
     given = dict(options or {})
     for name in sorted(set(given) - set(RESET_OPTIONS)):
         raise unknown("reset option", name, RESET_OPTIONS)
+    if "elapsed_steps" in given and "steps_left" in given:
+        raise ConfigError("elapsed_steps and steps_left say the same: give one of them.")
     mask = _mask(given.get("reset_mask", np.ones(num_envs, bool)), num_envs)
+    if "steps_left" in given:
+        left = given["steps_left"]
+        left = np.full(num_envs, left) if np.ndim(left) == 0 else left
+        steps_left = _steps("steps_left", left, num_envs, 1, NO_LIMIT)
+        return mask, np.maximum(max_episode_steps - steps_left, 0)
     elapsed_steps = given.get("elapsed_steps", np.zeros(num_envs, int))
-    return mask, _elapsed(elapsed_steps, num_envs, max_episode_steps)
+    return mask, _steps("elapsed_steps", elapsed_steps, num_envs, 0, max_episode_steps - 1)
 
 
 def _mask(mask: Any, num_envs: int) -> Bools:
@@ -95,21 +102,12 @@ def _mask(mask: Any, num_envs: int) -> Bools:
     return mask
 
 
-def _elapsed(elapsed_steps: Any, num_envs: int, max_episode_steps: int) -> Ints:
-    steps = np.asarray(elapsed_steps)
-    check_shape("elapsed_steps", steps.shape, (num_envs,), "one for each environment")
-    whole = np.issubdtype(steps.dtype, np.integer)
-    if not whole or not ((steps >= 0) & (steps < max_episode_steps)).all():
+def _steps(name: str, given: Any, num_envs: int, low: int, high: int) -> Ints:
+    steps = np.asarray(given)
+    check_shape(name, steps.shape, (num_envs,), "one for each environment")
+    is_whole = np.issubdtype(steps.dtype, np.integer)
+    if not is_whole or not ((steps >= low) & (steps <= high)).all():
         raise ConfigError(
-            'options["elapsed_steps"] must be whole numbers from 0 to '
-            f"{max_episode_steps - 1}, got {elapsed_steps!r}."
+            f'options["{name}"] must be whole numbers from {low} to {high}, got {given!r}.'
         )
     return steps
-
-
-def _whole(what: str, value: Any, low: int, high: int) -> int:
-    """A whole number in [low, high]."""
-    is_whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
-    if not is_whole or not low <= value <= high:
-        raise ConfigError(f"{what} must be a whole number from {low} to {high}, got {value!r}.")
-    return int(value)

@@ -236,6 +236,53 @@ def test_contact_ends_the_episode_when_asked():
     pytest.fail("no contact in 40 episodes: the test saw nothing")
 
 
+def test_a_reset_costs_nothing_and_knows_no_separation():
+    _, info = make(perception="truth").reset(seed=0)
+    costs = {name: value for name, value in info.items() if "cost" in name}
+    assert costs == dict.fromkeys(
+        ("cost", "cost_sum", "cost_proximity", "cost_contact", "episode_cost"), 0.0
+    )
+    assert "safety/min_separation_m" not in info
+
+
+def ends(env: gymnasium.Env) -> list[bool]:
+    return [env.step(np.zeros(6, np.float32))[3] for _ in range(5)]
+
+
+def test_an_episode_begins_with_so_many_steps_left_and_the_next_has_all_of_them():
+    env = make(perception="none", n_workers=0, max_episode_steps=4)
+    env.reset(seed=0, options={"steps_left": 2})
+    assert ends(env)[:2] == [False, True]
+    env.reset()
+    assert ends(env)[:4] == [False, False, False, True]
+
+
+def test_steps_left_are_no_more_than_the_time_limit_and_go_with_a_state():
+    env = make(perception="none", n_workers=0, max_episode_steps=4)
+    env.reset(seed=0, options={"steps_left": 200})
+    assert ends(env)[:4] == [False, False, False, True]
+    bare = HRCReachEnv(perception="none", n_workers=0)
+    bare.reset(seed=0, options={"steps_left": 3})
+    state = bare.get_state()
+    assert ends(bare)[:3] == [False, False, True]
+    bare.set_state(state)
+    assert ends(bare)[:3] == [False, False, True]
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"elapsed_steps": 3}, r"does not know.*\{\"steps_left\": n\}"),
+        ({"step_left": 3}, "Did you mean 'steps_left'"),
+        ({"steps_left": 0}, "whole number from 1"),
+        ({"steps_left": np.array([1, 2])}, "whole number from 1"),
+    ],
+)
+def test_reset_options_that_cannot_work_say_so(options, said):
+    with pytest.raises(ConfigError, match=said):
+        make(perception="none").reset(options=options)
+
+
 @pytest.mark.parametrize(
     "config", [{"reward": {"proximity": 0.0}}, HRCConfig(reward=RewardConfig(proximity=0.0))]
 )
@@ -247,9 +294,27 @@ def test_a_config_survives_the_spec(config):
     assert again.unwrapped.config.reward.proximity == 0.0
 
 
+@pytest.mark.parametrize("n_workers", [12, 36, 10**9, (0, 36)])
+def test_more_workers_than_there_is_room_for_are_refused_with_how_many_fit(n_workers):
+    with pytest.raises(ConfigError, match="no more than 11 fit on these grounds"):
+        HRCReachEnv(perception="none", n_workers=n_workers)
+
+
+def test_a_large_site_has_room_and_memory_for_many_workers():
+    env = HRCReachEnv(perception="none", scene="site", n_workers=40)
+    env.reset(seed=0)
+    assert np.isfinite(env.step(np.ones(6))[0]).all()
+
+
 @pytest.mark.parametrize(
     ("kwargs", "said"),
     [
+        ({"config": {"task": {"radius_m": -1}}}, r"^task\.radius_m must be > 0"),
+        ({"people": {"tempo": -1.0}}, r"^people\.tempo must be"),
+        ({"people": {"temp": 1.0}}, r"Did you mean 'people\.tempo'"),
+        ({"people": ["hurried"]}, "a name.*'unaware'.*a mapping"),
+        ({"motions": 5}, "list of paths or clips"),
+        ({"config": {"horizons_s": [3.0]}}, r"horizons_s must be in \(0, 1\] s"),
         ({"perception": "pixel"}, "Did you mean 'pixels'"),
         ({"estimator": "ekf"}, "'paper'"),
         ({"cameras": [7]}, "valid indices are 0 to 3"),

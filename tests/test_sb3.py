@@ -4,6 +4,8 @@ import gymnasium
 import numpy as np
 import pytest
 from stable_baselines3 import PPO, SAC
+from stable_baselines3.common.callbacks import EvalCallback
+from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecCheckNan, VecMonitor, VecNormalize
 
@@ -48,12 +50,20 @@ def compare_ends(info, observation, ended):
     assert np.isclose(ended["episode"]["r"], monitored["r"], atol=1e-5)
 
 
-def test_infos_are_empty_until_an_episode_ends():
-    env = HRCVecEnv(2, perception="truth", stagger=False, max_episode_steps=3)
+def test_the_cost_of_every_step_is_in_its_infos_and_in_an_array():
+    """Also of the step that ends an episode, whose successor has cost nothing yet."""
+    near = {"cost": {"proximity_m": 2.0}}
+    env = HRCVecEnv(2, perception="truth", max_episode_steps=3, config=near)
     env.reset()
-    infos = [env.step(action)[3] for action in actions(4, 2)]
-    assert infos[0] == infos[1] == infos[3] == [{}, {}]
-    assert all("episode" in info for info in infos[2])
+    assert (env.costs == 0.0).all()
+    costs = []
+    for action in actions(6, 2):
+        infos = env.step(action)[3]
+        assert [info["cost"] for info in infos] == env.costs.tolist()
+        assert [set(info) == {"cost"} for info in infos] == [len(costs) % 3 < 2] * 2
+        costs.append(env.costs)
+    assert np.ravel(costs).any()
+    assert [info["episode_cost"] for info in infos] == np.sum(costs[3:], axis=0).tolist()
 
 
 def test_the_infos_of_resets_are_at_hand():
@@ -63,7 +73,7 @@ def test_the_infos_of_resets_are_at_hand():
     for action in actions(2, 2):
         env.step(action)
     assert first[0]["tracking/mpjpe_m"] == env.reset_infos[1]["tracking/mpjpe_m"] == 0.0
-    assert "cost" not in env.reset_infos[0]
+    assert env.reset_infos[0]["cost"] == env.reset_infos[0]["cost_contact"] == 0.0
 
 
 def test_a_second_reset_goes_on_and_a_seed_begins_again():
@@ -110,7 +120,7 @@ def test_an_episode_that_fails_at_its_time_limit_has_failed(monkeypatch):
 
 
 def test_staggered_starts_end_the_first_episodes_at_different_times():
-    env = HRCVecEnv(8, perception="none", max_episode_steps=50, seed=1)
+    env = HRCVecEnv(8, perception="none", stagger=True, max_episode_steps=50, seed=1)
     env.reset()
     ends = [[] for _ in range(8)]
     for step, action in enumerate(actions(100, 8)):
@@ -143,16 +153,38 @@ def test_threads_change_nothing():
     np.testing.assert_array_equal(runs[0], runs[2])
 
 
-def test_the_same_seed_gives_the_same_phases_and_a_second_reset_others():
+def test_only_the_reset_after_a_seed_is_staggered_and_the_same_seed_gives_the_same_phases():
+    env = HRCVecEnv(6, perception="none", stagger=True, max_episode_steps=30, seed=5)
     ends = []
-    for _ in range(2):
-        env = HRCVecEnv(6, perception="none", max_episode_steps=30, seed=5)
-        for _ in range(2):
-            env.reset()
-            ends.append(np.stack([env.step(action)[2] for action in actions(30, 6)]))
+    for again in (None, None, 5):
+        if again is not None:
+            env.seed(again)
+        env.reset()
+        ends.append(np.stack([env.step(action)[2] for action in actions(30, 6)]))
     np.testing.assert_array_equal(ends[0], ends[2])
-    np.testing.assert_array_equal(ends[1], ends[3])
-    assert not np.array_equal(ends[0], ends[1])
+    assert ends[0][:-1].any()
+    assert not ends[1][:-1].any()
+    assert ends[1][-1].all()
+
+
+def test_sb3s_evaluation_sees_whole_episodes_only():
+    """In the callback every time, not the first time only."""
+    env = HRCVecEnv(2, perception="none", n_workers=0, seed=3)
+    nobody = HRCVecEnv(2, perception="none", n_workers=0)
+    learner = PPO("MlpPolicy", nobody, n_steps=8, batch_size=16)
+    _, lengths = evaluate_policy(learner, env, 4, return_episode_rewards=True, warn=False)
+    assert lengths == [250] * 4
+    seen = []
+    callback = EvalCallback(env, n_eval_episodes=3, eval_freq=8, verbose=0, warn=False)
+    log = callback._log_success_callback
+    callback._log_success_callback = lambda said, scope: (
+        seen.extend([said["info"]["episode"]["l"]] if said["done"] else []),
+        log(said, scope),
+    )
+    learner.learn(24, callback=callback)
+    assert callback.n_calls >= 16
+    assert len(seen) >= 6
+    assert set(seen) == {250}
 
 
 def test_sb3_finds_what_it_asks_a_vec_env_for():

@@ -5,6 +5,7 @@ sensor's generator without touching what that one draws: workers, goals and the 
 are those of the same seed without faults.
 """
 
+import numbers
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -61,8 +62,9 @@ class FaultConfig:
 
     kind: str
     """A key of `KINDS`."""
-    cameras: tuple[str, ...]
-    """Names of the cameras that have it; ("all",) is every one."""
+    cameras: tuple[int | str, ...]
+    """Cameras that have it, by name or by index (from 0) among those in use; ("all",) is every
+    one."""
     amount: float | None = None
     """How much, in the kind's unit; None is the kind's usual amount."""
     from_s: float = 0.0
@@ -73,10 +75,10 @@ class FaultConfig:
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
             raise unknown("fault", self.kind, KINDS)
-        named = isinstance(self.cameras, tuple) and all(isinstance(c, str) for c in self.cameras)
+        named = isinstance(self.cameras, tuple) and all(map(_is_choice, self.cameras))
         if not named or not self.cameras:
             raise ConfigError(
-                f"Fault {self.kind!r} must name its cameras, as ('camera_1',) or ('all',), "
+                f"Fault {self.kind!r} must name its cameras, as ('camera_1',), (0,) or ('all',), "
                 f"got {self.cameras!r}."
             )
         low, high = KINDS[self.kind].bounds
@@ -109,8 +111,18 @@ class FaultConfig:
 
 
 def check_cameras(faults: Sequence[FaultConfig], names: Sequence[str]) -> None:
-    """Raise `ConfigError` for a fault of a camera that the rig does not have."""
+    """Raise `ConfigError` for a fault of a camera that is not one of those in use, by name."""
     for fault in faults:
         for camera in fault.cameras:
-            if camera != ALL and camera not in names:
-                raise unknown(f"camera of fault {fault.kind!r}:", camera, (*names, ALL))
+            if isinstance(camera, str):
+                if camera not in (*names, ALL):
+                    raise unknown(f"camera of fault {fault.kind!r}:", camera, (*names, ALL))
+            elif not 0 <= camera < len(names):
+                raise ConfigError(
+                    f"Camera index {camera} of fault {fault.kind!r} is outside the cameras in use: "
+                    f"valid indices are 0 to {len(names) - 1}, valid names {', '.join(names)}."
+                )
+
+
+def _is_choice(camera: object) -> bool:
+    return isinstance(camera, str | numbers.Integral) and not isinstance(camera, bool)

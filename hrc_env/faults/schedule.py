@@ -73,7 +73,7 @@ class Schedule:
             (k, fault)
             for k, fault in enumerate(self.faults)
             if fault.group == group
-            and (name in fault.cameras or ALL in fault.cameras)
+            and not {c, name, ALL}.isdisjoint(fault.cameras)
             and (step is None or fault.active(step * self.dt_s))
         ]
 

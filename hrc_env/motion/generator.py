@@ -95,6 +95,7 @@ def make_state(
 
     bones = anatomies(body)
     clips = stocked([opened(motion) for motion in config.motions], bones.size)
+    mind = _mind(config, grounds, clips, n_workers, fewest)
 
     def array(*shape: int) -> Floats:
         return np.zeros((batch, n_workers, *shape))
@@ -107,7 +108,7 @@ def make_state(
         spots=array(st.N_SPOT), errand=np.zeros((batch, n_workers, st.N_ERRAND), np.int64),
         alert=array(st.N_ALERT), robot=np.full((batch, 2, 3), np.inf), present=array(),
         body=np.zeros((batch, n_workers), np.int64), anatomy=bones,
-        mind=_mind(config, grounds, clips, n_workers, fewest),
+        mind=mind,
     )  # fmt: skip
 
 

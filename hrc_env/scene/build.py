@@ -48,6 +48,8 @@ ROBOT_YAW_RAD = math.pi
 
 ARENA_BYTES = 2**20
 """Memory of one simulation for contacts; the arm in a pile of them takes a tenth."""
+PAIR_BYTES = 1280
+"""And for who may touch whom: MuJoCo takes about 990 times the square of the number of workers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,7 +247,7 @@ def _spec(
     spec.compiler.degree = 0
     spec.option.timestep = config.sim_dt
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    spec.memory = ARENA_BYTES
+    spec.memory = ARENA_BYTES + PAIR_BYTES * n_workers**2
     # The velocity command in force, and which body each worker has: part of the state.
     spec.nuserdata = len(HOME_Q) + n_workers
     SCENES[name].add(spec, config.clutter)

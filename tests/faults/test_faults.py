@@ -50,6 +50,35 @@ def test_a_fault_is_of_its_cameras_and_of_its_time_only():
     assert film(plan, c=1) == film(schedule(), c=1)
 
 
+def test_cameras_of_a_fault_are_named_or_counted_among_those_in_use():
+    named = schedule(FaultConfig("lost", ("camera_2",)))
+    counted = schedule(FaultConfig("lost", (1,)))
+    turned = schedule(FaultConfig("lost", (0, "camera_2")), rig=RIG[::-1])
+    for c in range(2):
+        assert film(named, c) == film(counted, c)
+        assert film(turned, c) == film(named, 1 - c)
+    assert film(counted, 1) == [None] * 12
+
+
+@pytest.mark.parametrize("choice", [2, -1, 7])
+def test_an_index_of_no_camera_is_refused_with_those_that_are(choice):
+    with pytest.raises(ConfigError, match="indices are 0 to 1, valid names camera_1, camera_2"):
+        schedule(FaultConfig("lost", (choice,)))
+
+
+def test_the_environment_counts_a_faults_cameras_among_those_that_it_uses():
+    """As the rows of its arrays are; `cameras` itself counts those that hang in the scene."""
+    env = HRCReachEnv(
+        perception="keypoints", cameras=["camera_3", 0],
+        faults=[{"kind": "lost", "cameras": [np.int64(0)]}],
+    )  # fmt: skip
+    env.reset(seed=0)
+    env.step(np.zeros(6))
+    seen = env.simulation.senses.looks(0)[0]
+    assert env.simulation.settings["cameras"] == ("camera_3", "camera_1")
+    assert np.isnan(seen.px).all((-3, -2, -1)).ravel().tolist() == [True, False]
+
+
 def test_a_frozen_camera_shows_its_last_image_as_if_new():
     assert film(schedule(first("frozen", from_s=0.16)), n=7)[3:] == [
         Frame(3, 3), Frame(3, 4), Frame(3, 5), Frame(3, 6),

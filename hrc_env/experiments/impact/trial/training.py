@@ -56,8 +56,8 @@ def _train(learning: Learning, tick: Tick) -> dict[str, Any]:
     threads = torch.get_num_threads()
     torch.set_num_threads(1)  # more are slower in networks as small as these
     env = HRCVecEnv(
-        N_ENVS, seed=SEED, perception="keypoints", estimator="particle", people=PEOPLE,
-        config={"reward": {"proximity": PROXIMITY}}, num_threads=learning.n_threads,
+        N_ENVS, stagger=True, seed=SEED, perception="keypoints", estimator="particle",
+        people=PEOPLE, config={"reward": {"proximity": PROXIMITY}}, num_threads=learning.n_threads,
     )  # fmt: skip
     try:
         learner = ppo.make_learner(env, ppo.PPOSettings(), SEED)
