@@ -23,9 +23,14 @@ class Stage:
 
     def __init__(self, scene: Scene, width: int, height: int) -> None:
         """A stage for pictures of at most `width` x `height`."""
+        self._largest = width, height
         self._layers = Layers(scene, width, height)
         self._kept: dict[Any, _Backdrop] = {}
         self._shade: Any = None
+
+    def fits(self, width: int, height: int) -> bool:
+        """Whether a picture is not too large."""
+        return width <= self._largest[0] and height <= self._largest[1]
 
     def dress(self, look: Look | None) -> None:
         """Draw with an episode's look from the next pose on."""

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rich.console import Console
-from rich.table import Table
 
 from hrc_env.agents_door import agents
-from hrc_env.cli.film import film_episode
+from hrc_env.cli.film import film_episode, table
 from hrc_env.config import HRCConfig
 
 
@@ -34,12 +33,7 @@ class Demo:
             lambda here: base.make_agent("scripted_slowed", here),
             self.out, self.seed, n_steps, perception=self.perception,
         )  # fmt: skip
-        table = Table("", "", title="the worker is known through four cameras only")
-        for name, value in totals.items():
-            table.add_row(name, f"{value:.2f}")
-        table.add_row(
-            "steps/s (drawing included)", f"{n_steps / (time.monotonic() - started_s):.1f}"
-        )
-        console.print(table)
+        totals["all in all, start included [s]"] = time.monotonic() - started_s
+        console.print(table(totals, "the worker is known through four cameras only"))
         console.print(f"Watch [bold]{self.out}[/] (still: {self.out.with_suffix('.png')})")
         return 0

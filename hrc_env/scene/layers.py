@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.appearance import Look
-from hrc_env.geometry.cameras import PinholeCamera
+from hrc_env.geometry.cameras import PinholeCamera, pinhole
 from hrc_env.records import CropWindow, WorkerMotion
 from hrc_env.scene import gl
 from hrc_env.scene.build import Scene
 from hrc_env.scene.canvas import BEFORE_THE_SUN, IN_THE_SHADE, MOVING, STILL, Canvas, across
-from hrc_env.scene.render import ALL_GROUPS
+from hrc_env.scene.render import ALL_GROUPS, VIEWPOINTS
 from hrc_env.typing import Floats, Image, JointAngles
 
 SMOOTHING = 2
@@ -25,7 +25,7 @@ SMOOTHING = 2
 QUALITY = {
     "offsamples": 0, "shadowsize": 4096, "numslices": 14, "numstacks": 5, "numquads": 1,
 }  # fmt: skip
-SUN_PX = 512
+SUN_PX = 384
 """Side of the picture from the sun."""
 BIAS_M = 0.03
 """Nothing shades what is nearer to it than this, along the light [m]."""
@@ -131,7 +131,11 @@ class Layers:
         middles, radii_m = self._canvas.movers()
         camera = place.camera
         x, y, depth = ((middles - camera.eye_world) @ camera.T_world_from_cam[:3, :3]).T
-        if not len(depth) or (depth < radii_m + 0.1).any():
+        ahead = depth > -radii_m
+        x, y, depth, radii_m = x[ahead], y[ahead], depth[ahead], radii_m[ahead]
+        if not len(depth):
+            return 0, 0, 0, 0
+        if (depth < radii_m + 0.1).any():
             return 0, 0, place.width, place.height
         scale = place.width / place.wide_px
         reach = 1.3 * camera.K[0, 0] * scale * radii_m / (depth - radii_m) + 4
@@ -179,6 +183,12 @@ class Layers:
         y = place.middle_px[1] + ((top + bottom) / 2 - place.height / 2) * scale
         window = CropWindow((x, y), (right - left) * scale, 0.0)
         self._canvas.aim(place.camera, window, (bottom - top) * scale)
+
+
+def viewpoint(name: str, width: int, height: int) -> PinholeCamera:
+    """The camera of one of `VIEWPOINTS`, for pictures of this size [px]."""
+    eye, target, hfov_deg = VIEWPOINTS[name]
+    return pinhole(name, np.array(eye), np.array(target), hfov_deg, width, height)
 
 
 def _points(place: Place, depth_m: NDArray[np.float32]) -> Floats:
