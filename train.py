@@ -65,6 +65,8 @@ class Arguments:
     """A folder of an earlier run to go on with; its environment and seed stay what they were."""
 
 
+FILM_SEEDS = 8
+"""The film shows that of so many episodes which comes closest to the worker."""
 LEARNT_WITH = ("num_envs", "seed", "perception", "estimator", "control", "proximity", "ramp")
 """Arguments that a resumed run takes from the run that it goes on with."""
 
@@ -159,15 +161,16 @@ def train(arguments: Arguments, folder: Path, kwargs: dict[str, Any]) -> tuple[C
 
 
 def film(checkpoint: Path, path: Path, arguments: Arguments, kwargs: dict[str, Any]) -> None:
-    """Film one episode of the policy, if this machine can draw."""
-    from hrc_env.cli.film import film_episode
+    """Film the episode with the closest encounter, if this machine can draw."""
+    from hrc_env.cli.film import film_episode, nearest_seed
 
     def make(here: Situation) -> ppo.TrainedAgent:
         return ppo.load(checkpoint, here)
 
     settings = {name: value for name, value in kwargs.items() if name != "num_threads"}
     try:
-        film_episode(make, path, seed=arguments.seed, **settings)
+        seeds = range(arguments.seed, arguments.seed + FILM_SEEDS)
+        film_episode(make, path, seed=nearest_seed(make, seeds, **settings), **settings)
     except RenderingError as error:
         print(f"No film: {error}")
 

@@ -1,6 +1,7 @@
 """Pictures for people: what the cameras see and what is made of it, drawn over a render."""
 
 from functools import lru_cache
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -120,7 +121,7 @@ def draw_path(
     if (depth_m < 0.1).any():
         return
     scaled = px[0, 0] * (image.shape[1] / camera.width_px)
-    for first, second in zip(scaled, scaled[1:], strict=False):
+    for first, second in pairwise(scaled):
         _line(image, first, second, colour, thickness)
 
 

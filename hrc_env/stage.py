@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from hrc_env.appearance import Look
 from hrc_env.records import WorkerMotion
 from hrc_env.scene.build import Scene
-from hrc_env.scene.layers import BIAS_M, SMOOTHING, SUN_PX, Layers, Place
+from hrc_env.scene.layers import BIAS_M, SMOOTHING, Layers, Place
 from hrc_env.typing import Floats, Image, JointAngles
 
 SOFT_PX = 3

@@ -28,8 +28,8 @@ SMOOTHING = 2
 """Pictures through lenses are drawn so many times as large, and shrunk, for smooth edges."""
 MOSAIC_TILE = (640, 360)
 SIDES = (
-    ("from above", np.array([0.0, 0.0, 7.0]), np.zeros(3)),
-    ("from the side", np.array([0.0, -5.0, 1.6]), np.array([0.0, 0.0, 1.0])),
+    ("from above", np.array([0.0, 0.0, 5.0]), np.zeros(3)),
+    ("from the side", np.array([0.0, -3.8, 1.5]), np.array([0.0, 0.0, 1.0])),
 )
 """Where what is believed is seen from: eye and target from the robot's foot [m]."""
 SIDES_HFOV_DEG = 55.0
@@ -119,8 +119,8 @@ class Views:
             image = np.empty((height, width, 3), np.uint8)
             image[:] = pictures.PANEL
             pictures.draw_floor(image, camera, foot)
-            for ends in arm:
-                pictures.draw_path(image, camera, ends, pictures.ARM, 5)
+            for ends in ([foot, arm[0, 0]], *arm):
+                pictures.draw_path(image, camera, np.array(ends), pictures.ARM, 5)
             pictures.draw_estimate(image, camera, believed.estimate, robot_b)
             pictures.draw_goal(image, camera, believed.goal_world[robot_b])
             nobody = "" if believed.estimate.tracked[robot_b].any() else ": nobody is known"

@@ -12,7 +12,7 @@ from rich.progress import track
 
 import hrc_env
 from hrc_env.agents_door import agents
-from hrc_env.cli.film import film_episode
+from hrc_env.cli.film import film_episode, table
 from hrc_env.env import HRCReachEnv
 from hrc_env.errors import unknown
 from hrc_env.scene.viewer import Viewer
@@ -59,8 +59,7 @@ class Play:
                 lambda here: base.make_agent(self.agent, here, self.seed),
                 self.video, self.seed, **kwargs,
             )  # fmt: skip
-            for name, value in totals.items():
-                Console().print(f"{name:28s} {value:.2f}")
+            Console().print(table(totals))
             return 0
         env = gymnasium.make(self.id, **kwargs)
         try:

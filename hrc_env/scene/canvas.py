@@ -173,7 +173,9 @@ class Canvas:
             eye.frustum_top = (height_px / 2 - v) * scale
             eye.frustum_bottom = (-height_px / 2 - v) * scale
 
-    def aim_along(self, direction: Floats, middle_world: Floats, half_m: float, far_m: float) -> None:
+    def aim_along(
+        self, direction: Floats, middle_world: Floats, half_m: float, far_m: float
+    ) -> None:
         """Look along parallel rays, as a sun shines: a square of 2 `half_m` round a point.
 
         Args:
@@ -182,7 +184,7 @@ class Canvas:
             half_m: half of the square's side [m].
             far_m: how far is drawn [m].
         """
-        right, down = across(direction)
+        _, down = across(direction)
         for eye in self._shown.camera:
             eye.orthographic = 1
             eye.pos, eye.forward, eye.up = middle_world - direction, direction, -down

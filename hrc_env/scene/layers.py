@@ -143,7 +143,9 @@ class Layers:
         v = (camera.K[1, 1] * y / depth + camera.K[1, 2] - place.middle_px[1]) * scale
         left, right = (u - reach).min() + place.width / 2, (u + reach).max() + place.width / 2
         top, bottom = (v - reach).min() + place.height / 2, (v + reach).max() + place.height / 2
-        corners = np.clip(np.floor([left, top, right, bottom]), 0, [*[place.width, place.height] * 2])
+        corners = np.clip(
+            np.floor([left, top, right, bottom]), 0, [*[place.width, place.height] * 2]
+        )
         return tuple(int(value) for value in corners)  # type: ignore[return-value]
 
     def shade(self) -> Shade | None:
