@@ -10,7 +10,7 @@ from hrc_env.appearance import Look
 from hrc_env.records import WorkerMotion
 from hrc_env.scene.build import Scene
 from hrc_env.scene.layers import BIAS_M, SMOOTHING, Layers, Place
-from hrc_env.typing import Floats, Image, JointAngles
+from hrc_env.typing import Image, JointAngles
 
 SOFT_PX = 3
 """Edges of shadows are so soft."""
@@ -113,7 +113,7 @@ class _Backdrop:
         self.rgb = _shrunk(still.rgb, size)
         self.z: NDArray[np.float32] = still.z
         self.dark = None if still.dark is None else _shrunk(still.dark, size)
-        self.spots: tuple[Floats, ...] = ()
+        self.spots: tuple[NDArray[np.floating], ...] = ()
         """What the picture shows in the sun's axes: right, down and along, (h, w) [m] each."""
         axes = layers.sun_axes()
         if still.lit_world is not None and axes is not None:

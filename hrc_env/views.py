@@ -1,22 +1,25 @@
 """Views of a simulation for people: the room, the cameras with what was made of them."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env import pictures
-from hrc_env.batching import one
+from hrc_env.appearance import Look
+from hrc_env.batching import one, rows
 from hrc_env.errors import ConfigError
 from hrc_env.geometry.cameras import PinholeCamera, image_from_pinhole, pinhole
+from hrc_env.geometry.chains import capsules
 from hrc_env.motion import generator
 from hrc_env.perception.lensed import Lensed
-from hrc_env.records import CropWindow, Keypoints, WorkerMotion
+from hrc_env.records import CropWindow, Keypoints, PoseEstimate, WorkerMotion
 from hrc_env.scene.layers import Place, viewpoint
 from hrc_env.scene.render import PICTURE_QUALITY, CropRenderer, PictureRenderer
 from hrc_env.simulation import Simulation
 from hrc_env.stage import Stage
-from hrc_env.typing import Image, JointAngles
+from hrc_env.typing import Image, JointAngles, Points3
 
 PICTURE_SIZE = (960, 720)
 """Width and height of a picture, if nobody asks for another [px]."""
@@ -51,8 +54,32 @@ def picture_size(width: Any, height: Any) -> tuple[int, int]:
     return int(width), int(height)
 
 
+@dataclass(frozen=True, slots=True)
+class Glance:
+    """One environment at one moment, apart from the simulation, which may go on."""
+
+    q: JointAngles
+    """(N,)."""
+    motion: WorkerMotion
+    """The workers, arrays (W, S, ...)."""
+    look: Look | None
+    goal_world: Points3
+    """(3,) [m]."""
+    estimate: PoseEstimate
+    """Of a batch of one, as are the keypoints."""
+    keypoints: Keypoints | None
+    windows: list[list[CropWindow | None]]
+    """Of every worker, through every camera."""
+    crops: list[Image | None]
+    """What the pose network was given of the first worker."""
+
+
 class Views:
-    """Pictures of one environment of a simulation; graphics contexts are made when asked for."""
+    """Pictures of one environment of a simulation; graphics contexts are made when asked for.
+
+    All pictures must be asked for, and `close` called, in one thread; with a `glance` taken before
+    that may be another one than the simulation's.
+    """
 
     def __init__(self, simulation: Simulation, b: int = 0) -> None:
         self.simulation, self.b = simulation, b
@@ -67,51 +94,66 @@ class Views:
 
         Of another environment than usual with `b`; `size` is width and height [px].
         """
+        seen = self.glance(b)
         if depth:
-            return self._depth_renderer(size).picture(*self.pose(b), VIEWPOINT, depth=True)
-        return self._drawn([_whole(viewpoint(VIEWPOINT, *size), *size, shadows=True)], b)[0]
+            renderer = self._depth_renderer(size, seen.look)
+            return renderer.picture(seen.q, seen.motion, VIEWPOINT, depth=True)
+        return self._drawn([_whole(viewpoint(VIEWPOINT, *size), *size, shadows=True)], seen)[0]
 
-    def room(self, width: int, height: int) -> Image:
+    def glance(self, b: int | None = None) -> Glance:
+        """All that there is to draw now, of another environment than usual with `b`."""
+        b, simulation = self.b if b is None else b, self.simulation
+        keypoints, windows = simulation.senses.looks(b)
+        return Glance(
+            *self.pose(b),
+            simulation.senses.look_of(b),
+            simulation.task.goal_world[b].copy(),
+            rows(simulation.estimate, np.array([b])),
+            keypoints,
+            [list(of_worker) for of_worker in windows],
+            list(simulation.senses.crops(b)),
+        )
+
+    def room(self, width: int, height: int, seen: Glance | None = None) -> Image:
         """The room with the estimated skeleton over it."""
-        camera = viewpoint(VIEWPOINT, width, height)
-        (image,) = self._drawn([_whole(camera, width, height, shadows=True)])
-        pictures.draw_estimate(image, camera, self.simulation.estimate, self.b)
-        pictures.draw_goal(image, camera, self.simulation.task.goal_world[self.b])
+        seen, camera = seen or self.glance(), viewpoint(VIEWPOINT, width, height)
+        (image,) = self._drawn([_whole(camera, width, height, shadows=True)], seen)
+        pictures.draw_estimate(image, camera, seen.estimate)
+        pictures.draw_goal(image, camera, seen.goal_world)
         return image
 
-    def cameras(self, width: int, height: int) -> list[Image]:
+    def cameras(self, width: int, height: int, seen: Glance | None = None) -> list[Image]:
         """Every camera's picture with crops, detected keypoints and the estimate.
 
         Without shadows, as the detector sees the scene; what stands still is drawn once.
         """
-        keypoints, windows = self._looks()
-        views = self._through_cameras(width, height)
+        seen = seen or self.glance()
+        views = self._through_cameras(width, height, seen)
         for c, (camera, image) in enumerate(zip(self.simulation.scene.cameras, views, strict=True)):
-            for window in (of_worker[c] for of_worker in windows):
+            for window in (of_worker[c] for of_worker in seen.windows):
                 if window is not None:
                     pictures.draw_window(image, camera, window)
-            pictures.draw_estimate(image, camera, self.simulation.estimate, self.b, thickness=1)
-            if keypoints is not None:
-                pictures.draw_keypoints(image, camera, keypoints, c)
+            pictures.draw_estimate(image, camera, seen.estimate, thickness=1)
+            if seen.keypoints is not None:
+                pictures.draw_keypoints(image, camera, seen.keypoints, c)
             pictures.label(image, camera.name.replace("_", " "), (6, 6), 13)
         return views
 
-    def crops(self, size: int) -> list[Image]:
+    def crops(self, size: int, seen: Glance | None = None) -> list[Image]:
         """What the pose network was given: each camera's crop, with its landmarks."""
-        keypoints, windows = self._looks()
-        if keypoints is None or not windows:
+        seen = seen or self.glance()
+        if seen.keypoints is None or not seen.windows:
             return []
-        crops = self.simulation.senses.crops(self.b)
         return [
-            self._crop(crop, c, window, keypoints, size)
-            for c, (crop, window) in enumerate(zip(crops, windows[0], strict=True))
+            self._crop(crop, c, window, seen.keypoints, size)
+            for c, (crop, window) in enumerate(zip(seen.crops, seen.windows[0], strict=True))
         ]
 
-    def beliefs(self, width: int, height: int) -> list[Image]:
+    def beliefs(self, width: int, height: int, seen: Glance | None = None) -> list[Image]:
         """What the robot knows, seen from above and from the side: itself, the goal, its estimate
         of the workers. No truth in here."""
-        believed, robot_b = self.simulation.believed, self.b
-        arm = believed.robot.capsules_world[robot_b]
+        seen = seen or self.glance()
+        arm = capsules(self.simulation.chain, seen.q)
         foot = np.array([*arm[0, 0, :2], 0.0])
         images = []
         for name, eye, target in SIDES:
@@ -121,9 +163,9 @@ class Views:
             pictures.draw_floor(image, camera, foot)
             for ends in ([foot, arm[0, 0]], *arm):
                 pictures.draw_path(image, camera, np.array(ends), pictures.ARM, 5)
-            pictures.draw_estimate(image, camera, believed.estimate, robot_b)
-            pictures.draw_goal(image, camera, believed.goal_world[robot_b])
-            nobody = "" if believed.estimate.tracked[robot_b].any() else ": nobody is known"
+            pictures.draw_estimate(image, camera, seen.estimate)
+            pictures.draw_goal(image, camera, seen.goal_world)
+            nobody = "" if seen.estimate.tracked[0].any() else ": nobody is known"
             pictures.label(image, name + nobody, (6, 6), 13)
             images.append(image)
         return images
@@ -164,17 +206,14 @@ class Views:
         """The arm (N,) and the workers (W, S, ...) now, of another environment with `b`."""
         b = self.b if b is None else b
         motion = one(generator.current(self.simulation.motion, np.array([b])), 0)
-        return self.simulation.physics.q[b], motion
+        return self.simulation.physics.q[b].copy(), motion
 
-    def _looks(self) -> tuple[Keypoints | None, list[list[CropWindow | None]]]:
-        return self.simulation.senses.looks(self.b)
-
-    def _through_cameras(self, width: int, height: int) -> list[Image]:
+    def _through_cameras(self, width: int, height: int, seen: Glance) -> list[Image]:
         """What every camera sees, without shadows."""
         cameras = self.simulation.scene.cameras
         if all(camera.lens is None for camera in cameras):
-            return self._drawn([_whole(camera, width, height) for camera in cameras])
-        images = self._square_images(SMOOTHING * width)
+            return self._drawn([_whole(camera, width, height) for camera in cameras], seen)
+        images = self._square_images(SMOOTHING * width, seen)
         squares = [
             images.crop(c, CropWindow(_middle(camera), float(camera.width_px), 0.0))
             for c, camera in enumerate(cameras)
@@ -184,7 +223,7 @@ class Views:
             for square in squares
         ]
 
-    def _drawn(self, places: list[Place], b: int | None = None) -> list[Image]:
+    def _drawn(self, places: list[Place], seen: Glance) -> list[Image]:
         """Pictures from places that stay."""
         width = max(place.width for place in places)
         height = max(place.height for place in places)
@@ -192,23 +231,23 @@ class Views:
             if self._stage is not None:
                 self._stage.close()
             self._stage = Stage(self.simulation.scene, width, height)
-        self._stage.dress(self.simulation.senses.look_of(self.b if b is None else b))
-        self._stage.pose(*self.pose(b))
+        self._stage.dress(seen.look)
+        self._stage.pose(seen.q, seen.motion)
         return [self._stage.picture(place) for place in places]
 
-    def _depth_renderer(self, size: tuple[int, int]) -> PictureRenderer:
+    def _depth_renderer(self, size: tuple[int, int], look: Look | None) -> PictureRenderer:
         if size not in self._depths:
             self._depths[size] = PictureRenderer(self.simulation.scene, *size, DEPTH_QUALITY)
-        self._depths[size].dress(self.simulation.senses.look_of(self.b))
+        self._depths[size].dress(look)
         return self._depths[size]
 
-    def _square_images(self, size: int) -> Lensed:
+    def _square_images(self, size: int, seen: Glance) -> Lensed:
         """Square windows of what the cameras see now."""
         scene = self.simulation.scene
         if size not in self._squares:
             self._squares[size] = CropRenderer(scene, size)
-        self._squares[size].dress(self.simulation.senses.look_of(self.b))
-        self._squares[size].draw(*self.pose())
+        self._squares[size].dress(seen.look)
+        self._squares[size].draw(seen.q, seen.motion)
         return Lensed(self._squares[size], scene.cameras)
 
 

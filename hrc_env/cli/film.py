@@ -1,5 +1,6 @@
 """Films of an agent: played, drawn and encoded; and which episode is worth one."""
 
+import copy
 import os
 import time
 from collections import deque
@@ -18,6 +19,7 @@ from hrc_env.cli.frame import Diary, compose
 from hrc_env.cli.progress import progress_bar
 from hrc_env.env import HRCReachEnv
 from hrc_env.typing import Image
+from hrc_env.views import Glance
 
 STEPS_PER_FRAME = 2
 """A film shows every second step, in real time."""
@@ -25,8 +27,8 @@ CLOSE_M = 0.1
 """The still shows the closest moment that is not yet closer than this [m]."""
 H264 = ("-preset", "veryfast", "-crf", "17")
 """A third of the usual preset's time; sharp."""
-FRAMES_AHEAD = 8
-"""So many frames may wait for the encoder."""
+FRAMES_BEHIND = 2
+"""So many frames may wait to be drawn."""
 
 Make = Callable[[Any], Any]
 """Builds the agent for a `Situation`."""
@@ -55,12 +57,12 @@ def film_episode(
     draft = path.with_suffix(".draft.mp4")
     try:
         agent = make(agents("base").situation(env.simulation))
-        console.print("First look at the scene, and drawing what stands still in it ...")
+        console.print("First look at the scene ...")
         observation, _ = env.reset(seed=seed)
-        compose(env, Diary())
-        with _Encoder(draft, 1 / env.config.ctrl_dt / STEPS_PER_FRAME) as encoder:
-            still = path.with_suffix(".png")
-            totals = _roll(env, agent, observation, n_steps, encoder, still, console)
+        console.print("Drawing what stands still in it ...")
+        with _Studio(env, draft) as studio:
+            totals = _roll(env, agent, observation, n_steps, studio, console)
+        imageio.imwrite(path.with_suffix(".png"), studio.still)
     finally:
         env.close()
     os.replace(draft, path)
@@ -127,11 +129,10 @@ def _roll(
     agent: Any,
     observation: Any,
     n_steps: int,
-    encoder: "_Encoder",
-    still: Path,
+    studio: "_Studio",
     console: Console,
 ) -> dict[str, float]:
-    """Play, draw every second step, and keep the stillest moment of truth: the closest one seen."""
+    """Play and have every second step drawn; the still is the closest moment yet to come."""
     diary, errors_m, info = Diary(), [], {}
     closest_m, started_s = np.inf, time.monotonic()
     with progress_bar(console, "filming") as advance:
@@ -140,16 +141,13 @@ def _roll(
             diary.note(info, float(env.simulation.believed.gap.distance_m.min(initial=np.inf)))
             errors_m.append(info.get("tracking/mpjpe_m", np.nan))
             if step % STEPS_PER_FRAME == 0:
-                frame = compose(env, diary)
-                encoder.add(frame)
                 closer = CLOSE_M < diary.true_m[-1] < closest_m
                 closest_m = diary.true_m[-1] if closer else closest_m
-                if closer or step == 0:
-                    kept = frame
+                studio.add(diary, closer or step == 0)
             advance(1 / n_steps, "filming")
             if terminated:
                 break
-    imageio.imwrite(still, kept)
+        studio.finish()
     seconds = time.monotonic() - started_s
     known = [error for error in errors_m if error == error]
     return {
@@ -164,29 +162,43 @@ def _roll(
     }
 
 
-class _Encoder:
-    """Writes frames to a film in a thread; the encoder itself is ffmpeg's process."""
+class _Studio:
+    """Draws frames and hands them to ffmpeg in a thread, while the environment goes on."""
 
-    def __init__(self, path: Path, fps: float) -> None:
+    def __init__(self, env: HRCReachEnv, path: Path) -> None:
+        self.still: Image = np.zeros((1, 1, 3), np.uint8)
+        """The last frame that was asked to be one."""
+        self._env = env
         self._writer = imageio.get_writer(
-            path, fps=fps, quality=None, macro_block_size=4, output_params=list(H264)
-        )
+            path, fps=1 / env.config.ctrl_dt / STEPS_PER_FRAME, quality=None,
+            macro_block_size=4, output_params=list(H264),
+        )  # fmt: skip
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="hrc_env-film")
         self._waiting: deque[Future[None]] = deque()
 
-    def add(self, frame: Image) -> None:
-        """Take a frame, which is not to be changed any more."""
-        self._waiting.append(self._thread.submit(self._writer.append_data, frame))
-        while len(self._waiting) > FRAMES_AHEAD or (self._waiting and self._waiting[0].done()):
+    def add(self, diary: Diary, is_still: bool) -> None:
+        """Draw this moment some time."""
+        seen = self._env.views.glance()
+        self._waiting.append(self._thread.submit(self._draw, copy.deepcopy(diary), seen, is_still))
+        while len(self._waiting) > FRAMES_BEHIND:
             self._waiting.popleft().result()
 
-    def __enter__(self) -> "_Encoder":
+    def finish(self) -> None:
+        """Wait for what is not drawn yet."""
+        while self._waiting:
+            self._waiting.popleft().result()
+
+    def _draw(self, diary: Diary, seen: Glance, is_still: bool) -> None:
+        frame = compose(self._env, diary, seen)
+        self.still = frame if is_still else self.still
+        self._writer.append_data(frame)
+
+    def __enter__(self) -> "_Studio":
         return self
 
     def __exit__(self, *_: object) -> None:
-        try:
-            for future in self._waiting:
-                future.result()
-        finally:
-            self._thread.shutdown()
-            self._writer.close()
+        """Free what was made in the thread, there."""
+        self._waiting.clear()
+        self._thread.submit(self._env.views.close).result()
+        self._thread.shutdown()
+        self._writer.close()

@@ -12,6 +12,7 @@ from hrc_env import pictures
 from hrc_env.env import HRCReachEnv
 from hrc_env.senses import CAMERA_LEVELS
 from hrc_env.typing import Image
+from hrc_env.views import Glance
 
 WIDTH, HEIGHT = 1600, 900
 ROOM = (792, 716)
@@ -53,22 +54,28 @@ class Diary:
         self.missed = int(info["task/goals_missed"])
 
 
-def compose(env: HRCReachEnv, diary: Diary) -> Image:
-    """One frame (900, 1600, 3): room, cameras, crops or belief, strip."""
-    level = env.simulation.perception
+def compose(env: HRCReachEnv, diary: Diary, seen: Glance | None = None) -> Image:
+    """One frame (900, 1600, 3): room, cameras, crops or belief, strip.
+
+    Args:
+        env: whose views draw; it may have gone on since `seen`.
+        diary: what has happened until then; not written to while this runs.
+        seen: the moment that is shown; None is now.
+    """
+    level, seen = env.simulation.perception, seen or env.views.glance()
     frame = _panel(HEIGHT, WIDTH, level).copy()
-    room = env.views.room(*ROOM)
+    room = env.views.room(*ROOM, seen)
     pictures.label(room, "what happens", (10, 10), 18)
     foot = room[-LEGEND_HEIGHT:]
     cv2.addWeighted(foot, 0.25, legend(level), 0.75, 0, dst=foot)
     _paste(frame, room, (0, 0))
-    for k, view in enumerate(env.views.cameras(*TILE)[:4]):
+    for k, view in enumerate(env.views.cameras(*TILE, seen)[:4]):
         x, y = k % 2 * (TILE[0] + 4), k // 2 * (TILE[1] + 4)
         _paste(frame, view, (RIGHT_X + x, y))
-    for k, crop in enumerate(env.views.crops(CROP)[:4]):
+    for k, crop in enumerate(env.views.crops(CROP, seen)[:4]):
         _paste(frame, crop, (RIGHT_X + k * (CROP + 4), TITLE_Y + 30))
     if level != "pixels":
-        for k, belief in enumerate(env.views.beliefs(*BELIEF)):
+        for k, belief in enumerate(env.views.beliefs(*BELIEF, seen)):
             _paste(frame, belief, (RIGHT_X + k * (BELIEF[0] + 4), TITLE_Y + 30))
     _paste(frame, strip(diary, env.config.ctrl_dt, env.config.cost.proximity_m), (0, 720))
     return frame

@@ -211,8 +211,8 @@ class Canvas:
         """
         self._open()
         self._gl.make_current()
-        height, width = np.shape(z if rgb is None else rgb)[:2]
-        rect = mujoco.MjrRect(0, 0, width, height)
+        shapes = [each.shape for each in (rgb, z) if each is not None]
+        rect = mujoco.MjrRect(0, 0, shapes[0][1], shapes[0][0])
         mujoco.mjr_render(rect, self._shown, self._context)
         mujoco.mjr_readPixels(rgb, z, rect, self._context)
 

@@ -64,7 +64,7 @@ class Still:
     """The same without the sun; None where shadows are not asked for."""
     z: NDArray[np.float32]
     """Top row first; 1 is near."""
-    lit_world: Floats | None
+    lit_world: NDArray[np.float32] | None
     """(H, W, 3) the points that the picture shows [m], one for each of its own pixels."""
 
 
@@ -193,7 +193,7 @@ def viewpoint(name: str, width: int, height: int) -> PinholeCamera:
     return pinhole(name, np.array(eye), np.array(target), hfov_deg, width, height)
 
 
-def _points(place: Place, depth_m: NDArray[np.float32]) -> Floats:
+def _points(place: Place, depth_m: NDArray[np.float32]) -> NDArray[np.float32]:
     """(H, W, 3) float32 points in the world [m]."""
     scale, camera = place.wide_px / place.width, place.camera
     u = place.middle_px[0] + (np.arange(place.width) + 0.5 - place.width / 2) * scale
