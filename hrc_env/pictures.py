@@ -1,7 +1,6 @@
 """Pictures for people: what the cameras see and what is made of it, drawn over a render."""
 
-from functools import lru_cache
-from itertools import pairwise
+from functools import cache, lru_cache
 
 import cv2
 import numpy as np
@@ -30,6 +29,7 @@ BELIEF: Colour = (90, 230, 160)
 COST: Colour = (255, 110, 120)
 
 
+@cache
 def bone_colour(first: int, second: int) -> Colour:
     """Blue on the worker's left, orange on the right, white across."""
     sides = {JOINTS[first].split("_")[0], JOINTS[second].split("_")[0]}
@@ -55,10 +55,8 @@ def draw_estimate(
             continue
         points = image_from_pinhole(camera, px[0, 0]) * scale
         _ellipses(image, camera, joints, estimate.cov_world[row, worker], scale)
-        for first, second in BONES[:-2]:
-            _line(image, points[first], points[second], bone_colour(first, second), thickness)
-        neck = points[[1, 2]].mean(0)
-        _line(image, points[0], neck, MIDDLE, thickness)
+        _draw_bones(image, points, thickness)
+        _lines(image, np.stack([points[0], points[[1, 2]].mean(0)]), MIDDLE, thickness)
 
 
 def draw_keypoints(
@@ -69,11 +67,9 @@ def draw_keypoints(
     for worker in range(keypoints.px.shape[2]):
         px = image_from_pinhole(camera, keypoints.px[row, index, worker])
         confidence = keypoints.confidence[row, index, worker]
-        for point, sure in zip(px, confidence, strict=True):
-            if np.isfinite(point).all():
-                radius = max(2, round(image.shape[1] / 200))
-                colour = _mix(PANEL, DETECTED, 0.35 + 0.65 * float(sure))
-                cv2.circle(image, _fixed(point * scale), radius * 16, colour, -1, cv2.LINE_AA, 4)
+        known = np.isfinite(px).all(-1)
+        radius = max(2, round(image.shape[1] / 200))
+        _draw_joints(image, px[known] * scale, confidence[known], radius)
 
 
 def draw_window(image: Image, camera: PinholeCamera, window: CropWindow) -> None:
@@ -97,11 +93,8 @@ def draw_landmarks(
     points = offset @ np.array([[c, -s], [s, c]]) + image.shape[1] / 2
     if not np.isfinite(points).all():
         return
-    for first, second in BONES[:-2]:
-        _line(image, points[first], points[second], bone_colour(first, second), 1)
-    for point, sure in zip(points, confidence, strict=True):
-        colour = _mix(PANEL, DETECTED, 0.35 + 0.65 * float(sure))
-        cv2.circle(image, _fixed(point), 3 * 16, colour, -1, cv2.LINE_AA, 4)
+    _draw_bones(image, points, 1)
+    _draw_joints(image, points, confidence, 3)
 
 
 def draw_floor(image: Image, camera: PinholeCamera, middle: Floats, reach_m: int = 4) -> None:
@@ -120,9 +113,7 @@ def draw_path(
     px, depth_m = project(camera.P[None], points[None])
     if (depth_m < 0.1).any():
         return
-    scaled = px[0, 0] * (image.shape[1] / camera.width_px)
-    for first, second in pairwise(scaled):
-        _line(image, first, second, colour, thickness)
+    _lines(image, px[0, 0] * (image.shape[1] / camera.width_px), colour, thickness)
 
 
 def draw_goal(image: Image, camera: PinholeCamera, goal_world: Floats) -> None:
@@ -132,8 +123,9 @@ def draw_goal(image: Image, camera: PinholeCamera, goal_world: Floats) -> None:
         return
     scale = image.shape[1] / camera.width_px
     radius = max(4, round(0.05 * camera.K[0, 0] * scale / depth_m[0, 0, 0]))
-    cv2.circle(image, _fixed(px[0, 0, 0] * scale), radius * 16, GOAL, 2, cv2.LINE_AA, 4)
-    cv2.circle(image, _fixed(px[0, 0, 0] * scale), 2 * 16, GOAL, -1, cv2.LINE_AA, 4)
+    (middle,) = _fixed(px[0, 0] * scale)
+    cv2.circle(image, middle, radius * 16, GOAL, 2, cv2.LINE_AA, 4)
+    cv2.circle(image, middle, 2 * 16, GOAL, -1, cv2.LINE_AA, 4)
 
 
 def label(
@@ -222,14 +214,30 @@ def _ellipses(
     part[:] = cv2.addWeighted(overlay, 0.35, part, 0.65, 0)
 
 
-def _line(image: Image, a: Points2, b: Points2, colour: Colour, thickness: int) -> None:
-    cv2.line(image, _fixed(a), _fixed(b), colour, thickness, cv2.LINE_AA, 4)
+def _draw_bones(image: Image, points: Points2, thickness: int) -> None:
+    spots = _fixed(points)
+    for first, second in BONES[:-2]:
+        colour = bone_colour(first, second)
+        cv2.line(image, spots[first], spots[second], colour, thickness, cv2.LINE_AA, 4)
 
 
-def _fixed(point: Points2) -> tuple[int, int]:
-    """Sub-pixel coordinates for OpenCV, which counts from pixel centres: 4 binary places."""
-    x, y = (min(max(float(value) - 0.5, -30000.0), 30000.0) for value in point)
-    return round(x * 16), round(y * 16)
+def _draw_joints(image: Image, points: Points2, confidence: Floats, radius: int) -> None:
+    """Joints (N, 2) [px], faint where nobody was sure."""
+    for spot, sure in zip(_fixed(points), confidence.tolist(), strict=True):
+        colour = _mix(PANEL, DETECTED, 0.35 + 0.65 * sure)
+        cv2.circle(image, spot, radius * 16, colour, -1, cv2.LINE_AA, 4)
+
+
+def _lines(image: Image, points: Points2, colour: Colour, thickness: int) -> None:
+    """Straight lines from point to point (N, 2) [px]."""
+    spots = np.array(_fixed(points), np.int32)
+    cv2.polylines(image, [spots], False, colour, thickness, cv2.LINE_AA, 4)
+
+
+def _fixed(points: Points2) -> list[tuple[int, int]]:
+    """Sub-pixel coordinates (N, 2) for OpenCV, which counts from pixel centres: 4 binary places."""
+    limited = np.clip(points - 0.5, -30000, 30000)
+    return [(x, y) for x, y in np.round(limited * 16).astype(int).tolist()]
 
 
 def _mix(a: Colour, b: Colour, share: float) -> Colour:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from hrc_env.appearance import Look
 from hrc_env.records import WorkerMotion
 from hrc_env.scene.build import Scene
-from hrc_env.scene.layers import BIAS_M, SMOOTHING, Layers, Place
+from hrc_env.scene.layers import BIAS_M, SMOOTHING, Box, Layers, Place
 from hrc_env.typing import Image, JointAngles
 
 SOFT_PX = 3
@@ -47,22 +47,9 @@ class Stage:
         backdrop = self._backdrop(place)
         image = backdrop.rgb.copy()
         self._cast_shadows(image, backdrop)
-        box = left, top, right, bottom = self._layers.box(place)
-        if right <= left or bottom <= top:
-            return image
-        rgb, z = self._layers.moving(place, box)
-        behind = backdrop.z[
-            SMOOTHING * top : SMOOTHING * bottom, SMOOTHING * left : SMOOTHING * right
-        ]
-        nearer = cv2.compare(np.ascontiguousarray(z), np.ascontiguousarray(behind), cv2.CMP_GT)
-        shown = cv2.bitwise_and(np.ascontiguousarray(rgb), np.ascontiguousarray(rgb), mask=nearer)
-        size = (right - left, bottom - top)
-        over = cv2.resize(shown, size, interpolation=cv2.INTER_AREA)
-        free = 255 - cv2.resize(nearer, size, interpolation=cv2.INTER_AREA)
-        part = image[top:bottom, left:right]
-        through = cv2.multiply(part, cv2.cvtColor(free, cv2.COLOR_GRAY2RGB), scale=1 / 255)
-        cv2.add(through, over, dst=through)
-        part[:] = through
+        box = self._layers.box(place)
+        if box[2] > box[0] and box[3] > box[1]:
+            _lay_over(image, backdrop, box, *self._layers.moving(place, box))
         return image
 
     def close(self) -> None:
@@ -88,11 +75,9 @@ class Stage:
         right, down, along = backdrop.spots
         x = (right - shade.corner[0]) / shade.step_m - 0.5
         y = (down - shade.corner[1]) / shade.step_m - 0.5
-        far = float("inf")
-        blocker = cv2.remap(
-            shade.depth_m, x, y, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT, borderValue=far
-        )
-        shaded = cv2.compare(blocker, along - BIAS_M, cv2.CMP_LT)
+        blocker = cv2.remap(shade.z, x, y, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT)
+        z = np.maximum(1 - (along - (BIAS_M + shade.begin_m)) / shade.deep_m, 0)
+        shaded = cv2.compare(blocker, z, cv2.CMP_GT)
         share = cv2.resize(shaded, image.shape[1::-1], interpolation=cv2.INTER_LINEAR)
         share = cv2.blur(share, (SOFT_PX, SOFT_PX))
         x0, y0, wide, high = cv2.boundingRect(share)
@@ -116,10 +101,25 @@ class _Backdrop:
         self.spots: tuple[NDArray[np.floating], ...] = ()
         """What the picture shows in the sun's axes: right, down and along, (h, w) [m] each."""
         axes = layers.sun_axes()
-        if still.lit_world is not None and axes is not None:
-            places = still.lit_world[::COARSE, ::COARSE] @ axes.astype(np.float32)
+        if still.points_world is not None and axes is not None:
+            places = still.points_world[::COARSE, ::COARSE] @ axes.astype(np.float32)
             self.spots = tuple(np.ascontiguousarray(places[..., k]) for k in range(3))
 
 
 def _shrunk(image: Image, size: tuple[int, int]) -> Image:
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def _lay_over(
+    image: Image, backdrop: _Backdrop, box: Box, rgb: Image, z: NDArray[np.float32]
+) -> None:
+    """Lay what is nearer over the picture, with smooth edges, in place."""
+    left, top, right, bottom = box
+    fine = SMOOTHING * np.array(box)
+    behind = np.ascontiguousarray(backdrop.z[fine[1] : fine[3], fine[0] : fine[2]])
+    nearer = cv2.compare(z, behind, cv2.CMP_GT)
+    shown = cv2.bitwise_and(rgb, rgb, mask=nearer)
+    free = 255 - _shrunk(nearer, (right - left, bottom - top))
+    part = image[top:bottom, left:right]
+    through = cv2.multiply(part, cv2.cvtColor(free, cv2.COLOR_GRAY2RGB), scale=1 / 255)
+    part[:] = cv2.add(through, _shrunk(shown, (right - left, bottom - top)))

@@ -53,6 +53,11 @@ class Diary:
         self.reached = int(info["task/goals_reached"])
         self.missed = int(info["task/goals_missed"])
 
+    def copy(self) -> "Diary":
+        """As it is now."""
+        lists = list(self.true_m), list(self.estimated_m), list(self.cost)
+        return Diary(*lists, self.reached, self.missed)
+
 
 def compose(env: HRCReachEnv, diary: Diary, seen: Glance | None = None) -> Image:
     """One frame (900, 1600, 3): room, cameras, crops or belief, strip.

@@ -22,7 +22,7 @@ from hrc_env.records import CropWindow, WorkerMotion
 from hrc_env.scene import gl
 from hrc_env.scene.build import Scene, drawing_model, drawn_looks, drawn_props
 from hrc_env.scene.dressing import as_built, dress, strew, take_off_hats
-from hrc_env.scene.primitives import ROBOT_LOOKS
+from hrc_env.scene.primitives import ROBOT_CAPSULES, ROBOT_LOOKS
 from hrc_env.scene.props import PARKED_M, pose_props
 from hrc_env.scene.rig import glcam_axes
 from hrc_env.scene.wardrobe import wear
@@ -198,10 +198,12 @@ class Canvas:
         return self._data.light_xdir[shining[0]].copy() if len(shining) else None
 
     def movers(self) -> tuple[Floats, Floats]:
-        """Spheres round all that moves: middles (N, 3) and radii (N,) [m]."""
+        """Spheres round all that moves, a worker's capsules for the skin: middles (N, 3) and radii
+        (N,) [m]."""
         model, of = self._model, self._model.geom_bodyid
         moving = (model.body_weldid[of] != 0) | (model.body_mocapid[of] >= 0)
         moving &= self._data.geom_xpos[:, 2] > PARKED_M[2] / 2
+        moving &= model.geom_group != ROBOT_CAPSULES
         return self._data.geom_xpos[moving], model.geom_rbound[moving]
 
     def read(self, rgb: NDArray[np.uint8] | None, z: NDArray[np.float32] | None) -> None:

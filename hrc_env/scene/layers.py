@@ -16,7 +16,14 @@ from hrc_env.geometry.cameras import PinholeCamera, pinhole
 from hrc_env.records import CropWindow, WorkerMotion
 from hrc_env.scene import gl
 from hrc_env.scene.build import Scene
-from hrc_env.scene.canvas import BEFORE_THE_SUN, IN_THE_SHADE, MOVING, STILL, Canvas, across
+from hrc_env.scene.canvas import (
+    BEFORE_THE_SUN,
+    IN_THE_SHADE,
+    MOVING,
+    STILL,
+    Canvas,
+    across,
+)
 from hrc_env.scene.render import ALL_GROUPS, VIEWPOINTS
 from hrc_env.typing import Floats, Image, JointAngles
 
@@ -25,7 +32,7 @@ SMOOTHING = 2
 QUALITY = {
     "offsamples": 0, "shadowsize": 4096, "numslices": 14, "numstacks": 5, "numquads": 1,
 }  # fmt: skip
-SUN_PX = 384
+SUN_PX = 256
 """Side of the picture from the sun."""
 BIAS_M = 0.03
 """Nothing shades what is nearer to it than this, along the light [m]."""
@@ -64,7 +71,7 @@ class Still:
     """The same without the sun; None where shadows are not asked for."""
     z: NDArray[np.float32]
     """Top row first; 1 is near."""
-    lit_world: NDArray[np.float32] | None
+    points_world: NDArray[np.float32] | None
     """(H, W, 3) the points that the picture shows [m], one for each of its own pixels."""
 
 
@@ -72,8 +79,11 @@ class Still:
 class Shade:
     """What moves, seen from the sun."""
 
-    depth_m: NDArray[np.float32]
-    """(SUN_PX, SUN_PX) how far along the light, infinite where nothing is [m]; top row first."""
+    z: NDArray[np.float32]
+    """(SUN_PX, SUN_PX) how near to the sun: 1 `begin_m` along the light, 0 `deep_m` further and
+    where nothing is; top row first."""
+    begin_m: float
+    deep_m: float
     corner: tuple[float, float]
     """Where the first pixel begins: right and down [m], as `sun_axes`."""
     step_m: float
@@ -104,27 +114,27 @@ class Layers:
         canvas.show(STILL, shadows=place.shadows)
         self._aim(place, (0, 0, place.width, place.height))
         canvas.read(rgb, z)
-        dark = lit_world = None
+        dark = points_world = None
         if place.shadows and canvas.sun() is not None:
-            lit_world = _points(place, canvas.distance_m(z[::-1][::SMOOTHING, ::SMOOTHING]))
+            points_world = _points(place, canvas.distance_m(z[::-1][::SMOOTHING, ::SMOOTHING]))
             dark = np.empty_like(rgb)
             canvas.show(IN_THE_SHADE)
             self._aim(place, (0, 0, place.width, place.height))
             canvas.read(dark, None)
             dark = np.ascontiguousarray(dark[::-1])
         z = np.ascontiguousarray(z[::-1])
-        return Still(np.ascontiguousarray(rgb[::-1]), dark, z, lit_world)
+        return Still(np.ascontiguousarray(rgb[::-1]), dark, z, points_world)
 
     def moving(self, place: Place, box: Box) -> tuple[Image, NDArray[np.float32]]:
-        """What moves within a box of the picture: rgb and z, `SMOOTHING` times as large, top row
-        first; black and 0 where nothing is."""
+        """What moves within a box of the picture: rgb and z, `SMOOTHING` times as large,
+        top row first; black and 0 where nothing is."""
         left, top, right, bottom = box
         shape = SMOOTHING * (bottom - top), SMOOTHING * (right - left)
         rgb, z = np.empty((*shape, 3), np.uint8), np.empty(shape, np.float32)
         self._canvas.show(MOVING)
         self._aim(place, box)
         self._canvas.read(rgb, z)
-        return rgb[::-1], z[::-1]
+        return np.ascontiguousarray(rgb[::-1]), np.ascontiguousarray(z[::-1])
 
     def box(self, place: Place) -> Box:
         """Where in the picture things that move are, and maybe a little more."""
@@ -137,16 +147,13 @@ class Layers:
             return 0, 0, 0, 0
         if (depth < radii_m + 0.1).any():
             return 0, 0, place.width, place.height
-        scale = place.width / place.wide_px
-        reach = 1.3 * camera.K[0, 0] * scale * radii_m / (depth - radii_m) + 4
-        u = (camera.K[0, 0] * x / depth + camera.K[0, 2] - place.middle_px[0]) * scale
-        v = (camera.K[1, 1] * y / depth + camera.K[1, 2] - place.middle_px[1]) * scale
-        left, right = (u - reach).min() + place.width / 2, (u + reach).max() + place.width / 2
-        top, bottom = (v - reach).min() + place.height / 2, (v + reach).max() + place.height / 2
-        corners = np.clip(
-            np.floor([left, top, right, bottom]), 0, [*[place.width, place.height] * 2]
-        )
-        return tuple(int(value) for value in corners)  # type: ignore[return-value]
+        u = _reach(x, depth, radii_m) * camera.K[0, 0] + camera.K[0, 2] - place.middle_px[0]
+        v = _reach(y, depth, radii_m) * camera.K[1, 1] + camera.K[1, 2] - place.middle_px[1]
+        scale, size = place.width / place.wide_px, np.array([place.width, place.height])
+        low = np.floor(np.array([u[0], v[0]]) * scale + size / 2 - 2)
+        high = np.ceil(np.array([u[1], v[1]]) * scale + size / 2 + 2)
+        (left, top), (right, bottom) = (np.clip(each, 0, size).astype(int) for each in (low, high))
+        return int(left), int(top), int(right), int(bottom)
 
     def shade(self) -> Shade | None:
         """What moves, as the sun sees it; None without a sun or without anything that moves."""
@@ -165,9 +172,9 @@ class Layers:
         canvas.aim_along(direction, near, half_m, deep_m)
         z = np.empty((SUN_PX, SUN_PX), np.float32)
         canvas.read(None, z)
-        depth_m = np.where(z[::-1] > 0, low[2] + (1 - z[::-1]) * deep_m, np.inf)
         corner = float(middle[0]) - half_m, float(middle[1]) - half_m
-        return Shade(depth_m.astype(np.float32), corner, 2 * half_m / SUN_PX)
+        upright = np.ascontiguousarray(z[::-1])
+        return Shade(upright, float(low[2]), deep_m, corner, 2 * half_m / SUN_PX)
 
     def sun_axes(self) -> Floats | None:
         """(3, 3) columns right, down and along the light that casts shadows."""
@@ -191,6 +198,14 @@ def viewpoint(name: str, width: int, height: int) -> PinholeCamera:
     """The camera of one of `VIEWPOINTS`, for pictures of this size [px]."""
     eye, target, hfov_deg = VIEWPOINTS[name]
     return pinhole(name, np.array(eye), np.array(target), hfov_deg, width, height)
+
+
+def _reach(x: Floats, depth: Floats, radii_m: Floats) -> Floats:
+    """(2,) the least and the greatest of what spheres cover, in focal lengths from the axis."""
+    nearest, furthest = depth - radii_m, depth + radii_m
+    low = np.minimum((x - radii_m) / nearest, (x - radii_m) / furthest)
+    high = np.maximum((x + radii_m) / nearest, (x + radii_m) / furthest)
+    return np.array([low.min(), high.max()])
 
 
 def _points(place: Place, depth_m: NDArray[np.float32]) -> NDArray[np.float32]:
