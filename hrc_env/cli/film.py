@@ -62,9 +62,10 @@ def film_episode(
         with _Studio(env, draft) as studio:
             totals = _roll(env, agent, observation, n_steps, studio, console)
         imageio.imwrite(path.with_suffix(".png"), studio.still)
+        os.replace(draft, path)
     finally:
         env.close()
-    os.replace(draft, path)
+        draft.unlink(missing_ok=True)
     return totals
 
 
