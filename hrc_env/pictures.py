@@ -97,7 +97,7 @@ def draw_landmarks(
     _draw_joints(image, points, confidence, 3)
 
 
-def draw_floor(image: Image, camera: PinholeCamera, middle: Floats, reach_m: int = 4) -> None:
+def draw_floor(image: Image, camera: PinholeCamera, middle: Floats, reach_m: int = 3) -> None:
     """A grid of metres on the floor round a point (3,), in place."""
     along = np.linspace(-reach_m, reach_m, 2)
     for k in range(-reach_m, reach_m + 1):
@@ -252,7 +252,7 @@ def _ink(text: str, size: int) -> NDArray[np.float32]:
     _, _, right, bottom = (round(value) for value in font.getbbox(text))
     drawn = PillowImage.new("L", (right + 2, bottom + 2))
     ImageDraw.Draw(drawn).text((0, 0), text, fill=255, font=font)
-    return np.asarray(drawn, np.float32)[..., None] / 255
+    return np.asarray(drawn, np.float32)[..., None] / np.float32(255)
 
 
 @lru_cache(maxsize=16)

@@ -106,7 +106,7 @@ class _Backdrop:
             self.spots = tuple(np.ascontiguousarray(places[..., k]) for k in range(3))
 
 
-def _shrunk(image: Image, size: tuple[int, int]) -> Image:
+def _shrunk(image: Any, size: tuple[int, int]) -> Image:
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 

@@ -1,5 +1,7 @@
 """Pictures of an environment: sizes, what they show, and that they change nothing."""
 
+from dataclasses import replace
+
 import gymnasium
 import numpy as np
 import pytest
@@ -86,11 +88,12 @@ def test_a_glance_stays_while_the_environment_goes_on():
 def test_what_is_believed_is_drawn_without_the_truth():
     env = HRCReachEnv(perception="none")
     env.reset(seed=7)
-    first = env.views.beliefs(200, 110)
-    q, goal = env.simulation.physics.q.copy(), env.simulation.task.goal_world.copy()
+    seen = env.views.glance()
     env.reset(seed=8)  # another worker, of whom nothing is known
-    env.simulation.physics.q[:], env.simulation.task.goal_world[:] = q, goal
-    for before, after in zip(first, env.views.beliefs(200, 110), strict=True):
+    other = replace(env.views.glance(), q=seen.q, goal_world=seen.goal_world)
+    assert not np.array_equal(seen.motion.position_world, other.motion.position_world)
+    first, second = (env.views.beliefs(200, 110, each) for each in (seen, other))
+    for before, after in zip(first, second, strict=True):
         assert before.std() > 3
         np.testing.assert_array_equal(before, after)
     env.close()
