@@ -10,6 +10,7 @@ from typing import Any, get_type_hints
 
 from rich.console import Console
 
+from hrc_env.cli.kernels import compile_kernels
 from hrc_env.cli.progress import Meter
 from hrc_env.cli.train import Train
 from hrc_env.config import resolve
@@ -31,6 +32,8 @@ with learner():
 
 ONLY_OF_A_RUN = ("out", "timesteps", "threads", "backend", "episodes", "film", "resume")
 """Arguments that a resumed run does not take from the run that it goes on with."""
+FILM_SEEDS = 8
+"""The film shows that of so many episodes which comes closest to the worker."""
 STOPPED = 130
 """Exit status of what Ctrl-C stopped."""
 
@@ -47,6 +50,7 @@ def run(arguments: Train) -> int:
     folder = arguments.resume or unused(arguments.out)
     if arguments.resume is not None:
         arguments = as_before(arguments, folder)
+    compile_kernels(console, arguments.perception)
     curve, seconds = train(arguments, folder, console)
     if seconds is None:
         return STOPPED
@@ -151,8 +155,8 @@ def _learner(
 
 
 def film(folder: Path, arguments: Train, console: Console) -> bool:
-    """Film one episode of the policy; whether this machine can draw."""
-    from hrc_env.cli.film import film_episode
+    """Film the policy's closest encounter with the worker; whether this machine can draw."""
+    from hrc_env.cli.film import film_episode, nearest_seed
 
     def make(here: Situation) -> ppo.TrainedAgent:
         return ppo.load(folder / "policy.zip", here)
@@ -160,7 +164,9 @@ def film(folder: Path, arguments: Train, console: Console) -> bool:
     kwargs = arguments.keywords()
     del kwargs["num_threads"]
     try:
-        film_episode(make, folder / "policy.mp4", seed=arguments.seed, **kwargs)
+        seeds = range(arguments.seed, arguments.seed + FILM_SEEDS)
+        seed = nearest_seed(make, seeds, **kwargs)
+        film_episode(make, folder / "policy.mp4", seed, **kwargs)
     except RenderingError as error:
         console.print(f"No film: {error}", markup=False)
         return False

@@ -34,7 +34,7 @@ from hrc_env.rewards import RewardConfig
 from hrc_env.simulation import Simulation, checked_action
 from hrc_env.stateful import Stateful
 from hrc_env.typing import Floats
-from hrc_env.views import Views
+from hrc_env.views import PICTURE_SIZE, Views, picture_size
 
 RENDER_MODES = ("rgb_array", "depth_array")
 RESET_OPTIONS = ("steps_left",)
@@ -83,7 +83,9 @@ class HRCReachEnv(  # type: ignore[override]  # a property is `spec`, too
             `hrc_env.appearance.APPEARANCES`, an `AppearanceConfig` or a mapping; None for that
             of the config (as built). Level "pixels" only.
         control: "joint" (joint velocities) or "tool" (tool velocity).
-        render_mode: "rgb_array", "depth_array" or None.
+        render_mode: "rgb_array", "depth_array" or None; `gymnasium.make` also takes "human", a
+            window (docs/rendering.md).
+        width, height: of what `render` gives [px].
         config: an `HRCConfig` or a nested mapping of changes to the default.
 
     Raises:
@@ -106,10 +108,12 @@ class HRCReachEnv(  # type: ignore[override]  # a property is `spec`, too
         appearance: str | AppearanceConfig | Mapping[str, Any] | None = None,
         control: str = "joint",
         render_mode: str | None = None,
+        width: int = PICTURE_SIZE[0],
+        height: int = PICTURE_SIZE[1],
         config: HRCConfig | Mapping[str, Any] | None = None,
     ) -> None:
-        if render_mode is not None and render_mode not in RENDER_MODES:
-            raise unknown("render_mode", render_mode, RENDER_MODES)
+        check_render_mode(render_mode)
+        self._size = picture_size(width, height)
         given = with_motions(with_people(resolve(config), people), motions)
         given = with_appearance(given, appearance)
         self.config, used = with_cameras(with_faults(given, faults), cameras)
@@ -169,7 +173,7 @@ class HRCReachEnv(  # type: ignore[override]  # a property is `spec`, too
         """The scene from a good viewpoint, as the render mode says."""
         if self.render_mode is None:
             return None
-        return self.views.picture(depth=self.render_mode == "depth_array")
+        return self.views.picture(self.render_mode == "depth_array", size=self._size)
 
     def mosaic(self) -> NDArray[np.uint8]:
         """The four cameras with crops, detected keypoints and the estimated skeleton."""
@@ -202,6 +206,22 @@ def _steps_left(options: Mapping[str, Any]) -> int:
         if name not in RESET_OPTIONS:
             raise unknown("reset option", name, RESET_OPTIONS)
     return whole('options["steps_left"]', options.get("steps_left", ENDLESS), 1, ENDLESS)
+
+
+def check_render_mode(render_mode: str | None) -> None:
+    """Refuse render modes that there are not.
+
+    Raises:
+        ConfigError: with those that there are, and how to get a window.
+    """
+    if render_mode == "human":
+        raise ConfigError(
+            "render_mode='human' is a window round an environment that draws: gymnasium.make("
+            "'HRCReach-v0', render_mode='human') puts it there (pip install 'hrc_env[view]'), or "
+            "gymnasium.wrappers.HumanRendering does, round one with render_mode='rgb_array'."
+        )
+    if render_mode is not None and render_mode not in RENDER_MODES:
+        raise unknown("render_mode", render_mode, RENDER_MODES)
 
 
 def spaces(simulation: Simulation) -> tuple[Box[np.float32], Box[np.float32]]:

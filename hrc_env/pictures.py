@@ -1,9 +1,10 @@
 """Pictures for people: what the cameras see and what is made of it, drawn over a render."""
 
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image as PillowImage
 from PIL import ImageDraw, ImageFont
 
@@ -22,8 +23,13 @@ WINDOW: Colour = (250, 250, 120)
 INK: Colour = (236, 239, 241)
 PANEL: Colour = (24, 28, 34)
 GOAL: Colour = (255, 214, 0)
+GRID: Colour = (46, 53, 61)
+ARM: Colour = (150, 158, 168)
+BELIEF: Colour = (90, 230, 160)
+COST: Colour = (255, 110, 120)
 
 
+@cache
 def bone_colour(first: int, second: int) -> Colour:
     """Blue on the worker's left, orange on the right, white across."""
     sides = {JOINTS[first].split("_")[0], JOINTS[second].split("_")[0]}
@@ -48,14 +54,9 @@ def draw_estimate(
         if (depth_m < 0.1).any():
             continue
         points = image_from_pinhole(camera, px[0, 0]) * scale
-        overlay = image.copy()
-        for j in range(len(JOINTS)):
-            _ellipse(overlay, camera, joints[j], estimate.cov_world[row, worker, j], scale)
-        cv2.addWeighted(overlay, 0.35, image, 0.65, 0, dst=image)
-        for first, second in BONES[:-2]:
-            _line(image, points[first], points[second], bone_colour(first, second), thickness)
-        neck = points[[1, 2]].mean(0)
-        _line(image, points[0], neck, MIDDLE, thickness)
+        _ellipses(image, camera, joints, estimate.cov_world[row, worker], scale)
+        _draw_bones(image, points, thickness)
+        _lines(image, np.stack([points[0], points[[1, 2]].mean(0)]), MIDDLE, thickness)
 
 
 def draw_keypoints(
@@ -66,11 +67,9 @@ def draw_keypoints(
     for worker in range(keypoints.px.shape[2]):
         px = image_from_pinhole(camera, keypoints.px[row, index, worker])
         confidence = keypoints.confidence[row, index, worker]
-        for point, sure in zip(px, confidence, strict=True):
-            if np.isfinite(point).all():
-                radius = max(2, round(image.shape[1] / 200))
-                colour = _mix(PANEL, DETECTED, 0.35 + 0.65 * float(sure))
-                cv2.circle(image, _fixed(point * scale), radius * 16, colour, -1, cv2.LINE_AA, 4)
+        known = np.isfinite(px).all(-1)
+        radius = max(2, round(image.shape[1] / 200))
+        _draw_joints(image, px[known] * scale, confidence[known], radius)
 
 
 def draw_window(image: Image, camera: PinholeCamera, window: CropWindow) -> None:
@@ -94,11 +93,27 @@ def draw_landmarks(
     points = offset @ np.array([[c, -s], [s, c]]) + image.shape[1] / 2
     if not np.isfinite(points).all():
         return
-    for first, second in BONES[:-2]:
-        _line(image, points[first], points[second], bone_colour(first, second), 1)
-    for point, sure in zip(points, confidence, strict=True):
-        colour = _mix(PANEL, DETECTED, 0.35 + 0.65 * float(sure))
-        cv2.circle(image, _fixed(point), 3 * 16, colour, -1, cv2.LINE_AA, 4)
+    _draw_bones(image, points, 1)
+    _draw_joints(image, points, confidence, 3)
+
+
+def draw_floor(image: Image, camera: PinholeCamera, middle: Floats, reach_m: int = 3) -> None:
+    """A grid of metres on the floor round a point (3,), in place."""
+    along = np.linspace(-reach_m, reach_m, 2)
+    for k in range(-reach_m, reach_m + 1):
+        for line in ([(x, k) for x in along], [(k, y) for y in along]):
+            ends = np.array([(middle[0] + x, middle[1] + y, 0.0) for x, y in line])
+            draw_path(image, camera, ends, GRID, 1)
+
+
+def draw_path(
+    image: Image, camera: PinholeCamera, points: Floats, colour: Colour, thickness: int
+) -> None:
+    """Straight lines from point to point (N, 3) [m], in place; none where one is behind."""
+    px, depth_m = project(camera.P[None], points[None])
+    if (depth_m < 0.1).any():
+        return
+    _lines(image, px[0, 0] * (image.shape[1] / camera.width_px), colour, thickness)
 
 
 def draw_goal(image: Image, camera: PinholeCamera, goal_world: Floats) -> None:
@@ -108,8 +123,9 @@ def draw_goal(image: Image, camera: PinholeCamera, goal_world: Floats) -> None:
         return
     scale = image.shape[1] / camera.width_px
     radius = max(4, round(0.05 * camera.K[0, 0] * scale / depth_m[0, 0, 0]))
-    cv2.circle(image, _fixed(px[0, 0, 0] * scale), radius * 16, GOAL, 2, cv2.LINE_AA, 4)
-    cv2.circle(image, _fixed(px[0, 0, 0] * scale), 2 * 16, GOAL, -1, cv2.LINE_AA, 4)
+    (middle,) = _fixed(px[0, 0] * scale)
+    cv2.circle(image, middle, radius * 16, GOAL, 2, cv2.LINE_AA, 4)
+    cv2.circle(image, middle, 2 * 16, GOAL, -1, cv2.LINE_AA, 4)
 
 
 def label(
@@ -130,13 +146,16 @@ def write(
     image: Image, text: str, at: tuple[int, int], size: int = 16, colour: Colour = INK
 ) -> None:
     """Text with its upper left corner at `at`, in place."""
-    font = _font(size)
-    _, _, right, bottom = (round(value) for value in font.getbbox(text))
     x, y = at
-    patch = image[y : y + bottom + 2, x : x + right + 2]
-    drawn = PillowImage.fromarray(patch)
-    ImageDraw.Draw(drawn).text((0, 0), text, fill=colour, font=font)
-    patch[:] = np.asarray(drawn)
+    ink = _ink(text, size)
+    patch = image[y : y + ink.shape[0], x : x + ink.shape[1]]
+    ink = ink[: patch.shape[0], : patch.shape[1]]
+    patch[:] = patch + ink * (np.array(colour, np.float32) - patch)
+
+
+def text_width(text: str, size: int = 16) -> int:
+    """How wide a text is [px]."""
+    return round(_font(size).getbbox(text)[2])
 
 
 def tile(pictures: list[Image], columns: int, gap: int = 4) -> Image:
@@ -162,41 +181,78 @@ def middle_rows(image: Image, height: int) -> Image:
     return image[top : top + height]
 
 
-def _ellipse(
-    image: Image, camera: PinholeCamera, joint: Floats, covariance: Floats, scale: float
+def _ellipses(
+    image: Image, camera: PinholeCamera, joints: Floats, covariances: Floats, scale: float
 ) -> None:
-    """The image of a 2-sigma region, to first order."""
+    """The images of 2-sigma regions of joints (J, 3), to first order, faintly, in place."""
     R_cam_from_world = camera.T_world_from_cam[:3, :3].T
-    x, y, z = R_cam_from_world @ (joint - camera.eye_world)
-    focal = camera.K[0, 0] * scale
-    J = focal / z * np.array([[1, 0, -x / z], [0, 1, -y / z]]) @ R_cam_from_world
-    values, vectors = np.linalg.eigh(J @ covariance @ J.T)
-    stretch = float(
-        pinhole_stretch(camera, camera.K[:2, 2] + camera.K[0, 0] * np.array([x, y]) / z)
-    )
+    x, y, z = ((joints - camera.eye_world) @ R_cam_from_world.T).T
+    one, none = np.ones_like(z), np.zeros_like(z)
+    local = np.stack([np.stack([one, none, -x / z], -1), np.stack([none, one, -y / z], -1)], 1)
+    J = (camera.K[0, 0] * scale / z)[:, None, None] * local @ R_cam_from_world
+    values, vectors = np.linalg.eigh(J @ covariances @ J.transpose(0, 2, 1))
+    pinhole_px = camera.K[:2, 2] + camera.K[0, 0] * np.stack([x, y], -1) / z[:, None]
+    stretch = np.reshape(pinhole_stretch(camera, pinhole_px), (-1, 1))
     axes = 2 * np.sqrt(np.maximum(values, 0.25)) / stretch
-    if axes.max() > 4 * image.shape[1]:
+    angles = np.degrees(np.arctan2(vectors[:, 1, 1], vectors[:, 0, 1]))
+    centres = image_from_pinhole(camera, pinhole_px) * scale
+    fit = np.flatnonzero((axes.max(-1) <= 4 * image.shape[1]) & np.isfinite(centres).all(-1))
+    if not len(fit):
         return
-    angle = np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1]))
-    px = image_from_pinhole(camera, project(camera.P[None], joint[None, None])[0][0, 0, 0]) * scale
-    centre = (int(px[0]), int(px[1]))
-    size = (max(1, round(axes[1])), max(1, round(axes[0])))
-    cv2.ellipse(image, centre, size, angle, 0, 360, (90, 230, 160), -1, cv2.LINE_AA)
+    reach = axes[fit].max(-1, keepdims=True) + 2
+    size = np.array(image.shape[1::-1])
+    low = np.clip(np.floor((centres[fit] - reach).min(0)), 0, size).astype(int)
+    high = np.clip(np.ceil((centres[fit] + reach).max(0)), 0, size).astype(int)
+    part = image[low[1] : high[1], low[0] : high[0]]
+    if not part.size:
+        return
+    overlay = part.copy()
+    for j in fit.tolist():
+        centre = int(centres[j, 0]) - int(low[0]), int(centres[j, 1]) - int(low[1])
+        radii = max(1, round(axes[j, 1])), max(1, round(axes[j, 0]))
+        cv2.ellipse(overlay, centre, radii, angles[j], 0, 360, BELIEF, -1, cv2.LINE_AA)
+    part[:] = cv2.addWeighted(overlay, 0.35, part, 0.65, 0)
 
 
-def _line(image: Image, a: Points2, b: Points2, colour: Colour, thickness: int) -> None:
-    cv2.line(image, _fixed(a), _fixed(b), colour, thickness, cv2.LINE_AA, 4)
+def _draw_bones(image: Image, points: Points2, thickness: int) -> None:
+    spots = _fixed(points)
+    for first, second in BONES[:-2]:
+        colour = bone_colour(first, second)
+        cv2.line(image, spots[first], spots[second], colour, thickness, cv2.LINE_AA, 4)
 
 
-def _fixed(point: Points2) -> tuple[int, int]:
-    """Sub-pixel coordinates for OpenCV, which counts from pixel centres: 4 binary places."""
-    limited = np.clip(point - 0.5, -30000, 30000)
-    return round(limited[0] * 16), round(limited[1] * 16)
+def _draw_joints(image: Image, points: Points2, confidence: Floats, radius: int) -> None:
+    """Joints (N, 2) [px], faint where nobody was sure."""
+    for spot, sure in zip(_fixed(points), confidence.tolist(), strict=True):
+        colour = _mix(PANEL, DETECTED, 0.35 + 0.65 * sure)
+        cv2.circle(image, spot, radius * 16, colour, -1, cv2.LINE_AA, 4)
+
+
+def _lines(image: Image, points: Points2, colour: Colour, thickness: int) -> None:
+    """Straight lines from point to point (N, 2) [px]."""
+    spots = np.array(_fixed(points), np.int32)
+    cv2.polylines(image, [spots], False, colour, thickness, cv2.LINE_AA, 4)
+
+
+def _fixed(points: Points2) -> list[tuple[int, int]]:
+    """Sub-pixel coordinates (N, 2) for OpenCV, which counts from pixel centres: 4 binary places."""
+    limited = np.clip(points - 0.5, -30000, 30000)
+    return [(x, y) for x, y in np.round(limited * 16).astype(int).tolist()]
 
 
 def _mix(a: Colour, b: Colour, share: float) -> Colour:
     red, green, blue = (round(p + share * (q - p)) for p, q in zip(a, b, strict=True))
     return red, green, blue
+
+
+@lru_cache(maxsize=256)
+def _ink(text: str, size: int) -> NDArray[np.float32]:
+    """(H, W, 1) how much ink there is where, 0 to 1."""
+    font = _font(size)
+    _, _, right, bottom = (round(value) for value in font.getbbox(text))
+    drawn = PillowImage.new("L", (right + 2, bottom + 2))
+    ImageDraw.Draw(drawn).text((0, 0), text, fill=255, font=font)
+    return np.asarray(drawn, np.float32)[..., None] / np.float32(255)
 
 
 @lru_cache(maxsize=16)

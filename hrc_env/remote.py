@@ -74,9 +74,9 @@ class Remote:
         """As `Simulation.set_state`."""
         self._ask("set_state", state)
 
-    def picture(self, depth: bool, b: int) -> NDArray[Any]:
+    def picture(self, depth: bool, b: int, size: tuple[int, int]) -> NDArray[Any]:
         """As `Views.picture`."""
-        return self._ask("picture", depth, b)
+        return self._ask("picture", depth, b, size)
 
     def close(self) -> None:
         """End the process."""

@@ -32,7 +32,7 @@ from hrc_env.tracking import given
 from hrc_env.tracking.ahead import ahead
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import make_estimator
-from hrc_env.typing import Bools, Ints
+from hrc_env.typing import Bools, Image, Ints
 
 LEVELS = ("pixels", "keypoints", "truth", "none")
 CAMERA_LEVELS = LEVELS[:2]
@@ -56,6 +56,11 @@ class Senses(Protocol):
 
     def looks(self, b: int) -> tuple[Keypoints | None, Windows]:
         """What environment `b` saw last, and through which windows (for pictures)."""
+        ...
+
+    def crops(self, b: int) -> list[Image | None]:
+        """What the pose network was given of environment `b`'s first worker, one a camera (for
+        pictures); none where there is no network."""
         ...
 
     def look_of(self, b: int) -> Look | None:
@@ -153,6 +158,10 @@ class GivenSenses(Stateful):
         """No camera took part."""
         return None, []
 
+    def crops(self, b: int) -> list[Image | None]:
+        """No network was given anything."""
+        return []
+
     def look_of(self, b: int) -> Look | None:
         """As it was built."""
         return None
@@ -185,6 +194,10 @@ class BlindSenses(Stateful):
     def looks(self, b: int) -> tuple[Keypoints | None, Windows]:
         """No camera took part."""
         return None, []
+
+    def crops(self, b: int) -> list[Image | None]:
+        """No network was given anything."""
+        return []
 
     def look_of(self, b: int) -> Look | None:
         """As it was built."""

@@ -29,7 +29,7 @@ from hrc_env.config import (
     with_motions,
     with_people,
 )
-from hrc_env.env import RENDER_MODES, PlainSpec, spaces
+from hrc_env.env import RENDER_MODES, PlainSpec, check_render_mode, spaces
 from hrc_env.errors import ConfigError, unknown
 from hrc_env.faults.fault import FaultConfig
 from hrc_env.motion.generator import Clip, PeopleConfig
@@ -49,7 +49,7 @@ from hrc_env.vector_options import (
     threads_of,
     time_limit,
 )
-from hrc_env.views import Views
+from hrc_env.views import PICTURE_SIZE, Views, picture_size
 
 THREADS, PROCESSES = BACKENDS = ("threads", "processes")
 
@@ -70,6 +70,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         estimator, cameras, scene, n_workers, people, motions, faults, appearance, control,
             config: as `HRCReachEnv`.
         render_mode: "rgb_array", "depth_array" or None.
+        width, height: of what `render` gives [px].
         max_episode_steps: the time limit; None or -1 is none.
         autoreset_mode: when an environment whose episode is over starts anew: at the next
             step (default), in the same step, or not by itself ("Disabled").
@@ -99,6 +100,8 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         appearance: str | AppearanceConfig | Mapping[str, Any] | None = None,
         control: str = "joint",
         render_mode: str | None = None,
+        width: int = PICTURE_SIZE[0],
+        height: int = PICTURE_SIZE[1],
         config: HRCConfig | Mapping[str, Any] | None = None,
         max_episode_steps: int | None = 250,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
@@ -110,8 +113,8 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
                 'perception="pixels" has no batched form: gymnasium.make_vec makes it with a '
                 'process for each environment. perception="keypoints" emulates it, batched.'
             )
-        if render_mode is not None and render_mode not in RENDER_MODES:
-            raise unknown("render_mode", render_mode, RENDER_MODES)
+        check_render_mode(render_mode)
+        self._size = picture_size(width, height)
         self.num_envs = count_of(num_envs)
         self.autoreset_mode = autoreset_of(autoreset_mode)
         self.render_mode = render_mode
@@ -226,7 +229,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
             return None
         depth = self.render_mode == "depth_array"
         return tuple(
-            view.picture(depth, b)
+            view.picture(depth, b, self._size)
             for view, part in zip(self.views, self.shards.parts, strict=True)
             for b in range(part.batch)
         )

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rich.console import Console
-from rich.table import Table
 
 from hrc_env.agents_door import agents
 from hrc_env.cli.checks import at_least, writable_file
@@ -27,25 +26,21 @@ class Demo(EnvironmentArguments):
         """Film and tell."""
         at_least("--seed", self.seed, 0)
         writable_file(self.out, ".mp4")
-        from hrc_env.cli.film import film_episode  # here: --help imports no simulator
+        console, started_s = Console(), time.monotonic()
+        console.print("Loading the simulator ...")
+        from hrc_env.cli.film import film_episode, table  # here: --help imports no simulator
         from hrc_env.config import resolve
 
         keywords = self.keywords()
         ctrl_dt = resolve(keywords.get("config")).ctrl_dt
         at_least("--seconds", self.seconds, ctrl_dt)
-        console, started_s = Console(), time.monotonic()
         base = agents("base")
         n_steps = round(self.seconds / ctrl_dt)
         totals = film_episode(
             lambda here: base.make_agent("scripted_slowed", here),
             self.out, self.seed, n_steps, **keywords,
         )  # fmt: skip
-        table = Table("", "", title="the worker is known through four cameras only")
-        for name, value in totals.items():
-            table.add_row(name, f"{value:.2f}")
-        table.add_row(
-            "steps/s (drawing included)", f"{n_steps / (time.monotonic() - started_s):.1f}"
-        )
-        console.print(table)
+        totals["all in all [s]"] = time.monotonic() - started_s
+        console.print(table(totals, "the worker is known through four cameras only"))
         console.print(f"Watch [bold]{self.out}[/] (still: {self.out.with_suffix('.png')})")
         return 0

@@ -1,167 +1,206 @@
-"""Films: the room beside the four cameras, with a strip that tells distance and cost."""
+"""Films of an agent: played, drawn and encoded; and which episode is worth one."""
 
 import os
-from collections.abc import Callable
-from dataclasses import dataclass, field
+import time
+from collections import deque
+from collections.abc import Callable, Iterable
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-import cv2
 import imageio.v2 as imageio
 import numpy as np
-from numpy.typing import NDArray
+from rich.console import Console
+from rich.table import Table
 
-from hrc_env import pictures
 from hrc_env.agents_door import agents
-from hrc_env.cli.progress import track
+from hrc_env.cli.frame import Diary, compose
+from hrc_env.cli.kernels import compile_kernels
+from hrc_env.cli.progress import progress_bar
 from hrc_env.env import HRCReachEnv
 from hrc_env.typing import Image
+from hrc_env.views import Glance
 
-WIDTH, HEIGHT = 1600, 900
-ROOM = (792, 716)
-TILE = (400, 225)
-CROP = 196
-STRIP_HEIGHT = 180
 STEPS_PER_FRAME = 2
 """A film shows every second step, in real time."""
 CLOSE_M = 0.1
 """The still shows the closest moment that is not yet closer than this [m]."""
-STRIP_S = 10.0
-"""Seconds that the strip below shows."""
-FAR_M = 1.5
-"""Distances are drawn up to this [m]."""
+H264 = ("-preset", "superfast", "-crf", "18")
+"""A fifth of the usual preset's time; sharp."""
+FRAMES_BEHIND = 2
+"""So many frames may wait to be drawn."""
 
-
-@dataclass(slots=True)
-class Diary:
-    """What the strip shows: one entry a step."""
-
-    true_m: list[float] = field(default_factory=list)
-    estimated_m: list[float] = field(default_factory=list)
-    cost: list[float] = field(default_factory=list)
-
-    def note(self, info: dict[str, Any], estimated_m: float) -> None:
-        """Add a step."""
-        self.true_m.append(info.get("safety/min_separation_m", np.inf))
-        self.estimated_m.append(estimated_m)
-        self.cost.append(info["cost"])
+Make = Callable[[Any], Any]
+"""Builds the agent for a `Situation`."""
 
 
 def film_episode(
-    make: Callable[[Any], Any], path: Path, seed: int = 0, n_steps: int = 250, **kwargs: Any
+    make: Make, path: Path, seed: int = 0, n_steps: int = 250, **kwargs: Any
 ) -> dict[str, float]:
-    """Film `n_steps` of an agent; returns what came of them.
+    """Film `n_steps` of an agent; returns what came of them, by name and [unit].
 
     Args:
         make: builds the agent for a `Situation`.
         path: an .mp4 file; a still of the closest moment that is no near miss yet (or of the
             first step) is written beside it as .png.
+        seed: of the episode.
+        n_steps: how many steps; every second one is a frame.
         kwargs: as of `HRCReachEnv`.
 
     Raises:
         RenderingError: this machine has no OpenGL.
     """
+    console = Console()
+    compile_kernels(console, kwargs.get("perception", "pixels"))
+    console.print(f"Making the environment: perception {kwargs.get('perception', 'pixels')} ...")
     env = HRCReachEnv(**kwargs)
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_suffix(".draft.mp4")
-    fps = 1 / env.config.ctrl_dt / STEPS_PER_FRAME
     try:
-        with imageio.get_writer(draft, fps=fps, quality=8, macro_block_size=4) as writer:
-            totals = _roll(env, make, seed, n_steps, writer, path.with_suffix(".png"))
+        agent = make(agents("base").situation(env.simulation))
+        console.print("First look at the scene ...")
+        observation, _ = env.reset(seed=seed)
+        console.print("Drawing what stands still in it ...")
+        with _Studio(env, draft) as studio:
+            totals = _roll(env, agent, observation, n_steps, studio, console)
+        imageio.imwrite(path.with_suffix(".png"), studio.still)
+        os.replace(draft, path)
     finally:
         env.close()
-    os.replace(draft, path)
+        draft.unlink(missing_ok=True)
     return totals
 
 
-def _roll(
-    env: HRCReachEnv, make: Callable[[Any], Any], seed: int, n_steps: int, writer: Any, still: Path
-) -> dict[str, float]:
-    """Play, draw every step, and keep the stillest moment of truth: the closest one seen."""
+def nearest_seed(make: Make, seeds: Iterable[int], n_steps: int = 250, **kwargs: Any) -> int:
+    """Of some seeds the one whose episode comes closest to the worker without touching them.
+
+    Nothing is drawn: "pixels" is played as "keypoints", and may come out otherwise in the film.
+
+    Args:
+        make: builds the agent for a `Situation`.
+        seeds: of the episodes that are played.
+        n_steps: their length.
+        kwargs: as of `HRCReachEnv`.
+    """
+    if kwargs.get("perception", "pixels") == "pixels":
+        kwargs = {**kwargs, "perception": "keypoints", "appearance": None}
+    env, closest_m, tried = HRCReachEnv(**kwargs), {}, list(seeds)
+    try:
+        with progress_bar(Console(), "looking for an encounter") as advance:
+            for seed in tried:
+                closest_m[seed] = _closest_m(env, make, seed, n_steps)
+                advance(1 / len(tried), "looking for an encounter")
+    finally:
+        env.close()
+    return _encounter(closest_m)
+
+
+def table(totals: dict[str, float], title: str = "") -> Table:
+    """What `film_episode` has returned, each value with its unit."""
+    rows = Table("", "", "unit", title=title or None)
+    rows.columns[1].justify = "right"
+    for name, value in totals.items():
+        what, _, unit = name.partition(" [")
+        places = {"count": 0, "m": 2}.get(unit.rstrip("]"), 1)
+        rows.add_row(what, f"{value:.{places}f}", unit.rstrip("]"))
+    return rows
+
+
+def _encounter(closest_m: dict[int, float]) -> int:
+    """The seed of the closest episode that is no near miss; else of the one least close."""
+    apart = {seed: metres for seed, metres in closest_m.items() if metres > CLOSE_M}
+    if apart:
+        return min(apart, key=lambda seed: apart[seed])
+    return max(closest_m, key=lambda seed: closest_m[seed])
+
+
+def _closest_m(env: HRCReachEnv, make: Make, seed: int, n_steps: int) -> float:
     agent = make(agents("base").situation(env.simulation))
     observation, _ = env.reset(seed=seed)
-    diary, errors_m, infos = Diary(), [], []
     closest_m = np.inf
-    for step in track(range(n_steps), description="filming"):
+    for _ in range(n_steps):
         observation, _, terminated, _, info = env.step(agent.act(observation))
-        infos.append(info)
-        diary.note(info, float(env.simulation.believed.gap.distance_m.min(initial=np.inf)))
-        errors_m.append(info.get("tracking/mpjpe_m", np.nan))
-        if step % STEPS_PER_FRAME == 0:
-            frame = compose(env, diary)
-            writer.append_data(frame)
-            closer = CLOSE_M < diary.true_m[-1] < closest_m
-            closest_m = diary.true_m[-1] if closer else closest_m
-            if closer or step == 0:
-                imageio.imwrite(still, frame)
+        closest_m = min(closest_m, float(info.get("safety/min_separation_m", np.inf)))
         if terminated:
             break
+    return closest_m
+
+
+def _roll(
+    env: HRCReachEnv,
+    agent: Any,
+    observation: Any,
+    n_steps: int,
+    studio: "_Studio",
+    console: Console,
+) -> dict[str, float]:
+    """Play and have every second step drawn; the still is the closest moment yet to come."""
+    diary, errors_m, info = Diary(), [], {}
+    closest_m, started_s = np.inf, time.monotonic()
+    with progress_bar(console, "filming") as advance:
+        for step in range(n_steps):
+            observation, _, terminated, _, info = env.step(agent.act(observation))
+            diary.note(info, float(env.simulation.believed.gap.distance_m.min(initial=np.inf)))
+            errors_m.append(info.get("tracking/mpjpe_m", np.nan))
+            if step % STEPS_PER_FRAME == 0:
+                closer = CLOSE_M < diary.true_m[-1] < closest_m
+                closest_m = diary.true_m[-1] if closer else closest_m
+                studio.add(diary, closer or step == 0)
+            advance(1 / n_steps, "filming")
+            if terminated:
+                break
+        studio.finish()
+    seconds = time.monotonic() - started_s
     known = [error for error in errors_m if error == error]
     return {
         "median tracking error [mm]": 1e3 * float(np.median(known)) if known else np.nan,
         "lost steps [%]": 100 * (1 - len(known) / len(errors_m)),
         "minimum separation [m]": float(np.min(diary.true_m)),
-        "goals reached": infos[-1]["task/goals_reached"],
-        "goals missed": infos[-1]["task/goals_missed"],
-        "cost": infos[-1]["episode_cost"],
+        "goals reached [count]": info["task/goals_reached"],
+        "goals missed [count]": info["task/goals_missed"],
+        "cost [count]": info["episode_cost"],
+        "steps played [steps/s]": len(errors_m) / seconds,
+        "film drawn [frames/s]": len(range(0, len(errors_m), STEPS_PER_FRAME)) / seconds,
     }
 
 
-def compose(env: HRCReachEnv, diary: Diary) -> Image:
-    """One frame: room, cameras, crops, strip."""
-    frame = np.empty((HEIGHT, WIDTH, 3), np.uint8)
-    frame[:] = pictures.PANEL
-    room = env.views.room(*ROOM)
-    pictures.label(room, "what happens", (10, 10), 18)
-    _paste(frame, room, (0, 0))
-    views = env.views.cameras(*TILE)
-    _paste(frame, pictures.tile(views, 2), (WIDTH - 2 * TILE[0] - 4, 0))
-    crops = env.views.crops(CROP)
-    for k, crop in enumerate(crops[:4]):
-        _paste(frame, crop, (WIDTH - 2 * TILE[0] - 4 + k * (CROP + 4), 2 * TILE[1] + 52))
-    title = "what the pose network is given: crops round the predicted worker"
-    if not crops:
-        title = f"perception level {env.simulation.perception}: nobody looked at these pictures"
-    pictures.write(frame, title, (WIDTH - 2 * TILE[0], 2 * TILE[1] + 22), 16)
-    _paste(frame, strip(diary, env.config.ctrl_dt, env.config.cost.proximity_m), (0, 720))
-    return frame
+class _Studio:
+    """Draws frames and hands them to ffmpeg in a thread, while the environment goes on."""
 
+    def __init__(self, env: HRCReachEnv, path: Path) -> None:
+        self.still: Image = np.zeros((1, 1, 3), np.uint8)
+        """The last frame that was asked to be one."""
+        self._env = env
+        self._writer = imageio.get_writer(
+            path, fps=1 / env.config.ctrl_dt / STEPS_PER_FRAME, quality=None,
+            macro_block_size=4, output_params=list(H264),
+        )  # fmt: skip
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="hrc_env-film")
+        self._waiting: deque[Future[None]] = deque()
 
-def strip(diary: Diary, dt_s: float, limit_m: float) -> Image:
-    """True and estimated separation over the last seconds; red where a step cost."""
-    image = np.empty((STRIP_HEIGHT, WIDTH, 3), np.uint8)
-    image[:] = pictures.PANEL
-    n_shown = round(STRIP_S / dt_s)
-    left, right, top, bottom = 230, WIDTH - 20, 14, STRIP_HEIGHT - 14
+    def add(self, diary: Diary, is_still: bool) -> None:
+        """Draw this moment some time."""
+        seen = self._env.views.glance()
+        self._waiting.append(self._thread.submit(self._draw, diary.copy(), seen, is_still))
+        while len(self._waiting) > FRAMES_BEHIND:
+            self._waiting.popleft().result()
 
-    def y_of(metres: float) -> int:
-        return round(bottom - (bottom - top) * float(np.clip(metres, 0, FAR_M)) / FAR_M)
+    def finish(self) -> None:
+        """Wait for what is not drawn yet."""
+        while self._waiting:
+            self._waiting.popleft().result()
 
-    first = max(0, len(diary.cost) - n_shown)
-    for k, value in enumerate(diary.cost[first:]):
-        if value > 0:
-            x = round(left + (right - left) * k / n_shown)
-            colour = (150, 30, 40) if value < 2 else (255, 40, 60)
-            cv2.rectangle(image, (x, top), (x + 6, bottom), colour, -1)
-    for metres in (0.0, 0.5, 1.0, 1.5):
-        cv2.line(image, (left, y_of(metres)), (right, y_of(metres)), (60, 66, 74), 1)
-        pictures.write(image, f"{metres:.1f} m", (left - 52, y_of(metres) - 9), 14)
-    cv2.line(image, (left, y_of(limit_m)), (right, y_of(limit_m)), (190, 70, 80), 1)
-    for series, colour in ((diary.true_m, pictures.INK), (diary.estimated_m, (90, 230, 160))):
-        shown = series[first:]
-        points = [
-            (round(left + (right - left) * k / n_shown), y_of(value))
-            for k, value in enumerate(shown)
-        ]
-        cv2.polylines(image, [np.array(points, np.int32)], False, colour, 2, cv2.LINE_AA)
-    pictures.write(image, "separation", (14, 14), 18)
-    pictures.write(image, "true", (14, 44), 15)
-    pictures.write(image, "as the robot believes", (14, 66), 15, (90, 230, 160))
-    pictures.write(image, f"cost {sum(diary.cost):.0f}", (14, 100), 18, (255, 110, 120))
-    pictures.write(image, f"{len(diary.cost) * dt_s:.1f} s", (14, 130), 18)
-    return image
+    def _draw(self, diary: Diary, seen: Glance, is_still: bool) -> None:
+        frame = compose(self._env, diary, seen)
+        self.still = frame if is_still else self.still
+        self._writer.append_data(frame)
 
+    def __enter__(self) -> "_Studio":
+        return self
 
-def _paste(frame: Image, picture: NDArray[np.uint8], at: tuple[int, int]) -> None:
-    x, y = at
-    frame[y : y + picture.shape[0], x : x + picture.shape[1]] = picture
+    def __exit__(self, *_: object) -> None:
+        """Free what was made in the thread, there."""
+        self._waiting.clear()
+        self._thread.submit(self._env.views.close).result()
+        self._thread.shutdown()
+        self._writer.close()

@@ -47,7 +47,10 @@ class Play(EnvironmentArguments):
             return self._film(self.video)
         import gymnasium  # here and below: --help imports no simulator
 
+        from hrc_env.cli.kernels import compile_kernels
+
         base = agents("base")
+        compile_kernels(Console(), self.perception)
         env = gymnasium.make(self.id, **self.keywords())
         try:
             for episode in range(self.episodes):
@@ -57,15 +60,14 @@ class Play(EnvironmentArguments):
         return 0
 
     def _film(self, video: Path) -> int:
-        from hrc_env.cli.film import film_episode
+        from hrc_env.cli.film import film_episode, table
 
         base = agents("base")
         totals = film_episode(
             lambda here: base.make_agent(self.agent, here, self.seed),
             video, self.seed, **self.keywords(),
         )  # fmt: skip
-        for name, value in totals.items():
-            Console().print(f"{name:28s} {value:.2f}", markup=False)  # units stand in []
+        Console().print(table(totals))
         return 0
 
     def _play(self, env: "gymnasium.Env[Any, Any]", base: Any, seed: int) -> None:

@@ -8,8 +8,7 @@ from typing import Literal
 
 from rich.console import Console
 
-from hrc_env.cli.progress import progress_bar
-from hrc_env.kernels import ahead
+from hrc_env.cli.kernels import compile_kernels
 from hrc_env.kernels.cache import folder
 from hrc_env.perception import weights
 from hrc_env.scene.gl import APT_LINE, gl_status
@@ -32,6 +31,7 @@ class Setup:
             weights.fetch_weights(names=[*weights.ALWAYS, *extra])
         console.print(f"[green]ok[/] pose network: official weights in {weights.cache_dir()}")
         compile_kernels(console)
+        console.print(f"[green]ok[/] kernels: compiled, in {folder()}")
         ready, message = gl_status()
         if not ready and _may_install():
             console.print(f"Installing OpenGL: {APT_LINE}")
@@ -47,16 +47,6 @@ class Setup:
             "Without it everything works but perception='pixels' and pictures."
         )
         return 0
-
-
-def compile_kernels(console: Console, level: str | None = None) -> None:
-    """Compile what a perception level (None: any) calls, under a progress bar."""
-    n_missing = len(ahead.missing(level))
-    if n_missing:
-        console.print(f"Compiling {n_missing} kernels for this machine, once ...")
-        with progress_bar(console, "kernels") as say:
-            ahead.compile_missing(level, say)
-    console.print(f"[green]ok[/] kernels: compiled, in {folder()}")
 
 
 def _may_install() -> bool:

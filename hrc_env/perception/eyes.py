@@ -8,7 +8,7 @@ numbers, so that what is seen does not depend on who came first.
 import functools
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 import cv2
@@ -100,6 +100,8 @@ class Sight:
     """(C, J) standard deviation of each coordinate [px]."""
     windows: list[CropWindow | None]
     """Where each camera looked."""
+    crops: list[Image | None] = field(default_factory=list)
+    """(C,) what the network was given of each camera."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,8 +169,8 @@ class Eyes(Stateful):
             windows = agreed_windows(apart_from(known, others), self.cameras)
         used = [c for c, window in enumerate(windows) if window is not None]
         asked = [not searched and self._is_turn(looks[c], c) for c in used]
-        joints_of = self._share(self._landmark_jobs(source, windows, used, asked, folded))
         sight = self._nothing(list(windows))
+        joints_of = self._share(self._landmark_jobs(source, sight, used, asked, folded))
         for c, joints in zip(used, joints_of, strict=True):
             if joints is None:
                 looks[c] = 0  # ask the detector stage again before believing
@@ -214,16 +216,16 @@ class Eyes(Stateful):
     def _landmark_jobs(
         self,
         source: ImageSource,
-        windows: Sequence[CropWindow | None],
+        sight: Sight,
         used: list[int],
         asked: list[bool],
         folded: bool,
     ) -> Iterator[Callable[[_Networks], Floats | None]]:
         """Draw one crop after the other; each comes with the work that is to be done on it."""
         for c, ask in zip(used, asked, strict=True):
-            window = windows[c]
+            window = sight.windows[c]
             if window is not None:
-                crop = _seen(source.crop(c, window), window, self.cameras[c])
+                crop = sight.crops[c] = _seen(source.crop(c, window), window, self.cameras[c])
                 yield lambda nets, k=crop, w=window, a=ask: _joints(
                     nets, nets.folded if folded else nets.landmark, k, w, a, self.config
                 )
@@ -255,7 +257,10 @@ class Eyes(Stateful):
 
     def _nothing(self, windows: list[CropWindow | None]) -> Sight:
         shape = (len(self.cameras), N_JOINTS)
-        return Sight(np.full((*shape, 2), np.nan), np.zeros(shape), np.full(shape, np.inf), windows)
+        return Sight(
+            np.full((*shape, 2), np.nan), np.zeros(shape), np.full(shape, np.inf), windows,
+            [None] * len(windows),
+        )  # fmt: skip
 
     def _write(self, sight: Sight, c: int, joints: Floats, posture: Sequence[float]) -> None:
         window = sight.windows[c]

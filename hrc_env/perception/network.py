@@ -4,6 +4,8 @@ Each function belongs to one thread at a time; load one per thread.
 """
 
 from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
 from typing import TypeAlias
 
 from hrc_env.errors import unknown
@@ -72,4 +74,10 @@ def _load(weights: str, outputs: tuple[str, ...], runtime: str) -> Network:
     path = find_weights(weights)
     if chosen_runtime(runtime) == "openvino":
         return vino.load(path, outputs)
-    return litert.load(litert.prune(path.read_bytes(), outputs), outputs)
+    return litert.load(_pruned(path, outputs), outputs)
+
+
+@lru_cache(maxsize=4)
+def _pruned(path: Path, outputs: tuple[str, ...]) -> bytes:
+    """Every thread has an interpreter of its own; pruning takes half a second."""
+    return litert.prune(path.read_bytes(), outputs)

@@ -22,11 +22,11 @@ from hrc_env.records import CropWindow, WorkerMotion
 from hrc_env.scene import gl
 from hrc_env.scene.build import Scene, drawing_model, drawn_looks, drawn_props
 from hrc_env.scene.dressing import as_built, dress, strew, take_off_hats
-from hrc_env.scene.primitives import ROBOT_LOOKS
-from hrc_env.scene.props import pose_props
+from hrc_env.scene.primitives import ROBOT_CAPSULES, ROBOT_LOOKS
+from hrc_env.scene.props import PARKED_M, pose_props
 from hrc_env.scene.rig import glcam_axes
 from hrc_env.scene.wardrobe import wear
-from hrc_env.typing import Image, JointAngles
+from hrc_env.typing import Floats, Image, JointAngles
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,11 +38,15 @@ class Part:
     """Behind all else; False: black."""
     group: int | None = None
     """Geoms of this group only, and no skins."""
+    sunny: bool = True
+    """With the light that casts shadows."""
 
 
 EVERYTHING = Part(mujoco.mjtCatBit.mjCAT_ALL, True)
 STILL = Part(mujoco.mjtCatBit.mjCAT_STATIC, True)
 MOVING = Part(mujoco.mjtCatBit.mjCAT_DYNAMIC, False)
+IN_THE_SHADE = Part(mujoco.mjtCatBit.mjCAT_STATIC, True, sunny=False)
+BEFORE_THE_SUN = Part(mujoco.mjtCatBit.mjCAT_DYNAMIC, False, sunny=False)
 ROBOT = Part(mujoco.mjtCatBit.mjCAT_DYNAMIC, False, ROBOT_LOOKS)
 """The arm alone: the part that needs no camera to be known."""
 
@@ -74,7 +78,6 @@ class Canvas:
         self._option.sitegroup[:] = 0
         self._camera = mujoco.MjvCamera()
         mujoco.mjv_defaultFreeCamera(self._model, self._camera)
-        self._rect = mujoco.MjrRect(0, 0, width_px, height_px)
         self._gl: Any = None
         self._context: Any = None
         self._lists: dict[Part, Any] = {}
@@ -126,6 +129,9 @@ class Canvas:
         )  # fmt: skip
         if self._look is not None and what.sky:
             strew(self._shown, self._scene.grounds, self._look)
+        for light in self._shown.lights[: 0 if what.sunny else self._shown.nlight]:
+            if light.castshadow:
+                light.diffuse, light.specular = np.zeros(3), np.zeros(3)
         flags = self._shown.flags
         flags[mujoco.mjtRndFlag.mjRND_SHADOW.value] = shadows
         flags[mujoco.mjtRndFlag.mjRND_SKYBOX.value] = what.sky
@@ -167,15 +173,50 @@ class Canvas:
             eye.frustum_top = (height_px / 2 - v) * scale
             eye.frustum_bottom = (-height_px / 2 - v) * scale
 
+    def aim_along(
+        self, direction: Floats, middle_world: Floats, half_m: float, far_m: float
+    ) -> None:
+        """Look along parallel rays, as a sun shines: a square of 2 `half_m` round a point.
+
+        Args:
+            direction: (3,) unit vector; rows and columns go along `across(direction)`.
+            middle_world: (3,) the point in the middle of the near plane [m].
+            half_m: half of the square's side [m].
+            far_m: how far is drawn [m].
+        """
+        _, down = across(direction)
+        for eye in self._shown.camera:
+            eye.orthographic = 1
+            eye.pos, eye.forward, eye.up = middle_world - direction, direction, -down
+            eye.frustum_near, eye.frustum_far = 1.0, 1.0 + far_m
+            eye.frustum_center, eye.frustum_width = 0.0, half_m
+            eye.frustum_top, eye.frustum_bottom = half_m, -half_m
+
+    def sun(self) -> Floats | None:
+        """(3,) where the light goes that casts shadows, if there is one."""
+        shining = np.flatnonzero(self._model.light_castshadow & self._model.light_active)
+        return self._data.light_xdir[shining[0]].copy() if len(shining) else None
+
+    def movers(self) -> tuple[Floats, Floats]:
+        """Spheres round all that moves, a worker's capsules for the skin: middles (N, 3) and radii
+        (N,) [m]."""
+        model, of = self._model, self._model.geom_bodyid
+        moving = (model.body_weldid[of] != 0) | (model.body_mocapid[of] >= 0)
+        moving &= self._data.geom_xpos[:, 2] > PARKED_M[2] / 2
+        moving &= model.geom_group != ROBOT_CAPSULES
+        return self._data.geom_xpos[moving], model.geom_rbound[moving]
+
     def read(self, rgb: NDArray[np.uint8] | None, z: NDArray[np.float32] | None) -> None:
         """Draw into rgb (H, W, 3) and z (H, W), bottom row first as OpenGL has them.
 
-        z is 1 at the near plane and 0 at the far one.
+        z is 1 at the near plane and 0 at the far one. Both may be smaller than the canvas.
         """
         self._open()
         self._gl.make_current()
-        mujoco.mjr_render(self._rect, self._shown, self._context)
-        mujoco.mjr_readPixels(rgb, z, self._rect, self._context)
+        shapes = [each.shape for each in (rgb, z) if each is not None]
+        rect = mujoco.MjrRect(0, 0, shapes[0][1], shapes[0][0])
+        mujoco.mjr_render(rect, self._shown, self._context)
+        mujoco.mjr_readPixels(rgb, z, rect, self._context)
 
     def paint(self) -> Image:
         """The picture (H, W, 3), top row first."""
@@ -188,10 +229,13 @@ class Canvas:
         far plane."""
         z = np.empty((self.height_px, self.width_px), np.float32)
         self.read(None, z)
+        return self.distance_m(z[::-1])
+
+    def distance_m(self, z: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Distance along the optical axis [m] of what `read` has found."""
         near = float(self._shown.camera[0].frustum_near)
         far = float(self._shown.camera[0].frustum_far)
-        depth = near * far / (near + z[::-1].astype(float) * (far - near))
-        return depth.astype(np.float32)
+        return (near * far / (near + z.astype(float) * (far - near))).astype(np.float32)
 
     def close(self) -> None:
         """Free the context; the canvas cannot draw any more. Twice does no harm."""
@@ -214,3 +258,10 @@ class Canvas:
             self._gl, self._context = gl.new_context(self.width_px, self.height_px, self._model)
             mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
             self._context.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
+
+
+def across(direction: Floats) -> tuple[Floats, Floats]:
+    """Two unit vectors (3,) at right angles to one: to the right and down of who looks along it."""
+    right = np.cross(direction, [0.0, 1.0, 0.0])
+    right /= np.linalg.norm(right)
+    return right, np.cross(direction, right)

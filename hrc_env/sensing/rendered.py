@@ -27,7 +27,7 @@ from hrc_env.sensing.searches import Searches
 from hrc_env.sensing.strays import Strays
 from hrc_env.sensing.tracking import TrackingSenses, no_keypoints
 from hrc_env.tracking.estimators import Estimator
-from hrc_env.typing import Floats, Ints
+from hrc_env.typing import Floats, Image, Ints
 
 
 class CameraSenses(TrackingSenses):
@@ -51,6 +51,9 @@ class CameraSenses(TrackingSenses):
             [[None] * len(scene.cameras) for _ in range(scene.n_workers)] for _ in range(batch)
         ]
 
+        self.seen: dict[int, tuple[list[CropWindow | None], list[Image | None]]] = {}
+        """What the network was given of each environment's first worker, and through which windows:
+        for pictures, no part of the state."""
         self.searches = Searches(batch, len(scene.cameras), config.eyes.search_every)
         self.strays = Strays(batch, scene.n_workers, len(scene.cameras))
 
@@ -70,6 +73,8 @@ class CameraSenses(TrackingSenses):
             for worker, sight in self._look(expected, row, b, has_image):
                 for c in np.flatnonzero(has_image).tolist():
                     self.windows[b][worker][c] = sight.windows[c]
+                if worker == 0:
+                    self.seen[b] = list(sight.windows), sight.crops
                 seen.px[row, :, worker] = sight.px
                 seen.confidence[row, :, worker] = sight.confidence
                 seen.sigma_px[row, :, worker] = sight.sigma_px
@@ -157,6 +162,12 @@ class CameraSenses(TrackingSenses):
     def looks(self, b: int) -> tuple[Keypoints | None, Windows]:
         """The keypoints of environment `b` and the windows they were found in."""
         return rows(self.keypoints, np.array([b])), self.windows[b]
+
+    def crops(self, b: int) -> list[Image | None]:
+        """What the network was given of the first worker of environment `b`."""
+        windows, crops = self.seen.get(b, ([], []))
+        current = self.windows[b][0] if self.windows[b] else []
+        return crops if windows == current else [None] * len(current)
 
     def look_of(self, b: int) -> Look | None:
         """How environment b looks in its episode."""

@@ -21,7 +21,7 @@ from hrc_env.tracking.calibration_watch import forget, make_watch, watch
 from hrc_env.tracking.estimators import Estimator
 from hrc_env.tracking.people.association import associate
 from hrc_env.tracking.stuck import forget_stuck, leave_out_stuck, make_stuck
-from hrc_env.typing import Bools, Floats, Ints
+from hrc_env.typing import Bools, Floats, Image, Ints
 
 
 class TrackingSenses(Stateful):
@@ -114,6 +114,10 @@ class TrackingSenses(Stateful):
     def looks(self, b: int) -> tuple[Keypoints | None, Windows]:
         """The keypoints of environment `b`."""
         return rows(self.keypoints, np.array([b])), []
+
+    def crops(self, b: int) -> list[Image | None]:
+        """No network was given anything."""
+        return []
 
     def close(self) -> None:
         """Nothing to release."""

@@ -1,0 +1,174 @@
+"""A film's frame: the room beside the four cameras, what is believed, and the separation."""
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from hrc_env import pictures
+from hrc_env.env import HRCReachEnv
+from hrc_env.senses import CAMERA_LEVELS
+from hrc_env.typing import Image
+from hrc_env.views import Glance
+
+WIDTH, HEIGHT = 1600, 900
+ROOM = (792, 716)
+TILE = (400, 225)
+RIGHT_X = WIDTH - 2 * TILE[0] - 4
+"""Where the pictures on the right begin."""
+TITLE_Y = 2 * TILE[1] + 22
+CROP = 196
+BELIEF = (400, 214)
+LEGEND_HEIGHT = 28
+STRIP_HEIGHT = 180
+STRIP_S = 10.0
+"""Seconds that the strip below shows."""
+FAR_M = 1.5
+"""Distances are drawn up to this [m]."""
+LEFT, RIGHT, TOP, BOTTOM = 290, WIDTH - 20, 14, STRIP_HEIGHT - 14
+"""Where in the strip the curves are."""
+NEAR, TOUCHING = (150, 30, 40), (255, 40, 60)
+"""Colours of steps that cost."""
+
+
+@dataclass(slots=True)
+class Diary:
+    """What the strip shows: one entry a step."""
+
+    true_m: list[float] = field(default_factory=list)
+    estimated_m: list[float] = field(default_factory=list)
+    cost: list[float] = field(default_factory=list)
+    reached: int = 0
+    missed: int = 0
+    """Goals so far."""
+
+    def note(self, info: dict[str, Any], estimated_m: float) -> None:
+        """Add a step."""
+        self.true_m.append(info.get("safety/min_separation_m", np.inf))
+        self.estimated_m.append(estimated_m)
+        self.cost.append(info["cost"])
+        self.reached = int(info["task/goals_reached"])
+        self.missed = int(info["task/goals_missed"])
+
+    def copy(self) -> "Diary":
+        """As it is now."""
+        lists = list(self.true_m), list(self.estimated_m), list(self.cost)
+        return Diary(*lists, self.reached, self.missed)
+
+
+def compose(env: HRCReachEnv, diary: Diary, seen: Glance | None = None) -> Image:
+    """One frame (900, 1600, 3): room, cameras, crops or belief, strip.
+
+    Args:
+        env: whose views draw; it may have gone on since `seen`.
+        diary: what has happened until then; not written to while this runs.
+        seen: the moment that is shown; None is now.
+    """
+    level, seen = env.simulation.perception, seen or env.views.glance()
+    frame = _panel(HEIGHT, WIDTH, level).copy()
+    room = env.views.room(*ROOM, seen)
+    pictures.label(room, "what happens", (10, 10), 18)
+    foot = room[-LEGEND_HEIGHT:]
+    cv2.addWeighted(foot, 0.25, legend(level), 0.75, 0, dst=foot)
+    _paste(frame, room, (0, 0))
+    for k, view in enumerate(env.views.cameras(*TILE, seen)[:4]):
+        x, y = k % 2 * (TILE[0] + 4), k // 2 * (TILE[1] + 4)
+        _paste(frame, view, (RIGHT_X + x, y))
+    for k, crop in enumerate(env.views.crops(CROP, seen)[:4]):
+        _paste(frame, crop, (RIGHT_X + k * (CROP + 4), TITLE_Y + 30))
+    if level != "pixels":
+        for k, belief in enumerate(env.views.beliefs(*BELIEF, seen)):
+            _paste(frame, belief, (RIGHT_X + k * (BELIEF[0] + 4), TITLE_Y + 30))
+    _paste(frame, strip(diary, env.config.ctrl_dt, env.config.cost.proximity_m), (0, 720))
+    return frame
+
+
+@lru_cache(maxsize=4)
+def _panel(height: int, width: int, level: str) -> Image:
+    """What is the same in all frames; not to be written to."""
+    image = np.empty((height, width, 3), np.uint8)
+    image[:] = pictures.PANEL
+    title = f"what the robot believes (perception: {level}), from above and from the side"
+    if level == "pixels":
+        title = "what the pose network is given: crops round the predicted worker"
+    pictures.write(image, title, (RIGHT_X + 4, TITLE_Y), 16)
+    return image
+
+
+@lru_cache(maxsize=4)
+def legend(level: str) -> Image:
+    """(28, 792, 3) what the colours mean at a perception level; not to be written to."""
+    image = np.empty((LEGEND_HEIGHT, ROOM[0], 3), np.uint8)
+    image[:] = pictures.PANEL
+    marks = [
+        ("worker's left", pictures.LEFT, "line"),
+        ("right", pictures.RIGHT, "line"),
+        ("estimate, 2 sigma", pictures.BELIEF, "dot"),
+        ("goal", pictures.GOAL, "ring"),
+    ]
+    if level in CAMERA_LEVELS:
+        marks.append(("detected joint", pictures.DETECTED, "dot"))
+    if level == "pixels":
+        marks.append(("crop", pictures.WINDOW, "box"))
+    x, y = 12, LEGEND_HEIGHT // 2
+    for text, colour, shape in marks:
+        if shape == "line":
+            cv2.line(image, (x, y), (x + 18, y), colour, 3, cv2.LINE_AA)
+        elif shape == "box":
+            cv2.rectangle(image, (x + 2, y - 6), (x + 14, y + 6), colour, 1)
+        else:
+            cv2.circle(image, (x + 9, y), 6, colour, -1 if shape == "dot" else 2, cv2.LINE_AA)
+        pictures.write(image, text, (x + 26, y - 9), 14)
+        x += 26 + pictures.text_width(text, 14) + 20
+    return image
+
+
+def strip(diary: Diary, dt_s: float, limit_m: float) -> Image:
+    """True and estimated separation over the last seconds; red where a step cost."""
+    image = _axes(limit_m).copy()
+    n_shown = round(STRIP_S / dt_s)
+    first = max(0, len(diary.cost) - n_shown)
+    x = np.round(LEFT + (RIGHT - LEFT) * np.arange(len(diary.cost) - first) / n_shown).astype(int)
+    cost = np.array(diary.cost[first:])
+    for k in np.flatnonzero(cost > 0).tolist():
+        colour = NEAR if cost[k] < 2 else TOUCHING
+        cv2.rectangle(image, (int(x[k]), TOP), (int(x[k]) + 6, BOTTOM), colour, -1)
+    series = (diary.true_m, pictures.INK), (diary.estimated_m, pictures.BELIEF)
+    for values, colour in series:
+        points = np.stack([x, _y_of(np.array(values[first:]))], -1).astype(np.int32)
+        cv2.polylines(image, [points], False, colour, 2, cv2.LINE_AA)
+    goals = f"goals: {diary.reached} reached, {diary.missed} missed"
+    pictures.write(image, goals, (14, 104), 16, pictures.GOAL)
+    pictures.write(image, f"cost {sum(diary.cost):.0f}", (14, 128), 16, pictures.COST)
+    pictures.write(image, f"{len(diary.cost) * dt_s:.1f} s", (14, 152), 16)
+    return image
+
+
+@lru_cache(maxsize=4)
+def _axes(limit_m: float) -> Image:
+    """The strip without its curves; not to be written to."""
+    image = np.empty((STRIP_HEIGHT, WIDTH, 3), np.uint8)
+    image[:] = pictures.PANEL
+    for metres in (0.0, 0.5, 1.0, 1.5):
+        y = int(_y_of(np.array(metres)))
+        cv2.line(image, (LEFT, y), (RIGHT, y), (60, 66, 74), 1)
+        pictures.write(image, f"{metres:.1f} m", (LEFT - 52, y - 9), 14)
+    y = int(_y_of(np.array(limit_m)))
+    cv2.line(image, (LEFT, y), (RIGHT, y), (190, 70, 80), 1)
+    pictures.write(image, "separation", (14, 10), 18)
+    pictures.write(image, "true", (14, 36), 15)
+    pictures.write(image, "as the robot believes", (14, 56), 15, pictures.BELIEF)
+    pictures.write(image, "bar: a step that costs", (14, 76), 15, pictures.COST)
+    return image
+
+
+def _y_of(metres: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.round(BOTTOM - (BOTTOM - TOP) * np.clip(metres, 0, FAR_M) / FAR_M)
+
+
+def _paste(frame: Image, picture: NDArray[np.uint8], at: tuple[int, int]) -> None:
+    x, y = at
+    frame[y : y + picture.shape[0], x : x + picture.shape[1]] = picture

@@ -1,0 +1,65 @@
+"""A film's frame: legend, belief, goals, separation."""
+
+import numpy as np
+import pytest
+
+from hrc_env import pictures
+from hrc_env.cli.frame import LEGEND_HEIGHT, RIGHT_X, TITLE_Y, Diary, compose, legend, strip
+from hrc_env.env import HRCReachEnv
+
+
+def colours(image: np.ndarray) -> set[tuple[int, ...]]:
+    return set(map(tuple, image.reshape(-1, 3).tolist()))
+
+
+def a_diary(n_steps: int = 20, **changes) -> Diary:
+    diary = Diary(**changes)
+    diary.true_m, diary.estimated_m = [0.8] * n_steps, [0.7] * n_steps
+    diary.cost = [0.0] * n_steps
+    return diary
+
+
+def test_the_legend_names_what_a_level_shows():
+    at = {level: colours(legend(level)) for level in ("pixels", "keypoints", "truth")}
+    for level in at:
+        assert {pictures.LEFT, pictures.RIGHT, pictures.BELIEF, pictures.GOAL} <= at[level]
+    assert pictures.WINDOW in at["pixels"]
+    assert pictures.WINDOW not in at["keypoints"]
+    assert pictures.DETECTED in at["keypoints"]
+    assert pictures.DETECTED not in at["truth"]
+
+
+def test_the_strip_counts_goals_and_marks_steps_that_cost():
+    plain = strip(a_diary(), 0.04, 0.15)
+    scored = strip(a_diary(reached=3, missed=1), 0.04, 0.15)
+    assert not np.array_equal(plain[:, :280], scored[:, :280])
+    np.testing.assert_array_equal(plain[:, 280:], scored[:, 280:])
+    costly = a_diary()
+    costly.cost[-1] = 1.0
+    assert not np.array_equal(plain[:, 280:], strip(costly, 0.04, 0.15)[:, 280:])
+
+
+def test_a_diary_goes_on_without_its_copy():
+    diary = a_diary()
+    copy = diary.copy()
+    diary.note({"cost": 1.0, "task/goals_reached": 2.0, "task/goals_missed": 0.0}, 0.5)
+    assert len(copy.cost) == len(copy.true_m) == len(copy.estimated_m) == 20
+    assert (copy.reached, diary.reached) == (0, 2)
+    assert diary.true_m[-1] == np.inf  # nobody there
+
+
+@pytest.mark.parametrize("level", ["keypoints", "none"])
+def test_a_frame_is_full_at_levels_without_crops(level):
+    env = HRCReachEnv(perception=level)
+    env.reset(seed=7)
+    *_, info = env.step(np.zeros(6))
+    diary = Diary()
+    diary.note(info, 0.5)
+    frame = compose(env, diary)
+    env.close()
+    assert frame.shape == (900, 1600, 3)
+    for x in (RIGHT_X, RIGHT_X + 404):
+        belief = frame[TITLE_Y + 60 : TITLE_Y + 230, x : x + 400]
+        assert belief.std() > 3
+        assert pictures.ARM in colours(belief)
+    assert frame[716 - LEGEND_HEIGHT : 716, :300].std() > 10
