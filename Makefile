@@ -1,12 +1,13 @@
 # make demo   a film of the robot working beside a worker it sees through four cameras
-# make test   the proof
+# make test   the proof, in minutes; make test-all: all of it; make test-long: for a release
 # make check  style, types, floors
 PYTHON ?= python3
 VENV := .venv
 RUN := $(VENV)/bin/python
 READY := $(VENV)/.ready
+PYTEST := $(RUN) -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
-.PHONY: demo test check bench train-quick clean
+.PHONY: demo test test-all test-long check bench train-quick clean
 .DEFAULT_GOAL := demo
 
 $(READY): pyproject.toml constraints.txt
@@ -21,7 +22,15 @@ demo: $(READY)
 
 test: $(READY)
 	$(RUN) -m hrc_env setup
-	$(RUN) -m pytest -n 2
+	$(PYTEST) -m "not slow and not long"
+
+test-all: $(READY)
+	$(RUN) -m hrc_env setup
+	$(PYTEST) -m "not long"
+
+test-long: $(READY) test-stock
+	$(RUN) -m hrc_env setup
+	$(PYTEST) -m long
 
 check: $(READY)
 	$(VENV)/bin/ruff check .

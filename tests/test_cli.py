@@ -1,22 +1,13 @@
 """The command line as people use it."""
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import hrc
 
 from hrc_env.body import load_body
 from hrc_env.motion.capture.clip import load_clip
-
-
-def hrc(*words: str, **env: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "hrc_env", *words],
-        capture_output=True, text=True, check=False, env={**os.environ, **env},
-    )  # fmt: skip
 
 
 @pytest.mark.parametrize(

@@ -3,12 +3,12 @@
 import json
 import shutil
 import subprocess
-import sys
 import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import ROOT, called
 
 from agents import ppo
 from agents.base import make_agent, situation
@@ -17,13 +17,11 @@ from agents.evaluate import evaluate
 from hrc_env.env import HRCReachEnv
 from hrc_env.errors import CheckpointError, ConfigError
 
-ROOT = Path(__file__).resolve().parent.parent
 TINY = ["--perception", "truth", "--num-envs", "4", "--episodes", "2", "--no-film"]
 
 
 def train(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, ROOT / "train.py", *TINY, *map(str, arguments)]
-    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    return called(ROOT / "train.py", *TINY, *arguments)
 
 
 @pytest.fixture(scope="module")
