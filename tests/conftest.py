@@ -1,7 +1,10 @@
 """What tests of several rooms need, and which tests are slow, by fixture and perception level."""
 
+import os
 import subprocess
 import sys
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # workers share the cores; read by NumPy and torch
 
 import pytest
 

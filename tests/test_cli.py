@@ -32,8 +32,9 @@ def test_check_says_ok_line_by_line():
     assert "TODO" not in done.stdout
 
 
-def test_check_says_what_to_do_without_weights(tmp_path):
-    done = hrc("check", HRC_ENV_CACHE=str(tmp_path / "empty"))
+def test_check_says_what_to_do_without_weights(tmp_path, monkeypatch):
+    monkeypatch.setenv("HRC_ENV_CACHE", str(tmp_path / "empty"))
+    done = hrc("check")
     assert done.returncode == 1
     assert "python -m hrc_env setup" in done.stdout.replace("\n", " ")
 
