@@ -19,6 +19,7 @@ def done(request, films_seen_at, weights, tmp_path_factory):
     with films_seen_at(request.param) as patch:
         if request.param == "keypoints":
             patch.setattr(figures, "VIEW_PX", (96, 54))
+            patch.setattr(figures, "ABOVE_PX", (110, 110))
         metrics = run(TINY, out, lambda share, label: shares.append(share))
     return out, metrics, shares
 
