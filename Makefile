@@ -1,6 +1,8 @@
 # make demo         a film of the robot working beside a worker it sees through four cameras
-# make test         the proof
-# make test-stock   the same in a fresh environment with the packages that everybody gets
+# make test         the proof, in minutes
+# make test-all     all of it: pixels at length, processes, experiments end to end
+# make test-stock   all of it in a fresh environment with the packages that everybody gets
+# make test-long    what a release needs: that, and what takes its time
 # make train-quick  a policy
 # make check        style, types, floors
 PYTHON ?= python3
@@ -11,8 +13,9 @@ RUN := $(VENV)/bin/python
 CORE := $(VENV)/.core
 TRAIN := $(VENV)/.train
 DEV := $(VENV)/.dev
+PYTEST := $(RUN) -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
-.PHONY: demo test test-stock check bench train-quick clean
+.PHONY: demo test test-all test-stock test-long check bench train-quick clean
 .DEFAULT_GOAL := demo
 
 $(CORE): NEEDED := .
@@ -32,14 +35,22 @@ demo: $(CORE)
 
 test: $(DEV)
 	$(RUN) -m hrc_env setup
-	$(RUN) -m pytest -n 2
+	$(PYTEST) -m "not slow and not long"
+
+test-all: $(DEV)
+	$(RUN) -m hrc_env setup
+	$(PYTEST) -m "not long"
+
+test-long: $(DEV) test-stock
+	$(RUN) -m hrc_env setup
+	$(PYTEST) -m long
 
 # No settings of pip, nothing cached: on Linux torch is its CUDA build, with triton, 6 GB.
 test-stock:
 	rm -rf $(STOCK)
 	mkdir -p $(STOCK)/home
 	env -i HOME="$(CURDIR)/$(STOCK)/home" PATH="$$PATH" MAKEFLAGS="$(MAKEFLAGS)" \
-		$(MAKE) test VENV="$(STOCK)/venv" PYTHON="$(PYTHON)"
+		$(MAKE) test-all VENV="$(STOCK)/venv" PYTHON="$(PYTHON)"
 
 check: $(DEV)
 	$(VENV)/bin/ruff check .

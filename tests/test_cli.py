@@ -1,22 +1,13 @@
 """The command line as people use it."""
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import hrc
 
 from hrc_env.body import load_body
 from hrc_env.motion.capture.clip import load_clip
-
-
-def hrc(*words: str, **env: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "hrc_env", *words],
-        capture_output=True, text=True, check=False, env={**os.environ, **env},
-    )  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -41,8 +32,9 @@ def test_check_says_ok_line_by_line():
     assert "TODO" not in done.stdout
 
 
-def test_check_says_what_to_do_without_weights(tmp_path):
-    done = hrc("check", HRC_ENV_CACHE=str(tmp_path / "empty"))
+def test_check_says_what_to_do_without_weights(tmp_path, monkeypatch):
+    monkeypatch.setenv("HRC_ENV_CACHE", str(tmp_path / "empty"))
+    done = hrc("check")
     assert done.returncode == 1
     assert "python -m hrc_env setup" in done.stdout.replace("\n", " ")
 

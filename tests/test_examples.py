@@ -2,21 +2,18 @@
 
 import importlib.util
 import re
-import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
+from commands import ROOT, called
 
-ROOT = Path(__file__).resolve().parent.parent
 SMALL = ("--num-envs", "8", "--n-steps", "32", "--timesteps", "3000", "--perception", "truth")
 
 
 def run(name: str, *arguments: str) -> str:
-    command = [sys.executable, ROOT / "examples" / name, *arguments]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    done = called(ROOT / "examples" / name, *arguments)
     assert done.returncode == 0, done.stderr
     return done.stdout
 

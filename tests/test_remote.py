@@ -4,8 +4,6 @@ import itertools
 import os
 import pickle
 import signal
-import subprocess
-import sys
 import time
 
 import numpy as np
@@ -61,13 +59,11 @@ def same(one, other) -> None:
     np.testing.assert_array_equal(one, other, strict=isinstance(one, np.ndarray))
 
 
-def test_processes_give_the_numbers_of_threads_once_everything_is_compiled():
+def test_processes_give_the_numbers_of_threads_once_everything_is_compiled(process):
     """In a program of its own, twice: kernels that were compiled just now may differ from the
     same kernels out of their cache in the last bit."""
     for is_warm in (False, True):
-        done = subprocess.run(
-            [sys.executable, __file__], capture_output=True, text=True, check=False
-        )
+        done = process(__file__)
         assert done.returncode == 0 or not is_warm, done.stderr
 
 
@@ -83,7 +79,7 @@ def test_a_state_goes_back_and_to_threads():
     threads.close(), processes.close()
 
 
-def test_pictures_come_from_there():
+def test_pictures_come_from_there(process):
     threads, processes = (make(each, render_mode="rgb_array") for each in ("threads", "processes"))
     for env in (threads, processes):
         env.reset(seed=2)
@@ -122,7 +118,7 @@ def test_a_process_that_is_killed_is_named():
     env.close()
 
 
-def test_processes_end_with_a_parent_that_is_killed():
+def test_processes_end_with_a_parent_that_is_killed(process):
     """A script without a guard makes some, says who they are, and is killed."""
     script = """
 import os, signal
@@ -132,7 +128,7 @@ env.reset(seed=0)
 print(env.shards.parts[1]._child.pid, flush=True)
 os.kill(os.getpid(), signal.SIGKILL)
 """
-    done = subprocess.run([sys.executable, "-c", script], stdout=subprocess.PIPE, timeout=300)
+    done = process("-c", script)
     child = int(done.stdout)
     for _ in range(600):
         if not _is_running(child):

@@ -136,7 +136,7 @@ def test_errors_do_not_depend_on_which_worker_is_called_the_first():
     assert tracking_error(doubled, reordered)[0] > 0.1  # two tracks on one person
 
 
-def test_in_pictures_two_different_people_are_found():
+def test_in_pictures_two_different_people_are_found(pixels):
     env = HRCReachEnv(perception="pixels", n_workers=2)
     seen = walk(env, 6, seed=1)
     info, estimate = seen[-1][2], env.simulation.estimate
@@ -158,7 +158,7 @@ def test_an_empty_room_in_pictures_is_quiet():
     env.close()
 
 
-def test_who_comes_in_late_is_found_and_nobody_is_taken_for_them():
+def test_who_comes_in_late_is_found_and_nobody_is_taken_for_them(pixels):
     """Searches for the second worker see the first one only, until the second is there."""
     env = HRCReachEnv(perception="pixels", n_workers=2)
     renderer = env.simulation.senses.renderer

@@ -1,18 +1,23 @@
-"""The soak's bookkeeping, on a short run."""
+"""The soak's bookkeeping, on a short run and a long one."""
 
 import json
 
 import numpy as np
+import pytest
 
 from benchmarks import soak
 from hrc_env.suspects import MISCALIBRATED
 
 
-def test_a_short_soak_counts_nothing_wrong(tmp_path):
+@pytest.mark.parametrize(
+    ("steps", "num_envs", "perception"),
+    [(1200, 4, "truth"), pytest.param(320_000, 64, "keypoints", marks=pytest.mark.long)],
+)
+def test_a_soak_counts_nothing_wrong(steps, num_envs, perception, tmp_path):
     out = tmp_path / "results.json"
-    soak.main(soak.Arguments(out, steps=1200, num_envs=4, perception="truth", episodes=1))
+    soak.main(soak.Arguments(out, steps, num_envs, perception=perception, episodes=1))
     metrics = json.loads(out.read_text())["metrics"]
-    assert metrics["steps"]["value"] == 1200
+    assert metrics["steps"]["value"] == steps
     assert metrics["nans"]["value"] == 0
     assert metrics["resident_memory"]["value"] > 50
 

@@ -1,19 +1,16 @@
 """Training through the real command line: learn a little, resume, refuse what does not fit."""
 
-import io
 import json
 import shlex
 import shutil
 import signal
 import subprocess
-import sys
 import zipfile
-from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from commands import ROOT, called
 from matplotlib.figure import Figure
 
 from agents import ppo
@@ -28,15 +25,11 @@ from hrc_env.cli.train import Train
 from hrc_env.env import HRCReachEnv
 from hrc_env.errors import CheckpointError, ConfigError
 
-ROOT = Path(__file__).resolve().parent.parent
 TINY = ["--perception", "truth", "--num-envs", "4", "--episodes", "2", "--no-film"]
 
 
-def train(*arguments: object) -> SimpleNamespace:
-    """`python -m hrc_env train` in this process: its exit status and what it said."""
-    with redirect_stdout(io.StringIO()) as out, redirect_stderr(io.StringIO()) as err:
-        status = main(["train", *TINY, *map(str, arguments)])
-    return SimpleNamespace(returncode=status, stdout=out.getvalue(), stderr=err.getvalue())
+def train(*words: object) -> subprocess.CompletedProcess[str]:
+    return called(ROOT / "train.py", *TINY, *words)
 
 
 @pytest.fixture(scope="module")
@@ -94,9 +87,7 @@ def test_a_second_run_leaves_the_first_alone(run, tmp_path):
 
 
 def test_resuming_nothing_says_so_without_a_traceback(tmp_path):
-    """And `python train.py` is the same command."""
-    command = [sys.executable, ROOT / "train.py", "--resume", tmp_path / "nowhere"]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    done = train("--resume", tmp_path / "nowhere")
     assert done.returncode == 2
     assert "holds no run to resume" in done.stderr
     assert "Traceback" not in done.stderr

@@ -44,8 +44,8 @@ def same(a, b) -> bool:
 @pytest.mark.parametrize("mode", list(AutoresetMode))
 def test_it_is_the_single_environments_bit_for_bit_at_1_2_and_3_threads(mode):
     """Also their infos' layout; `python benchmarks/identity.py` does it for 64 x 500 steps."""
-    envs = identity.vectors(12, (1, 2, 3), mode, perception="keypoints", max_episode_steps=50)
-    assert identity.compare(envs, 120, seed=3) == [0, 0, 0]
+    envs = identity.vectors(5, (1, 2, 3), mode, perception="keypoints", max_episode_steps=25)
+    assert identity.compare(envs, 60, seed=3) == [0, 0, 0]
 
 
 @pytest.mark.filterwarnings("ignore:num_threads")
@@ -242,7 +242,7 @@ def test_pictures_of_every_environment():
     env.close(), single.close()
 
 
-def test_pixels_are_processes():
+def test_pixels_are_processes(pixels):
     env = gymnasium.make_vec(
         "HRCReach-v0", num_envs=2, perception="pixels", max_episode_steps=2,
         autoreset_mode="SameStep",

@@ -1,10 +1,7 @@
 """Beyond the paper, in its smallest form: every key, the same after a kill, bad input in words."""
 
 import json
-import os
 import signal
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -24,7 +21,8 @@ from hrc_env.experiments.beyond.trial.walks import walks_of
 from hrc_env.skeleton import N_JOINTS
 from hrc_env.tracking.tree.gaussian import PARENT, ROOT
 
-TINY = BeyondConfig(n_seeds=1, seconds=1.24, n_timed=2)
+WHOLE = BeyondConfig(n_seeds=1, seconds=1.24, n_timed=2)
+TINY = replace(WHOLE, studies=("latency",))
 SEEDS = (7, 8, 9)
 N_STEPS = N_WARM_UP + 5
 
@@ -55,19 +53,21 @@ def state_of(setting):
     return senses.state, lengths_m(joints[0])
 
 
-@pytest.fixture(scope="module")
-def done(tmp_path_factory):
-    """A run of all studies: folder, numbers, told progress."""
+@pytest.fixture(
+    scope="module", params=[TINY, pytest.param(WHOLE, marks=pytest.mark.slow)], ids=["one", "all"]
+)
+def done(request, tmp_path_factory):
+    """A run of some studies: configuration, folder, numbers, told progress."""
     out, shares = tmp_path_factory.mktemp("beyond"), []
-    metrics = run(TINY, out, lambda share, label: shares.append(share))
-    return out, metrics, shares
+    metrics = run(request.param, out, lambda share, label: shares.append(share))
+    return request.param, out, metrics, shares
 
 
 def test_every_number_of_every_setting_is_there_and_finite(done):
-    out, metrics, _ = done
+    config, out, metrics, _ = done
     written = json.loads((out / "results.json").read_text())["metrics"]
     assert written.keys() == metrics.keys()
-    for study in STUDIES.values():
+    for study in (STUDIES[name] for name in config.studies):
         for setting in study.settings:
             key = f"{study.name}.{setting.name}"
             assert f"error_m.{key}.median" in metrics
@@ -87,30 +87,31 @@ def test_names_are_said_once_and_have_no_dots():
 
 
 def test_report_and_figures_are_written_and_the_progress_is_complete(done):
-    out, _, shares = done
+    config, out, _, shares = done
     assert sum(shares) == pytest.approx(1.0)
-    assert {path.stem for path in (out / "figures").iterdir()} == set(STUDIES)
+    assert {path.stem for path in (out / "figures").iterdir()} == set(config.studies)
     page = (out / "report.html").read_text()
-    assert page.count("data:image/png") == len(STUDIES)
-    for study in STUDIES.values():
-        assert study.title in page
+    assert page.count("data:image/png") == len(config.studies)
+    for name in config.studies:
+        assert STUDIES[name].title in page
     assert "nan" not in (out / "report.md").read_text()
 
 
 def test_what_is_finished_is_used_again(done, monkeypatch):
-    out, _, _ = done
+    config, out, _, _ = done
 
     def never(*args):
         raise AssertionError("made again")
 
     monkeypatch.setattr(experiment, "_part", never)
+    monkeypatch.setattr(experiment, "draw_figures", lambda *args: None)  # they are there
     before = (out / "results.json").read_text()
-    run(TINY, out, silent)
+    run(config, out, silent)
     assert (out / "results.json").read_text() == before
 
 
-def test_a_run_that_is_killed_goes_on_to_the_same_numbers(tmp_path):
-    config = replace(TINY, n_seeds=2, studies=("workers",))
+def test_a_run_that_is_killed_goes_on_to_the_same_numbers(process, tmp_path):
+    config = replace(WHOLE, n_seeds=2, studies=("workers",))
     script = (
         "import os, sys; from pathlib import Path; "
         "from hrc_env.experiments.beyond.experiment import BeyondConfig, run\n"
@@ -119,7 +120,7 @@ def test_a_run_that_is_killed_goes_on_to_the_same_numbers(tmp_path):
         f"run({config!r}, Path(sys.argv[1]), say)"
     )
     out, other = tmp_path / "killed", tmp_path / "whole"
-    killed = subprocess.run([sys.executable, "-c", script, out], env=os.environ, check=False)
+    killed = process("-c", script, out)
     assert killed.returncode == -signal.SIGKILL
     kept = {path.name: path.stat().st_mtime_ns for path in (out / "parts").iterdir()}
     assert set(kept) == {"workers.lab_1.json", "workers.lab_2.json"}

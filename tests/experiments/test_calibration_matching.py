@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from hrc_env.config import HRCConfig
-from hrc_env.experiments.calibration import validate
+from hrc_env.experiments.calibration import matching, validate
 from hrc_env.experiments.calibration.clips import family_of, fit_clips
-from hrc_env.experiments.calibration.matching import matched
 from hrc_env.experiments.calibration.samples import postures_of, samples_of
 from hrc_env.experiments.calibration.validate import (
     Compared,
@@ -21,7 +20,9 @@ from hrc_env.experiments.calibration.watch import watch
 from hrc_env.perception.calibration import POSTURES, read_calibration, write_calibration
 from hrc_env.perception.emulator import EmulatorConfig
 
-CLIPS = [clip for clip in fit_clips(0, 3) if family_of(clip.motion) in ("stand", "walk", "fold")]
+ALL = [clip for clip in fit_clips(0, 3) if family_of(clip.motion) in ("stand", "walk", "fold")]
+MOTIONS = ("stand", "walk 1.1 m/s", "squat", "kneel")
+CLIPS = [next(clip for clip in ALL if clip.motion == motion) for motion in MOTIONS]
 
 
 @pytest.fixture(scope="module")
@@ -30,10 +31,10 @@ def played():
     return list(watch("keypoints", CLIPS, HRCConfig()))
 
 
-def played_with(path, calibration):
+def played_with(path, calibration, clips=CLIPS):
     write_calibration(path, calibration, {})
     config = replace(HRCConfig(), emulator=EmulatorConfig(calibration=str(path)))
-    return list(watch("keypoints", CLIPS, config))
+    return list(watch("keypoints", clips, config))
 
 
 def test_every_clip_draws_errors_of_its_own(played):
@@ -81,17 +82,28 @@ def test_ratios_of_errors_have_intervals_over_clips(played, monkeypatch):
         assert less.low <= less.value <= less.high < 0.0
 
 
-def test_errors_that_are_too_small_and_too_short_are_mended(played, tmp_path):
-    known = read_calibration()
+@pytest.mark.parametrize(
+    ("clips", "few"),
+    [
+        (CLIPS, {"IN_SPACE": 1, "DRAWS": 1, "OFTEN": 500}),
+        pytest.param(ALL, {}, marks=pytest.mark.slow),
+    ],
+    ids=["few", "all"],
+)
+def test_errors_that_are_too_small_and_too_short_are_mended(clips, few, tmp_path, monkeypatch):
+    for name, value in few.items():
+        monkeypatch.setattr(matching, name, value)
+    known, played = read_calibration(), list(watch("keypoints", clips, HRCConfig()))
     draft = replace(
         known, size=0.6 * known.size, wander_m=0.6 * known.wander_m,
         slow_s=0.4 * known.slow_s, slow_m=0.4 * known.slow_m,
     )  # fmt: skip
     told: list[float] = []
-    mended = matched(
-        draft, CLIPS, played, tmp_path / "draft.json", lambda share, label: told.append(share)
+    mended = matching.matched(
+        draft, clips, played, tmp_path / "draft.json", lambda share, label: told.append(share)
     )
-    wrong, right = (played_with(tmp_path / "one.json", each) for each in (draft, mended))
+    path = tmp_path / "one.json"
+    wrong, right = (played_with(path, each, clips) for each in (draft, mended))
     median = outcome(played).px_median
     assert outcome(wrong).px_median < 0.8 * median
     assert outcome(right).px_median == pytest.approx(median, rel=0.15)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from hrc_env.errors import ConfigError
+from hrc_env.experiments.gallery import motions
 from hrc_env.experiments.gallery.gallery import GalleryConfig, run
 from hrc_env.experiments.gallery.motions import FRAMES, STAGED, moments, stage_of
 from hrc_env.experiments.gallery.page import Exhibit, write_page
@@ -46,7 +47,8 @@ def test_an_unknown_motion_is_told_the_valid_ones():
         GalleryConfig(motions=("hamer on a table",))
 
 
-def test_a_small_gallery_is_a_page_of_pictures_that_show_something(tmp_path):
+def test_a_small_gallery_is_a_page_of_pictures_that_show_something(tmp_path, monkeypatch):
+    monkeypatch.setattr(motions, "FRAMES", 2)
     said = []
     config = GalleryConfig(bodies=("worker_1",), motions=("stand",), scenes=())
     shown = run(config, tmp_path, lambda share, name: said.append(share))

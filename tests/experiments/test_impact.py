@@ -2,10 +2,7 @@
 
 import hashlib
 import json
-import os
 import signal
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -226,7 +223,7 @@ def test_an_environment_that_is_used_again_starts_afresh():
     assert first == again
 
 
-def test_a_run_that_is_killed_goes_on_to_the_same_numbers(finished, tmp_path):
+def test_a_run_that_is_killed_goes_on_to_the_same_numbers(finished, process, tmp_path):
     _, metrics = finished
     script = (
         "import os, sys; from pathlib import Path; "
@@ -236,7 +233,7 @@ def test_a_run_that_is_killed_goes_on_to_the_same_numbers(finished, tmp_path):
         f"    if label == 'scripted.{REFERENCE}': os.kill(os.getpid(), 9)\n"
         "run(config, Path(sys.argv[1]), say)"
     )
-    killed = subprocess.run([sys.executable, "-c", script, tmp_path], env=os.environ, check=False)
+    killed = process("-c", script, tmp_path)
     assert killed.returncode == -signal.SIGKILL
     kept = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "parts").iterdir()}
     assert len(kept) == 4  # truth and none, two policies each

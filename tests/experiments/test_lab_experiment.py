@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hrc_env.errors import ConfigError
-from hrc_env.experiments.lab import experiment
+from hrc_env.experiments.lab import experiment, figures
 from hrc_env.experiments.lab.experiment import LabConfig, config_for, laboratory, run
 from hrc_env.experiments.lab.motions import MOTIONS, play
 from hrc_env.experiments.lab.sides import LEFT, RIGHT, turned_away
@@ -16,10 +16,14 @@ TINY = LabConfig(n_seeds=1, max_frames=26)
 CAMERAS = (*(f"camera_{k}" for k in range(1, 5)), "multi")
 
 
-@pytest.fixture(scope="module")
-def done(weights, tmp_path_factory):
+@pytest.fixture(scope="module", params=["keypoints", "pixels"])
+def done(request, films_seen_at, weights, tmp_path_factory):
+    """A run; at keypoints it shows no crops, for there are none."""
     out = tmp_path_factory.mktemp("lab")
-    return out, run(TINY, out, lambda share, label: None)
+    with films_seen_at(request.param) as patch:
+        if request.param == "keypoints":
+            patch.setattr(figures, "SHOWN", ())
+        yield out, run(TINY, out, lambda share, label: None)
 
 
 def test_every_number_is_there(done):
@@ -56,6 +60,7 @@ def test_what_is_finished_is_used_again(done, monkeypatch):
         raise AssertionError("made again")
 
     monkeypatch.setattr(experiment, "film", never)
+    monkeypatch.setattr(experiment, "draw_figures", lambda *args: None)  # they are there
     before = (out / "results.json").read_text()
     run(TINY, out, lambda share, label: None)
     assert (out / "results.json").read_text() == before

@@ -125,7 +125,7 @@ def test_more_faulty_episodes_than_faultless_ones_are_refused():
         PerceptionBenchConfig(n_faults=31)
 
 
-def test_a_bench_writes_everything_and_goes_on_where_it_was(tmp_path):
+def test_a_bench_writes_everything_and_goes_on_where_it_was(pixels, tmp_path):
     said = []
     bench.run(TINY, tmp_path, lambda share, label: said.append(share))
     assert sum(said) == pytest.approx(1.0)

@@ -5,18 +5,22 @@ import json
 import pytest
 
 from hrc_env.errors import ConfigError
-from hrc_env.experiments.site import experiment
+from hrc_env.experiments.site import experiment, figures
 from hrc_env.experiments.site.experiment import SiteConfig, config_for, run
 
 TINY = SiteConfig(n_seeds=1, seconds=2.0, estimators=("particle",))
 CAMERAS = (*(f"camera_{k}" for k in range(1, 5)), "multi")
 
 
-@pytest.fixture(scope="module")
-def done(weights, tmp_path_factory):
+@pytest.fixture(scope="module", params=["keypoints", "pixels"])
+def done(request, films_seen_at, weights, tmp_path_factory):
     out = tmp_path_factory.mktemp("site")
     shares: list[float] = []
-    metrics = run(TINY, out, lambda share, label: shares.append(share))
+    with films_seen_at(request.param) as patch:
+        if request.param == "keypoints":
+            patch.setattr(figures, "VIEW_PX", (96, 54))
+            patch.setattr(figures, "ABOVE_PX", (110, 110))
+        metrics = run(TINY, out, lambda share, label: shares.append(share))
     return out, metrics, shares
 
 
@@ -57,6 +61,7 @@ def test_what_is_finished_is_used_again(done, monkeypatch):
 
     monkeypatch.setattr(experiment, "film", never)
     monkeypatch.setattr(experiment, "closed_loop", never)
+    monkeypatch.setattr(experiment, "draw_figures", lambda *args: None)  # they are there
     before = (out / "results.json").read_text()
     run(TINY, out, lambda share, label: None)
     assert (out / "results.json").read_text() == before
