@@ -11,7 +11,8 @@ they are needed where that is known (`ahead`).
 """
 
 from collections.abc import Callable
-from typing import Any
+from functools import partial
+from typing import Any, TypeVar, overload
 
 from numba.core import config
 
@@ -20,7 +21,15 @@ from hrc_env.kernels.lean import KernelDispatcher
 KERNELS: dict[str, KernelDispatcher] = {}
 """Every kernel that has been imported, by "module:name"."""
 
+Function = TypeVar("Function", bound=Callable[..., Any])
 
+
+@overload
+def kernel(function: Function) -> Function: ...
+@overload
+def kernel(
+    *, makes_arrays: bool = ..., fastmath: bool | set[str] = ..., forceinline: bool = ...
+) -> Callable[[Function], Function]: ...
 def kernel(
     function: Callable[..., Any] | None = None,
     *,
@@ -43,8 +52,8 @@ def kernel(
     records of them: numba looks at a named tuple for 3 us longer.
     """
     if function is None:
-        return lambda each: kernel(
-            each, makes_arrays=makes_arrays, fastmath=fastmath, forceinline=forceinline
+        return partial(
+            kernel, makes_arrays=makes_arrays, fastmath=fastmath, forceinline=forceinline
         )
     if getattr(config, "DISABLE_JIT", False):
         return function

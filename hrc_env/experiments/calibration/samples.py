@@ -1,5 +1,6 @@
 """Errors of detections in the terms in which the emulator draws them."""
 
+import inspect
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
@@ -92,7 +93,7 @@ def postures_of(clip: Watched) -> Floats:
     """(T, P) how far the body counts as each of `POSTURES`."""
     look_of = clip.look_of[:, 0]
     columns = look_of[:, [FOLDING, KNEELING, HANDLING, STEPPING]].T
-    shares = weigh.py_func(*columns)  # of arrays, not compiled
+    shares = inspect.unwrap(weigh)(*columns)  # of arrays, not compiled
     return np.stack(shares, -1)
 
 
