@@ -2,7 +2,7 @@
 # make test         the proof, in minutes
 # make test-all     all of it: pixels at length, processes, experiments end to end
 # make test-stock   all of it in a fresh environment with the packages that everybody gets
-# make test-long    what a release needs: that, and what takes its time
+# make test-long    what a release needs: that, and what takes longest
 # make train-quick  a policy
 # make check        style, types, floors
 PYTHON ?= python3

@@ -17,13 +17,17 @@ PROGRAM = "python -m hrc_env"
 COMMANDS: dict[str, tuple[str, str, str]] = {
     "setup": (
         "setup", "Setup",
-        "Fetch the pose network's weights (once, checked) and see that headless OpenGL works.",
+        "Fetch the pose network's weights (once, checked), compile the kernels for this machine, "
+        "and see that headless OpenGL works.",
     ),
     "demo": (
         "demo", "Demo",
         "Film the scripted reacher, slowed by the separation that it estimates from pixels.",
     ),
-    "check": ("check", "Check", "Versions, OpenGL, weights, cores: each line ok, or what to do."),
+    "check": (
+        "check", "Check",
+        "Versions, machine, OpenGL, kernels, weights, one step: each line ok, or what to do.",
+    ),
     "list": (
         "listing", "List",
         "Environments, perception levels, estimators, scenes, cameras and agents by name.",

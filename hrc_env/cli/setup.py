@@ -8,11 +8,6 @@ from typing import Literal
 
 from rich.console import Console
 
-from hrc_env.cli.kernels import compile_kernels
-from hrc_env.kernels.cache import folder
-from hrc_env.perception import weights
-from hrc_env.scene.gl import APT_LINE, gl_status
-
 
 @dataclass(frozen=True)
 class Setup:
@@ -25,6 +20,11 @@ class Setup:
 
     def run(self) -> int:
         """Set up; 0 also without OpenGL, which only pictures need."""
+        from hrc_env.cli.kernels import compile_kernels  # here: --help imports no simulator
+        from hrc_env.kernels.cache import folder
+        from hrc_env.perception import weights
+        from hrc_env.scene.gl import APT_LINE, gl_status
+
         console = Console()
         with console.status("Fetching the weights of MediaPipe Pose ..."):
             extra = [f"pose_landmark_{network}" for network in self.networks]
