@@ -5,6 +5,7 @@ child is `python -m hrc_env.remote`, which reads pickled calls from its standard
 scripts need no `if __name__ == "__main__"`. It ends when its parent does.
 """
 
+import contextlib
 import os
 import pickle
 import signal
@@ -80,9 +81,9 @@ class Remote:
 
     def close(self) -> None:
         """End the process."""
-        if self._child.poll() is None:
+        with contextlib.suppress(BrokenPipeError):  # it has ended, with words unread
             self._pipe(self._child.stdin).close()
-            self._child.wait()
+        self._child.wait()
         self._pipe(self._child.stdout).close()
 
     def __getstate__(self) -> Any:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from hrc_env import pictures
 from hrc_env.appearance import Look
 from hrc_env.batching import one, rows
-from hrc_env.errors import ConfigError
+from hrc_env.errors import whole
 from hrc_env.geometry.cameras import PinholeCamera, image_from_pinhole, pinhole
 from hrc_env.geometry.chains import capsules
 from hrc_env.motion import generator
@@ -44,14 +44,10 @@ def picture_size(width: Any, height: Any) -> tuple[int, int]:
     Raises:
         ConfigError: no whole numbers from 16 to 4096.
     """
-    for name, value in (("width", width), ("height", height)):
-        whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
-        if not whole or not SMALLEST_PX <= value <= LARGEST_PX:
-            raise ConfigError(
-                f"{name} must be a whole number of pixels from {SMALLEST_PX} to {LARGEST_PX}, "
-                f"got {value!r}."
-            )
-    return int(width), int(height)
+    return (
+        whole("width [px]", width, SMALLEST_PX, LARGEST_PX),
+        whole("height [px]", height, SMALLEST_PX, LARGEST_PX),
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,8 +1,9 @@
-"""What tests of several rooms need, and which tests are slow, by fixture and perception level."""
+"""What tests of several rooms need, and which tests are slow: by what they ask for."""
 
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # workers share the cores; read by NumPy and torch
 
@@ -10,16 +11,19 @@ import pytest
 
 from hrc_env.perception.weights import fetch_weights
 
-SLOW = {"process", "pixels"}
-"""Fixtures that take their time: `make test` leaves out who asks for one."""
+SLOW = {"process", "pixels", "end_to_end"}
+"""Fixtures that take their time: `make test` leaves out who asks for one. `end_to_end` is a whole
+run of an experiment, of which each has its own."""
+SLOW_WORDS = {"pixels", "processes"}
+"""And parameters that do."""
 
 
 @pytest.hookimpl(tryfirst=True)  # before -m deselects
 def pytest_collection_modifyitems(items: list[pytest.Function]) -> None:
-    """Mark who uses a slow fixture, or has pixels among its parameters."""
     for item in items:
-        called = item.callspec.params.values() if hasattr(item, "callspec") else ()
-        if SLOW & set(item.fixturenames) or "pixels" in [c for c in called if isinstance(c, str)]:
+        given = item.callspec.params.values() if hasattr(item, "callspec") else ()
+        words = {each for each in given if isinstance(each, str)}
+        if SLOW & set(item.fixturenames) or SLOW_WORDS & words:
             item.add_marker(pytest.mark.slow)
 
 
@@ -37,10 +41,19 @@ def pixels(weights):
 
 @pytest.fixture
 def process():
-    """Runs Python with some words in a process of its own, and returns what came of it."""
+    """Runs Python with some words in a process of its own, and returns what came of it.
 
-    def run(*words: object) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, *map(str, words)]
-        return subprocess.run(command, capture_output=True, text=True, check=False, timeout=600)
+    Other variables of the environment are keywords; None takes one away.
+    """
+
+    def run(
+        *words: object, cwd: Path | None = None, **env: str | None
+    ) -> subprocess.CompletedProcess[str]:
+        kept = {name: value for name, value in os.environ.items() if name not in env}
+        given = {name: value for name, value in env.items() if value is not None}
+        return subprocess.run(
+            [sys.executable, *map(str, words)], cwd=cwd, env={**kept, **given},
+            capture_output=True, text=True, check=False, timeout=600,
+        )  # fmt: skip
 
     return run

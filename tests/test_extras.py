@@ -1,7 +1,5 @@
 """The environment without the learner's libraries: nothing imports them before somebody learns."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -23,14 +21,13 @@ sys.meta_path = [Without if finder is PathFinder else finder for finder in sys.m
 """From here on it is as if they were not installed."""
 
 
-def without_learner(code: str, *words: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-c", WITHOUT + code, *words],
-        cwd=ROOT, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+@pytest.fixture
+def without_learner(process):
+    """Runs code there, with some words."""
+    return lambda code, *words: process("-c", WITHOUT + code, *words, cwd=ROOT)
 
 
-def test_no_module_imports_a_learner_but_the_door_to_one():
+def test_no_module_imports_a_learner_but_the_door_to_one(without_learner):
     done = without_learner("""
 import importlib, pkgutil, hrc_env, agents.base, agents.random, agents.scripted
 refused = []
@@ -48,7 +45,7 @@ print(len(refused), *refused)
     assert LINE in done.stdout
 
 
-def test_the_scripted_film_needs_no_learner(tmp_path: Path):
+def test_the_scripted_film_needs_no_learner(without_learner, tmp_path: Path):
     film = tmp_path / "film.mp4"
     done = without_learner(
         "from hrc_env.__main__ import main; sys.exit(main())",
@@ -67,7 +64,7 @@ def test_the_scripted_film_needs_no_learner(tmp_path: Path):
     ],
     ids=["train.py", "a checkpoint"],
 )
-def test_who_wants_to_learn_is_told_the_line_to_type(code):
+def test_who_wants_to_learn_is_told_the_line_to_type(without_learner, code):
     done = without_learner(code)
     assert done.returncode != 0
     assert LINE in done.stderr

@@ -116,6 +116,7 @@ def test_a_process_that_is_killed_is_named():
     with pytest.raises(HRCError, match="process of 2 environments has ended"):
         env.step(np.zeros((3, 6)))
     env.close()
+    assert env.shards.parts[1]._child.stdin.closed
 
 
 def test_processes_end_with_a_parent_that_is_killed(process):

@@ -35,8 +35,8 @@ def test_pictures_of_many_have_that_size_too(backend):
 @pytest.mark.parametrize(
     ("size", "said"),
     [
-        ({"width": 0}, "width must be a whole number of pixels from 16 to 4096, got 0"),
-        ({"height": -5}, "height must be"),
+        ({"width": 0}, r"width \[px\] must be a whole number from 16 to 4096, got 0"),
+        ({"height": -5}, "height"),
         ({"width": 480.0}, "got 480.0"),
         ({"height": 5000}, "got 5000"),
         ({"width": True}, "got True"),

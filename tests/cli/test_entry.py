@@ -1,7 +1,5 @@
 """`python -m hrc_env` itself: what it says of its commands, and how it refuses."""
 
-import subprocess
-import sys
 from importlib import import_module
 from pathlib import Path
 
@@ -11,26 +9,23 @@ from hrc_env import __version__
 from hrc_env.__main__ import COMMANDS, main
 
 
-def in_a_process_of_its_own(code: str) -> str:
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
-
-
-def test_the_overview_names_every_command_and_imports_none():
-    said = in_a_process_of_its_own(
+def test_the_overview_names_every_command_and_imports_none(process):
+    done = process(
+        "-c",
         "import sys\n"
         "from hrc_env.__main__ import main\n"
         "assert main(['--help']) == 0 and main(['--version']) == 0\n"
         "heavy = {'tyro', 'rich', 'mujoco', 'numba', 'torch', 'hrc_env.cli'}\n"
-        "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n"
+        "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n",
     )
+    assert done.returncode == 0, done.stderr
     for name in COMMANDS:
-        assert f"\n  {name} " in said
+        assert f"\n  {name} " in done.stdout
 
 
-def test_the_help_of_a_command_imports_no_simulator():
-    in_a_process_of_its_own(
+def test_the_help_of_a_command_imports_no_simulator(process):
+    done = process(
+        "-c",
         "import sys\n"
         "from hrc_env.__main__ import COMMANDS, main\n"
         "for name in COMMANDS:\n"
@@ -40,8 +35,9 @@ def test_the_help_of_a_command_imports_no_simulator():
         "    except SystemExit as end:\n"
         "        assert end.code == 0\n"
         "heavy = {'mujoco', 'numba', 'torch', 'stable_baselines3', 'cv2'}\n"
-        "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n"
+        "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n",
     )
+    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize("name", COMMANDS)

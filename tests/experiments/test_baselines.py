@@ -29,7 +29,7 @@ def test_what_an_agent_is_worth_comes_from_its_episodes():
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory):
+def end_to_end(tmp_path_factory):
     """One level, two episodes; the folder, what was written, and what a second run trains."""
     out = tmp_path_factory.mktemp("baselines")
     arguments = baselines.Arguments(out=out, episodes=2, timesteps=256, threads=1)
@@ -45,8 +45,8 @@ def run(tmp_path_factory):
     return out, json.loads(first), trained
 
 
-def test_every_agent_gets_a_row_with_intervals_and_where_it_came_from(run):
-    out, results, _ = run
+def test_every_agent_gets_a_row_with_intervals_and_where_it_came_from(end_to_end):
+    out, results, _ = end_to_end
     for agent in ("random", "scripted", "scripted_slowed", "ppo", "ppo_safety"):
         for key in ("return", "goals_per_minute", "cost_per_episode", "contacts_per_episode"):
             metric = results["metrics"][f"truth.{agent}.{key}"]
@@ -59,13 +59,13 @@ def test_every_agent_gets_a_row_with_intervals_and_where_it_came_from(run):
     assert "Means of 2 episodes" in said
 
 
-def test_scripted_reaches_more_goals_than_chance(run):
-    metrics = run[1]["metrics"]
+def test_scripted_reaches_more_goals_than_chance(end_to_end):
+    metrics = end_to_end[1]["metrics"]
     scripted, chance = (metrics[f"truth.{name}.return"] for name in ("scripted", "random"))
     assert scripted["value"] > chance["value"]
 
 
-def test_what_is_there_is_neither_learnt_nor_played_again(run):
-    out, results, trained = run
+def test_what_is_there_is_neither_learnt_nor_played_again(end_to_end):
+    out, results, trained = end_to_end
     assert trained == []
     assert json.loads((out / "results.json").read_text())["metrics"] == results["metrics"]

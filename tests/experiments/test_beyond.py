@@ -21,8 +21,7 @@ from hrc_env.experiments.beyond.trial.walks import walks_of
 from hrc_env.skeleton import N_JOINTS
 from hrc_env.tracking.tree.gaussian import PARENT, ROOT
 
-WHOLE = BeyondConfig(n_seeds=1, seconds=1.24, n_timed=2)
-TINY = replace(WHOLE, studies=("latency",))
+TINY = BeyondConfig(n_seeds=1, seconds=1.24, n_timed=2)
 SEEDS = (7, 8, 9)
 N_STEPS = N_WARM_UP + 5
 
@@ -53,21 +52,19 @@ def state_of(setting):
     return senses.state, lengths_m(joints[0])
 
 
-@pytest.fixture(
-    scope="module", params=[TINY, pytest.param(WHOLE, marks=pytest.mark.slow)], ids=["one", "all"]
-)
-def done(request, tmp_path_factory):
-    """A run of some studies: configuration, folder, numbers, told progress."""
+@pytest.fixture(scope="module")
+def end_to_end(tmp_path_factory):
+    """A run of all studies: folder, numbers, told progress."""
     out, shares = tmp_path_factory.mktemp("beyond"), []
-    metrics = run(request.param, out, lambda share, label: shares.append(share))
-    return request.param, out, metrics, shares
+    metrics = run(TINY, out, lambda share, label: shares.append(share))
+    return out, metrics, shares
 
 
-def test_every_number_of_every_setting_is_there_and_finite(done):
-    config, out, metrics, _ = done
+def test_every_number_of_every_setting_is_there_and_finite(end_to_end):
+    out, metrics, _ = end_to_end
     written = json.loads((out / "results.json").read_text())["metrics"]
     assert written.keys() == metrics.keys()
-    for study in (STUDIES[name] for name in config.studies):
+    for study in STUDIES.values():
         for setting in study.settings:
             key = f"{study.name}.{setting.name}"
             assert f"error_m.{key}.median" in metrics
@@ -86,19 +83,19 @@ def test_names_are_said_once_and_have_no_dots():
         assert not any("." in name for name in names)
 
 
-def test_report_and_figures_are_written_and_the_progress_is_complete(done):
-    config, out, _, shares = done
+def test_report_and_figures_are_written_and_the_progress_is_complete(end_to_end):
+    out, _, shares = end_to_end
     assert sum(shares) == pytest.approx(1.0)
-    assert {path.stem for path in (out / "figures").iterdir()} == set(config.studies)
+    assert {path.stem for path in (out / "figures").iterdir()} == set(STUDIES)
     page = (out / "report.html").read_text()
-    assert page.count("data:image/png") == len(config.studies)
-    for name in config.studies:
-        assert STUDIES[name].title in page
+    assert page.count("data:image/png") == len(STUDIES)
+    for study in STUDIES.values():
+        assert study.title in page
     assert "nan" not in (out / "report.md").read_text()
 
 
-def test_what_is_finished_is_used_again(done, monkeypatch):
-    config, out, _, _ = done
+def test_what_is_finished_is_used_again(end_to_end, monkeypatch):
+    out, _, _ = end_to_end
 
     def never(*args):
         raise AssertionError("made again")
@@ -106,12 +103,12 @@ def test_what_is_finished_is_used_again(done, monkeypatch):
     monkeypatch.setattr(experiment, "_part", never)
     monkeypatch.setattr(experiment, "draw_figures", lambda *args: None)  # they are there
     before = (out / "results.json").read_text()
-    run(config, out, silent)
+    run(TINY, out, silent)
     assert (out / "results.json").read_text() == before
 
 
 def test_a_run_that_is_killed_goes_on_to_the_same_numbers(process, tmp_path):
-    config = replace(WHOLE, n_seeds=2, studies=("workers",))
+    config = replace(TINY, n_seeds=2, studies=("workers",))
     script = (
         "import os, sys; from pathlib import Path; "
         "from hrc_env.experiments.beyond.experiment import BeyondConfig, run\n"

@@ -58,7 +58,7 @@ def tally_of(*steps, margin_m=0.0):
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory):
+def end_to_end(tmp_path_factory):
     """A run from beginning to end: its folder and its numbers."""
     out = tmp_path_factory.mktemp("impact")
     return out, run(TINY, out, silent)
@@ -180,8 +180,8 @@ def test_the_margin_is_where_no_more_stops_are_missed_than_on_time():
     assert tax._margin([row(6), row(5)], np.array([0.0, 0.1]), row(3)).value == 0.1
 
 
-def test_every_row_says_everything(finished):
-    out, metrics = finished
+def test_every_row_says_everything(end_to_end):
+    out, metrics = end_to_end
     keys = ("separation_min_m", "contacts_towards", "contacts_fleeing", "contacts_standing",
             "cost", "goals_per_min", "missed_stops", "false_stops", "z_d_m", "tax_m")  # fmt: skip
     for policy in TINY.policies:
@@ -193,16 +193,16 @@ def test_every_row_says_everything(finished):
     assert written["seeds"] == [1_000_000, 1_000_001]
 
 
-def test_the_report_holds_its_pictures(finished):
-    out, _ = finished
+def test_the_report_holds_its_pictures(end_to_end):
+    out, _ = end_to_end
     page = (out / "report.html").read_text()
     assert page.count("data:image/png;base64,") == 3
     for words in ("What was asked", "What lateness costs", "What it does not mean"):
         assert words in page
 
 
-def test_the_truth_has_no_error_and_lateness_a_tax(finished):
-    _, metrics = finished
+def test_the_truth_has_no_error_and_lateness_a_tax(end_to_end):
+    _, metrics = end_to_end
     assert metrics["scripted.truth.z_d_m"].value < 1e-3
     late, on_time = metrics[f"scripted.{LATE}.tax_m"], metrics[f"scripted.{REFERENCE}.z_d_m"]
     assert late.value >= on_time.value + 0.12 * 1.6 - 1e-9
@@ -223,8 +223,8 @@ def test_an_environment_that_is_used_again_starts_afresh():
     assert first == again
 
 
-def test_a_run_that_is_killed_goes_on_to_the_same_numbers(finished, process, tmp_path):
-    _, metrics = finished
+def test_a_run_that_is_killed_goes_on_to_the_same_numbers(end_to_end, process, tmp_path):
+    _, metrics = end_to_end
     script = (
         "import os, sys; from pathlib import Path; "
         "from hrc_env.experiments.impact.experiment import ImpactConfig, run\n"
@@ -262,8 +262,8 @@ def test_a_policy_is_learnt_once_and_again_only_if_its_file_is_lost(tmp_path, mo
     assert len(learnt) == 2
 
 
-def test_pages_are_written_without_the_policy_that_yields(finished, tmp_path):
-    _, metrics = finished
+def test_pages_are_written_without_the_policy_that_yields(end_to_end, tmp_path):
+    _, metrics = end_to_end
     out = tmp_path / "one"
     table = experiment._played(
         replace(TINY, policies=("scripted",), eyes=("truth", REFERENCE)),

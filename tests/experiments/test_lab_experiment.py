@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hrc_env.errors import ConfigError
-from hrc_env.experiments.lab import experiment, figures
+from hrc_env.experiments.lab import experiment
 from hrc_env.experiments.lab.experiment import LabConfig, config_for, laboratory, run
 from hrc_env.experiments.lab.motions import MOTIONS, play
 from hrc_env.experiments.lab.sides import LEFT, RIGHT, turned_away
@@ -16,18 +16,14 @@ TINY = LabConfig(n_seeds=1, max_frames=26)
 CAMERAS = (*(f"camera_{k}" for k in range(1, 5)), "multi")
 
 
-@pytest.fixture(scope="module", params=["keypoints", "pixels"])
-def done(request, films_seen_at, weights, tmp_path_factory):
-    """A run; at keypoints it shows no crops, for there are none."""
+@pytest.fixture(scope="module")
+def end_to_end(weights, tmp_path_factory):
     out = tmp_path_factory.mktemp("lab")
-    with films_seen_at(request.param) as patch:
-        if request.param == "keypoints":
-            patch.setattr(figures, "SHOWN", ())
-        yield out, run(TINY, out, lambda share, label: None)
+    return out, run(TINY, out, lambda share, label: None)
 
 
-def test_every_number_is_there(done):
-    out, metrics = done
+def test_every_number_is_there(end_to_end):
+    out, metrics = end_to_end
     written = json.loads((out / "results.json").read_text())["metrics"]
     assert written.keys() == metrics.keys()
     for motion in MOTIONS:
@@ -37,24 +33,24 @@ def test_every_number_is_there(done):
             assert 0 <= metrics[f"missed.{camera}.{motion}"].value <= 1
 
 
-def test_four_cameras_know_all_joints_better_than_any_one(done):
-    _, metrics = done
+def test_four_cameras_know_all_joints_better_than_any_one(end_to_end):
+    _, metrics = end_to_end
     four = metrics["error_m.particle.multi.all.median"].value
     assert four < 0.05
     for camera in CAMERAS[:4]:
         assert metrics[f"error_m.particle.{camera}.all.median"].value > four
 
 
-def test_report_and_figures_are_written(done):
-    out, _ = done
+def test_report_and_figures_are_written(end_to_end):
+    out, _ = end_to_end
     assert {path.name for path in (out / "figures").iterdir()} == {
         "figure_6.png", "errors.png", "far_side.png",
     }  # fmt: skip
     assert (out / "report.html").read_text().count("data:image/png") == 3
 
 
-def test_what_is_finished_is_used_again(done, monkeypatch):
-    out, _ = done
+def test_what_is_finished_is_used_again(end_to_end, monkeypatch):
+    out, _ = end_to_end
 
     def never(*args):
         raise AssertionError("made again")

@@ -5,27 +5,23 @@ import json
 import pytest
 
 from hrc_env.errors import ConfigError
-from hrc_env.experiments.site import experiment, figures
+from hrc_env.experiments.site import experiment
 from hrc_env.experiments.site.experiment import SiteConfig, config_for, run
 
 TINY = SiteConfig(n_seeds=1, seconds=2.0, estimators=("particle",))
 CAMERAS = (*(f"camera_{k}" for k in range(1, 5)), "multi")
 
 
-@pytest.fixture(scope="module", params=["keypoints", "pixels"])
-def done(request, films_seen_at, weights, tmp_path_factory):
+@pytest.fixture(scope="module")
+def end_to_end(weights, tmp_path_factory):
     out = tmp_path_factory.mktemp("site")
     shares: list[float] = []
-    with films_seen_at(request.param) as patch:
-        if request.param == "keypoints":
-            patch.setattr(figures, "VIEW_PX", (96, 54))
-            patch.setattr(figures, "ABOVE_PX", (110, 110))
-        metrics = run(TINY, out, lambda share, label: shares.append(share))
+    metrics = run(TINY, out, lambda share, label: shares.append(share))
     return out, metrics, shares
 
 
-def test_every_number_is_there(done):
-    out, metrics, _ = done
+def test_every_number_is_there(end_to_end):
+    out, metrics, _ = end_to_end
     written = json.loads((out / "results.json").read_text())["metrics"]
     for name in ("particle", "kalman", "per_joint"):
         for camera in CAMERAS:
@@ -35,15 +31,15 @@ def test_every_number_is_there(done):
     assert {"rmse_m.particle.two", "rmse_m.particle.three"} <= written.keys() == metrics.keys()
 
 
-def test_four_cameras_know_the_head_and_one_does_not(done):
-    _, metrics, _ = done
+def test_four_cameras_know_the_head_and_one_does_not(end_to_end):
+    _, metrics, _ = end_to_end
     four = metrics["rmse_m.particle.multi"].value
     assert four < 0.1
     assert metrics["rmse_m.per_joint.camera_1"].value > 2 * four
 
 
-def test_report_and_figures_are_written_and_the_progress_is_complete(done):
-    out, _, shares = done
+def test_report_and_figures_are_written_and_the_progress_is_complete(end_to_end):
+    out, _, shares = end_to_end
     assert sum(shares) == pytest.approx(1.0)
     assert {path.name for path in (out / "figures").iterdir()} == {
         "figure_3.png", "figure_4_particle.png", "rmse.png",
@@ -53,8 +49,8 @@ def test_report_and_figures_are_written_and_the_progress_is_complete(done):
     assert "6.771" in page
 
 
-def test_what_is_finished_is_used_again(done, monkeypatch):
-    out, _, _ = done
+def test_what_is_finished_is_used_again(end_to_end, monkeypatch):
+    out, _, _ = end_to_end
 
     def never(*args):
         raise AssertionError("made again")

@@ -19,14 +19,14 @@ TINY = bench.SpeedBenchConfig(
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory):
+def end_to_end(tmp_path_factory):
     out, said = tmp_path_factory.mktemp("speed"), []
     metrics = bench.run(TINY, out, lambda share, label: said.append(share))
     return out, metrics, said
 
 
-def test_every_number_is_there_and_finite(done):
-    _, metrics, _ = done
+def test_every_number_is_there_and_finite(end_to_end):
+    _, metrics, _ = end_to_end
     sizes = ("single", "1.1", "3.1", "3.2")
     for size in sizes:
         assert metrics[f"env_steps_per_s.keypoints.{size}"].value > 0
@@ -41,8 +41,8 @@ def test_every_number_is_there_and_finite(done):
     assert all(math.isfinite(metric.value) for metric in metrics.values())
 
 
-def test_organs_and_rest_are_the_whole_and_organs_are_most_of_it(done):
-    _, metrics, _ = done
+def test_organs_and_rest_are_the_whole_and_organs_are_most_of_it(end_to_end):
+    _, metrics, _ = end_to_end
     for size in ("single", "1.1", "3.1", "3.2"):
         us = {
             organ: metrics[f"us_per_env_step.{organ}.{size}"].value
@@ -54,8 +54,8 @@ def test_organs_and_rest_are_the_whole_and_organs_are_most_of_it(done):
         assert us[REST] < total / 2 or size == "3.2"
 
 
-def test_files_are_written_and_the_progress_ends_at_one(done):
-    out, metrics, said = done
+def test_files_are_written_and_the_progress_ends_at_one(end_to_end):
+    out, metrics, said = end_to_end
     content = json.loads((out / "results.json").read_text())
     assert set(content["metrics"]) == set(metrics)
     assert content["config"]["bench"]["n_rounds"] == 1

@@ -48,7 +48,7 @@ def small():
 
 
 @pytest.fixture(scope="module")
-def bench(tmp_path_factory):
+def end_to_end(tmp_path_factory):
     """The folder of a bench on a few frames of two sequences, and what it said."""
     out, said = tmp_path_factory.mktemp("bench"), []
     with small():
@@ -56,8 +56,8 @@ def bench(tmp_path_factory):
     return out, said
 
 
-def test_every_key_is_written_in_the_shared_form(bench):
-    out, _ = bench
+def test_every_key_is_written_in_the_shared_form(end_to_end):
+    out, _ = end_to_end
     results = json.loads((out / "results.json").read_text())
     assert set(results) >= {"config", "git", "versions", "machine", "seeds", "metrics"}
     metrics = results["metrics"]
@@ -80,8 +80,8 @@ def test_every_key_is_written_in_the_shared_form(bench):
         assert np.isfinite([metric["value"], metric["low"], metric["high"]]).all()
 
 
-def test_the_report_is_a_table_and_two_plots(bench):
-    out, _ = bench
+def test_the_report_is_a_table_and_two_plots(end_to_end):
+    out, _ = end_to_end
     text = (out / "tracking.md").read_text()
     for name in (*ESTIMATORS, DLT):
         assert name in text
@@ -89,13 +89,13 @@ def test_the_report_is_a_table_and_two_plots(bench):
         assert (out / plot).read_bytes().startswith(b"\x89PNG")
 
 
-def test_progress_ends_at_the_whole(bench):
-    _, said = bench
+def test_progress_ends_at_the_whole(end_to_end):
+    _, said = end_to_end
     assert sum(share for share, _ in said) == pytest.approx(1.0)
 
 
-def test_a_second_run_makes_only_what_is_missing(bench):
-    out, _ = bench
+def test_a_second_run_makes_only_what_is_missing(end_to_end):
+    out, _ = end_to_end
     missing = out / "parts" / "lab.clean.paper.json"
     before = json.loads(missing.read_text())
     missing.unlink()
@@ -109,7 +109,7 @@ def test_a_second_run_makes_only_what_is_missing(bench):
     assert not list(out.rglob("*.draft"))
 
 
-def test_parts_of_other_settings_are_not_used(bench):
+def test_parts_of_other_settings_are_not_used(end_to_end):
     assert fingerprint_of({"n": 1}, "tracking") != fingerprint_of({"n": 2}, "tracking")
 
 

@@ -5,12 +5,8 @@ import pytest
 
 from hrc_env.env import HRCReachEnv
 from hrc_env.faults.fault import KINDS, FaultConfig
-from hrc_env.perception.weights import fetch_weights
 
-
-@pytest.fixture(scope="module", autouse=True)
-def weights():
-    fetch_weights()
+pytestmark = pytest.mark.usefixtures("pixels")
 
 
 def rolled(n_steps, *faults, seed=3, **kwargs):

@@ -1,9 +1,6 @@
 """Compiled kernels lie beside the package or where the user may write, and always fit."""
 
-import os
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -30,23 +27,25 @@ def tree(tmp_path) -> Path:
     return copy
 
 
-def was_compiled(tree: Path) -> bool:
-    """Whether the kernel lay on disk; it does from now on."""
-    environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
-    program = [sys.executable, "-c", COMPILE.format(KERNEL)]
-    told = subprocess.run(
-        program,
-        env={**environment, "PYTHONPATH": str(tree), "XDG_CACHE_HOME": str(tree / "cache")},
-        cwd=tree,
-        check=True,
-        capture_output=True,
-        text=True,
-    ).stdout.split()
-    assert told[1] == "True"
-    return told[0] == "True"
+@pytest.fixture
+def was_compiled(process):
+    """Whether a tree's kernel lay on disk; it does from then on."""
+
+    def asked(tree: Path) -> bool:
+        words = "-c", COMPILE.format(KERNEL)
+        cache = str(tree / "cache")
+        done = process(
+            *words, cwd=tree, NUMBA_CACHE_DIR=None, PYTHONPATH=str(tree), XDG_CACHE_HOME=cache
+        )
+        assert done.returncode == 0, done.stderr
+        told = done.stdout.split()
+        assert told[1] == "True"
+        return told[0] == "True"
+
+    return asked
 
 
-def test_a_copied_and_edited_tree_keeps_the_kernels_that_still_fit(tree):
+def test_a_copied_and_edited_tree_keeps_the_kernels_that_still_fit(tree, was_compiled):
     assert not was_compiled(tree)
     copy = tree.with_name("second")
     shutil.copytree(tree, copy, copy_function=shutil.copy)  # with times of its own

@@ -2,8 +2,6 @@
 
 import json
 import logging
-import os
-import subprocess
 import sys
 
 import pytest
@@ -42,12 +40,10 @@ def two_kernels(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("level", ["truth", "keypoints", "none"])
-def test_everything_that_a_level_calls_is_recorded(level):
-    run = subprocess.run(
-        [sys.executable, "-c", PLAY.format(level=level)],
-        check=True, capture_output=True, text=True, env=os.environ,
-    )  # fmt: skip
-    called = {json.dumps(each) for each in json.loads(run.stdout.splitlines()[-1])}
+def test_everything_that_a_level_calls_is_recorded(level, process):
+    done = process("-c", PLAY.format(level=level))
+    assert done.returncode == 0, done.stderr
+    called = {json.dumps(each) for each in json.loads(done.stdout.splitlines()[-1])}
     known = {json.dumps([each.kernel, each.args]) for each in signatures.recorded(level)}
     assert called <= known, "run python -m assets.kernels.record"
 

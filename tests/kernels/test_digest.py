@@ -1,9 +1,5 @@
 """A kernel's digest changes with what the kernel computes, and with nothing else."""
 
-import os
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 
@@ -57,21 +53,13 @@ def test_it_stays_with_comments_places_and_what_is_not_named(before, after):
     assert digest(PLAIN.replace(before, after)) == digest(PLAIN)
 
 
-def test_it_is_the_same_in_every_process():
+def test_it_is_the_same_in_every_process(process):
     program = (
         "import hrc_env.simulation\n"
         "from hrc_env.kernels import KERNELS\n"
         "from hrc_env.kernels.digest import digest_of\n"
         "print(sorted((name, digest_of(each)) for name, each in KERNELS.items()))"
     )
-    told = [
-        subprocess.run(
-            [sys.executable, "-c", program],
-            env={**os.environ, "PYTHONHASHSEED": seed},
-            check=True,
-            capture_output=True,
-        ).stdout
-        for seed in ("1", "2")
-    ]
+    told = [process("-c", program, PYTHONHASHSEED=seed).stdout for seed in ("1", "2")]
     assert told[0] == told[1]
-    assert told[0].count(b"hrc_env.") > 100
+    assert told[0].count("hrc_env.") > 100

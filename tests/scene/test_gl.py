@@ -2,9 +2,7 @@
 
 import ctypes.util
 import importlib.util
-import os
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
@@ -45,14 +43,6 @@ except RenderingError as error:
 """
 
 
-def python(code: str, **env: str) -> subprocess.CompletedProcess[str]:
-    inherited = {name: value for name, value in os.environ.items() if name != "MUJOCO_GL"}
-    return subprocess.run(
-        [sys.executable, "-c", code],
-        capture_output=True, text=True, check=False, env={**inherited, **env},
-    )  # fmt: skip
-
-
 @pytest.mark.parametrize(
     "order",
     [
@@ -64,7 +54,7 @@ def python(code: str, **env: str) -> subprocess.CompletedProcess[str]:
         "foreign render triton render",
     ],
 )
-def test_no_order_of_libraries_crashes(order):
+def test_no_order_of_libraries_crashes(order, process):
     """`make test-stock` runs this with triton: torch's build for CPUs has none."""
     steps = order.split()
     missing = {NEEDS[step] for step in steps if step in NEEDS} - {
@@ -73,14 +63,15 @@ def test_no_order_of_libraries_crashes(order):
     if missing:
         pytest.skip(f"not tested, because not installed: {', '.join(sorted(missing))}")
     code = "; ".join(STEPS[step] for step in steps)
-    done = python(code, MUJOCO_GL="egl")
+    done = process("-c", code, MUJOCO_GL="egl")
     assert done.returncode == 0, (done.returncode, done.stderr)
 
 
 @pytest.mark.skipif(NO_TRITON, reason="not tested: triton is not installed")
-def test_triton_compiles_and_mesa_draws_in_one_process():
+def test_triton_compiles_and_mesa_draws_in_one_process(process):
     """Each keeps to its own LLVM: a kernel for a GPU that need not be there, between pictures."""
-    done = python(f"{STEPS['render']}; import tests.scene.triton_kernel as k; k.compile_it()")
+    code = f"{STEPS['render']}; import tests.scene.triton_kernel as k; k.compile_it()"
+    done = process("-c", code, MUJOCO_GL=None)
     assert done.returncode == 0, (done.returncode, done.stderr)
     assert "exp" in done.stdout or ".entry" in done.stdout
 
@@ -107,9 +98,9 @@ def test_tritons_library_is_there_before_the_first_context(monkeypatch, tmp_path
     assert seen == [True]
 
 
-def test_pictures_need_no_display():
+def test_pictures_need_no_display(process):
     """A dead display is everyday in ssh."""
-    done = python(STATUS, DISPLAY=":99")
+    done = process("-c", STATUS, MUJOCO_GL=None, DISPLAY=":99")
     assert "True, 'OpenGL works (MUJOCO_GL=egl" in done.stdout, done.stderr
 
 
@@ -121,17 +112,17 @@ def test_pictures_need_no_display():
         ("off", "unset it"),
     ],
 )
-def test_a_backend_that_cannot_draw_says_what_to_do(backend, said):
-    done = python(STATUS, MUJOCO_GL=backend, DISPLAY=":99")
+def test_a_backend_that_cannot_draw_says_what_to_do(backend, said, process):
+    done = process("-c", STATUS, MUJOCO_GL=backend, DISPLAY=":99")
     assert done.returncode == 0, done.stderr
     assert "False" in done.stdout
     assert said in done.stdout.replace("\\", "")
 
 
 @pytest.mark.skipif(bool(ctypes.util.find_library("OSMesa")), reason="OSMesa is installed here")
-def test_without_a_library_truth_works_and_pictures_say_what_to_do():
+def test_without_a_library_truth_works_and_pictures_say_what_to_do(process):
     """mujoco itself cannot be imported with such a MUJOCO_GL."""
-    done = python(TRUTH, MUJOCO_GL="osmesa")
+    done = process("-c", TRUTH, MUJOCO_GL="osmesa")
     assert done.returncode == 0, done.stderr
     assert "RenderingError" in done.stdout
     assert "there is no library libOSMesa" in done.stdout
