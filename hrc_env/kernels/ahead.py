@@ -112,7 +112,7 @@ def _logged() -> Say:
     """Progress as lines of the log."""
     started_s = said_s = time.monotonic()
     done = 0.0
-    log.warning("Compiling hrc_env's kernels for this machine, once (about a minute) ...")
+    log.warning("Compiling hrc_env's kernels for this machine, once (a minute or two) ...")
 
     def say(share: float, what: str) -> None:
         nonlocal done, said_s
