@@ -32,7 +32,7 @@ SMOOTHING = 2
 MOSAIC_TILE = (640, 360)
 SIDES = (
     ("from above", np.array([0.0, 0.0, 5.0]), np.zeros(3)),
-    ("from the side", np.array([0.0, -3.8, 1.5]), np.array([0.0, 0.0, 1.0])),
+    ("from the side", np.array([0.0, -4.2, 1.4]), np.array([0.0, 0.0, 0.9])),
 )
 """Where what is believed is seen from: eye and target from the robot's foot [m]."""
 SIDES_HFOV_DEG = 55.0

@@ -78,7 +78,7 @@ class Meter:
         left = "?"
         if since > 0:
             left = _time(max(self.total - self.done, 0.0) / since * passed_s)
-        share = 100 * self.done / self.total if self.total else 100.0
+        share = 100 * min(self.done / self.total, 1.0) if self.total else 100.0
         parts = [f"{share:.0f} %", self._counted(), f"{_time(passed_s)} passed, {left} left"]
         said = ", ".join(part for part in (*parts, self.note) if part)
         self.console.print(f"{self.name}: {said}", markup=False, highlight=False, soft_wrap=True)
