@@ -30,7 +30,7 @@ from .monitor import Curve, TrainingMonitor, plot_curve
 with learner():
     import torch
 
-ONLY_OF_A_RUN = ("out", "timesteps", "threads", "backend", "episodes", "film", "resume")
+ONLY_OF_A_RUN = ("out", "timesteps", "threads", "episodes", "film", "resume")
 """Arguments that a resumed run does not take from the run that it goes on with."""
 FILM_SEEDS = 8
 """The film shows that of so many episodes which comes closest to the worker."""
@@ -114,9 +114,7 @@ def train(arguments: Train, folder: Path, console: Console) -> tuple[Curve, floa
     Progress survives a kill.
     """
     kwargs, settings = arguments.keywords(), ppo.PPOSettings()
-    vector = HRCVecEnv(
-        arguments.num_envs, stagger=True, seed=arguments.seed, backend=arguments.backend, **kwargs
-    )
+    vector = HRCVecEnv(arguments.num_envs, stagger=True, seed=arguments.seed, **kwargs)
     with closing(vector) as env, Interrupt() as interrupt:
         config = asdict(resolve(kwargs["config"]))
         record = {"arguments": _plain(arguments), "config": config, **provenance()}

@@ -1,14 +1,13 @@
 """A batch of environments in contiguous ranges, each a `Simulation` stepped by its own thread.
 
-A range's simulation may live in a process of its own instead. As no result depends on the size
-of a batch, none depends on the number of ranges either.
+As no result depends on the size of a batch, none depends on the number of ranges either.
 """
 
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from itertools import pairwise
-from typing import Any, Generic, Protocol, TypeAlias, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -20,68 +19,25 @@ from hrc_env.stateful import State
 from hrc_env.typing import Floats, Ints
 
 
-class Part(Protocol):
-    """A range of environments: a `Simulation`, or what stands for one in another process."""
-
-    batch: int
-
-    def reset(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> Outcome:
-        """As `Simulation.reset`."""
-        ...
-
-    def step(self, action: Floats) -> Outcome:
-        """As `Simulation.step`."""
-        ...
-
-    def get_state(self) -> State:
-        """A copy of everything that changes."""
-        ...
-
-    def set_state(self, state: State) -> None:
-        """Continue from a state."""
-        ...
-
-    def close(self) -> None:
-        """Release what it holds."""
-        ...
-
-
-PartT = TypeVar("PartT", bound=Part)
-Start: TypeAlias = Callable[[PartT, str, tuple[Any, ...]], Callable[[], Outcome]]
-"""Sets a part to work on a method with arguments; what it gives is called for the result."""
-
-
-class Shards(Generic[PartT]):
+class Shards:
     """`batch` environments in `n_shards` simulations; the calling thread works on the first."""
 
-    def __init__(
-        self,
-        batch: int,
-        n_shards: int,
-        make: Callable[[int], Simulation],
-        make_other: Callable[[int], PartT],
-        start: Start[PartT] | None = None,
-    ) -> None:
+    def __init__(self, batch: int, n_shards: int, make: Callable[[int], Simulation]) -> None:
         """Make them.
 
         Args:
             batch: how many environments.
             n_shards: in how many ranges.
             make: gives a simulation of so many environments, always of the same kind.
-            make_other: gives those beside the first, which is made while these come about.
-            start: sets one of those to work; with None a thread works on it.
         """
         self.bounds = [batch * k // n_shards for k in range(n_shards + 1)]
-        here, *others = (high - low for low, high in pairwise(self.bounds))
-        self._others = [make_other(size) for size in others]
-        self.first = make(here)
-        self._start = start or self._submit
+        self.parts = [make(high - low) for low, high in pairwise(self.bounds)]
         self._pool: ThreadPoolExecutor | None = None
 
     @property
-    def parts(self) -> list[Simulation | PartT]:
-        """Them all."""
-        return [self.first, *self._others]
+    def first(self) -> Simulation:
+        """That of the calling thread."""
+        return self.parts[0]
 
     def reset(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> Outcome:
         """Start environments `ids` (sorted) anew, one generator each; their rows."""
@@ -131,19 +87,21 @@ class Shards(Generic[PartT]):
         mine, *theirs = arguments
         others = [
             (first, self._start(part, name, each))
-            for part, first, each in zip(self._others, self.bounds[1:-1], theirs, strict=True)
+            for part, first, each in zip(self.parts[1:], self.bounds[1:-1], theirs, strict=True)
             if each is not None
         ]
         own = [] if mine is None else [(0, partial(getattr(self.first, name), *mine))]
         return joined(_all_done([*own, *others]))
 
-    def _submit(self, part: Part, name: str, arguments: tuple[Any, ...]) -> Callable[[], Outcome]:
+    def _start(
+        self, part: Simulation, name: str, arguments: tuple[Any, ...]
+    ) -> Callable[[], Outcome]:
         """Have a thread work on a part; but a reset is Python for the most part, in which threads
         would only wait for each other."""
         if name == "reset":
             return partial(getattr(part, name), *arguments)
         if self._pool is None:
-            n_helpers = len(self._others)
+            n_helpers = len(self.parts) - 1
             self._pool = ThreadPoolExecutor(n_helpers, thread_name_prefix="hrc_env-shard")
         return self._pool.submit(getattr(part, name), *arguments).result
 

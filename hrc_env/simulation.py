@@ -121,17 +121,13 @@ class Simulation(Stateful):
         self.streams = Streams(*(list(blank) for _ in range(5)))
 
     def reset(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> Outcome:
-        """Start environments `ids` anew, one generator each; their rows of an outcome."""
-        return self.begin(ids, [children(rng, N_STREAMS) for rng in rngs])
+        """Start environments `ids` anew, one generator each; their rows of an outcome.
 
-    def begin(self, ids: Ints, streams: Sequence[Sequence[np.random.Generator]]) -> Outcome:
-        """Start environments `ids` anew with a stream for every organ.
-
-        Always as many and in the same order, so that the worker's walk does not depend on
-        who looks at it.
+        Every organ draws from a stream of its own, always as many and in the same order, so that
+        the worker's walk does not depend on who looks at it.
         """
-        for b, mine in zip(ids, streams, strict=True):
-            for organ, stream in zip(self.streams.organs(), mine, strict=True):
+        for b, rng in zip(ids, rngs, strict=True):
+            for organ, stream in zip(self.streams.organs(), children(rng, N_STREAMS), strict=True):
                 organ[b] = stream
         generator.reset(self.motion, ids, self.streams.motion)
         self.worn[ids] = bodies_of(self.motion, ids, self.bodies.names)

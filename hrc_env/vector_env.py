@@ -8,7 +8,7 @@ environments and of threads. What it says, and in which form, is what gymnasium'
 `SyncVectorEnv` of the same environments says.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -30,11 +30,10 @@ from hrc_env.config import (
     with_people,
 )
 from hrc_env.env import RENDER_MODES, PlainSpec, check_render_mode, spaces
-from hrc_env.errors import ConfigError, unknown
+from hrc_env.errors import ConfigError
 from hrc_env.faults.fault import FaultConfig
 from hrc_env.motion.generator import Clip, PeopleConfig
 from hrc_env.outcome import Outcome
-from hrc_env.remote import Remote
 from hrc_env.rewards import RewardConfig
 from hrc_env.shards import Shards
 from hrc_env.simulation import Simulation, checked_action
@@ -43,6 +42,7 @@ from hrc_env.typing import Bools, Floats, Ints
 from hrc_env.vector_infos import InfoTable, blank, table
 from hrc_env.vector_options import (
     autoreset_of,
+    check_backend,
     count_of,
     read_options,
     seeds_of,
@@ -50,8 +50,6 @@ from hrc_env.vector_options import (
     time_limit,
 )
 from hrc_env.views import PICTURE_SIZE, Views, picture_size
-
-THREADS, PROCESSES = BACKENDS = ("threads", "processes")
 
 Observations = NDArray[np.float32]
 Stream = tuple[np.random.Generator, int]
@@ -75,9 +73,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         autoreset_mode: when an environment whose episode is over starts anew: at the next
             step (default), in the same step, or not by itself ("Disabled").
         num_threads: threads that share the environments; all cores if None.
-        backend: "threads", or "processes": all of them but the first in a process of its own,
-            where no lock is shared, with the memory of as many more programs and some seconds
-            later to start. Results are the same; which is faster, docs/speed.md says.
+        backend: "threads"; there is no other.
 
     Raises:
         ConfigError: an argument that cannot work, with what would.
@@ -106,13 +102,14 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         max_episode_steps: int | None = 250,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         num_threads: int | None = None,
-        backend: str = THREADS,
+        backend: str = "threads",
     ) -> None:
         if perception == "pixels":
             raise ConfigError(
                 'perception="pixels" has no batched form: gymnasium.make_vec makes it with a '
                 'process for each environment. perception="keypoints" emulates it, batched.'
             )
+        check_backend(backend)
         check_render_mode(render_mode)
         self._size = picture_size(width, height)
         self.num_envs = count_of(num_envs)
@@ -131,10 +128,9 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
             control=control,
             config=self.config,
         )
-        self.shards = _shards(
-            self.num_envs, min(threads_of(num_threads), self.num_envs), make, backend
-        )
-        self.views = [_views_of(part) for part in self.shards.parts]
+        n_shards = min(threads_of(num_threads), self.num_envs)
+        self.shards = Shards(self.num_envs, n_shards, make)
+        self.views = [Views(part) for part in self.shards.parts]
         self.single_observation_space, self.single_action_space = spaces(self.shards.first)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
@@ -304,18 +300,3 @@ def _finals(observation: Observations, info: InfoTable, who: Bools) -> dict[str,
         "final_info": info.arrays(who),
         "_final_info": who.copy(),
     }
-
-
-def _shards(
-    num_envs: int, n_shards: int, make: Callable[[int], Simulation], backend: str
-) -> Shards[Simulation] | Shards[Remote]:
-    """The environments, in as many ranges as work at once."""
-    if backend not in BACKENDS:
-        raise unknown("backend", backend, BACKENDS)
-    if backend == PROCESSES:
-        return Shards(num_envs, n_shards, make, partial(Remote, make), Remote.start)
-    return Shards(num_envs, n_shards, make, make)
-
-
-def _views_of(part: Simulation | Remote) -> Views | Remote:
-    return part if isinstance(part, Remote) else Views(part)

@@ -37,6 +37,15 @@ def autoreset_of(mode: str | AutoresetMode) -> AutoresetMode:
     return AutoresetMode(mode)
 
 
+def check_backend(backend: str) -> None:
+    """Raise `ConfigError` for any but "threads"."""
+    if backend != "threads":
+        raise ConfigError(
+            f"backend={backend!r}: environments are stepped by threads, which are as fast as "
+            "processes were. Leave backend out; num_threads= says how many."
+        )
+
+
 def threads_of(num_threads: int | None) -> int:
     """How many threads to use: as many as cores, unless a number was given."""
     cores = n_cores()

@@ -14,7 +14,7 @@ from hrc_env.perception.weights import fetch_weights
 SLOW = {"process", "pixels", "end_to_end"}
 """Fixtures that take their time: `make test` leaves out who asks for one. `end_to_end` is a whole
 run of an experiment, of which each has its own."""
-SLOW_WORDS = {"pixels", "processes"}
+SLOW_WORDS = {"pixels"}
 """And parameters that do."""
 
 

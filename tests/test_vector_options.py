@@ -65,3 +65,8 @@ def test_options_that_cannot_work_say_so():
     for options, said in bad:
         with pytest.raises(ConfigError, match=said):
             env.reset(options=options)
+
+
+def test_processes_are_answered_with_what_to_use_instead():
+    with pytest.raises(ConfigError, match=r"stepped by threads.*num_threads="):
+        HRCVectorEnv(2, perception="none", backend="processes")

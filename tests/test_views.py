@@ -21,10 +21,9 @@ def test_pictures_have_the_size_that_was_asked_for(mode):
     env.close()
 
 
-@pytest.mark.parametrize("backend", ["threads", "processes"])
-def test_pictures_of_many_have_that_size_too(backend):
+def test_pictures_of_many_have_that_size_too():
     env = HRCVectorEnv(
-        2, perception="truth", render_mode="rgb_array", width=96, height=64, backend=backend,
+        2, perception="truth", render_mode="rgb_array", width=96, height=64,
         num_threads=2,
     )  # fmt: skip
     env.reset(seed=0)

@@ -7,7 +7,7 @@ from typing import Any
 from hrc_env.agents_door import agents
 from hrc_env.cli.checks import at_least, writable_folder
 from hrc_env.cli.environment import EnvironmentArguments, merged
-from hrc_env.errors import ConfigError, unknown
+from hrc_env.errors import ConfigError
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,9 +36,6 @@ class Train(EnvironmentArguments):
     it from the start; the policy learns several times slower, and is more careful in the end."""
     threads: int | None = None
     """How many ranges the environments are stepped in at once; all cores by default."""
-    backend: str = "threads"
-    """Where those beside the first live: threads, or processes of their own. The policy is the
-    same."""
     episodes: int = 128
     """Episodes of the evaluation at the end."""
     film: bool = True
@@ -65,8 +62,6 @@ class Train(EnvironmentArguments):
             ("--episodes", self.episodes, 1),
         ):
             at_least(option, value, low)
-        if self.backend not in ("threads", "processes"):
-            raise unknown("backend", self.backend, ("threads", "processes"))
         if self.perception == "pixels":
             raise ConfigError(
                 "--perception pixels is too slow to learn on: learn on keypoints, which emulates "

@@ -123,7 +123,6 @@ def test_training_refuses_numbers_that_mean_nothing(option, tmp_path: Path, caps
         ["experiment", "impact", "--seeds", "0"],
         ["calibrate-keypoints", "--rounds", "-1"],
         ["train", "--perception", "pixels"],
-        ["train", "--backend", "proceses"],
     ],
 )
 def test_other_values_that_mean_nothing_are_refused(words, capsys):

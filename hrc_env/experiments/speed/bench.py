@@ -14,7 +14,6 @@ from pathlib import Path
 from hrc_env.errors import ConfigError
 from hrc_env.experiments.speed.contenders import OURS, PEER, Contender, Single, Vector
 from hrc_env.experiments.speed.measured import (
-    IN_PROCESSES,
     REACHER,
     SINGLE,
     Measured,
@@ -25,7 +24,6 @@ from hrc_env.experiments.speed.report import write_report
 from hrc_env.experiments.speed.starts import Starts
 from hrc_env.experiments.study.shelf import Say
 from hrc_env.results import Metric, write_results
-from hrc_env.vector_env import PROCESSES, THREADS
 
 WATCHED = "keypoints"
 """The level whose organs are timed."""
@@ -71,7 +69,7 @@ class Turn:
 
     level: str
     configuration: str
-    """"single", "<num_envs>.<threads>", or with processes "<num_envs>.<processes>p"."""
+    """"single" or "<num_envs>.<threads>"."""
     n_threads: int
     contender: Contender
     n_episodes: int
@@ -80,8 +78,8 @@ class Turn:
 
     @property
     def is_watched(self) -> bool:
-        """Whether its organs are timed: all of them are in this process."""
-        return self.level == WATCHED and not self.configuration.endswith(IN_PROCESSES)
+        """Whether its organs are timed."""
+        return self.level == WATCHED
 
 
 def run(config: SpeedBenchConfig, out: Path, say: Say) -> dict[str, Metric]:
@@ -135,13 +133,8 @@ def _take(turn: Turn, measured: Measured, organs: Organs) -> None:
 
 def _turns(config: SpeedBenchConfig, closing: ExitStack, say: Say) -> Iterator[Turn]:
     """Make everybody, ready to run, to be closed in the end."""
-    backends = {"": THREADS, IN_PROCESSES: PROCESSES}
     known = [
-        (size, threads, kind)
-        for size in config.sizes
-        for threads in config.threads
-        for kind in backends
-        if threads <= size and (threads > 1 or not kind)
+        (size, threads) for size in config.sizes for threads in config.threads if threads <= size
     ]
     n_contenders = len(config.levels) * (1 + len(known)) + 2
 
@@ -157,7 +150,6 @@ def _turns(config: SpeedBenchConfig, closing: ExitStack, say: Say) -> Iterator[T
     yield turn(REACHER, f"{_PEERS}.1", 1, Vector(PEER, _PEERS))
     for level in config.levels:
         yield turn(level, SINGLE, 1, Single(OURS, perception=level))
-        for size, threads, kind in known:
-            how = {"num_threads": threads, "backend": backends[kind]}
-            contender = Vector(OURS, size, perception=level, **how)
-            yield turn(level, f"{size}.{threads}{kind}", threads, contender)
+        for size, threads in known:
+            contender = Vector(OURS, size, perception=level, num_threads=threads)
+            yield turn(level, f"{size}.{threads}", threads, contender)

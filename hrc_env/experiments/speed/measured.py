@@ -9,16 +9,13 @@ SINGLE = "single"
 """The environment that `gymnasium.make` gives, as opposed to a vector of one."""
 REACHER = "reacher"
 """Gymnasium's Reacher where levels are named."""
-IN_PROCESSES = "p"
-"""What stands behind the number of threads where these are processes."""
 RESET, REST, TOTAL = "reset", "rest", "total"
 """What stands in the organs' table besides organs: resets, what nobody does, and the sum."""
 
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """One number a round. Configurations are "single", "<num_envs>.<threads>" or, with
-    processes in place of threads, "<num_envs>.<processes>p"."""
+    """One number a round. Configurations are "single" and "<num_envs>.<threads>"."""
 
     env_steps_per_s: dict[str, list[float]] = field(default_factory=dict)
     """By "<level>.<configuration>"."""
@@ -55,6 +52,4 @@ def title(configuration: str) -> str:
     if configuration == SINGLE:
         return SINGLE
     size, threads = configuration.split(".")
-    if threads.endswith(IN_PROCESSES):
-        return f"{size} in {threads.removesuffix(IN_PROCESSES)} processes"
     return f"{size} on {threads} thread{'s' if threads != '1' else ''}"

@@ -36,7 +36,7 @@ class Stages:
 
     def __init__(self, eyes: Eyes, seeds: Sequence[int], n_steps: int, n_threads: int) -> None:
         self.eyes, self.seeds, self.n_steps, self.n_threads = eyes, seeds, n_steps, n_threads
-        self._built: dict[Rig, Shards[Simulation]] = {}
+        self._built: dict[Rig, Shards] = {}
 
     def play(self, make_agent: MakeAgent, margin_m: float, tick: Tick) -> Rows:
         """Sums of every episode, in the order of the seeds.
@@ -65,13 +65,13 @@ class Stages:
             env.close()
         self._built.clear()
 
-    def _env(self, rig: Rig, n_episodes: int) -> Shards[Simulation]:
+    def _env(self, rig: Rig, n_episodes: int) -> Shards:
         if rig not in self._built:
             self._built[rig] = _build(self.eyes, rig, n_episodes, self.n_threads)
         return self._built[rig]
 
 
-def _build(eyes: Eyes, rig: Rig, n_episodes: int, n_threads: int) -> Shards[Simulation]:
+def _build(eyes: Eyes, rig: Rig, n_episodes: int, n_threads: int) -> Shards:
     """Environments with such eyes, through these cameras."""
     config = with_faults(with_people(resolve(None), PEOPLE), eyes.faults(rig))
     config, used = with_cameras(config, list(eyes.cameras(rig)))
@@ -82,11 +82,11 @@ def _build(eyes: Eyes, rig: Rig, n_episodes: int, n_threads: int) -> Shards[Simu
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # that one camera is a poor rig is what we ask about
-        return Shards(n_episodes, threads, make, make)
+        return Shards(n_episodes, threads, make)
 
 
 def _run(
-    env: Shards[Simulation],
+    env: Shards,
     make_agent: MakeAgent,
     margin_m: float,
     seeds: Sequence[int],
