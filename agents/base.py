@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.control import ControlConfig
-from hrc_env.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.geometry.chains import SerialChain
 from hrc_env.observations import ObservationLayout
 from hrc_env.simulation import Simulation

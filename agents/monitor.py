@@ -11,7 +11,7 @@ import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 
 from hrc_env.cli.progress import Meter
-from hrc_env.results import write_whole
+from hrc_env.core.results import write_whole
 
 from . import ppo
 from .curriculum import Ramp

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env import __version__
-from hrc_env.errors import CheckpointError, learner
+from hrc_env.core.errors import CheckpointError, learner
 
 from .base import Situation
 

@@ -14,10 +14,10 @@ from hrc_env.cli.kernels import compile_kernels
 from hrc_env.cli.progress import Meter
 from hrc_env.cli.train import Train
 from hrc_env.config import resolve
-from hrc_env.errors import CheckpointError, RenderingError, learner
-from hrc_env.mapping import restored
-from hrc_env.provenance import provenance
-from hrc_env.results import write_whole
+from hrc_env.core.errors import CheckpointError, RenderingError, learner
+from hrc_env.core.mapping import restored
+from hrc_env.core.provenance import provenance
+from hrc_env.core.results import write_whole
 from hrc_env.sb3 import HRCVecEnv
 
 from . import ppo

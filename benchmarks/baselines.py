@@ -30,9 +30,9 @@ from agents.base import AGENTS, make_agent
 from agents.evaluate import EVALUATION_SEED, judged
 from hrc_env.cli.checks import at_least, writable_folder
 from hrc_env.cli.progress import progress_bar
+from hrc_env.core.results import Metric, write_results, write_whole
 from hrc_env.experiments.study.intervals import mean_over, ratio_over
 from hrc_env.experiments.study.shelf import Shelf, Tick, fingerprint_of
-from hrc_env.results import Metric, write_results, write_whole
 
 ROOT = Path(__file__).resolve().parent.parent
 PPO = {"ppo": 0.0, "ppo_safety": 2.0}

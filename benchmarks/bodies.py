@@ -17,14 +17,14 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from hrc_env.body import worker_names
 from hrc_env.cli.progress import track
+from hrc_env.core.results import Metric, write_results
+from hrc_env.core.typing import Image
 from hrc_env.experiments.perception.crops import GOOD_SHARE, Looker, instants
 from hrc_env.experiments.perception.measured import share
-from hrc_env.pictures import draw_landmarks, label, tile
-from hrc_env.results import Metric, write_results
+from hrc_env.render.overlay import draw_landmarks, label, tile
 from hrc_env.scene.build import SCENES, Scene, SceneConfig, build
-from hrc_env.typing import Image
+from hrc_env.worker.body import worker_names
 
 N_PICTURED = 40
 

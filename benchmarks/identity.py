@@ -19,7 +19,7 @@ from rich.console import Console
 
 import hrc_env  # noqa: F401  registers the ids
 from hrc_env.cli.progress import track
-from hrc_env.results import Metric, write_results
+from hrc_env.core.results import Metric, write_results
 
 RESET_SHARE = 0.01
 """Chance that an environment is reset after a step."""

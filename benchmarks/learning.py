@@ -17,7 +17,7 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from hrc_env.results import Metric, over, write_results
+from hrc_env.core.results import Metric, over, write_results
 
 ROOT = Path(__file__).resolve().parent.parent
 GOOD = 0.8

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 import tyro
 
+from hrc_env.core.records import Grounds
+from hrc_env.core.typing import Bools, Floats
 from hrc_env.geometry.sight import hidden
-from hrc_env.records import Grounds
 from hrc_env.scene.build import Scene, build
-from hrc_env.typing import Bools, Floats
 
 HEAD_M = (1.60, 1.75)
 """Heights of the heads' middles [m]."""

@@ -17,17 +17,17 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from hrc_env.body import pool, stack, worker_truth
 from hrc_env.cli.progress import track
+from hrc_env.core.results import Metric, write_results
 from hrc_env.geometry import chains
 from hrc_env.geometry.distances import narrowest_gap
 from hrc_env.geometry.shapes import AXES, BOX, CAPSULE, CENTRE, HALF_SIZE, KIND, PLANE, REACH
 from hrc_env.motion import generator
 from hrc_env.motion.plans import CLIMB
 from hrc_env.motion.state import GOING, SPOT_X, SPOT_Y, THERE
-from hrc_env.results import Metric, write_results
 from hrc_env.scene.build import Scene, build
 from hrc_env.simulation import WATCHED_CAPSULES
+from hrc_env.worker.body import pool, stack, worker_truth
 
 DEEPEST_M, STUCK_S = 0.03, 10.0
 """What must not be exceeded."""

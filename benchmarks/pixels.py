@@ -15,11 +15,11 @@ from rich.console import Console
 from rich.table import Table
 
 from agents.base import make_agent, situation
-from hrc_env.body import worker_truth
 from hrc_env.cli.progress import track
+from hrc_env.core.results import Metric, write_results
 from hrc_env.env import HRCReachEnv
 from hrc_env.motion import generator
-from hrc_env.results import Metric, write_results
+from hrc_env.worker.body import worker_truth
 
 CHI2_95_3D = 7.815
 """95 % of a three-dimensional normal variable lies within this squared distance."""

@@ -16,13 +16,13 @@ import numpy as np
 from rich.console import Console
 from rich.table import Column, Table
 
-from hrc_env.body import load_body, rest_motion, worker_capsules
+from hrc_env.core.records import WorkerPath
+from hrc_env.core.results import Metric, over, write_results
 from hrc_env.geometry import chains
 from hrc_env.geometry.distances import narrowest_gap
-from hrc_env.records import WorkerPath
-from hrc_env.results import Metric, over, write_results
 from hrc_env.scene.build import Scene, SceneConfig, build
 from hrc_env.scene.physics import Physics, no_workers
+from hrc_env.worker.body import load_body, rest_motion, worker_capsules
 
 CTRL_DT = 0.04
 SEEDS = range(8)

@@ -20,10 +20,10 @@ from rich.console import Console
 from rich.progress import Progress, track
 
 import hrc_env  # noqa: F401  registers the ids
-from hrc_env.crew import ACTIVITY, BODY
-from hrc_env.results import Metric, over, write_results
-from hrc_env.suspects import MISCALIBRATED
-from hrc_env.vector_env import HRCVectorEnv
+from hrc_env.core.results import Metric, over, write_results
+from hrc_env.motion.workers import ACTIVITY, BODY
+from hrc_env.tracking.miscalibration import MISCALIBRATED
+from hrc_env.vector.env import HRCVectorEnv
 
 WARM_UP_STEPS = 1_000_000
 """Memory is compared with what it was after so many environment steps."""

@@ -21,7 +21,7 @@ from rich.table import Table
 
 from benchmarks.trajectory import CASES, differences
 from hrc_env.cli.progress import track
-from hrc_env.errors import ConfigError, HRCError
+from hrc_env.core.errors import ConfigError, HRCError
 
 ROOT = Path(__file__).resolve().parent.parent
 RENAMED = Path(__file__).with_name("renamed.toml")

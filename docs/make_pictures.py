@@ -20,17 +20,17 @@ import cv2
 import imageio.v2 as imageio
 import numpy as np
 
-from hrc_env.appearance import VARIED, draw_look
-from hrc_env.batching import copied
+from hrc_env.core.batching import copied
+from hrc_env.core.records import Roi
 from hrc_env.env import HRCReachEnv
-from hrc_env.faults.camera_film import CameraFilm, Shot
-from hrc_env.faults.fault import IMAGE, KINDS, FaultConfig
-from hrc_env.faults.schedule import Schedule
 from hrc_env.geometry.cameras import pinhole, project, projections
+from hrc_env.perception.faults.camera_film import CameraFilm, Shot
+from hrc_env.perception.faults.fault import IMAGE, KINDS, FaultConfig
+from hrc_env.perception.faults.schedule import Schedule
 from hrc_env.perception.lensed import Lensed
 from hrc_env.perception.windows import window_from_joints
-from hrc_env.pictures import label, middle_rows, shrink, tile
-from hrc_env.records import CropWindow
+from hrc_env.render.overlay import label, middle_rows, shrink, tile
+from hrc_env.scene.domain_randomization import VARIED, draw_look
 from hrc_env.scene.render import CropRenderer, PictureRenderer
 
 PICTURES = Path(__file__).parent / "pictures"
@@ -74,7 +74,7 @@ def cameras() -> None:
     wide = pinhole("wide", gopro.eye_world, np.array([0.2, 0.0, 1.0]), 118.2, 1920, 1080)
     renderer = CropRenderer(env.simulation.scene, 1920)
     renderer.draw(*env.views.pose())
-    whole = CropWindow((960.0, 540.0), 1920.0, 0.0)
+    whole = Roi((960.0, 540.0), 1920.0, 0.0)
     images = [Lensed(renderer, (gopro,)).view(each, whole) for each in (wide, gopro)]
     shown = [shrink(middle_rows(image, 1080), 800, 450) for image in images]
     for image, text in zip(shown, ("pinhole, 118.2 degrees", "GoPro HERO8 wide"), strict=True):

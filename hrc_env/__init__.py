@@ -13,6 +13,6 @@ IDS = ("HRCReach-v0",)
 register(
     id="HRCReach-v0",
     entry_point="hrc_env.env:HRCReachEnv",
-    vector_entry_point="hrc_env.vector_factory:make_vector",
+    vector_entry_point="hrc_env.vector.factory:make_vector",
     max_episode_steps=250,  # 10 s at 25 Hz
 )

@@ -11,7 +11,7 @@ from importlib import import_module
 from importlib.metadata import version
 
 from hrc_env import __version__
-from hrc_env.errors import HRCError, unknown
+from hrc_env.core.errors import HRCError, unknown
 
 PROGRAM = "python -m hrc_env"
 COMMANDS: dict[str, tuple[str, str, str]] = {

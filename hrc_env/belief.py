@@ -5,16 +5,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hrc_env.core.kernels import kernel
+from hrc_env.core.records import PoseEstimate, RobotState
+from hrc_env.core.skeleton import SEGMENT_RADIUS_M
+from hrc_env.core.typing import Floats, Points3
 from hrc_env.geometry.distances import Gap, narrowest_gap
 from hrc_env.geometry.segments import segments
-from hrc_env.kernels import kernel
-from hrc_env.records import PoseEstimate, RobotState
-from hrc_env.skeleton import SEGMENT_RADIUS_M
-from hrc_env.typing import Floats, Points3
 
 
 @dataclass(frozen=True, slots=True)
-class Believed:
+class Belief:
     """Everything a robot may know in one step: itself, its task, and the estimate."""
 
     robot: RobotState

@@ -12,25 +12,25 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.appearance import AppearanceConfig, appearance_called
-from hrc_env.body import pool
 from hrc_env.control import ControlConfig
-from hrc_env.errors import ConfigError
-from hrc_env.faults.fault import FaultConfig
-from hrc_env.mapping import from_mapping, restored
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.mapping import from_mapping, restored
+from hrc_env.geometry.camera_config import CameraConfig
+from hrc_env.geometry.rig_files import read_rig
 from hrc_env.metrics import CostConfig
 from hrc_env.motion.generator import PEOPLE, Clip, MotionConfig, PeopleConfig, people_called
-from hrc_env.optics.camera import CameraConfig
-from hrc_env.optics.rigs import read_rig
 from hrc_env.perception.emulator import EmulatorConfig
 from hrc_env.perception.eyes import EyesConfig
+from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.rewards import RewardConfig
 from hrc_env.scene.build import SceneConfig
+from hrc_env.scene.domain_randomization import AppearanceConfig, appearance_called
 from hrc_env.scene.rigs import RIGS
 from hrc_env.tasks.reach import ReachConfig
 from hrc_env.tracking.ahead import LONGEST_S
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.people.association import AssociationConfig
+from hrc_env.worker.body import pool
 
 
 @dataclass(frozen=True, slots=True)

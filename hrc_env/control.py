@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.typing import Floats, JointAngles, JointVelocities, Velocities3
 from hrc_env.geometry.chains import SerialChain, jacobian
-from hrc_env.typing import Floats, JointAngles, JointVelocities, Velocities3
 
 CONTROLS = ("joint", "tool")
 

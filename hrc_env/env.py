@@ -16,7 +16,6 @@ from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
 from hrc_env import observations
-from hrc_env.appearance import AppearanceConfig
 from hrc_env.config import (
     HRCConfig,
     resolve,
@@ -26,15 +25,16 @@ from hrc_env.config import (
     with_motions,
     with_people,
 )
-from hrc_env.errors import ConfigError, unknown, whole
-from hrc_env.faults.fault import FaultConfig
-from hrc_env.mapping import plain
+from hrc_env.core.errors import ConfigError, unknown, whole
+from hrc_env.core.mapping import plain
+from hrc_env.core.stateful import Stateful
+from hrc_env.core.typing import Floats
 from hrc_env.motion.generator import Clip, PeopleConfig
+from hrc_env.perception.faults.fault import FaultConfig
+from hrc_env.render.views import PICTURE_SIZE, Views, picture_size
 from hrc_env.rewards import RewardConfig
+from hrc_env.scene.domain_randomization import AppearanceConfig
 from hrc_env.simulation import Simulation, checked_action
-from hrc_env.stateful import Stateful
-from hrc_env.typing import Floats
-from hrc_env.views import PICTURE_SIZE, Views, picture_size
 
 RENDER_MODES = ("rgb_array", "depth_array")
 RESET_OPTIONS = ("steps_left",)
@@ -80,8 +80,8 @@ class HRCReachEnv(  # type: ignore[override]  # a property is `spec`, too
         faults: what goes wrong with cameras, `FaultConfig`s or mappings
             (docs/cameras.md); None for those of the config (none).
         appearance: how scene and workers look, drawn for every episode: "varied" or another of
-            `hrc_env.appearance.APPEARANCES`, an `AppearanceConfig` or a mapping; None for that
-            of the config (as built). Level "pixels" only.
+            `hrc_env.scene.domain_randomization.APPEARANCES`, an `AppearanceConfig` or a mapping;
+            None for that of the config (as built). Level "pixels" only.
         control: "joint" (joint velocities) or "tool" (tool velocity).
         render_mode: "rgb_array", "depth_array" or None; `gymnasium.make` also takes "human", a
             window (docs/rendering.md).

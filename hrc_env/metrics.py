@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.kernels import kernel
+from hrc_env.core.records import PoseEstimate, WorkerTruth
+from hrc_env.core.typing import Bools, Capsules, Floats
 from hrc_env.geometry.assignment import assign_rows
 from hrc_env.geometry.distances import narrowest_gap
-from hrc_env.kernels import kernel
-from hrc_env.records import PoseEstimate, WorkerTruth
-from hrc_env.typing import Bools, Capsules, Floats
 
 
 @dataclass(frozen=True, slots=True)

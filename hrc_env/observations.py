@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.belief import Believed, standard_deviation_m
-from hrc_env.kernels import kernel
-from hrc_env.skeleton import N_JOINTS
-from hrc_env.typing import Floats
+from hrc_env.belief import Belief, standard_deviation_m
+from hrc_env.core.kernels import kernel
+from hrc_env.core.skeleton import N_JOINTS
+from hrc_env.core.typing import Floats
 
 FAR_GAP_M = 1.0
 """A gap as wide as this or wider is reported as this: nothing near, or nobody known of."""
@@ -45,17 +45,17 @@ class ObservationTerm:
     scale: float
     """What one unit of the observation stands for, in `unit`."""
     doc: str
-    function: Callable[[Believed], Floats]
-    """Believed -> (B, ...), flattened per environment; not asked where it has no entries."""
+    function: Callable[[Belief], Floats]
+    """Belief -> (B, ...), flattened per environment; not asked where it has no entries."""
 
 
-def _goal_direction(now: Believed) -> Floats:
+def _goal_direction(now: Belief) -> Floats:
     offset = now.goal_world - now.robot.tool_world
     _shorten(offset, 0.05)
     return offset
 
 
-def _nearest_direction(now: Believed) -> Floats:
+def _nearest_direction(now: Belief) -> Floats:
     direction = (now.gap.point_b_world - now.gap.point_a_world).reshape(-1, 3)
     _shorten(direction, 1e-3)
     near = now.gap.distance_m < FAR_GAP_M
@@ -72,13 +72,13 @@ def _shorten(vectors: Floats, softening: float) -> None:
             vectors[k, i] /= divisor
 
 
-def _joints_ahead(now: Believed) -> Floats:
+def _joints_ahead(now: Belief) -> Floats:
     """(B, W, H, J, 3) from the tool point now."""
     joints = np.stack([later.mean_world for later in now.ahead], axis=2)
     return joints - now.robot.tool_world[:, None, None, None]
 
 
-def _std_ahead(now: Believed) -> Floats:
+def _std_ahead(now: Belief) -> Floats:
     """(B, W, H, J)."""
     return np.stack([standard_deviation_m(later) for later in now.ahead], axis=2)
 
@@ -203,7 +203,7 @@ def layout(of: Sizes) -> ObservationLayout:
     return ObservationLayout(terms, slices, -bound, bound, np.concatenate(scale))
 
 
-def observe(now: Believed, where: ObservationLayout) -> NDArray[np.float32]:
+def observe(now: Belief, where: ObservationLayout) -> NDArray[np.float32]:
     """(B, n) flat observations; cast to float32 once, here.
 
     Raises:

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.belief import Believed
-from hrc_env.errors import ConfigError
-from hrc_env.kernels import kernel
+from hrc_env.belief import Belief
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 from hrc_env.tasks.reach import ReachProgress
-from hrc_env.typing import Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ class RewardTerm:
 
     name: str
     doc: str
-    function: Callable[[Believed, ReachProgress, Floats, RewardConfig], Floats]
+    function: Callable[[Belief, ReachProgress, Floats, RewardConfig], Floats]
     """(believed, progress, previous action (B, A), weights) -> (B,)."""
 
 
@@ -63,9 +63,7 @@ def _mean_square(vectors: Floats) -> Floats:
     return mean
 
 
-def _proximity(
-    now: Believed, step: ReachProgress, previous: Floats, config: RewardConfig
-) -> Floats:
+def _proximity(now: Belief, step: ReachProgress, previous: Floats, config: RewardConfig) -> Floats:
     nearest_m = np.minimum.reduce(now.gap.distance_m, axis=-1, initial=np.inf)
     penalty: Floats = -config.proximity * closeness(nearest_m, config.proximity_reach_m)
     return penalty
@@ -104,7 +102,7 @@ TERMS: tuple[RewardTerm, ...] = (
 
 
 def reward(
-    now: Believed, step: ReachProgress, previous_action: Floats, config: RewardConfig
+    now: Belief, step: ReachProgress, previous_action: Floats, config: RewardConfig
 ) -> tuple[Floats, dict[str, Floats]]:
     """The reward (B,) and its terms by name.
 

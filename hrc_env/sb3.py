@@ -12,11 +12,11 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from hrc_env.errors import ConfigError, learner
+from hrc_env.core.errors import ConfigError, learner
+from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.rewards import RewardConfig
 from hrc_env.simulation import Simulation
-from hrc_env.typing import Bools, Floats, Ints
-from hrc_env.vector_env import HRCVectorEnv
+from hrc_env.vector.env import HRCVectorEnv
 
 with learner():
     from stable_baselines3.common.vec_env import VecEnv

@@ -12,30 +12,30 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hrc_env import metrics, observations, rewards
-from hrc_env.batching import picked, rows, write_rows
-from hrc_env.belief import Believed, estimated_gap
-from hrc_env.body import pool, stack, worker_capsules, worker_truth
+from hrc_env.belief import Belief, estimated_gap
 from hrc_env.config import HRCConfig
 from hrc_env.control import joint_command, n_actions
-from hrc_env.crew import Crew, bodies_of, worker_counts
-from hrc_env.errors import ConfigError, check_shape
+from hrc_env.core.batching import picked, rows, write_rows
+from hrc_env.core.errors import ConfigError, check_shape
+from hrc_env.core.kernels import ahead
+from hrc_env.core.records import PoseEstimate, RobotState, WorkerMotion, WorkerTruth
+from hrc_env.core.stateful import State, Stateful
+from hrc_env.core.streams import children
+from hrc_env.core.typing import Floats, Ints
 from hrc_env.geometry import chains
-from hrc_env.kernels import ahead
 from hrc_env.motion import generator
-from hrc_env.outcome import Info, Outcome, cost_info, no_cost, rows_of, tracking_info
-from hrc_env.records import PoseEstimate, RobotState, WorkerMotion, WorkerTruth
+from hrc_env.motion.workers import Crew, bodies_of, worker_counts
+from hrc_env.pipeline.levels import CAMERA_LEVELS, make_senses
+from hrc_env.pipeline.sensor_input import Moment
 from hrc_env.rewards import RewardConfig
 from hrc_env.scene.build import build
 from hrc_env.scene.physics import Physics
 from hrc_env.scene.rigs import findings
-from hrc_env.senses import CAMERA_LEVELS, make_senses
-from hrc_env.sensing.moment import Moment
-from hrc_env.stateful import State, Stateful
-from hrc_env.streams import children
-from hrc_env.suspects import Suspects
+from hrc_env.step import Info, StepResult, cost_info, no_cost, rows_of, tracking_info
 from hrc_env.tasks import reach
 from hrc_env.tracking import given
-from hrc_env.typing import Floats, Ints
+from hrc_env.tracking.miscalibration import MiscalibrationFlags
+from hrc_env.worker.body import pool, stack, worker_capsules, worker_truth
 
 CLOSING_M_S = 8.0
 """Arm and worker never come nearer to each other than so fast [m/s]; 3.4 was the most in some
@@ -120,7 +120,7 @@ class Simulation(Stateful):
         blank = [np.random.default_rng(0)] * batch
         self.streams = Streams(*(list(blank) for _ in range(5)))
 
-    def reset(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> Outcome:
+    def reset(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> StepResult:
         """Start environments `ids` anew, one generator each; their rows of an outcome.
 
         Every organ draws from a stream of its own, always as many and in the same order, so that
@@ -148,9 +148,9 @@ class Simulation(Stateful):
             **rows_of(self._tally(), ids),
         }
         over = np.zeros(len(ids), bool)
-        return Outcome(observation, np.zeros(len(ids)), over, info, crew, self._suspects(ids))
+        return StepResult(observation, np.zeros(len(ids)), over, info, crew, self._suspects(ids))
 
-    def step(self, action: Floats) -> Outcome:
+    def step(self, action: Floats) -> StepResult:
         """One control step of every environment; action (B, A) in [-1, 1]."""
         config, streams = self.config, self.streams
         previous, self.action = self.action, np.array(action, float)
@@ -190,7 +190,7 @@ class Simulation(Stateful):
         terminated = (cost.contact > 0) & config.cost.contact_terminates
         observation = observations.observe(believed, self.layout)
         suspects = self._suspects(self._everyone)
-        return Outcome(observation, reward, terminated, info, crew, suspects)
+        return StepResult(observation, reward, terminated, info, crew, suspects)
 
     def set_reward(self, weights: RewardConfig) -> None:
         """Weigh the reward's terms so from the next step on."""
@@ -233,7 +233,7 @@ class Simulation(Stateful):
         return Crew(generator.activity(self.motion), self.worn)
 
     @property
-    def believed(self) -> Believed:
+    def believed(self) -> Belief:
         """What every robot believes now."""
         robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
         return self._believed(self._everyone, robot, self.estimate, self.ahead)
@@ -259,9 +259,9 @@ class Simulation(Stateful):
 
     def _believed(
         self, ids: Ints, robot: RobotState, estimate: PoseEstimate, ahead: tuple[PoseEstimate, ...]
-    ) -> Believed:
+    ) -> Belief:
         """What the robots of environments `ids` believe; the records are of them only."""
-        return Believed(
+        return Belief(
             robot=robot,
             estimate=estimate,
             gap=estimated_gap(robot, estimate),
@@ -271,11 +271,11 @@ class Simulation(Stateful):
             ahead=ahead,
         )
 
-    def _suspects(self, ids: Ints) -> Suspects:
+    def _suspects(self, ids: Ints) -> MiscalibrationFlags:
         """Which cameras of environments `ids` are thought to be miscalibrated."""
         flags = self.senses.suspected(ids)
         names = self.settings["cameras"] if flags.shape[1] else ()
-        return Suspects(names, flags)
+        return MiscalibrationFlags(names, flags)
 
     def _tally(self) -> Info:
         """What the episode has come to so far."""

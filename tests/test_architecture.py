@@ -14,11 +14,11 @@ SOURCES = sorted(PACKAGE.rglob("*.py"))
 ALL_SOURCES = [*SOURCES, *sorted((ROOT / "agents").glob("*.py")), ROOT / "train.py"]
 
 TRUTH_READERS = {
-    "hrc_env/records.py": "declares it",
-    "hrc_env/body.py": "makes it from the worker's motion",
-    "hrc_env/outcome.py": "gives errors against it their names",
+    "hrc_env/core/records.py": "declares it",
+    "hrc_env/worker/body.py": "makes it from the worker's motion",
+    "hrc_env/step.py": "gives errors against it their names",
     "hrc_env/simulation.py": "carries it to cost, metrics and senses",
-    "hrc_env/sensing/moment.py": "hands it to the emulator and to the level `truth`",
+    "hrc_env/pipeline/sensor_input.py": "hands it to the emulator and to the level `truth`",
     "hrc_env/metrics.py": "counts cost and errors",
     "hrc_env/perception/emulator.py": "projects it into emulated cameras",
     "hrc_env/tracking/given.py": "copies it into the belief: the one place",
@@ -36,7 +36,7 @@ def nodes(path: Path) -> list[ast.AST]:
 
 @cache
 def imported(path: Path) -> frozenset[str]:
-    """Modules and names in them that a file imports, as "hrc_env.records.WorkerTruth"."""
+    """Modules and names in them that a file imports, as "hrc_env.core.records.WorkerTruth"."""
     package = [*path.relative_to(ROOT).with_suffix("").parts][:-1]
     found: set[str] = set()
     for node in nodes(path):
@@ -78,7 +78,7 @@ def test_only_these_files_know_the_truth():
 
 @pytest.mark.parametrize("name", ["belief", "observations", "rewards", "control", "tasks/reach"])
 def test_what_the_robot_reads_knows_no_truth(name):
-    """Terms take `Believed`, which has no truth in it; nothing in these files names it."""
+    """Terms take `Belief`, which has no truth in it; nothing in these files names it."""
     path = PACKAGE / f"{name}.py"
     assert not {each for each in identifiers(path) if "truth" in each or "_true" in each}
     assert "WorkerMotion" not in identifiers(path)

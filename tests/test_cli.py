@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from commands import hrc
 
-from hrc_env.body import load_body
 from hrc_env.motion.capture.clip import load_clip
+from hrc_env.worker.body import load_body
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hrc_env.control import ControlConfig, joint_command, n_actions, resolved_rate
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
 from hrc_env.geometry.chains import jacobian
 from hrc_env.scene.build import build
 

@@ -11,12 +11,12 @@ from stable_baselines3.common.env_checker import check_env as check_env_for_sb3
 
 import hrc_env  # registers the ids
 from hrc_env.config import HRCConfig
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.records import Keypoints
 from hrc_env.env import HRCReachEnv
-from hrc_env.errors import ConfigError
-from hrc_env.records import Keypoints
+from hrc_env.pipeline.levels import LEVELS
 from hrc_env.rewards import RewardConfig
 from hrc_env.scene.rig import CameraConfig
-from hrc_env.senses import LEVELS
 
 FAST_LEVELS = ("keypoints", "truth", "none")
 

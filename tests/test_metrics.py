@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from hrc_env.core.records import PoseEstimate, WorkerTruth
 from hrc_env.metrics import CostConfig, cost, tracking_error
-from hrc_env.records import PoseEstimate, WorkerTruth
 
 ROBOT_RADIUS, WORKER_RADIUS = np.array([0.05]), np.array([0.1])
 

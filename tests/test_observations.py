@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 import hrc_env  # noqa: F401  registers the ids
+from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.env import HRCReachEnv
 from hrc_env.observations import Sizes, layout
 from hrc_env.sb3 import HRCVecEnv
-from hrc_env.skeleton import N_JOINTS
 
 ASKED = {"horizons_s": (0.2, 0.6)}
 ADDED = ("worker_joints_ahead", "worker_joints_ahead_std")

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from hrc_env.belief import Believed
+from hrc_env.belief import Belief
+from hrc_env.core.records import PoseEstimate, RobotState
 from hrc_env.env import HRCReachEnv
 from hrc_env.geometry.distances import Gap
-from hrc_env.records import PoseEstimate, RobotState
 from hrc_env.rewards import TERMS, RewardConfig, closeness, reward
 from hrc_env.tasks.reach import ReachProgress
-from hrc_env.vector_env import HRCVectorEnv
+from hrc_env.vector.env import HRCVectorEnv
 
 
-def believed(gap_m: float, action: float = 0.0, workers: int = 1) -> Believed:
+def believed(gap_m: float, action: float = 0.0, workers: int = 1) -> Belief:
     shape = (1, workers, 15)
     pose = PoseEstimate(
         np.zeros((*shape, 3)), np.zeros((*shape, 3, 3)), np.zeros((*shape, 3)), np.zeros(shape),
@@ -23,7 +23,7 @@ def believed(gap_m: float, action: float = 0.0, workers: int = 1) -> Believed:
         np.zeros((1, 9, 2, 3)), np.zeros(9),
     )  # fmt: skip
     gap = Gap(np.full((1, workers), gap_m), np.zeros((1, workers, 3)), np.zeros((1, workers, 3)))
-    return Believed(robot, pose, gap, np.zeros((1, 3)), np.ones(1), np.full((1, 6), action))
+    return Belief(robot, pose, gap, np.zeros((1, 3)), np.ones(1), np.full((1, 6), action))
 
 
 def progress(metres: float = 0.0, reached: bool = False) -> ReachProgress:

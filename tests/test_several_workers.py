@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from stable_baselines3.common.env_checker import check_env
 
-from hrc_env.body import worker_truth
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.records import WorkerTruth
 from hrc_env.env import HRCReachEnv
-from hrc_env.errors import ConfigError
 from hrc_env.geometry.assignment import assign
 from hrc_env.metrics import tracking_error
 from hrc_env.motion.generator import PeopleConfig, activity_names, current
-from hrc_env.records import WorkerTruth
 from hrc_env.sb3 import HRCVecEnv
 from hrc_env.tracking.given import estimate_from_truth
+from hrc_env.worker.body import worker_truth
 
 COUNTS = (0, 2, 3)
 FAST_LEVELS = ("keypoints", "truth", "none")

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import hrc_env  # noqa: F401  registers the ids
+from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCReachEnv
-from hrc_env.errors import ConfigError
-from hrc_env.vector_env import HRCVectorEnv
+from hrc_env.vector.env import HRCVectorEnv
 
 STEPS = [("pixels", 3), ("keypoints", 30), ("truth", 30), ("none", 30)]
 

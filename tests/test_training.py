@@ -22,8 +22,8 @@ from agents.monitor import Curve, TrainingMonitor, plot_curve
 from agents.training import as_before
 from hrc_env.__main__ import main
 from hrc_env.cli.train import Train
+from hrc_env.core.errors import CheckpointError, ConfigError
 from hrc_env.env import HRCReachEnv
-from hrc_env.errors import CheckpointError, ConfigError
 
 TINY = ["--perception", "truth", "--num-envs", "4", "--episodes", "2", "--no-film"]
 

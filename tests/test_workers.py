@@ -7,7 +7,13 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from hrc_env.body import (
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.records import WorkerMotion, WorkerPath
+from hrc_env.core.skeleton import MIRROR, N_JOINTS
+from hrc_env.geometry.rotations import matrix_from_quaternion
+from hrc_env.motion import generator
+from hrc_env.motion.anatomy import anatomies, anatomy
+from hrc_env.worker.body import (
     N_SEGMENTS,
     SEGMENT,
     assets_dir,
@@ -18,13 +24,7 @@ from hrc_env.body import (
     worker_names,
     worker_truth,
 )
-from hrc_env.errors import ConfigError
-from hrc_env.geometry.rotations import matrix_from_quaternion
-from hrc_env.looks import SkinLooks, load_looks
-from hrc_env.motion import generator
-from hrc_env.motion.anatomy import anatomies, anatomy
-from hrc_env.records import WorkerMotion, WorkerPath
-from hrc_env.skeleton import MIRROR, N_JOINTS
+from hrc_env.worker.mesh import SkinLooks, load_looks
 
 sys.path.insert(0, str(assets_dir() / "workers"))
 from recipes import RECIPES

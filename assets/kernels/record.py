@@ -1,4 +1,4 @@
-"""python -m assets.kernels.record: writes hrc_env/kernels/signatures.json.
+"""python -m assets.kernels.record: writes hrc_env/core/kernels/signatures.json.
 
 Plays every perception level, single and batched, and notes which kernels Python called with which
 types. What was not on disk is compiled meanwhile, and how long that took is noted, too; with an
@@ -17,9 +17,9 @@ import gymnasium
 from numba.core import event
 
 from agents.base import make_agent, situation
-from hrc_env.kernels import KERNELS, ahead, signatures
-from hrc_env.kernels.lean import KernelDispatcher
-from hrc_env.kernels.signatures import Signature
+from hrc_env.core.kernels import KERNELS, ahead, signatures
+from hrc_env.core.kernels.lean import KernelDispatcher
+from hrc_env.core.kernels.signatures import Signature
 
 LEVELS = {"truth": 250, "keypoints": 250, "none": 250, "pixels": 40}
 """Steps of each level that are played."""

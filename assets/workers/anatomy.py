@@ -13,7 +13,7 @@ SEGMENTS = ("pelvis", "abdomen", "torso", "chest", "neck", "head") + tuple(
     for side in ("left", "right")
     for part in ("clavicle", "upper_arm", "forearm", "hand", "thigh", "shank", "foot", "toes")
 )
-"""Must equal `hrc_env.body.SEGMENTS`; written out because this tool runs without hrc_env."""
+"""Must equal `hrc_env.worker.body.SEGMENTS`; written out because this tool runs without hrc_env."""
 
 ORIGIN_BONE = {
     "pelvis": "root", "abdomen": "spine05", "torso": "spine03", "chest": "spine01",

@@ -35,7 +35,7 @@ JOINTS = (
         for side in ("left", "right")
     ),
 )  # fmt: skip
-"""The 15 joints in the order of hrc_env.skeleton.JOINTS: (joint, segment, COCO landmark)."""
+"""The 15 joints in the order of hrc_env.core.skeleton.JOINTS: (joint, segment, COCO landmark)."""
 
 N_VERTICES = {"head": 800, "hand": 190, "cloth": 1000}
 

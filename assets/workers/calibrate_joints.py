@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from poses import POSES, posed
 
-from hrc_env.body import SEGMENTS, Body, assets_dir, load_body, worker_names, worker_truth
+from hrc_env.worker.body import SEGMENTS, Body, assets_dir, load_body, worker_names, worker_truth
 from hrc_env.geometry.cameras import project, projections
 from hrc_env.geometry.rotations import matrix_from_quaternion
 from hrc_env.geometry.triangulation import triangulate_robust
@@ -24,11 +24,11 @@ from hrc_env.perception.eyes import STATURE_OF_SIDE
 from hrc_env.perception.network import Landmarker, load_landmarker
 from hrc_env.perception.noise import sigma_px
 from hrc_env.perception.windows import window_from_joints
-from hrc_env.records import CropWindow, WorkerMotion
+from hrc_env.core.records import Roi, WorkerMotion
 from hrc_env.scene.build import SceneConfig, build
 from hrc_env.scene.render import CropRenderer
 from hrc_env.scene.rig import LAB_CAMERAS, pinholes
-from hrc_env.skeleton import BLAZEPOSE_INDEX, JOINTS, MIRROR, N_JOINTS
+from hrc_env.core.skeleton import BLAZEPOSE_INDEX, JOINTS, MIRROR, N_JOINTS
 
 PLACES = (((0.3, 0.0), 0.4), ((1.1, 0.6), 2.1), ((0.5, -0.7), -1.8), ((1.5, -0.2), 3.6))
 """Where the worker stands (x, y) [m] and looks (yaw) [rad]."""
@@ -81,7 +81,7 @@ def _one_worker(motion: WorkerMotion) -> WorkerMotion:
 
 
 def _detect(
-    renderer: CropRenderer, look: Landmarker, camera: int, window: CropWindow | None
+    renderer: CropRenderer, look: Landmarker, camera: int, window: Roi | None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Landmarks of one view in image pixels (J, 2) and their deviations (J,)."""
     if window is None:

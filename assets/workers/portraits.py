@@ -12,10 +12,10 @@ import cv2
 import numpy as np
 from poses import posed
 
-from hrc_env.body import SEGMENT, load_body, worker_names
+from hrc_env.worker.body import SEGMENT, load_body, worker_names
 from hrc_env.geometry.cameras import PinholeCamera, pinhole
-from hrc_env.pictures import label, tile
-from hrc_env.records import WorkerMotion
+from hrc_env.render.overlay import label, tile
+from hrc_env.core.records import WorkerMotion
 from hrc_env.scene.build import SceneConfig, build
 from hrc_env.scene.render import PictureRenderer
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from hrc_env.body import N_SEGMENTS, PARENT, SEGMENT, Body
+from hrc_env.worker.body import N_SEGMENTS, PARENT, SEGMENT, Body
 from hrc_env.geometry.rotations import about_axis, quaternion_from_matrix
-from hrc_env.records import WorkerMotion
+from hrc_env.core.records import WorkerMotion
 
 HANGING, ALONG, STRAIGHT = (5, 10), (18, 6), (2, 4, 4)
 POSES: dict[str, dict] = {

@@ -12,8 +12,8 @@ from rich.markdown import Markdown
 
 from hrc_env.cli.checks import at_least, writable_folder
 from hrc_env.cli.progress import progress_bar
-from hrc_env.errors import ConfigError
-from hrc_env.machine import n_cores
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.machine import n_cores
 
 Say = Callable[[float, str], None]
 """Told by how much the share that is done grew, and what is being done."""

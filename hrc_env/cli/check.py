@@ -67,7 +67,7 @@ def _packages() -> Finding:
 
 
 def _torch() -> Finding:
-    from hrc_env.errors import MissingExtraError, learner
+    from hrc_env.core.errors import MissingExtraError, learner
 
     try:
         with learner():
@@ -83,7 +83,7 @@ def _torch() -> Finding:
 
 
 def _machine() -> Finding:
-    from hrc_env.machine import usable_cores, usable_memory_gb
+    from hrc_env.core.machine import usable_cores, usable_memory_gb
 
     cores, memory_gb = usable_cores(), usable_memory_gb()
     said = f"{cores:g} cores" if cores > 1 else f"{cores:g} core: pixels will be slow"
@@ -118,9 +118,9 @@ def _in_a_process(code: str) -> Finding:
 
 
 def _kernels() -> Finding:
-    from hrc_env.kernels import ahead
-    from hrc_env.kernels.cache import folder
-    from hrc_env.machine import n_cores
+    from hrc_env.core.kernels import ahead
+    from hrc_env.core.kernels.cache import folder
+    from hrc_env.core.machine import n_cores
 
     todo = ahead.missing()
     if not todo:
@@ -133,7 +133,7 @@ def _kernels() -> Finding:
 
 
 def _weights() -> Finding:
-    from hrc_env.errors import HRCError
+    from hrc_env.core.errors import HRCError
     from hrc_env.perception import weights
 
     try:

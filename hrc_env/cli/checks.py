@@ -4,7 +4,7 @@ import math
 import tempfile
 from pathlib import Path
 
-from hrc_env.errors import ConfigError, HRCError
+from hrc_env.core.errors import ConfigError, HRCError
 
 
 def at_least(option: str, value: float | None, low: float) -> None:

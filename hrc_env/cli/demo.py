@@ -6,9 +6,9 @@ from pathlib import Path
 
 from rich.console import Console
 
-from hrc_env.agents_door import agents
 from hrc_env.cli.checks import at_least, writable_file
 from hrc_env.cli.environment import EnvironmentArguments
+from hrc_env.core.agents_door import agents
 
 
 @dataclass(frozen=True, kw_only=True)

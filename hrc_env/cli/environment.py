@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,13 +13,13 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from hrc_env.agents_door import agents
 from hrc_env.cli.frame import Diary, compose
 from hrc_env.cli.kernels import compile_kernels
 from hrc_env.cli.progress import progress_bar
+from hrc_env.core.agents_door import agents
+from hrc_env.core.typing import Image
 from hrc_env.env import HRCReachEnv
-from hrc_env.typing import Image
-from hrc_env.views import Glance
+from hrc_env.render.views import Glance
 
 STEPS_PER_FRAME = 2
 """A film shows every second step, in real time."""

@@ -8,11 +8,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env import pictures
+from hrc_env.core.typing import Image
 from hrc_env.env import HRCReachEnv
-from hrc_env.senses import CAMERA_LEVELS
-from hrc_env.typing import Image
-from hrc_env.views import Glance
+from hrc_env.pipeline.levels import CAMERA_LEVELS
+from hrc_env.render import overlay
+from hrc_env.render.views import Glance
 
 WIDTH, HEIGHT = 1600, 900
 ROOM = (792, 716)
@@ -70,7 +70,7 @@ def compose(env: HRCReachEnv, diary: Diary, seen: Glance | None = None) -> Image
     level, seen = env.simulation.perception, seen or env.views.glance()
     frame = _panel(HEIGHT, WIDTH, level).copy()
     room = env.views.room(*ROOM, seen)
-    pictures.label(room, "what happens", (10, 10), 18)
+    overlay.label(room, "what happens", (10, 10), 18)
     foot = room[-LEGEND_HEIGHT:]
     cv2.addWeighted(foot, 0.25, legend(level), 0.75, 0, dst=foot)
     _paste(frame, room, (0, 0))
@@ -90,11 +90,11 @@ def compose(env: HRCReachEnv, diary: Diary, seen: Glance | None = None) -> Image
 def _panel(height: int, width: int, level: str) -> Image:
     """What is the same in all frames; not to be written to."""
     image = np.empty((height, width, 3), np.uint8)
-    image[:] = pictures.PANEL
+    image[:] = overlay.PANEL
     title = f"what the robot believes (perception: {level}), from above and from the side"
     if level == "pixels":
         title = "what the pose network is given: crops round the predicted worker"
-    pictures.write(image, title, (RIGHT_X + 4, TITLE_Y), 16)
+    overlay.write(image, title, (RIGHT_X + 4, TITLE_Y), 16)
     return image
 
 
@@ -102,17 +102,17 @@ def _panel(height: int, width: int, level: str) -> Image:
 def legend(level: str) -> Image:
     """(28, 792, 3) what the colours mean at a perception level; not to be written to."""
     image = np.empty((LEGEND_HEIGHT, ROOM[0], 3), np.uint8)
-    image[:] = pictures.PANEL
+    image[:] = overlay.PANEL
     marks = [
-        ("worker's left", pictures.LEFT, "line"),
-        ("right", pictures.RIGHT, "line"),
-        ("estimate, 2 sigma", pictures.BELIEF, "dot"),
-        ("goal", pictures.GOAL, "ring"),
+        ("worker's left", overlay.LEFT, "line"),
+        ("right", overlay.RIGHT, "line"),
+        ("estimate, 2 sigma", overlay.BELIEF, "dot"),
+        ("goal", overlay.GOAL, "ring"),
     ]
     if level in CAMERA_LEVELS:
-        marks.append(("detected joint", pictures.DETECTED, "dot"))
+        marks.append(("detected joint", overlay.DETECTED, "dot"))
     if level == "pixels":
-        marks.append(("crop", pictures.WINDOW, "box"))
+        marks.append(("crop", overlay.WINDOW, "box"))
     x, y = 12, LEGEND_HEIGHT // 2
     for text, colour, shape in marks:
         if shape == "line":
@@ -121,8 +121,8 @@ def legend(level: str) -> Image:
             cv2.rectangle(image, (x + 2, y - 6), (x + 14, y + 6), colour, 1)
         else:
             cv2.circle(image, (x + 9, y), 6, colour, -1 if shape == "dot" else 2, cv2.LINE_AA)
-        pictures.write(image, text, (x + 26, y - 9), 14)
-        x += 26 + pictures.text_width(text, 14) + 20
+        overlay.write(image, text, (x + 26, y - 9), 14)
+        x += 26 + overlay.text_width(text, 14) + 20
     return image
 
 
@@ -136,14 +136,14 @@ def strip(diary: Diary, dt_s: float, limit_m: float) -> Image:
     for k in np.flatnonzero(cost > 0).tolist():
         colour = NEAR if cost[k] < 2 else TOUCHING
         cv2.rectangle(image, (int(x[k]), TOP), (int(x[k]) + 6, BOTTOM), colour, -1)
-    series = (diary.true_m, pictures.INK), (diary.estimated_m, pictures.BELIEF)
+    series = (diary.true_m, overlay.INK), (diary.estimated_m, overlay.BELIEF)
     for values, colour in series:
         points = np.stack([x, _y_of(np.array(values[first:]))], -1).astype(np.int32)
         cv2.polylines(image, [points], False, colour, 2, cv2.LINE_AA)
     goals = f"goals: {diary.reached} reached, {diary.missed} missed"
-    pictures.write(image, goals, (14, 104), 16, pictures.GOAL)
-    pictures.write(image, f"cost {sum(diary.cost):.0f}", (14, 128), 16, pictures.COST)
-    pictures.write(image, f"{len(diary.cost) * dt_s:.1f} s", (14, 152), 16)
+    overlay.write(image, goals, (14, 104), 16, overlay.GOAL)
+    overlay.write(image, f"cost {sum(diary.cost):.0f}", (14, 128), 16, overlay.COST)
+    overlay.write(image, f"{len(diary.cost) * dt_s:.1f} s", (14, 152), 16)
     return image
 
 
@@ -151,17 +151,17 @@ def strip(diary: Diary, dt_s: float, limit_m: float) -> Image:
 def _axes(limit_m: float) -> Image:
     """The strip without its curves; not to be written to."""
     image = np.empty((STRIP_HEIGHT, WIDTH, 3), np.uint8)
-    image[:] = pictures.PANEL
+    image[:] = overlay.PANEL
     for metres in (0.0, 0.5, 1.0, 1.5):
         y = int(_y_of(np.array(metres)))
         cv2.line(image, (LEFT, y), (RIGHT, y), (60, 66, 74), 1)
-        pictures.write(image, f"{metres:.1f} m", (LEFT - 52, y - 9), 14)
+        overlay.write(image, f"{metres:.1f} m", (LEFT - 52, y - 9), 14)
     y = int(_y_of(np.array(limit_m)))
     cv2.line(image, (LEFT, y), (RIGHT, y), (190, 70, 80), 1)
-    pictures.write(image, "separation", (14, 10), 18)
-    pictures.write(image, "true", (14, 36), 15)
-    pictures.write(image, "as the robot believes", (14, 56), 15, pictures.BELIEF)
-    pictures.write(image, "bar: a step that costs", (14, 76), 15, pictures.COST)
+    overlay.write(image, "separation", (14, 10), 18)
+    overlay.write(image, "true", (14, 36), 15)
+    overlay.write(image, "as the robot believes", (14, 56), 15, overlay.BELIEF)
+    overlay.write(image, "bar: a step that costs", (14, 76), 15, overlay.COST)
     return image
 
 

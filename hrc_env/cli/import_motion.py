@@ -10,8 +10,8 @@ from rich.table import Table
 
 from hrc_env.cli.checks import writable_file
 from hrc_env.cli.progress import progress_bar
-from hrc_env.errors import ConfigError
-from hrc_env.skeleton import JOINTS
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.skeleton import JOINTS
 
 if TYPE_CHECKING:  # --help imports no simulator
     from hrc_env.motion.capture.clip import Clip
@@ -54,10 +54,10 @@ class ImportMotion:
             raise ConfigError("--out is the recording itself; give the clip another name.")
         if self.picture is not None:
             writable_file(self.picture, ".png", "--picture")
-        from hrc_env.body import load_body
         from hrc_env.motion.capture.clip import save_clip
         from hrc_env.motion.capture.read import read_capture
         from hrc_env.motion.capture.retarget import retarget
+        from hrc_env.worker.body import load_body
 
         body, console = load_body(self.worker), Console()
         capture = read_capture(self.file, self.fps, self.source_fps, self.skeleton)

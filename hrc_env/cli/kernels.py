@@ -3,7 +3,7 @@
 from rich.console import Console
 
 from hrc_env.cli.progress import progress_bar
-from hrc_env.kernels import ahead
+from hrc_env.core.kernels import ahead
 
 
 def compile_kernels(console: Console, level: str | None = None) -> None:

@@ -6,7 +6,7 @@ from rich.console import Console
 from rich.table import Table
 
 from hrc_env import IDS
-from hrc_env.agents_door import agents
+from hrc_env.core.agents_door import agents
 
 
 @dataclass(frozen=True)
@@ -16,9 +16,9 @@ class List:
     def run(self) -> int:
         """Print the table."""
         from hrc_env.control import CONTROLS  # here: --help imports no simulator
+        from hrc_env.pipeline.levels import LEVELS
         from hrc_env.scene.build import SCENES
         from hrc_env.scene.rig import LAB_CAMERAS
-        from hrc_env.senses import LEVELS
         from hrc_env.tracking.estimators import ESTIMATORS
 
         table = Table("argument", "names", title="hrc_env")

@@ -21,7 +21,7 @@ class Setup:
     def run(self) -> int:
         """Set up; 0 also without OpenGL, which only pictures need."""
         from hrc_env.cli.kernels import compile_kernels  # here: --help imports no simulator
-        from hrc_env.kernels.cache import folder
+        from hrc_env.core.kernels.cache import folder
         from hrc_env.perception import weights
         from hrc_env.scene.gl import APT_LINE, gl_status
 

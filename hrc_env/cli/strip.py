@@ -2,17 +2,17 @@
 
 import numpy as np
 
-from hrc_env import pictures
-from hrc_env.body import load_body
+from hrc_env.core.records import WorkerMotion
+from hrc_env.core.typing import Image
 from hrc_env.geometry.cameras import pinhole
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import anatomy
 from hrc_env.motion.capture.clip import Clip, fitted_to
 from hrc_env.motion.capture.segments import segments_in
-from hrc_env.records import WorkerMotion
+from hrc_env.render import overlay
 from hrc_env.scene.build import SceneConfig, build
 from hrc_env.scene.render import PictureRenderer
-from hrc_env.typing import Image
+from hrc_env.worker.body import load_body
 
 TILE = (300, 400)
 N_MOMENTS, COLUMNS = 12, 6
@@ -45,8 +45,8 @@ def film_strip(clip: Clip, worker: str) -> Image:
         for k, row in enumerate(rows):
             motion = WorkerMotion(position[k : k + 1], turn[k : k + 1], still, still)
             tile = np.array(renderer.picture(scene.home_q, motion, camera), np.uint8)
-            pictures.label(tile, f"{row / clip.fps:.1f} s", (6, 6), 14)
+            overlay.label(tile, f"{row / clip.fps:.1f} s", (6, 6), 14)
             tiles.append(tile)
     finally:
         renderer.close()
-    return pictures.tile(tiles, COLUMNS)
+    return overlay.tile(tiles, COLUMNS)

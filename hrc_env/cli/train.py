@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hrc_env.agents_door import agents
 from hrc_env.cli.checks import at_least, writable_folder
 from hrc_env.cli.environment import EnvironmentArguments, merged
-from hrc_env.errors import ConfigError
+from hrc_env.core.agents_door import agents
+from hrc_env.core.errors import ConfigError
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,19 +11,19 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.body import worker_truth
 from hrc_env.config import HRCConfig
+from hrc_env.core.records import Keypoints, PoseEstimate
+from hrc_env.core.skeleton import N_JOINTS
+from hrc_env.core.typing import Bools, Points3, Velocities3
 from hrc_env.experiments.tracking.detections import CONDITIONS, detect
 from hrc_env.experiments.tracking.rigs import DT_S, SIGMA_PX, make_rig
 from hrc_env.experiments.tracking.walks import walk
 from hrc_env.geometry.cameras import projections
 from hrc_env.motion import generator
 from hrc_env.perception import emulator
-from hrc_env.records import Keypoints, PoseEstimate
 from hrc_env.simulation import Simulation
-from hrc_env.skeleton import N_JOINTS
 from hrc_env.tracking.estimators import Estimator, make_estimator
-from hrc_env.typing import Bools, Points3, Velocities3
+from hrc_env.worker.body import worker_truth
 
 LIVELY = {"dwell_s": (0.5, 4.0), "near_probability": 0.5}
 """Changes to `MotionConfig` that make a worker walk for about half of the time."""

@@ -6,9 +6,9 @@ Jonker and Volgenant, Computing 38, 1987), for matrices with a few rows, inside 
 
 import numpy as np
 
-from hrc_env.errors import ConfigError
-from hrc_env.kernels import kernel
-from hrc_env.typing import Floats, Ints
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats, Ints
 
 
 def assign(cost: Floats) -> Ints:

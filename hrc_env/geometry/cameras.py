@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.typing import Floats, Points2, Points3, Transforms
+from hrc_env.geometry.lens import Lens, bend, rays_cam, straighten, stretch
 from hrc_env.geometry.rotations import look_at
-from hrc_env.optics.lens import Lens, bend, rays_cam, straighten, stretch
-from hrc_env.typing import Floats, Points2, Points3, Transforms
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.errors import check_shape
-from hrc_env.kernels import kernel
-from hrc_env.records import RobotState
-from hrc_env.typing import Capsules, Floats, Ints, JointAngles, JointVelocities, Transforms
+from hrc_env.core.errors import check_shape
+from hrc_env.core.kernels import kernel
+from hrc_env.core.records import RobotState
+from hrc_env.core.typing import Capsules, Floats, Ints, JointAngles, JointVelocities, Transforms
 
 
 @dataclass(frozen=True, slots=True, eq=False)

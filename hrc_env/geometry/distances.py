@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.kernels import kernel
-from hrc_env.typing import Capsules, Floats, Points3
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Capsules, Floats, Points3
 
 SLACK_M = 1e-9
 """Far more than the rounding of a sphere's bound."""

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from hrc_env.kernels import kernel
-from hrc_env.typing import Floats, Points3, QuaternionsWxyz, Rotations
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats, Points3, QuaternionsWxyz, Rotations
 
 
 def matrix_from_quaternion(quaternion_wxyz: QuaternionsWxyz) -> Rotations:

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from hrc_env.kernels import kernel
-from hrc_env.skeleton import HAND_SEGMENTS, N_JOINTS, SEGMENT_ENDS, SEGMENT_RADIUS_M
-from hrc_env.typing import Floats, Ints
+from hrc_env.core.kernels import kernel
+from hrc_env.core.skeleton import HAND_SEGMENTS, N_JOINTS, SEGMENT_ENDS, SEGMENT_RADIUS_M
+from hrc_env.core.typing import Floats, Ints
 
 _FIRST_ENDS: Ints = np.array([(first[0], first[-1]) for first, _, _ in SEGMENT_ENDS])
 _SECOND_ENDS: Ints = np.array([(second[0], second[-1]) for _, second, _ in SEGMENT_ENDS])

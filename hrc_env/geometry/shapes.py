@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 
-from hrc_env.kernels import kernel
-from hrc_env.typing import Floats
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 
 PLANE, BOX, CYLINDER, CAPSULE = range(4)
 """Kinds of shapes; a sphere is a capsule without length."""

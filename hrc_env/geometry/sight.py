@@ -10,7 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.errors import check_shape
+from hrc_env.core.errors import check_shape
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Bools, Capsules, Floats, Points3
 from hrc_env.geometry.shapes import (
     AXES,
     CENTRE,
@@ -23,8 +25,6 @@ from hrc_env.geometry.shapes import (
     set_capsules,
     set_rows,
 )
-from hrc_env.kernels import kernel
-from hrc_env.typing import Bools, Capsules, Floats, Points3
 
 NEAR_POINT_M = 0.08
 """A line of sight ends this far before the point, so that what a joint touches (the table

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.errors import ConfigError, check_shape
-from hrc_env.kernels import kernel
-from hrc_env.typing import Bools, Covariances3, Floats, Ints, Points2, Points3
+from hrc_env.core.errors import ConfigError, check_shape
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Bools, Covariances3, Floats, Ints, Points2, Points3
 
 NEAREST_DEPTH_M = 0.05
 """Points nearer to a camera's plane than this have no usable pixel."""

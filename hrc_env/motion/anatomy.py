@@ -4,13 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.body import N_SEGMENTS, PARENT, Bodies, Body
+from hrc_env.core.typing import Floats
 from hrc_env.geometry.rotations import about_axis
-from hrc_env.typing import Floats
+from hrc_env.worker.body import N_SEGMENTS, PARENT, Bodies, Body
 
 CHEST, HEAD = 3, 5
 LEFT, SIDE_STRIDE = 6, 8
-"""First segment of the left side, and how many a side has (order of `hrc_env.body`)."""
+"""First segment of the left side, and how many a side has (order of `hrc_env.worker.body`)."""
 CLAVICLE, UPPER_ARM, FOREARM, HAND, THIGH, SHANK, FOOT, TOES = range(8)
 """Segments of one side, counted from its first."""
 

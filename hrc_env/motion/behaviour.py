@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 
+from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.errands import HERE, picked
@@ -60,8 +61,7 @@ from hrc_env.motion.who import (
     Who,
     who_is,
 )
-from hrc_env.props import prop_index
-from hrc_env.typing import Floats
+from hrc_env.worker.props import prop_index
 
 WAIT_S = (0.5, 1.1)
 """Who finds no way looks again after so long [s]; judgement."""

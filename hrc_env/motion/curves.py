@@ -6,7 +6,7 @@ compiled before, and then the last bits of a walk would depend on that, too.
 
 import math
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
 
 
 @kernel

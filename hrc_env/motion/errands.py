@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from hrc_env.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.records import WORKPLACE_KINDS
 from hrc_env.motion.plans import ACTIVITY_NAMES
-from hrc_env.props import PROPS
-from hrc_env.records import WORKPLACE_KINDS
+from hrc_env.worker.props import PROPS
 
 HERE = "here"
 """As a kind of place: wherever the worker is."""

@@ -8,12 +8,12 @@ high the ground is there. Steps may be gone back: then their time runs backwards
 
 import math
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.anatomy import ANKLE_Z, BALL_X, BALL_Z, HEEL_X
 from hrc_env.motion.curves import cruise, hump, min_jerk
-from hrc_env.typing import Floats
 
 STRIKE_PITCH, PUSH_PITCH = -0.35, 1.0
 """Foot's pitch at heel strike and greatest at push-off of a full stride [rad]: about -20 and

@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hrc_env.errors import ConfigError
-from hrc_env.kernels import kernel
-from hrc_env.records import Grounds, Workplace
-from hrc_env.typing import Floats
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.kernels import kernel
+from hrc_env.core.records import Grounds, Workplace
+from hrc_env.core.typing import Floats
 
 BODY_M = 0.40
 """Walkers keep so far from what stands there: half their width, arms swinging included [m]."""

@@ -2,11 +2,11 @@
 
 import math
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import STAND_Z
 from hrc_env.motion.curves import wrap
-from hrc_env.typing import Floats
 
 NECK_SHARE = 0.70
 """Height of the eyes above the pelvis as a share of the pelvis's; from the baked bodies."""

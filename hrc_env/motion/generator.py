@@ -8,8 +8,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hrc_env.body import N_SEGMENTS, Bodies, Body
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.records import Grounds, Held, WorkerMotion, WorkerPath, Workplace
+from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion import state as st
@@ -27,8 +28,7 @@ from hrc_env.motion.playing import Clips, stocked
 from hrc_env.motion.reactions import notice
 from hrc_env.motion.state import MotionState
 from hrc_env.motion.who import N_DRAWS
-from hrc_env.records import Grounds, Held, WorkerMotion, WorkerPath, Workplace
-from hrc_env.typing import Bools, Floats, Ints
+from hrc_env.worker.body import N_SEGMENTS, Bodies, Body
 
 __all__ = [
     "ABSENT",

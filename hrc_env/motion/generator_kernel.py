@@ -1,10 +1,10 @@
 """The compiled part of the worker: from what workers do to where their bodies are, one by one."""
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.motion.holding import prop_pose
 from hrc_env.motion.kinematics import pose, quaternion, spin
 from hrc_env.motion.state import RATE_H_S, evaluate
-from hrc_env.typing import Bools, Floats, Ints
 
 PARKED_Z_M = -100.0
 """Who is not in an episode is so far below the floor, where no camera looks [m]."""

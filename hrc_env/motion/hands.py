@@ -2,14 +2,14 @@
 
 import math
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.anatomy import ARM, HAND, LEFT, SIDE_STRIDE, UPPER_ARM
 from hrc_env.motion.curves import hump, min_jerk
 from hrc_env.motion.kinematics import ARM_KNEE, pose
 from hrc_env.motion.posture import MOST_LEAN, beyond, lean, stand
-from hrc_env.typing import Floats
 
 GAZE_LEAD_S = 0.25
 """Eyes and head set off before the hand (Land & Hayhoe 2001: about half a second at most)."""

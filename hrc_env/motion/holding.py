@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
-from hrc_env.props import PROPS
-from hrc_env.typing import Floats
+from hrc_env.worker.props import PROPS
 
 GRIPS = np.array([np.nan_to_num(prop.grips) for prop in PROPS])
 """(N, 2, 3) where the left and right hand hold each prop, in its frame [m]."""

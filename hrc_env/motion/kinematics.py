@@ -2,7 +2,8 @@
 
 import math
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import (
     ARM,
@@ -26,7 +27,6 @@ from hrc_env.motion.anatomy import (
     UPPER_LENGTH,
 )
 from hrc_env.motion.curves import min_jerk, saturate, soft_min
-from hrc_env.typing import Floats
 
 ARM_KNEE, ARM_LIMIT = 0.97, 0.998
 """Shares of the arm's length where stretching begins to resist, and that it never passes."""

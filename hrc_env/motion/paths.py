@@ -7,10 +7,10 @@ Directions run on and are not wrapped.
 
 import math
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 from hrc_env.motion import plans as pl
 from hrc_env.motion.curves import wrap
-from hrc_env.typing import Floats
 
 HEADING_WINDOW_M = 0.3
 """Walkers face the mean direction of so much of the path behind and ahead: people turn into a

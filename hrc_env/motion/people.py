@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, fields
 
-from hrc_env.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, unknown
 
 Range = tuple[float, float]
 

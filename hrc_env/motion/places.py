@@ -5,6 +5,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from hrc_env.core.records import WORKPLACE_KINDS
+from hrc_env.core.typing import Floats
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.worker import Place
 from hrc_env.motion.errands import HERE
@@ -19,8 +21,6 @@ from hrc_env.motion.who import (
     PLACES,
     Who,
 )
-from hrc_env.records import WORKPLACE_KINDS
-from hrc_env.typing import Floats
 
 ROBOT_WORK_M = 1.1
 """Height of the work at the robot [m]."""

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.typing import Floats, Ints
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.recorded import (
@@ -27,7 +28,6 @@ from hrc_env.motion.capture.stance import footprints
 from hrc_env.motion.curves import ramp
 from hrc_env.motion.posture import STANCE_HALF_WIDTH_M
 from hrc_env.motion.walk import footprint
-from hrc_env.typing import Floats, Ints
 
 LONGEST_S, SHORTEST_S = 20.0, 0.5
 """Longer clips are played in pieces; no piece is shorter [s]."""

@@ -2,12 +2,12 @@
 
 import math
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.anatomy import ARM, FOREARM_GRIP, LEFT, SIDE_STRIDE, STAND_Z, UPPER_ARM
 from hrc_env.motion.kinematics import ARM_KNEE, pose
-from hrc_env.typing import Floats
 
 STANCE_HALF_WIDTH_M = 0.10
 """Ankles' distance from the middle when standing [m]; shoulder-wide for the baked bodies."""

@@ -7,7 +7,8 @@ their activity's time coming to a halt, and are taken away by its going backward
 
 import math
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats, Ints
 from hrc_env.motion import plans as pl
 from hrc_env.motion.anatomy import CHEST, HAND, HEAD, LEFT, SIDE_STRIDE
 from hrc_env.motion.state import (
@@ -24,7 +25,6 @@ from hrc_env.motion.state import (
 )
 from hrc_env.motion.traffic import goes, meets
 from hrc_env.motion.walk import brake
-from hrc_env.typing import Floats, Ints
 
 BODY_POINTS = (CHEST, HEAD, LEFT + HAND, LEFT + SIDE_STRIDE + HAND)
 """Segments that people guard."""

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from hrc_env.core.typing import Floats
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.climb import start_climb
 from hrc_env.motion.activities.crouching import plan_kneel, plan_squat
@@ -36,7 +37,6 @@ from hrc_env.motion.activities.point import plan_point
 from hrc_env.motion.activities.saw import plan_saw
 from hrc_env.motion.activities.worker import N_START, Place, Worker
 from hrc_env.motion.solo import Film, play, rest
-from hrc_env.typing import Floats
 
 Start = Callable[[Floats, Place, Worker], float]
 """Begins an activity, see `activities`; how long it lasts [s]."""

@@ -9,11 +9,11 @@ import math
 
 import numpy as np
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 from hrc_env.motion import plans as pl
 from hrc_env.motion.floorplan import CELL_M, slack_at
 from hrc_env.motion.paths import along, lay_path
-from hrc_env.typing import Floats
 
 STRIDE = 3
 """Grid points of the field to a node of the search: 15 cm."""

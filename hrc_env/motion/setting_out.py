@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 
+from hrc_env.core.records import WORKPLACE_KINDS
+from hrc_env.core.typing import Floats
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.worker import N_START, Place
 from hrc_env.motion.errands import HERE
@@ -29,9 +31,7 @@ from hrc_env.motion.who import (
     EVENT,
     Who,
 )
-from hrc_env.props import prop_index
-from hrc_env.records import WORKPLACE_KINDS
-from hrc_env.typing import Floats
+from hrc_env.worker.props import prop_index
 
 WISHED_CLIP, WHICH_CLIP = N_START - 2, N_START - 1
 """Of an activity's own draws: whether to play a clip instead of it, and which."""

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.body import N_SEGMENTS, Body
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.records import Held, WorkerMotion
+from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.worker import Worker
@@ -14,8 +15,7 @@ from hrc_env.motion.feet import feet
 from hrc_env.motion.holding import N_HELD, drop_load, prop_pose
 from hrc_env.motion.kinematics import N_FRAMES, N_POINTS, pose, quaternion
 from hrc_env.motion.state import RATE_H_S, evaluate, settle, stop
-from hrc_env.records import Held, WorkerMotion
-from hrc_env.typing import Floats
+from hrc_env.worker.body import N_SEGMENTS, Body
 
 
 @dataclass(frozen=True, slots=True)

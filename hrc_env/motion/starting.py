@@ -3,7 +3,8 @@
 import math
 from collections.abc import Callable
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.climb import start_climb
 from hrc_env.motion.activities.crouching import plan_kneel, plan_squat
@@ -33,7 +34,6 @@ from hrc_env.motion.config import Numbers
 from hrc_env.motion.curves import wrap
 from hrc_env.motion.feet import feet
 from hrc_env.motion.hands import plan_lift, plan_reach
-from hrc_env.typing import Floats
 
 BODY_M = 0.36
 """Hands reach no nearer to their own root than this [m]."""

@@ -4,7 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.records import Workplace
+from hrc_env.core.typing import Floats, Ints
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.climb import climb
@@ -24,8 +26,6 @@ from hrc_env.motion.holding import drop_load, hold_load
 from hrc_env.motion.playing import Clips
 from hrc_env.motion.posture import STANCE_HALF_WIDTH_M, stand
 from hrc_env.motion.walk import footprint, walk
-from hrc_env.records import Workplace
-from hrc_env.typing import Floats, Ints
 
 BLEND_S = 0.45
 """Time in which the difference between two activities decays [s]; about a settling step."""

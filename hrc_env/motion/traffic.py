@@ -6,12 +6,12 @@ ended; a worker who begins something makes sure to keep clear of all of that, so
 
 import math
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats, Ints
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.recorded import clip_root
 from hrc_env.motion.paths import along
 from hrc_env.motion.walk import travelled
-from hrc_env.typing import Floats, Ints
 
 APART_M = 0.80
 """Roots keep so far from each other [m]: two half widths of people with arms, and some."""

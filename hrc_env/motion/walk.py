@@ -6,7 +6,8 @@ Cadence and step length follow 68 walking trials of the CMU motion-capture datab
 
 import math
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.anatomy import ANKLE_X, LEG, STAND_Z
@@ -22,7 +23,6 @@ from hrc_env.motion.posture import (
     hang,
     stand,
 )
-from hrc_env.typing import Floats
 
 CADENCE_PER_MIN, CADENCE_POWER, SLOWEST_M_S = 96.2, 0.468, 0.65
 """Fit above; slower starts and turns keep the cadence of the slowest speed [m/s]."""

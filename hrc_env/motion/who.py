@@ -4,14 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hrc_env.core.records import WORKPLACE_KINDS
+from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.worker import N_START, Worker
 from hrc_env.motion.errands import Task
 from hrc_env.motion.kinematics import N_FRAMES, N_POINTS
 from hrc_env.motion.state import AT, GOING, NOWHERE, SPOT_SINCE, TASK, WAITING, MotionState
-from hrc_env.records import WORKPLACE_KINDS
-from hrc_env.typing import Floats
 
 NEXT, BOW, LASTS, DELAY, REACTION, REACTION_S, EVENT, DWELL = range(N_START, N_START + 8)
 """Which draw decides what; the first N_START are the activity's own."""

@@ -11,6 +11,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from hrc_env.core.records import Roi
+from hrc_env.core.typing import Points3
 from hrc_env.geometry.cameras import (
     PinholeCamera,
     image_from_pinhole,
@@ -18,8 +20,6 @@ from hrc_env.geometry.cameras import (
     project,
     rays,
 )
-from hrc_env.records import CropWindow
-from hrc_env.typing import Points3
 
 MEETING_M = 0.3
 """Lines of sight that pass a point within this distance [m] see the same hips there."""
@@ -31,12 +31,10 @@ somebody folded up to somebody tall who reaches up."""
 MIN_CROSSING = 0.1
 """Sine of the smallest angle between two lines that fixes a point."""
 
-Candidates = Sequence[Sequence[CropWindow]]
+Candidates = Sequence[Sequence[Roi]]
 
 
-def agreed_windows(
-    candidates: Candidates, cameras: Sequence[PinholeCamera]
-) -> list[CropWindow | None]:
+def agreed_windows(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> list[Roi | None]:
     """One person's window a camera: those whose hips' lines of sight meet best.
 
     Args:
@@ -50,7 +48,7 @@ def agreed_windows(
     """
     if len(cameras) == 1:
         return [found[0] if found else None for found in candidates]
-    best: list[CropWindow | None] = [None] * len(cameras)
+    best: list[Roi | None] = [None] * len(cameras)
     best_rank = (1, 0.0)
     for point in _crossings(candidates, cameras):
         windows, rank = _support(point, candidates, cameras)
@@ -59,7 +57,7 @@ def agreed_windows(
     return best
 
 
-def apart_from(candidates: Candidates, others: Sequence[Sequence[CropWindow | None]]) -> Candidates:
+def apart_from(candidates: Candidates, others: Sequence[Sequence[Roi | None]]) -> Candidates:
     """Candidates (C,) without those who are in a window (C,) of somebody else already."""
     known = [[windows[c] for windows in others] for c in range(len(candidates))]
     return [
@@ -68,7 +66,7 @@ def apart_from(candidates: Candidates, others: Sequence[Sequence[CropWindow | No
     ]
 
 
-def same_person(window: CropWindow, other: CropWindow | None) -> bool:
+def same_person(window: Roi, other: Roi | None) -> bool:
     """Whether two windows of one camera have their middle, the hips, in nearly one place."""
     if other is None:
         return False
@@ -97,9 +95,9 @@ def _crossings(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Iter
 
 def _support(
     point_world: Points3, candidates: Candidates, cameras: Sequence[PinholeCamera]
-) -> tuple[list[CropWindow | None], tuple[int, float]]:
+) -> tuple[list[Roi | None], tuple[int, float]]:
     """Windows that see their hips at a point, with their number and how well they meet."""
-    windows: list[CropWindow | None] = [None] * len(cameras)
+    windows: list[Roi | None] = [None] * len(cameras)
     error_m = 0.0
     for c, (camera, found) in enumerate(zip(cameras, candidates, strict=True)):
         px, depth_m = project(camera.P[None], point_world[None])

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.records import Roi
+from hrc_env.core.typing import Floats, Image, Points2
 from hrc_env.perception.network import DETECTOR_SIDE, LANDMARK_SIDE
 from hrc_env.perception.tensors import Tensor
-from hrc_env.records import CropWindow
-from hrc_env.typing import Floats, Image, Points2
 
 MIN_SCORE = 0.5
 """Detector score and person flag from which MediaPipe believes in a person."""
@@ -63,7 +63,7 @@ def wrap_angle(angle_rad: float) -> float:
     return angle_rad - 2 * math.pi * math.floor((angle_rad + math.pi) / (2 * math.pi))
 
 
-def window_from_points(centre_px: Points2, rim_px: Points2) -> CropWindow:
+def window_from_points(centre_px: Points2, rim_px: Points2) -> Roi:
     """BlazePose's region of interest: round mid-hip, upright towards the rim point.
 
     Args:
@@ -73,10 +73,10 @@ def window_from_points(centre_px: Points2, rim_px: Points2) -> CropWindow:
     dx, dy = rim_px[0] - centre_px[0], rim_px[1] - centre_px[1]
     side_px = 2 * math.hypot(dx, dy) * ROI_MARGIN
     rotation = wrap_angle(math.pi / 2 - math.atan2(-dy, dx))
-    return CropWindow((float(centre_px[0]), float(centre_px[1])), side_px, rotation)
+    return Roi((float(centre_px[0]), float(centre_px[1])), side_px, rotation)
 
 
-def sample_window(image: Image, window: CropWindow, side: int = LANDMARK_SIDE) -> Image:
+def sample_window(image: Image, window: Roi, side: int = LANDMARK_SIDE) -> Image:
     """The turned square of an image as an upright (side, side, 3) picture, bilinear.
 
     The square's corners map to the picture's corners (no half-pixel shift), and the image's
@@ -88,13 +88,13 @@ def sample_window(image: Image, window: CropWindow, side: int = LANDMARK_SIDE) -
     return crop.astype(np.uint8, copy=False)
 
 
-def to_image(points: Points2, window: CropWindow) -> Points2:
+def to_image(points: Points2, window: Roi) -> Points2:
     """Points (..., 2) in units of the window's side (0..1 from its corner) to image pixels."""
     matrix = image_from_crop(window, 1)
     return points @ matrix[:, :2].T + matrix[:, 2]
 
 
-def image_from_crop(window: CropWindow, side: int) -> Floats:
+def image_from_crop(window: Roi, side: int) -> Floats:
     """(2, 3) affine map from crop pixels to image pixels."""
     scale = window.side_px / side
     c, s = math.cos(window.rotation_rad) * scale, math.sin(window.rotation_rad) * scale
@@ -102,10 +102,10 @@ def image_from_crop(window: CropWindow, side: int) -> Floats:
     return np.column_stack([turn, np.array(window.centre_px) - turn @ [side / 2, side / 2]])
 
 
-def detector_input(image: Image) -> tuple[Tensor, CropWindow]:
+def detector_input(image: Image) -> tuple[Tensor, Roi]:
     """An image of any shape, letterboxed for the detector, and the window that it covers."""
     height, width = image.shape[:2]
-    window = CropWindow((width / 2, height / 2), float(max(height, width)), 0.0)
+    window = Roi((width / 2, height / 2), float(max(height, width)), 0.0)
     size = (DETECTOR_SIDE, DETECTOR_SIDE)
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     small = cv2.warpAffine(image, image_from_crop(window, DETECTOR_SIDE), size, flags=flags)
@@ -155,7 +155,7 @@ def merge_people(score: Floats, box: Floats, keypoints: Floats) -> list[Person]:
     return people
 
 
-def person_window(person: Person, window: CropWindow) -> CropWindow:
+def person_window(person: Person, window: Roi) -> Roi:
     """The region of interest of a person found in the square `window`, in image pixels."""
     hip, rim = to_image(np.array([person.hip, person.rim]), window)
     return window_from_points(hip, rim)

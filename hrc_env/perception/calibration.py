@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.errors import ConfigError
-from hrc_env.skeleton import JOINTS, MIRROR
-from hrc_env.typing import Floats, Ints
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.skeleton import JOINTS, MIRROR
+from hrc_env.core.typing import Floats, Ints
 
 FORMAT, VERSION = "hrc_env keypoints", 5
 """Version: what the tables mean. A file of another one is refused."""

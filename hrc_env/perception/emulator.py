@@ -15,10 +15,13 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.errors import ConfigError, check_shape
+from hrc_env.core.errors import ConfigError, check_shape
+from hrc_env.core.records import Keypoints, WorkerTruth
+from hrc_env.core.skeleton import MIRROR, N_JOINTS
+from hrc_env.core.typing import Floats, Ints
 from hrc_env.geometry.cameras import PinholeCamera, projections
+from hrc_env.geometry.lens import lens_row
 from hrc_env.geometry.sight import Surroundings
-from hrc_env.optics.lens import lens_row
 from hrc_env.perception.calibration import (
     HAND,
     INNER,
@@ -39,9 +42,6 @@ from hrc_env.perception.emulator_kernel import (
 )
 from hrc_env.perception.eyes import STATURE_OF_SIDE
 from hrc_env.perception.sightlines import CENTRE, N_LOOK, Rig, World, sight_batch
-from hrc_env.records import Keypoints, WorkerTruth
-from hrc_env.skeleton import MIRROR, N_JOINTS
-from hrc_env.typing import Floats, Ints
 
 Generators = Sequence[np.random.Generator]
 

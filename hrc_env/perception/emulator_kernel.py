@@ -6,8 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hrc_env.core.kernels import kernel
+from hrc_env.core.skeleton import JOINT
+from hrc_env.core.typing import Floats, Ints
 from hrc_env.geometry.sight import make_table
-from hrc_env.kernels import kernel
 from hrc_env.perception.calibration import POSTURED, SHAPES
 from hrc_env.perception.noise import error_share
 from hrc_env.perception.outline import facing, mix, posture_of, seen_from, speed
@@ -23,8 +25,6 @@ from hrc_env.perception.sightlines import (
     fill,
     see,
 )
-from hrc_env.skeleton import JOINT
-from hrc_env.typing import Floats, Ints
 
 N_NORMALS = 6
 """Normal variables of a joint in an image: two for errors that last a while, two for new ones,

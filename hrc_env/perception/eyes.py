@@ -15,7 +15,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.errors import ConfigError, check_shape, unknown
+from hrc_env.core.errors import ConfigError, check_shape, unknown
+from hrc_env.core.records import Roi
+from hrc_env.core.skeleton import BLAZEPOSE_INDEX, N_JOINTS
+from hrc_env.core.stateful import Stateful
+from hrc_env.core.typing import Floats, Image, Points2
 from hrc_env.geometry.cameras import PinholeCamera, inside_image
 from hrc_env.perception import blazepose
 from hrc_env.perception.acquisition import Candidates, agreed_windows, apart_from
@@ -32,10 +36,6 @@ from hrc_env.perception.network import (
 from hrc_env.perception.noise import STANDING, sigma_px
 from hrc_env.perception.searching import ImageSource, distinct, people, search_jobs
 from hrc_env.perception.weights import find_weights
-from hrc_env.records import CropWindow
-from hrc_env.skeleton import BLAZEPOSE_INDEX, N_JOINTS
-from hrc_env.stateful import Stateful
-from hrc_env.typing import Floats, Image, Points2
 
 STATURE_OF_SIDE = 0.75
 """Stature of an upright worker as a share of the side of BlazePose's window round them."""
@@ -98,7 +98,7 @@ class Sight:
     """(C, J) visibility in [0, 1]."""
     sigma_px: Floats
     """(C, J) standard deviation of each coordinate [px]."""
-    windows: list[CropWindow | None]
+    windows: list[Roi | None]
     """Where each camera looked."""
     crops: list[Image | None] = field(default_factory=list)
     """(C,) what the network was given of each camera."""
@@ -141,9 +141,9 @@ class Eyes(Stateful):
     def look(
         self,
         source: ImageSource,
-        windows: Sequence[CropWindow | None],
+        windows: Sequence[Roi | None],
         track: int = 0,
-        others: Sequence[Sequence[CropWindow | None]] = (),
+        others: Sequence[Sequence[Roi | None]] = (),
         found: Candidates | None = None,
         folded: bool = False,
         posture: Sequence[float] = STANDING,
@@ -181,9 +181,7 @@ class Eyes(Stateful):
             looks[c] = 0
         return sight
 
-    def search(
-        self, source: ImageSource, which: Sequence[int] | None = None
-    ) -> list[list[CropWindow]]:
+    def search(self, source: ImageSource, which: Sequence[int] | None = None) -> list[list[Roi]]:
         """Regions of interest of the people in each camera's whole image, best first.
 
         Args:
@@ -255,7 +253,7 @@ class Eyes(Stateful):
             self._helper = ThreadPoolExecutor(1, thread_name_prefix="hrc_env-eyes")
         return self._helper, self._networks
 
-    def _nothing(self, windows: list[CropWindow | None]) -> Sight:
+    def _nothing(self, windows: list[Roi | None]) -> Sight:
         shape = (len(self.cameras), N_JOINTS)
         return Sight(
             np.full((*shape, 2), np.nan), np.zeros(shape), np.full(shape, np.inf), windows,
@@ -284,7 +282,7 @@ def _joints(
     nets: _Networks,
     landmark: Landmarker,
     crop: Image,
-    window: CropWindow,
+    window: Roi,
     ask_detector: bool,
     config: EyesConfig,
 ) -> Floats | None:
@@ -301,7 +299,7 @@ def _joints(
     return joints
 
 
-def _seen(crop: Image, window: CropWindow, camera: PinholeCamera) -> Image:
+def _seen(crop: Image, window: Roi, camera: PinholeCamera) -> Image:
     """A copy of the crop, black where the camera does not see: renderers go on drawing."""
     check_shape("crop", crop.shape, (LANDMARK_SIDE, LANDMARK_SIDE, 3), "rows, columns, RGB")
     mask = _frame_mask(window, camera.width_px, camera.height_px)
@@ -311,7 +309,7 @@ def _seen(crop: Image, window: CropWindow, camera: PinholeCamera) -> Image:
 
 
 @functools.lru_cache(maxsize=64)
-def _frame_mask(window: CropWindow, width_px: int, height_px: int) -> NDArray[np.uint8] | None:
+def _frame_mask(window: Roi, width_px: int, height_px: int) -> NDArray[np.uint8] | None:
     """Which pixels of a crop are in the image, not 0; None for all. Windows are steady."""
     corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
     frame = np.array([width_px, height_px])

@@ -6,10 +6,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.records import Roi
+from hrc_env.core.typing import Floats, Image, Points2
 from hrc_env.perception.blazepose import sample_window
-from hrc_env.records import CropWindow
-from hrc_env.typing import Floats, Image, Points2
 
 
 class Films:
@@ -60,11 +60,11 @@ class Films:
         for _ in range(n_frames):
             self._films[camera_index].grab()
 
-    def crop(self, camera_index: int, window: CropWindow) -> Image:
+    def crop(self, camera_index: int, window: Roi) -> Image:
         """The window of a camera's open frame, upright, (256, 256, 3) RGB."""
         return sample_window(self.frames[camera_index], window)
 
-    def empty(self, camera_index: int, window: CropWindow) -> Image | None:
+    def empty(self, camera_index: int, window: Roi) -> Image | None:
         """Nobody knows what a film would show without people."""
         return None
 

@@ -15,6 +15,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from hrc_env.core.records import Keypoints, Roi
+from hrc_env.core.typing import Floats, Image
 from hrc_env.geometry.cameras import (
     PinholeCamera,
     inside_image,
@@ -23,8 +25,6 @@ from hrc_env.geometry.cameras import (
     rays,
 )
 from hrc_env.perception.blazepose import to_image
-from hrc_env.records import CropWindow, Keypoints
-from hrc_env.typing import Floats, Image
 
 WIDEST = float(np.tan(np.radians(78.0)))
 """A pinhole's picture reaches no further from its middle than this, in focal lengths; what a
@@ -38,11 +38,11 @@ class Drawer(Protocol):
 
     size_px: int
 
-    def view(self, camera: PinholeCamera, window: CropWindow) -> Image:
+    def view(self, camera: PinholeCamera, window: Roi) -> Image:
         """The window of what a pinhole would see, (size, size, 3) RGB, top row first."""
         ...
 
-    def unpeopled(self, camera: PinholeCamera, window: CropWindow) -> Image:
+    def unpeopled(self, camera: PinholeCamera, window: Roi) -> Image:
         """The same without people."""
         ...
 
@@ -53,7 +53,7 @@ class _Cover:
 
     camera: PinholeCamera
     """Turned to the window's middle, in units of its focal length."""
-    window: CropWindow
+    window: Roi
     """What of it is drawn."""
     x: NDArray[np.float32]
     y: NDArray[np.float32]
@@ -67,23 +67,23 @@ class Lensed:
         self.drawer, self.cameras = drawer, tuple(cameras)
         self._covers: OrderedDict[tuple, _Cover | None] = OrderedDict()
 
-    def crop(self, camera_index: int, window: CropWindow) -> Image:
+    def crop(self, camera_index: int, window: Roi) -> Image:
         """The window of a camera's present image, upright, (size, size, 3) RGB."""
         return self.view(self.cameras[camera_index], window)
 
-    def view(self, camera: PinholeCamera, window: CropWindow) -> Image:
+    def view(self, camera: PinholeCamera, window: Roi) -> Image:
         """The same of any camera."""
         return self._bent(camera, window, self.drawer.view)
 
-    def empty(self, camera_index: int, window: CropWindow) -> Image:
+    def empty(self, camera_index: int, window: Roi) -> Image:
         """The window of a camera's image, were nobody there: the robot knows where it is itself."""
         return self._bent(self.cameras[camera_index], window, self.drawer.unpeopled)
 
     def _bent(
         self,
         camera: PinholeCamera,
-        window: CropWindow,
-        draw: Callable[[PinholeCamera, CropWindow], Image],
+        window: Roi,
+        draw: Callable[[PinholeCamera, Roi], Image],
     ) -> Image:
         if camera.lens is None:
             return draw(camera, window)
@@ -96,7 +96,7 @@ class Lensed:
             cv2.remap(drawn, cover.x, cover.y, cv2.INTER_LINEAR, borderMode=black), np.uint8
         )
 
-    def _cover(self, camera: PinholeCamera, window: CropWindow) -> _Cover | None:
+    def _cover(self, camera: PinholeCamera, window: Roi) -> _Cover | None:
         key = (camera.K.tobytes(), camera.T_world_from_cam.tobytes(), camera.lens, window)
         if key not in self._covers:
             self._covers[key] = _cover(camera, window, self.drawer.size_px)
@@ -125,7 +125,7 @@ def pinhole_keypoints(found: Keypoints, cameras: Sequence[PinholeCamera]) -> Key
     return Keypoints(px, confidence, sigma_px, found.time_s)
 
 
-def _cover(camera: PinholeCamera, window: CropWindow, size: int) -> _Cover | None:
+def _cover(camera: PinholeCamera, window: Roi, size: int) -> _Cover | None:
     """None where the lens shows nothing in the window."""
     middles = (np.arange(size) + 0.5) / size
     places = np.stack(np.meshgrid(middles, middles), -1)
@@ -146,12 +146,12 @@ def _cover(camera: PinholeCamera, window: CropWindow, size: int) -> _Cover | Non
     view = PinholeCamera(camera.name, np.diag([1.0, 1.0, 1.0]), T_world_from_view, 1, 1)
     shift = side / 2 - np.array(middle)
     return _Cover(
-        view, CropWindow(middle, side, 0.0), _pixels(u + shift[0], side, size),
+        view, Roi(middle, side, 0.0), _pixels(u + shift[0], side, size),
         _pixels(v + shift[1], side, size),
     )  # fmt: skip
 
 
-def _axes(ray: Floats, window: CropWindow, camera: PinholeCamera) -> Floats:
+def _axes(ray: Floats, window: Roi, camera: PinholeCamera) -> Floats:
     """R_world_from_view: forward to the middle of what is seen, upright with the window."""
     forward = np.asarray(np.nanmean(ray.reshape(-1, 3), 0), float)
     forward /= np.linalg.norm(forward)

@@ -8,7 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TypeAlias
 
-from hrc_env.errors import unknown
+from hrc_env.core.errors import unknown
 from hrc_env.perception import litert, vino
 from hrc_env.perception.tensors import Network, Tensor
 from hrc_env.perception.weights import find_weights

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hrc_env.errors import check_shape
-from hrc_env.kernels import kernel
+from hrc_env.core.errors import check_shape
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 from hrc_env.perception.calibration import KIND, POSTURES, VISIBILITY, read_calibration
-from hrc_env.typing import Floats
 
 ERROR: Floats = read_calibration().sigma
 """(P, K, V) standard deviation of each image coordinate, as a share of stature, for each

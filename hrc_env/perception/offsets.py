@@ -10,11 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.records import PoseEstimate
+from hrc_env.core.typing import Floats
 from hrc_env.perception.calibration import HAND, KIND, read_calibration
 from hrc_env.perception.outline import facing, mix, posture_of
-from hrc_env.records import PoseEstimate
-from hrc_env.typing import Floats
 
 OFFSET_M: Floats = read_calibration().offset_m
 """(P, K, 3) ahead, to the joint's own side, up [m]."""

@@ -2,7 +2,7 @@
 
 import math
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
 from hrc_env.perception.blazepose import ROI_MARGIN
 from hrc_env.perception.windows import CROWN, HAND, MIN_REACH_M, MIN_TORSO_M
 

@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 
-from hrc_env.skeleton import JOINT
-from hrc_env.typing import Points3
+from hrc_env.core.skeleton import JOINT
+from hrc_env.core.typing import Points3
 
 LEAN_RAD = math.radians(30.0)
 """A torso that leans further is bent: from there on the error of `full` in the image is half as

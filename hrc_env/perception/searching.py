@@ -13,12 +13,12 @@ from typing import Protocol
 import cv2
 import numpy as np
 
+from hrc_env.core.records import Roi
+from hrc_env.core.typing import Image
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.perception import blazepose
 from hrc_env.perception.acquisition import same_person
 from hrc_env.perception.network import Detector
-from hrc_env.records import CropWindow
-from hrc_env.typing import Image
 
 SEARCH_RAD = math.radians(75.0)
 """In a wider search window people are too small for the detector stage."""
@@ -33,18 +33,18 @@ share of a crop is looked at as a whole; no more than so many places in a window
 ROOM = 1.6
 """Windows round what has changed are so many times as large."""
 
-Found = tuple[int, float, CropWindow]
+Found = tuple[int, float, Roi]
 """Which camera, how sure, where."""
 
 
 class ImageSource(Protocol):
     """What gives pictures: a renderer, a camera, a recorded film."""
 
-    def crop(self, camera_index: int, window: CropWindow) -> Image:
+    def crop(self, camera_index: int, window: Roi) -> Image:
         """The window of a camera's present image, upright, (256, 256, 3) RGB."""
         ...
 
-    def empty(self, camera_index: int, window: CropWindow) -> Image | None:
+    def empty(self, camera_index: int, window: Roi) -> Image | None:
         """The same if nobody were there, robot and all; None where that is not known."""
         ...
 
@@ -66,7 +66,7 @@ def search_jobs(
                 ]
 
 
-def changed(crop: Image, empty: Image, window: CropWindow) -> list[CropWindow]:
+def changed(crop: Image, empty: Image, window: Roi) -> list[Roi]:
     """Upright windows round what is not as it is in the empty place, the largest first.
 
     Args:
@@ -89,7 +89,7 @@ def changed(crop: Image, empty: Image, window: CropWindow) -> list[CropWindow]:
             continue
         middle = np.array([[left + width / 2, top + height / 2]]) / size
         x, y = blazepose.to_image(middle, window)[0].tolist()
-        places.append(CropWindow((x, y), side * window.side_px, window.rotation_rad))
+        places.append(Roi((x, y), side * window.side_px, window.rotation_rad))
     return list(dict.fromkeys(places))
 
 
@@ -99,7 +99,7 @@ def people(detect: Detector, crop: Image) -> list[blazepose.Person]:
     return blazepose.decode_people(*detect(image))
 
 
-def search_windows(camera: PinholeCamera, step: float = 0.5) -> list[CropWindow]:
+def search_windows(camera: PinholeCamera, step: float = 0.5) -> list[Roi]:
     """Upright squares that overlap and together cover a camera's image.
 
     As large as fit; behind a lens that sees more than `SEARCH_RAD`, no larger than that.
@@ -108,16 +108,12 @@ def search_windows(camera: PinholeCamera, step: float = 0.5) -> list[CropWindow]
     if camera.lens is not None:
         side = min(side, SEARCH_RAD * float(camera.K[0, 0]))
     columns = _middles(camera.width_px, side, step)
-    return [
-        CropWindow((x, y), side, 0.0)
-        for y in _middles(camera.height_px, side, step)
-        for x in columns
-    ]
+    return [Roi((x, y), side, 0.0) for y in _middles(camera.height_px, side, step) for x in columns]
 
 
-def distinct(found: Sequence[Found], n_cameras: int) -> list[list[CropWindow]]:
+def distinct(found: Sequence[Found], n_cameras: int) -> list[list[Roi]]:
     """Each camera's people, best first, one window each: search windows overlap."""
-    kept: list[list[CropWindow]] = [[] for _ in range(n_cameras)]
+    kept: list[list[Roi]] = [[] for _ in range(n_cameras)]
     for c, _, window in sorted(found, key=lambda item: -item[1]):
         if not any(same_person(window, other) for other in kept[c]):
             kept[c].append(window)

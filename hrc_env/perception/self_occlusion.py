@@ -6,8 +6,8 @@ line passes through: a joint is hidden where that is much more than the way from
 capsule's axis to its surface.
 """
 
+from hrc_env.core.kernels import kernel
 from hrc_env.geometry.shapes import HALF_SIZE, against_axis, rounded, through_tube
-from hrc_env.kernels import kernel
 
 BLOCKING_CHORD = 1.4
 """A line that runs through a capsule for more than this many of its radii is blocked: it

@@ -4,10 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
+from hrc_env.geometry.lens import FOLD, bent, stretch_at
 from hrc_env.geometry.shapes import passage, set_capsules, set_rows
 from hrc_env.geometry.sight import blocks, line, look, make_table, meets
-from hrc_env.kernels import kernel
-from hrc_env.optics.lens import FOLD, bent, stretch_at
 from hrc_env.perception.outline import (
     facing,
     folded,
@@ -19,7 +20,6 @@ from hrc_env.perception.outline import (
     window_round,
 )
 from hrc_env.perception.self_occlusion import body_blocks
-from hrc_env.typing import Floats
 
 MIN_DEPTH_M = 0.5
 """Nearer to a camera's plane there is no image of a person."""

@@ -4,7 +4,7 @@ import shutil
 import urllib.request
 from pathlib import Path
 
-from hrc_env.errors import DownloadError
+from hrc_env.core.errors import DownloadError
 
 PATIENCE_S = 60.0
 """How long the server may be silent."""

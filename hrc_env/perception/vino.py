@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
 from hrc_env.perception.tensors import Network, Tensor
 
 INSTALL = 'pip install "hrc_env[openvino]"'

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from hrc_env.errors import DownloadError, WeightsError, unknown
+from hrc_env.core.errors import DownloadError, WeightsError, unknown
 from hrc_env.perception.tarballs import download_tarball
 from hrc_env.perception.wheels import download_wheel
 

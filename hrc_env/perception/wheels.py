@@ -4,7 +4,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from hrc_env.errors import DownloadError
+from hrc_env.core.errors import DownloadError
 
 
 def download_wheel(requirement: str, folder: Path, again: str) -> Path:

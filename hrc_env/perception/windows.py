@@ -11,6 +11,9 @@ import math
 
 import numpy as np
 
+from hrc_env.core.records import Roi
+from hrc_env.core.skeleton import JOINT, TORSO
+from hrc_env.core.typing import Floats, Points2
 from hrc_env.geometry.cameras import (
     PinholeCamera,
     image_from_pinhole,
@@ -18,9 +21,6 @@ from hrc_env.geometry.cameras import (
     pinhole_stretch,
 )
 from hrc_env.perception.blazepose import window_from_points, wrap_angle
-from hrc_env.records import CropWindow
-from hrc_env.skeleton import JOINT, TORSO
-from hrc_env.typing import Floats, Points2
 
 MIN_DEPTH_M = 0.5
 """A worker whose torso is nearer to the camera's plane is not looked at."""
@@ -52,9 +52,7 @@ _ELBOWS = [JOINT[f"{side}_elbow"] for side in _LEFT_RIGHT]
 _WRISTS = [JOINT[f"{side}_wrist"] for side in _LEFT_RIGHT]
 
 
-def window_from_joints(
-    joints_px: Points2, depth_m: Floats, camera: PinholeCamera
-) -> CropWindow | None:
+def window_from_joints(joints_px: Points2, depth_m: Floats, camera: PinholeCamera) -> Roi | None:
     """The region of interest round projected joints, or None where there is nothing to see.
 
     Args:
@@ -85,7 +83,7 @@ def window_from_joints(
     return window_from_points(hip, hip + reach_px * up)
 
 
-def steady_window(kept: CropWindow | None, wanted: CropWindow | None) -> CropWindow | None:
+def steady_window(kept: Roi | None, wanted: Roi | None) -> Roi | None:
     """The window of the last look while it is still good for the wanted one, else the latter.
 
     Steady crops make steady landmarks, and what stands still in them need not be drawn again.

@@ -15,6 +15,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from hrc_env.core.typing import Floats
 from hrc_env.geometry.chains import SerialChain
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.scene.arm_looks import (
@@ -32,7 +33,6 @@ from hrc_env.scene.primitives import (
     WORKER_BIT,
     capsule,
 )
-from hrc_env.typing import Floats
 
 JOINTS = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
 LINKS = ("shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3")

@@ -9,16 +9,14 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from hrc_env.body import load_body, pool
-from hrc_env.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.records import Grounds, Held
+from hrc_env.core.typing import Floats, Ints, JointAngles
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.geometry.chains import SerialChain, capsules
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.geometry.shapes import WIDTH
 from hrc_env.geometry.sight import Surroundings
-from hrc_env.looks import load_looks
-from hrc_env.props import held_shapes
-from hrc_env.records import Grounds, Held
 from hrc_env.scene.arena import add_lab, paint_lab
 from hrc_env.scene.arm import (
     CAPSULES,
@@ -38,7 +36,9 @@ from hrc_env.scene.site import SITE_CAMERAS, add_site, paint_site
 from hrc_env.scene.site_grounds import site_grounds
 from hrc_env.scene.wardrobe import Wardrobe, dress, wardrobe
 from hrc_env.scene.worker import add_worker, capsule_geom_ids, mocap_ids
-from hrc_env.typing import Floats, Ints, JointAngles
+from hrc_env.worker.body import load_body, pool
+from hrc_env.worker.mesh import load_looks
+from hrc_env.worker.props import held_shapes
 
 ROBOT_BASE_WORLD = (*ROBOT_XY_M, 0.75)
 """The middle of the arm's foot, on the pedestal [m]."""

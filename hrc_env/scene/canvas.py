@@ -15,18 +15,18 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.appearance import Look
-from hrc_env.errors import RenderingError, check_shape
+from hrc_env.core.errors import RenderingError, check_shape
+from hrc_env.core.records import Roi, WorkerMotion
+from hrc_env.core.typing import Floats, Image, JointAngles
 from hrc_env.geometry.cameras import PinholeCamera
-from hrc_env.records import CropWindow, WorkerMotion
 from hrc_env.scene import gl
 from hrc_env.scene.build import Scene, drawing_model, drawn_looks, drawn_props
+from hrc_env.scene.domain_randomization import Look
 from hrc_env.scene.dressing import as_built, dress, strew, take_off_hats
 from hrc_env.scene.primitives import ROBOT_CAPSULES, ROBOT_LOOKS
 from hrc_env.scene.props import PARKED_M, pose_props
 from hrc_env.scene.rig import glcam_axes
 from hrc_env.scene.wardrobe import wear
-from hrc_env.typing import Floats, Image, JointAngles
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +153,7 @@ class Canvas:
         option.flags[mujoco.mjtVisFlag.mjVIS_SKIN.value] = 0
         return option
 
-    def aim(self, camera: PinholeCamera, window: CropWindow, height_px: float) -> None:
+    def aim(self, camera: PinholeCamera, window: Roi, height_px: float) -> None:
         """Look through a turned rectangle of a camera's image, `side_px` wide.
 
         Args:

@@ -2,9 +2,9 @@
 
 import math
 
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats, JointAngles, JointVelocities
 from hrc_env.geometry.chains import SerialChain
-from hrc_env.kernels import kernel
-from hrc_env.typing import Floats, JointAngles, JointVelocities
 
 END_MARGIN_RAD = 0.02
 """Where the arm comes to rest before the end of a joint's range."""

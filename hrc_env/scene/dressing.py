@@ -6,11 +6,11 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from hrc_env.appearance import Look
+from hrc_env.core.records import Grounds
+from hrc_env.core.typing import Floats, Ints
 from hrc_env.geometry.rotations import about_axis
-from hrc_env.records import Grounds
+from hrc_env.scene.domain_randomization import Look
 from hrc_env.scene.wardrobe import PUT_AWAY, Wardrobe
-from hrc_env.typing import Floats, Ints
 
 LEAST_FALL = 0.4
 """Light comes from above: it falls by at least this share of its way."""

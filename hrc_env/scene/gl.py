@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hrc_env.errors import RenderingError, unknown
+from hrc_env.core.errors import RenderingError, unknown
 
 if TYPE_CHECKING:
     import mujoco

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
+from hrc_env.core.records import Grounds, Workplace
+from hrc_env.core.typing import Floats
 from hrc_env.geometry.shapes import AXES, BOX, CENTRE, HALF_SIZE, KIND, PLANE
-from hrc_env.records import Grounds, Workplace
-from hrc_env.typing import Floats
 
 ROBOT_XY_M = (-0.75, 0.0)
 """The axis of the arm's first joint [m]."""

@@ -11,9 +11,9 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.appearance import Look
+from hrc_env.core.records import Roi, WorkerMotion
+from hrc_env.core.typing import Floats, Image, JointAngles
 from hrc_env.geometry.cameras import PinholeCamera, pinhole
-from hrc_env.records import CropWindow, WorkerMotion
 from hrc_env.scene import gl
 from hrc_env.scene.build import Scene
 from hrc_env.scene.canvas import (
@@ -24,8 +24,8 @@ from hrc_env.scene.canvas import (
     Canvas,
     across,
 )
+from hrc_env.scene.domain_randomization import Look
 from hrc_env.scene.render import ALL_GROUPS, VIEWPOINTS
-from hrc_env.typing import Floats, Image, JointAngles
 
 SMOOTHING = 2
 """All is drawn so many times as large, for smooth edges."""
@@ -190,7 +190,7 @@ class Layers:
         scale = place.wide_px / place.width
         x = place.middle_px[0] + ((left + right) / 2 - place.width / 2) * scale
         y = place.middle_px[1] + ((top + bottom) / 2 - place.height / 2) * scale
-        window = CropWindow((x, y), (right - left) * scale, 0.0)
+        window = Roi((x, y), (right - left) * scale, 0.0)
         self._canvas.aim(place.camera, window, (bottom - top) * scale)
 
 

@@ -3,10 +3,10 @@
 import mujoco
 import numpy as np
 
-from hrc_env.errors import HRCError
+from hrc_env.core.errors import HRCError
+from hrc_env.core.typing import Floats
 from hrc_env.geometry.shapes import BOX, CAPSULE, CYLINDER, PLANE, WIDTH, shape
 from hrc_env.scene.primitives import SOLID
-from hrc_env.typing import Floats
 
 KINDS = {
     mujoco.mjtGeom.mjGEOM_PLANE: PLANE,

@@ -9,12 +9,12 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from hrc_env.errors import ConfigError, HRCError, check_shape
-from hrc_env.records import WorkerPath
+from hrc_env.core.errors import ConfigError, HRCError, check_shape
+from hrc_env.core.records import WorkerPath
+from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, JointVelocities
 from hrc_env.scene.build import Scene, without_workers
 from hrc_env.scene.commands import substep_commands
 from hrc_env.scene.worker import CAPSULE_FIELDS, capsule_shapes
-from hrc_env.typing import Bools, Floats, Ints, JointAngles, JointVelocities
 
 INPUTS = int(
     mujoco.mjtState.mjSTATE_CTRL

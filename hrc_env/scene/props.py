@@ -8,11 +8,11 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from hrc_env.props import PROP_NAMES
-from hrc_env.records import Held
+from hrc_env.core.records import Held
+from hrc_env.core.typing import Ints
 from hrc_env.scene.primitives import DECORATION, WORKER_CAPSULES, add_painted, paint_materials
 from hrc_env.scene.prop_looks import LOOKS, PAINTED, add_prop_meshes
-from hrc_env.typing import Ints
+from hrc_env.worker.props import PROP_NAMES
 
 PARKED_M = (0.0, 0.0, -30.0)
 """Where things are that nobody holds [m]."""

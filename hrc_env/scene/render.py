@@ -12,16 +12,16 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.appearance import Look
-from hrc_env.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.kernels import kernel
+from hrc_env.core.records import Roi, WorkerMotion
+from hrc_env.core.typing import Image, JointAngles
 from hrc_env.geometry.cameras import PinholeCamera, pinhole
-from hrc_env.kernels import kernel
-from hrc_env.records import CropWindow, WorkerMotion
 from hrc_env.scene import gl
 from hrc_env.scene.build import Scene
 from hrc_env.scene.canvas import EVERYTHING, MOVING, ROBOT, STILL, Canvas, Part
+from hrc_env.scene.domain_randomization import Look
 from hrc_env.scene.primitives import DECORATION, OVERHEAD, ROBOT_LOOKS, SOLID
-from hrc_env.typing import Image, JointAngles
 
 CROP_PX = 256
 CROP_QUALITY = {
@@ -82,7 +82,7 @@ class CropRenderer:
         """
         self._canvas.pose(q, motion)
 
-    def crop(self, camera_index: int, window: CropWindow) -> Image:
+    def crop(self, camera_index: int, window: Roi) -> Image:
         """(size, size, 3) of a turned square of a camera's image, top row first.
 
         Lenses are left out: `perception.lensed` puts them before.
@@ -96,7 +96,7 @@ class CropRenderer:
             )
         return self.view(self.scene.cameras[camera_index], window)
 
-    def view(self, camera: PinholeCamera, window: CropWindow) -> Image:
+    def view(self, camera: PinholeCamera, window: Roi) -> Image:
         """The same of any camera, as a pinhole sees."""
         key = _key(camera, window)
         if key not in self._kept:
@@ -105,7 +105,7 @@ class CropRenderer:
             return self._canvas.paint()
         return self._laid_over(MOVING, self._background(key, camera, window), camera, window)
 
-    def unpeopled(self, camera: PinholeCamera, window: CropWindow) -> Image:
+    def unpeopled(self, camera: PinholeCamera, window: Roi) -> Image:
         """The same without people and what they hold: the place, and the robot as it stands."""
         key = _key(camera, window)
         if key not in self._kept:
@@ -120,7 +120,7 @@ class CropRenderer:
         return CropRenderer, (self.scene, self.size_px)
 
     def _laid_over(
-        self, part: Part, background: "_Background", camera: PinholeCamera, window: CropWindow
+        self, part: Part, background: "_Background", camera: PinholeCamera, window: Roi
     ) -> Image:
         """A part of what moves before what stands still."""
         self._show(part, camera, window)
@@ -129,11 +129,11 @@ class CropRenderer:
         _lay_over(self._rgb, self._z, background.z, crop)
         return crop
 
-    def _show(self, what: Part, camera: PinholeCamera, window: CropWindow) -> None:
+    def _show(self, what: Part, camera: PinholeCamera, window: Roi) -> None:
         self._canvas.show(what)
         self._canvas.aim(camera, window, window.side_px)
 
-    def _background(self, key: Key, camera: PinholeCamera, window: CropWindow) -> "_Background":
+    def _background(self, key: Key, camera: PinholeCamera, window: Roi) -> "_Background":
         """What stands still in this window, drawn when it is first asked for."""
         background = self._kept[key]
         if background is None:
@@ -161,7 +161,7 @@ class _Background:
     """Bottom row first."""
 
 
-def _key(camera: PinholeCamera, window: CropWindow) -> Key:
+def _key(camera: PinholeCamera, window: Roi) -> Key:
     numbers = (*camera.K.ravel(), *camera.T_world_from_cam.ravel())
     side = (*window.centre_px, window.side_px, window.rotation_rad)
     return tuple(map(float, (*numbers, *side)))
@@ -234,7 +234,7 @@ class PictureRenderer:
         roofless = viewpoint in OPEN_ROOF
         canvas.groups([group for group in ALL_GROUPS if not (roofless and group == OVERHEAD)])
         canvas.show(shadows=shadows and not depth)
-        middle = CropWindow((camera.width_px / 2, camera.height_px / 2), camera.width_px, 0.0)
+        middle = Roi((camera.width_px / 2, camera.height_px / 2), camera.width_px, 0.0)
         canvas.aim(camera, middle, camera.width_px * canvas.height_px / canvas.width_px)
         return canvas.depth_m() if depth else canvas.paint()
 

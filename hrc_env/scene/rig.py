@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.typing import Floats, Rotations
+from hrc_env.geometry.camera_config import MOST_CAMERAS, CameraConfig, intrinsics
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.geometry.rotations import about_axis, look_at, quaternion_from_matrix
-from hrc_env.optics.camera import MOST_CAMERAS, CameraConfig, intrinsics
-from hrc_env.typing import Floats, Rotations
 
 OPENCV_FROM_OPENGL: Floats = np.diag([1.0, -1.0, -1.0])
 """Its own inverse."""

@@ -2,15 +2,15 @@
 
 import numpy as np
 
+from hrc_env.core.records import Grounds
+from hrc_env.core.typing import Bools, Floats, Points3
+from hrc_env.geometry.camera_config import CameraConfig, made
 from hrc_env.geometry.cameras import PinholeCamera, image_from_pinhole, inside_image, project
 from hrc_env.geometry.shapes import BOX, CENTRE, HALF_SIZE, KIND, PLANE, on_axis
 from hrc_env.geometry.sight import Surroundings, hidden, nothing
-from hrc_env.optics.camera import CameraConfig, made
-from hrc_env.records import Grounds
 from hrc_env.scene.build import Scene
 from hrc_env.scene.rig import LAB_CAMERAS
 from hrc_env.scene.site import SITE_CAMERAS
-from hrc_env.typing import Bools, Floats, Points3
 
 RIGS: dict[str, tuple[CameraConfig, ...]] = {
     "lab": LAB_CAMERAS,

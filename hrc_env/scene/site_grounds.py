@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from hrc_env.records import Grounds, Workplace
+from hrc_env.core.records import Grounds, Workplace
+from hrc_env.core.typing import Bools, Floats
 from hrc_env.scene.grounds import (
     ROBOT_CLEARANCE_M,
     ROBOT_FRONT_RAD,
@@ -14,7 +15,6 @@ from hrc_env.scene.grounds import (
 )
 from hrc_env.scene.site_house import OPEN_STUDS
 from hrc_env.scene.site_stock import CONES, HOP_UP_M, HOP_UP_XY_M, PANEL_YAW_RAD, SAND_XY_M
-from hrc_env.typing import Bools, Floats
 
 NORTH, SOUTH, EAST, WEST = math.pi / 2, -math.pi / 2, 0.0, math.pi
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.typing import Floats
+from hrc_env.core.typing import Floats
 
 Colour = Sequence[float]
 Paint = NDArray[np.float64]

@@ -5,13 +5,13 @@ from typing import Any
 
 import mujoco
 
-from hrc_env.errors import RenderingError
-from hrc_env.records import WorkerMotion
+from hrc_env.core.errors import RenderingError
+from hrc_env.core.records import WorkerMotion
+from hrc_env.core.typing import JointAngles
 from hrc_env.scene import gl
 from hrc_env.scene.build import Scene, drawing_model, drawn_looks, drawn_props
 from hrc_env.scene.props import pose_props
 from hrc_env.scene.wardrobe import wear
-from hrc_env.typing import JointAngles
 
 
 def viewing_model(scene: Scene) -> mujoco.MjModel:

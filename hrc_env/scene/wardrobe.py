@@ -10,10 +10,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from hrc_env.body import SEGMENTS, Body
-from hrc_env.looks import HatLooks, Looks, SkinLooks
+from hrc_env.core.typing import Ints
 from hrc_env.scene.primitives import DECORATION, LOOKS_ONLY, WORKER_CAPSULES
-from hrc_env.typing import Ints
+from hrc_env.worker.body import SEGMENTS, Body
+from hrc_env.worker.mesh import HatLooks, Looks, SkinLooks
 
 SKIN_SPECULAR, SKIN_SHININESS = 0.08, 0.15
 HAT_SPECULAR, HAT_SHININESS = 0.45, 0.55

@@ -11,10 +11,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from hrc_env.body import SEGMENTS, Body, load_body
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.typing import Floats, Ints
 from hrc_env.scene.primitives import WORKER_BIT, WORKER_CAPSULES, capsule
-from hrc_env.typing import Floats, Ints
+from hrc_env.worker.body import SEGMENTS, Body, load_body
 
 CAPSULE_FIELDS = ("geom_pos", "geom_quat", "geom_size", "geom_rbound", "geom_aabb")
 """Fields of MuJoCo's model in which the capsules of two bodies differ."""

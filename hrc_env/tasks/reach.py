@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.errors import ConfigError
-from hrc_env.kernels import kernel
-from hrc_env.typing import Bools, Floats, Ints, Points3
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Bools, Floats, Ints, Points3
 
 
 @dataclass(frozen=True, slots=True)

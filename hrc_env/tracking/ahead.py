@@ -8,13 +8,13 @@ says how good this is and what it was compared with.
 
 import numpy as np
 
-from hrc_env.errors import ConfigError
-from hrc_env.kernels import kernel
-from hrc_env.records import PoseEstimate
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.kernels import kernel
+from hrc_env.core.records import PoseEstimate
+from hrc_env.core.typing import Floats, Ints
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.forecast import N_INPUTS, describe, foresee, load_forecast, make_scratch
 from hrc_env.tracking.tracks import Tracks, relax, report
-from hrc_env.typing import Floats, Ints
 
 LONGEST_S = 1.0
 """No estimator looks further ahead [s]."""

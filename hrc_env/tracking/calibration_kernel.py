@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
+from hrc_env.core.kernels import kernel
 from hrc_env.geometry.triangulation import pixel_of
-from hrc_env.kernels import kernel
 
 N_NUMBERS = 5
 """Shift along u and v, growth, turn, all in radians or shares; delay [s]."""

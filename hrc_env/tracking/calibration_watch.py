@@ -24,9 +24,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hrc_env.records import Keypoints, PoseEstimate
+from hrc_env.core.records import Keypoints, PoseEstimate
+from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.tracking.calibration_kernel import N_NUMBERS, gather
-from hrc_env.typing import Bools, Floats, Ints
 
 EVERY = 10
 """Updates between two samples: errors of the detector last for about twelve."""

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from hrc_env.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, unknown
 
 _POSITIVE = (
     "prior_std_m",

@@ -19,8 +19,9 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
-from hrc_env.errors import ConfigError, unknown
-from hrc_env.records import Keypoints, PoseEstimate
+from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.records import Keypoints, PoseEstimate
+from hrc_env.core.typing import Floats, Ints
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.kalman import KalmanEstimator
 from hrc_env.tracking.late import LateEstimator
@@ -28,7 +29,6 @@ from hrc_env.tracking.paper import PaperEstimator
 from hrc_env.tracking.particle import ParticleEstimator
 from hrc_env.tracking.per_joint import PerJointEstimator
 from hrc_env.tracking.triangulating import TriangulationEstimator, ransac, triangulation
-from hrc_env.typing import Floats, Ints
 
 State = TypeVar("State")
 Rngs = list[np.random.Generator]

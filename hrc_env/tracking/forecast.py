@@ -14,11 +14,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.body import assets_dir
-from hrc_env.kernels import kernel
-from hrc_env.skeleton import N_JOINTS
+from hrc_env.core.kernels import kernel
+from hrc_env.core.skeleton import N_JOINTS
+from hrc_env.core.typing import Floats
 from hrc_env.tracking.models.acquisition import heading
-from hrc_env.typing import Floats
+from hrc_env.worker.body import assets_dir
 
 N_INPUTS = 7 * N_JOINTS + 4
 _N_OUTPUTS = 4 * N_JOINTS

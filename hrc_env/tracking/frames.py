@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hrc_env.records import Keypoints
-from hrc_env.skeleton import N_JOINTS
-from hrc_env.typing import Bools, Floats, Ints, Points2
+from hrc_env.core.records import Keypoints
+from hrc_env.core.skeleton import N_JOINTS
+from hrc_env.core.typing import Bools, Floats, Ints, Points2
 
 SAME_S = 5e-5
 """Times that differ by no more are the same."""

@@ -7,8 +7,8 @@ before it has seen anything.
 
 import numpy as np
 
-from hrc_env.records import PoseEstimate, WorkerTruth
-from hrc_env.skeleton import N_JOINTS
+from hrc_env.core.records import PoseEstimate, WorkerTruth
+from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.tracking.config import TrackerConfig
 
 GIVEN_STD_M = 1e-3

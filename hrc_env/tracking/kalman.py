@@ -15,8 +15,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hrc_env.records import Keypoints, PoseEstimate
-from hrc_env.skeleton import N_JOINTS
+from hrc_env.core.records import Keypoints, PoseEstimate
+from hrc_env.core.skeleton import N_JOINTS
+from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.tracking.ahead import ahead
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.measurements import arrays_of
@@ -28,7 +29,6 @@ from hrc_env.tracking.tracks import blank, forget, gaussian_tracks
 from hrc_env.tracking.tree.bone_lengths import population_edges
 from hrc_env.tracking.tree.filter import predict_all, update_all
 from hrc_env.tracking.tree.reports import estimate_all
-from hrc_env.typing import Bools, Floats, Ints
 
 
 class KalmanState(NamedTuple):

@@ -18,10 +18,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hrc_env.batching import mapped, picked, rows, write_rows
-from hrc_env.errors import check_shape
-from hrc_env.records import Keypoints, PoseEstimate
-from hrc_env.skeleton import N_JOINTS
+from hrc_env.core.batching import mapped, picked, rows, write_rows
+from hrc_env.core.errors import check_shape
+from hrc_env.core.records import Keypoints, PoseEstimate
+from hrc_env.core.skeleton import N_JOINTS
+from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.frames import (
     SAME_S,
@@ -35,7 +36,6 @@ from hrc_env.tracking.frames import (
     shows_anything,
     without,
 )
-from hrc_env.typing import Bools, Floats, Ints
 
 IGNORED = ("no time", "future", "not newer", "too old")
 """Why frames were left out; the last axis of `LateState.ignored`."""

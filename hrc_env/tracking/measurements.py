@@ -7,15 +7,15 @@ there is no measurement; wrong pixels that look like pixels are left to the robu
 
 import numpy as np
 
-from hrc_env.errors import check_shape
+from hrc_env.core.errors import check_shape
+from hrc_env.core.kernels import kernel
+from hrc_env.core.records import Keypoints
+from hrc_env.core.typing import Floats
 from hrc_env.geometry.triangulation import (
     FURTHEST_PX,
     NEAREST_DEPTH_M,
     pixel_of,
 )
-from hrc_env.kernels import kernel
-from hrc_env.records import Keypoints
-from hrc_env.typing import Floats
 
 MIN_SIGMA_PX = 0.25
 """No detector is believed to be better than this [px]."""

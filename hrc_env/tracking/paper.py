@@ -18,9 +18,10 @@ from typing import TypeAlias
 
 import numpy as np
 
-from hrc_env.kernels import kernel
-from hrc_env.records import Keypoints, PoseEstimate
-from hrc_env.skeleton import N_JOINTS
+from hrc_env.core.kernels import kernel
+from hrc_env.core.records import Keypoints, PoseEstimate
+from hrc_env.core.skeleton import N_JOINTS
+from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.tracking.ahead import ahead
 from hrc_env.tracking.clouds.likelihoods import add_log_likelihood, normalise
 from hrc_env.tracking.clouds.moments import moments, roll, scatter
@@ -36,7 +37,6 @@ from hrc_env.tracking.models.acquisition import (
     triangulate_body,
 )
 from hrc_env.tracking.tracks import Tracks, forget, grow_older, make_tracks, report
-from hrc_env.typing import Bools, Floats, Ints
 
 Measured: TypeAlias = tuple[Floats, Floats, Bools]
 """One worker's pixels (J, C, 2), sigma (J, C) and whether there are any (J, C)."""

@@ -14,8 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.records import Keypoints, PoseEstimate
-from hrc_env.skeleton import N_JOINTS
+from hrc_env.core.records import Keypoints, PoseEstimate
+from hrc_env.core.skeleton import N_JOINTS
+from hrc_env.core.typing import Floats, Ints
 from hrc_env.tracking.ahead import ahead, mixed
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.hypotheses.filter import predict_all, update_all
@@ -25,7 +26,6 @@ from hrc_env.tracking.kalman import KalmanEstimator, motion
 from hrc_env.tracking.measurements import arrays_of
 from hrc_env.tracking.models.acquisition import STANDING_M
 from hrc_env.tracking.tracks import blank, gaussian_tracks, report
-from hrc_env.typing import Floats, Ints
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,8 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.records import Keypoints, PoseEstimate
-from hrc_env.skeleton import N_JOINTS
+from hrc_env.core.records import Keypoints, PoseEstimate
+from hrc_env.core.skeleton import N_JOINTS
+from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.tracking.ahead import ahead
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.joints.filter import predict_all, update_all
@@ -26,7 +27,6 @@ from hrc_env.tracking.models.bones import population
 from hrc_env.tracking.models.motion import STANDING_COUNT, damped_joints
 from hrc_env.tracking.settings import Settings, settings_of
 from hrc_env.tracking.tracks import forget, gaussian_tracks, grow_older, report
-from hrc_env.typing import Bools, Floats, Ints
 
 _N_TABLES = 64
 

@@ -23,15 +23,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hrc_env.batching import mapped
-from hrc_env.errors import ConfigError
-from hrc_env.records import Keypoints, PoseEstimate
-from hrc_env.skeleton import N_JOINTS, TORSO
+from hrc_env.core.batching import mapped
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.records import Keypoints, PoseEstimate
+from hrc_env.core.skeleton import N_JOINTS, TORSO
+from hrc_env.core.typing import Bools, Floats
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.kalman import KalmanEstimator, KalmanState, motion
 from hrc_env.tracking.tracks import Tracks, report
 from hrc_env.tracking.tree.gaussian import ORDER, PARENT
-from hrc_env.typing import Bools, Floats
 
 _N = 6 * N_JOINTS
 

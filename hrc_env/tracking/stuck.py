@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hrc_env.kernels import kernel
-from hrc_env.records import Keypoints
-from hrc_env.typing import Floats, Ints
+from hrc_env.core.kernels import kernel
+from hrc_env.core.records import Keypoints
+from hrc_env.core.typing import Floats, Ints
 
 LEAST_NEW = 3
 """So many images in a row must be new before a camera that was stuck is believed again."""

@@ -6,13 +6,13 @@ from typing import Protocol
 
 import numpy as np
 
-from hrc_env.kernels import kernel
-from hrc_env.records import PoseEstimate
-from hrc_env.skeleton import N_JOINTS
+from hrc_env.core.kernels import kernel
+from hrc_env.core.records import PoseEstimate
+from hrc_env.core.skeleton import N_JOINTS
+from hrc_env.core.typing import Bools, Covariances3, Floats, Ints, Points3, Velocities3
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.given import prior
 from hrc_env.tracking.settings import settings_of
-from hrc_env.typing import Bools, Covariances3, Floats, Ints, Points3, Velocities3
 
 _ROUNDING = 1e-6
 """Least eigenvalues may be wrong by no more than this share of the largest."""

@@ -12,21 +12,21 @@ from typing import TypeAlias
 
 import numpy as np
 
+from hrc_env.core.kernels import kernel
+from hrc_env.core.records import Keypoints, PoseEstimate
+from hrc_env.core.skeleton import N_JOINTS
+from hrc_env.core.typing import Floats, Ints, Points2
 from hrc_env.geometry.triangulation import (
     FURTHEST_PX,
     Triangulation,
     triangulate,
     triangulate_robust,
 )
-from hrc_env.kernels import kernel
-from hrc_env.records import Keypoints, PoseEstimate
-from hrc_env.skeleton import N_JOINTS
 from hrc_env.tracking.ahead import ahead
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.measurements import MIN_SIGMA_PX, arrays_of
 from hrc_env.tracking.models.acquisition import STANDING_M, complete_body, keep_one_body
 from hrc_env.tracking.tracks import Tracks, forget, grow_older, make_tracks, report
-from hrc_env.typing import Floats, Ints, Points2
 
 Solve: TypeAlias = Callable[[Floats, Points2, Floats], Triangulation]
 """From P (C, 3, 4), px (B, C, W, J, 2) and sigma (B, C, W, J) to points."""

@@ -4,10 +4,10 @@ import signal
 
 import pytest
 
-from hrc_env import machine
 from hrc_env.cli import check
-from hrc_env.kernels import ahead
-from hrc_env.kernels.signatures import recorded
+from hrc_env.core import machine
+from hrc_env.core.kernels import ahead
+from hrc_env.core.kernels.signatures import recorded
 
 NAMES = ["python", "packages", "torch", "machine", "OpenGL", "triton"]
 NAMES += ["kernels", "weights", "OpenVINO", "environment"]

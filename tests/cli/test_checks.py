@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from hrc_env.cli.checks import at_least, writable_file, writable_folder
-from hrc_env.errors import ConfigError, HRCError
+from hrc_env.core.errors import ConfigError, HRCError
 
 
 def test_a_number_below_the_least_is_named_with_what_would_do():

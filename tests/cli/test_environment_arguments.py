@@ -14,8 +14,8 @@ from hrc_env.cli.environment import EnvironmentArguments, cameras_named, read_co
 from hrc_env.cli.play import Play
 from hrc_env.cli.train import Train
 from hrc_env.config import resolve
+from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCReachEnv
-from hrc_env.errors import ConfigError
 
 OF_RENDER = {"render_mode", "width", "height"}
 """What only `render` reads, which no command calls: films have a form of their own."""

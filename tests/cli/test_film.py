@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from hrc_env.agents_door import agents
 from hrc_env.cli import film
-from hrc_env.errors import RenderingError
+from hrc_env.core.agents_door import agents
+from hrc_env.core.errors import RenderingError
 
 
 def scripted(here):

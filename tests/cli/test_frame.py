@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from hrc_env import pictures
 from hrc_env.cli.frame import LEGEND_HEIGHT, RIGHT_X, TITLE_Y, Diary, compose, legend, strip
 from hrc_env.env import HRCReachEnv
+from hrc_env.render import overlay
 
 
 def colours(image: np.ndarray) -> set[tuple[int, ...]]:
@@ -22,11 +22,11 @@ def a_diary(n_steps: int = 20, **changes) -> Diary:
 def test_the_legend_names_what_a_level_shows():
     at = {level: colours(legend(level)) for level in ("pixels", "keypoints", "truth")}
     for level in at:
-        assert {pictures.LEFT, pictures.RIGHT, pictures.BELIEF, pictures.GOAL} <= at[level]
-    assert pictures.WINDOW in at["pixels"]
-    assert pictures.WINDOW not in at["keypoints"]
-    assert pictures.DETECTED in at["keypoints"]
-    assert pictures.DETECTED not in at["truth"]
+        assert {overlay.LEFT, overlay.RIGHT, overlay.BELIEF, overlay.GOAL} <= at[level]
+    assert overlay.WINDOW in at["pixels"]
+    assert overlay.WINDOW not in at["keypoints"]
+    assert overlay.DETECTED in at["keypoints"]
+    assert overlay.DETECTED not in at["truth"]
 
 
 def test_the_strip_counts_goals_and_marks_steps_that_cost():
@@ -61,5 +61,5 @@ def test_a_frame_is_full_at_levels_without_crops(level):
     for x in (RIGHT_X, RIGHT_X + 404):
         belief = frame[TITLE_Y + 60 : TITLE_Y + 230, x : x + 400]
         assert belief.std() > 3
-        assert pictures.ARM in colours(belief)
+        assert overlay.ARM in colours(belief)
     assert frame[716 - LEGEND_HEIGHT : 716, :300].std() > 10

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from benchmarks import baselines
-from hrc_env.results import Metric
+from hrc_env.core.results import Metric
 
 
 def episode(**changes: float) -> dict[str, float]:

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.experiments.beyond import experiment
 from hrc_env.experiments.beyond.experiment import BeyondConfig, config_for, run
 from hrc_env.experiments.beyond.metrics import metrics_of
@@ -18,7 +19,6 @@ from hrc_env.experiments.beyond.trial.play import DT_S, N_WARM_UP, eyes_of, play
 from hrc_env.experiments.beyond.trial.setting import Setting, left_of
 from hrc_env.experiments.beyond.trial.truth import matched
 from hrc_env.experiments.beyond.trial.walks import walks_of
-from hrc_env.skeleton import N_JOINTS
 from hrc_env.tracking.tree.gaussian import PARENT, ROOT
 
 TINY = BeyondConfig(n_seeds=1, seconds=1.24, n_timed=2)

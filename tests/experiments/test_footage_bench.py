@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 from footage_stored import calibration
 
-from hrc_env.errors import ConfigError, DownloadError
+from hrc_env.core.errors import ConfigError, DownloadError
+from hrc_env.core.records import Roi
+from hrc_env.core.results import Metric
 from hrc_env.experiments.footage import detections, fetch
 from hrc_env.experiments.footage.bench import markdown
 from hrc_env.experiments.footage.calibration import read_calibration
@@ -18,8 +20,6 @@ from hrc_env.experiments.footage.film import film_track
 from hrc_env.experiments.footage.metrics import NAMES, Track
 from hrc_env.perception.eyes import Sight
 from hrc_env.perception.films import Films
-from hrc_env.records import CropWindow
-from hrc_env.results import Metric
 
 N_FRAMES = 12
 
@@ -107,7 +107,7 @@ def test_films_are_read_side_by_side_and_can_begin_late(films):
     first, second = (frame[100:200, 50:100].mean((0, 1)) for frame in source.frames)
     assert np.allclose(first, 20, atol=6)
     assert np.allclose(second, [110, 50, 50], atol=12)  # 3 frames on, and in RGB
-    crop = source.crop(0, CropWindow((80.0, 160.0), 100.0, 0.3))
+    crop = source.crop(0, Roi((80.0, 160.0), 100.0, 0.3))
     assert crop.shape == (256, 256, 3)
     for _ in range(N_FRAMES - 4):
         assert source.advance()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from footage_stored import AT_FRONT, calibration
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
 from hrc_env.experiments.footage.calibration import (
     meeting_point,
     read_calibration,

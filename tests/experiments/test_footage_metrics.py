@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from footage_stored import SIGMA_PX, recording
 
+from hrc_env.core.skeleton import MIRROR
 from hrc_env.experiments.footage.lag import lag_of
 from hrc_env.experiments.footage.metrics import (
     Track,
@@ -14,7 +15,6 @@ from hrc_env.experiments.footage.metrics import (
     jerk,
     two_camera_share,
 )
-from hrc_env.skeleton import MIRROR
 
 
 def test_cameras_that_are_out_of_step_are_found_out():

@@ -6,7 +6,7 @@ import imageio.v2 as imageio
 import numpy as np
 import pytest
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
 from hrc_env.experiments.gallery import motions
 from hrc_env.experiments.gallery.gallery import GalleryConfig, run
 from hrc_env.experiments.gallery.motions import FRAMES, STAGED, moments, stage_of

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hrc_env.errors import ConfigError, HRCError
+from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.experiments.impact import experiment, tax
 from hrc_env.experiments.impact.experiment import ImpactConfig, config_for, run
 from hrc_env.experiments.impact.report import write_pages

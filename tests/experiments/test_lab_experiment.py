@@ -5,12 +5,12 @@ import json
 import numpy as np
 import pytest
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.skeleton import JOINT
 from hrc_env.experiments.lab import experiment
 from hrc_env.experiments.lab.experiment import LabConfig, config_for, laboratory, run
 from hrc_env.experiments.lab.motions import MOTIONS, play
 from hrc_env.experiments.lab.sides import LEFT, RIGHT, turned_away
-from hrc_env.skeleton import JOINT
 
 TINY = LabConfig(n_seeds=1, max_frames=26)
 CAMERAS = (*(f"camera_{k}" for k in range(1, 5)), "multi")

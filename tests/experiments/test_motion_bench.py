@@ -5,7 +5,7 @@ import math
 
 import pytest
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
 from hrc_env.experiments.motion import bench
 from hrc_env.experiments.motion.report import inside
 from hrc_env.experiments.motion.targets import TARGETS, targets_of

@@ -6,7 +6,8 @@ import math
 import numpy as np
 import pytest
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.results import Metric
 from hrc_env.experiments.perception import bench, sheet, speed
 from hrc_env.experiments.perception.families import FAMILIES, FAMILY_OF
 from hrc_env.experiments.perception.loops import Episode, episode_of, rotated, some_steps
@@ -15,7 +16,6 @@ from hrc_env.experiments.perception.report import markdown
 from hrc_env.experiments.perception.settings import PerceptionBenchConfig
 from hrc_env.experiments.perception.views import View, rows_of
 from hrc_env.motion.generator import activity_names
-from hrc_env.results import Metric
 
 TINY = PerceptionBenchConfig(
     episodes=(("lab", 1),), n_steps=4, n_faults=1, fault_steps=3, n_emulated=1, kinds=("lost",),

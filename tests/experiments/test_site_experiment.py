@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
 from hrc_env.experiments.site import experiment
 from hrc_env.experiments.site.experiment import SiteConfig, config_for, run
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from hrc_env.errors import ConfigError, HRCError
+from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.experiments.speed import bench, organs
 from hrc_env.experiments.speed.contenders import OURS, Pace, Single, Vector
 from hrc_env.experiments.speed.measured import REST, TOTAL

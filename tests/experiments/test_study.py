@@ -5,12 +5,12 @@ import os
 import numpy as np
 import pytest
 
-from hrc_env.errors import ConfigError, HRCError
+from hrc_env.core.errors import ConfigError, HRCError
+from hrc_env.core.results import Metric, write_results, write_whole
 from hrc_env.experiments.study import intervals
 from hrc_env.experiments.study.folder import claim, owner_of
 from hrc_env.experiments.study.page import Picture, Section, Table, said, write_report
 from hrc_env.experiments.study.shelf import Shelf
-from hrc_env.results import Metric, write_results, write_whole
 
 
 def silent(share, label):

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
 from hrc_env.experiments.study.shelf import fingerprint_of
 from hrc_env.experiments.tracking import bench as tracking_bench
 from hrc_env.experiments.tracking import sequences

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.experiments.tracking.bound import (
     joint_blocks,
     posterior_bound,
@@ -25,7 +26,6 @@ from hrc_env.experiments.tracking.matched import (
 )
 from hrc_env.experiments.tracking.rigs import make_rig
 from hrc_env.experiments.tracking.sequences import make_sequences
-from hrc_env.skeleton import N_JOINTS
 
 MODEL = matched_model(0.5, 0.05, 16)
 BONELESS = matched_model(0.5, 0.05, 0)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from hrc_env.core.skeleton import JOINT, TORSO
 from hrc_env.experiments.tracking.arrivals import delivered, in_time
 from hrc_env.experiments.tracking.cells import run_cell
 from hrc_env.experiments.tracking.couples import couples, detect_couples, identities
@@ -13,7 +14,6 @@ from hrc_env.experiments.tracking.own import make_own_rig
 from hrc_env.experiments.tracking.rigs import RIGS, make_rig
 from hrc_env.experiments.tracking.sequences import make_sequences
 from hrc_env.experiments.tracking.walks import walk
-from hrc_env.skeleton import JOINT, TORSO
 
 LIMBS = ("shoulder elbow", "elbow wrist", "hip knee", "knee ankle", "ankle foot")
 LAB = make_rig("lab")

@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks import unchanged
 from benchmarks.trajectory import differences
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
 
 OLD = {"cost": [None, 1.0], "worker/activity": [["idle"], ["saw"]], "gone": [1.0, 2.0]}
 NAMES = {"renamed": {"cost": "safety/cost"}, "words": {"saw": "sawing"}, "gone": {"gone": "why"}}

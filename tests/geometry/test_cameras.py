@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
 from hrc_env.geometry.cameras import inside_image, pinhole, project, projections, rays
 from hrc_env.geometry.rotations import about_axis
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
 from hrc_env.geometry import chains
 from hrc_env.scene.arm import arm_chain
 from hrc_env.scene.build import build

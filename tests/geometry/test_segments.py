@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from hrc_env.core.skeleton import HAND_SEGMENTS, JOINT, SEGMENT_ENDS, SEGMENT_RADIUS_M
 from hrc_env.geometry.segments import segments
-from hrc_env.skeleton import HAND_SEGMENTS, JOINT, SEGMENT_ENDS, SEGMENT_RADIUS_M
 
 JOINTS_WORLD = np.random.default_rng(0).normal(size=(4, 2, 15, 3))
 

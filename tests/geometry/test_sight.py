@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
 from hrc_env.geometry.shapes import BOX, CAPSULE, CYLINDER, PLANE, WIDTH, absent, shape
 from hrc_env.geometry.sight import Surroundings, hidden, nothing
 

@@ -4,11 +4,11 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from hrc_env.body import load_body
 from hrc_env.motion import generator
 from hrc_env.motion import plans as pl
 from hrc_env.motion.posture import STANCE_HALF_WIDTH_M
 from hrc_env.motion.walk import footprint, plan_walk
+from hrc_env.worker.body import load_body
 
 DT_S = 0.02
 

@@ -6,7 +6,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from hrc_env.body import SEGMENT, load_body, worker_names
 from hrc_env.experiments.motion.gait import knee_flexion_deg
 from hrc_env.experiments.motion.statistics import (
     ANKLES,
@@ -21,7 +20,8 @@ from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.repertoire import REPERTOIRE, perform
 from hrc_env.motion.solo import alone
-from hrc_env.props import PROP_NAMES, PROPS
+from hrc_env.worker.body import SEGMENT, load_body, worker_names
+from hrc_env.worker.props import PROP_NAMES, PROPS
 
 DT_S = 0.01
 STATURES_M = (1.55, 1.75, 1.92)

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from recorded import started
 
-from hrc_env.body import load_body
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
 from hrc_env.motion import generator
 from hrc_env.motion import plans as pl
 from hrc_env.motion import state as st
 from hrc_env.motion.errands import TASKS, Task, errands_at, picked
 from hrc_env.motion.traffic import APART_M
+from hrc_env.worker.body import load_body
 
 NO_REACTIONS = generator.people_called("unaware")
 

@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from recorded import started, watched
 
-from hrc_env.body import PARENT, SEGMENT, SEGMENTS, load_body, worker_truth
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.records import WorkerMotion
 from hrc_env.geometry.rotations import matrix_from_quaternion
 from hrc_env.motion import anatomy, generator
-from hrc_env.records import WorkerMotion
+from hrc_env.worker.body import PARENT, SEGMENT, SEGMENTS, load_body, worker_truth
 
 HANDS = [SEGMENT["left_hand"], SEGMENT["right_hand"]]
 BASE = np.array(generator.OPEN_FLOOR.robot_xy_m)

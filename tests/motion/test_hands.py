@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from recorded import started, watched
 
-from hrc_env.batching import one
-from hrc_env.body import SEGMENT
+from hrc_env.core.batching import one
 from hrc_env.motion import controls as c
 from hrc_env.motion import generator
 from hrc_env.motion import plans as pl
@@ -15,6 +14,7 @@ from hrc_env.motion.anatomy import GRIP_M
 from hrc_env.motion.feet import foot
 from hrc_env.motion.hands import plan_lift, plan_reach
 from hrc_env.motion.kinematics import N_FRAMES, N_POINTS
+from hrc_env.worker.body import SEGMENT
 
 STATE, RNGS = started(1, config=generator.MotionConfig(near_probability=1.0))
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from recorded import started, watched
 
-from hrc_env.body import SEGMENT
 from hrc_env.motion import plans as pl
 from hrc_env.motion.paths import along, facing, lay_path
 from hrc_env.motion.posture import STANCE_HALF_WIDTH_M
 from hrc_env.motion.walk import brake, footprint, plan_walk
+from hrc_env.worker.body import SEGMENT
 
 CORNERS = np.array([[2.0, 0.0, 0.6], [2.0, 2.0, 0.6], [4.0, 2.0, 0.3]])
 END = (4.0, 4.0)

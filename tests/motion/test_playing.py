@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from recorded import joined, started, walk_straight, watched
 
-from hrc_env.batching import one
-from hrc_env.body import SEGMENT, load_body, worker_truth
 from hrc_env.config import resolve, with_motions
-from hrc_env.errors import ConfigError
+from hrc_env.core.batching import one
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.records import WorkerMotion
+from hrc_env.core.skeleton import JOINTS
 from hrc_env.motion import controls as c
 from hrc_env.motion import generator
 from hrc_env.motion import plans as pl
@@ -19,8 +20,7 @@ from hrc_env.motion.capture.record import Capture
 from hrc_env.motion.capture.retarget import retarget
 from hrc_env.motion.capture.segments import segments_in
 from hrc_env.motion.playing import LONGEST_S, stocked
-from hrc_env.records import WorkerMotion
-from hrc_env.skeleton import JOINTS
+from hrc_env.worker.body import SEGMENT, load_body, worker_truth
 
 BODY = load_body()
 FPS = 50.0

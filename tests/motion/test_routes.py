@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.records import Grounds, Workplace
 from hrc_env.motion import plans as pl
 from hrc_env.motion.floorplan import BODY_M, floorplan, room_for, slack_at
 from hrc_env.motion.paths import along
 from hrc_env.motion.routes import route
-from hrc_env.records import Grounds, Workplace
 
 WALL = (2.0, 0.0, 0.1, 1.5, 0.0)
 """Across the straight way from (0, 0) to (4, 0)."""

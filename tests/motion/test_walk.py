@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from recorded import walk_straight
 
-from hrc_env.body import SEGMENT
 from hrc_env.motion import plans as pl
+from hrc_env.worker.body import SEGMENT
 
 SPEEDS = (0.8, 1.0, 1.2, 1.4)
 

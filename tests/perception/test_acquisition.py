@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from hrc_env.core.records import Roi
 from hrc_env.geometry.cameras import pinhole, project, projections
 from hrc_env.perception.acquisition import agreed_windows, apart_from
-from hrc_env.records import CropWindow
 
 CAMERAS = tuple(
     pinhole(f"camera_{k}", np.array([x, y, 2.45]), np.array([0.2, 0, 1.0]), 90, 1920, 1080)
@@ -18,7 +18,7 @@ def seen(*people, side_m=2.3):
     px, depth_m = project(projections(CAMERAS), np.array([people]))
     return [
         [
-            CropWindow((u, v), side_m * camera.K[0, 0] / far_m, 0.0)
+            Roi((u, v), side_m * camera.K[0, 0] / far_m, 0.0)
             for (u, v), far_m in zip(places, depths, strict=True)
         ]
         for camera, places, depths in zip(CAMERAS, px[0], depth_m[0], strict=True)
@@ -32,7 +32,7 @@ def test_one_person_is_found_by_all_cameras():
 
 def test_a_mistake_of_one_camera_is_left_out():
     candidates = seen(ANNA)
-    candidates[1] = [CropWindow((100.0, 200.0), 400.0, 0.0)]
+    candidates[1] = [Roi((100.0, 200.0), 400.0, 0.0)]
     windows = agreed_windows(candidates, CAMERAS)
     assert windows[1] is None
     assert windows[0] == candidates[0][0]
@@ -60,7 +60,7 @@ def test_a_camera_that_is_alone_is_believed_and_one_of_several_is_not():
 
 
 def test_a_contradiction_is_nobody():
-    contradiction = [seen(ANNA)[0], [CropWindow((100.0, 200.0), 400.0, 0.0)], [], []]
+    contradiction = [seen(ANNA)[0], [Roi((100.0, 200.0), 400.0, 0.0)], [], []]
     assert agreed_windows(contradiction, CAMERAS) == [None] * 4
 
 

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from stored import PICTURES
 
+from hrc_env.core.records import Roi
 from hrc_env.perception import blazepose as bp
 from hrc_env.perception.network import load_detector, load_landmarker
-from hrc_env.records import CropWindow
 
 coordinates = st.floats(-500, 500)
 angles = st.floats(-math.pi, math.pi)
@@ -88,7 +88,7 @@ def test_the_rim_lies_straight_above_the_middle_of_its_window(x, y, radius, angl
 @given(angles)
 def test_turning_the_window_turns_the_crop_back(angle):
     """A dot at a place of the window appears at that place of the crop, however it is turned."""
-    window = CropWindow((150.0, 140.0), 160.0, angle)
+    window = Roi((150.0, 140.0), 160.0, angle)
     place = np.array([0.7, 0.35])
     x, y = bp.to_image(place, window)
     rows, columns = np.mgrid[:300, :300] + 0.0

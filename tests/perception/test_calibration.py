@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hrc_env.config import resolve
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
 from hrc_env.perception.calibration import (
     PACKAGED,
     SHAPES,

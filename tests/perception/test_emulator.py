@@ -9,7 +9,8 @@ import pytest
 from people import truth
 from scipy.stats import multivariate_normal, norm
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.skeleton import JOINT, MIRROR, N_JOINTS
 from hrc_env.geometry.cameras import pinhole, project, projections
 from hrc_env.geometry.sight import Surroundings, nothing
 from hrc_env.perception.calibration import KINDS, SHAPES, read_calibration, write_calibration
@@ -21,7 +22,6 @@ from hrc_env.perception.emulator import (
     reset,
 )
 from hrc_env.perception.sightlines import HIDDEN, SEEN, SIDE
-from hrc_env.skeleton import JOINT, MIRROR, N_JOINTS
 
 DT = 0.04
 CONFIG = EmulatorConfig()

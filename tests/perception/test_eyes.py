@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 from stored import Stills, hung_in_a_room
 
-from hrc_env.errors import ConfigError, WeightsError
+from hrc_env.core.errors import ConfigError, WeightsError
+from hrc_env.core.records import Roi
+from hrc_env.core.skeleton import BLAZEPOSE_INDEX
 from hrc_env.geometry.cameras import pinhole
 from hrc_env.perception import eyes as eyes_module
 from hrc_env.perception.eyes import Eyes, EyesConfig
 from hrc_env.perception.network import load_landmarker
 from hrc_env.perception.searching import search_windows
-from hrc_env.records import CropWindow
-from hrc_env.skeleton import BLAZEPOSE_INDEX
 
 NAMES = ["stand.png", "walk.png", "reach.png", "robot_in_front.png"]
-WINDOW = CropWindow((118.0, 138.0), 220.0, 0.0)
+WINDOW = Roi((118.0, 138.0), 220.0, 0.0)
 
 
 def camera(width_px=256, height_px=256):
@@ -171,7 +171,7 @@ def test_the_detector_stage_is_asked_of_a_new_track_and_then_in_turns(four, monk
 
 def test_somebody_far_from_the_middle_of_the_window_is_somebody_else(weights, pictures):
     eyes = new_eyes(1)
-    aside = CropWindow((0.0, 138.0), 240.0, 0.0)
+    aside = Roi((0.0, 138.0), 240.0, 0.0)
     assert np.isnan(eyes.look(Stills([pictures["stand.png"]]), [aside]).px).all()
     eyes.close()
 

@@ -6,6 +6,8 @@ import mujoco
 import numpy as np
 import pytest
 
+from hrc_env.core.records import Keypoints, Roi
+from hrc_env.geometry.camera_config import made
 from hrc_env.geometry.cameras import (
     image_from_pinhole,
     pinhole_from_image,
@@ -14,12 +16,10 @@ from hrc_env.geometry.cameras import (
     projections,
     rays,
 )
-from hrc_env.optics.camera import made
-from hrc_env.optics.lens import Lens
+from hrc_env.geometry.lens import Lens
 from hrc_env.perception import lensed
 from hrc_env.perception.blazepose import to_image
 from hrc_env.perception.lensed import Lensed, pinhole_keypoints
-from hrc_env.records import CropWindow, Keypoints
 from hrc_env.scene.build import SceneConfig, build
 from hrc_env.scene.primitives import SOLID
 from hrc_env.scene.render import CropRenderer
@@ -43,7 +43,7 @@ def pattern():
     return spec.compile()
 
 
-def found_px(crop: np.ndarray, window: CropWindow) -> np.ndarray:
+def found_px(crop: np.ndarray, window: Roi) -> np.ndarray:
     """Image pixels of the middle of what is bright in a crop."""
     weight = crop.max(-1).astype(float)
     rows, columns = np.indices(weight.shape) + 0.5
@@ -64,9 +64,9 @@ def test_a_pattern_through_the_lens_and_back_is_the_pinholes(
     images = Lensed(renderer, scene.cameras)
     for ball in BALLS:
         px = project(projections((camera,)), ball[None])[0][0, 0]
-        straight = CropWindow(tuple(px + SHIFT_PX), 90.0, rotation_rad)
+        straight = Roi(tuple(px + SHIFT_PX), 90.0, rotation_rad)
         by_pinhole = found_px(renderer.view(camera, straight), straight)
-        bent = CropWindow(tuple(image_from_pinhole(camera, px) - SHIFT_PX), 80.0, rotation_rad)
+        bent = Roi(tuple(image_from_pinhole(camera, px) - SHIFT_PX), 80.0, rotation_rad)
         by_lens = pinhole_from_image(camera, found_px(images.view(camera, bent), bent))
         assert np.abs(by_lens - by_pinhole).max() < 0.3
     renderer.close()
@@ -87,7 +87,7 @@ class Plain:
 @pytest.mark.parametrize("config", [GOPRO, BROWN], ids=lambda config: config.name)
 def test_every_pixel_shows_the_light_that_the_lens_brings_there(config):
     (camera,) = pinholes((config,))
-    window = CropWindow((700.0, 500.0), 620.0, 0.4)
+    window = Roi((700.0, 500.0), 620.0, 0.4)
     crop = Lensed(Plain(), (camera,)).crop(0, window)
     middles = (np.arange(64) + 0.5) / 64
     light = rays(camera, to_image(np.stack(np.meshgrid(middles, middles), -1), window))
@@ -96,20 +96,20 @@ def test_every_pixel_shows_the_light_that_the_lens_brings_there(config):
 
 def test_outside_the_image_it_is_black():
     (camera,) = pinholes((GOPRO,))
-    crop = Lensed(Plain(), (camera,)).crop(0, CropWindow((0.0, 540.0), 400.0, 0.0))
+    crop = Lensed(Plain(), (camera,)).crop(0, Roi((0.0, 540.0), 400.0, 0.0))
     assert (crop[:, :31] == 0).all()
     assert (crop[:, 33:] > 0).any()
 
 
 def test_where_the_lens_shows_nothing_it_is_black():
     (camera,) = pinholes((GOPRO,))
-    crop = Lensed(Plain(), (camera,)).crop(0, CropWindow((5000.0, 540.0), 400.0, 0.0))
+    crop = Lensed(Plain(), (camera,)).crop(0, Roi((5000.0, 540.0), 400.0, 0.0))
     assert not crop.any()
 
 
 def test_a_camera_without_lens_is_the_renderers_own():
     (camera,) = pinholes(LAB_CAMERAS[:1])
-    window = CropWindow((900.0, 500.0), 300.0, 0.3)
+    window = Roi((900.0, 500.0), 300.0, 0.3)
     np.testing.assert_array_equal(
         Lensed(Plain(), (camera,)).crop(0, window), Plain().view(camera, window)
     )
@@ -119,7 +119,7 @@ def test_maps_are_kept_and_not_without_end():
     (camera,) = pinholes((GOPRO,))
     images = Lensed(Plain(), (camera,))
     for k in range(3 * lensed.MAPS_KEPT):
-        images.crop(0, CropWindow((700.0 + k, 500.0), 300.0, 0.0))
+        images.crop(0, Roi((700.0 + k, 500.0), 300.0, 0.0))
     assert len(images._covers) == lensed.MAPS_KEPT
 
 

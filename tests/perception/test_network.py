@@ -2,12 +2,12 @@
 
 import numpy as np
 
+from hrc_env.core.records import Roi
 from hrc_env.perception import litert
 from hrc_env.perception.blazepose import detector_input, landmark_input, sample_window
 from hrc_env.perception.network import LANDMARK_OUTPUTS, load_detector, load_landmarker
-from hrc_env.records import CropWindow
 
-MIDDLE = CropWindow((118.0, 138.0), 220.0, 0.1)
+MIDDLE = Roi((118.0, 138.0), 220.0, 0.1)
 
 
 def test_the_pruned_network_gives_the_bits_of_the_whole_one(weights, pictures):

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from hrc_env.core.skeleton import JOINT, N_JOINTS
 from hrc_env.perception.noise import ERROR, VISIBILITY, error_share, sigma_px
-from hrc_env.skeleton import JOINT, N_JOINTS
 
 
 def test_more_visible_joints_are_surer_and_larger_people_cost_more_pixels():

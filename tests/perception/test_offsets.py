@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from people import truth
 
+from hrc_env.core.records import PoseEstimate
+from hrc_env.core.skeleton import JOINT, N_JOINTS
 from hrc_env.perception.calibration import HAND, KIND, POSTURES
 from hrc_env.perception.offsets import OFFSET_M, our_joints
-from hrc_env.records import PoseEstimate
-from hrc_env.skeleton import JOINT, N_JOINTS
 
 
 def turned(joints, yaw_rad):

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from people import STANDING
 
+from hrc_env.core.skeleton import JOINT
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.perception.calibration import POSTURES
 from hrc_env.perception.outline import posture_of
 from hrc_env.perception.posture import is_folded
-from hrc_env.skeleton import JOINT
 
 ONLY = np.eye(len(POSTURES))
 UPPER = [JOINT["nose"]] + [

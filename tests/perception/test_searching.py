@@ -3,19 +3,19 @@
 import numpy as np
 import pytest
 
-from hrc_env.batching import one
-from hrc_env.body import load_body, worker_truth
+from hrc_env.core.batching import one
+from hrc_env.core.records import Roi
+from hrc_env.core.skeleton import JOINT
 from hrc_env.geometry.cameras import project, projections
 from hrc_env.motion import generator
 from hrc_env.perception.eyes import Eyes
 from hrc_env.perception.lensed import Lensed
 from hrc_env.perception.searching import changed
-from hrc_env.records import CropWindow
 from hrc_env.scene.build import build
 from hrc_env.scene.render import CropRenderer
-from hrc_env.skeleton import JOINT
+from hrc_env.worker.body import load_body, worker_truth
 
-WINDOW = CropWindow((640.0, 360.0), 512.0, 0.0)
+WINDOW = Roi((640.0, 360.0), 512.0, 0.0)
 HIPS = [JOINT["left_hip"], JOINT["right_hip"]]
 
 

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from stored import Stills
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.records import Roi
 from hrc_env.geometry.cameras import pinhole
 from hrc_env.perception import vino
 from hrc_env.perception.blazepose import decode_landmarks, landmark_input, sample_window
 from hrc_env.perception.eyes import Eyes, EyesConfig
 from hrc_env.perception.network import LANDMARK_OUTPUTS, chosen_runtime, load_landmarker
-from hrc_env.records import CropWindow
 
-MIDDLE = CropWindow((118.0, 138.0), 220.0, 0.1)
+MIDDLE = Roi((118.0, 138.0), 220.0, 0.1)
 needs_openvino = pytest.mark.skipif(
     not vino.installed(), reason=f"OpenVINO, an extra, is not installed: {vino.INSTALL}"
 )

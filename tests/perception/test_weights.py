@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import pytest
 
-from hrc_env.errors import ConfigError, WeightsError
+from hrc_env.core.errors import ConfigError, WeightsError
 from hrc_env.perception import weights as w
 
 SETUP = "python -m hrc_env setup"

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from people import STANDING
 
+from hrc_env.core.records import Roi
+from hrc_env.core.skeleton import BLAZEPOSE_INDEX
 from hrc_env.geometry.cameras import pinhole, project, projections
 from hrc_env.perception.blazepose import wrap_angle
 from hrc_env.perception.windows import steady_window, window_from_joints
-from hrc_env.records import CropWindow
-from hrc_env.skeleton import BLAZEPOSE_INDEX
 
 CAMERA = pinhole("camera", np.array([4.0, 0, 1.0]), np.array([0, 0, 1.0]), 60, 1920, 1080)
 
@@ -83,13 +83,13 @@ def test_joints_of_a_picture_give_about_the_region_that_the_network_uses(referen
 
 
 def test_a_window_stays_until_the_wanted_one_has_moved_away():
-    kept = CropWindow((500.0, 400.0), 300.0, 0.1)
-    near = CropWindow((520.0, 410.0), 330.0, -0.05)
+    kept = Roi((500.0, 400.0), 300.0, 0.1)
+    near = Roi((520.0, 410.0), 330.0, -0.05)
     assert steady_window(kept, near) is kept
     for wanted in (
-        CropWindow((535.0, 400.0), 300.0, 0.1),
-        CropWindow((500.0, 400.0), 360.0, 0.1),
-        CropWindow((500.0, 400.0), 300.0, 0.31),
+        Roi((535.0, 400.0), 300.0, 0.1),
+        Roi((500.0, 400.0), 360.0, 0.1),
+        Roi((500.0, 400.0), 300.0, 0.31),
     ):
         assert steady_window(kept, wanted) is wanted
     assert steady_window(None, near) is near

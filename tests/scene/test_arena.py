@@ -6,11 +6,11 @@ import mujoco
 import numpy as np
 import pytest
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
 from hrc_env.geometry.sight import hidden
-from hrc_env.props import PROPS
 from hrc_env.scene.build import SceneConfig, build, drawing_model
 from hrc_env.scene.primitives import DECORATION, OVERHEAD, ROBOT_LOOKS, SOLID
+from hrc_env.worker.props import PROPS
 
 
 def test_an_unknown_scene_is_told_the_valid_ones():

@@ -7,12 +7,12 @@ import mujoco
 import numpy as np
 import pytest
 
+from hrc_env.core.records import Held
 from hrc_env.geometry.shapes import AXES, BOX, CENTRE, HALF_SIZE, KIND
-from hrc_env.props import PROP_NAMES, PROPS, prop_index
-from hrc_env.records import Held
 from hrc_env.scene.build import build, drawing_model, drawn_props
 from hrc_env.scene.primitives import DECORATION
 from hrc_env.scene.props import PARKED_M, pose_props
+from hrc_env.worker.props import PROP_NAMES, PROPS, prop_index
 
 SCENE = build(n_workers=2)
 

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from hrc_env.errors import RenderingError
+from hrc_env.core.errors import RenderingError
 from hrc_env.scene import gl
 from hrc_env.scene.build import build
 from hrc_env.scene.viewer import Viewer
@@ -32,7 +32,7 @@ NEEDS = {"torch": "torch", "optimiser": "torch", "openvino": "openvino", "triton
 STATUS = "from hrc_env.scene import gl; print(gl.gl_status())"
 TRUTH = """
 import gymnasium, hrc_env
-from hrc_env.errors import RenderingError
+from hrc_env.core.errors import RenderingError
 env = gymnasium.make("HRCReach-v0", perception="truth", render_mode="rgb_array")
 env.reset(seed=0)
 env.step(env.action_space.sample())

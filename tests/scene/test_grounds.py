@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from hrc_env.core.records import WORKPLACE_KINDS
 from hrc_env.motion.generator import OPEN_FLOOR
-from hrc_env.records import WORKPLACE_KINDS
 from hrc_env.scene.build import SCENES, SceneConfig, build
 from hrc_env.scene.grounds import footprints
 

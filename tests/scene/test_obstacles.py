@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from hrc_env.errors import HRCError
+from hrc_env.core.errors import HRCError
 from hrc_env.geometry.chains import capsules
 from hrc_env.geometry.shapes import WIDTH
 from hrc_env.geometry.sight import NEAR_POINT_M, Surroundings, hidden

@@ -5,11 +5,11 @@ import pickle
 import numpy as np
 import pytest
 
-from hrc_env.body import load_body, rest_motion
-from hrc_env.errors import ConfigError, HRCError
-from hrc_env.records import WorkerPath
+from hrc_env.core.errors import ConfigError, HRCError
+from hrc_env.core.records import WorkerPath
 from hrc_env.scene.build import build
 from hrc_env.scene.physics import Physics, no_workers
+from hrc_env.worker.body import load_body, rest_motion
 
 LAB = build()
 T = 5

@@ -8,16 +8,16 @@ import mujoco
 import numpy as np
 import pytest
 
-from hrc_env.batching import mapped
-from hrc_env.body import load_body, rest_motion
-from hrc_env.errors import ConfigError, RenderingError
+from hrc_env.core.batching import mapped
+from hrc_env.core.errors import ConfigError, RenderingError
+from hrc_env.core.records import Roi, WorkerMotion
 from hrc_env.geometry.cameras import project, projections, rays
-from hrc_env.records import CropWindow, WorkerMotion
 from hrc_env.scene import build as building
 from hrc_env.scene import gl
 from hrc_env.scene.build import SceneConfig, build
 from hrc_env.scene.canvas import Canvas
 from hrc_env.scene.render import CROP_QUALITY, CropRenderer, PictureRenderer
+from hrc_env.worker.body import load_body, rest_motion
 
 BALLS = np.array([[0.6, 0.2, 1.2], [0.1, -0.5, 1.6], [1.4, 0.9, 0.7]])
 
@@ -41,7 +41,7 @@ def centroid(image: np.ndarray) -> np.ndarray:
     return np.array([columns.mean() + 0.5, rows.mean() + 0.5])
 
 
-def crop_px(window: CropWindow, px: np.ndarray) -> np.ndarray:
+def crop_px(window: Roi, px: np.ndarray) -> np.ndarray:
     """Full-image pixels to pixels of the 256 px crop."""
     c, s = np.cos(window.rotation_rad), np.sin(window.rotation_rad)
     d = (px - np.array(window.centre_px)) / window.side_px * 256
@@ -66,7 +66,7 @@ def test_a_rendered_ball_is_where_the_camera_projects_it(
         mujoco.mj_forward(canvas._model, canvas._data)
         canvas._fresh.clear()
         px = project(projections((camera,)), ball[None])[0][0, 0]
-        window = CropWindow(tuple(px + shift), side_px, rotation_rad)
+        window = Roi(tuple(px + shift), side_px, rotation_rad)
         canvas.show()
         canvas.aim(camera, window, side_px)
         error = centroid(canvas.paint()) - crop_px(window, px)
@@ -93,7 +93,7 @@ def crops(lab):
     renderer.close()
 
 
-WINDOW = CropWindow((900.0, 560.0), 500.0, 0.1)
+WINDOW = Roi((900.0, 560.0), 500.0, 0.1)
 
 
 def test_a_crop_is_a_picture_of_the_asked_size_and_not_empty(lab, person, crops):
@@ -146,8 +146,8 @@ def test_a_kept_background_changes_no_pixel(place, person):
     fresh, keeping = CropRenderer(scene), CropRenderer(scene)
     windows = [
         WINDOW,
-        CropWindow((1700.0, 800.0), 620.0, -0.7),
-        CropWindow((700.0, 300.0), 300.0, 2.0),
+        Roi((1700.0, 800.0), 620.0, -0.7),
+        Roi((700.0, 300.0), 300.0, 2.0),
     ]
     for look, turn in enumerate(np.linspace(0.0, 1.1, 12)):
         shift = np.array([-turn, 0.4 * turn, 0.0])
@@ -175,8 +175,8 @@ def test_a_renderer_survives_pickling(lab, person, crops):
 
 def test_a_turned_window_shows_the_picture_turned(lab, person, crops):
     crops.draw(lab.home_q, person)
-    upright = crops.crop(2, CropWindow((900.0, 560.0), 500.0, 0.0)).astype(int)
-    turned = crops.crop(2, CropWindow((900.0, 560.0), 500.0, np.pi / 2)).astype(int)
+    upright = crops.crop(2, Roi((900.0, 560.0), 500.0, 0.0)).astype(int)
+    turned = crops.crop(2, Roi((900.0, 560.0), 500.0, np.pi / 2)).astype(int)
     # A window turned clockwise shows its content turned anticlockwise.
     difference = np.abs(np.rot90(upright) - turned).max(-1)
     assert np.median(difference) <= 1

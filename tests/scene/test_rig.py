@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
 from hrc_env.scene.build import build, drawing_model
 from hrc_env.scene.rig import LAB_CAMERAS, CameraConfig, glcam_axes, pinholes, select
 

@@ -3,7 +3,7 @@
 import mujoco
 import pytest
 
-from hrc_env.errors import RenderingError
+from hrc_env.core.errors import RenderingError
 from hrc_env.scene.build import build
 from hrc_env.scene.viewer import Viewer, viewing_model
 

@@ -4,12 +4,12 @@ import mujoco
 import numpy as np
 import pytest
 
-from hrc_env.body import SEGMENT, SEGMENTS, load_body, rest_motion, worker_truth
-from hrc_env.errors import ConfigError
-from hrc_env.looks import load_looks
-from hrc_env.records import WorkerMotion
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.records import WorkerMotion
 from hrc_env.scene.wardrobe import dress
 from hrc_env.scene.worker import add_worker, capsule_geom_ids, mocap_ids
+from hrc_env.worker.body import SEGMENT, SEGMENTS, load_body, rest_motion, worker_truth
+from hrc_env.worker.mesh import load_looks
 
 PREFIX = "worker_1/"
 

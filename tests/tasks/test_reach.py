@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
 from hrc_env.tasks import reach
 
 CONFIG = reach.ReachConfig()

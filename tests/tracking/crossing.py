@@ -3,9 +3,9 @@
 import numpy as np
 from simulated import DT, LAB, _bursts, walk
 
+from hrc_env.core.records import Keypoints
+from hrc_env.core.skeleton import MIRROR
 from hrc_env.geometry.cameras import project
-from hrc_env.records import Keypoints
-from hrc_env.skeleton import MIRROR
 
 EYES = np.stack([-np.linalg.inv(camera[:, :3]) @ camera[:, 3] for camera in LAB])
 

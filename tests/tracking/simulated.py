@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hrc_env.core.records import Keypoints
+from hrc_env.core.skeleton import MIRROR, N_JOINTS
 from hrc_env.geometry.cameras import pinhole, project, projections
 from hrc_env.geometry.rotations import about_axis
-from hrc_env.records import Keypoints
-from hrc_env.skeleton import MIRROR, N_JOINTS
 
 DT = 0.04
 LAB = projections(

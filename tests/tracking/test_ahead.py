@@ -5,10 +5,10 @@ import pytest
 from simulated import DT, LAB, Damage, detections, generators, keypoints, walk
 
 from hrc_env.config import HRCConfig
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.records import PoseEstimate
+from hrc_env.core.skeleton import MIRROR, N_JOINTS
 from hrc_env.geometry.rotations import about_axis
-from hrc_env.records import PoseEstimate
-from hrc_env.skeleton import MIRROR, N_JOINTS
 from hrc_env.tracking.ahead import ahead, check_horizon, mixed
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import ESTIMATORS, make_estimator

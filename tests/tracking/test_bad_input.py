@@ -8,8 +8,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from simulated import DT, HARD, LAB, Damage, detections, generators, keypoints, walk
 
-from hrc_env.batching import mapped
-from hrc_env.errors import ConfigError
+from hrc_env.core.batching import mapped
+from hrc_env.core.errors import ConfigError
 from hrc_env.geometry.cameras import pinhole, projections
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.tracking.config import TrackerConfig

@@ -6,11 +6,11 @@ from functools import partial
 import numpy as np
 import pytest
 
-from hrc_env.batching import copied
+from hrc_env.core.batching import copied
+from hrc_env.core.records import Keypoints, PoseEstimate
+from hrc_env.core.skeleton import MIRROR
 from hrc_env.geometry.cameras import pinhole, project
 from hrc_env.geometry.rotations import about_axis
-from hrc_env.records import Keypoints, PoseEstimate
-from hrc_env.skeleton import MIRROR
 from hrc_env.tracking.calibration_watch import forget, make_watch, watch
 
 CORNERS = [(2.9, 2.6, 2.4), (-2.9, 2.6, 2.4), (-2.9, -2.6, 2.4), (2.9, -2.6, 2.4)]

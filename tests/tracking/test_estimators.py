@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from simulated import DT, HARD, LAB, Damage, detections, generators, keypoints, track, walk
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.records import Keypoints
 from hrc_env.geometry.rotations import about_axis
-from hrc_env.records import Keypoints
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import ESTIMATORS, make_estimator
 

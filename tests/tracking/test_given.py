@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hrc_env.records import WorkerTruth
+from hrc_env.core.records import WorkerTruth
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.given import estimate_from_truth, prior
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from simulated import DT, HARD, LAB, Damage, detections, generators, keypoints, track, walk
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import make_estimator
 from hrc_env.tracking.hypotheses.anatomy import anatomy

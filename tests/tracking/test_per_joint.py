@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from simulated import DT, HARD, LAB, Damage, detections, generators, keypoints, track, walk
 
-from hrc_env.skeleton import BONES, MIRROR
+from hrc_env.core.skeleton import BONES, MIRROR
 from hrc_env.tracking.estimators import make_estimator
 from hrc_env.tracking.joints.importance import exp_of_negative, make_noise
 from hrc_env.tracking.models.motion import SPEED_M_S, SPREAD_M, damped_joints

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hrc_env.records import Keypoints
+from hrc_env.core.records import Keypoints
 from hrc_env.tracking.stuck import LEAST_NEW, forget_stuck, leave_out_stuck, make_stuck
 
 

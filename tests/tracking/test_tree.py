@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from simulated import DT
 
-from hrc_env.skeleton import BONES, N_JOINTS, TORSO
+from hrc_env.core.skeleton import BONES, N_JOINTS, TORSO
 from hrc_env.tracking.models.acquisition import STANDING_M
 from hrc_env.tracking.models.motion import damped_joints, whole_body_noise
 from hrc_env.tracking.tree.bone_lengths import learn_lengths, population_edges

@@ -6,7 +6,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.machine import n_cores
+from hrc_env.core.results import Metric, write_results
 from hrc_env.experiments.beyond.figures import draw_figures
 from hrc_env.experiments.beyond.metrics import metrics_of
 from hrc_env.experiments.beyond.report import report
@@ -19,8 +21,6 @@ from hrc_env.experiments.beyond.trial.timing import update_us
 from hrc_env.experiments.beyond.trial.walks import walks_of
 from hrc_env.experiments.study.folder import claim
 from hrc_env.experiments.study.shelf import Say, Shelf, Tick, emulator_mark, fingerprint_of
-from hrc_env.machine import n_cores
-from hrc_env.results import Metric, write_results
 
 NAME = "beyond"
 

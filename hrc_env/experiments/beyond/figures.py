@@ -11,10 +11,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+from hrc_env.core.results import Metric
+from hrc_env.core.typing import Floats
 from hrc_env.experiments.beyond.metrics import Found, Metrics
 from hrc_env.experiments.beyond.study import Curves, Rows, Study
-from hrc_env.results import Metric
-from hrc_env.typing import Floats
 
 PanelT = TypeVar("PanelT", Curves, Rows)
 COLOURS = ("#1565c0", "#e65100", "#2e7d32", "#6a1b9a")

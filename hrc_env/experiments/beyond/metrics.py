@@ -4,10 +4,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from hrc_env.core.results import Metric, over
 from hrc_env.experiments.beyond.trial.tally import Rows
 from hrc_env.experiments.impact.trial.counts import ERRORS_M, quantile_over
 from hrc_env.experiments.study.intervals import ratio_over, rmse_over
-from hrc_env.results import Metric, over
 
 QUANTILES = {"median": 0.5, "p95": 0.95}
 SEEN = "seen"

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from hrc_env.core.provenance import provenance
 from hrc_env.experiments.beyond.metrics import Found, Metrics
 from hrc_env.experiments.beyond.study import Study
 from hrc_env.experiments.beyond.trial.setting import WARM_UP_S
 from hrc_env.experiments.study.page import Part, Picture, Section, Table, said, write_report
-from hrc_env.provenance import provenance
 
 if TYPE_CHECKING:
     from hrc_env.experiments.beyond.experiment import BeyondConfig

@@ -6,16 +6,16 @@ from typing import TypeAlias
 
 import numpy as np
 
-from hrc_env.batching import rows
-from hrc_env.body import Body, load_body, worker_names
 from hrc_env.config import HRCConfig
+from hrc_env.core.batching import rows
+from hrc_env.core.records import Held, WorkerMotion
+from hrc_env.core.typing import Floats, JointAngles
+from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.motion.floorplan import BODY_M, STAND_M, floorplan, slack_at
 from hrc_env.motion.repertoire import REPERTOIRE, perform
 from hrc_env.motion.solo import Film, alone
-from hrc_env.optics.camera import CameraConfig
-from hrc_env.records import Held, WorkerMotion
 from hrc_env.scene.build import SCENES, Scene, SceneConfig, build
-from hrc_env.typing import Floats, JointAngles
+from hrc_env.worker.body import Body, load_body, worker_names
 
 DT_S = 0.04
 """Between the frames of a clip [s]: the environment's control step."""

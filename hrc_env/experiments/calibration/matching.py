@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from hrc_env.config import HRCConfig
+from hrc_env.core.typing import Floats
 from hrc_env.experiments.calibration.clips import WARM_UP, Clip
 from hrc_env.experiments.calibration.fit.body import body_spread
 from hrc_env.experiments.calibration.fit.cells import (
@@ -28,7 +29,6 @@ from hrc_env.experiments.calibration.samples import Samples, postures_of, sample
 from hrc_env.experiments.calibration.watch import Watched, watch
 from hrc_env.perception.calibration import LONGEST_TAIL, Calibration, write_calibration
 from hrc_env.perception.emulator import EmulatorConfig
-from hrc_env.typing import Floats
 
 IN_THE_IMAGE, IN_SPACE = 3, 7
 """Rounds: first errors in the image are matched, then those in space; in one more their scale."""

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from hrc_env.core.typing import Floats
 from hrc_env.experiments.calibration.clips import DT_S, WARM_UP, family_of
 from hrc_env.experiments.calibration.validate import Compared, errors_in_image, lasting
 from hrc_env.experiments.calibration.watch import Watched
 from hrc_env.perception.sightlines import HIDDEN, SEEN
-from hrc_env.typing import Floats
 
 PIXELS, EMULATOR = "#1b6ca8", "#e07b39"
 LAGS = (1, 2, 4, 7, 12, 18, 25, 35)

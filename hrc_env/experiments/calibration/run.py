@@ -6,7 +6,8 @@ from functools import partial
 from pathlib import Path
 
 from hrc_env.config import HRCConfig
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.provenance import provenance
 from hrc_env.experiments.calibration.clips import fit_clips
 from hrc_env.experiments.calibration.fit.fit import fit
 from hrc_env.experiments.calibration.matching import matched
@@ -16,7 +17,6 @@ from hrc_env.experiments.calibration.shelf import kept
 from hrc_env.experiments.calibration.validate import Compared, compared
 from hrc_env.perception.calibration import Calibration, write_calibration
 from hrc_env.perception.emulator import EmulatorConfig
-from hrc_env.provenance import provenance
 
 Say = Callable[[float, str], None]
 """Told by how much the share that is done grew, and what is being done."""

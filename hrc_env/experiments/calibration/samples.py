@@ -6,6 +6,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from hrc_env.core.skeleton import MIRROR
+from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.experiments.calibration.clips import DT_S, WARM_UP
 from hrc_env.experiments.calibration.watch import Watched
 from hrc_env.perception.calibration import HAND
@@ -21,8 +23,6 @@ from hrc_env.perception.sightlines import (
     TURN,
     VIEW,
 )
-from hrc_env.skeleton import MIRROR
-from hrc_env.typing import Bools, Floats, Ints
 
 LEFT_OF_PAIR = np.flatnonzero(np.arange(len(MIRROR)) < MIRROR)
 """Left joints of the seven pairs."""

@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 
 from hrc_env.config import HRCConfig
+from hrc_env.core.results import Metric
+from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.experiments.calibration.clips import FAMILIES, WARM_UP, Clip, family_of, unseen_clips
 from hrc_env.experiments.calibration.shelf import kept
 from hrc_env.experiments.calibration.watch import Watched, watch
 from hrc_env.perception.sightlines import SEEN
-from hrc_env.results import Metric
-from hrc_env.typing import Bools, Floats, Ints
 
 CHI2_95_3D = 7.815
 """95 % of a three-dimensional normal variable lies within this squared distance."""
@@ -33,7 +33,7 @@ InSpace = tuple[Floats, Bools]
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class StepResult:
     """What a level of perception made of clips."""
 
     median_m: float
@@ -66,7 +66,7 @@ class Compared:
     """(K,)."""
     emulated: Sequence[Sequence[Watched]]
     """(K, `DRAWS`)."""
-    outcomes: dict[str, tuple[Outcome, Outcome]]
+    outcomes: dict[str, tuple[StepResult, StepResult]]
     """Of pixels and emulator, by family and for "all"."""
 
 
@@ -145,7 +145,7 @@ def compared(rounds: int, seed: int, say: Say, config: HRCConfig, store: Path | 
 
 def by_family(
     clips: Sequence[Clip], pixels: Sequence[list[Watched]], emulated: Sequence[list[Watched]]
-) -> dict[str, tuple[Outcome, Outcome]]:
+) -> dict[str, tuple[StepResult, StepResult]]:
     """Outcomes of both levels for each family that occurs, and for "all"."""
     result = {}
     for family in (*FAMILIES, "all"):
@@ -161,7 +161,7 @@ def _of_family(clips: Sequence[Clip], family: str) -> list[int]:
     return [k for k, clip in enumerate(clips) if family in ("all", family_of(clip.motion))]
 
 
-def outcome(watched: Sequence[Watched]) -> Outcome:
+def outcome(watched: Sequence[Watched]) -> StepResult:
     """Numbers of some clips."""
     error, inside = _in_space(watched)
     px = np.concatenate([errors_in_image(each).ravel() for each in watched])
@@ -170,7 +170,7 @@ def outcome(watched: Sequence[Watched]) -> Outcome:
         [(each.sight[WARM_UP:] == SEEN).sum(-1).ravel() >= HALF_SEEN for each in watched]
     )
     missed = np.concatenate([np.isnan(each.px[WARM_UP:, :, 0, 0]).ravel() for each in watched])
-    return Outcome(
+    return StepResult(
         float(np.median(error)), float(np.percentile(error, 95)), float(inside.mean()),
         float(1 - np.concatenate([each.tracked[WARM_UP:] for each in watched]).mean()),
         float(np.median(px)), float(np.percentile(px, 95)), lasting(watched),
@@ -211,7 +211,7 @@ def lasting(watched: Sequence[Watched], lag: int = 12, sharp: float = 0.06) -> f
     return product / square
 
 
-def table_of(seen: dict[str, tuple[Outcome, Outcome]]) -> Iterator[tuple[str, ...]]:
+def table_of(seen: dict[str, tuple[StepResult, StepResult]]) -> Iterator[tuple[str, ...]]:
     """Rows of text: family, then each number as "pixels / emulator"."""
     for family, (a, b) in seen.items():
         yield (

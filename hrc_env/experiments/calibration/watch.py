@@ -7,19 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.batching import rows
-from hrc_env.body import worker_truth
 from hrc_env.config import HRCConfig
-from hrc_env.errors import ConfigError
+from hrc_env.core.batching import rows
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.records import Keypoints, Roi
+from hrc_env.core.typing import Bools, Covariances3, Floats, Ints, Points2, Points3
 from hrc_env.experiments.calibration.clips import DT_S, Clip, Staged, number_of, scene_of, stage
 from hrc_env.geometry.cameras import project, projections
 from hrc_env.perception.emulator import lines_of_sight
-from hrc_env.records import CropWindow, Keypoints
+from hrc_env.pipeline.levels import make_senses
+from hrc_env.pipeline.sensor_input import Generators, Moment
+from hrc_env.pipeline.tracking import TrackingSenses
 from hrc_env.scene.build import Scene
-from hrc_env.senses import make_senses
-from hrc_env.sensing.moment import Generators, Moment
-from hrc_env.sensing.tracking import TrackingSenses
-from hrc_env.typing import Bools, Covariances3, Floats, Ints, Points2, Points3
+from hrc_env.worker.body import worker_truth
 
 INTRODUCED, INTRODUCED_PX = 3, 10.0
 """So many frames of true joints the tracker is given first, as known to so many pixels [px]."""
@@ -115,7 +115,7 @@ def _introduce(senses: TrackingSenses, joints_world: Points3, P: Floats, rngs: G
         senses.tracker.update(senses.state, Keypoints(px, np.ones_like(sigma_px), sigma_px), rngs)
 
 
-def _windows(windows: list[list[CropWindow | None]], n_cameras: int) -> Floats:
+def _windows(windows: list[list[Roi | None]], n_cameras: int) -> Floats:
     found = windows[0] if windows else [None] * n_cameras
     rows = [
         (np.nan,) * 4 if w is None else (*w.centre_px, w.side_px, w.rotation_rad) for w in found

@@ -4,6 +4,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
 
+from hrc_env.core.results import Metric, write_results
+from hrc_env.core.typing import Floats
 from hrc_env.experiments.footage.calibration import read_calibration, tracker_config
 from hrc_env.experiments.footage.detections import FOLLOWER, Detections, detections_of
 from hrc_env.experiments.footage.fetch import WHEEL, fetch_footage
@@ -21,9 +23,7 @@ from hrc_env.experiments.footage.metrics import (
 from hrc_env.experiments.tracking.names import DEFAULT
 from hrc_env.geometry.cameras import projections
 from hrc_env.perception.films import Films
-from hrc_env.results import Metric, write_results
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.typing import Floats
 
 Say = Callable[[float, str], None]
 """Told by how much the share that is done grew, and what is being done."""

@@ -14,10 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.typing import Floats, Points3
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.typing import Floats, Points3
 
 _PER_PX = 64.0
 _PARALLEL = 1e9

@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 
 import hrc_env
+from hrc_env.core.records import Keypoints, PoseEstimate, Roi
+from hrc_env.core.skeleton import N_JOINTS
+from hrc_env.core.typing import Floats, Points2
 from hrc_env.experiments.footage.calibration import FilmedCamera, tracker_config
 from hrc_env.geometry.cameras import PinholeCamera, project, projections
 from hrc_env.perception.eyes import Eyes, EyesConfig
 from hrc_env.perception.films import Films, undistort
 from hrc_env.perception.windows import window_from_joints
-from hrc_env.records import CropWindow, Keypoints, PoseEstimate
-from hrc_env.skeleton import N_JOINTS
 from hrc_env.tracking.estimators import make_estimator
-from hrc_env.typing import Floats, Points2
 
 FOLLOWER = "per_joint"
 """The estimator whose prediction says where to look: a rival of the default one, so that nobody
@@ -124,7 +124,7 @@ def _detect(films: Films, cameras: list[FilmedCamera], tick: Tick) -> Detections
     return Detections(px, confidence, sigma, dt_s)
 
 
-def _windows(predicted: PoseEstimate, cameras: list[PinholeCamera]) -> list[CropWindow | None]:
+def _windows(predicted: PoseEstimate, cameras: list[PinholeCamera]) -> list[Roi | None]:
     """A window a camera round the predicted joints; none at all, a search, without a track."""
     if not predicted.tracked[0, 0]:
         return [None] * len(cameras)

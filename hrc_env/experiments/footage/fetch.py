@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from hrc_env.errors import DownloadError
+from hrc_env.core.errors import DownloadError
 from hrc_env.perception.weights import cache_dir
 from hrc_env.perception.wheels import download_wheel
 

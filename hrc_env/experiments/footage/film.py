@@ -8,12 +8,12 @@ from pathlib import Path
 import imageio.v2 as imageio
 import numpy as np
 
-from hrc_env import pictures
+from hrc_env.core.records import PoseEstimate
+from hrc_env.core.typing import Image
 from hrc_env.experiments.footage.metrics import Track
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.perception.films import Films
-from hrc_env.records import PoseEstimate
-from hrc_env.typing import Image
+from hrc_env.render import overlay
 
 TILE = (480, 852)
 HEAD = 60
@@ -62,15 +62,15 @@ def compose(frames: list[Image], cameras: list[PinholeCamera], track: Track, t: 
     """One picture of the film: the views (C, H, W, 3) with frame `t` of the track."""
     tiles = []
     for frame, camera in zip(frames, cameras, strict=True):
-        small = pictures.shrink(frame, *TILE).copy()
-        pictures.draw_estimate(small, camera, _estimate(track, t), thickness=2)
-        pictures.label(small, camera.name, (10, 10), 20)
+        small = overlay.shrink(frame, *TILE).copy()
+        overlay.draw_estimate(small, camera, _estimate(track, t), thickness=2)
+        overlay.label(small, camera.name, (10, 10), 20)
         tiles.append(small)
-    views = pictures.tile(tiles, len(tiles))
+    views = overlay.tile(tiles, len(tiles))
     sheet = np.empty((HEAD + views.shape[0], views.shape[1] - views.shape[1] % 4, 3), np.uint8)
-    sheet[:] = pictures.PANEL
+    sheet[:] = overlay.PANEL
     sheet[HEAD:] = views[:, : sheet.shape[1]]
-    pictures.write(
+    overlay.write(
         sheet,
         "blue: the left side, orange: the right; green: where a joint may be (2 sigma)",
         (14, 16),

@@ -7,10 +7,10 @@ cameras projects there; no estimator takes part.
 
 import numpy as np
 
+from hrc_env.core.typing import Floats
 from hrc_env.experiments.footage.detections import Detections
 from hrc_env.experiments.tracking.dlt import triangulate_frame
 from hrc_env.geometry.cameras import project
-from hrc_env.typing import Floats
 
 MAX_LAG_FRAMES = 10
 SURE = 0.5

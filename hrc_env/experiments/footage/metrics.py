@@ -10,16 +10,16 @@ from itertools import combinations
 
 import numpy as np
 
+from hrc_env.core.records import PoseEstimate
+from hrc_env.core.results import Metric
+from hrc_env.core.skeleton import BONES, MIRROR
+from hrc_env.core.typing import Bools, Covariances3, Floats, Points3
 from hrc_env.experiments.footage.detections import Detections
 from hrc_env.experiments.footage.lag import SURE
 from hrc_env.geometry.cameras import project
-from hrc_env.records import PoseEstimate
-from hrc_env.results import Metric
-from hrc_env.skeleton import BONES, MIRROR
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import ESTIMATORS, make_estimator
 from hrc_env.tracking.smoother import smooth
-from hrc_env.typing import Bools, Covariances3, Floats, Points3
 
 SMOOTHER = "smoother"
 """Offline: it sees the whole recording at once."""

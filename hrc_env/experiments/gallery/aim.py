@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from hrc_env.core.typing import Points3
 from hrc_env.geometry.cameras import PinholeCamera, pinhole
-from hrc_env.typing import Points3
 
 EYE_M = 1.45
 """How high above the floor the cameras are [m]."""

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import imageio.v2 as imageio
 
-from hrc_env.body import load_body, worker_names
-from hrc_env.errors import unknown
+from hrc_env.core.errors import unknown
+from hrc_env.core.typing import Image
 from hrc_env.experiments.gallery.motions import strip
 from hrc_env.experiments.gallery.page import Exhibit, write_page
 from hrc_env.experiments.gallery.still import CASTS, portrait, views
 from hrc_env.motion.repertoire import REPERTOIRE
-from hrc_env.typing import Image
+from hrc_env.worker.body import load_body, worker_names
 
 Say = Callable[[float, str], None]
 """Told by how much the share that is done grew, and what is being done."""

@@ -5,15 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env import pictures
-from hrc_env.batching import one
-from hrc_env.body import SEGMENT, load_body
+from hrc_env.core.batching import one
+from hrc_env.core.typing import Image
 from hrc_env.experiments.gallery.aim import camera_at
 from hrc_env.motion.repertoire import REPERTOIRE, perform
 from hrc_env.motion.solo import alone
+from hrc_env.render import overlay
 from hrc_env.scene.build import build
 from hrc_env.scene.render import PictureRenderer
-from hrc_env.typing import Image
+from hrc_env.worker.body import SEGMENT, load_body
 
 FRAMES, FRAME_PX = 6, (300, 420)
 """How many frames a strip has, width and height of each [px]."""
@@ -76,10 +76,10 @@ def strip(name: str, body_name: str, seed: int = 0) -> Image:
         target = np.array([*root[:2], TARGET_M])
         camera = camera_at(target, turn, stage.away_m, HFOV_DEG, FRAME_PX)
         frame = np.array(renderer.picture(scene.home_q, motion, camera), np.uint8)
-        pictures.label(frame, f"{DT_S * (sum(lengths[:k]) + row):.1f} s", (8, 8), 14)
+        overlay.label(frame, f"{DT_S * (sum(lengths[:k]) + row):.1f} s", (8, 8), 14)
         frames.append(frame)
     renderer.close()
-    return pictures.tile(frames, FRAMES)
+    return overlay.tile(frames, FRAMES)
 
 
 def stage_of(name: str) -> Stage:

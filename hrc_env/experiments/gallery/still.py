@@ -5,15 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.batching import one
-from hrc_env.body import load_body
+from hrc_env.core.batching import one
+from hrc_env.core.records import Held, WorkerMotion, Workplace
+from hrc_env.core.typing import Floats, Image
 from hrc_env.experiments.gallery.aim import camera_at
 from hrc_env.motion.repertoire import REPERTOIRE, perform
 from hrc_env.motion.solo import alone
-from hrc_env.records import Held, WorkerMotion, Workplace
 from hrc_env.scene.build import Scene, build
 from hrc_env.scene.render import PictureRenderer
-from hrc_env.typing import Floats, Image
+from hrc_env.worker.body import load_body
 
 PORTRAIT_PX = (600, 900)
 SITTING = (0.75, -0.6, -0.2)

@@ -5,7 +5,9 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from hrc_env.errors import ConfigError, HRCError
+from hrc_env.core.errors import ConfigError, HRCError
+from hrc_env.core.machine import n_cores
+from hrc_env.core.results import Metric, write_results
 from hrc_env.experiments.impact.measures import Table, metrics_of
 from hrc_env.experiments.impact.report import write_pages
 from hrc_env.experiments.impact.tax import tax_metrics
@@ -29,8 +31,6 @@ from hrc_env.experiments.impact.trial.policies import (
 )
 from hrc_env.experiments.study.folder import claim
 from hrc_env.experiments.study.shelf import Say, Shelf, emulator_mark, fingerprint_of
-from hrc_env.machine import n_cores
-from hrc_env.results import Metric, write_results
 
 NAME = "impact"
 FIRST_SEED = 1_000_000

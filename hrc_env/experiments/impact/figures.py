@@ -8,12 +8,12 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from hrc_env.core.results import Metric
 from hrc_env.experiments.impact.measures import Table
 from hrc_env.experiments.impact.tax import MEASURED, missed_share
 from hrc_env.experiments.impact.trial.eyes import LATE, LATE_S, REFERENCE, Eyes, eyes_called
 from hrc_env.experiments.impact.trial.policies import SCRIPTED, SLOWED, Policy
 from hrc_env.experiments.impact.words import eyes_words
-from hrc_env.results import Metric
 
 Metrics = Mapping[str, Metric]
 _COLOURS = {

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from hrc_env.core.results import Metric
 from hrc_env.experiments.impact.measures import NOMINAL_MPS, Table
 from hrc_env.experiments.impact.tax import MEASURED
 from hrc_env.experiments.impact.trial.eyes import LATE, Eyes
@@ -11,7 +12,6 @@ from hrc_env.experiments.impact.trial.tally import SLOW_M
 from hrc_env.experiments.impact.words import eyes_words
 from hrc_env.experiments.study import page
 from hrc_env.experiments.study.page import Part, Picture, said
-from hrc_env.results import Metric
 
 Metrics = Mapping[str, Metric]
 AGREES = 0.3

@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from hrc_env.core.results import Metric
+from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.experiments.impact.trial.counts import (
     ERRORS_M,
     GAPS_M,
@@ -14,8 +16,6 @@ from hrc_env.experiments.impact.trial.counts import (
 )
 from hrc_env.experiments.impact.trial.eyes import REFERENCE, Eyes, eyes_called, seeing
 from hrc_env.experiments.study.intervals import iqm_over, mean_over, ratio_over
-from hrc_env.results import Metric
-from hrc_env.skeleton import N_JOINTS
 
 Row = Mapping[str, list[Any]]
 Table = Mapping[tuple[str, str], Row]

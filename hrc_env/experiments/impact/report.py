@@ -3,6 +3,8 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from hrc_env.core.provenance import provenance
+from hrc_env.core.results import Metric
 from hrc_env.experiments.impact.figures import plot_stops, plot_tax, plot_tradeoff
 from hrc_env.experiments.impact.lateness import lateness_parts
 from hrc_env.experiments.impact.measures import NOMINAL_MPS, Table
@@ -12,8 +14,6 @@ from hrc_env.experiments.impact.trial.tally import MOVING_MPS, SLOW_M, STOP_M
 from hrc_env.experiments.impact.words import eyes_words
 from hrc_env.experiments.study import page
 from hrc_env.experiments.study.page import Part, Picture, Section, said
-from hrc_env.provenance import provenance
-from hrc_env.results import Metric
 
 Metrics = Mapping[str, Metric]
 ONE_CAMERA = seeing(n_cameras=1).name

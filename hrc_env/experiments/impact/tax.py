@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
+from hrc_env.core.results import Metric
+from hrc_env.core.typing import Floats
 from hrc_env.experiments.impact.measures import NOMINAL_MPS, Row, Table
 from hrc_env.experiments.impact.trial.eyes import LATE, REFERENCE, Eyes
 from hrc_env.experiments.impact.trial.policies import SLOWED, Policy
-from hrc_env.results import Metric
-from hrc_env.typing import Floats
 
 N_RESAMPLES = 1000
 PREDICTED = ("nominal_m", "speeds_here_m", "squares_m")

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.body import load_body
 from hrc_env.config import HRCConfig, with_cameras
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.results import Metric, write_results
 from hrc_env.experiments.lab.figures import draw_figures
 from hrc_env.experiments.lab.metrics import Parts, metrics_of
 from hrc_env.experiments.lab.motions import MOTIONS, body_of, play
@@ -19,8 +19,8 @@ from hrc_env.experiments.study.folder import claim
 from hrc_env.experiments.study.recording import Recording, record, replay
 from hrc_env.experiments.study.shelf import Say, Shelf, Tick, fingerprint_of
 from hrc_env.perception.eyes import EyesConfig
-from hrc_env.results import Metric, write_results
 from hrc_env.scene.build import Scene, build
+from hrc_env.worker.body import load_body
 
 RIG = "lab_gopro"
 CROPS = "particle"

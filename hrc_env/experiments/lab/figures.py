@@ -9,20 +9,20 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
-from hrc_env import pictures
-from hrc_env.batching import one
-from hrc_env.body import load_body
 from hrc_env.config import HRCConfig
+from hrc_env.core.batching import one
+from hrc_env.core.results import Metric
+from hrc_env.core.skeleton import BONES
+from hrc_env.core.typing import Floats, Image, Points3
 from hrc_env.experiments.lab.metrics import COLUMNS
 from hrc_env.experiments.lab.motions import MOTIONS, play
 from hrc_env.experiments.lab.sides import missed_by_camera, turned_away
 from hrc_env.experiments.study.recording import Beliefs, Recording, replay
 from hrc_env.geometry.cameras import image_from_pinhole
 from hrc_env.perception.lensed import Lensed
-from hrc_env.results import Metric
+from hrc_env.render import overlay
 from hrc_env.scene.render import CropRenderer
-from hrc_env.skeleton import BONES
-from hrc_env.typing import Floats, Image, Points3
+from hrc_env.worker.body import load_body
 
 SHOWN = (("standing", "(a) standing"), ("bending", "(b) bending"), ("lifting", "(c) lifting"))
 CROP_PX = 512
@@ -142,7 +142,7 @@ def _crop(recording: Recording, motion: str, seed: int, t: int, c: int) -> Image
     renderer.close()
     found = recording.keypoints[t]
     px = image_from_pinhole(scene.cameras[c], found.px[0, c, 0])
-    pictures.draw_landmarks(image, window, px, found.confidence[0, c, 0])
+    overlay.draw_landmarks(image, window, px, found.confidence[0, c, 0])
     return image
 
 

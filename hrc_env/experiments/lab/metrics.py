@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from hrc_env.core.results import Metric
+from hrc_env.core.skeleton import JOINTS
+from hrc_env.core.typing import Bools, Floats
 from hrc_env.experiments.lab.motions import MOTIONS
 from hrc_env.experiments.lab.sides import MISSED_SHARE
 from hrc_env.experiments.study.intervals import quantile_over, ratio_over
-from hrc_env.results import Metric
-from hrc_env.skeleton import JOINTS
-from hrc_env.typing import Bools, Floats
 
 COLUMNS = (*(f"camera_{k + 1}" for k in range(4)), "multi")
 ALL = "all"

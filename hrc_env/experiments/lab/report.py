@@ -5,13 +5,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from hrc_env.core.results import Metric
+from hrc_env.core.skeleton import JOINTS
 from hrc_env.experiments.lab.figures import SPOKEN
 from hrc_env.experiments.lab.metrics import ALL, COLUMNS
 from hrc_env.experiments.lab.motions import MOTIONS
 from hrc_env.experiments.lab.sides import MISSED_CONFIDENCE, MISSED_SHARE
 from hrc_env.experiments.study.page import Part, Picture, Section, Table, said, write_report
-from hrc_env.results import Metric
-from hrc_env.skeleton import JOINTS
 
 if TYPE_CHECKING:
     from hrc_env.experiments.lab.experiment import LabConfig

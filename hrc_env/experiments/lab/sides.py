@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from hrc_env.core.records import Keypoints
+from hrc_env.core.skeleton import JOINTS
+from hrc_env.core.typing import Bools, Floats, Points3
 from hrc_env.geometry.cameras import PinholeCamera, project
-from hrc_env.records import Keypoints
-from hrc_env.skeleton import JOINTS
-from hrc_env.typing import Bools, Floats, Points3
 
 MISSED_CONFIDENCE = 0.5
 """The network always returns its points: below this visibility a joint counts as missed (ours)."""

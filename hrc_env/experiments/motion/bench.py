@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from hrc_env.body import Body, load_body, worker_names
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.results import Metric, over, write_results
 from hrc_env.experiments.motion.gait import gait_of
 from hrc_env.experiments.motion.plot import plot_targets
 from hrc_env.experiments.motion.report import write_report
@@ -18,7 +18,7 @@ from hrc_env.motion import plans as pl
 from hrc_env.motion.generator import MotionConfig, advance, make_state, reset
 from hrc_env.motion.repertoire import REPERTOIRE, perform
 from hrc_env.motion.solo import Film, alone
-from hrc_env.results import Metric, over, write_results
+from hrc_env.worker.body import Body, load_body, worker_names
 
 DT_S = 0.01
 """Between the frames of a film [s]: fast enough for accelerations."""

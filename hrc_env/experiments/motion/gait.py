@@ -4,10 +4,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from hrc_env.body import SEGMENT
+from hrc_env.core.typing import Floats
 from hrc_env.experiments.motion.statistics import SIDES
 from hrc_env.motion.solo import Film
-from hrc_env.typing import Floats
+from hrc_env.worker.body import SEGMENT
 
 STEADY_SHARE = 0.97
 """Of the top speed: from there on a walk is steady."""

@@ -6,9 +6,9 @@ from pathlib import Path
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from hrc_env.core.results import Metric
 from hrc_env.experiments.motion.report import inside, scenes_of
 from hrc_env.experiments.motion.targets import ANY, targets_of
-from hrc_env.results import Metric
 
 
 def plot_targets(path: Path, metrics: Mapping[str, Metric]) -> None:

@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+from hrc_env.core.provenance import provenance
+from hrc_env.core.results import Metric
 from hrc_env.experiments.motion.targets import ANY, Target, targets_of
-from hrc_env.provenance import provenance
-from hrc_env.results import Metric
 
 COLUMNS = (
     ("seconds", "s", 1), ("wrist_p95_m_s", "wrist p95", 2), ("wrist_max_m_s", "max", 2),

@@ -4,12 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hrc_env.body import SEGMENT, Body, worker_truth
+from hrc_env.core.typing import Bools, Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.anatomy import GRIP_M
 from hrc_env.motion.solo import Film
-from hrc_env.typing import Bools, Floats
+from hrc_env.worker.body import SEGMENT, Body, worker_truth
 
 SIDES = ("left", "right")
 WRISTS = [SEGMENT[f"{side}_hand"] for side in SIDES]

@@ -12,8 +12,8 @@ from typing import Any
 import cv2
 import numpy as np
 
-from hrc_env.skeleton import BONES
-from hrc_env.typing import Floats, Points2, Points3
+from hrc_env.core.skeleton import BONES
+from hrc_env.core.typing import Floats, Points2, Points3
 
 
 def follow(P: Floats, px: Points2, seed: int) -> Points3:

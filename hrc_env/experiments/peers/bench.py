@@ -10,15 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.results import Metric, write_results
+from hrc_env.core.typing import Points3
 from hrc_env.experiments.peers.registry import PEERS, missing_sentence
 from hrc_env.experiments.study.shelf import Say, Shelf, Tick, fingerprint_of
 from hrc_env.experiments.tracking.cells import beliefs
 from hrc_env.experiments.tracking.names import DEFAULT, DLT
 from hrc_env.experiments.tracking.rigs import RIGS, Rig, make_rig
 from hrc_env.experiments.tracking.sequences import Sequences, make_sequences
-from hrc_env.results import Metric, write_results
-from hrc_env.typing import Points3
 
 CONDITIONS = ("clean", "occluded", "hard", "one_camera")
 ROWS = (*CONDITIONS, "after_return")

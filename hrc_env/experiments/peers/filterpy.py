@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from hrc_env.core.typing import Bools, Floats, Points2, Points3
 from hrc_env.experiments.peers.model import START_COV, F, Q, first_joints, pixels
 from hrc_env.experiments.tracking.dlt import triangulate_frame
 from hrc_env.experiments.tracking.rigs import DT_S, SIGMA_PX
-from hrc_env.typing import Bools, Floats, Points2, Points3
 
 GATE_SIGMA = 5.0
 """Pixels further from the prediction than so many standard deviations are left out."""

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from hrc_env.core.typing import Floats, Points2, Points3
 from hrc_env.experiments.tracking.dlt import triangulate_frame
 from hrc_env.experiments.tracking.rigs import DT_S
-from hrc_env.typing import Floats, Points2, Points3
 
 ACCELERATION = 10.0
 """Spectral density of a joint's acceleration [m^2/s^3]."""

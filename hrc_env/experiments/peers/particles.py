@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from hrc_env.core.typing import Floats, Points2, Points3
 from hrc_env.experiments.peers.model import START_COV, F, Q, first_joints, pixels
 from hrc_env.experiments.tracking.rigs import SIGMA_PX
-from hrc_env.typing import Floats, Points2, Points3
 
 N_PARTICLES = 1000
 FREEDOM = 3.0

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
 
-from hrc_env.typing import Floats, Points2, Points3
+from hrc_env.core.typing import Floats, Points2, Points3
 
 INSTALL = 'pip install -c constraints.txt -e ".[peers]"'
 

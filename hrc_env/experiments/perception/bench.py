@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hrc_env.core.results import Metric, write_results
 from hrc_env.experiments.perception import loops, sheet
 from hrc_env.experiments.perception.measured import NO_FAULT, PIXELS, Measured, metrics_of
 from hrc_env.experiments.perception.parts import FIRST_SEED, tasks_of
@@ -16,7 +17,6 @@ from hrc_env.experiments.perception.report import write_report
 from hrc_env.experiments.perception.settings import PerceptionBenchConfig
 from hrc_env.experiments.perception.views import PLAIN
 from hrc_env.experiments.study.shelf import Say, Shelf, emulator_mark, fingerprint_of
-from hrc_env.results import Metric, write_results
 
 
 def run(config: PerceptionBenchConfig, out: Path, say: Say) -> dict[str, Metric]:

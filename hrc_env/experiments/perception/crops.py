@@ -11,9 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hrc_env.appearance import Look
-from hrc_env.body import load_body, worker_truth
 from hrc_env.config import HRCConfig
+from hrc_env.core.records import Held, Roi, WorkerMotion
+from hrc_env.core.skeleton import JOINT
+from hrc_env.core.typing import Bools, Floats, Image, JointAngles, Points2, Points3
 from hrc_env.geometry.cameras import (
     image_from_pinhole,
     inside_image,
@@ -26,11 +27,10 @@ from hrc_env.motion import generator
 from hrc_env.perception.eyes import Eyes
 from hrc_env.perception.lensed import Lensed
 from hrc_env.perception.windows import window_from_joints
-from hrc_env.records import CropWindow, Held, WorkerMotion
 from hrc_env.scene.build import Scene
+from hrc_env.scene.domain_randomization import Look
 from hrc_env.scene.render import CropRenderer
-from hrc_env.skeleton import JOINT
-from hrc_env.typing import Bools, Floats, Image, JointAngles, Points2, Points3
+from hrc_env.worker.body import load_body, worker_truth
 
 GOOD_SHARE = 0.10
 """Joints that are on average this share of the stature from the truth are still good."""
@@ -57,7 +57,7 @@ class Looked:
 
     in_view: Bools
     """(C,) all joints in the image, nothing of room or robot before them."""
-    windows: list[CropWindow | None]
+    windows: list[Roi | None]
     found_px: Points2
     """(C, J, 2) pinhole pixels; NaN where nobody was found."""
     true_px: Points2
@@ -105,7 +105,7 @@ class Looker:
             angle_deg=view_angle_deg(joints[0], eyes),
         )
 
-    def crop(self, camera: int, window: CropWindow) -> Image:
+    def crop(self, camera: int, window: Roi) -> Image:
         """A copy of a crop of the last instant."""
         return np.array(self.source.crop(camera, window))
 
@@ -118,7 +118,7 @@ class Looker:
         self.eyes.close()
         self.renderer.close()
 
-    def _found(self, now: Instant, windows: list[CropWindow | None]) -> Points2:
+    def _found(self, now: Instant, windows: list[Roi | None]) -> Points2:
         """(C, J, 2) pinhole pixels."""
         found = np.full((len(windows), len(JOINT), 2), np.nan)
         if not any(windows):

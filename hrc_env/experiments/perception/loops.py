@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.body import worker_truth
+from hrc_env.core.skeleton import N_JOINTS
+from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.env import HRCReachEnv
 from hrc_env.experiments.perception.families import family_index
-from hrc_env.faults.fault import FaultConfig
 from hrc_env.geometry.cameras import project
 from hrc_env.motion import generator
-from hrc_env.skeleton import N_JOINTS
-from hrc_env.typing import Bools, Floats, Ints
+from hrc_env.perception.faults.fault import FaultConfig
+from hrc_env.worker.body import worker_truth
 
 CHI2_95_3D = 7.815
 """95 % of a three-dimensional normal variable lies within this squared distance."""

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from hrc_env.core.results import Metric
 from hrc_env.experiments.perception.crops import STEP_S
 from hrc_env.experiments.perception.families import NAMES
 from hrc_env.experiments.perception.loops import Episode, camera_name, some_steps
 from hrc_env.experiments.perception.speed import ROUNDS
 from hrc_env.experiments.perception.views import ROWS, View, rows_of
 from hrc_env.experiments.study.intervals import quantile_over, ratio_over, rmse_ratio_over
-from hrc_env.results import Metric
 
 PIXELS, EMULATED = "pixels", "keypoints"
 NO_FAULT = "none"

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hrc_env.appearance import APPEARANCES, AS_BUILT, draw_look
+from hrc_env.core.results import Metric
 from hrc_env.experiments.calibration.validate import error_ratios
 from hrc_env.experiments.perception import loops, phantoms, sheet, speed
 from hrc_env.experiments.perception.crops import Instant, Looked, Looker, instants
@@ -18,10 +18,10 @@ from hrc_env.experiments.perception.loops import Episode, episode_of
 from hrc_env.experiments.perception.measured import EMULATED, NO_FAULT, PIXELS, Measured
 from hrc_env.experiments.perception.settings import PerceptionBenchConfig
 from hrc_env.experiments.perception.views import PLAIN, View, view_of
-from hrc_env.faults.fault import IMAGE, KINDS
 from hrc_env.perception import vino
-from hrc_env.results import Metric
+from hrc_env.perception.faults.fault import IMAGE, KINDS
 from hrc_env.scene.build import SCENES, Scene, SceneConfig, build
+from hrc_env.scene.domain_randomization import APPEARANCES, AS_BUILT, draw_look
 from hrc_env.scene.rigs import RIGS
 
 LENSES = {"pinhole": "lab", "fisheye": "lab_gopro"}

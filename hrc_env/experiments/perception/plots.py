@@ -8,10 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from hrc_env.core.results import Metric
 from hrc_env.experiments.perception.speed import REST, STAGES
 from hrc_env.experiments.perception.views import ROWS
-from hrc_env.faults.fault import KINDS
-from hrc_env.results import Metric
+from hrc_env.perception.faults.fault import KINDS
 
 _Metrics = Mapping[str, Metric]
 LEAST_COVERAGE, MOST_RATIO = 0.9, 1.5

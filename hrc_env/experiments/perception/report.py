@@ -3,12 +3,12 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from hrc_env.core.provenance import provenance
+from hrc_env.core.results import Metric
 from hrc_env.experiments.perception.plots import plot_faults, plot_speed, plot_views
 from hrc_env.experiments.perception.speed import REST, STAGES
 from hrc_env.experiments.perception.views import ROWS
-from hrc_env.faults.fault import IMAGE, KINDS, PLACE
-from hrc_env.provenance import provenance
-from hrc_env.results import Metric
+from hrc_env.perception.faults.fault import IMAGE, KINDS, PLACE
 
 _Metrics = Mapping[str, Metric]
 PLACE_KINDS = tuple(kind for kind, each in KINDS.items() if each.group == PLACE)

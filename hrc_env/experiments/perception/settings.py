@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from hrc_env.body import worker_names
-from hrc_env.errors import ConfigError
-from hrc_env.faults.fault import KINDS
+from hrc_env.core.errors import ConfigError
+from hrc_env.perception.faults.fault import KINDS
+from hrc_env.worker.body import worker_names
 
 
 @dataclass(frozen=True, slots=True)

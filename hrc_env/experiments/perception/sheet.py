@@ -6,11 +6,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from hrc_env.core.records import Roi
+from hrc_env.core.skeleton import BONES
+from hrc_env.core.typing import Image, Points2
 from hrc_env.perception.blazepose import image_from_crop
-from hrc_env.pictures import draw_landmarks, label, tile
-from hrc_env.records import CropWindow
-from hrc_env.skeleton import BONES
-from hrc_env.typing import Image, Points2
+from hrc_env.render.overlay import draw_landmarks, label, tile
 
 N_CROPS, COLUMNS = 20, 5
 MOST_MISSED = 8
@@ -20,9 +20,7 @@ SCALE = 1.25
 TRUTH = (90, 230, 160)
 
 
-def marked(
-    crop: Image, window: CropWindow, found_px: Points2, true_px: Points2, text: str
-) -> Image:
+def marked(crop: Image, window: Roi, found_px: Points2, true_px: Points2, text: str) -> Image:
     """A crop with the true body in thin green and the detected one over it.
 
     Args:

@@ -12,10 +12,10 @@ from hrc_env.env import HRCReachEnv
 from hrc_env.experiments.speed.stopwatch import Place, Stopwatch
 from hrc_env.motion import generator
 from hrc_env.perception.network import LANDMARK_SIDE, load_landmarker
+from hrc_env.pipeline.rendered import CameraSenses
+from hrc_env.pipeline.tracking import TrackingSenses
 from hrc_env.scene.physics import Physics
 from hrc_env.scene.render import CropRenderer
-from hrc_env.sensing.rendered import CameraSenses
-from hrc_env.sensing.tracking import TrackingSenses
 
 STAGES: Mapping[str, Sequence[Place]] = {
     "draw": ((CropRenderer, "draw"), (CropRenderer, "view")),

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from hrc_env.config import HRCConfig
-from hrc_env.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.results import Metric, write_results
 from hrc_env.experiments.site.figures import draw_figures
 from hrc_env.experiments.site.metrics import Parts, metrics_of
 from hrc_env.experiments.site.report import report
@@ -18,8 +19,7 @@ from hrc_env.experiments.site.walk import walk
 from hrc_env.experiments.study.folder import claim
 from hrc_env.experiments.study.recording import record, replay
 from hrc_env.experiments.study.shelf import Say, Shelf, Tick, fingerprint_of
-from hrc_env.faults.fault import FaultConfig
-from hrc_env.results import Metric, write_results
+from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.scene.build import Scene, build
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import ESTIMATORS

@@ -9,15 +9,15 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
-from hrc_env.batching import one
+from hrc_env.core.batching import one
+from hrc_env.core.records import WorkerMotion
+from hrc_env.core.results import Metric
+from hrc_env.core.typing import Floats
 from hrc_env.experiments.site.metrics import Parts
 from hrc_env.experiments.site.rows import MULTI
 from hrc_env.geometry.cameras import pinhole, project
-from hrc_env.records import WorkerMotion
-from hrc_env.results import Metric
 from hrc_env.scene.build import Scene
 from hrc_env.scene.render import PictureRenderer
-from hrc_env.typing import Floats
 
 PAPER_RMSE_M = {
     "camera_1": 6.771, "camera_2": 3.763, "camera_3": 5.630, "camera_4": 12.814, MULTI: 0.133,

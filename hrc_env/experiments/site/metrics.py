@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from hrc_env.core.results import Metric
+from hrc_env.core.typing import Floats
 from hrc_env.experiments.site.rows import MULTI, Row, rows_of, squared_m2
 from hrc_env.experiments.study.intervals import mean_over, rmse_over, rmse_ratio_over
-from hrc_env.results import Metric
-from hrc_env.typing import Floats
 
 SIZES = {2: "two", 3: "three"}
 Said = Mapping[str, Any]

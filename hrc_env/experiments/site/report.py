@@ -5,12 +5,12 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from hrc_env.core.results import Metric
 from hrc_env.experiments.site.figures import COLUMNS, PAPER_RMSE_M, spoken
 from hrc_env.experiments.site.metrics import best
 from hrc_env.experiments.site.rows import MULTI, WARM_UP_S
 from hrc_env.experiments.study.intervals import apart
 from hrc_env.experiments.study.page import Part, Picture, Section, Table, said, write_report
-from hrc_env.results import Metric
 
 if TYPE_CHECKING:
     from hrc_env.experiments.site.experiment import SiteConfig

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from hrc_env.core.skeleton import JOINT
+from hrc_env.core.typing import Floats
 from hrc_env.experiments.study.recording import Beliefs
-from hrc_env.skeleton import JOINT
-from hrc_env.typing import Floats
 
 HEAD = JOINT["nose"]
 """The paper's "head"; MediaPipe has no joint of that name (judgement: the nose)."""

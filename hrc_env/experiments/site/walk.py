@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from hrc_env.batching import rows
-from hrc_env.body import load_body
+from hrc_env.core.batching import rows
+from hrc_env.core.records import WORKPLACE_KINDS, WorkerMotion
 from hrc_env.motion import generator
 from hrc_env.motion.config import MotionConfig
 from hrc_env.motion.errands import Task
-from hrc_env.records import WORKPLACE_KINDS, WorkerMotion
 from hrc_env.scene.build import Scene
+from hrc_env.worker.body import load_body
 
 PASSING = MotionConfig(
     near_probability=0.0,

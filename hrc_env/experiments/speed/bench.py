@@ -11,7 +11,8 @@ from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.results import Metric, write_results
 from hrc_env.experiments.speed.contenders import OURS, PEER, Contender, Single, Vector
 from hrc_env.experiments.speed.measured import (
     REACHER,
@@ -23,7 +24,6 @@ from hrc_env.experiments.speed.organs import Organs
 from hrc_env.experiments.speed.report import write_report
 from hrc_env.experiments.speed.starts import Starts
 from hrc_env.experiments.study.shelf import Say
-from hrc_env.results import Metric, write_results
 
 WATCHED = "keypoints"
 """The level whose organs are timed."""

@@ -9,7 +9,7 @@ import gymnasium
 import numpy as np
 
 import hrc_env  # noqa: F401  registers the ids
-from hrc_env.typing import Bools
+from hrc_env.core.typing import Bools
 
 OURS, PEER = "HRCReach-v0", "Reacher-v5"
 

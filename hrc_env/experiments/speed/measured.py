@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from hrc_env.results import Metric, over
+from hrc_env.core.results import Metric, over
 
 SINGLE = "single"
 """The environment that `gymnasium.make` gives, as opposed to a vector of one."""

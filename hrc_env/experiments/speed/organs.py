@@ -6,24 +6,18 @@ bench: no organ can become free of charge by moving elsewhere.
 
 from collections.abc import Mapping, Sequence
 
-from hrc_env import (
-    metrics,
-    observations,
-    rewards,
-    simulation,
-    vector_env,
-    vector_infos,
-)
-from hrc_env.errors import HRCError
+from hrc_env import metrics, observations, rewards, simulation
+from hrc_env.core.errors import HRCError
 from hrc_env.experiments.speed.contenders import Contender
 from hrc_env.experiments.speed.measured import RESET, REST, TOTAL
 from hrc_env.experiments.speed.stopwatch import Place, Stopwatch
 from hrc_env.geometry import chains
 from hrc_env.motion import generator
 from hrc_env.perception import emulator
+from hrc_env.pipeline.tracking import TrackingSenses
 from hrc_env.scene.physics import Physics
-from hrc_env.sensing.tracking import TrackingSenses
 from hrc_env.tasks import reach
+from hrc_env.vector import env, infos
 
 ORGANS: Mapping[str, Sequence[Place]] = {
     "physics": ((simulation, "joint_command"), (Physics, "step")),
@@ -46,9 +40,9 @@ ORGANS: Mapping[str, Sequence[Place]] = {
         (simulation, "tracking_info"),
         (simulation, "cost_info"),
         (simulation.Simulation, "_tally"),
-        (simulation.Outcome, "info_of"),
-        (vector_env, "table"),
-        (vector_infos.InfoTable, "arrays"),
+        (simulation.StepResult, "info_of"),
+        (env, "table"),
+        (infos.InfoTable, "arrays"),
     ),
     RESET: ((simulation.Simulation, "reset"),),
 }

@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from hrc_env.core.results import Metric
 from hrc_env.experiments.speed.measured import REST, SINGLE, TOTAL, configurations_of, title
 from hrc_env.experiments.speed.organs import ORGANS
-from hrc_env.results import Metric
 
 _COLOURS = (*(f"C{k}" for k in range(7)), "gold", "C9", "0.75")
 """Of the organs, of resets and of the rest."""

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+from hrc_env.core.provenance import provenance
+from hrc_env.core.results import Metric
 from hrc_env.experiments.speed.measured import (
     REACHER,
     REST,
@@ -13,8 +15,6 @@ from hrc_env.experiments.speed.measured import (
 )
 from hrc_env.experiments.speed.organs import ORGANS
 from hrc_env.experiments.speed.plot import plot_organs
-from hrc_env.provenance import provenance
-from hrc_env.results import Metric
 
 _Metrics = Mapping[str, Metric]
 

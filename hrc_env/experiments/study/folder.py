@@ -4,8 +4,8 @@ import json
 import shutil
 from pathlib import Path
 
-from hrc_env.errors import ConfigError
-from hrc_env.results import write_whole
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.results import write_whole
 
 LABEL = "experiment.json"
 """Says whose folder it is."""

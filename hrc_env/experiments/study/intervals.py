@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from hrc_env.results import Metric
-from hrc_env.typing import Floats
+from hrc_env.core.results import Metric
+from hrc_env.core.typing import Floats
 
 N_RESAMPLES = 4000
 

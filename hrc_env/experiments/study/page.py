@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from hrc_env.results import Metric, write_whole
+from hrc_env.core.results import Metric, write_whole
 
 _STYLE = """
 body { font: 17px/1.55 system-ui, sans-serif; color: #1c2430; max-width: 66rem;

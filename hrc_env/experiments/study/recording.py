@@ -9,17 +9,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hrc_env.batching import rows
-from hrc_env.body import stack, worker_truth
 from hrc_env.config import HRCConfig
+from hrc_env.core.batching import rows
+from hrc_env.core.records import Keypoints, PoseEstimate, WorkerMotion
+from hrc_env.core.typing import Bools, Covariances3, Ints, Points3
 from hrc_env.experiments.study.shelf import Tick
 from hrc_env.geometry.cameras import projections
-from hrc_env.records import Keypoints, PoseEstimate, WorkerMotion
+from hrc_env.pipeline.levels import make_senses
+from hrc_env.pipeline.sensor_input import Moment, Windows
 from hrc_env.scene.build import Scene
-from hrc_env.senses import make_senses
-from hrc_env.sensing.moment import Moment, Windows
 from hrc_env.tracking.estimators import make_estimator
-from hrc_env.typing import Bools, Covariances3, Ints, Points3
+from hrc_env.worker.body import stack, worker_truth
 
 
 @dataclass(frozen=True, slots=True)

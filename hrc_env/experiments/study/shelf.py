@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 import hrc_env
+from hrc_env.core.results import write_whole
 from hrc_env.perception.calibration import PACKAGED
-from hrc_env.results import write_whole
 
 Say = Callable[[float, str], None]
 """Told by how much the share that is done grew, and what is being done."""

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from hrc_env.core.typing import Floats, Points2
 from hrc_env.experiments.tracking.rigs import DT_S
-from hrc_env.typing import Floats, Points2
 
 LONGEST_DELAY_S = 0.5
 """How late a frame may be for the estimators' memory [s]."""

@@ -12,7 +12,8 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.results import Metric, write_results
 from hrc_env.experiments.study.shelf import Say, Shelf, Tick, fingerprint_of
 from hrc_env.experiments.tracking.cells import run_cell
 from hrc_env.experiments.tracking.detections import CONDITIONS
@@ -23,7 +24,6 @@ from hrc_env.experiments.tracking.report import write_report
 from hrc_env.experiments.tracking.rigs import RIGS, SIGMA_PX, Rig, make_rig
 from hrc_env.experiments.tracking.sequences import BOUNDED, Sequences, make_sequences
 from hrc_env.experiments.tracking.timing import BATCH, time_association, time_estimator
-from hrc_env.results import Metric, write_results
 from hrc_env.tracking.estimators import ESTIMATORS
 
 

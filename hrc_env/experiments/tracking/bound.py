@@ -11,14 +11,14 @@ as is usual; written here in covariances.
 
 import numpy as np
 
+from hrc_env.core.skeleton import N_JOINTS
+from hrc_env.core.typing import Bools, Covariances3, Floats, Points3
 from hrc_env.experiments.tracking.matched import (
     N_PLACES,
     MatchedModel,
     tilted,
 )
 from hrc_env.geometry.cameras import project
-from hrc_env.skeleton import N_JOINTS
-from hrc_env.typing import Bools, Covariances3, Floats, Points3
 
 
 def camera_information(P: Floats, joints: Points3, seen: Bools, sigma_px: float) -> Covariances3:

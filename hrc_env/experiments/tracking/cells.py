@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.batching import rows
+from hrc_env.core.batching import rows
+from hrc_env.core.records import Keypoints, PoseEstimate
+from hrc_env.core.typing import Covariances3, Points3
 from hrc_env.experiments.study.shelf import Tick
 from hrc_env.experiments.tracking.arrivals import in_time
 from hrc_env.experiments.tracking.couples import identities
@@ -16,11 +18,9 @@ from hrc_env.experiments.tracking.names import DEFAULT, DLT, FULL_STATE, SMOOTHE
 from hrc_env.experiments.tracking.rigs import DT_S, SIGMA_PX, Rig
 from hrc_env.experiments.tracking.sequences import Sequences
 from hrc_env.experiments.tracking.tally import tally
-from hrc_env.records import Keypoints, PoseEstimate
 from hrc_env.tracking.estimators import make_estimator
 from hrc_env.tracking.people.association import associate
 from hrc_env.tracking.smoother import smooth
-from hrc_env.typing import Covariances3, Points3
 
 UNKNOWN_M2 = 1e6
 """Variance of a bone's length of which nothing is known [m^2]."""

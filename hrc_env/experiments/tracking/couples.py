@@ -4,11 +4,11 @@ import itertools
 
 import numpy as np
 
+from hrc_env.core.skeleton import JOINT
+from hrc_env.core.typing import Bools, Floats, Ints, Points2, Points3
 from hrc_env.experiments.tracking.detections import Damage, detect
 from hrc_env.experiments.tracking.rigs import DT_S
 from hrc_env.experiments.tracking.walks import Path, bodies_along
-from hrc_env.skeleton import JOINT
-from hrc_env.typing import Bools, Floats, Ints, Points2, Points3
 
 MEETING_S = 3.0
 """When the two are side by side."""

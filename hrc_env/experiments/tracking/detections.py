@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hrc_env.core.skeleton import MIRROR
+from hrc_env.core.typing import Bools, Floats, Points2, Points3
 from hrc_env.experiments.tracking.rigs import DT_S, HEIGHT_PX, SIGMA_PX, WIDTH_PX
 from hrc_env.geometry.cameras import project
-from hrc_env.skeleton import MIRROR
-from hrc_env.typing import Bools, Floats, Points2, Points3
 
 _HZ = 1 / DT_S
 _DRIFT_TAU_S = 0.5

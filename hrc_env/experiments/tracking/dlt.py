@@ -7,7 +7,7 @@ a set of sequences is, whoever made it.
 
 import numpy as np
 
-from hrc_env.typing import Floats, Points2, Points3
+from hrc_env.core.typing import Floats, Points2, Points3
 
 
 def triangulate_frame(P: Floats, px: Points2, last: Points3) -> Points3:

@@ -9,6 +9,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from hrc_env.core.skeleton import N_JOINTS
+from hrc_env.core.typing import Covariances3, Floats, Points2, Points3
 from hrc_env.experiments.tracking.bound import (
     block_diagonal,
     camera_information,
@@ -24,8 +26,6 @@ from hrc_env.experiments.tracking.matched import (
     tilted,
 )
 from hrc_env.geometry.cameras import project
-from hrc_env.skeleton import N_JOINTS
-from hrc_env.typing import Covariances3, Floats, Points2, Points3
 
 _STEPS = 3
 """Steps of Gauss-Newton; more change nothing that could be seen."""

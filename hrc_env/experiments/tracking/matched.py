@@ -22,12 +22,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hrc_env.core.skeleton import BONES, N_JOINTS, TORSO
+from hrc_env.core.typing import Floats, Ints, Points3
 from hrc_env.experiments.tracking.rigs import DT_S
-from hrc_env.skeleton import BONES, N_JOINTS, TORSO
 from hrc_env.tracking.models.acquisition import STANDING_M
 from hrc_env.tracking.models.bones import STIFFNESS_M
 from hrc_env.tracking.models.motion import damped_joints
-from hrc_env.typing import Floats, Ints, Points3
 
 N_STATES = 6 * N_JOINTS
 N_PLACES = 3 * N_JOINTS

@@ -5,11 +5,11 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from hrc_env.core.results import Metric, over
+from hrc_env.core.typing import Floats
 from hrc_env.experiments.tracking.names import DEFAULT, RIVALS, names_of, rows
 from hrc_env.experiments.tracking.rigs import RIGS
 from hrc_env.experiments.tracking.sequences import MATCHED, MATCHED_BONES
-from hrc_env.results import Metric, over
-from hrc_env.typing import Floats
 
 TIMING = "timing"
 """The condition under which `Parts` holds microseconds."""

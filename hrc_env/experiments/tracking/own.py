@@ -9,16 +9,16 @@ from functools import lru_cache
 
 import numpy as np
 
-from hrc_env.body import worker_truth
 from hrc_env.config import HRCConfig
+from hrc_env.core.records import Keypoints
+from hrc_env.core.typing import Bools, Floats, Points3
 from hrc_env.experiments.tracking.rigs import Rig
 from hrc_env.geometry.cameras import projections
 from hrc_env.geometry.sight import nothing
 from hrc_env.motion import generator
 from hrc_env.perception import emulator
-from hrc_env.records import Keypoints
 from hrc_env.simulation import Simulation
-from hrc_env.typing import Bools, Floats, Points3
+from hrc_env.worker.body import worker_truth
 
 OWN = "own"
 """Name of the rig: the environment's room and its four cameras."""

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+from hrc_env.core.results import Metric
 from hrc_env.experiments.tracking.metrics import Parts
 from hrc_env.experiments.tracking.names import (
     DEFAULT,
@@ -16,7 +17,6 @@ from hrc_env.experiments.tracking.names import (
 from hrc_env.experiments.tracking.plots import plot_calibration, plot_error
 from hrc_env.experiments.tracking.rigs import RIGS
 from hrc_env.experiments.tracking.sequences import BOUNDED, LATE, MATCHED, TWO_WORKERS
-from hrc_env.results import Metric
 from hrc_env.tracking.estimators import ESTIMATORS
 
 _Metrics = Mapping[str, Metric]

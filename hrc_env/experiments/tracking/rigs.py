@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.errors import unknown
+from hrc_env.core.errors import unknown
+from hrc_env.core.typing import Floats
 from hrc_env.geometry.cameras import PinholeCamera, projections
 from hrc_env.geometry.rotations import look_at
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.typing import Floats
 
 DT_S = 0.04
 """Time between two sets of frames [s]."""

@@ -4,6 +4,9 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from hrc_env.core.records import Keypoints
+from hrc_env.core.skeleton import BONES
+from hrc_env.core.typing import Floats, Ints, Points2, Points3
 from hrc_env.experiments.tracking.arrivals import LONGEST_DELAY_S, delivered
 from hrc_env.experiments.tracking.bound import posterior_bound
 from hrc_env.experiments.tracking.couples import couples, detect_couples, shuffles
@@ -12,10 +15,7 @@ from hrc_env.experiments.tracking.matched import MatchedModel, draw, matched_mod
 from hrc_env.experiments.tracking.own import OWN, OWN_CONDITIONS, OWN_FRAMES, record
 from hrc_env.experiments.tracking.rigs import SIGMA_PX, Rig
 from hrc_env.experiments.tracking.walks import walk
-from hrc_env.records import Keypoints
-from hrc_env.skeleton import BONES
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.typing import Floats, Ints, Points2, Points3
 
 MATCHED, MATCHED_BONES = "matched", "matched_bones"
 TWO_WORKERS, LATE = "two_workers", "late"

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.skeleton import TORSO
-from hrc_env.typing import Bools, Covariances3, Floats, Ints, Points3
+from hrc_env.core.skeleton import TORSO
+from hrc_env.core.typing import Bools, Covariances3, Floats, Ints, Points3
 
 CHI2_95_3D = 7.815
 """95 % of a three-dimensional normal variable lies within this squared distance."""

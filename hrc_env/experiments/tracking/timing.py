@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from hrc_env.core.typing import Floats
 from hrc_env.experiments.study.shelf import Tick
 from hrc_env.experiments.tracking.couples import shuffles
 from hrc_env.experiments.tracking.detections import Damage, detect
@@ -13,7 +14,6 @@ from hrc_env.experiments.tracking.sequences import Sequences
 from hrc_env.experiments.tracking.walks import walk
 from hrc_env.tracking.estimators import make_estimator
 from hrc_env.tracking.people.association import associate
-from hrc_env.typing import Floats
 
 BATCH = 64
 _N_FRAMES, _FIRST = 75, 25

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hrc_env.core.skeleton import JOINT, N_JOINTS
+from hrc_env.core.typing import Floats, Points3
 from hrc_env.experiments.tracking.rigs import DT_S
 from hrc_env.geometry.rotations import about_axis
-from hrc_env.skeleton import JOINT, N_JOINTS
-from hrc_env.typing import Floats, Points3
 
 _SUBSTEPS = 8
 _SHORTEST = 500

@@ -2,7 +2,8 @@
 
 import math
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import between, blank
@@ -10,7 +11,6 @@ from hrc_env.motion.activities.worker import Place, Worker
 from hrc_env.motion.curves import cruise, min_jerk
 from hrc_env.motion.feet import step_time
 from hrc_env.motion.posture import RELAXED_ELBOW, RELAXED_PITCH, hang, stand
-from hrc_env.typing import Floats
 
 HIGHEST_RISER_M = 0.32
 """Greatest rise of one step [m]; ladders have rungs 0.25 to 0.30 m apart (EN 131-1)."""

@@ -1,6 +1,7 @@
 """Work at floor height with both hands: on a knee, or on the haunches."""
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import (
     CALM_M_S,
@@ -17,7 +18,6 @@ from hrc_env.motion.activities.planning import (
 )
 from hrc_env.motion.activities.strokes import BUSY
 from hrc_env.motion.activities.worker import Place, Worker
-from hrc_env.typing import Floats
 
 
 @kernel

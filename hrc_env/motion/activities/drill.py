@@ -3,7 +3,8 @@ pouch; overhead it holds the work up."""
 
 import math
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import (
     CALM_M_S,
@@ -21,8 +22,7 @@ from hrc_env.motion.activities.planning import (
 from hrc_env.motion.activities.strokes import BORE, PRESS
 from hrc_env.motion.activities.work import LOW_M
 from hrc_env.motion.activities.worker import Place, Worker
-from hrc_env.props import prop_index
-from hrc_env.typing import Floats
+from hrc_env.worker.props import prop_index
 
 DRILL = prop_index("drill")
 BIT_M, BIT_UP_M = 0.22, 0.09

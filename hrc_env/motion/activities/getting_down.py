@@ -2,13 +2,13 @@
 
 import math
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.worker import Worker
 from hrc_env.motion.anatomy import ANKLE_Z, LEG, STAND_SHARE, STAND_Z, THIGH_LENGTH
 from hrc_env.motion.feet import raise_heel
-from hrc_env.typing import Floats
 
 KNEE_M = 0.055
 """Height of a kneeling knee's joint above the floor [m]; half a knee."""

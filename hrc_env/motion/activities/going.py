@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import between, in_reach, shoulders
@@ -15,8 +16,7 @@ from hrc_env.motion.holding import GRIPS, drop_load, grip_load, place_load
 from hrc_env.motion.paths import lay_path
 from hrc_env.motion.posture import lean
 from hrc_env.motion.walk import plan_pace, plan_walk, root, speed, walk
-from hrc_env.props import prop_index
-from hrc_env.typing import Floats
+from hrc_env.worker.props import prop_index
 
 CART, WHEELBARROW = prop_index("cart"), prop_index("wheelbarrow")
 CART_AHEAD_M, WHEELBARROW_AHEAD_LEGS = 0.47, 0.26

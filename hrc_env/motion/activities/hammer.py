@@ -6,7 +6,8 @@ driving nails 1.25 to 2.0 m/s.
 
 import math
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import (
     CALM_M_S,
@@ -24,8 +25,7 @@ from hrc_env.motion.activities.planning import (
 from hrc_env.motion.activities.strokes import STRIKE
 from hrc_env.motion.activities.work import LOW_M
 from hrc_env.motion.activities.worker import Place, Worker
-from hrc_env.props import prop_index
-from hrc_env.typing import Floats
+from hrc_env.worker.props import prop_index
 
 HAMMER = prop_index("hammer")
 HEAD_M, FACE_M = 0.25, 0.05

@@ -7,7 +7,8 @@ median trial and 2.1 in the 95th percentile, heads at 1.6.
 
 import math
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import (
@@ -28,8 +29,7 @@ from hrc_env.motion.gaze import look_at
 from hrc_env.motion.holding import GRIPS, grip, place_load
 from hrc_env.motion.kinematics import pose
 from hrc_env.motion.posture import lean, stand
-from hrc_env.props import prop_index
-from hrc_env.typing import Floats
+from hrc_env.worker.props import prop_index
 
 BOX, BOARD = prop_index("box"), prop_index("board")
 BOX_AHEAD_M, BOX_SHARE = 0.37, 1.10

@@ -1,13 +1,13 @@
 """Looking round: the head to one side and the other, the trunk a little with it."""
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import between, blank
 from hrc_env.motion.activities.worker import Place, Worker
 from hrc_env.motion.curves import min_jerk
 from hrc_env.motion.posture import stand
-from hrc_env.typing import Floats
 
 TURN_S = 0.75
 """To turn the head across [s]; about 1.5 rad/s."""

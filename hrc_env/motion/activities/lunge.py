@@ -3,7 +3,8 @@
 Hands at 2.5 to 3.5 m/s; assumed, near the fastest arm movements at work.
 """
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import (
     between,
@@ -17,7 +18,6 @@ from hrc_env.motion.activities.planning import (
 from hrc_env.motion.activities.strokes import STILL
 from hrc_env.motion.activities.worker import Place, Worker
 from hrc_env.motion.anatomy import ARM
-from hrc_env.typing import Floats
 
 AHEAD_ARMS = (1.2, 1.5)
 """How far ahead it is, in lengths of the arm: a step and a bow away; judgement."""

@@ -1,6 +1,7 @@
 """Measuring: both hands pull a tape along the work, hold it still and read it."""
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import (
     CALM_M_S,
@@ -17,8 +18,7 @@ from hrc_env.motion.activities.planning import (
 from hrc_env.motion.activities.strokes import SHIFT
 from hrc_env.motion.activities.work import LOW_M
 from hrc_env.motion.activities.worker import Place, Worker
-from hrc_env.props import prop_index
-from hrc_env.typing import Floats
+from hrc_env.worker.props import prop_index
 
 TAPE = prop_index("tape_measure")
 

@@ -2,7 +2,8 @@
 
 import math
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import (
     between,
@@ -15,7 +16,6 @@ from hrc_env.motion.activities.planning import (
 from hrc_env.motion.activities.strokes import JAB
 from hrc_env.motion.activities.worker import Place, Worker
 from hrc_env.motion.anatomy import ARM, STAND_Z
-from hrc_env.typing import Floats
 
 SHOULDER_SHARE, SHOULDER_M = 1.50, 0.19
 """Height of the shoulder in heights of the pelvis, and its distance from the middle [m]."""

@@ -7,13 +7,13 @@ then both feet.
 
 import math
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.curves import min_jerk, ramp
 from hrc_env.motion.feet import foot, raise_heel
 from hrc_env.motion.posture import stand
-from hrc_env.typing import Floats
 
 STEP_AT_S, PERIOD_S, SWING_S = 0.12, 0.50, 0.42
 """First lift-off, then the times of `plans` of the steps into a clip and out of it [s]."""

@@ -3,7 +3,8 @@
 Wrists at 1.25 to 2.0 m/s (95th percentile) in the recordings.
 """
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 from hrc_env.motion.activities.planning import (
     CALM_M_S,
     between,
@@ -17,8 +18,7 @@ from hrc_env.motion.activities.planning import (
 )
 from hrc_env.motion.activities.strokes import SAW
 from hrc_env.motion.activities.worker import Place, Worker
-from hrc_env.props import prop_index
-from hrc_env.typing import Floats
+from hrc_env.worker.props import prop_index
 
 HAND_SAW = prop_index("saw")
 CUT_RAD = 0.6

@@ -6,11 +6,11 @@ that hand's target (to which `work.hands_on` adds the target itself).
 
 import math
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.curves import min_jerk
-from hrc_env.typing import Floats
 
 STILL, STRIKE, BORE, PRESS, SAW, SHIFT, BUSY, JAB = range(8)
 """Nothing; a hammer's blows; a drill's thrusts, the other hand fetching screws or not; a saw's

@@ -5,7 +5,8 @@ The first half of such an activity and its second half are mirror images in time
 
 import math
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.getting_down import get_down
@@ -14,7 +15,6 @@ from hrc_env.motion.curves import min_jerk
 from hrc_env.motion.gaze import look_at
 from hrc_env.motion.holding import GRIPS, TWO_HANDED, grip
 from hrc_env.motion.posture import lean, stand
-from hrc_env.typing import Floats
 
 GAZE_LEAD_S = 0.25
 """Eyes and head set off before the hand (Land & Hayhoe 2001: about half a second at most)."""

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from hrc_env.typing import Floats
+from hrc_env.core.typing import Floats
 
 N_START = 16
 """Uniform numbers that a start function may use."""

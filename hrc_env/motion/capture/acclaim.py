@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.typing import Floats, Ints, Rotations
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.motion.capture.record import Moving, forward
 from hrc_env.motion.capture.rows import FEWEST_FRAMES, Rows, number
-from hrc_env.typing import Floats, Ints, Rotations
 
 ROOT = "root"
 FREEDOMS = ("tx", "ty", "tz", "rx", "ry", "rz")

@@ -6,10 +6,10 @@ directions and take the worker's lengths.
 
 import numpy as np
 
+from hrc_env.core.skeleton import JOINT
+from hrc_env.core.typing import Bools, Floats, Points3
 from hrc_env.motion.capture.marks import Marks
 from hrc_env.motion.capture.person import across, length, middle
-from hrc_env.skeleton import JOINT
-from hrc_env.typing import Bools, Floats, Points3
 
 STILL_M_S = 0.15
 """An ankle slower than this stands, if it is low [m/s]."""

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
+from hrc_env.core.typing import Floats, Rotations
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.motion.capture.record import Moving, forward
 from hrc_env.motion.capture.rows import Rows, number, numbers_of, usable_frames
-from hrc_env.typing import Floats, Rotations
 
 CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "xyz")
 

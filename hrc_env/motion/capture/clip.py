@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.typing import Bools, Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import ANKLE_Z, ARM, LEG, N_SIZES, STAND_Z
 from hrc_env.motion.capture.record import check_rate
-from hrc_env.typing import Bools, Floats
 
 VERSION = 1
 """Of the file; raised when its columns or fields change."""

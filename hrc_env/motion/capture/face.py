@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from hrc_env.core.skeleton import JOINTS, N_JOINTS
+from hrc_env.core.typing import Floats, Points3
 from hrc_env.motion.capture.person import across, middle, stature
 from hrc_env.motion.capture.record import Moving
-from hrc_env.skeleton import JOINTS, N_JOINTS
-from hrc_env.typing import Floats, Points3
 
 NOSE_SHARE = 0.065
 """From the head's joint forward to the nose, as a share of stature (the baked bodies)."""

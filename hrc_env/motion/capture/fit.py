@@ -9,12 +9,12 @@ from typing import TypeAlias
 
 import numpy as np
 
+from hrc_env.core.skeleton import JOINTS
+from hrc_env.core.typing import Floats, Points3
 from hrc_env.motion import controls as c
 from hrc_env.motion.capture.guess import PELVIS_SHARE, first_guess
 from hrc_env.motion.capture.marks import Marks, joints_in
 from hrc_env.motion.capture.series import smoothed
-from hrc_env.skeleton import JOINTS
-from hrc_env.typing import Floats, Points3
 
 Say: TypeAlias = Callable[[float], None]
 """Told by how much the share that is done grew."""

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.skeleton import JOINTS, N_JOINTS
+from hrc_env.core.typing import Points3
 from hrc_env.motion.capture.rows import FEWEST_FRAMES
-from hrc_env.skeleton import JOINTS, N_JOINTS
-from hrc_env.typing import Points3
 
 
 def read_joints(path: Path) -> tuple[Points3, float]:

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.body import SEGMENT, Body
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.skeleton import JOINTS
+from hrc_env.core.typing import Floats, Ints, Points3
 from hrc_env.motion.anatomy import Anatomy, anatomy
 from hrc_env.motion.kinematics import N_FRAMES, N_POINTS, pose
-from hrc_env.skeleton import JOINTS
-from hrc_env.typing import Floats, Ints, Points3
+from hrc_env.worker.body import SEGMENT, Body
 
 STARTS = {
     "shoulder": "upper_arm", "elbow": "forearm", "wrist": "hand",

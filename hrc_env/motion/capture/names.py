@@ -2,8 +2,8 @@
 
 import re
 
-from hrc_env.errors import ConfigError
-from hrc_env.skeleton import JOINTS
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.skeleton import JOINTS
 
 SIDED: dict[str, tuple[str, ...]] = {
     "shoulder": ("uparm", "upperarm", "arm", "humerus", "shoulder"),

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from hrc_env.errors import ConfigError
-from hrc_env.skeleton import BONE_LENGTH_M, BONES, JOINT, JOINTS
-from hrc_env.typing import Floats, Points3
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.skeleton import BONE_LENGTH_M, BONES, JOINT, JOINTS
+from hrc_env.core.typing import Floats, Points3
 
 MEASURED_SHARE = 0.755
 """Shank, thigh and trunk together as a share of stature (the baked bodies)."""

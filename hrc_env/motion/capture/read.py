@@ -4,7 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.skeleton import JOINTS
+from hrc_env.core.typing import Points3
 from hrc_env.motion.capture import repair
 from hrc_env.motion.capture.acclaim import read_acclaim
 from hrc_env.motion.capture.bvh import read_bvh
@@ -14,8 +16,6 @@ from hrc_env.motion.capture.names import find_joints
 from hrc_env.motion.capture.person import check_person
 from hrc_env.motion.capture.record import Capture, check_rate
 from hrc_env.motion.capture.series import resampled
-from hrc_env.skeleton import JOINTS
-from hrc_env.typing import Points3
 
 SUFFIXES = (".bvh", ".amc", ".npz")
 CMU_HZ = 120.0

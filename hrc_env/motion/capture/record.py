@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.errors import ConfigError, check_shape
-from hrc_env.skeleton import N_JOINTS
-from hrc_env.typing import Floats, Ints, Points3, Rotations
+from hrc_env.core.errors import ConfigError, check_shape
+from hrc_env.core.skeleton import N_JOINTS
+from hrc_env.core.typing import Floats, Ints, Points3, Rotations
 
 SLOWEST_HZ, FASTEST_HZ = 5.0, 1000.0
 """Frame rates between which a recording is believed; judgement: below, a step is lost."""
@@ -17,7 +17,7 @@ class Capture:
     """A person's joints over time, upright on the floor."""
 
     joints_world: Points3
-    """(T, 15, 3) joints in the order of `hrc_env.skeleton.JOINTS`, +Z up, floor at 0 [m]."""
+    """(T, 15, 3) joints in the order of `hrc_env.core.skeleton.JOINTS`, +Z up, floor at 0 [m]."""
     fps: float
     """Frames a second."""
     landmarks: bool

@@ -6,12 +6,12 @@ changed; a file's trouble is always one of the same few.
 
 import numpy as np
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.skeleton import JOINT, JOINTS
+from hrc_env.core.typing import Bools, Floats, Points3
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.motion.capture.person import STATURES_M, forwards, stature, upright
 from hrc_env.motion.capture.series import bridged, runs
-from hrc_env.skeleton import JOINT, JOINTS
-from hrc_env.typing import Bools, Floats, Points3
 
 UNITS: dict[str, float] = {
     "metres": 1.0,

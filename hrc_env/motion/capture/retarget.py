@@ -4,14 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.body import Body
+from hrc_env.core.typing import Floats, Points3
 from hrc_env.motion.capture.adapt import adapted
 from hrc_env.motion.capture.clip import Clip, placed_at_origin
 from hrc_env.motion.capture.fit import Say, fitted
 from hrc_env.motion.capture.marks import joints_in, marks_of
 from hrc_env.motion.capture.record import Capture
 from hrc_env.motion.capture.stance import locked, slip
-from hrc_env.typing import Floats, Points3
+from hrc_env.worker.body import Body
 
 
 @dataclass(frozen=True, slots=True)

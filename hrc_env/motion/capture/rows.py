@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from hrc_env.errors import ConfigError
-from hrc_env.typing import Floats
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.typing import Floats
 
 FEWEST_FRAMES = 2
 LEAST_SHARE = 0.5

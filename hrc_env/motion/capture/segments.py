@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from hrc_env.body import N_SEGMENTS
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats, Points3, QuaternionsWxyz
 from hrc_env.motion.anatomy import Anatomy
 from hrc_env.motion.kinematics import N_FRAMES, N_POINTS, pose, quaternion
-from hrc_env.typing import Floats, Points3, QuaternionsWxyz
+from hrc_env.worker.body import N_SEGMENTS
 
 
 def segments_in(controls: Floats, anatomy: Anatomy) -> tuple[Points3, QuaternionsWxyz]:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hrc_env.typing import Bools, Floats
+from hrc_env.core.typing import Bools, Floats
 
 
 def smoothed(values: Floats, sigma_frames: float) -> Floats:

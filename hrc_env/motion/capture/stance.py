@@ -7,14 +7,14 @@ is set to one place then, and what that changes fades out in the swings before a
 
 import numpy as np
 
-from hrc_env.body import SEGMENT
+from hrc_env.core.typing import Bools, Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import ANKLE_Z, BALL_X, BALL_Z, HEEL_X, Anatomy
 from hrc_env.motion.capture.segments import segments_in
 from hrc_env.motion.capture.series import runs, smoothed
 from hrc_env.motion.curves import decay
 from hrc_env.motion.feet import about
-from hrc_env.typing import Bools, Floats
+from hrc_env.worker.body import SEGMENT
 
 RESTS_M_S = 0.2
 """A footprint slower than this rests [m/s]: a small step moves it at 0.3, a stride at 2."""

@@ -6,8 +6,8 @@ a few pixels underflows long before the particles are bad.
 
 import math
 
+from hrc_env.core.kernels import kernel
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
-from hrc_env.kernels import kernel
 
 BEHIND = -1e12
 """Log-likelihood of a particle behind the camera that saw the joint: the last to be chosen."""

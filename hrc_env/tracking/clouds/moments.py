@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from hrc_env.kernels import kernel
-from hrc_env.typing import Covariances3, Floats, Points3
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Covariances3, Floats, Points3
 
 
 def scatter(particles: Floats, mean: Points3, cov: Covariances3, rng: np.random.Generator) -> None:

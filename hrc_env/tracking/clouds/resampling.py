@@ -3,7 +3,7 @@
 The random numbers are arguments, so that each environment draws its own.
 """
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
 
 
 @kernel(makes_arrays=True)

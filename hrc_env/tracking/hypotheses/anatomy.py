@@ -4,7 +4,7 @@ A body that is tracked mirrored in depth has them behind. That is told between h
 potential of the pose that is believed now, not anew with every frame: it does not add up.
 """
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
 from hrc_env.tracking.models.acquisition import heading
 
 _FEATURES = (

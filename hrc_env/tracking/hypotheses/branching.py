@@ -8,7 +8,7 @@ negligible, becomes a hypothesis.
 
 import numpy as np
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
 from hrc_env.tracking.hypotheses.anatomy import anatomy
 from hrc_env.tracking.hypotheses.mirrors import (
     N_MIRRORS,

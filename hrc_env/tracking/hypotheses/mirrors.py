@@ -7,10 +7,10 @@ starting points for a search; bones, places on the body and motion decide what b
 
 import numpy as np
 
+from hrc_env.core.kernels import kernel
+from hrc_env.core.skeleton import N_JOINTS, TORSO
+from hrc_env.core.typing import Bools
 from hrc_env.geometry.triangulation import inverse3
-from hrc_env.kernels import kernel
-from hrc_env.skeleton import N_JOINTS, TORSO
-from hrc_env.typing import Bools
 
 _PARTS: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...] = (
     (tuple(int(j) for j in TORSO), tuple(range(N_JOINTS))),  # the whole body

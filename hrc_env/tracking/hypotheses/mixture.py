@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.hypotheses.slots import hypotheses
 from hrc_env.tracking.settings import Settings

@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats, Ints
 from hrc_env.tracking.kalman import KalmanState
 from hrc_env.tracking.tree.evidence import distance_between
-from hrc_env.typing import Floats, Ints
 
 
 class Hypotheses(NamedTuple):

@@ -8,8 +8,8 @@ import math
 
 import numpy as np
 
+from hrc_env.core.kernels import kernel
 from hrc_env.geometry.triangulation import inverse3
-from hrc_env.kernels import kernel
 from hrc_env.tracking.joints.importance import (
     cholesky3,
     draw,

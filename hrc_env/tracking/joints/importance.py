@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
 
 _f = np.float32
 _LOG2_E, _LN_2 = np.float32(math.log2(math.e)), np.float32(math.log(2.0))

@@ -8,9 +8,9 @@ import math
 
 import numpy as np
 
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 from hrc_env.geometry.triangulation import consensus_point
-from hrc_env.kernels import kernel
-from hrc_env.typing import Floats
 
 STANDING_M: Floats = np.array(
     [

@@ -9,10 +9,10 @@ import math
 
 import numpy as np
 
-from hrc_env.kernels import kernel
-from hrc_env.skeleton import BONE_LENGTH_M, BONES, JOINT
+from hrc_env.core.kernels import kernel
+from hrc_env.core.skeleton import BONE_LENGTH_M, BONES, JOINT
+from hrc_env.core.typing import Floats
 from hrc_env.tracking.models.motion import relative_covariance, shared_covariance
-from hrc_env.typing import Floats
 
 POPULATION_SHARE = 0.10
 """Standard deviation of a bone's length over people, as a share of it."""

@@ -11,10 +11,10 @@ import math
 
 import numpy as np
 
-from hrc_env.kernels import kernel
-from hrc_env.skeleton import TORSO
+from hrc_env.core.kernels import kernel
+from hrc_env.core.skeleton import TORSO
+from hrc_env.core.typing import Floats
 from hrc_env.tracking.models.acquisition import heading
-from hrc_env.typing import Floats
 
 SPREAD_M: Floats = np.array(
     [.06, .04, .04, .12, .12, .20, .20, .04, .04, .12, .12, .20, .20, .22, .22]

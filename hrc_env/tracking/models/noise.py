@@ -23,8 +23,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hrc_env.core.kernels import kernel
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, inverse3
-from hrc_env.kernels import kernel
 from hrc_env.tracking.config import TrackerConfig
 
 N_SUMS = 5

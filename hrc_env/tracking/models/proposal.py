@@ -8,8 +8,8 @@ taken for outliers (graduated non-convexity), and ends with the likelihood as it
 
 import math
 
+from hrc_env.core.kernels import kernel
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, inverse3, pixel_of
-from hrc_env.kernels import kernel
 
 _REORDER = {"reassoc", "contract", "arcp", "nsz"}  # NaN and infinity keep their meaning
 

@@ -9,9 +9,9 @@ seem to be wrong.
 
 import math
 
+from hrc_env.core.kernels import kernel
+from hrc_env.core.skeleton import MIRROR
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
-from hrc_env.kernels import kernel
-from hrc_env.skeleton import MIRROR
 from hrc_env.tracking.measurements import pixel_spread
 from hrc_env.tracking.models.proposal import contrast_of
 

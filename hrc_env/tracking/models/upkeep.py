@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
 from hrc_env.tracking.models.acquisition import (
     complete_body,
     distance,

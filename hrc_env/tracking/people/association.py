@@ -13,11 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hrc_env.errors import ConfigError, check_shape
+from hrc_env.core.errors import ConfigError, check_shape
+from hrc_env.core.kernels import kernel
+from hrc_env.core.records import Keypoints, PoseEstimate
+from hrc_env.core.skeleton import BONE_LENGTH_M, BONES, MIRROR, N_JOINTS
+from hrc_env.core.typing import Floats, Ints
 from hrc_env.geometry.assignment import assign_rows
-from hrc_env.kernels import kernel
-from hrc_env.records import Keypoints, PoseEstimate
-from hrc_env.skeleton import BONE_LENGTH_M, BONES, MIRROR, N_JOINTS
 from hrc_env.tracking.measurements import arrays_of, is_measurement
 from hrc_env.tracking.people.newcomers import (
     camera_model,
@@ -27,7 +28,6 @@ from hrc_env.tracking.people.newcomers import (
     propose,
 )
 from hrc_env.tracking.people.resemblance import LEAST_JOINTS, expect, resemblance
-from hrc_env.typing import Floats, Ints
 
 
 @dataclass(frozen=True, slots=True)

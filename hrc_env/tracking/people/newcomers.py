@@ -14,8 +14,8 @@ import math
 
 import numpy as np
 
+from hrc_env.core.kernels import kernel
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
-from hrc_env.kernels import kernel
 from hrc_env.tracking.people.resemblance import expect, resemblance
 
 MEETING_M = 0.03

@@ -10,8 +10,8 @@ import math
 
 import numpy as np
 
+from hrc_env.core.kernels import kernel
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
-from hrc_env.kernels import kernel
 from hrc_env.tracking.measurements import pixel_spread
 
 LEAST_JOINTS = 3

@@ -8,11 +8,11 @@ import math
 
 import numpy as np
 
-from hrc_env.kernels import kernel
-from hrc_env.skeleton import BONE_LENGTH_M
+from hrc_env.core.kernels import kernel
+from hrc_env.core.skeleton import BONE_LENGTH_M
+from hrc_env.core.typing import Floats
 from hrc_env.tracking.models.bones import POPULATION_SHARE, STIFFNESS_M, learn_length
 from hrc_env.tracking.tree.gaussian import EDGE_BONE, PARENT, ROOT
-from hrc_env.typing import Floats
 
 _STIFFNESS = tuple(0.0 if j == ROOT else float(STIFFNESS_M[k]) for j, k in enumerate(EDGE_BONE))
 

@@ -14,9 +14,9 @@ import math
 
 import numpy as np
 
+from hrc_env.core.kernels import kernel
+from hrc_env.core.skeleton import JOINT
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
-from hrc_env.kernels import kernel
-from hrc_env.skeleton import JOINT
 from hrc_env.tracking.tree.gaussian import ORDER, PARENT, multiply, multiply_transposed
 
 _NOSE, _RIGHT_SHOULDER = JOINT["nose"], JOINT["right_shoulder"]

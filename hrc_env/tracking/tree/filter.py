@@ -6,7 +6,7 @@ z (J, C, 2), sigma (J, C), ok (J, C) as `measurements.read_worker` fills them.
 
 import numpy as np
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
 from hrc_env.tracking.measurements import read_worker
 from hrc_env.tracking.models.acquisition import count_conflict
 from hrc_env.tracking.models.noise import learn_noise, scale_sigma

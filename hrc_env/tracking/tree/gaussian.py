@@ -9,8 +9,8 @@ the root, the slope B_j (6, 6) with which it follows its parent q:
 Everything that these say is exact; a joint depends on all others through its parent only.
 """
 
-from hrc_env.kernels import kernel
-from hrc_env.skeleton import BONES, N_JOINTS
+from hrc_env.core.kernels import kernel
+from hrc_env.core.skeleton import BONES, N_JOINTS
 
 PARENT = (1, -1, 1, 1, 2, 3, 4, 1, 2, 7, 8, 9, 10, 11, 12)
 """Parents: the nose, the right shoulder and the left half hang on the left shoulder."""

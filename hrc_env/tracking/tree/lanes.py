@@ -7,9 +7,9 @@ one number for each joint and one that is nobody's.
 
 import math
 
+from hrc_env.core.kernels import kernel
+from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M
-from hrc_env.kernels import kernel
-from hrc_env.skeleton import N_JOINTS
 
 LANES = 16
 """Joints, rounded up to a whole number of vectors."""

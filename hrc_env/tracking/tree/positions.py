@@ -6,7 +6,7 @@ The prior of the positions alone is taken as a tree of 3-vectors; rows and quads
 
 import math
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
 from hrc_env.tracking.tree.gaussian import inverse_of
 from hrc_env.tracking.tree.quads import (
     ABOVE,

@@ -8,7 +8,7 @@ forgetting all other covariances is the nearest Gaussian on the tree (least Kull
 divergence).
 """
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
 from hrc_env.tracking.models.acquisition import heading
 from hrc_env.tracking.models.motion import learn_offsets
 from hrc_env.tracking.tree.gaussian import multiply, multiply_transposed

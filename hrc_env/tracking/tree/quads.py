@@ -9,7 +9,7 @@ A matrix of 6x6 is 36 rows, row by row; `rows` is one flat array, and matrices a
 they begin in it.
 """
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
 from hrc_env.tracking.tree.gaussian import PARENT, inverse_of
 from hrc_env.tracking.tree.lanes import JOINT_OF_LANE, LANE_OF_JOINT, LANES
 from hrc_env.tracking.tree.vectors import (

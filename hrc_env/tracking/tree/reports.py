@@ -1,6 +1,6 @@
 """What is told of a Gaussian on the tree: each joint for itself, no more certain than is honest."""
 
-from hrc_env.kernels import kernel
+from hrc_env.core.kernels import kernel
 from hrc_env.tracking.tracks import bound
 
 _FORGOTTEN_UPDATES = 8

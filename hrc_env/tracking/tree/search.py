@@ -7,8 +7,8 @@ The prior of the positions alone is taken as a tree of 3-vectors; cameras inform
 
 import math
 
-from hrc_env.kernels import kernel
-from hrc_env.skeleton import JOINT
+from hrc_env.core.kernels import kernel
+from hrc_env.core.skeleton import JOINT
 from hrc_env.tracking.tree.gaussian import PARENT
 from hrc_env.tracking.tree.lanes import (
     JOINT_OF_LANE,

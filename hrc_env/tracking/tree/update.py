@@ -5,8 +5,8 @@ the same tree: elimination from the leaves to the root and substitution back giv
 and slopes exactly.
 """
 
+from hrc_env.core.kernels import kernel
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
-from hrc_env.kernels import kernel
 from hrc_env.tracking.measurements import pixel_spread
 from hrc_env.tracking.tree.gaussian import PARENT
 from hrc_env.tracking.tree.lanes import JOINT_OF_LANE, LANE_OF_JOINT, LANES

@@ -4,11 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hrc_env.kernels import kernel
-from hrc_env.skeleton import N_JOINTS
+from hrc_env.core.kernels import kernel
+from hrc_env.core.skeleton import N_JOINTS
+from hrc_env.core.typing import Floats, Ints
 from hrc_env.tracking.tree.lanes import LANES, N_JOINT_ROWS, N_SUM_ROWS, N_VIEW_ROWS
 from hrc_env.tracking.tree.quads import QUAD, QUADS
-from hrc_env.typing import Floats, Ints
 
 
 class Work(NamedTuple):

@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from written import ORDERS, Y_UP, angles_of, cmu_name, write_acclaim, write_bvh
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.skeleton import JOINTS
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.motion.capture.bvh import read_bvh
 from hrc_env.motion.capture.names import HEAD, SIDED
 from hrc_env.motion.capture.read import read_capture
-from hrc_env.skeleton import JOINTS
 
 KNOWN = [j for j, joint in enumerate(JOINTS) if not joint.endswith(("nose", "foot"))]
 

@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.skeleton import JOINT, MIRROR
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.motion.capture import repair
 from hrc_env.motion.capture.read import read_capture
 from hrc_env.motion.capture.series import resampled, smoothed
-from hrc_env.skeleton import JOINT, MIRROR
 
 UPS = {
     "+y": about_axis("x", -np.pi / 2), "-y": about_axis("x", np.pi / 2),

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from written import BODY, write_bvh
 
-from hrc_env.body import SEGMENT, load_body, worker_names
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import LEG, anatomy
 from hrc_env.motion.capture.clip import fitted_to, load_clip, save_clip
@@ -15,6 +14,7 @@ from hrc_env.motion.capture.marks import joints_in, marks_of
 from hrc_env.motion.capture.read import read_capture
 from hrc_env.motion.capture.retarget import aligned_errors, retarget
 from hrc_env.motion.capture.segments import segments_in
+from hrc_env.worker.body import SEGMENT, load_body, worker_names
 
 
 @pytest.fixture(scope="module")

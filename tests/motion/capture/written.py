@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from hrc_env.body import PARENT, SEGMENT, SEGMENTS, load_body, worker_truth
+from hrc_env.core.records import WorkerMotion
 from hrc_env.geometry.rotations import about_axis, matrix_from_quaternion
 from hrc_env.motion.capture.marks import marks_of
-from hrc_env.records import WorkerMotion
+from hrc_env.worker.body import PARENT, SEGMENT, SEGMENTS, load_body, worker_truth
 
 AXES = "xyz"
 Y_UP = about_axis("x", -np.pi / 2)

@@ -11,15 +11,15 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from hrc_env.batching import one
-from hrc_env.body import load_body, worker_truth
+from hrc_env.core.batching import one
+from hrc_env.core.records import Roi, WorkerMotion
 from hrc_env.geometry.cameras import project, projections
 from hrc_env.motion import generator
 from hrc_env.motion.config import MotionConfig
 from hrc_env.perception.windows import window_from_joints
-from hrc_env.records import CropWindow, WorkerMotion
 from hrc_env.scene.build import build
 from hrc_env.scene.render import CropRenderer
+from hrc_env.worker.body import load_body, worker_truth
 
 DATA = Path(__file__).parents[1] / "data"
 SIDE_PX = 256
@@ -60,7 +60,7 @@ def draw(name: str, renderer: CropRenderer, motion: WorkerMotion, camera: int) -
         raise SystemExit(f"Camera {camera} does not see the worker of {name!r}: choose another.")
     x, y = window.centre_px
     renderer.draw(renderer.scene.home_q, now)
-    picture = renderer.crop(camera, CropWindow((x + 15, y - 10), 1.15 * window.side_px, 0.0))
+    picture = renderer.crop(camera, Roi((x + 15, y - 10), 1.15 * window.side_px, 0.0))
     cv2.imwrite(str(DATA / f"{name}.png"), picture[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 9])
 
 

@@ -1,6 +1,6 @@
 """All studies by name, in the order of the report."""
 
-from hrc_env.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.experiments.beyond.studies.algorithm1 import ALGORITHM_1
 from hrc_env.experiments.beyond.studies.calibration import CALIBRATION
 from hrc_env.experiments.beyond.studies.cameras import CAMERAS

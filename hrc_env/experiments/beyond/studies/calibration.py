@@ -5,8 +5,8 @@ import math
 from hrc_env.experiments.beyond.metrics import Found
 from hrc_env.experiments.beyond.study import Curves, Line, Panel, Rows, Study
 from hrc_env.experiments.beyond.trial.setting import Setting, Turn
-from hrc_env.faults.fault import ALL as EVERY
-from hrc_env.faults.fault import FaultConfig
+from hrc_env.perception.faults.fault import ALL as EVERY
+from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.scene.rigs import RIGS
 
 AMOUNTS: dict[str, tuple[float, ...]] = {

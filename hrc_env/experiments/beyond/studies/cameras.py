@@ -14,7 +14,7 @@ from hrc_env.experiments.beyond.trial.setting import (
     left_of,
     left_with,
 )
-from hrc_env.optics.camera import CameraConfig
+from hrc_env.geometry.camera_config import CameraConfig
 
 X_M, Y_M, UNDER_CEILING_M, BREAST_M = 2.9, 2.6, 2.45, 1.0
 """Cameras hang so far from the laboratory's middle and above its floor [m]."""

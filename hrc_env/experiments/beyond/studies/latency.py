@@ -6,7 +6,7 @@ from hrc_env.experiments.beyond.metrics import Found
 from hrc_env.experiments.beyond.study import Curves, Panel, Study, across
 from hrc_env.experiments.beyond.trial.play import DT_S
 from hrc_env.experiments.beyond.trial.setting import Setting, Turn
-from hrc_env.faults.fault import FaultConfig
+from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.scene.rigs import RIGS
 
 LATE_MS = (40, 80, 120, 200, 320)

@@ -11,7 +11,7 @@ from hrc_env.experiments.beyond.trial.setting import (
     Turn,
     left_of,
 )
-from hrc_env.faults.fault import FaultConfig
+from hrc_env.perception.faults.fault import FaultConfig
 
 SCENES = ("lab", "site")
 LEFT = {0: (ALL,), 1: TRIPLES, 2: PAIRS, 3: SINGLE}

@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.errors import ConfigError
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.typing import Floats, Points3
 from hrc_env.tracking.tree.gaussian import PARENT, ROOT
-from hrc_env.typing import Floats, Points3
 
 BONES = ("learnt", "known", "none")
 """Lengths as the filter learns them; the true ones, given; nothing is expected of any."""

@@ -8,22 +8,22 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2
 
-from hrc_env.batching import rows
-from hrc_env.body import worker_truth
 from hrc_env.config import HRCConfig
-from hrc_env.errors import ConfigError
+from hrc_env.core.batching import rows
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.records import Keypoints, PoseEstimate
+from hrc_env.core.typing import Ints, Points3
 from hrc_env.experiments.beyond.trial.handicaps import handicap, lengths_m
 from hrc_env.experiments.beyond.trial.setting import WARM_UP_S, Setting, Turn
 from hrc_env.experiments.beyond.trial.tally import Played, Rows, joined, sums_of
 from hrc_env.experiments.beyond.trial.truth import matched, n_seeing
 from hrc_env.experiments.beyond.trial.walks import BODIES, Walks
 from hrc_env.experiments.study.shelf import Tick
-from hrc_env.records import Keypoints, PoseEstimate
+from hrc_env.pipeline.levels import make_senses
+from hrc_env.pipeline.sensor_input import Generators, Moment
+from hrc_env.pipeline.tracking import TrackingSenses
 from hrc_env.scene.build import Scene, build
-from hrc_env.senses import make_senses
-from hrc_env.sensing.moment import Generators, Moment
-from hrc_env.sensing.tracking import TrackingSenses
-from hrc_env.typing import Ints, Points3
+from hrc_env.worker.body import worker_truth
 
 LEVEL = "keypoints"
 DT_S = HRCConfig().ctrl_dt

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from hrc_env.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.experiments.beyond.trial.handicaps import BONES, MOTION, TREES
-from hrc_env.faults.fault import FaultConfig
-from hrc_env.optics.camera import CameraConfig
+from hrc_env.geometry.camera_config import CameraConfig
+from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.scene.rigs import RIGS
 from hrc_env.tracking.config import TrackerConfig
 

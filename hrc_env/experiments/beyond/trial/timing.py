@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.batching import rows
+from hrc_env.core.batching import rows
 from hrc_env.experiments.beyond.trial.handicaps import BONES, MOTION
 from hrc_env.experiments.beyond.trial.play import DT_S, N_WARM_UP, eyes_of, watch
 from hrc_env.experiments.beyond.trial.setting import Setting

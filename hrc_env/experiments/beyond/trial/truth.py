@@ -4,12 +4,12 @@ from itertools import permutations
 
 import numpy as np
 
+from hrc_env.core.typing import Bools, Ints, Points3
 from hrc_env.experiments.beyond.trial.setting import Turn
 from hrc_env.perception.emulator import lines_of_sight
 from hrc_env.perception.sightlines import SEEN
+from hrc_env.pipeline.sensor_input import Moment
 from hrc_env.scene.build import Scene
-from hrc_env.sensing.moment import Moment
-from hrc_env.typing import Bools, Ints, Points3
 
 
 def matched(mean_world: Points3, tracked: Bools, joints_world: Points3) -> Ints:

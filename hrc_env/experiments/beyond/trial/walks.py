@@ -5,12 +5,12 @@ from functools import lru_cache
 
 import numpy as np
 
-from hrc_env.body import Bodies, pool, stack
 from hrc_env.config import HRCConfig
+from hrc_env.core.records import WorkerMotion
+from hrc_env.core.typing import JointAngles
 from hrc_env.motion import generator
-from hrc_env.records import WorkerMotion
 from hrc_env.scene.build import build
-from hrc_env.typing import JointAngles
+from hrc_env.worker.body import Bodies, pool, stack
 
 BODIES = "any"
 """Every episode gives each worker one of the baked bodies."""

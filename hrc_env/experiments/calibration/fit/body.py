@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from hrc_env.core.typing import Floats
 from hrc_env.experiments.calibration.fit.cells import FEW, N_P, N_S, Cells
 from hrc_env.perception.calibration import BODY_KNOTS, KINDS
-from hrc_env.typing import Floats
 
 LOG_RAYLEIGH_VAR = np.pi**2 / 24
 """Of the logarithm of the length of two normal variables of standard deviation 1."""

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.experiments.calibration.samples import Samples
 from hrc_env.perception.calibration import HAND, KIND, KINDS, N_VIEWS, POSTURES, SIGHTS
-from hrc_env.typing import Bools, Floats, Ints
 
 N_K, N_P, N_S = len(KINDS), len(POSTURES), len(SIGHTS)
 FEW = 300

@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 
+from hrc_env.core.typing import Floats
 from hrc_env.experiments.calibration.fit.body import LOG_RAYLEIGH_VAR
 from hrc_env.experiments.calibration.fit.cells import FEW, N_K, N_P, N_S, Cells, mix
 from hrc_env.experiments.calibration.samples import Samples
 from hrc_env.perception.calibration import KIND, KNOTS, VISIBILITY
 from hrc_env.perception.eyes import STATURE_OF_SIDE
 from hrc_env.perception.sightlines import OUTSIDE
-from hrc_env.typing import Floats
 
 TOLD = 1.2
 """What is told is larger than what is measured by this, as errors that last and that cameras share

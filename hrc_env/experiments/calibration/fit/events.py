@@ -4,12 +4,12 @@ import numpy as np
 from scipy.optimize import isotonic_regression
 from scipy.special import ndtri, owens_t
 
+from hrc_env.core.typing import Bools, Floats
 from hrc_env.experiments.calibration.clips import DT_S
 from hrc_env.experiments.calibration.fit.cells import FEW, N_P, class_of
 from hrc_env.experiments.calibration.samples import Samples
 from hrc_env.perception.calibration import N_SEEN, N_VIEWS
 from hrc_env.perception.sightlines import SEEN
-from hrc_env.typing import Bools, Floats
 
 LAGS = (5, 12, 25, 40)
 """In frames, at which it is asked whether it still happens."""

@@ -4,12 +4,12 @@ import itertools
 
 import numpy as np
 
+from hrc_env.core.typing import Floats
 from hrc_env.experiments.calibration.clips import DT_S
 from hrc_env.experiments.calibration.fit.cells import N_K, Cells
 from hrc_env.experiments.calibration.samples import Samples
 from hrc_env.perception.calibration import INNER, KIND
 from hrc_env.perception.sightlines import HIDDEN, SEEN
-from hrc_env.typing import Floats
 
 SPEEDS = (0.0, 0.08, 0.2, 0.4, 0.7, 1.1, 3.0)
 """Edges of classes of workers by their joints' mean speed [m/s]."""

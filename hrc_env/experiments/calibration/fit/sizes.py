@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 
+from hrc_env.core.typing import Floats
 from hrc_env.experiments.calibration.fit.cells import FEW, N_K, N_P, N_S, SHARP, Cells, mix
 from hrc_env.experiments.calibration.samples import Samples
 from hrc_env.perception.calibration import HAND, KIND, N_VIEWS
 from hrc_env.perception.sightlines import HIDDEN, OUTSIDE, SEEN
-from hrc_env.typing import Floats
 
 _SPREADS = np.linspace(0.0, 2.0, 41)
 

@@ -4,10 +4,10 @@ import itertools
 
 import numpy as np
 
+from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.experiments.calibration.fit.cells import FEW, N_K, N_P, class_of
 from hrc_env.experiments.calibration.samples import Samples
 from hrc_env.perception.calibration import HAND, KIND, NEXT, POSTURES
-from hrc_env.typing import Bools, Floats, Ints
 
 GROSS = 6.0
 """Errors of so many times their median are left out: they are the business of the tails."""

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.results import Metric
-from hrc_env.typing import Bools, Floats, Ints
+from hrc_env.core.results import Metric
+from hrc_env.core.typing import Bools, Floats, Ints
 
 N_DRAWS = 1000
 """Resamples of the episodes."""

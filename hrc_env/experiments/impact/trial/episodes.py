@@ -12,9 +12,9 @@ from hrc_env.experiments.impact.trial.eyes import Eyes, Rig
 from hrc_env.experiments.impact.trial.judge import judge, scene_of
 from hrc_env.experiments.impact.trial.tally import Tally
 from hrc_env.experiments.study.shelf import Tick
-from hrc_env.outcome import rows_of
-from hrc_env.shards import Shards
 from hrc_env.simulation import Simulation, checked_action
+from hrc_env.step import rows_of
+from hrc_env.vector.shards import Shards
 
 PEOPLE = "unaware"
 """Workers who take no notice of the robot: their walk is then the same whatever it does."""

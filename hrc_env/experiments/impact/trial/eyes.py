@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from hrc_env.errors import unknown
-from hrc_env.faults.fault import FaultConfig
-from hrc_env.optics.camera import CameraConfig
+from hrc_env.core.errors import unknown
+from hrc_env.geometry.camera_config import CameraConfig
+from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.scene.rigs import RIGS
 
 Rig = tuple[int, ...]

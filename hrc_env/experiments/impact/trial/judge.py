@@ -9,12 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.body import worker_truth
+from hrc_env.core.typing import Capsules, Floats, Points3
 from hrc_env.geometry import chains
 from hrc_env.geometry.distances import narrowest_gap
 from hrc_env.motion import generator
 from hrc_env.simulation import Simulation
-from hrc_env.typing import Capsules, Floats, Points3
+from hrc_env.worker.body import worker_truth
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import hrc_env
-from hrc_env.agents_door import agents
-from hrc_env.errors import unknown
+from hrc_env.core.agents_door import agents
+from hrc_env.core.errors import unknown
 from hrc_env.experiments.impact.trial.episodes import MakeAgent
 from hrc_env.experiments.impact.trial.tally import SLOW_M, STOP_M
 from hrc_env.simulation import Simulation

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from hrc_env.core.typing import Bools, Floats, Ints, Points3
 from hrc_env.experiments.impact.trial.counts import ERRORS_M, GAPS_M, SPEEDS_MPS, Bins
 from hrc_env.experiments.impact.trial.judge import Step
-from hrc_env.outcome import Info
-from hrc_env.typing import Bools, Floats, Ints, Points3
+from hrc_env.step import Info
 
 STOP_M, SLOW_M = 0.10, 0.60
 """A gap below the first calls for standing still, below the second for slowing down [m]: the

@@ -1,0 +1,1 @@
+"""Words that all rooms share: types, errors, records, random streams, compiled kernels."""

@@ -1,0 +1,72 @@
+"""Some rows of a batch: states are records of arrays whose first axis is the environment.
+
+An organ that works on a few environments only (a reset of 3 of 64) works on a record of
+their rows; as no result depends on the size of the batch, that is the same computation.
+"""
+
+import copy
+import dataclasses
+import functools
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
+
+import numpy as np
+
+from hrc_env.core.typing import Ints
+
+RecordT = TypeVar("RecordT")
+
+
+def rows(record: RecordT, ids: Ints) -> RecordT:
+    """A copy of rows `ids` of every array of a (nested) record."""
+    return mapped(record, lambda array: array[ids])
+
+
+def one(record: RecordT, b: int) -> RecordT:
+    """Environment `b` of a record, without the batch's axis; its arrays are views."""
+    return mapped(record, lambda array: array[b])
+
+
+def write_rows(record: object, ids: Ints, part: object) -> None:
+    """Write a record of rows back into rows `ids` of a record, in place."""
+    for name in _names(type(record)):
+        value, new = getattr(record, name), getattr(part, name)
+        if isinstance(value, np.ndarray):
+            value[ids] = new
+        else:
+            write_rows(value, ids, new)
+
+
+def mapped(record: RecordT, change: Callable[[Any], Any]) -> RecordT:
+    """A (nested) record of the same kind with `change` applied to every array."""
+    kind = type(record)
+    values = [getattr(record, name) for name in _names(kind)]
+    return kind(*[change(v) if isinstance(v, np.ndarray) else _mapped(v, change) for v in values])
+
+
+def copied(value: Any) -> Any:
+    """A deep copy of records, lists and generators; arrays that are read-only are shared."""
+    if isinstance(value, np.ndarray):
+        return value.copy() if value.flags.writeable else value
+    if names := _names(type(value)):
+        return type(value)(*[copied(getattr(value, name)) for name in names])
+    if isinstance(value, (list, tuple)):
+        return type(value)(copied(each) for each in value)
+    return copy.deepcopy(value)
+
+
+def picked(streams: Sequence[np.random.Generator], ids: Ints) -> list[np.random.Generator]:
+    """The generators of environments `ids`."""
+    return [streams[b] for b in ids]
+
+
+@functools.cache
+def _names(kind: type) -> tuple[str, ...]:
+    """The fields of a dataclass or a named tuple; whatever else there is has none."""
+    if dataclasses.is_dataclass(kind):
+        return tuple(each.name for each in dataclasses.fields(kind))
+    return getattr(kind, "_fields", ())
+
+
+def _mapped(value: Any, change: Callable[[Any], Any]) -> Any:
+    return mapped(value, change) if _names(type(value)) else value

@@ -1,0 +1,125 @@
+"""Compiles kernels before they are needed, on all cores."""
+
+import contextlib
+import json
+import logging
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
+from queue import Empty, SimpleQueue
+from typing import IO, cast
+
+from hrc_env.core.kernels.cache import folder
+from hrc_env.core.kernels.signatures import Signature, recorded
+from hrc_env.core.machine import n_cores
+
+log = logging.getLogger("hrc_env.core.kernels")
+Say = Callable[[float, str], None]
+"""Told by how much the share that is done grew, and what is being done."""
+AT_ONCE_S = 3.0
+"""What takes less is compiled when it is called [s]: a process takes as long to start."""
+LOG_EVERY_S = 10.0
+
+
+def missing(level: str | None = None) -> list[Signature]:
+    """What a perception level calls (None: any) that has not been compiled yet."""
+    return [each for each in recorded(level) if not each.is_compiled()]
+
+
+@lru_cache(maxsize=8)
+def ensure(level: str) -> None:
+    """Compile what a perception level calls, unless it lies on disk; the log says so."""
+    if sum(each.seconds for each in missing(level)) > AT_ONCE_S:
+        compile_missing(level, _logged())
+
+
+def compile_missing(level: str | None, say: Say) -> int:
+    """Compile what is missing in as many processes as there are cores; how many there were.
+
+    Where no process can be started, or one dies, kernels are compiled when they are called.
+    """
+    with _alone(say):
+        wanted: SimpleQueue[Signature] = SimpleQueue()
+        todo = missing(level)
+        total_s = sum(each.seconds for each in todo)
+        for each in todo:
+            wanted.put(each)
+        n_workers = min(n_cores(), len(todo))
+        with ThreadPoolExecutor(max(n_workers, 1)) as threads:
+            workers = [threads.submit(_serve, wanted, total_s, say) for _ in range(n_workers)]
+            for worker in workers:
+                worker.result()
+    return len(todo)
+
+
+def _serve(wanted: "SimpleQueue[Signature]", total_s: float, say: Say) -> None:
+    """Let one process compile until nothing is left."""
+    command = [sys.executable, "-m", "hrc_env.core.kernels.worker"]
+    try:
+        process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1
+        )
+    except OSError as error:
+        log.warning("Kernels cannot be compiled ahead (%s); they are when called.", error)
+        return
+    try:
+        while not wanted.empty():
+            with contextlib.suppress(Empty):
+                each = wanted.get_nowait()
+                if not _compile(process, each):
+                    log.warning("Compiling %s failed; it is tried when called.", each.kernel)
+                    return
+                say(each.seconds / total_s, each.kernel.partition(":")[2])
+    finally:
+        with contextlib.suppress(OSError):
+            process.communicate()
+
+
+def _compile(process: "subprocess.Popen[str]", each: Signature) -> bool:
+    """Have a kernel compiled; whether it was."""
+    asked, answers = cast("IO[str]", process.stdin), cast("IO[str]", process.stdout)
+    try:
+        asked.write(json.dumps([each.kernel, each.args]) + "\n")
+        return answers.readline() == "done\n"
+    except OSError:  # it has died
+        return False
+
+
+@contextlib.contextmanager
+def _alone(say: Say) -> Iterator[None]:
+    """Wait for another program that compiles into the same folder."""
+    try:
+        import fcntl
+
+        folder().mkdir(parents=True, exist_ok=True)
+        lock = (folder() / "lock").open("w")
+    except (ImportError, OSError):  # no such locks, or nothing can be written: no harm, only work
+        yield
+        return
+    with lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            say(0.0, "waiting for another program that compiles")
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
+def _logged() -> Say:
+    """Progress as lines of the log."""
+    started_s = said_s = time.monotonic()
+    done = 0.0
+    log.warning("Compiling hrc_env's kernels for this machine, once (a minute or two) ...")
+
+    def say(share: float, what: str) -> None:
+        nonlocal done, said_s
+        done, now_s = done + share, time.monotonic()
+        if now_s - said_s > LOG_EVERY_S:
+            said_s = now_s
+            left_s = (now_s - started_s) * (1 - done) / max(done, 1e-3)
+            log.warning("Compiling kernels: %.0f %%, %.0f s left (%s)", 100 * done, left_s, what)
+
+    return say

@@ -1,0 +1,147 @@
+"""A cheaper way through numba's compiler: callees are lowered, only the kernel itself is compiled.
+
+numba links the code of every callee into its caller, optimises all of it and emits machine code
+for all of it, and does so again at every level of calls. Here a callee is translated to LLVM's
+intermediate form and left as it is; the kernel that Python calls links each of them once, optimises
+once and emits once. That halves the time to compile and the memory that it takes.
+
+Everything is done by subclasses, so that other people's numba functions are compiled as ever. What
+is subclassed is numba's inside: `pyproject.toml` admits the versions with which this is tested.
+"""
+
+import copy
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import llvmlite.binding as llvm
+from numba import _dynfunc  # type: ignore[attr-defined]
+from numba.core import codegen, cpu, registry
+
+from hrc_env.core.kernels.cache import KernelCache
+
+
+class LeanLibrary(codegen.JITCodeLibrary):
+    """The code of one function: a kernel's is compiled, a callee's is only kept for its callers."""
+
+    _is_callee = False
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Compile, and the address of the wrapper by which Python calls; callees have none."""
+        if not self._finalized and name not in {each.name for each in self._final_module.functions}:
+            self.keep_as_callee()
+        return 0 if self._is_callee else super().get_pointer_to_function(name)
+
+    def keep_as_callee(self) -> None:
+        """Neither link nor optimise nor emit: whoever links this does."""
+        self._finalize_dynamic_globals()
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage == llvm.Linkage.external:
+                function.linkage = "linkonce_odr"
+        self._is_callee = self._finalized = True
+
+    def add_linking_library(self, library: codegen.CPUCodeLibrary) -> None:
+        """Note a function that this one calls."""
+        if isinstance(library, LeanLibrary) and not library._finalized:
+            library.keep_as_callee()
+        super().add_linking_library(library)
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        """Left to the optimiser of the whole."""
+        ll_module.data_layout = self._codegen._data_layout
+
+    def finalize(self) -> None:
+        """Link everything that is called, from callers to callees, optimise and emit."""
+        self._codegen._check_llvm_bugs()
+        self._raise_if_finalized()
+        for library in self._callers_first():
+            self._reload_init.update(library._reload_init)
+            kept = isinstance(library, LeanLibrary)
+            module = library._final_module if kept else library._get_module_for_linking()
+            self._final_module.link_in(module, preserve=True)
+        self._optimize_final_module()
+        self._final_module.verify()
+        self._finalize_final_module()
+
+    def _callers_first(self) -> Iterator[codegen.CPUCodeLibrary]:
+        """What this calls, directly or not, each once; nobody before all who call it."""
+        seen: set[int] = set()
+        order: list[codegen.CPUCodeLibrary] = []
+
+        def visit(library: codegen.CPUCodeLibrary) -> None:
+            seen.add(id(library))
+            if isinstance(library, LeanLibrary):
+                for callee in library._linking_libraries:
+                    if id(callee) not in seen:
+                        visit(callee)
+            order.append(library)
+
+        visit(self)
+        return reversed(order[:-1])
+
+
+class LeanContext(cpu.CPUContext):
+    """numba's own context, everything shared with it but how libraries are compiled."""
+
+    def get_executable(self, library: LeanLibrary, fndesc: Any, env: Any) -> Any:
+        """What Python calls; of a callee something that nobody can call."""
+        if library.get_pointer_to_function(fndesc.llvm_cpython_wrapper_name):
+            return super().get_executable(library, fndesc, env)
+        return _dynfunc.make_function(
+            fndesc.lookup_module(), fndesc.qualname, "a callee", 0, env, (library,)
+        )
+
+
+def _lean_context() -> LeanContext:
+    usual: Any = registry.cpu_target.target_context
+    generator = copy.copy(usual.codegen())
+    generator._library_class = LeanLibrary
+    context = LeanContext.__new__(LeanContext)
+    context.__dict__.update(usual.__dict__)
+    context._internal_codegen = generator
+    context.cached_internal_func = {}  # what is kept as a callee is not for numba's own functions
+    return context
+
+
+class LeanTarget(registry.CPUTarget):
+    """numba's own target with the lean context."""
+
+    _context: LeanContext | None = None
+
+    @property
+    def target_context(self) -> Any:
+        """One for all kernels."""
+        if LeanTarget._context is None:
+            LeanTarget._context = _lean_context()
+        return LeanTarget._context
+
+    @property
+    def typing_context(self) -> Any:
+        """numba's own."""
+        return registry.cpu_target.typing_context
+
+
+class CalleeDispatcher(registry.CPUDispatcher):
+    """A kernel as other kernels call it."""
+
+    targetdescr = LeanTarget("cpu")
+
+
+class KernelDispatcher(registry.CPUDispatcher):
+    """A kernel as Python calls it, kept on disk; other kernels call its `callee`."""
+
+    targetdescr = LeanTarget("cpu")
+
+    def __init__(self, py_func: Callable[..., Any], targetoptions: dict[str, Any]) -> None:
+        super().__init__(py_func, targetoptions=targetoptions)
+        self.callee = CalleeDispatcher(
+            py_func, targetoptions={**targetoptions, "no_cpython_wrapper": True}
+        )
+        self._cache: Any = KernelCache(self)
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """How a kernel types its call."""
+        return self.callee.get_call_template(args, kws)
+
+    def get_overload(self, sig: Any) -> Any:
+        """What a kernel calls."""
+        return self.callee.get_overload(sig)

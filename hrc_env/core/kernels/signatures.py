@@ -1,0 +1,94 @@
+"""Which kernels Python calls, with which types of arguments: `signatures.json`, written by
+`python -m assets.kernels.record`."""
+
+import importlib
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from numba import types
+
+from hrc_env.core.kernels import KERNELS
+
+PATH = Path(__file__).with_name("signatures.json")
+
+
+@dataclass(frozen=True, slots=True)
+class Signature:
+    """A kernel with types of arguments that it is called with."""
+
+    kernel: str
+    """"module:name"."""
+    args: list[Any]
+    """As `encode` writes them."""
+    levels: list[str]
+    """The perception levels that call it."""
+    seconds: float
+    """What compiling it took where this was recorded [s]; what comes first, and how much is left,
+    goes by it."""
+
+    def types(self) -> tuple[Any, ...]:
+        """The types as numba has them."""
+        return tuple(decode(each) for each in self.args)
+
+    def is_compiled(self) -> bool:
+        """Whether it lies on disk."""
+        return kernel_named(self.kernel)._cache.has(self.types())
+
+
+def kernel_named(name: str) -> Any:
+    """A kernel by "module:name"; its module is imported."""
+    importlib.import_module(name.partition(":")[0])
+    return KERNELS[name]
+
+
+def recorded(level: str | None = None) -> list[Signature]:
+    """What a perception level calls, or any of them; slowest to compile first."""
+    known = [Signature(**each) for each in json.loads(PATH.read_text())]
+    return [each for each in known if level is None or level in each.levels]
+
+
+def write(signatures: Sequence[Signature]) -> None:
+    """Write the file, one line a signature."""
+    ordered = sorted(signatures, key=lambda each: (-each.seconds, each.kernel, str(each.args)))
+    lines = ",\n".join(json.dumps(asdict(each)) for each in ordered)
+    PATH.write_text(f"[\n{lines}\n]\n")
+
+
+def encode(kind: Any) -> Any:
+    """A type of numba's as JSON: "float64", "float64[3C]" ("!" behind it: not to be written),
+    a list for a tuple, {"module:name": [...]} for a named one.
+
+    Raises:
+        TypeError: a type that no kernel has been called with so far.
+    """
+    text: Any = str(kind)
+    inside = [encode(each) for each in getattr(kind, "types", ())]
+    if isinstance(kind, types.Array):
+        text = f"{kind.dtype}[{kind.ndim}{kind.layout}]{'' if kind.mutable else '!'}"
+    elif isinstance(kind, types.NamedTuple | types.NamedUniTuple):
+        made = kind.instance_class
+        text = {f"{made.__module__}:{made.__qualname__}": inside}
+    elif isinstance(kind, types.BaseTuple):
+        text = inside
+    if decode(text) != kind:
+        raise TypeError(f"signatures.encode knows no {type(kind).__name__}: {kind}.")
+    return text
+
+
+def decode(text: Any) -> Any:
+    """The type that `encode` wrote."""
+    if isinstance(text, list):
+        return types.Tuple([decode(each) for each in text])
+    if isinstance(text, dict):
+        ((name, inside),) = text.items()
+        module, _, made = name.partition(":")
+        kinds = [decode(each) for each in inside]
+        return types.BaseTuple.from_types(kinds, getattr(importlib.import_module(module), made))
+    if "[" in text:
+        dtype, _, rest = text.partition("[")
+        form, _, mark = rest.partition("]")
+        return types.Array(decode(dtype), int(form[:-1]), form[-1], readonly=mark == "!")
+    return types.boolean if text == "bool" else getattr(types, text)

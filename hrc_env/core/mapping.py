@@ -1,0 +1,134 @@
+"""Frozen settings from plain mappings and back: what JSON or a notebook gives, field by field."""
+
+import dataclasses
+import enum
+import math
+import re
+import types
+import typing
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from hrc_env.core.errors import ConfigError, unknown
+
+RecordT = TypeVar("RecordT")
+
+
+def from_mapping(kind: type[RecordT], mapping: Mapping[str, Any], path: str = "") -> RecordT:
+    """A dataclass from a mapping; what it nests may be mappings too, tuples may be lists.
+
+    This undoes what `dataclasses.asdict` and JSON do to a config.
+
+    Raises:
+        ConfigError: a field that does not exist, with the nearest that does; one that is
+            missing; a value of another type or length than the field's, or one that the
+            dataclass refuses. Fields are called by their path, as in `scene.cameras[0].name`.
+    """
+    hints = typing.get_type_hints(kind)
+    fields = dataclasses.fields(kind)  # type: ignore[arg-type]
+    names = [f"{path}{each.name}" for each in fields]
+    values: dict[str, Any] = {}
+    for name, value in mapping.items():
+        where = f"{path}{name}"
+        if where not in names:
+            raise unknown("config field", where, names)
+        values[name] = restored(hints[name], value, where)
+    for each in fields:
+        nothing = each.default is each.default_factory is dataclasses.MISSING
+        if nothing and each.name not in values:
+            raise ConfigError(f"Config field {path}{each.name} is missing and has no default.")
+    try:
+        return kind(**values)
+    except ConfigError as error:
+        raise _located(error, kind, path) from error
+
+
+def restored(hint: Any, value: Any, where: str) -> Any:
+    """A field's value as its type hint wants it, or a `ConfigError` that says so."""
+    if dataclasses.is_dataclass(hint):
+        if isinstance(value, Mapping):
+            return from_mapping(typing.cast(type, hint), value, f"{where}.")
+        return _checked(isinstance(value, typing.cast(type, hint)), "a mapping", value, where)
+    if isinstance(hint, types.UnionType):
+        return _one_of(typing.get_args(hint), value, where)
+    if typing.get_origin(hint) is tuple:
+        return _tuple(typing.get_args(hint), value, where)
+    if isinstance(value, np.generic):
+        value = value.item()
+    if hint is float:
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        return float(_checked(number and math.isfinite(value), "a finite number", value, where))
+    if hint is int:
+        whole = isinstance(value, int) and not isinstance(value, bool)
+        return _checked(whole, "a whole number", value, where)
+    if hint in (bool, str):
+        return _checked(isinstance(value, hint), f"a {hint.__name__}", value, where)
+    return value
+
+
+def _one_of(hints: tuple[Any, ...], value: Any, where: str) -> Any:
+    """The value as the first of several hints wants it that can have it.
+
+    Raises:
+        ConfigError: none can, in the words of each.
+    """
+    refused = []
+    for hint in hints:
+        try:
+            return restored(hint, value, where)
+        except ConfigError as error:
+            refused.append(str(error))
+    raise ConfigError(" Or: ".join(refused))
+
+
+def _tuple(inner: tuple[Any, ...], value: Any, where: str) -> tuple[Any, ...]:
+    """Every part as its own hint wants it, and as many as there are hints."""
+    _checked(isinstance(value, list | tuple), "a list", value, where)
+    hints = [inner[0]] * len(value) if inner[-1] is Ellipsis else list(inner)
+    _checked(len(value) == len(hints), f"{len(hints)} values", value, where)
+    return tuple(
+        restored(hint, part, f"{where}[{k}]")
+        for k, (hint, part) in enumerate(zip(hints, value, strict=True))
+    )
+
+
+def plain(value: Any) -> Any:
+    """A value as JSON has it: paths are text, NumPy's numbers and enumerations what they hold.
+
+    What has no such form (a recorded clip, a function) stays, and JSON's writer refuses it.
+    """
+    if isinstance(value, Mapping):
+        return {name: plain(each) for name, each in value.items()}
+    if isinstance(value, list | tuple):
+        return type(value)(map(plain, value))
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, enum.Enum):
+        return value.value
+    return str(value) if isinstance(value, Path) else value
+
+
+def _located(error: ConfigError, kind: type, path: str) -> ConfigError:
+    """What a dataclass says about its fields, with the fields called by their path.
+
+    Fields are found by name: any with an underscore, others where the sentence begins with them.
+    """
+    if not path:
+        return error
+    said = str(error).removeprefix(f"{kind.__name__}.")
+    names = [each.name for each in dataclasses.fields(kind)]
+    long = "|".join(name for name in names if "_" in name) or "(?!)"
+    pattern = rf"^(?:{'|'.join(names)})\b|(?<![\w.'\"])(?:{long})\b(?!['\"])"
+    located = re.sub(pattern, lambda found: f"{path}{found[0]}", said)
+    if path not in located:
+        located = f"{path.rstrip('.')}: {located}"
+    return type(error)(located)
+
+
+def _checked(good: bool, expected: str, value: Any, where: str) -> Any:
+    if not good:
+        raise ConfigError(f"Config field {where} must be {expected}, got {value!r}.")
+    return value

@@ -1,0 +1,184 @@
+"""What the organs hand to each other: frozen records of arrays, the batch axis first.
+
+B environments, W workers, C cameras, J = 15 joints, S = 22 body segments, K capsules,
+N arm joints. World frame: +Z up, origin on the floor, metres, seconds, radians.
+
+Belief and truth are different records on purpose: `PoseEstimate` is what the cameras made
+of a worker, `WorkerTruth` is the worker. Observations, rewards and shields take the first,
+cost and metrics the second (`tests/test_architecture.py` holds this).
+"""
+
+from dataclasses import dataclass
+
+from hrc_env.core.typing import (
+    Bools,
+    Capsules,
+    Covariances3,
+    Floats,
+    Ints,
+    JointAngles,
+    JointVelocities,
+    Points2,
+    Points3,
+    QuaternionsWxyz,
+    Velocities3,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Keypoints:
+    """2D joints as a detector (or its emulator) reports them, in full-image pixels.
+
+    A joint that was not found is NaN with confidence 0: data, not an error.
+    """
+
+    px: Points2
+    """(B, C, W, J, 2) pixels, continuous from the image's top-left corner."""
+    confidence: Floats
+    """(B, C, W, J) in [0, 1]; 0 where there is no measurement."""
+    sigma_px: Floats
+    """(B, C, W, J) standard deviation of each coordinate [px]; infinite where missing."""
+    time_s: Floats | None = None
+    """(B, C) when each camera's frame was taken [s], on the tracker's clock, which is 0 at the
+    reset; NaN: no frame of that camera. None: every frame is of this very update."""
+
+
+@dataclass(frozen=True, slots=True)
+class Roi:
+    """A square region of one camera's image, turned about its centre."""
+
+    centre_px: tuple[float, float]
+    side_px: float
+    rotation_rad: float
+    """Turn of the window's upright, clockwise in the image; 0 is the image's own upright."""
+
+
+@dataclass(frozen=True, slots=True)
+class PoseEstimate:
+    """What the robot believes about the workers (the only worker it may look at)."""
+
+    mean_world: Points3
+    """(B, W, J, 3) [m]; of a worker not yet acquired: the documented prior."""
+    cov_world: Covariances3
+    """(B, W, J, 3, 3) [m^2], finite and positive definite always."""
+    velocity_world: Velocities3
+    """(B, W, J, 3) [m/s]."""
+    age_s: Floats
+    """(B, W, J) seconds since a measurement last supported the joint."""
+    tracked: Bools
+    """(B, W) whether there is a track; False: prior or predicting for too long (lost)."""
+
+
+@dataclass(frozen=True, slots=True)
+class WorkerPath:
+    """Where the worker's body goes: what physics and cost follow from substep to substep."""
+
+    position_world: Points3
+    """(B, T, W, S, 3) origins of the 22 body segments after every substep [m]."""
+    quaternion_wxyz: QuaternionsWxyz
+    """(B, T, W, S, 4) world_from_segment."""
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """What the workers' hands hold, and where it is; see `props.PROPS`."""
+
+    kind: Ints
+    """(B, W) index into `props.PROPS`; 0: nothing."""
+    position_world: Points3
+    """(B, W, 3) origin of the prop's frame [m]; of no meaning where nothing is held."""
+    quaternion_wxyz: QuaternionsWxyz
+    """(B, W, 4) world_from_prop."""
+
+
+@dataclass(frozen=True, slots=True)
+class WorkerMotion:
+    """Where the worker's body is and how it moves: what the motion generator says."""
+
+    position_world: Points3
+    """(B, W, S, 3) origins of the 22 body segments [m]."""
+    quaternion_wxyz: QuaternionsWxyz
+    """(B, W, S, 4) world_from_segment."""
+    velocity_world: Velocities3
+    """(B, W, S, 3) velocity of the origins [m/s], from the generator."""
+    angular_velocity_world: Floats
+    """(B, W, S, 3) [rad/s]."""
+    held: Held | None = None
+    """What their hands hold; None: nothing."""
+    body: Ints | None = None
+    """(B, W) which of the scene's bodies each has; None: all have the first."""
+
+
+@dataclass(frozen=True, slots=True)
+class WorkerTruth:
+    """The worker as they are. Only the estimator's emulators, cost and metrics read it."""
+
+    joints_world: Points3
+    """(B, W, J, 3) true joints in BlazePose's sense [m]."""
+    velocity_world: Velocities3
+    """(B, W, J, 3) [m/s]."""
+    capsules_world: Capsules
+    """(B, W, K, 2, 3) the body's capsules [m]."""
+    capsule_radius_m: Floats
+    """(B, W, K) [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class RobotState:
+    """The robot as its own encoders know it (exact, so neither belief nor truth)."""
+
+    q: JointAngles
+    """(B, N) [rad]."""
+    qd: JointVelocities
+    """(B, N) [rad/s]."""
+    tool_world: Points3
+    """(B, 3) [m]."""
+    tool_velocity_world: Velocities3
+    """(B, 3) [m/s]."""
+    capsules_world: Capsules
+    """(B, K, 2, 3) [m]."""
+    capsule_radius_m: Floats
+    """(K,) [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Workplace:
+    """A place where a worker stands and works."""
+
+    name: str
+    """Unique in its scene."""
+    kind: str
+    """One of `WORKPLACE_KINDS`."""
+    xy_m: tuple[float, float]
+    """Where the worker stands [m]."""
+    yaw_rad: float
+    """Which way the worker looks, from world +x [rad]."""
+    height_m: float
+    """How high above the floor the work is [m]: where hands work, a load is gripped, or how
+    high a step is; 0 where there is nothing."""
+
+
+WORKPLACE_KINDS = ("robot", "bench", "floor", "wall", "overhead", "pile", "cart", "step", "open")
+"""Beside the robot, hands in its workspace; at a table; kneeling; at a wall; above the head;
+at materials to lift; where a cart is taken or left; before a tread 0.3 m ahead; nothing there."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Grounds:
+    """Where people can stand, walk and work in a scene."""
+
+    walkable_x_m: tuple[float, float]
+    """Where workers stand and walk, least and greatest x [m]."""
+    walkable_y_m: tuple[float, float]
+    """The same along y [m]."""
+    blocked: Floats
+    """(N, 5) footprints of what stands on the floor, the robot's pedestal left out: middle x
+    and y, half length and half width [m], yaw of the length from world +x [rad]."""
+    places: tuple[Workplace, ...]
+    """Where there is work, all of them inside the walkable area and outside `blocked`."""
+    robot_xy_m: tuple[float, float]
+    """The axis of the robot's first joint [m]."""
+    robot_front_rad: float
+    """Where the robot's front looks to, from world +x [rad]."""
+    robot_clearance_m: float
+    """Paths keep so far from that axis [m]: a pedestal's radius and half a person."""

@@ -1,0 +1,27 @@
+"""Array aliases: the shape and the unit of an argument, spelled once.
+
+Axes, everywhere in this package: B batch (environments), W workers, C cameras,
+J joints (15, see `hrc_env.core.skeleton`), S body segments of the worker (22), K capsules,
+P particles, T time, N links of the arm.
+"""
+
+from typing import Annotated, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats: TypeAlias = NDArray[np.float64]
+Bools: TypeAlias = NDArray[np.bool_]
+Ints: TypeAlias = NDArray[np.int64]
+
+Points2: TypeAlias = Annotated[Floats, "(..., 2) [px]"]
+Points3: TypeAlias = Annotated[Floats, "(..., 3) [m]"]
+Velocities3: TypeAlias = Annotated[Floats, "(..., 3) [m/s]"]
+Covariances3: TypeAlias = Annotated[Floats, "(..., 3, 3) [m^2]"]
+Rotations: TypeAlias = Annotated[Floats, "(..., 3, 3)"]
+QuaternionsWxyz: TypeAlias = Annotated[Floats, "(..., 4), scalar first, unit norm"]
+Transforms: TypeAlias = Annotated[Floats, "(..., 4, 4), parent_from_child"]
+Capsules: TypeAlias = Annotated[Floats, "(..., K, 2, 3) end points [m]"]
+JointAngles: TypeAlias = Annotated[Floats, "(..., N) [rad]"]
+JointVelocities: TypeAlias = Annotated[Floats, "(..., N) [rad/s]"]
+Image: TypeAlias = Annotated[NDArray[np.uint8], "(H, W, 3) RGB"]

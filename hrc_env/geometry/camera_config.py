@@ -1,0 +1,185 @@
+"""What a camera is: where it hangs, what its lens and sensor do, when it takes images."""
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.typing import Floats
+from hrc_env.geometry.lens import Lens, bend_radius, rays_cam
+
+MOST_CAMERAS = 16
+"""A rig has no more."""
+SIZE_PX = (64, 16_384)
+"""Least and greatest width and height of an image [px]."""
+FIELD_DEG = (1.0, 340.0)
+"""Least and greatest horizontal field of view; without a fisheye lens less than 179 degrees."""
+LONGEST_S = 1.0
+"""Greatest latency [s]: the tracker's memory is no longer."""
+
+
+@dataclass(frozen=True, slots=True)
+class CameraConfig:
+    """One fixed camera."""
+
+    name: str
+    """What the camera is called; unique in its rig."""
+    eye_world: tuple[float, float, float]
+    """Where it hangs [m], world frame."""
+    target_world: tuple[float, float, float] = (0.2, 0.0, 1.0)
+    """What it looks at [m]: by default the middle of the space that robot and worker share."""
+    hfov_deg: float = 90.0
+    """Horizontal field of view through the lens [degrees]; without meaning if `focal_px` is
+    given."""
+    width_px: int = 1920
+    """Width of its images [px]."""
+    height_px: int = 1080
+    """Height of its images [px]."""
+    roll_deg: float = 0.0
+    """How far it is turned about its axis [degrees], clockwise as it looks."""
+    focal_px: tuple[float, ...] = ()
+    """Focal lengths fx, fy [px]; none: the same in x and y, from `hfov_deg`."""
+    centre_px: tuple[float, ...] = ()
+    """Principal point cx, cy [px]; none: the middle of the image."""
+    lens: Lens = field(default_factory=Lens)
+    """How the lens bends the image."""
+    rate_hz: float = 0.0
+    """Images a second; 0: one at every control step. Images are taken at control steps."""
+    latency_s: float = 0.0
+    """Time from taking an image to having it [s], up to 1; the tracker uses it at its own time."""
+    exposure_s: float = 0.0
+    """How long the shutter is open [s], up to 0.1; what moves is smeared (`pixels` only)."""
+
+    def __post_init__(self) -> None:
+        _check_place(self)
+        for name in ("width_px", "height_px"):
+            if not SIZE_PX[0] <= getattr(self, name) <= SIZE_PX[1]:
+                raise ConfigError(
+                    f"Camera {self.name!r}: {name} must be from {SIZE_PX[0]} to {SIZE_PX[1]}, "
+                    f"got {getattr(self, name)}."
+                )
+        for name, most in (("rate_hz", math.inf), ("latency_s", LONGEST_S), ("exposure_s", 0.1)):
+            if not 0 <= getattr(self, name) <= most or not math.isfinite(getattr(self, name)):
+                raise ConfigError(
+                    f"Camera {self.name!r}: {name} must be from 0 to {most}, "
+                    f"got {getattr(self, name)}."
+                )
+        for name in ("focal_px", "centre_px"):
+            if len(getattr(self, name)) not in (0, 2):
+                raise ConfigError(
+                    f"Camera {self.name!r}: {name} must be empty or two numbers (x, y), "
+                    f"got {getattr(self, name)}."
+                )
+        _check_image(self, intrinsics(self))
+
+
+def intrinsics(camera: CameraConfig) -> Floats:
+    """(3, 3) K [px], pixels continuous from the image's corner.
+
+    Raises:
+        ConfigError: a field of view that the lens cannot have.
+    """
+    fx, fy = camera.focal_px or (_focal_px(camera),) * 2
+    cx, cy = camera.centre_px or (camera.width_px / 2, camera.height_px / 2)
+    return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]])
+
+
+def fields_deg(camera: CameraConfig) -> tuple[float, float]:
+    """Horizontal and vertical field of view through the middle of the image [degrees]."""
+    half = _edge_rays(camera, intrinsics(camera))
+    angles = np.degrees(np.arccos(np.clip(half[:, 2], -1.0, 1.0)))
+    return float(angles[0] + angles[1]), float(angles[2] + angles[3])
+
+
+def _focal_px(camera: CameraConfig) -> float:
+    straight = camera.lens.model != "kannala_brandt"
+    most = 179.0 if straight else FIELD_DEG[1]
+    if not FIELD_DEG[0] <= camera.hfov_deg < most:
+        raise ConfigError(
+            f"Camera {camera.name!r}: horizontal field of view must be in [{FIELD_DEG[0]:g}, "
+            f"{most:g}) degrees, got {camera.hfov_deg}."
+        )
+    half_rad = math.radians(camera.hfov_deg) / 2
+    if camera.lens.model == "none":
+        return float(camera.width_px / 2 / np.tan(half_rad))
+    radius = bend_radius(camera.lens, half_rad)
+    if math.isnan(radius):
+        raise ConfigError(
+            f"Camera {camera.name!r}: its lens {camera.lens} folds the image over before "
+            f"{camera.hfov_deg / 2:g} degrees from the axis; expected a lens whose radius grows "
+            "over the whole field of view."
+        )
+    return camera.width_px / 2 / radius
+
+
+def _check_place(camera: CameraConfig) -> None:
+    places = (*camera.eye_world, *camera.target_world, camera.roll_deg)
+    if not np.isfinite(places).all():
+        raise ConfigError(
+            f"Camera {camera.name!r}: eye_world, target_world and roll_deg must be finite, got "
+            f"{camera.eye_world}, {camera.target_world}, {camera.roll_deg}."
+        )
+    if math.dist(camera.eye_world, camera.target_world) < 1e-3:
+        raise ConfigError(
+            f"Camera {camera.name!r} must look at another place than where it hangs; both are "
+            f"{camera.eye_world}."
+        )
+
+
+def _check_image(camera: CameraConfig, K: Floats) -> None:
+    size = np.array([camera.width_px, camera.height_px])
+    focal, centre = K[[0, 1], [0, 1]], K[:2, 2]
+    if not (np.isfinite(K).all() and (focal > 0).all()):
+        raise ConfigError(
+            f"Camera {camera.name!r}: focal lengths must be positive and finite, got "
+            f"{tuple(focal.tolist())} px."
+        )
+    if not ((centre > 0) & (centre < size)).all():
+        raise ConfigError(
+            f"Camera {camera.name!r}: the principal point must lie in the image of "
+            f"{size[0]} x {size[1]} px, got {tuple(centre.tolist())}."
+        )
+    if np.isnan(_edge_rays(camera, K)).any():
+        raise ConfigError(
+            f"Camera {camera.name!r}: its lens {camera.lens} with focal lengths "
+            f"{tuple(focal.tolist())} px lets no light through to the middle of each of the "
+            "image's edges; expected weaker coefficients or longer focal lengths."
+        )
+
+
+def _edge_rays(camera: CameraConfig, K: Floats) -> Floats:
+    """(4, 3) directions of the image's left, right, upper and lower edge beside the centre."""
+    (fx, fy), (cx, cy) = K[[0, 1], [0, 1]], K[:2, 2]
+    right, low = (camera.width_px - cx) / fx, (camera.height_px - cy) / fy
+    edges = np.array([[-cx / fx, 0], [right, 0], [0, -cy / fy], [0, low]])
+    return rays_cam(camera.lens, edges * (1 - 1e-9))
+
+
+MAKES: dict[str, CameraConfig] = {
+    "gopro_hero8_wide": CameraConfig(
+        "gopro_hero8_wide",
+        (0.0, 0.0, 2.4),
+        hfov_deg=118.2,
+        lens=Lens("kannala_brandt", (0.0667,)),
+    ),
+}
+"""Cameras as they are made, to be hung up with `made`. The GoPro HERO8 Black with its wide lens
+is the paper's: 118.2 x 69.5 degrees on 1920 x 1080. No pinhole with square pixels has both; the
+fisheye polynomial with this coefficient does."""
+
+
+def made(
+    make: str,
+    name: str,
+    eye_world: tuple[float, float, float],
+    target_world: tuple[float, float, float] = (0.2, 0.0, 1.0),
+) -> CameraConfig:
+    """A camera of a make, hung up somewhere.
+
+    Raises:
+        ConfigError: a make that there is not.
+    """
+    if make not in MAKES:
+        raise unknown("make of camera", make, MAKES)
+    return replace(MAKES[make], name=name, eye_world=eye_world, target_world=target_world)

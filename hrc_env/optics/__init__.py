@@ -1,1 +1,0 @@
-"""Cameras as they are: lenses, makes of camera, rigs in files."""

@@ -1,0 +1,142 @@
+"""The images that cameras give, faults and all, drawn when they are looked at."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+
+from hrc_env.core.records import Held, Roi, WorkerMotion
+from hrc_env.core.typing import Floats, Image, JointAngles
+from hrc_env.geometry.cameras import PinholeCamera
+from hrc_env.perception.faults.fault import IMAGE
+from hrc_env.perception.faults.looks import spoil
+from hrc_env.perception.faults.schedule import Schedule
+
+BLUR_IMAGES = 5
+"""An image with an open shutter is the mean of so many."""
+
+
+class Stage(Protocol):
+    """What poses and draws a scene."""
+
+    size_px: int
+
+    def draw(self, q: JointAngles, motion: WorkerMotion) -> None:
+        """Pose the scene for the views that follow."""
+        ...
+
+
+class Viewer(Protocol):
+    """What draws the posed scene through any camera, its lens included."""
+
+    def view(self, camera: PinholeCamera, window: Roi) -> Image:
+        """A window of its image."""
+        ...
+
+    def empty(self, camera_index: int, window: Roi) -> Image:
+        """A window of the posed scene without people, as a camera of the rig shows it."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Shot:
+    """A scene of which images may be wanted later."""
+
+    step: int
+    """When it was."""
+    q: JointAngles
+    """(N,) the arm [rad]."""
+    motion: WorkerMotion
+    """(W, S, ...)."""
+    before: tuple[JointAngles, WorkerMotion]
+    """Arm and workers one step earlier."""
+    cameras: tuple[PinholeCamera, ...]
+    """Where the cameras really were."""
+
+
+class CameraFilm:
+    """An `ImageSource` of what each camera gives now; black where it gives nothing."""
+
+    def __init__(self, stage: Stage, viewer: Viewer, schedule: Schedule) -> None:
+        self.stage, self.viewer, self.schedule = stage, viewer, schedule
+        self._shots: Sequence[Shot | None] = ()
+        self._seed = 0
+        self._drawn: Any = None
+
+    def show(self, shots: Sequence[Shot | None], seed: int) -> None:
+        """The scene that each camera's image shows; the episode's number for faults."""
+        self._shots, self._seed, self._drawn = tuple(shots), seed, None
+
+    def crop(self, camera_index: int, window: Roi) -> Image:
+        """The window of a camera's image, upright, (size, size, 3) RGB."""
+        shot = self._shots[camera_index]
+        if shot is None:
+            return np.zeros((self.stage.size_px, self.stage.size_px, 3), np.uint8)
+        camera = shot.cameras[camera_index]
+        image = self._taken(shot, camera_index, window)
+        for k, fault in self.schedule.of(IMAGE, camera_index, shot.step):
+            if fault.kind != "motion_blur":
+                seeds = (self._seed, k, camera_index, shot.step)
+                image = spoil(image, camera, window, fault, seeds)
+        return image
+
+    def empty(self, camera_index: int, window: Roi) -> Image:
+        """What the window would show if the camera were well and nobody there."""
+        shot = self._shots[camera_index]
+        if shot is not None:
+            self._pose(shot, 0.0)
+        return self.viewer.empty(camera_index, window)
+
+    def _taken(self, shot: Shot, c: int, window: Roi) -> Image:
+        """The light that came while the shutter was open."""
+        camera, open_s = shot.cameras[c], self.schedule.exposure_s(c, shot.step)
+        if open_s == 0.0:
+            self._pose(shot, 0.0)
+            return self.viewer.view(camera, window)
+        total = np.zeros((self.stage.size_px, self.stage.size_px, 3))
+        for ago_s in np.linspace(0.0, open_s, BLUR_IMAGES):
+            self._pose(shot, float(ago_s))
+            total += self.viewer.view(camera, window)
+        return np.round(total / BLUR_IMAGES).astype(np.uint8)
+
+    def _pose(self, shot: Shot, ago_s: float) -> None:
+        """Draw a scene as it was, a moment before the shutter closed."""
+        if self._drawn != (shot.step, ago_s):
+            self.stage.draw(*_earlier(shot, ago_s / self.schedule.dt_s))
+            self._drawn = (shot.step, ago_s)
+
+
+def _earlier(shot: Shot, share: float) -> tuple[JointAngles, WorkerMotion]:
+    """Arm and workers a share of a step before a shot, on the straight way from the step before."""
+    if share == 0.0:
+        return shot.q, shot.motion
+    q, motion = shot.before
+    held, held_before = shot.motion.held, motion.held
+    if held is not None and held_before is not None:
+        same = (held.kind == held_before.kind)[..., None]
+        held = Held(
+            held.kind,
+            np.where(same, _between(held.position_world, held_before.position_world, share),
+                     held.position_world),
+            np.where(same, _turned(held.quaternion_wxyz, held_before.quaternion_wxyz, share),
+                     held.quaternion_wxyz),
+        )  # fmt: skip
+    moved = replace(
+        shot.motion,
+        position_world=_between(shot.motion.position_world, motion.position_world, share),
+        quaternion_wxyz=_turned(shot.motion.quaternion_wxyz, motion.quaternion_wxyz, share),
+        held=held,
+    )
+    return _between(shot.q, q, share), moved
+
+
+def _between(now: Floats, before: Floats, share: float) -> Floats:
+    return now + share * (before - now)
+
+
+def _turned(now: Floats, before: Floats, share: float) -> Floats:
+    """Quaternions (..., 4) on the way back to `before`, the shorter way round."""
+    sign = np.where((now * before).sum(-1, keepdims=True) < 0, -1.0, 1.0)
+    mixed = _between(now, sign * before, share)
+    return mixed / np.linalg.norm(mixed, axis=-1, keepdims=True)

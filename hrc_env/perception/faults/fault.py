@@ -1,0 +1,128 @@
+"""Faults of cameras by name: what each does, how much, and when.
+
+Whatever is drawn for a fault comes from the episode's number for faults, spawned from the
+sensor's generator without touching what that one draws: workers, goals and the detector's errors
+are those of the same seed without faults.
+"""
+
+import numbers
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from hrc_env.core.errors import ConfigError, unknown
+
+FOREVER_S = 1e9
+TIMING, PLACE, IMAGE = "timing", "place", "image"
+
+
+class Kind(NamedTuple):
+    """One kind of fault."""
+
+    group: str
+    """When images come (`TIMING`), where the camera really is (`PLACE`), how an image looks."""
+    unit: str
+    """Of the amount."""
+    usual: float
+    """The amount if none is given: clearly visible, not absurd; a judgement."""
+    bounds: tuple[float, float]
+    """Least and greatest amount."""
+    says: str
+
+
+KINDS: dict[str, Kind] = {
+    "lost": Kind(TIMING, "-", 0.0, (0.0, 0.0), "no images"),
+    "frozen": Kind(TIMING, "-", 0.0, (0.0, 0.0), "the last image again and again, as if new"),
+    "late": Kind(TIMING, "s", 0.2, (0.0, 1.0), "images come later, with their true times"),
+    "dropped": Kind(TIMING, "share", 0.3, (0.0, 1.0), "so many images are missing, at random"),
+    "out_of_step": Kind(
+        TIMING, "control steps", 2.0, (0.0, 25.0), "images are so old and claim to be new"
+    ),
+    "wrong_rotation": Kind(PLACE, "rad", 0.02, (0.0, 0.5), "it looks so far beside what is told"),
+    "wrong_translation": Kind(PLACE, "m", 0.05, (0.0, 1.0), "it hangs so far from where is told"),
+    "wrong_focal": Kind(PLACE, "share", 0.03, (-0.5, 0.5), "its focal length is so much longer"),
+    "knocked": Kind(PLACE, "rad", 0.1, (0.0, 1.0), "it has been turned by so much"),
+    "motion_blur": Kind(IMAGE, "s", 0.04, (0.0, 0.1), "the shutter is open for so long"),
+    "defocus": Kind(IMAGE, "px", 8.0, (0.0, 60.0), "points are discs of this radius"),
+    "noise": Kind(IMAGE, "grey levels", 20.0, (0.0, 100.0), "standard deviation of each pixel"),
+    "dirt": Kind(IMAGE, "share", 0.15, (0.0, 0.9), "spots on the lens hide so much of the image"),
+    "white_balance": Kind(IMAGE, "share", 0.4, (-0.9, 0.9), "more red and less blue by so much"),
+    "exposure": Kind(IMAGE, "stops", 2.0, (-6.0, 6.0), "brighter by so many stops"),
+    "darkness": Kind(IMAGE, "share", 0.05, (0.001, 1.0), "so much light is left, and noise"),
+    "glare": Kind(IMAGE, "share", 0.8, (0.0, 1.0), "a light shines into the lens"),
+}
+"""All faults; amounts are refused outside their bounds."""
+ALL = "all"
+"""In the place of a camera's name: every camera."""
+
+
+@dataclass(frozen=True, slots=True)
+class FaultConfig:
+    """One fault of some cameras during a part of every episode."""
+
+    kind: str
+    """A key of `KINDS`."""
+    cameras: tuple[int | str, ...]
+    """Cameras that have it, by name or by index (from 0) among those in use; ("all",) is every
+    one."""
+    amount: float | None = None
+    """How much, in the kind's unit; None is the kind's usual amount."""
+    from_s: float = 0.0
+    """When in the episode it begins [s]; 0 is the reset."""
+    until_s: float = FOREVER_S
+    """When it ends [s]."""
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise unknown("fault", self.kind, KINDS)
+        named = isinstance(self.cameras, tuple) and all(map(_is_choice, self.cameras))
+        if not named or not self.cameras:
+            raise ConfigError(
+                f"Fault {self.kind!r} must name its cameras, as ('camera_1',), (0,) or ('all',), "
+                f"got {self.cameras!r}."
+            )
+        low, high = KINDS[self.kind].bounds
+        number = isinstance(self.how_much, int | float) and not isinstance(self.how_much, bool)
+        if not number or not low <= self.how_much <= high:
+            raise ConfigError(
+                f"Fault {self.kind!r}: amount must be from {low:g} to {high:g} "
+                f"{KINDS[self.kind].unit}, got {self.amount!r}."
+            )
+        if not 0 <= self.from_s < self.until_s:
+            raise ConfigError(
+                f"Fault {self.kind!r} must begin at 0 s or later and end after that, "
+                f"got from {self.from_s} to {self.until_s} s."
+            )
+
+    @property
+    def group(self) -> str:
+        """The group of its kind."""
+        return KINDS[self.kind].group
+
+    @property
+    def how_much(self) -> float:
+        """The amount, in the kind's unit."""
+        return KINDS[self.kind].usual if self.amount is None else self.amount
+
+    def active(self, time_s: float) -> bool:
+        """Whether an image taken at this time of the episode has it; half a millisecond is
+        nothing."""
+        return self.from_s - 5e-4 <= time_s < self.until_s - 5e-4
+
+
+def check_cameras(faults: Sequence[FaultConfig], names: Sequence[str]) -> None:
+    """Raise `ConfigError` for a fault of a camera that is not one of those in use, by name."""
+    for fault in faults:
+        for camera in fault.cameras:
+            if isinstance(camera, str):
+                if camera not in (*names, ALL):
+                    raise unknown(f"camera of fault {fault.kind!r}:", camera, (*names, ALL))
+            elif not 0 <= camera < len(names):
+                raise ConfigError(
+                    f"Camera index {camera} of fault {fault.kind!r} is outside the cameras in use: "
+                    f"valid indices are 0 to {len(names) - 1}, valid names {', '.join(names)}."
+                )
+
+
+def _is_choice(camera: object) -> bool:
+    return isinstance(camera, str | numbers.Integral) and not isinstance(camera, bool)

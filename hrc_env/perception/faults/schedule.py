@@ -1,0 +1,174 @@
+"""Which image a camera gives at which step, and where the camera then really is.
+
+Everything here follows from an episode's number for faults (its seed), the step and the camera:
+nothing is remembered. Step 0 is the reset's; images are taken at the end of control steps.
+"""
+
+import functools
+import math
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from hrc_env.core.typing import Floats
+from hrc_env.geometry.camera_config import CameraConfig
+from hrc_env.geometry.cameras import PinholeCamera
+from hrc_env.perception.faults.fault import ALL, IMAGE, PLACE, TIMING, FaultConfig, check_cameras
+
+_EARLY = 1e-6
+"""Share of a step by which times may be too small for having been added up."""
+
+
+class Frame(NamedTuple):
+    """An image that arrives."""
+
+    shows: int
+    """The step whose scene it shows."""
+    taken: int
+    """The step at which it was taken, as it says."""
+
+
+@dataclass(frozen=True, slots=True)
+class Schedule:
+    """What cameras do over an episode."""
+
+    cameras: tuple[CameraConfig, ...]
+    """The rig in use, as it is told."""
+    faults: tuple[FaultConfig, ...]
+    """What goes wrong."""
+    dt_s: float
+    """Time between steps [s]."""
+
+    def __post_init__(self) -> None:
+        check_cameras(self.faults, [camera.name for camera in self.cameras])
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether every camera gives a faultless image at once at every step."""
+        return not self.faults and not any(
+            camera.rate_hz or camera.latency_s or camera.exposure_s for camera in self.cameras
+        )
+
+    @property
+    def longest_delay_s(self) -> float:
+        """The greatest age of an image that says its time truly [s]."""
+        return self.dt_s * max(self._delay(c, None) for c in range(len(self.cameras)))
+
+    @property
+    def longest_memory(self) -> int:
+        """How many steps back a scene can be that an image shows, frozen ones left out."""
+        behind = [f.how_much for f in self.faults if f.kind == "out_of_step"]
+        return round(self.longest_delay_s / self.dt_s) + math.ceil(max(behind, default=0.0))
+
+    @property
+    def frozen_steps(self) -> frozenset[int]:
+        """Steps whose scenes frozen images show."""
+        return frozenset(self._frozen_at(f) for f in self.faults if f.kind == "frozen")
+
+    def of(self, group: str, c: int, step: int | None) -> list[tuple[int, FaultConfig]]:
+        """Faults of a group that camera c has at a step (None: ever), each with its number."""
+        name = self.cameras[c].name
+        return [
+            (k, fault)
+            for k, fault in enumerate(self.faults)
+            if fault.group == group
+            and not {c, name, ALL}.isdisjoint(fault.cameras)
+            and (step is None or fault.active(step * self.dt_s))
+        ]
+
+    def frame(self, seed: int, step: int, c: int) -> Frame | None:
+        """The newest image of camera c that arrives at a step; None if none does."""
+        for taken in range(step, step - self._delay(c, None) - 1, -1):
+            if taken < 0:
+                break
+            if taken + self._delay(c, taken) == step and self._is_taken(seed, taken, c):
+                return Frame(self._shows(taken, c), taken)
+        return None
+
+    def exposure_s(self, c: int, step: int) -> float:
+        """How long the shutter was open for an image of a step [s]."""
+        blurs = [f.how_much for _, f in self.of(IMAGE, c, step) if f.kind == "motion_blur"]
+        return max([self.cameras[c].exposure_s, *blurs])
+
+    def actual(
+        self, rig: tuple[PinholeCamera, ...], seed: int, step: int
+    ) -> tuple[PinholeCamera, ...]:
+        """The cameras as they really are at a step; the very `rig` where all is as told."""
+        wrong = tuple(tuple(self.of(PLACE, c, step)) for c in range(len(rig)))
+        return _displaced(rig, wrong, seed) if any(wrong) else rig
+
+    def _is_taken(self, seed: int, step: int, c: int) -> bool:
+        """Whether an image is due at a step, and comes through."""
+        rate = self.cameras[c].rate_hz * self.dt_s
+        due = not 0 < rate < 1 or math.floor(step * rate + _EARLY) > math.floor(
+            (step - 1) * rate + _EARLY
+        )
+        for k, fault in self.of(TIMING, c, step):
+            if fault.kind == "lost":
+                return False
+            if fault.kind == "dropped" and draws(seed, k, c, step).random() < fault.how_much:
+                return False
+        return due
+
+    def _delay(self, c: int, taken: int | None) -> int:
+        """Steps until an image arrives (None: the most there can be)."""
+        late_s = sum(f.how_much for _, f in self.of(TIMING, c, taken) if f.kind == "late")
+        return math.ceil((self.cameras[c].latency_s + late_s) / self.dt_s - _EARLY)
+
+    def _shows(self, taken: int, c: int) -> int:
+        """The step whose scene an image taken at a step shows."""
+        for _, fault in self.of(TIMING, c, taken):
+            if fault.kind == "frozen":
+                return self._frozen_at(fault)
+        behind = [f.how_much for _, f in self.of(TIMING, c, taken) if f.kind == "out_of_step"]
+        return max(0, taken - round(sum(behind)))
+
+    def _frozen_at(self, fault: FaultConfig) -> int:
+        """The last step before a camera froze."""
+        return max(0, math.ceil(fault.from_s / self.dt_s - _EARLY) - 1)
+
+
+def draws(*numbers: int) -> np.random.Generator:
+    """The random numbers of an episode's fault, of its camera and of its step."""
+    return np.random.default_rng(numbers)
+
+
+@functools.lru_cache(maxsize=256)
+def _displaced(
+    rig: tuple[PinholeCamera, ...], wrong: tuple, seed: int
+) -> tuple[PinholeCamera, ...]:
+    """A rig with what is wrong about the places of its cameras."""
+    cameras = []
+    for c, (camera, faults) in enumerate(zip(rig, wrong, strict=True)):
+        for k, fault in faults:
+            camera = _with_fault(camera, fault, draws(seed, k, c))
+        cameras.append(camera)
+    return tuple(cameras)
+
+
+def _with_fault(
+    camera: PinholeCamera, fault: FaultConfig, rng: np.random.Generator
+) -> PinholeCamera:
+    """A camera somewhere else than told; which way is drawn."""
+    K, T_world_from_cam = camera.K.copy(), camera.T_world_from_cam.copy()
+    if fault.kind == "wrong_focal":
+        K[[0, 1], [0, 1]] *= 1.0 + fault.how_much
+    elif fault.kind == "wrong_translation":
+        T_world_from_cam[:3, 3] += fault.how_much * _direction(rng)
+    else:
+        T_world_from_cam[:3, :3] @= _turn(_direction(rng), fault.how_much)
+    return replace(camera, K=K, T_world_from_cam=T_world_from_cam)
+
+
+def _direction(rng: np.random.Generator) -> Floats:
+    """(3,) any direction."""
+    along = rng.standard_normal(3)
+    return along / np.linalg.norm(along)
+
+
+def _turn(axis: Floats, angle_rad: float) -> Floats:
+    """(3, 3) a turn about an axis (3,): Rodrigues' formula."""
+    x, y, z = axis
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle_rad) * cross + (1 - np.cos(angle_rad)) * cross @ cross

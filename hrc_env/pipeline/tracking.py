@@ -1,0 +1,129 @@
+"""What the levels with cameras share: predict, get keypoints, update."""
+
+from typing import Any
+
+import numpy as np
+
+from hrc_env.config import HRCConfig
+from hrc_env.core.batching import rows, write_rows
+from hrc_env.core.records import Keypoints, PoseEstimate
+from hrc_env.core.skeleton import N_JOINTS
+from hrc_env.core.stateful import Stateful
+from hrc_env.core.typing import Bools, Floats, Image, Ints
+from hrc_env.geometry.cameras import projections
+from hrc_env.perception.faults.recent import Recent
+from hrc_env.perception.faults.schedule import Schedule
+from hrc_env.perception.lensed import pinhole_keypoints
+from hrc_env.perception.offsets import our_joints
+from hrc_env.pipeline.sensor_input import Generators, Moment, Windows
+from hrc_env.scene.build import Scene
+from hrc_env.scene.domain_randomization import Look
+from hrc_env.tracking.calibration_watch import forget, make_watch, watch
+from hrc_env.tracking.estimators import Estimator
+from hrc_env.tracking.people.association import associate
+from hrc_env.tracking.stuck import forget_stuck, leave_out_stuck, make_stuck
+
+
+class TrackingSenses(Stateful):
+    """What the levels with cameras share: predict, get keypoints, update."""
+
+    CHANGES = ("state", "keypoints", "recent", "stuck", "watched")
+
+    def __init__(
+        self, batch: int, scene: Scene, tracker: Estimator, config: HRCConfig, schedule: Schedule
+    ) -> None:
+        self.scene, self.tracker, self.dt_s = scene, tracker, config.ctrl_dt
+        self.association = config.association
+        self.P = projections(scene.cameras)
+        self.state: Any = tracker.init(batch, scene.n_workers)
+        self.keypoints = no_keypoints(batch, len(scene.cameras), scene.n_workers)
+        self.recent = None if schedule.is_plain else Recent(batch, schedule)
+        self.stuck = make_stuck(batch, len(scene.cameras))
+        self.watched = make_watch(batch, len(scene.cameras))
+        self.axes = np.array([(*camera.K[:2, 2], camera.K[0, 0]) for camera in scene.cameras])
+        """(C, 3) principal point and focal length [px]."""
+
+    def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
+        """Forget the tracks of environments `ids`, and what their cameras gave."""
+        self.tracker.reset(self.state, ids, tracker_rngs)
+        forget(self.watched, ids)
+        if self.recent is not None:
+            self.recent.reset(ids, sensor_rngs)
+            forget_stuck(self.stuck, ids)
+
+    def sense(self, now: Moment, sensor_rngs: Generators, tracker_rngs: Generators) -> PoseEstimate:
+        """Predict the workers, look at them where they should be, and update."""
+        whole = len(now.ids) == len(self.keypoints.px)
+        state = self.state if whole else rows(self.state, now.ids)
+        self.tracker.predict(state, self.dt_s, tracker_rngs)
+        found = pinhole_keypoints(self.detect(now, state, sensor_rngs), self.scene.cameras)
+        if self.recent is not None:
+            leave_out_stuck(self.stuck, now.ids, found)
+        keypoints = self._sorted(found, state)
+        self.tracker.update(state, keypoints, tracker_rngs)
+        if whole:
+            self.keypoints = keypoints
+        else:
+            write_rows(self.keypoints, now.ids, keypoints)
+            write_rows(self.state, now.ids, state)
+        estimate = self.tracker.estimate(state)
+        age_s = self._age_s(now.ids, keypoints)
+        watch(self.watched, now.ids, keypoints, age_s, estimate, self.P, self.axes)
+        return our_joints(estimate)
+
+    def ahead(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
+        """What the estimator expects."""
+        whole = len(ids) == len(self.keypoints.px)
+        state = self.state if whole else rows(self.state, ids)
+        return our_joints(self.tracker.ahead(state, horizon_s))
+
+    def detect(self, now: Moment, predicted: Any, sensor_rngs: Generators) -> Keypoints:
+        """Keypoints of this moment, by whatever eyes the level has; whose they are is open.
+
+        They are in pixels of the images, as the lenses bend them.
+
+        Args:
+            now: the scene.
+            predicted: the tracker's state before the measurement.
+            sensor_rngs: one generator a row.
+        """
+        raise NotImplementedError
+
+    def _sorted(self, keypoints: Keypoints, predicted: Any) -> Keypoints:
+        """Keypoints by worker; where there is one worker, whatever was found is theirs."""
+        if self.scene.n_workers < 2:
+            return keypoints
+        expected = self.tracker.estimate(predicted)
+        return associate(self.P, keypoints, expected, self.association).keypoints
+
+    def look_of(self, b: int) -> Look | None:
+        """How environment `b` looks in its episode; None: as it was built."""
+        del b
+        return None
+
+    def suspected(self, ids: Ints) -> Bools:
+        """(B, C) which cameras of environments `ids` are thought to be miscalibrated."""
+        return self.watched.suspected[ids]
+
+    def _age_s(self, ids: Ints, keypoints: Keypoints) -> Floats:
+        """(B, C) how old the images of this update are, as they say [s]; NaN: none."""
+        if self.recent is None or keypoints.time_s is None:
+            return np.zeros(keypoints.px.shape[:2])
+        return (self.recent.steps[ids, None] + 1) * self.dt_s - keypoints.time_s
+
+    def looks(self, b: int) -> tuple[Keypoints | None, Windows]:
+        """The keypoints of environment `b`."""
+        return rows(self.keypoints, np.array([b])), []
+
+    def crops(self, b: int) -> list[Image | None]:
+        """No network was given anything."""
+        return []
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+
+def no_keypoints(batch: int, n_cameras: int, n_workers: int) -> Keypoints:
+    """Nobody is seen by any camera."""
+    shape = (batch, n_cameras, n_workers, N_JOINTS)
+    return Keypoints(np.full((*shape, 2), np.nan), np.zeros(shape), np.full(shape, np.inf))

@@ -1,0 +1,261 @@
+"""Pictures for people: what the cameras see and what is made of it, drawn over a render."""
+
+from functools import cache, lru_cache
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image as PillowImage
+from PIL import ImageDraw, ImageFont
+
+from hrc_env.core.records import Keypoints, PoseEstimate, Roi
+from hrc_env.core.skeleton import BONES, JOINTS
+from hrc_env.core.typing import Floats, Image, Points2
+from hrc_env.geometry.cameras import PinholeCamera, image_from_pinhole, pinhole_stretch, project
+
+Colour = tuple[int, int, int]
+
+LEFT: Colour = (66, 165, 245)
+RIGHT: Colour = (255, 138, 60)
+MIDDLE: Colour = (235, 235, 235)
+DETECTED: Colour = (255, 64, 96)
+WINDOW: Colour = (250, 250, 120)
+INK: Colour = (236, 239, 241)
+PANEL: Colour = (24, 28, 34)
+GOAL: Colour = (255, 214, 0)
+GRID: Colour = (46, 53, 61)
+ARM: Colour = (150, 158, 168)
+BELIEF: Colour = (90, 230, 160)
+COST: Colour = (255, 110, 120)
+
+
+@cache
+def bone_colour(first: int, second: int) -> Colour:
+    """Blue on the worker's left, orange on the right, white across."""
+    sides = {JOINTS[first].split("_")[0], JOINTS[second].split("_")[0]}
+    if sides == {"left"}:
+        return LEFT
+    return RIGHT if sides == {"right"} else MIDDLE
+
+
+def draw_estimate(
+    image: Image, camera: PinholeCamera, estimate: PoseEstimate, row: int = 0, thickness: int = 2
+) -> None:
+    """The estimated skeletons of one environment with 2-sigma ellipses, in place.
+
+    Args:
+        image: (H, W, 3) a render of `camera`, of any size with its aspect.
+        estimate: belief; row `row` is drawn, workers without a track are not.
+    """
+    scale = image.shape[1] / camera.width_px
+    for worker in np.flatnonzero(estimate.tracked[row]):
+        joints = estimate.mean_world[row, worker]
+        px, depth_m = project(camera.P[None], joints[None])
+        if (depth_m < 0.1).any():
+            continue
+        points = image_from_pinhole(camera, px[0, 0]) * scale
+        _ellipses(image, camera, joints, estimate.cov_world[row, worker], scale)
+        _draw_bones(image, points, thickness)
+        _lines(image, np.stack([points[0], points[[1, 2]].mean(0)]), MIDDLE, thickness)
+
+
+def draw_keypoints(
+    image: Image, camera: PinholeCamera, keypoints: Keypoints, index: int, row: int = 0
+) -> None:
+    """The joints that camera `index` detected, in place; faint where it was not sure."""
+    scale = image.shape[1] / camera.width_px
+    for worker in range(keypoints.px.shape[2]):
+        px = image_from_pinhole(camera, keypoints.px[row, index, worker])
+        confidence = keypoints.confidence[row, index, worker]
+        known = np.isfinite(px).all(-1)
+        radius = max(2, round(image.shape[1] / 200))
+        _draw_joints(image, px[known] * scale, confidence[known], radius)
+
+
+def draw_window(image: Image, camera: PinholeCamera, window: Roi) -> None:
+    """The outline of a crop, in place."""
+    scale = image.shape[1] / camera.width_px
+    box = (
+        (window.centre_px[0] * scale, window.centre_px[1] * scale),
+        (window.side_px * scale, window.side_px * scale),
+        float(np.degrees(window.rotation_rad)),
+    )
+    corners = cv2.boxPoints(box)
+    cv2.polylines(image, [np.round(corners * 16).astype(np.int32)], True, WINDOW, 1, cv2.LINE_AA, 4)
+
+
+def draw_landmarks(image: Image, window: Roi, joints_px: Points2, confidence: Floats) -> None:
+    """Detected joints and bones on a crop, in place; joints_px (J, 2) of the whole image."""
+    offset = (joints_px - np.array(window.centre_px)) * (image.shape[1] / window.side_px)
+    c, s = np.cos(window.rotation_rad), np.sin(window.rotation_rad)
+    points = offset @ np.array([[c, -s], [s, c]]) + image.shape[1] / 2
+    if not np.isfinite(points).all():
+        return
+    _draw_bones(image, points, 1)
+    _draw_joints(image, points, confidence, 3)
+
+
+def draw_floor(image: Image, camera: PinholeCamera, middle: Floats, reach_m: int = 3) -> None:
+    """A grid of metres on the floor round a point (3,), in place."""
+    along = np.linspace(-reach_m, reach_m, 2)
+    for k in range(-reach_m, reach_m + 1):
+        for line in ([(x, k) for x in along], [(k, y) for y in along]):
+            ends = np.array([(middle[0] + x, middle[1] + y, 0.0) for x, y in line])
+            draw_path(image, camera, ends, GRID, 1)
+
+
+def draw_path(
+    image: Image, camera: PinholeCamera, points: Floats, colour: Colour, thickness: int
+) -> None:
+    """Straight lines from point to point (N, 3) [m], in place; none where one is behind."""
+    px, depth_m = project(camera.P[None], points[None])
+    if (depth_m < 0.1).any():
+        return
+    _lines(image, px[0, 0] * (image.shape[1] / camera.width_px), colour, thickness)
+
+
+def draw_goal(image: Image, camera: PinholeCamera, goal_world: Floats) -> None:
+    """A ring round the goal, in place; drawn over whatever stands before it."""
+    px, depth_m = project(camera.P[None], goal_world[None, None])
+    if depth_m[0, 0, 0] < 0.1:
+        return
+    scale = image.shape[1] / camera.width_px
+    radius = max(4, round(0.05 * camera.K[0, 0] * scale / depth_m[0, 0, 0]))
+    (middle,) = _fixed(px[0, 0] * scale)
+    cv2.circle(image, middle, radius * 16, GOAL, 2, cv2.LINE_AA, 4)
+    cv2.circle(image, middle, 2 * 16, GOAL, -1, cv2.LINE_AA, 4)
+
+
+def label(
+    image: Image, text: str, at: tuple[int, int], size: int = 16, colour: Colour = INK
+) -> None:
+    """Text with its upper left corner at `at`, on a dark plate, in place."""
+    font = _font(size)
+    _, _, right, bottom = (round(value) for value in font.getbbox(text))
+    x, y = at
+    pad = max(3, size // 4)
+    y1, x1 = min(y + bottom + 2 * pad, image.shape[0]), min(x + right + 2 * pad, image.shape[1])
+    plate = image[y:y1, x:x1]
+    plate[:] = (0.35 * plate + 0.65 * np.array(PANEL)).astype(np.uint8)
+    write(image, text, (x + pad, y + pad), size, colour)
+
+
+def write(
+    image: Image, text: str, at: tuple[int, int], size: int = 16, colour: Colour = INK
+) -> None:
+    """Text with its upper left corner at `at`, in place."""
+    x, y = at
+    ink = _ink(text, size)
+    patch = image[y : y + ink.shape[0], x : x + ink.shape[1]]
+    ink = ink[: patch.shape[0], : patch.shape[1]]
+    patch[:] = patch + ink * (np.array(colour, np.float32) - patch)
+
+
+def text_width(text: str, size: int = 16) -> int:
+    """How wide a text is [px]."""
+    return round(_font(size).getbbox(text)[2])
+
+
+def tile(pictures: list[Image], columns: int, gap: int = 4) -> Image:
+    """Pictures of one size in rows, with dark seams."""
+    height, width = pictures[0].shape[:2]
+    rows = -(-len(pictures) // columns)
+    sheet = np.empty((rows * (height + gap) - gap, columns * (width + gap) - gap, 3), np.uint8)
+    sheet[:] = PANEL
+    for k, picture in enumerate(pictures):
+        y, x = (k // columns) * (height + gap), (k % columns) * (width + gap)
+        sheet[y : y + height, x : x + width] = picture
+    return sheet
+
+
+def shrink(image: Image, width: int, height: int) -> Image:
+    """The image in another size; every pixel is the mean of those it stands for."""
+    return np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def middle_rows(image: Image, height: int) -> Image:
+    """The middle `height` rows."""
+    top = (image.shape[0] - height) // 2
+    return image[top : top + height]
+
+
+def _ellipses(
+    image: Image, camera: PinholeCamera, joints: Floats, covariances: Floats, scale: float
+) -> None:
+    """The images of 2-sigma regions of joints (J, 3), to first order, faintly, in place."""
+    R_cam_from_world = camera.T_world_from_cam[:3, :3].T
+    x, y, z = ((joints - camera.eye_world) @ R_cam_from_world.T).T
+    one, none = np.ones_like(z), np.zeros_like(z)
+    local = np.stack([np.stack([one, none, -x / z], -1), np.stack([none, one, -y / z], -1)], 1)
+    J = (camera.K[0, 0] * scale / z)[:, None, None] * local @ R_cam_from_world
+    values, vectors = np.linalg.eigh(J @ covariances @ J.transpose(0, 2, 1))
+    pinhole_px = camera.K[:2, 2] + camera.K[0, 0] * np.stack([x, y], -1) / z[:, None]
+    stretch = np.reshape(pinhole_stretch(camera, pinhole_px), (-1, 1))
+    axes = 2 * np.sqrt(np.maximum(values, 0.25)) / stretch
+    angles = np.degrees(np.arctan2(vectors[:, 1, 1], vectors[:, 0, 1]))
+    centres = image_from_pinhole(camera, pinhole_px) * scale
+    fit = np.flatnonzero((axes.max(-1) <= 4 * image.shape[1]) & np.isfinite(centres).all(-1))
+    if not len(fit):
+        return
+    reach = axes[fit].max(-1, keepdims=True) + 2
+    size = np.array(image.shape[1::-1])
+    low = np.clip(np.floor((centres[fit] - reach).min(0)), 0, size).astype(int)
+    high = np.clip(np.ceil((centres[fit] + reach).max(0)), 0, size).astype(int)
+    part = image[low[1] : high[1], low[0] : high[0]]
+    if not part.size:
+        return
+    overlay = part.copy()
+    for j in fit.tolist():
+        centre = int(centres[j, 0]) - int(low[0]), int(centres[j, 1]) - int(low[1])
+        radii = max(1, round(axes[j, 1])), max(1, round(axes[j, 0]))
+        cv2.ellipse(overlay, centre, radii, angles[j], 0, 360, BELIEF, -1, cv2.LINE_AA)
+    part[:] = cv2.addWeighted(overlay, 0.35, part, 0.65, 0)
+
+
+def _draw_bones(image: Image, points: Points2, thickness: int) -> None:
+    spots = _fixed(points)
+    for first, second in BONES[:-2]:
+        colour = bone_colour(first, second)
+        cv2.line(image, spots[first], spots[second], colour, thickness, cv2.LINE_AA, 4)
+
+
+def _draw_joints(image: Image, points: Points2, confidence: Floats, radius: int) -> None:
+    """Joints (N, 2) [px], faint where nobody was sure."""
+    for spot, sure in zip(_fixed(points), confidence.tolist(), strict=True):
+        colour = _mix(PANEL, DETECTED, 0.35 + 0.65 * sure)
+        cv2.circle(image, spot, radius * 16, colour, -1, cv2.LINE_AA, 4)
+
+
+def _lines(image: Image, points: Points2, colour: Colour, thickness: int) -> None:
+    """Straight lines from point to point (N, 2) [px]."""
+    spots = np.array(_fixed(points), np.int32)
+    cv2.polylines(image, [spots], False, colour, thickness, cv2.LINE_AA, 4)
+
+
+def _fixed(points: Points2) -> list[tuple[int, int]]:
+    """Sub-pixel coordinates (N, 2) for OpenCV, which counts from pixel centres: 4 binary places."""
+    limited = np.clip(points - 0.5, -30000, 30000)
+    return [(x, y) for x, y in np.round(limited * 16).astype(int).tolist()]
+
+
+def _mix(a: Colour, b: Colour, share: float) -> Colour:
+    red, green, blue = (round(p + share * (q - p)) for p, q in zip(a, b, strict=True))
+    return red, green, blue
+
+
+@lru_cache(maxsize=256)
+def _ink(text: str, size: int) -> NDArray[np.float32]:
+    """(H, W, 1) how much ink there is where, 0 to 1."""
+    font = _font(size)
+    _, _, right, bottom = (round(value) for value in font.getbbox(text))
+    drawn = PillowImage.new("L", (right + 2, bottom + 2))
+    ImageDraw.Draw(drawn).text((0, 0), text, fill=255, font=font)
+    return np.asarray(drawn, np.float32)[..., None] / np.float32(255)
+
+
+@lru_cache(maxsize=16)
+def _font(size: int) -> ImageFont.FreeTypeFont:
+    """DejaVu Sans, which comes with matplotlib."""
+    from matplotlib import get_data_path
+
+    return ImageFont.truetype(f"{get_data_path()}/fonts/ttf/DejaVuSans.ttf", size)

@@ -1,0 +1,256 @@
+"""Views of a simulation for people: the room, the cameras with what was made of them."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hrc_env.core.batching import one, rows
+from hrc_env.core.errors import whole
+from hrc_env.core.records import Keypoints, PoseEstimate, Roi, WorkerMotion
+from hrc_env.core.typing import Image, JointAngles, Points3
+from hrc_env.geometry.cameras import PinholeCamera, image_from_pinhole, pinhole
+from hrc_env.geometry.chains import capsules
+from hrc_env.motion import generator
+from hrc_env.perception.lensed import Lensed
+from hrc_env.render import overlay
+from hrc_env.render.stage import Stage
+from hrc_env.scene.domain_randomization import Look
+from hrc_env.scene.layers import Place, viewpoint
+from hrc_env.scene.render import PICTURE_QUALITY, CropRenderer, PictureRenderer
+from hrc_env.simulation import Simulation
+
+PICTURE_SIZE = (960, 720)
+"""Width and height of a picture, if nobody asks for another [px]."""
+SMALLEST_PX, LARGEST_PX = 16, 4096
+VIEWPOINT = "beside"
+"""From where people look on: robot and worker side by side."""
+DEPTH_QUALITY = {**PICTURE_QUALITY, "offsamples": 0, "shadowsize": 0}
+SMOOTHING = 2
+"""Pictures through lenses are drawn so many times as large, and shrunk, for smooth edges."""
+MOSAIC_TILE = (640, 360)
+SIDES = (
+    ("from above", np.array([0.0, 0.0, 5.0]), np.zeros(3)),
+    ("from the side", np.array([0.0, -4.2, 1.4]), np.array([0.0, 0.0, 0.9])),
+)
+"""Where what is believed is seen from: eye and target from the robot's foot [m]."""
+SIDES_HFOV_DEG = 55.0
+
+
+def picture_size(width: Any, height: Any) -> tuple[int, int]:
+    """A picture's width and height [px].
+
+    Raises:
+        ConfigError: no whole numbers from 16 to 4096.
+    """
+    return (
+        whole("width [px]", width, SMALLEST_PX, LARGEST_PX),
+        whole("height [px]", height, SMALLEST_PX, LARGEST_PX),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Glance:
+    """One environment at one moment, apart from the simulation, which may go on."""
+
+    q: JointAngles
+    """(N,)."""
+    motion: WorkerMotion
+    """The workers, arrays (W, S, ...)."""
+    look: Look | None
+    goal_world: Points3
+    """(3,) [m]."""
+    estimate: PoseEstimate
+    """Of a batch of one, as are the keypoints."""
+    keypoints: Keypoints | None
+    windows: list[list[Roi | None]]
+    """Of every worker, through every camera."""
+    crops: list[Image | None]
+    """What the pose network was given of the first worker."""
+
+
+class Views:
+    """Pictures of one environment of a simulation; graphics contexts are made when asked for.
+
+    All pictures must be asked for, and `close` called, in one thread; with a `glance` taken before
+    that may be another one than the simulation's.
+    """
+
+    def __init__(self, simulation: Simulation, b: int = 0) -> None:
+        self.simulation, self.b = simulation, b
+        self._stage: Stage | None = None
+        self._depths: dict[tuple[int, int], PictureRenderer] = {}
+        self._squares: dict[int, CropRenderer] = {}
+
+    def picture(
+        self, depth: bool = False, b: int | None = None, size: tuple[int, int] = PICTURE_SIZE
+    ) -> NDArray[Any]:
+        """Robot and worker, (height, width, 3) uint8, or distances (height, width) float32 [m].
+
+        Of another environment than usual with `b`; `size` is width and height [px].
+        """
+        seen = self.glance(b)
+        if depth:
+            renderer = self._depth_renderer(size, seen.look)
+            return renderer.picture(seen.q, seen.motion, VIEWPOINT, depth=True)
+        return self._drawn([_whole(viewpoint(VIEWPOINT, *size), *size, shadows=True)], seen)[0]
+
+    def glance(self, b: int | None = None) -> Glance:
+        """All that there is to draw now, of another environment than usual with `b`."""
+        b, simulation = self.b if b is None else b, self.simulation
+        keypoints, windows = simulation.senses.looks(b)
+        return Glance(
+            *self.pose(b),
+            simulation.senses.look_of(b),
+            simulation.task.goal_world[b].copy(),
+            rows(simulation.estimate, np.array([b])),
+            keypoints,
+            [list(of_worker) for of_worker in windows],
+            list(simulation.senses.crops(b)),
+        )
+
+    def room(self, width: int, height: int, seen: Glance | None = None) -> Image:
+        """The room with the estimated skeleton over it."""
+        seen, camera = seen or self.glance(), viewpoint(VIEWPOINT, width, height)
+        (image,) = self._drawn([_whole(camera, width, height, shadows=True)], seen)
+        overlay.draw_estimate(image, camera, seen.estimate)
+        overlay.draw_goal(image, camera, seen.goal_world)
+        return image
+
+    def cameras(self, width: int, height: int, seen: Glance | None = None) -> list[Image]:
+        """Every camera's picture with crops, detected keypoints and the estimate.
+
+        Without shadows, as the detector sees the scene; what stands still is drawn once.
+        """
+        seen = seen or self.glance()
+        views = self._through_cameras(width, height, seen)
+        for c, (camera, image) in enumerate(zip(self.simulation.scene.cameras, views, strict=True)):
+            for window in (of_worker[c] for of_worker in seen.windows):
+                if window is not None:
+                    overlay.draw_window(image, camera, window)
+            overlay.draw_estimate(image, camera, seen.estimate, thickness=1)
+            if seen.keypoints is not None:
+                overlay.draw_keypoints(image, camera, seen.keypoints, c)
+            overlay.label(image, camera.name.replace("_", " "), (6, 6), 13)
+        return views
+
+    def crops(self, size: int, seen: Glance | None = None) -> list[Image]:
+        """What the pose network was given: each camera's crop, with its landmarks."""
+        seen = seen or self.glance()
+        if seen.keypoints is None or not seen.windows:
+            return []
+        return [
+            self._crop(crop, c, window, seen.keypoints, size)
+            for c, (crop, window) in enumerate(zip(seen.crops, seen.windows[0], strict=True))
+        ]
+
+    def beliefs(self, width: int, height: int, seen: Glance | None = None) -> list[Image]:
+        """What the robot knows, seen from above and from the side: itself, the goal, its estimate
+        of the workers. No truth in here."""
+        seen = seen or self.glance()
+        arm = capsules(self.simulation.chain, seen.q)
+        foot = np.array([*arm[0, 0, :2], 0.0])
+        images = []
+        for name, eye, target in SIDES:
+            camera = pinhole(name, foot + eye, foot + target, SIDES_HFOV_DEG, width, height)
+            image = np.empty((height, width, 3), np.uint8)
+            image[:] = overlay.PANEL
+            overlay.draw_floor(image, camera, foot)
+            for ends in ([foot, arm[0, 0]], *arm):
+                overlay.draw_path(image, camera, np.array(ends), overlay.ARM, 5)
+            overlay.draw_estimate(image, camera, seen.estimate)
+            overlay.draw_goal(image, camera, seen.goal_world)
+            nobody = "" if seen.estimate.tracked[0].any() else ": nobody is known"
+            overlay.label(image, name + nobody, (6, 6), 13)
+            images.append(image)
+        return images
+
+    def mosaic(self) -> Image:
+        """The cameras in two columns."""
+        return overlay.tile(self.cameras(*MOSAIC_TILE), 2)
+
+    def close(self) -> None:
+        """Free the graphics contexts."""
+        stages = [] if self._stage is None else [self._stage]
+        for renderer in (*stages, *self._depths.values(), *self._squares.values()):
+            renderer.close()
+        self._stage, self._depths, self._squares = None, {}, {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_stage": None, "_depths": {}, "_squares": {}}
+
+    def _crop(
+        self,
+        crop: Image | None,
+        c: int,
+        window: Roi | None,
+        keypoints: Keypoints,
+        size: int,
+    ) -> Image:
+        if window is None or crop is None:
+            image = np.empty((size, size, 3), np.uint8)
+            image[:] = overlay.PANEL
+            overlay.write(image, "no worker in view", (10, size // 2 - 10), 13)
+            return image
+        image = overlay.shrink(crop, size, size)
+        joints_px = image_from_pinhole(self.simulation.scene.cameras[c], keypoints.px[0, c, 0])
+        overlay.draw_landmarks(image, window, joints_px, keypoints.confidence[0, c, 0])
+        return image
+
+    def pose(self, b: int | None = None) -> tuple[JointAngles, WorkerMotion]:
+        """The arm (N,) and the workers (W, S, ...) now, of another environment with `b`."""
+        b = self.b if b is None else b
+        motion = one(generator.current(self.simulation.motion, np.array([b])), 0)
+        return self.simulation.physics.q[b].copy(), motion
+
+    def _through_cameras(self, width: int, height: int, seen: Glance) -> list[Image]:
+        """What every camera sees, without shadows."""
+        cameras = self.simulation.scene.cameras
+        if all(camera.lens is None for camera in cameras):
+            return self._drawn([_whole(camera, width, height) for camera in cameras], seen)
+        images = self._square_images(SMOOTHING * width, seen)
+        squares = [
+            images.crop(c, Roi(_middle(camera), float(camera.width_px), 0.0))
+            for c, camera in enumerate(cameras)
+        ]
+        return [
+            overlay.shrink(overlay.middle_rows(square, SMOOTHING * height), width, height)
+            for square in squares
+        ]
+
+    def _drawn(self, places: list[Place], seen: Glance) -> list[Image]:
+        """Pictures from places that stay."""
+        width = max(place.width for place in places)
+        height = max(place.height for place in places)
+        if self._stage is None or not self._stage.fits(width, height):
+            if self._stage is not None:
+                self._stage.close()
+            self._stage = Stage(self.simulation.scene, width, height)
+        self._stage.dress(seen.look)
+        self._stage.pose(seen.q, seen.motion)
+        return [self._stage.picture(place) for place in places]
+
+    def _depth_renderer(self, size: tuple[int, int], look: Look | None) -> PictureRenderer:
+        if size not in self._depths:
+            self._depths[size] = PictureRenderer(self.simulation.scene, *size, DEPTH_QUALITY)
+        self._depths[size].dress(look)
+        return self._depths[size]
+
+    def _square_images(self, size: int, seen: Glance) -> Lensed:
+        """Square windows of what the cameras see now."""
+        scene = self.simulation.scene
+        if size not in self._squares:
+            self._squares[size] = CropRenderer(scene, size)
+        self._squares[size].dress(seen.look)
+        self._squares[size].draw(seen.q, seen.motion)
+        return Lensed(self._squares[size], scene.cameras)
+
+
+def _middle(camera: PinholeCamera) -> tuple[float, float]:
+    return camera.width_px / 2, camera.height_px / 2
+
+
+def _whole(camera: PinholeCamera, width: int, height: int, shadows: bool = False) -> Place:
+    """A camera's whole width; the picture's shape decides how much of its height."""
+    return Place(camera, _middle(camera), float(camera.width_px), width, height, shadows)

@@ -1,0 +1,157 @@
+"""How scene and workers look, drawn anew for every episode: light, colours, hats, litter.
+
+Looks change images and nothing else: where things are, what hides what, how workers move, goals
+and faults are those of the same seed without. They are drawn from a stream of their own.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.typing import Floats
+
+STREAM = 0x10075
+"""Tells the stream for looks from those that a generator's `spawn` gives: these count from 0."""
+
+
+@dataclass(frozen=True, slots=True)
+class AppearanceConfig:
+    """Between what looks are drawn; as it stands, everything looks as it was built."""
+
+    light: tuple[float, float] = (1.0, 1.0)
+    """Least and greatest factor on the strength of all light."""
+    light_turn_deg: float = 0.0
+    """Lamps and sun come from directions turned by at most so much about the vertical [deg]."""
+    light_tilt_deg: float = 0.0
+    """And tilted by at most so much [deg]."""
+    warmth: float = 0.0
+    """Light is redder and less blue by at most this share, or the other way round."""
+    plain: float = 0.0
+    """Share of the surfaces of the scene that lose their pictures (wood, concrete, plaster)."""
+    tint: float = 0.0
+    """Each channel of each surface of the scene is darker by at most this share."""
+    clothing: float = 0.0
+    """The same of each worker's clothes."""
+    skin: float = 0.0
+    """Workers' skins are darker by at most this share."""
+    hat: float = 1.0
+    """How probable it is that a worker who has a hat wears it."""
+    litter: int = 0
+    """At most so many flat things of any colour lie on the floor, too thin to hide anything."""
+
+    def __post_init__(self) -> None:
+        low, high = self.light
+        if not 0.05 <= low <= high <= 3.0:
+            raise ConfigError(
+                "light must be two factors from 0.05 to 3, the lesser one first, got "
+                f"{self.light}; (0.5, 1.3) is from half the light to a third more."
+            )
+        for name, most in (("light_turn_deg", 180.0), ("light_tilt_deg", 60.0)):
+            if not 0 <= getattr(self, name) <= most:
+                raise ConfigError(f"{name} must be from 0 to {most}, got {getattr(self, name)}.")
+        for name in ("warmth", "plain", "tint", "clothing", "skin", "hat"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise ConfigError(f"{name} must be a share from 0 to 1, got {getattr(self, name)}.")
+        if not 0 <= self.litter <= MOST_LITTER:
+            raise ConfigError(f"litter must be from 0 to {MOST_LITTER}, got {self.litter}.")
+
+
+MOST_LITTER = 60
+AS_BUILT = AppearanceConfig()
+VARIED = AppearanceConfig(
+    light=(0.5, 1.3), light_turn_deg=180.0, light_tilt_deg=25.0, warmth=0.2, plain=0.3, tint=0.5,
+    clothing=0.6, skin=0.5, hat=0.6, litter=25,
+)  # fmt: skip
+"""What one may meet; a judgement."""
+APPEARANCES: dict[str, AppearanceConfig] = {
+    "as_built": AS_BUILT,
+    "varied": VARIED,
+    "lights": AppearanceConfig(
+        light=(0.4, 1.4), light_turn_deg=180.0, light_tilt_deg=40.0, warmth=0.3
+    ),
+    "surfaces": AppearanceConfig(plain=0.5, tint=0.7, litter=40),
+    "people": AppearanceConfig(clothing=0.8, skin=0.6, hat=0.5),
+}
+"""By name: everything as it was built, everything varied, and one thing at a time."""
+
+
+class Look(NamedTuple):
+    """One episode's looks: numbers from which a scene of any size is dressed."""
+
+    light: float
+    """Factor on all light."""
+    turn_rad: float
+    """Turn of its directions about the vertical."""
+    tilt_rad: float
+    """Their tilt, about the horizontal direction `tilt_about_rad`."""
+    tilt_about_rad: float
+    light_rgb: Floats
+    """(3,) its colour."""
+    clothing_rgb: Floats
+    """(W, 3) factors on the colours of clothes."""
+    skin_rgb: Floats
+    """(W, 3) the same of skins."""
+    has_hat: Floats
+    """(W,) 1 or 0."""
+    plain: float
+    """Share of surfaces without pictures."""
+    tint: float
+    """By how much surfaces' channels are darker at most."""
+    n_litter: int
+    seed: int
+    """For the surfaces and for what lies on the floor."""
+
+
+def draw_look(config: AppearanceConfig, n_workers: int, rng: np.random.Generator) -> Look:
+    """An episode's looks.
+
+    Args:
+        config: between what.
+        n_workers: how many workers there is room for.
+        rng: the environment's sensor generator, at the episode's beginning: it stays as it is.
+    """
+    own = _own_stream(rng)
+    low, high = config.light
+    warmth = config.warmth * own.uniform(-1, 1)
+    return Look(
+        light=float(np.exp(own.uniform(np.log(low), np.log(high)))),
+        turn_rad=float(np.radians(config.light_turn_deg * own.uniform(-1, 1))),
+        tilt_rad=float(np.radians(config.light_tilt_deg * own.uniform(0, 1))),
+        tilt_about_rad=float(own.uniform(0, 2 * np.pi)),
+        light_rgb=1.0 + warmth * np.array([1.0, 0.0, -1.0]),
+        clothing_rgb=1.0 - config.clothing * own.uniform(0, 1, (n_workers, 3)),
+        skin_rgb=np.repeat(1.0 - config.skin * own.uniform(0, 1, (n_workers, 1)), 3, 1),
+        has_hat=(own.uniform(0, 1, n_workers) < config.hat).astype(float),
+        plain=config.plain,
+        tint=config.tint,
+        n_litter=int(own.integers(config.litter + 1)),
+        seed=int(own.integers(2**31)),
+    )
+
+
+def appearance_called(given: "str | AppearanceConfig | Mapping[str, Any]") -> AppearanceConfig:
+    """An appearance by name, or as it was given.
+
+    Raises:
+        ConfigError: a name that there is not, with those that there are.
+    """
+    if isinstance(given, AppearanceConfig):
+        return given
+    if isinstance(given, str):
+        if given not in APPEARANCES:
+            raise unknown("appearance", given, APPEARANCES)
+        return APPEARANCES[given]
+    raise ConfigError(
+        "appearance must be a name, an AppearanceConfig or a mapping of its fields "
+        f"({', '.join(each.name for each in fields(AppearanceConfig))}), got {given!r}."
+    )
+
+
+def _own_stream(rng: np.random.Generator) -> np.random.Generator:
+    """A generator that depends on where `rng` came from, and not on what was drawn from it."""
+    seeds = rng.bit_generator.seed_seq
+    key = (*seeds.spawn_key, STREAM)  # type: ignore[attr-defined]
+    return np.random.default_rng(np.random.SeedSequence(seeds.entropy, spawn_key=key))  # type: ignore[attr-defined]

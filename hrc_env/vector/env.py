@@ -1,0 +1,302 @@
+"""The vector environment: many environments as one `gymnasium.vector.VectorEnv`.
+
+import gymnasium, hrc_env
+envs = gymnasium.make_vec("HRCReach-v0", num_envs=64, perception="keypoints")
+
+Environment k is `gymnasium.make("HRCReach-v0", ...)`, bit for bit, whatever the number of
+environments and of threads. What it says, and in which form, is what gymnasium's
+`SyncVectorEnv` of the same environments says.
+"""
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from hrc_env.config import (
+    HRCConfig,
+    resolve,
+    with_appearance,
+    with_cameras,
+    with_faults,
+    with_motions,
+    with_people,
+)
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.stateful import Stateful
+from hrc_env.core.typing import Bools, Floats, Ints
+from hrc_env.env import RENDER_MODES, PlainSpec, check_render_mode, spaces
+from hrc_env.motion.generator import Clip, PeopleConfig
+from hrc_env.perception.faults.fault import FaultConfig
+from hrc_env.render.views import PICTURE_SIZE, Views, picture_size
+from hrc_env.rewards import RewardConfig
+from hrc_env.scene.domain_randomization import AppearanceConfig
+from hrc_env.simulation import Simulation, checked_action
+from hrc_env.step import StepResult
+from hrc_env.vector.infos import InfoTable, blank, table
+from hrc_env.vector.options import (
+    autoreset_of,
+    check_backend,
+    count_of,
+    read_options,
+    seeds_of,
+    threads_of,
+    time_limit,
+)
+from hrc_env.vector.shards import Shards
+
+Observations = NDArray[np.float32]
+Stream = tuple[np.random.Generator, int]
+"""An environment's generator, and what it was made from."""
+Step = tuple[Observations, NDArray[np.float64], Bools, Bools, dict[str, Any]]
+
+
+class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
+    PlainSpec, Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
+):
+    """`num_envs` robots, each beside a worker of its own, stepped at once.
+
+    Args:
+        num_envs: how many.
+        perception: "keypoints", "truth" or "none"; pictures have no batched form.
+        estimator, cameras, scene, n_workers, people, motions, faults, appearance, control,
+            config: as `HRCReachEnv`.
+        render_mode: "rgb_array", "depth_array" or None.
+        width, height: of what `render` gives [px].
+        max_episode_steps: the time limit; None or -1 is none.
+        autoreset_mode: when an environment whose episode is over starts anew: at the next
+            step (default), in the same step, or not by itself ("Disabled").
+        num_threads: threads that share the environments; all cores if None.
+        backend: "threads"; there is no other.
+
+    Raises:
+        ConfigError: an argument that cannot work, with what would.
+    """
+
+    CHANGES = ("shards", "_streams", "_steps", "_ended", "_observation")
+
+    def __init__(
+        self,
+        num_envs: int,
+        *,
+        perception: str = "keypoints",
+        estimator: str = "particle",
+        cameras: str | Path | Sequence[Any] | NDArray[Any] | None = None,
+        scene: str = "lab",
+        n_workers: int | tuple[int, int] = 1,
+        people: str | PeopleConfig | Mapping[str, Any] | None = None,
+        motions: Sequence[str | Path | Clip] | None = None,
+        faults: Sequence[FaultConfig | Mapping[str, Any]] | None = None,
+        appearance: str | AppearanceConfig | Mapping[str, Any] | None = None,
+        control: str = "joint",
+        render_mode: str | None = None,
+        width: int = PICTURE_SIZE[0],
+        height: int = PICTURE_SIZE[1],
+        config: HRCConfig | Mapping[str, Any] | None = None,
+        max_episode_steps: int | None = 250,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        num_threads: int | None = None,
+        backend: str = "threads",
+    ) -> None:
+        if perception == "pixels":
+            raise ConfigError(
+                'perception="pixels" has no batched form: gymnasium.make_vec makes it with a '
+                'process for each environment. perception="keypoints" emulates it, batched.'
+            )
+        check_backend(backend)
+        check_render_mode(render_mode)
+        self._size = picture_size(width, height)
+        self.num_envs = count_of(num_envs)
+        self.autoreset_mode = autoreset_of(autoreset_mode)
+        self.render_mode = render_mode
+        given = with_motions(with_people(resolve(config), people), motions)
+        given = with_appearance(given, appearance)
+        self.config, used = with_cameras(with_faults(given, faults), cameras)
+        make = partial(
+            Simulation,
+            perception=perception,
+            estimator=estimator,
+            cameras=used,
+            scene=scene,
+            n_workers=n_workers,
+            control=control,
+            config=self.config,
+        )
+        n_shards = min(threads_of(num_threads), self.num_envs)
+        self.shards = Shards(self.num_envs, n_shards, make)
+        self.views = [Views(part) for part in self.shards.parts]
+        self.single_observation_space, self.single_action_space = spaces(self.shards.first)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self.metadata = {
+            "render_modes": list(RENDER_MODES),
+            "render_fps": round(1 / self.config.ctrl_dt),
+            "autoreset_mode": self.autoreset_mode,
+        }
+        self._streams: list[Stream | None] = [None] * self.num_envs
+        self._action_shape = (self.num_envs, self.shards.first.n_actions)
+        self.max_episode_steps = time_limit(max_episode_steps)
+        self._steps = np.zeros(self.num_envs, int)
+        self._ended = np.zeros(self.num_envs, bool)
+        self._observation: Observations | None = None
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: Mapping[str, Any] | None = None,
+    ) -> tuple[Observations, dict[str, Any]]:
+        """Start episodes.
+
+        Args:
+            seed: environment k gets `seed + k`, or the k-th of a list; with None its random
+                stream goes on.
+            options: "reset_mask", (num_envs,) bool: only these environments start anew.
+                "steps_left", a whole number or (num_envs,) of them: after so many steps these
+                first episodes are truncated, if their time limit does not end them before, so
+                that not all of them end at once. Or "elapsed_steps", (num_envs,) int: how much of
+                the time limit they have behind them.
+
+        Returns:
+            Observations of all environments, and infos of those that started.
+        """
+        self._refuse_closed()
+        seeds = seeds_of(seed, self.num_envs)
+        mask, elapsed_steps = read_options(options, self.num_envs, self.max_episode_steps)
+        if self._observation is None and not mask.all():
+            raise ConfigError("The first reset() must be for everyone: leave out the reset_mask.")
+        ids = np.flatnonzero(mask)
+        for k in ids.tolist():
+            if seeds[k] is not None:
+                self._streams[k] = seeding.np_random(seeds[k])
+        fresh = self._begin(ids)
+        self._steps[ids] = elapsed_steps[ids]
+        if self._observation is None:
+            self._observation = fresh.observation.copy()
+        self._observation[ids] = fresh.observation
+        self._ended = self._ended & ~mask
+        info = blank(fresh, self.num_envs)
+        info.write(ids, fresh)
+        return self._observation.copy(), info.arrays(mask)
+
+    def step(self, actions: NDArray[np.float32]) -> Step:
+        """One control step of every environment.
+
+        Args:
+            actions: (num_envs, n) in [-1, 1]. In the mode NEXT_STEP those of environments
+                whose episode has just ended are ignored: these start anew instead.
+
+        Returns:
+            Observations (num_envs, m) float32; rewards, terminations and truncations
+            (num_envs,); infos as arrays (num_envs,), each with a mask "_name".
+        """
+        outcome = self.shards.step(self._checked(actions))
+        observation, info = outcome.observation.copy(), table(outcome)
+        reward, terminated, over = outcome.reward.copy(), outcome.terminated.copy(), self._ended
+        self._steps += 1
+        if over.any():  # only where the mode is NEXT_STEP
+            self._restart(over, observation, info)
+            reward[over], terminated[over] = 0.0, False
+        truncated = self._steps >= self.max_episode_steps
+        ended, finals = terminated | truncated, {}
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and ended.any():
+            finals = _finals(observation, info, ended)
+            self._restart(ended, observation, info)
+            ended = np.zeros_like(ended)
+        self._observation, self._ended = observation, ended
+        infos = {**finals, **info.arrays(np.ones_like(ended))}
+        return observation.copy(), reward, terminated, truncated, infos
+
+    def set_reward(self, weights: RewardConfig) -> None:
+        """Weigh the reward's terms so from the next step on, in every environment."""
+        for part in self.shards.parts:
+            part.set_reward(weights)
+
+    def render(self) -> tuple[NDArray[Any], ...] | None:  # type: ignore[override]
+        """A picture of every environment, one after the other (slow), as the render mode says."""
+        self._refuse_closed()
+        if self.render_mode is None:
+            return None
+        depth = self.render_mode == "depth_array"
+        return tuple(
+            view.picture(depth, b, self._size)
+            for view, part in zip(self.views, self.shards.parts, strict=True)
+            for b in range(part.batch)
+        )
+
+    @property
+    def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
+        """The environments' random generators."""
+        return tuple(self._stream(k)[0] for k in range(self.num_envs))
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
+        """What the environments' random generators were made from."""
+        return tuple(self._stream(k)[1] for k in range(self.num_envs))
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Stop the threads and release graphics contexts."""
+        for view in self.views:
+            view.close()
+        self.shards.close()
+
+    def _begin(self, ids: Ints) -> StepResult:
+        """Start environments `ids` anew; their random streams go on."""
+        self._steps[ids] = 0
+        return self.shards.reset(ids, [self._stream(k)[0] for k in ids.tolist()])
+
+    def _stream(self, k: int) -> Stream:
+        """The generator of environment k; from the system's entropy if nobody gave a seed."""
+        stream = self._streams[k] or seeding.np_random()
+        self._streams[k] = stream
+        return stream
+
+    def _restart(self, who: Bools, observation: Observations, info: InfoTable) -> None:
+        """Start environments `who` (B,) anew and write what they see over what they saw."""
+        ids = np.flatnonzero(who)
+        fresh = self._begin(ids)
+        observation[ids] = fresh.observation
+        info.write(ids, fresh)
+
+    def _checked(self, actions: Any) -> Floats:
+        """Actions (num_envs, n) clipped to [-1, 1]; zero for environments that start anew.
+
+        Raises:
+            ConfigError: other shapes, no finite numbers, or not the time for a step.
+        """
+        self._refuse_closed()
+        if self._observation is None:
+            raise ConfigError("Call reset() before step().")
+        over = np.flatnonzero(self._ended)
+        if len(over) > 0 and self.autoreset_mode is AutoresetMode.DISABLED:
+            raise ConfigError(
+                f"The episodes of environments {over.tolist()} are over: call "
+                'reset(options={"reset_mask": terminations | truncations}) before step().'
+            )
+        if len(over) > 0 and np.shape(actions) == self.action_space.shape:
+            actions = np.array(actions)
+            actions[over] = 0.0
+        return checked_action(actions, self._action_shape)
+
+    def _refuse_closed(self) -> None:
+        if self.closed:
+            raise ConfigError("This vector environment is closed; make a new one.")
+
+
+def _finals(observation: Observations, info: InfoTable, who: Bools) -> dict[str, Any]:
+    """The last observations and infos of the episodes of environments `who` (B,)."""
+    last = np.full(len(who), None, dtype=object)
+    for k in np.flatnonzero(who).tolist():
+        last[k] = observation[k].copy()
+    return {
+        "final_obs": last,
+        "_final_obs": who.copy(),
+        "final_info": info.arrays(who),
+        "_final_info": who.copy(),
+    }

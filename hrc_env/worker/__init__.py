@@ -1,0 +1,1 @@
+"""A worker's body: measures, surface, what the hands hold."""

@@ -1,0 +1,303 @@
+"""The worker's body: 22 segments, 15 joints, the capsules round them.
+
+A body is numbers that `assets/workers/bake.py` wrote once into `assets/workers/<name>.npz`;
+the README beside them says where they come from. Rest frame: x forward, y left, z up, soles
+at z = 0, origin on the floor below the pelvis. All segment frames are world-aligned at rest,
+so that a pose is 22 positions and rotations and nothing else.
+"""
+
+import functools
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from hrc_env.core.errors import ConfigError, check_shape, unknown
+from hrc_env.core.kernels import kernel
+from hrc_env.core.records import WorkerMotion, WorkerPath, WorkerTruth
+from hrc_env.core.typing import Capsules, Floats, Ints, Points3, QuaternionsWxyz
+from hrc_env.geometry.rotations import turned
+
+TRUNK = ("pelvis", "abdomen", "torso", "chest", "neck", "head")
+LIMBS = ("clavicle", "upper_arm", "forearm", "hand", "thigh", "shank", "foot", "toes")
+SEGMENTS: tuple[str, ...] = (
+    *TRUNK,
+    *(f"left_{part}" for part in LIMBS),
+    *(f"right_{part}" for part in LIMBS),
+)
+N_SEGMENTS = len(SEGMENTS)
+SEGMENT: dict[str, int] = {name: index for index, name in enumerate(SEGMENTS)}
+
+PARENT: Ints = np.array(
+    [-1, 0, 1, 2, 3, 4, 3, 6, 7, 8, 0, 10, 11, 12, 3, 14, 15, 16, 0, 18, 19, 20]
+)
+"""(22,) segment that each segment hangs on; -1 for the pelvis."""
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """One worker's measures, all in metres."""
+
+    name: str
+    stature_m: float
+    """Barefoot, without the hat."""
+    rest_position: Points3
+    """(S, 3) origins of the segments at rest."""
+    joint_segment: Ints
+    """(J,) segment that carries each of the 15 joints."""
+    joint_offset: Points3
+    """(J, 3) the joint in that segment's frame, where BlazePose would place it."""
+    capsule_names: tuple[str, ...]
+    capsule_segment: Ints
+    """(K,) segment that carries each capsule."""
+    capsule_ends: Points3
+    """(K, 2, 3) end points in that segment's frame."""
+    capsule_radius_m: Floats
+    """(K,)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bodies:
+    """The measures of N workers, row by row; names and segments are the same for all."""
+
+    names: tuple[str, ...]
+    stature_m: Floats
+    """(N,)."""
+    rest_position: Points3
+    """(N, S, 3)."""
+    joint_segment: Ints
+    """(J,)."""
+    joint_offset: Points3
+    """(N, J, 3)."""
+    capsule_names: tuple[str, ...]
+    capsule_segment: Ints
+    """(K,)."""
+    capsule_ends: Points3
+    """(N, K, 2, 3)."""
+    capsule_radius_m: Floats
+    """(N, K)."""
+
+
+def assets_dir() -> Path:
+    """The folder of assets: `hrc_env/assets` when installed, `../assets` in a checkout."""
+    package = Path(__file__).parents[1]
+    installed = package / "assets"
+    return installed if installed.is_dir() else package.parent / "assets"
+
+
+def worker_names() -> tuple[str, ...]:
+    """Names of the baked workers."""
+    return tuple(sorted(path.stem for path in (assets_dir() / "workers").glob("*.npz")))
+
+
+@functools.cache
+def load_body(name: str = "worker_1") -> Body:
+    """Read a baked worker's measures.
+
+    Raises:
+        ConfigError: no worker of that name has been baked.
+    """
+    with np.load(baked_path(name)) as baked:
+        return Body(
+            name=name,
+            stature_m=float(baked["stature_m"]),
+            rest_position=fixed(baked["rest_position"], np.float64),
+            joint_segment=fixed(baked["joint_segment"], np.int64),
+            joint_offset=fixed(baked["joint_offset"], np.float64),
+            capsule_names=tuple(str(capsule) for capsule in baked["capsule_names"]),
+            capsule_segment=fixed(baked["capsule_segment"], np.int64),
+            capsule_ends=fixed(baked["capsule_ends"], np.float64),
+            capsule_radius_m=fixed(baked["capsule_radius_m"], np.float64),
+        )
+
+
+@functools.cache
+def stack(names: tuple[str, ...]) -> Bodies:
+    """Read several baked workers.
+
+    Raises:
+        ConfigError: no name, an unknown one, or bodies whose rows mean different things.
+    """
+    if not names:
+        raise ConfigError(f"Expected at least one worker of {', '.join(worker_names())}; got none.")
+    bodies = [load_body(name) for name in names]
+    first = bodies[0]
+    for body in bodies:
+        if not _same_rows(body, first):
+            raise ConfigError(
+                f"{body.name} has other capsules or joints than {first.name}; expected the same "
+                "names on the same segments. Bake both with the same assets/workers/bake.py."
+            )
+    return Bodies(
+        names=names,
+        stature_m=fixed(np.array([body.stature_m for body in bodies]), np.float64),
+        rest_position=fixed(np.stack([body.rest_position for body in bodies]), np.float64),
+        joint_segment=first.joint_segment,
+        joint_offset=fixed(np.stack([body.joint_offset for body in bodies]), np.float64),
+        capsule_names=first.capsule_names,
+        capsule_segment=first.capsule_segment,
+        capsule_ends=fixed(np.stack([body.capsule_ends for body in bodies]), np.float64),
+        capsule_radius_m=fixed(np.stack([body.capsule_radius_m for body in bodies]), np.float64),
+    )
+
+
+ANY = "any"
+"""Stands for all baked workers."""
+
+
+def pool(worker: str | tuple[str, ...]) -> tuple[str, ...]:
+    """The bodies that workers can have: of one name, of several, or all of them (`ANY`).
+
+    Raises:
+        ConfigError: no name, one twice, or one of which no worker has been baked.
+    """
+    if worker == ANY:
+        return worker_names()
+    names = (worker,) if isinstance(worker, str) else tuple(worker)
+    valid = (*worker_names(), ANY)
+    if not names or len(set(names)) < len(names):
+        raise ConfigError(
+            f"worker must be a name or several different ones of {', '.join(valid[:-1])}, "
+            f"or {ANY!r} for all of them; got {worker!r}."
+        )
+    for name in names:
+        if name not in worker_names():
+            raise unknown("worker", name, valid)
+    return names
+
+
+def rest_motion(body: Body) -> WorkerMotion:
+    """The body at rest and still, without leading axes: (S, ...)."""
+    upright = np.zeros((N_SEGMENTS, 4))
+    upright[:, 0] = 1.0
+    still = np.zeros((N_SEGMENTS, 3))
+    return WorkerMotion(body.rest_position.copy(), upright, still, still.copy())
+
+
+def worker_truth(body: Body | Bodies, motion: WorkerMotion) -> WorkerTruth:
+    """Where the joints and capsules of a body in motion are, and how fast the joints.
+
+    Args:
+        body: the worker's measures, or those of several.
+        motion: segments (..., S, 3 or 4) with any leading axes; its `body` says rows of
+            `Bodies`, of a single `Body` there is nothing to choose.
+
+    Returns:
+        The truth with the same leading axes. A joint moves with its segment: v + omega x r
+        (rigid body kinematics).
+    """
+    position, quaternion = motion.position_world, motion.quaternion_wxyz
+    lead, n_joints = position.shape[:-2], len(body.joint_segment)
+    rows = _rows(body, motion.body, lead)
+    capsules = _capsules_of(body, position, quaternion, rows)
+    joints, velocity = np.empty((*lead, n_joints, 3)), np.empty((*lead, n_joints, 3))
+    _joints(
+        _flat(position), _flat(quaternion),
+        _flat(motion.velocity_world), _flat(motion.angular_velocity_world), rows,
+        body.joint_segment, body.joint_offset.reshape(-1, n_joints, 3),
+        _flat(joints), _flat(velocity),
+    )  # fmt: skip
+    radius = body.capsule_radius_m.reshape(-1, len(body.capsule_names))[rows]
+    return WorkerTruth(joints, velocity, capsules, radius.reshape(*lead, radius.shape[1]))
+
+
+def worker_capsules(body: Body | Bodies, path: WorkerPath, which: Ints | None = None) -> Capsules:
+    """(B, T, W, K, 2, 3) the bodies' capsules along a path [m]; `which` (B, W) of `Bodies`."""
+    position = path.position_world
+    over_time = None if which is None else np.asarray(which)[..., None, :]
+    rows = _rows(body, over_time, position.shape[:-2])
+    return _capsules_of(body, position, path.quaternion_wxyz, rows)
+
+
+def _same_rows(body: Body, other: Body) -> bool:
+    return (
+        body.capsule_names == other.capsule_names
+        and np.array_equal(body.capsule_segment, other.capsule_segment)
+        and np.array_equal(body.joint_segment, other.joint_segment)
+    )
+
+
+def _rows(body: Body | Bodies, which: Ints | None, lead: tuple[int, ...]) -> Ints:
+    """(count,) row of every body in motion."""
+    if isinstance(body, Body) or which is None or len(body.names) == 1:
+        return _first(math.prod(lead))
+    last = len(body.names) - 1
+    if which.size and not 0 <= which.min() <= which.max() <= last:
+        raise ConfigError(f"Bodies must be rows 0 to {last} of {body.names}, got {which}.")
+    rows = np.empty(lead, np.int64)
+    rows[...] = which
+    rows.setflags(write=False)  # as `_first`'s: one compiled function takes both
+    return rows.reshape(-1)
+
+
+@functools.lru_cache(maxsize=16)
+def _first(count: int) -> Ints:
+    """(count,) zeros."""
+    return fixed(np.zeros(count), np.int64)
+
+
+def _capsules_of(
+    body: Body | Bodies, position: Points3, quaternion: QuaternionsWxyz, rows: Ints
+) -> Capsules:
+    """Capsules (..., K, 2, 3) of bodies with any leading axes."""
+    check_shape("position_world", position.shape[-2:], (N_SEGMENTS, 3), "segments, xyz")
+    flat, shape = _flat(position), (len(body.capsule_segment), 2, 3)
+    ends = np.empty((len(flat), *shape))
+    known = body.capsule_ends.reshape(-1, *shape)
+    _capsules(flat, _flat(quaternion), rows, body.capsule_segment, known, ends)
+    return ends.reshape(*position.shape[:-2], *shape)
+
+
+def _flat(array: Floats) -> Floats:
+    """(..., n, m) as (count, n, m), contiguous."""
+    whole = np.ascontiguousarray(array)
+    return whole.reshape(math.prod(whole.shape[:-2]), *whole.shape[-2:])
+
+
+@kernel
+def _joints(
+    position, quaternion, linear, angular, rows, segment, offset, joints, velocity
+):  # pragma: no cover - compiled
+    """Joints, and how fast the segments carry them, one body after the other."""
+    for b in range(position.shape[0]):
+        mine = offset[rows[b]]
+        for j in range(len(segment)):
+            s = segment[j]
+            arm = turned(quaternion[b, s], mine[j])
+            for i in range(3):
+                k, m = (i + 1) % 3, (i + 2) % 3
+                joints[b, j, i] = position[b, s, i] + arm[i]
+                omega_k, omega_m = angular[b, s, k], angular[b, s, m]
+                velocity[b, j, i] = linear[b, s, i] + omega_k * arm[m] - omega_m * arm[k]
+
+
+@kernel
+def _capsules(position, quaternion, rows, segment, ends, capsules):  # pragma: no cover - compiled
+    """Both ends of the capsules of bodies."""
+    for b in range(position.shape[0]):
+        mine = ends[rows[b]]
+        for k in range(len(segment)):
+            s = segment[k]
+            for end in range(2):
+                arm = turned(quaternion[b, s], mine[k, end])
+                for i in range(3):
+                    capsules[b, k, end, i] = position[b, s, i] + arm[i]
+
+
+def baked_path(name: str) -> Path:
+    """The file of a worker.
+
+    Raises:
+        ConfigError: no worker of that name has been baked.
+    """
+    if name not in worker_names():
+        raise unknown("worker", name, worker_names())
+    return assets_dir() / "workers" / f"{name}.npz"
+
+
+def fixed(array: np.ndarray, dtype: type) -> np.ndarray:
+    """A read-only copy: bodies are shared, nobody may write into them."""
+    copy = np.array(array, dtype=dtype)
+    copy.setflags(write=False)
+    return copy

@@ -1,0 +1,186 @@
+"""What workers hold: tools, boards, boxes, things on wheels. Shapes and grips, no looks.
+
+A prop's frame is the worker's (x ahead, y left, z up) when the prop is held in front and upright.
+Things in one hand have their origin in the middle of that fist; the grip is listed for the right
+hand and is the left's as well. Things in two hands have it between the hands, those on wheels on
+the floor below that. Sizes are of common tools, rounded; judgement.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hrc_env.core.kernels import kernel
+from hrc_env.core.records import Held
+from hrc_env.core.typing import Floats, Ints, Points3
+from hrc_env.geometry.rotations import turned
+from hrc_env.geometry.shapes import BOX, CAPSULE, CENTRE, HALF_SIZE, WIDTH, absent, shape
+
+Triple = Sequence[float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prop:
+    """A thing that can be held."""
+
+    name: str
+    shapes: Floats
+    """(G, `shapes.WIDTH`) its solid parts, capsules and boxes, in its own frame [m]."""
+    grips: Points3
+    """(2, 3) where the left and the right hand hold it, own frame [m]; NaN: that hand does not."""
+
+
+def prop_index(name: str) -> int:
+    """Where `PROPS` has the prop of a name."""
+    return PROP_NAMES.index(name)
+
+
+def _box(centre: Triple, size: Triple) -> Floats:
+    """A box of full edge lengths."""
+    return shape(BOX, np.array(centre, float), np.eye(3), np.array(size) / 2)
+
+
+def _rod(start: Triple, end: Triple, radius: float) -> Floats:
+    """A capsule between two points."""
+    ends = np.array([start, end], float)
+    along = ends[1] - ends[0]
+    length = float(np.linalg.norm(along))
+    z = along / length
+    x = np.cross(z, np.eye(3)[np.argmin(np.abs(z))])
+    x /= np.linalg.norm(x)
+    axes = np.stack([x, np.cross(z, x), z], -1)
+    return shape(CAPSULE, ends.mean(0), axes, np.array([radius, length / 2, 0.0]))
+
+
+def _prop(name: str, parts: Sequence[Floats], left: Triple | None, right: Triple | None) -> Prop:
+    nowhere = (np.nan,) * 3
+    grips = np.array([nowhere if grip is None else grip for grip in (left, right)], float)
+    shapes = np.array(parts, float).reshape(-1, WIDTH)
+    for values in (shapes, grips):
+        values.setflags(write=False)
+    return Prop(name, shapes, grips)
+
+
+def _hammer() -> Prop:
+    """Its handle stands up from the fist, the face that strikes looks ahead."""
+    handle = _rod((0, 0, -0.06), (0, 0, 0.24), 0.015)
+    head = _rod((-0.05, 0, 0.25), (0.05, 0, 0.25), 0.016)
+    return _prop("hammer", [handle, head], None, (0, 0, 0))
+
+
+def _drill() -> Prop:
+    """A cordless drill: the bit points ahead, above the fist."""
+    parts = [
+        _rod((-0.06, 0, 0.09), (0.10, 0, 0.09), 0.034),
+        _rod((0, 0, -0.05), (0, 0, 0.06), 0.020),
+        _box((0.01, 0, -0.09), (0.12, 0.075, 0.06)),
+        _rod((0.13, 0, 0.09), (0.22, 0, 0.09), 0.005),
+    ]
+    return _prop("drill", parts, None, (0, 0, 0))
+
+
+def _saw() -> Prop:
+    """A hand saw: the blade runs ahead from the fist, its teeth down."""
+    parts = [_box((0.0, 0, 0.0), (0.09, 0.024, 0.12)), _box((0.30, 0, -0.02), (0.52, 0.004, 0.09))]
+    return _prop("saw", parts, None, (0, 0, 0))
+
+
+def _tape_measure() -> Prop:
+    """Drawn out half a metre from the right hand, its end in the left."""
+    parts = [_box((0, -0.25, 0), (0.07, 0.045, 0.07)), _box((0, 0.0, -0.02), (0.022, 0.50, 0.003))]
+    return _prop("tape_measure", parts, (0, 0.25, -0.02), (0, -0.25, 0))
+
+
+def _board() -> Prop:
+    """A sawn stud of 2.4 m, crosswise in both hands."""
+    return _prop("board", [_box((0, 0, 0), (0.089, 2.4, 0.038))], (0, 0.30, 0), (0, -0.30, 0))
+
+
+def _carton() -> Prop:
+    """A box between the palms."""
+    return _prop("box", [_box((0, 0, 0), (0.34, 0.40, 0.30))], (0, 0.20, 0), (0, -0.20, 0))
+
+
+def _cart() -> Prop:
+    """A platform cart that is pushed by its bar."""
+    parts = [
+        _box((0.56, 0, 0.20), (0.90, 0.58, 0.06)),
+        _box((0.60, 0, 0.41), (0.70, 0.48, 0.36)),
+        _rod((0.0, -0.27, 0.98), (0.0, 0.27, 0.98), 0.016),
+        *(_rod((0.13, y, 0.20), (0.0, y, 0.98), 0.016) for y in (-0.27, 0.27)),
+        *(_box((x, y, 0.08), (0.16, 0.04, 0.16)) for x in (0.25, 0.88) for y in (-0.22, 0.22)),
+    ]
+    return _prop("cart", parts, (0, 0.20, 0.98), (0, -0.20, 0.98))
+
+
+def _wheelbarrow() -> Prop:
+    """Level on its wheel while its handles are held."""
+    parts = [
+        *(_rod((-0.10, y, 0.72), (1.15, 0.3 * y, 0.26), 0.018) for y in (-0.29, 0.29)),
+        _box((0.68, 0, 0.63), (0.80, 0.58, 0.36)),
+        _box((1.20, 0, 0.19), (0.34, 0.08, 0.34)),
+        *(_rod((0.42, y, 0.16), (0.40, y, 0.48), 0.016) for y in (-0.20, 0.20)),
+    ]
+    return _prop("wheelbarrow", parts, (0, 0.28, 0.685), (0, -0.28, 0.685))
+
+
+def _level() -> Prop:
+    """A spirit level, flat to a wall ahead, in both hands."""
+    return _prop("level", [_box((0, 0, 0), (0.025, 0.80, 0.06))], (0, 0.22, 0), (0, -0.22, 0))
+
+
+PROPS: tuple[Prop, ...] = (
+    _prop("nothing", [], None, None),
+    _hammer(),
+    _drill(),
+    _saw(),
+    _tape_measure(),
+    _board(),
+    _carton(),
+    _cart(),
+    _wheelbarrow(),
+    _level(),
+)
+"""Everything that can be held; the first is nothing."""
+PROP_NAMES: tuple[str, ...] = tuple(prop.name for prop in PROPS)
+
+
+_N_PARTS: Ints = np.array([len(prop.shapes) for prop in PROPS])
+_PARTS: Floats = np.stack(
+    [np.resize(np.vstack([prop.shapes, absent()]), (_N_PARTS.max(), WIDTH)) for prop in PROPS]
+)
+"""(P, n, `shapes.WIDTH`) the parts of every prop, `_N_PARTS` of them, then anything."""
+
+
+def held_shapes(held: Held) -> Floats:
+    """(B, W * n, `shapes.WIDTH`) the solid parts of what workers hold, in the world [m].
+
+    There are rows for the prop of most parts; those that are left over are absent.
+    """
+    batch, n_workers = held.kind.shape
+    rows = np.empty((batch, n_workers * _PARTS.shape[1], WIDTH))
+    _place(held.kind, held.position_world, held.quaternion_wxyz, _PARTS, _N_PARTS, absent(), rows)
+    return rows
+
+
+@kernel
+def _place(kind, position, quaternion, parts, n_parts, nothing, rows):
+    """Parts of the props of B environments, of W workers each, from their frames to the world."""
+    most = parts.shape[1]
+    for b in range(len(kind)):
+        for k in range(rows.shape[1]):
+            w, part, row = k // most, k % most, rows[b, k]
+            prop = kind[b, w]
+            if part >= n_parts[prop]:
+                for i in range(WIDTH):
+                    row[i] = nothing[i]
+                continue
+            own = parts[prop, part]
+            for i in range(WIDTH):
+                row[i] = own[i]
+            for at in range(CENTRE, HALF_SIZE, 3):
+                x, y, z = turned(quaternion[b, w], own[at : at + 3])
+                row[at], row[at + 1], row[at + 2] = x, y, z
+            for i in range(3):
+                row[CENTRE + i] += position[b, w, i]

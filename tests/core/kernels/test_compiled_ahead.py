@@ -1,0 +1,75 @@
+"""What a perception level needs is compiled before, in processes of their own."""
+
+import json
+import logging
+import sys
+
+import pytest
+
+from hrc_env.core.kernels import ahead, cache, signatures
+
+PLAY = """
+import json, warnings
+import gymnasium, hrc_env
+from hrc_env.core.kernels import KERNELS
+from hrc_env.core.kernels.signatures import encode
+warnings.simplefilter("ignore")
+env = gymnasium.make("HRCReach-v0", perception={level!r})
+envs = gymnasium.make_vec("HRCReach-v0", 3, perception={level!r})
+env.reset(seed=0)
+envs.reset(seed=0)
+for _ in range(20):
+    env.step(env.action_space.sample())
+    envs.step(envs.action_space.sample())
+print(json.dumps([[name, [encode(each) for each in args]] for name, kernel in KERNELS.items()
+                  for args in kernel.overloads]))
+"""
+
+
+@pytest.fixture
+def two_kernels(tmp_path, monkeypatch):
+    """A folder in which nothing is compiled, and two small kernels that are to be."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    names = ("hrc_env.observations:_scale", "hrc_env.rewards:_mean_square")
+    some = [each for each in signatures.recorded("truth") if each.kernel in names]
+    monkeypatch.setattr(signatures, "PATH", tmp_path / "signatures.json")
+    signatures.write(some)
+    cache.folder.cache_clear()
+    yield some
+    cache.folder.cache_clear()
+
+
+@pytest.mark.parametrize("level", ["truth", "keypoints", "none"])
+def test_everything_that_a_level_calls_is_recorded(level, process):
+    done = process("-c", PLAY.format(level=level))
+    assert done.returncode == 0, done.stderr
+    called = {json.dumps(each) for each in json.loads(done.stdout.splitlines()[-1])}
+    known = {json.dumps([each.kernel, each.args]) for each in signatures.recorded(level)}
+    assert called <= known, "run python -m assets.kernels.record"
+
+
+def test_what_is_missing_is_compiled_and_then_no_longer_missing(two_kernels):
+    told: list[float] = []
+    assert ahead.missing() == two_kernels
+    assert ahead.compile_missing(None, lambda share, what: told.append(share)) == len(two_kernels)
+    assert ahead.missing() == []
+    assert sum(told) == pytest.approx(1.0)
+    assert ahead.compile_missing(None, lambda share, what: told.append(share)) == 0
+
+
+def test_where_no_process_can_be_started_it_says_so_and_goes_on(two_kernels, monkeypatch, caplog):
+    monkeypatch.setattr(sys, "executable", "/nonexistent/python")
+    with caplog.at_level(logging.WARNING):
+        ahead.compile_missing(None, lambda share, what: None)
+    assert "cannot be compiled ahead" in caplog.text
+    assert ahead.missing() == two_kernels
+
+
+def test_a_process_that_dies_is_named_and_its_kernel_left_for_later(
+    two_kernels, monkeypatch, caplog
+):
+    monkeypatch.setattr(sys, "executable", "/bin/false")
+    with caplog.at_level(logging.WARNING):
+        ahead.compile_missing(None, lambda share, what: None)
+    assert "_scale" in caplog.text or "_mean_square" in caplog.text
+    assert ahead.missing() == two_kernels

@@ -1,0 +1,82 @@
+"""Kernels give what Python gives; callees are part of them; others' functions are left alone."""
+
+import numba
+import numpy as np
+import pytest
+from numba.core.codegen import JITCodeLibrary
+
+from hrc_env.core.kernels import kernel
+from hrc_env.core.kernels.lean import LeanLibrary
+
+
+@kernel
+def scaled(row, factor):
+    total = 0.0
+    for k in range(len(row)):
+        row[k] *= factor
+        total += row[k]
+    if total < 0.0:
+        raise ValueError("the sum must not be negative")
+    return total
+
+
+@kernel(makes_arrays=True)
+def with_ones(n, width=2):
+    return np.ones((n, width))
+
+
+@kernel(makes_arrays=True)
+def sums(rows, factor):
+    ones = with_ones(len(rows), width=1)
+    return np.array([scaled(rows[k], factor) for k in range(len(rows))]) + ones[:, 0]
+
+
+@pytest.fixture(autouse=True)
+def nothing_kept(tmp_path, monkeypatch):
+    """A folder of its own for what is compiled here."""
+    monkeypatch.setattr("hrc_env.core.kernels.cache.folder", lambda: tmp_path)
+
+
+def test_a_kernel_that_calls_others_gives_what_python_gives():
+    rows = np.arange(12.0).reshape(3, 4)
+    expected = rows.sum(axis=1) * 0.5 + 1.0
+    assert sums(rows, 0.5) == pytest.approx(expected)
+    assert rows[2] == pytest.approx([4.0, 4.5, 5.0, 5.5])
+
+
+def test_an_error_in_a_callee_reaches_python():
+    with pytest.raises(ValueError, match="must not be negative"):
+        sums(-np.ones((2, 3)), 1.0)
+
+
+def test_a_callee_is_compiled_only_within_its_caller():
+    sums(np.ones((2, 3)), 1.0)
+    assert scaled.overloads == {}
+    (callee,) = scaled.callee.overloads.values()
+    assert isinstance(callee.library, LeanLibrary)
+    assert callee.library._is_callee
+    assert len(scaled.callee.signatures) == 1
+
+
+def test_what_a_kernel_gives_does_not_depend_on_what_python_called_before():
+    def fresh():
+        inner = kernel(lambda x, y: x * y + y)
+        scope = {"inner": inner, "__name__": __name__}
+        exec("def outer(x, y):\n    return inner(x, y) / 3.0 + inner(y, x)", scope)
+        return inner, kernel(scope["outer"])
+
+    _, alone = fresh()
+    inner, after = fresh()
+    assert inner(0.1, 0.7) == pytest.approx(0.77)
+    pairs = np.random.default_rng(0).normal(size=(100, 2))
+    assert [alone(*each) for each in pairs] == [after(*each) for each in pairs]
+
+
+def test_functions_that_others_compile_with_numba_are_compiled_as_ever():
+    @numba.njit
+    def theirs(x):
+        return 2.0 * x
+
+    assert theirs(2.0) == 4.0
+    (compiled,) = theirs.overloads.values()
+    assert type(compiled.library) is JITCodeLibrary

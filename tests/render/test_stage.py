@@ -1,0 +1,115 @@
+"""What moves, laid over what was drawn once, is the picture that all at once would be."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hrc_env.env import HRCReachEnv
+from hrc_env.geometry.cameras import project
+from hrc_env.render.stage import Stage
+from hrc_env.scene.layers import QUALITY, Layers, Place, viewpoint
+from hrc_env.scene.render import PictureRenderer
+
+SIZE = (240, 180)
+
+
+@pytest.fixture(scope="module")
+def env():
+    env = HRCReachEnv(perception="truth")
+    env.reset(seed=7)
+    for _ in range(10):
+        env.step(np.full(6, 0.3))
+    yield env
+    env.close()
+
+
+@pytest.fixture(scope="module")
+def stage(env):
+    stage = Stage(env.simulation.scene, *SIZE)
+    yield stage
+    stage.close()
+
+
+def place(name: str = "beside", shadows: bool = True) -> Place:
+    camera = viewpoint(name, *SIZE)
+    return Place(camera, (SIZE[0] / 2, SIZE[1] / 2), SIZE[0], *SIZE, shadows)
+
+
+def difference(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.abs(a.astype(float) - b).mean())
+
+
+def test_it_is_the_picture_that_all_at_once_would_be_shadows_included(env, stage):
+    quality = {**QUALITY, "offsamples": 4}
+    renderer = PictureRenderer(env.simulation.scene, *SIZE, quality)
+    stage.pose(*env.views.pose())
+    drawn = stage.picture(place())
+    whole = renderer.picture(*env.views.pose(), "beside")
+    unshaded = renderer.picture(*env.views.pose(), "beside", shadows=False)
+    renderer.close()
+    assert difference(drawn, whole) < 3.0
+    assert difference(drawn, whole) < 0.5 * difference(drawn, unshaded)
+
+
+def test_shadows_of_what_moves_darken_the_floor(env, stage):
+    q, motion = env.views.pose()
+    away = replace(motion, position_world=motion.position_world + np.array([0.0, 0.0, 20.0]))
+    stage.pose(q, away)
+    without = stage.picture(place("top")).astype(int)
+    stage.pose(q, motion)
+    with_worker = stage.picture(place("top")).astype(int)
+    lit = stage.picture(place("top", shadows=False)).astype(int)
+    darker = ((without - with_worker) > 15).all(-1) & (np.abs(with_worker - lit).max(-1) > 15)
+    assert darker.sum() > 20
+
+
+def test_the_same_pose_is_the_same_picture_whatever_was_drawn_between(env, stage):
+    q, motion = env.views.pose()
+    stage.pose(q, motion)
+    before = stage.picture(place())
+    stage.pose(q + 0.5, motion)
+    other = stage.picture(place())
+    stage.picture(place("top"))
+    stage.pose(q, motion)
+    np.testing.assert_array_equal(stage.picture(place()), before)
+    assert difference(before, other) > 0.5
+
+
+def test_nothing_that_moves_is_outside_the_box(env):
+    layers, here = Layers(env.simulation.scene, *SIZE), place()
+    layers.pose(*env.views.pose())
+    left, top, right, bottom = layers.box(here)
+    _, z = layers.moving(here, (0, 0, *SIZE))
+    layers.close()
+    rows, columns = np.nonzero(z)
+    assert len(rows) > 1000
+    assert (columns // 2 >= left).all()
+    assert (columns // 2 < right).all()
+    assert (rows // 2 >= top).all()
+    assert (rows // 2 < bottom).all()
+    assert (right - left) * (bottom - top) < 0.8 * SIZE[0] * SIZE[1]
+
+
+def test_the_picture_from_the_sun_has_things_where_they_are(env):
+    layers = Layers(env.simulation.scene, *SIZE)
+    layers.pose(*env.views.pose())
+    shade, axes = layers.shade(), layers.sun_axes()
+    layers.close()
+    assert shade is not None
+    assert axes is not None
+    head = env.simulation.estimate.mean_world[0, 0, 0] @ axes  # at level truth: the worker's own
+    column, row = ((head[:2] - shade.corner) / shade.step_m).astype(int)
+    along_m = shade.begin_m + (1 - shade.z[row, column]) * shade.deep_m
+    assert head[2] - 0.35 < along_m < head[2] + 0.05
+
+
+def test_a_picture_too_large_for_the_stage_is_known(stage):
+    assert stage.fits(240, 180)
+    assert not stage.fits(241, 180)
+
+
+def test_a_viewpoint_sees_what_it_looks_at_in_the_middle():
+    camera = viewpoint("beside", *SIZE)
+    px, _ = project(camera.P[None], np.array([[[0.12, 0.0, 0.95]]]))
+    np.testing.assert_allclose(px[0, 0, 0], (120, 90), atol=1e-9)

@@ -1,0 +1,135 @@
+"""Looks: drawn for every episode, of images and of nothing else."""
+
+import numpy as np
+import pytest
+
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.records import Roi
+from hrc_env.env import HRCReachEnv
+from hrc_env.scene.build import build
+from hrc_env.scene.domain_randomization import (
+    APPEARANCES,
+    AS_BUILT,
+    VARIED,
+    AppearanceConfig,
+    draw_look,
+)
+from hrc_env.scene.dressing import as_built, dress, take_off_hats
+from hrc_env.scene.render import CropRenderer
+from hrc_env.vector.env import HRCVectorEnv
+from hrc_env.worker.body import load_body, rest_motion
+
+MIDDLE = Roi((640.0, 360.0), 700.0, 0.0)
+
+
+def stream(seed=0):
+    return np.random.default_rng(np.random.SeedSequence(7).spawn(seed + 1)[seed])
+
+
+def same(look, other):
+    return all(np.array_equal(a, b) for a, b in zip(look, other, strict=True))
+
+
+def test_a_look_depends_on_where_a_stream_came_from_and_leaves_it_alone():
+    one, used = stream(), stream()
+    used.standard_normal(5)
+    used.spawn(3)
+    before = one.bit_generator.state
+    assert same(draw_look(VARIED, 2, one), draw_look(VARIED, 2, used))
+    assert one.bit_generator.state == before
+    assert not same(draw_look(VARIED, 2, stream()), draw_look(VARIED, 2, stream(1)))
+
+
+@pytest.mark.parametrize("name", APPEARANCES)
+def test_looks_stay_between_what_was_asked_for(name):
+    config = APPEARANCES[name]
+    for seed in range(20):
+        look = draw_look(config, 1, stream(seed))
+        assert config.light[0] - 1e-9 <= look.light <= config.light[1] + 1e-9
+        assert 0 <= look.n_litter <= config.litter
+        assert (look.clothing_rgb >= 1 - config.clothing).all()
+        assert name != "as_built" or look.has_hat.all()
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "words"),
+    [
+        ("light", (1.2, 0.4), "two factors"),
+        ("hat", 1.5, "share"),
+        ("litter", 1000, "litter must be"),
+        ("light_tilt_deg", 80.0, "from 0 to 60"),
+    ],
+)
+def test_what_cannot_be_is_refused(field, value, words):
+    with pytest.raises(ConfigError, match=words):
+        AppearanceConfig(**{field: value})
+
+
+@pytest.mark.parametrize("make", [HRCReachEnv, lambda **k: HRCVectorEnv(2, **k)])
+def test_without_images_looks_are_refused(make):
+    with pytest.raises(ConfigError, match="Looks are of images"):
+        make(perception="keypoints", appearance="varied")
+
+
+@pytest.mark.parametrize("given", ["wild", {"lamp": 1.0}, 3])
+def test_an_unknown_appearance_is_answered_in_words(given):
+    with pytest.raises(ConfigError, match=r"appearance|Unknown"):
+        HRCReachEnv(perception="keypoints", appearance=given)
+
+
+def test_a_mapping_and_a_name_say_the_same():
+    env = HRCReachEnv(perception="keypoints", appearance="as_built")
+    assert env.config.appearance == AS_BUILT
+    assert HRCReachEnv(perception="truth", appearance={"hat": 1.0}).config.appearance == AS_BUILT
+
+
+def test_a_look_changes_the_picture_and_what_is_kept_of_it_is_the_same():
+    scene = build(None, "lab", 1)
+    renderer, motion = CropRenderer(scene), rest_motion(load_body())
+    renderer.draw(scene.home_q, motion)
+    plain = renderer.crop(0, MIDDLE)
+    look = draw_look(VARIED, 1, stream())
+    assert renderer.dress(look)
+    assert not renderer.dress(look)
+    renderer.draw(scene.home_q, motion)
+    first, kept = renderer.crop(0, MIDDLE), renderer.crop(0, MIDDLE)
+    assert np.abs(first.astype(int) - plain).mean() > 5
+    np.testing.assert_array_equal(first, kept)
+    renderer.close()
+
+
+def test_hats_come_off_and_lamps_stay_above():
+    from hrc_env.scene.build import drawing_model, drawn_looks
+
+    scene = build(None, "lab", 1)
+    model, wardrobe = drawing_model(scene), drawn_looks(scene)
+    built = as_built(model)
+    kept = {name: getattr(model, name).copy() for name in ("light_dir", "mat_rgba", "mat_texid")}
+    look = draw_look(VARIED, 1, stream())._replace(has_hat=np.zeros(1), tilt_rad=1.0)
+    worn = model.geom_group.copy()
+    dress(model, built, wardrobe, look)
+    take_off_hats(model, wardrobe, look)
+    assert (model.light_dir[:, 2] < -0.3).all()
+    assert (model.geom_group != worn).sum() <= len(wardrobe.hats)
+    dress(model, built, wardrobe, draw_look(AS_BUILT, 1, stream()))  # the model is everybody's
+    model.geom_group[:] = worn
+    for name, values in kept.items():
+        np.testing.assert_allclose(getattr(model, name), values)
+
+
+def test_the_world_is_that_of_the_same_seed_without():
+    walks = []
+    for appearance in (None, "varied"):
+        env = HRCReachEnv(appearance=appearance)
+        env.reset(seed=5)
+        env.step(np.zeros(6, np.float32))
+        simulation = env.simulation
+        walks.append((simulation.motion.plan.copy(), simulation.task.goal_world.copy()))
+        if appearance:
+            assert env.simulation.senses.look_of(0) is not None
+            state = env.get_state()
+            env.set_state(state)
+            env.step(np.zeros(6, np.float32))
+        env.close()
+    for plain, varied in zip(*walks, strict=True):
+        np.testing.assert_array_equal(plain, varied)

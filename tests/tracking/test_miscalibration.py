@@ -1,0 +1,82 @@
+"""Cameras that are not where they are said to be are named in info, at levels that have cameras."""
+
+import numpy as np
+import pytest
+
+from hrc_env.env import HRCReachEnv
+from hrc_env.tracking.miscalibration import MISCALIBRATED, MiscalibrationFlags
+from hrc_env.vector.env import HRCVectorEnv
+
+KNOCKED = ({"kind": "knocked", "cameras": ["camera_3"]},)
+REST = np.zeros(6, np.float32)
+
+
+def last_info(env, steps, seed=3):
+    _, info = env.reset(seed=seed)
+    assert info[MISCALIBRATED] == ()
+    for _ in range(steps):
+        info = env.step(REST)[-1]
+    return info
+
+
+def test_a_knocked_camera_is_named():
+    env = HRCReachEnv(perception="keypoints", faults=KNOCKED)
+    assert last_info(env, 60)[MISCALIBRATED] == ("camera_3",)
+
+
+def test_nobody_is_named_without_a_fault():
+    env = HRCReachEnv(perception="keypoints")
+    assert last_info(env, 60)[MISCALIBRATED] == ()
+
+
+@pytest.mark.parametrize("kind", ["frozen", "out_of_step", "late"])
+def test_bad_cameras_in_their_right_place_are_not_named(kind):
+    env = HRCReachEnv(perception="keypoints", faults=[{"kind": kind, "cameras": ["camera_3"]}])
+    assert last_info(env, 100)[MISCALIBRATED] == ()
+
+
+@pytest.mark.parametrize("level", ["truth", "none"])
+def test_levels_without_cameras_say_nothing(level):
+    env = HRCReachEnv(perception=level)
+    assert MISCALIBRATED not in env.reset(seed=0)[1]
+    assert MISCALIBRATED not in env.step(REST)[-1]
+
+
+def test_a_vector_names_what_its_environments_would():
+    env = HRCVectorEnv(3, perception="keypoints", faults=KNOCKED, num_threads=1)
+    single = HRCReachEnv(perception="keypoints", faults=KNOCKED)
+    env.reset(seed=2)
+    last_info(single, 40)
+    for _ in range(40):
+        infos = env.step(np.tile(REST, (3, 1)))[-1]
+    assert (
+        infos[MISCALIBRATED][1]
+        == single.simulation._suspects(np.array([0])).info_of(0)[MISCALIBRATED]
+    )
+    assert infos[f"_{MISCALIBRATED}"].all()
+    one, many = single.simulation.senses.watched, env.shards.parts[0].senses.watched
+    for alone, together in zip(one, many, strict=True):
+        np.testing.assert_array_equal(alone[0], together[1])
+
+
+def test_what_is_suspected_is_part_of_the_state():
+    env = HRCReachEnv(perception="keypoints", faults=KNOCKED)
+    last_info(env, 35)
+    state = env.get_state()
+    first = [env.step(REST)[-1][MISCALIBRATED] for _ in range(20)]
+    env.set_state(state)
+    assert [env.step(REST)[-1][MISCALIBRATED] for _ in range(20)] == first
+
+
+def test_a_reset_forgets():
+    env = HRCReachEnv(perception="keypoints", faults=KNOCKED)
+    assert last_info(env, 60)[MISCALIBRATED] == ("camera_3",)
+    assert env.reset(seed=4)[1][MISCALIBRATED] == ()
+
+
+def test_who_has_no_info_has_no_names():
+    flags = np.array([[False, True], [True, False], [False, False]])
+    said = MiscalibrationFlags(("a", "b"), flags).arrays(np.array([True, False, True]))[
+        MISCALIBRATED
+    ]
+    assert said.tolist() == [("b",), None, ()]
