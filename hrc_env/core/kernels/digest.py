@@ -1,5 +1,5 @@
-"""What a kernel is made of, as a digest: its bytecode, its options, the values of the constants it
-names, and the same of every kernel that it calls."""
+"""What a kernel is made of, as a digest: its module, its bytecode, its options, the values of the
+constants it names, and the same of every kernel that it calls."""
 
 import hashlib
 import types
@@ -17,7 +17,8 @@ def digest_of(dispatcher: Dispatcher) -> str:
     if "_digest" not in known:
         known["_digest"] = "itself"  # where a kernel calls itself
         options = sorted(dispatcher.targetoptions.items())
-        parts = [_value(options, set()), *_function(dispatcher.py_func)]
+        function = dispatcher.py_func
+        parts = [function.__module__, _value(options, set()), *_function(function)]
         known["_digest"] = hashlib.sha256("\n".join(parts).encode()).hexdigest()
     return known["_digest"]
 

@@ -18,8 +18,8 @@ def caller(x):
 """
 
 
-def digest(source: str, name: str = "caller") -> str:
-    scope = {"np": np, "kernel": kernel, "__name__": __name__}
+def digest(source: str, name: str = "caller", module: str = __name__) -> str:
+    scope = {"np": np, "kernel": kernel, "__name__": module}
     exec(source, scope)
     return digest_of(scope[name])
 
@@ -38,6 +38,11 @@ def digest(source: str, name: str = "caller") -> str:
 def test_it_changes_with_code_constants_and_options_of_whatever_is_called(before, after):
     assert before in PLAIN
     assert digest(PLAIN.replace(before, after)) != digest(PLAIN)
+
+
+def test_it_changes_with_the_module():
+    """A compiled kernel looks for the modules of what it calls under the names they had."""
+    assert digest(PLAIN, module="moved") != digest(PLAIN)
 
 
 @pytest.mark.parametrize(
