@@ -13,7 +13,7 @@ from gymnasium.wrappers.vector import DictInfoToList, NormalizeObservation, Reco
 import hrc_env  # noqa: F401  registers the ids
 from hrc_env.vector.env import HRCVectorEnv
 
-BENCHMARK = Path(__file__).parents[1] / "benchmarks" / "identity.py"
+BENCHMARK = Path(__file__).parents[2] / "benchmarks" / "identity.py"
 
 
 def load_benchmark():
