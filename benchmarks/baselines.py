@@ -31,8 +31,9 @@ from agents.evaluate import EVALUATION_SEED, judged
 from hrc_env.cli.checks import at_least, writable_folder
 from hrc_env.cli.progress import progress_bar
 from hrc_env.core.results import Metric, write_results, write_whole
+from hrc_env.experiments.study.fingerprint import fingerprint_of
 from hrc_env.experiments.study.intervals import mean_over, ratio_over
-from hrc_env.experiments.study.shelf import Shelf, Tick, fingerprint_of
+from hrc_env.experiments.study.shelf import Shelf, Tick
 
 ROOT = Path(__file__).resolve().parent.parent
 PPO = {"ppo": 0.0, "ppo_safety": 2.0}
@@ -82,7 +83,7 @@ def main(arguments: Arguments) -> None:
     settings = {name: value for name, value in asdict(arguments).items() if name != "out"}
     policies = {(level, agent): learnt(arguments, level, agent) for level in ORDER for agent in PPO}
     console, metrics = Console(), dict[str, Metric]()
-    mark = fingerprint_of(settings, "study")
+    mark = fingerprint_of(settings, "benchmarks.baselines", "agents.scripted", "agents.policy")
     with progress_bar(console, "baselines") as say:
         shelf = Shelf(arguments.out / "parts", mark, len(ORDER) * len(ROWS), say)
         for level in ORDER:

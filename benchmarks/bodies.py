@@ -1,6 +1,6 @@
 """Whether BlazePose sees our people as people: python benchmarks/bodies.py
 
-Every baked body in every scene; crops as in `hrc_env.experiments.perception.crops`. What counts are
+Every baked body in every scene; crops as in `benchmarks.perception.crops`. What counts are
 those in view: how many are detected, and in how many the joints are on average nearer to the truth
 than a tenth of the stature.
 """
@@ -17,11 +17,11 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks.perception.crops import GOOD_SHARE, Looker, instants
+from benchmarks.perception.measured import share
 from hrc_env.cli.progress import track
 from hrc_env.core.results import Metric, write_results
 from hrc_env.core.typing import Image
-from hrc_env.experiments.perception.crops import GOOD_SHARE, Looker, instants
-from hrc_env.experiments.perception.measured import share
 from hrc_env.render.overlay import draw_landmarks, label, tile
 from hrc_env.scene.build import SCENES, Scene, SceneConfig, build
 from hrc_env.worker.body import worker_names

@@ -23,10 +23,10 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks.tracking.rigs import DT_S
+from benchmarks.tracking.tracks import Tracks, follow_own, follow_walkers
 from hrc_env.core.records import PoseEstimate
 from hrc_env.core.results import Metric, write_results
-from hrc_env.experiments.ahead_tracks import Tracks, follow_own, follow_walkers
-from hrc_env.experiments.tracking.rigs import DT_S
 from hrc_env.tracking.ahead import ahead
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.kalman import KalmanEstimator, KalmanState, motion

@@ -13,12 +13,12 @@ import numpy as np
 import tyro
 from rich.console import Console
 
+from benchmarks.tracking.rigs import DT_S, RIGS, Rig, make_rig
+from benchmarks.tracking.sequences import Sequences, make_sequences
 from hrc_env.cli.progress import track
 from hrc_env.core.results import Metric, write_results
 from hrc_env.core.typing import Floats
-from hrc_env.experiments.tracking.rigs import DT_S, RIGS, Rig, make_rig
-from hrc_env.experiments.tracking.sequences import Sequences, make_sequences
-from hrc_env.experiments.tracking.variants import VARIANTS, estimator_of
+from hrc_env.experiments.beyond.variants import VARIANTS, estimator_of
 from hrc_env.tracking.estimators import make_estimator
 
 PLAIN = {"one_view_inflation": 1.0}

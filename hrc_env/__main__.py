@@ -7,57 +7,63 @@ import platform
 import sys
 import textwrap
 from collections.abc import Sequence
-from importlib import import_module
 from importlib.metadata import version
 
 from hrc_env import __version__
+from hrc_env.core.checkout import module_of
 from hrc_env.core.errors import HRCError, unknown
 
 PROGRAM = "python -m hrc_env"
 COMMANDS: dict[str, tuple[str, str, str]] = {
     "setup": (
-        "setup", "Setup",
+        "hrc_env.cli.setup", "Setup",
         "Fetch the pose network's weights (once, checked), compile the kernels for this machine, "
         "and see that headless OpenGL works.",
     ),
     "demo": (
-        "demo", "Demo",
+        "hrc_env.cli.demo", "Demo",
         "Film the scripted reacher, slowed by the separation that it estimates from pixels.",
     ),
     "check": (
-        "check", "Check",
+        "hrc_env.cli.check", "Check",
         "Versions, machine, OpenGL, kernels, weights, one step: each line ok, or what to do.",
     ),
     "list": (
-        "listing", "List",
+        "hrc_env.cli.listing", "List",
         "Environments, perception levels, estimators, scenes, cameras and agents by name.",
     ),
-    "play": ("play", "Play", "Play episodes of an environment with an agent; say how they went."),
-    "train": ("train", "Train", "Train PPO, evaluate it on fixed seeds, draw its curve, film it."),
+    "play": (
+        "hrc_env.cli.play", "Play",
+        "Play episodes of an environment with an agent; say how they went.",
+    ),
+    "train": (
+        "hrc_env.cli.train", "Train",
+        "Train PPO, evaluate it on fixed seeds, draw its curve, film it.",
+    ),
     "bench": (
-        "bench", "Bench",
+        "benchmarks.commands.bench", "Bench",
         "Measure the estimators (tracking), the eyes (perception), the environment (speed) or the "
         "workers (motion).",
     ),
     "experiment": (
-        "experiment", "Experiment",
+        "hrc_env.cli.experiment", "Experiment",
         "The paper's two experiments (site, lab), what the eyes are worth in safety (impact), and "
         "ablations of rigs and estimators (beyond).",
     ),
     "gallery": (
-        "gallery", "Gallery",
+        "benchmarks.commands.gallery", "Gallery",
         "Draw every worker, a film strip of every motion, and both scenes from all cameras.",
     ),
     "import-motion": (
-        "import_motion", "ImportMotion",
+        "hrc_env.cli.import_motion", "ImportMotion",
         "Bring your own motion capture: a BVH, ASF/AMC or npz recording becomes a clip.",
     ),
     "calibrate-keypoints": (
-        "calibrate", "CalibrateKeypoints",
+        "assets.emulator.calibrate", "CalibrateKeypoints",
         "Fit the emulator of keypoints to what the pose network says of rendered workers.",
     ),
 }  # fmt: skip
-"""Each command: its module in `hrc_env.cli`, its class, and the class's first sentence."""
+"""Each command: its module, its class, and the class's first sentence."""
 
 
 def main(words: Sequence[str] | None = None) -> int:
@@ -124,7 +130,7 @@ def _run(name: str, words: list[str]) -> int:
 
     module, kind, _ = COMMANDS[name]
     command = tyro.cli(
-        getattr(import_module(f"hrc_env.cli.{module}"), kind),
+        getattr(module_of(module), kind),
         prog=f"{PROGRAM} {name}",
         args=words,
         config=(tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),

@@ -16,8 +16,8 @@ import numpy as np
 import torch
 from torch import nn
 
-from hrc_env.experiments.ahead_tracks import Tracks, follow_own
-from hrc_env.experiments.tracking.rigs import DT_S
+from benchmarks.tracking.tracks import Tracks, follow_own
+from benchmarks.tracking.rigs import DT_S
 from hrc_env.core.skeleton import MIRROR, N_JOINTS, TORSO
 from hrc_env.tracking.forecast import N_INPUTS, describe
 from hrc_env.tracking.given import GIVEN_STD_M

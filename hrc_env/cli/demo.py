@@ -8,7 +8,7 @@ from rich.console import Console
 
 from hrc_env.cli.checks import at_least, writable_file
 from hrc_env.cli.environment import EnvironmentArguments
-from hrc_env.core.agents_door import agents
+from hrc_env.core.checkout import agents
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import tyro
 
-from hrc_env.cli.bench import show
+from benchmarks.commands.bench import show
 from hrc_env.cli.checks import at_least
 
 

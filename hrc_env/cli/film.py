@@ -16,7 +16,7 @@ from rich.table import Table
 from hrc_env.cli.frame import Diary, compose
 from hrc_env.cli.kernels import compile_kernels
 from hrc_env.cli.progress import progress_bar
-from hrc_env.core.agents_door import agents
+from hrc_env.core.checkout import agents
 from hrc_env.core.typing import Image
 from hrc_env.env import HRCReachEnv
 from hrc_env.render.views import Glance

@@ -6,7 +6,7 @@ from rich.console import Console
 from rich.table import Table
 
 from hrc_env import IDS
-from hrc_env.core.agents_door import agents
+from hrc_env.core.checkout import agents
 
 
 @dataclass(frozen=True)

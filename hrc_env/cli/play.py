@@ -12,7 +12,7 @@ import hrc_env
 from hrc_env.cli.checks import at_least, writable_file
 from hrc_env.cli.environment import EnvironmentArguments
 from hrc_env.cli.progress import track
-from hrc_env.core.agents_door import agents
+from hrc_env.core.checkout import agents
 from hrc_env.core.errors import unknown
 
 if TYPE_CHECKING:

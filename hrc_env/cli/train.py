@@ -6,7 +6,7 @@ from typing import Any
 
 from hrc_env.cli.checks import at_least, writable_folder
 from hrc_env.cli.environment import EnvironmentArguments, merged
-from hrc_env.core.agents_door import agents
+from hrc_env.core.checkout import agents
 from hrc_env.core.errors import ConfigError
 
 

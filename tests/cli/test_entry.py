@@ -43,7 +43,7 @@ def test_the_help_of_a_command_imports_no_simulator(process):
 @pytest.mark.parametrize("name", COMMANDS)
 def test_the_overview_says_of_a_command_what_it_says_of_itself(name: str):
     module, kind, says = COMMANDS[name]
-    doc = getattr(import_module(f"hrc_env.cli.{module}"), kind).__doc__ or ""
+    doc = getattr(import_module(module), kind).__doc__ or ""
     assert " ".join(doc.split("\n\n")[0].split()) == says
 
 
@@ -130,3 +130,13 @@ def test_other_values_that_mean_nothing_are_refused(words, capsys):
     said = capsys.readouterr().err
     assert "ConfigError" in said
     assert "Traceback" not in said
+
+
+@pytest.mark.parametrize("name", ["bench", "gallery", "calibrate-keypoints"])
+def test_what_only_a_clone_has_says_so_elsewhere(name, monkeypatch, capsys):
+    def absent(module: str):
+        raise ModuleNotFoundError(f"No module named {module!r}", name=module.split(".")[0])
+
+    monkeypatch.setattr("hrc_env.core.checkout.importlib.import_module", absent)
+    assert main([name, "--help"]) == 2
+    assert "Clone the repository" in " ".join(capsys.readouterr().err.split())

@@ -6,7 +6,7 @@ import pytest
 from rich.console import Console
 
 from hrc_env.cli import film
-from hrc_env.core.agents_door import agents
+from hrc_env.core.checkout import agents
 from hrc_env.core.errors import RenderingError
 
 

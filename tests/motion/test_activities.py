@@ -6,8 +6,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from hrc_env.experiments.motion.gait import knee_flexion_deg
-from hrc_env.experiments.motion.statistics import (
+from benchmarks.motion.gait import knee_flexion_deg
+from benchmarks.motion.statistics import (
     ANKLES,
     HEAD,
     WRISTS,

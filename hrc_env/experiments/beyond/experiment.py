@@ -19,8 +19,9 @@ from hrc_env.experiments.beyond.trial.setting import WARM_UP_S, Setting
 from hrc_env.experiments.beyond.trial.tally import Rows
 from hrc_env.experiments.beyond.trial.timing import update_us
 from hrc_env.experiments.beyond.trial.walks import walks_of
+from hrc_env.experiments.study.fingerprint import fingerprint_of
 from hrc_env.experiments.study.folder import claim
-from hrc_env.experiments.study.shelf import Say, Shelf, Tick, emulator_mark, fingerprint_of
+from hrc_env.experiments.study.shelf import Say, Shelf, Tick
 
 NAME = "beyond"
 
@@ -107,7 +108,9 @@ def _played(
     )
     rows: dict[tuple[str, str], Rows] = {}
     for study, setting in order:
-        own = fingerprint_of({**settings, "setting": setting.numbers()}, f"{NAME}/trial")
+        own = fingerprint_of(
+            {**settings, "setting": setting.numbers()}, "hrc_env.experiments.beyond.trial.play"
+        )
         own_shelf = replace(shelf, fingerprint=own, n_parts=len(order))
         label = f"{study}.{setting.name}"
         rows[study, setting.name] = own_shelf.part(label, partial(_part, config, setting))
@@ -132,4 +135,4 @@ def _settings(config: BeyondConfig) -> dict[str, Any]:
     """What all numbers depend on; which studies are asked for changes none of them."""
     values = asdict(config)
     del values["studies"]
-    return {"experiment": NAME, "emulator": emulator_mark(), **values}
+    return {"experiment": NAME, **values}

@@ -26,13 +26,21 @@ from hrc_env.experiments.impact.trial.policies import (
     SLOWED,
     Policy,
     check_policy,
-    code_of_policies,
     maker,
 )
+from hrc_env.experiments.study.fingerprint import fingerprint_of
 from hrc_env.experiments.study.folder import claim
-from hrc_env.experiments.study.shelf import Say, Shelf, emulator_mark, fingerprint_of
+from hrc_env.experiments.study.shelf import Say, Shelf
 
 NAME = "impact"
+PARTS_FROM = (
+    "hrc_env.experiments.impact.trial.episodes",
+    "hrc_env.experiments.impact.trial.training",
+    "agents.base",
+    "agents.scripted",
+    "agents.policy",
+)
+"""The modules that finished parts are made by."""
 FIRST_SEED = 1_000_000
 """Of the episodes, far from those that the policy learns in."""
 SWEPT = (REFERENCE, *(eyes.name for eyes in LATE))
@@ -98,7 +106,7 @@ def run(config: ImpactConfig, out: Path, say: Say, overwrite: bool = False) -> d
     """
     claim(out, NAME, overwrite)
     settings = _settings(config)
-    fingerprint = fingerprint_of(settings, f"{NAME}/trial")
+    fingerprint = fingerprint_of(settings, *PARTS_FROM)
     n_parts = len(list(_rows(config))) + (PPO in config.policies)
     shelf = Shelf(out / "parts", fingerprint, n_parts, say)
     checkpoint = out / "parts" / "ppo.zip"
@@ -159,8 +167,6 @@ def _settings(config: ImpactConfig) -> dict[str, Any]:
     return {
         "experiment": NAME,
         "people": PEOPLE,
-        "emulator": emulator_mark(),
-        "policies_code": code_of_policies(),
         **asdict(config),
     }
 

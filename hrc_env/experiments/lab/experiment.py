@@ -15,9 +15,10 @@ from hrc_env.experiments.lab.metrics import Parts, metrics_of
 from hrc_env.experiments.lab.motions import MOTIONS, body_of, play
 from hrc_env.experiments.lab.report import report
 from hrc_env.experiments.lab.sides import missed_by_camera, turned_away
+from hrc_env.experiments.study.fingerprint import fingerprint_of
 from hrc_env.experiments.study.folder import claim
 from hrc_env.experiments.study.recording import Recording, record, replay
-from hrc_env.experiments.study.shelf import Say, Shelf, Tick, fingerprint_of
+from hrc_env.experiments.study.shelf import Say, Shelf, Tick
 from hrc_env.perception.eyes import EyesConfig
 from hrc_env.scene.build import Scene, build
 from hrc_env.worker.body import load_body
@@ -70,7 +71,7 @@ def run(config: LabConfig, out: Path, say: Say, overwrite: bool = False) -> dict
     seeds = [FIRST_SEED + k for k in range(config.n_seeds)]
     settings = {**asdict(config), "rig": RIG, "estimators": ESTIMATORS, "crops": CROPS}
     shelf = Shelf(
-        out / "parts", fingerprint_of(settings, "lab"), len(seeds) * len(MOTIONS) + 1, say
+        out / "parts", fingerprint_of(settings, __name__), len(seeds) * len(MOTIONS) + 1, say
     )
     films = {
         (motion, seed): shelf.part(f"{motion}.{seed}", partial(film, config, motion, seed))

@@ -16,9 +16,10 @@ from hrc_env.experiments.site.metrics import Parts, metrics_of
 from hrc_env.experiments.site.report import report
 from hrc_env.experiments.site.rows import HEAD, WARM_UP_S, Row, head_path, rows_of
 from hrc_env.experiments.site.walk import walk
+from hrc_env.experiments.study.fingerprint import fingerprint_of
 from hrc_env.experiments.study.folder import claim
 from hrc_env.experiments.study.recording import record, replay
-from hrc_env.experiments.study.shelf import Say, Shelf, Tick, fingerprint_of
+from hrc_env.experiments.study.shelf import Say, Shelf, Tick
 from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.scene.build import Scene, build
 from hrc_env.tracking.config import TrackerConfig
@@ -82,7 +83,7 @@ def run(config: SiteConfig, out: Path, say: Say, overwrite: bool = False) -> dic
     settings = {**asdict(config), "also": ALSO, "crops": CROPS}
     again = seeds[: config.n_closed]
     n_parts = len(seeds) + len(closed) * len(again)
-    shelf = Shelf(out / "parts", fingerprint_of(settings, "site"), n_parts, say)
+    shelf = Shelf(out / "parts", fingerprint_of(settings, __name__), n_parts, say)
     parts = Parts(
         films={seed: shelf.part(f"film.{seed}", partial(film, config, seed)) for seed in seeds},
         closed={

@@ -1,24 +1,17 @@
 """Where an experiment keeps the parts that are done, so that it can be stopped and goes on."""
 
-import hashlib
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-import hrc_env
 from hrc_env.core.results import write_whole
-from hrc_env.perception.calibration import PACKAGED
 
 Say = Callable[[float, str], None]
 """Told by how much the share that is done grew, and what is being done."""
 Tick = Callable[[float], None]
 """Told by how much the share of a part that is done grew."""
-_ROOMS = ("geometry", "optics", "scene", "motion", "perception", "tracking", "faults", "sensing")
-_FILES = ("body", "config", "skeleton", "simulation", "control", "senses", "metrics")
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,25 +60,3 @@ class Shelf:
         """Write a part, whole or not at all."""
         content = json.dumps({"fingerprint": self.fingerprint, "part": part})
         write_whole(self.folder / f"{label}.json", content)
-
-
-def fingerprint_of(settings: Mapping[str, Any], room: str) -> str:
-    """What a part depends on: the settings, and the code that it comes from.
-
-    Args:
-        settings: numbers and words.
-        room: of `hrc_env.experiments`, whose code counts beside that of the environment.
-    """
-    digest = hashlib.sha256(json.dumps(settings, sort_keys=True).encode())
-    root = Path(hrc_env.__file__).parent
-    rooms = (*_ROOMS, "experiments/study", f"experiments/{room}")
-    for pattern in (*(f"{each}/**/*.py" for each in rooms), *(f"{name}.py" for name in _FILES)):
-        for path in sorted(root.glob(pattern)):
-            digest.update(path.read_bytes())
-    digest.update(np.__version__.encode())
-    return digest.hexdigest()[:16]
-
-
-def emulator_mark() -> str:
-    """Which numbers the emulator draws from; part of the settings of whoever lets it look."""
-    return hashlib.sha256(PACKAGED.read_bytes()).hexdigest()[:16]

@@ -6,7 +6,7 @@ from typing import Any
 from hrc_env.experiments.beyond.metrics import Found
 from hrc_env.experiments.beyond.study import Panel, Rows, Study
 from hrc_env.experiments.beyond.trial.setting import ALL, SINGLE, Rig, Setting, left_of
-from hrc_env.experiments.tracking.variants import VARIANTS, estimator_of
+from hrc_env.experiments.beyond.variants import VARIANTS, estimator_of
 from hrc_env.tracking.config import TrackerConfig
 
 WHOLE = "all"

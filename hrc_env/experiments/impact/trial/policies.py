@@ -1,12 +1,10 @@
 """The policies whose eyes are exchanged."""
 
-import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import hrc_env
-from hrc_env.core.agents_door import agents
+from hrc_env.core.checkout import agents
 from hrc_env.core.errors import unknown
 from hrc_env.experiments.impact.trial.episodes import MakeAgent
 from hrc_env.experiments.impact.trial.tally import SLOW_M, STOP_M
@@ -15,7 +13,6 @@ from hrc_env.simulation import Simulation
 SCRIPTED, SLOWED, PPO = "scripted", "scripted_slowed", "ppo"
 POLICIES = (SCRIPTED, SLOWED, PPO)
 """Full speed whoever is near; slower by the estimated gap; trained."""
-_READ = ("belief", "observations", "rewards", "sb3")
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,15 +51,3 @@ def maker(policy: Policy, checkpoint: Path) -> MakeAgent:
         return base.make_agent(policy.name, here)
 
     return make
-
-
-def code_of_policies() -> str:
-    """A fingerprint of what policies are, read and learn from: rows are of these and no others."""
-    package = Path(hrc_env.__file__).parent
-    files = [package / f"{name}.py" for name in _READ]
-    files += sorted((package / "tasks").glob("*.py"))
-    files += sorted(Path(agents("base").__file__ or "").parent.glob("*.py"))
-    digest = hashlib.sha256()
-    for path in files:
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hrc_env.core.agents_door import agents
+from hrc_env.core.checkout import agents
 from hrc_env.experiments.impact.trial.episodes import PEOPLE
 from hrc_env.experiments.study.shelf import Shelf, Tick
 

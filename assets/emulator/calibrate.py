@@ -1,0 +1,59 @@
+"""python -m hrc_env calibrate-keypoints: the emulator's numbers, fitted to renders."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from hrc_env.cli.checks import at_least, writable_file
+from hrc_env.cli.progress import progress_bar
+
+
+@dataclass(frozen=True)
+class CalibrateKeypoints:
+    """Fit the emulator of keypoints to what the pose network says of rendered workers.
+
+    Every motion is played in both scenes by all bodies, four cameras look at it as they do in the
+    environment, and what they find is compared with the truth. Use the file with
+    config={"emulator": {"calibration": FILE}}. Rendered clips are kept beside it, so that a run
+    that was stopped goes on where it was. docs/emulator.md says what is fitted.
+    """
+
+    out: Path = Path("out/keypoints.json")
+    """The calibration file; there whole or not at all."""
+    quick: bool = False
+    """Each motion in one of the scenes, once (folded bodies four times): 41 clips, not 328."""
+    rounds: int | None = None
+    """How often each motion is played in each scene, instead of 4 (0, in one scene, if quick);
+    folded bodies four times as often."""
+    seed: int = 0
+    """Of places, people and details of the motions."""
+    validate: bool = False
+    """Then compare pixels and emulator on as many clips and cameras that the fit has not seen, in a
+    table and a plot (PNG) beside the file. Takes as long again."""
+
+    def run(self) -> int:
+        """Fit; show what came of it."""
+        at_least("--rounds", self.rounds, 0)
+        at_least("--seed", self.seed, 0)
+        writable_file(self.out)
+        from assets.emulator.run import CalibrationRun, calibrate, compare
+        from assets.emulator.validate import COLUMNS, table_of
+
+        usual = 0 if self.quick else 4
+        rounds = usual if self.rounds is None else self.rounds
+        run = CalibrationRun(rounds=rounds, seed=self.seed)
+        console = Console()
+        with progress_bar(console, "clips") as say:
+            calibrate(run, self.out, say)
+        console.print(f"In [bold]{self.out}[/]: a calibration of the emulator")
+        if self.validate:
+            with progress_bar(console, "unseen clips") as say:
+                seen = compare(run, self.out, say)
+            table = Table(*COLUMNS, title="pixels / emulator, on clips that the fit has not seen")
+            for row in table_of(seen.outcomes):
+                table.add_row(*row)
+            console.print(table)
+            console.print(f"In [bold]{self.out.with_suffix('.png')}[/]: distributions of both")
+        return 0

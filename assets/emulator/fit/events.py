@@ -1,0 +1,79 @@
+"""What happens now and then, and lasts: left and right exchanged, workers lost."""
+
+import numpy as np
+from scipy.optimize import isotonic_regression
+from scipy.special import ndtri, owens_t
+
+from assets.emulator.clips import DT_S
+from assets.emulator.fit.cells import FEW, N_P, class_of
+from assets.emulator.samples import Samples
+from hrc_env.core.typing import Bools, Floats
+from hrc_env.perception.calibration import N_SEEN, N_VIEWS
+from hrc_env.perception.sightlines import SEEN
+
+LAGS = (5, 12, 25, 40)
+"""In frames, at which it is asked whether it still happens."""
+FEW_MISSES = 20
+"""So many samples a guess counts for."""
+
+
+def swaps_of(samples: Samples) -> tuple[Floats, Floats]:
+    """(P, A, 2) shares of time by view, mirror images together; (2,) for how long [s]."""
+    view = np.round(np.abs(samples.view) * N_VIEWS / (2 * np.pi)).astype(int)
+    looked = ~samples.missed & samples.counts[..., None]
+    share, length = np.zeros((N_P, N_VIEWS, 2)), np.zeros(2)
+    for what in range(2):
+        now, overall = samples.exchanged[..., what] & looked, 0.0
+        for posture in range(N_P):
+            chosen = _are(samples, posture)
+            known = chosen & looked
+            if known.any() or posture == 0:
+                overall = now[known].sum() / max(known.sum(), 1)
+            for bin_ in range(N_VIEWS // 2 + 1):
+                mine = chosen & looked & (view == bin_)
+                value = (now[mine].sum() + FEW * overall) / (mine.sum() + FEW)
+                share[posture, [bin_, -bin_], what] = value
+        length[what] = _lasts_s(now, looked)
+    return share, length
+
+
+def misses_of(samples: Samples) -> tuple[Floats, Floats]:
+    """(P, 16) shares of time by the number of joints seen, never more with more; how long [s]."""
+    n_seen = (samples.sight == SEEN).sum(-1)
+    looked = np.broadcast_to(samples.counts[..., None], n_seen.shape)
+    share = np.zeros((N_P, N_SEEN))
+    for posture in range(N_P):
+        chosen = _are(samples, posture)
+        mine = [looked & chosen & (n_seen == n) for n in range(N_SEEN)]
+        count = np.array([each.sum() for each in mine]) + FEW_MISSES
+        guess = share[0] if posture else np.maximum(0.0, 1 - np.arange(N_SEEN) / 6)
+        missed = np.array([samples.missed[each].sum() for each in mine])
+        raw = (missed + FEW_MISSES * guess) / count
+        share[posture] = isotonic_regression(raw, weights=count, increasing=False).x
+    return np.clip(share, 0, 1), np.array(_lasts_s(samples.missed, looked & (n_seen >= 7)))
+
+
+def _are(samples: Samples, posture: int) -> Bools:
+    """(L, T, C) which samples are of such bodies."""
+    return np.broadcast_to(class_of(samples.posture)[..., None] == posture, samples.missed.shape)
+
+
+def _lasts_s(now: Bools, looked: Bools) -> float:
+    """Time constant of a slow normal variable that is in its lower tail while `now` (L, T, C) [s].
+
+    From how much likelier it is some frames after it was, among samples that were looked at.
+    """
+    share = float(now[looked].mean()) if looked.any() else 0.0
+    if share == 0.0:
+        return 0.2
+    shared = np.linspace(0.0, 0.999, 60)
+    edge = ndtri(min(share, 0.999))
+    again = 1 - 2 * owens_t(edge, np.sqrt((1 - shared) / (1 + shared))) / share
+    constants = []
+    for lag in LAGS:
+        both = looked[:, lag:] & looked[:, :-lag] & now[:, :-lag]
+        if both.sum() < 30:
+            continue
+        rho = float(np.interp(now[:, lag:][both].mean(), again, shared))
+        constants.append(-lag * DT_S / np.log(np.clip(rho, 1e-3, 0.9995)))
+    return float(np.clip(np.median(constants), DT_S, 30.0)) if constants else 0.2

@@ -1,0 +1,78 @@
+"""The whole of `python -m hrc_env calibrate-keypoints`: render, fit, write, compare."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+from assets.emulator.clips import fit_clips
+from assets.emulator.fit.fit import fit
+from assets.emulator.matching import matched
+from assets.emulator.plot import plot_comparison
+from assets.emulator.samples import samples_of
+from assets.emulator.shelf import kept
+from assets.emulator.validate import Compared, compared
+from hrc_env.config import HRCConfig
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.provenance import provenance
+from hrc_env.perception.calibration import Calibration, write_calibration
+from hrc_env.perception.emulator import EmulatorConfig
+
+Say = Callable[[float, str], None]
+"""Told by how much the share that is done grew, and what is being done."""
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationRun:
+    """How much is rendered."""
+
+    rounds: int = 4
+    """How often each motion is played in each scene; 0: once, in one of the scenes."""
+    seed: int = 0
+    """Of the clips."""
+
+    def __post_init__(self) -> None:
+        if self.rounds < 0 or self.seed < 0:
+            raise ConfigError(f"rounds and seed must be 0 or more, got {self.rounds}, {self.seed}.")
+
+
+def calibrate(run: CalibrationRun, out: Path, say: Say) -> Calibration:
+    """Render, fit, write the file; rendered clips stay in a folder beside it.
+
+    Args:
+        run: how much.
+        out: the calibration file.
+        say: hears of the progress: shares that sum to 1.
+    """
+    clips, pixels = fit_clips(run.rounds, run.seed), []
+    for clip, seen in zip(clips, kept("pixels", clips, HRCConfig(), folder_of(out)), strict=True):
+        pixels.append(seen)
+        say(0.85 / len(clips), f"{clip.scene}: {clip.motion}")
+    rest = partial(_part, say, 0.15)
+    calibration = matched(fit(samples_of(pixels)), clips, pixels, out.with_suffix(".fit"), rest)
+    write_calibration(out, calibration, _made(run, out, len(clips)))
+    return calibration
+
+
+def _part(say: Say, part: float, share: float, label: str) -> None:
+    """Tell of progress in a part of the whole."""
+    say(part * share, label)
+
+
+def compare(run: CalibrationRun, out: Path, say: Say) -> Compared:
+    """Pixels beside the emulator with this file, on clips that the fit has not seen; a plot."""
+    config = replace(HRCConfig(), emulator=EmulatorConfig(calibration=str(out)))
+    seen = compared(run.rounds, run.seed, say, config, folder_of(out))
+    plot_comparison(out.with_suffix(".png"), seen)
+    return seen
+
+
+def folder_of(out: Path) -> Path:
+    """Where the rendered clips are kept."""
+    return out.with_name(f"{out.stem}_clips")
+
+
+def _made(run: CalibrationRun, out: Path, n_clips: int) -> dict[str, object]:
+    words = f"python -m hrc_env calibrate-keypoints --rounds {run.rounds} --seed {run.seed}"
+    command = f"{words} --out {out.name}"
+    return {"command": command, "seed": run.seed, "git": provenance()["git"], "clips": n_clips}

@@ -1,0 +1,231 @@
+"""Whether the emulator predicts the pixels: the same clips, seen by both, tracked by the default.
+
+The clips are none of the fit's: other seeds, other pairs of motion and body, and cameras that hang
+elsewhere. What counts is the 3D error after tracking, by family of motions.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from assets.emulator.clips import FAMILIES, WARM_UP, Clip, family_of, unseen_clips
+from assets.emulator.shelf import kept
+from assets.emulator.watch import Watched, watch
+from hrc_env.config import HRCConfig
+from hrc_env.core.results import Metric
+from hrc_env.core.typing import Bools, Floats, Ints
+from hrc_env.perception.sightlines import SEEN
+
+CHI2_95_3D = 7.815
+"""95 % of a three-dimensional normal variable lies within this squared distance."""
+HALF_SEEN = 8
+"""So many joints of 15."""
+DRAWS = 4
+"""How often the emulator plays a clip."""
+RESAMPLES = 200
+"""Draws of clips for an interval."""
+Say = Callable[[float, str], None]
+"""Told by how much the share that is done grew, and what is being done."""
+InSpace = tuple[Floats, Bools]
+"""(N,) errors of joints [m], and whether they are within the reported region."""
+
+
+@dataclass(frozen=True, slots=True)
+class StepResult:
+    """What a level of perception made of clips."""
+
+    median_m: float
+    """Of the joints' errors while tracked [m]."""
+    p95_m: float
+    """Their 95th percentile [m]."""
+    coverage: float
+    """Share of them within the reported 95 % region."""
+    lost: float
+    """Share of frames in which nobody was tracked."""
+    px_median: float
+    """Median error in an image, a share of the window's side."""
+    px_p95: float
+    """Its 95th percentile."""
+    lasting: float
+    """Correlation of these errors (without gross ones) with those 0.48 s later."""
+    missed: float
+    """Share of looks at a body half of which is in sight that found nobody."""
+    n: int
+    """Joints."""
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """The same clips as both levels saw them."""
+
+    clips: Sequence[Clip]
+    """K of them."""
+    pixels: Sequence[Watched]
+    """(K,)."""
+    emulated: Sequence[Sequence[Watched]]
+    """(K, `DRAWS`)."""
+    outcomes: dict[str, tuple[StepResult, StepResult]]
+    """Of pixels and emulator, by family and for "all"."""
+
+
+def error_ratios(
+    rounds: int = 1,
+    seed: int = 0,
+    say: Say = lambda share, label: None,
+    config: HRCConfig | None = None,
+    store: Path | None = None,
+) -> dict[str, Metric]:
+    """Error of the emulator over that of the pixels, by family of motions.
+
+    Args:
+        rounds: how often each motion is rendered in each scene: 82 clips a round; 0: once, in
+            one of them.
+        seed: of the clips.
+        say: hears of the progress: shares that sum to 1.
+        config: settings; its `emulator` is judged.
+        store: a folder in which what was rendered stays, and is taken from; None: nothing stays.
+
+    Returns:
+        `emulator_error_ratio.<family>` for medians, `.<family>.p95`, and
+        `emulator_coverage_difference.<family>`; their 95 % intervals draw clips anew.
+    """
+    seen = compared(rounds, seed, say, config or HRCConfig(), store)
+    pixels = [_in_space([each]) for each in seen.pixels]
+    emulated = [_in_space(each) for each in seen.emulated]
+    metrics: dict[str, Metric] = {}
+    for family in seen.outcomes:
+        mine = _of_family(seen.clips, family)
+        metrics |= _apart(family, [pixels[k] for k in mine], [emulated[k] for k in mine])
+    return metrics
+
+
+def _apart(
+    family: str, pixels: Sequence[InSpace], emulated: Sequence[InSpace]
+) -> dict[str, Metric]:
+    """How far both levels are apart on K clips of a family."""
+    draws, n = np.random.default_rng(0), len(pixels)
+
+    def apart(ks: Ints) -> list[float]:
+        (a, a_inside), (b, b_inside) = (
+            [np.concatenate(part) for part in zip(*(level[k] for k in ks.tolist()), strict=True)]
+            for level in (pixels, emulated)
+        )
+        ratios = np.percentile(b, [50, 95]) / np.percentile(a, [50, 95])
+        return [*ratios.tolist(), float(b_inside.mean() - a_inside.mean())]
+
+    again = [apart(draws.integers(0, n, n)) for _ in range(RESAMPLES)]
+    lows, highs = np.percentile(again, [2.5, 97.5], axis=0).tolist()
+    ratio = f"emulator_error_ratio.{family}"
+    names = (ratio, f"{ratio}.p95", f"emulator_coverage_difference.{family}")
+    n_joints = sum(error.size for error, _ in pixels)
+    return {
+        name: Metric(value, low, high, "", n_joints)
+        for name, value, low, high in zip(names, apart(np.arange(n)), lows, highs, strict=True)
+    }
+
+
+def compared(rounds: int, seed: int, say: Say, config: HRCConfig, store: Path | None) -> Compared:
+    """What pixels and emulator make of clips that no fit has seen."""
+    clips = unseen_clips(rounds, seed)
+    pixels: list[Watched] = []
+    for clip, watched in zip(clips, kept("pixels", clips, config, store), strict=True):
+        pixels.append(watched)
+        say(0.9 / len(clips), f"pixels: {clip.motion}")
+    emulated: list[list[Watched]] = [[] for _ in clips]
+    for draw in range(DRAWS):
+        others = [replace(clip, draw=draw) for clip in clips]
+        for k, watched in enumerate(watch("keypoints", others, config)):
+            emulated[k].append(watched)
+            say(0.1 / DRAWS / len(clips), f"emulator: {clips[k].motion}")
+    outcomes = by_family(clips, [[each] for each in pixels], emulated)
+    return Compared(clips, pixels, emulated, outcomes)
+
+
+def by_family(
+    clips: Sequence[Clip], pixels: Sequence[list[Watched]], emulated: Sequence[list[Watched]]
+) -> dict[str, tuple[StepResult, StepResult]]:
+    """Outcomes of both levels for each family that occurs, and for "all"."""
+    result = {}
+    for family in (*FAMILIES, "all"):
+        mine = _of_family(clips, family)
+        if mine:
+            parts = [[each for k in mine for each in level[k]] for level in (pixels, emulated)]
+            result[family] = (outcome(parts[0]), outcome(parts[1]))
+    return result
+
+
+def _of_family(clips: Sequence[Clip], family: str) -> list[int]:
+    """Which of the clips are of a family; of "all" every one is."""
+    return [k for k, clip in enumerate(clips) if family in ("all", family_of(clip.motion))]
+
+
+def outcome(watched: Sequence[Watched]) -> StepResult:
+    """Numbers of some clips."""
+    error, inside = _in_space(watched)
+    px = np.concatenate([errors_in_image(each).ravel() for each in watched])
+    px = px[np.isfinite(px)]
+    looked = np.concatenate(
+        [(each.sight[WARM_UP:] == SEEN).sum(-1).ravel() >= HALF_SEEN for each in watched]
+    )
+    missed = np.concatenate([np.isnan(each.px[WARM_UP:, :, 0, 0]).ravel() for each in watched])
+    return StepResult(
+        float(np.median(error)), float(np.percentile(error, 95)), float(inside.mean()),
+        float(1 - np.concatenate([each.tracked[WARM_UP:] for each in watched]).mean()),
+        float(np.median(px)), float(np.percentile(px, 95)), lasting(watched),
+        float(missed[looked].mean()), error.size,
+    )  # fmt: skip
+
+
+def _in_space(watched: Sequence[Watched]) -> InSpace:
+    """Errors of the tracked joints [m], and whether the reported region held them."""
+    errors, inside = [], []
+    for each in watched:
+        tracked = np.flatnonzero(each.tracked[WARM_UP:]) + WARM_UP
+        offset = (each.mean_world - each.joints_world)[tracked]
+        squared = np.einsum(
+            "tji,tjik,tjk->tj", offset, np.linalg.inv(each.cov_world[tracked]), offset
+        )
+        errors.append(np.linalg.norm(offset, axis=-1).ravel())
+        inside.append((squared < CHI2_95_3D).ravel())
+    return np.concatenate(errors), np.concatenate(inside)
+
+
+def errors_in_image(watched: Watched) -> Floats:
+    """(T, C, J) errors of the detections, of the window's side."""
+    away = np.linalg.norm(watched.px - watched.true_px, axis=-1)[WARM_UP:]
+    return away / watched.look_of[WARM_UP:, :, :1]
+
+
+def lasting(watched: Sequence[Watched], lag: int = 12, sharp: float = 0.06) -> float:
+    """Correlation about zero of errors below `sharp` with those `lag` frames later."""
+    product, square = 0.0, 1e-12
+    for each in watched:
+        error = (each.px - each.true_px)[WARM_UP:] / each.look_of[WARM_UP:, :, None, :1]
+        error = np.where(np.linalg.norm(error, axis=-1, keepdims=True) < sharp, error, np.nan)
+        a, b = error[lag:], error[:-lag]
+        both = np.isfinite(a) & np.isfinite(b)
+        product += float((a[both] * b[both]).sum())
+        square += 0.5 * float((a[both] ** 2 + b[both] ** 2).sum())
+    return product / square
+
+
+def table_of(seen: dict[str, tuple[StepResult, StepResult]]) -> Iterator[tuple[str, ...]]:
+    """Rows of text: family, then each number as "pixels / emulator"."""
+    for family, (a, b) in seen.items():
+        yield (
+            family,
+            f"{1e3 * a.median_m:.1f} / {1e3 * b.median_m:.1f}", f"{b.median_m / a.median_m:.2f}",
+            f"{1e3 * a.p95_m:.0f} / {1e3 * b.p95_m:.0f}", f"{b.p95_m / a.p95_m:.2f}",
+            f"{a.coverage:.3f} / {b.coverage:.3f}", f"{a.lost:.3f} / {b.lost:.3f}",
+            f"{100 * a.px_median:.2f} / {100 * b.px_median:.2f}",
+            f"{100 * a.px_p95:.1f} / {100 * b.px_p95:.1f}",
+            f"{a.lasting:.2f} / {b.lasting:.2f}", f"{a.missed:.3f} / {b.missed:.3f}",
+        )  # fmt: skip
+
+
+COLUMNS = (
+    "family", "median [mm]", "ratio", "p95 [mm]", "ratio", "coverage", "lost",
+    "2D median [%]", "2D p95 [%]", "after 0.48 s", "missed",
+)  # fmt: skip

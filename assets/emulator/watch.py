@@ -1,0 +1,137 @@
+"""What is seen of clips: by the pose network in rendered pictures, or by its emulator."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from assets.emulator.clips import DT_S, Clip, Staged, number_of, scene_of, stage
+from hrc_env.config import HRCConfig
+from hrc_env.core.batching import rows
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.records import Keypoints, Roi
+from hrc_env.core.typing import Bools, Covariances3, Floats, Ints, Points2, Points3
+from hrc_env.geometry.cameras import project, projections
+from hrc_env.perception.emulator import lines_of_sight
+from hrc_env.pipeline.levels import make_senses
+from hrc_env.pipeline.sensor_input import Generators, Moment
+from hrc_env.pipeline.tracking import TrackingSenses
+from hrc_env.scene.build import Scene
+from hrc_env.worker.body import worker_truth
+
+INTRODUCED, INTRODUCED_PX = 3, 10.0
+"""So many frames of true joints the tracker is given first, as known to so many pixels [px]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Watched:
+    """A clip of T frames as C cameras and the tracker had it."""
+
+    px: Points2
+    """(T, C, J, 2) what was detected; NaN: nothing."""
+    confidence: Floats
+    """(T, C, J)."""
+    sigma_px: Floats
+    """(T, C, J)."""
+    window: Floats
+    """(T, C, 4) centre x and y, side [px], turn [rad]; NaN: did not look, or emulated."""
+    true_px: Points2
+    """(T, C, J, 2) where the joints are, in pixels of the image."""
+    depth_m: Floats
+    """(T, C, J)."""
+    sight: Ints
+    """(T, C, J) as `perception.emulator.lines_of_sight`."""
+    look_of: Floats
+    """(T, C, `sightlines.N_LOOK`) the same."""
+    joints_world: Points3
+    """(T, J, 3) [m]."""
+    mean_world: Points3
+    """(T, J, 3) the estimate [m]."""
+    cov_world: Covariances3
+    """(T, J, 3, 3) [m^2]."""
+    tracked: Bools
+    """(T,)."""
+    P: Floats
+    """(C, 3, 4) the cameras."""
+
+
+def watch(
+    level: str, clips: Iterable[Clip], config: HRCConfig, estimator: str = "particle"
+) -> Iterator[Watched]:
+    """Play clips before the senses of a perception level; those of one scene together."""
+    senses, known = None, None
+    try:
+        for clip in clips:
+            scene = scene_of(clip)
+            if senses is None or scene is not known:
+                if senses is not None:
+                    senses.close()
+                senses, known = make_senses(level, estimator, scene, 1, config), scene
+            if not isinstance(senses, TrackingSenses):
+                raise ConfigError(f"Clips are for levels with cameras, not for {level!r}.")
+            yield _watched(senses, scene, stage(clip, scene), (number_of(clip), clip.draw))
+    finally:
+        if senses is not None:
+            senses.close()
+
+
+def _watched(
+    senses: TrackingSenses, scene: Scene, staged: Staged, seed: tuple[int, int]
+) -> Watched:
+    rngs = [[np.random.default_rng([*seed, 71, k])] for k in range(2)]
+    senses.reset(np.arange(1), *rngs)
+    P, frames = projections(scene.cameras), []
+    _introduce(senses, worker_truth(staged.body, staged.motion).joints_world[:1], P, rngs[1])
+    q = staged.q[None]
+    for t in range(len(staged.motion.position_world)):
+        motion = rows(staged.motion, np.array([t]))
+        truth = worker_truth(staged.body, motion)
+        now = Moment(np.arange(1), q, motion, truth, np.ones((1, 1), bool))
+        estimate = senses.sense(now, *rngs)
+        keypoints, windows = senses.keypoints, senses.looks(0)[1]
+        true_px, depth_m = project(P, truth.joints_world[:, 0])
+        sight, look_of = lines_of_sight(truth, scene.surroundings(q, motion.held), scene.cameras)
+        frames.append(
+            (
+                keypoints.px[0, :, 0], keypoints.confidence[0, :, 0], keypoints.sigma_px[0, :, 0],
+                _windows(windows, len(P)), true_px[0], depth_m[0], sight[0, :, 0],
+                look_of[0, :, 0],
+                truth.joints_world[0, 0], estimate.mean_world[0, 0], estimate.cov_world[0, 0],
+                estimate.tracked[0, 0],
+            )
+        )  # fmt: skip
+    columns: list[Any] = [np.array(column) for column in zip(*frames, strict=True)]
+    return Watched(*[*columns, P])
+
+
+def _introduce(senses: TrackingSenses, joints_world: Points3, P: Floats, rngs: Generators) -> None:
+    """Let the tracker know the worker: how a search finds people is no matter of the clip."""
+    px, _ = project(P, joints_world)
+    sigma_px = np.full(px.shape[:-1], INTRODUCED_PX)
+    for _ in range(INTRODUCED):
+        senses.tracker.predict(senses.state, DT_S, rngs)
+        senses.tracker.update(senses.state, Keypoints(px, np.ones_like(sigma_px), sigma_px), rngs)
+
+
+def _windows(windows: list[list[Roi | None]], n_cameras: int) -> Floats:
+    found = windows[0] if windows else [None] * n_cameras
+    rows = [
+        (np.nan,) * 4 if w is None else (*w.centre_px, w.side_px, w.rotation_rad) for w in found
+    ]
+    return np.array(rows, float)
+
+
+def save(path: Path, watched: Watched) -> None:
+    """Write what was seen of a clip, whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    draft = path.with_suffix(".draft.npz")
+    np.savez(draft, **{f.name: getattr(watched, f.name) for f in fields(watched)})
+    draft.replace(path)
+
+
+def load(path: Path) -> Watched:
+    """What `save` wrote."""
+    with np.load(path) as stored:
+        return Watched(*(stored[f.name] for f in fields(Watched)))

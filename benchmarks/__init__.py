@@ -1,0 +1,1 @@
+"""Benchmarks: estimators, detectors, speed, motion; each writes a table and results.json."""

@@ -1,0 +1,1 @@
+"""The commands that want a checkout: bench and gallery."""

@@ -1,0 +1,89 @@
+"""Still pictures: portraits of the workers, and the scenes with people at work in them."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from benchmarks.gallery.aim import camera_at
+from hrc_env.core.batching import one
+from hrc_env.core.records import Held, WorkerMotion, Workplace
+from hrc_env.core.typing import Floats, Image
+from hrc_env.motion.repertoire import REPERTOIRE, perform
+from hrc_env.motion.solo import alone
+from hrc_env.scene.build import Scene, build
+from hrc_env.scene.render import PictureRenderer
+from hrc_env.worker.body import load_body
+
+PORTRAIT_PX = (600, 900)
+SITTING = (0.75, -0.6, -0.2)
+"""Where workers stand for their portrait, and which way they look: x, y [m], yaw [rad]."""
+PLACE_PX = (1600, 900)
+CASTS: dict[str, tuple[tuple[str, str, float], ...]] = {
+    "lab": (("robot_4", "lunge", 0.3), ("open_studs", "drill", 0.5)),
+    "site": (
+        ("robot_4", "lunge", 0.3), ("north_studs_1", "hammer at a wall", 0.5),
+        ("slab_floor_1", "kneel", 0.5), ("carts", "wheelbarrow", 0.35),
+    ),
+}  # fmt: skip
+"""Who stands in the pictures of a scene: workplace, scene of the repertoire, share of it."""
+OVERVIEW = {"lab": "room", "site": "overview"}
+"""The view for people that shows most of a scene."""
+
+
+def portrait(body_name: str, seed: int = 1) -> Image:
+    """A worker on the laboratory's floor, from before and a little aside."""
+    scene = build(n_workers=1, bodies=body_name)
+    x, y, yaw = SITTING
+    me = alone(load_body(body_name), (x, y), yaw)
+    film = perform(REPERTOIRE["stand"], me, np.random.default_rng(seed), 0.1)[0]
+    camera = camera_at(np.array([x, y, 1.0]), yaw + 0.4, 2.1, 40.5, PORTRAIT_PX)
+    renderer = PictureRenderer(scene, *PORTRAIT_PX)
+    picture = np.array(renderer.picture(scene.home_q, one(film.motion, 10), camera), np.uint8)
+    renderer.close()
+    return picture
+
+
+def views(scene_name: str, body_name: str) -> dict[str, Image]:
+    """A scene with people at work: one view for people, then what each camera sees."""
+    cast = CASTS[scene_name]
+    scene = build(name=scene_name, n_workers=len(cast), bodies=body_name)
+    motion = _together([_at_work(scene, body_name, *role) for role in cast])
+    renderer = PictureRenderer(scene, *PLACE_PX)
+    names = (OVERVIEW[scene_name], *(camera.name for camera in scene.cameras))
+    found = {
+        name: np.array(renderer.picture(scene.home_q, motion, name), np.uint8) for name in names
+    }
+    renderer.close()
+    return found
+
+
+def _at_work(
+    scene: Scene, body_name: str, place_name: str, doing: str, share: float
+) -> WorkerMotion:
+    """One worker, arrays (1, ...), at a share of what they do at a place."""
+    place: Workplace = next(p for p in scene.grounds.places if p.name == place_name)
+    me = alone(load_body(body_name), place.xy_m, place.yaw_rad)
+    films = perform(REPERTOIRE[doing], me, np.random.default_rng(2), 0.05)
+    rows = films[0].motion
+    return one(rows, int(share * len(rows.position_world)))
+
+
+def _together(workers: list[WorkerMotion]) -> WorkerMotion:
+    """Several workers, each with arrays (1, ...), as one record (W, ...)."""
+
+    def joined(records: Sequence[Any], name: str) -> Floats:
+        return np.concatenate([getattr(record, name) for record in records])
+
+    things = [worker.held for worker in workers]
+    return WorkerMotion(
+        joined(workers, "position_world"),
+        joined(workers, "quaternion_wxyz"),
+        joined(workers, "velocity_world"),
+        joined(workers, "angular_velocity_world"),
+        Held(
+            joined(things, "kind").astype(np.int64),
+            joined(things, "position_world"),
+            joined(things, "quaternion_wxyz"),
+        ),
+    )

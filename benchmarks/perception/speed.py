@@ -1,0 +1,115 @@
+"""Steps a second at level `pixels`, every camera in every step, and what takes the time."""
+
+import time
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from benchmarks.speed.stopwatch import Place, Stopwatch
+from hrc_env.env import HRCReachEnv
+from hrc_env.motion import generator
+from hrc_env.perception.network import LANDMARK_SIDE, load_landmarker
+from hrc_env.pipeline.rendered import CameraSenses
+from hrc_env.pipeline.tracking import TrackingSenses
+from hrc_env.scene.physics import Physics
+from hrc_env.scene.render import CropRenderer
+
+STAGES: Mapping[str, Sequence[Place]] = {
+    "draw": ((CropRenderer, "draw"), (CropRenderer, "view")),
+    "detect": ((CameraSenses, "detect"),),
+    "track": ((TrackingSenses, "sense"),),
+    "physics": ((Physics, "step"),),
+    "motion": ((generator, "advance"), (generator, "watch")),
+}
+"""Time of the thread that steps: `detect` is what is left of looking when drawing is taken out,
+most of it the network's, or waiting for it; `track` has association in it."""
+REST = "rest"
+WARM_UP = 10
+"""Steps before the clock runs."""
+ROUNDS = 60
+"""Of four crops, to time the network alone."""
+LITERT, OPENVINO = "litert", "openvino"
+
+
+class Setting(NamedTuple):
+    """What is timed."""
+
+    cameras: int
+    workers: int
+    scene: str = "lab"
+    runtime: str = LITERT
+
+    @property
+    def name(self) -> str:
+        """As in the names of metrics: numbers, then what is not usual."""
+        usual = {"lab", LITERT}
+        special = (each for each in (self.scene, self.runtime) if each not in usual)
+        return ".".join([str(self.cameras), str(self.workers), *special])
+
+
+def network_ms(runtime: str, tick: Callable[[float], None]) -> float:
+    """Median time in which two threads get the landmarks of four crops [ms]: no loop is faster."""
+    landmarkers = [load_landmarker(runtime=runtime) for _ in range(2)]
+    crop = np.random.default_rng(0).random((LANDMARK_SIDE, LANDMARK_SIDE, 3), np.float32)
+    seconds = []
+    with ThreadPoolExecutor(1) as helper:
+        for _ in range(ROUNDS):
+            started_s = time.perf_counter()
+            other = helper.submit(lambda: [landmarkers[1](crop) for _ in range(2)])
+            for _ in range(2):
+                landmarkers[0](crop)
+            other.result()
+            seconds.append(time.perf_counter() - started_s)
+            tick(1 / ROUNDS)
+    return 1e3 * float(np.median(seconds))
+
+
+def measure(
+    setting: Setting, n_steps: int, seed: int, tick: Callable[[float], None]
+) -> dict[str, Any]:
+    """Random actions for `n_steps`, then as many with the stopwatch round the stages.
+
+    Returns:
+        "steps_per_s" of the median step, "mean" of all of them, and "stages": milliseconds a step.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # that one camera is few is known
+        env = HRCReachEnv(
+            scene=setting.scene,
+            cameras=list(range(setting.cameras)),
+            n_workers=setting.workers,
+            config={"eyes": {"runtime": setting.runtime}},
+        )
+    try:
+        actions = np.random.default_rng(seed)
+        env.reset(seed=seed)
+        _step(env, actions, WARM_UP)
+        seconds = _step(env, actions, n_steps)
+        tick(0.5)
+        watch = Stopwatch(STAGES)
+        with watch.running():
+            total = sum(_step(env, actions, n_steps))
+        tick(0.5)
+    finally:
+        env.close()
+    stages = {name: 1e3 * s / n_steps for name, s in watch.seconds.items()}
+    stages[REST] = 1e3 * total / n_steps - sum(stages.values())
+    return {
+        "steps_per_s": float(1 / np.median(seconds)),
+        "mean": float(len(seconds) / np.sum(seconds)),
+        "stages": stages,
+    }
+
+
+def _step(env: HRCReachEnv, actions: np.random.Generator, n_steps: int) -> list[float]:
+    """Seconds of each step."""
+    seconds = []
+    for _ in range(n_steps):
+        action = actions.uniform(-1, 1, env.simulation.n_actions).astype(np.float32)
+        started_s = time.perf_counter()
+        env.step(action)
+        seconds.append(time.perf_counter() - started_s)
+    return seconds

@@ -1,0 +1,74 @@
+"""Crops as rows of a table: by what the worker does, how far away, from which side."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from benchmarks.perception.families import FAMILY_OF
+
+DISTANCES_M = (0, 3, 4, 6, 9, 13)
+"""Lower bounds of the rows by distance; the last one is open."""
+ANGLES_DEG = (0, 45, 90, 135)
+"""Lower bounds of the rows by view angle; each is 45 degrees wide."""
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """One crop in which the whole worker was in view, and what came of it."""
+
+    variant: str
+    """Under which conditions it was taken, `PLAIN` or "<kind> <row>"."""
+    scene: str
+    body: str
+    activity: str
+    camera: str
+    distance_m: float
+    angle_deg: float
+    error: float | None
+    """Mean distance of the joints from the truth as a share of the stature; None: missed."""
+    picture: str | None
+    """File name of the crop, if it was kept."""
+
+
+ROWS: Mapping[str, Callable[[View], str]] = {
+    "scene": lambda view: view.scene,
+    "body": lambda view: view.body,
+    "pose": lambda view: FAMILY_OF[view.activity],
+    "distance": lambda view: _band(view.distance_m, DISTANCES_M, "m"),
+    "angle": lambda view: _band(view.angle_deg, (*ANGLES_DEG, 180), "deg"),
+    "lens": lambda view: view.variant.removeprefix("lens "),
+    "appearance": lambda view: view.variant.removeprefix("appearance "),
+}
+"""By what crops are told apart, and the row that each is in."""
+COMPARED = ("lens", "appearance")
+"""Kinds that compare variants "<kind> <row>" of the same moments; the others have `PLAIN` ones."""
+PLAIN = "plain"
+"""The variant of the scenes as they are."""
+
+
+def rows_of(views: list[View], kind: str) -> dict[str, list[View]]:
+    """The views of a kind of row by row, in a sensible order."""
+    name = ROWS[kind]
+    compared = kind in COMPARED
+    chosen = [v for v in views if v.variant.startswith(f"{kind} " if compared else PLAIN)]
+    found = sorted({name(view) for view in chosen}, key=_order)
+    return {row: [view for view in chosen if name(view) == row] for row in found}
+
+
+def view_of(content: dict[str, Any]) -> View:
+    """From what `dataclasses.asdict` gave."""
+    return View(**content)
+
+
+def _band(value: float, bounds: tuple[float, ...], unit: str) -> str:
+    k = max(i for i, bound in enumerate(bounds) if value >= bound or i == 0)
+    if unit == "deg":
+        k = min(k, len(bounds) - 2)
+    last = k + 1 == len(bounds)
+    return f"{bounds[k]:g}_{'up' if last else f'{bounds[k + 1]:g}'}_{unit}"
+
+
+def _order(row: str) -> tuple[float, str]:
+    """Bands by their numbers, names by the alphabet."""
+    number = row.split("_", 1)[0]
+    return (float(number) if number.replace(".", "").isdigit() else -1.0, row)

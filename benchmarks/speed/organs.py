@@ -1,0 +1,85 @@
+"""Which functions do each organ's work in a step, and how long they take.
+
+A function that is renamed is missed at once, and one that no step calls any more stops the
+bench: no organ can become free of charge by moving elsewhere.
+"""
+
+from collections.abc import Mapping, Sequence
+
+from benchmarks.speed.contenders import Contender
+from benchmarks.speed.measured import RESET, REST, TOTAL
+from benchmarks.speed.stopwatch import Place, Stopwatch
+from hrc_env import metrics, observations, rewards, simulation
+from hrc_env.core.errors import HRCError
+from hrc_env.geometry import chains
+from hrc_env.motion import generator
+from hrc_env.perception import emulator
+from hrc_env.pipeline.tracking import TrackingSenses
+from hrc_env.scene.physics import Physics
+from hrc_env.tasks import reach
+from hrc_env.vector import env, infos
+
+ORGANS: Mapping[str, Sequence[Place]] = {
+    "physics": ((simulation, "joint_command"), (Physics, "step")),
+    "motion": (
+        (generator, "advance"),
+        (generator, "watch"),
+        (simulation, "worker_truth"),
+        (simulation, "worker_capsules"),
+    ),
+    "emulator": ((emulator, "emulate"),),
+    "tracking": ((TrackingSenses, "sense"),),
+    "distances": (
+        (chains, "robot_along"),
+        (simulation, "estimated_gap"),
+        (metrics, "cost"),
+    ),
+    "observation": ((observations, "observe"),),
+    "reward": ((reach, "advance"), (rewards, "reward")),
+    "info": (
+        (simulation, "tracking_info"),
+        (simulation, "cost_info"),
+        (simulation.Simulation, "_tally"),
+        (simulation.StepResult, "info_of"),
+        (env, "table"),
+        (infos.InfoTable, "arrays"),
+    ),
+    RESET: ((simulation.Simulation, "reset"),),
+}
+"""Level `keypoints`, one worker. Lines of sight are part of the `emulator`; `physics` has the
+controller in it, `distances` the robot's own bodies, `reward` the task, and `tracking` whatever
+carries keypoints to the estimator."""
+
+
+class Organs:
+    """Times the organs, and remembers which of their functions were never called."""
+
+    def __init__(self, organs: Mapping[str, Sequence[Place]] = ORGANS) -> None:
+        self.organs = organs
+        self._idle: set[str] | None = None
+
+    def us_per_env_step(
+        self, contender: Contender, n_episodes: int, n_threads: int
+    ) -> dict[str, float]:
+        """Microseconds per environment and step: of organs, resets, the rest, and the total.
+
+        An organ's time is summed over threads and divided by their number: what it adds to the
+        whole, which is the time on the wall.
+        """
+        watch = Stopwatch(self.organs, whole=(RESET,))
+        with watch.running():
+            pace = contender.run(n_episodes)
+        idle = set(watch.idle)
+        self._idle = idle if self._idle is None else self._idle & idle
+        us = {organ: 1e6 * s / n_threads / pace.env_steps for organ, s in watch.seconds.items()}
+        total = 1e6 * pace.seconds / pace.env_steps
+        return {**us, REST: total - sum(us.values()), TOTAL: total}
+
+    def check_all_called(self) -> None:
+        """Raise `HRCError` if a function of the table has not been called in any run."""
+        if self._idle:
+            raise HRCError(
+                "The speed bench's table of organs names functions that no step calls, so that "
+                f"their work would be missed: {', '.join(sorted(self._idle))}. Correct ORGANS in "
+                "benchmarks/speed/organs.py."
+            )

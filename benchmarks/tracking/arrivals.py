@@ -1,0 +1,47 @@
+"""When frames arrive: every camera late in its own way, one at half the rate, some not at all."""
+
+import numpy as np
+
+from benchmarks.tracking.rigs import DT_S
+from hrc_env.core.typing import Floats, Points2
+
+LONGEST_DELAY_S = 0.5
+"""How late a frame may be for the estimators' memory [s]."""
+_LATENCY_S = (0.04, 0.20)
+_JITTER_S = 0.02
+_DROPPED = 0.05
+
+
+def delivered(px: Points2, seeds: list[int]) -> tuple[Points2, Floats]:
+    """What cameras deliver in each step, of frames (T, S, C, J, 2) taken at its end.
+
+    Every camera has a constant latency of 40 to 200 ms and, for each frame, up to 20 ms more; one
+    in four sequence by sequence takes every other frame only; one frame in twenty is lost. Of
+    frames that arrive in the same step the newest is delivered.
+
+    Returns:
+        pixels (T, S, C, J, 2), NaN where nothing arrived, and times (T, S, C) at which they were
+        taken [s], NaN likewise, on a clock that is 0.04 s at the first frame.
+    """
+    out = np.full(px.shape, np.nan)
+    time_s = np.full(px.shape[:3], np.nan)
+    for s, seed in enumerate(seeds):
+        rng = np.random.default_rng([seed, 11])
+        n_frames, n_cameras = px.shape[0], px.shape[2]
+        delay_s = rng.uniform(*_LATENCY_S, n_cameras)
+        delay_s = delay_s + rng.uniform(0, _JITTER_S, (n_frames, n_cameras))
+        lost = rng.random((n_frames, n_cameras)) < _DROPPED
+        lost[1::2, seed % n_cameras] = True
+        step = np.arange(n_frames)[:, None] + np.ceil(delay_s / DT_S - 1e-9).astype(int)
+        for taken, c in np.argwhere(~lost & (step < n_frames)):  # later ones replace earlier ones
+            now = step[taken, c]
+            out[now, s, c], time_s[now, s, c] = px[taken, s, c], (taken + 1) * DT_S
+    return out, time_s
+
+
+def in_time(px: Points2, time_s: Floats) -> Points2:
+    """Delivered frames (T, S, C, ...) put back to the steps in which they were taken."""
+    out = np.full(px.shape, np.nan)
+    now, s, c = np.nonzero(np.isfinite(time_s))
+    out[np.rint(time_s[now, s, c] / DT_S).astype(int) - 1, s, c] = px[now, s, c]
+    return out

@@ -1,0 +1,82 @@
+"""particles' bootstrap filter, one a joint (N. Chopin, MIT)."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from benchmarks.tracking.baselines.model import START_COV, F, Q, first_joints, pixels
+from benchmarks.tracking.rigs import SIGMA_PX
+from hrc_env.core.typing import Floats, Points2, Points3
+
+N_PARTICLES = 1000
+FREEDOM = 3.0
+"""Of the pixels' Student t distribution, whose tails allow for gross errors (particles that are
+all outliers would drift away under a flat density)."""
+
+
+def follow(P: Floats, px: Points2, seed: int) -> Points3:
+    """Joints (T, J, 3) from px (T, C, J, 2)."""
+    start = first_joints(P, px)
+    with _seeded(seed):
+        joints = [_one_joint(P, px[:, :, j], start[j]) for j in range(px.shape[2])]
+    return np.stack(joints, axis=1)
+
+
+@contextmanager
+def _seeded(seed: int) -> Iterator[None]:
+    """The library draws from NumPy's global stream alone: seed it, then put it back."""
+    before = np.random.get_state()  # noqa: NPY002
+    np.random.seed(seed)  # noqa: NPY002
+    try:
+        yield
+    finally:
+        np.random.set_state(before)  # noqa: NPY002
+
+
+def _one_joint(P: Floats, px: Points2, start: Points3) -> Points3:
+    """(T, 3) from px (T, C, 2)."""
+    particles = import_module("particles")
+    moments = import_module("particles.collectors").Moments()
+    model = import_module("particles.state_space_models").Bootstrap(
+        ssm=_joint_model(P, start), data=list(px)
+    )
+    smc = particles.SMC(fk=model, N=N_PARTICLES, resampling="systematic", collect=[moments])
+    smc.run()
+    return np.stack([moment["mean"][:3] for moment in smc.summaries.moments])
+
+
+def _joint_model(P: Floats, start: Points3) -> Any:
+    """The state-space model in the library's terms."""
+    distributions = import_module("particles.distributions")
+    models = import_module("particles.state_space_models")
+
+    class Pixels(distributions.ProbDist):
+        """Pixels of the cameras that see the joint: Student's t."""
+
+        dim = 2 * len(P)
+
+        def __init__(self, expected: Points2) -> None:
+            self.expected = expected
+
+        def logpdf(self, x: Points2) -> Floats:
+            off = (x.ravel() - self.expected).reshape(*self.expected.shape[:-1], -1, 2)
+            squared = (off**2).sum(-1) / SIGMA_PX**2
+            density = -0.5 * (FREEDOM + 2) * np.log1p(squared / FREEDOM)
+            return np.where(np.isfinite(density), density, 0.0).sum(-1)
+
+    class Joint(models.StateSpaceModel):
+        """Constant velocity."""
+
+        def PX0(self) -> Any:  # noqa: N802
+            return distributions.MvNormal(loc=np.concatenate([start, np.zeros(3)]), cov=START_COV)
+
+        def PX(self, t: int, xp: Floats) -> Any:  # noqa: N802
+            return distributions.MvNormal(loc=xp @ F.T, cov=Q)
+
+        def PY(self, t: int, xp: Floats, x: Floats) -> Any:  # noqa: N802
+            return Pixels(pixels(P, x[:, :3]))
+
+    return Joint()

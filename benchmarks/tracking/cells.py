@@ -1,0 +1,154 @@
+"""One cell of the tracking bench: an estimator on the sequences of a rig and a condition."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from benchmarks.tracking.arrivals import in_time
+from benchmarks.tracking.couples import identities
+from benchmarks.tracking.dlt import triangulate_frame
+from benchmarks.tracking.full_state import filter_matched
+from benchmarks.tracking.names import DEFAULT, DLT, FULL_STATE, SMOOTHER, UNBUFFERED
+from benchmarks.tracking.rigs import DT_S, SIGMA_PX, Rig
+from benchmarks.tracking.sequences import Sequences
+from benchmarks.tracking.tally import tally
+from hrc_env.core.batching import rows
+from hrc_env.core.records import Keypoints, PoseEstimate
+from hrc_env.core.typing import Covariances3, Points3
+from hrc_env.experiments.study.shelf import Tick
+from hrc_env.tracking.estimators import make_estimator
+from hrc_env.tracking.people.association import associate
+from hrc_env.tracking.smoother import smooth
+
+UNKNOWN_M2 = 1e6
+"""Variance of a bone's length of which nothing is known [m^2]."""
+_AT_ONCE = 10
+"""Sequences that are smoothed at once: it keeps 90x90 numbers of every frame."""
+
+
+def beliefs(
+    name: str, rig: Rig, sequences: Sequences, seeds: list[int]
+) -> Iterator[tuple[Points3, Covariances3 | None]]:
+    """Mean (S, W, J, 3) and covariance (S, W, J, 3, 3) after each frame; DLT has none."""
+    if name == DLT:
+        yield from _triangulated(rig, sequences)
+    elif name == FULL_STATE:
+        if sequences.model is None:
+            raise ValueError(f"{FULL_STATE} runs on sequences whose model is known.")
+        for mean, cov in filter_matched(rig.P, sequences.model, sequences.px[:, :, :, 0], SIGMA_PX):
+            yield mean[:, None], cov[:, None]
+    elif name == SMOOTHER:
+        yield from _smoothed(rig, sequences, seeds)
+    else:
+        for _, belief in _estimated(name, rig, sequences, seeds):
+            yield belief.mean_world, belief.cov_world
+
+
+def _triangulated(rig: Rig, sequences: Sequences) -> Iterator[tuple[Points3, None]]:
+    shape = sequences.joints.shape[1:]
+    last = np.tile(sequences.config.prior_mean_world, (shape[0], shape[1] * shape[2], 1))
+    for px in sequences.px:
+        last = triangulate_frame(rig.P, px.reshape(*px.shape[:2], -1, 2), last)
+        yield last.reshape(shape), None
+
+
+def _estimated(
+    name: str, rig: Rig, sequences: Sequences, seeds: list[int]
+) -> Iterator[tuple[Keypoints, PoseEstimate]]:
+    """An estimator as an environment runs it: what it is given, and what it believes then.
+
+    With several people, poses are given to the tracks whose predictions they fit.
+    """
+    n_sequences, n_people = sequences.joints.shape[1:3]
+    if name == UNBUFFERED:  # frames are taken as of the moment at which they arrive
+        name = DEFAULT
+        sequences = replace(
+            sequences, time_s=None, config=replace(sequences.config, longest_delay_s=0.0)
+        )
+    estimator = make_estimator(name, rig.P, DT_S, sequences.config)
+    rngs = [np.random.default_rng([seed, 4]) for seed in seeds]
+    state = estimator.init(n_sequences, n_people)
+    estimator.reset(state, np.arange(n_sequences), rngs)
+    for t in range(len(sequences.px)):
+        estimator.predict(state, DT_S, rngs)
+        keypoints = sequences.keypoints(t)
+        if sequences.order is not None:
+            keypoints = associate(rig.P, keypoints, estimator.estimate(state)).keypoints
+        if not sequences.has_bones:
+            _forget_bones(state)
+        estimator.update(state, keypoints, rngs)
+        yield keypoints, estimator.estimate(state)
+
+
+def _smoothed(
+    rig: Rig, sequences: Sequences, seeds: list[int]
+) -> Iterator[tuple[Points3, Covariances3]]:
+    """The smoother, to which late frames are given at their time, some sequences at once.
+
+    Of several people it smooths the tracks to which `kalman` gave the poses.
+    """
+    if sequences.time_s is not None:
+        px = in_time(sequences.px, sequences.time_s)
+        config = replace(sequences.config, longest_delay_s=0.0)
+        sequences = replace(sequences, px=px, time_s=None, config=config)
+    if sequences.order is None:
+        clip = [sequences.keypoints(t) for t in range(len(sequences.px))]
+    else:
+        clip = [given for given, _ in _estimated("kalman", rig, sequences, seeds)]
+    parts = []
+    for begin in range(0, len(seeds), _AT_ONCE):
+        some = np.arange(begin, min(begin + _AT_ONCE, len(seeds)))
+        frames = [rows(keypoints, some) for keypoints in clip]
+        parts.append(smooth(rig.P, frames, DT_S, sequences.config))
+    for t in range(len(clip)):
+        yield (
+            np.concatenate([part.mean_world[t] for part in parts]),
+            np.concatenate([part.cov_world[t] for part in parts]),
+        )
+
+
+def _forget_bones(state: Any) -> None:
+    """Tell an estimator, or each of its hypotheses, that nothing is known of bones' lengths."""
+    for record in (state, getattr(state, "slots", state)):
+        if hasattr(record, "bone_variance"):
+            record.bone_variance[...] = UNKNOWN_M2
+
+
+def run_cell(
+    name: str, rig: Rig, sequences: Sequences, seeds: list[int], tick: Tick
+) -> dict[str, Any]:
+    """Run one estimator; sums per sequence of each window, as `tally` gives them."""
+    n_frames = len(sequences.joints)
+    means = np.empty(sequences.joints.shape)
+    covs = np.empty((*sequences.joints.shape, 3)) if name != DLT else None
+    for t, (mean, cov) in enumerate(beliefs(name, rig, sequences, seeds)):
+        means[t] = mean
+        if covs is not None and cov is not None:
+            covs[t] = cov
+        tick(1 / n_frames)
+    return {
+        window: _window(slice(*frames), sequences, means, covs)
+        for window, frames in sequences.windows.items()
+    }
+
+
+def _window(
+    frames: slice, sequences: Sequences, means: Points3, covs: Covariances3 | None
+) -> dict[str, Any]:
+    """The sums of one window; where there are several people, each is held against one track."""
+    truth, mean = sequences.joints[frames], means[frames]
+    cov = None if covs is None else covs[frames]
+    swaps = None
+    if sequences.order is not None:
+        track, swaps = identities(truth, mean)
+        mean = np.take_along_axis(mean, track[None, :, :, None, None], 2)
+        if cov is not None:
+            cov = np.take_along_axis(cov, track[None, :, :, None, None, None], 2)
+    sums = tally(truth, mean, cov, np.isfinite(sequences.px[frames, ..., 0]))
+    if swaps is not None:
+        sums["identity_swaps"] = swaps.tolist()
+    if sequences.bound_m2 is not None:
+        sums["bound"] = sequences.bound_m2[frames].sum((0, 2)).tolist()
+    return sums

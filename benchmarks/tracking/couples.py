@@ -1,0 +1,134 @@
+"""Two people who walk past each other, and what cameras that know no names see of them."""
+
+import itertools
+
+import numpy as np
+
+from benchmarks.tracking.detections import Damage, detect
+from benchmarks.tracking.rigs import DT_S
+from benchmarks.tracking.walks import Path, bodies_along
+from hrc_env.core.skeleton import JOINT
+from hrc_env.core.typing import Bools, Floats, Ints, Points2, Points3
+
+MEETING_S = 3.0
+"""When the two are side by side."""
+APART_M = 0.6
+"""How far from each other they are then, middle to middle."""
+_TRUNK_M, _LEAST_JOINTS = 0.18, 6
+_LOST_EVERY_S, _LOST_S = 4.0, (0.2, 0.8)
+_SURE_M = 0.3
+
+
+def couples(seeds: list[int], n_frames: int) -> Points3:
+    """Joints (T, S, 2, J, 3) [m]: two walkers on parallel lines, in opposite directions."""
+    rngs = [np.random.default_rng([seed, 6]) for seed in seeds]
+    along = np.stack([rng.uniform(0, 2 * np.pi) for rng in rngs])
+    middle = np.stack([rng.uniform(-0.2, 0.2, 2) for rng in rngs])
+    speed = np.stack([rng.uniform(0.5, 0.8, 2) for rng in rngs])
+    phase = np.stack([rng.uniform(0, 2 * np.pi, 2) for rng in rngs])
+    gesture = np.stack([rng.uniform(0, 0.6, (2, 2)) for rng in rngs])
+    time_s = DT_S * np.arange(n_frames)[:, None] - MEETING_S
+    ahead = np.stack([np.cos(along), np.sin(along)], -1)
+    aside = APART_M / 2 * np.stack([-ahead[:, 1], ahead[:, 0]], -1)
+    people = []
+    for k, sign in enumerate((1.0, -1.0)):
+        gone = (speed[:, k] * time_s)[..., None]
+        stride = phase[:, k] + 2 * np.pi * 0.72 * speed[:, k] * time_s
+        waving = np.sin(0.8 * time_s + phase[:, k])[..., None] ** 2
+        path = Path(
+            ground=middle + sign * (gone * ahead + aside),
+            heading=np.tile(along + (np.pi if k else 0.0), (n_frames, 1)),
+            stride=stride,
+            lean=np.full(stride.shape, 0.08),
+            gesture=waving * gesture[:, k],
+        )
+        people.append(bodies_along(path))
+    return np.stack(people, 2)
+
+
+def detect_couples(P: Floats, joints: Points3, seeds: list[int]) -> Points2:
+    """Pixels (T, S, C, 2, J, 2) of joints (T, S, 2, J, 3), NaN where a joint was not found.
+
+    Joints are lost as in `occluded`; who stands behind the other is hidden by that trunk; each
+    camera loses each person for 0.2-0.8 s every 4 s, and reports nobody with fewer than six
+    joints.
+    """
+    damage = Damage(occluded=True)
+    px = np.stack(
+        [detect(P, joints[:, :, k], damage, [2 * seed + k for seed in seeds]) for k in (0, 1)], 3
+    )
+    seen = np.isfinite(px[..., 0]) & ~_hidden_by_each_other(P, joints)
+    for s, seed in enumerate(seeds):
+        rng = np.random.default_rng([seed, 7])
+        seen[:, s] &= ~_lost(rng, seen.shape[0], seen.shape[2])[..., None]
+    seen &= seen.sum(-1, keepdims=True) >= _LEAST_JOINTS
+    return np.where(seen[..., None], px, np.nan)
+
+
+def shuffles(seeds: list[int], n_frames: int, n_cameras: int, n_people: int) -> Ints:
+    """(T, S, C, D) in which order each camera reports people, anew in every frame."""
+    one = np.tile(np.arange(n_people), (n_frames, n_cameras, 1))
+    return np.stack([np.random.default_rng([seed, 8]).permuted(one, axis=-1) for seed in seeds], 1)
+
+
+def identities(truth: Points3, mean: Points3) -> tuple[Ints, Floats]:
+    """Which track is whom, and how often that changes.
+
+    Args:
+        truth: (T, S, W, J, 3) people.
+        mean: (T, S, W, J, 3) tracks.
+
+    Returns:
+        track (S, W) that is nearest to each person in the first frame, all together, and (S,) how
+        often the nearest change hands by more than 0.3 m from then on.
+    """
+    n_sequences, n_people = truth.shape[1:3]
+    orders = np.array(list(itertools.permutations(range(n_people))))
+    apart = np.linalg.norm((mean[:, :, :, None] - truth[:, :, None]).mean(-2), axis=-1)
+    total = apart[:, :, orders, np.arange(n_people)].sum(-1)  # (T, S, orders)
+    every = np.arange(n_sequences)
+    current = total[0].argmin(-1)
+    first, swaps = orders[current], np.zeros(n_sequences)
+    for now in total:
+        best = now.argmin(-1)
+        surely = now[every, best] + _SURE_M < now[every, current]
+        swaps += surely
+        current = np.where(surely, best, current)
+    return first, swaps
+
+
+def _hidden_by_each_other(P: Floats, joints: Points3) -> Bools:
+    """(T, S, C, 2, J) joints whose line of sight passes the other one's trunk."""
+    hidden = np.zeros((*joints.shape[:2], len(P), *joints.shape[2:4]), bool)
+    for c, camera in enumerate(P):
+        eye = -np.linalg.solve(camera[:, :3], camera[:, 3])
+        for k in (0, 1):
+            hidden[:, :, c, k] = _passes(joints[:, :, k] - eye, joints[:, :, 1 - k] - eye)
+    return hidden
+
+
+def _passes(to_joints: Points3, to_other: Points3) -> Bools:
+    """(T, S, J) whether lines of sight pass a nearer trunk, all seen from the eye."""
+    shoulders = to_other[..., [JOINT["left_shoulder"], JOINT["right_shoulder"]], :].mean(-2)
+    ankles = to_other[..., [JOINT["left_ankle"], JOINT["right_ankle"]], :].mean(-2)
+    length = np.linalg.norm(to_joints, axis=-1)
+    direction = to_joints / length[..., None]
+    out = np.zeros(length.shape, bool)
+    for share in np.linspace(0, 1, 7):
+        ball = (shoulders + share * (ankles - shoulders))[..., None, :]
+        far = (ball * direction).sum(-1)
+        gap = np.linalg.norm(ball - far[..., None] * direction, axis=-1)
+        out |= (gap < _TRUNK_M) & (far < length - 0.25)
+    return out
+
+
+def _lost(rng: np.random.Generator, n_frames: int, n_cameras: int) -> Bools:
+    """(T, C, 2) whether a camera has lost a person."""
+    lost = np.zeros((n_frames, n_cameras, 2), bool)
+    for c, k in itertools.product(range(n_cameras), (0, 1)):
+        t = rng.exponential(_LOST_EVERY_S / DT_S)
+        while t < n_frames:
+            length = 1 + int(rng.uniform(*_LOST_S) / DT_S)
+            lost[int(t) : int(t) + length, c, k] = True
+            t += length + rng.exponential(_LOST_EVERY_S / DT_S)
+    return lost

@@ -1,0 +1,138 @@
+"""From sums per sequence to numbers with intervals, bootstrapped over sequences."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from benchmarks.tracking.names import DEFAULT, RIVALS, names_of, rows
+from benchmarks.tracking.rigs import RIGS
+from benchmarks.tracking.sequences import MATCHED, MATCHED_BONES
+from hrc_env.core.results import Metric, over
+from hrc_env.core.typing import Floats
+
+TIMING = "timing"
+"""The condition under which `Parts` holds microseconds."""
+ASSOCIATION = "association"
+"""The name under which it holds those of association."""
+Parts: TypeAlias = dict[tuple[str, str, str], dict[str, Any]]
+"""(rig, condition, name) to what the cell gave."""
+N_RESAMPLED = 1000
+_Sums: TypeAlias = Mapping[str, Floats]
+
+
+def metrics_of(parts: Parts) -> dict[str, Metric]:
+    """All metrics of the bench by their dotted names."""
+    metrics = _times(parts)
+    for rig, condition, window in rows():
+        drawn = {
+            name: _drawn(parts[rig, condition, name][window]) for name in names_of(rig, condition)
+        }
+        for name, sums in drawn.items():
+            for kind, (unit, statistic) in _KINDS.items():
+                if _NEEDS.get(kind, "n") in sums:
+                    metrics[f"{kind}.{rig}.{window}.{name}"] = _metric(statistic(sums), unit, sums)
+        default = _rmse(drawn[DEFAULT])
+        for name in RIVALS:
+            ratio = default / _rmse(drawn[name])
+            metrics[f"default_over.{rig}.{window}.{name}"] = _metric(ratio, "-", drawn[name])
+    for rig in RIGS:
+        metrics |= _after_return(parts, rig)
+    for name in names_of(RIGS[0], MATCHED):
+        metrics |= _bounds(parts, name)
+    return dict(sorted(metrics.items()))
+
+
+def _rmse(sums: _Sums) -> Floats:
+    return np.sqrt(sums["squared"] / sums["n"])
+
+
+def _calibration_gap(sums: _Sums) -> Floats:
+    held = np.cumsum(sums["levels"], -1) / sums["n"][:, None]
+    return np.abs(held - np.arange(1, held.shape[1] + 1) / held.shape[1]).max(-1)
+
+
+_KINDS: dict[str, tuple[str, Callable[[_Sums], Floats]]] = {
+    "rmse_m": ("m", _rmse),
+    "median_m": ("m", lambda sums: sums["median"] / sums["one"]),
+    "facing_wrong": ("share", lambda sums: sums["wrong_way"] / sums["n_frames"]),
+    "coverage95": ("share", lambda sums: sums["inside"] / sums["n"]),
+    "std_over_rmse": ("-", lambda sums: np.sqrt(sums["trace"] / sums["squared"])),
+    "nees": ("-", lambda sums: sums["nees"] / sums["n"] / 3),
+    "calibration_gap": ("share", _calibration_gap),
+    "identity_swaps": (
+        "per 100 sequences",
+        lambda sums: 100 * sums["identity_swaps"] / sums["one"],
+    ),
+}
+"""Each as a function of sums over sequences. The median is the mean of the sequences' medians;
+NEES is per degree of freedom, 1 if the covariance is right; the calibration gap is the largest
+difference between the share of joints that the reported regions of 5, 10, ... 95 % hold and what
+they claim (the distance of Kolmogorov from chi-square); facing wrong is the share of frames in
+which the torso's left is where its right is."""
+_NEEDS = {
+    **dict.fromkeys(("coverage95", "std_over_rmse", "nees", "calibration_gap"), "inside"),
+    "identity_swaps": "identity_swaps",
+}
+
+
+def _drawn(sums: Mapping[str, Any]) -> dict[str, Floats]:
+    """Sums over all sequences, and over 1000 draws of as many with replacement: (1001, ...).
+
+    The draws depend on the number of sequences only, so that two estimators' are the same.
+    """
+    arrays = {name: np.array(values, float) for name, values in sums.items()}
+    n = len(arrays["n"])
+    arrays["one"] = np.ones(n)
+    picked = np.random.default_rng(0).integers(n, size=(N_RESAMPLED, n))
+    counts = np.ones((N_RESAMPLED + 1, n))
+    for k in range(n):
+        counts[1:, k] = (picked == k).sum(1)
+    return {name: np.tensordot(counts, values, 1) for name, values in arrays.items()}
+
+
+def _metric(values: Floats, unit: str, sums: _Sums, factor: int = 1) -> Metric:
+    """The first value, with the middle 95 % of the others."""
+    low, high = np.percentile(values[1:], (2.5, 97.5))
+    n = factor * round(float(sums["one"][0]))
+    return Metric(float(values[0]), float(low), float(high), unit, n)
+
+
+def _times(parts: Parts) -> dict[str, Metric]:
+    metrics = {}
+    for (_, condition, name), part in parts.items():
+        if condition != TIMING:
+            continue
+        for batch, times in part.items():
+            key = "association_us" if name == ASSOCIATION else f"update_us.{name}.{batch}"
+            metrics[key] = over(times, "us")
+    return metrics
+
+
+def _after_return(parts: Parts, rig: str) -> dict[str, Metric]:
+    """How the estimators are a second after the other cameras' return."""
+    metrics = {}
+    for name in names_of(rig, "one_camera"):
+        cell = parts[rig, "one_camera", name]["after_return"]
+        after = _drawn(cell)
+        ratio = _rmse(after) / _rmse(_drawn(parts[rig, "clean", name]["clean"]))
+        metrics[f"after_return_over_clean.{rig}.{name}"] = _metric(ratio, "-", after)
+        mirrored = np.array(cell["wrong_way"]) > 0.5 * np.array(cell["n_frames"])
+        share = _drawn({"n": cell["n"], "mirrored": mirrored})
+        metrics[f"mirrored_returns.{rig}.one_camera.{name}"] = _metric(
+            100 * share["mirrored"] / share["one"], "per 100 sequences", share
+        )
+    return metrics
+
+
+def _bounds(parts: Parts, name: str) -> dict[str, Metric]:
+    """RMSE over its bound: root of the mean of the squared ratios over rigs, and of each."""
+    metrics = {}
+    for condition, kind in ((MATCHED, "ratio_to_bound"), (MATCHED_BONES, "ratio_to_bound_bones")):
+        drawn = {rig: _drawn(parts[rig, condition, name][condition]) for rig in RIGS}
+        squared = {rig: sums["squared"] / sums["bound"] for rig, sums in drawn.items()}
+        for rig, values in squared.items():
+            metrics[f"{kind}_in.{rig}.{name}"] = _metric(np.sqrt(values), "-", drawn[rig])
+        both = np.sqrt(np.mean(list(squared.values()), axis=0))
+        metrics[f"{kind}.{name}"] = _metric(both, "-", drawn[RIGS[0]], len(RIGS))
+    return metrics

@@ -1,0 +1,164 @@
+"""The sequences of the tracking bench: what all estimators are given and held against."""
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from benchmarks.tracking.arrivals import LONGEST_DELAY_S, delivered
+from benchmarks.tracking.bound import posterior_bound
+from benchmarks.tracking.couples import couples, detect_couples, shuffles
+from benchmarks.tracking.detections import CONDITIONS, Damage, detect
+from benchmarks.tracking.matched import MatchedModel, draw, matched_model
+from benchmarks.tracking.own import OWN, OWN_CONDITIONS, OWN_FRAMES, record
+from benchmarks.tracking.rigs import SIGMA_PX, Rig
+from benchmarks.tracking.walks import walk
+from hrc_env.core.records import Keypoints
+from hrc_env.core.skeleton import BONES
+from hrc_env.core.typing import Floats, Ints, Points2, Points3
+from hrc_env.tracking.config import TrackerConfig
+
+MATCHED, MATCHED_BONES = "matched", "matched_bones"
+TWO_WORKERS, LATE = "two_workers", "late"
+SIMULATED = (*CONDITIONS, LATE, TWO_WORKERS)
+"""Conditions of the rigs lab and site, beside those that have a bound."""
+BOUNDED = (MATCHED, MATCHED_BONES)
+"""Conditions for which the least mean squared error is known."""
+MATCHED_ROOT_ACCELERATION = 0.05
+"""Of the matched sequences and of the estimators on them, so that they stay in view [m^2/s^3]."""
+N_FRAMES = {
+    **dict.fromkeys(("clean", "occluded", "hard", "drifting"), 500),
+    "one_camera": 175, LATE: 175, TWO_WORKERS: 125, MATCHED: 40, MATCHED_BONES: 40,
+}  # fmt: skip
+_ALONE = {
+    "one_camera_half_second": (25, 38),
+    "one_camera_one_second": (25, 50),
+    "one_camera_two_seconds": (25, 75),
+    "one_camera": (25, 125),
+}
+WINDOWS: dict[str, dict[str, tuple[int, int]]] = {
+    **{name: {name: (25, 500)} for name in ("clean", "occluded", "hard", "drifting")},
+    "one_camera": {**_ALONE, "after_return": (150, 175)},
+    LATE: {LATE: (25, 175)},
+    TWO_WORKERS: {TWO_WORKERS: (25, 125)},
+    MATCHED: {MATCHED: (15, 40)},
+    MATCHED_BONES: {MATCHED_BONES: (15, 40)},
+}
+"""Frames that count: after the first second; while one camera sees, and from one second after
+the others' return; matched sequences are short, lest the drifting body leave the images."""
+OWN_WINDOWS = {
+    **{name: {name: (25, OWN_FRAMES)} for name in OWN_CONDITIONS},
+    "one_camera": {"one_camera": (25, 125), "after_return": (135, OWN_FRAMES)},
+}
+"""The same of the environment's own motion; its return is looked at after 0.4 s."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sequences:
+    """S sequences of T frames with W people."""
+
+    joints: Points3
+    """(T, S, W, J, 3) [m]."""
+    px: Points2
+    """(T, S, C, W, J, 2), by person."""
+    windows: dict[str, tuple[int, int]]
+    """Name of each window and its frames."""
+    config: TrackerConfig
+    confidence: Floats | None = None
+    """(T, S, C, W, J); None: 0.9 where there is a pixel."""
+    sigma_px: Floats | None = None
+    """(T, S, C, W, J); None: `SIGMA_PX` where there is a pixel."""
+    order: Ints | None = None
+    """(T, S, C, W) in which order cameras report people, whose names they do not know; None:
+    there is one."""
+    time_s: Floats | None = None
+    """(T, S, C) when the frame was taken that each camera delivers [s], as in `Keypoints`; None:
+    all are of now."""
+    model: MatchedModel | None = None
+    """What the sequences were drawn from, if an estimator can know it."""
+    bound_m2: Floats | None = None
+    """(T, S, J) the least mean squared error, where it is known."""
+
+    @property
+    def has_bones(self) -> bool:
+        """Whether distances between neighbouring joints stay as they are."""
+        return self.model is None or len(self.model.bones) > 0
+
+    def first(self, n: int) -> "Sequences":
+        """The first n sequences."""
+        arrays = {
+            each.name: getattr(self, each.name)[:, :n]
+            for each in fields(self)
+            if isinstance(getattr(self, each.name), np.ndarray)
+        }
+        return replace(self, **arrays)
+
+    def keypoints(self, t: int) -> Keypoints:
+        """What cameras report of frame t."""
+        px = self.px[t]
+        seen = np.isfinite(px[..., 0])
+        if self.confidence is None or self.sigma_px is None:
+            confidence, sigma_px = np.where(seen, 0.9, 0.0), np.where(seen, SIGMA_PX, np.inf)
+        else:
+            confidence, sigma_px = self.confidence[t], self.sigma_px[t]
+        if self.order is not None:
+            order = self.order[t][..., None]
+            confidence = np.take_along_axis(confidence, order, 2)
+            sigma_px = np.take_along_axis(sigma_px, order, 2)
+            px = np.take_along_axis(px, order[..., None], 2)
+        time_s = None if self.time_s is None else self.time_s[t]
+        return Keypoints(px, confidence, sigma_px, time_s)
+
+
+def make_sequences(rig: Rig, condition: str, seeds: list[int]) -> Sequences:
+    """Sequences of a rig and a condition, one per seed, each depending on its own seed only."""
+    if rig.name == OWN:
+        joints, seen = record(condition, seeds)
+        given = (seen.confidence, seen.sigma_px)
+        return Sequences(joints, seen.px, OWN_WINDOWS[condition], rig.tracker, *given)
+    if condition in BOUNDED:
+        return _matched(rig, condition, seeds)
+    n_frames, windows = N_FRAMES[condition], WINDOWS[condition]
+    if condition == TWO_WORKERS:
+        joints = couples(seeds, n_frames)
+        px = detect_couples(rig.P, joints, seeds)
+        order = shuffles(seeds, n_frames, len(rig.P), joints.shape[2])
+        return Sequences(joints, px, windows, rig.tracker, order=order)
+    joints = walk(rig.walk_m, seeds, n_frames)
+    if condition == LATE:
+        px, time_s = delivered(detect(rig.P, joints, Damage(), seeds), seeds)
+        config = replace(rig.tracker, longest_delay_s=LONGEST_DELAY_S)
+        return Sequences(joints[:, :, None], px[:, :, :, None], windows, config, time_s=time_s)
+    px = detect(rig.P, joints, CONDITIONS[condition], seeds)
+    return Sequences(joints[:, :, None], px[:, :, :, None], windows, rig.tracker)
+
+
+def _matched(rig: Rig, condition: str, seeds: list[int]) -> Sequences:
+    """Sequences from the estimators' own model, of which they are told what can be told.
+
+    That is: the shared acceleration, no outliers, no exchanged sides, detections as good as they
+    say, bones that give what they are drawn with, no floor; and without bones, that a body may be
+    of any size.
+    """
+    n_bones = len(BONES) if condition == MATCHED_BONES else 0
+    config = replace(
+        rig.tracker,
+        root_acceleration=MATCHED_ROOT_ACCELERATION,
+        outlier_weight=1e-9,
+        swap_begins=1e-9,
+        noise_bounds=(1.0, 1.0),
+        bone_give=1.0,
+        floor_std_m=np.inf,
+        body_radius_m=rig.tracker.body_radius_m if n_bones else 10.0,
+    )
+    model = matched_model(config.damping, config.root_acceleration, n_bones)
+    joints = draw(model, seeds, N_FRAMES[condition])
+    px = detect(rig.P, joints, Damage(), seeds)
+    bound = posterior_bound(rig.P, model, joints, np.isfinite(px[..., 0]), SIGMA_PX)
+    return Sequences(
+        joints[:, :, None],
+        px[:, :, :, None],
+        WINDOWS[condition],
+        config,
+        model=model,
+        bound_m2=np.trace(bound, axis1=-2, axis2=-1),
+    )

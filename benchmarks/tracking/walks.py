@@ -1,0 +1,155 @@
+"""People who walk and gesture: the tracking bench's own motion, seeded, with rigid bones.
+
+Independent of the package's motion room, so that estimators which were tuned there are asked
+about something else. A walker steers through the area at 0.9 to 1.5 m/s and turns back before
+its edge; legs swing with the stride; arms burst into gestures of up to 3 m/s at the wrist.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from benchmarks.tracking.rigs import DT_S
+from hrc_env.core.skeleton import JOINT, N_JOINTS
+from hrc_env.core.typing import Floats, Points3
+from hrc_env.geometry.rotations import about_axis
+
+_SUBSTEPS = 8
+_SHORTEST = 500
+"""Noise is scaled to unit variance over so many frames; shorter walks are cut from these."""
+_NOISE_TAU_S = (1.5, 0.8, 1.2, 0.6, 0.6)
+"""Widths of the noise in speed, steering, leaning and the two arms' gestures [s]."""
+_TURN_RATE, _TURN_TAU_S = 2.5, 0.25
+_UPPER_ARM_M, _FOREARM_M, _THIGH_M, _SHANK_M, _FOOT_M = 0.29, 0.26, 0.43, 0.42, 0.15
+_HIP_HEIGHT_M, _GROUND_M = 0.92, 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class Path:
+    """A walk on the ground, and what the limbs make of it; all (T, S), T in frames of 0.04 s."""
+
+    ground: Floats
+    """(T, S, 2) [m]."""
+    heading: Floats
+    stride: Floats
+    """Phase of the stride [rad]."""
+    lean: Floats
+    gesture: Floats
+    """(T, S, 2) how much the left and right arm gesture, in [0, 1]."""
+
+
+def walk(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
+    """Joints (T, S, J, 3) [m] of one walker per seed, T = n_frames at 25 Hz.
+
+    Args:
+        walk_m: half the length and width of the area about the origin [m].
+        seeds: one per sequence; a sequence depends on its own seed only.
+        n_frames: how many frames.
+    """
+    return bodies_along(_steer(walk_m, seeds, max(n_frames, _SHORTEST)))[:n_frames]
+
+
+def bodies_along(path: Path) -> Points3:
+    """Joints (T, S, J, 3) [m] of walkers who go along `path`."""
+    body = _body(path)
+    joints = np.einsum("tsij,tskj->tski", about_axis("z", path.heading), body)
+    joints[..., :2] += path.ground[:, :, None]
+    joints[..., 2] += (_HIP_HEIGHT_M + 0.02 * np.cos(2 * path.stride))[..., None]
+    below = _GROUND_M - joints[..., 2].min(-1)
+    joints[..., 2] += np.maximum(below, 0.0)[..., None]  # the whole body, so that bones stay rigid
+    return joints
+
+
+def _steer(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Path:
+    """Walk in substeps; returns every frame."""
+    dt, n_steps = DT_S / _SUBSTEPS, n_frames * _SUBSTEPS
+    rngs = [np.random.default_rng([seed, 1]) for seed in seeds]
+    starts = np.stack([rng.uniform(-0.5, 0.5, 3) for rng in rngs])
+    noise = np.stack([_smooth(rng, n_steps, dt) for rng in rngs], -1)  # (5, n, S)
+    speed = np.clip(1.25 + 0.2 * noise[0], 0.9, 1.5)
+    wander = 0.8 * noise[1]
+    place, heading = starts[:, :2].copy(), 2 * np.pi * (starts[:, 2] + 0.5)
+    turning = np.zeros(len(seeds))
+    places, headings = np.empty((n_steps, len(seeds), 2)), np.empty((n_steps, len(seeds)))
+    for k in range(n_steps):
+        far = np.maximum(np.abs(place[:, 0]) / walk_m[0], np.abs(place[:, 1]) / walk_m[1])
+        back = np.arctan2(-place[:, 1], -place[:, 0]) - heading
+        back = (back + np.pi) % (2 * np.pi) - np.pi
+        home = 2.5 * back * np.minimum(1.0, 4 * (far - 0.75)) + 0.3 * wander[k]
+        wanted = np.clip(np.where(far > 0.75, home, wander[k]), -_TURN_RATE, _TURN_RATE)
+        turning += (wanted - turning) * dt / _TURN_TAU_S
+        heading = heading + turning * dt
+        direction = np.stack([np.cos(heading), np.sin(heading)], -1)
+        place = place + (speed[k] * dt)[:, None] * direction
+        places[k], headings[k] = place, heading
+    stride = 2 * np.pi * np.cumsum(0.9 * speed / 1.25, 0) * dt
+    shown = slice(None, None, _SUBSTEPS)
+    return Path(
+        ground=places[shown],
+        heading=headings[shown],
+        stride=stride[shown],
+        lean=(0.08 + 0.25 * np.clip(noise[2] - 0.8, 0, 1.5))[shown],
+        gesture=np.moveaxis(np.clip(noise[3:] - 0.3, 0, 1.2) / 1.2, 0, -1)[shown],
+    )
+
+
+def _smooth(rng: np.random.Generator, n_steps: int, dt: float) -> Floats:
+    """(5, n) white noise under Gaussian windows of `_NOISE_TAU_S`, of unit variance."""
+    width = np.array(_NOISE_TAU_S) / dt
+    padded = n_steps + int(8 * width.max())
+    spectrum = np.fft.rfft(rng.standard_normal((len(width), padded)))
+    frequency = np.fft.rfftfreq(padded)
+    spectrum *= np.exp(-0.5 * (2 * np.pi * frequency * width[:, None]) ** 2)
+    smooth = np.fft.irfft(spectrum, padded)[:, :n_steps]
+    return smooth / smooth.std(1, keepdims=True)
+
+
+def _limb(angle: Floats, length_m: float) -> Points3:
+    """A limb that hangs down at angle 0 and swings forward."""
+    return length_m * np.stack([np.sin(angle), np.zeros_like(angle), -np.cos(angle)], -1)
+
+
+def _body(path: Path) -> Points3:
+    """(T, S, J, 3) joints about the middle of the hips: x forward, y left, z up."""
+    body = np.zeros((*path.heading.shape, N_JOINTS, 3))
+    lean, upright = np.sin(path.lean), np.cos(path.lean)
+    level = np.zeros_like(lean)
+    chest = 0.5 * np.stack([lean, level, upright], -1)
+    body[..., JOINT["nose"], :] = np.stack([0.65 * lean + 0.12, level, 0.68 * upright], -1)
+    twist = -0.1 * np.sin(path.stride)
+    across = 0.18 * np.stack([-np.sin(twist), np.cos(twist), level], -1)
+    time_s = DT_S * np.arange(len(lean), dtype=float)[:, None]
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        swing = path.stride + (0.0 if sign > 0 else np.pi)
+        leg = _leg(swing, sign)
+        for name, points in zip(("hip", "knee", "ankle", "foot"), leg, strict=True):
+            body[..., JOINT[f"{side}_{name}"], :] = points
+        gesture = path.gesture[..., 0 if sign > 0 else 1]
+        arm = _arm(chest + sign * across, swing, gesture, sign, time_s)
+        for name, points in zip(("shoulder", "elbow", "wrist"), arm, strict=True):
+            body[..., JOINT[f"{side}_{name}"], :] = points
+    return body
+
+
+def _leg(swing: Floats, sign: float) -> tuple[Points3, ...]:
+    """Hip, knee, ankle and foot of one side."""
+    thigh = 0.45 * np.sin(swing)
+    shank = thigh - 0.15 - 0.55 * np.clip(np.cos(swing), 0, 1) ** 2
+    hip = np.broadcast_to(np.array([0.0, 0.11 * sign, 0.0]), (*swing.shape, 3))
+    knee = hip + _limb(thigh, _THIGH_M)
+    ankle = knee + _limb(shank, _SHANK_M)
+    return hip, knee, ankle, ankle + _limb(shank + 1.35, _FOOT_M)
+
+
+def _arm(
+    shoulder: Points3, swing: Floats, gesture: Floats, sign: float, time_s: Floats
+) -> tuple[Points3, ...]:
+    """Shoulder, elbow and wrist of one side; a gesture lifts, spreads and shakes the arm."""
+    pace = 2 * np.pi * (0.7 if sign > 0 else 0.95)
+    start = 0.0 if sign > 0 else 1.0
+    shake = gesture * (0.9 + 0.75 * np.sin(pace * time_s + start))
+    upper = -0.4 * np.sin(swing) + shake
+    fore = upper + 0.3 + gesture * (0.6 + 0.5 * np.sin(1.3 * pace * time_s))
+    outward = about_axis("x", sign * (0.1 + 0.5 * gesture))
+    elbow = shoulder + np.einsum("tsij,tsj->tsi", outward, _limb(upper, _UPPER_ARM_M))
+    return shoulder, elbow, elbow + np.einsum("tsij,tsj->tsi", outward, _limb(fore, _FOREARM_M))

@@ -1,0 +1,106 @@
+"""What a finished part depends on: settings, code, data and libraries, by their content."""
+
+import ast
+import hashlib
+import json
+import sys
+from collections.abc import Iterator, Mapping
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import hrc_env
+from hrc_env.worker.body import assets_dir
+
+LIBRARIES = ("numpy", "numba", "scipy", "mujoco", "gymnasium", "opencv-python-headless",
+             "ai-edge-litert", "openvino", "torch", "stable-baselines3")  # fmt: skip
+_PACKAGE = Path(hrc_env.__file__).resolve().parent
+_CODE = {".py", ".pyc"}
+
+
+def fingerprint_of(settings: Mapping[str, Any], *modules: str) -> str:
+    """What a part depends on, as a word: it is made anew when any of it changes.
+
+    Args:
+        settings: numbers and words.
+        modules: dotted names of those that make the part. What they import, directly or not, of
+            this repository counts too, and so do all data files and the libraries' versions.
+
+    Raises:
+        ModuleNotFoundError: a module is not of this repository.
+    """
+    digest = hashlib.sha256(json.dumps(settings, sort_keys=True).encode())
+    for path in sorted(sources_of(*modules)):
+        digest.update(path.read_bytes())
+    digest.update(_data().encode())
+    digest.update(json.dumps([_version(name) for name in LIBRARIES]).encode())
+    digest.update(sys.version.encode())
+    return digest.hexdigest()[:16]
+
+
+def sources_of(*modules: str) -> set[Path]:
+    """The files of modules and of everything of this repository that they import, in time."""
+    found: set[Path] = set()
+    todo: list[str] = []
+    for name in modules:
+        if _file(name) is None:
+            raise ModuleNotFoundError(f"{name} is no module of this repository.", name=name)
+        todo.append(name)
+    while todo:
+        path = _file(todo.pop())
+        if path is not None and path not in found:
+            found.add(path)
+            todo.extend(_imports(path))
+    return found
+
+
+def _file(name: str) -> Path | None:
+    """The source of a module, in a clone or an installed package; None if it is another's."""
+    top, *rest = name.split(".")
+    if top == "hrc_env":
+        path = _PACKAGE.joinpath(*rest)
+    elif top == "agents" and (_PACKAGE / "agents").is_dir():
+        path = _PACKAGE.joinpath(top, *rest)
+    else:
+        path = _PACKAGE.parent.joinpath(top, *rest)
+    for each in (path.with_suffix(".py"), path / "__init__.py"):
+        if each.is_file():
+            return each
+    return None
+
+
+@cache
+def _imports(path: Path) -> frozenset[str]:
+    """Modules, and names that may be modules, that a file imports anywhere in it."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            found |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
+    return frozenset(found)
+
+
+@cache
+def _data() -> str:
+    """The content of every data file: bodies, calibrations, scenery, networks of our own."""
+    digest = hashlib.sha256()
+    for path in sorted(_data_files()):
+        digest.update(path.name.encode() + path.read_bytes())
+    return digest.hexdigest()
+
+
+def _data_files() -> Iterator[Path]:
+    for root in {assets_dir(), _PACKAGE}:
+        for path in root.rglob("*"):
+            own = path.is_file() and path.suffix not in _CODE and "__pycache__" not in path.parts
+            if own:
+                yield path
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None

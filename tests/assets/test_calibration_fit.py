@@ -1,0 +1,147 @@
+"""The fit finds the numbers that errors were made with."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from assets.emulator.clips import FAMILIES, TIMES, fit_clips, unseen_clips
+from assets.emulator.fit.fit import fit
+from assets.emulator.samples import Samples
+from hrc_env.motion.repertoire import REPERTOIRE
+from hrc_env.perception.calibration import INNER, KIND, KINDS, N_VIEWS, NEXT, POSTURES
+
+L, T, C, J = 24, 50, 4, 15
+STANDING, FOLDED, KNEELING = (
+    np.eye(len(POSTURES))[POSTURES.index(name)] for name in ("standing", "folded", "kneeling")
+)
+HIP, ELBOW = KINDS.index("hip"), KINDS.index("elbow")
+
+
+def made(error, **changes):
+    """Samples of upright workers, seen from anywhere, with errors (L, T, C, J, 2)."""
+    rng = np.random.default_rng(5)
+    view = np.broadcast_to(rng.uniform(-np.pi, np.pi, (L, 1, C)), (L, T, C))
+    nowhere = np.full((L, T, J, 3), np.nan)
+    parts = {
+        "error": error, "confidence": rng.uniform(0.9, 0.99, (L, T, C, J)),
+        "sight": np.zeros((L, T, C, J), int), "view": view,
+        "posture": np.tile(STANDING, (L, T, 1)),
+        "speed_m_s": np.full((L, T), 0.1), "missed": np.zeros((L, T, C), bool),
+        "exchanged": np.zeros((L, T, C, 2), bool), "shown": np.zeros((L, T, C, J, 2, 3)),
+        "offset_m": nowhere, "counts": np.ones((L, T), bool),
+    }  # fmt: skip
+    return Samples(**(parts | changes))
+
+
+def white(size=0.01, seed=1):
+    return size * np.random.default_rng(seed).standard_normal((L, T, C, J, 2))
+
+
+def test_sizes_are_found():
+    known = fit(made(white(0.012)))
+    np.testing.assert_allclose(known.size[0, 0], 0.012, rtol=0.08)
+    assert known.spread[0, 0].max() < 0.15
+
+
+def test_heavy_tails_are_found():
+    rng = np.random.default_rng(2)
+    error = white() * np.exp(0.6 * rng.standard_normal((L, T, C, J, 1)))
+    np.testing.assert_allclose(fit(made(error)).spread[0, 0], 0.6, atol=0.1)
+
+
+def test_new_errors_are_known_from_lasting_ones():
+    assert fit(made(white())).shares[:, 2].min() > 0.9
+    staying = np.broadcast_to(white()[:, :1], (L, T, C, J, 2))
+    assert fit(made(staying)).shares[:, 2].max() < 0.1
+
+
+def test_biases_by_view_are_found():
+    samples = made(white(0.005))
+    front = np.cos(samples.view) > np.cos(np.pi / N_VIEWS)
+    samples.error[front] += np.where((KIND == HIP)[:, None], [0.0, 0.02], 0.0)
+    bias = fit(samples).bias
+    assert bias[0, HIP, 1] == pytest.approx(0.02, rel=0.3)
+    assert abs(bias[N_VIEWS // 2, HIP, 1]) < 0.003
+
+
+def test_offsets_in_space_are_found():
+    rng = np.random.default_rng(3)
+    offset = 0.01 * rng.standard_normal((L, T, J, 3)) + np.array([0.0, 0.0, 0.03])
+    known = fit(made(white(), offset_m=offset))
+    np.testing.assert_allclose(known.offset_m[0], [[0.0, 0.0, 0.03]] * len(KINDS), atol=0.002)
+
+
+def in_space(offset_m):
+    """Errors (L, T, C, J, 2) as cameras all round show offsets (L, T, J, 3), and how they do."""
+    azimuth = np.linspace(0.3, 2 * np.pi, C, endpoint=False)
+    right = np.stack([-np.sin(azimuth), np.cos(azimuth), 0 * azimuth], -1)
+    down = np.tile([0.0, 0.0, -1.0], (C, 1))
+    shown = np.broadcast_to(np.stack([right, down], 1)[:, None], (L, T, C, J, 2, 3)) / 2.0
+    return np.einsum("ltcjka,ltja->ltcjk", shown, offset_m), shown
+
+
+def test_what_varies_in_space_is_told_from_what_cameras_err_on_their_own():
+    rng = np.random.default_rng(3)
+    std = np.array([0.03, 0.02, 0.0])
+    error, shown = in_space(std * rng.standard_normal((L, T, J, 3)))
+    wander = fit(made(error + white(0.01), shown=shown)).wander_m[0]
+    np.testing.assert_allclose(wander, np.tile(np.maximum(std, 0.002), (len(KINDS), 1)), atol=0.003)
+    assert fit(made(white(0.01), shown=shown)).wander_m[0].max() < 0.004
+
+
+def test_what_varies_in_space_together_is_found():
+    """Elbows with their shoulders, and the right hip with the left one."""
+    rng = np.random.default_rng(3)
+    normal = rng.standard_normal((L, T, J, 3))
+    for j in range(J):
+        if KIND[j] == ELBOW or (KIND[j] == HIP and NEXT[j] != j):
+            normal[:, :, j] = 0.8 * normal[:, :, NEXT[j]] + 0.6 * normal[:, :, j]
+    error, shown = in_space(0.03 * normal)
+    posture = np.tile(STANDING, (L, T, 1))
+    posture[L // 3 :], posture[2 * L // 3 :] = FOLDED, KNEELING
+    limb = fit(made(error + white(0.01), shown=shown, posture=posture)).space_limb
+    np.testing.assert_allclose(limb[[ELBOW, HIP]], 0.8, atol=0.1)
+    assert np.abs(np.delete(limb, [ELBOW, HIP], 0)).max() < 0.2
+
+
+def test_errors_along_a_limb_are_alike():
+    error = white()
+    for j in np.flatnonzero(KIND == ELBOW):
+        error[..., j, :] = 0.5 * error[..., INNER[j], :] + np.sqrt(0.75) * error[..., j, :]
+    assert fit(made(error)).limb[ELBOW] == pytest.approx(0.5, abs=0.05)
+
+
+def test_exchanged_sides_and_misses_are_counted():
+    exchanged = np.zeros((L, T, C, 2), bool)
+    exchanged[:, :5, :, 0] = True
+    missed = np.zeros((L, T, C), bool)
+    missed[:, 10:20] = True
+    known = fit(made(white(), exchanged=exchanged, missed=missed))
+    np.testing.assert_allclose(known.swap_share[..., 0], 0.125, atol=0.01)
+    assert known.miss_share[0, 15] == pytest.approx(0.2, abs=0.02)
+    np.testing.assert_allclose(known.swap_share[..., 1], 0.0)
+
+
+def test_how_long_mishaps_last_is_found():
+    rng = np.random.default_rng(6)
+    latent, keep = rng.standard_normal((L, 1, C)), np.exp(-0.04 / 0.8)
+    slow = [latent]
+    for _ in range(T * 4 - 1):
+        slow.append(keep * slow[-1] + np.sqrt(1 - keep**2) * rng.standard_normal((L, 1, C)))
+    missed = np.concatenate(slow, 1).reshape(L, 4, T, C).reshape(4 * L, T, C) < -0.5
+    one = made(white())
+    four = {f.name: np.concatenate([getattr(one, f.name)] * 4) for f in fields(Samples)}
+    assert fit(Samples(**{**four, "missed": missed})).miss_s == pytest.approx(0.8, rel=0.35)
+
+
+def test_every_motion_has_a_family_and_unseen_clips_are_others():
+    assert sorted(sum(FAMILIES.values(), ())) == sorted(REPERTOIRE)
+    ours, others = fit_clips(2, 0), unseen_clips(2, 0)
+    once = sum(TIMES.get(family, 1) * len(motions) for family, motions in FAMILIES.items())
+    assert len(ours) == len(others) == 4 * once
+    assert len(fit_clips(0, 0)) == once
+    assert {clip.motion for clip in fit_clips(0, 0)} == set(REPERTOIRE)
+    played = {(clip.scene, clip.motion, clip.body) for clip in ours}
+    assert sum((c.scene, c.motion, c.body) in played for c in others) < len(others) / 2
+    assert not {clip.seed for clip in ours} & {clip.seed for clip in others}

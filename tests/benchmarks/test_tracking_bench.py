@@ -1,0 +1,152 @@
+"""The bench as a whole: every key, the shared form, and going on where it was stopped."""
+
+import json
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+from benchmarks.tracking import bench as tracking_bench
+from benchmarks.tracking import sequences
+from benchmarks.tracking.bench import TrackingBenchConfig, run
+from benchmarks.tracking.names import DLT, rows
+from benchmarks.tracking.rigs import RIGS, make_rig
+from benchmarks.tracking.sequences import make_sequences
+from benchmarks.tracking.tally import CHI2_95_3D, CHI2_LEVELS, tally
+from benchmarks.tracking.timing import time_association, time_estimator
+from hrc_env.core.errors import ConfigError
+from hrc_env.experiments.study.fingerprint import fingerprint_of
+from hrc_env.tracking.estimators import ESTIMATORS
+
+TINY = TrackingBenchConfig(n_seeds=2, n_matched=2, n_smoothed=1, timing_repeats=1)
+
+
+def no_time(name, rig, clean, hard, n_repeats, tick):
+    """Instead of the clock."""
+    tick(1.0)
+    return {"1": [2.0], "64": [1.0], "hard_64": [1.5]}
+
+
+def no_association_time(rig, n_repeats, tick):
+    """The same."""
+    tick(1.0)
+    return {"us": [9.0]}
+
+
+@contextmanager
+def small():
+    """Few frames, no clock, and code that nobody edits meanwhile."""
+    short = {name: min(n, 20) for name, n in sequences.N_FRAMES.items()}
+    windows = {name: dict.fromkeys(inner, (10, 20)) for name, inner in sequences.WINDOWS.items()}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sequences, "N_FRAMES", short)
+        patch.setattr(sequences, "WINDOWS", windows)
+        patch.setattr(tracking_bench, "time_estimator", no_time)
+        patch.setattr(tracking_bench, "time_association", no_association_time)
+        patch.setattr(tracking_bench, "fingerprint_of", lambda settings, *modules: "the same code")
+        yield patch
+
+
+@pytest.fixture(scope="module")
+def end_to_end(tmp_path_factory):
+    """The folder of a bench on a few frames of two sequences, and what it said."""
+    out, said = tmp_path_factory.mktemp("bench"), []
+    with small():
+        run(TINY, out, lambda share, label: said.append((share, label)))
+    return out, said
+
+
+def test_every_key_is_written_in_the_shared_form(end_to_end):
+    out, _ = end_to_end
+    results = json.loads((out / "results.json").read_text())
+    assert set(results) >= {"config", "git", "versions", "machine", "seeds", "metrics"}
+    metrics = results["metrics"]
+    for name in ESTIMATORS:
+        assert f"ratio_to_bound.{name}" in metrics
+        assert f"ratio_to_bound_bones.{name}" in metrics
+        for batch in ("1", "64", "hard_64"):
+            assert f"update_us.{name}.{batch}" in metrics
+        for rig in RIGS:
+            assert f"identity_swaps.{rig}.two_workers.{name}" in metrics
+            assert f"mirrored_returns.{rig}.one_camera.{name}" in metrics
+        for rig, _, window in rows():
+            for kind in ("rmse_m", "coverage95", "std_over_rmse", "nees", "facing_wrong"):
+                assert f"{kind}.{rig}.{window}.{name}" in metrics
+    assert "association_us" in metrics
+    assert f"rmse_m.lab.clean.{DLT}" in metrics
+    assert f"default_over.own.four_cameras.{DLT}" in metrics
+    for metric in metrics.values():
+        assert set(metric) == {"value", "low", "high", "unit", "n"}
+        assert np.isfinite([metric["value"], metric["low"], metric["high"]]).all()
+
+
+def test_the_report_is_a_table_and_two_plots(end_to_end):
+    out, _ = end_to_end
+    text = (out / "tracking.md").read_text()
+    for name in (*ESTIMATORS, DLT):
+        assert name in text
+    for plot in ("error_by_views.png", "calibration.png"):
+        assert (out / plot).read_bytes().startswith(b"\x89PNG")
+
+
+def test_progress_ends_at_the_whole(end_to_end):
+    _, said = end_to_end
+    assert sum(share for share, _ in said) == pytest.approx(1.0)
+
+
+def test_a_second_run_makes_only_what_is_missing(end_to_end):
+    out, _ = end_to_end
+    missing = out / "parts" / "lab.clean.paper.json"
+    before = json.loads(missing.read_text())
+    missing.unlink()
+    made = []
+    real = tracking_bench.run_cell
+    with small() as patch:
+        patch.setattr(tracking_bench, "run_cell", lambda *a: made.append(a[0]) or real(*a))
+        run(TINY, out, lambda share, label: None)
+    assert made == ["paper"]
+    assert json.loads(missing.read_text()) == before
+    assert not list(out.rglob("*.draft"))
+
+
+def test_parts_of_other_settings_are_not_used(end_to_end):
+    assert fingerprint_of({"n": 1}, "benchmarks.tracking.cells") != fingerprint_of(
+        {"n": 2}, "benchmarks.tracking.cells"
+    )
+
+
+def test_time_per_update_is_positive():
+    """The clock itself, on a few frames; nothing is said about how fast this machine is."""
+    rig = make_rig("lab")
+    sequences = make_sequences(rig, "one_camera", list(range(64)))
+    shares = []
+    times = time_estimator("triangulation", rig, sequences, sequences, 2, shares.append)
+    assert set(times) == {"1", "64", "hard_64"}
+    assert min(min(values) for values in times.values()) > 0
+    assert sum(shares) == pytest.approx(1.0)
+
+
+def test_sizes_that_cannot_work_are_answered():
+    with pytest.raises(ConfigError, match="n_seeds"):
+        TrackingBenchConfig(n_seeds=0)
+
+
+def test_a_right_covariance_is_found_calibrated():
+    """Errors drawn from the reported Gaussian: 95 % inside, NEES of 1, levels equally filled."""
+    rng = np.random.default_rng(0)
+    factor = rng.normal(size=(3, 3))
+    truth = rng.normal(size=(50, 20, 1, 15, 3))
+    mean = truth + rng.standard_normal(truth.shape) @ factor.T
+    cov = np.broadcast_to(factor @ factor.T, (*truth.shape, 3))
+    sums = tally(truth, mean, cov, np.ones((50, 20, 4, 1, 15), bool))
+    n = np.sum(sums["n"])
+    assert np.sum(sums["inside"]) / n == pytest.approx(0.95, abs=0.01)
+    assert np.sum(sums["nees"]) / n / 3 == pytest.approx(1.0, abs=0.03)
+    assert np.sqrt(np.sum(sums["trace"]) / np.sum(sums["squared"])) == pytest.approx(1.0, abs=0.03)
+    np.testing.assert_allclose(np.sum(sums["levels"], 0) / n, 0.05, atol=0.007)
+    assert CHI2_LEVELS[-1] == pytest.approx(CHI2_95_3D, abs=1e-3)
+
+
+def test_the_association_of_four_people_takes_time():
+    times = time_association(make_rig("site"), 1, lambda share: None)
+    assert min(times["us"]) > 0

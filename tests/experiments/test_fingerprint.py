@@ -1,0 +1,69 @@
+"""A finished part is used again only while everything it depends on is the same."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from hrc_env.experiments.study import fingerprint
+from hrc_env.experiments.study.fingerprint import fingerprint_of, sources_of
+
+SITE = "hrc_env.experiments.site.experiment"
+
+
+def test_settings_and_makers_count():
+    assert fingerprint_of({"n": 1}, SITE) == fingerprint_of({"n": 1}, SITE)
+    assert fingerprint_of({"n": 1}, SITE) != fingerprint_of({"n": 2}, SITE)
+    assert fingerprint_of({"n": 1}, SITE) != fingerprint_of({"n": 1}, "hrc_env.metrics")
+
+
+def test_everything_that_is_imported_counts_and_nothing_else():
+    package = Path(fingerprint.__file__).parents[2]
+    found = {path.relative_to(package).as_posix() for path in sources_of(SITE)}
+    assert {"simulation.py", "core/streams.py", "worker/props.py", "core/records.py"} <= found
+    assert not [name for name in found if name.startswith(("cli/", "experiments/impact"))]
+
+
+def test_a_module_of_somebody_else_is_refused():
+    with pytest.raises(ModuleNotFoundError, match="numpy"):
+        sources_of("numpy")
+
+
+@pytest.fixture
+def copied(tmp_path, monkeypatch):
+    """A small package and its data where the repository's would be."""
+    package = tmp_path / "hrc_env"
+    (package / "room").mkdir(parents=True)
+    (package / "maker.py").write_text("def f():\n    from hrc_env.room import organ\n")
+    (package / "room" / "organ.py").write_text("import numpy\nimport hrc_env.deep\n")
+    (package / "deep.py").write_text("X = 1\n")
+    (package / "other.py").write_text("X = 1\n")
+    assets = tmp_path / "assets" / "workers"
+    assets.mkdir(parents=True)
+    (assets / "worker_1.npz").write_bytes(b"painted")
+    monkeypatch.setattr(fingerprint, "_PACKAGE", package)
+    monkeypatch.setattr(fingerprint, "assets_dir", lambda: tmp_path / "assets")
+    yield tmp_path
+    shutil.rmtree(tmp_path)
+    fingerprint._imports.cache_clear()
+    fingerprint._data.cache_clear()
+
+
+def of_now() -> str:
+    fingerprint._imports.cache_clear()
+    fingerprint._data.cache_clear()
+    return fingerprint_of({}, "hrc_env.maker")
+
+
+def test_a_repainted_worker_is_seen_anew(copied):
+    before = of_now()
+    (copied / "assets" / "workers" / "worker_1.npz").write_bytes(b"repainted")
+    assert of_now() != before
+
+
+def test_deep_imports_are_followed_even_from_inside_a_function(copied):
+    before = of_now()
+    (copied / "hrc_env" / "other.py").write_text("X = 2\n")
+    assert of_now() == before
+    (copied / "hrc_env" / "deep.py").write_text("X = 2\n")
+    assert of_now() != before
