@@ -8,20 +8,20 @@ import pytest
 from hrc_env.experiments.study import fingerprint
 from hrc_env.experiments.study.fingerprint import fingerprint_of, sources_of
 
-SITE = "hrc_env.experiments.site.experiment"
+TRIAL = "hrc_env.experiments.impact.trial.episodes"
 
 
 def test_settings_and_makers_count():
-    assert fingerprint_of({"n": 1}, SITE) == fingerprint_of({"n": 1}, SITE)
-    assert fingerprint_of({"n": 1}, SITE) != fingerprint_of({"n": 2}, SITE)
-    assert fingerprint_of({"n": 1}, SITE) != fingerprint_of({"n": 1}, "hrc_env.metrics")
+    assert fingerprint_of({"n": 1}, TRIAL) == fingerprint_of({"n": 1}, TRIAL)
+    assert fingerprint_of({"n": 1}, TRIAL) != fingerprint_of({"n": 2}, TRIAL)
+    assert fingerprint_of({"n": 1}, TRIAL) != fingerprint_of({"n": 1}, "hrc_env.metrics")
 
 
 def test_everything_that_is_imported_counts_and_nothing_else():
     package = Path(fingerprint.__file__).parents[2]
-    found = {path.relative_to(package).as_posix() for path in sources_of(SITE)}
+    found = {path.relative_to(package).as_posix() for path in sources_of(TRIAL)}
     assert {"simulation.py", "core/streams.py", "worker/props.py", "core/records.py"} <= found
-    assert not [name for name in found if name.startswith(("cli/", "experiments/impact"))]
+    assert not [name for name in found if name.startswith(("cli/", "experiments/lab"))]
 
 
 def test_a_module_of_somebody_else_is_refused():
