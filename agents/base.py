@@ -33,6 +33,8 @@ class Situation:
     control: str
     control_config: ControlConfig
     n_actions: int
+    task: str
+    """The task's id."""
 
 
 def situation(simulation: Simulation) -> Situation:
@@ -44,6 +46,7 @@ def situation(simulation: Simulation) -> Situation:
         control=simulation.control,
         control_config=simulation.config.control,
         n_actions=simulation.n_actions,
+        task=simulation.task.id,
     )
 
 
@@ -63,8 +66,8 @@ def make_agent(name: str, here: Situation, seed: int = 0) -> Agent:
 
     makers: dict[str, Callable[[], Any]] = {
         "random": lambda: random.RandomAgent(here, seed),
-        "scripted": lambda: scripted.ScriptedAgent(here),
-        "scripted_slowed": lambda: scripted.ScriptedAgent(here, scripted.Yielding()),
+        "scripted": lambda: scripted.expert(here),
+        "scripted_slowed": lambda: scripted.expert(here, scripted.Yielding()),
     }
     if name in makers:
         return makers[name]()

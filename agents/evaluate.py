@@ -7,8 +7,10 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from hrc_env.env import HRCReachEnv
-from hrc_env.sb3 import HRCVecEnv
+from hrc_env.env import HRCEnv
+from hrc_env.sb3 import ACHIEVED, FAILED, HRCVecEnv
+from hrc_env.tasks import DEFAULT
+from hrc_env.tasks.task import Task
 
 from .base import Agent, situation
 
@@ -22,7 +24,7 @@ class Score:
 
     episodes: int
     success_rate: float
-    """Goals reached of goals reached or missed."""
+    """Of all attempts (`Task.achieved` and `Task.failed`)."""
     goals_per_minute: float
     contacts_per_episode: float
     """Touches of the true worker; one that lasts counts once."""
@@ -63,7 +65,7 @@ def judged(
         seed: of the first.
         tick: told by how much the share that is done grew.
         kwargs: as of `HRCVecEnv`; with perception="pixels", which has no batched form, as of
-            `HRCReachEnv`.
+            `HRCEnv`.
     """
     if kwargs.get("perception") == "pixels":
         return one_by_one(make, n_episodes, seed, tick, **kwargs)
@@ -91,20 +93,22 @@ def one_by_one(
     **kwargs: Any,
 ) -> list[dict[str, float]]:
     """As `judged`, in the single environment."""
-    env = gymnasium.make("HRCReach-v0", **kwargs)
+    env = gymnasium.make(kwargs.pop("task", DEFAULT), **kwargs)
     inner = env.unwrapped
-    assert isinstance(inner, HRCReachEnv)
+    assert isinstance(inner, HRCEnv)
     try:
         agent, done = make(situation(inner.simulation)), []
         for k in range(n_episodes):
-            done.append(_one(env, agent, seed + k, inner.config.ctrl_dt))
+            done.append(_one(env, agent, seed + k, inner.simulation.task, inner.config.ctrl_dt))
             tick(1 / n_episodes)
         return done
     finally:
         env.close()
 
 
-def _one(env: gymnasium.Env[Any, Any], agent: Agent, seed: int, ctrl_dt: float) -> dict[str, float]:
+def _one(
+    env: gymnasium.Env[Any, Any], agent: Agent, seed: int, task: Task, ctrl_dt: float
+) -> dict[str, float]:
     """Statistics of one episode, by the names that `HRCVecEnv` gives them."""
     observation, info = env.reset(seed=seed)
     rewards, infos, over = [], [], False
@@ -122,8 +126,8 @@ def _one(env: gymnasium.Env[Any, Any], agent: Agent, seed: int, ctrl_dt: float) 
         "cost": float(sum(each["cost"] for each in infos)),
         "cost_steps": float(sum(each["cost_proximity"] for each in infos)),
         "contacts": float((touching & ~np.append(False, touching[:-1])).sum()),
-        "goals_reached": info["task/goals_reached"],
-        "goals_missed": info["task/goals_missed"],
+        ACHIEVED: info[task.achieved],
+        FAILED: info[task.failed],
         "min_separation_m": float(np.min(gaps_m)),
     }
 
@@ -131,7 +135,7 @@ def _one(env: gymnasium.Env[Any, Any], agent: Agent, seed: int, ctrl_dt: float) 
 def summarise(episodes: list[dict[str, float]]) -> Score:
     """The score of finished episodes."""
     column = {name: np.array([each[name] for each in episodes]) for name in episodes[0]}
-    reached, missed = column["goals_reached"].sum(), column["goals_missed"].sum()
+    reached, missed = column[ACHIEVED].sum(), column[FAILED].sum()
     minutes = column["seconds"].sum() / 60
     return Score(
         episodes=len(episodes),

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.control import resolved_rate
+from hrc_env.core.errors import ConfigError
 from hrc_env.observations import split
 
-from .base import Situation
+from .base import Agent, Situation
 
 GAIN_HZ = 4.0
 """Approach speed per distance [1/s]."""
@@ -36,7 +37,7 @@ class Yielding:
         return np.clip((gap_m - self.stop_m) / (self.full_speed_m - self.stop_m), 0.0, 1.0)
 
 
-class ScriptedAgent:
+class Reacher:
     """Resolved-rate reaching, with or without yielding."""
 
     def __init__(self, here: Situation, yielding: Yielding | None = None) -> None:
@@ -67,3 +68,21 @@ class ScriptedAgent:
         qd = resolved_rate(here.chain, q, velocity, here.home_q, here.control_config)
         action = qd / (here.control_config.joint_speed_share * here.chain.velocity_limit_rad_s)
         return action / np.maximum(np.abs(action).max(-1, keepdims=True), 1.0)
+
+
+EXPERTS = {"HRCReach-v0": Reacher}
+"""By task: what solves it without learning."""
+
+
+def expert(here: Situation, yielding: Yielding | None = None) -> Agent:
+    """The scripted agent for a task, with or without yielding.
+
+    Raises:
+        ConfigError: nobody has written one.
+    """
+    if here.task not in EXPERTS:
+        raise ConfigError(
+            f"There is no scripted agent for {here.task}; there is for {', '.join(EXPERTS)}. "
+            "The agent 'random' and checkpoints work with every task."
+        )
+    return EXPERTS[here.task](here, yielding)

@@ -13,7 +13,7 @@ from rich.console import Console
 from hrc_env.cli.kernels import compile_kernels
 from hrc_env.cli.progress import Meter
 from hrc_env.cli.train import Train
-from hrc_env.config import resolve
+from hrc_env.config import settle
 from hrc_env.core.errors import CheckpointError, RenderingError, learner
 from hrc_env.core.mapping import restored
 from hrc_env.core.provenance import provenance
@@ -56,8 +56,8 @@ def run(arguments: Train) -> int:
         return STOPPED
     score = judge(arguments, folder, console)
     _write(folder / "score.json", {**score.as_dict(), "training_s": seconds})
-    proximity = resolve(arguments.keywords()["config"]).reward.proximity
-    title = f"PPO, {arguments.perception}, proximity weight {proximity:g}"
+    config = settle(task=arguments.task, config=arguments.keywords()["config"]).config
+    title = f"PPO, {arguments.perception}, proximity weight {config.reward.proximity:g}"
     plot_curve(curve, folder / "curve.png", title)
     written = "policy.zip, curve.png, score.json"
     if arguments.film and film(folder, arguments, console):
@@ -116,7 +116,7 @@ def train(arguments: Train, folder: Path, console: Console) -> tuple[Curve, floa
     kwargs, settings = arguments.keywords(), ppo.PPOSettings()
     vector = HRCVecEnv(arguments.num_envs, stagger=True, seed=arguments.seed, **kwargs)
     with closing(vector) as env, Interrupt() as interrupt:
-        config = asdict(resolve(kwargs["config"]))
+        config = asdict(env.env.config)
         record = {"arguments": _plain(arguments), "config": config, **provenance()}
         _write(folder / "run.json", record)
         learner, curve = _learner(arguments, folder, env, settings)

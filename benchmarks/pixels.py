@@ -17,7 +17,7 @@ from rich.table import Table
 from agents.base import make_agent, situation
 from hrc_env.cli.progress import track
 from hrc_env.core.results import Metric, write_results
-from hrc_env.env import HRCReachEnv
+from hrc_env.env import HRCEnv
 from hrc_env.motion import generator
 from hrc_env.worker.body import worker_truth
 
@@ -52,7 +52,7 @@ class Notes:
     seconds: list[float]
 
 
-def frames_until_tracked(env: HRCReachEnv, seed: int, limit: int = 5) -> int | None:
+def frames_until_tracked(env: HRCEnv, seed: int, limit: int = 5) -> int | None:
     """Looks until the worker is tracked; the reset's own look is the first."""
     env.reset(seed=seed)
     for frame in range(1, limit + 1):
@@ -62,7 +62,7 @@ def frames_until_tracked(env: HRCReachEnv, seed: int, limit: int = 5) -> int | N
     return None
 
 
-def episode(env: HRCReachEnv, seed: int, notes: Notes) -> None:
+def episode(env: HRCEnv, seed: int, notes: Notes) -> None:
     """Play one episode and note every step."""
     agent = make_agent("scripted_slowed", situation(env.simulation))
     observation, _ = env.reset(seed=seed)
@@ -74,7 +74,7 @@ def episode(env: HRCReachEnv, seed: int, notes: Notes) -> None:
         note(env, notes)
 
 
-def note(env: HRCReachEnv, notes: Notes) -> None:
+def note(env: HRCEnv, notes: Notes) -> None:
     """Errors of the tracked joints, and whether the reported region held them."""
     simulation = env.simulation
     truth = worker_truth(simulation.bodies, generator.current(simulation.motion))
@@ -91,7 +91,7 @@ def note(env: HRCReachEnv, notes: Notes) -> None:
 
 def main(arguments: Arguments) -> None:
     """Measure, print, write."""
-    env = HRCReachEnv(perception=arguments.perception, estimator=arguments.estimator)
+    env = HRCEnv(perception=arguments.perception, estimator=arguments.estimator)
     frames = [
         frames_until_tracked(env, 1000 + k)
         for k in track(range(arguments.resets), description="acquisition")

@@ -14,9 +14,8 @@ from typing import Any
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # where benchmarks/ is
 
 from benchmarks import baselines
-from hrc_env import observations, rewards
-from hrc_env.config import HRCConfig
-from hrc_env.env import HRCReachEnv
+from hrc_env import observations
+from hrc_env.env import HRCEnv
 
 PAGE = Path(__file__).parent / "environment.md"
 WITH_BASELINES = (PAGE.parent.parent / "README.md", PAGE.parent / "learning.md")
@@ -103,31 +102,31 @@ memory has no such form (give its file).
 
 def page() -> str:
     """The page's text."""
-    env = HRCReachEnv(perception="none")
+    env = HRCEnv(perception="none")
     config, size = env.config, env.observation_space.shape
     text = INTRODUCTION.format(
-        doc=inspect.cleandoc(HRCReachEnv.__doc__ or "").splitlines()[0],
+        doc=inspect.cleandoc(HRCEnv.__doc__ or "").splitlines()[0],
         n_joint=env.simulation.n_actions,
         share=config.control.joint_speed_share,
         tool=config.control.tool_speed_mps,
         size=size[0] if size else 0,
         observations=observation_table(env),
-        rewards=reward_table(),
+        rewards=reward_table(env),
         far=observations.FAR_GAP_M,
         proximity=config.cost.proximity_m,
-        config="\n\n".join(config_tables(HRCConfig(), "")),
+        config="\n\n".join(config_tables(env.config, "")),
     )
     env.close()
     return text
 
 
-def observation_table(env: HRCReachEnv) -> str:
+def observation_table(env: HRCEnv) -> str:
     """One row a term."""
     lines = [
         "| entries | name | unit | frame | bound | scale | meaning |",
         "|---|---|---|---|---|---|---|",
     ]
-    for term in observations.TERMS:
+    for term in env.simulation.terms:
         part = env.simulation.layout.slices[term.name]
         entries = f"{part.start}-{part.stop - 1}" if part.stop > part.start else "if asked for"
         lines.append(
@@ -137,10 +136,11 @@ def observation_table(env: HRCReachEnv) -> str:
     return "\n".join(lines)
 
 
-def reward_table() -> str:
+def reward_table(env: HRCEnv) -> str:
     """One row a term."""
     lines = ["| name | meaning |", "|---|---|"]
-    return "\n".join([*lines, *(f"| `{term.name}` | {term.doc} |" for term in rewards.TERMS)])
+    terms = env.simulation.task.reward_terms
+    return "\n".join([*lines, *(f"| `{term.name}` | {term.doc} |" for term in terms)])
 
 
 def config_tables(config: Any, path: str) -> list[str]:

@@ -22,7 +22,7 @@ import numpy as np
 
 from hrc_env.core.batching import copied
 from hrc_env.core.records import Roi
-from hrc_env.env import HRCReachEnv
+from hrc_env.env import HRCEnv
 from hrc_env.geometry.cameras import pinhole, project, projections
 from hrc_env.perception.faults.camera_film import CameraFilm, Shot
 from hrc_env.perception.faults.fault import IMAGE, KINDS, FaultConfig
@@ -53,7 +53,7 @@ def loop() -> None:
 
 def room() -> None:
     """The place."""
-    env = HRCReachEnv(perception="truth")
+    env = HRCEnv(perception="truth")
     env.reset(seed=3)
     for _ in range(60):
         env.step(np.zeros(6))
@@ -66,7 +66,7 @@ def room() -> None:
 
 def cameras() -> None:
     """The laboratory through a pinhole and through the paper's GoPro, in one place."""
-    env = HRCReachEnv(perception="truth", cameras="lab_gopro")
+    env = HRCEnv(perception="truth", cameras="lab_gopro")
     env.reset(seed=3)
     for _ in range(60):
         env.step(np.zeros(6))
@@ -90,7 +90,7 @@ def faults() -> None:
     crops = []
     for kind in (None, *kinds):
         given = [] if kind is None else [FaultConfig(kind, ("camera_1",))]
-        env = HRCReachEnv(perception="truth")
+        env = HRCEnv(perception="truth")
         env.reset(seed=SEED_WALK)
         for _ in range(STEPS_WALK - 1):
             env.step(np.zeros(6))
@@ -116,7 +116,7 @@ def appearance() -> None:
     """The lab and the site as they were built, and in five `varied` looks."""
     for_each = []
     for scene, view in (("lab", "room"), ("site", "camera_1")):
-        env = HRCReachEnv(perception="truth", scene=scene)
+        env = HRCEnv(perception="truth", scene=scene)
         env.reset(seed=SEED_WALK)
         for _ in range(STEPS_WALK):
             env.step(np.zeros(6))
@@ -144,7 +144,7 @@ def clip() -> None:
 
 def site() -> None:
     """The construction site."""
-    env = HRCReachEnv(perception="truth", scene="site", n_workers=3)
+    env = HRCEnv(perception="truth", scene="site", n_workers=3)
     env.reset(seed=3)
     for _ in range(200):
         env.step(np.zeros(6))
@@ -156,7 +156,7 @@ def site() -> None:
 
 def workers() -> None:
     """Three workers of different bodies, near the robot on the site."""
-    env = HRCReachEnv(perception="truth", scene="site", n_workers=3, config={"worker": "any"})
+    env = HRCEnv(perception="truth", scene="site", n_workers=3, config={"worker": "any"})
     env.reset(seed=11)
     for _ in range(160):
         env.step(np.zeros(6))

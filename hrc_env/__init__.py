@@ -1,18 +1,21 @@
 """hrc_env: learn to work beside people whom a robot sees through cameras only.
 
 Importing this package registers the environments; `gymnasium.make("hrc_env:HRCReach-v0")`
-does both. See `hrc_env.env` for the arguments and `hrc_env.config` for everything else.
+does both. See `hrc_env.env` for the arguments, `hrc_env.config` for everything else, and
+`hrc_env.registration` for tasks, estimators and more of your own.
 """
 
-from gymnasium.envs.registration import register
+from hrc_env.registration import (
+    IDS,
+    import_files,
+    register_environment,
+    register_task,
+)
+from hrc_env.tasks import BUILT_IN
 
 __version__ = "0.1.0"
+__all__ = ["IDS", "register_task"]
 
-IDS = ("HRCReach-v0",)
-
-register(
-    id="HRCReach-v0",
-    entry_point="hrc_env.env:HRCReachEnv",
-    vector_entry_point="hrc_env.vector.factory:make_vector",
-    max_episode_steps=250,  # 10 s at 25 Hz
-)
+for _id in BUILT_IN:
+    register_environment(_id)
+import_files()

@@ -3,15 +3,18 @@
 A command's own file is imported when it is called, so that this one answers at once.
 """
 
+import os
 import platform
 import sys
 import textwrap
 from collections.abc import Sequence
 from importlib.metadata import version
+from pathlib import Path
 
 from hrc_env import __version__
 from hrc_env.core.checkout import module_of
-from hrc_env.core.errors import HRCError, unknown
+from hrc_env.core.errors import ConfigError, HRCError, unknown
+from hrc_env.registration import IMPORT, import_files
 
 PROGRAM = "python -m hrc_env"
 COMMANDS: dict[str, tuple[str, str, str]] = {
@@ -83,6 +86,7 @@ def main(words: Sequence[str] | None = None) -> int:
         print(versions())
         return 0
     try:
+        given = _imported(given)
         return _run(given[0], given[1:])
     except HRCError as error:
         from rich.console import Console
@@ -111,7 +115,8 @@ def overview() -> str:
             "",
             *lines,
             "",
-            f"{PROGRAM} COMMAND --help says what a command takes.",
+            f"{PROGRAM} COMMAND --help says what a command takes. Every command takes",
+            "--import FILE, too: a Python file that registers a task, an estimator or more.",
         )
     )
 
@@ -121,6 +126,22 @@ def versions() -> str:
     named = {"hrc_env": __version__, "Python": platform.python_version()}
     named |= {package: version(package) for package in ("mujoco", "gymnasium")}
     return ", ".join(f"{name} {number}" for name, number in named.items())
+
+
+def _imported(words: list[str]) -> list[str]:
+    """The words without `--import FILE`, here or in a process that this one starts imported."""
+    if "--import" not in words:
+        return words
+    at = words.index("--import")
+    if at + 1 == len(words):
+        raise ConfigError("--import wants a Python file, as in --import my_task.py.")
+    known = os.environ.get(IMPORT, "")
+    os.environ[IMPORT] = os.pathsep.join(filter(None, (known, str(Path(words[at + 1]).resolve()))))
+    import_files()
+    rest = _imported(words[:at] + words[at + 2 :])
+    if not rest:
+        raise ConfigError(f"--import goes with a command; {PROGRAM} --help names them.")
+    return rest
 
 
 def _run(name: str, words: list[str]) -> int:

@@ -2,13 +2,14 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import PoseEstimate, RobotState
 from hrc_env.core.skeleton import SEGMENT_RADIUS_M
-from hrc_env.core.typing import Floats, Points3
+from hrc_env.core.typing import Floats
 from hrc_env.geometry.distances import Gap, narrowest_gap
 from hrc_env.geometry.segments import segments
 
@@ -21,10 +22,8 @@ class Belief:
     estimate: PoseEstimate
     gap: Gap
     """(B, W) narrowest place between the robot and each *estimated* body."""
-    goal_world: Points3
-    """(B, 3) [m]."""
-    goal_time_left_s: Floats
-    """(B,)."""
+    task: Any
+    """What the task says to the robot (`Task.view`)."""
     action: Floats
     """(B, A) the last action, in [-1, 1]."""
     ahead: tuple[PoseEstimate, ...] = ()

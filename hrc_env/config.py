@@ -5,7 +5,7 @@
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from hrc_env.control import ControlConfig
-from hrc_env.core.errors import ConfigError
+from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.core.mapping import from_mapping, restored
 from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.geometry.rig_files import read_rig
@@ -26,7 +26,8 @@ from hrc_env.rewards import RewardConfig
 from hrc_env.scene.build import SceneConfig
 from hrc_env.scene.domain_randomization import AppearanceConfig, appearance_called
 from hrc_env.scene.rigs import RIGS
-from hrc_env.tasks.reach import ReachConfig
+from hrc_env.tasks import DEFAULT
+from hrc_env.tasks.task import Task, task_called
 from hrc_env.tracking.ahead import LONGEST_S
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.people.association import AssociationConfig
@@ -65,8 +66,8 @@ class HRCConfig:
     """Which detection is of whom, where there are several workers."""
     control: ControlConfig = field(default_factory=ControlConfig)
     """What an action means."""
-    task: ReachConfig = field(default_factory=ReachConfig)
-    """Goals."""
+    task: Any = None
+    """The task's own settings (`Task.config`); None: its defaults."""
     reward: RewardConfig = field(default_factory=RewardConfig)
     """Weights of the reward's terms."""
     cost: CostConfig = field(default_factory=CostConfig)
@@ -99,27 +100,81 @@ class HRCConfig:
         return round(self.ctrl_dt / self.scene.sim_dt)
 
 
-def resolve(config: "HRCConfig | Mapping[str, Any] | None") -> HRCConfig:
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """Everything that a simulation is made from, whole and checked."""
+
+    task: Task
+    perception: str
+    estimator: str
+    cameras: Sequence[int | str] | None
+    """Which of the scene's cameras are used; None: all."""
+    scene: str
+    n_workers: int | tuple[int, int]
+    control: str
+    config: HRCConfig
+
+
+def settle(
+    *,
+    task: str | Task = DEFAULT,
+    perception: str = "pixels",
+    estimator: str = "particle",
+    scene: str = "lab",
+    n_workers: int | tuple[int, int] = 1,
+    control: str = "joint",
+    config: "HRCConfig | Mapping[str, Any] | None" = None,
+    cameras: "str | Path | Sequence[Any] | np.ndarray | None" = None,
+    **changes: Any,
+) -> Settings:
+    """Settings from the keyword arguments of an environment; see `HRCEnv`.
+
+    Args:
+        changes: people, motions, faults, appearance, folded into the config.
+
+    Raises:
+        ConfigError: an argument that there is not, or a value that cannot be.
+    """
+    chosen = task_called(task)
+    whole = resolve(config, chosen)
+    for name, value in changes.items():
+        if name not in _CHANGES:
+            raise unknown("argument", name, [*_ARGUMENTS, *_CHANGES])
+        whole = whole if value is None else _CHANGES[name](whole, value)
+    whole, used = with_cameras(whole, cameras)
+    return Settings(chosen, perception, estimator, used, scene, n_workers, control, whole)
+
+
+def resolve(config: "HRCConfig | Mapping[str, Any] | None", task: Task) -> HRCConfig:
     """A config from what a user gave: a config, a (nested) mapping of changes, or nothing.
 
     Raises:
-        ConfigError: a field that does not exist, with the nearest that does; a bad value.
+        ConfigError: a field that does not exist, with the nearest that does; a bad value; the
+            settings of another task.
     """
     if config is None:
-        return HRCConfig()
-    if isinstance(config, HRCConfig):
-        return config
-    if not isinstance(config, Mapping):
+        config = HRCConfig()
+    elif isinstance(config, Mapping):
+        said = {name: value for name, value in config.items() if (name, value) != ("task", None)}
+        config = from_mapping(HRCConfig, said, kinds={"task": task.config})
+    elif not isinstance(config, HRCConfig):
         raise ConfigError(
             f"config must be an HRCConfig, a mapping or None, got {type(config).__name__}."
         )
-    return from_mapping(HRCConfig, config)
+    if config.task is None:
+        return replace(config, task=task.config())
+    if not isinstance(config.task, task.config):
+        raise ConfigError(
+            f"config.task must be {task.config.__name__} with {task.id}, "
+            f"got {type(config.task).__name__}."
+        )
+    return config
 
 
 def with_cameras(
     config: HRCConfig, cameras: "str | Path | Sequence[Any] | np.ndarray | None"
 ) -> "tuple[HRCConfig, Sequence[int | str] | None]":
-    """A config with another rig, and which of its cameras are used; see `HRCReachEnv`.
+    """A config with another rig, and which of its cameras are used; see `HRCEnv`.
 
     Raises:
         ConfigError: no rig of that name, no such file, or a mixture of names and cameras.
@@ -163,44 +218,38 @@ def _camera(given: Any, index: int) -> CameraConfig:
     return CameraConfig(f"camera_{index + 1}", (x, y, z))
 
 
-def with_faults(
-    config: HRCConfig, faults: "Sequence[FaultConfig | Mapping[str, Any]] | None"
+def _with_faults(
+    config: HRCConfig, faults: "Sequence[FaultConfig | Mapping[str, Any]]"
 ) -> HRCConfig:
-    """A config with these faults of cameras instead of its own; None for those it has.
+    """A config with these faults of cameras.
 
     Raises:
         ConfigError: something else than a list of faults or mappings, or a fault that cannot be.
     """
-    if faults is None:
-        return config
     if isinstance(faults, FaultConfig | Mapping | str) or not isinstance(faults, Sequence):
         raise ConfigError(f"faults must be a list of FaultConfigs or mappings, got {faults!r}.")
     return replace(config, faults=restored(tuple[FaultConfig, ...], list(faults), "faults"))
 
 
-def with_appearance(
-    config: HRCConfig, appearance: "str | AppearanceConfig | Mapping[str, Any] | None"
+def _with_appearance(
+    config: HRCConfig, appearance: "str | AppearanceConfig | Mapping[str, Any]"
 ) -> HRCConfig:
-    """A config with another appearance: by name, settings or a mapping; None for its own.
+    """A config with another appearance: by name, settings or a mapping.
 
     Raises:
         ConfigError: a name or a field that there is not, a value that cannot be.
     """
-    if appearance is None:
-        return config
     if isinstance(appearance, Mapping):
         appearance = from_mapping(AppearanceConfig, appearance, "appearance.")
     return replace(config, appearance=appearance_called(appearance))
 
 
-def with_motions(config: HRCConfig, motions: "Sequence[str | Path | Clip] | None") -> HRCConfig:
-    """A config whose workers play these clips, too; None for those it has.
+def _with_motions(config: HRCConfig, motions: "Sequence[str | Path | Clip]") -> HRCConfig:
+    """A config whose workers play these clips, too.
 
     Raises:
         ConfigError: something else than paths and clips.
     """
-    if motions is None:
-        return config
     if isinstance(motions, str | Path | Clip):
         motions = (motions,)
     if not isinstance(motions, Sequence):
@@ -209,17 +258,13 @@ def with_motions(config: HRCConfig, motions: "Sequence[str | Path | Clip] | None
     return replace(config, motion=replace(config.motion, motions=given))
 
 
-def with_people(
-    config: HRCConfig, people: "str | PeopleConfig | Mapping[str, Any] | None"
-) -> HRCConfig:
-    """A config with other people: by name, settings or a mapping; None for those it has.
+def _with_people(config: HRCConfig, people: "str | PeopleConfig | Mapping[str, Any]") -> HRCConfig:
+    """A config with other people: by name, settings or a mapping.
 
     Raises:
         ConfigError: a name of no preset, with those that there are; a field that there is not, a
             value that cannot be.
     """
-    if people is None:
-        return config
     if isinstance(people, Mapping):
         people = from_mapping(PeopleConfig, people, "people.")
     elif isinstance(people, str):
@@ -230,3 +275,14 @@ def with_people(
             f"of its fields, got {people!r}."
         )
     return replace(config, motion=replace(config.motion, people=people))
+
+
+_CHANGES: dict[str, Callable[[HRCConfig, Any], HRCConfig]] = {
+    "people": _with_people,
+    "motions": _with_motions,
+    "faults": _with_faults,
+    "appearance": _with_appearance,
+}
+_ARGUMENTS = (
+    "task", "perception", "estimator", "scene", "n_workers", "control", "config", "cameras",
+)  # fmt: skip

@@ -16,15 +16,7 @@ from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
 from hrc_env import observations
-from hrc_env.config import (
-    HRCConfig,
-    resolve,
-    with_appearance,
-    with_cameras,
-    with_faults,
-    with_motions,
-    with_people,
-)
+from hrc_env.config import HRCConfig, settle
 from hrc_env.core.errors import ConfigError, unknown, whole
 from hrc_env.core.mapping import plain
 from hrc_env.core.stateful import Stateful
@@ -35,6 +27,8 @@ from hrc_env.render.views import PICTURE_SIZE, Views, picture_size
 from hrc_env.rewards import RewardConfig
 from hrc_env.scene.domain_randomization import AppearanceConfig
 from hrc_env.simulation import Simulation, checked_action
+from hrc_env.tasks import DEFAULT
+from hrc_env.tasks.task import Task
 
 RENDER_MODES = ("rgb_array", "depth_array")
 RESET_OPTIONS = ("steps_left",)
@@ -57,12 +51,13 @@ class PlainSpec:
         self._spec = spec and replace(spec, kwargs=plain(spec.kwargs))
 
 
-class HRCReachEnv(  # type: ignore[override]  # a property is `spec`, too
+class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
     PlainSpec, Stateful, gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]
 ):
-    """A robot arm reaches for goals beside a worker whom it knows through cameras only.
+    """A robot works beside people whom it knows through cameras only.
 
     Args:
+        task: what it has to do: an id ("HRCReach-v0") or a `Task` (docs/bring_your_own.md).
         perception: "pixels" (rendered images through MediaPipe Pose), "keypoints" (an
             emulator of that), "truth" (the worker as they are) or "none".
         estimator: "particle" (default), "kalman" (one Gaussian on the body's tree), "paper"
@@ -97,6 +92,7 @@ class HRCReachEnv(  # type: ignore[override]  # a property is `spec`, too
 
     def __init__(
         self,
+        task: str | Task = DEFAULT,
         perception: str = "pixels",
         estimator: str = "particle",
         cameras: str | Path | Sequence[Any] | NDArray[Any] | None = None,
@@ -114,13 +110,14 @@ class HRCReachEnv(  # type: ignore[override]  # a property is `spec`, too
     ) -> None:
         check_render_mode(render_mode)
         self._size = picture_size(width, height)
-        given = with_motions(with_people(resolve(config), people), motions)
-        given = with_appearance(given, appearance)
-        self.config, used = with_cameras(with_faults(given, faults), cameras)
         self.render_mode = render_mode
-        self.simulation = Simulation(
-            1, perception, estimator, used, scene, n_workers, control, self.config
-        )
+        settings = settle(
+            task=task, perception=perception, estimator=estimator, cameras=cameras, scene=scene,
+            n_workers=n_workers, people=people, motions=motions, faults=faults,
+            appearance=appearance, control=control, config=config,
+        )  # fmt: skip
+        self.config = settings.config
+        self.simulation = Simulation(1, settings)
         self.views = Views(self.simulation)
         self.observation_space, self.action_space = spaces(self.simulation)
         self.metadata = {**self.metadata, "render_fps": round(1 / self.config.ctrl_dt)}

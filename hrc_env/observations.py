@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.belief import Belief, standard_deviation_m
+from hrc_env.core.errors import check_shape
 from hrc_env.core.kernels import kernel
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats
@@ -49,21 +50,15 @@ class ObservationTerm:
     """Belief -> (B, ...), flattened per environment; not asked where it has no entries."""
 
 
-def _goal_direction(now: Belief) -> Floats:
-    offset = now.goal_world - now.robot.tool_world
-    _shorten(offset, 0.05)
-    return offset
-
-
 def _nearest_direction(now: Belief) -> Floats:
     direction = (now.gap.point_b_world - now.gap.point_a_world).reshape(-1, 3)
-    _shorten(direction, 1e-3)
+    shorten(direction, 1e-3)
     near = now.gap.distance_m < FAR_GAP_M
     return np.where(near.reshape(-1, 1), direction, 0.0)
 
 
 @kernel
-def _shorten(vectors: Floats, softening: float) -> None:
+def shorten(vectors: Floats, softening: float) -> None:
     """Divide vectors (n, 3) by their length plus a little: unit vectors, but 0 stays 0."""
     for k in range(len(vectors)):
         x, y, z = vectors[k]
@@ -83,7 +78,7 @@ def _std_ahead(now: Belief) -> Floats:
     return np.stack([standard_deviation_m(later) for later in now.ahead], axis=2)
 
 
-TERMS: tuple[ObservationTerm, ...] = (
+ROBOT_TERMS: tuple[ObservationTerm, ...] = (
     ObservationTerm(
         "joint_angle_sin", lambda of: of.arm_joints, "-", "base", 1.0, 1.0,
         "Sine of each arm joint's angle.",
@@ -104,21 +99,10 @@ TERMS: tuple[ObservationTerm, ...] = (
         "Position of the tool point.",
         lambda now: now.robot.tool_world,
     ),
-    ObservationTerm(
-        "goal_from_tool", lambda of: 3, "m", "world", 3.0, 0.5,
-        "From the tool point to the goal.",
-        lambda now: now.goal_world - now.robot.tool_world,
-    ),
-    ObservationTerm(
-        "goal_direction", lambda of: 3, "-", "world", 1.0, 1.0,
-        "The same, divided by its length plus 5 cm.",
-        _goal_direction,
-    ),
-    ObservationTerm(
-        "goal_time_left", lambda of: 1, "s", "-", 10.0, 4.0,
-        "Time until the goal is missed.",
-        lambda now: now.goal_time_left_s,
-    ),
+)  # fmt: skip
+"""The robot's own state, which opens the observation."""
+
+SHARED_TERMS: tuple[ObservationTerm, ...] = (
     ObservationTerm(
         "last_action", lambda of: of.actions, "-", "-", 1.0, 1.0,
         "The action of the previous step.",
@@ -172,6 +156,12 @@ TERMS: tuple[ObservationTerm, ...] = (
         _std_ahead,
     ),
 )  # fmt: skip
+"""What closes it: the last action, and the workers as they are estimated."""
+
+
+def terms_of(task_terms: tuple[ObservationTerm, ...]) -> tuple[ObservationTerm, ...]:
+    """All terms of a task's observation, in their order: the robot, the task, the workers."""
+    return (*ROBOT_TERMS, *task_terms, *SHARED_TERMS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,7 +169,7 @@ class ObservationLayout:
     """Which entries of the flat observation belong to which term."""
 
     terms: tuple[int, ...]
-    """Indices into `TERMS` of those that have entries."""
+    """Which of all terms have entries, in their order."""
     slices: dict[str, slice]
     """Of every term."""
     low: NDArray[np.float32]
@@ -188,36 +178,54 @@ class ObservationLayout:
     """(n,) what one unit of each entry stands for, in the term's unit."""
 
 
-def layout(of: Sizes) -> ObservationLayout:
-    """The layout for an arm, an action space, a number of workers and of times ahead."""
+def layout(terms: tuple[ObservationTerm, ...], of: Sizes) -> ObservationLayout:
+    """The layout of terms for an arm, an action space, a number of workers and of times ahead."""
     slices: dict[str, slice] = {}
     high, scale, start = [], [], 0
-    for term in TERMS:
+    for term in terms:
         size = term.size(of)
         slices[term.name] = slice(start, start + size)
         high.append(np.full(size, term.bound / term.scale))
         scale.append(np.full(size, term.scale))
         start += size
     bound = np.concatenate(high).astype(np.float32)
-    terms = tuple(k for k, term in enumerate(TERMS) if term.size(of))
-    return ObservationLayout(terms, slices, -bound, bound, np.concatenate(scale))
+    present = tuple(k for k, term in enumerate(terms) if term.size(of))
+    return ObservationLayout(present, slices, -bound, bound, np.concatenate(scale))
 
 
-def observe(now: Belief, where: ObservationLayout) -> NDArray[np.float32]:
+def observe(
+    now: Belief, where: ObservationLayout, terms: tuple[ObservationTerm, ...]
+) -> NDArray[np.float32]:
     """(B, n) flat observations; cast to float32 once, here.
 
+    Args:
+        now: what is believed.
+        where: the layout of
+        terms: all that the observation is made of.
+
     Raises:
+        ConfigError: a term has another number of entries than it says.
         FloatingPointError: a term is not a number; a fault of the code, never of a camera.
     """
-    batch = len(now.goal_world)
-    physical = np.concatenate(
-        [TERMS[k].function(now).reshape(batch, -1) for k in where.terms], axis=1
-    )
+    batch = len(now.action)
+    present = [terms[k] for k in where.terms]
+    parts = [term.function(now).reshape(batch, -1) for term in present]
+    physical = np.concatenate(parts, axis=1)
+    if physical.shape[1] != len(where.scale):
+        _refuse_sizes(present, parts, where)
     observation = np.empty(physical.shape, np.float32)
     if not _scale(physical, where.scale, where.low, where.high, observation):
         names = [name for name, part in where.slices.items() if np.isnan(physical[:, part]).any()]
         raise FloatingPointError(f"Observation terms that are not a number: {', '.join(names)}.")
     return observation
+
+
+def _refuse_sizes(
+    terms: list[ObservationTerm], parts: list[Floats], where: ObservationLayout
+) -> None:
+    for term, part in zip(terms, parts, strict=True):
+        size = where.slices[term.name].stop - where.slices[term.name].start
+        check_shape(f"observation term {term.name!r}", part.shape[1:], (size,), "its `size`")
 
 
 @kernel

@@ -1,25 +1,21 @@
 """What the robot is rewarded for: one declaration per term. Terms read the estimate only."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from hrc_env.belief import Belief
-from hrc_env.core.errors import ConfigError
+from hrc_env.core.errors import ConfigError, check_shape
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
-from hrc_env.tasks.reach import ReachProgress
 
 
 @dataclass(frozen=True, slots=True)
 class RewardConfig:
-    """Weights of the terms; the reward of a step is their sum."""
+    """Weights of the terms that every task shares; a task's own are in its settings."""
 
-    progress_per_m: float = 10.0
-    """For every metre that the tool comes nearer to its goal."""
-    goal: float = 5.0
-    """For reaching a goal."""
     effort: float = 0.02
     """Taken off for the mean squared action."""
     smoothness: float = 0.02
@@ -42,8 +38,9 @@ class RewardTerm:
 
     name: str
     doc: str
-    function: Callable[[Belief, ReachProgress, Floats, RewardConfig], Floats]
-    """(believed, progress, previous action (B, A), weights) -> (B,)."""
+    function: Callable[[Belief, Any, Floats, Any], Floats]
+    """(belief, the task's progress, previous action (B, A), weights) -> (B,). The weights are a
+    `RewardConfig`; those of a task's term are the task's settings."""
 
 
 def closeness(gap_m: Floats, reach_m: float) -> Floats:
@@ -63,23 +60,13 @@ def _mean_square(vectors: Floats) -> Floats:
     return mean
 
 
-def _proximity(now: Belief, step: ReachProgress, previous: Floats, config: RewardConfig) -> Floats:
+def _proximity(now: Belief, step: Any, previous: Floats, config: RewardConfig) -> Floats:
     nearest_m = np.minimum.reduce(now.gap.distance_m, axis=-1, initial=np.inf)
     penalty: Floats = -config.proximity * closeness(nearest_m, config.proximity_reach_m)
     return penalty
 
 
-TERMS: tuple[RewardTerm, ...] = (
-    RewardTerm(
-        "progress",
-        "Metres that the tool came nearer to its goal, times `progress_per_m`.",
-        lambda now, step, previous, config: config.progress_per_m * step.progress_m,
-    ),
-    RewardTerm(
-        "goal",
-        "`goal` in the step in which a goal is reached.",
-        lambda now, step, previous, config: np.multiply(config.goal, step.reached),
-    ),
+SHARED_TERMS: tuple[RewardTerm, ...] = (
     RewardTerm(
         "effort",
         "Minus `effort` times the mean squared action.",
@@ -101,17 +88,24 @@ TERMS: tuple[RewardTerm, ...] = (
 )
 
 
-def reward(
-    now: Belief, step: ReachProgress, previous_action: Floats, config: RewardConfig
-) -> tuple[Floats, dict[str, Floats]]:
-    """The reward (B,) and its terms by name.
+def evaluated(
+    terms: tuple[RewardTerm, ...], now: Belief, step: Any, previous_action: Floats, weights: Any
+) -> dict[str, Floats]:
+    """The value (B,) of each of these terms by its name."""
+    return {term.name: term.function(now, step, previous_action, weights) for term in terms}
+
+
+def total(terms: Mapping[str, Floats], batch: int) -> Floats:
+    """The reward (B,): the sum of its terms.
 
     Raises:
+        ConfigError: a term has another shape.
         FloatingPointError: a term is not finite; a fault of the code, never of a camera.
     """
-    terms = {term.name: term.function(now, step, previous_action, config) for term in TERMS}
-    total: Floats = sum(terms.values(), np.zeros(len(now.goal_world)))
-    if not np.isfinite(total).all():
+    for name, value in terms.items():
+        check_shape(f"reward term {name!r}", np.shape(value), (batch,), "a value an environment")
+    reward: Floats = sum(terms.values(), np.zeros(batch))
+    if not np.isfinite(reward).all():
         wrong = [name for name, value in terms.items() if not np.isfinite(value).all()]
         raise FloatingPointError(f"Reward terms that are not finite: {', '.join(wrong)}.")
-    return total, terms
+    return reward

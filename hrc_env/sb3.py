@@ -23,16 +23,18 @@ with learner():
 
 EPISODE_SUMS = ("cost", "cost_proximity", "cost_contact")
 """Infos whose sums over an episode are kept."""
+ACHIEVED, FAILED = "goals_reached", "goals_missed"
+"""What an episode's statistics call the attempts of every task (`Task.achieved`, `Task.failed`)."""
 
 
 class HRCVecEnv(VecEnv):
     """An `HRCVectorEnv` as SB3 expects environments, with episode statistics.
 
-    Environment k of `seed(s)` and then `reset()` is `HRCReach-v0` after `reset(seed=s + k)`;
-    what follows the end of an episode continues its random stream. The info of a step holds its
-    "cost", of which `costs` is the array, and nothing else but where an episode ended: there it is
-    the whole, with what SB3 reads ("terminal_observation", "TimeLimit.truncated") and the
-    episode's statistics ("episode").
+    Environment k of `seed(s)` and then `reset()` is the single environment after
+    `reset(seed=s + k)`; what follows the end of an episode continues its random stream. The info
+    of a step holds its "cost", of which `costs` is the array, and nothing else but where an
+    episode ended: there it is the whole, with what SB3 reads ("terminal_observation",
+    "TimeLimit.truncated") and the episode's statistics ("episode").
 
     Args:
         num_envs: how many.
@@ -144,6 +146,7 @@ class HRCVecEnv(VecEnv):
 
     def _episode(self, b: int, info: Mapping[str, Any]) -> dict[str, float]:
         """Statistics of an episode under the names of SB3's Monitor, and ours."""
+        task = self.simulation.task
         return {
             "r": float(self._sums["reward"][b]),
             "l": int(self._steps[b]),
@@ -152,8 +155,8 @@ class HRCVecEnv(VecEnv):
             "cost": float(self._sums["cost"][b]),
             "cost_steps": float(self._sums["cost_proximity"][b]),
             "contacts": float(self._sums["contacts"][b]),
-            "goals_reached": info["task/goals_reached"],
-            "goals_missed": info["task/goals_missed"],
+            ACHIEVED: info[task.achieved],
+            FAILED: info[task.failed],
             "min_separation_m": float(self._nearest_m[b]),
         }
 

@@ -1,6 +1,6 @@
 """The closed loop for a batch of environments: act, move, see, believe, judge.
 
-`HRCReachEnv` is a simulation of one. A result of environment b depends on its own random
+`HRCEnv` is a simulation of one. A result of environment b depends on its own random
 streams only, never on the size of the batch.
 """
 
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from hrc_env import metrics, observations, rewards
 from hrc_env.belief import Belief, estimated_gap
-from hrc_env.config import HRCConfig
+from hrc_env.config import Settings
 from hrc_env.control import joint_command, n_actions
 from hrc_env.core.batching import picked, rows, write_rows
 from hrc_env.core.errors import ConfigError, check_shape
@@ -21,7 +21,7 @@ from hrc_env.core.kernels import ahead
 from hrc_env.core.records import PoseEstimate, RobotState, WorkerMotion, WorkerTruth
 from hrc_env.core.stateful import State, Stateful
 from hrc_env.core.streams import children
-from hrc_env.core.typing import Floats, Ints
+from hrc_env.core.typing import Floats, Ints, Points3
 from hrc_env.geometry import chains
 from hrc_env.motion import generator
 from hrc_env.motion.workers import Crew, bodies_of, worker_counts
@@ -32,7 +32,7 @@ from hrc_env.scene.build import build
 from hrc_env.scene.physics import Physics
 from hrc_env.scene.rigs import findings
 from hrc_env.step import Info, StepResult, cost_info, no_cost, rows_of, tracking_info
-from hrc_env.tasks import reach
+from hrc_env.tasks.task import World
 from hrc_env.tracking import given
 from hrc_env.tracking.miscalibration import MiscalibrationFlags
 from hrc_env.worker.body import pool, stack, worker_capsules, worker_truth
@@ -63,54 +63,50 @@ N_STREAMS = len(fields(Streams))
 
 
 class Simulation(Stateful):
-    """`batch` environments that step together; arguments as of `HRCReachEnv`."""
+    """`batch` environments of the same settings that step together."""
 
     CHANGES = (
-        "physics", "senses", "motion", "task", "streams", "action", "episode_cost", "gap_m",
+        "physics", "senses", "motion", "task_state", "streams", "action", "episode_cost", "gap_m",
         "estimate", "ahead", "worn", "reward_weights",
     )  # fmt: skip
 
-    def __init__(
-        self,
-        batch: int,
-        perception: str,
-        estimator: str,
-        cameras: Sequence[int | str] | None,
-        scene: str,
-        n_workers: int | tuple[int, int],
-        control: str,
-        config: HRCConfig,
-    ) -> None:
+    def __init__(self, batch: int, settings: Settings) -> None:
+        config, perception, scene = settings.config, settings.perception, settings.scene
         ahead.ensure(perception)
-        self.batch, self.config, self.control = batch, config, control
+        self.batch, self.config, self.control = batch, config, settings.control
         self.perception, self.reward_weights = perception, config.reward
+        self.task = settings.task
         self.bodies = stack(pool(config.worker))
-        fewest, most = worker_counts(n_workers)
-        empty = build(config.scene, scene, 0, self.bodies.names, cameras)
+        fewest, most = worker_counts(settings.n_workers)
+        empty = build(config.scene, scene, 0, self.bodies.names, settings.cameras)
         self.motion = generator.make_state(
             batch, most, self.bodies, config.motion, empty.grounds, fewest
         )  # first, as it knows how many workers there is room for
-        self.scene = build(config.scene, scene, most, self.bodies.names, cameras)
+        self.scene = build(config.scene, scene, most, self.bodies.names, settings.cameras)
         if perception in CAMERA_LEVELS:
             for finding in findings(self.scene):
                 warnings.warn(finding, stacklevel=3)
         self.settings = {
-            "batch": batch, "perception": perception, "estimator": estimator, "scene": scene,
+            "batch": batch, "task": settings.task.id, "perception": perception,
+            "estimator": settings.estimator, "scene": scene,
             "cameras": tuple(camera.name for camera in self.scene.cameras),
-            "n_workers": (fewest, most) if fewest < most else most, "control": control,
+            "n_workers": (fewest, most) if fewest < most else most, "control": settings.control,
             "config": config,
         }  # fmt: skip
         self.chain = self.scene.chain
         spread = config.start_spread_rad
         check_shape("start_spread_rad", (len(spread),), (self.chain.n_joints,), "one a joint")
-        self.n_actions = n_actions(control, self.chain)
+        self.n_actions = n_actions(settings.control, self.chain)
         self.layout = observations.layout(
-            observations.Sizes(len(self.scene.home_q), self.n_actions, most, len(config.horizons_s))
+            self.terms,
+            observations.Sizes(
+                len(self.scene.home_q), self.n_actions, most, len(config.horizons_s)
+            ),
         )
         self.physics = Physics(self.scene, batch)
-        self.senses = make_senses(perception, estimator, self.scene, batch, config)
+        self.senses = make_senses(perception, settings.estimator, self.scene, batch, config)
         self.worn = np.full(batch, None, object)
-        self.task = reach.make_state(batch)
+        self.task_state = self.task.init(batch)
         self._everyone = np.arange(batch)
         self.action = np.zeros((batch, self.n_actions))
         self.episode_cost = np.zeros(batch)
@@ -134,13 +130,13 @@ class Simulation(Stateful):
         self.physics.reset(ids, self._starting_angles(ids), self.motion.body[ids])
         self.action[ids], self.episode_cost[ids], self.gap_m[ids] = 0.0, 0.0, 0.0
         robot = chains.robot_state(self.chain, self.physics.q[ids], self.physics.qd[ids])
-        reach.reset(self.task, ids, self.streams.task, robot.tool_world, self.config.task)
+        self.task.reset(self.task_state, ids, self.streams.task, World(robot), self.config.task)
         self.senses.reset(ids, self.streams.sensor, self.streams.tracker)
         motion = generator.current(self.motion, ids)
         truth = worker_truth(self.bodies, motion)
         estimate, ahead = self._sense(ids, motion, truth)
         believed = self._believed(ids, robot, estimate, ahead)
-        observation = observations.observe(believed, self.layout)
+        observation = observations.observe(believed, self.layout, self.terms)
         crew = rows(self.crew, ids)
         info = {
             **no_cost(len(ids)),
@@ -168,11 +164,17 @@ class Simulation(Stateful):
         robot, arm = chains.robot_along(self.chain, q_path, self.physics.qd)
         seen_world = robot.capsules_world[:, WATCHED_CAPSULES, 1]
         generator.watch(self.motion, seen_world, motion, config.ctrl_dt)
-        progress = reach.advance(
-            self.task, streams.task, robot.tool_world, config.ctrl_dt, config.task
+        progress = self.task.advance(
+            self.task_state, streams.task, World(robot), config.ctrl_dt, config.task
         )
         believed = self._believed(self._everyone, robot, estimate, ahead)
-        reward, terms = rewards.reward(believed, progress, previous, self.reward_weights)
+        terms = {
+            **rewards.evaluated(self.task.rewards, believed, progress, previous, config.task),
+            **rewards.evaluated(
+                rewards.SHARED_TERMS, believed, progress, previous, self.reward_weights
+            ),
+        }
+        reward = rewards.total(terms, self.batch)
 
         workers = worker_capsules(self.bodies, path, motion.body)
         cost = metrics.cost(
@@ -188,7 +190,7 @@ class Simulation(Stateful):
             **self._tally(),
         }
         terminated = (cost.contact > 0) & config.cost.contact_terminates
-        observation = observations.observe(believed, self.layout)
+        observation = observations.observe(believed, self.layout, self.terms)
         suspects = self._suspects(self._everyone)
         return StepResult(observation, reward, terminated, info, crew, suspects)
 
@@ -228,6 +230,11 @@ class Simulation(Stateful):
         return np.array(angles).reshape(len(ids), -1)
 
     @property
+    def terms(self) -> tuple[observations.ObservationTerm, ...]:
+        """Of the observation, in their order."""
+        return self.task.observation_terms
+
+    @property
     def crew(self) -> Crew:
         """Who is there now."""
         return Crew(generator.activity(self.motion), self.worn)
@@ -237,6 +244,11 @@ class Simulation(Stateful):
         """What every robot believes now."""
         robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
         return self._believed(self._everyone, robot, self.estimate, self.ahead)
+
+    def markers(self, b: int) -> Points3:
+        """(M, 3) what the task of environment `b` has to show [m]."""
+        view = self.task.view(self.task_state, np.array([b]), self.config.task)
+        return self.task.markers(view)[0]
 
     def _sense(
         self, ids: Ints, motion: WorkerMotion, truth: WorkerTruth
@@ -265,8 +277,7 @@ class Simulation(Stateful):
             robot=robot,
             estimate=estimate,
             gap=estimated_gap(robot, estimate),
-            goal_world=self.task.goal_world[ids],
-            goal_time_left_s=self.config.task.time_limit_s - self.task.goal_age_s[ids],
+            task=self.task.view(self.task_state, ids, self.config.task),
             action=self.action[ids],
             ahead=ahead,
         )
@@ -279,12 +290,7 @@ class Simulation(Stateful):
 
     def _tally(self) -> Info:
         """What the episode has come to so far."""
-        return {
-            "episode_cost": self.episode_cost.copy(),
-            "task/goals_reached": self.task.n_reached.astype(float),
-            "task/goals_missed": self.task.n_missed.astype(float),
-            "is_success": reach.succeeded(self.task).astype(float),
-        }
+        return {"episode_cost": self.episode_cost.copy(), **self.task.info(self.task_state)}
 
 
 def checked_action(action: ArrayLike, shape: tuple[int, ...]) -> Floats:

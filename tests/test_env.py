@@ -13,7 +13,7 @@ import hrc_env  # registers the ids
 from hrc_env.config import HRCConfig
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Keypoints
-from hrc_env.env import HRCReachEnv
+from hrc_env.env import HRCEnv
 from hrc_env.pipeline.levels import LEVELS
 from hrc_env.rewards import RewardConfig
 from hrc_env.scene.rig import CameraConfig
@@ -48,7 +48,7 @@ def same(a, b) -> bool:
 
 @pytest.mark.parametrize("level", LEVELS)
 def test_both_checkers_have_nothing_to_say(level):
-    env = HRCReachEnv(perception=level, render_mode="rgb_array" if level == "truth" else None)
+    env = HRCEnv(perception=level, render_mode="rgb_array" if level == "truth" else None)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check_env_for_sb3(env)
@@ -82,7 +82,7 @@ def test_a_reset_without_a_seed_goes_on_with_the_stream():
     ("level", "n_steps"), [("pixels", 3), ("keypoints", 20), ("truth", 20), ("none", 20)]
 )
 def test_pickled_in_the_middle_of_an_episode_it_goes_on_the_same(level, n_steps):
-    env = HRCReachEnv(perception=level)
+    env = HRCEnv(perception=level)
     roll(env, n_steps)
     twin = pickle.loads(pickle.dumps(env))
     rng = np.random.default_rng(5)
@@ -151,7 +151,7 @@ def test_observations_stay_inside_their_space_and_are_fresh_copies():
 
 @pytest.mark.parametrize("level", ["truth", "keypoints"])
 def test_the_site_is_a_scene_like_the_laboratory(level):
-    env = HRCReachEnv(scene="site", perception=level)
+    env = HRCEnv(scene="site", perception=level)
     env.reset(seed=5)
     errors_m = [env.step(np.zeros(6))[4]["tracking/mpjpe_m"] for _ in range(30)]
     assert np.median(errors_m) < 0.08
@@ -166,7 +166,7 @@ def test_nobody_there_and_tool_control():
 
 
 def test_without_an_estimate_the_prior_is_observed_at_its_bounds():
-    env = HRCReachEnv(perception="none")
+    env = HRCEnv(perception="none")
     observation, info = env.reset(seed=0)
     terms = env.split_observation(observation)
     assert terms["worker_tracked"] == [0.0]
@@ -191,7 +191,7 @@ def looking_at_the_ceiling() -> dict:
 @pytest.mark.parametrize(("level", "n_steps"), [("keypoints", 60), ("pixels", 2)])
 def test_a_worker_out_of_every_view_is_data(level, n_steps):
     """Never acquired, never an exception: the prior, and the episode goes on."""
-    env = HRCReachEnv(perception=level, config=looking_at_the_ceiling())
+    env = HRCEnv(perception=level, config=looking_at_the_ceiling())
     for observation, reward, info in roll(env, n_steps):
         assert info["tracking/lost"] == 1.0
         assert "tracking/mpjpe_m" not in info
@@ -202,7 +202,7 @@ def test_a_worker_out_of_every_view_is_data(level, n_steps):
 
 def test_a_worker_who_leaves_the_views_is_lost_with_growing_doubt():
     """Twenty steps with four cameras, then none: deviation and age grow until the track ends."""
-    env = HRCReachEnv(perception="keypoints")
+    env = HRCEnv(perception="keypoints")
     roll(env, 20)
     hide_everything(env)
     stds, lost = [], []
@@ -215,7 +215,7 @@ def test_a_worker_who_leaves_the_views_is_lost_with_growing_doubt():
     assert lost[-1] == 1.0
 
 
-def hide_everything(env: HRCReachEnv) -> None:
+def hide_everything(env: HRCEnv) -> None:
     """From now on the detector finds nobody."""
     senses = env.simulation.senses
     blank = senses.keypoints
@@ -261,7 +261,7 @@ def test_steps_left_are_no_more_than_the_time_limit_and_go_with_a_state():
     env = make(perception="none", n_workers=0, max_episode_steps=4)
     env.reset(seed=0, options={"steps_left": 200})
     assert ends(env)[:4] == [False, False, False, True]
-    bare = HRCReachEnv(perception="none", n_workers=0)
+    bare = HRCEnv(perception="none", n_workers=0)
     bare.reset(seed=0, options={"steps_left": 3})
     state = bare.get_state()
     assert ends(bare)[:3] == [False, False, True]
@@ -297,11 +297,11 @@ def test_a_config_survives_the_spec(config):
 @pytest.mark.parametrize("n_workers", [12, 36, 10**9, (0, 36)])
 def test_more_workers_than_there_is_room_for_are_refused_with_how_many_fit(n_workers):
     with pytest.raises(ConfigError, match="no more than 11 fit on these grounds"):
-        HRCReachEnv(perception="none", n_workers=n_workers)
+        HRCEnv(perception="none", n_workers=n_workers)
 
 
 def test_a_large_site_has_room_and_memory_for_many_workers():
-    env = HRCReachEnv(perception="none", scene="site", n_workers=40)
+    env = HRCEnv(perception="none", scene="site", n_workers=40)
     env.reset(seed=0)
     assert np.isfinite(env.step(np.ones(6))[0]).all()
 
@@ -346,7 +346,7 @@ def test_a_large_site_has_room_and_memory_for_many_workers():
 )
 def test_bad_arguments_are_answered_with_the_valid_ones(kwargs, said):
     with pytest.raises(ConfigError, match=said):
-        HRCReachEnv(**{"perception": "truth", **kwargs})
+        HRCEnv(**{"perception": "truth", **kwargs})
 
 
 @pytest.mark.parametrize(
@@ -359,7 +359,7 @@ def test_bad_arguments_are_answered_with_the_valid_ones(kwargs, said):
     ],
 )
 def test_bad_actions_are_refused_in_words(action, said):
-    env = HRCReachEnv(perception="truth")
+    env = HRCEnv(perception="truth")
     env.reset(seed=0)
     with pytest.raises(ConfigError, match=said):
         env.step(action)
@@ -368,20 +368,20 @@ def test_bad_actions_are_refused_in_words(action, said):
 def test_an_unknown_id_names_the_package():
     with pytest.raises(gymnasium.error.Error, match="HRCReach"):
         gymnasium.make("HRCReach-v7")
-    assert hrc_env.IDS == ("HRCReach-v0",)
+    assert hrc_env.IDS == ["HRCReach-v0"]
 
 
 def test_the_id_registers_itself_when_its_package_is_named():
     env = gymnasium.make("hrc_env:HRCReach-v0", perception="none")
-    assert isinstance(env.unwrapped, HRCReachEnv)
+    assert isinstance(env.unwrapped, HRCEnv)
 
 
 def test_pictures_have_the_shape_they_promise():
-    env = HRCReachEnv(perception="keypoints", render_mode="rgb_array")
+    env = HRCEnv(perception="keypoints", render_mode="rgb_array")
     env.reset(seed=0)
     assert env.render().shape == (720, 960, 3)
     assert env.mosaic().shape == (724, 1284, 3)
-    depth = HRCReachEnv(perception="truth", render_mode="depth_array")
+    depth = HRCEnv(perception="truth", render_mode="depth_array")
     depth.reset(seed=0)
     metres = depth.render()
     assert metres.shape == (720, 960)
@@ -391,4 +391,4 @@ def test_pictures_have_the_shape_they_promise():
 
 def test_stepping_before_a_reset_is_refused():
     with pytest.raises(ConfigError, match="reset"):
-        HRCReachEnv(perception="truth").step(np.zeros(6))
+        HRCEnv(perception="truth").step(np.zeros(6))

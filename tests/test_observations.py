@@ -6,9 +6,12 @@ import pytest
 
 import hrc_env  # noqa: F401  registers the ids
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.env import HRCReachEnv
+from hrc_env.env import HRCEnv
 from hrc_env.observations import Sizes, layout
 from hrc_env.sb3 import HRCVecEnv
+from hrc_env.tasks.reach import TASK
+
+TERMS = TASK.observation_terms
 
 ASKED = {"horizons_s": (0.2, 0.6)}
 ADDED = ("worker_joints_ahead", "worker_joints_ahead_std")
@@ -23,7 +26,7 @@ def rolled(env, n_steps=15):
 
 
 def test_horizons_add_their_terms_and_no_others():
-    plain, more = layout(Sizes(6, 6, 2)), layout(Sizes(6, 6, 2, horizons=2))
+    plain, more = layout(TERMS, Sizes(6, 6, 2)), layout(TERMS, Sizes(6, 6, 2, horizons=2))
     assert len(more.low) - len(plain.low) == 2 * 2 * N_JOINTS * (3 + 1)
     for name, part in plain.slices.items():
         assert name in ADDED or more.slices[name] == part
@@ -32,14 +35,14 @@ def test_horizons_add_their_terms_and_no_others():
 
 @pytest.mark.parametrize("level", ["keypoints", "truth", "none"])
 def test_asking_changes_nothing_else(level):
-    plain, more = HRCReachEnv(perception=level), HRCReachEnv(perception=level, config=ASKED)
+    plain, more = HRCEnv(perception=level), HRCEnv(perception=level, config=ASKED)
     for before, after in zip(rolled(plain), rolled(more), strict=True):
         np.testing.assert_array_equal(after[: len(before)], before)
 
 
 @pytest.mark.parametrize("level", ["keypoints", "truth"])
 def test_a_worker_is_expected_near_and_less_surely_the_later(level):
-    env = HRCReachEnv(perception=level, config=ASKED)
+    env = HRCEnv(perception=level, config=ASKED)
     terms = env.split_observation(rolled(env)[-1])
     now = terms["worker_joints_from_tool"].reshape(1, N_JOINTS, 3)
     ahead = terms["worker_joints_ahead"].reshape(2, N_JOINTS, 3)
@@ -53,7 +56,7 @@ def test_a_worker_is_expected_near_and_less_surely_the_later(level):
 
 
 def test_of_nobody_the_prior_is_expected():
-    env = HRCReachEnv(perception="none", config=ASKED)
+    env = HRCEnv(perception="none", config=ASKED)
     terms = env.split_observation(rolled(env, 3)[-1])
     now = terms["worker_joints_from_tool"].reshape(1, N_JOINTS, 3)
     np.testing.assert_allclose(terms["worker_joints_ahead"].reshape(2, N_JOINTS, 3) - now, 0.0)
@@ -77,7 +80,7 @@ def test_many_environments_expect_what_each_alone_expects():
 
 
 def test_two_workers_have_their_own_futures():
-    env = HRCReachEnv(perception="truth", n_workers=2, config=ASKED)
+    env = HRCEnv(perception="truth", n_workers=2, config=ASKED)
     ahead = env.split_observation(rolled(env, 3)[-1])["worker_joints_ahead"]
     first, second = ahead.reshape(2, 2, N_JOINTS, 3)
     assert np.linalg.norm(first.mean(1) - second.mean(1), axis=-1).min() > 0.3

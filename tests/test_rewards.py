@@ -1,14 +1,16 @@
 """Reward terms: shapes, signs, and that their sum is the reward."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from hrc_env.belief import Belief
 from hrc_env.core.records import PoseEstimate, RobotState
-from hrc_env.env import HRCReachEnv
+from hrc_env.env import HRCEnv
 from hrc_env.geometry.distances import Gap
-from hrc_env.rewards import TERMS, RewardConfig, closeness, reward
-from hrc_env.tasks.reach import ReachProgress
+from hrc_env.rewards import SHARED_TERMS, RewardConfig, closeness, evaluated, total
+from hrc_env.tasks.reach import TASK, ReachConfig, ReachProgress
 from hrc_env.vector.env import HRCVectorEnv
 
 
@@ -23,7 +25,17 @@ def believed(gap_m: float, action: float = 0.0, workers: int = 1) -> Belief:
         np.zeros((1, 9, 2, 3)), np.zeros(9),
     )  # fmt: skip
     gap = Gap(np.full((1, workers), gap_m), np.zeros((1, workers, 3)), np.zeros((1, workers, 3)))
-    return Belief(robot, pose, gap, np.zeros((1, 3)), np.ones(1), np.full((1, 6), action))
+    return Belief(robot, pose, gap, None, np.full((1, 6), action))
+
+
+def reward(now, step, before, shared, own=None):
+    """All terms, of which the task's come first."""
+    own = own or ReachConfig()
+    terms = {
+        **evaluated(TASK.rewards, now, step, before, own),
+        **evaluated(SHARED_TERMS, now, step, before, shared),
+    }
+    return total(terms, 1), terms
 
 
 def progress(metres: float = 0.0, reached: bool = False) -> ReachProgress:
@@ -39,21 +51,25 @@ def test_closeness_grows_from_its_reach_to_touch_and_saturates(gap_m, expected):
 
 
 def test_the_reward_is_the_sum_of_its_terms():
-    total, terms = reward(
+    whole, terms = reward(
         believed(0.1, 0.5), progress(0.02, True), np.zeros((1, 6)), RewardConfig()
     )
-    assert set(terms) == {term.name for term in TERMS}
-    assert total[0] == sum(value[0] for value in terms.values())
+    assert list(terms) == [term.name for term in TASK.reward_terms]
+    assert whole[0] == sum(value[0] for value in terms.values())
 
 
 def test_each_weight_scales_its_own_term_only():
     now, step, before = believed(0.1, 0.5), progress(0.02, True), np.zeros((1, 6))
     base = reward(now, step, before, RewardConfig())[1]
-    fields = {"progress": "progress_per_m", "goal": "goal", "effort": "effort",
+    fields = {"progress": "progress_per_m", "goal": "goal_bonus", "effort": "effort",
               "smoothness": "smoothness", "proximity": "proximity"}  # fmt: skip
     for term, field in fields.items():
-        doubled = RewardConfig(**{field: 2 * getattr(RewardConfig(), field)})
-        changed = reward(now, step, before, doubled)[1]
+        own, shared = ReachConfig(), RewardConfig()
+        if hasattr(own, field):
+            own = replace(own, **{field: 2 * getattr(own, field)})
+        else:
+            shared = replace(shared, **{field: 2 * getattr(shared, field)})
+        changed = reward(now, step, before, shared, own)[1]
         assert changed[term][0] == pytest.approx(2 * base[term][0])
         assert base[term][0] != 0
         assert all(changed[other][0] == base[other][0] for other in fields if other != term)
@@ -80,7 +96,7 @@ def proximity_of(env, weight):
 
 
 def test_weights_that_change_in_the_course_of_a_run_count_from_the_next_step_on():
-    single = HRCReachEnv(perception="truth")
+    single = HRCEnv(perception="truth")
     several = HRCVectorEnv(2, perception="truth")
     for env in (single, several):
         once, thrice = proximity_of(env, 1.0), proximity_of(env, 3.0)

@@ -9,7 +9,7 @@ from stable_baselines3.common.env_checker import check_env
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import WorkerTruth
-from hrc_env.env import HRCReachEnv
+from hrc_env.env import HRCEnv
 from hrc_env.geometry.assignment import assign
 from hrc_env.metrics import tracking_error
 from hrc_env.motion.generator import PeopleConfig, activity_names, current
@@ -36,7 +36,7 @@ def walk(env, n_steps, seed=0):
 @pytest.mark.parametrize("n_workers", COUNTS)
 def test_any_number_of_workers_is_an_environment(n_workers, level):
     """The observation has a block for each, the reward its terms, the cost its truth."""
-    env = HRCReachEnv(perception=level, n_workers=n_workers)
+    env = HRCEnv(perception=level, n_workers=n_workers)
     check_env(env)
     for observation, reward, info in walk(env, 30)[1:]:
         assert env.observation_space.contains(observation)
@@ -52,7 +52,7 @@ def test_any_number_of_workers_is_an_environment(n_workers, level):
 @pytest.mark.parametrize("level", FAST_LEVELS)
 @pytest.mark.parametrize("n_workers", COUNTS)
 def test_pickled_with_its_workers_it_goes_on_the_same(n_workers, level):
-    env = HRCReachEnv(perception=level, n_workers=n_workers)
+    env = HRCEnv(perception=level, n_workers=n_workers)
     walk(env, 12)
     twin = pickle.loads(pickle.dumps(env))
     for _ in range(12):
@@ -64,7 +64,7 @@ def test_pickled_with_its_workers_it_goes_on_the_same(n_workers, level):
 @pytest.mark.parametrize("n_workers", COUNTS)
 def test_many_environments_are_the_single_one_bit_for_bit(n_workers):
     many = HRCVecEnv(3, n_workers=n_workers, stagger=False, max_episode_steps=9, seed=4)
-    one = HRCReachEnv(perception="keypoints", n_workers=n_workers)
+    one = HRCEnv(perception="keypoints", n_workers=n_workers)
     batch, (alone, _) = many.reset()[2], one.reset(seed=6)
     actions = np.random.default_rng(1).uniform(-1, 1, (20, 3, 6)).astype(np.float32)
     for step, action in enumerate(actions, start=1):
@@ -80,7 +80,7 @@ def test_many_environments_are_the_single_one_bit_for_bit(n_workers):
 def test_two_workers_without_names_are_both_followed(estimator):
     """Four seconds of keypoints that each camera reports in an order of its own."""
     for seed in range(3):
-        env = HRCReachEnv(perception="keypoints", estimator=estimator, n_workers=2)
+        env = HRCEnv(perception="keypoints", estimator=estimator, n_workers=2)
         infos = [info for *_, info in walk(env, 100, seed)][5:]
         assert np.median([info["tracking/mpjpe_m"] for info in infos]) < 0.08
         assert np.mean([info["tracking/lost"] for info in infos]) < 0.05
@@ -102,7 +102,7 @@ def test_three_workers_without_names_keep_their_tracks():
 
 def test_the_emulator_does_not_say_who_is_who():
     """What a camera reports first is one worker as often as the other; the senses sort it."""
-    env = HRCReachEnv(perception="keypoints", n_workers=2)
+    env = HRCEnv(perception="keypoints", n_workers=2)
     senses, reported, sorted_ = env.simulation.senses, [], []
     detect = senses.detect
     senses.detect = lambda *now: reported.append(detect(*now)) or reported[-1]
@@ -123,7 +123,7 @@ def first_is_further_right(keypoints, camera):
 
 
 def test_errors_do_not_depend_on_which_worker_is_called_the_first():
-    truth = HRCReachEnv(perception="truth", n_workers=3)
+    truth = HRCEnv(perception="truth", n_workers=3)
     truth.reset(seed=0)
     seen = truth.simulation.estimate.mean_world
     reordered = WorkerTruth(seen[:, [2, 0, 1]], seen, np.zeros((1, 3, 1, 2, 3)), np.ones(1))
@@ -137,7 +137,7 @@ def test_errors_do_not_depend_on_which_worker_is_called_the_first():
 
 
 def test_in_pictures_two_different_people_are_found(pixels):
-    env = HRCReachEnv(perception="pixels", n_workers=2)
+    env = HRCEnv(perception="pixels", n_workers=2)
     seen = walk(env, 6, seed=1)
     info, estimate = seen[-1][2], env.simulation.estimate
     assert estimate.tracked.all()
@@ -151,7 +151,7 @@ def test_in_pictures_two_different_people_are_found(pixels):
 
 
 def test_an_empty_room_in_pictures_is_quiet():
-    env = HRCReachEnv(perception="pixels", n_workers=0)
+    env = HRCEnv(perception="pixels", n_workers=0)
     assert all(info["tracking/lost"] == 0.0 for *_, info in walk(env, 2))
     assert env.mosaic().shape == (724, 1284, 3)
     assert env.views.crops(64) == []
@@ -160,7 +160,7 @@ def test_an_empty_room_in_pictures_is_quiet():
 
 def test_who_comes_in_late_is_found_and_nobody_is_taken_for_them(pixels):
     """Searches for the second worker see the first one only, until the second is there."""
-    env = HRCReachEnv(perception="pixels", n_workers=2)
+    env = HRCEnv(perception="pixels", n_workers=2)
     renderer = env.simulation.senses.renderer
     draw = renderer.draw
     renderer.draw = lambda q, motion: draw(q, without_the_second(motion))
@@ -187,7 +187,7 @@ def without_the_second(motion):
 @pytest.mark.parametrize("level", FAST_LEVELS)
 def test_the_number_of_workers_is_drawn_anew_for_each_episode(level):
     """Shapes stay; who is not there is not tracked, not seen and in nobody's way."""
-    env = HRCReachEnv(perception=level, n_workers=(1, 3))
+    env = HRCEnv(perception=level, n_workers=(1, 3))
     counts = set()
     for seed in range(12):
         for _, _, info in walk(env, 6, seed):
@@ -207,13 +207,13 @@ def test_the_number_of_workers_is_drawn_anew_for_each_episode(level):
 @pytest.mark.parametrize("count", [-1, 1.5, (2, 1), (1, 2, 3), True])
 def test_a_number_of_workers_that_cannot_be_is_refused(count):
     with pytest.raises(ConfigError, match="n_workers"):
-        HRCReachEnv(perception="none", n_workers=count)
+        HRCEnv(perception="none", n_workers=count)
 
 
 @pytest.mark.parametrize("people", ["hurried", "unaware", PeopleConfig(tempo=0.8)])
 def test_people_are_chosen_by_name_or_made(people):
-    env = HRCReachEnv(perception="none", n_workers=2, people=people)
+    env = HRCEnv(perception="none", n_workers=2, people=people)
     infos = [info for *_, info in walk(env, 20)]
     assert all(set(info["worker/activity"]) <= set(activity_names) for info in infos)
     with pytest.raises(ConfigError, match="attentive"):
-        HRCReachEnv(perception="none", people="atentive")
+        HRCEnv(perception="none", people="atentive")

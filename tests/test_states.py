@@ -8,7 +8,7 @@ import pytest
 
 import hrc_env  # noqa: F401  registers the ids
 from hrc_env.core.errors import ConfigError
-from hrc_env.env import HRCReachEnv
+from hrc_env.env import HRCEnv
 from hrc_env.vector.env import HRCVectorEnv
 
 STEPS = [("pixels", 3), ("keypoints", 30), ("truth", 30), ("none", 30)]
@@ -34,14 +34,14 @@ def same(a, b) -> bool:
 @pytest.mark.parametrize(("level", "n_steps"), STEPS)
 def test_the_single_environment_goes_on_from_a_state(level, n_steps):
     """A state is not touched by what comes after, and another environment can take it."""
-    env = HRCReachEnv(perception=level)
+    env = HRCEnv(perception=level)
     env.reset(seed=2)
     go_on(env, n_steps, seed=0)
     state = env.get_state()
     first = go_on(env, n_steps, seed=1)
     env.set_state(state)
     assert same(first, go_on(env, n_steps, seed=1))
-    other = HRCReachEnv(perception=level)
+    other = HRCEnv(perception=level)
     other.set_state(pickle.loads(pickle.dumps(state)))
     assert same(first, go_on(other, n_steps, seed=1))
     env.close(), other.close()
@@ -60,7 +60,7 @@ def test_the_single_environment_goes_on_from_a_state(level, n_steps):
     ids=str,
 )
 def test_every_estimators_state_is_in_it(kwargs):
-    env = HRCReachEnv(perception="keypoints", **kwargs)
+    env = HRCEnv(perception="keypoints", **kwargs)
     env.reset(seed=2)
     go_on(env, 8, seed=0)
     state = env.get_state()
@@ -103,20 +103,20 @@ def test_a_state_before_the_first_reset_can_be_taken_too():
 
 
 def test_a_state_of_other_settings_is_refused_by_their_name():
-    state = HRCReachEnv(perception="truth").get_state()
+    state = HRCEnv(perception="truth").get_state()
     with pytest.raises(ConfigError, match="perception='truth'"):
-        HRCReachEnv(perception="none").set_state(state)
+        HRCEnv(perception="none").set_state(state)
     with pytest.raises(ConfigError, match="control='joint'"):
-        HRCReachEnv(perception="truth", control="tool").set_state(state)
+        HRCEnv(perception="truth", control="tool").set_state(state)
     with pytest.raises(ConfigError, match="was taken with cameras="):
-        HRCReachEnv(perception="truth", cameras=[0, 1]).set_state(state)
+        HRCEnv(perception="truth", cameras=[0, 1]).set_state(state)
     two = HRCVectorEnv(4, perception="none", num_threads=2).get_state()
     with pytest.raises(ConfigError, match="num_threads=2"):
         HRCVectorEnv(4, perception="none", num_threads=1).set_state(two)
 
 
 def test_a_closed_environment_says_so():
-    env = HRCReachEnv(perception="none")
+    env = HRCEnv(perception="none")
     env.reset(seed=0)
     env.close()
     env.close()

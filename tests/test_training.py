@@ -23,7 +23,7 @@ from agents.training import as_before
 from hrc_env.__main__ import main
 from hrc_env.cli.train import Train
 from hrc_env.core.errors import CheckpointError, ConfigError
-from hrc_env.env import HRCReachEnv
+from hrc_env.env import HRCEnv
 
 TINY = ["--perception", "truth", "--num-envs", "4", "--episodes", "2", "--no-film"]
 
@@ -94,7 +94,7 @@ def test_resuming_nothing_says_so_without_a_traceback(tmp_path):
 
 
 def here(**kwargs):
-    env = HRCReachEnv(perception="truth", **kwargs)
+    env = HRCEnv(perception="truth", **kwargs)
     return situation(env.simulation)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from benchmarks.perception.families import family_index
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Bools, Floats, Ints
-from hrc_env.env import HRCReachEnv
+from hrc_env.env import HRCEnv
 from hrc_env.geometry.cameras import project
 from hrc_env.motion import generator
 from hrc_env.perception.faults.fault import FaultConfig
@@ -80,9 +80,9 @@ def play(
         seeds: one an episode.
         n_steps: of each.
         tick: told of the share that is done after each.
-        arguments: of `HRCReachEnv`.
+        arguments: of `HRCEnv`.
     """
-    env = HRCReachEnv(n_workers=1, **arguments)
+    env = HRCEnv(n_workers=1, **arguments)
     try:
         episodes = []
         for seed in seeds:
@@ -103,7 +103,7 @@ def camera_name(c: int) -> str:
     return f"camera_{c + 1}"
 
 
-def _episode(env: HRCReachEnv, seed: int, n_steps: int) -> Episode:
+def _episode(env: HRCEnv, seed: int, n_steps: int) -> Episode:
     simulation = env.simulation
     n_cameras = len(simulation.scene.cameras)
     error, std = np.full((2, n_steps, N_JOINTS), np.nan)
@@ -127,7 +127,7 @@ def _episode(env: HRCReachEnv, seed: int, n_steps: int) -> Episode:
     return Episode(error, std, inside, off_px, family, named)
 
 
-def _off_px(env: HRCReachEnv, joints_world: Floats) -> Floats:
+def _off_px(env: HRCEnv, joints_world: Floats) -> Floats:
     """(C,) how far the keypoints of this step are from the truth; NaN: none."""
     keypoints, _ = env.simulation.senses.looks(0)
     cameras = env.simulation.scene.cameras

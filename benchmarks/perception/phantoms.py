@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hrc_env.env import HRCReachEnv
+from hrc_env.env import HRCEnv
 
 EPISODE_STEPS = 250
 
@@ -22,7 +22,7 @@ def count(scene: str, n_steps: int, seed: int, tick: Callable[[float], None]) ->
         "images" that were looked at, those with somebody in them, and "tracked" steps.
     """
     found = {"images": 0, "phantoms": 0, "tracked": 0}
-    env = HRCReachEnv(scene=scene, n_workers=(0, 1))
+    env = HRCEnv(scene=scene, n_workers=(0, 1))
     try:
         actions = np.random.default_rng(seed)
         steps = 0

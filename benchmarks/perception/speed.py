@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from benchmarks.speed.stopwatch import Place, Stopwatch
-from hrc_env.env import HRCReachEnv
+from hrc_env.env import HRCEnv
 from hrc_env.motion import generator
 from hrc_env.perception.network import LANDMARK_SIDE, load_landmarker
 from hrc_env.pipeline.rendered import CameraSenses
@@ -77,7 +77,7 @@ def measure(
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # that one camera is few is known
-        env = HRCReachEnv(
+        env = HRCEnv(
             scene=setting.scene,
             cameras=list(range(setting.cameras)),
             n_workers=setting.workers,
@@ -104,7 +104,7 @@ def measure(
     }
 
 
-def _step(env: HRCReachEnv, actions: np.random.Generator, n_steps: int) -> list[float]:
+def _step(env: HRCEnv, actions: np.random.Generator, n_steps: int) -> list[float]:
     """Seconds of each step."""
     seconds = []
     for _ in range(n_steps):

@@ -16,7 +16,6 @@ from hrc_env.motion import generator
 from hrc_env.perception import emulator
 from hrc_env.pipeline.tracking import TrackingSenses
 from hrc_env.scene.physics import Physics
-from hrc_env.tasks import reach
 from hrc_env.vector import env, infos
 
 ORGANS: Mapping[str, Sequence[Place]] = {
@@ -35,7 +34,7 @@ ORGANS: Mapping[str, Sequence[Place]] = {
         (metrics, "cost"),
     ),
     "observation": ((observations, "observe"),),
-    "reward": ((reach, "advance"), (rewards, "reward")),
+    "reward": ((rewards, "evaluated"), (rewards, "total")),
     "info": (
         (simulation, "tracking_info"),
         (simulation, "cost_info"),

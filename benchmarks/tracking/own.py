@@ -10,7 +10,7 @@ from functools import lru_cache
 import numpy as np
 
 from benchmarks.tracking.rigs import Rig
-from hrc_env.config import HRCConfig
+from hrc_env.config import HRCConfig, settle
 from hrc_env.core.records import Keypoints
 from hrc_env.core.typing import Bools, Floats, Points3
 from hrc_env.geometry.cameras import projections
@@ -108,4 +108,4 @@ def _stacked(records: list[Keypoints]) -> Keypoints:
 
 
 def _simulation(batch: int) -> Simulation:
-    return Simulation(batch, "none", "triangulation", None, "lab", 1, "joint", HRCConfig())
+    return Simulation(batch, settle(perception="none", estimator="triangulation"))

@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks.tracking.detections import CONDITIONS, detect
 from benchmarks.tracking.rigs import DT_S, SIGMA_PX, make_rig
 from benchmarks.tracking.walks import walk
-from hrc_env.config import HRCConfig
+from hrc_env.config import HRCConfig, settle
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Bools, Points3, Velocities3
@@ -90,7 +90,7 @@ def follow_own(
     config = HRCConfig()
     if lively:
         config = replace(config, motion=replace(config.motion, **LIVELY))  # type: ignore[arg-type]
-    scene = Simulation(len(seeds), "none", "kalman", None, "lab", 1, "joint", config)
+    scene = Simulation(len(seeds), settle(perception="none", estimator="kalman", config=config))
     cameras = scene.scene.cameras
     blind = _failures(seeds, n_frames, len(cameras), failing)[..., None, None]
     estimator = make_estimator(name, projections(cameras), config.ctrl_dt, config.tracker)

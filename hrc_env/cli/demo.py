@@ -29,10 +29,10 @@ class Demo(EnvironmentArguments):
         console, started_s = Console(), time.monotonic()
         console.print("Loading the simulator ...")
         from hrc_env.cli.film import film_episode, table  # here: --help imports no simulator
-        from hrc_env.config import resolve
+        from hrc_env.config import settle
 
         keywords = self.keywords()
-        ctrl_dt = resolve(keywords.get("config")).ctrl_dt
+        ctrl_dt = settle(**keywords).config.ctrl_dt
         at_least("--seconds", self.seconds, ctrl_dt)
         base = agents("base")
         n_steps = round(self.seconds / ctrl_dt)

@@ -8,12 +8,15 @@ from pathlib import Path
 from typing import Any
 
 from hrc_env.core.errors import ConfigError
+from hrc_env.tasks import DEFAULT
 
 
 @dataclass(frozen=True, kw_only=True)
 class EnvironmentArguments:
-    """What `gymnasium.make("HRCReach-v0", ...)` takes; names are in `python -m hrc_env list`."""
+    """What `gymnasium.make` takes; names are in `python -m hrc_env list`."""
 
+    task: str = DEFAULT
+    """Which environment, by its id."""
     perception: str = "pixels"
     """What the robot sees with: pixels, keypoints, truth or none."""
     estimator: str = "particle"
@@ -42,7 +45,7 @@ class EnvironmentArguments:
     JSON, or else text), or a file of them (.json or .toml). Later ones win. docs/environment.md"""
 
     def keywords(self) -> dict[str, Any]:
-        """Keyword arguments of `HRCReachEnv`, of lists, mappings, text and numbers only.
+        """Keyword arguments of `HRCEnv`, of lists, mappings, text and numbers only.
 
         Raises:
             ConfigError: a fault or a change that cannot be read.
@@ -56,6 +59,7 @@ class EnvironmentArguments:
             "config": read_config(self.config),
         }
         return {
+            "task": self.task,
             "perception": self.perception,
             "estimator": self.estimator,
             "scene": self.scene,

@@ -18,7 +18,7 @@ from hrc_env.cli.kernels import compile_kernels
 from hrc_env.cli.progress import progress_bar
 from hrc_env.core.checkout import agents
 from hrc_env.core.typing import Image
-from hrc_env.env import HRCReachEnv
+from hrc_env.env import HRCEnv
 from hrc_env.render.views import Glance
 
 STEPS_PER_FRAME = 2
@@ -45,7 +45,7 @@ def film_episode(
             first step) is written beside it as .png.
         seed: of the episode.
         n_steps: how many steps; every second one is a frame.
-        kwargs: as of `HRCReachEnv`.
+        kwargs: as of `HRCEnv`.
 
     Raises:
         RenderingError: this machine has no OpenGL.
@@ -53,7 +53,7 @@ def film_episode(
     console = Console()
     compile_kernels(console, kwargs.get("perception", "pixels"))
     console.print(f"Making the environment: perception {kwargs.get('perception', 'pixels')} ...")
-    env = HRCReachEnv(**kwargs)
+    env = HRCEnv(**kwargs)
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_suffix(".draft.mp4")
     try:
@@ -80,11 +80,11 @@ def nearest_seed(make: Make, seeds: Iterable[int], n_steps: int = 250, **kwargs:
         make: builds the agent for a `Situation`.
         seeds: of the episodes that are played.
         n_steps: their length.
-        kwargs: as of `HRCReachEnv`.
+        kwargs: as of `HRCEnv`.
     """
     if kwargs.get("perception", "pixels") == "pixels":
         kwargs = {**kwargs, "perception": "keypoints", "appearance": None}
-    env, closest_m, tried = HRCReachEnv(**kwargs), {}, list(seeds)
+    env, closest_m, tried = HRCEnv(**kwargs), {}, list(seeds)
     try:
         with progress_bar(Console(), "looking for an encounter") as advance:
             for seed in tried:
@@ -114,7 +114,7 @@ def _encounter(closest_m: dict[int, float]) -> int:
     return max(closest_m, key=lambda seed: closest_m[seed])
 
 
-def _closest_m(env: HRCReachEnv, make: Make, seed: int, n_steps: int) -> float:
+def _closest_m(env: HRCEnv, make: Make, seed: int, n_steps: int) -> float:
     agent = make(agents("base").situation(env.simulation))
     observation, _ = env.reset(seed=seed)
     closest_m = np.inf
@@ -127,7 +127,7 @@ def _closest_m(env: HRCReachEnv, make: Make, seed: int, n_steps: int) -> float:
 
 
 def _roll(
-    env: HRCReachEnv,
+    env: HRCEnv,
     agent: Any,
     observation: Any,
     n_steps: int,
@@ -140,7 +140,8 @@ def _roll(
     with progress_bar(console, "filming") as advance:
         for step in range(n_steps):
             observation, _, terminated, _, info = env.step(agent.act(observation))
-            diary.note(info, float(env.simulation.believed.gap.distance_m.min(initial=np.inf)))
+            gap_m = float(env.simulation.believed.gap.distance_m.min(initial=np.inf))
+            diary.note(info, gap_m, env.simulation.task.counts(info))
             errors_m.append(info.get("tracking/mpjpe_m", np.nan))
             if step % STEPS_PER_FRAME == 0:
                 closer = CLOSE_M < diary.true_m[-1] < closest_m
@@ -156,8 +157,7 @@ def _roll(
         "median tracking error [mm]": 1e3 * float(np.median(known)) if known else np.nan,
         "lost steps [%]": 100 * (1 - len(known) / len(errors_m)),
         "minimum separation [m]": float(np.min(diary.true_m)),
-        "goals reached [count]": info["task/goals_reached"],
-        "goals missed [count]": info["task/goals_missed"],
+        **{f"{name} [count]": n for name, n in env.simulation.task.counts(info).items()},
         "cost [count]": info["episode_cost"],
         "steps played [steps/s]": len(errors_m) / seconds,
         "film drawn [frames/s]": len(range(0, len(errors_m), STEPS_PER_FRAME)) / seconds,
@@ -167,7 +167,7 @@ def _roll(
 class _Studio:
     """Draws frames and hands them to ffmpeg in a thread, while the environment goes on."""
 
-    def __init__(self, env: HRCReachEnv, path: Path) -> None:
+    def __init__(self, env: HRCEnv, path: Path) -> None:
         self.still: Image = np.zeros((1, 1, 3), np.uint8)
         """The last frame that was asked to be one."""
         self._env = env

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.core.typing import Image
-from hrc_env.env import HRCReachEnv
+from hrc_env.env import HRCEnv
 from hrc_env.pipeline.levels import CAMERA_LEVELS
 from hrc_env.render import overlay
 from hrc_env.render.views import Glance
@@ -41,25 +41,23 @@ class Diary:
     true_m: list[float] = field(default_factory=list)
     estimated_m: list[float] = field(default_factory=list)
     cost: list[float] = field(default_factory=list)
-    reached: int = 0
-    missed: int = 0
-    """Goals so far."""
+    counts: dict[str, Any] = field(default_factory=dict)
+    """What was achieved and what failed so far."""
 
-    def note(self, info: dict[str, Any], estimated_m: float) -> None:
+    def note(self, info: dict[str, Any], estimated_m: float, counts: dict[str, Any]) -> None:
         """Add a step."""
         self.true_m.append(info.get("safety/min_separation_m", np.inf))
         self.estimated_m.append(estimated_m)
         self.cost.append(info["cost"])
-        self.reached = int(info["task/goals_reached"])
-        self.missed = int(info["task/goals_missed"])
+        self.counts = counts
 
     def copy(self) -> "Diary":
         """As it is now."""
         lists = list(self.true_m), list(self.estimated_m), list(self.cost)
-        return Diary(*lists, self.reached, self.missed)
+        return Diary(*lists, self.counts)
 
 
-def compose(env: HRCReachEnv, diary: Diary, seen: Glance | None = None) -> Image:
+def compose(env: HRCEnv, diary: Diary, seen: Glance | None = None) -> Image:
     """One frame (900, 1600, 3): room, cameras, crops or belief, strip.
 
     Args:
@@ -140,10 +138,10 @@ def strip(diary: Diary, dt_s: float, limit_m: float) -> Image:
     for values, colour in series:
         points = np.stack([x, _y_of(np.array(values[first:]))], -1).astype(np.int32)
         cv2.polylines(image, [points], False, colour, 2, cv2.LINE_AA)
-    goals = f"goals: {diary.reached} reached, {diary.missed} missed"
-    overlay.write(image, goals, (14, 104), 16, overlay.GOAL)
-    overlay.write(image, f"cost {sum(diary.cost):.0f}", (14, 128), 16, overlay.COST)
-    overlay.write(image, f"{len(diary.cost) * dt_s:.1f} s", (14, 152), 16)
+    for row, (name, count) in enumerate(diary.counts.items()):
+        overlay.write(image, f"{name}: {count:.0f}", (14, 100 + 20 * row), 15, overlay.GOAL)
+    overlay.write(image, f"cost: {sum(diary.cost):.0f}", (14, 142), 15, overlay.COST)
+    overlay.write(image, f"{len(diary.cost) * dt_s:.1f} s", (140, 142), 15)
     return image
 
 

@@ -14,6 +14,7 @@ from hrc_env.cli.environment import EnvironmentArguments
 from hrc_env.cli.progress import track
 from hrc_env.core.checkout import agents
 from hrc_env.core.errors import unknown
+from hrc_env.tasks import DEFAULT
 
 if TYPE_CHECKING:
     import gymnasium
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
 class Play(EnvironmentArguments):
     """Play episodes of an environment with an agent; say how they went."""
 
-    id: Annotated[str, tyro.conf.Positional] = "HRCReach-v0"
-    """Which environment."""
+    task: Annotated[str, tyro.conf.Positional] = DEFAULT
+    """Which environment, by its id."""
     agent: str = "scripted_slowed"
     """random, scripted, scripted_slowed, or the path of a checkpoint of `train` (.zip)."""
     episodes: int = 1
@@ -38,8 +39,8 @@ class Play(EnvironmentArguments):
 
     def run(self) -> int:
         """Play."""
-        if self.id not in hrc_env.IDS:
-            raise unknown("environment", self.id, hrc_env.IDS)
+        if self.task not in hrc_env.IDS:
+            raise unknown("environment", self.task, hrc_env.IDS)
         at_least("--episodes", self.episodes, 1)
         at_least("--seed", self.seed, 0)
         if self.video is not None:
@@ -51,7 +52,7 @@ class Play(EnvironmentArguments):
 
         base = agents("base")
         compile_kernels(Console(), self.perception)
-        env = gymnasium.make(self.id, **self.keywords())
+        env = gymnasium.make(self.task, **self.keywords())
         try:
             for episode in range(self.episodes):
                 self._play(env, base, self.seed + episode)
@@ -71,11 +72,11 @@ class Play(EnvironmentArguments):
         return 0
 
     def _play(self, env: "gymnasium.Env[Any, Any]", base: Any, seed: int) -> None:
-        from hrc_env.env import HRCReachEnv
+        from hrc_env.env import HRCEnv
         from hrc_env.scene.viewer import Viewer
 
         inner = env.unwrapped
-        assert isinstance(inner, HRCReachEnv)
+        assert isinstance(inner, HRCEnv)
         agent = base.make_agent(self.agent, base.situation(inner.simulation), seed)
         observation, info = env.reset(seed=seed)
         window = Viewer(inner.simulation.scene) if self.viewer else None
@@ -92,8 +93,10 @@ class Play(EnvironmentArguments):
                 break
         if window is not None:
             window.close()
+        counts = inner.simulation.task.counts(info)
         Console().print(
-            f"seed {seed}: return {total:.1f}, goals {info['task/goals_reached']:.0f} reached "
-            f"{info['task/goals_missed']:.0f} missed, cost {info['episode_cost']:.0f}, "
+            f"seed {seed}: return {total:.1f}, "
+            f"{', '.join(f'{name} {n:.0f}' for name, n in counts.items())}, "
+            f"cost {info['episode_cost']:.0f}, "
             f"{steps / (time.monotonic() - started_s):.0f} steps/s"
         )

@@ -55,8 +55,17 @@ def learner() -> Iterator[None]:
         ) from error
 
 
+RENAMED = {
+    "reward.goal": "task.goal_bonus",
+    "reward.progress_per_m": "task.progress_per_m",
+}
+"""What is called otherwise now: fields of the config by their path, estimators, commands."""
+
+
 def unknown(what: str, got: object, valid: Iterable[str]) -> ConfigError:
-    """The error for a name that is not in a list, with the nearest valid one."""
+    """The error for a name that is not in a list, with the nearest valid one or its new name."""
+    if got in RENAMED:
+        return ConfigError(f"The {what} {got!r} is {RENAMED[str(got)]!r} now.")
     names = list(valid)
     near = difflib.get_close_matches(str(got), names, n=1)
     hint = f" Did you mean {near[0]!r}?" if near else ""

@@ -17,17 +17,28 @@ from hrc_env.core.errors import ConfigError, unknown
 RecordT = TypeVar("RecordT")
 
 
-def from_mapping(kind: type[RecordT], mapping: Mapping[str, Any], path: str = "") -> RecordT:
+def from_mapping(
+    kind: type[RecordT],
+    mapping: Mapping[str, Any],
+    path: str = "",
+    kinds: Mapping[str, type] | None = None,
+) -> RecordT:
     """A dataclass from a mapping; what it nests may be mappings too, tuples may be lists.
 
     This undoes what `dataclasses.asdict` and JSON do to a config.
+
+    Args:
+        kind: of the record.
+        mapping: values by field.
+        path: what comes before the fields' names in errors.
+        kinds: types of fields where the record's own hints leave them open.
 
     Raises:
         ConfigError: a field that does not exist, with the nearest that does; one that is
             missing; a value of another type or length than the field's, or one that the
             dataclass refuses. Fields are called by their path, as in `scene.cameras[0].name`.
     """
-    hints = typing.get_type_hints(kind)
+    hints = {**typing.get_type_hints(kind), **(kinds or {})}
     fields = dataclasses.fields(kind)  # type: ignore[arg-type]
     names = [f"{path}{each.name}" for each in fields]
     values: dict[str, Any] = {}

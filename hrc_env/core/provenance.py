@@ -14,10 +14,8 @@ PACKAGES = ("numpy", "numba", "mujoco", "gymnasium", "stable-baselines3", "torch
 
 def provenance() -> dict[str, Any]:
     """Versions, the checkout's commit (if it is one) and the machine."""
-    from hrc_env import __version__
-
     return {
-        "hrc_env": __version__,
+        "hrc_env": _version("hrc_env"),
         "git": _commit(),
         "versions": {name: _version(name) for name in PACKAGES},
         "machine": {

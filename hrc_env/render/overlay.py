@@ -114,16 +114,17 @@ def draw_path(
     _lines(image, px[0, 0] * (image.shape[1] / camera.width_px), colour, thickness)
 
 
-def draw_goal(image: Image, camera: PinholeCamera, goal_world: Floats) -> None:
-    """A ring round the goal, in place; drawn over whatever stands before it."""
-    px, depth_m = project(camera.P[None], goal_world[None, None])
-    if depth_m[0, 0, 0] < 0.1:
-        return
+def draw_markers(image: Image, camera: PinholeCamera, markers_world: Floats) -> None:
+    """A ring round each point (M, 3), in place; drawn over whatever stands before it."""
+    px, depth_m = project(camera.P[None], markers_world[None])
     scale = image.shape[1] / camera.width_px
-    radius = max(4, round(0.05 * camera.K[0, 0] * scale / depth_m[0, 0, 0]))
-    (middle,) = _fixed(px[0, 0] * scale)
-    cv2.circle(image, middle, radius * 16, GOAL, 2, cv2.LINE_AA, 4)
-    cv2.circle(image, middle, 2 * 16, GOAL, -1, cv2.LINE_AA, 4)
+    for middle_px, away_m in zip(px[0, 0], depth_m[0, 0].tolist(), strict=True):
+        if away_m < 0.1:
+            continue
+        radius = max(4, round(0.05 * camera.K[0, 0] * scale / away_m))
+        (middle,) = _fixed(middle_px[None] * scale)
+        cv2.circle(image, middle, radius * 16, GOAL, 2, cv2.LINE_AA, 4)
+        cv2.circle(image, middle, 2 * 16, GOAL, -1, cv2.LINE_AA, 4)
 
 
 def label(

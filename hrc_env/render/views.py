@@ -59,8 +59,8 @@ class Glance:
     motion: WorkerMotion
     """The workers, arrays (W, S, ...)."""
     look: Look | None
-    goal_world: Points3
-    """(3,) [m]."""
+    markers_world: Points3
+    """(M, 3) what the task has to show [m]."""
     estimate: PoseEstimate
     """Of a batch of one, as are the keypoints."""
     keypoints: Keypoints | None
@@ -103,7 +103,7 @@ class Views:
         return Glance(
             *self.pose(b),
             simulation.senses.look_of(b),
-            simulation.task.goal_world[b].copy(),
+            simulation.markers(b),
             rows(simulation.estimate, np.array([b])),
             keypoints,
             [list(of_worker) for of_worker in windows],
@@ -115,7 +115,7 @@ class Views:
         seen, camera = seen or self.glance(), viewpoint(VIEWPOINT, width, height)
         (image,) = self._drawn([_whole(camera, width, height, shadows=True)], seen)
         overlay.draw_estimate(image, camera, seen.estimate)
-        overlay.draw_goal(image, camera, seen.goal_world)
+        overlay.draw_markers(image, camera, seen.markers_world)
         return image
 
     def cameras(self, width: int, height: int, seen: Glance | None = None) -> list[Image]:
@@ -146,7 +146,7 @@ class Views:
         ]
 
     def beliefs(self, width: int, height: int, seen: Glance | None = None) -> list[Image]:
-        """What the robot knows, seen from above and from the side: itself, the goal, its estimate
+        """What the robot knows, seen from above and from the side: itself, its task, its estimate
         of the workers. No truth in here."""
         seen = seen or self.glance()
         arm = capsules(self.simulation.chain, seen.q)
@@ -160,7 +160,7 @@ class Views:
             for ends in ([foot, arm[0, 0]], *arm):
                 overlay.draw_path(image, camera, np.array(ends), overlay.ARM, 5)
             overlay.draw_estimate(image, camera, seen.estimate)
-            overlay.draw_goal(image, camera, seen.goal_world)
+            overlay.draw_markers(image, camera, seen.markers_world)
             nobody = "" if seen.estimate.tracked[0].any() else ": nobody is known"
             overlay.label(image, name + nobody, (6, 6), 13)
             images.append(image)

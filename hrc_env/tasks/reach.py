@@ -6,14 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hrc_env.belief import Belief
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Bools, Floats, Ints, Points3
+from hrc_env.observations import ObservationTerm, shorten
+from hrc_env.rewards import RewardTerm
+from hrc_env.tasks.task import Task, World
 
 
 @dataclass(frozen=True, slots=True)
 class ReachConfig:
-    """Where goals appear and what counts as reaching one."""
+    """Where goals appear, what counts as reaching one, and what that is worth."""
 
     radius_m: float = 0.05
     """A goal is reached when the tool point is nearer than this [m]."""
@@ -27,6 +31,10 @@ class ReachConfig:
     """Range of the goals' direction from world +X, seen from that axis [rad]."""
     height_m: tuple[float, float] = (0.8, 1.45)
     """Range of the goals' height above the floor [m]."""
+    progress_per_m: float = 10.0
+    """Reward for every metre that the tool comes nearer to its goal."""
+    goal_bonus: float = 5.0
+    """Reward for reaching a goal."""
 
     def __post_init__(self) -> None:
         for name in ("distance_m", "azimuth_rad", "height_m"):
@@ -55,6 +63,16 @@ class ReachState:
 
 
 @dataclass(frozen=True, slots=True)
+class ReachView:
+    """What robots know of their task."""
+
+    goal_world: Points3
+    """(B, 3) [m]."""
+    time_left_s: Floats
+    """(B,) until the goal is missed."""
+
+
+@dataclass(frozen=True, slots=True)
 class ReachProgress:
     """What one step brought."""
 
@@ -66,7 +84,7 @@ class ReachProgress:
     """(B,) whether it ran out of time in this step."""
 
 
-def make_state(batch: int) -> ReachState:
+def init(batch: int) -> ReachState:
     """A state for `batch` environments, to be filled by `reset`."""
     return ReachState(
         goal_world=np.zeros((batch, 3)),
@@ -81,23 +99,24 @@ def reset(
     state: ReachState,
     ids: Ints,
     rngs: Sequence[np.random.Generator],
-    tool_world: Points3,
+    world: World,
     config: ReachConfig,
 ) -> None:
-    """Start environments `ids` anew with a first goal each; tool_world is (len(ids), 3) [m]."""
+    """Start environments `ids` anew with a first goal each."""
     state.n_reached[ids] = 0
     state.n_missed[ids] = 0
-    _new_goals(state, ids, rngs, tool_world, config)
+    _new_goals(state, ids, rngs, world.robot.tool_world, config)
 
 
 def advance(
     state: ReachState,
     rngs: Sequence[np.random.Generator],
-    tool_world: Points3,
+    world: World,
     dt_s: float,
     config: ReachConfig,
 ) -> ReachProgress:
-    """Judge the tool's new place (B, 3) and replace goals that are done."""
+    """Judge the tool's new place and replace goals that are done."""
+    tool_world = world.robot.tool_world
     batch = len(tool_world)
     step = ReachProgress(np.empty(batch), np.empty(batch, np.bool_), np.empty(batch, np.bool_))
     if _judge(
@@ -110,9 +129,23 @@ def advance(
     return step
 
 
+def view(state: ReachState, ids: Ints, config: ReachConfig) -> ReachView:
+    """What robots `ids` know of their task."""
+    return ReachView(state.goal_world[ids], config.time_limit_s - state.goal_age_s[ids])
+
+
 def succeeded(state: ReachState) -> Bools:
     """(B,) whether so far every goal of the episode, and at least one, was reached in time."""
     return (state.n_reached > 0) & (state.n_missed == 0)
+
+
+def info(state: ReachState) -> dict[str, Floats]:
+    """What the episode has come to so far, (B,) each."""
+    return {
+        "task/goals_reached": state.n_reached.astype(float),
+        "task/goals_missed": state.n_missed.astype(float),
+        "is_success": succeeded(state).astype(float),
+    }
 
 
 @kernel
@@ -165,3 +198,53 @@ def _between(limits: tuple[float, float], share: float) -> float:
     """The value at a share in [0, 1] of the way from the low to the high limit."""
     low, high = limits
     return low + (high - low) * share
+
+
+def _goal_direction(now: Belief) -> Floats:
+    offset = now.task.goal_world - now.robot.tool_world
+    shorten(offset, 0.05)
+    return offset
+
+
+TASK = Task(
+    id="HRCReach-v0",
+    says="Touch goals one after another with the tool, in a volume shared with a worker.",
+    config=ReachConfig,
+    init=init,
+    reset=reset,
+    advance=advance,
+    view=view,
+    observations=(
+        ObservationTerm(
+            "goal_from_tool", lambda of: 3, "m", "world", 3.0, 0.5,
+            "From the tool point to the goal.",
+            lambda now: now.task.goal_world - now.robot.tool_world,
+        ),
+        ObservationTerm(
+            "goal_direction", lambda of: 3, "-", "world", 1.0, 1.0,
+            "The same, divided by its length plus 5 cm.",
+            _goal_direction,
+        ),
+        ObservationTerm(
+            "goal_time_left", lambda of: 1, "s", "-", 10.0, 4.0,
+            "Time until the goal is missed.",
+            lambda now: now.task.time_left_s,
+        ),
+    ),
+    rewards=(
+        RewardTerm(
+            "progress",
+            "Metres that the tool came nearer to its goal, times `task.progress_per_m`.",
+            lambda now, step, previous, config: config.progress_per_m * step.progress_m,
+        ),
+        RewardTerm(
+            "goal",
+            "`task.goal_bonus` in the step in which a goal is reached.",
+            lambda now, step, previous, config: np.multiply(config.goal_bonus, step.reached),
+        ),
+    ),
+    info=info,
+    achieved="task/goals_reached",
+    failed="task/goals_missed",
+    markers=lambda view: view.goal_world[:, None],
+)  # fmt: skip

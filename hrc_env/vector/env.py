@@ -10,7 +10,6 @@ environments and of threads. What it says, and in which form, is what gymnasium'
 
 from collections.abc import Mapping, Sequence
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,24 +18,13 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from hrc_env.config import (
-    HRCConfig,
-    resolve,
-    with_appearance,
-    with_cameras,
-    with_faults,
-    with_motions,
-    with_people,
-)
+from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.stateful import Stateful
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.env import RENDER_MODES, PlainSpec, check_render_mode, spaces
-from hrc_env.motion.generator import Clip, PeopleConfig
-from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.render.views import PICTURE_SIZE, Views, picture_size
 from hrc_env.rewards import RewardConfig
-from hrc_env.scene.domain_randomization import AppearanceConfig
 from hrc_env.simulation import Simulation, checked_action
 from hrc_env.step import StepResult
 from hrc_env.vector.infos import InfoTable, blank, table
@@ -65,15 +53,15 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
     Args:
         num_envs: how many.
         perception: "keypoints", "truth" or "none"; pictures have no batched form.
-        estimator, cameras, scene, n_workers, people, motions, faults, appearance, control,
-            config: as `HRCReachEnv`.
         render_mode: "rgb_array", "depth_array" or None.
         width, height: of what `render` gives [px].
-        max_episode_steps: the time limit; None or -1 is none.
+        max_episode_steps: the time limit; None is the task's, -1 none.
         autoreset_mode: when an environment whose episode is over starts anew: at the next
             step (default), in the same step, or not by itself ("Disabled").
         num_threads: threads that share the environments; all cores if None.
         backend: "threads"; there is no other.
+        arguments: of `HRCEnv`: task, estimator, cameras, scene, n_workers, people, motions,
+            faults, appearance, control, config.
 
     Raises:
         ConfigError: an argument that cannot work, with what would.
@@ -86,23 +74,14 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         num_envs: int,
         *,
         perception: str = "keypoints",
-        estimator: str = "particle",
-        cameras: str | Path | Sequence[Any] | NDArray[Any] | None = None,
-        scene: str = "lab",
-        n_workers: int | tuple[int, int] = 1,
-        people: str | PeopleConfig | Mapping[str, Any] | None = None,
-        motions: Sequence[str | Path | Clip] | None = None,
-        faults: Sequence[FaultConfig | Mapping[str, Any]] | None = None,
-        appearance: str | AppearanceConfig | Mapping[str, Any] | None = None,
-        control: str = "joint",
         render_mode: str | None = None,
         width: int = PICTURE_SIZE[0],
         height: int = PICTURE_SIZE[1],
-        config: HRCConfig | Mapping[str, Any] | None = None,
-        max_episode_steps: int | None = 250,
+        max_episode_steps: int | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         num_threads: int | None = None,
         backend: str = "threads",
+        **arguments: Any,
     ) -> None:
         if perception == "pixels":
             raise ConfigError(
@@ -115,21 +94,10 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         self.num_envs = count_of(num_envs)
         self.autoreset_mode = autoreset_of(autoreset_mode)
         self.render_mode = render_mode
-        given = with_motions(with_people(resolve(config), people), motions)
-        given = with_appearance(given, appearance)
-        self.config, used = with_cameras(with_faults(given, faults), cameras)
-        make = partial(
-            Simulation,
-            perception=perception,
-            estimator=estimator,
-            cameras=used,
-            scene=scene,
-            n_workers=n_workers,
-            control=control,
-            config=self.config,
-        )
+        settings = settle(perception=perception, **arguments)
+        self.config = settings.config
         n_shards = min(threads_of(num_threads), self.num_envs)
-        self.shards = Shards(self.num_envs, n_shards, make)
+        self.shards = Shards(self.num_envs, n_shards, partial(Simulation, settings=settings))
         self.views = [Views(part) for part in self.shards.parts]
         self.single_observation_space, self.single_action_space = spaces(self.shards.first)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
@@ -141,7 +109,8 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         }
         self._streams: list[Stream | None] = [None] * self.num_envs
         self._action_shape = (self.num_envs, self.shards.first.n_actions)
-        self.max_episode_steps = time_limit(max_episode_steps)
+        limit = settings.task.max_episode_steps if max_episode_steps is None else max_episode_steps
+        self.max_episode_steps = time_limit(limit)
         self._steps = np.zeros(self.num_envs, int)
         self._ended = np.zeros(self.num_envs, bool)
         self._observation: Observations | None = None

@@ -1,4 +1,4 @@
-"""What `gymnasium.make_vec("HRCReach-v0", ...)` calls: the batch, or processes for pictures."""
+"""What `gymnasium.make_vec` calls: the batch, or processes for pictures."""
 
 from functools import partial
 from typing import Any
@@ -8,6 +8,8 @@ from gymnasium.vector import AsyncVectorEnv, AutoresetMode, VectorEnv
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.machine import n_cores
+from hrc_env.tasks import DEFAULT
+from hrc_env.tasks.task import task_called
 from hrc_env.vector.env import HRCVectorEnv
 
 PROCESSES_PER_CORE = 2
@@ -52,5 +54,6 @@ def _processes(
         )
     if num_threads is not None:
         raise ConfigError('perception="pixels" is processes, not threads: leave out num_threads.')
-    make = partial(gymnasium.make, "hrc_env:HRCReach-v0", perception="pixels", **kwargs)
+    task = task_called(kwargs.pop("task", DEFAULT)).id
+    make = partial(gymnasium.make, f"hrc_env:{task}", perception="pixels", **kwargs)
     return AsyncVectorEnv([make] * num_envs, context="spawn", autoreset_mode=autoreset_mode)

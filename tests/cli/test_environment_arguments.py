@@ -13,23 +13,23 @@ from hrc_env.cli.demo import Demo
 from hrc_env.cli.environment import EnvironmentArguments, cameras_named, read_config
 from hrc_env.cli.play import Play
 from hrc_env.cli.train import Train
-from hrc_env.config import resolve
+from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError
-from hrc_env.env import HRCReachEnv
+from hrc_env.env import HRCEnv
 
 OF_RENDER = {"render_mode", "width", "height"}
 """What only `render` reads, which no command calls: films have a form of their own."""
 
 
 def test_commands_take_what_the_environment_takes():
-    taken = set(inspect.signature(HRCReachEnv).parameters) - OF_RENDER
+    taken = set(inspect.signature(HRCEnv).parameters) - OF_RENDER
     assert {field.name for field in fields(EnvironmentArguments)} == taken
     for command in (Play, Demo, Train):
         assert issubclass(command, EnvironmentArguments)
 
 
 def test_nothing_said_is_the_environments_own_default():
-    parameters = inspect.signature(HRCReachEnv).parameters
+    parameters = inspect.signature(HRCEnv).parameters
     assert all(parameters[name].default == value for name, value in Play().keywords().items())
 
 
@@ -43,13 +43,13 @@ def test_everything_said_reaches_the_environment():
     keywords = json.loads(json.dumps(arguments.keywords()))  # as a checkpoint keeps them
     env = gymnasium.make("HRCReach-v0", **keywords)
     inner = env.unwrapped
-    assert isinstance(inner, HRCReachEnv)
+    assert isinstance(inner, HRCEnv)
     simulation, config = inner.simulation, inner.config
     assert [camera.name for camera in simulation.scene.cameras] == ["camera_2", "camera_1"]
     assert (simulation.perception, simulation.settings["estimator"]) == ("keypoints", "kalman")
     assert (simulation.scene.name, simulation.control) == ("site", "tool")
     assert list(simulation.settings["n_workers"]) == [1, 2]
-    assert config.motion.people != resolve({}).motion.people
+    assert config.motion.people != settle().config.motion.people
     assert [(fault.kind, fault.how_much) for fault in config.faults] == [("late", 0.2)]
     assert (config.reward.proximity, config.worker) == (0.5, "any")
     env.close()
@@ -69,12 +69,16 @@ def test_cameras_are_a_rig_a_file_or_names_and_numbers():
 
 
 def test_changes_come_from_words_and_files_and_later_ones_win(tmp_path: Path):
-    (tmp_path / "a.toml").write_text("ctrl_dt = 0.08\n[reward]\ngoal = 1.0\neffort = 0.1\n")
-    (tmp_path / "b.json").write_text('{"reward": {"goal": 2.0}}')
+    (tmp_path / "a.toml").write_text("ctrl_dt = 0.08\n[reward]\nsmoothness = 1.0\neffort = 0.1\n")
+    (tmp_path / "b.json").write_text('{"reward": {"smoothness": 2.0}}')
     words = [str(tmp_path / "a.toml"), str(tmp_path / "b.json"), "reward.effort=0.3", "worker=any"]
     config = read_config(words)
-    assert config == {"ctrl_dt": 0.08, "reward": {"goal": 2.0, "effort": 0.3}, "worker": "any"}
-    assert resolve(config).reward.goal == 2.0
+    assert config == {
+        "ctrl_dt": 0.08,
+        "reward": {"smoothness": 2.0, "effort": 0.3},
+        "worker": "any",
+    }
+    assert settle(config=config).config.reward.smoothness == 2.0
 
 
 @pytest.mark.parametrize(
@@ -142,5 +146,5 @@ def test_a_film_is_told_with_its_units(tmp_path: Path, monkeypatch, capsys):
 
 def test_training_weighs_safety_as_config_says_where_both_say():
     assert Train(proximity=0.5).keywords()["config"] == {"reward": {"proximity": 0.5}}
-    both = Train(proximity=0.5, config=("reward.proximity=1", "reward.goal=3")).keywords()
-    assert both["config"] == {"reward": {"proximity": 1, "goal": 3}}
+    both = Train(proximity=0.5, config=("reward.proximity=1", "reward.effort=3")).keywords()
+    assert both["config"] == {"reward": {"proximity": 1, "effort": 3}}

@@ -78,7 +78,7 @@ def test_the_same_seed_is_chosen_every_time_and_is_the_closest():
     seeds, kwargs = range(3), {"n_steps": 40, "perception": "truth"}
     chosen = film.nearest_seed(scripted, seeds, **kwargs)
     assert film.nearest_seed(scripted, seeds, **kwargs) == chosen
-    env = film.HRCReachEnv(perception="truth")
+    env = film.HRCEnv(perception="truth")
     closest_m = {seed: film._closest_m(env, scripted, seed, 40) for seed in seeds}
     env.close()
     assert closest_m[chosen] == min(each for each in closest_m.values() if each > film.CLOSE_M)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hrc_env.cli.frame import LEGEND_HEIGHT, RIGHT_X, TITLE_Y, Diary, compose, legend, strip
-from hrc_env.env import HRCReachEnv
+from hrc_env.env import HRCEnv
 from hrc_env.render import overlay
 
 
@@ -31,7 +31,7 @@ def test_the_legend_names_what_a_level_shows():
 
 def test_the_strip_counts_goals_and_marks_steps_that_cost():
     plain = strip(a_diary(), 0.04, 0.15)
-    scored = strip(a_diary(reached=3, missed=1), 0.04, 0.15)
+    scored = strip(a_diary(counts={"goals reached": 3.0, "goals missed": 1.0}), 0.04, 0.15)
     assert not np.array_equal(plain[:, :280], scored[:, :280])
     np.testing.assert_array_equal(plain[:, 280:], scored[:, 280:])
     costly = a_diary()
@@ -42,19 +42,19 @@ def test_the_strip_counts_goals_and_marks_steps_that_cost():
 def test_a_diary_goes_on_without_its_copy():
     diary = a_diary()
     copy = diary.copy()
-    diary.note({"cost": 1.0, "task/goals_reached": 2.0, "task/goals_missed": 0.0}, 0.5)
+    diary.note({"cost": 1.0}, 0.5, {"goals reached": 2.0})
     assert len(copy.cost) == len(copy.true_m) == len(copy.estimated_m) == 20
-    assert (copy.reached, diary.reached) == (0, 2)
+    assert (copy.counts, diary.counts) == ({}, {"goals reached": 2.0})
     assert diary.true_m[-1] == np.inf  # nobody there
 
 
 @pytest.mark.parametrize("level", ["keypoints", "none"])
 def test_a_frame_is_full_at_levels_without_crops(level):
-    env = HRCReachEnv(perception=level)
+    env = HRCEnv(perception=level)
     env.reset(seed=7)
     *_, info = env.step(np.zeros(6))
     diary = Diary()
-    diary.note(info, 0.5)
+    diary.note(info, 0.5, {})
     frame = compose(env, diary)
     env.close()
     assert frame.shape == (900, 1600, 3)

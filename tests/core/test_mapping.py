@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
-from hrc_env.config import resolve, with_appearance, with_cameras, with_faults, with_people
+from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.mapping import from_mapping, plain
 
@@ -47,23 +47,23 @@ def camera(**other):
 )
 def test_a_nested_value_that_cannot_work_is_called_by_its_path(config, said):
     with pytest.raises(ConfigError, match=said):
-        resolve(config)
+        settle(config=config)
 
 
 @pytest.mark.parametrize(
     ("refused", "said"),
     [
-        (lambda c: with_people(c, {"tempo": -1}), r"^people\.tempo must be 0 or more"),
-        (lambda c: with_appearance(c, {"litter": 999}), r"^appearance\.litter must be from"),
-        (lambda c: with_cameras(c, [{"name": "a", "eye_world": EYE, "rate_hz": -1}]),
+        ({"people": {"tempo": -1}}, r"^people\.tempo must be 0 or more"),
+        ({"appearance": {"litter": 999}}, r"^appearance\.litter must be from"),
+        ({"cameras": [{"name": "a", "eye_world": EYE, "rate_hz": -1}]},
          r"^Camera 'a': cameras\[0\]\.rate_hz must"),
-        (lambda c: with_faults(c, [{"kind": "late", "cameras": [0], "amount": 9}]),
+        ({"faults": [{"kind": "late", "cameras": [0], "amount": 9}]},
          r"^faults\[0\]: Fault 'late': amount must"),
     ],
 )  # fmt: skip
 def test_so_is_one_of_a_keyword_argument(refused, said):
     with pytest.raises(ConfigError, match=said):
-        refused(resolve(None))
+        settle(**refused)
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,9 @@ def test_only_the_fields_themselves_are_called_by_their_path():
 
 
 def test_numbers_of_numpy_are_numbers():
-    config = resolve({"task": {"radius_m": np.float32(0.25)}, "tracker": {"paper_iterations": 2}})
+    config = settle(
+        config={"task": {"radius_m": np.float32(0.25)}, "tracker": {"paper_iterations": 2}}
+    ).config
     assert config.task.radius_m == 0.25
     assert type(config.task.radius_m) is float
 
@@ -94,3 +96,8 @@ def test_plain_values_are_what_json_has():
     assert plain(value) == {"a": (1, ["b.toml"]), "mode": AutoresetMode.SAME_STEP.value}
     assert plain(np.eye(2)) == [[1.0, 0.0], [0.0, 1.0]]
     assert plain(len) is len
+
+
+def test_a_field_that_is_called_otherwise_now_says_so():
+    with pytest.raises(ConfigError, match=r"'reward\.goal' is 'task\.goal_bonus' now"):
+        settle(config={"reward": {"goal": 1.0}})

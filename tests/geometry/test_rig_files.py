@@ -7,7 +7,7 @@ import pytest
 
 from hrc_env.config import HRCConfig, with_cameras
 from hrc_env.core.errors import ConfigError
-from hrc_env.env import HRCReachEnv
+from hrc_env.env import HRCEnv
 from hrc_env.geometry.camera_config import CameraConfig, made
 from hrc_env.geometry.rig_files import read_rig, write_rig
 from hrc_env.scene.build import SceneConfig, build
@@ -85,12 +85,12 @@ def test_cameras_are_names_places_records_or_a_file(tmp_path):
 )
 def test_what_is_no_rig_is_refused(cameras, said):
     with pytest.raises(ConfigError, match=said):
-        HRCReachEnv(perception="keypoints", cameras=cameras)
+        HRCEnv(perception="keypoints", cameras=cameras)
 
 
 def test_sixteen_cameras_work():
     angle = np.linspace(0, 2 * np.pi, 16, endpoint=False)
-    env = HRCReachEnv(
+    env = HRCEnv(
         perception="keypoints", cameras=[(2.8 * np.cos(a), 2.5 * np.sin(a), 2.3) for a in angle]
     )
     env.reset(seed=0)
@@ -102,7 +102,7 @@ def test_sixteen_cameras_work():
 def test_a_wide_lens_is_tracked_as_well_as_a_pinhole():
     errors = {}
     for rig in ("lab", "lab_gopro"):
-        env = HRCReachEnv(perception="keypoints", cameras=rig)
+        env = HRCEnv(perception="keypoints", cameras=rig)
         env.reset(seed=4)
         infos = [env.step(np.zeros(6))[4] for _ in range(60)]
         errors[rig] = np.median([info["tracking/mpjpe_m"] for info in infos[10:]])
@@ -111,7 +111,7 @@ def test_a_wide_lens_is_tracked_as_well_as_a_pinhole():
 
 def test_one_camera_works_and_it_is_said_what_is_lost():
     with pytest.warns(UserWarning, match="One camera, 'camera_2'.*depth"):
-        env = HRCReachEnv(perception="keypoints", cameras=["camera_2"])
+        env = HRCEnv(perception="keypoints", cameras=["camera_2"])
     env.reset(seed=0)
     assert "tracking/lost" in [env.step(np.zeros(6)) for _ in range(10)][-1][4]
 
@@ -126,7 +126,7 @@ def test_one_camera_works_and_it_is_said_what_is_lost():
 def test_a_poorly_hung_camera_is_told_what_it_sees(eye, target, said):
     poor = CameraConfig("poor", eye, target)
     with pytest.warns(UserWarning, match=said):
-        HRCReachEnv(perception="keypoints", cameras=[poor, (-2.0, 2.0, 2.3)])
+        HRCEnv(perception="keypoints", cameras=[poor, (-2.0, 2.0, 2.3)])
 
 
 def test_the_scenes_own_rigs_see_their_workspace():

@@ -6,11 +6,11 @@ import pickle
 import numpy as np
 import pytest
 
-from hrc_env.config import resolve
+from hrc_env.config import settle
 from hrc_env.core.batching import mapped, one
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Roi, WorkerPath
-from hrc_env.env import HRCReachEnv
+from hrc_env.env import HRCEnv
 from hrc_env.motion import generator, workers
 from hrc_env.scene.build import build
 from hrc_env.scene.physics import Physics
@@ -24,7 +24,7 @@ PUSH = np.full(6, 0.3, np.float32)
 
 
 def made(n_workers=3, perception="truth", config=ANY):
-    return HRCReachEnv(perception=perception, n_workers=n_workers, config=config)
+    return HRCEnv(perception=perception, n_workers=n_workers, config=config)
 
 
 def test_every_worker_of_an_episode_is_somebody_else():
@@ -185,4 +185,4 @@ def rest_of(motion):
 )
 def test_bodies_that_there_are_not_are_refused_with_those_that_there_are(worker, words):
     with pytest.raises(ConfigError, match=words):
-        resolve({"worker": worker})
+        settle(config={"worker": worker})

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from recorded import joined, started, walk_straight, watched
 
-from hrc_env.config import resolve, with_motions
+from hrc_env.config import settle
 from hrc_env.core.batching import one
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import WorkerMotion
@@ -123,16 +123,14 @@ def test_motions_come_as_paths_or_clips(clip, tmp_path):
     path = tmp_path / "walk.npz"
     save_clip(clip, path)
     assert load_clip(path) == clip
-    by_path = resolve({"motion": {"motions": [str(path)]}})
-    assert by_path == with_motions(resolve(None), [path])
-    assert with_motions(resolve(None), [clip]).motion.motions == (clip,)
-    assert with_motions(by_path, None) is by_path
+    by_path = settle(config={"motion": {"motions": [str(path)]}}).config
+    assert by_path == settle(motions=[path]).config
+    assert settle(motions=[clip]).config.motion.motions == (clip,)
+    assert settle(config=by_path, motions=None).config.motion is by_path.motion
     with pytest.raises(ConfigError, match="paths or clips"):
-        with_motions(resolve(None), [3])
+        settle(motions=[3])
     with pytest.raises(ConfigError, match="There is no clip"):
-        generator.make_state(
-            1, 1, BODY, with_motions(resolve(None), [tmp_path / "none.npz"]).motion
-        )
+        generator.make_state(1, 1, BODY, settle(motions=[tmp_path / "none.npz"]).config.motion)
 
 
 def test_the_same_seed_plays_the_same(clip):

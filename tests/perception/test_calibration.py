@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from hrc_env.config import resolve
+from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError
 from hrc_env.perception.calibration import (
     PACKAGED,
@@ -49,7 +49,7 @@ def test_shares_of_errors_add_up_to_one():
 def test_a_file_of_another_version_is_refused_with_the_command_that_makes_a_new_one(tmp_path):
     path = changed(tmp_path, version=VERSION + 1)
     with pytest.raises(ConfigError, match=f"version {VERSION + 1}.*calibrate-keypoints --out"):
-        resolve({"emulator": {"calibration": str(path)}})
+        settle(config={"emulator": {"calibration": str(path)}})
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "\x00", '{"format": "something else"}'])
@@ -62,7 +62,7 @@ def test_a_broken_file_is_refused(tmp_path, text):
 
 def test_a_file_that_is_not_there_is_refused():
     with pytest.raises(ConfigError, match="cannot be read"):
-        resolve({"emulator": {"calibration": "nowhere.json"}})
+        settle(config={"emulator": {"calibration": "nowhere.json"}})
 
 
 def test_a_missing_table_is_named(tmp_path):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hrc_env.env import HRCReachEnv
+from hrc_env.env import HRCEnv
 from hrc_env.geometry.cameras import project
 from hrc_env.render.stage import Stage
 from hrc_env.scene.layers import QUALITY, Layers, Place, viewpoint
@@ -16,7 +16,7 @@ SIZE = (240, 180)
 
 @pytest.fixture(scope="module")
 def env():
-    env = HRCReachEnv(perception="truth")
+    env = HRCEnv(perception="truth")
     env.reset(seed=7)
     for _ in range(10):
         env.step(np.full(6, 0.3))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.env import HRCReachEnv
+from hrc_env.env import HRCEnv
 from hrc_env.vector.env import HRCVectorEnv
 
 
@@ -44,20 +44,20 @@ def test_pictures_of_many_have_that_size_too():
 )
 def test_a_size_that_cannot_be_is_told_what_can(size, said):
     with pytest.raises(ConfigError, match=said):
-        HRCReachEnv(perception="none", render_mode="rgb_array", **size)
+        HRCEnv(perception="none", render_mode="rgb_array", **size)
     with pytest.raises(ConfigError, match=said):
         HRCVectorEnv(2, perception="none", render_mode="rgb_array", **size)
 
 
 def test_who_asks_for_a_window_is_told_how_to_get_one():
     with pytest.raises(ConfigError, match="HumanRendering"):
-        HRCReachEnv(perception="none", render_mode="human")
+        HRCEnv(perception="none", render_mode="human")
 
 
 def test_rendering_changes_nothing_that_happens():
     seen = []
     for mode in (None, "rgb_array"):
-        env = HRCReachEnv(perception="keypoints", render_mode=mode, width=64, height=64)
+        env = HRCEnv(perception="keypoints", render_mode=mode, width=64, height=64)
         env.reset(seed=4)
         rows = []
         for k in range(6):
@@ -69,7 +69,7 @@ def test_rendering_changes_nothing_that_happens():
 
 
 def test_a_glance_stays_while_the_environment_goes_on():
-    env = HRCReachEnv(perception="keypoints")
+    env = HRCEnv(perception="keypoints")
     env.reset(seed=7)
     for _ in range(5):
         env.step(np.zeros(6))
@@ -85,11 +85,11 @@ def test_a_glance_stays_while_the_environment_goes_on():
 
 
 def test_what_is_believed_is_drawn_without_the_truth():
-    env = HRCReachEnv(perception="none")
+    env = HRCEnv(perception="none")
     env.reset(seed=7)
     seen = env.views.glance()
     env.reset(seed=8)  # another worker, of whom nothing is known
-    other = replace(env.views.glance(), q=seen.q, goal_world=seen.goal_world)
+    other = replace(env.views.glance(), q=seen.q, markers_world=seen.markers_world)
     assert not np.array_equal(seen.motion.position_world, other.motion.position_world)
     first, second = (env.views.beliefs(200, 110, each) for each in (seen, other))
     for before, after in zip(first, second, strict=True):
@@ -99,7 +99,7 @@ def test_what_is_believed_is_drawn_without_the_truth():
 
 
 def test_crops_are_what_the_network_was_given(weights):
-    env = HRCReachEnv(perception="pixels")
+    env = HRCEnv(perception="pixels")
     env.reset(seed=7)
     env.step(np.zeros(6))
     given = env.simulation.senses.crops(0)

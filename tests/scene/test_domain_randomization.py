@@ -5,7 +5,7 @@ import pytest
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Roi
-from hrc_env.env import HRCReachEnv
+from hrc_env.env import HRCEnv
 from hrc_env.scene.build import build
 from hrc_env.scene.domain_randomization import (
     APPEARANCES,
@@ -65,7 +65,7 @@ def test_what_cannot_be_is_refused(field, value, words):
         AppearanceConfig(**{field: value})
 
 
-@pytest.mark.parametrize("make", [HRCReachEnv, lambda **k: HRCVectorEnv(2, **k)])
+@pytest.mark.parametrize("make", [HRCEnv, lambda **k: HRCVectorEnv(2, **k)])
 def test_without_images_looks_are_refused(make):
     with pytest.raises(ConfigError, match="Looks are of images"):
         make(perception="keypoints", appearance="varied")
@@ -74,13 +74,13 @@ def test_without_images_looks_are_refused(make):
 @pytest.mark.parametrize("given", ["wild", {"lamp": 1.0}, 3])
 def test_an_unknown_appearance_is_answered_in_words(given):
     with pytest.raises(ConfigError, match=r"appearance|Unknown"):
-        HRCReachEnv(perception="keypoints", appearance=given)
+        HRCEnv(perception="keypoints", appearance=given)
 
 
 def test_a_mapping_and_a_name_say_the_same():
-    env = HRCReachEnv(perception="keypoints", appearance="as_built")
+    env = HRCEnv(perception="keypoints", appearance="as_built")
     assert env.config.appearance == AS_BUILT
-    assert HRCReachEnv(perception="truth", appearance={"hat": 1.0}).config.appearance == AS_BUILT
+    assert HRCEnv(perception="truth", appearance={"hat": 1.0}).config.appearance == AS_BUILT
 
 
 def test_a_look_changes_the_picture_and_what_is_kept_of_it_is_the_same():
@@ -120,11 +120,11 @@ def test_hats_come_off_and_lamps_stay_above():
 def test_the_world_is_that_of_the_same_seed_without():
     walks = []
     for appearance in (None, "varied"):
-        env = HRCReachEnv(appearance=appearance)
+        env = HRCEnv(appearance=appearance)
         env.reset(seed=5)
         env.step(np.zeros(6, np.float32))
         simulation = env.simulation
-        walks.append((simulation.motion.plan.copy(), simulation.task.goal_world.copy()))
+        walks.append((simulation.motion.plan.copy(), simulation.task_state.goal_world.copy()))
         if appearance:
             assert env.simulation.senses.look_of(0) is not None
             state = env.get_state()

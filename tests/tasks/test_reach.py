@@ -1,26 +1,35 @@
 """Goals one after another: reached, missed, replaced."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.tasks import reach
+from hrc_env.tasks.task import World
 
 CONFIG = reach.ReachConfig()
+
+
+def tools_at(tool_world):
+    return World(SimpleNamespace(tool_world=tool_world))
+
+
 EVERYONE = np.array([0, 1])
 
 
 def two_environments():
-    state = reach.make_state(2)
+    state = reach.init(2)
     rngs = [np.random.default_rng(seed) for seed in (1, 2)]
-    reach.reset(state, EVERYONE, rngs, np.zeros((2, 3)), CONFIG)
+    reach.reset(state, EVERYONE, rngs, tools_at(np.zeros((2, 3))), CONFIG)
     return state, rngs
 
 
 def test_goals_lie_in_the_stated_volume():
     state, rngs = two_environments()
     for _ in range(200):
-        reach.reset(state, EVERYONE, rngs, np.zeros((2, 3)), CONFIG)
+        reach.reset(state, EVERYONE, rngs, tools_at(np.zeros((2, 3))), CONFIG)
         offset = state.goal_world[:, :2] - CONFIG.base_xy_world
         distance, azimuth = np.hypot(*offset.T), np.arctan2(offset[:, 1], offset[:, 0])
         assert ((distance >= 0.5) & (distance <= 0.95)).all()
@@ -32,7 +41,7 @@ def test_a_goal_that_is_touched_counts_and_is_replaced():
     state, rngs = two_environments()
     old = state.goal_world.copy()
     tools = np.array([old[0] + [0.03, 0, 0], np.zeros(3)])
-    step = reach.advance(state, rngs, tools, 0.04, CONFIG)
+    step = reach.advance(state, rngs, tools_at(tools), 0.04, CONFIG)
     assert step.reached.tolist() == [True, False]
     assert state.n_reached.tolist() == [1, 0]
     assert (state.goal_world[0] != old[0]).any()
@@ -43,13 +52,16 @@ def test_progress_is_by_how_much_the_tool_came_nearer():
     state, rngs = two_environments()
     before = np.linalg.norm(state.goal_world, axis=1)
     tools = 0.25 * state.goal_world
-    step = reach.advance(state, rngs, tools, 0.04, CONFIG)
+    step = reach.advance(state, rngs, tools_at(tools), 0.04, CONFIG)
     np.testing.assert_allclose(step.progress_m, 0.25 * before)
 
 
 def test_a_goal_is_missed_after_its_time_and_not_a_step_earlier():
     state, rngs = two_environments()
-    missed = [reach.advance(state, rngs, np.zeros((2, 3)), 0.04, CONFIG).missed for _ in range(100)]
+    missed = [
+        reach.advance(state, rngs, tools_at(np.zeros((2, 3))), 0.04, CONFIG).missed
+        for _ in range(100)
+    ]
     assert [bool(each[0]) for each in missed] == [False] * 99 + [True]
     assert state.n_missed.tolist() == [1, 1]
     assert not reach.succeeded(state).any()
@@ -57,8 +69,10 @@ def test_a_goal_is_missed_after_its_time_and_not_a_step_earlier():
 
 def test_an_environment_draws_from_its_own_stream_only():
     both, _ = two_environments()
-    alone = reach.make_state(1)
-    reach.reset(alone, np.array([0]), [np.random.default_rng(2)], np.zeros((1, 3)), CONFIG)
+    alone = reach.init(1)
+    reach.reset(
+        alone, np.array([0]), [np.random.default_rng(2)], tools_at(np.zeros((1, 3))), CONFIG
+    )
     np.testing.assert_array_equal(alone.goal_world[0], both.goal_world[1])
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hrc_env.env import HRCReachEnv
+from hrc_env.env import HRCEnv
 from hrc_env.tracking.miscalibration import MISCALIBRATED, MiscalibrationFlags
 from hrc_env.vector.env import HRCVectorEnv
 
@@ -20,31 +20,31 @@ def last_info(env, steps, seed=3):
 
 
 def test_a_knocked_camera_is_named():
-    env = HRCReachEnv(perception="keypoints", faults=KNOCKED)
+    env = HRCEnv(perception="keypoints", faults=KNOCKED)
     assert last_info(env, 60)[MISCALIBRATED] == ("camera_3",)
 
 
 def test_nobody_is_named_without_a_fault():
-    env = HRCReachEnv(perception="keypoints")
+    env = HRCEnv(perception="keypoints")
     assert last_info(env, 60)[MISCALIBRATED] == ()
 
 
 @pytest.mark.parametrize("kind", ["frozen", "out_of_step", "late"])
 def test_bad_cameras_in_their_right_place_are_not_named(kind):
-    env = HRCReachEnv(perception="keypoints", faults=[{"kind": kind, "cameras": ["camera_3"]}])
+    env = HRCEnv(perception="keypoints", faults=[{"kind": kind, "cameras": ["camera_3"]}])
     assert last_info(env, 100)[MISCALIBRATED] == ()
 
 
 @pytest.mark.parametrize("level", ["truth", "none"])
 def test_levels_without_cameras_say_nothing(level):
-    env = HRCReachEnv(perception=level)
+    env = HRCEnv(perception=level)
     assert MISCALIBRATED not in env.reset(seed=0)[1]
     assert MISCALIBRATED not in env.step(REST)[-1]
 
 
 def test_a_vector_names_what_its_environments_would():
     env = HRCVectorEnv(3, perception="keypoints", faults=KNOCKED, num_threads=1)
-    single = HRCReachEnv(perception="keypoints", faults=KNOCKED)
+    single = HRCEnv(perception="keypoints", faults=KNOCKED)
     env.reset(seed=2)
     last_info(single, 40)
     for _ in range(40):
@@ -60,7 +60,7 @@ def test_a_vector_names_what_its_environments_would():
 
 
 def test_what_is_suspected_is_part_of_the_state():
-    env = HRCReachEnv(perception="keypoints", faults=KNOCKED)
+    env = HRCEnv(perception="keypoints", faults=KNOCKED)
     last_info(env, 35)
     state = env.get_state()
     first = [env.step(REST)[-1][MISCALIBRATED] for _ in range(20)]
@@ -69,7 +69,7 @@ def test_what_is_suspected_is_part_of_the_state():
 
 
 def test_a_reset_forgets():
-    env = HRCReachEnv(perception="keypoints", faults=KNOCKED)
+    env = HRCEnv(perception="keypoints", faults=KNOCKED)
     assert last_info(env, 60)[MISCALIBRATED] == ("camera_3",)
     assert env.reset(seed=4)[1][MISCALIBRATED] == ()
 

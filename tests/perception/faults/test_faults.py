@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.env import HRCReachEnv
+from hrc_env.env import HRCEnv
 from hrc_env.perception.faults.fault import KINDS, FaultConfig
 from hrc_env.perception.faults.schedule import Frame, Schedule
 from hrc_env.scene.rig import LAB_CAMERAS, pinholes
@@ -32,7 +32,7 @@ def film(plan, c=0, n=12, seed=7):
 
 
 def rolled(n_steps=40, seed=7, **kwargs):
-    env = HRCReachEnv(**{"perception": "keypoints", **kwargs})
+    env = HRCEnv(**{"perception": "keypoints", **kwargs})
     env.reset(seed=seed)
     infos = [env.step(np.zeros(6))[4] for _ in range(n_steps)]
     env.close()
@@ -68,7 +68,7 @@ def test_an_index_of_no_camera_is_refused_with_those_that_are(choice):
 
 def test_the_environment_counts_a_faults_cameras_among_those_that_it_uses():
     """As the rows of its arrays are; `cameras` itself counts those that hang in the scene."""
-    env = HRCReachEnv(
+    env = HRCEnv(
         perception="keypoints", cameras=["camera_3", 0],
         faults=[{"kind": "lost", "cameras": [np.int64(0)]}],
     )  # fmt: skip
@@ -149,7 +149,7 @@ def test_a_batch_with_faults_is_its_environments_one_by_one(kind):
     together = [batch.reset(seed=10)[0]]
     together += [batch.step(np.zeros((3, 6)))[0] for _ in range(12)]
     for k in range(3):
-        env = HRCReachEnv(perception="keypoints", faults=faults)
+        env = HRCEnv(perception="keypoints", faults=faults)
         alone = [env.reset(seed=10 + k)[0]]
         alone += [env.step(np.zeros(6))[0] for _ in range(12)]
         np.testing.assert_array_equal([each[k] for each in together], alone)
@@ -161,7 +161,7 @@ def test_an_episode_goes_on_from_a_pickle_in_the_middle_of_a_fault():
         FaultConfig("late", ("camera_1",), 0.12),
         FaultConfig("frozen", ("camera_2",), None, 0.2),
     ]
-    env = HRCReachEnv(perception="keypoints", faults=faults)
+    env = HRCEnv(perception="keypoints", faults=faults)
     env.reset(seed=1)
     for _ in range(8):
         env.step(np.zeros(6))
@@ -201,18 +201,18 @@ def test_of_somebody_who_walks_late_images_tell_more_than_images_that_claim_to_b
 )
 def test_what_is_no_fault_is_refused_in_words(fault, said):
     with pytest.raises(ConfigError, match=said):
-        HRCReachEnv(perception="keypoints", faults=[fault])
+        HRCEnv(perception="keypoints", faults=[fault])
 
 
 @pytest.mark.parametrize("faults", ["lost", {"kind": "lost"}, 3, FaultConfig("lost", ("all",))])
 def test_faults_are_a_list(faults):
     with pytest.raises(ConfigError, match="list"):
-        HRCReachEnv(perception="keypoints", faults=faults)
+        HRCEnv(perception="keypoints", faults=faults)
 
 
 def test_faults_without_cameras_are_refused():
     with pytest.raises(ConfigError, match="Faults are of cameras"):
-        HRCReachEnv(perception="truth", faults=[FaultConfig("lost", ("all",))])
+        HRCEnv(perception="truth", faults=[FaultConfig("lost", ("all",))])
 
 
 def test_faults_are_part_of_the_config_too():

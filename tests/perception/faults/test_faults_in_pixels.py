@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from hrc_env.env import HRCReachEnv
+from hrc_env.env import HRCEnv
 from hrc_env.perception.faults.fault import KINDS, FaultConfig
 
 pytestmark = pytest.mark.usefixtures("pixels")
 
 
 def rolled(n_steps, *faults, seed=3, **kwargs):
-    env = HRCReachEnv(perception="pixels", faults=faults, **kwargs)
+    env = HRCEnv(perception="pixels", faults=faults, **kwargs)
     infos = [env.reset(seed=seed)[1], *(env.step(np.zeros(6))[4] for _ in range(n_steps))]
     env.close()
     return infos
@@ -22,7 +22,7 @@ def test_cameras_that_never_look_at_once_find_a_worker_together():
         {"name": name, "eye_world": (2.9, y, 2.45), "rate_hz": rate_hz, "latency_s": latency_s}
         for name, (rate_hz, latency_s, y) in rates.items()
     ]
-    env = HRCReachEnv(cameras=cameras)
+    env = HRCEnv(cameras=cameras)
     env.reset(seed=0)
     for _ in range(14):
         env.step(np.zeros(6, np.float32))
@@ -31,7 +31,7 @@ def test_cameras_that_never_look_at_once_find_a_worker_together():
 
 
 def test_where_nobody_is_found_a_search_comes_only_now_and_then():
-    env = HRCReachEnv(n_workers=1)
+    env = HRCEnv(n_workers=1)
     searched = []
 
     def nobody(source, which):

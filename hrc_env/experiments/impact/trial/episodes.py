@@ -2,12 +2,13 @@
 
 import warnings
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 from gymnasium.utils import seeding
 
-from hrc_env.config import resolve, with_cameras, with_faults, with_people
+from hrc_env.config import settle
 from hrc_env.experiments.impact.trial.eyes import Eyes, Rig
 from hrc_env.experiments.impact.trial.judge import judge, scene_of
 from hrc_env.experiments.impact.trial.tally import Tally
@@ -73,16 +74,15 @@ class Stages:
 
 def _build(eyes: Eyes, rig: Rig, n_episodes: int, n_threads: int) -> Shards:
     """Environments with such eyes, through these cameras."""
-    config = with_faults(with_people(resolve(None), PEOPLE), eyes.faults(rig))
-    config, used = with_cameras(config, list(eyes.cameras(rig)))
+    settings = settle(
+        perception=eyes.perception, estimator=eyes.estimator, people=PEOPLE,
+        faults=eyes.faults(rig), cameras=list(eyes.cameras(rig)),
+    )  # fmt: skip
     threads = 1 if eyes.perception == "pixels" else min(n_threads, n_episodes)
-
-    def make(batch: int) -> Simulation:
-        return Simulation(batch, eyes.perception, eyes.estimator, used, "lab", 1, "joint", config)
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # that one camera is a poor rig is what we ask about
-        return Shards(n_episodes, threads, make)
+        return Shards(n_episodes, threads, partial(Simulation, settings=settings))
 
 
 def _run(

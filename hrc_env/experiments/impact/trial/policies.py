@@ -47,7 +47,7 @@ def maker(policy: Policy, checkpoint: Path) -> MakeAgent:
         if policy.name == SLOWED:
             scripted = agents("scripted")
             yielding = scripted.Yielding(STOP_M + policy.margin_m, SLOW_M + policy.margin_m)
-            return scripted.ScriptedAgent(here, yielding)
+            return scripted.expert(here, yielding)
         return base.make_agent(policy.name, here)
 
     return make

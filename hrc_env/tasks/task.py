@@ -1,0 +1,102 @@
+"""What a task is: a record of settings, functions over a batch, terms and names."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from hrc_env.core.errors import unknown
+from hrc_env.core.records import RobotState
+from hrc_env.core.typing import Floats, Ints, Points3
+from hrc_env.observations import ObservationTerm, terms_of
+from hrc_env.rewards import SHARED_TERMS, RewardTerm
+from hrc_env.tasks import BUILT_IN, EPISODE_STEPS
+
+Rngs = Sequence[np.random.Generator]
+
+
+@dataclass(frozen=True, slots=True)
+class World:
+    """What a task judges; rows are the environments in question."""
+
+    robot: RobotState
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """A task. Its state is a record (dataclass) of arrays whose rows are environments.
+
+    State, progress and view are of types of the task's own; `config` below is an instance of the
+    type of that name. `rngs` holds a generator for every environment of the batch; what happens
+    in environment b is drawn from its own only.
+    """
+
+    id: str
+    """As `gymnasium.make` knows it, "HRCName-v0"."""
+    says: str
+    """A sentence: what the robot has to do."""
+    config: type
+    """A frozen dataclass of settings, every one with a default."""
+    init: Callable[[int], Any]
+    """(batch) -> state, to be filled by `reset`."""
+    reset: Callable[[Any, Ints, Rngs, World, Any], None]
+    """(state, ids, rngs, world, config): start environments `ids` anew; world is of these."""
+    advance: Callable[[Any, Rngs, World, float, Any], Any]
+    """(state, rngs, world, dt_s, config) -> progress: move all environments on by a step."""
+    view: Callable[[Any, Ints, Any], Any]
+    """(state, ids, config) -> what robots `ids` know of their task: `Belief.task`."""
+    observations: tuple[ObservationTerm, ...]
+    """The task's part of the observation; terms read `Belief.task`."""
+    rewards: tuple[RewardTerm, ...]
+    """The task's part of the reward; the weights that these terms are given are `config`."""
+    info: Callable[[Any], Mapping[str, Floats]]
+    """(state) -> "task/..." values (B,) of the episode so far, and "is_success", 0 or 1."""
+    achieved: str
+    """The name in `info` that counts what was achieved,"""
+    failed: str
+    """and what was not, of as many attempts."""
+    markers: Callable[[Any], Points3]
+    """(view) -> (B, M, 3) points that pictures show [m]."""
+    max_episode_steps: int = EPISODE_STEPS
+
+    @property
+    def observation_terms(self) -> tuple[ObservationTerm, ...]:
+        """All of the observation, in its order: the robot, the task, the workers."""
+        return terms_of(self.observations)
+
+    @property
+    def reward_terms(self) -> tuple[RewardTerm, ...]:
+        """All of the reward: the task's, and those that every task shares."""
+        return (*self.rewards, *SHARED_TERMS)
+
+    def counts(self, info: Mapping[str, Any]) -> dict[str, Any]:
+        """What an info says of attempts, in words: {"goals reached": 3.0, "goals missed": 1.0}."""
+        names = (self.achieved, self.failed)
+        return {name.removeprefix("task/").replace("_", " "): info[name] for name in names}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A task that is known by its id is pickled as that."""
+        if TASKS.get(self.id) is self:
+            return task_called, (self.id,)
+        return Task, tuple(getattr(self, each.name) for each in fields(self))
+
+
+TASKS: dict[str, Task] = {}
+"""By id: those that have been asked for, and those that were registered."""
+
+
+def task_called(task: str | Task) -> Task:
+    """A task by its id.
+
+    Raises:
+        ConfigError: an id that nobody has registered, with those that there are.
+    """
+    if isinstance(task, Task):
+        return task
+    if task not in TASKS and task in BUILT_IN:
+        TASKS[task] = import_module(BUILT_IN[task]).TASK
+    if task not in TASKS:
+        raise unknown("task", task, sorted({*BUILT_IN, *TASKS}))
+    return TASKS[task]

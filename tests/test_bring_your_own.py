@@ -1,0 +1,128 @@
+"""The examples of bringing one's own: short, and known wherever a name is asked for."""
+
+import dataclasses
+import subprocess
+import sys
+
+import gymnasium
+import numpy as np
+import pytest
+from commands import ROOT, hrc
+
+import hrc_env
+from hrc_env.core.errors import ConfigError
+from hrc_env.registration import import_files
+from hrc_env.tasks.task import TASKS, task_called
+from hrc_env.vector.env import HRCVectorEnv
+
+EXAMPLES = ROOT / "examples" / "bring_your_own"
+TASK = "HRCTend-v0"
+
+
+@pytest.fixture(autouse=True)
+def imported():
+    import_files(str(EXAMPLES / "task.py"))
+
+
+@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.stem)
+def test_an_example_is_short(path):
+    assert len(path.read_text().splitlines()) <= 60
+
+
+def test_a_task_is_an_environment():
+    env = gymnasium.make(TASK, perception="truth", config={"task": {"radius_m": 0.5}})
+    observation, info = env.reset(seed=1)
+    assert env.observation_space.contains(observation)
+    assert info["task/visits"] == 0.0
+    for _ in range(40):
+        observation, reward, *_, info = env.step(env.action_space.sample())
+    terms = [info[name] for name in info if name.startswith("reward/")]
+    assert "reward/visit" in info
+    assert reward == pytest.approx(sum(terms))
+    assert "station" in env.unwrapped.split_observation(observation)
+    assert env.spec.kwargs["task"] == TASK
+
+
+def test_a_task_is_a_vector_environment_with_the_same_numbers():
+    many = gymnasium.make_vec(TASK, num_envs=2, perception="keypoints")
+    one = gymnasium.make(TASK, perception="keypoints")
+    seen, _ = many.reset(seed=[3, 4])
+    np.testing.assert_array_equal(seen[1], one.reset(seed=4)[0])
+    for _ in range(5):
+        actions = many.action_space.sample()
+        seen, *_ = many.step(actions)
+        np.testing.assert_array_equal(seen[1], one.step(actions[1])[0])
+
+
+def test_the_command_line_plays_a_task_that_a_file_registers(process):
+    done = subprocess.run(
+        [sys.executable, "-m", "hrc_env", "--import", EXAMPLES / "task.py", "play", TASK,
+         "--agent", "random", "--perception", "truth"],
+        cwd=ROOT, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "visits" in done.stdout
+
+
+def test_what_nobody_wrote_an_expert_for_says_so():
+    done = hrc("play", TASK, "--perception", "truth")
+    assert done.returncode == 2
+    assert "no scripted agent for HRCTend-v0" in " ".join(done.stderr.split())
+
+
+BAD = {
+    "markers that are no function": ({"id": "HRCTend-v1", "markers": None}, "markers must be"),
+    "an id that is taken": ({}, "There is a task 'HRCTend-v0' already"),
+    "an id that is none": ({"id": "tend"}, "must be like"),
+    "no function": ({"id": "HRCTend-v1", "advance": None}, "advance must be a function"),
+    "settings without defaults": (
+        {"id": "HRCTend-v1", "config": dataclasses.make_dataclass("C", ["x"])},
+        "needs a default",
+    ),
+    "a term that is taken": (
+        {"id": "HRCTend-v1", "rewards": hrc_env.rewards.SHARED_TERMS[:1]},
+        "term 'effort' already",
+    ),
+    "an info that lacks a count": (
+        {"id": "HRCTend-v1", "achieved": "task/screws"},
+        "info must hold 'task/screws'",
+    ),
+    "a state of other rows": (
+        {"id": "HRCTend-v1", "init": lambda batch: task_called(TASK).init(3)},
+        "must have shape \\(2,\\)",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_what_is_wrong_with_a_task_is_said(name):
+    changes, said = BAD[name]
+    with pytest.raises(ConfigError, match=said):
+        hrc_env.register_task(dataclasses.replace(task_called(TASK), **changes))
+
+
+def test_an_observation_that_is_no_number_is_named():
+    view = lambda state, ids, config: np.full((len(ids), 3), np.nan)  # noqa: E731
+    env = HRCVectorEnv(2, task=dataclasses.replace(TASKS[TASK], view=view), perception="none")
+    with pytest.raises(FloatingPointError, match="station"):
+        env.reset(seed=1)
+
+
+def test_an_observation_term_of_another_size_is_named():
+    term = dataclasses.replace(TASKS[TASK].observations[0], size=lambda of: 4)
+    task = dataclasses.replace(TASKS[TASK], observations=(term,))
+    with pytest.raises(ConfigError, match="observation term 'station' must have shape"):
+        HRCVectorEnv(2, task=task, perception="none").reset(seed=1)
+
+
+def test_a_reward_term_of_another_shape_is_named():
+    term = dataclasses.replace(TASKS[TASK].rewards[0], function=lambda *_: np.zeros(5))
+    env = HRCVectorEnv(2, task=dataclasses.replace(TASKS[TASK], rewards=(term,)), perception="none")
+    env.reset(seed=1)
+    with pytest.raises(ConfigError, match="reward term 'visit' must have shape"):
+        env.step(np.zeros((2, 6), np.float32))
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(ConfigError, match="cannot be imported"):
+        import_files(str(tmp_path / "nowhere.py"))
