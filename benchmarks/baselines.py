@@ -83,7 +83,7 @@ def main(arguments: Arguments) -> None:
     settings = {name: value for name, value in asdict(arguments).items() if name != "out"}
     policies = {(level, agent): learnt(arguments, level, agent) for level in ORDER for agent in PPO}
     console, metrics = Console(), dict[str, Metric]()
-    mark = fingerprint_of(settings, "benchmarks.baselines", "agents.scripted", "agents.policy")
+    mark = fingerprint_of(settings, "benchmarks.baselines", "agents.scripted", "agents.ppo")
     with progress_bar(console, "baselines") as say:
         shelf = Shelf(arguments.out / "parts", mark, len(ORDER) * len(ROWS), say)
         for level in ORDER:

@@ -25,13 +25,15 @@ from rich.table import Table
 
 from benchmarks.tracking.rigs import DT_S
 from benchmarks.tracking.tracks import Tracks, follow_own, follow_walkers
+from hrc_env.core.batching import copied
 from hrc_env.core.records import PoseEstimate
 from hrc_env.core.results import Metric, write_results
 from hrc_env.tracking.ahead import ahead
-from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.kalman import KalmanEstimator, KalmanState, motion
-from hrc_env.tracking.settings import settings_of
-from hrc_env.tracking.tree.filter import predict_all
+from hrc_env.tracking.config import ParticleConfig
+from hrc_env.tracking.hypotheses.filter import predict_all
+from hrc_env.tracking.hypotheses.slots import Hypotheses, plain
+from hrc_env.tracking.particle import ParticleEstimator
+from hrc_env.tracking.tree.state import motion
 
 mpl.use("Agg")
 HORIZONS_S = (0.1, 0.2, 0.4, 0.6, 1.0)
@@ -53,37 +55,40 @@ class Arguments:
     """Fewer and shorter sequences."""
 
 
-def hold(estimator: KalmanEstimator, state: KalmanState, horizon_s: float) -> Gaussian:
+def hold(estimator: ParticleEstimator, state: Hypotheses, horizon_s: float) -> Gaussian:
     """Nobody moves; the present covariance says nothing of the future and is not shown."""
-    return state.body[:, 0, :, :3].copy(), np.full((*state.body.shape[:1], 15, 3, 3), np.nan)
+    body = state.slots.body
+    return body[:, 0, :, :3].copy(), np.full((*body.shape[:1], 15, 3, 3), np.nan)
 
 
-def constant_velocity(estimator: KalmanEstimator, state: KalmanState, horizon_s: float) -> Gaussian:
+def constant_velocity(
+    estimator: ParticleEstimator, state: Hypotheses, horizon_s: float
+) -> Gaussian:
     """Every joint goes on; the covariance with the filter's own random acceleration."""
-    body, cov = state.body[:, 0], state.cov[:, 0]
+    body, cov = state.slots.body[:, 0], state.slots.cov[:, 0]
     cross = cov[..., :3, 3:] + cov[..., 3:, :3]
     moved = cov[..., :3, :3] + horizon_s * cross + horizon_s**2 * cov[..., 3:, 3:]
     noise = estimator.config.root_acceleration * horizon_s**3 / 3 * np.eye(3)
     return body[..., :3] + horizon_s * body[..., 3:], moved + noise
 
 
-def damped(estimator: KalmanEstimator, state: KalmanState, horizon_s: float) -> Gaussian:
+def damped(estimator: ParticleEstimator, state: Hypotheses, horizon_s: float) -> Gaussian:
     """One exact step of the filter's model on a copy that learns nothing."""
-    copy = KalmanState(*(array.copy() for array in state))
-    copy.offset_count[:] = np.inf
+    copy = copied(state)
+    copy.slots.offset_count[:] = np.inf
     config = estimator.config
     model = motion(horizon_s, config.damping, config.root_acceleration)
-    predict_all(copy, model, 0.0, settings_of(config))
-    return copy.body[:, 0, :, :3], copy.cov[:, 0, :, :3, :3]
+    predict_all(plain(copy), model, 0.0, *estimator.constants[:2])
+    return copy.slots.body[:, 0, :, :3], copy.slots.cov[:, 0, :, :3, :3]
 
 
-def forecast(estimator: KalmanEstimator, state: KalmanState, horizon_s: float) -> Gaussian:
+def forecast(estimator: ParticleEstimator, state: Hypotheses, horizon_s: float) -> Gaussian:
     """What `Estimator.ahead` gives."""
     later = estimator.ahead(state, horizon_s)
     return later.mean_world[:, 0], later.cov_world[:, 0]
 
 
-PREDICTIONS: dict[str, Callable[[KalmanEstimator, KalmanState, float], Gaussian]] = {
+PREDICTIONS: dict[str, Callable[[ParticleEstimator, Hypotheses, float], Gaussian]] = {
     "hold": hold,
     "constant_velocity": constant_velocity,
     "damped": damped,
@@ -97,7 +102,7 @@ class Asker:
     def __init__(self) -> None:
         self.frame = 0
 
-    def __call__(self, estimator: Any, state: KalmanState) -> Any:
+    def __call__(self, estimator: Any, state: Hypotheses) -> Any:
         """Answers by name and horizon, in float32; None between."""
         self.frame += 1
         if self.frame % EVERY:
@@ -189,7 +194,7 @@ def costs_us() -> dict[str, Metric]:
         times = []
         for _ in range(300):
             begin = time.perf_counter()
-            ahead(whole, 0.4, TrackerConfig())
+            ahead(whole, 0.4, ParticleConfig())
             times.append(1e6 * (time.perf_counter() - begin) / batch)
         least, low, high = (float(value) for value in np.percentile(times, (0, 25, 75)))
         metrics[f"ahead_us.{batch}"] = Metric(least, low, high, "us", len(times))

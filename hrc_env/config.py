@@ -29,7 +29,8 @@ from hrc_env.scene.rigs import RIGS
 from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import Task, task_called
 from hrc_env.tracking.ahead import LONGEST_S
-from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.config import ParticleConfig, TrackerConfig, of_kind
+from hrc_env.tracking.estimators import EstimatorChoice, EstimatorSpec, estimator_called
 from hrc_env.tracking.people.association import AssociationConfig
 from hrc_env.worker.body import pool
 
@@ -60,8 +61,8 @@ class HRCConfig:
     """What goes wrong with the cameras, and when (docs/cameras.md)."""
     appearance: AppearanceConfig = field(default_factory=AppearanceConfig)
     """How scene and workers look, drawn for every episode (`perception="pixels"`)."""
-    tracker: TrackerConfig = field(default_factory=TrackerConfig)
-    """The estimators."""
+    tracker: TrackerConfig = field(default_factory=ParticleConfig)
+    """The estimator; what may be set is its own (`EstimatorSpec.config`)."""
     association: AssociationConfig = field(default_factory=AssociationConfig)
     """Which detection is of whom, where there are several workers."""
     control: ControlConfig = field(default_factory=ControlConfig)
@@ -106,7 +107,7 @@ class Settings:
 
     task: Task
     perception: str
-    estimator: str
+    estimator: EstimatorSpec
     cameras: Sequence[int | str] | None
     """Which of the scene's cameras are used; None: all."""
     scene: str
@@ -119,7 +120,7 @@ def settle(
     *,
     task: str | Task = DEFAULT,
     perception: str = "pixels",
-    estimator: str = "particle",
+    estimator: EstimatorChoice = "particle",
     scene: str = "lab",
     n_workers: int | tuple[int, int] = 1,
     control: str = "joint",
@@ -136,16 +137,19 @@ def settle(
         ConfigError: an argument that there is not, or a value that cannot be.
     """
     chosen = task_called(task)
-    whole = resolve(config, chosen)
+    spec = estimator_called(estimator)
+    whole = resolve(config, chosen, spec)
     for name, value in changes.items():
         if name not in _CHANGES:
             raise unknown("argument", name, [*_ARGUMENTS, *_CHANGES])
         whole = whole if value is None else _CHANGES[name](whole, value)
     whole, used = with_cameras(whole, cameras)
-    return Settings(chosen, perception, estimator, used, scene, n_workers, control, whole)
+    return Settings(chosen, perception, spec, used, scene, n_workers, control, whole)
 
 
-def resolve(config: "HRCConfig | Mapping[str, Any] | None", task: Task) -> HRCConfig:
+def resolve(
+    config: "HRCConfig | Mapping[str, Any] | None", task: Task, estimator: EstimatorSpec
+) -> HRCConfig:
     """A config from what a user gave: a config, a (nested) mapping of changes, or nothing.
 
     Raises:
@@ -156,11 +160,13 @@ def resolve(config: "HRCConfig | Mapping[str, Any] | None", task: Task) -> HRCCo
         config = HRCConfig()
     elif isinstance(config, Mapping):
         said = {name: value for name, value in config.items() if (name, value) != ("task", None)}
-        config = from_mapping(HRCConfig, said, kinds={"task": task.config})
+        kinds = {"task": task.config, "tracker": estimator.config}
+        config = from_mapping(HRCConfig, said, kinds=kinds)
     elif not isinstance(config, HRCConfig):
         raise ConfigError(
             f"config must be an HRCConfig, a mapping or None, got {type(config).__name__}."
         )
+    config = replace(config, tracker=of_kind(config.tracker, estimator.config))
     if config.task is None:
         return replace(config, task=task.config())
     if not isinstance(config.task, task.config):

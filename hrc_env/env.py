@@ -29,6 +29,7 @@ from hrc_env.scene.domain_randomization import AppearanceConfig
 from hrc_env.simulation import Simulation, checked_action
 from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import Task
+from hrc_env.tracking.estimators import EstimatorChoice
 
 RENDER_MODES = ("rgb_array", "depth_array")
 RESET_OPTIONS = ("steps_left",)
@@ -60,8 +61,9 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         task: what it has to do: an id ("HRCReach-v0") or a `Task` (docs/bring_your_own.md).
         perception: "pixels" (rendered images through MediaPipe Pose), "keypoints" (an
             emulator of that), "truth" (the worker as they are) or "none".
-        estimator: "particle" (default), "kalman" (one Gaussian on the body's tree), "paper"
-            (Algorithm 1), "per_joint", "triangulation" or "ransac".
+        estimator: "particle" (default), "kalman" (the same with one hypothesis), "paper"
+            (Algorithm 1), "triangulation" or "ransac"; one that was registered, an
+            `EstimatorSpec`, or a function that makes an estimator (docs/bring_your_own.md).
         cameras: indices or names of the scene's cameras to use; or a rig of your own: its name
             ("lab_gopro"), a TOML file's path, or a list of places (x, y, z) [m],
             `CameraConfig`s or mappings. None is all cameras of the scene. docs/cameras.md
@@ -94,7 +96,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         self,
         task: str | Task = DEFAULT,
         perception: str = "pixels",
-        estimator: str = "particle",
+        estimator: EstimatorChoice = "particle",
         cameras: str | Path | Sequence[Any] | NDArray[Any] | None = None,
         scene: str = "lab",
         n_workers: int | tuple[int, int] = 1,

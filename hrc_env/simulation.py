@@ -88,7 +88,7 @@ class Simulation(Stateful):
                 warnings.warn(finding, stacklevel=3)
         self.settings = {
             "batch": batch, "task": settings.task.id, "perception": perception,
-            "estimator": settings.estimator, "scene": scene,
+            "estimator": settings.estimator.name, "scene": scene,
             "cameras": tuple(camera.name for camera in self.scene.cameras),
             "n_workers": (fewest, most) if fewest < most else most, "control": settings.control,
             "config": config,

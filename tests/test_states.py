@@ -51,7 +51,6 @@ def test_the_single_environment_goes_on_from_a_state(level, n_steps):
     "kwargs",
     [
         {"estimator": "kalman"},
-        {"estimator": "per_joint"},
         {"estimator": "paper"},
         {"estimator": "triangulation"},
         {"n_workers": 2, "control": "tool"},

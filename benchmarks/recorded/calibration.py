@@ -17,7 +17,7 @@ import numpy as np
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.typing import Floats, Points3
 from hrc_env.geometry.cameras import PinholeCamera
-from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.config import ParticleConfig
 
 _PER_PX = 64.0
 _PARALLEL = 1e9
@@ -82,13 +82,13 @@ def meeting_point(cameras: list[PinholeCamera]) -> Points3:
     return np.asarray(np.linalg.solve(normal, rhs), float)
 
 
-def tracker_config(cameras: list[PinholeCamera]) -> TrackerConfig:
+def tracker_config(cameras: list[PinholeCamera]) -> ParticleConfig:
     """Where a rig expects somebody: where it looks, give or take half its mean distance; where the
     floor is, the file does not say."""
     point = meeting_point(cameras)
     distances_m = [float(np.linalg.norm(camera.eye_world - point)) for camera in cameras]
     x, y, z = (float(value) for value in point)
-    return TrackerConfig(
+    return ParticleConfig(
         prior_mean_world=(x, y, z),
         prior_std_m=float(np.mean(distances_m)) / 2,
         image_area_px=float(np.mean([c.width_px * c.height_px for c in cameras])),

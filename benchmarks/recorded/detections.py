@@ -18,7 +18,7 @@ from hrc_env.perception.films import Films, undistort
 from hrc_env.perception.windows import window_from_joints
 from hrc_env.tracking.estimators import make_estimator
 
-FOLLOWER = "per_joint"
+FOLLOWER = "kalman"
 """The estimator whose prediction says where to look: a rival of the default one, so that nobody
 can say that the default was given windows of its own."""
 Tick = Callable[[float], None]

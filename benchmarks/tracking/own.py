@@ -18,6 +18,7 @@ from hrc_env.geometry.sight import nothing
 from hrc_env.motion import generator
 from hrc_env.perception import emulator
 from hrc_env.simulation import Simulation
+from hrc_env.tracking.config import ParticleConfig, of_kind
 from hrc_env.worker.body import worker_truth
 
 OWN = "own"
@@ -35,7 +36,7 @@ def make_own_rig() -> Rig:
     simulation = _simulation(1)
     P = projections(simulation.scene.cameras)
     simulation.close()
-    return Rig(OWN, P, (np.nan, np.nan), HRCConfig().tracker)
+    return Rig(OWN, P, (np.nan, np.nan), of_kind(HRCConfig().tracker, ParticleConfig))
 
 
 def record(condition: str, seeds: list[int]) -> tuple[Points3, Keypoints]:

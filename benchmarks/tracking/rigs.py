@@ -8,7 +8,7 @@ from hrc_env.core.errors import unknown
 from hrc_env.core.typing import Floats
 from hrc_env.geometry.cameras import PinholeCamera, projections
 from hrc_env.geometry.rotations import look_at
-from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.config import ParticleConfig
 
 DT_S = 0.04
 """Time between two sets of frames [s]."""
@@ -27,7 +27,7 @@ class Rig:
     """(4, 3, 4) projections."""
     walk_m: tuple[float, float]
     """Half the length and width of the area in which people walk [m]."""
-    tracker: TrackerConfig
+    tracker: ParticleConfig
     """Settings of the estimators: where a worker is expected, and how surely."""
 
 
@@ -71,7 +71,7 @@ def _rig(
         pose[:3, :3] = look_at(eye, np.array([0.0, 0.0, target_height_m]))
         pose[:3, 3] = eye
         cameras.append(PinholeCamera(f"camera_{k + 1}", K, pose, WIDTH_PX, HEIGHT_PX))
-    tracker = TrackerConfig(
+    tracker = ParticleConfig(
         prior_mean_world=(0.0, 0.0, 1.0),
         prior_std_m=prior_std_m,
         image_area_px=float(WIDTH_PX * HEIGHT_PX),

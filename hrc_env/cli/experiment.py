@@ -74,12 +74,14 @@ class ImpactExperiment(AnyExperiment):
     out: Path = Path("out/impact")
     seeds: int | None = None
     """Episodes of every row, instead of 200 (8 if quick)."""
+    estimator: tuple[str, ...] = ()
+    """Compare these only, with the default one, the truth and nothing; all eyes if not given."""
 
     def run(self) -> int:
         """Run, show the tables."""
         from hrc_env.experiments.impact.experiment import config_for, run
 
-        return self.shown(partial(run, config_for(self.quick, self.seeds)))
+        return self.shown(partial(run, config_for(self.quick, self.seeds, self.estimator)))
 
 
 @dataclass(frozen=True)

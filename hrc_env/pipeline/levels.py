@@ -32,7 +32,7 @@ from hrc_env.scene.domain_randomization import AS_BUILT, Look
 from hrc_env.tracking import given
 from hrc_env.tracking.ahead import ahead
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.estimators import make_estimator
+from hrc_env.tracking.estimators import EstimatorChoice, make_estimator
 
 LEVELS = ("pixels", "keypoints", "truth", "none")
 CAMERA_LEVELS = LEVELS[:2]
@@ -84,11 +84,13 @@ class Senses(Protocol):
         ...
 
 
-def make_senses(level: str, estimator: str, scene: Scene, batch: int, config: HRCConfig) -> Senses:
+def make_senses(
+    level: str, estimator: EstimatorChoice, scene: Scene, batch: int, config: HRCConfig
+) -> Senses:
     """The senses of a perception level.
 
     Raises:
-        ConfigError: `level` or `estimator` is not a name of one.
+        ConfigError: `level` is not a name of one.
         WeightsError: `pixels` without the network's weights.
         RenderingError: `pixels` without OpenGL.
     """

@@ -1,54 +1,17 @@
-"""Settings of the estimators: one record, read by all of them."""
+"""Settings of the estimators: what all of them share, and a record for each."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import TypeVar
 
 from hrc_env.core.errors import ConfigError, unknown
 
-_POSITIVE = (
-    "prior_std_m",
-    "max_age_s",
-    "lost_after_s",
-    "forget_s",
-    "acquire_min_joints",
-    "body_radius_m",
-    "conflict_frames",
-    "gate_sigma",
-    "sigma_scale",
-    "min_std_m",
-    "floor_std_m",
-    "bone_give",
-    "velocity_tau_s",
-    "noise_tau_s",
-    "noise_persists_s",
-    "hold_speed_m_s",
-    "paper_particles",
-    "paper_iterations",
-    "proposal_inflation",
-    "gauss_newton_steps",
-    "image_area_px",
-    "root_acceleration",
-    "one_view_inflation",
-    "n_hypotheses",
-    "look_every_s",
-    "open_depth_m",
-    "turn_std_rad",
-    "evidence_trust",
-)
 _SCHEMES = ("multinomial", "systematic")
 _MIRRORED = ("body", "limbs")
-_BETWEEN_0_AND_1 = (
-    "least_weight",
-    "outlier_weight",
-    "damping",
-    "swap_begins",
-    "swap_ends",
-    "defensive_share",
-)
 
 
 @dataclass(frozen=True, slots=True)
 class TrackerConfig:
-    """How workers are acquired, tracked, lost and reported."""
+    """How workers are acquired, lost and reported, whatever the estimator."""
 
     prior_mean_world: tuple[float, float, float] = (1.3, 0.0, 1.0)
     """Where a worker is thought to be when nothing was seen [m]: the working area's centre."""
@@ -60,11 +23,9 @@ class TrackerConfig:
     """A track is lost when no joint was supported by a measurement for this long [s]."""
     forget_s: float = 2.0
     """Time constant with which a lost worker's estimate relaxes to the prior [s]."""
-
     longest_delay_s: float = 0.0
     """Frames that arrive up to this late are used at their own time (`Keypoints.time_s`), at most
     1 s [s]; 0: every frame is taken as of the update that brings it."""
-
     acquire_min_joints: int = 6
     """A worker is acquired when two cameras agree on at least this many joints."""
     body_radius_m: float = 1.3
@@ -76,9 +37,39 @@ class TrackerConfig:
     sigma_scale: float = 1.0
     """Factor on the detector's sigma; where it is not learnt, 1.2 suits errors that persist for
     half a second."""
+    min_std_m: float = 0.005
+    """No standard deviation, in any direction, is reported as less than this [m]."""
+    root_acceleration: float = 3.0
+    """Spectral density of the whole body's acceleration [m^2/s^3]."""
+
+    def __post_init__(self) -> None:
+        """Raise `ConfigError` for values that cannot work."""
+        self.check_positive(
+            "prior_std_m", "max_age_s", "lost_after_s", "forget_s", "acquire_min_joints",
+            "body_radius_m", "conflict_frames", "gate_sigma", "sigma_scale", "min_std_m",
+            "root_acceleration",
+        )  # fmt: skip
+        if not 0 <= self.longest_delay_s <= 1:
+            raise ConfigError(f"longest_delay_s must be in [0, 1], got {self.longest_delay_s}.")
+        if self.lost_after_s > self.max_age_s:
+            raise ConfigError(
+                f"lost_after_s ({self.lost_after_s}) must not exceed max_age_s ({self.max_age_s})."
+            )
+
+    def check_positive(self, *names: str) -> None:
+        """Raise `ConfigError` unless these fields are > 0."""
+        for name in names:
+            if not getattr(self, name) > 0:
+                raise ConfigError(f"{name} must be positive, got {getattr(self, name)}.")
+
+
+@dataclass(frozen=True, slots=True)
+class ParticleConfig(TrackerConfig):
+    """The default estimator: hypotheses about what is discrete, each with a Gaussian."""
+
     noise_bounds: tuple[float, float] = (1.0, 6.0)
     """Least and most of the factor on the detector's variance that is learnt for every camera
-    and joint (particle, kalman). Errors that all views share do not show where views disagree:
+    and joint. Errors that all views share do not show where views disagree:
     never less than told is careful. Equal bounds are that factor, and nothing is learnt."""
     noise_tau_s: float = 4.0
     """Time constant with which it is learnt and forgotten [s]."""
@@ -87,34 +78,12 @@ class TrackerConfig:
     noise_share: float = 0.9
     """Share of the variance that is thought to persist before anything was learnt, as BlazePose's
     does; 0 for a detector that is known to be wrong anew in every image. [0, 1)"""
-    min_std_m: float = 0.005
-    """No standard deviation, in any direction, is reported as less than this [m]."""
     floor_std_m: float = 0.05
     """Nobody stands below the floor, z = 0: a joint that the views put there is measured to be on
-    it, with this standard deviation [m] (kalman, particle); infinity: no floor is known."""
+    it, with this standard deviation [m]; infinity: no floor is known."""
     bone_give: float = 1.5
-    """Factor on how much bones give (kalman, particle): what a detector takes for a joint wanders
+    """Factor on how much bones give: what a detector takes for a joint wanders
     on the body, so that even a rigid bone seems to change its length; 1 for points that do not."""
-    velocity_tau_s: float = 0.2
-    """Time constant of the difference filter for velocities (paper, triangulation) [s]."""
-    hold_speed_m_s: float = 1.0
-    """How fast a held point loses its worth in gaps (triangulation) [m/s]."""
-
-    paper_particles: int = 1000
-    """The paper's M: particles per joint."""
-    paper_sigma_m: float = 0.05
-    """The paper's Sigma: random walk per frame and axis [m]; the paper gives no number."""
-    paper_iterations: int = 1
-    """The paper's N: passes of Algorithm 1 over one set of frames."""
-    paper_resampling: str = "multinomial"
-    """"multinomial" as in the paper's line 17, or "systematic" (less noise)."""
-
-    n_particles: int = 100
-    """Particles per joint (per_joint)."""
-    defensive_share: float = 0.16
-    """Share of these particles that are drawn from the prediction, not from the posterior mode."""
-    proposal_inflation: float = 1.2
-    """Factor on the covariance of its other particles' proposal."""
     gauss_newton_steps: int = 2
     """Steps of the search for the posterior mode; more make no measurable difference."""
     outlier_weight: float = 0.15
@@ -123,34 +92,32 @@ class TrackerConfig:
     """Area of an image [px^2]: an outlier's density is its inverse."""
     damping: float = 0.5
     """Damping ratio of a joint about its place on the body; in (0, 1)."""
-    root_acceleration: float = 3.0
-    """Spectral density of the whole body's acceleration [m^2/s^3]."""
     mean_correction: float = 0.8
-    """Share of Laplace's step from the mode to the mean (kalman); without it the depth that one
+    """Share of Laplace's step from the mode to the mean; without it the depth that one
     camera leaves open runs to the lens, the whole of it overshoots a little."""
     one_view_inflation: float = 1.21
     """Factor on the reported covariance of a worker whom one camera alone has seen for a while
-    (kalman, particle)."""
+   ."""
     n_hypotheses: int = 8
-    """Most hypotheses about one worker (particle); with 1 it is the filter of kalman."""
+    """Most hypotheses about one worker; one is a Gaussian (estimator="kalman")."""
     mirrored_parts: tuple[str, ...] = ("body", "limbs")
-    """What may be turned or reflected in depth when one view carries it (particle)."""
+    """What may be turned or reflected in depth when one view carries it."""
     look_every_s: float = 0.12
-    """Time between two searches for other hypotheses (particle) [s]."""
+    """Time between two searches for other hypotheses [s]."""
     open_depth_m: float = 0.04
     """They are looked for where one view carries a part whose depth has at least this standard
     deviation [m]: what other views said a moment ago is still known."""
     turn_std_rad: float = 0.7
     """A body that is turned by this much against a known hypothesis begins e^-0.5 as likely."""
     evidence_trust: float = 0.1
-    """Share of the log-evidence of a set of frames that counts between hypotheses (particle): what
+    """Share of the log-evidence of a set of frames that counts between hypotheses: what
     the model gets wrong in one frame it gets wrong in the next."""
     anatomy_trust: float = 1.0
     """Share of what the places of nose, toes, knees and elbows say between hypotheses."""
     walking_odds: float = 2.0
     """Log-odds per second by which a hypothesis that walks forwards gains on one that does not."""
     least_weight: float = 1e-3
-    """Probability below which a hypothesis is dropped (particle)."""
+    """Probability below which a hypothesis is dropped."""
     swap_begins: float = 0.01
     """Probability per update that a camera begins to exchange left and right."""
     swap_ends: float = 0.15
@@ -158,10 +125,13 @@ class TrackerConfig:
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for values that cannot work."""
-        for name in _POSITIVE:
-            if not getattr(self, name) > 0:
-                raise ConfigError(f"{name} must be positive, got {getattr(self, name)}.")
-        for name in _BETWEEN_0_AND_1:
+        TrackerConfig.__post_init__(self)
+        self.check_positive(
+            "floor_std_m", "bone_give", "noise_tau_s", "noise_persists_s",
+            "gauss_newton_steps", "image_area_px", "one_view_inflation", "n_hypotheses",
+            "look_every_s", "open_depth_m", "turn_std_rad", "evidence_trust",
+        )  # fmt: skip
+        for name in ("least_weight", "outlier_weight", "damping", "swap_begins", "swap_ends"):
             if not 0 < getattr(self, name) < 1:
                 raise ConfigError(f"{name} must be in (0, 1), got {getattr(self, name)}.")
         least, most = self.noise_bounds
@@ -172,26 +142,70 @@ class TrackerConfig:
             )
         if not 0 <= self.noise_share < 1:
             raise ConfigError(f"noise_share must be in [0, 1), got {self.noise_share}.")
-        if not 0 <= self.longest_delay_s <= 1:
-            raise ConfigError(f"longest_delay_s must be in [0, 1], got {self.longest_delay_s}.")
-        if self.paper_resampling not in _SCHEMES:
-            raise unknown("paper_resampling", self.paper_resampling, _SCHEMES)
-        if self.paper_particles < 10:
-            raise ConfigError(
-                f"paper_particles must be at least 10, got {self.paper_particles}: after a "
-                "resampling fewer have no covariance."
-            )
-        if self.paper_sigma_m < 0:
-            raise ConfigError(f"paper_sigma_m must not be negative, got {self.paper_sigma_m}.")
         for name in ("mean_correction", "anatomy_trust", "walking_odds"):
             if not getattr(self, name) >= 0:
                 raise ConfigError(f"{name} must not be negative, got {getattr(self, name)}.")
         for part in self.mirrored_parts:
             if part not in _MIRRORED:
                 raise unknown("part in mirrored_parts", part, _MIRRORED)
-        if self.n_particles < 50:
-            raise ConfigError(f"n_particles must be at least 50, got {self.n_particles}.")
-        if self.lost_after_s > self.max_age_s:
+
+
+@dataclass(frozen=True, slots=True)
+class PaperConfig(TrackerConfig):
+    """The paper's Algorithm 1."""
+
+    velocity_tau_s: float = 0.2
+    """Time constant of the difference filter for velocities [s]."""
+    n_particles: int = 1000
+    """The paper's M: particles per joint."""
+    sigma_m: float = 0.05
+    """The paper's Sigma: random walk per frame and axis [m]; the paper gives no number."""
+    n_iterations: int = 1
+    """The paper's N: passes of Algorithm 1 over one set of frames."""
+    resampling: str = "multinomial"
+    """"multinomial" as in the paper's line 17, or "systematic" (less noise)."""
+
+    def __post_init__(self) -> None:
+        """Raise `ConfigError` for values that cannot work."""
+        TrackerConfig.__post_init__(self)
+        self.check_positive("velocity_tau_s", "n_iterations")
+        if self.resampling not in _SCHEMES:
+            raise unknown("resampling", self.resampling, _SCHEMES)
+        if self.n_particles < 10:
             raise ConfigError(
-                f"lost_after_s ({self.lost_after_s}) must not exceed max_age_s ({self.max_age_s})."
+                f"n_particles must be at least 10, got {self.n_particles}: after a resampling "
+                "fewer have no covariance."
             )
+        if self.sigma_m < 0:
+            raise ConfigError(f"sigma_m must not be negative, got {self.sigma_m}.")
+
+
+@dataclass(frozen=True, slots=True)
+class TriangulationConfig(TrackerConfig):
+    """Triangulation, frame by frame."""
+
+    velocity_tau_s: float = 0.2
+    """Time constant of the difference filter for velocities [s]."""
+    hold_speed_m_s: float = 1.0
+    """How fast a held point loses its worth in gaps [m/s]."""
+
+    def __post_init__(self) -> None:
+        """Raise `ConfigError` for values that cannot work."""
+        TrackerConfig.__post_init__(self)
+        self.check_positive("velocity_tau_s", "hold_speed_m_s")
+
+
+ConfigT = TypeVar("ConfigT", bound=TrackerConfig)
+
+
+def of_kind(config: TrackerConfig | None, kind: type[ConfigT]) -> ConfigT:
+    """The settings of one estimator: these, or what they share with it and its defaults.
+
+    Args:
+        config: any estimator's settings; None: the defaults.
+        kind: of the estimator in question.
+    """
+    if isinstance(config, kind):
+        return config
+    shared = {each.name for each in fields(TrackerConfig)}
+    return kind(**({} if config is None else {name: getattr(config, name) for name in shared}))

@@ -3,8 +3,7 @@
 | name | what it is |
 |---|---|
 | `particle` | the default: hypotheses about what is discrete, each with one Gaussian on the body |
-| `per_joint` | a Gaussian particle filter per joint on a body motion model |
-| `kalman` | one Gaussian on the kinematic tree: honest with one camera (docs/tracking.md) |
+| `kalman` | the same with one hypothesis: a Gaussian on the kinematic tree |
 | `paper` | the paper's Algorithm 1 as printed |
 | `triangulation` | every frame by itself, all views by weighted least squares; gaps are held |
 | `ransac` | the same from the views that agree |
@@ -15,6 +14,7 @@ A control step is `predict` and then `update`; `estimate` may be asked at any ti
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -22,13 +22,17 @@ import numpy as np
 from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.typing import Floats, Ints
-from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.kalman import KalmanEstimator
+from hrc_env.tracking.config import (
+    PaperConfig,
+    ParticleConfig,
+    TrackerConfig,
+    TriangulationConfig,
+    of_kind,
+)
 from hrc_env.tracking.late import LateEstimator
 from hrc_env.tracking.paper import PaperEstimator
 from hrc_env.tracking.particle import ParticleEstimator
-from hrc_env.tracking.per_joint import PerJointEstimator
-from hrc_env.tracking.triangulating import TriangulationEstimator, ransac, triangulation
+from hrc_env.tracking.triangulating import ransac, triangulation
 
 State = TypeVar("State")
 Rngs = list[np.random.Generator]
@@ -76,48 +80,94 @@ class Estimator(Protocol[State]):
         ...
 
 
-ESTIMATORS: dict[str, Callable[[Floats, float, TrackerConfig], Estimator[Any]]] = {
-    "particle": ParticleEstimator,
-    "per_joint": PerJointEstimator,
-    "kalman": KalmanEstimator,
-    "paper": PaperEstimator,
-    "triangulation": triangulation,
-    "ransac": ransac,
+@dataclass(frozen=True, slots=True)
+class EstimatorSpec:
+    """An estimator by name: how it is made, and what may be set."""
+
+    name: str
+    make: Callable[[Floats, float, Any], Estimator[Any]]
+    """(P (C, 3, 4), time between updates [s], settings) -> estimator."""
+    config: type[TrackerConfig] = TrackerConfig
+    """The kind of its settings."""
+    needs_pairs: bool = False
+    """Whether it makes nothing of a camera alone; see `late.LateEstimator`."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A spec that is known by its name is pickled as that."""
+        if ESTIMATORS.get(self.name) is self:
+            return estimator_called, (self.name,)
+        return EstimatorSpec, (self.name, self.make, self.config, self.needs_pairs)
+
+
+def _kalman(P: Floats, ctrl_dt: float, config: ParticleConfig) -> ParticleEstimator:
+    return ParticleEstimator(P, ctrl_dt, replace(config, n_hypotheses=1))
+
+
+ESTIMATORS: dict[str, EstimatorSpec] = {
+    spec.name: spec
+    for spec in (
+        EstimatorSpec("particle", ParticleEstimator, ParticleConfig),
+        EstimatorSpec("kalman", _kalman, ParticleConfig),
+        EstimatorSpec("paper", PaperEstimator, PaperConfig),
+        EstimatorSpec("triangulation", triangulation, TriangulationConfig, needs_pairs=True),
+        EstimatorSpec("ransac", ransac, TriangulationConfig, needs_pairs=True),
+    )
 }
-
-
+"""By name: those of this package, and those that were registered."""
 OFFLINE = {"smoother": "hrc_env.tracking.smoother.smooth(P, clip, dt_s)"}
 """What needs the future, and the function that gives it a whole clip."""
 
 
-def make_estimator(
-    name: str, P: Floats, ctrl_dt: float, config: TrackerConfig | None = None
-) -> Estimator[Any]:
-    """The estimator called `name` for a rig.
+EstimatorChoice = str | EstimatorSpec | Callable[..., Any]
+"""A name in `ESTIMATORS`, a spec, or a function as `EstimatorSpec.make`."""
 
-    Args:
-        name: one of `ESTIMATORS`.
-        P: (C, 3, 4) projections of the cameras.
-        ctrl_dt: the usual time between two updates [s].
-        config: settings; the defaults if None. With `longest_delay_s` the estimator is wrapped
-            in a `late.LateEstimator`, which uses late frames at their own time.
+
+def estimator_called(estimator: EstimatorChoice) -> EstimatorSpec:
+    """The spec of an estimator: by its name, itself, or of a function that makes one.
 
     Raises:
-        ConfigError: a name that is unknown or `OFFLINE`, a rig of another shape, or no
-            positive time.
+        ConfigError: a name that is unknown or `OFFLINE`, or nothing of these.
     """
-    if name in OFFLINE:
-        raise ConfigError(f"{name!r} needs the future: call {OFFLINE[name]} for a whole clip.")
-    if name not in ESTIMATORS:
-        raise unknown("estimator", name, ESTIMATORS)
+    if isinstance(estimator, EstimatorSpec):
+        return estimator
+    if callable(estimator):
+        return EstimatorSpec(getattr(estimator, "__name__", type(estimator).__name__), estimator)
+    if estimator in OFFLINE:
+        raise ConfigError(
+            f"{estimator!r} needs the future: call {OFFLINE[estimator]} for a whole clip."
+        )
+    if estimator not in ESTIMATORS:
+        raise unknown("estimator", estimator, ESTIMATORS)
+    return ESTIMATORS[estimator]
+
+
+def make_estimator(
+    estimator: EstimatorChoice,
+    P: Floats,
+    ctrl_dt: float,
+    config: TrackerConfig | None = None,
+) -> Estimator[Any]:
+    """An estimator for a rig.
+
+    Args:
+        estimator: a name in `ESTIMATORS`, a spec, or a function that makes one.
+        P: (C, 3, 4) projections of the cameras.
+        ctrl_dt: the usual time between two updates [s].
+        config: settings; of another estimator's, those that all share count. The defaults if
+            None. With `longest_delay_s` the estimator is wrapped in a `late.LateEstimator`, which
+            uses late frames at their own time.
+
+    Raises:
+        ConfigError: an estimator that there is not, a rig of another shape, or no positive time.
+    """
+    spec = estimator_called(estimator)
     P = np.ascontiguousarray(P, dtype=float)
     if P.ndim != 3 or P.shape[1:] != (3, 4) or not np.isfinite(P).all():
         raise ConfigError(f"P must be finite with shape (C, 3, 4), got {P.shape}.")
     if not ctrl_dt > 0:
         raise ConfigError(f"ctrl_dt must be positive, got {ctrl_dt}.")
-    config = config or TrackerConfig()
-    estimator = ESTIMATORS[name](P, ctrl_dt, config)
-    if config.longest_delay_s > 0:
-        needs_pairs = isinstance(estimator, TriangulationEstimator)
-        return LateEstimator(estimator, len(P), ctrl_dt, config.longest_delay_s, needs_pairs)
-    return estimator
+    settings = of_kind(config, spec.config)
+    made = spec.make(P, ctrl_dt, settings)
+    if settings.longest_delay_s > 0:
+        return LateEstimator(made, len(P), ctrl_dt, settings.longest_delay_s, spec.needs_pairs)
+    return made

@@ -5,7 +5,7 @@
 - every joint has its own cloud (line 1 speaks of "the i-th joint"; one cloud for all 45
   coordinates does not work with any number of particles that one can afford);
 - a step of the simulation is one pass of the loop of line 2: line 7 happens in `predict`,
-  lines 8 to 17 in `update`; more passes over the same frames (`paper_iterations`) repeat both;
+  lines 8 to 17 in `update`; more passes over the same frames (`n_iterations`) repeat both;
 - the likelihoods of cameras are multiplied (line 13), that of one camera is a Gaussian of the
   pixel distance with the detector's sigma; a joint that a camera does not see multiplies by 1;
 - a cloud starts round a triangulated point (line 1), as `acquisition` finds it: a start all
@@ -26,7 +26,7 @@ from hrc_env.tracking.ahead import ahead
 from hrc_env.tracking.clouds.likelihoods import add_log_likelihood, normalise
 from hrc_env.tracking.clouds.moments import moments, roll, scatter
 from hrc_env.tracking.clouds.resampling import multinomial, systematic
-from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.config import PaperConfig
 from hrc_env.tracking.measurements import arrays_of, read_worker, supports
 from hrc_env.tracking.models.acquisition import (
     STANDING_M,
@@ -59,11 +59,11 @@ class PaperEstimator:
 
     P: Floats
     ctrl_dt: float
-    config: TrackerConfig
+    config: PaperConfig
 
     def init(self, batch: int, n_workers: int) -> PaperState:
         """Workers whom nobody has seen."""
-        shape = (batch, n_workers, N_JOINTS, 3, self.config.paper_particles)
+        shape = (batch, n_workers, N_JOINTS, 3, self.config.n_particles)
         tracks = make_tracks(batch, n_workers, self.config)
         return PaperState(tracks, np.zeros(shape), np.zeros(batch))
 
@@ -78,7 +78,7 @@ class PaperEstimator:
 
         The estimate keeps its mean (the walk has none) and its covariance grows by the walk's.
         """
-        sigma_m = self.config.paper_sigma_m * np.sqrt(dt_s / self.ctrl_dt)
+        sigma_m = self.config.sigma_m * np.sqrt(dt_s / self.ctrl_dt)
         state.elapsed_s[:] += dt_s
         for b, w in np.argwhere(state.tracks.tracked):
             roll(state.particles[b, w], sigma_m, rngs[b])  # line 7
@@ -134,10 +134,10 @@ class PaperEstimator:
     ) -> None:
         """The loop of lines 2 to 18 for one worker, then the estimate of line 19."""
         config, tracks, particles = self.config, state.tracks, state.particles[b, w]
-        for n in range(config.paper_iterations):  # line 2: for n = 1 to N
+        for n in range(config.n_iterations):  # line 2: for n = 1 to N
             if n > 0:
-                roll(particles, config.paper_sigma_m, rng)  # line 7, of further passes
-            by_weight = config.paper_resampling == "multinomial"
+                roll(particles, config.sigma_m, rng)  # line 7, of further passes
+            by_weight = config.resampling == "multinomial"
             chance = _chance(by_weight, particles.shape[-1], rng)
             weigh_and_resample(self.P, *measured, particles, by_weight, chance)
         mean, cov = np.empty((N_JOINTS, 3)), np.empty((N_JOINTS, 3, 3))

@@ -1,7 +1,7 @@
 """The default estimator: particles that are hypotheses, each with a Gaussian of its own.
 
 Given the discrete facts (is the body, or a limb, mirrored in depth; does a camera exchange
-left and right) a whole body is well described by one Gaussian on the kinematic tree (`kalman`).
+left and right) a whole body is well described by one Gaussian on the kinematic tree (`tree.state`).
 What is left is discrete, and one Gaussian cannot hold it. This is a Rao-Blackwellised particle
 filter (Doucet, de Freitas, Murphy and Russell, UAI 2000): the particles are the discrete facts,
 the rest is integrated exactly. One particle suffices while the views agree; where one view is
@@ -18,14 +18,16 @@ from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.tracking.ahead import ahead, mixed
-from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.config import ParticleConfig
 from hrc_env.tracking.hypotheses.filter import predict_all, update_all
 from hrc_env.tracking.hypotheses.mixture import estimate_all, mixture_settings
 from hrc_env.tracking.hypotheses.slots import Hypotheses, plain
-from hrc_env.tracking.kalman import KalmanEstimator, motion
 from hrc_env.tracking.measurements import arrays_of
 from hrc_env.tracking.models.acquisition import STANDING_M
+from hrc_env.tracking.models.noise import noise_model
+from hrc_env.tracking.settings import settings_of
 from hrc_env.tracking.tracks import blank, gaussian_tracks, report
+from hrc_env.tracking.tree.state import forget_trees, make_trees, motion
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,24 +36,21 @@ class ParticleEstimator:
 
     P: Floats
     ctrl_dt: float
-    config: TrackerConfig
-    single: KalmanEstimator = field(init=False, repr=False)
-    """The filter of one hypothesis."""
+    config: ParticleConfig
     constants: tuple[tuple[Any, ...], ...] = field(init=False, repr=False)
     """Settings of one hypothesis, of the mixture, and its model of noise, as kernels take them."""
 
     def __post_init__(self) -> None:
         """Make what the kernels take, constants."""
-        single = KalmanEstimator(self.P, self.ctrl_dt, self.config)
-        object.__setattr__(self, "single", single)
-        records = (single.settings, mixture_settings(self.config), single.noise)
+        settings, noise = settings_of(self.config), noise_model(self.config, self.ctrl_dt)
+        records = (settings, mixture_settings(self.config), noise)
         object.__setattr__(self, "constants", tuple(tuple(each) for each in records))
 
     def init(self, batch: int, n_workers: int) -> Hypotheses:
         """Workers whom nobody has seen."""
         n_slots = n_workers * self.config.n_hypotheses
         return Hypotheses(
-            slots=self.single.init(batch, n_slots),
+            slots=make_trees(batch, n_slots, len(self.P), self.config),
             log_weight=np.zeros((batch, n_slots)),
             form=np.zeros((batch, n_slots)),
             n_alive=np.ones((batch, n_workers), np.int64),
@@ -60,7 +59,8 @@ class ParticleEstimator:
 
     def reset(self, state: Hypotheses, ids: Ints, rngs: list[np.random.Generator]) -> None:
         """Forget environments `ids`; draws nothing."""
-        self.single.reset(state.slots, ids, rngs)
+        del rngs
+        forget_trees(state.slots, ids, self.config)
         state.log_weight[ids], state.form[ids] = 0.0, 0.0
         state.n_alive[ids], state.waited_s[ids] = 1, 0.0
 

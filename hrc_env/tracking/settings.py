@@ -2,11 +2,11 @@
 
 from typing import NamedTuple
 
-from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.config import ParticleConfig, TrackerConfig, of_kind
 
 
 class Settings(NamedTuple):
-    """What the kernels need of `TrackerConfig`, under the same names."""
+    """What the kernels need of `ParticleConfig`, under the same names."""
 
     sigma_scale: float
     gate_sigma: float
@@ -18,7 +18,6 @@ class Settings(NamedTuple):
     swap_begins: float
     swap_ends: float
     gauss_newton_steps: int
-    proposal_inflation: float
     prior_mean_world: tuple[float, float, float]
     prior_std_m: float
     max_age_s: float
@@ -32,5 +31,6 @@ class Settings(NamedTuple):
 
 
 def settings_of(config: TrackerConfig) -> Settings:
-    """The kernels' part of the configuration."""
+    """The kernels' part of the configuration; of another estimator's, what all share."""
+    config = of_kind(config, ParticleConfig)
     return Settings(*(getattr(config, name) for name in Settings._fields))

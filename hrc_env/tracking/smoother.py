@@ -1,9 +1,10 @@
 """What could have been known: a whole clip, smoothed after the fact.
 
-The filter on the kinematic tree (`kalman`) goes through the clip and decides who is where, which
-camera is swapped and what is an outlier; then a Rauch-Tung-Striebel pass (AIAA Journal 3, 1965)
-goes back over the filter's own linear motion, on all 90 numbers of a body at once. With P the
-covariance of the belief at t, F and Q the motion to t + 1, x- and P- = F P F' + Q the prediction:
+The filter on the kinematic tree goes through the clip, with one hypothesis, and decides who is
+where, which camera is swapped and what is an outlier; then a Rauch-Tung-Striebel pass (AIAA
+Journal 3, 1965) goes back over the filter's own linear motion, on all 90 numbers of a body at
+once. With P the covariance of the belief at t, F and Q the motion to t + 1, x- and
+P- = F P F' + Q the prediction:
 
     G = P F' (P-)^-1,   x_s = x + G (x_s' - x-),   P_s = P + G (P_s' - P-) G'.
 
@@ -19,6 +20,7 @@ Needing the future, this is no estimator of an environment; it is offline, and i
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -28,10 +30,11 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS, TORSO
 from hrc_env.core.typing import Bools, Floats
-from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.kalman import KalmanEstimator, KalmanState, motion
+from hrc_env.tracking.config import ParticleConfig, TrackerConfig, of_kind
+from hrc_env.tracking.particle import ParticleEstimator
 from hrc_env.tracking.tracks import Tracks, report
 from hrc_env.tracking.tree.gaussian import ORDER, PARENT
+from hrc_env.tracking.tree.state import Trees, motion
 
 _N = 6 * N_JOINTS
 
@@ -91,8 +94,8 @@ def smooth(
     """
     if len(clip) == 0 or not dt_s > 0:
         raise ConfigError(f"a clip needs frames and a positive dt_s, got {len(clip)}, {dt_s}.")
-    config = config or TrackerConfig()
-    estimator = KalmanEstimator(np.ascontiguousarray(P, float), dt_s, config)
+    config = replace(of_kind(config, ParticleConfig), n_hypotheses=1)
+    estimator = ParticleEstimator(np.ascontiguousarray(P, float), dt_s, config)
     forth = _one_way(estimator, clip, dt_s)
     back = _turned(_one_way(estimator, clip[::-1], dt_s))
     batch, _, n_workers = clip[0].px.shape[:3]
@@ -126,7 +129,7 @@ def rts_step(
     return mean, 0.5 * (cov + cov.swapaxes(-1, -2))
 
 
-def linear_motion(dt_s: float, config: TrackerConfig) -> tuple[Floats, Floats]:
+def linear_motion(dt_s: float, config: ParticleConfig) -> tuple[Floats, Floats]:
     """F, Q (90, 90): x' = F x + constant + noise, as `tree.predict` moves the body."""
     own, travel, noise, shared = motion(dt_s, config.damping, config.root_acceleration)
     F = np.zeros((N_JOINTS, 2, N_JOINTS, 2))
@@ -156,7 +159,7 @@ def _on_axes(blocks: Floats) -> Floats:
     return full.reshape(_N, _N)
 
 
-def _one_way(estimator: KalmanEstimator, clip: Sequence[Keypoints], dt_s: float) -> _Smoothed:
+def _one_way(estimator: ParticleEstimator, clip: Sequence[Keypoints], dt_s: float) -> _Smoothed:
     """Filter through a clip, smooth back."""
     passed = _filtered(estimator, clip, dt_s)
     F, Q = linear_motion(dt_s, estimator.config)
@@ -181,14 +184,17 @@ def _one_way(estimator: KalmanEstimator, clip: Sequence[Keypoints], dt_s: float)
     )
 
 
-def _filtered(estimator: KalmanEstimator, clip: Sequence[Keypoints], dt_s: float) -> list[_Passed]:
+def _filtered(
+    estimator: ParticleEstimator, clip: Sequence[Keypoints], dt_s: float
+) -> list[_Passed]:
     batch, _, n_workers = clip[0].px.shape[:3]
-    state, passed = estimator.init(batch, n_workers), []
+    hypotheses, passed = estimator.init(batch, n_workers), []
+    state = hypotheses.slots
     blocks = (-1, N_JOINTS, 6, 6)
     for keypoints in clip:
-        estimator.predict(state, dt_s, [])
+        estimator.predict(hypotheses, dt_s, [])
         predicted, before = state.body.reshape(-1, _N).copy(), state.tracked.ravel().copy()
-        estimator.update(state, keypoints, [])
+        estimator.update(hypotheses, keypoints, [])
         tracked = state.tracked.ravel().copy()
         passed.append(
             _Passed(
@@ -204,7 +210,7 @@ def _filtered(estimator: KalmanEstimator, clip: Sequence[Keypoints], dt_s: float
     return passed
 
 
-def _began(state: KalmanState) -> Bools:
+def _began(state: Trees) -> Bools:
     """(n,) whether a track was begun in this frame: then the body is at rest, and only then."""
     return ~state.body[..., 3:].any((-2, -1)).ravel()
 
@@ -242,7 +248,7 @@ def _mixture(a: _Smoothed, b: _Smoothed) -> _Smoothed:
 
 
 def _reported(
-    smoothed: _Smoothed, shape: tuple[int, int, int], config: TrackerConfig
+    smoothed: _Smoothed, shape: tuple[int, int, int], config: ParticleConfig
 ) -> PoseEstimate:
     """Arrays (T, B, W, ...) as estimators report theirs."""
     n_frames, batch, n_workers = shape

@@ -23,7 +23,7 @@ from hrc_env.geometry.triangulation import (
     triangulate_robust,
 )
 from hrc_env.tracking.ahead import ahead
-from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.config import TriangulationConfig
 from hrc_env.tracking.measurements import MIN_SIGMA_PX, arrays_of
 from hrc_env.tracking.models.acquisition import STANDING_M, complete_body, keep_one_body
 from hrc_env.tracking.tracks import Tracks, forget, grow_older, make_tracks, report
@@ -32,12 +32,14 @@ Solve: TypeAlias = Callable[[Floats, Points2, Floats], Triangulation]
 """From P (C, 3, 4), px (B, C, W, J, 2) and sigma (B, C, W, J) to points."""
 
 
-def triangulation(P: Floats, ctrl_dt: float, config: TrackerConfig) -> "TriangulationEstimator":
+def triangulation(
+    P: Floats, ctrl_dt: float, config: TriangulationConfig
+) -> "TriangulationEstimator":
     """Weighted least squares from all views."""
     return TriangulationEstimator(P, ctrl_dt, config, triangulate)
 
 
-def ransac(P: Floats, ctrl_dt: float, config: TrackerConfig) -> "TriangulationEstimator":
+def ransac(P: Floats, ctrl_dt: float, config: TriangulationConfig) -> "TriangulationEstimator":
     """Least squares from the views that agree within `gate_sigma`."""
 
     def solve(P: Floats, px: Points2, sigma_px: Floats) -> Triangulation:
@@ -52,7 +54,7 @@ class TriangulationEstimator:
 
     P: Floats
     ctrl_dt: float
-    config: TrackerConfig
+    config: TriangulationConfig
     solve: Solve
     """How points are made of pixels."""
 

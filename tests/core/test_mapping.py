@@ -27,12 +27,12 @@ def camera(**other):
         ({"cost": {"proximity_m": -1}}, r"^cost\.proximity_m must be >= 0"),
         ({"reward": {"proximity_reach_m": 0}}, r"^reward\.proximity_reach_m must"),
         ({"scene": {"sim_dt": 0}}, r"^scene\.sim_dt must be positive"),
-        ({"tracker": {"n_particles": 1}}, r"^tracker\.n_particles must be at least"),
+        ({"tracker": {"n_hypotheses": 0}}, r"^tracker\.n_hypotheses must be positive"),
         (
             {"tracker": {"lost_after_s": 9}},
             r"^tracker\.lost_after_s \(9\.0\) must not exceed tracker\.max_age_s",
         ),
-        ({"tracker": {"paper_resampling": "x"}}, r"^Unknown tracker\.paper_resampling 'x'"),
+        ({"tracker": {"mirrored_parts": ["x"]}}, r"Unknown part in tracker\.mirrored_parts 'x'"),
         ({"eyes": {"runtime": "x"}}, r"^Unknown eyes\.runtime 'x'"),
         ({"eyes": {"search_step": 0}}, r"^eyes\.search_step must be positive"),
         ({"motion": {"spacing_m": 0.1}}, r"^motion\.spacing_m must be 0\.8 or more"),
@@ -85,7 +85,7 @@ def test_only_the_fields_themselves_are_called_by_their_path():
 
 def test_numbers_of_numpy_are_numbers():
     config = settle(
-        config={"task": {"radius_m": np.float32(0.25)}, "tracker": {"paper_iterations": 2}}
+        config={"task": {"radius_m": np.float32(0.25)}, "tracker": {"n_hypotheses": 2}}
     ).config
     assert config.task.radius_m == 0.25
     assert type(config.task.radius_m) is float
@@ -99,5 +99,5 @@ def test_plain_values_are_what_json_has():
 
 
 def test_a_field_that_is_called_otherwise_now_says_so():
-    with pytest.raises(ConfigError, match=r"'reward\.goal' is 'task\.goal_bonus' now"):
+    with pytest.raises(ConfigError, match=r"'reward\.goal' is gone: use 'task\.goal_bonus'"):
         settle(config={"reward": {"goal": 1.0}})

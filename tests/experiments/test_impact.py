@@ -15,7 +15,7 @@ from hrc_env.experiments.impact.report import write_pages
 from hrc_env.experiments.impact.trial import training
 from hrc_env.experiments.impact.trial.counts import GAPS_M, Bins, quantile_over
 from hrc_env.experiments.impact.trial.episodes import Stages
-from hrc_env.experiments.impact.trial.eyes import ALL_EYES, REFERENCE, eyes_called, seeing
+from hrc_env.experiments.impact.trial.eyes import REFERENCE, all_eyes, eyes_called, seeing
 from hrc_env.experiments.impact.trial.judge import Step, judge, scene_of
 from hrc_env.experiments.impact.trial.policies import Policy, maker
 from hrc_env.experiments.impact.trial.tally import Tally
@@ -67,7 +67,7 @@ def end_to_end(tmp_path_factory):
 def test_eyes_are_called_what_they_are():
     assert seeing("paper").name == "keypoints_paper_4cam_0ms"
     assert eyes_called("keypoints_particle_1cam_120ms").latency_s == 0.12
-    assert all(eyes.name == name for name, eyes in ALL_EYES.items())
+    assert all(eyes.name == name for name, eyes in all_eyes().items())
     with pytest.raises(ConfigError, match="Did you mean 'keypoints_paper_4cam_0ms'"):
         eyes_called("keypoints_papers_4cam_0ms")
 

@@ -12,10 +12,10 @@ from hrc_env.core.batching import mapped
 from hrc_env.core.errors import ConfigError
 from hrc_env.geometry.cameras import pinhole, projections
 from hrc_env.geometry.rotations import about_axis
-from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.config import PaperConfig
 from hrc_env.tracking.estimators import ESTIMATORS, make_estimator
 
-CONFIG = TrackerConfig(paper_particles=100)
+CONFIG = PaperConfig(n_particles=100)
 every = pytest.mark.parametrize("name", sorted(ESTIMATORS))
 FIELDS = ("mean_world", "cov_world", "velocity_world", "age_s", "tracked")
 NO_PIXEL = (np.nan, np.inf, -np.inf, 1e300, -1e300, -1e9, 2e5)
@@ -168,8 +168,8 @@ def test_any_number_of_cameras_will_do(name, n_cameras):
 
 @pytest.mark.parametrize("n", [0, 1, 9])
 def test_fewer_particles_than_algorithm_1_needs_are_refused_in_words(n):
-    with pytest.raises(ConfigError, match=r"paper_particles must be (at least 10|positive)"):
-        TrackerConfig(paper_particles=n)
+    with pytest.raises(ConfigError, match=r"n_particles must be (at least 10|positive)"):
+        PaperConfig(n_particles=n)
 
 
 @every

@@ -11,10 +11,10 @@ from simulated import DT, HARD, LAB, Damage, detections, generators, keypoints, 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Keypoints
 from hrc_env.geometry.rotations import about_axis
-from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.config import PaperConfig, ParticleConfig, TriangulationConfig
 from hrc_env.tracking.estimators import ESTIMATORS, make_estimator
 
-CONFIG = TrackerConfig(paper_particles=300)
+CONFIG = PaperConfig(n_particles=300)
 every = pytest.mark.parametrize("name", sorted(ESTIMATORS))
 seeds = st.integers(0, 2**32 - 1)
 
@@ -212,19 +212,19 @@ def test_keypoints_of_another_rig_are_refused(name):
 
 
 @pytest.mark.parametrize(
-    "setting",
+    ("kind", "setting"),
     [
-        {"prior_std_m": 0.0},
-        {"outlier_weight": 1.0},
-        {"n_particles": 10},
-        {"lost_after_s": 6.0},
-        {"paper_sigma_m": -0.1},
-        {"paper_resampling": "systematical"},
+        (TriangulationConfig, {"prior_std_m": 0.0}),
+        (ParticleConfig, {"outlier_weight": 1.0}),
+        (PaperConfig, {"n_particles": 9}),
+        (ParticleConfig, {"lost_after_s": 6.0}),
+        (PaperConfig, {"sigma_m": -0.1}),
+        (PaperConfig, {"resampling": "systematical"}),
     ],
 )
-def test_settings_that_cannot_work_are_refused(setting):
+def test_settings_that_cannot_work_are_refused(kind, setting):
     with pytest.raises(ConfigError):
-        TrackerConfig(**setting)
+        kind(**setting)
 
 
 @every

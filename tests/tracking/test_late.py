@@ -8,11 +8,11 @@ import pytest
 from simulated import DT, HARD, LAB, Damage, detections, generators, keypoints, walk
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.config import PaperConfig
 from hrc_env.tracking.estimators import ESTIMATORS, make_estimator
 from hrc_env.tracking.late import IGNORED
 
-LATE = TrackerConfig(longest_delay_s=0.5, paper_particles=200)
+LATE = PaperConfig(longest_delay_s=0.5, n_particles=200)
 every = pytest.mark.parametrize("name", sorted(ESTIMATORS))
 FIELDS = ("mean_world", "cov_world", "velocity_world", "age_s", "tracked")
 
@@ -97,7 +97,7 @@ def test_once_all_have_arrived_their_order_of_arrival_does_not_matter():
             )
         e.update(state, replace(keypoints(frame), time_s=time_s), rngs)
     assert_same([e.estimate(state)], expected[-1:])
-    np.testing.assert_array_equal(state.now.bone_length, inner.bone_length)
+    np.testing.assert_array_equal(state.now.slots.bone_length, inner.slots.bone_length)
     assert not state.ignored.any()
 
 
@@ -284,7 +284,7 @@ def test_a_copied_state_continues_as_the_original_does():
 
 def test_delays_beyond_a_second_and_times_of_another_rig_are_refused():
     with pytest.raises(ConfigError, match=r"longest_delay_s must be in \[0, 1\]"):
-        TrackerConfig(longest_delay_s=1.5)
+        PaperConfig(longest_delay_s=1.5)
     _, px = walks(1, 1)
     e = late()
     with pytest.raises(ConfigError, match="time_s must have shape"):

@@ -5,16 +5,15 @@ import pytest
 from simulated import DT, LAB, Damage, detections, generators, keypoints, walk
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.config import ParticleConfig
 from hrc_env.tracking.estimators import make_estimator
-from hrc_env.tracking.kalman import KalmanEstimator
 
 INSIDE_95 = 7.815
 """95 % of chi-squared with 3 degrees of freedom."""
 SEEDS = range(300, 306)
 N_FRAMES = 175
-FIXED = TrackerConfig(noise_bounds=(1.0, 1.0))
-WHITE = TrackerConfig(noise_share=0.0)
+FIXED = ParticleConfig(noise_bounds=(1.0, 1.0))
+WHITE = ParticleConfig(noise_share=0.0)
 """Told that errors are new in every image."""
 
 
@@ -55,7 +54,7 @@ def judged(joints, means, covs):
 def test_white_errors_as_large_as_told_leave_the_factor_at_one_and_the_estimate_alone():
     joints, px = walks()
     state, *ours = follow(px, WHITE)
-    np.testing.assert_allclose(state.noise_factor.mean((2, 3)), 1.0, atol=0.1)
+    np.testing.assert_allclose(state.slots.noise_factor.mean((2, 3)), 1.0, atol=0.1)
     _, *fixed = follow(px, FIXED)
     assert judged(joints, *ours)[0] < 1.01 * judged(joints, *fixed)[0]
     assert judged(joints, *ours)[1] == pytest.approx(judged(joints, *fixed)[1], abs=0.01)
@@ -63,14 +62,14 @@ def test_white_errors_as_large_as_told_leave_the_factor_at_one_and_the_estimate_
 
 @pytest.mark.parametrize(("told_px", "factor"), [(4.0, 0.56), (2.0, 2.25)])
 def test_white_errors_of_another_size_than_told_are_measured(told_px, factor):
-    config = TrackerConfig(noise_bounds=(0.5, 6.0), noise_share=0.0)
+    config = ParticleConfig(noise_bounds=(0.5, 6.0), noise_share=0.0)
     state, *_ = follow(walks()[1], config, sigma_px=told_px)
-    assert state.noise_factor.mean() == pytest.approx(factor, rel=0.08)
+    assert state.slots.noise_factor.mean() == pytest.approx(factor, rel=0.08)
 
 
 def test_a_share_that_is_told_too_large_is_unlearnt():
     _, px = walks()
-    first, last = (follow(px[:n])[0].noise_factor.mean() for n in (5, N_FRAMES))
+    first, last = (follow(px[:n])[0].slots.noise_factor.mean() for n in (5, N_FRAMES))
     assert last < first
     assert last == pytest.approx(1.0, abs=0.15)
 
@@ -78,7 +77,7 @@ def test_a_share_that_is_told_too_large_is_unlearnt():
 def test_one_camera_that_is_worse_than_the_others_is_found():
     _, px = walks()
     px[:, :, 2] += 6.0 * np.random.default_rng(1).standard_normal(px[:, :, 2].shape)
-    factor = follow(px)[0].noise_factor.mean((0, 1, 2))
+    factor = follow(px)[0].slots.noise_factor.mean((0, 1, 2))
     assert factor[2] == pytest.approx(5.0, rel=0.15)
     np.testing.assert_allclose(factor[[0, 1, 3]], 1.0, atol=0.25)
 
@@ -91,7 +90,7 @@ def test_errors_that_last_are_taken_for_more_than_their_size_and_reported_honest
     """
     joints, px = walks(drift_px=4.0)
     state, *ours = follow(px)
-    assert 2.9 < state.noise_factor.mean() < 4.0
+    assert 2.9 < state.slots.noise_factor.mean() < 4.0
     _, *fixed = follow(px, FIXED)
     assert judged(joints, *fixed)[1] < 0.70
     assert 0.93 < judged(joints, *ours)[1] < 0.985
@@ -101,7 +100,7 @@ def test_errors_that_last_are_taken_for_more_than_their_size_and_reported_honest
 def test_it_is_the_lasting_that_counts_and_not_the_size_alone():
     _, lasting = walks(drift_px=4.0)
     _, white = walks(sigma_px=5.0)
-    ours, same_size = (follow(px)[0].noise_factor.mean() for px in (lasting, white))
+    ours, same_size = (follow(px)[0].slots.noise_factor.mean() for px in (lasting, white))
     assert same_size == pytest.approx(25 / 9, rel=0.08)
     assert ours > 1.1 * same_size
 
@@ -110,14 +109,14 @@ def test_two_views_teach_as_well():
     joints, px = walks(drift_px=4.0)
     px[:, :, 2:] = np.nan
     state, *ours = follow(px)
-    assert state.noise_factor[..., :2].mean() > 2.5
+    assert state.slots.noise_factor[..., :2].mean() > 2.5
     assert judged(joints, *ours)[1] > 0.90
 
 
 def test_a_camera_that_is_grossly_wrong_for_a_while_teaches_nothing():
     _, px = walks()
     px[60:110, :, 1] += 200.0
-    factor = follow(px)[0].noise_factor
+    factor = follow(px)[0].slots.noise_factor
     np.testing.assert_allclose(factor.mean((0, 1, 2)), 1.0, atol=0.15)
 
 
@@ -128,10 +127,10 @@ def test_nothing_that_a_camera_shows_makes_it_leave_its_bounds():
     px[90:100, :, 2] *= 1e6
     px[100:110] = 0.0
     state, means, _ = follow(px)
-    for part in (state.noise_factor, state.noise_sums, state.noise_last, means):
+    for part in (state.slots.noise_factor, state.slots.noise_sums, state.slots.noise_last, means):
         assert np.isfinite(part).all()
-    assert (state.noise_factor >= 1.0).all()
-    assert (state.noise_factor <= 6.0).all()
+    assert (state.slots.noise_factor >= 1.0).all()
+    assert (state.slots.noise_factor <= 6.0).all()
 
 
 def test_what_is_learnt_does_not_depend_on_who_else_is_in_the_batch():
@@ -139,9 +138,9 @@ def test_what_is_learnt_does_not_depend_on_who_else_is_in_the_batch():
     together, reverse = follow(px[:80])[0], follow(px[:80, ::-1])[0]
     alone = follow(px[:80, 2:3])[0]
     for name in ("noise_factor", "noise_sums", "noise_last"):
-        whole = getattr(together, name)
-        np.testing.assert_array_equal(whole[2:3], getattr(alone, name))
-        np.testing.assert_array_equal(whole[::-1], getattr(reverse, name))
+        whole = getattr(together.slots, name)
+        np.testing.assert_array_equal(whole[2:3], getattr(alone.slots, name))
+        np.testing.assert_array_equal(whole[::-1], getattr(reverse.slots, name))
 
 
 def test_a_reset_forgets_it():
@@ -149,22 +148,21 @@ def test_a_reset_forgets_it():
     e = make_estimator("kalman", LAB, DT)
     state = follow(px[:50])[0]
     e.reset(state, np.array([1]), generators(1))
-    assert (state.noise_factor[1] == 1.0).all()
-    assert not state.noise_sums[1].any()
-    assert (state.noise_factor[0] > 1.0).any()
+    assert (state.slots.noise_factor[1] == 1.0).all()
+    assert not state.slots.noise_sums[1].any()
+    assert (state.slots.noise_factor[0] > 1.0).any()
 
 
 def test_equal_bounds_are_a_fixed_factor():
     _, px = walks()
-    config = TrackerConfig(noise_bounds=(1.44, 1.44))
-    assert isinstance(make_estimator("kalman", LAB, DT, config), KalmanEstimator)
+    config = ParticleConfig(noise_bounds=(1.44, 1.44))
     state, means, _ = follow(px[:60], config)
-    assert (state.noise_factor == 1.44).all()
-    _, scaled, _ = follow(px[:60], TrackerConfig(noise_bounds=(1.0, 1.0), sigma_scale=1.2))
+    assert (state.slots.noise_factor == 1.44).all()
+    _, scaled, _ = follow(px[:60], ParticleConfig(noise_bounds=(1.0, 1.0), sigma_scale=1.2))
     np.testing.assert_allclose(means, scaled, atol=1e-9)
 
 
 @pytest.mark.parametrize("bounds", [(0.0, 1.0), (2.0, 1.0), (1.0, np.inf), (np.nan, 1.0)])
 def test_bounds_that_cannot_work_are_refused_in_words(bounds):
     with pytest.raises(ConfigError, match="noise_bounds must be positive, finite and ordered"):
-        TrackerConfig(noise_bounds=bounds)
+        ParticleConfig(noise_bounds=bounds)

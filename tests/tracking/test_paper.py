@@ -5,7 +5,7 @@ import pytest
 from simulated import DT, LAB, Damage, detections, generators, keypoints, track, walk
 
 from hrc_env.tracking.clouds.moments import roll
-from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.config import PaperConfig
 from hrc_env.tracking.estimators import make_estimator
 
 SIGMA_PX, FOCAL_PX = 3.0, 100.0
@@ -41,9 +41,7 @@ def test_it_converges_to_the_kalman_filter_on_a_linear_gaussian_problem(n_partic
     truth = np.array([1.0, 0.0, 1.0]) + np.cumsum(steps, 0)
     px = np.stack([truth[..., [0, 2]], truth[..., [1, 2]]], 1) * FOCAL_PX + 500
     px += SIGMA_PX * rng.standard_normal(px.shape)
-    config = TrackerConfig(
-        paper_particles=n_particles, paper_sigma_m=walk_m, min_std_m=1e-6, gate_sigma=20.0
-    )
+    config = PaperConfig(n_particles=n_particles, sigma_m=walk_m, min_std_m=1e-6, gate_sigma=20.0)
     estimates = track(make_estimator("paper", AFFINE, DT, config), px[:, None], SIGMA_PX)
     mean = np.stack([e.mean_world[0, 0] for e in estimates])
     exact, variance = kalman(px[1:], mean[0], walk_m)
@@ -93,10 +91,10 @@ def test_four_cameras_follow_a_walk_to_a_few_centimetres():
     assert np.sqrt((error**2).mean()) < 0.03
 
 
-@pytest.mark.parametrize("setting", [{"paper_resampling": "systematic"}, {"paper_iterations": 2}])
+@pytest.mark.parametrize("setting", [{"resampling": "systematic"}, {"n_iterations": 2}])
 def test_other_resampling_and_more_passes_follow_too(setting):
     joints = walk(2, 50)
-    estimator = make_estimator("paper", LAB, DT, TrackerConfig(paper_particles=500, **setting))
+    estimator = make_estimator("paper", LAB, DT, PaperConfig(n_particles=500, **setting))
     estimates = track(estimator, detections(joints, Damage(), 2)[:, None])
     assert np.linalg.norm(estimates[-1].mean_world[0, 0] - joints[-1], axis=-1).max() < 0.1
 

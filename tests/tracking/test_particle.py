@@ -5,7 +5,7 @@ import pytest
 from simulated import DT, HARD, LAB, Damage, detections, generators, keypoints, track, walk
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.config import ParticleConfig
 from hrc_env.tracking.estimators import make_estimator
 from hrc_env.tracking.hypotheses.anatomy import anatomy
 from hrc_env.tracking.hypotheses.mirrors import eye_of, lone_camera, open_depth, reflect
@@ -62,7 +62,7 @@ def standing(heading_rad=0.0, place=(0.5, 0.2, 0.0)):
 def test_with_one_hypothesis_it_is_the_kalman_filter():
     px = np.stack([detections(walk(s, 60), HARD, s) for s in (3, 4)], 1)
     px[30:, :, 1:] = np.nan
-    config = TrackerConfig(n_hypotheses=1)
+    config = ParticleConfig(n_hypotheses=1)
     ours, theirs = (track(make_estimator(n, LAB, DT, config), px) for n in ("particle", "kalman"))
     for a, b in zip(ours, theirs, strict=True):
         np.testing.assert_allclose(a.mean_world, b.mean_world, rtol=0, atol=1e-12)
@@ -83,7 +83,7 @@ def test_nobody_who_looks_smaller_to_one_camera_goes_through_the_floor():
     px[25:, 0, 0] = middle + share * (px[25:, 0, 0] - middle)
     lowest = {}
     for std in (0.05, np.inf):
-        e = make_estimator("particle", LAB, DT, TrackerConfig(floor_std_m=std))
+        e = make_estimator("particle", LAB, DT, ParticleConfig(floor_std_m=std))
         lowest[std] = min(each.mean_world[0, 0, :, 2].min() for each in track(e, px)[25:])
     assert lowest[np.inf] < -0.3
     assert lowest[0.05] > -0.1
@@ -168,7 +168,7 @@ def test_results_do_not_depend_on_the_batch():
 
 def test_the_mixtures_moments_are_those_of_its_parts():
     _, px = one_camera([101], 3.0, 0.0)
-    config = TrackerConfig(one_view_inflation=1.0)
+    config = ParticleConfig(one_view_inflation=1.0)
     e, rngs = make_estimator("particle", LAB, DT, config), generators(1)
     state, most = e.init(1, 1), 1
     for frame in px:
@@ -305,4 +305,4 @@ def test_exchanging_slots_exchanges_every_array():
 )
 def test_settings_that_cannot_work_are_refused(change):
     with pytest.raises(ConfigError):
-        TrackerConfig(**change)
+        ParticleConfig(**change)

@@ -5,7 +5,7 @@ import pytest
 from simulated import DT, HARD, LAB, Damage, detections, keypoints, track, walk
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.config import ParticleConfig
 from hrc_env.tracking.estimators import make_estimator
 from hrc_env.tracking.smoother import dense, linear_motion, rts_step, smooth
 from hrc_env.tracking.tree.gaussian import ORDER, PARENT
@@ -95,13 +95,13 @@ def test_its_motion_is_the_filters():
     for frame in px:
         e.predict(state, DT, [])
         e.update(state, keypoints(frame), [])
-    F, Q = linear_motion(DT, TrackerConfig())
-    before = dense(state.cov[0], state.slope[0])[0]
+    F, Q = linear_motion(DT, ParticleConfig())
+    before = dense(state.slots.cov[0], state.slots.slope[0])[0]
     e.predict(state, DT, [])
     after = F @ before @ F.T + Q
     for j in range(15):
         own = after[6 * j : 6 * j + 6, 6 * j : 6 * j + 6]
-        np.testing.assert_allclose(own, state.cov[0, 0, j], atol=1e-12)
+        np.testing.assert_allclose(own, state.slots.cov[0, 0, j], atol=1e-12)
 
 
 @pytest.mark.parametrize("damage", [Damage(), Damage(occlusions=True), HARD])

@@ -1,7 +1,7 @@
 """What an estimator is worth in safety: the experiment, part by part."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +13,13 @@ from hrc_env.experiments.impact.report import write_pages
 from hrc_env.experiments.impact.tax import tax_metrics
 from hrc_env.experiments.impact.trial.episodes import PEOPLE, Stages
 from hrc_env.experiments.impact.trial.eyes import (
-    ALL_EYES,
     LATE,
     PIXELS,
     REFERENCE,
     Eyes,
     eyes_called,
+    seeing,
+    usual_eyes,
 )
 from hrc_env.experiments.impact.trial.policies import (
     POLICIES,
@@ -31,6 +32,7 @@ from hrc_env.experiments.impact.trial.policies import (
 from hrc_env.experiments.study.fingerprint import fingerprint_of
 from hrc_env.experiments.study.folder import claim
 from hrc_env.experiments.study.shelf import Say, Shelf
+from hrc_env.tracking.estimators import estimator_called
 
 NAME = "impact"
 PARTS_FROM = (
@@ -38,7 +40,7 @@ PARTS_FROM = (
     "hrc_env.experiments.impact.trial.training",
     "agents.base",
     "agents.scripted",
-    "agents.policy",
+    "agents.ppo",
 )
 """The modules that finished parts are made by."""
 FIRST_SEED = 1_000_000
@@ -61,7 +63,7 @@ class ImpactConfig:
     """Environment steps in which the trained policy learns."""
     policies: tuple[str, ...] = POLICIES
     """Whose eyes are exchanged."""
-    eyes: tuple[str, ...] = tuple(ALL_EYES)
+    eyes: tuple[str, ...] = field(default_factory=usual_eyes)
     """Which eyes they get; the reference is always among them."""
     margins_m: tuple[float, ...] = (0.05, 0.1, 0.2)
     """What `scripted_slowed` adds to its distances where margins are compared [m]."""
@@ -85,9 +87,20 @@ QUICK = ImpactConfig(n_episodes=8, n_pixels=1, n_steps=100, learning_steps=65_53
 """Every number, from little, and for 4 s: what takes the time is the number of steps."""
 
 
-def config_for(quick: bool = False, seeds: int | None = None) -> ImpactConfig:
-    """The settings of a run; `seeds`: episodes of a row."""
+def config_for(
+    quick: bool = False, seeds: int | None = None, estimators: Sequence[str] = ()
+) -> ImpactConfig:
+    """The settings of a run.
+
+    Args:
+        quick: every number, from little.
+        seeds: episodes of a row.
+        estimators: compare these with the reference, the truth and nothing; all eyes if none.
+    """
     config = QUICK if quick else ImpactConfig()
+    if estimators:
+        asked = (seeing(estimator_called(name).name).name for name in estimators)
+        config = replace(config, eyes=tuple(dict.fromkeys(("truth", "none", REFERENCE, *asked))))
     return config if seeds is None else replace(config, n_episodes=seeds)
 
 

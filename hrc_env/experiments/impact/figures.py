@@ -14,6 +14,7 @@ from hrc_env.experiments.impact.tax import MEASURED, missed_share
 from hrc_env.experiments.impact.trial.eyes import LATE, LATE_S, REFERENCE, Eyes, eyes_called
 from hrc_env.experiments.impact.trial.policies import SCRIPTED, SLOWED, Policy
 from hrc_env.experiments.impact.words import eyes_words
+from hrc_env.tracking.estimators import ESTIMATORS
 
 Metrics = Mapping[str, Metric]
 _COLOURS = {
@@ -21,6 +22,8 @@ _COLOURS = {
     "truth": "black", "none": "0.55", "pixels": "C1",
 }  # fmt: skip
 """Of perception levels, and of estimators with four cameras."""
+_FREE = (3, 5, 8, 9)
+"""Colours of the cycle for everybody else's."""
 _CAMERA_COLOURS = {4: "C0", 3: "#5aa2d6", 2: "#e8a33d", 1: "#d1495b"}
 _ACROSS = {
     "cost": "true cost per episode  (less is safer)",
@@ -144,7 +147,11 @@ def _placed(
 def _colour(eyes: Eyes) -> str:
     if eyes.n_cameras < 4:
         return _CAMERA_COLOURS[eyes.n_cameras]
-    return _COLOURS.get(eyes.perception, _COLOURS[eyes.estimator])
+    name = eyes.perception if eyes.perception in _COLOURS else eyes.estimator
+    if name not in _COLOURS:  # somebody's own
+        others = [each for each in ESTIMATORS if each not in _COLOURS]
+        return f"C{_FREE[others.index(name) % len(_FREE)]}"
+    return _COLOURS[name]
 
 
 def _margins(axis: Axes, table: Table, late: Sequence[Eyes], margins_m: Sequence[float]) -> None:

@@ -14,6 +14,7 @@ from hrc_env.experiments.impact.trial.tally import MOVING_MPS, SLOW_M, STOP_M
 from hrc_env.experiments.impact.words import eyes_words
 from hrc_env.experiments.study import page
 from hrc_env.experiments.study.page import Part, Picture, Section, said
+from hrc_env.tracking.estimators import ESTIMATORS
 
 Metrics = Mapping[str, Metric]
 ONE_CAMERA = seeing(n_cameras=1).name
@@ -154,7 +155,7 @@ def _one_camera(metrics: Metrics, policy: str) -> str:
 
 def _estimators(metrics: Metrics, policies: Sequence[str]) -> tuple[str, ...]:
     """How far apart the estimators are with four cameras, for the policy that yields."""
-    names = [seeing(each).name for each in ("kalman", "triangulation", "paper")]
+    names = [seeing(each).name for each in ESTIMATORS if each != "particle"]
     key = f"difference.{SLOWED}"
     known = [name for name in names if f"{key}.{name}.cost" in metrics]
     if SLOWED not in policies or not known:

@@ -31,7 +31,7 @@ CROPS = "particle"
 PRIOR_STD_M = 3.0
 """How far people may be from the middle of the work when nothing is known of them [m]: the walks go
 all over the place."""
-ALSO = ("kalman", "per_joint")
+ALSO = ("kalman",)
 """Everybody's best must be known for a fair comparison: these are given the film, too."""
 
 

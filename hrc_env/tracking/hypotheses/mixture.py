@@ -4,7 +4,7 @@ import math
 from typing import NamedTuple
 
 from hrc_env.core.kernels import kernel
-from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.config import ParticleConfig
 from hrc_env.tracking.hypotheses.slots import hypotheses
 from hrc_env.tracking.settings import Settings
 from hrc_env.tracking.tree.reports import tell_moments, tell_rest
@@ -51,7 +51,7 @@ class MixtureSettings(NamedTuple):
     """Gauss-Newton steps from a mirror image."""
 
 
-def mixture_settings(config: TrackerConfig) -> MixtureSettings:
+def mixture_settings(config: ParticleConfig) -> MixtureSettings:
     """The kernels' part of the configuration."""
     return MixtureSettings(
         mirror_body="body" in config.mirrored_parts,

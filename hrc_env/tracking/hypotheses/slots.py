@@ -1,8 +1,7 @@
 """Hypotheses about one body: slots with a Gaussian tree each, weighted, merged and dropped.
 
 A worker has H slots, of which the first `n_alive` are in use, the heaviest first. Every slot is
-a whole `kalman.KalmanState` of one worker: worker w's are the columns w H to (w + 1) H of its
-arrays, so that whatever works on a worker of `kalman` works on a hypothesis.
+a column of `tree.state.Trees`: worker w's are the columns w H to (w + 1) H.
 """
 
 import math
@@ -12,14 +11,14 @@ import numpy as np
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats, Ints
-from hrc_env.tracking.kalman import KalmanState
 from hrc_env.tracking.tree.evidence import distance_between
+from hrc_env.tracking.tree.state import Trees
 
 
 class Hypotheses(NamedTuple):
     """Hypotheses about each worker; arrays changed in place."""
 
-    slots: KalmanState
+    slots: Trees
     """Arrays (B, W H, ...), one Gaussian tree each."""
     log_weight: Floats
     """(B, W H) log-probabilities of the slots in use, which sum to one after an update."""
@@ -40,7 +39,7 @@ def plain(state: Hypotheses) -> tuple[Any, ...]:
 def hypotheses(state):
     """The hypotheses that `plain` gave."""
     slots, log_weight, form, n_alive, waited_s = state
-    return Hypotheses(KalmanState(*slots), log_weight, form, n_alive, waited_s)
+    return Hypotheses(Trees(*slots), log_weight, form, n_alive, waited_s)
 
 
 @kernel

@@ -25,7 +25,7 @@ import numpy as np
 
 from hrc_env.core.kernels import kernel
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, inverse3
-from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.config import ParticleConfig
 
 N_SUMS = 5
 """Fading sums of the residuals' squares, redundancy, products with the last ones and the squares
@@ -62,7 +62,7 @@ class NoiseModel(NamedTuple):
     """Bounds of the factor on the variance; equal: nothing is learnt."""
 
 
-def noise_model(config: TrackerConfig, ctrl_dt: float) -> NoiseModel:
+def noise_model(config: ParticleConfig, ctrl_dt: float) -> NoiseModel:
     """The constants for updates that are `ctrl_dt` [s] apart."""
     least, most = config.noise_bounds
     keep, persists = (
@@ -71,7 +71,7 @@ def noise_model(config: TrackerConfig, ctrl_dt: float) -> NoiseModel:
     return NoiseModel(keep**_TURNS, persists, config.noise_share, least, most)
 
 
-def first_factor(config: TrackerConfig) -> float:
+def first_factor(config: ParticleConfig) -> float:
     """The factor before anything was learnt: the detector is believed."""
     return min(max(1.0, config.noise_bounds[0]), config.noise_bounds[1])
 

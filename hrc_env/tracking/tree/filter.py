@@ -1,79 +1,21 @@
-"""The kernels of `kalman`: one loop over (B, W), one function per step of it.
+"""An update of one Gaussian on the tree, step by step.
 
-`state` and `s` are `kalman.KalmanState` and `settings.Settings`; a worker's measurements are
+`state` and `s` are `state.Trees` and `settings.Settings`; a worker's measurements are
 z (J, C, 2), sigma (J, C), ok (J, C) as `measurements.read_worker` fills them.
 """
 
-import numpy as np
-
 from hrc_env.core.kernels import kernel
-from hrc_env.tracking.measurements import read_worker
 from hrc_env.tracking.models.acquisition import count_conflict
-from hrc_env.tracking.models.noise import learn_noise, scale_sigma
 from hrc_env.tracking.models.proposal import contrast_of
-from hrc_env.tracking.models.swaps import undo_swaps
 from hrc_env.tracking.models.upkeep import (
-    acquire,
     acquire_anew,
     check,
     find_joints_again,
-    grow_older,
 )
 from hrc_env.tracking.tree.bone_lengths import learn_lengths, stiff_lengths
 from hrc_env.tracking.tree.gaussian import PARENT
-from hrc_env.tracking.tree.predict import predict_tree
 from hrc_env.tracking.tree.search import find_pose
 from hrc_env.tracking.tree.update import correct_mean, update_tree
-from hrc_env.tracking.tree.work import make_work
-
-
-@kernel(makes_arrays=True)
-def predict_all(state, model, dt, s):
-    """Let dt [s] pass: bodies move and ages grow; `model` as in `tree.predict.predict_tree`."""
-    work = make_work(0)
-    for b in range(state.tracked.shape[0]):
-        for w in range(state.tracked.shape[1]):
-            if state.tracked[b, w]:
-                gaussian = (state.body[b, w], state.cov[b, w], state.slope[b, w])
-                places = (state.offset[b, w], state.offset_count[b, w])
-                predict_tree(*gaussian, *places, model, dt, work)
-            grow_older(state, b, w, dt, s)
-
-
-@kernel(makes_arrays=True)
-def update_all(state, P, px, confidence, sigma_px, standing, s, noise):
-    """Take one set of frames in.
-
-    Args:
-        state: changed in place.
-        P: (C, 3, 4).
-        px, confidence, sigma_px: as in `records.Keypoints`.
-        standing: (J, 3) `acquisition.STANDING_M`.
-        s: settings.
-        noise: `noise.NoiseModel`.
-    """
-    n_batch, n_cameras, n_workers, n_joints = confidence.shape
-    z, sigma = np.empty((n_joints, n_cameras, 2)), np.empty((n_joints, n_cameras))
-    ok, belief = np.empty((n_joints, n_cameras), np.bool_), np.empty((n_joints, n_cameras))
-    scratch = (belief, np.empty(n_joints), make_work(n_cameras))
-    placed, predicted = np.empty(n_joints, np.bool_), np.empty((n_joints, 3, 3))
-    for b in range(n_batch):
-        for w in range(n_workers):
-            read_worker(px, confidence, sigma_px, b, w, s.sigma_scale, z, sigma, ok)
-            scale_sigma(state.noise_factor[b, w], sigma)
-            if not state.tracked[b, w]:
-                if acquire(state, b, w, P, z, sigma, ok, standing, s):
-                    state.slope[b, w] = 0.0
-                continue
-            swaps = (state.swap_chance[b, w], state.blind[b, w], state.believed[b, w])
-            undo_swaps(P, state.body[b, w], state.cov[b, w], z, sigma, ok, *swaps, s)
-            seen = (P, z, sigma, ok)
-            keep_positions(state.cov[b, w], predicted)
-            follow(state, b, w, seen, s, scratch)
-            known = (state.noise_factor[b, w], state.noise_sums[b, w], state.noise_last[b, w])
-            body = (state.body[b, w], state.cov[b, w], predicted)
-            learn_noise(seen, belief, body, *known, noise, scratch[2])
-            look_after(state, b, w, seen, standing, s, placed, scratch[2].a)
 
 
 @kernel

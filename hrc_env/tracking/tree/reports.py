@@ -8,15 +8,6 @@ _FORGOTTEN_UPDATES = 8
 
 
 @kernel
-def estimate_all(state, s, out):
-    """Fill the arrays of a `PoseEstimate` in; `state` is `kalman.KalmanState`."""
-    for b in range(state.tracked.shape[0]):
-        for w in range(state.tracked.shape[1]):
-            tell_moments(state, b, w, out, w)
-            tell_rest(state, b, w, s, out, w)
-
-
-@kernel
 def tell_moments(state, b, k, out, w):
     """Mean, velocity and covariance of column k, to be those of worker w."""
     mean, cov, velocity = out[0][b, w], out[1][b, w], out[2][b, w]

@@ -3,7 +3,7 @@
 from hrc_env.experiments.beyond.metrics import Found
 from hrc_env.experiments.beyond.study import Curves, Line, Panel, Study
 from hrc_env.experiments.beyond.trial.setting import Setting
-from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.config import PaperConfig
 
 PARTICLES = (30, 100, 300, 1000, 3000, 10_000)
 ITERATIONS = (1, 2, 5, 10)
@@ -17,8 +17,8 @@ def _called(n: int, m: int) -> str:
 
 
 def _paper(name: str, n: int, m: int, sigma_cm: float = 5.0) -> Setting:
-    tracker = TrackerConfig(
-        paper_iterations=n, paper_particles=m, paper_sigma_m=sigma_cm / 100
+    tracker = PaperConfig(
+        n_iterations=n, n_particles=m, sigma_m=sigma_cm / 100
     )  # fmt: skip
     words = f"N = {n}, M = {m:,}, noise {sigma_cm:g} cm"
     return Setting(name, words, estimator="paper", tracker=tracker, is_timed=True)

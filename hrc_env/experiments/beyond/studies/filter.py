@@ -7,7 +7,7 @@ from hrc_env.experiments.beyond.metrics import Found
 from hrc_env.experiments.beyond.study import Panel, Rows, Study
 from hrc_env.experiments.beyond.trial.setting import ALL, SINGLE, Rig, Setting, left_of
 from hrc_env.experiments.beyond.variants import VARIANTS, estimator_of
-from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.config import ParticleConfig
 
 WHOLE = "all"
 """The variant that is the default filter."""
@@ -42,7 +42,6 @@ WORDS = {
     "one hypothesis": "no mixture (one hypothesis)",
 }
 RIVALS = {
-    "per_joint": "per_joint: joint by joint, with particles",
     "paper": "paper: Algorithm 1",
     "ransac": "ransac: no motion, no body",
 }
@@ -62,7 +61,7 @@ def _setting(cameras: str, name: str, estimator: str, change: dict[str, Any]) ->
         f"{cameras}_{name.replace(' ', '_')}",
         f"{spoken}: {words}",
         estimator=estimator,
-        tracker=TrackerConfig(**change),
+        tracker=ParticleConfig(**change),
         bones=bones,
         motion=motion,
         turns=left_of("lab", rigs),

@@ -13,7 +13,6 @@ KNOWING = {
     "known": ("bone lengths known", "particle", "known"),
     "learnt": ("bone lengths learnt (the default)", "particle", "learnt"),
     "none": ("bones of any length", "particle", "none"),
-    "per_joint": ("each joint for itself, and bones (per_joint)", "per_joint", "learnt"),
     "points": ("points without a body (ransac)", "ransac", "learnt"),
 }
 """What is known of the body: words, estimator and bones."""

@@ -7,6 +7,7 @@ from hrc_env.core.errors import unknown
 from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.scene.rigs import RIGS
+from hrc_env.tracking.estimators import ESTIMATORS
 
 Rig = tuple[int, ...]
 """Cameras of the laboratory, counted from 0."""
@@ -83,12 +84,18 @@ def seeing(
 
 LATE_S = (0.12, 0.2)
 """How late images are [s]: three and five control steps."""
-ESTIMATORS = ("particle", "kalman", "triangulation", "paper")
 LATE = tuple(seeing(latency_s=s, is_told=told) for told in (True, False) for s in LATE_S)
 """Late eyes with four cameras: those that are told how late they are, and those that are not."""
-ALL_EYES: dict[str, Eyes] = {
-    each.name: each
-    for each in (
+NOT_ASKED = ("ransac",)
+"""Estimators that are compared on request only."""
+REFERENCE = seeing().name
+"""What everybody is compared with."""
+PIXELS = seeing(perception="pixels").name
+
+
+def all_eyes() -> dict[str, Eyes]:
+    """By name, with every estimator that is registered now; the slowest last."""
+    eyes = (
         Eyes("truth", "truth"),
         Eyes("none", "none"),
         *(seeing(estimator) for estimator in ESTIMATORS),
@@ -98,11 +105,13 @@ ALL_EYES: dict[str, Eyes] = {
         *(seeing(n_cameras=1, latency_s=s) for s in LATE_S),
         seeing(perception="pixels"),
     )
-}
-"""By name; the slowest last."""
-REFERENCE = seeing().name
-"""What everybody is compared with."""
-PIXELS = seeing(perception="pixels").name
+    return {each.name: each for each in eyes}
+
+
+def usual_eyes() -> tuple[str, ...]:
+    """The names of those that are compared if nobody asks for others."""
+    left_out = {seeing(name).name for name in NOT_ASKED}
+    return tuple(name for name in all_eyes() if name not in left_out)
 
 
 def eyes_called(name: str) -> Eyes:
@@ -111,6 +120,7 @@ def eyes_called(name: str) -> Eyes:
     Raises:
         ConfigError: there are none of that name.
     """
-    if name not in ALL_EYES:
-        raise unknown("eyes", name, ALL_EYES)
-    return ALL_EYES[name]
+    eyes = all_eyes()
+    if name not in eyes:
+        raise unknown("eyes", name, eyes)
+    return eyes[name]

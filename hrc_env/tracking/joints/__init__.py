@@ -1,1 +1,0 @@
-"""One Gaussian particle filter for each joint."""
