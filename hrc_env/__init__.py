@@ -9,12 +9,13 @@ from hrc_env.registration import (
     IDS,
     import_files,
     register_environment,
+    register_estimator,
     register_task,
 )
 from hrc_env.tasks import BUILT_IN
 
 __version__ = "0.1.0"
-__all__ = ["IDS", "register_task"]
+__all__ = ["IDS", "register_estimator", "register_task"]
 
 for _id in BUILT_IN:
     register_environment(_id)

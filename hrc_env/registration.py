@@ -9,15 +9,16 @@ import os
 import sys
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from gymnasium.envs.registration import register
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.tasks import EPISODE_STEPS
+from hrc_env.tasks import BUILT_IN, EPISODE_STEPS
 
 if TYPE_CHECKING:
     from hrc_env.tasks.task import Task
+    from hrc_env.tracking.estimators import EstimatorSpec
 
 IMPORT = "HRC_ENV_IMPORT"
 """Environment variable: Python files that are imported with this package, as PATH has folders."""
@@ -35,13 +36,30 @@ def register_task(task: "Task") -> None:
         ConfigError: its id is taken, or something in it is missing or of the wrong kind.
     """
     from hrc_env.tasks.checks import check_task  # here and below: kernels take time to import
-    from hrc_env.tasks.task import TASKS
+    from hrc_env.tasks.task import TASKS, task_called
 
+    for each in BUILT_IN:
+        task_called(each)
     check_task(task)
-    if task.id in IDS:
-        raise ConfigError(f"There is a task {task.id!r} already; choose another id.")
-    TASKS[task.id] = task
+    _add(TASKS, "task", task.id, task)
     register_environment(task.id, task.max_episode_steps)
+
+
+def register_estimator(spec: "EstimatorSpec") -> None:
+    """Make an estimator known by its name: wherever `estimator=` or `--estimator` is taken.
+
+    Args:
+        spec: a `hrc_env.tracking.estimators.EstimatorSpec`.
+
+    Raises:
+        ConfigError: its name is taken, a function is missing, or an estimate has a wrong shape, no
+            finite numbers or no covariance.
+    """
+    from hrc_env.tracking.checks import check_estimator
+    from hrc_env.tracking.estimators import ESTIMATORS
+
+    check_estimator(spec)
+    _add(ESTIMATORS, "estimator", spec.name, spec)
 
 
 def register_environment(task_id: str, max_episode_steps: int = EPISODE_STEPS) -> None:
@@ -54,6 +72,12 @@ def register_environment(task_id: str, max_episode_steps: int = EPISODE_STEPS) -
         kwargs={"task": task_id},
     )
     IDS.append(task_id)
+
+
+def _add(known: dict[str, Any], what: str, name: str, thing: Any) -> None:
+    if name in known:
+        raise ConfigError(f"There is the {what} {name!r} already; choose another name.")
+    known[name] = thing
 
 
 def import_files(paths: str | None = None) -> None:

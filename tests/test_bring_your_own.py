@@ -1,6 +1,7 @@
 """The examples of bringing one's own: short, and known wherever a name is asked for."""
 
 import dataclasses
+import os
 import subprocess
 import sys
 
@@ -13,15 +14,18 @@ import hrc_env
 from hrc_env.core.errors import ConfigError
 from hrc_env.registration import import_files
 from hrc_env.tasks.task import TASKS, task_called
+from hrc_env.tracking.config import ParticleConfig, of_kind
+from hrc_env.tracking.estimators import ESTIMATORS
+from hrc_env.tracking.particle import ParticleEstimator
 from hrc_env.vector.env import HRCVectorEnv
 
 EXAMPLES = ROOT / "examples" / "bring_your_own"
-TASK = "HRCTend-v0"
+TASK, OWN = "HRCTend-v0", "alpha_beta"
 
 
 @pytest.fixture(autouse=True)
 def imported():
-    import_files(str(EXAMPLES / "task.py"))
+    import_files(os.pathsep.join(map(str, sorted(EXAMPLES.glob("*.py")))))
 
 
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.stem)
@@ -72,7 +76,7 @@ def test_what_nobody_wrote_an_expert_for_says_so():
 
 BAD = {
     "markers that are no function": ({"id": "HRCTend-v1", "markers": None}, "markers must be"),
-    "an id that is taken": ({}, "There is a task 'HRCTend-v0' already"),
+    "an id that is taken": ({}, "There is the task 'HRCTend-v0' already"),
     "an id that is none": ({"id": "tend"}, "must be like"),
     "no function": ({"id": "HRCTend-v1", "advance": None}, "advance must be a function"),
     "settings without defaults": (
@@ -126,3 +130,67 @@ def test_a_reward_term_of_another_shape_is_named():
 def test_a_file_that_is_not_there_is_named(tmp_path):
     with pytest.raises(ConfigError, match="cannot be imported"):
         import_files(str(tmp_path / "nowhere.py"))
+
+
+def test_an_estimator_works_wherever_one_is_named():
+    many = gymnasium.make_vec(
+        "HRCReach-v0", 2, perception="keypoints", estimator=OWN, config={"tracker": {"alpha": 0.4}}
+    )
+    many.reset(seed=[3, 4])
+    for _ in range(30):
+        *_, infos = many.step(many.action_space.sample())
+    assert (infos["tracking/mpjpe_m"] < 0.1).all()
+    assert OWN in hrc("list").stdout
+
+
+def test_a_function_that_makes_an_estimator_is_one():
+    from hrc_env_import_estimator import AlphaBeta
+
+    env = gymnasium.make(
+        "HRCReach-v0", perception="keypoints",
+        estimator=lambda P, dt_s, config: AlphaBeta(P, dt_s, ESTIMATORS[OWN].config()),
+    )  # fmt: skip
+    assert env.reset(seed=1)[1]["tracking/mpjpe_m"] < 0.2
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({}, "There is the estimator 'alpha_beta' already"),
+        ({"make": lambda P, dt_s, config: object()}, "lacks init, reset, predict"),
+        ({"config": dict}, "must be a kind of TrackerConfig"),
+        ({"make": lambda *given: Wrong(*given, np.nan)}, "estimate.mean_world must be finite"),
+        (
+            {"make": lambda *given: Wrong(*given, np.zeros(7))},
+            "estimate.mean_world must have shape",
+        ),
+    ],
+)
+def test_what_is_wrong_with_an_estimator_is_said(changes, said):
+    with pytest.raises(ConfigError, match=said):
+        hrc_env.register_estimator(dataclasses.replace(ESTIMATORS[OWN], **changes))
+
+
+class Wrong(ParticleEstimator):
+    """The default one, whose means are something else."""
+
+    def __init__(self, P, dt_s, config, mean):
+        super().__init__(P, dt_s, of_kind(config, ParticleConfig))
+        object.__setattr__(self, "mean", mean)
+
+    def estimate(self, state):
+        found = super().estimate(state)
+        shape = found.mean_world.shape if np.ndim(self.mean) == 0 else self.mean.shape
+        return dataclasses.replace(found, mean_world=np.broadcast_to(self.mean, shape))
+
+
+def test_impact_compares_an_estimator_that_a_file_registers(tmp_path, end_to_end):
+    """One command, one file."""
+    from hrc_env.experiments.impact.experiment import config_for, run
+
+    config = dataclasses.replace(
+        config_for(True, 2, [OWN]), n_steps=12, policies=("scripted_slowed",), margins_m=()
+    )
+    metrics = run(config, tmp_path, lambda share, label: None)
+    assert f"scripted_slowed.keypoints_{OWN}_4cam_0ms.cost" in metrics
+    assert (tmp_path / "figures" / "tradeoff.png").exists()
