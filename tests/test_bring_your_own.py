@@ -162,7 +162,7 @@ def test_a_function_that_makes_an_estimator_is_one():
         ({"make": lambda *given: Wrong(*given, np.nan)}, "estimate.mean_world must be finite"),
         (
             {"make": lambda *given: Wrong(*given, np.zeros(7))},
-            "estimate.mean_world must have shape",
+            "mean_world must have shape",
         ),
     ],
 )
@@ -182,15 +182,3 @@ class Wrong(ParticleEstimator):
         found = super().estimate(state)
         shape = found.mean_world.shape if np.ndim(self.mean) == 0 else self.mean.shape
         return dataclasses.replace(found, mean_world=np.broadcast_to(self.mean, shape))
-
-
-def test_impact_compares_an_estimator_that_a_file_registers(tmp_path, end_to_end):
-    """One command, one file."""
-    from hrc_env.experiments.impact.experiment import config_for, run
-
-    config = dataclasses.replace(
-        config_for(True, 2, [OWN]), n_steps=12, policies=("scripted_slowed",), margins_m=()
-    )
-    metrics = run(config, tmp_path, lambda share, label: None)
-    assert f"scripted_slowed.keypoints_{OWN}_4cam_0ms.cost" in metrics
-    assert (tmp_path / "figures" / "tradeoff.png").exists()

@@ -1,4 +1,4 @@
-"""An estimator of your own: triangulation, smoothed by a constant gain (an alpha-beta filter).
+"""An estimator of your own: triangulation, smoothed by constant gains.
 
 python -m hrc_env --import examples/bring_your_own/estimator.py bench tracking --quick
 """
@@ -17,7 +17,6 @@ from hrc_env.tracking.estimators import EstimatorSpec, make_estimator
 @dataclass(frozen=True)
 class AlphaBetaConfig(TrackerConfig):
     alpha: float = 0.5
-    beta: float = 0.1
 
 
 class AlphaBetaState(NamedTuple):
@@ -45,11 +44,10 @@ class AlphaBeta:
 
     def update(self, state, keypoints, rngs):
         self.points.update(state.points, keypoints, rngs)
-        found = self.points.estimate(state.points)
-        error = found.mean_world - state.mean
+        error = self.points.estimate(state.points).mean_world - state.mean
         lost = np.abs(error).max((2, 3), keepdims=True) > 0.5
         state.mean[:] += np.where(lost, error, self.config.alpha * error)
-        state.velocity[:] += np.where(lost, -state.velocity, self.config.beta / self.dt_s * error)
+        state.velocity[:] += np.where(lost, -state.velocity, 0.1 / self.dt_s * error)
 
     def estimate(self, state):
         found = self.points.estimate(state.points)

@@ -83,7 +83,7 @@ class ImpactConfig:
             raise ConfigError(f"margins_m must be positive, got {self.margins_m}.")
 
 
-QUICK = ImpactConfig(n_episodes=8, n_pixels=1, n_steps=100, learning_steps=65_536)
+QUICK = {"n_episodes": 8, "n_pixels": 1, "n_steps": 100, "learning_steps": 65_536}
 """Every number, from little, and for 4 s: what takes the time is the number of steps."""
 
 
@@ -97,7 +97,7 @@ def config_for(
         seeds: episodes of a row.
         estimators: compare these with the reference, the truth and nothing; all eyes if none.
     """
-    config = QUICK if quick else ImpactConfig()
+    config = ImpactConfig(**QUICK) if quick else ImpactConfig()
     if estimators:
         asked = (seeing(estimator_called(name).name).name for name in estimators)
         config = replace(config, eyes=tuple(dict.fromkeys(("truth", "none", REFERENCE, *asked))))
