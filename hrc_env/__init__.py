@@ -8,14 +8,22 @@ does both. See `hrc_env.env` for the arguments, `hrc_env.config` for everything 
 from hrc_env.registration import (
     IDS,
     import_files,
+    register_detector,
     register_environment,
     register_estimator,
+    register_shield,
     register_task,
 )
 from hrc_env.tasks import BUILT_IN
 
 __version__ = "0.1.0"
-__all__ = ["IDS", "register_estimator", "register_task"]
+__all__ = [
+    "IDS",
+    "register_detector",
+    "register_estimator",
+    "register_shield",
+    "register_task",
+]
 
 for _id in BUILT_IN:
     register_environment(_id)

@@ -19,10 +19,11 @@ from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.geometry.rig_files import read_rig
 from hrc_env.metrics import CostConfig
 from hrc_env.motion.generator import PEOPLE, Clip, MotionConfig, PeopleConfig, people_called
+from hrc_env.perception.detector import DetectorConfig
 from hrc_env.perception.emulator import EmulatorConfig
-from hrc_env.perception.eyes import EyesConfig
 from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.rewards import RewardConfig
+from hrc_env.safety.shield import Shield, shield_called
 from hrc_env.scene.build import SceneConfig
 from hrc_env.scene.domain_randomization import AppearanceConfig, appearance_called
 from hrc_env.scene.rigs import RIGS
@@ -53,7 +54,7 @@ class HRCConfig:
     """Room, cameras, physics."""
     motion: MotionConfig = field(default_factory=MotionConfig)
     """How the workers move."""
-    eyes: EyesConfig = field(default_factory=EyesConfig)
+    detector: DetectorConfig = field(default_factory=DetectorConfig)
     """The camera pipeline (`perception="pixels"`)."""
     emulator: EmulatorConfig = field(default_factory=EmulatorConfig)
     """Its emulator (`perception="keypoints"`)."""
@@ -113,6 +114,7 @@ class Settings:
     scene: str
     n_workers: int | tuple[int, int]
     control: str
+    shield: Shield | None
     config: HRCConfig
 
 
@@ -124,6 +126,7 @@ def settle(
     scene: str = "lab",
     n_workers: int | tuple[int, int] = 1,
     control: str = "joint",
+    shield: "str | Shield | None" = None,
     config: "HRCConfig | Mapping[str, Any] | None" = None,
     cameras: "str | Path | Sequence[Any] | np.ndarray | None" = None,
     **changes: Any,
@@ -144,7 +147,9 @@ def settle(
             raise unknown("argument", name, [*_ARGUMENTS, *_CHANGES])
         whole = whole if value is None else _CHANGES[name](whole, value)
     whole, used = with_cameras(whole, cameras)
-    return Settings(chosen, perception, spec, used, scene, n_workers, control, whole)
+    return Settings(
+        chosen, perception, spec, used, scene, n_workers, control, shield_called(shield), whole
+    )  # fmt: skip
 
 
 def resolve(
@@ -290,5 +295,6 @@ _CHANGES: dict[str, Callable[[HRCConfig, Any], HRCConfig]] = {
     "appearance": _with_appearance,
 }
 _ARGUMENTS = (
-    "task", "perception", "estimator", "scene", "n_workers", "control", "config", "cameras",
+    "task", "perception", "estimator", "scene", "n_workers", "control", "shield", "config",
+    "cameras",
 )  # fmt: skip

@@ -25,6 +25,7 @@ from hrc_env.motion.generator import Clip, PeopleConfig
 from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.render.views import PICTURE_SIZE, Views, picture_size
 from hrc_env.rewards import RewardConfig
+from hrc_env.safety.shield import Shield
 from hrc_env.scene.domain_randomization import AppearanceConfig
 from hrc_env.simulation import Simulation, checked_action
 from hrc_env.tasks import DEFAULT
@@ -80,6 +81,8 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
             `hrc_env.scene.domain_randomization.APPEARANCES`, an `AppearanceConfig` or a mapping;
             None for that of the config (as built). Level "pixels" only.
         control: "joint" (joint velocities) or "tool" (tool velocity).
+        shield: what may change a command before the arm gets it: a name that was registered or a
+            function (`hrc_env.safety.shield.Shield`); None: nothing.
         render_mode: "rgb_array", "depth_array" or None; `gymnasium.make` also takes "human", a
             window (docs/rendering.md).
         width, height: of what `render` gives [px].
@@ -105,6 +108,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         faults: Sequence[FaultConfig | Mapping[str, Any]] | None = None,
         appearance: str | AppearanceConfig | Mapping[str, Any] | None = None,
         control: str = "joint",
+        shield: str | Shield | None = None,
         render_mode: str | None = None,
         width: int = PICTURE_SIZE[0],
         height: int = PICTURE_SIZE[1],
@@ -116,7 +120,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         settings = settle(
             task=task, perception=perception, estimator=estimator, cameras=cameras, scene=scene,
             n_workers=n_workers, people=people, motions=motions, faults=faults,
-            appearance=appearance, control=control, config=config,
+            appearance=appearance, control=control, shield=shield, config=config,
         )  # fmt: skip
         self.config = settings.config
         self.simulation = Simulation(1, settings)

@@ -7,6 +7,8 @@ it starts: `python -m hrc_env --import my_file.py play MyTask-v0`, or the enviro
 
 import os
 import sys
+from collections.abc import Callable
+from importlib import import_module
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +19,8 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.tasks import BUILT_IN, EPISODE_STEPS
 
 if TYPE_CHECKING:
+    from hrc_env.perception.detector import KeypointFunction
+    from hrc_env.safety.shield import Shield
     from hrc_env.tasks.task import Task
     from hrc_env.tracking.estimators import EstimatorSpec
 
@@ -24,6 +28,13 @@ IMPORT = "HRC_ENV_IMPORT"
 """Environment variable: Python files that are imported with this package, as PATH has folders."""
 IDS: list[str] = []
 """The environments that are registered."""
+REGISTRIES = {
+    "task": ("hrc_env.tasks.task", "TASKS"),
+    "estimator": ("hrc_env.tracking.estimators", "ESTIMATORS"),
+    "detector": ("hrc_env.perception.detector", "DETECTORS"),
+    "shield": ("hrc_env.safety.shield", "SHIELDS"),
+}
+"""What can be brought: the module and the table in which it is kept by name."""
 
 
 def register_task(task: "Task") -> None:
@@ -36,12 +47,11 @@ def register_task(task: "Task") -> None:
         ConfigError: its id is taken, or something in it is missing or of the wrong kind.
     """
     from hrc_env.tasks.checks import check_task  # here and below: kernels take time to import
-    from hrc_env.tasks.task import TASKS, task_called
 
-    for each in BUILT_IN:
-        task_called(each)
     check_task(task)
-    _add(TASKS, "task", task.id, task)
+    if task.id in BUILT_IN:
+        raise ConfigError(f"There is the task {task.id!r} already; choose another id.")
+    _add("task", task.id, task)
     register_environment(task.id, task.max_episode_steps)
 
 
@@ -56,10 +66,41 @@ def register_estimator(spec: "EstimatorSpec") -> None:
             finite numbers or no covariance.
     """
     from hrc_env.tracking.checks import check_estimator
-    from hrc_env.tracking.estimators import ESTIMATORS
 
     check_estimator(spec)
-    _add(ESTIMATORS, "estimator", spec.name, spec)
+    _add("estimator", spec.name, spec)
+
+
+def register_detector(name: str, make: "Callable[[], KeypointFunction]") -> None:
+    """Make a pose detector known: `config={"detector": {"keypoints": name}}`, level "pixels".
+
+    Args:
+        name: of it.
+        make: gives the function from a crop to keypoints (`hrc_env.perception.detector`'s
+            `KeypointFunction`); called once for each thread that detects.
+
+    Raises:
+        ConfigError: the name is taken, or what is given is no function.
+    """
+    if not callable(make):
+        raise ConfigError(f"{name}: make must be a function of no arguments, got {make!r}.")
+    _add("detector", name, make)
+
+
+def register_shield(name: str, shield: "Shield") -> None:
+    """Make a shield known: `shield=name` of every environment.
+
+    Args:
+        name: of it.
+        shield: a function (`hrc_env.safety.shield`'s `Shield`); what it gives is checked in every
+            step.
+
+    Raises:
+        ConfigError: the name is taken, or what is given is no function.
+    """
+    if not callable(shield):
+        raise ConfigError(f"{name}: a shield must be a function, got {shield!r}.")
+    _add("shield", name, shield)
 
 
 def register_environment(task_id: str, max_episode_steps: int = EPISODE_STEPS) -> None:
@@ -74,10 +115,10 @@ def register_environment(task_id: str, max_episode_steps: int = EPISODE_STEPS) -
     IDS.append(task_id)
 
 
-def _add(known: dict[str, Any], what: str, name: str, thing: Any) -> None:
-    if name in known:
-        raise ConfigError(f"There is the {what} {name!r} already; choose another name.")
-    known[name] = thing
+def known(what: str) -> dict[str, Any]:
+    """What there is of a kind in `REGISTRIES`, by name."""
+    module, table = REGISTRIES[what]
+    return getattr(import_module(module), table)
 
 
 def import_files(paths: str | None = None) -> None:
@@ -98,6 +139,15 @@ def import_files(paths: str | None = None) -> None:
         spec = spec_from_file_location(name, path)
         if spec is None or spec.loader is None or not path.is_file():
             raise ConfigError(f"{path} cannot be imported: it must be a Python file (.py).")
-        module = module_from_spec(spec)
-        sys.modules[name] = module
-        spec.loader.exec_module(module)
+        sys.modules[name] = module = module_from_spec(spec)
+        try:
+            spec.loader.exec_module(module)
+        except BaseException:
+            del sys.modules[name]
+            raise
+
+
+def _add(what: str, name: str, thing: Any) -> None:
+    if name in known(what):
+        raise ConfigError(f"There is the {what} {name!r} already; choose another name.")
+    known(what)[name] = thing

@@ -28,6 +28,7 @@ from hrc_env.motion.workers import Crew, bodies_of, worker_counts
 from hrc_env.pipeline.levels import CAMERA_LEVELS, make_senses
 from hrc_env.pipeline.sensor_input import Moment
 from hrc_env.rewards import RewardConfig
+from hrc_env.safety.shield import shielded
 from hrc_env.scene.build import build
 from hrc_env.scene.physics import Physics
 from hrc_env.scene.rigs import findings
@@ -74,6 +75,7 @@ class Simulation(Stateful):
         config, perception, scene = settings.config, settings.perception, settings.scene
         ahead.ensure(perception)
         self.batch, self.config, self.control = batch, config, settings.control
+        self.shield = settings.shield
         self.perception, self.reward_weights = perception, config.reward
         self.task = settings.task
         self.bodies = stack(pool(config.worker))
@@ -153,6 +155,9 @@ class Simulation(Stateful):
         command = joint_command(
             self.control, action, self.physics.q, self.chain, self.scene.home_q, config.control
         )
+        shield_info: Info = {}
+        if self.shield is not None:
+            command, shield_info = shielded(self.shield, self.believed, command, config.ctrl_dt)
         path, motion = generator.advance(
             self.motion, streams.motion, config.scene.sim_dt, config.n_substeps
         )
@@ -187,6 +192,7 @@ class Simulation(Stateful):
             **{f"reward/{name}": value for name, value in terms.items()},
             **cost_info(cost, crew.present),
             **tracking_info(estimate, truth, crew.present),
+            **shield_info,
             **self._tally(),
         }
         terminated = (cost.contact > 0) & config.cost.contact_terminates

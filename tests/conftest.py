@@ -7,9 +7,14 @@ from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # workers share the cores; read by NumPy and torch
 
+import gymnasium
 import pytest
+from commands import ROOT
 
+import hrc_env
 from hrc_env.perception.weights import fetch_weights
+from hrc_env.registration import REGISTRIES, import_files, known
+from hrc_env.tasks import BUILT_IN
 
 SLOW = {"process", "pixels", "end_to_end"}
 """Fixtures that take their time: `make test` leaves out who asks for one. `end_to_end` is a whole
@@ -57,3 +62,19 @@ def process():
         )  # fmt: skip
 
     return run
+
+
+@pytest.fixture(scope="module")
+def brought():
+    """What examples/bring_your_own registers is known, for the tests of one file."""
+    before = {what: set(known(what)) for what in REGISTRIES}
+    examples = sorted((ROOT / "examples" / "bring_your_own").glob("*.py"))
+    import_files(os.pathsep.join(map(str, examples)))
+    yield [path.stem for path in examples]
+    for what in REGISTRIES:
+        for added in set(known(what)) - before[what] - set(BUILT_IN):
+            del known(what)[added]
+            gymnasium.registry.pop(added, None)
+            hrc_env.IDS[:] = [each for each in hrc_env.IDS if each != added]
+    for path in examples:
+        del sys.modules[f"hrc_env_import_{path.stem}"]

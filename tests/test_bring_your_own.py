@@ -1,31 +1,36 @@
 """The examples of bringing one's own: short, and known wherever a name is asked for."""
 
 import dataclasses
-import os
 import subprocess
 import sys
 
 import gymnasium
+import imageio.v2 as imageio
 import numpy as np
 import pytest
 from commands import ROOT, hrc
 
 import hrc_env
+from agents.base import make_agent, situation
 from hrc_env.core.errors import ConfigError
+from hrc_env.core.records import Roi
+from hrc_env.env import HRCEnv
+from hrc_env.geometry.rig_files import write_rig
+from hrc_env.perception.detector import own_joints
 from hrc_env.registration import import_files
+from hrc_env.scene.render import PictureRenderer
 from hrc_env.tasks.task import TASKS, task_called
 from hrc_env.tracking.config import ParticleConfig, of_kind
 from hrc_env.tracking.estimators import ESTIMATORS
 from hrc_env.tracking.particle import ParticleEstimator
 from hrc_env.vector.env import HRCVectorEnv
+from hrc_env.worker.body import worker_truth
 
 EXAMPLES = ROOT / "examples" / "bring_your_own"
 TASK, OWN = "HRCTend-v0", "alpha_beta"
 
 
-@pytest.fixture(autouse=True)
-def imported():
-    import_files(os.pathsep.join(map(str, sorted(EXAMPLES.glob("*.py")))))
+pytestmark = pytest.mark.usefixtures("brought")
 
 
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.stem)
@@ -182,3 +187,139 @@ class Wrong(ParticleEstimator):
         found = super().estimate(state)
         shape = found.mean_world.shape if np.ndim(self.mean) == 0 else self.mean.shape
         return dataclasses.replace(found, mean_world=np.broadcast_to(self.mean, shape))
+
+
+def test_a_shield_changes_commands_and_says_so():
+    infos, angles = {}, {}
+    for shield in (None, "slow_down"):
+        env = gymnasium.make("HRCReach-v0", perception="truth", shield=shield)
+        simulation = env.unwrapped.simulation
+        agent, (observation, _) = make_agent("scripted", situation(simulation)), env.reset(seed=2)
+        infos[shield] = []
+        for _ in range(200):
+            observation, *_, info = env.step(agent.act(observation))
+            infos[shield].append(info)
+        angles[shield] = simulation.physics.q.copy()
+    assert "shield/speed_share" not in infos[None][0]
+    assert min(info["shield/speed_share"] for info in infos["slow_down"]) < 1.0
+    assert np.abs(angles[None] - angles["slow_down"]).max() > 1e-3
+
+
+def test_a_shield_reads_the_belief_alone():
+    """With nobody perceived there is nobody to yield to, wherever they are."""
+    env = gymnasium.make("HRCReach-v0", perception="none", shield="slow_down")
+    env.reset(seed=2)
+    assert {env.step(env.action_space.sample())[4]["shield/speed_share"] for _ in range(20)} == {
+        1.0
+    }
+
+
+def test_the_vector_environment_says_what_the_single_one_says_of_its_shield():
+    many = gymnasium.make_vec("HRCReach-v0", 2, perception="keypoints", shield="slow_down")
+    one = gymnasium.make("HRCReach-v0", perception="keypoints", shield="slow_down")
+    many.reset(seed=[5, 6])
+    one.reset(seed=6)
+    for _ in range(5):
+        actions = many.action_space.sample()
+        *_, infos = many.step(actions)
+        *_, info = one.step(actions[1])
+        assert infos["shield/speed_share"][1] == info["shield/speed_share"]
+
+
+@pytest.mark.parametrize(
+    ("shield", "said"),
+    [
+        ("slow_donw", "Did you mean 'slow_down'"),
+        (lambda now, velocities, dt_s: (velocities[:, :2], {}), "velocities must have shape"),
+        (lambda now, velocities, dt_s: (velocities * np.nan, {}), "velocities must be finite"),
+        (lambda now, velocities, dt_s: (velocities, {"x": np.zeros(7)}), "'x' must have shape"),
+        (3, "shield must be a name, a function or None"),
+    ],
+)
+def test_what_is_wrong_with_a_shield_is_said(shield, said):
+    with pytest.raises(ConfigError, match=said):
+        stepped(perception="none", shield=shield)
+
+
+def stepped(**arguments):
+    env = gymnasium.make("HRCReach-v0", **arguments)
+    env.reset(seed=1)
+    return env.step(np.zeros(6))
+
+
+@pytest.mark.parametrize(
+    ("register", "given", "said"),
+    [
+        (hrc_env.register_shield, ("slow_down", print), "the shield 'slow_down' already"),
+        (hrc_env.register_shield, ("other", None), "must be a function"),
+        (
+            hrc_env.register_detector,
+            ("mirrored", print),
+            "the detector 'mirrored' already",
+        ),
+        (hrc_env.register_detector, ("other", None), "must be a function"),
+    ],
+)
+def test_what_is_no_function_or_has_a_taken_name_is_refused(register, given, said):
+    with pytest.raises(ConfigError, match=said):
+        register(*given)
+
+
+def test_a_detector_finds_the_worker(pixels):
+    config = {"detector": {"keypoints": "mirrored"}}
+    env = gymnasium.make("HRCReach-v0", perception="pixels", config=config)
+    env.reset(seed=3)
+    errors_m = [env.step(np.zeros(6))[4].get("tracking/mpjpe_m", np.nan) for _ in range(8)]
+    env.close()
+    assert np.nanmedian(errors_m) < 0.06
+
+
+@pytest.mark.parametrize(
+    ("found", "said"),
+    [(np.zeros((33, 3)), "keypoints must have shape"), (np.full((15, 3), 2.0), "in \\[0, 1\\]")],
+)
+def test_what_is_wrong_with_keypoints_is_said(found, said):
+    with pytest.raises(ConfigError, match=said):
+        own_joints(lambda crop: found, np.zeros((256, 256, 3), np.uint8), Roi((9.0, 9.0), 9.0, 0.0))
+
+
+def test_a_joint_that_is_not_found_is_data():
+    found = np.full((15, 3), 0.5)
+    found[3] = np.nan
+    joints = own_joints(
+        lambda crop: found, np.zeros((256, 256, 3), np.uint8), Roi((9.0, 9.0), 9.0, 0.0)
+    )
+    assert joints[3, 2] == 0.0
+    assert np.isnan(joints[3, :2]).all()
+
+
+def test_an_unknown_detector_is_refused_with_those_that_there_are():
+    with pytest.raises(ConfigError, match="Did you mean 'mirrored'"):
+        gymnasium.make("HRCReach-v0", config={"detector": {"keypoints": "mirored"}})
+
+
+def test_films_are_followed_without_a_simulator(tmp_path, pixels):
+    """Somebody is filmed by four cameras; the example says where they are."""
+    from hrc_env_import_image_source import poses
+
+    env = HRCEnv(perception="none")
+    env.reset(seed=3)
+    scene = env.simulation.scene
+    films = [tmp_path / f"{camera.name}.mp4" for camera in scene.cameras]
+    writers = [imageio.get_writer(film, fps=25, quality=9) for film in films]
+    renderer, truths = PictureRenderer(scene, 1920, 1080), []
+    for _ in range(8):
+        seen = env.views.glance()
+        for camera, writer in zip(scene.cameras, writers, strict=True):
+            writer.append_data(renderer.picture(seen.q, seen.motion, camera, shadows=False))
+        truths.append(worker_truth(env.simulation.bodies, seen.motion).joints_world)
+        env.step(np.zeros(6))
+    for each in (*writers, renderer, env):
+        each.close()
+    write_rig(tmp_path / "rig.toml", scene.rig)
+    found = list(poses(tmp_path / "rig.toml", films))
+    assert len(found) == 8
+    assert found[-1] is not None
+    middle, deviation_m = found[-1]
+    assert np.linalg.norm(middle - np.reshape(truths[-1], (15, 3)).mean(0)) < 0.05
+    assert 0.005 < deviation_m < 0.2

@@ -170,7 +170,7 @@ def test_who_comes_in_late_is_found_and_nobody_is_taken_for_them(pixels):
         assert env.simulation.estimate.tracked.sum() == 1
         assert info["tracking/lost"] == 1.0
     renderer.draw = draw
-    for _ in range(env.config.eyes.search_every + 3):  # a search that has missed somebody rests
+    for _ in range(env.config.detector.search_every + 3):  # a search that has missed somebody rests
         *_, info = env.step(np.zeros(6))
     assert info["tracking/lost"] == 0.0
     assert info["tracking/mpjpe_m"] < 0.08

@@ -26,7 +26,7 @@ def kept(
         yield from watch(level, clips, config)
         return
     told = hashlib.sha256(ERROR.tobytes() + OFFSET_M.tobytes()).hexdigest()
-    settings = {"level": level, "eyes": asdict(config.eyes), "told": told}
+    settings = {"level": level, "detector": asdict(config.detector), "told": told}
     code = fingerprint_of(settings, "assets.emulator.watch")
     paths = [folder / f"{_name(clip, code)}.npz" for clip in clips]
     todo = [clip for clip, path in zip(clips, paths, strict=True) if not path.exists()]

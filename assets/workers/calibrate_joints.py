@@ -20,7 +20,7 @@ from hrc_env.geometry.cameras import project, projections
 from hrc_env.geometry.rotations import matrix_from_quaternion
 from hrc_env.geometry.triangulation import triangulate_robust
 from hrc_env.perception.blazepose import decode_landmarks, landmark_input, to_image
-from hrc_env.perception.eyes import STATURE_OF_SIDE
+from hrc_env.perception.detector import STATURE_OF_SIDE
 from hrc_env.perception.network import Landmarker, load_landmarker
 from hrc_env.perception.noise import sigma_px
 from hrc_env.perception.windows import window_from_joints

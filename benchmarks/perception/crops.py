@@ -24,7 +24,7 @@ from hrc_env.geometry.cameras import (
 )
 from hrc_env.geometry.sight import hidden
 from hrc_env.motion import generator
-from hrc_env.perception.eyes import Eyes
+from hrc_env.perception.detector import PoseDetector
 from hrc_env.perception.lensed import Lensed
 from hrc_env.perception.windows import window_from_joints
 from hrc_env.scene.build import Scene
@@ -72,19 +72,19 @@ class Looked:
 
 
 class Looker:
-    """Eyes and a renderer for the crops of one scene."""
+    """PoseDetector and a renderer for the crops of one scene."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.body = scene, load_body(scene.bodies[0])
         self.renderer = CropRenderer(scene)
         self.source = Lensed(self.renderer, scene.cameras)
-        self.eyes = Eyes(scene.cameras)
+        self.detector = PoseDetector(scene.cameras)
 
     def dress(self, look: Look) -> None:
         """Let everything look so from the next look on."""
         self.renderer.dress(look)
 
-    def look(self, now: Instant) -> Looked:
+    def detect(self, now: Instant) -> Looked:
         """Look at an instant with every camera."""
         scene = self.scene
         joints = worker_truth(self.body, now.motion).joints_world[0]
@@ -115,7 +115,7 @@ class Looker:
 
     def close(self) -> None:
         """Free threads and the graphics context."""
-        self.eyes.close()
+        self.detector.close()
         self.renderer.close()
 
     def _found(self, now: Instant, windows: list[Roi | None]) -> Points2:
@@ -124,8 +124,8 @@ class Looker:
         if not any(windows):
             return found
         self.renderer.draw(now.q, alone(now.motion))
-        self.eyes.forget(0)  # as at a first look: the detector stage must agree
-        sight = self.eyes.look(self.source, windows)
+        self.detector.forget(0)  # as at a first look: the detector stage must agree
+        sight = self.detector.detect(self.source, windows)
         for c, camera in enumerate(self.scene.cameras):
             found[c] = pinhole_from_image(camera, sight.px[c])
         return found

@@ -164,7 +164,7 @@ def _look(
     for k, now in enumerate(instants(place, n, rng, in_turns())):
         if appearance != AS_BUILT:
             looker.dress(draw_look(appearance, 1, np.random.default_rng([FIRST_SEED, k])))
-        looked = looker.look(now)
+        looked = looker.detect(now)
         for c in np.flatnonzero(looked.in_view).tolist():
             view = _view(variant, place, now, looked, c)
             if _is_bad(view, views):

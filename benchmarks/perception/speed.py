@@ -81,7 +81,7 @@ def measure(
             scene=setting.scene,
             cameras=list(range(setting.cameras)),
             n_workers=setting.workers,
-            config={"eyes": {"runtime": setting.runtime}},
+            config={"detector": {"runtime": setting.runtime}},
         )
     try:
         actions = np.random.default_rng(seed)

@@ -13,7 +13,7 @@ from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats, Points2
 from hrc_env.experiments.study.fingerprint import fingerprint_of
 from hrc_env.geometry.cameras import PinholeCamera, project, projections
-from hrc_env.perception.eyes import Eyes, EyesConfig
+from hrc_env.perception.detector import DetectorConfig, PoseDetector
 from hrc_env.perception.films import Films, undistort
 from hrc_env.perception.windows import window_from_joints
 from hrc_env.tracking.estimators import make_estimator
@@ -101,13 +101,13 @@ def _detect(films: Films, cameras: list[FilmedCamera], tick: Tick) -> Detections
     rngs = [np.random.default_rng([0, 6])]
     state = tracker.init(1, 1)
     tracker.reset(state, np.arange(1), rngs)
-    eyes = Eyes(pinholes, EyesConfig(gate_every=round(films.frames_per_s)))
+    detector = PoseDetector(pinholes, DetectorConfig(gate_every=round(films.frames_per_s)))
     rows: list[tuple[Points2, Floats, Floats]] = []
     n_frames = films.n_frames
     try:
         while films.advance():
             tracker.predict(state, dt_s, rngs)
-            sight = eyes.look(films, _windows(tracker.estimate(state), pinholes))
+            sight = detector.detect(films, _windows(tracker.estimate(state), pinholes))
             px = np.stack(
                 [
                     undistort(seen, camera.pinhole.K, camera.distortion)
@@ -119,7 +119,7 @@ def _detect(films: Films, cameras: list[FilmedCamera], tick: Tick) -> Detections
             tracker.update(state, last.keypoints(0, list(range(len(cameras)))), rngs)
             tick(1 / n_frames)
     finally:
-        eyes.close()
+        detector.close()
     px, confidence, sigma = (np.stack(column) for column in zip(*rows, strict=True))
     return Detections(px, confidence, sigma, dt_s)
 

@@ -149,7 +149,7 @@ def _openvino() -> Finding:
 
     if not vino.installed():
         return True, f"not installed; it makes pixels faster: {vino.INSTALL}"
-    return True, f"computes in {vino.precision()} where eyes.runtime is openvino or auto"
+    return True, f"computes in {vino.precision()} where detector.runtime is openvino or auto"
 
 
 def _environment() -> Finding:

@@ -40,6 +40,8 @@ class EnvironmentArguments:
     for more."""
     control: str = "joint"
     """What actions are: joint or tool velocities."""
+    shield: str | None = None
+    """A shield that was registered (--import)."""
     config: tuple[str, ...] = ()
     """Changes to the default configuration: FIELD=VALUE as in reward.proximity=0 (a value is
     JSON, or else text), or a file of them (.json or .toml). Later ones win. docs/environment.md"""
@@ -56,6 +58,7 @@ class EnvironmentArguments:
             "motions": [str(path) for path in self.motions],
             "faults": [_fault(text) for text in self.faults],
             "appearance": self.appearance,
+            "shield": self.shield,
             "config": read_config(self.config),
         }
         return {

@@ -15,8 +15,8 @@ class Setup:
     see that headless OpenGL works."""
 
     networks: tuple[Literal["lite", "heavy"], ...] = ()
-    """Other landmark networks that are to be fetched, too (41 MB): for eyes.folded and
-    eyes.network."""
+    """Other landmark networks that are to be fetched, too (41 MB): for detector.folded and
+    detector.network."""
 
     def run(self) -> int:
         """Set up; 0 also without OpenGL, which only pictures need."""

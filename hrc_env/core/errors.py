@@ -58,6 +58,7 @@ def learner() -> Iterator[None]:
 RENAMED = {
     "reward.goal": "task.goal_bonus",
     "reward.progress_per_m": "task.progress_per_m",
+    "eyes": "detector",
     "per_joint": "particle",
     "tracker.paper_iterations": "tracker.n_iterations",
     "tracker.paper_particles": "tracker.n_particles",

@@ -1,1 +1,1 @@
-"""Images to `Keypoints` (`eyes`), or `Keypoints` without images (`emulator`)."""
+"""Images to `Keypoints` (`detector`), or `Keypoints` without images (`emulator`)."""

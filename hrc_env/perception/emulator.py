@@ -33,6 +33,7 @@ from hrc_env.perception.calibration import (
     changed_ns,
     read_calibration,
 )
+from hrc_env.perception.detector import STATURE_OF_SIDE
 from hrc_env.perception.emulator_kernel import (
     N_NORMALS,
     N_OF_BODY,
@@ -40,7 +41,6 @@ from hrc_env.perception.emulator_kernel import (
     Tables,
     emulate_batch,
 )
-from hrc_env.perception.eyes import STATURE_OF_SIDE
 from hrc_env.perception.sightlines import CENTRE, N_LOOK, Rig, World, sight_batch
 
 Generators = Sequence[np.random.Generator]
@@ -65,7 +65,7 @@ class EmulatorConfig:
     min_joints: int = 1
     """Fewer joints (of 15) in sight of a camera, and it does not see the worker."""
     outside_confidence: float = 0.1
-    """Joints outside the image are guesses, at most this visible; as in `EyesConfig`."""
+    """Joints outside the image are guesses, at most this visible; as in `DetectorConfig`."""
 
     def __post_init__(self) -> None:
         for name in ("error_scale", "max_error"):

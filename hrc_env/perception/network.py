@@ -26,7 +26,7 @@ LANDMARK_OUTPUTS = ("Identity", "Identity_1", "Identity_3")
 RUNTIMES = ("litert", "openvino", "auto")
 """LiteRT, the default; OpenVINO, an extra; OpenVINO where it is installed, else LiteRT."""
 
-Detector: TypeAlias = Callable[[Tensor], tuple[Tensor, Tensor]]
+PersonDetector: TypeAlias = Callable[[Tensor], tuple[Tensor, Tensor]]
 """(224, 224, 3) in [-1, 1] -> boxes (2254, 12), score logits (2254,)."""
 
 Landmarker: TypeAlias = Callable[[Tensor], tuple[Tensor, float, Tensor]]
@@ -48,7 +48,7 @@ def chosen_runtime(name: str) -> str:
     return name
 
 
-def load_detector(runtime: str = "litert") -> Detector:
+def load_person_detector(runtime: str = "litert") -> PersonDetector:
     """The person detector stage. Raises `WeightsError` where the weights are missing."""
     run = _load("pose_detection", DETECTOR_OUTPUTS, runtime)
 

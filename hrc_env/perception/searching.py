@@ -18,7 +18,7 @@ from hrc_env.core.typing import Image
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.perception import blazepose
 from hrc_env.perception.acquisition import same_person
-from hrc_env.perception.network import Detector
+from hrc_env.perception.network import PersonDetector
 
 SEARCH_RAD = math.radians(75.0)
 """In a wider search window people are too small for the detector stage."""
@@ -51,7 +51,7 @@ class ImageSource(Protocol):
 
 def search_jobs(
     source: ImageSource, cameras: Sequence[PinholeCamera], which: Sequence[int], step: float
-) -> Iterator[Callable[[Detector], list[Found]]]:
+) -> Iterator[Callable[[PersonDetector], list[Found]]]:
     """Draw one place after the other; each comes with the work that is to be done on it."""
     for c in which:
         for window in search_windows(cameras[c], step):
@@ -93,7 +93,7 @@ def changed(crop: Image, empty: Image, window: Roi) -> list[Roi]:
     return list(dict.fromkeys(places))
 
 
-def people(detect: Detector, crop: Image) -> list[blazepose.Person]:
+def people(detect: PersonDetector, crop: Image) -> list[blazepose.Person]:
     """Whom the detector stage finds in a crop."""
     image, _ = blazepose.detector_input(crop)
     return blazepose.decode_people(*detect(image))

@@ -78,7 +78,7 @@ class TrackingSenses(Stateful):
         return our_joints(self.tracker.ahead(state, horizon_s))
 
     def detect(self, now: Moment, predicted: Any, sensor_rngs: Generators) -> Keypoints:
-        """Keypoints of this moment, by whatever eyes the level has; whose they are is open.
+        """Keypoints of this moment, by whatever detector the level has; whose they are is open.
 
         They are in pixels of the images, as the lenses bend them.
 

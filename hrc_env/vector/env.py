@@ -61,7 +61,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         num_threads: threads that share the environments; all cores if None.
         backend: "threads"; there is no other.
         arguments: of `HRCEnv`: task, estimator, cameras, scene, n_workers, people, motions,
-            faults, appearance, control, config.
+            faults, appearance, control, shield, config.
 
     Raises:
         ConfigError: an argument that cannot work, with what would.

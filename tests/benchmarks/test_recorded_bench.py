@@ -18,7 +18,7 @@ from benchmarks.recorded.metrics import NAMES, Track
 from hrc_env.core.errors import ConfigError, DownloadError
 from hrc_env.core.records import Roi
 from hrc_env.core.results import Metric
-from hrc_env.perception.eyes import Sight
+from hrc_env.perception.detector import Detection
 from hrc_env.perception.films import Films
 
 N_FRAMES = 12
@@ -122,7 +122,7 @@ def test_a_file_that_is_no_film_is_refused_in_words(tmp_path):
         Films([path])
 
 
-class BlinkingEyes:
+class BlinkingDetector:
     """Eyes that see a body in the middle of every picture, and count their looks."""
 
     n_looks = 0
@@ -130,28 +130,28 @@ class BlinkingEyes:
     def __init__(self, cameras, config):
         self.n_cameras = len(cameras)
 
-    def look(self, source, windows):
-        BlinkingEyes.n_looks += 1
+    def detect(self, source, windows):
+        BlinkingDetector.n_looks += 1
         assert len(source.frames) == self.n_cameras
         shape = (self.n_cameras, 15)
-        return Sight(np.full((*shape, 2), 80.0), np.ones(shape), np.full(shape, 4.0), windows)
+        return Detection(np.full((*shape, 2), 80.0), np.ones(shape), np.full(shape, 4.0), windows)
 
     def close(self):
         pass
 
 
 def test_detections_are_made_once_and_stored_whole(films, tmp_path, monkeypatch):
-    monkeypatch.setattr(detections, "Eyes", BlinkingEyes)
+    monkeypatch.setattr(detections, "PoseDetector", BlinkingDetector)
     cameras = read_calibration(calibration(tmp_path / "c.txt"), [(160, 320)] * 2)
-    BlinkingEyes.n_looks, shares = 0, []
+    BlinkingDetector.n_looks, shares = 0, []
     path = tmp_path / "out" / "detections.npz"
     made = detections_of(Films(films), cameras, path, shares.append)
-    assert BlinkingEyes.n_looks == N_FRAMES
+    assert BlinkingDetector.n_looks == N_FRAMES
     assert sum(shares) == pytest.approx(1)
     assert made.px.shape == (N_FRAMES, 2, 15, 2)
     assert made.dt_s == pytest.approx(1 / 60)
     again = detections_of(Films(films), cameras, path, shares.append)
-    assert BlinkingEyes.n_looks == N_FRAMES
+    assert BlinkingDetector.n_looks == N_FRAMES
     assert np.array_equal(again.px, made.px)
     assert [file.name for file in path.parent.iterdir()] == ["detections.npz"]
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from commands import ROOT
 
 from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.experiments.impact import experiment, tax
@@ -21,7 +20,6 @@ from hrc_env.experiments.impact.trial.judge import Step, judge, scene_of
 from hrc_env.experiments.impact.trial.policies import Policy, maker
 from hrc_env.experiments.impact.trial.tally import Tally
 from hrc_env.experiments.study.shelf import Shelf
-from hrc_env.registration import import_files
 
 LATE = seeing(latency_s=0.12).name
 TINY = ImpactConfig(
@@ -275,9 +273,8 @@ def test_pages_are_written_without_the_policy_that_yields(end_to_end, tmp_path):
     assert (out / "report.html").read_text().count("data:image/png;base64,") == 1
 
 
-def test_an_estimator_that_a_file_registers_is_compared(tmp_path, end_to_end):
+def test_an_estimator_that_a_file_registers_is_compared(tmp_path, process, brought):
     """One command, one file."""
-    import_files(str(ROOT / "examples" / "bring_your_own" / "estimator.py"))
     config = replace(
         config_for(True, 2, ["alpha_beta"]), n_steps=12, policies=("scripted_slowed",), margins_m=()
     )

@@ -10,7 +10,7 @@ from stored import PICTURES
 
 from hrc_env.core.records import Roi
 from hrc_env.perception import blazepose as bp
-from hrc_env.perception.network import load_detector, load_landmarker
+from hrc_env.perception.network import load_landmarker, load_person_detector
 
 coordinates = st.floats(-500, 500)
 angles = st.floats(-math.pi, math.pi)
@@ -33,7 +33,7 @@ def find(picture, detect, landmark):
 
 @pytest.mark.parametrize("name", PICTURES)
 def test_landmarks_agree_with_the_official_package(name, weights, pictures, reference):
-    found, flag = find(pictures[name], load_detector(), load_landmarker())
+    found, flag = find(pictures[name], load_person_detector(), load_landmarker())
     error_px = np.linalg.norm(found[:33, :2] - reference[name][:, :2], axis=1)
     assert flag > 0.9
     assert np.median(error_px) < 0.05
@@ -46,7 +46,7 @@ def test_a_region_of_interest_found_again_from_its_landmarks_finds_the_same(
     weights, pictures, reference
 ):
     landmark = load_landmarker()
-    found, _ = find(pictures["walk.png"], load_detector(), landmark)
+    found, _ = find(pictures["walk.png"], load_person_detector(), landmark)
     window = bp.window_from_points(found[33, :2], found[34, :2])
     picture = bp.sample_window(pictures["walk.png"], window)
     points, _, heat = landmark(bp.landmark_input(picture))
@@ -57,7 +57,7 @@ def test_a_region_of_interest_found_again_from_its_landmarks_finds_the_same(
 
 def test_an_empty_room_holds_nobody(weights):
     image, _ = bp.detector_input(np.full((240, 320, 3), 128, np.uint8))
-    assert bp.decode_people(*load_detector()(image)) == []
+    assert bp.decode_people(*load_person_detector()(image)) == []
 
 
 def test_anchors_cover_the_image_symmetrically():

@@ -5,7 +5,7 @@ import numpy as np
 from hrc_env.core.records import Roi
 from hrc_env.perception import litert
 from hrc_env.perception.blazepose import detector_input, landmark_input, sample_window
-from hrc_env.perception.network import LANDMARK_OUTPUTS, load_detector, load_landmarker
+from hrc_env.perception.network import LANDMARK_OUTPUTS, load_landmarker, load_person_detector
 
 MIDDLE = Roi((118.0, 138.0), 220.0, 0.1)
 
@@ -28,7 +28,9 @@ def test_pruning_leaves_a_smaller_file(weights):
 def test_two_copies_of_a_network_agree_bit_for_bit(weights, pictures):
     picture = next(iter(pictures.values()))
     image, _ = detector_input(picture)
-    for ours, theirs in zip(load_detector()(image), load_detector()(image), strict=True):
+    for ours, theirs in zip(
+        load_person_detector()(image), load_person_detector()(image), strict=True
+    ):
         np.testing.assert_array_equal(ours, theirs)
 
 

@@ -8,7 +8,7 @@ from hrc_env.core.records import Roi
 from hrc_env.core.skeleton import JOINT
 from hrc_env.geometry.cameras import project, projections
 from hrc_env.motion import generator
-from hrc_env.perception.eyes import Eyes
+from hrc_env.perception.detector import PoseDetector
 from hrc_env.perception.lensed import Lensed
 from hrc_env.perception.searching import changed
 from hrc_env.scene.build import build
@@ -55,9 +55,9 @@ def test_a_worker_far_away_is_found(weights, name):
     generator.reset(state, np.arange(1), [np.random.default_rng(3)])
     motion = one(generator.current(state), 0)
     renderer = CropRenderer(scene)
-    eyes, source = Eyes(scene.cameras), Lensed(renderer, scene.cameras)
+    detector, source = PoseDetector(scene.cameras), Lensed(renderer, scene.cameras)
     renderer.draw(scene.home_q, motion)
-    found = eyes.search(source)
+    found = detector.search(source)
     joints = worker_truth(load_body("worker_1"), motion).joints_world
     hips = project(projections(scene.cameras), joints)[0][0][:, HIPS].mean(1)
     seen = [
@@ -65,5 +65,5 @@ def test_a_worker_far_away_is_found(weights, name):
         for windows, hip in zip(found, hips, strict=True)
     ]
     assert sum(seen) >= 2
-    eyes.close()
+    detector.close()
     renderer.close()

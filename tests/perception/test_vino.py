@@ -11,7 +11,7 @@ from hrc_env.core.records import Roi
 from hrc_env.geometry.cameras import pinhole
 from hrc_env.perception import vino
 from hrc_env.perception.blazepose import decode_landmarks, landmark_input, sample_window
-from hrc_env.perception.eyes import Eyes, EyesConfig
+from hrc_env.perception.detector import DetectorConfig, PoseDetector
 from hrc_env.perception.network import LANDMARK_OUTPUTS, chosen_runtime, load_landmarker
 
 MIDDLE = Roi((118.0, 138.0), 220.0, 0.1)
@@ -67,9 +67,9 @@ def test_eyes_see_the_same_worker_on_either_runtime(weights, pictures):
     camera = pinhole("still", np.array([4.0, 0, 1]), np.array([0, 0, 1.0]), 60, 256, 256)
     sights = []
     for runtime in ("litert", "openvino"):
-        eyes = Eyes([camera], EyesConfig(runtime=runtime))
-        sights.append(eyes.look(Stills([pictures["walk.png"]]), [MIDDLE]))
-        eyes.close()
+        detector = PoseDetector([camera], DetectorConfig(runtime=runtime))
+        sights.append(detector.detect(Stills([pictures["walk.png"]]), [MIDDLE]))
+        detector.close()
     assert np.median(np.linalg.norm(sights[0].px - sights[1].px, axis=-1)) < 0.5
 
 
@@ -86,9 +86,9 @@ def test_where_openvino_is_missing_auto_is_litert_and_an_order_names_the_remedy(
     assert chosen_runtime("auto") == "litert"
     camera = pinhole("still", np.array([4.0, 0, 1]), np.array([0, 0, 1.0]), 60, 256, 256)
     with pytest.raises(ConfigError, match=r"hrc_env\[openvino\].*litert"):
-        Eyes([camera], EyesConfig(runtime="openvino"))
+        PoseDetector([camera], DetectorConfig(runtime="openvino"))
 
 
 def test_an_unknown_runtime_is_told_the_valid_ones():
     with pytest.raises(ConfigError, match="Did you mean 'openvino'"):
-        EyesConfig(runtime="openvinno")
+        DetectorConfig(runtime="openvinno")

@@ -113,7 +113,7 @@ def test_crops_are_what_the_network_was_given(weights):
     pictures = env.views.crops(64)
     assert [picture.shape for picture in pictures] == [(64, 64, 3)] * 4
     before = env.simulation.get_state()
-    env.simulation.senses.windows[0][0] = [None] * 4  # as after `set_state`
+    env.simulation.senses.looking.windows[0][0] = [None] * 4  # as after `set_state`
     assert env.simulation.senses.crops(0) == [None] * 4
     env.simulation.set_state(before)
     assert [crop is None for crop in env.simulation.senses.crops(0)] == [w is None for w in windows]

@@ -9,7 +9,7 @@ from assets.emulator.fit.cells import FEW, N_K, N_P, N_S, Cells, mix
 from assets.emulator.samples import Samples
 from hrc_env.core.typing import Floats
 from hrc_env.perception.calibration import KIND, KNOTS, VISIBILITY
-from hrc_env.perception.eyes import STATURE_OF_SIDE
+from hrc_env.perception.detector import STATURE_OF_SIDE
 from hrc_env.perception.sightlines import OUTSIDE
 
 TOLD = 1.2

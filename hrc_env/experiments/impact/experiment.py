@@ -83,7 +83,7 @@ class ImpactConfig:
             raise ConfigError(f"margins_m must be positive, got {self.margins_m}.")
 
 
-QUICK = {"n_episodes": 8, "n_pixels": 1, "n_steps": 100, "learning_steps": 65_536}
+QUICK: dict[str, Any] = {"n_episodes": 8, "n_pixels": 1, "n_steps": 100, "learning_steps": 65_536}
 """Every number, from little, and for 4 s: what takes the time is the number of steps."""
 
 

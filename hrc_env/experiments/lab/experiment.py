@@ -19,7 +19,7 @@ from hrc_env.experiments.study.fingerprint import fingerprint_of
 from hrc_env.experiments.study.folder import claim
 from hrc_env.experiments.study.recording import Recording, record, replay
 from hrc_env.experiments.study.shelf import Say, Shelf, Tick
-from hrc_env.perception.eyes import EyesConfig
+from hrc_env.perception.detector import DetectorConfig
 from hrc_env.scene.build import Scene, build
 from hrc_env.worker.body import load_body
 
@@ -52,7 +52,7 @@ class LabConfig:
             raise ConfigError(f"--seeds must be at least 1, got {self.n_seeds}.")
         if self.max_frames < 2 * WARM_UP:
             raise ConfigError(f"Films need at least {2 * WARM_UP} frames, got {self.max_frames}.")
-        EyesConfig(folded=self.folded)
+        DetectorConfig(folded=self.folded)
 
 
 QUICK = LabConfig(n_seeds=2, max_frames=100)
@@ -88,8 +88,8 @@ def run(config: LabConfig, out: Path, say: Say, overwrite: bool = False) -> dict
 
 def laboratory(seed: int, folded: str = "full") -> tuple[Scene, HRCConfig]:
     """The room with the paper's four cameras, and whose body is in it."""
-    eyes = EyesConfig(folded=folded)
-    config, use = with_cameras(HRCConfig(worker=body_of(seed), eyes=eyes), RIG)
+    settings = HRCConfig(worker=body_of(seed), detector=DetectorConfig(folded=folded))
+    config, use = with_cameras(settings, RIG)
     return build(config.scene, "lab", 1, config.worker, use), config
 
 

@@ -27,11 +27,11 @@ from hrc_env.perception.network import (
     LANDMARK_SIDE,
     NETWORKS,
     RUNTIMES,
-    Detector,
     Landmarker,
+    PersonDetector,
     chosen_runtime,
-    load_detector,
     load_landmarker,
+    load_person_detector,
 )
 from hrc_env.perception.noise import STANDING, sigma_px
 from hrc_env.perception.searching import ImageSource, distinct, people, search_jobs
@@ -43,9 +43,17 @@ STATURE_OF_SIDE = 0.75
 ResultT = TypeVar("ResultT")
 
 
+KeypointFunction = Callable[[Image], Floats | None]
+"""A crop (256, 256, 3) RGB uint8 -> (J, 3): x and y in pixels of the crop, continuous from its
+top-left corner, and confidence in [0, 1], joints as in `core.skeleton.JOINTS`; NaN with confidence
+0 where a joint was not found. None: nobody is there."""
+DETECTORS: dict[str, Callable[[], KeypointFunction] | None] = {"blazepose": None}
+"""By name: what makes the function, once for every thread that calls it."""
+
+
 @dataclass(frozen=True, slots=True)
-class EyesConfig:
-    """How much the eyes believe."""
+class DetectorConfig:
+    """Which networks find people, and what is believed of them."""
 
     min_presence: float = 0.5
     """Landmarks are believed from this person flag on [0..1]; MediaPipe's own default."""
@@ -70,16 +78,22 @@ class EyesConfig:
     network: str = "full"
     """The landmark network: "lite", "full" or "heavy"; all but "full" are fetched once with
     `python -m hrc_env setup --networks lite heavy`."""
+    keypoints: str = "blazepose"
+    """What finds joints in crops: BlazePose's landmark network, or another function that was
+    registered (`hrc_env.register_detector`). People are searched for by BlazePose's person
+    detector whatever finds their joints."""
     folded: str = "full"
     """The landmark network for workers who are bent, squatting or kneeling; "heavy" is more exact
     there, and three times as slow."""
 
     def __post_init__(self) -> None:
         if self.runtime not in RUNTIMES:
-            raise unknown("eyes.runtime", self.runtime, RUNTIMES)
+            raise unknown("detector.runtime", self.runtime, RUNTIMES)
+        if self.keypoints not in DETECTORS:
+            raise unknown("detector.keypoints", self.keypoints, DETECTORS)
         for name in ("network", "folded"):
             if getattr(self, name) not in NETWORKS:
-                raise unknown(f"eyes.{name}", getattr(self, name), NETWORKS)
+                raise unknown(f"detector.{name}", getattr(self, name), NETWORKS)
         for name in ("min_presence", "sure_presence", "outside_confidence"):
             if not 0 < getattr(self, name) <= 1:
                 raise ConfigError(f"{name} must be in (0, 1], got {getattr(self, name)}.")
@@ -89,7 +103,7 @@ class EyesConfig:
 
 
 @dataclass(frozen=True, slots=True)
-class Sight:
+class Detection:
     """One worker as all cameras see them; a camera without them is NaN, 0 and infinite."""
 
     px: Points2
@@ -108,13 +122,15 @@ class Sight:
 class _Networks:
     """One thread's interpreters."""
 
-    detect: Detector
+    detect: PersonDetector
     landmark: Landmarker
     folded: Landmarker
     """For workers who are folded up."""
+    own: KeypointFunction | None
+    """What finds joints instead of `landmark` and `folded`."""
 
 
-class Eyes(Stateful):
+class PoseDetector(Stateful):
     """Finds the joints of workers in the images of a rig.
 
     Networks and the helper thread are made at the first look and left out of a pickle.
@@ -122,14 +138,16 @@ class Eyes(Stateful):
 
     CHANGES = ("_looks",)
 
-    def __init__(self, cameras: Sequence[PinholeCamera], config: EyesConfig | None = None) -> None:
+    def __init__(
+        self, cameras: Sequence[PinholeCamera], config: DetectorConfig | None = None
+    ) -> None:
         """Args are the rig and settings.
 
         Raises:
             WeightsError: without the weights. ConfigError: without the runtime.
         """
         self.cameras = tuple(cameras)
-        self.config = config or EyesConfig()
+        self.config = config or DetectorConfig()
         find_weights("pose_detection")
         for network in (self.config.network, self.config.folded):
             find_weights(f"pose_landmark_{network}")
@@ -138,7 +156,7 @@ class Eyes(Stateful):
         self._networks: tuple[_Networks, _Networks] | None = None
         self._helper: ThreadPoolExecutor | None = None
 
-    def look(
+    def detect(
         self,
         source: ImageSource,
         windows: Sequence[Roi | None],
@@ -147,13 +165,13 @@ class Eyes(Stateful):
         found: Candidates | None = None,
         folded: bool = False,
         posture: Sequence[float] = STANDING,
-    ) -> Sight:
+    ) -> Detection:
         """Look for one worker through a window a camera; search if there is no window at all.
 
         Args:
             source: gives crops of the cameras' present images.
             windows: (C,) where to look; None where this camera need not.
-            track: whom the eyes are following; any number that stays the worker's own. The
+            track: who is followed; any number that stays the worker's own. The
                 detector stage's turns are counted for each.
             others: windows (C,) of other workers; a search does not find these again.
             found: what `search` found in these very images, if it was asked already.
@@ -214,7 +232,7 @@ class Eyes(Stateful):
     def _landmark_jobs(
         self,
         source: ImageSource,
-        sight: Sight,
+        sight: Detection,
         used: list[int],
         asked: list[bool],
         folded: bool,
@@ -224,8 +242,14 @@ class Eyes(Stateful):
             window = sight.windows[c]
             if window is not None:
                 crop = sight.crops[c] = _seen(source.crop(c, window), window, self.cameras[c])
-                yield lambda nets, k=crop, w=window, a=ask: _joints(
-                    nets, nets.folded if folded else nets.landmark, k, w, a, self.config
+                yield (
+                    lambda nets, k=crop, w=window, a=ask: (
+                        _joints(
+                            nets, nets.folded if folded else nets.landmark, k, w, a, self.config
+                        )
+                        if nets.own is None
+                        else own_joints(nets.own, k, w)
+                    )
                 )
 
     def _share(self, jobs: Iterable[Callable[[_Networks], ResultT]]) -> list[ResultT]:
@@ -250,17 +274,17 @@ class Eyes(Stateful):
         if self._networks is None:
             self._networks = (_networks(self.config), _networks(self.config))
         if self._helper is None:
-            self._helper = ThreadPoolExecutor(1, thread_name_prefix="hrc_env-eyes")
+            self._helper = ThreadPoolExecutor(1, thread_name_prefix="hrc_env-detector")
         return self._helper, self._networks
 
-    def _nothing(self, windows: list[Roi | None]) -> Sight:
+    def _nothing(self, windows: list[Roi | None]) -> Detection:
         shape = (len(self.cameras), N_JOINTS)
-        return Sight(
+        return Detection(
             np.full((*shape, 2), np.nan), np.zeros(shape), np.full(shape, np.inf), windows,
             [None] * len(windows),
         )  # fmt: skip
 
-    def _write(self, sight: Sight, c: int, joints: Floats, posture: Sequence[float]) -> None:
+    def _write(self, sight: Detection, c: int, joints: Floats, posture: Sequence[float]) -> None:
         window = sight.windows[c]
         outside = ~inside_image(self.cameras[c], joints[:, :2])
         confidence = joints[:, 2].copy()
@@ -270,12 +294,33 @@ class Eyes(Stateful):
         sight.sigma_px[c] = sigma_px(confidence, stature_px, posture)
 
 
-def _networks(config: EyesConfig) -> _Networks:
+def _networks(config: DetectorConfig) -> _Networks:
     runtime = chosen_runtime(config.runtime)
     landmark = load_landmarker(config.network, runtime)
     same = config.folded == config.network
     folded = landmark if same else load_landmarker(config.folded, runtime)
-    return _Networks(load_detector(runtime), landmark, folded)
+    make = DETECTORS[config.keypoints]
+    own = None if make is None else make()
+    return _Networks(load_person_detector(runtime), landmark, folded, own)
+
+
+def own_joints(find: KeypointFunction, crop: Image, window: Roi) -> Floats | None:
+    """(J, 3) pixels and confidence, or None, by somebody's function.
+
+    Raises:
+        ConfigError: it gives another shape, or confidences that are none.
+    """
+    found = find(crop)
+    if found is None:
+        return None
+    joints = np.array(found, float)
+    check_shape("A detector's keypoints", joints.shape, (N_JOINTS, 3), "joints, x y confidence")
+    missing = np.isnan(joints[:, :2]).any(1)
+    joints[missing] = (np.nan, np.nan, 0.0)
+    if not ((joints[:, 2] >= 0) & (joints[:, 2] <= 1)).all():
+        raise ConfigError(f"A detector's confidences must be in [0, 1], got {joints[:, 2]}.")
+    joints[:, :2] = blazepose.to_image(joints[:, :2] / LANDMARK_SIDE, window)
+    return joints
 
 
 def _joints(
@@ -284,7 +329,7 @@ def _joints(
     crop: Image,
     window: Roi,
     ask_detector: bool,
-    config: EyesConfig,
+    config: DetectorConfig,
 ) -> Floats | None:
     """(J, 3) pixels and visibility of the 15 joints, or None where there is no worker."""
     points, presence, heat = landmark(blazepose.landmark_input(crop))

@@ -11,8 +11,8 @@ from hrc_env.core.errors import ConfigError, WeightsError
 from hrc_env.core.records import Roi
 from hrc_env.core.skeleton import BLAZEPOSE_INDEX
 from hrc_env.geometry.cameras import pinhole
-from hrc_env.perception import eyes as eyes_module
-from hrc_env.perception.eyes import Eyes, EyesConfig
+from hrc_env.perception import detector as detector_module
+from hrc_env.perception.detector import DetectorConfig, PoseDetector
 from hrc_env.perception.network import load_landmarker
 from hrc_env.perception.searching import search_windows
 
@@ -24,21 +24,21 @@ def camera(width_px=256, height_px=256):
     return pinhole("still", np.array([4.0, 0, 1]), np.array([0, 0, 1.0]), 60, width_px, height_px)
 
 
-def new_eyes(n_cameras, config=None, **size):
-    return Eyes([camera(**size)] * n_cameras, config)
+def new_detector(n_cameras, config=None, **size):
+    return PoseDetector([camera(**size)] * n_cameras, config)
 
 
 @pytest.fixture
 def four(weights, pictures):
     """Eyes of four cameras that each see another picture."""
-    eyes = new_eyes(4)
-    yield eyes, Stills(pictures[name] for name in NAMES)
-    eyes.close()
+    detector = new_detector(4)
+    yield detector, Stills(pictures[name] for name in NAMES)
+    detector.close()
 
 
 def test_every_camera_reports_the_joints_of_its_picture(four, reference):
-    eyes, stills = four
-    sight = eyes.look(stills, [WINDOW] * 4)
+    detector, stills = four
+    sight = detector.detect(stills, [WINDOW] * 4)
     for c, name in enumerate(NAMES):
         official = reference[name][BLAZEPOSE_INDEX, :2]
         stature_px = np.ptp(official[:, 1])
@@ -49,9 +49,9 @@ def test_every_camera_reports_the_joints_of_its_picture(four, reference):
 
 
 def test_an_empty_room_is_nan_without_confidence_and_with_infinite_sigma(four, pictures):
-    eyes, _ = four
+    detector, _ = four
     room = np.full((256, 256, 3), 128, np.uint8)
-    sight = eyes.look(Stills([pictures["stand.png"], room, room, room]), [WINDOW] * 4)
+    sight = detector.detect(Stills([pictures["stand.png"], room, room, room]), [WINDOW] * 4)
     assert np.isfinite(sight.px[0]).all()
     assert np.isnan(sight.px[1:]).all()
     assert np.all(sight.confidence[1:] == 0)
@@ -59,44 +59,44 @@ def test_an_empty_room_is_nan_without_confidence_and_with_infinite_sigma(four, p
 
 
 def test_a_camera_without_a_window_does_not_look(four):
-    eyes, stills = four
-    sight = eyes.look(stills, [WINDOW, None, WINDOW, None])
+    detector, stills = four
+    sight = detector.detect(stills, [WINDOW, None, WINDOW, None])
     assert np.isfinite(sight.px[[0, 2]]).all()
     assert np.isnan(sight.px[[1, 3]]).all()
 
 
 def test_without_any_window_the_eyes_search_the_whole_image(weights, pictures, reference):
-    eyes = new_eyes(1, width_px=1920, height_px=1080)
+    detector = new_detector(1, width_px=1920, height_px=1080)
     for left, top in ((40, 300), (700, 200), (1200, 400)):
-        sight = eyes.look(Stills([hung_in_a_room(pictures["walk.png"], left, top)]), [None])
+        sight = detector.detect(Stills([hung_in_a_room(pictures["walk.png"], left, top)]), [None])
         found = (sight.px[0] - [left, top]) / 2
         official = reference["walk.png"][BLAZEPOSE_INDEX, :2]
         error = np.linalg.norm(found - official, axis=1) / np.ptp(official[:, 1])
         assert np.median(error) < 0.02
         assert sight.windows[0] is not None
-    eyes.close()
+    detector.close()
 
 
 def test_one_search_serves_several_workers(weights, pictures):
     """The second look is given whom the search found, and may not take the first one's person."""
-    eyes = new_eyes(1, width_px=1920, height_px=1080)
+    detector = new_detector(1, width_px=1920, height_px=1080)
     room = Stills([hung_in_a_room(pictures["stand.png"], 600, 300)])
-    people = eyes.search(room)
-    searching = eyes.look(room, [None], track=0)
-    given = eyes.look(room, [None], track=1, found=people)
+    people = detector.search(room)
+    searching = detector.detect(room, [None], track=0)
+    given = detector.detect(room, [None], track=1, found=people)
     np.testing.assert_array_equal(given.px, searching.px)
-    other = eyes.look(room, [None], track=2, others=[given.windows], found=people)
+    other = detector.detect(room, [None], track=2, others=[given.windows], found=people)
     assert np.isnan(other.px).all()
     assert other.windows == [None]
-    eyes.close()
+    detector.close()
 
 
 def test_one_person_in_two_search_windows_is_one_person(weights, pictures):
-    eyes = new_eyes(1, width_px=1920, height_px=1080)
+    detector = new_detector(1, width_px=1920, height_px=1080)
     room = hung_in_a_room(pictures["stand.png"], 600, 300)  # in the first and second square
-    (people,) = eyes.search(Stills([room]))
+    (people,) = detector.search(Stills([room]))
     assert len(people) == 1
-    eyes.close()
+    detector.close()
 
 
 def test_search_windows_cover_the_image_and_overlap():
@@ -110,22 +110,22 @@ def test_search_windows_cover_the_image_and_overlap():
 
 def test_what_is_seen_does_not_depend_on_who_does_the_work(four):
     """Slow crops leave everything to the helper, fast ones half to each thread."""
-    eyes, stills = four
+    detector, stills = four
 
     class Slow:
         def crop(self, camera_index, window):
             time.sleep(0.03)
             return stills.crop(camera_index, window)
 
-    first = eyes.look(stills, [WINDOW] * 4, track=0)
+    first = detector.detect(stills, [WINDOW] * 4, track=0)
     for track, source in enumerate((Slow(), stills, Slow()), start=1):
-        again = eyes.look(source, [WINDOW] * 4, track=track)
+        again = detector.detect(source, [WINDOW] * 4, track=track)
         np.testing.assert_array_equal(again.px, first.px)
         np.testing.assert_array_equal(again.confidence, first.confidence)
 
 
 def test_a_source_may_use_one_buffer_for_all_crops(four):
-    eyes, stills = four
+    detector, stills = four
     buffer = np.empty((256, 256, 3), np.uint8)
 
     class Frugal:
@@ -133,51 +133,54 @@ def test_a_source_may_use_one_buffer_for_all_crops(four):
             buffer[:] = stills.crop(camera_index, window)
             return buffer
 
-    first, again = eyes.look(stills, [WINDOW] * 4, 0), eyes.look(Frugal(), [WINDOW] * 4, 1)
+    first, again = (
+        detector.detect(stills, [WINDOW] * 4, 0),
+        detector.detect(Frugal(), [WINDOW] * 4, 1),
+    )
     np.testing.assert_array_equal(again.px, first.px)
 
 
 def test_what_a_camera_does_not_see_is_black_and_joints_there_are_guesses(weights, pictures):
-    """The source goes on drawing beyond the image's lower border; the eyes do not look."""
-    eyes = Eyes([camera(256, 190)])
-    sight = eyes.look(Stills([pictures["stand.png"]]), [WINDOW])
+    """The source goes on drawing beyond the image's lower border; the detector do not look."""
+    detector = PoseDetector([camera(256, 190)])
+    sight = detector.detect(Stills([pictures["stand.png"]]), [WINDOW])
     outside = sight.px[0, :, 1] >= 190
     assert outside.any()
     assert np.all(sight.confidence[0, outside] <= 0.1)
     assert np.all(np.isfinite(sight.sigma_px[0]))
     assert sight.sigma_px[0, outside].min() > 3 * sight.sigma_px[0].min()
-    eyes.close()
+    detector.close()
 
 
 def test_the_detector_stage_is_asked_of_a_new_track_and_then_in_turns(four, monkeypatch):
     _, stills = four
     asked = []
-    people = eyes_module.people
-    monkeypatch.setattr(eyes_module, "people", lambda *args: asked.append(1) or people(*args))
-    eyes = new_eyes(4, EyesConfig(gate_every=4, sure_presence=0.5))
+    people = detector_module.people
+    monkeypatch.setattr(detector_module, "people", lambda *args: asked.append(1) or people(*args))
+    detector = new_detector(4, DetectorConfig(gate_every=4, sure_presence=0.5))
     counts = []
     for _ in range(9):
         asked.clear()
-        eyes.look(stills, [WINDOW] * 4)
+        detector.detect(stills, [WINDOW] * 4)
         counts.append(len(asked))
     assert counts[0] == 4
     assert counts[1:] == [1] * 8  # one of four cameras each time
-    eyes.forget(0)
+    detector.forget(0)
     asked.clear()
-    eyes.look(stills, [WINDOW] * 4)
+    detector.detect(stills, [WINDOW] * 4)
     assert len(asked) == 4
-    eyes.close()
+    detector.close()
 
 
 def test_somebody_far_from_the_middle_of_the_window_is_somebody_else(weights, pictures):
-    eyes = new_eyes(1)
+    detector = new_detector(1)
     aside = Roi((0.0, 138.0), 240.0, 0.0)
-    assert np.isnan(eyes.look(Stills([pictures["stand.png"]]), [aside]).px).all()
-    eyes.close()
+    assert np.isnan(detector.detect(Stills([pictures["stand.png"]]), [aside]).px).all()
+    detector.close()
 
 
 def test_an_error_of_the_source_is_passed_on_and_the_eyes_go_on(four):
-    eyes, stills = four
+    detector, stills = four
 
     class Broken:
         def crop(self, camera_index, window):
@@ -186,18 +189,18 @@ def test_an_error_of_the_source_is_passed_on_and_the_eyes_go_on(four):
             return stills.crop(camera_index, window)
 
     with pytest.raises(OSError, match="no picture"):
-        eyes.look(Broken(), [WINDOW] * 4)
-    assert np.isfinite(eyes.look(stills, [WINDOW] * 4).px).all()
+        detector.detect(Broken(), [WINDOW] * 4)
+    assert np.isfinite(detector.detect(stills, [WINDOW] * 4).px).all()
 
 
-def test_eyes_can_be_pickled_and_closed_at_any_time(four):
-    eyes, stills = four
-    first = eyes.look(stills, [WINDOW] * 4)
-    copy = pickle.loads(pickle.dumps(eyes))
-    eyes.close()
-    eyes.close()
-    for each in (copy, eyes):
-        np.testing.assert_array_equal(each.look(stills, [WINDOW] * 4).px, first.px)
+def test_a_detector_can_be_pickled_and_closed_at_any_time(four):
+    detector, stills = four
+    first = detector.detect(stills, [WINDOW] * 4)
+    copy = pickle.loads(pickle.dumps(detector))
+    detector.close()
+    detector.close()
+    for each in (copy, detector):
+        np.testing.assert_array_equal(each.detect(stills, [WINDOW] * 4).px, first.px)
     copy.close()
 
 
@@ -210,36 +213,36 @@ def test_folded_workers_have_a_network_of_their_own(four, monkeypatch):
         landmark = load_landmarker("full", runtime)
         return lambda image: asked.append(network) or landmark(image)
 
-    monkeypatch.setattr(eyes_module, "load_landmarker", load)
-    monkeypatch.setattr(eyes_module, "find_weights", lambda name: name)
-    eyes = new_eyes(4, EyesConfig(folded="heavy"))
-    eyes.look(stills, [WINDOW] * 4)
+    monkeypatch.setattr(detector_module, "load_landmarker", load)
+    monkeypatch.setattr(detector_module, "find_weights", lambda name: name)
+    detector = new_detector(4, DetectorConfig(folded="heavy"))
+    detector.detect(stills, [WINDOW] * 4)
     assert set(asked) == {"full"}
     asked.clear()
-    eyes.look(stills, [WINDOW] * 4, folded=True)
+    detector.detect(stills, [WINDOW] * 4, folded=True)
     assert set(asked) == {"heavy"}
-    eyes.close()
+    detector.close()
 
 
 def test_a_network_that_there_is_not_is_told_those_that_there_are():
     with pytest.raises(ConfigError, match="Did you mean 'heavy'"):
-        EyesConfig(folded="heavvy")
+        DetectorConfig(folded="heavvy")
 
 
 def test_wrong_shapes_are_explained(four):
-    eyes, stills = four
+    detector, stills = four
     with pytest.raises(ConfigError, match="one a camera"):
-        eyes.look(stills, [WINDOW] * 3)
+        detector.detect(stills, [WINDOW] * 3)
 
     class Small:
         def crop(self, camera_index, window):
             return np.zeros((128, 128, 3), np.uint8)
 
     with pytest.raises(ConfigError, match=r"\(256, 256, 3\)"):
-        eyes.look(Small(), [WINDOW] * 4)
+        detector.detect(Small(), [WINDOW] * 4)
 
 
 def test_eyes_without_weights_say_so_at_once(tmp_path, monkeypatch):
     monkeypatch.setenv("HRC_ENV_CACHE", str(tmp_path))
     with pytest.raises(WeightsError, match="python -m hrc_env setup"):
-        new_eyes(1)
+        new_detector(1)

@@ -1,0 +1,158 @@
+"""Where to look for every worker, and looking there: windows, searches, people who were missed."""
+
+from collections.abc import Iterator, Sequence
+
+from hrc_env.core.records import PoseEstimate, Roi
+from hrc_env.core.stateful import Stateful
+from hrc_env.core.typing import Image
+from hrc_env.geometry.cameras import PinholeCamera, project, projections
+from hrc_env.perception.detector import Detection, DetectorConfig, PoseDetector
+from hrc_env.perception.noise import STANDING
+from hrc_env.perception.outline import posture_of
+from hrc_env.perception.posture import is_folded
+from hrc_env.perception.searching import ImageSource
+from hrc_env.perception.windows import steady_window, window_from_joints
+from hrc_env.pipeline.reacquisition import Strays
+from hrc_env.pipeline.search_schedule import Searches
+from hrc_env.pipeline.sensor_input import Windows
+
+
+class Looking(Stateful):
+    """Finds the workers of a batch of environments in the images of a rig, wherever these are from.
+
+    Args:
+        batch: how many environments.
+        cameras: the rig.
+        n_workers: how many are followed in each.
+        config: of the detector.
+    """
+
+    CHANGES = ("detector", "windows", "searches", "strays")
+
+    def __init__(
+        self, batch: int, cameras: Sequence[PinholeCamera], n_workers: int, config: DetectorConfig
+    ) -> None:
+        self.cameras, self.n_workers = tuple(cameras), n_workers
+        self.P = projections(self.cameras)
+        self.detector = PoseDetector(self.cameras, config)
+        self.windows: list[Windows] = [
+            [[None] * len(self.cameras) for _ in range(n_workers)] for _ in range(batch)
+        ]
+        self.searches = Searches(batch, len(self.cameras), config.search_every)
+        self.strays = Strays(batch, n_workers, len(self.cameras))
+        self.seen: dict[int, tuple[list[Roi | None], list[Image | None]]] = {}
+        """What the network was given of each environment's first worker, and through which windows:
+        for pictures, no part of the state."""
+
+    def look(
+        self,
+        source: ImageSource,
+        expected: PoseEstimate,
+        row: int,
+        b: int,
+        has_image: Sequence[bool],
+    ) -> Iterator[tuple[int, Detection]]:
+        """Look for every worker of environment b; a search finds nobody who has been looked at.
+
+        Those with a window come first, and one search serves all the others. Who is in view of
+        cameras only that have no image now is not looked for.
+
+        Args:
+            source: the images.
+            expected: where the tracker expects the workers.
+            row: environment b's row there.
+            b: which environment.
+            has_image: (C,) whether each camera has an image now.
+        """
+        wanted = [self._windows(expected, row, w) for w in range(self.n_workers)]
+        taken: Windows = []
+        people, missed = None, False
+        self.searches.tick(b)
+        for worker in sorted(range(len(wanted)), key=lambda w: not any(wanted[w])):
+            steady = list(map(steady_window, self.windows[b][worker], wanted[worker]))
+            windows = [w if has else None for w, has in zip(steady, has_image, strict=True)]
+            if not any(has_image) or (any(steady) and not any(windows)):
+                continue
+            if not any(windows) and people is None:
+                due = self.searches.due(b, has_image)
+                if not due:
+                    continue
+                people = self.searches.remember(b, due, self.detector.search(source, due))
+            if any(windows):
+                windows = self._followed(source, b, worker, windows, taken, has_image)
+            track = self._track(b, worker)
+            folded, posture = _expected_posture(expected, row, worker)
+            seen = self.detector.detect(source, windows, track, taken, people, folded, posture)
+            taken.append(seen.windows)
+            self.strays.saw(b, worker, seen.confidence.max(-1) > 0.0)
+            missed |= not any(windows) and not seen.confidence.any()
+            self._keep(b, worker, seen, has_image)
+            yield worker, seen
+        if missed:
+            self.searches.rest(b)
+
+    def forget(self, b: int) -> None:
+        """Forget whom environment b was following."""
+        self.searches.reset(b)
+        for worker in range(self.n_workers):
+            self.detector.forget(self._track(b, worker))
+            self.strays.reset(b, worker)
+            self.windows[b][worker] = [None] * len(self.cameras)
+
+    def crops(self, b: int) -> list[Image | None]:
+        """What the network was given of the first worker of environment b."""
+        windows, crops = self.seen.get(b, ([], []))
+        current = self.windows[b][0] if self.windows[b] else []
+        return crops if windows == current else [None] * len(current)
+
+    def close(self) -> None:
+        """Stop the detector's thread."""
+        self.detector.close()
+
+    def _keep(self, b: int, worker: int, seen: Detection, has_image: Sequence[bool]) -> None:
+        for c, has in enumerate(has_image):
+            if has:
+                self.windows[b][worker][c] = seen.windows[c]
+        if worker == 0:
+            self.seen[b] = list(seen.windows), seen.crops
+
+    def _followed(
+        self,
+        source: ImageSource,
+        b: int,
+        worker: int,
+        windows: list[Roi | None],
+        taken: Windows,
+        has_image: Sequence[bool],
+    ) -> list[Roi | None]:
+        """Where to look for a worker with a track: elsewhere if most cameras have missed them."""
+        blind = self.strays.blind(b, worker, has_image)
+        if blind:
+            people = self.detector.search(source, blind)
+            self.strays.found(b, worker, people, windows, taken, self.cameras)
+        there = self.strays.windows(b, worker, windows)
+        return [window if has else None for window, has in zip(there, has_image, strict=True)]
+
+    def _track(self, b: int, worker: int) -> int:
+        """The number by which the detector knows a worker of an environment."""
+        return b * self.n_workers + worker
+
+    def _windows(self, predicted: PoseEstimate, row: int, worker: int) -> list[Roi | None]:
+        """A window a camera; None where the worker is unknown or out of view: search."""
+        if not predicted.tracked[row, worker]:
+            return [None] * len(self.cameras)
+        px, depth_m = project(self.P, predicted.mean_world[row : row + 1, worker])
+        return [
+            window_from_joints(px[0, c], depth_m[0, c], camera)
+            for c, camera in enumerate(self.cameras)
+        ]
+
+
+def _expected_posture(
+    expected: PoseEstimate, row: int, worker: int
+) -> tuple[bool, Sequence[float]]:
+    """Whether a worker is expected to be folded up; how far they count as each posture."""
+    if not expected.tracked[row, worker]:
+        return False, STANDING
+    joints = expected.mean_world[row, worker]
+    return is_folded(joints), posture_of(joints, expected.velocity_world[row, worker])

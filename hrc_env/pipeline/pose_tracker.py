@@ -1,0 +1,93 @@
+"""Images to poses without a simulator: recorded films, live cameras, anybody's renderer.
+
+tracker = PoseTracker(cameras)
+while films.advance():
+    estimate = tracker.update(films)
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hrc_env.core.records import PoseEstimate
+from hrc_env.geometry.cameras import PinholeCamera, projections
+from hrc_env.perception.detector import DetectorConfig
+from hrc_env.perception.lensed import pinhole_keypoints
+from hrc_env.perception.offsets import our_joints
+from hrc_env.perception.searching import ImageSource
+from hrc_env.pipeline.looking import Looking
+from hrc_env.pipeline.tracking import no_keypoints
+from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.estimators import EstimatorChoice, make_estimator
+from hrc_env.tracking.people.association import AssociationConfig, associate
+
+
+class PoseTracker:
+    """Follows the workers before a rig; what level `pixels` does, for one place.
+
+    Args:
+        cameras: the rig; `geometry.rig_files.read_rig` and `geometry.cameras.pinhole` make them.
+        n_workers: how many are followed at most.
+        dt_s: the usual time between two sets of frames [s].
+        estimator: as of an environment.
+        tracker: settings of the estimator; None: its defaults. The prior says where somebody
+            is looked for to be (`prior_mean_world`, `prior_std_m`).
+        detector: settings of the detector; None: the defaults.
+
+    Raises:
+        WeightsError: without the network's weights.
+    """
+
+    def __init__(
+        self,
+        cameras: Sequence[PinholeCamera],
+        n_workers: int = 1,
+        dt_s: float = 0.04,
+        estimator: EstimatorChoice = "particle",
+        tracker: TrackerConfig | None = None,
+        detector: DetectorConfig | None = None,
+    ) -> None:
+        self.cameras, self.n_workers, self.dt_s = tuple(cameras), n_workers, dt_s
+        self.P = projections(self.cameras)
+        self.estimator = make_estimator(estimator, self.P, dt_s, tracker)
+        self.looking = Looking(1, self.cameras, n_workers, detector or DetectorConfig())
+        self.state = self.estimator.init(1, n_workers)
+
+    def update(
+        self,
+        source: ImageSource,
+        dt_s: float | None = None,
+        rngs: Sequence[np.random.Generator] = (),
+    ) -> PoseEstimate:
+        """Take the present frames in.
+
+        Args:
+            source: the images of all cameras.
+            dt_s: time since the last frames [s]; None: the usual.
+            rngs: one generator, for estimators that draw; none: one with seed 0.
+
+        Returns:
+            The workers, arrays (1, W, J, ...), in the frame of the cameras' poses.
+        """
+        drawn = list(rngs) or [np.random.default_rng(0)]
+        self.estimator.predict(self.state, self.dt_s if dt_s is None else dt_s, drawn)
+        expected = self.estimator.estimate(self.state)
+        seen = no_keypoints(1, len(self.cameras), self.n_workers)
+        for worker, found in self.looking.look(source, expected, 0, 0, [True] * len(self.cameras)):
+            seen.px[0, :, worker] = found.px
+            seen.confidence[0, :, worker] = found.confidence
+            seen.sigma_px[0, :, worker] = found.sigma_px
+        keypoints = pinhole_keypoints(seen, self.cameras)
+        if self.n_workers > 1:
+            keypoints = associate(self.P, keypoints, expected, AssociationConfig()).keypoints
+        self.estimator.update(self.state, keypoints, drawn)
+        return our_joints(self.estimator.estimate(self.state))
+
+    def forget(self) -> None:
+        """Nobody is known any more."""
+        self.estimator.reset(self.state, np.arange(1), [np.random.default_rng(0)])
+        self.looking.forget(0)
+
+    def close(self) -> None:
+        """Stop the detector's thread."""
+        self.looking.close()

@@ -1,0 +1,1 @@
+"""What keeps a robot from harm between its agent and its joints."""
