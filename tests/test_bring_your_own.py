@@ -194,7 +194,7 @@ def test_a_shield_changes_commands_and_says_so():
     for shield in (None, "slow_down"):
         env = gymnasium.make("HRCReach-v0", perception="truth", shield=shield)
         simulation = env.unwrapped.simulation
-        agent, (observation, _) = make_agent("scripted", situation(simulation)), env.reset(seed=2)
+        agent, (observation, _) = make_agent("scripted", situation(simulation)), env.reset(seed=1)
         infos[shield] = []
         for _ in range(200):
             observation, *_, info = env.step(agent.act(observation))
@@ -208,7 +208,7 @@ def test_a_shield_changes_commands_and_says_so():
 def test_a_shield_reads_the_belief_alone():
     """With nobody perceived there is nobody to yield to, wherever they are."""
     env = gymnasium.make("HRCReach-v0", perception="none", shield="slow_down")
-    env.reset(seed=2)
+    env.reset(seed=1)  # a worker who comes close
     assert {env.step(env.action_space.sample())[4]["shield/speed_share"] for _ in range(20)} == {
         1.0
     }
