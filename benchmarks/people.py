@@ -20,7 +20,7 @@ from rich.table import Table
 from hrc_env.cli.progress import track
 from hrc_env.core.results import Metric, write_results
 from hrc_env.geometry import chains
-from hrc_env.geometry.distances import narrowest_gap
+from hrc_env.geometry.distances import least_separation
 from hrc_env.geometry.shapes import AXES, BOX, CAPSULE, CENTRE, HALF_SIZE, KIND, PLANE, REACH
 from hrc_env.motion import generator
 from hrc_env.motion.plans import CLIMB
@@ -202,7 +202,7 @@ def _measure(scene, body, motion, solids, state, deepest, notes) -> None:
             near = np.flatnonzero(np.linalg.norm(root[:, i] - root[:, j], axis=-1) < 2.6)
             if not len(near):
                 continue
-            gap = -narrowest_gap(
+            gap = -least_separation(
                 capsules[near, i], radius[near, i], capsules[near, j], radius[near, j]
             ).distance_m
             k = int(gap.argmax())

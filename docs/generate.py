@@ -52,7 +52,7 @@ holds where each joint is expected then, one worker after the other, one horizon
 {observations}
 
 Without a track the estimate is a prior: its deviation and age are at their bounds,
-`worker_tracked` is 0 and `worker_gap` {far} m.
+`worker_tracked` is 0 and `worker_separation` {far} m.
 
 ## Reward
 The sum of these terms, each in `info["reward/<name>"]`; float64. Distances are to the
@@ -71,7 +71,7 @@ The sum of these terms, each in `info["reward/<name>"]`; float64. Distances are 
 "absent" of who is not in the episode |
 | `perception/miscalibrated` | names of cameras that contradict the others as if they had been \
 moved, turned or zoomed (docs/cameras.md); at `pixels` and `keypoints` |
-| `safety/min_separation_m` | smallest true gap in this step; absent without workers |
+| `safety/min_separation_m` | smallest true separation in this step; absent without workers |
 | `tracking/mpjpe_m` | mean joint error of the estimate; absent where nobody is tracked |
 | `tracking/lost` | 1 if a worker is there who is not tracked |
 | `task/goals_reached`, `task/goals_missed` | in this episode so far |
@@ -112,7 +112,7 @@ def page() -> str:
         size=size[0] if size else 0,
         observations=observation_table(env),
         rewards=reward_table(env),
-        far=observations.FAR_GAP_M,
+        far=observations.FAR_SEPARATION_M,
         proximity=config.cost.proximity_m,
         config="\n\n".join(config_tables(env.config, "")),
     )

@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 from hrc_env.belief import Belief, standard_deviation_m
 from hrc_env.core.errors import check_shape
 from hrc_env.core.kernels import kernel
+from hrc_env.core.old_names import Named
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats
 
-FAR_GAP_M = 1.0
-"""A gap as wide as this or wider is reported as this: nothing near, or nobody known of."""
+FAR_SEPARATION_M = 1.0
+"""Larger separations are reported as this: nothing near, or nobody known of."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,9 +52,9 @@ class ObservationTerm:
 
 
 def _nearest_direction(now: Belief) -> Floats:
-    direction = (now.gap.point_b_world - now.gap.point_a_world).reshape(-1, 3)
+    direction = (now.separation.point_b_world - now.separation.point_a_world).reshape(-1, 3)
     shorten(direction, 1e-3)
-    near = now.gap.distance_m < FAR_GAP_M
+    near = now.separation.distance_m < FAR_SEPARATION_M
     return np.where(near.reshape(-1, 1), direction, 0.0)
 
 
@@ -134,9 +135,9 @@ SHARED_TERMS: tuple[ObservationTerm, ...] = (
         lambda now: now.estimate.tracked.astype(float),
     ),
     ObservationTerm(
-        "worker_gap", lambda of: of.workers, "m", "-", FAR_GAP_M, 0.5,
+        "worker_separation", lambda of: of.workers, "m", "-", FAR_SEPARATION_M, 0.5,
         "Distance between the robot's surface and the estimated body's, at most 1 m.",
-        lambda now: np.minimum(now.gap.distance_m, FAR_GAP_M),
+        lambda now: np.minimum(now.separation.distance_m, FAR_SEPARATION_M),
     ),
     ObservationTerm(
         "worker_direction", lambda of: of.workers * 3, "-", "world", 1.0, 1.0,
@@ -249,4 +250,4 @@ def _scale(
 def split(observation: NDArray[np.float32], where: ObservationLayout) -> dict[str, Floats]:
     """A flat observation (..., n) as named terms in their units."""
     physical = observation * where.scale
-    return {name: physical[..., part] for name, part in where.slices.items()}
+    return Named((name, physical[..., part]) for name, part in where.slices.items())

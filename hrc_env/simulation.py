@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hrc_env import metrics, observations, rewards
-from hrc_env.belief import Belief, estimated_gap
+from hrc_env.belief import Belief, estimated_separation
 from hrc_env.config import Settings
 from hrc_env.control import joint_command, n_actions
 from hrc_env.core.batching import picked, rows, write_rows
@@ -67,8 +67,8 @@ class Simulation(Stateful):
     """`batch` environments of the same settings that step together."""
 
     CHANGES = (
-        "physics", "senses", "motion", "task_state", "streams", "action", "episode_cost", "gap_m",
-        "estimate", "ahead", "worn", "reward_weights",
+        "physics", "senses", "motion", "task_state", "streams", "action", "episode_cost",
+        "separation_m", "estimate", "ahead", "worn", "reward_weights",
     )  # fmt: skip
 
     def __init__(self, batch: int, settings: Settings) -> None:
@@ -112,7 +112,7 @@ class Simulation(Stateful):
         self._everyone = np.arange(batch)
         self.action = np.zeros((batch, self.n_actions))
         self.episode_cost = np.zeros(batch)
-        self.gap_m = np.zeros(batch)
+        self.separation_m = np.zeros(batch)
         self.estimate = given.prior(batch, most, config.tracker)
         self.ahead = tuple(given.prior(batch, most, config.tracker) for _ in config.horizons_s)
         blank = [np.random.default_rng(0)] * batch
@@ -130,7 +130,7 @@ class Simulation(Stateful):
         generator.reset(self.motion, ids, self.streams.motion)
         self.worn[ids] = bodies_of(self.motion, ids, self.bodies.names)
         self.physics.reset(ids, self._starting_angles(ids), self.motion.body[ids])
-        self.action[ids], self.episode_cost[ids], self.gap_m[ids] = 0.0, 0.0, 0.0
+        self.action[ids], self.episode_cost[ids], self.separation_m[ids] = 0.0, 0.0, 0.0
         robot = chains.robot_state(self.chain, self.physics.q[ids], self.physics.qd[ids])
         self.task.reset(self.task_state, ids, self.streams.task, World(robot), self.config.task)
         self.senses.reset(ids, self.streams.sensor, self.streams.tracker)
@@ -161,7 +161,7 @@ class Simulation(Stateful):
         path, motion = generator.advance(
             self.motion, streams.motion, config.scene.sim_dt, config.n_substeps
         )
-        apart = self.gap_m > CLOSING_M_S * config.ctrl_dt
+        apart = self.separation_m > CLOSING_M_S * config.ctrl_dt
         q_path = self.physics.step(command, path, apart)
         truth = worker_truth(self.bodies, motion)
 
@@ -186,7 +186,7 @@ class Simulation(Stateful):
             arm, robot.capsule_radius_m, workers, truth.capsule_radius_m, config.cost
         )
         self.episode_cost += cost.total
-        self.gap_m = cost.min_separation_m
+        self.separation_m = cost.min_separation_m
         crew = self.crew
         info = {
             **{f"reward/{name}": value for name, value in terms.items()},
@@ -282,7 +282,7 @@ class Simulation(Stateful):
         return Belief(
             robot=robot,
             estimate=estimate,
-            gap=estimated_gap(robot, estimate),
+            separation=estimated_separation(robot, estimate),
             task=self.task.view(self.task_state, ids, self.config.task),
             action=self.action[ids],
             ahead=ahead,

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env import metrics
+from hrc_env.core.old_names import Named
 from hrc_env.core.records import PoseEstimate, WorkerTruth
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.motion.workers import Crew
@@ -40,7 +41,7 @@ class StepResult:
         known: dict[str, Any] = {name: value for name, value in values.items() if value == value}
         for name in FLAGS:
             known[name] = bool(known[name])
-        return {**known, **self.crew.info_of(b), **self.suspects.info_of(b)}
+        return Named(known, **self.crew.info_of(b), **self.suspects.info_of(b))
 
 
 def rows_of(info: Info, ids: Ints) -> Info:

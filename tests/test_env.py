@@ -170,7 +170,7 @@ def test_without_an_estimate_the_prior_is_observed_at_its_bounds():
     observation, info = env.reset(seed=0)
     terms = env.split_observation(observation)
     assert terms["worker_tracked"] == [0.0]
-    assert terms["worker_gap"] == [1.0]
+    assert terms["worker_separation"] == [1.0]
     np.testing.assert_allclose(terms["worker_joints_std"], 1.0)
     np.testing.assert_allclose(terms["worker_joints_age"], 2.0)
     assert info["tracking/lost"] == 1.0
