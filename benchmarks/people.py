@@ -136,7 +136,7 @@ def episodes(name: str, arguments: Arguments) -> Notes:
 def _some(scene: Scene, first: int, batch: int, arguments: Arguments, notes: Notes) -> float:
     """A batch of episodes; microseconds of a worker's control step."""
     body = stack(pool(arguments.body))
-    config = generator.MotionConfig(people=generator.people_called(arguments.people))
+    config = generator.MotionConfig(people=generator.PEOPLE[arguments.people])
     state = generator.make_state(batch, arguments.workers, body, config, scene.grounds)
     rngs = [np.random.default_rng([first + b]) for b in range(batch)]
     generator.reset(state, np.arange(batch), rngs)

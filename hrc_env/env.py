@@ -16,7 +16,7 @@ from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
 from hrc_env import observations
-from hrc_env.config import HRCConfig, settle
+from hrc_env.config import ConfigChoice, settle
 from hrc_env.core.errors import ConfigError, unknown, whole
 from hrc_env.core.mapping import plain
 from hrc_env.core.stateful import Stateful
@@ -86,7 +86,8 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         render_mode: "rgb_array", "depth_array" or None; `gymnasium.make` also takes "human", a
             window (docs/rendering.md).
         width, height: of what `render` gives [px].
-        config: an `HRCConfig` or a nested mapping of changes to the default.
+        config: an `HRCConfig`, a nested mapping of changes to the default, or the path of a TOML
+            file of such (`hrc_env.config.save_config` writes one).
 
     Raises:
         ConfigError: a name, index or value that is not valid, with those that are.
@@ -112,7 +113,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         render_mode: str | None = None,
         width: int = PICTURE_SIZE[0],
         height: int = PICTURE_SIZE[1],
-        config: HRCConfig | Mapping[str, Any] | None = None,
+        config: ConfigChoice = None,
     ) -> None:
         check_render_mode(render_mode)
         self._size = picture_size(width, height)
