@@ -108,7 +108,7 @@ def test_so_is_an_old_key_of_infos_and_observations():
     observation, info = env.reset(seed=0)
     with pytest.raises(KeyError, match="worker_separation"):
         env.split_observation(observation)["worker_gap"]
-    with pytest.raises(KeyError, match="^'nothing'$"):
+    with pytest.raises(KeyError, match="nothing"):
         info["nothing"]
     assert isinstance(info, Named)
     assert info.get("worker_gap") is None

@@ -14,8 +14,8 @@ OLD_NAMES = {
     "tracker.paper_sigma_m": "tracker.sigma_m",
     "worker_gap": "worker_separation",
 }
-"""Fields of the config by their path, arguments, their values, commands and "--options", observation
-terms and keys of the infos."""
+"""Fields of the config by their path, arguments, their values, commands, "--options",
+observation terms and keys of the infos."""
 
 
 class Named(dict[str, Any]):
