@@ -47,7 +47,7 @@ class HRCConfig:
     """Time between actions [s]; a multiple of `scene.sim_dt`. 0.04 s is 25 Hz."""
     start_spread_rad: tuple[float, ...] = (1.3, 0.15, 0.15, 0.15, 0.15, 0.15)
     """At reset each arm joint is drawn within so much of its home angle [rad]."""
-    horizons_s: tuple[float, ...] = ()
+    forecast_s: tuple[float, ...] = ()
     """Times ahead at which the observation also holds where the workers' joints are expected,
     each in (0, 1] [s]; none by default. (0.2, 0.4) adds 120 entries a worker."""
     worker: str | tuple[str, ...] = "worker_1"
@@ -86,10 +86,10 @@ class HRCConfig:
                 f"start_spread_rad must hold angles >= 0, one a joint, got {self.start_spread_rad}."
             )
         pool(self.worker)
-        for horizon_s in self.horizons_s:
+        for horizon_s in self.forecast_s:
             if not 0 < horizon_s <= LONGEST_S:
                 raise ConfigError(
-                    f"horizons_s must be in (0, {LONGEST_S:g}] s each, got {self.horizons_s}."
+                    f"forecast_s must be in (0, {LONGEST_S:g}] s each, got {self.forecast_s}."
                 )
         substeps = self.ctrl_dt / self.scene.sim_dt
         if substeps < 0.5 or abs(substeps - round(substeps)) > 1e-6:
@@ -123,10 +123,11 @@ class Settings:
     task: Task
     perception: str
     estimator: EstimatorSpec
-    cameras: Sequence[int | str] | None
-    """Which of the scene's cameras are used; None: all."""
+    cameras: Any
+    """Names and indices of the scene's cameras that are used; None: all."""
     scene: str
-    n_workers: int | tuple[int, int]
+    n_workers: tuple[int, int]
+    """The fewest and the most of an episode."""
     control: str
     shield: Shield | None
     config: HRCConfig
@@ -164,9 +165,8 @@ def settle(
             raise unknown("argument", name, [*_keywords(), *PARTS])
         if value is not None:
             whole = _with_part(whole, PARTS[name], value, name)
-    return Settings(
-        chosen, perception, spec, cameras, scene, n_workers, control, shield_called(shield), whole
-    )  # fmt: skip
+    counts, guard = _worker_counts(n_workers), shield_called(shield)
+    return Settings(chosen, perception, spec, cameras, scene, counts, control, guard, whole)
 
 
 def _keywords() -> list[str]:
@@ -259,6 +259,22 @@ def _camera(given: Any, index: int) -> CameraConfig:
         )
     x, y, z = (float(value) for value in place)
     return CameraConfig(f"camera_{index + 1}", (x, y, z))
+
+
+def _worker_counts(n_workers: int | tuple[int, int]) -> tuple[int, int]:
+    """The fewest and the most workers of an episode, from one number or from both.
+
+    Raises:
+        ConfigError: they are no whole numbers, 0 or more, in this order.
+    """
+    pair = tuple(n_workers) if isinstance(n_workers, Sequence) else (n_workers, n_workers)
+    whole = all(isinstance(k, int | np.integer) and not isinstance(k, bool) for k in pair)
+    if not whole or len(pair) != 2 or not 0 <= pair[0] <= pair[1]:
+        raise ConfigError(
+            "n_workers must be a whole number, 0 or more, or (fewest, most), from which each "
+            f"episode's number is drawn, got {n_workers!r}."
+        )
+    return int(pair[0]), int(pair[1])
 
 
 def _with_part(record: Any, path: str, value: Any, where: str) -> Any:

@@ -4,6 +4,7 @@ from typing import Any
 
 OLD_NAMES = {
     "eyes": "detector",
+    "horizons_s": "forecast_s",
     "per_joint": "particle",
     "processes": "threads",
     "reward.goal": "task.goal_bonus",
@@ -13,6 +14,8 @@ OLD_NAMES = {
     "tracker.paper_resampling": "tracker.resampling",
     "tracker.paper_sigma_m": "tracker.sigma_m",
     "worker_gap": "worker_separation",
+    "worker_joints_ahead": "worker_joints_forecast",
+    "worker_joints_ahead_std": "worker_joints_forecast_std",
 }
 """Fields of the config by their path, arguments, their values, commands, "--options",
 observation terms and keys of the infos."""
