@@ -71,7 +71,7 @@ def test_a_clip_in_memory_is_not_written(tmp_path):
         ("[reward]\ngoal = 1\n", "'reward.goal' is gone: use 'task.goal_bonus'"),
         ("reward = [", "must be TOML"),
         ('[motion]\npeople = "hurrid"\n', "motion.people 'hurrid'. Did you mean 'hurried'"),
-        ("appearance = 3\n", "appearance must be one of 'as_built'"),
+        ("appearance = 3\n", "appearance must be a name ('as_built'"),
     ],
 )
 def test_a_file_that_cannot_be_is_answered_with_what_would_do(text, said, tmp_path):

@@ -91,9 +91,8 @@ def _record(kind: type[RecordT], value: Any, where: str) -> RecordT:
         if value not in presets:
             raise unknown(where, value, presets)
         return presets[value]
-    named = [f"one of {', '.join(map(repr, presets))}"] if presets else []
-    expected = " or ".join([*named, f"{kind.__name__} or a mapping of its fields"])
-    return _checked(isinstance(value, kind), expected, value, where)
+    name = f"a name ({', '.join(map(repr, presets))}) or " if presets else ""
+    return _checked(isinstance(value, kind), f"{name}a mapping", value, where)
 
 
 def _one_of(hints: tuple[Any, ...], value: Any, where: str) -> Any:
