@@ -41,7 +41,7 @@ class PerceptionPipeline(Stateful):
         raise NotImplementedError
 
     def ahead(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
-        """What is expected of rows `ids` in `horizon_s`; `now` is what `perceive` has just given."""
+        """What is expected in `horizon_s` of rows `ids`, of which `now` is believed."""
         raise NotImplementedError
 
     def last_detections(self, b: int) -> tuple[Keypoints | None, Windows]:
