@@ -294,4 +294,5 @@ def _capsules(
         links.append(link)
         ends.append((T[:3, 3] - along, T[:3, 3] + along))
         radii_m.append(geom.size[0])
-    return np.array(links), np.round(ends, 12), np.array(radii_m)  # quaternions round
+    rounded = np.round(np.array(ends, float), 12)  # as the quaternions are
+    return np.array(links), rounded, np.array(radii_m)
