@@ -16,7 +16,7 @@ from hrc_env.motion import plans as pl
 from hrc_env.motion import state as st
 from hrc_env.motion.anatomy import anatomies
 from hrc_env.motion.behaviour import begin_episode, follow_up
-from hrc_env.motion.capture.clip import Clip, opened
+from hrc_env.motion.clip import Clip, opened
 from hrc_env.motion.config import MotionConfig, numbers
 from hrc_env.motion.errands import errands_at
 from hrc_env.motion.floorplan import floorplan, room_for
