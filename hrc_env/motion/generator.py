@@ -28,7 +28,7 @@ from hrc_env.motion.playing import Clips, stocked
 from hrc_env.motion.reactions import notice
 from hrc_env.motion.state import MotionState
 from hrc_env.motion.who import N_DRAWS
-from hrc_env.worker.body import N_SEGMENTS, Bodies, Body
+from hrc_env.worker.body import N_SEGMENTS, Body
 
 __all__ = [
     "ABSENT",
@@ -70,7 +70,7 @@ OPEN_FLOOR = Grounds(
 
 
 def make_state(
-    batch: int, n_workers: int, body: Body | Bodies, config: MotionConfig,
+    batch: int, n_workers: int, body: Body, config: MotionConfig,
     grounds: Grounds = OPEN_FLOOR, fewest: int | None = None,
 ) -> MotionState:  # fmt: skip
     """Arrays for `batch` environments of `n_workers` each; call `reset` before use.
