@@ -27,7 +27,7 @@ INFOS = {
     "cost": ("-", "sum of both; 0 after a reset"),
     "cost_sum": ("-", "the same, under the name that some safe-RL libraries read"),
     "episode_cost": ("-", "running sum of `cost`"),
-    "safety/min_separation_m": ("m", "smallest true separation of the step; absent without workers"),
+    "safety/min_separation_m": ("m", "least true separation of the step; absent without workers"),
     "tracking/mpjpe_m": (
         "m", "mean joint error of the estimate; absent where nobody is tracked. Tracks are "
         "compared with the workers whom they fit best",
