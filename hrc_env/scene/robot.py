@@ -295,4 +295,4 @@ def _capsules(
         ends.append((T[:3, 3] - along, T[:3, 3] + along))
         radii_m.append(geom.size[0])
     rounded = np.round(np.array(ends, float), 12)  # as the quaternions are
-    return np.array(links), rounded, np.array(radii_m)
+    return np.array(links), np.asarray(rounded, np.float64), np.array(radii_m, np.float64)
