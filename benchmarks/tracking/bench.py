@@ -5,23 +5,22 @@ that was stopped goes on where it was; parts made by other code or settings are 
 """
 
 import multiprocessing
-from collections import Counter
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
+from benchmarks.common import check_positive
 from benchmarks.tracking.cells import run_cell
 from benchmarks.tracking.detections import CONDITIONS
+from benchmarks.tracking.env_sequences import ENV, make_env_rig
 from benchmarks.tracking.metrics import ASSOCIATION, TIMING, Parts, metrics_of
-from benchmarks.tracking.names import DEFAULT, SMOOTHER, cells, names_of
-from benchmarks.tracking.own import OWN, make_own_rig
-from benchmarks.tracking.report import write_report
+from benchmarks.tracking.names import DEFAULT, SMOOTHER, conditions, names_of
+from benchmarks.tracking.report import report
 from benchmarks.tracking.rigs import RIGS, SIGMA_PX, Rig, make_rig
-from benchmarks.tracking.sequences import BOUNDED, Sequences, make_sequences
+from benchmarks.tracking.sequences import MATCHED, Sequences, make_sequences
 from benchmarks.tracking.timing import BATCH, time_association, time_estimator
-from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric, write_results
 from hrc_env.experiments.study.fingerprint import fingerprint_of
 from hrc_env.experiments.study.shelf import Say, Shelf, Tick
@@ -46,9 +45,7 @@ class TrackingBenchConfig:
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for numbers that cannot work."""
-        for name in ("n_seeds", "n_matched", "n_smoothed", "timing_repeats"):
-            if getattr(self, name) < 1:
-                raise ConfigError(f"{name} must be at least 1, got {getattr(self, name)}.")
+        check_positive(self, "n_seeds", "n_matched", "n_smoothed", "timing_repeats")
 
 
 QUICK = TrackingBenchConfig(n_seeds=8, n_matched=30, n_smoothed=2, timing_repeats=2)
@@ -56,7 +53,7 @@ QUICK = TrackingBenchConfig(n_seeds=8, n_matched=30, n_smoothed=2, timing_repeat
 
 
 def run(config: TrackingBenchConfig, out: Path, say: Say, processes: int = 1) -> dict[str, Metric]:
-    """Run what is not yet there; writes results.json, tracking.md and two plots into `out`.
+    """Run what is not yet there; writes results.json, a report and a plot into `out`.
 
     Args:
         config: how much.
@@ -64,79 +61,54 @@ def run(config: TrackingBenchConfig, out: Path, say: Say, processes: int = 1) ->
         say: hears of the progress: shares that sum to 1.
         processes: how many conditions are run at once; times are taken alone, at the end.
     """
-    asked = cells()
-    n_parts = len(asked) + len(ESTIMATORS) + 1
-    shelf = Shelf(
-        out / "parts", fingerprint_of(asdict(config), "benchmarks.tracking.cells"), n_parts, say
-    )
-    if processes > 1:
-        _run_conditions(config, shelf, processes)
-        shelf = Shelf(shelf.folder, shelf.fingerprint, n_parts, _silent)
+    asked = conditions()
+    n_parts = sum(len(names_of(condition)) for _, condition in asked) + len(ESTIMATORS) + 1
+    fingerprint = fingerprint_of(asdict(config), "benchmarks.tracking.cells")
+    shelf = Shelf(out / "parts", fingerprint, n_parts, say)
+    quiet = replace(shelf, say=_silent)
+    if processes > 1:  # they leave their parts on the shelf
+        context = multiprocessing.get_context("spawn")
+        with ProcessPoolExecutor(processes, mp_context=context) as pool:
+            running = {pool.submit(make_condition, config, quiet, *each): each for each in asked}
+            for done in as_completed(running):
+                done.result()
+                say(len(names_of(running[done][1])) / n_parts, ".".join(running[done]))
     parts: Parts = {}
-    for rig, condition in dict.fromkeys(cell[:2] for cell in asked):
-        parts |= make_condition(config, shelf, rig, condition)
-    shelf = Shelf(shelf.folder, shelf.fingerprint, n_parts, say)
+    for each in asked:
+        parts |= make_condition(config, quiet if processes > 1 else shelf, *each)
     parts |= _timing(config, shelf)
     metrics = metrics_of(parts)
     settings = {
         "bench": asdict(config),
         "default": DEFAULT,
         "sigma_px": SIGMA_PX,
-        "tracker": {name: asdict(_rig(name).tracker) for name in (*RIGS, OWN)},
+        "tracker": {name: asdict(_rig(name).tracker) for name in (*RIGS, ENV)},
         "conditions": {name: asdict(damage) for name, damage in CONDITIONS.items()},
-        "fingerprint": shelf.fingerprint,
+        "fingerprint": fingerprint,
     }
     write_results(out / "results.json", settings, _seeds(config, "clean"), metrics)
-    write_report(out, parts, metrics)
+    report(out, parts, metrics)
     return metrics
 
 
-def make_condition(
-    config: TrackingBenchConfig, shelf: Shelf, rig_name: str, condition: str
-) -> Parts:
+def make_condition(config: TrackingBenchConfig, shelf: Shelf, rig_name: str, what: str) -> Parts:
     """Everybody on one rig and condition; the sequences are made if a part is missing."""
-    seeds = _seeds(config, condition)
+    seeds = _seeds(config, what)
 
     @cache
     def sequences() -> tuple[Rig, Sequences]:
         rig = _rig(rig_name)
-        return rig, make_sequences(rig, condition, seeds)
+        return rig, make_sequences(rig, what, seeds)
 
     def make(name: str, tick: Tick) -> dict[str, Any]:
         rig, given = sequences()
-        if name == SMOOTHER:
-            n = min(config.n_smoothed, len(seeds))
-            return run_cell(name, rig, given.first(n), seeds[:n], tick)
-        return run_cell(name, rig, given, seeds, tick)
+        n = min(config.n_smoothed, len(seeds)) if name == SMOOTHER else len(seeds)
+        return run_cell(name, rig, given.first(n), seeds[:n], tick)
 
     return {
-        (rig_name, condition, name): shelf.part(
-            f"{rig_name}.{condition}.{name}", partial(make, name)
-        )
-        for name in names_of(rig_name, condition)
+        (rig_name, what, name): shelf.part(f"{rig_name}.{what}.{name}", partial(make, name))
+        for name in names_of(what)
     }
-
-
-def _run_conditions(config: TrackingBenchConfig, shelf: Shelf, processes: int) -> None:
-    """Let several processes put the parts of whole conditions on the shelf."""
-    todo = Counter((rig, condition) for rig, condition, _ in cells())
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(processes, mp_context=context) as pool:
-        running = {
-            pool.submit(_in_process, config, shelf.folder, shelf.fingerprint, *what): what
-            for what in todo
-        }
-        for done in as_completed(running):
-            done.result()
-            what = running[done]
-            shelf.say(todo[what] / shelf.n_parts, ".".join(what))
-
-
-def _in_process(
-    config: TrackingBenchConfig, folder: Path, fingerprint: str, rig: str, condition: str
-) -> None:
-    """What another process does: the parts stay on the shelf."""
-    make_condition(config, Shelf(folder, fingerprint, 1, _silent), rig, condition)
 
 
 def _silent(share: float, label: str) -> None:
@@ -144,11 +116,11 @@ def _silent(share: float, label: str) -> None:
 
 
 def _rig(name: str) -> Rig:
-    return make_own_rig() if name == OWN else make_rig(name)
+    return make_env_rig() if name == ENV else make_rig(name)
 
 
 def _seeds(config: TrackingBenchConfig, condition: str) -> list[int]:
-    n = config.n_matched if condition in BOUNDED else config.n_seeds
+    n = config.n_matched if condition == MATCHED else config.n_seeds
     return [config.first_seed + k for k in range(n)]
 
 
@@ -165,8 +137,7 @@ def _timing(config: TrackingBenchConfig, shelf: Shelf) -> Parts:
         ("lab", TIMING, name): shelf.part(f"{TIMING}.{name}", partial(make, name))
         for name in ESTIMATORS
     }
-    site = make_rig("site")
     parts["site", TIMING, ASSOCIATION] = shelf.part(
-        f"{TIMING}.{ASSOCIATION}", partial(time_association, site, repeats)
+        f"{TIMING}.{ASSOCIATION}", partial(time_association, make_rig("site"), repeats)
     )
     return parts

@@ -9,9 +9,8 @@ import numpy as np
 from benchmarks.tracking.arrivals import in_time
 from benchmarks.tracking.couples import identities
 from benchmarks.tracking.dlt import triangulate_frame
-from benchmarks.tracking.full_state import filter_matched
-from benchmarks.tracking.names import DEFAULT, DLT, FULL_STATE, SMOOTHER, UNBUFFERED
-from benchmarks.tracking.rigs import DT_S, SIGMA_PX, Rig
+from benchmarks.tracking.names import DEFAULT, DLT, SMOOTHER, UNBUFFERED
+from benchmarks.tracking.rigs import DT_S, Rig
 from benchmarks.tracking.sequences import Sequences
 from benchmarks.tracking.tally import tally
 from hrc_env.core.batching import rows
@@ -34,11 +33,6 @@ def beliefs(
     """Mean (S, W, J, 3) and covariance (S, W, J, 3, 3) after each frame; DLT has none."""
     if name == DLT:
         yield from _triangulated(rig, sequences)
-    elif name == FULL_STATE:
-        if sequences.model is None:
-            raise ValueError(f"{FULL_STATE} runs on sequences whose model is known.")
-        for mean, cov in filter_matched(rig.P, sequences.model, sequences.px[:, :, :, 0], SIGMA_PX):
-            yield mean[:, None], cov[:, None]
     elif name == SMOOTHER:
         yield from _smoothed(rig, sequences, seeds)
     else:
@@ -146,7 +140,7 @@ def _window(
         mean = np.take_along_axis(mean, track[None, :, :, None, None], 2)
         if cov is not None:
             cov = np.take_along_axis(cov, track[None, :, :, None, None, None], 2)
-    sums = tally(truth, mean, cov, np.isfinite(sequences.px[frames, ..., 0]))
+    sums = tally(truth, mean, cov)
     if swaps is not None:
         sums["identity_swaps"] = swaps.tolist()
     if sequences.bound_m2 is not None:

@@ -1,28 +1,27 @@
 """Sums per sequence over one window's frames, people and joints: what all metrics are made of."""
 
-from math import erf, exp, pi, sqrt
 from typing import Any
 
 import numpy as np
+from scipy import stats
 
+from benchmarks.common import CHI2_95_3D
 from hrc_env.core.skeleton import TORSO
 from hrc_env.core.typing import Bools, Covariances3, Floats, Ints, Points3
 
-CHI2_95_3D = 7.815
-"""95 % of a three-dimensional normal variable lies within this squared distance."""
 N_LEVELS = 20
 """Bins of the probability that the reported Gaussian gives to a nearer joint."""
-_MOST_VIEWS = 4
+CHI2_LEVELS: Floats = stats.chi2(3).ppf(np.arange(1, N_LEVELS) / N_LEVELS)
+"""(19,) limits of the 20 equally likely classes of a normalised squared error."""
 
 
-def tally(truth: Points3, mean: Points3, cov: Covariances3 | None, seen: Bools) -> dict[str, Any]:
+def tally(truth: Points3, mean: Points3, cov: Covariances3 | None) -> dict[str, Any]:
     """Sums by name, each a list over sequences.
 
     Args:
         truth: (T, S, W, J, 3) [m].
         mean: (T, S, W, J, 3) [m].
         cov: (T, S, W, J, 3, 3) [m^2]; None: nothing is claimed.
-        seen: (T, S, C, W, J) which joints cameras see.
     """
     n_frames, n_sequences = truth.shape[:2]
     offset = mean - truth
@@ -34,10 +33,6 @@ def tally(truth: Points3, mean: Points3, cov: Covariances3 | None, seen: Bools) 
         "wrong_way": _total(((_left(mean) * _left(truth)).sum(-1) < 0)[..., None]),
         "median": np.median(np.sqrt(squared), axis=(0, 2, 3)),
     }
-    n_views = seen.sum(2)
-    views = [n_views == k for k in range(_MOST_VIEWS + 1)]
-    out["squared_by_views"] = np.stack([_total(np.where(v, squared, 0)) for v in views], -1)
-    out["n_by_views"] = np.stack([_total(v) for v in views], -1)
     if cov is not None:
         nees = np.einsum("...i,...i->...", offset, np.linalg.solve(cov, offset[..., None])[..., 0])
         level = np.searchsorted(CHI2_LEVELS, nees)
@@ -57,23 +52,3 @@ def _left(joints: Points3) -> Floats:
     """(..., 2) from right to left across the torso, on the ground."""
     a, b, c, d = (joints[..., j, :2] for j in TORSO)
     return a - b + c - d
-
-
-def _chi2_levels() -> Floats:
-    """Squared distances within which 1/n, 2/n, ... of a 3D normal variable lie.
-
-    By Newton's method on the distribution erf(r / sqrt 2) - r sqrt(2 / pi) exp(-r^2 / 2).
-    """
-    levels = []
-    r = 1.0
-    for k in range(1, N_LEVELS):
-        for _ in range(30):
-            below = erf(r / sqrt(2)) - r * sqrt(2 / pi) * exp(-r * r / 2)
-            density = sqrt(2 / pi) * r * r * exp(-r * r / 2)
-            r = max(r - (below - k / N_LEVELS) / density, 0.05)
-        levels.append(r * r)
-    return np.array(levels)
-
-
-CHI2_LEVELS: Floats = _chi2_levels()
-"""(19,) limits of the 20 equally likely classes of a normalised squared error."""

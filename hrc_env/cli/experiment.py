@@ -8,8 +8,8 @@ from typing import Annotated
 
 import tyro
 
-from benchmarks.commands.bench import show
 from hrc_env.cli.checks import at_least
+from hrc_env.cli.progress import show
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class AnyExperiment:
         """Run `run(folder, say, overwrite=...)`, show the tables."""
         at_least("--seeds", self.seeds, 1)
         written = "report.html, results.json, figures/"
-        return show(partial(run, overwrite=self.overwrite), self.out, "report.md", written)
+        return show(partial(run, overwrite=self.overwrite), self.out, "experiment", written)
 
 
 @dataclass(frozen=True)
