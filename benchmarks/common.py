@@ -1,4 +1,4 @@
-"""What the benches share: checks of how much is asked, cells of tables, pictures, shares."""
+"""What the benches share: shares, normalised errors, cells of tables, a way to show results."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -6,27 +6,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from rich.console import Console
 from rich.markdown import Markdown
 
-from hrc_env.core.errors import ConfigError
-from hrc_env.core.results import Metric, write_results
+from hrc_env.core.results import Metric
 from hrc_env.core.typing import Covariances3, Floats, Points3
-from hrc_env.experiments.study.page import Part, Section, Table, write_report
+from hrc_env.experiments.study.report import Metrics, Report, Table
 
-Metrics = Mapping[str, Metric]
 CHI2_95_3D = 7.815
 """95 % of a three-dimensional normal variable lies within this squared distance."""
-
-
-def check_positive(config: Any, *names: str) -> None:
-    """Raise `ConfigError` unless these fields of a config are 1 or more."""
-    for name in names:
-        if getattr(config, name) < 1:
-            raise ConfigError(f"{name} must be at least 1, got {getattr(config, name)}.")
 
 
 def exactly(value: float, unit: str, n: int = 1) -> Metric:
@@ -70,29 +58,13 @@ def table(header: Iterable[str], rows: Iterable[Iterable[str]]) -> Table:
     return Table(tuple(header), tuple(tuple(row) for row in rows))
 
 
-def grid(axis: Axes, which: str = "both") -> None:
-    """Pale lines behind what is drawn."""
-    axis.grid(True, axis=which, color="0.9")  # pyright: ignore[reportArgumentType]
-    axis.set_axisbelow(True)
-
-
-def save(figure: Figure, path: Path, title: str) -> None:
-    """Write a picture."""
-    figure.suptitle(title, fontsize=14)
-    FigureCanvasAgg(figure)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=110)
-
-
 def publish(
     out: Path,
-    title: str,
-    parts: Sequence[Part],
+    report: Report,
     config: Mapping[str, Any],
     seeds: Sequence[int],
     metrics: Metrics,
 ) -> None:
     """Write results.json, report.html and report.md into a folder; show the report."""
-    write_results(out / "results.json", {**config, "out": str(out)}, seeds, metrics)
-    write_report(out, title, "", [Section("Measured", tuple(parts))])
+    report.write(out, {**config, "out": str(out)}, seeds, metrics)
     Console().print(Markdown((out / "report.md").read_text()))

@@ -13,13 +13,14 @@ from hrc_env.experiments.impact import experiment, tax
 from hrc_env.experiments.impact.experiment import ImpactConfig, config_for, run
 from hrc_env.experiments.impact.report import write_pages
 from hrc_env.experiments.impact.trial import training
-from hrc_env.experiments.impact.trial.counts import GAPS_M, Bins, quantile_over
 from hrc_env.experiments.impact.trial.episodes import Stages
 from hrc_env.experiments.impact.trial.eyes import REFERENCE, all_eyes, eyes_called, seeing
 from hrc_env.experiments.impact.trial.judge import Step, judge, scene_of
 from hrc_env.experiments.impact.trial.policies import Policy, maker
 from hrc_env.experiments.impact.trial.tally import Tally
-from hrc_env.experiments.study.shelf import Shelf
+from hrc_env.experiments.study.cache import PartCache
+from hrc_env.experiments.study.counts import GAPS_M, Bins
+from hrc_env.experiments.study.intervals import counted_quantile_over
 
 LATE = seeing(latency_s=0.12).name
 TINY = ImpactConfig(
@@ -159,7 +160,7 @@ def test_directed_speeds_add_up_to_how_the_gap_closes():
 def test_quantiles_of_bins_are_those_of_the_values():
     rng = np.random.default_rng(0)
     values = rng.normal(0.2, 0.1, (40, 500))
-    found = quantile_over(GAPS_M, GAPS_M.count(values).tolist(), 0.95, "m")
+    found = counted_quantile_over(GAPS_M, GAPS_M.count(values).tolist(), 0.95, "m")
     assert found.value == pytest.approx(np.quantile(values, 0.95), abs=0.002)
     assert found.low < found.value < found.high
 
@@ -252,13 +253,13 @@ def test_a_policy_is_learnt_once_and_again_only_if_its_file_is_lost(tmp_path, mo
         return {"sha256": hashlib.sha256(b"policy").hexdigest()}
 
     monkeypatch.setattr(training, "_train", learn)
-    shelf = Shelf(tmp_path, "here", 1, silent)
+    cache = PartCache(tmp_path, "here", 1, silent)
     learning = training.Learning(1, 1, tmp_path / "ppo.zip")
     for n_times in (1, 1):
-        training.trained(shelf, learning)
+        training.trained(cache, learning)
         assert len(learnt) == n_times
     learning.path.write_bytes(b"half")
-    assert training.trained(shelf, learning).read_bytes() == b"policy"
+    assert training.trained(cache, learning).read_bytes() == b"policy"
     assert len(learnt) == 2
 
 
@@ -267,7 +268,7 @@ def test_pages_are_written_without_the_policy_that_yields(end_to_end, tmp_path):
     out = tmp_path / "one"
     table = experiment._played(
         replace(TINY, policies=("scripted",), eyes=("truth", REFERENCE)),
-        Shelf(out / "parts", "", 1, silent), out / "none.zip",
+        PartCache(out / "parts", "", 1, silent), out / "none.zip",
     )  # fmt: skip
     write_pages(out, 2, (), table, metrics)
     assert (out / "report.html").read_text().count("data:image/png;base64,") == 1

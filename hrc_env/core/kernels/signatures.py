@@ -3,12 +3,15 @@
 
 import importlib
 import json
+import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from numba import types
+import numpy as np
+from numba import from_dtype, types
+from numba.np.numpy_support import as_dtype
 
 from hrc_env.core.kernels import KERNELS
 
@@ -59,15 +62,18 @@ def write(signatures: Sequence[Signature]) -> None:
 
 def encode(kind: Any) -> Any:
     """A type of numba's as JSON: "float64", "float64[3C]" ("!" behind it: not to be written),
-    a list for a tuple, {"module:name": [...]} for a named one.
+    "module:DTYPE" for a record and "module:DTYPE[2C]" for a structured array, a list for a tuple,
+    {"module:name": [...]} for a named one.
 
     Raises:
         TypeError: a type that no kernel has been called with so far.
     """
     text: Any = str(kind)
     inside = [encode(each) for each in getattr(kind, "types", ())]
-    if isinstance(kind, types.Array):
-        text = f"{kind.dtype}[{kind.ndim}{kind.layout}]{'' if kind.mutable else '!'}"
+    if isinstance(kind, types.Record):
+        text = _name_of(kind)
+    elif isinstance(kind, types.Array):
+        text = f"{encode(kind.dtype)}[{kind.ndim}{kind.layout}]{'' if kind.mutable else '!'}"
     elif isinstance(kind, types.NamedTuple | types.NamedUniTuple):
         made = kind.instance_class
         text = {f"{made.__module__}:{made.__qualname__}": inside}
@@ -91,4 +97,17 @@ def decode(text: Any) -> Any:
         dtype, _, rest = text.partition("[")
         form, _, mark = rest.partition("]")
         return types.Array(decode(dtype), int(form[:-1]), form[-1], readonly=mark == "!")
+    module, _, name = text.rpartition(":")
+    if module:
+        return from_dtype(getattr(importlib.import_module(module), name))
     return types.boolean if text == "bool" else getattr(types, text)
+
+
+def _name_of(record: types.Record) -> str:
+    """The module's constant that holds a record's dtype, as "module:DTYPE"."""
+    dtype = as_dtype(record)
+    for module in [name for name in sys.modules if name.startswith("hrc_env.")]:
+        for name, value in vars(sys.modules[module]).items():
+            if isinstance(value, np.dtype) and value == dtype and value.names == dtype.names:
+                return f"{module}:{name}"
+    raise TypeError(f"{dtype} is no constant of a module of hrc_env: give its dtype a name there.")

@@ -19,9 +19,8 @@ from hrc_env.experiments.beyond.trial.setting import WARM_UP_S, Setting
 from hrc_env.experiments.beyond.trial.tally import Rows
 from hrc_env.experiments.beyond.trial.timing import update_us
 from hrc_env.experiments.beyond.trial.walks import walks_of
+from hrc_env.experiments.study.cache import PartCache, PartProgress, Progress, own_folder
 from hrc_env.experiments.study.fingerprint import fingerprint_of
-from hrc_env.experiments.study.folder import claim
-from hrc_env.experiments.study.shelf import Say, Shelf, Tick
 
 NAME = "beyond"
 
@@ -73,7 +72,9 @@ def config_for(
     return config if seeds is None else replace(config, n_seeds=seeds)
 
 
-def run(config: BeyondConfig, out: Path, say: Say, overwrite: bool = False) -> dict[str, Metric]:
+def run(
+    config: BeyondConfig, out: Path, say: Progress, overwrite: bool = False
+) -> dict[str, Metric]:
     """Play everything that is not there yet; results.json, figures, report.html into `out`.
 
     Args:
@@ -85,10 +86,10 @@ def run(config: BeyondConfig, out: Path, say: Say, overwrite: bool = False) -> d
     Raises:
         ConfigError: the folder holds other results.
     """
-    claim(out, NAME, overwrite)
+    own_folder(out, NAME, overwrite)
     asked = tuple(study for name, study in STUDIES.items() if name in config.studies)
     settings = _settings(config)
-    played = _played(config, asked, Shelf(out / "parts", "", 1, say), settings)
+    played = _played(config, asked, PartCache(out / "parts", "", 1, say), settings)
     metrics: dict[str, Metric] = {}
     for study in asked:
         metrics |= metrics_of(study.name, played[study.name])
@@ -99,7 +100,7 @@ def run(config: BeyondConfig, out: Path, say: Say, overwrite: bool = False) -> d
 
 
 def _played(
-    config: BeyondConfig, asked: tuple[Study, ...], shelf: Shelf, settings: Mapping[str, Any]
+    config: BeyondConfig, asked: tuple[Study, ...], cache: PartCache, settings: Mapping[str, Any]
 ) -> dict[str, dict[str, Rows]]:
     """Every setting's sums, study by study; those that share their walks are played together."""
     order = sorted(
@@ -111,7 +112,7 @@ def _played(
         own = fingerprint_of(
             {**settings, "setting": setting.numbers()}, "hrc_env.experiments.beyond.trial.play"
         )
-        own_shelf = replace(shelf, fingerprint=own, n_parts=len(order))
+        own_shelf = replace(cache, fingerprint=own, n_parts=len(order))
         label = f"{study}.{setting.name}"
         rows[study, setting.name] = own_shelf.part(label, partial(_part, config, setting))
     return {
@@ -120,7 +121,7 @@ def _played(
     }
 
 
-def _part(config: BeyondConfig, setting: Setting, tick: Tick) -> Rows:
+def _part(config: BeyondConfig, setting: Setting, tick: PartProgress) -> Rows:
     """Sums of one setting's episodes, and the time that its updates take."""
     n_steps = round(config.seconds / DT_S)
     walks = walks_of(setting.scene, setting.n_workers, config.seeds, n_steps)

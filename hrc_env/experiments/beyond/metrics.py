@@ -6,8 +6,8 @@ from typing import Any
 
 from hrc_env.core.results import Metric, over
 from hrc_env.experiments.beyond.trial.tally import Rows
-from hrc_env.experiments.impact.trial.counts import ERRORS_M, quantile_over
-from hrc_env.experiments.study.intervals import ratio_over, rmse_over
+from hrc_env.experiments.study.counts import ERRORS_M
+from hrc_env.experiments.study.intervals import counted_quantile_over, ratio_over, rmse_over
 
 QUANTILES = {"median": 0.5, "p95": 0.95}
 SEEN = "seen"
@@ -64,17 +64,13 @@ def metrics_of(study: str, rows: Mapping[str, Rows]) -> dict[str, Metric]:
 
 def _of_joints(key: str, sums: Mapping[str, Sequence[Any]]) -> dict[str, Metric]:
     """Errors of joints and how far they are told."""
-    found = {f"error_m.{key}.{name}": _quantile(sums["errors"], q) for name, q in QUANTILES.items()}
+    found = {
+        f"error_m.{key}.{name}": counted_quantile_over(ERRORS_M, sums["errors"], q, "m")
+        for name, q in QUANTILES.items()
+    }
     found[f"rmse_m.{key}"] = rmse_over(sums["squares"], sums["joints"], "m")
     found[f"coverage95.{key}"] = ratio_over(sums["inside"], sums["joints"], "share")
     return found
-
-
-def _quantile(counts: Sequence[Sequence[int]], q: float) -> Metric:
-    """Of counted errors; what lies beyond the last limit is it."""
-    found, most = quantile_over(ERRORS_M, counts, q, "m"), float(ERRORS_M.edges[-1])
-    value, low, high = (min(each, most) for each in (found.value, found.low, found.high))
-    return Metric(value, low, high, found.unit, found.n)
 
 
 def _by_sight(rows: Mapping[str, Rows]) -> Iterator[tuple[str, Rows]]:

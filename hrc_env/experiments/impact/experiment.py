@@ -29,9 +29,8 @@ from hrc_env.experiments.impact.trial.policies import (
     check_policy,
     maker,
 )
+from hrc_env.experiments.study.cache import PartCache, Progress, own_folder
 from hrc_env.experiments.study.fingerprint import fingerprint_of
-from hrc_env.experiments.study.folder import claim
-from hrc_env.experiments.study.shelf import Say, Shelf
 from hrc_env.tracking.estimators import estimator_called
 
 NAME = "impact"
@@ -104,7 +103,9 @@ def config_for(
     return config if seeds is None else replace(config, n_episodes=seeds)
 
 
-def run(config: ImpactConfig, out: Path, say: Say, overwrite: bool = False) -> dict[str, Metric]:
+def run(
+    config: ImpactConfig, out: Path, say: Progress, overwrite: bool = False
+) -> dict[str, Metric]:
     """Play everything that is not there yet; results.json, figures, report.html into `out`.
 
     Args:
@@ -117,17 +118,17 @@ def run(config: ImpactConfig, out: Path, say: Say, overwrite: bool = False) -> d
         ConfigError: the folder holds other results.
         HRCError: workers did not walk the same way with different eyes.
     """
-    claim(out, NAME, overwrite)
+    own_folder(out, NAME, overwrite)
     settings = _settings(config)
     fingerprint = fingerprint_of(settings, *PARTS_FROM)
     n_parts = len(list(_rows(config))) + (PPO in config.policies)
-    shelf = Shelf(out / "parts", fingerprint, n_parts, say)
+    cache = PartCache(out / "parts", fingerprint, n_parts, say)
     checkpoint = out / "parts" / "ppo.zip"
     if PPO in config.policies:
         from hrc_env.experiments.impact.trial.training import Learning, trained
 
-        trained(shelf, Learning(config.learning_steps, n_cores(), checkpoint))
-    table = _played(config, shelf, checkpoint)
+        trained(cache, Learning(config.learning_steps, n_cores(), checkpoint))
+    table = _played(config, cache, checkpoint)
     _check_walks(table)
     metrics = metrics_of(table)
     metrics |= tax_metrics(table, metrics, config.margins_m)
@@ -136,7 +137,7 @@ def run(config: ImpactConfig, out: Path, say: Say, overwrite: bool = False) -> d
     return metrics
 
 
-def _played(config: ImpactConfig, shelf: Shelf, checkpoint: Path) -> Table:
+def _played(config: ImpactConfig, cache: PartCache, checkpoint: Path) -> Table:
     """Every row, by policy and eyes."""
     table: dict[tuple[str, str], dict[str, list[Any]]] = {}
     stages: Stages | None = None
@@ -146,7 +147,7 @@ def _played(config: ImpactConfig, shelf: Shelf, checkpoint: Path) -> Table:
                 stages.close()
             stages = Stages(eyes, _seeds(_n_episodes(config, eyes)), config.n_steps, n_cores())
         here, make = stages, maker(policy, checkpoint)
-        table[policy.label, eyes.name] = shelf.part(
+        table[policy.label, eyes.name] = cache.part(
             f"{policy.label}.{eyes.name}",
             lambda tick, here=here, make=make, policy=policy: here.play(
                 make, policy.margin_m, tick

@@ -7,15 +7,14 @@ import numpy as np
 
 from hrc_env.core.results import Metric
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.experiments.impact.trial.counts import (
-    ERRORS_M,
-    GAPS_M,
-    SPEEDS_MPS,
-    Bins,
-    quantile_over,
-)
 from hrc_env.experiments.impact.trial.eyes import REFERENCE, Eyes, eyes_called, seeing
-from hrc_env.experiments.study.intervals import iqm_over, mean_over, ratio_over
+from hrc_env.experiments.study.counts import ERRORS_M, GAPS_M, SPEEDS_MPS, Bins
+from hrc_env.experiments.study.intervals import (
+    counted_quantile_over,
+    iqm_over,
+    mean_over,
+    ratio_over,
+)
 
 Row = Mapping[str, list[Any]]
 Table = Mapping[tuple[str, str], Row]
@@ -82,9 +81,7 @@ def _quantile(bins: Bins, counts: Sequence[Sequence[int]], q: float, unit: str) 
     """A quantile; what lies beyond the last limit, as for a robot that knows of nobody, is it."""
     if not np.any(counts):
         return Metric(np.nan, np.nan, np.nan, unit, 0)
-    found, most = quantile_over(bins, counts, q, unit), float(bins.edges[-1])
-    value, low, high = (min(each, most) for each in (found.value, found.low, found.high))
-    return Metric(value, low, high, unit, found.n)
+    return counted_quantile_over(bins, counts, q, unit)
 
 
 def tax(eyes: Eyes, on_time: Row, row: Row) -> Metric:

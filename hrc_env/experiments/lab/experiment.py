@@ -15,10 +15,9 @@ from hrc_env.experiments.lab.metrics import Parts, metrics_of
 from hrc_env.experiments.lab.motions import MOTIONS, body_of, play
 from hrc_env.experiments.lab.report import report
 from hrc_env.experiments.lab.sides import missed_by_camera, turned_away
+from hrc_env.experiments.study.cache import PartCache, PartProgress, Progress, own_folder
 from hrc_env.experiments.study.fingerprint import fingerprint_of
-from hrc_env.experiments.study.folder import claim
 from hrc_env.experiments.study.recording import Recording, record, replay
-from hrc_env.experiments.study.shelf import Say, Shelf, Tick
 from hrc_env.perception.detector import DetectorConfig
 from hrc_env.scene.build import Scene, build
 from hrc_env.worker.body import load_body
@@ -65,22 +64,27 @@ def config_for(quick: bool, seeds: int | None, folded: str = "full") -> LabConfi
     return config if seeds is None else replace(config, n_seeds=seeds)
 
 
-def run(config: LabConfig, out: Path, say: Say, overwrite: bool = False) -> dict[str, Metric]:
+def run(
+    config: LabConfig,
+    out: Path,
+    say: Progress,
+    overwrite: bool = False,
+) -> dict[str, Metric]:
     """Run what is not yet there; writes results.json, figures and report.html into `out`."""
-    claim(out, "lab", overwrite)
+    own_folder(out, "lab", overwrite)
     seeds = [FIRST_SEED + k for k in range(config.n_seeds)]
     settings = {**asdict(config), "rig": RIG, "estimators": ESTIMATORS, "crops": CROPS}
-    shelf = Shelf(
+    cache = PartCache(
         out / "parts", fingerprint_of(settings, __name__), len(seeds) * len(MOTIONS) + 1, say
     )
     films = {
-        (motion, seed): shelf.part(f"{motion}.{seed}", partial(film, config, motion, seed))
+        (motion, seed): cache.part(f"{motion}.{seed}", partial(film, config, motion, seed))
         for seed in seeds
         for motion in MOTIONS
     }
     metrics = metrics_of(Parts(films, ESTIMATORS))
     write_results(out / "results.json", {"experiment": "lab", **settings}, seeds, metrics)
-    shelf.say(0.0, "figures")
+    cache.progress(0.0, "figures")
     draw_figures(out / "figures", partial(taken, config), WARM_UP, seeds, metrics)
     report(out, config, seeds, metrics)
     return metrics
@@ -93,14 +97,14 @@ def laboratory(seed: int, folded: str = "full") -> tuple[Scene, HRCConfig]:
     return build(config.scene, "lab", 1, config.worker, use), config
 
 
-def taken(config: LabConfig, motion: str, seed: int, tick: Tick) -> Recording:
+def taken(config: LabConfig, motion: str, seed: int, tick: PartProgress) -> Recording:
     """One film of one motion."""
     scene, settings = laboratory(seed, config.folded)
     motions = play(scene, motion, seed, config.max_frames, settings.ctrl_dt)
     return record(scene, motions, settings, CROPS, seed, tick)
 
 
-def film(config: LabConfig, motion: str, seed: int, tick: Tick) -> dict[str, Any]:
+def film(config: LabConfig, motion: str, seed: int, tick: PartProgress) -> dict[str, Any]:
     """What everybody made of one film, after the warm-up."""
     recording = taken(config, motion, seed, lambda share: tick(0.8 * share))
     _, settings = laboratory(seed, config.folded)

@@ -16,10 +16,9 @@ from hrc_env.experiments.site.metrics import Parts, metrics_of
 from hrc_env.experiments.site.report import report
 from hrc_env.experiments.site.rows import HEAD, WARM_UP_S, Row, head_path, rows_of
 from hrc_env.experiments.site.walk import walk
+from hrc_env.experiments.study.cache import PartCache, PartProgress, Progress, own_folder
 from hrc_env.experiments.study.fingerprint import fingerprint_of
-from hrc_env.experiments.study.folder import claim
 from hrc_env.experiments.study.recording import record, replay
-from hrc_env.experiments.study.shelf import Say, Shelf, Tick
 from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.scene.build import Scene, build
 from hrc_env.tracking.config import TrackerConfig
@@ -75,19 +74,24 @@ def config_for(quick: bool, seeds: int | None, estimators: Sequence[str]) -> Sit
     return config if seeds is None else replace(config, n_seeds=seeds)
 
 
-def run(config: SiteConfig, out: Path, say: Say, overwrite: bool = False) -> dict[str, Metric]:
+def run(
+    config: SiteConfig,
+    out: Path,
+    say: Progress,
+    overwrite: bool = False,
+) -> dict[str, Metric]:
     """Run what is not yet there; writes results.json, figures and report.html into `out`."""
-    claim(out, "site", overwrite)
+    own_folder(out, "site", overwrite)
     seeds = [config.first_seed + k for k in range(config.n_seeds)]
     closed = rows_of(config.estimators, (1, 4))
     settings = {**asdict(config), "also": ALSO, "crops": CROPS}
     again = seeds[: config.n_closed]
     n_parts = len(seeds) + len(closed) * len(again)
-    shelf = Shelf(out / "parts", fingerprint_of(settings, __name__), n_parts, say)
+    cache = PartCache(out / "parts", fingerprint_of(settings, __name__), n_parts, say)
     parts = Parts(
-        films={seed: shelf.part(f"film.{seed}", partial(film, config, seed)) for seed in seeds},
+        films={seed: cache.part(f"film.{seed}", partial(film, config, seed)) for seed in seeds},
         closed={
-            (row.name, seed): shelf.part(
+            (row.name, seed): cache.part(
                 f"closed.{row.name}.{seed}", partial(closed_loop, config, row, seed)
             )
             for row in closed
@@ -114,7 +118,7 @@ def settings_for(faults: tuple[FaultConfig, ...] = ()) -> HRCConfig:
     return HRCConfig(faults=faults, tracker=TrackerConfig(prior_std_m=PRIOR_STD_M))
 
 
-def film(config: SiteConfig, seed: int, tick: Tick) -> dict[str, Any]:
+def film(config: SiteConfig, seed: int, tick: PartProgress) -> dict[str, Any]:
     """One walk, filmed with the crops of the four-camera track, and everybody's word on it."""
     settings = settings_for()
     n_frames = round(config.seconds / settings.ctrl_dt)
@@ -138,7 +142,7 @@ def film(config: SiteConfig, seed: int, tick: Tick) -> dict[str, Any]:
     }
 
 
-def closed_loop(config: SiteConfig, row: Row, seed: int, tick: Tick) -> dict[str, Any]:
+def closed_loop(config: SiteConfig, row: Row, seed: int, tick: PartProgress) -> dict[str, Any]:
     """The same walk with eyes that make their own crops; after a second some cameras are lost."""
     others = tuple(f"camera_{c + 1}" for c in range(4) if c not in row.cameras)
     lost = (FaultConfig("lost", others, from_s=WARM_UP_S),) if others else ()

@@ -9,7 +9,7 @@ import numpy as np
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats
 from hrc_env.experiments.site.rows import MULTI, Row, rows_of, squared_m2
-from hrc_env.experiments.study.intervals import mean_over, rmse_over, rmse_ratio_over
+from hrc_env.experiments.study.intervals import mean_over, rmse_over
 
 SIZES = {2: "two", 3: "three"}
 Said = Mapping[str, Any]
@@ -90,4 +90,5 @@ def _over_multi(parts: Parts, row: Row) -> Metric:
 
     films = list(parts.films.values())
     multi = f"{row.estimator}.{MULTI}"
-    return rmse_ratio_over(list(map(total(row.name), films)), list(map(total(multi), films)))
+    above, below = list(map(total(row.name), films)), list(map(total(multi), films))
+    return rmse_over(above, below, "ratio")

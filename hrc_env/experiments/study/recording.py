@@ -13,7 +13,7 @@ from hrc_env.config import HRCConfig
 from hrc_env.core.batching import rows
 from hrc_env.core.records import Keypoints, PoseEstimate, WorkerMotion
 from hrc_env.core.typing import Bools, Covariances3, Ints, Points3
-from hrc_env.experiments.study.shelf import Tick
+from hrc_env.experiments.study.cache import PartProgress
 from hrc_env.geometry.cameras import projections
 from hrc_env.pipeline.levels import make_senses
 from hrc_env.pipeline.sensor_input import Moment, Windows
@@ -56,7 +56,7 @@ def record(
     config: HRCConfig,
     estimator: str,
     seed: int,
-    tick: Tick,
+    tick: PartProgress,
 ) -> Recording:
     """Film a worker with every camera of a scene.
 

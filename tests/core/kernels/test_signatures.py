@@ -32,6 +32,22 @@ def test_an_array_that_must_not_be_written_is_told_from_one_that_may():
     assert signatures.decode(signatures.encode(typeof(fixed))) == typeof(fixed)
 
 
+PAIR = np.dtype([("mean", "f8", (2, 3)), ("tracked", "?")], align=True)
+
+
+def test_a_structured_array_is_recorded_by_the_name_of_its_dtype(monkeypatch):
+    monkeypatch.setattr(signatures, "PAIR", PAIR, raising=False)
+    pairs = np.zeros((4, 2), PAIR)
+    assert signatures.encode(typeof(pairs)) == "hrc_env.core.kernels.signatures:PAIR[2C]"
+    for kind in (typeof(pairs), typeof(pairs).dtype):
+        assert signatures.decode(signatures.encode(kind)) == kind
+
+
+def test_a_dtype_without_a_name_is_refused():
+    with pytest.raises(TypeError, match="give its dtype a name"):
+        signatures.encode(typeof(np.zeros(1, [("a_dtype_of_nobody", "f8")])))
+
+
 def test_a_type_that_cannot_be_recorded_is_named():
     with pytest.raises((TypeError, AttributeError), match=r"[Ss]et"):
         signatures.encode(types.Set(types.float64))

@@ -18,7 +18,7 @@ from hrc_env.experiments.beyond.trial.setting import WARM_UP_S, Setting, Turn
 from hrc_env.experiments.beyond.trial.tally import Played, Rows, joined, sums_of
 from hrc_env.experiments.beyond.trial.truth import matched, n_seeing
 from hrc_env.experiments.beyond.trial.walks import BODIES, Walks
-from hrc_env.experiments.study.shelf import Tick
+from hrc_env.experiments.study.cache import PartProgress
 from hrc_env.pipeline.levels import make_senses
 from hrc_env.pipeline.sensor_input import Generators, Moment
 from hrc_env.pipeline.tracking import TrackingSenses
@@ -34,7 +34,9 @@ Heard = Callable[[int, PoseEstimate, Points3, Moment], None]
 """Told the frame's number, what is believed, the true joints (B, W, J, 3) [m], the scene."""
 
 
-def play(setting: Setting, walks: Walks, seeds: Sequence[int], n_threads: int, tick: Tick) -> Rows:
+def play(
+    setting: Setting, walks: Walks, seeds: Sequence[int], n_threads: int, tick: PartProgress
+) -> Rows:
     """Sums of every episode, in the order of the seeds.
 
     Args:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from hrc_env.core.typing import Bools, Floats, Ints
-from hrc_env.experiments.impact.trial.counts import ERRORS_M
+from hrc_env.experiments.study.counts import ERRORS_M
 
 Rows = dict[str, list[Any]]
 """Sums by name, one an episode."""

@@ -12,7 +12,7 @@ from hrc_env.config import settle
 from hrc_env.experiments.impact.trial.eyes import Eyes, Rig
 from hrc_env.experiments.impact.trial.judge import judge, scene_of
 from hrc_env.experiments.impact.trial.tally import Tally
-from hrc_env.experiments.study.shelf import Tick
+from hrc_env.experiments.study.cache import PartProgress
 from hrc_env.simulation import Simulation, checked_action
 from hrc_env.step import rows_of
 from hrc_env.vector.shards import Shards
@@ -39,7 +39,7 @@ class Stages:
         self.eyes, self.seeds, self.n_steps, self.n_threads = eyes, seeds, n_steps, n_threads
         self._built: dict[Rig, Shards] = {}
 
-    def play(self, make_agent: MakeAgent, margin_m: float, tick: Tick) -> Rows:
+    def play(self, make_agent: MakeAgent, margin_m: float, tick: PartProgress) -> Rows:
         """Sums of every episode, in the order of the seeds.
 
         Args:

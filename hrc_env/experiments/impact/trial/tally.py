@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from hrc_env.core.typing import Bools, Floats, Ints, Points3
-from hrc_env.experiments.impact.trial.counts import ERRORS_M, GAPS_M, SPEEDS_MPS, Bins
 from hrc_env.experiments.impact.trial.judge import Step
+from hrc_env.experiments.study.counts import ERRORS_M, GAPS_M, SPEEDS_MPS, Bins
 from hrc_env.step import Info
 
 STOP_M, SLOW_M = 0.10, 0.60

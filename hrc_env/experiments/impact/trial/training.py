@@ -10,7 +10,7 @@ from typing import Any
 
 from hrc_env.core.checkout import agents
 from hrc_env.experiments.impact.trial.episodes import PEOPLE
-from hrc_env.experiments.study.shelf import Shelf, Tick
+from hrc_env.experiments.study.cache import PartCache, PartProgress
 
 SEED = 0
 """Of the learner and of the environments that it learns in."""
@@ -31,17 +31,17 @@ class Learning:
     path: Path
 
 
-def trained(shelf: Shelf, learning: Learning) -> Path:
+def trained(cache: PartCache, learning: Learning) -> Path:
     """The checkpoint: the one that is there, or a new one if it is not what the part says."""
     path = learning.path
-    part = shelf.part(LABEL, lambda tick: _train(learning, tick))
+    part = cache.part(LABEL, lambda tick: _train(learning, tick))
     if not path.exists() or _digest(path) != part["sha256"]:
-        (shelf.folder / f"{LABEL}.json").unlink(missing_ok=True)
-        shelf.part(LABEL, lambda tick: _train(learning, tick))
+        (cache.folder / f"{LABEL}.json").unlink(missing_ok=True)
+        cache.part(LABEL, lambda tick: _train(learning, tick))
     return path
 
 
-def _train(learning: Learning, tick: Tick) -> dict[str, Any]:
+def _train(learning: Learning, tick: PartProgress) -> dict[str, Any]:
     """Learn on the camera emulator with the default estimator; write the checkpoint."""
     ppo, curriculum = agents("ppo"), agents("curriculum")
     import torch

@@ -1,15 +1,10 @@
-"""Values counted in bins, an episode a row: what quantiles with intervals are made of."""
+"""Values counted in bins, an episode a row: what quantiles of long runs are made of."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.core.results import Metric
 from hrc_env.core.typing import Bools, Floats, Ints
-
-N_DRAWS = 1000
-"""Resamples of the episodes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,12 +15,7 @@ class Bins:
     """(n,) for n + 1 bins, growing."""
 
     def count(self, values: Floats, which: Bools | None = None) -> Ints:
-        """(B, n + 1) how many of the values (B, ...) lie in each bin.
-
-        Args:
-            values: (B, ...).
-            which: (B, ...) those that count; all if None.
-        """
+        """(B, n + 1) how many of the values (B, ...), or of those marked, lie in each bin."""
         batch, n_bins = len(values), len(self.edges) + 1
         index = np.searchsorted(self.edges, values.reshape(batch, -1), side="right")
         index += n_bins * np.arange(batch)[:, None]
@@ -47,20 +37,6 @@ class Bins:
         with np.errstate(invalid="ignore"):
             inside = np.where(np.isinf(high), np.inf, low + into * (high - low))
         return np.where(totals[..., 0] > 0, inside, np.nan)
-
-
-def quantile_over(bins: Bins, counts: Sequence[Sequence[int]], q: float, unit: str) -> Metric:
-    """A quantile of all episodes together; the interval draws episodes anew (bootstrap)."""
-    rows = np.asarray(counts, float)
-    point = float(bins.quantile(rows.sum(0), q))
-    n = len(rows)
-    drawn = np.random.default_rng(0).multinomial(n, np.full(n, 1 / n), N_DRAWS)
-    found = bins.quantile(drawn @ rows, q)
-    found = found[~np.isnan(found)]  # episodes without any value were drawn alone
-    if np.isnan(point) or not np.isfinite(found).all():
-        return Metric(point, point, point, unit, n)
-    low, high = np.quantile(found, [0.025, 0.975])
-    return Metric(point, float(low), float(high), unit, n)
 
 
 ERRORS_M = Bins(np.geomspace(1e-4, 10.0, 240))
