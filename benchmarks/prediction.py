@@ -5,7 +5,7 @@
 "env" is the environment's worker at the level `keypoints` (seeds that the network was not trained
 on), "env_failing" the same while cameras fail, "walkers" and "walkers_hard" the tracking bench's,
 of whom nothing here was told. All start from the same estimate, of `kalman`: `hold` stays there,
-`constant_velocity` goes on, `forecast` is what `Estimator.ahead` gives; only it says how sure it is.
+`constant_velocity` goes on, `forecast` is what `Estimator.ahead` gives.
 """
 
 import time

@@ -10,18 +10,20 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.perception.families import family_index
+from benchmarks.common import CHI2_95_3D, normalised_square
+from benchmarks.perception.views import family_index
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.env import HRCEnv
 from hrc_env.geometry.cameras import project
 from hrc_env.motion import generator
-from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.worker.body import worker_truth
 
-CHI2_95_3D = 7.815
-"""95 % of a three-dimensional normal variable lies within this squared distance."""
 TENTH_MM = 1e-4
+PATIENCE_FRAMES = 5
+"""A worker who is tracked by then counts as acquired."""
+EMPTY_STEPS = 250
+"""Of an episode without workers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +39,7 @@ class Episode:
     off_px: Floats
     """(T, C) mean distance of a camera's keypoints from the true joints; NaN: nothing found."""
     family: Ints
-    """(T,) what the worker did, an index of `families.NAMES`."""
+    """(T,) what the worker did, an index of `views.FAMILIES`."""
     named: Bools
     """(T, C) whether a camera was named in info as miscalibrated."""
 
@@ -93,14 +95,53 @@ def play(
         env.close()
 
 
-def rotated(kind: str, episode: int, n_cameras: int) -> FaultConfig:
-    """A fault for an episode: the cameras have it in turns."""
-    return FaultConfig(kind, (camera_name(episode % n_cameras),))
+def acquisition(seeds: Sequence[int], tick: Callable[[float], None]) -> list[bool]:
+    """Whether each reset finds the worker within `PATIENCE_FRAMES`, its own look counted."""
+    env, found = HRCEnv(), []
+    for seed in seeds:
+        env.reset(seed=seed)
+        for _ in range(PATIENCE_FRAMES - 1):
+            if env.simulation.estimate.tracked.all():
+                break
+            env.step(np.zeros(env.action_space.shape or (0,), np.float32))
+        found.append(bool(env.simulation.estimate.tracked.all()))
+        tick(1 / len(seeds))
+    env.close()
+    return found
 
 
-def camera_name(c: int) -> str:
-    """Camera c of the scenes' own rigs."""
-    return f"camera_{c + 1}"
+def phantoms(scene: str, n_steps: int, seed: int, tick: Callable[[float], None]) -> dict[str, int]:
+    """Look for workers in a scene that has none, while the arm moves at random.
+
+    Args:
+        scene: its name.
+        n_steps: how often every camera looks.
+        seed: of the first episode tried; those in which somebody comes are passed over.
+        tick: told of the share that is done.
+
+    Returns:
+        "images" that were looked at, "phantoms" of them with somebody in them, "tracked" steps.
+    """
+    counts = {"images": 0, "phantoms": 0, "tracked": 0}
+    env, actions, steps = HRCEnv(scene=scene, n_workers=(0, 1)), np.random.default_rng(seed), 0
+    while steps < n_steps:
+        env.reset(seed=seed)
+        seed += 1
+        if env.simulation.crew.present.any():
+            continue
+        n = min(EMPTY_STEPS, n_steps - steps)
+        for _ in range(n):
+            env.step(actions.uniform(-1, 1, env.simulation.n_actions).astype(np.float32))
+            keypoints, _ = env.simulation.senses.looks(0)
+            if keypoints is not None:
+                somebody = (keypoints.confidence[0] > 0).any((1, 2))
+                counts["images"] += len(somebody)
+                counts["phantoms"] += int(somebody.sum())
+            counts["tracked"] += int(env.simulation.estimate.tracked.any())
+            tick(1 / n_steps)
+        steps += n
+    env.close()
+    return counts
 
 
 def _episode(env: HRCEnv, seed: int, n_steps: int) -> Episode:
@@ -120,10 +161,9 @@ def _episode(env: HRCEnv, seed: int, n_steps: int) -> Episode:
         named[t] = simulation.senses.suspected(np.array([0]))[0]
         if estimate.tracked[0, 0]:
             offset, cov = estimate.mean_world[0, 0] - joints, estimate.cov_world[0, 0]
-            squared = np.einsum("ji,jik,jk->j", offset, np.linalg.inv(cov), offset)
             error[t] = np.linalg.norm(offset, axis=-1)
             std[t] = np.sqrt(np.trace(cov, axis1=-2, axis2=-1))
-            inside[t] = np.count_nonzero(squared < CHI2_95_3D)
+            inside[t] = np.count_nonzero(normalised_square(offset, cov) < CHI2_95_3D)
     return Episode(error, std, inside, off_px, family, named)
 
 
