@@ -22,7 +22,8 @@ from benchmarks.tracking.rigs import DT_S
 from benchmarks.tracking.tracks import Tracks, follow_env, follow_walkers
 from hrc_env.core.records import PoseEstimate
 from hrc_env.core.results import Metric
-from hrc_env.experiments.study.intervals import mean_over, ratio_over, rmse_over, rmse_ratio_over
+from hrc_env.experiments.study.intervals import mean_over, ratio_over, rmse_over
+from hrc_env.experiments.study.report import Report
 from hrc_env.tracking.ahead import ahead
 from hrc_env.tracking.config import ParticleConfig
 
@@ -101,7 +102,7 @@ def metrics_of(source: str, tracks: Tracks) -> dict[str, Metric]:
                 inside = (normalised_square(error, cov) < CHI2_95_3D).sum((0, 2))
                 spread = np.trace(cov, axis1=-2, axis2=-1) * use[..., None]
                 metrics[f"coverage95.{key}"] = ratio_over(inside, n, "share")
-                metrics[f"std_over_rmse.{key}"] = rmse_ratio_over(spread.sum((0, 2)), sums, "-")
+                metrics[f"std_over_rmse.{key}"] = rmse_over(spread.sum((0, 2)), sums, "-")
     return metrics
 
 
@@ -146,7 +147,8 @@ def main(arguments: Arguments) -> None:
         f"deviation over RMSE. `ahead` takes {us[0]} us alone, {us[1]} us a worker at batch 64."
     )
     parts = [table(["", *NAMES], lines), said]
-    publish(arguments.out, "Prediction", parts, asdict(arguments), [1000, 500], metrics)
+    report = Report("Prediction", (__doc__ or "").strip(), parts)
+    publish(arguments.out, report, asdict(arguments), [1000, 500], metrics)
 
 
 if __name__ == "__main__":

@@ -18,9 +18,9 @@ from hrc_env.experiments.study.runner import run
 from hrc_env.motion.generator import activity_names
 
 TINY = PerceptionBenchConfig(
-    episodes=(("lab", 1),), n_steps=4, n_resets=1, n_faults=1, fault_steps=3, n_emulated=1, kinds=("lost",),
-    bodies=("worker_1",), n_instants=1, n_empty=1, emulator_rounds=None, cameras=(1,),
-    workers=(1,), speed_steps=2,
+    episodes=(("lab", 1),), n_steps=4, n_resets=1, n_faults=1, fault_steps=3, n_emulated=1,
+    kinds=("lost",), bodies=("worker_1",), n_instants=1, n_empty=1, emulator_rounds=None,
+    cameras=(1,), workers=(1,), speed_steps=2,
 )  # fmt: skip
 
 
@@ -42,9 +42,7 @@ VIEWS = [
 
 def found():
     """Faults that double the error; four cameras have them in turns."""
-    base, twice = (
-        {"episodes": [episode(error_m).to_json()] * 4} for error_m in (0.02, 0.04)
-    )
+    base, twice = ({"episodes": [episode(error_m).to_json()] * 4} for error_m in (0.02, 0.04))
     pace = {"steps_per_s": 50.0, "n": 9, "stages": dict.fromkeys((*speed.STAGES, "rest"), 4)}
     ratio = asdict(Metric(1.1, 1.0, 1.2, "", 9))
     return {

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from benchmarks.tracking.full_state import filter_matched
 
 from benchmarks.tracking.bound import (
     joint_blocks,
@@ -11,7 +12,6 @@ from benchmarks.tracking.bound import (
 )
 from benchmarks.tracking.cells import run_cell
 from benchmarks.tracking.detections import Damage, detect
-from benchmarks.tracking.full_state import filter_matched
 from benchmarks.tracking.matched import (
     N_PLACES,
     N_STATES,

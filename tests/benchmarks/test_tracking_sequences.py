@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from benchmarks.tracking.own import make_own_rig
 
 from benchmarks.tracking.arrivals import delivered, in_time
 from benchmarks.tracking.cells import run_cell
@@ -9,7 +10,6 @@ from benchmarks.tracking.couples import couples, detect_couples, identities
 from benchmarks.tracking.detections import CONDITIONS, Damage, detect
 from benchmarks.tracking.dlt import triangulate_frame
 from benchmarks.tracking.names import DLT
-from benchmarks.tracking.own import make_own_rig
 from benchmarks.tracking.rigs import RIGS, make_rig
 from benchmarks.tracking.sequences import make_sequences
 from benchmarks.tracking.walks import walk
