@@ -63,8 +63,7 @@ class TrackingBench(AnyBench):
         if self.real:
             from benchmarks.recorded.bench import RECORDED, RecordedConfig
 
-            beside = self._beside("_real")
-            return beside.shown(RECORDED, RecordedConfig(beside.out))
+            return self._beside("_real").shown(RECORDED, RecordedConfig())
         from benchmarks.tracking.bench import QUICK, TRACKING, TrackingBenchConfig
 
         config = QUICK if self.quick else TrackingBenchConfig()

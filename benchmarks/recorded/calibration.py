@@ -1,4 +1,4 @@
-"""The calibration of recorded footage: Qualisys' XML to pinhole cameras with a lens.
+"""The calibration of a recording: Qualisys' XML to pinhole cameras with a lens.
 
 Frames: the file's world is right-handed, +Z up, in millimetres, and becomes `world` in metres.
 Its matrix has the camera's axes in its rows (+X right, +Y up, -Z forward), so that OpenCV's

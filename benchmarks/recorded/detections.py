@@ -1,4 +1,4 @@
-"""What the pose network sees in recorded footage: made once, kept, given to every estimator."""
+"""What the pose network sees in a recording: made once, kept, given to every estimator."""
 
 import os
 from collections.abc import Callable

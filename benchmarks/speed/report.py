@@ -101,7 +101,7 @@ def _stack(axis: Axes, group: list[str], metrics: Metrics) -> None:
         us = np.array([metrics[f"us_per_env_step.{organ}.{each}"].value for each in group])
         axis.bar(x, us, 0.72, foot, label=organ, color=colour, edgecolor="white", linewidth=0.5)
         foot += us
-    for place, total in zip(x, foot, strict=True):
+    for place, total in enumerate(foot):
         axis.text(place, total, f"{total:.0f}", ha="center", va="bottom", fontsize=12)
     axis.set_xticks(x, [title(each).replace(" on ", " in one\n") for each in group], fontsize=11)
     axis.margins(y=0.08)

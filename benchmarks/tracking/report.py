@@ -30,21 +30,16 @@ _ABOUT_THE_BOUND = """\
 `matched` bodies move as the estimators' motion model says, without bones; estimators are told so
 (no outliers, no exchanged sides, detections as good as they say, nothing known of bone lengths),
 and still learn the joints' places on the body. The bound is that of each sequence, averaged."""
-_TABLES: dict[str, tuple[str, float, int]] = {
-    "rmse_m": ("RMSE in cm", 100, 2),
-    "median_m": ("Median error in cm", 100, 2),
-    "coverage95": ("Coverage of the reported 95 % region", 1, 3),
-    "std_over_rmse": ("Reported standard deviation / RMSE", 1, 2),
-    "nees": ("Normalised estimation error squared per degree of freedom", 1, 2),
-    "calibration_gap": (
-        "Calibration gap: largest error of what regions claim to hold",
-        1,
-        3,
-        False,
-    ),
-    "facing_wrong": ("Percent of frames in which the torso faces the wrong way", 100, 2),
+_TABLES: dict[str, tuple[str, int]] = {
+    "rmse_m": ("RMSE in cm", 100),
+    "median_m": ("Median error in cm", 100),
+    "coverage95": ("Coverage of the reported 95 % region", 1),
+    "std_over_rmse": ("Reported standard deviation / RMSE", 1),
+    "nees": ("Normalised estimation error squared per degree of freedom", 1),
+    "calibration_gap": ("Calibration gap: largest error of what regions claim to hold", 1),
+    "facing_wrong": ("Percent of frames in which the torso faces the wrong way", 100),
 }
-"""Title, scale and digits of every table with a row a window."""
+"""Title and scale of every table with a row a window."""
 _ABOUT_LATE = f"""\
 Cameras are 40 to 220 ms late, one has half the rate, one frame in twenty is lost. `{UNBUFFERED}`
 takes frames as of the moment at which they arrive."""
@@ -69,8 +64,8 @@ def report(config: Any, parts: Parts, metrics: Metrics, figures: Path) -> Report
         f"## {DEFAULT}, the default, and the best of the others", _lead(metrics), _beaten(metrics),
         "## RMSE / posterior Cramer-Rao bound", _bound(metrics), _ABOUT_THE_BOUND,
         "## Microseconds per worker and update, one core", *_cost(metrics),
-        *(part for kind, (title, *how) in _TABLES.items()
-          for part in (f"## {title}", _by_row(metrics, kind, *how))),
+        *(part for kind, (title, scale) in _TABLES.items()
+          for part in (f"## {title}", _by_row(metrics, kind, scale))),
         "## After one camera", _by_rig(metrics, rivals, returns),
         "## Late frames", _ABOUT_LATE, _by_rig(metrics, (DEFAULT, UNBUFFERED), late),
         "## Two workers: changes of identity per 100 sequences",
@@ -113,9 +108,9 @@ def _beaten(metrics: Metrics) -> str:
     return f"Where another's error is less than that of `{DEFAULT}`: " + "; ".join(said) + "."
 
 
-def _by_row(metrics: Metrics, kind: str, scale: float, digits: int) -> Table:
+def _by_row(metrics: Metrics, kind: str, scale: int) -> Table:
     """One row per rig and window, one column per estimator; what is not known is left empty."""
-    names = [DEFAULT, *RIVALS, SMOOTHER]
+    names, digits = [DEFAULT, *RIVALS, SMOOTHER], 2 if scale == 100 else 3
     lines = [
         [f"{rig} {window}"]
         + [cell(metrics.get(f"{kind}.{rig}.{window}.{name}"), scale, digits) for name in names]
