@@ -17,6 +17,7 @@ import sys
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +36,6 @@ from hrc_env.experiments.study.cache import PartCache, PartProgress
 from hrc_env.experiments.study.fingerprint import fingerprint_of
 from hrc_env.experiments.study.intervals import mean_over, ratio_over
 
-ROOT = Path(__file__).resolve().parent.parent
 PPO = {"ppo": 0.0, "ppo_safety": 2.0}
 """The weight of the safety term in what each of them learns from."""
 ROWS = {
@@ -84,18 +84,16 @@ def main(arguments: Arguments) -> None:
     policies = {(level, agent): learnt(arguments, level, agent) for level in ORDER for agent in PPO}
     console, metrics = Console(), dict[str, Metric]()
     mark = fingerprint_of(settings, "benchmarks.baselines", "agents.scripted", "agents.ppo")
-    with progress_bar(console, "baselines") as say:
-        cache = PartCache(arguments.out / "parts", mark, len(ORDER) * len(ROWS), say)
-        for level in ORDER:
-            for agent in ROWS:
-                done = played(cache, arguments, level, agent, policies.get((level, agent)))
-                metrics |= {f"{level}.{agent}.{key}": each for key, each in worth(done).items()}
+    with progress_bar(console, "baselines") as progress:
+        parts = PartCache(arguments.out / "parts", mark, len(ORDER) * len(ROWS), progress)
+        for level, agent in product(ORDER, ROWS):
+            done = played(parts, arguments, level, agent, policies.get((level, agent)))
+            metrics |= {f"{level}.{agent}.{key}": each for key, each in worth(done).items()}
     seeds = list(range(EVALUATION_SEED, EVALUATION_SEED + arguments.episodes))
     write_results(arguments.out / "results.json", settings, seeds, metrics)
     said = table(settings, {name: asdict(metric) for name, metric in metrics.items()})
     write_whole(arguments.out / "baselines.md", said)
     console.print(Markdown(said))
-    console.print(f"In [bold]{arguments.out}[/]: results.json, baselines.md, policies/")
 
 
 def learnt(arguments: Arguments, level: str, agent: str) -> Path:
@@ -125,7 +123,7 @@ def learnt(arguments: Arguments, level: str, agent: str) -> Path:
 
 
 def played(
-    cache: PartCache, arguments: Arguments, level: str, agent: str, policy: Path | None
+    parts: PartCache, arguments: Arguments, level: str, agent: str, policy: Path | None
 ) -> list[dict[str, float]]:
     """Statistics of an agent's episodes at a level, from the cache or anew."""
     label, make = f"{level}.{agent}", partial(make_agent, str(policy or agent))
@@ -139,7 +137,7 @@ def played(
     def play(tick: PartProgress) -> dict[str, Any]:
         return {"episodes": judged(make, n_episodes, tick=tick, **kwargs)}
 
-    return cache.part(label, play)["episodes"]
+    return parts.part(label, play)["episodes"]
 
 
 def worth(episodes: list[dict[str, float]]) -> dict[str, Metric]:

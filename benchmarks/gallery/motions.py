@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.gallery.aim import camera_at
+from benchmarks.gallery.still import camera_at
 from hrc_env.core.batching import one
 from hrc_env.core.typing import Image
 from hrc_env.motion.repertoire import REPERTOIRE, perform

@@ -3,6 +3,7 @@
 import html
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 
 
@@ -23,31 +24,12 @@ class Exhibit:
 
 
 STYLE = """
-:root { color-scheme: light dark; --ink: #1f2428; --soft: #66707a; --paper: #f4f2ee;
-  --card: #ffffff; --line: #dcd8d0; --mark: #c96a1b; }
-@media (prefers-color-scheme: dark) { :root { --ink: #e8e6e1; --soft: #9aa3ab; --paper: #17191c;
-  --card: #202327; --line: #33383d; --mark: #f0984a; } }
-* { box-sizing: border-box; }
-body { margin: 0; background: var(--paper); color: var(--ink);
-  font: 16px/1.5 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; }
-header, main { max-width: 1240px; margin: 0 auto; padding: 0 24px; }
-header { padding-top: 56px; padding-bottom: 8px; }
-h1 { font-size: 34px; line-height: 1.15; margin: 0 0 8px; letter-spacing: -0.01em; }
-header p { color: var(--soft); max-width: 62ch; margin: 0; }
-nav { margin-top: 20px; display: flex; gap: 18px; flex-wrap: wrap; }
-nav a { color: var(--mark); text-decoration: none; font-weight: 600; }
-h2 { font-size: 22px; margin: 56px 0 16px; padding-top: 12px; border-top: 3px solid var(--mark);
-  display: inline-block; }
+:root { color-scheme: light dark; }
+body { max-width: 1240px; margin: 40px auto; padding: 0 24px; font: 16px/1.5 system-ui, sans-serif; }
 .grid { display: grid; grid-template-columns: repeat(auto-fill, minmax(240px, 1fr)); gap: 18px; }
-figure { margin: 0; background: var(--card); border: 1px solid var(--line); border-radius: 8px;
-  overflow: hidden; }
-figure.wide { grid-column: 1 / -1; }
-img { display: block; width: 100%; height: auto; }
-figcaption { padding: 10px 14px 14px; }
-figcaption b { display: block; }
-figcaption span { color: var(--soft); font-size: 14px; }
-footer { max-width: 1240px; margin: 48px auto 0; padding: 0 24px 48px; color: var(--soft);
-  font-size: 14px; }
+figure { margin: 0; } .wide { grid-column: 1 / -1; }
+img { display: block; width: 100%; height: auto; border-radius: 8px; }
+figcaption { padding: 6px 2px; } figcaption span { opacity: .7; }
 """
 
 
@@ -59,38 +41,19 @@ def write_page(exhibits: Sequence[Exhibit], out: Path, command: str) -> None:
         out: the folder.
         command: what made it, told at the page's end.
     """
-    sections = list(dict.fromkeys(exhibit.section for exhibit in exhibits))
-    links = "".join(f'<a href="#{_anchor(name)}">{html.escape(name)}</a>' for name in sections)
-    parts = [_section(name, [e for e in exhibits if e.section == name]) for name in sections]
-    text = f"""<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>hrc_env: gallery</title>
-<style>{STYLE}</style>
-</head>
-<body>
-<header>
-<h1>People beside a robot</h1>
-<p>Workers, what they do, and the places where they do it: {len(exhibits)} pictures, drawn by the
-environment's own renderer.</p>
-<nav>{links}</nav>
-</header>
-<main>
-{"".join(parts)}
-</main>
-<footer>Made by <code>{html.escape(command)}</code></footer>
-</body>
-</html>
-"""
+    sections = groupby(exhibits, lambda exhibit: exhibit.section)
+    body = "".join(
+        f'<h2>{html.escape(name)}</h2><div class="grid">{"".join(map(_figure, some))}</div>\n'
+        for name, some in sections
+    )
+    text = (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>hrc_env: gallery</title><style>{STYLE}</style></head><body>\n"
+        f"<h1>People beside a robot</h1>\n{body}"
+        f"<footer>Made by <code>{html.escape(command)}</code></footer></body></html>\n"
+    )
     (out / "index.html").write_text(text, encoding="utf-8")
-
-
-def _section(name: str, exhibits: Sequence[Exhibit]) -> str:
-    figures = "\n".join(_figure(exhibit) for exhibit in exhibits)
-    heading = f'<h2 id="{_anchor(name)}">{html.escape(name)}</h2>'
-    return f'{heading}\n<div class="grid">\n{figures}\n</div>\n'
 
 
 def _figure(exhibit: Exhibit) -> str:
@@ -98,9 +61,5 @@ def _figure(exhibit: Exhibit) -> str:
     return (
         f"<figure{' class=wide' if exhibit.wide else ''}>"
         f'<img src="{html.escape(exhibit.file)}" alt="{title}: {caption}" loading="lazy">'
-        f"<figcaption><b>{title}</b><span>{caption}</span></figcaption></figure>"
+        f"<figcaption><b>{title}</b> <span>{caption}</span></figcaption></figure>\n"
     )
-
-
-def _anchor(name: str) -> str:
-    return name.lower().replace(" ", "-")
