@@ -25,7 +25,7 @@ class Exhibit:
 
 STYLE = """
 :root { color-scheme: light dark; }
-body { max-width: 1240px; margin: 40px auto; padding: 0 24px; font: 16px/1.5 system-ui, sans-serif; }
+body { max-width: 1240px; margin: 40px auto; padding: 24px; font: 16px/1.5 system-ui, sans-serif; }
 .grid { display: grid; grid-template-columns: repeat(auto-fill, minmax(240px, 1fr)); gap: 18px; }
 figure { margin: 0; } .wide { grid-column: 1 / -1; }
 img { display: block; width: 100%; height: auto; border-radius: 8px; }
