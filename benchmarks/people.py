@@ -5,27 +5,25 @@ bodies it takes how deep they ever are in what stands there and in each other; h
 who wants to be elsewhere, or cannot begin a task, stays within 5 cm; and what is not a number.
 """
 
-import math
 import time
-from collections import Counter
 from dataclasses import asdict, dataclass, field
 from itertools import combinations
 from pathlib import Path
 
-import numba
 import numpy as np
 import tyro
 
 from benchmarks.common import exactly, publish, table
 from hrc_env.cli.progress import track
 from hrc_env.core.results import Metric
+from hrc_env.core.typing import Floats, Points3
 from hrc_env.experiments.study.report import Report
 from hrc_env.geometry import chains
 from hrc_env.geometry.distances import narrowest_gap
-from hrc_env.geometry.shapes import AXES, BOX, CAPSULE, CENTRE, HALF_SIZE, KIND, PLANE, REACH
+from hrc_env.geometry.shapes import AXES, BOX, CAPSULE, CENTRE, HALF_SIZE, KIND, PLANE
 from hrc_env.motion import generator
 from hrc_env.motion.plans import CLIMB
-from hrc_env.motion.state import GOING, SPOT_X, SPOT_Y, THERE
+from hrc_env.motion.state import GOING, THERE
 from hrc_env.scene.build import Scene, build
 from hrc_env.simulation import WATCHED_CAPSULES
 from hrc_env.worker.body import pool, stack, worker_truth
@@ -74,15 +72,13 @@ class Notes:
     frame_us: list[float] = field(default_factory=list)
     """A worker's control step [us], planning and watching the robot included; a number a batch."""
     nans: int = 0
-    worst: dict[str, tuple[float, str]] = field(default_factory=dict)
-    """By what was being done: deepest beyond the limit [m], and of what where."""
-    doing: Counter[str] = field(default_factory=Counter)
-    """Moments looked at by activity."""
+    worst: dict[str, float] = field(default_factory=dict)
+    """By what was being done: deepest beyond the limit [m]."""
 
-    def deep(self, doing: str, depth_m: float, where: str) -> None:
+    def deep(self, doing: str, depth_m: float) -> None:
         """Keep what is the worst of its kind."""
-        if depth_m > max(DEEPEST_M, self.worst.get(doing, (0.0, ""))[0]):
-            self.worst[doing] = depth_m, where
+        if depth_m > max(DEEPEST_M, self.worst.get(doing, 0.0)):
+            self.worst[doing] = depth_m
 
 
 def main(arguments: Arguments) -> None:
@@ -107,11 +103,9 @@ def main(arguments: Arguments) -> None:
             _beyond(notes.in_each_other_m, DEEPEST_M, 100), str(notes.nans),
             f"{metrics[f'{name}/frame'].value:.1f}",
         ])  # fmt: skip
-        total = sum(notes.doing.values())
-        shares = (f"{doing} {count / total:.1%}" for doing, count in notes.doing.most_common(12))
-        worst = sorted(notes.worst.items(), key=lambda each: -each[1][0])
-        deep = (f"{100 * depth:.1f} cm: {doing}: {where}" for doing, (depth, where) in worst)
-        said.append(f"{name}: {', '.join(shares)}; deepest: {'; '.join(deep) or 'none'}.")
+        worst = sorted(notes.worst.items(), key=lambda each: -each[1])
+        deep = (f"{doing} {100 * depth:.1f} cm" for doing, depth in worst)
+        said.append(f"{name}, deepest beyond 3 cm: {'; '.join(deep) or 'none'}.")
     header = ("scene", "in solids [cm]", "stuck [s]", "in each other [cm]", "NaN", "frame [us]")
     limits = f"In brackets: of {arguments.episodes} episodes beyond 3 cm, 10 s and 3 cm."
     report = Report("People", (__doc__ or "").strip(), [table(header, lines), limits, *said])
@@ -168,16 +162,15 @@ def _measure(body, motion, solids, state, deepest, notes) -> None:
     """Note how deep anybody is in what."""
     truth, names = worker_truth(body, motion), generator.activity_names
     capsules, radius = truth.capsules_world, truth.capsule_radius_m
-    notes.doing.update(names[doing] for doing in state.activity.ravel().tolist())
     feet = np.array(["foot" in part or "toes" in part for part in body.capsule_names])
-    depth, part, solid = _in_solids(capsules, radius, solids, state.activity == CLIMB, feet)
+    share = np.linspace(0.0, 1.0, 5)[:, None]
+    points = capsules[..., :1, :] * (1 - share) + capsules[..., 1:, :] * share
+    inside = radius - _away(points, solids).min((-1, -2))
+    inside[(state.activity == CLIMB)[..., None] & feet] = -np.inf  # they stand on what they climb
+    depth = inside.max(-1)
     deepest[0] = np.maximum(deepest[0], depth.max(1))
-    for b in np.flatnonzero(depth.max(1) > DEEPEST_M):
-        w = int(depth[b].argmax())
-        at = np.round(solids[solid[b, w], CENTRE : CENTRE + 3], 2).tolist()
-        spot = np.round(state.spots[b, w, [SPOT_X, SPOT_Y]], 2).tolist()
-        where = f"{body.capsule_names[part[b, w]]}, place {spot}, solid at {at}"
-        notes.deep(names[state.activity[b, w]], float(depth[b, w]), where)
+    for b, w in np.argwhere(depth > DEEPEST_M):
+        notes.deep(names[state.activity[b, w]], float(depth[b, w]))
     root = motion.position_world[:, :, 0, :2]
     for i, j in combinations(range(capsules.shape[1]), 2):
         apart = np.linalg.norm(root[:, i] - root[:, j], axis=-1)
@@ -187,54 +180,29 @@ def _measure(body, motion, solids, state, deepest, notes) -> None:
             gap = -narrowest_gap(*ends).distance_m
             k = int(gap.argmax())
             both = " beside ".join(names[state.activity[near[k], w]] for w in (i, j))
-            notes.deep(both, float(gap[k]), f"{apart[near[k]]:.2f} m apart")
+            notes.deep(both, float(gap[k]))
             deepest[1, near] = np.maximum(deepest[1, near], gap)
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _in_solids(capsules, radius, solids, climbing, feet):
-    """How deep each of (B, W) workers is in a solid [m], with which capsule, in which solid.
-
-    Feet (K,) of who is climbing stand on one, as others' on the floor, and are left out.
-    """
-    n_b, n_w, n_k = capsules.shape[:3]
-    depth = np.full((n_b, n_w), -np.inf)
-    part, solid = np.zeros((n_b, n_w), np.int64), np.zeros((n_b, n_w), np.int64)
-    for b in range(n_b):
-        for w in range(n_w):
-            for g in range(solids.shape[0]):
-                dx = capsules[b, w, 0, 0, 0] - solids[g, CENTRE]
-                dy = capsules[b, w, 0, 0, 1] - solids[g, CENTRE + 1]
-                if solids[g, KIND] != PLANE and math.hypot(dx, dy) > solids[g, REACH] + 1.6:
-                    continue
-                for k in range(n_k):
-                    if climbing[b, w] and feet[k]:
-                        continue
-                    for i in range(5):
-                        away = _distance(capsules[b, w, k], 0.25 * i, solids[g])
-                        inside = radius[b, w, k] - away
-                        if inside > depth[b, w]:
-                            depth[b, w], part[b, w], solid[b, w] = inside, k, g
-    return depth, part, solid
+def _away(points: Points3, solids: Floats) -> Floats:
+    """(..., G) signed distances of points (..., 3) from shapes (G, ...) [m]; of planes within
+    their edges."""
+    axes = solids[:, AXES : AXES + 9].reshape(-1, 3, 3)
+    offset = points[..., None, :] - solids[:, CENTRE : CENTRE + 3]
+    local = np.einsum("gij,...gj->...gi", axes, offset)
+    half, kind, up = solids[:, HALF_SIZE : HALF_SIZE + 3], solids[:, KIND], local[..., 2]
+    side, beyond = np.hypot(local[..., 0], local[..., 1]), np.abs(local) - half
+    over = np.abs(up) - half[:, 1]  # of what is round: radius, then half its length
+    plane = np.where((beyond[..., :2] < 0).all(-1), up, 9.0)
+    capsule = np.hypot(side, np.maximum(over, 0.0)) - half[:, 0]
+    cylinder = _outside(np.stack([side - half[:, 0], over], -1))
+    kinds = [kind == PLANE, kind == BOX, kind == CAPSULE]
+    return np.select(kinds, [plane, _outside(beyond), capsule], cylinder)
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _distance(ends, u, row):
-    """Signed distance of a point of a segment from a shape [m]; of planes within their edges."""
-    offset = ends[0] + u * (ends[1] - ends[0]) - row[CENTRE : CENTRE + 3]
-    x, y, z = row[AXES : AXES + 9].reshape(3, 3) @ offset
-    hx, hy, hz = row[HALF_SIZE], row[HALF_SIZE + 1], row[HALF_SIZE + 2]
-    if row[KIND] == PLANE:
-        return z if abs(x) < hx and abs(y) < hy else 9.0
-    if row[KIND] == BOX:
-        ox, oy, oz = abs(x) - hx, abs(y) - hy, abs(z) - hz
-        outside = math.sqrt(max(ox, 0.0) ** 2 + max(oy, 0.0) ** 2 + max(oz, 0.0) ** 2)
-        return outside + min(max(ox, oy, oz), 0.0)
-    side = math.hypot(x, y)
-    if row[KIND] == CAPSULE:
-        return math.hypot(side, max(abs(z) - hy, 0.0)) - hx
-    ox, oz = side - hx, abs(z) - hy
-    return math.hypot(max(ox, 0.0), max(oz, 0.0)) + min(max(ox, oz), 0.0)
+def _outside(beyond: Floats) -> Floats:
+    """Signed distance from how far a point is beyond each pair of faces (..., n)."""
+    return np.linalg.norm(np.maximum(beyond, 0.0), axis=-1) + np.minimum(beyond.max(-1), 0.0)
 
 
 if __name__ == "__main__":

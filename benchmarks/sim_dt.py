@@ -43,42 +43,34 @@ def substeps(scene: Scene) -> int:
 def standing(scene: Scene, batch: int, xy: tuple[float, float]) -> WorkerPath:
     """A worker who stands still at `xy`, for every environment and substep."""
     rest = rest_motion(load_body(scene.bodies[0]))
-    lead = (batch, substeps(scene), 1)
-
-    def spread(array: np.ndarray) -> np.ndarray:
-        return np.broadcast_to(array, (*lead, *array.shape)).copy()
-
     position = rest.position_world + np.array([*xy, 0.0])
-    return WorkerPath(spread(position), spread(rest.quaternion_wxyz))
+    lead = (batch, substeps(scene), 1, 1, 1)
+    return WorkerPath(np.tile(position, lead), np.tile(rest.quaternion_wxyz, lead))
 
 
-def smooth_targets(rng: np.random.Generator, n_steps: int, batch: int) -> np.ndarray:
-    """(n_steps, B, 6) sines of 0.4 to 0.8 Hz with peaks of 0.6 to 1.3 rad/s round home."""
-    time_s = CTRL_DT * np.arange(n_steps)[:, None, None]
+def targets(kind: str, seed: int, n_steps: int = 150, batch: int = 32) -> Floats:
+    """(n_steps, B, 6) velocities with peaks of 0.6 to 1.3 rad/s: sines of 0.4 to 0.8 Hz round home,
+    or square waves that turn every 0.4 to 0.8 s."""
+    rng, step = np.random.default_rng(seed), np.arange(n_steps)[:, None, None]
     peak = rng.uniform(0.6, 1.3, (batch, 6)) * rng.choice((-1, 1), (batch, 6))
-    rate = 2 * np.pi * rng.uniform(0.4, 0.8, (batch, 6))
-    return EXCURSION * peak * np.cos(rate * time_s)
-
-
-def jumping_targets(rng: np.random.Generator, n_steps: int, batch: int) -> np.ndarray:
-    """(n_steps, B, 6) square waves of 0.6 to 1.3 rad/s that turn every 0.4 to 0.8 s."""
-    step = np.arange(n_steps)[:, None, None]
-    peak = rng.uniform(0.6, 1.3, (batch, 6)) * rng.choice((-1, 1), (batch, 6))
+    if kind == "smooth":
+        rate = 2 * np.pi * rng.uniform(0.4, 0.8, (batch, 6))
+        return EXCURSION * peak * np.cos(rate * CTRL_DT * step)
     half = rng.integers(10, 21, (batch, 6))
     return EXCURSION * peak * np.where((step + half // 2) // half % 2 == 0, 1.0, -1.0)
 
 
-def tool_error_mm(scene: Scene, targets: np.ndarray) -> np.ndarray:
+def tool_error_mm(scene: Scene, wanted: Floats) -> Floats:
     """(n,) distance of the tool from the integral of the command, at every control step."""
-    batch, slew = targets.shape[1], scene.config.slew_rad_s2
+    batch, slew = wanted.shape[1], scene.config.slew_rad_s2
     physics, still = Physics(scene, batch), no_workers(batch, substeps(scene))
     command, reference, errors = np.zeros((batch, 6)), physics.q, []
-    for wanted in targets:
-        change = np.clip(wanted - command, -slew * CTRL_DT, slew * CTRL_DT)
+    for target in wanted:
+        change = np.clip(target - command, -slew * CTRL_DT, slew * CTRL_DT)
         ramp_s = np.abs(change) / slew
         reference = reference + command * CTRL_DT + change * (CTRL_DT - ramp_s / 2)
         command = command + change
-        physics.step(wanted, still)
+        physics.step(target, still)
         here = chains.tool(scene.chain, physics.q)[:, :3, 3]
         there = chains.tool(scene.chain, reference)[:, :3, 3]
         errors.append(1000 * np.linalg.norm(here - there, axis=-1))
@@ -142,10 +134,8 @@ def measure(sim_dt: float) -> dict[str, Metric]:
     scene = build(SceneConfig(sim_dt=sim_dt), n_workers=1)
     empty = build(SceneConfig(sim_dt=sim_dt))
     metrics: dict[str, Metric] = {}
-    for kind, targets in (("smooth", smooth_targets), ("jumping", jumping_targets)):
-        errors = [
-            tool_error_mm(empty, targets(np.random.default_rng(seed), 150, 32)) for seed in SEEDS
-        ]
+    for kind in ("smooth", "jumping"):
+        errors = [tool_error_mm(empty, targets(kind, seed)) for seed in SEEDS]
         for share in (50, 95):
             each = [float(np.percentile(error, share)) for error in errors]
             metrics[f"tool_error_p{share}.{kind}.{name}"] = over(each, "mm")

@@ -73,11 +73,8 @@ class Notes:
 
 def single(n_episodes: int) -> int:
     """Steps of episodes of the single environment at level truth; raises if one has no number."""
-    env, rng, n_steps = (
-        gymnasium.make("HRCReach-v0", perception="truth"),
-        np.random.default_rng(0),
-        0,
-    )
+    env, rng = gymnasium.make("HRCReach-v0", perception="truth"), np.random.default_rng(0)
+    n_steps = 0
     for seed in track(range(n_episodes), "episodes"):
         env.reset(seed=seed)
         ended = False

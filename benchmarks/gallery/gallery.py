@@ -1,12 +1,14 @@
 """All pictures and the page: every body, every motion, every scene."""
 
+import html
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 
 import imageio.v2 as imageio
 
 from benchmarks.gallery.motions import strip
-from benchmarks.gallery.page import Exhibit, write_page
 from benchmarks.gallery.still import CASTS, portrait, views
 from hrc_env.core.errors import unknown
 from hrc_env.core.typing import Image
@@ -16,6 +18,32 @@ from hrc_env.worker.body import load_body, worker_names
 
 VIEWS = 5
 """Pictures of a scene."""
+
+
+STYLE = """
+:root { color-scheme: light dark; }
+body { max-width: 1240px; margin: 40px auto; padding: 24px; font: 16px/1.5 system-ui, sans-serif; }
+.grid { display: grid; grid-template-columns: repeat(auto-fill, minmax(240px, 1fr)); gap: 18px; }
+figure { margin: 0; } .wide { grid-column: 1 / -1; }
+img { display: block; width: 100%; height: auto; border-radius: 8px; }
+figcaption { padding: 6px 2px; } figcaption span { opacity: .7; }
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Exhibit:
+    """A picture in the gallery."""
+
+    section: str
+    """The heading that it stands under."""
+    file: str
+    """Path of the PNG, relative to the page."""
+    title: str
+    """One or two words."""
+    caption: str
+    """One sentence."""
+    wide: bool
+    """Whether it takes a row of its own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,13 +69,7 @@ class GalleryConfig:
 
 
 def run(config: GalleryConfig, out: Path, say: Progress) -> list[Exhibit]:
-    """Draw everything into a folder, with an `index.html`; returns what the page shows.
-
-    Args:
-        config: what is drawn.
-        out: the folder, made if it is not there.
-        say: hears of the progress.
-    """
+    """Draw everything into a folder, with an `index.html`; returns what the page shows."""
     out.mkdir(parents=True, exist_ok=True)
     share = 1.0 / max(len(config.bodies) + len(config.motions) + VIEWS * len(config.scenes), 1)
     shown: list[Exhibit] = []
@@ -73,3 +95,29 @@ def run(config: GalleryConfig, out: Path, say: Progress) -> list[Exhibit]:
             hang(strip(name, body), "Motions", name, f"by {body.replace('_', ' ')}", True)
     write_page(shown, out, "python -m hrc_env gallery")
     return shown
+
+
+def write_page(exhibits: Sequence[Exhibit], out: Path, command: str) -> None:
+    """Write `index.html` into a folder that has the pictures; those of a section come together."""
+    sections = groupby(exhibits, lambda exhibit: exhibit.section)
+    body = "".join(
+        f'<h2>{html.escape(name)}</h2><div class="grid">{"".join(map(_figure, some))}</div>\n'
+        for name, some in sections
+    )
+    text = (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>hrc_env: gallery</title><style>{STYLE}</style></head><body>\n"
+        f"<h1>People beside a robot</h1>\n{body}"
+        f"<footer>Made by <code>{html.escape(command)}</code></footer></body></html>\n"
+    )
+    (out / "index.html").write_text(text, encoding="utf-8")
+
+
+def _figure(exhibit: Exhibit) -> str:
+    title, caption = html.escape(exhibit.title), html.escape(exhibit.caption)
+    return (
+        f"<figure{' class=wide' if exhibit.wide else ''}>"
+        f'<img src="{html.escape(exhibit.file)}" alt="{title}: {caption}" loading="lazy">'
+        f"<figcaption><b>{title}</b> <span>{caption}</span></figcaption></figure>\n"
+    )

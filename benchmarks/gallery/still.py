@@ -36,15 +36,8 @@ OVERVIEW = {"lab": "room", "site": "overview"}
 def camera_at(
     target_world: Points3, turn_rad: float, away_m: float, hfov_deg: float, size_px: tuple[int, int]
 ) -> PinholeCamera:
-    """A camera that looks at a point.
-
-    Args:
-        target_world: (3,) the point [m].
-        turn_rad: direction from the point to the camera, from world +x.
-        away_m: level distance between them.
-        hfov_deg: horizontal field of view.
-        size_px: width and height of its image.
-    """
+    """A camera that looks at a point (3,) [m] from a direction (from world +x) and level distance;
+    its horizontal field of view, width and height."""
     x, y, _ = target_world
     eye = np.array([x + away_m * np.cos(turn_rad), y + away_m * np.sin(turn_rad), EYE_M])
     return pinhole("follower", eye, np.asarray(target_world, float), hfov_deg, *size_px)

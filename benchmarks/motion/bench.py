@@ -6,9 +6,8 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from benchmarks.motion.gait import gait_of
 from benchmarks.motion.report import report
-from benchmarks.motion.statistics import statistics_of
+from benchmarks.motion.statistics import gait_of, statistics_of
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric, over
 from hrc_env.experiments.study.cache import PartCache
@@ -117,7 +116,7 @@ def _cost_us(body: Body) -> Metric:
 
 MOTION = Study(
     name="bench motion",
-    modules=("benchmarks.motion.statistics", "benchmarks.motion.gait"),
+    modules=("benchmarks.motion.statistics",),
     settings=lambda config: {"bench": asdict(config)},
     seeds=lambda config: list(range(config.n_seeds)),
     n_parts=lambda _: 1,

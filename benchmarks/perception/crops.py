@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from hrc_env.config import HRCConfig
-from hrc_env.core.records import Held, WorkerMotion
+from hrc_env.core.batching import one
+from hrc_env.core.records import WorkerMotion
 from hrc_env.core.skeleton import JOINT
 from hrc_env.core.typing import Bools, Floats, JointAngles, Points2, Points3
 from hrc_env.geometry.cameras import (
@@ -110,24 +111,17 @@ class Looker:
         windows = [window_from_joints(*view) for view in views]
         if not any(windows):
             return np.full_like(true_px, np.nan)
-        self.renderer.draw(now.q, alone(now.motion))
+        self.renderer.draw(now.q, one(now.motion, 0))
         self.detector.forget(0)  # as at a first look: the detector stage must agree
         px = self.detector.detect(self.source, windows).px
         return np.stack([pinhole_from_image(camera, px[c]) for c, camera in enumerate(cameras)])
 
 
 def instants(
-    scene: Scene, n: int, rng: np.random.Generator, wanted: Sequence[str] = ()
+    scene: Scene, n: int, rng: np.random.Generator, wanted: Sequence[str]
 ) -> Iterator[Instant]:
-    """n moments of a worker's day in a scene.
-
-    Args:
-        scene: where; the worker has its first body.
-        n: how many.
-        rng: draws the day and the arm.
-        wanted: moments of these activities, in turns, where one comes within some minutes, else
-            as they come; none takes every moment as it comes.
-    """
+    """n moments of a worker's day in a scene, of whose first body they are: of the activities that
+    are wanted, in turns, where one comes within some minutes, else as they come."""
     body = load_body(scene.bodies[0])
     state = generator.make_state(1, 1, body, HRCConfig().motion, scene.grounds)
     streams = [np.random.default_rng(rng.integers(2**63))]
@@ -138,29 +132,14 @@ def instants(
             steps = int(rng.integers(*PAUSE_STEPS))
             generator.advance(state, streams, STEP_S, steps)
             name = generator.activity_names[generator.activity(state)[0, 0]]
-            if not wanted or name == wanted[k % len(wanted)]:
+            if name == wanted[k % len(wanted)]:
                 break
         q = scene.home_q + rng.uniform(-1, 1, len(spread)) * spread
         yield Instant(name, q, generator.current(state))
 
 
-def alone(motion: WorkerMotion) -> WorkerMotion:
-    """The first environment's part of a motion, as the renderer takes it: (W, S, ...)."""
-    held = motion.held
-    return WorkerMotion(
-        motion.position_world[0], motion.quaternion_wxyz[0], motion.velocity_world[0],
-        motion.angular_velocity_world[0],
-        held and Held(held.kind[0], held.position_world[0], held.quaternion_wxyz[0]),
-    )  # fmt: skip
-
-
 def view_angle_deg(joints_world: Points3, eyes_world: Points3) -> Floats:
-    """(C,) see `Looked.angle_deg`.
-
-    Args:
-        joints_world: (J, 3) of one worker.
-        eyes_world: (C, 3).
-    """
+    """(C,) see `Looked.angle_deg`, of one worker's joints (J, 3) from eyes (C, 3)."""
     left = joints_world[[JOINT["left_shoulder"], JOINT["left_hip"]]].mean(0)
     right = joints_world[[JOINT["right_shoulder"], JOINT["right_hip"]]].mean(0)
     across = (left - right)[:2]

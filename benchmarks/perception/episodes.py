@@ -76,14 +76,7 @@ def some_steps(episode: Episode, steps: Bools | slice) -> Episode:
 def play(
     seeds: Sequence[int], n_steps: int, tick: Callable[[float], None], **arguments: Any
 ) -> list[Episode]:
-    """Episodes of an environment whose arm rests.
-
-    Args:
-        seeds: one an episode.
-        n_steps: of each.
-        tick: told of the share that is done after each.
-        arguments: of `HRCEnv`.
-    """
+    """An episode a seed of an environment, made with these arguments, whose arm rests."""
     env = HRCEnv(n_workers=1, **arguments)
     try:
         episodes = []
@@ -111,17 +104,9 @@ def acquisition(seeds: Sequence[int], tick: Callable[[float], None]) -> list[boo
 
 
 def phantoms(scene: str, n_steps: int, seed: int, tick: Callable[[float], None]) -> dict[str, int]:
-    """Look for workers in a scene that has none, while the arm moves at random.
-
-    Args:
-        scene: its name.
-        n_steps: how often every camera looks.
-        seed: of the first episode tried; those in which somebody comes are passed over.
-        tick: told of the share that is done.
-
-    Returns:
-        "images" that were looked at, "phantoms" of them with somebody in them, "tracked" steps.
-    """
+    """Look for workers in a scene that has none, while the arm moves at random: "images" that were
+    looked at, "phantoms" of them with somebody in them, "tracked" steps. Episodes from `seed` on in
+    which somebody comes are passed over."""
     counts = {"images": 0, "phantoms": 0, "tracked": 0}
     env, actions, steps = HRCEnv(scene=scene, n_workers=(0, 1)), np.random.default_rng(seed), 0
     while steps < n_steps:

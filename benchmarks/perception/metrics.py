@@ -22,13 +22,8 @@ Found = Mapping[str, dict[str, Any]]
 
 
 def metrics_of(found: Found, n_faults: int, fault_steps: int) -> Metrics:
-    """Every number by its name.
-
-    Args:
-        found: what was played.
-        n_faults: so many of the lab's first episodes are what faults are compared with,
-        fault_steps: cut to so many steps.
-    """
+    """Every number by its name; faults are compared with so many of the lab's first episodes, cut
+    to so many steps."""
     played = {
         label: [episode_of(each) for each in part["episodes"]]
         for label, part in found.items()

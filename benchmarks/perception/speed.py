@@ -70,11 +70,8 @@ def network_ms(runtime: str, tick: Callable[[float], None]) -> dict[str, float]:
 def measure(
     setting: Setting, n_steps: int, seed: int, tick: Callable[[float], None]
 ) -> dict[str, Any]:
-    """Random actions for `n_steps`, then as many with the stopwatch round the stages.
-
-    Returns:
-        "steps_per_s" of the median step, "stages": milliseconds a step, and "n", steps.
-    """
+    """Random actions for "n" steps, then as many with the stopwatch round the stages: "steps_per_s"
+    of the median step, and of "stages" milliseconds a step."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # that one camera is few is known
         env = HRCEnv(

@@ -6,10 +6,9 @@ from typing import Any
 
 from benchmarks.common import exactly
 from benchmarks.recorded.calibration import read_calibration, tracker_config
-from benchmarks.recorded.detections import FOLLOWER, Detections, detections_of
+from benchmarks.recorded.detections import FOLLOWER, Detections, detections_of, lag_of
 from benchmarks.recorded.fetch import WHEEL, fetch_recording
 from benchmarks.recorded.film import film_track
-from benchmarks.recorded.lag import lag_of
 from benchmarks.recorded.metrics import (
     NAMES,
     bone_std,

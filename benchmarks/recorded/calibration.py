@@ -36,11 +36,7 @@ class FilmedCamera:
 
 
 def read_calibration(path: Path, sizes_px: list[tuple[int, int]]) -> list[FilmedCamera]:
-    """The cameras of a Qualisys calibration file.
-
-    Args:
-        path: the file.
-        sizes_px: width and height of each camera's film, in the file's order.
+    """The cameras of a Qualisys calibration file, whose films have these widths and heights.
 
     Raises:
         ConfigError: the file is no such calibration, or has another number of cameras.

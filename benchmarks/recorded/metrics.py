@@ -9,8 +9,7 @@ from itertools import combinations
 
 import numpy as np
 
-from benchmarks.recorded.detections import Detections
-from benchmarks.recorded.lag import SURE
+from benchmarks.recorded.detections import SURE, Detections
 from hrc_env.core.records import PoseEstimate
 from hrc_env.core.results import Metric
 from hrc_env.core.skeleton import BONES, MIRROR

@@ -18,14 +18,8 @@ from hrc_env.geometry.cameras import project
 
 
 def camera_information(P: Floats, joints: Points3, seen: Bools, sigma_px: float) -> Covariances3:
-    """What one frame tells of each joint alone, (S, J, 3, 3) [1/m^2].
-
-    Args:
-        P: (C, 3, 4) projections.
-        joints: (S, J, 3) true points [m].
-        seen: (S, C, J) which detections there are.
-        sigma_px: standard deviation of each coordinate [px].
-    """
+    """What one frame of detections (S, C, J) tells of each joint (S, J, 3) alone, (S, J, 3, 3)
+    [1/m^2]."""
     px, depth = project(P, joints)
     rows = P[:, None, :2, :3] - px[..., None] * P[:, None, 2:, :3]
     rows = np.where(seen[..., None, None], rows / depth[..., None, None], 0.0)
@@ -42,13 +36,8 @@ def posterior_bound(
 ) -> Covariances3:
     """Bound on the covariance of each joint's estimate, (T, S, J, 3, 3) [m^2].
 
-    Args:
-        P: (C, 3, 4) projections.
-        model: what the sequences were drawn from.
-        joints: (T, S, J, 3) the sequences [m].
-        seen: (T, S, C, J) which detections there are.
-        sigma_px: their standard deviation [px].
-        start_std: of positions [m] and velocities [m/s] before the first frame.
+    Of sequences (T, S, J, 3) [m] drawn from the model, with detections where they were `seen` (T,
+    S, C, J); `start_std` of positions [m] and velocities [m/s] is before the first frame.
     """
     n_frames, n_sequences = joints.shape[:2]
     start = np.repeat(np.square(start_std), N_PLACES)

@@ -40,12 +40,8 @@ class MatchedModel:
 
 
 def matched_model(damping: float, root_acceleration: float) -> MatchedModel:
-    """The motion model of `tracking.models.motion` as a model of the whole body at 25 Hz.
-
-    Args:
-        damping: as `TrackerConfig.damping`.
-        root_acceleration: as `TrackerConfig.root_acceleration` [m^2/s^3].
-    """
+    """The motion model of `tracking.models.motion` as one of the whole body at 25 Hz; the settings
+    are those of `ParticleConfig`."""
     F, own = damped_joints(DT_S, damping, 0.0)
     average = np.zeros((N_JOINTS, N_JOINTS))
     average[:, TORSO] = 1 / len(TORSO)

@@ -16,13 +16,8 @@ CHI2_LEVELS: Floats = stats.chi2(3).ppf(np.arange(1, N_LEVELS) / N_LEVELS)
 
 
 def tally(truth: Points3, mean: Points3, cov: Covariances3 | None) -> dict[str, Any]:
-    """Sums by name, each a list over sequences.
-
-    Args:
-        truth: (T, S, W, J, 3) [m].
-        mean: (T, S, W, J, 3) [m].
-        cov: (T, S, W, J, 3, 3) [m^2]; None: nothing is claimed.
-    """
+    """Sums by name, each a list over sequences, of joints (T, S, W, J, 3) [m] and what is claimed
+    of them [m^2], if anything is."""
     n_frames, n_sequences = truth.shape[:2]
     offset = mean - truth
     squared = (offset**2).sum(-1)

@@ -90,12 +90,8 @@ def follow_env(
 ) -> Tracks:
     """The environment's own worker at the level `keypoints`, one episode per seed.
 
-    Args:
-        seeds: one per sequence.
-        n_frames: how many frames.
-        lively: workers walk more than the environment's.
-        failing: after the first second cameras fail for up to 3 s, all but one or two at once.
-        look: asked after every frame.
+    Lively workers walk more than the environment's. Failing cameras do so after the first second,
+    for up to 3 s, all but one or two at once; `look` is asked after every frame.
     """
     config = HRCConfig()
     if lively:

@@ -21,7 +21,7 @@ def from_clone(module: str) -> ModuleType:
     """A module of the benchmarks or of the assets' makers.
 
     Args:
-        module: its dotted name, as "benchmarks.commands.bench".
+        module: its dotted name, as "benchmarks.commands".
 
     Raises:
         HRCError: if this installation holds the package alone.

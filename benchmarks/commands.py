@@ -1,4 +1,4 @@
-"""python -m hrc_env bench: how good estimators and detection, how fast all, how human workers."""
+"""python -m hrc_env bench and gallery: what is measured, and pictures of workers and scenes."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import tyro
+from rich.console import Console
 
-from hrc_env.cli.checks import at_least
-from hrc_env.cli.progress import show
+from hrc_env.cli.checks import at_least, writable_folder
+from hrc_env.cli.progress import progress_bar, show
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.machine import n_cores
 from hrc_env.experiments.study.runner import Study, changed, run
@@ -147,3 +148,22 @@ class Bench:
     def run(self) -> int:
         """Run it."""
         return self.what.run()
+
+
+@dataclass(frozen=True)
+class Gallery:
+    """Draw every worker, a film strip of every motion, and both scenes from all cameras."""
+
+    out: Path = Path("out/gallery")
+    """Folder for the pictures (PNG) and `index.html`."""
+
+    def run(self) -> int:
+        """Draw, tell where."""
+        writable_folder(self.out)
+        from benchmarks.gallery.gallery import GalleryConfig, run
+
+        console = Console()
+        with progress_bar(console, "gallery") as say:
+            exhibits = run(GalleryConfig(), self.out, say)
+        console.print(f"{len(exhibits)} pictures; open [bold]{self.out / 'index.html'}[/]")
+        return 0
