@@ -54,7 +54,7 @@ def test_every_target_names_a_scene_that_exists():
 
 
 def test_an_empty_bench_is_refused():
-    with pytest.raises(ConfigError, match="n_seeds"):
+    with pytest.raises(ConfigError, match="seeds"):
         bench.MotionBenchConfig(n_seeds=0)
     with pytest.raises(ConfigError, match="bodies"):
         bench.MotionBenchConfig(bodies=())

@@ -108,8 +108,8 @@ def test_numbers_say_what_was_found():
 
 def test_the_report_has_a_row_for_every_fault_that_was_played(tmp_path):
     metrics = metrics_of(found(), 4, 10)
-    report(TINY, found(), metrics, tmp_path).write(tmp_path.parent, {}, [0], metrics)
-    said = (tmp_path.parent / "report.md").read_text()
+    report(TINY, found(), metrics, tmp_path / "figures").write(tmp_path, {}, [0], metrics)
+    said = (tmp_path / "report.md").read_text()
     assert "| `lost` | 2.00" in said
     assert "| `glare` | 2.00" in said
     assert "`defocus`" not in said

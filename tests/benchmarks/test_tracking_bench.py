@@ -119,7 +119,7 @@ def test_time_per_update_is_positive():
 
 
 def test_sizes_that_cannot_work_are_answered():
-    with pytest.raises(ConfigError, match="n_seeds"):
+    with pytest.raises(ConfigError, match="seeds"):
         TrackingBenchConfig(n_seeds=0)
 
 
