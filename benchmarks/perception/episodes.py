@@ -117,7 +117,7 @@ def phantoms(scene: str, n_steps: int, seed: int, tick: Callable[[float], None])
         n = min(EMPTY_STEPS, n_steps - steps)
         for _ in range(n):
             env.step(actions.uniform(-1, 1, env.simulation.n_actions).astype(np.float32))
-            keypoints, _ = env.simulation.senses.looks(0)
+            keypoints, _ = env.simulation.pipeline.last_detections(0)
             if keypoints is not None:
                 somebody = (keypoints.confidence[0] > 0).any((1, 2))
                 counts["images"] += len(somebody)
@@ -143,7 +143,7 @@ def _episode(env: HRCEnv, seed: int, n_steps: int) -> Episode:
         joints, estimate = truth.joints_world[0, 0], simulation.estimate
         family[t] = family_index(int(generator.activity(simulation.motion)[0, 0]))
         off_px[t] = _off_px(env, joints)
-        named[t] = simulation.senses.suspected(np.array([0]))[0]
+        named[t] = simulation.pipeline.suspected(np.array([0]))[0]
         if estimate.tracked[0, 0]:
             offset, cov = estimate.mean_world[0, 0] - joints, estimate.cov_world[0, 0]
             error[t] = np.linalg.norm(offset, axis=-1)
@@ -154,7 +154,7 @@ def _episode(env: HRCEnv, seed: int, n_steps: int) -> Episode:
 
 def _off_px(env: HRCEnv, joints_world: Floats) -> Floats:
     """(C,) how far the keypoints of this step are from the truth; NaN: none."""
-    keypoints, _ = env.simulation.senses.looks(0)
+    keypoints, _ = env.simulation.pipeline.last_detections(0)
     cameras = env.simulation.scene.cameras
     if keypoints is None:
         return np.full(len(cameras), np.nan)

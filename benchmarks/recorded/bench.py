@@ -9,6 +9,7 @@ from benchmarks.recorded.calibration import read_calibration, tracker_config
 from benchmarks.recorded.detections import FOLLOWER, Detections, detections_of, lag_of
 from benchmarks.recorded.fetch import WHEEL, fetch_recording
 from benchmarks.recorded.film import film_track
+from benchmarks.recorded.films import Films
 from benchmarks.recorded.metrics import (
     NAMES,
     bone_std,
@@ -25,7 +26,6 @@ from hrc_env.experiments.study.cache import PartCache
 from hrc_env.experiments.study.report import Column, Metrics, Picture, Report, table_of
 from hrc_env.experiments.study.runner import Study
 from hrc_env.geometry.cameras import projections
-from hrc_env.perception.films import Films
 from hrc_env.tracking.config import TrackerConfig
 
 FILM = "recorded.mp4"
