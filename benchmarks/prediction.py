@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 import tyro
 
-from benchmarks.common import CHI2_95_3D, Metrics, cell, exactly, normalised_square, publish, table
+from benchmarks.common import CHI2_95_3D, cell, exactly, normalised_square, publish
 from benchmarks.tracking.rigs import DT_S
 from benchmarks.tracking.tracks import Tracks, follow_env, follow_walkers
 from hrc_env.core.records import PoseEstimate
 from hrc_env.core.results import Metric
 from hrc_env.experiments.study.intervals import mean_over, ratio_over, rmse_over
-from hrc_env.experiments.study.report import Report
+from hrc_env.experiments.study.report import Column, Report, table_of
 from hrc_env.tracking.ahead import ahead
 from hrc_env.tracking.config import ParticleConfig
 
@@ -120,19 +120,6 @@ def costs_us() -> dict[str, Metric]:
     return metrics
 
 
-def row(metrics: Metrics, source: str, horizon_s: float) -> list[str]:
-    """A line of the table."""
-    cells = []
-    for name in NAMES:
-        key = f"{source}.{horizon_s:g}.{name}"
-        said = [cell(metrics[f"{kind}.{key}"], 100) for kind in ("rmse_m", "median_m")]
-        if name == "forecast":
-            said += [cell(metrics[f"coverage95.{key}"], 1, 3)]
-            said += [cell(metrics[f"std_over_rmse.{key}"], 1, 2)]
-        cells.append(", ".join(said))
-    return [f"{source}, {horizon_s:g} s", *cells]
-
-
 def main(arguments: Arguments) -> None:
     """Follow, predict, compare."""
     metrics: dict[str, Metric] = {}
@@ -140,13 +127,15 @@ def main(arguments: Arguments) -> None:
     for source, follow in asked.items():
         metrics |= metrics_of(source, follow())
     metrics |= costs_us()
-    lines = [row(metrics, source, horizon_s) for source in asked for horizon_s in HORIZONS_S]
+    rows = {f"{name}.{s:g}": f"{name}, {s:g} s" for name in asked for s in HORIZONS_S}
+    columns = [
+        *(Column(f"rmse_m.{{}}.{name}", f"{name}, RMSE [cm]", 1, 100) for name in NAMES),
+        Column("coverage95.{}.forecast", "coverage", 3),
+        Column("std_over_rmse.{}.forecast", "std/RMSE", 2),
+    ]
     us = [cell(metrics[f"ahead_us.{batch}"]) for batch in (1, 64)]
-    said = (
-        "RMSE and median in cm; of the forecast also coverage of its 95 % region and standard "
-        f"deviation over RMSE. `ahead` takes {us[0]} us alone, {us[1]} us a worker at batch 64."
-    )
-    parts = [table(["", *NAMES], lines), said]
+    said = f"`ahead` takes {us[0]} us alone, {us[1]} us a worker at batch 64."
+    parts = [table_of("", rows, columns, metrics), said]
     report = Report("Prediction", (__doc__ or "").strip(), parts)
     publish(arguments.out, report, asdict(arguments), [1000, 500], metrics)
 

@@ -122,5 +122,5 @@ MOTION = Study(
     n_parts=lambda _: 1,
     play=play,
     metrics=lambda _, played: played,
-    report=lambda _, played, *rest: report(*rest),
+    report=lambda _, played, metrics, figures: report(metrics),
 )

@@ -1,15 +1,11 @@
-"""The motion bench as people read it: tables, and every target in its band."""
-
-from pathlib import Path
+"""The motion bench as people read it."""
 
 from benchmarks.common import table
 from benchmarks.motion.targets import ANY, Target, targets_of
 from hrc_env.core.results import Metric
-from hrc_env.experiments.study.plots import label, new_figure, save
 from hrc_env.experiments.study.report import (
     Column,
     Metrics,
-    Picture,
     Report,
     Table,
     said,
@@ -32,11 +28,10 @@ COLUMNS = (
 """Of the table of everything."""
 
 
-def report(metrics: Metrics, figures: Path) -> Report:
-    """What is to be read; motion.png is drawn into `figures`."""
+def report(metrics: Metrics) -> Report:
+    """What is to be read."""
     cost = metrics["us_per_control_step"].value
     scenes = [name.rsplit(".", 1)[0] for name in metrics if name.endswith(".seconds")]
-    _plot_targets(figures / "motion.png", scenes, metrics)
     lead = (
         "Medians over bodies, smallest and largest in brackets; the first table has the targets of "
         "single scenes, the second what all scenes have (speeds in m/s). A control step of the "
@@ -46,7 +41,6 @@ def report(metrics: Metrics, figures: Path) -> Report:
     asked = (f"`{each.statistic}` <= {each.high:g} ({each.source})" for each in targets_of(ANY))
     return Report("Motion bench", lead, (
         "## Beside what is known of people", _targets(scenes, metrics),
-        Picture(figures / "motion.png", "0 and 1 are the ends of the band; outside of it: red."),
         "## Every scene", table_of("scene", {each: each for each in scenes}, COLUMNS, metrics),
         f"Everywhere: {'; '.join(asked)}.",
     ))  # fmt: skip
@@ -68,29 +62,3 @@ def _targets(scenes: list[str], metrics: Metrics) -> Table:
                 measured = said(metric, 1, 3)
                 lines.append([scene, target.statistic, measured, band, verdict, target.source])
     return table(["scene", "statistic", "measured", "target", "", "source"], lines)
-
-
-def _plot_targets(path: Path, scenes: list[str], metrics: Metrics) -> None:
-    """Measured values, where 0 and 1 are the ends of the band that was measured of people."""
-    rows = [
-        (f"{scene}: {target.statistic}", target, metrics[f"{scene}.{target.statistic}"])
-        for scene in scenes
-        for target in targets_of(scene)
-        if target.scene != ANY
-    ][::-1]
-    figure = new_figure(10, 0.24 * len(rows) + 1.4)
-    axis = figure.subplots()
-    axis.axvspan(0.0, 1.0, color="0.9")
-    for y, (_, target, metric) in enumerate(rows):
-        low, value, high = (
-            min(max((number - target.low) / (target.high - target.low), -0.9), 1.9)
-            for number in (metric.low, metric.value, metric.high)
-        )
-        colour = "C0" if inside(target, metric) else "C3"
-        axis.plot([low, high], [y, y], color=colour, linewidth=1.5)
-        axis.plot(value, y, "o", color=colour)
-    axis.set_yticks(range(len(rows)), [name for name, _, _ in rows], fontsize=9)
-    axis.set_xlim(-1.0, 2.0)
-    axis.set_xticks([0.0, 1.0], ["least", "most"])
-    label(axis, title="Workers' motion beside people's", grid="y")
-    save(figure, path)

@@ -1,6 +1,6 @@
 """The tracking bench on recorded films: every estimator on the same detections."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -80,7 +80,7 @@ def play(config: RecordedConfig, parts: PartCache) -> dict[str, Metric]:
         )
     finally:
         films.close()
-    pinholes = [camera.pinhole for camera in cameras]
+    pinholes = [replace(camera, lens=None) for camera in cameras]
     P, tracker = projections(tuple(pinholes)), tracker_config(pinholes)
     lags = lag_of(P, detections)
     in_step = detections.shifted(lags)

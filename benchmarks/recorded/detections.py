@@ -2,19 +2,19 @@
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.recorded.calibration import FilmedCamera, tracker_config
-from benchmarks.recorded.films import Films, undistort
+from benchmarks.recorded.calibration import tracker_config
+from benchmarks.recorded.films import Films
 from benchmarks.tracking.dlt import triangulate_frame
 from hrc_env.core.records import Keypoints, PoseEstimate, Roi
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats, Points2
 from hrc_env.experiments.study.fingerprint import fingerprint_of
-from hrc_env.geometry.cameras import PinholeCamera, project, projections
+from hrc_env.geometry.cameras import PinholeCamera, pinhole_from_image, project, projections
 from hrc_env.perception.detector import DetectorConfig, PoseDetector
 from hrc_env.perception.windows import window_from_joints
 from hrc_env.tracking.estimators import make_estimator
@@ -63,7 +63,7 @@ class Detections:
         return Detections(px, confidence, sigma, self.dt_s)
 
 
-def detections_of(films: Films, cameras: list[FilmedCamera], path: Path, tick: Tick) -> Detections:
+def detections_of(films: Films, cameras: list[PinholeCamera], path: Path, tick: Tick) -> Detections:
     """The detections that are in `path` (.npz), if the same code made them of the same films, or
     new ones, which are put there."""
     shape = {"films": repr((films.sizes_px, films.n_frames, films.frames_per_s))}
@@ -89,13 +89,13 @@ def detections_of(films: Films, cameras: list[FilmedCamera], path: Path, tick: T
     return found
 
 
-def _detect(films: Films, cameras: list[FilmedCamera], tick: Tick) -> Detections:
+def _detect(films: Films, cameras: list[PinholeCamera], tick: Tick) -> Detections:
     """Look at every frame where the person is predicted to be; search while nobody is followed.
 
     A follower with all cameras chooses the windows, so that somebody who stands by is not
     looked at: hips where the lines of sight of most cameras meet win the search.
     """
-    pinholes = [camera.pinhole for camera in cameras]
+    pinholes = [replace(camera, lens=None) for camera in cameras]
     dt_s = 1 / films.frames_per_s
     tracker = make_estimator(FOLLOWER, projections(tuple(pinholes)), dt_s, tracker_config(pinholes))
     rngs = [np.random.default_rng([0, 6])]
@@ -108,12 +108,8 @@ def _detect(films: Films, cameras: list[FilmedCamera], tick: Tick) -> Detections
         while films.advance():
             tracker.predict(state, dt_s, rngs)
             sight = detector.detect(films, _windows(tracker.estimate(state), pinholes))
-            px = np.stack(
-                [
-                    undistort(seen, camera.pinhole.K, camera.distortion)
-                    for seen, camera in zip(sight.px, cameras, strict=True)
-                ]
-            )
+            views = zip(cameras, sight.px, strict=True)
+            px = np.stack([pinhole_from_image(camera, seen) for camera, seen in views])
             rows.append((px, sight.confidence, sight.sigma_px))
             last = Detections(px[None], sight.confidence[None], sight.sigma_px[None], dt_s)
             tracker.update(state, last.keypoints(0, list(range(len(cameras)))), rngs)

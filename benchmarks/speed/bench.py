@@ -8,7 +8,7 @@ import math
 import os
 from collections.abc import Iterator
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 
 from benchmarks.speed.contenders import OURS, PEER, Contender, Single, Starts, Vector
 from benchmarks.speed.organs import Organs
@@ -54,18 +54,17 @@ QUICK = SpeedBenchConfig(n_rounds=1, least_steps=1000)
 """Every number, from one short turn."""
 
 
-@dataclass(frozen=True, slots=True)
 class Measured:
-    """One number a round. Configurations are "single" and "<num_envs>.<threads>"."""
+    """One number a round, by kind and name; configurations: "single" and "<num_envs>.<threads>"."""
 
-    load_before: float | None
-    """Load average before it began; None where nobody knows."""
-    env_steps_per_s: dict[str, list[float]] = field(default_factory=dict)
-    """By "<level>.<configuration>"."""
-    us_per_env_step: dict[str, list[float]] = field(default_factory=dict)
-    """By "<organ>.<configuration>", at level `keypoints`."""
-    reset_ms: dict[str, list[float]] = field(default_factory=dict)
-    """By "<environments that are reset>_of_<num_envs>"."""
+    def __init__(self) -> None:
+        self.load_before = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
+        """Load average before it began; None where nobody knows."""
+        self.values: dict[str, dict[str, list[float]]] = {}
+
+    def add(self, kind: str, name: str, value: float) -> None:
+        """One more."""
+        self.values.setdefault(kind, {}).setdefault(name, []).append(value)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,8 +86,7 @@ def play(config: SpeedBenchConfig, parts: PartCache) -> Measured:
     Raises:
         HRCError: an organ's function is no longer called, so that its time would be missed.
     """
-    load = round(os.getloadavg()[0], 1) if hasattr(os, "getloadavg") else None
-    measured, organs = Measured(load), Organs()
+    measured, organs = Measured(), Organs()
     with ExitStack() as closing:
         turns = [*_turns(config, closing, parts.progress)]
         starts = Starts()
@@ -100,7 +98,7 @@ def play(config: SpeedBenchConfig, parts: PartCache) -> Measured:
                 parts.progress(share * turn.cost, f"{turn.level} {turn.configuration}")
             organs.check_all_called()
             for name, ms in starts.run(config.n_resets).items():
-                measured.reset_ms.setdefault(name, []).append(ms)
+                measured.add("reset_ms", name, ms)
     return measured
 
 
@@ -108,12 +106,11 @@ def _take(turn: Turn, measured: Measured, organs: Organs) -> None:
     """Run as it is; then, where organs are timed, with the stopwatch round them."""
     pace = turn.contender.run(turn.n_episodes)
     name = f"{turn.level}.{turn.configuration}"
-    measured.env_steps_per_s.setdefault(name, []).append(pace.env_steps / pace.seconds)
+    measured.add("env_steps_per_s", name, pace.env_steps / pace.seconds)
     if turn.level == WATCHED:
         shares = organs.us_per_env_step(turn.contender, turn.n_episodes, turn.n_threads)
         for organ, us in shares.items():
-            name = f"{organ}.{turn.configuration}"
-            measured.us_per_env_step.setdefault(name, []).append(us)
+            measured.add("us_per_env_step", f"{organ}.{turn.configuration}", us)
 
 
 def _turns(config: SpeedBenchConfig, closing: ExitStack, progress: Progress) -> Iterator[Turn]:
@@ -142,20 +139,15 @@ def _turns(config: SpeedBenchConfig, closing: ExitStack, progress: Progress) -> 
 
 def metrics_of(measured: Measured) -> dict[str, Metric]:
     """Medians over rounds with smallest and largest; ratios to Reacher, round by round."""
-    theirs = measured.env_steps_per_s[f"{REACHER}.{SINGLE}"]
-    ratios = {
-        name: [our / their for our, their in zip(values, theirs, strict=True)]
-        for name, values in measured.env_steps_per_s.items()
-        if name != f"{REACHER}.{SINGLE}"
-    }
+    single = f"{REACHER}.{SINGLE}"
+    steps = measured.values["env_steps_per_s"]
+    for name, values in steps.items():
+        for ours, theirs in zip(values, steps[single], strict=True) if name != single else ():
+            measured.add("ratio_to_reacher", name, ours / theirs)
+    units = {"env_steps_per_s": "1/s", "us_per_env_step": "us", "reset_ms": "ms"}
     return {
-        f"{kind}.{name}": over(values, unit)
-        for kind, unit, found in (
-            ("env_steps_per_s", "1/s", measured.env_steps_per_s),
-            ("ratio_to_reacher", "", ratios),
-            ("us_per_env_step", "us", measured.us_per_env_step),
-            ("reset_ms", "ms", measured.reset_ms),
-        )
+        f"{kind}.{name}": over(values, units.get(kind, ""))
+        for kind, found in measured.values.items()
         for name, values in found.items()
     }
 

@@ -53,7 +53,7 @@ def report(load_before: float | None, metrics: Metrics, figures: Path) -> Report
 
 def _lead(metrics: Metrics, load_before: float | None) -> str:
     n_rounds = metrics[f"env_steps_per_s.{REACHER}.{SINGLE}"].n
-    busy = "" if load_before is None else f" Load average {load_before} before it began."
+    busy = "" if load_before is None else f" Load average {load_before:.1f} before it began."
     return (
         "Random actions for whole episodes, resets inside, every info read. Medians of "
         f"{n_rounds} rounds in which everybody takes turns, in brackets the smallest and the "

@@ -1,21 +1,14 @@
-"""The tracking bench as people read it: tables, and a picture of the calibration."""
+"""The tracking bench as people read it."""
 
 from collections.abc import Mapping, Sequence
 from itertools import product
-from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from benchmarks.common import cell, table
 from benchmarks.tracking.env_sequences import ENV
-from benchmarks.tracking.metrics import Parts
 from benchmarks.tracking.names import DEFAULT, DLT, RIVALS, SMOOTHER, UNBUFFERED, names_of, rows
 from benchmarks.tracking.rigs import RIGS
 from benchmarks.tracking.sequences import LATE, MATCHED, TWO_WORKERS
-from benchmarks.tracking.tally import N_LEVELS
-from hrc_env.experiments.study.plots import label, new_figure, save
-from hrc_env.experiments.study.report import Metrics, Picture, Report, Table
+from hrc_env.experiments.study.report import Metrics, Report, Table
 from hrc_env.tracking.estimators import ESTIMATORS
 
 _LEAD = f"""\
@@ -46,10 +39,8 @@ takes frames as of the moment at which they arrive."""
 _BATCHES = {"1": "batch 1", "64": "batch 64", "hard_64": "batch 64, mean over hard"}
 
 
-def report(config: Any, parts: Parts, metrics: Metrics, figures: Path) -> Report:
-    """What is to be read; calibration.png is drawn into `figures`."""
-    del config
-    _plot_calibration(figures / "calibration.png", parts)
+def report(metrics: Metrics) -> Report:
+    """What is to be read."""
     rivals = [DEFAULT, *RIVALS]
     swaps = {"": f"identity_swaps.{{rig}}.{TWO_WORKERS}.{{name}}"}
     returns = {
@@ -70,8 +61,6 @@ def report(config: Any, parts: Parts, metrics: Metrics, figures: Path) -> Report
         "## Late frames", _ABOUT_LATE, _by_rig(metrics, (DEFAULT, UNBUFFERED), late),
         "## Two workers: changes of identity per 100 sequences",
         _by_rig(metrics, [name for name in rivals if name != DLT], swaps),
-        "## Calibration",
-        Picture(figures / "calibration.png", "Under the diagonal: over-confident."),
     ))  # fmt: skip
 
 
@@ -150,22 +139,3 @@ def _cost(metrics: Metrics) -> tuple[Table, str]:
         "Smallest and largest of the repeats in brackets. To tell four people apart in four "
         f"cameras takes {association} microseconds a frame."
     )
-
-
-def _plot_calibration(path: Path, parts: Parts) -> None:
-    """Share of joints within the reported region, against what the region claims."""
-    shown = [(rig, what) for rig in RIGS for what in ("clean", "hard", "one_camera")]
-    shown += [(ENV, what) for what in ("four_cameras", "two_cameras", "one_camera")]
-    figure = new_figure(12, 12.8)
-    axes = figure.subplots(3, 3, sharex=True, sharey=True)
-    claimed = np.arange(N_LEVELS + 1) / N_LEVELS
-    for axis, (rig, condition) in zip(axes.flat, shown, strict=True):
-        axis.plot([0, 1], [0, 1], color="0.6", linestyle="--", label="honest")
-        for name in (each for each in (DEFAULT, *RIVALS) if each != DLT):
-            levels = np.array(parts[rig, condition, name][condition]["levels"]).sum(0)
-            held = np.concatenate([[0], np.cumsum(levels) / levels.sum()])
-            axis.plot(claimed, held, label=name, linewidth=2.4 if name == DEFAULT else 1.4)
-        axis.set_aspect("equal")
-        label(axis, "claimed probability", "share of joints inside", f"{rig}, {condition}")
-    figure.legend(*axes.flat[0].get_legend_handles_labels(), loc="outside lower center", ncols=5)
-    save(figure, path)

@@ -45,7 +45,6 @@ def test_files_are_written_and_the_progress_ends_at_one(done):
     content = json.loads((out / "results.json").read_text())
     assert set(content["metrics"]) == set(metrics)
     assert sum(said) == pytest.approx(1.0)
-    assert (out / "figures" / "motion.png").stat().st_size > 5_000
     assert "| saw | wrist_p95_m_s |" in (out / "report.md").read_text()
 
 

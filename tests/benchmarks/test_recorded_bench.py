@@ -158,10 +158,7 @@ def test_detections_are_made_once_and_stored_whole(films, tmp_path, monkeypatch)
 
 
 def test_the_film_shows_all_views_of_every_frame(films, tmp_path):
-    cameras = [
-        camera.pinhole
-        for camera in read_calibration(calibration(tmp_path / "c.txt"), [(160, 320)] * 2)
-    ]
+    cameras = read_calibration(calibration(tmp_path / "c.txt"), [(160, 320)] * 2)
     n_frames = N_FRAMES - 2
     joints = np.tile([0.0, 0.0, 1.5], (n_frames, 15, 1))
     cov = np.tile(1e-4 * np.eye(3), (n_frames, 15, 1, 1))
