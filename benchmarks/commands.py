@@ -62,9 +62,9 @@ class TrackingBench(AnyBench):
             n_seeds = self.seeds or (1 if self.quick else 5)
             return self._beside("_baselines").shown(BASELINES, BaselinesConfig(n_seeds))
         if self.real:
-            from benchmarks.recorded.bench import RECORDED, RecordedConfig
+            from benchmarks.recorded.bench import RECORDED
 
-            return self._beside("_real").shown(RECORDED, RecordedConfig())
+            return self._beside("_real").shown(RECORDED, None)
         from benchmarks.tracking.bench import QUICK, TRACKING, TrackingBenchConfig
 
         config = QUICK if self.quick else TrackingBenchConfig()

@@ -19,7 +19,6 @@ from hrc_env.geometry.cameras import project
 from hrc_env.motion import generator
 from hrc_env.worker.body import worker_truth
 
-TENTH_MM = 1e-4
 PATIENCE_FRAMES = 5
 """A worker who is tracked by then counts as acquired."""
 EMPTY_STEPS = 250
@@ -44,27 +43,15 @@ class Episode:
     """(T, C) whether a camera was named in info as miscalibrated."""
 
     def to_json(self) -> dict[str, Any]:
-        """Plain lists: whole tenths of millimetres and of pixels, -1 where unknown."""
-        return {
-            "error": _whole(self.error_m, TENTH_MM),
-            "std": _whole(self.std_m, TENTH_MM),
-            "inside95": self.inside95.tolist(),
-            "off_px": _whole(self.off_px, 0.1),
-            "family": self.family.tolist(),
-            "named": self.named.astype(int).tolist(),
-        }
+        """Lists of numbers, lengths to a tenth of a millimetre; NaN where unknown."""
+        arrays = {each.name: np.asarray(getattr(self, each.name), float) for each in fields(self)}
+        return {name: np.round(values, 4).tolist() for name, values in arrays.items()}
 
 
 def episode_of(content: dict[str, Any]) -> Episode:
-    """What `Episode.to_json` wrote."""
-    return Episode(
-        error_m=_lengths(content["error"], TENTH_MM),
-        std_m=_lengths(content["std"], TENTH_MM),
-        inside95=np.array(content["inside95"], np.int64),
-        off_px=_lengths(content["off_px"], 0.1),
-        family=np.array(content["family"], np.int64),
-        named=np.array(content["named"], np.bool_),
-    )
+    """What `Episode.to_json` gave."""
+    arrays = {name: np.array(values, float) for name, values in content.items()}
+    return Episode(**{**arrays, "named": arrays["named"] > 0})
 
 
 def some_steps(episode: Episode, steps: Bools | slice) -> Episode:
@@ -163,13 +150,3 @@ def _off_px(env: HRCEnv, joints_world: Floats) -> Floats:
     seen: Bools = np.isfinite(away)
     total = np.where(seen, away, 0.0).sum(-1)
     return np.where(seen.any(-1), total / np.maximum(seen.sum(-1), 1), np.nan)
-
-
-def _whole(values: Floats, unit: float) -> list[Any]:
-    """Whole multiples of a unit as nested lists; -1 where there is no value."""
-    return np.round(np.nan_to_num(values / unit, nan=-1.0)).astype(int).tolist()
-
-
-def _lengths(values: list[Any], unit: float) -> Floats:
-    whole = np.array(values, float)
-    return np.where(whole < 0, np.nan, whole * unit)

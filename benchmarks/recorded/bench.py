@@ -1,8 +1,7 @@
 """The tracking bench on recorded films: every estimator on the same detections."""
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from benchmarks.common import exactly
 from benchmarks.recorded.calibration import read_calibration, tracker_config
@@ -54,19 +53,13 @@ _COLUMNS = [
 ]
 
 
-@dataclass(frozen=True, slots=True)
-class RecordedConfig:
-    """Nothing can be chosen."""
-
-
-def play(config: RecordedConfig, parts: PartCache) -> dict[str, Metric]:
+def play(config: None, parts: PartCache) -> dict[str, Metric]:
     """Fetch, detect, estimate, film; detections that are there already are not made again.
 
     Raises:
         DownloadError: the recording is not there and cannot be fetched.
         WeightsError: the pose network's weights are not there.
     """
-    del config
     recording = fetch_recording(lambda sentence: parts.progress(0.0, sentence))
     parts.progress(0.05, "detecting")
     films = Films(recording.films)
@@ -132,14 +125,10 @@ def report(metrics: Metrics, figures: Path) -> Report:
     ])  # fmt: skip
 
 
-def _settings(config: Any) -> dict[str, Any]:
-    return {**asdict(config), "recording": WHEEL, "follower": FOLLOWER}
-
-
 RECORDED = Study(
     name="bench recorded",
     modules=("benchmarks.recorded.metrics",),
-    settings=_settings,
+    settings=lambda _: {"recording": WHEEL, "follower": FOLLOWER},
     seeds=lambda _: [0],
     n_parts=lambda _: 1,
     play=play,

@@ -9,10 +9,10 @@ import pytest
 from benchmarks.tracking import bench as tracking_bench
 from benchmarks.tracking import sequences
 from benchmarks.tracking.bench import TRACKING, TrackingBenchConfig
+from benchmarks.tracking.cells import CHI2_95_3D, CHI2_LEVELS, tally
 from benchmarks.tracking.names import DLT, rows
 from benchmarks.tracking.rigs import RIGS, make_rig
 from benchmarks.tracking.sequences import make_sequences
-from benchmarks.tracking.tally import CHI2_95_3D, CHI2_LEVELS, tally
 from benchmarks.tracking.timing import time_association, time_estimator
 from hrc_env.core.errors import ConfigError
 from hrc_env.experiments.study import runner
