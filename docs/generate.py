@@ -45,7 +45,7 @@ axes, 1 is {tool} m/s (`control="tool"`). Commands are limited in slew. 25 Hz.
 ## Observation space
 `Box({size},)` float32 for one worker, flat and finite. An entry is the value in its unit,
 clipped to the bound, divided by the scale; `env.unwrapped.split_observation` undoes this.
-Everything about a worker is the *estimate*. With `config={{"horizons_s": (0.2, 0.4)}}` it also
+Everything about a worker is the *estimate*. With `config={{"forecast_s": (0.2, 0.4)}}` it also
 holds where each joint is expected then, one worker after the other, one horizon after the other
 ([how well](tracking.md#ahead)).
 

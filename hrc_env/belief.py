@@ -26,8 +26,8 @@ class Belief:
     """What the task says to the robot (`Task.view`)."""
     action: Floats
     """(B, A) the last action, in [-1, 1]."""
-    ahead: tuple[PoseEstimate, ...] = ()
-    """What is expected of the workers at each of `HRCConfig.horizons_s` from now."""
+    forecasts: tuple[PoseEstimate, ...] = ()
+    """What is expected of the workers at each of `HRCConfig.forecast_s` from now."""
 
 
 def estimated_gap(robot: RobotState, estimate: PoseEstimate) -> Gap:

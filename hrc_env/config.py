@@ -29,9 +29,9 @@ from hrc_env.scene.domain_randomization import AppearanceConfig, appearance_call
 from hrc_env.scene.rigs import RIGS
 from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import Task, task_called
-from hrc_env.tracking.ahead import LONGEST_S
 from hrc_env.tracking.config import ParticleConfig, TrackerConfig, of_kind
 from hrc_env.tracking.estimators import EstimatorChoice, EstimatorSpec, estimator_called
+from hrc_env.tracking.forecast import LONGEST_S
 from hrc_env.tracking.people.association import AssociationConfig
 from hrc_env.worker.body import pool
 
@@ -44,7 +44,7 @@ class HRCConfig:
     """Time between actions [s]; a multiple of `scene.sim_dt`. 0.04 s is 25 Hz."""
     start_spread_rad: tuple[float, ...] = (1.3, 0.15, 0.15, 0.15, 0.15, 0.15)
     """At reset each arm joint is drawn within so much of its home angle [rad]."""
-    horizons_s: tuple[float, ...] = ()
+    forecast_s: tuple[float, ...] = ()
     """Times ahead at which the observation also holds where the workers' joints are expected,
     each in (0, 1] [s]; none by default. (0.2, 0.4) adds 120 entries a worker."""
     worker: str | tuple[str, ...] = "worker_1"
@@ -83,10 +83,10 @@ class HRCConfig:
                 f"start_spread_rad must hold angles >= 0, one a joint, got {self.start_spread_rad}."
             )
         pool(self.worker)
-        for horizon_s in self.horizons_s:
+        for horizon_s in self.forecast_s:
             if not 0 < horizon_s <= LONGEST_S:
                 raise ConfigError(
-                    f"horizons_s must be in (0, {LONGEST_S:g}] s each, got {self.horizons_s}."
+                    f"forecast_s must be in (0, {LONGEST_S:g}] s each, got {self.forecast_s}."
                 )
         substeps = self.ctrl_dt / self.scene.sim_dt
         if substeps < 0.5 or abs(substeps - round(substeps)) > 1e-6:

@@ -28,8 +28,8 @@ class Sizes:
     arm_joints: int
     actions: int
     workers: int
-    horizons: int = 0
-    """How many times ahead were asked for."""
+    forecasts: int = 0
+    """How many forecasts were asked for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,15 +67,15 @@ def shorten(vectors: Floats, softening: float) -> None:
             vectors[k, i] /= divisor
 
 
-def _joints_ahead(now: Belief) -> Floats:
+def _joints_forecast(now: Belief) -> Floats:
     """(B, W, H, J, 3) from the tool point now."""
-    joints = np.stack([later.mean_world for later in now.ahead], axis=2)
+    joints = np.stack([later.mean_world for later in now.forecasts], axis=2)
     return joints - now.robot.tool_world[:, None, None, None]
 
 
-def _std_ahead(now: Belief) -> Floats:
+def _std_forecast(now: Belief) -> Floats:
     """(B, W, H, J)."""
-    return np.stack([standard_deviation_m(later) for later in now.ahead], axis=2)
+    return np.stack([standard_deviation_m(later) for later in now.forecasts], axis=2)
 
 
 ROBOT_TERMS: tuple[ObservationTerm, ...] = (
@@ -144,16 +144,16 @@ SHARED_TERMS: tuple[ObservationTerm, ...] = (
         _nearest_direction,
     ),
     ObservationTerm(
-        "worker_joints_ahead", lambda of: of.workers * of.horizons * N_JOINTS * 3,
+        "worker_joints_forecast", lambda of: of.workers * of.forecasts * N_JOINTS * 3,
         "m", "world", 6.0, 1.0,
-        "From the tool point now to where each joint will be, for each of `horizons_s`.",
-        _joints_ahead,
+        "From the tool point now to where each joint will be, for each of `forecast_s`.",
+        _joints_forecast,
     ),
     ObservationTerm(
-        "worker_joints_ahead_std", lambda of: of.workers * of.horizons * N_JOINTS,
+        "worker_joints_forecast_std", lambda of: of.workers * of.forecasts * N_JOINTS,
         "m", "world", 1.0, 0.25,
         "Standard deviation of each of these (root mean over the axes).",
-        _std_ahead,
+        _std_forecast,
     ),
 )  # fmt: skip
 """What closes it: the last action, and the workers as they are estimated."""

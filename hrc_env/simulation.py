@@ -34,7 +34,7 @@ from hrc_env.scene.physics import Physics
 from hrc_env.scene.rigs import findings
 from hrc_env.step import Info, StepResult, cost_info, no_cost, rows_of, tracking_info
 from hrc_env.tasks.task import World
-from hrc_env.tracking import given
+from hrc_env.tracking import oracle
 from hrc_env.tracking.miscalibration import MiscalibrationFlags
 from hrc_env.worker.body import pool, stack, worker_capsules, worker_truth
 
@@ -68,7 +68,7 @@ class Simulation(Stateful):
 
     CHANGES = (
         "physics", "senses", "motion", "task_state", "streams", "action", "episode_cost", "gap_m",
-        "estimate", "ahead", "worn", "reward_weights",
+        "estimate", "forecasts", "worn", "reward_weights",
     )  # fmt: skip
 
     def __init__(self, batch: int, settings: Settings) -> None:
@@ -102,7 +102,7 @@ class Simulation(Stateful):
         self.layout = observations.layout(
             self.terms,
             observations.Sizes(
-                len(self.scene.home_q), self.n_actions, most, len(config.horizons_s)
+                len(self.scene.home_q), self.n_actions, most, len(config.forecast_s)
             ),
         )
         self.physics = Physics(self.scene, batch)
@@ -113,8 +113,8 @@ class Simulation(Stateful):
         self.action = np.zeros((batch, self.n_actions))
         self.episode_cost = np.zeros(batch)
         self.gap_m = np.zeros(batch)
-        self.estimate = given.prior(batch, most, config.tracker)
-        self.ahead = tuple(given.prior(batch, most, config.tracker) for _ in config.horizons_s)
+        self.estimate = oracle.prior(batch, most, config.tracker)
+        self.forecasts = tuple(oracle.prior(batch, most, config.tracker) for _ in config.forecast_s)
         blank = [np.random.default_rng(0)] * batch
         self.streams = Streams(*(list(blank) for _ in range(5)))
 
@@ -136,8 +136,8 @@ class Simulation(Stateful):
         self.senses.reset(ids, self.streams.sensor, self.streams.tracker)
         motion = generator.current(self.motion, ids)
         truth = worker_truth(self.bodies, motion)
-        estimate, ahead = self._sense(ids, motion, truth)
-        believed = self._believed(ids, robot, estimate, ahead)
+        estimate, forecasts = self._sense(ids, motion, truth)
+        believed = self._believed(ids, robot, estimate, forecasts)
         observation = observations.observe(believed, self.layout, self.terms)
         crew = rows(self.crew, ids)
         info = {
@@ -165,14 +165,14 @@ class Simulation(Stateful):
         q_path = self.physics.step(command, path, apart)
         truth = worker_truth(self.bodies, motion)
 
-        estimate, ahead = self._sense(self._everyone, motion, truth)
+        estimate, forecasts = self._sense(self._everyone, motion, truth)
         robot, arm = chains.robot_along(self.chain, q_path, self.physics.qd)
         seen_world = robot.capsules_world[:, WATCHED_CAPSULES, 1]
         generator.watch(self.motion, seen_world, motion, config.ctrl_dt)
         progress = self.task.advance(
             self.task_state, streams.task, World(robot), config.ctrl_dt, config.task
         )
-        believed = self._believed(self._everyone, robot, estimate, ahead)
+        believed = self._believed(self._everyone, robot, estimate, forecasts)
         terms = {
             **rewards.evaluated(self.task.rewards, believed, progress, previous, config.task),
             **rewards.evaluated(
@@ -249,7 +249,7 @@ class Simulation(Stateful):
     def believed(self) -> Belief:
         """What every robot believes now."""
         robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
-        return self._believed(self._everyone, robot, self.estimate, self.ahead)
+        return self._believed(self._everyone, robot, self.estimate, self.forecasts)
 
     def markers(self, b: int) -> Points3:
         """(M, 3) what the task of environment `b` has to show [m]."""
@@ -265,18 +265,24 @@ class Simulation(Stateful):
         estimate = self.senses.sense(
             moment, picked(streams.sensor, ids), picked(streams.tracker, ids)
         )
-        ahead = tuple(
-            self.senses.ahead(estimate, ids, horizon_s) for horizon_s in self.config.horizons_s
+        forecasts = tuple(
+            self.senses.forecast(estimate, ids, horizon_s) for horizon_s in self.config.forecast_s
         )
         if ids is self._everyone:
-            self.estimate, self.ahead = estimate, ahead
+            self.estimate, self.forecasts = estimate, forecasts
         else:
-            for whole, part in zip((self.estimate, *self.ahead), (estimate, *ahead), strict=True):
+            for whole, part in zip(
+                (self.estimate, *self.forecasts), (estimate, *forecasts), strict=True
+            ):
                 write_rows(whole, ids, part)
-        return estimate, ahead
+        return estimate, forecasts
 
     def _believed(
-        self, ids: Ints, robot: RobotState, estimate: PoseEstimate, ahead: tuple[PoseEstimate, ...]
+        self,
+        ids: Ints,
+        robot: RobotState,
+        estimate: PoseEstimate,
+        forecasts: tuple[PoseEstimate, ...],
     ) -> Belief:
         """What the robots of environments `ids` believe; the records are of them only."""
         return Belief(
@@ -285,7 +291,7 @@ class Simulation(Stateful):
             gap=estimated_gap(robot, estimate),
             task=self.task.view(self.task_state, ids, self.config.task),
             action=self.action[ids],
-            ahead=ahead,
+            forecasts=forecasts,
         )
 
     def _suspects(self, ids: Ints) -> MiscalibrationFlags:

@@ -314,7 +314,7 @@ def test_a_large_site_has_room_and_memory_for_many_workers():
         ({"people": {"temp": 1.0}}, r"Did you mean 'people\.tempo'"),
         ({"people": ["hurried"]}, "a name.*'unaware'.*a mapping"),
         ({"motions": 5}, "list of paths or clips"),
-        ({"config": {"horizons_s": [3.0]}}, r"horizons_s must be in \(0, 1\] s"),
+        ({"config": {"forecast_s": [3.0]}}, r"forecast_s must be in \(0, 1\] s"),
         ({"perception": "pixel"}, "Did you mean 'pixels'"),
         ({"estimator": "ekf"}, "'paper'"),
         ({"cameras": [7]}, "valid indices are 0 to 3"),

@@ -59,6 +59,7 @@ RENAMED = {
     "reward.goal": "task.goal_bonus",
     "reward.progress_per_m": "task.progress_per_m",
     "eyes": "detector",
+    "horizons_s": "forecast_s",
     "per_joint": "particle",
     "tracker.paper_iterations": "tracker.n_iterations",
     "tracker.paper_particles": "tracker.n_particles",

@@ -29,10 +29,10 @@ from hrc_env.pipeline.rendered import CameraSenses
 from hrc_env.pipeline.sensor_input import Generators, Moment, Windows
 from hrc_env.scene.build import Scene
 from hrc_env.scene.domain_randomization import AS_BUILT, Look
-from hrc_env.tracking import given
-from hrc_env.tracking.ahead import ahead
+from hrc_env.tracking import oracle
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import EstimatorChoice, make_estimator
+from hrc_env.tracking.forecast import forecast
 
 LEVELS = ("pixels", "keypoints", "truth", "none")
 CAMERA_LEVELS = LEVELS[:2]
@@ -50,7 +50,7 @@ class Senses(Protocol):
         """Look at `now` and say what is believed of it, in its rows."""
         ...
 
-    def ahead(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
+    def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
         """What is expected in `horizon_s` of rows `ids`, of which `sense` has just said `now`."""
         ...
 
@@ -106,9 +106,9 @@ def make_senses(
     settings = replace(config.tracker, longest_delay_s=memory_s)
     tracker = make_estimator(estimator, projections(scene.cameras), config.ctrl_dt, settings)
     if level == "truth":
-        return GivenSenses(config.tracker, given.prior(batch, scene.n_workers, config.tracker))
+        return GivenSenses(config.tracker, oracle.prior(batch, scene.n_workers, config.tracker))
     if level == "none":
-        return BlindSenses(given.prior(batch, scene.n_workers, config.tracker))
+        return BlindSenses(oracle.prior(batch, scene.n_workers, config.tracker))
     if level == "keypoints":
         return EmulatedSenses(scene, batch, tracker, config, schedule)
     return CameraSenses(scene, batch, tracker, config, schedule)
@@ -147,14 +147,14 @@ class GivenSenses(Stateful):
 
     def sense(self, now: Moment, sensor_rngs: Generators, tracker_rngs: Generators) -> PoseEstimate:
         """The truth, as an estimate; of who is not there, the prior."""
-        seen = given.estimate_from_truth(now.truth)
+        seen = oracle.estimate_from_truth(now.truth)
         if now.present.all():
             return seen
         return _chosen(now.present, seen, rows(self.prior, now.ids))
 
-    def ahead(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
+    def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
         """Where a body that moves so goes: nobody is given the future."""
-        return ahead(now, horizon_s, self.config)
+        return forecast(now, horizon_s, self.config)
 
     def looks(self, b: int) -> tuple[Keypoints | None, Windows]:
         """No camera took part."""
@@ -189,7 +189,7 @@ class BlindSenses(Stateful):
         """The prior."""
         return rows(self.prior, now.ids)
 
-    def ahead(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
+    def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
         """The prior, then as now."""
         return rows(self.prior, ids)
 
