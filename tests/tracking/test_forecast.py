@@ -38,7 +38,7 @@ def deviation(estimate):
 def test_a_horizon_that_is_none_is_refused_in_words(horizon_s):
     with pytest.raises(ConfigError, match=r"horizon must be in \(0, 1\] s, got"):
         check_horizon(horizon_s)
-    with pytest.raises(ConfigError, match="forecast_s must be in"):
+    with pytest.raises(ConfigError, match="horizon"):
         HRCConfig(forecast_s=(0.2, horizon_s))
 
 
@@ -122,7 +122,7 @@ def _followed(name, n_batch):
 
 
 @pytest.mark.parametrize("name", ESTIMATORS)
-def test_every_estimator_forecasts_and_its_state_stays(name):
+def test_every_estimator_looks_ahead_and_its_state_stays(name):
     estimator, state, _ = _followed(name, 2)
     before = estimator.estimate(state)
     later = estimator.forecast(state, 0.3)
