@@ -19,7 +19,7 @@ from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats, Points3
 from hrc_env.experiments.study.report import Report
 from hrc_env.geometry import chains
-from hrc_env.geometry.distances import narrowest_gap
+from hrc_env.geometry.distances import least_separation
 from hrc_env.geometry.shapes import AXES, BOX, CAPSULE, CENTRE, HALF_SIZE, KIND, PLANE
 from hrc_env.motion import generator
 from hrc_env.motion.plans import CLIMB
@@ -124,7 +124,7 @@ def _play(scene: Scene, arguments: Arguments, first: int, notes: Notes) -> None:
     batch, n_workers = min(BATCH, arguments.episodes - first), arguments.workers
     first += arguments.seed
     body = stack(pool(arguments.body))
-    config = generator.MotionConfig(people=generator.people_called(arguments.people))
+    config = generator.MotionConfig(people=generator.PEOPLE[arguments.people])
     state = generator.make_state(batch, n_workers, body, config, scene.grounds)
     rngs = [np.random.default_rng([first + b]) for b in range(batch)]
     generator.reset(state, np.arange(batch), rngs)
@@ -176,7 +176,7 @@ def _measure(body, motion, solids, state, deepest, notes) -> None:
         near = np.flatnonzero(apart < 2.6)
         if len(near):
             ends = (capsules[near, i], radius[near, i], capsules[near, j], radius[near, j])
-            gap = -narrowest_gap(*ends).distance_m
+            gap = -least_separation(*ends).distance_m
             k = int(gap.argmax())
             both = " beside ".join(names[state.activity[near[k], w]] for w in (i, j))
             notes.deep(both, float(gap[k]))

@@ -5,7 +5,7 @@
 "env" is the environment's worker at the level `keypoints` (seeds that the network was not trained
 on), "env_failing" the same while cameras fail, "walkers" and "walkers_hard" the tracking bench's,
 of whom nothing here was told. All start from the same estimate, of `kalman`: `hold` stays there,
-`constant_velocity` goes on, `forecast` is what `Estimator.ahead` gives.
+`constant_velocity` goes on, `forecast` is what `Estimator.forecast` gives.
 """
 
 import time
@@ -24,8 +24,8 @@ from hrc_env.core.records import PoseEstimate
 from hrc_env.core.results import Metric
 from hrc_env.experiments.study.intervals import mean_over, ratio_over, rmse_over
 from hrc_env.experiments.study.report import Column, Report, table_of
-from hrc_env.tracking.ahead import ahead
 from hrc_env.tracking.config import ParticleConfig
+from hrc_env.tracking.forecast import forecast
 
 HORIZONS_S = (0.1, 0.2, 0.4, 0.6, 1.0)
 FIELDS = ("mean_world", "cov_world", "velocity_world", "age_s", "tracked")
@@ -54,7 +54,7 @@ class Forecasts:
         self.frame += 1
         if self.frame % EVERY:
             return None
-        later = (estimator.ahead(state, horizon_s) for horizon_s in HORIZONS_S)
+        later = (estimator.forecast(state, horizon_s) for horizon_s in HORIZONS_S)
         return [
             [part[:, 0].astype(np.float32) for part in (each.mean_world, each.cov_world)]
             for each in later
@@ -107,16 +107,16 @@ def metrics_of(source: str, tracks: Tracks) -> dict[str, Metric]:
 
 
 def costs_us() -> dict[str, Metric]:
-    """Time of `ahead` per worker, alone and with 63 others: the least of many."""
+    """Time of `forecast` per worker, alone and with 63 others: the least of many."""
     metrics, now = {}, follow_env([7], 30).estimates[-1]
     for batch in (1, 64):
         whole = PoseEstimate(*(np.repeat(getattr(now, name), batch, 0) for name in FIELDS))
         times = []
         for _ in range(300):
             begin = time.perf_counter()
-            ahead(whole, 0.4, ParticleConfig())
+            forecast(whole, 0.4, ParticleConfig())
             times.append(1e6 * (time.perf_counter() - begin) / batch)
-        metrics[f"ahead_us.{batch}"] = exactly(min(times), "us", len(times))
+        metrics[f"forecast_us.{batch}"] = exactly(min(times), "us", len(times))
     return metrics
 
 
@@ -133,8 +133,8 @@ def main(arguments: Arguments) -> None:
         Column("coverage95.{}.forecast", "coverage", 3),
         Column("std_over_rmse.{}.forecast", "std/RMSE", 2),
     ]
-    us = [cell(metrics[f"ahead_us.{batch}"]) for batch in (1, 64)]
-    said = f"`ahead` takes {us[0]} us alone, {us[1]} us a worker at batch 64."
+    us = [cell(metrics[f"forecast_us.{batch}"]) for batch in (1, 64)]
+    said = f"`forecast` takes {us[0]} us alone, {us[1]} us a worker at batch 64."
     parts = [table_of("", rows, columns, metrics), said]
     report = Report("Prediction", (__doc__ or "").strip(), parts)
     publish(arguments.out, report, asdict(arguments), [1000, 500], metrics)

@@ -21,7 +21,7 @@ from hrc_env.core.results import Metric, over
 from hrc_env.core.typing import Floats
 from hrc_env.experiments.study.report import Column, Report, table_of
 from hrc_env.geometry import chains
-from hrc_env.geometry.distances import narrowest_gap
+from hrc_env.geometry.distances import least_separation
 from hrc_env.scene.build import Scene, SceneConfig, build
 from hrc_env.scene.physics import Physics, no_workers
 from hrc_env.worker.body import load_body, rest_motion, worker_capsules
@@ -111,7 +111,7 @@ def worker_contact(scene: Scene) -> dict[str, Metric]:
 
     def gap_m(arm: Floats) -> float:
         ends = (arm, scene.chain.capsule_radius_m, person, body.capsule_radius_m)
-        return float(narrowest_gap(*ends).distance_m[0])
+        return float(least_separation(*ends).distance_m[0])
 
     q, pushed = [-1.2, -0.9, 1.2, -1.87, -1.57, 0.0], [1.0, 0, 0, 0, 0, 0.0]
     return contact(scene, q, pushed, path, gap_m)

@@ -22,8 +22,7 @@ import hrc_env  # noqa: F401  registers the ids
 from benchmarks.common import exactly
 from hrc_env.cli.progress import track
 from hrc_env.core.results import Metric, write_results
-from hrc_env.motion.workers import ACTIVITY, BODY
-from hrc_env.tracking.miscalibration import MISCALIBRATED
+from hrc_env.step import ACTIVITY, BODY, MISCALIBRATED
 from hrc_env.vector.env import HRCVectorEnv
 
 WARM_UP_STEPS = 1_000_000

@@ -99,7 +99,7 @@ def phantoms(scene: str, n_steps: int, seed: int, tick: Callable[[float], None])
     while steps < n_steps:
         env.reset(seed=seed)
         seed += 1
-        if env.simulation.crew.present.any():
+        if env.simulation.present.any():
             continue
         n = min(EMPTY_STEPS, n_steps - steps)
         for _ in range(n):
