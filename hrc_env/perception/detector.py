@@ -22,7 +22,6 @@ from hrc_env.core.stateful import Stateful
 from hrc_env.core.typing import Floats, Image, Points2
 from hrc_env.geometry.cameras import PinholeCamera, inside_image
 from hrc_env.perception import blazepose
-from hrc_env.perception.acquisition import Candidates, agreed_windows, apart_from
 from hrc_env.perception.network import (
     LANDMARK_SIDE,
     NETWORKS,
@@ -34,7 +33,15 @@ from hrc_env.perception.network import (
     load_person_detector,
 )
 from hrc_env.perception.noise import STANDING, sigma_px
-from hrc_env.perception.searching import ImageSource, distinct, people, search_jobs
+from hrc_env.perception.searching import (
+    Candidates,
+    ImageSource,
+    agreed_windows,
+    apart_from,
+    distinct,
+    people,
+    search_jobs,
+)
 from hrc_env.perception.weights import find_weights
 
 STATURE_OF_SIDE = 0.75
@@ -175,7 +182,7 @@ class PoseDetector(Stateful):
                 detector stage's turns are counted for each.
             others: windows (C,) of other workers; a search does not find these again.
             found: what `search` found in these very images, if it was asked already.
-            folded: whether the worker is expected to be folded up (`posture.is_folded`).
+            folded: whether the worker is expected to be folded up (`outline.is_folded`).
             posture: how far they are expected to count as each of `calibration.POSTURES`
                 (`outline.posture_of`): folded bodies are seen less exactly.
         """
