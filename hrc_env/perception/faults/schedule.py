@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
+import cv2
 import numpy as np
 
 from hrc_env.core.stateful import Stateful
@@ -211,7 +212,7 @@ def _with_fault(
     elif fault.kind == "wrong_translation":
         T_world_from_cam[:3, 3] += fault.how_much * _direction(rng)
     else:
-        T_world_from_cam[:3, :3] @= _turn(_direction(rng), fault.how_much)
+        T_world_from_cam[:3, :3] @= cv2.Rodrigues(fault.how_much * _direction(rng))[0]
     return replace(camera, K=K, T_world_from_cam=T_world_from_cam)
 
 
@@ -219,10 +220,3 @@ def _direction(rng: np.random.Generator) -> Floats:
     """(3,) any direction."""
     along = rng.standard_normal(3)
     return along / np.linalg.norm(along)
-
-
-def _turn(axis: Floats, angle_rad: float) -> Floats:
-    """(3, 3) a turn about an axis (3,): Rodrigues' formula."""
-    x, y, z = axis
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + np.sin(angle_rad) * cross + (1 - np.cos(angle_rad)) * cross @ cross
