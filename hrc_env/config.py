@@ -15,8 +15,7 @@ import numpy as np
 from hrc_env.control import ControlConfig
 from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.core.mapping import from_mapping, restored
-from hrc_env.geometry.camera_config import CameraConfig
-from hrc_env.geometry.rig_files import read_rig
+from hrc_env.geometry.camera_config import CameraConfig, read_rig
 from hrc_env.metrics import CostConfig
 from hrc_env.motion.generator import PEOPLE, Clip, MotionConfig, PeopleConfig, people_called
 from hrc_env.perception.detector import DetectorConfig

@@ -1,11 +1,26 @@
-"""What a camera is: where it hangs, what its lens and sensor do, when it takes images."""
+"""What a camera is: where it hangs, what its lens and sensor do, when it takes images; rig files.
 
+A rig file is TOML, a `[[camera]]` for each with the fields of `CameraConfig`:
+
+[[camera]]
+name = "left"
+eye_world = [2.9, 2.6, 2.45]
+lens = {model = "kannala_brandt", coefficients = [0.0667]}
+"""
+
+import dataclasses
+import json
 import math
+import tomllib
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.mapping import from_mapping
 from hrc_env.core.typing import Floats
 from hrc_env.geometry.lens import Lens, distorted_radius, rays_cam
 
@@ -83,13 +98,6 @@ def intrinsics(camera: CameraConfig) -> Floats:
     fx, fy = camera.focal_px or (_focal_px(camera),) * 2
     cx, cy = camera.centre_px or (camera.width_px / 2, camera.height_px / 2)
     return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]])
-
-
-def fields_deg(camera: CameraConfig) -> tuple[float, float]:
-    """Horizontal and vertical field of view through the middle of the image [degrees]."""
-    half = _edge_rays(camera, intrinsics(camera))
-    angles = np.degrees(np.arccos(np.clip(half[:, 2], -1.0, 1.0)))
-    return float(angles[0] + angles[1]), float(angles[2] + angles[3])
 
 
 def _focal_px(camera: CameraConfig) -> float:
@@ -183,3 +191,55 @@ def made(
     if make not in MAKES:
         raise unknown("make of camera", make, MAKES)
     return replace(MAKES[make], name=name, eye_world=eye_world, target_world=target_world)
+
+
+def read_rig(path: Path | str) -> tuple[CameraConfig, ...]:
+    """The cameras of a rig file.
+
+    Raises:
+        ConfigError: no such file, no TOML, or a field that is unknown, missing or wrong.
+    """
+    path = Path(path)
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigError(f"The rig file {path} cannot be read: {error}.") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(
+            f"{path} must be TOML with a [[camera]] for each camera; reading it ended with: {error}"
+        ) from error
+    others = sorted(set(content) - {"camera"})
+    entries = content.get("camera", [])
+    tables = isinstance(entries, list) and all(isinstance(entry, dict) for entry in entries)
+    if others or not tables or not entries:
+        raise ConfigError(
+            f"{path} must hold a [[camera]] for each camera and nothing else, "
+            f"got {', '.join(map(repr, others)) or 'no camera'}."
+        )
+    cameras = []
+    for k, entry in enumerate(entries):
+        try:
+            cameras.append(from_mapping(CameraConfig, entry, f"camera[{k}]."))
+        except ConfigError as error:
+            raise ConfigError(f"{path}: {error}") from error
+    return tuple(cameras)
+
+
+def write_rig(path: Path | str, cameras: Sequence[CameraConfig]) -> None:
+    """Write a rig, every field of every camera, so that `read_rig` gives the same back."""
+    tables = []
+    for camera in cameras:
+        fields = dataclasses.asdict(camera).items()
+        lines = [f"{name} = {_toml(value)}" for name, value in fields]
+        tables.append("\n".join(["[[camera]]", *lines]) + "\n")
+    Path(path).write_text("\n".join(tables), encoding="utf-8")
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{name} = {_toml(each)}" for name, each in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)  # TOML's escapes are among JSON's
+    return repr(float(value)) if isinstance(value, float) else str(int(value))

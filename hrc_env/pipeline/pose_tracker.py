@@ -26,7 +26,7 @@ class PoseTracker:
     """Follows the workers before a rig; what level `pixels` does, for one place.
 
     Args:
-        cameras: the rig; `geometry.rig_files.read_rig` and `geometry.cameras.pinhole` make them.
+        cameras: the rig, as of `geometry.cameras.pinhole`.
         n_workers: how many are followed at most.
         dt_s: the usual time between two sets of frames [s].
         estimator: as of an environment.
