@@ -41,8 +41,6 @@ from hrc_env.worker.body import pool, stack, worker_capsules, worker_truth
 CLOSING_M_S = 8.0
 """Arm and worker never come nearer to each other than so fast [m/s]; 3.4 was the most in some
 290,000 steps of arms that were driven to and fro as hard as they can be."""
-WATCHED_CAPSULES = (3, 8)
-"""Of the arm: elbow and tool, whose ends the workers watch."""
 
 
 @dataclass(slots=True)
@@ -80,24 +78,27 @@ class Simulation(Stateful):
         self.task = settings.task
         self.bodies = stack(pool(config.worker))
         fewest, most = worker_counts(settings.n_workers)
-        empty = build(config.scene, scene, 0, self.bodies.names, settings.cameras)
+        empty = build(config.scene, scene, 0, self.bodies.names, settings.cameras, settings.robot)
         self.motion = generator.make_state(
             batch, most, self.bodies, config.motion, empty.grounds, fewest
         )  # first, as it knows how many workers there is room for
-        self.scene = build(config.scene, scene, most, self.bodies.names, settings.cameras)
+        self.scene = build(
+            config.scene, scene, most, self.bodies.names, settings.cameras, settings.robot
+        )
         if perception in CAMERA_LEVELS:
             for finding in findings(self.scene):
                 warnings.warn(finding, stacklevel=3)
         self.settings = {
             "batch": batch, "task": settings.task.id, "perception": perception,
-            "estimator": settings.estimator.name, "scene": scene,
+            "estimator": settings.estimator.name, "scene": scene, "robot": settings.robot.name,
             "cameras": tuple(camera.name for camera in self.scene.cameras),
             "n_workers": (fewest, most) if fewest < most else most, "control": settings.control,
             "config": config,
         }  # fmt: skip
         self.chain = self.scene.chain
-        spread = config.start_spread_rad
-        check_shape("start_spread_rad", (len(spread),), (self.chain.n_joints,), "one a joint")
+        self._spread_rad = np.array(config.start_spread_rad or settings.robot.spread_rad)
+        joints = (self.chain.n_joints,)
+        check_shape("start_spread_rad", self._spread_rad.shape, joints, "one a joint")
         self.n_actions = n_actions(settings.control, self.chain)
         self.layout = observations.layout(
             self.terms,
@@ -167,7 +168,7 @@ class Simulation(Stateful):
 
         estimate, ahead = self._perceive(self._everyone, motion, truth)
         robot, arm = chains.robot_along(self.chain, q_path, self.physics.qd)
-        seen_world = robot.capsules_world[:, WATCHED_CAPSULES, 1]
+        seen_world = robot.capsules_world[:, self.scene.watched, 1]
         generator.watch(self.motion, seen_world, motion, config.ctrl_dt)
         progress = self.task.advance(
             self.task_state, streams.task, World(robot), config.ctrl_dt, config.task
@@ -228,7 +229,7 @@ class Simulation(Stateful):
 
     def _starting_angles(self, ids: Ints) -> Floats:
         """(len(ids), N) arm angles near home, turned anywhere in front of the base."""
-        spread = np.array(self.config.start_spread_rad)
+        spread = self._spread_rad
         angles = [
             self.scene.home_q + self.streams.robot[b].uniform(-1, 1, len(spread)) * spread
             for b in ids

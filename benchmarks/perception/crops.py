@@ -156,7 +156,7 @@ def instants(
     state = generator.make_state(1, 1, body, HRCConfig().motion, scene.grounds)
     streams = [np.random.default_rng(rng.integers(2**63))]
     generator.reset(state, np.arange(1), streams)
-    spread, name = np.array(HRCConfig().start_spread_rad), ""
+    spread, name = np.array(scene.robot.spread_rad), ""
     for k in range(n):
         for _ in range(PATIENCE):
             steps = int(rng.integers(*PAUSE_STEPS))

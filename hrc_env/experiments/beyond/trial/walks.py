@@ -10,7 +10,7 @@ from hrc_env.core.records import WorkerMotion
 from hrc_env.core.typing import JointAngles
 from hrc_env.motion import generator
 from hrc_env.scene.build import build
-from hrc_env.worker.body import Bodies, pool, stack
+from hrc_env.worker.body import Body, pool, stack
 
 BODIES = "any"
 """Every episode gives each worker one of the baked bodies."""
@@ -20,7 +20,7 @@ BODIES = "any"
 class Walks:
     """Episodes of the same length, side by side."""
 
-    bodies: Bodies
+    bodies: Body
     motions: tuple[WorkerMotion, ...]
     """(T) records of arrays (B, W, ...), a control step apart; the first is the beginning."""
     q: JointAngles
@@ -47,6 +47,6 @@ def walks_of(scene: str, n_workers: int, seeds: tuple[int, ...], n_steps: int) -
     for _ in range(n_steps - 1):
         _, motion = generator.advance(state, rngs, config.scene.sim_dt, config.n_substeps)
         motions.append(motion)
-    spread = np.array(config.start_spread_rad)
+    spread = np.array(config.start_spread_rad or place.robot.spread_rad)
     turned = [np.random.default_rng([seed, 1]).uniform(-spread, spread) for seed in seeds]
     return Walks(bodies, tuple(motions), place.home_q + np.stack(turned))
