@@ -61,7 +61,6 @@ def test_the_jacobian_is_the_tools_change_per_joint(q):
     np.testing.assert_allclose(chains.jacobian(ARM, q), (ahead - behind).T / (2 * step), atol=1e-7)
 
 
-@settings(max_examples=15, deadline=None)
 def test_robot_state_holds_the_tool_its_velocity_and_the_capsules():
     rng = np.random.default_rng(0)
     q, qd = rng.uniform(-2, 2, (2, 3, 6)), rng.uniform(-1, 1, (2, 3, 6))
