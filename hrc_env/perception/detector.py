@@ -77,7 +77,7 @@ class DetectorConfig:
     """A camera whose whole image was searched for nobody is searched again so many steps later."""
     runtime: str = "litert"
     """What the networks run on: "litert", "openvino" (an extra, faster) or "auto"
-    (docs/speed.md)."""
+    (docs/perception_and_estimators.md)."""
     network: str = "full"
     """The landmark network: "lite", "full" or "heavy"; all but "full" are fetched once with
     `python -m hrc_env setup --networks lite heavy`."""
