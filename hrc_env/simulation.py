@@ -129,7 +129,7 @@ class Simulation(Stateful):
                 organ[b] = stream
         generator.reset(self.motion, ids, self.streams.motion)
         self.worn[ids] = bodies_of(self.motion, ids, self.bodies.names)
-        self.physics.reset(ids, self._starting_angles(ids), self.motion.body[ids])
+        self.physics.reset(ids, self._starting_angles(ids), self.motion.workers["body"][ids])
         self.action[ids], self.episode_cost[ids], self.gap_m[ids] = 0.0, 0.0, 0.0
         robot = chains.robot_state(self.chain, self.physics.q[ids], self.physics.qd[ids])
         self.task.reset(self.task_state, ids, self.streams.task, World(robot), self.config.task)
@@ -260,7 +260,9 @@ class Simulation(Stateful):
         self, ids: Ints, motion: WorkerMotion, truth: WorkerTruth
     ) -> tuple[PoseEstimate, tuple[PoseEstimate, ...]]:
         """Let the senses look at environments `ids`; their rows of the estimates now and ahead."""
-        moment = Moment(ids, self.physics.q[ids], motion, truth, self.motion.present[ids] > 0.0)
+        moment = Moment(
+            ids, self.physics.q[ids], motion, truth, self.motion.workers["present"][ids]
+        )
         streams = self.streams
         estimate = self.senses.sense(
             moment, picked(streams.sensor, ids), picked(streams.tracker, ids)

@@ -11,7 +11,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import ANKLE_Z, ARM, BALL_X, BALL_Z, HEEL_X, LEG, N_SIZES, STAND_Z
-from hrc_env.motion.feet import about
+from hrc_env.motion.curves import about
 
 VERSION = 1
 """Of the file; raised when its columns or fields change."""

@@ -91,3 +91,10 @@ def decay(u: float, duration: float, value: float, rate: float) -> float:
 def wrap(angle: float) -> float:
     """The same direction in (-pi, pi]."""
     return math.atan2(math.sin(angle), math.cos(angle))
+
+
+@kernel
+def about(pitch: float, pivot_x: float, pivot_z: float) -> tuple[float, float]:
+    """How far forward and up the ankle goes when the foot pitches about a point of its own."""
+    cos, sin = math.cos(pitch), math.sin(pitch)
+    return pivot_x * (1.0 - cos) - pivot_z * sin, pivot_z * (1.0 - cos) + pivot_x * sin

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.core.records import WORKPLACE_KINDS
-from hrc_env.motion.plans import ACTIVITY_NAMES
+from hrc_env.motion.state import ACTIVITY_NAMES
 from hrc_env.worker.props import PROPS
 
 HERE = "here"

@@ -11,9 +11,9 @@ import math
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
-from hrc_env.motion import plans as pl
 from hrc_env.motion.anatomy import ANKLE_Z, BALL_X, BALL_Z, HEEL_X
-from hrc_env.motion.curves import cruise, hump, min_jerk
+from hrc_env.motion.curves import about, cruise, hump, min_jerk
+from hrc_env.motion.state import Worker
 
 STRIKE_PITCH, PUSH_PITCH = -0.35, 1.0
 """Foot's pitch at heel strike and greatest at push-off of a full stride [rad]: about -20 and
@@ -41,32 +41,31 @@ def _roll(t: float, lift: float, land: float, period: float, stride: float) -> t
 
 
 @kernel
-def _last_step(t: float, first: int, count: int, plan: Floats) -> int:
+def _last_step(t: float, first: int, count: int, me: Worker) -> int:
     """Index of the latest step of a foot that has left the floor; below `first` if none."""
-    k = math.floor((t - plan[pl.STEP_START]) / plan[pl.STEP_PERIOD])
+    k = math.floor((t - me.step_start) / me.step_period)
     k -= (k - first) % 2
     return min(k, count - 1 - (count - 1 - first) % 2)
 
 
 @kernel
-def step_time(t: float, plan: Floats) -> float:
+def step_time(t: float, me: Worker) -> float:
     """The time that counts for feet: it turns round when the steps are gone back."""
-    undo = plan[pl.UNDO_AT]
+    undo = me.undo_at
     return t if undo <= 0.0 or t < undo else 2.0 * undo - t
 
 
 @kernel
-def foot(
-    t: float, side: int, plan: Floats, prints: Floats, stance: Floats, size: Floats, q: Floats
-) -> None:
+def foot(t: float, side: int, prints: Floats, stance: Floats, me: Worker) -> None:
     """Write the ankle columns of one side at time t into the control vector."""
+    q = me.q
     x, y, yaw, ground = stance[side, 0], stance[side, 1], stance[side, 2], stance[side, 4]
     heel_up, toes_up, rise, flown = 0.0, 0.0, 0.0, 0.0
-    count = int(plan[pl.STEP_COUNT])
+    count = me.step_count
     if count > 0:
-        start, period, swing = plan[pl.STEP_START], plan[pl.STEP_PERIOD], plan[pl.STEP_SWING]
-        first = (side + int(plan[pl.STEP_FIRST])) % 2
-        k = _last_step(t, first, count, plan)
+        start, period, swing = me.step_start, me.step_period, me.step_swing
+        first = (side + me.step_first) % 2
+        k = _last_step(t, first, count, me)
         coming = max(k + 2, first)
         if coming < count:
             lift = start + coming * period
@@ -88,19 +87,19 @@ def foot(
             rise = (LIFT_BASE_M + LIFT_STRIDE_M * stride) * hump(w)
             flown = min_jerk(2.0 * w) if w < 1.0 else 0.0
     at = c.ANKLE + 6 * side
-    ahead, above = about(heel_up, size[BALL_X], size[BALL_Z])
-    behind, below = about(toes_up, size[HEEL_X], -size[ANKLE_Z])
+    ahead, above = about(heel_up, me.size[BALL_X], me.size[BALL_Z])
+    behind, below = about(toes_up, me.size[HEEL_X], -me.size[ANKLE_Z])
     q[at] = x + math.cos(yaw) * (ahead + behind)
     q[at + 1] = y + math.sin(yaw) * (ahead + behind)
-    q[at + 2] = size[ANKLE_Z] + above + below + rise + ground
+    q[at + 2] = me.size[ANKLE_Z] + above + below + rise + ground
     q[at + 3], q[at + 4], q[at + 5] = yaw, heel_up + toes_up, heel_up * flown + toes_up
 
 
 @kernel
-def feet(t: float, plan: Floats, prints: Floats, stance: Floats, size: Floats, q: Floats) -> None:
+def feet(t: float, me: Worker) -> None:
     """Both."""
     for side in range(2):
-        foot(t, side, plan, prints, stance, size, q)
+        foot(t, side, me.prints, me.stance, me)
 
 
 @kernel
@@ -110,20 +109,14 @@ def _climbed(w: float, step_up: float) -> float:
 
 
 @kernel
-def raise_heel(side: int, pitch: float, size: Floats, q: Floats) -> None:
+def raise_heel(side: int, pitch: float, me: Worker) -> None:
     """Pitch a standing foot about its ball, where the toes stay (negative: about its heel)."""
+    q = me.q
     at = c.ANKLE + 6 * side
-    ahead, above = about(pitch, size[BALL_X], size[BALL_Z])
+    ahead, above = about(pitch, me.size[BALL_X], me.size[BALL_Z])
     if pitch < 0.0:
-        ahead, above = about(pitch, size[HEEL_X], -size[ANKLE_Z])
+        ahead, above = about(pitch, me.size[HEEL_X], -me.size[ANKLE_Z])
     q[at] += math.cos(q[at + 3]) * ahead
     q[at + 1] += math.sin(q[at + 3]) * ahead
     q[at + 2] += above
     q[at + 4] += pitch
-
-
-@kernel
-def about(pitch: float, pivot_x: float, pivot_z: float) -> tuple[float, float]:
-    """How far forward and up the ankle goes when the foot pitches about a point of its own."""
-    cos, sin = math.cos(pitch), math.sin(pitch)
-    return pivot_x * (1.0 - cos) - pivot_z * sin, pivot_z * (1.0 - cos) + pivot_x * sin

@@ -71,7 +71,9 @@ def bodies_of(motion: MotionState, ids: Ints, names: tuple[str, ...]) -> NDArray
     """
     said = np.full(len(ids), None, object)
     for row, b in enumerate(ids.tolist()):
-        there = zip(motion.body[b].tolist(), motion.present[b].tolist(), strict=True)
+        there = zip(
+            motion.workers["body"][b].tolist(), motion.workers["present"][b].tolist(), strict=True
+        )
         said[row] = tuple(names[k] if present else ABSENT_NAME for k, present in there)
     return said
 

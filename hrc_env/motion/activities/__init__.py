@@ -26,7 +26,7 @@ In place (`place` gives the height only):
     drill at a height of 1.7 m or more is overhead work; hammer, drill and measure below 0.6 m
     are done kneeling.
 
-Loads, which stay in the hands from one activity to the next (`plan[pl.LOAD_PROP]` > 0 says that
+Loads, which stay in the hands from one activity to the next (`plan[st.LOAD_PROP]` > 0 says that
 one is held) while the worker walks, turns, stands, stumbles or looks round:
 
     plan_pick_up(draws, place, prop, on_shoulder, me)   a box or a board, from `height`
