@@ -26,6 +26,8 @@ class EnvironmentArguments:
     of the scene if not given."""
     scene: str = "lab"
     """lab or site."""
+    robot: str = "ur10e_like"
+    """ur10e_like, or one that was registered (--import)."""
     n_workers: int | tuple[int, int] = 1
     """How many workers; two numbers are the fewest and the most, drawn for every episode."""
     people: str | None = None
@@ -66,6 +68,7 @@ class EnvironmentArguments:
             "perception": self.perception,
             "estimator": self.estimator,
             "scene": self.scene,
+            "robot": self.robot,
             "n_workers": self.n_workers,
             "control": self.control,
             **{name: value for name, value in given.items() if value},
