@@ -17,15 +17,13 @@ CLAVICLE, UPPER_ARM, FOREARM, HAND, THIGH, SHANK, FOOT, TOES = range(8)
 ARM, FOREARM_GRIP, LEG, THIGH_LENGTH, SHANK_LENGTH, ANKLE_Z, STAND_Z = range(7)
 ANKLE_X, BALL_X, BALL_Z, HEEL_X, UPPER_LENGTH = range(7, 12)
 N_SIZES = 12
-"""Columns of `Anatomy.size` [m]: shoulder to grip, elbow to grip, hip to ankle, its two
-bones, height of the resting ankle, height of the standing pelvis; forward of the pelvis the
-ankle; forward of and above the ankle the ball of the foot; the heel; the upper arm."""
+"""Columns of `Anatomy.size` [m]: shoulder to grip, elbow to grip, hip to ankle, its bones, heights of
+ankle and standing pelvis; ankle ahead of it; ball ahead of and above the ankle; heel; upper arm."""
 
 GRIP_M = 0.08
 """How far beyond the wrist a hand grips (half a hand's length, a judgement)."""
 FOREARM_TWIST_RAD, HAND_TWIST_RAD = 0.15, 0.35
-"""Outward turns about the forearm from the rest pose, whose palms look down: with these a
-hanging palm faces the thigh; judgement."""
+"""Outward turns about the forearm from the rest pose, so that a hanging palm faces the thigh."""
 HEEL_M = -0.045
 """Heel's contact behind the ankle (a quarter of a foot, a judgement)."""
 STAND_SHARE = 0.994

@@ -1,8 +1,7 @@
 """What a worker does next: decided when an activity has ended, from uniform draws in [0, 1).
 
-A worker goes about errands (`errands`): a task at a place, then what follows it, there or
-elsewhere. Who wants to go somewhere looks for a way that meets nobody (`routes`, `traffic`),
-takes another place of the kind if there is none, or waits.
+Errands are tasks at places (`errands`); who wants to go somewhere looks for a way that meets
+nobody, takes another place of the kind if there is none, or waits.
 """
 
 import math
@@ -51,14 +50,9 @@ def follow_up(state: MotionState, b: int, w: int, draws: Floats) -> None:
 
 
 def begin_episode(state: MotionState, b: int, n_present: int, bodies: Ints, draws: Floats) -> None:
-    """Put the workers of environment b at places of theirs, in the middle of something.
+    """Put n_present workers of environment b at places of theirs, in the middle of something.
 
-    Args:
-        state: changed in place.
-        b: which environment.
-        n_present: how many of its workers are there; the others are parked.
-        bodies: (W,) which body each has.
-        draws: (W, 2, N_DRAWS): of each worker's beginning, and of their first activity.
+    They have `bodies` (W,); draws (W, 2, N_DRAWS) are of their beginning and their first activity.
     """
     mind, workers = state.mind, state.workers[b]
     workers[...] = np.zeros((), st.WORKER)
@@ -197,10 +191,7 @@ def _stand(who: Decision, lasts: float) -> tuple[int, float]:
 
 
 def _wait(who: Decision) -> tuple[int, float]:
-    """Wait for a way; after a while, with empty hands, think of something else to do.
-
-    Who has waited long sets down what they hold, or looks about.
-    """
+    """Wait for a way; after a while think of something else, at last set down what is held."""
     me = who.me
     if me["going"] == UNDER_WAY:
         who.go(WAITING)

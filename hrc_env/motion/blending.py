@@ -21,8 +21,7 @@ from hrc_env.motion.walk import footprint, walk
 BLEND_S = 0.45
 """Time in which the difference between two activities decays [s]; about a settling step."""
 RATE_H_S = 1e-4
-"""Step of the difference quotient of the closed form that gives velocities [s]: at 60 m/s^2
-its error is 3 mm/s."""
+"""Step of the difference quotient that gives velocities [s]: 3 mm/s of error at 60 m/s^2."""
 
 
 @kernel

@@ -12,10 +12,7 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class PeopleConfig:
-    """What workers notice of the robot and do then, and how briskly they go about their work.
-
-    Judgement where no source is named; change them to study other people.
-    """
+    """What workers notice of the robot, and how brisk they are; judgement where no source is named."""
 
     notice_m: float = 0.40
     """Workers notice a part of the arm that comes so near to trunk, head or a hand [m]."""
@@ -91,10 +88,7 @@ def people_called(name: str) -> PeopleConfig:
 
 @dataclass(frozen=True)
 class MotionConfig:
-    """What a worker does and how fast; ranges are drawn from uniformly.
-
-    "Judgement" marks choices that no source fixes; change them to study another workplace.
-    """
+    """What a worker does and how fast; ranges are drawn from uniformly. "Judgement": no source."""
 
     near_probability: float = 0.85
     """Chance that the next errand is at the robot; judgement, so that the two often meet."""

@@ -24,8 +24,7 @@ class Task:
     at: str
     """Kind of workplace (`WORKPLACE_KINDS`), or "here"."""
     then: tuple[tuple[str, float], ...] = ()
-    """Names of the tasks that may follow and their weights; nothing: the errand is over. When a
-    worker has been long enough at a place, so is an errand that would stay there."""
+    """What may follow, with weights; nothing, or only the same place for too long: the errand is over."""
     begins: float = 0.0
     """Weight with which an errand begins with this task; 0: none does."""
     prop: str = "nothing"
@@ -78,12 +77,7 @@ TASKS: tuple[Task, ...] = (
 
 
 def check_tasks(tasks: Sequence[Task]) -> None:
-    """Check names and weights.
-
-    Raises:
-        ConfigError: a name of an activity, a kind of place, a task or a prop that there is not,
-            bad weights, or no task at the robot.
-    """
+    """Refuse unknown names of activities, places, tasks and props, bad weights, and no robot."""
     names = [task.name for task in tasks]
     if len(set(names)) < len(names):
         raise ConfigError(f"Tasks must have different names, got {names}.")

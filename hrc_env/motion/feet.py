@@ -1,9 +1,8 @@
 """Feet: locked to their footprint while loaded, rolling from heel to ball, swinging between.
 
-Step k of a plan is taken by foot (first + k) % 2, leaves the floor at start + k * period and
-lands a fixed swing later. A footprint is where the ankle's shadow falls: x, y, heading; the
-share of a full stride of the step that made it, which scales its roll and its height; and how
-high the ground is there. Steps may be gone back: then their time runs backwards.
+Step k is taken by foot (first + k) % 2, leaves the floor at start + k * period and lands a fixed
+swing later. Footprints: the ankle's x, y, heading; the share of a full stride of the step that
+made it; height of the ground. Steps may be gone back: then their time runs backwards.
 """
 
 import math
@@ -16,8 +15,7 @@ from hrc_env.motion.curves import about, cruise, hump, min_jerk
 from hrc_env.motion.state import Worker
 
 STRIKE_PITCH, PUSH_PITCH = -0.35, 1.0
-"""Foot's pitch at heel strike and greatest at push-off of a full stride [rad]: about -20 and
-57 degrees in level walking (Winter, Biomechanics and Motor Control of Human Movement)."""
+"""Foot's pitch at heel strike and push-off of a full stride [rad] (Winter, Biomechanics)."""
 FLAT_S, ROLL_SHARE = 0.10, 0.62
 """Heel strike to foot flat [s]; heel-off to toe-off as a share of the period of a step."""
 RAMP_SHARE = 0.29

@@ -66,15 +66,11 @@ def make_state(
     """Workers of `batch` environments, `n_workers` each; call `reset` before use.
 
     Args:
-        batch: environments.
-        n_workers: workers whom each has room for.
+        batch, n_workers: how many environments, and workers whom each has room for.
         body: of all of them, or those of which each episode gives each worker one.
         config: settings.
         grounds: where they walk and work.
-        fewest: so many workers are in an episode at least, drawn at its beginning; None: all.
-
-    Raises:
-        ConfigError: sizes or settings that cannot be, with what can.
+        fewest: so many are in an episode at least, drawn at its beginning; None: all.
     """
     if batch < 1 or n_workers < 0:
         raise ConfigError(f"Need batch >= 1 and n_workers >= 0, got {batch} and {n_workers}.")
@@ -108,8 +104,7 @@ def reset(state: MotionState, ids: Ints, rngs: Sequence[np.random.Generator]) ->
 
 
 def drawn_bodies(draws: Floats, n_bodies: int) -> Ints:
-    """(W,) a body for each worker by draws (W,) in [0, 1), no two the same as long as there are
-    others."""
+    """(W,) a body for each worker by draws in [0, 1), no two the same as long as there are others."""
     bodies, left = np.zeros(len(draws), np.int64), list[int]()
     for w, draw in enumerate(draws.tolist()):
         left = left or list(range(n_bodies))
@@ -120,17 +115,10 @@ def drawn_bodies(draws: Floats, n_bodies: int) -> Ints:
 def advance(
     state: MotionState, rngs: Sequence[np.random.Generator], dt_s: float, n_steps: int
 ) -> tuple[WorkerPath, WorkerMotion]:
-    """Move on by n_steps of dt_s.
+    """Move on by n_steps of dt_s; generators are drawn from only when an activity ends.
 
-    Args:
-        state: changed in place.
-        rngs: one generator an environment, drawn from only when an activity ends.
-        dt_s: seconds between poses, positive.
-        n_steps: T >= 1.
-
-    Returns:
-        The bodies' path, arrays (B, T, W, 22, ...) at dt_s, 2 dt_s, ... after the last call,
-        and their motion at its end, (B, W, 22, ...).
+    Returns the path, arrays (B, T, W, 22, ...) at dt_s, 2 dt_s, ... after the last call, and the
+    motion at its end, (B, W, 22, ...).
     """
     workers, frames = state.workers, state.mind.clips.frames
     batch, n_workers = workers.shape
@@ -155,14 +143,7 @@ def _over(workers: Workers) -> Bools:
 def watch(
     state: MotionState, elbow_and_tool_world: Floats, motion: WorkerMotion, dt_s: float
 ) -> None:
-    """Let the workers see the robot; they react in the steps to come.
-
-    Args:
-        state: changed in place.
-        elbow_and_tool_world: (B, 2, 3) where these truly are [m].
-        motion: the workers now.
-        dt_s: since they last looked [s].
-    """
+    """Let the workers see where elbow and tool (B, 2, 3) are, dt_s after the last look."""
     people = state.mind.config.people
     settings = (people.notice_m, people.fast_m_s, people.calm_s)
     notice(dt_s, settings, elbow_and_tool_world, motion.position_world, state.workers)

@@ -85,10 +85,7 @@ def attach(child: int, parent: int, me: Worker) -> None:
 
 @kernel
 def aim(bone: int, end: int, length: float, me: Worker) -> None:
-    """Turn a bone so that it points from its origin to p[end], its hinge along p[HINGE].
-
-    frame[bone] holds the rows (bone, hinge x bone, hinge) of the rest pose.
-    """
+    """Turn a bone to point from its origin to p[end], its hinge along p[HINGE]; see `Anatomy.frame`."""
     p, r = me.p, me.r
     inverse = 1.0 / length
     bx = (p[end, 0] - p[bone, 0]) * inverse
@@ -107,8 +104,7 @@ def aim(bone: int, end: int, length: float, me: Worker) -> None:
 def bend(
     start: int, end: int, first: float, second: float, knee: float, limit: float, me: Worker
 ) -> None:
-    """Two-bone IK from p[start] to p[TARGET]: sets the middle joint p[start + 1] on the side of
-    p[POLE], the end p[end] at (or, where the bones are too short, towards) the target."""
+    """Two-bone IK from p[start] to p[TARGET]: the middle p[start + 1] towards p[POLE], and p[end]."""
     p = me.p
     dx = p[TARGET, 0] - p[start, 0]
     dy = p[TARGET, 1] - p[start, 1]
@@ -163,10 +159,7 @@ def trunk(me: Worker) -> None:
 
 @kernel
 def shoulder(side: int, cos: float, sin: float, me: Worker) -> None:
-    """The clavicle, going a little up and forward with the hand; the grip goes to p[TARGET].
-
-    cos and sin are of the level heading of the chest, the frame of hanging arms.
-    """
+    """The clavicle, going a little up and forward with the hand; the grip goes to p[TARGET]."""
     q, p, r = me.q, me.p, me.r
     sign = 1.0 - 2.0 * side
     clavicle = LEFT + side * SIDE_STRIDE + CLAVICLE
@@ -197,8 +190,7 @@ def shoulder(side: int, cos: float, sin: float, me: Worker) -> None:
 
 @kernel
 def arm(side: int, cos: float, sin: float, me: Worker) -> None:
-    """Shoulder to hand; the elbow back and outwards, and down but where the arm hangs: there down
-    is along the arm, which leaves the elbow no side."""
+    """Shoulder to hand, the elbow back and out; cos and sin are of the level heading of the chest."""
     p = me.p
     shoulder(side, cos, sin, me)
     sign = 1.0 - 2.0 * side

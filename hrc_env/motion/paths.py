@@ -1,8 +1,7 @@
 """A way over the floor: straight lines joined by arcs, by the metres walked along it.
 
-Rows of `path` are its pieces: where each begins [m], its first point, its direction there [rad],
-its curvature [1/m] and the integral of the direction up to it [rad m].
-Directions run on and are not wrapped.
+Pieces: where each begins [m], its point, direction there [rad] (not wrapped), curvature [1/m], and
+the integral of the direction up to it [rad m].
 """
 
 import math
@@ -13,18 +12,14 @@ from hrc_env.motion.curves import wrap
 from hrc_env.motion.state import MAX_VIA, Worker
 
 HEADING_WINDOW_M = 0.3
-"""Walkers face the mean direction of so much of the path behind and ahead: people turn into a
-corner before they are in it (Grasso et al. 1998 saw the head lead by about 0.2 s); judgement."""
+"""Walkers face the mean direction of so much of the path behind and ahead (Grasso et al. 1998)."""
 OWN_EDGE, SHARED_EDGE = 0.9, 0.5
 """Most of an edge that the arc of a corner takes: of the first or last, of one between two."""
 
 
 @kernel
 def lay_path(start: tuple[float, float], via: Floats, end: tuple[float, float], me: Worker) -> None:
-    """Write the path from start to end past corners; length, pieces, sharpest curve.
-
-    `via` (n, 3) are the corners: x, y, and how far from it at most its arc may begin [m].
-    """
+    """Write the path past corners `via` (n, 3): x, y, and how far from it its arc may begin [m]."""
     n = min(via.shape[0], MAX_VIA)
     x, y, s, total, count = start[0], start[1], 0.0, 0.0, 0
     me.sharpest, heading, first = 0.0, 0.0, True

@@ -87,10 +87,7 @@ def stand(x: float, y: float, yaw: float, clock_s: float, me: Worker) -> None:
 
 @kernel
 def lean(amount: float, squat: float, twist: float, me: Worker) -> None:
-    """Bend the trunk forward (1: a deep bow), the knees too by the share `squat`, and turn.
-
-    The pelvis goes back as the trunk goes forward, so that the feet can stay under the weight.
-    """
+    """Bend the trunk forward (1: a deep bow), the pelvis going back, knees by `squat`, and turn."""
     q = me.q
     back = (0.07 + 0.10 * squat) * amount
     q[c.ROOT_X] -= math.cos(q[c.HEADING]) * back

@@ -1,8 +1,7 @@
-"""What workers notice of the robot, and what that does to what they are at.
+"""What workers notice of the robot: after a while they pause, or step back with the hands taken away.
 
-Somebody who notices takes a while, and then pauses or takes the hands away and steps back, or
-does neither; which, and how long it takes, is drawn when an activity begins. Hands pause by
-their activity's time coming to a halt, and are taken away by its going backwards; walkers brake.
+Hands pause by their activity's time coming to a halt, and are taken away by its going backwards;
+walkers brake. What they would do, and how late, is drawn when an activity begins.
 """
 
 import math
@@ -29,10 +28,7 @@ People = tuple[float, float, float]
 def notice(
     dt_s: float, people: People, robot_world: Floats, position_world: Floats, workers: Workers
 ) -> None:
-    """Let every worker look at the robot, dt_s after the last look, and react when it is time.
-
-    From points of the arm (B, 2, 3) and the workers' segments (B, W, 22, 3) [m].
-    """
+    """Let all look at the arm (B, 2, 3), dt_s after the last look, and react when it is time."""
     for b, w in np.ndindex(workers.shape):
         me = workers[b, w]
         if me.present:

@@ -1,7 +1,5 @@
-"""Ways round what stands there and round other people: A* on a grid, pulled tight.
-
-Hart, Nilsson and Raphael (1968), doi:10.1109/TSSC.1968.300136; corners are where a pulled
-string would touch, and arcs round them (`paths`).
+"""Ways round what stands there and other people: A* on a grid (Hart, Nilsson and Raphael 1968),
+pulled tight; corners are where a pulled string would touch, and arcs round them (`paths`).
 """
 
 import heapq
@@ -21,8 +19,7 @@ STRIDE = 3
 EASE_M = 0.7
 """So near its ends a way may be as near to things as its ends are [m]."""
 SEARCHED_M, PULLED_M, WALKED_M = 0.05, 0.03, -0.02
-"""Slack that nodes, straight lines and the arcs at last must have [m]: each step of the planning
-may lose a little."""
+"""Slack that nodes, straight lines and the arcs at last must have [m]."""
 SAMPLE_M = 0.06
 """Lines are looked at in steps of this length [m]."""
 ARMS_M = (1.2, 0.7, 0.35, 0.15, 0.02)
@@ -45,10 +42,7 @@ class Ground(NamedTuple):
 
 @kernel
 def roomy(x: float, y: float, margin: float, ground: Ground) -> bool:
-    """Whether a point of a way is free.
-
-    With `margin` [m] of slack far from the ends, less where these have less themselves.
-    """
+    """Whether a point of a way is free, with `margin` [m] of slack far from the ends."""
     need = margin
     for k in range(2):
         if ground.ends[k, 2] < margin:
@@ -81,15 +75,10 @@ def route(
     start: tuple[float, float], end: tuple[float, float], bow: float, discs: Floats,
     slack: Floats, origin: Floats, via: Floats, me: Worker,
 ) -> int:  # fmt: skip
-    """Find a way and lay the path; the number of its corners, -1 where there is none.
+    """Find a way and lay the path; the number of its corners `via` (MAX_VIA, 3), -1: there is none.
 
-    Args:
-        start, end: x, y [m].
-        bow: in [-1, 1], how much and to which side a free way bends.
-        discs: (n, 3) x, y, radius to keep away from; those that hold an end give way to it.
-        slack, origin: the field of a `Floorplan`.
-        via: (MAX_VIA, 3) corners, written; see `paths.lay_path`.
-        me: its path is written.
+    `bow` in [-1, 1] is how a free way bends; discs (n, 3), x, y, radius, are kept away from, but
+    give way where they hold an end; slack and origin are a `Floorplan`'s field.
     """
     ends, own = np.empty((2, 3)), discs.copy()
     for k in range(2):

@@ -113,10 +113,7 @@ def meets_somebody(who: Decision, activity: int, lasts: float) -> tuple[float, f
 
 
 def play(who: Decision) -> tuple[int, float] | None:
-    """Begin to play a clip where the worker is, if it is wished and there is room for it.
-
-    Who has just played one goes on with the next, wherever they are.
-    """
+    """Begin to play a clip, if it is wished and there is room; after one follows the next."""
     mind, me, n_clips = who.mind, who.me, len(who.mind.clips.count)
     was_clip = me["activity"] == st.CLIP
     if n_clips == 0 or who.loaded or not (was_clip or me["going"] == THERE):

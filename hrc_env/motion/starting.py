@@ -42,8 +42,7 @@ def start_going(
 
 
 Start = Callable[[Floats, Place, Worker], float]
-"""Begins an activity at a place, from N_START uniform numbers in [0, 1): its size, tempo, side.
-Returns how long it lasts [s]."""
+"""Begins an activity at a place from N_START draws in [0, 1): size, tempo, side; how long it lasts."""
 
 
 def _work(plan: Start) -> Start:
@@ -75,15 +74,8 @@ def start_here(
 ) -> float:  # fmt: skip
     """Start an activity where the worker stands; how long it takes [s], 0 of standing.
 
-    Args:
-        activity: index into `state.ACTIVITY_NAMES`.
-        draws: N_START uniform numbers or more.
-        place: of which the height counts.
-        near: whether hands reach into the robot's workspace.
-        others: (n, 2) where the other workers stand; hands stay on their own side.
-        prop: what is picked up.
-        config: see `config.numbers`.
-        me: the worker.
+    Hands reach into the robot's workspace if `near`, and stay on the worker's own side of the
+    middle to others (n, 2); `prop` is what is picked up; of the place the height counts.
     """
     feet(0.0, me)
     if activity == st.REACH:

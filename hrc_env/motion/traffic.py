@@ -1,7 +1,6 @@
-"""Who is where when: nobody begins what meets somebody on theirs.
+"""Who is where when: nobody begins what meets somebody on theirs, so everybody stays clear.
 
-Everybody's motion is a closed form of time until the activity ends, and then they stay where it
-ended; a worker who begins something makes sure to keep clear of all of that, so it stays clear.
+Motion is a closed form of time until the activity ends; then workers stay where it ended.
 """
 
 import math
@@ -71,10 +70,7 @@ def gap_to(x: float, y: float, t: float, me: Worker) -> float:
 
 @kernel
 def meets(w: int, workers: Workers) -> tuple[float, float, float]:
-    """When and where worker w of (W,) first comes too near to another: time from now [s], x, y.
-
-    Time -1: to nobody. Who is too near now may stay so, but comes no nearer.
-    """
+    """When and where worker w first comes too near to another: time from now [s] (-1: never), x, y."""
     found, fx, fy = -1.0, 0.0, 0.0
     me = workers[w]
     for k in range(len(workers)):

@@ -27,11 +27,9 @@ from hrc_env.motion.state import MAX_STEPS, Worker
 CADENCE_PER_MIN, CADENCE_POWER, SLOWEST_M_S = 96.2, 0.468, 0.65
 """Fit above; slower starts and turns keep the cadence of the slowest speed [m/s]."""
 LEG_M = 0.8685772217237624
-"""Leg of a worker who walks just so; others step more or less often by the square root of their
-legs' ratio, as pendulums would (dynamic similarity, Alexander 1989)."""
+"""Leg of a worker who walks just so; others step by the square root of their legs' ratio."""
 SWING_SHARE, SWING_FAST_SHARE, FASTEST_M_S = 0.80, 0.02, 1.8
-"""Time in the air in periods of a step: stance is 60 % of the gait cycle; up to so much more from
-1 m/s to FASTEST_M_S, for stance gets shorter (59 % at 1.8 m/s)."""
+"""Time in the air in periods of a step; up to so much more from 1 m/s to FASTEST_M_S."""
 MID_STANCE = 0.46
 """When the root passes over a footprint, in periods of a step after its landing."""
 WALK_HALF_WIDTH_M = 0.04
@@ -39,8 +37,7 @@ WALK_HALF_WIDTH_M = 0.04
 SHIFT_S, TURN_S, TURN_RATE = 0.28, 0.5, 1.7
 """Weight shift before the first step [s]; duration of a turn: TURN_S + angle / TURN_RATE."""
 SIDE_STEP_M_S, SIDE_STEP_PERIOD_S, SIDE_STEP_M = 0.2, 0.52, 0.5
-"""Going nowhere far (nearer than SIDE_STEP_M), people do not turn: they take small steps, slow
-enough that the feet never cross; judgement."""
+"""Nearer than SIDE_STEP_M people do not turn, but take small steps; judgement."""
 CORNER_M_S2 = 1.6
 """Walkers slow down so that corners accelerate them sideways by no more [m/s^2]; judgement."""
 NORMAL_M_S = 1.3
@@ -48,11 +45,9 @@ NORMAL_M_S = 1.3
 BOB_M, BOB_PACE_M = 0.0095, 0.0035
 """Half the pelvis's rise and fall: of any walk, and more with the pace [m]; 2 to 4 cm measured."""
 BENT_M, BENT_FAST_M = 0.026, 0.10
-"""How much lower than standing people walk [m]: with the pace, and with the square of how much
-faster they go than suits their legs, or these would lift them at mid-stance; judgement."""
+"""How much lower than standing [m]: with the pace, and with the square of the hurry; judgement."""
 SWING_SLOW_RAD, SWING_FAST_RAD, FULL_SWING, ELBOW_SWING = 0.05, 0.104, 1.1, 0.73
-"""Swing of the upper arm to each side [rad]: at any pace, and more with the cube of the pace (up to
-FULL_SWING); the elbow's share of it. Wrists so go as fast as those measured at 1.1 to 1.4 m/s."""
+"""Swing of the upper arm to each side [rad]: at any pace, with its cube; the elbow's share of it."""
 LOADED_TWIST = 0.4
 """Share of the trunk's turning that is left with something in the hands; judgement."""
 LURCH_S = 1.4
@@ -134,10 +129,7 @@ def walk(t: float, clock_s: float, me: Worker) -> None:
 
 @kernel
 def _lurch(t: float, trip: float, me: Worker) -> None:
-    """Pitch forward with the arms out, `t` after a foot caught, and come up again.
-
-    Lower as well as forward, or the leg behind would come to its full stretch and jerk the body.
-    """
+    """Pitch forward and down with the arms out, `t` after a foot caught, and come up again."""
     q = me.q
     scale = me.size[LEG] / LEG_M
     fall, arms = trip * hump(t / LURCH_S), trip * scale * hump((t - 0.04) / (1.6 * LURCH_S))
@@ -162,10 +154,7 @@ def plan_walk(
     wished_m_s: float,
     me: Worker,
 ) -> float:
-    """Plan to go from (x, y, yaw) to (x, y, yaw) past corners `via` (n, 3: `lay_path`).
-
-    Returns the duration [s].
-    """
+    """Plan to go from (x, y, yaw) to (x, y, yaw) past corners (`lay_path`); the duration [s]."""
     me.start_x, me.start_y, me.start_yaw = start
     me.end_x, me.end_y = end[0], end[1]
     lay_path((start[0], start[1]), via, (end[0], end[1]), me)
@@ -207,8 +196,7 @@ def plan_pace(pace: tuple[float, float, float], end_yaw: float, me: Worker) -> f
 def brake(t: float, me: Worker) -> float:
     """Come to a stand on the path as soon as a walker can from time t; the new duration [s].
 
-    What has happened until t stays as it was, and so do the landings of feet in the air.
-    Returns -1 for one who is about to arrive, and goes on.
+    Landings of feet in the air stay as they were. -1: about to arrive, and goes on.
     """
     t -= me.taken_s
     going = max(t - me.depart, me.ramp)
@@ -243,10 +231,7 @@ def _plan_turns(end_yaw: float, me: Worker) -> None:
 
 @kernel
 def _plan_steps(first: int, me: Worker) -> float:
-    """Lay footprints from a step on where the root will pass at mid-stance; when all is over [s].
-
-    The last two stand at the end. Steps before the first are taken already.
-    """
+    """Lay footprints from a step on where the root will pass at mid-stance; when all is over [s]."""
     period, start = me.step_period, me.step_start
     done = max(me.depart + me.travel_s, me.turn_out_at + me.turn_out_s)
     over = start + me.step_swing + MID_STANCE * period

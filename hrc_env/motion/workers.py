@@ -62,13 +62,7 @@ def joined(crews: Sequence[Crew]) -> Crew:
 
 
 def bodies_of(motion: MotionState, ids: Ints, names: tuple[str, ...]) -> NDArray[np.object_]:
-    """(len(ids),) the names of the bodies in environments `ids`, a tuple of W each.
-
-    Args:
-        motion: of all environments.
-        ids: which.
-        names: of the bodies that there are, row by row.
-    """
+    """(len(ids),) the names of the bodies in environments `ids`, a tuple of W each."""
     said = np.full(len(ids), None, object)
     for row, b in enumerate(ids.tolist()):
         there = zip(
@@ -90,11 +84,7 @@ def _names_of(activity: tuple[int, ...]) -> tuple[str, ...]:
 
 
 def worker_counts(n_workers: int | tuple[int, int]) -> tuple[int, int]:
-    """The fewest and the most workers of an episode, from one number or from both.
-
-    Raises:
-        ConfigError: they are no whole numbers, 0 or more, in this order.
-    """
+    """The fewest and the most workers of an episode, from one number or from both."""
     pair = tuple(n_workers) if isinstance(n_workers, Sequence) else (n_workers, n_workers)
     whole = all(isinstance(k, int | np.integer) and not isinstance(k, bool) for k in pair)
     if not whole or len(pair) != 2 or not 0 <= pair[0] <= pair[1]:

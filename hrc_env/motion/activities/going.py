@@ -19,16 +19,13 @@ from hrc_env.worker.props import prop_index
 
 CART, WHEELBARROW = prop_index("cart"), prop_index("wheelbarrow")
 CART_AHEAD_M, WHEELBARROW_AHEAD_LEGS = 0.47, 0.26
-"""Handles ahead of the root: [m], arms bent before the belly; and in lengths of the leg while the
-wheelbarrow is level, arms hanging before the thighs, which bend between them; judgement."""
+"""Handles ahead of the root: [m]; and in lengths of the leg while the wheelbarrow is level."""
 PUSHING_SHARE, STOOPED_M, CART_LEAN = 0.99, 0.4, 0.06
-"""Arms push stretched to this share; where they are too short for that, the trunk leans: a lean of
-1 brings the shoulders so far forward [m]; how far everybody leans to a cart; judgement."""
+"""Arms push stretched to this share, then the trunk leans: 1 brings shoulders so far [m]; always."""
 WHEEL_AHEAD_M, WHEEL_UP_M, STANDS_RAD = 1.2, 0.17, 0.2
 """A wheelbarrow's axle in its frame [m], and how far it tips back onto its legs."""
 KNUCKLES_SHARE, BEND = 0.97, 1.3
-"""Handles are carried as high as this share of the pelvis, by arms that hang almost straight;
-how far the trunk bends to take them; judgement."""
+"""Handles are carried as high as this share of the pelvis; the bow to take them; judgement."""
 TAKE_S, LIFT_S = 0.7, 0.5
 """For the hands to go to the handles; to lift a wheelbarrow by them [s]."""
 BACK_M_S, BACK_PERIOD_S = 0.62, 0.42

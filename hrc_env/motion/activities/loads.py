@@ -1,8 +1,7 @@
-"""Loads: picked up and set down, taken from somebody and handed over.
+"""Loads: picked up and set down (that backwards), taken from somebody and handed over.
 
-Setting down is picking up backwards. Boxes are held before the belly, boards before the thighs
-or on the shoulder. Recorded lifts: pelvis 0.57 to 1.01 m high, wrists at 1.3 m/s at most in the
-median trial and 2.1 in the 95th percentile, heads at 1.6.
+Recorded lifts: pelvis 0.57 to 1.01 m high, wrists at 1.3 m/s at most in the median trial, 2.1 in
+the 95th percentile, heads at 1.6.
 """
 
 import math
@@ -32,8 +31,7 @@ from hrc_env.worker.props import prop_index
 BOX, BOARD = prop_index("box"), prop_index("board")
 BOX_AHEAD_M, BOX_SHARE = 0.37, 1.10
 BOARD_AHEAD_M, BOARD_SHARE = 0.27, 0.96
-"""A held load's middle: ahead of the root [m], and height in heights of the pelvis, or
-as high as the arms need it; judgement."""
+"""A held load's middle: ahead of the root [m], height in heights of the pelvis; judgement."""
 CARRYING_SHARE = 0.95
 """Arms carry stretched to this share at most: swinging trunks need the rest; judgement."""
 ON_SHOULDER = (0.12, 0.165, 0.075)
@@ -168,11 +166,7 @@ def _lay_out(prop: int, at: tuple[float, float, float], me: Worker) -> None:
 
 @kernel
 def finish_lift(raise_s: float, me: Worker) -> float:
-    """Settle trunk, way and times of a load between where it stands and where it is carried.
-
-    From its pace, the time to raise it by about a metre [s], to how long it takes [s]. As
-    `planning.finish`, no plan function calls it.
-    """
+    """Settle trunk, way and times of a load, from the time to raise it by a metre to how long [s]."""
     size = me.size
     z = me.tool_pose[2]
     low = min(max((size[STAND_Z] - z) / 0.6, 0.0), 1.0)

@@ -30,8 +30,7 @@ TAKE_S = 0.55
 KNEEL_S, CROUCH_S = 1.5, 1.1
 """To get down on a knee, on the haunches [s]; judgement."""
 KNEEL_STEPS_S = (0.15, 0.62, 0.60)
-"""First lift-off and the two times of `plans` of the steps onto a knee [s]: slow, or a leg would be
-stretched before the body is down, and the knee would jerk; judgement."""
+"""First lift-off, period and swing of the steps onto a knee [s], slow or the knee would jerk."""
 STEP_S = 0.9
 """To step into a stance [s]."""
 CALM_M_S = 1.1

@@ -1,8 +1,7 @@
 """Playing a clip: two steps into its first pose, the recording, two steps out of its last.
 
-The recording's time gathers pace and loses it again, so that what was cut out of a longer motion
-begins and ends at rest. Frames hold `clip.RECORDED`: the columns up to the hands' shift, then both
-feet. Long clips are cut into pieces, and all are fitted to every body that there is.
+The recording's time gathers pace and loses it again. Frames hold `clip.RECORDED`: the columns up to
+the hands' shift, then both feet. Long clips are cut into pieces, fitted to every body there is.
 """
 
 import itertools

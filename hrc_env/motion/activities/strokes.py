@@ -1,7 +1,6 @@
 """What hands and tools do at work: strokes in bursts, moving along the work between them.
 
-A stroke moves the tool's pose in q, and writes how far the other hand is from its target into
-that hand's target (to which `work.hands_on` adds the target itself).
+A stroke moves the tool's pose in q, and writes how far the other hand is from its target.
 """
 
 import math
@@ -12,9 +11,7 @@ from hrc_env.motion.curves import min_jerk
 from hrc_env.motion.state import Worker
 
 STILL, STRIKE, BORE, PRESS, SAW, SHIFT, BUSY, JAB = range(8)
-"""Nothing; a hammer's blows; a drill's thrusts, the other hand fetching screws or not; a saw's
-strokes; holding still at one place after the other; the small movements of busy hands; beating
-the air."""
+"""Nothing; hammer; drill, the other hand fetching screws or not; saw; still; busy hands; a beat."""
 PAUSE_S = 0.7
 """Between two bursts [s]: time to go on to the next nail; judgement."""
 EASE_S = 0.25

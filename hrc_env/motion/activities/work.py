@@ -1,7 +1,4 @@
-"""Work in place: get down to it, take a tool from the belt, work, and all of it backwards.
-
-The first half of such an activity and its second half are mirror images in time.
-"""
+"""Work in place: get down to it, take a tool from the belt, work, and all of it backwards."""
 
 import math
 
@@ -28,8 +25,7 @@ ELBOWS_RAD, LOW_ELBOWS_RAD = 0.25, 0.4
 JOIN_AT = 0.3
 """Share of the way from which the second hand comes to a tool for two; judgement."""
 RISE, OVER_KNEE_M, LOW_M = 0.5, 0.22, 0.6
-"""Hands go up ahead of the shoulder, by this share of the height, and down over the knees, so
-far ahead and up on the way to work below LOW_M [m]; judgement."""
+"""Hands go up by this share of the height, and over the knees by so much to work below LOW_M [m]."""
 DRAWN_SHARE = 0.6
 """Share of the way at which what is drawn out with both hands is out."""
 KNEE_M = 0.055
@@ -68,10 +64,7 @@ def get_down(down: float, me: Worker) -> None:
 
 @kernel
 def step_into(first: int, ahead: float, other: float, out: float, me: Worker) -> None:
-    """Plan one step of foot `first` (and one of the other, unless 0) that the end goes back.
-
-    They go forward by `ahead` and `other`, sideways and apart by `out` [m].
-    """
+    """Plan a step of foot `first` forward, one of the other (unless 0), both `out` [m] sideways."""
     cos, sin = math.cos(me.start_yaw), math.sin(me.start_yaw)
     me.step_start, me.step_first = STEP_AT_S, first
     me.step_period, me.step_swing = STEP_PERIOD_S, STEP_SWING_S
@@ -123,10 +116,7 @@ def belt(side: int, at: int, me: Worker) -> None:
 
 @kernel
 def hands_on(out: float, taken: float, early: float, me: Worker) -> None:
-    """Send the tool's hand to the tool, the other to its own target or to the tool.
-
-    Both are before the body, by the share `early`, when thighs rise of those who get down.
-    """
+    """Send the tool's hand to the tool, the other to its target; both before the body (`early`)."""
     q = me.q
     side, tool = me.side, me.tool
     other = 1 - side

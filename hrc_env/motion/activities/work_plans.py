@@ -1,9 +1,7 @@
 """Plans of work in place: with tools, pointing, a lunge, with both hands at floor height.
 
-`plan_...(draws, place, me)` returns how fast hands may go to the work [m/s], for `planning.finish`.
-Wrists in the recordings: light hammering 5.6 blows a second at 1.4 m/s (95th percentile), driving
-nails and sawing 1.25 to 2.0 m/s. Lunges are assumed: hands at 2.5 to 3.5 m/s, near the fastest arm
-movements at work.
+`plan_...` returns how fast hands may go to the work [m/s], for `planning.finish`. Wrists in the
+recordings: light hammering at 1.4 m/s (95th percentile), driving nails and sawing 1.25 to 2.0.
 """
 
 import math
