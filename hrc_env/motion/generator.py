@@ -18,7 +18,7 @@ from hrc_env.motion.anatomy import anatomies
 from hrc_env.motion.behaviour import begin_episode, follow_up
 from hrc_env.motion.blending import RATE_H_S, evaluate
 from hrc_env.motion.clip import Clip, opened
-from hrc_env.motion.config import PEOPLE, MotionConfig, PeopleConfig, numbers, people_called
+from hrc_env.motion.config import PEOPLE, MotionConfig, PeopleConfig, numbers
 from hrc_env.motion.decision import N_DRAWS, BehaviourParams, MotionState
 from hrc_env.motion.errands import errands_at
 from hrc_env.motion.floorplan import floorplan, room_for
@@ -30,7 +30,7 @@ from hrc_env.worker.body import N_SEGMENTS, Body
 
 __all__ = [
     "ABSENT", "PEOPLE", "Clip", "MotionConfig", "MotionState", "PeopleConfig", "activity",
-    "activity_names", "advance", "current", "make_state", "people_called", "reset", "watch",
+    "activity_names", "advance", "current", "make_state", "reset", "watch",
 ]  # fmt: skip
 
 activity_names: tuple[str, ...] = st.ACTIVITY_NAMES
