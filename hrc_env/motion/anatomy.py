@@ -17,8 +17,8 @@ CLAVICLE, UPPER_ARM, FOREARM, HAND, THIGH, SHANK, FOOT, TOES = range(8)
 ARM, FOREARM_GRIP, LEG, THIGH_LENGTH, SHANK_LENGTH, ANKLE_Z, STAND_Z = range(7)
 ANKLE_X, BALL_X, BALL_Z, HEEL_X, UPPER_LENGTH = range(7, 12)
 N_SIZES = 12
-"""Columns of `Anatomy.size` [m]: shoulder to grip, elbow to grip, hip to ankle, its bones, heights of
-ankle and standing pelvis; ankle ahead of it; ball ahead of and above the ankle; heel; upper arm."""
+"""Columns of `Anatomy.size` [m]: shoulder to grip, elbow to grip, hip to ankle, its bones, heights
+of ankle and standing pelvis; ankle ahead of it; ball ahead of and above the ankle; heel; arm."""
 
 GRIP_M = 0.08
 """How far beyond the wrist a hand grips (half a hand's length, a judgement)."""

@@ -157,13 +157,13 @@ def _check(clip: Clip) -> None:
 
 
 def footprints(feet: Floats, size: Floats) -> Floats:
-    """(T, 4) flat feet's ankles and headings, from feet (T, 5 or more): ankle, heading, pitch."""
+    """(T, 4) flat feet's ankles and headings, from (T, 5 or more): ankle, heading, pitch."""
     flat = feet[:, :3] - rolled(feet[:, 3], feet[:, 4], size)
     return np.concatenate([flat, feet[:, 3:4]], axis=1)
 
 
 def rolled(yaw: Floats, pitch: Floats, size: Floats) -> Floats:
-    """(T, 3) how far a foot's pitch takes its ankle: heel up round the ball, toes up round the heel."""
+    """(T, 3) how far a foot's pitch takes its ankle: heel up round the ball, toes up."""
     moved = [
         about(p, size[BALL_X], size[BALL_Z]) if p > 0.0 else about(p, size[HEEL_X], -size[ANKLE_Z])
         for p in pitch.tolist()

@@ -3,7 +3,7 @@
 from collections import namedtuple
 from dataclasses import dataclass, field, fields
 
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError
 from hrc_env.motion.clip import Clip
 from hrc_env.motion.errands import TASKS, Task, check_tasks
 
@@ -12,7 +12,7 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class PeopleConfig:
-    """What workers notice of the robot, and how brisk they are; judgement where no source is named."""
+    """What workers notice of the robot, and how brisk they are; judgement without a source."""
 
     notice_m: float = 0.40
     """Workers notice a part of the arm that comes so near to trunk, head or a hand [m]."""
@@ -79,13 +79,6 @@ PEOPLE: dict[str, PeopleConfig] = {
 """By name: who looks out for the robot, who has no time to, who does not know that it moves."""
 
 
-def people_called(name: str) -> PeopleConfig:
-    """The preset of a name; `ConfigError`, with those that there are, where there is none."""
-    if name not in PEOPLE:
-        raise unknown("people", name, PEOPLE)
-    return PEOPLE[name]
-
-
 @dataclass(frozen=True)
 class MotionConfig:
     """What a worker does and how fast; ranges are drawn from uniformly. "Judgement": no source."""
@@ -129,7 +122,7 @@ class MotionConfig:
     tasks: tuple[Task, ...] = TASKS
     """What they do, and what follows what."""
     motions: tuple[str | Clip, ...] = ()
-    """Clips of recorded motion that workers play, too: paths, or clips (docs/motion_capture.md)."""
+    """Clips of recorded motion that workers play, too (docs/people_and_scenes.md)."""
     motions_probability: float = 0.5
     """Chance that a worker with empty hands plays one next, where there is room for it."""
 

@@ -67,7 +67,7 @@ def saturate(d: float, knee: float, limit: float) -> float:
 
 @kernel
 def decay(u: float, duration: float, value: float, rate: float) -> float:
-    """Quintic from (value, rate, 0) at u = 0 to rest at zero at u = 1 (inertialisation: Bollo 2018)."""
+    """Quintic from (value, rate, 0) at u = 0 to rest at zero at u = 1 (inertialisation)."""
     if u >= 1.0:
         return 0.0
     v = rate * duration

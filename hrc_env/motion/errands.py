@@ -24,7 +24,7 @@ class Task:
     at: str
     """Kind of workplace (`WORKPLACE_KINDS`), or "here"."""
     then: tuple[tuple[str, float], ...] = ()
-    """What may follow, with weights; nothing, or only the same place for too long: the errand is over."""
+    """What may follow, with weights; nothing, or the same place for too long: it is over."""
     begins: float = 0.0
     """Weight with which an errand begins with this task; 0: none does."""
     prop: str = "nothing"

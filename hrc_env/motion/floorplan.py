@@ -1,4 +1,4 @@
-"""Where a worker's root may be: the slack [m] on a grid, to everything that stands there and the edge.
+"""Where a worker's root may be: the slack [m] on a grid, to what stands there and the edge.
 
 Workplaces may lie nearer to things, for who works at a wall stands before it.
 """

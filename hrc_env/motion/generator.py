@@ -18,7 +18,7 @@ from hrc_env.motion.anatomy import anatomies
 from hrc_env.motion.behaviour import begin_episode, follow_up
 from hrc_env.motion.blending import RATE_H_S, evaluate
 from hrc_env.motion.clip import Clip, opened
-from hrc_env.motion.config import PEOPLE, MotionConfig, PeopleConfig, numbers, people_called
+from hrc_env.motion.config import PEOPLE, MotionConfig, PeopleConfig, numbers
 from hrc_env.motion.decision import N_DRAWS, BehaviourParams, MotionState
 from hrc_env.motion.errands import errands_at
 from hrc_env.motion.floorplan import floorplan, room_for
@@ -30,7 +30,7 @@ from hrc_env.worker.body import N_SEGMENTS, Body
 
 __all__ = [
     "ABSENT", "PEOPLE", "Clip", "MotionConfig", "MotionState", "PeopleConfig", "activity",
-    "activity_names", "advance", "current", "make_state", "people_called", "reset", "watch",
+    "activity_names", "advance", "current", "make_state", "reset", "watch",
 ]  # fmt: skip
 
 activity_names: tuple[str, ...] = st.ACTIVITY_NAMES
@@ -104,7 +104,7 @@ def reset(state: MotionState, ids: Ints, rngs: Sequence[np.random.Generator]) ->
 
 
 def drawn_bodies(draws: Floats, n_bodies: int) -> Ints:
-    """(W,) a body for each worker by draws in [0, 1), no two the same as long as there are others."""
+    """(W,) a body for each worker by draws in [0, 1), no two the same while there are others."""
     bodies, left = np.zeros(len(draws), np.int64), list[int]()
     for w, draw in enumerate(draws.tolist()):
         left = left or list(range(n_bodies))

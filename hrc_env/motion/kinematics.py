@@ -85,7 +85,7 @@ def attach(child: int, parent: int, me: Worker) -> None:
 
 @kernel
 def aim(bone: int, end: int, length: float, me: Worker) -> None:
-    """Turn a bone to point from its origin to p[end], its hinge along p[HINGE]; see `Anatomy.frame`."""
+    """Turn a bone to point from its origin to p[end], its hinge along p[HINGE]."""
     p, r = me.p, me.r
     inverse = 1.0 / length
     bx = (p[end, 0] - p[bone, 0]) * inverse
@@ -104,7 +104,7 @@ def aim(bone: int, end: int, length: float, me: Worker) -> None:
 def bend(
     start: int, end: int, first: float, second: float, knee: float, limit: float, me: Worker
 ) -> None:
-    """Two-bone IK from p[start] to p[TARGET]: the middle p[start + 1] towards p[POLE], and p[end]."""
+    """Two-bone IK from p[start] to p[TARGET]: p[start + 1], towards p[POLE], and p[end]."""
     p = me.p
     dx = p[TARGET, 0] - p[start, 0]
     dy = p[TARGET, 1] - p[start, 1]
@@ -190,7 +190,7 @@ def shoulder(side: int, cos: float, sin: float, me: Worker) -> None:
 
 @kernel
 def arm(side: int, cos: float, sin: float, me: Worker) -> None:
-    """Shoulder to hand, the elbow back and out; cos and sin are of the level heading of the chest."""
+    """Shoulder to hand, the elbow back and out; cos and sin: level heading of the chest."""
     p = me.p
     shoulder(side, cos, sin, me)
     sign = 1.0 - 2.0 * side

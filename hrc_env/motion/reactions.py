@@ -1,4 +1,4 @@
-"""What workers notice of the robot: after a while they pause, or step back with the hands taken away.
+"""What workers notice of the robot: they pause, or take their hands away and step back.
 
 Hands pause by their activity's time coming to a halt, and are taken away by its going backwards;
 walkers brake. What they would do, and how late, is drawn when an activity begins.

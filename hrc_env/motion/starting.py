@@ -42,7 +42,7 @@ def start_going(
 
 
 Start = Callable[[Floats, Place, Worker], float]
-"""Begins an activity at a place from N_START draws in [0, 1): size, tempo, side; how long it lasts."""
+"""Begins an activity at a place from N_START draws in [0, 1); how long it lasts [s]."""
 
 
 def _work(plan: Start) -> Start:

@@ -70,7 +70,7 @@ def gap_to(x: float, y: float, t: float, me: Worker) -> float:
 
 @kernel
 def meets(w: int, workers: Workers) -> tuple[float, float, float]:
-    """When and where worker w first comes too near to another: time from now [s] (-1: never), x, y."""
+    """When worker w first comes too near to another, from now [s] (-1: never), and x, y."""
     found, fx, fy = -1.0, 0.0, 0.0
     me = workers[w]
     for k in range(len(workers)):

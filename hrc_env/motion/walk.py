@@ -45,7 +45,7 @@ NORMAL_M_S = 1.3
 BOB_M, BOB_PACE_M = 0.0095, 0.0035
 """Half the pelvis's rise and fall: of any walk, and more with the pace [m]; 2 to 4 cm measured."""
 BENT_M, BENT_FAST_M = 0.026, 0.10
-"""How much lower than standing [m]: with the pace, and with the square of the hurry; judgement."""
+"""Lower than standing [m]: with the pace, with the square of the hurry; judgement."""
 SWING_SLOW_RAD, SWING_FAST_RAD, FULL_SWING, ELBOW_SWING = 0.05, 0.104, 1.1, 0.73
 """Swing of the upper arm to each side [rad]: at any pace, with its cube; the elbow's share of it."""
 LOADED_TWIST = 0.4
@@ -231,7 +231,7 @@ def _plan_turns(end_yaw: float, me: Worker) -> None:
 
 @kernel
 def _plan_steps(first: int, me: Worker) -> float:
-    """Lay footprints from a step on where the root will pass at mid-stance; when all is over [s]."""
+    """Lay footprints from a step on where the root passes at mid-stance; when all is over [s]."""
     period, start = me.step_period, me.step_start
     done = max(me.depart + me.travel_s, me.turn_out_at + me.turn_out_s)
     over = start + me.step_swing + MID_STANCE * period

@@ -21,7 +21,7 @@ CART, WHEELBARROW = prop_index("cart"), prop_index("wheelbarrow")
 CART_AHEAD_M, WHEELBARROW_AHEAD_LEGS = 0.47, 0.26
 """Handles ahead of the root: [m]; and in lengths of the leg while the wheelbarrow is level."""
 PUSHING_SHARE, STOOPED_M, CART_LEAN = 0.99, 0.4, 0.06
-"""Arms push stretched to this share, then the trunk leans: 1 brings shoulders so far [m]; always."""
+"""Arms push stretched to this share, then trunks lean: 1 brings shoulders so far [m]; always."""
 WHEEL_AHEAD_M, WHEEL_UP_M, STANDS_RAD = 1.2, 0.17, 0.2
 """A wheelbarrow's axle in its frame [m], and how far it tips back onto its legs."""
 KNUCKLES_SHARE, BEND = 0.97, 1.3

@@ -166,7 +166,7 @@ def _lay_out(prop: int, at: tuple[float, float, float], me: Worker) -> None:
 
 @kernel
 def finish_lift(raise_s: float, me: Worker) -> float:
-    """Settle trunk, way and times of a load, from the time to raise it by a metre to how long [s]."""
+    """Settle trunk, way and times of a load; from the time to raise it by a metre, how long [s]."""
     size = me.size
     z = me.tool_pose[2]
     low = min(max((size[STAND_Z] - z) / 0.6, 0.0), 1.0)

@@ -25,7 +25,7 @@ ELBOWS_RAD, LOW_ELBOWS_RAD = 0.25, 0.4
 JOIN_AT = 0.3
 """Share of the way from which the second hand comes to a tool for two; judgement."""
 RISE, OVER_KNEE_M, LOW_M = 0.5, 0.22, 0.6
-"""Hands go up by this share of the height, and over the knees by so much to work below LOW_M [m]."""
+"""Hands go up by this share of the height, and over the knees to work below LOW_M [m]."""
 DRAWN_SHARE = 0.6
 """Share of the way at which what is drawn out with both hands is out."""
 KNEE_M = 0.055

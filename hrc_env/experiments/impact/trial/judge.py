@@ -11,7 +11,7 @@ import numpy as np
 
 from hrc_env.core.typing import Capsules, Floats, Points3
 from hrc_env.geometry import chains
-from hrc_env.geometry.distances import narrowest_gap
+from hrc_env.geometry.distances import least_separation
 from hrc_env.motion import generator
 from hrc_env.simulation import Simulation
 from hrc_env.worker.body import worker_truth
@@ -37,9 +37,9 @@ class Scene:
 class Step:
     """What happened in a step, per environment."""
 
-    true_gap_m: Floats
+    true_separation_m: Floats
     """(B,) at the end of the step."""
-    believed_gap_m: Floats
+    believed_separation_m: Floats
     """(B,) the same as the robot believes it; infinite where it knows of nobody."""
     robot_mps: Floats
     """(B,) the robot's speed towards the worker."""
@@ -65,8 +65,8 @@ def judge(part: Simulation, before: Scene, now: Scene) -> Step:
     """One step of a simulation, from the scenes at its beginning and its end."""
     dt_s, gap_m = part.config.ctrl_dt, _gap(now, now)
     return Step(
-        true_gap_m=gap_m,
-        believed_gap_m=part.believed.gap.distance_m[:, 0],
+        true_separation_m=gap_m,
+        believed_separation_m=part.believed.separation.distance_m[:, 0],
         robot_mps=(_gap(before, now) - gap_m) / dt_s,
         worker_mps=(_gap(now, before) - gap_m) / dt_s,
         error_m=np.linalg.norm(part.estimate.mean_world[:, 0] - now.joints_world, axis=-1),
@@ -75,6 +75,6 @@ def judge(part: Simulation, before: Scene, now: Scene) -> Step:
 
 def _gap(robot: Scene, worker: Scene) -> Floats:
     """(B,) between the robot of one scene and the worker of another [m]."""
-    return narrowest_gap(
+    return least_separation(
         robot.robot_world, robot.robot_radius_m, worker.worker_world, worker.worker_radius_m
     ).distance_m

@@ -64,14 +64,14 @@ class Tally:
 
     def _stops(self, step: Step) -> None:
         """Decisions that the belief makes otherwise than the truth, and what came of them."""
-        believed_m = step.believed_gap_m - self.margin_m
+        believed_m = step.believed_separation_m - self.margin_m
         for name, limit_m in (("stops", STOP_M), ("slowings", SLOW_M)):
-            called, given = step.true_gap_m < limit_m, believed_m < limit_m
+            called, given = step.true_separation_m < limit_m, believed_m < limit_m
             self.sums[f"called_{name}"] += called
             self.sums[f"missed_{name}"] += called & ~given
             self.sums[f"false_{name}"] += given & ~called
         approaching = step.robot_mps > MOVING_MPS
-        self.sums["approaches"] += approaching & (step.true_gap_m < STOP_M)
+        self.sums["approaches"] += approaching & (step.true_separation_m < STOP_M)
 
     def _contacts(self, step: Step, touching: Bools) -> None:
         """Touches that begin; one that lasts counts once."""
@@ -84,9 +84,9 @@ class Tally:
 
     def _spread(self, step: Step) -> None:
         """Errors always; gaps and speeds where the gap matters."""
-        near = step.true_gap_m < SLOW_M
+        near = step.true_separation_m < SLOW_M
         self.counts["error"] += ERRORS_M.count(step.error_m)
-        optimism_m = step.believed_gap_m - step.true_gap_m
+        optimism_m = step.believed_separation_m - step.true_separation_m
         self.counts["optimism"] += GAPS_M.count(optimism_m, near)
         self.counts["robot_speed"] += SPEEDS_MPS.count(step.robot_mps, near)
         self.counts["worker_speed"] += SPEEDS_MPS.count(step.worker_mps, near)
