@@ -4,10 +4,9 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion import state as st
-from hrc_env.motion.activities.climb import climb
+from hrc_env.motion.activities.climb import climb, look_round
 from hrc_env.motion.activities.going import push
 from hrc_env.motion.activities.loads import pick_up
-from hrc_env.motion.activities.look_round import look_round
 from hrc_env.motion.activities.playing import play
 from hrc_env.motion.activities.work import work
 from hrc_env.motion.curves import decay, wrap

@@ -2,6 +2,9 @@
 
 from collections import namedtuple
 from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.motion.clip import Clip
@@ -45,21 +48,25 @@ class PeopleConfig:
 
     def __post_init__(self) -> None:
         """Check ranges and probabilities."""
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if isinstance(value, tuple):
-                if not 0.0 <= value[0] <= value[1]:
-                    raise ConfigError(f"{item.name} must be (low, high) >= 0, got {value}.")
-            elif item.name.endswith("_probability") and not 0.0 <= value <= 1.0:
-                raise ConfigError(f"{item.name} must lie in [0, 1], got {value}.")
-            elif value < 0.0:
-                raise ConfigError(f"{item.name} must be 0 or more, got {value}.")
+        _check_ranges(self)
+        if any(np.min(getattr(self, item.name)) < 0.0 for item in fields(self)):
+            raise ConfigError(f"Settings of people must be 0 or more, got {self}.")
         if self.pause_probability + self.step_back_probability > 1.0:
             raise ConfigError("pause_probability + step_back_probability must be at most 1.")
         if not 0.3 <= self.speed_m_s[0] <= self.speed_m_s[1] <= 2.0:
             raise ConfigError(f"speed_m_s must lie in [0.3, 2], got {self.speed_m_s}.")
         if not self.tempo > 0.0:
             raise ConfigError(f"tempo must be positive, got {self.tempo}.")
+
+
+def _check_ranges(config: Any) -> None:
+    """Refuse ranges that are not (low, high), and probabilities outside [0, 1]."""
+    for item in fields(config):
+        value = getattr(config, item.name)
+        if item.name.endswith(("_m", "_s")) and isinstance(value, tuple) and value[0] > value[1]:
+            raise ConfigError(f"{item.name} must be (low, high), got {value}.")
+        if item.name.endswith("_probability") and not 0.0 <= value <= 1.0:
+            raise ConfigError(f"{item.name} must lie in [0, 1], got {value}.")
 
 
 PEOPLE: dict[str, PeopleConfig] = {
@@ -128,13 +135,7 @@ class MotionConfig:
 
     def __post_init__(self) -> None:
         """Check ranges and probabilities."""
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if item.name.endswith(("_m", "_s")) and isinstance(value, tuple):
-                if value[0] > value[1]:
-                    raise ConfigError(f"{item.name} must be (low, high), got {value}.")
-            elif item.name.endswith("_probability") and not 0.0 <= value <= 1.0:
-                raise ConfigError(f"{item.name} must lie in [0, 1], got {value}.")
+        _check_ranges(self)
         if self.spacing_m < 0.8:
             raise ConfigError(
                 f"spacing_m must be 0.8 or more, or workers would touch: {self.spacing_m}."

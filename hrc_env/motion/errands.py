@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.core.records import WORKPLACE_KINDS
 from hrc_env.motion.state import ACTIVITY_NAMES
-from hrc_env.worker.props import PROPS
+from hrc_env.worker.props import PROP_NAMES
 
 HERE = "here"
 """As a kind of place: wherever the worker is."""
@@ -84,21 +84,20 @@ def check_tasks(tasks: Sequence[Task]) -> None:
     if not any(task.at == "robot" for task in tasks):
         raise ConfigError("Some task must be at the robot: at='robot'.")
     for task in tasks:
-        if task.activity not in ACTIVITY_NAMES:
-            raise unknown(f"activity of {task.name!r}", task.activity, ACTIVITY_NAMES)
-        if task.at not in (*WORKPLACE_KINDS, HERE):
-            raise unknown(f"kind of place of {task.name!r}", task.at, (*WORKPLACE_KINDS, HERE))
-        if task.prop not in [prop.name for prop in PROPS]:
-            raise unknown(f"prop of {task.name!r}", task.prop, [prop.name for prop in PROPS])
-        if task.by not in ROUTES:
-            raise unknown(f"way to {task.name!r}", task.by, ROUTES)
-        for name, weight in task.then:
-            if name not in names:
-                raise unknown(f"task after {task.name!r}", name, names)
-            if not weight > 0.0:
-                raise ConfigError(f"{task.name!r}: the weight of {name!r} must be > 0: {weight}.")
-        if task.begins < 0.0:
-            raise ConfigError(f"{task.name!r}: begins must be 0 or more, got {task.begins}.")
+        for what, got, valid in (
+            ("activity of", task.activity, ACTIVITY_NAMES),
+            ("kind of place of", task.at, (*WORKPLACE_KINDS, HERE)),
+            ("prop of", task.prop, PROP_NAMES),
+            ("way to", task.by, ROUTES),
+            *(("task after", name, names) for name, _ in task.then),
+        ):
+            if got not in valid:
+                raise unknown(f"{what} {task.name!r}", got, valid)
+        if task.begins < 0.0 or not all(weight > 0.0 for _, weight in task.then):
+            raise ConfigError(
+                f"{task.name!r}: begins must be 0 or more, weights must be > 0, got "
+                f"{task.begins} and {task.then}."
+            )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -139,7 +138,4 @@ def _shares(weights: list[tuple[int, float]]) -> tuple[tuple[int, float], ...]:
 
 def picked(shares: tuple[tuple[int, float], ...], draw: float) -> int:
     """The task that a uniform draw in [0, 1) falls on; shares are not empty."""
-    for k, share in shares:
-        if draw < share:
-            return k
-    return shares[-1][0]
+    return next((k for k, share in shares if draw < share), shares[-1][0])

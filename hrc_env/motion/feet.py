@@ -39,14 +39,6 @@ def _roll(t: float, lift: float, land: float, period: float, stride: float) -> t
 
 
 @kernel
-def _last_step(t: float, first: int, count: int, me: Worker) -> int:
-    """Index of the latest step of a foot that has left the floor; below `first` if none."""
-    k = math.floor((t - me.step_start) / me.step_period)
-    k -= (k - first) % 2
-    return min(k, count - 1 - (count - 1 - first) % 2)
-
-
-@kernel
 def step_time(t: float, me: Worker) -> float:
     """The time that counts for feet: it turns round when the steps are gone back."""
     undo = me.undo_at
@@ -63,7 +55,8 @@ def foot(t: float, side: int, prints: Floats, stance: Floats, me: Worker) -> Non
     if count > 0:
         start, period, swing = me.step_start, me.step_period, me.step_swing
         first = (side + me.step_first) % 2
-        k = _last_step(t, first, count, me)
+        k = math.floor((t - start) / period)  # the foot's latest step that has left the floor
+        k = min(k - (k - first) % 2, count - 1 - (count - 1 - first) % 2)
         coming = max(k + 2, first)
         if coming < count:
             lift = start + coming * period
@@ -80,8 +73,8 @@ def foot(t: float, side: int, prints: Floats, stance: Floats, me: Worker) -> Non
             heel, toes = _roll(t, lift, lift + swing, period, stride)
             heel_up, toes_up = heel_up + heel, toes_up + toes
             step_up = prints[k, 4] - ground
-            if step_up != 0.0:
-                ground += step_up * _climbed(w, step_up)
+            if step_up != 0.0:  # up early, before the foot comes over the tread; down late
+                ground += step_up * min_jerk((w if step_up > 0.0 else w - 0.4) / 0.6)
             rise = (LIFT_BASE_M + LIFT_STRIDE_M * stride) * hump(w)
             flown = min_jerk(2.0 * w) if w < 1.0 else 0.0
     at = c.ANKLE + 6 * side
@@ -98,12 +91,6 @@ def feet(t: float, me: Worker) -> None:
     """Both."""
     for side in range(2):
         foot(t, side, me.prints, me.stance, me)
-
-
-@kernel
-def _climbed(w: float, step_up: float) -> float:
-    """Share of a step up (early, before the foot comes over the tread) or down (late) at w."""
-    return min_jerk(w / 0.6) if step_up > 0.0 else min_jerk((w - 0.4) / 0.6)
 
 
 @kernel

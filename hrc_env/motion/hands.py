@@ -6,8 +6,8 @@ from hrc_env.core.kernels import kernel
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import ARM, HAND, LEFT, SIDE_STRIDE, UPPER_ARM
 from hrc_env.motion.curves import hump, min_jerk
-from hrc_env.motion.kinematics import ARM_KNEE, pose
-from hrc_env.motion.posture import MOST_LEAN, beyond, lean, stand
+from hrc_env.motion.kinematics import ARM_KNEE
+from hrc_env.motion.posture import MOST_LEAN, beyond, farthest, from_here, lean, stand
 from hrc_env.motion.state import Worker
 
 GAZE_LEAD_S = 0.25
@@ -133,10 +133,8 @@ def plan_reach(
     ahead, left = cos * dx + sin * dy, -sin * dx + cos * dy
     apart = 0.12 if used[0] > 0.0 and used[1] > 0.0 else 0.0
     for side in range(2):
-        lateral = left + (1.0 - 2.0 * side) * apart
-        me.target[3 * side] = me.start_x + cos * ahead - sin * lateral
-        me.target[3 * side + 1] = me.start_y + sin * ahead + cos * lateral
-        me.target[3 * side + 2] = target[2]
+        at = me.target[3 * side :]
+        at[0], at[1], at[2] = from_here((ahead, left + (1.0 - 2.0 * side) * apart, target[2]), me)
     me.used[0], me.used[1] = used
     azimuth = math.atan2(left, max(ahead, 0.2))
     stretch = min(max((math.hypot(ahead, left) - 0.4) / 0.35, 0.0), 1.0)
@@ -145,7 +143,10 @@ def plan_reach(
     me.gaze_yaw = 0.5 * azimuth - 0.5 * me.twist
     me.gaze_pitch = 0.25 + 0.4 * min(max(1.4 - target[2], -0.3), 0.6)
     _settle_lean(me)
-    way = _way(me)
+    stand(me.start_x, me.start_y, me.start_yaw, 0.0, me)
+    for i in range(6):
+        me.q[c.HAND_TARGET + i] = me.target[i]
+    way = max(0.1, farthest(HAND, me.target, used, me))
     me.out_s = max(1.875 * way / peak_m_s, 0.3)
     me.back_s = max(1.875 * way / min(peak_m_s, 1.2), 0.45)
     me.hold_s = hold_s
@@ -154,36 +155,13 @@ def plan_reach(
 
 
 @kernel
-def _way(me: Worker) -> float:
-    """The longest way that a used hand has from hanging to its target [m]."""
-    stand(me.start_x, me.start_y, me.start_yaw, 0.0, me)
-    for i in range(6):
-        me.q[c.HAND_TARGET + i] = me.target[i]
-    way = 0.1
-    pose(me)
-    for side in range(2):
-        wrist = LEFT + SIDE_STRIDE * side + HAND
-        d = 0.0
-        for i in range(3):
-            d += (me.target[3 * side + i] - me.p[wrist, i]) ** 2
-        if me.used[side] > 0.0:
-            way = max(way, math.sqrt(d))
-    return way
-
-
-@kernel
 def plan_lift(ahead: float, z: float, times: tuple[float, float, float], me: Worker) -> float:
     """Plan to lift a load `ahead` of the feet at height z; times: bend, raise, carry [s]."""
-    cos, sin = math.cos(me.start_yaw), math.sin(me.start_yaw)
     for side in range(2):
         left = (1.0 - 2.0 * side) * LOAD_HALF_WIDTH_M
-        for at, forward, height in (
-            (me.target, ahead, z),
-            (me.raised, CARRY_FORWARD_M, CARRY_Z_M),
-        ):
-            at[3 * side] = me.start_x + cos * forward - sin * left
-            at[3 * side + 1] = me.start_y + sin * forward + cos * left
-            at[3 * side + 2] = height
+        at, up = me.target[3 * side :], me.raised[3 * side :]
+        at[0], at[1], at[2] = from_here((ahead, left, z), me)
+        up[0], up[1], up[2] = from_here((CARRY_FORWARD_M, left, CARRY_Z_M), me)
     me.twist, me.gaze_yaw, me.gaze_pitch = 0.0, 0.0, 0.25
     me.squat = me.squat_share
     me.used[0], me.used[1] = 1.0, 1.0

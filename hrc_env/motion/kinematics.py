@@ -4,28 +4,8 @@ import math
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
+from hrc_env.motion import anatomy as an
 from hrc_env.motion import controls as c
-from hrc_env.motion.anatomy import (
-    ARM,
-    CHEST,
-    CLAVICLE,
-    FOOT,
-    FOREARM,
-    FOREARM_GRIP,
-    GRIP_M,
-    HAND,
-    HEAD,
-    LEFT,
-    LEG,
-    SHANK,
-    SHANK_LENGTH,
-    SIDE_STRIDE,
-    THIGH,
-    THIGH_LENGTH,
-    TOES,
-    UPPER_ARM,
-    UPPER_LENGTH,
-)
 from hrc_env.motion.curves import min_jerk, saturate, soft_min
 from hrc_env.motion.state import Worker
 
@@ -136,9 +116,9 @@ def trunk(me: Worker) -> None:
     yaw = q[c.HEADING] + q[c.PELVIS_YAW]
     yaw_pitch_roll(yaw, q[c.PELVIS_PITCH], q[c.PELVIS_ROLL], 0, me)
     p[0, 0], p[0, 1], p[0, 2] = q[c.ROOT_X], q[c.ROOT_Y], q[c.PELVIS_Z]
-    longest = LEG_LIMIT * me.size[LEG]
+    longest = LEG_LIMIT * me.size[an.LEG]
     for side in range(2):
-        thigh, ankle = LEFT + side * SIDE_STRIDE + THIGH, c.ANKLE + 6 * side
+        thigh, ankle = an.LEFT + side * an.SIDE_STRIDE + an.THIGH, c.ANKLE + 6 * side
         attach(thigh, 0, me)
         dx, dy = q[ankle] - p[thigh, 0], q[ankle + 1] - p[thigh, 1]
         rise = math.sqrt(max(longest * longest - dx * dx - dy * dy, 0.01))
@@ -147,12 +127,12 @@ def trunk(me: Worker) -> None:
     share = 1.0 / 3.0
     twist, flex, lateral = q[c.SPINE_TWIST], q[c.SPINE_FLEX], q[c.SPINE_SIDE]
     yaw_pitch_roll(share * twist, share * flex, share * lateral, TURN, me)
-    for s in range(1, CHEST + 1):
+    for s in range(1, an.CHEST + 1):
         attach(s, s - 1, me)
         product(s - 1, TURN, s, me)
     yaw = 0.5 * q[c.HEAD_YAW]
     pitched(math.cos(yaw), math.sin(yaw), 0.5 * q[c.HEAD_PITCH], TURN, me)
-    for s in range(CHEST + 1, HEAD + 1):
+    for s in range(an.CHEST + 1, an.HEAD + 1):
         attach(s, s - 1, me)
         product(s - 1, TURN, s, me)
 
@@ -162,12 +142,12 @@ def shoulder(side: int, cos: float, sin: float, me: Worker) -> None:
     """The clavicle, going a little up and forward with the hand; the grip goes to p[TARGET]."""
     q, p, r = me.q, me.p, me.r
     sign = 1.0 - 2.0 * side
-    clavicle = LEFT + side * SIDE_STRIDE + CLAVICLE
-    upper = clavicle + UPPER_ARM - CLAVICLE
-    attach(clavicle, CHEST, me)
+    clavicle = an.LEFT + side * an.SIDE_STRIDE + an.CLAVICLE
+    upper = clavicle + an.UPPER_ARM - an.CLAVICLE
+    attach(clavicle, an.CHEST, me)
     for i in range(3):
         for j in range(3):
-            r[clavicle, i, j] = r[CHEST, i, j]
+            r[clavicle, i, j] = r[an.CHEST, i, j]
     attach(upper, clavicle, me)
     rel, tgt, share = c.HAND_OFFSET + 3 * side, c.HAND_TARGET + 3 * side, q[c.HAND_SHARE + side]
     x = p[upper, 0] + cos * q[rel] - sin * q[rel + 1]
@@ -177,14 +157,14 @@ def shoulder(side: int, cos: float, sin: float, me: Worker) -> None:
     p[TARGET, 1] = y + share * (q[tgt + 1] - y)
     p[TARGET, 2] = z + share * (q[tgt + 2] - z)
     dx, dy = p[TARGET, 0] - p[upper, 0], p[TARGET, 1] - p[upper, 1]
-    ahead = (cos * dx + sin * dy) / me.size[ARM]
-    above = (p[TARGET, 2] - p[upper, 2]) / me.size[ARM]
+    ahead = (cos * dx + sin * dy) / me.size[an.ARM]
+    above = (p[TARGET, 2] - p[upper, 2]) / me.size[an.ARM]
     forward, up = min(max(ahead - 0.3, 0.0) / 0.7, 1.0), min(max(above + 0.5, 0.0), 1.0)
     if forward > 0.0 or up > 0.0:
         forward, up = forward * forward * (3.0 - 2.0 * forward), up * up * (3.0 - 2.0 * up)
         give = sign * SHOULDER_RAD
         yaw_pitch_roll(-give * forward, 0.0, give * up, TURN, me)
-        product(CHEST, TURN, clavicle, me)
+        product(an.CHEST, TURN, clavicle, me)
         attach(upper, clavicle, me)
 
 
@@ -194,27 +174,31 @@ def arm(side: int, cos: float, sin: float, me: Worker) -> None:
     p = me.p
     shoulder(side, cos, sin, me)
     sign = 1.0 - 2.0 * side
-    upper = LEFT + side * SIDE_STRIDE + UPPER_ARM
-    fore, hand = upper + FOREARM - UPPER_ARM, upper + HAND - UPPER_ARM
+    upper = an.LEFT + side * an.SIDE_STRIDE + an.UPPER_ARM
+    fore, hand = upper + an.FOREARM - an.UPPER_ARM, upper + an.HAND - an.UPPER_ARM
     swivel = me.q[c.SWIVEL + side]
     level, out = math.cos(swivel), math.sin(swivel)
     back, left = -0.7 * level, sign * (0.45 * level + out)
     p[POLE, 0], p[POLE, 1] = cos * back - sin * left, sin * back + cos * left
-    above = (p[TARGET, 2] - p[upper, 2]) / me.size[ARM]
+    above = (p[TARGET, 2] - p[upper, 2]) / me.size[an.ARM]
     p[POLE, 2] = -0.9 * level * (0.15 + 0.85 * min_jerk(1.2 * (above + 1.0)))
-    bend(upper, GRIP, me.size[UPPER_LENGTH], me.size[FOREARM_GRIP], ARM_KNEE, ARM_LIMIT, me)
-    aim(upper, fore, me.size[UPPER_LENGTH], me)
-    aim(fore, GRIP, me.size[FOREARM_GRIP], me)
+    bend(upper, GRIP, me.size[an.UPPER_LENGTH], me.size[an.FOREARM_GRIP], ARM_KNEE, ARM_LIMIT, me)
+    aim(upper, fore, me.size[an.UPPER_LENGTH], me)
+    aim(fore, GRIP, me.size[an.FOREARM_GRIP], me)
     attach(hand, fore, me)
-    aim(hand, GRIP, GRIP_M, me)
+    aim(hand, GRIP, an.GRIP_M, me)
 
 
 @kernel
 def leg(side: int, me: Worker) -> None:
     """Hip to toes; the knee over the foot."""
     q, p, r = me.q, me.p, me.r
-    thigh, ankle = LEFT + side * SIDE_STRIDE + THIGH, c.ANKLE + 6 * side
-    shank, foot, toes = thigh + SHANK - THIGH, thigh + FOOT - THIGH, thigh + TOES - THIGH
+    thigh, ankle = an.LEFT + side * an.SIDE_STRIDE + an.THIGH, c.ANKLE + 6 * side
+    shank, foot, toes = (
+        thigh + an.SHANK - an.THIGH,
+        thigh + an.FOOT - an.THIGH,
+        thigh + an.TOES - an.THIGH,
+    )
     attach(thigh, 0, me)
     cos, sin = math.cos(q[ankle + 3]), math.sin(q[ankle + 3])
     pitched(cos, sin, q[ankle + 4], foot, me)
@@ -223,9 +207,9 @@ def leg(side: int, me: Worker) -> None:
     p[POLE, 2] = 0.12
     for i in range(3):
         p[TARGET, i] = q[ankle + i]
-    bend(thigh, foot, me.size[THIGH_LENGTH], me.size[SHANK_LENGTH], 1.0, 1.001, me)
-    aim(thigh, shank, me.size[THIGH_LENGTH], me)
-    aim(shank, foot, me.size[SHANK_LENGTH], me)
+    bend(thigh, foot, me.size[an.THIGH_LENGTH], me.size[an.SHANK_LENGTH], 1.0, 1.001, me)
+    aim(thigh, shank, me.size[an.THIGH_LENGTH], me)
+    aim(shank, foot, me.size[an.SHANK_LENGTH], me)
     attach(toes, foot, me)
 
 

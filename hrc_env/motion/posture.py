@@ -3,12 +3,14 @@
 import math
 
 from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import ARM, FOREARM_GRIP, LEFT, SIDE_STRIDE, STAND_Z, UPPER_ARM
 from hrc_env.motion.curves import wrap
 from hrc_env.motion.kinematics import ARM_KNEE, pose
 from hrc_env.motion.state import Worker
 
+Triple = tuple[float, float, float]
 STANCE_HALF_WIDTH_M = 0.10
 """Ankles' distance from the middle when standing [m]; shoulder-wide for the baked bodies."""
 TOE_OUT_RAD = 0.12
@@ -103,16 +105,29 @@ def lean(amount: float, squat: float, twist: float, me: Worker) -> None:
 @kernel
 def beyond(used: tuple[float, float], me: Worker) -> float:
     """How far the targets lie beyond what the used arms reach from this posture [m]."""
+    far = farthest(UPPER_ARM, me.q[c.HAND_TARGET :], used, me)
+    return max(far - ARM_KNEE * me.size[ARM], -1.0)
+
+
+@kernel
+def farthest(segment: int, goals: Floats, used: tuple[float, float], me: Worker) -> float:
+    """From a segment of the used arms, posed as q says, to the farther goal (6,) [m]; -1: none."""
     pose(me)
     far = -1.0
     for side in range(2):
-        upper = LEFT + SIDE_STRIDE * side + UPPER_ARM
-        d = 0.0
+        at, d = LEFT + SIDE_STRIDE * side + segment, 0.0
         for i in range(3):
-            d += (me.q[c.HAND_TARGET + 3 * side + i] - me.p[upper, i]) ** 2
+            d += (goals[3 * side + i] - me.p[at, i]) ** 2
         if used[side] > 0.0:
-            far = max(far, math.sqrt(d) - ARM_KNEE * me.size[ARM])
+            far = max(far, math.sqrt(d))
     return far
+
+
+@kernel
+def from_here(at: Triple, me: Worker) -> Triple:
+    """A point ahead, left [m] of where the worker stands, at a height, in the world."""
+    cos, sin = math.cos(me.start_yaw), math.sin(me.start_yaw)
+    return me.start_x + cos * at[0] - sin * at[1], me.start_y + sin * at[0] + cos * at[1], at[2]
 
 
 @kernel

@@ -71,11 +71,12 @@ def _react(w: int, workers: Workers) -> None:
     """Do what worker w does about the robot, if what they are at allows it."""
     me = workers[w]
     kind = me.activity
+    upright = kind <= st.REACH or kind == st.LOOK_ROUND or st.HAMMER <= kind <= st.POINT
     if goes(kind):
         if (kind == st.WALK or kind == st.CARRY) and _brake(w, workers):
             me.doing = st.PAUSE
             me.doing_until = me.clock_s + me.duration_s - me.time_s + me.reaction_s
-    elif me.reaction == st.BACK_AWAY and _withdraws(kind):
+    elif me.reaction == st.BACK_AWAY and upright:
         me.doing = st.BACK_AWAY
         if kind == st.STAND or kind == st.LOOK_ROUND:
             me.duration_s = me.time_s
@@ -83,12 +84,6 @@ def _react(w: int, workers: Workers) -> None:
             me.pace_wished = WITHDRAW
     else:
         me.doing, me.doing_until, me.pace_wished = st.PAUSE, me.clock_s + me.reaction_s, 0.0
-
-
-@kernel
-def _withdraws(activity: int) -> bool:
-    """Whether one can step back from it: standing up, with empty hands."""
-    return activity <= st.REACH or activity == st.LOOK_ROUND or st.HAMMER <= activity <= st.POINT
 
 
 @kernel(makes_arrays=True)

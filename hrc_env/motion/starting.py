@@ -7,7 +7,7 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
 from hrc_env.motion import state as st
 from hrc_env.motion.activities import work_plans as wp
-from hrc_env.motion.activities.climb import start_climb
+from hrc_env.motion.activities.climb import start_climb, start_look_round
 from hrc_env.motion.activities.going import start_push, start_step_back, start_stumble, start_walk
 from hrc_env.motion.activities.loads import (
     finish_lift,
@@ -16,7 +16,6 @@ from hrc_env.motion.activities.loads import (
     plan_receive,
     plan_set_down,
 )
-from hrc_env.motion.activities.look_round import start_look_round
 from hrc_env.motion.activities.planning import between, finish
 from hrc_env.motion.config import Numbers
 from hrc_env.motion.curves import wrap

@@ -25,6 +25,7 @@ _SCRATCH = [
     ("p", "f8", (N_POINTS, 3)),  # origins of the segments
     ("r", "f8", (N_FRAMES, 3, 3)),  # world_from_segment
     ("later_p", "f8", (N_POINTS, 3)), ("later_r", "f8", (N_FRAMES, 3, 3)),
+    ("goals", "f8", (6,)),  # of the hands, while work is planned
     ("handover", "f8", (2, c.N_BLENDED)),  # q where an activity ended, and a little later
 ]  # fmt: skip
 _EPISODE = [

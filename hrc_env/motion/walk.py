@@ -47,7 +47,7 @@ BOB_M, BOB_PACE_M = 0.0095, 0.0035
 BENT_M, BENT_FAST_M = 0.026, 0.10
 """Lower than standing [m]: with the pace, with the square of the hurry; judgement."""
 SWING_SLOW_RAD, SWING_FAST_RAD, FULL_SWING, ELBOW_SWING = 0.05, 0.104, 1.1, 0.73
-"""Swing of the upper arm to each side [rad]: at any pace, with its cube; the elbow's share of it."""
+"""Swing of the upper arm to each side [rad]: at any pace, with its cube; the elbow's share."""
 LOADED_TWIST = 0.4
 """Share of the trunk's turning that is left with something in the hands; judgement."""
 LURCH_S = 1.4

@@ -13,7 +13,7 @@ import numpy as np
 from hrc_env.core.typing import Ints
 from hrc_env.scene.primitives import DECORATION, LOOKS_ONLY, WORKER_CAPSULES
 from hrc_env.worker.body import SEGMENTS, Body
-from hrc_env.worker.mesh import HatLooks, Looks, SkinLooks
+from hrc_env.worker.mesh import HatMesh, SkinMesh, WorkerMesh
 
 SKIN_SPECULAR, SKIN_SHININESS = 0.08, 0.15
 HAT_SPECULAR, HAT_SHININESS = 0.45, 0.55
@@ -31,7 +31,7 @@ class Wardrobe:
     """(H, 3) whose each hat is, of which body, and its geom."""
 
 
-def dress(spec: Any, body: Body, looks: Looks, prefix: str) -> None:
+def dress(spec: Any, body: Body, looks: WorkerMesh, prefix: str) -> None:
     """Add the skins and the hat of a body to a worker whom `add_worker` has added.
 
     Workers who have the same body share its textures.
@@ -78,7 +78,7 @@ def wear(model: mujoco.MjModel, looks: Wardrobe, body: Ints | None) -> None:
     model.geom_group[hats[:, 2]] = np.where(worn[hats[:, 0]] == hats[:, 1], WORN, PUT_AWAY)
 
 
-def _add_skin(spec: Any, skin: SkinLooks, body: Body, prefix: str) -> None:
+def _add_skin(spec: Any, skin: SkinMesh, body: Body, prefix: str) -> None:
     material = f"{body.name}_{skin.name}"
     if spec.material(material) is None:
         _add_cloth(spec, skin, material)
@@ -98,7 +98,7 @@ def _add_skin(spec: Any, skin: SkinLooks, body: Body, prefix: str) -> None:
     )
 
 
-def _add_cloth(spec: Any, skin: SkinLooks, name: str) -> None:
+def _add_cloth(spec: Any, skin: SkinMesh, name: str) -> None:
     """The material and the texture of a skin."""
     height, width = skin.texture.shape[:2]
     texture = spec.add_texture(
@@ -109,7 +109,7 @@ def _add_cloth(spec: Any, skin: SkinLooks, name: str) -> None:
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
 
 
-def _add_hat(spec: Any, hat: HatLooks, body: Body, prefix: str) -> None:
+def _add_hat(spec: Any, hat: HatMesh, body: Body, prefix: str) -> None:
     name = f"{body.name}_hat"
     if spec.mesh(name) is None:
         spec.add_mesh(

@@ -1,4 +1,4 @@
-"""Climbing a step or a low ladder, looking about up there, and coming down backwards."""
+"""Climbing a step or a low ladder and coming down backwards; looking round where one stands."""
 
 import math
 
@@ -17,6 +17,8 @@ FIRST_M, TREAD_M = 0.40, 0.24
 """Where a foot goes on the first tread, and from tread to tread [m]."""
 STEP_AT_S, PERIOD_S, SWING_S = 0.12, 0.72, 0.56
 """First lift-off, then the times of `plans` of a climber's steps [s]; judgement."""
+TURN_S = 0.75
+"""To turn the head across [s]; about 1.5 rad/s."""
 
 
 @kernel
@@ -64,3 +66,28 @@ def start_climb(draws: Floats, place: Place, me: Worker) -> float:
     me.up_s = STEP_AT_S + treads * PERIOD_S + SWING_S + 0.1
     me.undo_at = me.up_s + 0.5 * between(draws[2], 0.5, 4.0)
     return 2.0 * me.undo_at
+
+
+@kernel
+def look_round(t: float, clock_s: float, me: Worker) -> None:
+    """The control vector of someone who looks about."""
+    q = me.q
+    stand(me.start_x, me.start_y, me.start_yaw, clock_s, me)
+    there, across = min_jerk(t / TURN_S), min_jerk((t - me.left_s) / TURN_S)
+    back = min_jerk((t - me.right_s) / TURN_S)
+    gaze = me.left_rad * (there - across) + me.right_rad * (across - back)
+    q[c.HEAD_YAW] += 0.62 * gaze
+    q[c.SPINE_TWIST] += 0.26 * gaze
+    q[c.PELVIS_YAW] += 0.12 * gaze
+
+
+@kernel
+def start_look_round(draws: Floats, place: Place, me: Worker) -> float:
+    """Plan to look round; returns how long it takes [s]."""
+    blank(me)
+    first = 1.0 if draws[0] < 0.5 else -1.0
+    me.left_rad = first * between(draws[1], 0.6, 1.5)
+    me.right_rad = -first * between(draws[2], 0.6, 1.5)
+    me.left_s = TURN_S + between(draws[3], 0.3, 1.2)
+    me.right_s = me.left_s + TURN_S + between(draws[4], 0.3, 1.2)
+    return me.right_s + TURN_S + 0.05

@@ -18,13 +18,12 @@ from hrc_env.motion.activities.planning import (
     put_tool,
     settle_lean,
     shoulders,
-    world,
 )
 from hrc_env.motion.anatomy import LEFT, SIDE_STRIDE, STAND_Z, UPPER_ARM
 from hrc_env.motion.curves import hump, min_jerk
 from hrc_env.motion.holding import GRIPS, grip, place_load
 from hrc_env.motion.kinematics import pose
-from hrc_env.motion.posture import lean, look_at, stand
+from hrc_env.motion.posture import from_here, lean, look_at, stand
 from hrc_env.motion.state import Place, Worker
 from hrc_env.worker.props import prop_index
 
@@ -175,9 +174,7 @@ def finish_lift(raise_s: float, me: Worker) -> float:
     shoulder = me.load_at[3] != 0.0
     mid_z = 1.15 * size[STAND_Z] if shoulder else me.load_at[2]
     ahead = 0.36 if shoulder else me.load_at[0]
-    point = world(ahead, 0.0, mid_z, me)
-    for i in range(3):
-        me.midway[i] = point[i]
+    me.midway[0], me.midway[1], me.midway[2] = from_here((ahead, 0.0, mid_z), me)
     me.midway[3] = me.start_yaw
     way = abs(mid_z - z)
     me.raise_s = max(raise_s * (0.50 + 0.48 * way), 0.6)

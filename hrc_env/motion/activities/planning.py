@@ -3,27 +3,14 @@
 import math
 
 from hrc_env.core.kernels import kernel
+from hrc_env.motion import anatomy as an
 from hrc_env.motion import controls as c
 from hrc_env.motion.activities.strokes import PAUSE_S, stroke
 from hrc_env.motion.activities.work import FRONT_LEG, REAR_LEG, extend, hands_on, step_into
-from hrc_env.motion.anatomy import (
-    ARM,
-    CHEST,
-    CLAVICLE,
-    HAND,
-    LEFT,
-    LEG,
-    SIDE_STRIDE,
-    STAND_Z,
-    UPPER_ARM,
-)
 from hrc_env.motion.feet import feet
 from hrc_env.motion.holding import TWO_HANDED
-from hrc_env.motion.kinematics import pose
-from hrc_env.motion.posture import MOST_LEAN, beyond, stand
+from hrc_env.motion.posture import MOST_LEAN, Triple, beyond, farthest, from_here, stand
 from hrc_env.motion.state import Worker
-
-Triple = tuple[float, float, float]
 
 TAKE_S = 0.55
 """For a hand to go to the belt [s]."""
@@ -39,7 +26,7 @@ KNEE_ASIDE_M = 0.17
 """Aside of the middle: where the other leg is not in the way [m]."""
 SPARE_M = 0.03
 """Arms keep this much in hand when the trunk has settled [m]: bodies sway."""
-TO_SHOULDER = (*range(1, CHEST + 1), LEFT + CLAVICLE, LEFT + UPPER_ARM)
+TO_SHOULDER = (*range(1, an.CHEST + 1), an.LEFT + an.CLAVICLE, an.LEFT + an.UPPER_ARM)
 """The segments from the pelvis on, each the child of the one before."""
 SLUMP_M = 0.01
 """How far a standing trunk brings the shoulders forward [m]."""
@@ -77,7 +64,7 @@ def blank(me: Worker) -> None:
 @kernel
 def kneel_down(side: int, me: Worker) -> None:
     """Plan to kneel on the knee of that side."""
-    leg = me.size[LEG]
+    leg = me.size[an.LEG]
     me.kneel, me.ahead = 1.0, -0.08
     me.settle_s, me.out_at = KNEEL_S, 0.4
     step_into(side, REAR_LEG * leg, FRONT_LEG * leg, 0.02, me)
@@ -99,21 +86,10 @@ def step_ahead(side: int, ahead: float, me: Worker) -> None:
 
 
 @kernel
-def world(ahead: float, left: float, z: float, me: Worker) -> Triple:
-    """A point of the frame in which the worker stands."""
-    cos, sin = math.cos(me.start_yaw), math.sin(me.start_yaw)
-    return (
-        me.start_x + cos * ahead - sin * left,
-        me.start_y + sin * ahead + cos * left,
-        z,
-    )
-
-
-@kernel
 def shoulders(me: Worker) -> Triple:
     """Where the shoulders' joints of one who stands are: ahead of the root, aside, height [m]."""
     bones = me.bones
-    ahead, aside, up = SLUMP_M, 0.0, me.size[STAND_Z]
+    ahead, aside, up = SLUMP_M, 0.0, me.size[an.STAND_Z]
     for segment in TO_SHOULDER:
         ahead += bones[segment, 0]
         aside += bones[segment, 1]
@@ -124,7 +100,7 @@ def shoulders(me: Worker) -> Triple:
 @kernel
 def in_reach(share: float, one: float, other: float, me: Worker) -> float:
     """How far arms, stretched by a share, reach along an axis if so far along the others [m]."""
-    reach = share * me.size[ARM]
+    reach = share * me.size[an.ARM]
     return math.sqrt(max(reach * reach - one * one - other * other, 0.0))
 
 
@@ -133,11 +109,9 @@ def put_tool(tool: int, side: int, at: Triple, turn: Triple, me: Worker) -> None
     """Plan where the tool is at work: ahead, left [m], height; yaw, pitch, roll."""
     me.tool, me.side = tool, side
     me.take_s = TAKE_S if tool > 0 else 0.0
-    point = world(at[0], at[1], at[2], me)
-    for i in range(3):
-        me.tool_pose[i] = point[i]
-        me.tool_pose[3 + i] = turn[i]
-    me.tool_pose[3] += me.start_yaw
+    pose = me.tool_pose
+    pose[0], pose[1], pose[2] = from_here(at, me)
+    pose[3], pose[4], pose[5] = turn[0] + me.start_yaw, turn[1], turn[2]
     if TWO_HANDED[tool]:
         me.used[0] = me.used[1] = 1.0
 
@@ -146,18 +120,15 @@ def put_tool(tool: int, side: int, at: Triple, turn: Triple, me: Worker) -> None
 def put_other(at: Triple, me: Worker) -> None:
     """Plan where the other hand works: ahead, left [m], height."""
     other = 1 - me.side
-    point = world(at[0], at[1], at[2], me)
-    for i in range(3):
-        me.target[3 * other + i] = point[i]
+    target = me.target[3 * other :]
+    target[0], target[1], target[2] = from_here(at, me)
     me.used[other] = 1.0
 
 
 @kernel
 def look_to(at: Triple, me: Worker) -> None:
     """Plan where the eyes are: ahead, left [m], height."""
-    point = world(at[0], at[1], at[2], me)
-    for i in range(3):
-        me.gaze[i] = point[i]
+    me.gaze[0], me.gaze[1], me.gaze[2] = from_here(at, me)
 
 
 @kernel
@@ -183,15 +154,14 @@ def finish(peak_m_s: float, me: Worker) -> float:
 
     No plan function calls it: each would be compiled with all of it once more.
     """
-    side = me.side
-    low = min(max((0.95 * me.size[STAND_Z] - me.tool_pose[2]) / 0.5, 0.0), 1.0)
+    low = min(max((0.95 * me.size[an.STAND_Z] - me.tool_pose[2]) / 0.5, 0.0), 1.0)
     me.squat = 0.0 if me.kneel + me.crouch > 0.0 else 0.8 * low
     settle_lean(me)
     down_s = me.settle_s - me.out_at - me.take_s
     if me.kneel + me.crouch == 0.0:
         down_s = 0.35
     slowly = 1.7 if TWO_HANDED[me.tool] else 1.0
-    me.out_s = max(1.875 * slowly * _way(side, me) / peak_m_s, down_s)
+    me.out_s = max(1.875 * slowly * _way(me) / peak_m_s, down_s)
     done = me.out_at + me.take_s + me.out_s
     me.lasts = 2.0 * done + me.hold_s
     me.undo_at = 0.5 * me.lasts if me.step_count > 0.0 else 0.0
@@ -234,33 +204,21 @@ def _short(me: Worker) -> float:
 def _come_nearer(far: float, me: Worker) -> None:
     """Move tool and targets towards the shoulders by what is out of reach, as `_short` says."""
     p = me.p
-    x, y, z = p[CHEST, 0], p[CHEST, 1], p[CHEST, 2]
-    dx, dy, dz = me.tool_pose[0] - x, me.tool_pose[1] - y, me.tool_pose[2] - z
+    pose, other = me.tool_pose, me.target[3 * (1 - me.side) :]
+    dx, dy, dz = (pose[0] - p[an.CHEST, 0], pose[1] - p[an.CHEST, 1], pose[2] - p[an.CHEST, 2])
     share = 1.15 * far / math.sqrt(dx * dx + dy * dy + dz * dz)
-    other = 3 * (1 - me.side)
     for i, d in enumerate((dx, dy, dz)):
-        me.tool_pose[i] -= share * d
-        me.target[other + i] -= share * d
+        pose[i] -= share * d
+        other[i] -= share * d
 
 
 @kernel
-def _way(side: int, me: Worker) -> float:
+def _way(me: Worker) -> float:
     """The longest way that a hand has from hanging, or from the belt, to its work [m]."""
-    q, p = me.q, me.p
     at_work(me)
-    way = 0.15
-    goal = (q[c.HAND_TARGET], q[c.HAND_TARGET + 1], q[c.HAND_TARGET + 2])
-    right = (q[c.HAND_TARGET + 3], q[c.HAND_TARGET + 4], q[c.HAND_TARGET + 5])
-    used = (q[c.HAND_SHARE], q[c.HAND_SHARE + 1])
+    used, goal = (me.q[c.HAND_SHARE], me.q[c.HAND_SHARE + 1]), me.goals
+    for i in range(6):
+        goal[i] = me.q[c.HAND_TARGET + i]
     stand(me.start_x, me.start_y, me.start_yaw, 0.0, me)
     extend(1.0, 0.0, me)
-    pose(me)
-    for hand in range(2):
-        wrist = LEFT + SIDE_STRIDE * hand + HAND
-        to = goal if hand == 0 else right
-        d = 0.0
-        for i in range(3):
-            d += (to[i] - p[wrist, i]) ** 2
-        if used[hand] > 0.0:
-            way = max(way, math.sqrt(d) - 0.05)
-    return way
+    return max(0.15, farthest(an.HAND, goal, used, me) - 0.05)

@@ -37,7 +37,8 @@ def stroke(t: float, me: Worker) -> None:
     if kind == STRIKE:
         _strike(ease, turn, me)
     elif kind in (BORE, PRESS):
-        _bore(u, me)
+        push = min_jerk(u / 0.5) - min_jerk((u - me.burst_s + 0.5) / 0.5)
+        _along(me.stroke_m * push, me)
         if kind == BORE:
             _fetch(u, other, me)
     elif kind == SAW:
@@ -85,13 +86,6 @@ def _strike(ease: float, turn: float, me: Worker) -> None:
     q[c.PROP_POSE] -= math.sin(me.start_yaw) * out
     q[c.PROP_POSE + 1] += math.cos(me.start_yaw) * out
     q[c.PROP_POSE + 4] -= min(0.3 + 2.2 * size, 1.1) * back
-
-
-@kernel
-def _bore(u: float, me: Worker) -> None:
-    """Lean on the drill."""
-    push = min_jerk(u / 0.5) - min_jerk((u - me.burst_s + 0.5) / 0.5)
-    _along(me.stroke_m * push, me)
 
 
 @kernel
