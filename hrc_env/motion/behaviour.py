@@ -1,6 +1,6 @@
 """What a worker does next: decided when an activity has ended, from uniform draws in [0, 1).
 
-Errands are tasks at places (`errands`); who wants to go somewhere looks for a way that meets
+Jobs at places follow each other (`schedule`); who wants to go somewhere looks for a way that meets
 nobody, takes another place of the kind if there is none, or waits.
 """
 
@@ -13,7 +13,7 @@ from hrc_env.motion import decision as dc
 from hrc_env.motion import state as st
 from hrc_env.motion.blending import join, leave, settle
 from hrc_env.motion.decision import Decision, MotionState, take_first_place
-from hrc_env.motion.errands import HERE, picked
+from hrc_env.motion.schedule import HERE, picked
 from hrc_env.motion.setting_out import arrived, go, meets_somebody, play, stay, step_back
 from hrc_env.motion.starting import start_here
 from hrc_env.motion.state import NOWHERE, THERE, UNDER_WAY, WAITING
@@ -77,7 +77,7 @@ def begin_episode(state: MotionState, b: int, n_present: int, bodies: Ints, draw
     for who in everyone[:n_present]:
         share = who.draws.item(dc.PLACES - 1)
         who.draws = draws[who.w, 1]
-        _begin(who, *_do_task(who))
+        _begin(who, *_do_job(who))
         who.me["time_s"] = math.floor(1e6 * share * float(who.me["duration_s"])) * 1e-6
 
 
@@ -95,15 +95,15 @@ def next_activity(who: Decision) -> tuple[int, float]:
         return played
     if me["going"] == UNDER_WAY and arrived(who):
         who.go(THERE)
-        return _do_task(who)
+        return _do_job(who)
     if me["going"] == THERE:
         if who.draws[dc.EVENT] < who.mind.config.people.careless_probability:
             stepped = step_back(who)
             if stepped:
                 return stepped
-        _choose_task(who)
-        if who.task.at in (HERE, who.kind_here):
-            return _do_task(who)
+        _choose_job(who)
+        if who.job.at in (HERE, who.kind_here):
+            return _do_job(who)
         who.go(WAITING)
         me["since_s"] = who.now
     return go(who) or _wait(who)
@@ -125,11 +125,11 @@ def _begin(who: Decision, activity: int, lasts: float) -> None:
     me["reaction_s"] = who.draw(dc.REACTION_S, people.pause_s)
 
 
-def _choose_task(who: Decision) -> None:
-    """What follows the task that is done, or another errand."""
-    me, errands = who.me, who.mind.errands
-    then = errands.then[me["job"]]
-    stays = all(errands.tasks[k].at in (HERE, who.kind_here) for k, _ in then)
+def _choose_job(who: Decision) -> None:
+    """What follows the job that is done, or another errand."""
+    me, schedule = who.me, who.mind.schedule
+    then = schedule.then[me["job"]]
+    stays = all(schedule.jobs[k].at in (HERE, who.kind_here) for k, _ in then)
     if then and not (stays and who.now >= me["until_s"] and not who.loaded):
         me["job"] = picked(then, who.draws.item(dc.NEXT))
     else:
@@ -140,16 +140,16 @@ def _new_errand(who: Decision) -> None:
     """Choose what to go about next: at the robot, or elsewhere."""
     mind, me, draw = who.mind, who.me, who.draws.item(dc.NEXT)
     near = mind.config.near_probability
-    if draw < near or not mind.errands.begins:
-        me["job"] = mind.errands.robot
+    if draw < near or not mind.schedule.begins:
+        me["job"] = mind.schedule.robot
     else:
-        me["job"] = picked(mind.errands.begins, (draw - near) / (1.0 - near))
+        me["job"] = picked(mind.schedule.begins, (draw - near) / (1.0 - near))
     me["at"] = NOWHERE
 
 
-def _do_task(who: Decision) -> tuple[int, float]:
-    """Begin the task where the worker is; set down first what is in the way of it."""
-    activity = st.ACTIVITY_NAMES.index(who.task.activity)
+def _do_job(who: Decision) -> tuple[int, float]:
+    """Begin the job where the worker is; set down first what is in the way of it."""
+    activity = st.ACTIVITY_NAMES.index(who.job.activity)
     if not who.kind_here:
         activity = st.LOOK_ROUND
     if who.loaded and activity not in WITH_LOAD:
@@ -175,13 +175,13 @@ def _work(who: Decision, activity: int) -> tuple[int, float]:
     if near and activity == st.REACH:
         lunges = who.draws[dc.EVENT] > 1.0 - config.people.lunge_probability
         activity = st.LUNGE if lunges else st.REACH
-    others, prop = who.workers["spot"][who.others(), :2], prop_index(who.task.prop)
+    others, prop = who.workers["spot"][who.others(), :2], prop_index(who.job.prop)
     place = (x, y, yaw, height)
     lasts = start_here(activity, who.draws, place, near, others, prop, who.mind.numbers, me)
     if meets_somebody(who, activity, lasts)[0] >= 0.0:
         stay(who)
         if who.kind_here:
-            who.go(UNDER_WAY)  # that is, the task comes next
+            who.go(UNDER_WAY)  # that is, the job comes next
         return _stand(who, who.draw(dc.LASTS, WAIT_S))
     return activity, lasts
 

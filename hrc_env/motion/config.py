@@ -8,7 +8,7 @@ import numpy as np
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.motion.clip import Clip
-from hrc_env.motion.errands import TASKS, Task, check_tasks
+from hrc_env.motion.schedule import JOBS, Job, check_jobs
 
 Range = tuple[float, float]
 
@@ -126,7 +126,7 @@ class MotionConfig:
 
     people: PeopleConfig = field(default_factory=PeopleConfig)
     """How the workers are with the robot and their work; the environment's `people` by name."""
-    tasks: tuple[Task, ...] = TASKS
+    jobs: tuple[Job, ...] = JOBS
     """What they do, and what follows what."""
     motions: tuple[str | Clip, ...] = ()
     """Clips of recorded motion that workers play, too (docs/people_and_scenes.md)."""
@@ -140,7 +140,7 @@ class MotionConfig:
             raise ConfigError(
                 f"spacing_m must be 0.8 or more, or workers would touch: {self.spacing_m}."
             )
-        check_tasks(self.tasks)
+        check_jobs(self.jobs)
         for motion in self.motions:
             if not isinstance(motion, str | Clip):
                 raise ConfigError(f"motions must hold paths or clips, got {motion!r}.")

@@ -11,8 +11,8 @@ from hrc_env.core.typing import Bools, Floats
 from hrc_env.motion.activities.playing import Clips
 from hrc_env.motion.anatomy import Anatomy
 from hrc_env.motion.config import MotionConfig, Numbers
-from hrc_env.motion.errands import HERE, Errands, Task
 from hrc_env.motion.floorplan import CELL_M, Floorplan, slack_at
+from hrc_env.motion.schedule import HERE, Job, Schedule
 from hrc_env.motion.state import N_START, NOWHERE, UNDER_WAY, WAITING, Place, Worker, Workers
 from hrc_env.motion.traffic import AHEAD_M, APART_M, HANDS_M
 
@@ -33,7 +33,7 @@ class BehaviourParams:
     config: MotionConfig
     numbers: Numbers
     plan: Floorplan
-    errands: Errands
+    schedule: Schedule
     places: dict[str, tuple[Workplace, ...]]
     """By kind."""
     clips: Clips
@@ -85,9 +85,9 @@ class Decision:
         return "" if at == NOWHERE else WORKPLACE_KINDS[at]
 
     @property
-    def task(self) -> Task:
+    def job(self) -> Job:
         """What they do or want to do."""
-        return self.mind.errands.tasks[self.me["job"]]
+        return self.mind.schedule.jobs[self.me["job"]]
 
     @property
     def loaded(self) -> bool:
@@ -119,10 +119,10 @@ def in_the_way(who: Decision) -> Floats:
 
 
 def wished(who: Decision) -> Iterator[Place]:
-    """Places for the task that nobody else has, the one last chosen first."""
+    """Places for the job that nobody else has, the one last chosen first."""
     if who.me["going"] == UNDER_WAY:
         yield tuple(who.me["spot"].tolist())  # type: ignore[misc]
-    for place in _candidates(who, who.task.at):
+    for place in _candidates(who, who.job.at):
         if _is_free(who, place):
             yield place
 
@@ -156,20 +156,20 @@ def _is_free(who: Decision, place: Place) -> bool:
 
 
 def take_first_place(who: Decision) -> None:
-    """A place to begin at, and the task there; where all are taken, the loneliest that is free."""
+    """A place to begin at, and the job there; where all are taken, the loneliest that is free."""
     mind, me, draw = who.mind, who.me, who.draws.item(NEXT)
-    begins = [k for k, _ in mind.errands.begins]
+    begins = [k for k, _ in mind.schedule.begins]
     near = draw < mind.config.near_probability or not begins
-    first = mind.errands.robot if near else begins[int(who.draws[BOW] * len(begins))]
-    for task in (first, mind.errands.robot, *begins):
-        kind = mind.errands.tasks[task].at
+    first = mind.schedule.robot if near else begins[int(who.draws[BOW] * len(begins))]
+    for job in (first, mind.schedule.robot, *begins):
+        kind = mind.schedule.jobs[job].at
         for place in _candidates(who, kind):
             if _is_free(who, place):
-                me["job"], me["at"], me["spot"] = task, WORKPLACE_KINDS.index(kind), place
+                me["job"], me["at"], me["spot"] = job, WORKPLACE_KINDS.index(kind), place
                 dwell = who.draw(DWELL, mind.config.dwell_s) * mind.config.people.tempo
                 me["until_s"] = max(0.05, dwell * who.draws.item(LASTS))
                 return
-    me["job"], me["at"], me["spot"] = mind.errands.robot, NOWHERE, _loneliest(who)
+    me["job"], me["at"], me["spot"] = mind.schedule.robot, NOWHERE, _loneliest(who)
 
 
 def _loneliest(who: Decision) -> Place:

@@ -20,11 +20,11 @@ from hrc_env.motion.blending import RATE_H_S, evaluate
 from hrc_env.motion.clip import Clip, opened
 from hrc_env.motion.config import PEOPLE, MotionConfig, PeopleConfig, numbers
 from hrc_env.motion.decision import N_DRAWS, BehaviourParams, MotionState
-from hrc_env.motion.errands import errands_at
 from hrc_env.motion.floorplan import floorplan, room_for
 from hrc_env.motion.holding import N_HELD, prop_pose
 from hrc_env.motion.kinematics import pose, quaternion, spin
 from hrc_env.motion.reactions import notice
+from hrc_env.motion.schedule import schedule_at
 from hrc_env.motion.state import Worker, Workers
 from hrc_env.worker.body import N_SEGMENTS, Body
 
@@ -88,9 +88,9 @@ def make_state(
     for place in plan.places:
         places[place.kind] = (*places.get(place.kind, ()), place)
     clips = stocked([opened(motion) for motion in config.motions], bones.size)
-    errands = errands_at(config.tasks, tuple(places))
+    schedule = schedule_at(config.jobs, tuple(places))
     values = numbers(config, grounds.robot_xy_m)
-    mind = BehaviourParams(config, values, plan, errands, places, clips, bones, fewest)
+    mind = BehaviourParams(config, values, plan, schedule, places, clips, bones, fewest)
     return MotionState(np.zeros((batch, n_workers), st.WORKER), mind)
 
 

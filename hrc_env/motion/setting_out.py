@@ -9,9 +9,9 @@ from hrc_env.core.typing import Floats
 from hrc_env.motion import state as st
 from hrc_env.motion.activities.playing import TURNS_RAD, following, start_clip
 from hrc_env.motion.decision import BOW, DWELL, EVENT, Decision, in_the_way, wished
-from hrc_env.motion.errands import HERE
 from hrc_env.motion.floorplan import slack_at
 from hrc_env.motion.routes import route
+from hrc_env.motion.schedule import HERE
 from hrc_env.motion.starting import start_going, start_here
 from hrc_env.motion.state import MAX_VIA, N_START, THERE, UNDER_WAY, Place
 from hrc_env.motion.traffic import APART_M, meets
@@ -28,8 +28,8 @@ STUMBLE_TO = ("robot", "open", "floor")
 
 
 def go(who: Decision) -> tuple[int, float] | None:
-    """Begin to walk to a place of the task, if there is a free one and a free way to it."""
-    mind, task, me = who.mind, who.task, who.me
+    """Begin to walk to a place of the job, if there is a free one and a free way to it."""
+    mind, job, me = who.mind, who.job, who.me
     for place in wished(who):
         me["end_x"], me["end_y"] = place[:2]
         obstacles = in_the_way(who)
@@ -40,7 +40,7 @@ def go(who: Decision) -> tuple[int, float] | None:
             when, at_x, at_y = meets_somebody(who, *begun)
             if when < 0.0:
                 me["spot"] = place
-                me["at"] = WORKPLACE_KINDS.index(task.at if task.at != HERE else "open")
+                me["at"] = WORKPLACE_KINDS.index(job.at if job.at != HERE else "open")
                 dwell = who.draw(DWELL, mind.config.dwell_s) * mind.config.people.tempo
                 me["until_s"] = who.now + begun[1] + dwell
                 who.go(UNDER_WAY)
@@ -65,9 +65,9 @@ def _set_out(
     stumbles = who.draws[EVENT] > 1.0 - mind.config.people.stumble_probability
     if who.loaded:
         activity = st.CARRY
-    elif who.task.by == "push":
-        activity, prop = st.PUSH, prop_index(who.task.prop)
-    elif who.task.at in STUMBLE_TO and stumbles:
+    elif who.job.by == "push":
+        activity, prop = st.PUSH, prop_index(who.job.prop)
+    elif who.job.at in STUMBLE_TO and stumbles:
         activity = st.STUMBLE
     pace = share * float(me["speed_m_s"])
     return activity, start_going(activity, who.draws, place, via[:n], pace, prop, me)

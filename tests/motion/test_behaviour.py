@@ -10,7 +10,7 @@ from recorded import started
 from hrc_env.core.errors import ConfigError
 from hrc_env.motion import generator
 from hrc_env.motion import state as st
-from hrc_env.motion.errands import TASKS, Task, errands_at, picked
+from hrc_env.motion.schedule import JOBS, Job, picked, schedule_at
 from hrc_env.motion.traffic import APART_M
 from hrc_env.worker.body import load_body
 
@@ -54,18 +54,18 @@ def test_a_workers_day_does_not_depend_on_the_other_environments():
 
 
 def test_every_task_leads_to_tasks_that_there_are():
-    errands = errands_at(TASKS, ("wall", "pile"))
-    assert {task.at for task in errands.tasks} == {"robot", "here", "wall", "pile"}
-    for shares in errands.then:
+    schedule = schedule_at(JOBS, ("wall", "pile"))
+    assert {job.at for job in schedule.jobs} == {"robot", "here", "wall", "pile"}
+    for shares in schedule.then:
         assert not shares or shares[-1][1] == pytest.approx(1.0)
-        assert all(0 <= k < len(errands.tasks) for k, _ in shares)
+        assert all(0 <= k < len(schedule.jobs) for k, _ in shares)
     assert picked(((4, 0.25), (7, 1.0)), 0.2) == 4
     assert picked(((4, 0.25), (7, 1.0)), 0.3) == 7
 
 
 def test_a_task_of_ones_own_is_what_workers_do():
-    tasks = (Task("drive nails", "hammer", "robot", (("drive nails", 1.0),)),)
-    config = generator.MotionConfig(tasks=tasks, people=NO_REACTIONS)
+    jobs = (Job("drive nails", "hammer", "robot", (("drive nails", 1.0),)),)
+    config = generator.MotionConfig(jobs=jobs, people=NO_REACTIONS)
     _, doing = go_on(*started(2, config=config), 20.0)
     allowed = {st.HAMMER, st.WALK, st.STEP_BACK, st.STUMBLE}
     assert st.HAMMER in doing
@@ -77,9 +77,9 @@ def test_a_task_of_ones_own_is_what_workers_do():
     [({"activity": "hamer"}, "hammer"), ({"at": "roof"}, "robot"), ({"prop": "piano"}, "prop")],
 )
 def test_a_task_that_cannot_be_is_refused_with_what_can(change, message):
-    task = dataclasses.replace(Task("work", "reach", "robot", (("work", 1.0),)), **change)
+    job = dataclasses.replace(Job("work", "reach", "robot", (("work", 1.0),)), **change)
     with pytest.raises(ConfigError, match=message):
-        generator.MotionConfig(tasks=(Task("x", "reach", "robot"), task))
+        generator.MotionConfig(jobs=(Job("x", "reach", "robot"), job))
 
 
 def test_more_workers_than_fit_are_refused():
