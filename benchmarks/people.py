@@ -26,7 +26,6 @@ from hrc_env.motion import generator
 from hrc_env.motion.plans import CLIMB
 from hrc_env.motion.state import GOING, SPOT_X, SPOT_Y, THERE
 from hrc_env.scene.build import Scene, build
-from hrc_env.simulation import WATCHED_CAPSULES
 from hrc_env.worker.body import pool, stack, worker_truth
 
 DEEPEST_M, STUCK_S = 0.03, 10.0
@@ -147,7 +146,7 @@ def _some(scene: Scene, first: int, batch: int, arguments: Arguments, notes: Not
     n_steps, spent = round(arguments.seconds / CTRL_DT_S), 0.0
     for step in range(1, n_steps + 1):
         q = scene.home_q + swing[:, 0] * np.sin(swing[:, 1] * step * CTRL_DT_S)
-        robot = chains.capsules(scene.chain, q)[:, WATCHED_CAPSULES, 1]
+        robot = chains.capsules(scene.chain, q)[:, scene.watched, 1]
         began = time.thread_time()
         _, motion = generator.advance(state, rngs, CTRL_DT_S / 5, 5)
         generator.watch(state, robot, motion, CTRL_DT_S)

@@ -30,6 +30,8 @@ from hrc_env.safety.shield import Shield, shield_called
 from hrc_env.scene.build import SceneConfig
 from hrc_env.scene.domain_randomization import APPEARANCES, AppearanceConfig
 from hrc_env.scene.rigs import RIGS
+from hrc_env.scene.robot import DEFAULT as DEFAULT_ROBOT
+from hrc_env.scene.robot import Robot, robot_called
 from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import Task, task_called
 from hrc_env.tracking.ahead import LONGEST_S
@@ -45,8 +47,8 @@ class HRCConfig:
 
     ctrl_dt: float = 0.04
     """Time between actions [s]; a multiple of `scene.sim_dt`. 0.04 s is 25 Hz."""
-    start_spread_rad: tuple[float, ...] = (1.3, 0.15, 0.15, 0.15, 0.15, 0.15)
-    """At reset each arm joint is drawn within so much of its home angle [rad]."""
+    start_spread_rad: tuple[float, ...] = ()
+    """At reset each joint is drawn within so much of its home angle [rad]; none: the robot's."""
     forecast_s: tuple[float, ...] = ()
     """Times ahead at which the observation also holds where the workers' joints are expected,
     each in (0, 1] [s]; none by default. (0.2, 0.4) adds 120 entries a worker."""
@@ -81,10 +83,8 @@ class HRCConfig:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.ctrl_dt) and self.ctrl_dt > 0):
             raise ConfigError(f"ctrl_dt must be a positive time [s], got {self.ctrl_dt}.")
-        if not self.start_spread_rad or min(self.start_spread_rad) < 0:
-            raise ConfigError(
-                f"start_spread_rad must hold angles >= 0, one a joint, got {self.start_spread_rad}."
-            )
+        if min(self.start_spread_rad, default=0.0) < 0:
+            raise ConfigError(f"start_spread_rad must be >= 0, got {self.start_spread_rad}.")
         pool(self.worker)
         for horizon_s in self.forecast_s:
             if not 0 < horizon_s <= LONGEST_S:
@@ -126,6 +126,7 @@ class Settings:
     cameras: Any
     """Names and indices of the scene's cameras that are used; None: all."""
     scene: str
+    robot: Robot
     n_workers: tuple[int, int]
     """The fewest and the most of an episode."""
     control: str
@@ -139,6 +140,7 @@ def settle(
     perception: str = "pixels",
     estimator: EstimatorChoice = "particle",
     scene: str = "lab",
+    robot: str | Robot = DEFAULT_ROBOT,
     n_workers: int | tuple[int, int] = 1,
     control: str = "joint",
     shield: "str | Shield | None" = None,
@@ -165,8 +167,10 @@ def settle(
             raise unknown("argument", name, [*_keywords(), *PARTS])
         if value is not None:
             whole = _with_part(whole, PARTS[name], value, name)
-    counts, guard = _worker_counts(n_workers), shield_called(shield)
-    return Settings(chosen, perception, spec, cameras, scene, counts, control, guard, whole)
+    return Settings(
+        chosen, perception, spec, cameras, scene, robot_called(robot), _worker_counts(n_workers),
+        control, shield_called(shield), whole,
+    )  # fmt: skip
 
 
 def _keywords() -> list[str]:

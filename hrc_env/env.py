@@ -27,6 +27,8 @@ from hrc_env.render.views import PICTURE_SIZE, Views, picture_size
 from hrc_env.rewards import RewardConfig
 from hrc_env.safety.shield import Shield
 from hrc_env.scene.domain_randomization import AppearanceConfig
+from hrc_env.scene.robot import DEFAULT as DEFAULT_ROBOT
+from hrc_env.scene.robot import Robot
 from hrc_env.simulation import Simulation, checked_action
 from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import Task
@@ -69,6 +71,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
             ("lab_gopro"), a TOML file's path, or a list of places (x, y, z) [m],
             `CameraConfig`s or mappings. None is all cameras of the scene. docs/cameras.md
         scene: name of the place: "lab", a workshop, or "site", a construction site.
+        robot: a name ("ur10e_like"), one that was registered or a `hrc_env.scene.robot.Robot`.
         n_workers: 0 or more workers; (fewest, most): each episode's number is drawn, and the
             observation has room for the most.
         people: how the workers are with the robot: "attentive", "hurried", "unaware", a
@@ -103,6 +106,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         estimator: EstimatorChoice = "particle",
         cameras: str | Path | Sequence[Any] | NDArray[Any] | None = None,
         scene: str = "lab",
+        robot: str | Robot = DEFAULT_ROBOT,
         n_workers: int | tuple[int, int] = 1,
         people: str | PeopleConfig | Mapping[str, Any] | None = None,
         motions: Sequence[str | Path | Clip] | None = None,
@@ -120,7 +124,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         self.render_mode = render_mode
         settings = settle(
             task=task, perception=perception, estimator=estimator, cameras=cameras, scene=scene,
-            n_workers=n_workers, people=people, motions=motions, faults=faults,
+            robot=robot, n_workers=n_workers, people=people, motions=motions, faults=faults,
             appearance=appearance, control=control, shield=shield, config=config,
         )  # fmt: skip
         self.config = settings.config

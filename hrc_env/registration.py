@@ -21,6 +21,7 @@ from hrc_env.tasks import BUILT_IN, EPISODE_STEPS
 if TYPE_CHECKING:
     from hrc_env.perception.detector import KeypointFunction
     from hrc_env.safety.shield import Shield
+    from hrc_env.scene.robot import Robot
     from hrc_env.tasks.task import Task
     from hrc_env.tracking.estimators import EstimatorSpec
 
@@ -32,6 +33,7 @@ REGISTRIES = {
     "task": ("hrc_env.tasks.task", "TASKS"),
     "estimator": ("hrc_env.tracking.estimators", "ESTIMATORS"),
     "detector": ("hrc_env.perception.detector", "DETECTORS"),
+    "robot": ("hrc_env.scene.robot", "ROBOTS"),
     "shield": ("hrc_env.safety.shield", "SHIELDS"),
 }
 """What can be brought: the module and the table in which it is kept by name."""
@@ -85,6 +87,22 @@ def register_detector(name: str, make: "Callable[[], KeypointFunction]") -> None
     if not callable(make):
         raise ConfigError(f"{name}: make must be a function of no arguments, got {make!r}.")
     _add("detector", name, make)
+
+
+def register_robot(robot: "Robot") -> None:
+    """Make a robot known by its name: wherever `robot=` or `--robot` is taken.
+
+    Args:
+        robot: a `hrc_env.scene.robot.Robot`.
+
+    Raises:
+        ConfigError: its name is taken, or something that it names is missing in its MJCF or of
+            the wrong kind.
+    """
+    from hrc_env.scene.robot import check_robot
+
+    check_robot(robot)
+    _add("robot", robot.name, robot)
 
 
 def register_shield(name: str, shield: "Shield") -> None:

@@ -24,8 +24,8 @@ from hrc_env.core.streams import children
 from hrc_env.core.typing import Bools, Floats, Ints, Points3
 from hrc_env.geometry import chains
 from hrc_env.motion import generator
-from hrc_env.pipeline.levels import CAMERA_LEVELS, make_senses
-from hrc_env.pipeline.sensor_input import Moment
+from hrc_env.pipeline.levels import CAMERA_LEVELS, make_pipeline
+from hrc_env.pipeline.sensor_input import SensorInput, TrueSensorInput
 from hrc_env.rewards import RewardConfig
 from hrc_env.safety.shield import shielded
 from hrc_env.scene.build import build
@@ -49,8 +49,6 @@ from hrc_env.worker.body import pool, stack, worker_capsules, worker_truth
 CLOSING_M_S = 8.0
 """Arm and worker never come nearer to each other than so fast [m/s]; 3.4 was the most in some
 290,000 steps of arms that were driven to and fro as hard as they can be."""
-WATCHED_CAPSULES = (3, 8)
-"""Of the arm: elbow and tool, whose ends the workers watch."""
 
 
 @dataclass(slots=True)
@@ -75,7 +73,7 @@ class Simulation(Stateful):
     """`batch` environments of the same settings that step together."""
 
     CHANGES = (
-        "physics", "senses", "motion", "task_state", "streams", "action", "episode_cost",
+        "physics", "pipeline", "motion", "task_state", "streams", "action", "episode_cost",
         "separation_m", "estimate", "forecast", "body_names", "reward_weights",
     )  # fmt: skip
 
@@ -88,24 +86,27 @@ class Simulation(Stateful):
         self.task = settings.task
         self.bodies = stack(pool(config.worker))
         fewest, most = settings.n_workers
-        empty = build(config.scene, scene, 0, self.bodies.names, settings.cameras)
+        empty = build(config.scene, scene, 0, self.bodies.names, settings.cameras, settings.robot)
         self.motion = generator.make_state(
             batch, most, self.bodies, config.motion, empty.grounds, fewest
         )  # first, as it knows how many workers there is room for
-        self.scene = build(config.scene, scene, most, self.bodies.names, settings.cameras)
+        self.scene = build(
+            config.scene, scene, most, self.bodies.names, settings.cameras, settings.robot
+        )
         if perception in CAMERA_LEVELS:
             for finding in findings(self.scene):
                 warnings.warn(finding, stacklevel=3)
         self.settings = {
             "batch": batch, "task": settings.task.id, "perception": perception,
-            "estimator": settings.estimator.name, "scene": scene,
+            "estimator": settings.estimator.name, "scene": scene, "robot": settings.robot.name,
             "cameras": tuple(camera.name for camera in self.scene.cameras),
             "n_workers": (fewest, most) if fewest < most else most, "control": settings.control,
             "config": config,
         }  # fmt: skip
         self.chain = self.scene.chain
-        spread = config.start_spread_rad
-        check_shape("start_spread_rad", (len(spread),), (self.chain.n_joints,), "one a joint")
+        self._spread_rad = np.array(config.start_spread_rad or settings.robot.spread_rad)
+        joints = (self.chain.n_joints,)
+        check_shape("start_spread_rad", self._spread_rad.shape, joints, "one a joint")
         self.n_actions = n_actions(settings.control, self.chain)
         self.layout = observations.layout(
             self.terms,
@@ -114,7 +115,7 @@ class Simulation(Stateful):
             ),
         )
         self.physics = Physics(self.scene, batch)
-        self.senses = make_senses(perception, settings.estimator, self.scene, batch, config)
+        self.pipeline = make_pipeline(perception, settings.estimator, self.scene, batch, config)
         self.body_names = np.full(batch, None, object)
         self.task_state = self.task.init(batch)
         self._everyone = np.arange(batch)
@@ -143,10 +144,10 @@ class Simulation(Stateful):
         self.action[ids], self.episode_cost[ids], self.separation_m[ids] = 0.0, 0.0, 0.0
         robot = chains.robot_state(self.chain, self.physics.q[ids], self.physics.qd[ids])
         self.task.reset(self.task_state, ids, self.streams.task, World(robot), self.config.task)
-        self.senses.reset(ids, self.streams.sensor, self.streams.tracker)
+        self.pipeline.reset(ids, self.streams.sensor, self.streams.tracker)
         motion = generator.current(self.motion, ids)
         truth = worker_truth(self.bodies, motion)
-        estimate, forecast = self._sense(ids, motion, truth)
+        estimate, forecast = self._perceive(ids, motion, truth)
         believed = self._believed(ids, robot, estimate, forecast)
         observation = observations.observe(believed, self.layout, self.terms)
         info = {
@@ -173,9 +174,9 @@ class Simulation(Stateful):
         q_path = self.physics.step(command, path, apart)
         truth = worker_truth(self.bodies, motion)
 
-        estimate, forecast = self._sense(self._everyone, motion, truth)
+        estimate, forecast = self._perceive(self._everyone, motion, truth)
         robot, arm = chains.robot_along(self.chain, q_path, self.physics.qd)
-        seen_world = robot.capsules_world[:, WATCHED_CAPSULES, 1]
+        seen_world = robot.capsules_world[:, self.scene.watched, 1]
         generator.watch(self.motion, seen_world, motion, config.ctrl_dt)
         progress = self.task.advance(
             self.task_state, streams.task, World(robot), config.ctrl_dt, config.task
@@ -231,11 +232,11 @@ class Simulation(Stateful):
 
     def close(self) -> None:
         """Release threads and graphics contexts."""
-        self.senses.close()
+        self.pipeline.close()
 
     def _starting_angles(self, ids: Ints) -> Floats:
         """(len(ids), N) arm angles near home, turned anywhere in front of the base."""
-        spread = np.array(self.config.start_spread_rad)
+        spread = self._spread_rad
         angles = [
             self.scene.home_q + self.streams.robot[b].uniform(-1, 1, len(spread)) * spread
             for b in ids
@@ -263,17 +264,20 @@ class Simulation(Stateful):
         view = self.task.view(self.task_state, np.array([b]), self.config.task)
         return self.task.markers(view)[0]
 
-    def _sense(
+    def _perceive(
         self, ids: Ints, motion: WorkerMotion, truth: WorkerTruth
     ) -> tuple[PoseEstimate, tuple[PoseEstimate, ...]]:
-        """Let the senses look at environments `ids`; their rows of the estimates now and later."""
-        moment = Moment(ids, self.physics.q[ids], motion, truth, self.motion.present[ids] > 0.0)
+        """Let the pipeline look at environments `ids`: their estimates now and ahead."""
+        now = SensorInput(ids, self.physics.q[ids], motion)
+        if self.pipeline.NEEDS_TRUTH:
+            present = self.motion.present[ids] > 0.0
+            now = TrueSensorInput(ids, now.q, motion, truth, present)
         streams = self.streams
-        estimate = self.senses.sense(
-            moment, picked(streams.sensor, ids), picked(streams.tracker, ids)
+        estimate = self.pipeline.perceive(
+            now, picked(streams.sensor, ids), picked(streams.tracker, ids)
         )
         forecast = tuple(
-            self.senses.ahead(estimate, ids, horizon_s) for horizon_s in self.config.forecast_s
+            self.pipeline.ahead(estimate, ids, horizon_s) for horizon_s in self.config.forecast_s
         )
         if ids is self._everyone:
             self.estimate, self.forecast = estimate, forecast
@@ -307,7 +311,7 @@ class Simulation(Stateful):
         return {
             **rows_of(tally, ids),
             **worker_info(generator.activity(self.motion)[ids], self.body_names[ids]),
-            **miscalibration_info(self.settings["cameras"], self.senses.suspected(ids)),
+            **miscalibration_info(self.settings["cameras"], self.pipeline.suspected(ids)),
         }
 
 

@@ -157,7 +157,7 @@ def stage(clip: Clip, scene: Scene) -> Staged:
     motion = _played(clip.motion, body, seed, xy_m, yaw_rad)
     frames = np.minimum(first + np.arange(N_FRAMES), len(path) - 1)
     motion = rows(motion, frames)
-    spread = np.array(HRCConfig().start_spread_rad)
+    spread = np.array(scene.robot.spread_rad)
     q = scene.home_q + rng.uniform(-1, 1, len(spread)) * spread
     return Staged(q, body, motion)
 

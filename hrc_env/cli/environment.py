@@ -28,6 +28,8 @@ class EnvironmentArguments:
     of the scene if not given."""
     scene: str = "lab"
     """lab or site."""
+    robot: str = "ur10e_like"
+    """ur10e_like, or one that was registered (--import)."""
     n_workers: int | tuple[int, int] = 1
     """How many workers; two numbers are the fewest and the most, drawn for every episode."""
     people: str | None = None
@@ -63,7 +65,7 @@ class EnvironmentArguments:
             "shield": self.shield,
             "config": read_config(self.config or ()),
         }
-        names = "task", "perception", "estimator", "scene", "n_workers", "control"
+        names = "task", "perception", "estimator", "scene", "robot", "n_workers", "control"
         return {
             **{name: getattr(self, name) for name in names},
             **{name: value for name, value in given.items() if value},

@@ -28,6 +28,7 @@ class List(EnvironmentArguments):
         from hrc_env.pipeline.levels import LEVELS
         from hrc_env.scene.build import SCENES
         from hrc_env.scene.rig import LAB_CAMERAS
+        from hrc_env.scene.robot import ROBOTS
         from hrc_env.tracking.estimators import ESTIMATORS
 
         table = Table("argument", "names", title="hrc_env")
@@ -37,6 +38,7 @@ class List(EnvironmentArguments):
             ("perception", LEVELS),
             ("estimator", ESTIMATORS),
             ("scene", SCENES),
+            ("robot", ROBOTS),
             ("cameras", cameras),
             ("control", CONTROLS),
             ("agent", (*agents("base").AGENTS, "a checkpoint: PATH.zip")),

@@ -8,8 +8,9 @@ from hrc_env.core.records import Grounds, Workplace
 from hrc_env.core.typing import Floats
 from hrc_env.geometry.shapes import AXES, BOX, CENTRE, HALF_SIZE, KIND, PLANE
 
-ROBOT_XY_M = (-0.75, 0.0)
-"""The axis of the arm's first joint [m]."""
+MOUNT_WORLD = (-0.75, 0.0, 0.75)
+"""The middle of the pedestal's top, on which a robot stands [m]."""
+ROBOT_XY_M = MOUNT_WORLD[:2]
 ROBOT_FRONT_RAD = 0.0
 """It looks to world +x."""
 ROBOT_CLEARANCE_M = 0.8

@@ -10,8 +10,8 @@ import numpy as np
 
 from hrc_env.core.records import Held
 from hrc_env.core.typing import Ints
-from hrc_env.scene.primitives import DECORATION, WORKER_CAPSULES, add_painted, paint_materials
-from hrc_env.scene.prop_looks import LOOKS, PAINTED, add_prop_meshes
+from hrc_env.scene.primitives import DECORATION, WORKER_CAPSULES
+from hrc_env.worker.body import assets_dir
 from hrc_env.worker.props import PROP_NAMES
 
 PARKED_M = (0.0, 0.0, -30.0)
@@ -25,19 +25,9 @@ def add_props(spec: Any, prefixes: tuple[str, ...]) -> None:
         spec: the model.
         prefixes: what the names of each worker's bodies start with.
     """
-    if not prefixes:
-        return
-    add_painted(spec, PAINTED)
-    add_prop_meshes(spec)
     for prefix in prefixes:
-        for name in PROP_NAMES[1:]:
-            body = spec.worldbody.add_body(name=prefix + name, pos=PARKED_M, mocap=True)
-            LOOKS[name](body)
-
-
-def paint_props(spec: Any) -> None:
-    """Paint what `add_props` has added."""
-    paint_materials(spec, PAINTED)
+        props = mujoco.MjSpec.from_file(str(assets_dir() / "scenes" / "props.xml"))
+        spec.attach(props, prefix=prefix, frame=spec.worldbody.add_frame())
 
 
 def prop_mocap(model: mujoco.MjModel, prefixes: tuple[str, ...]) -> Ints:

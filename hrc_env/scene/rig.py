@@ -26,6 +26,11 @@ LAB_CAMERAS = (
     CameraConfig("camera_4", (2.9, -2.6, 2.45)),
 )
 """Four cameras under the ceiling, one in each corner, like the paper's laboratory."""
+SITE_CAMERAS = tuple(
+    CameraConfig(f"camera_{i + 1}", (9.6 * x, 9.6 * y, 5.0), (0.4, 0.0, 0.9), hfov_deg=72.0)
+    for i, (x, y) in enumerate(((1, 1), (-1, 1), (-1, -1), (1, -1)))
+)
+"""On masts in the site's four corners; the field of view holds all of the walkable area."""
 
 
 def select(

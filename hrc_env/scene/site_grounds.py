@@ -13,9 +13,9 @@ from hrc_env.scene.grounds import (
     beside_robot,
     footprints,
 )
-from hrc_env.scene.site_house import OPEN_STUDS
-from hrc_env.scene.site_stock import CONES, HOP_UP_M, HOP_UP_XY_M, PANEL_YAW_RAD, SAND_XY_M
 
+OPEN_STUDS = ((-4.2, -0.1, 1.2, 0.06, np.pi / 2), (1.0, 4.6, 1.03, 0.06, 0.0))
+"""Stretches of open studs, through which nobody walks: x, y, half length, half width, yaw."""
 NORTH, SOUTH, EAST, WEST = math.pi / 2, -math.pi / 2, 0.0, math.pi
 
 PLACES = (
@@ -43,16 +43,17 @@ CLUTTER_PLACES = (
     Workplace("timber_end", "pile", (6.0, 1.4), EAST, 1.24),
     Workplace("blocks", "pile", (5.1, -1.0), SOUTH, 0.9),
     Workplace("cartons", "pile", (4.1, 4.63), 0.9, 0.9),
-    Workplace("hop_up", "step", (HOP_UP_XY_M[0], HOP_UP_XY_M[1] - 0.6), NORTH, HOP_UP_M[2]),
+    Workplace("hop_up", "step", (-2.9, 3.9 - 0.6), NORTH, 0.22),
     Workplace("sand", "cart", (-4.6, -4.9), -2.7, 0.69),
 )
 """At walls (tools work 0.7 m ahead of who stands there), table and stacks."""
 
 
+CONES = ((4.55, -3.95), (4.55, 5.15), (-4.75, -3.95), (2.0, -6.9), (6.6, -6.2), (-1.62, 0.86))
 FLAT = (
-    (SAND_XY_M[0], SAND_XY_M[1], 1.4, 1.3, 0.0),
+    (-6.3, -5.6, 1.4, 1.3, 0.0),
     (1.05, 5.75, 0.45, 0.25, 0.0),
-    (2.95, -5.65, 1.0, 0.6, PANEL_YAW_RAD),
+    (2.95, -5.65, 1.0, 0.6, 0.12),
     *((x, y, 0.14, 0.14, 0.2) for x, y in CONES),
 )
 """What stands in the way and hides nobody: sand, a ladder's foot, a panel's struts, cones."""

@@ -60,8 +60,8 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
             step (default), in the same step, or not by itself ("Disabled").
         num_threads: threads that share the environments; all cores if None.
         backend: "threads"; there is no other.
-        arguments: of `HRCEnv`: task, estimator, cameras, scene, n_workers, people, motions,
-            faults, appearance, control, shield, config.
+        arguments: of `HRCEnv`: task, estimator, cameras, scene, robot, n_workers, people,
+            motions, faults, appearance, control, shield, config.
 
     Raises:
         ConfigError: an argument that cannot work, with what would.

@@ -49,11 +49,11 @@ def test_a_vector_names_what_its_environments_would():
     last_info(single, 40)
     for _ in range(40):
         infos = env.step(np.tile(REST, (3, 1)))[-1]
-    suspected = single.simulation.senses.suspected(np.array([0]))
+    suspected = single.simulation.pipeline.suspected(np.array([0]))
     cameras = single.simulation.settings["cameras"]
     assert infos[MISCALIBRATED][1] == miscalibration_info(cameras, suspected)[MISCALIBRATED][0]
     assert infos[f"_{MISCALIBRATED}"].all()
-    one, many = single.simulation.senses.watched, env.shards.parts[0].senses.watched
+    one, many = single.simulation.pipeline.watched, env.shards.parts[0].pipeline.watched
     for alone, together in zip(one, many, strict=True):
         np.testing.assert_array_equal(alone[0], together[1])
 

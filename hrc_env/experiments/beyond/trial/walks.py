@@ -47,6 +47,6 @@ def walks_of(scene: str, n_workers: int, seeds: tuple[int, ...], n_steps: int) -
     for _ in range(n_steps - 1):
         _, motion = generator.advance(state, rngs, config.scene.sim_dt, config.n_substeps)
         motions.append(motion)
-    spread = np.array(config.start_spread_rad)
+    spread = np.array(config.start_spread_rad or place.robot.spread_rad)
     turned = [np.random.default_rng([seed, 1]).uniform(-spread, spread) for seed in seeds]
     return Walks(bodies, tuple(motions), place.home_q + np.stack(turned))

@@ -4,18 +4,10 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.scene import textures
-from hrc_env.scene.furniture import add_cones
-from hrc_env.scene.primitives import (
-    HIDES,
-    LOOKS_ONLY,
-    Painted,
-    box,
-    capsule,
-    cylinder,
-    ellipsoid,
-    yaw_quaternion,
-)
+from assets.scenes import textures
+from assets.scenes.furniture import add_cones
+from assets.scenes.primitives import HIDES, Painted, box, cylinder, ellipsoid, yaw_quaternion
+from hrc_env.scene.primitives import LOOKS_ONLY, capsule
 
 TIMBER_XY_M = (7.2, 2.6)
 BLOCKS_XY_M, BLOCKS_YAW_RAD = (5.2, -2.2), 0.1

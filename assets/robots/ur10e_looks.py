@@ -5,7 +5,8 @@ Looks weigh nothing and touch nothing; lengths in metres, in the frames of the l
 
 from typing import Any
 
-from hrc_env.scene.primitives import ROBOT_LOOKS, SOLID_SCENE, box, cylinder, ellipsoid
+from assets.scenes.primitives import box, cylinder, ellipsoid
+from hrc_env.scene.primitives import ROBOT_LOOKS
 
 SHOULDER, ELBOW, WRIST = 0.076, 0.062, 0.0475
 UPPER_TUBE, FORE_TUBE = 0.0585, 0.0455
@@ -21,7 +22,6 @@ MATERIALS: dict[str, tuple[tuple[float, float, float], float, float]] = {
     "arm_black": ((0.05, 0.05, 0.055), 0.35, 0.3),
     "arm_dark": ((0.20, 0.21, 0.23), 0.4, 0.3),
     "arm_steel": ((0.74, 0.75, 0.77), 0.9, 0.8),
-    "arm_plinth": ((0.17, 0.19, 0.22), 0.35, 0.3),
     "tool_shell": ((0.93, 0.62, 0.10), 0.5, 0.5),
 }
 """Name: colour, specular, shininess."""
@@ -31,30 +31,6 @@ def add_arm_materials(spec: Any) -> None:
     """The arm's and the tool's colours."""
     for name, (colour, specular, shininess) in MATERIALS.items():
         spec.add_material(name=name, rgba=[*colour, 1], specular=specular, shininess=shininess)
-
-
-def add_pedestal(spec: Any, top_world: tuple[float, float, float]) -> None:
-    """A steel column with a foot plate and a head plate that ends at `top_world`; solid."""
-    x, y, height = top_world
-    world = spec.worldbody
-    box(
-        world, (x, y, 0.010), (0.56, 0.56, 0.020), "arm_plinth", name="pedestal_foot", **SOLID_SCENE
-    )
-    cylinder(
-        world, (x, y, 0.02), (x, y, height - 0.022), 0.105, "arm_plinth",
-        name="pedestal_column", **SOLID_SCENE,
-    )  # fmt: skip
-    cylinder(
-        world, (x, y, height - 0.022), (x, y, height), 0.15, "arm_dark",
-        name="pedestal_head", **SOLID_SCENE,
-    )  # fmt: skip
-    for sx in (-1, 1):
-        for sy in (-1, 1):
-            foot = (x + 0.23 * sx, y + 0.23 * sy)
-            cylinder(world, (*foot, 0.02), (*foot, 0.034), 0.016, "arm_steel")
-    box(world, (x - 0.03, y + 0.115, 0.36), (0.17, 0.03, 0.22), "arm_joint")
-    box(world, (x - 0.03, y + 0.131, 0.40), (0.11, 0.004, 0.07), "arm_black")
-    cylinder(world, (x + 0.03, y + 0.13, 0.30), (x + 0.03, y + 0.142, 0.30), 0.016, "hazard_red")
 
 
 def add_base_looks(base: Any) -> None:

@@ -9,14 +9,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from hrc_env.geometry.rotations import quaternion_from_matrix
-from hrc_env.scene import furniture, textures
-from hrc_env.scene.grounds import ROBOT_XY_M
-from hrc_env.scene.markings import WHITE, blend, mark_cell
-from hrc_env.scene.primitives import (
+from assets.scenes import furniture, textures
+from assets.scenes.markings import WHITE, blend, mark_cell
+from assets.scenes.primitives import (
     HIDES,
-    LOOKS_ONLY,
-    OVERHEAD,
     SOLID_SCENE,
     Painted,
     add_painted,
@@ -24,7 +20,10 @@ from hrc_env.scene.primitives import (
     cylinder,
     paint_materials,
 )
-from hrc_env.scene.textures import Paint
+from assets.scenes.textures import Paint
+from hrc_env.geometry.rotations import quaternion_from_matrix
+from hrc_env.scene.grounds import ROBOT_XY_M
+from hrc_env.scene.primitives import LOOKS_ONLY, OVERHEAD
 
 LENGTH_M, DEPTH_M, HEIGHT_M = 6.09, 5.48, 2.59
 FLOOR_PX_PER_M = 220

@@ -1,4 +1,4 @@
-"""A UR10e-like arm on a pedestal: kinematics, masses, servos, capsules.
+"""A UR10e-like arm: kinematics, masses, servos, capsules.
 
 Lengths, limits, offsets and masses: the maker's public ROS description (ur_description,
 UR10e). Body i has the axis of joint i as its z; the next body stands at Tz(d) Tx(a) Rx(alpha)
@@ -15,16 +15,13 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from hrc_env.core.typing import Floats
-from hrc_env.geometry.chains import SerialChain
-from hrc_env.geometry.rotations import about_axis
-from hrc_env.scene.arm_looks import (
+from assets.robots.ur10e_looks import (
     add_arm_materials,
     add_base_looks,
     add_link_looks,
-    add_pedestal,
     add_tool_looks,
 )
+from hrc_env.geometry.rotations import about_axis
 from hrc_env.scene.primitives import (
     OBJECT_BIT,
     ROBOT_BIT,
@@ -44,9 +41,6 @@ DH_ALPHA_RAD = np.array([HALF_TURN, 0.0, 0.0, HALF_TURN, -HALF_TURN, 0.0])
 RANGE_RAD = np.array([[-2.0, 2.0], [-2.0, 2.0], [-1.0, 1.0]] + [[-2.0, 2.0]] * 3) * np.pi
 VELOCITY_LIMIT_RAD_S = np.radians([120.0, 120.0, 180.0, 180.0, 180.0, 180.0])
 TORQUE_LIMIT_NM = np.array([330.0, 330.0, 150.0, 56.0, 56.0, 56.0])
-HOME_Q = np.array([0.0, -1.9, 2.1, -1.77, -HALF_TURN, 0.0])
-"""The tool in front of the arm and pointing down [rad]."""
-
 MASS_KG = (7.369, 13.051, 3.989, 2.1, 1.98, 0.615)
 CENTRE_OF_MASS_M = (
     (0.021, 0.0, 0.027), (0.38, 0.0, 0.158), (0.24, 0.0, 0.068),
@@ -90,62 +84,17 @@ SELF_COLLISIONS = (
 )  # fmt: skip
 """The pairs of the arm's own capsules that can meet in its joint ranges."""
 
-OUT_OF_REACH = frozenset({
-    ("shoulder", "pedestal_column"), ("shoulder", "pedestal_head"),
-    ("shoulder_lift", "pedestal_column"), ("shoulder_lift", "pedestal_head"),
-    ("upper_arm", "pedestal_foot"), ("elbow", "pedestal_foot"), ("elbow", "pedestal_head"),
-})  # fmt: skip
-"""Capsules and parts of what the arm stands on that never meet, near as some always are."""
 
-
-def arm_chain(T_world_from_base: np.ndarray, tool_length_m: float = TOOL_LENGTH_M) -> SerialChain:
-    """The arm's numbers as a chain; a tool length of 0 puts the tool point on the flange."""
-    fixed = np.tile(np.eye(4), (len(JOINTS), 1, 1))
-    for i in range(1, len(JOINTS)):
-        fixed[i, :3, :3] = about_axis("x", DH_ALPHA_RAD[i - 1])
-        fixed[i, :3, 3] = DH_A_M[i - 1], 0.0, DH_D_M[i - 1]
-    link_from_tool = np.eye(4)
-    link_from_tool[2, 3] = FLANGE + tool_length_m
-    return SerialChain(
-        joint_names=JOINTS,
-        T_world_from_base=np.array(T_world_from_base, float),
-        parent_from_joint=fixed,
-        link_from_tool=link_from_tool,
-        range_rad=RANGE_RAD.copy(),
-        velocity_limit_rad_s=VELOCITY_LIMIT_RAD_S.copy(),
-        capsule_names=tuple(name for name, *_ in CAPSULES),
-        capsule_link=np.array([link for _, link, *_ in CAPSULES]),
-        capsule_ends=np.array([(start, end) for *_, start, end, _ in CAPSULES], float),
-        capsule_radius_m=np.array([radius for *_, radius in CAPSULES]),
-    )
-
-
-def capsule_reach_m() -> Floats:
-    """(K,) no point of a capsule is ever farther from the arm's foot than this [m]."""
-    steps = np.hypot(DH_A_M, DH_D_M)
-    before = np.concatenate([[0.0], np.cumsum(steps)])[: len(JOINTS)]
-    return np.array(
-        [
-            before[link] + max(np.linalg.norm(start), np.linalg.norm(end)) + radius
-            for _, link, start, end, radius in CAPSULES
-        ]
-    )
-
-
-def add_arm(spec: Any, base_world: tuple[float, float, float], yaw_rad: float) -> None:
-    """Bolt the arm (and its pedestal) into a scene, `base_world` the middle of its foot [m]."""
+def add_arm(spec: Any) -> None:
+    """Build the arm, the middle of its foot at the origin; it reaches to +x, along its own -x."""
     add_arm_materials(spec)
-    add_pedestal(spec, base_world)
-    half = yaw_rad / 2
-    base = spec.worldbody.add_body(
-        name="arm_base", pos=list(base_world), quat=[np.cos(half), 0, 0, np.sin(half)]
-    )
+    base = spec.worldbody.add_body(name="base", quat=[np.cos(HALF_TURN), 0, 0, np.sin(HALF_TURN)])
     add_base_looks(base)
     links = _add_links(base)
     for name, link, start, end, radius in CAPSULES:
         _add_capsule(links[link], name, start, end, radius)
     for first, second in SELF_COLLISIONS:
-        spec.add_pair(geomname1=f"arm_{first}", geomname2=f"arm_{second}", condim=3)
+        spec.add_pair(geomname1=first, geomname2=second, condim=3)
     _add_tool(links[-1])
     _add_servos(spec)
 
@@ -184,7 +133,7 @@ def _add_capsule(link: Any, name: str, start: Any, end: Any, radius: float) -> N
         start,
         end,
         radius,
-        name=f"arm_{name}",
+        name=name,
         contype=ROBOT_BIT,
         conaffinity=SCENE_BIT | WORKER_BIT | OBJECT_BIT,
         group=ROBOT_CAPSULES,

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from assets.scenes import textures
+from assets.scenes.textures import Paint
 from hrc_env.core.typing import Bools, Floats
-from hrc_env.scene import textures
-from hrc_env.scene.textures import Paint
 
 REACH_M = 1.35
 YELLOW, BLACK, WHITE = (222, 176, 20), (34, 34, 34), (226, 226, 220)

@@ -5,8 +5,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from hrc_env.scene import textures
-from hrc_env.scene.primitives import HIDES, LOOKS_ONLY, Painted, add_mesh, box, capsule, cylinder
+from assets.scenes import textures
+from assets.scenes.primitives import HIDES, Painted, add_mesh, box, cylinder
+from hrc_env.scene.primitives import LOOKS_ONLY, capsule
 
 TRUCK_XY_M = (0.4, -8.4)
 """Middle of the truck; it looks to +x, to the gate."""

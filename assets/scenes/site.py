@@ -11,38 +11,29 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from hrc_env.geometry.rotations import quaternion_from_matrix
-from hrc_env.scene import arena, furniture, site_house, site_stock, site_vehicles, textures
-from hrc_env.scene.grounds import ROBOT_XY_M
-from hrc_env.scene.markings import mark_cell
-from hrc_env.scene.primitives import (
+from assets.scenes import arena, furniture, site_house, site_stock, site_vehicles, textures
+from assets.scenes.markings import mark_cell
+from assets.scenes.primitives import (
     HIDES,
-    LOOKS_ONLY,
     SOLID_SCENE,
     Painted,
     add_painted,
     box,
-    capsule,
     cylinder,
     ellipsoid,
     paint_materials,
 )
-from hrc_env.scene.rig import CameraConfig
-from hrc_env.scene.textures import Paint
+from assets.scenes.textures import Paint
+from hrc_env.geometry.rotations import quaternion_from_matrix
+from hrc_env.scene.grounds import ROBOT_XY_M
+from hrc_env.scene.primitives import LOOKS_ONLY, capsule
+from hrc_env.scene.rig import SITE_CAMERAS
 
 SIDE_M = 20.0
-CORNER_M, MAST_M = 9.6, 5.0
+CORNER_M = 9.6
 HOARDING_M = 2.2
 GROUND_PX_PER_M = 72
 SLAB_PX_PER_M = 130
-
-SITE_CAMERAS = tuple(
-    CameraConfig(
-        f"camera_{i + 1}", (sx * CORNER_M, sy * CORNER_M, MAST_M), (0.4, 0.0, 0.9), hfov_deg=72.0
-    )
-    for i, (sx, sy) in enumerate(((1, 1), (-1, 1), (-1, -1), (1, -1)))
-)
-"""On masts in the four corners; the field of view holds all of the walkable area."""
 
 
 def _ground() -> Paint:

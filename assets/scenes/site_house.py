@@ -6,16 +6,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from hrc_env.scene import textures
-from hrc_env.scene.primitives import (
-    HIDES,
-    LOOKS_ONLY,
-    Painted,
-    add_mesh,
-    box,
-    cylinder,
-    yaw_quaternion,
-)
+from assets.scenes import textures
+from assets.scenes.primitives import HIDES, Painted, add_mesh, box, cylinder, yaw_quaternion
+from hrc_env.scene.primitives import LOOKS_ONLY
 
 SLAB_X_M, SLAB_Y_M = (-4.5, 4.3), (-3.7, 4.9)
 WEST_X_M, NORTH_Y_M = -4.2, 4.6

@@ -11,19 +11,18 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from hrc_env.scene import textures
-from hrc_env.scene.primitives import (
+from assets.scenes import textures
+from assets.scenes.primitives import (
     HIDES,
-    LOOKS_ONLY,
     SOLID_SCENE,
     Painted,
     add_mesh,
     add_painted,
     box,
-    capsule,
     cylinder,
     ellipsoid,
 )
+from hrc_env.scene.primitives import LOOKS_ONLY, capsule
 
 
 def _drawing() -> textures.Paint:

@@ -9,16 +9,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from hrc_env.scene import textures
-from hrc_env.scene.primitives import (
-    LOOKS_ONLY,
-    Painted,
-    add_mesh,
-    box,
-    capsule,
-    cylinder,
-    ellipsoid,
-)
+from assets.scenes import textures
+from assets.scenes.primitives import Painted, add_mesh, box, cylinder, ellipsoid
+from hrc_env.scene.primitives import LOOKS_ONLY, capsule
 
 COLOURS: dict[str, tuple[tuple[float, float, float], float, float]] = {
     "prop_steel": ((0.68, 0.69, 0.71), 0.8, 0.7),
