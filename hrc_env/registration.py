@@ -48,7 +48,7 @@ def register_task(task: "Task") -> None:
     Raises:
         ConfigError: its id is taken, or something in it is missing or of the wrong kind.
     """
-    from hrc_env.tasks.checks import check_task  # here and below: kernels take time to import
+    from hrc_env.tasks.task import check_task  # here and below: kernels take time to import
 
     check_task(task)
     if task.id in BUILT_IN:
