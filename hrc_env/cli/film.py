@@ -121,7 +121,7 @@ def _filmed(
     ) as writer:
         for step in track(range(n_steps), "filming"):
             observation, _, terminated, _, info = env.step(agent.act(observation))
-            believed = env.simulation.believed.separation.distance_m
+            believed = env.simulation.belief.separation.distance_m
             diary.note(info, float(believed.min(initial=np.inf)), env.simulation.task.counts(info))
             if step % STEPS_PER_FRAME == 0:
                 frame = compose(env, diary)

@@ -66,7 +66,7 @@ def judge(part: Simulation, before: Scene, now: Scene) -> Step:
     dt_s, gap_m = part.config.ctrl_dt, _gap(now, now)
     return Step(
         true_separation_m=gap_m,
-        believed_separation_m=part.believed.separation.distance_m[:, 0],
+        believed_separation_m=part.belief.separation.distance_m[:, 0],
         robot_mps=(_gap(before, now) - gap_m) / dt_s,
         worker_mps=(_gap(now, before) - gap_m) / dt_s,
         error_m=np.linalg.norm(part.estimate.mean_world[:, 0] - now.joints_world, axis=-1),
