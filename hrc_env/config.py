@@ -64,7 +64,7 @@ class HRCConfig:
     emulator: EmulatorConfig = field(default_factory=EmulatorConfig)
     """Its emulator (`perception="keypoints"`)."""
     faults: tuple[FaultConfig, ...] = ()
-    """What goes wrong with the cameras, and when (docs/cameras.md)."""
+    """What goes wrong with the cameras, and when (docs/perception_and_estimators.md)."""
     appearance: AppearanceConfig = field(default_factory=AppearanceConfig)
     """How scene and workers look, drawn for every episode (`perception="pixels"`)."""
     tracker: TrackerConfig = field(default_factory=ParticleConfig)

@@ -10,7 +10,7 @@ from hrc_env.config import HRCConfig, load_config, save_config, settle
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.old_names import OLD_NAMES, Named
 from hrc_env.env import HRCEnv
-from hrc_env.motion.capture.clip import Clip
+from hrc_env.motion.clip import Clip
 from hrc_env.motion.people import PEOPLE
 from hrc_env.scene.domain_randomization import APPEARANCES
 from hrc_env.scene.rigs import RIGS

@@ -48,7 +48,7 @@ class EnvironmentArguments:
     """A shield that was registered (--import)."""
     config: tuple[str, ...] = ()
     """Changes to the default configuration: FIELD=VALUE as in reward.proximity=0 (a value is
-    JSON, or else text), or a .toml file of them. Later ones win. docs/environment.md"""
+    JSON, or else text), or a .toml file of them. Later ones win. docs/reference/config.md"""
 
     def keywords(self) -> dict[str, Any]:
         """Keyword arguments of `HRCEnv`, of lists, mappings, text and numbers only.
@@ -119,7 +119,7 @@ def _assigned(word: str) -> dict[str, Any]:
 def _fault(text: str) -> dict[str, Any]:
     fault = _json(text, None)
     if not isinstance(fault, dict):
-        raise ConfigError(f"--faults takes JSON objects, as {FAULT}, got {text!r}. docs/cameras.md")
+        raise ConfigError(f"--faults takes JSON objects, as {FAULT}, got {text!r}.")
     return fault
 
 
