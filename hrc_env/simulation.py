@@ -61,7 +61,7 @@ class Simulation(Stateful):
 
     CHANGES = (
         "physics", "pipeline", "motion", "task_state", "streams", "action", "episode_cost",
-        "separation_m", "estimate", "forecast", "body_names", "reward_weights",
+        "separation_m", "estimates", "body_names", "reward_weights",
     )  # fmt: skip
 
     def __init__(self, batch: int, settings: Settings) -> None:

@@ -113,7 +113,7 @@ def check_task(task: Task) -> None:
     if not isinstance(task, Task):
         raise ConfigError(f"A task must be a hrc_env.tasks.task.Task, got {type(task).__name__}.")
     if not isinstance(task.id, str) or not _ID.fullmatch(task.id):
-        raise ConfigError(f"A task's id must be like 'HRCSort-v0', got {task.id!r}.")
+        raise ConfigError(f"A task's id must be like 'Name-v0', got {task.id!r}.")
     for name in ("init", "reset", "advance", "view", "info", "markers"):
         if not callable(getattr(task, name)):
             raise ConfigError(f"{task.id}: {name} must be a function (see Task).")
