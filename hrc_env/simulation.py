@@ -43,7 +43,7 @@ from hrc_env.step import (
     worker_info,
 )
 from hrc_env.tasks.task import World
-from hrc_env.tracking import given
+from hrc_env.tracking import oracle
 from hrc_env.worker.body import pool, stack, worker_capsules, worker_truth
 
 CLOSING_M_S = 8.0
@@ -106,7 +106,7 @@ class Simulation(Stateful):
         self.action = np.zeros((batch, self.n_actions))
         self.episode_cost, self.separation_m = np.zeros(batch), np.zeros(batch)
         self.estimates = tuple(
-            given.prior(batch, most, config.tracker) for _ in (0.0, *config.forecast_s)
+            oracle.prior(batch, most, config.tracker) for _ in (0.0, *config.forecast_s)
         )
         """What is believed of the workers now, and expected at each of `forecast_s`."""
         self.streams = {name: [np.random.default_rng(0)] * batch for name in STREAMS}
@@ -254,7 +254,7 @@ class Simulation(Stateful):
             now = TrueSensorInput(ids, now.q, motion, truth, self.motion.present[ids] > 0.0)
         sensor, tracker = (picked(self.streams[name], ids) for name in ("sensor", "tracker"))
         estimate = self.pipeline.perceive(now, sensor, tracker)
-        later = (self.pipeline.ahead(estimate, ids, t) for t in self.config.forecast_s)
+        later = (self.pipeline.forecast(estimate, ids, t) for t in self.config.forecast_s)
         estimates = (estimate, *later)
         if ids is self._everyone:
             self.estimates = estimates
