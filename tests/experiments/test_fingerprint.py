@@ -1,14 +1,15 @@
 """A finished part is used again only while everything it depends on is the same."""
 
+import hashlib
 import shutil
 from pathlib import Path
 
 import pytest
 
 from hrc_env.experiments.study import fingerprint
-from hrc_env.experiments.study.fingerprint import fingerprint_of, sources_of
+from hrc_env.experiments.study.fingerprint import fingerprint_of, source_digest, sources_of
 
-TRIAL = "hrc_env.experiments.impact.trial.episodes"
+TRIAL = "hrc_env.experiments.impact.episodes"
 
 
 def test_settings_and_makers_count():
@@ -67,3 +68,9 @@ def test_deep_imports_are_followed_even_from_inside_a_function(copied):
     assert of_now() == before
     (copied / "hrc_env" / "deep.py").write_text("X = 2\n")
     assert of_now() != before
+
+
+def test_the_file_of_what_somebody_registered_counts():
+    here = Path(__file__).read_bytes()
+    assert source_digest(test_settings_and_makers_count) == hashlib.sha256(here).hexdigest()
+    assert source_digest(3) == ""
