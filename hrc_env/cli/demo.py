@@ -34,10 +34,10 @@ class Demo(EnvironmentArguments):
         keywords = self.keywords()
         ctrl_dt = settle(**keywords).config.ctrl_dt
         at_least("--seconds", self.seconds, ctrl_dt)
-        base = agents("base")
+        registry = agents("registry")
         n_steps = round(self.seconds / ctrl_dt)
         totals = film_episode(
-            lambda here: base.make_agent("scripted_slowed", here),
+            lambda env_info: registry.make_agent("scripted_slowed", env_info),
             self.out, self.seed, n_steps, **keywords,
         )  # fmt: skip
         totals["all in all [s]"] = time.monotonic() - started_s

@@ -31,7 +31,7 @@ FRAMES_BEHIND = 2
 """So many frames may wait to be drawn."""
 
 Make = Callable[[Any], Any]
-"""Builds the agent for a `Situation`."""
+"""Builds the agent for an `EnvInfo`."""
 
 
 def film_episode(
@@ -40,7 +40,7 @@ def film_episode(
     """Film `n_steps` of an agent; returns what came of them, by name and [unit].
 
     Args:
-        make: builds the agent for a `Situation`.
+        make: builds the agent for an `EnvInfo`.
         path: an .mp4 file; a still of the closest moment that is no near miss yet (or of the
             first step) is written beside it as .png.
         seed: of the episode.
@@ -57,7 +57,7 @@ def film_episode(
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_suffix(".draft.mp4")
     try:
-        agent = make(agents("base").situation(env.simulation))
+        agent = make(agents("env_info").env_info(env.simulation))
         console.print("First look at the scene ...")
         observation, _ = env.reset(seed=seed)
         console.print("Drawing what stands still in it ...")
@@ -77,7 +77,7 @@ def nearest_seed(make: Make, seeds: Iterable[int], n_steps: int = 250, **kwargs:
     Nothing is drawn: "pixels" is played as "keypoints", and may come out otherwise in the film.
 
     Args:
-        make: builds the agent for a `Situation`.
+        make: builds the agent for an `EnvInfo`.
         seeds: of the episodes that are played.
         n_steps: their length.
         kwargs: as of `HRCEnv`.
@@ -115,7 +115,7 @@ def _encounter(closest_m: dict[int, float]) -> int:
 
 
 def _closest_m(env: HRCEnv, make: Make, seed: int, n_steps: int) -> float:
-    agent = make(agents("base").situation(env.simulation))
+    agent = make(agents("env_info").env_info(env.simulation))
     observation, _ = env.reset(seed=seed)
     closest_m = np.inf
     for _ in range(n_steps):

@@ -50,12 +50,11 @@ class Play(EnvironmentArguments):
 
         from hrc_env.cli.kernels import compile_kernels
 
-        base = agents("base")
         compile_kernels(Console(), self.perception)
         env = gymnasium.make(self.task, **self.keywords())
         try:
             for episode in range(self.episodes):
-                self._play(env, base, self.seed + episode)
+                self._play(env, self.seed + episode)
         finally:
             env.close()
         return 0
@@ -63,21 +62,22 @@ class Play(EnvironmentArguments):
     def _film(self, video: Path) -> int:
         from hrc_env.cli.film import film_episode, table
 
-        base = agents("base")
+        registry = agents("registry")
         totals = film_episode(
-            lambda here: base.make_agent(self.agent, here, self.seed),
+            lambda env_info: registry.make_agent(self.agent, env_info, self.seed),
             video, self.seed, **self.keywords(),
         )  # fmt: skip
         Console().print(table(totals))
         return 0
 
-    def _play(self, env: "gymnasium.Env[Any, Any]", base: Any, seed: int) -> None:
+    def _play(self, env: "gymnasium.Env[Any, Any]", seed: int) -> None:
         from hrc_env.env import HRCEnv
         from hrc_env.scene.viewer import Viewer
 
         inner = env.unwrapped
         assert isinstance(inner, HRCEnv)
-        agent = base.make_agent(self.agent, base.situation(inner.simulation), seed)
+        env_info = agents("env_info").env_info(inner.simulation)
+        agent = agents("registry").make_agent(self.agent, env_info, seed)
         observation, info = env.reset(seed=seed)
         window = Viewer(inner.simulation.scene) if self.viewer else None
         started_s, total, steps = time.monotonic(), 0.0, 0
