@@ -39,6 +39,7 @@ def copied(tmp_path, monkeypatch):
     (package / "room" / "organ.py").write_text("import numpy\nimport hrc_env.deep\n")
     (package / "deep.py").write_text("X = 1\n")
     (package / "other.py").write_text("X = 1\n")
+    (package / "room" / "beside.py").write_text("from . import organ\nfrom ..deep import X\n")
     assets = tmp_path / "assets" / "workers"
     assets.mkdir(parents=True)
     (assets / "worker_1.npz").write_bytes(b"painted")
@@ -74,3 +75,8 @@ def test_the_file_of_what_somebody_registered_counts():
     here = Path(__file__).read_bytes()
     assert source_digest(test_settings_and_makers_count) == hashlib.sha256(here).hexdigest()
     assert source_digest(3) == ""
+
+
+def test_relative_imports_are_followed(copied):
+    names = {path.name for path in sources_of("hrc_env.room.beside")}
+    assert names == {"beside.py", "organ.py", "deep.py"}

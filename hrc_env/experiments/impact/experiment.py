@@ -27,6 +27,7 @@ PARTS_FROM = (
     "hrc_env.experiments.impact.policies",
     "agents.registry",
     "agents.ppo",
+    "agents.callbacks",
 )
 """The modules that finished parts are made by."""
 FIRST_SEED = 1_000_000

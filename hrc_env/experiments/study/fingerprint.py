@@ -74,11 +74,14 @@ def _file(name: str) -> Path | None:
 def _imports(path: Path) -> frozenset[str]:
     """Modules, and names that may be modules, that a file imports anywhere in it."""
     found: set[str] = set()
+    folders = path.relative_to(_PACKAGE.parent).parent.parts
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            found |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
+        elif isinstance(node, ast.ImportFrom):
+            inside = folders[: len(folders) - node.level + 1] if node.level else ()
+            module = ".".join(filter(None, (*inside, node.module)))
+            found |= {module, *(f"{module}.{alias.name}" for alias in node.names)}
     return frozenset(found)
 
 
