@@ -48,7 +48,7 @@ class Reacher:
         terms = split(observation, self.env_info.layout)
         velocity = self._tool_velocity(terms["goal_from_tool"])
         if self.yielding is not None:
-            nearest_m = terms["worker_gap"].min(axis=-1, initial=np.inf)
+            nearest_m = terms["worker_separation"].min(axis=-1, initial=np.inf)
             velocity = velocity * self.yielding.share(nearest_m)[..., None]
         if self.env_info.control == "tool":
             return (velocity / self.env_info.control_config.tool_speed_mps).astype(np.float32)

@@ -12,19 +12,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hrc_env import metrics, observations, rewards
-from hrc_env.belief import Belief, estimated_gap
+from hrc_env.belief import Belief, estimated_separation
 from hrc_env.config import Settings
 from hrc_env.control import joint_command, n_actions
-from hrc_env.core.batching import picked, rows, write_rows
+from hrc_env.core.batching import picked, write_rows
 from hrc_env.core.errors import ConfigError, check_shape
 from hrc_env.core.kernels import ahead
 from hrc_env.core.records import PoseEstimate, RobotState, WorkerMotion, WorkerTruth
 from hrc_env.core.stateful import State, Stateful
 from hrc_env.core.streams import children
-from hrc_env.core.typing import Floats, Ints, Points3
+from hrc_env.core.typing import Bools, Floats, Ints, Points3
 from hrc_env.geometry import chains
 from hrc_env.motion import generator
-from hrc_env.motion.workers import Crew, bodies_of, worker_counts
 from hrc_env.pipeline.levels import CAMERA_LEVELS, make_pipeline
 from hrc_env.pipeline.sensor_input import SensorInput, TrueSensorInput
 from hrc_env.rewards import RewardConfig
@@ -32,10 +31,19 @@ from hrc_env.safety.shield import shielded
 from hrc_env.scene.build import build
 from hrc_env.scene.physics import Physics
 from hrc_env.scene.rigs import findings
-from hrc_env.step import Info, StepResult, cost_info, no_cost, rows_of, tracking_info
+from hrc_env.step import (
+    Info,
+    StepResult,
+    body_names,
+    cost_info,
+    miscalibration_info,
+    no_cost,
+    rows_of,
+    tracking_info,
+    worker_info,
+)
 from hrc_env.tasks.task import World
 from hrc_env.tracking import given
-from hrc_env.tracking.miscalibration import MiscalibrationFlags
 from hrc_env.worker.body import pool, stack, worker_capsules, worker_truth
 
 CLOSING_M_S = 8.0
@@ -65,8 +73,8 @@ class Simulation(Stateful):
     """`batch` environments of the same settings that step together."""
 
     CHANGES = (
-        "physics", "pipeline", "motion", "task_state", "streams", "action", "episode_cost", "gap_m",
-        "estimate", "ahead", "worn", "reward_weights",
+        "physics", "pipeline", "motion", "task_state", "streams", "action", "episode_cost",
+        "separation_m", "estimate", "forecast", "body_names", "reward_weights",
     )  # fmt: skip
 
     def __init__(self, batch: int, settings: Settings) -> None:
@@ -77,7 +85,7 @@ class Simulation(Stateful):
         self.perception, self.reward_weights = perception, config.reward
         self.task = settings.task
         self.bodies = stack(pool(config.worker))
-        fewest, most = worker_counts(settings.n_workers)
+        fewest, most = settings.n_workers
         empty = build(config.scene, scene, 0, self.bodies.names, settings.cameras, settings.robot)
         self.motion = generator.make_state(
             batch, most, self.bodies, config.motion, empty.grounds, fewest
@@ -103,19 +111,19 @@ class Simulation(Stateful):
         self.layout = observations.layout(
             self.terms,
             observations.Sizes(
-                len(self.scene.home_q), self.n_actions, most, len(config.horizons_s)
+                len(self.scene.home_q), self.n_actions, most, len(config.forecast_s)
             ),
         )
         self.physics = Physics(self.scene, batch)
         self.pipeline = make_pipeline(perception, settings.estimator, self.scene, batch, config)
-        self.worn = np.full(batch, None, object)
+        self.body_names = np.full(batch, None, object)
         self.task_state = self.task.init(batch)
         self._everyone = np.arange(batch)
         self.action = np.zeros((batch, self.n_actions))
         self.episode_cost = np.zeros(batch)
-        self.gap_m = np.zeros(batch)
+        self.separation_m = np.zeros(batch)
         self.estimate = given.prior(batch, most, config.tracker)
-        self.ahead = tuple(given.prior(batch, most, config.tracker) for _ in config.horizons_s)
+        self.forecast = tuple(given.prior(batch, most, config.tracker) for _ in config.forecast_s)
         blank = [np.random.default_rng(0)] * batch
         self.streams = Streams(*(list(blank) for _ in range(5)))
 
@@ -129,25 +137,25 @@ class Simulation(Stateful):
             for organ, stream in zip(self.streams.organs(), children(rng, N_STREAMS), strict=True):
                 organ[b] = stream
         generator.reset(self.motion, ids, self.streams.motion)
-        self.worn[ids] = bodies_of(self.motion, ids, self.bodies.names)
+        self.body_names[ids] = body_names(
+            self.motion.body[ids], self.motion.present[ids] > 0.0, self.bodies.names
+        )
         self.physics.reset(ids, self._starting_angles(ids), self.motion.body[ids])
-        self.action[ids], self.episode_cost[ids], self.gap_m[ids] = 0.0, 0.0, 0.0
+        self.action[ids], self.episode_cost[ids], self.separation_m[ids] = 0.0, 0.0, 0.0
         robot = chains.robot_state(self.chain, self.physics.q[ids], self.physics.qd[ids])
         self.task.reset(self.task_state, ids, self.streams.task, World(robot), self.config.task)
         self.pipeline.reset(ids, self.streams.sensor, self.streams.tracker)
         motion = generator.current(self.motion, ids)
         truth = worker_truth(self.bodies, motion)
-        estimate, ahead = self._perceive(ids, motion, truth)
-        believed = self._believed(ids, robot, estimate, ahead)
+        estimate, forecast = self._perceive(ids, motion, truth)
+        believed = self._believed(ids, robot, estimate, forecast)
         observation = observations.observe(believed, self.layout, self.terms)
-        crew = rows(self.crew, ids)
         info = {
             **no_cost(len(ids)),
-            **tracking_info(estimate, truth, crew.present),
-            **rows_of(self._tally(), ids),
+            **tracking_info(estimate, truth, self.present[ids]),
+            **self._episode_info(ids),
         }
-        over = np.zeros(len(ids), bool)
-        return StepResult(observation, np.zeros(len(ids)), over, info, crew, self._suspects(ids))
+        return StepResult(observation, np.zeros(len(ids)), np.zeros(len(ids), bool), info)
 
     def step(self, action: Floats) -> StepResult:
         """One control step of every environment; action (B, A) in [-1, 1]."""
@@ -162,18 +170,18 @@ class Simulation(Stateful):
         path, motion = generator.advance(
             self.motion, streams.motion, config.scene.sim_dt, config.n_substeps
         )
-        apart = self.gap_m > CLOSING_M_S * config.ctrl_dt
+        apart = self.separation_m > CLOSING_M_S * config.ctrl_dt
         q_path = self.physics.step(command, path, apart)
         truth = worker_truth(self.bodies, motion)
 
-        estimate, ahead = self._perceive(self._everyone, motion, truth)
+        estimate, forecast = self._perceive(self._everyone, motion, truth)
         robot, arm = chains.robot_along(self.chain, q_path, self.physics.qd)
         seen_world = robot.capsules_world[:, self.scene.watched, 1]
         generator.watch(self.motion, seen_world, motion, config.ctrl_dt)
         progress = self.task.advance(
             self.task_state, streams.task, World(robot), config.ctrl_dt, config.task
         )
-        believed = self._believed(self._everyone, robot, estimate, ahead)
+        believed = self._believed(self._everyone, robot, estimate, forecast)
         terms = {
             **rewards.evaluated(self.task.rewards, believed, progress, previous, config.task),
             **rewards.evaluated(
@@ -187,19 +195,18 @@ class Simulation(Stateful):
             arm, robot.capsule_radius_m, workers, truth.capsule_radius_m, config.cost
         )
         self.episode_cost += cost.total
-        self.gap_m = cost.min_separation_m
-        crew = self.crew
+        self.separation_m = cost.min_separation_m
+        present = self.present
         info = {
             **{f"reward/{name}": value for name, value in terms.items()},
-            **cost_info(cost, crew.present),
-            **tracking_info(estimate, truth, crew.present),
+            **cost_info(cost, present),
+            **tracking_info(estimate, truth, present),
             **shield_info,
-            **self._tally(),
+            **self._episode_info(self._everyone),
         }
         terminated = (cost.contact > 0) & config.cost.contact_terminates
         observation = observations.observe(believed, self.layout, self.terms)
-        suspects = self._suspects(self._everyone)
-        return StepResult(observation, reward, terminated, info, crew, suspects)
+        return StepResult(observation, reward, terminated, info)
 
     def set_reward(self, weights: RewardConfig) -> None:
         """Weigh the reward's terms so from the next step on."""
@@ -242,15 +249,15 @@ class Simulation(Stateful):
         return self.task.observation_terms
 
     @property
-    def crew(self) -> Crew:
-        """Who is there now."""
-        return Crew(generator.activity(self.motion), self.worn)
+    def present(self) -> Bools:
+        """(B, W) who is in the episode."""
+        return generator.activity(self.motion) != generator.ABSENT
 
     @property
     def believed(self) -> Belief:
         """What every robot believes now."""
         robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
-        return self._believed(self._everyone, robot, self.estimate, self.ahead)
+        return self._believed(self._everyone, robot, self.estimate, self.forecast)
 
     def markers(self, b: int) -> Points3:
         """(M, 3) what the task of environment `b` has to show [m]."""
@@ -269,38 +276,43 @@ class Simulation(Stateful):
         estimate = self.pipeline.perceive(
             now, picked(streams.sensor, ids), picked(streams.tracker, ids)
         )
-        ahead = tuple(
-            self.pipeline.ahead(estimate, ids, horizon_s) for horizon_s in self.config.horizons_s
+        forecast = tuple(
+            self.pipeline.ahead(estimate, ids, horizon_s) for horizon_s in self.config.forecast_s
         )
         if ids is self._everyone:
-            self.estimate, self.ahead = estimate, ahead
+            self.estimate, self.forecast = estimate, forecast
         else:
-            for whole, part in zip((self.estimate, *self.ahead), (estimate, *ahead), strict=True):
+            for whole, part in zip(
+                (self.estimate, *self.forecast), (estimate, *forecast), strict=True
+            ):
                 write_rows(whole, ids, part)
-        return estimate, ahead
+        return estimate, forecast
 
     def _believed(
-        self, ids: Ints, robot: RobotState, estimate: PoseEstimate, ahead: tuple[PoseEstimate, ...]
+        self,
+        ids: Ints,
+        robot: RobotState,
+        estimate: PoseEstimate,
+        forecast: tuple[PoseEstimate, ...],
     ) -> Belief:
         """What the robots of environments `ids` believe; the records are of them only."""
         return Belief(
             robot=robot,
             estimate=estimate,
-            gap=estimated_gap(robot, estimate),
+            separation=estimated_separation(robot, estimate),
             task=self.task.view(self.task_state, ids, self.config.task),
             action=self.action[ids],
-            ahead=ahead,
+            forecast=forecast,
         )
 
-    def _suspects(self, ids: Ints) -> MiscalibrationFlags:
-        """Which cameras of environments `ids` are thought to be miscalibrated."""
-        flags = self.pipeline.suspected(ids)
-        names = self.settings["cameras"] if flags.shape[1] else ()
-        return MiscalibrationFlags(names, flags)
-
-    def _tally(self) -> Info:
-        """What the episode has come to so far."""
-        return {"episode_cost": self.episode_cost.copy(), **self.task.info(self.task_state)}
+    def _episode_info(self, ids: Ints) -> Info:
+        """What the episodes of environments `ids` have come to so far, and who is there."""
+        tally = {"episode_cost": self.episode_cost, **self.task.info(self.task_state)}
+        return {
+            **rows_of(tally, ids),
+            **worker_info(generator.activity(self.motion)[ids], self.body_names[ids]),
+            **miscalibration_info(self.settings["cameras"], self.pipeline.suspected(ids)),
+        }
 
 
 def checked_action(action: ArrayLike, shape: tuple[int, ...]) -> Floats:

@@ -8,7 +8,7 @@ import pytest
 from hrc_env.belief import Belief
 from hrc_env.core.records import PoseEstimate, RobotState
 from hrc_env.env import HRCEnv
-from hrc_env.geometry.distances import Gap
+from hrc_env.geometry.distances import Separation
 from hrc_env.rewards import SHARED_TERMS, RewardConfig, closeness, evaluated, total
 from hrc_env.tasks.reach import TASK, ReachConfig, ReachProgress
 from hrc_env.vector.env import HRCVectorEnv
@@ -24,7 +24,9 @@ def believed(gap_m: float, action: float = 0.0, workers: int = 1) -> Belief:
         np.zeros((1, 6)), np.zeros((1, 6)), np.zeros((1, 3)), np.zeros((1, 3)),
         np.zeros((1, 9, 2, 3)), np.zeros(9),
     )  # fmt: skip
-    gap = Gap(np.full((1, workers), gap_m), np.zeros((1, workers, 3)), np.zeros((1, workers, 3)))
+    gap = Separation(
+        np.full((1, workers), gap_m), np.zeros((1, workers, 3)), np.zeros((1, workers, 3))
+    )
     return Belief(robot, pose, gap, None, np.full((1, 6), action))
 
 

@@ -38,7 +38,7 @@ PLACES = [(2.9, 2.6, 2.4), (-2.9, 2.6, 2.4)]
         {"cameras": [{"name": f"c{k}", "eye_world": p} for k, p in enumerate(PLACES)]},
         {"n_workers": (0, 2), "estimator": "kalman", "scene": "site", "control": "tool"},
         {"n_workers": np.int64(2)},
-        {"config": HRCConfig(worker=("worker_1", "worker_2"), horizons_s=(0.2,))},
+        {"config": HRCConfig(worker=("worker_1", "worker_2"), forecast_s=(0.2,))},
         {"config": {"scene": {"cameras": [{"name": "a", "eye_world": PLACES[0]}]}}},
     ],
 )

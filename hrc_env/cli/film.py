@@ -140,7 +140,7 @@ def _roll(
     with progress_bar(console, "filming") as advance:
         for step in range(n_steps):
             observation, _, terminated, _, info = env.step(agent.act(observation))
-            gap_m = float(env.simulation.believed.gap.distance_m.min(initial=np.inf))
+            gap_m = float(env.simulation.believed.separation.distance_m.min(initial=np.inf))
             diary.note(info, gap_m, env.simulation.task.counts(info))
             errors_m.append(info.get("tracking/mpjpe_m", np.nan))
             if step % STEPS_PER_FRAME == 0:

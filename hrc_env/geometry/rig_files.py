@@ -9,13 +9,13 @@ The fields are those of `CameraConfig`; a name and a place are needed, the rest 
 """
 
 import dataclasses
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.mapping import from_mapping
+from hrc_env.core.toml import read_toml, to_toml
 from hrc_env.geometry.camera_config import CameraConfig
 
 
@@ -25,16 +25,7 @@ def read_rig(path: Path | str) -> tuple[CameraConfig, ...]:
     Raises:
         ConfigError: no such file, no TOML, or a field that is unknown, missing or wrong.
     """
-    path = Path(path)
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(f"The rig file {path} cannot be read: {error}.") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ConfigError(
-            f"{path} must be TOML with a [[camera]] for each camera; reading it ended with: {error}"
-        ) from error
-    return rig_from(content, str(path))
+    return rig_from(read_toml(path), str(path))
 
 
 def rig_from(content: dict[str, Any], where: str) -> tuple[CameraConfig, ...]:
@@ -62,23 +53,5 @@ def rig_from(content: dict[str, Any], where: str) -> tuple[CameraConfig, ...]:
 
 def write_rig(path: Path | str, cameras: Sequence[CameraConfig]) -> None:
     """Write a rig, every field of every camera, so that `read_rig` gives the same back."""
-    tables = []
-    for camera in cameras:
-        fields = dataclasses.asdict(camera).items()
-        lines = [f"{name} = {_toml(value)}" for name, value in fields]
-        tables.append("\n".join(["[[camera]]", *lines]) + "\n")
-    Path(path).write_text("\n".join(tables), encoding="utf-8")
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{name} = {_toml(each)}" for name, each in value.items()) + "}"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(_toml, value)) + "]"
-    if isinstance(value, str):
-        escaped = "".join(_ESCAPED.get(letter, letter) for letter in value)
-        return f'"{escaped}"'
-    return repr(float(value)) if isinstance(value, float) else str(int(value))
-
-
-_ESCAPED = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\r": "\\r", "\t": "\\t"}
+    content = to_toml({"camera": [dataclasses.asdict(camera) for camera in cameras]})
+    Path(path).write_text(content, encoding="utf-8")

@@ -142,7 +142,7 @@ def test_directed_speeds_add_up_to_how_the_gap_closes(monkeypatch):
         now = bodies_of(part)
         steps.append(judge(part, before, now))
         before = now
-    gaps = np.array([step.true_gap_m for step in steps])
+    gaps = np.array([step.true_separation_m for step in steps])
     closing = -np.diff(gaps, axis=0) / part.config.ctrl_dt
     both = np.array([step.robot_mps + step.worker_mps for step in steps[1:]])
     assert np.abs(closing).max() > 0.05

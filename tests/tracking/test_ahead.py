@@ -39,7 +39,7 @@ def test_a_horizon_that_is_none_is_refused_in_words(horizon_s):
     with pytest.raises(ConfigError, match=r"horizon must be in \(0, 1\] s, got"):
         check_horizon(horizon_s)
     with pytest.raises(ConfigError, match="horizon"):
-        HRCConfig(horizons_s=(0.2, horizon_s))
+        HRCConfig(forecast_s=(0.2, horizon_s))
 
 
 def test_who_stands_still_is_expected_there_and_who_moves_further_on():

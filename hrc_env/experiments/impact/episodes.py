@@ -2,7 +2,7 @@
 
 What is counted is the truth. Distances are between the robot's capsules and the worker's true
 capsules, as in the cost. A directed speed is by how much one body's motion of a step narrowed the
-gap while the other is held where it is at its end: positive is towards the other.
+separation while the other is held where it is at its end: positive is towards the other.
 """
 
 import hashlib
@@ -24,7 +24,7 @@ from hrc_env.experiments.study.counts import ERRORS_M, GAPS_M, SPEEDS_MPS
 from hrc_env.experiments.study.recording import concatenated
 from hrc_env.experiments.study.rigs import Turn
 from hrc_env.geometry import chains
-from hrc_env.geometry.distances import narrowest_gap
+from hrc_env.geometry.distances import least_separation
 from hrc_env.motion import generator
 from hrc_env.simulation import Simulation, checked_action
 from hrc_env.step import Info
@@ -34,7 +34,7 @@ from hrc_env.worker.body import worker_truth
 PEOPLE = "unaware"
 """Workers who take no notice of the robot: their walk is then the same whatever it does."""
 STOP_M, SLOW_M = 0.10, 0.60
-"""A gap below the first calls for standing still, below the second for slowing down [m]: the
+"""A separation below the first calls for standing still, below the second for slowing down [m]: the
 distances of `agents.scripted.Yielding`, judgement."""
 MOVING_MPS = 0.05
 """From this directed speed on a robot moves towards the worker or flees [m/s]; judgement. No
@@ -65,9 +65,9 @@ class Bodies:
 class Step:
     """What happened in a step (B, ...), or in all steps of episodes (T, B, ...)."""
 
-    true_gap_m: Floats
+    true_separation_m: Floats
     """At the end of the step."""
-    believed_gap_m: Floats
+    believed_separation_m: Floats
     """The same as the robot believes it; infinite where it knows of nobody."""
     robot_mps: Floats
     """The robot's speed towards the worker."""
@@ -171,20 +171,20 @@ def bodies_of(part: Simulation) -> Bodies:
 
 def judge(part: Simulation, before: Bodies, now: Bodies) -> Step:
     """One step of a simulation, from where bodies were at its beginning and its end."""
-    dt_s, gap_m = part.config.ctrl_dt, _gap_m(now, now)
+    dt_s, separation_m = part.config.ctrl_dt, _separation_m(now, now)
     return Step(
-        true_gap_m=gap_m,
-        believed_gap_m=part.believed.gap.distance_m[:, 0],
-        robot_mps=(_gap_m(before, now) - gap_m) / dt_s,
-        worker_mps=(_gap_m(now, before) - gap_m) / dt_s,
+        true_separation_m=separation_m,
+        believed_separation_m=part.believed.separation.distance_m[:, 0],
+        robot_mps=(_separation_m(before, now) - separation_m) / dt_s,
+        worker_mps=(_separation_m(now, before) - separation_m) / dt_s,
         error_m=np.linalg.norm(part.estimate.mean_world[:, 0] - now.joints_world, axis=-1),
         joints_world=now.joints_world,
     )
 
 
-def _gap_m(robot: Bodies, worker: Bodies) -> Floats:
+def _separation_m(robot: Bodies, worker: Bodies) -> Floats:
     """(B,) between the robot of one moment and the worker of another."""
-    return narrowest_gap(
+    return least_separation(
         robot.robot_world, robot.robot_radius_m, worker.worker_world, worker.worker_radius_m
     ).distance_m
 
@@ -220,11 +220,14 @@ def _decisions(steps: Step, margin_m: float) -> dict[str, Bools]:
     """(T, B) where the belief decides otherwise than the truth, and what came of it."""
     found = {}
     for name, limit_m in (("stops", STOP_M), ("slowings", SLOW_M)):
-        called, given = steps.true_gap_m < limit_m, steps.believed_gap_m - margin_m < limit_m
+        called, given = (
+            steps.true_separation_m < limit_m,
+            steps.believed_separation_m - margin_m < limit_m,
+        )
         found[f"called_{name}"] = called
         found[f"missed_{name}"] = called & ~given
         found[f"false_{name}"] = given & ~called
-    found["approaches"] = (steps.robot_mps > MOVING_MPS) & (steps.true_gap_m < STOP_M)
+    found["approaches"] = (steps.robot_mps > MOVING_MPS) & (steps.true_separation_m < STOP_M)
     return found
 
 
@@ -241,9 +244,9 @@ def _contacts(steps: Step, touching: Bools) -> dict[str, Bools]:
 
 
 def _counts(steps: Step) -> dict[str, Any]:
-    """(B, bins) errors always; gaps and speeds where the gap matters."""
-    near = (steps.true_gap_m < SLOW_M).T
-    optimism_m = (steps.believed_gap_m - steps.true_gap_m).T
+    """(B, bins) errors always; separations and speeds where the separation matters."""
+    near = (steps.true_separation_m < SLOW_M).T
+    optimism_m = (steps.believed_separation_m - steps.true_separation_m).T
     return {
         "error_counts": ERRORS_M.count(np.swapaxes(steps.error_m, 0, 1)),
         "optimism_counts": GAPS_M.count(optimism_m, near),

@@ -16,7 +16,7 @@ from hrc_env.simulation import Simulation
 
 SCRIPTED, SLOWED, PPO = "scripted", "scripted_slowed", "ppo"
 POLICIES = (SCRIPTED, SLOWED, PPO)
-"""Full speed whoever is near; slower by the estimated gap; trained."""
+"""Full speed whoever is near; slower by the estimated separation; trained."""
 SEED = 0
 """Of the learner and of the environments that it learns in."""
 N_ENVS = 64

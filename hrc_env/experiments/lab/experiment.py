@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.config import HRCConfig, with_cameras
+from hrc_env.config import HRCConfig
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric
 from hrc_env.core.skeleton import JOINTS
@@ -22,7 +22,8 @@ from hrc_env.experiments.study.rigs import ALL as EVERY_CAMERA
 from hrc_env.experiments.study.rigs import SINGLE
 from hrc_env.experiments.study.runner import Study, at_least_one, changed
 from hrc_env.perception.detector import DetectorConfig
-from hrc_env.scene.build import Scene, build
+from hrc_env.scene.build import Scene, SceneConfig, build
+from hrc_env.scene.rigs import RIGS
 from hrc_env.worker.body import load_body
 
 RIG = "lab_gopro"
@@ -74,9 +75,12 @@ def config_for(quick: bool = False, seeds: int | None = None, folded: str = "ful
 
 def laboratory(seed: int, folded: str = "full") -> tuple[Scene, HRCConfig]:
     """The room with the paper's four cameras, and whose body is in it."""
-    settings = HRCConfig(worker=body_of(seed), detector=DetectorConfig(folded=folded))
-    config, use = with_cameras(settings, RIG)
-    return build(config.scene, "lab", 1, config.worker, use), config
+    config = HRCConfig(
+        worker=body_of(seed),
+        detector=DetectorConfig(folded=folded),
+        scene=SceneConfig(cameras=RIGS[RIG]),
+    )
+    return build(config.scene, "lab", 1, config.worker), config
 
 
 def taken(config: LabConfig, motion: str, seed: int, tick: PartProgress) -> Recording:
