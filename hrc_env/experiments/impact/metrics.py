@@ -1,7 +1,7 @@
 """From sums of episodes to numbers: rows, rows beside the reference, what lateness costs.
 
 Lateness in metres is measured in two ways, both on the truth: in the belief, by how much the 95th
-percentile of "believed less true separation" grows; in the loop, by the margin that `scripted_slowed`
+percentile of believed less true separation grows; in the loop, by the margin that `scripted_slowed`
 has to add to its distances until no greater share of the stops that the truth calls for is missed
 than on time. Predicted as latency x (v_h + v_r), with the nominal speed of a worker and with the
 speeds that there were; and by what follows where lateness and other errors are independent: then
