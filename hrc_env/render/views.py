@@ -15,10 +15,9 @@ from hrc_env.geometry.chains import capsules
 from hrc_env.motion import generator
 from hrc_env.perception.lensed import Lensed
 from hrc_env.render import overlay
-from hrc_env.render.stage import Stage
+from hrc_env.render.stage import SMOOTHING, Place, Stage
 from hrc_env.scene.domain_randomization import Look
-from hrc_env.scene.layers import Place, viewpoint
-from hrc_env.scene.render import PICTURE_QUALITY, CropRenderer, PictureRenderer
+from hrc_env.scene.render import PICTURE_QUALITY, CropRenderer, PictureRenderer, viewpoint_camera
 from hrc_env.simulation import Simulation
 
 PICTURE_SIZE = (960, 720)
@@ -27,8 +26,6 @@ SMALLEST_PX, LARGEST_PX = 16, 4096
 VIEWPOINT = "beside"
 """From where people look on: robot and worker side by side."""
 DEPTH_QUALITY = {**PICTURE_QUALITY, "offsamples": 0, "shadowsize": 0}
-SMOOTHING = 2
-"""Pictures through lenses are drawn so many times as large, and shrunk, for smooth edges."""
 MOSAIC_TILE = (640, 360)
 SIDES = (
     ("from above", np.array([0.0, 0.0, 5.0]), np.zeros(3)),
@@ -94,7 +91,9 @@ class Views:
         if depth:
             renderer = self._depth_renderer(size, seen.look)
             return renderer.picture(seen.q, seen.motion, VIEWPOINT, depth=True)
-        return self._drawn([_whole(viewpoint(VIEWPOINT, *size), *size, shadows=True)], seen)[0]
+        return self._drawn([_whole(viewpoint_camera(VIEWPOINT, *size), *size, shadows=True)], seen)[
+            0
+        ]
 
     def glance(self, b: int | None = None) -> Glance:
         """All that there is to draw now, of another environment than usual with `b`."""
@@ -112,7 +111,7 @@ class Views:
 
     def room(self, width: int, height: int, seen: Glance | None = None) -> Image:
         """The room with the estimated skeleton over it."""
-        seen, camera = seen or self.glance(), viewpoint(VIEWPOINT, width, height)
+        seen, camera = seen or self.glance(), viewpoint_camera(VIEWPOINT, width, height)
         (image,) = self._drawn([_whole(camera, width, height, shadows=True)], seen)
         overlay.draw_estimate(image, camera, seen.estimate)
         overlay.draw_markers(image, camera, seen.markers_world)
@@ -227,14 +226,14 @@ class Views:
             if self._stage is not None:
                 self._stage.close()
             self._stage = Stage(self.simulation.scene, width, height)
-        self._stage.dress(seen.look)
+        self._stage.randomize(seen.look)
         self._stage.pose(seen.q, seen.motion)
         return [self._stage.picture(place) for place in places]
 
     def _depth_renderer(self, size: tuple[int, int], look: Look | None) -> PictureRenderer:
         if size not in self._depths:
             self._depths[size] = PictureRenderer(self.simulation.scene, *size, DEPTH_QUALITY)
-        self._depths[size].dress(look)
+        self._depths[size].randomize(look)
         return self._depths[size]
 
     def _square_images(self, size: int, seen: Glance) -> Lensed:
@@ -242,7 +241,7 @@ class Views:
         scene = self.simulation.scene
         if size not in self._squares:
             self._squares[size] = CropRenderer(scene, size)
-        self._squares[size].dress(seen.look)
+        self._squares[size].randomize(seen.look)
         self._squares[size].draw(seen.q, seen.motion)
         return Lensed(self._squares[size], scene.cameras)
 

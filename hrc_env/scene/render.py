@@ -19,9 +19,9 @@ from hrc_env.core.typing import Image, JointAngles
 from hrc_env.geometry.cameras import PinholeCamera, pinhole
 from hrc_env.scene import gl
 from hrc_env.scene.build import Scene
-from hrc_env.scene.canvas import EVERYTHING, MOVING, ROBOT, STILL, Canvas, Part
+from hrc_env.scene.canvas import ALL_GROUPS, EVERYTHING, MOVING, ROBOT, STILL, Canvas, Part
 from hrc_env.scene.domain_randomization import Look
-from hrc_env.scene.primitives import DECORATION, OVERHEAD, ROBOT_LOOKS, SOLID
+from hrc_env.scene.primitives import OVERHEAD
 
 CROP_PX = 256
 CROP_QUALITY = {
@@ -30,7 +30,6 @@ CROP_QUALITY = {
 PICTURE_QUALITY = {
     "offsamples": 4, "shadowsize": 8192, "numslices": 40, "numstacks": 20, "numquads": 4,
 }  # fmt: skip
-ALL_GROUPS = (SOLID, DECORATION, ROBOT_LOOKS, OVERHEAD)
 WINDOWS_KEPT = 4
 """Windows per camera whose background is kept."""
 Key: TypeAlias = tuple[float, ...]
@@ -50,6 +49,12 @@ OPEN_ROOF = ("outside", "top", "overview")
 """Viewpoints from which ceiling and lamps are left out."""
 
 
+def viewpoint_camera(name: str, width: int, height: int) -> PinholeCamera:
+    """The camera of one of `VIEWPOINTS`, for pictures of this size [px]."""
+    eye, target, hfov_deg = VIEWPOINTS[name]
+    return pinhole(name, np.array(eye), np.array(target), hfov_deg, width, height)
+
+
 class CropRenderer:
     """Square crops of the cameras' images: what the detector sees.
 
@@ -66,9 +71,9 @@ class CropRenderer:
         self._z = np.empty((size_px, size_px), np.float32)
         self._kept: OrderedDict[Key, _Background | None] = OrderedDict()
 
-    def dress(self, look: Look | None) -> bool:
+    def randomize(self, look: Look | None) -> bool:
         """Draw with an episode's look from the next pose on; whether that is another one."""
-        if not self._canvas.dress(look):
+        if not self._canvas.randomize(look):
             return False
         self._kept.clear()
         return True
@@ -198,9 +203,9 @@ class PictureRenderer:
         self.quality = PICTURE_QUALITY if quality is None else quality
         self._canvas = Canvas(scene, width_px, height_px, self.quality, ALL_GROUPS)
 
-    def dress(self, look: Look | None) -> None:
+    def randomize(self, look: Look | None) -> None:
         """Draw with an episode's look from now on."""
-        self._canvas.dress(look)
+        self._canvas.randomize(look)
 
     def viewpoints(self) -> tuple[str, ...]:
         """What `picture` takes: named views and the cameras of the rig."""
@@ -247,9 +252,7 @@ class PictureRenderer:
                 return camera
         if viewpoint not in VIEWPOINTS:
             raise unknown("viewpoint", viewpoint, self.viewpoints())
-        eye, target, hfov_deg = VIEWPOINTS[viewpoint]
-        size = self._canvas.width_px, self._canvas.height_px
-        return pinhole(viewpoint, np.array(eye), np.array(target), hfov_deg, *size)
+        return viewpoint_camera(viewpoint, self._canvas.width_px, self._canvas.height_px)
 
     def close(self) -> None:
         """Free the OpenGL context."""

@@ -1,7 +1,7 @@
 """Put a baked worker into a MuJoCo model: mocap bodies, and capsules round them.
 
 The worker is moved, not simulated: 22 mocap bodies take positions and rotations straight
-from `WorkerMotion`. What one sees (`wardrobe`) nobody can touch; what touches the worker are
+from `WorkerMotion`. What one sees (`worker_visuals`) nobody can touch; what touches the worker are
 capsules that no camera draws and that meet only geoms whose conaffinity has the workers' bit.
 """
 
