@@ -135,7 +135,7 @@ def appearance() -> None:
 def clip() -> None:
     """A recording, imported."""
     out = Path("out/clips")
-    subprocess.run([sys.executable, "tests/motion/capture/written.py", str(out)], check=True)
+    subprocess.run([sys.executable, "tests/mocap/written.py", str(out)], check=True)
     words = ["import-motion", str(out / "traps.bvh"), "--out", str(out / "traps.npz")]
     strip = out / "traps.png"
     subprocess.run([sys.executable, "-m", "hrc_env", *words, "--picture", str(strip)], check=True)

@@ -25,8 +25,8 @@ from hrc_env.core.typing import Floats, Ints, Points3
 from hrc_env.geometry import chains
 from hrc_env.motion import generator
 from hrc_env.motion.workers import Crew, bodies_of, worker_counts
-from hrc_env.pipeline.levels import CAMERA_LEVELS, make_senses
-from hrc_env.pipeline.sensor_input import Moment
+from hrc_env.pipeline.levels import CAMERA_LEVELS, make_pipeline
+from hrc_env.pipeline.sensor_input import SensorInput, TrueSensorInput
 from hrc_env.rewards import RewardConfig
 from hrc_env.safety.shield import shielded
 from hrc_env.scene.build import build
@@ -65,7 +65,7 @@ class Simulation(Stateful):
     """`batch` environments of the same settings that step together."""
 
     CHANGES = (
-        "physics", "senses", "motion", "task_state", "streams", "action", "episode_cost", "gap_m",
+        "physics", "pipeline", "motion", "task_state", "streams", "action", "episode_cost", "gap_m",
         "estimate", "ahead", "worn", "reward_weights",
     )  # fmt: skip
 
@@ -107,7 +107,7 @@ class Simulation(Stateful):
             ),
         )
         self.physics = Physics(self.scene, batch)
-        self.senses = make_senses(perception, settings.estimator, self.scene, batch, config)
+        self.pipeline = make_pipeline(perception, settings.estimator, self.scene, batch, config)
         self.worn = np.full(batch, None, object)
         self.task_state = self.task.init(batch)
         self._everyone = np.arange(batch)
@@ -134,10 +134,10 @@ class Simulation(Stateful):
         self.action[ids], self.episode_cost[ids], self.gap_m[ids] = 0.0, 0.0, 0.0
         robot = chains.robot_state(self.chain, self.physics.q[ids], self.physics.qd[ids])
         self.task.reset(self.task_state, ids, self.streams.task, World(robot), self.config.task)
-        self.senses.reset(ids, self.streams.sensor, self.streams.tracker)
+        self.pipeline.reset(ids, self.streams.sensor, self.streams.tracker)
         motion = generator.current(self.motion, ids)
         truth = worker_truth(self.bodies, motion)
-        estimate, ahead = self._sense(ids, motion, truth)
+        estimate, ahead = self._perceive(ids, motion, truth)
         believed = self._believed(ids, robot, estimate, ahead)
         observation = observations.observe(believed, self.layout, self.terms)
         crew = rows(self.crew, ids)
@@ -166,7 +166,7 @@ class Simulation(Stateful):
         q_path = self.physics.step(command, path, apart)
         truth = worker_truth(self.bodies, motion)
 
-        estimate, ahead = self._sense(self._everyone, motion, truth)
+        estimate, ahead = self._perceive(self._everyone, motion, truth)
         robot, arm = chains.robot_along(self.chain, q_path, self.physics.qd)
         seen_world = robot.capsules_world[:, self.scene.watched, 1]
         generator.watch(self.motion, seen_world, motion, config.ctrl_dt)
@@ -225,7 +225,7 @@ class Simulation(Stateful):
 
     def close(self) -> None:
         """Release threads and graphics contexts."""
-        self.senses.close()
+        self.pipeline.close()
 
     def _starting_angles(self, ids: Ints) -> Floats:
         """(len(ids), N) arm angles near home, turned anywhere in front of the base."""
@@ -257,17 +257,20 @@ class Simulation(Stateful):
         view = self.task.view(self.task_state, np.array([b]), self.config.task)
         return self.task.markers(view)[0]
 
-    def _sense(
+    def _perceive(
         self, ids: Ints, motion: WorkerMotion, truth: WorkerTruth
     ) -> tuple[PoseEstimate, tuple[PoseEstimate, ...]]:
-        """Let the senses look at environments `ids`; their rows of the estimates now and ahead."""
-        moment = Moment(ids, self.physics.q[ids], motion, truth, self.motion.present[ids] > 0.0)
+        """Let the pipeline look at environments `ids`: their estimates now and ahead."""
+        now = SensorInput(ids, self.physics.q[ids], motion)
+        if self.pipeline.NEEDS_TRUTH:
+            present = self.motion.present[ids] > 0.0
+            now = TrueSensorInput(ids, now.q, motion, truth, present)
         streams = self.streams
-        estimate = self.senses.sense(
-            moment, picked(streams.sensor, ids), picked(streams.tracker, ids)
+        estimate = self.pipeline.perceive(
+            now, picked(streams.sensor, ids), picked(streams.tracker, ids)
         )
         ahead = tuple(
-            self.senses.ahead(estimate, ids, horizon_s) for horizon_s in self.config.horizons_s
+            self.pipeline.ahead(estimate, ids, horizon_s) for horizon_s in self.config.horizons_s
         )
         if ids is self._everyone:
             self.estimate, self.ahead = estimate, ahead
@@ -291,7 +294,7 @@ class Simulation(Stateful):
 
     def _suspects(self, ids: Ints) -> MiscalibrationFlags:
         """Which cameras of environments `ids` are thought to be miscalibrated."""
-        flags = self.senses.suspected(ids)
+        flags = self.pipeline.suspected(ids)
         names = self.settings["cameras"] if flags.shape[1] else ()
         return MiscalibrationFlags(names, flags)
 

@@ -17,7 +17,7 @@ TRUTH_READERS = {
     "hrc_env/core/records.py": "declares it",
     "hrc_env/worker/body.py": "makes it from the worker's motion",
     "hrc_env/step.py": "gives errors against it their names",
-    "hrc_env/simulation.py": "carries it to cost, metrics and senses",
+    "hrc_env/simulation.py": "carries it to cost, metrics and perception",
     "hrc_env/pipeline/sensor_input.py": "hands it to the emulator and to the level `truth`",
     "hrc_env/metrics.py": "counts cost and errors",
     "hrc_env/perception/emulator.py": "projects it into emulated cameras",

@@ -217,13 +217,13 @@ def test_a_worker_who_leaves_the_views_is_lost_with_growing_doubt():
 
 def hide_everything(env: HRCEnv) -> None:
     """From now on the detector finds nobody."""
-    senses = env.simulation.senses
-    blank = senses.keypoints
+    pipeline = env.simulation.pipeline
+    blank = pipeline.keypoints
     nothing = Keypoints(
         np.full_like(blank.px, np.nan), np.zeros_like(blank.confidence),
         np.full_like(blank.sigma_px, np.inf),
     )  # fmt: skip
-    senses.detect = lambda now, predicted, rngs: nothing
+    pipeline.detect = lambda now, predicted, rngs: nothing
 
 
 def test_contact_ends_the_episode_when_asked():

@@ -110,7 +110,7 @@ class Looker:
         return np.array(self.source.crop(camera, window))
 
     def image_px(self, camera: int, pinhole_px: Points2) -> Points2:
-        """Pixels of a camera's image, as its lens bends it, of pinhole ones."""
+        """Pixels of a camera's image, as its lens distorts it, of pinhole ones."""
         return image_from_pinhole(self.scene.cameras[camera], pinhole_px)
 
     def close(self) -> None:

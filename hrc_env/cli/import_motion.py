@@ -14,9 +14,9 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import JOINTS
 
 if TYPE_CHECKING:  # --help imports no simulator
-    from hrc_env.motion.capture.clip import Clip
-    from hrc_env.motion.capture.record import Capture
-    from hrc_env.motion.capture.retarget import RetargetError
+    from hrc_env.mocap.record import Capture
+    from hrc_env.mocap.retarget import RetargetError
+    from hrc_env.motion.clip import Clip
 
 USUAL_FPS = 60.0
 """Faster recordings are thinned out to this rate: a step keeps 30 frames."""
@@ -54,9 +54,9 @@ class ImportMotion:
             raise ConfigError("--out is the recording itself; give the clip another name.")
         if self.picture is not None:
             writable_file(self.picture, ".png", "--picture")
-        from hrc_env.motion.capture.clip import save_clip
-        from hrc_env.motion.capture.read import read_capture
-        from hrc_env.motion.capture.retarget import retarget
+        from hrc_env.mocap.read import read_capture
+        from hrc_env.mocap.retarget import retarget
+        from hrc_env.motion.clip import save_clip
         from hrc_env.worker.body import load_body
 
         body, console = load_body(self.worker), Console()

@@ -5,10 +5,10 @@ import numpy as np
 from hrc_env.core.records import WorkerMotion
 from hrc_env.core.typing import Image
 from hrc_env.geometry.cameras import pinhole
+from hrc_env.mocap.poses import segments_in
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import anatomy
-from hrc_env.motion.capture.clip import Clip, fitted_to
-from hrc_env.motion.capture.segments import segments_in
+from hrc_env.motion.clip import Clip, fitted_to
 from hrc_env.render import overlay
 from hrc_env.scene.build import SceneConfig, build
 from hrc_env.scene.render import PictureRenderer

@@ -7,7 +7,7 @@ import numpy as np
 
 from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.core.typing import Floats
-from hrc_env.geometry.lens import Lens, bend_radius, rays_cam
+from hrc_env.geometry.lens import Lens, distorted_radius, rays_cam
 
 MOST_CAMERAS = 16
 """A rig has no more."""
@@ -43,7 +43,7 @@ class CameraConfig:
     centre_px: tuple[float, ...] = ()
     """Principal point cx, cy [px]; none: the middle of the image."""
     lens: Lens = field(default_factory=Lens)
-    """How the lens bends the image."""
+    """How the lens distorts the image."""
     rate_hz: float = 0.0
     """Images a second; 0: one at every control step. Images are taken at control steps."""
     latency_s: float = 0.0
@@ -103,7 +103,7 @@ def _focal_px(camera: CameraConfig) -> float:
     half_rad = math.radians(camera.hfov_deg) / 2
     if camera.lens.model == "none":
         return float(camera.width_px / 2 / np.tan(half_rad))
-    radius = bend_radius(camera.lens, half_rad)
+    radius = distorted_radius(camera.lens, half_rad)
     if math.isnan(radius):
         raise ConfigError(
             f"Camera {camera.name!r}: its lens {camera.lens} folds the image over before "

@@ -6,7 +6,7 @@ import numpy as np
 
 from hrc_env.core.typing import Floats
 from hrc_env.geometry.rotations import about_axis
-from hrc_env.worker.body import N_SEGMENTS, PARENT, Bodies, Body
+from hrc_env.worker.body import N_SEGMENTS, PARENT, Body
 
 CHEST, HEAD = 3, 5
 LEFT, SIDE_STRIDE = 6, 8
@@ -49,7 +49,7 @@ def anatomy(body: Body) -> Anatomy:
     return _measured(np.asarray(body.rest_position, float))
 
 
-def anatomies(bodies: Body | Bodies) -> Anatomy:
+def anatomies(bodies: Body) -> Anatomy:
     """Measure N bodies, or one: arrays (N, ...), each row as `anatomy` of that body alone."""
     each = [_measured(rest) for rest in bodies.rest_position.reshape(-1, N_SEGMENTS, 3)]
     return Anatomy(

@@ -4,7 +4,7 @@ from collections import namedtuple
 from dataclasses import dataclass, field, fields
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.motion.capture.clip import Clip
+from hrc_env.motion.clip import Clip
 from hrc_env.motion.errands import TASKS, Task, check_tasks
 from hrc_env.motion.people import PeopleConfig
 

@@ -16,7 +16,7 @@ from hrc_env.motion import plans as pl
 from hrc_env.motion import state as st
 from hrc_env.motion.anatomy import anatomies
 from hrc_env.motion.behaviour import begin_episode, follow_up
-from hrc_env.motion.capture.clip import Clip, opened
+from hrc_env.motion.clip import Clip, opened
 from hrc_env.motion.config import MotionConfig, numbers
 from hrc_env.motion.errands import errands_at
 from hrc_env.motion.floorplan import floorplan, room_for
@@ -28,7 +28,7 @@ from hrc_env.motion.playing import Clips, stocked
 from hrc_env.motion.reactions import notice
 from hrc_env.motion.state import MotionState
 from hrc_env.motion.who import N_DRAWS
-from hrc_env.worker.body import N_SEGMENTS, Bodies, Body
+from hrc_env.worker.body import N_SEGMENTS, Body
 
 __all__ = [
     "ABSENT",
@@ -70,7 +70,7 @@ OPEN_FLOOR = Grounds(
 
 
 def make_state(
-    batch: int, n_workers: int, body: Body | Bodies, config: MotionConfig,
+    batch: int, n_workers: int, body: Body, config: MotionConfig,
     grounds: Grounds = OPEN_FLOOR, fewest: int | None = None,
 ) -> MotionState:  # fmt: skip
     """Arrays for `batch` environments of `n_workers` each; call `reset` before use.

@@ -23,8 +23,7 @@ from hrc_env.motion.activities.recorded import (
 )
 from hrc_env.motion.activities.worker import Worker
 from hrc_env.motion.anatomy import ANKLE_Z
-from hrc_env.motion.capture.clip import RECORDED, Clip, fitted_to, placed_at_origin
-from hrc_env.motion.capture.stance import footprints
+from hrc_env.motion.clip import RECORDED, Clip, fitted_to, footprints, placed_at_origin
 from hrc_env.motion.curves import ramp
 from hrc_env.motion.posture import STANCE_HALF_WIDTH_M
 from hrc_env.motion.walk import footprint

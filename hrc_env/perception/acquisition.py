@@ -16,7 +16,7 @@ from hrc_env.core.typing import Points3
 from hrc_env.geometry.cameras import (
     PinholeCamera,
     image_from_pinhole,
-    pinhole_stretch,
+    pinhole_magnification,
     project,
     rays,
 )
@@ -103,7 +103,9 @@ def _support(
         px, depth_m = project(camera.P[None], point_world[None])
         if not found or depth_m[0, 0] <= 0:
             continue
-        m_per_px = float(depth_m[0, 0]) / camera.K[0, 0] * float(pinhole_stretch(camera, px[0, 0]))
+        m_per_px = (
+            float(depth_m[0, 0]) / camera.K[0, 0] * float(pinhole_magnification(camera, px[0, 0]))
+        )
         hips_px = image_from_pinhole(camera, px[0, 0])
         off_m = [
             math.dist(window.centre_px, hips_px) * m_per_px

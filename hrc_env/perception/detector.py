@@ -107,7 +107,7 @@ class Detection:
     """One worker as all cameras see them; a camera without them is NaN, 0 and infinite."""
 
     px: Points2
-    """(C, J, 2) [px] in the whole image, as its lens bends it."""
+    """(C, J, 2) [px] in the whole image, as its lens distorts it."""
     confidence: Floats
     """(C, J) visibility in [0, 1]."""
     sigma_px: Floats

@@ -167,7 +167,7 @@ def emulate(
         config: as given to `make_state`.
 
     Returns:
-        Keypoints in pixels of the images, as lenses bend them, with NaN, 0 and infinity where a
+        Keypoints in pixels of the images, as lenses distort them, with NaN, 0 and infinity where a
         camera does not see a worker.
     """
     batch, n_cameras, n_workers = state.body.shape
@@ -238,13 +238,13 @@ def without_names(keypoints: Keypoints, rngs: Generators) -> Keypoints:
 def _rig(cameras: tuple[PinholeCamera, ...]) -> Rig:
     image = [(camera.width_px, camera.height_px, camera.K[0, 0]) for camera in cameras]
     eyes_world = np.stack([camera.eye_world for camera in cameras])
-    bending = np.stack([_bending(camera) for camera in cameras])
+    lenses = np.stack([_lens_of(camera) for camera in cameras])
     return Rig(
-        projections(cameras), np.ascontiguousarray(eyes_world), np.array(image, float), bending
+        projections(cameras), np.ascontiguousarray(eyes_world), np.array(image, float), lenses
     )
 
 
-def _bending(camera: PinholeCamera) -> Floats:
+def _lens_of(camera: PinholeCamera) -> Floats:
     """(12,) a lens with what makes pixels of its numbers; zeros for a pinhole."""
     if camera.lens is None:
         return np.zeros(CENTRE + 2)

@@ -6,7 +6,7 @@ import numpy as np
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
-from hrc_env.geometry.lens import FOLD, bent, stretch_at
+from hrc_env.geometry.lens import FOLD, distorted, magnification_at
 from hrc_env.geometry.shapes import passage, set_capsules, set_rows
 from hrc_env.geometry.sight import blocks, line, look, make_table, meets
 from hrc_env.perception.outline import (
@@ -25,7 +25,7 @@ MIN_DEPTH_M = 0.5
 """Nearer to a camera's plane there is no image of a person."""
 
 FOCAL, CENTRE = FOLD + 1, FOLD + 3
-"""Columns of a camera's row of `bending` behind its lens: fx and fy, 0 if it has no lens; cx and
+"""Columns of a camera's row of `lenses` behind its lens: fx and fy, 0 if it has no lens; cx and
 cy."""
 
 SEEN, HIDDEN, OUTSIDE, BEHIND = range(4)
@@ -68,7 +68,7 @@ class Rig(NamedTuple):
     """(C, 3) [m]."""
     image: Floats
     """(C, 3) width, height, focal length [px]."""
-    bending: Floats
+    lenses: Floats
     """(C, `CENTRE` + 2) lenses; zeros for pinholes."""
 
 
@@ -119,8 +119,8 @@ def see(rig, c, joints, meant, table, first_body, view, rows, uv, depth, state, 
     for j in range(1, 3):
         total += depth[j] + depth[j + 6]
     px_per_m = 4.0 * rig.image[c, 2] / max(total, 4.0 * MIN_DEPTH_M)
-    if rig.bending[c, FOCAL] > 0.0:
-        px_per_m /= _bend(rig.bending[c], uv, depth)
+    if rig.lenses[c, FOCAL] > 0.0:
+        px_per_m /= _distort(rig.lenses[c], uv, depth)
     look_of[SIDE], look_of[TURN] = window_round(uv, depth, px_per_m, MIN_DEPTH_M)
     _image(uv, depth, rig.image[c], state)
     return _sight(rig.eyes[c], joints, table, first_body, view, rows, state)
@@ -137,16 +137,16 @@ def _project(P, joints, uv, depth):
 
 
 @kernel
-def _bend(bending, uv, depth):
-    """Bend pinhole pixels in place. How many times longer the pinhole shows the body."""
-    fx, fy, cx, cy = bending[FOCAL], bending[FOCAL + 1], bending[CENTRE], bending[CENTRE + 1]
+def _distort(lenses, uv, depth):
+    """Distort pinhole pixels in place. How many times longer the pinhole shows the body."""
+    fx, fy, cx, cy = lenses[FOCAL], lenses[FOCAL + 1], lenses[CENTRE], lenses[CENTRE + 1]
     total, n = 0.0, 0
     for j in range(len(depth)):
         if depth[j] >= MIN_DEPTH_M:
             x, y = (uv[j, 0] - cx) / fx, (uv[j, 1] - cy) / fy
-            total += stretch_at(bending, x, y)
+            total += magnification_at(lenses, x, y)
             n += 1
-            x, y = bent(bending, x, y)
+            x, y = distorted(lenses, x, y)
             uv[j, 0], uv[j, 1] = x * fx + cx, y * fy + cy
     return total / n if n > 0 else 1.0
 

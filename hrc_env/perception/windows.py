@@ -18,7 +18,7 @@ from hrc_env.geometry.cameras import (
     PinholeCamera,
     image_from_pinhole,
     inside_image,
-    pinhole_stretch,
+    pinhole_magnification,
 )
 from hrc_env.perception.blazepose import window_from_points, wrap_angle
 
@@ -67,11 +67,11 @@ def window_from_joints(joints_px: Points2, depth_m: Floats, camera: PinholeCamer
     if depth_m[TORSO].min() < MIN_DEPTH_M:
         return None
     ahead = depth_m > MIN_DEPTH_M
-    stretch = pinhole_stretch(camera, joints_px[TORSO].mean(0))
+    magnification = pinhole_magnification(camera, joints_px[TORSO].mean(0))
     joints_px = image_from_pinhole(camera, joints_px)
     if np.count_nonzero(ahead & inside_image(camera, joints_px)) < MIN_JOINTS_INSIDE:
         return None
-    px_per_m = camera.K[0, 0] / (depth_m[TORSO].mean() * stretch)
+    px_per_m = camera.K[0, 0] / (depth_m[TORSO].mean() * magnification)
     hip = joints_px[_HIPS].mean(0)
     torso = joints_px[_SHOULDERS].mean(0) - hip
     missing = max(0.0, MIN_TORSO_M * px_per_m - float(np.hypot(*torso)))

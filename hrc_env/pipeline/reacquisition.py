@@ -26,7 +26,7 @@ Views = list[Roi | None]
 """A window a camera."""
 
 
-class Strays(Stateful):
+class Reacquisition(Stateful):
     """Workers W of environments B before cameras C, and how long each camera has missed them."""
 
     CHANGES = ("unseen", "elsewhere", "left")

@@ -14,18 +14,18 @@ from hrc_env.perception.faults.recent import Recent
 from hrc_env.perception.faults.schedule import Schedule
 from hrc_env.perception.lensed import Lensed
 from hrc_env.pipeline.looking import Looking
-from hrc_env.pipeline.sensor_input import Generators, Moment, Windows
-from hrc_env.pipeline.tracking import TrackingSenses, no_keypoints
+from hrc_env.pipeline.sensor_input import Generators, SensorInput, Windows
+from hrc_env.pipeline.tracking import PoseTracking, no_keypoints
 from hrc_env.scene.build import Scene
 from hrc_env.scene.domain_randomization import AS_BUILT, Look, draw_look
 from hrc_env.scene.render import CropRenderer
 from hrc_env.tracking.estimators import Estimator
 
 
-class CameraSenses(TrackingSenses):
+class PixelPipeline(PoseTracking):
     """Level `pixels`: rendered crops through the pose network."""
 
-    CHANGES = (*TrackingSenses.CHANGES, "looking", "worn")
+    CHANGES = (*PoseTracking.CHANGES, "looking", "worn")
 
     def __init__(
         self, scene: Scene, batch: int, tracker: Estimator, config: HRCConfig, schedule: Schedule
@@ -40,7 +40,7 @@ class CameraSenses(TrackingSenses):
         """How each environment looks in its episode; None: as it was built."""
         self.looking = Looking(batch, scene.cameras, scene.n_workers, config.detector)
 
-    def detect(self, now: Moment, predicted: Any, sensor_rngs: Generators) -> Keypoints:
+    def detect(self, now: SensorInput, predicted: Any, sensor_rngs: Generators) -> Keypoints:
         """Landmarks of crops round the predicted worker, or of a search where there is none."""
         seen = no_keypoints(len(now.ids), len(self.scene.cameras), self.scene.n_workers)
         time_s = None if self.recent is None else np.empty(seen.px.shape[:2])
@@ -59,7 +59,7 @@ class CameraSenses(TrackingSenses):
                 seen.sigma_px[row, :, worker] = sight.sigma_px
         return replace(seen, time_s=time_s)
 
-    def _take_images(self, now: Moment, row: int, b: int, recent: Recent) -> Floats:
+    def _take_images(self, now: SensorInput, row: int, b: int, recent: Recent) -> Floats:
         """Let every camera show what has come of it. (C,) its time; NaN for nothing."""
         step, pose = recent.begin(b), (now.q[row].copy(), copied(one(now.motion, row)))
         before = recent.at(b, step - 1)
@@ -80,7 +80,7 @@ class CameraSenses(TrackingSenses):
             if self.appearance != AS_BUILT:
                 self.worn[b] = draw_look(self.appearance, self.scene.n_workers, sensor_rngs[b])
 
-    def looks(self, b: int) -> tuple[Keypoints | None, Windows]:
+    def last_detections(self, b: int) -> tuple[Keypoints | None, Windows]:
         """The keypoints of environment `b` and the windows they were found in."""
         return rows(self.keypoints, np.array([b])), self.looking.windows[b]
 

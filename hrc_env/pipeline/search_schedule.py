@@ -16,7 +16,7 @@ REMEMBERED = 10
 hips hardly move further than two lines of sight may pass each other by."""
 
 
-class Searches(Stateful):
+class SearchSchedule(Stateful):
     """The searches of B environments with C cameras."""
 
     CHANGES = ("rests", "ages", "people")

@@ -98,15 +98,15 @@ class Views:
     def glance(self, b: int | None = None) -> Glance:
         """All that there is to draw now, of another environment than usual with `b`."""
         b, simulation = self.b if b is None else b, self.simulation
-        keypoints, windows = simulation.senses.looks(b)
+        keypoints, windows = simulation.pipeline.last_detections(b)
         return Glance(
             *self.pose(b),
-            simulation.senses.look_of(b),
+            simulation.pipeline.look_of(b),
             simulation.markers(b),
             rows(simulation.estimate, np.array([b])),
             keypoints,
             [list(of_worker) for of_worker in windows],
-            list(simulation.senses.crops(b)),
+            list(simulation.pipeline.crops(b)),
         )
 
     def room(self, width: int, height: int, seen: Glance | None = None) -> Image:

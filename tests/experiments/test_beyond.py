@@ -39,17 +39,17 @@ def sums(setting, n_threads=2):
 def state_of(setting):
     """A tracker's state after an episode, and the true bones."""
     walks, turn = walks_of("lab", 1, SEEDS, N_STEPS), setting.turns[0]
-    senses, ids = eyes_of(setting, turn, 1), np.zeros(1, int)
+    pipeline, ids = eyes_of(setting, turn, 1), np.zeros(1, int)
     joints = []
     shown = watch(
         setting, turn, walks, SEEDS, ids, lambda k, said, truth, now: joints.append(truth)
     )
     rngs = [np.random.default_rng(0)]
-    senses.tracker.reset(senses.state, ids, rngs)
+    pipeline.tracker.reset(pipeline.state, ids, rngs)
     for keypoints in shown:
-        senses.tracker.predict(senses.state, DT_S, rngs)
-        senses.tracker.update(senses.state, keypoints, rngs)
-    return senses.state, lengths_m(joints[0])
+        pipeline.tracker.predict(pipeline.state, DT_S, rngs)
+        pipeline.tracker.update(pipeline.state, keypoints, rngs)
+    return pipeline.state, lengths_m(joints[0])
 
 
 @pytest.fixture(scope="module")

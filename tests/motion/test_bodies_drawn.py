@@ -65,9 +65,9 @@ def test_one_name_is_the_same_however_it_is_written():
 def test_the_truth_has_the_measures_of_the_body():
     env = made()
     names = env.reset(seed=1)[1][workers.BODY]
-    senses, looks = env.simulation.senses, []
-    sense = senses.sense
-    senses.sense = lambda now, *rngs: looks.append(now.truth) or sense(now, *rngs)
+    pipeline, looks = env.simulation.pipeline, []
+    sense = pipeline.perceive
+    pipeline.perceive = lambda now, *rngs: looks.append(now.truth) or sense(now, *rngs)
     env.step(PUSH)
     truth = one(looks[0], 0)
     for w, body in enumerate(map(load_body, names)):

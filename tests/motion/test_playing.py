@@ -11,14 +11,14 @@ from hrc_env.core.batching import one
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import WorkerMotion
 from hrc_env.core.skeleton import JOINTS
+from hrc_env.mocap.poses import segments_in
+from hrc_env.mocap.record import Capture
+from hrc_env.mocap.retarget import retarget
 from hrc_env.motion import controls as c
 from hrc_env.motion import generator
 from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.recorded import PACE_S, SETTLE_S
-from hrc_env.motion.capture.clip import load_clip, save_clip
-from hrc_env.motion.capture.record import Capture
-from hrc_env.motion.capture.retarget import retarget
-from hrc_env.motion.capture.segments import segments_in
+from hrc_env.motion.clip import load_clip, save_clip
 from hrc_env.motion.playing import LONGEST_S, stocked
 from hrc_env.worker.body import SEGMENT, load_body, worker_truth
 

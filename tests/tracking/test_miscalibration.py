@@ -54,7 +54,7 @@ def test_a_vector_names_what_its_environments_would():
         == single.simulation._suspects(np.array([0])).info_of(0)[MISCALIBRATED]
     )
     assert infos[f"_{MISCALIBRATED}"].all()
-    one, many = single.simulation.senses.watched, env.shards.parts[0].senses.watched
+    one, many = single.simulation.pipeline.watched, env.shards.parts[0].pipeline.watched
     for alone, together in zip(one, many, strict=True):
         np.testing.assert_array_equal(alone[0], together[1])
 

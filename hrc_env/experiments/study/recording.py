@@ -15,8 +15,8 @@ from hrc_env.core.records import Keypoints, PoseEstimate, WorkerMotion
 from hrc_env.core.typing import Bools, Covariances3, Ints, Points3
 from hrc_env.experiments.study.shelf import Tick
 from hrc_env.geometry.cameras import projections
-from hrc_env.pipeline.levels import make_senses
-from hrc_env.pipeline.sensor_input import Moment, Windows
+from hrc_env.pipeline.levels import make_pipeline
+from hrc_env.pipeline.sensor_input import SensorInput, Windows
 from hrc_env.scene.build import Scene
 from hrc_env.tracking.estimators import make_estimator
 from hrc_env.worker.body import stack, worker_truth
@@ -69,18 +69,18 @@ def record(
         tick: hears of the progress: shares that sum to 1.
     """
     body = stack(scene.bodies)
-    senses = make_senses("pixels", estimator, scene, 1, config)
+    pipeline = make_pipeline("pixels", estimator, scene, 1, config)
     rngs = [[np.random.default_rng([seed, k])] for k in range(2)]
     n_frames = len(motions.position_world)
-    q, ids, present = scene.home_q[None], np.zeros(1, int), np.ones((1, 1), bool)
+    q, ids = scene.home_q[None], np.zeros(1, int)
     joints, keypoints, windows, said = [], [], [], []
     try:
-        senses.reset(ids, *rngs)
+        pipeline.reset(ids, *rngs)
         for frame in range(n_frames):
             motion = rows(motions, np.array([frame]))
             truth = worker_truth(body, motion)
-            estimate = senses.sense(Moment(ids, q, motion, truth, present), *rngs)
-            seen, looked = senses.looks(0)
+            estimate = pipeline.perceive(SensorInput(ids, q, motion), *rngs)
+            seen, looked = pipeline.last_detections(0)
             if seen is not None:
                 keypoints.append(rows(replace(seen, time_s=None), ids))
             joints.append(truth.joints_world[0, 0].copy())
@@ -88,7 +88,7 @@ def record(
             said.append(rows(estimate, ids))
             tick(1.0 / n_frames)
     finally:
-        senses.close()
+        pipeline.close()
     return Recording(
         scene, config.ctrl_dt, np.stack(joints), tuple(keypoints), tuple(windows), _beliefs(said)
     )

@@ -9,8 +9,8 @@ import numpy as np
 from hrc_env.core.records import Held, Roi, WorkerMotion
 from hrc_env.core.typing import Floats, Image, JointAngles
 from hrc_env.geometry.cameras import PinholeCamera
+from hrc_env.perception.faults.corruptions import spoil
 from hrc_env.perception.faults.fault import IMAGE
-from hrc_env.perception.faults.looks import spoil
 from hrc_env.perception.faults.schedule import Schedule
 
 BLUR_IMAGES = 5

@@ -6,8 +6,8 @@ import pytest
 from hrc_env.core.batching import mapped
 from hrc_env.core.records import Roi
 from hrc_env.perception.faults.camera_film import BLUR_IMAGES, CameraFilm, Shot
+from hrc_env.perception.faults.corruptions import spoil
 from hrc_env.perception.faults.fault import KINDS, FaultConfig
-from hrc_env.perception.faults.looks import spoil
 from hrc_env.perception.faults.schedule import Schedule
 from hrc_env.scene.rig import LAB_CAMERAS, pinholes
 from hrc_env.worker.body import load_body, rest_motion

@@ -19,9 +19,9 @@ from hrc_env.experiments.beyond.trial.tally import Played, Rows, joined, sums_of
 from hrc_env.experiments.beyond.trial.truth import matched, n_seeing
 from hrc_env.experiments.beyond.trial.walks import BODIES, Walks
 from hrc_env.experiments.study.shelf import Tick
-from hrc_env.pipeline.levels import make_senses
-from hrc_env.pipeline.sensor_input import Generators, Moment
-from hrc_env.pipeline.tracking import TrackingSenses
+from hrc_env.pipeline.levels import make_pipeline
+from hrc_env.pipeline.sensor_input import Generators, TrueSensorInput
+from hrc_env.pipeline.tracking import PoseTracking
 from hrc_env.scene.build import Scene, build
 from hrc_env.worker.body import worker_truth
 
@@ -30,7 +30,7 @@ DT_S = HRCConfig().ctrl_dt
 N_WARM_UP = round(WARM_UP_S / DT_S)
 INSIDE_95 = float(chi2.ppf(0.95, 3))
 """Squares of errors in units of their covariance are below this in 95 % of all cases."""
-Heard = Callable[[int, PoseEstimate, Points3, Moment], None]
+Heard = Callable[[int, PoseEstimate, Points3, TrueSensorInput], None]
 """Told the frame's number, what is believed, the true joints (B, W, J, 3) [m], the scene."""
 
 
@@ -75,7 +75,7 @@ def _episodes(
     errors, inside, lost, seeing = [], [], [], []
     scene = place_of(setting, turn)
 
-    def heard(frame: int, said: PoseEstimate, joints_world: Points3, now: Moment) -> None:
+    def heard(frame: int, said: PoseEstimate, joints_world: Points3, now: TrueSensorInput) -> None:
         if frame < N_WARM_UP:
             return
         order = matched(said.mean_world, said.tracked, joints_world)
@@ -104,33 +104,33 @@ def watch(
     Returns:
         (T) keypoints of every frame.
     """
-    senses = eyes_of(setting, turn, len(ids))
+    pipeline = eyes_of(setting, turn, len(ids))
     rngs: list[Generators] = [
         [np.random.default_rng([seeds[b], k]) for b in ids.tolist()] for k in (2, 3)
     ]
     everyone, present = np.arange(len(ids)), np.ones((len(ids), setting.n_workers), bool)
-    senses.reset(everyone, *rngs)
+    pipeline.reset(everyone, *rngs)
     shown, q, lengths = [], walks.q[ids], None
     for frame, motion in enumerate(walks.motions):
         here = rows(motion, ids)
         truth = worker_truth(walks.bodies, here)
         if lengths is None:
             lengths = lengths_m(truth.joints_world)
-        handicap(senses.state, setting.bones, setting.motion, lengths)
-        now = Moment(everyone, q, here, truth, present)
-        heard(frame, senses.sense(now, *rngs), truth.joints_world, now)
-        shown.append(senses.keypoints)
-    senses.close()
+        handicap(pipeline.state, setting.bones, setting.motion, lengths)
+        now = TrueSensorInput(everyone, q, here, truth, present)
+        heard(frame, pipeline.perceive(now, *rngs), truth.joints_world, now)
+        shown.append(pipeline.keypoints)
+    pipeline.close()
     return shown
 
 
-def eyes_of(setting: Setting, turn: Turn, batch: int) -> TrackingSenses:
+def eyes_of(setting: Setting, turn: Turn, batch: int) -> PoseTracking:
     """The emulator and the estimator of a setting, for so many episodes."""
     config = HRCConfig(worker=BODIES, tracker=setting.tracker, faults=turn.faults)
-    senses: Any = make_senses(LEVEL, setting.estimator, place_of(setting, turn), batch, config)
-    if not isinstance(senses, TrackingSenses):
+    pipeline: Any = make_pipeline(LEVEL, setting.estimator, place_of(setting, turn), batch, config)
+    if not isinstance(pipeline, PoseTracking):
         raise ConfigError(f"Level {LEVEL!r} must have cameras and a tracker; it has none.")
-    return senses
+    return pipeline
 
 
 def place_of(setting: Setting, turn: Turn) -> Scene:

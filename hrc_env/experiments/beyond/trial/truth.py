@@ -8,7 +8,7 @@ from hrc_env.core.typing import Bools, Ints, Points3
 from hrc_env.experiments.beyond.trial.setting import Turn
 from hrc_env.perception.emulator import lines_of_sight
 from hrc_env.perception.sightlines import SEEN
-from hrc_env.pipeline.sensor_input import Moment
+from hrc_env.pipeline.sensor_input import TrueSensorInput
 from hrc_env.scene.build import Scene
 
 
@@ -28,7 +28,7 @@ def matched(mean_world: Points3, tracked: Bools, joints_world: Points3) -> Ints:
     return orders[totals.argmin(1)]
 
 
-def n_seeing(now: Moment, scene: Scene, turn: Turn) -> Ints:
+def n_seeing(now: TrueSensorInput, scene: Scene, turn: Turn) -> Ints:
     """(B, W, J) cameras that have a free line of sight to each joint and are not lost for good."""
     surroundings = scene.surroundings(now.q, now.motion.held)
     sight, _ = lines_of_sight(now.truth, surroundings, scene.cameras)

@@ -10,7 +10,7 @@ from hrc_env.core.records import WorkerMotion
 from hrc_env.core.typing import JointAngles
 from hrc_env.motion import generator
 from hrc_env.scene.build import build
-from hrc_env.worker.body import Bodies, pool, stack
+from hrc_env.worker.body import Body, pool, stack
 
 BODIES = "any"
 """Every episode gives each worker one of the baked bodies."""
@@ -20,7 +20,7 @@ BODIES = "any"
 class Walks:
     """Episodes of the same length, side by side."""
 
-    bodies: Bodies
+    bodies: Body
     motions: tuple[WorkerMotion, ...]
     """(T) records of arrays (B, W, ...), a control step apart; the first is the beginning."""
     q: JointAngles

@@ -1,21 +1,20 @@
 """Any file of motion capture to a `Capture`."""
 
+import zipfile
 from pathlib import Path
 
 import numpy as np
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.skeleton import JOINTS
+from hrc_env.core.skeleton import JOINTS, N_JOINTS
 from hrc_env.core.typing import Points3
-from hrc_env.motion.capture import repair
-from hrc_env.motion.capture.acclaim import read_acclaim
-from hrc_env.motion.capture.bvh import read_bvh
-from hrc_env.motion.capture.face import joints_of
-from hrc_env.motion.capture.markers import read_joints
-from hrc_env.motion.capture.names import find_joints
-from hrc_env.motion.capture.person import check_person
-from hrc_env.motion.capture.record import Capture, check_rate
-from hrc_env.motion.capture.series import resampled
+from hrc_env.mocap.acclaim import read_acclaim
+from hrc_env.mocap.bvh import read_bvh
+from hrc_env.mocap.person import resampled
+from hrc_env.mocap.record import FEWEST_FRAMES, Capture
+from hrc_env.mocap.repair import mended
+from hrc_env.mocap.skeleton import find_joints, joints_of
+from hrc_env.motion.clip import check_rate
 
 SUFFIXES = (".bvh", ".amc", ".npz")
 CMU_HZ = 120.0
@@ -25,11 +24,9 @@ LEAST_S = 0.5
 
 
 def read_capture(
-    path: Path,
-    fps: float | None = None,
-    source_fps: float | None = None,
+    path: Path, fps: float | None = None, source_fps: float | None = None,
     skeleton: Path | None = None,
-) -> Capture:
+) -> Capture:  # fmt: skip
     """Read, mend and resample a recording.
 
     Args:
@@ -48,7 +45,7 @@ def read_capture(
     elif np.isnan(rate_hz):
         rate_hz, repaired = CMU_HZ, (*repaired, f"No frame rate: taken to be {CMU_HZ:g} Hz.")
     check_rate(rate_hz, source)
-    joints, notes = _mended(joints, rate_hz, source)
+    joints, notes = mended(joints, rate_hz, source)
     if (len(joints) - 1) / rate_hz < LEAST_S:
         raise ConfigError(
             f"{source}: {(len(joints) - 1) / rate_hz:.2f} s of motion; {LEAST_S} s is the least."
@@ -69,7 +66,7 @@ def _read(
         raise ConfigError(f"{path} is no file.")
     suffix = path.suffix.lower()
     if suffix == ".npz":
-        joints, rate_hz = read_joints(path)
+        joints, rate_hz = _read_joints(path)
         return joints, rate_hz, True, JOINTS, ()
     if suffix == ".bvh":
         moving = read_bvh(path)
@@ -85,13 +82,27 @@ def _read(
     return joints_of(moving, found, head), moving.fps, False, named, moving.repaired
 
 
-def _mended(joints: Points3, fps: float, source: str) -> tuple[Points3, tuple[str, ...]]:
-    """Whole, in metres, upright, not mirrored, without a rest pose, on the floor."""
-    joints, gaps = repair.fill_gaps(joints, fps, source)
-    joints, unit = repair.in_metres(joints, source)
-    first, rest = repair.without_rest_pose(joints)
-    joints, turned = repair.z_up(joints[first:], source)
-    joints, mirrored = repair.unmirrored(joints, source)
-    joints, floor = repair.on_floor(joints)
-    check_person(joints, source)
-    return joints, (*gaps, *unit, *rest, *turned, *mirrored, *floor)
+def _read_joints(path: Path) -> tuple[Points3, float]:
+    """Joints (T, 15, 3) in any unit, missing ones NaN, and frames a second, of an npz file."""
+    wanted = ("joints", "fps")
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            names = tuple(file.files)
+            arrays = {name: np.asarray(file[name], float) for name in names if name in wanted}
+    except (zipfile.BadZipFile, ValueError, EOFError, OSError, KeyError) as error:
+        raise ConfigError(f"{path.name} is cut off or no npz file: {error}.") from None
+    missing = [name for name in wanted if name not in arrays]
+    if missing:
+        raise ConfigError(
+            f"{path.name}: expected arrays joints (T, {N_JOINTS}, 3) and fps, "
+            f"found {', '.join(names) or 'none'}; missing {', '.join(missing)}."
+        )
+    joints, fps = arrays["joints"], arrays["fps"]
+    if joints.ndim != 3 or joints.shape[1:] != (N_JOINTS, 3) or len(joints) < FEWEST_FRAMES:
+        raise ConfigError(
+            f"{path.name}: joints must be (T >= {FEWEST_FRAMES}, {N_JOINTS}, 3), one row each of "
+            f"{', '.join(JOINTS)}; got {joints.shape}."
+        )
+    if fps.size != 1:
+        raise ConfigError(f"{path.name}: fps must be one number, got shape {fps.shape}.")
+    return np.where(np.isfinite(joints), joints, np.nan), float(fps.reshape(-1)[0])

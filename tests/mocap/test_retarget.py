@@ -7,13 +7,12 @@ import pytest
 from written import BODY, write_bvh
 
 from hrc_env.core.errors import ConfigError
+from hrc_env.mocap.poses import joints_in, marks_of, segments_in
+from hrc_env.mocap.read import read_capture
+from hrc_env.mocap.retarget import aligned_errors, retarget
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import LEG, anatomy
-from hrc_env.motion.capture.clip import fitted_to, load_clip, save_clip
-from hrc_env.motion.capture.marks import joints_in, marks_of
-from hrc_env.motion.capture.read import read_capture
-from hrc_env.motion.capture.retarget import aligned_errors, retarget
-from hrc_env.motion.capture.segments import segments_in
+from hrc_env.motion.clip import fitted_to, load_clip, save_clip
 from hrc_env.worker.body import SEGMENT, load_body, worker_names
 
 

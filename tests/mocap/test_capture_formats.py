@@ -11,9 +11,9 @@ from written import ORDERS, Y_UP, angles_of, cmu_name, write_acclaim, write_bvh
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import JOINTS
 from hrc_env.geometry.rotations import about_axis
-from hrc_env.motion.capture.bvh import read_bvh
-from hrc_env.motion.capture.names import HEAD, SIDED
-from hrc_env.motion.capture.read import read_capture
+from hrc_env.mocap.bvh import read_bvh
+from hrc_env.mocap.read import read_capture
+from hrc_env.mocap.skeleton import HEAD, SIDED
 
 KNOWN = [j for j, joint in enumerate(JOINTS) if not joint.endswith(("nose", "foot"))]
 
@@ -182,6 +182,6 @@ def test_an_npz_file_of_another_shape_is_refused_with_the_right_one(work, tmp_pa
 
 
 def test_the_page_has_every_name_that_is_understood():
-    page = (Path(__file__).parents[3] / "docs" / "motion_capture.md").read_text()
+    page = (Path(__file__).parents[2] / "docs" / "motion_capture.md").read_text()
     for names in (*SIDED.values(), HEAD):
         assert f"| {', '.join(names)} |" in page

@@ -1,6 +1,6 @@
 """The project's own motion in other people's formats, with as many of their traps as wished.
 
-python tests/motion/capture/written.py FOLDER   writes a walk in all of them
+python tests/mocap/written.py FOLDER   writes a walk in all of them
 """
 
 import itertools
@@ -11,7 +11,7 @@ import numpy as np
 
 from hrc_env.core.records import WorkerMotion
 from hrc_env.geometry.rotations import about_axis, matrix_from_quaternion
-from hrc_env.motion.capture.marks import marks_of
+from hrc_env.mocap.poses import marks_of
 from hrc_env.worker.body import PARENT, SEGMENT, SEGMENTS, load_body, worker_truth
 
 AXES = "xyz"

@@ -1,4 +1,4 @@
-"""The 15 joints of a body in any pose of the control vector."""
+"""Joints and segments of a body in any pose of the control vector."""
 
 from dataclasses import dataclass
 
@@ -6,10 +6,10 @@ import numpy as np
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.skeleton import JOINTS
-from hrc_env.core.typing import Floats, Ints, Points3
+from hrc_env.core.typing import Floats, Ints, Points3, QuaternionsWxyz
 from hrc_env.motion.anatomy import Anatomy, anatomy
-from hrc_env.motion.kinematics import N_FRAMES, N_POINTS, pose
-from hrc_env.worker.body import SEGMENT, Body
+from hrc_env.motion.kinematics import N_FRAMES, N_POINTS, pose, quaternion
+from hrc_env.worker.body import N_SEGMENTS, SEGMENT, Body
 
 STARTS = {
     "shoulder": "upper_arm", "elbow": "forearm", "wrist": "hand",
@@ -42,33 +42,38 @@ def marks_of(body: Body, landmarks: bool) -> Marks:
             side, _, part = joint.partition("_")
             if part in STARTS:
                 segment[j], offset[j] = SEGMENT[f"{side}_{STARTS[part]}"], 0.0
-    rest = body.rest_position[segment] + offset
-    return Marks(anatomy(body), segment, offset, rest)
+    return Marks(anatomy(body), segment, offset, body.rest_position[segment] + offset)
 
 
 def joints_in(q: Floats, marks: Marks) -> Points3:
     """(N, 15, 3) joints of poses (N, N_CONTROLS)."""
-    out = np.empty((len(q), len(marks.segment), 3))
-    bones = marks.anatomy
-    _joints(
-        np.ascontiguousarray(q), bones.offset, bones.frame, bones.size,
-        marks.segment, marks.offset, out,
-    )  # fmt: skip
-    return out
+    position, _, turn = _posed(q, marks.anatomy)
+    arm = turn[:, marks.segment] @ marks.offset[..., None]
+    return position[:, marks.segment] + arm[..., 0]
+
+
+def segments_in(controls: Floats, anatomy: Anatomy) -> tuple[Points3, QuaternionsWxyz]:
+    """Origins (T, 22, 3) [m] and turns (T, 22, 4) of control vectors (T, N_CONTROLS)."""
+    return _posed(controls, anatomy)[:2]
+
+
+def _posed(q: Floats, bones: Anatomy) -> tuple[Points3, QuaternionsWxyz, Floats]:
+    position, turn = np.empty((len(q), N_SEGMENTS, 3)), np.empty((len(q), N_SEGMENTS, 4))
+    matrix = np.empty((len(q), N_SEGMENTS, 3, 3))
+    controls = np.ascontiguousarray(q)
+    _pose_each(controls, bones.offset, bones.frame, bones.size, position, turn, matrix)
+    return position, turn, matrix
 
 
 @kernel(makes_arrays=True)
-def _joints(
-    q: Floats, bones: Floats, frame: Floats, size: Floats, segment: Ints, offset: Floats,
-    out: Floats,
+def _pose_each(
+    q: Floats, bones: Floats, frame: Floats, size: Floats, position: Floats, turn: Floats,
+    matrix: Floats,
 ) -> None:  # fmt: skip
-    """Joints of one pose after the other."""
+    """One pose after the other."""
     p, r = np.zeros((N_POINTS, 3)), np.zeros((N_FRAMES, 3, 3))
     for n in range(q.shape[0]):
         pose(q[n], bones, frame, size, p, r)
-        for j in range(segment.shape[0]):
-            s = segment[j]
-            for i in range(3):
-                out[n, j, i] = p[s, i]
-                for k in range(3):
-                    out[n, j, i] += r[s, i, k] * offset[j, k]
+        position[n], matrix[n] = p[:N_SEGMENTS], r[:N_SEGMENTS]
+        for s in range(N_SEGMENTS):
+            quaternion(r, s, turn[n])

@@ -5,12 +5,14 @@ from pathlib import Path
 
 import numpy as np
 
+from hrc_env.core.errors import ConfigError
 from hrc_env.core.typing import Floats, Rotations
 from hrc_env.geometry.rotations import about_axis
-from hrc_env.motion.capture.record import Moving, forward
-from hrc_env.motion.capture.rows import Rows, number, numbers_of, usable_frames
+from hrc_env.mocap.record import FEWEST_FRAMES, Moving, Rows, forward
 
 CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "xyz")
+LEAST_SHARE = 0.5
+"""A file with less than this share of the frames it announces is refused; judgement."""
 
 
 @dataclass(slots=True)
@@ -24,19 +26,16 @@ class _Tree:
 
 
 def read_bvh(path: Path) -> Moving:
-    """A BVH file's skeleton over time.
-
-    Raises:
-        ConfigError: no BVH, cut off within the skeleton, or with too few of its frames.
-    """
+    """A BVH file's skeleton over time; `ConfigError` where it is none, or cut off too early."""
     rows = Rows(path)
     tree = _read_tree(rows)
-    frames, seconds = _read_timing(rows)
-    width = sum(map(len, tree.channels))
-    values, repaired = usable_frames(numbers_of(rows, width), frames, path.name)
-    offset, turned = _moved(tree, values)
+    count, step = rows.next("Frames:"), rows.next("Frame Time:")
+    if count[0].lower() != "frames:" or [w.lower() for w in step[:2]] != ["frame", "time:"]:
+        raise rows.wrong('expected "Frames: N" and "Frame Time: seconds" after MOTION')
+    announced, seconds = rows.numbers([count[-1], step[-1]])
+    values, repaired = _frames(rows, sum(map(len, tree.channels)), int(announced))
     parent = np.array(tree.parent)
-    position, rotation = forward(parent, offset, turned)
+    position, rotation = forward(parent, *_moved(tree, values))
     still = np.broadcast_to(np.eye(3), (1, len(parent), 3, 3))
     rest, _ = forward(parent, np.array(tree.offset)[None], still)
     fps = round(1.0 / seconds, 2) if seconds > 0.0 else 0.0  # 0.033333 s is 30 Hz
@@ -47,7 +46,7 @@ def _read_tree(rows: Rows) -> _Tree:
     """Everything before MOTION."""
     if rows.next("HIERARCHY")[0].upper() != "HIERARCHY":
         raise rows.wrong("a BVH file begins with the word HIERARCHY")
-    tree, open_nodes, node = _Tree(), [], -1
+    tree, open_nodes = _Tree(), list[int]()
     while True:
         words = rows.next("the skeleton")
         word = words[0].upper()
@@ -58,14 +57,13 @@ def _read_tree(rows: Rows) -> _Tree:
             tree.parent.append(above)
             tree.offset.append([0.0, 0.0, 0.0])
             tree.channels.append([])
-            node = len(tree.names) - 1
             words = words[-1:] if words[-1] == "{" else [""]
         if words[0] == "{":
-            open_nodes.append(node)
+            open_nodes.append(len(tree.names) - 1)
         elif word == "}" and open_nodes:
             open_nodes.pop()
         elif word == "OFFSET" and open_nodes:
-            tree.offset[open_nodes[-1]] = [number(w, rows) for w in words[1:4]]
+            tree.offset[open_nodes[-1]] = rows.numbers(words[1:4])
         elif word == "CHANNELS" and open_nodes:
             tree.channels[open_nodes[-1]] = _channels(words, rows)
         elif word == "MOTION" and tree.names and not open_nodes:
@@ -82,12 +80,31 @@ def _channels(words: list[str], rows: Rows) -> list[str]:
     return named
 
 
-def _read_timing(rows: Rows) -> tuple[int, float]:
-    """How many frames the file says it has, and the seconds between two."""
-    count, step = rows.next("Frames:"), rows.next("Frame Time:")
-    if count[0].lower() != "frames:" or [w.lower() for w in step[:2]] != ["frame", "time:"]:
-        raise rows.wrong('expected "Frames: N" and "Frame Time: seconds" after MOTION')
-    return int(number(count[-1], rows)), number(step[-1], rows)
+def _frames(rows: Rows, width: int, announced: int) -> tuple[Floats, tuple[str, ...]]:
+    """(T, width) the numbers of the frames, an incomplete last line left out; what was mended."""
+    first, lines = rows.at, list(rows.rest())
+    if lines and len(lines[-1]) < width:
+        lines.pop()
+    for k, words in enumerate(lines):
+        if len(words) != width:
+            raise ConfigError(
+                f"{rows.source}: a frame has {width} numbers, one a channel; "
+                f"frame {k + 1} (about line {first + k + 1}) has {len(words)}."
+            )
+    try:
+        values = np.array(lines, dtype=float).reshape(len(lines), width)
+    except ValueError as error:
+        raise ConfigError(f"{rows.source}: expected numbers in its frames; {error}.") from None
+    there = len(values)
+    if there < max(FEWEST_FRAMES, LEAST_SHARE * announced):
+        raise ConfigError(
+            f"{rows.source} is cut off: it announces {announced} frames, {there} are there."
+        )
+    if there == announced:
+        return values, ()
+    kept = min(there, announced) if announced >= FEWEST_FRAMES else there
+    told = f"{announced} frames are announced, {there} are there: {kept} are used."
+    return values[:kept], (told,)
 
 
 def _moved(tree: _Tree, values: Floats) -> tuple[Floats, Rotations]:
@@ -95,27 +112,17 @@ def _moved(tree: _Tree, values: Floats) -> tuple[Floats, Rotations]:
     offset = np.repeat(np.array(tree.offset)[None], len(values), axis=0)
     rotation = np.empty((*offset.shape[:2], 3, 3))
     rotation[:] = np.eye(3)
-    column = 0
+    columns = iter(values.T)
     for node, channels in enumerate(tree.channels):
-        given = np.zeros((len(values), 3))
+        placed = np.zeros((len(values), 3))
         for channel in channels:
-            axis = channel[0]
             if channel.endswith("position"):
-                given[:, "xyz".index(axis)] = values[:, column]
+                placed[:, "xyz".index(channel[0])] = next(columns)
             else:
-                turn = about_axis(axis, np.radians(values[:, column]))
+                turn = about_axis(channel[0], np.radians(next(columns)))
                 rotation[:, node] = rotation[:, node] @ turn
-            column += 1
         if any(channel.endswith("position") for channel in channels):
-            offset[:, node] = _placed(offset[0, node], given)
+            # Most programs write the place itself, some what is to be added to OFFSET: small then.
+            usual, own = np.linalg.norm(np.nanmedian(placed, axis=0)), offset[0, node].copy()
+            offset[:, node] = placed + own if usual < 0.5 * np.linalg.norm(own) else placed
     return offset, rotation
-
-
-def _placed(offset: Floats, given: Floats) -> Floats:
-    """(T, 3) where position channels put a node.
-
-    Most programs write the place itself, some what is to be added to OFFSET; then the numbers
-    are small beside it.
-    """
-    added = np.linalg.norm(np.nanmedian(given, axis=0)) < 0.5 * np.linalg.norm(offset)
-    return given + offset if added else given

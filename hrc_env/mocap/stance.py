@@ -8,12 +8,12 @@ is set to one place then, and what that changes fades out in the swings before a
 import numpy as np
 
 from hrc_env.core.typing import Bools, Floats
+from hrc_env.mocap.person import runs, smoothed
+from hrc_env.mocap.poses import segments_in
 from hrc_env.motion import controls as c
-from hrc_env.motion.anatomy import ANKLE_Z, BALL_X, BALL_Z, HEEL_X, Anatomy
-from hrc_env.motion.capture.segments import segments_in
-from hrc_env.motion.capture.series import runs, smoothed
+from hrc_env.motion.anatomy import ANKLE_Z, Anatomy
+from hrc_env.motion.clip import footprints, rolled
 from hrc_env.motion.curves import decay
-from hrc_env.motion.feet import about
 from hrc_env.worker.body import SEGMENT
 
 RESTS_M_S = 0.2
@@ -39,7 +39,7 @@ def locked(q: Floats, fps: float, size: Floats) -> tuple[Floats, Bools]:
         stances = _stances(footprint, fps)
         cleaned = footprint + _corrections(footprint, stances, fps, size[ANKLE_Z])
         cleaned[:, 2] = np.maximum(cleaned[:, 2], size[ANKLE_Z])
-        out[:, at : at + 3] = cleaned[:, :3] + _roll(cleaned[:, 3], q[:, at + 4], size)
+        out[:, at : at + 3] = cleaned[:, :3] + rolled(cleaned[:, 3], q[:, at + 4], size)
         out[:, at + 3] = cleaned[:, 3]
         for first, last in stances:
             stands[first:last, side] = True
@@ -63,28 +63,6 @@ def slip(q: Floats, stands: Bools, fps: float, anatomy: Anatomy) -> Floats:
         speed = np.linalg.norm(np.diff(ball, axis=0), axis=-1) * fps
         speeds.append(speed[on[1:] & on[:-1]])
     return np.concatenate(speeds)
-
-
-def footprints(feet: Floats, size: Floats) -> Floats:
-    """(T, 4) where ankles x, y, z would be if their feet were flat, and the feet's headings.
-
-    Args:
-        feet: (T, 5 or more) ankle x, y, z, heading and pitch of a foot.
-        size: `Anatomy.size`.
-    """
-    flat = feet[:, :3] - _roll(feet[:, 3], feet[:, 4], size)
-    return np.concatenate([flat, feet[:, 3:4]], axis=1)
-
-
-def _roll(yaw: Floats, pitch: Floats, size: Floats) -> Floats:
-    """(T, 3) how far a foot's pitch takes its ankle: heel up round the ball, toes up round the
-    heel."""
-    moved = [
-        about(p, size[BALL_X], size[BALL_Z]) if p > 0.0 else about(p, size[HEEL_X], -size[ANKLE_Z])
-        for p in pitch.tolist()
-    ]
-    ahead, above = np.array(moved).T
-    return np.stack([np.cos(yaw) * ahead, np.sin(yaw) * ahead, above], -1)
 
 
 def _stances(footprint: Floats, fps: float) -> list[tuple[int, int]]:

@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import JOINT, MIRROR
 from hrc_env.geometry.rotations import about_axis
-from hrc_env.motion.capture import repair
-from hrc_env.motion.capture.read import read_capture
-from hrc_env.motion.capture.series import resampled, smoothed
+from hrc_env.mocap import repair
+from hrc_env.mocap.person import resampled, smoothed
+from hrc_env.mocap.read import read_capture
 
 UPS = {
     "+y": about_axis("x", -np.pi / 2), "-y": about_axis("x", np.pi / 2),

@@ -1,7 +1,6 @@
 """What goes wrong in files of motion capture, mended where it can be told, refused where not.
 
-Every function takes joints (T, 15, 3) and returns them with a sentence for each thing that it
-changed; a file's trouble is always one of the same few.
+Functions take joints (T, 15, 3) and return them with a sentence for each thing that they changed.
 """
 
 import numpy as np
@@ -10,9 +9,10 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import JOINT, JOINTS
 from hrc_env.core.typing import Bools, Floats, Points3
 from hrc_env.geometry.rotations import about_axis
-from hrc_env.motion.capture.person import STATURES_M, forwards, stature, upright
-from hrc_env.motion.capture.series import bridged, runs
+from hrc_env.mocap.person import across, check_person, length, middle, runs, stature
 
+STATURES_M = (1.3, 2.2)
+"""Statures of people who are believed [m]."""
 UNITS: dict[str, float] = {
     "metres": 1.0,
     "units of 1/0.45 inch (CMU)": 0.0254 / 0.45,
@@ -41,12 +41,20 @@ JUMP_M = 0.03
 Mended = tuple[Points3, tuple[str, ...]]
 
 
-def fill_gaps(joints: Points3, fps: float, source: str) -> Mended:
-    """Joints that are missing (NaN) for a short time, on straight lines.
+def mended(joints: Points3, fps: float, source: str) -> Mended:
+    """Whole, in metres, upright, not mirrored, without a rest pose, on the floor."""
+    joints, gaps = fill_gaps(joints, fps, source)
+    joints, unit = in_metres(joints, source)
+    first, rest = without_rest_pose(joints)
+    joints, turned = z_up(joints[first:], source)
+    joints, mirrored = unmirrored(joints, source)
+    joints, floor = on_floor(joints)
+    check_person(joints, source)
+    return joints, (*gaps, *unit, *rest, *turned, *mirrored, *floor)
 
-    Raises:
-        ConfigError: a joint is missing for longer than LONGEST_GAP_S.
-    """
+
+def fill_gaps(joints: Points3, fps: float, source: str) -> Mended:
+    """Joints that are missing (NaN) for a short time, on straight lines."""
     filled, told = joints.copy(), []
     for j, joint in enumerate(JOINTS):
         known: Bools = ~np.isnan(joints[:, j].sum(-1))
@@ -59,17 +67,15 @@ def fill_gaps(joints: Points3, fps: float, source: str) -> Mended:
                 f"{source}: {joint} is missing for {(last - first) / fps:.2f} s from frame "
                 f"{first}; gaps of up to {LONGEST_GAP_S} s are filled. Cut the clip there."
             )
-        filled[:, j] = bridged(joints[:, j], known)
+        at = np.flatnonzero(known)
+        for i in range(3):
+            filled[:, j, i] = np.interp(np.arange(len(joints)), at, joints[at, j, i])
         told.append(f"{joint} ({np.sum(~known)} frames)")
     return filled, (f"Missing joints were filled in: {', '.join(told)}.",) if told else ()
 
 
 def in_metres(joints: Points3, source: str) -> Mended:
-    """The joints in metres, by the person's stature.
-
-    Raises:
-        ConfigError: in no known unit is it a person's.
-    """
+    """The joints in metres, by the person's stature."""
     tall = stature(joints)
     for name, unit_m in UNITS.items():
         if STATURES_M[0] < tall * unit_m < STATURES_M[1]:
@@ -82,12 +88,9 @@ def in_metres(joints: Points3, source: str) -> Mended:
 
 
 def z_up(joints: Points3, source: str) -> Mended:
-    """The joints turned so that the person stands along +z.
-
-    Raises:
-        ConfigError: they lie or stand aslant for most of the time, so that nothing tells.
-    """
-    up = upright(joints)
+    """The joints turned so that the person stands along +z."""
+    way = middle(joints, "shoulder") - middle(joints, "ankle")
+    up = np.nanmean(way / np.linalg.norm(way, axis=-1, keepdims=True), axis=0)
     axis = int(np.argmax(np.abs(up)))
     if abs(up[axis]) < STEADY:
         raise ConfigError(
@@ -111,12 +114,8 @@ def _to_z(axis: int, positive: bool) -> Floats:
 
 
 def unmirrored(joints: Points3, source: str) -> Mended:
-    """The joints of a person, where two axes (or left and right) had been exchanged.
-
-    Raises:
-        ConfigError: feet point forward and knees bend backward, or the other way round.
-    """
-    feet, knees = forwards(joints, np.array([0.0, 0.0, 1.0]))
+    """The joints of a person, where two axes (or left and right) had been exchanged."""
+    feet, knees = _forwards(joints)
     if feet > 0.0 and knees > -KNEES:
         return joints, ()
     if feet < 0.0 and knees < KNEES:
@@ -127,6 +126,20 @@ def unmirrored(joints: Points3, source: str) -> Mended:
         f"{'for' if knees > 0 else 'back'}ward: left and right are exchanged in some joints only. "
         "Exchange them in shoulders, hips, knees, ankles and feet alike."
     )
+
+
+def _forwards(joints: Points3) -> tuple[float, float]:
+    """How far feet point, and knees bend, to where left-hand and up say that forward is.
+
+    In shares of the bones: positive for a person, negative for their mirror image.
+    """
+    ahead = np.cross(across(joints, "hip") + across(joints, "shoulder"), np.array([0.0, 0.0, 1.0]))
+    ahead /= np.linalg.norm(ahead, axis=-1, keepdims=True)
+    foot = middle(joints, "foot") - middle(joints, "ankle")
+    feet = (foot * ahead).sum(-1) / np.linalg.norm(foot, axis=-1)
+    bent = middle(joints, "knee") - 0.5 * (middle(joints, "hip") + middle(joints, "ankle"))
+    knees = (bent * ahead).sum(-1) / length(joints, "knee", "ankle")
+    return float(np.nanmedian(feet)), float(np.nanmean(knees))
 
 
 def without_rest_pose(joints: Points3) -> tuple[int, tuple[str, ...]]:

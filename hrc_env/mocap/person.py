@@ -1,15 +1,14 @@
-"""Measures of a recorded person, by which a file's unit and its faults are known."""
+"""Measures of a recorded person, by which a file's unit and its faults are known; smoothing."""
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import BONE_LENGTH_M, BONES, JOINT, JOINTS
-from hrc_env.core.typing import Floats, Points3
+from hrc_env.core.typing import Bools, Floats, Points3
 
 MEASURED_SHARE = 0.755
 """Shank, thigh and trunk together as a share of stature (the baked bodies)."""
-STATURES_M = (1.3, 2.2)
-"""Statures of people who are believed [m]."""
 STRANGE = 2.0
 """A bone so many times longer or shorter than of an adult of the same stature is a mistake."""
 
@@ -40,33 +39,8 @@ def stature(joints: Points3) -> float:
     return (legs + float(np.nanmedian(trunk))) / MEASURED_SHARE
 
 
-def upright(joints: Points3) -> Floats:
-    """(3,) mean direction from the ankles to the shoulders; its length tells how steadily."""
-    way = middle(joints, "shoulder") - middle(joints, "ankle")
-    return np.nanmean(way / np.linalg.norm(way, axis=-1, keepdims=True), axis=0)
-
-
-def forwards(joints: Points3, up: Floats) -> tuple[float, float]:
-    """How far feet point, and knees bend, to where left-hand and up say that forward is.
-
-    Both are medians in shares of the bones: positive for a person, negative for their mirror
-    image.
-    """
-    ahead = np.cross(across(joints, "hip") + across(joints, "shoulder"), up)
-    ahead /= np.linalg.norm(ahead, axis=-1, keepdims=True)
-    foot = middle(joints, "foot") - middle(joints, "ankle")
-    feet = (foot * ahead).sum(-1) / np.linalg.norm(foot, axis=-1)
-    bent = middle(joints, "knee") - 0.5 * (middle(joints, "hip") + middle(joints, "ankle"))
-    knees = (bent * ahead).sum(-1) / length(joints, "knee", "ankle")
-    return float(np.nanmedian(feet)), float(np.nanmean(knees))
-
-
 def check_person(joints: Points3, source: str) -> None:
-    """Refuse what has a person's stature but no person's bones.
-
-    Raises:
-        ConfigError: a bone is far too long or short; names it.
-    """
+    """Refuse what has a person's stature but no person's bones; names the bone."""
     tall = stature(joints) / 1.75
     for (first, second), usual_m in zip(BONES, BONE_LENGTH_M, strict=True):
         got_m = float(np.median(np.linalg.norm(joints[:, first] - joints[:, second], axis=-1)))
@@ -77,3 +51,29 @@ def check_person(joints: Points3, source: str) -> None:
                 f"apart, about {usual_m:.2f} m expected. Are the joints in the order "
                 f"{', '.join(JOINTS)}?"
             )
+
+
+def smoothed(values: Floats, sigma_frames: float) -> Floats:
+    """(T, ...) averaged over time with a bell-shaped weight; the ends are held."""
+    radius = int(np.ceil(3.0 * sigma_frames))
+    if radius < 1:
+        return values.copy()
+    return gaussian_filter1d(values, sigma_frames, axis=0, mode="nearest", radius=radius)
+
+
+def resampled(values: Floats, fps: float, wished_fps: float) -> Floats:
+    """(T, ...) at another rate, by Catmull-Rom splines; smoothed first where frames are lost."""
+    if wished_fps < fps:
+        values = smoothed(values, 0.4 * fps / wished_fps)
+    n = int(np.floor((len(values) - 1) * wished_fps / fps + 1e-6)) + 1
+    at = np.minimum(np.arange(n) * fps / wished_fps, len(values) - 1.0)
+    whole = np.minimum(at.astype(int), len(values) - 2)
+    u = (at - whole).reshape(-1, *[1] * (values.ndim - 1))
+    a, b, c, d = (values[np.clip(whole + k, 0, len(values) - 1)] for k in (-1, 0, 1, 2))
+    return b + 0.5 * u * (c - a + u * (2 * a - 5 * b + 4 * c - d + u * (3 * (b - c) + d - a)))
+
+
+def runs(flag: Bools) -> list[tuple[int, int]]:
+    """(first, one past the last) of each unbroken run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flag, [False]])))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))

@@ -10,14 +10,16 @@ import numpy as np
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.motion import controls as c
-from hrc_env.motion.anatomy import ANKLE_Z, ARM, LEG, N_SIZES, STAND_Z
-from hrc_env.motion.capture.record import check_rate
+from hrc_env.motion.anatomy import ANKLE_Z, ARM, BALL_X, BALL_Z, HEEL_X, LEG, N_SIZES, STAND_Z
+from hrc_env.motion.feet import about
 
 VERSION = 1
 """Of the file; raised when its columns or fields change."""
 RECORDED = np.array([*range(c.N_BLENDED), *range(c.ANKLE, c.ANKLE + 12)])
 """(32,) columns of the control vector that a recording fills, in the file's order: root, pelvis,
 spine, head, elbows, hands from their shoulders; both feet."""
+SLOWEST_HZ, FASTEST_HZ = 5.0, 1000.0
+"""Frame rates between which a recording is believed; judgement: below, a step is lost."""
 FARTHEST_M, FASTEST_M_S = 200.0, 15.0
 """Clips whose root goes beyond these are damaged; judgement."""
 
@@ -97,11 +99,7 @@ def save_clip(clip: Clip, path: Path) -> None:
 
 
 def load_clip(path: Path) -> Clip:
-    """Read a clip.
-
-    Raises:
-        ConfigError: no clip, one of another version, or damaged.
-    """
+    """Read a clip; `ConfigError` where it is none, damaged or of another version."""
     names = {item.name for item in fields(Clip)}
     try:
         with np.load(path, allow_pickle=False) as file:
@@ -129,20 +127,21 @@ def load_clip(path: Path) -> Clip:
 
 
 def opened(motion: str | Path | Clip) -> Clip:
-    """A clip, or the one at a path.
-
-    Raises:
-        ConfigError: as `load_clip`.
-    """
+    """A clip, or the one at a path."""
     return motion if isinstance(motion, Clip) else load_clip(Path(motion))
 
 
-def _check(clip: Clip) -> None:
-    """Refuse a clip that cannot be played.
+def check_rate(fps: float, source: str) -> None:
+    """Refuse a frame rate that cannot be."""
+    if not SLOWEST_HZ <= fps <= FASTEST_HZ:
+        raise ConfigError(
+            f"{source}: a frame rate between {SLOWEST_HZ:g} and {FASTEST_HZ:g} frames a second is "
+            f"expected, the file has {fps:g}. If you know the true one, give it (--source-fps)."
+        )
 
-    Raises:
-        ConfigError: shapes, numbers or speeds that no recording has.
-    """
+
+def _check(clip: Clip) -> None:
+    """Refuse shapes, numbers or speeds that no recording has."""
     q, source = clip.controls, clip.source
     check_rate(clip.fps, source)
     expected = {"contacts": (len(q), 2), "size": (N_SIZES,)}
@@ -160,3 +159,23 @@ def _check(clip: Clip) -> None:
             f"{source}: the root goes {np.abs(root).max():.0f} m far at up to {speed:.0f} m/s; "
             f"at most {FARTHEST_M:g} m and {FASTEST_M_S:g} m/s are expected of a person."
         )
+
+
+def footprints(feet: Floats, size: Floats) -> Floats:
+    """(T, 4) where ankles would be if their feet were flat, and the feet's headings.
+
+    From feet (T, 5 or more): ankle x, y, z, heading and pitch.
+    """
+    flat = feet[:, :3] - rolled(feet[:, 3], feet[:, 4], size)
+    return np.concatenate([flat, feet[:, 3:4]], axis=1)
+
+
+def rolled(yaw: Floats, pitch: Floats, size: Floats) -> Floats:
+    """(T, 3) how far a foot's pitch takes its ankle: heel up round the ball, toes up round the
+    heel."""
+    moved = [
+        about(p, size[BALL_X], size[BALL_Z]) if p > 0.0 else about(p, size[HEEL_X], -size[ANKLE_Z])
+        for p in pitch.tolist()
+    ]
+    ahead, above = np.array(moved).T
+    return np.stack([np.cos(yaw) * ahead, np.sin(yaw) * ahead, above], -1)

@@ -1,15 +1,17 @@
 """What a file of motion capture says, in the project's joints, frames and units."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from hrc_env.core.errors import ConfigError, check_shape
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats, Ints, Points3, Rotations
+from hrc_env.motion.clip import check_rate
 
-SLOWEST_HZ, FASTEST_HZ = 5.0, 1000.0
-"""Frame rates between which a recording is believed; judgement: below, a step is lost."""
+FEWEST_FRAMES = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,15 +55,9 @@ class Moving:
 
 
 def forward(parent: Ints, offset: Floats, rotation: Rotations) -> tuple[Points3, Rotations]:
-    """Forward kinematics of a tree whose parents come before their children.
+    """Origins (T, N, 3) and rotations (T, N, 3, 3) of a tree whose parents come first (-1: none).
 
-    Args:
-        parent: (N,) -1 for the root.
-        offset: (T or 1, N, 3) origin of each node in its parent's frame.
-        rotation: (T, N, 3, 3) parent_from_node.
-
-    Returns:
-        Origins (T, N, 3) and rotations (T, N, 3, 3) in the frame of the root's parent.
+    From offsets (T or 1, N, 3) and rotations (T, N, 3, 3) in the parent's frame.
     """
     position = np.broadcast_to(offset, (*rotation.shape[:2], 3)).copy()
     turned = rotation.copy()
@@ -73,14 +69,38 @@ def forward(parent: Ints, offset: Floats, rotation: Rotations) -> tuple[Points3,
     return position, turned
 
 
-def check_rate(fps: float, source: str) -> None:
-    """Refuse a frame rate that cannot be.
+class Rows:
+    """The lines of a text file that hold words, one after the other; errors say where."""
 
-    Raises:
-        ConfigError: no number, or outside SLOWEST_HZ to FASTEST_HZ.
-    """
-    if not SLOWEST_HZ <= fps <= FASTEST_HZ:
+    def __init__(self, path: Path) -> None:
+        self.source = path.name
+        self._lines = path.read_text(errors="replace").splitlines()
+        self.at = 0
+
+    def next(self, expected: str) -> list[str]:
+        """Words of the next line that has any; `ConfigError` where the file ends here."""
+        for words in self.rest():
+            return words
         raise ConfigError(
-            f"{source}: a frame rate between {SLOWEST_HZ:g} and {FASTEST_HZ:g} frames a second is "
-            f"expected, the file has {fps:g}. If you know the true one, give it (--source-fps)."
+            f"{self.source} is cut off: after its {len(self._lines)} lines {expected} is missing."
         )
+
+    def rest(self) -> Iterator[list[str]]:
+        """Words of each line that is left and has any."""
+        while self.at < len(self._lines):
+            words = self._lines[self.at].split()
+            self.at += 1
+            if words:
+                yield words
+
+    def wrong(self, expected: str) -> ConfigError:
+        """The error for the line that was read last."""
+        line = self._lines[max(self.at, 1) - 1].strip() if self._lines else ""
+        return ConfigError(f"{self.source}, line {self.at}: {expected}; got {line[:60]!r}.")
+
+    def numbers(self, words: list[str]) -> list[float]:
+        """Words of the line that was read last as numbers."""
+        try:
+            return [float(word) for word in words]
+        except ValueError:
+            raise self.wrong("expected a number") from None

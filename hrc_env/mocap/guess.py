@@ -4,11 +4,10 @@ import numpy as np
 
 from hrc_env.core.skeleton import JOINT
 from hrc_env.core.typing import Floats, Points3
+from hrc_env.mocap.person import across, middle, smoothed
+from hrc_env.mocap.poses import Marks
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import GRIP_M
-from hrc_env.motion.capture.marks import Marks
-from hrc_env.motion.capture.person import across, middle
-from hrc_env.motion.capture.series import smoothed
 
 HEADING_S = 0.25
 """The heading is the pelvis' direction, smoothed over about this time [s]."""
