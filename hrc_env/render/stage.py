@@ -18,7 +18,6 @@ from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.scene import gl
 from hrc_env.scene.build import Scene
 from hrc_env.scene.canvas import (
-    ALL_GROUPS,
     BEFORE_THE_SUN,
     IN_THE_SHADE,
     MOVING,
@@ -106,31 +105,27 @@ class _Backdrop:
     """What the picture shows in the sun's axes: right, down and along, (h, w) [m] each."""
 
 
-class Stage:
+class Stage(Canvas):
     """Pictures of a scene from a few places; what stands still is kept for each."""
 
     def __init__(self, scene: Scene, width: int, height: int) -> None:
         """A stage for pictures of at most `width` x `height`."""
         gl.draw_on_one_thread()
-        self._largest = width, height
         size = max(SMOOTHING * width, SUN_PX), max(SMOOTHING * height, SUN_PX)
-        self._canvas = Canvas(scene, *size, QUALITY, ALL_GROUPS)
+        super().__init__(scene, *size, QUALITY)
         self._kept: dict[Any, _Backdrop] = {}
         self._shade: Shade | None = None
         self._shade_known = False
 
-    def fits(self, width: int, height: int) -> bool:
-        """Whether a picture is not too large."""
-        return width <= self._largest[0] and height <= self._largest[1]
-
-    def randomize(self, look: Look | None) -> None:
-        """Draw with an episode's look from the next pose on."""
-        if self._canvas.randomize(look):
+    def randomize(self, look: Look | None) -> bool:
+        """Draw with an episode's look from the next pose on; whether that is another one."""
+        if changed := super().randomize(look):
             self._kept.clear()
+        return changed
 
     def pose(self, q: JointAngles, motion: WorkerMotion | None) -> None:
         """Pose what moves: arm q (N,), the workers of one environment (W, S, ...)."""
-        self._canvas.pose(q, motion)
+        super().pose(q, motion)
         self._shade_known = False
 
     def picture(self, place: Place) -> Image:
@@ -146,20 +141,15 @@ class Stage:
             _lay_over(image, backdrop, box, *self.moving(place, box))
         return image
 
-    def close(self) -> None:
-        """Free the OpenGL context."""
-        self._canvas.close()
-        self._kept.clear()
-
     def moving(self, place: Place, box: Box) -> tuple[Image, Depths]:
         """What moves within a box of the picture: rgb and z, `SMOOTHING` times as large,
         top row first; black and 0 where nothing is."""
-        self._canvas.show(MOVING)
+        self.show(MOVING)
         return self._read(place, box)
 
     def box(self, place: Place) -> Box:
         """Where in the picture things that move are, and maybe a little more."""
-        middles, radii_m = self._canvas.movers()
+        middles, radii_m = self.movers()
         camera = place.camera
         x, y, depth = ((middles - camera.eye_world) @ camera.T_world_from_cam[:3, :3]).T
         ahead = depth > -radii_m
@@ -178,9 +168,8 @@ class Stage:
 
     def shade(self) -> Shade | None:
         """What moves, as the sun sees it; None without a sun or without anything that moves."""
-        canvas = self._canvas
-        canvas.show(BEFORE_THE_SUN)
-        direction, (middles, radii_m) = canvas.sun(), canvas.movers()
+        self.show(BEFORE_THE_SUN)
+        direction, (middles, radii_m) = self.sun(), self.movers()
         if direction is None or not len(middles):
             return None
         right, down = across(direction)
@@ -190,28 +179,28 @@ class Stage:
         half_m, deep_m = float((high - low)[:2].max()) / 2, float((high - low)[2])
         middle = (low + high) / 2
         near = middle[0] * right + middle[1] * down + low[2] * direction
-        canvas.aim_along(direction, near, half_m, deep_m)
+        self.aim_along(direction, near, half_m, deep_m)
         z = np.empty((SUN_PX, SUN_PX), np.float32)
-        canvas.read(None, z)
+        self.read(None, z)
         corner = float(middle[0]) - half_m, float(middle[1]) - half_m
         upright = np.ascontiguousarray(z[::-1])
         return Shade(upright, float(low[2]), deep_m, corner, 2 * half_m / SUN_PX)
 
     def sun_axes(self) -> Floats | None:
         """(3, 3) columns right, down and along the light that casts shadows."""
-        direction = self._canvas.sun()
+        direction = self.sun()
         return None if direction is None else np.stack([*across(direction), direction], -1)
 
     def _still(self, place: Place) -> _Backdrop:
-        canvas, size, axes = self._canvas, (place.width, place.height), self.sun_axes()
-        canvas.show(STILL, shadows=place.shadows)
+        size, axes = (place.width, place.height), self.sun_axes()
+        self.show(STILL, shadows=place.shadows)
         rgb, z = self._read(place, place.whole)
         dark, spots = None, ()
         if place.shadows and axes is not None:
-            points = _points(place, canvas.distance_m(z[::SMOOTHING, ::SMOOTHING]))
+            points = _points(place, self.distance_m(z[::SMOOTHING, ::SMOOTHING]))
             at = points[::COARSE, ::COARSE] @ axes.astype(np.float32)
             spots = tuple(np.ascontiguousarray(at[..., k]) for k in range(3))
-            canvas.show(IN_THE_SHADE)
+            self.show(IN_THE_SHADE)
             dark = _shrunk(self._read(place, place.whole)[0], size)
         return _Backdrop(_shrunk(rgb, size), z, dark, spots)
 
@@ -222,10 +211,10 @@ class Stage:
         x = place.middle_px[0] + ((left + right) / 2 - place.width / 2) * scale
         y = place.middle_px[1] + ((top + bottom) / 2 - place.height / 2) * scale
         window = Roi((x, y), (right - left) * scale, 0.0)
-        self._canvas.aim(place.camera, window, (bottom - top) * scale)
+        self.aim(place.camera, window, (bottom - top) * scale)
         shape = SMOOTHING * (bottom - top), SMOOTHING * (right - left)
         rgb, z = np.empty((*shape, 3), np.uint8), np.empty(shape, np.float32)
-        self._canvas.read(rgb, z)
+        self.read(rgb, z)
         return np.ascontiguousarray(rgb[::-1]), np.ascontiguousarray(z[::-1])
 
     def _cast_shadows(self, image: Image, backdrop: _Backdrop, dark: Image) -> None:

@@ -60,10 +60,9 @@ class Canvas:
         width_px: int,
         height_px: int,
         quality: dict[str, int],
-        groups: Sequence[int],
     ) -> None:
         self.width_px, self.height_px = width_px, height_px
-        self._scene = scene
+        self.scene = scene
         self._model = copy.copy(drawing_model(scene))  # its own drawing settings
         for name, value in quality.items():
             setattr(self._model.vis.quality, name, value)
@@ -84,7 +83,7 @@ class Canvas:
         self._shown: Any = None
         self._fresh: set[Part] = set()
         self._closed = False
-        self.groups(groups)
+        self.groups(ALL_GROUPS)
 
     def randomize(self, look: Look | None) -> bool:
         """Draw with this look from the next pose on; None leaves it. Whether it is another one."""
@@ -96,9 +95,9 @@ class Canvas:
 
     def pose(self, q: JointAngles, motion: WorkerMotion | None) -> None:
         """Put the arm at q (N,), the workers and what they hold where `motion` (W, S, ...) says."""
-        check_shape("q", np.shape(q), self._scene.home_q.shape, "one angle per joint")
+        check_shape("q", np.shape(q), self.scene.home_q.shape, "one angle per joint")
         self._data.qpos[: len(q)] = q
-        rows = self._scene.worker_mocap
+        rows = self.scene.worker_mocap
         if rows.size and motion is not None:
             show_workers(self._model, self._data, self._visuals, rows, motion)
             if self._look is not None:
@@ -125,7 +124,7 @@ class Canvas:
             int(what.category), self._shown,
         )  # fmt: skip
         if self._look is not None and what.sky:
-            strew(self._shown, self._scene.grounds, self._look)
+            strew(self._shown, self.scene.grounds, self._look)
         for light in self._shown.lights[: 0 if what.sunny else self._shown.nlight]:
             if light.castshadow:
                 light.diffuse, light.specular = np.zeros(3), np.zeros(3)

@@ -103,11 +103,6 @@ def test_the_picture_from_the_sun_has_things_where_they_are(env):
     assert head[2] - 0.35 < along_m < head[2] + 0.05
 
 
-def test_a_picture_too_large_for_the_stage_is_known(stage):
-    assert stage.fits(240, 180)
-    assert not stage.fits(241, 180)
-
-
 def test_a_viewpoint_sees_what_it_looks_at_in_the_middle():
     camera = viewpoint_camera("beside", *SIZE)
     px, _ = project(camera.P[None], np.array([[[0.12, 0.0, 0.95]]]))
