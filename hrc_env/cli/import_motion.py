@@ -29,7 +29,7 @@ class ImportMotion:
     Unit, upward axis, a T-pose in the first frame, short gaps and exchanged axes are found and
     mended, and said; what cannot be mended is refused with the reason. The person's joints are
     fitted by a worker's body, standing feet are locked, and the error is printed a joint.
-    docs/motion_capture.md has the names of joints that are understood.
+    docs/people_and_scenes.md has the names of joints that are understood.
     """
 
     file: tyro.conf.Positional[Path]

@@ -55,7 +55,7 @@ def find_joints(names: tuple[str, ...], source: str) -> tuple[dict[str, int], in
         raise ConfigError(
             f"{source}: an unknown skeleton. Missed: {', '.join(missed)}. Found: "
             f"{', '.join(f'{joint} = {names[node]}' for joint, node in found.items()) or 'none'}. "
-            f"The file has: {', '.join(names)}. Rename its joints as in docs/motion_capture.md."
+            f"The file has: {', '.join(names)}. Rename its joints as in docs/people_and_scenes.md."
         )
     return found, head
 

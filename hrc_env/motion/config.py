@@ -57,7 +57,7 @@ class MotionConfig:
     tasks: tuple[Task, ...] = TASKS
     """What they do, and what follows what."""
     motions: tuple[str | Clip, ...] = ()
-    """Clips of recorded motion that workers play, too: paths, or clips (docs/motion_capture.md)."""
+    """Clips of recorded motion that workers play, too (docs/people_and_scenes.md)."""
     motions_probability: float = 0.5
     """Chance that a worker with empty hands plays one next, where there is room for it."""
 

@@ -74,7 +74,7 @@ class DetectorConfig:
     search costs as much as several steps, most of all with bad images."""
     runtime: str = "litert"
     """What the networks run on: "litert", "openvino" (an extra, faster) or "auto"
-    (docs/speed.md)."""
+    (docs/perception_and_estimators.md)."""
     network: str = "full"
     """The landmark network: "lite", "full" or "heavy"; all but "full" are fetched once with
     `python -m hrc_env setup --networks lite heavy`."""
