@@ -20,7 +20,7 @@ from rich.table import Table
 from hrc_env.cli.progress import track
 from hrc_env.core.results import Metric, write_results
 from hrc_env.geometry import chains
-from hrc_env.geometry.distances import narrowest_gap
+from hrc_env.geometry.distances import least_separation
 from hrc_env.geometry.shapes import AXES, BOX, CAPSULE, CENTRE, HALF_SIZE, KIND, PLANE, REACH
 from hrc_env.motion import generator
 from hrc_env.motion.plans import CLIMB
@@ -135,7 +135,7 @@ def episodes(name: str, arguments: Arguments) -> Notes:
 def _some(scene: Scene, first: int, batch: int, arguments: Arguments, notes: Notes) -> float:
     """A batch of episodes; microseconds of a worker's control step."""
     body = stack(pool(arguments.body))
-    config = generator.MotionConfig(people=generator.people_called(arguments.people))
+    config = generator.MotionConfig(people=generator.PEOPLE[arguments.people])
     state = generator.make_state(batch, arguments.workers, body, config, scene.grounds)
     rngs = [np.random.default_rng([first + b]) for b in range(batch)]
     generator.reset(state, np.arange(batch), rngs)
@@ -201,7 +201,7 @@ def _measure(scene, body, motion, solids, state, deepest, notes) -> None:
             near = np.flatnonzero(np.linalg.norm(root[:, i] - root[:, j], axis=-1) < 2.6)
             if not len(near):
                 continue
-            gap = -narrowest_gap(
+            gap = -least_separation(
                 capsules[near, i], radius[near, i], capsules[near, j], radius[near, j]
             ).distance_m
             k = int(gap.argmax())

@@ -27,7 +27,7 @@ INFOS = {
     "cost": ("-", "sum of both; 0 after a reset"),
     "cost_sum": ("-", "the same, under the name that some safe-RL libraries read"),
     "episode_cost": ("-", "running sum of `cost`"),
-    "safety/min_separation_m": ("m", "smallest true gap of the step; absent without workers"),
+    "safety/min_separation_m": ("m", "least true separation of the step; absent without workers"),
     "tracking/mpjpe_m": (
         "m", "mean joint error of the estimate; absent where nobody is tracked. Tracks are "
         "compared with the workers whom they fit best",
@@ -73,13 +73,13 @@ axes, 1 is {tool} m/s (`control="tool"`). The change of a command is limited. 25
 ## Observation space
 `Box({size},)` float32 for one worker, flat and finite. An entry is the value in its unit,
 clipped to the bound, divided by the scale; `env.unwrapped.split_observation` inverts this.
-Everything about a worker is the *estimate*. With `config={{"horizons_s": (0.2, 0.4)}}` it also
+Everything about a worker is the *estimate*. With `config={{"forecast_s": (0.2, 0.4)}}` it also
 holds the [forecast](../tracking.md#forecast) of each joint, worker by worker, horizon by horizon.
 
 {observations}
 
 Without a track the estimate is the prior: its deviation and age are at their bounds,
-`worker_tracked` is 0 and `worker_gap` {far} m.
+`worker_tracked` is 0 and `worker_separation` {far} m.
 
 ## Reward
 The sum of these terms, each in `info["reward/<name>"]`; float64. Distances are to the
@@ -116,7 +116,7 @@ def environment() -> str:
         size=size[0] if size else 0,
         observations=observation_table(env),
         rewards=_table(("name", "meaning"), _rewards(env)),
-        far=observations.FAR_GAP_M,
+        far=observations.FAR_SEPARATION_M,
     )
     env.close()
     return text

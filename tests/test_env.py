@@ -170,7 +170,7 @@ def test_without_an_estimate_the_prior_is_observed_at_its_bounds():
     observation, info = env.reset(seed=0)
     terms = env.split_observation(observation)
     assert terms["worker_tracked"] == [0.0]
-    assert terms["worker_gap"] == [1.0]
+    assert terms["worker_separation"] == [1.0]
     np.testing.assert_allclose(terms["worker_joints_std"], 1.0)
     np.testing.assert_allclose(terms["worker_joints_age"], 2.0)
     assert info["tracking/lost"] == 1.0
@@ -313,8 +313,8 @@ def test_a_large_site_has_room_and_memory_for_many_workers():
         ({"people": {"tempo": -1.0}}, r"^people\.tempo must be"),
         ({"people": {"temp": 1.0}}, r"Did you mean 'people\.tempo'"),
         ({"people": ["hurried"]}, "a name.*'unaware'.*a mapping"),
-        ({"motions": 5}, "list of paths or clips"),
-        ({"config": {"horizons_s": [3.0]}}, r"horizons_s must be in \(0, 1\] s"),
+        ({"motions": 5}, "motions must be a list"),
+        ({"config": {"forecast_s": [3.0]}}, r"forecast_s must be in \(0, 1\] s"),
         ({"perception": "pixel"}, "Did you mean 'pixels'"),
         ({"estimator": "ekf"}, "'paper'"),
         ({"cameras": [7]}, "valid indices are 0 to 3"),

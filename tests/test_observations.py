@@ -13,8 +13,8 @@ from hrc_env.tasks.reach import TASK
 
 TERMS = TASK.observation_terms
 
-ASKED = {"horizons_s": (0.2, 0.6)}
-ADDED = ("worker_joints_ahead", "worker_joints_ahead_std")
+ASKED = {"forecast_s": (0.2, 0.6)}
+ADDED = ("worker_joints_forecast", "worker_joints_forecast_std")
 
 
 def rolled(env, n_steps=15):
@@ -45,21 +45,21 @@ def test_a_worker_is_expected_near_and_less_surely_the_later(level):
     env = HRCEnv(perception=level, config=ASKED)
     terms = env.split_observation(rolled(env)[-1])
     now = terms["worker_joints_from_tool"].reshape(1, N_JOINTS, 3)
-    ahead = terms["worker_joints_ahead"].reshape(2, N_JOINTS, 3)
-    std = terms["worker_joints_ahead_std"].reshape(2, N_JOINTS)
-    moved = np.linalg.norm(ahead - now, axis=-1).mean(1)
+    later = terms["worker_joints_forecast"].reshape(2, N_JOINTS, 3)
+    std = terms["worker_joints_forecast_std"].reshape(2, N_JOINTS)
+    moved = np.linalg.norm(later - now, axis=-1).mean(1)
     assert (moved < (0.5, 1.2)).all()
     assert terms["worker_joints_std"].mean() < std[0].mean() < std[1].mean()
-    expected = env.simulation.believed.ahead[1].mean_world[0, 0]
-    tool = env.simulation.believed.robot.tool_world
-    np.testing.assert_allclose(ahead[1], expected - tool, atol=1e-5)
+    expected = env.simulation.belief.forecast[1].mean_world[0, 0]
+    tool = env.simulation.belief.robot.tool_world
+    np.testing.assert_allclose(later[1], expected - tool, atol=1e-5)
 
 
 def test_of_nobody_the_prior_is_expected():
     env = HRCEnv(perception="none", config=ASKED)
     terms = env.split_observation(rolled(env, 3)[-1])
     now = terms["worker_joints_from_tool"].reshape(1, N_JOINTS, 3)
-    np.testing.assert_allclose(terms["worker_joints_ahead"].reshape(2, N_JOINTS, 3) - now, 0.0)
+    np.testing.assert_allclose(terms["worker_joints_forecast"].reshape(2, N_JOINTS, 3) - now, 0.0)
 
 
 def test_many_environments_expect_what_each_alone_expects():
@@ -81,6 +81,6 @@ def test_many_environments_expect_what_each_alone_expects():
 
 def test_two_workers_have_their_own_futures():
     env = HRCEnv(perception="truth", n_workers=2, config=ASKED)
-    ahead = env.split_observation(rolled(env, 3)[-1])["worker_joints_ahead"]
-    first, second = ahead.reshape(2, 2, N_JOINTS, 3)
+    later = env.split_observation(rolled(env, 3)[-1])["worker_joints_forecast"]
+    first, second = later.reshape(2, 2, N_JOINTS, 3)
     assert np.linalg.norm(first.mean(1) - second.mean(1), axis=-1).min() > 0.3

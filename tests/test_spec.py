@@ -8,8 +8,7 @@ from gymnasium.vector import AutoresetMode
 
 import hrc_env  # noqa: F401  registers the ids
 from hrc_env.config import HRCConfig
-from hrc_env.geometry.camera_config import made
-from hrc_env.geometry.rig_files import write_rig
+from hrc_env.geometry.camera_config import made, write_rig
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import STAND_Z, anatomies
 from hrc_env.motion.clip import Clip, save_clip
@@ -38,7 +37,7 @@ PLACES = [(2.9, 2.6, 2.4), (-2.9, 2.6, 2.4)]
         {"cameras": [{"name": f"c{k}", "eye_world": p} for k, p in enumerate(PLACES)]},
         {"n_workers": (0, 2), "estimator": "kalman", "scene": "site", "control": "tool"},
         {"n_workers": np.int64(2)},
-        {"config": HRCConfig(worker=("worker_1", "worker_2"), horizons_s=(0.2,))},
+        {"config": HRCConfig(worker=("worker_1", "worker_2"), forecast_s=(0.2,))},
         {"config": {"scene": {"cameras": [{"name": "a", "eye_world": PLACES[0]}]}}},
     ],
 )

@@ -54,7 +54,7 @@ def test_the_single_environment_goes_on_from_a_state(level, n_steps):
         {"estimator": "paper"},
         {"estimator": "triangulation"},
         {"n_workers": 2, "control": "tool"},
-        {"config": {"horizons_s": (0.2,), "tracker": {"longest_delay_s": 0.2}}},
+        {"config": {"forecast_s": (0.2,), "tracker": {"longest_delay_s": 0.2}}},
     ],
     ids=str,
 )

@@ -29,7 +29,7 @@ def count(scene: str, n_steps: int, seed: int, tick: Callable[[float], None]) ->
         while steps < n_steps:
             env.reset(seed=seed)
             seed += 1
-            if env.simulation.crew.present.any():
+            if env.simulation.present.any():
                 continue
             n = min(EPISODE_STEPS, n_steps - steps)
             for _ in range(n):

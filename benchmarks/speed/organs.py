@@ -30,7 +30,7 @@ ORGANS: Mapping[str, Sequence[Place]] = {
     "tracking": ((PoseTracking, "perceive"),),
     "distances": (
         (chains, "robot_along"),
-        (simulation, "estimated_gap"),
+        (simulation, "estimated_separation"),
         (metrics, "cost"),
     ),
     "observation": ((observations, "observe"),),

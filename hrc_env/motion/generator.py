@@ -23,7 +23,7 @@ from hrc_env.motion.floorplan import floorplan, room_for
 from hrc_env.motion.generator_kernel import bodies_now, move_on
 from hrc_env.motion.holding import N_HELD
 from hrc_env.motion.kinematics import N_FRAMES, N_POINTS
-from hrc_env.motion.people import PEOPLE, PeopleConfig, people_called
+from hrc_env.motion.people import PEOPLE, PeopleConfig
 from hrc_env.motion.playing import Clips, stocked
 from hrc_env.motion.reactions import notice
 from hrc_env.motion.state import MotionState
@@ -42,7 +42,6 @@ __all__ = [
     "advance",
     "current",
     "make_state",
-    "people_called",
     "reset",
     "watch",
 ]

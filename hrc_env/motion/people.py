@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, fields
 
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError
 
 Range = tuple[float, float]
 
@@ -77,14 +77,3 @@ PEOPLE: dict[str, PeopleConfig] = {
     ),
 }  # fmt: skip
 """By name: who looks out for the robot, who has no time to, who does not know that it moves."""
-
-
-def people_called(name: str) -> PeopleConfig:
-    """The preset of a name.
-
-    Raises:
-        ConfigError: there is none, with those that there are.
-    """
-    if name not in PEOPLE:
-        raise unknown("people", name, PEOPLE)
-    return PEOPLE[name]

@@ -4,14 +4,13 @@ Looks change images and nothing else: where things are, what hides what, how wor
 and faults are those of the same seed without. They are drawn from a stream of their own.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Grounds
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.geometry.rotations import about_axis
@@ -142,24 +141,6 @@ def draw_look(config: AppearanceConfig, n_workers: int, rng: np.random.Generator
         tint=config.tint,
         n_litter=int(own.integers(config.litter + 1)),
         seed=int(own.integers(2**31)),
-    )
-
-
-def appearance_called(given: "str | AppearanceConfig | Mapping[str, Any]") -> AppearanceConfig:
-    """An appearance by name, or as it was given.
-
-    Raises:
-        ConfigError: a name that there is not, with those that there are.
-    """
-    if isinstance(given, AppearanceConfig):
-        return given
-    if isinstance(given, str):
-        if given not in APPEARANCES:
-            raise unknown("appearance", given, APPEARANCES)
-        return APPEARANCES[given]
-    raise ConfigError(
-        "appearance must be a name, an AppearanceConfig or a mapping of its fields "
-        f"({', '.join(each.name for each in fields(AppearanceConfig))}), got {given!r}."
     )
 
 

@@ -15,7 +15,7 @@ from hrc_env.motion.errands import TASKS, Task, errands_at, picked
 from hrc_env.motion.traffic import APART_M
 from hrc_env.worker.body import load_body
 
-NO_REACTIONS = generator.people_called("unaware")
+NO_REACTIONS = generator.PEOPLE["unaware"]
 
 
 def go_on(state, rngs, seconds, robot=None):
@@ -86,11 +86,6 @@ def test_a_task_that_cannot_be_is_refused_with_what_can(change, message):
 def test_more_workers_than_fit_are_refused():
     with pytest.raises(ConfigError, match="n_workers=40"):
         generator.make_state(1, 40, load_body(), generator.MotionConfig())
-
-
-def test_unknown_people_are_refused_with_those_that_there_are():
-    with pytest.raises(ConfigError, match="hurried"):
-        generator.people_called("hurying")
 
 
 def certain(**changes):

@@ -127,7 +127,7 @@ def test_motions_come_as_paths_or_clips(clip, tmp_path):
     assert by_path == settle(motions=[path]).config
     assert settle(motions=[clip]).config.motion.motions == (clip,)
     assert settle(config=by_path, motions=None).config.motion is by_path.motion
-    with pytest.raises(ConfigError, match="paths or clips"):
+    with pytest.raises(ConfigError, match=r"motions\[0\] must be a str, got 3"):
         settle(motions=[3])
     with pytest.raises(ConfigError, match="There is no clip"):
         generator.make_state(1, 1, BODY, settle(motions=[tmp_path / "none.npz"]).config.motion)

@@ -6,7 +6,7 @@ import pytest
 
 from assets.robots.ur10e_like import JOINTS, LINKS, MASS_KG, TORQUE_LIMIT_NM
 from hrc_env.geometry import chains
-from hrc_env.geometry.distances import narrowest_gap
+from hrc_env.geometry.distances import least_separation
 from hrc_env.scene.build import build, drawing_model
 from hrc_env.scene.places import SCENES
 
@@ -81,5 +81,5 @@ def test_mujoco_and_the_geometry_room_agree_on_the_gap_between_tool_and_upper_ar
         SCENE.model, data, SCENE.model.geom("robot/tool").id,
         SCENE.model.geom("robot/upper_arm").id, 5.0, fromto,
     )  # fmt: skip
-    gap = narrowest_gap(ends[[first]], radius[[first]], ends[[second]], radius[[second]])
+    gap = least_separation(ends[[first]], radius[[first]], ends[[second]], radius[[second]])
     assert float(gap.distance_m) == pytest.approx(expected, abs=1e-6)

@@ -55,7 +55,7 @@ def test_the_other_levels_too_with_episodes_that_end_by_contact(level):
         "perception": level,
         "n_workers": 2,
         "control": "tool",
-        "config": {"cost": {"contact_terminates": True}, "horizons_s": (0.2,)},
+        "config": {"cost": {"contact_terminates": True}, "forecast_s": (0.2,)},
     }
     envs = identity.vectors(5, (3,), AutoresetMode.SAME_STEP, **kwargs)
     assert identity.compare(envs, 60, seed=8) == [0]
