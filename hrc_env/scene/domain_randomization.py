@@ -5,7 +5,7 @@ and faults are those of the same seed without. They are drawn from a stream of t
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
