@@ -24,8 +24,8 @@ import tyro
 from rich.console import Console
 
 from agents import ppo
-from agents.base import AGENTS, make_agent
 from agents.evaluate import EVALUATION_SEED, judged
+from agents.registry import AGENTS, make_agent
 from benchmarks.common import publish
 from hrc_env.cli.checks import at_least, writable_folder
 from hrc_env.cli.progress import progress_bar

@@ -22,8 +22,7 @@ from hrc_env.geometry import chains
 from hrc_env.geometry.distances import least_separation
 from hrc_env.geometry.shapes import AXES, BOX, CAPSULE, CENTRE, HALF_SIZE, KIND, PLANE
 from hrc_env.motion import generator
-from hrc_env.motion.plans import CLIMB
-from hrc_env.motion.state import GOING, THERE
+from hrc_env.motion.state import CLIMB, THERE
 from hrc_env.scene.build import Scene, build
 from hrc_env.worker.body import pool, stack, worker_truth
 
@@ -143,9 +142,7 @@ def _play(scene: Scene, arguments: Arguments, first: int, notes: Notes) -> None:
         spent += time.thread_time() - began
         notes.nans += int(not np.isfinite(motion.position_world).all())
         now = motion.position_world[:, :, 0, :2]
-        fine = (np.linalg.norm(now - place, axis=-1) > STILL_M) | (
-            state.errand[..., GOING] == THERE
-        )
+        fine = (np.linalg.norm(now - place, axis=-1) > STILL_M) | (state.workers["going"] == THERE)
         since_s = np.where(fine, 0.0, since_s + CTRL_DT_S)
         place = np.where(fine[..., None], now, place)
         stuck_s = np.maximum(stuck_s, since_s)
@@ -165,11 +162,11 @@ def _measure(body, motion, solids, state, deepest, notes) -> None:
     share = np.linspace(0.0, 1.0, 5)[:, None]
     points = capsules[..., :1, :] * (1 - share) + capsules[..., 1:, :] * share
     inside = radius - _away(points, solids).min((-1, -2))
-    inside[(state.activity == CLIMB)[..., None] & feet] = -np.inf  # they stand on what they climb
+    inside[(state.workers["activity"] == CLIMB)[..., None] & feet] = -np.inf  # on what they climb
     depth = inside.max(-1)
     deepest[0] = np.maximum(deepest[0], depth.max(1))
     for b, w in np.argwhere(depth > DEEPEST_M):
-        notes.deep(names[state.activity[b, w]], float(depth[b, w]))
+        notes.deep(names[state.workers["activity"][b, w]], float(depth[b, w]))
     root = motion.position_world[:, :, 0, :2]
     for i, j in combinations(range(capsules.shape[1]), 2):
         apart = np.linalg.norm(root[:, i] - root[:, j], axis=-1)
@@ -178,7 +175,7 @@ def _measure(body, motion, solids, state, deepest, notes) -> None:
             ends = (capsules[near, i], radius[near, i], capsules[near, j], radius[near, j])
             gap = -least_separation(*ends).distance_m
             k = int(gap.argmax())
-            both = " beside ".join(names[state.activity[near[k], w]] for w in (i, j))
+            both = " beside ".join(names[state.workers["activity"][near[k], w]] for w in (i, j))
             notes.deep(both, float(gap[k]))
             deepest[1, near] = np.maximum(deepest[1, near], gap)
 

@@ -199,7 +199,7 @@ def _look(variant: str, make: Callable[[], Scene], n: int, tick: PartProgress) -
     looker = Looker(scene)
     for k, now in enumerate(instants(scene, n, rng, in_turns())):
         if appearance != AS_BUILT:
-            looker.dress(draw_look(appearance, 1, np.random.default_rng([FIRST_SEED, k])))
+            looker.randomize(draw_look(appearance, 1, np.random.default_rng([FIRST_SEED, k])))
         looked = looker.detect(now)
         for c in np.flatnonzero(looked.in_view).tolist():
             error = float(looked.error[c])

@@ -74,9 +74,9 @@ class Looker:
         self.source = Lensed(self.renderer, scene.cameras)
         self.detector = PoseDetector(scene.cameras)
 
-    def dress(self, look: Look) -> None:
+    def randomize(self, look: Look) -> None:
         """Let everything look so from the next look on."""
-        self.renderer.dress(look)
+        self.renderer.randomize(look)
 
     def detect(self, now: Instant) -> Looked:
         """Look at an instant with every camera."""

@@ -11,7 +11,6 @@ from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.core.results import Metric, write_results, write_whole
 from hrc_env.experiments.study import intervals, report, runner
 from hrc_env.experiments.study.cache import PartCache, own_folder, owner_of
-from hrc_env.experiments.study.page import Picture, Section, Table, said, write_report
 
 
 @dataclass(frozen=True)
@@ -111,20 +110,6 @@ def test_a_quantile_draws_whole_seeds():
     same = [[1.0, 2.0, 3.0]] * 5
     found = intervals.quantile_over(same, 0.5, "m")
     assert (found.value, found.low, found.high) == (2.0, 2.0, 2.0)
-
-
-def test_the_page_holds_its_pictures_and_escapes_words(tmp_path):
-    figure = tmp_path / "one.png"
-    figure.write_bytes(b"not really a picture")
-    table = Table(("who", "m"), (("a < b", said(Metric(0.1234, 0.1, 0.2, "m", 3), 100)),))
-    parts = ("run `make`", table, Picture(figure, "seen"))
-    write_report(tmp_path, "Title", "Lead", [Section("Heading", parts)])
-    page = (tmp_path / "report.html").read_text()
-    assert "data:image/png;base64," in page
-    assert "a &lt; b" in page
-    assert "12.3 <span class='whole'>(10.0-20.0)</span>" in page
-    assert "<code>make</code>" in page
-    assert "| a < b | 12.3 (10.0-20.0) |" in (tmp_path / "report.md").read_text()
 
 
 def test_a_report_holds_its_pictures_its_origin_and_all_numbers(tmp_path):
