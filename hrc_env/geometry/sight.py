@@ -1,8 +1,7 @@
 """Lines of sight: what stands between an eye and points.
 
-Whatever can stand in the way is a row of one table of shapes. Of these, an eye that looks at a
-group of points needs those in the cone round the group; a line then meets some of their
-bounding spheres, and only the shapes in these are asked exactly.
+Of a table of shapes, an eye that looks at a group of points needs those in the cone round them;
+only shapes whose bounding spheres a line meets are asked exactly.
 """
 
 import math
@@ -45,14 +44,10 @@ OWN_CAPSULE_M = 0.06
 class Surroundings:
     """All that can stand between cameras and workers, but the workers, in B environments."""
 
-    still: Floats
-    """(G, `shapes.WIDTH`) what never moves, a shape a row."""
-    moving: Floats
-    """(B, M, `shapes.WIDTH`) what is carried about; rows may be `shapes.absent`."""
-    capsules_world: Capsules
-    """(B, K, 2, 3) the robot [m]."""
-    capsule_radius_m: Floats
-    """(K,) [m]."""
+    still: Floats  # (G, `shapes.WIDTH`) what never moves, a shape a row
+    moving: Floats  # (B, M, `shapes.WIDTH`) what is carried about; some rows `shapes.absent`
+    capsules_world: Capsules  # (B, K, 2, 3) the robot [m]
+    capsule_radius_m: Floats  # (K,) [m]
 
 
 def nothing(batch: int) -> Surroundings:
@@ -62,16 +57,7 @@ def nothing(batch: int) -> Surroundings:
 
 
 def hidden(surroundings: Surroundings, eyes_world: Points3, points_world: Points3) -> Bools:
-    """Whether anything stands between each eye and each point.
-
-    Args:
-        surroundings: of B environments.
-        eyes_world: (C, 3) [m].
-        points_world: (B, J, 3) [m].
-
-    Returns:
-        (B, C, J).
-    """
+    """(B, C, J) whether anything stands between eyes (C, 3) and points (B, J, 3) [m]."""
     batch = len(surroundings.capsules_world)
     check_shape("points_world", points_world.shape[::2], (batch, 3), "environments, ..., xyz")
     eyes, points = np.ascontiguousarray(eyes_world), np.ascontiguousarray(points_world)
@@ -86,15 +72,10 @@ def hidden(surroundings: Surroundings, eyes_world: Points3, points_world: Points
 class Occluders(NamedTuple):
     """A table of shapes, the last of them workers' capsules, and which of them are in view."""
 
-    table: Floats
-    """(G, `shapes.WIDTH`)."""
-    first_body: int
-    """The first row of a worker's capsule."""
-    spheres: Floats
-    """(5, G) of the shapes in view: centre less the eye [m], its square less the bounding sphere's,
-    that sphere's radius [m]."""
-    rows: Ints
-    """(G,) their rows in the table."""
+    table: Floats  # (G, `shapes.WIDTH`)
+    first_body: int  # the first row of a worker's capsule
+    spheres: Floats  # (5, G) in view: centre less the eye, tangent squared, radius [m]
+    rows: Ints  # (G,) their rows in the table
 
 
 @kernel(makes_arrays=True)

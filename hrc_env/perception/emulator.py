@@ -1,10 +1,7 @@
 """Keypoints without pixels: the projected truth with BlazePose's errors.
 
-The errors are drawn from a calibration: numbers fitted to what the network made of rendered
-workers (`perception.calibration`, docs/emulator.md). Some are the same in every camera, as they
-are of what the network takes for a hip; others depend on the view and on how folded the body is;
-they last, are larger where a joint is hidden, and the confidence tells of that as far as the
-network's does. Now and then a camera exchanges left and right, or loses the worker.
+The errors are drawn from a calibration, numbers fitted to what the network made of rendered workers
+(`perception.calibration`, docs/emulator.md).
 """
 
 import functools
@@ -74,11 +71,7 @@ class EmulatorConfig:
         self.calibrated()
 
     def calibrated(self) -> Calibration:
-        """The calibration, with what is different.
-
-        Raises:
-            ConfigError: its file cannot be read.
-        """
+        """The calibration, with what is different. Raises `ConfigError` for a bad file."""
         known = read_calibration(self.calibration or None)
         if self.swap_share is not None:
             share = np.zeros_like(known.swap_share)
@@ -93,13 +86,9 @@ class EmulatorConfig:
 class EmulatorState:
     """What the detector's errors remember from image to image, in standard deviations."""
 
-    errors: NDArray[np.void]
-    """(B, C, W) `emulator_kernel.ERRORS`."""
-    wander: Floats
-    """(B, W, J, 3) what is the same in every camera, as far as it is the joint's own: ahead, to
-    its side, up."""
-    dt_s: float
-    """Time between images [s]."""
+    errors: NDArray[np.void]  # (B, C, W) `emulator_kernel.ERRORS`
+    wander: Floats  # (B, W, J, 3) the same in every camera, a joint's own: ahead, aside, up
+    dt_s: float  # time between images [s]
 
 
 def make_state(
@@ -163,12 +152,8 @@ def emulate(
 def lines_of_sight(
     truth: WorkerTruth, surroundings: Surroundings, cameras: tuple[PinholeCamera, ...]
 ) -> tuple[Ints, Floats]:
-    """How each camera sees each joint and each worker, as the emulator has it.
-
-    Returns:
-        (B, C, W, J) `sightlines.SEEN`, `HIDDEN`, `OUTSIDE` or `BEHIND`; (B, C, W, `N_LOOK`)
-        side [px] and turn [rad] of the window, view [rad], folding, kneeling, handling, stepping.
-    """
+    """How each camera sees each joint, (B, C, W, J) `sightlines.SEEN` to `BEHIND`, and each worker,
+    (B, C, W, `N_LOOK`) `SIDE` to `STEPPING`, as the emulator has it."""
     batch, n_workers, n_joints = truth.joints_world.shape[:3]
     sight = np.empty((batch, len(cameras), n_workers, n_joints), np.int64)
     look_of = np.empty((batch, len(cameras), n_workers, N_LOOK))
@@ -186,12 +171,7 @@ def _world(truth: WorkerTruth, surroundings: Surroundings) -> World:
 
 
 def without_names(keypoints: Keypoints, rngs: Generators) -> Keypoints:
-    """The same poses, in every camera in an order of its own: nobody wears a name.
-
-    Args:
-        keypoints: (B, C, W, J, ...).
-        rngs: one generator per environment.
-    """
+    """The same poses, in every camera in an order of its own: nobody wears a name."""
     batch, n_cameras, n_workers = keypoints.confidence.shape[:3]
     order = np.tile(np.arange(n_workers), (batch, n_cameras, 1))
     for b in range(batch):

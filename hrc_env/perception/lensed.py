@@ -50,13 +50,10 @@ class Drawer(Protocol):
 class _Cover:
     """How a window of a distorted image is made."""
 
-    camera: PinholeCamera
-    """Turned to the window's middle, in units of its focal length."""
-    window: Roi
-    """What of it is drawn."""
-    x: NDArray[np.float32]
-    y: NDArray[np.float32]
-    """(size, size) which of the drawn pixels every pixel shows, counted from pixel centres."""
+    camera: PinholeCamera  # turned to the window's middle, in units of its focal length
+    window: Roi  # what of it is drawn
+    x: NDArray[np.float32]  # (size, size) which of the drawn pixels every pixel shows,
+    y: NDArray[np.float32]  # counted from pixel centres
 
 
 class Lensed:
@@ -79,10 +76,7 @@ class Lensed:
         return self._distorted(self.cameras[camera_index], window, self.drawer.unpeopled)
 
     def _distorted(
-        self,
-        camera: PinholeCamera,
-        window: Roi,
-        draw: Callable[[PinholeCamera, Roi], Image],
+        self, camera: PinholeCamera, window: Roi, draw: Callable[[PinholeCamera, Roi], Image]
     ) -> Image:
         if camera.lens is None:
             return draw(camera, window)
@@ -106,11 +100,8 @@ class Lensed:
 
 
 def pinhole_keypoints(found: Keypoints, cameras: Sequence[PinholeCamera]) -> Keypoints:
-    """Keypoints (B, C, ...) in pixels of the images to pinhole pixels: the tracker's.
-
-    Their deviations grow as the pinhole's image is stretched. What a pinhole has no place for is
-    missing.
-    """
+    """Keypoints (B, C, ...) in pixels of the images to pinhole pixels, the tracker's; deviations
+    grow with the magnification, and what a pinhole has no place for is missing."""
     if all(camera.lens is None for camera in cameras):
         return found
     px, confidence = found.px.copy(), found.confidence.copy()
