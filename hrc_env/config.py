@@ -33,9 +33,9 @@ from hrc_env.scene.robot import DEFAULT as DEFAULT_ROBOT
 from hrc_env.scene.robot import Robot, robot_called
 from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import Task, task_called
-from hrc_env.tracking.ahead import LONGEST_S
 from hrc_env.tracking.config import ParticleConfig, TrackerConfig, of_kind
 from hrc_env.tracking.estimators import EstimatorChoice, EstimatorSpec, estimator_called
+from hrc_env.tracking.forecast import LONGEST_S
 from hrc_env.tracking.people.association import AssociationConfig
 from hrc_env.worker.body import pool
 

@@ -14,7 +14,7 @@ from hrc_env.env import HRCEnv
 from hrc_env.metrics import tracking_error
 from hrc_env.motion.generator import PeopleConfig, activity_names, current
 from hrc_env.sb3 import HRCVecEnv
-from hrc_env.tracking.given import estimate_from_truth
+from hrc_env.tracking.oracle import estimate_from_truth
 from hrc_env.worker.body import worker_truth
 
 COUNTS = (0, 2, 3)

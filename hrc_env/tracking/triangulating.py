@@ -21,8 +21,8 @@ from hrc_env.geometry.triangulation import (
     Triangulation,
     triangulate,
 )
-from hrc_env.tracking.ahead import ahead
 from hrc_env.tracking.config import TriangulationConfig
+from hrc_env.tracking.forecast import forecast
 from hrc_env.tracking.measurements import MIN_SIGMA_PX, arrays_of
 from hrc_env.tracking.models.acquisition import STANDING_M, complete_body, keep_one_body
 from hrc_env.tracking.tracks import Tracks, forget, grow_older, make_tracks, report
@@ -98,9 +98,9 @@ class TriangulationEstimator:
         """What is believed now."""
         return report(state, self.config)
 
-    def ahead(self, state: Tracks, horizon_s: float) -> PoseEstimate:
-        """What is expected in `horizon_s`; see `tracking.ahead`."""
-        return ahead(self.estimate(state), horizon_s, self.config)
+    def forecast(self, state: Tracks, horizon_s: float) -> PoseEstimate:
+        """What is expected in `horizon_s`; see `tracking.forecast`."""
+        return forecast(self.estimate(state), horizon_s, self.config)
 
 
 def _believed(
