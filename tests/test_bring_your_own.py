@@ -13,7 +13,8 @@ import pytest
 from commands import ROOT, hrc
 
 import hrc_env
-from agents.base import make_agent, situation
+from agents.env_info import env_info
+from agents.registry import make_agent
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Roi
 from hrc_env.env import HRCEnv
@@ -199,7 +200,7 @@ def test_a_shield_changes_commands_and_says_so():
     for shield in (None, "slow_down"):
         env = gymnasium.make("HRCReach-v0", perception="truth", shield=shield)
         simulation = env.unwrapped.simulation
-        agent, (observation, _) = make_agent("scripted", situation(simulation)), env.reset(seed=1)
+        agent, (observation, _) = make_agent("scripted", env_info(simulation)), env.reset(seed=1)
         infos[shield] = []
         for _ in range(200):
             observation, *_, info = env.step(agent.act(observation))
