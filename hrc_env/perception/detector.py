@@ -20,17 +20,7 @@ from hrc_env.core.skeleton import BLAZEPOSE_INDEX, N_JOINTS
 from hrc_env.core.stateful import Stateful
 from hrc_env.core.typing import Floats, Image, Points2
 from hrc_env.geometry.cameras import PinholeCamera, inside_image
-from hrc_env.perception import blazepose
-from hrc_env.perception.network import (
-    LANDMARK_SIDE,
-    NETWORKS,
-    RUNTIMES,
-    Landmarker,
-    PersonDetector,
-    chosen_runtime,
-    load_landmarker,
-    load_person_detector,
-)
+from hrc_env.perception import blazepose, network
 from hrc_env.perception.noise import STANDING, sigma_px
 from hrc_env.perception.searching import (
     Candidates,
@@ -43,6 +33,7 @@ from hrc_env.perception.searching import (
 )
 from hrc_env.perception.weights import find_weights
 
+SIDE = network.LANDMARK_SIDE
 STATURE_OF_SIDE = 0.75
 """Stature of an upright worker as a share of the side of BlazePose's window round them."""
 
@@ -88,13 +79,13 @@ class DetectorConfig:
     there, and three times as slow."""
 
     def __post_init__(self) -> None:
-        if self.runtime not in RUNTIMES:
-            raise unknown("detector.runtime", self.runtime, RUNTIMES)
+        if self.runtime not in network.RUNTIMES:
+            raise unknown("detector.runtime", self.runtime, network.RUNTIMES)
         if self.keypoints not in DETECTORS:
             raise unknown("detector.keypoints", self.keypoints, DETECTORS)
         for name in ("network", "folded"):
-            if getattr(self, name) not in NETWORKS:
-                raise unknown(f"detector.{name}", getattr(self, name), NETWORKS)
+            if getattr(self, name) not in network.NETWORKS:
+                raise unknown(f"detector.{name}", getattr(self, name), network.NETWORKS)
         for name in ("min_presence", "sure_presence", "outside_confidence"):
             if not 0 < getattr(self, name) <= 1:
                 raise ConfigError(f"{name} must be in (0, 1], got {getattr(self, name)}.")
@@ -118,8 +109,8 @@ class Detection:
 class _Networks:
     """One thread's interpreters."""
 
-    detect: PersonDetector
-    landmark: tuple[Landmarker, Landmarker]  # for upright workers, for folded ones
+    detect: network.PersonDetector
+    landmark: tuple[network.Landmarker, network.Landmarker]  # for upright workers, for folded ones
     own: KeypointFunction | None  # what finds joints instead of these
 
 
@@ -136,9 +127,9 @@ class PoseDetector(Stateful):
         self.cameras = tuple(cameras)
         self.config = config or DetectorConfig()
         find_weights("pose_detection")
-        for network in (self.config.network, self.config.folded):
-            find_weights(f"pose_landmark_{network}")
-        chosen_runtime(self.config.runtime)
+        for name in (self.config.network, self.config.folded):
+            find_weights(f"pose_landmark_{name}")
+        network.chosen_runtime(self.config.runtime)
         self._looks: dict[int, list[int]] = {}
         self._networks: tuple[_Networks, _Networks] | None = None
         self._helper: ThreadPoolExecutor | None = None
@@ -251,13 +242,13 @@ class PoseDetector(Stateful):
 
 
 def _networks(config: DetectorConfig) -> _Networks:
-    runtime = chosen_runtime(config.runtime)
-    landmark = load_landmarker(config.network, runtime)
+    runtime = network.chosen_runtime(config.runtime)
+    landmark = network.load_landmarker(config.network, runtime)
     same = config.folded == config.network
-    folded = landmark if same else load_landmarker(config.folded, runtime)
+    folded = landmark if same else network.load_landmarker(config.folded, runtime)
     make = DETECTORS[config.keypoints]
     own = None if make is None else make()
-    return _Networks(load_person_detector(runtime), (landmark, folded), own)
+    return _Networks(network.load_person_detector(runtime), (landmark, folded), own)
 
 
 def own_joints(find: KeypointFunction, crop: Image, window: Roi) -> Floats | None:
@@ -271,7 +262,7 @@ def own_joints(find: KeypointFunction, crop: Image, window: Roi) -> Floats | Non
     joints[missing] = (np.nan, np.nan, 0.0)
     if not ((joints[:, 2] >= 0) & (joints[:, 2] <= 1)).all():
         raise ConfigError(f"A detector's confidences must be in [0, 1], got {joints[:, 2]}.")
-    joints[:, :2] = blazepose.to_image(joints[:, :2] / LANDMARK_SIDE, window)
+    joints[:, :2] = blazepose.to_image(joints[:, :2] / SIDE, window)
     return joints
 
 
@@ -295,7 +286,7 @@ def _joints(
 
 def _seen(crop: Image, window: Roi, camera: PinholeCamera) -> Image:
     """A copy of the crop, black where the camera does not see: renderers go on drawing."""
-    check_shape("crop", crop.shape, (LANDMARK_SIDE, LANDMARK_SIDE, 3), "rows, columns, RGB")
+    check_shape("crop", crop.shape, (SIDE, SIDE, 3), "rows, columns, RGB")
     mask = _frame_mask(window, camera.width_px, camera.height_px)
     if mask is None:
         return np.array(crop)
@@ -310,8 +301,8 @@ def _frame_mask(window: Roi, width_px: int, height_px: int) -> NDArray[np.uint8]
     square = blazepose.to_image(corners, window)
     if ((square >= 0) & (square < frame)).all():
         return None
-    back = cv2.invertAffineTransform(blazepose.image_from_crop(window, LANDMARK_SIDE))
-    mask = np.zeros((LANDMARK_SIDE, LANDMARK_SIDE), np.uint8)
+    back = cv2.invertAffineTransform(blazepose.image_from_crop(window, SIDE))
+    mask = np.zeros((SIDE, SIDE), np.uint8)
     polygon = np.round(corners * frame @ back[:, :2].T + back[:, 2]).astype(np.int32)
     cv2.fillConvexPoly(mask, polygon, 1)
     return mask

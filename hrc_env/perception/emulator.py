@@ -19,6 +19,7 @@ from hrc_env.core.typing import Floats, Ints
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.geometry.lens import lens_row
 from hrc_env.geometry.sight import Surroundings
+from hrc_env.perception import emulator_kernel as kernels
 from hrc_env.perception.calibration import (
     POSTURED,
     Calibration,
@@ -26,14 +27,6 @@ from hrc_env.perception.calibration import (
     read_calibration,
 )
 from hrc_env.perception.detector import STATURE_OF_SIDE
-from hrc_env.perception.emulator_kernel import (
-    ERRORS,
-    N_NORMALS,
-    N_OF_BODY,
-    SETTINGS,
-    Report,
-    emulate_batch,
-)
 from hrc_env.perception.sightlines import CAMERA, N_LOOK, World, sight_batch
 
 Generators = Sequence[np.random.Generator]
@@ -97,13 +90,13 @@ def make_state(
     """A state for `batch` environments with images `dt_s` apart; `reset` it before use."""
     if not dt_s > 0:
         raise ConfigError(f"The time between images must be positive, got {dt_s} s.")
-    errors = np.zeros((batch, n_cameras, n_workers), ERRORS)
+    errors = np.zeros((batch, n_cameras, n_workers), kernels.ERRORS)
     return EmulatorState(errors, np.zeros((batch, n_workers, N_JOINTS, 3)), dt_s)
 
 
 def reset(state: EmulatorState, ids: Ints, rngs: Generators) -> None:
     """Begin environments `ids` anew with errors drawn from how they are in the long run."""
-    *names, last = (state.errors[name] for name in ERRORS.names or ())
+    *names, last = (state.errors[name] for name in kernels.ERRORS.names or ())
     arrays = (*names, state.wander, last)
     sizes = [math.prod(array.shape[1:]) for array in arrays]
     drawn = np.array([rngs[b].standard_normal(sum(sizes)) for b in ids]).reshape(len(ids), -1)
@@ -137,15 +130,15 @@ def emulate(
     shape = (batch, n_cameras, n_workers, N_JOINTS)
     robot = surroundings.capsules_world
     check_shape("surroundings.capsules_world", (len(robot),), (batch,), "environments")
-    n_image = N_NORMALS * N_JOINTS + N_OF_BODY
+    n_image = kernels.N_NORMALS * N_JOINTS + kernels.N_OF_BODY
     normals = np.empty((batch, n_workers * (3 * N_JOINTS + n_cameras * n_image)))
     for rng, normal in zip(rngs, normals, strict=True):
         rng.standard_normal(out=normal)
     written_ns = changed_ns(config.calibration) if config.calibration else 0
     postures, settings = _settings(config, state.dt_s, written_ns)
-    out = Report(np.empty((*shape, 2)), np.empty(shape), np.empty(shape))
+    out = kernels.Report(np.empty((*shape, 2)), np.empty(shape), np.empty(shape))
     world, rig = _world(truth, surroundings), _rig(cameras)
-    emulate_batch(state.errors, state.wander, normals, world, rig, postures, settings, out)
+    kernels.emulate_batch(state.errors, state.wander, normals, world, rig, postures, settings, out)
     return Keypoints(*out)
 
 
@@ -206,7 +199,7 @@ def _settings(
     of_posture["size"] = np.log(known.size)
     of_posture["confidence"] = np.log(confidence / (1 - confidence))
     rows = [table.reshape(len(table), -1) for table in of_posture.values()]
-    settings = np.zeros(1, SETTINGS)
+    settings = np.zeros(1, kernels.SETTINGS)
     for name in ("space_limb", "bias", "limb", "follows"):
         settings[name] = getattr(known, name)
     for name in ("error_scale", "max_error", "min_joints", "outside_confidence"):
