@@ -19,7 +19,7 @@ from rich.table import Column, Table
 from hrc_env.core.records import WorkerPath
 from hrc_env.core.results import Metric, over, write_results
 from hrc_env.geometry import chains
-from hrc_env.geometry.distances import narrowest_gap
+from hrc_env.geometry.distances import least_separation
 from hrc_env.scene.build import Scene, SceneConfig, build
 from hrc_env.scene.physics import Physics, no_workers
 from hrc_env.worker.body import load_body, rest_motion, worker_capsules
@@ -108,7 +108,7 @@ def worker_contact(scene: Scene) -> dict[str, float]:
     for step in range(75):
         physics.step(np.array([[1.0 if step < 50 else -1.0, 0, 0, 0, 0, 0.0]]), path)
         arm = chains.capsules(scene.chain, physics.q)
-        gap = narrowest_gap(arm, scene.chain.capsule_radius_m, person, body.capsule_radius_m)
+        gap = least_separation(arm, scene.chain.capsule_radius_m, person, body.capsule_radius_m)
         gap_m = float(gap.distance_m[0])
         deepest = min(deepest, gap_m)
         if 40 <= step < 50:

@@ -21,8 +21,7 @@ from rich.progress import Progress, track
 
 import hrc_env  # noqa: F401  registers the ids
 from hrc_env.core.results import Metric, over, write_results
-from hrc_env.motion.workers import ACTIVITY, BODY
-from hrc_env.tracking.miscalibration import MISCALIBRATED
+from hrc_env.step import ACTIVITY, BODY, MISCALIBRATED
 from hrc_env.vector.env import HRCVectorEnv
 
 WARM_UP_STEPS = 1_000_000

@@ -11,6 +11,7 @@ from hrc_env.registration import (
     register_detector,
     register_environment,
     register_estimator,
+    register_robot,
     register_shield,
     register_task,
 )
@@ -21,6 +22,7 @@ __all__ = [
     "IDS",
     "register_detector",
     "register_estimator",
+    "register_robot",
     "register_shield",
     "register_task",
 ]

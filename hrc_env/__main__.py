@@ -14,6 +14,7 @@ from pathlib import Path
 from hrc_env import __version__
 from hrc_env.core.checkout import module_of
 from hrc_env.core.errors import ConfigError, HRCError, unknown
+from hrc_env.core.old_names import OLD_NAMES
 from hrc_env.registration import IMPORT, import_files
 
 PROGRAM = "python -m hrc_env"
@@ -24,7 +25,7 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
         "and see that headless OpenGL works.",
     ),
     "demo": (
-        "hrc_env.cli.demo", "Demo",
+        "hrc_env.cli.play", "Demo",
         "Film the scripted reacher, slowed by the separation that it estimates from pixels.",
     ),
     "check": (
@@ -50,8 +51,8 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     ),
     "experiment": (
         "hrc_env.cli.experiment", "Experiment",
-        "The paper's two experiments (site, lab), what the eyes are worth in safety (impact), and "
-        "ablations of rigs and estimators (beyond).",
+        "The paper's two experiments (site, lab), what perception is worth in safety (impact), and "
+        "ablations of rigs and estimators (ablations).",
     ),
     "gallery": (
         "benchmarks.commands.gallery", "Gallery",
@@ -87,6 +88,7 @@ def main(words: Sequence[str] | None = None) -> int:
         return 0
     try:
         given = _imported(given)
+        _refuse_old_words(given)
         return _run(given[0], given[1:])
     except HRCError as error:
         from rich.console import Console
@@ -142,6 +144,14 @@ def _imported(words: list[str]) -> list[str]:
     if not rest:
         raise ConfigError(f"--import goes with a command; {PROGRAM} --help names them.")
     return rest
+
+
+def _refuse_old_words(words: list[str]) -> None:
+    """Answer commands and options that are called otherwise now with their new names."""
+    for k, word in enumerate(words):
+        name = word.partition("=")[0]
+        if name in OLD_NAMES and (k < 2 or name.startswith("--")):
+            raise unknown("word", name, ())
 
 
 def _run(name: str, words: list[str]) -> int:

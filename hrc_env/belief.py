@@ -10,7 +10,7 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.records import PoseEstimate, RobotState
 from hrc_env.core.skeleton import SEGMENT_RADIUS_M
 from hrc_env.core.typing import Floats
-from hrc_env.geometry.distances import Gap, narrowest_gap
+from hrc_env.geometry.distances import Separation, least_separation
 from hrc_env.geometry.segments import segments
 
 
@@ -20,17 +20,17 @@ class Belief:
 
     robot: RobotState
     estimate: PoseEstimate
-    gap: Gap
+    separation: Separation
     """(B, W) narrowest place between the robot and each *estimated* body."""
     task: Any
     """What the task says to the robot (`Task.view`)."""
     action: Floats
     """(B, A) the last action, in [-1, 1]."""
-    forecasts: tuple[PoseEstimate, ...] = ()
+    forecast: tuple[PoseEstimate, ...] = ()
     """What is expected of the workers at each of `HRCConfig.forecast_s` from now."""
 
 
-def estimated_gap(robot: RobotState, estimate: PoseEstimate) -> Gap:
+def estimated_separation(robot: RobotState, estimate: PoseEstimate) -> Separation:
     """(B, W) narrowest place between the robot's capsules and each estimated body.
 
     The body is made of the segments between the estimated joints with radii, the hands
@@ -38,9 +38,13 @@ def estimated_gap(robot: RobotState, estimate: PoseEstimate) -> Gap:
     nothing to keep away from that the robot knows of.
     """
     bodies = segments(estimate.mean_world)
-    gap = narrowest_gap(robot.capsules_world, robot.capsule_radius_m, bodies, SEGMENT_RADIUS_M)
-    return Gap(
-        np.where(estimate.tracked, gap.distance_m, np.inf), gap.point_a_world, gap.point_b_world
+    nearest = least_separation(
+        robot.capsules_world, robot.capsule_radius_m, bodies, SEGMENT_RADIUS_M
+    )
+    return Separation(
+        np.where(estimate.tracked, nearest.distance_m, np.inf),
+        nearest.point_a_world,
+        nearest.point_b_world,
     )
 
 

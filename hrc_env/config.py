@@ -1,32 +1,36 @@
 """The whole configuration: one frozen tree, a branch for each organ.
 
-`HRCConfig()` is the default; `dataclasses.replace` or a nested mapping changes it:
+`HRCConfig()` is the default; `dataclasses.replace`, a nested mapping or a TOML file changes it:
 `gymnasium.make("HRCReach-v0", config={"reward": {"proximity": 0.0}})`.
 """
 
+import inspect
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 import numpy as np
 
 from hrc_env.control import ControlConfig
 from hrc_env.core.errors import ConfigError, unknown
-from hrc_env.core.mapping import from_mapping, restored
-from hrc_env.geometry.camera_config import CameraConfig
-from hrc_env.geometry.rig_files import read_rig
+from hrc_env.core.mapping import PRESETS, from_mapping, plain, restored
+from hrc_env.core.results import write_whole
+from hrc_env.core.toml import read_toml, to_toml
+from hrc_env.geometry.camera_config import CameraConfig, read_rig
 from hrc_env.metrics import CostConfig
-from hrc_env.motion.generator import PEOPLE, Clip, MotionConfig, PeopleConfig, people_called
+from hrc_env.motion.generator import PEOPLE, MotionConfig, PeopleConfig
 from hrc_env.perception.detector import DetectorConfig
 from hrc_env.perception.emulator import EmulatorConfig
 from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.rewards import RewardConfig
 from hrc_env.safety.shield import Shield, shield_called
 from hrc_env.scene.build import SceneConfig
-from hrc_env.scene.domain_randomization import AppearanceConfig, appearance_called
+from hrc_env.scene.domain_randomization import APPEARANCES, AppearanceConfig
 from hrc_env.scene.rigs import RIGS
+from hrc_env.scene.robot import DEFAULT as DEFAULT_ROBOT
+from hrc_env.scene.robot import Robot, robot_called
 from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import Task, task_called
 from hrc_env.tracking.config import ParticleConfig, TrackerConfig, of_kind
@@ -42,8 +46,8 @@ class HRCConfig:
 
     ctrl_dt: float = 0.04
     """Time between actions [s]; a multiple of `scene.sim_dt`. 0.04 s is 25 Hz."""
-    start_spread_rad: tuple[float, ...] = (1.3, 0.15, 0.15, 0.15, 0.15, 0.15)
-    """At reset each arm joint is drawn within so much of its home angle [rad]."""
+    start_spread_rad: tuple[float, ...] = ()
+    """At reset each joint is drawn within so much of its home angle [rad]; none: the robot's."""
     forecast_s: tuple[float, ...] = ()
     """Times ahead at which the observation also holds where the workers' joints are expected,
     each in (0, 1] [s]; none by default. (0.2, 0.4) adds 120 entries a worker."""
@@ -59,7 +63,7 @@ class HRCConfig:
     emulator: EmulatorConfig = field(default_factory=EmulatorConfig)
     """Its emulator (`perception="keypoints"`)."""
     faults: tuple[FaultConfig, ...] = ()
-    """What goes wrong with the cameras, and when (docs/cameras.md)."""
+    """What goes wrong with the cameras, and when (docs/perception_and_estimators.md)."""
     appearance: AppearanceConfig = field(default_factory=AppearanceConfig)
     """How scene and workers look, drawn for every episode (`perception="pixels"`)."""
     tracker: TrackerConfig = field(default_factory=ParticleConfig)
@@ -78,10 +82,8 @@ class HRCConfig:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.ctrl_dt) and self.ctrl_dt > 0):
             raise ConfigError(f"ctrl_dt must be a positive time [s], got {self.ctrl_dt}.")
-        if not self.start_spread_rad or min(self.start_spread_rad) < 0:
-            raise ConfigError(
-                f"start_spread_rad must hold angles >= 0, one a joint, got {self.start_spread_rad}."
-            )
+        if min(self.start_spread_rad, default=0.0) < 0:
+            raise ConfigError(f"start_spread_rad must be >= 0, got {self.start_spread_rad}.")
         pool(self.worker)
         for horizon_s in self.forecast_s:
             if not 0 < horizon_s <= LONGEST_S:
@@ -102,6 +104,17 @@ class HRCConfig:
         return round(self.ctrl_dt / self.scene.sim_dt)
 
 
+ConfigChoice = HRCConfig | Mapping[str, Any] | str | Path | None
+PARTS = {
+    "people": "motion.people",
+    "motions": "motion.motions",
+    "faults": "faults",
+    "appearance": "appearance",
+}
+"""Keyword arguments that are parts of the config: chosen often."""
+PRESETS.update({AppearanceConfig: APPEARANCES, PeopleConfig: PEOPLE})
+
+
 @dataclass(frozen=True, slots=True)
 class Settings:
     """Everything that a simulation is made from, whole and checked."""
@@ -109,10 +122,12 @@ class Settings:
     task: Task
     perception: str
     estimator: EstimatorSpec
-    cameras: Sequence[int | str] | None
-    """Which of the scene's cameras are used; None: all."""
+    cameras: Any
+    """Names and indices of the scene's cameras that are used; None: all."""
     scene: str
-    n_workers: int | tuple[int, int]
+    robot: Robot
+    n_workers: tuple[int, int]
+    """The fewest and the most of an episode."""
     control: str
     shield: Shield | None
     config: HRCConfig
@@ -124,52 +139,62 @@ def settle(
     perception: str = "pixels",
     estimator: EstimatorChoice = "particle",
     scene: str = "lab",
+    robot: str | Robot = DEFAULT_ROBOT,
     n_workers: int | tuple[int, int] = 1,
     control: str = "joint",
     shield: "str | Shield | None" = None,
-    config: "HRCConfig | Mapping[str, Any] | None" = None,
+    config: ConfigChoice = None,
     cameras: "str | Path | Sequence[Any] | np.ndarray | None" = None,
-    **changes: Any,
+    **parts: Any,
 ) -> Settings:
     """Settings from the keyword arguments of an environment; see `HRCEnv`.
 
     Args:
-        changes: people, motions, faults, appearance, folded into the config.
+        parts: people, motions, faults, appearance: parts of the config (`PARTS`).
 
     Raises:
         ConfigError: an argument that there is not, or a value that cannot be.
     """
-    chosen = task_called(task)
-    spec = estimator_called(estimator)
-    whole = resolve(config, chosen, spec)
-    for name, value in changes.items():
-        if name not in _CHANGES:
-            raise unknown("argument", name, [*_ARGUMENTS, *_CHANGES])
-        whole = whole if value is None else _CHANGES[name](whole, value)
-    whole, used = with_cameras(whole, cameras)
+    chosen, spec = task_called(task), estimator_called(estimator)
+    if isinstance(cameras, np.ndarray):
+        cameras = cameras.tolist()
+    whole, rig = resolve(config, chosen, spec), rig_of(cameras)
+    if rig is not None:
+        whole, cameras = replace(whole, scene=replace(whole.scene, cameras=rig)), None
+    for name, value in parts.items():
+        if name not in PARTS:
+            raise unknown("argument", name, [*_keywords(), *PARTS])
+        if value is not None:
+            whole = _with_part(whole, PARTS[name], value, name)
     return Settings(
-        chosen, perception, spec, used, scene, n_workers, control, shield_called(shield), whole
+        chosen, perception, spec, cameras, scene, robot_called(robot), _worker_counts(n_workers),
+        control, shield_called(shield), whole,
     )  # fmt: skip
 
 
-def resolve(
-    config: "HRCConfig | Mapping[str, Any] | None", task: Task, estimator: EstimatorSpec
-) -> HRCConfig:
-    """A config from what a user gave: a config, a (nested) mapping of changes, or nothing.
+def _keywords() -> list[str]:
+    return [name for name in inspect.signature(settle).parameters if name != "parts"]
+
+
+def resolve(config: ConfigChoice, task: Task, estimator: EstimatorSpec) -> HRCConfig:
+    """A config from what a user gave: itself, a (nested) mapping of changes, a TOML file, nothing.
 
     Raises:
         ConfigError: a field that does not exist, with the nearest that does; a bad value; the
             settings of another task.
     """
-    if config is None:
-        config = HRCConfig()
-    elif isinstance(config, Mapping):
+    if isinstance(config, str | Path):
+        config = read_toml(config)
+    if isinstance(config, Mapping):
         said = {name: value for name, value in config.items() if (name, value) != ("task", None)}
         kinds = {"task": task.config, "tracker": estimator.config}
         config = from_mapping(HRCConfig, said, kinds=kinds)
-    elif not isinstance(config, HRCConfig):
+    if config is None:
+        config = HRCConfig()
+    if not isinstance(config, HRCConfig):
         raise ConfigError(
-            f"config must be an HRCConfig, a mapping or None, got {type(config).__name__}."
+            "config must be an HRCConfig, a mapping, a TOML file's path or None, "
+            f"got {type(config).__name__}."
         )
     config = replace(config, tracker=of_kind(config.tracker, estimator.config))
     if config.task is None:
@@ -182,43 +207,53 @@ def resolve(
     return config
 
 
-def with_cameras(
-    config: HRCConfig, cameras: "str | Path | Sequence[Any] | np.ndarray | None"
-) -> "tuple[HRCConfig, Sequence[int | str] | None]":
-    """A config with another rig, and which of its cameras are used; see `HRCEnv`.
+def save_config(config: HRCConfig, path: str | Path) -> None:
+    """Write every setting to a TOML file, which `config=` and `--config` take.
+
+    Raises:
+        ConfigError: a clip in memory, which has no such form (give its file).
+    """
+    for motion in config.motion.motions:
+        if not isinstance(motion, str):
+            raise ConfigError(f"The clip {motion.source!r} cannot be written: give its file.")
+    write_whole(Path(path), to_toml(plain(asdict(config))))
+
+
+def load_config(
+    path: str | Path, task: str | Task = DEFAULT, estimator: EstimatorChoice = "particle"
+) -> HRCConfig:
+    """A config from a TOML file, which may hold changes to the default only.
+
+    Raises:
+        ConfigError: see `resolve`.
+    """
+    return resolve(Path(path), task_called(task), estimator_called(estimator))
+
+
+def rig_of(cameras: Any) -> tuple[CameraConfig, ...] | None:
+    """The rig that `cameras=` says (`HRCEnv`); None if it chooses among the scene's cameras.
 
     Raises:
         ConfigError: no rig of that name, no such file, or a mixture of names and cameras.
     """
-    given: Any = cameras.tolist() if isinstance(cameras, np.ndarray) else cameras
-    if isinstance(given, str | Path):
-        rig = _rig(given)
-    elif isinstance(given, Sequence) and any(not isinstance(c, _CHOICE) for c in given):
-        rig = tuple(_camera(camera, k) for k, camera in enumerate(given))
-    else:
-        return config, given
-    return replace(config, scene=replace(config.scene, cameras=rig)), None
-
-
-_CHOICE = (str, int, float, np.number)
-
-
-def _rig(named: str | Path) -> tuple[CameraConfig, ...]:
-    if isinstance(named, Path) or named.endswith(".toml"):
-        return read_rig(named)
-    if named not in RIGS:
+    if isinstance(cameras, str | Path):
+        if str(cameras).endswith(".toml"):
+            return read_rig(cameras)
+        if cameras in RIGS:
+            return RIGS[str(cameras)]
         raise ConfigError(
-            f"cameras={named!r} is no rig: valid are {', '.join(map(repr, RIGS))}, a path that "
+            f"cameras={cameras!r} is no rig: valid are {', '.join(map(repr, RIGS))}, a path that "
             "ends in .toml, or a list of names, indices, places or cameras."
         )
-    return RIGS[named]
+    several = isinstance(cameras, Sequence)
+    if not several or all(isinstance(each, str | int | float | np.number) for each in cameras):
+        return None
+    return tuple(_camera(camera, k) for k, camera in enumerate(cameras))
 
 
 def _camera(given: Any, index: int) -> CameraConfig:
-    if isinstance(given, CameraConfig):
-        return given
-    if isinstance(given, Mapping):
-        return from_mapping(CameraConfig, given, f"cameras[{index}].")
+    if isinstance(given, CameraConfig | Mapping):
+        return restored(CameraConfig, given, f"cameras[{index}]")
     place = np.asarray(given) if isinstance(given, Sequence | np.ndarray) else np.zeros(0)
     if place.shape != (3,) or not np.issubdtype(place.dtype, np.number):
         raise ConfigError(
@@ -229,72 +264,27 @@ def _camera(given: Any, index: int) -> CameraConfig:
     return CameraConfig(f"camera_{index + 1}", (x, y, z))
 
 
-def _with_faults(
-    config: HRCConfig, faults: "Sequence[FaultConfig | Mapping[str, Any]]"
-) -> HRCConfig:
-    """A config with these faults of cameras.
+def _worker_counts(n_workers: int | tuple[int, int]) -> tuple[int, int]:
+    """The fewest and the most workers of an episode, from one number or from both.
 
     Raises:
-        ConfigError: something else than a list of faults or mappings, or a fault that cannot be.
+        ConfigError: they are no whole numbers, 0 or more, in this order.
     """
-    if isinstance(faults, FaultConfig | Mapping | str) or not isinstance(faults, Sequence):
-        raise ConfigError(f"faults must be a list of FaultConfigs or mappings, got {faults!r}.")
-    return replace(config, faults=restored(tuple[FaultConfig, ...], list(faults), "faults"))
-
-
-def _with_appearance(
-    config: HRCConfig, appearance: "str | AppearanceConfig | Mapping[str, Any]"
-) -> HRCConfig:
-    """A config with another appearance: by name, settings or a mapping.
-
-    Raises:
-        ConfigError: a name or a field that there is not, a value that cannot be.
-    """
-    if isinstance(appearance, Mapping):
-        appearance = from_mapping(AppearanceConfig, appearance, "appearance.")
-    return replace(config, appearance=appearance_called(appearance))
-
-
-def _with_motions(config: HRCConfig, motions: "Sequence[str | Path | Clip]") -> HRCConfig:
-    """A config whose workers play these clips, too.
-
-    Raises:
-        ConfigError: something else than paths and clips.
-    """
-    if isinstance(motions, str | Path | Clip):
-        motions = (motions,)
-    if not isinstance(motions, Sequence):
-        raise ConfigError(f"motions must be a list of paths or clips, got {motions!r}.")
-    given = tuple(str(motion) if isinstance(motion, Path) else motion for motion in motions)
-    return replace(config, motion=replace(config.motion, motions=given))
-
-
-def _with_people(config: HRCConfig, people: "str | PeopleConfig | Mapping[str, Any]") -> HRCConfig:
-    """A config with other people: by name, settings or a mapping.
-
-    Raises:
-        ConfigError: a name of no preset, with those that there are; a field that there is not, a
-            value that cannot be.
-    """
-    if isinstance(people, Mapping):
-        people = from_mapping(PeopleConfig, people, "people.")
-    elif isinstance(people, str):
-        people = people_called(people)
-    elif not isinstance(people, PeopleConfig):
+    pair = tuple(n_workers) if isinstance(n_workers, Sequence) else (n_workers, n_workers)
+    whole = all(isinstance(k, int | np.integer) and not isinstance(k, bool) for k in pair)
+    if not whole or len(pair) != 2 or not 0 <= pair[0] <= pair[1]:
         raise ConfigError(
-            f"people must be a name ({', '.join(map(repr, PEOPLE))}), a PeopleConfig or a mapping "
-            f"of its fields, got {people!r}."
+            "n_workers must be a whole number, 0 or more, or (fewest, most), from which each "
+            f"episode's number is drawn, got {n_workers!r}."
         )
-    return replace(config, motion=replace(config.motion, people=people))
+    return int(pair[0]), int(pair[1])
 
 
-_CHANGES: dict[str, Callable[[HRCConfig, Any], HRCConfig]] = {
-    "people": _with_people,
-    "motions": _with_motions,
-    "faults": _with_faults,
-    "appearance": _with_appearance,
-}
-_ARGUMENTS = (
-    "task", "perception", "estimator", "scene", "n_workers", "control", "shield", "config",
-    "cameras",
-)  # fmt: skip
+def _with_part(record: Any, path: str, value: Any, where: str) -> Any:
+    """A record with another value of a field "a.b"; `where` is what the user calls it."""
+    name, _, rest = path.partition(".")
+    if rest:
+        new = _with_part(getattr(record, name), rest, value, where)
+    else:
+        new = restored(get_type_hints(type(record))[name], value, where)
+    return replace(record, **{name: new})

@@ -16,7 +16,7 @@ from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
 from hrc_env import observations
-from hrc_env.config import HRCConfig, settle
+from hrc_env.config import ConfigChoice, settle
 from hrc_env.core.errors import ConfigError, unknown, whole
 from hrc_env.core.mapping import plain
 from hrc_env.core.stateful import Stateful
@@ -27,6 +27,8 @@ from hrc_env.render.views import PICTURE_SIZE, Views, picture_size
 from hrc_env.rewards import RewardConfig
 from hrc_env.safety.shield import Shield
 from hrc_env.scene.domain_randomization import AppearanceConfig
+from hrc_env.scene.robot import DEFAULT as DEFAULT_ROBOT
+from hrc_env.scene.robot import Robot
 from hrc_env.simulation import Simulation, checked_action
 from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import Task
@@ -67,16 +69,17 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
             `EstimatorSpec`, or a function that makes an estimator (docs/bring_your_own.md).
         cameras: indices or names of the scene's cameras to use; or a rig of your own: its name
             ("lab_gopro"), a TOML file's path, or a list of places (x, y, z) [m],
-            `CameraConfig`s or mappings. None is all cameras of the scene. docs/cameras.md
+            `CameraConfig`s or mappings. None is all cameras of the scene.
         scene: name of the place: "lab", a workshop, or "site", a construction site.
+        robot: a name ("ur10e_like"), one that was registered or a `hrc_env.scene.robot.Robot`.
         n_workers: 0 or more workers; (fewest, most): each episode's number is drawn, and the
             observation has room for the most.
         people: how the workers are with the robot: "attentive", "hurried", "unaware", a
             `PeopleConfig` or a mapping; None for those of the config (attentive).
         motions: clips of recorded motion that the workers play, too, or paths of such
-            (docs/motion_capture.md); None for those of the config (none).
+            (docs/people_and_scenes.md); None for those of the config (none).
         faults: what goes wrong with cameras, `FaultConfig`s or mappings
-            (docs/cameras.md); None for those of the config (none).
+            (docs/perception_and_estimators.md); None for those of the config (none).
         appearance: how scene and workers look, drawn for every episode: "varied" or another of
             `hrc_env.scene.domain_randomization.APPEARANCES`, an `AppearanceConfig` or a mapping;
             None for that of the config (as built). Level "pixels" only.
@@ -84,9 +87,10 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         shield: what may change a command before the arm gets it: a name that was registered or a
             function (`hrc_env.safety.shield.Shield`); None: nothing.
         render_mode: "rgb_array", "depth_array" or None; `gymnasium.make` also takes "human", a
-            window (docs/rendering.md).
+            window (docs/start.md).
         width, height: of what `render` gives [px].
-        config: an `HRCConfig` or a nested mapping of changes to the default.
+        config: an `HRCConfig`, a nested mapping of changes to the default, or the path of a TOML
+            file of such (`hrc_env.config.save_config` writes one).
 
     Raises:
         ConfigError: a name, index or value that is not valid, with those that are.
@@ -102,6 +106,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         estimator: EstimatorChoice = "particle",
         cameras: str | Path | Sequence[Any] | NDArray[Any] | None = None,
         scene: str = "lab",
+        robot: str | Robot = DEFAULT_ROBOT,
         n_workers: int | tuple[int, int] = 1,
         people: str | PeopleConfig | Mapping[str, Any] | None = None,
         motions: Sequence[str | Path | Clip] | None = None,
@@ -112,14 +117,14 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         render_mode: str | None = None,
         width: int = PICTURE_SIZE[0],
         height: int = PICTURE_SIZE[1],
-        config: HRCConfig | Mapping[str, Any] | None = None,
+        config: ConfigChoice = None,
     ) -> None:
         check_render_mode(render_mode)
         self._size = picture_size(width, height)
         self.render_mode = render_mode
         settings = settle(
             task=task, perception=perception, estimator=estimator, cameras=cameras, scene=scene,
-            n_workers=n_workers, people=people, motions=motions, faults=faults,
+            robot=robot, n_workers=n_workers, people=people, motions=motions, faults=faults,
             appearance=appearance, control=control, shield=shield, config=config,
         )  # fmt: skip
         self.config = settings.config
@@ -220,7 +225,7 @@ def check_render_mode(render_mode: str | None) -> None:
     if render_mode == "human":
         raise ConfigError(
             "render_mode='human' is a window round an environment that draws: gymnasium.make("
-            "'HRCReach-v0', render_mode='human') puts it there (pip install 'hrc_env[view]'), or "
+            "ID, render_mode='human') puts it there (pip install 'hrc_env[view]'), or "
             "gymnasium.wrappers.HumanRendering does, round one with render_mode='rgb_array'."
         )
     if render_mode is not None and render_mode not in RENDER_MODES:

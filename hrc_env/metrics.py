@@ -10,7 +10,7 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.records import PoseEstimate, WorkerTruth
 from hrc_env.core.typing import Bools, Capsules, Floats
 from hrc_env.geometry.assignment import assign_rows
-from hrc_env.geometry.distances import narrowest_gap
+from hrc_env.geometry.distances import least_separation
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,7 @@ class Cost:
     proximity: Floats
     contact: Floats
     min_separation_m: Floats
-    """Smallest true gap of the step; infinite without workers."""
+    """Smallest true separation of the step; infinite without workers."""
 
     @property
     def total(self) -> Floats:
@@ -62,8 +62,10 @@ def cost(
     """
     batch, steps = robot_world.shape[:2]
     bodies = workers_world.reshape(batch, steps, -1, 2, 3)
-    gap = narrowest_gap(robot_world, robot_radius_m, bodies, worker_radius_m.reshape(batch, -1))
-    nearest_m = gap.distance_m.min(axis=1)
+    nearest = least_separation(
+        robot_world, robot_radius_m, bodies, worker_radius_m.reshape(batch, -1)
+    )
+    nearest_m = nearest.distance_m.min(axis=1)
     return Cost(
         proximity=(nearest_m < config.proximity_m).astype(float),
         contact=(nearest_m <= 0.0).astype(float),

@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 from hrc_env.belief import Belief, standard_deviation_m
 from hrc_env.core.errors import check_shape
 from hrc_env.core.kernels import kernel
+from hrc_env.core.old_names import Named
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats
 
-FAR_GAP_M = 1.0
-"""A gap as wide as this or wider is reported as this: nothing near, or nobody known of."""
+FAR_SEPARATION_M = 1.0
+"""Larger separations are reported as this: nothing near, or nobody known of."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,8 +29,8 @@ class Sizes:
     arm_joints: int
     actions: int
     workers: int
-    forecasts: int = 0
-    """How many forecasts were asked for."""
+    horizons: int = 0
+    """How many times ahead were asked for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,9 +52,9 @@ class ObservationTerm:
 
 
 def _nearest_direction(now: Belief) -> Floats:
-    direction = (now.gap.point_b_world - now.gap.point_a_world).reshape(-1, 3)
+    direction = (now.separation.point_b_world - now.separation.point_a_world).reshape(-1, 3)
     shorten(direction, 1e-3)
-    near = now.gap.distance_m < FAR_GAP_M
+    near = now.separation.distance_m < FAR_SEPARATION_M
     return np.where(near.reshape(-1, 1), direction, 0.0)
 
 
@@ -69,13 +70,13 @@ def shorten(vectors: Floats, softening: float) -> None:
 
 def _joints_forecast(now: Belief) -> Floats:
     """(B, W, H, J, 3) from the tool point now."""
-    joints = np.stack([later.mean_world for later in now.forecasts], axis=2)
+    joints = np.stack([later.mean_world for later in now.forecast], axis=2)
     return joints - now.robot.tool_world[:, None, None, None]
 
 
 def _std_forecast(now: Belief) -> Floats:
     """(B, W, H, J)."""
-    return np.stack([standard_deviation_m(later) for later in now.forecasts], axis=2)
+    return np.stack([standard_deviation_m(later) for later in now.forecast], axis=2)
 
 
 ROBOT_TERMS: tuple[ObservationTerm, ...] = (
@@ -134,9 +135,9 @@ SHARED_TERMS: tuple[ObservationTerm, ...] = (
         lambda now: now.estimate.tracked.astype(float),
     ),
     ObservationTerm(
-        "worker_gap", lambda of: of.workers, "m", "-", FAR_GAP_M, 0.5,
+        "worker_separation", lambda of: of.workers, "m", "-", FAR_SEPARATION_M, 0.5,
         "Distance between the robot's surface and the estimated body's, at most 1 m.",
-        lambda now: np.minimum(now.gap.distance_m, FAR_GAP_M),
+        lambda now: np.minimum(now.separation.distance_m, FAR_SEPARATION_M),
     ),
     ObservationTerm(
         "worker_direction", lambda of: of.workers * 3, "-", "world", 1.0, 1.0,
@@ -144,13 +145,13 @@ SHARED_TERMS: tuple[ObservationTerm, ...] = (
         _nearest_direction,
     ),
     ObservationTerm(
-        "worker_joints_forecast", lambda of: of.workers * of.forecasts * N_JOINTS * 3,
+        "worker_joints_forecast", lambda of: of.workers * of.horizons * N_JOINTS * 3,
         "m", "world", 6.0, 1.0,
         "From the tool point now to where each joint will be, for each of `forecast_s`.",
         _joints_forecast,
     ),
     ObservationTerm(
-        "worker_joints_forecast_std", lambda of: of.workers * of.forecasts * N_JOINTS,
+        "worker_joints_forecast_std", lambda of: of.workers * of.horizons * N_JOINTS,
         "m", "world", 1.0, 0.25,
         "Standard deviation of each of these (root mean over the axes).",
         _std_forecast,
@@ -249,4 +250,4 @@ def _scale(
 def split(observation: NDArray[np.float32], where: ObservationLayout) -> dict[str, Floats]:
     """A flat observation (..., n) as named terms in their units."""
     physical = observation * where.scale
-    return {name: physical[..., part] for name, part in where.slices.items()}
+    return Named((name, physical[..., part]) for name, part in where.slices.items())

@@ -21,6 +21,7 @@ from hrc_env.tasks import BUILT_IN, EPISODE_STEPS
 if TYPE_CHECKING:
     from hrc_env.perception.detector import KeypointFunction
     from hrc_env.safety.shield import Shield
+    from hrc_env.scene.robot import Robot
     from hrc_env.tasks.task import Task
     from hrc_env.tracking.estimators import EstimatorSpec
 
@@ -32,6 +33,7 @@ REGISTRIES = {
     "task": ("hrc_env.tasks.task", "TASKS"),
     "estimator": ("hrc_env.tracking.estimators", "ESTIMATORS"),
     "detector": ("hrc_env.perception.detector", "DETECTORS"),
+    "robot": ("hrc_env.scene.robot", "ROBOTS"),
     "shield": ("hrc_env.safety.shield", "SHIELDS"),
 }
 """What can be brought: the module and the table in which it is kept by name."""
@@ -46,7 +48,7 @@ def register_task(task: "Task") -> None:
     Raises:
         ConfigError: its id is taken, or something in it is missing or of the wrong kind.
     """
-    from hrc_env.tasks.checks import check_task  # here and below: kernels take time to import
+    from hrc_env.tasks.task import check_task  # here and below: kernels take time to import
 
     check_task(task)
     if task.id in BUILT_IN:
@@ -87,6 +89,22 @@ def register_detector(name: str, make: "Callable[[], KeypointFunction]") -> None
     _add("detector", name, make)
 
 
+def register_robot(robot: "Robot") -> None:
+    """Make a robot known by its name: wherever `robot=` or `--robot` is taken.
+
+    Args:
+        robot: a `hrc_env.scene.robot.Robot`.
+
+    Raises:
+        ConfigError: its name is taken, or something that it names is missing in its MJCF or of
+            the wrong kind.
+    """
+    from hrc_env.scene.robot import check_robot
+
+    check_robot(robot)
+    _add("robot", robot.name, robot)
+
+
 def register_shield(name: str, shield: "Shield") -> None:
     """Make a shield known: `shield=name` of every environment.
 
@@ -108,7 +126,7 @@ def register_environment(task_id: str, max_episode_steps: int = EPISODE_STEPS) -
     register(
         id=task_id,
         entry_point="hrc_env.env:HRCEnv",
-        vector_entry_point="hrc_env.vector.factory:make_vector",
+        vector_entry_point="hrc_env.vector.env:make_vector",
         max_episode_steps=max_episode_steps,
         kwargs={"task": task_id},
     )

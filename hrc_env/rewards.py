@@ -23,7 +23,7 @@ class RewardConfig:
     proximity: float = 2.0
     """Taken off for closeness to the *estimated* body, times the term's shape in [0, 2.25]."""
     proximity_reach_m: float = 0.3
-    """Closeness begins to count below this gap between the surfaces [m]."""
+    """Closeness begins to count below this separation of the surfaces [m]."""
 
     def __post_init__(self) -> None:
         if self.proximity_reach_m <= 0:
@@ -43,9 +43,9 @@ class RewardTerm:
     `RewardConfig`; those of a task's term are the task's settings."""
 
 
-def closeness(gap_m: Floats, reach_m: float) -> Floats:
+def closeness(separation_m: Floats, reach_m: float) -> Floats:
     """Shape of the proximity term: 0 from `reach_m` on, 1 at touch, at most 2.25 inside."""
-    share = np.minimum(np.maximum((reach_m - gap_m) / reach_m, 0.0), 1.5)
+    share = np.minimum(np.maximum((reach_m - separation_m) / reach_m, 0.0), 1.5)
     return share * share
 
 
@@ -61,7 +61,7 @@ def _mean_square(vectors: Floats) -> Floats:
 
 
 def _proximity(now: Belief, step: Any, previous: Floats, config: RewardConfig) -> Floats:
-    nearest_m = np.minimum.reduce(now.gap.distance_m, axis=-1, initial=np.inf)
+    nearest_m = np.minimum.reduce(now.separation.distance_m, axis=-1, initial=np.inf)
     penalty: Floats = -config.proximity * closeness(nearest_m, config.proximity_reach_m)
     return penalty
 
@@ -81,8 +81,8 @@ SHARED_TERMS: tuple[RewardTerm, ...] = (
     ),
     RewardTerm(
         "proximity",
-        "Minus `proximity` times clip((d0 - d) / d0, 0, 1.5)^2, where d is the gap between the "
-        "robot's surface and the nearest estimated body and d0 is `proximity_reach_m`.",
+        "Minus `proximity` times clip((d0 - d) / d0, 0, 1.5)^2, where d is the distance of the "
+        "robot's surface from the nearest estimated body and d0 is `proximity_reach_m`.",
         _proximity,
     ),
 )

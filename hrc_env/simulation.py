@@ -6,199 +6,178 @@ streams only, never on the size of the batch.
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hrc_env import metrics, observations, rewards
-from hrc_env.belief import Belief, estimated_gap
+from hrc_env.belief import Belief, estimated_separation
 from hrc_env.config import Settings
 from hrc_env.control import joint_command, n_actions
-from hrc_env.core.batching import picked, rows, write_rows
+from hrc_env.core.batching import picked, write_rows
 from hrc_env.core.errors import ConfigError, check_shape
 from hrc_env.core.kernels import ahead
 from hrc_env.core.records import PoseEstimate, RobotState, WorkerMotion, WorkerTruth
 from hrc_env.core.stateful import State, Stateful
 from hrc_env.core.streams import children
-from hrc_env.core.typing import Floats, Ints, Points3
+from hrc_env.core.typing import Bools, Floats, Ints, JointVelocities, Points3
 from hrc_env.geometry import chains
 from hrc_env.motion import generator
-from hrc_env.motion.workers import Crew, bodies_of, worker_counts
-from hrc_env.pipeline.levels import CAMERA_LEVELS, make_senses
-from hrc_env.pipeline.sensor_input import Moment
+from hrc_env.pipeline.levels import CAMERA_LEVELS, make_pipeline
+from hrc_env.pipeline.sensor_input import SensorInput, TrueSensorInput
 from hrc_env.rewards import RewardConfig
 from hrc_env.safety.shield import shielded
 from hrc_env.scene.build import build
 from hrc_env.scene.physics import Physics
 from hrc_env.scene.rigs import findings
-from hrc_env.step import Info, StepResult, cost_info, no_cost, rows_of, tracking_info
+from hrc_env.step import (
+    Info,
+    StepResult,
+    body_names,
+    cost_info,
+    miscalibration_info,
+    no_cost,
+    rows_of,
+    tracking_info,
+    worker_info,
+)
 from hrc_env.tasks.task import World
 from hrc_env.tracking import oracle
-from hrc_env.tracking.miscalibration import MiscalibrationFlags
 from hrc_env.worker.body import pool, stack, worker_capsules, worker_truth
 
 CLOSING_M_S = 8.0
 """Arm and worker never come nearer to each other than so fast [m/s]; 3.4 was the most in some
 290,000 steps of arms that were driven to and fro as hard as they can be."""
-WATCHED_CAPSULES = (3, 8)
-"""Of the arm: elbow and tool, whose ends the workers watch."""
 
 
-@dataclass(slots=True)
-class Streams:
-    """One random generator per environment for each organ that draws numbers."""
-
-    robot: list[np.random.Generator]
-    motion: list[np.random.Generator]
-    sensor: list[np.random.Generator]
-    tracker: list[np.random.Generator]
-    task: list[np.random.Generator]
-
-    def organs(self) -> tuple[list[np.random.Generator], ...]:
-        """Them all, in the order in which streams are handed out."""
-        return self.robot, self.motion, self.sensor, self.tracker, self.task
-
-
-N_STREAMS = len(fields(Streams))
+STREAMS = ("robot", "motion", "sensor", "tracker", "task")
+"""Who draws numbers, each from a generator of its own, in the order in which these are handed out:
+the worker's walk does not depend on who looks at it."""
 
 
 class Simulation(Stateful):
     """`batch` environments of the same settings that step together."""
 
     CHANGES = (
-        "physics", "senses", "motion", "task_state", "streams", "action", "episode_cost", "gap_m",
-        "estimate", "forecasts", "worn", "reward_weights",
+        "physics", "pipeline", "motion", "task_state", "streams", "action", "episode_cost",
+        "separation_m", "estimates", "body_names", "reward_weights",
     )  # fmt: skip
 
     def __init__(self, batch: int, settings: Settings) -> None:
         config, perception, scene = settings.config, settings.perception, settings.scene
         ahead.ensure(perception)
         self.batch, self.config, self.control = batch, config, settings.control
-        self.shield = settings.shield
-        self.perception, self.reward_weights = perception, config.reward
-        self.task = settings.task
+        self.perception, self.shield, self.task = perception, settings.shield, settings.task
         self.bodies = stack(pool(config.worker))
-        fewest, most = worker_counts(settings.n_workers)
-        empty = build(config.scene, scene, 0, self.bodies.names, settings.cameras)
+        fewest, most = settings.n_workers
+        empty = build(config.scene, scene, 0, self.bodies.names, settings.cameras, settings.robot)
         self.motion = generator.make_state(
             batch, most, self.bodies, config.motion, empty.grounds, fewest
         )  # first, as it knows how many workers there is room for
-        self.scene = build(config.scene, scene, most, self.bodies.names, settings.cameras)
+        self.scene = build(
+            config.scene, scene, most, self.bodies.names, settings.cameras, settings.robot
+        )
         if perception in CAMERA_LEVELS:
             for finding in findings(self.scene):
                 warnings.warn(finding, stacklevel=3)
         self.settings = {
             "batch": batch, "task": settings.task.id, "perception": perception,
-            "estimator": settings.estimator.name, "scene": scene,
+            "estimator": settings.estimator.name, "scene": scene, "robot": settings.robot.name,
             "cameras": tuple(camera.name for camera in self.scene.cameras),
             "n_workers": (fewest, most) if fewest < most else most, "control": settings.control,
             "config": config,
         }  # fmt: skip
         self.chain = self.scene.chain
-        spread = config.start_spread_rad
-        check_shape("start_spread_rad", (len(spread),), (self.chain.n_joints,), "one a joint")
+        self._spread_rad = np.array(config.start_spread_rad or settings.robot.spread_rad)
+        joints = (self.chain.n_joints,)
+        check_shape("start_spread_rad", self._spread_rad.shape, joints, "one a joint")
         self.n_actions = n_actions(settings.control, self.chain)
-        self.layout = observations.layout(
-            self.terms,
-            observations.Sizes(
-                len(self.scene.home_q), self.n_actions, most, len(config.forecast_s)
-            ),
+        sizes = observations.Sizes(
+            self.chain.n_joints, self.n_actions, most, len(config.forecast_s)
         )
+        self.layout = observations.layout(self.terms, sizes)
         self.physics = Physics(self.scene, batch)
-        self.senses = make_senses(perception, settings.estimator, self.scene, batch, config)
-        self.worn = np.full(batch, None, object)
+        self.pipeline = make_pipeline(perception, settings.estimator, self.scene, batch, config)
+        self.body_names = np.full(batch, None, object)
         self.task_state = self.task.init(batch)
+        self.reward_weights = config.reward
         self._everyone = np.arange(batch)
         self.action = np.zeros((batch, self.n_actions))
-        self.episode_cost = np.zeros(batch)
-        self.gap_m = np.zeros(batch)
-        self.estimate = oracle.prior(batch, most, config.tracker)
-        self.forecasts = tuple(oracle.prior(batch, most, config.tracker) for _ in config.forecast_s)
-        blank = [np.random.default_rng(0)] * batch
-        self.streams = Streams(*(list(blank) for _ in range(5)))
+        self.episode_cost, self.separation_m = np.zeros(batch), np.zeros(batch)
+        self.estimates = tuple(
+            oracle.prior(batch, most, config.tracker) for _ in (0.0, *config.forecast_s)
+        )
+        """What is believed of the workers now, and expected at each of `forecast_s`."""
+        self.streams = {name: [np.random.default_rng(0)] * batch for name in STREAMS}
 
     def reset(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> StepResult:
-        """Start environments `ids` anew, one generator each; their rows of an outcome.
-
-        Every organ draws from a stream of its own, always as many and in the same order, so that
-        the worker's walk does not depend on who looks at it.
-        """
+        """Start environments `ids` anew, one generator each; their rows of a result."""
+        streams = self.streams
         for b, rng in zip(ids, rngs, strict=True):
-            for organ, stream in zip(self.streams.organs(), children(rng, N_STREAMS), strict=True):
-                organ[b] = stream
-        generator.reset(self.motion, ids, self.streams.motion)
-        self.worn[ids] = bodies_of(self.motion, ids, self.bodies.names)
-        self.physics.reset(ids, self._starting_angles(ids), self.motion.body[ids])
-        self.action[ids], self.episode_cost[ids], self.gap_m[ids] = 0.0, 0.0, 0.0
+            for name, stream in zip(STREAMS, children(rng, len(STREAMS)), strict=True):
+                streams[name][b] = stream
+        generator.reset(self.motion, ids, streams["motion"])
+        bodies = self.motion.workers["body"][ids]
+        self.body_names[ids] = body_names(
+            bodies, self.motion.workers["present"][ids], self.bodies.names
+        )
+        self.physics.reset(ids, self._starting_angles(ids), bodies)
+        self.action[ids], self.episode_cost[ids], self.separation_m[ids] = 0.0, 0.0, 0.0
         robot = chains.robot_state(self.chain, self.physics.q[ids], self.physics.qd[ids])
-        self.task.reset(self.task_state, ids, self.streams.task, World(robot), self.config.task)
-        self.senses.reset(ids, self.streams.sensor, self.streams.tracker)
+        self.task.reset(self.task_state, ids, streams["task"], World(robot), self.config.task)
+        self.pipeline.reset(ids, streams["sensor"], streams["tracker"])
         motion = generator.current(self.motion, ids)
         truth = worker_truth(self.bodies, motion)
-        estimate, forecasts = self._sense(ids, motion, truth)
-        believed = self._believed(ids, robot, estimate, forecasts)
-        observation = observations.observe(believed, self.layout, self.terms)
-        crew = rows(self.crew, ids)
+        estimates = self._perceive(ids, motion, truth)
+        belief = self._believed(ids, robot, estimates)
+        observation = observations.observe(belief, self.layout, self.terms)
         info = {
             **no_cost(len(ids)),
-            **tracking_info(estimate, truth, crew.present),
-            **rows_of(self._tally(), ids),
+            **tracking_info(estimates[0], truth, self.present[ids]),
+            **self._episode_info(ids),
         }
-        over = np.zeros(len(ids), bool)
-        return StepResult(observation, np.zeros(len(ids)), over, info, crew, self._suspects(ids))
+        return StepResult(observation, np.zeros(len(ids)), np.zeros(len(ids), bool), info)
 
     def step(self, action: Floats) -> StepResult:
         """One control step of every environment; action (B, A) in [-1, 1]."""
-        config, streams = self.config, self.streams
+        config = self.config
         previous, self.action = self.action, np.array(action, float)
-        command = joint_command(
-            self.control, action, self.physics.q, self.chain, self.scene.home_q, config.control
-        )
-        shield_info: Info = {}
-        if self.shield is not None:
-            command, shield_info = shielded(self.shield, self.believed, command, config.ctrl_dt)
+        command, shield_info = self._command()
         path, motion = generator.advance(
-            self.motion, streams.motion, config.scene.sim_dt, config.n_substeps
+            self.motion, self.streams["motion"], config.scene.sim_dt, config.n_substeps
         )
-        apart = self.gap_m > CLOSING_M_S * config.ctrl_dt
-        q_path = self.physics.step(command, path, apart)
+        far = self.separation_m > CLOSING_M_S * config.ctrl_dt
+        q_path = self.physics.step(command, path, far)
         truth = worker_truth(self.bodies, motion)
-
-        estimate, forecasts = self._sense(self._everyone, motion, truth)
+        estimates = self._perceive(self._everyone, motion, truth)
         robot, arm = chains.robot_along(self.chain, q_path, self.physics.qd)
-        seen_world = robot.capsules_world[:, WATCHED_CAPSULES, 1]
+        seen_world = robot.capsules_world[:, self.scene.watched, 1]
         generator.watch(self.motion, seen_world, motion, config.ctrl_dt)
         progress = self.task.advance(
-            self.task_state, streams.task, World(robot), config.ctrl_dt, config.task
+            self.task_state, self.streams["task"], World(robot), config.ctrl_dt, config.task
         )
-        believed = self._believed(self._everyone, robot, estimate, forecasts)
-        terms = {
-            **rewards.evaluated(self.task.rewards, believed, progress, previous, config.task),
-            **rewards.evaluated(
-                rewards.SHARED_TERMS, believed, progress, previous, self.reward_weights
-            ),
-        }
-        reward = rewards.total(terms, self.batch)
-
+        belief = self._believed(self._everyone, robot, estimates)
+        terms = self._reward_terms(belief, progress, previous)
         workers = worker_capsules(self.bodies, path, motion.body)
         cost = metrics.cost(
             arm, robot.capsule_radius_m, workers, truth.capsule_radius_m, config.cost
         )
         self.episode_cost += cost.total
-        self.gap_m = cost.min_separation_m
-        crew = self.crew
+        self.separation_m = cost.min_separation_m
         info = {
             **{f"reward/{name}": value for name, value in terms.items()},
-            **cost_info(cost, crew.present),
-            **tracking_info(estimate, truth, crew.present),
+            **cost_info(cost, self.present),
+            **tracking_info(estimates[0], truth, self.present),
             **shield_info,
-            **self._tally(),
+            **self._episode_info(self._everyone),
         }
-        terminated = (cost.contact > 0) & config.cost.contact_terminates
-        observation = observations.observe(believed, self.layout, self.terms)
-        suspects = self._suspects(self._everyone)
-        return StepResult(observation, reward, terminated, info, crew, suspects)
+        return StepResult(
+            observations.observe(belief, self.layout, self.terms),
+            rewards.total(terms, self.batch),
+            (cost.contact > 0) & config.cost.contact_terminates,
+            info,
+        )
 
     def set_reward(self, weights: RewardConfig) -> None:
         """Weigh the reward's terms so from the next step on."""
@@ -224,16 +203,12 @@ class Simulation(Stateful):
 
     def close(self) -> None:
         """Release threads and graphics contexts."""
-        self.senses.close()
+        self.pipeline.close()
 
-    def _starting_angles(self, ids: Ints) -> Floats:
-        """(len(ids), N) arm angles near home, turned anywhere in front of the base."""
-        spread = np.array(self.config.start_spread_rad)
-        angles = [
-            self.scene.home_q + self.streams.robot[b].uniform(-1, 1, len(spread)) * spread
-            for b in ids
-        ]
-        return np.array(angles).reshape(len(ids), -1)
+    @property
+    def estimate(self) -> PoseEstimate:
+        """What is believed of the workers now."""
+        return self.estimates[0]
 
     @property
     def terms(self) -> tuple[observations.ObservationTerm, ...]:
@@ -241,68 +216,85 @@ class Simulation(Stateful):
         return self.task.observation_terms
 
     @property
-    def crew(self) -> Crew:
-        """Who is there now."""
-        return Crew(generator.activity(self.motion), self.worn)
+    def present(self) -> Bools:
+        """(B, W) who is in the episode."""
+        return generator.activity(self.motion) != generator.ABSENT
 
     @property
-    def believed(self) -> Belief:
+    def belief(self) -> Belief:
         """What every robot believes now."""
         robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
-        return self._believed(self._everyone, robot, self.estimate, self.forecasts)
+        return self._believed(self._everyone, robot, self.estimates)
 
     def markers(self, b: int) -> Points3:
         """(M, 3) what the task of environment `b` has to show [m]."""
         view = self.task.view(self.task_state, np.array([b]), self.config.task)
         return self.task.markers(view)[0]
 
-    def _sense(
+    def _starting_angles(self, ids: Ints) -> Floats:
+        """(len(ids), N) arm angles near home, turned anywhere in front of the base."""
+        spread, rngs = self._spread_rad, picked(self.streams["robot"], ids)
+        angles = [self.scene.home_q + rng.uniform(-1, 1, len(spread)) * spread for rng in rngs]
+        return np.array(angles).reshape(len(ids), -1)
+
+    def _command(self) -> tuple[JointVelocities, Info]:
+        """(B, N) what the arms are to do [rad/s], and what the shield says to it."""
+        command = joint_command(
+            self.control, self.action, self.physics.q, self.chain, self.scene.home_q,
+            self.config.control,
+        )  # fmt: skip
+        if self.shield is None:
+            return command, {}
+        return shielded(self.shield, self.belief, command, self.config.ctrl_dt)
+
+    def _perceive(
         self, ids: Ints, motion: WorkerMotion, truth: WorkerTruth
-    ) -> tuple[PoseEstimate, tuple[PoseEstimate, ...]]:
-        """Let the senses look at environments `ids`; their rows of the estimates now and ahead."""
-        moment = Moment(ids, self.physics.q[ids], motion, truth, self.motion.present[ids] > 0.0)
-        streams = self.streams
-        estimate = self.senses.sense(
-            moment, picked(streams.sensor, ids), picked(streams.tracker, ids)
-        )
-        forecasts = tuple(
-            self.senses.forecast(estimate, ids, horizon_s) for horizon_s in self.config.forecast_s
-        )
+    ) -> tuple[PoseEstimate, ...]:
+        """Let the pipeline look at environments `ids`: their rows of `estimates`."""
+        now = SensorInput(ids, self.physics.q[ids], motion)
+        if self.pipeline.NEEDS_TRUTH:
+            now = TrueSensorInput(ids, now.q, motion, truth, self.motion.workers["present"][ids])
+        sensor, tracker = (picked(self.streams[name], ids) for name in ("sensor", "tracker"))
+        estimate = self.pipeline.perceive(now, sensor, tracker)
+        later = (self.pipeline.forecast(estimate, ids, t) for t in self.config.forecast_s)
+        estimates = (estimate, *later)
         if ids is self._everyone:
-            self.estimate, self.forecasts = estimate, forecasts
+            self.estimates = estimates
         else:
-            for whole, part in zip(
-                (self.estimate, *self.forecasts), (estimate, *forecasts), strict=True
-            ):
+            for whole, part in zip(self.estimates, estimates, strict=True):
                 write_rows(whole, ids, part)
-        return estimate, forecasts
+        return estimates
 
     def _believed(
-        self,
-        ids: Ints,
-        robot: RobotState,
-        estimate: PoseEstimate,
-        forecasts: tuple[PoseEstimate, ...],
+        self, ids: Ints, robot: RobotState, estimates: tuple[PoseEstimate, ...]
     ) -> Belief:
         """What the robots of environments `ids` believe; the records are of them only."""
+        estimate, *later = estimates
         return Belief(
             robot=robot,
             estimate=estimate,
-            gap=estimated_gap(robot, estimate),
+            separation=estimated_separation(robot, estimate),
             task=self.task.view(self.task_state, ids, self.config.task),
             action=self.action[ids],
-            forecasts=forecasts,
+            forecast=tuple(later),
         )
 
-    def _suspects(self, ids: Ints) -> MiscalibrationFlags:
-        """Which cameras of environments `ids` are thought to be miscalibrated."""
-        flags = self.senses.suspected(ids)
-        names = self.settings["cameras"] if flags.shape[1] else ()
-        return MiscalibrationFlags(names, flags)
+    def _reward_terms(self, belief: Belief, progress: Any, previous: Floats) -> dict[str, Floats]:
+        """(B,) every term of the reward: the task's, then what all tasks share."""
+        own, shared = self.task.rewards, rewards.SHARED_TERMS
+        return {
+            **rewards.evaluated(own, belief, progress, previous, self.config.task),
+            **rewards.evaluated(shared, belief, progress, previous, self.reward_weights),
+        }
 
-    def _tally(self) -> Info:
-        """What the episode has come to so far."""
-        return {"episode_cost": self.episode_cost.copy(), **self.task.info(self.task_state)}
+    def _episode_info(self, ids: Ints) -> Info:
+        """What the episodes of environments `ids` have come to so far, and who is there."""
+        tally = {"episode_cost": self.episode_cost, **self.task.info(self.task_state)}
+        return {
+            **rows_of(tally, ids),
+            **worker_info(generator.activity(self.motion)[ids], self.body_names[ids]),
+            **miscalibration_info(self.settings["cameras"], self.pipeline.suspected(ids)),
+        }
 
 
 def checked_action(action: ArrayLike, shape: tuple[int, ...]) -> Floats:

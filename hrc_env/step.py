@@ -1,21 +1,32 @@
-"""What a step or a reset gives: observation, reward, end, named values, crew, suspects."""
+"""What a step or a reset gives: observation, reward, end, and infos by name."""
 
+import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import compress
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env import metrics
+from hrc_env.core.old_names import Named
 from hrc_env.core.records import PoseEstimate, WorkerTruth
 from hrc_env.core.typing import Bools, Floats, Ints
-from hrc_env.motion.workers import Crew
-from hrc_env.tracking.miscalibration import MiscalibrationFlags
+from hrc_env.motion import generator
 
-Info = dict[str, Floats]
-"""Named values (B,); NaN means that the environment has no such value in this step."""
+Info = dict[str, NDArray[Any]]
+"""Named values (B,): numbers, NaN where an environment has none in this step; or tuples of words,
+as objects."""
 FLAGS = ("is_success",)
 """Values that are true or false."""
+ACTIVITY = "worker/activity"
+"""What each worker is doing, by name; `ABSENT` of who is not in the episode."""
+BODY = "worker/body"
+"""Which baked body each worker has in this episode; likewise."""
+ABSENT = "absent"
+MISCALIBRATED = "perception/miscalibrated"
+"""Names of cameras that contradict the others as if they had been moved, turned or zoomed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,18 +40,26 @@ class StepResult:
     terminated: Bools
     """(B,)."""
     info: Info
-    crew: Crew
-    """Who is there, and what they do."""
-    suspects: MiscalibrationFlags
-    """Which cameras are thought to be miscalibrated."""
 
-    def info_of(self, b: int) -> dict[str, Any]:
+    def info_of(self, b: int) -> Named:
         """The info of one environment: absent values are left out, flags are bool."""
         values = {name: value.item(b) for name, value in self.info.items()}
-        known: dict[str, Any] = {name: value for name, value in values.items() if value == value}
+        known = Named((name, value) for name, value in values.items() if value == value)
         for name in FLAGS:
             known[name] = bool(known[name])
-        return {**known, **self.crew.info_of(b), **self.suspects.info_of(b)}
+        return known
+
+
+def joined(results: Sequence[StepResult]) -> StepResult:
+    """Results of ranges of a batch, one after the other."""
+    if len(results) == 1:
+        return results[0]
+    return StepResult(
+        np.concatenate([each.observation for each in results]),
+        np.concatenate([each.reward for each in results]),
+        np.concatenate([each.terminated for each in results]),
+        {name: np.concatenate([each.info[name] for each in results]) for name in results[0].info},
+    )
 
 
 def rows_of(info: Info, ids: Ints) -> Info:
@@ -69,3 +88,41 @@ def tracking_info(estimate: PoseEstimate, truth: WorkerTruth, present: Bools) ->
     """How far the belief is from the truth; no error is given where nobody is tracked."""
     error_m, lost = metrics.tracking_error(estimate, truth, present)
     return {"tracking/mpjpe_m": error_m, "tracking/lost": lost.astype(float)}
+
+
+def worker_info(activity: Ints, body_names: NDArray[np.object_]) -> Info:
+    """What workers (B, W) do, and whose bodies (B,) they have, by name."""
+    doing = [_activity_names(tuple(row)) for row in activity.tolist()]
+    return {ACTIVITY: objects(doing), BODY: body_names.copy()}
+
+
+def miscalibration_info(cameras: tuple[str, ...], suspected: Bools) -> Info:
+    """Which of the cameras (B, C) contradict the others; nothing where there are no cameras."""
+    if not suspected.shape[1]:
+        return {}
+    return {MISCALIBRATED: objects([tuple(compress(cameras, row)) for row in suspected.tolist()])}
+
+
+def body_names(bodies: Ints, present: Bools, names: tuple[str, ...]) -> NDArray[np.object_]:
+    """(B,) the names of the workers' bodies (B, W), a tuple each."""
+    rows = zip(bodies.tolist(), present.tolist(), strict=True)
+    return objects(
+        [
+            tuple(names[k] if there else ABSENT for k, there in zip(*row, strict=True))
+            for row in rows
+        ]
+    )
+
+
+def objects(values: Sequence[Any]) -> NDArray[np.object_]:
+    """(B,) things of any kind, tuples too."""
+    array = np.empty(len(values), object)
+    for k, value in enumerate(values):
+        array[k] = value
+    return array
+
+
+@functools.lru_cache(maxsize=4096)
+def _activity_names(activity: tuple[int, ...]) -> tuple[str, ...]:
+    names = generator.activity_names
+    return tuple(ABSENT if k == generator.ABSENT else names[k] for k in activity)

@@ -1,24 +1,30 @@
 """The examples of bringing one's own: short, and known wherever a name is asked for."""
 
 import dataclasses
+import re
 import subprocess
 import sys
 
 import gymnasium
 import imageio.v2 as imageio
+import mujoco
 import numpy as np
 import pytest
 from commands import ROOT, hrc
 
 import hrc_env
-from agents.base import make_agent, situation
+from agents.env_info import env_info
+from agents.registry import make_agent
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Roi
 from hrc_env.env import HRCEnv
-from hrc_env.geometry.rig_files import write_rig
+from hrc_env.geometry import chains
+from hrc_env.geometry.camera_config import write_rig
 from hrc_env.perception.detector import own_joints
 from hrc_env.registration import import_files
+from hrc_env.scene.build import build
 from hrc_env.scene.render import PictureRenderer
+from hrc_env.scene.robot import ROBOTS
 from hrc_env.tasks.task import TASKS, task_called
 from hrc_env.tracking.config import ParticleConfig, of_kind
 from hrc_env.tracking.estimators import ESTIMATORS
@@ -194,7 +200,7 @@ def test_a_shield_changes_commands_and_says_so():
     for shield in (None, "slow_down"):
         env = gymnasium.make("HRCReach-v0", perception="truth", shield=shield)
         simulation = env.unwrapped.simulation
-        agent, (observation, _) = make_agent("scripted", situation(simulation)), env.reset(seed=1)
+        agent, (observation, _) = make_agent("scripted", env_info(simulation)), env.reset(seed=1)
         infos[shield] = []
         for _ in range(200):
             observation, *_, info = env.step(agent.act(observation))
@@ -323,3 +329,74 @@ def test_films_are_followed_without_a_simulator(tmp_path, pixels):
     middle, deviation_m = found[-1]
     assert np.linalg.norm(middle - np.reshape(truths[-1], (15, 3)).mean(0)) < 0.05
     assert 0.005 < deviation_m < 0.2
+
+
+def test_a_robot_works_wherever_one_is_named():
+    many = gymnasium.make_vec("HRCReach-v0", 2, perception="keypoints", robot="swing_arm")
+    one = gymnasium.make("HRCReach-v0", perception="keypoints", robot=ROBOTS["swing_arm"])
+    assert one.action_space.shape == (3,)
+    many.reset(seed=[3, 4])
+    one.reset(seed=4)
+    for _ in range(5):
+        actions = many.action_space.sample()
+        seen, *_ = many.step(actions)
+        np.testing.assert_array_equal(seen[1], one.step(actions[1])[0])
+    assert "swing_arm" in hrc("list").stdout
+
+
+def test_the_geometry_of_a_robot_is_that_of_its_mjcf():
+    scene, q = build(robot="swing_arm"), np.array([0.4, -0.3, 1.1])
+    data = mujoco.MjData(scene.model)
+    data.qpos[:] = q
+    mujoco.mj_kinematics(scene.model, data)
+    tip = chains.tool(scene.chain, q)[:3, 3]
+    np.testing.assert_allclose(data.site("robot/tip").xpos, tip, atol=1e-9)
+    for name, ends in zip(scene.robot.capsules, chains.capsules(scene.chain, q), strict=True):
+        np.testing.assert_allclose(data.geom(f"robot/{name}").xpos, ends.mean(0), atol=1e-9)
+
+
+def test_a_robot_goes_where_it_is_told():
+    env = gymnasium.make("HRCReach-v0", perception="none", n_workers=0, robot="swing_arm")
+    env.reset(seed=1)
+    physics = env.unwrapped.simulation.physics
+    before = physics.q[0]
+    for _ in range(12):
+        env.step(np.array([0.5, 0.0, 0.0]))
+    moved = physics.q[0] - before
+    assert moved[0] > 0.1
+    np.testing.assert_allclose(moved[1:], 0.0, atol=1e-3)
+
+
+SERVO = '<velocity joint="bend" kv="400" ctrlrange="-3 3"/>'
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({}, "the robot 'swing_arm' already"),
+        ({"mjcf": "<mujoco><"}, "cannot be used"),
+        ({"mjcf": "nowhere.xml"}, "cannot be used"),
+        ({"tool_site": "top"}, "no site 'top'"),
+        ({"joints": ("turn", "lift", "bent")}, "no joint 'bent'"),
+        ({"joints": ("lift", "turn", "bend")}, "in its order"),
+        ({"capsules": ("turret", "boom", "claw")}, "no geom 'claw'"),
+        ({"watched": ("jip",)}, "Did you mean 'jib'"),
+        ({"home_q": (0.0, 0.6)}, "home_q must be 3 angles"),
+        ({"home_q": (0.0, 0.6, np.nan)}, "home_q must be 3 angles"),
+        ({"home_q": (3.0, 0.6, 1.2)}, "outside of the joints' ranges"),
+        ({"mjcf": lambda text: text.replace(SERVO, "")}, "needs an <intvelocity>"),
+        ({"mjcf": lambda text: re.sub('capsule(" size=".05)', r"cylinder\1", text)},
+         "must be a capsule"),
+        ({"mjcf": lambda text: re.sub("<inertial[^>]*>", "", text)}, "needs an <inertial>"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_a_robot_is_said(changes, said):
+    if callable(changes.get("mjcf")):
+        changes = {"mjcf": changes["mjcf"](ROBOTS["swing_arm"].mjcf)}
+    with pytest.raises(ConfigError, match=said):
+        hrc_env.register_robot(dataclasses.replace(ROBOTS["swing_arm"], **changes))
+
+
+def test_an_unknown_robot_is_refused_with_those_that_there_are():
+    with pytest.raises(ConfigError, match="Did you mean 'swing_arm'"):
+        gymnasium.make("HRCReach-v0", robot="swing_amr")

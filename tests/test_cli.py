@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from commands import hrc
 
-from hrc_env.motion.capture.clip import load_clip
+from hrc_env.motion.clip import load_clip
 from hrc_env.worker.body import load_body
 
 

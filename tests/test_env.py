@@ -170,7 +170,7 @@ def test_without_an_estimate_the_prior_is_observed_at_its_bounds():
     observation, info = env.reset(seed=0)
     terms = env.split_observation(observation)
     assert terms["worker_tracked"] == [0.0]
-    assert terms["worker_gap"] == [1.0]
+    assert terms["worker_separation"] == [1.0]
     np.testing.assert_allclose(terms["worker_joints_std"], 1.0)
     np.testing.assert_allclose(terms["worker_joints_age"], 2.0)
     assert info["tracking/lost"] == 1.0
@@ -217,13 +217,13 @@ def test_a_worker_who_leaves_the_views_is_lost_with_growing_doubt():
 
 def hide_everything(env: HRCEnv) -> None:
     """From now on the detector finds nobody."""
-    senses = env.simulation.senses
-    blank = senses.keypoints
+    pipeline = env.simulation.pipeline
+    blank = pipeline.keypoints
     nothing = Keypoints(
         np.full_like(blank.px, np.nan), np.zeros_like(blank.confidence),
         np.full_like(blank.sigma_px, np.inf),
     )  # fmt: skip
-    senses.detect = lambda now, predicted, rngs: nothing
+    pipeline.detect = lambda now, predicted, rngs: nothing
 
 
 def test_contact_ends_the_episode_when_asked():
@@ -313,7 +313,7 @@ def test_a_large_site_has_room_and_memory_for_many_workers():
         ({"people": {"tempo": -1.0}}, r"^people\.tempo must be"),
         ({"people": {"temp": 1.0}}, r"Did you mean 'people\.tempo'"),
         ({"people": ["hurried"]}, "a name.*'unaware'.*a mapping"),
-        ({"motions": 5}, "list of paths or clips"),
+        ({"motions": 5}, "motions must be a list"),
         ({"config": {"forecast_s": [3.0]}}, r"forecast_s must be in \(0, 1\] s"),
         ({"perception": "pixel"}, "Did you mean 'pixels'"),
         ({"estimator": "ekf"}, "'paper'"),

@@ -26,7 +26,7 @@ def rolled(env, n_steps=15):
 
 
 def test_horizons_add_their_terms_and_no_others():
-    plain, more = layout(TERMS, Sizes(6, 6, 2)), layout(TERMS, Sizes(6, 6, 2, forecasts=2))
+    plain, more = layout(TERMS, Sizes(6, 6, 2)), layout(TERMS, Sizes(6, 6, 2, horizons=2))
     assert len(more.low) - len(plain.low) == 2 * 2 * N_JOINTS * (3 + 1)
     for name, part in plain.slices.items():
         assert name in ADDED or more.slices[name] == part
@@ -45,14 +45,14 @@ def test_a_worker_is_expected_near_and_less_surely_the_later(level):
     env = HRCEnv(perception=level, config=ASKED)
     terms = env.split_observation(rolled(env)[-1])
     now = terms["worker_joints_from_tool"].reshape(1, N_JOINTS, 3)
-    ahead = terms["worker_joints_forecast"].reshape(2, N_JOINTS, 3)
+    later = terms["worker_joints_forecast"].reshape(2, N_JOINTS, 3)
     std = terms["worker_joints_forecast_std"].reshape(2, N_JOINTS)
-    moved = np.linalg.norm(ahead - now, axis=-1).mean(1)
+    moved = np.linalg.norm(later - now, axis=-1).mean(1)
     assert (moved < (0.5, 1.2)).all()
     assert terms["worker_joints_std"].mean() < std[0].mean() < std[1].mean()
-    expected = env.simulation.believed.forecasts[1].mean_world[0, 0]
-    tool = env.simulation.believed.robot.tool_world
-    np.testing.assert_allclose(ahead[1], expected - tool, atol=1e-5)
+    expected = env.simulation.belief.forecast[1].mean_world[0, 0]
+    tool = env.simulation.belief.robot.tool_world
+    np.testing.assert_allclose(later[1], expected - tool, atol=1e-5)
 
 
 def test_of_nobody_the_prior_is_expected():
@@ -81,6 +81,6 @@ def test_many_environments_expect_what_each_alone_expects():
 
 def test_two_workers_have_their_own_futures():
     env = HRCEnv(perception="truth", n_workers=2, config=ASKED)
-    ahead = env.split_observation(rolled(env, 3)[-1])["worker_joints_forecast"]
-    first, second = ahead.reshape(2, 2, N_JOINTS, 3)
+    later = env.split_observation(rolled(env, 3)[-1])["worker_joints_forecast"]
+    first, second = later.reshape(2, 2, N_JOINTS, 3)
     assert np.linalg.norm(first.mean(1) - second.mean(1), axis=-1).min() > 0.3

@@ -7,10 +7,11 @@ import pytest
 
 from hrc_env.belief import Belief
 from hrc_env.core.records import PoseEstimate, RobotState
+from hrc_env.core.typing import Records
 from hrc_env.env import HRCEnv
-from hrc_env.geometry.distances import Gap
+from hrc_env.geometry.distances import Separation
 from hrc_env.rewards import SHARED_TERMS, RewardConfig, closeness, evaluated, total
-from hrc_env.tasks.reach import TASK, ReachConfig, ReachProgress
+from hrc_env.tasks.reach import REACH_STEP, TASK, ReachConfig
 from hrc_env.vector.env import HRCVectorEnv
 
 
@@ -24,7 +25,9 @@ def believed(gap_m: float, action: float = 0.0, workers: int = 1) -> Belief:
         np.zeros((1, 6)), np.zeros((1, 6)), np.zeros((1, 3)), np.zeros((1, 3)),
         np.zeros((1, 9, 2, 3)), np.zeros(9),
     )  # fmt: skip
-    gap = Gap(np.full((1, workers), gap_m), np.zeros((1, workers, 3)), np.zeros((1, workers, 3)))
+    gap = Separation(
+        np.full((1, workers), gap_m), np.zeros((1, workers, 3)), np.zeros((1, workers, 3))
+    )
     return Belief(robot, pose, gap, None, np.full((1, 6), action))
 
 
@@ -38,8 +41,8 @@ def reward(now, step, before, shared, own=None):
     return total(terms, 1), terms
 
 
-def progress(metres: float = 0.0, reached: bool = False) -> ReachProgress:
-    return ReachProgress(np.array([metres]), np.array([reached]), np.array([False]))
+def progress(metres: float = 0.0, reached: bool = False) -> Records:
+    return np.array([(metres, reached, False)], REACH_STEP)
 
 
 @pytest.mark.parametrize(

@@ -5,12 +5,12 @@ import pickle
 
 import numpy as np
 import pytest
+from scipy.optimize import linear_sum_assignment
 from stable_baselines3.common.env_checker import check_env
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import WorkerTruth
 from hrc_env.env import HRCEnv
-from hrc_env.geometry.assignment import assign
 from hrc_env.metrics import tracking_error
 from hrc_env.motion.generator import PeopleConfig, activity_names, current
 from hrc_env.sb3 import HRCVecEnv
@@ -96,20 +96,20 @@ def test_three_workers_without_names_keep_their_tracks():
         estimate, motion = env.simulation.estimate, env.simulation.motion
         truth = worker_truth(env.simulation.bodies, current(motion)).joints_world
         apart = np.linalg.norm(estimate.mean_world[:, :, None] - truth[:, None], axis=-1).mean(-1)
-        whom.append([assign(of_room) for of_room in apart])
+        whom.append([linear_sum_assignment(of_room)[1] for of_room in apart])
     assert (np.array(whom)[5:] == whom[5]).all()
 
 
 def test_the_emulator_does_not_say_who_is_who():
-    """What a camera reports first is one worker as often as the other; the senses sort it."""
+    """What a camera reports first is one worker as often as the other; the pipeline sorts it."""
     env = HRCEnv(perception="keypoints", n_workers=2)
-    senses, reported, sorted_ = env.simulation.senses, [], []
-    detect = senses.detect
-    senses.detect = lambda *now: reported.append(detect(*now)) or reported[-1]
+    pipeline, reported, sorted_ = env.simulation.pipeline, [], []
+    detect = pipeline.detect
+    pipeline.detect = lambda *now: reported.append(detect(*now)) or reported[-1]
     env.reset(seed=0)
     for _ in range(40):
         env.step(np.zeros(6))
-        sorted_.append(senses.looks(0)[0])
+        sorted_.append(pipeline.last_detections(0)[0])
     for camera in range(4):
         assert 0.2 < first_is_further_right(reported, camera) < 0.8
         assert first_is_further_right(sorted_, camera) in (0.0, 1.0)
@@ -159,9 +159,9 @@ def test_an_empty_room_in_pictures_is_quiet():
 
 
 def test_who_comes_in_late_is_found_and_nobody_is_taken_for_them(pixels):
-    """Searches for the second worker see the first one only, until the second is there."""
+    """SearchSchedule for the second worker see the first one only, until the second is there."""
     env = HRCEnv(perception="pixels", n_workers=2)
-    renderer = env.simulation.senses.renderer
+    renderer = env.simulation.pipeline.renderer
     draw = renderer.draw
     renderer.draw = lambda q, motion: draw(q, without_the_second(motion))
     env.reset(seed=1)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks import soak
-from hrc_env.tracking.miscalibration import MISCALIBRATED
+from hrc_env.step import MISCALIBRATED
 
 
 @pytest.mark.parametrize(

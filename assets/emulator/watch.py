@@ -15,9 +15,9 @@ from hrc_env.core.records import Keypoints, Roi
 from hrc_env.core.typing import Bools, Covariances3, Floats, Ints, Points2, Points3
 from hrc_env.geometry.cameras import project, projections
 from hrc_env.perception.emulator import lines_of_sight
-from hrc_env.pipeline.levels import make_senses
-from hrc_env.pipeline.sensor_input import Generators, Moment
-from hrc_env.pipeline.tracking import TrackingSenses
+from hrc_env.pipeline.levels import make_pipeline
+from hrc_env.pipeline.sensor_input import Generators, TrueSensorInput
+from hrc_env.pipeline.tracking import PoseTracking
 from hrc_env.scene.build import Scene
 from hrc_env.worker.body import worker_truth
 
@@ -60,37 +60,37 @@ class Watched:
 def watch(
     level: str, clips: Iterable[Clip], config: HRCConfig, estimator: str = "particle"
 ) -> Iterator[Watched]:
-    """Play clips before the senses of a perception level; those of one scene together."""
-    senses, known = None, None
+    """Play clips before the pipeline of a perception level; those of one scene together."""
+    pipeline, known = None, None
     try:
         for clip in clips:
             scene = scene_of(clip)
-            if senses is None or scene is not known:
-                if senses is not None:
-                    senses.close()
-                senses, known = make_senses(level, estimator, scene, 1, config), scene
-            if not isinstance(senses, TrackingSenses):
+            if pipeline is None or scene is not known:
+                if pipeline is not None:
+                    pipeline.close()
+                pipeline, known = make_pipeline(level, estimator, scene, 1, config), scene
+            if not isinstance(pipeline, PoseTracking):
                 raise ConfigError(f"Clips are for levels with cameras, not for {level!r}.")
-            yield _watched(senses, scene, stage(clip, scene), (number_of(clip), clip.draw))
+            yield _watched(pipeline, scene, stage(clip, scene), (number_of(clip), clip.draw))
     finally:
-        if senses is not None:
-            senses.close()
+        if pipeline is not None:
+            pipeline.close()
 
 
 def _watched(
-    senses: TrackingSenses, scene: Scene, staged: Staged, seed: tuple[int, int]
+    pipeline: PoseTracking, scene: Scene, staged: Staged, seed: tuple[int, int]
 ) -> Watched:
     rngs = [[np.random.default_rng([*seed, 71, k])] for k in range(2)]
-    senses.reset(np.arange(1), *rngs)
+    pipeline.reset(np.arange(1), *rngs)
     P, frames = projections(scene.cameras), []
-    _introduce(senses, worker_truth(staged.body, staged.motion).joints_world[:1], P, rngs[1])
+    _introduce(pipeline, worker_truth(staged.body, staged.motion).joints_world[:1], P, rngs[1])
     q = staged.q[None]
     for t in range(len(staged.motion.position_world)):
         motion = rows(staged.motion, np.array([t]))
         truth = worker_truth(staged.body, motion)
-        now = Moment(np.arange(1), q, motion, truth, np.ones((1, 1), bool))
-        estimate = senses.sense(now, *rngs)
-        keypoints, windows = senses.keypoints, senses.looks(0)[1]
+        now = TrueSensorInput(np.arange(1), q, motion, truth, np.ones((1, 1), bool))
+        estimate = pipeline.perceive(now, *rngs)
+        keypoints, windows = pipeline.keypoints, pipeline.last_detections(0)[1]
         true_px, depth_m = project(P, truth.joints_world[:, 0])
         sight, look_of = lines_of_sight(truth, scene.surroundings(q, motion.held), scene.cameras)
         frames.append(
@@ -106,13 +106,15 @@ def _watched(
     return Watched(*[*columns, P])
 
 
-def _introduce(senses: TrackingSenses, joints_world: Points3, P: Floats, rngs: Generators) -> None:
+def _introduce(pipeline: PoseTracking, joints_world: Points3, P: Floats, rngs: Generators) -> None:
     """Let the tracker know the worker: how a search finds people is no matter of the clip."""
     px, _ = project(P, joints_world)
     sigma_px = np.full(px.shape[:-1], INTRODUCED_PX)
     for _ in range(INTRODUCED):
-        senses.tracker.predict(senses.state, DT_S, rngs)
-        senses.tracker.update(senses.state, Keypoints(px, np.ones_like(sigma_px), sigma_px), rngs)
+        pipeline.tracker.predict(pipeline.state, DT_S, rngs)
+        pipeline.tracker.update(
+            pipeline.state, Keypoints(px, np.ones_like(sigma_px), sigma_px), rngs
+        )
 
 
 def _windows(windows: list[list[Roi | None]], n_cameras: int) -> Floats:

@@ -82,7 +82,7 @@ class Looker:
 
     def dress(self, look: Look) -> None:
         """Let everything look so from the next look on."""
-        self.renderer.dress(look)
+        self.renderer.randomize(look)
 
     def detect(self, now: Instant) -> Looked:
         """Look at an instant with every camera."""
@@ -110,7 +110,7 @@ class Looker:
         return np.array(self.source.crop(camera, window))
 
     def image_px(self, camera: int, pinhole_px: Points2) -> Points2:
-        """Pixels of a camera's image, as its lens bends it, of pinhole ones."""
+        """Pixels of a camera's image, as its lens distorts it, of pinhole ones."""
         return image_from_pinhole(self.scene.cameras[camera], pinhole_px)
 
     def close(self) -> None:
@@ -156,7 +156,7 @@ def instants(
     state = generator.make_state(1, 1, body, HRCConfig().motion, scene.grounds)
     streams = [np.random.default_rng(rng.integers(2**63))]
     generator.reset(state, np.arange(1), streams)
-    spread, name = np.array(HRCConfig().start_spread_rad), ""
+    spread, name = np.array(scene.robot.spread_rad), ""
     for k in range(n):
         for _ in range(PATIENCE):
             steps = int(rng.integers(*PAUSE_STEPS))

@@ -117,7 +117,7 @@ def _episode(env: HRCEnv, seed: int, n_steps: int) -> Episode:
         joints, estimate = truth.joints_world[0, 0], simulation.estimate
         family[t] = family_index(int(generator.activity(simulation.motion)[0, 0]))
         off_px[t] = _off_px(env, joints)
-        named[t] = simulation.senses.suspected(np.array([0]))[0]
+        named[t] = simulation.pipeline.suspected(np.array([0]))[0]
         if estimate.tracked[0, 0]:
             offset, cov = estimate.mean_world[0, 0] - joints, estimate.cov_world[0, 0]
             squared = np.einsum("ji,jik,jk->j", offset, np.linalg.inv(cov), offset)
@@ -129,7 +129,7 @@ def _episode(env: HRCEnv, seed: int, n_steps: int) -> Episode:
 
 def _off_px(env: HRCEnv, joints_world: Floats) -> Floats:
     """(C,) how far the keypoints of this step are from the truth; NaN: none."""
-    keypoints, _ = env.simulation.senses.looks(0)
+    keypoints, _ = env.simulation.pipeline.last_detections(0)
     cameras = env.simulation.scene.cameras
     if keypoints is None:
         return np.full(len(cameras), np.nan)

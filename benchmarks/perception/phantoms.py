@@ -29,12 +29,12 @@ def count(scene: str, n_steps: int, seed: int, tick: Callable[[float], None]) ->
         while steps < n_steps:
             env.reset(seed=seed)
             seed += 1
-            if env.simulation.crew.present.any():
+            if env.simulation.present.any():
                 continue
             n = min(EPISODE_STEPS, n_steps - steps)
             for _ in range(n):
                 env.step(actions.uniform(-1, 1, env.simulation.n_actions).astype(np.float32))
-                keypoints, _ = env.simulation.senses.looks(0)
+                keypoints, _ = env.simulation.pipeline.last_detections(0)
                 if keypoints is not None:
                     somebody = (keypoints.confidence[0] > 0).any((1, 2))
                     found["images"] += len(somebody)

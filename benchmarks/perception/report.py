@@ -66,7 +66,7 @@ def markdown(metrics: _Metrics) -> str:
 
 
 def fault_table(metrics: _Metrics) -> str:
-    """A row for every fault; also what docs/cameras.md shows."""
+    """A row for every fault; also what docs/perception_and_estimators.md shows."""
     lines = []
     kinds = [kind for kind in KINDS if f"error_ratio.{kind}" in metrics]
     for kind in ("none", *kinds):

@@ -12,15 +12,15 @@ from benchmarks.speed.stopwatch import Place, Stopwatch
 from hrc_env.env import HRCEnv
 from hrc_env.motion import generator
 from hrc_env.perception.network import LANDMARK_SIDE, load_landmarker
-from hrc_env.pipeline.rendered import CameraSenses
-from hrc_env.pipeline.tracking import TrackingSenses
+from hrc_env.pipeline.rendered import PixelPipeline
+from hrc_env.pipeline.tracking import PoseTracking
 from hrc_env.scene.physics import Physics
 from hrc_env.scene.render import CropRenderer
 
 STAGES: Mapping[str, Sequence[Place]] = {
     "draw": ((CropRenderer, "draw"), (CropRenderer, "view")),
-    "detect": ((CameraSenses, "detect"),),
-    "track": ((TrackingSenses, "sense"),),
+    "detect": ((PixelPipeline, "detect"),),
+    "track": ((PoseTracking, "perceive"),),
     "physics": ((Physics, "step"),),
     "motion": ((generator, "advance"), (generator, "watch")),
 }

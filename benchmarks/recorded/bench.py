@@ -8,6 +8,7 @@ from benchmarks.recorded.calibration import read_calibration, tracker_config
 from benchmarks.recorded.detections import FOLLOWER, Detections, detections_of
 from benchmarks.recorded.fetch import WHEEL, fetch_footage
 from benchmarks.recorded.film import film_track
+from benchmarks.recorded.films import Films
 from benchmarks.recorded.lag import lag_of
 from benchmarks.recorded.metrics import (
     NAMES,
@@ -22,7 +23,6 @@ from benchmarks.tracking.names import DEFAULT
 from hrc_env.core.results import Metric, write_results
 from hrc_env.core.typing import Floats
 from hrc_env.geometry.cameras import projections
-from hrc_env.perception.films import Films
 from hrc_env.tracking.config import TrackerConfig
 
 Say = Callable[[float, str], None]

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.recorded.calibration import FilmedCamera, tracker_config
+from benchmarks.recorded.films import Films, undistort
 from hrc_env.core.records import Keypoints, PoseEstimate, Roi
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats, Points2
 from hrc_env.experiments.study.fingerprint import fingerprint_of
 from hrc_env.geometry.cameras import PinholeCamera, project, projections
 from hrc_env.perception.detector import DetectorConfig, PoseDetector
-from hrc_env.perception.films import Films, undistort
 from hrc_env.perception.windows import window_from_joints
 from hrc_env.tracking.estimators import make_estimator
 

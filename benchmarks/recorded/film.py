@@ -8,11 +8,11 @@ from pathlib import Path
 import imageio.v2 as imageio
 import numpy as np
 
+from benchmarks.recorded.films import Films
 from benchmarks.recorded.metrics import Track
 from hrc_env.core.records import PoseEstimate
 from hrc_env.core.typing import Image
 from hrc_env.geometry.cameras import PinholeCamera
-from hrc_env.perception.films import Films
 from hrc_env.render import overlay
 
 TILE = (480, 852)

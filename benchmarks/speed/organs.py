@@ -14,7 +14,7 @@ from hrc_env.core.errors import HRCError
 from hrc_env.geometry import chains
 from hrc_env.motion import generator
 from hrc_env.perception import emulator
-from hrc_env.pipeline.tracking import TrackingSenses
+from hrc_env.pipeline.tracking import PoseTracking
 from hrc_env.scene.physics import Physics
 from hrc_env.vector import env, infos
 
@@ -27,10 +27,10 @@ ORGANS: Mapping[str, Sequence[Place]] = {
         (simulation, "worker_capsules"),
     ),
     "emulator": ((emulator, "emulate"),),
-    "tracking": ((TrackingSenses, "sense"),),
+    "tracking": ((PoseTracking, "perceive"),),
     "distances": (
         (chains, "robot_along"),
-        (simulation, "estimated_gap"),
+        (simulation, "estimated_separation"),
         (metrics, "cost"),
     ),
     "observation": ((observations, "observe"),),

@@ -14,7 +14,7 @@ STOP_M, FREE_M = 0.1, 0.6
 
 def slow_down(now, velocities, dt_s):
     unsure_m = 2 * standard_deviation_m(now.estimate).max(-1)
-    gap_m = (now.gap.distance_m - unsure_m).min(-1, initial=np.inf)
+    gap_m = (now.separation.distance_m - unsure_m).min(-1, initial=np.inf)
     share = np.clip((gap_m - STOP_M) / (FREE_M - STOP_M), 0.0, 1.0)
     return velocities * share[:, None], {"speed_share": share}
 

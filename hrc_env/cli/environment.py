@@ -1,14 +1,16 @@
 """The arguments of an environment, as the commands take them that make one."""
 
 import json
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from hrc_env.core.errors import ConfigError
+from hrc_env.core.toml import read_toml
 from hrc_env.tasks import DEFAULT
+
+FAULT = """'{"kind": "late", "cameras": ["camera_1"], "amount": 0.2}'"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,6 +28,8 @@ class EnvironmentArguments:
     of the scene if not given."""
     scene: str = "lab"
     """lab or site."""
+    robot: str = "ur10e_like"
+    """ur10e_like, or one that was registered (--import)."""
     n_workers: int | tuple[int, int] = 1
     """How many workers; two numbers are the fewest and the most, drawn for every episode."""
     people: str | None = None
@@ -44,7 +48,7 @@ class EnvironmentArguments:
     """A shield that was registered (--import)."""
     config: tuple[str, ...] = ()
     """Changes to the default configuration: FIELD=VALUE as in reward.proximity=0 (a value is
-    JSON, or else text), or a file of them (.json or .toml). Later ones win. docs/environment.md"""
+    JSON, or else text), or a .toml file of them. Later ones win. docs/reference/config.md"""
 
     def keywords(self) -> dict[str, Any]:
         """Keyword arguments of `HRCEnv`, of lists, mappings, text and numbers only.
@@ -59,15 +63,11 @@ class EnvironmentArguments:
             "faults": [_fault(text) for text in self.faults],
             "appearance": self.appearance,
             "shield": self.shield,
-            "config": read_config(self.config),
+            "config": read_config(self.config or ()),
         }
+        names = "task", "perception", "estimator", "scene", "robot", "n_workers", "control"
         return {
-            "task": self.task,
-            "perception": self.perception,
-            "estimator": self.estimator,
-            "scene": self.scene,
-            "n_workers": self.n_workers,
-            "control": self.control,
+            **{name: getattr(self, name) for name in names},
             **{name: value for name, value in given.items() if value},
         }
 
@@ -83,14 +83,18 @@ def cameras_named(words: Sequence[str]) -> str | list[int | str]:
 
 
 def read_config(words: Sequence[str]) -> dict[str, Any]:
-    """A nested mapping of changes from FIELD=VALUE and files; later ones win.
+    """A nested mapping of changes from FIELD=VALUE and TOML files; later ones win.
 
     Raises:
         ConfigError: neither, or a file that cannot be read.
     """
     config: dict[str, Any] = {}
     for word in words:
-        config = merged(config, _assigned(word) if "=" in word else _in_file(Path(word)))
+        if "=" not in word and not word.endswith(".toml"):
+            raise ConfigError(
+                f"--config takes FIELD=VALUE, as reward.proximity=0, or a .toml file, got {word!r}."
+            )
+        config = merged(config, _assigned(word) if "=" in word else read_toml(word))
     return config
 
 
@@ -106,42 +110,21 @@ def merged(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
 def _assigned(word: str) -> dict[str, Any]:
     """The nested mapping that a.b=VALUE is."""
     path, _, text = word.partition("=")
-    try:
-        value = json.loads(text)
-    except json.JSONDecodeError:
-        value = text
-    return _nested(path.split("."), value)
-
-
-def _nested(path: Sequence[str], value: Any) -> dict[str, Any]:
-    return {path[0]: _nested(path[1:], value) if path[1:] else value}
-
-
-def _in_file(path: Path) -> dict[str, Any]:
-    readers = {".json": json.loads, ".toml": tomllib.loads}
-    if path.suffix not in readers:
-        raise ConfigError(
-            f"--config takes FIELD=VALUE, as reward.proximity=0, or a .json or .toml file, "
-            f"got {str(path)!r}."
-        )
-    try:
-        content = readers[path.suffix](path.read_text())
-    except (OSError, ValueError) as error:  # the readers' errors are ValueErrors
-        raise ConfigError(f"--config {path} cannot be read: {error}.") from error
-    if not isinstance(content, dict):
-        raise ConfigError(f"--config {path} must hold names and values, got {content!r}.")
-    return content
+    value = _json(text, text)
+    for name in reversed(path.split(".")):
+        value = {name: value}
+    return value
 
 
 def _fault(text: str) -> dict[str, Any]:
-    try:
-        fault = json.loads(text)
-    except json.JSONDecodeError:
-        fault = None
+    fault = _json(text, None)
     if not isinstance(fault, dict):
-        raise ConfigError(
-            "--faults takes JSON objects, as "
-            '\'{"kind": "late", "cameras": ["camera_1"], "amount": 0.2}\', '
-            f"got {text!r}. docs/cameras.md"
-        )
+        raise ConfigError(f"--faults takes JSON objects, as {FAULT}, got {text!r}.")
     return fault
+
+
+def _json(text: str, otherwise: Any) -> Any:
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError:
+        return otherwise

@@ -1,24 +1,34 @@
-"""python -m hrc_env list: the names that arguments take."""
+"""python -m hrc_env list: the names that arguments take, or the configuration that they make."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 from rich.console import Console
 from rich.table import Table
 
 from hrc_env import IDS
+from hrc_env.cli.environment import EnvironmentArguments
 from hrc_env.core.checkout import agents
 
 
-@dataclass(frozen=True)
-class List:
-    """Environments, perception levels, estimators, scenes, cameras and agents by name."""
+@dataclass(frozen=True, kw_only=True)
+class List(EnvironmentArguments):
+    """Environments, perception levels, estimators, scenes, cameras and agents by name.
+
+    With --config: every setting of the environment that the arguments say, as a TOML file has it.
+    """
+
+    config: tuple[str, ...] | None = None  # type: ignore[assignment]
+    """Show the configuration, with these changes if any are given: FIELD=VALUE or a .toml file."""
 
     def run(self) -> int:
-        """Print the table."""
+        """Print the table, or the configuration."""
+        if self.config is not None:
+            return self._show_config()
         from hrc_env.control import CONTROLS  # here: --help imports no simulator
         from hrc_env.pipeline.levels import LEVELS
         from hrc_env.scene.build import SCENES
         from hrc_env.scene.rig import LAB_CAMERAS
+        from hrc_env.scene.robot import ROBOTS
         from hrc_env.tracking.estimators import ESTIMATORS
 
         table = Table("argument", "names", title="hrc_env")
@@ -28,10 +38,19 @@ class List:
             ("perception", LEVELS),
             ("estimator", ESTIMATORS),
             ("scene", SCENES),
+            ("robot", ROBOTS),
             ("cameras", cameras),
             ("control", CONTROLS),
-            ("agent", (*agents("base").AGENTS, "a checkpoint: PATH.zip")),
+            ("agent", (*agents("registry").AGENTS, "a checkpoint: PATH.zip")),
         ):
             table.add_row(argument, ", ".join(names))
         Console().print(table)
+        return 0
+
+    def _show_config(self) -> int:
+        from hrc_env.config import settle
+        from hrc_env.core.mapping import plain
+        from hrc_env.core.toml import to_toml
+
+        print(to_toml(plain(asdict(settle(**self.keywords()).config))), end="")
         return 0

@@ -9,6 +9,8 @@ import numbers
 from collections.abc import Iterable, Iterator
 from typing import Any
 
+from hrc_env.core.old_names import OLD_NAMES
+
 
 class HRCError(Exception):
     """Base of every error that this package raises on purpose."""
@@ -55,24 +57,10 @@ def learner() -> Iterator[None]:
         ) from error
 
 
-RENAMED = {
-    "reward.goal": "task.goal_bonus",
-    "reward.progress_per_m": "task.progress_per_m",
-    "eyes": "detector",
-    "horizons_s": "forecast_s",
-    "per_joint": "particle",
-    "tracker.paper_iterations": "tracker.n_iterations",
-    "tracker.paper_particles": "tracker.n_particles",
-    "tracker.paper_resampling": "tracker.resampling",
-    "tracker.paper_sigma_m": "tracker.sigma_m",
-}
-"""What is called otherwise now: fields of the config by their path, estimators, commands."""
-
-
 def unknown(what: str, got: object, valid: Iterable[str]) -> ConfigError:
     """The error for a name that is not in a list, with the nearest valid one or its new name."""
-    if got in RENAMED:
-        return ConfigError(f"The {what} {got!r} is gone: use {RENAMED[str(got)]!r}.")
+    if got in OLD_NAMES:
+        return ConfigError(f"The {what} {got!r} is gone: use {OLD_NAMES[str(got)]!r}.")
     names = list(valid)
     near = difflib.get_close_matches(str(got), names, n=1)
     hint = f" Did you mean {near[0]!r}?" if near else ""

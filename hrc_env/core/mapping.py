@@ -15,6 +15,8 @@ import numpy as np
 from hrc_env.core.errors import ConfigError, unknown
 
 RecordT = TypeVar("RecordT")
+PRESETS: dict[type, Mapping[str, Any]] = {}
+"""Records that have names, by their type: a name stands for the record."""
 
 
 def from_mapping(
@@ -60,15 +62,15 @@ def from_mapping(
 def restored(hint: Any, value: Any, where: str) -> Any:
     """A field's value as its type hint wants it, or a `ConfigError` that says so."""
     if dataclasses.is_dataclass(hint):
-        if isinstance(value, Mapping):
-            return from_mapping(typing.cast(type, hint), value, f"{where}.")
-        return _checked(isinstance(value, typing.cast(type, hint)), "a mapping", value, where)
+        return _record(typing.cast(type, hint), value, where)
     if isinstance(hint, types.UnionType):
         return _one_of(typing.get_args(hint), value, where)
     if typing.get_origin(hint) is tuple:
         return _tuple(typing.get_args(hint), value, where)
     if isinstance(value, np.generic):
         value = value.item()
+    if hint is str and isinstance(value, Path):
+        return str(value)
     if hint is float:
         number = isinstance(value, int | float) and not isinstance(value, bool)
         return float(_checked(number and math.isfinite(value), "a finite number", value, where))
@@ -78,6 +80,19 @@ def restored(hint: Any, value: Any, where: str) -> Any:
     if hint in (bool, str):
         return _checked(isinstance(value, hint), f"a {hint.__name__}", value, where)
     return value
+
+
+def _record(kind: type[RecordT], value: Any, where: str) -> RecordT:
+    """A record by the name of a preset, from a mapping, or itself."""
+    presets = PRESETS.get(kind, {})
+    if isinstance(value, Mapping):
+        return from_mapping(kind, value, f"{where}.")
+    if isinstance(value, str) and presets:
+        if value not in presets:
+            raise unknown(where, value, presets)
+        return presets[value]
+    name = f"a name ({', '.join(map(repr, presets))}) or " if presets else ""
+    return _checked(isinstance(value, kind), f"{name}a mapping", value, where)
 
 
 def _one_of(hints: tuple[Any, ...], value: Any, where: str) -> Any:

@@ -1,8 +1,7 @@
 """Cameras: points to pixels and pixels to rays.
 
-A camera projects like a pinhole; where it has a lens, its image is bent, and there are two kinds
-of pixels: `pinhole` ones, in which projection is linear and the trackers think, and those of the
-`image`, which detectors find. Without a lens they are the same.
+A camera with a lens has two kinds of pixels: `pinhole` ones, in which projection is linear and the
+trackers think, and those of the `image`, which detectors find. Without a lens they are the same.
 
 Pixels are continuous from the image's top-left corner, so that pixel centres lie at
 half-integers and the principal point of a symmetric image is (W/2, H/2). Camera axes are
@@ -15,7 +14,7 @@ import numpy as np
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.typing import Floats, Points2, Points3, Transforms
-from hrc_env.geometry.lens import Lens, bend, rays_cam, straighten, stretch
+from hrc_env.geometry.lens import Lens, distort, magnification, rays_cam, undistort
 from hrc_env.geometry.rotations import look_at
 
 
@@ -33,7 +32,7 @@ class PinholeCamera:
     height_px: int
     """Height of its image [px]."""
     lens: Lens | None = None
-    """What bends its image; None: nothing."""
+    """What distorts its image; None: nothing."""
 
     @property
     def eye_world(self) -> Points3:
@@ -111,24 +110,24 @@ def image_from_pinhole(camera: PinholeCamera, pixels: Points2) -> Points2:
     """Where the image shows what a pinhole would show at pixels (..., 2)."""
     if camera.lens is None:
         return pixels
-    return _in_pixels(camera, bend(camera.lens, _normalised(camera, pixels)))
+    return _in_pixels(camera, distort(camera.lens, _normalised(camera, pixels)))
 
 
 def pinhole_from_image(camera: PinholeCamera, pixels: Points2) -> Points2:
     """Where a pinhole would show what the image shows at pixels (..., 2).
 
-    NaN where that is nowhere: beyond `optics.lens.STRAIGHT_RAD` from the axis.
+    NaN where that is nowhere: beyond `geometry.lens.PINHOLE_RAD` from the axis.
     """
     if camera.lens is None:
         return pixels
-    return _in_pixels(camera, straighten(camera.lens, _normalised(camera, pixels)))
+    return _in_pixels(camera, undistort(camera.lens, _normalised(camera, pixels)))
 
 
-def pinhole_stretch(camera: PinholeCamera, pinhole_px: Points2) -> Floats | float:
+def pinhole_magnification(camera: PinholeCamera, pinhole_px: Points2) -> Floats | float:
     """How many times longer a pinhole shows things at pinhole pixels (..., 2) than the image."""
     if camera.lens is None:
         return 1.0
-    return stretch(camera.lens, _normalised(camera, pinhole_px))
+    return magnification(camera.lens, _normalised(camera, pinhole_px))
 
 
 def _normalised(camera: PinholeCamera, pixels: Points2) -> Floats:

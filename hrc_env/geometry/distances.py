@@ -20,7 +20,7 @@ _PARALLEL = 1e-13
 
 
 @dataclass(frozen=True, slots=True)
-class Gap:
+class Separation:
     """The narrowest place between two sets of capsules, over leading axes (...)."""
 
     distance_m: Floats
@@ -31,9 +31,9 @@ class Gap:
     """(..., 3) the same of the second set [m]."""
 
 
-def narrowest_gap(
+def least_separation(
     capsules_a: Capsules, radius_a_m: Floats, capsules_b: Capsules, radius_b_m: Floats
-) -> Gap:
+) -> Separation:
     """The smallest gap between any capsule of one set and any of the other.
 
     Args:
@@ -49,7 +49,7 @@ def narrowest_gap(
     radius_a, radius_b = _sets(radius_a_m), _sets(radius_b_m)
     _narrowest(flat_a, radius_a, flat_b, radius_b, gap, points)
     points = points.reshape(*lead, 2, 3)
-    return Gap(gap.reshape(lead), points[..., 0, :], points[..., 1, :])
+    return Separation(gap.reshape(lead), points[..., 0, :], points[..., 1, :])
 
 
 def _flat(capsules: Capsules) -> Capsules:

@@ -1,9 +1,9 @@
 """Lenses: where light that a pinhole would show at one place arrives in the real image.
 
-Places are normalised: pixels less the principal point, over the focal lengths; "straight" ones
-are the pinhole's, "bent" ones the image's. Two models, with OpenCV's coefficients:
+Places are normalised: pixels less the principal point, over the focal lengths; "undistorted" ones
+are the pinhole's, "distorted" ones the image's. Two models, with OpenCV's coefficients:
 
-| model | bent from straight |
+| model | distorted from undistorted |
 |---|---|
 | `brown_conrady` | radius times 1 + k1 r^2 + k2 r^4 + k3 r^6, and decentring p1, p2 (Brown 1966) |
 | `kannala_brandt` | angle t from the axis at radius t (1 + k1 t^2 + k2 t^4 + k3 t^6 + k4 t^8) |
@@ -16,6 +16,7 @@ import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -31,11 +32,11 @@ COEFFICIENTS = {
 """Models and what their coefficients are called, in order; those left out are 0."""
 NONE, BROWN_CONRADY, KANNALA_BRANDT = range(3)
 LIMIT, FOLD = 6, 7
-"""Columns of a lens' row behind the model and its coefficients: the bent radius from which on
+"""Columns of a lens' row behind the model and its coefficients: the distorted radius from which on
 nothing is seen, and the angle that it is of."""
 WIDEST_RAD = math.radians(175.0)
 """No lens sees further from its axis."""
-STRAIGHT_RAD = math.radians(80.0)
+PINHOLE_RAD = math.radians(80.0)
 """Further from the axis [rad] a pinhole's image has no place for what a lens sees."""
 FAR = 1e6
 _SAMPLES = 4096
@@ -69,9 +70,9 @@ def lens_row(lens: Lens) -> Floats:
     row = np.zeros(FOLD + 1)
     row[0] = list(COEFFICIENTS).index(lens.model)
     row[1 : 1 + len(lens.coefficients)] = lens.coefficients
-    widest = WIDEST_RAD if lens.model == "kannala_brandt" else STRAIGHT_RAD
+    widest = WIDEST_RAD if lens.model == "kannala_brandt" else PINHOLE_RAD
     angle = np.linspace(0.0, widest, _SAMPLES)
-    radius = np.array([_bent_radius(row, each) for each in angle])
+    radius = np.array([_radius_of(row, each) for each in angle])
     falls = np.flatnonzero(np.diff(radius) <= 0)
     last = falls[0] if len(falls) else -1
     row[LIMIT], row[FOLD] = radius[last], angle[last]
@@ -79,69 +80,55 @@ def lens_row(lens: Lens) -> Floats:
     return row
 
 
-def bend(lens: Lens, straight: Floats) -> Floats:
-    """Straight places (..., 2) to bent ones."""
-    return _each(_bend_all, lens, straight, 2)
+def distort(lens: Lens, undistorted: Floats) -> Floats:
+    """Undistorted places (..., 2) to distorted ones."""
+    return _each(distorted, lens, undistorted).reshape(np.shape(undistorted))
 
 
-def rays_cam(lens: Lens, bent: Floats) -> Floats:
-    """(..., 3) unit directions in the camera's axes of bent places (..., 2).
-
-    NaN where the lens lets nothing through.
-    """
-    return _each(_rays_all, lens, bent, 3)
+def magnification(lens: Lens, undistorted: Floats) -> Floats:
+    """(...,) how many times longer a pinhole shows a short line at undistorted places (..., 2) than
+    the lens does; the mean of both directions."""
+    return _each(magnification_at, lens, undistorted).reshape(np.shape(undistorted)[:-1])
 
 
-def straighten(lens: Lens, bent: Floats) -> Floats:
-    """Bent places (..., 2) to straight ones; NaN beyond `STRAIGHT_RAD` from the axis."""
-    ray = rays_cam(lens, bent)
-    ahead = ray[..., 2:] > math.cos(STRAIGHT_RAD)
+def undistort(lens: Lens, distorted: Floats) -> Floats:
+    """Distorted places (..., 2) to undistorted ones; NaN beyond `PINHOLE_RAD` from the axis."""
+    ray = rays_cam(lens, distorted)
+    ahead = ray[..., 2:] > math.cos(PINHOLE_RAD)
     return np.where(ahead, ray[..., :2] / np.where(ahead, ray[..., 2:], 1.0), np.nan)
 
 
-def stretch(lens: Lens, straight: Floats) -> Floats:
-    """(...,) how many times longer a pinhole shows a short line at straight places (..., 2) than
-    the lens does; the mean of both directions."""
-    flat = np.ascontiguousarray(straight, float).reshape(-1, 2)
-    out = np.empty(len(flat))
-    _stretch_all(lens_row(lens), flat, out)
-    return out.reshape(np.shape(straight)[:-1])
+def rays_cam(lens: Lens, distorted: Floats) -> Floats:
+    """(..., 3) unit directions in the camera's axes of distorted places (..., 2).
+
+    NaN where the lens lets nothing through.
+    """
+    flat = np.ascontiguousarray(distorted, float).reshape(-1, 2)
+    out = np.empty((len(flat), 3))
+    _rays_all(lens_row(lens), flat, out)
+    return out.reshape(*np.shape(distorted)[:-1], 3)
 
 
-def bend_radius(lens: Lens, angle_rad: float) -> float:
+def distorted_radius(lens: Lens, angle_rad: float) -> float:
     """How far from the middle, in focal lengths, light arrives that comes at an angle to the axis;
     NaN beyond what the lens can do."""
     row = lens_row(lens)
-    return float(_bent_radius(row, angle_rad)) if angle_rad <= row[FOLD] else math.nan
+    return float(_radius_of(row, angle_rad)) if angle_rad <= row[FOLD] else math.nan
 
 
-def _each(kernel: Callable[..., None], lens: Lens, places: Floats, width: int) -> Floats:
-    flat = np.ascontiguousarray(places, float).reshape(-1, 2)
-    out = np.empty((len(flat), width))
-    kernel(lens_row(lens), flat, out)
-    return out.reshape(*np.shape(places)[:-1], width)
+def _each(at: Callable[..., Any], lens: Lens, places: Floats) -> Floats:
+    row, flat = lens_row(lens), np.asarray(places, float).reshape(-1, 2)
+    return np.array([at(row, x, y) for x, y in flat.tolist()], float)
 
 
-@kernel(makes_arrays=True)
-def _bend_all(row, straight, out):
-    for i in range(len(straight)):
-        out[i, 0], out[i, 1] = bent(row, straight[i, 0], straight[i, 1])
-
-
-@kernel(makes_arrays=True)
-def _stretch_all(row, straight, out):
-    for i in range(len(straight)):
-        out[i] = stretch_at(row, straight[i, 0], straight[i, 1])
-
-
-@kernel(makes_arrays=True)
+@kernel
 def _rays_all(row, places, out):
     for i in range(len(places)):
         out[i, 0], out[i, 1], out[i, 2] = _ray(row, places[i, 0], places[i, 1])
 
 
 @kernel
-def bent(row, x, y):
+def distorted(row, x, y):
     """Where the lens of a row shows what a pinhole shows at x, y; far away what it does not see."""
     squared = x * x + y * y
     if row[0] != NONE and squared > math.tan(row[FOLD]) ** 2 and row[FOLD] < 0.5 * math.pi:
@@ -155,25 +142,25 @@ def bent(row, x, y):
         radius = math.sqrt(squared)
         if radius < 1e-12:
             return x, y
-        scale = _bent_radius(row, math.atan(radius)) / radius
+        scale = _radius_of(row, math.atan(radius)) / radius
         return x * scale, y * scale
     return x, y
 
 
 @kernel
-def stretch_at(row, x, y):
-    """`stretch` at one straight place."""
+def magnification_at(row, x, y):
+    """`magnification` at one undistorted place."""
     if row[0] == NONE:
         return 1.0
-    left, right = bent(row, x - _STEP, y), bent(row, x + _STEP, y)
-    above, below = bent(row, x, y - _STEP), bent(row, x, y + _STEP)
+    left, right = distorted(row, x - _STEP, y), distorted(row, x + _STEP, y)
+    above, below = distorted(row, x, y - _STEP), distorted(row, x, y + _STEP)
     area = (right[0] - left[0]) * (below[1] - above[1])
     area -= (right[1] - left[1]) * (below[0] - above[0])
     return 2.0 * _STEP / math.sqrt(max(abs(area), 1e-18))
 
 
 @kernel
-def _bent_radius(row, angle):
+def _radius_of(row, angle):
     """How far from the middle light arrives that comes at an angle [rad] to the axis."""
     if row[0] == KANNALA_BRANDT:
         s = angle * angle
@@ -187,7 +174,7 @@ def _bent_radius(row, angle):
 
 @kernel
 def _ray(row, x, y):
-    """Unit direction of a bent place; NaN where nothing is seen."""
+    """Unit direction of a distorted place; NaN where nothing is seen."""
     far = math.sqrt(x * x + y * y)
     if not far < row[LIMIT]:
         return np.nan, np.nan, np.nan
@@ -212,12 +199,12 @@ def _angle_of(row, far):
     low, high = 0.0, row[FOLD]
     angle = min(far, 0.5 * high)
     for _ in range(60):
-        off = _bent_radius(row, angle) - far
+        off = _radius_of(row, angle) - far
         if off > 0.0:
             high = angle
         else:
             low = angle
-        slope = (_bent_radius(row, angle + _STEP) - off - far) / _STEP
+        slope = (_radius_of(row, angle + _STEP) - off - far) / _STEP
         step = off / slope if slope > 0.0 else np.inf
         if abs(step) < 1e-13:
             break
@@ -227,13 +214,13 @@ def _angle_of(row, far):
 
 @kernel
 def _without_decentring(row, x, y, u, v):
-    """Newton's steps from a first guess to the straight place that is bent to x, y."""
+    """Newton's steps from a first guess to the undistorted place that is distorted to x, y."""
     for _ in range(_NEWTON_STEPS):
-        at = bent(row, u, v)
+        at = distorted(row, u, v)
         off_x, off_y = at[0] - x, at[1] - y
         if off_x * off_x + off_y * off_y < 1e-24:
             break
-        right, below = bent(row, u + _STEP, v), bent(row, u, v + _STEP)
+        right, below = distorted(row, u + _STEP, v), distorted(row, u, v + _STEP)
         a, b = (right[0] - at[0]) / _STEP, (below[0] - at[0]) / _STEP
         c, d = (right[1] - at[1]) / _STEP, (below[1] - at[1]) / _STEP
         det = a * d - b * c

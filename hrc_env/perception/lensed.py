@@ -1,9 +1,8 @@
 """Lenses before a renderer that draws like a pinhole, and behind the detector.
 
-A window of a bent image is made from a pinhole's picture: drawn from the same eye, turned to the
-window's middle and just wide enough to cover it, then resampled so that every pixel shows the
-light that the lens brings there. What was found in a bent image goes to the tracker in pinhole
-pixels.
+A window of a distorted image is resampled from a pinhole's picture, drawn from the same eye, turned
+to the window's middle and just wide enough to cover it. Keypoints of a distorted image go to the
+tracker in pinhole pixels.
 """
 
 from collections import OrderedDict
@@ -21,7 +20,7 @@ from hrc_env.geometry.cameras import (
     PinholeCamera,
     inside_image,
     pinhole_from_image,
-    pinhole_stretch,
+    pinhole_magnification,
     rays,
 )
 from hrc_env.perception.blazepose import to_image
@@ -49,7 +48,7 @@ class Drawer(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class _Cover:
-    """How a window of a bent image is made."""
+    """How a window of a distorted image is made."""
 
     camera: PinholeCamera
     """Turned to the window's middle, in units of its focal length."""
@@ -61,7 +60,7 @@ class _Cover:
 
 
 class Lensed:
-    """Windows of a rig's images as its lenses bend them: an `ImageSource`."""
+    """Windows of a rig's images as its lenses distort them: an `ImageSource`."""
 
     def __init__(self, drawer: Drawer, cameras: Sequence[PinholeCamera]) -> None:
         self.drawer, self.cameras = drawer, tuple(cameras)
@@ -73,13 +72,13 @@ class Lensed:
 
     def view(self, camera: PinholeCamera, window: Roi) -> Image:
         """The same of any camera."""
-        return self._bent(camera, window, self.drawer.view)
+        return self._distorted(camera, window, self.drawer.view)
 
     def empty(self, camera_index: int, window: Roi) -> Image:
         """The window of a camera's image, were nobody there: the robot knows where it is itself."""
-        return self._bent(self.cameras[camera_index], window, self.drawer.unpeopled)
+        return self._distorted(self.cameras[camera_index], window, self.drawer.unpeopled)
 
-    def _bent(
+    def _distorted(
         self,
         camera: PinholeCamera,
         window: Roi,
@@ -119,7 +118,7 @@ def pinhole_keypoints(found: Keypoints, cameras: Sequence[PinholeCamera]) -> Key
     for c, camera in enumerate(cameras):
         if camera.lens is not None:
             px[:, c] = pinhole_from_image(camera, found.px[:, c])
-            sigma_px[:, c] *= np.nan_to_num(pinhole_stretch(camera, px[:, c]), nan=1.0)
+            sigma_px[:, c] *= np.nan_to_num(pinhole_magnification(camera, px[:, c]), nan=1.0)
     missing = np.isnan(px).any(-1)
     px[missing], confidence[missing], sigma_px[missing] = np.nan, 0.0, np.inf
     return Keypoints(px, confidence, sigma_px, found.time_s)

@@ -7,28 +7,27 @@
 | `truth` | nothing: the estimate is the worker as they are |
 | `none` | nothing: the estimate stays the prior |
 
-The organs do not know each other; they meet here and in `sensing`.
+The organs do not know each other; they meet here.
 """
 
 from dataclasses import replace
-from typing import Any, Protocol
 
 import numpy as np
 
 from hrc_env.config import HRCConfig
 from hrc_env.core.batching import rows
 from hrc_env.core.errors import ConfigError, unknown
-from hrc_env.core.records import Keypoints, PoseEstimate
-from hrc_env.core.stateful import Stateful
-from hrc_env.core.typing import Bools, Image, Ints
+from hrc_env.core.records import PoseEstimate
+from hrc_env.core.typing import Bools, Ints
 from hrc_env.geometry.cameras import projections
 from hrc_env.perception.faults.fault import IMAGE, KINDS
 from hrc_env.perception.faults.schedule import Schedule
-from hrc_env.pipeline.emulated import EmulatedSenses
-from hrc_env.pipeline.rendered import CameraSenses
-from hrc_env.pipeline.sensor_input import Generators, Moment, Windows
+from hrc_env.pipeline.emulated import EmulatorPipeline
+from hrc_env.pipeline.rendered import PixelPipeline
+from hrc_env.pipeline.sensor_input import Generators, SensorInput, with_truth
+from hrc_env.pipeline.tracking import PerceptionPipeline
 from hrc_env.scene.build import Scene
-from hrc_env.scene.domain_randomization import AS_BUILT, Look
+from hrc_env.scene.domain_randomization import AS_BUILT
 from hrc_env.tracking import oracle
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import EstimatorChoice, make_estimator
@@ -39,55 +38,10 @@ CAMERA_LEVELS = LEVELS[:2]
 """Those that have cameras."""
 
 
-class Senses(Protocol):
-    """One perception level with its estimator, for a batch of environments."""
-
-    def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
-        """Forget environments `ids`; there is a generator for each environment of the batch."""
-        ...
-
-    def sense(self, now: Moment, sensor_rngs: Generators, tracker_rngs: Generators) -> PoseEstimate:
-        """Look at `now` and say what is believed of it, in its rows."""
-        ...
-
-    def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
-        """What is expected in `horizon_s` of rows `ids`, of which `sense` has just said `now`."""
-        ...
-
-    def looks(self, b: int) -> tuple[Keypoints | None, Windows]:
-        """What environment `b` saw last, and through which windows (for pictures)."""
-        ...
-
-    def crops(self, b: int) -> list[Image | None]:
-        """What the pose network was given of environment `b`'s first worker, one a camera (for
-        pictures); none where there is no network."""
-        ...
-
-    def look_of(self, b: int) -> Look | None:
-        """How environment `b` looks in its episode (for pictures); None: as it was built."""
-        ...
-
-    def suspected(self, ids: Ints) -> Bools:
-        """(B, C) which cameras of environments `ids` are thought to be miscalibrated."""
-        ...
-
-    def get_state(self) -> Any:
-        """A copy of what changes."""
-        ...
-
-    def set_state(self, state: Any) -> None:
-        """Continue from a state."""
-        ...
-
-    def close(self) -> None:
-        """Release threads and graphics contexts."""
-        ...
-
-
-def make_senses(
+def make_pipeline(
     level: str, estimator: EstimatorChoice, scene: Scene, batch: int, config: HRCConfig
-) -> Senses:
-    """The senses of a perception level.
+) -> PerceptionPipeline:
+    """The pipeline of a perception level.
 
     Raises:
         ConfigError: `level` is not a name of one.
@@ -106,12 +60,12 @@ def make_senses(
     settings = replace(config.tracker, longest_delay_s=memory_s)
     tracker = make_estimator(estimator, projections(scene.cameras), config.ctrl_dt, settings)
     if level == "truth":
-        return GivenSenses(config.tracker, oracle.prior(batch, scene.n_workers, config.tracker))
+        return Oracle(config.tracker, oracle.prior(batch, scene.n_workers, config.tracker))
     if level == "none":
-        return BlindSenses(oracle.prior(batch, scene.n_workers, config.tracker))
+        return NoPerception(oracle.prior(batch, scene.n_workers, config.tracker))
     if level == "keypoints":
-        return EmulatedSenses(scene, batch, tracker, config, schedule)
-    return CameraSenses(scene, batch, tracker, config, schedule)
+        return EmulatorPipeline(scene, batch, tracker, config, schedule)
+    return PixelPipeline(scene, batch, tracker, config, schedule)
 
 
 def _schedule(scene: Scene, level: str, config: HRCConfig) -> Schedule:
@@ -136,81 +90,44 @@ def _schedule(scene: Scene, level: str, config: HRCConfig) -> Schedule:
     return Schedule(scene.rig, faults, config.ctrl_dt)
 
 
-class GivenSenses(Stateful):
+class Oracle(PerceptionPipeline):
     """Level `truth`: the worker as they are."""
+
+    NEEDS_TRUTH = True
 
     def __init__(self, config: TrackerConfig, prior: PoseEstimate) -> None:
         self.config, self.prior = config, prior
 
-    def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
-        """Nothing to forget."""
-
-    def sense(self, now: Moment, sensor_rngs: Generators, tracker_rngs: Generators) -> PoseEstimate:
+    def perceive(
+        self, now: SensorInput, sensor_rngs: Generators, tracker_rngs: Generators
+    ) -> PoseEstimate:
         """The truth, as an estimate; of who is not there, the prior."""
-        seen = oracle.estimate_from_truth(now.truth)
-        if now.present.all():
+        known = with_truth(now)
+        seen = oracle.estimate_from_truth(known.truth)
+        if known.present.all():
             return seen
-        return _chosen(now.present, seen, rows(self.prior, now.ids))
+        return _chosen(known.present, seen, rows(self.prior, now.ids))
 
     def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
         """Where a body that moves so goes: nobody is given the future."""
         return forecast(now, horizon_s, self.config)
 
-    def looks(self, b: int) -> tuple[Keypoints | None, Windows]:
-        """No camera took part."""
-        return None, []
 
-    def crops(self, b: int) -> list[Image | None]:
-        """No network was given anything."""
-        return []
-
-    def look_of(self, b: int) -> Look | None:
-        """As it was built."""
-        return None
-
-    def suspected(self, ids: Ints) -> Bools:
-        """(B, 0): there are no cameras."""
-        return np.zeros((len(ids), 0), np.bool_)
-
-    def close(self) -> None:
-        """Nothing to release."""
-
-
-class BlindSenses(Stateful):
+class NoPerception(PerceptionPipeline):
     """Level `none`: the prior, whatever happens."""
 
     def __init__(self, prior: PoseEstimate) -> None:
         self.prior = prior
 
-    def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
-        """Nothing to forget."""
-
-    def sense(self, now: Moment, sensor_rngs: Generators, tracker_rngs: Generators) -> PoseEstimate:
+    def perceive(
+        self, now: SensorInput, sensor_rngs: Generators, tracker_rngs: Generators
+    ) -> PoseEstimate:
         """The prior."""
         return rows(self.prior, now.ids)
 
     def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
         """The prior, then as now."""
         return rows(self.prior, ids)
-
-    def looks(self, b: int) -> tuple[Keypoints | None, Windows]:
-        """No camera took part."""
-        return None, []
-
-    def crops(self, b: int) -> list[Image | None]:
-        """No network was given anything."""
-        return []
-
-    def look_of(self, b: int) -> Look | None:
-        """As it was built."""
-        return None
-
-    def suspected(self, ids: Ints) -> Bools:
-        """(B, 0): there are no cameras."""
-        return np.zeros((len(ids), 0), np.bool_)
-
-    def close(self) -> None:
-        """Nothing to release."""
 
 
 def _chosen(who: Bools, one: PoseEstimate, other: PoseEstimate) -> PoseEstimate:

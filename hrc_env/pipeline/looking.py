@@ -1,19 +1,17 @@
-"""Where to look for every worker, and looking there: windows, searches, people who were missed."""
+"""Detects every worker of a scene: windows where they are expected, searches, people missed."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
-from hrc_env.core.records import PoseEstimate, Roi
+from hrc_env.core.records import Keypoints, PoseEstimate, Roi
 from hrc_env.core.stateful import Stateful
 from hrc_env.core.typing import Image
 from hrc_env.geometry.cameras import PinholeCamera, project, projections
 from hrc_env.perception.detector import Detection, DetectorConfig, PoseDetector
 from hrc_env.perception.noise import STANDING
-from hrc_env.perception.outline import posture_of
-from hrc_env.perception.posture import is_folded
+from hrc_env.perception.outline import is_folded, posture_of
 from hrc_env.perception.searching import ImageSource
 from hrc_env.perception.windows import steady_window, window_from_joints
-from hrc_env.pipeline.reacquisition import Strays
-from hrc_env.pipeline.search_schedule import Searches
+from hrc_env.pipeline.reacquisition import Reacquisition, SearchSchedule
 from hrc_env.pipeline.sensor_input import Windows
 
 
@@ -27,7 +25,7 @@ class Looking(Stateful):
         config: of the detector.
     """
 
-    CHANGES = ("detector", "windows", "searches", "strays")
+    CHANGES = ("detector", "windows", "schedule", "reacquisition")
 
     def __init__(
         self, batch: int, cameras: Sequence[PinholeCamera], n_workers: int, config: DetectorConfig
@@ -38,8 +36,8 @@ class Looking(Stateful):
         self.windows: list[Windows] = [
             [[None] * len(self.cameras) for _ in range(n_workers)] for _ in range(batch)
         ]
-        self.searches = Searches(batch, len(self.cameras), config.search_every)
-        self.strays = Strays(batch, n_workers, len(self.cameras))
+        self.schedule = SearchSchedule(batch, len(self.cameras), config.search_every)
+        self.reacquisition = Reacquisition(batch, n_workers, len(self.cameras))
         self.seen: dict[int, tuple[list[Roi | None], list[Image | None]]] = {}
         """What the network was given of each environment's first worker, and through which windows:
         for pictures, no part of the state."""
@@ -51,7 +49,8 @@ class Looking(Stateful):
         row: int,
         b: int,
         has_image: Sequence[bool],
-    ) -> Iterator[tuple[int, Detection]]:
+        out: Keypoints,
+    ) -> None:
         """Look for every worker of environment b; a search finds nobody who has been looked at.
 
         Those with a window come first, and one search serves all the others. Who is in view of
@@ -63,40 +62,42 @@ class Looking(Stateful):
             row: environment b's row there.
             b: which environment.
             has_image: (C,) whether each camera has an image now.
+            out: whose row is filled.
         """
         wanted = [self._windows(expected, row, w) for w in range(self.n_workers)]
         taken: Windows = []
         people, missed = None, False
-        self.searches.tick(b)
+        self.schedule.tick(b)
         for worker in sorted(range(len(wanted)), key=lambda w: not any(wanted[w])):
             steady = list(map(steady_window, self.windows[b][worker], wanted[worker]))
             windows = [w if has else None for w, has in zip(steady, has_image, strict=True)]
             if not any(has_image) or (any(steady) and not any(windows)):
                 continue
             if not any(windows) and people is None:
-                due = self.searches.due(b, has_image)
+                due = self.schedule.due(b, has_image)
                 if not due:
                     continue
-                people = self.searches.remember(b, due, self.detector.search(source, due))
+                people = self.schedule.remember(b, due, self.detector.search(source, due))
             if any(windows):
                 windows = self._followed(source, b, worker, windows, taken, has_image)
             track = self._track(b, worker)
             folded, posture = _expected_posture(expected, row, worker)
             seen = self.detector.detect(source, windows, track, taken, people, folded, posture)
             taken.append(seen.windows)
-            self.strays.saw(b, worker, seen.confidence.max(-1) > 0.0)
+            self.reacquisition.saw(b, worker, seen.confidence.max(-1) > 0.0)
             missed |= not any(windows) and not seen.confidence.any()
             self._keep(b, worker, seen, has_image)
-            yield worker, seen
+            out.px[row, :, worker], out.sigma_px[row, :, worker] = seen.px, seen.sigma_px
+            out.confidence[row, :, worker] = seen.confidence
         if missed:
-            self.searches.rest(b)
+            self.schedule.rest(b)
 
     def forget(self, b: int) -> None:
         """Forget whom environment b was following."""
-        self.searches.reset(b)
+        self.schedule.reset(b)
         for worker in range(self.n_workers):
             self.detector.forget(self._track(b, worker))
-            self.strays.reset(b, worker)
+            self.reacquisition.reset(b, worker)
             self.windows[b][worker] = [None] * len(self.cameras)
 
     def crops(self, b: int) -> list[Image | None]:
@@ -104,10 +105,6 @@ class Looking(Stateful):
         windows, crops = self.seen.get(b, ([], []))
         current = self.windows[b][0] if self.windows[b] else []
         return crops if windows == current else [None] * len(current)
-
-    def close(self) -> None:
-        """Stop the detector's thread."""
-        self.detector.close()
 
     def _keep(self, b: int, worker: int, seen: Detection, has_image: Sequence[bool]) -> None:
         for c, has in enumerate(has_image):
@@ -126,11 +123,11 @@ class Looking(Stateful):
         has_image: Sequence[bool],
     ) -> list[Roi | None]:
         """Where to look for a worker with a track: elsewhere if most cameras have missed them."""
-        blind = self.strays.blind(b, worker, has_image)
+        blind = self.reacquisition.blind(b, worker, has_image)
         if blind:
             people = self.detector.search(source, blind)
-            self.strays.found(b, worker, people, windows, taken, self.cameras)
-        there = self.strays.windows(b, worker, windows)
+            self.reacquisition.found(b, worker, people, windows, taken, self.cameras)
+        there = self.reacquisition.windows(b, worker, windows)
         return [window if has else None for window, has in zip(there, has_image, strict=True)]
 
     def _track(self, b: int, worker: int) -> int:
@@ -142,10 +139,7 @@ class Looking(Stateful):
         if not predicted.tracked[row, worker]:
             return [None] * len(self.cameras)
         px, depth_m = project(self.P, predicted.mean_world[row : row + 1, worker])
-        return [
-            window_from_joints(px[0, c], depth_m[0, c], camera)
-            for c, camera in enumerate(self.cameras)
-        ]
+        return list(map(window_from_joints, px[0], depth_m[0], self.cameras))
 
 
 def _expected_posture(

@@ -1,9 +1,10 @@
-"""What the senses are given of the world."""
+"""What a perception pipeline is given of the world."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
+from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Roi, WorkerMotion, WorkerTruth
 from hrc_env.core.typing import Bools, Ints, JointAngles
 
@@ -13,8 +14,8 @@ Windows = list[list[Roi | None]]
 
 
 @dataclass(frozen=True, slots=True)
-class Moment:
-    """The scene when the shutters open; rows are environments `ids`."""
+class SensorInput:
+    """The scene when the shutters open, to be drawn; rows are environments `ids`."""
 
     ids: Ints
     """(B,) environments of the batch that these rows are."""
@@ -22,7 +23,20 @@ class Moment:
     """(B, N) the arm [rad]."""
     motion: WorkerMotion
     """(B, W, S, ...)."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrueSensorInput(SensorInput):
+    """The same with what no camera knows: for pipelines with `NEEDS_TRUTH` only."""
+
     truth: WorkerTruth
-    """(B, W, ...): for the emulator and the level `truth`, and for nobody else."""
+    """(B, W, ...)."""
     present: Bools
-    """(B, W) who is in the episode: for the level `truth`, and for nobody else."""
+    """(B, W) who is in the episode."""
+
+
+def with_truth(now: SensorInput) -> TrueSensorInput:
+    """`now`, which must hold the truth."""
+    if not isinstance(now, TrueSensorInput):
+        raise ConfigError(f"This pipeline needs a TrueSensorInput, got a {type(now).__name__}.")
+    return now

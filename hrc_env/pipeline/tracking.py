@@ -11,11 +11,10 @@ from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.stateful import Stateful
 from hrc_env.core.typing import Bools, Floats, Image, Ints
 from hrc_env.geometry.cameras import projections
-from hrc_env.perception.faults.recent import Recent
-from hrc_env.perception.faults.schedule import Schedule
+from hrc_env.perception.faults.schedule import Recent, Schedule
 from hrc_env.perception.lensed import pinhole_keypoints
 from hrc_env.perception.offsets import our_joints
-from hrc_env.pipeline.sensor_input import Generators, Moment, Windows
+from hrc_env.pipeline.sensor_input import Generators, SensorInput, Windows
 from hrc_env.scene.build import Scene
 from hrc_env.scene.domain_randomization import Look
 from hrc_env.tracking.calibration_monitor import forget_monitor, make_monitor, monitor
@@ -24,7 +23,48 @@ from hrc_env.tracking.frozen_frames import forget_frozen, leave_out_frozen, make
 from hrc_env.tracking.people.association import associate
 
 
-class TrackingSenses(Stateful):
+class PerceptionPipeline(Stateful):
+    """One perception level with its estimator, for a batch of environments; here, one without
+    cameras and memory."""
+
+    NEEDS_TRUTH: bool = False
+    """Whether `perceive` is to be given a `TrueSensorInput`."""
+
+    def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
+        """Forget environments `ids`; there is a generator for each environment of the batch."""
+
+    def perceive(
+        self, now: SensorInput, sensor_rngs: Generators, tracker_rngs: Generators
+    ) -> PoseEstimate:
+        """Look at `now`; what is believed of it, in its rows."""
+        raise NotImplementedError
+
+    def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
+        """What is expected in `horizon_s` of rows `ids`, of which `now` is believed."""
+        raise NotImplementedError
+
+    def last_detections(self, b: int) -> tuple[Keypoints | None, Windows]:
+        """What environment `b` saw last, and through which windows (for pictures)."""
+        return None, []
+
+    def crops(self, b: int) -> list[Image | None]:
+        """What the network was given of environment `b`'s first worker, one a camera (for
+        pictures); none where there is no network."""
+        return []
+
+    def look_of(self, b: int) -> Look | None:
+        """How environment `b` looks in its episode (for pictures); None: as it was built."""
+        return None
+
+    def suspected(self, ids: Ints) -> Bools:
+        """(B, C) which cameras of environments `ids` are thought to be miscalibrated."""
+        return np.zeros((len(ids), 0), np.bool_)
+
+    def close(self) -> None:
+        """Release threads and graphics contexts."""
+
+
+class PoseTracking(PerceptionPipeline):
     """What the levels with cameras share: predict, get keypoints, update."""
 
     CHANGES = ("state", "keypoints", "recent", "frozen", "monitored")
@@ -51,7 +91,9 @@ class TrackingSenses(Stateful):
             self.recent.reset(ids, sensor_rngs)
             forget_frozen(self.frozen, ids)
 
-    def sense(self, now: Moment, sensor_rngs: Generators, tracker_rngs: Generators) -> PoseEstimate:
+    def perceive(
+        self, now: SensorInput, sensor_rngs: Generators, tracker_rngs: Generators
+    ) -> PoseEstimate:
         """Predict the workers, look at them where they should be, and update."""
         whole = len(now.ids) == len(self.keypoints.px)
         state = self.state if whole else rows(self.state, now.ids)
@@ -77,10 +119,10 @@ class TrackingSenses(Stateful):
         state = self.state if whole else rows(self.state, ids)
         return our_joints(self.tracker.forecast(state, horizon_s))
 
-    def detect(self, now: Moment, predicted: Any, sensor_rngs: Generators) -> Keypoints:
+    def detect(self, now: SensorInput, predicted: Any, sensor_rngs: Generators) -> Keypoints:
         """Keypoints of this moment, by whatever detector the level has; whose they are is open.
 
-        They are in pixels of the images, as the lenses bend them.
+        They are in pixels of the images, as the lenses distort them.
 
         Args:
             now: the scene.
@@ -96,11 +138,6 @@ class TrackingSenses(Stateful):
         expected = self.tracker.estimate(predicted)
         return associate(self.P, keypoints, expected, self.association).keypoints
 
-    def look_of(self, b: int) -> Look | None:
-        """How environment `b` looks in its episode; None: as it was built."""
-        del b
-        return None
-
     def suspected(self, ids: Ints) -> Bools:
         """(B, C) which cameras of environments `ids` are thought to be miscalibrated."""
         return self.monitored.suspected[ids]
@@ -111,16 +148,9 @@ class TrackingSenses(Stateful):
             return np.zeros(keypoints.px.shape[:2])
         return (self.recent.steps[ids, None] + 1) * self.dt_s - keypoints.time_s
 
-    def looks(self, b: int) -> tuple[Keypoints | None, Windows]:
+    def last_detections(self, b: int) -> tuple[Keypoints | None, Windows]:
         """The keypoints of environment `b`."""
         return rows(self.keypoints, np.array([b])), []
-
-    def crops(self, b: int) -> list[Image | None]:
-        """No network was given anything."""
-        return []
-
-    def close(self) -> None:
-        """Nothing to release."""
 
 
 def no_keypoints(batch: int, n_cameras: int, n_workers: int) -> Keypoints:

@@ -11,7 +11,12 @@ from PIL import ImageDraw, ImageFont
 from hrc_env.core.records import Keypoints, PoseEstimate, Roi
 from hrc_env.core.skeleton import BONES, JOINTS
 from hrc_env.core.typing import Floats, Image, Points2
-from hrc_env.geometry.cameras import PinholeCamera, image_from_pinhole, pinhole_stretch, project
+from hrc_env.geometry.cameras import (
+    PinholeCamera,
+    image_from_pinhole,
+    pinhole_magnification,
+    project,
+)
 
 Colour = tuple[int, int, int]
 
@@ -191,8 +196,8 @@ def _ellipses(
     J = (camera.K[0, 0] * scale / z)[:, None, None] * local @ R_cam_from_world
     values, vectors = np.linalg.eigh(J @ covariances @ J.transpose(0, 2, 1))
     pinhole_px = camera.K[:2, 2] + camera.K[0, 0] * np.stack([x, y], -1) / z[:, None]
-    stretch = np.reshape(pinhole_stretch(camera, pinhole_px), (-1, 1))
-    axes = 2 * np.sqrt(np.maximum(values, 0.25)) / stretch
+    magnification = np.reshape(pinhole_magnification(camera, pinhole_px), (-1, 1))
+    axes = 2 * np.sqrt(np.maximum(values, 0.25)) / magnification
     angles = np.degrees(np.arctan2(vectors[:, 1, 1], vectors[:, 0, 1]))
     centres = image_from_pinhole(camera, pinhole_px) * scale
     fit = np.flatnonzero((axes.max(-1) <= 4 * image.shape[1]) & np.isfinite(centres).all(-1))

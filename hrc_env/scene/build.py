@@ -1,7 +1,6 @@
 """From settings to a compiled scene: room, arm, workers, cameras."""
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -14,37 +13,26 @@ from hrc_env.core.records import Grounds, Held
 from hrc_env.core.typing import Floats, Ints, JointAngles
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.geometry.chains import SerialChain, capsules
-from hrc_env.geometry.rotations import about_axis
 from hrc_env.geometry.shapes import WIDTH
 from hrc_env.geometry.sight import Surroundings
-from hrc_env.scene.arena import add_lab, paint_lab
-from hrc_env.scene.arm import (
-    CAPSULES,
-    DAMPING_NMS_RAD,
-    HOME_Q,
-    OUT_OF_REACH,
-    add_arm,
-    arm_chain,
-    capsule_reach_m,
-)
-from hrc_env.scene.grounds import ROBOT_XY_M, lab_grounds
-from hrc_env.scene.obstacles import obstacles
+from hrc_env.scene.places import SCENES, obstacles
 from hrc_env.scene.primitives import DECORATION, OVERHEAD, ROBOT_BIT, ROBOT_LOOKS
-from hrc_env.scene.props import add_props, paint_props, prop_mocap
-from hrc_env.scene.rig import LAB_CAMERAS, CameraConfig, add_cameras, pinholes, select
-from hrc_env.scene.site import SITE_CAMERAS, add_site, paint_site
-from hrc_env.scene.site_grounds import site_grounds
-from hrc_env.scene.wardrobe import Wardrobe, dress, wardrobe
+from hrc_env.scene.rig import CameraConfig, add_cameras, pinholes, select
+from hrc_env.scene.robot import (
+    DEFAULT,
+    PREFIX,
+    Robot,
+    add_robot,
+    chain_of,
+    reach_m,
+    robot_called,
+    servo_lead_s,
+)
 from hrc_env.scene.worker import add_worker, capsule_geom_ids, mocap_ids
-from hrc_env.worker.body import load_body, pool
-from hrc_env.worker.mesh import load_looks
+from hrc_env.scene.worker_visuals import WorkerVisuals, add_props, add_visuals, visuals_of
+from hrc_env.worker.body import assets_dir, load_body, pool
+from hrc_env.worker.mesh import load_mesh
 from hrc_env.worker.props import held_shapes
-
-ROBOT_BASE_WORLD = (*ROBOT_XY_M, 0.75)
-"""The middle of the arm's foot, on the pedestal [m]."""
-ROBOT_YAW_RAD = math.pi
-"""The arm reaches along its own -x, which so looks to world +x."""
-
 
 ARENA_BYTES = 2**20
 """Memory of one simulation for contacts; the arm in a pile of them takes a tenth."""
@@ -64,37 +52,16 @@ class SceneConfig:
     stay shallow and calm; at 10 ms one seed of eight is beyond (`benchmarks/sim_dt.py`)."""
     slew_rad_s2: float = 8.0
     """Fastest change of a commanded joint velocity [rad/s^2]; keeps the overshoot below 5 %."""
-    leash_rad: float = 0.05
+    integrator_clamp_rad: float = 0.05
     """How far the holding servo's angle may be ahead of a blocked joint [rad]."""
     cameras: tuple[CameraConfig, ...] = ()
     """All cameras that hang in the scene, of which `build` says which are switched on; none: the
     scene's own four."""
 
     def __post_init__(self) -> None:
-        for name in ("sim_dt", "slew_rad_s2", "leash_rad"):
+        for name in ("sim_dt", "slew_rad_s2", "integrator_clamp_rad"):
             if not getattr(self, name) > 0:
                 raise ConfigError(f"{name} must be positive, got {getattr(self, name)}.")
-
-
-@dataclass(frozen=True, slots=True)
-class Room:
-    """How a scene's room is made."""
-
-    add: Callable[[Any, bool], None]
-    """Adds it to an MjSpec, with clutter or without."""
-    paint: Callable[[Any], None]
-    """Paints its surfaces; only done when somebody looks."""
-    grounds: Callable[[Floats, bool], Grounds]
-    """Where people walk and work, from what stands there, with clutter or without."""
-    cameras: tuple[CameraConfig, ...]
-    """Those that hang there unless the settings say otherwise."""
-
-
-SCENES: dict[str, Room] = {
-    "lab": Room(add_lab, paint_lab, lab_grounds, LAB_CAMERAS),
-    "site": Room(add_site, paint_site, site_grounds, SITE_CAMERAS),
-}
-"""The scenes by name."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,6 +71,7 @@ class Scene:
     config: SceneConfig
     name: str
     n_workers: int
+    robot: Robot
     bodies: tuple[str, ...]
     """Baked bodies that the workers can have; their capsules in `model` are the first one's."""
     model: mujoco.MjModel
@@ -114,6 +82,8 @@ class Scene:
     """(N,) the arm's pose at rest [rad]."""
     servo_lead_s: Floats
     """(N,) inertia at rest over damping, joint by joint: the rate servos' lead [s]."""
+    watched: Ints
+    """Which of the chain's capsules workers keep an eye on."""
     worker_mocap: Ints
     """(W, S) mocap row of every body segment of every worker."""
     worker_capsules: Ints
@@ -137,7 +107,7 @@ class Scene:
     def __reduce__(self) -> tuple[Any, ...]:
         """A scene is pickled as its recipe."""
         use = tuple(camera.name for camera in self.cameras)
-        return build, (self.config, self.name, self.n_workers, self.bodies, use)
+        return build, (self.config, self.name, self.n_workers, self.bodies, use, self.robot)
 
 
 def build(
@@ -146,6 +116,7 @@ def build(
     n_workers: int = 0,
     bodies: str | tuple[str, ...] = "worker_1",
     cameras: Sequence[int | str] | None = None,
+    robot: str | Robot = DEFAULT,
 ) -> Scene:
     """The scene of these settings, compiled once and kept.
 
@@ -155,9 +126,10 @@ def build(
         n_workers: how many workers it has room for, 0 or more.
         bodies: the baked body of all of them, or those that they can have; "any": all.
         cameras: names or indices of the cameras that are used; None uses all.
+        robot: which one works there, a name or itself.
 
     Raises:
-        ConfigError: an unknown scene, body or camera, or a negative number of workers.
+        ConfigError: an unknown scene, body, camera or robot, or a negative number of workers.
     """
     if name not in SCENES:
         raise unknown("scene", name, SCENES)
@@ -168,17 +140,23 @@ def build(
     if not config.cameras:
         config = replace(config, cameras=SCENES[name].cameras)
     use = tuple(camera.name for camera in select(config.cameras, cameras))
-    return _build(config, name, n_workers, pool(bodies), use)
+    return _build(config, name, n_workers, pool(bodies), use, robot_called(robot))
 
 
 @lru_cache(maxsize=8)
 def _build(
-    config: SceneConfig, name: str, n_workers: int, bodies: tuple[str, ...], use: tuple | None
+    config: SceneConfig,
+    name: str,
+    n_workers: int,
+    bodies: tuple[str, ...],
+    use: tuple[str, ...],
+    robot: Robot,
 ) -> Scene:
-    cameras = pinholes(select(config.cameras, use))
-    spec = _spec(config, name, n_workers, bodies[0], cameras)
+    room = SCENES[name]
+    cameras, chain = pinholes(select(config.cameras, use)), chain_of(robot, room.mount_world)
+    spec = _spec(config, name, n_workers, bodies[0], cameras, robot)
     _strip(spec)
-    _pair(spec)
+    _pair(spec, robot, chain)
     model = spec.compile()
     prefixes, body = _prefixes(n_workers), load_body(bodies[0])
     rows = [mocap_ids(model, prefix) for prefix in prefixes]
@@ -188,23 +166,25 @@ def _build(
         config=config,
         name=name,
         n_workers=n_workers,
+        robot=robot,
         bodies=bodies,
         model=model,
-        chain=arm_chain(_base_transform()),
+        chain=chain,
         cameras=cameras,
-        home_q=HOME_Q.copy(),
-        servo_lead_s=_servo_lead_s(model),
+        home_q=np.array(robot.home_q),
+        servo_lead_s=servo_lead_s(robot, model),
+        watched=np.array([robot.capsules.index(name) for name in robot.watched]),
         worker_mocap=np.stack(rows) if rows else np.zeros((0, 0), np.int64),
         worker_capsules=np.array(touched, np.int64).reshape(n_workers, len(body.capsule_names)),
         obstacles=still,
-        grounds=SCENES[name].grounds(still, config.clutter),
+        grounds=room.grounds(still, config.clutter),
     )
 
 
 def without_workers(scene: Scene) -> Scene:
     """The same scene with nobody in it."""
     names = tuple(camera.name for camera in scene.cameras)
-    return _build(scene.config, scene.name, 0, scene.bodies, names)
+    return _build(scene.config, scene.name, 0, scene.bodies, names, scene.robot)
 
 
 @lru_cache(maxsize=4)
@@ -214,24 +194,19 @@ def drawing_model(scene: Scene) -> mujoco.MjModel:
     The physics' joints and its mocap rows come first, in the same order, so that its state fits.
     """
     prefixes = _prefixes(scene.n_workers)
-    spec = _spec(scene.config, scene.name, scene.n_workers, scene.bodies[0], scene.cameras)
+    spec = _spec(
+        scene.config, scene.name, scene.n_workers, scene.bodies[0], scene.cameras, scene.robot
+    )
     for prefix in prefixes:
         for name in scene.bodies:
-            dress(spec, load_body(name), load_looks(name), prefix)
+            add_visuals(spec, load_body(name), load_mesh(name), prefix)
     add_props(spec, prefixes)
-    SCENES[scene.name].paint(spec)
-    paint_props(spec)
     return spec.compile()
 
 
-def drawn_props(scene: Scene) -> Ints:
-    """(W, len(PROPS) - 1) mocap rows in the drawing model of what the workers can hold."""
-    return prop_mocap(drawing_model(scene), _prefixes(scene.n_workers))
-
-
-def drawn_looks(scene: Scene) -> Wardrobe:
-    """Where the looks of the workers' bodies are in the drawing model."""
-    return wardrobe(drawing_model(scene), _prefixes(scene.n_workers), scene.bodies)
+def visuals(scene: Scene) -> WorkerVisuals:
+    """Where the workers' looks, and what they can hold, are in the drawing model."""
+    return visuals_of(drawing_model(scene), _prefixes(scene.n_workers), scene.bodies)
 
 
 def _spec(
@@ -240,18 +215,17 @@ def _spec(
     n_workers: int,
     body_name: str,
     cameras: tuple[PinholeCamera, ...],
+    robot: Robot,
 ) -> mujoco.MjSpec:
-    """Everything, unpainted."""
-    spec = mujoco.MjSpec()
-    spec.modelname = name
-    spec.compiler.degree = 0
+    """Everything but the workers' looks and what they hold."""
+    path = assets_dir() / "scenes" / f"{name}{'' if config.clutter else '_bare'}.xml"
+    spec = mujoco.MjSpec.from_file(str(path))
     spec.option.timestep = config.sim_dt
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.memory = ARENA_BYTES + PAIR_BYTES * n_workers**2
     # The velocity command in force, and which body each worker has: part of the state.
-    spec.nuserdata = len(HOME_Q) + n_workers
-    SCENES[name].add(spec, config.clutter)
-    add_arm(spec, ROBOT_BASE_WORLD, ROBOT_YAW_RAD)
+    spec.nuserdata = len(robot.joints) + n_workers
+    add_robot(spec, robot, SCENES[name].mount_world)
     add_cameras(spec, cameras)
     for prefix in _prefixes(n_workers):
         add_worker(spec, load_body(body_name), prefix)
@@ -273,37 +247,36 @@ def _strip(spec: mujoco.MjSpec) -> None:
         spec.delete(unseen)
 
 
-def _pair(spec: mujoco.MjSpec) -> None:
-    """Say pair by pair what may touch the arm: quicker than to look for it in every substep.
+def _pair(spec: mujoco.MjSpec, robot: Robot, chain: SerialChain) -> None:
+    """Say pair by pair what may touch the robot: quicker than to look for it in every substep.
 
     What stands still out of a link's reach is no pair of it: the physics is the same.
     """
-    arm = [geom for geom in spec.geoms if geom.contype & ROBOT_BIT]
-    reach_m = {
-        f"arm_{name}": reach for (name, *_), reach in zip(CAPSULES, capsule_reach_m(), strict=True)
-    }
-    never = {(f"arm_{capsule}", other) for capsule, other in OUT_OF_REACH}
+    reach = dict(zip(robot.capsules, reach_m(chain).tolist(), strict=True))
+    foot_world = chain.T_world_from_base[:3, 3]
+    parts = [geom for geom in spec.geoms if geom.contype & ROBOT_BIT]
     others = [geom for geom in spec.geoms if geom.contype & ~ROBOT_BIT]
     for row, other in enumerate(others):
         other.name = other.name or f"solid_{row}"
-    for part in arm:
+    for part in parts:
+        name = part.name.removeprefix(PREFIX)
         for other in others:
             meets = part.conaffinity & other.contype
-            if not meets or (part.name, other.name) in never:
+            if not meets or (name, other.name) in robot.never_touch:
                 continue
-            if _nearest_m(other) <= reach_m[part.name]:
+            if _nearest_m(other, foot_world) <= reach[name]:
                 spec.add_pair(geomname1=part.name, geomname2=other.name)
-    for geom in (*arm, *others):
+    for geom in (*parts, *others):
         geom.contype = geom.conaffinity = 0
 
 
-def _nearest_m(geom: Any) -> float:
-    """How near a geom can come to the arm's foot at least [m]; 0 for what moves."""
+def _nearest_m(geom: Any, foot_world: Floats) -> float:
+    """How near a geom can come to the robot's foot at least [m]; 0 for what moves."""
     if geom.parent.name != "world":
         return 0.0
     turn = np.zeros(9)
     mujoco.mju_quat2Mat(turn, geom.quat)
-    foot = np.abs(turn.reshape(3, 3).T @ (np.array(ROBOT_BASE_WORLD) - geom.pos))
+    foot = np.abs(turn.reshape(3, 3).T @ (foot_world - geom.pos))
     half = geom.size.copy()
     if geom.type == mujoco.mjtGeom.mjGEOM_PLANE:
         half[2] = 0.0
@@ -317,19 +290,3 @@ def _nearest_m(geom: Any) -> float:
 def _prefixes(n_workers: int) -> tuple[str, ...]:
     """What the names of the workers' bodies start with."""
     return tuple(f"worker_{worker + 1}/" for worker in range(n_workers))
-
-
-def _servo_lead_s(model: mujoco.MjModel) -> Floats:
-    data = mujoco.MjData(model)
-    data.qpos[: len(HOME_Q)] = HOME_Q
-    mujoco.mj_forward(model, data)
-    inertia = np.zeros((model.nv, model.nv))
-    mujoco.mj_fullM(model, data, inertia)
-    return np.diag(inertia)[: len(HOME_Q)] / np.array(DAMPING_NMS_RAD)
-
-
-def _base_transform() -> np.ndarray:
-    transform = np.eye(4)
-    transform[:3, :3] = about_axis("z", ROBOT_YAW_RAD)
-    transform[:3, 3] = ROBOT_BASE_WORLD
-    return transform

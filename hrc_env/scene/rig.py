@@ -14,18 +14,14 @@ from hrc_env.core.typing import Floats, Rotations
 from hrc_env.geometry.camera_config import MOST_CAMERAS, CameraConfig, intrinsics
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.geometry.rotations import about_axis, look_at, quaternion_from_matrix
+from hrc_env.scene.places import SCENES
 
 OPENCV_FROM_OPENGL: Floats = np.diag([1.0, -1.0, -1.0])
 """Its own inverse."""
 
 
-LAB_CAMERAS = (
-    CameraConfig("camera_1", (2.9, 2.6, 2.45)),
-    CameraConfig("camera_2", (-2.9, 2.6, 2.45)),
-    CameraConfig("camera_3", (-2.9, -2.6, 2.45)),
-    CameraConfig("camera_4", (2.9, -2.6, 2.45)),
-)
-"""Four cameras under the ceiling, one in each corner, like the paper's laboratory."""
+LAB_CAMERAS, SITE_CAMERAS = (SCENES[name].cameras for name in ("lab", "site"))
+"""Under the ceiling, one in each corner, as in the paper's laboratory; on masts in the corners."""
 
 
 def select(

@@ -9,8 +9,7 @@ from hrc_env.geometry.cameras import PinholeCamera, image_from_pinhole, inside_i
 from hrc_env.geometry.shapes import BOX, CENTRE, HALF_SIZE, KIND, PLANE, on_axis
 from hrc_env.geometry.sight import Surroundings, hidden, nothing
 from hrc_env.scene.build import Scene
-from hrc_env.scene.rig import LAB_CAMERAS
-from hrc_env.scene.site import SITE_CAMERAS
+from hrc_env.scene.rig import LAB_CAMERAS, SITE_CAMERAS
 
 RIGS: dict[str, tuple[CameraConfig, ...]] = {
     "lab": LAB_CAMERAS,

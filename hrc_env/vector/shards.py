@@ -14,10 +14,8 @@ import numpy as np
 from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.core.stateful import State
 from hrc_env.core.typing import Floats, Ints
-from hrc_env.motion import workers
 from hrc_env.simulation import Simulation
-from hrc_env.step import StepResult
-from hrc_env.tracking import miscalibration
+from hrc_env.step import StepResult, joined
 
 
 class Shards:
@@ -121,20 +119,3 @@ def _all_done(jobs: Iterable[tuple[int, Callable[[], StepResult]]]) -> list[Step
     if errors:
         raise errors[0]
     return outcomes
-
-
-def joined(outcomes: list[StepResult]) -> StepResult:
-    """Outcomes of ranges, one after the other."""
-    if len(outcomes) == 1:
-        return outcomes[0]
-    return StepResult(
-        observation=np.concatenate([each.observation for each in outcomes]),
-        reward=np.concatenate([each.reward for each in outcomes]),
-        terminated=np.concatenate([each.terminated for each in outcomes]),
-        crew=workers.joined([each.crew for each in outcomes]),
-        suspects=miscalibration.joined([each.suspects for each in outcomes]),
-        info={
-            name: np.concatenate([each.info[name] for each in outcomes])
-            for name in outcomes[0].info
-        },
-    )

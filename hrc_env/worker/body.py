@@ -1,15 +1,14 @@
 """The worker's body: 22 segments, 15 joints, the capsules round them.
 
-A body is numbers that `assets/workers/bake.py` wrote once into `assets/workers/<name>.npz`;
-the README beside them says where they come from. Rest frame: x forward, y left, z up, soles
-at z = 0, origin on the floor below the pelvis. All segment frames are world-aligned at rest,
-so that a pose is 22 positions and rotations and nothing else.
+Numbers that `assets/workers/bake.py` wrote into `assets/workers/<name>.npz`. Rest frame: x forward,
+y left, z up, origin on the floor below the pelvis; all segments are world-aligned at rest.
 """
 
 import functools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -37,46 +36,33 @@ PARENT: Ints = np.array(
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """One worker's measures, all in metres."""
+    """One worker's measures, all in metres; or those of N workers, with a first axis of N."""
 
-    name: str
-    stature_m: float
-    """Barefoot, without the hat."""
+    names: tuple[str, ...]
+    stature_m: Any
+    """(...,) barefoot, without the hat."""
     rest_position: Points3
-    """(S, 3) origins of the segments at rest."""
+    """(..., S, 3) origins of the segments at rest."""
     joint_segment: Ints
     """(J,) segment that carries each of the 15 joints."""
     joint_offset: Points3
-    """(J, 3) the joint in that segment's frame, where BlazePose would place it."""
+    """(..., J, 3) the joint in that segment's frame, where BlazePose would place it."""
     capsule_names: tuple[str, ...]
     capsule_segment: Ints
     """(K,) segment that carries each capsule."""
     capsule_ends: Points3
-    """(K, 2, 3) end points in that segment's frame."""
+    """(..., K, 2, 3) end points in that segment's frame."""
     capsule_radius_m: Floats
-    """(K,)."""
+    """(..., K)."""
+
+    @property
+    def name(self) -> str:
+        """The first one's."""
+        return self.names[0]
 
 
-@dataclass(frozen=True, slots=True)
-class Bodies:
-    """The measures of N workers, row by row; names and segments are the same for all."""
-
-    names: tuple[str, ...]
-    stature_m: Floats
-    """(N,)."""
-    rest_position: Points3
-    """(N, S, 3)."""
-    joint_segment: Ints
-    """(J,)."""
-    joint_offset: Points3
-    """(N, J, 3)."""
-    capsule_names: tuple[str, ...]
-    capsule_segment: Ints
-    """(K,)."""
-    capsule_ends: Points3
-    """(N, K, 2, 3)."""
-    capsule_radius_m: Floats
-    """(N, K)."""
+OWN = ("stature_m", "rest_position", "joint_offset", "capsule_ends", "capsule_radius_m")
+"""What differs from body to body."""
 
 
 def assets_dir() -> Path:
@@ -93,32 +79,20 @@ def worker_names() -> tuple[str, ...]:
 
 @functools.cache
 def load_body(name: str = "worker_1") -> Body:
-    """Read a baked worker's measures.
-
-    Raises:
-        ConfigError: no worker of that name has been baked.
-    """
+    """Read a baked worker's measures; `ConfigError` where no worker of that name was baked."""
     with np.load(baked_path(name)) as baked:
         return Body(
-            name=name,
-            stature_m=float(baked["stature_m"]),
-            rest_position=fixed(baked["rest_position"], np.float64),
-            joint_segment=fixed(baked["joint_segment"], np.int64),
-            joint_offset=fixed(baked["joint_offset"], np.float64),
+            names=(name,),
             capsule_names=tuple(str(capsule) for capsule in baked["capsule_names"]),
+            joint_segment=fixed(baked["joint_segment"], np.int64),
             capsule_segment=fixed(baked["capsule_segment"], np.int64),
-            capsule_ends=fixed(baked["capsule_ends"], np.float64),
-            capsule_radius_m=fixed(baked["capsule_radius_m"], np.float64),
+            **{field: fixed(baked[field], np.float64) for field in OWN},
         )
 
 
 @functools.cache
-def stack(names: tuple[str, ...]) -> Bodies:
-    """Read several baked workers.
-
-    Raises:
-        ConfigError: no name, an unknown one, or bodies whose rows mean different things.
-    """
+def stack(names: tuple[str, ...]) -> Body:
+    """Read several baked workers; `ConfigError` where their rows would mean different things."""
     if not names:
         raise ConfigError(f"Expected at least one worker of {', '.join(worker_names())}; got none.")
     bodies = [load_body(name) for name in names]
@@ -129,17 +103,8 @@ def stack(names: tuple[str, ...]) -> Bodies:
                 f"{body.name} has other capsules or joints than {first.name}; expected the same "
                 "names on the same segments. Bake both with the same assets/workers/bake.py."
             )
-    return Bodies(
-        names=names,
-        stature_m=fixed(np.array([body.stature_m for body in bodies]), np.float64),
-        rest_position=fixed(np.stack([body.rest_position for body in bodies]), np.float64),
-        joint_segment=first.joint_segment,
-        joint_offset=fixed(np.stack([body.joint_offset for body in bodies]), np.float64),
-        capsule_names=first.capsule_names,
-        capsule_segment=first.capsule_segment,
-        capsule_ends=fixed(np.stack([body.capsule_ends for body in bodies]), np.float64),
-        capsule_radius_m=fixed(np.stack([body.capsule_radius_m for body in bodies]), np.float64),
-    )
+    own = {f: fixed(np.stack([getattr(body, f) for body in bodies]), np.float64) for f in OWN}
+    return replace(first, names=names, **own)
 
 
 ANY = "any"
@@ -147,11 +112,7 @@ ANY = "any"
 
 
 def pool(worker: str | tuple[str, ...]) -> tuple[str, ...]:
-    """The bodies that workers can have: of one name, of several, or all of them (`ANY`).
-
-    Raises:
-        ConfigError: no name, one twice, or one of which no worker has been baked.
-    """
+    """The bodies that workers can have: of one name, of several, or all of them (`ANY`)."""
     if worker == ANY:
         return worker_names()
     names = (worker,) if isinstance(worker, str) else tuple(worker)
@@ -175,17 +136,11 @@ def rest_motion(body: Body) -> WorkerMotion:
     return WorkerMotion(body.rest_position.copy(), upright, still, still.copy())
 
 
-def worker_truth(body: Body | Bodies, motion: WorkerMotion) -> WorkerTruth:
-    """Where the joints and capsules of a body in motion are, and how fast the joints.
+def worker_truth(body: Body, motion: WorkerMotion) -> WorkerTruth:
+    """Where the joints and capsules of bodies in motion are, and how fast the joints.
 
-    Args:
-        body: the worker's measures, or those of several.
-        motion: segments (..., S, 3 or 4) with any leading axes; its `body` says rows of
-            `Bodies`, of a single `Body` there is nothing to choose.
-
-    Returns:
-        The truth with the same leading axes. A joint moves with its segment: v + omega x r
-        (rigid body kinematics).
+    `motion` has segments (..., S, 3 or 4); its `body` says rows of several bodies. A joint moves
+    with its segment: v + omega x r (rigid body kinematics).
     """
     position, quaternion = motion.position_world, motion.quaternion_wxyz
     lead, n_joints = position.shape[:-2], len(body.joint_segment)
@@ -202,8 +157,8 @@ def worker_truth(body: Body | Bodies, motion: WorkerMotion) -> WorkerTruth:
     return WorkerTruth(joints, velocity, capsules, radius.reshape(*lead, radius.shape[1]))
 
 
-def worker_capsules(body: Body | Bodies, path: WorkerPath, which: Ints | None = None) -> Capsules:
-    """(B, T, W, K, 2, 3) the bodies' capsules along a path [m]; `which` (B, W) of `Bodies`."""
+def worker_capsules(body: Body, path: WorkerPath, which: Ints | None = None) -> Capsules:
+    """(B, T, W, K, 2, 3) the bodies' capsules along a path [m]; `which` (B, W) of several."""
     position = path.position_world
     over_time = None if which is None else np.asarray(which)[..., None, :]
     rows = _rows(body, over_time, position.shape[:-2])
@@ -218,9 +173,9 @@ def _same_rows(body: Body, other: Body) -> bool:
     )
 
 
-def _rows(body: Body | Bodies, which: Ints | None, lead: tuple[int, ...]) -> Ints:
+def _rows(body: Body, which: Ints | None, lead: tuple[int, ...]) -> Ints:
     """(count,) row of every body in motion."""
-    if isinstance(body, Body) or which is None or len(body.names) == 1:
+    if which is None or len(body.names) == 1:
         return _first(math.prod(lead))
     last = len(body.names) - 1
     if which.size and not 0 <= which.min() <= which.max() <= last:
@@ -238,7 +193,7 @@ def _first(count: int) -> Ints:
 
 
 def _capsules_of(
-    body: Body | Bodies, position: Points3, quaternion: QuaternionsWxyz, rows: Ints
+    body: Body, position: Points3, quaternion: QuaternionsWxyz, rows: Ints
 ) -> Capsules:
     """Capsules (..., K, 2, 3) of bodies with any leading axes."""
     check_shape("position_world", position.shape[-2:], (N_SEGMENTS, 3), "segments, xyz")
@@ -286,11 +241,7 @@ def _capsules(position, quaternion, rows, segment, ends, capsules):  # pragma: n
 
 
 def baked_path(name: str) -> Path:
-    """The file of a worker.
-
-    Raises:
-        ConfigError: no worker of that name has been baked.
-    """
+    """The file of a worker; `ConfigError` where none of that name was baked."""
     if name not in worker_names():
         raise unknown("worker", name, worker_names())
     return assets_dir() / "workers" / f"{name}.npz"

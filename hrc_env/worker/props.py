@@ -1,9 +1,7 @@
 """What workers hold: tools, boards, boxes, things on wheels. Shapes and grips, no looks.
 
-A prop's frame is the worker's (x ahead, y left, z up) when the prop is held in front and upright.
-Things in one hand have their origin in the middle of that fist; the grip is listed for the right
-hand and is the left's as well. Things in two hands have it between the hands, those on wheels on
-the floor below that. Sizes are of common tools, rounded; judgement.
+A prop's frame is the worker's (x ahead, y left, z up) when it is held in front and upright: origin
+in the fist (the right hand's grip is the left's as well), between two hands, or on the floor below.
 """
 
 from collections.abc import Sequence
@@ -62,89 +60,63 @@ def _prop(name: str, parts: Sequence[Floats], left: Triple | None, right: Triple
     return Prop(name, shapes, grips)
 
 
-def _hammer() -> Prop:
-    """Its handle stands up from the fist, the face that strikes looks ahead."""
-    handle = _rod((0, 0, -0.06), (0, 0, 0.24), 0.015)
-    head = _rod((-0.05, 0, 0.25), (0.05, 0, 0.25), 0.016)
-    return _prop("hammer", [handle, head], None, (0, 0, 0))
-
-
-def _drill() -> Prop:
-    """A cordless drill: the bit points ahead, above the fist."""
-    parts = [
-        _rod((-0.06, 0, 0.09), (0.10, 0, 0.09), 0.034),
-        _rod((0, 0, -0.05), (0, 0, 0.06), 0.020),
-        _box((0.01, 0, -0.09), (0.12, 0.075, 0.06)),
-        _rod((0.13, 0, 0.09), (0.22, 0, 0.09), 0.005),
-    ]
-    return _prop("drill", parts, None, (0, 0, 0))
-
-
-def _saw() -> Prop:
-    """A hand saw: the blade runs ahead from the fist, its teeth down."""
-    parts = [_box((0.0, 0, 0.0), (0.09, 0.024, 0.12)), _box((0.30, 0, -0.02), (0.52, 0.004, 0.09))]
-    return _prop("saw", parts, None, (0, 0, 0))
-
-
-def _tape_measure() -> Prop:
-    """Drawn out half a metre from the right hand, its end in the left."""
-    parts = [_box((0, -0.25, 0), (0.07, 0.045, 0.07)), _box((0, 0.0, -0.02), (0.022, 0.50, 0.003))]
-    return _prop("tape_measure", parts, (0, 0.25, -0.02), (0, -0.25, 0))
-
-
-def _board() -> Prop:
-    """A sawn stud of 2.4 m, crosswise in both hands."""
-    return _prop("board", [_box((0, 0, 0), (0.089, 2.4, 0.038))], (0, 0.30, 0), (0, -0.30, 0))
-
-
-def _carton() -> Prop:
-    """A box between the palms."""
-    return _prop("box", [_box((0, 0, 0), (0.34, 0.40, 0.30))], (0, 0.20, 0), (0, -0.20, 0))
-
-
-def _cart() -> Prop:
-    """A platform cart that is pushed by its bar."""
-    parts = [
-        _box((0.56, 0, 0.20), (0.90, 0.58, 0.06)),
-        _box((0.60, 0, 0.41), (0.70, 0.48, 0.36)),
-        _rod((0.0, -0.27, 0.98), (0.0, 0.27, 0.98), 0.016),
-        *(_rod((0.13, y, 0.20), (0.0, y, 0.98), 0.016) for y in (-0.27, 0.27)),
-        *(_box((x, y, 0.08), (0.16, 0.04, 0.16)) for x in (0.25, 0.88) for y in (-0.22, 0.22)),
-    ]
-    return _prop("cart", parts, (0, 0.20, 0.98), (0, -0.20, 0.98))
-
-
-def _wheelbarrow() -> Prop:
-    """Level on its wheel while its handles are held."""
-    parts = [
-        *(_rod((-0.10, y, 0.72), (1.15, 0.3 * y, 0.26), 0.018) for y in (-0.29, 0.29)),
-        _box((0.68, 0, 0.63), (0.80, 0.58, 0.36)),
-        _box((1.20, 0, 0.19), (0.34, 0.08, 0.34)),
-        *(_rod((0.42, y, 0.16), (0.40, y, 0.48), 0.016) for y in (-0.20, 0.20)),
-    ]
-    return _prop("wheelbarrow", parts, (0, 0.28, 0.685), (0, -0.28, 0.685))
-
-
-def _level() -> Prop:
-    """A spirit level, flat to a wall ahead, in both hands."""
-    return _prop("level", [_box((0, 0, 0), (0.025, 0.80, 0.06))], (0, 0.22, 0), (0, -0.22, 0))
-
-
+ORIGIN = (0, 0, 0)
 PROPS: tuple[Prop, ...] = (
     _prop("nothing", [], None, None),
-    _hammer(),
-    _drill(),
-    _saw(),
-    _tape_measure(),
-    _board(),
-    _carton(),
-    _cart(),
-    _wheelbarrow(),
-    _level(),
-)
+    _prop(  # its handle stands up from the fist, the face that strikes looks ahead
+        "hammer",
+        [_rod((0, 0, -0.06), (0, 0, 0.24), 0.015), _rod((-0.05, 0, 0.25), (0.05, 0, 0.25), 0.016)],
+        None, ORIGIN,
+    ),
+    _prop(  # cordless: the bit points ahead, above the fist
+        "drill",
+        [
+            _rod((-0.06, 0, 0.09), (0.10, 0, 0.09), 0.034),
+            _rod((0, 0, -0.05), (0, 0, 0.06), 0.020),
+            _box((0.01, 0, -0.09), (0.12, 0.075, 0.06)),
+            _rod((0.13, 0, 0.09), (0.22, 0, 0.09), 0.005),
+        ],
+        None, ORIGIN,
+    ),
+    _prop(  # a hand saw: the blade runs ahead from the fist, its teeth down
+        "saw",
+        [_box((0.0, 0, 0.0), (0.09, 0.024, 0.12)), _box((0.30, 0, -0.02), (0.52, 0.004, 0.09))],
+        None, ORIGIN,
+    ),
+    _prop(  # drawn out half a metre from the right hand, its end in the left
+        "tape_measure",
+        [_box((0, -0.25, 0), (0.07, 0.045, 0.07)), _box((0, 0.0, -0.02), (0.022, 0.50, 0.003))],
+        (0, 0.25, -0.02), (0, -0.25, 0),
+    ),
+    # A sawn stud of 2.4 m, crosswise in both hands; a box between the palms.
+    _prop("board", [_box(ORIGIN, (0.089, 2.4, 0.038))], (0, 0.30, 0), (0, -0.30, 0)),
+    _prop("box", [_box(ORIGIN, (0.34, 0.40, 0.30))], (0, 0.20, 0), (0, -0.20, 0)),
+    _prop(  # a platform that is pushed by its bar
+        "cart",
+        [
+            _box((0.56, 0, 0.20), (0.90, 0.58, 0.06)),
+            _box((0.60, 0, 0.41), (0.70, 0.48, 0.36)),
+            _rod((0.0, -0.27, 0.98), (0.0, 0.27, 0.98), 0.016),
+            *(_rod((0.13, y, 0.20), (0.0, y, 0.98), 0.016) for y in (-0.27, 0.27)),
+            *(_box((x, y, 0.08), (0.16, 0.04, 0.16)) for x in (0.25, 0.88) for y in (-0.22, 0.22)),
+        ],
+        (0, 0.20, 0.98), (0, -0.20, 0.98),
+    ),
+    _prop(  # level on its wheel while its handles are held
+        "wheelbarrow",
+        [
+            *(_rod((-0.10, y, 0.72), (1.15, 0.3 * y, 0.26), 0.018) for y in (-0.29, 0.29)),
+            _box((0.68, 0, 0.63), (0.80, 0.58, 0.36)),
+            _box((1.20, 0, 0.19), (0.34, 0.08, 0.34)),
+            *(_rod((0.42, y, 0.16), (0.40, y, 0.48), 0.016) for y in (-0.20, 0.20)),
+        ],
+        (0, 0.28, 0.685), (0, -0.28, 0.685),
+    ),
+    # A spirit level, flat to a wall ahead, in both hands.
+    _prop("level", [_box(ORIGIN, (0.025, 0.80, 0.06))], (0, 0.22, 0), (0, -0.22, 0)),
+)  # fmt: skip
 """Everything that can be held; the first is nothing."""
 PROP_NAMES: tuple[str, ...] = tuple(prop.name for prop in PROPS)
-
 
 _N_PARTS: Ints = np.array([len(prop.shapes) for prop in PROPS])
 _PARTS: Floats = np.stack(

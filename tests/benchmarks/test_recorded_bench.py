@@ -14,12 +14,12 @@ from benchmarks.recorded.bench import markdown
 from benchmarks.recorded.calibration import read_calibration
 from benchmarks.recorded.detections import detections_of
 from benchmarks.recorded.film import film_track
+from benchmarks.recorded.films import Films
 from benchmarks.recorded.metrics import NAMES, Track
 from hrc_env.core.errors import ConfigError, DownloadError
 from hrc_env.core.records import Roi
 from hrc_env.core.results import Metric
 from hrc_env.perception.detector import Detection
-from hrc_env.perception.films import Films
 
 N_FRAMES = 12
 

@@ -9,9 +9,9 @@ from benchmarks.recorded.calibration import (
     read_calibration,
     tracker_config,
 )
+from benchmarks.recorded.films import undistort
 from hrc_env.core.errors import ConfigError
 from hrc_env.geometry.cameras import pinhole, project
-from hrc_env.perception.films import undistort
 
 SIZES = [(1000, 2000), (1000, 2000)]
 

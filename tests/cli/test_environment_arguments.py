@@ -9,9 +9,8 @@ import gymnasium
 import pytest
 
 from hrc_env.__main__ import main
-from hrc_env.cli.demo import Demo
 from hrc_env.cli.environment import EnvironmentArguments, cameras_named, read_config
-from hrc_env.cli.play import Play
+from hrc_env.cli.play import Demo, Play
 from hrc_env.cli.train import Train
 from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError
@@ -70,8 +69,8 @@ def test_cameras_are_a_rig_a_file_or_names_and_numbers():
 
 def test_changes_come_from_words_and_files_and_later_ones_win(tmp_path: Path):
     (tmp_path / "a.toml").write_text("ctrl_dt = 0.08\n[reward]\nsmoothness = 1.0\neffort = 0.1\n")
-    (tmp_path / "b.json").write_text('{"reward": {"smoothness": 2.0}}')
-    words = [str(tmp_path / "a.toml"), str(tmp_path / "b.json"), "reward.effort=0.3", "worker=any"]
+    (tmp_path / "b.toml").write_text("reward.smoothness = 2.0\n")
+    words = [str(tmp_path / "a.toml"), str(tmp_path / "b.toml"), "reward.effort=0.3", "worker=any"]
     config = read_config(words)
     assert config == {
         "ctrl_dt": 0.08,
@@ -85,14 +84,13 @@ def test_changes_come_from_words_and_files_and_later_ones_win(tmp_path: Path):
     ("words", "says"),
     [
         (["reward.proximity"], "FIELD=VALUE"),
-        (["nowhere.json"], "cannot be read"),
-        (["{}/broken.toml"], "cannot be read"),
-        (["{}/list.json"], "names and values"),
+        (["{}/mine.json"], "a .toml file"),
+        (["nowhere.toml"], "cannot be read"),
+        (["{}/broken.toml"], "must be TOML"),
     ],
 )
 def test_what_is_no_change_is_refused(words, says, tmp_path: Path):
     (tmp_path / "broken.toml").write_text("reward = [")
-    (tmp_path / "list.json").write_text("[1]")
     with pytest.raises(ConfigError, match=says):
         read_config([word.format(tmp_path) for word in words])
 

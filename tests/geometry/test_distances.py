@@ -5,7 +5,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from hrc_env.geometry.distances import narrowest_gap
+from hrc_env.geometry.distances import least_separation
 
 coordinates = st.floats(-2, 2, allow_nan=False, width=32)
 segment = st.lists(coordinates, min_size=6, max_size=6).map(
@@ -28,7 +28,7 @@ def _segment(*numbers: float) -> np.ndarray:
 @example(_segment(1, 0, 0, 0, 0, 1), _segment(1, 0, 6.103515625e-05, 0, 0, 1))  # all but parallel
 @settings(max_examples=150, deadline=None)
 def test_a_gap_is_never_above_what_sampling_finds_and_hardly_below(a, b):
-    gap = narrowest_gap(a, np.zeros(1), b, np.zeros(1))
+    gap = least_separation(a, np.zeros(1), b, np.zeros(1))
     found = sampled_distance(a[0], b[0])
     spacing = (np.linalg.norm(np.diff(a[0], axis=0)) + np.linalg.norm(np.diff(b[0], axis=0))) / 59
     assert gap.distance_m <= found + 1e-6
@@ -41,17 +41,21 @@ def test_a_gap_is_never_above_what_sampling_finds_and_hardly_below(a, b):
 def test_radii_are_taken_off_and_overlap_is_negative():
     a = np.array([[[0.0, 0, 0], [1, 0, 0]]])
     b = np.array([[[0.5, 0, 0.3], [0.5, 0, 1]]])
-    assert narrowest_gap(a, np.array([0.1]), b, np.array([0.05])).distance_m == pytest.approx(0.15)
-    assert narrowest_gap(a, np.array([0.2]), b, np.array([0.2])).distance_m == pytest.approx(-0.1)
+    assert least_separation(a, np.array([0.1]), b, np.array([0.05])).distance_m == pytest.approx(
+        0.15
+    )
+    assert least_separation(a, np.array([0.2]), b, np.array([0.2])).distance_m == pytest.approx(
+        -0.1
+    )
 
 
 def test_pruning_by_spheres_changes_nothing():
     rng = np.random.default_rng(0)
     a, b = rng.normal(size=(50, 9, 2, 3)), rng.normal(size=(50, 18, 2, 3)) + 1.5
     ra, rb = rng.uniform(0, 0.3, 9), rng.uniform(0, 0.3, 18)
-    whole = narrowest_gap(a, ra, b, rb).distance_m
+    whole = least_separation(a, ra, b, rb).distance_m
     pairs = [
-        narrowest_gap(a[:, [i]], ra[[i]], b[:, [j]], rb[[j]]).distance_m
+        least_separation(a[:, [i]], ra[[i]], b[:, [j]], rb[[j]]).distance_m
         for i in range(9)
         for j in range(18)
     ]
@@ -59,7 +63,7 @@ def test_pruning_by_spheres_changes_nothing():
 
 
 def test_nobody_is_infinitely_far_away():
-    gap = narrowest_gap(np.zeros((3, 2, 2, 3)), np.ones(2), np.zeros((3, 0, 2, 3)), np.ones(4))
+    gap = least_separation(np.zeros((3, 2, 2, 3)), np.ones(2), np.zeros((3, 0, 2, 3)), np.ones(4))
     assert np.isinf(gap.distance_m).all()
 
 
@@ -68,5 +72,5 @@ def test_several_workers_share_one_list_of_radii():
     two = np.zeros((1, 2, 1, 2, 3))
     two[0, 1, ..., 0] = 5.0
     two[0, 0, ..., 0] = 2.0
-    gap = narrowest_gap(a, np.array([0.1]), two.reshape(1, 2, 2, 3), np.array([0.4]))
+    gap = least_separation(a, np.array([0.1]), two.reshape(1, 2, 2, 3), np.array([0.4]))
     assert gap.distance_m[0] == pytest.approx(1.5)

@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hrc_env.config import HRCConfig, with_cameras
+from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCEnv
-from hrc_env.geometry.camera_config import CameraConfig, made
-from hrc_env.geometry.rig_files import read_rig, write_rig
+from hrc_env.geometry.camera_config import CameraConfig, made, read_rig, write_rig
 from hrc_env.scene.build import SceneConfig, build
 from hrc_env.scene.rigs import RIGS, findings, sees, workspace
 
@@ -58,19 +57,20 @@ def test_a_missing_file_is_refused(tmp_path):
 
 def test_cameras_are_names_places_records_or_a_file(tmp_path):
     write_rig(tmp_path / "rig.toml", (ODD,))
-    assert with_cameras(HRCConfig(), "lab_gopro")[0].scene.cameras == RIGS["lab_gopro"]
-    assert with_cameras(HRCConfig(), tmp_path / "rig.toml")[0].scene.cameras == (ODD,)
-    assert with_cameras(HRCConfig(), str(tmp_path / "rig.toml"))[0].scene.cameras == (ODD,)
+    assert settle(cameras="lab_gopro").config.scene.cameras == RIGS["lab_gopro"]
+    assert settle(cameras=tmp_path / "rig.toml").config.scene.cameras == (ODD,)
+    assert settle(cameras=str(tmp_path / "rig.toml")).config.scene.cameras == (ODD,)
     mapping = {"name": "b", "eye_world": [0, 1, 2]}
-    config, used = with_cameras(HRCConfig(), [(1, 2, 2.5), ODD, mapping, np.array([1.0, 0, 2])])
-    assert [camera.name for camera in config.scene.cameras] == [
+    settings = settle(cameras=[(1, 2, 2.5), ODD, mapping, np.array([1.0, 0, 2])])
+    assert [camera.name for camera in settings.config.scene.cameras] == [
         "camera_1",
         ODD.name,
         "b",
         "camera_4",
     ]
-    assert used is None
-    assert with_cameras(HRCConfig(), ("camera_2", 0)) == (HRCConfig(), ("camera_2", 0))
+    assert settings.cameras is None
+    some = settle(cameras=("camera_2", 0))
+    assert (some.config, some.cameras) == (settle().config, ("camera_2", 0))
 
 
 @pytest.mark.parametrize(

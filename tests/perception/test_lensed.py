@@ -11,7 +11,7 @@ from hrc_env.geometry.camera_config import made
 from hrc_env.geometry.cameras import (
     image_from_pinhole,
     pinhole_from_image,
-    pinhole_stretch,
+    pinhole_magnification,
     project,
     projections,
     rays,
@@ -60,7 +60,7 @@ def test_a_pattern_through_the_lens_and_back_is_the_pinholes(
     monkeypatch.setattr("hrc_env.scene.canvas.drawing_model", lambda _: pattern)
     scene = build(SceneConfig(clutter=False, cameras=(config,)))
     camera, renderer = scene.cameras[0], CropRenderer(scene)
-    mujoco.mj_forward(renderer._canvas._model, renderer._canvas._data)
+    mujoco.mj_forward(renderer._model, renderer._data)
     images = Lensed(renderer, scene.cameras)
     for ball in BALLS:
         px = project(projections((camera,)), ball[None])[0][0, 0]
@@ -132,7 +132,7 @@ def test_keypoints_go_to_the_tracker_in_pinhole_pixels_with_their_deviations_str
     np.testing.assert_array_equal(straight.px[:, 0], px[:, 0])
     np.testing.assert_allclose(image_from_pinhole(cameras[1], straight.px[:, 1]), px[:, 1])
     seen = np.isfinite(px[0, 1, 0, :, 0])
-    grown = pinhole_stretch(cameras[1], straight.px[0, 1, 0, seen])
+    grown = pinhole_magnification(cameras[1], straight.px[0, 1, 0, seen])
     np.testing.assert_allclose(straight.sigma_px[0, 1, 0, seen], 3.0 * grown)
     assert straight.confidence[0, 1, 0, 3] == 0
     assert np.isinf(straight.sigma_px[0, 1, 0, 3])

@@ -4,7 +4,7 @@ import numpy as np
 
 from hrc_env.core.records import Roi
 from hrc_env.geometry.cameras import pinhole, project, projections
-from hrc_env.pipeline.reacquisition import FOLLOWED, PATIENCE, Strays
+from hrc_env.pipeline.reacquisition import FOLLOWED, PATIENCE, Reacquisition
 
 CAMERAS = tuple(
     pinhole(f"camera_{k}", np.array([x, y, 2.45]), np.array([0.2, 0, 1.0]), 90, 1920, 1080)
@@ -23,9 +23,9 @@ def windows(place, side_m=2.3) -> list[Roi | None]:
     ]
 
 
-def astray(shown: list[bool], n_steps: int = PATIENCE) -> Strays:
+def astray(shown: list[bool], n_steps: int = PATIENCE) -> Reacquisition:
     """One worker whom these cameras have shown in each of so many steps."""
-    strays = Strays(1, 1, len(shown))
+    strays = Reacquisition(1, 1, len(shown))
     for _ in range(n_steps):
         strays.saw(0, 0, np.array(shown))
     return strays

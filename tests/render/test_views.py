@@ -102,19 +102,21 @@ def test_crops_are_what_the_network_was_given(weights):
     env = HRCEnv(perception="pixels")
     env.reset(seed=7)
     env.step(np.zeros(6))
-    given = env.simulation.senses.crops(0)
-    windows = env.simulation.senses.looks(0)[1][0]
+    given = env.simulation.pipeline.crops(0)
+    windows = env.simulation.pipeline.last_detections(0)[1][0]
     assert [crop is None for crop in given] == [window is None for window in windows]
     assert sum(crop is not None for crop in given) >= 2
     for crop, window, c in zip(given, windows, range(4), strict=True):
         if crop is not None and window is not None:
-            again = env.simulation.senses.lensed.crop(c, window)
+            again = env.simulation.pipeline.lensed.crop(c, window)
             assert np.abs(crop.astype(int) - again).max(-1).mean() < 30  # black outside the image
     pictures = env.views.crops(64)
     assert [picture.shape for picture in pictures] == [(64, 64, 3)] * 4
     before = env.simulation.get_state()
-    env.simulation.senses.looking.windows[0][0] = [None] * 4  # as after `set_state`
-    assert env.simulation.senses.crops(0) == [None] * 4
+    env.simulation.pipeline.looking.windows[0][0] = [None] * 4  # as after `set_state`
+    assert env.simulation.pipeline.crops(0) == [None] * 4
     env.simulation.set_state(before)
-    assert [crop is None for crop in env.simulation.senses.crops(0)] == [w is None for w in windows]
+    assert [crop is None for crop in env.simulation.pipeline.crops(0)] == [
+        w is None for w in windows
+    ]
     env.close()

@@ -4,12 +4,14 @@ import mujoco
 import numpy as np
 import pytest
 
+from assets.robots.ur10e_like import JOINTS, LINKS, MASS_KG, TORQUE_LIMIT_NM
 from hrc_env.geometry import chains
-from hrc_env.geometry.distances import narrowest_gap
-from hrc_env.scene.arm import CAPSULES, HOME_Q, JOINTS, LINKS, MASS_KG, TORQUE_LIMIT_NM
-from hrc_env.scene.build import ROBOT_BASE_WORLD, build, drawing_model
+from hrc_env.geometry.distances import least_separation
+from hrc_env.scene.build import build, drawing_model
+from hrc_env.scene.places import SCENES
 
 SCENE = build()
+HOME_Q = SCENE.home_q
 
 
 def at_home() -> mujoco.MjData:
@@ -22,14 +24,14 @@ def at_home() -> mujoco.MjData:
 
 def test_at_home_the_tool_is_in_front_of_the_base_points_down_and_touches_nothing():
     data = at_home()
-    tool = data.site("tool_point")
-    assert tool.xpos[0] - ROBOT_BASE_WORLD[0] > 0.3
+    tool = data.site("robot/tool_point")
+    assert tool.xpos[0] - SCENES["lab"].mount_world[0] > 0.3
     np.testing.assert_allclose(tool.xmat.reshape(3, 3)[:, 2], [0, 0, -1], atol=1e-2)
     assert data.ncon == 0
 
 
 def test_links_weigh_what_the_maker_says():
-    masses = [SCENE.model.body(name).mass[0] for name in LINKS]
+    masses = [SCENE.model.body(f"robot/{name}").mass[0] for name in LINKS]
     np.testing.assert_allclose(masses, MASS_KG)
 
 
@@ -46,7 +48,7 @@ def test_the_arm_does_not_sag():
 
 def test_each_joint_has_a_holding_and_a_rate_servo_and_a_torque_limit():
     names = [SCENE.model.actuator(i).name for i in range(SCENE.model.nu)]
-    assert names == [f"{j}_hold" for j in JOINTS] + [f"{j}_rate" for j in JOINTS]
+    assert names == [f"robot/{j}_{kind}" for kind in ("hold", "rate") for j in JOINTS]
     np.testing.assert_allclose(SCENE.model.jnt_actfrcrange[:, 1], TORQUE_LIMIT_NM)
 
 
@@ -61,7 +63,7 @@ def test_a_folded_arm_touches_itself():
     data = mujoco.MjData(SCENE.model)
     data.qpos[:] = [0.0, -1.57, 2.9, 0.0, 0.0, 0.0]
     mujoco.mj_forward(SCENE.model, data)
-    own = {f"arm_{name}" for name, *_ in CAPSULES}
+    own = {f"robot/{name}" for name in SCENE.robot.capsules}
     touching = [
         {SCENE.model.geom(contact.geom1).name, SCENE.model.geom(contact.geom2).name}
         for contact in data.contact[: data.ncon]
@@ -76,8 +78,8 @@ def test_mujoco_and_the_geometry_room_agree_on_the_gap_between_tool_and_upper_ar
     first, second = names.index("tool"), names.index("upper_arm")
     fromto = np.zeros(6)
     expected = mujoco.mj_geomDistance(
-        SCENE.model, data, SCENE.model.geom("arm_tool").id,
-        SCENE.model.geom("arm_upper_arm").id, 5.0, fromto,
+        SCENE.model, data, SCENE.model.geom("robot/tool").id,
+        SCENE.model.geom("robot/upper_arm").id, 5.0, fromto,
     )  # fmt: skip
-    gap = narrowest_gap(ends[[first]], radius[[first]], ends[[second]], radius[[second]])
+    gap = least_separation(ends[[first]], radius[[first]], ends[[second]], radius[[second]])
     assert float(gap.distance_m) == pytest.approx(expected, abs=1e-6)

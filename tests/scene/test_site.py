@@ -7,9 +7,10 @@ import pytest
 from benchmarks.occlusion import hidden_from, random_heads
 from hrc_env.geometry.cameras import project, projections
 from hrc_env.geometry.chains import capsules
-from hrc_env.scene.arm import CAPSULES, OUT_OF_REACH, arm_chain, capsule_reach_m
-from hrc_env.scene.build import SCENES, SceneConfig, build, drawing_model
+from hrc_env.scene.build import SceneConfig, build, drawing_model
+from hrc_env.scene.places import SCENES
 from hrc_env.scene.rig import CameraConfig
+from hrc_env.scene.robot import reach_m
 
 SITE = build(name="site")
 EYES = np.stack([camera.eye_world for camera in SITE.cameras])
@@ -62,22 +63,22 @@ def test_other_cameras_can_hang_there():
 
 
 def test_the_arm_never_reaches_beyond_the_reach_that_its_pairs_allow_for():
-    """Contacts are only looked for within `capsule_reach_m`; no pose goes farther."""
-    chain, rng = arm_chain(np.eye(4)), np.random.default_rng(4)
+    """Contacts are only looked for within `reach_m`; no pose goes farther."""
+    chain, rng = SITE.chain, np.random.default_rng(4)
     low, high = chain.range_rad.T
     q = rng.uniform(low, high, (4000, 6))
-    ends = capsules(chain, q)
+    ends = capsules(chain, q) - chain.T_world_from_base[:3, 3]
     farthest = np.linalg.norm(ends, axis=-1).max((0, 2)) + chain.capsule_radius_m
-    assert len(farthest) == len(CAPSULES)
-    assert (farthest <= capsule_reach_m() + 1e-9).all()
+    assert (farthest <= reach_m(chain) + 1e-9).all()
 
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_what_is_said_to_be_out_of_reach_is_met_in_no_pose(scene):
-    model = drawing_model(build(name=scene, n_workers=0))
+    place = build(name=scene, n_workers=0)
+    model = drawing_model(place)
     data, rng = mujoco.MjData(model), np.random.default_rng(5)
-    pairs = [(model.geom(f"arm_{a}").id, model.geom(b).id) for a, b in sorted(OUT_OF_REACH)]
-    for q in rng.uniform(*arm_chain(np.eye(4)).range_rad.T, (4000, 6)):
+    pairs = [(model.geom(f"robot/{a}").id, model.geom(b).id) for a, b in place.robot.never_touch]
+    for q in rng.uniform(*place.chain.range_rad.T, (4000, 6)):
         data.qpos[:6] = q
         mujoco.mj_kinematics(model, data)
         gaps_m = [mujoco.mj_geomDistance(model, data, *pair, 1.0, None) for pair in pairs]

@@ -14,7 +14,7 @@ def test_the_window_would_show_arm_and_worker():
     scene = build(n_workers=1)
     model = viewing_model(scene)
     assert model.nskin == 2
-    arm = [g for g in range(model.ngeom) if model.geom_bodyid[g] == model.body("forearm").id]
+    arm = [g for g in range(model.ngeom) if model.geom_bodyid[g] == model.body("robot/forearm").id]
     assert any(model.geom_group[g] in SHOWN_AT_FIRST for g in arm)
     assert model is not scene.model
 

@@ -122,7 +122,7 @@ def _followed(name, n_batch):
 
 
 @pytest.mark.parametrize("name", ESTIMATORS)
-def test_every_estimator_forecasts_and_its_state_stays(name):
+def test_every_estimator_looks_ahead_and_its_state_stays(name):
     estimator, state, _ = _followed(name, 2)
     before = estimator.estimate(state)
     later = estimator.forecast(state, 0.3)

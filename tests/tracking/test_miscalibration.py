@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hrc_env.env import HRCEnv
-from hrc_env.tracking.miscalibration import MISCALIBRATED, MiscalibrationFlags
+from hrc_env.step import MISCALIBRATED, miscalibration_info
 from hrc_env.vector.env import HRCVectorEnv
 
 KNOCKED = ({"kind": "knocked", "cameras": ["camera_3"]},)
@@ -49,12 +49,11 @@ def test_a_vector_names_what_its_environments_would():
     last_info(single, 40)
     for _ in range(40):
         infos = env.step(np.tile(REST, (3, 1)))[-1]
-    assert (
-        infos[MISCALIBRATED][1]
-        == single.simulation._suspects(np.array([0])).info_of(0)[MISCALIBRATED]
-    )
+    suspected = single.simulation.pipeline.suspected(np.array([0]))
+    cameras = single.simulation.settings["cameras"]
+    assert infos[MISCALIBRATED][1] == miscalibration_info(cameras, suspected)[MISCALIBRATED][0]
     assert infos[f"_{MISCALIBRATED}"].all()
-    one, many = single.simulation.senses.monitored, env.shards.parts[0].senses.monitored
+    one, many = single.simulation.pipeline.watched, env.shards.parts[0].pipeline.watched
     for alone, together in zip(one, many, strict=True):
         np.testing.assert_array_equal(alone[0], together[1])
 
@@ -74,9 +73,7 @@ def test_a_reset_forgets():
     assert env.reset(seed=4)[1][MISCALIBRATED] == ()
 
 
-def test_who_has_no_info_has_no_names():
+def test_cameras_are_named():
     flags = np.array([[False, True], [True, False], [False, False]])
-    said = MiscalibrationFlags(("a", "b"), flags).arrays(np.array([True, False, True]))[
-        MISCALIBRATED
-    ]
-    assert said.tolist() == [("b",), None, ()]
+    assert miscalibration_info(("a", "b"), flags)[MISCALIBRATED].tolist() == [("b",), ("a",), ()]
+    assert miscalibration_info((), flags[:, :0]) == {}

@@ -94,13 +94,18 @@ class KernelCache:
         return CompileResult._rebuild(target_context, *parts)
 
     def save_overload(self, sig: Any, data: CompileResult) -> None:
-        """Keep a compiled form, in place of older ones; where nothing can be written, nowhere."""
+        """Keep a compiled form; where nothing can be written, nowhere.
+
+        Older ones go, but not from a folder of the user's choice, which several checkouts may use.
+        """
         path = self.path(_args(sig), self._dispatcher.targetctx)
         draft = path.with_name(f"{uuid.uuid4().hex}.tmp")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             draft.write_bytes(dumps(data._reduce()))
             draft.replace(path)
+            if os.environ.get("NUMBA_CACHE_DIR"):
+                return
             for older in path.parent.glob(f"{path.name.rsplit('-', 1)[0]}-*{SUFFIX}"):
                 if older != path:
                     older.unlink(missing_ok=True)

@@ -37,8 +37,11 @@ class Signature:
         return tuple(decode(each) for each in self.args)
 
     def is_compiled(self) -> bool:
-        """Whether it lies on disk."""
-        return kernel_named(self.kernel)._cache.has(self.types())
+        """Whether it lies on disk, or there is no such kernel any more."""
+        try:
+            return kernel_named(self.kernel)._cache.has(self.types())
+        except (ImportError, KeyError, AttributeError):
+            return True
 
 
 def kernel_named(name: str) -> Any:

@@ -61,15 +61,19 @@ def edit(path: Path, before: str, after: str) -> None:
     path.write_text(source.replace(before, after))
 
 
-def test_an_older_form_of_a_kernel_goes_when_a_newer_one_is_kept(tmp_path, monkeypatch):
+@pytest.mark.parametrize(("chosen", "n_kept"), [("", 1), ("a folder of several checkouts", 2)])
+def test_an_older_form_of_a_kernel_goes_but_from_a_chosen_folder(
+    tmp_path, monkeypatch, chosen, n_kept
+):
     from hrc_env.core.kernels import kernel
 
+    monkeypatch.setenv("NUMBA_CACHE_DIR", chosen)
     monkeypatch.setattr(cache, "folder", lambda: tmp_path)
     for constant in (1.0, 2.0):
         scope = {"kernel": kernel, "__name__": __name__, "C": constant}
         exec("@kernel\ndef grow(x):\n    return x + C", scope)
         assert scope["grow"](1.0) == 1.0 + constant
-        assert len(list(tmp_path.glob("*grow*"))) == 1
+    assert len(list(tmp_path.glob("*grow*"))) == n_kept
 
 
 def test_where_the_package_cannot_be_written_kernels_go_to_the_users_cache(tmp_path, monkeypatch):

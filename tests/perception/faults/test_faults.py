@@ -74,7 +74,7 @@ def test_the_environment_counts_a_faults_cameras_among_those_that_it_uses():
     )  # fmt: skip
     env.reset(seed=0)
     env.step(np.zeros(6))
-    seen = env.simulation.senses.looks(0)[0]
+    seen = env.simulation.pipeline.last_detections(0)[0]
     assert env.simulation.settings["cameras"] == ("camera_3", "camera_1")
     assert np.isnan(seen.px).all((-3, -2, -1)).ravel().tolist() == [True, False]
 

@@ -1,0 +1,58 @@
+"""Write robots, scenes and what workers hold as MJCF and PNG: python -m assets.scenes.bake
+
+The package reads these files only; run this after a change to one of the makers beside it.
+"""
+
+import sys
+from pathlib import Path
+
+import mujoco
+
+from assets.robots.ur10e_like import add_arm
+from assets.scenes import arena, prop_looks, site
+from assets.scenes.mjcf import TEXTURES, write_mjcf
+from assets.scenes.pedestal import add_pedestal
+from assets.scenes.primitives import add_painted, paint_materials
+from hrc_env.scene.worker_visuals import PARKED_M
+from hrc_env.worker.props import PROP_NAMES
+
+ASSETS = Path(__file__).resolve().parent.parent
+MAKERS = {"lab": (arena.add_lab, arena.paint_lab), "site": (site.add_site, site.paint_site)}
+
+
+def bake(assets: Path) -> None:
+    """Write `robots/*.xml` and `scenes/*.xml` with their pictures below a folder."""
+    for name in ("robots", "scenes"):
+        (assets / name).mkdir(parents=True, exist_ok=True)
+    arm = mujoco.MjSpec()
+    add_arm(arm)
+    write_mjcf(arm, assets / "robots" / "ur10e_like.xml")
+    for name in MAKERS:
+        for clutter in (False, True):
+            path = assets / "scenes" / f"{name}{'' if clutter else '_bare'}.xml"
+            write_mjcf(scene(name, clutter), path, texturedir=TEXTURES)
+    write_mjcf(props(), assets / "scenes" / "props.xml", texturedir=TEXTURES)
+
+
+def scene(name: str, clutter: bool) -> mujoco.MjSpec:
+    """A place with the robot's pedestal, with clutter or without."""
+    spec, (add, paint) = mujoco.MjSpec(), MAKERS[name]
+    add(spec, clutter)
+    add_pedestal(spec)
+    paint(spec)
+    return spec
+
+
+def props() -> mujoco.MjSpec:
+    """A body for each thing that workers hold."""
+    spec = mujoco.MjSpec()
+    add_painted(spec, prop_looks.PAINTED)
+    prop_looks.add_prop_meshes(spec)
+    for name in PROP_NAMES[1:]:
+        prop_looks.LOOKS[name](spec.worldbody.add_body(name=name, pos=PARKED_M, mocap=True))
+    paint_materials(spec, prop_looks.PAINTED)
+    return spec
+
+
+if __name__ == "__main__":
+    bake(Path(sys.argv[1]) if len(sys.argv) > 1 else ASSETS)

@@ -1,0 +1,78 @@
+"""Joints and segments of a body in any pose of the control vector."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hrc_env.core.kernels import kernel
+from hrc_env.core.skeleton import JOINTS
+from hrc_env.core.typing import Floats, Ints, Points3, QuaternionsWxyz
+from hrc_env.motion.anatomy import Anatomy, anatomy
+from hrc_env.motion.kinematics import pose, quaternion
+from hrc_env.motion.state import WORKER, Worker
+from hrc_env.worker.body import N_SEGMENTS, SEGMENT, Body
+
+STARTS = {
+    "shoulder": "upper_arm", "elbow": "forearm", "wrist": "hand",
+    "hip": "thigh", "knee": "shank", "ankle": "foot",
+}  # fmt: skip
+"""Segment that begins at a joint's centre."""
+
+
+@dataclass(frozen=True, slots=True)
+class Marks:
+    """Where a body carries the 15 joints."""
+
+    anatomy: Anatomy
+    segment: Ints
+    """(15,) segment that carries each."""
+    offset: Floats
+    """(15, 3) in that segment's frame [m]."""
+    rest: Points3
+    """(15, 3) at rest [m]."""
+
+
+def marks_of(body: Body, landmarks: bool) -> Marks:
+    """A body's joints as BlazePose means them (landmarks) or where its bones turn (centres).
+
+    Noses and foot tips, which are no centres, are BlazePose's in both senses.
+    """
+    segment, offset = body.joint_segment.copy(), body.joint_offset.copy()
+    if not landmarks:
+        for j, joint in enumerate(JOINTS):
+            side, _, part = joint.partition("_")
+            if part in STARTS:
+                segment[j], offset[j] = SEGMENT[f"{side}_{STARTS[part]}"], 0.0
+    return Marks(anatomy(body), segment, offset, body.rest_position[segment] + offset)
+
+
+def joints_in(q: Floats, marks: Marks) -> Points3:
+    """(N, 15, 3) joints of poses (N, N_CONTROLS)."""
+    position, _, turn = _posed(q, marks.anatomy)
+    arm = turn[:, marks.segment] @ marks.offset[..., None]
+    return position[:, marks.segment] + arm[..., 0]
+
+
+def segments_in(controls: Floats, anatomy: Anatomy) -> tuple[Points3, QuaternionsWxyz]:
+    """Origins (T, 22, 3) [m] and turns (T, 22, 4) of control vectors (T, N_CONTROLS)."""
+    return _posed(controls, anatomy)[:2]
+
+
+def _posed(q: Floats, bones: Anatomy) -> tuple[Points3, QuaternionsWxyz, Floats]:
+    position, turn = np.empty((len(q), N_SEGMENTS, 3)), np.empty((len(q), N_SEGMENTS, 4))
+    matrix = np.empty((len(q), N_SEGMENTS, 3, 3))
+    me = np.zeros(1, WORKER)[0]
+    me["bones"], me["frame"], me["size"] = bones.offset, bones.frame, bones.size
+    _pose_each(np.ascontiguousarray(q), position, turn, matrix, me)
+    return position, turn, matrix
+
+
+@kernel(makes_arrays=True)
+def _pose_each(q: Floats, position: Floats, turn: Floats, matrix: Floats, me: Worker) -> None:
+    """One pose after the other."""
+    for n in range(q.shape[0]):
+        me.q[:] = q[n]
+        pose(me)
+        position[n, :], matrix[n, :] = me.p[:N_SEGMENTS], me.r[:N_SEGMENTS]
+        for s in range(N_SEGMENTS):
+            quaternion(me.r, s, turn[n])

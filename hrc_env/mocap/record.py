@@ -1,0 +1,106 @@
+"""What a file of motion capture says, in the project's joints, frames and units."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from hrc_env.core.errors import ConfigError, check_shape
+from hrc_env.core.skeleton import N_JOINTS
+from hrc_env.core.typing import Floats, Ints, Points3, Rotations
+from hrc_env.motion.clip import check_rate
+
+FEWEST_FRAMES = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Capture:
+    """A person's joints over time, upright on the floor."""
+
+    joints_world: Points3
+    """(T, 15, 3) joints in the order of `hrc_env.core.skeleton.JOINTS`, +Z up, floor at 0 [m]."""
+    fps: float
+    """Frames a second."""
+    landmarks: bool
+    """True: joints as BlazePose means them; False: the centres that the bones turn about."""
+    found: tuple[str, ...]
+    """(15,) by which name the file calls each joint."""
+    source: str
+    """Name of the file."""
+    repaired: tuple[str, ...] = ()
+    """What was guessed or mended, a sentence each."""
+
+    def __post_init__(self) -> None:
+        check_shape("joints", self.joints_world.shape[1:], (N_JOINTS, 3), "joints, xyz")
+        check_rate(self.fps, self.source)
+
+
+@dataclass(frozen=True, slots=True)
+class Moving:
+    """A skeleton in a file's own frame and unit, N nodes over T frames."""
+
+    names: tuple[str, ...]
+    """(N,) as in the file; the tip of a chain is called after its joint, with " end" added."""
+    position: Points3
+    """(T, N, 3) origins of the nodes [unit of the file]."""
+    rotation: Rotations
+    """(T, N, 3, 3) file_from_node."""
+    rest: Points3
+    """(N, 3) origins with every rotation zero [unit of the file]."""
+    fps: float
+    """Frames a second; NaN where the format has none."""
+    repaired: tuple[str, ...] = ()
+    """What was guessed or mended, a sentence each."""
+
+
+def forward(parent: Ints, offset: Floats, rotation: Rotations) -> tuple[Points3, Rotations]:
+    """Origins (T, N, 3) and rotations (T, N, 3, 3) of a tree whose parents come first (-1: none).
+
+    From offsets (T or 1, N, 3) and rotations (T, N, 3, 3) in the parent's frame.
+    """
+    position = np.broadcast_to(offset, (*rotation.shape[:2], 3)).copy()
+    turned = rotation.copy()
+    for node, above in enumerate(parent):
+        if above >= 0:
+            turned[:, node] = turned[:, above] @ rotation[:, node]
+            arm = turned[:, above] @ position[:, node, :, None]
+            position[:, node] = position[:, above] + arm[..., 0]
+    return position, turned
+
+
+class Rows:
+    """The lines of a text file that hold words, one after the other; errors say where."""
+
+    def __init__(self, path: Path) -> None:
+        self.source = path.name
+        self._lines = path.read_text(errors="replace").splitlines()
+        self.at = 0
+
+    def next(self, expected: str) -> list[str]:
+        """Words of the next line that has any; `ConfigError` where the file ends here."""
+        for words in self.rest():
+            return words
+        raise ConfigError(
+            f"{self.source} is cut off: after its {len(self._lines)} lines {expected} is missing."
+        )
+
+    def rest(self) -> Iterator[list[str]]:
+        """Words of each line that is left and has any."""
+        while self.at < len(self._lines):
+            words = self._lines[self.at].split()
+            self.at += 1
+            if words:
+                yield words
+
+    def wrong(self, expected: str) -> ConfigError:
+        """The error for the line that was read last."""
+        line = self._lines[max(self.at, 1) - 1].strip() if self._lines else ""
+        return ConfigError(f"{self.source}, line {self.at}: {expected}; got {line[:60]!r}.")
+
+    def numbers(self, words: list[str]) -> list[float]:
+        """Words of the line that was read last as numbers."""
+        try:
+            return [float(word) for word in words]
+        except ValueError:
+            raise self.wrong("expected a number") from None

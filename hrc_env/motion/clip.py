@@ -1,0 +1,172 @@
+"""A clip: recorded motion as control vectors, in a file of its own that any worker plays."""
+
+import os
+import zipfile
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.typing import Bools, Floats
+from hrc_env.motion import controls as c
+from hrc_env.motion.anatomy import ANKLE_Z, ARM, BALL_X, BALL_Z, HEEL_X, LEG, N_SIZES, STAND_Z
+from hrc_env.motion.curves import about
+
+VERSION = 1
+"""Of the file; raised when its columns or fields change."""
+RECORDED = np.array([*range(c.N_BLENDED), *range(c.ANKLE, c.ANKLE + 12)])
+"""(32,) columns of the control vector that a recording fills: all that is blended, both feet."""
+SLOWEST_HZ, FASTEST_HZ = 5.0, 1000.0
+"""Frame rates between which a recording is believed; judgement: below, a step is lost."""
+FARTHEST_M, FASTEST_M_S = 200.0, 15.0
+"""Clips whose root goes beyond these are damaged; judgement."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Clip:
+    """Motion of the worker whose measures are `size`, beginning at the origin, towards +x."""
+
+    controls: Floats
+    """(T, N_CONTROLS) of `controls`; zero where a recording says nothing (see RECORDED)."""
+    fps: float
+    """Frames a second."""
+    contacts: Bools
+    """(T, 2) whether the left and the right foot stand."""
+    size: Floats
+    """(N_SIZES,) lengths of the worker that it was made for [m], see `Anatomy.size`."""
+    source: str
+    """Name of the recording."""
+
+    def __post_init__(self) -> None:
+        _check(self)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether it is the same motion, number by number."""
+        return isinstance(other, Clip) and all(
+            np.array_equal(getattr(self, item.name), getattr(other, item.name))
+            for item in fields(self)
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.source, self.fps, len(self.controls)))
+
+    @property
+    def duration_s(self) -> float:
+        """From the first frame to the last [s]."""
+        return (len(self.controls) - 1) / self.fps
+
+
+def placed_at_origin(controls: Floats) -> Floats:
+    """Control vectors moved and turned so that the first root is at the origin, towards +x."""
+    out = controls.copy()
+    x, y, yaw = controls[0, [c.ROOT_X, c.ROOT_Y, c.HEADING]]
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    for at in (c.ROOT_X, c.ANKLE, c.ANKLE + 6):
+        dx, dy = controls[:, at] - x, controls[:, at + 1] - y
+        out[:, at], out[:, at + 1] = cos * dx + sin * dy, cos * dy - sin * dx
+    for at in (c.HEADING, c.ANKLE + 3, c.ANKLE + 9):
+        out[:, at] -= yaw
+    return out
+
+
+def fitted_to(clip: Clip, size: Floats) -> Floats:
+    """(T, N_CONTROLS) for a worker of other measures: ways scale with legs, reach with arms."""
+    out, legs = clip.controls.copy(), size[LEG] / clip.size[LEG]
+    out[:, [c.ROOT_X, c.ROOT_Y]] *= legs
+    out[:, c.PELVIS_Z] = size[STAND_Z] + legs * (out[:, c.PELVIS_Z] - clip.size[STAND_Z])
+    out[:, c.HAND_OFFSET : c.HAND_OFFSET + 6] *= size[ARM] / clip.size[ARM]
+    for at in (c.ANKLE, c.ANKLE + 6):
+        out[:, [at, at + 1]] *= legs
+        out[:, at + 2] = size[ANKLE_Z] + legs * (out[:, at + 2] - clip.size[ANKLE_Z])
+    return out
+
+
+def save_clip(clip: Clip, path: Path) -> None:
+    """Write a clip; the file is there whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    draft = path.with_name(path.name + ".draft")
+    arrays = {item.name: getattr(clip, item.name) for item in fields(clip)}
+    arrays["controls"] = clip.controls[:, RECORDED]
+    with draft.open("wb") as file:
+        np.savez_compressed(file, version=VERSION, **arrays)
+    os.replace(draft, path)
+
+
+def load_clip(path: Path) -> Clip:
+    """Read a clip; `ConfigError` where it is none, damaged or of another version."""
+    names = {item.name for item in fields(Clip)}
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            found, version = set(file.files), int(file["version"]) if "version" in file.files else 0
+            arrays = {name: file[name] for name in names & found}
+    except FileNotFoundError:
+        raise ConfigError(f"There is no clip {path}.") from None
+    except (zipfile.BadZipFile, ValueError, EOFError, OSError, KeyError) as error:
+        raise ConfigError(f"{path} is damaged or no clip: {error}.") from None
+    if version != VERSION or set(arrays) != names:
+        what = f"version {version}" if version else f"arrays {', '.join(sorted(found)) or 'none'}"
+        raise ConfigError(
+            f"{path}: expected a clip of version {VERSION}, got {what}. Make it (anew) with: "
+            f"python -m hrc_env import-motion RECORDING --out {path}"
+        )
+    recorded = np.asarray(arrays["controls"], float)
+    if recorded.ndim != 2 or recorded.shape[1] != len(RECORDED):
+        raise ConfigError(f"{path}: controls must be (T, {len(RECORDED)}), got {recorded.shape}.")
+    controls = np.zeros((len(recorded), c.N_CONTROLS))
+    controls[:, RECORDED] = recorded
+    return Clip(
+        controls, float(arrays["fps"]), np.asarray(arrays["contacts"], bool),
+        np.asarray(arrays["size"], float), str(arrays["source"]),
+    )  # fmt: skip
+
+
+def opened(motion: str | Path | Clip) -> Clip:
+    """A clip, or the one at a path."""
+    return motion if isinstance(motion, Clip) else load_clip(Path(motion))
+
+
+def check_rate(fps: float, source: str) -> None:
+    """Refuse a frame rate that cannot be."""
+    if not SLOWEST_HZ <= fps <= FASTEST_HZ:
+        raise ConfigError(
+            f"{source}: a frame rate between {SLOWEST_HZ:g} and {FASTEST_HZ:g} frames a second is "
+            f"expected, the file has {fps:g}. If you know the true one, give it (--source-fps)."
+        )
+
+
+def _check(clip: Clip) -> None:
+    """Refuse shapes, numbers or speeds that no recording has."""
+    q, source = clip.controls, clip.source
+    check_rate(clip.fps, source)
+    expected = {"contacts": (len(q), 2), "size": (N_SIZES,)}
+    if q.ndim != 2 or len(q) < 2 or q.shape[1] != c.N_CONTROLS:
+        raise ConfigError(f"{source}: controls must be (T >= 2, {c.N_CONTROLS}), got {q.shape}.")
+    for name, shape in expected.items():
+        if getattr(clip, name).shape != shape:
+            raise ConfigError(f"{source}: {name} must be {shape}, got {getattr(clip, name).shape}.")
+    if not (np.isfinite(q).all() and np.isfinite(clip.size).all() and clip.size[LEG] > 0.0):
+        raise ConfigError(f"{source}: controls and size must be finite numbers.")
+    root = q[:, [c.ROOT_X, c.ROOT_Y]]
+    speed = np.linalg.norm(np.diff(root, axis=0), axis=-1).max() * clip.fps
+    if np.abs(root).max() > FARTHEST_M or speed > FASTEST_M_S:
+        raise ConfigError(
+            f"{source}: the root goes {np.abs(root).max():.0f} m far at up to {speed:.0f} m/s; "
+            f"at most {FARTHEST_M:g} m and {FASTEST_M_S:g} m/s are expected of a person."
+        )
+
+
+def footprints(feet: Floats, size: Floats) -> Floats:
+    """(T, 4) flat feet's ankles and headings, from (T, 5 or more): ankle, heading, pitch."""
+    flat = feet[:, :3] - rolled(feet[:, 3], feet[:, 4], size)
+    return np.concatenate([flat, feet[:, 3:4]], axis=1)
+
+
+def rolled(yaw: Floats, pitch: Floats, size: Floats) -> Floats:
+    """(T, 3) how far a foot's pitch takes its ankle: heel up round the ball, toes up."""
+    moved = [
+        about(p, size[BALL_X], size[BALL_Z]) if p > 0.0 else about(p, size[HEEL_X], -size[ANKLE_Z])
+        for p in pitch.tolist()
+    ]
+    ahead, above = np.array(moved).T
+    return np.stack([np.cos(yaw) * ahead, np.sin(yaw) * ahead, above], -1)

@@ -1,0 +1,121 @@
+"""One way to configure: keyword arguments for what is chosen often, `config=` for the rest."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hrc_env.__main__ import main
+from hrc_env.config import HRCConfig, load_config, save_config, settle
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.old_names import OLD_NAMES, Named
+from hrc_env.env import HRCEnv
+from hrc_env.motion.clip import Clip
+from hrc_env.motion.config import PEOPLE
+from hrc_env.scene.domain_randomization import APPEARANCES
+from hrc_env.scene.rigs import RIGS
+
+ODD = {
+    "people": "hurried",
+    "cameras": "lab_gopro",
+    "appearance": "varied",
+    "faults": [{"kind": "lost", "cameras": ["all"], "until_s": 2.5}],
+    "config": {"worker": ["worker_1", "worker_2"], "motion": {"motions": ['a "b"\\.npz']}},
+}
+
+
+@pytest.mark.parametrize("estimator", ["particle", "paper", "triangulation"])
+def test_a_config_that_is_saved_and_loaded_is_the_same(estimator, tmp_path):
+    config = settle(estimator=estimator, **ODD).config
+    save_config(config, tmp_path / "mine.toml")
+    assert load_config(tmp_path / "mine.toml", estimator=estimator) == config
+    assert settle(estimator=estimator, config=tmp_path / "mine.toml").config == config
+
+
+def test_a_file_may_hold_a_few_changes_and_names_of_presets(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text('appearance = "varied"\n[motion]\npeople = "unaware"\n[reward]\neffort = 1\n')
+    config = HRCEnv(perception="pixels", config=str(path)).config
+    assert config.appearance == APPEARANCES["varied"]
+    assert config.motion.people == PEOPLE["unaware"]
+    assert config.reward == replace(HRCConfig().reward, effort=1.0)
+
+
+def test_a_keyword_argument_is_the_field_of_the_config_that_it_stands_for():
+    by_keyword = settle(**{name: value for name, value in ODD.items() if name != "config"}).config
+    by_config = settle(
+        config={
+            "scene": {"cameras": RIGS["lab_gopro"]},
+            "motion": {"people": "hurried"},
+            "faults": ODD["faults"],
+            "appearance": "varied",
+        }
+    ).config
+    assert by_keyword == by_config
+
+
+def test_a_clip_in_memory_is_not_written(tmp_path):
+    clip = object.__new__(Clip)
+    object.__setattr__(clip, "source", "walk")
+    config = replace(HRCConfig(), motion=replace(HRCConfig().motion, motions=(clip,)))
+    with pytest.raises(ConfigError, match="'walk' cannot be written: give its file"):
+        save_config(config, tmp_path / "mine.toml")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[reward]\nproximty = 1\n", "'reward.proximty'. Did you mean 'reward.proximity'"),
+        ('ctrl_dt = "fast"\n', "ctrl_dt must be a finite number, got 'fast'"),
+        ("[reward]\ngoal = 1\n", "'reward.goal' is gone: use 'task.goal_bonus'"),
+        ("reward = [", "must be TOML"),
+        ('[motion]\npeople = "hurrid"\n', "motion.people 'hurrid'. Did you mean 'hurried'"),
+        ("appearance = 3\n", "appearance must be a name ('as_built'"),
+    ],
+)
+def test_a_file_that_cannot_be_is_answered_with_what_would_do(text, said, tmp_path):
+    (tmp_path / "mine.toml").write_text(text)
+    with pytest.raises(ConfigError) as refused:
+        load_config(tmp_path / "mine.toml")
+    assert said in str(refused.value)
+
+
+def test_the_list_shows_the_configuration_that_arguments_make(tmp_path, capsys):
+    assert main(["list", "--config", "reward.proximity=0.5", "--people", "hurried"]) == 0
+    (tmp_path / "mine.toml").write_text(capsys.readouterr().out)
+    said = settle(people="hurried", config={"reward": {"proximity": 0.5}}).config
+    assert load_config(tmp_path / "mine.toml") == said
+    assert main(["list", "--config"]) == 0
+    (tmp_path / "mine.toml").write_text(capsys.readouterr().out)
+    assert load_config(tmp_path / "mine.toml") == settle().config
+
+
+@pytest.mark.parametrize("old", [{"estimator": "per_joint"}, {"config": {"eyes": {}}}])
+def test_an_old_name_is_answered_with_the_new_one(old):
+    with pytest.raises(ConfigError, match="is gone: use"):
+        settle(**old)
+
+
+def test_so_is_an_old_word_of_the_command_line(monkeypatch, capsys):
+    monkeypatch.setitem(OLD_NAMES, "--watch", "--viewer")
+    assert main(["play", "--watch=1"]) == 2
+    assert "'--watch' is gone: use '--viewer'" in " ".join(capsys.readouterr().err.split())
+
+
+def test_so_is_an_old_key_of_infos_and_observations():
+    env = HRCEnv(perception="none")
+    observation, info = env.reset(seed=0)
+    with pytest.raises(KeyError, match="worker_separation"):
+        env.split_observation(observation)["worker_gap"]
+    with pytest.raises(KeyError, match="nothing"):
+        info["nothing"]
+    assert isinstance(info, Named)
+    assert info.get("worker_gap") is None
+    assert np.isfinite(info["cost"])
+
+
+def test_no_name_of_today_is_an_old_one():
+    env = HRCEnv(perception="none")
+    observation, info = env.reset(seed=0)
+    assert not OLD_NAMES.keys() & {*info, *env.split_observation(observation)}
