@@ -83,7 +83,7 @@ def test_the_inverse_is_the_inverse_and_says_when_there_is_none(seed):
 def test_an_update_is_the_dense_gaussian_update(seed):
     rng = np.random.default_rng(seed)
     body, cov, slope = random_tree(rng)
-    prior, mean, w = dense(cov, slope), body.copy().ravel(), np.zeros(1, WORK)[0]
+    prior, mean, w = dense(cov, slope), body.copy().ravel(), np.zeros(1, WORK).view(np.recarray)[0]
     precision, gradient = np.linalg.inv(prior), np.zeros(6 * J)
     for j in range(J):
         w.camera_information[j] = random_covariance(rng, 3, 5.0) * rng.integers(0, 2)
@@ -116,7 +116,16 @@ def test_a_prediction_is_the_dense_one_projected_on_the_tree(seed):
     shared = whole_body_noise(DT, 4.0)
     travel = np.array([[1, DT], [0, 1]]) - F
     offset, count = STANDING_M.copy(), np.full(J, 5.0)
-    predict_tree(body, cov, slope, offset, count, (F, travel, Q, shared), DT, np.zeros(1, WORK)[0])
+    predict_tree(
+        body,
+        cov,
+        slope,
+        offset,
+        count,
+        (F, travel, Q, shared),
+        DT,
+        np.zeros(1, WORK).view(np.recarray)[0],
+    )
     moves, noise = np.zeros((J, 6, J, 6)), np.zeros((J, 6, J, 6))
     for j in range(J):
         moves[j, :, j] += np.kron(F[j], _I3)
@@ -142,7 +151,9 @@ def test_a_body_that_nobody_sees_keeps_its_shape_but_not_its_place():
     model = (*_model(), whole_body_noise(DT, 4.0))
     offset, count = STANDING_M.copy(), np.full(J, 5.0)
     for _ in range(50):
-        predict_tree(body, cov, slope, offset, count, model, DT, np.zeros(1, WORK)[0])
+        predict_tree(
+            body, cov, slope, offset, count, model, DT, np.zeros(1, WORK).view(np.recarray)[0]
+        )
     full = dense(cov, slope)
     spread = np.sqrt(np.diagonal(full).reshape(J, 6)[:, :3].mean(-1))
     assert (spread > 2.0).all()  # two seconds of 4 m^2/s^3: sqrt(4 * 8 / 3) = 3.3 m

@@ -19,7 +19,6 @@ from hrc_env.tracking.hypotheses.depth_flip import (
 )
 from hrc_env.tracking.hypotheses.slots import copy_slot, slot_distance
 from hrc_env.tracking.hypotheses.yaw_flip import heads_like, turn_body, turn_of
-from hrc_env.tracking.models.proposal import inlier_odds_of
 from hrc_env.tracking.tree.bone_lengths import stiff_lengths
 from hrc_env.tracking.tree.evidence import log_evidence
 from hrc_env.tracking.tree.filter import condition, correct_mean
@@ -133,10 +132,9 @@ def _reflect(slots, b, own, n, where, seen, s, m, work):
     body, cov, slope = slots.body[b, new], slots.cov[b, new], slots.slope[b, new]
     if not reflect(part, seen.P[camera], body, work.point):
         return np.inf
-    inlier_odds = inlier_odds_of(s.outlier_weight, s.image_area_px)
     stiff_lengths(slots.bone_variance[b, new], s.bone_give, give)
     bones = (slots.bone_length[b, new], give)
-    how = (inlier_odds, s.floor_std_m, m.search_steps, 0.0)
+    how = (s.inlier_odds, s.floor_std_m, m.search_steps, 0.0)
     find_pose_near(prior[0], prior[1], prior[2], seen, bones, *how, work)
     moved = 0.0
     for j in range(len(body)):
@@ -146,7 +144,7 @@ def _reflect(slots, b, own, n, where, seen, s, m, work):
         return np.inf
     body[:], cov[:], slope[:] = prior[0], prior[1], prior[2]
     update_tree(body, cov, slope, work)
-    found = log_evidence(prior, (body, cov, slope), seen, bones, inlier_odds, s.floor_std_m, work)
+    found = log_evidence(prior, (body, cov, slope), seen, bones, s.inlier_odds, s.floor_std_m, work)
     if not found - evidence > m.log_least:
         return np.inf
     correct_mean(slots, b, new, seen, s, work)

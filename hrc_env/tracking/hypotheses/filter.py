@@ -14,7 +14,6 @@ from hrc_env.tracking.hypotheses.slots import drop, hypotheses, merge, normalise
 from hrc_env.tracking.measurements import make_seen, read_worker
 from hrc_env.tracking.models.acquisition import heading
 from hrc_env.tracking.models.noise import NoiseModel, learn_noise, scale_sigma
-from hrc_env.tracking.models.proposal import inlier_odds_of
 from hrc_env.tracking.models.swaps import undo_swaps
 from hrc_env.tracking.models.track_management import acquire, grow_older
 from hrc_env.tracking.settings import Settings
@@ -174,11 +173,10 @@ def _weigh(slots, b, k, seen, s, prior, work):
     body, cov, slope = slots.body[b, k], slots.cov[b, k], slots.slope[b, k]
     prior[0][:], prior[1][:], prior[2][:] = body, cov, slope
     condition(slots, b, k, seen, s, work)
-    inlier_odds = inlier_odds_of(s.outlier_weight, s.image_area_px)
     bones = (slots.bone_length[b, k], work.bone_variance)
     # the mean correction needs the factors that the evidence leaves alone
     evidence = log_evidence(
-        prior, (body, cov, slope), seen, bones, inlier_odds, s.floor_std_m, work
+        prior, (body, cov, slope), seen, bones, s.inlier_odds, s.floor_std_m, work
     )
     correct_mean(slots, b, k, seen, s, work)
     return evidence

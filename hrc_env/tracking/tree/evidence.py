@@ -31,7 +31,7 @@ def log_evidence(prior, posterior, seen, bones, inlier_odds, floor_std_m, w):
         posterior: the same after `tree.update.update_tree` and before the mean correction.
         seen: `measurements.Seen`.
         bones: lengths (J,) [m] and their variances as measurements (J,) [m^2].
-        inlier_odds: as `proposal.inlier_odds_of` gives.
+        inlier_odds: as in `Settings`.
         floor_std_m: as in `tree.search.find_pose`.
         w: scratch, a record of `WORK`; a, b, c, d and step are used.
     """

@@ -6,7 +6,6 @@ z (J, C, 2), sigma (J, C), ok (J, C) as `measurements.read_worker` fills them.
 
 from hrc_env.core.kernels import kernel
 from hrc_env.tracking.models.acquisition import count_conflict
-from hrc_env.tracking.models.proposal import inlier_odds_of
 from hrc_env.tracking.models.track_management import (
     acquire_anew,
     check,
@@ -39,10 +38,9 @@ def condition(state, b, w, seen, s, work):
     """Search the mode and condition the tree there; seen.belief says what was believed."""
     give = work.bone_variance
     body, cov, slope = state.body[b, w], state.cov[b, w], state.slope[b, w]
-    inlier_odds = inlier_odds_of(s.outlier_weight, s.image_area_px)
     stiff_lengths(state.bone_variance[b, w], s.bone_give, give)
     bones = (state.bone_length[b, w], give)
-    how = (inlier_odds, s.floor_std_m, s.gauss_newton_steps)
+    how = (s.inlier_odds, s.floor_std_m, s.gauss_newton_steps)
     find_pose(body, cov, slope, seen, bones, *how, work)
     update_tree(body, cov, slope, work)
 

@@ -26,7 +26,7 @@ def find_pose(body, cov, slope, seen, bones, inlier_odds, floor_std_m, n_steps, 
         body, cov, slope: the prediction (J, 6), (J, 6, 6), (J, 6, 6).
         seen: `measurements.Seen`, of which belief is filled.
         bones: lengths (J,) to the parent [m] and their variances as measurements (J,) [m^2].
-        inlier_odds: as `proposal.inlier_odds_of` gives.
+        inlier_odds: as in `Settings`.
         floor_std_m: of the floor, as a measurement of whatever is below it [m].
         n_steps: Gauss-Newton steps.
         w: scratch, in which the point and what cameras and bones say there stay: information and
