@@ -26,14 +26,14 @@ from rich.console import Console
 from rich.markdown import Markdown
 
 from agents import ppo
-from agents.base import AGENTS, make_agent
 from agents.evaluate import EVALUATION_SEED, judged
+from agents.registry import AGENTS, make_agent
 from hrc_env.cli.checks import at_least, writable_folder
 from hrc_env.cli.progress import progress_bar
 from hrc_env.core.results import Metric, write_results, write_whole
+from hrc_env.experiments.study.cache import PartCache, PartProgress
 from hrc_env.experiments.study.fingerprint import fingerprint_of
 from hrc_env.experiments.study.intervals import mean_over, ratio_over
-from hrc_env.experiments.study.shelf import Shelf, Tick
 
 ROOT = Path(__file__).resolve().parent.parent
 PPO = {"ppo": 0.0, "ppo_safety": 2.0}
@@ -85,10 +85,10 @@ def main(arguments: Arguments) -> None:
     console, metrics = Console(), dict[str, Metric]()
     mark = fingerprint_of(settings, "benchmarks.baselines", "agents.scripted", "agents.ppo")
     with progress_bar(console, "baselines") as say:
-        shelf = Shelf(arguments.out / "parts", mark, len(ORDER) * len(ROWS), say)
+        cache = PartCache(arguments.out / "parts", mark, len(ORDER) * len(ROWS), say)
         for level in ORDER:
             for agent in ROWS:
-                done = played(shelf, arguments, level, agent, policies.get((level, agent)))
+                done = played(cache, arguments, level, agent, policies.get((level, agent)))
                 metrics |= {f"{level}.{agent}.{key}": each for key, each in worth(done).items()}
     seeds = list(range(EVALUATION_SEED, EVALUATION_SEED + arguments.episodes))
     write_results(arguments.out / "results.json", settings, seeds, metrics)
@@ -125,9 +125,9 @@ def learnt(arguments: Arguments, level: str, agent: str) -> Path:
 
 
 def played(
-    shelf: Shelf, arguments: Arguments, level: str, agent: str, policy: Path | None
+    cache: PartCache, arguments: Arguments, level: str, agent: str, policy: Path | None
 ) -> list[dict[str, float]]:
-    """Statistics of an agent's episodes at a level, from the shelf or anew."""
+    """Statistics of an agent's episodes at a level, from the cache or anew."""
     label, make = f"{level}.{agent}", partial(make_agent, str(policy or agent))
     if policy is not None:
         label += "." + hashlib.sha256(policy.read_bytes()).hexdigest()[:12]
@@ -136,10 +136,10 @@ def played(
     if level != "pixels":
         kwargs["num_threads"], n_episodes = arguments.threads, arguments.episodes
 
-    def play(tick: Tick) -> dict[str, Any]:
+    def play(tick: PartProgress) -> dict[str, Any]:
         return {"episodes": judged(make, n_episodes, tick=tick, **kwargs)}
 
-    return shelf.part(label, play)["episodes"]
+    return cache.part(label, play)["episodes"]
 
 
 def worth(episodes: list[dict[str, float]]) -> dict[str, Metric]:

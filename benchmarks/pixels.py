@@ -14,7 +14,8 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from agents.base import make_agent, situation
+from agents.env_info import env_info
+from agents.registry import make_agent
 from hrc_env.cli.progress import track
 from hrc_env.core.results import Metric, write_results
 from hrc_env.env import HRCEnv
@@ -64,7 +65,7 @@ def frames_until_tracked(env: HRCEnv, seed: int, limit: int = 5) -> int | None:
 
 def episode(env: HRCEnv, seed: int, notes: Notes) -> None:
     """Play one episode and note every step."""
-    agent = make_agent("scripted_slowed", situation(env.simulation))
+    agent = make_agent("scripted_slowed", env_info(env.simulation))
     observation, _ = env.reset(seed=seed)
     for _ in range(250):
         action = agent.act(observation)

@@ -18,7 +18,7 @@ from benchmarks.tracking.sequences import Sequences, make_sequences
 from hrc_env.cli.progress import track
 from hrc_env.core.results import Metric, write_results
 from hrc_env.core.typing import Floats
-from hrc_env.experiments.beyond.variants import VARIANTS, estimator_of
+from hrc_env.experiments.ablations.questions.filters import VARIANTS, estimator_of
 from hrc_env.tracking.estimators import make_estimator
 
 PLAIN = {"one_view_inflation": 1.0}

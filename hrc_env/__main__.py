@@ -51,8 +51,8 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     ),
     "experiment": (
         "hrc_env.cli.experiment", "Experiment",
-        "The paper's two experiments (site, lab), what the eyes are worth in safety (impact), and "
-        "ablations of rigs and estimators (beyond).",
+        "The paper's two experiments (site, lab), what perception is worth in safety (impact), and "
+        "ablations of rigs and estimators (ablations).",
     ),
     "gallery": (
         "benchmarks.commands.gallery", "Gallery",

@@ -96,7 +96,7 @@ def test_agents_do_not_touch_simulator_state():
     state = {"hrc_env.simulation", "hrc_env.motion", "hrc_env.scene", "hrc_env.metrics"}
     for path in (ROOT / "agents").glob("*.py"):
         assert not identifiers(path) & {"truth", "motion", "physics", "worker_truth"}, path
-        if relative(path) != "agents/base.py":  # which reads a situation from a simulation
+        if relative(path) != "agents/env_info.py":  # which reads a simulation
             assert not [each for each in imported(path) if each.startswith(tuple(state))], path
 
 

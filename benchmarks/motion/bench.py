@@ -13,7 +13,7 @@ from benchmarks.motion.report import write_report
 from benchmarks.motion.statistics import statistics_of
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric, over, write_results
-from hrc_env.experiments.study.shelf import Say
+from hrc_env.experiments.study.cache import Progress
 from hrc_env.motion import plans as pl
 from hrc_env.motion.generator import MotionConfig, advance, make_state, reset
 from hrc_env.motion.repertoire import REPERTOIRE, perform
@@ -49,7 +49,7 @@ QUICK = MotionBenchConfig(n_seeds=2, bodies=("worker_1",))
 """Every number, from little."""
 
 
-def run(config: MotionBenchConfig, out: Path, say: Say) -> dict[str, Metric]:
+def run(config: MotionBenchConfig, out: Path, say: Progress) -> dict[str, Metric]:
     """Measure; writes results.json, motion.md and motion.png into `out`.
 
     Args:

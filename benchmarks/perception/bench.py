@@ -16,11 +16,11 @@ from benchmarks.perception.report import write_report
 from benchmarks.perception.settings import PerceptionBenchConfig
 from benchmarks.perception.views import PLAIN
 from hrc_env.core.results import Metric, write_results
+from hrc_env.experiments.study.cache import PartCache, Progress
 from hrc_env.experiments.study.fingerprint import fingerprint_of
-from hrc_env.experiments.study.shelf import Say, Shelf
 
 
-def run(config: PerceptionBenchConfig, out: Path, say: Say) -> dict[str, Metric]:
+def run(config: PerceptionBenchConfig, out: Path, say: Progress) -> dict[str, Metric]:
     """Measure what is not yet there.
 
     Writes results.json, perception.md, plots and the sheet of the worst crops into `out`.
@@ -36,8 +36,8 @@ def run(config: PerceptionBenchConfig, out: Path, say: Say) -> dict[str, Metric]
     total = sum(task.cost for task in tasks)
     for task in tasks:
         n_parts = total / task.cost
-        shelf = Shelf(out / "parts", fingerprint, n_parts, say)
-        task.take(shelf.part(task.label, task.make), found)
+        cache = PartCache(out / "parts", fingerprint, n_parts, say)
+        task.take(cache.part(task.label, task.make), found)
     base = found.loops["lab"][: config.n_faults]
     first = slice(config.fault_steps)
     found.faults[PIXELS, NO_FAULT] = [loops.some_steps(each, first) for each in base]

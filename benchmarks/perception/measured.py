@@ -13,7 +13,7 @@ from benchmarks.perception.loops import Episode, camera_name, some_steps
 from benchmarks.perception.speed import ROUNDS
 from benchmarks.perception.views import ROWS, View, rows_of
 from hrc_env.core.results import Metric
-from hrc_env.experiments.study.intervals import quantile_over, ratio_over, rmse_ratio_over
+from hrc_env.experiments.study.intervals import quantile_over, ratio_over, rmse_over
 
 PIXELS, EMULATED = "pixels", "keypoints"
 NO_FAULT = "none"
@@ -102,7 +102,7 @@ def _belief(name: str, episodes: list[Episode]) -> Metrics:
         f"error_m.{name}.median": quantile_over(errors, 0.5, "m"),
         f"error_m.{name}.p95": quantile_over(errors, 0.95, "m"),
         f"coverage95.{name}": ratio_over(inside, [float(len(each)) for each in errors], "share"),
-        f"std_over_error.{name}": rmse_ratio_over(reported, squared),
+        f"std_over_error.{name}": rmse_over(reported, squared, "ratio"),
         f"lost_steps.{name}": ratio_over(lost, steps, "share"),
     }
 

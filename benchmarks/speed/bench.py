@@ -23,7 +23,7 @@ from benchmarks.speed.report import write_report
 from benchmarks.speed.starts import Starts
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric, write_results
-from hrc_env.experiments.study.shelf import Say
+from hrc_env.experiments.study.cache import Progress
 
 WATCHED = "keypoints"
 """The level whose organs are timed."""
@@ -82,7 +82,7 @@ class Turn:
         return self.level == WATCHED
 
 
-def run(config: SpeedBenchConfig, out: Path, say: Say) -> dict[str, Metric]:
+def run(config: SpeedBenchConfig, out: Path, say: Progress) -> dict[str, Metric]:
     """Measure; writes results.json, speed.md and organs.png into `out`.
 
     Args:
@@ -131,7 +131,7 @@ def _take(turn: Turn, measured: Measured, organs: Organs) -> None:
             measured.us_per_env_step.setdefault(name, []).append(us)
 
 
-def _turns(config: SpeedBenchConfig, closing: ExitStack, say: Say) -> Iterator[Turn]:
+def _turns(config: SpeedBenchConfig, closing: ExitStack, say: Progress) -> Iterator[Turn]:
     """Make everybody, ready to run, to be closed in the end."""
     known = [
         (size, threads) for size in config.sizes for threads in config.threads if threads <= size

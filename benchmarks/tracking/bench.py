@@ -4,11 +4,12 @@ Each (rig, condition, estimator) is written to DIR/parts as soon as it is done, 
 that was stopped goes on where it was; parts made by other code or settings are made anew.
 """
 
+import functools
 import multiprocessing
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +24,8 @@ from benchmarks.tracking.sequences import BOUNDED, Sequences, make_sequences
 from benchmarks.tracking.timing import BATCH, time_association, time_estimator
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric, write_results
+from hrc_env.experiments.study.cache import PartCache, PartProgress, Progress
 from hrc_env.experiments.study.fingerprint import fingerprint_of
-from hrc_env.experiments.study.shelf import Say, Shelf, Tick
 from hrc_env.tracking.estimators import ESTIMATORS
 
 
@@ -55,7 +56,9 @@ QUICK = TrackingBenchConfig(n_seeds=8, n_matched=30, n_smoothed=2, timing_repeat
 """Every number, from fewer sequences."""
 
 
-def run(config: TrackingBenchConfig, out: Path, say: Say, processes: int = 1) -> dict[str, Metric]:
+def run(
+    config: TrackingBenchConfig, out: Path, say: Progress, processes: int = 1
+) -> dict[str, Metric]:
     """Run what is not yet there; writes results.json, tracking.md and two plots into `out`.
 
     Args:
@@ -66,17 +69,17 @@ def run(config: TrackingBenchConfig, out: Path, say: Say, processes: int = 1) ->
     """
     asked = cells()
     n_parts = len(asked) + len(ESTIMATORS) + 1
-    shelf = Shelf(
+    cache = PartCache(
         out / "parts", fingerprint_of(asdict(config), "benchmarks.tracking.cells"), n_parts, say
     )
     if processes > 1:
-        _run_conditions(config, shelf, processes)
-        shelf = Shelf(shelf.folder, shelf.fingerprint, n_parts, _silent)
+        _run_conditions(config, cache, processes)
+        cache = PartCache(cache.folder, cache.fingerprint, n_parts, _silent)
     parts: Parts = {}
     for rig, condition in dict.fromkeys(cell[:2] for cell in asked):
-        parts |= make_condition(config, shelf, rig, condition)
-    shelf = Shelf(shelf.folder, shelf.fingerprint, n_parts, say)
-    parts |= _timing(config, shelf)
+        parts |= make_condition(config, cache, rig, condition)
+    cache = PartCache(cache.folder, cache.fingerprint, n_parts, say)
+    parts |= _timing(config, cache)
     metrics = metrics_of(parts)
     settings = {
         "bench": asdict(config),
@@ -84,7 +87,7 @@ def run(config: TrackingBenchConfig, out: Path, say: Say, processes: int = 1) ->
         "sigma_px": SIGMA_PX,
         "tracker": {name: asdict(_rig(name).tracker) for name in (*RIGS, OWN)},
         "conditions": {name: asdict(damage) for name, damage in CONDITIONS.items()},
-        "fingerprint": shelf.fingerprint,
+        "fingerprint": cache.fingerprint,
     }
     write_results(out / "results.json", settings, _seeds(config, "clean"), metrics)
     write_report(out, parts, metrics)
@@ -92,17 +95,17 @@ def run(config: TrackingBenchConfig, out: Path, say: Say, processes: int = 1) ->
 
 
 def make_condition(
-    config: TrackingBenchConfig, shelf: Shelf, rig_name: str, condition: str
+    config: TrackingBenchConfig, cache: PartCache, rig_name: str, condition: str
 ) -> Parts:
     """Everybody on one rig and condition; the sequences are made if a part is missing."""
     seeds = _seeds(config, condition)
 
-    @cache
+    @functools.cache
     def sequences() -> tuple[Rig, Sequences]:
         rig = _rig(rig_name)
         return rig, make_sequences(rig, condition, seeds)
 
-    def make(name: str, tick: Tick) -> dict[str, Any]:
+    def make(name: str, tick: PartProgress) -> dict[str, Any]:
         rig, given = sequences()
         if name == SMOOTHER:
             n = min(config.n_smoothed, len(seeds))
@@ -110,33 +113,33 @@ def make_condition(
         return run_cell(name, rig, given, seeds, tick)
 
     return {
-        (rig_name, condition, name): shelf.part(
+        (rig_name, condition, name): cache.part(
             f"{rig_name}.{condition}.{name}", partial(make, name)
         )
         for name in names_of(rig_name, condition)
     }
 
 
-def _run_conditions(config: TrackingBenchConfig, shelf: Shelf, processes: int) -> None:
-    """Let several processes put the parts of whole conditions on the shelf."""
+def _run_conditions(config: TrackingBenchConfig, cache: PartCache, processes: int) -> None:
+    """Let several processes put the parts of whole conditions in the cache."""
     todo = Counter((rig, condition) for rig, condition, _ in cells())
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(processes, mp_context=context) as pool:
         running = {
-            pool.submit(_in_process, config, shelf.folder, shelf.fingerprint, *what): what
+            pool.submit(_in_process, config, cache.folder, cache.fingerprint, *what): what
             for what in todo
         }
         for done in as_completed(running):
             done.result()
             what = running[done]
-            shelf.say(todo[what] / shelf.n_parts, ".".join(what))
+            cache.progress(todo[what] / cache.n_parts, ".".join(what))
 
 
 def _in_process(
     config: TrackingBenchConfig, folder: Path, fingerprint: str, rig: str, condition: str
 ) -> None:
-    """What another process does: the parts stay on the shelf."""
-    make_condition(config, Shelf(folder, fingerprint, 1, _silent), rig, condition)
+    """What another process does: the parts stay in the cache."""
+    make_condition(config, PartCache(folder, fingerprint, 1, _silent), rig, condition)
 
 
 def _silent(share: float, label: str) -> None:
@@ -152,21 +155,21 @@ def _seeds(config: TrackingBenchConfig, condition: str) -> list[int]:
     return [config.first_seed + k for k in range(n)]
 
 
-def _timing(config: TrackingBenchConfig, shelf: Shelf) -> Parts:
+def _timing(config: TrackingBenchConfig, cache: PartCache) -> Parts:
     """Microseconds per update of every estimator, on the lab's sequences, and of association."""
     rig = make_rig("lab")
     frames = cache(lambda kind: make_sequences(rig, kind, list(range(BATCH))))
     repeats = config.timing_repeats
 
-    def make(name: str, tick: Tick) -> dict[str, Any]:
+    def make(name: str, tick: PartProgress) -> dict[str, Any]:
         return time_estimator(name, rig, frames("clean"), frames("hard"), repeats, tick)
 
     parts: Parts = {
-        ("lab", TIMING, name): shelf.part(f"{TIMING}.{name}", partial(make, name))
+        ("lab", TIMING, name): cache.part(f"{TIMING}.{name}", partial(make, name))
         for name in ESTIMATORS
     }
     site = make_rig("site")
-    parts["site", TIMING, ASSOCIATION] = shelf.part(
+    parts["site", TIMING, ASSOCIATION] = cache.part(
         f"{TIMING}.{ASSOCIATION}", partial(time_association, site, repeats)
     )
     return parts

@@ -17,7 +17,7 @@ from benchmarks.tracking.tally import tally
 from hrc_env.core.batching import rows
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.typing import Covariances3, Points3
-from hrc_env.experiments.study.shelf import Tick
+from hrc_env.experiments.study.cache import PartProgress
 from hrc_env.tracking.estimators import make_estimator
 from hrc_env.tracking.people.association import associate
 from hrc_env.tracking.smoother import smooth
@@ -117,7 +117,7 @@ def _forget_bones(state: Any) -> None:
 
 
 def run_cell(
-    name: str, rig: Rig, sequences: Sequences, seeds: list[int], tick: Tick
+    name: str, rig: Rig, sequences: Sequences, seeds: list[int], tick: PartProgress
 ) -> dict[str, Any]:
     """Run one estimator; sums per sequence of each window, as `tally` gives them."""
     n_frames = len(sequences.joints)

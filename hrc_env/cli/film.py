@@ -25,7 +25,7 @@ H264 = ("-preset", "superfast", "-crf", "18")
 """A fifth of the usual preset's time; sharp."""
 
 Make = Callable[[Any], Any]
-"""Builds the agent for a `Situation`."""
+"""Builds the agent for an `EnvInfo`."""
 
 
 def film_episode(
@@ -34,7 +34,7 @@ def film_episode(
     """Film `n_steps` of an agent; returns what came of them, by name and [unit].
 
     Args:
-        make: builds the agent for a `Situation`.
+        make: builds the agent for an `EnvInfo`.
         path: an .mp4 file; a still of the closest moment that is no near miss yet (or of the
             first step) is written beside it as .png.
         seed: of the episode.
@@ -66,7 +66,7 @@ def nearest_seed(make: Make, seeds: Iterable[int], n_steps: int = 250, **kwargs:
     Nothing is drawn: "pixels" is played as "keypoints", and may come out otherwise in the film.
 
     Args:
-        make: builds the agent for a `Situation`.
+        make: builds the agent for an `EnvInfo`.
         seeds: of the episodes that are played.
         n_steps: their length.
         kwargs: as of `HRCEnv`.
@@ -96,7 +96,7 @@ def table(totals: dict[str, float], title: str = "") -> Table:
 
 
 def _closest_m(env: HRCEnv, make: Make, seed: int, n_steps: int) -> float:
-    agent = make(agents("base").situation(env.simulation))
+    agent = make(agents("env_info").env_info(env.simulation))
     observation, _ = env.reset(seed=seed)
     closest_m = np.inf
     for _ in range(n_steps):
@@ -111,7 +111,7 @@ def _filmed(
     env: HRCEnv, make: Make, path: Path, seed: int, n_steps: int
 ) -> tuple[dict[str, float], Image]:
     """Play, draw every second step; what came of it, and the still."""
-    agent = make(agents("base").situation(env.simulation))
+    agent = make(agents("env_info").env_info(env.simulation))
     observation, info = env.reset(seed=seed)
     diary, closest_m, started_s = Diary(), np.inf, time.monotonic()
     still = np.zeros((1, 1, 3), np.uint8)

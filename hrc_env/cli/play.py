@@ -62,9 +62,10 @@ class Play(EnvironmentArguments):
         from hrc_env.env import HRCEnv
         from hrc_env.scene.viewer import Viewer
 
-        base, inner = agents("base"), env.unwrapped
+        inner = env.unwrapped
         assert isinstance(inner, HRCEnv)
-        agent = base.make_agent(self.agent, base.situation(inner.simulation), seed)
+        env_info = agents("env_info").env_info(inner.simulation)
+        agent = agents("registry").make_agent(self.agent, env_info, seed)
         observation, info = env.reset(seed=seed)
         window = Viewer(inner.simulation.scene) if self.viewer else None
         started_s, total, steps = time.monotonic(), 0.0, 0
@@ -117,9 +118,9 @@ def filmed(asked: Play | Demo, agent: str, path: Path, n_steps: int = 250, title
     """Film an episode of an agent by its name; show what came of it."""
     from hrc_env.cli import film
 
-    base = agents("base")
+    registry = agents("registry")
     totals = film.film_episode(
-        lambda here: base.make_agent(agent, here, asked.seed),
+        lambda env_info: registry.make_agent(agent, env_info, asked.seed),
         path, asked.seed, n_steps=n_steps, **asked.keywords(),
     )  # fmt: skip
     Console().print(film.table(totals, title))

@@ -3,6 +3,7 @@
 from typing import Any
 
 OLD_NAMES = {
+    "beyond": "ablations",
     "eyes": "detector",
     "horizons_s": "forecast_s",
     "per_joint": "particle",

@@ -11,8 +11,7 @@ from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.stateful import Stateful
 from hrc_env.core.typing import Bools, Floats, Image, Ints
 from hrc_env.geometry.cameras import projections
-from hrc_env.perception.faults.recent import Recent
-from hrc_env.perception.faults.schedule import Schedule
+from hrc_env.perception.faults.schedule import Recent, Schedule
 from hrc_env.perception.lensed import pinhole_keypoints
 from hrc_env.perception.offsets import our_joints
 from hrc_env.pipeline.sensor_input import Generators, SensorInput, Windows

@@ -20,7 +20,6 @@ from hrc_env.geometry.triangulation import (
     FURTHEST_PX,
     Triangulation,
     triangulate,
-    triangulate_robust,
 )
 from hrc_env.tracking.config import TriangulationConfig
 from hrc_env.tracking.forecast import forecast
@@ -43,7 +42,7 @@ def ransac(P: Floats, ctrl_dt: float, config: TriangulationConfig) -> "Triangula
     """Least squares from the views that agree within `gate_sigma`."""
 
     def solve(P: Floats, px: Points2, sigma_px: Floats) -> Triangulation:
-        return triangulate_robust(P, px, sigma_px, config.gate_sigma)
+        return triangulate(P, px, sigma_px, config.gate_sigma)
 
     return TriangulationEstimator(P, ctrl_dt, config, solve)
 

@@ -10,8 +10,8 @@ from hrc_env.core.checkout import agents
 from hrc_env.core.errors import RenderingError
 
 
-def scripted(here):
-    return agents("base").make_agent("scripted", here)
+def scripted(env_info):
+    return agents("registry").make_agent("scripted", env_info)
 
 
 def test_a_film_has_a_frame_for_every_second_step(tmp_path):

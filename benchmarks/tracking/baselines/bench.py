@@ -18,8 +18,8 @@ from benchmarks.tracking.sequences import Sequences, make_sequences
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric, write_results
 from hrc_env.core.typing import Points3
+from hrc_env.experiments.study.cache import PartCache, PartProgress, Progress
 from hrc_env.experiments.study.fingerprint import fingerprint_of
-from hrc_env.experiments.study.shelf import Say, Shelf, Tick
 
 CONDITIONS = ("clean", "occluded", "hard", "one_camera")
 ROWS = (*CONDITIONS, "after_return")
@@ -41,7 +41,7 @@ class PeersConfig:
             raise ConfigError(f"n_seeds must be at least 1, got {self.n_seeds}.")
 
 
-def run(config: PeersConfig, out: Path, say: Say) -> dict[str, Metric]:
+def run(config: PeersConfig, out: Path, say: Progress) -> dict[str, Metric]:
     """Run what is installed; writes results.json and peers.md into `out`.
 
     Args:
@@ -55,7 +55,7 @@ def run(config: PeersConfig, out: Path, say: Say) -> dict[str, Metric]:
     versions = {name: version(name) for name in installed}
     fingerprint = fingerprint_of({**asdict(config), **versions}, __name__)
     n_parts = len(RIGS) * len(CONDITIONS) * len(names) * config.n_seeds
-    shelf = Shelf(out / "parts", fingerprint, n_parts, say)
+    cache = PartCache(out / "parts", fingerprint, n_parts, say)
     seeds = [config.first_seed + k for k in range(config.n_seeds)]
     cells: dict[tuple[str, str], list[dict[str, Any]]] = {}
     for rig in map(make_rig, RIGS):
@@ -63,7 +63,7 @@ def run(config: PeersConfig, out: Path, say: Say) -> dict[str, Metric]:
             for seed in seeds:
                 for name in names:
                     make = partial(_part, name, rig, condition, seed)
-                    part = shelf.part(f"{rig.name}.{condition}.{name}.{seed}", make)
+                    part = cache.part(f"{rig.name}.{condition}.{name}.{seed}", make)
                     for window, sums in part.items():
                         cells.setdefault((f"{rig.name}.{window}", name), []).append(sums)
     metrics = _metrics(cells)
@@ -73,7 +73,7 @@ def run(config: PeersConfig, out: Path, say: Say) -> dict[str, Metric]:
     return metrics
 
 
-def _part(name: str, rig: Rig, condition: str, seed: int, tick: Tick) -> dict[str, Any]:
+def _part(name: str, rig: Rig, condition: str, seed: int, tick: PartProgress) -> dict[str, Any]:
     """One sequence: squared errors and time of each window."""
     sequences = make_sequences(rig, condition, [seed])
     if name in PEERS:
