@@ -43,7 +43,7 @@ def register_task(task: "Task") -> None:
     """Make a task an environment: its id works in `gymnasium.make`, `make_vec` and `play`.
 
     Raises:
-        ConfigError: its id is taken, or something in it is missing or of the wrong kind.
+        ConfigError: here and below: the name is taken, or something is missing or of a wrong kind.
     """
     from hrc_env.tasks.task import check_task  # here and below: kernels take time to import
 
@@ -56,8 +56,7 @@ def register_estimator(spec: "EstimatorSpec") -> None:
     """Make an estimator known by its name: wherever `estimator=` or `--estimator` is taken.
 
     Raises:
-        ConfigError: its name is taken, a function is missing, or an estimate has a wrong shape, no
-            finite numbers or no covariance.
+        ConfigError: also for an estimate of a wrong shape, without finite numbers or covariance.
     """
     from hrc_env.tracking.checks import check_estimator
 
@@ -66,12 +65,7 @@ def register_estimator(spec: "EstimatorSpec") -> None:
 
 
 def register_robot(robot: "Robot") -> None:
-    """Make a robot known by its name: wherever `robot=` or `--robot` is taken.
-
-    Raises:
-        ConfigError: its name is taken, or something that it names is missing in its MJCF or of
-            the wrong kind.
-    """
+    """Make a robot known by its name: wherever `robot=` or `--robot` is taken."""
     from hrc_env.scene.robot import check_robot
 
     check_robot(robot)
@@ -81,23 +75,14 @@ def register_robot(robot: "Robot") -> None:
 def register_detector(name: str, make: "Callable[[], KeypointFunction]") -> None:
     """Make a pose detector known: `config={"detector": {"keypoints": name}}`, level "pixels".
 
-    Args:
-        name: of it.
-        make: gives the function from a crop to keypoints (`hrc_env.perception.detector`'s
-            `KeypointFunction`); called once for each thread that detects.
-
-    Raises:
-        ConfigError: the name is taken, or what is given is no function.
+    `make` gives the function from a crop to keypoints (`hrc_env.perception.detector`'s
+    `KeypointFunction`); it is called once for each thread that detects.
     """
     _add("detector", name, make, is_function=True)
 
 
 def register_shield(name: str, shield: "Shield") -> None:
-    """Make a shield (`hrc_env.safety.shield.Shield`) known: `shield=name` of every environment.
-
-    Raises:
-        ConfigError: the name is taken, or what is given is no function.
-    """
+    """Make a shield (`hrc_env.safety.shield.Shield`) known: `shield=name` of every environment."""
     _add("shield", name, shield, is_function=True)
 
 
@@ -122,11 +107,7 @@ def known(what: str) -> dict[str, Any]:
 def import_files(paths: str | None = None) -> None:
     """Import Python files, each once; their calls of `register_...` take effect.
 
-    Args:
-        paths: files, separated as in PATH; None: those of the environment variable `IMPORT`.
-
-    Raises:
-        ConfigError: a file that is not there.
+    They are separated as in PATH; None: those of the environment variable `IMPORT`.
     """
     given = os.environ.get(IMPORT, "") if paths is None else paths
     for path in (Path(each).resolve() for each in given.split(os.pathsep) if each):

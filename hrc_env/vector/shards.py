@@ -22,13 +22,7 @@ class Shards:
     """`batch` environments in `n_shards` simulations; the calling thread works on the first."""
 
     def __init__(self, batch: int, n_shards: int, make: Callable[[int], Simulation]) -> None:
-        """Make them.
-
-        Args:
-            batch: how many environments.
-            n_shards: in how many ranges.
-            make: gives a simulation of so many environments, always of the same kind.
-        """
+        """`make` gives a simulation of so many environments, always of the same kind."""
         self.bounds = [batch * k // n_shards for k in range(n_shards + 1)]
         self.parts = [make(high - low) for low, high in pairwise(self.bounds)]
         self._pool: ThreadPoolExecutor | None = None
@@ -68,11 +62,7 @@ class Shards:
         return [part.get_state() for part in self.parts]
 
     def set_state(self, state: list[State]) -> None:
-        """Continue from a state.
-
-        Raises:
-            ConfigError: it was taken with other settings or another number of parts.
-        """
+        """Continue from a state of as many parts with the same settings."""
         if len(state) != len(self.parts):
             raise ConfigError(
                 f"The state was taken with {len(state)} threads; here there are "
