@@ -7,7 +7,7 @@ the level `keypoints` (seeds that the network was not trained on), "own_failing"
 cameras fail, "walkers" and "walkers_hard" the tracking bench's, of whom nothing here was told.
 All start from the same estimate, of `kalman`: `hold` stays there, `constant_velocity` goes on,
 `damped` is one exact step of the filter's own model of the body, `forecast` is what
-`Estimator.ahead` gives.
+`Estimator.forecast` gives.
 """
 
 import time
@@ -28,8 +28,8 @@ from benchmarks.tracking.tracks import Tracks, follow_own, follow_walkers
 from hrc_env.core.batching import copied
 from hrc_env.core.records import PoseEstimate
 from hrc_env.core.results import Metric, write_results
-from hrc_env.tracking.ahead import ahead
 from hrc_env.tracking.config import ParticleConfig
+from hrc_env.tracking.forecast import forecast as forecast_all
 from hrc_env.tracking.hypotheses.filter import predict_all
 from hrc_env.tracking.hypotheses.slots import Hypotheses, plain
 from hrc_env.tracking.particle import ParticleEstimator
@@ -83,8 +83,8 @@ def damped(estimator: ParticleEstimator, state: Hypotheses, horizon_s: float) ->
 
 
 def forecast(estimator: ParticleEstimator, state: Hypotheses, horizon_s: float) -> Gaussian:
-    """What `Estimator.ahead` gives."""
-    later = estimator.ahead(state, horizon_s)
+    """What `Estimator.forecast` gives."""
+    later = estimator.forecast(state, horizon_s)
     return later.mean_world[:, 0], later.cov_world[:, 0]
 
 
@@ -187,14 +187,14 @@ def metrics_of(source: str, tracks: Tracks) -> dict[str, Metric]:
 
 
 def costs_us() -> dict[str, Metric]:
-    """Time of `ahead` per worker, alone and with 63 others: smallest and quartiles of many."""
+    """Time of `forecast` per worker, alone and with 63 others: smallest and quartiles of many."""
     metrics, now = {}, follow_own([7], 30).estimates[-1]
     for batch in (1, 64):
         whole = PoseEstimate(*(np.repeat(getattr(now, name), batch, 0) for name in FIELDS))
         times = []
         for _ in range(300):
             begin = time.perf_counter()
-            ahead(whole, 0.4, ParticleConfig())
+            forecast_all(whole, 0.4, ParticleConfig())
             times.append(1e6 * (time.perf_counter() - begin) / batch)
         least, low, high = (float(value) for value in np.percentile(times, (0, 25, 75)))
         metrics[f"ahead_us.{batch}"] = Metric(least, low, high, "us", len(times))
@@ -251,7 +251,7 @@ def main(arguments: Arguments) -> None:
     show(metrics, list(asked))
     draw(metrics, list(asked), arguments.out / "prediction.png")
     seeds = [*seeds_of(arguments.quick)[0], *seeds_of(arguments.quick)[1]]
-    config = {"horizons_s": HORIZONS_S, "quick": arguments.quick, "estimator": "kalman"}
+    config = {"forecast_s": HORIZONS_S, "quick": arguments.quick, "estimator": "kalman"}
     write_results(arguments.out / "results.json", config, seeds, metrics)
 
 

@@ -18,8 +18,7 @@ from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.core.mapping import PRESETS, from_mapping, plain, restored
 from hrc_env.core.results import write_whole
 from hrc_env.core.toml import read_toml, to_toml
-from hrc_env.geometry.camera_config import CameraConfig
-from hrc_env.geometry.rig_files import read_rig
+from hrc_env.geometry.camera_config import CameraConfig, read_rig
 from hrc_env.metrics import CostConfig
 from hrc_env.motion.generator import PEOPLE, MotionConfig, PeopleConfig
 from hrc_env.perception.detector import DetectorConfig
@@ -34,9 +33,9 @@ from hrc_env.scene.robot import DEFAULT as DEFAULT_ROBOT
 from hrc_env.scene.robot import Robot, robot_called
 from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import Task, task_called
-from hrc_env.tracking.ahead import LONGEST_S
 from hrc_env.tracking.config import ParticleConfig, TrackerConfig, of_kind
 from hrc_env.tracking.estimators import EstimatorChoice, EstimatorSpec, estimator_called
+from hrc_env.tracking.forecast import LONGEST_S
 from hrc_env.tracking.people.association import AssociationConfig
 from hrc_env.worker.body import pool
 

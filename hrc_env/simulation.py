@@ -43,7 +43,7 @@ from hrc_env.step import (
     worker_info,
 )
 from hrc_env.tasks.task import World
-from hrc_env.tracking import given
+from hrc_env.tracking import oracle
 from hrc_env.worker.body import pool, stack, worker_capsules, worker_truth
 
 CLOSING_M_S = 8.0
@@ -122,8 +122,8 @@ class Simulation(Stateful):
         self.action = np.zeros((batch, self.n_actions))
         self.episode_cost = np.zeros(batch)
         self.separation_m = np.zeros(batch)
-        self.estimate = given.prior(batch, most, config.tracker)
-        self.forecast = tuple(given.prior(batch, most, config.tracker) for _ in config.forecast_s)
+        self.estimate = oracle.prior(batch, most, config.tracker)
+        self.forecast = tuple(oracle.prior(batch, most, config.tracker) for _ in config.forecast_s)
         blank = [np.random.default_rng(0)] * batch
         self.streams = Streams(*(list(blank) for _ in range(5)))
 
@@ -277,7 +277,7 @@ class Simulation(Stateful):
             now, picked(streams.sensor, ids), picked(streams.tracker, ids)
         )
         forecast = tuple(
-            self.pipeline.ahead(estimate, ids, horizon_s) for horizon_s in self.config.forecast_s
+            self.pipeline.forecast(estimate, ids, horizon_s) for horizon_s in self.config.forecast_s
         )
         if ids is self._everyone:
             self.estimate, self.forecast = estimate, forecast

@@ -21,7 +21,7 @@ TRUTH_READERS = {
     "hrc_env/pipeline/sensor_input.py": "hands it to the emulator and to the level `truth`",
     "hrc_env/metrics.py": "counts cost and errors",
     "hrc_env/perception/emulator.py": "projects it into emulated cameras",
-    "hrc_env/tracking/given.py": "copies it into the belief: the one place",
+    "hrc_env/tracking/oracle.py": "copies it into the belief: the one place",
 }
 
 
@@ -73,7 +73,7 @@ def test_only_these_files_know_the_truth():
     """Whoever is not in the list, with a reason, does not even name the record of truth."""
     knowing = {relative(path) for path in SOURCES if "WorkerTruth" in identifiers(path)}
     assert knowing == set(TRUTH_READERS) & knowing
-    assert knowing >= {"hrc_env/metrics.py", "hrc_env/tracking/given.py"}
+    assert knowing >= {"hrc_env/metrics.py", "hrc_env/tracking/oracle.py"}
 
 
 @pytest.mark.parametrize("name", ["belief", "observations", "rewards", "control", "tasks/reach"])

@@ -19,7 +19,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Roi
 from hrc_env.env import HRCEnv
 from hrc_env.geometry import chains
-from hrc_env.geometry.rig_files import write_rig
+from hrc_env.geometry.camera_config import write_rig
 from hrc_env.perception.detector import own_joints
 from hrc_env.registration import import_files
 from hrc_env.scene.build import build

@@ -1,5 +1,6 @@
 """README and docs stay true: generated parts are up to date, code runs, links lead somewhere."""
 
+import pydoc
 import re
 from pathlib import Path
 
@@ -115,3 +116,30 @@ def test_commands_of_the_readme_exist():
         r"^make ([\w-]+)", text, re.M
     ):
         assert re.search(rf"^{goal}:", makefile, re.M), goal
+
+
+ROOMS = ("", "hrc_env", "hrc_env/tracking")
+"""Where the paths that pages name begin."""
+
+
+@pytest.mark.parametrize("page", WRITTEN, ids=name_of)
+def test_files_that_a_page_names_exist(page):
+    named = re.findall(r"`((?:\w+/)*\w+\.py|(?:hrc_env|assets|tests|benchmarks|examples)/[\w/.]*)`",
+                       by_hand(page))  # fmt: skip
+    assert [
+        path for path in named if not any((ROOT / room / path).exists() for room in ROOMS)
+    ] == []
+
+
+@pytest.mark.parametrize("page", WRITTEN, ids=name_of)
+def test_names_of_modules_and_what_is_in_them_exist(page):
+    for name in re.findall(r"`(hrc_env(?:\.\w+)+)`", by_hand(page)):
+        assert pydoc.locate(name) is not None, name
+
+
+@pytest.mark.parametrize("page", generate.PAGES, ids=name_of)
+def test_options_that_a_page_names_exist(page):
+    known = (ROOT / "docs" / "reference" / "command_line.md").read_text()
+    for line in re.findall(r"python -m hrc_env [^`#\n]*", by_hand(page)):
+        for option in re.findall(r" (--[a-z-]+)", line):
+            assert f"`{option}`" in known or option == "--import", line

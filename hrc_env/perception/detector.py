@@ -1,8 +1,7 @@
 """Pixels to keypoints: crops of every camera through BlazePose, two at a time.
 
-The calling thread draws a crop and goes on to the next while a helper thread runs the
-network on it; then both empty the queue. Each thread has its own interpreters with the same
-numbers, so that what is seen does not depend on who came first.
+The calling thread draws crops while a helper thread runs the network on them; then both empty the
+queue. Each has its own interpreters: what is seen does not depend on who came first.
 """
 
 import functools
@@ -22,7 +21,6 @@ from hrc_env.core.stateful import Stateful
 from hrc_env.core.typing import Floats, Image, Points2
 from hrc_env.geometry.cameras import PinholeCamera, inside_image
 from hrc_env.perception import blazepose
-from hrc_env.perception.acquisition import Candidates, agreed_windows, apart_from
 from hrc_env.perception.network import (
     LANDMARK_SIDE,
     NETWORKS,
@@ -34,15 +32,21 @@ from hrc_env.perception.network import (
     load_person_detector,
 )
 from hrc_env.perception.noise import STANDING, sigma_px
-from hrc_env.perception.searching import ImageSource, distinct, people, search_jobs
+from hrc_env.perception.searching import (
+    Candidates,
+    ImageSource,
+    agreed_windows,
+    apart_from,
+    distinct,
+    people,
+    search_jobs,
+)
 from hrc_env.perception.weights import find_weights
 
 STATURE_OF_SIDE = 0.75
 """Stature of an upright worker as a share of the side of BlazePose's window round them."""
 
 ResultT = TypeVar("ResultT")
-
-
 KeypointFunction = Callable[[Image], Floats | None]
 """A crop (256, 256, 3) RGB uint8 -> (J, 3): x and y in pixels of the crop, continuous from its
 top-left corner, and confidence in [0, 1], joints as in `core.skeleton.JOINTS`; NaN with confidence
@@ -70,8 +74,7 @@ class DetectorConfig:
     search_step: float = 0.5
     """Search windows follow each other by at most this share of their side."""
     search_every: int = 5
-    """A camera whose whole image was searched for nobody is searched again so many steps later: a
-    search costs as much as several steps, most of all with bad images."""
+    """A camera whose whole image was searched for nobody is searched again so many steps later."""
     runtime: str = "litert"
     """What the networks run on: "litert", "openvino" (an extra, faster) or "auto"
     (docs/perception_and_estimators.md)."""
@@ -123,11 +126,10 @@ class _Networks:
     """One thread's interpreters."""
 
     detect: PersonDetector
-    landmark: Landmarker
-    folded: Landmarker
-    """For workers who are folded up."""
+    landmark: tuple[Landmarker, Landmarker]
+    """For upright workers, for folded ones."""
     own: KeypointFunction | None
-    """What finds joints instead of `landmark` and `folded`."""
+    """What finds joints instead of these."""
 
 
 class PoseDetector(Stateful):
@@ -141,11 +143,7 @@ class PoseDetector(Stateful):
     def __init__(
         self, cameras: Sequence[PinholeCamera], config: DetectorConfig | None = None
     ) -> None:
-        """Args are the rig and settings.
-
-        Raises:
-            WeightsError: without the weights. ConfigError: without the runtime.
-        """
+        """Raises `WeightsError` without the weights, `ConfigError` without the runtime."""
         self.cameras = tuple(cameras)
         self.config = config or DetectorConfig()
         find_weights("pose_detection")
@@ -171,13 +169,11 @@ class PoseDetector(Stateful):
         Args:
             source: gives crops of the cameras' present images.
             windows: (C,) where to look; None where this camera need not.
-            track: who is followed; any number that stays the worker's own. The
-                detector stage's turns are counted for each.
+            track: who is followed: a number of the worker's own.
             others: windows (C,) of other workers; a search does not find these again.
             found: what `search` found in these very images, if it was asked already.
-            folded: whether the worker is expected to be folded up (`posture.is_folded`).
-            posture: how far they are expected to count as each of `calibration.POSTURES`
-                (`outline.posture_of`): folded bodies are seen less exactly.
+            folded: whether the worker is expected to be folded up (`outline.is_folded`).
+            posture: how far they are expected to count as each posture (`outline.posture_of`).
         """
         check_shape("windows", (len(windows),), (len(self.cameras),), "one a camera")
         looks = self._looks.setdefault(track, [0] * len(self.cameras))
@@ -187,7 +183,9 @@ class PoseDetector(Stateful):
             windows = agreed_windows(apart_from(known, others), self.cameras)
         used = [c for c, window in enumerate(windows) if window is not None]
         asked = [not searched and self._is_turn(looks[c], c) for c in used]
-        sight = self._nothing(list(windows))
+        shape = (len(self.cameras), N_JOINTS)
+        nothing = np.full((*shape, 2), np.nan), np.zeros(shape), np.full(shape, np.inf)
+        sight = Detection(*nothing, list(windows), [None] * len(windows))
         joints_of = self._share(self._landmark_jobs(source, sight, used, asked, folded))
         for c, joints in zip(used, joints_of, strict=True):
             if joints is None:
@@ -200,12 +198,8 @@ class PoseDetector(Stateful):
         return sight
 
     def search(self, source: ImageSource, which: Sequence[int] | None = None) -> list[list[Roi]]:
-        """Regions of interest of the people in each camera's whole image, best first.
-
-        Args:
-            source: gives crops of the cameras' present images.
-            which: the cameras whose images are searched; None: all.
-        """
+        """Regions of interest of the people in whole images of cameras `which` (None: all), best
+        first; empty for the others."""
         which = range(len(self.cameras)) if which is None else which
         jobs = search_jobs(source, self.cameras, which, self.config.search_step)
         found = self._share(lambda nets, job=job: job(nets.detect) for job in jobs)
@@ -242,15 +236,7 @@ class PoseDetector(Stateful):
             window = sight.windows[c]
             if window is not None:
                 crop = sight.crops[c] = _seen(source.crop(c, window), window, self.cameras[c])
-                yield (
-                    lambda nets, k=crop, w=window, a=ask: (
-                        _joints(
-                            nets, nets.folded if folded else nets.landmark, k, w, a, self.config
-                        )
-                        if nets.own is None
-                        else own_joints(nets.own, k, w)
-                    )
-                )
+                yield functools.partial(_joints, crop, window, ask, folded, self.config)
 
     def _share(self, jobs: Iterable[Callable[[_Networks], ResultT]]) -> list[ResultT]:
         """Results in order; the helper works from the front, this thread from the back."""
@@ -277,13 +263,6 @@ class PoseDetector(Stateful):
             self._helper = ThreadPoolExecutor(1, thread_name_prefix="hrc_env-detector")
         return self._helper, self._networks
 
-    def _nothing(self, windows: list[Roi | None]) -> Detection:
-        shape = (len(self.cameras), N_JOINTS)
-        return Detection(
-            np.full((*shape, 2), np.nan), np.zeros(shape), np.full(shape, np.inf), windows,
-            [None] * len(windows),
-        )  # fmt: skip
-
     def _write(self, sight: Detection, c: int, joints: Floats, posture: Sequence[float]) -> None:
         window = sight.windows[c]
         outside = ~inside_image(self.cameras[c], joints[:, :2])
@@ -301,7 +280,7 @@ def _networks(config: DetectorConfig) -> _Networks:
     folded = landmark if same else load_landmarker(config.folded, runtime)
     make = DETECTORS[config.keypoints]
     own = None if make is None else make()
-    return _Networks(load_person_detector(runtime), landmark, folded, own)
+    return _Networks(load_person_detector(runtime), (landmark, folded), own)
 
 
 def own_joints(find: KeypointFunction, crop: Image, window: Roi) -> Floats | None:
@@ -324,18 +303,15 @@ def own_joints(find: KeypointFunction, crop: Image, window: Roi) -> Floats | Non
 
 
 def _joints(
-    nets: _Networks,
-    landmark: Landmarker,
-    crop: Image,
-    window: Roi,
-    ask_detector: bool,
-    config: DetectorConfig,
+    crop: Image, window: Roi, ask: bool, folded: bool, config: DetectorConfig, nets: _Networks
 ) -> Floats | None:
-    """(J, 3) pixels and visibility of the 15 joints, or None where there is no worker."""
-    points, presence, heat = landmark(blazepose.landmark_input(crop))
+    """(J, 3) pixels and visibility, or None where there is no worker; `ask` the detector stage?"""
+    if nets.own is not None:
+        return own_joints(nets.own, crop, window)
+    points, presence, heat = nets.landmark[folded](blazepose.landmark_input(crop))
     if presence < config.min_presence:
         return None
-    if ask_detector or presence < config.sure_presence:
+    if ask or presence < config.sure_presence:
         offsets = [np.hypot(*(person.hip - 0.5)) for person in people(nets.detect, crop)]
         if min(offsets, default=np.inf) > config.max_offset:
             return None

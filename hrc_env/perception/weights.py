@@ -8,17 +8,18 @@ when asked for, out of Google's package on npm. See docs/third_party_perception.
 import functools
 import hashlib
 import os
+import shutil
+import subprocess
 import sys
 import tarfile
 import tempfile
+import urllib.request
 import zipfile
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 from hrc_env.core.errors import DownloadError, WeightsError, unknown
-from hrc_env.perception.tarballs import download_tarball
-from hrc_env.perception.wheels import download_wheel
 
 WHEEL = "mediapipe==0.10.21"
 """The last release of mediapipe that carries both files."""
@@ -26,16 +27,16 @@ TARBALL = "https://registry.npmjs.org/@mediapipe/pose/-/pose-0.5.1675469404.tgz"
 """The package `@mediapipe/pose`, which carries all landmark networks."""
 SIZE_MB = {WHEEL: 36, TARBALL: 41}
 """What a download takes."""
-
+PATIENCE_S = 60.0
+"""How long the server of npm may be silent."""
 SETUP = "python -m hrc_env setup"
 
 
 @dataclass(frozen=True, slots=True)
 class WeightsFile:
-    """One official file: where it lies and what it must be."""
+    """One official file: in which archive it lies and what it must be."""
 
     archive: str
-    """`WHEEL` or `TARBALL`."""
     member: str
     size_bytes: int
     sha256: str
@@ -81,14 +82,13 @@ def cache_dir() -> Path:
     """The folder that keeps the weights: $HRC_ENV_CACHE, or `hrc_env` in the user's caches."""
     if chosen := os.environ.get("HRC_ENV_CACHE"):
         return Path(chosen).expanduser()
-    if chosen := os.environ.get("XDG_CACHE_HOME"):
-        return Path(chosen).expanduser() / "hrc_env"
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches" / "hrc_env"
+    home = Path.home()
+    usual = {"darwin": home / "Library/Caches", "win32": home / "AppData/Local"}
+    chosen = os.environ.get("XDG_CACHE_HOME")
     if sys.platform == "win32":
-        local = os.environ.get("LOCALAPPDATA")
-        return (Path(local) if local else Path.home() / "AppData" / "Local") / "hrc_env"
-    return Path.home() / ".cache" / "hrc_env"
+        chosen = chosen or os.environ.get("LOCALAPPDATA")
+    folder = Path(chosen).expanduser() if chosen else usual.get(sys.platform, home / ".cache")
+    return folder / "hrc_env"
 
 
 def find_weights(name: str) -> Path:
@@ -106,8 +106,7 @@ def find_weights(name: str) -> Path:
             f"The pose network's weights {path.name!r} are not in {path.parent}. "
             f"Fetch them once with: {setup_for([name])}"
         )
-    stat = path.stat()
-    _verified(name, path, stat.st_mtime_ns, stat.st_size)
+    _verified(name, path, path.stat().st_mtime_ns, path.stat().st_size)
     return path
 
 
@@ -160,11 +159,53 @@ def _check(name: str, content: bytes, where: str) -> None:
 
 
 def _download(archive: str, folder: Path, again: str) -> Path:
-    download = download_wheel if archive == WHEEL else download_tarball
+    download = download_wheel if archive == WHEEL else _download_tarball
     try:
         return download(archive, folder, again)
     except DownloadError as error:
         raise WeightsError(str(error)) from error
+
+
+def download_wheel(requirement: str, folder: Path, again: str) -> Path:
+    """A wheel, downloaded by pip as it is configured, for a platform that any Python can unzip.
+
+    Args:
+        requirement: name and version, `name==1.2.3`.
+        folder: where it is put.
+        again: the command with which one tries once more.
+
+    Raises:
+        DownloadError: no network or no pip.
+    """
+    command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps"]
+    command += ["--disable-pip-version-check", "--only-binary=:all:", "--python-version", "3.11"]
+    command += ["--platform", "manylinux_2_28_x86_64", "--dest", str(folder), requirement]
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    wheels = sorted(folder.glob("*.whl"))
+    if result.returncode == 0 and wheels:
+        return wheels[0]
+    if "No module named pip" in result.stderr:
+        raise DownloadError(
+            f"pip is needed to download {requirement}, and {sys.executable} has none. "
+            f"Add it with: python -m ensurepip, then run: {again}"
+        )
+    said = (result.stderr.strip().splitlines() or ["nothing"])[-1]
+    raise DownloadError(
+        f"Could not download {requirement} (is there a network?). pip said: {said} "
+        f"Try again with: {again}"
+    )
+
+
+def _download_tarball(url: str, folder: Path, again: str) -> Path:
+    place = folder / url.rsplit("/", 1)[-1]
+    try:
+        with urllib.request.urlopen(url, timeout=PATIENCE_S) as answer, place.open("wb") as file:
+            shutil.copyfileobj(answer, file)
+    except OSError as error:
+        raise DownloadError(
+            f"Could not download {url} (is there a network?): {error}. Try again with: {again}"
+        ) from error
+    return place
 
 
 def _unpack(place: Path, name: str) -> None:

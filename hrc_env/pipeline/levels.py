@@ -28,10 +28,10 @@ from hrc_env.pipeline.sensor_input import Generators, SensorInput, with_truth
 from hrc_env.pipeline.tracking import PerceptionPipeline
 from hrc_env.scene.build import Scene
 from hrc_env.scene.domain_randomization import AS_BUILT
-from hrc_env.tracking import given
-from hrc_env.tracking.ahead import ahead
+from hrc_env.tracking import oracle
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import EstimatorChoice, make_estimator
+from hrc_env.tracking.forecast import forecast
 
 LEVELS = ("pixels", "keypoints", "truth", "none")
 CAMERA_LEVELS = LEVELS[:2]
@@ -60,9 +60,9 @@ def make_pipeline(
     settings = replace(config.tracker, longest_delay_s=memory_s)
     tracker = make_estimator(estimator, projections(scene.cameras), config.ctrl_dt, settings)
     if level == "truth":
-        return Oracle(config.tracker, given.prior(batch, scene.n_workers, config.tracker))
+        return Oracle(config.tracker, oracle.prior(batch, scene.n_workers, config.tracker))
     if level == "none":
-        return NoPerception(given.prior(batch, scene.n_workers, config.tracker))
+        return NoPerception(oracle.prior(batch, scene.n_workers, config.tracker))
     if level == "keypoints":
         return EmulatorPipeline(scene, batch, tracker, config, schedule)
     return PixelPipeline(scene, batch, tracker, config, schedule)
@@ -103,14 +103,14 @@ class Oracle(PerceptionPipeline):
     ) -> PoseEstimate:
         """The truth, as an estimate; of who is not there, the prior."""
         known = with_truth(now)
-        seen = given.estimate_from_truth(known.truth)
+        seen = oracle.estimate_from_truth(known.truth)
         if known.present.all():
             return seen
         return _chosen(known.present, seen, rows(self.prior, now.ids))
 
-    def ahead(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
+    def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
         """Where a body that moves so goes: nobody is given the future."""
-        return ahead(now, horizon_s, self.config)
+        return forecast(now, horizon_s, self.config)
 
 
 class NoPerception(PerceptionPipeline):
@@ -125,7 +125,7 @@ class NoPerception(PerceptionPipeline):
         """The prior."""
         return rows(self.prior, now.ids)
 
-    def ahead(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
+    def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
         """The prior, then as now."""
         return rows(self.prior, ids)
 

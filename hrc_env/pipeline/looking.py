@@ -1,19 +1,17 @@
-"""Where to look for every worker, and looking there: windows, searches, people who were missed."""
+"""Detects every worker of a scene: windows where they are expected, searches, people missed."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
-from hrc_env.core.records import PoseEstimate, Roi
+from hrc_env.core.records import Keypoints, PoseEstimate, Roi
 from hrc_env.core.stateful import Stateful
 from hrc_env.core.typing import Image
 from hrc_env.geometry.cameras import PinholeCamera, project, projections
 from hrc_env.perception.detector import Detection, DetectorConfig, PoseDetector
 from hrc_env.perception.noise import STANDING
-from hrc_env.perception.outline import posture_of
-from hrc_env.perception.posture import is_folded
+from hrc_env.perception.outline import is_folded, posture_of
 from hrc_env.perception.searching import ImageSource
 from hrc_env.perception.windows import steady_window, window_from_joints
-from hrc_env.pipeline.reacquisition import Reacquisition
-from hrc_env.pipeline.search_schedule import SearchSchedule
+from hrc_env.pipeline.reacquisition import Reacquisition, SearchSchedule
 from hrc_env.pipeline.sensor_input import Windows
 
 
@@ -51,7 +49,8 @@ class Looking(Stateful):
         row: int,
         b: int,
         has_image: Sequence[bool],
-    ) -> Iterator[tuple[int, Detection]]:
+        out: Keypoints,
+    ) -> None:
         """Look for every worker of environment b; a search finds nobody who has been looked at.
 
         Those with a window come first, and one search serves all the others. Who is in view of
@@ -63,6 +62,7 @@ class Looking(Stateful):
             row: environment b's row there.
             b: which environment.
             has_image: (C,) whether each camera has an image now.
+            out: whose row is filled.
         """
         wanted = [self._windows(expected, row, w) for w in range(self.n_workers)]
         taken: Windows = []
@@ -87,7 +87,8 @@ class Looking(Stateful):
             self.reacquisition.saw(b, worker, seen.confidence.max(-1) > 0.0)
             missed |= not any(windows) and not seen.confidence.any()
             self._keep(b, worker, seen, has_image)
-            yield worker, seen
+            out.px[row, :, worker], out.sigma_px[row, :, worker] = seen.px, seen.sigma_px
+            out.confidence[row, :, worker] = seen.confidence
         if missed:
             self.schedule.rest(b)
 
@@ -104,10 +105,6 @@ class Looking(Stateful):
         windows, crops = self.seen.get(b, ([], []))
         current = self.windows[b][0] if self.windows[b] else []
         return crops if windows == current else [None] * len(current)
-
-    def close(self) -> None:
-        """Stop the detector's thread."""
-        self.detector.close()
 
     def _keep(self, b: int, worker: int, seen: Detection, has_image: Sequence[bool]) -> None:
         for c, has in enumerate(has_image):
@@ -142,10 +139,7 @@ class Looking(Stateful):
         if not predicted.tracked[row, worker]:
             return [None] * len(self.cameras)
         px, depth_m = project(self.P, predicted.mean_world[row : row + 1, worker])
-        return [
-            window_from_joints(px[0, c], depth_m[0, c], camera)
-            for c, camera in enumerate(self.cameras)
-        ]
+        return list(map(window_from_joints, px[0], depth_m[0], self.cameras))
 
 
 def _expected_posture(

@@ -10,7 +10,7 @@ from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import EstimatorSpec, make_estimator
 
-METHODS = ("init", "reset", "predict", "update", "estimate", "ahead")
+METHODS = ("init", "reset", "predict", "update", "estimate", "forecast")
 _DT_S = 0.04
 _P = np.array([[[900.0, 640, 0, 0], [0, 360, -900, 0], [0, 1, 0, 3]],
                [[640.0, -900, 0, 0], [360, 0, -900, 0], [1, 0, 0, 3]]])  # fmt: skip
@@ -42,7 +42,7 @@ def check_estimator(spec: EstimatorSpec) -> None:
     made.predict(state, _DT_S, rngs)
     made.update(state, nothing, rngs)
     _check_estimate(spec.name, "estimate", made.estimate(state), shape)
-    _check_estimate(spec.name, "ahead", made.ahead(state, 0.2), shape)
+    _check_estimate(spec.name, "forecast", made.forecast(state, 0.2), shape)
 
 
 def _check_estimate(name: str, what: str, estimate: Any, shape: tuple[int, int, int]) -> None:

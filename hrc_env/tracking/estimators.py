@@ -29,7 +29,7 @@ from hrc_env.tracking.config import (
     TriangulationConfig,
     of_kind,
 )
-from hrc_env.tracking.late import LateEstimator
+from hrc_env.tracking.out_of_sequence import OutOfSequence
 from hrc_env.tracking.paper import PaperEstimator
 from hrc_env.tracking.particle import ParticleEstimator
 from hrc_env.tracking.triangulating import ransac, triangulation
@@ -71,7 +71,7 @@ class Estimator(Protocol[State]):
         """What is believed now, in arrays of its own."""
         ...
 
-    def ahead(self, state: State, horizon_s: float) -> PoseEstimate:
+    def forecast(self, state: State, horizon_s: float) -> PoseEstimate:
         """What is expected in `horizon_s`, in (0, 1] [s], if nobody looks; the state stays.
 
         Raises:
@@ -90,7 +90,7 @@ class EstimatorSpec:
     config: type[TrackerConfig] = TrackerConfig
     """The kind of its settings."""
     needs_pairs: bool = False
-    """Whether it makes nothing of a camera alone; see `late.LateEstimator`."""
+    """Whether it makes nothing of a camera alone; see `out_of_sequence.OutOfSequence`."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A spec that is known by its name is pickled as that."""
@@ -154,8 +154,8 @@ def make_estimator(
         P: (C, 3, 4) projections of the cameras.
         ctrl_dt: the usual time between two updates [s].
         config: settings; of another estimator's, those that all share count. The defaults if
-            None. With `longest_delay_s` the estimator is wrapped in a `late.LateEstimator`, which
-            uses late frames at their own time.
+            None. With `longest_delay_s` an `out_of_sequence.OutOfSequence` uses late frames at
+            their own time.
 
     Raises:
         ConfigError: an estimator that there is not, a rig of another shape, or no positive time.
@@ -169,5 +169,5 @@ def make_estimator(
     settings = of_kind(config, spec.config)
     made = spec.make(P, ctrl_dt, settings)
     if settings.longest_delay_s > 0:
-        return LateEstimator(made, len(P), ctrl_dt, settings.longest_delay_s, spec.needs_pairs)
+        return OutOfSequence(made, len(P), ctrl_dt, settings.longest_delay_s, spec.needs_pairs)
     return made

@@ -22,11 +22,11 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Bools, Floats, Ints
-from hrc_env.tracking.ahead import ahead
 from hrc_env.tracking.clouds.likelihoods import add_log_likelihood, normalise
 from hrc_env.tracking.clouds.moments import moments, roll, scatter
 from hrc_env.tracking.clouds.resampling import multinomial, systematic
 from hrc_env.tracking.config import PaperConfig
+from hrc_env.tracking.forecast import forecast
 from hrc_env.tracking.measurements import arrays_of, read_worker, supports
 from hrc_env.tracking.models.acquisition import (
     STANDING_M,
@@ -107,9 +107,9 @@ class PaperEstimator:
         """Line 19: what is believed now."""
         return report(state.tracks, self.config)
 
-    def ahead(self, state: PaperState, horizon_s: float) -> PoseEstimate:
-        """What is expected in `horizon_s`; see `tracking.ahead`."""
-        return ahead(self.estimate(state), horizon_s, self.config)
+    def forecast(self, state: PaperState, horizon_s: float) -> PoseEstimate:
+        """What is expected in `horizon_s`; see `tracking.forecast`."""
+        return forecast(self.estimate(state), horizon_s, self.config)
 
     def _initialize(
         self, state: PaperState, b: int, w: int, measured: Measured, rng: np.random.Generator

@@ -17,8 +17,8 @@ import numpy as np
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats, Ints
-from hrc_env.tracking.ahead import ahead, mixed
 from hrc_env.tracking.config import ParticleConfig
+from hrc_env.tracking.forecast import forecast, mixed
 from hrc_env.tracking.hypotheses.filter import predict_all, update_all
 from hrc_env.tracking.hypotheses.mixture import estimate_all, mixture_settings
 from hrc_env.tracking.hypotheses.slots import Hypotheses, plain
@@ -52,7 +52,7 @@ class ParticleEstimator:
         return Hypotheses(
             slots=make_trees(batch, n_slots, len(self.P), self.config),
             log_weight=np.zeros((batch, n_slots)),
-            form=np.zeros((batch, n_slots)),
+            pose_log_prior=np.zeros((batch, n_slots)),
             n_alive=np.ones((batch, n_workers), np.int64),
             waited_s=np.zeros((batch, n_workers)),
         )
@@ -61,7 +61,7 @@ class ParticleEstimator:
         """Forget environments `ids`; draws nothing."""
         del rngs
         forget_trees(state.slots, ids, self.config)
-        state.log_weight[ids], state.form[ids] = 0.0, 0.0
+        state.log_weight[ids], state.pose_log_prior[ids] = 0.0, 0.0
         state.n_alive[ids], state.waited_s[ids] = 1, 0.0
 
     def predict(self, state: Hypotheses, dt_s: float, rngs: list[np.random.Generator]) -> None:
@@ -82,11 +82,11 @@ class ParticleEstimator:
 
     def estimate(self, state: Hypotheses) -> PoseEstimate:
         """Mean and covariance of the mixture; ages are the heaviest hypothesis's."""
-        told = blank(state.n_alive.shape)
-        estimate_all(plain(state), self.constants[0], told)
-        return PoseEstimate(*told)
+        out = blank(state.n_alive.shape)
+        estimate_all(plain(state), self.constants[0], out)
+        return PoseEstimate(*out)
 
-    def ahead(self, state: Hypotheses, horizon_s: float) -> PoseEstimate:
-        """What is expected in `horizon_s`, hypothesis by hypothesis; see `tracking.ahead`."""
+    def forecast(self, state: Hypotheses, horizon_s: float) -> PoseEstimate:
+        """What is expected in `horizon_s`, hypothesis by hypothesis; see `tracking.forecast`."""
         each = report(gaussian_tracks(state.slots), self.config)
-        return mixed(ahead(each, horizon_s, self.config), state.log_weight, state.n_alive)
+        return mixed(forecast(each, horizon_s, self.config), state.log_weight, state.n_alive)

@@ -11,7 +11,7 @@ from hrc_env.core.records import PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Bools, Covariances3, Floats, Ints, Points3, Velocities3
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.given import prior
+from hrc_env.tracking.oracle import prior
 from hrc_env.tracking.settings import settings_of
 
 _ROUNDING = 1e-6

@@ -10,7 +10,7 @@ WARM_UP, FRAMES_AHEAD = 25, 10
 
 
 def predicted(estimator, state):
-    return estimator.ahead(state, FRAMES_AHEAD * DT_S)
+    return estimator.forecast(state, FRAMES_AHEAD * DT_S)
 
 
 def misses(tracks):

@@ -306,8 +306,8 @@ def test_a_reset_touches_only_its_own_environments():
     state, rngs = start(3, CONFIG)
     before = copy.deepcopy(state)
     reset(state, np.array([1]), rngs)
-    np.testing.assert_array_equal(state.slow[[0, 2]], before.slow[[0, 2]])
-    assert not np.array_equal(state.slow[1], before.slow[1])
+    np.testing.assert_array_equal(state.errors["slow"][[0, 2]], before.errors["slow"][[0, 2]])
+    assert not np.array_equal(state.errors["slow"][1], before.errors["slow"][1])
 
 
 def test_a_room_without_workers_has_no_keypoints():

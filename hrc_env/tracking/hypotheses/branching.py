@@ -1,7 +1,7 @@
 """New hypotheses, where one view carries the body or a limb.
 
-A whole body may be turned the other way (`twins`). For a limb the search for the posterior's
-mode is begun again with the limb reflected in depth (`mirrors`), under the same prediction and
+A whole body may be turned the other way (`yaw_flip`). For a limb the search for the posterior's
+mode is begun again with the limb reflected in depth (`depth_flip`), under the same prediction and
 frames: a mode several posterior deviations from the known ones, with evidence that is not
 negligible, becomes a hypothesis.
 """
@@ -10,7 +10,7 @@ import numpy as np
 
 from hrc_env.core.kernels import kernel
 from hrc_env.tracking.hypotheses.anatomy import anatomy
-from hrc_env.tracking.hypotheses.mirrors import (
+from hrc_env.tracking.hypotheses.depth_flip import (
     N_MIRRORS,
     WHOLE_BODY,
     lone_camera,
@@ -18,11 +18,11 @@ from hrc_env.tracking.hypotheses.mirrors import (
     reflect,
 )
 from hrc_env.tracking.hypotheses.slots import copy_slot, slot_distance
-from hrc_env.tracking.hypotheses.twins import heads_like, turn_body, turn_of
-from hrc_env.tracking.models.proposal import contrast_of
+from hrc_env.tracking.hypotheses.yaw_flip import heads_like, turn_body, turn_of
+from hrc_env.tracking.models.proposal import inlier_odds_of
 from hrc_env.tracking.tree.bone_lengths import stiff_lengths
 from hrc_env.tracking.tree.evidence import log_evidence
-from hrc_env.tracking.tree.filter import condition, settle
+from hrc_env.tracking.tree.filter import condition, correct_mean
 from hrc_env.tracking.tree.search import find_pose_near
 from hrc_env.tracking.tree.update import update_tree
 
@@ -83,11 +83,11 @@ def branch(state, b, w, prior, evidence, seen, s, m, scratch):
             where = (part, camera, prior, evidence)
             penalty = _reflect(state.slots, b, own, n, where, seen, s, m, scratch)
         if penalty < np.inf:
-            form = m.anatomy * anatomy(state.slots.body[b, new])
+            pose_log_prior = m.anatomy * anatomy(state.slots.body[b, new])
             state.log_weight[b, new] = (
-                state.log_weight[b, own] + form - state.form[b, own] - penalty
+                state.log_weight[b, own] + pose_log_prior - state.pose_log_prior[b, own] - penalty
             )
-            state.form[b, new], state.n_alive[b, w] = form, n + 1
+            state.pose_log_prior[b, new], state.n_alive[b, w] = pose_log_prior, n + 1
 
 
 @kernel(makes_arrays=True)
@@ -107,7 +107,7 @@ def _turn(slots, b, own, n, camera, prior, seen, s, m, scratch):
     if _turned_alike(slots, b, own, n):
         return np.inf
     condition(slots, b, new, seen, s, scratch)
-    settle(slots, b, new, seen, s, scratch)
+    correct_mean(slots, b, new, seen, s, scratch)
     return np.inf if _turned_alike(slots, b, own, n) else penalty
 
 
@@ -133,10 +133,10 @@ def _reflect(slots, b, own, n, where, seen, s, m, scratch):
     body, cov, slope = slots.body[b, new], slots.cov[b, new], slots.slope[b, new]
     if not reflect(part, seen[0][camera], body, work.point):
         return np.inf
-    contrast = contrast_of(s.outlier_weight, s.image_area_px)
+    inlier_odds = inlier_odds_of(s.outlier_weight, s.image_area_px)
     stiff_lengths(slots.bone_variance[b, new], s.bone_give, give)
     bones = (slots.bone_length[b, new], give)
-    how = (contrast, s.floor_std_m, m.search_steps, 0.0)
+    how = (inlier_odds, s.floor_std_m, m.search_steps, 0.0)
     find_pose_near(prior[0], prior[1], prior[2], seen, bones, *how, belief, work)
     moved = 0.0
     for j in range(len(body)):
@@ -146,10 +146,10 @@ def _reflect(slots, b, own, n, where, seen, s, m, scratch):
         return np.inf
     body[:], cov[:], slope[:] = prior[0], prior[1], prior[2]
     update_tree(body, cov, slope, work)
-    found = log_evidence(prior, (body, cov, slope), seen, bones, contrast, s.floor_std_m, work)
+    found = log_evidence(prior, (body, cov, slope), seen, bones, inlier_odds, s.floor_std_m, work)
     if not found - evidence > m.log_least:
         return np.inf
-    settle(slots, b, new, seen, s, scratch)
+    correct_mean(slots, b, new, seen, s, scratch)
     for k in range(own, own + n):
         if not slot_distance(slots, b, k, new, work) > m.distinct:
             return np.inf

@@ -14,13 +14,13 @@ from hrc_env.tracking.hypotheses.slots import drop, hypotheses, merge, normalise
 from hrc_env.tracking.measurements import read_worker
 from hrc_env.tracking.models.acquisition import heading
 from hrc_env.tracking.models.noise import NoiseModel, learn_noise, scale_sigma
-from hrc_env.tracking.models.proposal import contrast_of
+from hrc_env.tracking.models.proposal import inlier_odds_of
 from hrc_env.tracking.models.swaps import undo_swaps
-from hrc_env.tracking.models.upkeep import acquire, grow_older
+from hrc_env.tracking.models.track_management import acquire, grow_older
 from hrc_env.tracking.settings import Settings
 from hrc_env.tracking.tracks import count_up
 from hrc_env.tracking.tree.evidence import log_evidence
-from hrc_env.tracking.tree.filter import condition, follow, keep_positions, look_after, settle
+from hrc_env.tracking.tree.filter import condition, correct_mean, follow, keep_positions, recover
 from hrc_env.tracking.tree.predict import predict_tree
 from hrc_env.tracking.tree.work import make_work
 
@@ -73,7 +73,11 @@ def _grow_older(state, b, w, dt, s):
     first = w * (slots.tracked.shape[1] // state.n_alive.shape[1])
     grow_older(slots, b, first, dt, s)
     if not slots.tracked[b, first]:
-        state.n_alive[b, w], state.log_weight[b, first], state.form[b, first] = 1, 0.0, 0.0
+        state.n_alive[b, w], state.log_weight[b, first], state.pose_log_prior[b, first] = (
+            1,
+            0.0,
+            0.0,
+        )
     for k in range(first + 1, first + state.n_alive[b, w]):
         count_up(slots.age_s[b, k], dt, s.max_age_s)
 
@@ -156,16 +160,16 @@ def _follow(state, b, w, h, several, look, seen, standing, s, m, noise, kept):
     if look:
         state.waited_s[b, w] = 0.0
         branch(state, b, w, prior, evidence, seen, s, m, scratch)
-    look_after(slots, b, k, seen, standing, s, placed, scratch[2].a)
+    recover(slots, b, k, seen, standing, s, placed, scratch[2].a)
 
 
 @kernel
 def _weight_form(state, b, k, several, gain, m):
     """Weigh a hypothesis by its evidence, and by its pose in the place of the last one."""
-    form = m.anatomy * anatomy(state.slots.body[b, k])
+    pose_log_prior = m.anatomy * anatomy(state.slots.body[b, k])
     if several:
-        state.log_weight[b, k] += gain + form - state.form[b, k]
-    state.form[b, k] = form
+        state.log_weight[b, k] += gain + pose_log_prior - state.pose_log_prior[b, k]
+    state.pose_log_prior[b, k] = pose_log_prior
 
 
 @kernel(makes_arrays=True)
@@ -174,13 +178,13 @@ def _weigh(slots, b, k, seen, s, prior, scratch):
     body, cov, slope = slots.body[b, k], slots.cov[b, k], slots.slope[b, k]
     prior[0][:], prior[1][:], prior[2][:] = body, cov, slope
     condition(slots, b, k, seen, s, scratch)
-    contrast = contrast_of(s.outlier_weight, s.image_area_px)
+    inlier_odds = inlier_odds_of(s.outlier_weight, s.image_area_px)
     bones = (slots.bone_length[b, k], scratch[1])
     # the mean correction needs the factors that the evidence leaves alone
     evidence = log_evidence(
-        prior, (body, cov, slope), seen, bones, contrast, s.floor_std_m, scratch[2]
+        prior, (body, cov, slope), seen, bones, inlier_odds, s.floor_std_m, scratch[2]
     )
-    settle(slots, b, k, seen, s, scratch)
+    correct_mean(slots, b, k, seen, s, scratch)
     return evidence
 
 

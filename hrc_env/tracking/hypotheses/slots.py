@@ -22,7 +22,7 @@ class Hypotheses(NamedTuple):
     """Arrays (B, W H, ...), one Gaussian tree each."""
     log_weight: Floats
     """(B, W H) log-probabilities of the slots in use, which sum to one after an update."""
-    form: Floats
+    pose_log_prior: Floats
     """(B, W H) what `anatomy` says of their poses; part of the weights."""
     n_alive: Ints
     """(B, W) slots in use, at least one."""
@@ -38,8 +38,8 @@ def plain(state: Hypotheses) -> tuple[Any, ...]:
 @kernel(makes_arrays=True)
 def hypotheses(state):
     """The hypotheses that `plain` gave."""
-    slots, log_weight, form, n_alive, waited_s = state
-    return Hypotheses(Trees(*slots), log_weight, form, n_alive, waited_s)
+    slots, log_weight, pose_log_prior, n_alive, waited_s = state
+    return Hypotheses(Trees(*slots), log_weight, pose_log_prior, n_alive, waited_s)
 
 
 @kernel
@@ -91,7 +91,7 @@ def drop(state, b, w, h):
     if h != last:
         copy_slot(state.slots, b, first + last, first + h)
         state.log_weight[b, first + h] = state.log_weight[b, first + last]
-        state.form[b, first + h] = state.form[b, first + last]
+        state.pose_log_prior[b, first + h] = state.pose_log_prior[b, first + last]
     state.n_alive[b, w] = last
 
 
@@ -109,10 +109,10 @@ def normalise(state, b, w, log_least):
     for h in range(state.n_alive[b, w]):
         best = h if log_weight[h] > log_weight[best] else best
     if best > 0:
-        form = state.form[b, first : first + len(log_weight)]
+        pose_log_prior = state.pose_log_prior[b, first : first + len(log_weight)]
         exchange_slots(state.slots, b, first, first + best)
         log_weight[0], log_weight[best] = log_weight[best], log_weight[0]
-        form[0], form[best] = form[best], form[0]
+        pose_log_prior[0], pose_log_prior[best] = pose_log_prior[best], pose_log_prior[0]
 
 
 @kernel(makes_arrays=True)
@@ -139,7 +139,7 @@ def merge(state, b, w, least_distance, work):
             if slot_distance(state.slots, b, first + h, first + k, work) < least_distance:
                 if log_weight[first + k] > log_weight[first + h]:
                     exchange_slots(state.slots, b, first + h, first + k)
-                    state.form[b, first + h] = state.form[b, first + k]
+                    state.pose_log_prior[b, first + h] = state.pose_log_prior[b, first + k]
                 both = np.logaddexp(log_weight[first + h], log_weight[first + k])
                 log_weight[first + h] = both
                 drop(state, b, w, k)

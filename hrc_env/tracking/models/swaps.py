@@ -13,7 +13,7 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.skeleton import MIRROR
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
 from hrc_env.tracking.measurements import pixel_spread
-from hrc_env.tracking.models.proposal import contrast_of
+from hrc_env.tracking.models.proposal import inlier_odds_of
 
 _MIRROR = tuple(int(j) for j in MIRROR)
 _BLIND_UPDATES, _BELIEVED_UPDATES = 8, 5
@@ -28,7 +28,7 @@ def undo_swaps(P, body, cov, z, sigma, ok, chance, blind, believed, s):
     `chance` (C,) is the probability of being swapped, `blind` and `believed` (C,) count
     updates; `s` are the `settings.Settings`.
     """
-    contrast, n_seeing, n_swapped = contrast_of(s.outlier_weight, s.image_area_px), 0, 0
+    inlier_odds, n_seeing, n_swapped = inlier_odds_of(s.outlier_weight, s.image_area_px), 0, 0
     for c in range(len(P)):
         sees = False
         for j in range(len(_MIRROR)):
@@ -43,7 +43,7 @@ def undo_swaps(P, body, cov, z, sigma, ok, chance, blind, believed, s):
             chance[c] = _LEAST_CHANCE
             continue
         prior = chance[c] * (1.0 - s.swap_ends) + (1.0 - chance[c]) * s.swap_begins
-        evidence = swap_evidence(P[c], c, body, cov, z, sigma, ok, contrast)
+        evidence = swap_evidence(P[c], c, body, cov, z, sigma, ok, inlier_odds)
         odds = math.log(prior / (1.0 - prior)) + evidence
         chance[c] = min(max(1.0 / (1.0 + math.exp(-odds)), _LEAST_CHANCE), 1.0 - _LEAST_CHANCE)
         n_swapped += chance[c] > 0.5
@@ -55,7 +55,7 @@ def undo_swaps(P, body, cov, z, sigma, ok, chance, blind, believed, s):
 
 
 @kernel
-def swap_evidence(camera, c, body, cov, z, sigma, ok, contrast):
+def swap_evidence(camera, c, body, cov, z, sigma, ok, inlier_odds):
     """Log-likelihood ratio of camera c being swapped, bounded."""
     swapped, right = 1.0, 1.0  # products: no term is more than 1e10
     for j in range(len(_MIRROR)):
@@ -67,17 +67,17 @@ def swap_evidence(camera, c, body, cov, z, sigma, ok, contrast):
             continue
         spread = pixel_spread(camera, u, v, depth, cov[j])
         if ok[m, c]:
-            swapped *= _mixture(z[m, c, 0] - u, z[m, c, 1] - v, sigma[m, c], spread, contrast)
+            swapped *= _mixture(z[m, c, 0] - u, z[m, c, 1] - v, sigma[m, c], spread, inlier_odds)
         if ok[j, c]:
-            right *= _mixture(z[j, c, 0] - u, z[j, c, 1] - v, sigma[j, c], spread, contrast)
+            right *= _mixture(z[j, c, 0] - u, z[j, c, 1] - v, sigma[j, c], spread, inlier_odds)
     return min(max(math.log(swapped / right), -_MOST_EVIDENCE), _MOST_EVIDENCE)
 
 
 @kernel(fastmath=_REORDER)
-def _mixture(du, dv, sigma, spread, contrast):
+def _mixture(du, dv, sigma, spread, inlier_odds):
     """Density of a detection over that of an outlier, but for a factor that pairs share."""
     near = 1.0 / (sigma * sigma + spread)
-    return 1.0 + contrast * near * math.exp(-0.5 * (du * du + dv * dv) * near)
+    return 1.0 + inlier_odds * near * math.exp(-0.5 * (du * du + dv * dv) * near)
 
 
 @kernel

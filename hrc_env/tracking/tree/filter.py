@@ -6,8 +6,8 @@ z (J, C, 2), sigma (J, C), ok (J, C) as `measurements.read_worker` fills them.
 
 from hrc_env.core.kernels import kernel
 from hrc_env.tracking.models.acquisition import count_conflict
-from hrc_env.tracking.models.proposal import contrast_of
-from hrc_env.tracking.models.upkeep import (
+from hrc_env.tracking.models.proposal import inlier_odds_of
+from hrc_env.tracking.models.track_management import (
     acquire_anew,
     check,
     find_joints_again,
@@ -15,7 +15,7 @@ from hrc_env.tracking.models.upkeep import (
 from hrc_env.tracking.tree.bone_lengths import learn_lengths, stiff_lengths
 from hrc_env.tracking.tree.gaussian import PARENT
 from hrc_env.tracking.tree.search import find_pose
-from hrc_env.tracking.tree.update import correct_mean, update_tree
+from hrc_env.tracking.tree.update import shift_to_mean, update_tree
 
 
 @kernel
@@ -31,7 +31,7 @@ def keep_positions(cov, out):
 def follow(state, b, w, seen, s, scratch):
     """Update a tracked worker: search, condition, correct the mean, learn the bones."""
     condition(state, b, w, seen, s, scratch)
-    settle(state, b, w, seen, s, scratch)
+    correct_mean(state, b, w, seen, s, scratch)
 
 
 @kernel
@@ -42,26 +42,26 @@ def condition(state, b, w, seen, s, scratch):
     """
     belief, give, work = scratch
     body, cov, slope = state.body[b, w], state.cov[b, w], state.slope[b, w]
-    contrast = contrast_of(s.outlier_weight, s.image_area_px)
+    inlier_odds = inlier_odds_of(s.outlier_weight, s.image_area_px)
     stiff_lengths(state.bone_variance[b, w], s.bone_give, give)
     bones = (state.bone_length[b, w], give)
-    how = (contrast, s.floor_std_m, s.gauss_newton_steps)
+    how = (inlier_odds, s.floor_std_m, s.gauss_newton_steps)
     find_pose(body, cov, slope, seen, bones, *how, belief, work)
     update_tree(body, cov, slope, work)
 
 
 @kernel
-def settle(state, b, w, seen, s, scratch):
+def correct_mean(state, b, w, seen, s, scratch):
     """Go from the mode to the mean, and learn what is to be learnt from it."""
     belief, _, work = scratch
     if s.mean_correction > 0.0:
         gaussian = (state.body[b, w], state.cov[b, w], state.slope[b, w])
-        correct_mean(*gaussian, seen, belief, s.mean_correction, work)
-    keep_books(state, b, w, seen, belief, work.n_views)
+        shift_to_mean(*gaussian, seen, belief, s.mean_correction, work)
+    update_ages(state, b, w, seen, belief, work.n_views)
 
 
 @kernel
-def keep_books(state, b, w, seen, belief, n_views):
+def update_ages(state, b, w, seen, belief, n_views):
     """Ages, conflicts and bone lengths of a worker who has been updated.
 
     `belief` (J, C) is how far each measurement was believed; `n_views` (J,) is scratch.
@@ -81,7 +81,7 @@ def keep_books(state, b, w, seen, belief, n_views):
 
 
 @kernel
-def look_after(state, b, w, seen, standing, s, placed, factor):
+def recover(state, b, w, seen, standing, s, placed, factor):
     """Find joints or the whole body again where the views say so; notice a body that is lost.
 
     `placed` (J,) and `factor` (6, 6) are scratch. What is known of a joint that was put

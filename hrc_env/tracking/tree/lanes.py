@@ -54,17 +54,17 @@ def set_joints(body, cov, joints):
 
 
 @kernel(fastmath=_REORDER)
-def add_view(p, joints, view, widen, contrast, seen, sums):
+def add_view(p, joints, view, widen, inlier_odds, seen, sums):
     """Add one camera's information and gradient, of all joints, to the rows of `sums`.
 
     Args:
         p: (3, 4).
         joints, view: rows, as `set_joints` and `set_views` give them.
-        widen, contrast: as in `proposal.add_cameras`.
+        widen, inlier_odds: as in `proposal.add_cameras`.
         seen: rows filled, beliefs first.
         sums: rows added to.
     """
-    _image(p, joints, view, widen, contrast, seen)
+    _image(p, joints, view, widen, inlier_odds, seen)
     for j in range(LANES):
         odds = math.exp(seen[LANES + j]) * seen[2 * LANES + j]
         seen[j] = odds / (odds + 1.0)
@@ -85,7 +85,7 @@ def add_view(p, joints, view, widen, contrast, seen, sums):
 
 
 @kernel(fastmath=_REORDER)
-def _image(p, joints, view, widen, contrast, seen):
+def _image(p, joints, view, widen, inlier_odds, seen):
     """Where the camera sees the joints, and how odd that the pixels lie where they do."""
     p00, p01, p02, p03 = p[0, 0], p[0, 1], p[0, 2], p[0, 3]
     p10, p11, p12, p13 = p[1, 0], p[1, 1], p[1, 2], p[1, 3]
@@ -110,7 +110,7 @@ def _image(p, joints, view, widen, contrast, seen):
         spread = 1.0 / precision + widen * (0.5 * own + cross)
         narrow = 1.0 / spread if usable else 0.0
         seen[LANES + j] = -0.5 * (du * du + dv * dv) * narrow
-        seen[2 * LANES + j] = contrast * narrow
+        seen[2 * LANES + j] = inlier_odds * narrow
         seen[3 * LANES + j], seen[4 * LANES + j], seen[5 * LANES + j] = a0, a1, a2
         seen[6 * LANES + j], seen[7 * LANES + j], seen[8 * LANES + j] = b0, b1, b2
         seen[9 * LANES + j] = precision

@@ -47,14 +47,14 @@ _REORDER = {"reassoc", "contract", "nsz"}
 
 
 @kernel
-def find_pose(body, cov, slope, seen, bones, contrast, floor_std_m, n_steps, belief, w):
+def find_pose(body, cov, slope, seen, bones, inlier_odds, floor_std_m, n_steps, belief, w):
     """Search the most probable positions and leave everything linearised there.
 
     Args:
         body, cov, slope: the prediction (J, 6), (J, 6, 6), (J, 6, 6).
         seen: P (C, 3, 4), z (J, C, 2), sigma (J, C), ok (J, C).
         bones: lengths (J,) to the parent [m] and their variances as measurements (J,) [m^2].
-        contrast: as `proposal.contrast_of` gives.
+        inlier_odds: as `proposal.inlier_odds_of` gives.
         floor_std_m: of the floor, as a measurement of whatever is below it [m].
         n_steps: Gauss-Newton steps.
         belief: (J, C) filled: how far each measurement is believed.
@@ -65,13 +65,13 @@ def find_pose(body, cov, slope, seen, bones, contrast, floor_std_m, n_steps, bel
     for j in range(len(body)):
         for i in range(3):
             w.point[j, i] = body[j, i]
-    how = (contrast, floor_std_m, n_steps, 1.0)
+    how = (inlier_odds, floor_std_m, n_steps, 1.0)
     find_pose_near(body, cov, slope, seen, bones, *how, belief, w)
 
 
 @kernel
 def find_pose_near(
-    body, cov, slope, seen, bones, contrast, floor_std_m, n_steps, widen, belief, w
+    body, cov, slope, seen, bones, inlier_odds, floor_std_m, n_steps, widen, belief, w
 ):  # fmt: skip
     """As `find_pose`, but the search begins at w.point (J, 3) instead of the predicted means.
 
@@ -86,7 +86,7 @@ def find_pose_near(
     set_views(seen, w.views)
     for step in range(n_steps + 1):
         widening = widen if step < n_steps - 1 else 0.0
-        _linearise_cameras(w.views, seen[0], contrast, widening, belief, w)
+        _linearise_cameras(w.views, seen[0], inlier_odds, widening, belief, w)
         _stand_on_the_floor(rows, 1.0 / floor_std_m**2)
         for quad in range(QUADS):
             fetch_above(rows, quad, SHIFT, ABOVE_SHIFT, 6)
@@ -122,7 +122,7 @@ def _place(lane):
 
 
 @kernel
-def _linearise_cameras(views, P, contrast, widening, belief, w):
+def _linearise_cameras(views, P, inlier_odds, widening, belief, w):
     """Information and gradient of what the cameras say, at the points."""
     rows, joints, sums = w.rows, w.joints, w.sums
     for quad in range(QUADS):
@@ -132,7 +132,7 @@ def _linearise_cameras(views, P, contrast, widening, belief, w):
                 joints[i * LANES + 4 * quad + lane] = rows[at + POINT]
     sums[:] = 0.0
     for c in range(len(P)):
-        add_view(P[c], joints, views[c], widening, contrast, w.seen, sums)
+        add_view(P[c], joints, views[c], widening, inlier_odds, w.seen, sums)
         for j in range(len(belief)):
             belief[j, c] = w.seen[LANE_OF_JOINT[j]]
     for quad in range(QUADS):

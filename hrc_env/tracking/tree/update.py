@@ -55,7 +55,7 @@ def update_tree(body, cov, slope, w):
 
     The tree is in the rows of `w`, and what they say in camera_information, camera_gradient,
     edge_information and edge_gradient, as `tree.search.find_pose` leaves all that. Keeps the
-    factors for `correct_mean`.
+    factors for `shift_to_mean`.
     """
     rows = w.rows
     for quad in range(QUADS):
@@ -165,7 +165,7 @@ def _substitute(body, gradient, rows):
 
 
 @kernel
-def correct_mean(body, cov, slope, seen, belief, share, w):
+def shift_to_mean(body, cov, slope, seen, belief, share, w):
     """Lead the means from the mode towards the mean of the posterior (Laplace's next term).
 
     A camera's information on a position falls with the square of the depth, so that there is

@@ -45,7 +45,7 @@ def expect(camera, mean, cov, known, slack_m, image):
 
 
 @kernel(makes_arrays=True)
-def resemblance(image, z, sigma, ok, mirror, gate_sigma, area_px):
+def affinity(image, z, sigma, ok, mirror, gate_sigma, area_px):
     """Mean log likelihood ratio of a pose z (J, 2), sigma, ok (J,); 0 where it does not fit."""
     plain = _one_reading(image, z, sigma, ok, mirror, False, gate_sigma, area_px)
     swapped = _one_reading(image, z, sigma, ok, mirror, True, gate_sigma, area_px)

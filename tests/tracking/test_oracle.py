@@ -4,7 +4,7 @@ import numpy as np
 
 from hrc_env.core.records import WorkerTruth
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.given import estimate_from_truth, prior
+from hrc_env.tracking.oracle import estimate_from_truth, prior
 
 
 def test_the_truth_becomes_a_sure_and_present_belief():

@@ -14,7 +14,7 @@ SAME_S = 5e-5
 _TICK_S = 1e-4
 """Times within a control step are taken to this, so that equal latencies share a computation."""
 _TOGETHER_TICKS = 20
-"""Frames within 2 ms are of one moment: at walking speed, less than 3 mm."""
+"""Frames within 2 ms are of one set: at walking speed, less than 3 mm."""
 _END, _NEVER = 2**40, 2**41
 """Ticks of a frame at the end of its step, and of one that is not within it."""
 _HELD_S = 0.1
@@ -42,7 +42,7 @@ class Frames(NamedTuple):
     """(B,) time of the newest frame that was overwritten [s]."""
 
 
-class Moment(NamedTuple):
+class FrameSet(NamedTuple):
     """Frames of one time in G environments."""
 
     keypoints: Keypoints
@@ -86,9 +86,9 @@ def remember(frames: Frames, keypoints: Keypoints, time_s: Floats, use: Bools) -
     frames.n_taken[b, c] += 1
 
 
-def moments_of(
+def frame_sets_of(
     frames: Frames, ids: Ints, end_s: Floats, step_s: Floats
-) -> Iterator[tuple[Ints, float, list[tuple[float, Moment]]]]:
+) -> Iterator[tuple[Ints, float, list[tuple[float, FrameSet]]]]:
     """What was seen within a step of environments `ids`, by groups with equal times.
 
     Args:
@@ -98,7 +98,7 @@ def moments_of(
         step_s: (G,) how long it was.
 
     Yields:
-        members (M,) of `ids`; the step [s]; and its moments in order of time, each with the
+        members (M,) of `ids`; the step [s]; and its frame sets in order of time, each with the
         time since the step began [s].
     """
     ticks = _ticks(frames.time_s[ids], end_s, step_s)
@@ -107,27 +107,27 @@ def moments_of(
     for members in _alike(np.column_stack([step_s.view(np.int64), times])):
         step = float(step_s[members[0]])
         begin_s = end_s[members] - step
-        moments = []
+        frame_sets = []
         for first, last in _spans(times[members[0]]):
             at_s = step if last == _END else float(last) * _TICK_S
             inside = (ticks[members] >= first) & (ticks[members] <= last)
-            moments.append((at_s, _moment(frames, ids[members], inside, begin_s + at_s)))
-        yield members, step, moments
+            frame_sets.append((at_s, _frame_set(frames, ids[members], inside, begin_s + at_s)))
+        yield members, step, frame_sets
 
 
-def beside(frames: Frames, ids: Ints, moment: Moment, wanted: Bools) -> Keypoints:
-    """The frames of a moment, and the other cameras' last ones for the workers `wanted` (G, W).
+def beside(frames: Frames, ids: Ints, frame_set: FrameSet, wanted: Bools) -> Keypoints:
+    """The frames of a set, and the other cameras' last ones for the workers `wanted` (G, W).
 
     Two views that are a little out of step say where somebody is better than one alone does.
     Detections of a held frame are told as less certain, by how far a walker may have come.
     """
-    age_s = moment.at_s[:, None, None] - frames.time_s[ids]
-    recent = (age_s > -SAME_S) & (age_s < _HELD_S) & ~moment.has[:, :, None]
-    held = _moment(frames, ids, recent, moment.at_s)
+    age_s = frame_set.at_s[:, None, None] - frames.time_s[ids]
+    recent = (age_s > -SAME_S) & (age_s < _HELD_S) & ~frame_set.has[:, :, None]
+    held = _frame_set(frames, ids, recent, frame_set.at_s)
     youngest_s = np.where(recent, age_s, np.inf).min(2)
     drift_px = _DRIFT_PX_S * np.where(held.has, youngest_s, 0.0)
     use = held.has[:, :, None] & wanted[:, None]
-    shown = moment.keypoints
+    shown = frame_set.keypoints
     return Keypoints(
         np.where(use[..., None, None], held.keypoints.px, shown.px),
         np.where(use[..., None], held.keypoints.confidence, shown.confidence),
@@ -176,7 +176,7 @@ def _alike(keys: Ints) -> Iterator[Ints]:
 
 
 def _spans(times: Ints) -> list[tuple[int, int]]:
-    """First and last tick of each moment in sorted ticks."""
+    """First and last tick of each set in sorted ticks."""
     spans: list[tuple[int, int]] = []
     for tick in map(int, times[times < _NEVER]):
         if spans and tick - spans[-1][0] <= _TOGETHER_TICKS:
@@ -186,10 +186,10 @@ def _spans(times: Ints) -> list[tuple[int, int]]:
     return spans
 
 
-def _moment(frames: Frames, ids: Ints, among: Bools, at_s: Floats) -> Moment:
+def _frame_set(frames: Frames, ids: Ints, among: Bools, at_s: Floats) -> FrameSet:
     """The newest frame of each camera `among` (G, C, N)."""
     n = np.where(among, frames.time_s[ids], -np.inf).argmax(2)
     b, c = ids[:, None], np.arange(n.shape[1])
     keypoints = Keypoints(frames.px[b, c, n], frames.confidence[b, c, n], frames.sigma_px[b, c, n])
     has = np.asarray(among.any(2))
-    return Moment(keypoints if has.all() else without(keypoints, ~has), has, at_s)
+    return FrameSet(keypoints if has.all() else without(keypoints, ~has), has, at_s)

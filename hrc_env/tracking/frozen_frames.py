@@ -18,7 +18,7 @@ LEAST_NEW = 3
 """So many images in a row must be new before a camera that was stuck is believed again."""
 
 
-class StuckState(NamedTuple):
+class FrozenState(NamedTuple):
     """What is remembered of B environments and C cameras; arrays changed in place."""
 
     last: Floats
@@ -27,19 +27,19 @@ class StuckState(NamedTuple):
     """(B, C) images in a row that were new, up to `LEAST_NEW`."""
 
 
-def make_stuck(batch: int, n_cameras: int) -> StuckState:
+def make_frozen(batch: int, n_cameras: int) -> FrozenState:
     """A state in which every camera is believed."""
-    return StuckState(
+    return FrozenState(
         np.zeros((batch, n_cameras)), np.full((batch, n_cameras), LEAST_NEW, np.int64)
     )
 
 
-def forget_stuck(state: StuckState, ids: Ints) -> None:
+def forget_frozen(state: FrozenState, ids: Ints) -> None:
     """Begin environments `ids` anew."""
     state.last[ids], state.new[ids] = 0.0, LEAST_NEW
 
 
-def leave_out_stuck(state: StuckState, ids: Ints, keypoints: Keypoints) -> None:
+def leave_out_frozen(state: FrozenState, ids: Ints, keypoints: Keypoints) -> None:
     """Make what stuck cameras report of environments `ids` missing, in place.
 
     Args:

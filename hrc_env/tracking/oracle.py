@@ -11,7 +11,7 @@ from hrc_env.core.records import PoseEstimate, WorkerTruth
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.tracking.config import TrackerConfig
 
-GIVEN_STD_M = 1e-3
+ORACLE_STD_M = 1e-3
 """Standard deviation that is reported with the truth [m]: small, and invertible."""
 
 
@@ -20,7 +20,7 @@ def estimate_from_truth(truth: WorkerTruth) -> PoseEstimate:
     shape = truth.joints_world.shape[:-1]
     return PoseEstimate(
         mean_world=truth.joints_world.copy(),
-        cov_world=np.full((*shape, 3, 3), GIVEN_STD_M**2 * np.eye(3)),
+        cov_world=np.full((*shape, 3, 3), ORACLE_STD_M**2 * np.eye(3)),
         velocity_world=truth.velocity_world.copy(),
         age_s=np.zeros(shape),
         tracked=np.ones(shape[:-1], bool),

@@ -1,6 +1,6 @@
 """Frames that arrive late are used at their own time: a short memory, and replay.
 
-`LateEstimator` wraps any estimator. It keeps what the inner one believed at the end of every
+`OutOfSequence` wraps any estimator. It keeps what the inner one believed at the end of every
 control step, and the frames of every camera with their times. A frame that was taken before
 now is put where it belongs: the belief before it is restored, and what came after is lived
 through again, each step's prediction split at the exact times of its frames.
@@ -24,14 +24,14 @@ from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.frames import (
+from hrc_env.tracking.frame_sets import (
     SAME_S,
     Frames,
-    Moment,
+    FrameSet,
     beside,
     forget_frames,
+    frame_sets_of,
     make_frames,
-    moments_of,
     remember,
     shows_anything,
     without,
@@ -72,7 +72,7 @@ class LateState(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class LateEstimator:
+class OutOfSequence:
     """An estimator with a memory of `longest_delay_s`; see `tracking.estimators.Estimator`.
 
     It holds a copy of the inner state for every control step of that time: with `paper`, whose
@@ -88,7 +88,7 @@ class LateEstimator:
     """Frames older than this are too old [s]."""
     needs_pairs: bool = False
     """Whether the inner estimator makes nothing of a camera alone: then the last frames of the
-    others are shown to it beside a frame that came out of step, as of the same moment."""
+    others are shown to it beside a frame that came out of step, as of the same set."""
 
     @property
     def config(self) -> TrackerConfig:
@@ -158,9 +158,9 @@ class LateEstimator:
         """What is believed now."""
         return self.inner.estimate(state.now)
 
-    def ahead(self, state: LateState, horizon_s: float) -> PoseEstimate:
-        """What is expected in `horizon_s`; see `tracking.ahead`."""
-        return self.inner.ahead(state.now, horizon_s)
+    def forecast(self, state: LateState, horizon_s: float) -> PoseEstimate:
+        """What is expected in `horizon_s`; see `tracking.forecast`."""
+        return self.inner.forecast(state.now, horizon_s)
 
     def _take_in(self, state: LateState, keypoints: Keypoints, use: Bools, rngs: Rngs) -> None:
         """Update with frames of now, `use` (B, C); environments without one are left alone."""
@@ -171,8 +171,8 @@ class LateEstimator:
         if len(ids) == 0:
             return
         part = self._part(state, ids)
-        moment = Moment(without(rows(keypoints, ids), ~use[ids]), use[ids], state.clock_s[ids])
-        self._see(part, state, ids, moment, picked(rngs, ids))
+        frame_set = FrameSet(without(rows(keypoints, ids), ~use[ids]), use[ids], state.clock_s[ids])
+        self._see(part, state, ids, frame_set, picked(rngs, ids))
         self._write(state, ids, part)
 
     def _relive(self, state: LateState, ids: Ints, age: int, rngs: Rngs) -> None:
@@ -182,25 +182,25 @@ class LateEstimator:
         """
         slot = (state.slot[ids] - age + 1) % state.end_s.shape[1]
         steps = (state.end_s[ids, slot], state.step_s[ids, slot])
-        for members, step_s, moments in moments_of(state.frames, ids, *steps):
+        for members, step_s, frame_sets in frame_sets_of(state.frames, ids, *steps):
             group, done_s = ids[members], 0.0
             part, streams = self._part(state, group), picked(rngs, group)
-            for at_s, moment in moments:
+            for at_s, frame_set in frame_sets:
                 self.inner.predict(part, at_s - done_s, streams)
-                self._see(part, state, group, moment, streams)
+                self._see(part, state, group, frame_set, streams)
                 done_s = at_s
             if step_s > done_s:
                 self.inner.predict(part, step_s - done_s, streams)
             self._write(state, group, part)
 
-    def _see(self, part: Any, state: LateState, ids: Ints, moment: Moment, rngs: Rngs) -> None:
-        """Update with the frames of a moment; whom nobody follows is shown held ones beside."""
-        keypoints = moment.keypoints
-        if not moment.has.all():
+    def _see(self, part: Any, state: LateState, ids: Ints, frame_set: FrameSet, rngs: Rngs) -> None:
+        """Update with the frames of a set; whom nobody follows is shown held ones beside."""
+        keypoints = frame_set.keypoints
+        if not frame_set.has.all():
             tracked = self.inner.estimate(part).tracked
             wanted = ~tracked if not self.needs_pairs else np.ones_like(tracked)
             if wanted.any():
-                keypoints = beside(state.frames, ids, moment, wanted)
+                keypoints = beside(state.frames, ids, frame_set, wanted)
         self.inner.update(part, keypoints, rngs)
 
     def _part(self, state: LateState, ids: Ints) -> Any:
@@ -237,7 +237,11 @@ def _ends_by_age(state: LateState) -> Floats:
 
 
 def _usable(
-    state: LateState, keypoints: Keypoints, time_s: Floats, ends_s: Floats, longest_delay_s: float
+    state: LateState,
+    keypoints: Keypoints,
+    time_s: Floats,
+    ends_s: Floats,
+    longest_delay_s: float,
 ) -> Bools:
     """(B, C) which frames can be used; the others are counted, each for one reason."""
     now_s = state.clock_s[:, None]

@@ -6,7 +6,7 @@ import pytest
 from hrc_env.core.batching import mapped
 from hrc_env.core.records import Roi
 from hrc_env.perception.faults.camera_film import BLUR_IMAGES, CameraFilm, Shot
-from hrc_env.perception.faults.corruptions import spoil
+from hrc_env.perception.faults.corruptions import Shown, spoil
 from hrc_env.perception.faults.fault import KINDS, FaultConfig
 from hrc_env.perception.faults.schedule import Schedule
 from hrc_env.scene.rig import LAB_CAMERAS, pinholes
@@ -20,7 +20,8 @@ OF_LOOKS = [k for k, each in KINDS.items() if each.group == "image" and k != "mo
 
 
 def spoilt(kind, image, amount=None, window=CLOSE, seeds=SEEDS):
-    return spoil(image, CAMERA, window, FaultConfig(kind, ("camera_1",), amount), seeds)
+    shown = Shown(image, CAMERA, window, seeds)
+    return spoil(shown, FaultConfig(kind, ("camera_1",), amount))
 
 
 def grey(level=120, size=256):

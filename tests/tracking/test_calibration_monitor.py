@@ -11,7 +11,7 @@ from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import MIRROR
 from hrc_env.geometry.cameras import pinhole, project
 from hrc_env.geometry.rotations import about_axis
-from hrc_env.tracking.calibration_watch import forget, make_watch, watch
+from hrc_env.tracking.calibration_monitor import forget_monitor, make_monitor, monitor
 
 CORNERS = [(2.9, 2.6, 2.4), (-2.9, 2.6, 2.4), (-2.9, -2.6, 2.4), (2.9, -2.6, 2.4)]
 RIG = tuple(
@@ -43,7 +43,7 @@ def run(
     actual=RIG, n_cameras=4, change=lambda t, px, rng: px, steps=STEPS, until=10**9, seed=0, batch=1
 ):
     """The state after an episode in which cameras are `actual` until then, and said to be `RIG`."""
-    rng, state = np.random.default_rng(seed), make_watch(batch, n_cameras)
+    rng, state = np.random.default_rng(seed), make_monitor(batch, n_cameras)
     P = np.stack([camera.P for camera in RIG[:n_cameras]])
     axes = np.array([(*camera.K[:2, 2], camera.K[0, 0]) for camera in RIG[:n_cameras]])
     for t in range(steps):
@@ -57,7 +57,7 @@ def run(
             np.tile(velocity, (batch, 1, 1, 1)), np.zeros((batch, 1, 15)),
             np.ones((batch, 1), bool),
         )  # fmt: skip
-        watch(state, np.arange(batch), found, np.zeros((batch, n_cameras)), estimate, P, axes)
+        monitor(state, np.arange(batch), found, np.zeros((batch, n_cameras)), estimate, P, axes)
     return state
 
 
@@ -150,7 +150,7 @@ def test_a_batch_gives_the_bits_of_one_and_a_copy_goes_on():
     for single, three in zip(one, many, strict=True):
         np.testing.assert_array_equal(np.repeat(single, 3, 0), three)
     assert copied(many).information.tobytes() == many.information.tobytes()
-    forget(many, np.array([1]))
+    forget_monitor(many, np.array([1]))
     assert named(many) == [0]
     assert not many.suspected[1].any()
     assert many.updates.tolist() == [STEPS, 0, STEPS]

@@ -3,7 +3,7 @@
 import numpy as np
 
 from hrc_env.core.records import Keypoints
-from hrc_env.tracking.stuck import LEAST_NEW, forget_stuck, leave_out_stuck, make_stuck
+from hrc_env.tracking.frozen_frames import LEAST_NEW, forget_frozen, leave_out_frozen, make_frozen
 
 
 def image(*values):
@@ -15,7 +15,7 @@ def image(*values):
 
 def believed(state, *values):
     found = image(*values)
-    leave_out_stuck(state, np.array([0]), found)
+    leave_out_frozen(state, np.array([0]), found)
     missing = np.isnan(found.px[0, :, 0, 0, 0])
     assert (found.confidence[0, missing] == 0).all()
     assert np.isinf(found.sigma_px[0, missing]).all()
@@ -23,14 +23,14 @@ def believed(state, *values):
 
 
 def test_who_repeats_an_image_is_left_out_and_the_others_are_not():
-    state = make_stuck(1, 2)
+    state = make_frozen(1, 2)
     assert believed(state, 1.0, 1.0) == [True, True]
     assert believed(state, 1.0, 2.0) == [False, True]
     assert believed(state, 1.0, 3.0) == [False, True]
 
 
 def test_one_new_image_is_not_enough_and_several_are():
-    state = make_stuck(1, 1)
+    state = make_frozen(1, 1)
     for value in (1.0, 1.0):
         believed(state, value)
     told = [believed(state, 2.0 + k)[0] for k in range(LEAST_NEW)]
@@ -38,7 +38,7 @@ def test_one_new_image_is_not_enough_and_several_are():
 
 
 def test_nobody_seen_is_no_repetition():
-    state = make_stuck(1, 1)
+    state = make_frozen(1, 1)
     believed(state, 1.0)
     for _ in range(3):
         assert believed(state, np.nan) == [False]
@@ -46,8 +46,8 @@ def test_nobody_seen_is_no_repetition():
 
 
 def test_a_reset_believes_everybody():
-    state = make_stuck(1, 1)
+    state = make_frozen(1, 1)
     for value in (1.0, 1.0):
         believed(state, value)
-    forget_stuck(state, np.array([0]))
+    forget_frozen(state, np.array([0]))
     assert believed(state, 1.0) == [True]

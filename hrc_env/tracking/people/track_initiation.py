@@ -16,7 +16,7 @@ import numpy as np
 
 from hrc_env.core.kernels import kernel
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
-from hrc_env.tracking.people.resemblance import expect, resemblance
+from hrc_env.tracking.people.affinity import affinity, expect
 
 MEETING_M = 0.03
 """Lines of sight may pass each other at this distance [m] for other reasons than noise."""
@@ -151,7 +151,7 @@ def fit_cameras(P, poses, free, body, tables, s, member, score):
         body: (points (J, 3), met (J,)).
         tables: (mirror, bones, bone lengths).
         s: settings.
-        member, score: (C,) filled: the pose or -1, and its resemblance.
+        member, score: (C,) filled: the pose or -1, and its affinity.
     """
     (z, sigma, ok), (points, met), total = poses, body, 0.0
     image, nothing = np.empty((len(points), 3)), np.zeros((len(points), 3, 3))
@@ -160,7 +160,7 @@ def fit_cameras(P, poses, free, body, tables, s, member, score):
         expect(P[c], points, nothing, met, BODY_SLACK_M, image)
         for d in range(free.shape[1]):
             if free[c, d]:
-                fit = resemblance(
+                fit = affinity(
                     image, z[c, d], sigma[c, d], ok[c, d], tables[0], s.gate_sigma, s.image_area_px
                 )
                 if fit > score[c]:

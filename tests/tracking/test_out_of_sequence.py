@@ -10,7 +10,7 @@ from simulated import DT, HARD, LAB, Damage, detections, generators, keypoints, 
 from hrc_env.core.errors import ConfigError
 from hrc_env.tracking.config import PaperConfig
 from hrc_env.tracking.estimators import ESTIMATORS, make_estimator
-from hrc_env.tracking.late import IGNORED
+from hrc_env.tracking.out_of_sequence import IGNORED
 
 LATE = PaperConfig(longest_delay_s=0.5, n_particles=200)
 every = pytest.mark.parametrize("name", sorted(ESTIMATORS))
