@@ -96,8 +96,7 @@ def test_agents_do_not_touch_simulator_state():
 def test_randomness_is_an_argument():
     """No module draws from NumPy's global generator; one seeds it for a library that does."""
     made = {"Generator", "default_rng", "SeedSequence", "BitGenerator", "PCG64"}
-    peer = PACKAGE / "experiments" / "peers" / "particles.py"
-    for path in set(ALL_SOURCES) - {peer}:
+    for path in ALL_SOURCES:
         drawn = {
             node.attr
             for node in nodes(path)
