@@ -10,8 +10,7 @@ from typing import Any, get_type_hints
 
 from rich.console import Console
 
-from hrc_env.cli.kernels import compile_kernels
-from hrc_env.cli.progress import Meter
+from hrc_env.cli.progress import Meter, compile_kernels
 from hrc_env.cli.train import Train
 from hrc_env.config import settle
 from hrc_env.core.errors import CheckpointError, RenderingError, learner

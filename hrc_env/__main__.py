@@ -25,7 +25,7 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
         "and see that headless OpenGL works.",
     ),
     "demo": (
-        "hrc_env.cli.demo", "Demo",
+        "hrc_env.cli.play", "Demo",
         "Film the scripted reacher, slowed by the separation that it estimates from pixels.",
     ),
     "check": (

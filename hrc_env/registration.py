@@ -48,7 +48,7 @@ def register_task(task: "Task") -> None:
     Raises:
         ConfigError: its id is taken, or something in it is missing or of the wrong kind.
     """
-    from hrc_env.tasks.checks import check_task  # here and below: kernels take time to import
+    from hrc_env.tasks.task import check_task  # here and below: kernels take time to import
 
     check_task(task)
     if task.id in BUILT_IN:
@@ -126,7 +126,7 @@ def register_environment(task_id: str, max_episode_steps: int = EPISODE_STEPS) -
     register(
         id=task_id,
         entry_point="hrc_env.env:HRCEnv",
-        vector_entry_point="hrc_env.vector.factory:make_vector",
+        vector_entry_point="hrc_env.vector.env:make_vector",
         max_episode_steps=max_episode_steps,
         kwargs={"task": task_id},
     )

@@ -374,8 +374,8 @@ SERVO = '<velocity joint="bend" kv="400" ctrlrange="-3 3"/>'
     ("changes", "said"),
     [
         ({}, "the robot 'swing_arm' already"),
-        ({"mjcf": "<mujoco><"}, "cannot be read"),
-        ({"mjcf": "nowhere.xml"}, "cannot be read"),
+        ({"mjcf": "<mujoco><"}, "cannot be used"),
+        ({"mjcf": "nowhere.xml"}, "cannot be used"),
         ({"tool_site": "top"}, "no site 'top'"),
         ({"joints": ("turn", "lift", "bent")}, "no joint 'bent'"),
         ({"joints": ("lift", "turn", "bend")}, "in its order"),

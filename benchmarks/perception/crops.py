@@ -82,7 +82,7 @@ class Looker:
 
     def dress(self, look: Look) -> None:
         """Let everything look so from the next look on."""
-        self.renderer.dress(look)
+        self.renderer.randomize(look)
 
     def detect(self, now: Instant) -> Looked:
         """Look at an instant with every camera."""

@@ -163,7 +163,7 @@ def _look(
     appearance = APPEARANCES.get(variant.removeprefix("appearance "), AS_BUILT)
     for k, now in enumerate(instants(place, n, rng, in_turns())):
         if appearance != AS_BUILT:
-            looker.dress(draw_look(appearance, 1, np.random.default_rng([FIRST_SEED, k])))
+            looker.randomize(draw_look(appearance, 1, np.random.default_rng([FIRST_SEED, k])))
         looked = looker.detect(now)
         for c in np.flatnonzero(looked.in_view).tolist():
             view = _view(variant, place, now, looked, c)

@@ -9,7 +9,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import version
 
@@ -21,6 +20,11 @@ Finding = tuple[bool, str]
 PACKAGES = ("mujoco", "gymnasium", "numpy", "numba")
 DRAW = "from hrc_env.scene import gl; ok, said = gl.gl_status(); print(said); ok or exit(1)"
 """Draws a pixel; says with what, or what to do."""
+NAMES = (
+    "python", "packages", "torch", "machine", "OpenGL", "triton", "kernels", "weights", "OpenVINO",
+    "environment",
+)  # fmt: skip
+"""What is checked, each by the function of that name."""
 LITTLE_GB = 2.0
 """Level `pixels` and a film do not fit into much less [GB]."""
 
@@ -32,21 +36,9 @@ class Check:
     def run(self) -> int:
         """Print the findings; 0 if all are ok."""
         console, fine = Console(), True
-        checks: dict[str, Callable[[], Finding]] = {
-            "python": _python,
-            "packages": _packages,
-            "torch": _torch,
-            "machine": _machine,
-            "OpenGL": _opengl,
-            "triton": _triton,
-            "kernels": _kernels,
-            "weights": _weights,
-            "OpenVINO": _openvino,
-            "environment": _environment,
-        }
-        for name, check in checks.items():
+        for name in NAMES:
             try:
-                ok, message = check()
+                ok, message = globals()[f"_{name.lower()}"]()
             except Exception as error:  # whatever is wrong with this machine, say it
                 ok, message = False, f"{type(error).__name__}: {error}"
             fine &= ok
@@ -155,10 +147,12 @@ def _openvino() -> Finding:
 def _environment() -> Finding:
     import gymnasium
 
+    from hrc_env.tasks import DEFAULT
+
     started_s = time.monotonic()
-    env = gymnasium.make("hrc_env:HRCReach-v0", perception="keypoints")
+    env = gymnasium.make(f"hrc_env:{DEFAULT}", perception="keypoints")
     env.reset(seed=0)
     env.step(env.action_space.sample() * 0)
     env.close()
     taken_s = time.monotonic() - started_s
-    return True, f"HRCReach-v0 at level keypoints: made, reset and stepped in {taken_s:.1f} s"
+    return True, f"{DEFAULT} at level keypoints: made, reset and stepped in {taken_s:.1f} s"

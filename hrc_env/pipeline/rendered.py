@@ -45,7 +45,7 @@ class PixelPipeline(PoseTracking):
         time_s = None if self.recent is None else np.empty(seen.px.shape[:2])
         expected = self.tracker.estimate(predicted)
         for row, b in enumerate(now.ids.tolist()):
-            self.renderer.dress(self.worn[b])
+            self.renderer.randomize(self.worn[b])
             if self.recent is None or time_s is None:
                 self.renderer.draw(now.q[row], one(now.motion, row))
                 has_image = [True] * len(self.scene.cameras)

@@ -1,6 +1,6 @@
 """From settings to a compiled scene: room, arm, workers, cameras."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -15,11 +15,9 @@ from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.geometry.chains import SerialChain, capsules
 from hrc_env.geometry.shapes import WIDTH
 from hrc_env.geometry.sight import Surroundings
-from hrc_env.scene.grounds import MOUNT_WORLD, lab_grounds
-from hrc_env.scene.obstacles import obstacles
+from hrc_env.scene.places import SCENES, obstacles
 from hrc_env.scene.primitives import DECORATION, OVERHEAD, ROBOT_BIT, ROBOT_LOOKS
-from hrc_env.scene.props import add_props, prop_mocap
-from hrc_env.scene.rig import LAB_CAMERAS, SITE_CAMERAS, CameraConfig, add_cameras, pinholes, select
+from hrc_env.scene.rig import CameraConfig, add_cameras, pinholes, select
 from hrc_env.scene.robot import (
     DEFAULT,
     PREFIX,
@@ -30,9 +28,8 @@ from hrc_env.scene.robot import (
     robot_called,
     servo_lead_s,
 )
-from hrc_env.scene.site_grounds import site_grounds
-from hrc_env.scene.wardrobe import Wardrobe, dress, wardrobe
 from hrc_env.scene.worker import add_worker, capsule_geom_ids, mocap_ids
+from hrc_env.scene.worker_visuals import WorkerVisuals, add_props, add_visuals, visuals_of
 from hrc_env.worker.body import assets_dir, load_body, pool
 from hrc_env.worker.mesh import load_looks
 from hrc_env.worker.props import held_shapes
@@ -55,33 +52,16 @@ class SceneConfig:
     stay shallow and calm; at 10 ms one seed of eight is beyond (`benchmarks/sim_dt.py`)."""
     slew_rad_s2: float = 8.0
     """Fastest change of a commanded joint velocity [rad/s^2]; keeps the overshoot below 5 %."""
-    leash_rad: float = 0.05
+    integrator_clamp_rad: float = 0.05
     """How far the holding servo's angle may be ahead of a blocked joint [rad]."""
     cameras: tuple[CameraConfig, ...] = ()
     """All cameras that hang in the scene, of which `build` says which are switched on; none: the
     scene's own four."""
 
     def __post_init__(self) -> None:
-        for name in ("sim_dt", "slew_rad_s2", "leash_rad"):
+        for name in ("sim_dt", "slew_rad_s2", "integrator_clamp_rad"):
             if not getattr(self, name) > 0:
                 raise ConfigError(f"{name} must be positive, got {getattr(self, name)}.")
-
-
-@dataclass(frozen=True, slots=True)
-class Room:
-    """What a scene is beside `assets/scenes/NAME.xml`, or `NAME_bare.xml` without clutter."""
-
-    grounds: Callable[[Floats, bool], Grounds]
-    """Where people walk and work, from what stands there, with clutter or without."""
-    cameras: tuple[CameraConfig, ...]
-    """Those that hang there unless the settings say otherwise."""
-
-
-SCENES: dict[str, Room] = {
-    "lab": Room(lab_grounds, LAB_CAMERAS),
-    "site": Room(site_grounds, SITE_CAMERAS),
-}
-"""The scenes by name."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -172,7 +152,8 @@ def _build(
     use: tuple[str, ...],
     robot: Robot,
 ) -> Scene:
-    cameras, chain = pinholes(select(config.cameras, use)), chain_of(robot, MOUNT_WORLD)
+    room = SCENES[name]
+    cameras, chain = pinholes(select(config.cameras, use)), chain_of(robot, room.mount_world)
     spec = _spec(config, name, n_workers, bodies[0], cameras, robot)
     _strip(spec)
     _pair(spec, robot, chain)
@@ -196,7 +177,7 @@ def _build(
         worker_mocap=np.stack(rows) if rows else np.zeros((0, 0), np.int64),
         worker_capsules=np.array(touched, np.int64).reshape(n_workers, len(body.capsule_names)),
         obstacles=still,
-        grounds=SCENES[name].grounds(still, config.clutter),
+        grounds=room.grounds(still, config.clutter),
     )
 
 
@@ -218,19 +199,14 @@ def drawing_model(scene: Scene) -> mujoco.MjModel:
     )
     for prefix in prefixes:
         for name in scene.bodies:
-            dress(spec, load_body(name), load_looks(name), prefix)
+            add_visuals(spec, load_body(name), load_looks(name), prefix)
     add_props(spec, prefixes)
     return spec.compile()
 
 
-def drawn_props(scene: Scene) -> Ints:
-    """(W, len(PROPS) - 1) mocap rows in the drawing model of what the workers can hold."""
-    return prop_mocap(drawing_model(scene), _prefixes(scene.n_workers))
-
-
-def drawn_looks(scene: Scene) -> Wardrobe:
-    """Where the looks of the workers' bodies are in the drawing model."""
-    return wardrobe(drawing_model(scene), _prefixes(scene.n_workers), scene.bodies)
+def visuals(scene: Scene) -> WorkerVisuals:
+    """Where the workers' looks, and what they can hold, are in the drawing model."""
+    return visuals_of(drawing_model(scene), _prefixes(scene.n_workers), scene.bodies)
 
 
 def _spec(
@@ -249,7 +225,7 @@ def _spec(
     spec.memory = ARENA_BYTES + PAIR_BYTES * n_workers**2
     # The velocity command in force, and which body each worker has: part of the state.
     spec.nuserdata = len(robot.joints) + n_workers
-    add_robot(spec, robot, MOUNT_WORLD)
+    add_robot(spec, robot, SCENES[name].mount_world)
     add_cameras(spec, cameras)
     for prefix in _prefixes(n_workers):
         add_worker(spec, load_body(body_name), prefix)

@@ -12,14 +12,16 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
+import gymnasium
 import numpy as np
 from gymnasium.utils import seeding
-from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector import AsyncVectorEnv, AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from hrc_env.config import settle
-from hrc_env.core.errors import ConfigError
+from hrc_env.core.errors import ConfigError, unknown, whole
+from hrc_env.core.machine import n_cores
 from hrc_env.core.stateful import Stateful
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.env import RENDER_MODES, PlainSpec, check_render_mode, spaces
@@ -27,11 +29,12 @@ from hrc_env.render.views import PICTURE_SIZE, Views, picture_size
 from hrc_env.rewards import RewardConfig
 from hrc_env.simulation import Simulation, checked_action
 from hrc_env.step import StepResult
+from hrc_env.tasks import DEFAULT
+from hrc_env.tasks.task import task_called
 from hrc_env.vector.infos import InfoTable, blank, table
 from hrc_env.vector.options import (
+    MAX_ENVS,
     autoreset_of,
-    check_backend,
-    count_of,
     read_options,
     seeds_of,
     threads_of,
@@ -42,6 +45,8 @@ from hrc_env.vector.shards import Shards
 Observations = NDArray[np.float32]
 Stream = tuple[np.random.Generator, int]
 """An environment's generator, and what it was made from."""
+PROCESSES_PER_CORE = 2
+"""More processes that render and run networks only wait for each other."""
 Step = tuple[Observations, NDArray[np.float64], Bools, Bools, dict[str, Any]]
 
 
@@ -88,10 +93,11 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
                 'perception="pixels" has no batched form: gymnasium.make_vec makes it with a '
                 'process for each environment. perception="keypoints" emulates it, batched.'
             )
-        check_backend(backend)
+        if backend != "threads":
+            raise unknown("backend", backend, ("threads",))
         check_render_mode(render_mode)
         self._size = picture_size(width, height)
-        self.num_envs = count_of(num_envs)
+        self.num_envs = whole("num_envs", num_envs, 1, MAX_ENVS)
         self.autoreset_mode = autoreset_of(autoreset_mode)
         self.render_mode = render_mode
         settings = settle(perception=perception, **arguments)
@@ -269,3 +275,46 @@ def _finals(observation: Observations, info: InfoTable, who: Bools) -> dict[str,
         "final_info": info.arrays(who),
         "_final_info": who.copy(),
     }
+
+
+def make_vector(
+    num_envs: int = 1, *, perception: str = "pixels", force: bool = False, **kwargs: Any
+) -> VectorEnv[Any, Any, Any]:
+    """A vector environment.
+
+    Args:
+        num_envs: how many environments.
+        perception: "pixels" is gymnasium's `AsyncVectorEnv`, a process for each environment;
+            the other levels are an `HRCVectorEnv`.
+        force: allow more processes than two for each core.
+        kwargs: of `HRCVectorEnv`; no `num_threads` with "pixels".
+
+    Raises:
+        ConfigError: too many processes, or arguments that cannot work.
+    """
+    if perception != "pixels":
+        return HRCVectorEnv(num_envs, perception=perception, **kwargs)
+    return _processes(num_envs, force, **kwargs)
+
+
+def _processes(
+    num_envs: int,
+    force: bool,
+    autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+    num_threads: int | None = None,
+    **kwargs: Any,
+) -> AsyncVectorEnv[Any, Any]:
+    """A process for each environment."""
+    limit = PROCESSES_PER_CORE * n_cores()
+    if num_envs > limit and not force:
+        raise ConfigError(
+            f'num_envs={num_envs} with perception="pixels" are as many processes, each with a '
+            f"renderer and a network; on {n_cores()} cores no more than {limit} make sense. "
+            'Use perception="keypoints", which emulates the detector and steps thousands of '
+            "environments in one process, or force=True."
+        )
+    if num_threads is not None:
+        raise ConfigError('perception="pixels" is processes, not threads: leave out num_threads.')
+    task = task_called(kwargs.pop("task", DEFAULT)).id
+    make = partial(gymnasium.make, f"hrc_env:{task}", perception="pixels", **kwargs)
+    return AsyncVectorEnv([make] * num_envs, context="spawn", autoreset_mode=autoreset_mode)

@@ -60,7 +60,7 @@ def test_a_pattern_through_the_lens_and_back_is_the_pinholes(
     monkeypatch.setattr("hrc_env.scene.canvas.drawing_model", lambda _: pattern)
     scene = build(SceneConfig(clutter=False, cameras=(config,)))
     camera, renderer = scene.cameras[0], CropRenderer(scene)
-    mujoco.mj_forward(renderer._canvas._model, renderer._canvas._data)
+    mujoco.mj_forward(renderer._model, renderer._data)
     images = Lensed(renderer, scene.cameras)
     for ball in BALLS:
         px = project(projections((camera,)), ball[None])[0][0, 0]

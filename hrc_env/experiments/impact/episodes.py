@@ -159,14 +159,11 @@ def judge(part: Simulation, before: Bodies, now: Bodies) -> Step:
         return least_separation(robot_world, radius_m, *capsules).distance_m
 
     (robot_before, worker_before), (robot, worker) = before, now
-    dt_s, at_end_m, joints_world = (
-        part.config.ctrl_dt,
-        separation_m(*now),
-        worker.joints_world[:, 0],
-    )
+    dt_s, at_end_m = part.config.ctrl_dt, separation_m(*now)
+    joints_world = worker.joints_world[:, 0]
     return Step(
         true_separation_m=at_end_m,
-        believed_separation_m=part.believed.separation.distance_m[:, 0],
+        believed_separation_m=part.belief.separation.distance_m[:, 0],
         robot_mps=(separation_m(robot_before, worker) - at_end_m) / dt_s,
         worker_mps=(separation_m(robot, worker_before) - at_end_m) / dt_s,
         error_m=np.linalg.norm(part.estimate.mean_world[:, 0] - joints_world, axis=-1),
