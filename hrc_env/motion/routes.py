@@ -170,14 +170,7 @@ def _search(start: Pair, end: Pair, ground: Ground, via: Floats) -> int:
 
 @kernel
 def _pull(
-    goal: int,
-    parent: Floats,
-    n_y: int,
-    h: float,
-    start: Pair,
-    end: Pair,
-    ground: Ground,
-    via: Floats,
+    goal: int, parent: Ints, n_y: int, start: Pair, end: Pair, ground: Ground, via: Floats
 ) -> int:
     """Pull a chain of nodes tight, from its end to its start, into at most MAX_VIA corners."""
     origin, h = ground.origin, STRIDE * CELL_M
