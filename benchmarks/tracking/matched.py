@@ -16,7 +16,6 @@ from hrc_env.core.skeleton import N_JOINTS, TORSO
 from hrc_env.core.typing import Floats, Points3
 from hrc_env.tracking.models.acquisition import STANDING_M
 from hrc_env.tracking.models.motion import damped_joints
-from hrc_env.tracking.tree.bone_lengths import STIFFNESS_M
 
 N_STATES = 6 * N_JOINTS
 N_PLACES = 3 * N_JOINTS
