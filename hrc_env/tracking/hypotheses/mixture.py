@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 from hrc_env.core.kernels import kernel
 from hrc_env.tracking.config import ParticleConfig
-from hrc_env.tracking.hypotheses.slots import hypotheses
+from hrc_env.tracking.hypotheses.slots import Hypotheses
 from hrc_env.tracking.settings import Settings
-from hrc_env.tracking.tree.reports import tell_moments, tell_rest
+from hrc_env.tracking.tree.reports import report_moments, report_rest
 
 _LEAST_EVIDENCE = 0.01
 """A limb's other mode with less evidence than this share of the known one's is none."""
@@ -74,34 +74,35 @@ def mixture_settings(config: ParticleConfig) -> MixtureSettings:
 @kernel(makes_arrays=True)
 def estimate_all(state, s, out):
     """Fill the arrays of a `PoseEstimate` in; `state` and `s` as in `hypotheses.filter`."""
-    state, s = hypotheses(state), Settings(*s)
-    slots, limit = state.slots, state.log_weight.shape[1] // state.n_alive.shape[1]
+    state, s = Hypotheses(*state), Settings(*s)
+    trees, limit = state.trees, state.trees.shape[1] // state.n_alive.shape[1]
     for b in range(state.n_alive.shape[0]):
         for w in range(state.n_alive.shape[1]):
             first = w * limit
             if state.n_alive[b, w] == 1:
-                tell_moments(slots, b, first, out, w)
+                report_moments(trees[b, first], b, out, w)
             else:
                 mean, cov, velocity = out[0][b, w], out[1][b, w], out[2][b, w]
                 mix(state, b, w, mean, cov, velocity)
-            tell_rest(slots, b, first, s, out, w)
+            report_rest(trees[b, first], state.views[b, first], b, s, out, w)
 
 
 @kernel
 def mix(state, b, w, mean, cov, velocity):
     """Moments of a mixture: mean, velocity (J, 3) and cov (J, 3, 3) of the positions."""
-    slots, limit = state.slots, state.log_weight.shape[1] // state.n_alive.shape[1]
+    trees, limit = state.trees, state.trees.shape[1] // state.n_alive.shape[1]
     first, n = w * limit, state.n_alive[b, w]
     mean[:], cov[:], velocity[:] = 0.0, 0.0, 0.0
     for k in range(first, first + n):
-        share = math.exp(state.log_weight[b, k])
+        tree = trees[b, k]
+        share = math.exp(tree.log_weight)
         for j in range(len(mean)):
             for i in range(3):
-                mean[j, i] += share * slots.body[b, k, j, i]
-                velocity[j, i] += share * slots.body[b, k, j, 3 + i]
+                mean[j, i] += share * tree.body[j, i]
+                velocity[j, i] += share * tree.body[j, 3 + i]
     for k in range(first, first + n):
-        share = math.exp(state.log_weight[b, k])
-        _add_moments(share, slots.body[b, k], slots.cov[b, k], mean, cov)
+        tree = trees[b, k]
+        _add_moments(math.exp(tree.log_weight), tree.body, tree.cov, mean, cov)
 
 
 @kernel
