@@ -1,7 +1,7 @@
 """What an agent is worth: fixed seeds, deterministic actions, cost counted on the truth."""
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import gymnasium
@@ -12,7 +12,7 @@ from hrc_env.sb3 import ACHIEVED, FAILED, HRCVecEnv
 from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import Task
 
-from .base import Agent, situation
+from .env_info import Agent, env_info
 
 EVALUATION_SEED = 1_000_000
 """First seed of evaluations, far from those that training uses."""
@@ -34,16 +34,9 @@ class Score:
     median_min_separation_m: float
     return_mean: float
 
-    def as_dict(self) -> dict[str, float]:
-        """Names and values."""
-        return asdict(self)
-
 
 def evaluate(
-    make: Callable[[Any], Agent],
-    n_episodes: int = 64,
-    seed: int = EVALUATION_SEED,
-    **kwargs: Any,
+    make: Callable[[Any], Agent], n_episodes: int = 64, seed: int = EVALUATION_SEED, **kwargs: Any
 ) -> Score:
     """Score of an agent; arguments as of `judged`."""
     return summarise(judged(make, n_episodes, seed, **kwargs))
@@ -60,7 +53,7 @@ def judged(
     agents and perception levels can be compared episode by episode.
 
     Args:
-        make: builds the agent for a `Situation`.
+        make: builds the agent for an `EnvInfo`.
         n_episodes: how many.
         seed: of the first.
         tick: told by how much the share that is done grew.
@@ -71,7 +64,7 @@ def judged(
         return one_by_one(make, n_episodes, seed, tick, **kwargs)
     env = HRCVecEnv(n_episodes, seed=seed, **kwargs)
     try:
-        agent, observation = make(situation(env.simulation)), env.reset()
+        agent, observation = make(env_info(env.simulation)), env.reset()
         first: dict[int, dict[str, float]] = {}
         while len(first) < n_episodes:
             env.step_async(agent.act(observation))
@@ -97,7 +90,7 @@ def one_by_one(
     inner = env.unwrapped
     assert isinstance(inner, HRCEnv)
     try:
-        agent, done = make(situation(inner.simulation)), []
+        agent, done = make(env_info(inner.simulation)), []
         for k in range(n_episodes):
             done.append(_one(env, agent, seed + k, inner.simulation.task, inner.config.ctrl_dt))
             tick(1 / n_episodes)

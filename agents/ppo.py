@@ -1,9 +1,8 @@
 """Proximal policy optimisation by Stable-Baselines3, with settings that suit this task.
 
-Schulman et al. 2017, arXiv:1707.06347. The settings were found by trials on a prototype of
-this task; what mattered most: no running normalisation of observations (it inflates nearly
-constant ones such as ages), a progress term, many short rollouts at random phases of an
-episode.
+Schulman et al. 2017, arXiv:1707.06347. What mattered most: no running normalisation of observations
+(it inflates nearly constant ones such as ages), a progress term, many short rollouts at random
+phases of an episode.
 """
 
 import json
@@ -19,7 +18,7 @@ from numpy.typing import NDArray
 from hrc_env import __version__
 from hrc_env.core.errors import CheckpointError, learner
 
-from .base import Situation
+from .env_info import EnvInfo
 
 with learner():
     import torch
@@ -58,25 +57,17 @@ def make_learner(
 ) -> PPO:
     """A fresh PPO on `env`; a running estimate scales rewards, observations stay as they are."""
     normalised = VecNormalize(env, norm_obs=False, norm_reward=True, gamma=settings.gamma)
+    values = asdict(settings)
+    policy = {
+        "net_arch": list(values.pop("hidden")),
+        "activation_fn": torch.nn.Tanh,
+        "log_std_init": values.pop("log_std_init"),
+    }
+    log = None if tensorboard is None else str(tensorboard)
     return PPO(
-        "MlpPolicy",
-        normalised,
-        n_steps=settings.n_steps,
-        batch_size=settings.batch_size,
-        n_epochs=settings.n_epochs,
-        learning_rate=settings.learning_rate,
-        gamma=settings.gamma,
-        gae_lambda=settings.gae_lambda,
-        clip_range=settings.clip_range,
-        policy_kwargs={
-            "net_arch": list(settings.hidden),
-            "activation_fn": torch.nn.Tanh,
-            "log_std_init": settings.log_std_init,
-        },
-        tensorboard_log=None if tensorboard is None else str(tensorboard),
-        seed=seed,
+        "MlpPolicy", normalised, **values, policy_kwargs=policy, tensorboard_log=log, seed=seed,
         device="cpu",
-    )
+    )  # fmt: skip
 
 
 def save(learner: PPO, path: Path, facts: dict[str, Any]) -> None:
@@ -139,13 +130,13 @@ def resume(path: Path, env: VecEnv, tensorboard: Path | None = None) -> PPO:
     return learner
 
 
-def load(path: Path, here: Situation) -> "TrainedAgent":
+def load(path: Path, env_info: EnvInfo) -> "TrainedAgent":
     """A trained policy for acting.
 
     Raises:
         CheckpointError: it was made for another version or another environment.
     """
-    _check_fits(path, describe(path), here.layout.low.shape, (here.n_actions,))
+    _check_fits(path, describe(path), env_info.layout.low.shape, (env_info.n_actions,))
     return TrainedAgent(PPO.load(path, device="cpu"))
 
 
@@ -163,11 +154,11 @@ class TrainedAgent:
 def _check_fits(
     path: Path, meta: dict[str, Any], observation: tuple[int, ...], action: tuple[int, ...]
 ) -> None:
-    made_with, here = meta["hrc_env"], __version__
-    if made_with.split(".")[:2] != here.split(".")[:2]:
+    made_with = meta["hrc_env"]
+    if made_with.split(".")[:2] != __version__.split(".")[:2]:
         raise CheckpointError(
-            f"{path} was made with hrc_env {made_with}, this is {here}; checkpoints fit the same "
-            f"minor version. Install hrc_env {made_with} or train anew: {TRAIN}"
+            f"{path} was made with hrc_env {made_with}, this is {__version__}; checkpoints fit the "
+            f"same minor version. Install hrc_env {made_with} or train anew: {TRAIN}"
         )
     sizes = (meta["observation_size"],), (meta["action_size"],)
     if sizes != (tuple(observation), tuple(action)):
@@ -176,8 +167,3 @@ def _check_fits(
             f"{tuple(observation)} and {tuple(action)}: make it with the same n_workers and "
             f"control ({meta.get('environment')})."
         )
-
-
-def settings_as_dict(settings: PPOSettings) -> dict[str, Any]:
-    """For the run's record."""
-    return asdict(settings)

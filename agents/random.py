@@ -3,14 +3,14 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from .base import Situation
+from .env_info import EnvInfo
 
 
 class RandomAgent:
     """Draws every action anew from its own generator."""
 
-    def __init__(self, here: Situation, seed: int = 0) -> None:
-        self.n_actions = here.n_actions
+    def __init__(self, env_info: EnvInfo, seed: int = 0) -> None:
+        self.n_actions = env_info.n_actions
         self.rng = np.random.default_rng(seed)
 
     def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:

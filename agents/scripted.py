@@ -15,7 +15,7 @@ from hrc_env.control import resolved_rate
 from hrc_env.core.errors import ConfigError
 from hrc_env.observations import split
 
-from .base import Agent, Situation
+from .env_info import Agent, EnvInfo
 
 GAIN_HZ = 4.0
 """Approach speed per distance [1/s]."""
@@ -40,33 +40,33 @@ class Yielding:
 class Reacher:
     """Resolved-rate reaching, with or without yielding."""
 
-    def __init__(self, here: Situation, yielding: Yielding | None = None) -> None:
-        self.here, self.yielding = here, yielding
+    def __init__(self, env_info: EnvInfo, yielding: Yielding | None = None) -> None:
+        self.env_info, self.yielding = env_info, yielding
 
     def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
         """Actions (..., A) that move the tool straight towards its goal."""
-        terms = split(observation, self.here.layout)
+        terms = split(observation, self.env_info.layout)
         velocity = self._tool_velocity(terms["goal_from_tool"])
         if self.yielding is not None:
             nearest_m = terms["worker_separation"].min(axis=-1, initial=np.inf)
             velocity = velocity * self.yielding.share(nearest_m)[..., None]
-        if self.here.control == "tool":
-            return (velocity / self.here.control_config.tool_speed_mps).astype(np.float32)
+        if self.env_info.control == "tool":
+            return (velocity / self.env_info.control_config.tool_speed_mps).astype(np.float32)
         q = np.arctan2(terms["joint_angle_sin"], terms["joint_angle_cos"])
         return self._joint_action(q, velocity).astype(np.float32)
 
     def _tool_velocity(self, goal_from_tool: NDArray[np.float64]) -> NDArray[np.float64]:
         error_m = np.linalg.norm(goal_from_tool, axis=-1, keepdims=True)
         speed = np.minimum(GAIN_HZ * error_m, np.sqrt(2 * BRAKE_MPS2 * error_m))
-        speed = np.minimum(speed, self.here.control_config.tool_speed_mps)
+        speed = np.minimum(speed, self.env_info.control_config.tool_speed_mps)
         return goal_from_tool / np.maximum(error_m, 1e-9) * speed
 
     def _joint_action(
         self, q: NDArray[np.float64], velocity: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        here = self.here
-        qd = resolved_rate(here.chain, q, velocity, here.home_q, here.control_config)
-        action = qd / (here.control_config.joint_speed_share * here.chain.velocity_limit_rad_s)
+        info, config = self.env_info, self.env_info.control_config
+        qd = resolved_rate(info.chain, q, velocity, info.home_q, config)
+        action = qd / (config.joint_speed_share * info.chain.velocity_limit_rad_s)
         return action / np.maximum(np.abs(action).max(-1, keepdims=True), 1.0)
 
 
@@ -74,15 +74,15 @@ EXPERTS = {"HRCReach-v0": Reacher}
 """By task: what solves it without learning."""
 
 
-def expert(here: Situation, yielding: Yielding | None = None) -> Agent:
+def expert(env_info: EnvInfo, yielding: Yielding | None = None) -> Agent:
     """The scripted agent for a task, with or without yielding.
 
     Raises:
         ConfigError: nobody has written one.
     """
-    if here.task not in EXPERTS:
+    if env_info.task not in EXPERTS:
         raise ConfigError(
-            f"There is no scripted agent for {here.task}; there is for {', '.join(EXPERTS)}. "
+            f"There is no scripted agent for {env_info.task}; there is for {', '.join(EXPERTS)}. "
             "The agent 'random' and checkpoints work with every task."
         )
-    return EXPERTS[here.task](here, yielding)
+    return EXPERTS[env_info.task](env_info, yielding)

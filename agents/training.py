@@ -10,8 +10,7 @@ from typing import Any, get_type_hints
 
 from rich.console import Console
 
-from hrc_env.cli.kernels import compile_kernels
-from hrc_env.cli.progress import Meter
+from hrc_env.cli.progress import Meter, compile_kernels
 from hrc_env.cli.train import Train
 from hrc_env.config import settle
 from hrc_env.core.errors import CheckpointError, RenderingError, learner
@@ -21,11 +20,16 @@ from hrc_env.core.results import write_whole
 from hrc_env.sb3 import HRCVecEnv
 
 from . import ppo
-from .base import Situation
-from .curriculum import ProximityCurriculum, Ramp
+from .callbacks import (
+    Curve,
+    Interrupt,
+    ProximityCurriculum,
+    Ramp,
+    TrainingMonitor,
+    plot_curve,
+)
+from .env_info import EnvInfo
 from .evaluate import Score, evaluate
-from .interrupt import Interrupt
-from .monitor import Curve, TrainingMonitor, plot_curve
 
 with learner():
     import torch
@@ -55,7 +59,7 @@ def run(arguments: Train) -> int:
     if seconds is None:
         return STOPPED
     score = judge(arguments, folder, console)
-    _write(folder / "score.json", {**score.as_dict(), "training_s": seconds})
+    _write(folder / "score.json", {**asdict(score), "training_s": seconds})
     config = settle(task=arguments.task, config=arguments.keywords()["config"]).config
     title = f"PPO, {arguments.perception}, proximity weight {config.reward.proximity:g}"
     plot_curve(curve, folder / "curve.png", title)
@@ -71,9 +75,9 @@ def judge(arguments: Train, folder: Path, console: Console) -> Score:
     checkpoint = folder / "policy.zip"
     console.print(f"Evaluating {arguments.episodes} episodes on fixed seeds ...")
     score = evaluate(
-        lambda here: ppo.load(checkpoint, here), arguments.episodes, **arguments.keywords()
+        lambda env_info: ppo.load(checkpoint, env_info), arguments.episodes, **arguments.keywords()
     )
-    for name, value in score.as_dict().items():
+    for name, value in asdict(score).items():
         console.print(f"  {name:28s} {value:.3f}", highlight=False)
     return score
 
@@ -117,10 +121,10 @@ def train(arguments: Train, folder: Path, console: Console) -> tuple[Curve, floa
     vector = HRCVecEnv(arguments.num_envs, stagger=True, seed=arguments.seed, **kwargs)
     with closing(vector) as env, Interrupt() as interrupt:
         config = asdict(env.env.config)
-        record = {"arguments": _plain(arguments), "config": config, **provenance()}
+        record = {"arguments": asdict(arguments), "config": config, **provenance()}
         _write(folder / "run.json", record)
         learner, curve = _learner(arguments, folder, env, settings)
-        facts = {"environment": kwargs, "settings": ppo.settings_as_dict(settings)}
+        facts = {"environment": kwargs, "settings": asdict(settings)}
         ramp, total = Ramp(arguments.ramp), arguments.timesteps
         started_s = time.monotonic()
         with Meter(console, "training", total, "steps", learner.num_timesteps) as meter:
@@ -156,8 +160,8 @@ def film(folder: Path, arguments: Train, console: Console) -> bool:
     """Film the policy's closest encounter with the worker; whether this machine can draw."""
     from hrc_env.cli.film import film_episode, nearest_seed
 
-    def make(here: Situation) -> ppo.TrainedAgent:
-        return ppo.load(folder / "policy.zip", here)
+    def make(env_info: EnvInfo) -> ppo.TrainedAgent:
+        return ppo.load(folder / "policy.zip", env_info)
 
     kwargs = arguments.keywords()
     del kwargs["num_threads"]
@@ -171,9 +175,5 @@ def film(folder: Path, arguments: Train, console: Console) -> bool:
     return True
 
 
-def _plain(arguments: Train) -> dict[str, Any]:
-    return json.loads(json.dumps(asdict(arguments), default=str))
-
-
 def _write(path: Path, content: dict[str, Any]) -> None:
-    write_whole(path, json.dumps(content, indent=1))
+    write_whole(path, json.dumps(content, indent=1, default=str))

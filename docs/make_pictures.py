@@ -123,7 +123,7 @@ def appearance() -> None:
         renderer = PictureRenderer(env.simulation.scene, 400, 300)
         for k in range(6):
             if k > 0:
-                renderer.dress(draw_look(VARIED, 1, np.random.default_rng(k)))
+                renderer.randomize(draw_look(VARIED, 1, np.random.default_rng(k)))
             picture = renderer.picture(*env.views.pose(), view).astype(np.uint8).copy()
             label(picture, f"look {k}" if k else "as built", (6, 6), 13)
             for_each.append(picture)
@@ -178,5 +178,5 @@ if __name__ == "__main__":
     faults()
     appearance()
     clip()
-    if Path("out/learning/curves.png").exists():
-        shutil.copy("out/learning/curves.png", PICTURES / "learning.png")
+    if Path("out/learning/figures/curves.png").exists():
+        shutil.copy("out/learning/figures/curves.png", PICTURES / "learning.png")

@@ -25,7 +25,7 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
         "and see that headless OpenGL works.",
     ),
     "demo": (
-        "hrc_env.cli.demo", "Demo",
+        "hrc_env.cli.play", "Demo",
         "Film the scripted reacher, slowed by the separation that it estimates from pixels.",
     ),
     "check": (
@@ -45,17 +45,17 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
         "Train PPO, evaluate it on fixed seeds, draw its curve, film it.",
     ),
     "bench": (
-        "benchmarks.commands.bench", "Bench",
+        "benchmarks.commands", "Bench",
         "Measure the estimators (tracking), the eyes (perception), the environment (speed) or the "
         "workers (motion).",
     ),
     "experiment": (
         "hrc_env.cli.experiment", "Experiment",
-        "The paper's two experiments (site, lab), what the eyes are worth in safety (impact), and "
-        "ablations of rigs and estimators (beyond).",
+        "The paper's two experiments (site, lab), what perception is worth in safety (impact), and "
+        "ablations of rigs and estimators (ablations).",
     ),
     "gallery": (
-        "benchmarks.commands.gallery", "Gallery",
+        "benchmarks.commands", "Gallery",
         "Draw every worker, a film strip of every motion, and both scenes from all cameras.",
     ),
     "import-motion": (

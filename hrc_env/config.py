@@ -18,8 +18,7 @@ from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.core.mapping import PRESETS, from_mapping, plain, restored
 from hrc_env.core.results import write_whole
 from hrc_env.core.toml import read_toml, to_toml
-from hrc_env.geometry.camera_config import CameraConfig
-from hrc_env.geometry.rig_files import read_rig
+from hrc_env.geometry.camera_config import CameraConfig, read_rig
 from hrc_env.metrics import CostConfig
 from hrc_env.motion.generator import PEOPLE, MotionConfig, PeopleConfig
 from hrc_env.perception.detector import DetectorConfig
@@ -34,9 +33,9 @@ from hrc_env.scene.robot import DEFAULT as DEFAULT_ROBOT
 from hrc_env.scene.robot import Robot, robot_called
 from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import Task, task_called
-from hrc_env.tracking.ahead import LONGEST_S
 from hrc_env.tracking.config import ParticleConfig, TrackerConfig, of_kind
 from hrc_env.tracking.estimators import EstimatorChoice, EstimatorSpec, estimator_called
+from hrc_env.tracking.forecast import LONGEST_S
 from hrc_env.tracking.people.association import AssociationConfig
 from hrc_env.worker.body import pool
 
@@ -223,11 +222,7 @@ def save_config(config: HRCConfig, path: str | Path) -> None:
 def load_config(
     path: str | Path, task: str | Task = DEFAULT, estimator: EstimatorChoice = "particle"
 ) -> HRCConfig:
-    """A config from a TOML file, which may hold changes to the default only.
-
-    Raises:
-        ConfigError: see `resolve`.
-    """
+    """A config from a TOML file, which may hold changes to the default only."""
     return resolve(Path(path), task_called(task), estimator_called(estimator))
 
 
@@ -266,11 +261,7 @@ def _camera(given: Any, index: int) -> CameraConfig:
 
 
 def _worker_counts(n_workers: int | tuple[int, int]) -> tuple[int, int]:
-    """The fewest and the most workers of an episode, from one number or from both.
-
-    Raises:
-        ConfigError: they are no whole numbers, 0 or more, in this order.
-    """
+    """The fewest and the most workers of an episode, from one number or from both."""
     pair = tuple(n_workers) if isinstance(n_workers, Sequence) else (n_workers, n_workers)
     whole = all(isinstance(k, int | np.integer) and not isinstance(k, bool) for k in pair)
     if not whole or len(pair) != 2 or not 0 <= pair[0] <= pair[1]:

@@ -225,7 +225,7 @@ def check_render_mode(render_mode: str | None) -> None:
     if render_mode == "human":
         raise ConfigError(
             "render_mode='human' is a window round an environment that draws: gymnasium.make("
-            "'HRCReach-v0', render_mode='human') puts it there (pip install 'hrc_env[view]'), or "
+            "ID, render_mode='human') puts it there (pip install 'hrc_env[view]'), or "
             "gymnasium.wrappers.HumanRendering does, round one with render_mode='rgb_array'."
         )
     if render_mode is not None and render_mode not in RENDER_MODES:

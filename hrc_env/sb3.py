@@ -21,7 +21,7 @@ from hrc_env.vector.env import HRCVectorEnv
 with learner():
     from stable_baselines3.common.vec_env import VecEnv
 
-EPISODE_SUMS = ("cost", "cost_proximity", "cost_contact")
+COSTS = ("cost", "cost_proximity", "cost_contact")
 """Infos whose sums over an episode are kept."""
 ACHIEVED, FAILED = "goals_reached", "goals_missed"
 """What an episode's statistics call the attempts of every task (`Task.achieved`, `Task.failed`)."""
@@ -31,13 +31,11 @@ class HRCVecEnv(VecEnv):
     """An `HRCVectorEnv` as SB3 expects environments, with episode statistics.
 
     Environment k of `seed(s)` and then `reset()` is the single environment after
-    `reset(seed=s + k)`; what follows the end of an episode continues its random stream. The info
-    of a step holds its "cost", of which `costs` is the array, and nothing else but where an
-    episode ended: there it is the whole, with what SB3 reads ("terminal_observation",
-    "TimeLimit.truncated") and the episode's statistics ("episode").
+    `reset(seed=s + k)`. The info of a step holds its "cost", of which `costs` is the array, and
+    nothing else but where an episode ended: there it is the whole, with what SB3 reads
+    ("terminal_observation", "TimeLimit.truncated") and the episode's statistics ("episode").
 
     Args:
-        num_envs: how many.
         stagger: after the first `reset()` and after those that follow a `seed()`, let each
             environment's first episode end early at a random time, so that a short rollout of a
             learner sees all phases of an episode and not one. Not for evaluation.
@@ -57,7 +55,7 @@ class HRCVecEnv(VecEnv):
         self.costs: Floats = np.zeros(num_envs)
         """(num_envs,) the cost of the last step; 0 after a reset."""
         self._action = np.zeros((num_envs, *(actions.shape or ())), np.float32)
-        self._sums = {name: np.zeros(num_envs) for name in ("reward", "contacts", *EPISODE_SUMS)}
+        self._sums = {name: np.zeros(num_envs) for name in ("reward", "contacts", *COSTS)}
         self._touching = np.zeros(num_envs, bool)
         self._nearest_m = np.full(num_envs, np.inf)
         self._steps = np.zeros(num_envs, int)
@@ -134,11 +132,10 @@ class HRCVecEnv(VecEnv):
     def _count(self, reward: Floats, infos: Mapping[str, Any]) -> None:
         self._steps += 1
         self._sums["reward"] += reward
-        costs = {name: _of_step(infos, name, self.num_envs) for name in EPISODE_SUMS}
+        costs = {name: _of_step(infos, name, self.num_envs) for name in COSTS}
         for name, cost in costs.items():
             self._sums[name] += cost
-        self.costs = costs["cost"]
-        touching = costs["cost_contact"] > 0
+        self.costs, touching = costs["cost"], costs["cost_contact"] > 0
         self._sums["contacts"] += touching & ~self._touching  # a long touch is one contact
         self._touching = touching
         separation_m = _of_step(infos, "safety/min_separation_m", self.num_envs)
@@ -146,15 +143,15 @@ class HRCVecEnv(VecEnv):
 
     def _episode(self, b: int, info: Mapping[str, Any]) -> dict[str, float]:
         """Statistics of an episode under the names of SB3's Monitor, and ours."""
-        task = self.simulation.task
+        task, sums = self.simulation.task, self._sums
         return {
-            "r": float(self._sums["reward"][b]),
+            "r": float(sums["reward"][b]),
             "l": int(self._steps[b]),
             "seconds": float(self._steps[b] * self.env.config.ctrl_dt),
             "t": time.time() - self.started_s,
-            "cost": float(self._sums["cost"][b]),
-            "cost_steps": float(self._sums["cost_proximity"][b]),
-            "contacts": float(self._sums["contacts"][b]),
+            "cost": float(sums["cost"][b]),
+            "cost_steps": float(sums["cost_proximity"][b]),
+            "contacts": float(sums["contacts"][b]),
             ACHIEVED: info[task.achieved],
             FAILED: info[task.failed],
             "min_separation_m": float(self._nearest_m[b]),

@@ -6,7 +6,7 @@ streams only, never on the size of the batch.
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,7 +21,7 @@ from hrc_env.core.kernels import ahead
 from hrc_env.core.records import PoseEstimate, RobotState, WorkerMotion, WorkerTruth
 from hrc_env.core.stateful import State, Stateful
 from hrc_env.core.streams import children
-from hrc_env.core.typing import Bools, Floats, Ints, Points3
+from hrc_env.core.typing import Bools, Floats, Ints, JointVelocities, Points3
 from hrc_env.geometry import chains
 from hrc_env.motion import generator
 from hrc_env.pipeline.levels import CAMERA_LEVELS, make_pipeline
@@ -43,7 +43,7 @@ from hrc_env.step import (
     worker_info,
 )
 from hrc_env.tasks.task import World
-from hrc_env.tracking import given
+from hrc_env.tracking import oracle
 from hrc_env.worker.body import pool, stack, worker_capsules, worker_truth
 
 CLOSING_M_S = 8.0
@@ -51,22 +51,9 @@ CLOSING_M_S = 8.0
 290,000 steps of arms that were driven to and fro as hard as they can be."""
 
 
-@dataclass(slots=True)
-class Streams:
-    """One random generator per environment for each organ that draws numbers."""
-
-    robot: list[np.random.Generator]
-    motion: list[np.random.Generator]
-    sensor: list[np.random.Generator]
-    tracker: list[np.random.Generator]
-    task: list[np.random.Generator]
-
-    def organs(self) -> tuple[list[np.random.Generator], ...]:
-        """Them all, in the order in which streams are handed out."""
-        return self.robot, self.motion, self.sensor, self.tracker, self.task
-
-
-N_STREAMS = len(fields(Streams))
+STREAMS = ("robot", "motion", "sensor", "tracker", "task")
+"""Who draws numbers, each from a generator of its own, in the order in which these are handed out:
+the worker's walk does not depend on who looks at it."""
 
 
 class Simulation(Stateful):
@@ -74,16 +61,14 @@ class Simulation(Stateful):
 
     CHANGES = (
         "physics", "pipeline", "motion", "task_state", "streams", "action", "episode_cost",
-        "separation_m", "estimate", "forecast", "body_names", "reward_weights",
+        "separation_m", "estimates", "body_names", "reward_weights",
     )  # fmt: skip
 
     def __init__(self, batch: int, settings: Settings) -> None:
         config, perception, scene = settings.config, settings.perception, settings.scene
         ahead.ensure(perception)
         self.batch, self.config, self.control = batch, config, settings.control
-        self.shield = settings.shield
-        self.perception, self.reward_weights = perception, config.reward
-        self.task = settings.task
+        self.perception, self.shield, self.task = perception, settings.shield, settings.task
         self.bodies = stack(pool(config.worker))
         fewest, most = settings.n_workers
         empty = build(config.scene, scene, 0, self.bodies.names, settings.cameras, settings.robot)
@@ -108,105 +93,91 @@ class Simulation(Stateful):
         joints = (self.chain.n_joints,)
         check_shape("start_spread_rad", self._spread_rad.shape, joints, "one a joint")
         self.n_actions = n_actions(settings.control, self.chain)
-        self.layout = observations.layout(
-            self.terms,
-            observations.Sizes(
-                len(self.scene.home_q), self.n_actions, most, len(config.forecast_s)
-            ),
+        sizes = observations.Sizes(
+            self.chain.n_joints, self.n_actions, most, len(config.forecast_s)
         )
+        self.layout = observations.layout(self.terms, sizes)
         self.physics = Physics(self.scene, batch)
         self.pipeline = make_pipeline(perception, settings.estimator, self.scene, batch, config)
         self.body_names = np.full(batch, None, object)
         self.task_state = self.task.init(batch)
+        self.reward_weights = config.reward
         self._everyone = np.arange(batch)
         self.action = np.zeros((batch, self.n_actions))
-        self.episode_cost = np.zeros(batch)
-        self.separation_m = np.zeros(batch)
-        self.estimate = given.prior(batch, most, config.tracker)
-        self.forecast = tuple(given.prior(batch, most, config.tracker) for _ in config.forecast_s)
-        blank = [np.random.default_rng(0)] * batch
-        self.streams = Streams(*(list(blank) for _ in range(5)))
+        self.episode_cost, self.separation_m = np.zeros(batch), np.zeros(batch)
+        self.estimates = tuple(
+            oracle.prior(batch, most, config.tracker) for _ in (0.0, *config.forecast_s)
+        )
+        """What is believed of the workers now, and expected at each of `forecast_s`."""
+        self.streams = {name: [np.random.default_rng(0)] * batch for name in STREAMS}
 
     def reset(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> StepResult:
-        """Start environments `ids` anew, one generator each; their rows of an outcome.
-
-        Every organ draws from a stream of its own, always as many and in the same order, so that
-        the worker's walk does not depend on who looks at it.
-        """
+        """Start environments `ids` anew, one generator each; their rows of a result."""
+        streams = self.streams
         for b, rng in zip(ids, rngs, strict=True):
-            for organ, stream in zip(self.streams.organs(), children(rng, N_STREAMS), strict=True):
-                organ[b] = stream
-        generator.reset(self.motion, ids, self.streams.motion)
+            for name, stream in zip(STREAMS, children(rng, len(STREAMS)), strict=True):
+                streams[name][b] = stream
+        generator.reset(self.motion, ids, streams["motion"])
+        bodies = self.motion.workers["body"][ids]
         self.body_names[ids] = body_names(
-            self.motion.body[ids], self.motion.present[ids] > 0.0, self.bodies.names
+            bodies, self.motion.workers["present"][ids], self.bodies.names
         )
-        self.physics.reset(ids, self._starting_angles(ids), self.motion.body[ids])
+        self.physics.reset(ids, self._starting_angles(ids), bodies)
         self.action[ids], self.episode_cost[ids], self.separation_m[ids] = 0.0, 0.0, 0.0
         robot = chains.robot_state(self.chain, self.physics.q[ids], self.physics.qd[ids])
-        self.task.reset(self.task_state, ids, self.streams.task, World(robot), self.config.task)
-        self.pipeline.reset(ids, self.streams.sensor, self.streams.tracker)
+        self.task.reset(self.task_state, ids, streams["task"], World(robot), self.config.task)
+        self.pipeline.reset(ids, streams["sensor"], streams["tracker"])
         motion = generator.current(self.motion, ids)
         truth = worker_truth(self.bodies, motion)
-        estimate, forecast = self._perceive(ids, motion, truth)
-        believed = self._believed(ids, robot, estimate, forecast)
-        observation = observations.observe(believed, self.layout, self.terms)
+        estimates = self._perceive(ids, motion, truth)
+        belief = self._believed(ids, robot, estimates)
+        observation = observations.observe(belief, self.layout, self.terms)
         info = {
             **no_cost(len(ids)),
-            **tracking_info(estimate, truth, self.present[ids]),
+            **tracking_info(estimates[0], truth, self.present[ids]),
             **self._episode_info(ids),
         }
         return StepResult(observation, np.zeros(len(ids)), np.zeros(len(ids), bool), info)
 
     def step(self, action: Floats) -> StepResult:
         """One control step of every environment; action (B, A) in [-1, 1]."""
-        config, streams = self.config, self.streams
+        config = self.config
         previous, self.action = self.action, np.array(action, float)
-        command = joint_command(
-            self.control, action, self.physics.q, self.chain, self.scene.home_q, config.control
-        )
-        shield_info: Info = {}
-        if self.shield is not None:
-            command, shield_info = shielded(self.shield, self.believed, command, config.ctrl_dt)
+        command, shield_info = self._command()
         path, motion = generator.advance(
-            self.motion, streams.motion, config.scene.sim_dt, config.n_substeps
+            self.motion, self.streams["motion"], config.scene.sim_dt, config.n_substeps
         )
-        apart = self.separation_m > CLOSING_M_S * config.ctrl_dt
-        q_path = self.physics.step(command, path, apart)
+        far = self.separation_m > CLOSING_M_S * config.ctrl_dt
+        q_path = self.physics.step(command, path, far)
         truth = worker_truth(self.bodies, motion)
-
-        estimate, forecast = self._perceive(self._everyone, motion, truth)
+        estimates = self._perceive(self._everyone, motion, truth)
         robot, arm = chains.robot_along(self.chain, q_path, self.physics.qd)
         seen_world = robot.capsules_world[:, self.scene.watched, 1]
         generator.watch(self.motion, seen_world, motion, config.ctrl_dt)
         progress = self.task.advance(
-            self.task_state, streams.task, World(robot), config.ctrl_dt, config.task
+            self.task_state, self.streams["task"], World(robot), config.ctrl_dt, config.task
         )
-        believed = self._believed(self._everyone, robot, estimate, forecast)
-        terms = {
-            **rewards.evaluated(self.task.rewards, believed, progress, previous, config.task),
-            **rewards.evaluated(
-                rewards.SHARED_TERMS, believed, progress, previous, self.reward_weights
-            ),
-        }
-        reward = rewards.total(terms, self.batch)
-
+        belief = self._believed(self._everyone, robot, estimates)
+        terms = self._reward_terms(belief, progress, previous)
         workers = worker_capsules(self.bodies, path, motion.body)
         cost = metrics.cost(
             arm, robot.capsule_radius_m, workers, truth.capsule_radius_m, config.cost
         )
         self.episode_cost += cost.total
         self.separation_m = cost.min_separation_m
-        present = self.present
         info = {
             **{f"reward/{name}": value for name, value in terms.items()},
-            **cost_info(cost, present),
-            **tracking_info(estimate, truth, present),
+            **cost_info(cost, self.present),
+            **tracking_info(estimates[0], truth, self.present),
             **shield_info,
             **self._episode_info(self._everyone),
         }
-        terminated = (cost.contact > 0) & config.cost.contact_terminates
-        observation = observations.observe(believed, self.layout, self.terms)
-        return StepResult(observation, reward, terminated, info)
+        return StepResult(
+            observations.observe(belief, self.layout, self.terms),
+            rewards.total(terms, self.batch),
+            (cost.contact > 0) & config.cost.contact_terminates,
+            info,
+        )
 
     def set_reward(self, weights: RewardConfig) -> None:
         """Weigh the reward's terms so from the next step on."""
@@ -217,11 +188,7 @@ class Simulation(Stateful):
         return {"settings": self.settings, **super().get_state()}
 
     def set_state(self, state: State) -> None:
-        """Continue from a state, bit for bit.
-
-        Raises:
-            ConfigError: it was taken with other settings.
-        """
+        """Continue from a state that was taken with the same settings, bit for bit."""
         for name, value in self.settings.items():
             if state["settings"][name] != value:
                 raise ConfigError(
@@ -234,14 +201,10 @@ class Simulation(Stateful):
         """Release threads and graphics contexts."""
         self.pipeline.close()
 
-    def _starting_angles(self, ids: Ints) -> Floats:
-        """(len(ids), N) arm angles near home, turned anywhere in front of the base."""
-        spread = self._spread_rad
-        angles = [
-            self.scene.home_q + self.streams.robot[b].uniform(-1, 1, len(spread)) * spread
-            for b in ids
-        ]
-        return np.array(angles).reshape(len(ids), -1)
+    @property
+    def estimate(self) -> PoseEstimate:
+        """What is believed of the workers now."""
+        return self.estimates[0]
 
     @property
     def terms(self) -> tuple[observations.ObservationTerm, ...]:
@@ -254,56 +217,71 @@ class Simulation(Stateful):
         return generator.activity(self.motion) != generator.ABSENT
 
     @property
-    def believed(self) -> Belief:
+    def belief(self) -> Belief:
         """What every robot believes now."""
         robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
-        return self._believed(self._everyone, robot, self.estimate, self.forecast)
+        return self._believed(self._everyone, robot, self.estimates)
 
     def markers(self, b: int) -> Points3:
         """(M, 3) what the task of environment `b` has to show [m]."""
         view = self.task.view(self.task_state, np.array([b]), self.config.task)
         return self.task.markers(view)[0]
 
+    def _starting_angles(self, ids: Ints) -> Floats:
+        """(len(ids), N) arm angles near home, turned anywhere in front of the base."""
+        spread, rngs = self._spread_rad, picked(self.streams["robot"], ids)
+        angles = [self.scene.home_q + rng.uniform(-1, 1, len(spread)) * spread for rng in rngs]
+        return np.array(angles).reshape(len(ids), -1)
+
+    def _command(self) -> tuple[JointVelocities, Info]:
+        """(B, N) what the arms are to do [rad/s], and what the shield says to it."""
+        command = joint_command(
+            self.control, self.action, self.physics.q, self.chain, self.scene.home_q,
+            self.config.control,
+        )  # fmt: skip
+        if self.shield is None:
+            return command, {}
+        return shielded(self.shield, self.belief, command, self.config.ctrl_dt)
+
     def _perceive(
         self, ids: Ints, motion: WorkerMotion, truth: WorkerTruth
-    ) -> tuple[PoseEstimate, tuple[PoseEstimate, ...]]:
-        """Let the pipeline look at environments `ids`: their estimates now and ahead."""
+    ) -> tuple[PoseEstimate, ...]:
+        """Let the pipeline look at environments `ids`: their rows of `estimates`."""
         now = SensorInput(ids, self.physics.q[ids], motion)
         if self.pipeline.NEEDS_TRUTH:
-            present = self.motion.present[ids] > 0.0
-            now = TrueSensorInput(ids, now.q, motion, truth, present)
-        streams = self.streams
-        estimate = self.pipeline.perceive(
-            now, picked(streams.sensor, ids), picked(streams.tracker, ids)
-        )
-        forecast = tuple(
-            self.pipeline.ahead(estimate, ids, horizon_s) for horizon_s in self.config.forecast_s
-        )
+            now = TrueSensorInput(ids, now.q, motion, truth, self.motion.workers["present"][ids])
+        sensor, tracker = (picked(self.streams[name], ids) for name in ("sensor", "tracker"))
+        estimate = self.pipeline.perceive(now, sensor, tracker)
+        later = (self.pipeline.forecast(estimate, ids, t) for t in self.config.forecast_s)
+        estimates = (estimate, *later)
         if ids is self._everyone:
-            self.estimate, self.forecast = estimate, forecast
+            self.estimates = estimates
         else:
-            for whole, part in zip(
-                (self.estimate, *self.forecast), (estimate, *forecast), strict=True
-            ):
+            for whole, part in zip(self.estimates, estimates, strict=True):
                 write_rows(whole, ids, part)
-        return estimate, forecast
+        return estimates
 
     def _believed(
-        self,
-        ids: Ints,
-        robot: RobotState,
-        estimate: PoseEstimate,
-        forecast: tuple[PoseEstimate, ...],
+        self, ids: Ints, robot: RobotState, estimates: tuple[PoseEstimate, ...]
     ) -> Belief:
         """What the robots of environments `ids` believe; the records are of them only."""
+        estimate, *later = estimates
         return Belief(
             robot=robot,
             estimate=estimate,
             separation=estimated_separation(robot, estimate),
             task=self.task.view(self.task_state, ids, self.config.task),
             action=self.action[ids],
-            forecast=forecast,
+            forecast=tuple(later),
         )
+
+    def _reward_terms(self, belief: Belief, progress: Any, previous: Floats) -> dict[str, Floats]:
+        """(B,) every term of the reward: the task's, then what all tasks share."""
+        own, shared = self.task.rewards, rewards.SHARED_TERMS
+        return {
+            **rewards.evaluated(own, belief, progress, previous, self.config.task),
+            **rewards.evaluated(shared, belief, progress, previous, self.reward_weights),
+        }
 
     def _episode_info(self, ids: Ints) -> Info:
         """What the episodes of environments `ids` have come to so far, and who is there."""
@@ -316,11 +294,7 @@ class Simulation(Stateful):
 
 
 def checked_action(action: ArrayLike, shape: tuple[int, ...]) -> Floats:
-    """Actions as float64 of a shape, clipped to [-1, 1].
-
-    Raises:
-        ConfigError: another shape, or values that are no finite numbers.
-    """
+    """Actions as float64, clipped to [-1, 1]; `ConfigError` for other shapes or no numbers."""
     try:
         values = np.asarray(action, np.float64)
     except (TypeError, ValueError) as error:

@@ -13,12 +13,13 @@ import pytest
 from commands import ROOT, hrc
 
 import hrc_env
-from agents.base import make_agent, situation
+from agents.env_info import env_info
+from agents.registry import make_agent
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Roi
 from hrc_env.env import HRCEnv
 from hrc_env.geometry import chains
-from hrc_env.geometry.rig_files import write_rig
+from hrc_env.geometry.camera_config import write_rig
 from hrc_env.perception.detector import own_joints
 from hrc_env.registration import import_files
 from hrc_env.scene.build import build
@@ -199,7 +200,7 @@ def test_a_shield_changes_commands_and_says_so():
     for shield in (None, "slow_down"):
         env = gymnasium.make("HRCReach-v0", perception="truth", shield=shield)
         simulation = env.unwrapped.simulation
-        agent, (observation, _) = make_agent("scripted", situation(simulation)), env.reset(seed=1)
+        agent, (observation, _) = make_agent("scripted", env_info(simulation)), env.reset(seed=1)
         infos[shield] = []
         for _ in range(200):
             observation, *_, info = env.step(agent.act(observation))
@@ -373,8 +374,8 @@ SERVO = '<velocity joint="bend" kv="400" ctrlrange="-3 3"/>'
     ("changes", "said"),
     [
         ({}, "the robot 'swing_arm' already"),
-        ({"mjcf": "<mujoco><"}, "cannot be read"),
-        ({"mjcf": "nowhere.xml"}, "cannot be read"),
+        ({"mjcf": "<mujoco><"}, "cannot be used"),
+        ({"mjcf": "nowhere.xml"}, "cannot be used"),
         ({"tool_site": "top"}, "no site 'top'"),
         ({"joints": ("turn", "lift", "bent")}, "no joint 'bent'"),
         ({"joints": ("lift", "turn", "bend")}, "in its order"),

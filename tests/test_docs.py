@@ -1,5 +1,7 @@
 """README and docs stay true: generated parts are up to date, code runs, links lead somewhere."""
 
+import importlib.util
+import pydoc
 import re
 from pathlib import Path
 
@@ -115,3 +117,48 @@ def test_commands_of_the_readme_exist():
         r"^make ([\w-]+)", text, re.M
     ):
         assert re.search(rf"^{goal}:", makefile, re.M), goal
+
+
+ROOMS = ("", "hrc_env", "hrc_env/tracking")
+"""Where the paths that pages name begin."""
+
+
+@pytest.mark.parametrize("page", WRITTEN, ids=name_of)
+def test_files_that_a_page_names_exist(page):
+    named = re.findall(r"`((?:\w+/)*\w+\.py|(?:hrc_env|assets|tests|benchmarks|examples)/[\w/.]*)`",
+                       by_hand(page))  # fmt: skip
+    assert [
+        path for path in named if not any((ROOT / room / path).exists() for room in ROOMS)
+    ] == []
+
+
+@pytest.mark.parametrize("page", WRITTEN, ids=name_of)
+def test_names_of_modules_and_what_is_in_them_exist(page):
+    for name in re.findall(r"`(hrc_env(?:\.\w+)+)`", by_hand(page)):
+        assert pydoc.locate(name) is not None, name
+
+
+def test_what_a_page_says_is_in_a_file_is_in_it():
+    said = [
+        pair
+        for page in WRITTEN
+        for pair in re.findall(r"`([\w.]+)` in `([\w/]+\.py)`", by_hand(page))
+    ]
+    assert ("Simulation.step", "hrc_env/simulation.py") in said
+    for name, path in said:
+        assert re.search(rf"\b{name.split('.')[-1]}\b", (ROOT / path).read_text()), (name, path)
+
+
+@pytest.mark.parametrize("path", sorted(tables.RESULTS.glob("*.json")), ids=lambda path: path.stem)
+def test_what_measured_a_table_can_be_called(path):
+    command = tables.read(path.stem)["command"]
+    module, script = re.match(r"python (?:-m ([\w.]+)|([\w/]+\.py))", command).groups()
+    assert (ROOT / script).exists() if script else importlib.util.find_spec(module)
+
+
+@pytest.mark.parametrize("page", generate.PAGES, ids=name_of)
+def test_options_that_a_page_names_exist(page):
+    known = (ROOT / "docs" / "reference" / "command_line.md").read_text()
+    for line in re.findall(r"python -m hrc_env [^`#\n]*", page.read_text()):
+        for option in re.findall(r" (--[a-z-]+)", line):
+            assert f"`{option}`" in known or option == "--import", line

@@ -29,7 +29,7 @@ def without_learner(process):
 
 def test_no_module_imports_a_learner_but_the_door_to_one(without_learner):
     done = without_learner("""
-import importlib, pkgutil, hrc_env, agents.base, agents.random, agents.scripted
+import importlib, pkgutil, hrc_env, agents.registry, agents.random, agents.scripted
 refused = []
 for module in pkgutil.walk_packages(hrc_env.__path__, "hrc_env.", onerror=refused.append):
     try:

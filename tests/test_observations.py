@@ -50,8 +50,8 @@ def test_a_worker_is_expected_near_and_less_surely_the_later(level):
     moved = np.linalg.norm(later - now, axis=-1).mean(1)
     assert (moved < (0.5, 1.2)).all()
     assert terms["worker_joints_std"].mean() < std[0].mean() < std[1].mean()
-    expected = env.simulation.believed.forecast[1].mean_world[0, 0]
-    tool = env.simulation.believed.robot.tool_world
+    expected = env.simulation.belief.forecast[1].mean_world[0, 0]
+    tool = env.simulation.belief.robot.tool_world
     np.testing.assert_allclose(later[1], expected - tool, atol=1e-5)
 
 

@@ -5,16 +5,16 @@ import pickle
 
 import numpy as np
 import pytest
+from scipy.optimize import linear_sum_assignment
 from stable_baselines3.common.env_checker import check_env
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import WorkerTruth
 from hrc_env.env import HRCEnv
-from hrc_env.geometry.assignment import assign
 from hrc_env.metrics import tracking_error
 from hrc_env.motion.generator import PeopleConfig, activity_names, current
 from hrc_env.sb3 import HRCVecEnv
-from hrc_env.tracking.given import estimate_from_truth
+from hrc_env.tracking.oracle import estimate_from_truth
 from hrc_env.worker.body import worker_truth
 
 COUNTS = (0, 2, 3)
@@ -96,7 +96,7 @@ def test_three_workers_without_names_keep_their_tracks():
         estimate, motion = env.simulation.estimate, env.simulation.motion
         truth = worker_truth(env.simulation.bodies, current(motion)).joints_world
         apart = np.linalg.norm(estimate.mean_world[:, :, None] - truth[:, None], axis=-1).mean(-1)
-        whom.append([assign(of_room) for of_room in apart])
+        whom.append([linear_sum_assignment(of_room)[1] for of_room in apart])
     assert (np.array(whom)[5:] == whom[5]).all()
 
 

@@ -14,11 +14,10 @@ from commands import ROOT, called
 from matplotlib.figure import Figure
 
 from agents import ppo
-from agents.base import make_agent, situation
-from agents.curriculum import Ramp
+from agents.callbacks import Curve, Interrupt, Ramp, TrainingMonitor, plot_curve
+from agents.env_info import env_info
 from agents.evaluate import evaluate, judged, one_by_one
-from agents.interrupt import Interrupt
-from agents.monitor import Curve, TrainingMonitor, plot_curve
+from agents.registry import make_agent
 from agents.training import as_before
 from hrc_env.__main__ import main
 from hrc_env.cli.train import Train
@@ -95,7 +94,7 @@ def test_resuming_nothing_says_so_without_a_traceback(tmp_path):
 
 def here(**kwargs):
     env = HRCEnv(perception="truth", **kwargs)
-    return situation(env.simulation)
+    return env_info(env.simulation)
 
 
 def test_a_checkpoint_acts_the_same_every_time(run):

@@ -16,11 +16,11 @@ import numpy as np
 import torch
 from torch import nn
 
-from benchmarks.tracking.tracks import Tracks, follow_own
+from benchmarks.tracking.tracks import Tracks, follow_env
 from benchmarks.tracking.rigs import DT_S
 from hrc_env.core.skeleton import MIRROR, N_JOINTS, TORSO
 from hrc_env.tracking.forecast import N_INPUTS, describe
-from hrc_env.tracking.given import GIVEN_STD_M
+from hrc_env.tracking.oracle import ORACLE_STD_M
 
 OUT = Path(__file__).parent / "ahead.npz"
 HORIZONS_S = (0.1, 0.2, 0.4, 0.6, 0.8, 1.0)
@@ -29,7 +29,7 @@ SCALE_M = np.array([0.05, 0.1, 0.2, 0.3, 0.4, 0.5], np.float32)
 WARM_UP, N_FRAMES = 25, 300
 N_AHEAD = 39
 """Frames of the future that a sample needs: 1 s at 1.5 times the pace, and a frame for rates."""
-BOUNDS = (np.log(GIVEN_STD_M), np.log(1.5))
+BOUNDS = (np.log(ORACLE_STD_M), np.log(1.5))
 SETS = (  # seeds, lively, failing
     (range(100_000, 100_096), False, False),
     (range(101_000, 101_096), True, False),
@@ -126,7 +126,7 @@ def batch(samples: Samples, n: int, rng: np.random.Generator) -> list[torch.Tens
     mean, velocity, cov = (array[pick] for array in samples.seen)
     given = rng.random(n) < GIVEN_SHARE
     mean[given], velocity[given] = samples.path[start[given]], samples.speed[start[given]]
-    cov[given] = GIVEN_STD_M**2 * np.eye(3)
+    cov[given] = ORACLE_STD_M**2 * np.eye(3)
     later, pace, turn, size = future(samples, start, rng)
     about = mean - mean[:, TORSO].mean(1, keepdims=True)
     spin = np.stack([-about[..., 1], about[..., 0], 0 * about[..., 0]], -1)
@@ -190,7 +190,7 @@ def train(samples: Samples, steps: int, width: int, seed: int):
 
 
 def save(path: Path, net: nn.Sequential, mean: torch.Tensor, std: torch.Tensor) -> None:
-    """Write the file that `forecast.load_forecast` reads; scales go into the weights."""
+    """Write the file that `forecast.load_network` reads; scales go into the weights."""
     layers = [(net[k].weight.detach().numpy().T, net[k].bias.detach().numpy()) for k in (0, 2, 4)]
     mean, std = mean.numpy(), std.numpy()
     n_moved, n_horizons = len(HORIZONS_S) * N_JOINTS * 3, len(HORIZONS_S)
@@ -223,7 +223,7 @@ def main() -> None:
     options = parser.parse_args()
     sets = []
     for seeds, lively, failing in SETS:
-        sets.append(follow_own(list(seeds), N_FRAMES, lively, failing))
+        sets.append(follow_env(list(seeds), N_FRAMES, lively, failing))
         print(f"{len(seeds)} workers followed", flush=True)
     samples = gather(sets)
     print(f"{len(samples.start)} moments", flush=True)

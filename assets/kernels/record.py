@@ -16,7 +16,8 @@ from typing import Any
 import gymnasium
 from numba.core import event
 
-from agents.base import make_agent, situation
+from agents.env_info import env_info
+from agents.registry import make_agent
 from hrc_env.core.kernels import KERNELS, ahead, signatures
 from hrc_env.core.kernels.lean import KernelDispatcher
 from hrc_env.core.kernels.signatures import Signature
@@ -99,7 +100,7 @@ def called() -> Iterator[tuple[str, tuple[Any, ...]]]:
 def play(level: str, variant: dict[str, Any]) -> None:
     """An episode of one environment, and where there are such of several at once."""
     env = gymnasium.make("HRCReach-v0", perception=level, **variant)
-    agent = make_agent("scripted_slowed", situation(env.unwrapped.simulation))
+    agent = make_agent("scripted_slowed", env_info(env.unwrapped.simulation))
     observation, _ = env.reset(seed=0)
     for _ in range(LEVELS[level]):
         observation, *_ = env.step(agent.act(observation))

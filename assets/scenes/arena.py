@@ -11,6 +11,7 @@ import numpy as np
 
 from assets.scenes import furniture, textures
 from assets.scenes.markings import WHITE, blend, mark_cell
+from assets.scenes.pedestal import MOUNT_WORLD
 from assets.scenes.primitives import (
     HIDES,
     SOLID_SCENE,
@@ -22,7 +23,6 @@ from assets.scenes.primitives import (
 )
 from assets.scenes.textures import Paint
 from hrc_env.geometry.rotations import quaternion_from_matrix
-from hrc_env.scene.grounds import ROBOT_XY_M
 from hrc_env.scene.primitives import LOOKS_ONLY, OVERHEAD
 
 LENGTH_M, DEPTH_M, HEIGHT_M = 6.09, 5.48, 2.59
@@ -52,7 +52,7 @@ def _floor() -> Paint:
     height, width = paint.shape[:2]
     x = (np.arange(width) + 0.5)[None] / FLOOR_PX_PER_M - LENGTH_M / 2
     y = DEPTH_M / 2 - (np.arange(height) + 0.5)[:, None] / FLOOR_PX_PER_M
-    worn = mark_cell(paint, x - ROBOT_XY_M[0], y - ROBOT_XY_M[1], FLOOR_PX_PER_M)
+    worn = mark_cell(paint, x - MOUNT_WORLD[0], y - MOUNT_WORLD[1], FLOOR_PX_PER_M)
     walkway = np.abs(y) < 2.12
     lines = (np.abs(np.abs(y) - 2.08) < 0.03) & (np.abs(x) < 2.4)
     ends = (np.abs(np.abs(x) - 2.40) < 0.03) & walkway

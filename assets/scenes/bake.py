@@ -13,7 +13,7 @@ from assets.scenes import arena, prop_looks, site
 from assets.scenes.mjcf import TEXTURES, write_mjcf
 from assets.scenes.pedestal import add_pedestal
 from assets.scenes.primitives import add_painted, paint_materials
-from hrc_env.scene.props import PARKED_M
+from hrc_env.scene.worker_visuals import PARKED_M
 from hrc_env.worker.props import PROP_NAMES
 
 ASSETS = Path(__file__).resolve().parent.parent

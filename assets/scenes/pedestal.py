@@ -3,7 +3,10 @@
 from typing import Any
 
 from assets.scenes.primitives import SOLID_SCENE, box, cylinder
-from hrc_env.scene.grounds import MOUNT_WORLD
+from hrc_env.scene.places import SCENES
+
+MOUNT_WORLD = SCENES["lab"].mount_world
+"""The same on the site."""
 
 COLOURS: dict[str, tuple[tuple[float, float, float], float, float]] = {
     "arm_joint": ((0.64, 0.66, 0.69), 0.5, 0.45),

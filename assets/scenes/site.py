@@ -13,6 +13,7 @@ import numpy as np
 
 from assets.scenes import arena, furniture, site_house, site_stock, site_vehicles, textures
 from assets.scenes.markings import mark_cell
+from assets.scenes.pedestal import MOUNT_WORLD
 from assets.scenes.primitives import (
     HIDES,
     SOLID_SCENE,
@@ -25,7 +26,6 @@ from assets.scenes.primitives import (
 )
 from assets.scenes.textures import Paint
 from hrc_env.geometry.rotations import quaternion_from_matrix
-from hrc_env.scene.grounds import ROBOT_XY_M
 from hrc_env.scene.primitives import LOOKS_ONLY, capsule
 from hrc_env.scene.rig import SITE_CAMERAS
 
@@ -64,7 +64,7 @@ def _slab() -> Paint:
     height, width = paint.shape[:2]
     x = x0 + (np.arange(width) + 0.5)[None] / SLAB_PX_PER_M
     y = y1 - (np.arange(height) + 0.5)[:, None] / SLAB_PX_PER_M
-    mark_cell(paint, x - ROBOT_XY_M[0], y - ROBOT_XY_M[1], SLAB_PX_PER_M)
+    mark_cell(paint, x - MOUNT_WORLD[0], y - MOUNT_WORLD[1], SLAB_PX_PER_M)
     dust = textures.noise(np.random.default_rng(62), (height, width), (90, 90))
     share = 0.28 * np.clip(dust, 0, 1)[..., None]
     return paint * (1 - share) + share * np.array([186.0, 164, 130])

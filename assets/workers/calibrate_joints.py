@@ -18,7 +18,7 @@ from poses import POSES, posed
 from hrc_env.worker.body import SEGMENTS, Body, assets_dir, load_body, worker_names, worker_truth
 from hrc_env.geometry.cameras import project, projections
 from hrc_env.geometry.rotations import matrix_from_quaternion
-from hrc_env.geometry.triangulation import triangulate_robust
+from hrc_env.geometry.triangulation import triangulate
 from hrc_env.perception.blazepose import decode_landmarks, landmark_input, to_image
 from hrc_env.perception.detector import STATURE_OF_SIDE
 from hrc_env.perception.network import Landmarker, load_landmarker
@@ -132,7 +132,7 @@ def calibrate(name: str) -> Calibration:
     """Look at a worker in all poses and places."""
     body = load_body(name)
     motions, px, sigma = observe(name)
-    points = triangulate_robust(projections(pinholes(LAB_CAMERAS)), px, sigma).points_world[:, 0]
+    points = triangulate(projections(pinholes(LAB_CAMERAS)), px, sigma, 5.0).points_world[:, 0]
     local = in_segments(body, motions, points, body.joint_segment)
     anatomical = anatomical_offset(name)
     held_out = np.arange(len(motions)) % 2 == 1

@@ -11,7 +11,7 @@ from benchmarks.tracking.rigs import DT_S, Rig
 from benchmarks.tracking.sequences import Sequences
 from benchmarks.tracking.walks import walk
 from hrc_env.core.typing import Floats
-from hrc_env.experiments.study.shelf import Tick
+from hrc_env.experiments.study.cache import PartProgress
 from hrc_env.tracking.estimators import make_estimator
 from hrc_env.tracking.people.association import associate
 
@@ -21,18 +21,10 @@ _N_PEOPLE = 4
 
 
 def time_estimator(
-    name: str, rig: Rig, clean: Sequences, hard: Sequences, n_repeats: int, tick: Tick
+    name: str, rig: Rig, clean: Sequences, hard: Sequences, n_repeats: int, tick: PartProgress
 ) -> dict[str, list[float]]:
-    """Microseconds per worker and update, one number per repeat.
-
-    Args:
-        name: an estimator.
-        rig: of the sequences.
-        clean: at least 64 sequences; the median over frames at batch 1 and 64 ("1", "64").
-        hard: the same for the mean over frames at batch 64 ("hard_64").
-        n_repeats: how often.
-        tick: told the share that is done.
-    """
+    """Microseconds per worker and update, one number per repeat: medians over frames of `clean` at
+    batch 1 and 64 ("1", "64"), the mean of `hard` at batch 64 ("hard_64")."""
     times: dict[str, list[float]] = {"1": [], "64": [], "hard_64": []}
     _frame_times(name, rig, clean, 1, 2)  # compiles
     for _ in range(n_repeats):
@@ -61,7 +53,7 @@ def _frame_times(
     return 1e6 * seconds[min(_FIRST, n_frames - 1) :] / batch
 
 
-def time_association(rig: Rig, n_repeats: int, tick: Tick) -> dict[str, list[float]]:
+def time_association(rig: Rig, n_repeats: int, tick: PartProgress) -> dict[str, list[float]]:
     """Microseconds to tell four people apart in one frame of four cameras, one per repeat."""
     sequences = _crowd(rig)
     estimator: Any = make_estimator("kalman", rig.P, DT_S, sequences.config)

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 import hrc_env
-from hrc_env.tracking.ahead import ahead
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import EstimatorSpec, make_estimator
+from hrc_env.tracking.forecast import forecast
 
 
 @dataclass(frozen=True)
@@ -53,8 +53,8 @@ class AlphaBeta:
         found = self.points.estimate(state.points)
         return replace(found, mean_world=1.0 * state.mean, velocity_world=1.0 * state.velocity)
 
-    def ahead(self, state, horizon_s):
-        return ahead(self.estimate(state), horizon_s, self.config)
+    def forecast(self, state, horizon_s):
+        return forecast(self.estimate(state), horizon_s, self.config)
 
 
 hrc_env.register_estimator(EstimatorSpec("alpha_beta", AlphaBeta, AlphaBetaConfig, True))

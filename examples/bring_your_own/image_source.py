@@ -9,7 +9,7 @@ from pathlib import Path
 import imageio.v2 as imageio
 import numpy as np
 
-from hrc_env.geometry.rig_files import read_rig
+from hrc_env.geometry.camera_config import read_rig
 from hrc_env.perception.blazepose import sample_window
 from hrc_env.pipeline.pose_tracker import PoseTracker
 from hrc_env.scene.rig import pinholes

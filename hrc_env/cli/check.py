@@ -9,7 +9,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import version
 
@@ -21,6 +20,11 @@ Finding = tuple[bool, str]
 PACKAGES = ("mujoco", "gymnasium", "numpy", "numba")
 DRAW = "from hrc_env.scene import gl; ok, said = gl.gl_status(); print(said); ok or exit(1)"
 """Draws a pixel; says with what, or what to do."""
+NAMES = (
+    "python", "packages", "torch", "machine", "OpenGL", "triton", "kernels", "weights", "OpenVINO",
+    "environment",
+)  # fmt: skip
+"""What is checked, each by the function of that name."""
 LITTLE_GB = 2.0
 """Level `pixels` and a film do not fit into much less [GB]."""
 
@@ -32,21 +36,9 @@ class Check:
     def run(self) -> int:
         """Print the findings; 0 if all are ok."""
         console, fine = Console(), True
-        checks: dict[str, Callable[[], Finding]] = {
-            "python": _python,
-            "packages": _packages,
-            "torch": _torch,
-            "machine": _machine,
-            "OpenGL": _opengl,
-            "triton": _triton,
-            "kernels": _kernels,
-            "weights": _weights,
-            "OpenVINO": _openvino,
-            "environment": _environment,
-        }
-        for name, check in checks.items():
+        for name in NAMES:
             try:
-                ok, message = check()
+                ok, message = globals()[f"_{name.lower()}"]()
             except Exception as error:  # whatever is wrong with this machine, say it
                 ok, message = False, f"{type(error).__name__}: {error}"
             fine &= ok
@@ -62,8 +54,8 @@ def _python() -> Finding:
 def _packages() -> Finding:
     from hrc_env import __version__
 
-    others = [f"{name} {version(name)}" for name in PACKAGES]
-    return True, ", ".join([f"hrc_env {__version__}", *others])
+    others = ", ".join(f"{name} {version(name)}" for name in PACKAGES)
+    return True, f"hrc_env {__version__}, {others}"
 
 
 def _torch() -> Finding:
@@ -77,9 +69,8 @@ def _torch() -> Finding:
         return True, f"not installed, the environment does without. {error}"
     gpus = {"CUDA": torch.version.cuda, "ROCm": torch.version.hip}
     builds = [f"{name} {number} build" for name, number in gpus.items() if number] or ["CPU build"]
-    return True, (
-        f"{torch.__version__} ({builds[0]}), stable-baselines3 {stable_baselines3.__version__}"
-    )
+    ours = f"{torch.__version__} ({builds[0]})"
+    return True, f"{ours}, stable-baselines3 {stable_baselines3.__version__}"
 
 
 def _machine() -> Finding:
@@ -108,9 +99,8 @@ def _triton() -> Finding:
 
 def _in_a_process(code: str) -> Finding:
     """Whether Python code ends well, and the last line that it prints."""
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=120
-    )
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
     if done.returncode < 0:
         return False, f"the process was ended by {signal.Signals(-done.returncode).name}"
     lines = (done.stdout if done.stdout.strip() else done.stderr).strip().splitlines()
@@ -126,10 +116,8 @@ def _kernels() -> Finding:
     if not todo:
         return True, f"compiled, in {folder()}"
     wait_s = sum(each.seconds for each in todo) / n_cores()
-    return True, (
-        f"{len(todo)} are not compiled yet: whoever first needs them waits, about {wait_s:.0f} s "
-        "for all; or do it now: python -m hrc_env setup"
-    )
+    said = f"{len(todo)} are not compiled yet: whoever first needs them waits, about {wait_s:.0f} s"
+    return True, f"{said} for all; or do it now: python -m hrc_env setup"
 
 
 def _weights() -> Finding:
@@ -155,10 +143,12 @@ def _openvino() -> Finding:
 def _environment() -> Finding:
     import gymnasium
 
+    from hrc_env.tasks import DEFAULT
+
     started_s = time.monotonic()
-    env = gymnasium.make("hrc_env:HRCReach-v0", perception="keypoints")
+    env = gymnasium.make(f"hrc_env:{DEFAULT}", perception="keypoints")
     env.reset(seed=0)
     env.step(env.action_space.sample() * 0)
     env.close()
     taken_s = time.monotonic() - started_s
-    return True, f"HRCReach-v0 at level keypoints: made, reset and stepped in {taken_s:.1f} s"
+    return True, f"{DEFAULT} at level keypoints: made, reset and stepped in {taken_s:.1f} s"

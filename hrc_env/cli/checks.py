@@ -15,22 +15,20 @@ def at_least(option: str, value: float | None, low: float) -> None:
 
 def writable_folder(path: Path, option: str = "--out") -> None:
     """Raise `HRCError` unless files can be written into the folder; it need not exist yet."""
-    if path.exists() and not path.is_dir():
-        raise _refusal(option, path, "a file of that name is there, and a folder is needed")
-    _try(path, path, option)
+    reason = "a file of that name is there, and a folder is needed" if path.is_file() else ""
+    _refuse(option, path, reason or _unwritable(path))
 
 
 def writable_file(path: Path, suffix: str = "", option: str = "--out") -> None:
     """Raise `HRCError` unless a file of that name and ending can be written."""
     if suffix and path.suffix.lower() != suffix:
         raise ConfigError(f"{option} must end in {suffix}, got {path.name!r}.")
-    if path.is_dir():
-        raise _refusal(option, path, "it is a folder, and a file is needed")
-    _try(path, path.parent, option)
+    reason = "it is a folder, and a file is needed" if path.is_dir() else ""
+    _refuse(option, path, reason or _unwritable(path.parent))
 
 
-def _try(path: Path, folder: Path, option: str) -> None:
-    """Write something where the folder is, or into the nearest one above it that exists."""
+def _unwritable(folder: Path) -> str:
+    """Why nothing can be written into the folder, or the nearest one above it that exists."""
     there = folder.absolute()
     while not there.exists() and there != there.parent:
         there = there.parent
@@ -38,9 +36,10 @@ def _try(path: Path, folder: Path, option: str) -> None:
         with tempfile.TemporaryFile(dir=there) as file:
             file.write(b"hrc_env")
     except OSError as error:
-        reason = f"{there}: {error.strerror}" if there.is_dir() else f"{there} is no folder"
-        raise _refusal(option, path, reason) from error
+        return f"{there}: {error.strerror}" if there.is_dir() else f"{there} is no folder"
+    return ""
 
 
-def _refusal(option: str, path: Path, reason: str) -> HRCError:
-    return HRCError(f"{path} cannot be written ({reason}). Name another place with {option}.")
+def _refuse(option: str, path: Path, reason: str) -> None:
+    if reason:
+        raise HRCError(f"{path} cannot be written ({reason}). Name another place with {option}.")

@@ -1,21 +1,23 @@
-"""python -m hrc_env experiment: the paper's experiments, what the eyes are worth, and beyond."""
+"""python -m hrc_env experiment: the paper's two, what perception is worth, ablations."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import partial
+from importlib import import_module
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import tyro
 
-from benchmarks.commands.bench import show
 from hrc_env.cli.checks import at_least
+from hrc_env.cli.progress import show
 
 
 @dataclass(frozen=True)
 class AnyExperiment:
     """What every experiment is asked."""
 
+    name: ClassVar[str]
+    """Of its folder."""
     out: Path
     """Folder for report.html, results.json and figures; a run that was stopped goes on there."""
     quick: bool = False
@@ -23,36 +25,37 @@ class AnyExperiment:
     seeds: int | None = None
     """How many seeds."""
     overwrite: bool = False
-    """Throw away the results of something else in the folder."""
+    """Delete the results of something else in the folder."""
 
-    def shown(self, run: Callable[..., object]) -> int:
-        """Run `run(folder, say, overwrite=...)`, show the tables."""
+    def run(self) -> int:
+        """Run, show the tables."""
         at_least("--seeds", self.seeds, 1)
-        written = "report.html, results.json, figures/"
-        return show(partial(run, overwrite=self.overwrite), self.out, "report.md", written)
+        experiment = import_module(f"hrc_env.experiments.{self.name}.experiment")
+        runner = import_module("hrc_env.experiments.study.runner")
+        asked = {each.name: getattr(self, each.name) for each in fields(self)}
+        out, overwrite = asked.pop("out"), asked.pop("overwrite")
+        config = experiment.config_for(**asked)
+        run = partial(runner.run, experiment.STUDY, config, overwrite=overwrite)
+        return show(run, out, "experiment", "report.html, results.json, figures/")
 
 
 @dataclass(frozen=True)
 class SiteExperiment(AnyExperiment):
     """The paper's simulation: a walk over the site, single cameras against four."""
 
+    name = "site"
     out: Path = Path("out/site")
     seeds: int | None = None
     """Walks, instead of 10 (2 if quick)."""
     estimator: tuple[str, ...] = ("particle", "paper")
     """Estimators: python -m hrc_env list."""
 
-    def run(self) -> int:
-        """Run, show the tables."""
-        from hrc_env.experiments.site.experiment import config_for, run
-
-        return self.shown(partial(run, config_for(self.quick, self.seeds, self.estimator)))
-
 
 @dataclass(frozen=True)
 class LabExperiment(AnyExperiment):
     """The paper's laboratory: all joints, five kinds of motion, one camera against four."""
 
+    name = "lab"
     out: Path = Path("out/lab")
     seeds: int | None = None
     """Films of every motion, instead of 10 (2 if quick)."""
@@ -60,53 +63,37 @@ class LabExperiment(AnyExperiment):
     """The landmark network for workers who are folded up: full, or heavy, which is fetched once
     with `python -m hrc_env setup --networks heavy`."""
 
-    def run(self) -> int:
-        """Run, show the tables."""
-        from hrc_env.experiments.lab.experiment import config_for, run
-
-        return self.shown(partial(run, config_for(self.quick, self.seeds, self.folded)))
-
 
 @dataclass(frozen=True)
 class ImpactExperiment(AnyExperiment):
-    """What an estimator is worth in safety: the same robots and workers, other eyes."""
+    """What perception is worth in safety: the same robots and workers, other detections."""
 
+    name = "impact"
     out: Path = Path("out/impact")
     seeds: int | None = None
     """Episodes of every row, instead of 200 (8 if quick)."""
     estimator: tuple[str, ...] = ()
-    """Compare these only, with the default one, the truth and nothing; all eyes if not given."""
-
-    def run(self) -> int:
-        """Run, show the tables."""
-        from hrc_env.experiments.impact.experiment import config_for, run
-
-        return self.shown(partial(run, config_for(self.quick, self.seeds, self.estimator)))
+    """Compare these only, with the default one, the truth and nothing; all setups if not given."""
 
 
 @dataclass(frozen=True)
-class BeyondExperiment(AnyExperiment):
+class AblationsExperiment(AnyExperiment):
     """What the paper leaves open: cameras and places, N and M of Algorithm 1, latency,
     calibration, occlusion, several workers, what the parts of the default filter contribute."""
 
-    out: Path = Path("out/beyond")
+    name = "ablations"
+    out: Path = Path("out/ablations")
     seeds: int | None = None
     """Episodes of every setting, instead of 80 (4 if quick)."""
     studies: tuple[str, ...] | None = None
     """Which of cameras, algorithm1, latency, calibration, occlusion, workers, filter, kinematics;
     all if not given."""
 
-    def run(self) -> int:
-        """Run, show the tables."""
-        from hrc_env.experiments.beyond.experiment import config_for, run
-
-        return self.shown(partial(run, config_for(self.quick, self.seeds, self.studies)))
-
 
 @dataclass(frozen=True)
 class Experiment:
-    """The paper's two experiments (site, lab), what the eyes are worth in safety (impact), and
-    ablations of rigs and estimators (beyond).
+    """The paper's two experiments (site, lab), what perception is worth in safety (impact), and
+    ablations of rigs and estimators (ablations).
 
     Each takes --quick (minutes) and --out DIR, where it writes report.html, results.json and
     figures; it keeps what is finished when it is stopped, and goes on there.
@@ -116,7 +103,7 @@ class Experiment:
         Annotated[SiteExperiment, tyro.conf.subcommand("site")]
         | Annotated[LabExperiment, tyro.conf.subcommand("lab")]
         | Annotated[ImpactExperiment, tyro.conf.subcommand("impact")]
-        | Annotated[BeyondExperiment, tyro.conf.subcommand("beyond")]
+        | Annotated[AblationsExperiment, tyro.conf.subcommand("ablations")]
     )
     """Which experiment."""
 

@@ -2,9 +2,7 @@
 
 import os
 import time
-from collections import deque
 from collections.abc import Callable, Iterable
-from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +12,10 @@ from rich.console import Console
 from rich.table import Table
 
 from hrc_env.cli.frame import Diary, compose
-from hrc_env.cli.kernels import compile_kernels
-from hrc_env.cli.progress import progress_bar
+from hrc_env.cli.progress import compile_kernels, track
 from hrc_env.core.checkout import agents
 from hrc_env.core.typing import Image
 from hrc_env.env import HRCEnv
-from hrc_env.render.views import Glance
 
 STEPS_PER_FRAME = 2
 """A film shows every second step, in real time."""
@@ -27,11 +23,9 @@ CLOSE_M = 0.1
 """The still shows the closest moment that is not yet closer than this [m]."""
 H264 = ("-preset", "superfast", "-crf", "18")
 """A fifth of the usual preset's time; sharp."""
-FRAMES_BEHIND = 2
-"""So many frames may wait to be drawn."""
 
 Make = Callable[[Any], Any]
-"""Builds the agent for a `Situation`."""
+"""Builds the agent for an `EnvInfo`."""
 
 
 def film_episode(
@@ -40,30 +34,22 @@ def film_episode(
     """Film `n_steps` of an agent; returns what came of them, by name and [unit].
 
     Args:
-        make: builds the agent for a `Situation`.
+        make: builds the agent for an `EnvInfo`.
         path: an .mp4 file; a still of the closest moment that is no near miss yet (or of the
             first step) is written beside it as .png.
         seed: of the episode.
         n_steps: how many steps; every second one is a frame.
         kwargs: as of `HRCEnv`.
-
-    Raises:
-        RenderingError: this machine has no OpenGL.
     """
-    console = Console()
-    compile_kernels(console, kwargs.get("perception", "pixels"))
-    console.print(f"Making the environment: perception {kwargs.get('perception', 'pixels')} ...")
+    level = kwargs.get("perception", "pixels")
+    compile_kernels(Console(), level)
+    Console().print(f"Making the environment: perception {level} ...")
     env = HRCEnv(**kwargs)
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_suffix(".draft.mp4")
     try:
-        agent = make(agents("base").situation(env.simulation))
-        console.print("First look at the scene ...")
-        observation, _ = env.reset(seed=seed)
-        console.print("Drawing what stands still in it ...")
-        with _Studio(env, draft) as studio:
-            totals = _roll(env, agent, observation, n_steps, studio, console)
-        imageio.imwrite(path.with_suffix(".png"), studio.still)
+        totals, still = _filmed(env, make, draft, seed, n_steps)
+        imageio.imwrite(path.with_suffix(".png"), still)
         os.replace(draft, path)
     finally:
         env.close()
@@ -75,24 +61,19 @@ def nearest_seed(make: Make, seeds: Iterable[int], n_steps: int = 250, **kwargs:
     """Of some seeds the one whose episode comes closest to the worker without touching them.
 
     Nothing is drawn: "pixels" is played as "keypoints", and may come out otherwise in the film.
-
-    Args:
-        make: builds the agent for a `Situation`.
-        seeds: of the episodes that are played.
-        n_steps: their length.
-        kwargs: as of `HRCEnv`.
     """
     if kwargs.get("perception", "pixels") == "pixels":
         kwargs = {**kwargs, "perception": "keypoints", "appearance": None}
-    env, closest_m, tried = HRCEnv(**kwargs), {}, list(seeds)
+    env = HRCEnv(**kwargs)
     try:
-        with progress_bar(Console(), "looking for an encounter") as advance:
-            for seed in tried:
-                closest_m[seed] = _closest_m(env, make, seed, n_steps)
-                advance(1 / len(tried), "looking for an encounter")
+        tried = track(list(seeds), "looking for an encounter")
+        closest_m = {seed: _closest_m(env, make, seed, n_steps) for seed in tried}
     finally:
         env.close()
-    return _encounter(closest_m)
+    free = {seed: metres for seed, metres in closest_m.items() if metres > CLOSE_M}
+    if free:
+        return min(free, key=lambda seed: free[seed])
+    return max(closest_m, key=lambda seed: closest_m[seed])  # all are near misses: the least one
 
 
 def table(totals: dict[str, float], title: str = "") -> Table:
@@ -100,22 +81,13 @@ def table(totals: dict[str, float], title: str = "") -> Table:
     rows = Table("", "", "unit", title=title or None)
     rows.columns[1].justify = "right"
     for name, value in totals.items():
-        what, _, unit = name.partition(" [")
-        places = {"count": 0, "m": 2}.get(unit.rstrip("]"), 1)
-        rows.add_row(what, f"{value:.{places}f}", unit.rstrip("]"))
+        what, _, unit = name.removesuffix("]").partition(" [")
+        rows.add_row(what, f"{value:.{({'count': 0, 'm': 2}).get(unit, 1)}f}", unit)
     return rows
 
 
-def _encounter(closest_m: dict[int, float]) -> int:
-    """The seed of the closest episode that is no near miss; else of the one least close."""
-    apart = {seed: metres for seed, metres in closest_m.items() if metres > CLOSE_M}
-    if apart:
-        return min(apart, key=lambda seed: apart[seed])
-    return max(closest_m, key=lambda seed: closest_m[seed])
-
-
 def _closest_m(env: HRCEnv, make: Make, seed: int, n_steps: int) -> float:
-    agent = make(agents("base").situation(env.simulation))
+    agent = make(agents("env_info").env_info(env.simulation))
     observation, _ = env.reset(seed=seed)
     closest_m = np.inf
     for _ in range(n_steps):
@@ -126,81 +98,41 @@ def _closest_m(env: HRCEnv, make: Make, seed: int, n_steps: int) -> float:
     return closest_m
 
 
-def _roll(
-    env: HRCEnv,
-    agent: Any,
-    observation: Any,
-    n_steps: int,
-    studio: "_Studio",
-    console: Console,
-) -> dict[str, float]:
-    """Play and have every second step drawn; the still is the closest moment yet to come."""
-    diary, errors_m, info = Diary(), [], {}
-    closest_m, started_s = np.inf, time.monotonic()
-    with progress_bar(console, "filming") as advance:
-        for step in range(n_steps):
+def _filmed(
+    env: HRCEnv, make: Make, path: Path, seed: int, n_steps: int
+) -> tuple[dict[str, float], Image]:
+    """Play, draw every second step; what came of it, and the still."""
+    agent = make(agents("env_info").env_info(env.simulation))
+    observation, info = env.reset(seed=seed)
+    diary, closest_m, started_s = Diary(), np.inf, time.monotonic()
+    still = np.zeros((1, 1, 3), np.uint8)
+    fps = 1 / env.config.ctrl_dt / STEPS_PER_FRAME
+    with imageio.get_writer(
+        path, fps=fps, quality=None, macro_block_size=4, output_params=list(H264)
+    ) as writer:
+        for step in track(range(n_steps), "filming"):
             observation, _, terminated, _, info = env.step(agent.act(observation))
-            gap_m = float(env.simulation.believed.separation.distance_m.min(initial=np.inf))
-            diary.note(info, gap_m, env.simulation.task.counts(info))
-            errors_m.append(info.get("tracking/mpjpe_m", np.nan))
+            believed = env.simulation.belief.separation.distance_m
+            diary.note(info, float(believed.min(initial=np.inf)), env.simulation.task.counts(info))
             if step % STEPS_PER_FRAME == 0:
-                closer = CLOSE_M < diary.true_m[-1] < closest_m
-                closest_m = diary.true_m[-1] if closer else closest_m
-                studio.add(diary, closer or step == 0)
-            advance(1 / n_steps, "filming")
+                frame = compose(env, diary)
+                writer.append_data(frame)
+                if step == 0 or CLOSE_M < diary.true_m[-1] < closest_m:
+                    still = frame
+                    closest_m = diary.true_m[-1] if diary.true_m[-1] > CLOSE_M else np.inf
             if terminated:
                 break
-        studio.finish()
-    seconds = time.monotonic() - started_s
-    known = [error for error in errors_m if error == error]
+    return _totals(env, diary, info, time.monotonic() - started_s), still
+
+
+def _totals(env: HRCEnv, diary: Diary, info: dict[str, Any], seconds: float) -> dict[str, float]:
+    errors_m = np.array(diary.error_m)
+    known = errors_m[np.isfinite(errors_m)]
     return {
-        "median tracking error [mm]": 1e3 * float(np.median(known)) if known else np.nan,
+        "median tracking error [mm]": 1e3 * float(np.median(known)) if len(known) else np.nan,
         "lost steps [%]": 100 * (1 - len(known) / len(errors_m)),
-        "minimum separation [m]": float(np.min(diary.true_m)),
+        "minimum separation [m]": min(diary.true_m),
         **{f"{name} [count]": n for name, n in env.simulation.task.counts(info).items()},
         "cost [count]": info["episode_cost"],
-        "steps played [steps/s]": len(errors_m) / seconds,
-        "film drawn [frames/s]": len(range(0, len(errors_m), STEPS_PER_FRAME)) / seconds,
+        "steps played and drawn [steps/s]": len(errors_m) / seconds,
     }
-
-
-class _Studio:
-    """Draws frames and hands them to ffmpeg in a thread, while the environment goes on."""
-
-    def __init__(self, env: HRCEnv, path: Path) -> None:
-        self.still: Image = np.zeros((1, 1, 3), np.uint8)
-        """The last frame that was asked to be one."""
-        self._env = env
-        self._writer = imageio.get_writer(
-            path, fps=1 / env.config.ctrl_dt / STEPS_PER_FRAME, quality=None,
-            macro_block_size=4, output_params=list(H264),
-        )  # fmt: skip
-        self._thread = ThreadPoolExecutor(1, thread_name_prefix="hrc_env-film")
-        self._waiting: deque[Future[None]] = deque()
-
-    def add(self, diary: Diary, is_still: bool) -> None:
-        """Draw this moment some time."""
-        seen = self._env.views.glance()
-        self._waiting.append(self._thread.submit(self._draw, diary.copy(), seen, is_still))
-        while len(self._waiting) > FRAMES_BEHIND:
-            self._waiting.popleft().result()
-
-    def finish(self) -> None:
-        """Wait for what is not drawn yet."""
-        while self._waiting:
-            self._waiting.popleft().result()
-
-    def _draw(self, diary: Diary, seen: Glance, is_still: bool) -> None:
-        frame = compose(self._env, diary, seen)
-        self.still = frame if is_still else self.still
-        self._writer.append_data(frame)
-
-    def __enter__(self) -> "_Studio":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Free what was made in the thread, there."""
-        self._waiting.clear()
-        self._thread.submit(self._env.views.close).result()
-        self._thread.shutdown()
-        self._writer.close()

@@ -1,7 +1,6 @@
 """A film's frame: the room beside the four cameras, what is believed, and the separation."""
 
 from dataclasses import dataclass, field
-from functools import lru_cache
 from typing import Any
 
 import cv2
@@ -12,7 +11,6 @@ from hrc_env.core.typing import Image
 from hrc_env.env import HRCEnv
 from hrc_env.pipeline.levels import CAMERA_LEVELS
 from hrc_env.render import overlay
-from hrc_env.render.views import Glance
 
 WIDTH, HEIGHT = 1600, 900
 ROOM = (792, 716)
@@ -40,6 +38,8 @@ class Diary:
 
     true_m: list[float] = field(default_factory=list)
     estimated_m: list[float] = field(default_factory=list)
+    error_m: list[float] = field(default_factory=list)
+    """Of the tracked joints; NaN where nobody was tracked."""
     cost: list[float] = field(default_factory=list)
     counts: dict[str, Any] = field(default_factory=dict)
     """What was achieved and what failed so far."""
@@ -48,59 +48,36 @@ class Diary:
         """Add a step."""
         self.true_m.append(info.get("safety/min_separation_m", np.inf))
         self.estimated_m.append(estimated_m)
+        self.error_m.append(info.get("tracking/mpjpe_m", np.nan))
         self.cost.append(info["cost"])
         self.counts = counts
 
-    def copy(self) -> "Diary":
-        """As it is now."""
-        lists = list(self.true_m), list(self.estimated_m), list(self.cost)
-        return Diary(*lists, self.counts)
 
-
-def compose(env: HRCEnv, diary: Diary, seen: Glance | None = None) -> Image:
-    """One frame (900, 1600, 3): room, cameras, crops or belief, strip.
-
-    Args:
-        env: whose views draw; it may have gone on since `seen`.
-        diary: what has happened until then; not written to while this runs.
-        seen: the moment that is shown; None is now.
-    """
-    level, seen = env.simulation.perception, seen or env.views.glance()
-    frame = _panel(HEIGHT, WIDTH, level).copy()
-    room = env.views.room(*ROOM, seen)
+def compose(env: HRCEnv, diary: Diary) -> Image:
+    """One frame (900, 1600, 3): room, cameras, crops or belief, strip."""
+    level, views = env.simulation.perception, env.views
+    frame = _panel(HEIGHT, WIDTH)
+    title = f"what the robot believes (perception: {level}), from above and from the side"
+    if level == "pixels":
+        title = "what the pose network is given: crops round the predicted worker"
+    overlay.write(frame, title, (RIGHT_X + 4, TITLE_Y), 16)
+    room = views.room(*ROOM)
     overlay.label(room, "what happens", (10, 10), 18)
     foot = room[-LEGEND_HEIGHT:]
     cv2.addWeighted(foot, 0.25, legend(level), 0.75, 0, dst=foot)
     _paste(frame, room, (0, 0))
-    for k, view in enumerate(env.views.cameras(*TILE, seen)[:4]):
-        x, y = k % 2 * (TILE[0] + 4), k // 2 * (TILE[1] + 4)
-        _paste(frame, view, (RIGHT_X + x, y))
-    for k, crop in enumerate(env.views.crops(CROP, seen)[:4]):
-        _paste(frame, crop, (RIGHT_X + k * (CROP + 4), TITLE_Y + 30))
-    if level != "pixels":
-        for k, belief in enumerate(env.views.beliefs(*BELIEF, seen)):
-            _paste(frame, belief, (RIGHT_X + k * (BELIEF[0] + 4), TITLE_Y + 30))
+    for k, view in enumerate(views.cameras(*TILE)[:4]):
+        _paste(frame, view, (RIGHT_X + k % 2 * (TILE[0] + 4), k // 2 * (TILE[1] + 4)))
+    pictures = views.crops(CROP)[:4] if level == "pixels" else views.beliefs(*BELIEF)
+    for k, picture in enumerate(pictures):
+        _paste(frame, picture, (RIGHT_X + k * (picture.shape[1] + 4), TITLE_Y + 30))
     _paste(frame, strip(diary, env.config.ctrl_dt, env.config.cost.proximity_m), (0, 720))
     return frame
 
 
-@lru_cache(maxsize=4)
-def _panel(height: int, width: int, level: str) -> Image:
-    """What is the same in all frames; not to be written to."""
-    image = np.empty((height, width, 3), np.uint8)
-    image[:] = overlay.PANEL
-    title = f"what the robot believes (perception: {level}), from above and from the side"
-    if level == "pixels":
-        title = "what the pose network is given: crops round the predicted worker"
-    overlay.write(image, title, (RIGHT_X + 4, TITLE_Y), 16)
-    return image
-
-
-@lru_cache(maxsize=4)
 def legend(level: str) -> Image:
-    """(28, 792, 3) what the colours mean at a perception level; not to be written to."""
-    image = np.empty((LEGEND_HEIGHT, ROOM[0], 3), np.uint8)
-    image[:] = overlay.PANEL
+    """(28, 792, 3) what the colours mean at a perception level."""
+    image = _panel(LEGEND_HEIGHT, ROOM[0])
     marks = [
         ("worker's left", overlay.LEFT, "line"),
         ("right", overlay.RIGHT, "line"),
@@ -126,7 +103,7 @@ def legend(level: str) -> Image:
 
 def strip(diary: Diary, dt_s: float, limit_m: float) -> Image:
     """True and estimated separation over the last seconds; red where a step cost."""
-    image = _axes(limit_m).copy()
+    image = _axes(limit_m)
     n_shown = round(STRIP_S / dt_s)
     first = max(0, len(diary.cost) - n_shown)
     x = np.round(LEFT + (RIGHT - LEFT) * np.arange(len(diary.cost) - first) / n_shown).astype(int)
@@ -145,11 +122,9 @@ def strip(diary: Diary, dt_s: float, limit_m: float) -> Image:
     return image
 
 
-@lru_cache(maxsize=4)
 def _axes(limit_m: float) -> Image:
-    """The strip without its curves; not to be written to."""
-    image = np.empty((STRIP_HEIGHT, WIDTH, 3), np.uint8)
-    image[:] = overlay.PANEL
+    """The strip without its curves."""
+    image = _panel(STRIP_HEIGHT, WIDTH)
     for metres in (0.0, 0.5, 1.0, 1.5):
         y = int(_y_of(np.array(metres)))
         cv2.line(image, (LEFT, y), (RIGHT, y), (60, 66, 74), 1)
@@ -165,6 +140,10 @@ def _axes(limit_m: float) -> Image:
 
 def _y_of(metres: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.round(BOTTOM - (BOTTOM - TOP) * np.clip(metres, 0, FAR_M) / FAR_M)
+
+
+def _panel(height: int, width: int) -> Image:
+    return np.full((height, width, 3), overlay.PANEL, np.uint8)
 
 
 def _paste(frame: Image, picture: NDArray[np.uint8], at: tuple[int, int]) -> None:

@@ -41,7 +41,7 @@ class List(EnvironmentArguments):
             ("robot", ROBOTS),
             ("cameras", cameras),
             ("control", CONTROLS),
-            ("agent", (*agents("base").AGENTS, "a checkpoint: PATH.zip")),
+            ("agent", (*agents("registry").AGENTS, "a checkpoint: PATH.zip")),
         ):
             table.add_row(argument, ", ".join(names))
         Console().print(table)

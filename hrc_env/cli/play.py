@@ -1,4 +1,4 @@
-"""python -m hrc_env play: let an agent loose, in the terminal, a film or a window."""
+"""python -m hrc_env play, demo: let an agent loose, in the terminal, a film or a window."""
 
 import time
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from rich.console import Console
 import hrc_env
 from hrc_env.cli.checks import at_least, writable_file
 from hrc_env.cli.environment import EnvironmentArguments
-from hrc_env.cli.progress import track
+from hrc_env.cli.progress import compile_kernels, track
 from hrc_env.core.checkout import agents
 from hrc_env.core.errors import unknown
 from hrc_env.tasks import DEFAULT
@@ -45,39 +45,27 @@ class Play(EnvironmentArguments):
         at_least("--seed", self.seed, 0)
         if self.video is not None:
             writable_file(self.video, ".mp4", "--video")
-            return self._film(self.video)
-        import gymnasium  # here and below: --help imports no simulator
+            filmed(self, self.agent, self.video)
+            return 0
+        import gymnasium  # here: --help imports no simulator
 
-        from hrc_env.cli.kernels import compile_kernels
-
-        base = agents("base")
         compile_kernels(Console(), self.perception)
         env = gymnasium.make(self.task, **self.keywords())
         try:
             for episode in range(self.episodes):
-                self._play(env, base, self.seed + episode)
+                self._play(env, self.seed + episode)
         finally:
             env.close()
         return 0
 
-    def _film(self, video: Path) -> int:
-        from hrc_env.cli.film import film_episode, table
-
-        base = agents("base")
-        totals = film_episode(
-            lambda here: base.make_agent(self.agent, here, self.seed),
-            video, self.seed, **self.keywords(),
-        )  # fmt: skip
-        Console().print(table(totals))
-        return 0
-
-    def _play(self, env: "gymnasium.Env[Any, Any]", base: Any, seed: int) -> None:
+    def _play(self, env: "gymnasium.Env[Any, Any]", seed: int) -> None:
         from hrc_env.env import HRCEnv
         from hrc_env.scene.viewer import Viewer
 
         inner = env.unwrapped
         assert isinstance(inner, HRCEnv)
-        agent = base.make_agent(self.agent, base.situation(inner.simulation), seed)
+        env_info = agents("env_info").env_info(inner.simulation)
+        agent = agents("registry").make_agent(self.agent, env_info, seed)
         observation, info = env.reset(seed=seed)
         window = Viewer(inner.simulation.scene) if self.viewer else None
         started_s, total, steps = time.monotonic(), 0.0, 0
@@ -93,10 +81,46 @@ class Play(EnvironmentArguments):
                 break
         if window is not None:
             window.close()
-        counts = inner.simulation.task.counts(info)
-        Console().print(
-            f"seed {seed}: return {total:.1f}, "
-            f"{', '.join(f'{name} {n:.0f}' for name, n in counts.items())}, "
-            f"cost {info['episode_cost']:.0f}, "
-            f"{steps / (time.monotonic() - started_s):.0f} steps/s"
-        )
+        counts = inner.simulation.task.counts(info).items()
+        said = [f"return {total:.1f}", *(f"{name} {n:.0f}" for name, n in counts)]
+        said += [f"cost {info['episode_cost']:.0f}"]
+        said += [f"{steps / (time.monotonic() - started_s):.0f} steps/s"]
+        Console().print(f"seed {seed}: {', '.join(said)}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Demo(EnvironmentArguments):
+    """Film the scripted reacher, slowed by the separation that it estimates from pixels."""
+
+    out: Path = Path("out/demo.mp4")
+    """The film; a still PNG is written beside it."""
+    seed: int = 7
+    """Seed of the episode."""
+    seconds: float = 10.0
+    """Length of the film."""
+
+    def run(self) -> int:
+        """Film and tell."""
+        at_least("--seed", self.seed, 0)
+        writable_file(self.out, ".mp4")
+        Console().print("Loading the simulator ...")
+        from hrc_env.config import settle  # here: --help imports no simulator
+
+        ctrl_dt = settle(**self.keywords()).config.ctrl_dt
+        at_least("--seconds", self.seconds, ctrl_dt)
+        title = "the worker is known through four cameras only"
+        filmed(self, "scripted_slowed", self.out, round(self.seconds / ctrl_dt), title)
+        Console().print(f"Watch [bold]{self.out}[/] (still: {self.out.with_suffix('.png')})")
+        return 0
+
+
+def filmed(asked: Play | Demo, agent: str, path: Path, n_steps: int = 250, title: str = "") -> None:
+    """Film an episode of an agent by its name; show what came of it."""
+    from hrc_env.cli import film
+
+    registry = agents("registry")
+    totals = film.film_episode(
+        lambda env_info: registry.make_agent(agent, env_info, asked.seed),
+        path, asked.seed, n_steps=n_steps, **asked.keywords(),
+    )  # fmt: skip
+    Console().print(film.table(totals, title))

@@ -4,16 +4,14 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sized
 from contextlib import contextmanager
 from datetime import timedelta
+from pathlib import Path
 from typing import Any, Self, TypeVar
 
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
+from rich.markdown import Markdown
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from hrc_env.cli.checks import writable_folder
 
 EVERY_S = 10.0
 """Between two lines in a log file [s]."""
@@ -64,10 +62,8 @@ class Meter:
         """So much is done; `name` is what is being done now, `note` how it goes."""
         self.done, self.name, self.note = done, name or self.name, note
         if self._bar is not None:
-            self._bar.update(
-                self._task, completed=done, description=self.name, counted=self._counted(),
-                note=note,
-            )  # fmt: skip
+            said = {"description": self.name, "counted": self._counted(), "note": note}
+            self._bar.update(self._task, completed=done, **said)
         elif self._clock() - self._line_s >= EVERY_S:
             self._say()
 
@@ -75,9 +71,7 @@ class Meter:
         """One line: share, count, time that has passed and that is left."""
         self._said, self._line_s = True, self._clock()
         passed_s, since = self._line_s - self._began_s, self.done - self._before
-        left = "?"
-        if since > 0:
-            left = _time(max(self.total - self.done, 0.0) / since * passed_s)
+        left = _time(max(self.total - self.done, 0.0) / since * passed_s) if since > 0 else "?"
         share = 100 * min(self.done / self.total, 1.0) if self.total else 100.0
         parts = [f"{share:.0f} %", self._counted(), f"{_time(passed_s)} passed, {left} left"]
         said = ", ".join(part for part in (*parts, self.note) if part)
@@ -94,22 +88,38 @@ def progress_bar(console: Console, name: str) -> Iterator[Callable[[float, str],
         yield lambda share, label: meter.show(meter.done + share, label)
 
 
+def show(
+    run: Callable[[Path, Callable[[float, str], None]], object], out: Path, name: str, written: str
+) -> int:
+    """Run a bench or an experiment under a progress bar, then show its report.md."""
+    writable_folder(out)
+    console = Console()
+    with progress_bar(console, name) as say:
+        run(out, say)
+    console.print(Markdown((out / "report.md").read_text()))
+    console.print(f"In [bold]{out}[/]: {written}")
+    return 0
+
+
 def track(
     values: Iterable[T], description: str, total: int | None = None, console: Console | None = None
 ) -> Iterator[T]:
-    """The values, one after the other, while it is shown how many of them are done.
-
-    Args:
-        values: what to go through.
-        description: what is being done with them.
-        total: how many there are, where they cannot be counted.
-        console: where to; the standard output if None.
-    """
+    """The values, one after the other, while it is shown how many of them (`total`) are done."""
     n = len(values) if total is None and isinstance(values, Sized) else total or 0
     with Meter(console or Console(), description, n) as meter:
         for k, value in enumerate(values, 1):
             yield value
             meter.show(k)
+
+
+def compile_kernels(console: Console, level: str | None = None) -> None:
+    """Compile what a perception level (None: any) calls and is not compiled yet, under a bar."""
+    from hrc_env.core.kernels import ahead  # here: --help imports no compiler
+
+    if n_missing := len(ahead.missing(level)):
+        console.print(f"Compiling {n_missing} kernels for this machine, once ...")
+        with progress_bar(console, "kernels") as say:
+            ahead.compile_missing(level, say)
 
 
 def _bar(console: Console) -> Progress:

@@ -8,6 +8,8 @@ from typing import Literal
 
 from rich.console import Console
 
+from hrc_env.cli.progress import compile_kernels
+
 
 @dataclass(frozen=True)
 class Setup:
@@ -20,8 +22,7 @@ class Setup:
 
     def run(self) -> int:
         """Set up; 0 also without OpenGL, which only pictures need."""
-        from hrc_env.cli.kernels import compile_kernels  # here: --help imports no simulator
-        from hrc_env.core.kernels.cache import folder
+        from hrc_env.core.kernels.cache import folder  # here: --help imports no simulator
         from hrc_env.perception import weights
         from hrc_env.scene.gl import APT_LINE, gl_status
 
@@ -36,16 +37,16 @@ class Setup:
         if not ready and _may_install():
             console.print(f"Installing OpenGL: {APT_LINE}")
             subprocess.run(["apt-get", "update", "-qq"], check=False)
-            words = APT_LINE.removeprefix("sudo ").split()
-            subprocess.run([words[0], words[1], "-qq", "-y", *words[2:]], check=False)
+            apt, install, *packages = APT_LINE.removeprefix("sudo ").split()
+            subprocess.run([apt, install, "-qq", "-y", *packages], check=False)
             ready, message = gl_status()
         if ready:
             console.print(f"[green]ok[/] headless OpenGL: {message}")
-            return 0
-        console.print(
-            f"[yellow]no headless OpenGL[/]: {message}\n"
-            "Without it everything works but perception='pixels' and pictures."
-        )
+        else:
+            console.print(
+                f"[yellow]no headless OpenGL[/]: {message}\n"
+                "Without it everything works but perception='pixels' and pictures."
+            )
         return 0
 
 

@@ -3,12 +3,14 @@
 from typing import Any
 
 OLD_NAMES = {
+    "beyond": "ablations",
     "eyes": "detector",
     "horizons_s": "forecast_s",
     "per_joint": "particle",
     "processes": "threads",
     "reward.goal": "task.goal_bonus",
     "reward.progress_per_m": "task.progress_per_m",
+    "scene.leash_rad": "scene.integrator_clamp_rad",
     "tracker.paper_iterations": "tracker.n_iterations",
     "tracker.paper_particles": "tracker.n_particles",
     "tracker.paper_resampling": "tracker.resampling",

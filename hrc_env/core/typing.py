@@ -5,7 +5,7 @@ J joints (15, see `hrc_env.core.skeleton`), S body segments of the worker (22), 
 P particles, T time, N links of the arm.
 """
 
-from typing import Annotated, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 Floats: TypeAlias = NDArray[np.float64]
 Bools: TypeAlias = NDArray[np.bool_]
 Ints: TypeAlias = NDArray[np.int64]
+Records: TypeAlias = NDArray[Any]
+"""A structured array: rows with named fields, which its dtype explains."""
 
 Points2: TypeAlias = Annotated[Floats, "(..., 2) [px]"]
 Points3: TypeAlias = Annotated[Floats, "(..., 3) [m]"]

@@ -1,33 +1,17 @@
 """Assignment: each row of a cost matrix gets a column of its own, at the least total cost.
 
-The shortest augmenting paths of the Hungarian method (Kuhn, Naval Research Logistics 2, 1955;
-Jonker and Volgenant, Computing 38, 1987), for matrices with a few rows, inside kernels.
+The shortest augmenting paths of the Hungarian method (Jonker and Volgenant, Computing 38, 1987),
+for matrices with a few rows, inside kernels.
 """
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Floats, Ints
-
-
-def assign(cost: Floats) -> Ints:
-    """(n,) the column of each row of a finite (n, m) cost matrix, m >= n, no column twice.
-
-    Raises:
-        ConfigError: more rows than columns, or a cost that is not finite.
-    """
-    cost = np.ascontiguousarray(cost, np.float64)
-    if cost.ndim != 2 or cost.shape[0] > cost.shape[1] or not np.isfinite(cost).all():
-        raise ConfigError(f"cost must be finite (n, m) with m >= n, got shape {cost.shape}.")
-    column = np.empty(len(cost), np.int64)
-    assign_rows(cost, column)
-    return column
 
 
 @kernel(makes_arrays=True)
 def assign_rows(cost, column):
-    """Kernel of `assign`: fills column (n,) for a finite cost (n, m) with m >= n."""
+    """Write the column of each row of a finite cost (n, m), m >= n, into column (n,)."""
     n_rows, n_columns = cost.shape
     # Rows and columns count from 1 here; column 0 stands for "the row that is being placed".
     row_price, column_price = np.zeros(n_rows + 1), np.zeros(n_columns + 1)

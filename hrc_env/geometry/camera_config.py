@@ -1,11 +1,25 @@
-"""What a camera is: where it hangs, what its lens and sensor do, when it takes images."""
+"""What a camera is: where it hangs, what its lens and sensor do, when it takes images; rig files.
 
+A rig file is TOML, a `[[camera]]` for each with the fields of `CameraConfig`:
+
+[[camera]]
+name = "left"
+eye_world = [2.9, 2.6, 2.45]
+lens = {model = "kannala_brandt", coefficients = [0.0667]}
+"""
+
+import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 
 from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.mapping import from_mapping
+from hrc_env.core.toml import read_toml, to_toml
 from hrc_env.core.typing import Floats
 from hrc_env.geometry.lens import Lens, distorted_radius, rays_cam
 
@@ -52,26 +66,26 @@ class CameraConfig:
     """How long the shutter is open [s], up to 0.1; what moves is smeared (`pixels` only)."""
 
     def __post_init__(self) -> None:
-        _check_place(self)
-        for name in ("width_px", "height_px"):
-            if not SIZE_PX[0] <= getattr(self, name) <= SIZE_PX[1]:
-                raise ConfigError(
-                    f"Camera {self.name!r}: {name} must be from {SIZE_PX[0]} to {SIZE_PX[1]}, "
-                    f"got {getattr(self, name)}."
-                )
-        for name, most in (("rate_hz", math.inf), ("latency_s", LONGEST_S), ("exposure_s", 0.1)):
-            if not 0 <= getattr(self, name) <= most or not math.isfinite(getattr(self, name)):
-                raise ConfigError(
-                    f"Camera {self.name!r}: {name} must be from 0 to {most}, "
-                    f"got {getattr(self, name)}."
-                )
+        places = (*self.eye_world, *self.target_world, self.roll_deg)
+        if not np.isfinite(places).all():
+            _refuse(self, "eye_world, target_world and roll_deg must be finite", places)
+        if math.dist(self.eye_world, self.target_world) < 1e-3:
+            _refuse(self, "it must look at another place than where it hangs", self.eye_world)
+        for name, least, most in (
+            ("width_px", *SIZE_PX), ("height_px", *SIZE_PX), ("rate_hz", 0, math.inf),
+            ("latency_s", 0, LONGEST_S), ("exposure_s", 0, 0.1),
+        ):  # fmt: skip
+            value = getattr(self, name)
+            if not least <= value <= most or not math.isfinite(value):
+                _refuse(self, f"{name} must be from {least} to {most}", value)
         for name in ("focal_px", "centre_px"):
             if len(getattr(self, name)) not in (0, 2):
-                raise ConfigError(
-                    f"Camera {self.name!r}: {name} must be empty or two numbers (x, y), "
-                    f"got {getattr(self, name)}."
-                )
+                _refuse(self, f"{name} must be empty or two numbers (x, y)", getattr(self, name))
         _check_image(self, intrinsics(self))
+
+
+def _refuse(camera: CameraConfig, expected: str, got: object) -> NoReturn:
+    raise ConfigError(f"Camera {camera.name!r}: {expected}, got {got}.")
 
 
 def intrinsics(camera: CameraConfig) -> Floats:
@@ -85,66 +99,34 @@ def intrinsics(camera: CameraConfig) -> Floats:
     return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]])
 
 
-def fields_deg(camera: CameraConfig) -> tuple[float, float]:
-    """Horizontal and vertical field of view through the middle of the image [degrees]."""
-    half = _edge_rays(camera, intrinsics(camera))
-    angles = np.degrees(np.arccos(np.clip(half[:, 2], -1.0, 1.0)))
-    return float(angles[0] + angles[1]), float(angles[2] + angles[3])
-
-
 def _focal_px(camera: CameraConfig) -> float:
-    straight = camera.lens.model != "kannala_brandt"
-    most = 179.0 if straight else FIELD_DEG[1]
+    most = FIELD_DEG[1] if camera.lens.model == "kannala_brandt" else 179.0
     if not FIELD_DEG[0] <= camera.hfov_deg < most:
-        raise ConfigError(
-            f"Camera {camera.name!r}: horizontal field of view must be in [{FIELD_DEG[0]:g}, "
-            f"{most:g}) degrees, got {camera.hfov_deg}."
-        )
+        valid = f"horizontal field of view must be in [{FIELD_DEG[0]:g}, {most:g}) degrees"
+        _refuse(camera, valid, camera.hfov_deg)
     half_rad = math.radians(camera.hfov_deg) / 2
     if camera.lens.model == "none":
         return float(camera.width_px / 2 / np.tan(half_rad))
     radius = distorted_radius(camera.lens, half_rad)
     if math.isnan(radius):
-        raise ConfigError(
-            f"Camera {camera.name!r}: its lens {camera.lens} folds the image over before "
-            f"{camera.hfov_deg / 2:g} degrees from the axis; expected a lens whose radius grows "
-            "over the whole field of view."
-        )
+        half = f"{camera.hfov_deg / 2:g} degrees from the axis"
+        _refuse(camera, f"its lens must not fold the image over before {half}", camera.lens)
     return camera.width_px / 2 / radius
-
-
-def _check_place(camera: CameraConfig) -> None:
-    places = (*camera.eye_world, *camera.target_world, camera.roll_deg)
-    if not np.isfinite(places).all():
-        raise ConfigError(
-            f"Camera {camera.name!r}: eye_world, target_world and roll_deg must be finite, got "
-            f"{camera.eye_world}, {camera.target_world}, {camera.roll_deg}."
-        )
-    if math.dist(camera.eye_world, camera.target_world) < 1e-3:
-        raise ConfigError(
-            f"Camera {camera.name!r} must look at another place than where it hangs; both are "
-            f"{camera.eye_world}."
-        )
 
 
 def _check_image(camera: CameraConfig, K: Floats) -> None:
     size = np.array([camera.width_px, camera.height_px])
     focal, centre = K[[0, 1], [0, 1]], K[:2, 2]
     if not (np.isfinite(K).all() and (focal > 0).all()):
-        raise ConfigError(
-            f"Camera {camera.name!r}: focal lengths must be positive and finite, got "
-            f"{tuple(focal.tolist())} px."
-        )
+        _refuse(camera, "focal lengths must be positive and finite", f"{focal} px")
     if not ((centre > 0) & (centre < size)).all():
-        raise ConfigError(
-            f"Camera {camera.name!r}: the principal point must lie in the image of "
-            f"{size[0]} x {size[1]} px, got {tuple(centre.tolist())}."
-        )
+        _refuse(camera, f"the principal point must lie in the image of {size} px", centre)
     if np.isnan(_edge_rays(camera, K)).any():
-        raise ConfigError(
-            f"Camera {camera.name!r}: its lens {camera.lens} with focal lengths "
-            f"{tuple(focal.tolist())} px lets no light through to the middle of each of the "
-            "image's edges; expected weaker coefficients or longer focal lengths."
+        _refuse(
+            camera,
+            "its lens must let light through to the middle of each of the image's edges (weaker "
+            "coefficients or longer focal lengths)",
+            f"{camera.lens} with focal lengths {focal} px",
         )
 
 
@@ -183,3 +165,31 @@ def made(
     if make not in MAKES:
         raise unknown("make of camera", make, MAKES)
     return replace(MAKES[make], name=name, eye_world=eye_world, target_world=target_world)
+
+
+def read_rig(path: Path | str) -> tuple[CameraConfig, ...]:
+    """The cameras of a rig file.
+
+    Raises:
+        ConfigError: no such file, no TOML, or a field that is unknown, missing or wrong.
+    """
+    content = read_toml(path)
+    others, entries = sorted(set(content) - {"camera"}), content.get("camera", [])
+    tables = isinstance(entries, list) and all(isinstance(entry, dict) for entry in entries)
+    if others or not tables or not entries:
+        raise ConfigError(
+            f"{path} must hold a [[camera]] for each camera and nothing else, "
+            f"got {', '.join(map(repr, others)) or 'no camera'}."
+        )
+    try:
+        return tuple(
+            from_mapping(CameraConfig, entry, f"camera[{k}].") for k, entry in enumerate(entries)
+        )
+    except ConfigError as error:
+        raise ConfigError(f"{path}: {error}") from error
+
+
+def write_rig(path: Path | str, cameras: Sequence[CameraConfig]) -> None:
+    """Write a rig, every field of every camera, so that `read_rig` gives the same back."""
+    content = to_toml({"camera": [dataclasses.asdict(camera) for camera in cameras]})
+    Path(path).write_text(content, encoding="utf-8")

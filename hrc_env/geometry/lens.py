@@ -16,6 +16,7 @@ import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -31,8 +32,8 @@ COEFFICIENTS = {
 """Models and what their coefficients are called, in order; those left out are 0."""
 NONE, BROWN_CONRADY, KANNALA_BRANDT = range(3)
 LIMIT, FOLD = 6, 7
-"""Columns of a lens' row behind the model and its coefficients: the distorted radius from which on
-nothing is seen, and the angle that it is of."""
+"""Columns of a lens' row behind model and coefficients: the distorted radius from which on nothing
+is seen, and its angle."""
 WIDEST_RAD = math.radians(175.0)
 """No lens sees further from its axis."""
 PINHOLE_RAD = math.radians(80.0)
@@ -81,15 +82,13 @@ def lens_row(lens: Lens) -> Floats:
 
 def distort(lens: Lens, undistorted: Floats) -> Floats:
     """Undistorted places (..., 2) to distorted ones."""
-    return _each(_distort_all, lens, undistorted, 2)
+    return _each(distorted, lens, undistorted).reshape(np.shape(undistorted))
 
 
-def rays_cam(lens: Lens, distorted: Floats) -> Floats:
-    """(..., 3) unit directions in the camera's axes of distorted places (..., 2).
-
-    NaN where the lens lets nothing through.
-    """
-    return _each(_rays_all, lens, distorted, 3)
+def magnification(lens: Lens, undistorted: Floats) -> Floats:
+    """(...,) how many times longer a pinhole shows a short line at undistorted places (..., 2) than
+    the lens does; the mean of both directions."""
+    return _each(magnification_at, lens, undistorted).reshape(np.shape(undistorted)[:-1])
 
 
 def undistort(lens: Lens, distorted: Floats) -> Floats:
@@ -99,13 +98,15 @@ def undistort(lens: Lens, distorted: Floats) -> Floats:
     return np.where(ahead, ray[..., :2] / np.where(ahead, ray[..., 2:], 1.0), np.nan)
 
 
-def magnification(lens: Lens, undistorted: Floats) -> Floats:
-    """(...,) how many times longer a pinhole shows a short line at undistorted places (..., 2) than
-    the lens does; the mean of both directions."""
-    flat = np.ascontiguousarray(undistorted, float).reshape(-1, 2)
-    out = np.empty(len(flat))
-    _magnify_all(lens_row(lens), flat, out)
-    return out.reshape(np.shape(undistorted)[:-1])
+def rays_cam(lens: Lens, distorted: Floats) -> Floats:
+    """(..., 3) unit directions in the camera's axes of distorted places (..., 2).
+
+    NaN where the lens lets nothing through.
+    """
+    flat = np.ascontiguousarray(distorted, float).reshape(-1, 2)
+    out = np.empty((len(flat), 3))
+    _rays_all(lens_row(lens), flat, out)
+    return out.reshape(*np.shape(distorted)[:-1], 3)
 
 
 def distorted_radius(lens: Lens, angle_rad: float) -> float:
@@ -115,26 +116,12 @@ def distorted_radius(lens: Lens, angle_rad: float) -> float:
     return float(_radius_of(row, angle_rad)) if angle_rad <= row[FOLD] else math.nan
 
 
-def _each(kernel: Callable[..., None], lens: Lens, places: Floats, width: int) -> Floats:
-    flat = np.ascontiguousarray(places, float).reshape(-1, 2)
-    out = np.empty((len(flat), width))
-    kernel(lens_row(lens), flat, out)
-    return out.reshape(*np.shape(places)[:-1], width)
+def _each(at: Callable[..., Any], lens: Lens, places: Floats) -> Floats:
+    row, flat = lens_row(lens), np.asarray(places, float).reshape(-1, 2)
+    return np.array([at(row, x, y) for x, y in flat.tolist()], float)
 
 
-@kernel(makes_arrays=True)
-def _distort_all(row, undistorted, out):
-    for i in range(len(undistorted)):
-        out[i, 0], out[i, 1] = distorted(row, undistorted[i, 0], undistorted[i, 1])
-
-
-@kernel(makes_arrays=True)
-def _magnify_all(row, undistorted, out):
-    for i in range(len(undistorted)):
-        out[i] = magnification_at(row, undistorted[i, 0], undistorted[i, 1])
-
-
-@kernel(makes_arrays=True)
+@kernel
 def _rays_all(row, places, out):
     for i in range(len(places)):
         out[i, 0], out[i, 1], out[i, 2] = _ray(row, places[i, 0], places[i, 1])
@@ -207,8 +194,7 @@ def _ray(row, x, y):
 
 @kernel
 def _angle_of(row, far):
-    """The angle [rad] whose light arrives at a radius below the limit: Newton's steps, halving
-    where these leave the bracket."""
+    """The angle [rad] whose light arrives at a radius below the limit: Newton or bisection."""
     low, high = 0.0, row[FOLD]
     angle = min(far, 0.5 * high)
     for _ in range(60):

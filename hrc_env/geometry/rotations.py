@@ -18,32 +18,15 @@ def matrix_from_quaternion(quaternion_wxyz: QuaternionsWxyz) -> Rotations:
 
 
 def quaternion_from_matrix(rotation: Rotations) -> QuaternionsWxyz:
-    """(..., 3, 3) matrices to (..., 4) unit quaternions with w >= 0 (Shepperd's method)."""
-    m = rotation
-    trace = m[..., 0, 0] + m[..., 1, 1] + m[..., 2, 2]
-    diagonal = np.stack([trace, m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]], -1)
-    symmetric = np.stack(
-        [
-            np.stack([trace, *_pairs(m, -1)], -1),
-            np.stack([_pairs(m, -1)[0], m[..., 0, 0], *_pairs(m, 1)[:2]], -1),
-            np.stack([_pairs(m, -1)[1], _pairs(m, 1)[0], m[..., 1, 1], _pairs(m, 1)[2]], -1),
-            np.stack([_pairs(m, -1)[2], _pairs(m, 1)[1], _pairs(m, 1)[2], m[..., 2, 2]], -1),
-        ],
-        -2,
-    )
-    identity = np.eye(4, dtype=bool)
-    symmetric = np.where(identity, 1 - trace[..., None, None] + 2 * symmetric, symmetric)
-    best = np.argmax(diagonal, -1)
-    quaternion = np.take_along_axis(symmetric, best[..., None, None], -2)[..., 0, :]
-    quaternion = quaternion / np.linalg.norm(quaternion, axis=-1, keepdims=True)
+    """(..., 3, 3) matrices to (..., 4) unit quaternions with w >= 0 (Bar-Itzhack 2000)."""
+    m, trace = rotation, np.trace(rotation, axis1=-2, axis2=-1)
+    skew = np.swapaxes(m, -1, -2) - m
+    profile = np.empty((*m.shape[:-2], 4, 4))
+    profile[..., 0, 0] = trace
+    profile[..., 0, 1:] = profile[..., 1:, 0] = skew[..., [1, 2, 0], [2, 0, 1]]
+    profile[..., 1:, 1:] = m + np.swapaxes(m, -1, -2) - trace[..., None, None] * np.eye(3)
+    quaternion = np.linalg.eigh(profile)[1][..., -1]
     return np.where(quaternion[..., :1] < 0, -quaternion, quaternion)
-
-
-def _pairs(m: Rotations, sign: int) -> tuple[Floats, Floats, Floats]:
-    """Sums (+1: xy, xz, yz) or differences (-1: x, y, z) of the off-diagonal elements."""
-    if sign > 0:
-        return m[..., 0, 1] + m[..., 1, 0], m[..., 0, 2] + m[..., 2, 0], m[..., 1, 2] + m[..., 2, 1]
-    return m[..., 2, 1] - m[..., 1, 2], m[..., 0, 2] - m[..., 2, 0], m[..., 1, 0] - m[..., 0, 1]
 
 
 def about_axis(axis: str, angle_rad: Floats | float) -> Rotations:

@@ -1,67 +1,48 @@
 """Lines of sight: what stands between an eye and points.
 
-Whatever can stand in the way is a row of one table of shapes. Of these, an eye that looks at a
-group of points needs those in the cone round the group; a line then meets some of their
-bounding spheres, and only the shapes in these are asked exactly.
+Of a table of shapes, an eye that looks at a group of points needs those in the cone round them;
+only shapes whose bounding spheres a line meets are asked exactly.
 """
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from hrc_env.core.errors import check_shape
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Bools, Capsules, Floats, Points3
-from hrc_env.geometry.shapes import (
-    AXES,
-    CENTRE,
-    KIND,
-    PLANE,
-    REACH,
-    WIDTH,
-    on_axis,
-    passage,
-    set_capsules,
-    set_rows,
-)
+from hrc_env.core.typing import Bools, Capsules, Floats, Ints, Points3
+from hrc_env.geometry import shapes
 
 NEAR_POINT_M = 0.08
 """A line of sight ends this far before the point, so that what a joint touches (the table
 under a wrist, the floor under a foot) does not hide it."""
+BLOCKING_CHORD = 1.4
+"""A line that runs through a body's capsule for more than this many of its radii is blocked: it
+then passes the axis within 0.7 radii."""
+OWN_CAPSULE_M = 0.06
+"""So much longer may the way out of a capsule be that the joint itself lies in [m]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surroundings:
     """All that can stand between cameras and workers, but the workers, in B environments."""
 
-    still: Floats
-    """(G, `shapes.WIDTH`) what never moves, a shape a row."""
-    moving: Floats
-    """(B, M, `shapes.WIDTH`) what is carried about; rows may be `shapes.absent`."""
-    capsules_world: Capsules
-    """(B, K, 2, 3) the robot [m]."""
-    capsule_radius_m: Floats
-    """(K,) [m]."""
+    still: Floats  # (G, `shapes.WIDTH`) what never moves, a shape a row
+    moving: Floats  # (B, M, `shapes.WIDTH`) what is carried about; some rows `shapes.absent`
+    capsules_world: Capsules  # (B, K, 2, 3) the robot [m]
+    capsule_radius_m: Floats  # (K,) [m]
 
 
 def nothing(batch: int) -> Surroundings:
     """Free lines of sight."""
     nobody = (np.zeros((batch, 0, 2, 3)), np.zeros(0))
-    return Surroundings(np.zeros((0, WIDTH)), np.zeros((batch, 0, WIDTH)), *nobody)
+    return Surroundings(np.zeros((0, shapes.WIDTH)), np.zeros((batch, 0, shapes.WIDTH)), *nobody)
 
 
 def hidden(surroundings: Surroundings, eyes_world: Points3, points_world: Points3) -> Bools:
-    """Whether anything stands between each eye and each point.
-
-    Args:
-        surroundings: of B environments.
-        eyes_world: (C, 3) [m].
-        points_world: (B, J, 3) [m].
-
-    Returns:
-        (B, C, J).
-    """
+    """(B, C, J) whether anything stands between eyes (C, 3) and points (B, J, 3) [m]."""
     batch = len(surroundings.capsules_world)
     check_shape("points_world", points_world.shape[::2], (batch, 3), "environments, ..., xyz")
     eyes, points = np.ascontiguousarray(eyes_world), np.ascontiguousarray(points_world)
@@ -73,43 +54,40 @@ def hidden(surroundings: Surroundings, eyes_world: Points3, points_world: Points
     return result
 
 
+class Occluders(NamedTuple):
+    """A table of shapes, the last of them workers' capsules, and which of them are in view."""
+
+    table: Floats  # (G, `shapes.WIDTH`)
+    first_body: int  # the first row of a worker's capsule
+    spheres: Floats  # (5, G) in view: centre less the eye, tangent squared, radius [m]
+    rows: Ints  # (G,) their rows in the table
+
+
 @kernel(makes_arrays=True)
-def make_table(still, n_more):
-    """A table that begins with `still` and has room for more shapes."""
-    table = np.empty((len(still) + n_more, WIDTH))
+def make_occluders(still, n_more, n_body):
+    """A table that begins with `still`, with room for more shapes and for those of bodies."""
+    first_body = len(still) + n_more
+    n = first_body + n_body
+    table = np.empty((n, shapes.WIDTH))
     table[: len(still)] = still
-    return table
+    return Occluders(table, first_body, np.empty((5, n)), np.empty(n, np.int64))
 
 
 @kernel
-def look(eye, points, table, view, rows):
-    """Find the shapes that can stand between an eye and any of the points (J, 3).
-
-    Args:
-        eye: (3,) [m].
-        points: (J, 3) [m].
-        table: (n, `WIDTH`) shapes.
-        view: (5, n) out: of those found, the sphere's centre from the eye [m], the squared
-            length of a tangent [m^2], the radius.
-        rows: (n,) out: their rows.
-
-    Returns:
-        How many.
-    """
+def look(eye, points, occluders):
+    """Put what can stand between an eye and any of the points (J, 3) into `spheres`; how many."""
+    table, view = occluders.table, occluders.spheres
     ux, uy, uz, radius = _ball_round(eye, points)
     far = math.sqrt(ux * ux + uy * uy + uz * uz)
     sine = min(radius / far, 1.0)
     cosine = math.sqrt(1.0 - sine * sine)
     n = 0
     for k in range(len(table)):
-        reach = table[k, REACH]
-        x, y, z = (
-            table[k, CENTRE] - eye[0],
-            table[k, CENTRE + 1] - eye[1],
-            table[k, CENTRE + 2] - eye[2],
-        )
+        reach = table[k, shapes.REACH]
+        x, y = table[k, shapes.CENTRE] - eye[0], table[k, shapes.CENTRE + 1] - eye[1]
+        z = table[k, shapes.CENTRE + 2] - eye[2]
         squared = x * x + y * y + z * z
-        if table[k, KIND] == PLANE:
+        if table[k, shapes.KIND] == shapes.PLANE:
             if not _is_between(eye, points, table, k):
                 continue
         elif sine < 1.0:  # the lines are in a cone; is the sphere beside or behind it?
@@ -117,7 +95,7 @@ def look(eye, points, table, view, rows):
             aside = math.sqrt(max(squared - along * along, 0.0))
             if aside * cosine - along * sine > reach or along > far + radius + reach:
                 continue
-        rows[n] = k
+        occluders.rows[n] = k
         view[0, n], view[1, n], view[2, n] = x, y, z
         view[3, n], view[4, n] = squared - reach * reach, reach
         n += 1
@@ -141,13 +119,14 @@ def _ball_round(eye, points):
 @kernel
 def _is_between(eye, points, table, row):
     """Whether an eye is in front of a plane and any of the points is not."""
-    centre = table[row, CENTRE:AXES]
-    level = on_axis(table, row, 2, centre[0], centre[1], centre[2])
-    if on_axis(table, row, 2, eye[0], eye[1], eye[2]) < level:
+    centre = table[row, shapes.CENTRE : shapes.AXES]
+    level = shapes.on_axis(table, row, 2, centre[0], centre[1], centre[2])
+    if shapes.on_axis(table, row, 2, eye[0], eye[1], eye[2]) < level:
         return False
     lowest = math.inf
     for j in range(len(points)):
-        lowest = min(lowest, on_axis(table, row, 2, points[j, 0], points[j, 1], points[j, 2]))
+        x, y, z = points[j, 0], points[j, 1], points[j, 2]
+        lowest = min(lowest, shapes.on_axis(table, row, 2, x, y, z))
     return lowest < level
 
 
@@ -179,25 +158,49 @@ def line(eye, points, j):
 
 @kernel(makes_arrays=True)
 def _hidden(still, moving, capsules, radius, eyes, points, hidden):
-    table = make_table(still, len(radius) + moving.shape[1])
-    n = len(table)
-    view, rows = np.empty((5, n)), np.empty(n, np.int64)
+    occluders = make_occluders(still, len(radius) + moving.shape[1], 0)
+    table = occluders.table
     for b in range(len(points)):
-        set_capsules(table, len(still), capsules[b], radius)
-        set_rows(table, len(still) + len(radius), moving[b])
+        shapes.set_capsules(table, len(still), capsules[b], radius)
+        shapes.set_rows(table, len(still) + len(radius), moving[b])
         for c in range(len(eyes)):
-            n_view = look(eyes[c], points[b], table, view, rows)
+            n_view = look(eyes[c], points[b], occluders)
             for j in range(points.shape[1]):
-                hidden[b, c, j] = _is_hidden(eyes[c], points[b], j, table, view, rows, n_view)
+                hidden[b, c, j] = is_hidden(eyes[c], points[b], j, occluders, n_view)
 
 
 @kernel
-def _is_hidden(eye, points, j, table, view, rows, n_view):
+def is_hidden(eye, points, j, occluders, n_view):
+    """Whether one of the `n_view` shapes in view stands between an eye and one of the points."""
+    table, view = occluders.table, occluders.spheres
     dx, dy, dz, length = line(eye, points, j)
     for i in range(n_view):
         if meets(view, i, dx, dy, dz, length):
-            px, py, pz = -view[0, i], -view[1, i], -view[2, i]
-            enter, leave = passage(table, rows[i], px, py, pz, dx, dy, dz)
+            row, px, py, pz = occluders.rows[i], -view[0, i], -view[1, i], -view[2, i]
+            if row >= occluders.first_body:
+                if body_blocks(table, row, px, py, pz, dx, dy, dz, length):
+                    return True
+                continue
+            enter, leave = shapes.passage(table, row, px, py, pz, dx, dy, dz)
             if blocks(enter, leave, length):
                 return True
     return False
+
+
+@kernel
+def body_blocks(table, row, px, py, pz, dx, dy, dz, length):
+    """Whether a body's capsule, a row of shapes, hides what is at `length` [m] on a line.
+
+    A joint lies inside the body, and so do the ends of the capsules that meet there: it is hidden
+    where the line's way through a capsule is much longer than from its axis to its surface. p is
+    the eye less the capsule's centre, d the line's unit direction.
+    """
+    radius, half = table[row, shapes.HALF_SIZE], table[row, shapes.HALF_SIZE + 1]
+    rise, height, ahead, excess = shapes.against_axis(table, row, px, py, pz, dx, dy, dz)
+    enter, leave = shapes.through_tube(rise, height, ahead, excess)
+    if min(leave, length) - max(enter, 0.0) <= BLOCKING_CHORD * radius:
+        return False  # and the way through the capsule is no longer
+    enter, leave = shapes.rounded(enter, leave, half, rise, height, ahead, excess)
+    within = enter < length and leave >= length
+    chord = min(leave, length) - max(enter, 0.0)
+    return chord > BLOCKING_CHORD * radius + (OWN_CAPSULE_M if within else 0.0)

@@ -2,9 +2,8 @@
 
 A linear start (planes through the optical centres, least squares) is refined by Gauss-Newton
 on the reprojection error (Hartley and Zisserman, Multiple View Geometry, 2nd ed., chapter 12).
-`triangulate_robust` first looks for the two cameras whose point the most cameras agree with,
-so that a wrong detection in one view does no harm. The kernels work on one point; the two
-public functions run them over (B, W, J).
+With a gate, the two cameras whose point the most cameras agree with come first, so that a wrong
+detection in one view does no harm. The kernels work on one point.
 """
 
 import math
@@ -26,12 +25,9 @@ FURTHEST_PX = 1e5
 class Triangulation:
     """Points with what is known about them; NaN where fewer than two views could be used."""
 
-    points_world: Points3
-    """(B, W, J, 3) [m]."""
-    cov_world: Covariances3
-    """(B, W, J, 3, 3) [m^2], the inverse information of the views that were used."""
-    used: Bools
-    """(B, C, W, J) the views that the point was made from."""
+    points_world: Points3  # (B, W, J, 3) [m]
+    cov_world: Covariances3  # (B, W, J, 3, 3) [m^2], inverse information of the views used
+    used: Bools  # (B, C, W, J) the views that the point was made from
 
     @property
     def n_views(self) -> Ints:
@@ -39,29 +35,19 @@ class Triangulation:
         return self.used.sum(1)
 
 
-def triangulate(P: Floats, px: Points2, sigma_px: Floats) -> Triangulation:
-    """Weighted least-squares points from all views.
+def triangulate(P: Floats, px: Points2, sigma_px: Floats, gate_sigma: float = 0.0) -> Triangulation:
+    """Weighted least-squares points from all views, or from those that agree.
 
     Args:
         P: (C, 3, 4) projections.
         px: (B, C, W, J, 2) pixels; NaN where missing.
         sigma_px: (B, C, W, J) standard deviations [px]; a view counts with 1 / sigma^2, and
             not at all where this is not finite and positive.
+        gate_sigma: within how many standard deviations views must agree; 0: all are used.
     """
-    return _run(P, px, sigma_px, 0.0)
-
-
-def triangulate_robust(
-    P: Floats, px: Points2, sigma_px: Floats, gate_sigma: float = 5.0
-) -> Triangulation:
-    """As `triangulate`, from the views that agree within `gate_sigma` standard deviations."""
-    if not gate_sigma > 0:
-        raise ConfigError(f"gate_sigma must be positive, got {gate_sigma}.")
-    return _run(P, px, sigma_px, gate_sigma)
-
-
-def _run(P: Floats, px: Points2, sigma_px: Floats, gate_sigma: float) -> Triangulation:
     px, sigma_px = np.asarray(px, float), np.asarray(sigma_px, float)
+    if not gate_sigma >= 0:
+        raise ConfigError(f"gate_sigma must not be negative, got {gate_sigma}.")
     if px.ndim != 5 or px.shape[1] != len(P):
         raise ConfigError(f"px must have shape (B, {len(P)}, W, J, 2), got {px.shape}.")
     check_shape("sigma_px", sigma_px.shape, px.shape[:-1], "B, C, W, J")
@@ -69,15 +55,8 @@ def _run(P: Floats, px: Points2, sigma_px: Floats, gate_sigma: float) -> Triangu
     points = np.full((n_batch, n_workers, n_joints, 3), np.nan)
     cov = np.full((n_batch, n_workers, n_joints, 3, 3), np.nan)
     used = np.zeros(px.shape[:-1], bool)
-    _triangulate_all(
-        np.ascontiguousarray(P, dtype=float),
-        np.ascontiguousarray(px),
-        np.ascontiguousarray(sigma_px),
-        gate_sigma,
-        points,
-        cov,
-        used,
-    )
+    arrays = map(np.ascontiguousarray, (np.asarray(P, float), px, sigma_px))
+    _triangulate_all(*arrays, gate_sigma, points, cov, used)
     return Triangulation(points, cov, used)
 
 

@@ -1,10 +1,9 @@
 """What is known of the detector's errors: numbers fitted to renders, in a small JSON file.
 
-`python -m hrc_env calibrate-keypoints` writes it, docs/emulator.md says what the model is. The
-file that comes with the package is `keypoints.json`; `EmulatorConfig.calibration` names another.
+`python -m hrc_env calibrate-keypoints` writes it, docs/emulator.md says what the model is;
+`keypoints.json` is the package's own.
 """
 
-import dataclasses
 import functools
 import json
 import os
@@ -54,56 +53,30 @@ _Q = len(BODY_KNOTS)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
-    """The model's numbers. Lengths "of side" are shares of the side of the window round the
-    worker; x is to the right in that window, y down; of right joints x is mirrored."""
+    """The model's numbers, of the shapes `SHAPES`. Lengths "of side" are shares of the side of the
+    window round the worker; x is to the right in that window, y down; of right joints x is
+    mirrored. P postures, K kinds, S sights, A views, Z and Q knots, V visibilities."""
 
-    offset_m: Floats
-    """(P, K, 3) where the detector means a joint to be, from where it is: ahead, to the joint's
-    own side, up [m]; the same in every camera."""
-    wander_m: Floats
-    """(P, K, 3) how far that varies, a standard deviation [m]."""
-    space_limb: Floats
-    """(K, 3) its correlation with what varies of the `NEXT` joint, axis by axis."""
-    tail: Floats
-    """(P,) how much further it goes now and then: a standard normal vector n is lengthened by
-    1 + tail n.n / 3."""
-    bias: Floats
-    """(A, K, 2) mean error in a camera by the view, of side."""
-    size: Floats
-    """(P, S, K) median over time of the standard deviation of each coordinate, of side."""
-    spread: Floats
-    """(P, S, K) standard deviation of its logarithm, joint by joint."""
-    body: Floats
-    """(P, Q) quantiles of the logarithm of a factor that all joints of a body have in common in a
-    camera, least first, at `BODY_KNOTS`: now and then a body is seen badly as a whole."""
-    common: Floats
-    """() share of the sizes' variance that this factor is: how far the confidence follows it."""
-    shares: Floats
-    """(K, 3) shares of a camera's variance: a function of the view that stays for an episode;
-    what lasts for `slow_s`; what is new in every image. They add up to 1."""
-    slow_s: Floats
-    """() for how long, while the worker stands still [s]."""
-    slow_m: Floats
-    """() how far the joints travel until they are other errors [m]; their sizes, the confidence and
-    what varies in space last as long."""
-    limb: Floats
-    """(K,) correlation with the error of the next joint towards the trunk."""
-    confidence: Floats
-    """(P, S, K, Z) quantiles of the reported visibility, least first, at `KNOTS`."""
-    follows: Floats
-    """(S, K) correlation of visibility and smallness of the error."""
-    swap_share: Floats
-    """(P, A, 2) share of the time that a camera exchanges left and right by the view: of all
-    joints, of knees, ankles and feet alone."""
-    swap_s: Floats
-    """(2,) time constant of the slow normal variable whose lower tail that is [s]."""
-    miss_share: Floats
-    """(P, 16) share of the time that a camera does not find a worker by how many joints of it
-    are seen, 0 to 15."""
-    miss_s: Floats
-    """() the same of that [s]."""
-    sigma: Floats
-    """(P, K, V) what is told of the standard deviation, a share of the stature, at `VISIBILITY`."""
+    offset_m: Floats  # where the detector means a joint to be: ahead, to its own side, up [m]
+    wander_m: Floats  # how far that varies, a standard deviation [m]
+    space_limb: Floats  # its correlation with what varies of the `NEXT` joint, axis by axis
+    tail: Floats  # now and then further: a normal vector n is lengthened by 1 + tail n.n / 3
+    bias: Floats  # mean error in a camera by the view, of side
+    size: Floats  # median over time of the standard deviation of each coordinate, of side
+    spread: Floats  # standard deviation of its logarithm, joint by joint
+    body: Floats  # quantiles at `BODY_KNOTS` of the logarithm of the factor of a whole body
+    common: Floats  # share of the sizes' variance that this factor is; the confidence follows it
+    shares: Floats  # of a camera's variance: by the view, for `slow_s`, new in every image; sum 1
+    slow_s: Floats  # for how long errors last while the worker stands still [s]
+    slow_m: Floats  # how far the joints travel until they are other errors [m]
+    limb: Floats  # correlation with the error of the next joint towards the trunk
+    confidence: Floats  # quantiles of the reported visibility at `KNOTS`, least first
+    follows: Floats  # correlation of visibility and smallness of the error
+    swap_share: Floats  # of the time that left and right are exchanged: all joints, legs alone
+    swap_s: Floats  # time constants of the normal variables whose lower tails these are [s]
+    miss_share: Floats  # of the time that nobody is found, by how many joints are seen, 0 to 15
+    miss_s: Floats  # the time constant of that [s]
+    sigma: Floats  # standard deviation that is told, a share of the stature, at `VISIBILITY`
 
 
 SHAPES: dict[str, tuple[int, ...]] = {
@@ -129,20 +102,12 @@ _RENEW = "make a new one with: python -m hrc_env calibrate-keypoints --out FILE"
 
 
 def read_calibration(path: Path | str | None = None) -> Calibration:
-    """The calibration of a file; None: the one that comes with the package.
-
-    Raises:
-        ConfigError: no such file, none of a calibration, of another version, or broken.
-    """
+    """The calibration of a file (None: the package's). Raises `ConfigError` for a bad one."""
     return _read(PACKAGED, 0) if path is None else _read(Path(path), changed_ns(path))
 
 
 def changed_ns(path: Path | str) -> int:
-    """When a calibration file was last written [ns].
-
-    Raises:
-        ConfigError: no such file.
-    """
+    """When a calibration file was last written [ns]. Raises `ConfigError` if there is none."""
     try:
         return os.stat(path).st_mtime_ns
     except OSError as error:
@@ -165,26 +130,18 @@ def _read(path: Path, changed: int) -> Calibration:
             f"{path} is a calibration of version {content.get('version')!r}; this hrc_env reads "
             f"version {VERSION}: {_RENEW}."
         )
-    return calibration_from(content.get("tables"), str(path))
-
-
-def calibration_from(tables: Any, where: str) -> Calibration:
-    """A calibration from tables by name.
-
-    Raises:
-        ConfigError: a table that is missing, unknown, of another shape or with impossible numbers.
-    """
-    if not isinstance(tables, dict) or set(tables) != set(SHAPES):
-        given = set(tables) if isinstance(tables, dict) else set()
+    tables = content.get("tables")
+    given = set(tables) if isinstance(tables, dict) else set()
+    if given != set(SHAPES):
         raise ConfigError(
-            f"{where} must have the tables {', '.join(SHAPES)}; missing: "
+            f"{path} must have the tables {', '.join(SHAPES)}; missing: "
             f"{', '.join(sorted(set(SHAPES) - given)) or 'none'}; unknown: "
             f"{', '.join(sorted(given - set(SHAPES))) or 'none'}. Or {_RENEW}."
         )
-    return Calibration(**{name: _table(name, value, where) for name, value in tables.items()})
+    return Calibration(**{name: _table(name, value, path) for name, value in tables.items()})
 
 
-def _table(name: str, value: Any, where: str) -> Floats:
+def _table(name: str, value: Any, where: Path) -> Floats:
     try:
         array = np.array(value, dtype=float)
     except (TypeError, ValueError):
@@ -201,31 +158,3 @@ def _table(name: str, value: Any, where: str) -> Floats:
         raise ConfigError(f"{where}: table {name!r} must hold {expected}. Mend it, or {_RENEW}.")
     array.setflags(write=False)
     return array
-
-
-def write_calibration(path: Path | str, calibration: Calibration, made: dict[str, Any]) -> None:
-    """Write a calibration, whole or not at all.
-
-    Args:
-        path: of the file.
-        calibration: the numbers, which are rounded to four digits.
-        made: command, seed, commit and whatever else one wants to know of its making.
-    """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    tables = {
-        each.name: _rounded(getattr(calibration, each.name).tolist())
-        for each in dataclasses.fields(calibration)
-    }
-    lines = [f" {json.dumps(name)}: {json.dumps(table)}" for name, table in tables.items()]
-    head = {"format": FORMAT, "version": VERSION, "made": made}
-    text = json.dumps(head)[:-1] + ',\n"tables": {\n' + ",\n".join(lines) + "\n}}\n"
-    draft = path.with_suffix(".draft")
-    draft.write_text(text, encoding="utf-8")
-    os.replace(draft, path)
-
-
-def _rounded(value: Any) -> Any:
-    if isinstance(value, list):
-        return [_rounded(each) for each in value]
-    return float(f"{value:.4g}")

@@ -1,12 +1,11 @@
 """Pixels to keypoints: crops of every camera through BlazePose, two at a time.
 
-The calling thread draws a crop and goes on to the next while a helper thread runs the
-network on it; then both empty the queue. Each thread has its own interpreters with the same
-numbers, so that what is seen does not depend on who came first.
+The calling thread draws crops while a helper thread runs the network on them; then both empty the
+queue. Each has its own interpreters: what is seen does not depend on who came first.
 """
 
 import functools
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
@@ -21,28 +20,24 @@ from hrc_env.core.skeleton import BLAZEPOSE_INDEX, N_JOINTS
 from hrc_env.core.stateful import Stateful
 from hrc_env.core.typing import Floats, Image, Points2
 from hrc_env.geometry.cameras import PinholeCamera, inside_image
-from hrc_env.perception import blazepose
-from hrc_env.perception.acquisition import Candidates, agreed_windows, apart_from
-from hrc_env.perception.network import (
-    LANDMARK_SIDE,
-    NETWORKS,
-    RUNTIMES,
-    Landmarker,
-    PersonDetector,
-    chosen_runtime,
-    load_landmarker,
-    load_person_detector,
-)
+from hrc_env.perception import blazepose, network
 from hrc_env.perception.noise import STANDING, sigma_px
-from hrc_env.perception.searching import ImageSource, distinct, people, search_jobs
+from hrc_env.perception.searching import (
+    Candidates,
+    ImageSource,
+    agreed_windows,
+    apart_from,
+    distinct,
+    people,
+    search_jobs,
+)
 from hrc_env.perception.weights import find_weights
 
+SIDE = network.LANDMARK_SIDE
 STATURE_OF_SIDE = 0.75
 """Stature of an upright worker as a share of the side of BlazePose's window round them."""
 
 ResultT = TypeVar("ResultT")
-
-
 KeypointFunction = Callable[[Image], Floats | None]
 """A crop (256, 256, 3) RGB uint8 -> (J, 3): x and y in pixels of the crop, continuous from its
 top-left corner, and confidence in [0, 1], joints as in `core.skeleton.JOINTS`; NaN with confidence
@@ -58,8 +53,7 @@ class DetectorConfig:
     min_presence: float = 0.5
     """Landmarks are believed from this person flag on [0..1]; MediaPipe's own default."""
     sure_presence: float = 0.9
-    """Below this flag [0..1] the detector stage is asked as well: the flag alone passed 8 %
-    of crops without a worker, the detector stage none of 120."""
+    """Below this flag [0..1] the detector stage is asked as well."""
     gate_every: int = 25
     """The detector stage is also asked once in so many looks: a second at 25 Hz."""
     max_offset: float = 0.25
@@ -70,8 +64,7 @@ class DetectorConfig:
     search_step: float = 0.5
     """Search windows follow each other by at most this share of their side."""
     search_every: int = 5
-    """A camera whose whole image was searched for nobody is searched again so many steps later: a
-    search costs as much as several steps, most of all with bad images."""
+    """A camera whose whole image was searched for nobody is searched again so many steps later."""
     runtime: str = "litert"
     """What the networks run on: "litert", "openvino" (an extra, faster) or "auto"
     (docs/perception_and_estimators.md)."""
@@ -80,20 +73,19 @@ class DetectorConfig:
     `python -m hrc_env setup --networks lite heavy`."""
     keypoints: str = "blazepose"
     """What finds joints in crops: BlazePose's landmark network, or another function that was
-    registered (`hrc_env.register_detector`). People are searched for by BlazePose's person
-    detector whatever finds their joints."""
+    registered (`hrc_env.register_detector`); people are always searched for by BlazePose."""
     folded: str = "full"
     """The landmark network for workers who are bent, squatting or kneeling; "heavy" is more exact
     there, and three times as slow."""
 
     def __post_init__(self) -> None:
-        if self.runtime not in RUNTIMES:
-            raise unknown("detector.runtime", self.runtime, RUNTIMES)
+        if self.runtime not in network.RUNTIMES:
+            raise unknown("detector.runtime", self.runtime, network.RUNTIMES)
         if self.keypoints not in DETECTORS:
             raise unknown("detector.keypoints", self.keypoints, DETECTORS)
         for name in ("network", "folded"):
-            if getattr(self, name) not in NETWORKS:
-                raise unknown(f"detector.{name}", getattr(self, name), NETWORKS)
+            if getattr(self, name) not in network.NETWORKS:
+                raise unknown(f"detector.{name}", getattr(self, name), network.NETWORKS)
         for name in ("min_presence", "sure_presence", "outside_confidence"):
             if not 0 < getattr(self, name) <= 1:
                 raise ConfigError(f"{name} must be in (0, 1], got {getattr(self, name)}.")
@@ -106,52 +98,38 @@ class DetectorConfig:
 class Detection:
     """One worker as all cameras see them; a camera without them is NaN, 0 and infinite."""
 
-    px: Points2
-    """(C, J, 2) [px] in the whole image, as its lens distorts it."""
-    confidence: Floats
-    """(C, J) visibility in [0, 1]."""
-    sigma_px: Floats
-    """(C, J) standard deviation of each coordinate [px]."""
-    windows: list[Roi | None]
-    """Where each camera looked."""
-    crops: list[Image | None] = field(default_factory=list)
-    """(C,) what the network was given of each camera."""
+    px: Points2  # (C, J, 2) [px] in the whole image, as its lens distorts it
+    confidence: Floats  # (C, J) visibility in [0, 1]
+    sigma_px: Floats  # (C, J) standard deviation of each coordinate [px]
+    windows: list[Roi | None]  # where each camera looked
+    crops: list[Image | None] = field(default_factory=list)  # what the network was given of each
 
 
 @dataclass(frozen=True, slots=True)
 class _Networks:
     """One thread's interpreters."""
 
-    detect: PersonDetector
-    landmark: Landmarker
-    folded: Landmarker
-    """For workers who are folded up."""
-    own: KeypointFunction | None
-    """What finds joints instead of `landmark` and `folded`."""
+    detect: network.PersonDetector
+    landmark: tuple[network.Landmarker, network.Landmarker]  # for upright workers, for folded ones
+    own: KeypointFunction | None  # what finds joints instead of these
 
 
 class PoseDetector(Stateful):
-    """Finds the joints of workers in the images of a rig.
-
-    Networks and the helper thread are made at the first look and left out of a pickle.
-    """
+    """Finds the joints of workers in the images of a rig; networks and the helper thread are made
+    at the first look and left out of a pickle."""
 
     CHANGES = ("_looks",)
 
     def __init__(
         self, cameras: Sequence[PinholeCamera], config: DetectorConfig | None = None
     ) -> None:
-        """Args are the rig and settings.
-
-        Raises:
-            WeightsError: without the weights. ConfigError: without the runtime.
-        """
+        """Raises `WeightsError` without the weights, `ConfigError` without the runtime."""
         self.cameras = tuple(cameras)
         self.config = config or DetectorConfig()
         find_weights("pose_detection")
-        for network in (self.config.network, self.config.folded):
-            find_weights(f"pose_landmark_{network}")
-        chosen_runtime(self.config.runtime)
+        for name in (self.config.network, self.config.folded):
+            find_weights(f"pose_landmark_{name}")
+        network.chosen_runtime(self.config.runtime)
         self._looks: dict[int, list[int]] = {}
         self._networks: tuple[_Networks, _Networks] | None = None
         self._helper: ThreadPoolExecutor | None = None
@@ -171,13 +149,11 @@ class PoseDetector(Stateful):
         Args:
             source: gives crops of the cameras' present images.
             windows: (C,) where to look; None where this camera need not.
-            track: who is followed; any number that stays the worker's own. The
-                detector stage's turns are counted for each.
+            track: who is followed: a number of the worker's own.
             others: windows (C,) of other workers; a search does not find these again.
             found: what `search` found in these very images, if it was asked already.
-            folded: whether the worker is expected to be folded up (`posture.is_folded`).
-            posture: how far they are expected to count as each of `calibration.POSTURES`
-                (`outline.posture_of`): folded bodies are seen less exactly.
+            folded: whether the worker is expected to be folded up (`outline.is_folded`).
+            posture: how far they are expected to count as each posture (`outline.posture_of`).
         """
         check_shape("windows", (len(windows),), (len(self.cameras),), "one a camera")
         looks = self._looks.setdefault(track, [0] * len(self.cameras))
@@ -185,27 +161,28 @@ class PoseDetector(Stateful):
         if searched:
             known = self.search(source) if found is None else found
             windows = agreed_windows(apart_from(known, others), self.cameras)
-        used = [c for c, window in enumerate(windows) if window is not None]
-        asked = [not searched and self._is_turn(looks[c], c) for c in used]
-        sight = self._nothing(list(windows))
-        joints_of = self._share(self._landmark_jobs(source, sight, used, asked, folded))
-        for c, joints in zip(used, joints_of, strict=True):
-            if joints is None:
-                looks[c] = 0  # ask the detector stage again before believing
-            else:
-                looks[c] += 1
-                self._write(sight, c, joints, posture)
-        for c in set(range(len(self.cameras))).difference(used):
-            looks[c] = 0
+        used = [(c, window) for c, window in enumerate(windows) if window is not None]
+        shape = (len(self.cameras), N_JOINTS)
+        nothing = np.full((*shape, 2), np.nan), np.zeros(shape), np.full(shape, np.inf)
+        sight = Detection(*nothing, list(windows), [None] * len(windows))
+
+        def job(c: int, window: Roi) -> Callable[[_Networks], Floats | None]:
+            """Draw a crop; it comes with the work that is to be done on it."""
+            crop = sight.crops[c] = _seen(source.crop(c, window), window, self.cameras[c])
+            ask = not searched and self._is_turn(looks[c], c)
+            return functools.partial(_joints, crop, window, ask, folded, self.config)
+
+        joints_of = self._share(job(c, window) for c, window in used)
+        before, looks[:] = list(looks), [0] * len(looks)  # 0: the detector stage is asked next
+        for (c, window), joints in zip(used, joints_of, strict=True):
+            if joints is not None:
+                looks[c] = before[c] + 1
+                self._write(sight, c, window, joints, posture)
         return sight
 
     def search(self, source: ImageSource, which: Sequence[int] | None = None) -> list[list[Roi]]:
-        """Regions of interest of the people in each camera's whole image, best first.
-
-        Args:
-            source: gives crops of the cameras' present images.
-            which: the cameras whose images are searched; None: all.
-        """
+        """Regions of interest of the people in whole images of cameras `which` (None: all), best
+        first; empty for the others."""
         which = range(len(self.cameras)) if which is None else which
         jobs = search_jobs(source, self.cameras, which, self.config.search_step)
         found = self._share(lambda nets, job=job: job(nets.detect) for job in jobs)
@@ -228,29 +205,6 @@ class PoseDetector(Stateful):
         """Whether the detector stage is due; the cameras take turns to spread its cost."""
         every = self.config.gate_every
         return looks == 0 or (looks + camera * every // len(self.cameras)) % every == 0
-
-    def _landmark_jobs(
-        self,
-        source: ImageSource,
-        sight: Detection,
-        used: list[int],
-        asked: list[bool],
-        folded: bool,
-    ) -> Iterator[Callable[[_Networks], Floats | None]]:
-        """Draw one crop after the other; each comes with the work that is to be done on it."""
-        for c, ask in zip(used, asked, strict=True):
-            window = sight.windows[c]
-            if window is not None:
-                crop = sight.crops[c] = _seen(source.crop(c, window), window, self.cameras[c])
-                yield (
-                    lambda nets, k=crop, w=window, a=ask: (
-                        _joints(
-                            nets, nets.folded if folded else nets.landmark, k, w, a, self.config
-                        )
-                        if nets.own is None
-                        else own_joints(nets.own, k, w)
-                    )
-                )
 
     def _share(self, jobs: Iterable[Callable[[_Networks], ResultT]]) -> list[ResultT]:
         """Results in order; the helper works from the front, this thread from the back."""
@@ -277,39 +231,28 @@ class PoseDetector(Stateful):
             self._helper = ThreadPoolExecutor(1, thread_name_prefix="hrc_env-detector")
         return self._helper, self._networks
 
-    def _nothing(self, windows: list[Roi | None]) -> Detection:
-        shape = (len(self.cameras), N_JOINTS)
-        return Detection(
-            np.full((*shape, 2), np.nan), np.zeros(shape), np.full(shape, np.inf), windows,
-            [None] * len(windows),
-        )  # fmt: skip
-
-    def _write(self, sight: Detection, c: int, joints: Floats, posture: Sequence[float]) -> None:
-        window = sight.windows[c]
+    def _write(
+        self, sight: Detection, c: int, window: Roi, joints: Floats, posture: Sequence[float]
+    ) -> None:
         outside = ~inside_image(self.cameras[c], joints[:, :2])
         confidence = joints[:, 2].copy()
         confidence[outside] = np.minimum(confidence[outside], self.config.outside_confidence)
         sight.px[c], sight.confidence[c] = joints[:, :2], confidence
-        stature_px = STATURE_OF_SIDE * window.side_px if window else np.nan
-        sight.sigma_px[c] = sigma_px(confidence, stature_px, posture)
+        sight.sigma_px[c] = sigma_px(confidence, STATURE_OF_SIDE * window.side_px, posture)
 
 
 def _networks(config: DetectorConfig) -> _Networks:
-    runtime = chosen_runtime(config.runtime)
-    landmark = load_landmarker(config.network, runtime)
+    runtime = network.chosen_runtime(config.runtime)
+    landmark = network.load_landmarker(config.network, runtime)
     same = config.folded == config.network
-    folded = landmark if same else load_landmarker(config.folded, runtime)
+    folded = landmark if same else network.load_landmarker(config.folded, runtime)
     make = DETECTORS[config.keypoints]
     own = None if make is None else make()
-    return _Networks(load_person_detector(runtime), landmark, folded, own)
+    return _Networks(network.load_person_detector(runtime), (landmark, folded), own)
 
 
 def own_joints(find: KeypointFunction, crop: Image, window: Roi) -> Floats | None:
-    """(J, 3) pixels and confidence, or None, by somebody's function.
-
-    Raises:
-        ConfigError: it gives another shape, or confidences that are none.
-    """
+    """(J, 3) pixels and confidence, or None, by somebody's function; refuses what is neither."""
     found = find(crop)
     if found is None:
         return None
@@ -319,23 +262,20 @@ def own_joints(find: KeypointFunction, crop: Image, window: Roi) -> Floats | Non
     joints[missing] = (np.nan, np.nan, 0.0)
     if not ((joints[:, 2] >= 0) & (joints[:, 2] <= 1)).all():
         raise ConfigError(f"A detector's confidences must be in [0, 1], got {joints[:, 2]}.")
-    joints[:, :2] = blazepose.to_image(joints[:, :2] / LANDMARK_SIDE, window)
+    joints[:, :2] = blazepose.to_image(joints[:, :2] / SIDE, window)
     return joints
 
 
 def _joints(
-    nets: _Networks,
-    landmark: Landmarker,
-    crop: Image,
-    window: Roi,
-    ask_detector: bool,
-    config: DetectorConfig,
+    crop: Image, window: Roi, ask: bool, folded: bool, config: DetectorConfig, nets: _Networks
 ) -> Floats | None:
-    """(J, 3) pixels and visibility of the 15 joints, or None where there is no worker."""
-    points, presence, heat = landmark(blazepose.landmark_input(crop))
+    """(J, 3) pixels and visibility, or None where there is no worker; `ask` the detector stage?"""
+    if nets.own is not None:
+        return own_joints(nets.own, crop, window)
+    points, presence, heat = nets.landmark[folded](blazepose.landmark_input(crop))
     if presence < config.min_presence:
         return None
-    if ask_detector or presence < config.sure_presence:
+    if ask or presence < config.sure_presence:
         offsets = [np.hypot(*(person.hip - 0.5)) for person in people(nets.detect, crop)]
         if min(offsets, default=np.inf) > config.max_offset:
             return None
@@ -346,7 +286,7 @@ def _joints(
 
 def _seen(crop: Image, window: Roi, camera: PinholeCamera) -> Image:
     """A copy of the crop, black where the camera does not see: renderers go on drawing."""
-    check_shape("crop", crop.shape, (LANDMARK_SIDE, LANDMARK_SIDE, 3), "rows, columns, RGB")
+    check_shape("crop", crop.shape, (SIDE, SIDE, 3), "rows, columns, RGB")
     mask = _frame_mask(window, camera.width_px, camera.height_px)
     if mask is None:
         return np.array(crop)
@@ -361,10 +301,8 @@ def _frame_mask(window: Roi, width_px: int, height_px: int) -> NDArray[np.uint8]
     square = blazepose.to_image(corners, window)
     if ((square >= 0) & (square < frame)).all():
         return None
-    matrix = np.eye(3)
-    matrix[:2] = blazepose.image_from_crop(window, LANDMARK_SIDE)
-    back = np.linalg.inv(matrix)[:2]
-    mask = np.zeros((LANDMARK_SIDE, LANDMARK_SIDE), np.uint8)
+    back = cv2.invertAffineTransform(blazepose.image_from_crop(window, SIDE))
+    mask = np.zeros((SIDE, SIDE), np.uint8)
     polygon = np.round(corners * frame @ back[:, :2].T + back[:, 2]).astype(np.int32)
     cv2.fillConvexPoly(mask, polygon, 1)
     return mask

@@ -1,47 +1,33 @@
 """Keypoints without pixels: the projected truth with BlazePose's errors.
 
-The errors are drawn from a calibration: numbers fitted to what the network made of rendered
-workers (`perception.calibration`, docs/emulator.md). Some are the same in every camera, as they
-are of what the network takes for a hip; others depend on the view and on how folded the body is;
-they last, are larger where a joint is hidden, and the confidence tells of that as far as the
-network's does. Now and then a camera exchanges left and right, or loses the worker.
+The errors are drawn from a calibration, numbers fitted to what the network made of rendered workers
+(`perception.calibration`, docs/emulator.md).
 """
 
 import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hrc_env.core.errors import ConfigError, check_shape
 from hrc_env.core.records import Keypoints, WorkerTruth
-from hrc_env.core.skeleton import MIRROR, N_JOINTS
+from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats, Ints
-from hrc_env.geometry.cameras import PinholeCamera, projections
+from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.geometry.lens import lens_row
 from hrc_env.geometry.sight import Surroundings
+from hrc_env.perception import emulator_kernel as kernels
 from hrc_env.perception.calibration import (
-    HAND,
-    INNER,
-    KIND,
-    NEXT,
     POSTURED,
-    VISIBILITY,
     Calibration,
     changed_ns,
     read_calibration,
 )
 from hrc_env.perception.detector import STATURE_OF_SIDE
-from hrc_env.perception.emulator_kernel import (
-    N_NORMALS,
-    N_OF_BODY,
-    Scalars,
-    Tables,
-    emulate_batch,
-)
-from hrc_env.perception.sightlines import CENTRE, N_LOOK, Rig, World, sight_batch
+from hrc_env.perception.sightlines import CAMERA, N_LOOK, World, sight_batch
 
 Generators = Sequence[np.random.Generator]
 
@@ -78,11 +64,7 @@ class EmulatorConfig:
         self.calibrated()
 
     def calibrated(self) -> Calibration:
-        """The calibration, with what is different.
-
-        Raises:
-            ConfigError: its file cannot be read.
-        """
+        """The calibration, with what is different. Raises `ConfigError` for a bad file."""
         known = read_calibration(self.calibration or None)
         if self.swap_share is not None:
             share = np.zeros_like(known.swap_share)
@@ -97,24 +79,9 @@ class EmulatorConfig:
 class EmulatorState:
     """What the detector's errors remember from image to image, in standard deviations."""
 
-    lasting: Floats
-    """(B, C, W, J, 2, 2) of an episode: factors of cosine and sine of the view, along x and y."""
-    slow: Floats
-    """(B, C, W, J, 2) what lasts for a while, along x and y."""
-    size: Floats
-    """(B, C, W, J) logarithm of the errors' size: a joint's own part."""
-    sure: Floats
-    """(B, C, W, J) the confidence, as far as it does not follow the size."""
-    body: Floats
-    """(B, C, W) the whole body's factor on the errors' size."""
-    wander: Floats
-    """(B, W, J, 3) what is the same in every camera, as far as it is the joint's own: ahead, to
-    its side, up."""
-    happening: Floats
-    """(B, C, W, 3) the lower, the sooner left and right are exchanged, those of the legs alone,
-    nobody is found."""
-    dt_s: float
-    """Time between images [s]."""
+    errors: NDArray[np.void]  # (B, C, W) `emulator_kernel.ERRORS`
+    wander: Floats  # (B, W, J, 3) the same in every camera, a joint's own: ahead, aside, up
+    dt_s: float  # time between images [s]
 
 
 def make_state(
@@ -123,25 +90,14 @@ def make_state(
     """A state for `batch` environments with images `dt_s` apart; `reset` it before use."""
     if not dt_s > 0:
         raise ConfigError(f"The time between images must be positive, got {dt_s} s.")
-    lead = (batch, n_cameras, n_workers)
-    return EmulatorState(
-        lasting=np.zeros((*lead, N_JOINTS, 2, 2)),
-        slow=np.zeros((*lead, N_JOINTS, 2)),
-        size=np.zeros((*lead, N_JOINTS)),
-        sure=np.zeros((*lead, N_JOINTS)),
-        body=np.zeros(lead),
-        wander=np.zeros((batch, n_workers, N_JOINTS, 3)),
-        happening=np.zeros((*lead, 3)),
-        dt_s=dt_s,
-    )
+    errors = np.zeros((batch, n_cameras, n_workers), kernels.ERRORS)
+    return EmulatorState(errors, np.zeros((batch, n_workers, N_JOINTS, 3)), dt_s)
 
 
 def reset(state: EmulatorState, ids: Ints, rngs: Generators) -> None:
     """Begin environments `ids` anew with errors drawn from how they are in the long run."""
-    arrays = (
-        state.lasting, state.slow, state.size, state.sure, state.body, state.wander,
-        state.happening,
-    )  # fmt: skip
+    *names, last = (state.errors[name] for name in kernels.ERRORS.names or ())
+    arrays = (*names, state.wander, last)
     sizes = [math.prod(array.shape[1:]) for array in arrays]
     drawn = np.array([rngs[b].standard_normal(sum(sizes)) for b in ids]).reshape(len(ids), -1)
     for array, part in zip(arrays, np.split(drawn, np.cumsum(sizes)[:-1], 1), strict=True):
@@ -170,38 +126,27 @@ def emulate(
         Keypoints in pixels of the images, as lenses distort them, with NaN, 0 and infinity where a
         camera does not see a worker.
     """
-    batch, n_cameras, n_workers = state.body.shape
+    batch, n_cameras, n_workers = state.errors.shape
     shape = (batch, n_cameras, n_workers, N_JOINTS)
     robot = surroundings.capsules_world
     check_shape("surroundings.capsules_world", (len(robot),), (batch,), "environments")
-    n_images = n_cameras * n_workers
-    n_normals = 3 * N_JOINTS * n_workers + (N_NORMALS * N_JOINTS + N_OF_BODY) * n_images
-    normals = np.empty((batch, n_normals))
+    n_image = kernels.N_NORMALS * N_JOINTS + kernels.N_OF_BODY
+    normals = np.empty((batch, n_workers * (3 * N_JOINTS + n_cameras * n_image)))
     for rng, normal in zip(rngs, normals, strict=True):
         rng.standard_normal(out=normal)
     written_ns = changed_ns(config.calibration) if config.calibration else 0
-    tables, scalars = _settings(config, state.dt_s, written_ns)
-    errors = (
-        state.lasting, state.slow, state.size, state.sure, state.body, state.wander,
-        state.happening,
-    )  # fmt: skip
-    out = Keypoints(np.empty((*shape, 2)), np.empty(shape), np.empty(shape))
-    emulate_batch(
-        errors, normals, tuple(_world(truth, surroundings)), tuple(_rig(cameras)), tables, scalars,
-        out.px, out.confidence, out.sigma_px,
-    )  # fmt: skip
-    return out
+    postures, settings = _settings(config, state.dt_s, written_ns)
+    out = kernels.Report(np.empty((*shape, 2)), np.empty(shape), np.empty(shape))
+    world, rig = _world(truth, surroundings), _rig(cameras)
+    kernels.emulate_batch(state.errors, state.wander, normals, world, rig, postures, settings, out)
+    return Keypoints(*out)
 
 
 def lines_of_sight(
     truth: WorkerTruth, surroundings: Surroundings, cameras: tuple[PinholeCamera, ...]
 ) -> tuple[Ints, Floats]:
-    """How each camera sees each joint and each worker, as the emulator has it.
-
-    Returns:
-        (B, C, W, J) `sightlines.SEEN`, `HIDDEN`, `OUTSIDE` or `BEHIND`; (B, C, W, `N_LOOK`)
-        side [px] and turn [rad] of the window, view [rad], folding, kneeling, handling, stepping.
-    """
+    """How each camera sees each joint, (B, C, W, J) `sightlines.SEEN` to `BEHIND`, and each worker,
+    (B, C, W, `N_LOOK`) `SIDE` to `STEPPING`, as the emulator has it."""
     batch, n_workers, n_joints = truth.joints_world.shape[:3]
     sight = np.empty((batch, len(cameras), n_workers, n_joints), np.int64)
     look_of = np.empty((batch, len(cameras), n_workers, N_LOOK))
@@ -219,12 +164,7 @@ def _world(truth: WorkerTruth, surroundings: Surroundings) -> World:
 
 
 def without_names(keypoints: Keypoints, rngs: Generators) -> Keypoints:
-    """The same poses, in every camera in an order of its own: nobody wears a name.
-
-    Args:
-        keypoints: (B, C, W, J, ...).
-        rngs: one generator per environment.
-    """
+    """The same poses, in every camera in an order of its own: nobody wears a name."""
     batch, n_cameras, n_workers = keypoints.confidence.shape[:3]
     order = np.tile(np.arange(n_workers), (batch, n_cameras, 1))
     for b in range(batch):
@@ -235,48 +175,38 @@ def without_names(keypoints: Keypoints, rngs: Generators) -> Keypoints:
 
 
 @functools.lru_cache(maxsize=16)
-def _rig(cameras: tuple[PinholeCamera, ...]) -> Rig:
-    image = [(camera.width_px, camera.height_px, camera.K[0, 0]) for camera in cameras]
-    eyes_world = np.stack([camera.eye_world for camera in cameras])
-    lenses = np.stack([_lens_of(camera) for camera in cameras])
-    return Rig(
-        projections(cameras), np.ascontiguousarray(eyes_world), np.array(image, float), lenses
-    )
-
-
-def _lens_of(camera: PinholeCamera) -> Floats:
-    """(12,) a lens with what makes pixels of its numbers; zeros for a pinhole."""
-    if camera.lens is None:
-        return np.zeros(CENTRE + 2)
-    K = camera.K
-    return np.concatenate([lens_row(camera.lens), K[[0, 1], [0, 1]], K[:2, 2]])
+def _rig(cameras: tuple[PinholeCamera, ...]) -> NDArray[np.void]:
+    """(C,) `CAMERA`."""
+    rig = np.zeros(len(cameras), CAMERA)
+    for row, camera in zip(rig, cameras, strict=True):
+        row["P"], row["eye"] = camera.P, camera.eye_world
+        row["size_px"] = camera.width_px, camera.height_px
+        row["focal_px"], row["centre_px"] = camera.K[[0, 1], [0, 1]], camera.K[:2, 2]
+        if camera.lens is not None:
+            row["has_lens"], row["lens"] = True, lens_row(camera.lens)
+    return rig
 
 
 @functools.lru_cache(maxsize=16)
 def _settings(
     config: EmulatorConfig, dt_s: float, written_ns: int
-) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
-    """A calibration as the kernel takes it: plain tuples of `Tables` and `Scalars`; read again if
-    its file has been written anew."""
+) -> tuple[Floats, NDArray[np.void]]:
+    """A calibration as the kernel takes it: (P, N) postures, (1,) `SETTINGS`; read again if its
+    file has been written anew."""
     known = config.calibrated()
     confidence = np.clip(known.confidence, 1e-6, 1 - 1e-6)
     of_posture = {name: getattr(known, name) for name in POSTURED}
     of_posture["size"] = np.log(known.size)
     of_posture["confidence"] = np.log(confidence / (1 - confidence))
-    others = (
-        known.space_limb, known.bias, np.sqrt(known.shares), known.limb, known.follows,
-        VISIBILITY, KIND, HAND, INNER, NEXT, MIRROR,
-    )  # fmt: skip
-    copies: list[Any] = [np.array(each) for each in others]  # writable: one type for the kernel
     rows = [table.reshape(len(table), -1) for table in of_posture.values()]
-    tables = Tables(np.concatenate(rows, 1), *copies)
-    keep_swap, keep_cross, keep_miss = (
-        float(np.exp(-dt_s / lasts_s)) for lasts_s in (*known.swap_s, known.miss_s)
-    )
-    scalars = Scalars(
-        float(dt_s / known.slow_s), float(dt_s / known.slow_m), float(np.sqrt(known.common)),
-        float(np.sqrt(1 - known.common)), config.error_scale, config.max_error,
-        keep_swap, keep_cross, keep_miss, config.min_joints,
-        config.outside_confidence, STATURE_OF_SIDE,
-    )  # fmt: skip
-    return tuple(tables), tuple(scalars)
+    settings = np.zeros(1, kernels.SETTINGS)
+    for name in ("space_limb", "bias", "limb", "follows"):
+        settings[name] = getattr(known, name)
+    for name in ("error_scale", "max_error", "min_joints", "outside_confidence"):
+        settings[name] = getattr(config, name)
+    settings["shares"] = np.sqrt(known.shares)
+    settings["at_rest"], settings["per_speed"] = dt_s / known.slow_s, dt_s / known.slow_m
+    settings["common"], settings["own"] = np.sqrt(known.common), np.sqrt(1 - known.common)
+    settings["keep"] = [np.exp(-dt_s / lasts_s) for lasts_s in (*known.swap_s, known.miss_s)]
+    settings["stature_of_side"] = STATURE_OF_SIDE
+    return np.concatenate(rows, 1), settings

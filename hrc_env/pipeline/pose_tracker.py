@@ -26,12 +26,11 @@ class PoseTracker:
     """Follows the workers before a rig; what level `pixels` does, for one place.
 
     Args:
-        cameras: the rig; `geometry.rig_files.read_rig` and `geometry.cameras.pinhole` make them.
+        cameras: the rig, as of `geometry.cameras.pinhole`.
         n_workers: how many are followed at most.
         dt_s: the usual time between two sets of frames [s].
         estimator: as of an environment.
-        tracker: settings of the estimator; None: its defaults. The prior says where somebody
-            is looked for to be (`prior_mean_world`, `prior_std_m`).
+        tracker: settings of the estimator; None: its defaults.
         detector: settings of the detector; None: the defaults.
 
     Raises:
@@ -73,10 +72,8 @@ class PoseTracker:
         self.estimator.predict(self.state, self.dt_s if dt_s is None else dt_s, drawn)
         expected = self.estimator.estimate(self.state)
         seen = no_keypoints(1, len(self.cameras), self.n_workers)
-        for worker, found in self.looking.look(source, expected, 0, 0, [True] * len(self.cameras)):
-            seen.px[0, :, worker] = found.px
-            seen.confidence[0, :, worker] = found.confidence
-            seen.sigma_px[0, :, worker] = found.sigma_px
+        has_image = [True] * len(self.cameras)
+        self.looking.look(source, expected, 0, 0, has_image, seen)
         keypoints = pinhole_keypoints(seen, self.cameras)
         if self.n_workers > 1:
             keypoints = associate(self.P, keypoints, expected, AssociationConfig()).keypoints
@@ -90,4 +87,4 @@ class PoseTracker:
 
     def close(self) -> None:
         """Stop the detector's thread."""
-        self.looking.close()
+        self.looking.detector.close()

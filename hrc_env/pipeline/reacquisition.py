@@ -1,20 +1,23 @@
-"""Workers whose windows show nobody while their track believes itself: where else they are.
+"""Searches of whole images: when they are due, and for workers whose track has gone astray.
 
-A window goes where the track expects the worker. A track that has gone astray sends all of them
-to where nobody is, and grows less sure only slowly. For whom fewer than two cameras have shown
-for a while the whole images of the others are searched; where these agree on a person, they look
-there for as long as an estimator takes to give up what it believed.
+A search costs as much as several steps: a camera in whose image nobody was believed rests for a
+while. Where fewer than two cameras have shown a tracked worker for some steps, the images of the
+others are searched; where these agree on a person, they look there until the estimator follows.
 """
 
 from collections.abc import Sequence
+
+import numpy as np
 
 from hrc_env.core.records import Roi
 from hrc_env.core.stateful import Stateful
 from hrc_env.core.typing import Bools
 from hrc_env.geometry.cameras import PinholeCamera
-from hrc_env.perception.acquisition import Candidates, agreed_windows, apart_from
+from hrc_env.perception.searching import Candidates, agreed_windows, apart_from
 from hrc_env.pipeline.sensor_input import Windows
 
+REMEMBERED = 10
+"""Steps for which what a search found stands for a camera that is not searched."""
 PATIENCE = 8
 """Steps in a row in which a camera shows nobody before its whole image is searched."""
 FOLLOWED = 5
@@ -26,34 +29,73 @@ Views = list[Roi | None]
 """A window a camera."""
 
 
+class SearchSchedule(Stateful):
+    """When B environments search the images of C cameras, and what these showed lately."""
+
+    CHANGES = ("rests", "ages", "people")
+
+    def __init__(self, batch: int, n_cameras: int, every: int) -> None:
+        """A camera is searched again `every` steps after nobody was believed."""
+        self.every = every
+        self.rests = np.zeros((batch, n_cameras), int)
+        """(B, C) steps for which a camera is not searched."""
+        self.ages = np.full((batch, n_cameras), REMEMBERED)
+        """(B, C) steps since a camera was searched, up to `REMEMBERED`."""
+        self.people: list[list[list[Roi]]] = [[[] for _ in range(n_cameras)] for _ in range(batch)]
+        """Whom each camera showed then."""
+
+    def reset(self, b: int) -> None:
+        """Begin environment b anew."""
+        self.rests[b], self.ages[b] = 0, REMEMBERED
+        self.people[b] = [[] for _ in self.people[b]]
+
+    def tick(self, b: int) -> None:
+        """Count a step of environment b."""
+        self.rests[b] = np.maximum(self.rests[b] - 1, 0)
+        self.ages[b] = np.minimum(self.ages[b] + 1, REMEMBERED)
+
+    def due(self, b: int, has_image: Sequence[bool]) -> list[int]:
+        """The cameras whose images are to be searched now."""
+        return np.flatnonzero(np.array(has_image) & (self.rests[b] == 0)).tolist()
+
+    def remember(self, b: int, cameras: Sequence[int], found: Candidates) -> Candidates:
+        """Keep what these cameras have just shown (C,); give it with what others showed lately."""
+        for c in cameras:
+            self.people[b][c], self.ages[b, c] = list(found[c]), 0
+        recent = self.ages[b] < REMEMBERED
+        return [people if recent[c] else [] for c, people in enumerate(self.people[b])]
+
+    def rest(self, b: int) -> None:
+        """Nobody was believed: the cameras that were searched now are left alone for a while."""
+        self.rests[b, self.ages[b] == 0] = self.every
+
+
 class Reacquisition(Stateful):
     """Workers W of environments B before cameras C, and how long each camera has missed them."""
 
     CHANGES = ("unseen", "elsewhere", "left")
 
     def __init__(self, batch: int, n_workers: int, n_cameras: int) -> None:
-        self.unseen = [[[0] * n_cameras for _ in range(n_workers)] for _ in range(batch)]
-        """Steps in a row in which a camera showed nobody."""
+        self.unseen = np.zeros((batch, n_workers, n_cameras), int)
+        """(B, W, C) steps in a row in which a camera showed nobody."""
         self.elsewhere: list[Windows] = [
             [[None] * n_cameras for _ in range(n_workers)] for _ in range(batch)
         ]
         """Where a search found them."""
-        self.left = [[0] * n_workers for _ in range(batch)]
-        """Steps for which they are still looked for there."""
+        self.left = np.zeros((batch, n_workers), int)
+        """(B, W) steps for which they are still looked for there."""
 
     def reset(self, b: int, worker: int) -> None:
         """Begin with a worker of environment b anew."""
-        n_cameras = len(self.unseen[b][worker])
-        self.unseen[b][worker] = [0] * n_cameras
-        self.elsewhere[b][worker], self.left[b][worker] = [None] * n_cameras, 0
+        self.unseen[b, worker], self.left[b, worker] = 0, 0
+        self.elsewhere[b][worker] = [None] * self.unseen.shape[2]
 
     def blind(self, b: int, worker: int, has_image: Sequence[bool]) -> list[int]:
         """Cameras whose images are to be searched for a worker who is being followed."""
-        unseen = self.unseen[b][worker]
-        n_missing = sum(steps >= PATIENCE for steps in unseen)
-        if self.left[b][worker] or len(unseen) - n_missing >= min(ENOUGH, len(unseen)):
+        missing = self.unseen[b, worker] >= PATIENCE
+        if self.left[b, worker] or np.sum(~missing) >= min(ENOUGH, len(missing)):
             return []
-        return [c for c, has in enumerate(has_image) if has and unseen[c] >= PATIENCE]
+        return np.flatnonzero(np.array(has_image) & missing).tolist()
 
     def found(
         self,
@@ -64,40 +106,34 @@ class Reacquisition(Stateful):
         others: Windows,
         cameras: Sequence[PinholeCamera],
     ) -> None:
-        """Learn what a search of the blind cameras gave.
+        """Learn what a search of the blind cameras gave for a worker of environment b.
 
         Args:
-            b: which environment.
-            worker: whom of it.
+            b: the environment.
+            worker: the worker.
             people: (C,) whom each blind camera shows.
             windows: (C,) where the track has the cameras look.
-            others: windows (C,) of other workers; they are not taken for this one.
+            others: windows (C,) of other workers, who are not taken for this one.
             cameras: the rig.
         """
-        unseen = self.unseen[b][worker]
-        blind = [steps >= PATIENCE for steps in unseen]
+        blind = self.unseen[b, worker] >= PATIENCE
         candidates = [
             people[c] if blind[c] else [window for window in [windows[c]] if window is not None]
             for c in range(len(cameras))
         ]
         agreed = agreed_windows(apart_from(candidates, others), cameras)
-        self.unseen[b][worker] = [
-            0 if is_blind else steps for is_blind, steps in zip(blind, unseen, strict=True)
-        ]
-        if any(
-            window is not None for window, is_blind in zip(agreed, blind, strict=True) if is_blind
-        ):
-            self.elsewhere[b][worker], self.left[b][worker] = agreed, FOLLOWED
+        self.unseen[b, worker, blind] = 0
+        if any(agreed[c] is not None for c in np.flatnonzero(blind)):
+            self.elsewhere[b][worker], self.left[b, worker] = agreed, FOLLOWED
 
     def windows(self, b: int, worker: int, expected: Views) -> Views:
         """Where the cameras look: where a search has just found the worker, else as expected."""
-        if not self.left[b][worker]:
+        if not self.left[b, worker]:
             return expected
-        self.left[b][worker] -= 1
+        self.left[b, worker] -= 1
         pairs = zip(self.elsewhere[b][worker], expected, strict=True)
         return [there if there is not None else here for there, here in pairs]
 
     def saw(self, b: int, worker: int, shown: Bools) -> None:
         """Count whom the cameras (C,) have shown in this step."""
-        pairs = zip(self.unseen[b][worker], shown.tolist(), strict=True)
-        self.unseen[b][worker] = [0 if is_shown else steps + 1 for steps, is_shown in pairs]
+        self.unseen[b, worker] = np.where(shown, 0, self.unseen[b, worker] + 1)

@@ -6,12 +6,11 @@ from typing import Any
 import numpy as np
 
 from hrc_env.config import HRCConfig
-from hrc_env.core.batching import copied, one, rows
+from hrc_env.core.batching import copied, one
 from hrc_env.core.records import Keypoints
 from hrc_env.core.typing import Floats, Image, Ints
 from hrc_env.perception.faults.camera_film import CameraFilm, Shot
-from hrc_env.perception.faults.recent import Recent
-from hrc_env.perception.faults.schedule import Schedule
+from hrc_env.perception.faults.schedule import Recent, Schedule
 from hrc_env.perception.lensed import Lensed
 from hrc_env.pipeline.looking import Looking
 from hrc_env.pipeline.sensor_input import Generators, SensorInput, Windows
@@ -46,17 +45,14 @@ class PixelPipeline(PoseTracking):
         time_s = None if self.recent is None else np.empty(seen.px.shape[:2])
         expected = self.tracker.estimate(predicted)
         for row, b in enumerate(now.ids.tolist()):
-            self.renderer.dress(self.worn[b])
+            self.renderer.randomize(self.worn[b])
             if self.recent is None or time_s is None:
                 self.renderer.draw(now.q[row], one(now.motion, row))
                 has_image = [True] * len(self.scene.cameras)
             else:
                 time_s[row] = self._take_images(now, row, b, self.recent)
                 has_image = np.isfinite(time_s[row]).tolist()
-            for worker, sight in self.looking.look(self.images, expected, row, b, has_image):
-                seen.px[row, :, worker] = sight.px
-                seen.confidence[row, :, worker] = sight.confidence
-                seen.sigma_px[row, :, worker] = sight.sigma_px
+            self.looking.look(self.images, expected, row, b, has_image, seen)
         return replace(seen, time_s=time_s)
 
     def _take_images(self, now: SensorInput, row: int, b: int, recent: Recent) -> Floats:
@@ -82,7 +78,7 @@ class PixelPipeline(PoseTracking):
 
     def last_detections(self, b: int) -> tuple[Keypoints | None, Windows]:
         """The keypoints of environment `b` and the windows they were found in."""
-        return rows(self.keypoints, np.array([b])), self.looking.windows[b]
+        return super().last_detections(b)[0], self.looking.windows[b]
 
     def crops(self, b: int) -> list[Image | None]:
         """What the network was given of the first worker of environment `b`."""
@@ -94,5 +90,5 @@ class PixelPipeline(PoseTracking):
 
     def close(self) -> None:
         """Stop the detector's thread and free the graphics context."""
-        self.looking.close()
+        self.looking.detector.close()
         self.renderer.close()

@@ -11,17 +11,16 @@ from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.stateful import Stateful
 from hrc_env.core.typing import Bools, Floats, Image, Ints
 from hrc_env.geometry.cameras import projections
-from hrc_env.perception.faults.recent import Recent
-from hrc_env.perception.faults.schedule import Schedule
+from hrc_env.perception.faults.schedule import Recent, Schedule
 from hrc_env.perception.lensed import pinhole_keypoints
 from hrc_env.perception.offsets import our_joints
 from hrc_env.pipeline.sensor_input import Generators, SensorInput, Windows
 from hrc_env.scene.build import Scene
 from hrc_env.scene.domain_randomization import Look
-from hrc_env.tracking.calibration_watch import forget, make_watch, watch
+from hrc_env.tracking.calibration_monitor import forget_monitor, make_monitor, monitor
 from hrc_env.tracking.estimators import Estimator
+from hrc_env.tracking.frozen_frames import forget_frozen, leave_out_frozen, make_frozen
 from hrc_env.tracking.people.association import associate
-from hrc_env.tracking.stuck import forget_stuck, leave_out_stuck, make_stuck
 
 
 class PerceptionPipeline(Stateful):
@@ -40,7 +39,7 @@ class PerceptionPipeline(Stateful):
         """Look at `now`; what is believed of it, in its rows."""
         raise NotImplementedError
 
-    def ahead(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
+    def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
         """What is expected in `horizon_s` of rows `ids`, of which `now` is believed."""
         raise NotImplementedError
 
@@ -68,7 +67,7 @@ class PerceptionPipeline(Stateful):
 class PoseTracking(PerceptionPipeline):
     """What the levels with cameras share: predict, get keypoints, update."""
 
-    CHANGES = ("state", "keypoints", "recent", "stuck", "watched")
+    CHANGES = ("state", "keypoints", "recent", "frozen", "monitored")
 
     def __init__(
         self, batch: int, scene: Scene, tracker: Estimator, config: HRCConfig, schedule: Schedule
@@ -79,18 +78,18 @@ class PoseTracking(PerceptionPipeline):
         self.state: Any = tracker.init(batch, scene.n_workers)
         self.keypoints = no_keypoints(batch, len(scene.cameras), scene.n_workers)
         self.recent = None if schedule.is_plain else Recent(batch, schedule)
-        self.stuck = make_stuck(batch, len(scene.cameras))
-        self.watched = make_watch(batch, len(scene.cameras))
+        self.frozen = make_frozen(batch, len(scene.cameras))
+        self.monitored = make_monitor(batch, len(scene.cameras))
         self.axes = np.array([(*camera.K[:2, 2], camera.K[0, 0]) for camera in scene.cameras])
         """(C, 3) principal point and focal length [px]."""
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
         """Forget the tracks of environments `ids`, and what their cameras gave."""
         self.tracker.reset(self.state, ids, tracker_rngs)
-        forget(self.watched, ids)
+        forget_monitor(self.monitored, ids)
         if self.recent is not None:
             self.recent.reset(ids, sensor_rngs)
-            forget_stuck(self.stuck, ids)
+            forget_frozen(self.frozen, ids)
 
     def perceive(
         self, now: SensorInput, sensor_rngs: Generators, tracker_rngs: Generators
@@ -101,7 +100,7 @@ class PoseTracking(PerceptionPipeline):
         self.tracker.predict(state, self.dt_s, tracker_rngs)
         found = pinhole_keypoints(self.detect(now, state, sensor_rngs), self.scene.cameras)
         if self.recent is not None:
-            leave_out_stuck(self.stuck, now.ids, found)
+            leave_out_frozen(self.frozen, now.ids, found)
         keypoints = self._sorted(found, state)
         self.tracker.update(state, keypoints, tracker_rngs)
         if whole:
@@ -111,14 +110,14 @@ class PoseTracking(PerceptionPipeline):
             write_rows(self.state, now.ids, state)
         estimate = self.tracker.estimate(state)
         age_s = self._age_s(now.ids, keypoints)
-        watch(self.watched, now.ids, keypoints, age_s, estimate, self.P, self.axes)
+        monitor(self.monitored, now.ids, keypoints, age_s, estimate, self.P, self.axes)
         return our_joints(estimate)
 
-    def ahead(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
+    def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
         """What the estimator expects."""
         whole = len(ids) == len(self.keypoints.px)
         state = self.state if whole else rows(self.state, ids)
-        return our_joints(self.tracker.ahead(state, horizon_s))
+        return our_joints(self.tracker.forecast(state, horizon_s))
 
     def detect(self, now: SensorInput, predicted: Any, sensor_rngs: Generators) -> Keypoints:
         """Keypoints of this moment, by whatever detector the level has; whose they are is open.
@@ -141,7 +140,7 @@ class PoseTracking(PerceptionPipeline):
 
     def suspected(self, ids: Ints) -> Bools:
         """(B, C) which cameras of environments `ids` are thought to be miscalibrated."""
-        return self.watched.suspected[ids]
+        return self.monitored["suspected"][ids]
 
     def _age_s(self, ids: Ints, keypoints: Keypoints) -> Floats:
         """(B, C) how old the images of this update are, as they say [s]; NaN: none."""

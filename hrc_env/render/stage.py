@@ -1,76 +1,220 @@
-"""Pictures from places that stay, quickly: what moves laid over what was drawn once."""
+"""Pictures from places that stay, quickly: what moves laid over what was drawn once.
 
-from typing import Any
+What stands still is drawn once, larger than the picture and with its shadows; then only the arm
+and the workers are drawn, where they are. What keeps the sun off the rest is asked of a picture
+of them from the sun.
+"""
+
+from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.core.records import WorkerMotion
-from hrc_env.core.typing import Image, JointAngles
+from hrc_env.core.records import Roi, WorkerMotion
+from hrc_env.core.typing import Floats, Image, JointAngles
+from hrc_env.geometry.cameras import PinholeCamera
+from hrc_env.scene import gl
 from hrc_env.scene.build import Scene
+from hrc_env.scene.canvas import (
+    BEFORE_THE_SUN,
+    IN_THE_SHADE,
+    MOVING,
+    STILL,
+    Canvas,
+)
 from hrc_env.scene.domain_randomization import Look
-from hrc_env.scene.layers import BIAS_M, SMOOTHING, Box, Layers, Place
 
+SMOOTHING = 2
+"""All is drawn so many times as large, for smooth edges."""
+QUALITY = {
+    "offsamples": 0, "shadowsize": 4096, "numslices": 14, "numstacks": 5, "numquads": 1,
+}  # fmt: skip
+SUN_PX = 256
+"""Side of the picture from the sun."""
+BIAS_M = 0.03
+"""Nothing shades what is nearer to it than this, along the light [m]."""
 SOFT_PX = 3
 """Edges of shadows are so soft."""
 COARSE = 2
 """Shadows are looked up for one pixel in so many, each way."""
+Box: TypeAlias = tuple[int, int, int, int]
+"""Left, top, right, bottom in a picture's pixels."""
+Depths = NDArray[np.float32]
 
 
-class Stage:
+@dataclass(frozen=True, slots=True)
+class Place:
+    """From where a picture is taken: an upright rectangle of a camera's image."""
+
+    camera: PinholeCamera
+    middle_px: tuple[float, float]
+    """In the camera's image, as is the next."""
+    wide_px: float
+    width: int
+    """Of the picture [px], as is the next."""
+    height: int
+    shadows: bool = False
+
+    @property
+    def key(self) -> tuple[Any, ...]:
+        """What tells places apart."""
+        camera = self.camera
+        view = (camera.K.tobytes(), camera.T_world_from_cam.tobytes())
+        return (*view, self.middle_px, self.wide_px, self.width, self.height, self.shadows)
+
+    @property
+    def whole(self) -> Box:
+        """All of the picture."""
+        return 0, 0, self.width, self.height
+
+    def pixels(self, image_px: Floats) -> Floats:
+        """Pixels of the camera's image (..., 2) as pixels of the picture."""
+        size = np.array([self.width, self.height])
+        return (image_px - self.middle_px) * (self.width / self.wide_px) + size / 2
+
+
+@dataclass(frozen=True, slots=True)
+class Shade:
+    """What moves, seen from the sun."""
+
+    z: Depths
+    """(SUN_PX, SUN_PX) how near to the sun: 1 `begin_m` along the light, 0 `deep_m` further and
+    where nothing is; top row first."""
+    begin_m: float
+    deep_m: float
+    corner: tuple[float, float]
+    """Where the first pixel begins: right and down [m], as `sun_axes`."""
+    step_m: float
+    """Side of a pixel [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Backdrop:
+    """What stands still, seen from a place."""
+
+    rgb: Image
+    """In the picture's size."""
+    z: Depths
+    """`SMOOTHING` times as large; 1 is near."""
+    dark: Image | None
+    """The picture without the sun; None where shadows are not asked for."""
+    spots: tuple[NDArray[np.floating], ...]
+    """What the picture shows in the sun's axes: right, down and along, (h, w) [m] each."""
+
+
+class Stage(Canvas):
     """Pictures of a scene from a few places; what stands still is kept for each."""
 
     def __init__(self, scene: Scene, width: int, height: int) -> None:
         """A stage for pictures of at most `width` x `height`."""
-        self._largest = width, height
-        self._layers = Layers(scene, width, height)
+        gl.draw_on_one_thread()
+        size = max(SMOOTHING * width, SUN_PX), max(SMOOTHING * height, SUN_PX)
+        super().__init__(scene, *size, QUALITY)
         self._kept: dict[Any, _Backdrop] = {}
-        self._shade: Any = None
+        self._shade: Shade | None = None
+        self._shade_known = False
 
-    def fits(self, width: int, height: int) -> bool:
-        """Whether a picture is not too large."""
-        return width <= self._largest[0] and height <= self._largest[1]
-
-    def dress(self, look: Look | None) -> None:
-        """Draw with an episode's look from the next pose on."""
-        if self._layers.dress(look):
+    def randomize(self, look: Look | None) -> bool:
+        """Draw with an episode's look from the next pose on; whether that is another one."""
+        if changed := super().randomize(look):
             self._kept.clear()
+        return changed
 
     def pose(self, q: JointAngles, motion: WorkerMotion | None) -> None:
         """Pose what moves: arm q (N,), the workers of one environment (W, S, ...)."""
-        self._layers.pose(q, motion)
-        self._shade = None
+        super().pose(q, motion)
+        self._shade_known = False
 
     def picture(self, place: Place) -> Image:
         """(height, width, 3) RGB."""
-        backdrop = self._backdrop(place)
+        if place.key not in self._kept:
+            self._kept[place.key] = self._still(place)
+        backdrop = self._kept[place.key]
         image = backdrop.rgb.copy()
-        self._cast_shadows(image, backdrop)
-        box = self._layers.box(place)
+        if backdrop.dark is not None:
+            self._cast_shadows(image, backdrop, backdrop.dark)
+        box = self.box(place)
         if box[2] > box[0] and box[3] > box[1]:
-            _lay_over(image, backdrop, box, *self._layers.moving(place, box))
+            _lay_over(image, backdrop, box, *self.moving(place, box))
         return image
 
-    def close(self) -> None:
-        """Free the OpenGL context."""
-        self._layers.close()
-        self._kept.clear()
+    def moving(self, place: Place, box: Box) -> tuple[Image, Depths]:
+        """What moves within a box of the picture: rgb and z, `SMOOTHING` times as large,
+        top row first; black and 0 where nothing is."""
+        self.show(MOVING)
+        return self._read(place, box)
 
-    def _backdrop(self, place: Place) -> "_Backdrop":
-        key = place.key
-        if key not in self._kept:
-            self._kept[key] = _Backdrop(self._layers, place)
-        return self._kept[key]
+    def box(self, place: Place) -> Box:
+        """Where in the picture things that move are, and maybe a little more."""
+        middles, radii_m = self.movers()
+        camera = place.camera
+        x, y, depth = ((middles - camera.eye_world) @ camera.T_world_from_cam[:3, :3]).T
+        ahead = depth > -radii_m
+        x, y, depth, radii_m = x[ahead], y[ahead], depth[ahead], radii_m[ahead]
+        if not len(depth):
+            return 0, 0, 0, 0
+        if (depth < radii_m + 0.1).any():
+            return place.whole
+        corners = np.stack([_reach(x, depth, radii_m), _reach(y, depth, radii_m)], -1)
+        corners_px = corners * camera.K[[0, 1], [0, 1]] + camera.K[:2, 2]
+        low, high = place.pixels(corners_px)
+        size = [place.width, place.height]
+        left, top = np.clip(np.floor(low - 2), 0, size).astype(int)
+        right, bottom = np.clip(np.ceil(high + 2), 0, size).astype(int)
+        return int(left), int(top), int(right), int(bottom)
 
-    def _cast_shadows(self, image: Image, backdrop: "_Backdrop") -> None:
+    def shade(self) -> Shade | None:
+        """What moves, as the sun sees it; None without a sun or without anything that moves."""
+        self.show(BEFORE_THE_SUN)
+        axes, (middles, radii_m) = self.sun_axes(), self.movers()
+        if axes is None or not len(middles):
+            return None
+        spots = middles @ axes
+        low = (spots - radii_m[:, None]).min(0) - 0.1
+        high = (spots + radii_m[:, None]).max(0) + 0.1
+        half_m, deep_m = float((high - low)[:2].max()) / 2, float((high - low)[2])
+        middle = (low + high) / 2
+        near = axes @ [middle[0], middle[1], low[2]]
+        self.aim_along(axes, near, half_m, deep_m)
+        z = np.empty((SUN_PX, SUN_PX), np.float32)
+        self.read(None, z)
+        corner = float(middle[0]) - half_m, float(middle[1]) - half_m
+        upright = np.ascontiguousarray(z[::-1])
+        return Shade(upright, float(low[2]), deep_m, corner, 2 * half_m / SUN_PX)
+
+    def _still(self, place: Place) -> _Backdrop:
+        size, axes = (place.width, place.height), self.sun_axes()
+        self.show(STILL, shadows=place.shadows)
+        rgb, z = self._read(place, place.whole)
+        dark, spots = None, ()
+        if place.shadows and axes is not None:
+            points = _points(place, self.distance_m(z[::SMOOTHING, ::SMOOTHING]))
+            at = points[::COARSE, ::COARSE] @ axes.astype(np.float32)
+            spots = tuple(np.ascontiguousarray(at[..., k]) for k in range(3))
+            self.show(IN_THE_SHADE)
+            dark = _shrunk(self._read(place, place.whole)[0], size)
+        return _Backdrop(_shrunk(rgb, size), z, dark, spots)
+
+    def _read(self, place: Place, box: Box) -> tuple[Image, Depths]:
+        """What is shown within a box of the picture, `SMOOTHING` times as large, top row first."""
+        left, top, right, bottom = box
+        scale = place.wide_px / place.width
+        x = place.middle_px[0] + ((left + right) / 2 - place.width / 2) * scale
+        y = place.middle_px[1] + ((top + bottom) / 2 - place.height / 2) * scale
+        window = Roi((x, y), (right - left) * scale, 0.0)
+        self.aim(place.camera, window, (bottom - top) * scale)
+        shape = SMOOTHING * (bottom - top), SMOOTHING * (right - left)
+        rgb, z = np.empty((*shape, 3), np.uint8), np.empty(shape, np.float32)
+        self.read(rgb, z)
+        return np.ascontiguousarray(rgb[::-1]), np.ascontiguousarray(z[::-1])
+
+    def _cast_shadows(self, image: Image, backdrop: _Backdrop, dark: Image) -> None:
         """Show the backdrop without the sun where something that moves keeps it off, in place."""
-        if backdrop.dark is None:
-            return
-        if self._shade is None:
-            self._shade = self._layers.shade()
-        shade = self._shade
-        if shade is None:
+        if not self._shade_known:
+            self._shade, self._shade_known = self.shade(), True
+        if (shade := self._shade) is None:
             return
         right, down, along = backdrop.spots
         x = (right - shade.corner[0]) / shade.step_m - 0.5
@@ -86,33 +230,33 @@ class Stage:
         where = slice(y0, y0 + high), slice(x0, x0 + wide)
         weight = cv2.cvtColor(share[where], cv2.COLOR_GRAY2RGB)
         lit = cv2.multiply(image[where], 255 - weight, scale=1 / 255)
-        image[where] = cv2.add(lit, cv2.multiply(backdrop.dark[where], weight, scale=1 / 255))
+        image[where] = cv2.add(lit, cv2.multiply(dark[where], weight, scale=1 / 255))
 
 
-class _Backdrop:
-    """What stands still, seen from a place, in the picture's size."""
+def _reach(x: Floats, depth: Floats, radii_m: Floats) -> Floats:
+    """(2,) the least and the greatest of what spheres cover, in focal lengths from the axis."""
+    nearest, furthest = depth - radii_m, depth + radii_m
+    low = np.minimum((x - radii_m) / nearest, (x - radii_m) / furthest)
+    high = np.maximum((x + radii_m) / nearest, (x + radii_m) / furthest)
+    return np.array([low.min(), high.max()])
 
-    def __init__(self, layers: Layers, place: Place) -> None:
-        still = layers.still(place)
-        size = place.width, place.height
-        self.rgb = _shrunk(still.rgb, size)
-        self.z: NDArray[np.float32] = still.z
-        self.dark = None if still.dark is None else _shrunk(still.dark, size)
-        self.spots: tuple[NDArray[np.floating], ...] = ()
-        """What the picture shows in the sun's axes: right, down and along, (h, w) [m] each."""
-        axes = layers.sun_axes()
-        if still.points_world is not None and axes is not None:
-            places = still.points_world[::COARSE, ::COARSE] @ axes.astype(np.float32)
-            self.spots = tuple(np.ascontiguousarray(places[..., k]) for k in range(3))
+
+def _points(place: Place, depth_m: Depths) -> Depths:
+    """(H, W, 3) points in the world that the picture shows [m]."""
+    scale, camera = place.wide_px / place.width, place.camera
+    u = place.middle_px[0] + (np.arange(place.width) + 0.5 - place.width / 2) * scale
+    v = place.middle_px[1] + (np.arange(place.height) + 0.5 - place.height / 2) * scale
+    x = (u - camera.K[0, 2]) / camera.K[0, 0] * depth_m
+    y = (v - camera.K[1, 2])[:, None] / camera.K[1, 1] * depth_m
+    points = np.stack([x, y, depth_m], -1) @ camera.T_world_from_cam[:3, :3].T + camera.eye_world
+    return points.astype(np.float32)
 
 
 def _shrunk(image: Any, size: tuple[int, int]) -> Image:
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
-def _lay_over(
-    image: Image, backdrop: _Backdrop, box: Box, rgb: Image, z: NDArray[np.float32]
-) -> None:
+def _lay_over(image: Image, backdrop: _Backdrop, box: Box, rgb: Image, z: Depths) -> None:
     """Lay what is nearer over the picture, with smooth edges, in place."""
     left, top, right, bottom = box
     fine = SMOOTHING * np.array(box)

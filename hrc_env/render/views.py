@@ -1,5 +1,6 @@
 """Views of a simulation for people: the room, the cameras with what was made of them."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,10 +16,10 @@ from hrc_env.geometry.chains import capsules
 from hrc_env.motion import generator
 from hrc_env.perception.lensed import Lensed
 from hrc_env.render import overlay
-from hrc_env.render.stage import Stage
+from hrc_env.render.stage import SMOOTHING, Place, Stage
+from hrc_env.scene.canvas import Canvas
 from hrc_env.scene.domain_randomization import Look
-from hrc_env.scene.layers import Place, viewpoint
-from hrc_env.scene.render import PICTURE_QUALITY, CropRenderer, PictureRenderer
+from hrc_env.scene.render import PICTURE_QUALITY, CropRenderer, PictureRenderer, viewpoint_camera
 from hrc_env.simulation import Simulation
 
 PICTURE_SIZE = (960, 720)
@@ -27,8 +28,6 @@ SMALLEST_PX, LARGEST_PX = 16, 4096
 VIEWPOINT = "beside"
 """From where people look on: robot and worker side by side."""
 DEPTH_QUALITY = {**PICTURE_QUALITY, "offsamples": 0, "shadowsize": 0}
-SMOOTHING = 2
-"""Pictures through lenses are drawn so many times as large, and shrunk, for smooth edges."""
 MOSAIC_TILE = (640, 360)
 SIDES = (
     ("from above", np.array([0.0, 0.0, 5.0]), np.zeros(3)),
@@ -79,9 +78,8 @@ class Views:
 
     def __init__(self, simulation: Simulation, b: int = 0) -> None:
         self.simulation, self.b = simulation, b
-        self._stage: Stage | None = None
-        self._depths: dict[tuple[int, int], PictureRenderer] = {}
-        self._squares: dict[int, CropRenderer] = {}
+        self._renderers: dict[str, tuple[tuple[int, int], Any]] = {}
+        """By purpose: the size of their pictures, and themselves."""
 
     def picture(
         self, depth: bool = False, b: int | None = None, size: tuple[int, int] = PICTURE_SIZE
@@ -92,9 +90,10 @@ class Views:
         """
         seen = self.glance(b)
         if depth:
-            renderer = self._depth_renderer(size, seen.look)
+            renderer = self._renderer("depth", size, seen)
             return renderer.picture(seen.q, seen.motion, VIEWPOINT, depth=True)
-        return self._drawn([_whole(viewpoint(VIEWPOINT, *size), *size, shadows=True)], seen)[0]
+        place = _whole(viewpoint_camera(VIEWPOINT, *size), *size, shadows=True)
+        return self._drawn([place], seen)[0]
 
     def glance(self, b: int | None = None) -> Glance:
         """All that there is to draw now, of another environment than usual with `b`."""
@@ -112,7 +111,7 @@ class Views:
 
     def room(self, width: int, height: int, seen: Glance | None = None) -> Image:
         """The room with the estimated skeleton over it."""
-        seen, camera = seen or self.glance(), viewpoint(VIEWPOINT, width, height)
+        seen, camera = seen or self.glance(), viewpoint_camera(VIEWPOINT, width, height)
         (image,) = self._drawn([_whole(camera, width, height, shadows=True)], seen)
         overlay.draw_estimate(image, camera, seen.estimate)
         overlay.draw_markers(image, camera, seen.markers_world)
@@ -172,21 +171,15 @@ class Views:
 
     def close(self) -> None:
         """Free the graphics contexts."""
-        stages = [] if self._stage is None else [self._stage]
-        for renderer in (*stages, *self._depths.values(), *self._squares.values()):
+        for _, renderer in self._renderers.values():
             renderer.close()
-        self._stage, self._depths, self._squares = None, {}, {}
+        self._renderers = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_stage": None, "_depths": {}, "_squares": {}}
+        return {**self.__dict__, "_renderers": {}}
 
     def _crop(
-        self,
-        crop: Image | None,
-        c: int,
-        window: Roi | None,
-        keypoints: Keypoints,
-        size: int,
+        self, crop: Image | None, c: int, window: Roi | None, keypoints: Keypoints, size: int
     ) -> Image:
         if window is None or crop is None:
             image = np.empty((size, size, 3), np.uint8)
@@ -209,7 +202,8 @@ class Views:
         cameras = self.simulation.scene.cameras
         if all(camera.lens is None for camera in cameras):
             return self._drawn([_whole(camera, width, height) for camera in cameras], seen)
-        images = self._square_images(SMOOTHING * width, seen)
+        size = (SMOOTHING * width, SMOOTHING * width)
+        images = Lensed(self._renderer("square", size, seen), cameras)
         squares = [
             images.crop(c, Roi(_middle(camera), float(camera.width_px), 0.0))
             for c, camera in enumerate(cameras)
@@ -221,30 +215,30 @@ class Views:
 
     def _drawn(self, places: list[Place], seen: Glance) -> list[Image]:
         """Pictures from places that stay."""
-        width = max(place.width for place in places)
-        height = max(place.height for place in places)
-        if self._stage is None or not self._stage.fits(width, height):
-            if self._stage is not None:
-                self._stage.close()
-            self._stage = Stage(self.simulation.scene, width, height)
-        self._stage.dress(seen.look)
-        self._stage.pose(seen.q, seen.motion)
-        return [self._stage.picture(place) for place in places]
+        largest = self._renderers["stage"][0] if "stage" in self._renderers else (0, 0)
+        sizes = [largest, *((place.width, place.height) for place in places)]
+        width, height = (max(size[k] for size in sizes) for k in range(2))
+        stage = self._renderer("stage", (width, height), seen)
+        return [stage.picture(place) for place in places]
 
-    def _depth_renderer(self, size: tuple[int, int], look: Look | None) -> PictureRenderer:
-        if size not in self._depths:
-            self._depths[size] = PictureRenderer(self.simulation.scene, *size, DEPTH_QUALITY)
-        self._depths[size].dress(look)
-        return self._depths[size]
+    def _renderer(self, purpose: str, size: tuple[int, int], seen: Glance) -> Any:
+        """What draws for a purpose, posed; made anew where pictures have another size."""
+        had, renderer = self._renderers.get(purpose, (None, None))
+        if had != size:
+            if renderer is not None:
+                renderer.close()
+            renderer = _MAKERS[purpose](self.simulation.scene, *size)
+            self._renderers[purpose] = size, renderer
+        renderer.randomize(seen.look)
+        renderer.pose(seen.q, seen.motion)
+        return renderer
 
-    def _square_images(self, size: int, seen: Glance) -> Lensed:
-        """Square windows of what the cameras see now."""
-        scene = self.simulation.scene
-        if size not in self._squares:
-            self._squares[size] = CropRenderer(scene, size)
-        self._squares[size].dress(seen.look)
-        self._squares[size].draw(seen.q, seen.motion)
-        return Lensed(self._squares[size], scene.cameras)
+
+_MAKERS: dict[str, Callable[..., Canvas]] = {
+    "stage": Stage,
+    "depth": lambda scene, *size: PictureRenderer(scene, *size, DEPTH_QUALITY),
+    "square": lambda scene, *size: CropRenderer(scene, size[0]),
+}
 
 
 def _middle(camera: PinholeCamera) -> tuple[float, float]:

@@ -1,6 +1,6 @@
 """From settings to a compiled scene: room, arm, workers, cameras."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -15,11 +15,9 @@ from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.geometry.chains import SerialChain, capsules
 from hrc_env.geometry.shapes import WIDTH
 from hrc_env.geometry.sight import Surroundings
-from hrc_env.scene.grounds import MOUNT_WORLD, lab_grounds
-from hrc_env.scene.obstacles import obstacles
+from hrc_env.scene.places import SCENES, obstacles
 from hrc_env.scene.primitives import DECORATION, OVERHEAD, ROBOT_BIT, ROBOT_LOOKS
-from hrc_env.scene.props import add_props, prop_mocap
-from hrc_env.scene.rig import LAB_CAMERAS, SITE_CAMERAS, CameraConfig, add_cameras, pinholes, select
+from hrc_env.scene.rig import CameraConfig, add_cameras, pinholes, select
 from hrc_env.scene.robot import (
     DEFAULT,
     PREFIX,
@@ -30,11 +28,10 @@ from hrc_env.scene.robot import (
     robot_called,
     servo_lead_s,
 )
-from hrc_env.scene.site_grounds import site_grounds
-from hrc_env.scene.wardrobe import Wardrobe, dress, wardrobe
 from hrc_env.scene.worker import add_worker, capsule_geom_ids, mocap_ids
+from hrc_env.scene.worker_visuals import WorkerVisuals, add_props, add_visuals, visuals_of
 from hrc_env.worker.body import assets_dir, load_body, pool
-from hrc_env.worker.mesh import load_looks
+from hrc_env.worker.mesh import load_mesh
 from hrc_env.worker.props import held_shapes
 
 ARENA_BYTES = 2**20
@@ -55,33 +52,16 @@ class SceneConfig:
     stay shallow and calm; at 10 ms one seed of eight is beyond (`benchmarks/sim_dt.py`)."""
     slew_rad_s2: float = 8.0
     """Fastest change of a commanded joint velocity [rad/s^2]; keeps the overshoot below 5 %."""
-    leash_rad: float = 0.05
+    integrator_clamp_rad: float = 0.05
     """How far the holding servo's angle may be ahead of a blocked joint [rad]."""
     cameras: tuple[CameraConfig, ...] = ()
     """All cameras that hang in the scene, of which `build` says which are switched on; none: the
     scene's own four."""
 
     def __post_init__(self) -> None:
-        for name in ("sim_dt", "slew_rad_s2", "leash_rad"):
+        for name in ("sim_dt", "slew_rad_s2", "integrator_clamp_rad"):
             if not getattr(self, name) > 0:
                 raise ConfigError(f"{name} must be positive, got {getattr(self, name)}.")
-
-
-@dataclass(frozen=True, slots=True)
-class Room:
-    """What a scene is beside `assets/scenes/NAME.xml`, or `NAME_bare.xml` without clutter."""
-
-    grounds: Callable[[Floats, bool], Grounds]
-    """Where people walk and work, from what stands there, with clutter or without."""
-    cameras: tuple[CameraConfig, ...]
-    """Those that hang there unless the settings say otherwise."""
-
-
-SCENES: dict[str, Room] = {
-    "lab": Room(lab_grounds, LAB_CAMERAS),
-    "site": Room(site_grounds, SITE_CAMERAS),
-}
-"""The scenes by name."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,10 +104,14 @@ class Scene:
         moving = np.zeros((len(q), 0, WIDTH)) if held is None else held_shapes(held)
         return Surroundings(self.obstacles, moving, capsules(chain, q), chain.capsule_radius_m)
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        """A scene is pickled as its recipe."""
+    @property
+    def recipe(self) -> tuple[Any, ...]:
+        """What `build` makes it from."""
         use = tuple(camera.name for camera in self.cameras)
-        return build, (self.config, self.name, self.n_workers, self.bodies, use, self.robot)
+        return self.config, self.name, self.n_workers, self.bodies, use, self.robot
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return build, self.recipe
 
 
 def build(
@@ -172,8 +156,9 @@ def _build(
     use: tuple[str, ...],
     robot: Robot,
 ) -> Scene:
-    cameras, chain = pinholes(select(config.cameras, use)), chain_of(robot, MOUNT_WORLD)
-    spec = _spec(config, name, n_workers, bodies[0], cameras, robot)
+    room = SCENES[name]
+    chain = chain_of(robot, room.mount_world)
+    spec = _spec(config, name, n_workers, bodies, use, robot)
     _strip(spec)
     _pair(spec, robot, chain)
     model = spec.compile()
@@ -189,21 +174,21 @@ def _build(
         bodies=bodies,
         model=model,
         chain=chain,
-        cameras=cameras,
+        cameras=pinholes(select(config.cameras, use)),
         home_q=np.array(robot.home_q),
         servo_lead_s=servo_lead_s(robot, model),
         watched=np.array([robot.capsules.index(name) for name in robot.watched]),
         worker_mocap=np.stack(rows) if rows else np.zeros((0, 0), np.int64),
         worker_capsules=np.array(touched, np.int64).reshape(n_workers, len(body.capsule_names)),
         obstacles=still,
-        grounds=SCENES[name].grounds(still, config.clutter),
+        grounds=room.grounds(still, config.clutter),
     )
 
 
 def without_workers(scene: Scene) -> Scene:
     """The same scene with nobody in it."""
-    names = tuple(camera.name for camera in scene.cameras)
-    return _build(scene.config, scene.name, 0, scene.bodies, names, scene.robot)
+    config, name, _, *rest = scene.recipe
+    return _build(config, name, 0, *rest)
 
 
 @lru_cache(maxsize=4)
@@ -213,32 +198,25 @@ def drawing_model(scene: Scene) -> mujoco.MjModel:
     The physics' joints and its mocap rows come first, in the same order, so that its state fits.
     """
     prefixes = _prefixes(scene.n_workers)
-    spec = _spec(
-        scene.config, scene.name, scene.n_workers, scene.bodies[0], scene.cameras, scene.robot
-    )
+    spec = _spec(*scene.recipe)
     for prefix in prefixes:
         for name in scene.bodies:
-            dress(spec, load_body(name), load_looks(name), prefix)
+            add_visuals(spec, load_body(name), load_mesh(name), prefix)
     add_props(spec, prefixes)
     return spec.compile()
 
 
-def drawn_props(scene: Scene) -> Ints:
-    """(W, len(PROPS) - 1) mocap rows in the drawing model of what the workers can hold."""
-    return prop_mocap(drawing_model(scene), _prefixes(scene.n_workers))
-
-
-def drawn_looks(scene: Scene) -> Wardrobe:
-    """Where the looks of the workers' bodies are in the drawing model."""
-    return wardrobe(drawing_model(scene), _prefixes(scene.n_workers), scene.bodies)
+def visuals(scene: Scene) -> WorkerVisuals:
+    """Where the workers' looks, and what they can hold, are in the drawing model."""
+    return visuals_of(drawing_model(scene), _prefixes(scene.n_workers), scene.bodies)
 
 
 def _spec(
     config: SceneConfig,
     name: str,
     n_workers: int,
-    body_name: str,
-    cameras: tuple[PinholeCamera, ...],
+    bodies: tuple[str, ...],
+    use: tuple[str, ...],
     robot: Robot,
 ) -> mujoco.MjSpec:
     """Everything but the workers' looks and what they hold."""
@@ -249,10 +227,10 @@ def _spec(
     spec.memory = ARENA_BYTES + PAIR_BYTES * n_workers**2
     # The velocity command in force, and which body each worker has: part of the state.
     spec.nuserdata = len(robot.joints) + n_workers
-    add_robot(spec, robot, MOUNT_WORLD)
-    add_cameras(spec, cameras)
+    add_robot(spec, robot, SCENES[name].mount_world)
+    add_cameras(spec, pinholes(select(config.cameras, use)))
     for prefix in _prefixes(n_workers):
-        add_worker(spec, load_body(body_name), prefix)
+        add_worker(spec, load_body(bodies[0]), prefix)
     return spec
 
 

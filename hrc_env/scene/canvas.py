@@ -20,13 +20,13 @@ from hrc_env.core.records import Roi, WorkerMotion
 from hrc_env.core.typing import Floats, Image, JointAngles
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.scene import gl
-from hrc_env.scene.build import Scene, drawing_model, drawn_looks, drawn_props
-from hrc_env.scene.domain_randomization import Look
-from hrc_env.scene.dressing import as_built, dress, strew, take_off_hats
-from hrc_env.scene.primitives import ROBOT_CAPSULES, ROBOT_LOOKS
-from hrc_env.scene.props import PARKED_M, pose_props
+from hrc_env.scene.build import Scene, drawing_model, visuals
+from hrc_env.scene.domain_randomization import Look, as_built, randomize, strew, take_off_hats
+from hrc_env.scene.primitives import DECORATION, OVERHEAD, ROBOT_CAPSULES, ROBOT_LOOKS, SOLID
 from hrc_env.scene.rig import glcam_axes
-from hrc_env.scene.wardrobe import wear
+from hrc_env.scene.worker_visuals import PARKED_M, show_bodies, show_workers
+
+ALL_GROUPS = (SOLID, DECORATION, ROBOT_LOOKS, OVERHEAD)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,20 +60,19 @@ class Canvas:
         width_px: int,
         height_px: int,
         quality: dict[str, int],
-        groups: Sequence[int],
     ) -> None:
         self.width_px, self.height_px = width_px, height_px
-        self._scene = scene
+        self.scene = scene
         self._model = copy.copy(drawing_model(scene))  # its own drawing settings
         for name, value in quality.items():
             setattr(self._model.vis.quality, name, value)
         view = self._model.vis.global_
         view.offwidth, view.offheight = width_px, height_px
         self._data = mujoco.MjData(self._model)
-        self._props, self._looks = drawn_props(scene), drawn_looks(scene)
+        self._visuals = visuals(scene)
         self._built = as_built(self._model)
         self._look: Look | None = None
-        wear(self._model, self._looks, None)
+        show_bodies(self._model, self._visuals, None)
         self._option = mujoco.MjvOption()
         self._option.sitegroup[:] = 0
         self._camera = mujoco.MjvCamera()
@@ -84,28 +83,25 @@ class Canvas:
         self._shown: Any = None
         self._fresh: set[Part] = set()
         self._closed = False
-        self.groups(groups)
+        self.groups(ALL_GROUPS)
 
-    def dress(self, look: Look | None) -> bool:
+    def randomize(self, look: Look | None) -> bool:
         """Draw with this look from the next pose on; None leaves it. Whether it is another one."""
         if look is None or look is self._look:
             return False
         self._look = look
-        dress(self._model, self._built, self._looks, look)
+        randomize(self._model, self._built, self._visuals, look)
         return True
 
     def pose(self, q: JointAngles, motion: WorkerMotion | None) -> None:
         """Put the arm at q (N,), the workers and what they hold where `motion` (W, S, ...) says."""
-        check_shape("q", np.shape(q), self._scene.home_q.shape, "one angle per joint")
+        check_shape("q", np.shape(q), self.scene.home_q.shape, "one angle per joint")
         self._data.qpos[: len(q)] = q
-        rows = self._scene.worker_mocap
+        rows = self.scene.worker_mocap
         if rows.size and motion is not None:
-            self._data.mocap_pos[rows] = np.reshape(motion.position_world, (*rows.shape, 3))
-            self._data.mocap_quat[rows] = np.reshape(motion.quaternion_wxyz, (*rows.shape, 4))
-            pose_props(self._model, self._data, self._props, motion.held)
-            wear(self._model, self._looks, motion.body)
+            show_workers(self._model, self._data, self._visuals, rows, motion)
             if self._look is not None:
-                take_off_hats(self._model, self._looks, self._look)
+                take_off_hats(self._model, self._visuals, self._look)
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_comPos(self._model, self._data)
         mujoco.mj_camlight(self._model, self._data)
@@ -128,7 +124,7 @@ class Canvas:
             int(what.category), self._shown,
         )  # fmt: skip
         if self._look is not None and what.sky:
-            strew(self._shown, self._scene.grounds, self._look)
+            strew(self._shown, self.scene.grounds, self._look)
         for light in self._shown.lights[: 0 if what.sunny else self._shown.nlight]:
             if light.castshadow:
                 light.diffuse, light.specular = np.zeros(3), np.zeros(3)
@@ -173,18 +169,16 @@ class Canvas:
             eye.frustum_top = (height_px / 2 - v) * scale
             eye.frustum_bottom = (-height_px / 2 - v) * scale
 
-    def aim_along(
-        self, direction: Floats, middle_world: Floats, half_m: float, far_m: float
-    ) -> None:
+    def aim_along(self, axes: Floats, middle_world: Floats, half_m: float, far_m: float) -> None:
         """Look along parallel rays, as a sun shines: a square of 2 `half_m` round a point.
 
         Args:
-            direction: (3,) unit vector; rows and columns go along `across(direction)`.
+            axes: (3, 3) columns right, down and along the rays.
             middle_world: (3,) the point in the middle of the near plane [m].
             half_m: half of the square's side [m].
             far_m: how far is drawn [m].
         """
-        _, down = across(direction)
+        _, down, direction = axes.T
         for eye in self._shown.camera:
             eye.orthographic = 1
             eye.pos, eye.forward, eye.up = middle_world - direction, direction, -down
@@ -192,10 +186,15 @@ class Canvas:
             eye.frustum_center, eye.frustum_width = 0.0, half_m
             eye.frustum_top, eye.frustum_bottom = half_m, -half_m
 
-    def sun(self) -> Floats | None:
-        """(3,) where the light goes that casts shadows, if there is one."""
+    def sun_axes(self) -> Floats | None:
+        """(3, 3) columns right, down and along the light that casts shadows, if there is one."""
         shining = np.flatnonzero(self._model.light_castshadow & self._model.light_active)
-        return self._data.light_xdir[shining[0]].copy() if len(shining) else None
+        if not len(shining):
+            return None
+        along = self._data.light_xdir[shining[0]].copy()
+        right = np.cross(along, [0.0, 1.0, 0.0])
+        right /= np.linalg.norm(right)
+        return np.stack([right, np.cross(along, right), along], -1)
 
     def movers(self) -> tuple[Floats, Floats]:
         """Spheres round all that moves, a worker's capsules for the skin: middles (N, 3) and radii
@@ -258,10 +257,3 @@ class Canvas:
             self._gl, self._context = gl.new_context(self.width_px, self.height_px, self._model)
             mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
             self._context.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
-
-
-def across(direction: Floats) -> tuple[Floats, Floats]:
-    """Two unit vectors (3,) at right angles to one: to the right and down of who looks along it."""
-    right = np.cross(direction, [0.0, 1.0, 0.0])
-    right /= np.linalg.norm(right)
-    return right, np.cross(direction, right)

@@ -34,18 +34,15 @@ OFF = ("disable", "disabled", "off", "false", "0")
 
 def import_mujoco() -> None:
     """Import mujoco, also where MUJOCO_GL names what it cannot load: only pictures need that."""
-    choose_backend()
+    chosen = choose_backend()
     try:
         importlib.import_module("mujoco")
     except Exception:  # what PyOpenGL says of a missing library is any of several errors
-        chosen = os.environ.get("MUJOCO_GL")
         os.environ["MUJOCO_GL"] = OFF[0]
         try:
             importlib.import_module("mujoco")
         finally:
-            del os.environ["MUJOCO_GL"]
-            if chosen is not None:
-                os.environ["MUJOCO_GL"] = chosen
+            os.environ["MUJOCO_GL"] = chosen
 
 
 def choose_backend() -> str:
@@ -61,11 +58,9 @@ def choose_backend() -> str:
 
 
 def draw_on_one_thread() -> None:
-    """Let Mesa's software OpenGL draw in the thread that asks, from this process's first context
-    on, unless the user has set LP_NUM_THREADS.
+    """Let Mesa's software OpenGL draw in the thread that asks, unless LP_NUM_THREADS is set.
 
-    Its own threads, one a core, take turns with the thread that detects: with them a step of
-    level `pixels` took half as long again on two cores.
+    Its own threads, one a core, take turns with the thread that detects.
     """
     os.environ.setdefault("LP_NUM_THREADS", "0")
 
@@ -75,8 +70,7 @@ def load_triton_first() -> None:
     """Load the library of triton, if it is installed, before Mesa's first context or window.
 
     Mesa opens its drivers, and libLLVM with them, for all to see; triton's library, loaded after
-    that (`torch.optim` does it), takes that LLVM for its own and crashes. The library alone costs
-    0.06 s and 70 MB, importing triton 0.25 s.
+    that (`torch.optim` does it), takes that LLVM for its own and crashes.
     """
     with contextlib.suppress(OSError, ValueError):  # no triton that anybody could load later
         triton = importlib.util.find_spec("triton")
@@ -178,9 +172,7 @@ def _has_library(name: str) -> bool:
     if ctypes.util.find_library(name):
         return True
     for suffix in (".so.1", ".so.8", ".so"):
-        try:
+        with contextlib.suppress(OSError):
             ctypes.CDLL(f"lib{name}{suffix}")
-        except OSError:
-            continue
-        return True
+            return True
     return False

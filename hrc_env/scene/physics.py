@@ -5,15 +5,17 @@ changes lives in the batch's state rows, so that copying them copies the simulat
 results do not depend on neighbours; threads are a matter of `shards`.
 """
 
+import math
+
 import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
 from hrc_env.core.errors import ConfigError, HRCError, check_shape
+from hrc_env.core.kernels import kernel
 from hrc_env.core.records import WorkerPath
 from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, JointVelocities
 from hrc_env.scene.build import Scene, without_workers
-from hrc_env.scene.commands import substep_commands
 from hrc_env.scene.worker import CAPSULE_FIELDS, capsule_shapes
 
 INPUTS = int(
@@ -26,6 +28,12 @@ COMMANDS = int(mujoco.mjtState.mjSTATE_CTRL)
 """The same without workers."""
 OF_THE_ARM = ("time", "qpos", "qvel", "act", "qacc_warmstart")
 """What of an environment's state the arm's motion hangs on, and changes."""
+
+
+END_MARGIN_RAD = 0.02
+"""Where the arm comes to rest before the end of a joint's range."""
+BRAKE_SHARE = 0.7
+"""Share of the slew limit that stopping before an end counts on."""
 
 
 class Physics:
@@ -76,10 +84,10 @@ class Physics:
         self._qpos[ids, : self._n] = q
         self._act[ids, : self._n] = q
         self._body[ids] = 0 if body is None else body
-        self._dress(ids)
+        self._set_capsules(ids)
 
     def step(
-        self, qd_command: JointVelocities, workers: WorkerPath, apart: Bools | None = None
+        self, qd_command: JointVelocities, workers: WorkerPath, out_of_reach: Bools | None = None
     ) -> JointAngles:
         """One control step of every environment.
 
@@ -90,7 +98,7 @@ class Physics:
                 braked before the joints' ends, here.
             workers: after every substep, arrays (B, T, W, S, ...); T is the number of substeps.
                 W = 0 in a scene without workers.
-            apart: (B,) where no worker can come to touch the arm in this step; None: nowhere.
+            out_of_reach: (B,) where no worker can touch the arm in this step; None: nowhere.
 
         Returns:
             (B, T, N) the arm's angles after every substep [rad].
@@ -100,14 +108,13 @@ class Physics:
         """
         check_shape("qd_command", np.shape(qd_command), (self.batch, self._n), "batch, joints")
         self._fit(workers)
-        config, n = self.scene.config, self._n
+        n = self._n
         substep_commands(
-            self.scene.chain, config.slew_rad_s2, config.leash_rad, config.sim_dt,
-            self.scene.servo_lead_s, self._qpos[:, :n], self._qvel[:, :n], self._act[:, :n],
-            self._command, np.asarray(qd_command, float),
-            hold=self._control[:, :, :n], rate=self._control[:, :, n : 2 * n],
+            self.scene, self._qpos[:, :n], self._qvel[:, :n], self._act[:, :n], self._command,
+            np.asarray(qd_command, float), hold=self._control[:, :, :n],
+            rate=self._control[:, :, n : 2 * n],
         )  # fmt: skip
-        alone = np.zeros(self.batch, bool) if apart is None else apart
+        alone = np.zeros(self.batch, bool) if out_of_reach is None else out_of_reach
         self._roll_beside(~alone, workers)
         self._roll_alone(alone)
         self._check_health()
@@ -121,7 +128,7 @@ class Physics:
         """Continue from a state that `get_state` gave (same scene and batch)."""
         check_shape("state", np.shape(state), self._sims.state.shape, "batch, state")
         self._sims.state[:] = state
-        self._dress(np.arange(self.batch))
+        self._set_capsules(np.arange(self.batch))
 
     def __getstate__(self) -> tuple[Scene, int, Floats]:
         return self.scene, self.batch, self.get_state()
@@ -131,7 +138,7 @@ class Physics:
         self.__init__(scene, batch)
         self.set_state(state)
 
-    def _dress(self, ids: Ints) -> None:
+    def _set_capsules(self, ids: Ints) -> None:
         """Give the workers of environments `ids` the capsules of their bodies."""
         body, geoms = self._body[ids].astype(np.int64), self.scene.worker_capsules
         known = capsule_shapes(self.scene.bodies) if self._shapes else {}
@@ -197,3 +204,71 @@ def no_workers(batch: int, n_substeps: int) -> WorkerPath:
     """The path of nobody, for scenes without workers: arrays (B, T, 0, 22, ...)."""
     lead = (batch, n_substeps, 0, 22)
     return WorkerPath(np.zeros((*lead, 3)), np.zeros((*lead, 4)))
+
+
+def substep_commands(
+    scene: Scene,
+    q: JointAngles,
+    qd: JointVelocities,
+    held: JointAngles,
+    command: JointVelocities,
+    wanted: JointVelocities,
+    hold: Floats,
+    rate: Floats,
+) -> None:
+    """Commands of one control step: limited in size, slew and before the joints' ends.
+
+    The rate servo's command runs ahead by `scene.servo_lead_s`: its torque then pays for the
+    acceleration, and the holding servo need not lag.
+
+    Args:
+        scene: for its settings, ranges and velocity limits.
+        q, qd: (B, N) angles [rad] and velocities [rad/s] now.
+        held: (B, N) angles that the holding servos hold [rad]; kept near a blocked arm, as are the
+            commands, so that it leaves at once.
+        command: (B, N) the command in force; at the end of the step on return [rad/s].
+        wanted: (B, N) wanted velocities [rad/s]; what is not finite counts as 0.
+        hold: (B, T, N) written: mean velocity in each substep, so that the holding servo's
+            integral is exact however time is cut [rad/s].
+        rate: (B, T, N) written: velocity at the end of each substep, with the lead [rad/s].
+    """
+    config, chain = scene.config, scene.chain
+    slew, sim_dt = config.slew_rad_s2, config.sim_dt
+    reach = slew * sim_dt * rate.shape[1]
+    _clamp_integrators(q, qd, held, command, config.integrator_clamp_rad, reach)
+    ranges, limits = chain.range_rad, chain.velocity_limit_rad_s
+    _ramp(q, command, wanted, ranges, limits, slew, sim_dt, scene.servo_lead_s, hold, rate)
+
+
+@kernel
+def _clamp_integrators(q, qd, held, command, clamp, reach):
+    for b in range(q.shape[0]):
+        for i in range(q.shape[1]):
+            held[b, i] = min(max(held[b, i], q[b, i] - clamp), q[b, i] + clamp)
+            command[b, i] = min(max(command[b, i], qd[b, i] - reach), qd[b, i] + reach)
+
+
+@kernel
+def _ramp(q, command, wanted, ranges, limits, slew, sim_dt, lead_s, hold, rate):
+    brake, ctrl_dt = BRAKE_SHARE * slew, sim_dt * rate.shape[1]
+    for b in range(q.shape[0]):
+        for i in range(q.shape[1]):
+            target = wanted[b, i]
+            if not math.isfinite(target):
+                target = 0.0
+            target = min(limits[i], max(-limits[i], target))
+            # v ctrl_dt + v^2 / (2 brake) = room: the speed that still stops in time.
+            room_up = max(0.0, ranges[i, 1] - END_MARGIN_RAD - q[b, i])
+            room_down = max(0.0, q[b, i] - ranges[i, 0] - END_MARGIN_RAD)
+            fastest_up = brake * (math.sqrt(ctrl_dt**2 + 2 * room_up / brake) - ctrl_dt)
+            fastest_down = brake * (math.sqrt(ctrl_dt**2 + 2 * room_down / brake) - ctrl_dt)
+            target = min(fastest_up, max(-fastest_down, target))
+            now = command[b, i]
+            for t in range(rate.shape[1]):
+                change = min(slew * sim_dt, max(-slew * sim_dt, target - now))
+                # Ramp for |change| / slew, then constant: the mean over the substep.
+                ramped = abs(change) / (slew * sim_dt)
+                hold[b, t, i] = now + change * (1.0 - 0.5 * ramped)
+                now += change
+                rate[b, t, i] = now + lead_s[i] * change / sim_dt
+            command[b, i] = now

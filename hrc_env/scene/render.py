@@ -19,9 +19,9 @@ from hrc_env.core.typing import Image, JointAngles
 from hrc_env.geometry.cameras import PinholeCamera, pinhole
 from hrc_env.scene import gl
 from hrc_env.scene.build import Scene
-from hrc_env.scene.canvas import EVERYTHING, MOVING, ROBOT, STILL, Canvas, Part
+from hrc_env.scene.canvas import ALL_GROUPS, EVERYTHING, MOVING, ROBOT, STILL, Canvas, Part
 from hrc_env.scene.domain_randomization import Look
-from hrc_env.scene.primitives import DECORATION, OVERHEAD, ROBOT_LOOKS, SOLID
+from hrc_env.scene.primitives import OVERHEAD
 
 CROP_PX = 256
 CROP_QUALITY = {
@@ -30,7 +30,6 @@ CROP_QUALITY = {
 PICTURE_QUALITY = {
     "offsamples": 4, "shadowsize": 8192, "numslices": 40, "numstacks": 20, "numquads": 4,
 }  # fmt: skip
-ALL_GROUPS = (SOLID, DECORATION, ROBOT_LOOKS, OVERHEAD)
 WINDOWS_KEPT = 4
 """Windows per camera whose background is kept."""
 Key: TypeAlias = tuple[float, ...]
@@ -50,7 +49,13 @@ OPEN_ROOF = ("outside", "top", "overview")
 """Viewpoints from which ceiling and lamps are left out."""
 
 
-class CropRenderer:
+def viewpoint_camera(name: str, width: int, height: int) -> PinholeCamera:
+    """The camera of one of `VIEWPOINTS`, for pictures of this size [px]."""
+    eye, target, hfov_deg = VIEWPOINTS[name]
+    return pinhole(name, np.array(eye), np.array(target), hfov_deg, width, height)
+
+
+class CropRenderer(Canvas):
     """Square crops of the cameras' images: what the detector sees.
 
     What never moves is drawn once for a window that comes again: then only the arm and the
@@ -59,28 +64,19 @@ class CropRenderer:
 
     def __init__(self, scene: Scene, size_px: int = CROP_PX) -> None:
         gl.draw_on_one_thread()
-        self.scene = scene
+        super().__init__(scene, size_px, size_px, CROP_QUALITY)
         self.size_px = size_px
-        self._canvas = Canvas(scene, size_px, size_px, CROP_QUALITY, ALL_GROUPS)
         self._rgb = np.empty((size_px, size_px, 3), np.uint8)
         self._z = np.empty((size_px, size_px), np.float32)
         self._kept: OrderedDict[Key, _Background | None] = OrderedDict()
 
-    def dress(self, look: Look | None) -> bool:
+    def randomize(self, look: Look | None) -> bool:
         """Draw with an episode's look from the next pose on; whether that is another one."""
-        if not self._canvas.dress(look):
-            return False
-        self._kept.clear()
-        return True
+        if changed := super().randomize(look):
+            self._kept.clear()
+        return changed
 
-    def draw(self, q: JointAngles, motion: WorkerMotion | None) -> None:
-        """Pose the scene for the crops that follow.
-
-        Args:
-            q: (N,) angles of the arm [rad].
-            motion: the workers of one environment, arrays (W, S, ...).
-        """
-        self._canvas.pose(q, motion)
+    draw = Canvas.pose
 
     def crop(self, camera_index: int, window: Roi) -> Image:
         """(size, size, 3) of a turned square of a camera's image, top row first.
@@ -102,7 +98,7 @@ class CropRenderer:
         if key not in self._kept:
             self._remember(key, None)
             self._show(EVERYTHING, camera, window)
-            return self._canvas.paint()
+            return self.paint()
         return self._laid_over(MOVING, self._background(key, camera, window), camera, window)
 
     def unpeopled(self, camera: PinholeCamera, window: Roi) -> Image:
@@ -112,10 +108,6 @@ class CropRenderer:
             self._remember(key, None)
         return self._laid_over(ROBOT, self._background(key, camera, window), camera, window)
 
-    def close(self) -> None:
-        """Free the OpenGL context."""
-        self._canvas.close()
-
     def __reduce__(self) -> tuple[Any, ...]:
         return CropRenderer, (self.scene, self.size_px)
 
@@ -124,14 +116,14 @@ class CropRenderer:
     ) -> Image:
         """A part of what moves before what stands still."""
         self._show(part, camera, window)
-        self._canvas.read(self._rgb, self._z)
+        self.read(self._rgb, self._z)
         crop = background.rgb.copy()
         _lay_over(self._rgb, self._z, background.z, crop)
         return crop
 
     def _show(self, what: Part, camera: PinholeCamera, window: Roi) -> None:
-        self._canvas.show(what)
-        self._canvas.aim(camera, window, window.side_px)
+        self.show(what)
+        self.aim(camera, window, window.side_px)
 
     def _background(self, key: Key, camera: PinholeCamera, window: Roi) -> "_Background":
         """What stands still in this window, drawn when it is first asked for."""
@@ -139,7 +131,7 @@ class CropRenderer:
         if background is None:
             z = np.empty_like(self._z)
             self._show(STILL, camera, window)
-            self._canvas.read(self._rgb, z)
+            self.read(self._rgb, z)
             background = _Background(np.ascontiguousarray(self._rgb[::-1]), z)
         self._remember(key, background)
         return background
@@ -183,7 +175,7 @@ def _lay_over(rgb, z, z_behind, out):
                     out[height - 1 - row, column, k] = rgb[row, column, k]
 
 
-class PictureRenderer:
+class PictureRenderer(Canvas):
     """Pictures for people: shadows, smooth edges, named viewpoints."""
 
     def __init__(
@@ -194,13 +186,8 @@ class PictureRenderer:
         quality: dict[str, int] | None = None,
     ) -> None:
         """A renderer of pictures of one size; quality is `PICTURE_QUALITY` unless given."""
-        self.scene = scene
         self.quality = PICTURE_QUALITY if quality is None else quality
-        self._canvas = Canvas(scene, width_px, height_px, self.quality, ALL_GROUPS)
-
-    def dress(self, look: Look | None) -> None:
-        """Draw with an episode's look from now on."""
-        self._canvas.dress(look)
+        super().__init__(scene, width_px, height_px, self.quality)
 
     def viewpoints(self) -> tuple[str, ...]:
         """What `picture` takes: named views and the cameras of the rig."""
@@ -229,14 +216,13 @@ class PictureRenderer:
             (H, W, 3) uint8, or (H, W) float32 distance along the optical axis [m].
         """
         camera = self.camera(viewpoint)
-        canvas = self._canvas
-        canvas.pose(q, motion)
+        self.pose(q, motion)
         roofless = viewpoint in OPEN_ROOF
-        canvas.groups([group for group in ALL_GROUPS if not (roofless and group == OVERHEAD)])
-        canvas.show(shadows=shadows and not depth)
+        self.groups([group for group in ALL_GROUPS if not (roofless and group == OVERHEAD)])
+        self.show(shadows=shadows and not depth)
         middle = Roi((camera.width_px / 2, camera.height_px / 2), camera.width_px, 0.0)
-        canvas.aim(camera, middle, camera.width_px * canvas.height_px / canvas.width_px)
-        return canvas.depth_m() if depth else canvas.paint()
+        self.aim(camera, middle, camera.width_px * self.height_px / self.width_px)
+        return self.depth_m() if depth else self.paint()
 
     def camera(self, viewpoint: str | PinholeCamera) -> PinholeCamera:
         """The camera of a viewpoint; its image is as wide as the picture, or the rig's own."""
@@ -247,14 +233,8 @@ class PictureRenderer:
                 return camera
         if viewpoint not in VIEWPOINTS:
             raise unknown("viewpoint", viewpoint, self.viewpoints())
-        eye, target, hfov_deg = VIEWPOINTS[viewpoint]
-        size = self._canvas.width_px, self._canvas.height_px
-        return pinhole(viewpoint, np.array(eye), np.array(target), hfov_deg, *size)
-
-    def close(self) -> None:
-        """Free the OpenGL context."""
-        self._canvas.close()
+        return viewpoint_camera(viewpoint, self.width_px, self.height_px)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        size = self._canvas.width_px, self._canvas.height_px
+        size = self.width_px, self.height_px
         return PictureRenderer, (self.scene, *size, self.quality)

@@ -14,23 +14,14 @@ from hrc_env.core.typing import Floats, Rotations
 from hrc_env.geometry.camera_config import MOST_CAMERAS, CameraConfig, intrinsics
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.geometry.rotations import about_axis, look_at, quaternion_from_matrix
+from hrc_env.scene.places import SCENES
 
 OPENCV_FROM_OPENGL: Floats = np.diag([1.0, -1.0, -1.0])
 """Its own inverse."""
 
 
-LAB_CAMERAS = (
-    CameraConfig("camera_1", (2.9, 2.6, 2.45)),
-    CameraConfig("camera_2", (-2.9, 2.6, 2.45)),
-    CameraConfig("camera_3", (-2.9, -2.6, 2.45)),
-    CameraConfig("camera_4", (2.9, -2.6, 2.45)),
-)
-"""Four cameras under the ceiling, one in each corner, like the paper's laboratory."""
-SITE_CAMERAS = tuple(
-    CameraConfig(f"camera_{i + 1}", (9.6 * x, 9.6 * y, 5.0), (0.4, 0.0, 0.9), hfov_deg=72.0)
-    for i, (x, y) in enumerate(((1, 1), (-1, 1), (-1, -1), (1, -1)))
-)
-"""On masts in the site's four corners; the field of view holds all of the walkable area."""
+LAB_CAMERAS, SITE_CAMERAS = (SCENES[name].cameras for name in ("lab", "site"))
+"""Under the ceiling, one in each corner, as in the paper's laboratory; on masts in the corners."""
 
 
 def select(

@@ -6,6 +6,7 @@ that follow the command itself (`velocity`). Measured against one servo of eithe
 tool error instead of 3-20, no sag under load. Links have explicit inertials.
 """
 
+import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -16,7 +17,8 @@ import mujoco
 import numpy as np
 
 from hrc_env.core.errors import ConfigError, unknown
-from hrc_env.core.typing import Floats, Transforms
+from hrc_env.core.mapping import from_mapping
+from hrc_env.core.typing import Floats, Ints, Transforms
 from hrc_env.geometry.chains import SerialChain
 from hrc_env.scene.primitives import (
     OBJECT_BIT,
@@ -65,28 +67,16 @@ class Robot:
                 )
 
 
+def _read(path: Path) -> Robot:
+    """A robot that comes with the package: a record in TOML beside its MJCF."""
+    own = {"name": path.stem, "mjcf": str(path.with_suffix(".xml"))}
+    return from_mapping(Robot, tomllib.loads(path.read_text(encoding="utf-8")) | own)
+
+
 ROBOTS: dict[str, Robot] = {
-    DEFAULT: Robot(
-        name=DEFAULT,
-        mjcf=assets_dir() / "robots" / "ur10e_like.xml",
-        joints=("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3"),
-        capsules=(
-            "shoulder", "shoulder_lift", "upper_arm", "elbow", "forearm", "wrist_1", "wrist_2",
-            "wrist_3", "tool",
-        ),
-        watched=("elbow", "tool"),
-        tool_site="tool_point",
-        home_q=(0.0, -1.9, 2.1, -1.77, -np.pi / 2, 0.0),
-        spread_rad=(1.3, 0.15, 0.15, 0.15, 0.15, 0.15),
-        never_touch=(
-            ("shoulder", "pedestal_column"), ("shoulder", "pedestal_head"),
-            ("shoulder_lift", "pedestal_column"), ("shoulder_lift", "pedestal_head"),
-            ("upper_arm", "pedestal_foot"), ("elbow", "pedestal_foot"),
-            ("elbow", "pedestal_head"),
-        ),
-    )
-}  # fmt: skip
-"""By name: the one that comes with the package, and those that were registered."""
+    path.stem: _read(path) for path in sorted((assets_dir() / "robots").glob("*.toml"))
+}
+"""By name: those in `assets/robots`, and those that were registered."""
 
 
 def robot_called(robot: str | Robot) -> Robot:
@@ -123,34 +113,12 @@ def chain_of(robot: Robot, mount_world: tuple[float, float, float]) -> SerialCha
     Raises:
         ConfigError: something that `Robot` names is missing in the MJCF or of another kind.
     """
-    model = _compiled(robot)
-    joints = [_id(robot, model, "joint", name) for name in robot.joints]
-    bodies, n = model.jnt_bodyid[joints], len(joints)
-    _check_servos(robot, model, joints)
-    turned = [_joint_frame(model, joint) for joint in joints]
-    fixed = np.zeros((n, 4, 4))
-    foot = int(model.body_parentid[bodies[0]])
-    for i, (body, frame) in enumerate(zip(bodies, turned, strict=True)):
-        before = np.linalg.inv(turned[i - 1]) if i else np.eye(4)
-        fixed[i] = before @ _between(robot, model, bodies[i - 1] if i else foot, body) @ frame
-    at = np.eye(4)
-    at[:3, 3] = mount_world
-    on, tool = _carried(robot, model, bodies, turned, "site", robot.tool_site)
-    if on != n - 1:
-        raise ConfigError(f"{robot.name}: site {robot.tool_site!r} must be on the last link.")
-    links, ends, radius_m = _capsules(robot, model, bodies, turned)
-    return SerialChain(
-        joint_names=robot.joints,
-        T_world_from_base=at @ _between(robot, model, 0, foot),
-        parent_from_joint=fixed,
-        link_from_tool=tool,
-        range_rad=model.jnt_range[joints],
-        velocity_limit_rad_s=model.actuator_ctrlrange[n:, 1].copy(),
-        capsule_names=robot.capsules,
-        capsule_link=links,
-        capsule_ends=ends,
-        capsule_radius_m=radius_m,
-    )
+    try:
+        return _chain(robot, mount_world)
+    except ConfigError as error:
+        raise ConfigError(f"{robot.name}: {error}") from error
+    except ValueError as error:
+        raise ConfigError(f"{robot.name}: its MJCF cannot be used: {error}") from error
 
 
 def reach_m(chain: SerialChain) -> Floats:
@@ -188,45 +156,61 @@ def check_robot(robot: Robot) -> None:
 
 def _parsed(robot: Robot) -> Any:
     text = str(robot.mjcf)
-    try:
-        if text.lstrip().startswith("<"):
-            return mujoco.MjSpec.from_string(text)
-        return mujoco.MjSpec.from_file(text)
-    except ValueError as error:
-        raise ConfigError(f"{robot.name}: its MJCF cannot be read: {error}") from error
+    read = mujoco.MjSpec.from_string if text.lstrip().startswith("<") else mujoco.MjSpec.from_file
+    return read(text)
 
 
-def _compiled(robot: Robot) -> mujoco.MjModel:
-    try:
-        return _parsed(robot).compile()
-    except ValueError as error:
-        raise ConfigError(f"{robot.name}: its MJCF cannot be compiled: {error}") from error
+def _chain(robot: Robot, mount_world: tuple[float, float, float]) -> SerialChain:
+    model, n = _parsed(robot).compile(), len(robot.joints)
+    joints = [_id(model, "joint", name) for name in robot.joints]
+    _check_servos(model, joints)
+    bodies = model.jnt_bodyid[joints].tolist()
+    turned = [_joint_frame(model, joint) for joint in joints]
+    foot, fixed = int(model.body_parentid[bodies[0]]), np.zeros((n, 4, 4))
+    above, before = foot, np.eye(4)
+    for i, (body, frame) in enumerate(zip(bodies, turned, strict=True)):
+        fixed[i] = before @ _between(model, above, body) @ frame
+        above, before = body, np.linalg.inv(frame)
+    last, tool = _carried(model, bodies, turned, "site", robot.tool_site)
+    if last != n - 1:
+        raise ConfigError(f"site {robot.tool_site!r} must be on the last link.")
+    links, ends, radius_m = _capsules(model, bodies, turned, robot.capsules)
+    T_world_from_foot = _transform(mount_world, np.array([1.0, 0, 0, 0]))
+    return SerialChain(
+        joint_names=robot.joints,
+        T_world_from_base=T_world_from_foot @ _between(model, 0, foot),
+        parent_from_joint=fixed,
+        link_from_tool=tool,
+        range_rad=model.jnt_range[joints],
+        velocity_limit_rad_s=model.actuator_ctrlrange[n:, 1].copy(),
+        capsule_names=robot.capsules,
+        capsule_link=links,
+        capsule_ends=ends,
+        capsule_radius_m=radius_m,
+    )
 
 
-def _id(robot: Robot, model: mujoco.MjModel, kind: str, name: str) -> int:
+def _id(model: mujoco.MjModel, kind: str, name: str) -> int:
     number = mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), name)
     if number < 0:
-        raise ConfigError(f"{robot.name}: its MJCF has no {kind} {name!r}.")
+        raise ConfigError(f"its MJCF has no {kind} {name!r}.")
     return number
 
 
-def _check_servos(robot: Robot, model: mujoco.MjModel, joints: list[int]) -> None:
+def _check_servos(model: mujoco.MjModel, joints: list[int]) -> None:
     """Only hinges with ranges, and their servos in order."""
-    hinge, n = mujoco.mjtJoint.mjJNT_HINGE, len(joints)
-    if joints != list(range(model.njnt)) or (model.jnt_type != hinge).any():
-        raise ConfigError(f"{robot.name}: joints must be all of its MJCF, hinges, in its order.")
-    if not model.jnt_limited.all():
-        raise ConfigError(f"{robot.name}: every joint needs a range.")
-    servos = np.tile(joints, 2)
+    hinges = (model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE).all() and model.jnt_limited.all()
+    if joints != list(range(model.njnt)) or not hinges:
+        raise ConfigError("joints must be all of its MJCF, in its order: hinges with a range.")
     integrates = model.actuator_dyntype == mujoco.mjtDyn.mjDYN_INTEGRATOR
     if not (
-        np.array_equal(model.actuator_trnid[:, 0], servos)
-        and np.array_equal(integrates, np.arange(2 * n) < n)
+        model.actuator_trnid[:, 0].tolist() == 2 * joints
+        and integrates.tolist() == [True] * len(joints) + [False] * len(joints)
         and model.actuator_ctrllimited.all()
     ):
         raise ConfigError(
-            f"{robot.name}: needs an <intvelocity> for every joint in order, then a <velocity> for "
-            "every joint, each with a ctrlrange [rad/s]."
+            "needs an <intvelocity> for every joint in order, then a <velocity> for every joint, "
+            "each with a ctrlrange [rad/s]."
         )
 
 
@@ -237,7 +221,7 @@ def _joint_frame(model: mujoco.MjModel, joint: int) -> Transforms:
     return _transform(model.jnt_pos[joint], quaternion)
 
 
-def _transform(pos: Floats, quaternion_wxyz: Floats) -> Transforms:
+def _transform(pos: Any, quaternion_wxyz: Floats) -> Transforms:
     """(4, 4); by the angle, whose cosine is then as exact as the MJCF's numbers are."""
     sine, T = np.linalg.norm(quaternion_wxyz[1:]), np.eye(4)
     angle = 2 * np.arctan2(sine, quaternion_wxyz[0])
@@ -248,48 +232,43 @@ def _transform(pos: Floats, quaternion_wxyz: Floats) -> Transforms:
     return T
 
 
-def _between(robot: Robot, model: mujoco.MjModel, above: int, body: int) -> Transforms:
+def _between(model: mujoco.MjModel, above: int, body: int) -> Transforms:
     """(4, 4) a body's frame in that of one above it, all joints at 0."""
     T = np.eye(4)
     while body != above:
         if body == 0:
-            raise ConfigError(f"{robot.name}: its joints must be a single chain.")
+            raise ConfigError("its joints must be a single chain, with all capsules and the tool.")
         T = _transform(model.body_pos[body], model.body_quat[body]) @ T
         body = model.body_parentid[body]
     return T
 
 
 def _carried(
-    robot: Robot,
-    model: mujoco.MjModel,
-    bodies: Floats,
-    turned: list[Transforms],
-    kind: str,
-    name: str,
+    model: mujoco.MjModel, bodies: list[int], turned: list[Transforms], kind: str, name: str
 ) -> tuple[int, Transforms]:
     """The link that carries a geom or a site, and (4, 4) its frame there."""
-    number = _id(robot, model, kind, name)
-    carrier = own = getattr(model, f"{kind}_bodyid")[number]
-    while own not in bodies:
-        if own == 0:
-            raise ConfigError(f"{robot.name}: {kind} {name!r} is on no link.")
-        own = model.body_parentid[own]
-    link = int(np.flatnonzero(bodies == own)[0])
+    number = _id(model, kind, name)
+    carrier = own = int(getattr(model, f"{kind}_bodyid")[number])
+    while own not in bodies and own:
+        own = int(model.body_parentid[own])
+    if own not in bodies:
+        raise ConfigError(f"{kind} {name!r} is on no link.")
+    link = bodies.index(own)
     pos, quat = getattr(model, f"{kind}_pos")[number], getattr(model, f"{kind}_quat")[number]
-    inside = _between(robot, model, own, carrier) @ _transform(pos, quat)
+    inside = _between(model, own, carrier) @ _transform(pos, quat)
     return link, np.linalg.inv(turned[link]) @ inside
 
 
 def _capsules(
-    robot: Robot, model: mujoco.MjModel, bodies: Floats, turned: list[Transforms]
-) -> tuple[Any, Floats, Floats]:
+    model: mujoco.MjModel, bodies: list[int], turned: list[Transforms], names: tuple[str, ...]
+) -> tuple[Ints, Floats, Floats]:
     """Links (K,), ends (K, 2, 3) and radii (K,) of the capsules."""
     links, ends, radii_m = [], [], []
-    for name in robot.capsules:
-        geom = model.geom(_id(robot, model, "geom", name))
+    for name in names:
+        geom = model.geom(_id(model, "geom", name))
         if geom.type[0] != mujoco.mjtGeom.mjGEOM_CAPSULE:
-            raise ConfigError(f"{robot.name}: geom {name!r} must be a capsule.")
-        link, T = _carried(robot, model, bodies, turned, "geom", name)
+            raise ConfigError(f"geom {name!r} must be a capsule.")
+        link, T = _carried(model, bodies, turned, "geom", name)
         along = T[:3, 2] * geom.size[1]
         links.append(link)
         ends.append((T[:3, 3] - along, T[:3, 3] + along))

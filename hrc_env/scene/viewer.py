@@ -9,18 +9,8 @@ from hrc_env.core.errors import RenderingError
 from hrc_env.core.records import WorkerMotion
 from hrc_env.core.typing import JointAngles
 from hrc_env.scene import gl
-from hrc_env.scene.build import Scene, drawing_model, drawn_looks, drawn_props
-from hrc_env.scene.props import pose_props
-from hrc_env.scene.wardrobe import wear
-
-
-def viewing_model(scene: Scene) -> mujoco.MjModel:
-    """The painted model, its own copy, with everything that is drawn in groups that are shown.
-
-    MuJoCo's window shows groups 0 to 2 at first; lamps and ceiling stay hidden, so that one can
-    look in from above.
-    """
-    return copy.copy(drawing_model(scene))
+from hrc_env.scene.build import Scene, drawing_model, visuals
+from hrc_env.scene.worker_visuals import show_workers
 
 
 class Viewer:
@@ -32,9 +22,9 @@ class Viewer:
         Raises:
             RenderingError: no display, or the viewer cannot run here.
         """
-        self._scene, self._model = scene, viewing_model(scene)
+        self._scene, self._model = scene, copy.copy(drawing_model(scene))
         self._data = mujoco.MjData(self._model)
-        self._props, self._looks = drawn_props(scene), drawn_looks(scene)
+        self._visuals = visuals(scene)
         try:
             gl.require_display()  # without one launch_passive would wait for ever
             gl.load_triton_first()
@@ -55,10 +45,7 @@ class Viewer:
         with self._window.lock():
             self._data.qpos[: len(q)] = q
             if rows.size:
-                self._data.mocap_pos[rows] = motion.position_world
-                self._data.mocap_quat[rows] = motion.quaternion_wxyz
-                pose_props(self._model, self._data, self._props, motion.held)
-                wear(self._model, self._looks, motion.body)
+                show_workers(self._model, self._data, self._visuals, rows, motion)
             mujoco.mj_forward(self._model, self._data)
         self._window.sync()
 

@@ -1,7 +1,7 @@
 """Put a baked worker into a MuJoCo model: mocap bodies, and capsules round them.
 
 The worker is moved, not simulated: 22 mocap bodies take positions and rotations straight
-from `WorkerMotion`. What one sees (`wardrobe`) nobody can touch; what touches the worker are
+from `WorkerMotion`. What one sees (`worker_visuals`) nobody can touch; what touches the worker are
 capsules that no camera draws and that meet only geoms whose conaffinity has the workers' bit.
 """
 
@@ -11,7 +11,6 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from hrc_env.core.errors import ConfigError
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.scene.primitives import WORKER_BIT, WORKER_CAPSULES, capsule
 from hrc_env.worker.body import SEGMENTS, Body, load_body
@@ -27,12 +26,7 @@ def add_worker(spec: Any, body: Body, prefix: str) -> None:
         spec: the model.
         body: measures.
         prefix: what every name of this worker starts with, for example "worker_1/".
-
-    Raises:
-        ConfigError: the model already has a worker of this prefix.
     """
-    if spec.body(prefix + SEGMENTS[0]) is not None:
-        raise ConfigError(f"The model already has a worker {prefix!r}; expected a new prefix.")
     segments = {
         name: spec.worldbody.add_body(name=prefix + name, pos=position, mocap=True)
         for name, position in zip(SEGMENTS, body.rest_position, strict=True)
@@ -56,16 +50,8 @@ def mocap_ids(model: Any, prefix: str) -> Ints:
 
     `data.mocap_pos[ids] = motion.position_world` and
     `data.mocap_quat[ids] = motion.quaternion_wxyz` pose the worker.
-
-    Raises:
-        ConfigError: the model has no worker of this prefix.
     """
-    bodies = [
-        mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, prefix + name) for name in SEGMENTS
-    ]
-    if min(bodies) < 0:
-        raise ConfigError(f"The model has no worker {prefix!r}: it was not added with add_worker.")
-    return np.array([model.body_mocapid[row] for row in bodies], dtype=np.int64)
+    return np.array([model.body(prefix + name).mocapid[0] for name in SEGMENTS], dtype=np.int64)
 
 
 def capsule_geom_ids(model: Any, body: Body, prefix: str) -> Ints:

@@ -1,7 +1,6 @@
 """Reaching: the tool has to touch goals one after another, in a volume shared with a worker."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,10 +8,10 @@ import numpy as np
 from hrc_env.belief import Belief
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Bools, Floats, Ints, Points3
+from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records
 from hrc_env.observations import ObservationTerm, shorten
 from hrc_env.rewards import RewardTerm
-from hrc_env.tasks.task import Task, World
+from hrc_env.tasks.task import Rngs, Task, World
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,20 +45,26 @@ class ReachConfig:
                 raise ConfigError(f"ReachConfig.{name} must be > 0, got {getattr(self, name)}.")
 
 
-@dataclass(slots=True)
-class ReachState:
-    """The task of every environment; rows are environments."""
-
-    goal_world: Points3
-    """(B, 3) [m]."""
-    goal_age_s: Floats
-    """(B,) since the goal appeared."""
-    distance_m: Floats
-    """(B,) from the tool point to the goal."""
-    n_reached: Ints
-    """(B,) goals reached in this episode."""
-    n_missed: Ints
-    """(B,) goals missed in this episode."""
+REACH = np.dtype(
+    [
+        ("goal_world", "f8", (3,)),  # [m]
+        ("goal_age_s", "f8"),  # since the goal appeared
+        ("distance_m", "f8"),  # from the tool point to the goal
+        ("n_reached", "i8"),  # goals of this episode
+        ("n_missed", "i8"),
+    ],
+    align=True,
+)
+"""The task of one environment."""
+REACH_STEP = np.dtype(
+    [
+        ("progress_m", "f8"),  # by how much the tool came nearer to the goal it had
+        ("reached", "?"),  # whether that goal was reached in this step
+        ("missed", "?"),  # whether it ran out of time in this step
+    ],
+    align=True,
+)
+"""What one step brought one environment."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,112 +77,75 @@ class ReachView:
     """(B,) until the goal is missed."""
 
 
-@dataclass(frozen=True, slots=True)
-class ReachProgress:
-    """What one step brought."""
-
-    progress_m: Floats
-    """(B,) by how much the tool came nearer to the goal it had [m]."""
-    reached: Bools
-    """(B,) whether that goal was reached in this step."""
-    missed: Bools
-    """(B,) whether it ran out of time in this step."""
+def init(batch: int) -> Records:
+    """(B,) of `REACH`, to be filled by `reset`."""
+    return np.zeros(batch, REACH)
 
 
-def init(batch: int) -> ReachState:
-    """A state for `batch` environments, to be filled by `reset`."""
-    return ReachState(
-        goal_world=np.zeros((batch, 3)),
-        goal_age_s=np.zeros(batch),
-        distance_m=np.zeros(batch),
-        n_reached=np.zeros(batch, np.int64),
-        n_missed=np.zeros(batch, np.int64),
-    )
-
-
-def reset(
-    state: ReachState,
-    ids: Ints,
-    rngs: Sequence[np.random.Generator],
-    world: World,
-    config: ReachConfig,
-) -> None:
+def reset(state: Records, ids: Ints, rngs: Rngs, world: World, config: ReachConfig) -> None:
     """Start environments `ids` anew with a first goal each."""
-    state.n_reached[ids] = 0
-    state.n_missed[ids] = 0
+    state["n_reached"][ids] = state["n_missed"][ids] = 0
     _new_goals(state, ids, rngs, world.robot.tool_world, config)
 
 
-def advance(
-    state: ReachState,
-    rngs: Sequence[np.random.Generator],
-    world: World,
-    dt_s: float,
-    config: ReachConfig,
-) -> ReachProgress:
-    """Judge the tool's new place and replace goals that are done."""
-    tool_world = world.robot.tool_world
-    batch = len(tool_world)
-    step = ReachProgress(np.empty(batch), np.empty(batch, np.bool_), np.empty(batch, np.bool_))
-    if _judge(
-        tool_world, dt_s, config.radius_m, config.time_limit_s,
-        state.goal_world, state.goal_age_s, state.distance_m, state.n_reached, state.n_missed,
-        step.progress_m, step.reached, step.missed,
-    ):  # fmt: skip
-        done = np.flatnonzero(step.reached | step.missed)
+def advance(state: Records, rngs: Rngs, world: World, dt_s: float, config: ReachConfig) -> Records:
+    """Judge the tool's new place and replace goals that are done; (B,) of `REACH_STEP`."""
+    tool_world, step = world.robot.tool_world, np.zeros(len(state), REACH_STEP)
+    if _judge(tool_world, dt_s, config.radius_m, config.time_limit_s, state, step):
+        done = np.flatnonzero(step["reached"] | step["missed"])
         _new_goals(state, done, rngs, tool_world[done], config)
     return step
 
 
-def view(state: ReachState, ids: Ints, config: ReachConfig) -> ReachView:
+def view(state: Records, ids: Ints, config: ReachConfig) -> ReachView:
     """What robots `ids` know of their task."""
-    return ReachView(state.goal_world[ids], config.time_limit_s - state.goal_age_s[ids])
+    return ReachView(state["goal_world"][ids], config.time_limit_s - state["goal_age_s"][ids])
 
 
-def succeeded(state: ReachState) -> Bools:
+def succeeded(state: Records) -> Bools:
     """(B,) whether so far every goal of the episode, and at least one, was reached in time."""
-    return (state.n_reached > 0) & (state.n_missed == 0)
+    return (state["n_reached"] > 0) & (state["n_missed"] == 0)
 
 
-def info(state: ReachState) -> dict[str, Floats]:
+def info(state: Records) -> dict[str, Floats]:
     """What the episode has come to so far, (B,) each."""
     return {
-        "task/goals_reached": state.n_reached.astype(float),
-        "task/goals_missed": state.n_missed.astype(float),
+        "task/goals_reached": state["n_reached"].astype(float),
+        "task/goals_missed": state["n_missed"].astype(float),
         "is_success": succeeded(state).astype(float),
     }
 
 
 @kernel
 def _judge(
-    tool_world: Points3, dt_s: float, radius_m: float, time_limit_s: float,
-    goal_world: Points3, goal_age_s: Floats, distance_m: Floats, n_reached: Ints, n_missed: Ints,
-    progress_m: Floats, reached: Bools, missed: Bools,
-) -> bool:  # fmt: skip
+    tool_world: Points3,
+    dt_s: float,
+    radius_m: float,
+    time_limit_s: float,
+    state: Records,
+    step: Records,
+) -> bool:
     """Move the state on and write what it brought; whether any goal is done."""
     done = False
-    for b in range(len(tool_world)):
+    for b in range(len(state)):
+        now, brought = state[b], step[b]
         squared = 0.0
         for i in range(3):
-            squared += (goal_world[b, i] - tool_world[b, i]) ** 2
-        now_m = math.sqrt(squared)
-        progress_m[b] = distance_m[b] - now_m
-        distance_m[b] = now_m
-        goal_age_s[b] += dt_s
-        reached[b] = now_m < radius_m
-        missed[b] = not reached[b] and goal_age_s[b] >= time_limit_s - 1e-9
-        n_reached[b] += reached[b]
-        n_missed[b] += missed[b]
-        done |= reached[b] or missed[b]
+            squared += (now.goal_world[i] - tool_world[b, i]) ** 2
+        distance_m = math.sqrt(squared)
+        brought.progress_m = now.distance_m - distance_m
+        now.distance_m = distance_m
+        now.goal_age_s += dt_s
+        brought.reached = distance_m < radius_m
+        brought.missed = not brought.reached and now.goal_age_s >= time_limit_s - 1e-9
+        now.n_reached += brought.reached
+        now.n_missed += brought.missed
+        done |= brought.reached or brought.missed
     return done
 
 
 def _new_goals(
-    state: ReachState,
-    ids: Ints,
-    rngs: Sequence[np.random.Generator],
-    tool_world: Points3,
-    config: ReachConfig,
+    state: Records, ids: Ints, rngs: Rngs, tool_world: Points3, config: ReachConfig
 ) -> None:
     x, y = config.base_xy_world
     for b, tool in zip(ids.tolist(), tool_world.tolist(), strict=True):
@@ -189,9 +157,9 @@ def _new_goals(
             y + distance * math.sin(azimuth),
             _between(config.height_m, share[2]),
         )
-        state.goal_world[b] = goal
-        state.goal_age_s[b] = 0.0
-        state.distance_m[b] = math.dist(goal, tool)
+        state["goal_world"][b] = goal
+        state["goal_age_s"][b] = 0.0
+        state["distance_m"][b] = math.dist(goal, tool)
 
 
 def _between(limits: tuple[float, float], share: float) -> float:
@@ -235,12 +203,12 @@ TASK = Task(
         RewardTerm(
             "progress",
             "Metres that the tool came nearer to its goal, times `task.progress_per_m`.",
-            lambda now, step, previous, config: config.progress_per_m * step.progress_m,
+            lambda now, step, previous, config: config.progress_per_m * step["progress_m"],
         ),
         RewardTerm(
             "goal",
             "`task.goal_bonus` in the step in which a goal is reached.",
-            lambda now, step, previous, config: np.multiply(config.goal_bonus, step.reached),
+            lambda now, step, previous, config: np.multiply(config.goal_bonus, step["reached"]),
         ),
     ),
     info=info,

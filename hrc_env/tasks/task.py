@@ -1,19 +1,22 @@
 """What a task is: a record of settings, functions over a batch, terms and names."""
 
+import re
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, is_dataclass
 from importlib import import_module
 from typing import Any
 
 import numpy as np
 
-from hrc_env.core.errors import unknown
+from hrc_env.core.errors import ConfigError, check_shape, unknown
 from hrc_env.core.records import RobotState
 from hrc_env.core.typing import Floats, Ints, Points3
 from hrc_env.observations import ObservationTerm, terms_of
 from hrc_env.rewards import SHARED_TERMS, RewardTerm
 from hrc_env.tasks import BUILT_IN, EPISODE_STEPS
 
+_ID = re.compile(r"[A-Za-z]\w*-v\d+")
 Rngs = Sequence[np.random.Generator]
 
 
@@ -26,7 +29,7 @@ class World:
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """A task. Its state is a record (dataclass) of arrays whose rows are environments.
+    """A task. Rows of its state, a structured array or a dataclass of arrays, are environments.
 
     State, progress and view are of types of the task's own; `config` below is an instance of the
     type of that name. `rngs` holds a generator for every environment of the batch; what happens
@@ -88,11 +91,7 @@ TASKS: dict[str, Task] = {}
 
 
 def task_called(task: str | Task) -> Task:
-    """A task by its id.
-
-    Raises:
-        ConfigError: an id that nobody has registered, with those that there are.
-    """
+    """A task by its id, or itself."""
     if isinstance(task, Task):
         return task
     if task not in TASKS and task in BUILT_IN:
@@ -100,3 +99,55 @@ def task_called(task: str | Task) -> Task:
     if task not in TASKS:
         raise unknown("task", task, sorted({*BUILT_IN, *TASKS}))
     return TASKS[task]
+
+
+def check_task(task: Task) -> None:
+    """Raise `ConfigError` for what is missing or wrong in a task.
+
+    Shapes and values of its terms are checked when an environment of it is reset and steps.
+    """
+    if not isinstance(task, Task):
+        raise ConfigError(f"A task must be a hrc_env.tasks.task.Task, got {type(task).__name__}.")
+    if not isinstance(task.id, str) or not _ID.fullmatch(task.id):
+        raise ConfigError(f"A task's id must be like 'Name-v0', got {task.id!r}.")
+    for name in ("init", "reset", "advance", "view", "info", "markers"):
+        if not callable(getattr(task, name)):
+            raise ConfigError(f"{task.id}: {name} must be a function (see Task).")
+    if not (isinstance(task.config, type) and is_dataclass(task.config)):
+        raise ConfigError(f"{task.id}: config must be a dataclass, got {task.config!r}.")
+    try:
+        task.config()
+    except TypeError as error:
+        raise ConfigError(f"{task.id}: every field of config needs a default ({error}).") from error
+    _check_terms(task)
+    _check_state(task)
+
+
+def _check_terms(task: Task) -> None:
+    for terms in (task.observation_terms, task.reward_terms):
+        name, times = Counter(term.name for term in terms).most_common(1)[0]
+        if times > 1:
+            raise ConfigError(f"{task.id}: there is a term {name!r} already; choose another name.")
+
+
+def _check_state(task: Task) -> None:
+    state = task.init(2)
+    if is_dataclass(state):
+        parts = {f"state.{each.name}": getattr(state, each.name) for each in fields(state)}
+    elif isinstance(state, np.ndarray):
+        parts = {"state": state}
+    else:
+        raise ConfigError(
+            f"{task.id}: init must give a structured array or a dataclass of arrays, "
+            f"got {type(state).__name__}."
+        )
+    for name, part in parts.items():
+        check_shape(f"{task.id}: {name}", np.shape(part)[:1], (2,), "a row an environment")
+    info = task.info(state)
+    for name in (task.achieved, task.failed, "is_success"):
+        if name not in info:
+            raise ConfigError(f"{task.id}: info must hold {name!r}, has {', '.join(info)}.")
+    for name, value in info.items():
+        if name != "is_success" and not name.startswith("task/"):
+            raise ConfigError(f"{task.id}: names in info must begin with 'task/', got {name!r}.")
+        check_shape(f"{task.id}: info[{name!r}]", np.shape(value), (2,), "a value an environment")

@@ -20,10 +20,9 @@ from hrc_env.geometry.triangulation import (
     FURTHEST_PX,
     Triangulation,
     triangulate,
-    triangulate_robust,
 )
-from hrc_env.tracking.ahead import ahead
 from hrc_env.tracking.config import TriangulationConfig
+from hrc_env.tracking.forecast import forecast
 from hrc_env.tracking.measurements import MIN_SIGMA_PX, arrays_of
 from hrc_env.tracking.models.acquisition import STANDING_M, complete_body, keep_one_body
 from hrc_env.tracking.tracks import Tracks, forget, grow_older, make_tracks, report
@@ -43,7 +42,7 @@ def ransac(P: Floats, ctrl_dt: float, config: TriangulationConfig) -> "Triangula
     """Least squares from the views that agree within `gate_sigma`."""
 
     def solve(P: Floats, px: Points2, sigma_px: Floats) -> Triangulation:
-        return triangulate_robust(P, px, sigma_px, config.gate_sigma)
+        return triangulate(P, px, sigma_px, config.gate_sigma)
 
     return TriangulationEstimator(P, ctrl_dt, config, solve)
 
@@ -99,9 +98,9 @@ class TriangulationEstimator:
         """What is believed now."""
         return report(state, self.config)
 
-    def ahead(self, state: Tracks, horizon_s: float) -> PoseEstimate:
-        """What is expected in `horizon_s`; see `tracking.ahead`."""
-        return ahead(self.estimate(state), horizon_s, self.config)
+    def forecast(self, state: Tracks, horizon_s: float) -> PoseEstimate:
+        """What is expected in `horizon_s`; see `tracking.forecast`."""
+        return forecast(self.estimate(state), horizon_s, self.config)
 
 
 def _believed(

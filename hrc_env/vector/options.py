@@ -17,14 +17,9 @@ NO_LIMIT = 2**62
 RESET_OPTIONS = ("reset_mask", "steps_left", "elapsed_steps")
 
 
-def count_of(num_envs: Any) -> int:
-    """How many environments."""
-    return whole("num_envs", num_envs, 1, MAX_ENVS)
-
-
-def time_limit(max_episode_steps: int | None) -> int:
-    """Steps of an episode; None and -1 are as good as infinitely many."""
-    if max_episode_steps is None or max_episode_steps == -1:
+def time_limit(max_episode_steps: int) -> int:
+    """Steps of an episode; -1 is as good as infinitely many."""
+    if max_episode_steps == -1:
         return NO_LIMIT
     return whole("max_episode_steps", max_episode_steps, 1, NO_LIMIT)
 
@@ -37,15 +32,6 @@ def autoreset_of(mode: str | AutoresetMode) -> AutoresetMode:
     return AutoresetMode(mode)
 
 
-def check_backend(backend: str) -> None:
-    """Raise `ConfigError` for any but "threads"."""
-    if backend != "threads":
-        raise ConfigError(
-            f"backend={backend!r}: environments are stepped by threads, which are as fast as "
-            "processes were. Leave backend out; num_threads= says how many."
-        )
-
-
 def threads_of(num_threads: int | None) -> int:
     """How many threads to use: as many as cores, unless a number was given."""
     cores = n_cores()
@@ -53,10 +39,8 @@ def threads_of(num_threads: int | None) -> int:
         return cores
     n_threads = whole("num_threads", num_threads, 1, MAX_ENVS)
     if n_threads > cores:
-        warnings.warn(
-            f"num_threads={n_threads} on {cores} cores: results are the same, and later.",
-            stacklevel=3,
-        )
+        said = f"num_threads={n_threads} on {cores} cores: results are the same, and later."
+        warnings.warn(said, stacklevel=3)
     return n_threads
 
 

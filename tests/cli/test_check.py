@@ -9,8 +9,7 @@ from hrc_env.core import machine
 from hrc_env.core.kernels import ahead
 from hrc_env.core.kernels.signatures import recorded
 
-NAMES = ["python", "packages", "torch", "machine", "OpenGL", "triton"]
-NAMES += ["kernels", "weights", "OpenVINO", "environment"]
+NAMES = check.NAMES
 
 
 @pytest.fixture

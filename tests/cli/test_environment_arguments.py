@@ -9,9 +9,8 @@ import gymnasium
 import pytest
 
 from hrc_env.__main__ import main
-from hrc_env.cli.demo import Demo
 from hrc_env.cli.environment import EnvironmentArguments, cameras_named, read_config
-from hrc_env.cli.play import Play
+from hrc_env.cli.play import Demo, Play
 from hrc_env.cli.train import Train
 from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError

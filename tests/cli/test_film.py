@@ -10,8 +10,8 @@ from hrc_env.core.checkout import agents
 from hrc_env.core.errors import RenderingError
 
 
-def scripted(here):
-    return agents("base").make_agent("scripted", here)
+def scripted(env_info):
+    return agents("registry").make_agent("scripted", env_info)
 
 
 def test_a_film_has_a_frame_for_every_second_step(tmp_path):
@@ -25,7 +25,7 @@ def test_a_film_has_a_frame_for_every_second_step(tmp_path):
     assert imageio.imread(path.with_suffix(".png")).shape == (900, 1600, 3)
     assert sorted(each.name for each in tmp_path.iterdir()) == ["film.mp4", "film.png"]
     assert totals["lost steps [%]"] == 0.0
-    assert totals["film drawn [frames/s]"] > 0
+    assert totals["steps played and drawn [steps/s]"] > 0
 
 
 def test_a_film_that_cannot_be_drawn_leaves_nothing_behind(tmp_path, monkeypatch):

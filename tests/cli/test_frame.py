@@ -39,15 +39,6 @@ def test_the_strip_counts_goals_and_marks_steps_that_cost():
     assert not np.array_equal(plain[:, 280:], strip(costly, 0.04, 0.15)[:, 280:])
 
 
-def test_a_diary_goes_on_without_its_copy():
-    diary = a_diary()
-    copy = diary.copy()
-    diary.note({"cost": 1.0}, 0.5, {"goals reached": 2.0})
-    assert len(copy.cost) == len(copy.true_m) == len(copy.estimated_m) == 20
-    assert (copy.counts, diary.counts) == ({}, {"goals reached": 2.0})
-    assert diary.true_m[-1] == np.inf  # nobody there
-
-
 @pytest.mark.parametrize("level", ["keypoints", "none"])
 def test_a_frame_is_full_at_levels_without_crops(level):
     env = HRCEnv(perception=level)

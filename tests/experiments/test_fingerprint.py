@@ -1,14 +1,15 @@
 """A finished part is used again only while everything it depends on is the same."""
 
+import hashlib
 import shutil
 from pathlib import Path
 
 import pytest
 
 from hrc_env.experiments.study import fingerprint
-from hrc_env.experiments.study.fingerprint import fingerprint_of, sources_of
+from hrc_env.experiments.study.fingerprint import fingerprint_of, source_digest, sources_of
 
-TRIAL = "hrc_env.experiments.impact.trial.episodes"
+TRIAL = "hrc_env.experiments.impact.episodes"
 
 
 def test_settings_and_makers_count():
@@ -38,6 +39,7 @@ def copied(tmp_path, monkeypatch):
     (package / "room" / "organ.py").write_text("import numpy\nimport hrc_env.deep\n")
     (package / "deep.py").write_text("X = 1\n")
     (package / "other.py").write_text("X = 1\n")
+    (package / "room" / "beside.py").write_text("from . import organ\nfrom ..deep import X\n")
     assets = tmp_path / "assets" / "workers"
     assets.mkdir(parents=True)
     (assets / "worker_1.npz").write_bytes(b"painted")
@@ -67,3 +69,14 @@ def test_deep_imports_are_followed_even_from_inside_a_function(copied):
     assert of_now() == before
     (copied / "hrc_env" / "deep.py").write_text("X = 2\n")
     assert of_now() != before
+
+
+def test_the_file_of_what_somebody_registered_counts():
+    here = Path(__file__).read_bytes()
+    assert source_digest(test_settings_and_makers_count) == hashlib.sha256(here).hexdigest()
+    assert source_digest(3) == ""
+
+
+def test_relative_imports_are_followed(copied):
+    names = {path.name for path in sources_of("hrc_env.room.beside")}
+    assert names == {"beside.py", "organ.py", "deep.py"}

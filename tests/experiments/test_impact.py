@@ -1,4 +1,4 @@
-"""The impact experiment: only the eyes are exchanged, and what is counted is the truth."""
+"""The impact experiment: only perception is exchanged, and what is counted is the truth."""
 
 import hashlib
 import json
@@ -9,24 +9,29 @@ import numpy as np
 import pytest
 
 from hrc_env.core.errors import ConfigError, HRCError
-from hrc_env.experiments.impact import experiment, tax
-from hrc_env.experiments.impact.experiment import ImpactConfig, config_for, run
-from hrc_env.experiments.impact.report import write_pages
-from hrc_env.experiments.impact.trial import training
-from hrc_env.experiments.impact.trial.counts import GAPS_M, Bins, quantile_over
-from hrc_env.experiments.impact.trial.episodes import Stages
-from hrc_env.experiments.impact.trial.eyes import REFERENCE, all_eyes, eyes_called, seeing
-from hrc_env.experiments.impact.trial.judge import Step, judge, scene_of
-from hrc_env.experiments.impact.trial.policies import Policy, maker
-from hrc_env.experiments.impact.trial.tally import Tally
-from hrc_env.experiments.study.shelf import Shelf
+from hrc_env.experiments.impact import episodes, policies
+from hrc_env.experiments.impact.episodes import Stage, Step, _build, bodies_of, judge, sums_of
+from hrc_env.experiments.impact.experiment import STUDY, ImpactConfig, check_walks, config_for, play
+from hrc_env.experiments.impact.metrics import margin_needed
+from hrc_env.experiments.impact.policies import Policy, maker, trained
+from hrc_env.experiments.impact.report import report
+from hrc_env.experiments.impact.setups import (
+    REFERENCE,
+    PerceptionSetup,
+    all_setups,
+    setup_called,
+)
+from hrc_env.experiments.study.cache import PartCache
+from hrc_env.experiments.study.counts import GAPS_M, Bins
+from hrc_env.experiments.study.intervals import counted_quantile_over
+from hrc_env.experiments.study.runner import run
 
-LATE = seeing(latency_s=0.12).name
+LATE = PerceptionSetup(latency_s=0.12).name
 TINY = ImpactConfig(
-    n_episodes=2,
+    n_seeds=2,
     n_steps=12,
     policies=("scripted", "scripted_slowed"),
-    eyes=("truth", "none", REFERENCE, seeing(n_cameras=1).name, LATE),
+    setups=("truth", "none", REFERENCE, PerceptionSetup(n_cameras=1).name, LATE),
     margins_m=(0.1,),
 )
 
@@ -35,67 +40,58 @@ def silent(share, label):
     """Say nothing."""
 
 
-def a_step(true_m, believed_m, robot_mps=0.0):
-    """A step of one environment."""
-    row = [np.array([value]) for value in (true_m, believed_m, robot_mps, 0.0)]
-    return Step(*row, error_m=np.zeros((1, 15)))
-
-
-def an_info(touching=0.0):
-    return {
-        "cost": np.array([touching]),
-        "cost_contact": np.array([touching]),
-        "safety/min_separation_m": np.array([0.5]),
-    }
-
-
-def tally_of(*steps, margin_m=0.0):
-    """What (step, touching) come to."""
-    tally = Tally(1, margin_m)
-    for step, touching in steps:
-        tally.add(step, np.zeros((1, 15, 3)), an_info(touching))
-    return {name: value[0] for name, value in tally.sums.items()}
+def sums(*steps, margin_m=0.0):
+    """What steps (true gap, believed gap, robot's speed, touching) of one episode come to."""
+    true_m, believed_m, robot_mps, touching = np.array(steps, float).T[..., None]
+    played = Step(
+        true_m, believed_m, robot_mps, np.zeros_like(true_m),
+        np.zeros((len(steps), 1, 15)), np.zeros((len(steps), 1, 15, 3)),
+    )  # fmt: skip
+    info = {"safety/min_separation_m": np.array([0.5])}
+    info |= {f"task/goals_{what}": np.zeros(1) for what in ("reached", "missed")}
+    infos = [info | {"cost": touch, "cost_contact": touch} for touch in touching]
+    return {name: value[0] for name, value in sums_of(played, infos, margin_m, 0.04).items()}
 
 
 @pytest.fixture(scope="module")
 def end_to_end(tmp_path_factory):
     """A run from beginning to end: its folder and its numbers."""
     out = tmp_path_factory.mktemp("impact")
-    return out, run(TINY, out, silent)
+    return out, run(STUDY, TINY, out, silent)
 
 
 def test_eyes_are_called_what_they_are():
-    assert seeing("paper").name == "keypoints_paper_4cam_0ms"
-    assert eyes_called("keypoints_particle_1cam_120ms").latency_s == 0.12
-    assert all(eyes.name == name for name, eyes in all_eyes().items())
+    assert PerceptionSetup(estimator="paper").name == "keypoints_paper_4cam_0ms"
+    assert setup_called("keypoints_particle_1cam_120ms").latency_s == 0.12
+    assert all(setup.name == name for name, setup in all_setups().items())
     with pytest.raises(ConfigError, match="Did you mean 'keypoints_paper_4cam_0ms'"):
-        eyes_called("keypoints_papers_4cam_0ms")
+        setup_called("keypoints_papers_4cam_0ms")
 
 
 def test_cameras_that_are_left_come_after_a_second_of_four():
-    eyes = seeing(n_cameras=1)
-    (lost,) = eyes.faults(eyes.rigs[1])
+    (lost,) = PerceptionSetup(n_cameras=1).turns[1].faults
     assert lost.cameras == ("camera_1", "camera_3", "camera_4")
     assert lost.from_s == 1.0
-    assert not seeing(n_cameras=1, is_alone=True).faults((1,))
+    assert not PerceptionSetup(n_cameras=1, is_alone=True).turns[1].faults
 
 
 def test_only_eyes_that_are_told_their_delay_have_cameras_that_say_it():
-    told, untold = (seeing(latency_s=0.2, is_told=told) for told in (True, False))
-    assert [camera.latency_s for camera in told.cameras(told.rigs[0])] == [0.2] * 4
-    assert [camera.latency_s for camera in untold.cameras(untold.rigs[0])] == [0.0] * 4
-    assert [(fault.kind, fault.amount) for fault in untold.faults(untold.rigs[0])] == [
-        ("out_of_step", 5.0)
-    ]
+    (told,), (untold,) = (
+        PerceptionSetup(latency_s=0.2, is_told=how).turns for how in (True, False)
+    )
+    assert [camera.latency_s for camera in told.cameras] == [0.2] * 4
+    assert [camera.latency_s for camera in untold.cameras] == [0.0] * 4
+    assert [(fault.kind, fault.amount) for fault in untold.faults] == [("out_of_step", 5.0)]
+    assert not told.faults
 
 
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"n_episodes": 0}, "n_episodes must be at least 1"),
+        ({"n_seeds": 0}, "--seeds must be at least 1"),
         ({"policies": ("scripted_slow",)}, "Unknown policy"),
-        ({"eyes": ("truth",)}, "must hold the reference"),
-        ({"eyes": (REFERENCE, "camera_9")}, "Unknown eyes"),
+        ({"setups": ("truth",)}, "must hold the reference"),
+        ({"setups": (REFERENCE, "camera_9")}, "Unknown perception setup"),
         ({"margins_m": (0.0,)}, "must be positive"),
     ],
 )
@@ -106,45 +102,44 @@ def test_what_cannot_be_played_is_refused(change, words):
 
 def test_quick_plays_every_row_of_the_full_run():
     full, quick = config_for(), config_for(quick=True)
-    assert (quick.eyes, quick.policies, quick.margins_m) == (
-        full.eyes, full.policies, full.margins_m,
-    )  # fmt: skip
-    assert config_for(seeds=7).n_episodes == 7
+    assert (quick.setups, quick.policies) == (full.setups, full.policies)
+    assert config_for(seeds=7).n_seeds == 7
 
 
 def test_a_stop_is_missed_where_the_belief_is_too_hopeful():
-    told = tally_of((a_step(0.05, 0.2), 0), (a_step(0.2, 0.05), 0), (a_step(0.05, 0.05), 0))
-    assert (told["called_stops"], told["missed_stops"], told["false_stops"]) == (2, 1, 1)
-    assert (told["called_slowings"], told["missed_slowings"]) == (3, 0)
+    found = sums((0.05, 0.2, 0, 0), (0.2, 0.05, 0, 0), (0.05, 0.05, 0, 0))
+    assert (found["called_stops"], found["missed_stops"], found["false_stops"]) == (2, 1, 1)
+    assert (found["called_slowings"], found["missed_slowings"]) == (3, 0)
 
 
 def test_a_margin_makes_up_for_hope():
-    assert tally_of((a_step(0.05, 0.2), 0), margin_m=0.15)["missed_stops"] == 0
+    assert sums((0.05, 0.2, 0, 0), margin_m=0.15)["missed_stops"] == 0
 
 
 def test_a_worker_whom_the_robot_knows_nothing_of_is_a_missed_stop():
-    assert tally_of((a_step(0.05, np.inf), 0))["missed_stops"] == 1
+    assert sums((0.05, np.inf, 0, 0))["missed_stops"] == 1
 
 
 def test_a_touch_counts_once_by_what_the_robot_did():
-    touched = tally_of(
-        (a_step(0.0, 0.0, 0.3), 1), (a_step(0.0, 0.0, -0.3), 1), (a_step(0.1, 0.1), 0),
-        (a_step(0.0, 0.0, -0.3), 1), (a_step(0.1, 0.1), 0), (a_step(0.0, 0.0, 0.01), 1),
+    touched = sums(
+        (0.0, 0.0, 0.3, 1), (0.0, 0.0, -0.3, 1), (0.1, 0.1, 0, 0),
+        (0.0, 0.0, -0.3, 1), (0.1, 0.1, 0, 0), (0.0, 0.0, 0.01, 1),
     )  # fmt: skip
     assert [touched[f"contacts_{how}"] for how in ("towards", "fleeing", "standing")] == [1, 1, 1]
 
 
-def test_directed_speeds_add_up_to_how_the_gap_closes():
-    stages = Stages(eyes_called("truth"), [3, 4], 10, 1)
-    rigs = stages._env(stages.eyes.rigs[0], 2)
+def test_directed_speeds_add_up_to_how_the_gap_closes(monkeypatch):
+    monkeypatch.setattr(episodes, "n_cores", lambda: 1)
+    setup = setup_called("truth")
+    env = _build(setup, setup.turns[0], 2)
+    part = env.first
     seeds = (2, 3)  # the same parts stay nearest to each other
-    rigs.reset(np.arange(2), [np.random.default_rng(seed) for seed in seeds])
-    (part,) = rigs.parts
+    env.reset(np.arange(2), [np.random.default_rng(seed) for seed in seeds])
     action = np.full((2, part.n_actions), 0.5)
-    steps, before = [], scene_of(part)
+    steps, before = [], bodies_of(part)
     for _ in range(5):
-        rigs.step(action)
-        now = scene_of(part)
+        env.step(action)
+        now = bodies_of(part)
         steps.append(judge(part, before, now))
         before = now
     gaps = np.array([step.true_separation_m for step in steps])
@@ -153,13 +148,13 @@ def test_directed_speeds_add_up_to_how_the_gap_closes():
     assert np.abs(closing).max() > 0.05
     assert np.allclose(both, closing, atol=0.05)
     assert np.abs(steps[-1].error_m).max() == 0.0
-    stages.close()
+    env.close()
 
 
 def test_quantiles_of_bins_are_those_of_the_values():
     rng = np.random.default_rng(0)
     values = rng.normal(0.2, 0.1, (40, 500))
-    found = quantile_over(GAPS_M, GAPS_M.count(values).tolist(), 0.95, "m")
+    found = counted_quantile_over(GAPS_M, GAPS_M.count(values).tolist(), 0.95, "m")
     assert found.value == pytest.approx(np.quantile(values, 0.95), abs=0.002)
     assert found.low < found.value < found.high
 
@@ -174,10 +169,10 @@ def test_the_margin_is_where_no_more_stops_are_missed_than_on_time():
     def row(missed):
         return {"missed_stops": [missed] * 5, "called_stops": [10] * 5, "walk": [""] * 5}
 
-    margin = tax._margin([row(6), row(2), row(0)], np.array([0.0, 0.1, 0.2]), row(3))
+    margin = margin_needed([row(6), row(2), row(0)], np.array([0.0, 0.1, 0.2]), row(3))
     assert margin.value == pytest.approx(0.075)
-    assert tax._margin([row(2), row(1)], np.array([0.0, 0.1]), row(3)).value == 0.0
-    assert tax._margin([row(6), row(5)], np.array([0.0, 0.1]), row(3)).value == 0.1
+    assert margin_needed([row(2), row(1)], np.array([0.0, 0.1]), row(3)).value == 0.0
+    assert margin_needed([row(6), row(5)], np.array([0.0, 0.1]), row(3)).value == 0.1
 
 
 def test_every_row_says_everything(end_to_end):
@@ -185,20 +180,20 @@ def test_every_row_says_everything(end_to_end):
     keys = ("separation_min_m", "contacts_towards", "contacts_fleeing", "contacts_standing",
             "cost", "goals_per_min", "missed_stops", "false_stops", "z_d_m", "tax_m")  # fmt: skip
     for policy in TINY.policies:
-        for eyes in TINY.eyes:
+        for setup in TINY.setups:
             for key in keys:
-                assert np.isfinite(metrics[f"{policy}.{eyes}.{key}"].value), (policy, eyes, key)
+                assert np.isfinite(metrics[f"{policy}.{setup}.{key}"].value), (policy, setup, key)
     written = json.loads((out / "results.json").read_text())
     assert set(written["metrics"]) == set(metrics)
     assert written["seeds"] == [1_000_000, 1_000_001]
 
 
-def test_the_report_holds_its_pictures(end_to_end):
+def test_the_report_holds_its_picture_and_every_table(end_to_end):
     out, _ = end_to_end
-    page = (out / "report.html").read_text()
-    assert page.count("data:image/png;base64,") == 3
-    for words in ("What was asked", "What lateness costs", "What it does not mean"):
-        assert words in page
+    page, text = ((out / f"report.{kind}").read_text() for kind in ("html", "md"))
+    assert page.count("data:image/png;base64,") == 1
+    assert text.count("\n| ---") == 2 * len(TINY.policies) + 1
+    assert "nan" not in text
 
 
 def test_the_truth_has_no_error_and_lateness_a_tax(end_to_end):
@@ -210,16 +205,16 @@ def test_the_truth_has_no_error_and_lateness_a_tax(end_to_end):
 
 def test_workers_who_walk_otherwise_are_noticed():
     table = {("scripted", "truth"): {"walk": ["a", "b"]}, ("scripted", "none"): {"walk": ["a"]}}
-    experiment._check_walks(table)
+    check_walks(table)
     with pytest.raises(HRCError, match="walked otherwise"):
-        experiment._check_walks(table | {("ppo", "none"): {"walk": ["b"]}})
+        check_walks(table | {("ppo", "none"): {"walk": ["b"]}})
 
 
 def test_an_environment_that_is_used_again_starts_afresh():
-    stages = Stages(eyes_called(LATE), [5, 6], 10, 1)
+    stage = Stage(setup_called(LATE), [5, 6], 10)
     make = maker(Policy("scripted_slowed"), None)
-    first, again = (stages.play(make, 0.0, lambda share: None) for _ in range(2))
-    stages.close()
+    first, again = (stage.play(make, 0.0, lambda share: None) for _ in range(2))
+    stage.close()
     assert first == again
 
 
@@ -227,18 +222,19 @@ def test_a_run_that_is_killed_goes_on_to_the_same_numbers(end_to_end, process, t
     _, metrics = end_to_end
     script = (
         "import os, sys; from pathlib import Path; "
-        "from hrc_env.experiments.impact.experiment import ImpactConfig, run\n"
+        "from hrc_env.experiments.impact.experiment import STUDY, ImpactConfig\n"
+        "from hrc_env.experiments.study.runner import run\n"
         f"config = {TINY!r}\n"
         "def say(share, label):\n"
         f"    if label == 'scripted.{REFERENCE}': os.kill(os.getpid(), 9)\n"
-        "run(config, Path(sys.argv[1]), say)"
+        "run(STUDY, config, Path(sys.argv[1]), say)"
     )
     killed = process("-c", script, tmp_path)
     assert killed.returncode == -signal.SIGKILL
     kept = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "parts").iterdir()}
     assert len(kept) == 4  # truth and none, two policies each
     assert not (tmp_path / "results.json").exists()
-    assert run(TINY, tmp_path, silent) == metrics
+    assert run(STUDY, TINY, tmp_path, silent) == metrics
     for name, time_ns in kept.items():
         assert (tmp_path / "parts" / name).stat().st_mtime_ns == time_ns
 
@@ -246,31 +242,28 @@ def test_a_run_that_is_killed_goes_on_to_the_same_numbers(end_to_end, process, t
 def test_a_policy_is_learnt_once_and_again_only_if_its_file_is_lost(tmp_path, monkeypatch):
     learnt = []
 
-    def learn(learning, tick):
+    def learn(n_steps, path, tick):
         learnt.append(1)
-        learning.path.write_bytes(b"policy")
+        path.write_bytes(b"policy")
         return {"sha256": hashlib.sha256(b"policy").hexdigest()}
 
-    monkeypatch.setattr(training, "_train", learn)
-    shelf = Shelf(tmp_path, "here", 1, silent)
-    learning = training.Learning(1, 1, tmp_path / "ppo.zip")
-    for n_times in (1, 1):
-        training.trained(shelf, learning)
-        assert len(learnt) == n_times
-    learning.path.write_bytes(b"half")
-    assert training.trained(shelf, learning).read_bytes() == b"policy"
+    monkeypatch.setattr(policies, "_train", learn)
+    cache, path = PartCache(tmp_path, "here", 1, silent), tmp_path / "ppo.zip"
+    digests = {trained(cache, 1, path, "key") for _ in range(2)}
+    assert len(learnt) == 1
+    path.write_bytes(b"half")
+    assert digests == {trained(cache, 1, path, "key")}
+    assert path.read_bytes() == b"policy"
     assert len(learnt) == 2
 
 
-def test_pages_are_written_without_the_policy_that_yields(end_to_end, tmp_path):
+def test_a_report_is_made_without_the_policy_that_yields(end_to_end, tmp_path):
     _, metrics = end_to_end
-    out = tmp_path / "one"
-    table = experiment._played(
-        replace(TINY, policies=("scripted",), eyes=("truth", REFERENCE)),
-        Shelf(out / "parts", "", 1, silent), out / "none.zip",
-    )  # fmt: skip
-    write_pages(out, 2, (), table, metrics)
-    assert (out / "report.html").read_text().count("data:image/png;base64,") == 1
+    config = replace(TINY, policies=("scripted",), setups=("truth", REFERENCE))
+    table = play(config, PartCache(tmp_path / "parts", "", 1, silent))
+    found = report(tmp_path / "figures", table, metrics)
+    assert (tmp_path / "figures" / "tradeoff.png").exists()
+    assert "scripted_slowed" not in str(found.parts[1])
 
 
 def test_an_estimator_that_a_file_registers_is_compared(tmp_path, process, brought):
@@ -278,6 +271,6 @@ def test_an_estimator_that_a_file_registers_is_compared(tmp_path, process, broug
     config = replace(
         config_for(True, 2, ["alpha_beta"]), n_steps=12, policies=("scripted_slowed",), margins_m=()
     )
-    metrics = run(config, tmp_path, silent)
+    metrics = run(STUDY, config, tmp_path, silent)
     assert "scripted_slowed.keypoints_alpha_beta_4cam_0ms.cost" in metrics
     assert (tmp_path / "figures").is_dir()

@@ -8,9 +8,11 @@ import pytest
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import JOINT
 from hrc_env.experiments.lab import experiment
-from hrc_env.experiments.lab.experiment import LabConfig, config_for, laboratory, run
+from hrc_env.experiments.lab.experiment import STUDY, LabConfig, config_for, laboratory
 from hrc_env.experiments.lab.motions import MOTIONS, play
 from hrc_env.experiments.lab.sides import LEFT, RIGHT, turned_away
+from hrc_env.experiments.study.report import Report
+from hrc_env.experiments.study.runner import run
 
 TINY = LabConfig(n_seeds=1, max_frames=26)
 CAMERAS = (*(f"camera_{k}" for k in range(1, 5)), "multi")
@@ -19,7 +21,7 @@ CAMERAS = (*(f"camera_{k}" for k in range(1, 5)), "multi")
 @pytest.fixture(scope="module")
 def end_to_end(weights, tmp_path_factory):
     out = tmp_path_factory.mktemp("lab")
-    return out, run(TINY, out, lambda share, label: None)
+    return out, run(STUDY, TINY, out, lambda share, label: None)
 
 
 def test_every_number_is_there(end_to_end):
@@ -43,10 +45,8 @@ def test_four_cameras_know_all_joints_better_than_any_one(end_to_end):
 
 def test_report_and_figures_are_written(end_to_end):
     out, _ = end_to_end
-    assert {path.name for path in (out / "figures").iterdir()} == {
-        "figure_6.png", "errors.png", "far_side.png",
-    }  # fmt: skip
-    assert (out / "report.html").read_text().count("data:image/png") == 3
+    assert [path.name for path in (out / "figures").iterdir()] == ["figure_6.png"]
+    assert (out / "report.html").read_text().count("data:image/png") == 1
 
 
 def test_what_is_finished_is_used_again(end_to_end, monkeypatch):
@@ -56,9 +56,9 @@ def test_what_is_finished_is_used_again(end_to_end, monkeypatch):
         raise AssertionError("made again")
 
     monkeypatch.setattr(experiment, "film", never)
-    monkeypatch.setattr(experiment, "draw_figures", lambda *args: None)  # they are there
+    monkeypatch.setattr(experiment, "report", lambda *args: Report("", "", ()))
     before = (out / "results.json").read_text()
-    run(TINY, out, lambda share, label: None)
+    run(STUDY, TINY, out, lambda share, label: None)
     assert (out / "results.json").read_text() == before
 
 

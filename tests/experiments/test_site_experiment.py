@@ -6,7 +6,9 @@ import pytest
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.experiments.site import experiment
-from hrc_env.experiments.site.experiment import SiteConfig, config_for, run
+from hrc_env.experiments.site.experiment import STUDY, SiteConfig, config_for
+from hrc_env.experiments.study.report import Report
+from hrc_env.experiments.study.runner import run
 
 TINY = SiteConfig(n_seeds=1, seconds=2.0, estimators=("particle",))
 CAMERAS = (*(f"camera_{k}" for k in range(1, 5)), "multi")
@@ -16,7 +18,7 @@ CAMERAS = (*(f"camera_{k}" for k in range(1, 5)), "multi")
 def end_to_end(weights, tmp_path_factory):
     out = tmp_path_factory.mktemp("site")
     shares: list[float] = []
-    metrics = run(TINY, out, lambda share, label: shares.append(share))
+    metrics = run(STUDY, TINY, out, lambda share, label: shares.append(share))
     return out, metrics, shares
 
 
@@ -41,11 +43,10 @@ def test_four_cameras_know_the_head_and_one_does_not(end_to_end):
 def test_report_and_figures_are_written_and_the_progress_is_complete(end_to_end):
     out, _, shares = end_to_end
     assert sum(shares) == pytest.approx(1.0)
-    assert {path.name for path in (out / "figures").iterdir()} == {
-        "figure_3.png", "figure_4_particle.png", "rmse.png",
-    }  # fmt: skip
+    names = {path.name for path in (out / "figures").iterdir()}
+    assert names == {"figure_3.png", "figure_4_particle.png"}
     page = (out / "report.html").read_text()
-    assert page.count("data:image/png") == 3
+    assert page.count("data:image/png") == 2
     assert "6.771" in page
 
 
@@ -57,9 +58,9 @@ def test_what_is_finished_is_used_again(end_to_end, monkeypatch):
 
     monkeypatch.setattr(experiment, "film", never)
     monkeypatch.setattr(experiment, "closed_loop", never)
-    monkeypatch.setattr(experiment, "draw_figures", lambda *args: None)  # they are there
+    monkeypatch.setattr(experiment, "report", lambda *args: Report("", "", ()))
     before = (out / "results.json").read_text()
-    run(TINY, out, lambda share, label: None)
+    run(STUDY, TINY, out, lambda share, label: None)
     assert (out / "results.json").read_text() == before
 
 
@@ -70,4 +71,4 @@ def test_what_cannot_work_is_explained(tmp_path):
         config_for(True, 0, ("particle",))
     (tmp_path / "experiment.json").write_text('{"experiment": "lab"}')
     with pytest.raises(ConfigError, match="--overwrite"):
-        run(TINY, tmp_path, lambda share, label: None)
+        run(STUDY, TINY, tmp_path, lambda share, label: None)

@@ -1,16 +1,23 @@
 """What the experiments share: folders, parts, intervals and the page."""
 
+import json
 import os
+from dataclasses import asdict, dataclass
 
 import numpy as np
 import pytest
 
 from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.core.results import Metric, write_results, write_whole
-from hrc_env.experiments.study import intervals
-from hrc_env.experiments.study.folder import claim, owner_of
-from hrc_env.experiments.study.page import Picture, Section, Table, said, write_report
-from hrc_env.experiments.study.shelf import Shelf
+from hrc_env.experiments.study import intervals, report, runner
+from hrc_env.experiments.study.cache import PartCache, own_folder, owner_of
+
+
+@dataclass(frozen=True)
+class Counting:
+    """The configuration of a study."""
+
+    n: int
 
 
 def silent(share, label):
@@ -18,46 +25,46 @@ def silent(share, label):
 
 
 def test_a_folder_belongs_to_one_experiment(tmp_path):
-    claim(tmp_path, "site")
-    claim(tmp_path, "site")
+    own_folder(tmp_path, "site")
+    own_folder(tmp_path, "site")
     with pytest.raises(ConfigError, match=r"holds the results of 'site'.*--overwrite"):
-        claim(tmp_path, "lab")
-    claim(tmp_path, "lab", overwrite=True)
+        own_folder(tmp_path, "lab")
+    own_folder(tmp_path, "lab", overwrite=True)
     assert owner_of(tmp_path) == "lab"
 
 
 def test_a_benchmarks_results_are_not_overwritten(tmp_path):
     write_results(tmp_path / "results.json", {}, [0], {})
     with pytest.raises(ConfigError, match="another benchmark"):
-        claim(tmp_path, "site")
+        own_folder(tmp_path, "site")
 
 
 def test_a_half_written_result_is_said_and_kept(tmp_path):
     (tmp_path / "results.json").write_text('{"config": ')
     with pytest.raises(ConfigError, match="unreadable"):
-        claim(tmp_path, "site")
+        own_folder(tmp_path, "site")
     assert (tmp_path / "results.json").exists()
 
 
 def test_a_half_written_part_is_made_anew(tmp_path):
-    shelf = Shelf(tmp_path, "code", 2, silent)
-    shelf.part("one", lambda tick: {"x": 1})
+    cache = PartCache(tmp_path, "code", 2, silent)
+    cache.part("one", lambda tick: {"x": 1})
     (tmp_path / "one.json").write_text('{"fingerp')
-    assert shelf.part("one", lambda tick: {"x": 2}) == {"x": 2}
-    assert shelf.part("one", lambda tick: {"x": 3}) == {"x": 2}
+    assert cache.part("one", lambda tick: {"x": 2}) == {"x": 2}
+    assert cache.part("one", lambda tick: {"x": 3}) == {"x": 2}
 
 
 def test_parts_of_other_code_do_not_count(tmp_path):
-    Shelf(tmp_path, "old", 1, silent).part("one", lambda tick: {"x": 1})
-    assert not Shelf(tmp_path, "new", 1, silent).has("one")
+    PartCache(tmp_path, "old", 1, silent).part("one", lambda tick: {"x": 1})
+    assert not PartCache(tmp_path, "new", 1, silent).has("one")
 
 
 def test_the_progress_of_parts_sums_to_one(tmp_path):
     shares: list[float] = []
-    shelf = Shelf(tmp_path, "code", 3, lambda share, label: shares.append(share))
-    shelf.part("quiet", lambda tick: {})
-    shelf.part("ticking", lambda tick: [tick(0.25) for _ in range(3)] and {})
-    shelf.part("quiet", lambda tick: {})
+    cache = PartCache(tmp_path, "code", 3, lambda share, label: shares.append(share))
+    cache.part("quiet", lambda tick: {})
+    cache.part("ticking", lambda tick: [tick(0.25) for _ in range(3)] and {})
+    cache.part("quiet", lambda tick: {})
     assert sum(shares) == pytest.approx(1.0)
 
 
@@ -88,8 +95,8 @@ def test_one_seed_has_no_interval_and_says_so():
 def test_ratios_of_paired_rows_are_narrower_than_of_strangers():
     rng = np.random.default_rng(1)
     hard = rng.uniform(1, 9, 40)
-    paired = intervals.rmse_ratio_over(4 * hard, hard)
-    strangers = intervals.rmse_ratio_over(4 * hard, rng.permutation(hard))
+    paired = intervals.rmse_over(4 * hard, hard, "ratio")
+    strangers = intervals.rmse_over(4 * hard, rng.permutation(hard), "ratio")
     assert paired.value == pytest.approx(2.0)
     assert paired.high - paired.low < 1e-9 < strangers.high - strangers.low
 
@@ -105,15 +112,45 @@ def test_a_quantile_draws_whole_seeds():
     assert (found.value, found.low, found.high) == (2.0, 2.0, 2.0)
 
 
-def test_the_page_holds_its_pictures_and_escapes_words(tmp_path):
-    figure = tmp_path / "one.png"
+def test_a_report_holds_its_pictures_its_origin_and_all_numbers(tmp_path):
+    figure = tmp_path / "figures" / "one.png"
+    figure.parent.mkdir()
     figure.write_bytes(b"not really a picture")
-    table = Table(("who", "m"), (("a < b", said(Metric(0.1234, 0.1, 0.2, "m", 3), 100)),))
-    parts = ("run `make`", table, Picture(figure, "seen"))
-    write_report(tmp_path, "Title", "Lead", [Section("Heading", parts)])
-    page = (tmp_path / "report.html").read_text()
-    assert "data:image/png;base64," in page
-    assert "a &lt; b" in page
-    assert "12.3 <span class='whole'>(10.0-20.0)</span>" in page
-    assert "<code>make</code>" in page
-    assert "| a < b | 12.3 (10.0-20.0) |" in (tmp_path / "report.md").read_text()
+    metrics = {"m.a": Metric(0.1234, 0.1, 0.2, "m", 3), "d.a": Metric(-0.5, -0.7, -0.1, "m", 3)}
+    columns = (report.Column("m.{}", "cm", scale=100), report.Column("d.{}", "less", signed=True),
+               report.Column("x.{}", "not measured"))  # fmt: skip
+    table = report.table_of("who", {"a": "a < b"}, columns, metrics)
+    asked = "run `make`"
+    page = report.Report("Title", asked, ("## Found", table, report.Picture(figure, "seen")))
+    page.write(tmp_path, {"n": 1}, [3, 4], metrics)
+    html, text = ((tmp_path / f"report.{kind}").read_text() for kind in ("html", "md"))
+    assert 'src="data:image/png;base64,' in html
+    assert "a &lt; b" in html
+    assert "<code>make</code>" in html
+    assert "| a < b | 12.3 (10.0-20.0) | -0.5 (-0.7 to -0.1) ● | - |" in text
+    assert "seeds 3 to 4" in text
+    assert set(json.loads((tmp_path / "results.json").read_text())["metrics"]) == set(metrics)
+
+
+def test_a_study_plays_each_part_once_and_again_with_other_settings(tmp_path):
+    played = []
+
+    def play(config, cache):
+        def make(tick):
+            played.append(config.n)
+            return {"x": config.n}
+
+        return cache.part("one", make)
+
+    study = runner.Study(
+        "count", ("hrc_env.metrics",), asdict, lambda config: [0], lambda config: 1, play,
+        lambda config, part: {"x": Metric(part["x"], part["x"], part["x"], "1", 1)},
+        lambda config, part, metrics, figures: report.Report("Counted", "How many?", ()),
+    )  # fmt: skip
+    for n in (1, 1, 2):
+        found = runner.run(study, Counting(n), tmp_path, silent)
+        assert found["x"].value == n
+    assert played == [1, 2]
+    assert runner.changed(Counting(1), n=None) == Counting(1)
+    with pytest.raises(ConfigError, match="n must be at least 1, got 0"):
+        runner.at_least_one(Counting(0), "n")

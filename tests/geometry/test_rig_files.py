@@ -8,8 +8,7 @@ import pytest
 from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCEnv
-from hrc_env.geometry.camera_config import CameraConfig, made
-from hrc_env.geometry.rig_files import read_rig, write_rig
+from hrc_env.geometry.camera_config import CameraConfig, made, read_rig, write_rig
 from hrc_env.scene.build import SceneConfig, build
 from hrc_env.scene.rigs import RIGS, findings, sees, workspace
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from hrc_env.core.records import Roi
 from hrc_env.geometry.cameras import pinhole, project, projections
-from hrc_env.perception.acquisition import agreed_windows, apart_from
+from hrc_env.perception.searching import agreed_windows, apart_from
 
 CAMERAS = tuple(
     pinhole(f"camera_{k}", np.array([x, y, 2.45]), np.array([0.2, 0, 1.0]), 90, 1920, 1080)

@@ -9,11 +9,12 @@ import pytest
 from people import truth
 from scipy.stats import multivariate_normal, norm
 
+from assets.emulator.writing import write_calibration
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import JOINT, MIRROR, N_JOINTS
 from hrc_env.geometry.cameras import pinhole, project, projections
 from hrc_env.geometry.sight import Surroundings, nothing
-from hrc_env.perception.calibration import KINDS, SHAPES, read_calibration, write_calibration
+from hrc_env.perception.calibration import KINDS, SHAPES, read_calibration
 from hrc_env.perception.emulator import (
     EmulatorConfig,
     emulate,
@@ -306,8 +307,8 @@ def test_a_reset_touches_only_its_own_environments():
     state, rngs = start(3, CONFIG)
     before = copy.deepcopy(state)
     reset(state, np.array([1]), rngs)
-    np.testing.assert_array_equal(state.slow[[0, 2]], before.slow[[0, 2]])
-    assert not np.array_equal(state.slow[1], before.slow[1])
+    np.testing.assert_array_equal(state.errors["slow"][[0, 2]], before.errors["slow"][[0, 2]])
+    assert not np.array_equal(state.errors["slow"][1], before.errors["slow"][1])
 
 
 def test_a_room_without_workers_has_no_keypoints():

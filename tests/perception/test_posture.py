@@ -7,8 +7,7 @@ from people import STANDING
 from hrc_env.core.skeleton import JOINT
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.perception.calibration import POSTURES
-from hrc_env.perception.outline import posture_of
-from hrc_env.perception.posture import is_folded
+from hrc_env.perception.outline import is_folded, posture_of
 
 ONLY = np.eye(len(POSTURES))
 UPPER = [JOINT["nose"]] + [

@@ -9,8 +9,7 @@ from people import STANDING
 from hrc_env.core.skeleton import JOINT, SEGMENT_RADIUS_M
 from hrc_env.geometry.segments import segments
 from hrc_env.geometry.shapes import CENTRE, WIDTH, set_capsules
-from hrc_env.geometry.sight import line
-from hrc_env.perception.self_occlusion import body_blocks
+from hrc_env.geometry.sight import body_blocks, line
 
 POST = np.array([[[0.0, 0, 0], [0, 0, 2.0]]])
 

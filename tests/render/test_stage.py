@@ -7,9 +7,8 @@ import pytest
 
 from hrc_env.env import HRCEnv
 from hrc_env.geometry.cameras import project
-from hrc_env.render.stage import Stage
-from hrc_env.scene.layers import QUALITY, Layers, Place, viewpoint
-from hrc_env.scene.render import PictureRenderer
+from hrc_env.render.stage import QUALITY, Place, Stage
+from hrc_env.scene.render import PictureRenderer, viewpoint_camera
 
 SIZE = (240, 180)
 
@@ -32,7 +31,7 @@ def stage(env):
 
 
 def place(name: str = "beside", shadows: bool = True) -> Place:
-    camera = viewpoint(name, *SIZE)
+    camera = viewpoint_camera(name, *SIZE)
     return Place(camera, (SIZE[0] / 2, SIZE[1] / 2), SIZE[0], *SIZE, shadows)
 
 
@@ -77,7 +76,7 @@ def test_the_same_pose_is_the_same_picture_whatever_was_drawn_between(env, stage
 
 
 def test_nothing_that_moves_is_outside_the_box(env):
-    layers, here = Layers(env.simulation.scene, *SIZE), place()
+    layers, here = Stage(env.simulation.scene, *SIZE), place()
     layers.pose(*env.views.pose())
     left, top, right, bottom = layers.box(here)
     _, z = layers.moving(here, (0, 0, *SIZE))
@@ -92,7 +91,7 @@ def test_nothing_that_moves_is_outside_the_box(env):
 
 
 def test_the_picture_from_the_sun_has_things_where_they_are(env):
-    layers = Layers(env.simulation.scene, *SIZE)
+    layers = Stage(env.simulation.scene, *SIZE)
     layers.pose(*env.views.pose())
     shade, axes = layers.shade(), layers.sun_axes()
     layers.close()
@@ -104,12 +103,7 @@ def test_the_picture_from_the_sun_has_things_where_they_are(env):
     assert head[2] - 0.35 < along_m < head[2] + 0.05
 
 
-def test_a_picture_too_large_for_the_stage_is_known(stage):
-    assert stage.fits(240, 180)
-    assert not stage.fits(241, 180)
-
-
 def test_a_viewpoint_sees_what_it_looks_at_in_the_middle():
-    camera = viewpoint("beside", *SIZE)
+    camera = viewpoint_camera("beside", *SIZE)
     px, _ = project(camera.P[None], np.array([[[0.12, 0.0, 0.95]]]))
     np.testing.assert_allclose(px[0, 0, 0], (120, 90), atol=1e-9)

@@ -8,7 +8,7 @@ from assets.robots.ur10e_like import JOINTS, LINKS, MASS_KG, TORQUE_LIMIT_NM
 from hrc_env.geometry import chains
 from hrc_env.geometry.distances import least_separation
 from hrc_env.scene.build import build, drawing_model
-from hrc_env.scene.grounds import MOUNT_WORLD
+from hrc_env.scene.places import SCENES
 
 SCENE = build()
 HOME_Q = SCENE.home_q
@@ -25,7 +25,7 @@ def at_home() -> mujoco.MjData:
 def test_at_home_the_tool_is_in_front_of_the_base_points_down_and_touches_nothing():
     data = at_home()
     tool = data.site("robot/tool_point")
-    assert tool.xpos[0] - MOUNT_WORLD[0] > 0.3
+    assert tool.xpos[0] - SCENES["lab"].mount_world[0] > 0.3
     np.testing.assert_allclose(tool.xmat.reshape(3, 3)[:, 2], [0, 0, -1], atol=1e-2)
     assert data.ncon == 0
 

@@ -12,9 +12,11 @@ from hrc_env.scene.domain_randomization import (
     AS_BUILT,
     VARIED,
     AppearanceConfig,
+    as_built,
     draw_look,
+    randomize,
+    take_off_hats,
 )
-from hrc_env.scene.dressing import as_built, dress, take_off_hats
 from hrc_env.scene.render import CropRenderer
 from hrc_env.vector.env import HRCVectorEnv
 from hrc_env.worker.body import load_body, rest_motion
@@ -89,8 +91,8 @@ def test_a_look_changes_the_picture_and_what_is_kept_of_it_is_the_same():
     renderer.draw(scene.home_q, motion)
     plain = renderer.crop(0, MIDDLE)
     look = draw_look(VARIED, 1, stream())
-    assert renderer.dress(look)
-    assert not renderer.dress(look)
+    assert renderer.randomize(look)
+    assert not renderer.randomize(look)
     renderer.draw(scene.home_q, motion)
     first, kept = renderer.crop(0, MIDDLE), renderer.crop(0, MIDDLE)
     assert np.abs(first.astype(int) - plain).mean() > 5
@@ -99,19 +101,19 @@ def test_a_look_changes_the_picture_and_what_is_kept_of_it_is_the_same():
 
 
 def test_hats_come_off_and_lamps_stay_above():
-    from hrc_env.scene.build import drawing_model, drawn_looks
+    from hrc_env.scene.build import drawing_model, visuals
 
     scene = build(None, "lab", 1)
-    model, wardrobe = drawing_model(scene), drawn_looks(scene)
+    model, seen = drawing_model(scene), visuals(scene)
     built = as_built(model)
     kept = {name: getattr(model, name).copy() for name in ("light_dir", "mat_rgba", "mat_texid")}
     look = draw_look(VARIED, 1, stream())._replace(has_hat=np.zeros(1), tilt_rad=1.0)
     worn = model.geom_group.copy()
-    dress(model, built, wardrobe, look)
-    take_off_hats(model, wardrobe, look)
+    randomize(model, built, seen, look)
+    take_off_hats(model, seen, look)
     assert (model.light_dir[:, 2] < -0.3).all()
-    assert (model.geom_group != worn).sum() <= len(wardrobe.hats)
-    dress(model, built, wardrobe, draw_look(AS_BUILT, 1, stream()))  # the model is everybody's
+    assert (model.geom_group != worn).sum() <= len(seen.hats)
+    randomize(model, built, seen, draw_look(AS_BUILT, 1, stream()))  # the model is everybody's
     model.geom_group[:] = worn
     for name, values in kept.items():
         np.testing.assert_allclose(getattr(model, name), values)
@@ -124,7 +126,7 @@ def test_the_world_is_that_of_the_same_seed_without():
         env.reset(seed=5)
         env.step(np.zeros(6, np.float32))
         simulation = env.simulation
-        walks.append((simulation.motion.plan.copy(), simulation.task_state.goal_world.copy()))
+        walks.append((simulation.motion.workers.copy(), simulation.task_state["goal_world"].copy()))
         if appearance:
             assert env.simulation.pipeline.look_of(0) is not None
             state = env.get_state()

@@ -9,9 +9,9 @@ import pytest
 
 from hrc_env.core.records import Held
 from hrc_env.geometry.shapes import AXES, BOX, CENTRE, HALF_SIZE, KIND
-from hrc_env.scene.build import build, drawing_model, drawn_props
+from hrc_env.scene.build import build, drawing_model, visuals
 from hrc_env.scene.primitives import DECORATION
-from hrc_env.scene.props import PARKED_M, pose_props
+from hrc_env.scene.worker_visuals import PARKED_M, show_props
 from hrc_env.worker.props import PROP_NAMES, PROPS, prop_index
 
 SCENE = build(n_workers=2)
@@ -36,29 +36,29 @@ def bounds_of_shapes(prop):
 
 def test_physics_has_the_workers_bodies_only():
     assert SCENE.model.nmocap == SCENE.worker_mocap.size
-    assert drawn_props(SCENE).min() == SCENE.model.nmocap
+    assert visuals(SCENE).props.min() == SCENE.model.nmocap
 
 
 def test_what_is_not_held_is_under_the_floor(drawn):
     model, data = drawn
-    rows = drawn_props(SCENE)
+    rows = visuals(SCENE).props
     np.testing.assert_allclose(data.mocap_pos[rows].reshape(-1, 3), [PARKED_M] * rows.size)
-    pose_props(model, data, rows, Held(np.zeros(2, int), np.ones((2, 3)), np.ones((2, 4))))
+    show_props(model, data, rows, Held(np.zeros(2, int), np.ones((2, 3)), np.ones((2, 4))))
     assert (data.mocap_pos[rows][..., 2] < -10).all()
 
 
 def test_what_is_held_is_where_the_record_says_and_is_put_away_after(drawn):
     model, data = drawn
-    rows, quaternion = drawn_props(SCENE), np.array([[1.0, 0, 0, 0], [0, 0, 0, 1.0]])
+    rows, quaternion = visuals(SCENE).props, np.array([[1.0, 0, 0, 0], [0, 0, 0, 1.0]])
     kinds = np.array([prop_index("saw"), prop_index("box")])
-    pose_props(model, data, rows, Held(kinds, np.array([[1.0, 2, 3], [4, 5, 6]]), quaternion))
+    show_props(model, data, rows, Held(kinds, np.array([[1.0, 2, 3], [4, 5, 6]]), quaternion))
     assert (data.mocap_pos[rows][..., 2] > 0).sum() == 2
     seen = model.geom_bodyid[model.geom_group == DECORATION]
     assert {model.body(body).name for body in seen} >= {"worker_1/saw", "worker_2/box"}
     assert "worker_2/saw" not in {model.body(body).name for body in seen}
     np.testing.assert_array_equal(data.mocap_pos[rows[1, kinds[1] - 1]], [4, 5, 6])
     np.testing.assert_array_equal(data.mocap_quat[rows[1, kinds[1] - 1]], quaternion[1])
-    pose_props(model, data, rows, None)
+    show_props(model, data, rows, None)
     assert (data.mocap_pos[rows][..., 2] < 0).all()
 
 

@@ -9,7 +9,7 @@ from hrc_env.geometry.chains import capsules
 from hrc_env.geometry.shapes import WIDTH
 from hrc_env.geometry.sight import NEAR_POINT_M, Surroundings, hidden
 from hrc_env.scene.build import SceneConfig, build
-from hrc_env.scene.obstacles import obstacles
+from hrc_env.scene.places import obstacles
 from hrc_env.scene.primitives import ROBOT_CAPSULES, SOLID
 
 TIE_M = 1e-9

@@ -59,7 +59,8 @@ def test_a_rendered_ball_is_where_the_camera_projects_it(
     scene, model = balls
     monkeypatch.setattr("hrc_env.scene.canvas.drawing_model", lambda _: model)
     camera = scene.cameras[camera_index]
-    canvas = Canvas(scene, 256, 256, CROP_QUALITY | {"numslices": 40, "numstacks": 40}, (0,))
+    canvas = Canvas(scene, 256, 256, CROP_QUALITY | {"numslices": 40, "numstacks": 40})
+    canvas.groups((0,))
     for index, ball in enumerate(BALLS):
         canvas._data.mocap_pos[:] = [0, 0, -50]
         canvas._data.mocap_pos[index] = ball

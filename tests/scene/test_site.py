@@ -7,7 +7,8 @@ import pytest
 from benchmarks.occlusion import hidden_from, random_heads
 from hrc_env.geometry.cameras import project, projections
 from hrc_env.geometry.chains import capsules
-from hrc_env.scene.build import SCENES, SceneConfig, build, drawing_model
+from hrc_env.scene.build import SceneConfig, build, drawing_model
+from hrc_env.scene.places import SCENES
 from hrc_env.scene.rig import CameraConfig
 from hrc_env.scene.robot import reach_m
 

@@ -12,7 +12,7 @@ from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import make_estimator
-from hrc_env.tracking.given import prior
+from hrc_env.tracking.oracle import prior
 from hrc_env.tracking.people.association import AssociationConfig, associate
 
 PLACES = [(0.3, -1.2), (1.2, 0.9), (1.6, -0.6), (0.2, 0.7)]

@@ -6,7 +6,8 @@ import pytest
 
 import hrc_env  # noqa: F401  registers the ids
 from hrc_env.core.errors import ConfigError, HRCError
-from hrc_env.vector import factory, options
+from hrc_env.vector import env as vector_env
+from hrc_env.vector import options
 from hrc_env.vector.env import HRCVectorEnv
 
 
@@ -119,7 +120,7 @@ def test_the_order_of_calls():
 
 
 def test_too_many_processes_name_the_fast_level(monkeypatch):
-    monkeypatch.setattr(factory, "n_cores", lambda: 2)
+    monkeypatch.setattr(vector_env, "n_cores", lambda: 2)
     with pytest.raises(ConfigError, match=r'perception="keypoints".*force=True'):
         gymnasium.make_vec("HRCReach-v0", num_envs=5)
     with pytest.raises(ConfigError, match="num_threads"):
@@ -128,9 +129,9 @@ def test_too_many_processes_name_the_fast_level(monkeypatch):
 
 def test_force_is_taken_at_its_word(monkeypatch):
     made = []
-    monkeypatch.setattr(factory, "n_cores", lambda: 2)
-    monkeypatch.setattr(factory, "AsyncVectorEnv", lambda makers, **kwargs: made.extend(makers))
-    factory.make_vector(5, perception="pixels", force=True)
+    monkeypatch.setattr(vector_env, "n_cores", lambda: 2)
+    monkeypatch.setattr(vector_env, "AsyncVectorEnv", lambda makers, **kwargs: made.extend(makers))
+    vector_env.make_vector(5, perception="pixels", force=True)
     assert len(made) == 5
 
 

@@ -68,5 +68,5 @@ def test_options_that_cannot_work_say_so():
 
 
 def test_processes_are_answered_with_what_to_use_instead():
-    with pytest.raises(ConfigError, match=r"stepped by threads.*num_threads="):
+    with pytest.raises(ConfigError, match="'processes' is gone: use 'threads'"):
         HRCVectorEnv(2, perception="none", backend="processes")

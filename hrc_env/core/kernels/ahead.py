@@ -10,10 +10,10 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from queue import Empty, SimpleQueue
-from typing import IO, cast
+from typing import Any
 
 from hrc_env.core.kernels.cache import folder
-from hrc_env.core.kernels.signatures import Signature, recorded
+from hrc_env.core.kernels.signatures import Signature, decode, kernel_named, recorded
 from hrc_env.core.machine import n_cores
 
 log = logging.getLogger("hrc_env.core.kernels")
@@ -57,35 +57,24 @@ def compile_missing(level: str | None, say: Say) -> int:
 
 def _serve(wanted: "SimpleQueue[Signature]", total_s: float, say: Say) -> None:
     """Let one process compile until nothing is left."""
-    command = [sys.executable, "-m", "hrc_env.core.kernels.worker"]
+    command = [sys.executable, "-m", "hrc_env.core.kernels.ahead"]
+    pipes: Any = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True, "bufsize": 1}
     try:
-        process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1
-        )
+        process: Any = subprocess.Popen(command, **pipes)
     except OSError as error:
         log.warning("Kernels cannot be compiled ahead (%s); they are when called.", error)
         return
-    try:
-        while not wanted.empty():
-            with contextlib.suppress(Empty):
-                each = wanted.get_nowait()
-                if not _compile(process, each):
-                    log.warning("Compiling %s failed; it is tried when called.", each.kernel)
-                    return
-                say(each.seconds / total_s, each.kernel.partition(":")[2])
-    finally:
-        with contextlib.suppress(OSError):
-            process.communicate()
-
-
-def _compile(process: "subprocess.Popen[str]", each: Signature) -> bool:
-    """Have a kernel compiled; whether it was."""
-    asked, answers = cast("IO[str]", process.stdin), cast("IO[str]", process.stdout)
-    try:
-        asked.write(json.dumps([each.kernel, each.args]) + "\n")
-        return answers.readline() == "done\n"
-    except OSError:  # it has died
-        return False
+    with contextlib.suppress(Empty):
+        while True:
+            each = wanted.get_nowait()
+            with contextlib.suppress(OSError):  # of a process that has died
+                process.stdin.write(json.dumps([each.kernel, each.args]) + "\n")
+            if process.stdout.readline() != "done\n":
+                log.warning("Compiling %s failed; it is tried when called.", each.kernel)
+                break
+            say(each.seconds / total_s, each.kernel.partition(":")[2])
+    with contextlib.suppress(OSError):
+        process.communicate()
 
 
 @contextlib.contextmanager
@@ -110,16 +99,30 @@ def _alone(say: Say) -> Iterator[None]:
 
 def _logged() -> Say:
     """Progress as lines of the log."""
-    started_s = said_s = time.monotonic()
-    done = 0.0
+    said_s, done = time.monotonic(), 0.0
     log.warning("Compiling hrc_env's kernels for this machine, once (a minute or two) ...")
 
     def say(share: float, what: str) -> None:
         nonlocal done, said_s
-        done, now_s = done + share, time.monotonic()
-        if now_s - said_s > LOG_EVERY_S:
-            said_s = now_s
-            left_s = (now_s - started_s) * (1 - done) / max(done, 1e-3)
-            log.warning("Compiling kernels: %.0f %%, %.0f s left (%s)", 100 * done, left_s, what)
+        done += share
+        if time.monotonic() - said_s > LOG_EVERY_S:
+            said_s = time.monotonic()
+            log.warning("Compiling kernels: %.0f %% (%s)", 100 * done, what)
 
     return say
+
+
+def main() -> None:
+    """What a process does that compiles: kernels by lines of JSON [kernel, args], answering each.
+
+    In a process of its own, so that several compile at once and their memory goes back.
+    """
+    for line in sys.stdin:
+        name, args = json.loads(line)
+        kernel_named(name).compile(tuple(decode(each) for each in args))
+        sys.stdout.write("done\n")
+        sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,59 +1,46 @@
-"""What an estimator is worth in safety: the experiment, part by part."""
+"""What perception is worth in safety: every policy with every setup, on the same workers."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path
+from dataclasses import asdict, dataclass, field
+from functools import partial
 from typing import Any
 
-from hrc_env.core.errors import ConfigError, HRCError
-from hrc_env.core.machine import n_cores
-from hrc_env.core.results import Metric, write_results
-from hrc_env.experiments.impact.measures import Table, metrics_of
-from hrc_env.experiments.impact.report import write_pages
-from hrc_env.experiments.impact.tax import tax_metrics
-from hrc_env.experiments.impact.trial.episodes import PEOPLE, Stages
-from hrc_env.experiments.impact.trial.eyes import (
+from hrc_env.core.errors import ConfigError, HRCError, unknown
+from hrc_env.experiments.impact.episodes import PEOPLE, Stage
+from hrc_env.experiments.impact.metrics import Table, metrics_of
+from hrc_env.experiments.impact.policies import POLICIES, PPO, SLOWED, Policy, maker, trained
+from hrc_env.experiments.impact.report import report
+from hrc_env.experiments.impact.setups import (
     LATE,
-    PIXELS,
     REFERENCE,
-    Eyes,
-    eyes_called,
-    seeing,
-    usual_eyes,
+    PerceptionSetup,
+    setup_called,
+    usual_setups,
 )
-from hrc_env.experiments.impact.trial.policies import (
-    POLICIES,
-    PPO,
-    SLOWED,
-    Policy,
-    check_policy,
-    maker,
-)
-from hrc_env.experiments.study.fingerprint import fingerprint_of
-from hrc_env.experiments.study.folder import claim
-from hrc_env.experiments.study.shelf import Say, Shelf
+from hrc_env.experiments.study.cache import PartCache
+from hrc_env.experiments.study.fingerprint import fingerprint_of, source_digest
+from hrc_env.experiments.study.runner import Study, at_least_one, changed
 from hrc_env.tracking.estimators import estimator_called
 
-NAME = "impact"
 PARTS_FROM = (
-    "hrc_env.experiments.impact.trial.episodes",
-    "hrc_env.experiments.impact.trial.training",
-    "agents.base",
-    "agents.scripted",
+    "hrc_env.experiments.impact.episodes",
+    "hrc_env.experiments.impact.policies",
+    "agents.registry",
     "agents.ppo",
+    "agents.callbacks",
 )
 """The modules that finished parts are made by."""
 FIRST_SEED = 1_000_000
 """Of the episodes, far from those that the policy learns in."""
-SWEPT = (REFERENCE, *(eyes.name for eyes in LATE))
-"""Eyes for which margins are compared."""
+SWEPT = (REFERENCE, *(setup.name for setup in LATE))
+"""Setups for which margins are compared."""
 
 
 @dataclass(frozen=True, slots=True)
 class ImpactConfig:
     """How much is played."""
 
-    n_episodes: int = 200
+    n_seeds: int = 200
     """Episodes of every row, at level `pixels` at most `n_pixels`."""
     n_pixels: int = 6
     """Episodes of a row at level `pixels`, where every image is drawn."""
@@ -62,135 +49,109 @@ class ImpactConfig:
     learning_steps: int = 300_000
     """Environment steps in which the trained policy learns."""
     policies: tuple[str, ...] = POLICIES
-    """Whose eyes are exchanged."""
-    eyes: tuple[str, ...] = field(default_factory=usual_eyes)
-    """Which eyes they get; the reference is always among them."""
+    """Whose perception is exchanged."""
+    setups: tuple[str, ...] = field(default_factory=usual_setups)
+    """Which perception they get; the reference is always among them."""
     margins_m: tuple[float, ...] = (0.05, 0.1, 0.2)
     """What `scripted_slowed` adds to its distances where margins are compared [m]."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for what cannot work."""
-        for name in ("n_episodes", "n_pixels", "n_steps", "learning_steps"):
-            if getattr(self, name) < 1:
-                raise ConfigError(f"{name} must be at least 1, got {getattr(self, name)}.")
+        at_least_one(self, "n_seeds", "n_pixels", "n_steps", "learning_steps")
         for name in self.policies:
-            check_policy(name)
-        for name in self.eyes:
-            eyes_called(name)
-        if REFERENCE not in self.eyes or not self.policies:
-            raise ConfigError(f"eyes must hold the reference {REFERENCE!r}; policies at least one.")
+            if name not in POLICIES:
+                raise unknown("policy", name, POLICIES)
+        for name in self.setups:
+            setup_called(name)
+        if REFERENCE not in self.setups or not self.policies:
+            raise ConfigError(
+                f"setups must hold the reference {REFERENCE!r}; policies at least one."
+            )
         if any(margin <= 0 for margin in self.margins_m):
             raise ConfigError(f"margins_m must be positive, got {self.margins_m}.")
 
+    def seeds(self, level: str = "keypoints") -> list[int]:
+        """One an episode."""
+        n = min(self.n_seeds, self.n_pixels) if level == "pixels" else self.n_seeds
+        return [FIRST_SEED + k for k in range(n)]
 
-QUICK: dict[str, Any] = {"n_episodes": 8, "n_pixels": 1, "n_steps": 100, "learning_steps": 65_536}
+    def rows(self) -> Iterator[tuple[PerceptionSetup, Policy]]:
+        """What is played, setup by setup."""
+        for name in self.setups:
+            setup = setup_called(name)
+            yield from ((setup, Policy(policy)) for policy in self.policies)
+            if SLOWED in self.policies and name in SWEPT:
+                yield from ((setup, Policy(SLOWED, margin_m)) for margin_m in self.margins_m)
+
+
+QUICK: dict[str, Any] = {"n_seeds": 8, "n_pixels": 1, "n_steps": 100, "learning_steps": 65_536}
 """Every number, from little, and for 4 s: what takes the time is the number of steps."""
 
 
 def config_for(
-    quick: bool = False, seeds: int | None = None, estimators: Sequence[str] = ()
+    quick: bool = False, seeds: int | None = None, estimator: Sequence[str] = ()
 ) -> ImpactConfig:
-    """The settings of a run.
-
-    Args:
-        quick: every number, from little.
-        seeds: episodes of a row.
-        estimators: compare these with the reference, the truth and nothing; all eyes if none.
-    """
+    """The settings that the command line asks for; if estimators are named, only these are
+    compared, with the reference, the truth and nothing."""
     config = ImpactConfig(**QUICK) if quick else ImpactConfig()
-    if estimators:
-        asked = (seeing(estimator_called(name).name).name for name in estimators)
-        config = replace(config, eyes=tuple(dict.fromkeys(("truth", "none", REFERENCE, *asked))))
-    return config if seeds is None else replace(config, n_episodes=seeds)
+    asked = [PerceptionSetup(estimator=estimator_called(name).name).name for name in estimator]
+    setups = tuple(dict.fromkeys(("truth", "none", REFERENCE, *asked))) if asked else None
+    return changed(config, n_seeds=seeds, setups=setups)
 
 
-def run(config: ImpactConfig, out: Path, say: Say, overwrite: bool = False) -> dict[str, Metric]:
-    """Play everything that is not there yet; results.json, figures, report.html into `out`.
-
-    Args:
-        config: how much.
-        out: a folder; what an earlier run with the same settings and code finished is used.
-        say: hears of the progress: shares that sum to 1.
-        overwrite: throw away what something else left there.
+def play(config: ImpactConfig, cache: PartCache) -> Table:
+    """Every row, by policy and setup.
 
     Raises:
-        ConfigError: the folder holds other results.
-        HRCError: workers did not walk the same way with different eyes.
+        HRCError: workers did not walk the same way in all rows.
     """
-    claim(out, NAME, overwrite)
-    settings = _settings(config)
-    fingerprint = fingerprint_of(settings, *PARTS_FROM)
-    n_parts = len(list(_rows(config))) + (PPO in config.policies)
-    shelf = Shelf(out / "parts", fingerprint, n_parts, say)
-    checkpoint = out / "parts" / "ppo.zip"
-    if PPO in config.policies:
-        from hrc_env.experiments.impact.trial.training import Learning, trained
-
-        trained(shelf, Learning(config.learning_steps, n_cores(), checkpoint))
-    table = _played(config, shelf, checkpoint)
-    _check_walks(table)
-    metrics = metrics_of(table)
-    metrics |= tax_metrics(table, metrics, config.margins_m)
-    write_results(out / "results.json", settings, _seeds(config.n_episodes), metrics)
-    write_pages(out, config.n_episodes, config.margins_m, table, metrics)
-    return metrics
-
-
-def _played(config: ImpactConfig, shelf: Shelf, checkpoint: Path) -> Table:
-    """Every row, by policy and eyes."""
     table: dict[tuple[str, str], dict[str, list[Any]]] = {}
-    stages: Stages | None = None
-    for eyes, policy in _rows(config):
-        if stages is None or stages.eyes != eyes:
-            if stages is not None:
-                stages.close()
-            stages = Stages(eyes, _seeds(_n_episodes(config, eyes)), config.n_steps, n_cores())
-        here, make = stages, maker(policy, checkpoint)
-        table[policy.label, eyes.name] = shelf.part(
-            f"{policy.label}.{eyes.name}",
-            lambda tick, here=here, make=make, policy=policy: here.play(
-                make, policy.margin_m, tick
-            ),
-        )
-    if stages is not None:
-        stages.close()
+    checkpoint, ppo = cache.folder / "ppo.zip", ""
+    if PPO in config.policies:
+        learnt = {"people": PEOPLE, "learning_steps": config.learning_steps}
+        ppo = trained(cache, config.learning_steps, checkpoint, fingerprint_of(learnt, *PARTS_FROM))
+    stage: Stage | None = None
+    for setup, policy in config.rows():
+        if stage is None or stage.setup != setup:
+            if stage is not None:
+                stage.close()
+            stage = Stage(setup, config.seeds(setup.level), config.n_steps)
+        made_of = {
+            "people": PEOPLE,
+            "seeds": stage.seeds,
+            "n_steps": config.n_steps,
+            "setup": asdict(setup),
+            "policy": asdict(policy),
+            "ppo": ppo if policy.name == PPO else "",
+            "estimator": source_digest(estimator_called(setup.estimator).make),
+        }
+        make = partial(stage.play, maker(policy, checkpoint), policy.margin_m)
+        key = fingerprint_of(made_of, *PARTS_FROM)
+        table[policy.label, setup.name] = cache.part(f"{policy.label}.{setup.name}", make, key)
+    if stage is not None:
+        stage.close()
+    check_walks(table)
     return table
 
 
-def _rows(config: ImpactConfig) -> Iterator[tuple[Eyes, Policy]]:
-    """What is played, eyes by eyes."""
-    for name in config.eyes:
-        eyes = eyes_called(name)
-        yield from ((eyes, Policy(policy)) for policy in config.policies)
-        if SLOWED in config.policies and name in SWEPT:
-            yield from ((eyes, Policy(SLOWED, margin_m)) for margin_m in config.margins_m)
-
-
-def _n_episodes(config: ImpactConfig, eyes: Eyes) -> int:
-    few = min(config.n_episodes, config.n_pixels)
-    return few if eyes.name == PIXELS else config.n_episodes
-
-
-def _seeds(n: int) -> list[int]:
-    return [FIRST_SEED + k for k in range(n)]
-
-
-def _settings(config: ImpactConfig) -> dict[str, Any]:
-    """What all numbers depend on."""
-    return {
-        "experiment": NAME,
-        "people": PEOPLE,
-        **asdict(config),
-    }
-
-
-def _check_walks(table: Mapping[tuple[str, str], Mapping[str, list[Any]]]) -> None:
+def check_walks(table: Mapping[tuple[str, str], Mapping[str, list[Any]]]) -> None:
     """Raise unless the worker of a seed walked the same way in every row, bit for bit."""
-    walks = [row["walk"] for row in table.values()]
-    longest = max(walks, key=len)
-    for (policy, eyes), row in table.items():
+    longest = max((row["walk"] for row in table.values()), key=len)
+    for (policy, setup), row in table.items():
         if row["walk"] != longest[: len(row["walk"])]:
             raise HRCError(
-                f"With {policy} and {eyes} the workers walked otherwise than in other rows: "
+                f"With {policy} and {setup} the workers walked otherwise than in other rows: "
                 "nothing can be compared. Delete the folder's parts and start again."
             )
+
+
+STUDY = Study(
+    name="impact",
+    modules=PARTS_FROM,
+    settings=lambda config: {"people": PEOPLE, **asdict(config)},
+    seeds=lambda config: config.seeds(),
+    n_parts=lambda config: len(list(config.rows())) + (PPO in config.policies),
+    play=play,
+    metrics=lambda config, table: metrics_of(table, config.margins_m),
+    report=lambda config, table, metrics, figures: report(figures, table, metrics),
+)

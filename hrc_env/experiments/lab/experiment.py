@@ -1,24 +1,26 @@
-"""The experiment as a whole: every motion filmed by four cameras, one camera against all."""
+"""The paper's laboratory, again: every motion filmed by four cameras, one camera against all."""
 
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from hrc_env.config import HRCConfig
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.results import Metric, write_results
-from hrc_env.experiments.lab.figures import draw_figures
-from hrc_env.experiments.lab.metrics import Parts, metrics_of
+from hrc_env.core.results import Metric
+from hrc_env.core.skeleton import JOINTS
+from hrc_env.core.typing import Bools, Floats
 from hrc_env.experiments.lab.motions import MOTIONS, body_of, play
-from hrc_env.experiments.lab.report import report
-from hrc_env.experiments.lab.sides import missed_by_camera, turned_away
-from hrc_env.experiments.study.fingerprint import fingerprint_of
-from hrc_env.experiments.study.folder import claim
+from hrc_env.experiments.lab.report import ALL, COLUMNS, ESTIMATORS, report
+from hrc_env.experiments.lab.sides import MISSED_SHARE, missed_by_camera, turned_away
+from hrc_env.experiments.study.cache import PartCache, PartProgress
+from hrc_env.experiments.study.intervals import quantile_over, ratio_over
 from hrc_env.experiments.study.recording import Recording, record, replay
-from hrc_env.experiments.study.shelf import Say, Shelf, Tick
+from hrc_env.experiments.study.rigs import ALL as EVERY_CAMERA
+from hrc_env.experiments.study.rigs import SINGLE
+from hrc_env.experiments.study.runner import Study, at_least_one, changed
 from hrc_env.perception.detector import DetectorConfig
 from hrc_env.scene.build import Scene, SceneConfig, build
 from hrc_env.scene.rigs import RIGS
@@ -27,12 +29,14 @@ from hrc_env.worker.body import load_body
 RIG = "lab_gopro"
 CROPS = "particle"
 """The estimator that the crops follow."""
-ESTIMATORS = ("particle", "paper", "kalman")
-"""Who is given the films."""
-CAMERAS: tuple[tuple[int, ...], ...] = ((0,), (1,), (2,), (3,), (0, 1, 2, 3))
+CAMERAS = dict(zip(COLUMNS, (*SINGLE, EVERY_CAMERA), strict=True))
+QUANTILES = {"median": 0.5, "p95": 0.95}
 FIRST_SEED = 200
-WARM_UP = 13
-"""In the first half second everybody has all cameras, and is not judged [frames]."""
+WARM_UP = 12
+"""At first everybody has all cameras, and is not judged [frames]."""
+Film = Mapping[str, Any]
+Films = Mapping[tuple[str, int], Film]
+"""By motion and seed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,42 +53,24 @@ class LabConfig:
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for what cannot work."""
-        if self.n_seeds < 1:
-            raise ConfigError(f"--seeds must be at least 1, got {self.n_seeds}.")
+        at_least_one(self, "n_seeds")
         if self.max_frames < 2 * WARM_UP:
             raise ConfigError(f"Films need at least {2 * WARM_UP} frames, got {self.max_frames}.")
         DetectorConfig(folded=self.folded)
+
+    @property
+    def seeds(self) -> list[int]:
+        """One a film of every motion."""
+        return [FIRST_SEED + k for k in range(self.n_seeds)]
 
 
 QUICK = LabConfig(n_seeds=2, max_frames=100)
 """Every number, from fewer and shorter films."""
 
 
-def config_for(quick: bool, seeds: int | None, folded: str = "full") -> LabConfig:
+def config_for(quick: bool = False, seeds: int | None = None, folded: str = "full") -> LabConfig:
     """The settings that the command line asks for."""
-    config = replace(QUICK if quick else LabConfig(), folded=folded)
-    return config if seeds is None else replace(config, n_seeds=seeds)
-
-
-def run(config: LabConfig, out: Path, say: Say, overwrite: bool = False) -> dict[str, Metric]:
-    """Run what is not yet there; writes results.json, figures and report.html into `out`."""
-    claim(out, "lab", overwrite)
-    seeds = [FIRST_SEED + k for k in range(config.n_seeds)]
-    settings = {**asdict(config), "rig": RIG, "estimators": ESTIMATORS, "crops": CROPS}
-    shelf = Shelf(
-        out / "parts", fingerprint_of(settings, __name__), len(seeds) * len(MOTIONS) + 1, say
-    )
-    films = {
-        (motion, seed): shelf.part(f"{motion}.{seed}", partial(film, config, motion, seed))
-        for seed in seeds
-        for motion in MOTIONS
-    }
-    metrics = metrics_of(Parts(films, ESTIMATORS))
-    write_results(out / "results.json", {"experiment": "lab", **settings}, seeds, metrics)
-    shelf.say(0.0, "figures")
-    draw_figures(out / "figures", partial(taken, config), WARM_UP, seeds, metrics)
-    report(out, config, seeds, metrics)
-    return metrics
+    return changed(QUICK if quick else LabConfig(), n_seeds=seeds, folded=folded)
 
 
 def laboratory(seed: int, folded: str = "full") -> tuple[Scene, HRCConfig]:
@@ -97,41 +83,31 @@ def laboratory(seed: int, folded: str = "full") -> tuple[Scene, HRCConfig]:
     return build(config.scene, "lab", 1, config.worker), config
 
 
-def taken(config: LabConfig, motion: str, seed: int, tick: Tick) -> Recording:
+def taken(config: LabConfig, motion: str, seed: int, tick: PartProgress) -> Recording:
     """One film of one motion."""
     scene, settings = laboratory(seed, config.folded)
     motions = play(scene, motion, seed, config.max_frames, settings.ctrl_dt)
     return record(scene, motions, settings, CROPS, seed, tick)
 
 
-def film(config: LabConfig, motion: str, seed: int, tick: Tick) -> dict[str, Any]:
+def film(config: LabConfig, motion: str, seed: int, tick: PartProgress) -> dict[str, Any]:
     """What everybody made of one film, after the warm-up."""
     recording = taken(config, motion, seed, lambda share: tick(0.8 * share))
     _, settings = laboratory(seed, config.folded)
-    truth = recording.joints_world[WARM_UP:]
+    truth, rig = recording.joints_world[WARM_UP:], recording.scene.cameras
     errors: dict[str, Any] = {}
     for name in ESTIMATORS:
-        for cameras in CAMERAS:
-            said = replay(recording, name, cameras, WARM_UP, settings, seed).mean_world[WARM_UP:]
-            off_m = np.linalg.norm(said - truth, axis=-1)
-            errors[f"{name}.{label(cameras)}"] = np.round(off_m, 4).tolist()
+        for column, cameras in CAMERAS.items():
+            said = replay(recording, name, cameras, WARM_UP, settings, seed).mean_world
+            off_m = np.linalg.norm(said[WARM_UP:, 0] - truth, axis=-1)
+            errors[f"{name}.{column}"] = np.round(off_m, 4).tolist()
             tick(0.2 / len(ESTIMATORS) / len(CAMERAS))
-    stature_m = load_body(recording.scene.bodies[0]).stature_m
-    frames = range(WARM_UP, len(recording.joints_world))
-    cameras = recording.scene.cameras
+    stature_m = float(load_body(recording.scene.bodies[0]).stature_m)
     missed = [
-        [
-            missed_by_camera(
-                recording.keypoints[t], c, camera, recording.joints_world[t], stature_m
-            )
-            for c, camera in enumerate(cameras)
-        ]
-        for t in frames
+        [missed_by_camera(found, c, rig[c], joints, stature_m) for c in range(len(rig))]
+        for found, joints in zip(recording.keypoints[WARM_UP:], truth, strict=True)
     ]
-    away = [
-        [turned_away(recording.joints_world[t], camera.eye_world) for camera in cameras]
-        for t in frames
-    ]
+    away = [[turned_away(joints, camera.eye_world) for camera in rig] for joints in truth]
     return {
         "body": recording.scene.bodies[0],
         "stature_m": stature_m,
@@ -141,8 +117,82 @@ def film(config: LabConfig, motion: str, seed: int, tick: Tick) -> dict[str, Any
     }
 
 
-def label(cameras: tuple[int, ...]) -> str:
-    """`camera_2`, or `multi` for all of them."""
-    if len(cameras) == 1:
-        return f"camera_{cameras[0] + 1}"
-    return "multi"
+def play_all(config: LabConfig, cache: PartCache) -> Films:
+    """Every film."""
+    return {
+        (motion, seed): cache.part(f"{motion}.{seed}", partial(film, config, motion, seed))
+        for seed in config.seeds
+        for motion in MOTIONS
+    }
+
+
+def metrics_of(config: LabConfig, played: Films) -> dict[str, Metric]:
+    """Every number of results.json."""
+    del config
+    metrics: dict[str, Metric] = {}
+    for motion in (*MOTIONS, ALL):
+        films = [each for (name, _), each in played.items() if motion in (name, ALL)]
+        for key in (f"{name}.{column}" for name in ESTIMATORS for column in COLUMNS):
+            errors = [_errors_m(each, key).ravel() for each in films]
+            for word, q in QUANTILES.items():
+                metrics[f"error_m.{key}.{motion}.{word}"] = quantile_over(errors, q, "m")
+        metrics |= _misses(films, motion)
+    for column in COLUMNS:
+        errors = [_errors_m(each, f"{ESTIMATORS[0]}.{column}") for each in played.values()]
+        for j, joint in enumerate(JOINTS):
+            found = quantile_over([each[:, j] for each in errors], 0.5, "m")
+            metrics[f"error_m.by_joint.{column}.{joint}.median"] = found
+    return metrics
+
+
+def _misses(films: Iterable[Film], motion: str) -> dict[str, Metric]:
+    """Shares of joints missed, on the far side apart, and of these the share that is known with
+    all cameras."""
+    metrics, known = {}, [_known(each) for each in films]
+    for c, column in enumerate(COLUMNS[:4]):
+        missed, away = (
+            [np.asarray(each[what], bool)[:, c] for each in films] for what in ("missed", "away")
+        )
+        far = [m & a for m, a in zip(missed, away, strict=True)]
+        back = [f & k for f, k in zip(far, known, strict=True)]
+        n = [each.size for each in missed]
+        for what, above, below in (
+            ("missed", _sums(missed), n),
+            ("missed_far", _sums(far), _sums(away)),
+            ("recovered_far", _sums(back), _sums(far)),
+        ):
+            metrics[f"{what}.{column}.{motion}"] = ratio_over(above, below, "share")
+    lost, total = _sums([~each for each in known]), [each.size for each in known]
+    metrics[f"missed.multi.{motion}"] = ratio_over(lost, total, "share")
+    return metrics
+
+
+def _errors_m(film: Film, key: str) -> Floats:
+    """(T, J) distances of an estimate from the truth [m]."""
+    return np.asarray(film["errors_m"][key], float)
+
+
+def _known(film: Film) -> Bools:
+    """(T, J) which joints the estimate of all cameras has near enough."""
+    return _errors_m(film, f"{ESTIMATORS[0]}.multi") <= MISSED_SHARE * film["stature_m"]
+
+
+def _sums(marked: Iterable[Bools]) -> list[float]:
+    return [float(each.sum()) for each in marked]
+
+
+STUDY = Study(
+    name="lab",
+    modules=(__name__,),
+    settings=lambda config: {
+        **asdict(config), "rig": RIG, "estimators": ESTIMATORS, "crops": CROPS,
+    },
+    seeds=lambda config: config.seeds,
+    n_parts=lambda config: config.n_seeds * len(MOTIONS),
+    play=play_all,
+    metrics=metrics_of,
+    report=lambda config, films, metrics, figures: report(
+        figures, partial(taken, config, seed=config.seeds[0], tick=lambda share: None),
+        WARM_UP, metrics,
+    ),
+)  # fmt: skip

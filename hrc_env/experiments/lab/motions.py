@@ -6,9 +6,9 @@ import numpy as np
 
 from hrc_env.core.batching import rows
 from hrc_env.core.records import WorkerMotion
-from hrc_env.experiments.site.walk import joined, walk
-from hrc_env.motion.repertoire import REPERTOIRE, Act, perform
-from hrc_env.motion.solo import alone
+from hrc_env.experiments.site.walk import walk
+from hrc_env.experiments.study.recording import concatenated
+from hrc_env.motion.repertoire import REPERTOIRE, Act, alone, perform
 from hrc_env.scene.build import Scene
 from hrc_env.worker.body import load_body, worker_names
 
@@ -47,11 +47,5 @@ def play(scene: Scene, motion: str, seed: int, n_frames: int, dt_s: float) -> Wo
         start, yaw = (x, rng.uniform(-0.8, 0.8)), rng.uniform(-math.pi, math.pi)
     me = alone(load_body(scene.bodies[0]), start, yaw, right=bool(rng.random() < 0.9))
     films = perform(ACTS[motion], me, rng, dt_s)
-    whole = joined([film.motion for film in films])
-    return first(whole, n_frames)
-
-
-def first(motion: WorkerMotion, n_frames: int) -> WorkerMotion:
-    """The first frames of a motion."""
-    count = min(n_frames, len(motion.position_world))
-    return rows(motion, np.arange(count))
+    whole = concatenated([film.motion for film in films])
+    return rows(whole, np.arange(min(n_frames, len(whole.position_world))))

@@ -38,12 +38,6 @@ def missed_by_camera(
     return ~(off <= MISSED_SHARE) | (found.confidence[0, c, 0] < MISSED_CONFIDENCE)
 
 
-def missed_in_the_room(mean_world: Points3, joints_world: Points3, stature_m: float) -> Bools:
-    """(..., J) joints whose estimate is too far from the truth."""
-    off_m = np.linalg.norm(mean_world - joints_world, axis=-1)
-    return ~(off_m <= MISSED_SHARE * stature_m)
-
-
 def turned_away(joints_world: Points3, eye_world: Floats) -> Bools:
     """(J,) the joints of the side that is turned away from an eye (3,); none if none is."""
     away_m = np.linalg.norm(joints_world - eye_world, axis=-1)

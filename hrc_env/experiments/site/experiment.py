@@ -1,38 +1,41 @@
-"""The experiment as a whole: walks are filmed once, everybody is given the same film."""
+"""The paper's simulation, again: walks are filmed once, everybody is given the same film."""
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from functools import partial
-from pathlib import Path
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 
 from hrc_env.config import HRCConfig
 from hrc_env.core.errors import ConfigError, unknown
-from hrc_env.core.results import Metric, write_results
-from hrc_env.experiments.site.figures import draw_figures
-from hrc_env.experiments.site.metrics import Parts, metrics_of
-from hrc_env.experiments.site.report import report
-from hrc_env.experiments.site.rows import HEAD, WARM_UP_S, Row, head_path, rows_of
+from hrc_env.core.records import PoseEstimate
+from hrc_env.core.results import Metric
+from hrc_env.core.skeleton import JOINT
+from hrc_env.core.typing import Floats
+from hrc_env.experiments.site.report import MULTI, SPOKEN, report, site
 from hrc_env.experiments.site.walk import walk
-from hrc_env.experiments.study.fingerprint import fingerprint_of
-from hrc_env.experiments.study.folder import claim
+from hrc_env.experiments.study.cache import PartCache, PartProgress
+from hrc_env.experiments.study.intervals import mean_over, rmse_over
 from hrc_env.experiments.study.recording import record, replay
-from hrc_env.experiments.study.shelf import Say, Shelf, Tick
+from hrc_env.experiments.study.rigs import WARM_UP_S, left_of
+from hrc_env.experiments.study.runner import Study, at_least_one, changed
 from hrc_env.perception.faults.fault import FaultConfig
-from hrc_env.scene.build import Scene, build
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import ESTIMATORS
 
-SCENE = "site"
+HEAD = JOINT["nose"]
+"""The paper's "head"; MediaPipe has no joint of that name (judgement: the nose)."""
 CROPS = "particle"
 """The estimator that the crops of the shared film follow."""
 PRIOR_STD_M = 3.0
 """How far people may be from the middle of the work when nothing is known of them [m]: the walks go
 all over the place."""
 ALSO = ("kalman",)
-"""Everybody's best must be known for a fair comparison: these are given the film, too."""
+"""These are given the film, too: single cameras get the best estimator that there is."""
+DT_S = HRCConfig().ctrl_dt
+N_WARM_UP = round(WARM_UP_S / DT_S)
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,83 +55,77 @@ class SiteConfig:
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for what cannot work."""
-        if self.n_seeds < 1:
-            raise ConfigError(f"--seeds must be at least 1, got {self.n_seeds}.")
+        at_least_one(self, "n_seeds", "n_closed")
         if not self.estimators:
             raise ConfigError(f"--estimator needs a name of {', '.join(ESTIMATORS)}.")
         for name in self.estimators:
             if name not in ESTIMATORS:
                 raise unknown("estimator", name, ESTIMATORS)
-        if self.n_closed < 1:
-            raise ConfigError(f"n_closed must be at least 1, got {self.n_closed}.")
         if not self.seconds >= 2.0:
             raise ConfigError(f"Walks must be at least 2 s long, got {self.seconds}.")
+
+    @property
+    def seeds(self) -> list[int]:
+        """One a walk."""
+        return [self.first_seed + k for k in range(self.n_seeds)]
+
+    @property
+    def everybody(self) -> tuple[str, ...]:
+        """All who are given the film."""
+        return tuple(dict.fromkeys((*self.estimators, *ALSO)))
 
 
 QUICK = SiteConfig(n_seeds=2, seconds=6.0, n_closed=1)
 """Every number, from fewer and shorter walks."""
 
 
-def config_for(quick: bool, seeds: int | None, estimators: Sequence[str]) -> SiteConfig:
+def config_for(
+    quick: bool = False, seeds: int | None = None, estimator: Sequence[str] = ("particle", "paper")
+) -> SiteConfig:
     """The settings that the command line asks for."""
-    config = replace(QUICK if quick else SiteConfig(), estimators=tuple(dict.fromkeys(estimators)))
-    return config if seeds is None else replace(config, n_seeds=seeds)
+    names = tuple(dict.fromkeys(estimator))
+    return changed(QUICK if quick else SiteConfig(), estimators=names, n_seeds=seeds)
 
 
-def run(config: SiteConfig, out: Path, say: Say, overwrite: bool = False) -> dict[str, Metric]:
-    """Run what is not yet there; writes results.json, figures and report.html into `out`."""
-    claim(out, "site", overwrite)
-    seeds = [config.first_seed + k for k in range(config.n_seeds)]
-    closed = rows_of(config.estimators, (1, 4))
-    settings = {**asdict(config), "also": ALSO, "crops": CROPS}
-    again = seeds[: config.n_closed]
-    n_parts = len(seeds) + len(closed) * len(again)
-    shelf = Shelf(out / "parts", fingerprint_of(settings, __name__), n_parts, say)
-    parts = Parts(
-        films={seed: shelf.part(f"film.{seed}", partial(film, config, seed)) for seed in seeds},
-        closed={
-            (row.name, seed): shelf.part(
-                f"closed.{row.name}.{seed}", partial(closed_loop, config, row, seed)
-            )
-            for row in closed
-            for seed in again
-        },
-        dt_s=HRCConfig().ctrl_dt,
-        estimators=config.estimators,
-        also=tuple(name for name in ALSO if name not in config.estimators),
-    )
-    metrics = metrics_of(parts)
-    write_results(out / "results.json", {"experiment": "site", **settings}, seeds, metrics)
-    draw_figures(out / "figures", site(), parts, metrics, walk(site(), seeds[0], 60, parts.dt_s))
-    report(out, config, metrics)
-    return metrics
+CHOICES: dict[str, tuple[int, ...]] = {
+    MULTI if size == 4 else "+".join(f"camera_{c + 1}" for c in cameras): cameras
+    for size in (1, 2, 3, 4)
+    for cameras in combinations(range(4), size)
+}
+"""Cameras by name: `camera_1`, `camera_1+camera_3`, `multi`."""
+ROWS = tuple(SPOKEN)
+"""Each camera alone, and all four."""
+Said = Mapping[str, Any]
+Played = tuple[Mapping[int, Said], Mapping[tuple[str, int], Said]]
+"""What everybody made of the shared film, and the truth, by seed; what came of crops of one's own
+in some walks, by row and seed."""
 
 
-def site() -> Scene:
-    """The paper's site with its four cameras."""
-    return build(HRCConfig().scene, SCENE, 1)
-
-
-def settings_for(faults: tuple[FaultConfig, ...] = ()) -> HRCConfig:
-    """Settings under which workers are expected anywhere on the site."""
-    return HRCConfig(faults=faults, tracker=TrackerConfig(prior_std_m=PRIOR_STD_M))
-
-
-def film(config: SiteConfig, seed: int, tick: Tick) -> dict[str, Any]:
-    """One walk, filmed with the crops of the four-camera track, and everybody's word on it."""
-    settings = settings_for()
-    n_frames = round(config.seconds / settings.ctrl_dt)
-    motions = walk(site(), seed, n_frames, settings.ctrl_dt)
-    taken = record(site(), motions, settings, CROPS, seed, lambda share: tick(0.7 * share))
-    asked = rows_of(config.estimators) + rows_of(
-        [name for name in ALSO if name not in config.estimators], (1, 4)
-    )
-    said: dict[str, Any] = {}
-    n_start = round(WARM_UP_S / settings.ctrl_dt)
-    for row in asked:
-        said[row.name] = head_path(
-            replay(taken, row.estimator, row.cameras, n_start, settings, seed)
+def play(config: SiteConfig, cache: PartCache) -> Played:
+    """All walks, filmed once for everybody; some again with everybody's own crops."""
+    films = {seed: cache.part(f"film.{seed}", partial(film, config, seed)) for seed in config.seeds}
+    closed = {
+        (f"{name}.{row}", seed): cache.part(
+            f"closed.{name}.{row}.{seed}", partial(closed_loop, config, name, row, seed)
         )
+        for name in config.estimators
+        for row in ROWS
+        for seed in config.seeds[: config.n_closed]
+    }
+    return films, closed
+
+
+def film(config: SiteConfig, seed: int, tick: PartProgress) -> dict[str, Any]:
+    """One walk, filmed with the crops of the four-camera track, and everybody's word on it."""
+    settings = _settings_with(())
+    motions = walk(site(), seed, round(config.seconds / DT_S), DT_S)
+    taken = record(site(), motions, settings, CROPS, seed, lambda share: tick(0.7 * share))
+    asked = [(name, row) for name in config.estimators for row in CHOICES]
+    asked += [(name, row) for name in ALSO if name not in config.estimators for row in ROWS]
+    said: dict[str, Any] = {}
+    for name, row in asked:
+        beliefs = replay(taken, name, CHOICES[row], N_WARM_UP, settings, seed)
+        said[f"{name}.{row}"] = _head_path(beliefs)
         tick(0.3 / len(asked))
     confidence = np.stack([each.confidence[0, :, 0, HEAD] for each in taken.keypoints])
     return {
@@ -138,11 +135,86 @@ def film(config: SiteConfig, seed: int, tick: Tick) -> dict[str, Any]:
     }
 
 
-def closed_loop(config: SiteConfig, row: Row, seed: int, tick: Tick) -> dict[str, Any]:
-    """The same walk with eyes that make their own crops; after a second some cameras are lost."""
-    others = tuple(f"camera_{c + 1}" for c in range(4) if c not in row.cameras)
-    lost = (FaultConfig("lost", others, from_s=WARM_UP_S),) if others else ()
-    settings = settings_for(lost)
-    n_frames = round(config.seconds / settings.ctrl_dt)
-    motions = walk(site(), seed, n_frames, settings.ctrl_dt)
-    return head_path(record(site(), motions, settings, row.estimator, seed, tick).beliefs)
+def closed_loop(
+    config: SiteConfig, estimator: str, row: str, seed: int, tick: PartProgress
+) -> dict[str, Any]:
+    """The same walk with crops of one's own; after a second some cameras are lost."""
+    settings = _settings_with(left_of("site", [CHOICES[row]])[0].faults)
+    motions = walk(site(), seed, round(config.seconds / DT_S), DT_S)
+    return _head_path(record(site(), motions, settings, estimator, seed, tick).beliefs)
+
+
+def _settings_with(faults: tuple[FaultConfig, ...]) -> HRCConfig:
+    """Settings under which workers are expected anywhere on the site."""
+    return HRCConfig(faults=faults, tracker=TrackerConfig(prior_std_m=PRIOR_STD_M))
+
+
+def _head_path(beliefs: PoseEstimate) -> dict[str, Any]:
+    """What is kept of a row: where the head was thought to be (T, 3) [m], and whether tracked."""
+    return {
+        "head": np.round(beliefs.mean_world[:, 0, HEAD], 4).tolist(),
+        "tracked": beliefs.tracked[:, 0].astype(int).tolist(),
+    }
+
+
+def metrics_of(config: SiteConfig, played: Played) -> dict[str, Metric]:
+    """Every number of results.json."""
+    films = played[0].values()
+
+    def squared(name: str, *rows: str) -> list[Floats]:
+        """Of all frames of some rows together, walk by walk [m^2]."""
+        return [
+            np.concatenate([_squared_m2(each, each["rows"][f"{name}.{row}"]) for row in rows])
+            for each in films
+        ]
+
+    metrics = {}
+    for name in config.everybody:
+        multi = [each.sum() for each in squared(name, MULTI)]
+        for row in ROWS:
+            metrics[f"rmse_m.{name}.{row}"] = _rmse(squared(name, row))
+            tracked = [float(np.mean(each["rows"][f"{name}.{row}"]["tracked"])) for each in films]
+            metrics[f"tracked.{name}.{row}"] = mean_over(tracked, "share")
+            if row != MULTI:
+                alone = [each.sum() for each in squared(name, row)]
+                metrics[f"over_multi.{name}.{row}"] = rmse_over(alone, multi, "ratio")
+    for name in config.estimators:
+        for size, word in ((2, "two"), (3, "three")):
+            rows = [row for row, cameras in CHOICES.items() if len(cameras) == size]
+            metrics[f"rmse_m.{name}.{word}"] = _rmse(squared(name, *rows))
+        for row in ROWS:
+            own = [(k, said) for (key, k), said in played[1].items() if key == f"{name}.{row}"]
+            squares = [_squared_m2(played[0][seed], said) for seed, said in own]
+            metrics[f"closed_rmse_m.{name}.{row}"] = _rmse(squares)
+    for k in range(4):
+        metrics[f"found.camera_{k + 1}"] = mean_over([each["found"][k] for each in films], "share")
+    return metrics
+
+
+def _squared_m2(part: Said, row: Said) -> Floats:
+    """(T,) squared distance of the head from the truth, after the warm-up [m^2].
+
+    Frames without a track count: the estimator's last word, or its prior, is its answer.
+    """
+    off = np.asarray(row["head"], float) - np.asarray(part["truth"], float)
+    return (off**2).sum(-1)[N_WARM_UP:]
+
+
+def _rmse(squares: Sequence[Floats]) -> Metric:
+    return rmse_over([each.sum() for each in squares], [each.size for each in squares], "m")
+
+
+STUDY = Study(
+    name="site",
+    modules=(__name__,),
+    settings=lambda config: {**asdict(config), "also": ALSO, "crops": CROPS},
+    seeds=lambda config: config.seeds,
+    n_parts=lambda config: (
+        config.n_seeds + len(config.estimators) * len(ROWS) * len(config.seeds[: config.n_closed])
+    ),
+    play=play,
+    metrics=metrics_of,
+    report=lambda config, played, metrics, figures: report(
+        figures, config.estimators, config.everybody, played[0], metrics
+    ),
+)

@@ -1,136 +1,137 @@
-"""The report of the site experiment."""
+"""The report of the site: the paper's figures 3 and 4 from our own data, and the table."""
 
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Polygon
+
+from hrc_env.config import HRCConfig
+from hrc_env.core.batching import one
 from hrc_env.core.results import Metric
-from hrc_env.experiments.site.figures import COLUMNS, PAPER_RMSE_M, spoken
-from hrc_env.experiments.site.metrics import best
-from hrc_env.experiments.site.rows import MULTI, WARM_UP_S
-from hrc_env.experiments.study.intervals import apart
-from hrc_env.experiments.study.page import Part, Picture, Section, Table, said, write_report
+from hrc_env.core.typing import Floats
+from hrc_env.experiments.site.walk import walk
+from hrc_env.experiments.study.plots import label, new_figure, save
+from hrc_env.experiments.study.report import Column, Metrics, Picture, Report, table_of
+from hrc_env.geometry.cameras import pinhole, project
+from hrc_env.scene.build import Scene, build
+from hrc_env.scene.render import PictureRenderer
 
-if TYPE_CHECKING:
-    from hrc_env.experiments.site.experiment import SiteConfig
-
-Metrics = Mapping[str, Metric]
-SINGLES = COLUMNS[:4]
-TITLE = "One camera or four: the paper's simulation, again"
-ABOUT_THE_TABLE = """\
-RMSE of the head in metres; in brackets 95 % intervals, bootstrapped over walks. Everybody is given
-the same film: detections made with the crops of the four-camera track. """
-ABOUT_DEPTH = """\
-They also get the crops of the four-camera track, which they could not have made. What remains is
-the depth along the ray: the size of a body in the image fixes it only as well as the lengths of
-its bones are known, and nothing fixes it while the body is hidden."""
-ABOUT_MORE = """\
-Two and three cameras: all choices of them together, on the shared film. With crops of their own,
-estimators look where they themselves expect the worker; who loses them searches the whole image,
-where people are small."""
-ASSUMED = """\
-What had to be assumed, because the paper does not say it: intrinsics of the cameras (72 degrees
-wide, 1280 x 720), where they look (the middle of the site, 0.9 m high), what stands where, how the
-worker walks and dresses, the time between images (40 ms), the noise of the filter, and what
-"head" is (here: the nose). The robot's arm rests. The paper's unit is not printed; metres are
-meant. It used another simulator and another renderer, so that its numbers and ours stand beside
-each other and are not the same measurement."""
+MULTI = "multi"
+"""All four cameras."""
+PAPER_RMSE_M = {
+    "camera_1": 6.771, "camera_2": 3.763, "camera_3": 5.630, "camera_4": 12.814, MULTI: 0.133,
+}  # fmt: skip
+"""What the paper reports; its unit is not printed, metres are meant."""
+SPOKEN = {name: name.replace("_", " ").replace(MULTI, "all four") for name in PAPER_RMSE_M}
+ABOVE_PX, VIEW_PX = (1100, 1100), (960, 540)
+LIMIT_M = 10.0
+ASKED = """\
+A worker walks over a construction site of 20 x 20 m, behind and past what stands there, before four
+cameras in the corners: how well is the head (the nose) known from one camera, and from four? All
+estimators are given the same detections (MediaPipe Pose on rendered images, crops follow the
+four-camera track), a second of all cameras, which is not judged, and then some of them. Errors are
+of every later frame, also where the track is lost."""
 
 
-def report(out: Path, config: "SiteConfig", metrics: Metrics) -> None:
-    """Write report.html and report.md into `out`; the figures are there."""
-    everybody = tuple(name.split(".")[1] for name in metrics if name.startswith("over_multi."))
-    everybody = tuple(dict.fromkeys(everybody))
-    sections = [
-        Section("What was done", _done(config, out / "figures")),
-        Section("What came out", _came_out(config, metrics, everybody, out / "figures")),
-        Section("Is it fair to the single camera?", _fair(metrics, everybody)),
-        Section("Two and three cameras, and crops of one's own", _more(metrics, config)),
-        Section("What it does not mean", (ASSUMED, f"Settings: {asdict(config)}.")),
-    ]
-    write_report(out, TITLE, _lead(config, metrics), sections)
+def site() -> Scene:
+    """The paper's site with its four cameras."""
+    return build(HRCConfig().scene, "site", 1)
 
 
-def _lead(config: "SiteConfig", metrics: Metrics) -> str:
-    name = config.estimators[0]
-    four = said(metrics[f"rmse_m.{name}.{MULTI}"], 100)
-    alone = [metrics[f"rmse_m.{name}.{camera}"].value for camera in SINGLES]
-    return (
-        "A worker walks over a construction site of 20 x 20 m, behind and past what stands there. "
-        f"Four cameras and `{name}` know the head to {four} cm (RMSE); "
-        f"one camera of them knows it to {min(alone):.2f} to {max(alone):.2f} m."
-    )
-
-
-def _done(config: "SiteConfig", figures: Path) -> tuple[Part, ...]:
-    last = config.first_seed + config.n_seeds - 1
-    words = (
-        f"{config.n_seeds} walks of {config.seconds:.0f} s (seeds {config.first_seed} to {last}), "
-        "rendered for four cameras in the corners at 5 m; MediaPipe Pose on crops, every image at "
-        f"25 Hz. Everybody begins with {WARM_UP_S:.0f} s of all four cameras, as no estimator "
-        "begins a track with one; then the others are taken away. Errors are of the nose, in every "
-        "frame after that, also where the track is lost: the last word is the answer."
-    )
-    place = "The paper's figure 3, our site: (a) from above, (b) from each camera."
-    return words, Picture(figures / "figure_3.png", place)
-
-
-def _came_out(
-    config: "SiteConfig", metrics: Metrics, everybody: tuple[str, ...], figures: Path
-) -> tuple[Part, ...]:
-    rows = [("the paper reports", *(f"{PAPER_RMSE_M[c]:.3f}" for c in COLUMNS))]
-    for name in config.estimators:
-        rows.append((f"`{name}`", *(said(metrics[f"rmse_m.{name}.{c}"], 1, 3) for c in COLUMNS)))
-    paths = [
-        Picture(
-            figures / f"figure_4_{name}.png",
-            f"The paper's figure 4: the first walk from above, `{name}`; grey: what stands there.",
-        )
-        for name in config.estimators
-    ]
-    return (
-        Table(("RMSE [m]", *map(spoken, COLUMNS)), tuple(rows)),
-        ABOUT_THE_TABLE + _conclusion(metrics, everybody),
-        Picture(figures / "rmse.png", "RMSE on the shared film, log scale."),
+def report(
+    figures: Path,
+    estimators: tuple[str, ...],
+    everybody: tuple[str, ...],
+    films: Mapping[int, Mapping[str, Any]],
+    metrics: Metrics,
+) -> Report:
+    """Draw the figures; the tables beside them."""
+    seed, film = next(iter(films.items()))
+    scene, truth = site(), np.asarray(film["truth"], float)
+    draw_place(figures / "figure_3.png", scene, seed, truth)
+    paths = []
+    for name in estimators:
+        heads = {c: np.asarray(film["rows"][f"{name}.{c}"]["head"], float) for c in SPOKEN}
+        path = figures / f"figure_4_{name}.png"
+        draw_paths(path, scene, name, truth, heads)
+        paths.append(Picture(path, f"The paper's figure 4: the first walk from above, `{name}`."))
+    names = {name: f"`{name}`" for name in estimators}
+    printed = {f"rmse_m.paper.as_printed.{c}": _exactly(v) for c, v in PAPER_RMSE_M.items()}
+    columns = [Column(f"rmse_m.{{}}.{c}", words, 3) for c, words in SPOKEN.items()]
+    ratios = [Column(f"over_multi.{{}}.{c}", w) for c, w in SPOKEN.items() if c != MULTI]
+    more = [Column(f"rmse_m.{{}}.{word}", word, 3) for word in ("two", "three")]
+    more += [Column(f"closed_rmse_m.{{}}.{c}", f"own crops, {w}", 3) for c, w in SPOKEN.items()]
+    parts = (
+        Picture(figures / "figure_3.png", "The paper's figure 3: our site, and what cameras see."),
+        table_of("RMSE of the head [m]", {"paper.as_printed": "the paper reports"} | names,
+                 columns, {**metrics, **printed}),
         *paths,
-    )
+        table_of("RMSE of one camera over that of four, walk by walk",
+                 {name: f"`{name}`" for name in everybody}, ratios, metrics),
+        table_of("RMSE [m] of two and three cameras, all choices together; with crops that follow "
+                 "the estimator's own track, some walks only", names, more, metrics),
+    )  # fmt: skip
+    return Report("One camera or four: the paper's simulation, again", ASKED, parts)
 
 
-def _conclusion(metrics: Metrics, everybody: tuple[str, ...]) -> str:
-    """Whether the paper's conclusion holds, estimator by estimator."""
-    words = []
-    for name in everybody:
-        four = metrics[f"rmse_m.{name}.{MULTI}"]
-        least = min(
-            (metrics[f"over_multi.{name}.{camera}"] for camera in SINGLES),
-            key=lambda ratio: ratio.value,
-        )
-        free = all(apart(metrics[f"rmse_m.{name}.{camera}"], four) for camera in SINGLES)
-        words.append(
-            f"`{name}`: the best single camera is {said(least)} times worse than four, intervals "
-            f"{'apart' if free else 'touching'}"
-        )
-    return "; ".join(words) + "."
+def draw_place(path: Path, scene: Scene, seed: int, path_world: Floats) -> None:
+    """The site from above with cameras and the first walk, and what each camera sees of it."""
+    above = pinhole("above", np.array([0, 0, 36.0]), np.zeros(3), 37.0, *ABOVE_PX)
+    worker = one(walk(scene, seed, 60, HRCConfig().ctrl_dt), 59)
+    figure = new_figure(15, 7.2)
+    grid = figure.add_gridspec(2, 4)
+    axes = [figure.add_subplot(grid[:, :2])]
+    axes += [figure.add_subplot(grid[k // 2, 2 + k % 2]) for k in range(4)]
+    titles = ("(a) the site from above, with the first walk", *(f"(b) camera {k}" for k in "1234"))
+    sizes = (ABOVE_PX, *[VIEW_PX] * 4)
+    for axis, camera, size, title in zip(axes, (above, *scene.cameras), sizes, titles, strict=True):
+        renderer = PictureRenderer(scene, *size)
+        axis.imshow(np.array(renderer.picture(scene.home_q, worker, camera), np.uint8))
+        renderer.close()
+        axis.set_title(title, fontsize=13)
+        axis.axis("off")
+    px = project(above.P[None], path_world[None])[0][0, 0]
+    axes[0].plot(*px.T, color="#ffd600", linewidth=2.5, label="the head's way")
+    places = np.stack([camera.eye_world for camera in scene.cameras])
+    px = project(above.P[None], places[None])[0][0, 0]
+    axes[0].plot(*px.T, "s", color="#ff1744", markersize=11, label="cameras, 5 m high")
+    for k, place in enumerate(px):
+        axes[0].annotate(f"{k + 1}", place, color="white", ha="center", va="center")
+    axes[0].legend(loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=2, fontsize=11)
+    axes[0].set(xlim=(0, ABOVE_PX[0]), ylim=(ABOVE_PX[1], 0))
+    save(figure, path)
 
 
-def _fair(metrics: Metrics, everybody: tuple[str, ...]) -> tuple[Part, ...]:
-    names = ", ".join(f"`{best(metrics, camera, everybody)}`" for camera in SINGLES)
-    words = f"Single cameras get the best of these estimators (cameras 1 to 4: {names}). "
-    rows = [
-        (f"`{name}`", *(said(metrics[f"over_multi.{name}.{camera}"]) for camera in SINGLES))
-        for name in everybody
-    ]
-    header = ("one over four, walk by walk", *map(spoken, SINGLES))
-    return words + ABOUT_DEPTH, Table(header, tuple(rows))
+def draw_paths(
+    path: Path, scene: Scene, estimator: str, truth: Floats, heads: Mapping[str, Floats]
+) -> None:
+    """The first walk's head from above, truth against estimate: a panel a camera, one for all."""
+    figure = new_figure(16, 4.2)
+    eyes = np.stack([camera.eye_world for camera in scene.cameras])
+    panels = zip(figure.subplots(1, 5, sharey=True), heads.items(), range(5), strict=True)
+    for axis, (column, head), k in panels:
+        _draw_ground(axis, scene)
+        axis.plot(*truth[:, :2].T, color="#111", linewidth=2.2, label="truth")
+        axis.plot(*head[:, :2].T, color="#e53935", linewidth=1.3, label=estimator)
+        used = eyes if column == MULTI else eyes[[k]]
+        axis.plot(*used[:, :2].T, "s", color="#1565c0", markersize=9, clip_on=False)
+        axis.set(xlim=(-LIMIT_M, LIMIT_M), ylim=(-LIMIT_M, LIMIT_M), aspect="equal")
+        label(axis, "x [m]", "" if k else "y [m]", SPOKEN[column])
+    figure.axes[0].legend(loc="upper left", fontsize=10)
+    save(figure, path)
 
 
-def _more(metrics: Metrics, config: "SiteConfig") -> tuple[Part, ...]:
-    rows = []
-    for name in config.estimators:
-        shown = [metrics[f"rmse_m.{name}.{word}"] for word in ("two", "three")]
-        shown += [metrics[f"closed_rmse_m.{name}.{column}"] for column in COLUMNS]
-        rows.append((f"`{name}`", *(said(each, 1, 3) for each in shown)))
-    own = tuple(f"own crops, {spoken(column)}" for column in COLUMNS)
-    walks = f"Own crops: the first {min(config.n_closed, config.n_seeds)} of the walks, again. "
-    return Table(("RMSE [m]", "two", "three", *own), tuple(rows)), walks + ABOUT_MORE
+def _draw_ground(axis: Axes, scene: Scene) -> None:
+    """What stands on the floor."""
+    for x, y, half_length, half_width, yaw in scene.grounds.blocked:
+        corners = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * [half_length, half_width]
+        c, s = np.cos(yaw), np.sin(yaw)
+        corners = corners @ np.array([[c, s], [-s, c]]) + [x, y]
+        axis.add_patch(Polygon(corners, color="#cfd4dc", zorder=0))
+
+
+def _exactly(value: float) -> Metric:
+    return Metric(value, value, value, "m", 1)

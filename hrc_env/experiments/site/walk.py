@@ -4,9 +4,10 @@ import numpy as np
 
 from hrc_env.core.batching import rows
 from hrc_env.core.records import WORKPLACE_KINDS, WorkerMotion
+from hrc_env.experiments.study.recording import concatenated
 from hrc_env.motion import generator
 from hrc_env.motion.config import MotionConfig
-from hrc_env.motion.errands import Task
+from hrc_env.motion.schedule import Job
 from hrc_env.scene.build import Scene
 from hrc_env.worker.body import load_body
 
@@ -15,7 +16,7 @@ PASSING = MotionConfig(
     dwell_s=(0.0, 0.4),
     near_pause_s=(0.1, 0.4),
     away_pause_s=(0.1, 0.4),
-    tasks=tuple(Task(f"pass the {kind}", "stand", kind, (), 1.0) for kind in WORKPLACE_KINDS),
+    jobs=tuple(Job(f"pass the {kind}", "stand", kind, (), 1.0) for kind in WORKPLACE_KINDS),
     people=generator.PEOPLE["unaware"],
 )
 """Workers who go on as soon as they have come anywhere; judgement: the paper says "walked"."""
@@ -26,30 +27,8 @@ def walk(scene: Scene, seed: int, n_frames: int, dt_s: float) -> WorkerMotion:
     state = generator.make_state(1, 1, load_body(scene.bodies[0]), PASSING, scene.grounds)
     rngs = [np.random.default_rng(seed)]
     generator.reset(state, np.arange(1), rngs)
-    moments = []
+    frames = []
     for _ in range(n_frames):
         generator.advance(state, rngs, dt_s, 1)
-        moments.append(rows(generator.current(state), np.arange(1)))
-    return joined(moments)
-
-
-def joined(moments: list[WorkerMotion]) -> WorkerMotion:
-    """Moments, each with arrays (1, ...), one after the other: (T, ...)."""
-    first = moments[0]
-
-    def along(name: str) -> np.ndarray:
-        return np.concatenate([getattr(each, name) for each in moments])
-
-    held = None
-    if first.held is not None:
-        parts = [each.held for each in moments if each.held is not None]
-        held = type(first.held)(
-            *(
-                np.concatenate([getattr(part, name) for part in parts])
-                for name in ("kind", "position_world", "quaternion_wxyz")
-            )
-        )
-    return WorkerMotion(
-        along("position_world"), along("quaternion_wxyz"), along("velocity_world"),
-        along("angular_velocity_world"), held, None if first.body is None else along("body"),
-    )  # fmt: skip
+        frames.append(rows(generator.current(state), np.arange(1)))
+    return concatenated(frames)

@@ -2,9 +2,10 @@
 
 import ast
 import hashlib
+import inspect
 import json
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -42,11 +43,10 @@ def fingerprint_of(settings: Mapping[str, Any], *modules: str) -> str:
 def sources_of(*modules: str) -> set[Path]:
     """The files of modules and of everything of this repository that they import, in time."""
     found: set[Path] = set()
-    todo: list[str] = []
+    todo = list(modules)
     for name in modules:
         if _file(name) is None:
             raise ModuleNotFoundError(f"{name} is no module of this repository.", name=name)
-        todo.append(name)
     while todo:
         path = _file(todo.pop())
         if path is not None and path not in found:
@@ -74,29 +74,35 @@ def _file(name: str) -> Path | None:
 def _imports(path: Path) -> frozenset[str]:
     """Modules, and names that may be modules, that a file imports anywhere in it."""
     found: set[str] = set()
+    folders = path.relative_to(_PACKAGE.parent).parent.parts
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            found |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
+        elif isinstance(node, ast.ImportFrom):
+            inside = folders[: len(folders) - node.level + 1] if node.level else ()
+            module = ".".join(filter(None, (*inside, node.module)))
+            found |= {module, *(f"{module}.{alias.name}" for alias in node.names)}
     return frozenset(found)
+
+
+def source_digest(made: Any) -> str:
+    """Of the file that defines a function or class, which somebody may have registered; "" where
+    nobody can tell."""
+    try:
+        return hashlib.sha256(Path(inspect.getfile(made)).read_bytes()).hexdigest()
+    except (OSError, TypeError):
+        return ""
 
 
 @cache
 def _data() -> str:
     """The content of every data file: bodies, calibrations, scenery, networks of our own."""
     digest = hashlib.sha256()
-    for path in sorted(_data_files()):
-        digest.update(path.name.encode() + path.read_bytes())
+    for root in sorted({assets_dir(), _PACKAGE}):
+        for path in sorted(root.rglob("*")):
+            if path.is_file() and path.suffix not in _CODE and "__pycache__" not in path.parts:
+                digest.update(path.name.encode() + path.read_bytes())
     return digest.hexdigest()
-
-
-def _data_files() -> Iterator[Path]:
-    for root in {assets_dir(), _PACKAGE}:
-        for path in root.rglob("*"):
-            own = path.is_file() and path.suffix not in _CODE and "__pycache__" not in path.parts
-            if own:
-                yield path
 
 
 def _version(package: str) -> str | None:

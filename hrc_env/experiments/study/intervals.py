@@ -1,84 +1,95 @@
-"""Numbers with 95 % intervals: bootstraps over seeds, by SciPy.
+"""Numbers with 95 % intervals: one bootstrap over seeds.
 
-Frames of one walk depend on each other; walks do not. So what is drawn anew is always the
-seed with all that belongs to it. Rows that share their seeds are compared seed by seed.
+Frames of one episode depend on each other, episodes do not: what is drawn anew is the seed with
+all that belongs to it. Rows that share their seeds are compared seed by seed.
 """
 
-import warnings
 from collections.abc import Callable, Sequence
-from typing import Any
+from functools import lru_cache
 
 import numpy as np
 from scipy import stats
 
 from hrc_env.core.results import Metric
-from hrc_env.core.typing import Floats
+from hrc_env.core.typing import Floats, Ints
+from hrc_env.experiments.study.counts import Bins
 
-N_RESAMPLES = 4000
+Statistic = Callable[[Ints], Floats]
+"""From how often each seed is drawn (R, n) to a number for each draw (R,)."""
 
 
-def mean_over(values: Sequence[float], unit: str) -> Metric:
+def bootstrap(statistic: Statistic, n: int, unit: str, n_draws: int = 4000) -> Metric:
+    """A statistic of n seeds with its percentile interval; draws without a value do not count."""
+    if n == 0:
+        return Metric(np.nan, np.nan, np.nan, unit, 0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        point = float(statistic(np.ones((1, n), np.int64))[0])
+        drawn = statistic(_draws(n, n_draws)) if n > 1 else np.array([point])
+    drawn = drawn[~np.isnan(drawn)]
+    if np.isnan(point) or not np.isfinite(drawn).all() or not drawn.size:
+        return Metric(point, point, point, unit, n)
+    low, high = np.quantile(drawn, [0.025, 0.975])
+    return Metric(point, float(low), float(high), unit, n)
+
+
+def ratio_over(
+    above: Sequence[float] | Floats, below: Sequence[float] | Floats, unit: str
+) -> Metric:
+    """Sum of one number a seed over the sum of another: rates, shares, ratios of paired rows."""
+    x, y = _usable(above, below)
+    return bootstrap(lambda w: (w @ x) / (w @ y), len(x), unit)
+
+
+def mean_over(values: Sequence[float] | Floats, unit: str) -> Metric:
     """The mean of one number a seed."""
-    return _boot((np.asarray(values, float),), lambda x, axis: x.mean(axis), unit)
+    return ratio_over(values, np.ones(len(values)), unit)
 
 
-def iqm_over(values: Sequence[float], unit: str) -> Metric:
+def rmse_over(
+    squared: Sequence[float] | Floats, counts: Sequence[float] | Floats, unit: str
+) -> Metric:
+    """Root of the mean square, from each seed's sum of squares and number of frames; of two sums
+    of squares, the ratio of their roots."""
+    x, y = _usable(squared, counts)
+    return bootstrap(lambda w: np.sqrt((w @ x) / (w @ y)), len(x), unit)
+
+
+def iqm_over(values: Sequence[float] | Floats, unit: str) -> Metric:
     """The interquartile mean: of the middle half of the seeds (Agarwal et al. 2021,
     arXiv:2108.13264)."""
+    (x,) = _usable(values)
 
-    def iqm(x: Floats, axis: int) -> Any:
-        return stats.trim_mean(x, 0.25, axis=axis)
+    def iqm(weights: Ints) -> Floats:
+        drawn = np.repeat(np.tile(x, len(weights)), weights.ravel()).reshape(weights.shape)
+        return stats.trim_mean(drawn, 0.25, axis=1)
 
-    return _boot((np.asarray(values, float),), iqm, unit)
-
-
-def ratio_over(above: Sequence[float], below: Sequence[float], unit: str) -> Metric:
-    """Sum of one number a seed over the sum of another: rates, shares, ratios of paired rows."""
-
-    def ratio(x: Floats, y: Floats, axis: int) -> Floats:
-        return x.sum(axis) / y.sum(axis)
-
-    return _boot((np.asarray(above, float), np.asarray(below, float)), ratio, unit)
-
-
-def rmse_over(squared: Sequence[float], counts: Sequence[float], unit: str) -> Metric:
-    """Root of the mean square, from each seed's sum of squares and number of frames."""
-
-    def rmse(x: Floats, n: Floats, axis: int) -> Floats:
-        return np.sqrt(x.sum(axis) / n.sum(axis))
-
-    return _boot((np.asarray(squared, float), np.asarray(counts, float)), rmse, unit)
-
-
-def rmse_ratio_over(
-    squared: Sequence[float], other_squared: Sequence[float], unit: str = "ratio"
-) -> Metric:
-    """RMSE over another RMSE of the same frames."""
-
-    def ratio(x: Floats, y: Floats, axis: int) -> Floats:
-        return np.sqrt(x.sum(axis) / y.sum(axis))
-
-    return _boot((np.asarray(squared, float), np.asarray(other_squared, float)), ratio, unit)
+    return bootstrap(iqm, len(x), unit)
 
 
 def quantile_over(values: Sequence[Sequence[float] | Floats], q: float, unit: str) -> Metric:
-    """A quantile of all values together; seeds are drawn with all of theirs."""
+    """A quantile of all values of all seeds together; its n is their number."""
     groups = [np.asarray(each, float) for each in values]
     groups = [each[np.isfinite(each)] for each in groups]
-    together = np.concatenate(groups) if groups else np.zeros(0)
-    if together.size == 0:
+    sizes = [each.size for each in groups]
+    together, owner = np.concatenate([*groups, []]), np.repeat(np.arange(len(groups)), sizes)
+    if not together.size:
         return Metric(np.nan, np.nan, np.nan, unit, 0)
 
-    def quantile(rows: Any) -> float:
-        drawn = np.concatenate([groups[int(k)] for k in rows])
-        return float(np.quantile(drawn, q)) if drawn.size else np.nan
+    def quantile(weights: Ints) -> Floats:
+        drawn = (np.repeat(together, each[owner]) for each in weights)
+        return np.array([np.quantile(each, q) if each.size else np.nan for each in drawn])
 
-    point = float(np.quantile(together, q))
-    if len(groups) < 2:
-        return Metric(point, point, point, unit, together.size)
-    draws = np.random.default_rng(0).integers(len(groups), size=(400, len(groups)))
-    low, high = np.nanquantile([quantile(rows) for rows in draws], [0.025, 0.975])
-    return Metric(point, float(low), float(high), unit, together.size)
+    found = bootstrap(quantile, len(groups), unit, 400)
+    return Metric(found.value, found.low, found.high, unit, together.size)
+
+
+def counted_quantile_over(
+    bins: Bins, counts: Sequence[Sequence[int]] | Ints, q: float, unit: str
+) -> Metric:
+    """A quantile of counted values, a row of counts (n, bins) a seed; what lies beyond the last
+    limit is that limit."""
+    rows, most = np.asarray(counts, float), bins.edges[-1]
+    return bootstrap(lambda w: np.minimum(bins.quantile(w @ rows, q), most), len(rows), unit, 1000)
 
 
 def apart(one: Metric, other: Metric) -> bool:
@@ -86,25 +97,14 @@ def apart(one: Metric, other: Metric) -> bool:
     return one.high < other.low or other.high < one.low
 
 
-def _boot(samples: tuple[Floats, ...], statistic: Callable[..., Any], unit: str) -> Metric:
-    """A statistic of paired samples (n,) with its percentile interval; none where all are equal.
+def _usable(*samples: Sequence[float] | Floats) -> list[Floats]:
+    """(n,) each: the seeds of which every number is finite."""
+    arrays = [np.asarray(each, float) for each in samples]
+    finite = np.all(np.isfinite(arrays), axis=0)
+    return [each[finite] for each in arrays]
 
-    Draws without a value (a ratio to nothing) do not count.
-    """
-    usable = np.all(np.isfinite(samples), axis=0)
-    samples = tuple(each[usable] for each in samples)
-    n = len(samples[0])
-    if n == 0:
-        return Metric(np.nan, np.nan, np.nan, unit, 0)
-    with np.errstate(divide="ignore", invalid="ignore"), warnings.catch_warnings():
-        warnings.simplefilter("ignore", stats.DegenerateDataWarning)  # draws that are all alike
-        point = float(statistic(*samples, axis=0))
-        if n < 2 or all(np.ptp(each) == 0 for each in samples):
-            return Metric(point, point, point, unit, n)
-        found = stats.bootstrap(
-            samples, statistic, n_resamples=N_RESAMPLES, paired=True, method="percentile",
-            vectorized=True, rng=np.random.default_rng(0), batch=200,
-        )  # fmt: skip
-    drawn = found.bootstrap_distribution[np.isfinite(found.bootstrap_distribution)]
-    low, high = np.quantile(drawn, [0.025, 0.975]) if drawn.size else (point, point)
-    return Metric(point, float(low), float(high), unit, n)
+
+@lru_cache(maxsize=8)
+def _draws(n: int, n_draws: int) -> Ints:
+    """(R, n) how often each seed is drawn, always the same."""
+    return np.random.default_rng(0).multinomial(n, np.full(n, 1 / n), n_draws)

@@ -5,15 +5,16 @@ given the recording afterwards has nothing to do with where the cameras looked.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from typing import Any, TypeVar
 
 import numpy as np
 
 from hrc_env.config import HRCConfig
 from hrc_env.core.batching import rows
 from hrc_env.core.records import Keypoints, PoseEstimate, WorkerMotion
-from hrc_env.core.typing import Bools, Covariances3, Ints, Points3
-from hrc_env.experiments.study.shelf import Tick
+from hrc_env.core.typing import Points3
+from hrc_env.experiments.study.cache import PartProgress
 from hrc_env.geometry.cameras import projections
 from hrc_env.pipeline.levels import make_pipeline
 from hrc_env.pipeline.sensor_input import SensorInput, Windows
@@ -21,17 +22,7 @@ from hrc_env.scene.build import Scene
 from hrc_env.tracking.estimators import make_estimator
 from hrc_env.worker.body import stack, worker_truth
 
-
-@dataclass(frozen=True, slots=True)
-class Beliefs:
-    """What an estimator said, frame by frame."""
-
-    mean_world: Points3
-    """(T, J, 3) [m]."""
-    cov_world: Covariances3
-    """(T, J, 3, 3) [m^2]."""
-    tracked: Bools
-    """(T,)."""
+RecordT = TypeVar("RecordT")
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,14 +31,16 @@ class Recording:
 
     scene: Scene
     dt_s: float
+    motions: WorkerMotion
+    """(T, 1, S, ...) truth."""
     joints_world: Points3
     """(T, J, 3) truth [m]."""
     keypoints: tuple[Keypoints, ...]
     """(T) records of arrays (1, C, 1, J, ...), in pinhole pixels of the rig's cameras."""
     windows: tuple[Windows, ...]
     """(T) where each camera looked."""
-    beliefs: Beliefs
-    """Of the estimator that the crops followed."""
+    beliefs: PoseEstimate
+    """(T, 1, ...) of the estimator that the crops followed."""
 
 
 def record(
@@ -56,17 +49,17 @@ def record(
     config: HRCConfig,
     estimator: str,
     seed: int,
-    tick: Tick,
+    tick: PartProgress,
 ) -> Recording:
     """Film a worker with every camera of a scene.
 
     Args:
         scene: with one worker.
         motions: (T, 1, S, ...) of that worker, `config.ctrl_dt` apart.
-        config: settings of eyes and tracker.
+        config: settings of detector and tracker.
         estimator: whose predictions the crops follow.
         seed: of its random numbers.
-        tick: hears of the progress: shares that sum to 1.
+        tick: told of the progress: shares that sum to 1.
     """
     body = stack(scene.bodies)
     pipeline = make_pipeline("pixels", estimator, scene, 1, config)
@@ -89,9 +82,8 @@ def record(
             tick(1.0 / n_frames)
     finally:
         pipeline.close()
-    return Recording(
-        scene, config.ctrl_dt, np.stack(joints), tuple(keypoints), tuple(windows), _beliefs(said)
-    )
+    seen = tuple(keypoints), tuple(windows), concatenated(said)
+    return Recording(scene, config.ctrl_dt, motions, np.stack(joints), *seen)
 
 
 def replay(
@@ -101,8 +93,8 @@ def replay(
     n_start: int,
     config: HRCConfig,
     seed: int,
-) -> Beliefs:
-    """An estimator on the detections of some of the cameras.
+) -> PoseEstimate:
+    """(T, 1, ...) what an estimator makes of the detections of some of the cameras.
 
     Args:
         recording: what they saw.
@@ -119,25 +111,25 @@ def replay(
     tracker.reset(state, np.zeros(1, int), rngs)
     said = []
     for frame, seen in enumerate(recording.keypoints):
+        given = seen
+        if frame >= n_start:
+            px, confidence, sigma_px = (
+                np.array(each) for each in (seen.px, seen.confidence, seen.sigma_px)
+            )
+            px[:, unused], confidence[:, unused], sigma_px[:, unused] = np.nan, 0.0, np.inf
+            given = Keypoints(px, confidence, sigma_px)
         tracker.predict(state, recording.dt_s, rngs)
-        tracker.update(state, seen if frame < n_start else _without(seen, unused), rngs)
+        tracker.update(state, given, rngs)
         said.append(tracker.estimate(state))
-    return _beliefs(said)
+    return concatenated(said)
 
 
-def _without(seen: Keypoints, cameras: Ints) -> Keypoints:
-    """Keypoints without those of some cameras."""
-    px, confidence, sigma_px = (
-        np.array(each) for each in (seen.px, seen.confidence, seen.sigma_px)
-    )
-    px[:, cameras], confidence[:, cameras], sigma_px[:, cameras] = np.nan, 0.0, np.inf
-    return Keypoints(px, confidence, sigma_px)
-
-
-def _beliefs(said: Sequence[PoseEstimate]) -> Beliefs:
-    """Frame after frame of one worker."""
-    return Beliefs(
-        np.stack([each.mean_world[0, 0] for each in said]),
-        np.stack([each.cov_world[0, 0] for each in said]),
-        np.array([bool(each.tracked[0, 0]) for each in said]),
-    )
+def concatenated(records: Sequence[RecordT]) -> RecordT:
+    """Records of arrays (n, ...), and of records of such, one after the other."""
+    first: Any = records[0]
+    if first is None:
+        return records[0]
+    if isinstance(first, np.ndarray):
+        return np.concatenate(records)  # type: ignore[return-value, call-overload]
+    names = [each.name for each in fields(first)]
+    return type(first)(*(concatenated([getattr(r, name) for r in records]) for name in names))

@@ -9,9 +9,10 @@ import numpy as np
 from hrc_env.core.records import Held, Roi, WorkerMotion
 from hrc_env.core.typing import Floats, Image, JointAngles
 from hrc_env.geometry.cameras import PinholeCamera
-from hrc_env.perception.faults.corruptions import spoil
+from hrc_env.perception.faults.corruptions import Shown, spoil
 from hrc_env.perception.faults.fault import IMAGE
 from hrc_env.perception.faults.schedule import Schedule
+from hrc_env.perception.lensed import Lensed
 
 BLUR_IMAGES = 5
 """An image with an open shutter is the mean of so many."""
@@ -24,18 +25,6 @@ class Stage(Protocol):
 
     def draw(self, q: JointAngles, motion: WorkerMotion) -> None:
         """Pose the scene for the views that follow."""
-        ...
-
-
-class Viewer(Protocol):
-    """What draws the posed scene through any camera, its lens included."""
-
-    def view(self, camera: PinholeCamera, window: Roi) -> Image:
-        """A window of its image."""
-        ...
-
-    def empty(self, camera_index: int, window: Roi) -> Image:
-        """A window of the posed scene without people, as a camera of the rig shows it."""
         ...
 
 
@@ -58,7 +47,7 @@ class Shot:
 class CameraFilm:
     """An `ImageSource` of what each camera gives now; black where it gives nothing."""
 
-    def __init__(self, stage: Stage, viewer: Viewer, schedule: Schedule) -> None:
+    def __init__(self, stage: Stage, viewer: Lensed, schedule: Schedule) -> None:
         self.stage, self.viewer, self.schedule = stage, viewer, schedule
         self._shots: Sequence[Shot | None] = ()
         self._seed = 0
@@ -73,12 +62,11 @@ class CameraFilm:
         shot = self._shots[camera_index]
         if shot is None:
             return np.zeros((self.stage.size_px, self.stage.size_px, 3), np.uint8)
-        camera = shot.cameras[camera_index]
         image = self._taken(shot, camera_index, window)
         for k, fault in self.schedule.of(IMAGE, camera_index, shot.step):
             if fault.kind != "motion_blur":
                 seeds = (self._seed, k, camera_index, shot.step)
-                image = spoil(image, camera, window, fault, seeds)
+                image = spoil(Shown(image, shot.cameras[camera_index], window, seeds), fault)
         return image
 
     def empty(self, camera_index: int, window: Roi) -> Image:

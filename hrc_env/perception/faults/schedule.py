@@ -1,17 +1,20 @@
 """Which image a camera gives at which step, and where the camera then really is.
 
-Everything here follows from an episode's number for faults (its seed), the step and the camera:
-nothing is remembered. Step 0 is the reset's; images are taken at the end of control steps.
+All follows from an episode's number for faults (its seed), the step and the camera. Step 0 is the
+reset's; images are taken at the end of control steps.
 """
 
 import functools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import cv2
 import numpy as np
 
-from hrc_env.core.typing import Floats
+from hrc_env.core.stateful import Stateful
+from hrc_env.core.typing import Floats, Ints
 from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.perception.faults.fault import ALL, IMAGE, PLACE, TIMING, FaultConfig, check_cameras
@@ -23,22 +26,17 @@ _EARLY = 1e-6
 class Frame(NamedTuple):
     """An image that arrives."""
 
-    shows: int
-    """The step whose scene it shows."""
-    taken: int
-    """The step at which it was taken, as it says."""
+    shows: int  # the step whose scene it shows
+    taken: int  # the step at which it was taken, as it says
 
 
 @dataclass(frozen=True, slots=True)
 class Schedule:
     """What cameras do over an episode."""
 
-    cameras: tuple[CameraConfig, ...]
-    """The rig in use, as it is told."""
+    cameras: tuple[CameraConfig, ...]  # the rig in use, as it is told
     faults: tuple[FaultConfig, ...]
-    """What goes wrong."""
-    dt_s: float
-    """Time between steps [s]."""
+    dt_s: float  # time between steps [s]
 
     def __post_init__(self) -> None:
         check_cameras(self.faults, [camera.name for camera in self.cameras])
@@ -129,6 +127,57 @@ class Schedule:
         return max(0, math.ceil(fault.from_s / self.dt_s - _EARLY) - 1)
 
 
+class Recent(Stateful):
+    """Steps of B environments with a record of each that may be wanted again."""
+
+    CHANGES = ("steps", "seeds", "_kept")
+
+    def __init__(self, batch: int, schedule: Schedule) -> None:
+        self.schedule = schedule
+        self.steps = np.full(batch, -1)
+        """(B,) the present step; -1 before the first."""
+        self.seeds: list[int] = [0] * batch
+        """Each episode's number for faults."""
+        self._kept: list[dict[int, Any]] = [{} for _ in range(batch)]
+        self._reach = max(1, schedule.longest_memory)
+        self._pinned = schedule.frozen_steps
+
+    def reset(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> None:
+        """Begin environments `ids` anew, with a child of each one's generator."""
+        for b in ids.tolist():
+            child = rngs[b].spawn(1)[0]
+            self.steps[b], self.seeds[b], self._kept[b] = -1, int(child.integers(2**31)), {}
+
+    def begin(self, b: int) -> int:
+        """Count a step of environment b, and let go of what is too old."""
+        self.steps[b] += 1
+        step = int(self.steps[b])
+        for old in [each for each in self._kept[b] if each < step - self._reach]:
+            if old not in self._pinned:
+                del self._kept[b][old]
+        return step
+
+    def keep(self, b: int, record: Any) -> None:
+        """Keep a record of the present step."""
+        self._kept[b][int(self.steps[b])] = record
+
+    def at(self, b: int, step: int) -> Any:
+        """The record of a step; None if it was never kept."""
+        return self._kept[b].get(step)
+
+    def frames(self, b: int) -> list[Frame | None]:
+        """What each camera gives environment b at its present step."""
+        schedule, step = self.schedule, int(self.steps[b])
+        cameras = range(len(schedule.cameras))
+        return [schedule.frame(self.seeds[b], step, c) for c in cameras]
+
+    def times_s(self, frames: Sequence[Frame | None]) -> Floats:
+        """(C,) when images were taken, as they say, on the tracker's clock, on which the reset's
+        image is one step old [s]; NaN: no image."""
+        dt_s = self.schedule.dt_s
+        return np.array([np.nan if f is None else (f.taken + 1) * dt_s for f in frames])
+
+
 def draws(*numbers: int) -> np.random.Generator:
     """The random numbers of an episode's fault, of its camera and of its step."""
     return np.random.default_rng(numbers)
@@ -157,7 +206,7 @@ def _with_fault(
     elif fault.kind == "wrong_translation":
         T_world_from_cam[:3, 3] += fault.how_much * _direction(rng)
     else:
-        T_world_from_cam[:3, :3] @= _turn(_direction(rng), fault.how_much)
+        T_world_from_cam[:3, :3] @= cv2.Rodrigues(fault.how_much * _direction(rng))[0]
     return replace(camera, K=K, T_world_from_cam=T_world_from_cam)
 
 
@@ -165,10 +214,3 @@ def _direction(rng: np.random.Generator) -> Floats:
     """(3,) any direction."""
     along = rng.standard_normal(3)
     return along / np.linalg.norm(along)
-
-
-def _turn(axis: Floats, angle_rad: float) -> Floats:
-    """(3, 3) a turn about an axis (3,): Rodrigues' formula."""
-    x, y, z = axis
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + np.sin(angle_rad) * cross + (1 - np.cos(angle_rad)) * cross @ cross

@@ -1,7 +1,7 @@
 """New hypotheses, where one view carries the body or a limb.
 
-A whole body may be turned the other way (`twins`). For a limb the search for the posterior's
-mode is begun again with the limb reflected in depth (`mirrors`), under the same prediction and
+A whole body may be turned the other way (`yaw_flip`). For a limb the search for the posterior's
+mode is begun again with the limb reflected in depth (`depth_flip`), under the same prediction and
 frames: a mode several posterior deviations from the known ones, with evidence that is not
 negligible, becomes a hypothesis.
 """
@@ -10,7 +10,7 @@ import numpy as np
 
 from hrc_env.core.kernels import kernel
 from hrc_env.tracking.hypotheses.anatomy import anatomy
-from hrc_env.tracking.hypotheses.mirrors import (
+from hrc_env.tracking.hypotheses.depth_flip import (
     N_MIRRORS,
     WHOLE_BODY,
     lone_camera,
@@ -18,11 +18,10 @@ from hrc_env.tracking.hypotheses.mirrors import (
     reflect,
 )
 from hrc_env.tracking.hypotheses.slots import copy_slot, slot_distance
-from hrc_env.tracking.hypotheses.twins import heads_like, turn_body, turn_of
-from hrc_env.tracking.models.proposal import contrast_of
+from hrc_env.tracking.hypotheses.yaw_flip import heads_like, turn_body, turn_of
 from hrc_env.tracking.tree.bone_lengths import stiff_lengths
 from hrc_env.tracking.tree.evidence import log_evidence
-from hrc_env.tracking.tree.filter import condition, settle
+from hrc_env.tracking.tree.filter import condition, correct_mean
 from hrc_env.tracking.tree.search import find_pose_near
 from hrc_env.tracking.tree.update import update_tree
 
@@ -55,8 +54,8 @@ def camera_of(part, P, body, cov, ok, m):
     return camera if camera >= 0 and open_depth(part, P[camera], body, cov) > m.open_m else -1
 
 
-@kernel
-def branch(state, b, w, prior, evidence, seen, s, m, scratch):
+@kernel(makes_arrays=True)
+def branch(state, b, w, prior, evidence, seen, s, m, work):
     """Look for other bodies beside the heaviest hypothesis, and keep them as hypotheses.
 
     Args:
@@ -64,80 +63,79 @@ def branch(state, b, w, prior, evidence, seen, s, m, scratch):
         b, w: environment, worker.
         prior: its body (J, 6), cov, slope (J, 6, 6) before the update.
         evidence: log-evidence of that update.
-        seen: P (C, 3, 4), z (J, C, 2), sigma (J, C), ok (J, C).
+        seen: `measurements.Seen`.
         s, m: settings.
-        scratch: belief, variances of the bones, `work.Work`.
+        work: scratch, a record of `WORK`.
     """
-    limit = state.log_weight.shape[1] // state.n_alive.shape[1]
+    limit = state.trees.shape[1] // state.n_alive.shape[1]
     own = w * limit
+    trees = state.trees[b, own:]
     for part in range(N_MIRRORS):
         n = state.n_alive[b, w]
-        camera = camera_of(part, seen[0], prior[0], prior[1], seen[3], m) if n < limit else -1
+        camera = camera_of(part, seen.P, prior[0], prior[1], seen.ok, m) if n < limit else -1
         if camera < 0:
             continue
         new = own + n
-        copy_slot(state.slots, b, own, new)
+        copy_slot(state, b, own, new)
         if part == WHOLE_BODY:
-            penalty = _turn(state.slots, b, own, n, camera, prior, seen, s, m, scratch)
+            penalty = _turn(trees, n, camera, prior, seen, s, m, work)
         else:
             where = (part, camera, prior, evidence)
-            penalty = _reflect(state.slots, b, own, n, where, seen, s, m, scratch)
+            penalty = _reflect(trees, n, where, seen, s, m, work)
         if penalty < np.inf:
-            form = m.anatomy * anatomy(state.slots.body[b, new])
-            state.log_weight[b, new] = (
-                state.log_weight[b, own] + form - state.form[b, own] - penalty
-            )
-            state.form[b, new], state.n_alive[b, w] = form, n + 1
+            tree = trees[n]
+            before, tree.pose_log_prior = tree.pose_log_prior, m.anatomy * anatomy(tree.body)
+            tree.log_weight += tree.pose_log_prior - before - penalty
+            state.n_alive[b, w] = n + 1
 
 
 @kernel(makes_arrays=True)
-def _turn(slots, b, own, n, camera, prior, seen, s, m, scratch):
-    """Make slot own + n the body that is turned the other way; its penalty [nat].
+def _turn(trees, n, camera, prior, seen, s, m, work):
+    """Make tree n the body that is turned the other way; its penalty [nat].
 
     It is infinite where one of the n hypotheses is turned alike.
     """
-    new = own + n
-    turn = turn_of(seen[0][camera], prior[0])
+    new = trees[n]
+    turn = turn_of(seen.P[camera], prior[0])
     penalty = 0.5 * (turn / m.turn) ** 2
     if penalty > m.most_penalty:
         return np.inf
-    body, cov, slope = slots.body[b, new], slots.cov[b, new], slots.slope[b, new]
+    body, cov, slope = new.body, new.cov, new.slope
     body[:], cov[:], slope[:] = prior[0], prior[1], prior[2]
-    turn_body(seen[0][camera], turn, body, cov, slope)
-    if _turned_alike(slots, b, own, n):
+    turn_body(seen.P[camera], turn, body, cov, slope)
+    if _turned_alike(trees, n):
         return np.inf
-    condition(slots, b, new, seen, s, scratch)
-    settle(slots, b, new, seen, s, scratch)
-    return np.inf if _turned_alike(slots, b, own, n) else penalty
+    condition(new, seen, s, work)
+    correct_mean(new, seen, s, work)
+    return np.inf if _turned_alike(trees, n) else penalty
 
 
 @kernel
-def _turned_alike(slots, b, own, n):
-    """Whether slot own + n is turned as one of the n slots before it."""
+def _turned_alike(trees, n):
+    """Whether tree n is turned as one of those before it."""
     alike = False
-    for k in range(own, own + n):
-        alike |= heads_like(slots.body[b, own + n], slots.body[b, k])
+    for k in range(n):
+        alike |= heads_like(trees[n].body, trees[k].body)
     return alike
 
 
 @kernel(makes_arrays=True)
-def _reflect(slots, b, own, n, where, seen, s, m, scratch):
-    """Condition slot own + n at the mode next to a reflected limb; 0, or infinity for none.
+def _reflect(trees, n, where, seen, s, m, work):
+    """Condition tree n at the mode next to a reflected limb; 0, or infinity for none.
 
     There is none where the search ends at one of the n hypotheses, or where the evidence is
     negligible beside that of the search from the prediction.
     """
     part, camera, prior, evidence = where
-    belief, give, work = scratch
-    new = own + n
-    body, cov, slope = slots.body[b, new], slots.cov[b, new], slots.slope[b, new]
-    if not reflect(part, seen[0][camera], body, work.point):
+    give = work.bone_variance
+    new = trees[n]
+    body, cov, slope = new.body, new.cov, new.slope
+    if not reflect(part, seen.P[camera], body, work.point):
         return np.inf
-    contrast = contrast_of(s.outlier_weight, s.image_area_px)
-    stiff_lengths(slots.bone_variance[b, new], s.bone_give, give)
-    bones = (slots.bone_length[b, new], give)
-    how = (contrast, s.floor_std_m, m.search_steps, 0.0)
-    find_pose_near(prior[0], prior[1], prior[2], seen, bones, *how, belief, work)
+    stiff_lengths(new.bone_variance, s.bone_give, give)
+    bones = (new.bone_length, give)
+    how = (s.inlier_odds, s.floor_std_m, m.search_steps, 0.0)
+    find_pose_near(prior[0], prior[1], prior[2], seen, bones, *how, work)
     moved = 0.0
     for j in range(len(body)):
         for i in range(3):
@@ -146,11 +144,11 @@ def _reflect(slots, b, own, n, where, seen, s, m, scratch):
         return np.inf
     body[:], cov[:], slope[:] = prior[0], prior[1], prior[2]
     update_tree(body, cov, slope, work)
-    found = log_evidence(prior, (body, cov, slope), seen, bones, contrast, s.floor_std_m, work)
+    found = log_evidence(prior, (body, cov, slope), seen, bones, s.inlier_odds, s.floor_std_m, work)
     if not found - evidence > m.log_least:
         return np.inf
-    settle(slots, b, new, seen, s, scratch)
-    for k in range(own, own + n):
-        if not slot_distance(slots, b, k, new, work) > m.distinct:
+    correct_mean(new, seen, s, work)
+    for k in range(n):
+        if not slot_distance(trees[k], new, work) > m.distinct:
             return np.inf
     return 0.0

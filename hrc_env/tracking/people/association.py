@@ -20,14 +20,14 @@ from hrc_env.core.skeleton import BONE_LENGTH_M, BONES, MIRROR, N_JOINTS
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.geometry.assignment import assign_rows
 from hrc_env.tracking.measurements import arrays_of, is_measurement
-from hrc_env.tracking.people.newcomers import (
+from hrc_env.tracking.people.affinity import LEAST_JOINTS, affinity, expect
+from hrc_env.tracking.people.track_initiation import (
     camera_model,
     fit_cameras,
     lines_of_sight,
     meeting,
     propose,
 )
-from hrc_env.tracking.people.resemblance import LEAST_JOINTS, expect, resemblance
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,7 +168,7 @@ def _follow(P, poses, free, mean, cov, tracked, mirror, s, pose):
             expect(P[c], mean[w], cov[w], known, s.slack_m, image)
             for d in range(n_poses):
                 if free[c, d]:
-                    fit[w, d] = -resemblance(
+                    fit[w, d] = -affinity(
                         image, z[c, d], sigma[c, d], ok[c, d], mirror,
                         s.gate_sigma, s.image_area_px,
                     )  # fmt: skip

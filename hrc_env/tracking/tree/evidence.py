@@ -23,17 +23,17 @@ _NOSE, _RIGHT_SHOULDER = JOINT["nose"], JOINT["right_shoulder"]
 
 
 @kernel
-def log_evidence(prior, posterior, seen, bones, contrast, floor_std_m, w):
+def log_evidence(prior, posterior, seen, bones, inlier_odds, floor_std_m, w):
     """Log of the evidence of one update, up to what all hypotheses share.
 
     Args:
         prior: body (J, 6), cov, slope (J, 6, 6) before the update.
         posterior: the same after `tree.update.update_tree` and before the mean correction.
-        seen: P (C, 3, 4), z (J, C, 2), sigma (J, C), ok (J, C).
+        seen: `measurements.Seen`.
         bones: lengths (J,) [m] and their variances as measurements (J,) [m^2].
-        contrast: as `proposal.contrast_of` gives.
+        inlier_odds: as in `Settings`.
         floor_std_m: as in `tree.search.find_pose`.
-        w: scratch `work.Work`; a, b, c, d and step are used.
+        w: scratch, a record of `WORK`; a, b, c, d and step are used.
     """
     body = posterior[0]
     for j in range(len(body)):
@@ -44,15 +44,15 @@ def log_evidence(prior, posterior, seen, bones, contrast, floor_std_m, w):
         for i in range(6):
             w.step[j, i] = 0.0
     _, log_det_after = tree_measure(posterior[1], posterior[2], w.step, w)
-    likelihood = log_likelihood(body, seen, contrast) + _bones(body, bones)
+    likelihood = log_likelihood(body, seen, inlier_odds) + _bones(body, bones)
     likelihood += _floor(body, floor_std_m)
     return likelihood - 0.5 * square + 0.5 * (log_det_after - log_det)
 
 
 @kernel
-def log_likelihood(body, seen, contrast):
+def log_likelihood(body, seen, inlier_odds):
     """Log-likelihood of all pixels at positions (J, 6), relative to all being outliers."""
-    P, z, sigma, ok = seen
+    P, z, sigma, ok = seen.P, seen.z, seen.sigma, seen.ok
     total = 0.0
     for j in range(len(ok)):
         for c in range(len(P)):
@@ -62,7 +62,7 @@ def log_likelihood(body, seen, contrast):
             if depth > NEAREST_DEPTH_M:
                 near = 1.0 / (sigma[j, c] * sigma[j, c])
                 miss = (z[j, c, 0] - u) ** 2 + (z[j, c, 1] - v) ** 2
-                total += math.log1p(contrast * near * math.exp(-0.5 * miss * near))
+                total += math.log1p(inlier_odds * near * math.exp(-0.5 * miss * near))
     return total
 
 

@@ -1,0 +1,184 @@
+"""What happens while PPO learns: the safety term grows, progress, curves, checkpoints, Ctrl-C."""
+
+import json
+import signal
+import threading
+import time
+from collections import deque
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from types import FrameType
+from typing import Any, Self
+
+import numpy as np
+from matplotlib.ticker import EngFormatter
+from stable_baselines3.common.callbacks import BaseCallback
+
+from hrc_env.cli.progress import Meter
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.results import write_whole
+from hrc_env.experiments.study.plots import label, new_figure, save
+from hrc_env.sb3 import HRCVecEnv
+
+from . import ppo
+from .evaluate import summarise
+
+RECENT_EPISODES = 64
+"""Curves average over so many finished episodes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ramp:
+    """A share that grows evenly from 0 to 1."""
+
+    n_steps: int
+    """Environment steps that it takes; 0: all of it from the start."""
+
+    def __post_init__(self) -> None:
+        if self.n_steps < 0:
+            raise ConfigError(f"A ramp takes 0 or more environment steps, got {self.n_steps}.")
+
+    def at(self, n_steps: int) -> float:
+        """The share in [0, 1] after so many environment steps."""
+        return 1.0 if n_steps >= self.n_steps else n_steps / self.n_steps
+
+
+class ProximityCurriculum(BaseCallback):
+    """Sets the proximity term's weight before every rollout; a resumed run goes on in it.
+
+    With the whole weight from the start a learner first learns to stay away, and finds its goals
+    about nine times later; it is then the more careful one (docs/learning.md has both).
+    """
+
+    def __init__(self, ramp: Ramp, env: HRCVecEnv) -> None:
+        super().__init__()
+        self.ramp, self.env = ramp, env
+        self.whole = env.env.config.reward
+
+    def _on_rollout_start(self) -> None:
+        share = self.ramp.at(self.num_timesteps)
+        self.env.set_reward(replace(self.whole, proximity=share * self.whole.proximity))
+
+    def _on_step(self) -> bool:
+        return True
+
+
+class Interrupt:
+    """After `listen` the first Ctrl-C is kept in `asked`; the second one interrupts as ever."""
+
+    def __init__(self) -> None:
+        self.asked = False
+        self._before: Any = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        if self._before is not None:
+            signal.signal(signal.SIGINT, self._before)
+
+    def listen(self) -> None:
+        """From now on."""
+        if threading.current_thread() is threading.main_thread():  # signals come nowhere else
+            self._before = signal.signal(signal.SIGINT, self._answer)
+
+    def _answer(self, number: int, frame: FrameType | None) -> None:
+        if self.asked:
+            raise KeyboardInterrupt
+        self.asked = True
+
+
+@dataclass(slots=True)
+class Curve:
+    """A learning curve: one entry a rollout."""
+
+    points: list[dict[str, float]] = field(default_factory=list)
+
+    def write(self, path: Path) -> None:
+        """As JSON, whole or not at all."""
+        write_whole(path, json.dumps(self.points, indent=1))
+
+
+class TrainingMonitor(BaseCallback):
+    """Keeps the curve, shows the progress, saves a checkpoint every minute and at the end.
+
+    Where it is interrupted it ends the training at the next step, as if that had been the last.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        facts: dict[str, Any],
+        curve: Curve,
+        ramp: Ramp,
+        interrupt: Interrupt,
+        meter: Meter,
+    ) -> None:
+        super().__init__()
+        self.folder, self.facts, self.curve, self.ramp = folder, facts, curve, ramp
+        self.interrupt, self.meter = interrupt, meter
+        self.recent: deque[dict[str, float]] = deque(maxlen=RECENT_EPISODES)
+        self.before_s = curve.points[-1]["wall_s"] if curve.points else 0.0
+
+    def _on_training_start(self) -> None:
+        self.started_s = self.saved_s = time.monotonic()
+        self.interrupt.listen()
+
+    def _on_step(self) -> bool:
+        self.recent.extend(each["episode"] for each in self.locals["infos"] if "episode" in each)
+        return not self.interrupt.asked
+
+    def _on_rollout_end(self) -> None:
+        self._note()
+        if time.monotonic() - self.saved_s > 60:
+            self._save()
+
+    def _on_training_end(self) -> None:
+        self._note()
+        self._save()
+
+    def _note(self) -> None:
+        note = ""
+        if self.recent:
+            score = asdict(summarise(list(self.recent)))
+            wall_s = self.before_s + time.monotonic() - self.started_s
+            share = self.ramp.at(self.num_timesteps)
+            point = {"steps": float(self.num_timesteps), "wall_s": wall_s, "safety_share": share}
+            self.curve.points.append(point | score)
+            for name, value in score.items():
+                self.logger.record(f"episode/{name}", value)
+            contacts = score["contacts_per_episode"]
+            note = f"goals {score['success_rate']:.0%}, contacts {contacts:.2f}"
+        self.meter.show(self.num_timesteps, note=note)
+
+    def _save(self) -> None:
+        self.saved_s = time.monotonic()
+        ppo.save(self.model, self.folder / "policy.zip", self.facts)  # type: ignore[arg-type]
+        self.curve.write(self.folder / "curve.json")
+
+
+def plot_curve(curve: Curve, path: Path, title: str) -> None:
+    """Goals, contacts and cost over environment steps as a PNG."""
+    steps = np.array([point["steps"] for point in curve.points])
+    share = np.array([point.get("safety_share", 1.0) for point in curve.points])
+    growing = steps[(share > 0) & (share < 1)]
+    panels = {
+        "success_rate": ("goals reached (share)", "tab:green"),
+        "goals_per_minute": ("goals per minute", "tab:blue"),
+        "contacts_per_episode": ("true contacts per episode", "tab:red"),
+        "close_steps_per_episode": ("steps < 15 cm per episode", "tab:orange"),
+    }
+    figure = new_figure(9, 6)
+    axes = figure.subplots(2, 2, sharex=True)
+    for axis, (name, (words, colour)) in zip(axes.ravel(), panels.items(), strict=True):
+        axis.plot(steps, [point[name] for point in curve.points], color=colour)
+        label(axis, "environment steps", words)
+        axis.set_ylim(bottom=0)
+        axis.xaxis.set_major_formatter(EngFormatter(sep=" "))
+        if len(growing):
+            axis.axvspan(growing[0], growing[-1], color="grey", alpha=0.15, linewidth=0)
+    if len(growing):
+        axes[1, 0].set_title("grey: the safety term grows", fontsize=9)
+    axes[0, 0].set_ylim(0, 1.05)
+    figure.suptitle(title)
+    save(figure, path, dpi=120)

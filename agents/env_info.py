@@ -1,0 +1,49 @@
+"""What an agent is, and what it is told about its environment."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hrc_env.control import ControlConfig
+from hrc_env.geometry.chains import SerialChain
+from hrc_env.observations import ObservationLayout
+
+if TYPE_CHECKING:
+    from hrc_env.simulation import Simulation
+
+
+class Agent(Protocol):
+    """A policy."""
+
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Actions (..., A) in [-1, 1] for observations (..., n)."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class EnvInfo:
+    """What an agent may know beforehand: the robot and how to read an observation."""
+
+    layout: ObservationLayout
+    chain: SerialChain
+    home_q: NDArray[np.float64]
+    control: str
+    control_config: ControlConfig
+    n_actions: int
+    task: str
+    """The task's id."""
+
+
+def env_info(simulation: "Simulation") -> EnvInfo:
+    """That of an environment's `simulation`."""
+    return EnvInfo(
+        layout=simulation.layout,
+        chain=simulation.chain,
+        home_q=simulation.scene.home_q,
+        control=simulation.control,
+        control_config=simulation.config.control,
+        n_actions=simulation.n_actions,
+        task=simulation.task.id,
+    )

@@ -1,0 +1,33 @@
+"""Agents by name, or from a checkpoint."""
+
+from pathlib import Path
+
+from hrc_env.core.errors import ConfigError, unknown
+
+from . import random, scripted
+from .env_info import Agent, EnvInfo
+
+AGENTS = ("random", "scripted", "scripted_slowed")
+"""Names of the agents that need no checkpoint."""
+
+
+def make_agent(name: str, env_info: EnvInfo, seed: int = 0) -> Agent:
+    """An agent by name ("random", "scripted", "scripted_slowed") or from a checkpoint file.
+
+    Raises:
+        ConfigError: neither an agent nor a file.
+        CheckpointError: a file that does not fit the environment.
+        MissingExtraError: a checkpoint, where the learner that reads it is not installed.
+    """
+    if name == "random":
+        return random.RandomAgent(env_info, seed)
+    if name in AGENTS:
+        return scripted.expert(env_info, scripted.Yielding() if name != "scripted" else None)
+    if Path(name).suffix == ".zip" or Path(name).exists():
+        from . import ppo  # here: torch takes seconds to import, and need not be there
+
+        return ppo.load(Path(name), env_info)
+    error = unknown("agent", name, AGENTS)
+    raise ConfigError(
+        f"{error} Or the path of a checkpoint that python -m hrc_env train wrote (.zip)."
+    )

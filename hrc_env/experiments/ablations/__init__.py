@@ -1,0 +1,1 @@
+"""Ablations of rigs, detections and estimators: what the paper leaves open."""

@@ -1,0 +1,59 @@
+"""An ablation: one question, and the settings that answer it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.experiments.ablations.handicaps import BONES, MOTION, TREES
+from hrc_env.experiments.study.rigs import Turn
+from hrc_env.tracking.config import TrackerConfig
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """What is the same in all episodes of a row: who walks where, tracked how."""
+
+    name: str
+    """As in results.json."""
+    words: str
+    """As in tables and figures."""
+    scene: str = "lab"
+    n_workers: int = 1
+    estimator: str = "particle"
+    tracker: TrackerConfig = field(default_factory=TrackerConfig)
+    bones: str = "learnt"
+    """One of `handicaps.BONES`."""
+    motion: str = "model"
+    """One of `handicaps.MOTION`."""
+    turns: tuple[Turn, ...] = (Turn(),)
+    """Episodes take turns in them, so that nothing hangs on one camera's place."""
+    by_sight: bool = False
+    """Whether errors are also kept by how many cameras see the joint."""
+    is_timed: bool = False
+    """Whether updates are timed."""
+
+    def __post_init__(self) -> None:
+        """Raise `ConfigError` for what cannot be played."""
+        for name, valid in (("bones", BONES), ("motion", MOTION)):
+            given = getattr(self, name)
+            if given not in valid:
+                raise unknown(name, given, valid)
+            if given != valid[0] and self.estimator not in TREES:
+                raise ConfigError(
+                    f"Setting {self.name!r}: {name}={given!r} is for {' and '.join(TREES)}, which "
+                    f"have a body on a tree; got {self.estimator!r}."
+                )
+
+
+@dataclass(frozen=True, slots=True)
+class Ablation:
+    """One question."""
+
+    name: str
+    """As in results.json and on the command line."""
+    title: str
+    asked: str
+    """The question, and what is played for it."""
+    settings: tuple[Setting, ...]
+    also: Mapping[str, str] = field(default_factory=dict)
+    """What is sorted out of the settings' joints, and its words."""

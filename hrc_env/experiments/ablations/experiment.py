@@ -1,0 +1,173 @@
+"""Ablations of rigs, detections and estimators: the experiment, setting by setting."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.results import Metric, over
+from hrc_env.experiments.ablations.ablation import Ablation, Setting
+from hrc_env.experiments.ablations.play import DT_S, N_WARM_UP, Sums, play, update_us, walks_of
+from hrc_env.experiments.ablations.questions.faults import CALIBRATION, LATENCY
+from hrc_env.experiments.ablations.questions.filters import ALGORITHM_1, FILTER, KINEMATICS
+from hrc_env.experiments.ablations.questions.rigs import CAMERAS, OCCLUSION, WORKERS
+from hrc_env.experiments.ablations.report import report
+from hrc_env.experiments.study.cache import PartCache, PartProgress
+from hrc_env.experiments.study.counts import ERRORS_M
+from hrc_env.experiments.study.fingerprint import fingerprint_of
+from hrc_env.experiments.study.intervals import counted_quantile_over, ratio_over, rmse_over
+from hrc_env.experiments.study.rigs import WARM_UP_S
+from hrc_env.experiments.study.runner import Study, at_least_one, changed
+
+ABLATIONS: dict[str, Ablation] = {
+    ablation.name: ablation
+    for ablation in (
+        CAMERAS, ALGORITHM_1, LATENCY, CALIBRATION, OCCLUSION, WORKERS, FILTER, KINEMATICS,
+    )
+}  # fmt: skip
+"""By name, in the order of the report."""
+PARTS_FROM = ("hrc_env.experiments.ablations.play",)
+Played = Mapping[str, Mapping[str, Sums]]
+"""Sums by question and setting."""
+
+
+@dataclass(frozen=True, slots=True)
+class AblationsConfig:
+    """How much is played."""
+
+    n_seeds: int = 80
+    """Episodes of every setting."""
+    first_seed: int = 2_000_000
+    """Seed of the first episode; the others count up."""
+    seconds: float = 10.0
+    """How long each is, the warm-up included."""
+    n_timed: int = 50
+    """Updates that are timed, where they are."""
+    studies: tuple[str, ...] = tuple(ABLATIONS)
+    """Which questions are asked."""
+
+    def __post_init__(self) -> None:
+        """Raise `ConfigError` for what cannot work."""
+        at_least_one(self, "n_seeds", "n_timed")
+        if not self.seconds > WARM_UP_S:
+            raise ConfigError(
+                f"Episodes must be longer than the warm-up of {WARM_UP_S:g} s, got {self.seconds}."
+            )
+        if not self.studies:
+            raise ConfigError(f"--studies needs a name of {', '.join(ABLATIONS)}.")
+        for name in self.studies:
+            if name not in ABLATIONS:
+                raise unknown("study", name, ABLATIONS)
+
+    @property
+    def seeds(self) -> tuple[int, ...]:
+        """One an episode."""
+        return tuple(self.first_seed + k for k in range(self.n_seeds))
+
+    @property
+    def asked(self) -> tuple[Ablation, ...]:
+        """The questions, in the order of the report."""
+        return tuple(each for name, each in ABLATIONS.items() if name in self.studies)
+
+
+QUICK = AblationsConfig(n_seeds=4, seconds=5.0, n_timed=20)
+"""Every number, from little."""
+
+
+def config_for(
+    quick: bool = False, seeds: int | None = None, studies: Sequence[str] | None = None
+) -> AblationsConfig:
+    """The settings that the command line asks for; None: as usual."""
+    names = None if studies is None else tuple(dict.fromkeys(studies))
+    return changed(QUICK if quick else AblationsConfig(), n_seeds=seeds, studies=names)
+
+
+def settings_of(config: AblationsConfig) -> dict[str, Any]:
+    """What all numbers depend on; which studies are asked for changes none of them."""
+    return {name: value for name, value in asdict(config).items() if name != "studies"}
+
+
+def play_all(config: AblationsConfig, cache: PartCache) -> Played:
+    """Every setting's sums; those that share their walks are played one after the other."""
+    order = sorted(
+        ((ablation.name, setting) for ablation in config.asked for setting in ablation.settings),
+        key=lambda each: (each[1].scene, each[1].n_workers),
+    )
+    played: dict[str, dict[str, Sums]] = {ablation.name: {} for ablation in config.asked}
+    for name, setting in order:
+        depends = settings_of(config) | {"setting": asdict(setting) | {"words": ""}}
+        key = fingerprint_of(depends, *PARTS_FROM)
+        label = f"{name}.{setting.name}"
+        played[name][setting.name] = cache.part(label, partial(part, config, setting), key)
+    return played
+
+
+def part(config: AblationsConfig, setting: Setting, tick: PartProgress) -> Sums:
+    """Sums of one setting's episodes, and the time that its updates take."""
+    n_steps = round(config.seconds / DT_S)
+    walks = walks_of(setting.scene, setting.n_workers, config.seeds, n_steps)
+    sums = play(setting, walks, config.seeds, tick)
+    if setting.is_timed:
+        n_frames = min(config.n_timed, n_steps - N_WARM_UP)
+        sums["update_us"] = update_us(setting, walks, config.seeds, n_frames)
+    return sums
+
+
+def metrics_of(played: Played) -> dict[str, Metric]:
+    """Every number. What never happened has none: joints that so many cameras see."""
+    metrics: dict[str, Metric] = {}
+    for name, of_settings in played.items():
+        for setting, sums in of_settings.items():
+            key = f"{name}.{setting}"
+            metrics |= _of_joints(key, sums)
+            metrics[f"lost.{key}"] = ratio_over(sums["lost"], sums["frames"], "share")
+            if "update_us" in sums:
+                metrics[f"update_us.{key}"] = over(sums["update_us"], "us")
+        for seen, sums in _by_sight(of_settings).items():
+            metrics |= _of_joints(f"{name}.{seen}", sums)
+    return metrics
+
+
+def _of_joints(key: str, sums: Mapping[str, Any]) -> dict[str, Metric]:
+    """Errors of joints and how well they are reported."""
+    return {
+        f"error_m.{key}.median": counted_quantile_over(ERRORS_M, sums["errors"], 0.5, "m"),
+        f"error_m.{key}.p95": counted_quantile_over(ERRORS_M, sums["errors"], 0.95, "m"),
+        f"rmse_m.{key}": rmse_over(sums["squares"], sums["joints"], "m"),
+        f"coverage95.{key}": ratio_over(sums["inside"], sums["joints"], "share"),
+    }
+
+
+def _by_sight(of_settings: Mapping[str, Sums]) -> dict[str, dict[str, Any]]:
+    """Settings of a scene together, by how many cameras see a joint: `<scene>_seen_<k>`.
+
+    An episode of one setting and that of another are of the same seed: they count as one.
+    """
+    found: dict[str, dict[str, Any]] = {}
+    for setting, sums in of_settings.items():
+        for what, values in sums.items():
+            if what.startswith("seen_"):
+                _, k, name = what.split("_")
+                together = found.setdefault(f"{setting.split('_')[0]}_seen_{k}", {})
+                together[name] = np.array(values) + together.get(name, 0)
+    kept = {name: sums["joints"] > 0 for name, sums in found.items()}
+    return {
+        name: {what: values[kept[name]] for what, values in sums.items()}
+        for name, sums in sorted(found.items())
+        if kept[name].any()
+    }
+
+
+STUDY = Study(
+    name="ablations",
+    modules=PARTS_FROM,
+    settings=settings_of,
+    seeds=lambda config: config.seeds,
+    n_parts=lambda config: sum(len(ablation.settings) for ablation in config.asked),
+    play=play_all,
+    metrics=lambda config, played: metrics_of(played),
+    report=lambda config, played, metrics, figures: report(figures, config.asked, metrics),
+)

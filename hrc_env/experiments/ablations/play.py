@@ -1,0 +1,234 @@
+"""A setting's detections and estimator on walks: what is believed beside what is true.
+
+Workers walk once: every setting is given the same walks of the same seeds, before an arm that
+rests, so that nobody has a reason to react to it.
+"""
+
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import islice, permutations
+from typing import Any
+
+import numpy as np
+from scipy.stats import chi2
+
+from hrc_env.config import HRCConfig
+from hrc_env.core.batching import rows
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.machine import n_cores
+from hrc_env.core.records import Keypoints, PoseEstimate, WorkerMotion
+from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, Points3
+from hrc_env.experiments.ablations.ablation import Setting
+from hrc_env.experiments.ablations.handicaps import BONES, MOTION, handicap, lengths_m
+from hrc_env.experiments.study.cache import PartProgress
+from hrc_env.experiments.study.counts import ERRORS_M
+from hrc_env.experiments.study.rigs import WARM_UP_S, Turn
+from hrc_env.motion import generator
+from hrc_env.perception.emulator import lines_of_sight
+from hrc_env.perception.sightlines import SEEN
+from hrc_env.pipeline.levels import make_pipeline
+from hrc_env.pipeline.sensor_input import Generators, TrueSensorInput
+from hrc_env.pipeline.tracking import PoseTracking
+from hrc_env.scene.build import Scene, build
+from hrc_env.worker.body import Body, pool, stack, worker_truth
+
+LEVEL = "keypoints"
+BODIES = "any"
+"""Every episode gives each worker one of the baked bodies."""
+DT_S = HRCConfig().ctrl_dt
+N_WARM_UP = round(WARM_UP_S / DT_S)
+INSIDE_95 = float(chi2.ppf(0.95, 3))
+"""Squares of errors in units of their covariance are below this in 95 % of all cases."""
+RECORDED_BY, N_TIMED = "triangulation", 3
+"""Detections do not depend on who follows them: the quickest does. Times are taken so often."""
+Sums = dict[str, list[Any]]
+"""By name, one an episode."""
+
+
+@dataclass(frozen=True, slots=True)
+class Walks:
+    """Episodes of the same length, side by side."""
+
+    bodies: Body
+    motions: tuple[WorkerMotion, ...]
+    """(T) records of arrays (B, W, ...), a control step apart; the first is the beginning."""
+    q: JointAngles
+    """(B, N) the arm, which rests [rad]."""
+
+
+@lru_cache(maxsize=1)
+def walks_of(scene: str, n_workers: int, seeds: tuple[int, ...], n_steps: int) -> Walks:
+    """Episodes of workers at their work, one a seed, each of n_steps."""
+    config, bodies = HRCConfig(), stack(pool(BODIES))
+    place = build(config.scene, scene, n_workers, bodies.names)
+    state = generator.make_state(len(seeds), n_workers, bodies, config.motion, place.grounds)
+    rngs = [np.random.default_rng([seed, 0]) for seed in seeds]
+    generator.reset(state, np.arange(len(seeds)), rngs)
+    motions = [generator.current(state)]
+    for _ in range(n_steps - 1):
+        _, motion = generator.advance(state, rngs, config.scene.sim_dt, config.n_substeps)
+        motions.append(motion)
+    spread = np.array(config.start_spread_rad or place.robot.spread_rad)
+    turned = [np.random.default_rng([seed, 1]).uniform(-spread, spread) for seed in seeds]
+    return Walks(bodies, tuple(motions), place.home_q + np.stack(turned))
+
+
+def play(setting: Setting, walks: Walks, seeds: Sequence[int], tick: PartProgress) -> Sums:
+    """Sums of every episode, in the order of the seeds.
+
+    Args:
+        setting: what is played; episode k has turn k modulo the number of turns.
+        walks: of the setting's scene and workers, one a seed.
+        seeds: of the detector's errors and the estimator.
+        tick: told the share that is done.
+    """
+    found: Sums = {}
+
+    def job(job: tuple[Turn, Ints]) -> tuple[Ints, Sums]:
+        return job[1], _episodes(setting, job[0], walks, seeds, job[1])
+
+    with ThreadPoolExecutor(n_cores()) as threads:
+        for ids, sums in threads.map(job, _jobs(setting.turns, len(seeds))):
+            for name, values in sums.items():
+                row = found.setdefault(name, [None] * len(seeds))
+                for b, value in zip(ids.tolist(), values, strict=True):
+                    row[b] = value
+            tick(len(ids) / len(seeds))
+    return found
+
+
+def _jobs(turns: Sequence[Turn], n_episodes: int) -> list[tuple[Turn, Ints]]:
+    """Turns and the episodes that are played together; nothing depends on how many."""
+    jobs = []
+    for k, turn in enumerate(turns[:n_episodes]):
+        mine = np.arange(k, n_episodes, len(turns))
+        n_parts = min(n_cores(), len(mine)) if len(turns) < n_cores() else 1
+        jobs += [(turn, part) for part in np.array_split(mine, n_parts)]
+    return jobs
+
+
+def _episodes(setting: Setting, turn: Turn, walks: Walks, seeds: Sequence[int], ids: Ints) -> Sums:
+    """Sums of some of the episodes, with these cameras, after the warm-up."""
+    errors, inside, lost, seeing = [], [], [], []
+    scene = scene_of(setting, turn)
+    for said, now, _ in islice(watch(setting, turn, walks, seeds, ids), N_WARM_UP, None):
+        joints_world = now.truth.joints_world
+        order = matched(said.mean_world, said.tracked, joints_world)
+        mean, cov = (
+            np.take_along_axis(each, order.reshape(*order.shape, *[1] * (each.ndim - 2)), 1)
+            for each in (said.mean_world, said.cov_world)
+        )
+        off = mean - joints_world
+        errors.append(np.linalg.norm(off, axis=-1))
+        squares = np.einsum("...i,...i->...", off, np.linalg.solve(cov, off[..., None])[..., 0])
+        inside.append(squares < INSIDE_95)
+        lost.append(~np.take_along_axis(said.tracked, order, 1))
+        if setting.by_sight:
+            seeing.append(n_seeing(now, scene, turn))
+    error_m, is_inside, is_lost = (np.stack(each, 1) for each in (errors, inside, lost))
+    sums = _sums(error_m, is_inside, np.ones(error_m.shape, bool), "")
+    sums["lost"] = is_lost.sum((1, 2)).tolist()
+    sums["frames"] = [is_lost[0].size] * len(ids)
+    if seeing:
+        for k in range(len(scene.cameras) + 1):
+            sums |= _sums(error_m, is_inside, np.stack(seeing, 1) == k, f"seen_{k}_")
+    return sums
+
+
+def _sums(error_m: Floats, inside: Bools, which: Bools, prefix: str) -> Sums:
+    """Of the values (B, T, W, J) that count."""
+    axes = tuple(range(1, error_m.ndim))
+    return {
+        f"{prefix}errors": ERRORS_M.count(error_m, which).tolist(),
+        f"{prefix}squares": np.where(which, error_m**2, 0.0).sum(axes).tolist(),
+        f"{prefix}inside": (inside & which).sum(axes).tolist(),
+        f"{prefix}joints": which.sum(axes).tolist(),
+    }
+
+
+def watch(
+    setting: Setting, turn: Turn, walks: Walks, seeds: Sequence[int], ids: Ints
+) -> Iterator[tuple[PoseEstimate, TrueSensorInput, Keypoints]]:
+    """Frame by frame of some episodes: what is believed, what is true, what was detected."""
+    pipeline = pipeline_of(setting, turn, len(ids))
+    rngs: list[Generators] = [
+        [np.random.default_rng([seeds[b], k]) for b in ids.tolist()] for k in (2, 3)
+    ]
+    everyone, present = np.arange(len(ids)), np.ones((len(ids), setting.n_workers), bool)
+    pipeline.reset(everyone, *rngs)
+    lengths = lengths_m(worker_truth(walks.bodies, rows(walks.motions[0], ids)).joints_world)
+    for motions in walks.motions:
+        motion = rows(motions, ids)
+        truth = worker_truth(walks.bodies, motion)
+        handicap(pipeline.state, setting.bones, setting.motion, lengths)
+        now = TrueSensorInput(everyone, walks.q[ids], motion, truth, present)
+        yield pipeline.perceive(now, *rngs), now, pipeline.keypoints
+    pipeline.close()
+
+
+def update_us(setting: Setting, walks: Walks, seeds: tuple[int, ...], n_frames: int) -> list[float]:
+    """Microseconds per worker and update after the warm-up, the median over n_frames, a number
+    for each repetition: processor time of one thread on a few of the walks, side by side."""
+    turn, ids = setting.turns[0], np.arange(min(len(seeds), 4))
+    short = replace(walks, motions=walks.motions[: N_WARM_UP + n_frames])
+    recorded_by = replace(setting, estimator=RECORDED_BY, bones=BONES[0], motion=MOTION[0])
+    shown = [seen for _, _, seen in watch(recorded_by, turn, short, seeds, ids)]
+    tracker: Any = pipeline_of(setting, turn, len(ids)).tracker
+    found = []
+    for _ in range(N_TIMED):
+        rngs = [np.random.default_rng([seeds[b], 3]) for b in ids.tolist()]
+        state = tracker.init(len(ids), setting.n_workers)
+        tracker.reset(state, ids, rngs)
+        spent_s = []
+        for keypoints in shown:
+            seen = rows(keypoints, ids)
+            begun_s = time.thread_time()
+            tracker.predict(state, DT_S, rngs)
+            tracker.update(state, seen, rngs)
+            spent_s.append(time.thread_time() - begun_s)
+        median_s = float(np.median(spent_s[N_WARM_UP:]))
+        found.append(1e6 * median_s / (len(ids) * setting.n_workers))
+    return found
+
+
+def pipeline_of(setting: Setting, turn: Turn, batch: int) -> PoseTracking:
+    """The emulator and the estimator of a setting, for so many episodes."""
+    config = HRCConfig(worker=BODIES, tracker=setting.tracker, faults=turn.faults)
+    pipeline: Any = make_pipeline(LEVEL, setting.estimator, scene_of(setting, turn), batch, config)
+    if not isinstance(pipeline, PoseTracking):
+        raise ConfigError(f"Level {LEVEL!r} must have cameras and a tracker; it has none.")
+    return pipeline
+
+
+def scene_of(setting: Setting, turn: Turn) -> Scene:
+    """The scene of a setting with a turn's cameras."""
+    config = replace(HRCConfig().scene, cameras=turn.cameras)
+    return build(config, setting.scene, setting.n_workers, BODIES)
+
+
+def matched(mean_world: Points3, tracked: Bools, joints_world: Points3) -> Ints:
+    """(B, W) the track of each worker: those that fit best together, no track twice.
+
+    Args:
+        mean_world: (B, W, J, 3) tracks [m].
+        tracked: (B, W) whether they follow anybody; those that do choose first.
+        joints_world: (B, W, J, 3) workers [m].
+    """
+    n_workers = tracked.shape[1]
+    off = np.linalg.norm(mean_world[:, None] - joints_world[:, :, None], axis=-1).mean(-1)
+    cost = np.where(tracked[:, None], off, 0.0)  # (B, worker, track)
+    orders = np.array(list(permutations(range(n_workers))))
+    totals = cost[:, np.arange(n_workers), orders].sum(-1)
+    return orders[totals.argmin(1)]
+
+
+def n_seeing(now: TrueSensorInput, scene: Scene, turn: Turn) -> Ints:
+    """(B, W, J) cameras that have a free line of sight to each joint and are not lost for good."""
+    surroundings = scene.surroundings(now.q, now.motion.held)
+    sight, _ = lines_of_sight(now.truth, surroundings, scene.cameras)
+    gone = {name for fault in turn.faults if fault.kind == "lost" for name in fault.cameras}
+    left = np.array([camera.name not in gone for camera in scene.cameras])
+    return (sight[:, left] == SEEN).sum(1)

@@ -1,0 +1,1 @@
+"""The questions: about rigs, about what goes wrong with cameras, about estimators."""

@@ -1,0 +1,68 @@
+"""The report: question by question what was asked, a picture and a table."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from hrc_env.experiments.ablations.ablation import Ablation
+from hrc_env.experiments.study.plots import label, new_figure, plain_log, points, save
+from hrc_env.experiments.study.report import Column, Metrics, Picture, Report, table_of
+
+QUANTILES = {"median": ("median", "o", "#1565c0"), "p95": ("95th percentile", "s", "#e65100")}
+ASKED = """\
+What the paper's two experiments leave open. Detections are those of the calibrated emulator
+(`perception="keypoints"`): these are questions about estimators and rigs. The estimator is the
+default, `particle`, unless a setting says otherwise; settings are changed one at a time. Workers of
+all bodies work beside an arm that rests, on the same walks in every setting of a scene.
+
+Every joint of every frame after the first second counts, also where the track is lost: the last
+word, or the prior, is then the answer. *Coverage*: the share of joints within the reported 95 %
+region; *lost*: the share of time without a track; *us an update*: processor time of one thread."""
+
+
+def report(figures: Path, ablations: Sequence[Ablation], metrics: Metrics) -> Report:
+    """A figure and a table for each question."""
+    parts: list = []
+    for ablation in ablations:
+        key, path = ablation.name, figures / f"{ablation.name}.png"
+        rows = {setting.name: setting.words for setting in ablation.settings}
+        rows |= {name: w for name, w in ablation.also.items() if f"rmse_m.{key}.{name}" in metrics}
+        draw(path, key, rows, metrics)
+        columns = [
+            Column(f"error_m.{key}.{{}}.median", "median [mm]", 1, 1000),
+            Column(f"error_m.{key}.{{}}.p95", "95th percentile [mm]", 0, 1000),
+            Column(f"rmse_m.{key}.{{}}", "RMSE [mm]", 0, 1000),
+            Column(f"coverage95.{key}.{{}}", "coverage [%]", 1, 100),
+            Column(f"lost.{key}.{{}}", "lost [%]", 2, 100),
+        ]
+        if any(setting.is_timed for setting in ablation.settings):
+            columns.append(Column(f"update_us.{key}.{{}}", "us an update", 0))
+        parts += [
+            f"## {ablation.title}\n\n{ablation.asked}",
+            Picture(path, "Error of a joint in each setting."),
+            table_of("setting", rows, columns, metrics),
+        ]
+    return Report("Ablations of rigs, detections and estimators", ASKED, parts)
+
+
+def draw(path: Path, key: str, rows: Mapping[str, str], metrics: Metrics) -> None:
+    """Errors of all rows with intervals, and coverage as numbers at the right."""
+    places = np.arange(len(rows))[::-1]
+    figure = new_figure(9, 0.3 * len(rows) + 1.6)
+    axis = figure.subplots()
+    across = axis.get_yaxis_transform()
+    for quantile, (words, mark, colour) in QUANTILES.items():
+        found = [metrics[f"error_m.{key}.{row}.{quantile}"] for row in rows]
+        points(axis, places, found, 1000, sideways=True, fmt=mark, color=colour, label=words)
+    for place, row in zip(places, rows, strict=True):
+        inside = f"{100 * metrics[f'coverage95.{key}.{row}'].value:.0f} %"
+        axis.text(1.02, place, inside, transform=across, fontsize=11, va="center", color="0.3")
+    axis.text(1.02, len(rows) - 0.4, "coverage", transform=across, fontsize=10, color="0.3")
+    axis.set_yticks(places, list(rows.values()))
+    axis.set_ylim(-0.7, len(rows) - 0.3)
+    axis.set_xscale("log")
+    plain_log(axis.xaxis)
+    label(axis, "error of a joint [mm]")
+    figure.legend(loc="outside lower center", ncols=2)
+    save(figure, path)

@@ -1,1 +1,0 @@
-"""What is played: settings, walks, eyes on them, sums of what was believed."""

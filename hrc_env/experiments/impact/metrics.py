@@ -1,0 +1,180 @@
+"""From sums of episodes to numbers: rows, rows beside the reference, what lateness costs.
+
+Lateness in metres is measured in two ways, both on the truth: in the belief, by how much the 95th
+percentile of believed less true separation grows; in the loop, by the margin that `scripted_slowed`
+has to add to its distances until no greater share of the stops that the truth calls for is missed
+than on time. Predicted as latency x (v_h + v_r), with the nominal speed of a worker and with the
+speeds that there were; and by what follows where lateness and other errors are independent: then
+their squares add up, and the robot's speed does not count, as its encoders are not late.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from hrc_env.core.results import Metric
+from hrc_env.core.skeleton import N_JOINTS
+from hrc_env.core.typing import Floats, Ints
+from hrc_env.experiments.impact.policies import SLOWED, Policy
+from hrc_env.experiments.impact.setups import LATE, REFERENCE, PerceptionSetup, setup_called
+from hrc_env.experiments.study.counts import ERRORS_M, GAPS_M, SPEEDS_MPS
+from hrc_env.experiments.study.intervals import (
+    bootstrap,
+    counted_quantile_over,
+    iqm_over,
+    mean_over,
+    ratio_over,
+)
+from hrc_env.experiments.study.report import Metrics
+
+Row = Mapping[str, list[Any]]
+Table = Mapping[tuple[str, str], Row]
+"""Rows by policy and setup."""
+NOMINAL_MPS = 1.6
+"""A worker's approach where it is not measured (ISO 13855, as in Marvel and Norcross 2017,
+PMC5117641; verify against the standard before certification) [m/s]."""
+A_MINUTE = {
+    "goals_per_min": "goals",
+    **{name: name for name in ("contacts_towards", "contacts_fleeing", "contacts_standing")},
+}
+"""What is counted a minute, and from which sum."""
+PER_1000 = (
+    "missed_stops", "false_stops", "called_stops", "missed_slowings", "false_slowings",
+    "called_slowings", "approaches",
+)  # fmt: skip
+"""What is counted in a thousand control steps."""
+QUANTILES = {
+    "z_d_m": (ERRORS_M, "error", 0.95, "m"),
+    "optimism_p50_m": (GAPS_M, "optimism", 0.5, "m"),
+    "optimism_p95_m": (GAPS_M, "optimism", 0.95, "m"),
+    "v_h_mps": (SPEEDS_MPS, "worker_speed", 0.95, "m/s"),
+    "v_r_mps": (SPEEDS_MPS, "robot_speed", 0.95, "m/s"),
+}
+COMPARED = {
+    "goals_per_min": "1/min", "cost": "per episode", "contacts_towards": "1/min",
+    "approaches": "per 1000 steps", "missed_stops": "per 1000 steps",
+    "false_stops": "per 1000 steps", "separation_min_m": "m",
+}  # fmt: skip
+"""What is compared with the reference, episode by episode, and its unit."""
+
+
+def metrics_of(table: Table, margins_m: Sequence[float]) -> dict[str, Metric]:
+    """By `<policy>.<setup>.<what>`, `difference.<policy>.<setup>.<what>` and
+    `lateness.<setup>.<how>`."""
+    metrics: dict[str, Metric] = {}
+    for (policy, setup), row in table.items():
+        for what, metric in _of_row(row).items():
+            metrics[f"{policy}.{setup}.{what}"] = metric
+        if setup != REFERENCE and (policy, REFERENCE) in table:
+            ours, theirs = _per_episode(row), _per_episode(table[policy, REFERENCE])
+            for what, unit in COMPARED.items():
+                off = ours[what] - theirs[what][: len(ours[what])]
+                metrics[f"difference.{policy}.{setup}.{what}"] = mean_over(off, unit)
+    for policy, name in table:
+        setup = setup_called(name)
+        on_time = replace(setup, latency_s=0.0, is_told=True).name
+        twin = on_time if (policy, on_time) in table else name
+        z_d, v_r = metrics[f"{policy}.{twin}.z_d_m"], metrics[f"{policy}.{name}.v_r_mps"]
+        metrics[f"{policy}.{name}.tax_m"] = _tax(setup.latency_s, z_d, v_r)
+    if (SLOWED, REFERENCE) in table:
+        for setup in LATE:
+            if (SLOWED, setup.name) in table:
+                for how, metric in _lateness(setup, table, metrics, margins_m).items():
+                    metrics[f"lateness.{setup.name}.{how}"] = metric
+    return metrics
+
+
+def _of_row(row: Row) -> dict[str, Metric]:
+    """What the episodes of a row came to."""
+    steps = _n_steps(row)
+    found = {
+        "separation_min_m": iqm_over(row["separation_min_m"], "m"),
+        "cost": mean_over(row["cost"], "per episode"),
+    }
+    for what, name in A_MINUTE.items():
+        found[what] = ratio_over(row[name], row["minutes"], "1/min")
+    for what in PER_1000:
+        found[what] = ratio_over(1000 * np.array(row[what]), steps, "per 1000 steps")
+    for what, (bins, name, q, unit) in QUANTILES.items():
+        found[what] = counted_quantile_over(bins, row[f"{name}_counts"], q, unit)
+    return found
+
+
+def _per_episode(row: Row) -> dict[str, Floats]:
+    """(n,) each: numbers that are compared, episode by episode."""
+    minutes, steps = np.array(row["minutes"]), _n_steps(row)
+    found = {what: np.array(row[what], float) for what in ("cost", "separation_min_m")}
+    found |= {what: np.array(row[name]) / minutes for what, name in A_MINUTE.items()}
+    return found | {what: 1000 * np.array(row[what]) / steps for what in PER_1000}
+
+
+def _n_steps(row: Row) -> Ints:
+    """(n,) control steps of every episode."""
+    return np.sum(row["error_counts"], axis=1) // N_JOINTS
+
+
+def _tax(latency_s: float, z_d: Metric, v_r: Metric) -> Metric:
+    """The separation tax Z_d + latency x (v_h + v_r) [m]: Z_d of the same setup on time, so that
+    nothing is counted twice; v_h is nominal, v_r what the robot did."""
+    value, low, high = (
+        getattr(z_d, end) + latency_s * (NOMINAL_MPS + getattr(v_r, end))
+        for end in ("value", "low", "high")
+    )
+    return Metric(value, low, high, "m", z_d.n)
+
+
+def _lateness(
+    setup: PerceptionSetup, table: Table, metrics: Metrics, margins_m: Sequence[float]
+) -> dict[str, Metric]:
+    """Extra metres of a late setup: predicted in three ways, measured in two."""
+    key, reference = f"{SLOWED}.{setup.name}", f"{SLOWED}.{REFERENCE}"
+    v_h, v_r = metrics[f"{key}.v_h_mps"].value, metrics[f"{key}.v_r_mps"].value
+    before, after = metrics[f"{reference}.optimism_p95_m"], metrics[f"{key}.optimism_p95_m"]
+    spread = before.value - metrics[f"{reference}.optimism_p50_m"].value
+    predicted = {
+        "nominal_m": setup.latency_s * (NOMINAL_MPS + v_r),
+        "speeds_here_m": setup.latency_s * (v_h + v_r),
+        "squares_m": float(np.hypot(spread, setup.latency_s * v_h)) - spread,
+    }
+    found = {how: Metric(m, m, m, "m", before.n) for how, m in predicted.items()}
+    found["belief_m"] = Metric(
+        after.value - before.value, after.low - before.high, after.high - before.low, "m", before.n
+    )
+    rows = [table.get((Policy(SLOWED, m).label, setup.name)) for m in (0.0, *margins_m)]
+    known = [row for row in rows if row is not None]
+    if len(known) == len(rows) > 1:
+        found["margin_m"] = margin_needed(
+            known, np.array([0.0, *margins_m]), table[SLOWED, REFERENCE]
+        )
+    return found
+
+
+def margin_needed(rows: Sequence[Row], margins_m: Floats, reference: Row) -> Metric:
+    """The margin with which no greater share of stops is missed than in the reference; the
+    interval draws seeds anew, all rows together."""
+    everybody = [*rows, reference]
+    missed, called = (
+        np.array([row[what] for row in everybody], float).T
+        for what in ("missed_stops", "called_stops")
+    )
+
+    def needed(weights: Ints) -> Floats:
+        share = np.nan_to_num((weights @ missed) / (weights @ called)).T
+        return _crossing(margins_m, share[:-1], share[-1])
+
+    return bootstrap(needed, len(missed), "m", 1000)
+
+
+def _crossing(x: Floats, y: Floats, level: Floats) -> Floats:
+    """Where falling values y (n, ...) at x (n,) first come down to a level (...): between the
+    two nearest linearly, the last x if they never do."""
+    reached = y <= level
+    first = np.where(reached.any(0), reached.argmax(0), len(x) - 1)
+    before = np.maximum(first - 1, 0)
+    high, low = (np.take_along_axis(y, k[None], 0)[0] for k in (before, first))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        into = np.clip((high - level) / (high - low), 0.0, 1.0)
+    into = np.where(first == before, 0.0, np.nan_to_num(into, nan=1.0))
+    return x[before] + into * (x[first] - x[before])

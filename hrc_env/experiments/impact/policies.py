@@ -1,0 +1,101 @@
+"""The policies that are given other perception: two scripted ones, and PPO, which learns here.
+
+The learner's libraries, which take seconds, are imported where somebody learns.
+"""
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from hrc_env.core.checkout import agents
+from hrc_env.core.machine import n_cores
+from hrc_env.experiments.impact.episodes import PEOPLE, SLOW_M, STOP_M, MakeAgent
+from hrc_env.experiments.study.cache import PartCache, PartProgress
+from hrc_env.simulation import Simulation
+
+SCRIPTED, SLOWED, PPO = "scripted", "scripted_slowed", "ppo"
+POLICIES = (SCRIPTED, SLOWED, PPO)
+"""Full speed whoever is near; slower by the estimated separation; trained."""
+SEED = 0
+"""Of the learner and of the environments that it learns in."""
+N_ENVS = 64
+PROXIMITY = 2.0
+"""Weight of closeness in the reward, as of `train.py`."""
+RAMP_SHARE = 0.5
+"""In this share of the steps that weight grows from 0."""
+
+
+@dataclass(frozen=True, slots=True)
+class Policy:
+    """A policy, and what it adds to the distances that it keeps."""
+
+    name: str
+    margin_m: float = 0.0
+
+    @property
+    def label(self) -> str:
+        """As parts and results are called."""
+        if self.margin_m == 0:
+            return self.name
+        return f"{self.name}_plus_{round(1000 * self.margin_m)}mm"
+
+
+def maker(policy: Policy, checkpoint: Path) -> MakeAgent:
+    """What makes the agent for a robot."""
+
+    def make(part: Simulation) -> Any:
+        env_info = agents("env_info").env_info(part)
+        if policy.name == SLOWED:
+            scripted = agents("scripted")
+            yielding = scripted.Yielding(STOP_M + policy.margin_m, SLOW_M + policy.margin_m)
+            return scripted.expert(env_info, yielding)
+        name = str(checkpoint) if policy.name == PPO else policy.name
+        return agents("registry").make_agent(name, env_info)
+
+    return make
+
+
+def trained(cache: PartCache, n_steps: int, path: Path, key: str) -> str:
+    """The digest of PPO's checkpoint: of the one that is there, or of a new one where it is not
+    what the part says."""
+    for _ in range(2):
+        part = cache.part(PPO, lambda tick: _train(n_steps, path, tick), key)
+        if path.exists() and _digest(path) == part["sha256"]:
+            break
+        (cache.folder / f"{PPO}.json").unlink(missing_ok=True)
+    return part["sha256"]
+
+
+def _train(n_steps: int, path: Path, tick: PartProgress) -> dict[str, Any]:
+    """Learn on the camera emulator with the default estimator; write the checkpoint."""
+    ppo, callbacks = agents("ppo"), agents("callbacks")
+    import torch
+    from stable_baselines3.common.callbacks import ConvertCallback
+
+    from hrc_env.sb3 import HRCVecEnv
+
+    def advance(*_: Any) -> bool:
+        tick(N_ENVS / n_steps)
+        return True
+
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)  # more are slower in networks as small as these
+    env = HRCVecEnv(
+        N_ENVS, stagger=True, seed=SEED, perception="keypoints", estimator="particle",
+        people=PEOPLE, config={"reward": {"proximity": PROXIMITY}}, num_threads=n_cores(),
+    )  # fmt: skip
+    try:
+        learner = ppo.make_learner(env, ppo.PPOSettings(), SEED)
+        ramp = callbacks.Ramp(round(RAMP_SHARE * n_steps))
+        care = callbacks.ProximityCurriculum(ramp, env)
+        learner.learn(n_steps, callback=[care, ConvertCallback(advance)])
+        ppo.save(learner, path, {"people": PEOPLE, "seed": SEED})
+    finally:
+        env.close()
+        torch.set_num_threads(threads)
+    return {"sha256": _digest(path), "n_steps": learner.num_timesteps}
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()

@@ -1,0 +1,115 @@
+"""The perception setups that are exchanged: level, estimator, cameras, lateness."""
+
+from dataclasses import dataclass
+
+from hrc_env.core.errors import unknown
+from hrc_env.experiments.study.rigs import (
+    ALL,
+    OPPOSITE,
+    SINGLE,
+    TRIPLES,
+    WARM_UP_S,
+    Turn,
+    late,
+    left_with,
+)
+from hrc_env.scene.rigs import RIGS
+from hrc_env.tracking.estimators import ESTIMATORS
+
+RIGS_OF = {4: (ALL,), 3: TRIPLES, 2: (*OPPOSITE, (0, 1), (2, 3)), 1: SINGLE}
+"""By how many cameras there are; episodes take turns in them."""
+
+
+@dataclass(frozen=True, slots=True)
+class PerceptionSetup:
+    """How a robot perceives."""
+
+    level: str = "keypoints"
+    estimator: str = "particle"
+    n_cameras: int = 4
+    """That are left after the warm-up."""
+    latency_s: float = 0.0
+    """From taking an image to having it [s]."""
+    is_told: bool = True
+    """Whether images say when they were taken; if not, they claim to be new."""
+    is_alone: bool = False
+    """Whether the other cameras were never there."""
+
+    @property
+    def name(self) -> str:
+        """As in results.json."""
+        if self.level in ("truth", "none"):
+            return self.level
+        name = f"{self.level}_{self.estimator}_{self.n_cameras}cam_{1000 * self.latency_s:.0f}ms"
+        return name + ("" if self.is_told else "_untold") + ("_alone" if self.is_alone else "")
+
+    @property
+    def words(self) -> str:
+        """As in tables and figures."""
+        if self.level in ("truth", "none"):
+            return self.level
+        words = ["pixels"] if self.level == "pixels" else []
+        words += [self.estimator, f"{self.n_cameras} camera{'s' if self.n_cameras > 1 else ''}"]
+        if self.n_cameras < 4:
+            words[-1] += " from the start" if self.is_alone else f" after {WARM_UP_S:g} s"
+        if self.latency_s:
+            words.append(f"{1000 * self.latency_s:.0f} ms late{'' if self.is_told else ', untold'}")
+        return ", ".join(words)
+
+    @property
+    def is_blind(self) -> bool:
+        """Whether nobody is ever tracked: one camera begins no track."""
+        return self.level == "none" or self.is_alone
+
+    @property
+    def turns(self) -> tuple[Turn, ...]:
+        """Cameras and their faults, in which episodes take turns."""
+        rig = RIGS["lab"]
+        turns = (
+            Turn(tuple(rig[c] for c in kept)) if self.is_alone else left_with(rig, kept)
+            for kept in RIGS_OF[self.n_cameras]
+        )
+        return tuple(late(turn, self.latency_s, self.is_told) for turn in turns)
+
+
+LATE_S = (0.12, 0.2)
+"""How late images are [s]: three and five control steps."""
+LATE = tuple(PerceptionSetup(latency_s=s, is_told=told) for told in (True, False) for s in LATE_S)
+"""Late images of four cameras: those that say how late they are, and those that do not."""
+ON_REQUEST = ("ransac",)
+"""Estimators that are compared on request only."""
+REFERENCE = PerceptionSetup().name
+"""What everybody is compared with."""
+
+
+def all_setups() -> dict[str, PerceptionSetup]:
+    """By name, with every estimator that is registered now; the slowest last."""
+    setups = (
+        PerceptionSetup("truth"),
+        PerceptionSetup("none"),
+        *(PerceptionSetup(estimator=name) for name in ESTIMATORS),
+        *(PerceptionSetup(n_cameras=n) for n in (3, 2, 1)),
+        PerceptionSetup(n_cameras=1, is_alone=True),
+        *LATE,
+        *(PerceptionSetup(n_cameras=1, latency_s=s) for s in LATE_S),
+        PerceptionSetup("pixels"),
+    )
+    return {each.name: each for each in setups}
+
+
+def usual_setups() -> tuple[str, ...]:
+    """The names of those that are compared if nobody asks for others."""
+    left_out = {PerceptionSetup(estimator=name).name for name in ON_REQUEST}
+    return tuple(name for name in all_setups() if name not in left_out)
+
+
+def setup_called(name: str) -> PerceptionSetup:
+    """A setup by name.
+
+    Raises:
+        ConfigError: there is none of that name.
+    """
+    setups = all_setups()
+    if name not in setups:
+        raise unknown("perception setup", name, setups)
+    return setups[name]

@@ -1,0 +1,64 @@
+"""What figures of all studies share: paper, error bars, axes, saving."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from hrc_env.core.results import Metric
+from hrc_env.core.typing import Floats
+
+
+def new_figure(width_in: float, height_in: float) -> Figure:
+    """An empty figure that finds room for what is drawn."""
+    return Figure(figsize=(width_in, height_in), layout="constrained")
+
+
+def save(figure: Figure, path: Path, dpi: int = 110) -> None:
+    """Write a PNG; its folder is made."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    FigureCanvasAgg(figure)
+    figure.savefig(path, dpi=dpi)
+
+
+def ends(metrics: Sequence[Metric], scale: float = 1.0) -> Floats:
+    """(2, n) how far the intervals go to either side of the values."""
+    return scale * np.abs([[m.value - m.low, m.high - m.value] for m in metrics]).T
+
+
+def points(
+    axis: Axes, x: Sequence[float] | Floats, metrics: Sequence[Metric], scale: float = 1.0,
+    sideways: bool = False, **style: Any,
+) -> None:  # fmt: skip
+    """Values with intervals, above x or, sideways, beside it."""
+    values, bars = [scale * each.value for each in metrics], ends(metrics, scale)
+    style = {"fmt": "o", "capsize": 3} | style
+    if sideways:
+        axis.errorbar(values, x, xerr=bars, **style)
+    else:
+        axis.errorbar(x, values, yerr=bars, **style)
+
+
+def label(axis: Axes, x: str = "", y: str = "", title: str = "", grid: str = "both") -> None:
+    """Words at an axis, and a pale grid behind what is drawn."""
+    axis.set_xlabel(x, fontsize=12)
+    axis.set_ylabel(y, fontsize=12)
+    axis.set_title(title, fontsize=13)
+    axis.grid(True, axis=grid, color="0.9")  # type: ignore[arg-type]
+    axis.set_axisbelow(True)
+
+
+def plain_log(axis: Axis) -> None:
+    """A logarithmic axis with plain numbers, as many as have room; call it when all is drawn."""
+    low, high = axis.get_view_interval()
+    span = np.log10(high / low)
+    fine = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0) if span < 0.9 else (1.0, 2.0, 5.0)
+    axis.set_major_locator(LogLocator(10, subs=fine if span < 2.5 else (1.0,)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,g}"))
+    axis.set_minor_formatter(NullFormatter())

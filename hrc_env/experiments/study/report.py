@@ -1,0 +1,139 @@
+"""A report: pictures, tables, and what each column means; as HTML, Markdown and results.json."""
+
+import base64
+import html
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from markdown_it import MarkdownIt
+
+from hrc_env.core.provenance import provenance
+from hrc_env.core.results import Metric, write_results, write_whole
+
+_STYLE = """
+body { font: 17px/1.55 system-ui, sans-serif; color: #1c2430; max-width: 66rem;
+       margin: 2.5rem auto; padding: 0 1.2rem; }
+h2 { margin-top: 2.6rem; } img { max-width: 100%; height: auto; }
+table { border-collapse: collapse; display: block; overflow-x: auto; font-size: .92rem;
+        font-variant-numeric: tabular-nums; }
+th, td { padding: .25rem .55rem; border-bottom: 1px solid #d8dde6; text-align: right; }
+td { white-space: nowrap; } td:first-child, th:first-child { text-align: left; }
+code { background: #f0f2f6; padding: .1rem .3rem; border-radius: 3px; }
+"""
+Metrics = Mapping[str, Metric]
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A column of a table of metrics."""
+
+    key: str
+    """Of the metric, with `{}` for the row's."""
+    words: str
+    digits: int = 1
+    scale: float = 1.0
+    signed: bool = False
+    """Whether it is a difference; one whose interval leaves out zero has a dot."""
+
+    def cell(self, metrics: Metrics, row: str) -> str:
+        """The number with its interval; a dash where there is none."""
+        metric = metrics.get(self.key.format(row))
+        if metric is None:
+            return "-"
+        return said(metric, self.scale, self.digits, self.signed)
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Words and numbers in rows; the first column says what the row is."""
+
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+    def markdown(self) -> str:
+        """As it stands in report.md."""
+        lines = [self.header, ("---", *("---:" for _ in self.header[1:])), *self.rows]
+        return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A PNG beside the report and what it shows."""
+
+    path: Path
+    caption: str
+
+    def markdown(self) -> str:
+        """As it stands in report.md."""
+        return f"![{self.caption}](figures/{self.path.name})\n\n*{self.caption}*"
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """What a study found."""
+
+    title: str
+    asked: str
+    """The question and how it is answered."""
+    parts: Sequence[str | Table | Picture]
+    """In the order of reading: paragraphs and headings of Markdown, tables, pictures."""
+
+    def write(
+        self, out: Path, settings: Mapping[str, Any], seeds: Sequence[int], metrics: Metrics
+    ) -> None:
+        """Write results.json, report.md and report.html, which holds its pictures, into `out`."""
+        write_results(out / "results.json", settings, seeds, metrics)
+        origin = f"Commit {provenance()['git']}, seeds {min(seeds)} to {max(seeds)}; "
+        origin += "numbers are given with 95 % intervals over seeds, all of them in results.json."
+        blocks = [f"# {self.title}", self.asked, *map(_markdown, self.parts), origin]
+        text = "\n\n".join(blocks) + "\n"
+        write_whole(out / "report.md", text)
+        body = MarkdownIt("commonmark", {"html": False}).enable("table").render(text)
+        body = re.sub(r'src="([^"]+)"', lambda found: f'src="{_embedded(out, found[1])}"', body)
+        page = (
+            '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+            f"<title>{html.escape(self.title)}</title><style>{_STYLE}</style></head>"
+            f"<body>{body}</body></html>"
+        )
+        write_whole(out / "report.html", page)
+
+
+def table_of(
+    name: str, rows: Mapping[str, str], columns: Sequence[Column], metrics: Metrics
+) -> Table:
+    """A table of metrics.
+
+    Args:
+        name: of the first column.
+        rows: by the part of the metrics' keys that stands for a row: what it is called.
+        columns: the others.
+        metrics: the numbers.
+    """
+    lines = ((words, *(each.cell(metrics, row) for each in columns)) for row, words in rows.items())
+    return Table((name, *(each.words for each in columns)), tuple(lines))
+
+
+def said(metric: Metric, scale: float = 1.0, digits: int = 1, signed: bool = False) -> str:
+    """A number with its interval, as tables show it."""
+    if metric.value != metric.value:
+        return "-"
+    sign = "+" if signed else ""
+    value, low, high = (
+        f"{scale * each:{sign},.{digits}f}" for each in (metric.value, metric.low, metric.high)
+    )
+    interval = "" if low == high else f" ({low} to {high})" if signed else f" ({low}-{high})"
+    dot = " ●" if signed and (metric.low > 0 or metric.high < 0) else ""
+    return value + interval + dot
+
+
+def _markdown(part: str | Table | Picture) -> str:
+    return part if isinstance(part, str) else part.markdown()
+
+
+def _embedded(out: Path, source: str) -> str:
+    """A picture's file as a data URI."""
+    data = base64.b64encode((out / source).read_bytes()).decode()
+    return f"data:image/png;base64,{data}"

@@ -1,0 +1,43 @@
+"""Beliefs that no camera made: the truth itself, and the prior.
+
+This is the one place where truth becomes belief (perception level `truth`, for teaching and
+for upper bounds). The prior is what is believed at the level `none`, and by every estimator
+before it has seen anything.
+"""
+
+import numpy as np
+
+from hrc_env.core.records import PoseEstimate, WorkerTruth
+from hrc_env.core.skeleton import N_JOINTS
+from hrc_env.tracking.config import TrackerConfig
+
+ORACLE_STD_M = 1e-3
+"""Standard deviation that is reported with the truth [m]: small, and invertible."""
+
+
+def estimate_from_truth(truth: WorkerTruth) -> PoseEstimate:
+    """The truth as an estimate: (B, W, J, ...) arrays, age 0, tracked."""
+    shape = truth.joints_world.shape[:-1]
+    return PoseEstimate(
+        mean_world=truth.joints_world.copy(),
+        cov_world=np.full((*shape, 3, 3), ORACLE_STD_M**2 * np.eye(3)),
+        velocity_world=truth.velocity_world.copy(),
+        age_s=np.zeros(shape),
+        tracked=np.ones(shape[:-1], bool),
+    )
+
+
+def prior(batch: int, n_workers: int, config: TrackerConfig) -> PoseEstimate:
+    """What is believed of workers that nobody has seen.
+
+    Every joint is at `prior_mean_world` with `prior_std_m` on each axis, at rest, as old as
+    ages get, and not tracked.
+    """
+    shape = (batch, n_workers, N_JOINTS)
+    return PoseEstimate(
+        mean_world=np.tile(np.array(config.prior_mean_world, float), (*shape, 1)),
+        cov_world=np.tile(config.prior_std_m**2 * np.eye(3), (*shape, 1, 1)),
+        velocity_world=np.zeros((*shape, 3)),
+        age_s=np.full(shape, config.max_age_s),
+        tracked=np.zeros(shape[:-1], bool),
+    )
