@@ -10,8 +10,7 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.records import PoseEstimate, RobotState
 from hrc_env.core.skeleton import SEGMENT_RADIUS_M
 from hrc_env.core.typing import Floats
-from hrc_env.geometry.distances import Separation, least_separation
-from hrc_env.geometry.segments import segments
+from hrc_env.geometry.distances import Separation, least_separation, segments
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +33,7 @@ def estimated_separation(robot: RobotState, estimate: PoseEstimate) -> Separatio
     """(B, W) narrowest place between the robot's capsules and each estimated body.
 
     The body is made of the segments between the estimated joints with radii, the hands
-    included (`geometry.segments`). A worker without a track is infinitely far: there is
+    included (`geometry.distances`). A worker without a track is infinitely far: there is
     nothing to keep away from that the robot knows of.
     """
     bodies = segments(estimate.mean_world)

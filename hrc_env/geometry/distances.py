@@ -9,12 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Capsules, Floats, Points3
+from hrc_env.core.skeleton import HAND_SEGMENTS, SEGMENT_ENDS, SEGMENT_RADIUS_M
+from hrc_env.core.typing import Capsules, Floats, Ints, Points3
 
 SLACK_M = 1e-9
 """Far more than the rounding of a sphere's bound."""
 _PARALLEL = 1e-13
 """Squared sine of an angle between segments that are parallel: a micrometre over their length."""
+_ENDS: Ints = np.array([[(e[0], e[-1]) for e in ends[:2]] for ends in SEGMENT_ENDS])
+"""(K, 2, 2) the two joints whose mean is each end (one twice where it is a joint itself)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,3 +125,31 @@ def _bound(a, k, b, m):
     """The gap of two spheres."""
     dx, dy, dz = b[0, m] - a[0, k], b[1, m] - a[1, k], b[2, m] - a[2, k]
     return math.sqrt(dx * dx + dy * dy + dz * dz) - a[3, k] - b[3, m]
+
+
+def segments(joints_world: Floats) -> Floats:
+    """(..., 16, 2, 3) end points of a body's segments, the hands last, of joints (..., 15, 3) [m];
+    radii are `SEGMENT_RADIUS_M`."""
+    flat = _flat(joints_world, 2)
+    ends = np.empty((len(flat), len(SEGMENT_RADIUS_M), 2, 3))
+    _segments(flat, ends)
+    return ends.reshape(*joints_world.shape[:-2], *ends.shape[1:])
+
+
+@kernel
+def _segments(joints, ends):
+    for b in range(joints.shape[0]):
+        for k in range(len(_ENDS)):
+            for e in range(2):
+                first, second = joints[b, _ENDS[k, e, 0]], joints[b, _ENDS[k, e, 1]]
+                for i in range(3):
+                    ends[b, k, e, i] = 0.5 * (first[i] + second[i])
+        for h in range(len(HAND_SEGMENTS)):
+            elbow, wrist = joints[b, HAND_SEGMENTS[h][0]], joints[b, HAND_SEGMENTS[h][1]]
+            squared, k = 0.0, len(_ENDS) + h
+            for i in range(3):
+                squared += (wrist[i] - elbow[i]) ** 2
+            share = HAND_SEGMENTS[h][2] / max(math.sqrt(squared), 1e-6)
+            for i in range(3):
+                ends[b, k, 0, i] = wrist[i]
+                ends[b, k, 1, i] = wrist[i] + share * (wrist[i] - elbow[i])

@@ -13,7 +13,7 @@ from hrc_env.core.typing import Bools, Floats, Image, Ints
 from hrc_env.geometry.cameras import projections
 from hrc_env.perception.faults.schedule import Recent, Schedule
 from hrc_env.perception.lensed import pinhole_keypoints
-from hrc_env.perception.offsets import our_joints
+from hrc_env.perception.noise import our_joints
 from hrc_env.pipeline.sensor_input import Generators, SensorInput, Windows
 from hrc_env.scene.build import Scene
 from hrc_env.scene.domain_randomization import Look
