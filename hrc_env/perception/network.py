@@ -15,7 +15,6 @@ from hrc_env.perception.weights import find_weights
 
 DETECTOR_SIDE = 224
 LANDMARK_SIDE = 256
-
 NETWORKS = ("lite", "full", "heavy")
 """Landmark networks, from quick to exact."""
 DETECTOR_OUTPUTS = ("Identity", "Identity_1")
@@ -24,7 +23,6 @@ LANDMARK_OUTPUTS = ("Identity", "Identity_1", "Identity_3")
 """Landmarks (1, 195), person flag (1, 1), heatmap (1, 64, 64, 39) in the official graph."""
 RUNTIMES = ("litert", "openvino", "auto")
 """LiteRT, the default; OpenVINO, an extra; OpenVINO where it is installed, else LiteRT."""
-
 PersonDetector: TypeAlias = Callable[[Tensor], tuple[Tensor, Tensor]]
 """(224, 224, 3) in [-1, 1] -> boxes (2254, 12), score logits (2254,)."""
 Landmarker: TypeAlias = Callable[[Tensor], tuple[Tensor, float, Tensor]]

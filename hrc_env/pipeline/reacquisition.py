@@ -24,7 +24,6 @@ FOLLOWED = 5
 """Steps for which it then looks there: estimators begin anew after three that contradict them."""
 ENOUGH = 2
 """So many cameras that show a worker hold the track where it is."""
-
 Views = list[Roi | None]
 """A window a camera."""
 
