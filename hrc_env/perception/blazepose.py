@@ -12,8 +12,7 @@ import numpy as np
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Roi
-from hrc_env.core.typing import Floats, Image, Points2
-from hrc_env.perception.litert import Tensor
+from hrc_env.core.typing import Floats, Image, Points2, Tensor
 from hrc_env.perception.network import DETECTOR_SIDE, LANDMARK_SIDE
 
 MIN_SCORE = 0.5

@@ -10,12 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hrc_env.core.errors import ConfigError, check_shape
 from hrc_env.core.records import Keypoints, WorkerTruth
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Floats, Ints
+from hrc_env.core.typing import Floats, Ints, Records
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.geometry.lens import lens_row
 from hrc_env.geometry.sight import Surroundings
@@ -79,7 +78,7 @@ class EmulatorConfig:
 class EmulatorState:
     """What the detector's errors remember from image to image, in standard deviations."""
 
-    errors: NDArray[np.void]  # (B, C, W) `emulator_kernel.ERRORS`
+    errors: Records  # (B, C, W) `emulator_kernel.ERRORS`
     wander: Floats  # (B, W, J, 3) the same in every camera, a joint's own: ahead, aside, up
     dt_s: float  # time between images [s]
 
@@ -175,7 +174,7 @@ def without_names(keypoints: Keypoints, rngs: Generators) -> Keypoints:
 
 
 @functools.lru_cache(maxsize=16)
-def _rig(cameras: tuple[PinholeCamera, ...]) -> NDArray[np.void]:
+def _rig(cameras: tuple[PinholeCamera, ...]) -> Records:
     """(C,) `CAMERA`."""
     rig = np.zeros(len(cameras), CAMERA)
     for row, camera in zip(rig, cameras, strict=True):
@@ -188,9 +187,7 @@ def _rig(cameras: tuple[PinholeCamera, ...]) -> NDArray[np.void]:
 
 
 @functools.lru_cache(maxsize=16)
-def _settings(
-    config: EmulatorConfig, dt_s: float, written_ns: int
-) -> tuple[Floats, NDArray[np.void]]:
+def _settings(config: EmulatorConfig, dt_s: float, written_ns: int) -> tuple[Floats, Records]:
     """A calibration as the kernel takes it: (P, N) postures, (1,) `SETTINGS`; read again if its
     file has been written anew."""
     known = config.calibrated()
