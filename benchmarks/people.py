@@ -23,8 +23,7 @@ from hrc_env.geometry import chains
 from hrc_env.geometry.distances import least_separation
 from hrc_env.geometry.shapes import AXES, BOX, CAPSULE, CENTRE, HALF_SIZE, KIND, PLANE, REACH
 from hrc_env.motion import generator
-from hrc_env.motion.plans import CLIMB
-from hrc_env.motion.state import GOING, SPOT_X, SPOT_Y, THERE
+from hrc_env.motion.state import CLIMB, THERE
 from hrc_env.scene.build import Scene, build
 from hrc_env.worker.body import pool, stack, worker_truth
 
@@ -152,7 +151,7 @@ def _some(scene: Scene, first: int, batch: int, arguments: Arguments, notes: Not
         generator.watch(state, robot, motion, CTRL_DT_S)
         spent += time.thread_time() - began
         notes.nans += int(not np.isfinite(motion.position_world).all())
-        stuck.look(motion.position_world[:, :, 0, :2], state.errand[..., GOING] != THERE)
+        stuck.look(motion.position_world[:, :, 0, :2], state.workers["going"] != THERE)
         if step % LOOK_EVERY == 0:
             _measure(scene, body, motion, solids, state, deepest, notes)
     notes.in_solids_m += deepest[0].tolist()
@@ -180,17 +179,19 @@ def _measure(scene, body, motion, solids, state, deepest, notes) -> None:
     truth = worker_truth(body, motion)
     capsules, radius = truth.capsules_world, truth.capsule_radius_m
     names = generator.activity_names
-    for doing in state.activity.ravel().tolist():
+    for doing in state.workers["activity"].ravel().tolist():
         notes.doing[names[doing]] += 1
     feet = np.array(["foot" in part or "toes" in part for part in body.capsule_names])
-    depth, part, solid = _in_solids(capsules, radius, solids, state.activity == CLIMB, feet)
+    depth, part, solid = _in_solids(
+        capsules, radius, solids, state.workers["activity"] == CLIMB, feet
+    )
     worst = depth.max(1)
     for b in np.flatnonzero(worst > DEEPEST_M):
         w = int(depth[b].argmax())
-        what = names[state.activity[b, w]]
+        what = names[state.workers["activity"][b, w]]
         if worst[b] > notes.worst.get(what, (0.0, ""))[0]:
             at = np.round(solids[solid[b, w], CENTRE : CENTRE + 3], 2).tolist()
-            spot = np.round(state.spots[b, w, [SPOT_X, SPOT_Y]], 2).tolist()
+            spot = np.round(state.workers["spot"][b, w, :2], 2).tolist()
             part_name = body.capsule_names[part[b, w]]
             notes.worst[what] = worst[b], f"{part_name}, place {spot}, solid at {at}"
     deepest[0] = np.maximum(deepest[0], worst)
@@ -205,7 +206,7 @@ def _measure(scene, body, motion, solids, state, deepest, notes) -> None:
                 capsules[near, i], radius[near, i], capsules[near, j], radius[near, j]
             ).distance_m
             k = int(gap.argmax())
-            both = " beside ".join(names[state.activity[near[k], w]] for w in (i, j))
+            both = " beside ".join(names[state.workers["activity"][near[k], w]] for w in (i, j))
             if gap[k] > max(DEEPEST_M, notes.worst.get(both, (0.0, ""))[0]):
                 apart = float(np.linalg.norm(root[near[k], i] - root[near[k], j]))
                 notes.worst[both] = float(gap[k]), f"{apart:.2f} m apart"

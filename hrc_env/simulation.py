@@ -118,8 +118,10 @@ class Simulation(Stateful):
             for name, stream in zip(STREAMS, children(rng, len(STREAMS)), strict=True):
                 streams[name][b] = stream
         generator.reset(self.motion, ids, streams["motion"])
-        bodies = self.motion.body[ids]
-        self.body_names[ids] = body_names(bodies, self.motion.present[ids] > 0.0, self.bodies.names)
+        bodies = self.motion.workers["body"][ids]
+        self.body_names[ids] = body_names(
+            bodies, self.motion.workers["present"][ids], self.bodies.names
+        )
         self.physics.reset(ids, self._starting_angles(ids), bodies)
         self.action[ids], self.episode_cost[ids], self.separation_m[ids] = 0.0, 0.0, 0.0
         robot = chains.robot_state(self.chain, self.physics.q[ids], self.physics.qd[ids])
@@ -251,7 +253,7 @@ class Simulation(Stateful):
         """Let the pipeline look at environments `ids`: their rows of `estimates`."""
         now = SensorInput(ids, self.physics.q[ids], motion)
         if self.pipeline.NEEDS_TRUTH:
-            now = TrueSensorInput(ids, now.q, motion, truth, self.motion.present[ids] > 0.0)
+            now = TrueSensorInput(ids, now.q, motion, truth, self.motion.workers["present"][ids])
         sensor, tracker = (picked(self.streams[name], ids) for name in ("sensor", "tracker"))
         estimate = self.pipeline.perceive(now, sensor, tracker)
         later = (self.pipeline.forecast(estimate, ids, t) for t in self.config.forecast_s)

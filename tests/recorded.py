@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 
 from hrc_env.motion import generator
-from hrc_env.motion import plans as pl
-from hrc_env.motion.posture import STANCE_HALF_WIDTH_M
-from hrc_env.motion.walk import footprint, plan_walk
+from hrc_env.motion import state as st
+from hrc_env.motion.blending import settle
+from hrc_env.motion.walk import plan_walk
 from hrc_env.worker.body import load_body
 
 DT_S = 0.02
@@ -35,17 +35,24 @@ def started(batch, n_workers=1, seed=0, config=None):
     return state, rngs
 
 
+def standing(state, x_m=0.0, yaw_rad=0.0):
+    """The first worker at a point of the x axis, with nothing planned."""
+    me = state.workers[0, 0]
+    me["load_prop"] = me["step_count"] = me["undo_at"] = 0
+    settle(x_m, 0.0, yaw_rad, me)
+    return me
+
+
+def begin(me, activity, lasts):
+    """Let the worker do what was planned."""
+    me["activity"], me["time_s"], me["duration_s"], me["blend"] = activity, 0.0, lasts, 0.0
+
+
 def walk_straight(speed_m_s, length_m=6.0, dt_s=0.005):
     """A walk along +x, alone: its plan, footprints and motion."""
     state, rngs = started(1)
-    plan, prints, stance = state.plan[0, 0], state.prints[0, 0], state.stance[0, 0]
-    size = state.anatomy.size[0]
-    plan[:] = 0.0
-    for side in range(2):
-        footprint(side, 0.0, 0.0, 0.0, STANCE_HALF_WIDTH_M, size, stance[side])
+    me = standing(state)
     start, via, end = (0.0, 0.0, 0.0), np.zeros((0, 3)), (length_m, 0.0, 0.0)
-    lasts = plan_walk(start, via, end, speed_m_s, plan, prints, stance, size)
-    state.activity[:], state.time_s[:], state.duration_s[:] = pl.WALK, 0.0, lasts
-    state.offset[:] = 0.0
-    motion = watched(state, rngs, dt_s, int(lasts / dt_s) - 1)
-    return SimpleNamespace(motion=motion, plan=plan, prints=prints, dt_s=dt_s)
+    begin(me, st.WALK, plan_walk(start, via, end, speed_m_s, me))
+    motion = watched(state, rngs, dt_s, int(me["duration_s"] / dt_s) - 1)
+    return SimpleNamespace(motion=motion, plan=me, prints=me["prints"], dt_s=dt_s)

@@ -11,7 +11,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.old_names import OLD_NAMES, Named
 from hrc_env.env import HRCEnv
 from hrc_env.motion.clip import Clip
-from hrc_env.motion.people import PEOPLE
+from hrc_env.motion.config import PEOPLE
 from hrc_env.scene.domain_randomization import APPEARANCES
 from hrc_env.scene.rigs import RIGS
 

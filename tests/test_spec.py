@@ -12,7 +12,7 @@ from hrc_env.geometry.camera_config import made, write_rig
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import STAND_Z, anatomies
 from hrc_env.motion.clip import Clip, save_clip
-from hrc_env.motion.people import PeopleConfig
+from hrc_env.motion.config import PeopleConfig
 from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.scene.domain_randomization import AS_BUILT, AppearanceConfig
 from hrc_env.scene.rig import LAB_CAMERAS

@@ -24,7 +24,7 @@ from hrc_env.worker.body import (
     worker_names,
     worker_truth,
 )
-from hrc_env.worker.mesh import SkinLooks, load_looks
+from hrc_env.worker.mesh import SkinMesh, load_mesh
 
 sys.path.insert(0, str(assets_dir() / "workers"))
 from recipes import RECIPES
@@ -42,21 +42,21 @@ def outside_m(points: np.ndarray, ends: np.ndarray, radius_m: np.ndarray) -> np.
 
 def surface(name: str) -> np.ndarray:
     """(V, 3) everything of a worker that can be seen, at rest."""
-    body, looks = load_body(name), load_looks(name)
+    body, looks = load_body(name), load_mesh(name)
     parts = [skin.vertices for skin in looks.skins]
     if looks.hat is not None:
         parts.append(looks.hat.vertices + body.rest_position[SEGMENT["head"]])
     return np.vstack(parts)
 
 
-def skinned(skin: SkinLooks, rest: np.ndarray, motion: WorkerMotion) -> np.ndarray:
+def skinned(skin: SkinMesh, rest: np.ndarray, motion: WorkerMotion) -> np.ndarray:
     """(V, 3) vertices moved by segments (S, ...): linear blend skinning, as MuJoCo does it."""
     turn = matrix_from_quaternion(motion.quaternion_wxyz)
     moved = np.einsum("sij,vsj->vsi", turn, skin.vertices[:, None] - rest) + motion.position_world
     return np.einsum("vs,vsi->vi", skin.weights, moved)
 
 
-def spread_over(skin: SkinLooks) -> np.ndarray:
+def spread_over(skin: SkinMesh) -> np.ndarray:
     """Points on every triangle, at most a third of an edge apart."""
     shares = [(a / 3, b / 3, 1 - (a + b) / 3) for a in range(4) for b in range(4 - a)]
     corners = skin.vertices[skin.faces]
@@ -65,7 +65,7 @@ def spread_over(skin: SkinLooks) -> np.ndarray:
 
 @pytest.mark.parametrize("name", worker_names())
 def test_a_body_is_as_tall_as_its_recipe_says(name):
-    body, head = load_body(name), load_looks(name).skins[0]
+    body, head = load_body(name), load_mesh(name).skins[0]
     assert body.stature_m == pytest.approx(RECIPES[name].stature_m, abs=0.01)
     soles_and_hair = head.vertices[:, 2].max() - body.stature_m
     assert 0.0 < soles_and_hair < 0.03
@@ -75,7 +75,7 @@ def test_a_body_is_as_tall_as_its_recipe_says(name):
 
 @pytest.mark.parametrize("name", worker_names())
 def test_hat_or_none_is_as_in_the_recipe(name):
-    assert (load_looks(name).hat is not None) == RECIPES[name].hat
+    assert (load_mesh(name).hat is not None) == RECIPES[name].hat
 
 
 @pytest.mark.parametrize("name", worker_names())
@@ -121,7 +121,7 @@ def test_left_and_right_measure_the_same(name):
 
 @pytest.mark.parametrize("name", worker_names())
 def test_what_one_sees_is_symmetric_to_some_millimetres(name):
-    for skin in load_looks(name).skins:
+    for skin in load_mesh(name).skins:
         points = spread_over(skin)
         away, _ = cKDTree(points).query(points * MIRRORED_Y)
         assert np.quantile(away, 0.95) < 0.012, "the points lie up to 2 cm apart"
@@ -130,7 +130,7 @@ def test_what_one_sees_is_symmetric_to_some_millimetres(name):
 @pytest.mark.parametrize("name", worker_names())
 def test_a_worker_of_this_body_has_the_soles_on_the_floor(name):
     body = load_body(name)
-    boots = load_looks(name).skins[1]
+    boots = load_mesh(name).skins[1]
     state = generator.make_state(3, 1, body, generator.MotionConfig())
     generator.reset(state, np.arange(3), [np.random.default_rng(seed) for seed in range(3)])
     everyone = generator.current(state)
@@ -145,7 +145,7 @@ def test_a_worker_of_this_body_has_the_soles_on_the_floor(name):
             assert abs(vertices[foot, 2].min()) < 0.005
 
 
-def _of_foot(boots: SkinLooks, side: str) -> np.ndarray:
+def _of_foot(boots: SkinMesh, side: str) -> np.ndarray:
     mine = [SEGMENT[f"{side}_{part}"] for part in ("foot", "toes")]
     return boots.weights[:, mine].sum(1) > 0.5
 

@@ -12,8 +12,7 @@ from hrc_env.core.records import Held, WorkerMotion
 from hrc_env.core.typing import Floats, JointAngles
 from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.motion.floorplan import BODY_M, STAND_M, floorplan, slack_at
-from hrc_env.motion.repertoire import REPERTOIRE, perform
-from hrc_env.motion.solo import Film, alone
+from hrc_env.motion.repertoire import REPERTOIRE, Film, alone, perform
 from hrc_env.scene.build import SCENES, Scene, SceneConfig, build
 from hrc_env.worker.body import Body, load_body, worker_names
 

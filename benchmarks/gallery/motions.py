@@ -8,8 +8,7 @@ import numpy as np
 from benchmarks.gallery.aim import camera_at
 from hrc_env.core.batching import one
 from hrc_env.core.typing import Image
-from hrc_env.motion.repertoire import REPERTOIRE, perform
-from hrc_env.motion.solo import alone
+from hrc_env.motion.repertoire import REPERTOIRE, alone, perform
 from hrc_env.render import overlay
 from hrc_env.scene.build import build
 from hrc_env.scene.render import PictureRenderer

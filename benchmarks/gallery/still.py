@@ -9,8 +9,7 @@ from benchmarks.gallery.aim import camera_at
 from hrc_env.core.batching import one
 from hrc_env.core.records import Held, WorkerMotion, Workplace
 from hrc_env.core.typing import Floats, Image
-from hrc_env.motion.repertoire import REPERTOIRE, perform
-from hrc_env.motion.solo import alone
+from hrc_env.motion.repertoire import REPERTOIRE, alone, perform
 from hrc_env.scene.build import Scene, build
 from hrc_env.scene.render import PictureRenderer
 from hrc_env.worker.body import load_body

@@ -14,10 +14,9 @@ from benchmarks.motion.statistics import statistics_of
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric, over, write_results
 from hrc_env.experiments.study.cache import Progress
-from hrc_env.motion import plans as pl
+from hrc_env.motion import state as st
 from hrc_env.motion.generator import MotionConfig, advance, make_state, reset
-from hrc_env.motion.repertoire import REPERTOIRE, perform
-from hrc_env.motion.solo import Film, alone
+from hrc_env.motion.repertoire import REPERTOIRE, Film, alone, perform
 from hrc_env.worker.body import Body, load_body, worker_names
 
 DT_S = 0.01
@@ -90,7 +89,7 @@ def _measure(scene: str, config: MotionBenchConfig) -> dict[str, Metric]:
         numbers = statistics_of(films, body)
         numbers["seconds"] = sum(film.time_s[-1] for film in films) / config.n_seeds
         numbers["us_per_frame"] = float(np.median(us))
-        if films[0].activity == pl.WALK:
+        if films[0].activity == st.WALK:
             gaits = [gait_of(film) for film in films]
             numbers |= {key: float(np.median([g[key] for g in gaits])) for key in gaits[0]}
         by_body.append(numbers)

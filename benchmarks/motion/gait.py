@@ -6,7 +6,7 @@ import numpy as np
 
 from benchmarks.motion.statistics import SIDES
 from hrc_env.core.typing import Floats
-from hrc_env.motion.solo import Film
+from hrc_env.motion.repertoire import Film
 from hrc_env.worker.body import SEGMENT
 
 STEADY_SHARE = 0.97

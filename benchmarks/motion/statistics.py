@@ -6,9 +6,9 @@ import numpy as np
 
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.motion import controls as c
-from hrc_env.motion import plans as pl
+from hrc_env.motion import state as st
 from hrc_env.motion.anatomy import GRIP_M
-from hrc_env.motion.solo import Film
+from hrc_env.motion.repertoire import Film
 from hrc_env.worker.body import SEGMENT, Body, worker_truth
 
 SIDES = ("left", "right")
@@ -28,7 +28,7 @@ def statistics_of(films: Sequence[Film], body: Body) -> dict[str, float]:
     numbers: dict[str, float] = {}
     for name, which in (("wrist", WRISTS), ("ankle", ANKLES), ("head", HEAD)):
         speeds = np.concatenate([_speeds(film, which) for film in films])
-        alike = name == "ankle" or films[0].activity == pl.WALK
+        alike = name == "ankle" or films[0].activity == st.WALK
         speeds = speeds.ravel() if alike else speeds.max(1)  # at work the busier hand counts
         numbers[f"{name}_p50_m_s"] = float(np.percentile(speeds, 50))
         numbers[f"{name}_p95_m_s"] = float(np.percentile(speeds, 95))

@@ -8,7 +8,8 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.skeleton import JOINTS
 from hrc_env.core.typing import Floats, Ints, Points3, QuaternionsWxyz
 from hrc_env.motion.anatomy import Anatomy, anatomy
-from hrc_env.motion.kinematics import N_FRAMES, N_POINTS, pose, quaternion
+from hrc_env.motion.kinematics import pose, quaternion
+from hrc_env.motion.state import WORKER, Worker
 from hrc_env.worker.body import N_SEGMENTS, SEGMENT, Body
 
 STARTS = {
@@ -60,20 +61,18 @@ def segments_in(controls: Floats, anatomy: Anatomy) -> tuple[Points3, Quaternion
 def _posed(q: Floats, bones: Anatomy) -> tuple[Points3, QuaternionsWxyz, Floats]:
     position, turn = np.empty((len(q), N_SEGMENTS, 3)), np.empty((len(q), N_SEGMENTS, 4))
     matrix = np.empty((len(q), N_SEGMENTS, 3, 3))
-    controls = np.ascontiguousarray(q)
-    _pose_each(controls, bones.offset, bones.frame, bones.size, position, turn, matrix)
+    me = np.zeros(1, WORKER)[0]
+    me["bones"], me["frame"], me["size"] = bones.offset, bones.frame, bones.size
+    _pose_each(np.ascontiguousarray(q), position, turn, matrix, me)
     return position, turn, matrix
 
 
 @kernel(makes_arrays=True)
-def _pose_each(
-    q: Floats, bones: Floats, frame: Floats, size: Floats, position: Floats, turn: Floats,
-    matrix: Floats,
-) -> None:  # fmt: skip
+def _pose_each(q: Floats, position: Floats, turn: Floats, matrix: Floats, me: Worker) -> None:
     """One pose after the other."""
-    p, r = np.zeros((N_POINTS, 3)), np.zeros((N_FRAMES, 3, 3))
     for n in range(q.shape[0]):
-        pose(q[n], bones, frame, size, p, r)
-        position[n], matrix[n] = p[:N_SEGMENTS], r[:N_SEGMENTS]
+        me.q[:] = q[n]
+        pose(me)
+        position[n, :], matrix[n, :] = me.p[:N_SEGMENTS], me.r[:N_SEGMENTS]
         for s in range(N_SEGMENTS):
-            quaternion(r, s, turn[n])
+            quaternion(me.r, s, turn[n])

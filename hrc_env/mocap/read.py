@@ -27,16 +27,13 @@ def read_capture(
     path: Path, fps: float | None = None, source_fps: float | None = None,
     skeleton: Path | None = None,
 ) -> Capture:  # fmt: skip
-    """Read, mend and resample a recording.
+    """Read, mend and resample a recording: a .bvh, .amc or .npz file.
 
     Args:
-        path: a .bvh, .amc or .npz file.
+        path: the file; `ConfigError` where it is no person in motion, or damaged beyond repair.
         fps: rate of the result; None keeps the file's.
         source_fps: the file's own rate, where it has none or a wrong one.
         skeleton: the .asf file of an .amc file; None looks beside it.
-
-    Raises:
-        ConfigError: not a person in motion, or damaged beyond repair; says what.
     """
     source = path.name
     joints, rate_hz, landmarks, found, repaired = _read(path, skeleton)

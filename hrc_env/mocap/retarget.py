@@ -1,10 +1,8 @@
 """A recording to a clip for a worker, and how far their joints are apart then.
 
-Where the pelvis and the feet go scales with the legs; trunk, arms and head keep the person's
-directions and take the worker's lengths. Then the control vector is found whose pose comes nearest
-to those joints: damped least squares a frame. What 15 joints do not tell (how a bow is shared
-between pelvis and spine, where the elbow of a straight arm points) is held near what people do and
-near the frames before and after.
+Ways scale with the legs; trunk, arms and head keep their directions and take the worker's lengths.
+Then the control vector is found whose pose comes nearest: damped least squares a frame. What 15
+joints do not tell is held near what people do and near the frames before and after.
 """
 
 from collections.abc import Callable

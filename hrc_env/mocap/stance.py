@@ -1,8 +1,7 @@
 """Feet that stand: found in a fitted motion, and locked so that they do not slide.
 
-While a foot rolls from heel to ball its ankle moves, but its footprint does not: where the
-ankle would be if the foot were flat. A foot whose footprint rests is standing; its footprint
-is set to one place then, and what that changes fades out in the swings before and after.
+A foot stands whose footprint rests: where the ankle would be if it were flat. That is set to one
+place then, and what that changes fades out in the swings before and after.
 """
 
 import numpy as np
@@ -50,11 +49,7 @@ def locked(q: Floats, fps: float, size: Floats) -> tuple[Floats, Bools]:
 
 
 def slip(q: Floats, stands: Bools, fps: float, anatomy: Anatomy) -> Floats:
-    """Speeds along the floor of the balls of a worker's standing feet [m/s].
-
-    One a frame and foot that stands flat or on its ball: where the legs are too short for a
-    footprint, the foot leaves it, and that shows here.
-    """
+    """Speeds along the floor of the balls of standing feet [m/s], one a frame and foot."""
     position, _ = segments_in(q, anatomy)
     speeds = []
     for side, name in enumerate(("left_toes", "right_toes")):

@@ -1,6 +1,6 @@
 """A worker's bones as the kinematics want them: rest offsets, rest frames and lengths."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -17,15 +17,13 @@ CLAVICLE, UPPER_ARM, FOREARM, HAND, THIGH, SHANK, FOOT, TOES = range(8)
 ARM, FOREARM_GRIP, LEG, THIGH_LENGTH, SHANK_LENGTH, ANKLE_Z, STAND_Z = range(7)
 ANKLE_X, BALL_X, BALL_Z, HEEL_X, UPPER_LENGTH = range(7, 12)
 N_SIZES = 12
-"""Columns of `Anatomy.size` [m]: shoulder to grip, elbow to grip, hip to ankle, its two
-bones, height of the resting ankle, height of the standing pelvis; forward of the pelvis the
-ankle; forward of and above the ankle the ball of the foot; the heel; the upper arm."""
+"""Columns of `Anatomy.size` [m]: shoulder to grip, elbow to grip, hip to ankle, its bones, heights
+of ankle and standing pelvis; ankle ahead of it; ball ahead of and above the ankle; heel; arm."""
 
 GRIP_M = 0.08
 """How far beyond the wrist a hand grips (half a hand's length, a judgement)."""
 FOREARM_TWIST_RAD, HAND_TWIST_RAD = 0.15, 0.35
-"""Outward turns about the forearm from the rest pose, whose palms look down: with these a
-hanging palm faces the thigh; judgement."""
+"""Outward turns about the forearm from the rest pose, so that a hanging palm faces the thigh."""
 HEEL_M = -0.045
 """Heel's contact behind the ankle (a quarter of a foot, a judgement)."""
 STAND_SHARE = 0.994
@@ -44,23 +42,19 @@ class Anatomy:
     """(12,) lengths [m], see the names above."""
 
 
+def anatomies(bodies: Body) -> Anatomy:
+    """Measure N bodies, or one: arrays (N, ...), each row as `anatomy` of that body alone."""
+    each = [_measured(rest) for rest in bodies.rest_position.reshape(-1, N_SEGMENTS, 3)]
+    return Anatomy(*(np.stack([getattr(a, f.name) for a in each]) for f in fields(Anatomy)))
+
+
 def anatomy(body: Body) -> Anatomy:
     """Measure a body; the right side's lengths are taken to equal the left side's."""
     return _measured(np.asarray(body.rest_position, float))
 
 
-def anatomies(bodies: Body) -> Anatomy:
-    """Measure N bodies, or one: arrays (N, ...), each row as `anatomy` of that body alone."""
-    each = [_measured(rest) for rest in bodies.rest_position.reshape(-1, N_SEGMENTS, 3)]
-    return Anatomy(
-        np.stack([one.offset for one in each]),
-        np.stack([one.frame for one in each]),
-        np.stack([one.size for one in each]),
-    )
-
-
 def _measured(rest: Floats) -> Anatomy:
-    """Measure a body of which the segments' origins (22, 3) at rest are known."""
+    """Measure a body from the segments' origins (22, 3) at rest."""
     offset = rest - rest[np.maximum(PARENT, 0)]
     offset[0] = rest[0]
     frame = np.zeros((len(rest), 3, 3))
@@ -71,8 +65,8 @@ def _measured(rest: Floats) -> Anatomy:
             frame[first + bone] = _rest_frame(along, np.array([pole, 0.0, 0.0]))
         outward = -1.0 if first == LEFT else 1.0
         straight = frame[first + FOREARM].copy()
-        frame[first + FOREARM] = _turned(straight, outward * FOREARM_TWIST_RAD)
-        frame[first + HAND] = _turned(straight, outward * HAND_TWIST_RAD)
+        frame[first + FOREARM] = about_axis("x", outward * FOREARM_TWIST_RAD) @ straight
+        frame[first + HAND] = about_axis("x", outward * HAND_TWIST_RAD) @ straight
     return Anatomy(np.ascontiguousarray(offset), frame, _sizes(rest))
 
 
@@ -82,11 +76,6 @@ def _rest_frame(along: Floats, pole: Floats) -> Floats:
     hinge = np.cross(pole, along)
     hinge /= np.linalg.norm(hinge)
     return np.stack([along, np.cross(hinge, along), hinge])
-
-
-def _turned(frame: Floats, angle_rad: float) -> Floats:
-    """A rest frame that gives a bone an extra turn about itself in every pose."""
-    return about_axis("x", angle_rad) @ frame
 
 
 def _sizes(rest: Floats) -> Floats:

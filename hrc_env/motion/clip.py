@@ -11,13 +11,12 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import ANKLE_Z, ARM, BALL_X, BALL_Z, HEEL_X, LEG, N_SIZES, STAND_Z
-from hrc_env.motion.feet import about
+from hrc_env.motion.curves import about
 
 VERSION = 1
 """Of the file; raised when its columns or fields change."""
 RECORDED = np.array([*range(c.N_BLENDED), *range(c.ANKLE, c.ANKLE + 12)])
-"""(32,) columns of the control vector that a recording fills, in the file's order: root, pelvis,
-spine, head, elbows, hands from their shoulders; both feet."""
+"""(32,) columns of the control vector that a recording fills: all that is blended, both feet."""
 SLOWEST_HZ, FASTEST_HZ = 5.0, 1000.0
 """Frame rates between which a recording is believed; judgement: below, a step is lost."""
 FARTHEST_M, FASTEST_M_S = 200.0, 15.0
@@ -29,8 +28,7 @@ class Clip:
     """Motion of the worker whose measures are `size`, beginning at the origin, towards +x."""
 
     controls: Floats
-    """(T, N_CONTROLS) a control vector a frame, see `hrc_env.motion.controls`; zero where a
-    recording says nothing (see RECORDED)."""
+    """(T, N_CONTROLS) of `controls`; zero where a recording says nothing (see RECORDED)."""
     fps: float
     """Frames a second."""
     contacts: Bools
@@ -73,10 +71,7 @@ def placed_at_origin(controls: Floats) -> Floats:
 
 
 def fitted_to(clip: Clip, size: Floats) -> Floats:
-    """(T, N_CONTROLS) the clip's motion for a worker of other measures.
-
-    Ways and heights scale with the legs, the hands' reach with the arms; angles stay.
-    """
+    """(T, N_CONTROLS) for a worker of other measures: ways scale with legs, reach with arms."""
     out, legs = clip.controls.copy(), size[LEG] / clip.size[LEG]
     out[:, [c.ROOT_X, c.ROOT_Y]] *= legs
     out[:, c.PELVIS_Z] = size[STAND_Z] + legs * (out[:, c.PELVIS_Z] - clip.size[STAND_Z])
@@ -162,17 +157,13 @@ def _check(clip: Clip) -> None:
 
 
 def footprints(feet: Floats, size: Floats) -> Floats:
-    """(T, 4) where ankles would be if their feet were flat, and the feet's headings.
-
-    From feet (T, 5 or more): ankle x, y, z, heading and pitch.
-    """
+    """(T, 4) flat feet's ankles and headings, from (T, 5 or more): ankle, heading, pitch."""
     flat = feet[:, :3] - rolled(feet[:, 3], feet[:, 4], size)
     return np.concatenate([flat, feet[:, 3:4]], axis=1)
 
 
 def rolled(yaw: Floats, pitch: Floats, size: Floats) -> Floats:
-    """(T, 3) how far a foot's pitch takes its ankle: heel up round the ball, toes up round the
-    heel."""
+    """(T, 3) how far a foot's pitch takes its ankle: heel up round the ball, toes up."""
     moved = [
         about(p, size[BALL_X], size[BALL_Z]) if p > 0.0 else about(p, size[HEEL_X], -size[ANKLE_Z])
         for p in pitch.tolist()

@@ -1,9 +1,7 @@
-"""The control vector: what an activity says of one moment, before any anatomy.
+"""The control vector: what an activity says of one moment, before any anatomy; its columns.
 
-One row of plain numbers per worker; these names are its columns. Angles are radians,
-lengths metres, in the world frame unless said. Relaxed arms are given relative to their
-shoulder (in a level frame that turns with the chest), grasping ones in the world, and the
-share of the second is a column too, so that a reach is one smooth number going 0, 1, 0.
+Radians and metres, in the world unless said. Relaxed arms are given relative to their shoulder (in
+a level frame that turns with the chest), grasping ones in the world, with the share of these.
 """
 
 ROOT_X, ROOT_Y, HEADING = 0, 1, 2

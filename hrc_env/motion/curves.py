@@ -1,8 +1,4 @@
-"""Smooth scalar curves that every activity is made of (compiled, no allocation).
-
-Nothing in this room is compiled with `fastmath`: what a compiler may reorder depends on what it had
-compiled before, and then the last bits of a walk would depend on that, too.
-"""
+"""Smooth scalar curves that every activity is made of; never `fastmath`, or bits would move."""
 
 import math
 
@@ -11,10 +7,7 @@ from hrc_env.core.kernels import kernel
 
 @kernel
 def min_jerk(u: float) -> float:
-    """0 to 1 over u in [0, 1] with zero velocity and acceleration at both ends, else held.
-
-    Flash & Hogan (1985), doi:10.1523/JNEUROSCI.05-07-01688.1985; its peak rate is 1.875.
-    """
+    """0 to 1 over u, at rest at both ends, else held; peak rate 1.875 (Flash & Hogan 1985)."""
     if u <= 0.0:
         return 0.0
     if u >= 1.0:
@@ -74,10 +67,7 @@ def saturate(d: float, knee: float, limit: float) -> float:
 
 @kernel
 def decay(u: float, duration: float, value: float, rate: float) -> float:
-    """Quintic from (value, rate, 0) at u = 0 to rest at zero at u = 1: inertialisation.
-
-    Bollo, "Inertialization: high-performance animation transitions", GDC 2018.
-    """
+    """Quintic from (value, rate, 0) at u = 0 to rest at zero at u = 1 (inertialisation)."""
     if u >= 1.0:
         return 0.0
     v = rate * duration
@@ -91,3 +81,10 @@ def decay(u: float, duration: float, value: float, rate: float) -> float:
 def wrap(angle: float) -> float:
     """The same direction in (-pi, pi]."""
     return math.atan2(math.sin(angle), math.cos(angle))
+
+
+@kernel
+def about(pitch: float, pivot_x: float, pivot_z: float) -> tuple[float, float]:
+    """How far forward and up the ankle goes when the foot pitches about a point of its own."""
+    cos, sin = math.cos(pitch), math.sin(pitch)
+    return pivot_x * (1.0 - cos) - pivot_z * sin, pivot_z * (1.0 - cos) + pivot_x * sin

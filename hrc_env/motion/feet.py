@@ -1,9 +1,8 @@
 """Feet: locked to their footprint while loaded, rolling from heel to ball, swinging between.
 
-Step k of a plan is taken by foot (first + k) % 2, leaves the floor at start + k * period and
-lands a fixed swing later. A footprint is where the ankle's shadow falls: x, y, heading; the
-share of a full stride of the step that made it, which scales its roll and its height; and how
-high the ground is there. Steps may be gone back: then their time runs backwards.
+Step k is taken by foot (first + k) % 2, leaves the floor at start + k * period and lands a fixed
+swing later. Footprints: the ankle's x, y, heading; the share of a full stride of the step that
+made it; height of the ground. Steps may be gone back: then their time runs backwards.
 """
 
 import math
@@ -11,13 +10,12 @@ import math
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
-from hrc_env.motion import plans as pl
 from hrc_env.motion.anatomy import ANKLE_Z, BALL_X, BALL_Z, HEEL_X
-from hrc_env.motion.curves import cruise, hump, min_jerk
+from hrc_env.motion.curves import about, cruise, hump, min_jerk
+from hrc_env.motion.state import Worker
 
 STRIKE_PITCH, PUSH_PITCH = -0.35, 1.0
-"""Foot's pitch at heel strike and greatest at push-off of a full stride [rad]: about -20 and
-57 degrees in level walking (Winter, Biomechanics and Motor Control of Human Movement)."""
+"""Foot's pitch at heel strike and push-off of a full stride [rad] (Winter, Biomechanics)."""
 FLAT_S, ROLL_SHARE = 0.10, 0.62
 """Heel strike to foot flat [s]; heel-off to toe-off as a share of the period of a step."""
 RAMP_SHARE = 0.29
@@ -41,32 +39,24 @@ def _roll(t: float, lift: float, land: float, period: float, stride: float) -> t
 
 
 @kernel
-def _last_step(t: float, first: int, count: int, plan: Floats) -> int:
-    """Index of the latest step of a foot that has left the floor; below `first` if none."""
-    k = math.floor((t - plan[pl.STEP_START]) / plan[pl.STEP_PERIOD])
-    k -= (k - first) % 2
-    return min(k, count - 1 - (count - 1 - first) % 2)
-
-
-@kernel
-def step_time(t: float, plan: Floats) -> float:
+def step_time(t: float, me: Worker) -> float:
     """The time that counts for feet: it turns round when the steps are gone back."""
-    undo = plan[pl.UNDO_AT]
+    undo = me.undo_at
     return t if undo <= 0.0 or t < undo else 2.0 * undo - t
 
 
 @kernel
-def foot(
-    t: float, side: int, plan: Floats, prints: Floats, stance: Floats, size: Floats, q: Floats
-) -> None:
+def foot(t: float, side: int, prints: Floats, stance: Floats, me: Worker) -> None:
     """Write the ankle columns of one side at time t into the control vector."""
+    q = me.q
     x, y, yaw, ground = stance[side, 0], stance[side, 1], stance[side, 2], stance[side, 4]
     heel_up, toes_up, rise, flown = 0.0, 0.0, 0.0, 0.0
-    count = int(plan[pl.STEP_COUNT])
+    count = me.step_count
     if count > 0:
-        start, period, swing = plan[pl.STEP_START], plan[pl.STEP_PERIOD], plan[pl.STEP_SWING]
-        first = (side + int(plan[pl.STEP_FIRST])) % 2
-        k = _last_step(t, first, count, plan)
+        start, period, swing = me.step_start, me.step_period, me.step_swing
+        first = (side + me.step_first) % 2
+        k = math.floor((t - start) / period)  # the foot's latest step that has left the floor
+        k = min(k - (k - first) % 2, count - 1 - (count - 1 - first) % 2)
         coming = max(k + 2, first)
         if coming < count:
             lift = start + coming * period
@@ -83,47 +73,35 @@ def foot(
             heel, toes = _roll(t, lift, lift + swing, period, stride)
             heel_up, toes_up = heel_up + heel, toes_up + toes
             step_up = prints[k, 4] - ground
-            if step_up != 0.0:
-                ground += step_up * _climbed(w, step_up)
+            if step_up != 0.0:  # up early, before the foot comes over the tread; down late
+                ground += step_up * min_jerk((w if step_up > 0.0 else w - 0.4) / 0.6)
             rise = (LIFT_BASE_M + LIFT_STRIDE_M * stride) * hump(w)
             flown = min_jerk(2.0 * w) if w < 1.0 else 0.0
     at = c.ANKLE + 6 * side
-    ahead, above = about(heel_up, size[BALL_X], size[BALL_Z])
-    behind, below = about(toes_up, size[HEEL_X], -size[ANKLE_Z])
+    ahead, above = about(heel_up, me.size[BALL_X], me.size[BALL_Z])
+    behind, below = about(toes_up, me.size[HEEL_X], -me.size[ANKLE_Z])
     q[at] = x + math.cos(yaw) * (ahead + behind)
     q[at + 1] = y + math.sin(yaw) * (ahead + behind)
-    q[at + 2] = size[ANKLE_Z] + above + below + rise + ground
+    q[at + 2] = me.size[ANKLE_Z] + above + below + rise + ground
     q[at + 3], q[at + 4], q[at + 5] = yaw, heel_up + toes_up, heel_up * flown + toes_up
 
 
 @kernel
-def feet(t: float, plan: Floats, prints: Floats, stance: Floats, size: Floats, q: Floats) -> None:
+def feet(t: float, me: Worker) -> None:
     """Both."""
     for side in range(2):
-        foot(t, side, plan, prints, stance, size, q)
+        foot(t, side, me.prints, me.stance, me)
 
 
 @kernel
-def _climbed(w: float, step_up: float) -> float:
-    """Share of a step up (early, before the foot comes over the tread) or down (late) at w."""
-    return min_jerk(w / 0.6) if step_up > 0.0 else min_jerk((w - 0.4) / 0.6)
-
-
-@kernel
-def raise_heel(side: int, pitch: float, size: Floats, q: Floats) -> None:
+def raise_heel(side: int, pitch: float, me: Worker) -> None:
     """Pitch a standing foot about its ball, where the toes stay (negative: about its heel)."""
+    q = me.q
     at = c.ANKLE + 6 * side
-    ahead, above = about(pitch, size[BALL_X], size[BALL_Z])
+    ahead, above = about(pitch, me.size[BALL_X], me.size[BALL_Z])
     if pitch < 0.0:
-        ahead, above = about(pitch, size[HEEL_X], -size[ANKLE_Z])
+        ahead, above = about(pitch, me.size[HEEL_X], -me.size[ANKLE_Z])
     q[at] += math.cos(q[at + 3]) * ahead
     q[at + 1] += math.sin(q[at + 3]) * ahead
     q[at + 2] += above
     q[at + 4] += pitch
-
-
-@kernel
-def about(pitch: float, pivot_x: float, pivot_z: float) -> tuple[float, float]:
-    """How far forward and up the ankle goes when the foot pitches about a point of its own."""
-    cos, sin = math.cos(pitch), math.sin(pitch)
-    return pivot_x * (1.0 - cos) - pivot_z * sin, pivot_z * (1.0 - cos) + pivot_x * sin

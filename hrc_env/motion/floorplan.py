@@ -1,8 +1,6 @@
-"""Where a worker's root may be: the grounds of a scene with room for a body, as a field.
+"""Where a worker's root may be: the slack [m] on a grid, to what stands there and the edge.
 
-The field is the slack [m] on a grid: how much farther from everything that stands there, and
-from the edge of the walkable area, one is than a walker must be. Workplaces may lie nearer to
-things, for who works at a wall stands before it.
+Workplaces may lie nearer to things, for who works at a wall stands before it.
 """
 
 import warnings
@@ -42,11 +40,7 @@ class Floorplan:
 
 
 def floorplan(grounds: Grounds) -> Floorplan:
-    """Measure the grounds.
-
-    Raises:
-        ConfigError: nowhere to walk, or a workplace inside something.
-    """
+    """Measure the grounds; `ConfigError`: nowhere to walk, or a workplace inside something."""
     (x0, x1), (y0, y1) = grounds.walkable_x_m, grounds.walkable_y_m
     if not (x0 < x1 and y0 < y1):
         raise ConfigError(
@@ -68,11 +62,7 @@ def floorplan(grounds: Grounds) -> Floorplan:
 
 
 def mended(plan: Floorplan, place: Workplace) -> Workplace:
-    """A workplace where a worker has room to stand; moved a little, with a warning, if need be.
-
-    Raises:
-        ConfigError: it is farther inside something, or beyond the walkable area.
-    """
+    """A workplace where there is room to stand; moved a little, with a warning, if need be."""
     if slack_at(*place.xy_m, plan.slack, plan.origin) >= STAND_M - BODY_M:
         return place
     xs, ys = (plan.origin[i] + CELL_M * np.arange(plan.slack.shape[i]) for i in range(2))

@@ -9,47 +9,38 @@ from collections.abc import Sequence
 import numpy as np
 
 from hrc_env.core.errors import ConfigError
+from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Grounds, Held, WorkerMotion, WorkerPath, Workplace
 from hrc_env.core.typing import Bools, Floats, Ints
-from hrc_env.motion import controls as c
-from hrc_env.motion import plans as pl
 from hrc_env.motion import state as st
+from hrc_env.motion.activities.playing import stocked
 from hrc_env.motion.anatomy import anatomies
 from hrc_env.motion.behaviour import begin_episode, follow_up
+from hrc_env.motion.blending import RATE_H_S, evaluate
 from hrc_env.motion.clip import Clip, opened
-from hrc_env.motion.config import MotionConfig, numbers
-from hrc_env.motion.errands import errands_at
+from hrc_env.motion.config import PEOPLE, MotionConfig, PeopleConfig, numbers
+from hrc_env.motion.decision import N_DRAWS, BehaviourParams, MotionState
 from hrc_env.motion.floorplan import floorplan, room_for
-from hrc_env.motion.generator_kernel import bodies_now, move_on
-from hrc_env.motion.holding import N_HELD
-from hrc_env.motion.kinematics import N_FRAMES, N_POINTS
-from hrc_env.motion.people import PEOPLE, PeopleConfig
-from hrc_env.motion.playing import Clips, stocked
+from hrc_env.motion.holding import N_HELD, prop_pose
+from hrc_env.motion.kinematics import pose, quaternion, spin
 from hrc_env.motion.reactions import notice
-from hrc_env.motion.state import MotionState
-from hrc_env.motion.who import N_DRAWS
+from hrc_env.motion.schedule import schedule_at
+from hrc_env.motion.state import Worker, Workers
 from hrc_env.worker.body import N_SEGMENTS, Body
 
 __all__ = [
-    "ABSENT",
-    "PEOPLE",
-    "Clip",
-    "MotionConfig",
-    "MotionState",
-    "PeopleConfig",
-    "activity",
-    "activity_names",
-    "advance",
-    "current",
-    "make_state",
-    "reset",
-    "watch",
-]
+    "ABSENT", "PEOPLE", "Clip", "MotionConfig", "MotionState", "PeopleConfig", "activity",
+    "activity_names", "advance", "current", "make_state", "reset", "watch",
+]  # fmt: skip
 
-activity_names: tuple[str, ...] = pl.ACTIVITY_NAMES
+activity_names: tuple[str, ...] = st.ACTIVITY_NAMES
 """Names of the values of `activity`."""
 ABSENT = -1
 """The activity of who is not in an episode."""
+PARKED_Z_M = -100.0
+"""Who is not in an episode is so far below the floor, where no camera looks [m]."""
+HALT_S = 0.3
+"""Time in which hands come to a halt, and go on [s]."""
 
 OPEN_FLOOR = Grounds(
     walkable_x_m=(-0.1, 2.4),
@@ -72,50 +63,21 @@ def make_state(
     batch: int, n_workers: int, body: Body, config: MotionConfig,
     grounds: Grounds = OPEN_FLOOR, fewest: int | None = None,
 ) -> MotionState:  # fmt: skip
-    """Arrays for `batch` environments of `n_workers` each; call `reset` before use.
+    """Workers of `batch` environments, `n_workers` each; call `reset` before use.
 
     Args:
-        batch: environments.
-        n_workers: workers whom each has room for.
+        batch, n_workers: how many environments, and workers whom each has room for.
         body: of all of them, or those of which each episode gives each worker one.
         config: settings.
         grounds: where they walk and work.
-        fewest: so many workers are in an episode at least, drawn at its beginning; None: all.
-
-    Raises:
-        ConfigError: negative sizes, more workers than fit, a place in a wall, a clip that
-            cannot be played.
+        fewest: so many are in an episode at least, drawn at its beginning; None: all.
     """
     if batch < 1 or n_workers < 0:
         raise ConfigError(f"Need batch >= 1 and n_workers >= 0, got {batch} and {n_workers}.")
     fewest = n_workers if fewest is None else fewest
     if not 0 <= fewest <= n_workers:
         raise ConfigError(f"The fewest workers must be 0 to {n_workers}, got {fewest}.")
-
-    bones = anatomies(body)
-    clips = stocked([opened(motion) for motion in config.motions], bones.size)
-    mind = _mind(config, grounds, clips, n_workers, fewest)
-
-    def array(*shape: int) -> Floats:
-        return np.zeros((batch, n_workers, *shape))
-
-    return MotionState(
-        clock_s=array(), time_s=array(), duration_s=array(),
-        activity=np.zeros((batch, n_workers), np.int64),
-        plan=array(pl.N_PLAN), prints=array(pl.MAX_STEPS, 5), stance=array(2, 5),
-        offset=array(c.N_BLENDED, 2), traits=array(pl.N_TRAITS), pace=array(2),
-        spots=array(st.N_SPOT), errand=np.zeros((batch, n_workers, st.N_ERRAND), np.int64),
-        alert=array(st.N_ALERT), robot=np.full((batch, 2, 3), np.inf), present=array(),
-        body=np.zeros((batch, n_workers), np.int64), anatomy=bones,
-        mind=mind,
-    )  # fmt: skip
-
-
-def _mind(
-    config: MotionConfig, grounds: Grounds, clips: Clips, n_workers: int, fewest: int
-) -> st.Mind:
-    """The constants of decisions."""
-    plan = floorplan(grounds)
+    bones, plan = anatomies(body), floorplan(grounds)
     fit = room_for(plan, config.spacing_m)
     if n_workers > fit:
         raise ConfigError(
@@ -125,23 +87,24 @@ def _mind(
     places: dict[str, tuple[Workplace, ...]] = {}
     for place in plan.places:
         places[place.kind] = (*places.get(place.kind, ()), place)
-    errands = errands_at(config.tasks, tuple(places))
+    clips = stocked([opened(motion) for motion in config.motions], bones.size)
+    schedule = schedule_at(config.jobs, tuple(places))
     values = numbers(config, grounds.robot_xy_m)
-    return st.Mind(config, values, plan, errands, places, clips, fewest)
+    mind = BehaviourParams(config, values, plan, schedule, places, clips, bones, fewest)
+    return MotionState(np.zeros((batch, n_workers), st.WORKER), mind)
 
 
 def reset(state: MotionState, ids: Ints, rngs: Sequence[np.random.Generator]) -> None:
     """Start environments `ids` anew; rngs holds one generator for each of the B environments."""
-    n_workers, fewest = state.activity.shape[1], state.mind.fewest
+    n_workers, fewest = state.workers.shape[1], state.mind.fewest
     for b in np.asarray(ids).tolist():
-        state.body[b] = drawn_bodies(rngs[b].random(n_workers), len(state.anatomy.size))
+        bodies = drawn_bodies(rngs[b].random(n_workers), len(state.mind.anatomy.size))
         n = n_workers if fewest == n_workers else int(rngs[b].integers(fewest, n_workers + 1))
-        begin_episode(state, b, n, rngs[b].random((n_workers, 2, N_DRAWS)))
+        begin_episode(state, b, n, bodies, rngs[b].random((n_workers, 2, N_DRAWS)))
 
 
 def drawn_bodies(draws: Floats, n_bodies: int) -> Ints:
-    """(W,) a body for each worker by draws (W,) in [0, 1), no two the same as long as there are
-    others."""
+    """(W,) a body for each worker by draws in [0, 1), no two the same while there are others."""
     bodies, left = np.zeros(len(draws), np.int64), list[int]()
     for w, draw in enumerate(draws.tolist()):
         left = left or list(range(n_bodies))
@@ -152,73 +115,55 @@ def drawn_bodies(draws: Floats, n_bodies: int) -> Ints:
 def advance(
     state: MotionState, rngs: Sequence[np.random.Generator], dt_s: float, n_steps: int
 ) -> tuple[WorkerPath, WorkerMotion]:
-    """Move on by n_steps of dt_s.
+    """Move on by n_steps of dt_s; generators are drawn from only when an activity ends.
 
-    Args:
-        state: changed in place.
-        rngs: one generator an environment, drawn from only when an activity ends.
-        dt_s: seconds between poses, positive.
-        n_steps: T >= 1.
-
-    Returns:
-        The bodies' path, arrays (B, T, W, 22, ...) at dt_s, 2 dt_s, ... after the last call,
-        and their motion at its end, (B, W, 22, ...).
+    Returns the path, arrays (B, T, W, 22, ...) at dt_s, 2 dt_s, ... after the last call, and the
+    motion at its end, (B, W, 22, ...).
     """
-    batch, n_workers = state.activity.shape
+    workers, frames = state.workers, state.mind.clips.frames
+    batch, n_workers = workers.shape
     done, ticked = np.zeros(batch, np.int64), np.zeros(batch, np.bool_)
-    arrays = _arrays(state)
-    out = _blank((batch, n_steps, n_workers), 3, 4) + _blank((batch, n_workers), 3, 3)
-    position, quaternion_, velocity, turning = out
-    held = np.empty((batch, n_workers, N_HELD))
-    rest: tuple = (*out, held, *_room())
-    while move_on(float(dt_s), n_steps, done, ticked, *arrays, *rest):
+    path = _blank((batch, n_steps, n_workers), 3, 4)
+    now = (*_blank((batch, n_workers), 3, 3), np.empty((batch, n_workers, N_HELD)))
+    while _move_on(float(dt_s), n_steps, done, ticked, workers, frames, path, now):
         for b in np.flatnonzero(ticked).tolist():
-            for w in np.flatnonzero(_over(state, b)).tolist():
+            for w in np.flatnonzero(_over(workers[b])).tolist():
                 follow_up(state, b, w, rngs[b].random(N_DRAWS))
-    last = position[:, -1], quaternion_[:, -1], velocity, turning, _held(held)
-    return WorkerPath(position, quaternion_), WorkerMotion(*last, state.body.copy())
+    bodies = workers["body"].copy()
+    last = WorkerMotion(path[0][:, -1], path[1][:, -1], now[0], now[1], _held(now[2]), bodies)
+    return WorkerPath(*path), last
 
 
-def _over(state: MotionState, b: int) -> Bools:
+def _over(workers: Workers) -> Bools:
     """(W,) whose activity is over: done, or taken back to its beginning."""
-    time_s = state.time_s[b]
-    return (time_s >= state.duration_s[b]) | ((time_s <= 0.0) & (state.pace[b, :, 0] < 0.0))
+    time_s = workers["time_s"]
+    return (time_s >= workers["duration_s"]) | ((time_s <= 0.0) & (workers["pace"] < 0.0))
 
 
 def watch(
     state: MotionState, elbow_and_tool_world: Floats, motion: WorkerMotion, dt_s: float
 ) -> None:
-    """Let the workers see the robot; they react in the steps to come.
-
-    Args:
-        state: changed in place.
-        elbow_and_tool_world: (B, 2, 3) where these truly are [m].
-        motion: the workers now.
-        dt_s: since they last looked [s].
-    """
+    """Let the workers see where elbow and tool (B, 2, 3) are, dt_s after the last look."""
     people = state.mind.config.people
-    notice(
-        dt_s, (people.notice_m, people.fast_m_s, people.calm_s), elbow_and_tool_world,
-        state.robot, motion.position_world, state.present, state.alert, state.pace,
-        state.clock_s, state.time_s, state.duration_s, state.activity, state.plan, state.prints,
-        state.stance, state.body, state.anatomy.size,
-    )  # fmt: skip
+    settings = (people.notice_m, people.fast_m_s, people.calm_s)
+    notice(dt_s, settings, elbow_and_tool_world, motion.position_world, state.workers)
 
 
 def current(state: MotionState, ids: Ints | None = None) -> WorkerMotion:
     """The bodies now: arrays (B, W, 22, ...), or of environments `ids` only (len(ids), W, ...)."""
-    batch, n_workers = state.activity.shape
+    batch, n_workers = state.workers.shape
     rows = np.arange(batch) if ids is None else np.asarray(ids, np.int64)
-    out = _blank((len(rows), n_workers), 3, 4, 3, 3)
+    position, turn, velocity, turning = _blank((len(rows), n_workers), 3, 4, 3, 3)
     held = np.empty((len(rows), n_workers, N_HELD))
-    rest: tuple = (*out, held, *_room())
-    bodies_now(rows, *_arrays(state), *rest)
-    return WorkerMotion(out[0], out[1], out[2], out[3], _held(held), state.body[rows])
+    now = (velocity, turning, held)
+    _bodies_now(rows, state.workers, state.mind.clips.frames, (position, turn), now)
+    bodies = state.workers["body"][rows]
+    return WorkerMotion(position, turn, velocity, turning, _held(held), bodies)
 
 
 def activity(state: MotionState) -> Ints:
     """(B, W) what each worker does: an index into `activity_names`, or `ABSENT`."""
-    return np.where(state.present > 0.0, state.activity, ABSENT)
+    return np.where(state.workers["present"], state.workers["activity"], ABSENT)
 
 
 def _held(rows: Floats) -> Held:
@@ -231,15 +176,92 @@ def _blank(lead: tuple[int, ...], *widths: int) -> tuple[Floats, ...]:
     return tuple(np.empty((*lead, N_SEGMENTS, n)) for n in widths)
 
 
-def _room() -> tuple[Floats, Floats, Floats]:
-    """Room to work in: a control vector, points and frames of two moments."""
-    return np.empty(c.N_CONTROLS), np.zeros((2, N_POINTS, 3)), np.zeros((2, N_FRAMES, 3, 3))
+Path = tuple[Floats, ...]
+"""Positions and quaternions (..., 22, 3 or 4)."""
+Now = tuple[Floats, Floats, Floats]
+"""Velocities, angular velocities (..., 22, 3), what is held (..., N_HELD)."""
 
 
-def _arrays(state: MotionState) -> tuple:
-    """What a pose follows from, in the order that the compiled functions take it."""
-    return (
-        state.clock_s, state.time_s, state.duration_s, state.activity, state.pace, state.plan,
-        state.prints, state.stance, state.offset, state.traits, state.present, state.body,
-        state.anatomy.offset, state.anatomy.frame, state.anatomy.size, state.mind.clips.frames,
-    )  # fmt: skip
+@kernel
+def _move_on(
+    dt_s: float, n_steps: int, done: Ints, ticked: Bools, workers: Workers, frames: Floats,
+    path: Path, now: Now,
+) -> bool:  # fmt: skip
+    """Move every environment on until done or someone must decide; whether anyone must."""
+    waiting = False
+    for b in range(done.shape[0]):
+        while done[b] < n_steps:
+            t, due = done[b], False
+            for w in range(workers.shape[1]):
+                me = workers[b, w]
+                if not ticked[b]:
+                    _tick(dt_s, me)
+                back = me.pace < 0.0 and me.time_s <= 0.0
+                due = due or back or me.time_s >= me.duration_s
+            ticked[b] = due
+            if due:
+                waiting = True
+                break
+            for w in range(workers.shape[1]):
+                me = workers[b, w]
+                last = t == n_steps - 1
+                if last:
+                    _rates_of(frames, now[0][b, w], now[1][b, w], me)
+                    prop_pose(now[2][b, w], me)
+                else:
+                    _pose(0.0, frames, me)
+                _place(path[0][b, t, w], path[1][b, t, w], me)
+            done[b] += 1
+    return waiting
+
+
+@kernel
+def _bodies_now(rows: Ints, workers: Workers, frames: Floats, path: Path, now: Now) -> None:
+    """Bodies of some environments as they are, into arrays (rows, W, ...)."""
+    for row in range(rows.shape[0]):
+        for w in range(workers.shape[1]):
+            me = workers[rows[row], w]
+            _rates_of(frames, now[0][row, w], now[1][row, w], me)
+            prop_pose(now[2][row, w], me)
+            _place(path[0][row, w], path[1][row, w], me)
+
+
+@kernel
+def _tick(dt_s: float, me: Worker) -> None:
+    """Let time go on at the worker's pace, which comes nearer to the wished one."""
+    most = dt_s / HALT_S
+    me.pace += min(max(me.pace_wished - me.pace, -most), most)
+    me.time_s += dt_s * me.pace
+    me.clock_s += dt_s
+
+
+@kernel
+def _pose(later_s: float, frames: Floats, me: Worker) -> None:
+    """A worker a little later than now: q, p and r."""
+    evaluate(me.time_s + me.pace * later_s, me.clock_s + later_s, frames, me)
+    pose(me)
+
+
+@kernel
+def _rates_of(frames: Floats, velocity: Floats, turning: Floats, me: Worker) -> None:
+    """The pose now, and velocities (22, 3) from that RATE_H_S later."""
+    _pose(RATE_H_S, frames, me)
+    me.later_p = me.p
+    me.later_r = me.r
+    _pose(0.0, frames, me)
+    rate = 1.0 / RATE_H_S
+    for s in range(velocity.shape[0]):
+        for i in range(3):
+            velocity[s, i] = (me.later_p[s, i] - me.p[s, i]) * rate
+        spin(me.r, me.later_r, s, RATE_H_S, turning)
+
+
+@kernel
+def _place(position: Floats, quaternion_: Floats, me: Worker) -> None:
+    """Write a pose into (22, ...) arrays; far below the floor of who is not there."""
+    down = 0.0 if me.present else PARKED_Z_M
+    for s in range(position.shape[0]):
+        for i in range(3):
+            position[s, i] = me.p[s, i]
+        position[s, 2] += down
+        quaternion(me.r, s, quaternion_)

@@ -3,13 +3,12 @@
 import math
 
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
-from hrc_env.motion import plans as pl
 from hrc_env.motion.anatomy import ARM, HAND, LEFT, SIDE_STRIDE, UPPER_ARM
 from hrc_env.motion.curves import hump, min_jerk
-from hrc_env.motion.kinematics import ARM_KNEE, pose
-from hrc_env.motion.posture import MOST_LEAN, beyond, lean, stand
+from hrc_env.motion.kinematics import ARM_KNEE
+from hrc_env.motion.posture import MOST_LEAN, beyond, farthest, from_here, lean, stand
+from hrc_env.motion.state import Worker
 
 GAZE_LEAD_S = 0.25
 """Eyes and head set off before the hand (Land & Hayhoe 2001: about half a second at most)."""
@@ -20,36 +19,39 @@ CARRY_FORWARD_M, CARRY_Z_M, LOAD_HALF_WIDTH_M = 0.36, 1.05, 0.20
 
 
 @kernel
-def _look(share: float, plan: Floats, q: Floats) -> None:
+def _look(share: float, me: Worker) -> None:
     """Turn the head to the work."""
-    q[c.HEAD_YAW] += share * (plan[pl.GAZE_YAW] - q[c.HEAD_YAW])
-    q[c.HEAD_PITCH] += share * plan[pl.GAZE_PITCH]
+    q = me.q
+    q[c.HEAD_YAW] += share * (me.gaze_yaw - q[c.HEAD_YAW])
+    q[c.HEAD_PITCH] += share * me.gaze_pitch
 
 
 @kernel
-def _extend(out: float, plan: Floats, q: Floats) -> None:
+def _extend(out: float, me: Worker) -> None:
     """Hands and trunk at share `out` of a reach."""
-    lean(plan[pl.LEAN] * out, plan[pl.SQUAT], plan[pl.TWIST] * out, q)
+    q = me.q
+    lean(me.lean * out, me.squat, me.twist * out, me)
     for i in range(6):
-        q[c.HAND_TARGET + i] = plan[pl.TARGET + i]
-    q[c.HAND_SHARE] = out * plan[pl.USE_LEFT]
-    q[c.HAND_SHARE + 1] = out * plan[pl.USE_RIGHT]
+        q[c.HAND_TARGET + i] = me.target[i]
+    q[c.HAND_SHARE] = out * me.used[0]
+    q[c.HAND_SHARE + 1] = out * me.used[1]
 
 
 @kernel
-def reach(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q: Floats) -> None:
+def reach(t: float, clock_s: float, me: Worker) -> None:
     """The control vector of someone who reaches out, works there, and takes the hands back."""
-    stand(plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW], clock_s, traits, size, q)
-    there = plan[pl.OUT_AT] + plan[pl.OUT_S]
-    leave = there + plan[pl.HOLD_S]
-    out = min_jerk((t - plan[pl.OUT_AT]) / plan[pl.OUT_S])
-    out -= min_jerk((t - leave) / plan[pl.BACK_S])
-    _extend(out, plan, q)
-    looking = min_jerk((t - plan[pl.OUT_AT] + GAZE_LEAD_S) / 0.6) - min_jerk((t - leave) / 0.7)
-    _look(looking, plan, q)
-    busy = plan[pl.FIDGET] * hump((t - there) / plan[pl.HOLD_S])
+    q = me.q
+    stand(me.start_x, me.start_y, me.start_yaw, clock_s, me)
+    there = me.out_at + me.out_s
+    leave = there + me.hold_s
+    out = min_jerk((t - me.out_at) / me.out_s)
+    out -= min_jerk((t - leave) / me.back_s)
+    _extend(out, me)
+    looking = min_jerk((t - me.out_at + GAZE_LEAD_S) / 0.6) - min_jerk((t - leave) / 0.7)
+    _look(looking, me)
+    busy = me.fidget_m * hump((t - there) / me.hold_s)
     if busy > 0.0:
-        beat = 2.0 * math.pi * plan[pl.FIDGET_HZ] * (t - there)
+        beat = 2.0 * math.pi * me.fidget_hz * (t - there)
         for side in range(2):
             q[c.HAND_TARGET + 3 * side] += busy * math.sin(beat + side)
             q[c.HAND_TARGET + 3 * side + 1] += busy * math.cos(0.7 * beat)
@@ -57,24 +59,23 @@ def reach(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, 
 
 
 @kernel
-def lift(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q: Floats) -> None:
+def lift(t: float, clock_s: float, me: Worker) -> None:
     """The control vector of someone who picks a load up, holds it, and puts it back."""
-    stand(plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW], clock_s, traits, size, q)
-    grip = plan[pl.OUT_AT] + plan[pl.OUT_S]
-    rise = grip + plan[pl.HOLD_S]
-    lower = rise + plan[pl.RAISE_S] + plan[pl.CARRY_S]
-    leave = lower + plan[pl.RAISE_S] + plan[pl.HOLD_S]
-    down = min_jerk((t - plan[pl.OUT_AT]) / plan[pl.OUT_S])
-    up = min_jerk((t - rise) / plan[pl.RAISE_S]) - min_jerk((t - lower) / plan[pl.RAISE_S])
-    away = min_jerk((t - leave) / plan[pl.BACK_S])
-    lean(plan[pl.LEAN] * (down - up - away), plan[pl.SQUAT], 0.0, q)
-    _look(down - 0.6 * up - away, plan, q)
+    q = me.q
+    stand(me.start_x, me.start_y, me.start_yaw, clock_s, me)
+    grip = me.out_at + me.out_s
+    rise = grip + me.hold_s
+    lower = rise + me.raise_s + me.carry_s
+    leave = lower + me.raise_s + me.hold_s
+    down = min_jerk((t - me.out_at) / me.out_s)
+    up = min_jerk((t - rise) / me.raise_s) - min_jerk((t - lower) / me.raise_s)
+    away = min_jerk((t - leave) / me.back_s)
+    lean(me.lean * (down - up - away), me.squat, 0.0, me)
+    _look(down - 0.6 * up - away, me)
     bulge = 0.06 * hump(up)
-    cos, sin = math.cos(plan[pl.START_YAW]), math.sin(plan[pl.START_YAW])
+    cos, sin = math.cos(me.start_yaw), math.sin(me.start_yaw)
     for i in range(6):
-        q[c.HAND_TARGET + i] = plan[pl.TARGET + i] + up * (
-            plan[pl.RAISED + i] - plan[pl.TARGET + i]
-        )
+        q[c.HAND_TARGET + i] = me.target[i] + up * (me.raised[i] - me.target[i])
     for side in range(2):
         q[c.HAND_TARGET + 3 * side] += cos * bulge
         q[c.HAND_TARGET + 3 * side + 1] += sin * bulge
@@ -82,117 +83,90 @@ def lift(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q
 
 
 @kernel
-def _settle_lean(
-    plan: Floats, traits: Floats, offset: Floats, frame: Floats, size: Floats,
-    q: Floats, p: Floats, r: Floats,
-) -> None:  # fmt: skip
+def _settle_lean(me: Worker) -> None:
     """Smallest lean that brings the targets within reach; else the targets come nearer."""
-    used = (plan[pl.USE_LEFT], plan[pl.USE_RIGHT])
+    p = me.p
+    used = (me.used[0], me.used[1])
     low, high = 0.0, MOST_LEAN
-    plan[pl.LEAN] = 0.0
+    me.lean = 0.0
     for attempt in range(12):
-        stand(plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW], 0.0, traits, size, q)
-        _extend(1.0, plan, q)
-        far = beyond(q, used, offset, frame, size, p, r)
+        stand(me.start_x, me.start_y, me.start_yaw, 0.0, me)
+        _extend(1.0, me)
+        far = beyond(used, me)
         if attempt == 0 and far <= 0.0:
             return
         if attempt > 0:
             if far > 0.0:
-                low = plan[pl.LEAN]
+                low = me.lean
             else:
-                high = plan[pl.LEAN]
-        plan[pl.LEAN] = 0.5 * (low + high)
-    plan[pl.LEAN] = high + SPARE_LEAN
+                high = me.lean
+        me.lean = 0.5 * (low + high)
+    me.lean = high + SPARE_LEAN
     if high < MOST_LEAN:
         return
     for side in range(2):
         upper = LEFT + SIDE_STRIDE * side + UPPER_ARM
-        at = pl.TARGET + 3 * side
+        target = me.target[3 * side : 3 * side + 3]
         d = math.sqrt(
-            (plan[at] - p[upper, 0]) ** 2
-            + (plan[at + 1] - p[upper, 1]) ** 2
-            + (plan[at + 2] - p[upper, 2]) ** 2
+            (target[0] - p[upper, 0]) ** 2
+            + (target[1] - p[upper, 1]) ** 2
+            + (target[2] - p[upper, 2]) ** 2
         )
-        nearer = min(1.0, ARM_KNEE * size[ARM] / d)
+        nearer = min(1.0, ARM_KNEE * me.size[ARM] / d)
         for i in range(3):
-            plan[at + i] = p[upper, i] + nearer * (plan[at + i] - p[upper, i])
+            target[i] = p[upper, i] + nearer * (target[i] - p[upper, i])
 
 
 @kernel
 def plan_reach(
-    target: tuple[float, float, float], used: tuple[float, float], peak_m_s: float,
-    hold_s: float, fidget: tuple[float, float], plan: Floats, traits: Floats,
-    offset: Floats, frame: Floats, size: Floats, q: Floats, p: Floats, r: Floats,
-) -> float:  # fmt: skip
+    target: tuple[float, float, float],
+    used: tuple[float, float],
+    peak_m_s: float,
+    hold_s: float,
+    fidget: tuple[float, float],
+    me: Worker,
+) -> float:
     """Plan to reach a world point with the used hands; returns the duration [s]."""
-    yaw = plan[pl.START_YAW]
+    yaw = me.start_yaw
     cos, sin = math.cos(yaw), math.sin(yaw)
-    dx, dy = target[0] - plan[pl.START_X], target[1] - plan[pl.START_Y]
+    dx, dy = target[0] - me.start_x, target[1] - me.start_y
     ahead, left = cos * dx + sin * dy, -sin * dx + cos * dy
     apart = 0.12 if used[0] > 0.0 and used[1] > 0.0 else 0.0
     for side in range(2):
-        lateral = left + (1.0 - 2.0 * side) * apart
-        plan[pl.TARGET + 3 * side] = plan[pl.START_X] + cos * ahead - sin * lateral
-        plan[pl.TARGET + 3 * side + 1] = plan[pl.START_Y] + sin * ahead + cos * lateral
-        plan[pl.TARGET + 3 * side + 2] = target[2]
-    plan[pl.USE_LEFT], plan[pl.USE_RIGHT] = used
+        at = me.target[3 * side :]
+        at[0], at[1], at[2] = from_here((ahead, left + (1.0 - 2.0 * side) * apart, target[2]), me)
+    me.used[0], me.used[1] = used
     azimuth = math.atan2(left, max(ahead, 0.2))
     stretch = min(max((math.hypot(ahead, left) - 0.4) / 0.35, 0.0), 1.0)
-    plan[pl.TWIST] = 0.6 * azimuth + 0.3 * stretch * (used[1] - used[0])
-    plan[pl.SQUAT] = min(max((0.95 - target[2]) / 0.5, 0.0), 1.0)
-    plan[pl.GAZE_YAW] = 0.5 * azimuth - 0.5 * plan[pl.TWIST]
-    plan[pl.GAZE_PITCH] = 0.25 + 0.4 * min(max(1.4 - target[2], -0.3), 0.6)
-    _settle_lean(plan, traits, offset, frame, size, q, p, r)
-    way = _way(plan, traits, offset, frame, size, q, p, r)
-    plan[pl.OUT_S] = max(1.875 * way / peak_m_s, 0.3)
-    plan[pl.BACK_S] = max(1.875 * way / min(peak_m_s, 1.2), 0.45)
-    plan[pl.HOLD_S] = hold_s
-    plan[pl.FIDGET], plan[pl.FIDGET_HZ] = fidget
-    return plan[pl.OUT_AT] + plan[pl.OUT_S] + hold_s + plan[pl.BACK_S] + 0.05
-
-
-@kernel
-def _way(
-    plan: Floats, traits: Floats, offset: Floats, frame: Floats, size: Floats,
-    q: Floats, p: Floats, r: Floats,
-) -> float:  # fmt: skip
-    """The longest way that a used hand has from hanging to its target [m]."""
-    stand(plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW], 0.0, traits, size, q)
+    me.twist = 0.6 * azimuth + 0.3 * stretch * (used[1] - used[0])
+    me.squat = min(max((0.95 - target[2]) / 0.5, 0.0), 1.0)
+    me.gaze_yaw = 0.5 * azimuth - 0.5 * me.twist
+    me.gaze_pitch = 0.25 + 0.4 * min(max(1.4 - target[2], -0.3), 0.6)
+    _settle_lean(me)
+    stand(me.start_x, me.start_y, me.start_yaw, 0.0, me)
     for i in range(6):
-        q[c.HAND_TARGET + i] = plan[pl.TARGET + i]
-    way = 0.1
-    pose(q, offset, frame, size, p, r)
-    for side in range(2):
-        wrist = LEFT + SIDE_STRIDE * side + HAND
-        d = 0.0
-        for i in range(3):
-            d += (plan[pl.TARGET + 3 * side + i] - p[wrist, i]) ** 2
-        if plan[pl.USE_LEFT + side] > 0.0:
-            way = max(way, math.sqrt(d))
-    return way
+        me.q[c.HAND_TARGET + i] = me.target[i]
+    way = max(0.1, farthest(HAND, me.target, used, me))
+    me.out_s = max(1.875 * way / peak_m_s, 0.3)
+    me.back_s = max(1.875 * way / min(peak_m_s, 1.2), 0.45)
+    me.hold_s = hold_s
+    me.fidget_m, me.fidget_hz = fidget
+    return me.out_at + me.out_s + hold_s + me.back_s + 0.05
 
 
 @kernel
-def plan_lift(
-    ahead: float, z: float, times: tuple[float, float, float], plan: Floats, traits: Floats,
-    offset: Floats, frame: Floats, size: Floats, q: Floats, p: Floats, r: Floats,
-) -> float:  # fmt: skip
+def plan_lift(ahead: float, z: float, times: tuple[float, float, float], me: Worker) -> float:
     """Plan to lift a load `ahead` of the feet at height z; times: bend, raise, carry [s]."""
-    cos, sin = math.cos(plan[pl.START_YAW]), math.sin(plan[pl.START_YAW])
     for side in range(2):
         left = (1.0 - 2.0 * side) * LOAD_HALF_WIDTH_M
-        for at, forward, height in (
-            (pl.TARGET, ahead, z),
-            (pl.RAISED, CARRY_FORWARD_M, CARRY_Z_M),
-        ):
-            plan[at + 3 * side] = plan[pl.START_X] + cos * forward - sin * left
-            plan[at + 3 * side + 1] = plan[pl.START_Y] + sin * forward + cos * left
-            plan[at + 3 * side + 2] = height
-    plan[pl.TWIST], plan[pl.GAZE_YAW], plan[pl.GAZE_PITCH] = 0.0, 0.0, 0.25
-    plan[pl.SQUAT] = traits[pl.SQUAT_TRAIT]
-    plan[pl.USE_LEFT], plan[pl.USE_RIGHT] = 1.0, 1.0
-    _settle_lean(plan, traits, offset, frame, size, q, p, r)
-    plan[pl.OUT_S], plan[pl.RAISE_S], plan[pl.CARRY_S] = times
-    plan[pl.BACK_S], plan[pl.HOLD_S] = times[0], 0.3
-    raising = 2.0 * (plan[pl.HOLD_S] + plan[pl.RAISE_S]) + plan[pl.CARRY_S]
-    return plan[pl.OUT_AT] + plan[pl.OUT_S] + raising + plan[pl.BACK_S] + 0.05
+        at, up = me.target[3 * side :], me.raised[3 * side :]
+        at[0], at[1], at[2] = from_here((ahead, left, z), me)
+        up[0], up[1], up[2] = from_here((CARRY_FORWARD_M, left, CARRY_Z_M), me)
+    me.twist, me.gaze_yaw, me.gaze_pitch = 0.0, 0.0, 0.25
+    me.squat = me.squat_share
+    me.used[0], me.used[1] = 1.0, 1.0
+    _settle_lean(me)
+    me.out_s, me.raise_s, me.carry_s = times
+    me.back_s, me.hold_s = times[0], 0.3
+    raising = 2.0 * (me.hold_s + me.raise_s) + me.carry_s
+    return me.out_at + me.out_s + raising + me.back_s + 0.05

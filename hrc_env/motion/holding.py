@@ -7,7 +7,7 @@ import numpy as np
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
-from hrc_env.motion import plans as pl
+from hrc_env.motion.state import Worker
 from hrc_env.worker.props import PROPS
 
 GRIPS = np.array([np.nan_to_num(prop.grips) for prop in PROPS])
@@ -20,8 +20,9 @@ N_HELD = 8
 
 
 @kernel
-def prop_pose(q: Floats, out: Floats) -> None:
+def prop_pose(out: Floats, me: Worker) -> None:
     """Write what q holds and where into out (N_HELD,)."""
+    q = me.q
     out[0] = q[c.PROP]
     for i in range(3):
         out[1 + i] = q[c.PROP_POSE + i] if q[c.PROP] > 0.0 else 0.0
@@ -38,8 +39,9 @@ def prop_pose(q: Floats, out: Floats) -> None:
 
 
 @kernel
-def grip(side: int, gx: float, gy: float, gz: float, q: Floats) -> None:
+def grip(side: int, gx: float, gy: float, gz: float, me: Worker) -> None:
     """Send a hand to a point of the prop's frame; its pose stands in q."""
+    q = me.q
     yaw, pitch, roll = q[c.PROP_POSE + 3], q[c.PROP_POSE + 4], q[c.PROP_POSE + 5]
     cy, sy = math.cos(yaw), math.sin(yaw)
     cp, sp = math.cos(pitch), math.sin(pitch)
@@ -53,36 +55,37 @@ def grip(side: int, gx: float, gy: float, gz: float, q: Floats) -> None:
 
 
 @kernel
-def hold_load(x: float, y: float, yaw: float, up: float, plan: Floats, q: Floats) -> None:
+def hold_load(x: float, y: float, yaw: float, up: float, me: Worker) -> None:
     """Put the load where someone at (x, y) facing yaw holds it, and the hands on it."""
-    place_load(x, y, yaw, up, plan, q)
-    grip_load(1.0, plan, q)
+    place_load(x, y, yaw, up, me)
+    grip_load(1.0, me)
 
 
 @kernel
-def place_load(x: float, y: float, yaw: float, up: float, plan: Floats, q: Floats) -> None:
+def place_load(x: float, y: float, yaw: float, up: float, me: Worker) -> None:
     """Put the load where it is of someone at (x, y) facing yaw, `up` higher than standing."""
+    q = me.q
     cos, sin = math.cos(yaw), math.sin(yaw)
-    at = pl.LOAD_AT
-    q[c.PROP] = plan[pl.LOAD_PROP]
-    q[c.PROP_POSE] = x + cos * plan[at] - sin * plan[at + 1]
-    q[c.PROP_POSE + 1] = y + sin * plan[at] + cos * plan[at + 1]
-    q[c.PROP_POSE + 2] = up + plan[at + 2]
-    q[c.PROP_POSE + 3] = yaw + plan[at + 3]
-    q[c.PROP_POSE + 4], q[c.PROP_POSE + 5] = plan[at + 4], plan[at + 5]
+    at = me.load_at
+    q[c.PROP] = me.load_prop
+    q[c.PROP_POSE] = x + cos * at[0] - sin * at[1]
+    q[c.PROP_POSE + 1] = y + sin * at[0] + cos * at[1]
+    q[c.PROP_POSE + 2], q[c.PROP_POSE + 3] = up + at[2], yaw + at[3]
+    q[c.PROP_POSE + 4], q[c.PROP_POSE + 5] = at[4], at[5]
 
 
 @kernel
-def grip_load(share: float, plan: Floats, q: Floats) -> None:
+def grip_load(share: float, me: Worker) -> None:
     """Send the hands that hold it to the load, by a share."""
     for side in range(2):
-        held = pl.LOAD_GRIP + 3 * side
-        grip(side, plan[held], plan[held + 1], plan[held + 2], q)
-        q[c.HAND_SHARE + side] = share * plan[pl.LOAD_USED + side]
+        held = me.load_grip[3 * side : 3 * side + 3]
+        grip(side, held[0], held[1], held[2], me)
+        me.q[c.HAND_SHARE + side] = share * me.load_used[side]
 
 
 @kernel
-def drop_load(plan: Floats) -> None:
+def drop_load(me: Worker) -> None:
     """Empty hands."""
-    for i in range(pl.N_LOAD):
-        plan[pl.LOAD_PROP + i] = 0.0
+    me.load_prop = 0
+    me.load_at[:] = me.load_grip[:] = 0.0
+    me.load_used[:] = 0.0

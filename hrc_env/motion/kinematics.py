@@ -4,29 +4,10 @@ import math
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
+from hrc_env.motion import anatomy as an
 from hrc_env.motion import controls as c
-from hrc_env.motion.anatomy import (
-    ARM,
-    CHEST,
-    CLAVICLE,
-    FOOT,
-    FOREARM,
-    FOREARM_GRIP,
-    GRIP_M,
-    HAND,
-    HEAD,
-    LEFT,
-    LEG,
-    SHANK,
-    SHANK_LENGTH,
-    SIDE_STRIDE,
-    THIGH,
-    THIGH_LENGTH,
-    TOES,
-    UPPER_ARM,
-    UPPER_LENGTH,
-)
 from hrc_env.motion.curves import min_jerk, saturate, soft_min
+from hrc_env.motion.state import Worker
 
 ARM_KNEE, ARM_LIMIT = 0.97, 0.998
 """Shares of the arm's length where stretching begins to resist, and that it never passes."""
@@ -38,14 +19,15 @@ LEG_SOFTNESS_M = 0.05
 """Width over which the longest possible leg takes over from the wished pelvis height."""
 
 
-TARGET, POLE, HINGE, GRIP, N_POINTS = 22, 23, 24, 25, 26
-TURN, N_FRAMES = 22, 23
+TARGET, POLE, HINGE, GRIP = range(22, 26)
+TURN = 22
 """Rows after the 22 segments that the kinematics work in: points and vectors, a rotation."""
 
 
 @kernel
-def yaw_pitch_roll(yaw: float, pitch: float, roll: float, r: Floats, s: int) -> None:
+def yaw_pitch_roll(yaw: float, pitch: float, roll: float, s: int, me: Worker) -> None:
     """r[s] = Rz(yaw) Ry(pitch) Rx(roll)."""
+    r = me.r
     cy, sy = math.cos(yaw), math.sin(yaw)
     cp, sp = math.cos(pitch), math.sin(pitch)
     cr, sr = math.cos(roll), math.sin(roll)
@@ -61,8 +43,9 @@ def yaw_pitch_roll(yaw: float, pitch: float, roll: float, r: Floats, s: int) -> 
 
 
 @kernel
-def product(a: int, b: int, out: int, r: Floats) -> None:
+def product(a: int, b: int, out: int, me: Worker) -> None:
     """r[out] = r[a] r[b]."""
+    r = me.r
     for i in range(3):
         x, y, z = r[a, i, 0], r[a, i, 1], r[a, i, 2]
         r[out, i, 0] = x * r[b, 0, 0] + y * r[b, 1, 0] + z * r[b, 2, 0]
@@ -71,20 +54,19 @@ def product(a: int, b: int, out: int, r: Floats) -> None:
 
 
 @kernel
-def attach(child: int, parent: int, offset: Floats, p: Floats, r: Floats) -> None:
+def attach(child: int, parent: int, me: Worker) -> None:
     """Put the child's origin where its rest offset lies in the parent's frame."""
-    x, y, z = offset[child, 0], offset[child, 1], offset[child, 2]
+    p, r = me.p, me.r
+    x, y, z = me.bones[child, 0], me.bones[child, 1], me.bones[child, 2]
     for i in range(3):
         turned = r[parent, i, 0] * x + r[parent, i, 1] * y + r[parent, i, 2] * z
         p[child, i] = p[parent, i] + turned
 
 
 @kernel
-def aim(bone: int, end: int, length: float, frame: Floats, p: Floats, r: Floats) -> None:
-    """Turn a bone so that it points from its origin to p[end], its hinge along p[HINGE].
-
-    frame[bone] holds the rows (bone, hinge x bone, hinge) of the rest pose.
-    """
+def aim(bone: int, end: int, length: float, me: Worker) -> None:
+    """Turn a bone to point from its origin to p[end], its hinge along p[HINGE]."""
+    p, r = me.p, me.r
     inverse = 1.0 / length
     bx = (p[end, 0] - p[bone, 0]) * inverse
     by = (p[end, 1] - p[bone, 1]) * inverse
@@ -92,7 +74,7 @@ def aim(bone: int, end: int, length: float, frame: Floats, p: Floats, r: Floats)
     hx, hy, hz = p[HINGE, 0], p[HINGE, 1], p[HINGE, 2]
     mx, my, mz = hy * bz - hz * by, hz * bx - hx * bz, hx * by - hy * bx
     for j in range(3):
-        b, m, h = frame[bone, 0, j], frame[bone, 1, j], frame[bone, 2, j]
+        b, m, h = me.frame[bone, 0, j], me.frame[bone, 1, j], me.frame[bone, 2, j]
         r[bone, 0, j] = bx * b + mx * m + hx * h
         r[bone, 1, j] = by * b + my * m + hy * h
         r[bone, 2, j] = bz * b + mz * m + hz * h
@@ -100,10 +82,10 @@ def aim(bone: int, end: int, length: float, frame: Floats, p: Floats, r: Floats)
 
 @kernel
 def bend(
-    start: int, end: int, first: float, second: float, knee: float, limit: float, p: Floats
+    start: int, end: int, first: float, second: float, knee: float, limit: float, me: Worker
 ) -> None:
-    """Two-bone IK from p[start] to p[TARGET]: sets the middle joint p[start + 1] on the side of
-    p[POLE], the end p[end] at (or, where the bones are too short, towards) the target."""
+    """Two-bone IK from p[start] to p[TARGET]: p[start + 1], towards p[POLE], and p[end]."""
+    p = me.p
     dx = p[TARGET, 0] - p[start, 0]
     dy = p[TARGET, 1] - p[start, 1]
     dz = p[TARGET, 2] - p[start, 2]
@@ -128,49 +110,45 @@ def bend(
 
 
 @kernel
-def trunk(q: Floats, offset: Floats, size: Floats, p: Floats, r: Floats) -> None:
+def trunk(me: Worker) -> None:
     """Pelvis (as high as wished and as the legs allow), spine, neck and head."""
+    q, p = me.q, me.p
     yaw = q[c.HEADING] + q[c.PELVIS_YAW]
-    yaw_pitch_roll(yaw, q[c.PELVIS_PITCH], q[c.PELVIS_ROLL], r, 0)
+    yaw_pitch_roll(yaw, q[c.PELVIS_PITCH], q[c.PELVIS_ROLL], 0, me)
     p[0, 0], p[0, 1], p[0, 2] = q[c.ROOT_X], q[c.ROOT_Y], q[c.PELVIS_Z]
-    longest = LEG_LIMIT * size[LEG]
+    longest = LEG_LIMIT * me.size[an.LEG]
     for side in range(2):
-        thigh, ankle = LEFT + side * SIDE_STRIDE + THIGH, c.ANKLE + 6 * side
-        attach(thigh, 0, offset, p, r)
+        thigh, ankle = an.LEFT + side * an.SIDE_STRIDE + an.THIGH, c.ANKLE + 6 * side
+        attach(thigh, 0, me)
         dx, dy = q[ankle] - p[thigh, 0], q[ankle + 1] - p[thigh, 1]
         rise = math.sqrt(max(longest * longest - dx * dx - dy * dy, 0.01))
         highest = q[ankle + 2] + rise - (p[thigh, 2] - p[0, 2])
         p[0, 2] = soft_min(p[0, 2], highest, LEG_SOFTNESS_M)
     share = 1.0 / 3.0
     twist, flex, lateral = q[c.SPINE_TWIST], q[c.SPINE_FLEX], q[c.SPINE_SIDE]
-    yaw_pitch_roll(share * twist, share * flex, share * lateral, r, TURN)
-    for s in range(1, CHEST + 1):
-        attach(s, s - 1, offset, p, r)
-        product(s - 1, TURN, s, r)
+    yaw_pitch_roll(share * twist, share * flex, share * lateral, TURN, me)
+    for s in range(1, an.CHEST + 1):
+        attach(s, s - 1, me)
+        product(s - 1, TURN, s, me)
     yaw = 0.5 * q[c.HEAD_YAW]
-    pitched(math.cos(yaw), math.sin(yaw), 0.5 * q[c.HEAD_PITCH], r, TURN)
-    for s in range(CHEST + 1, HEAD + 1):
-        attach(s, s - 1, offset, p, r)
-        product(s - 1, TURN, s, r)
+    pitched(math.cos(yaw), math.sin(yaw), 0.5 * q[c.HEAD_PITCH], TURN, me)
+    for s in range(an.CHEST + 1, an.HEAD + 1):
+        attach(s, s - 1, me)
+        product(s - 1, TURN, s, me)
 
 
 @kernel
-def shoulder(
-    side: int, q: Floats, cos: float, sin: float, offset: Floats, size: Floats,
-    p: Floats, r: Floats,
-) -> None:  # fmt: skip
-    """The clavicle, going a little up and forward with the hand; the grip goes to p[TARGET].
-
-    cos and sin are of the level heading of the chest, the frame of hanging arms.
-    """
+def shoulder(side: int, cos: float, sin: float, me: Worker) -> None:
+    """The clavicle, going a little up and forward with the hand; the grip goes to p[TARGET]."""
+    q, p, r = me.q, me.p, me.r
     sign = 1.0 - 2.0 * side
-    clavicle = LEFT + side * SIDE_STRIDE + CLAVICLE
-    upper = clavicle + UPPER_ARM - CLAVICLE
-    attach(clavicle, CHEST, offset, p, r)
+    clavicle = an.LEFT + side * an.SIDE_STRIDE + an.CLAVICLE
+    upper = clavicle + an.UPPER_ARM - an.CLAVICLE
+    attach(clavicle, an.CHEST, me)
     for i in range(3):
         for j in range(3):
-            r[clavicle, i, j] = r[CHEST, i, j]
-    attach(upper, clavicle, offset, p, r)
+            r[clavicle, i, j] = r[an.CHEST, i, j]
+    attach(upper, clavicle, me)
     rel, tgt, share = c.HAND_OFFSET + 3 * side, c.HAND_TARGET + 3 * side, q[c.HAND_SHARE + side]
     x = p[upper, 0] + cos * q[rel] - sin * q[rel + 1]
     y = p[upper, 1] + sin * q[rel] + cos * q[rel + 1]
@@ -179,65 +157,66 @@ def shoulder(
     p[TARGET, 1] = y + share * (q[tgt + 1] - y)
     p[TARGET, 2] = z + share * (q[tgt + 2] - z)
     dx, dy = p[TARGET, 0] - p[upper, 0], p[TARGET, 1] - p[upper, 1]
-    ahead = (cos * dx + sin * dy) / size[ARM]
-    above = (p[TARGET, 2] - p[upper, 2]) / size[ARM]
+    ahead = (cos * dx + sin * dy) / me.size[an.ARM]
+    above = (p[TARGET, 2] - p[upper, 2]) / me.size[an.ARM]
     forward, up = min(max(ahead - 0.3, 0.0) / 0.7, 1.0), min(max(above + 0.5, 0.0), 1.0)
     if forward > 0.0 or up > 0.0:
         forward, up = forward * forward * (3.0 - 2.0 * forward), up * up * (3.0 - 2.0 * up)
         give = sign * SHOULDER_RAD
-        yaw_pitch_roll(-give * forward, 0.0, give * up, r, TURN)
-        product(CHEST, TURN, clavicle, r)
-        attach(upper, clavicle, offset, p, r)
+        yaw_pitch_roll(-give * forward, 0.0, give * up, TURN, me)
+        product(an.CHEST, TURN, clavicle, me)
+        attach(upper, clavicle, me)
 
 
 @kernel
-def arm(
-    side: int, q: Floats, cos: float, sin: float, offset: Floats, frame: Floats,
-    size: Floats, p: Floats, r: Floats,
-) -> None:  # fmt: skip
-    """Shoulder to hand; the elbow back and outwards, and down but where the arm hangs: there down
-    is along the arm, which leaves the elbow no side."""
-    shoulder(side, q, cos, sin, offset, size, p, r)
+def arm(side: int, cos: float, sin: float, me: Worker) -> None:
+    """Shoulder to hand, the elbow back and out; cos and sin: level heading of the chest."""
+    p = me.p
+    shoulder(side, cos, sin, me)
     sign = 1.0 - 2.0 * side
-    upper = LEFT + side * SIDE_STRIDE + UPPER_ARM
-    fore, hand = upper + FOREARM - UPPER_ARM, upper + HAND - UPPER_ARM
-    swivel = q[c.SWIVEL + side]
+    upper = an.LEFT + side * an.SIDE_STRIDE + an.UPPER_ARM
+    fore, hand = upper + an.FOREARM - an.UPPER_ARM, upper + an.HAND - an.UPPER_ARM
+    swivel = me.q[c.SWIVEL + side]
     level, out = math.cos(swivel), math.sin(swivel)
     back, left = -0.7 * level, sign * (0.45 * level + out)
     p[POLE, 0], p[POLE, 1] = cos * back - sin * left, sin * back + cos * left
-    above = (p[TARGET, 2] - p[upper, 2]) / size[ARM]
+    above = (p[TARGET, 2] - p[upper, 2]) / me.size[an.ARM]
     p[POLE, 2] = -0.9 * level * (0.15 + 0.85 * min_jerk(1.2 * (above + 1.0)))
-    bend(upper, GRIP, size[UPPER_LENGTH], size[FOREARM_GRIP], ARM_KNEE, ARM_LIMIT, p)
-    aim(upper, fore, size[UPPER_LENGTH], frame, p, r)
-    aim(fore, GRIP, size[FOREARM_GRIP], frame, p, r)
-    attach(hand, fore, offset, p, r)
-    aim(hand, GRIP, GRIP_M, frame, p, r)
+    bend(upper, GRIP, me.size[an.UPPER_LENGTH], me.size[an.FOREARM_GRIP], ARM_KNEE, ARM_LIMIT, me)
+    aim(upper, fore, me.size[an.UPPER_LENGTH], me)
+    aim(fore, GRIP, me.size[an.FOREARM_GRIP], me)
+    attach(hand, fore, me)
+    aim(hand, GRIP, an.GRIP_M, me)
 
 
 @kernel
-def leg(
-    side: int, q: Floats, offset: Floats, frame: Floats, size: Floats, p: Floats, r: Floats
-) -> None:
+def leg(side: int, me: Worker) -> None:
     """Hip to toes; the knee over the foot."""
-    thigh, ankle = LEFT + side * SIDE_STRIDE + THIGH, c.ANKLE + 6 * side
-    shank, foot, toes = thigh + SHANK - THIGH, thigh + FOOT - THIGH, thigh + TOES - THIGH
-    attach(thigh, 0, offset, p, r)
+    q, p, r = me.q, me.p, me.r
+    thigh, ankle = an.LEFT + side * an.SIDE_STRIDE + an.THIGH, c.ANKLE + 6 * side
+    shank, foot, toes = (
+        thigh + an.SHANK - an.THIGH,
+        thigh + an.FOOT - an.THIGH,
+        thigh + an.TOES - an.THIGH,
+    )
+    attach(thigh, 0, me)
     cos, sin = math.cos(q[ankle + 3]), math.sin(q[ankle + 3])
-    pitched(cos, sin, q[ankle + 4], r, foot)
-    pitched(cos, sin, q[ankle + 5], r, toes)
+    pitched(cos, sin, q[ankle + 4], foot, me)
+    pitched(cos, sin, q[ankle + 5], toes, me)
     p[POLE, 0], p[POLE, 1] = 0.75 * cos + 0.25 * r[0, 0, 0], 0.75 * sin + 0.25 * r[0, 1, 0]
     p[POLE, 2] = 0.12
     for i in range(3):
         p[TARGET, i] = q[ankle + i]
-    bend(thigh, foot, size[THIGH_LENGTH], size[SHANK_LENGTH], 1.0, 1.001, p)
-    aim(thigh, shank, size[THIGH_LENGTH], frame, p, r)
-    aim(shank, foot, size[SHANK_LENGTH], frame, p, r)
-    attach(toes, foot, offset, p, r)
+    bend(thigh, foot, me.size[an.THIGH_LENGTH], me.size[an.SHANK_LENGTH], 1.0, 1.001, me)
+    aim(thigh, shank, me.size[an.THIGH_LENGTH], me)
+    aim(shank, foot, me.size[an.SHANK_LENGTH], me)
+    attach(toes, foot, me)
 
 
 @kernel
-def pitched(cos: float, sin: float, pitch: float, r: Floats, s: int) -> None:
+def pitched(cos: float, sin: float, pitch: float, s: int, me: Worker) -> None:
     """r[s] = Rz Ry(pitch), the cosine and sine of the first angle given."""
+    r = me.r
     cp, sp = 1.0, 0.0
     if pitch != 0.0:
         cp, sp = math.cos(pitch), math.sin(pitch)
@@ -247,14 +226,15 @@ def pitched(cos: float, sin: float, pitch: float, r: Floats, s: int) -> None:
 
 
 @kernel
-def pose(q: Floats, offset: Floats, frame: Floats, size: Floats, p: Floats, r: Floats) -> None:
+def pose(me: Worker) -> None:
     """Fill the first 22 rows of p (N_POINTS, 3) and r (N_FRAMES, 3, 3) from q."""
-    trunk(q, offset, size, p, r)
+    q = me.q
+    trunk(me)
     yaw = q[c.HEADING] + q[c.PELVIS_YAW] + q[c.SPINE_TWIST]
     cos, sin = math.cos(yaw), math.sin(yaw)
     for side in range(2):
-        arm(side, q, cos, sin, offset, frame, size, p, r)
-        leg(side, q, offset, frame, size, p, r)
+        arm(side, cos, sin, me)
+        leg(side, me)
 
 
 @kernel

@@ -1,39 +1,28 @@
 """A way over the floor: straight lines joined by arcs, by the metres walked along it.
 
-A path is a few rows of a plan, `plans.PATH`: where each piece begins [m], its first point, its
-direction there [rad], its curvature [1/m] and the integral of the direction up to it [rad m].
-Directions run on and are not wrapped.
+Pieces: where each begins [m], its point, direction there [rad] (not wrapped), curvature [1/m], and
+the integral of the direction up to it [rad m].
 """
 
 import math
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
-from hrc_env.motion import plans as pl
 from hrc_env.motion.curves import wrap
+from hrc_env.motion.state import MAX_VIA, Worker
 
 HEADING_WINDOW_M = 0.3
-"""Walkers face the mean direction of so much of the path behind and ahead: people turn into a
-corner before they are in it (Grasso et al. 1998 saw the head lead by about 0.2 s); judgement."""
+"""Walkers face the mean direction of so much of the path behind and ahead (Grasso et al. 1998)."""
 OWN_EDGE, SHARED_EDGE = 0.9, 0.5
 """Most of an edge that the arc of a corner takes: of the first or last, of one between two."""
 
 
 @kernel
-def lay_path(
-    start: tuple[float, float], via: Floats, end: tuple[float, float], plan: Floats
-) -> None:
-    """Write the path from start to end past corners; length, pieces, sharpest curve.
-
-    Args:
-        start: x, y [m].
-        via: (n, 3) corners between: x, y, and how far from it at most its arc may begin [m].
-        end: x, y [m].
-        plan: a row whose `LENGTH`, `SHARPEST` and `PATH` columns are written.
-    """
-    n = min(via.shape[0], pl.MAX_VIA)
+def lay_path(start: tuple[float, float], via: Floats, end: tuple[float, float], me: Worker) -> None:
+    """Write the path past corners `via` (n, 3): x, y, and how far from it its arc may begin [m]."""
+    n = min(via.shape[0], MAX_VIA)
     x, y, s, total, count = start[0], start[1], 0.0, 0.0, 0
-    plan[pl.SHARPEST], heading, first = 0.0, 0.0, True
+    me.sharpest, heading, first = 0.0, 0.0, True
     for k in range(n + 1):
         to_x, to_y = (via[k, 0], via[k, 1]) if k < n else end
         direction = math.atan2(to_y - y, to_x - x)
@@ -47,69 +36,74 @@ def lay_path(
             own = OWN_EDGE if k == 0 else 1.0  # what the corner before has left is all its own
             arm = min(via[k, 2], own * before, (SHARED_EDGE if k + 1 < n else OWN_EDGE) * after)
         straight = max(math.hypot(to_x - x, to_y - y) - arm, 0.0)
-        count = _piece(plan, count, s, x, y, heading, 0.0, total)
+        count = _piece(count, s, x, y, heading, 0.0, total, me)
         s, total = s + straight, total + heading * straight
         x, y = x + straight * math.cos(heading), y + straight * math.sin(heading)
         if arm > 1e-6 and abs(turn) > 1e-6:
             radius = arm / math.tan(0.5 * abs(turn))
             curvature, length = math.copysign(1.0 / radius, turn), radius * abs(turn)
-            count = _piece(plan, count, s, x, y, heading, curvature, total)
-            plan[pl.SHARPEST] = max(plan[pl.SHARPEST], 1.0 / radius)
+            count = _piece(count, s, x, y, heading, curvature, total, me)
+            me.sharpest = max(me.sharpest, 1.0 / radius)
             s, total = s + length, total + (heading + 0.5 * turn) * length
             heading += turn
             x = to_x + arm * math.cos(heading)
             y = to_y + arm * math.sin(heading)
-    plan[pl.LENGTH], plan[pl.N_PIECES] = max(s, 1e-6), count
+    me.length, me.n_pieces = max(s, 1e-6), count
 
 
 @kernel
 def _piece(
-    plan: Floats, count: int, s: float, x: float, y: float, heading: float, curvature: float,
+    count: int,
+    s: float,
+    x: float,
+    y: float,
+    heading: float,
+    curvature: float,
     total: float,
-) -> int:  # fmt: skip
+    me: Worker,
+) -> int:
     """Append a piece; how many there are then."""
-    at = pl.PATH + pl.PIECE * count
-    plan[at], plan[at + 1], plan[at + 2], plan[at + 3] = s, x, y, heading
-    plan[at + 4], plan[at + 5] = curvature, total
+    piece = me.path[count]
+    piece[0], piece[1], piece[2], piece[3], piece[4], piece[5] = s, x, y, heading, curvature, total
     return count + 1
 
 
 @kernel
-def _find(s: float, plan: Floats) -> int:
-    """First column of the piece that s [m] along the path lies on."""
-    k = int(plan[pl.N_PIECES]) - 1
-    while k > 0 and plan[pl.PATH + pl.PIECE * k] > s:
+def _find(s: float, me: Worker) -> int:
+    """The piece that s [m] along the path lies on."""
+    k = me.n_pieces - 1
+    while k > 0 and me.path[k, 0] > s:
         k -= 1
-    return pl.PATH + pl.PIECE * k
+    return k
 
 
 @kernel
-def along(s: float, plan: Floats) -> tuple[float, float]:
+def along(s: float, me: Worker) -> tuple[float, float]:
     """Point of the path after s metres, held at its ends."""
-    s = min(max(s, 0.0), plan[pl.LENGTH])
-    at = _find(s, plan)
-    way, heading, curvature = s - plan[at], plan[at + 3], plan[at + 4]
+    s = min(max(s, 0.0), me.length)
+    piece = me.path[_find(s, me)]
+    way, heading, curvature = s - piece[0], piece[3], piece[4]
     half = 0.5 * curvature * way
     if abs(half) > 1e-9:  # the chord of an arc
         way *= math.sin(half) / half
     return (
-        plan[at + 1] + way * math.cos(heading + half),
-        plan[at + 2] + way * math.sin(heading + half),
+        piece[1] + way * math.cos(heading + half),
+        piece[2] + way * math.sin(heading + half),
     )
 
 
 @kernel
-def facing(s: float, plan: Floats) -> float:
+def facing(s: float, me: Worker) -> float:
     """Mean direction of the path round s metres [rad], continuous and so is its rate."""
     behind, ahead = s - HEADING_WINDOW_M, s + HEADING_WINDOW_M
-    return (_turned(ahead, plan) - _turned(behind, plan)) / (2.0 * HEADING_WINDOW_M)
+    return (_turned(ahead, me) - _turned(behind, me)) / (2.0 * HEADING_WINDOW_M)
 
 
 @kernel
-def _turned(s: float, plan: Floats) -> float:
+def _turned(s: float, me: Worker) -> float:
     """Integral of the direction from 0 to s [rad m]; straight on beyond the ends."""
-    within = min(max(s, 0.0), plan[pl.LENGTH])
-    at = _find(within, plan)
-    way, heading, curvature = within - plan[at], plan[at + 3], plan[at + 4]
-    total = plan[at + 5] + (heading + 0.5 * curvature * way) * way
+    within = min(max(s, 0.0), me.length)
+    piece = me.path[_find(within, me)]
+    way, heading, curvature = within - piece[0], piece[3], piece[4]
+    total = piece[5] + (heading + 0.5 * curvature * way) * way
     return total + (s - within) * (heading + curvature * way)

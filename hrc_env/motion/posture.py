@@ -5,10 +5,12 @@ import math
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
-from hrc_env.motion import plans as pl
 from hrc_env.motion.anatomy import ARM, FOREARM_GRIP, LEFT, SIDE_STRIDE, STAND_Z, UPPER_ARM
+from hrc_env.motion.curves import wrap
 from hrc_env.motion.kinematics import ARM_KNEE, pose
+from hrc_env.motion.state import Worker
 
+Triple = tuple[float, float, float]
 STANCE_HALF_WIDTH_M = 0.10
 """Ankles' distance from the middle when standing [m]; shoulder-wide for the baked bodies."""
 TOE_OUT_RAD = 0.12
@@ -23,20 +25,27 @@ HAND_OUT_M = 0.05
 """The hand is so much farther out than the elbow [m]: beside broad hips, too; judgement."""
 MOST_LEAN = 1.3
 """Lean beyond which a person would step instead."""
+NECK_SHARE = 0.70
+"""Height of the eyes above the pelvis as a share of the pelvis's; from the baked bodies."""
+HEAD_SHARE = 0.75
+"""The head's share of a turn of gaze, the eyes do the rest (Freedman & Sparks 1997: 70-80 %)."""
+MOST_YAW_RAD, MOST_DOWN_RAD, MOST_UP_RAD = 1.2, 0.75, 0.75
+"""How far neck and head turn from the chest; comfortable ranges, judgement."""
 
 
 @kernel
-def sway(clock_s: float, i: int, traits: Floats) -> float:
+def sway(clock_s: float, i: int, me: Worker) -> float:
     """A slow wave of the worker's own, between -1 and 1; i in 0..4."""
-    return math.sin(2.0 * math.pi * (SWAY_HZ[i] * clock_s + traits[pl.PHASE + i]))
+    return math.sin(2.0 * math.pi * (SWAY_HZ[i] * clock_s + me.phases[i]))
 
 
 @kernel
-def hang(side: int, pitch: float, elbow: float, size: Floats, q: Floats) -> None:
+def hang(side: int, pitch: float, elbow: float, me: Worker) -> None:
     """Let an arm hang: upper arm `pitch` forward of the vertical, elbow bent by `elbow`."""
+    q = me.q
     sign = 1.0 - 2.0 * side
-    fore = size[FOREARM_GRIP]
-    upper = size[ARM] - fore
+    fore = me.size[FOREARM_GRIP]
+    upper = me.size[ARM] - fore
     at = c.HAND_OFFSET + 3 * side
     cos, sin = math.cos(pitch), math.sin(pitch)
     both_cos, both_sin = math.cos(pitch + elbow), math.sin(pitch + elbow)
@@ -46,21 +55,20 @@ def hang(side: int, pitch: float, elbow: float, size: Floats, q: Floats) -> None
 
 
 @kernel
-def stand(
-    x: float, y: float, yaw: float, clock_s: float, traits: Floats, size: Floats, q: Floats
-) -> None:
+def stand(x: float, y: float, yaw: float, clock_s: float, me: Worker) -> None:
     """Fill every column but the feet: at ease at (x, y), shifting weight, looking about."""
+    q = me.q
     first, second, third = (
-        sway(clock_s, 0, traits),
-        sway(clock_s, 1, traits),
-        sway(clock_s, 2, traits),
+        sway(clock_s, 0, me),
+        sway(clock_s, 1, me),
+        sway(clock_s, 2, me),
     )
-    fourth, fifth = sway(clock_s, 3, traits), sway(clock_s, 4, traits)
+    fourth, fifth = sway(clock_s, 3, me), sway(clock_s, 4, me)
     side_shift, ahead = SHIFT_M * (0.7 * first + 0.3 * third), 0.006 * fourth
     cos, sin = math.cos(yaw), math.sin(yaw)
     q[c.ROOT_X] = x + cos * ahead - sin * side_shift
     q[c.ROOT_Y] = y + sin * ahead + cos * side_shift
-    q[c.HEADING], q[c.PELVIS_Z] = yaw, size[STAND_Z]
+    q[c.HEADING], q[c.PELVIS_Z] = yaw, me.size[STAND_Z]
     q[c.PELVIS_PITCH] = 0.02 + 0.01 * fourth
     q[c.PELVIS_ROLL] = 1.2 * side_shift
     q[c.PELVIS_YAW] = 0.03 * second
@@ -72,7 +80,7 @@ def stand(
     q[c.SWIVEL], q[c.SWIVEL + 1] = 0.1, 0.1
     for side in range(2):
         wave = 0.04 * (third if side else fourth)
-        hang(side, RELAXED_PITCH + wave, RELAXED_ELBOW + wave, size, q)
+        hang(side, RELAXED_PITCH + wave, RELAXED_ELBOW + wave, me)
         q[c.HAND_SHARE + side] = 0.0
     for i in range(6):
         q[c.HAND_TARGET + i] = 0.0
@@ -80,11 +88,9 @@ def stand(
 
 
 @kernel
-def lean(amount: float, squat: float, twist: float, q: Floats) -> None:
-    """Bend the trunk forward (1: a deep bow), the knees too by the share `squat`, and turn.
-
-    The pelvis goes back as the trunk goes forward, so that the feet can stay under the weight.
-    """
+def lean(amount: float, squat: float, twist: float, me: Worker) -> None:
+    """Bend the trunk forward (1: a deep bow), the pelvis going back, knees by `squat`, and turn."""
+    q = me.q
     back = (0.07 + 0.10 * squat) * amount
     q[c.ROOT_X] -= math.cos(q[c.HEADING]) * back
     q[c.ROOT_Y] -= math.sin(q[c.HEADING]) * back
@@ -97,18 +103,50 @@ def lean(amount: float, squat: float, twist: float, q: Floats) -> None:
 
 
 @kernel
-def beyond(
-    q: Floats, used: tuple[float, float], offset: Floats, frame: Floats, size: Floats,
-    p: Floats, r: Floats,
-) -> float:  # fmt: skip
+def beyond(used: tuple[float, float], me: Worker) -> float:
     """How far the targets lie beyond what the used arms reach from this posture [m]."""
-    pose(q, offset, frame, size, p, r)
+    far = farthest(UPPER_ARM, me.q[c.HAND_TARGET :], used, me)
+    return max(far - ARM_KNEE * me.size[ARM], -1.0)
+
+
+@kernel
+def farthest(segment: int, goals: Floats, used: tuple[float, float], me: Worker) -> float:
+    """From a segment of the used arms, posed as q says, to the farther goal (6,) [m]; -1: none."""
+    pose(me)
     far = -1.0
     for side in range(2):
-        upper = LEFT + SIDE_STRIDE * side + UPPER_ARM
-        d = 0.0
+        at, d = LEFT + SIDE_STRIDE * side + segment, 0.0
         for i in range(3):
-            d += (q[c.HAND_TARGET + 3 * side + i] - p[upper, i]) ** 2
+            d += (goals[3 * side + i] - me.p[at, i]) ** 2
         if used[side] > 0.0:
-            far = max(far, math.sqrt(d) - ARM_KNEE * size[ARM])
+            far = max(far, math.sqrt(d))
     return far
+
+
+@kernel
+def from_here(at: Triple, me: Worker) -> Triple:
+    """A point ahead, left [m] of where the worker stands, at a height, in the world."""
+    cos, sin = math.cos(me.start_yaw), math.sin(me.start_yaw)
+    return me.start_x + cos * at[0] - sin * at[1], me.start_y + sin * at[0] + cos * at[1], at[2]
+
+
+@kernel
+def look_at(x: float, y: float, z: float, share: float, me: Worker) -> None:
+    """Turn the head to a point of the world, by a share; everything but the head stands in q."""
+    q = me.q
+    if share <= 0.0:
+        return
+    tilt = q[c.PELVIS_PITCH] + q[c.SPINE_FLEX]
+    heading = q[c.HEADING] + q[c.PELVIS_YAW]
+    tall = NECK_SHARE * me.size[STAND_Z]
+    ahead = math.sin(0.6 * tilt) * tall
+    dx = x - q[c.ROOT_X] - math.cos(heading) * ahead
+    dy = y - q[c.ROOT_Y] - math.sin(heading) * ahead
+    dz = z - q[c.PELVIS_Z] - math.cos(0.6 * tilt) * tall
+    yaw = wrap(math.atan2(dy, dx) - heading - q[c.SPINE_TWIST])
+    down = math.atan2(-dz, math.hypot(dx, dy)) - tilt
+    limit = MOST_DOWN_RAD if down > 0.0 else MOST_UP_RAD
+    yaw = MOST_YAW_RAD * math.tanh(HEAD_SHARE * yaw / MOST_YAW_RAD)
+    down = limit * math.tanh(HEAD_SHARE * down / limit)
+    q[c.HEAD_YAW] += share * (yaw - q[c.HEAD_YAW])
+    q[c.HEAD_PITCH] += share * (down - q[c.HEAD_PITCH])

@@ -1,28 +1,18 @@
-"""What workers notice of the robot, and what that does to what they are at.
+"""What workers notice of the robot: they pause, or take their hands away and step back.
 
-Somebody who notices takes a while, and then pauses or takes the hands away and steps back, or
-does neither; which, and how long it takes, is drawn when an activity begins. Hands pause by
-their activity's time coming to a halt, and are taken away by its going backwards; walkers brake.
+Hands pause by their activity's time coming to a halt, and are taken away by its going backwards;
+walkers brake. What they would do, and how late, is drawn when an activity begins.
 """
 
 import math
 
+import numpy as np
+
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Floats, Ints
-from hrc_env.motion import plans as pl
+from hrc_env.core.typing import Floats
+from hrc_env.motion import state as st
 from hrc_env.motion.anatomy import CHEST, HAND, HEAD, LEFT, SIDE_STRIDE
-from hrc_env.motion.state import (
-    ACTS_AT,
-    BACK_AWAY,
-    CALM_AT,
-    DELAY_S,
-    DOING,
-    KIND,
-    LASTS_S,
-    NO_REACTION,
-    PAUSE,
-    UNTIL_AT,
-)
+from hrc_env.motion.state import WORKER, Worker, Workers
 from hrc_env.motion.traffic import goes, meets
 from hrc_env.motion.walk import brake
 
@@ -30,66 +20,44 @@ BODY_POINTS = (CHEST, HEAD, LEFT + HAND, LEFT + SIDE_STRIDE + HAND)
 """Segments that people guard."""
 WITHDRAW = -1.6
 """Hands come back so much faster than they went."""
+People = tuple[float, float, float]
+"""`PeopleConfig.notice_m`, `.fast_m_s`, `.calm_s`."""
 
 
 @kernel
 def notice(
-    dt_s: float, people: tuple[float, float, float], robot_world: Floats, seen: Floats,
-    position_world: Floats, present: Floats, alert: Floats, pace: Floats, clock_s: Floats,
-    time_s: Floats, duration_s: Floats, activity: Ints, plan: Floats, prints: Floats,
-    stance: Floats, body: Ints, size: Floats,
-) -> None:  # fmt: skip
-    """Let every worker look at the robot, and react when it is time.
-
-    Args:
-        dt_s: since the last look.
-        people: `PeopleConfig.notice_m`, `.fast_m_s`, `.calm_s`.
-        robot_world: (B, P, 3) points of the arm now [m].
-        seen: (B, P, 3) the same at the last look; made those of now.
-        position_world: (B, W, 22, 3) the workers' segments now [m].
-        present, alert, pace, clock_s, time_s, duration_s, activity, plan, prints, stance: of
-            `MotionState`; what a reaction changes is written.
-        body: (B, W) which body each has.
-        size: (N, N_SIZES) of the bodies.
-    """
-    for b in range(clock_s.shape[0]):
-        for w in range(clock_s.shape[1]):
-            mine, clock = alert[b, w], clock_s[b, w]
-            if present[b, w] == 0.0:
-                continue
-            if mine[DOING] == PAUSE and clock >= mine[UNTIL_AT]:
-                mine[DOING], pace[b, w, 1] = NO_REACTION, 1.0
-            if clock >= mine[ACTS_AT]:
-                mine[ACTS_AT] = math.inf
-                _react(
-                    w, mine, pace[b], clock, time_s[b], duration_s[b], activity[b], plan[b],
-                    prints[b, w], stance[b, w], present[b], size[body[b, w]],
-                )  # fmt: skip
-                mine[CALM_AT] = clock + mine[LASTS_S] + people[2]
-                continue
-            wakeful = mine[KIND] != NO_REACTION and mine[ACTS_AT] == math.inf
-            if (
-                wakeful
-                and clock > mine[CALM_AT]
-                and _startling(dt_s, people, robot_world[b], seen[b], position_world[b, w])
+    dt_s: float, people: People, robot_world: Floats, position_world: Floats, workers: Workers
+) -> None:
+    """Let all look at the arm (B, 2, 3), dt_s after the last look, and react when it is time."""
+    for b, w in np.ndindex(workers.shape):
+        me = workers[b, w]
+        if me.present:
+            if me.doing == st.PAUSE and me.clock_s >= me.doing_until:
+                me.doing, me.pace_wished = st.NO_REACTION, 1.0
+            if me.clock_s >= me.acts_at:
+                me.acts_at = math.inf
+                _react(w, workers[b])
+                me.calm_until = me.clock_s + me.reaction_s + people[2]
+            elif (
+                me.reaction != st.NO_REACTION
+                and me.acts_at == math.inf
+                and me.clock_s > me.calm_until
+                and _startling(dt_s, people, robot_world[b], position_world[b, w], me)
             ):
-                mine[ACTS_AT] = clock + mine[DELAY_S]
-        for k in range(seen.shape[1]):
-            for i in range(3):
-                seen[b, k, i] = robot_world[b, k, i]
+                me.acts_at = me.clock_s + me.delay_s
+        for k, i in np.ndindex(me.robot_world.shape):
+            me.robot_world[k, i] = robot_world[b, k, i]
 
 
 @kernel
-def _startling(
-    dt_s: float, people: tuple[float, float, float], robot: Floats, before: Floats, body: Floats
-) -> bool:
+def _startling(dt_s: float, people: People, robot: Floats, body: Floats, me: Worker) -> bool:
     """Whether a point of the arm is near, or comes fast from not far."""
     for segment in BODY_POINTS:
         for k in range(robot.shape[0]):
             now, then = 0.0, 0.0
             for i in range(3):
                 now += (robot[k, i] - body[segment, i]) ** 2
-                then += (before[k, i] - body[segment, i]) ** 2
+                then += (me.robot_world[k, i] - body[segment, i]) ** 2
             now, then = math.sqrt(now), math.sqrt(then)
             if now < people[0]:
                 return True
@@ -99,46 +67,35 @@ def _startling(
 
 
 @kernel
-def _react(
-    w: int, mine: Floats, pace: Floats, clock: float, time_s: Floats, duration_s: Floats,
-    activity: Ints, plan: Floats, prints: Floats, stance: Floats, present: Floats, size: Floats,
-) -> None:  # fmt: skip
+def _react(w: int, workers: Workers) -> None:
     """Do what worker w does about the robot, if what they are at allows it."""
-    kind = activity[w]
+    me = workers[w]
+    kind = me.activity
+    upright = kind <= st.REACH or kind == st.LOOK_ROUND or st.HAMMER <= kind <= st.POINT
     if goes(kind):
-        if (kind == pl.WALK or kind == pl.CARRY) and _brake(
-            w, time_s, duration_s, activity, plan, prints, stance, present, size
-        ):
-            mine[DOING] = PAUSE
-            mine[UNTIL_AT] = clock + duration_s[w] - time_s[w] + mine[LASTS_S]
-    elif mine[KIND] == BACK_AWAY and withdraws(kind):
-        mine[DOING] = BACK_AWAY
-        if kind == pl.STAND or kind == pl.LOOK_ROUND:
-            duration_s[w] = time_s[w]
+        if (kind == st.WALK or kind == st.CARRY) and _brake(w, workers):
+            me.doing = st.PAUSE
+            me.doing_until = me.clock_s + me.duration_s - me.time_s + me.reaction_s
+    elif me.reaction == st.BACK_AWAY and upright:
+        me.doing = st.BACK_AWAY
+        if kind == st.STAND or kind == st.LOOK_ROUND:
+            me.duration_s = me.time_s
         else:
-            pace[w, 1] = WITHDRAW
+            me.pace_wished = WITHDRAW
     else:
-        mine[DOING], mine[UNTIL_AT], pace[w, 1] = PAUSE, clock + mine[LASTS_S], 0.0
-
-
-@kernel
-def withdraws(activity: int) -> bool:
-    """Whether one can step back from it: standing up, with empty hands."""
-    return activity <= pl.REACH or activity == pl.LOOK_ROUND or pl.HAMMER <= activity <= pl.POINT
+        me.doing, me.doing_until, me.pace_wished = st.PAUSE, me.clock_s + me.reaction_s, 0.0
 
 
 @kernel(makes_arrays=True)
-def _brake(
-    w: int, time_s: Floats, duration_s: Floats, activity: Ints, plan: Floats, prints: Floats,
-    stance: Floats, present: Floats, size: Floats,
-) -> bool:  # fmt: skip
+def _brake(w: int, workers: Workers) -> bool:
     """Brake a walker, unless somebody would walk into them; whether they do."""
-    old_plan, old_prints, old_s = plan[w].copy(), prints.copy(), duration_s[w]
-    lasts = brake(time_s[w], plan[w], prints, stance, size)
+    before = np.empty(1, WORKER)
+    before[0] = workers[w]
+    lasts = brake(workers[w].time_s, workers[w])
     if lasts < 0.0:
         return False
-    duration_s[w] = lasts
-    found, _, _ = meets(w, activity, time_s, duration_s, plan, present)
+    workers[w].duration_s = lasts
+    found, _, _ = meets(w, workers)
     if found >= 0.0:
-        plan[w], prints[:], duration_s[w] = old_plan, old_prints, old_s
+        workers[w] = before[0]
     return found < 0.0

@@ -1,45 +1,27 @@
 """Everything that workers can do, in scenes of one or a few activities: for reports, pictures."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
+from hrc_env.core.kernels import kernel
+from hrc_env.core.records import Held, WorkerMotion
 from hrc_env.core.typing import Floats
-from hrc_env.motion import plans as pl
-from hrc_env.motion.activities.climb import start_climb
-from hrc_env.motion.activities.crouching import plan_kneel, plan_squat
-from hrc_env.motion.activities.drill import plan_drill
-from hrc_env.motion.activities.going import (
-    CART,
-    WHEELBARROW,
-    start_push,
-    start_step_back,
-    start_stumble,
-    start_turn,
-    start_walk,
-)
-from hrc_env.motion.activities.hammer import plan_hammer
-from hrc_env.motion.activities.loads import (
-    BOARD,
-    BOX,
-    finish_lift,
-    plan_hand_over,
-    plan_pick_up,
-    plan_receive,
-    plan_set_down,
-)
-from hrc_env.motion.activities.look_round import start_look_round
-from hrc_env.motion.activities.lunge import plan_lunge
-from hrc_env.motion.activities.measure import plan_measure
-from hrc_env.motion.activities.planning import finish
-from hrc_env.motion.activities.point import plan_point
-from hrc_env.motion.activities.saw import plan_saw
-from hrc_env.motion.activities.worker import N_START, Place, Worker
-from hrc_env.motion.solo import Film, play, rest
+from hrc_env.motion import controls as c
+from hrc_env.motion import state as st
+from hrc_env.motion.activities.going import CART, WHEELBARROW, start_turn
+from hrc_env.motion.activities.loads import BOARD, BOX, finish_lift, plan_pick_up
+from hrc_env.motion.anatomy import anatomy
+from hrc_env.motion.blending import RATE_H_S, evaluate, settle, stop
+from hrc_env.motion.feet import feet
+from hrc_env.motion.holding import N_HELD, drop_load, prop_pose
+from hrc_env.motion.kinematics import pose, quaternion
+from hrc_env.motion.starting import STARTS, Start, start_going
+from hrc_env.motion.state import N_START, WORKER, Place, Worker
+from hrc_env.worker.body import N_SEGMENTS, Body
 
-Start = Callable[[Floats, Place, Worker], float]
-"""Begins an activity, see `activities`; how long it lasts [s]."""
 Act = tuple[int, Start, float]
 """An activity, what begins it, the height of its place [m]."""
 NO_CORNERS = np.zeros((0, 3))
@@ -49,36 +31,103 @@ LIGHT_DRAW = 2
 """Which draw of `plan_hammer` decides between taps and blows."""
 
 
+@dataclass(frozen=True, slots=True)
+class Film:
+    """What a worker did."""
+
+    activity: int
+    time_s: Floats
+    """(T,) since the activity began."""
+    controls: Floats
+    """(T, N_CONTROLS)."""
+    motion: WorkerMotion
+    """Arrays (T, 1, ...)."""
+    worker: Worker
+    """As the activity planned it."""
+
+
+def alone(
+    body: Body, xy_m: tuple[float, float] = (0.0, 0.0), yaw_rad: float = 0.0, right: bool = True
+) -> Worker:
+    """A worker at a point, feet side by side, who has nothing to do."""
+    bones, me = anatomy(body), np.zeros(1, WORKER)[0]
+    me["present"], me["pace"] = True, 1.0
+    me["bones"], me["frame"], me["size"] = bones.offset, bones.frame, bones.size
+    me["speed_m_s"], me["squat_share"], me["right_handed"] = 1.2, 0.7, 0.9 if right else 0.1
+    settle(*xy_m, yaw_rad, me)
+    feet(0.0, me)
+    return me
+
+
 def perform(acts: Sequence[Act], me: Worker, rng: np.random.Generator, dt_s: float) -> list[Film]:
     """Films of acts in their order, at intervals of dt_s; the worker stands where they end."""
     films, clock_s = [], 10.0 * float(rng.random())
     for activity, start, height_m in acts:
-        plan = me.plan
-        place = (float(plan[pl.START_X]), float(plan[pl.START_Y]), float(plan[pl.START_YAW]))
-        lasts_s = start(rng.random(N_START), (*place, height_m), me)
-        films.append(play(me, activity, np.arange(0.0, lasts_s, dt_s), clock_s))
-        rest(me, activity)
+        place = (float(me["start_x"]), float(me["start_y"]), float(me["start_yaw"]), height_m)
+        me["activity"] = activity
+        lasts_s = start(rng.random(N_START), place, me)
+        films.append(_film(me, np.arange(0.0, lasts_s, dt_s), clock_s))
+        stop(me)
+        if activity in st.GIVING or activity == st.PUSH:
+            drop_load(me)
+        feet(0.0, me)
         clock_s += lasts_s
     return films
 
 
-def _ahead(place: Place, way_m: float = AWAY_M) -> Place:
-    """A place some way ahead."""
-    x, y, yaw, height = place
-    return x + way_m * math.cos(yaw), y + way_m * math.sin(yaw), yaw, height
+def _film(me: Worker, time_s: Floats, clock_s: float) -> Film:
+    """The worker at the times (T,) of an activity that began at a clock."""
+    controls = np.empty((len(time_s), c.N_CONTROLS))
+    place, turn = np.empty((len(time_s), N_SEGMENTS, 3)), np.empty((len(time_s), N_SEGMENTS, 4))
+    rate, held = np.empty_like(place), np.empty((len(time_s), N_HELD))
+    _fill(clock_s, time_s, controls, place, turn, rate, held, me)
+    things = Held(held[:, None, 0].astype(int), held[:, None, 1:4], held[:, None, 4:])
+    spin = np.zeros_like(rate)[:, None]
+    motion = WorkerMotion(place[:, None], turn[:, None], rate[:, None], spin, things)
+    return Film(int(me["activity"]), time_s, controls, motion, me.copy())
 
 
-def _walk(speed_m_s: float, way_m: float = AWAY_M) -> Start:
-    return lambda draws, place, me: start_walk(_ahead(place, way_m), NO_CORNERS, speed_m_s, me)
+@kernel(makes_arrays=True)
+def _fill(
+    clock_s: float, time_s: Floats, controls: Floats, place: Floats, turn: Floats, rate: Floats,
+    held: Floats, me: Worker,
+) -> None:  # fmt: skip
+    """Fill the arrays of a film."""
+    frames = np.zeros((1, 1))
+    for k in range(len(time_s)):
+        for i in range(1, -1, -1):
+            t = time_s[k] + i * RATE_H_S
+            evaluate(t, clock_s + time_s[k] + i * RATE_H_S, frames, me)
+            pose(me)
+            if i == 1:
+                me.later_p = me.p
+        controls[k] = me.q
+        for s in range(place.shape[1]):
+            for i in range(3):
+                place[k, s, i] = me.p[s, i]
+                rate[k, s, i] = (me.later_p[s, i] - me.p[s, i]) / RATE_H_S
+            quaternion(me.r, s, turn[k])
+        prop_pose(held[k], me)
 
 
-def _hammer(lightly: bool) -> Start:
+def _going(activity: int, speed_m_s: float = 1.1, prop: int = 0, way_m: float = AWAY_M) -> Act:
+    """Go some way ahead."""
+
+    def start(draws: Floats, place: Place, me: Worker) -> float:
+        x, y, yaw, z = place
+        ahead = x + way_m * math.cos(yaw), y + way_m * math.sin(yaw), yaw, z
+        return start_going(activity, draws, ahead, NO_CORNERS, speed_m_s, prop, me)
+
+    return activity, start, 0.0
+
+
+def _hammer(lightly: bool, height_m: float) -> tuple[Act]:
     def start(draws: Floats, place: Place, me: Worker) -> float:
         chosen = draws.copy()
         chosen[LIGHT_DRAW] = 0.0 if lightly else 1.0
-        return finish(plan_hammer(chosen, place, me), me)
+        return STARTS[st.HAMMER](chosen, place, me)
 
-    return start
+    return ((st.HAMMER, start, height_m),)
 
 
 def _turn(draws: Floats, place: Place, me: Worker) -> float:
@@ -86,26 +135,15 @@ def _turn(draws: Floats, place: Place, me: Worker) -> float:
     return start_turn((place[0], place[1], place[2] + turn, 0.0), me)
 
 
-def _stumble(draws: Floats, place: Place, me: Worker) -> float:
-    return start_stumble(draws, _ahead(place), NO_CORNERS, 1.2, me)
+def _take(prop: int, on_shoulder: bool, height_m: float) -> Act:
+    def start(draws: Floats, place: Place, me: Worker) -> float:
+        return finish_lift(plan_pick_up(draws, place, prop, on_shoulder, me), me)
+
+    return st.PICK_UP, start, height_m
 
 
-def _push(prop: int) -> Start:
-    return lambda draws, place, me: start_push(_ahead(place), NO_CORNERS, 1.1, prop, me)
-
-
-def _work(plan: Start) -> Start:
-    """Work in place that is planned so."""
-    return lambda draws, place, me: finish(plan(draws, place, me), me)
-
-
-def _load(plan: Start) -> Start:
-    """The way of a load that is planned so."""
-    return lambda draws, place, me: finish_lift(plan(draws, place, me), me)
-
-
-def _take(prop: int, on_shoulder: bool) -> Start:
-    return _load(lambda draws, place, me: plan_pick_up(draws, place, prop, on_shoulder, me))
+def _here(activity: int, height_m: float = 0.0) -> tuple[Act]:
+    return ((activity, STARTS[activity], height_m),)
 
 
 def _stand(draws: Floats, place: Place, me: Worker) -> float:
@@ -113,45 +151,38 @@ def _stand(draws: Floats, place: Place, me: Worker) -> float:
 
 
 FLOOR_M, TABLE_M = 0.2, 0.85
-_SET_DOWN: Start = _load(plan_set_down)
-_CARRY: Act = (pl.CARRY, _walk(1.1), 0.0)
+_CARRY = _going(st.CARRY)
 REPERTOIRE: dict[str, tuple[Act, ...]] = {
-    "stand": ((pl.STAND, _stand, 0.0),),
-    "look round": ((pl.LOOK_ROUND, start_look_round, 0.0),),
-    "point": ((pl.POINT, _work(plan_point), 0.0),),
-    "walk 0.8 m/s": ((pl.WALK, _walk(0.8, FAR_M), 0.0),),
-    "walk 1.1 m/s": ((pl.WALK, _walk(1.1, FAR_M), 0.0),),
-    "walk 1.3 m/s": ((pl.WALK, _walk(1.3, FAR_M), 0.0),),
-    "walk 1.4 m/s": ((pl.WALK, _walk(1.4, FAR_M), 0.0),),
-    "walk 1.8 m/s": ((pl.WALK, _walk(1.8, FAR_M), 0.0),),
-    "turn": ((pl.TURN, _turn, 0.0),),
-    "step back": ((pl.STEP_BACK, start_step_back, 0.0),),
-    "stumble": ((pl.STUMBLE, _stumble, 0.0),),
-    "lunge": ((pl.LUNGE, _work(plan_lunge), 1.1),),
+    "stand": ((st.STAND, _stand, 0.0),),
+    "look round": _here(st.LOOK_ROUND),
+    "point": _here(st.POINT),
+    "walk 0.8 m/s": (_going(st.WALK, 0.8, way_m=FAR_M),),
+    "walk 1.1 m/s": (_going(st.WALK, 1.1, way_m=FAR_M),),
+    "walk 1.3 m/s": (_going(st.WALK, 1.3, way_m=FAR_M),),
+    "walk 1.4 m/s": (_going(st.WALK, 1.4, way_m=FAR_M),),
+    "walk 1.8 m/s": (_going(st.WALK, 1.8, way_m=FAR_M),),
+    "turn": ((st.TURN, _turn, 0.0),),
+    "step back": _here(st.STEP_BACK),
+    "stumble": (_going(st.STUMBLE, 1.2),),
+    "lunge": _here(st.LUNGE, 1.1),
     "box from the floor to a table": (
-        (pl.PICK_UP, _take(BOX, False), FLOOR_M), _CARRY, (pl.SET_DOWN, _SET_DOWN, TABLE_M)
+        _take(BOX, False, FLOOR_M), _CARRY, *_here(st.SET_DOWN, TABLE_M)
     ),
-    "board in both hands": (
-        (pl.PICK_UP, _take(BOARD, False), TABLE_M), _CARRY, (pl.SET_DOWN, _SET_DOWN, FLOOR_M)
-    ),
-    "board on the shoulder": (
-        (pl.PICK_UP, _take(BOARD, True), FLOOR_M), _CARRY, (pl.SET_DOWN, _SET_DOWN, FLOOR_M)
-    ),
-    "receive and hand over": (
-        (pl.RECEIVE, _load(plan_receive), 0.0), (pl.HAND_OVER, _load(plan_hand_over), 0.0)
-    ),
-    "cart": ((pl.PUSH, _push(CART), 0.0),),
-    "wheelbarrow": ((pl.PUSH, _push(WHEELBARROW), 0.0),),
-    "squat": ((pl.SQUATTING, _work(plan_squat), FLOOR_M),),
-    "kneel": ((pl.KNEELING, _work(plan_kneel), FLOOR_M),),
-    "hammer lightly": ((pl.HAMMER, _hammer(True), TABLE_M),),
-    "hammer on a table": ((pl.HAMMER, _hammer(False), TABLE_M),),
-    "hammer at a wall": ((pl.HAMMER, _hammer(False), 1.4),),
-    "hammer on the floor": ((pl.HAMMER, _hammer(False), FLOOR_M),),
-    "drill": ((pl.DRILL, _work(plan_drill), 1.25),),
-    "drill overhead": ((pl.OVERHEAD, _work(plan_drill), 2.0),),
-    "saw": ((pl.SAW, _work(plan_saw), TABLE_M),),
-    "measure": ((pl.MEASURE, _work(plan_measure), TABLE_M),),
-    "climb": ((pl.CLIMB, start_climb, 0.22),),
+    "board in both hands": (_take(BOARD, False, TABLE_M), _CARRY, *_here(st.SET_DOWN, FLOOR_M)),
+    "board on the shoulder": (_take(BOARD, True, FLOOR_M), _CARRY, *_here(st.SET_DOWN, FLOOR_M)),
+    "receive and hand over": (*_here(st.RECEIVE), *_here(st.HAND_OVER)),
+    "cart": (_going(st.PUSH, prop=CART),),
+    "wheelbarrow": (_going(st.PUSH, prop=WHEELBARROW),),
+    "squat": _here(st.SQUATTING, FLOOR_M),
+    "kneel": _here(st.KNEELING, FLOOR_M),
+    "hammer lightly": _hammer(True, TABLE_M),
+    "hammer on a table": _hammer(False, TABLE_M),
+    "hammer at a wall": _hammer(False, 1.4),
+    "hammer on the floor": _hammer(False, FLOOR_M),
+    "drill": _here(st.DRILL, 1.25),
+    "drill overhead": _here(st.OVERHEAD, 2.0),
+    "saw": _here(st.SAW, TABLE_M),
+    "measure": _here(st.MEASURE, TABLE_M),
+    "climb": _here(st.CLIMB, 0.22),
 }  # fmt: skip
 """Scenes by name."""

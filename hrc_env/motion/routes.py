@@ -1,27 +1,25 @@
-"""Ways round what stands there and round other people: A* on a grid, pulled tight.
-
-Hart, Nilsson and Raphael (1968), doi:10.1109/TSSC.1968.300136; corners are where a pulled
-string would touch, and arcs round them (`paths`).
+"""Ways round what stands there and other people: A* on a grid (Hart, Nilsson and Raphael 1968),
+pulled tight; corners are where a pulled string would touch, and arcs round them (`paths`).
 """
 
 import heapq
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
-from hrc_env.motion import plans as pl
 from hrc_env.motion.floorplan import CELL_M, slack_at
 from hrc_env.motion.paths import along, lay_path
+from hrc_env.motion.state import Worker
 
 STRIDE = 3
 """Grid points of the field to a node of the search: 15 cm."""
 EASE_M = 0.7
 """So near its ends a way may be as near to things as its ends are [m]."""
 SEARCHED_M, PULLED_M, WALKED_M = 0.05, 0.03, -0.02
-"""Slack that nodes, straight lines and the arcs at last must have [m]: each step of the planning
-may lose a little."""
+"""Slack that nodes, straight lines and the arcs at last must have [m]."""
 SAMPLE_M = 0.06
 """Lines are looked at in steps of this length [m]."""
 ARMS_M = (1.2, 0.7, 0.35, 0.15, 0.02)
@@ -30,43 +28,44 @@ BOW_SHARE = 0.12
 """People do not walk dead straight: sideways bow of a free way as a share of it; judgement."""
 
 
-@kernel
-def roomy(
-    x: float, y: float, margin: float, ends: Floats, discs: Floats, slack: Floats, origin: Floats
-) -> bool:
-    """Whether a point of a way is free.
+class Ground(NamedTuple):
+    """What ways keep clear of."""
 
-    Args:
-        x, y: [m].
-        margin: slack that it must have, far from the ends [m].
-        ends: (2, 3) x, y and slack of the way's ends.
-        discs: (n, 3) x, y, radius of what is in the way for now, people above all.
-        slack, origin: the field of a `Floorplan`.
-    """
+    ends: Floats
+    """(2, 3) x, y and slack of the way's ends."""
+    discs: Floats
+    """(n, 3) x, y, radius of what is in the way for now, people above all."""
+    slack: Floats
+    origin: Floats
+    """The field of a `Floorplan`."""
+
+
+@kernel
+def roomy(x: float, y: float, margin: float, ground: Ground) -> bool:
+    """Whether a point of a way is free, with `margin` [m] of slack far from the ends."""
     need = margin
     for k in range(2):
-        if ends[k, 2] < margin:
-            away = math.hypot(x - ends[k, 0], y - ends[k, 1]) / EASE_M
-            need = min(need, ends[k, 2] - 0.005 + (margin - ends[k, 2]) * min(away, 1.0))
-    if slack_at(x, y, slack, origin) < need:
+        if ground.ends[k, 2] < margin:
+            away = math.hypot(x - ground.ends[k, 0], y - ground.ends[k, 1]) / EASE_M
+            need = min(
+                need, ground.ends[k, 2] - 0.005 + (margin - ground.ends[k, 2]) * min(away, 1.0)
+            )
+    if slack_at(x, y, ground.slack, ground.origin) < need:
         return False
-    for k in range(discs.shape[0]):
-        if math.hypot(x - discs[k, 0], y - discs[k, 1]) < discs[k, 2]:
+    for k in range(ground.discs.shape[0]):
+        if math.hypot(x - ground.discs[k, 0], y - ground.discs[k, 1]) < ground.discs[k, 2]:
             return False
     return True
 
 
 @kernel
-def clear(
-    x0: float, y0: float, x1: float, y1: float, margin: float, ends: Floats, discs: Floats,
-    slack: Floats, origin: Floats,
-) -> bool:  # fmt: skip
+def clear(x0: float, y0: float, x1: float, y1: float, margin: float, ground: Ground) -> bool:
     """Whether a straight line is free."""
     n = int(math.hypot(x1 - x0, y1 - y0) / SAMPLE_M) + 1
     for k in range(n + 1):
         u = k / n
         x, y = x0 + u * (x1 - x0), y0 + u * (y1 - y0)
-        if not roomy(x, y, margin, ends, discs, slack, origin):
+        if not roomy(x, y, margin, ground):
             return False
     return True
 
@@ -74,20 +73,12 @@ def clear(
 @kernel(makes_arrays=True)
 def route(
     start: tuple[float, float], end: tuple[float, float], bow: float, discs: Floats,
-    slack: Floats, origin: Floats, plan: Floats, via: Floats,
+    slack: Floats, origin: Floats, via: Floats, me: Worker,
 ) -> int:  # fmt: skip
-    """Find a way and lay the path in a plan.
+    """Find a way and lay the path; the number of its corners `via` (MAX_VIA, 3), -1: there is none.
 
-    Args:
-        start, end: x, y [m].
-        bow: in [-1, 1], how much and to which side a free way bends.
-        discs: (n, 3) x, y, radius to keep away from; those that hold an end give way to it.
-        slack, origin: the field of a `Floorplan`.
-        plan: its `PATH` columns are written.
-        via: (MAX_VIA, 3) corners, written; see `paths.lay_path`.
-
-    Returns:
-        The number of corners; -1 where there is no way.
+    `bow` in [-1, 1] is how a free way bends; discs (n, 3), x, y, radius, are kept away from, but
+    give way where they hold an end; slack and origin are a `Floorplan`'s field.
     """
     ends, own = np.empty((2, 3)), discs.copy()
     for k in range(2):
@@ -95,46 +86,46 @@ def route(
         ends[k, 0], ends[k, 1], ends[k, 2] = x, y, slack_at(x, y, slack, origin)
         for i in range(own.shape[0]):
             own[i, 2] = min(own[i, 2], math.hypot(x - own[i, 0], y - own[i, 1]) - 0.02)
-    if clear(start[0], start[1], end[0], end[1], PULLED_M, ends, own, slack, origin):
+    ground = Ground(ends, own, slack, origin)
+    if clear(start[0], start[1], end[0], end[1], PULLED_M, ground):
         via[0, 0] = 0.5 * (start[0] + end[0]) - BOW_SHARE * bow * (end[1] - start[1])
         via[0, 1] = 0.5 * (start[1] + end[1]) + BOW_SHARE * bow * (end[0] - start[0])
         via[0, 2] = 9.0
-        lay_path(start, via[:1], end, plan)
-        if walkable(plan, ends, own, slack, origin):
+        lay_path(start, via[:1], end, me)
+        if walkable(ground, me):
             return 1
-        lay_path(start, via[:0], end, plan)
+        lay_path(start, via[:0], end, me)
         return 0
-    n = _search(start, end, ends, own, slack, origin, via)
+    n = _search(start, end, ground, via)
     if n < 0:
         return -1
     for arm in ARMS_M:
         via[:n, 2] = arm
-        lay_path(start, via[:n], end, plan)
-        if walkable(plan, ends, own, slack, origin):
+        lay_path(start, via[:n], end, me)
+        if walkable(ground, me):
             return n
     return -1
 
 
 @kernel
-def walkable(plan: Floats, ends: Floats, discs: Floats, slack: Floats, origin: Floats) -> bool:
+def walkable(ground: Ground, me: Worker) -> bool:
     """Whether the path of a plan is free."""
-    n = int(plan[pl.LENGTH] / SAMPLE_M) + 1
+    n = int(me.length / SAMPLE_M) + 1
     for k in range(n + 1):
-        x, y = along(k / n * plan[pl.LENGTH], plan)
-        if not roomy(x, y, WALKED_M, ends, discs, slack, origin):
+        x, y = along(k / n * me.length, me)
+        if not roomy(x, y, WALKED_M, ground):
             return False
     return True
 
 
 @kernel(makes_arrays=True)
 def _search(
-    start: tuple[float, float], end: tuple[float, float], ends: Floats, discs: Floats,
-    slack: Floats, origin: Floats, via: Floats,
+    start: tuple[float, float], end: tuple[float, float], ground: Ground, via: Floats,
 ) -> int:  # fmt: skip
     """Corners of a short way by A* (`route`); -1 where there is none, or it has too many."""
-    h = STRIDE * CELL_M
-    n_x = (slack.shape[0] + STRIDE - 1) // STRIDE
-    n_y = (slack.shape[1] + STRIDE - 1) // STRIDE
+    h, origin = STRIDE * CELL_M, ground.origin
+    n_x = (ground.slack.shape[0] + STRIDE - 1) // STRIDE
+    n_y = (ground.slack.shape[1] + STRIDE - 1) // STRIDE
     cost, parent = np.full(n_x * n_y, np.inf), np.full(n_x * n_y, -1)
     state = np.zeros(n_x * n_y, np.int8)  # 0 not looked at, 1 free, 2 not free, 3 done
     queue: list = [(0.0, -1)]
@@ -143,7 +134,7 @@ def _search(
     for i in range(max(si - 2, 0), min(si + 3, n_x)):
         for j in range(max(sj - 2, 0), min(sj + 3, n_y)):
             x, y = origin[0] + i * h, origin[1] + j * h
-            if clear(start[0], start[1], x, y, PULLED_M, ends, discs, slack, origin):
+            if clear(start[0], start[1], x, y, PULLED_M, ground):
                 node = i * n_y + j
                 cost[node] = math.hypot(x - start[0], y - start[1])
                 state[node] = 1
@@ -157,7 +148,7 @@ def _search(
         i, j = node // n_y, node % n_y
         x, y = origin[0] + i * h, origin[1] + j * h
         near = math.hypot(end[0] - x, end[1] - y) < 2.0 * h
-        if near and clear(x, y, end[0], end[1], PULLED_M, ends, discs, slack, origin):
+        if near and clear(x, y, end[0], end[1], PULLED_M, ground):
             goal = node
             break
         for di in range(-1, 2):
@@ -168,7 +159,7 @@ def _search(
                 other = a * n_y + b
                 ox, oy = origin[0] + a * h, origin[1] + b * h
                 if state[other] == 0:
-                    free = roomy(ox, oy, SEARCHED_M, ends, discs, slack, origin)
+                    free = roomy(ox, oy, SEARCHED_M, ground)
                     state[other] = 1 if free else 2
                 longer = cost[node] + h * math.hypot(di, dj)
                 if state[other] == 1 and longer < cost[other] - 1e-9:
@@ -176,16 +167,16 @@ def _search(
                     heapq.heappush(queue, (longer + math.hypot(end[0] - ox, end[1] - oy), other))
     if goal < 0:
         return -1
-    return _pull(goal, parent, n_y, h, start, end, ends, discs, slack, origin, via)
+    return _pull(goal, parent, n_y, h, start, end, ground, via)
 
 
 @kernel
 def _pull(
     goal: int, parent: Floats, n_y: int, h: float, start: tuple[float, float],
-    end: tuple[float, float], ends: Floats, discs: Floats, slack: Floats, origin: Floats,
-    via: Floats,
+    end: tuple[float, float], ground: Ground, via: Floats,
 ) -> int:  # fmt: skip
     """Pull a chain of nodes tight, from its end to its start, into at most MAX_VIA corners."""
+    origin = ground.origin
     at_x, at_y, last_x, last_y = end[0], end[1], end[0], end[1]
     node, count = goal, 0
     while True:
@@ -193,7 +184,7 @@ def _pull(
             x, y = origin[0] + (node // n_y) * h, origin[1] + (node % n_y) * h
         else:
             x, y = start
-        if not clear(at_x, at_y, x, y, PULLED_M, ends, discs, slack, origin):
+        if not clear(at_x, at_y, x, y, PULLED_M, ground):
             if count == via.shape[0] or (last_x == at_x and last_y == at_y):
                 return -1
             via[count, 0], via[count, 1] = last_x, last_y

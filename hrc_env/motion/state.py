@@ -1,241 +1,125 @@
-"""The state of the workers' motion, and the compiled code that moves it on."""
+"""The state of the workers' motion: one structured array, rows are environments and workers.
 
-from dataclasses import dataclass
+Metres, seconds, radians. Kernels take one worker's record (`Worker`) and read and write its fields.
+Fields below "The activity's plan" are written when an activity begins (`activities`), and its
+closed form reads them.
+"""
+
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from hrc_env.core.kernels import kernel
-from hrc_env.core.records import Workplace
-from hrc_env.core.typing import Floats, Ints
 from hrc_env.motion import controls as c
-from hrc_env.motion import plans as pl
-from hrc_env.motion.activities.climb import climb
-from hrc_env.motion.activities.going import push
-from hrc_env.motion.activities.loads import pick_up
-from hrc_env.motion.activities.look_round import look_round
-from hrc_env.motion.activities.recorded import play
-from hrc_env.motion.activities.work import work
-from hrc_env.motion.anatomy import Anatomy
-from hrc_env.motion.config import MotionConfig, Numbers
-from hrc_env.motion.curves import decay, wrap
-from hrc_env.motion.errands import Errands
-from hrc_env.motion.feet import feet, step_time
-from hrc_env.motion.floorplan import Floorplan
-from hrc_env.motion.hands import lift, reach
-from hrc_env.motion.holding import drop_load, hold_load
-from hrc_env.motion.playing import Clips
-from hrc_env.motion.posture import STANCE_HALF_WIDTH_M, stand
-from hrc_env.motion.walk import footprint, walk
+from hrc_env.motion.anatomy import N_SIZES
+from hrc_env.worker.body import N_SEGMENTS
 
-BLEND_S = 0.45
-"""Time in which the difference between two activities decays [s]; about a settling step."""
-RATE_H_S = 1e-4
-"""Step of the difference quotient of the closed form that gives velocities [s]: at 60 m/s^2
-its error is 3 mm/s."""
+MAX_VIA, N_ROOTS = 8, 48
+"""Most corners of a path; moments at which a clip's root is noted."""
+MAX_STEPS = 72
+"""Most steps of one walk: 30 m at the pace of 0.8 m/s, and turns at its ends."""
+N_POINTS, N_FRAMES = N_SEGMENTS + 4, N_SEGMENTS + 1
+"""Rows that the kinematics work in: the segments', then some of their own (`kinematics`)."""
 
+_SCRATCH = [
+    ("q", "f8", (c.N_CONTROLS,)),  # control vector
+    ("p", "f8", (N_POINTS, 3)),  # origins of the segments
+    ("r", "f8", (N_FRAMES, 3, 3)),  # world_from_segment
+    ("later_p", "f8", (N_POINTS, 3)), ("later_r", "f8", (N_FRAMES, 3, 3)),
+    ("goals", "f8", (6,)),  # of the hands, while work is planned
+    ("handover", "f8", (2, c.N_BLENDED)),  # q where an activity ended, and a little later
+]  # fmt: skip
+_EPISODE = [
+    ("present", "?"),  # whether they are in this episode
+    ("body", "i8"),  # row of the bodies that there are; the next three are its `Anatomy`
+    ("bones", "f8", (N_SEGMENTS, 3)), ("frame", "f8", (N_SEGMENTS, 3, 3)),
+    ("size", "f8", (N_SIZES,)),
+    ("speed_m_s", "f8"),  # at which they walk
+    ("squat_share", "f8"),  # of squatting when lifting
+    ("right_handed", "f8"),  # probability of using the right hand when either would do
+    ("phases", "f8", (5,)),  # of their sway
+]  # fmt: skip
+_NOW = [
+    ("clock_s", "f8"),  # since the episode began
+    ("activity", "i8"),  # index into `ACTIVITY_NAMES`
+    ("time_s", "f8"), ("duration_s", "f8"),  # since it began; how long it lasts
+    ("pace", "f8"), ("pace_wished", "f8"),  # of its time: 1 as planned, 0 halted, < 0 taken back
+    ("blend", "f8", (c.N_BLENDED, 2)),  # what the one before left over: value, rate at time 0
+    ("stance", "f8", (2, 5)),  # footprints that it begins on: left, right; columns as `prints`
+    ("prints", "f8", (MAX_STEPS, 5)),  # of its steps: x, y, heading, share of a full stride, height
+    # What the worker is about
+    ("spot", "f8", (4,)),  # place where they work or go to: x, y, heading, height of the work
+    ("until_s", "f8"), ("since_s", "f8"),  # clock until which they stay; wait for a way (0: do not)
+    ("job", "i8"),  # index into the jobs
+    ("going", "i8"),  # THERE, UNDER_WAY, WAITING
+    ("at", "i8"),  # kind of the place, index into `WORKPLACE_KINDS`, or NOWHERE: done there
+    # What they noticed of the robot
+    ("robot_world", "f8", (2, 3)),  # elbow and tool when last looked at; infinite: not yet
+    ("acts_at", "f8"),  # clock at which they will react; infinite: noticed nothing
+    ("doing", "i8"), ("doing_until", "f8"),  # NO_REACTION, PAUSE or BACK_AWAY now; until when
+    ("calm_until", "f8"),  # before which clock nothing startles them
+    ("delay_s", "f8"), ("reaction", "i8"), ("reaction_s", "f8"),  # drawn when an activity begins
+]  # fmt: skip
+_PLAN = [
+    ("start_x", "f8"), ("start_y", "f8"), ("start_yaw", "f8"),  # root on the floor, heading
+    ("end_x", "f8"), ("end_y", "f8"), ("end_yaw", "f8"),  # the same when it ends
+    ("step_start", "f8"), ("step_period", "f8"), ("step_swing", "f8"),  # first lift-off; from one
+    ("step_first", "i8"), ("step_count", "i8"),  # to the next; in the air; foot (0 left); number
+    ("undo_at", "f8"),  # when the steps are gone back, the last one first; 0: never
+    ("lasts", "f8"),  # how long all of it takes, of activities that end as they began
+    ("load_prop", "i8"),  # what they go about with (0: nothing), from one activity to the next
+    ("load_at", "f8", (6,)),  # from the root: ahead, left, up, yaw, pitch, roll
+    ("load_grip", "f8", (6,)), ("load_used", "f8", (2,)),  # where hands hold it; whether they do
+    # Walking
+    ("sharpest", "f8"), ("n_pieces", "i8"), ("length", "f8"),  # of the path: greatest curvature
+    ("path", "f8", (2 * MAX_VIA + 1, 6)),  # its pieces, see `paths`
+    ("depart", "f8"), ("ramp", "f8"), ("travel_s", "f8"), ("top_m_s", "f8"),  # the root's way
+    ("turn_in", "f8"), ("turn_in_s", "f8"),  # from the heading into the path
+    ("turn_out", "f8"), ("turn_out_s", "f8"), ("turn_out_at", "f8"),  # and out of it
+    ("follow", "f8"),  # whether they face along the path (1) or side-step (0)
+    ("trip_at", "f8"), ("trip", "f8"),  # a foot catches; how badly (0: never)
+    ("taken_s", "f8"), ("tipped", "f8"), ("stoop", "f8"),  # pushing: to the handle; barrow; trunk
+    # Reaching, lifting, work in place
+    ("lean", "f8"), ("twist", "f8"), ("squat", "f8"),  # of the trunk, see `posture.lean`
+    ("out_at", "f8"), ("out_s", "f8"), ("hold_s", "f8"), ("back_s", "f8"),  # hands leave, stay
+    ("target", "f8", (6,)), ("used", "f8", (2,)),  # grips, left and right; whether they go there
+    ("gaze_yaw", "f8"), ("gaze_pitch", "f8"), ("gaze", "f8", (3,)),  # or a point
+    ("fidget_m", "f8"), ("fidget_hz", "f8"),  # the work that reaching hands do
+    ("raised", "f8", (6,)), ("raise_s", "f8"), ("carry_s", "f8"),  # a load held up
+    ("settle_s", "f8"), ("kneel", "f8"), ("crouch", "f8"), ("ahead", "f8"),  # getting down
+    ("tool", "i8"), ("side", "i8"), ("take_s", "f8"),  # in which hand; to take it from the belt
+    ("tool_pose", "f8", (6,)),  # at work, or of a load where it stands: x, y, z, yaw, pitch, roll
+    ("midway", "f8", (6,)), ("shoulder_s", "f8"),  # a load when it is up; from there to be carried
+    ("hidden", "?"),  # a load that is somebody else's until it is gripped, and after
+    ("stroke", "i8"), ("stroke_m", "f8"), ("stroke_hz", "f8"), ("burst_s", "f8"),  # see `strokes`
+    ("wander_m", "f8"),  # how far they move along the work between bursts
+    ("treads", "f8"), ("riser_m", "f8"), ("up_s", "f8"),  # climbing
+    ("left_rad", "f8"), ("left_s", "f8"), ("right_rad", "f8"), ("right_s", "f8"),  # looking round
+    # Playing a clip
+    ("clip_row", "i8"), ("clip_frames", "i8"), ("clip_fps", "f8"),  # among all clips' frames
+    ("clip_yaw", "f8"), ("clip_s", "f8"),
+    ("roots", "f8", (N_ROOTS, 2)),  # where the root will be, for those who walk round it
+]  # fmt: skip
+WORKER = np.dtype((np.record, np.dtype(_EPISODE + _NOW + _PLAN + _SCRATCH, align=True)))
+"""One worker; `np.zeros((B, W), WORKER)` are all."""
+Worker: TypeAlias = Any
+Workers: TypeAlias = Any
+"""A record of WORKER, and an array of them."""
+Place = tuple[float, float, float, float]
+"""x, y [m], yaw [rad], height of the work [m]."""
+N_START = 16
+"""Uniform numbers that a start function may use."""
 
-SPOT_X, SPOT_Y, SPOT_YAW, SPOT_HEIGHT, SPOT_UNTIL, SPOT_SINCE = range(6)
-"""Where the worker works or goes to, which way they look there, how high the work is, until which
-clock they stay [s], since when they want to go (0: they do not)."""
-N_SPOT = 6
-TASK, GOING, AT = range(3)
-"""Index of the task; whether they do it, are on the way to it, or want to go; kind of the place
-(index into `WORKPLACE_KINDS`; NOWHERE: they have done there what they came for)."""
-N_ERRAND, NOWHERE = 3, -1
+STAND, WALK, REACH, LIFT, TURN, CARRY, PUSH, STUMBLE, STEP_BACK, LOOK_ROUND = range(10)
+PICK_UP, SET_DOWN, HAND_OVER, RECEIVE, SQUATTING, KNEELING, HAMMER, DRILL = range(10, 18)
+OVERHEAD, SAW, MEASURE, POINT, LUNGE, CLIMB, CLIP = range(18, 25)
+ACTIVITY_NAMES = (
+    "stand", "walk", "reach", "lift", "turn", "carry", "push", "stumble", "step back",
+    "look round", "pick up", "set down", "hand over", "receive", "squat", "kneel", "hammer",
+    "drill", "drill overhead", "saw", "measure", "point", "lunge", "climb", "clip",
+)  # fmt: skip
+GOING = (WALK, TURN, CARRY, STUMBLE, STEP_BACK)
+TAKING, GIVING = (PICK_UP, RECEIVE), (SET_DOWN, HAND_OVER)
+"""Activities that share a closed form."""
+NOWHERE = -1
 THERE, UNDER_WAY, WAITING = range(3)
-"""Values of `GOING`."""
-ACTS_AT, DOING, UNTIL_AT, CALM_AT, DELAY_S, KIND, LASTS_S = range(7)
-"""Clock at which the worker will react to what they noticed (infinite: noticed nothing); what
-they do about it now and until which clock; from which clock on they may be startled again; drawn
-when an activity begins: how long they take to react, how they would, for how long."""
-N_ALERT = 7
 NO_REACTION, PAUSE, BACK_AWAY = range(3)
-"""Values of `DOING` and `KIND`."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Mind:
-    """What decisions are made from; constants."""
-
-    config: MotionConfig
-    numbers: Numbers
-    plan: Floorplan
-    errands: Errands
-    places: dict[str, tuple[Workplace, ...]]
-    """By kind."""
-    clips: Clips
-    """What there is to play."""
-    fewest: int
-    """Workers who are in an episode at least."""
-
-
-@dataclass(frozen=True, slots=True)
-class MotionState:
-    """All that changes is in these arrays: copying them copies the state."""
-
-    clock_s: Floats
-    """(B, W) time since the episode began."""
-    time_s: Floats
-    """(B, W) time since the activity began."""
-    duration_s: Floats
-    """(B, W) how long the activity lasts."""
-    activity: Ints
-    """(B, W) index into `ACTIVITY_NAMES`."""
-    plan: Floats
-    """(B, W, N_PLAN) the activity's numbers, see `plans`."""
-    prints: Floats
-    """(B, W, MAX_STEPS, 5) footprints x, y, heading, share of a full stride, height."""
-    stance: Floats
-    """(B, W, 2, 5) footprints that the activity begins on: left, right; columns as `prints`."""
-    offset: Floats
-    """(B, W, N_BLENDED, 2) what the activity before left over: value and rate at time 0."""
-    traits: Floats
-    """(B, W, N_TRAITS) what the worker keeps for an episode."""
-    pace: Floats
-    """(B, W, 2) how fast the activity's time goes, and what that is going to: 1 as planned, 0
-    halted, negative: taken back."""
-    spots: Floats
-    """(B, W, N_SPOT) the worker's place, see below."""
-    errand: Ints
-    """(B, W, N_ERRAND) what they are about, see below."""
-    alert: Floats
-    """(B, W, N_ALERT) what they noticed of the robot, see below."""
-    robot: Floats
-    """(B, 2, 3) elbow and tool of the arm when the workers last looked [m]; infinite: not yet."""
-    present: Floats
-    """(B, W) 1 of a worker who is there, 0 of one who is not in this episode."""
-    body: Ints
-    """(B, W) row of `anatomy`: which body each worker has in this episode."""
-    anatomy: Anatomy
-    """(N, ...) constants of the bodies that there are."""
-    mind: Mind
-    """Constants of the behaviour."""
-
-
-@kernel
-def evaluate(
-    activity: int, t: float, clock_s: float, plan: Floats, prints: Floats, stance: Floats,
-    offset: Floats, traits: Floats, size: Floats, frames: Floats, q: Floats,
-) -> None:  # fmt: skip
-    """The control vector q at time t of an activity: its closed form."""
-    feet_s = step_time(t, plan) - (plan[pl.TAKEN_S] if activity == pl.PUSH else 0.0)
-    feet(feet_s, plan, prints, stance, size, q)
-    if activity in pl.GOING:
-        walk(t, plan, clock_s, traits, size, q)
-    elif activity == pl.REACH:
-        reach(t, plan, clock_s, traits, size, q)
-    elif activity == pl.LIFT:
-        lift(t, plan, clock_s, traits, size, q)
-    elif activity == pl.PUSH:
-        push(t, plan, clock_s, traits, size, q)
-    elif activity in pl.TAKING:
-        pick_up(t, plan, clock_s, traits, size, q)
-    elif activity in pl.GIVING:
-        pick_up(plan[pl.LASTS] - t, plan, clock_s, traits, size, q)
-    elif pl.SQUATTING <= activity <= pl.LUNGE:
-        work(t, plan, clock_s, traits, size, q)
-    elif activity == pl.CLIMB:
-        climb(t, plan, clock_s, traits, size, q)
-    elif activity == pl.CLIP:
-        play(t, plan, prints, stance, clock_s, traits, size, frames, q)
-    else:
-        _stay(activity, t, plan, clock_s, traits, size, q)
-    if t < BLEND_S:
-        for i in range(c.N_BLENDED):
-            q[i] += decay(t / BLEND_S, BLEND_S, offset[i, 0], offset[i, 1])
-
-
-@kernel
-def _stay(
-    activity: int, t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q: Floats
-) -> None:
-    """The control vector of someone who stands, perhaps looking round or with a load."""
-    x, y, yaw = plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW]
-    if activity == pl.LOOK_ROUND:
-        look_round(t, plan, clock_s, traits, size, q)
-    else:
-        stand(x, y, yaw, clock_s, traits, size, q)
-    if plan[pl.LOAD_PROP] > 0.0:
-        hold_load(x, y, yaw, 0.0, plan, q)
-
-
-@kernel
-def stop(plan: Floats, prints: Floats, stance: Floats) -> float:
-    """Begin where the last activity ended; returns by how much its heading was unwound."""
-    count = int(plan[pl.STEP_COUNT]) if plan[pl.UNDO_AT] == 0.0 else 0
-    for k in range(max(count - 2, 0), count):
-        side = (k + int(plan[pl.STEP_FIRST])) % 2
-        for i in range(5):
-            stance[side, i] = prints[k, i]
-    yaw = wrap(plan[pl.END_YAW])
-    unwound = yaw - plan[pl.END_YAW]
-    stance[0, 2] += unwound
-    stance[1, 2] += unwound
-    plan[pl.START_X] = plan[pl.END_X]
-    plan[pl.START_Y] = plan[pl.END_Y]
-    plan[pl.START_YAW] = plan[pl.END_YAW] = yaw
-    plan[pl.STEP_COUNT], plan[pl.STEP_FIRST], plan[pl.UNDO_AT] = 0.0, 0.0, 0.0
-    plan[pl.STEP_START], plan[pl.STEP_PERIOD], plan[pl.STEP_SWING] = 0.0, 1.0, 0.5
-    return unwound
-
-
-@kernel
-def leave(
-    t: float, pace: float, clock_s: float, activity: int, plan: Floats, prints: Floats,
-    stance: Floats, offset: Floats, traits: Floats, size: Floats, frames: Floats, q: Floats,
-) -> None:  # fmt: skip
-    """End an activity at its time t: fill q (2, N_CONTROLS) then and a little later, and stop.
-
-    Args:
-        t: [s].
-        pace: how fast the activity's time goes; negative where it was taken back.
-        clock_s: the clock at t.
-        activity, plan, prints, stance, offset, traits: the worker's rows; plan and stance are
-            made to begin where it ended, and what was set down is gone.
-        size: of the body.
-        frames: of the clips.
-        q: written.
-    """
-    for i in range(2):
-        later = i * RATE_H_S
-        evaluate(
-            activity, t + pace * later, clock_s + later, plan, prints, stance, offset, traits,
-            size, frames, q[i],
-        )  # fmt: skip
-    unwound = stop(plan, prints, stance)
-    if activity in pl.GIVING or activity == pl.PUSH:
-        drop_load(plan)
-    q[0, c.HEADING] += unwound
-    q[1, c.HEADING] += unwound
-
-
-@kernel(makes_arrays=True)
-def join(
-    clock_s: float, activity: int, plan: Floats, prints: Floats, stance: Floats, offset: Floats,
-    traits: Floats, size: Floats, frames: Floats, q: Floats,
-) -> None:  # fmt: skip
-    """Let an activity that begins now take over smoothly from q (2, N_CONTROLS) of `leave`."""
-    mine = np.empty((2, c.N_CONTROLS))
-    offset[:] = 0.0
-    for i in range(2):
-        later = i * RATE_H_S
-        evaluate(
-            activity, later, clock_s + later, plan, prints, stance, offset, traits, size, frames,
-            mine[i],
-        )  # fmt: skip
-    for i in range(c.N_BLENDED):
-        gap, then = q[0, i] - mine[0, i], q[1, i] - mine[1, i]
-        offset[i, 0], offset[i, 1] = gap, (then - gap) / RATE_H_S
-
-
-@kernel
-def settle(
-    x: float, y: float, yaw: float, plan: Floats, prints: Floats, stance: Floats, size: Floats
-) -> None:
-    """Stand somewhere, feet side by side, with nothing done yet."""
-    for i in range(plan.shape[0]):
-        plan[i] = 0.0
-    plan[pl.END_X], plan[pl.END_Y], plan[pl.END_YAW] = x, y, wrap(yaw)
-    stop(plan, prints, stance)
-    for side in range(2):
-        footprint(side, x, y, plan[pl.START_YAW], STANCE_HALF_WIDTH_M, size, stance[side])

@@ -1,16 +1,15 @@
-"""Who is where when: nobody begins what meets somebody on theirs.
+"""Who is where when: nobody begins what meets somebody on theirs, so everybody stays clear.
 
-Everybody's motion is a closed form of time until the activity ends, and then they stay where it
-ended; a worker who begins something makes sure to keep clear of all of that, so it stays clear.
+Motion is a closed form of time until the activity ends; then workers stay where it ended.
 """
 
 import math
 
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Floats, Ints
-from hrc_env.motion import plans as pl
-from hrc_env.motion.activities.recorded import clip_root
+from hrc_env.motion import state as st
+from hrc_env.motion.activities.playing import clip_root
 from hrc_env.motion.paths import along
+from hrc_env.motion.state import Worker, Workers
 from hrc_env.motion.walk import travelled
 
 APART_M = 0.80
@@ -28,40 +27,40 @@ LOOK_S = 0.12
 @kernel
 def goes(activity: int) -> bool:
     """Whether it moves along a path."""
-    return activity == pl.WALK or pl.TURN <= activity <= pl.STEP_BACK
+    return activity == st.WALK or st.TURN <= activity <= st.STEP_BACK
 
 
 @kernel
 def ahead_of(activity: int) -> tuple[float, float]:
     """How far ahead of the root someone is in the way with what, and how near one may go [m]."""
-    if activity == pl.PUSH:
+    if activity == st.PUSH:
         return CART_M, CART_APART_M
-    if activity == pl.CLIP:
+    if activity == st.CLIP:
         return CLIP_M, CLIP_APART_M
-    if activity == pl.STAND or activity == pl.LOOK_ROUND or goes(activity):
+    if activity == st.STAND or activity == st.LOOK_ROUND or goes(activity):
         return 0.0, 0.0
     return AHEAD_M, HANDS_M
 
 
 @kernel
-def root_at(activity: int, t: float, plan: Floats) -> tuple[float, float]:
-    """Where someone's root is on the floor at time t of an activity, and after it."""
-    if goes(activity):
-        return along(travelled(t - plan[pl.TAKEN_S], plan), plan)
-    if activity == pl.CLIP:
-        return clip_root(t, plan)
-    return plan[pl.START_X], plan[pl.START_Y]
+def root_at(t: float, me: Worker) -> tuple[float, float]:
+    """Where someone's root is on the floor at time t of their activity, and after it."""
+    if goes(me.activity):
+        return along(travelled(t - me.taken_s, me), me)
+    if me.activity == st.CLIP:
+        return clip_root(t, me)
+    return me.start_x, me.start_y
 
 
 @kernel
-def gap_to(x: float, y: float, activity: int, t: float, plan: Floats) -> float:
+def gap_to(x: float, y: float, t: float, me: Worker) -> float:
     """How much farther a root at (x, y) is than it must be from someone's body and hands [m]."""
-    ox, oy = root_at(activity, t, plan)
+    ox, oy = root_at(t, me)
     gap = math.hypot(x - ox, y - oy) - APART_M
-    ahead, apart = ahead_of(activity)
+    ahead, apart = ahead_of(me.activity)
     if ahead > 0.0:
-        nx, ny = (ox, oy) if not goes(activity) else root_at(activity, t + 0.1, plan)
-        yaw = plan[pl.START_YAW]
+        nx, ny = (ox, oy) if not goes(me.activity) else root_at(t + 0.1, me)
+        yaw = me.start_yaw
         if math.hypot(nx - ox, ny - oy) > 0.01:
             yaw = math.atan2(ny - oy, nx - ox)
         hx, hy = ox + ahead * math.cos(yaw), oy + ahead * math.sin(yaw)
@@ -70,33 +69,27 @@ def gap_to(x: float, y: float, activity: int, t: float, plan: Floats) -> float:
 
 
 @kernel
-def meets(
-    w: int, activity: Ints, time_s: Floats, duration_s: Floats, plan: Floats, present: Floats
-) -> tuple[float, float, float]:
-    """When and where worker w first comes too near to another of (W, ...) workers.
-
-    Who is too near now may stay so, but comes no nearer.
-
-    Returns:
-        Time from now [s], and the other's x, y [m]; time -1: nobody.
-    """
+def meets(w: int, workers: Workers) -> tuple[float, float, float]:
+    """When worker w first comes too near to another, from now [s] (-1: never), and x, y."""
     found, fx, fy = -1.0, 0.0, 0.0
-    for k in range(activity.shape[0]):
-        if k == w or present[k] == 0.0:
+    me = workers[w]
+    for k in range(len(workers)):
+        other = workers[k]
+        if k == w or not other.present:
             continue
-        left = max(duration_s[w] - time_s[w], duration_s[k] - time_s[k])
-        if not goes(activity[k]):
-            left = duration_s[w] - time_s[w]
+        left = me.duration_s - me.time_s
+        if goes(other.activity):
+            left = max(left, other.duration_s - other.time_s)
         allowed, n = 0.0, int(left / LOOK_S) + 1
         for i in range(n + 1):
             t = i * LOOK_S
             if found >= 0.0 and t >= found:
                 break
-            x, y = root_at(activity[w], time_s[w] + t, plan[w])
-            gap = gap_to(x, y, activity[k], time_s[k] + t, plan[k])
-            ox, oy = root_at(activity[k], time_s[k] + t, plan[k])
-            if ahead_of(activity[w])[0] > 0.0:
-                gap = min(gap, gap_to(ox, oy, activity[w], time_s[w] + t, plan[w]))
+            x, y = root_at(me.time_s + t, me)
+            gap = gap_to(x, y, other.time_s + t, other)
+            ox, oy = root_at(other.time_s + t, other)
+            if ahead_of(me.activity)[0] > 0.0:
+                gap = min(gap, gap_to(ox, oy, me.time_s + t, me))
             if i == 0:
                 allowed = min(gap - 0.02, 0.0)
             if gap < allowed:

@@ -31,7 +31,7 @@ from hrc_env.scene.robot import (
 from hrc_env.scene.worker import add_worker, capsule_geom_ids, mocap_ids
 from hrc_env.scene.worker_visuals import WorkerVisuals, add_props, add_visuals, visuals_of
 from hrc_env.worker.body import assets_dir, load_body, pool
-from hrc_env.worker.mesh import load_looks
+from hrc_env.worker.mesh import load_mesh
 from hrc_env.worker.props import held_shapes
 
 ARENA_BYTES = 2**20
@@ -199,7 +199,7 @@ def drawing_model(scene: Scene) -> mujoco.MjModel:
     )
     for prefix in prefixes:
         for name in scene.bodies:
-            add_visuals(spec, load_body(name), load_looks(name), prefix)
+            add_visuals(spec, load_body(name), load_mesh(name), prefix)
     add_props(spec, prefixes)
     return spec.compile()
 

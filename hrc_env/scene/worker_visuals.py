@@ -15,7 +15,7 @@ from hrc_env.core.records import Held, WorkerMotion
 from hrc_env.core.typing import Ints
 from hrc_env.scene.primitives import DECORATION, LOOKS_ONLY, WORKER_CAPSULES
 from hrc_env.worker.body import SEGMENTS, Body, assets_dir
-from hrc_env.worker.mesh import HatLooks, Looks, SkinLooks
+from hrc_env.worker.mesh import HatMesh, SkinMesh, WorkerMesh
 from hrc_env.worker.props import PROP_NAMES
 
 SKIN_SPECULAR, SKIN_SHININESS = 0.08, 0.15
@@ -38,7 +38,7 @@ class WorkerVisuals:
     """(W, len(PROPS) - 1) mocap row of every worker's things; they follow the workers' rows."""
 
 
-def add_visuals(spec: Any, body: Body, looks: Looks, prefix: str) -> None:
+def add_visuals(spec: Any, body: Body, looks: WorkerMesh, prefix: str) -> None:
     """Add the skins and the hat of a body to a worker whom `add_worker` has added.
 
     Workers who have the same body share its textures.
@@ -145,7 +145,7 @@ def show_props(model: mujoco.MjModel, data: mujoco.MjData, rows: Ints, held: Hel
     model.geom_group[things] = np.where(np.isin(of_geom[things], shown), SHOWN, HIDDEN)
 
 
-def _add_skin(spec: Any, skin: SkinLooks, body: Body, prefix: str) -> None:
+def _add_skin(spec: Any, skin: SkinMesh, body: Body, prefix: str) -> None:
     material = f"{body.name}_{skin.name}"
     if spec.material(material) is None:
         _add_cloth(spec, skin, material)
@@ -165,7 +165,7 @@ def _add_skin(spec: Any, skin: SkinLooks, body: Body, prefix: str) -> None:
     )
 
 
-def _add_cloth(spec: Any, skin: SkinLooks, name: str) -> None:
+def _add_cloth(spec: Any, skin: SkinMesh, name: str) -> None:
     """The material and the texture of a skin."""
     height, width = skin.texture.shape[:2]
     texture = spec.add_texture(
@@ -176,7 +176,7 @@ def _add_cloth(spec: Any, skin: SkinLooks, name: str) -> None:
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
 
 
-def _add_hat(spec: Any, hat: HatLooks, body: Body, prefix: str) -> None:
+def _add_hat(spec: Any, hat: HatMesh, body: Body, prefix: str) -> None:
     name = f"{body.name}_hat"
     if spec.mesh(name) is None:
         spec.add_mesh(

@@ -1,9 +1,7 @@
 """The worker's body: 22 segments, 15 joints, the capsules round them.
 
-A body is numbers that `assets/workers/bake.py` wrote once into `assets/workers/<name>.npz`;
-the README beside them says where they come from. Rest frame: x forward, y left, z up, soles
-at z = 0, origin on the floor below the pelvis. All segment frames are world-aligned at rest,
-so that a pose is 22 positions and rotations and nothing else.
+Numbers that `assets/workers/bake.py` wrote into `assets/workers/<name>.npz`. Rest frame: x forward,
+y left, z up, origin on the floor below the pelvis; all segments are world-aligned at rest.
 """
 
 import functools

@@ -14,7 +14,7 @@ from hrc_env.worker.body import N_SEGMENTS, baked_path, fixed
 
 
 @dataclass(frozen=True, slots=True)
-class SkinLooks:
+class SkinMesh:
     """A textured surface that follows the segments (linear blend skinning)."""
 
     name: str
@@ -31,7 +31,7 @@ class SkinLooks:
 
 
 @dataclass(frozen=True, slots=True)
-class HatLooks:
+class HatMesh:
     """A hard hat; it moves with the head."""
 
     vertices: Points3
@@ -42,30 +42,26 @@ class HatLooks:
 
 
 @dataclass(frozen=True, slots=True)
-class Looks:
+class WorkerMesh:
     """What a worker looks like; the room `scene` draws it."""
 
-    skins: tuple[SkinLooks, ...]
-    hat: HatLooks | None
+    skins: tuple[SkinMesh, ...]
+    hat: HatMesh | None
     """None for who wears none."""
 
 
 @functools.cache
-def load_looks(name: str = "worker_1") -> Looks:
-    """Read a baked worker's surfaces and textures.
-
-    Raises:
-        ConfigError: no worker of that name has been baked.
-    """
+def load_mesh(name: str = "worker_1") -> WorkerMesh:
+    """Read a baked worker's surfaces and textures; `ConfigError` where none was baked."""
     with np.load(baked_path(name)) as baked:
-        return Looks(tuple(_skin(baked, skin) for skin in ("skin", "cloth")), _hat(baked))
+        return WorkerMesh(tuple(_skin(baked, skin) for skin in ("skin", "cloth")), _hat(baked))
 
 
-def _skin(baked: np.lib.npyio.NpzFile, name: str) -> SkinLooks:
+def _skin(baked: np.lib.npyio.NpzFile, name: str) -> SkinMesh:
     segment, share = baked[f"{name}_weight_segment"], baked[f"{name}_weight"].astype(float)
     weights = np.zeros((len(segment), N_SEGMENTS))
     np.add.at(weights, (np.arange(len(segment))[:, None], segment), share)
-    return SkinLooks(
+    return SkinMesh(
         name=name,
         vertices=fixed(baked[f"{name}_vertices"] * float(baked["unit_m"]), np.float64),
         faces=fixed(baked[f"{name}_faces"], np.int64),
@@ -75,11 +71,11 @@ def _skin(baked: np.lib.npyio.NpzFile, name: str) -> SkinLooks:
     )
 
 
-def _hat(baked: np.lib.npyio.NpzFile) -> HatLooks | None:
+def _hat(baked: np.lib.npyio.NpzFile) -> HatMesh | None:
     if "hat_vertices" not in baked:
         return None
     red, green, blue = (float(value) / 255 for value in baked["hat_rgb"])
-    return HatLooks(
+    return HatMesh(
         vertices=fixed(baked["hat_vertices"] * float(baked["unit_m"]), np.float64),
         faces=fixed(baked["hat_faces"], np.int64),
         rgb=(red, green, blue),

@@ -1,9 +1,7 @@
 """What workers hold: tools, boards, boxes, things on wheels. Shapes and grips, no looks.
 
-A prop's frame is the worker's (x ahead, y left, z up) when the prop is held in front and upright.
-Things in one hand have their origin in the middle of that fist; the grip is listed for the right
-hand and is the left's as well. Things in two hands have it between the hands, those on wheels on
-the floor below that. Sizes are of common tools, rounded; judgement.
+A prop's frame is the worker's (x ahead, y left, z up) when it is held in front and upright: origin
+in the fist (the right hand's grip is the left's as well), between two hands, or on the floor below.
 """
 
 from collections.abc import Sequence

@@ -17,9 +17,8 @@ from benchmarks.motion.statistics import (
     wholly_there,
 )
 from hrc_env.motion import controls as c
-from hrc_env.motion import plans as pl
-from hrc_env.motion.repertoire import REPERTOIRE, perform
-from hrc_env.motion.solo import alone
+from hrc_env.motion import state as st
+from hrc_env.motion.repertoire import REPERTOIRE, alone, perform
 from hrc_env.worker.body import SEGMENT, load_body, worker_names
 from hrc_env.worker.props import PROP_NAMES, PROPS
 
@@ -136,7 +135,7 @@ def test_what_is_held_is_in_a_hand(scene):
         held, hands = film.motion.held, grips(film)
         there = wholly_there(film)
         for kind in np.unique(held.kind):
-            if kind == 0 or film.activity in (*pl.TAKING, *pl.GIVING, pl.PUSH, pl.CARRY):
+            if kind == 0 or film.activity in (*st.TAKING, *st.GIVING, st.PUSH, st.CARRY):
                 continue  # loads stand by themselves before and after; boards lie on shoulders
             when = (held.kind[:, 0] == kind) & there.any(1)
             apart = np.linalg.norm(hands[when] - held.position_world[when], axis=-1).min(1)
@@ -155,5 +154,5 @@ def test_nobody_falls_over(scene):
 
 def test_every_activity_has_a_scene():
     shown = {activity for acts in REPERTOIRE.values() for activity, _, _ in acts}
-    elsewhere = {pl.REACH, pl.LIFT, pl.CLIP}  # test_hands.py, test_playing.py
-    assert shown | elsewhere == set(range(len(pl.ACTIVITY_NAMES)))
+    elsewhere = {st.REACH, st.LIFT, st.CLIP}  # test_hands.py, test_playing.py
+    assert shown | elsewhere == set(range(len(st.ACTIVITY_NAMES)))

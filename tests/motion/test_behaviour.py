@@ -9,9 +9,8 @@ from recorded import started
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.motion import generator
-from hrc_env.motion import plans as pl
 from hrc_env.motion import state as st
-from hrc_env.motion.errands import TASKS, Task, errands_at, picked
+from hrc_env.motion.schedule import JOBS, Job, picked, schedule_at
 from hrc_env.motion.traffic import APART_M
 from hrc_env.worker.body import load_body
 
@@ -24,7 +23,7 @@ def go_on(state, rngs, seconds, robot=None):
     for _ in range(round(seconds / 0.1)):
         _, motion = generator.advance(state, rngs, 0.1, 1)
         if robot is not None:
-            generator.watch(state, np.broadcast_to(robot, (*state.robot.shape,)), motion, 0.1)
+            generator.watch(state, np.broadcast_to(robot, (len(state.workers), 2, 3)), motion, 0.1)
         roots.append(motion.position_world[:, :, 0, :2])
         doing.append(generator.activity(state))
     return np.array(roots), np.array(doing)
@@ -43,8 +42,8 @@ def test_nobody_waits_long_for_a_way():
     longest = 0.0
     for _ in range(60):
         go_on(state, rngs, 1.0)
-        since = state.spots[..., st.SPOT_SINCE]
-        longest = max(longest, np.where(since > 0.0, state.clock_s - since, 0.0).max())
+        since = state.workers["since_s"]
+        longest = max(longest, np.where(since > 0.0, state.workers["clock_s"] - since, 0.0).max())
     assert longest < 9.0
 
 
@@ -55,21 +54,21 @@ def test_a_workers_day_does_not_depend_on_the_other_environments():
 
 
 def test_every_task_leads_to_tasks_that_there_are():
-    errands = errands_at(TASKS, ("wall", "pile"))
-    assert {task.at for task in errands.tasks} == {"robot", "here", "wall", "pile"}
-    for shares in errands.then:
+    schedule = schedule_at(JOBS, ("wall", "pile"))
+    assert {job.at for job in schedule.jobs} == {"robot", "here", "wall", "pile"}
+    for shares in schedule.then:
         assert not shares or shares[-1][1] == pytest.approx(1.0)
-        assert all(0 <= k < len(errands.tasks) for k, _ in shares)
+        assert all(0 <= k < len(schedule.jobs) for k, _ in shares)
     assert picked(((4, 0.25), (7, 1.0)), 0.2) == 4
     assert picked(((4, 0.25), (7, 1.0)), 0.3) == 7
 
 
 def test_a_task_of_ones_own_is_what_workers_do():
-    tasks = (Task("drive nails", "hammer", "robot", (("drive nails", 1.0),)),)
-    config = generator.MotionConfig(tasks=tasks, people=NO_REACTIONS)
+    jobs = (Job("drive nails", "hammer", "robot", (("drive nails", 1.0),)),)
+    config = generator.MotionConfig(jobs=jobs, people=NO_REACTIONS)
     _, doing = go_on(*started(2, config=config), 20.0)
-    allowed = {pl.HAMMER, pl.WALK, pl.STEP_BACK, pl.STUMBLE}
-    assert pl.HAMMER in doing
+    allowed = {st.HAMMER, st.WALK, st.STEP_BACK, st.STUMBLE}
+    assert st.HAMMER in doing
     assert set(np.unique(doing)) <= allowed
 
 
@@ -78,9 +77,9 @@ def test_a_task_of_ones_own_is_what_workers_do():
     [({"activity": "hamer"}, "hammer"), ({"at": "roof"}, "robot"), ({"prop": "piano"}, "prop")],
 )
 def test_a_task_that_cannot_be_is_refused_with_what_can(change, message):
-    task = dataclasses.replace(Task("work", "reach", "robot", (("work", 1.0),)), **change)
+    job = dataclasses.replace(Job("work", "reach", "robot", (("work", 1.0),)), **change)
     with pytest.raises(ConfigError, match=message):
-        generator.MotionConfig(tasks=(Task("x", "reach", "robot"), task))
+        generator.MotionConfig(jobs=(Job("x", "reach", "robot"), job))
 
 
 def test_more_workers_than_fit_are_refused():
@@ -102,7 +101,7 @@ def test_who_notices_the_robot_pauses_after_a_while_and_goes_on():
     paces = []
     for _ in range(40):
         go_on(state, rngs, 0.1, robot=np.zeros(3))
-        paces.append(state.pace[:, 0, 0].copy())
+        paces.append(state.workers["pace"][:, 0].copy())
     halted = np.array(paces) == 0.0
     assert halted.any(0).mean() > 0.7
     first = halted.argmax(0)[halted.any(0)] * 0.1
@@ -115,7 +114,7 @@ def test_who_steps_back_is_farther_from_the_robot_and_looks_the_same_way():
     state, rngs = started(8, config=config, seed=2)
     before = generator.current(state).position_world[:, 0, 0, :2]
     roots, doing = go_on(state, rngs, 7.0, robot=np.zeros(3))
-    stepped = (doing == pl.STEP_BACK).any(0)[:, 0]
+    stepped = (doing == st.STEP_BACK).any(0)[:, 0]
     assert stepped.mean() > 0.6
     base = np.array(generator.OPEN_FLOOR.robot_xy_m)
     farthest = np.linalg.norm(roots[:, :, 0] - base, axis=-1).max(0)
@@ -135,10 +134,10 @@ def test_walkers_come_to_a_stand_and_then_go_where_they_wanted():
     state, rngs = started(24, config=config, seed=7)
     runs = ["" for _ in range(24)]
     for _ in range(300):
-        setting_out = (state.activity == pl.WALK) & (state.time_s < 1.0)
-        state.alert[..., st.CALM_AT] = np.where(setting_out, 0.0, np.inf)  # only these startle
+        setting_out = (state.workers["activity"] == st.WALK) & (state.workers["time_s"] < 1.0)
+        state.workers["calm_until"] = np.where(setting_out, 0.0, np.inf)  # only these startle
         _, doing = go_on(state, rngs, 0.1, robot=np.full(3, 0.5))
-        runs = [run + "sw"[int(k == pl.WALK)] for run, k in zip(runs, doing[0, :, 0], strict=True)]
+        runs = [run + "sw"[int(k == st.WALK)] for run, k in zip(runs, doing[0, :, 0], strict=True)]
     braked = [re.search("sw{5,30}s{7,9}w{8}", run) for run in runs]
     assert sum(match is not None for match in braked) > 5
 
@@ -147,7 +146,7 @@ def test_the_number_of_workers_is_drawn_and_the_others_are_far():
     state = generator.make_state(30, 3, load_body(), generator.MotionConfig(), fewest=1)
     rngs = [np.random.default_rng([8, b]) for b in range(30)]
     generator.reset(state, np.arange(30), rngs)
-    assert set(state.present.sum(1)) == {1.0, 2.0, 3.0}
+    assert set(state.workers["present"].sum(1)) == {1, 2, 3}
     roots, _ = go_on(state, rngs, 5.0)
     away = np.abs(roots).max((0, 3)) > 20.0
-    np.testing.assert_array_equal(away, state.present == 0.0)
+    np.testing.assert_array_equal(away, ~state.workers["present"])

@@ -120,7 +120,7 @@ def test_reset_restarts_only_the_named_environments():
 
 def test_random_numbers_are_drawn_only_when_an_activity_ends():
     state, rngs = started(1, seed=7)
-    left = float(state.duration_s[0, 0] - state.time_s[0, 0])
+    left = float(state.workers["duration_s"][0, 0] - state.workers["time_s"][0, 0])
     before = copy.deepcopy(rngs[0].bit_generator.state)
     generator.advance(state, rngs, 0.9 * left, 1)
     assert rngs[0].bit_generator.state == before

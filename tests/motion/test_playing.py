@@ -16,10 +16,9 @@ from hrc_env.mocap.record import Capture
 from hrc_env.mocap.retarget import retarget
 from hrc_env.motion import controls as c
 from hrc_env.motion import generator
-from hrc_env.motion import plans as pl
-from hrc_env.motion.activities.recorded import PACE_S, SETTLE_S
+from hrc_env.motion import state as st
+from hrc_env.motion.activities.playing import LONGEST_S, PACE_S, SETTLE_S, stocked
 from hrc_env.motion.clip import load_clip, save_clip
-from hrc_env.motion.playing import LONGEST_S, stocked
 from hrc_env.worker.body import SEGMENT, load_body, worker_truth
 
 BODY = load_body()
@@ -50,8 +49,8 @@ def played(clip):
 
 def test_workers_play_it_again_and_again(played):
     _, doing = played
-    playing = doing == pl.CLIP
-    assert generator.activity_names[pl.CLIP] == "clip"
+    playing = doing == st.CLIP
+    assert generator.activity_names[st.CLIP] == "clip"
     assert 0.2 < playing.mean() < 1.0
     begins = (playing[:, 1:] & ~playing[:, :-1]).sum()
     assert begins > 4
@@ -76,7 +75,7 @@ def test_feet_stand_still_while_it_is_played(played):
         ball = motion.position_world[:, :, 0, SEGMENT[f"{side}_toes"]]
         speed = np.linalg.norm(motion.velocity_world[:, :, 0, SEGMENT[f"{side}_toes"], :2], axis=-1)
         loaded = ball[..., 2] < BODY.rest_position[SEGMENT[f"{side}_toes"], 2] + 5e-4
-        assert np.percentile(speed[loaded & (doing == pl.CLIP)], 95) < 0.05
+        assert np.percentile(speed[loaded & (doing == st.CLIP)], 95) < 0.05
 
 
 def test_the_recorded_pose_is_the_one_that_is_seen(clip):
@@ -84,16 +83,16 @@ def test_the_recorded_pose_is_the_one_that_is_seen(clip):
     state, rngs = started(1, seed=5, config=config)
     for _ in range(1000):
         generator.advance(state, rngs, 0.1, 1)
-        at_s = state.time_s[0, 0] - SETTLE_S
-        if state.activity[0, 0] == pl.CLIP and PACE_S + 0.2 < at_s < PACE_S + 0.5:
+        at_s = state.workers["time_s"][0, 0] - SETTLE_S
+        if state.workers["activity"][0, 0] == st.CLIP and PACE_S + 0.2 < at_s < PACE_S + 0.5:
             break
     position = generator.current(state).position_world[0, 0]
     k = round((at_s - 0.5 * PACE_S) * FPS)
-    piece = stocked([clip], state.anatomy.size)
+    piece = stocked([clip], state.mind.anatomy.size)
     q = np.zeros((1, c.N_CONTROLS))
     q[0, : c.N_BLENDED] = piece.frames[k, : c.N_BLENDED]
     q[0, c.ANKLE : c.ANKLE + 12] = piece.frames[k, c.N_BLENDED :]
-    recorded = segments_in(q, one(state.anatomy, 0))[0][0]
+    recorded = segments_in(q, one(state.mind.anatomy, 0))[0][0]
     between = np.linalg.norm(position[:, None] - position[None], axis=-1)
     assert (
         np.abs(between - np.linalg.norm(recorded[:, None] - recorded[None], axis=-1)).max() < 0.02

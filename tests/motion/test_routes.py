@@ -5,7 +5,7 @@ import pytest
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Grounds, Workplace
-from hrc_env.motion import plans as pl
+from hrc_env.motion import state as st
 from hrc_env.motion.floorplan import BODY_M, floorplan, room_for, slack_at
 from hrc_env.motion.paths import along
 from hrc_env.motion.routes import route
@@ -23,11 +23,11 @@ def grounds(*blocked, places=()):
 
 def way(plan, start, end, people=NOBODY, bow=0.0):
     """Points of the way every 2 cm; None where there is none."""
-    row, via = np.zeros(pl.N_PLAN), np.zeros((pl.MAX_VIA, 3))
-    n = route(start, end, bow, people, plan.slack, plan.origin, row, via)
+    row, via = np.zeros(1, st.WORKER)[0], np.zeros((st.MAX_VIA, 3))
+    n = route(start, end, bow, people, plan.slack, plan.origin, via, row)
     if n < 0:
         return None
-    return np.array([along(s, row) for s in np.arange(0.0, row[pl.LENGTH] + 0.02, 0.02)])
+    return np.array([along(s, row) for s in np.arange(0.0, row["length"] + 0.02, 0.02)])
 
 
 def test_a_free_way_is_nearly_straight_and_bends_as_drawn():

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from recorded import walk_straight
 
-from hrc_env.motion import plans as pl
 from hrc_env.worker.body import SEGMENT
 
 SPEEDS = (0.8, 1.0, 1.2, 1.4)
@@ -37,12 +36,12 @@ def test_cadence_is_that_of_the_recordings(walk):
     toes = walk.position[walk.steady][:, SEGMENT["left_toes"], 2]
     landings = np.flatnonzero((toes[1:] < 0.055) & (toes[:-1] >= 0.055))
     strides = np.diff(landings) * walk.dt_s
-    cadence = 2 * 60 / (strides.mean() if len(strides) else 2 * walk.plan[pl.STEP_PERIOD])
+    cadence = 2 * 60 / (strides.mean() if len(strides) else 2 * walk.plan["step_period"])
     assert cadence == pytest.approx(96.2 * walk.speed**0.468, rel=0.1)
 
 
 def test_step_length_and_width_are_those_of_the_recordings(walk):
-    prints = walk.prints[3 : int(walk.plan[pl.STEP_COUNT]) - 4]
+    prints = walk.prints[3 : int(walk.plan["step_count"]) - 4]
     step = np.abs(np.diff(prints[:, :2], axis=0))
     assert step[:, 0].mean() == pytest.approx(0.345 + 0.286 * walk.speed, rel=0.1)
     assert 0.05 <= step[:, 1].mean() <= 0.09

@@ -126,7 +126,7 @@ def test_the_world_is_that_of_the_same_seed_without():
         env.reset(seed=5)
         env.step(np.zeros(6, np.float32))
         simulation = env.simulation
-        walks.append((simulation.motion.plan.copy(), simulation.task_state["goal_world"].copy()))
+        walks.append((simulation.motion.workers.copy(), simulation.task_state["goal_world"].copy()))
         if appearance:
             assert env.simulation.pipeline.look_of(0) is not None
             state = env.get_state()

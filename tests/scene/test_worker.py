@@ -8,7 +8,7 @@ from hrc_env.core.records import WorkerMotion
 from hrc_env.scene.worker import add_worker, capsule_geom_ids, mocap_ids
 from hrc_env.scene.worker_visuals import add_visuals
 from hrc_env.worker.body import SEGMENT, SEGMENTS, load_body, rest_motion, worker_truth
-from hrc_env.worker.mesh import load_looks
+from hrc_env.worker.mesh import load_mesh
 
 PREFIX = "worker_1/"
 
@@ -17,7 +17,7 @@ PREFIX = "worker_1/"
 def model() -> mujoco.MjModel:
     spec = mujoco.MjSpec()
     add_worker(spec, load_body(), PREFIX)
-    add_visuals(spec, load_body(), load_looks(), PREFIX)
+    add_visuals(spec, load_body(), load_mesh(), PREFIX)
     return spec.compile()
 
 
@@ -49,7 +49,7 @@ def test_every_segment_is_a_mocap_body(model):
 
 def test_at_rest_the_skin_is_the_baked_surface(model):
     for drawn, skin in zip(drawn_skins(model, posed(model, rest_motion(load_body()))),
-                           load_looks().skins, strict=True):  # fmt: skip
+                           load_mesh().skins, strict=True):  # fmt: skip
         np.testing.assert_allclose(drawn, skin.vertices, atol=1e-5)
 
 
@@ -59,7 +59,7 @@ def test_a_pose_moves_the_skin_by_linear_blending(model):
     arm = [SEGMENT[f"left_{part}"] for part in ("upper_arm", "forearm", "hand")]
     position[arm] += [0.0, 0.0, 0.3]
     raised = WorkerMotion(position, rest.quaternion_wxyz, np.zeros((22, 3)), np.zeros((22, 3)))
-    for drawn, skin in zip(drawn_skins(model, posed(model, raised)), load_looks().skins,
+    for drawn, skin in zip(drawn_skins(model, posed(model, raised)), load_mesh().skins,
                            strict=True):  # fmt: skip
         share = skin.weights[:, arm].sum(1)
         np.testing.assert_allclose(drawn[:, 2], skin.vertices[:, 2] + 0.3 * share, atol=1e-5)
@@ -104,7 +104,7 @@ def test_two_workers_share_a_model_under_their_own_names():
     spec = mujoco.MjSpec()
     for prefix in ("worker_1/", "worker_2/"):
         add_worker(spec, load_body(), prefix)
-        add_visuals(spec, load_body(), load_looks(), prefix)
+        add_visuals(spec, load_body(), load_mesh(), prefix)
     model = spec.compile()
     first, second = mocap_ids(model, "worker_1/"), mocap_ids(model, "worker_2/")
     assert len(set(first) | set(second)) == 44

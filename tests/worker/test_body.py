@@ -20,7 +20,7 @@ from hrc_env.worker.body import (
     worker_names,
     worker_truth,
 )
-from hrc_env.worker.mesh import load_looks
+from hrc_env.worker.mesh import load_mesh
 
 ANGLES = st.floats(-np.pi, np.pi)
 MIRRORED_Y = np.array([1.0, -1.0, 1.0])
@@ -81,7 +81,7 @@ def test_at_rest_joints_are_where_the_rest_pose_has_them():
 
 
 def test_a_worker_stands_on_the_floor_and_is_as_tall_as_a_man_with_boots_and_hat():
-    body, looks = load_body(), load_looks()
+    body, looks = load_body(), load_mesh()
     cloth = next(skin for skin in looks.skins if skin.name == "cloth")
     assert abs(cloth.vertices[:, 2].min()) < 1e-3
     crown = looks.hat.vertices[:, 2].max() + body.rest_position[SEGMENT["head"], 2]
@@ -154,7 +154,7 @@ def test_nobody_is_a_motion_too():
 
 
 def test_capsules_hold_the_clothed_surface_closely():
-    body, looks = load_body(), load_looks()
+    body, looks = load_body(), load_mesh()
     capsules = worker_truth(body, rest_motion(body)).capsules_world
     hat = looks.hat.vertices + body.rest_position[SEGMENT["head"]]
     points = np.vstack([skin.vertices for skin in looks.skins] + [hat])
@@ -166,7 +166,7 @@ def test_capsules_hold_the_clothed_surface_closely():
 
 @pytest.mark.parametrize("index", [0, 1])
 def test_skins_have_whole_weights_and_faces_that_exist(index):
-    skin = load_looks().skins[index]
+    skin = load_mesh().skins[index]
     np.testing.assert_allclose(skin.weights.sum(1), 1.0, atol=1e-12)
     assert np.all((skin.weights > 0).sum(1) <= 4)
     assert skin.faces.min() == 0

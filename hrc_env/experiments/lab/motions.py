@@ -8,8 +8,7 @@ from hrc_env.core.batching import rows
 from hrc_env.core.records import WorkerMotion
 from hrc_env.experiments.site.walk import walk
 from hrc_env.experiments.study.recording import concatenated
-from hrc_env.motion.repertoire import REPERTOIRE, Act, perform
-from hrc_env.motion.solo import alone
+from hrc_env.motion.repertoire import REPERTOIRE, Act, alone, perform
 from hrc_env.scene.build import Scene
 from hrc_env.worker.body import load_body, worker_names
 

@@ -7,7 +7,7 @@ from hrc_env.core.records import WORKPLACE_KINDS, WorkerMotion
 from hrc_env.experiments.study.recording import concatenated
 from hrc_env.motion import generator
 from hrc_env.motion.config import MotionConfig
-from hrc_env.motion.errands import Task
+from hrc_env.motion.schedule import Job
 from hrc_env.scene.build import Scene
 from hrc_env.worker.body import load_body
 
@@ -16,7 +16,7 @@ PASSING = MotionConfig(
     dwell_s=(0.0, 0.4),
     near_pause_s=(0.1, 0.4),
     away_pause_s=(0.1, 0.4),
-    tasks=tuple(Task(f"pass the {kind}", "stand", kind, (), 1.0) for kind in WORKPLACE_KINDS),
+    jobs=tuple(Job(f"pass the {kind}", "stand", kind, (), 1.0) for kind in WORKPLACE_KINDS),
     people=generator.PEOPLE["unaware"],
 )
 """Workers who go on as soon as they have come anywhere; judgement: the paper says "walked"."""

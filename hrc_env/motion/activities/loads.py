@@ -1,8 +1,7 @@
-"""Loads: picked up and set down, taken from somebody and handed over.
+"""Loads: picked up and set down (that backwards), taken from somebody and handed over.
 
-Setting down is picking up backwards. Boxes are held before the belly, boards before the thighs
-or on the shoulder. Recorded lifts: pelvis 0.57 to 1.01 m high, wrists at 1.3 m/s at most in the
-median trial and 2.1 in the 95th percentile, heads at 1.6.
+Recorded lifts: pelvis 0.57 to 1.01 m high, wrists at 1.3 m/s at most in the median trial, 2.1 in
+the 95th percentile, heads at 1.6.
 """
 
 import math
@@ -10,7 +9,6 @@ import math
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
-from hrc_env.motion import plans as pl
 from hrc_env.motion.activities.planning import (
     between,
     blank,
@@ -20,22 +18,19 @@ from hrc_env.motion.activities.planning import (
     put_tool,
     settle_lean,
     shoulders,
-    world,
 )
-from hrc_env.motion.activities.worker import Place, Worker
 from hrc_env.motion.anatomy import LEFT, SIDE_STRIDE, STAND_Z, UPPER_ARM
 from hrc_env.motion.curves import hump, min_jerk
-from hrc_env.motion.gaze import look_at
 from hrc_env.motion.holding import GRIPS, grip, place_load
 from hrc_env.motion.kinematics import pose
-from hrc_env.motion.posture import lean, stand
+from hrc_env.motion.posture import from_here, lean, look_at, stand
+from hrc_env.motion.state import Place, Worker
 from hrc_env.worker.props import prop_index
 
 BOX, BOARD = prop_index("box"), prop_index("board")
 BOX_AHEAD_M, BOX_SHARE = 0.37, 1.10
 BOARD_AHEAD_M, BOARD_SHARE = 0.27, 0.96
-"""A held load's middle: ahead of the root [m], and height in heights of the pelvis, or
-as high as the arms need it; judgement."""
+"""A held load's middle: ahead of the root [m], height in heights of the pelvis; judgement."""
 CARRYING_SHARE = 0.95
 """Arms carry stretched to this share at most: swinging trunks need the rest; judgement."""
 ON_SHOULDER = (0.12, 0.165, 0.075)
@@ -53,42 +48,41 @@ AWAY_M = 0.43
 
 
 @kernel
-def pick_up(
-    t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q: Floats
-) -> None:
+def pick_up(t: float, clock_s: float, me: Worker) -> None:
     """The control vector of someone who bends down to a load, grips it and comes up with it."""
-    x, y, yaw = plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW]
-    stand(x, y, yaw, clock_s, traits, size, q)
-    gripped = plan[pl.OUT_AT] + plan[pl.OUT_S]
+    q = me.q
+    x, y, yaw = me.start_x, me.start_y, me.start_yaw
+    stand(x, y, yaw, clock_s, me)
+    gripped = me.out_at + me.out_s
     rise = gripped + GRIP_S
-    down = min_jerk((t - plan[pl.OUT_AT]) / plan[pl.OUT_S])
-    up = min_jerk((t - rise) / plan[pl.RAISE_S])
+    down = min_jerk((t - me.out_at) / me.out_s)
+    up = min_jerk((t - rise) / me.raise_s)
     turned = 0.0
-    if plan[pl.SHOULDER_S] > 0.0:
-        turned = min_jerk((t - rise - plan[pl.RAISE_S]) / plan[pl.SHOULDER_S])
-    lean(plan[pl.LEAN] * (down - up), plan[pl.SQUAT], 0.0, q)
-    look_at(plan[pl.GAZE_X], plan[pl.GAZE_Y], plan[pl.GAZE_Z], down - up, size, q)
-    place_load(x, y, yaw, 0.0, plan, q)
+    if me.shoulder_s > 0.0:
+        turned = min_jerk((t - rise - me.raise_s) / me.shoulder_s)
+    lean(me.lean * (down - up), me.squat, 0.0, me)
+    look_at(me.gaze[0], me.gaze[1], me.gaze[2], down - up, me)
+    place_load(x, y, yaw, 0.0, me)
     for i in range(6):
-        at, mid = plan[pl.TOOL_POSE + i], plan[pl.MIDWAY + i]
+        at, mid = me.tool_pose[i], me.midway[i]
         q[c.PROP_POSE + i] = at + up * (mid - at) + turned * (q[c.PROP_POSE + i] - mid)
     bulge = 0.06 * hump(up)
     bulge += 0.15 * hump(turned)
     q[c.PROP_POSE] += math.cos(yaw) * bulge
     q[c.PROP_POSE + 1] += math.sin(yaw) * bulge
     q[c.PROP_POSE + 2] += 0.10 * hump(turned)
-    prop = int(plan[pl.TOOL])
-    q[c.PROP] = prop if t >= gripped or plan[pl.HIDDEN] == 0.0 else 0.0
+    prop = me.tool
+    q[c.PROP] = prop if t >= gripped or me.hidden == 0.0 else 0.0
     for side in range(2):
-        here, own = GRIPS[prop, side], pl.LOAD_GRIP + 3 * side
+        here, own = GRIPS[prop, side], me.load_grip[3 * side : 3 * side + 3]
         grip(
             side,
-            here[0] + turned * (plan[own] - here[0]),
-            here[1] + turned * (plan[own + 1] - here[1]),
-            here[2] + turned * (plan[own + 2] - here[2]),
-            q,
+            here[0] + turned * (own[0] - here[0]),
+            here[1] + turned * (own[1] - here[1]),
+            here[2] + turned * (own[2] - here[2]),
+            me,
         )
-        used = 1.0 + turned * (plan[pl.LOAD_USED + side] - 1.0)
+        used = 1.0 + turned * (me.load_used[side] - 1.0)
         q[c.HAND_SHARE + side] = down * used
 
 
@@ -106,7 +100,7 @@ def plan_receive(draws: Floats, place: Place, me: Worker) -> float:
     """Plan to take a box that somebody ahead holds out; its pace [s]."""
     _hold(BOX, False, 1, me)
     _lay_out(BOX, _given(place, me), me)
-    me.plan[pl.HIDDEN] = 1.0
+    me.hidden = 1.0
     return between(draws[2], 0.9, 1.1)
 
 
@@ -114,7 +108,7 @@ def plan_receive(draws: Floats, place: Place, me: Worker) -> float:
 def plan_set_down(draws: Floats, place: Place, me: Worker) -> float:
     """Plan to set down what is held, onto the place's height; its pace [s]."""
     z = place[3] if place[3] > 0.0 else between(draws[1], 0.18, 0.45)
-    prop = int(me.plan[pl.LOAD_PROP])
+    prop = me.load_prop
     _lay_out(prop, (AWAY_M, 0.0, z), me)
     return between(draws[2], 1.0, 1.35)
 
@@ -122,9 +116,9 @@ def plan_set_down(draws: Floats, place: Place, me: Worker) -> float:
 @kernel
 def plan_hand_over(draws: Floats, place: Place, me: Worker) -> float:
     """Plan to hold out what is carried until somebody has it; its pace [s]."""
-    prop = int(me.plan[pl.LOAD_PROP])
+    prop = me.load_prop
     _lay_out(prop, _given(place, me), me)
-    me.plan[pl.HIDDEN] = 1.0
+    me.hidden = 1.0
     return between(draws[2], 0.9, 1.1)
 
 
@@ -137,28 +131,28 @@ def _given(place: Place, me: Worker) -> tuple[float, float, float]:
 
 @kernel
 def _hold(prop: int, on_shoulder: bool, side: int, me: Worker) -> None:
-    """Write how a load will be carried into the plan's LOAD columns."""
-    plan, at = me.plan, pl.LOAD_AT
-    plan[pl.LOAD_PROP] = prop
+    """Write how a load will be carried into `load_at` and on."""
+    at = me.load_at
+    me.load_prop = prop
     for i in range(6):
-        plan[at + i] = 0.0
-        plan[pl.LOAD_GRIP + i] = GRIPS[prop, i // 3, i % 3]
-    plan[pl.LOAD_USED] = plan[pl.LOAD_USED + 1] = 1.0
+        at[i] = 0.0
+        me.load_grip[i] = GRIPS[prop, i // 3, i % 3]
+    me.load_used[0] = me.load_used[1] = 1.0
     ahead, share = (BOX_AHEAD_M, BOX_SHARE) if prop == BOX else (BOARD_AHEAD_M, BOARD_SHARE)
     forward, aside, up = shoulders(me)
     lowest = up - in_reach(CARRYING_SHARE, ahead - forward, GRIPS[prop, 0, 1] - aside, me)
-    plan[at], plan[at + 2] = ahead, max(share * me.size[STAND_Z], lowest)
+    at[0], at[2] = ahead, max(share * me.size[STAND_Z], lowest)
     if not on_shoulder:
         return
-    stand(plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW], 0.0, me.traits, me.size, me.q)
-    pose(me.q, me.bones, me.frame, me.size, me.p, me.r)
+    stand(me.start_x, me.start_y, me.start_yaw, 0.0, me)
+    pose(me)
     upper = LEFT + SIDE_STRIDE * side + UPPER_ARM
-    plan[at], plan[at + 1] = ON_SHOULDER[0], (1.0 - 2.0 * side) * ON_SHOULDER[1]
-    plan[at + 2] = me.p[upper, 2] + ON_SHOULDER[2]
+    at[0], at[1] = ON_SHOULDER[0], (1.0 - 2.0 * side) * ON_SHOULDER[1]
+    at[2] = me.p[upper, 2] + ON_SHOULDER[2]
     sign = 1.0 - 2.0 * side  # the end of the other hand comes to the front
-    plan[at + 3], plan[at + 5] = 0.5 * math.pi * sign, -NOSE_UP_RAD * sign
-    plan[pl.LOAD_USED + 1 - side] = 0.0
-    plan[pl.LOAD_GRIP + 3 * side + 1] = -STEADY_M * sign
+    at[3], at[5] = 0.5 * math.pi * sign, -NOSE_UP_RAD * sign
+    me.load_used[1 - side] = 0.0
+    me.load_grip[3 * side + 1] = -STEADY_M * sign
 
 
 @kernel
@@ -171,34 +165,20 @@ def _lay_out(prop: int, at: tuple[float, float, float], me: Worker) -> None:
 
 @kernel
 def finish_lift(raise_s: float, me: Worker) -> float:
-    """Settle trunk, way and times of a load between where it stands and where it is carried.
-
-    As `planning.finish`, no plan function calls it.
-
-    Args:
-        raise_s: its pace, the time to raise it by about a metre [s].
-        me: its plan says where the load stands, and how it is carried.
-
-    Returns:
-        How long it takes [s].
-    """
-    plan, size = me.plan, me.size
-    z = plan[pl.TOOL_POSE + 2]
+    """Settle trunk, way and times of a load; from the time to raise it by a metre, how long [s]."""
+    size = me.size
+    z = me.tool_pose[2]
     low = min(max((size[STAND_Z] - z) / 0.6, 0.0), 1.0)
-    plan[pl.SQUAT] = me.traits[pl.SQUAT_TRAIT] * low
+    me.squat = me.squat_share * low
     settle_lean(me)
-    shoulder = plan[pl.LOAD_AT + 3] != 0.0
-    mid_z = 1.15 * size[STAND_Z] if shoulder else plan[pl.LOAD_AT + 2]
-    ahead = 0.36 if shoulder else plan[pl.LOAD_AT]
-    point = world(ahead, 0.0, mid_z, me)
-    for i in range(3):
-        plan[pl.MIDWAY + i] = point[i]
-    plan[pl.MIDWAY + 3] = plan[pl.START_YAW]
+    shoulder = me.load_at[3] != 0.0
+    mid_z = 1.15 * size[STAND_Z] if shoulder else me.load_at[2]
+    ahead = 0.36 if shoulder else me.load_at[0]
+    me.midway[0], me.midway[1], me.midway[2] = from_here((ahead, 0.0, mid_z), me)
+    me.midway[3] = me.start_yaw
     way = abs(mid_z - z)
-    plan[pl.RAISE_S] = max(raise_s * (0.50 + 0.48 * way), 0.6)
-    plan[pl.OUT_S] = max(raise_s * (0.7 + 0.35 * low), 0.7)
-    plan[pl.SHOULDER_S] = SHOULDER_S if shoulder else 0.0
-    plan[pl.LASTS] = (
-        plan[pl.OUT_AT] + plan[pl.OUT_S] + GRIP_S + plan[pl.RAISE_S] + plan[pl.SHOULDER_S] + 0.1
-    )
-    return plan[pl.LASTS]
+    me.raise_s = max(raise_s * (0.50 + 0.48 * way), 0.6)
+    me.out_s = max(raise_s * (0.7 + 0.35 * low), 0.7)
+    me.shoulder_s = SHOULDER_S if shoulder else 0.0
+    me.lasts = me.out_at + me.out_s + GRIP_S + me.raise_s + me.shoulder_s + 0.1
+    return me.lasts

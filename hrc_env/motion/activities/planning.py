@@ -3,37 +3,21 @@
 import math
 
 from hrc_env.core.kernels import kernel
+from hrc_env.motion import anatomy as an
 from hrc_env.motion import controls as c
-from hrc_env.motion import plans as pl
-from hrc_env.motion.activities.getting_down import FRONT_LEG, REAR_LEG, step_into
 from hrc_env.motion.activities.strokes import PAUSE_S, stroke
-from hrc_env.motion.activities.work import extend, hands_on
-from hrc_env.motion.activities.worker import Worker
-from hrc_env.motion.anatomy import (
-    ARM,
-    CHEST,
-    CLAVICLE,
-    HAND,
-    LEFT,
-    LEG,
-    SIDE_STRIDE,
-    STAND_Z,
-    UPPER_ARM,
-)
+from hrc_env.motion.activities.work import FRONT_LEG, REAR_LEG, extend, hands_on, step_into
 from hrc_env.motion.feet import feet
 from hrc_env.motion.holding import TWO_HANDED
-from hrc_env.motion.kinematics import pose
-from hrc_env.motion.posture import MOST_LEAN, beyond, stand
-
-Triple = tuple[float, float, float]
+from hrc_env.motion.posture import MOST_LEAN, Triple, beyond, farthest, from_here, stand
+from hrc_env.motion.state import Worker
 
 TAKE_S = 0.55
 """For a hand to go to the belt [s]."""
 KNEEL_S, CROUCH_S = 1.5, 1.1
 """To get down on a knee, on the haunches [s]; judgement."""
 KNEEL_STEPS_S = (0.15, 0.62, 0.60)
-"""First lift-off and the two times of `plans` of the steps onto a knee [s]: slow, or a leg would be
-stretched before the body is down, and the knee would jerk; judgement."""
+"""First lift-off, period and swing of the steps onto a knee [s], slow or the knee would jerk."""
 STEP_S = 0.9
 """To step into a stance [s]."""
 CALM_M_S = 1.1
@@ -42,7 +26,7 @@ KNEE_ASIDE_M = 0.17
 """Aside of the middle: where the other leg is not in the way [m]."""
 SPARE_M = 0.03
 """Arms keep this much in hand when the trunk has settled [m]: bodies sway."""
-TO_SHOULDER = (*range(1, CHEST + 1), LEFT + CLAVICLE, LEFT + UPPER_ARM)
+TO_SHOULDER = (*range(1, an.CHEST + 1), an.LEFT + an.CLAVICLE, an.LEFT + an.UPPER_ARM)
 """The segments from the pelvis on, each the child of the one before."""
 SLUMP_M = 0.01
 """How far a standing trunk brings the shoulders forward [m]."""
@@ -59,63 +43,53 @@ def between(draw: float, low: float, high: float) -> float:
 @kernel
 def dominant(draw: float, me: Worker) -> int:
     """The side that holds the tool: 1 right."""
-    return 1 if draw < 0.5 + (me.traits[pl.RIGHT_HANDED] - 0.5) * 1.25 else 0
+    return 1 if draw < 0.5 + (me.right_handed - 0.5) * 1.25 else 0
 
 
 @kernel
 def blank(me: Worker) -> None:
     """A plan without steps and work of its own; what is carried stays."""
-    plan = me.plan
-    for i in range(pl.OWN, pl.WANDER_M + 1):
-        plan[i] = 0.0
-    plan[pl.UNDO_AT] = plan[pl.STEP_COUNT] = 0.0
-    plan[pl.STEP_START], plan[pl.STEP_PERIOD], plan[pl.STEP_SWING] = 0.0, 1.0, 0.5
-    plan[pl.SETTLE_S] = 0.1
-    plan[pl.OUT_AT] = 0.1
+    me.lean = me.twist = me.squat = me.kneel = me.crouch = me.ahead = 0.0
+    me.hold_s = me.take_s = me.wander_m = me.stroke_m = me.stroke_hz = me.burst_s = 0.0
+    me.tool = me.side = me.stroke = 0
+    me.target[:] = 0.0
+    me.used[:] = 0.0
+    me.hidden = False
+    me.undo_at = me.step_count = 0.0
+    me.step_start, me.step_period, me.step_swing = 0.0, 1.0, 0.5
+    me.settle_s = 0.1
+    me.out_at = 0.1
 
 
 @kernel
 def kneel_down(side: int, me: Worker) -> None:
     """Plan to kneel on the knee of that side."""
-    plan, leg = me.plan, me.size[LEG]
-    plan[pl.KNEEL], plan[pl.AHEAD] = 1.0, -0.08
-    plan[pl.SETTLE_S], plan[pl.OUT_AT] = KNEEL_S, 0.4
+    leg = me.size[an.LEG]
+    me.kneel, me.ahead = 1.0, -0.08
+    me.settle_s, me.out_at = KNEEL_S, 0.4
     step_into(side, REAR_LEG * leg, FRONT_LEG * leg, 0.02, me)
-    plan[pl.STEP_START], plan[pl.STEP_PERIOD], plan[pl.STEP_SWING] = KNEEL_STEPS_S
+    me.step_start, me.step_period, me.step_swing = KNEEL_STEPS_S
 
 
 @kernel
 def before_knee(me: Worker) -> float:
     """How far to the left the hands work of one who kneels: before the knee that is down [m]."""
-    kneeling = me.plan[pl.KNEEL] > 0.0
-    return KNEE_ASIDE_M * (1.0 - 2.0 * me.plan[pl.STEP_FIRST]) if kneeling else 0.0
+    kneeling = me.kneel > 0.0
+    return KNEE_ASIDE_M * (1.0 - 2.0 * me.step_first) if kneeling else 0.0
 
 
 @kernel
 def step_ahead(side: int, ahead: float, me: Worker) -> None:
     """Plan to work with the foot of that side a little ahead."""
-    plan = me.plan
     step_into(side, ahead, 0.0, 0.02, me)
-    plan[pl.AHEAD], plan[pl.SETTLE_S] = 0.45 * ahead, STEP_S
-
-
-@kernel
-def world(ahead: float, left: float, z: float, me: Worker) -> Triple:
-    """A point of the frame in which the worker stands."""
-    plan = me.plan
-    cos, sin = math.cos(plan[pl.START_YAW]), math.sin(plan[pl.START_YAW])
-    return (
-        plan[pl.START_X] + cos * ahead - sin * left,
-        plan[pl.START_Y] + sin * ahead + cos * left,
-        z,
-    )
+    me.ahead, me.settle_s = 0.45 * ahead, STEP_S
 
 
 @kernel
 def shoulders(me: Worker) -> Triple:
     """Where the shoulders' joints of one who stands are: ahead of the root, aside, height [m]."""
     bones = me.bones
-    ahead, aside, up = SLUMP_M, 0.0, me.size[STAND_Z]
+    ahead, aside, up = SLUMP_M, 0.0, me.size[an.STAND_Z]
     for segment in TO_SHOULDER:
         ahead += bones[segment, 0]
         aside += bones[segment, 1]
@@ -126,61 +100,52 @@ def shoulders(me: Worker) -> Triple:
 @kernel
 def in_reach(share: float, one: float, other: float, me: Worker) -> float:
     """How far arms, stretched by a share, reach along an axis if so far along the others [m]."""
-    reach = share * me.size[ARM]
+    reach = share * me.size[an.ARM]
     return math.sqrt(max(reach * reach - one * one - other * other, 0.0))
 
 
 @kernel
 def put_tool(tool: int, side: int, at: Triple, turn: Triple, me: Worker) -> None:
     """Plan where the tool is at work: ahead, left [m], height; yaw, pitch, roll."""
-    plan = me.plan
-    plan[pl.TOOL], plan[pl.SIDE] = tool, side
-    plan[pl.TAKE_S] = TAKE_S if tool > 0 else 0.0
-    point = world(at[0], at[1], at[2], me)
-    for i in range(3):
-        plan[pl.TOOL_POSE + i] = point[i]
-        plan[pl.TOOL_POSE + 3 + i] = turn[i]
-    plan[pl.TOOL_POSE + 3] += plan[pl.START_YAW]
+    me.tool, me.side = tool, side
+    me.take_s = TAKE_S if tool > 0 else 0.0
+    pose = me.tool_pose
+    pose[0], pose[1], pose[2] = from_here(at, me)
+    pose[3], pose[4], pose[5] = turn[0] + me.start_yaw, turn[1], turn[2]
     if TWO_HANDED[tool]:
-        plan[pl.USE_LEFT] = plan[pl.USE_RIGHT] = 1.0
+        me.used[0] = me.used[1] = 1.0
 
 
 @kernel
 def put_other(at: Triple, me: Worker) -> None:
     """Plan where the other hand works: ahead, left [m], height."""
-    plan = me.plan
-    other = 1 - int(plan[pl.SIDE])
-    point = world(at[0], at[1], at[2], me)
-    for i in range(3):
-        plan[pl.TARGET + 3 * other + i] = point[i]
-    plan[pl.USE_LEFT + other] = 1.0
+    other = 1 - me.side
+    target = me.target[3 * other :]
+    target[0], target[1], target[2] = from_here(at, me)
+    me.used[other] = 1.0
 
 
 @kernel
 def look_to(at: Triple, me: Worker) -> None:
     """Plan where the eyes are: ahead, left [m], height."""
-    point = world(at[0], at[1], at[2], me)
-    for i in range(3):
-        me.plan[pl.GAZE_X + i] = point[i]
+    me.gaze[0], me.gaze[1], me.gaze[2] = from_here(at, me)
 
 
 @kernel
 def strokes(kind: int, size_m: float, rate_hz: float, burst_s: float, n: int, me: Worker) -> None:
     """Plan n bursts of a stroke."""
-    plan = me.plan
-    plan[pl.STROKE], plan[pl.STROKE_M], plan[pl.STROKE_HZ] = kind, size_m, rate_hz
-    plan[pl.BURST_S], plan[pl.HOLD_S] = burst_s, n * (burst_s + PAUSE_S)
+    me.stroke, me.stroke_m, me.stroke_hz = kind, size_m, rate_hz
+    me.burst_s, me.hold_s = burst_s, n * (burst_s + PAUSE_S)
 
 
 @kernel
 def at_work(me: Worker) -> None:
     """Fill q as it is in the middle of the work, before the first stroke."""
-    plan, q, size = me.plan, me.q, me.size
-    feet(FAR, plan, me.prints, me.stance, size, q)
-    stand(plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW], 0.0, me.traits, size, q)
-    extend(1.0, 1.0, plan, size, q)
-    stroke(0.0, plan, q)
-    hands_on(1.0, 1.0, 1.0, plan, q)
+    feet(FAR, me)
+    stand(me.start_x, me.start_y, me.start_yaw, 0.0, me)
+    extend(1.0, 1.0, me)
+    stroke(0.0, me)
+    hands_on(1.0, 1.0, 1.0, me)
 
 
 @kernel
@@ -189,27 +154,24 @@ def finish(peak_m_s: float, me: Worker) -> float:
 
     No plan function calls it: each would be compiled with all of it once more.
     """
-    plan = me.plan
-    side = int(plan[pl.SIDE])
-    low = min(max((0.95 * me.size[STAND_Z] - plan[pl.TOOL_POSE + 2]) / 0.5, 0.0), 1.0)
-    plan[pl.SQUAT] = 0.0 if plan[pl.KNEEL] + plan[pl.CROUCH] > 0.0 else 0.8 * low
+    low = min(max((0.95 * me.size[an.STAND_Z] - me.tool_pose[2]) / 0.5, 0.0), 1.0)
+    me.squat = 0.0 if me.kneel + me.crouch > 0.0 else 0.8 * low
     settle_lean(me)
-    down_s = plan[pl.SETTLE_S] - plan[pl.OUT_AT] - plan[pl.TAKE_S]
-    if plan[pl.KNEEL] + plan[pl.CROUCH] == 0.0:
+    down_s = me.settle_s - me.out_at - me.take_s
+    if me.kneel + me.crouch == 0.0:
         down_s = 0.35
-    slowly = 1.7 if TWO_HANDED[int(plan[pl.TOOL])] else 1.0
-    plan[pl.OUT_S] = max(1.875 * slowly * _way(side, me) / peak_m_s, down_s)
-    done = plan[pl.OUT_AT] + plan[pl.TAKE_S] + plan[pl.OUT_S]
-    plan[pl.LASTS] = 2.0 * done + plan[pl.HOLD_S]
-    plan[pl.UNDO_AT] = 0.5 * plan[pl.LASTS] if plan[pl.STEP_COUNT] > 0.0 else 0.0
-    return plan[pl.LASTS]
+    slowly = 1.7 if TWO_HANDED[me.tool] else 1.0
+    me.out_s = max(1.875 * slowly * _way(me) / peak_m_s, down_s)
+    done = me.out_at + me.take_s + me.out_s
+    me.lasts = 2.0 * done + me.hold_s
+    me.undo_at = 0.5 * me.lasts if me.step_count > 0.0 else 0.0
+    return me.lasts
 
 
 @kernel
 def settle_lean(me: Worker) -> None:
     """Smallest lean that brings what the hands hold within reach; else that comes nearer."""
-    plan = me.plan
-    low, high, plan[pl.LEAN] = 0.0, MOST_LEAN, 0.0
+    low, high, me.lean = 0.0, MOST_LEAN, 0.0
     upright = _short(me)
     if upright <= 0.0:
         return
@@ -218,14 +180,14 @@ def settle_lean(me: Worker) -> None:
         if attempt > 0:
             far = _short(me)
         if far > 0.0:
-            low = plan[pl.LEAN]
+            low = me.lean
         else:
-            high = plan[pl.LEAN]
-        plan[pl.LEAN] = 0.5 * (low + high)
-    plan[pl.LEAN] = high
+            high = me.lean
+        me.lean = 0.5 * (low + high)
+    me.lean = high
     far = _short(me)
     if far > 0.0:
-        plan[pl.LEAN] = 0.0 if upright < far else high
+        me.lean = 0.0 if upright < far else high
         _come_nearer(_short(me), me)
 
 
@@ -234,42 +196,29 @@ def _short(me: Worker) -> float:
     """By how much an arm is too short for the work that is planned [m]."""
     at_work(me)
     used = (me.q[c.HAND_SHARE], me.q[c.HAND_SHARE + 1])
-    spare = SPARE_M + 0.4 * abs(me.plan[pl.WANDER_M])
-    return beyond(me.q, used, me.bones, me.frame, me.size, me.p, me.r) + spare
+    spare = SPARE_M + 0.4 * abs(me.wander_m)
+    return beyond(used, me) + spare
 
 
 @kernel
 def _come_nearer(far: float, me: Worker) -> None:
     """Move tool and targets towards the shoulders by what is out of reach, as `_short` says."""
-    plan, p = me.plan, me.p
-    x, y, z = p[CHEST, 0], p[CHEST, 1], p[CHEST, 2]
-    dx, dy, dz = plan[pl.TOOL_POSE] - x, plan[pl.TOOL_POSE + 1] - y, plan[pl.TOOL_POSE + 2] - z
+    p = me.p
+    pose, other = me.tool_pose, me.target[3 * (1 - me.side) :]
+    dx, dy, dz = (pose[0] - p[an.CHEST, 0], pose[1] - p[an.CHEST, 1], pose[2] - p[an.CHEST, 2])
     share = 1.15 * far / math.sqrt(dx * dx + dy * dy + dz * dz)
-    other = pl.TARGET + 3 * (1 - int(plan[pl.SIDE]))
-    for at in (pl.TOOL_POSE, other):
-        plan[at] -= share * dx
-        plan[at + 1] -= share * dy
-        plan[at + 2] -= share * dz
+    for i, d in enumerate((dx, dy, dz)):
+        pose[i] -= share * d
+        other[i] -= share * d
 
 
 @kernel
-def _way(side: int, me: Worker) -> float:
+def _way(me: Worker) -> float:
     """The longest way that a hand has from hanging, or from the belt, to its work [m]."""
-    plan, q, p = me.plan, me.q, me.p
     at_work(me)
-    way = 0.15
-    goal = (q[c.HAND_TARGET], q[c.HAND_TARGET + 1], q[c.HAND_TARGET + 2])
-    right = (q[c.HAND_TARGET + 3], q[c.HAND_TARGET + 4], q[c.HAND_TARGET + 5])
-    used = (q[c.HAND_SHARE], q[c.HAND_SHARE + 1])
-    stand(plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW], 0.0, me.traits, me.size, q)
-    extend(1.0, 0.0, plan, me.size, q)
-    pose(q, me.bones, me.frame, me.size, p, me.r)
-    for hand in range(2):
-        wrist = LEFT + SIDE_STRIDE * hand + HAND
-        to = goal if hand == 0 else right
-        d = 0.0
-        for i in range(3):
-            d += (to[i] - p[wrist, i]) ** 2
-        if used[hand] > 0.0:
-            way = max(way, math.sqrt(d) - 0.05)
-    return way
+    used, goal = (me.q[c.HAND_SHARE], me.q[c.HAND_SHARE + 1]), me.goals
+    for i in range(6):
+        goal[i] = me.q[c.HAND_TARGET + i]
+    stand(me.start_x, me.start_y, me.start_yaw, 0.0, me)
+    extend(1.0, 0.0, me)
+    return max(0.15, farthest(an.HAND, goal, used, me) - 0.05)

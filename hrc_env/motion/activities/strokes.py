@@ -1,21 +1,17 @@
 """What hands and tools do at work: strokes in bursts, moving along the work between them.
 
-A stroke moves the tool's pose in q, and writes how far the other hand is from its target into
-that hand's target (to which `work.hands_on` adds the target itself).
+A stroke moves the tool's pose in q, and writes how far the other hand is from its target.
 """
 
 import math
 
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
-from hrc_env.motion import plans as pl
 from hrc_env.motion.curves import min_jerk
+from hrc_env.motion.state import Worker
 
 STILL, STRIKE, BORE, PRESS, SAW, SHIFT, BUSY, JAB = range(8)
-"""Nothing; a hammer's blows; a drill's thrusts, the other hand fetching screws or not; a saw's
-strokes; holding still at one place after the other; the small movements of busy hands; beating
-the air."""
+"""Nothing; hammer; drill, the other hand fetching screws or not; saw; still; busy hands; a beat."""
 PAUSE_S = 0.7
 """Between two bursts [s]: time to go on to the next nail; judgement."""
 EASE_S = 0.25
@@ -23,41 +19,44 @@ EASE_S = 0.25
 
 
 @kernel
-def stroke(t: float, plan: Floats, q: Floats) -> None:
+def stroke(t: float, me: Worker) -> None:
     """Add what the stroke does at time t of the work (0 to HOLD_S)."""
-    kind, side = int(plan[pl.STROKE]), int(plan[pl.SIDE])
+    q = me.q
+    kind, side = me.stroke, me.side
     other = c.HAND_TARGET + 3 * (1 - side)
     for i in range(3):
         q[other + i] = 0.0
-    cycle = plan[pl.BURST_S] + PAUSE_S
+    cycle = me.burst_s + PAUSE_S
     n = math.floor(t / cycle)
     u = t - n * cycle
-    _wander(n, u, other, plan, q)
-    ease = min_jerk(u / EASE_S) - min_jerk((u - plan[pl.BURST_S] + EASE_S) / EASE_S)
-    if ease <= 0.0 or t >= plan[pl.HOLD_S]:
+    _wander(n, u, other, me)
+    ease = min_jerk(u / EASE_S) - min_jerk((u - me.burst_s + EASE_S) / EASE_S)
+    if ease <= 0.0 or t >= me.hold_s:
         return
-    turn = 2.0 * math.pi * plan[pl.STROKE_HZ] * u
+    turn = 2.0 * math.pi * me.stroke_hz * u
     if kind == STRIKE:
-        _strike(ease, turn, plan, q)
+        _strike(ease, turn, me)
     elif kind in (BORE, PRESS):
-        _bore(u, plan, q)
+        push = min_jerk(u / 0.5) - min_jerk((u - me.burst_s + 0.5) / 0.5)
+        _along(me.stroke_m * push, me)
         if kind == BORE:
-            _fetch(u, other, plan, q)
+            _fetch(u, other, me)
     elif kind == SAW:
-        _along(-ease * plan[pl.STROKE_M] * math.sin(turn), plan, q)
+        _along(-ease * me.stroke_m * math.sin(turn), me)
         q[c.SPINE_TWIST] += (1.0 - 2.0 * side) * 0.10 * ease * math.sin(turn)
     elif kind in (BUSY, JAB):
-        _busy(ease, turn, other, plan, q)
+        _busy(ease, turn, other, me)
 
 
 @kernel
-def _wander(n: int, u: float, other: int, plan: Floats, q: Floats) -> None:
+def _wander(n: int, u: float, other: int, me: Worker) -> None:
     """Go to and fro along the work, a place a burst."""
-    on = min_jerk((u - plan[pl.BURST_S]) / PAUSE_S)
+    q = me.q
+    on = min_jerk((u - me.burst_s) / PAUSE_S)
     here = n % 2
     share = here + on * (1.0 - 2.0 * here)
-    left = plan[pl.WANDER_M] * share
-    x, y = -math.sin(plan[pl.START_YAW]) * left, math.cos(plan[pl.START_YAW]) * left
+    left = me.wander_m * share
+    x, y = -math.sin(me.start_yaw) * left, math.cos(me.start_yaw) * left
     q[c.PROP_POSE] += x
     q[c.PROP_POSE + 1] += y
     q[other] += x
@@ -65,51 +64,47 @@ def _wander(n: int, u: float, other: int, plan: Floats, q: Floats) -> None:
 
 
 @kernel
-def _along(way: float, plan: Floats, q: Floats) -> None:
+def _along(way: float, me: Worker) -> None:
     """Move the tool where it points."""
-    pitch, yaw = plan[pl.TOOL_POSE + 4], plan[pl.TOOL_POSE + 3]
+    q = me.q
+    pitch, yaw = me.tool_pose[4], me.tool_pose[3]
     q[c.PROP_POSE] += math.cos(yaw) * math.cos(pitch) * way
     q[c.PROP_POSE + 1] += math.sin(yaw) * math.cos(pitch) * way
     q[c.PROP_POSE + 2] -= math.sin(pitch) * way
 
 
 @kernel
-def _strike(ease: float, turn: float, plan: Floats, q: Floats) -> None:
+def _strike(ease: float, turn: float, me: Worker) -> None:
     """Swing the hammer back slowly and forward faster, round the wrist and with the arm."""
-    size = plan[pl.STROKE_M]
+    q = me.q
+    size = me.stroke_m
     skew = min(1.5 * size, 0.35)
     back = 0.5 * ease * (1.0 - math.cos(turn + skew * math.sin(turn)))
-    _along(-size * back, plan, q)
+    _along(-size * back, me)
     q[c.PROP_POSE + 2] += 0.35 * size * back
-    out = (1.0 - 2.0 * plan[pl.SIDE]) * 0.6 * size * back  # past the shoulder
-    q[c.PROP_POSE] -= math.sin(plan[pl.START_YAW]) * out
-    q[c.PROP_POSE + 1] += math.cos(plan[pl.START_YAW]) * out
+    out = (1.0 - 2.0 * me.side) * 0.6 * size * back  # past the shoulder
+    q[c.PROP_POSE] -= math.sin(me.start_yaw) * out
+    q[c.PROP_POSE + 1] += math.cos(me.start_yaw) * out
     q[c.PROP_POSE + 4] -= min(0.3 + 2.2 * size, 1.1) * back
 
 
 @kernel
-def _bore(u: float, plan: Floats, q: Floats) -> None:
-    """Lean on the drill."""
-    push = min_jerk(u / 0.5) - min_jerk((u - plan[pl.BURST_S] + 0.5) / 0.5)
-    _along(plan[pl.STROKE_M] * push, plan, q)
-
-
-@kernel
-def _fetch(u: float, other: int, plan: Floats, q: Floats) -> None:
+def _fetch(u: float, other: int, me: Worker) -> None:
     """Take the other hand to the belt for the next screw, and back."""
-    late = u - plan[pl.BURST_S] + 0.05 + FETCH_S
+    q = me.q
+    late = u - me.burst_s + 0.05 + FETCH_S
     fetch = min_jerk((u - 0.1) / FETCH_S) - min_jerk(late / FETCH_S)
     if fetch <= 0.0:
         return
     hand = (other - c.HAND_TARGET) // 3
     cos, sin = math.cos(q[c.HEADING]), math.sin(q[c.HEADING])
     ahead, left = 0.17, (1.0 - 2.0 * hand) * 0.34
-    at = pl.TARGET + 3 * hand
+    target = me.target[3 * hand : 3 * hand + 3]
     x = q[c.ROOT_X] + cos * ahead - sin * left
     y = q[c.ROOT_Y] + sin * ahead + cos * left
-    q[other] += fetch * (x - plan[at])
-    q[other + 1] += fetch * (y - plan[at + 1])
-    q[other + 2] += fetch * (q[c.PELVIS_Z] + 0.06 - plan[at + 2])
+    q[other] += fetch * (x - target[0])
+    q[other + 1] += fetch * (y - target[1])
+    q[other + 2] += fetch * (q[c.PELVIS_Z] + 0.06 - target[2])
 
 
 FETCH_S = 0.55
@@ -117,10 +112,11 @@ FETCH_S = 0.55
 
 
 @kernel
-def _busy(ease: float, turn: float, other: int, plan: Floats, q: Floats) -> None:
+def _busy(ease: float, turn: float, other: int, me: Worker) -> None:
     """Small movements of both hands, or of the pointing one alone."""
-    size = ease * plan[pl.STROKE_M]
-    if plan[pl.STROKE] == JAB:
+    q = me.q
+    size = ease * me.stroke_m
+    if me.stroke == JAB:
         q[c.PROP_POSE + 2] += size * math.sin(turn)
         return
     q[c.PROP_POSE] += size * math.sin(turn)

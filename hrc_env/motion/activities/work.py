@@ -1,20 +1,16 @@
-"""Work in place: get down to it, take a tool from the belt, work, and all of it backwards.
-
-The first half of such an activity and its second half are mirror images in time.
-"""
+"""Work in place: get down to it, take a tool from the belt, work, and all of it backwards."""
 
 import math
 
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
-from hrc_env.motion import plans as pl
-from hrc_env.motion.activities.getting_down import get_down
 from hrc_env.motion.activities.strokes import stroke
+from hrc_env.motion.anatomy import ANKLE_Z, LEG, STAND_SHARE, STAND_Z, THIGH_LENGTH
 from hrc_env.motion.curves import min_jerk
-from hrc_env.motion.gaze import look_at
+from hrc_env.motion.feet import raise_heel
 from hrc_env.motion.holding import GRIPS, TWO_HANDED, grip
-from hrc_env.motion.posture import lean, stand
+from hrc_env.motion.posture import lean, look_at, stand
+from hrc_env.motion.state import Worker
 
 GAZE_LEAD_S = 0.25
 """Eyes and head set off before the hand (Land & Hayhoe 2001: about half a second at most)."""
@@ -29,26 +25,76 @@ ELBOWS_RAD, LOW_ELBOWS_RAD = 0.25, 0.4
 JOIN_AT = 0.3
 """Share of the way from which the second hand comes to a tool for two; judgement."""
 RISE, OVER_KNEE_M, LOW_M = 0.5, 0.22, 0.6
-"""Hands go up ahead of the shoulder, by this share of the height, and down over the knees, so
-far ahead and up on the way to work below LOW_M [m]; judgement."""
+"""Hands go up by this share of the height, and over the knees to work below LOW_M [m]."""
 DRAWN_SHARE = 0.6
 """Share of the way at which what is drawn out with both hands is out."""
+KNEE_M = 0.055
+"""Height of a kneeling knee's joint above the floor [m]; half a knee."""
+KNEEL_HEEL_RAD, HAUNCH_HEEL_RAD = 1.2, 0.55
+"""How far the heel goes up of a kneeling foot, of both on the haunches; judgement."""
+FRONT_LEG, REAR_LEG = 0.38, -0.72
+"""Kneeling feet ahead of where they stood, in lengths of the leg; from the two shanks' lie."""
+HAUNCH_SHARE = 0.46
+"""Height of the pelvis on the haunches as a share of the standing one; judgement."""
+STEP_AT_S, STEP_PERIOD_S, STEP_SWING_S = 0.08, 0.42, 0.38
+"""First lift-off, and the two times of `plans` of the steps that widen a stance [s]."""
 
 
 @kernel
-def extend(down: float, out: float, plan: Floats, size: Floats, q: Floats) -> None:
+def get_down(down: float, me: Worker) -> None:
+    """Lower a standing body by the share `down`, heels included; the feet's steps are planned."""
+    q = me.q
+    ahead = me.ahead * down
+    q[c.ROOT_X] += math.cos(q[c.HEADING]) * ahead
+    q[c.ROOT_Y] += math.sin(q[c.HEADING]) * ahead
+    kneel, crouch = me.kneel * down, me.crouch * down
+    if kneel > 0.0:
+        over = me.size[STAND_Z] - me.size[ANKLE_Z] - STAND_SHARE * me.size[LEG]
+        low = KNEE_M + me.size[THIGH_LENGTH] + over
+        q[c.PELVIS_Z] += kneel * (low - me.size[STAND_Z])
+        q[c.PELVIS_PITCH] += 0.06 * kneel
+        raise_heel(me.step_first, KNEEL_HEEL_RAD * kneel * kneel, me)
+    if crouch > 0.0:
+        q[c.PELVIS_Z] -= crouch * (1.0 - HAUNCH_SHARE) * me.size[STAND_Z]
+        q[c.PELVIS_PITCH] += 0.25 * crouch
+        q[c.SPINE_FLEX] += 0.40 * crouch
+        for side in range(2):
+            raise_heel(side, HAUNCH_HEEL_RAD * crouch, me)
+
+
+@kernel
+def step_into(first: int, ahead: float, other: float, out: float, me: Worker) -> None:
+    """Plan a step of foot `first` forward, one of the other (unless 0), both `out` [m] sideways."""
+    cos, sin = math.cos(me.start_yaw), math.sin(me.start_yaw)
+    me.step_start, me.step_first = STEP_AT_S, first
+    me.step_period, me.step_swing = STEP_PERIOD_S, STEP_SWING_S
+    me.step_count = 1.0 if other == 0.0 else 2.0
+    for k in range(2):
+        side = (first + k) % 2
+        forward, left = (other if k else ahead), (1.0 - 2.0 * side) * out
+        for i in range(5):
+            me.prints[k, i] = me.stance[side, i]
+        me.prints[k, 0] += cos * forward - sin * left
+        me.prints[k, 1] += sin * forward + cos * left
+        me.prints[k, 3] = 0.3
+
+
+@kernel
+def extend(down: float, out: float, me: Worker) -> None:
     """A standing body's q at a share of getting down, and of reaching out from there."""
-    get_down(down, plan, size, q)
-    belt(int(plan[pl.SIDE]), c.PROP_POSE, q)
-    lean(plan[pl.LEAN] * out, plan[pl.SQUAT], plan[pl.TWIST] * out, q)
+    q = me.q
+    get_down(down, me)
+    belt(me.side, c.PROP_POSE, me)
+    lean(me.lean * out, me.squat, me.twist * out, me)
     for i in range(6):
-        q[c.PROP_POSE + i] += out * (plan[pl.TOOL_POSE + i] - q[c.PROP_POSE + i])
-    _round(c.PROP_POSE, plan[pl.TOOL_POSE + 2], out, q)
+        q[c.PROP_POSE + i] += out * (me.tool_pose[i] - q[c.PROP_POSE + i])
+    _round(c.PROP_POSE, me.tool_pose[2], out, me)
 
 
 @kernel
-def _round(at: int, goal_z: float, out: float, q: Floats) -> None:
+def _round(at: int, goal_z: float, out: float, me: Worker) -> None:
     """Send q[at:], on its way out to a height, round shoulder or knee."""
+    q = me.q
     high = RISE * max(goal_z - q[c.PELVIS_Z] - 0.3, 0.0)
     bulge = max(high, OVER_KNEE_M if goal_z < LOW_M else 0.0) * 4.0 * out * (1.0 - out)
     q[at] += math.cos(q[c.HEADING]) * bulge
@@ -57,8 +103,9 @@ def _round(at: int, goal_z: float, out: float, q: Floats) -> None:
 
 
 @kernel
-def belt(side: int, at: int, q: Floats) -> None:
+def belt(side: int, at: int, me: Worker) -> None:
     """Write the pose of a tool on the belt, on that side, into q[at:]."""
+    q = me.q
     cos, sin = math.cos(q[c.HEADING]), math.sin(q[c.HEADING])
     left = (1.0 - 2.0 * side) * BELT_SIDE_M
     q[at] = q[c.ROOT_X] + cos * BELT_AHEAD_M - sin * left
@@ -68,63 +115,62 @@ def belt(side: int, at: int, q: Floats) -> None:
 
 
 @kernel
-def hands_on(out: float, taken: float, early: float, plan: Floats, q: Floats) -> None:
-    """Send the tool's hand to the tool, the other to its own target or to the tool.
-
-    Both are before the body, by the share `early`, when thighs rise of those who get down.
-    """
-    side, tool = int(plan[pl.SIDE]), int(plan[pl.TOOL])
+def hands_on(out: float, taken: float, early: float, me: Worker) -> None:
+    """Send the tool's hand to the tool, the other to its target; both before the body (`early`)."""
+    q = me.q
+    side, tool = me.side, me.tool
     other = 1 - side
     both = TWO_HANDED[tool]
-    low = plan[pl.TOOL_POSE + 2] < LOW_M and not both
+    low = me.tool_pose[2] < LOW_M and not both
     for hand in range(2):
         at = c.HAND_TARGET + 3 * hand
         if hand == side or both:
             of = hand if both else 1
-            grip(hand, GRIPS[tool, of, 0], GRIPS[tool, of, 1], GRIPS[tool, of, 2], q)
+            grip(hand, GRIPS[tool, of, 0], GRIPS[tool, of, 1], GRIPS[tool, of, 2], me)
         else:
             for i in range(3):
-                q[at + i] += plan[pl.TARGET + 3 * other + i]
+                q[at + i] += me.target[3 * other + i]
             if low:
-                _from_belly(hand, at, 1.0 - out, plan, q)
-            _round(at, plan[pl.TARGET + 3 * other + 2], out, q)
+                _from_belly(hand, at, 1.0 - out, me)
+            _round(at, me.target[3 * other + 2], out, me)
     for hand in range(2):
         q[c.SWIVEL + hand] += LOW_ELBOWS_RAD * early if low else ELBOWS_RAD * out
     q[c.HAND_SHARE + side] = max(taken, early) if low else taken
     joined = early if low else out
     if both and taken != out:
         joined = min_jerk((out - JOIN_AT) / (1.0 - JOIN_AT))
-    q[c.HAND_SHARE + other] = joined * plan[pl.USE_LEFT + other]
+    q[c.HAND_SHARE + other] = joined * me.used[other]
 
 
 @kernel
-def _from_belly(hand: int, at: int, share: float, plan: Floats, q: Floats) -> None:
+def _from_belly(hand: int, at: int, share: float, me: Worker) -> None:
     """Bring the target q[at:] of a hand back to before the belly by a share: over the thighs."""
+    q = me.q
     cos, sin = math.cos(q[c.HEADING]), math.sin(q[c.HEADING])
     left = (1.0 - 2.0 * hand) * BELLY_SIDE_M
-    goal = pl.TARGET + 3 * hand
-    q[at] += share * (q[c.ROOT_X] + cos * BELLY_AHEAD_M - sin * left - plan[goal])
-    q[at + 1] += share * (q[c.ROOT_Y] + sin * BELLY_AHEAD_M + cos * left - plan[goal + 1])
-    q[at + 2] += share * (q[c.PELVIS_Z] + BELLY_UP_M - plan[goal + 2])
+    goal = me.target[3 * hand : 3 * hand + 3]
+    q[at] += share * (q[c.ROOT_X] + cos * BELLY_AHEAD_M - sin * left - goal[0])
+    q[at + 1] += share * (q[c.ROOT_Y] + sin * BELLY_AHEAD_M + cos * left - goal[1])
+    q[at + 2] += share * (q[c.PELVIS_Z] + BELLY_UP_M - goal[2])
 
 
 @kernel
-def work(t: float, plan: Floats, clock_s: float, traits: Floats, size: Floats, q: Floats) -> None:
+def work(t: float, clock_s: float, me: Worker) -> None:
     """The control vector of someone who works in place with a tool, or empty hands."""
-    stand(plan[pl.START_X], plan[pl.START_Y], plan[pl.START_YAW], clock_s, traits, size, q)
-    near_end = min(t, plan[pl.LASTS] - t)
-    down = min_jerk(near_end / plan[pl.SETTLE_S])
-    since = near_end - plan[pl.OUT_AT] - plan[pl.TAKE_S]
-    out = min_jerk(since / plan[pl.OUT_S])
-    taken = min_jerk(1.0 + since / plan[pl.TAKE_S]) if plan[pl.TAKE_S] > 0.0 else out
-    extend(down, out, plan, size, q)
-    working = t - plan[pl.OUT_AT] - plan[pl.TAKE_S] - plan[pl.OUT_S]
+    stand(me.start_x, me.start_y, me.start_yaw, clock_s, me)
+    near_end = min(t, me.lasts - t)
+    down = min_jerk(near_end / me.settle_s)
+    since = near_end - me.out_at - me.take_s
+    out = min_jerk(since / me.out_s)
+    taken = min_jerk(1.0 + since / me.take_s) if me.take_s > 0.0 else out
+    extend(down, out, me)
+    working = t - me.out_at - me.take_s - me.out_s
     if out >= 1.0:
-        stroke(working, plan, q)
+        stroke(working, me)
     else:
-        stroke(0.0 if working < 0.0 else plan[pl.HOLD_S], plan, q)
-    hands_on(out, taken, min_jerk(near_end / (EARLY_SHARE * plan[pl.SETTLE_S])), plan, q)
-    drawn = DRAWN_SHARE * plan[pl.OUT_S] if TWO_HANDED[int(plan[pl.TOOL])] else 0.0
-    q[c.PROP] = plan[pl.TOOL] if since >= drawn else 0.0
+        stroke(0.0 if working < 0.0 else me.hold_s, me)
+    hands_on(out, taken, min_jerk(near_end / (EARLY_SHARE * me.settle_s)), me)
+    drawn = DRAWN_SHARE * me.out_s if TWO_HANDED[me.tool] else 0.0
+    me.q[c.PROP] = me.tool if since >= drawn else 0.0
     looking = min_jerk((since + GAZE_LEAD_S) / 0.6)
-    look_at(plan[pl.GAZE_X], plan[pl.GAZE_Y], plan[pl.GAZE_Z], looking, size, q)
+    look_at(me.gaze[0], me.gaze[1], me.gaze[2], looking, me)

@@ -1,0 +1,182 @@
+"""What decisions of workers are made from: constants, the state, draws; and where they may go."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from hrc_env.core.records import WORKPLACE_KINDS, Workplace
+from hrc_env.core.typing import Bools, Floats
+from hrc_env.motion.activities.playing import Clips
+from hrc_env.motion.anatomy import Anatomy
+from hrc_env.motion.config import MotionConfig, Numbers
+from hrc_env.motion.floorplan import CELL_M, Floorplan, slack_at
+from hrc_env.motion.schedule import HERE, Job, Schedule
+from hrc_env.motion.state import N_START, NOWHERE, UNDER_WAY, WAITING, Place, Worker, Workers
+from hrc_env.motion.traffic import AHEAD_M, APART_M, HANDS_M
+
+NEXT, BOW, LASTS, DELAY, REACTION, REACTION_S, EVENT, DWELL = range(N_START, N_START + 8)
+"""Which draw decides what; the first N_START are the activity's own."""
+PLACES, N_TRIED = N_START + 8, 5
+"""First of the draws for places, three a place, and how many are tried."""
+N_DRAWS = PLACES + 3 * N_TRIED
+"""Uniform numbers of one decision."""
+ROBOT_WORK_M = 1.1
+"""Height of the work at the robot [m]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BehaviourParams:
+    """Constants."""
+
+    config: MotionConfig
+    numbers: Numbers
+    plan: Floorplan
+    schedule: Schedule
+    places: dict[str, tuple[Workplace, ...]]
+    """By kind."""
+    clips: Clips
+    anatomy: Anatomy
+    """(N, ...) of the bodies that there are."""
+    fewest: int
+    """Workers who are in an episode at least."""
+
+
+@dataclass(frozen=True, slots=True)
+class MotionState:
+    """All that changes is in `workers`: copying it copies the state."""
+
+    workers: Workers
+    """(B, W) of WORKER."""
+    mind: BehaviourParams
+
+
+@dataclass(slots=True)
+class Decision:
+    """A worker who decides."""
+
+    mind: BehaviourParams
+    workers: Workers
+    """(W,) of their environment."""
+    w: int
+    draws: Floats
+    """(N_DRAWS,)."""
+    now: float
+    """Clock [s]."""
+    load: int = 0
+    """What they hold when they decide."""
+
+    @property
+    def me(self) -> Worker:
+        """Their record."""
+        return self.workers[self.w]
+
+    def go(self, going: int) -> None:
+        """They are `THERE`, `UNDER_WAY` or `WAITING` now."""
+        self.me["going"] = going
+        if going != WAITING:
+            self.me["since_s"] = 0.0
+
+    @property
+    def kind_here(self) -> str:
+        """Kind of the place where they are and have something to do; else nothing."""
+        at = self.me["at"]
+        return "" if at == NOWHERE else WORKPLACE_KINDS[at]
+
+    @property
+    def job(self) -> Job:
+        """What they do or want to do."""
+        return self.mind.schedule.jobs[self.me["job"]]
+
+    @property
+    def loaded(self) -> bool:
+        """Whether they hold something."""
+        return bool(self.me["load_prop"] > 0)
+
+    def draw(self, index: int, limits: tuple[float, float]) -> float:
+        """A draw stretched to (low, high)."""
+        return limits[0] + self.draws.item(index) * (limits[1] - limits[0])
+
+    def others(self) -> Bools:
+        """(W,) which other workers are there."""
+        there = self.workers["present"].copy()
+        there[self.w] = False
+        return there
+
+
+def in_the_way(who: Decision) -> Floats:
+    """(n, 3) x, y, radius of where other workers will stand and work, and of the robot's arm."""
+    people, rows = who.mind.config.people, []
+    ends = [who.workers[name][who.others()].tolist() for name in ("end_x", "end_y", "end_yaw")]
+    for x, y, yaw in zip(*ends, strict=True):
+        rows.append((x, y, APART_M))
+        rows.append((x + AHEAD_M * math.cos(yaw), y + AHEAD_M * math.sin(yaw), HANDS_M))
+    robot = who.me["robot_world"]
+    if people.detour_m > 0.0 and np.isfinite(robot[0, 0]):
+        rows += [(x, y, people.detour_m) for x, y, _ in robot.tolist()]
+    return np.array(rows).reshape(-1, 3)
+
+
+def wished(who: Decision) -> Iterator[Place]:
+    """Places for the job that nobody else has, the one last chosen first."""
+    if who.me["going"] == UNDER_WAY:
+        yield tuple(who.me["spot"].tolist())  # type: ignore[misc]
+    for place in _candidates(who, who.job.at):
+        if _is_free(who, place):
+            yield place
+
+
+def _candidates(who: Decision, kind: str) -> Iterator[Place]:
+    """Places of a kind: drawn round the robot, the scene's elsewhere, or where the worker is."""
+    mind, draws = who.mind, who.draws[PLACES:].tolist()
+    if kind == HERE:
+        yield tuple(who.me["spot"].tolist())  # type: ignore[misc]
+    elif kind == "robot":
+        config, ground = mind.config, mind.plan
+        for radius, azimuth, turn in zip(draws[::3], draws[1::3], draws[2::3], strict=True):
+            low, high = config.near_radius_m
+            r = low + radius * (high - low)
+            angle = ground.robot_front_rad + config.near_azimuth_rad * (2.0 * azimuth - 1.0)
+            x = ground.robot_xy_m[0] + r * math.cos(angle)
+            y = ground.robot_xy_m[1] + r * math.sin(angle)
+            if slack_at(x, y, ground.slack, ground.origin) >= 0.0:
+                yield x, y, angle + math.pi + 0.15 * (2.0 * turn - 1.0), ROBOT_WORK_M
+    else:
+        places = mind.places[kind]
+        first = int(draws[0] * len(places))
+        for place in (*places[first:], *places[:first]):
+            yield *place.xy_m, place.yaw_rad, place.height_m
+
+
+def _is_free(who: Decision, place: Place) -> bool:
+    """Whether no other worker has a place near this one."""
+    apart_m, spots = who.mind.config.spacing_m, who.workers["spot"][who.others(), :2].tolist()
+    return all(math.dist(spot, place[:2]) >= apart_m for spot in spots)
+
+
+def take_first_place(who: Decision) -> None:
+    """A place to begin at, and the job there; where all are taken, the loneliest that is free."""
+    mind, me, draw = who.mind, who.me, who.draws.item(NEXT)
+    begins = [k for k, _ in mind.schedule.begins]
+    near = draw < mind.config.near_probability or not begins
+    first = mind.schedule.robot if near else begins[int(who.draws[BOW] * len(begins))]
+    for job in (first, mind.schedule.robot, *begins):
+        kind = mind.schedule.jobs[job].at
+        for place in _candidates(who, kind):
+            if _is_free(who, place):
+                me["job"], me["at"], me["spot"] = job, WORKPLACE_KINDS.index(kind), place
+                dwell = who.draw(DWELL, mind.config.dwell_s) * mind.config.people.tempo
+                me["until_s"] = max(0.05, dwell * who.draws.item(LASTS))
+                return
+    me["job"], me["at"], me["spot"] = mind.schedule.robot, NOWHERE, _loneliest(who)
+
+
+def _loneliest(who: Decision) -> Place:
+    """Where there is room to walk, farthest from the other workers."""
+    ground = who.mind.plan
+    x, y = (np.argwhere(ground.slack >= 0.0) * CELL_M + ground.origin).T
+    others = who.workers["spot"][who.others(), :2]
+    away = np.min([np.hypot(x - ox, y - oy) for ox, oy in others], axis=0)
+    k = int(np.argmax(away))
+    return float(x[k]), float(y[k]), 2.0 * math.pi * who.draws.item(BOW), 0.0

@@ -1,0 +1,141 @@
+"""What workers do, one thing after another: a small graph of jobs at kinds of workplaces."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.records import WORKPLACE_KINDS
+from hrc_env.motion.state import ACTIVITY_NAMES
+from hrc_env.worker.props import PROP_NAMES
+
+HERE = "here"
+"""As a kind of place: wherever the worker is."""
+ROUTES = ("walk", "push")
+"""How workers go to a job."""
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """One thing to do, and what may follow; weights are shares of their sum."""
+
+    name: str
+    activity: str
+    """One of `plans.ACTIVITY_NAMES`."""
+    at: str
+    """Kind of workplace (`WORKPLACE_KINDS`), or "here"."""
+    then: tuple[tuple[str, float], ...] = ()
+    """What may follow, with weights; nothing, or the same place for too long: it is over."""
+    begins: float = 0.0
+    """Weight with which an errand begins with this job; 0: none does."""
+    prop: str = "nothing"
+    """What is picked up, or pushed on the way."""
+    by: str = "walk"
+    """How workers go there: "walk", or "push" the prop."""
+
+
+JOBS: tuple[Job, ...] = (
+    Job("work with the robot", "reach", "robot",
+         (("work with the robot", 0.78), ("wait for the robot", 0.16), ("show where", 0.03),
+          ("watch the robot", 0.03))),
+    Job("wait for the robot", "stand", "robot", (("work with the robot", 1.0),)),
+    Job("watch the robot", "look round", "robot", (("work with the robot", 1.0),)),
+    Job("show where", "point", "robot", (("work with the robot", 1.0),)),
+    Job("fetch a board", "pick up", "pile",
+         (("bring it to the wall", 0.7), ("bring it to the robot", 0.3)), 1.0, "board"),
+    Job("bring it to the wall", "set down", "wall",
+         (("nail it", 0.6), ("screw it on", 0.4))),
+    Job("bring it to the robot", "hand over", "robot", (("work with the robot", 1.0),)),
+    Job("fetch a box", "pick up", "pile",
+         (("put it on the bench", 0.6), ("put it on the floor", 0.4)), 0.7, "box"),
+    Job("put it on the bench", "set down", "bench", (("work at the bench", 1.0),)),
+    Job("put it on the floor", "set down", "floor", (("look about", 1.0),)),
+    Job("move a load", "lift", "floor", (("look about", 0.4), ("move a load", 0.3),
+         ("work on the floor", 0.3)), 0.6),
+    Job("nail it", "hammer", "wall", (("nail it", 0.3), ("measure the wall", 0.3),
+         ("screw it on", 0.2), ("look about", 0.2)), 0.5),
+    Job("screw it on", "drill", "wall", (("nail it", 0.3), ("measure the wall", 0.3),
+         ("look about", 0.4)), 0.4),
+    Job("measure the wall", "measure", "wall", (("nail it", 0.4), ("screw it on", 0.4),
+         ("look about", 0.2)), 0.5),
+    Job("work overhead", "drill overhead", "overhead", (("work overhead", 0.5),
+         ("look about", 0.5)), 0.6),
+    Job("work at the bench", "saw", "bench", (("work at the bench", 0.4), ("tidy the bench", 0.6)),
+         0.5),
+    Job("tidy the bench", "reach", "bench", (("tidy the bench", 0.5), ("work at the bench", 0.3),
+         ("look about", 0.2)), 0.5),
+    Job("work on the floor", "kneel", "floor", (("look about", 1.0),), 0.4),
+    Job("look at the floor", "squat", "floor", (("look about", 1.0),), 0.3),
+    Job("take the cart", "stand", "cart", (("bring the cart", 1.0),), 0.4),
+    Job("bring the cart", "look round", "open", (("look about", 1.0),), 0.0, "cart", "push"),
+    Job("climb up", "climb", "step", (("look about", 0.6), ("climb up", 0.4)), 0.3),
+    Job("stand about", "stand", "open", (("look about", 0.4), ("stand about", 0.3),
+         ("do something", 0.3)), 0.8),
+    Job("do something", "reach", "open", (("stand about", 0.5), ("do something", 0.5)), 0.4),
+    Job("look about", "look round", HERE),
+)  # fmt: skip
+"""Judgement: framing work beside a robot that holds what is worked on."""
+
+
+def check_jobs(jobs: Sequence[Job]) -> None:
+    """Refuse unknown names of activities, places, jobs and props, bad weights, and no robot."""
+    names = [job.name for job in jobs]
+    if len(set(names)) < len(names):
+        raise ConfigError(f"Jobs must have different names, got {names}.")
+    if not any(job.at == "robot" for job in jobs):
+        raise ConfigError("Some job must be at the robot: at='robot'.")
+    for job in jobs:
+        for what, got, valid in (
+            ("activity of", job.activity, ACTIVITY_NAMES),
+            ("kind of place of", job.at, (*WORKPLACE_KINDS, HERE)),
+            ("prop of", job.prop, PROP_NAMES),
+            ("way to", job.by, ROUTES),
+            *(("job after", name, names) for name, _ in job.then),
+        ):
+            if got not in valid:
+                raise unknown(f"{what} {job.name!r}", got, valid)
+        if job.begins < 0.0 or not all(weight > 0.0 for _, weight in job.then):
+            raise ConfigError(
+                f"{job.name!r}: begins must be 0 or more, weights must be > 0, got "
+                f"{job.begins} and {job.then}."
+            )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Schedule:
+    """The graph where only some kinds of places are: indices into `jobs`."""
+
+    jobs: tuple[Job, ...]
+    then: tuple[tuple[tuple[int, float], ...], ...]
+    """After each job: what may follow, with running shares up to 1."""
+    robot: int
+    """The first job at the robot."""
+    begins: tuple[tuple[int, float], ...]
+    """How errands elsewhere begin, with running shares; empty where there is nowhere else."""
+
+
+def schedule_at(jobs: Sequence[Job], kinds: Sequence[str]) -> Schedule:
+    """The jobs that can be done at these kinds of places; places at the robot always are."""
+    there = {*kinds, "robot", HERE}
+    kept = tuple(job for job in jobs if job.at in there)
+    index = {job.name: k for k, job in enumerate(kept)}
+    then = tuple(
+        _shares([(index[name], weight) for name, weight in job.then if name in index])
+        for job in kept
+    )
+    robot = next(k for k, job in enumerate(kept) if job.at == "robot")
+    return Schedule(kept, then, robot, _shares([(index[job.name], job.begins) for job in kept]))
+
+
+def _shares(weights: list[tuple[int, float]]) -> tuple[tuple[int, float], ...]:
+    """Weights as running shares of their sum; those of weight 0 are left out."""
+    total, running, shares = sum(weight for _, weight in weights), 0.0, []
+    for k, weight in weights:
+        if weight > 0.0:
+            running += weight / total
+            shares.append((k, running))
+    return tuple(shares)
+
+
+def picked(shares: tuple[tuple[int, float], ...], draw: float) -> int:
+    """The job that a uniform draw in [0, 1) falls on; shares are not empty."""
+    return next((k for k, share in shares if draw < share), shares[-1][0])
