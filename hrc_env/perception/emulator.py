@@ -19,12 +19,7 @@ from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.geometry.lens import lens_row
 from hrc_env.geometry.sight import Surroundings
 from hrc_env.perception import emulator_kernel as kernels
-from hrc_env.perception.calibration import (
-    POSTURED,
-    Calibration,
-    changed_ns,
-    read_calibration,
-)
+from hrc_env.perception.calibration import POSTURED, Calibration, changed_ns, read_calibration
 from hrc_env.perception.detector import STATURE_OF_SIDE
 from hrc_env.perception.sightlines import CAMERA, N_LOOK, World, sight_batch
 
@@ -122,8 +117,7 @@ def emulate(
         config: as given to `make_state`.
 
     Returns:
-        Keypoints in pixels of the images, as lenses distort them, with NaN, 0 and infinity where a
-        camera does not see a worker.
+        Keypoints in pixels of the images; NaN, 0 and infinity of a worker who is not seen.
     """
     batch, n_cameras, n_workers = state.errors.shape
     shape = (batch, n_cameras, n_workers, N_JOINTS)

@@ -37,11 +37,8 @@ Landmarker: TypeAlias = Callable[[Tensor], tuple[Tensor, float, Tensor]]
 
 
 def chosen_runtime(name: str) -> str:
-    """Which runtime `name` comes to here: "litert" or "openvino".
-
-    Raises:
-        ConfigError: no such runtime, or one that is not installed.
-    """
+    """Which runtime `name` comes to here: "litert" or "openvino". Raises `ConfigError` for one that
+    is not known or not installed."""
     if name not in RUNTIMES:
         raise unknown("runtime", name, RUNTIMES)
     if name == "openvino":

@@ -31,12 +31,9 @@ def sigma_px(
     """Standard deviation of each coordinate of a detected joint [px].
 
     Args:
-        confidence: (..., J) visibility in [0, 1]; 0 means that there is no measurement.
+        confidence: (..., J) visibility in [0, 1]; of 0 the deviation is infinite.
         stature_px: how long the worker's stature is at their distance [px]; broadcasts.
         posture: how far the body counts as each of `calibration.POSTURES` (`outline.posture_of`).
-
-    Returns:
-        (..., J) finite and positive, infinite where the confidence is 0.
     """
     confidence = np.asarray(confidence, float)
     check_shape("confidence", confidence.shape[-1:], (len(KIND),), "one a joint")

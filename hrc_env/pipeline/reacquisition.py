@@ -108,8 +108,7 @@ class Reacquisition(Stateful):
         """Learn what a search of the blind cameras gave for a worker of environment b.
 
         Args:
-            b: the environment.
-            worker: the worker.
+            b, worker: whose search.
             people: (C,) whom each blind camera shows.
             windows: (C,) where the track has the cameras look.
             others: windows (C,) of other workers, who are not taken for this one.
