@@ -55,16 +55,13 @@ def state_of(setting):
     """A tracker's state after an episode, and the true bones."""
     walks, turn = walks_of("lab", 1, SEEDS, N_STEPS), setting.turns[0]
     pipeline, ids = pipeline_of(setting, turn, 1), np.zeros(1, int)
-    joints = []
-    shown = watch(
-        setting, turn, walks, SEEDS, ids, lambda k, said, truth, now: joints.append(truth)
-    )
+    frames = list(watch(setting, turn, walks, SEEDS, ids))
     rngs = [np.random.default_rng(0)]
     pipeline.tracker.reset(pipeline.state, ids, rngs)
-    for keypoints in shown:
+    for _, _, keypoints in frames:
         pipeline.tracker.predict(pipeline.state, DT_S, rngs)
         pipeline.tracker.update(pipeline.state, keypoints, rngs)
-    return pipeline.state, lengths_m(joints[0])
+    return pipeline.state, lengths_m(frames[0][1].truth.joints_world)
 
 
 @pytest.fixture(scope="module")

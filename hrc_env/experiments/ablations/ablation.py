@@ -1,4 +1,4 @@
-"""An ablation: one question, the settings that answer it, and what is drawn of them."""
+"""An ablation: one question, and the settings that answer it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -45,32 +45,6 @@ class Setting:
                 )
 
 
-Line = Mapping[float, str]
-"""Settings by where they are along an axis."""
-
-
-@dataclass(frozen=True, slots=True)
-class Curves:
-    """Median and 95th percentile of the error against a number."""
-
-    title: str
-    across: str
-    """What the number is, with its unit."""
-    lines: Mapping[str, Line]
-    is_log: bool = False
-    """Whether the number's axis is logarithmic."""
-    by_time: bool = False
-    """Whether the time that an update takes is the number, instead of the line's."""
-
-
-@dataclass(frozen=True, slots=True)
-class Rows:
-    """Median and 95th percentile of the error and coverage, a line a setting."""
-
-    title: str
-    settings: tuple[Setting, ...]
-
-
 @dataclass(frozen=True, slots=True)
 class Ablation:
     """One question."""
@@ -81,7 +55,5 @@ class Ablation:
     asked: str
     """The question, and what is played for it."""
     settings: tuple[Setting, ...]
-    panels: tuple[Curves | Rows, ...]
-    """What is drawn."""
     also: Mapping[str, str] = field(default_factory=dict)
     """What is sorted out of the settings' joints, and its words."""

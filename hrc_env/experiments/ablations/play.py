@@ -5,11 +5,11 @@ rests, so that nobody has a reason to react to it.
 """
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import permutations
+from itertools import islice, permutations
 from typing import Any
 
 import numpy as np
@@ -44,8 +44,6 @@ INSIDE_95 = float(chi2.ppf(0.95, 3))
 """Squares of errors in units of their covariance are below this in 95 % of all cases."""
 RECORDED_BY, N_TIMED = "triangulation", 3
 """Detections do not depend on who follows them: the quickest does. Times are taken so often."""
-Heard = Callable[[int, PoseEstimate, Points3, TrueSensorInput], None]
-"""Told the frame's number, what is believed, the true joints (B, W, J, 3) [m], the scene."""
 Sums = dict[str, list[Any]]
 """By name, one an episode."""
 
@@ -116,10 +114,8 @@ def _episodes(setting: Setting, turn: Turn, walks: Walks, seeds: Sequence[int], 
     """Sums of some of the episodes, with these cameras, after the warm-up."""
     errors, inside, lost, seeing = [], [], [], []
     scene = scene_of(setting, turn)
-
-    def heard(frame: int, said: PoseEstimate, joints_world: Points3, now: TrueSensorInput) -> None:
-        if frame < N_WARM_UP:
-            return
+    for said, now, _ in islice(watch(setting, turn, walks, seeds, ids), N_WARM_UP, None):
+        joints_world = now.truth.joints_world
         order = matched(said.mean_world, said.tracked, joints_world)
         mean, cov = (
             np.take_along_axis(each, order.reshape(*order.shape, *[1] * (each.ndim - 2)), 1)
@@ -132,8 +128,6 @@ def _episodes(setting: Setting, turn: Turn, walks: Walks, seeds: Sequence[int], 
         lost.append(~np.take_along_axis(said.tracked, order, 1))
         if setting.by_sight:
             seeing.append(n_seeing(now, scene, turn))
-
-    watch(setting, turn, walks, seeds, ids, heard)
     error_m, is_inside, is_lost = (np.stack(each, 1) for each in (errors, inside, lost))
     sums = _sums(error_m, is_inside, np.ones(error_m.shape, bool), "")
     sums["lost"] = is_lost.sum((1, 2)).tolist()
@@ -156,27 +150,23 @@ def _sums(error_m: Floats, inside: Bools, which: Bools, prefix: str) -> Sums:
 
 
 def watch(
-    setting: Setting, turn: Turn, walks: Walks, seeds: Sequence[int], ids: Ints, heard: Heard
-) -> list[Keypoints]:
-    """(T) keypoints of every frame of some episodes, from beginning to end."""
+    setting: Setting, turn: Turn, walks: Walks, seeds: Sequence[int], ids: Ints
+) -> Iterator[tuple[PoseEstimate, TrueSensorInput, Keypoints]]:
+    """Frame by frame of some episodes: what is believed, what is true, what was detected."""
     pipeline = pipeline_of(setting, turn, len(ids))
     rngs: list[Generators] = [
         [np.random.default_rng([seeds[b], k]) for b in ids.tolist()] for k in (2, 3)
     ]
     everyone, present = np.arange(len(ids)), np.ones((len(ids), setting.n_workers), bool)
     pipeline.reset(everyone, *rngs)
-    shown, q, lengths = [], walks.q[ids], None
-    for frame, motions in enumerate(walks.motions):
+    lengths = lengths_m(worker_truth(walks.bodies, rows(walks.motions[0], ids)).joints_world)
+    for motions in walks.motions:
         motion = rows(motions, ids)
         truth = worker_truth(walks.bodies, motion)
-        if lengths is None:
-            lengths = lengths_m(truth.joints_world)
         handicap(pipeline.state, setting.bones, setting.motion, lengths)
-        now = TrueSensorInput(everyone, q, motion, truth, present)
-        heard(frame, pipeline.perceive(now, *rngs), truth.joints_world, now)
-        shown.append(pipeline.keypoints)
+        now = TrueSensorInput(everyone, walks.q[ids], motion, truth, present)
+        yield pipeline.perceive(now, *rngs), now, pipeline.keypoints
     pipeline.close()
-    return shown
 
 
 def update_us(setting: Setting, walks: Walks, seeds: tuple[int, ...], n_frames: int) -> list[float]:
@@ -185,7 +175,7 @@ def update_us(setting: Setting, walks: Walks, seeds: tuple[int, ...], n_frames: 
     turn, ids = setting.turns[0], np.arange(min(len(seeds), 4))
     short = replace(walks, motions=walks.motions[: N_WARM_UP + n_frames])
     recorded_by = replace(setting, estimator=RECORDED_BY, bones=BONES[0], motion=MOTION[0])
-    shown = watch(recorded_by, turn, short, seeds, ids, lambda *_: None)
+    shown = [seen for _, _, seen in watch(recorded_by, turn, short, seeds, ids)]
     tracker: Any = pipeline_of(setting, turn, len(ids)).tracker
     found = []
     for _ in range(N_TIMED):

@@ -17,6 +17,7 @@ from gymnasium.utils import seeding
 
 from hrc_env.config import settle
 from hrc_env.core.machine import n_cores
+from hrc_env.core.records import WorkerTruth
 from hrc_env.core.typing import Bools, Capsules, Floats, Points3
 from hrc_env.experiments.impact.setups import PerceptionSetup
 from hrc_env.experiments.study.cache import PartProgress
@@ -43,22 +44,8 @@ MakeAgent = Callable[[Simulation], Any]
 """The agent for a simulation's robot (`agents.env_info.Agent`)."""
 Rows = dict[str, list[Any]]
 """Sums by name, one an episode."""
-
-
-@dataclass(frozen=True, slots=True)
-class Bodies:
-    """Where robot and worker truly are."""
-
-    robot_world: Capsules
-    """(B, K, 2, 3) [m]."""
-    robot_radius_m: Floats
-    """(K,)."""
-    worker_world: Capsules
-    """(B, L, 2, 3) [m]."""
-    worker_radius_m: Floats
-    """(B, L)."""
-    joints_world: Points3
-    """(B, J, 3) [m]."""
+Bodies = tuple[Capsules, WorkerTruth]
+"""Where the robot's capsules (B, K, 2, 3) [m] and the workers truly are."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,35 +145,30 @@ def run(
 
 
 def bodies_of(part: Simulation) -> Bodies:
-    """Where everybody is now, in a simulation with one worker."""
+    """Where everybody is now."""
     truth = worker_truth(part.bodies, generator.current(part.motion))
-    return Bodies(
-        chains.capsules(part.chain, part.physics.q),
-        part.chain.capsule_radius_m,
-        truth.capsules_world[:, 0],
-        truth.capsule_radius_m[:, 0],
-        truth.joints_world[:, 0],
-    )
+    return chains.capsules(part.chain, part.physics.q), truth
 
 
 def judge(part: Simulation, before: Bodies, now: Bodies) -> Step:
-    """One step of a simulation, from where bodies were at its beginning and its end."""
-    dt_s, separation_m = part.config.ctrl_dt, _separation_m(now, now)
+    """One step of a simulation with one worker, from where bodies were at its beginning and end."""
+
+    def separation_m(robot_world: Capsules, worker: WorkerTruth) -> Floats:
+        capsules = worker.capsules_world[:, 0], worker.capsule_radius_m[:, 0]
+        radius_m = part.chain.capsule_radius_m
+        return least_separation(robot_world, radius_m, *capsules).distance_m
+
+    (robot_before, worker_before), (robot, worker) = before, now
+    dt_s, at_end_m = part.config.ctrl_dt, separation_m(*now)
+    joints_world = worker.joints_world[:, 0]
     return Step(
-        true_separation_m=separation_m,
+        true_separation_m=at_end_m,
         believed_separation_m=part.belief.separation.distance_m[:, 0],
-        robot_mps=(_separation_m(before, now) - separation_m) / dt_s,
-        worker_mps=(_separation_m(now, before) - separation_m) / dt_s,
-        error_m=np.linalg.norm(part.estimate.mean_world[:, 0] - now.joints_world, axis=-1),
-        joints_world=now.joints_world,
+        robot_mps=(separation_m(robot_before, worker) - at_end_m) / dt_s,
+        worker_mps=(separation_m(robot, worker_before) - at_end_m) / dt_s,
+        error_m=np.linalg.norm(part.estimate.mean_world[:, 0] - joints_world, axis=-1),
+        joints_world=joints_world,
     )
-
-
-def _separation_m(robot: Bodies, worker: Bodies) -> Floats:
-    """(B,) between the robot of one moment and the worker of another."""
-    return least_separation(
-        robot.robot_world, robot.robot_radius_m, worker.worker_world, worker.worker_radius_m
-    ).distance_m
 
 
 def sums_of(steps: Step, infos: Sequence[Info], margin_m: float, dt_s: float) -> Rows:

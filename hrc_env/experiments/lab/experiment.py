@@ -102,7 +102,7 @@ def film(config: LabConfig, motion: str, seed: int, tick: PartProgress) -> dict[
             off_m = np.linalg.norm(said[WARM_UP:, 0] - truth, axis=-1)
             errors[f"{name}.{column}"] = np.round(off_m, 4).tolist()
             tick(0.2 / len(ESTIMATORS) / len(CAMERAS))
-    stature_m = load_body(recording.scene.bodies[0]).stature_m
+    stature_m = float(load_body(recording.scene.bodies[0]).stature_m)
     missed = [
         [missed_by_camera(found, c, rig[c], joints, stature_m) for c in range(len(rig))]
         for found, joints in zip(recording.keypoints[WARM_UP:], truth, strict=True)

@@ -111,7 +111,7 @@ def draw_poses(path: Path, take: Take, warm_up: int) -> None:
 
 def telling(recording: Recording) -> tuple[int, int]:
     """A later frame, and the camera that misses most of the far side in it."""
-    stature_m = load_body(recording.scene.bodies[0]).stature_m
+    stature_m = float(load_body(recording.scene.bodies[0]).stature_m)
     frames = range(len(recording.joints_world) // 3, len(recording.joints_world), 5)
 
     def lost(pair: tuple[int, int]) -> int:

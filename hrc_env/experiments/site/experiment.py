@@ -14,7 +14,7 @@ from hrc_env.core.records import PoseEstimate
 from hrc_env.core.results import Metric
 from hrc_env.core.skeleton import JOINT
 from hrc_env.core.typing import Floats
-from hrc_env.experiments.site.report import MULTI, report, site
+from hrc_env.experiments.site.report import MULTI, SPOKEN, report, site
 from hrc_env.experiments.site.walk import walk
 from hrc_env.experiments.study.cache import PartCache, PartProgress
 from hrc_env.experiments.study.intervals import mean_over, rmse_over
@@ -87,30 +87,14 @@ def config_for(
     return changed(QUICK if quick else SiteConfig(), estimators=names, n_seeds=seeds)
 
 
-@dataclass(frozen=True, slots=True)
-class Row:
-    """An estimator with some of the four cameras."""
-
-    estimator: str
-    cameras: tuple[int, ...]
-
-    @property
-    def name(self) -> str:
-        """`particle.camera_1`, `particle.camera_1+camera_3`, `particle.multi`."""
-        cameras = "+".join(f"camera_{c + 1}" for c in self.cameras)
-        return f"{self.estimator}.{MULTI if len(self.cameras) == 4 else cameras}"
-
-
-def rows_of(estimators: Sequence[str], *sizes: int) -> list[Row]:
-    """Every estimator with every choice of so many of the four cameras."""
-    return [
-        Row(name, cameras)
-        for name in estimators
-        for size in sizes
-        for cameras in combinations(range(4), size)
-    ]
-
-
+CHOICES: dict[str, tuple[int, ...]] = {
+    MULTI if size == 4 else "+".join(f"camera_{c + 1}" for c in cameras): cameras
+    for size in (1, 2, 3, 4)
+    for cameras in combinations(range(4), size)
+}
+"""Cameras by name: `camera_1`, `camera_1+camera_3`, `multi`."""
+ROWS = tuple(SPOKEN)
+"""Each camera alone, and all four."""
 Said = Mapping[str, Any]
 Played = tuple[Mapping[int, Said], Mapping[tuple[str, int], Said]]
 """What everybody made of the shared film, and the truth, by seed; what came of crops of one's own
@@ -121,10 +105,11 @@ def play(config: SiteConfig, cache: PartCache) -> Played:
     """All walks, filmed once for everybody; some again with everybody's own crops."""
     films = {seed: cache.part(f"film.{seed}", partial(film, config, seed)) for seed in config.seeds}
     closed = {
-        (row.name, seed): cache.part(
-            f"closed.{row.name}.{seed}", partial(closed_loop, config, row, seed)
+        (f"{name}.{row}", seed): cache.part(
+            f"closed.{name}.{row}.{seed}", partial(closed_loop, config, name, row, seed)
         )
-        for row in rows_of(config.estimators, 1, 4)
+        for name in config.estimators
+        for row in ROWS
         for seed in config.seeds[: config.n_closed]
     }
     return films, closed
@@ -135,12 +120,12 @@ def film(config: SiteConfig, seed: int, tick: PartProgress) -> dict[str, Any]:
     settings = _settings_with(())
     motions = walk(site(), seed, round(config.seconds / DT_S), DT_S)
     taken = record(site(), motions, settings, CROPS, seed, lambda share: tick(0.7 * share))
-    others = [name for name in config.everybody if name not in config.estimators]
-    asked = rows_of(config.estimators, 1, 2, 3, 4) + rows_of(others, 1, 4)
+    asked = [(name, row) for name in config.estimators for row in CHOICES]
+    asked += [(name, row) for name in ALSO if name not in config.estimators for row in ROWS]
     said: dict[str, Any] = {}
-    for row in asked:
-        beliefs = replay(taken, row.estimator, row.cameras, N_WARM_UP, settings, seed)
-        said[row.name] = _head_path(beliefs)
+    for name, row in asked:
+        beliefs = replay(taken, name, CHOICES[row], N_WARM_UP, settings, seed)
+        said[f"{name}.{row}"] = _head_path(beliefs)
         tick(0.3 / len(asked))
     confidence = np.stack([each.confidence[0, :, 0, HEAD] for each in taken.keypoints])
     return {
@@ -150,11 +135,13 @@ def film(config: SiteConfig, seed: int, tick: PartProgress) -> dict[str, Any]:
     }
 
 
-def closed_loop(config: SiteConfig, row: Row, seed: int, tick: PartProgress) -> dict[str, Any]:
+def closed_loop(
+    config: SiteConfig, estimator: str, row: str, seed: int, tick: PartProgress
+) -> dict[str, Any]:
     """The same walk with crops of one's own; after a second some cameras are lost."""
-    settings = _settings_with(left_of("site", [row.cameras])[0].faults)
+    settings = _settings_with(left_of("site", [CHOICES[row]])[0].faults)
     motions = walk(site(), seed, round(config.seconds / DT_S), DT_S)
-    return _head_path(record(site(), motions, settings, row.estimator, seed, tick).beliefs)
+    return _head_path(record(site(), motions, settings, estimator, seed, tick).beliefs)
 
 
 def _settings_with(faults: tuple[FaultConfig, ...]) -> HRCConfig:
@@ -174,29 +161,31 @@ def metrics_of(config: SiteConfig, played: Played) -> dict[str, Metric]:
     """Every number of results.json."""
     films = played[0].values()
 
-    def squared(*rows: Row) -> list[Floats]:
+    def squared(name: str, *rows: str) -> list[Floats]:
         """Of all frames of some rows together, walk by walk [m^2]."""
         return [
-            np.concatenate([_squared_m2(each, each["rows"][row.name]) for row in rows])
+            np.concatenate([_squared_m2(each, each["rows"][f"{name}.{row}"]) for row in rows])
             for each in films
         ]
 
     metrics = {}
-    for row in rows_of(config.everybody, 1, 4):
-        metrics[f"rmse_m.{row.name}"] = _rmse(squared(row))
-        tracked = [float(np.mean(each["rows"][row.name]["tracked"])) for each in films]
-        metrics[f"tracked.{row.name}"] = mean_over(tracked, "share")
-    for row in rows_of(config.everybody, 1):
-        above, below = squared(row), squared(Row(row.estimator, (0, 1, 2, 3)))
-        above, below = ([each.sum() for each in squares] for squares in (above, below))
-        metrics[f"over_multi.{row.name}"] = rmse_over(above, below, "ratio")
+    for name in config.everybody:
+        multi = [each.sum() for each in squared(name, MULTI)]
+        for row in ROWS:
+            metrics[f"rmse_m.{name}.{row}"] = _rmse(squared(name, row))
+            tracked = [float(np.mean(each["rows"][f"{name}.{row}"]["tracked"])) for each in films]
+            metrics[f"tracked.{name}.{row}"] = mean_over(tracked, "share")
+            if row != MULTI:
+                alone = [each.sum() for each in squared(name, row)]
+                metrics[f"over_multi.{name}.{row}"] = rmse_over(alone, multi, "ratio")
     for name in config.estimators:
         for size, word in ((2, "two"), (3, "three")):
-            metrics[f"rmse_m.{name}.{word}"] = _rmse(squared(*rows_of([name], size)))
-    for row in rows_of(config.estimators, 1, 4):
-        own = [(k, said) for (name, k), said in played[1].items() if name == row.name]
-        squares = [_squared_m2(played[0][seed], said) for seed, said in own]
-        metrics[f"closed_rmse_m.{row.name}"] = _rmse(squares)
+            rows = [row for row, cameras in CHOICES.items() if len(cameras) == size]
+            metrics[f"rmse_m.{name}.{word}"] = _rmse(squared(name, *rows))
+        for row in ROWS:
+            own = [(k, said) for (key, k), said in played[1].items() if key == f"{name}.{row}"]
+            squares = [_squared_m2(played[0][seed], said) for seed, said in own]
+            metrics[f"closed_rmse_m.{name}.{row}"] = _rmse(squares)
     for k in range(4):
         metrics[f"found.camera_{k + 1}"] = mean_over([each["found"][k] for each in films], "share")
     return metrics
@@ -221,8 +210,7 @@ STUDY = Study(
     settings=lambda config: {**asdict(config), "also": ALSO, "crops": CROPS},
     seeds=lambda config: config.seeds,
     n_parts=lambda config: (
-        config.n_seeds
-        + len(rows_of(config.estimators, 1, 4)) * len(config.seeds[: config.n_closed])
+        config.n_seeds + len(config.estimators) * len(ROWS) * len(config.seeds[: config.n_closed])
     ),
     play=play,
     metrics=metrics_of,

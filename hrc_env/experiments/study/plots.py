@@ -14,8 +14,6 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats
 
-COLOURS = ("#1565c0", "#e65100", "#2e7d32", "#6a1b9a", "#455a64", "#ad1457")
-
 
 def new_figure(width_in: float, height_in: float) -> Figure:
     """An empty figure that finds room for what is drawn."""

@@ -11,31 +11,35 @@ from hrc_env.experiments.study.cache import PartCache, Progress, own_folder
 from hrc_env.experiments.study.fingerprint import fingerprint_of
 from hrc_env.experiments.study.report import Report
 
-C = TypeVar("C")
+ConfigT = TypeVar("ConfigT")
 PlayedT = TypeVar("PlayedT")
 Settings = Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
-class Study(Generic[C, PlayedT]):
-    """A question asked of simulated episodes; C is its configuration."""
+class Study(Generic[ConfigT, PlayedT]):
+    """A question asked of simulated episodes with some configuration."""
 
     name: str
     modules: tuple[str, ...]
     """Dotted names of those that make parts: with what they import, they are in the parts' key."""
-    settings: Callable[[C], Settings]
+    settings: Callable[[ConfigT], Settings]
     """What all numbers depend on."""
-    seeds: Callable[[C], Sequence[int]]
-    n_parts: Callable[[C], float]
-    play: Callable[[C, PartCache], PlayedT]
+    seeds: Callable[[ConfigT], Sequence[int]]
+    n_parts: Callable[[ConfigT], float]
+    play: Callable[[ConfigT, PartCache], PlayedT]
     """All parts, each from the cache or anew."""
-    metrics: Callable[[C, PlayedT], dict[str, Metric]]
-    report: Callable[[C, PlayedT, dict[str, Metric], Path], Report]
+    metrics: Callable[[ConfigT, PlayedT], dict[str, Metric]]
+    report: Callable[[ConfigT, PlayedT, dict[str, Metric], Path], Report]
     """Draws the figures into a folder; what is to be read."""
 
 
 def run(
-    study: Study[C, Any], config: C, out: Path, progress: Progress, overwrite: bool = False
+    study: Study[ConfigT, Any],
+    config: ConfigT,
+    out: Path,
+    progress: Progress,
+    overwrite: bool = False,
 ) -> dict[str, Metric]:
     """Play what is not there yet; results.json, figures/, report.html and report.md into `out`.
 
@@ -59,7 +63,7 @@ def run(
     return metrics
 
 
-def changed(config: C, **values: Any) -> C:
+def changed(config: ConfigT, **values: Any) -> ConfigT:
     """A configuration with the values that are given; None leaves a field as it is."""
     given = {name: value for name, value in values.items() if value is not None}
     return replace(config, **given)  # type: ignore[type-var]

@@ -3,46 +3,30 @@
 import math
 from typing import Any
 
-from hrc_env.experiments.ablations.ablation import Ablation, Curves, Rows, Setting
+from hrc_env.experiments.ablations.ablation import Ablation, Setting
 from hrc_env.experiments.ablations.questions.rigs import PAIRS
 from hrc_env.experiments.study.rigs import ALL, SINGLE, Rig, left_of
 from hrc_env.tracking.config import PaperConfig, ParticleConfig
 
-PARTICLES, ITERATIONS, SIGMAS_CM = (30, 100, 300, 1000, 3000, 10_000), (2, 5, 10), (1, 2, 10)
-USUAL_M, USUAL_CM = 1000, 5
 
-
-def _paper(name: str, n: int, m: int, sigma_cm: float = USUAL_CM) -> Setting:
+def _paper(name: str, n: int, m: int, sigma_cm: float = 5) -> Setting:
     tracker = PaperConfig(n_iterations=n, n_particles=m, sigma_m=sigma_cm / 100)
     words = f"N = {n}, M = {m:,}, noise {sigma_cm:g} cm"
     return Setting(name, words, estimator="paper", tracker=tracker, is_timed=True)
 
 
-USUAL = f"n1_m{USUAL_M}"
-BY_M = {float(m): f"n1_m{m}" for m in PARTICLES}
-BY_N = {float(USUAL_M): USUAL} | {float(n * USUAL_M): f"n{n}_m{USUAL_M}" for n in ITERATIONS}
-BY_SIGMA = {float(cm): f"sigma_{cm}cm" for cm in SIGMAS_CM} | {float(USUAL_CM): USUAL}
 ALGORITHM_1 = Ablation(
     "algorithm1",
     "N and M of Algorithm 1",
     "The paper gives neither its number of particles M nor of passes N nor the noise of line 7. "
     "Four cameras in the corners of the laboratory; one joint has M particles.",
     (
-        *(_paper(f"n1_m{m}", 1, m) for m in PARTICLES),
-        *(_paper(f"n{n}_m{USUAL_M}", n, USUAL_M) for n in ITERATIONS),
-        *(_paper(f"sigma_{cm}cm", 1, USUAL_M, cm) for cm in SIGMAS_CM),
+        *(_paper(f"n1_m{m}", 1, m) for m in (30, 100, 300, 1000, 3000, 10_000)),
+        *(_paper(f"n{n}_m1000", n, 1000) for n in (2, 5, 10)),
+        *(_paper(f"sigma_{cm}cm", 1, 1000, cm) for cm in (1, 2, 10)),
         Setting("particle", "the default filter", is_timed=True),
     ),
-    (
-        Curves("Particles and iterations", "M (N = 1), or N x M (M = 1,000)",
-               {"M, N = 1": BY_M, "N, M = 1,000": BY_N}, is_log=True),
-        Curves("Noise of line 7, N = 1, M = 1,000", "standard deviation [cm]",
-               {"noise": dict(sorted(BY_SIGMA.items()))}, is_log=True),
-        Curves("What it costs", "microseconds per worker and update",
-               {"M, N = 1": BY_M, "N, M = 1,000": BY_N, "the default filter": {0.0: "particle"}},
-               is_log=True, by_time=True),
-    ),
-)  # fmt: skip
+)
 
 VARIANTS: dict[str, dict[str, Any]] = {
     "kalman": {},
@@ -115,18 +99,16 @@ def _part(cameras: str, name: str) -> Setting:
 
 
 ONE = tuple(dict.fromkeys((WHOLE, *WITHOUT, *VARIANTS, *RIVALS)))
-PARTS = {
-    "4cam": tuple(_part("4cam", name) for name in ONE if name not in HANGING_ON_ONE_VIEW),
-    "1cam": tuple(_part("1cam", name) for name in ONE),
-}
 FILTER = Ablation(
     "filter",
     "What each part of the default filter contributes",
     "The default filter without one of its parts, and rivals that have fewer, on the same "
     "detections: with all four cameras of the laboratory, and with one that is left after the "
     "warm-up. Times are those of the settings with their cameras.",
-    (*PARTS["4cam"], *PARTS["1cam"]),
-    tuple(Rows(CAMERAS[cameras][0].capitalize(), parts) for cameras, parts in PARTS.items()),
+    (
+        *(_part("4cam", name) for name in ONE if name not in HANGING_ON_ONE_VIEW),
+        *(_part("1cam", name) for name in ONE),
+    ),
 )
 
 KNOWING = {
@@ -136,22 +118,21 @@ KNOWING = {
     "points": ("points without a body (ransac)", "ransac", "learnt"),
 }
 """What is known of the body: words, estimator and bones."""
-BODY = {
-    cameras: tuple(
-        Setting(
-            f"{cameras}_{name}", f"{spoken}: {words}", estimator=estimator, bones=bones,
-            turns=left_of("lab", rigs),
-        )
-        for name, (words, estimator, bones) in KNOWING.items()
-    )
-    for cameras, (spoken, rigs) in CAMERAS.items()
-}  # fmt: skip
 KINEMATICS = Ablation(
     "kinematics",
     "What it is worth to know the body",
     "The default filter with the worker's true bone lengths, with lengths that it learns, and "
     "with none expected (the motion model alone holds joints together); beside an estimator "
     "without a body. All four cameras of the laboratory, two or one of them after the warm-up.",
-    tuple(setting for settings in BODY.values() for setting in settings),
-    tuple(Rows(CAMERAS[cameras][0].capitalize(), settings) for cameras, settings in BODY.items()),
+    tuple(
+        Setting(
+            f"{cameras}_{name}",
+            f"{spoken}: {words}",
+            estimator=estimator,
+            bones=bones,
+            turns=left_of("lab", rigs),
+        )
+        for cameras, (spoken, rigs) in CAMERAS.items()
+        for name, (words, estimator, bones) in KNOWING.items()
+    ),
 )

@@ -1,6 +1,6 @@
 """How many cameras, and where; how many may be blocked; how many workers they can tell apart."""
 
-from hrc_env.experiments.ablations.ablation import Ablation, Curves, Rows, Setting
+from hrc_env.experiments.ablations.ablation import Ablation, Setting
 from hrc_env.experiments.study.rigs import (
     ALL,
     NEIGHBOURS,
@@ -68,81 +68,71 @@ def _of(rigs: tuple[Rig, ...]) -> tuple[Turn, ...]:
     return tuple(Turn(hung(tuple(CORNERS[c] for c in rig))) for rig in rigs)
 
 
-NUMBERS = tuple(
-    Setting(f"n{n}", f"{n} of eight places round the room", turns=spread_over(n))
-    for n in range(1, 9)
-)
-PLACES = (
-    Setting("corners", "four: in the corners", turns=_of((ALL,))),
-    Setting("walls", "four: in the middles of the walls", turns=(Turn(hung(WALLS)),)),
-    Setting("low", "four: in the corners, 1 m high", turns=(Turn(hung(CORNERS, BREAST_M)),)),
-    Setting("one_side", "four: along one wall", turns=side_by_side()),
-    Setting("two_opposite", "two: opposite corners", turns=_of(OPPOSITE)),
-    Setting("two_neighbours", "two: neighbouring corners", turns=_of(NEIGHBOURS)),
-    Setting("two_beside", f"two: {BESIDE_M:g} m from each other", turns=beside_each_other()),
-    *(
-        Setting(f"site_{name}", f"site: {words}", "site", turns=left_of("site", rigs))
-        for name, words, rigs in (
-            ("one", "one mast", SINGLE),
-            ("two_opposite", "two opposite masts", OPPOSITE),
-            ("two_neighbours", "two neighbouring masts", NEIGHBOURS),
-            ("three", "three masts", TRIPLES),
-            ("four", "four masts", (ALL,)),
-        )
-    ),
-)
 CAMERAS = Ablation(
     "cameras",
     "How many cameras, and where?",
     "Cameras of 90 degrees in some of eight places round the laboratory (corners, middles of "
     "walls), 2.45 m high unless said otherwise; which ones goes round. One camera is what is left "
     "of four after the warm-up, as are fewer than four masts of the site.",
-    (*NUMBERS, *PLACES),
     (
-        Curves("How many", "cameras", {
-            "evenly round the laboratory": {k + 1.0: each.name for k, each in enumerate(NUMBERS)},
-        }),
-        Rows("Where", PLACES),
+        *(
+            Setting(f"n{n}", f"{n} of eight places round the room", turns=spread_over(n))
+            for n in range(1, 9)
+        ),
+        Setting("corners", "four: in the corners", turns=_of((ALL,))),
+        Setting("walls", "four: in the middles of the walls", turns=(Turn(hung(WALLS)),)),
+        Setting("low", "four: in the corners, 1 m high", turns=(Turn(hung(CORNERS, BREAST_M)),)),
+        Setting("one_side", "four: along one wall", turns=side_by_side()),
+        Setting("two_opposite", "two: opposite corners", turns=_of(OPPOSITE)),
+        Setting("two_neighbours", "two: neighbouring corners", turns=_of(NEIGHBOURS)),
+        Setting("two_beside", f"two: {BESIDE_M:g} m from each other", turns=beside_each_other()),
+        *(
+            Setting(f"site_{name}", f"site: {words}", "site", turns=left_of("site", rigs))
+            for name, words, rigs in (
+                ("one", "one mast", SINGLE),
+                ("two_opposite", "two opposite masts", OPPOSITE),
+                ("two_neighbours", "two neighbouring masts", NEIGHBOURS),
+                ("three", "three masts", TRIPLES),
+                ("four", "four masts", (ALL,)),
+            )
+        ),
     ),
-)  # fmt: skip
+)
 
 SCENES = {"lab": "laboratory", "site": "site"}
-LOST = tuple(
-    Setting(
-        f"{scene}_lost_{n}", f"{scene}: {('none', 'one', 'two', 'three')[n]} of four lost", scene,
-        turns=left_of(scene, rigs), by_sight=True,
-    )
-    for scene in SCENES
-    for n, rigs in enumerate(((ALL,), TRIPLES, PAIRS, SINGLE))
-)  # fmt: skip
-DROPPED = tuple(
-    Setting(
-        f"dropped_{pct}pct", f"lab: {pct} % of all images missing",
-        turns=(Turn(faults=(FaultConfig("dropped", ("all",), pct / 100),)),),
-    )
-    for pct in (30, 60, 90)
-)  # fmt: skip
-SEEN = {
-    f"{scene}_seen_{n}": f"{scene}: joints that {n} of four cameras see"
-    for scene in SCENES
-    for n in range(5)
-}
 OCCLUSION = Ablation(
     "occlusion",
     "How many cameras may be blocked at once?",
     "Some of the four cameras fail after the warm-up, which ones goes round; or images of all "
     "cameras are missing at random. In the first, true lines of sight say how many cameras see "
     "each joint past furniture, robot, load and the body itself.",
-    (*LOST, *DROPPED),
     (
-        Rows("What is lost", (*LOST, *DROPPED)),
-        Curves("Who sees the joint, by truth", "cameras that see it", {
-            words: {float(n): f"{scene}_seen_{n}" for n in range(5)}
-            for scene, words in SCENES.items()
-        }),
+        *(
+            Setting(
+                f"{scene}_lost_{n}",
+                f"{scene}: {('none', 'one', 'two', 'three')[n]} of four lost",
+                scene,
+                turns=left_of(scene, rigs),
+                by_sight=True,
+            )
+            for scene in SCENES
+            for n, rigs in enumerate(((ALL,), TRIPLES, PAIRS, SINGLE))
+        ),
+        *(
+            Setting(
+                f"dropped_{pct}pct",
+                f"lab: {pct} % of all images missing",
+                turns=(Turn(faults=(FaultConfig("dropped", ("all",), pct / 100),)),),
+            )
+            for pct in (30, 60, 90)
+        ),
     ),
-    SEEN,
-)  # fmt: skip
+    {
+        f"{scene}_seen_{n}": f"{scene}: joints that {n} of four cameras see"
+        for scene in SCENES
+        for n in range(5)
+    },
+)
 
 WORKERS = Ablation(
     "workers",
@@ -154,9 +144,4 @@ WORKERS = Ablation(
         for scene, words in SCENES.items()
         for n in (1, 2, 3)
     ),
-    (
-        Curves("Four cameras", "workers", {
-            words: {float(n): f"{scene}_{n}" for n in (1, 2, 3)} for scene, words in SCENES.items()
-        }),
-    ),
-)  # fmt: skip
+)
