@@ -31,7 +31,7 @@ from hrc_env.core.results import Metric, write_results
 from hrc_env.tracking.config import ParticleConfig
 from hrc_env.tracking.forecast import forecast as forecast_all
 from hrc_env.tracking.hypotheses.filter import predict_all
-from hrc_env.tracking.hypotheses.slots import Hypotheses, plain
+from hrc_env.tracking.hypotheses.slots import Hypotheses
 from hrc_env.tracking.particle import ParticleEstimator
 from hrc_env.tracking.tree.state import motion
 from hrc_env.tracking.tree.work import WORK
@@ -58,7 +58,7 @@ class Arguments:
 
 def hold(estimator: ParticleEstimator, state: Hypotheses, horizon_s: float) -> Gaussian:
     """Nobody moves; the present covariance says nothing of the future and is not shown."""
-    body = state.slots.body
+    body = state.trees.body
     return body[:, 0, :, :3].copy(), np.full((*body.shape[:1], 15, 3, 3), np.nan)
 
 
@@ -66,7 +66,7 @@ def constant_velocity(
     estimator: ParticleEstimator, state: Hypotheses, horizon_s: float
 ) -> Gaussian:
     """Every joint goes on; the covariance with the filter's own random acceleration."""
-    body, cov = state.slots.body[:, 0], state.slots.cov[:, 0]
+    body, cov = state.trees.body[:, 0], state.trees.cov[:, 0]
     cross = cov[..., :3, 3:] + cov[..., 3:, :3]
     moved = cov[..., :3, :3] + horizon_s * cross + horizon_s**2 * cov[..., 3:, 3:]
     noise = estimator.config.root_acceleration * horizon_s**3 / 3 * np.eye(3)
@@ -76,11 +76,11 @@ def constant_velocity(
 def damped(estimator: ParticleEstimator, state: Hypotheses, horizon_s: float) -> Gaussian:
     """One exact step of the filter's model on a copy that learns nothing."""
     copy = copied(state)
-    copy.slots.offset_count[:] = np.inf
+    copy.trees.offset_count[:] = np.inf
     config = estimator.config
     model = motion(horizon_s, config.damping, config.root_acceleration)
-    predict_all(plain(copy), model, 0.0, *estimator.constants[:2], np.empty(1, WORK))
-    return copy.slots.body[:, 0, :, :3], copy.slots.cov[:, 0, :, :3, :3]
+    predict_all(tuple(copy), model, 0.0, *estimator.constants[:2], np.empty(1, WORK))
+    return copy.trees.body[:, 0, :, :3], copy.trees.cov[:, 0, :, :3, :3]
 
 
 def forecast(estimator: ParticleEstimator, state: Hypotheses, horizon_s: float) -> Gaussian:

@@ -111,9 +111,9 @@ def _smoothed(
 
 def _forget_bones(state: Any) -> None:
     """Tell an estimator, or each of its hypotheses, that nothing is known of bones' lengths."""
-    for record in (state, getattr(state, "slots", state)):
-        if hasattr(record, "bone_variance"):
-            record.bone_variance[...] = UNKNOWN_M2
+    trees = getattr(state, "trees", None)
+    if trees is not None:
+        trees["bone_variance"][...] = UNKNOWN_M2
 
 
 def run_cell(
