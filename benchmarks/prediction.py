@@ -34,6 +34,7 @@ from hrc_env.tracking.hypotheses.filter import predict_all
 from hrc_env.tracking.hypotheses.slots import Hypotheses, plain
 from hrc_env.tracking.particle import ParticleEstimator
 from hrc_env.tracking.tree.state import motion
+from hrc_env.tracking.tree.work import WORK
 
 mpl.use("Agg")
 HORIZONS_S = (0.1, 0.2, 0.4, 0.6, 1.0)
@@ -78,7 +79,7 @@ def damped(estimator: ParticleEstimator, state: Hypotheses, horizon_s: float) ->
     copy.slots.offset_count[:] = np.inf
     config = estimator.config
     model = motion(horizon_s, config.damping, config.root_acceleration)
-    predict_all(plain(copy), model, 0.0, *estimator.constants[:2])
+    predict_all(plain(copy), model, 0.0, *estimator.constants[:2], np.empty(1, WORK))
     return copy.slots.body[:, 0, :, :3], copy.slots.cov[:, 0, :, :3, :3]
 
 

@@ -31,11 +31,9 @@ class Belief:
 
 
 def estimated_separation(robot: RobotState, estimate: PoseEstimate) -> Separation:
-    """(B, W) narrowest place between the robot's capsules and each estimated body.
+    """(B, W) narrowest place between the robot's capsules and each estimated body, hands included.
 
-    The body is made of the segments between the estimated joints with radii, the hands
-    included (`geometry.segments`). A worker without a track is infinitely far: there is
-    nothing to keep away from that the robot knows of.
+    A worker without a track is infinitely far: the robot knows of nothing to keep away from.
     """
     bodies = segments(estimate.mean_world)
     nearest = least_separation(

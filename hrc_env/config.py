@@ -222,11 +222,7 @@ def save_config(config: HRCConfig, path: str | Path) -> None:
 def load_config(
     path: str | Path, task: str | Task = DEFAULT, estimator: EstimatorChoice = "particle"
 ) -> HRCConfig:
-    """A config from a TOML file, which may hold changes to the default only.
-
-    Raises:
-        ConfigError: see `resolve`.
-    """
+    """A config from a TOML file, which may hold changes to the default only."""
     return resolve(Path(path), task_called(task), estimator_called(estimator))
 
 
@@ -265,11 +261,7 @@ def _camera(given: Any, index: int) -> CameraConfig:
 
 
 def _worker_counts(n_workers: int | tuple[int, int]) -> tuple[int, int]:
-    """The fewest and the most workers of an episode, from one number or from both.
-
-    Raises:
-        ConfigError: they are no whole numbers, 0 or more, in this order.
-    """
+    """The fewest and the most workers of an episode, from one number or from both."""
     pair = tuple(n_workers) if isinstance(n_workers, Sequence) else (n_workers, n_workers)
     whole = all(isinstance(k, int | np.integer) and not isinstance(k, bool) for k in pair)
     if not whole or len(pair) != 2 or not 0 <= pair[0] <= pair[1]:

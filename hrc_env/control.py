@@ -41,11 +41,7 @@ class ControlConfig:
 
 
 def n_actions(control: str, chain: SerialChain) -> int:
-    """Length of an action: one entry per joint, or three for a tool velocity.
-
-    Raises:
-        ConfigError: `control` is not one of `CONTROLS`.
-    """
+    """Length of an action: one entry per joint, or three for a tool velocity."""
     if control not in CONTROLS:
         raise unknown("control", control, CONTROLS)
     return len(chain.velocity_limit_rad_s) if control == "joint" else 3

@@ -81,14 +81,9 @@ def tracking_error(
     Nothing tells a camera who of several workers is called the first: tracks are compared
     with the workers whom they fit best, none with two.
 
-    Args:
-        estimate: what is believed.
-        truth: what is.
-        present: (B, W) who is in the episode; None: everybody.
-
     Returns:
         (B,) mean over tracked workers and joints [m], NaN where nobody is tracked, and
-        (B,) whether a worker is there whom the estimator does not track.
+        (B,) whether a worker is there (`present` (B, W), or all) whom the estimator does not track.
     """
     error_m, lost = np.empty(len(estimate.tracked)), np.zeros(len(estimate.tracked), np.bool_)
     there = np.ones_like(estimate.tracked) if present is None else present

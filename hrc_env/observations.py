@@ -197,12 +197,7 @@ def layout(terms: tuple[ObservationTerm, ...], of: Sizes) -> ObservationLayout:
 def observe(
     now: Belief, where: ObservationLayout, terms: tuple[ObservationTerm, ...]
 ) -> NDArray[np.float32]:
-    """(B, n) flat observations; cast to float32 once, here.
-
-    Args:
-        now: what is believed.
-        where: the layout of
-        terms: all that the observation is made of.
+    """(B, n) flat observations of `terms`; cast to float32 once, here.
 
     Raises:
         ConfigError: a term has another number of entries than it says.
@@ -213,20 +208,14 @@ def observe(
     parts = [term.function(now).reshape(batch, -1) for term in present]
     physical = np.concatenate(parts, axis=1)
     if physical.shape[1] != len(where.scale):
-        _refuse_sizes(present, parts, where)
+        for term, part in zip(present, parts, strict=True):
+            size = where.slices[term.name].stop - where.slices[term.name].start
+            check_shape(f"observation term {term.name!r}", part.shape[1:], (size,), "its `size`")
     observation = np.empty(physical.shape, np.float32)
     if not _scale(physical, where.scale, where.low, where.high, observation):
         names = [name for name, part in where.slices.items() if np.isnan(physical[:, part]).any()]
         raise FloatingPointError(f"Observation terms that are not a number: {', '.join(names)}.")
     return observation
-
-
-def _refuse_sizes(
-    terms: list[ObservationTerm], parts: list[Floats], where: ObservationLayout
-) -> None:
-    for term, part in zip(terms, parts, strict=True):
-        size = where.slices[term.name].stop - where.slices[term.name].start
-        check_shape(f"observation term {term.name!r}", part.shape[1:], (size,), "its `size`")
 
 
 @kernel

@@ -7,7 +7,7 @@ it starts: `python -m hrc_env --import my_file.py play MyTask-v0`, or the enviro
 
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from importlib import import_module
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
@@ -42,30 +42,21 @@ REGISTRIES = {
 def register_task(task: "Task") -> None:
     """Make a task an environment: its id works in `gymnasium.make`, `make_vec` and `play`.
 
-    Args:
-        task: a `hrc_env.tasks.task.Task`.
-
     Raises:
-        ConfigError: its id is taken, or something in it is missing or of the wrong kind.
+        ConfigError: here and below: the name is taken, or something is missing or of a wrong kind.
     """
     from hrc_env.tasks.task import check_task  # here and below: kernels take time to import
 
     check_task(task)
-    if task.id in BUILT_IN:
-        raise ConfigError(f"There is the task {task.id!r} already; choose another id.")
-    _add("task", task.id, task)
+    _add("task", task.id, task, taken=BUILT_IN)
     register_environment(task.id, task.max_episode_steps)
 
 
 def register_estimator(spec: "EstimatorSpec") -> None:
     """Make an estimator known by its name: wherever `estimator=` or `--estimator` is taken.
 
-    Args:
-        spec: a `hrc_env.tracking.estimators.EstimatorSpec`.
-
     Raises:
-        ConfigError: its name is taken, a function is missing, or an estimate has a wrong shape, no
-            finite numbers or no covariance.
+        ConfigError: also for an estimate of a wrong shape, without finite numbers or covariance.
     """
     from hrc_env.tracking.checks import check_estimator
 
@@ -73,52 +64,26 @@ def register_estimator(spec: "EstimatorSpec") -> None:
     _add("estimator", spec.name, spec)
 
 
-def register_detector(name: str, make: "Callable[[], KeypointFunction]") -> None:
-    """Make a pose detector known: `config={"detector": {"keypoints": name}}`, level "pixels".
-
-    Args:
-        name: of it.
-        make: gives the function from a crop to keypoints (`hrc_env.perception.detector`'s
-            `KeypointFunction`); called once for each thread that detects.
-
-    Raises:
-        ConfigError: the name is taken, or what is given is no function.
-    """
-    if not callable(make):
-        raise ConfigError(f"{name}: make must be a function of no arguments, got {make!r}.")
-    _add("detector", name, make)
-
-
 def register_robot(robot: "Robot") -> None:
-    """Make a robot known by its name: wherever `robot=` or `--robot` is taken.
-
-    Args:
-        robot: a `hrc_env.scene.robot.Robot`.
-
-    Raises:
-        ConfigError: its name is taken, or something that it names is missing in its MJCF or of
-            the wrong kind.
-    """
+    """Make a robot known by its name: wherever `robot=` or `--robot` is taken."""
     from hrc_env.scene.robot import check_robot
 
     check_robot(robot)
     _add("robot", robot.name, robot)
 
 
-def register_shield(name: str, shield: "Shield") -> None:
-    """Make a shield known: `shield=name` of every environment.
+def register_detector(name: str, make: "Callable[[], KeypointFunction]") -> None:
+    """Make a pose detector known: `config={"detector": {"keypoints": name}}`, level "pixels".
 
-    Args:
-        name: of it.
-        shield: a function (`hrc_env.safety.shield`'s `Shield`); what it gives is checked in every
-            step.
-
-    Raises:
-        ConfigError: the name is taken, or what is given is no function.
+    `make` gives the function from a crop to keypoints (`hrc_env.perception.detector`'s
+    `KeypointFunction`); it is called once for each thread that detects.
     """
-    if not callable(shield):
-        raise ConfigError(f"{name}: a shield must be a function, got {shield!r}.")
-    _add("shield", name, shield)
+    _add("detector", name, make, is_function=True)
+
+
+def register_shield(name: str, shield: "Shield") -> None:
+    """Make a shield (`hrc_env.safety.shield.Shield`) known: `shield=name` of every environment."""
+    _add("shield", name, shield, is_function=True)
 
 
 def register_environment(task_id: str, max_episode_steps: int = EPISODE_STEPS) -> None:
@@ -142,12 +107,7 @@ def known(what: str) -> dict[str, Any]:
 def import_files(paths: str | None = None) -> None:
     """Import Python files, each once; their calls of `register_...` take effect.
 
-    Args:
-        paths: files, separated as in PATH; None: those of the environment variable
-            `HRC_ENV_IMPORT`.
-
-    Raises:
-        ConfigError: a file that is not there.
+    They are separated as in PATH; None: those of the environment variable `IMPORT`.
     """
     given = os.environ.get(IMPORT, "") if paths is None else paths
     for path in (Path(each).resolve() for each in given.split(os.pathsep) if each):
@@ -165,7 +125,11 @@ def import_files(paths: str | None = None) -> None:
             raise
 
 
-def _add(what: str, name: str, thing: Any) -> None:
-    if name in known(what):
+def _add(
+    what: str, name: str, thing: Any, taken: Collection[str] = (), is_function: bool = False
+) -> None:
+    if is_function and not callable(thing):
+        raise ConfigError(f"{name}: a {what} must be a function, got {thing!r}.")
+    if name in taken or name in known(what):
         raise ConfigError(f"There is the {what} {name!r} already; choose another name.")
     known(what)[name] = thing

@@ -31,13 +31,11 @@ class HRCVecEnv(VecEnv):
     """An `HRCVectorEnv` as SB3 expects environments, with episode statistics.
 
     Environment k of `seed(s)` and then `reset()` is the single environment after
-    `reset(seed=s + k)`; what follows the end of an episode continues its random stream. The info
-    of a step holds its "cost", of which `costs` is the array, and nothing else but where an
-    episode ended: there it is the whole, with what SB3 reads ("terminal_observation",
-    "TimeLimit.truncated") and the episode's statistics ("episode").
+    `reset(seed=s + k)`. The info of a step holds its "cost", of which `costs` is the array, and
+    nothing else but where an episode ended: there it is the whole, with what SB3 reads
+    ("terminal_observation", "TimeLimit.truncated") and the episode's statistics ("episode").
 
     Args:
-        num_envs: how many.
         stagger: after the first `reset()` and after those that follow a `seed()`, let each
             environment's first episode end early at a random time, so that a short rollout of a
             learner sees all phases of an episode and not one. Not for evaluation.

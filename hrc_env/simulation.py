@@ -188,11 +188,7 @@ class Simulation(Stateful):
         return {"settings": self.settings, **super().get_state()}
 
     def set_state(self, state: State) -> None:
-        """Continue from a state, bit for bit.
-
-        Raises:
-            ConfigError: it was taken with other settings.
-        """
+        """Continue from a state that was taken with the same settings, bit for bit."""
         for name, value in self.settings.items():
             if state["settings"][name] != value:
                 raise ConfigError(
@@ -298,11 +294,7 @@ class Simulation(Stateful):
 
 
 def checked_action(action: ArrayLike, shape: tuple[int, ...]) -> Floats:
-    """Actions as float64 of a shape, clipped to [-1, 1].
-
-    Raises:
-        ConfigError: another shape, or values that are no finite numbers.
-    """
+    """Actions as float64, clipped to [-1, 1]; `ConfigError` for other shapes or no numbers."""
     try:
         values = np.asarray(action, np.float64)
     except (TypeError, ValueError) as error:

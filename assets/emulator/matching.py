@@ -25,9 +25,10 @@ from assets.emulator.fit.cells import (
 from assets.emulator.fit.lasting import LAGS, add_lagged
 from assets.emulator.samples import Samples, postures_of, samples_of
 from assets.emulator.watch import Watched, watch
+from assets.emulator.writing import write_calibration
 from hrc_env.config import HRCConfig
 from hrc_env.core.typing import Floats
-from hrc_env.perception.calibration import LONGEST_TAIL, Calibration, write_calibration
+from hrc_env.perception.calibration import LONGEST_TAIL, Calibration
 from hrc_env.perception.emulator import EmulatorConfig
 
 IN_THE_IMAGE, IN_SPACE = 3, 7

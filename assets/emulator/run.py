@@ -12,10 +12,11 @@ from assets.emulator.plot import plot_comparison
 from assets.emulator.samples import samples_of
 from assets.emulator.shelf import kept
 from assets.emulator.validate import Compared, compared
+from assets.emulator.writing import write_calibration
 from hrc_env.config import HRCConfig
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.provenance import provenance
-from hrc_env.perception.calibration import Calibration, write_calibration
+from hrc_env.perception.calibration import Calibration
 from hrc_env.perception.emulator import EmulatorConfig
 
 Say = Callable[[float, str], None]

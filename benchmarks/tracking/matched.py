@@ -26,8 +26,8 @@ from benchmarks.tracking.rigs import DT_S
 from hrc_env.core.skeleton import BONES, N_JOINTS, TORSO
 from hrc_env.core.typing import Floats, Ints, Points3
 from hrc_env.tracking.models.acquisition import STANDING_M
-from hrc_env.tracking.models.bones import STIFFNESS_M
 from hrc_env.tracking.models.motion import damped_joints
+from hrc_env.tracking.tree.bone_lengths import STIFFNESS_M
 
 N_STATES = 6 * N_JOINTS
 N_PLACES = 3 * N_JOINTS

@@ -54,8 +54,8 @@ def _python() -> Finding:
 def _packages() -> Finding:
     from hrc_env import __version__
 
-    others = [f"{name} {version(name)}" for name in PACKAGES]
-    return True, ", ".join([f"hrc_env {__version__}", *others])
+    others = ", ".join(f"{name} {version(name)}" for name in PACKAGES)
+    return True, f"hrc_env {__version__}, {others}"
 
 
 def _torch() -> Finding:
@@ -69,9 +69,8 @@ def _torch() -> Finding:
         return True, f"not installed, the environment does without. {error}"
     gpus = {"CUDA": torch.version.cuda, "ROCm": torch.version.hip}
     builds = [f"{name} {number} build" for name, number in gpus.items() if number] or ["CPU build"]
-    return True, (
-        f"{torch.__version__} ({builds[0]}), stable-baselines3 {stable_baselines3.__version__}"
-    )
+    ours = f"{torch.__version__} ({builds[0]})"
+    return True, f"{ours}, stable-baselines3 {stable_baselines3.__version__}"
 
 
 def _machine() -> Finding:
@@ -100,9 +99,8 @@ def _triton() -> Finding:
 
 def _in_a_process(code: str) -> Finding:
     """Whether Python code ends well, and the last line that it prints."""
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=120
-    )
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
     if done.returncode < 0:
         return False, f"the process was ended by {signal.Signals(-done.returncode).name}"
     lines = (done.stdout if done.stdout.strip() else done.stderr).strip().splitlines()
@@ -118,10 +116,8 @@ def _kernels() -> Finding:
     if not todo:
         return True, f"compiled, in {folder()}"
     wait_s = sum(each.seconds for each in todo) / n_cores()
-    return True, (
-        f"{len(todo)} are not compiled yet: whoever first needs them waits, about {wait_s:.0f} s "
-        "for all; or do it now: python -m hrc_env setup"
-    )
+    said = f"{len(todo)} are not compiled yet: whoever first needs them waits, about {wait_s:.0f} s"
+    return True, f"{said} for all; or do it now: python -m hrc_env setup"
 
 
 def _weights() -> Finding:

@@ -51,11 +51,7 @@ class EnvironmentArguments:
     JSON, or else text), or a .toml file of them. Later ones win. docs/reference/config.md"""
 
     def keywords(self) -> dict[str, Any]:
-        """Keyword arguments of `HRCEnv`, of lists, mappings, text and numbers only.
-
-        Raises:
-            ConfigError: a fault or a change that cannot be read.
-        """
+        """Keyword arguments of `HRCEnv`, of lists, mappings, text and numbers only."""
         given = {
             "cameras": cameras_named(self.cameras),
             "people": self.people,
@@ -83,11 +79,7 @@ def cameras_named(words: Sequence[str]) -> str | list[int | str]:
 
 
 def read_config(words: Sequence[str]) -> dict[str, Any]:
-    """A nested mapping of changes from FIELD=VALUE and TOML files; later ones win.
-
-    Raises:
-        ConfigError: neither, or a file that cannot be read.
-    """
+    """A nested mapping of changes from FIELD=VALUE and TOML files; later ones win."""
     config: dict[str, Any] = {}
     for word in words:
         if "=" not in word and not word.endswith(".toml"):

@@ -40,9 +40,6 @@ def film_episode(
         seed: of the episode.
         n_steps: how many steps; every second one is a frame.
         kwargs: as of `HRCEnv`.
-
-    Raises:
-        RenderingError: this machine has no OpenGL.
     """
     level = kwargs.get("perception", "pixels")
     compile_kernels(Console(), level)
@@ -64,12 +61,6 @@ def nearest_seed(make: Make, seeds: Iterable[int], n_steps: int = 250, **kwargs:
     """Of some seeds the one whose episode comes closest to the worker without touching them.
 
     Nothing is drawn: "pixels" is played as "keypoints", and may come out otherwise in the film.
-
-    Args:
-        make: builds the agent for an `EnvInfo`.
-        seeds: of the episodes that are played.
-        n_steps: their length.
-        kwargs: as of `HRCEnv`.
     """
     if kwargs.get("perception", "pixels") == "pixels":
         kwargs = {**kwargs, "perception": "keypoints", "appearance": None}

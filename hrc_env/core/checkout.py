@@ -18,14 +18,7 @@ def agents(module: str) -> ModuleType:
 
 
 def from_clone(module: str) -> ModuleType:
-    """A module of the benchmarks or of the assets' makers.
-
-    Args:
-        module: its dotted name, as "benchmarks.commands.bench".
-
-    Raises:
-        HRCError: if this installation holds the package alone.
-    """
+    """A module of the benchmarks or of the assets' makers; an error if only a wheel is here."""
     try:
         return importlib.import_module(module)
     except ModuleNotFoundError as error:

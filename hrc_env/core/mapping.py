@@ -27,11 +27,9 @@ def from_mapping(
 ) -> RecordT:
     """A dataclass from a mapping; what it nests may be mappings too, tuples may be lists.
 
-    This undoes what `dataclasses.asdict` and JSON do to a config.
-
     Args:
         kind: of the record.
-        mapping: values by field.
+        mapping: values by field, as `dataclasses.asdict` and JSON have them.
         path: what comes before the fields' names in errors.
         kinds: types of fields where the record's own hints leave them open.
 
@@ -96,11 +94,7 @@ def _record(kind: type[RecordT], value: Any, where: str) -> RecordT:
 
 
 def _one_of(hints: tuple[Any, ...], value: Any, where: str) -> Any:
-    """The value as the first of several hints wants it that can have it.
-
-    Raises:
-        ConfigError: none can, in the words of each.
-    """
+    """The value as the first of several hints wants it that can have it; errors say all."""
     refused = []
     for hint in hints:
         try:

@@ -10,6 +10,7 @@ OLD_NAMES = {
     "processes": "threads",
     "reward.goal": "task.goal_bonus",
     "reward.progress_per_m": "task.progress_per_m",
+    "scene.leash_rad": "scene.integrator_clamp_rad",
     "tracker.paper_iterations": "tracker.n_iterations",
     "tracker.paper_particles": "tracker.n_particles",
     "tracker.paper_resampling": "tracker.resampling",

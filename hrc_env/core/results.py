@@ -49,12 +49,7 @@ def write_results(
 
 
 def write_whole(path: Path, content: str) -> None:
-    """Write a text file, whole or not at all; its folder is made.
-
-    Raises:
-        HRCError: it cannot be written (a full disk, no permission), with what to do. What was
-            there before is as it was.
-    """
+    """Write a text file, whole or not at all (what was there stays); its folder is made."""
     draft = path.with_name(path.name + ".draft")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

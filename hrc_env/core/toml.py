@@ -13,11 +13,7 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:
-    """The content of a TOML file.
-
-    Raises:
-        ConfigError: no such file, or no TOML.
-    """
+    """The content of a TOML file; `ConfigError` without one."""
     try:
         return tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
@@ -27,11 +23,7 @@ def read_toml(path: str | Path) -> dict[str, Any]:
 
 
 def to_toml(content: Mapping[str, Any], path: str = "") -> str:
-    """TOML of nested mappings, lists, text, numbers and truth values; None is left out.
-
-    Raises:
-        ConfigError: a value of another kind, by its name.
-    """
+    """TOML of nested mappings, lists, text, numbers and truth values; None is left out."""
     lines, tables = [], []
     for name, value in content.items():
         key = name if _BARE.fullmatch(name) else json.dumps(name)

@@ -23,16 +23,11 @@ class PinholeCamera:
     """A camera at a known place; a pinhole unless it has a lens."""
 
     name: str
-    K: Floats
-    """(3, 3) intrinsics [px]."""
-    T_world_from_cam: Transforms
-    """(4, 4)."""
-    width_px: int
-    """Width of its image [px]."""
+    K: Floats  # (3, 3) intrinsics [px]
+    T_world_from_cam: Transforms  # (4, 4)
+    width_px: int  # of its image
     height_px: int
-    """Height of its image [px]."""
-    lens: Lens | None = None
-    """What distorts its image; None: nothing."""
+    lens: Lens | None = None  # what distorts its image
 
     @property
     def eye_world(self) -> Points3:
@@ -93,10 +88,8 @@ def project(P: Floats, points_world: Points3) -> tuple[Points2, Floats]:
 
 
 def rays(camera: PinholeCamera, pixels: Points2) -> Points3:
-    """Unit directions in the world, (..., 3), of pixels (..., 2) of one camera's image.
-
-    NaN where its lens lets nothing through.
-    """
+    """Unit directions in the world, (..., 3), of pixels (..., 2) of one camera's image; NaN where
+    its lens lets nothing through."""
     if camera.lens is None:
         homogeneous = np.concatenate([pixels, np.ones((*pixels.shape[:-1], 1))], -1)
         direction_cam = homogeneous @ np.linalg.inv(camera.K).T
@@ -114,10 +107,8 @@ def image_from_pinhole(camera: PinholeCamera, pixels: Points2) -> Points2:
 
 
 def pinhole_from_image(camera: PinholeCamera, pixels: Points2) -> Points2:
-    """Where a pinhole would show what the image shows at pixels (..., 2).
-
-    NaN where that is nowhere: beyond `geometry.lens.PINHOLE_RAD` from the axis.
-    """
+    """Where a pinhole would show what the image shows at pixels (..., 2); NaN beyond
+    `geometry.lens.PINHOLE_RAD` from the axis."""
     if camera.lens is None:
         return pixels
     return _in_pixels(camera, undistort(camera.lens, _normalised(camera, pixels)))

@@ -20,23 +20,15 @@ class SerialChain:
     """An arm as its maker's data sheet has it: numbers only."""
 
     joint_names: tuple[str, ...]
-    T_world_from_base: Transforms
-    """(4, 4) where the arm is bolted down."""
-    parent_from_joint: Transforms
-    """(N, 4, 4) frame of each joint in the previous link (the base for the first) at q = 0."""
-    link_from_tool: Transforms
-    """(4, 4) the tool point's frame in the last link."""
-    range_rad: Floats
-    """(N, 2) lowest and highest angle."""
-    velocity_limit_rad_s: Floats
-    """(N,)."""
+    T_world_from_base: Transforms  # (4, 4) where the arm is bolted down
+    parent_from_joint: Transforms  # (N, 4, 4) each joint in the previous link (or base) at q = 0
+    link_from_tool: Transforms  # (4, 4) the tool point's frame in the last link
+    range_rad: Floats  # (N, 2) lowest and highest angle
+    velocity_limit_rad_s: Floats  # (N,)
     capsule_names: tuple[str, ...]
-    capsule_link: Ints
-    """(K,) index of the link that carries each capsule."""
-    capsule_ends: Capsules
-    """(K, 2, 3) end points in the frame of that link [m]."""
-    capsule_radius_m: Floats
-    """(K,)."""
+    capsule_link: Ints  # (K,) index of the link that carries each capsule
+    capsule_ends: Capsules  # (K, 2, 3) end points in the frame of that link [m]
+    capsule_radius_m: Floats  # (K,)
 
     @property
     def n_joints(self) -> int:
@@ -72,31 +64,24 @@ def capsules(chain: SerialChain, q: JointAngles) -> Capsules:
 
 def robot_state(chain: SerialChain, q: JointAngles, qd: JointVelocities) -> RobotState:
     """What the encoders tell: angles, tool and capsules of q and qd, both (..., N)."""
-    frames = forward(chain, q)
-    return _state(chain, q, qd, frames, _carried(chain, frames))
+    return robot_along(chain, np.asarray(q, float)[..., None, :], qd)[0]
 
 
 def robot_along(
     chain: SerialChain, q_path: JointAngles, qd: JointVelocities
 ) -> tuple[RobotState, Capsules]:
-    """The state at the end of paths (B, T, N) with velocities (B, N), and the capsules all along
-    them, (B, T, K, 2, 3)."""
+    """The state at the end of paths (..., T, N) with velocities (..., N), and the capsules all
+    along them, (..., T, K, 2, 3)."""
     frames = forward(chain, q_path)
     ends = _carried(chain, frames)
-    return _state(chain, q_path[:, -1], qd, frames[:, -1], ends[:, -1]), ends
-
-
-def _state(
-    chain: SerialChain, q: JointAngles, qd: JointVelocities, frames: Transforms, ends: Capsules
-) -> RobotState:
-    """The state of an arm whose link frames and capsules are known."""
     rates, lead = _flat(chain, "qd", qd)
+    last = np.ascontiguousarray(frames[..., -1, :, :, :]).reshape(len(rates), *frames.shape[-3:])
     tool_world, velocity = np.empty((len(rates), 3)), np.empty((len(rates), 3))
-    stacked = np.ascontiguousarray(frames).reshape(len(rates), *frames.shape[-3:])
-    _tool_motion(stacked, rates, chain.link_from_tool, tool_world, velocity)
+    _tool_motion(last, rates, chain.link_from_tool, tool_world, velocity)
     tool_world, velocity = tool_world.reshape(*lead, 3), velocity.reshape(*lead, 3)
-    q, qd = np.array(q, float), np.array(qd, float)
-    return RobotState(q, qd, tool_world, velocity, ends, chain.capsule_radius_m)
+    q, qd = np.array(q_path[..., -1, :], float), np.array(qd, float)
+    ended = ends[..., -1, :, :, :]
+    return RobotState(q, qd, tool_world, velocity, ended, chain.capsule_radius_m), ends
 
 
 def _carried(chain: SerialChain, frames: Transforms) -> Capsules:

@@ -1,8 +1,6 @@
-"""Gaps between capsules: how far two bodies' surfaces are apart, and where.
+"""Separation of capsules, segments with a radius: how far surfaces are apart, and where.
 
-A capsule is a segment with a radius. The closest points of two segments follow Ericson,
-Real-Time Collision Detection (2005), section 5.1.9; the gap is the distance of the
-segments less both radii, negative when the surfaces overlap.
+The closest points of two segments follow Ericson, Real-Time Collision Detection (2005), 5.1.9.
 """
 
 import math
@@ -23,12 +21,9 @@ _PARALLEL = 1e-13
 class Separation:
     """The narrowest place between two sets of capsules, over leading axes (...)."""
 
-    distance_m: Floats
-    """(...,) surface distance [m]; negative inside; infinite where one set is empty."""
-    point_a_world: Points3
-    """(..., 3) closest point on the axis of the nearest capsule of the first set [m]."""
-    point_b_world: Points3
-    """(..., 3) the same of the second set [m]."""
+    distance_m: Floats  # (...,) of the surfaces [m]; negative inside; infinite: a set is empty
+    point_a_world: Points3  # (..., 3) closest point on the axis of the nearest of the first set
+    point_b_world: Points3  # (..., 3) the same of the second set [m]
 
 
 def least_separation(
@@ -44,24 +39,17 @@ def least_separation(
         radius_b_m: (..., Kb) likewise; or those of one body where the second sets are several.
     """
     lead = capsules_b.shape[:-3]
-    flat_a, flat_b = _flat(capsules_a), _flat(capsules_b)
+    flat_a, flat_b = _flat(capsules_a, 3), _flat(capsules_b, 3)
     gap, points = np.empty(len(flat_b)), np.empty((len(flat_b), 2, 3))
-    radius_a, radius_b = _sets(radius_a_m), _sets(radius_b_m)
-    _narrowest(flat_a, radius_a, flat_b, radius_b, gap, points)
+    _narrowest(flat_a, _flat(radius_a_m, 1), flat_b, _flat(radius_b_m, 1), gap, points)
     points = points.reshape(*lead, 2, 3)
     return Separation(gap.reshape(lead), points[..., 0, :], points[..., 1, :])
 
 
-def _flat(capsules: Capsules) -> Capsules:
-    """(..., K, 2, 3) as (count, K, 2, 3), contiguous."""
-    count = math.prod(capsules.shape[:-3])
-    return np.ascontiguousarray(capsules).reshape(count, *capsules.shape[-3:])
-
-
-def _sets(radius_m: Floats) -> Floats:
-    """(..., K) as (count, K), contiguous."""
-    whole = np.ascontiguousarray(radius_m)
-    return whole.reshape(math.prod(whole.shape[:-1]), whole.shape[-1])
+def _flat(array: Floats, n_last: int) -> Floats:
+    """(..., *last) as (count, *last), contiguous."""
+    shape = array.shape[-n_last:]
+    return np.ascontiguousarray(array).reshape(math.prod(array.shape[:-n_last]), *shape)
 
 
 @kernel
@@ -104,16 +92,6 @@ def _spheres(capsules, radius, spheres):
         spheres[3, k] = 0.5 * math.sqrt(squared) + radius[k % len(radius)]
 
 
-@kernel
-def _sphere_gaps(a, b, least):
-    """least[k, m] = gap of sphere k of one set and sphere m of the other."""
-    for k in range(a.shape[1]):
-        x, y, z, reach = a[0, k], a[1, k], a[2, k], a[3, k]
-        for m in range(b.shape[1]):
-            dx, dy, dz = b[0, m] - x, b[1, m] - y, b[2, m] - z
-            least[k, m] = math.sqrt(dx * dx + dy * dy + dz * dz) - reach - b[3, m]
-
-
 @kernel(makes_arrays=True)
 def _narrowest(a, radius_a, b, radius_b, gap, points):
     """Spheres bound the gaps from below: only pairs that they leave open are measured."""
@@ -121,33 +99,26 @@ def _narrowest(a, radius_a, b, radius_b, gap, points):
     per_a, per_b = len(b) // max(len(a), 1), len(b) // max(len(radius_b), 1)
     per_first = len(b) // max(len(radius_a), 1)
     spheres_a, spheres_b = np.empty((4, n_a)), np.empty((4, n_b))
-    least = np.empty((n_a, n_b))
     for n in range(len(b)):
         first, first_m, second_m = a[n // per_a], radius_a[n // per_first], radius_b[n // per_b]
         _spheres(first, first_m, spheres_a)
         _spheres(b[n], second_m, spheres_b)
-        _sphere_gaps(spheres_a, spheres_b, least)
-        points[n] = 0.0
-        gap[n] = _search(first, first_m, b[n], second_m, least, points[n])
+        gap[n], points[n] = np.inf, 0.0
+        for k in range(n_a):
+            for m in range(n_b):
+                if _bound(spheres_a, k, spheres_b, m) > gap[n] + SLACK_M:
+                    continue
+                squared, s, t = closest_parameters(first[k, 0], first[k, 1], b[n, m, 0], b[n, m, 1])
+                distance = math.sqrt(squared) - first_m[k] - second_m[m % len(second_m)]
+                if distance < gap[n]:
+                    gap[n] = distance
+                    for i in range(3):
+                        points[n, 0, i] = first[k, 0, i] + s * (first[k, 1, i] - first[k, 0, i])
+                        points[n, 1, i] = b[n, m, 0, i] + t * (b[n, m, 1, i] - b[n, m, 0, i])
 
 
-@kernel(makes_arrays=True)
-def _search(a, radius_a, b, radius_b, least, points):
-    """The narrowest gap, the most promising pair first; of equal ones the first pair's."""
-    best, at, bounds = np.inf, 0, least.ravel()
-    if bounds.size == 0:
-        return best
-    likely = np.argmin(bounds)
-    for i in range(-1, bounds.size):
-        pair = likely if i < 0 else i
-        if bounds[pair] > best + SLACK_M or i == likely:
-            continue
-        k, m = pair // len(b), pair % len(b)
-        squared, s, t = closest_parameters(a[k, 0], a[k, 1], b[m, 0], b[m, 1])
-        distance = math.sqrt(squared) - radius_a[k] - radius_b[m % len(radius_b)]
-        if distance < best or (distance == best and pair < at):
-            best, at = distance, pair
-            for axis in range(3):
-                points[0, axis] = a[k, 0, axis] + s * (a[k, 1, axis] - a[k, 0, axis])
-                points[1, axis] = b[m, 0, axis] + t * (b[m, 1, axis] - b[m, 0, axis])
-    return best
+@kernel
+def _bound(a, k, b, m):
+    """The gap of two spheres."""
+    dx, dy, dz = b[0, m] - a[0, k], b[1, m] - a[1, k], b[2, m] - a[2, k]
+    return math.sqrt(dx * dx + dy * dy + dz * dz) - a[3, k] - b[3, m]

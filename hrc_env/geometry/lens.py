@@ -32,8 +32,8 @@ COEFFICIENTS = {
 """Models and what their coefficients are called, in order; those left out are 0."""
 NONE, BROWN_CONRADY, KANNALA_BRANDT = range(3)
 LIMIT, FOLD = 6, 7
-"""Columns of a lens' row behind the model and its coefficients: the distorted radius from which on
-nothing is seen, and the angle that it is of."""
+"""Columns of a lens' row behind model and coefficients: the distorted radius from which on nothing
+is seen, and its angle."""
 WIDEST_RAD = math.radians(175.0)
 """No lens sees further from its axis."""
 PINHOLE_RAD = math.radians(80.0)
@@ -194,8 +194,7 @@ def _ray(row, x, y):
 
 @kernel
 def _angle_of(row, far):
-    """The angle [rad] whose light arrives at a radius below the limit: Newton's steps, halving
-    where these leave the bracket."""
+    """The angle [rad] whose light arrives at a radius below the limit: Newton or bisection."""
     low, high = 0.0, row[FOLD]
     angle = min(far, 0.5 * high)
     for _ in range(60):

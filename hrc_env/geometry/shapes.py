@@ -14,25 +14,22 @@ from hrc_env.core.typing import Floats
 
 PLANE, BOX, CYLINDER, CAPSULE = range(4)
 """Kinds of shapes; a sphere is a capsule without length."""
-
 KIND, CENTRE, AXES, HALF_SIZE, REACH, WIDTH = 0, 1, 4, 13, 16, 17
 """Columns of a table and their number: the centre [m], the shape's x, y and z axes, its half
 edges (or its radius and half length along z) and the radius of the sphere that holds it [m]."""
-
 NEVER = (math.inf, -math.inf)
 PARALLEL = 1e-12
 """Square of the sine below which a line counts as parallel to an axis."""
 
 
 def shape(kind: int, centre: Floats, axes: Floats, half_size: Floats) -> Floats:
-    """The row (`WIDTH`,) of a shape.
+    """The row (`WIDTH`,) of a shape of a kind.
 
     Args:
         kind: `PLANE`, `BOX`, `CYLINDER` or `CAPSULE`.
         centre: (3,) [m].
         axes: (3, 3) world_from_shape; cylinders and capsules lie along z, planes face z.
-        half_size: (3,) half edges of a box or plane (infinite: endless), else radius, half
-            length and 0 [m].
+        half_size: (3,) half edges (infinite: endless), else radius, half length and 0 [m].
     """
     row = np.empty(WIDTH)
     row[KIND], row[CENTRE:AXES], row[AXES:HALF_SIZE] = kind, centre, axes.T.ravel()
@@ -95,12 +92,8 @@ def on_axis(table, row, axis, x, y, z):
 
 @kernel
 def against_axis(table, row, px, py, pz, dx, dy, dz):
-    """A line against a shape's z axis and radius: what the functions below are given.
-
-    Returns:
-        d along the axis, p along the axis [m], p along d [m], p squared less the radius
-        squared [m^2].
-    """
+    """A line against a shape's z axis and radius, as the functions below are given it: d and p
+    along the axis, p along d [m], p squared less the radius squared [m^2]."""
     radius = table[row, HALF_SIZE]
     rise, height = on_axis(table, row, 2, dx, dy, dz), on_axis(table, row, 2, px, py, pz)
     ahead = px * dx + py * dy + pz * dz

@@ -1,8 +1,7 @@
 """Lines of sight: what stands between an eye and points.
 
-Whatever can stand in the way is a row of one table of shapes. Of these, an eye that looks at a
-group of points needs those in the cone round the group; a line then meets some of their
-bounding spheres, and only the shapes in these are asked exactly.
+Of a table of shapes, an eye that looks at a group of points needs those in the cone round them;
+only shapes whose bounding spheres a line meets are asked exactly.
 """
 
 import math
@@ -14,22 +13,7 @@ import numpy as np
 from hrc_env.core.errors import check_shape
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Bools, Capsules, Floats, Ints, Points3
-from hrc_env.geometry.shapes import (
-    AXES,
-    CENTRE,
-    HALF_SIZE,
-    KIND,
-    PLANE,
-    REACH,
-    WIDTH,
-    against_axis,
-    on_axis,
-    passage,
-    rounded,
-    set_capsules,
-    set_rows,
-    through_tube,
-)
+from hrc_env.geometry import shapes
 
 NEAR_POINT_M = 0.08
 """A line of sight ends this far before the point, so that what a joint touches (the table
@@ -45,33 +29,20 @@ OWN_CAPSULE_M = 0.06
 class Surroundings:
     """All that can stand between cameras and workers, but the workers, in B environments."""
 
-    still: Floats
-    """(G, `shapes.WIDTH`) what never moves, a shape a row."""
-    moving: Floats
-    """(B, M, `shapes.WIDTH`) what is carried about; rows may be `shapes.absent`."""
-    capsules_world: Capsules
-    """(B, K, 2, 3) the robot [m]."""
-    capsule_radius_m: Floats
-    """(K,) [m]."""
+    still: Floats  # (G, `shapes.WIDTH`) what never moves, a shape a row
+    moving: Floats  # (B, M, `shapes.WIDTH`) what is carried about; some rows `shapes.absent`
+    capsules_world: Capsules  # (B, K, 2, 3) the robot [m]
+    capsule_radius_m: Floats  # (K,) [m]
 
 
 def nothing(batch: int) -> Surroundings:
     """Free lines of sight."""
     nobody = (np.zeros((batch, 0, 2, 3)), np.zeros(0))
-    return Surroundings(np.zeros((0, WIDTH)), np.zeros((batch, 0, WIDTH)), *nobody)
+    return Surroundings(np.zeros((0, shapes.WIDTH)), np.zeros((batch, 0, shapes.WIDTH)), *nobody)
 
 
 def hidden(surroundings: Surroundings, eyes_world: Points3, points_world: Points3) -> Bools:
-    """Whether anything stands between each eye and each point.
-
-    Args:
-        surroundings: of B environments.
-        eyes_world: (C, 3) [m].
-        points_world: (B, J, 3) [m].
-
-    Returns:
-        (B, C, J).
-    """
+    """(B, C, J) whether anything stands between eyes (C, 3) and points (B, J, 3) [m]."""
     batch = len(surroundings.capsules_world)
     check_shape("points_world", points_world.shape[::2], (batch, 3), "environments, ..., xyz")
     eyes, points = np.ascontiguousarray(eyes_world), np.ascontiguousarray(points_world)
@@ -86,15 +57,10 @@ def hidden(surroundings: Surroundings, eyes_world: Points3, points_world: Points
 class Occluders(NamedTuple):
     """A table of shapes, the last of them workers' capsules, and which of them are in view."""
 
-    table: Floats
-    """(G, `shapes.WIDTH`)."""
-    first_body: int
-    """The first row of a worker's capsule."""
-    spheres: Floats
-    """(5, G) of the shapes in view: centre less the eye [m], its square less the bounding sphere's,
-    that sphere's radius [m]."""
-    rows: Ints
-    """(G,) their rows in the table."""
+    table: Floats  # (G, `shapes.WIDTH`)
+    first_body: int  # the first row of a worker's capsule
+    spheres: Floats  # (5, G) in view: centre less the eye, tangent squared, radius [m]
+    rows: Ints  # (G,) their rows in the table
 
 
 @kernel(makes_arrays=True)
@@ -102,7 +68,7 @@ def make_occluders(still, n_more, n_body):
     """A table that begins with `still`, with room for more shapes and for those of bodies."""
     first_body = len(still) + n_more
     n = first_body + n_body
-    table = np.empty((n, WIDTH))
+    table = np.empty((n, shapes.WIDTH))
     table[: len(still)] = still
     return Occluders(table, first_body, np.empty((5, n)), np.empty(n, np.int64))
 
@@ -117,11 +83,11 @@ def look(eye, points, occluders):
     cosine = math.sqrt(1.0 - sine * sine)
     n = 0
     for k in range(len(table)):
-        reach = table[k, REACH]
-        x, y = table[k, CENTRE] - eye[0], table[k, CENTRE + 1] - eye[1]
-        z = table[k, CENTRE + 2] - eye[2]
+        reach = table[k, shapes.REACH]
+        x, y = table[k, shapes.CENTRE] - eye[0], table[k, shapes.CENTRE + 1] - eye[1]
+        z = table[k, shapes.CENTRE + 2] - eye[2]
         squared = x * x + y * y + z * z
-        if table[k, KIND] == PLANE:
+        if table[k, shapes.KIND] == shapes.PLANE:
             if not _is_between(eye, points, table, k):
                 continue
         elif sine < 1.0:  # the lines are in a cone; is the sphere beside or behind it?
@@ -153,13 +119,14 @@ def _ball_round(eye, points):
 @kernel
 def _is_between(eye, points, table, row):
     """Whether an eye is in front of a plane and any of the points is not."""
-    centre = table[row, CENTRE:AXES]
-    level = on_axis(table, row, 2, centre[0], centre[1], centre[2])
-    if on_axis(table, row, 2, eye[0], eye[1], eye[2]) < level:
+    centre = table[row, shapes.CENTRE : shapes.AXES]
+    level = shapes.on_axis(table, row, 2, centre[0], centre[1], centre[2])
+    if shapes.on_axis(table, row, 2, eye[0], eye[1], eye[2]) < level:
         return False
     lowest = math.inf
     for j in range(len(points)):
-        lowest = min(lowest, on_axis(table, row, 2, points[j, 0], points[j, 1], points[j, 2]))
+        x, y, z = points[j, 0], points[j, 1], points[j, 2]
+        lowest = min(lowest, shapes.on_axis(table, row, 2, x, y, z))
     return lowest < level
 
 
@@ -194,8 +161,8 @@ def _hidden(still, moving, capsules, radius, eyes, points, hidden):
     occluders = make_occluders(still, len(radius) + moving.shape[1], 0)
     table = occluders.table
     for b in range(len(points)):
-        set_capsules(table, len(still), capsules[b], radius)
-        set_rows(table, len(still) + len(radius), moving[b])
+        shapes.set_capsules(table, len(still), capsules[b], radius)
+        shapes.set_rows(table, len(still) + len(radius), moving[b])
         for c in range(len(eyes)):
             n_view = look(eyes[c], points[b], occluders)
             for j in range(points.shape[1]):
@@ -214,7 +181,7 @@ def is_hidden(eye, points, j, occluders, n_view):
                 if body_blocks(table, row, px, py, pz, dx, dy, dz, length):
                     return True
                 continue
-            enter, leave = passage(table, row, px, py, pz, dx, dy, dz)
+            enter, leave = shapes.passage(table, row, px, py, pz, dx, dy, dz)
             if blocks(enter, leave, length):
                 return True
     return False
@@ -228,12 +195,12 @@ def body_blocks(table, row, px, py, pz, dx, dy, dz, length):
     where the line's way through a capsule is much longer than from its axis to its surface. p is
     the eye less the capsule's centre, d the line's unit direction.
     """
-    radius, half = table[row, HALF_SIZE], table[row, HALF_SIZE + 1]
-    rise, height, ahead, excess = against_axis(table, row, px, py, pz, dx, dy, dz)
-    enter, leave = through_tube(rise, height, ahead, excess)
+    radius, half = table[row, shapes.HALF_SIZE], table[row, shapes.HALF_SIZE + 1]
+    rise, height, ahead, excess = shapes.against_axis(table, row, px, py, pz, dx, dy, dz)
+    enter, leave = shapes.through_tube(rise, height, ahead, excess)
     if min(leave, length) - max(enter, 0.0) <= BLOCKING_CHORD * radius:
         return False  # and the way through the capsule is no longer
-    enter, leave = rounded(enter, leave, half, rise, height, ahead, excess)
+    enter, leave = shapes.rounded(enter, leave, half, rise, height, ahead, excess)
     within = enter < length and leave >= length
     chord = min(leave, length) - max(enter, 0.0)
     return chord > BLOCKING_CHORD * radius + (OWN_CAPSULE_M if within else 0.0)

@@ -25,12 +25,9 @@ FURTHEST_PX = 1e5
 class Triangulation:
     """Points with what is known about them; NaN where fewer than two views could be used."""
 
-    points_world: Points3
-    """(B, W, J, 3) [m]."""
-    cov_world: Covariances3
-    """(B, W, J, 3, 3) [m^2], the inverse information of the views that were used."""
-    used: Bools
-    """(B, C, W, J) the views that the point was made from."""
+    points_world: Points3  # (B, W, J, 3) [m]
+    cov_world: Covariances3  # (B, W, J, 3, 3) [m^2], inverse information of the views used
+    used: Bools  # (B, C, W, J) the views that the point was made from
 
     @property
     def n_views(self) -> Ints:

@@ -1,8 +1,7 @@
 """What BlazePose's tensors mean: people, regions of interest, landmarks.
 
-Follows the graphs of MediaPipe 0.10.21 (pose_detection, pose_landmark) number by number;
-tests/perception compares with landmarks of the official package. Method: Bazarevsky et al.,
-BlazePose: On-device Real-time Body Pose tracking (2020), arXiv:2006.10204.
+Follows the graphs of MediaPipe 0.10.21 number by number. Method: Bazarevsky et al., BlazePose:
+On-device Real-time Body Pose tracking (2020), arXiv:2006.10204.
 """
 
 import math
@@ -19,13 +18,10 @@ from hrc_env.perception.network import DETECTOR_SIDE, LANDMARK_SIDE
 
 MIN_SCORE = 0.5
 """Detector score and person flag from which MediaPipe believes in a person."""
-
 MAX_OVERLAP = 0.3
 """Boxes that overlap more (intersection over union) are one person."""
-
 ROI_MARGIN = 1.25
 """The region of interest is this much larger than the circle round the person."""
-
 _REACH = 4  # a 9 x 9 neighbourhood in the 64 x 64 heatmap
 _HEAT_SIDE = 64
 _N_USED = 35  # 33 body landmarks, then the two that give the next region of interest
@@ -36,12 +32,9 @@ class Person:
     """One person as the detector stage sees them, in units of the square image's side."""
 
     score: float
-    box: Floats
-    """(4,) left, top, right, bottom of the face."""
-    hip: Points2
-    """(2,) midpoint of the hips."""
-    rim: Points2
-    """(2,) upright above the hips, on the circle round the whole body."""
+    box: Floats  # (4,) left, top, right, bottom of the face
+    hip: Points2  # (2,) midpoint of the hips
+    rim: Points2  # (2,) upright above the hips, on the circle round the whole body
 
 
 def _anchors() -> Floats:
@@ -64,12 +57,7 @@ def wrap_angle(angle_rad: float) -> float:
 
 
 def window_from_points(centre_px: Points2, rim_px: Points2) -> Roi:
-    """BlazePose's region of interest: round mid-hip, upright towards the rim point.
-
-    Args:
-        centre_px: (2,) the middle of the hips.
-        rim_px: (2,) a point upright of it on the circle that holds the whole body.
-    """
+    """BlazePose's region of interest: round mid-hip (2,), upright towards the rim (2,)."""
     dx, dy = rim_px[0] - centre_px[0], rim_px[1] - centre_px[1]
     side_px = 2 * math.hypot(dx, dy) * ROI_MARGIN
     rotation = wrap_angle(math.pi / 2 - math.atan2(-dy, dx))
@@ -77,11 +65,8 @@ def window_from_points(centre_px: Points2, rim_px: Points2) -> Roi:
 
 
 def sample_window(image: Image, window: Roi, side: int = LANDMARK_SIDE) -> Image:
-    """The turned square of an image as an upright (side, side, 3) picture, bilinear.
-
-    The square's corners map to the picture's corners (no half-pixel shift), and the image's
-    border is continued outside, as MediaPipe does.
-    """
+    """The turned square of an image as an upright (side, side, 3) picture, bilinear, corner to
+    corner; the image's border is continued outside, as MediaPipe does."""
     matrix = image_from_crop(window, side)
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     crop = cv2.warpAffine(image, matrix, (side, side), flags=flags, borderMode=cv2.BORDER_REPLICATE)
@@ -118,13 +103,7 @@ def landmark_input(crop: Image) -> Tensor:
 
 
 def decode_people(boxes: Tensor, logits: Tensor, min_score: float = MIN_SCORE) -> list[Person]:
-    """People from the detector's tensors, best first.
-
-    Args:
-        boxes: (2254, 12) box centre and size, then four keypoints, relative to the anchors.
-        logits: (2254,) scores.
-        min_score: from which score to believe.
-    """
+    """People from the detector's boxes (2254, 12) and score logits (2254,), best first."""
     score = _sigmoid(logits.astype(float))
     kept = np.flatnonzero(score >= min_score)
     raw, score, anchor = boxes[kept].astype(float) / DETECTOR_SIDE, score[kept], ANCHORS[kept]
@@ -135,13 +114,8 @@ def decode_people(boxes: Tensor, logits: Tensor, min_score: float = MIN_SCORE) -
 
 
 def merge_people(score: Floats, box: Floats, keypoints: Floats) -> list[Person]:
-    """Weighted non-maximum suppression: overlapping detections become their weighted mean.
-
-    Args:
-        score: (n,).
-        box: (n, 4) left, top, right, bottom.
-        keypoints: (n, 2, 2) mid-hip and rim.
-    """
+    """Weighted non-maximum suppression: overlapping boxes (n, 4) and their mid-hips and rims
+    (n, 2, 2) become their mean, weighted by the scores (n,)."""
     people = []
     order = np.argsort(-score, kind="stable")
     while len(order):
@@ -162,17 +136,15 @@ def person_window(person: Person, window: Roi) -> Roi:
 
 
 def decode_landmarks(points: Tensor, heat: Tensor) -> Floats:
-    """(35, 3) x, y in units of the crop's side and visibility in [0, 1].
+    """(35, 3) x, y in units of the crop's side and visibility in [0, 1]: 33 body landmarks, mid-hip
+    and rim.
 
-    The network's own regression is refined by the heatmap: where it is sure (above 0.5 in
-    the neighbourhood) the point becomes the neighbourhood's mean weighted by it.
+    Where the heatmap is sure (above 0.5 in the neighbourhood) a point becomes the neighbourhood's
+    mean weighted by it.
 
     Args:
         points: (39, 5) x, y, z in crop pixels, logits of visibility and presence.
         heat: (64, 64, 39) logits.
-
-    Returns:
-        33 body landmarks, then mid-hip and rim of the next region of interest.
     """
     out = np.empty((_N_USED, 3))
     refine(np.ascontiguousarray(points), np.ascontiguousarray(heat), out)
@@ -187,7 +159,7 @@ def refine(points, heat, out):
         out[k, 0], out[k, 1] = x, y
         out[k, 2] = _chance(np.float64(points[k, 3]))
         column, row = int(x * _HEAT_SIDE), int(y * _HEAT_SIDE)
-        if not (_on_map(column) and _on_map(row)):
+        if not (0 <= column < _HEAT_SIDE and 0 <= row < _HEAT_SIDE):
             continue
         total, at_column, at_row, surest = 0.0, 0.0, 0.0, 0.0
         for r in range(max(row - _REACH, 0), min(row + _REACH + 1, _HEAT_SIDE)):
@@ -200,11 +172,6 @@ def refine(points, heat, out):
         if surest >= MIN_SCORE:
             out[k, 0] = at_column / total / _HEAT_SIDE
             out[k, 1] = at_row / total / _HEAT_SIDE
-
-
-@kernel
-def _on_map(cell):
-    return 0 <= cell < _HEAT_SIDE
 
 
 @kernel

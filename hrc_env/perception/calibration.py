@@ -1,10 +1,9 @@
 """What is known of the detector's errors: numbers fitted to renders, in a small JSON file.
 
-`python -m hrc_env calibrate-keypoints` writes it, docs/emulator.md says what the model is. The
-file that comes with the package is `keypoints.json`; `EmulatorConfig.calibration` names another.
+`python -m hrc_env calibrate-keypoints` writes it, docs/emulator.md says what the model is;
+`keypoints.json` is the package's own.
 """
 
-import dataclasses
 import functools
 import json
 import os
@@ -103,20 +102,12 @@ _RENEW = "make a new one with: python -m hrc_env calibrate-keypoints --out FILE"
 
 
 def read_calibration(path: Path | str | None = None) -> Calibration:
-    """The calibration of a file; None: the one that comes with the package.
-
-    Raises:
-        ConfigError: no such file, none of a calibration, of another version, or broken.
-    """
+    """The calibration of a file (None: the package's). Raises `ConfigError` for a bad one."""
     return _read(PACKAGED, 0) if path is None else _read(Path(path), changed_ns(path))
 
 
 def changed_ns(path: Path | str) -> int:
-    """When a calibration file was last written [ns].
-
-    Raises:
-        ConfigError: no such file.
-    """
+    """When a calibration file was last written [ns]. Raises `ConfigError` if there is none."""
     try:
         return os.stat(path).st_mtime_ns
     except OSError as error:
@@ -139,26 +130,18 @@ def _read(path: Path, changed: int) -> Calibration:
             f"{path} is a calibration of version {content.get('version')!r}; this hrc_env reads "
             f"version {VERSION}: {_RENEW}."
         )
-    return calibration_from(content.get("tables"), str(path))
-
-
-def calibration_from(tables: Any, where: str) -> Calibration:
-    """A calibration from tables by name.
-
-    Raises:
-        ConfigError: a table that is missing, unknown, of another shape or with impossible numbers.
-    """
-    if not isinstance(tables, dict) or set(tables) != set(SHAPES):
-        given = set(tables) if isinstance(tables, dict) else set()
+    tables = content.get("tables")
+    given = set(tables) if isinstance(tables, dict) else set()
+    if given != set(SHAPES):
         raise ConfigError(
-            f"{where} must have the tables {', '.join(SHAPES)}; missing: "
+            f"{path} must have the tables {', '.join(SHAPES)}; missing: "
             f"{', '.join(sorted(set(SHAPES) - given)) or 'none'}; unknown: "
             f"{', '.join(sorted(given - set(SHAPES))) or 'none'}. Or {_RENEW}."
         )
-    return Calibration(**{name: _table(name, value, where) for name, value in tables.items()})
+    return Calibration(**{name: _table(name, value, path) for name, value in tables.items()})
 
 
-def _table(name: str, value: Any, where: str) -> Floats:
+def _table(name: str, value: Any, where: Path) -> Floats:
     try:
         array = np.array(value, dtype=float)
     except (TypeError, ValueError):
@@ -175,31 +158,3 @@ def _table(name: str, value: Any, where: str) -> Floats:
         raise ConfigError(f"{where}: table {name!r} must hold {expected}. Mend it, or {_RENEW}.")
     array.setflags(write=False)
     return array
-
-
-def write_calibration(path: Path | str, calibration: Calibration, made: dict[str, Any]) -> None:
-    """Write a calibration, whole or not at all.
-
-    Args:
-        path: of the file.
-        calibration: the numbers, which are rounded to four digits.
-        made: command, seed, commit and whatever else one wants to know of its making.
-    """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    tables = {
-        each.name: _rounded(getattr(calibration, each.name).tolist())
-        for each in dataclasses.fields(calibration)
-    }
-    lines = [f" {json.dumps(name)}: {json.dumps(table)}" for name, table in tables.items()]
-    head = {"format": FORMAT, "version": VERSION, "made": made}
-    text = json.dumps(head)[:-1] + ',\n"tables": {\n' + ",\n".join(lines) + "\n}}\n"
-    draft = path.with_suffix(".draft")
-    draft.write_text(text, encoding="utf-8")
-    os.replace(draft, path)
-
-
-def _rounded(value: Any) -> Any:
-    if isinstance(value, list):
-        return [_rounded(each) for each in value]
-    return float(f"{value:.4g}")

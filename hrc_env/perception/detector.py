@@ -5,7 +5,7 @@ queue. Each has its own interpreters: what is seen does not depend on who came f
 """
 
 import functools
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
@@ -20,17 +20,7 @@ from hrc_env.core.skeleton import BLAZEPOSE_INDEX, N_JOINTS
 from hrc_env.core.stateful import Stateful
 from hrc_env.core.typing import Floats, Image, Points2
 from hrc_env.geometry.cameras import PinholeCamera, inside_image
-from hrc_env.perception import blazepose
-from hrc_env.perception.network import (
-    LANDMARK_SIDE,
-    NETWORKS,
-    RUNTIMES,
-    Landmarker,
-    PersonDetector,
-    chosen_runtime,
-    load_landmarker,
-    load_person_detector,
-)
+from hrc_env.perception import blazepose, network
 from hrc_env.perception.noise import STANDING, sigma_px
 from hrc_env.perception.searching import (
     Candidates,
@@ -43,6 +33,7 @@ from hrc_env.perception.searching import (
 )
 from hrc_env.perception.weights import find_weights
 
+SIDE = network.LANDMARK_SIDE
 STATURE_OF_SIDE = 0.75
 """Stature of an upright worker as a share of the side of BlazePose's window round them."""
 
@@ -62,8 +53,7 @@ class DetectorConfig:
     min_presence: float = 0.5
     """Landmarks are believed from this person flag on [0..1]; MediaPipe's own default."""
     sure_presence: float = 0.9
-    """Below this flag [0..1] the detector stage is asked as well: the flag alone passed 8 %
-    of crops without a worker, the detector stage none of 120."""
+    """Below this flag [0..1] the detector stage is asked as well."""
     gate_every: int = 25
     """The detector stage is also asked once in so many looks: a second at 25 Hz."""
     max_offset: float = 0.25
@@ -83,20 +73,19 @@ class DetectorConfig:
     `python -m hrc_env setup --networks lite heavy`."""
     keypoints: str = "blazepose"
     """What finds joints in crops: BlazePose's landmark network, or another function that was
-    registered (`hrc_env.register_detector`). People are searched for by BlazePose's person
-    detector whatever finds their joints."""
+    registered (`hrc_env.register_detector`); people are always searched for by BlazePose."""
     folded: str = "full"
     """The landmark network for workers who are bent, squatting or kneeling; "heavy" is more exact
     there, and three times as slow."""
 
     def __post_init__(self) -> None:
-        if self.runtime not in RUNTIMES:
-            raise unknown("detector.runtime", self.runtime, RUNTIMES)
+        if self.runtime not in network.RUNTIMES:
+            raise unknown("detector.runtime", self.runtime, network.RUNTIMES)
         if self.keypoints not in DETECTORS:
             raise unknown("detector.keypoints", self.keypoints, DETECTORS)
         for name in ("network", "folded"):
-            if getattr(self, name) not in NETWORKS:
-                raise unknown(f"detector.{name}", getattr(self, name), NETWORKS)
+            if getattr(self, name) not in network.NETWORKS:
+                raise unknown(f"detector.{name}", getattr(self, name), network.NETWORKS)
         for name in ("min_presence", "sure_presence", "outside_confidence"):
             if not 0 < getattr(self, name) <= 1:
                 raise ConfigError(f"{name} must be in (0, 1], got {getattr(self, name)}.")
@@ -109,34 +98,25 @@ class DetectorConfig:
 class Detection:
     """One worker as all cameras see them; a camera without them is NaN, 0 and infinite."""
 
-    px: Points2
-    """(C, J, 2) [px] in the whole image, as its lens distorts it."""
-    confidence: Floats
-    """(C, J) visibility in [0, 1]."""
-    sigma_px: Floats
-    """(C, J) standard deviation of each coordinate [px]."""
-    windows: list[Roi | None]
-    """Where each camera looked."""
-    crops: list[Image | None] = field(default_factory=list)
-    """(C,) what the network was given of each camera."""
+    px: Points2  # (C, J, 2) [px] in the whole image, as its lens distorts it
+    confidence: Floats  # (C, J) visibility in [0, 1]
+    sigma_px: Floats  # (C, J) standard deviation of each coordinate [px]
+    windows: list[Roi | None]  # where each camera looked
+    crops: list[Image | None] = field(default_factory=list)  # what the network was given of each
 
 
 @dataclass(frozen=True, slots=True)
 class _Networks:
     """One thread's interpreters."""
 
-    detect: PersonDetector
-    landmark: tuple[Landmarker, Landmarker]
-    """For upright workers, for folded ones."""
-    own: KeypointFunction | None
-    """What finds joints instead of these."""
+    detect: network.PersonDetector
+    landmark: tuple[network.Landmarker, network.Landmarker]  # for upright workers, for folded ones
+    own: KeypointFunction | None  # what finds joints instead of these
 
 
 class PoseDetector(Stateful):
-    """Finds the joints of workers in the images of a rig.
-
-    Networks and the helper thread are made at the first look and left out of a pickle.
-    """
+    """Finds the joints of workers in the images of a rig; networks and the helper thread are made
+    at the first look and left out of a pickle."""
 
     CHANGES = ("_looks",)
 
@@ -147,9 +127,9 @@ class PoseDetector(Stateful):
         self.cameras = tuple(cameras)
         self.config = config or DetectorConfig()
         find_weights("pose_detection")
-        for network in (self.config.network, self.config.folded):
-            find_weights(f"pose_landmark_{network}")
-        chosen_runtime(self.config.runtime)
+        for name in (self.config.network, self.config.folded):
+            find_weights(f"pose_landmark_{name}")
+        network.chosen_runtime(self.config.runtime)
         self._looks: dict[int, list[int]] = {}
         self._networks: tuple[_Networks, _Networks] | None = None
         self._helper: ThreadPoolExecutor | None = None
@@ -181,20 +161,23 @@ class PoseDetector(Stateful):
         if searched:
             known = self.search(source) if found is None else found
             windows = agreed_windows(apart_from(known, others), self.cameras)
-        used = [c for c, window in enumerate(windows) if window is not None]
-        asked = [not searched and self._is_turn(looks[c], c) for c in used]
+        used = [(c, window) for c, window in enumerate(windows) if window is not None]
         shape = (len(self.cameras), N_JOINTS)
         nothing = np.full((*shape, 2), np.nan), np.zeros(shape), np.full(shape, np.inf)
         sight = Detection(*nothing, list(windows), [None] * len(windows))
-        joints_of = self._share(self._landmark_jobs(source, sight, used, asked, folded))
-        for c, joints in zip(used, joints_of, strict=True):
-            if joints is None:
-                looks[c] = 0  # ask the detector stage again before believing
-            else:
-                looks[c] += 1
-                self._write(sight, c, joints, posture)
-        for c in set(range(len(self.cameras))).difference(used):
-            looks[c] = 0
+
+        def job(c: int, window: Roi) -> Callable[[_Networks], Floats | None]:
+            """Draw a crop; it comes with the work that is to be done on it."""
+            crop = sight.crops[c] = _seen(source.crop(c, window), window, self.cameras[c])
+            ask = not searched and self._is_turn(looks[c], c)
+            return functools.partial(_joints, crop, window, ask, folded, self.config)
+
+        joints_of = self._share(job(c, window) for c, window in used)
+        before, looks[:] = list(looks), [0] * len(looks)  # 0: the detector stage is asked next
+        for (c, window), joints in zip(used, joints_of, strict=True):
+            if joints is not None:
+                looks[c] = before[c] + 1
+                self._write(sight, c, window, joints, posture)
         return sight
 
     def search(self, source: ImageSource, which: Sequence[int] | None = None) -> list[list[Roi]]:
@@ -223,21 +206,6 @@ class PoseDetector(Stateful):
         every = self.config.gate_every
         return looks == 0 or (looks + camera * every // len(self.cameras)) % every == 0
 
-    def _landmark_jobs(
-        self,
-        source: ImageSource,
-        sight: Detection,
-        used: list[int],
-        asked: list[bool],
-        folded: bool,
-    ) -> Iterator[Callable[[_Networks], Floats | None]]:
-        """Draw one crop after the other; each comes with the work that is to be done on it."""
-        for c, ask in zip(used, asked, strict=True):
-            window = sight.windows[c]
-            if window is not None:
-                crop = sight.crops[c] = _seen(source.crop(c, window), window, self.cameras[c])
-                yield functools.partial(_joints, crop, window, ask, folded, self.config)
-
     def _share(self, jobs: Iterable[Callable[[_Networks], ResultT]]) -> list[ResultT]:
         """Results in order; the helper works from the front, this thread from the back."""
         helper, (mine, helpers) = self._open()
@@ -263,32 +231,28 @@ class PoseDetector(Stateful):
             self._helper = ThreadPoolExecutor(1, thread_name_prefix="hrc_env-detector")
         return self._helper, self._networks
 
-    def _write(self, sight: Detection, c: int, joints: Floats, posture: Sequence[float]) -> None:
-        window = sight.windows[c]
+    def _write(
+        self, sight: Detection, c: int, window: Roi, joints: Floats, posture: Sequence[float]
+    ) -> None:
         outside = ~inside_image(self.cameras[c], joints[:, :2])
         confidence = joints[:, 2].copy()
         confidence[outside] = np.minimum(confidence[outside], self.config.outside_confidence)
         sight.px[c], sight.confidence[c] = joints[:, :2], confidence
-        stature_px = STATURE_OF_SIDE * window.side_px if window else np.nan
-        sight.sigma_px[c] = sigma_px(confidence, stature_px, posture)
+        sight.sigma_px[c] = sigma_px(confidence, STATURE_OF_SIDE * window.side_px, posture)
 
 
 def _networks(config: DetectorConfig) -> _Networks:
-    runtime = chosen_runtime(config.runtime)
-    landmark = load_landmarker(config.network, runtime)
+    runtime = network.chosen_runtime(config.runtime)
+    landmark = network.load_landmarker(config.network, runtime)
     same = config.folded == config.network
-    folded = landmark if same else load_landmarker(config.folded, runtime)
+    folded = landmark if same else network.load_landmarker(config.folded, runtime)
     make = DETECTORS[config.keypoints]
     own = None if make is None else make()
-    return _Networks(load_person_detector(runtime), (landmark, folded), own)
+    return _Networks(network.load_person_detector(runtime), (landmark, folded), own)
 
 
 def own_joints(find: KeypointFunction, crop: Image, window: Roi) -> Floats | None:
-    """(J, 3) pixels and confidence, or None, by somebody's function.
-
-    Raises:
-        ConfigError: it gives another shape, or confidences that are none.
-    """
+    """(J, 3) pixels and confidence, or None, by somebody's function; refuses what is neither."""
     found = find(crop)
     if found is None:
         return None
@@ -298,7 +262,7 @@ def own_joints(find: KeypointFunction, crop: Image, window: Roi) -> Floats | Non
     joints[missing] = (np.nan, np.nan, 0.0)
     if not ((joints[:, 2] >= 0) & (joints[:, 2] <= 1)).all():
         raise ConfigError(f"A detector's confidences must be in [0, 1], got {joints[:, 2]}.")
-    joints[:, :2] = blazepose.to_image(joints[:, :2] / LANDMARK_SIDE, window)
+    joints[:, :2] = blazepose.to_image(joints[:, :2] / SIDE, window)
     return joints
 
 
@@ -322,7 +286,7 @@ def _joints(
 
 def _seen(crop: Image, window: Roi, camera: PinholeCamera) -> Image:
     """A copy of the crop, black where the camera does not see: renderers go on drawing."""
-    check_shape("crop", crop.shape, (LANDMARK_SIDE, LANDMARK_SIDE, 3), "rows, columns, RGB")
+    check_shape("crop", crop.shape, (SIDE, SIDE, 3), "rows, columns, RGB")
     mask = _frame_mask(window, camera.width_px, camera.height_px)
     if mask is None:
         return np.array(crop)
@@ -337,10 +301,8 @@ def _frame_mask(window: Roi, width_px: int, height_px: int) -> NDArray[np.uint8]
     square = blazepose.to_image(corners, window)
     if ((square >= 0) & (square < frame)).all():
         return None
-    matrix = np.eye(3)
-    matrix[:2] = blazepose.image_from_crop(window, LANDMARK_SIDE)
-    back = np.linalg.inv(matrix)[:2]
-    mask = np.zeros((LANDMARK_SIDE, LANDMARK_SIDE), np.uint8)
+    back = cv2.invertAffineTransform(blazepose.image_from_crop(window, SIDE))
+    mask = np.zeros((SIDE, SIDE), np.uint8)
     polygon = np.round(corners * frame @ back[:, :2].T + back[:, 2]).astype(np.int32)
     cv2.fillConvexPoly(mask, polygon, 1)
     return mask

@@ -1,10 +1,7 @@
 """Keypoints without pixels: the projected truth with BlazePose's errors.
 
-The errors are drawn from a calibration: numbers fitted to what the network made of rendered
-workers (`perception.calibration`, docs/emulator.md). Some are the same in every camera, as they
-are of what the network takes for a hip; others depend on the view and on how folded the body is;
-they last, are larger where a joint is hidden, and the confidence tells of that as far as the
-network's does. Now and then a camera exchanges left and right, or loses the worker.
+The errors are drawn from a calibration, numbers fitted to what the network made of rendered workers
+(`perception.calibration`, docs/emulator.md).
 """
 
 import functools
@@ -22,6 +19,7 @@ from hrc_env.core.typing import Floats, Ints
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.geometry.lens import lens_row
 from hrc_env.geometry.sight import Surroundings
+from hrc_env.perception import emulator_kernel as kernels
 from hrc_env.perception.calibration import (
     POSTURED,
     Calibration,
@@ -29,14 +27,6 @@ from hrc_env.perception.calibration import (
     read_calibration,
 )
 from hrc_env.perception.detector import STATURE_OF_SIDE
-from hrc_env.perception.emulator_kernel import (
-    ERRORS,
-    N_NORMALS,
-    N_OF_BODY,
-    SETTINGS,
-    Report,
-    emulate_batch,
-)
 from hrc_env.perception.sightlines import CAMERA, N_LOOK, World, sight_batch
 
 Generators = Sequence[np.random.Generator]
@@ -74,11 +64,7 @@ class EmulatorConfig:
         self.calibrated()
 
     def calibrated(self) -> Calibration:
-        """The calibration, with what is different.
-
-        Raises:
-            ConfigError: its file cannot be read.
-        """
+        """The calibration, with what is different. Raises `ConfigError` for a bad file."""
         known = read_calibration(self.calibration or None)
         if self.swap_share is not None:
             share = np.zeros_like(known.swap_share)
@@ -93,13 +79,9 @@ class EmulatorConfig:
 class EmulatorState:
     """What the detector's errors remember from image to image, in standard deviations."""
 
-    errors: NDArray[np.void]
-    """(B, C, W) `emulator_kernel.ERRORS`."""
-    wander: Floats
-    """(B, W, J, 3) what is the same in every camera, as far as it is the joint's own: ahead, to
-    its side, up."""
-    dt_s: float
-    """Time between images [s]."""
+    errors: NDArray[np.void]  # (B, C, W) `emulator_kernel.ERRORS`
+    wander: Floats  # (B, W, J, 3) the same in every camera, a joint's own: ahead, aside, up
+    dt_s: float  # time between images [s]
 
 
 def make_state(
@@ -108,13 +90,13 @@ def make_state(
     """A state for `batch` environments with images `dt_s` apart; `reset` it before use."""
     if not dt_s > 0:
         raise ConfigError(f"The time between images must be positive, got {dt_s} s.")
-    errors = np.zeros((batch, n_cameras, n_workers), ERRORS)
+    errors = np.zeros((batch, n_cameras, n_workers), kernels.ERRORS)
     return EmulatorState(errors, np.zeros((batch, n_workers, N_JOINTS, 3)), dt_s)
 
 
 def reset(state: EmulatorState, ids: Ints, rngs: Generators) -> None:
     """Begin environments `ids` anew with errors drawn from how they are in the long run."""
-    *names, last = (state.errors[name] for name in ERRORS.names or ())
+    *names, last = (state.errors[name] for name in kernels.ERRORS.names or ())
     arrays = (*names, state.wander, last)
     sizes = [math.prod(array.shape[1:]) for array in arrays]
     drawn = np.array([rngs[b].standard_normal(sum(sizes)) for b in ids]).reshape(len(ids), -1)
@@ -148,27 +130,23 @@ def emulate(
     shape = (batch, n_cameras, n_workers, N_JOINTS)
     robot = surroundings.capsules_world
     check_shape("surroundings.capsules_world", (len(robot),), (batch,), "environments")
-    n_image = N_NORMALS * N_JOINTS + N_OF_BODY
+    n_image = kernels.N_NORMALS * N_JOINTS + kernels.N_OF_BODY
     normals = np.empty((batch, n_workers * (3 * N_JOINTS + n_cameras * n_image)))
     for rng, normal in zip(rngs, normals, strict=True):
         rng.standard_normal(out=normal)
     written_ns = changed_ns(config.calibration) if config.calibration else 0
     postures, settings = _settings(config, state.dt_s, written_ns)
-    out = Report(np.empty((*shape, 2)), np.empty(shape), np.empty(shape))
+    out = kernels.Report(np.empty((*shape, 2)), np.empty(shape), np.empty(shape))
     world, rig = _world(truth, surroundings), _rig(cameras)
-    emulate_batch(state.errors, state.wander, normals, world, rig, postures, settings, out)
+    kernels.emulate_batch(state.errors, state.wander, normals, world, rig, postures, settings, out)
     return Keypoints(*out)
 
 
 def lines_of_sight(
     truth: WorkerTruth, surroundings: Surroundings, cameras: tuple[PinholeCamera, ...]
 ) -> tuple[Ints, Floats]:
-    """How each camera sees each joint and each worker, as the emulator has it.
-
-    Returns:
-        (B, C, W, J) `sightlines.SEEN`, `HIDDEN`, `OUTSIDE` or `BEHIND`; (B, C, W, `N_LOOK`)
-        side [px] and turn [rad] of the window, view [rad], folding, kneeling, handling, stepping.
-    """
+    """How each camera sees each joint, (B, C, W, J) `sightlines.SEEN` to `BEHIND`, and each worker,
+    (B, C, W, `N_LOOK`) `SIDE` to `STEPPING`, as the emulator has it."""
     batch, n_workers, n_joints = truth.joints_world.shape[:3]
     sight = np.empty((batch, len(cameras), n_workers, n_joints), np.int64)
     look_of = np.empty((batch, len(cameras), n_workers, N_LOOK))
@@ -186,12 +164,7 @@ def _world(truth: WorkerTruth, surroundings: Surroundings) -> World:
 
 
 def without_names(keypoints: Keypoints, rngs: Generators) -> Keypoints:
-    """The same poses, in every camera in an order of its own: nobody wears a name.
-
-    Args:
-        keypoints: (B, C, W, J, ...).
-        rngs: one generator per environment.
-    """
+    """The same poses, in every camera in an order of its own: nobody wears a name."""
     batch, n_cameras, n_workers = keypoints.confidence.shape[:3]
     order = np.tile(np.arange(n_workers), (batch, n_cameras, 1))
     for b in range(batch):
@@ -226,7 +199,7 @@ def _settings(
     of_posture["size"] = np.log(known.size)
     of_posture["confidence"] = np.log(confidence / (1 - confidence))
     rows = [table.reshape(len(table), -1) for table in of_posture.values()]
-    settings = np.zeros(1, SETTINGS)
+    settings = np.zeros(1, kernels.SETTINGS)
     for name in ("space_limb", "bias", "limb", "follows"):
         settings[name] = getattr(known, name)
     for name in ("error_scale", "max_error", "min_joints", "outside_confidence"):

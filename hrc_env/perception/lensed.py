@@ -5,7 +5,7 @@ to the window's middle and just wide enough to cover it. Keypoints of a distorte
 tracker in pinhole pixels.
 """
 
-from collections import OrderedDict
+import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -28,8 +28,8 @@ from hrc_env.perception.blazepose import to_image
 WIDEST = float(np.tan(np.radians(78.0)))
 """A pinhole's picture reaches no further from its middle than this, in focal lengths; what a
 window shows beyond is black."""
-MAPS_KEPT = 4
-"""Windows per camera whose resampling is kept."""
+MAPS_KEPT = 64
+"""Windows whose resampling is kept."""
 
 
 class Drawer(Protocol):
@@ -50,13 +50,10 @@ class Drawer(Protocol):
 class _Cover:
     """How a window of a distorted image is made."""
 
-    camera: PinholeCamera
-    """Turned to the window's middle, in units of its focal length."""
-    window: Roi
-    """What of it is drawn."""
-    x: NDArray[np.float32]
-    y: NDArray[np.float32]
-    """(size, size) which of the drawn pixels every pixel shows, counted from pixel centres."""
+    camera: PinholeCamera  # turned to the window's middle, in units of its focal length
+    window: Roi  # what of it is drawn
+    x: NDArray[np.float32]  # (size, size) which of the drawn pixels every pixel shows,
+    y: NDArray[np.float32]  # counted from pixel centres
 
 
 class Lensed:
@@ -64,7 +61,6 @@ class Lensed:
 
     def __init__(self, drawer: Drawer, cameras: Sequence[PinholeCamera]) -> None:
         self.drawer, self.cameras = drawer, tuple(cameras)
-        self._covers: OrderedDict[tuple, _Cover | None] = OrderedDict()
 
     def crop(self, camera_index: int, window: Roi) -> Image:
         """The window of a camera's present image, upright, (size, size, 3) RGB."""
@@ -79,38 +75,20 @@ class Lensed:
         return self._distorted(self.cameras[camera_index], window, self.drawer.unpeopled)
 
     def _distorted(
-        self,
-        camera: PinholeCamera,
-        window: Roi,
-        draw: Callable[[PinholeCamera, Roi], Image],
+        self, camera: PinholeCamera, window: Roi, draw: Callable[[PinholeCamera, Roi], Image]
     ) -> Image:
         if camera.lens is None:
             return draw(camera, window)
-        cover = self._cover(camera, window)
+        cover = _cover(camera, window, self.drawer.size_px)
         if cover is None:
             return np.zeros((self.drawer.size_px, self.drawer.size_px, 3), np.uint8)
         drawn = draw(cover.camera, cover.window)
-        black = cv2.BORDER_CONSTANT
-        return np.asarray(
-            cv2.remap(drawn, cover.x, cover.y, cv2.INTER_LINEAR, borderMode=black), np.uint8
-        )
-
-    def _cover(self, camera: PinholeCamera, window: Roi) -> _Cover | None:
-        key = (camera.K.tobytes(), camera.T_world_from_cam.tobytes(), camera.lens, window)
-        if key not in self._covers:
-            self._covers[key] = _cover(camera, window, self.drawer.size_px)
-            while len(self._covers) > MAPS_KEPT * len(self.cameras):
-                self._covers.popitem(last=False)
-        self._covers.move_to_end(key)
-        return self._covers[key]
+        return np.asarray(cv2.remap(drawn, cover.x, cover.y, cv2.INTER_LINEAR), np.uint8)
 
 
 def pinhole_keypoints(found: Keypoints, cameras: Sequence[PinholeCamera]) -> Keypoints:
-    """Keypoints (B, C, ...) in pixels of the images to pinhole pixels: the tracker's.
-
-    Their deviations grow as the pinhole's image is stretched. What a pinhole has no place for is
-    missing.
-    """
+    """Keypoints (B, C, ...) in pixels of the images to pinhole pixels, the tracker's; deviations
+    grow with the magnification, and what a pinhole has no place for is missing."""
     if all(camera.lens is None for camera in cameras):
         return found
     px, confidence = found.px.copy(), found.confidence.copy()
@@ -124,6 +102,7 @@ def pinhole_keypoints(found: Keypoints, cameras: Sequence[PinholeCamera]) -> Key
     return Keypoints(px, confidence, sigma_px, found.time_s)
 
 
+@functools.lru_cache(maxsize=MAPS_KEPT)
 def _cover(camera: PinholeCamera, window: Roi, size: int) -> _Cover | None:
     """None where the lens shows nothing in the window."""
     middles = (np.arange(size) + 0.5) / size
@@ -142,12 +121,11 @@ def _cover(camera: PinholeCamera, window: Roi, size: int) -> _Cover | None:
     left, right, top, bottom = np.nanmin(u), np.nanmax(u), np.nanmin(v), np.nanmax(v)
     side = float(max(right - left, bottom - top)) * (1 + 2 / size)
     middle = float(left + right) / 2, float(top + bottom) / 2
-    view = PinholeCamera(camera.name, np.diag([1.0, 1.0, 1.0]), T_world_from_view, 1, 1)
-    shift = side / 2 - np.array(middle)
-    return _Cover(
-        view, Roi(middle, side, 0.0), _pixels(u + shift[0], side, size),
-        _pixels(v + shift[1], side, size),
-    )  # fmt: skip
+    view = PinholeCamera(camera.name, np.eye(3), T_world_from_view, 1, 1)
+    x, y = (
+        _pixels(at + (side / 2 - mid), side, size) for at, mid in ((u, middle[0]), (v, middle[1]))
+    )
+    return _Cover(view, Roi(middle, side, 0.0), x, y)
 
 
 def _axes(ray: Floats, window: Roi, camera: PinholeCamera) -> Floats:

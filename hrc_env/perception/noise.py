@@ -1,8 +1,5 @@
-"""How far a joint may be off, from which it is and how visible the network says it is.
-
-One mapping for the real pipeline and for its emulator, so that an estimator tuned on one
-meets the same numbers in the other.
-"""
+"""How far a joint may be off, by which it is and how visible the network says it is: one mapping
+for the real pipeline and for its emulator."""
 
 from collections.abc import Sequence
 
@@ -14,9 +11,8 @@ from hrc_env.core.typing import Floats
 from hrc_env.perception.calibration import KIND, POSTURES, VISIBILITY, read_calibration
 
 ERROR: Floats = read_calibration().sigma
-"""(P, K, V) standard deviation of each image coordinate, as a share of stature, for each
-posture and kind of joints (`calibration.KINDS`) at `VISIBILITY`; how it is
-fitted is said in docs/emulator.md."""
+"""(P, K, V) standard deviation of each image coordinate, a share of stature, by posture and kind of
+joint (`calibration.KINDS`) at `VISIBILITY`; see docs/emulator.md."""
 STANDING = (1.0, *(0.0,) * (len(POSTURES) - 1))
 
 
@@ -36,10 +32,8 @@ def sigma_px(
     confidence = np.asarray(confidence, float)
     check_shape("confidence", confidence.shape[-1:], (len(KIND),), "one a joint")
     error = np.tensordot(np.asarray(posture, float), ERROR, 1)
-    within = np.clip(confidence, VISIBILITY[0], VISIBILITY[-1])
-    low = np.clip(np.searchsorted(VISIBILITY, within) - 1, 0, len(VISIBILITY) - 2)
-    slope = np.diff(error, axis=1) / np.diff(VISIBILITY)
-    share = error[KIND, low] + (within - VISIBILITY[low]) * slope[KIND, low]
+    parts = [np.interp(confidence[..., j], VISIBILITY, error[k]) for j, k in enumerate(KIND)]
+    share = np.stack(parts, -1)
     return np.where(confidence > 0, share * stature_px, np.inf)
 
 

@@ -1,9 +1,7 @@
 """Where the pose network means joints to be, and where they are.
 
-A hip of BlazePose is 17 mm above ours, from wherever it is seen, and six centimetres ahead of it in
-who bends. Trackers follow what the network means; what is told of a worker are our joints. By how
-much they differ was measured on renders, with the numbers that the emulator draws from
-(`Calibration.offset_m`).
+A hip of BlazePose is 17 mm above ours, and 60 mm ahead of it in who bends. Trackers follow what the
+network means; estimates are of our joints, by `Calibration.offset_m`.
 """
 
 from dataclasses import replace
@@ -21,11 +19,8 @@ OFFSET_M: Floats = read_calibration().offset_m
 
 
 def our_joints(estimate: PoseEstimate) -> PoseEstimate:
-    """An estimate (B, W, ...) of what the network means, as one of joints.
-
-    Which way a body faces and what its posture is are the estimate's own; the prior
-    of who is not tracked stays. Covariances and velocities are the same.
-    """
+    """An estimate (B, W, ...) of what the network means, as one of joints; the prior of who is not
+    tracked, covariances and velocities stay."""
     mean_world = estimate.mean_world.copy()
     offset_of = OFFSET_M.reshape(len(OFFSET_M), -1)
     _put_right(mean_world, estimate.velocity_world, estimate.tracked, offset_of, KIND, HAND)

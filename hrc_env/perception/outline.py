@@ -9,25 +9,21 @@ from hrc_env.core.typing import Points3
 
 UPRIGHT, FOLDED = 0.15, 0.50
 """How much lower the shoulders are above the ankles than they can be, as a share, where a body
-begins to count as folded, and from where on it counts as folded up. Judgement: who walks is below
-.12, who bends, kneels or squats above .3."""
+begins to count as folded and is folded up: walking is below .12, bending or kneeling above .3."""
 SQUATS, KNEELS = 0.40, 0.10
-"""How much higher the lower knee is than its ankle, as a share of the shank's length, where a
-folded body begins to count as kneeling, and from where on it does. Judgement: who squats or bends
-is above .5, who has a knee on the ground at 0."""
+"""How much higher the lower knee is than its ankle, as a share of the shank, where a folded body
+begins to count as kneeling and does: squatting is above .5, a knee on the ground at 0."""
 STANDS_M_S, WALKS_M_S = 0.3, 0.7
-"""Mean speeds of the joints from where a body begins to count as walking, and does [m/s]: hands
-that hammer are at the first, people who walk slowly above the second."""
+"""Mean speeds of the joints [m/s] where a body begins to count as walking and does: hammering is at
+the first, walking slowly above the second."""
 HANGS, RAISED = 0.10, 0.25
-"""How much nearer in height a wrist is to its shoulder than when it hangs, as a share of the arm's
-length, from where on hands begin to count as busy, and do. Judgement: arms that swing are at the
-first, those that push a barrow between the two, those that carry, work or point above."""
+"""How much nearer in height a wrist is to its shoulder than when it hangs, as a share of the arm,
+where hands begin to count as busy and do: swinging is at the first, carrying above the second."""
 LEAN_RAD = math.radians(30.0)
-"""A torso that leans further is bent: from there on the error of `full` in the image is half as
-large again as of upright bodies, and one camera in ten misses the worker; nobody walks so."""
+"""A torso that leans further is bent: the error of `full` is then half as large again."""
 LOW_HIPS = 0.75
 """Hips that are less than this share of the leg's length above the lower ankle squat or kneel; in
-a walk they stay above .9 (judgement, between that and a seat's .6)."""
+a walk they stay above .9."""
 
 # Joints: nose 0; left and right shoulder 1 2, elbow 3 4, wrist 5 6, hip 7 8, knee 9 10,
 # ankle 11 12.

@@ -29,11 +29,11 @@ SEARCH_RAD = math.radians(75.0)
 DIFFERENCE = 20
 """Grey levels by which a pixel must differ from the empty place, in one colour at least."""
 MEND_PX, MEDIAN_PX = 7, 3
-"""Parts of one thing are less than the first apart, in pixels of a crop; single pixels, as noise
-changes them, go by a median over the second."""
+"""Of a crop: parts of one thing are less than the first apart; a median over the second removes
+noise."""
 LEAST_PX, MOST_SHARE, MOST_PLACES = 40, 0.7, 5
-"""What is smaller than the first [px of a crop's area] is not looked at; what is larger than this
-share of a crop is looked at as a whole; no more than so many places in a window."""
+"""Smaller changes [px of a crop's area] are not looked at; larger than this share of a crop, it is
+looked at as a whole; so many places in a window at most."""
 ROOM = 1.6
 """Windows round what has changed are so many times as large."""
 MEETING_M = 0.3
@@ -43,7 +43,6 @@ SIDE_M = (1.1, 3.6)
 somebody folded up to somebody tall who reaches up."""
 MIN_CROSSING = 0.1
 """Sine of the smallest angle between two lines that fixes a point."""
-
 Candidates = Sequence[Sequence[Roi]]
 """(C,) the people found by each camera."""
 Found = tuple[int, float, Roi]
@@ -80,13 +79,8 @@ def search_jobs(
 
 
 def changed(crop: Image, empty: Image, window: Roi) -> list[Roi]:
-    """Upright windows round what is not as it is in the empty place, the largest first.
-
-    Args:
-        crop: a window of an image now.
-        empty: the same of the empty place.
-        window: which.
-    """
+    """Upright windows round what is in a crop of `window` and not in the same of the empty place,
+    the largest first."""
     differs = cv2.absdiff(crop, empty).max(-1)
     mask = (cv2.medianBlur(differs, MEDIAN_PX) > DIFFERENCE).astype(np.uint8)
     mask = cv2.dilate(mask, np.ones((MEND_PX, MEND_PX), np.uint8))
@@ -113,10 +107,8 @@ def people(detect: PersonDetector, crop: Image) -> list[blazepose.Person]:
 
 
 def search_windows(camera: PinholeCamera, step: float = 0.5) -> list[Roi]:
-    """Upright squares that overlap and together cover a camera's image.
-
-    As large as fit; behind a lens that sees more than `SEARCH_RAD`, no larger than that.
-    """
+    """Upright squares that overlap and together cover a camera's image: as large as fit, through a
+    lens no larger than `SEARCH_RAD`."""
     side = float(min(camera.width_px, camera.height_px))
     if camera.lens is not None:
         side = min(side, SEARCH_RAD * float(camera.K[0, 0]))
@@ -147,9 +139,8 @@ def agreed_windows(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> 
         cameras: (C,) the rig.
 
     Returns:
-        (C,) None where a camera has not found that person. A camera that is alone in the rig is
-        believed; of several, two must have found the same person, and not too small or large a
-        one: else nobody. One view of several never begins a track.
+        (C,) None where a camera has not found that person. Of several cameras, two must have found
+        the same person, and not too small or large a one: else nobody.
     """
     if len(cameras) == 1:
         return [found[0] if found else None for found in candidates]

@@ -10,15 +10,7 @@ from hrc_env.core.typing import Floats
 from hrc_env.geometry.lens import FOLD, distorted, magnification_at
 from hrc_env.geometry.shapes import set_capsules, set_rows
 from hrc_env.geometry.sight import is_hidden, look, make_occluders
-from hrc_env.perception.outline import (
-    facing,
-    folded,
-    handling,
-    kneeling,
-    seen_from,
-    speed,
-    stepping,
-)
+from hrc_env.perception import outline
 from hrc_env.perception.windows import MIN_DEPTH_M, window_round
 
 SEEN, HIDDEN, OUTSIDE, BEHIND = range(4)
@@ -74,14 +66,15 @@ def sight_batch(world, rig, sight, look_of):
         fill(occluders.table, world, b)
         for w in range(world.joints.shape[1]):
             joints = world.joints[b, w]
-            front_x, front_y = facing(joints)
+            front_x, front_y = outline.facing(joints)
             for c in range(len(rig)):
                 seen = room[0]  # within the loop: a record does not keep its array alive
                 see(rig[c], joints, joints, occluders, seen)
-                seen.look[VIEW] = seen_from(joints, front_x, front_y, rig[c].eye)
-                seen.look[FOLDING], seen.look[KNEELING] = folded(joints), kneeling(joints)
-                seen.look[HANDLING] = handling(joints)
-                seen.look[STEPPING] = stepping(speed(world.velocity[b, w]))
+                seen.look[VIEW] = outline.seen_from(joints, front_x, front_y, rig[c].eye)
+                seen.look[FOLDING] = outline.folded(joints)
+                seen.look[KNEELING] = outline.kneeling(joints)
+                seen.look[HANDLING] = outline.handling(joints)
+                seen.look[STEPPING] = outline.stepping(outline.speed(world.velocity[b, w]))
                 sight[b, c, w], look_of[b, c, w] = seen.sight, seen.look
 
 

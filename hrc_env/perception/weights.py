@@ -44,30 +44,22 @@ class WeightsFile:
 
 WEIGHTS: dict[str, WeightsFile] = {
     "pose_detection": WeightsFile(
-        WHEEL,
-        "mediapipe/modules/pose_detection/pose_detection.tflite",
-        2_959_046,
+        WHEEL, "mediapipe/modules/pose_detection/pose_detection.tflite", 2_959_046,
         "9ba9dd3d42efaaba86b4ff0122b06f29c4122e756b329d89dca1e297fd8f866c",
     ),
     "pose_landmark_full": WeightsFile(
-        WHEEL,
-        "mediapipe/modules/pose_landmark/pose_landmark_full.tflite",
-        6_440_512,
+        WHEEL, "mediapipe/modules/pose_landmark/pose_landmark_full.tflite", 6_440_512,
         "e9a5c5cb17f736fafd4c2ec1da3b3d331d6edbe8a0d32395855aeb2cdfd64b9f",
     ),
     "pose_landmark_lite": WeightsFile(
-        TARBALL,
-        "package/pose_landmark_lite.tflite",
-        2_819_824,
+        TARBALL, "package/pose_landmark_lite.tflite", 2_819_824,
         "f17bfbecadb61c3be1baa8b8d851cc6619c870a87167b32848ad20db306b9d61",
     ),
     "pose_landmark_heavy": WeightsFile(
-        TARBALL,
-        "package/pose_landmark_heavy.tflite",
-        27_709_200,
+        TARBALL, "package/pose_landmark_heavy.tflite", 27_709_200,
         "59e42d71bcd44cbdbabc419f0ff76686595fd265419566bd4009ef703ea8e1fe",
     ),
-}
+}  # fmt: skip
 ALWAYS = ("pose_detection", "pose_landmark_full")
 """What the defaults need."""
 
@@ -113,11 +105,8 @@ def find_weights(name: str) -> Path:
 def fetch_weights(
     progress: Callable[[str], None] | None = None, names: Iterable[str] = ALWAYS
 ) -> dict[str, Path]:
-    """Weights in the cache folder, downloading (36 and 41 MB) only what is not there yet.
-
-    Args:
-        progress: is told in a sentence what is being done.
-        names: which.
+    """Weights by name in the cache folder, downloading only what is not there yet; `progress` is
+    told what is being done.
 
     Raises:
         ConfigError: no such weights.

@@ -26,8 +26,7 @@ MIN_DEPTH_M = 0.5
 MIN_JOINTS_INSIDE = 6
 """Fewer joints in the image, of 15, are not worth a look."""
 MIN_REACH_M = 0.85
-"""A window is never tighter than round somebody upright: whoever is folded up may rise, and a tight
-window round a wrong estimate shows too little to put it right."""
+"""A window is never tighter than round somebody upright: whoever is folded up may rise."""
 MIN_TORSO_M = 0.15
 """A torso that looks shorter is seen end on and gives no direction; then up is the image's."""
 CROWN = 0.8
@@ -40,7 +39,7 @@ logarithm of its size and this turn: half of what the landmark stage forgives.""
 
 
 def window_from_joints(joints_px: Points2, depth_m: Floats, camera: PinholeCamera) -> Roi | None:
-    """The region of interest round projected joints, or None where there is nothing to see.
+    """The region of interest of a camera's image round projected joints.
 
     Args:
         joints_px: (J, 2) projected joints, pinhole pixels.
@@ -48,8 +47,7 @@ def window_from_joints(joints_px: Points2, depth_m: Floats, camera: PinholeCamer
         camera: whose image it is.
 
     Returns:
-        In pixels of the image. None if the worker is behind or very close to the camera, or
-        outside its image.
+        In pixels of the image; None if the worker is behind, very close or outside.
     """
     if depth_m[TORSO].min() < MIN_DEPTH_M:
         return None

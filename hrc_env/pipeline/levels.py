@@ -12,13 +12,11 @@ The organs do not know each other; they meet here.
 
 from dataclasses import replace
 
-import numpy as np
-
 from hrc_env.config import HRCConfig
-from hrc_env.core.batching import rows
+from hrc_env.core.batching import rows, write_rows
 from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.core.records import PoseEstimate
-from hrc_env.core.typing import Bools, Ints
+from hrc_env.core.typing import Ints
 from hrc_env.geometry.cameras import projections
 from hrc_env.perception.faults.fault import IMAGE, KINDS
 from hrc_env.perception.faults.schedule import Schedule
@@ -44,7 +42,7 @@ def make_pipeline(
     """The pipeline of a perception level.
 
     Raises:
-        ConfigError: `level` is not a name of one.
+        ConfigError: `level` is not a name of one, or cannot have what `config` wants.
         WeightsError: `pixels` without the network's weights.
         RenderingError: `pixels` without OpenGL.
     """
@@ -69,11 +67,7 @@ def make_pipeline(
 
 
 def _schedule(scene: Scene, level: str, config: HRCConfig) -> Schedule:
-    """What the cameras do over an episode.
-
-    Raises:
-        ConfigError: faults that this level does not know.
-    """
+    """What the cameras do over an episode; refuses faults that a level does not know."""
     faults = config.faults
     if faults and level not in CAMERA_LEVELS:
         raise ConfigError(
@@ -106,7 +100,9 @@ class Oracle(PerceptionPipeline):
         seen = oracle.estimate_from_truth(known.truth)
         if known.present.all():
             return seen
-        return _chosen(known.present, seen, rows(self.prior, now.ids))
+        believed = rows(self.prior, now.ids)
+        write_rows(believed, known.present, rows(seen, known.present))
+        return believed
 
     def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
         """Where a body that moves so goes: nobody is given the future."""
@@ -128,14 +124,3 @@ class NoPerception(PerceptionPipeline):
     def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
         """The prior, then as now."""
         return rows(self.prior, ids)
-
-
-def _chosen(who: Bools, one: PoseEstimate, other: PoseEstimate) -> PoseEstimate:
-    """Of workers `who` (B, W) the first estimate, of the others the second."""
-    return PoseEstimate(
-        np.where(who[..., None, None], one.mean_world, other.mean_world),
-        np.where(who[..., None, None, None], one.cov_world, other.cov_world),
-        np.where(who[..., None, None], one.velocity_world, other.velocity_world),
-        np.where(who[..., None], one.age_s, other.age_s),
-        np.where(who, one.tracked, other.tracked),
-    )

@@ -16,14 +16,7 @@ from hrc_env.pipeline.sensor_input import Windows
 
 
 class Looking(Stateful):
-    """Finds the workers of a batch of environments in the images of a rig, wherever these are from.
-
-    Args:
-        batch: how many environments.
-        cameras: the rig.
-        n_workers: how many are followed in each.
-        config: of the detector.
-    """
+    """Finds the workers of a batch of environments in a rig's images, wherever these are from."""
 
     CHANGES = ("detector", "windows", "schedule", "reacquisition")
 
@@ -39,8 +32,7 @@ class Looking(Stateful):
         self.schedule = SearchSchedule(batch, len(self.cameras), config.search_every)
         self.reacquisition = Reacquisition(batch, n_workers, len(self.cameras))
         self.seen: dict[int, tuple[list[Roi | None], list[Image | None]]] = {}
-        """What the network was given of each environment's first worker, and through which windows:
-        for pictures, no part of the state."""
+        """Windows and crops of each environment's first worker: for pictures, no state."""
 
     def look(
         self,
@@ -51,18 +43,16 @@ class Looking(Stateful):
         has_image: Sequence[bool],
         out: Keypoints,
     ) -> None:
-        """Look for every worker of environment b; a search finds nobody who has been looked at.
-
-        Those with a window come first, and one search serves all the others. Who is in view of
-        cameras only that have no image now is not looked for.
+        """Look for every worker of environment b: those with a window first; one search serves all
+        the others. Who is in view of cameras without an image only is not looked for.
 
         Args:
             source: the images.
             expected: where the tracker expects the workers.
-            row: environment b's row there.
+            row: environment b's row there and in `out`.
             b: which environment.
             has_image: (C,) whether each camera has an image now.
-            out: whose row is filled.
+            out: is filled.
         """
         wanted = [self._windows(expected, row, w) for w in range(self.n_workers)]
         taken: Windows = []

@@ -30,8 +30,7 @@ class PoseTracker:
         n_workers: how many are followed at most.
         dt_s: the usual time between two sets of frames [s].
         estimator: as of an environment.
-        tracker: settings of the estimator; None: its defaults. The prior says where somebody
-            is looked for to be (`prior_mean_world`, `prior_std_m`).
+        tracker: settings of the estimator; None: its defaults.
         detector: settings of the detector; None: the defaults.
 
     Raises:

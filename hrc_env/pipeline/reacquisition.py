@@ -1,10 +1,8 @@
 """Searches of whole images: when they are due, and for workers whose track has gone astray.
 
-A search costs as much as several steps: a camera in whose image nobody was believed rests for some
-steps, and what it showed stands for it for a while. A track that has gone astray sends all windows
-to where nobody is: for whom fewer than two cameras have shown for a while the images of the others
-are searched; where these agree on a person, they look there for as long as an estimator takes to
-give up what it believed.
+A search costs as much as several steps: a camera in whose image nobody was believed rests for a
+while. Where fewer than two cameras have shown a tracked worker for some steps, the images of the
+others are searched; where these agree on a person, they look there until the estimator follows.
 """
 
 from collections.abc import Sequence
@@ -19,8 +17,7 @@ from hrc_env.perception.searching import Candidates, agreed_windows, apart_from
 from hrc_env.pipeline.sensor_input import Windows
 
 REMEMBERED = 10
-"""Steps for which what a search found stands for a camera that is not searched: 0.4 s, in which
-hips hardly move further than two lines of sight may pass each other by."""
+"""Steps for which what a search found stands for a camera that is not searched."""
 PATIENCE = 8
 """Steps in a row in which a camera shows nobody before its whole image is searched."""
 FOLLOWED = 5
@@ -109,14 +106,14 @@ class Reacquisition(Stateful):
         others: Windows,
         cameras: Sequence[PinholeCamera],
     ) -> None:
-        """Learn what a search of the blind cameras gave.
+        """Learn what a search of the blind cameras gave for a worker of environment b.
 
         Args:
-            b: which environment.
-            worker: whom of it.
+            b: the environment.
+            worker: the worker.
             people: (C,) whom each blind camera shows.
             windows: (C,) where the track has the cameras look.
-            others: windows (C,) of other workers; they are not taken for this one.
+            others: windows (C,) of other workers, who are not taken for this one.
             cameras: the rig.
         """
         blind = self.unseen[b, worker] >= PATIENCE

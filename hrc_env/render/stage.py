@@ -23,7 +23,6 @@ from hrc_env.scene.canvas import (
     MOVING,
     STILL,
     Canvas,
-    across,
 )
 from hrc_env.scene.domain_randomization import Look
 
@@ -169,27 +168,21 @@ class Stage(Canvas):
     def shade(self) -> Shade | None:
         """What moves, as the sun sees it; None without a sun or without anything that moves."""
         self.show(BEFORE_THE_SUN)
-        direction, (middles, radii_m) = self.sun(), self.movers()
-        if direction is None or not len(middles):
+        axes, (middles, radii_m) = self.sun_axes(), self.movers()
+        if axes is None or not len(middles):
             return None
-        right, down = across(direction)
-        spots = middles @ np.stack([right, down, direction], -1)
+        spots = middles @ axes
         low = (spots - radii_m[:, None]).min(0) - 0.1
         high = (spots + radii_m[:, None]).max(0) + 0.1
         half_m, deep_m = float((high - low)[:2].max()) / 2, float((high - low)[2])
         middle = (low + high) / 2
-        near = middle[0] * right + middle[1] * down + low[2] * direction
-        self.aim_along(direction, near, half_m, deep_m)
+        near = axes @ [middle[0], middle[1], low[2]]
+        self.aim_along(axes, near, half_m, deep_m)
         z = np.empty((SUN_PX, SUN_PX), np.float32)
         self.read(None, z)
         corner = float(middle[0]) - half_m, float(middle[1]) - half_m
         upright = np.ascontiguousarray(z[::-1])
         return Shade(upright, float(low[2]), deep_m, corner, 2 * half_m / SUN_PX)
-
-    def sun_axes(self) -> Floats | None:
-        """(3, 3) columns right, down and along the light that casts shadows."""
-        direction = self.sun()
-        return None if direction is None else np.stack([*across(direction), direction], -1)
 
     def _still(self, place: Place) -> _Backdrop:
         size, axes = (place.width, place.height), self.sun_axes()

@@ -17,11 +17,7 @@ SHIELDS: dict[str, Shield] = {}
 
 
 def shield_called(shield: str | Shield | None) -> Shield | None:
-    """A shield by its name, itself, or none.
-
-    Raises:
-        ConfigError: a name that nobody has registered, or no function.
-    """
+    """A shield by its name, itself, or none."""
     if isinstance(shield, str):
         if shield not in SHIELDS:
             raise unknown("shield", shield, SHIELDS)

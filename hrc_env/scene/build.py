@@ -104,10 +104,14 @@ class Scene:
         moving = np.zeros((len(q), 0, WIDTH)) if held is None else held_shapes(held)
         return Surroundings(self.obstacles, moving, capsules(chain, q), chain.capsule_radius_m)
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        """A scene is pickled as its recipe."""
+    @property
+    def recipe(self) -> tuple[Any, ...]:
+        """What `build` makes it from."""
         use = tuple(camera.name for camera in self.cameras)
-        return build, (self.config, self.name, self.n_workers, self.bodies, use, self.robot)
+        return self.config, self.name, self.n_workers, self.bodies, use, self.robot
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return build, self.recipe
 
 
 def build(
@@ -153,8 +157,8 @@ def _build(
     robot: Robot,
 ) -> Scene:
     room = SCENES[name]
-    cameras, chain = pinholes(select(config.cameras, use)), chain_of(robot, room.mount_world)
-    spec = _spec(config, name, n_workers, bodies[0], cameras, robot)
+    chain = chain_of(robot, room.mount_world)
+    spec = _spec(config, name, n_workers, bodies, use, robot)
     _strip(spec)
     _pair(spec, robot, chain)
     model = spec.compile()
@@ -170,7 +174,7 @@ def _build(
         bodies=bodies,
         model=model,
         chain=chain,
-        cameras=cameras,
+        cameras=pinholes(select(config.cameras, use)),
         home_q=np.array(robot.home_q),
         servo_lead_s=servo_lead_s(robot, model),
         watched=np.array([robot.capsules.index(name) for name in robot.watched]),
@@ -183,8 +187,8 @@ def _build(
 
 def without_workers(scene: Scene) -> Scene:
     """The same scene with nobody in it."""
-    names = tuple(camera.name for camera in scene.cameras)
-    return _build(scene.config, scene.name, 0, scene.bodies, names, scene.robot)
+    config, name, _, *rest = scene.recipe
+    return _build(config, name, 0, *rest)
 
 
 @lru_cache(maxsize=4)
@@ -194,9 +198,7 @@ def drawing_model(scene: Scene) -> mujoco.MjModel:
     The physics' joints and its mocap rows come first, in the same order, so that its state fits.
     """
     prefixes = _prefixes(scene.n_workers)
-    spec = _spec(
-        scene.config, scene.name, scene.n_workers, scene.bodies[0], scene.cameras, scene.robot
-    )
+    spec = _spec(*scene.recipe)
     for prefix in prefixes:
         for name in scene.bodies:
             add_visuals(spec, load_body(name), load_mesh(name), prefix)
@@ -213,8 +215,8 @@ def _spec(
     config: SceneConfig,
     name: str,
     n_workers: int,
-    body_name: str,
-    cameras: tuple[PinholeCamera, ...],
+    bodies: tuple[str, ...],
+    use: tuple[str, ...],
     robot: Robot,
 ) -> mujoco.MjSpec:
     """Everything but the workers' looks and what they hold."""
@@ -226,9 +228,9 @@ def _spec(
     # The velocity command in force, and which body each worker has: part of the state.
     spec.nuserdata = len(robot.joints) + n_workers
     add_robot(spec, robot, SCENES[name].mount_world)
-    add_cameras(spec, cameras)
+    add_cameras(spec, pinholes(select(config.cameras, use)))
     for prefix in _prefixes(n_workers):
-        add_worker(spec, load_body(body_name), prefix)
+        add_worker(spec, load_body(bodies[0]), prefix)
     return spec
 
 

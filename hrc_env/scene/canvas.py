@@ -169,18 +169,16 @@ class Canvas:
             eye.frustum_top = (height_px / 2 - v) * scale
             eye.frustum_bottom = (-height_px / 2 - v) * scale
 
-    def aim_along(
-        self, direction: Floats, middle_world: Floats, half_m: float, far_m: float
-    ) -> None:
+    def aim_along(self, axes: Floats, middle_world: Floats, half_m: float, far_m: float) -> None:
         """Look along parallel rays, as a sun shines: a square of 2 `half_m` round a point.
 
         Args:
-            direction: (3,) unit vector; rows and columns go along `across(direction)`.
+            axes: (3, 3) columns right, down and along the rays.
             middle_world: (3,) the point in the middle of the near plane [m].
             half_m: half of the square's side [m].
             far_m: how far is drawn [m].
         """
-        _, down = across(direction)
+        _, down, direction = axes.T
         for eye in self._shown.camera:
             eye.orthographic = 1
             eye.pos, eye.forward, eye.up = middle_world - direction, direction, -down
@@ -188,10 +186,15 @@ class Canvas:
             eye.frustum_center, eye.frustum_width = 0.0, half_m
             eye.frustum_top, eye.frustum_bottom = half_m, -half_m
 
-    def sun(self) -> Floats | None:
-        """(3,) where the light goes that casts shadows, if there is one."""
+    def sun_axes(self) -> Floats | None:
+        """(3, 3) columns right, down and along the light that casts shadows, if there is one."""
         shining = np.flatnonzero(self._model.light_castshadow & self._model.light_active)
-        return self._data.light_xdir[shining[0]].copy() if len(shining) else None
+        if not len(shining):
+            return None
+        along = self._data.light_xdir[shining[0]].copy()
+        right = np.cross(along, [0.0, 1.0, 0.0])
+        right /= np.linalg.norm(right)
+        return np.stack([right, np.cross(along, right), along], -1)
 
     def movers(self) -> tuple[Floats, Floats]:
         """Spheres round all that moves, a worker's capsules for the skin: middles (N, 3) and radii
@@ -254,10 +257,3 @@ class Canvas:
             self._gl, self._context = gl.new_context(self.width_px, self.height_px, self._model)
             mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
             self._context.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
-
-
-def across(direction: Floats) -> tuple[Floats, Floats]:
-    """Two unit vectors (3,) at right angles to one: to the right and down of who looks along it."""
-    right = np.cross(direction, [0.0, 1.0, 0.0])
-    right /= np.linalg.norm(right)
-    return right, np.cross(direction, right)

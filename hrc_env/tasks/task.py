@@ -91,11 +91,7 @@ TASKS: dict[str, Task] = {}
 
 
 def task_called(task: str | Task) -> Task:
-    """A task by its id.
-
-    Raises:
-        ConfigError: an id that nobody has registered, with those that there are.
-    """
+    """A task by its id, or itself."""
     if isinstance(task, Task):
         return task
     if task not in TASKS and task in BUILT_IN:

@@ -5,17 +5,21 @@ that are not in (0, 1] and standard deviations that are not finite and positive 
 there is no measurement; wrong pixels that look like pixels are left to the robust likelihoods.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from hrc_env.core.errors import check_shape
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Keypoints
-from hrc_env.core.typing import Floats
+from hrc_env.core.skeleton import N_JOINTS
+from hrc_env.core.typing import Bools, Floats
 from hrc_env.geometry.triangulation import (
     FURTHEST_PX,
     NEAREST_DEPTH_M,
     pixel_of,
 )
+from hrc_env.tracking.tree.cameras import LANES, N_VIEW
 
 MIN_SIGMA_PX = 0.25
 """No detector is believed to be better than this [px]."""
@@ -44,6 +48,40 @@ def is_measurement(u, v, belief, sigma):
         and abs(v) < FURTHEST_PX
         and 0.0 < belief <= 1.0 + 1e-6
         and 0.0 < sigma < FURTHEST_PX
+    )
+
+
+class Seen(NamedTuple):
+    """What C cameras measured of one worker, and what an update makes of it; filled in place."""
+
+    P: Floats
+    """(C, 3, 4)."""
+    z: Floats
+    """(J, C, 2) pixels; 0 where there is no measurement."""
+    sigma: Floats
+    """(J, C) [px]; 1 where there is none."""
+    ok: Bools
+    """(J, C) whether there is one."""
+    belief: Floats
+    """(J, C) how far it is believed to be no outlier."""
+    views: Floats
+    """(C, N_VIEW, LANES) the measurements as `tree.cameras` takes them."""
+    looks: Floats
+    """(C, 8) what each camera says of one joint, for `models.noise`."""
+
+
+@kernel(makes_arrays=True)
+def make_seen(P):
+    """Room for the measurements of one worker."""
+    n = len(P)
+    return Seen(
+        P=P,
+        z=np.empty((N_JOINTS, n, 2)),
+        sigma=np.empty((N_JOINTS, n)),
+        ok=np.empty((N_JOINTS, n), np.bool_),
+        belief=np.empty((N_JOINTS, n)),
+        views=np.zeros((n, N_VIEW, LANES)),
+        looks=np.empty((n, 8)),
     )
 
 

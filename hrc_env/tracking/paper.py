@@ -13,6 +13,7 @@
 - the estimate (line 19) is the mean and the covariance of the resampled cloud.
 """
 
+import math
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -21,10 +22,8 @@ import numpy as np
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Bools, Floats, Ints
-from hrc_env.tracking.clouds.likelihoods import add_log_likelihood, normalise
-from hrc_env.tracking.clouds.moments import moments, roll, scatter
-from hrc_env.tracking.clouds.resampling import multinomial, systematic
+from hrc_env.core.typing import Bools, Covariances3, Floats, Ints, Points3
+from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
 from hrc_env.tracking.config import PaperConfig
 from hrc_env.tracking.forecast import forecast
 from hrc_env.tracking.measurements import arrays_of, read_worker, supports
@@ -40,6 +39,8 @@ from hrc_env.tracking.tracks import Tracks, forget, grow_older, make_tracks, rep
 
 Measured: TypeAlias = tuple[Floats, Floats, Bools]
 """One worker's pixels (J, C, 2), sigma (J, C) and whether there are any (J, C)."""
+BEHIND = -1e12
+"""Log-likelihood of a particle behind the camera that saw the joint: the last to be chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,3 +221,101 @@ def _look_after(
             continue
         if find_again(P, z[j], sigma[j], ok[j], gate_sigma, radius, middle, point, spread):
             mean[j], cov[j], age[j], conflict[j], again[j] = point, spread, 0.0, 0, True
+
+
+def scatter(particles: Floats, mean: Points3, cov: Covariances3, rng: np.random.Generator) -> None:
+    """Draw clouds (..., 3, M) from Gaussians with mean (..., 3) and cov (..., 3, 3), in place."""
+    root = np.linalg.cholesky(cov)
+    particles[:] = mean[..., None] + root @ rng.standard_normal(particles.shape)
+
+
+def roll(particles: Floats, sigma_m: float, rng: np.random.Generator) -> None:
+    """Move every particle a Gaussian step of `sigma_m` on each axis, in place."""
+    _add_scaled(particles, rng.standard_normal(particles.shape, dtype=np.float32), sigma_m)
+
+
+@kernel(makes_arrays=True)
+def _add_scaled(particles, noise, scale):
+    for j in range(particles.shape[0]):
+        for i in range(3):
+            for m in range(particles.shape[2]):
+                particles[j, i, m] += scale * noise[j, i, m]
+
+
+@kernel(makes_arrays=True)
+def moments(particles, mean, cov):
+    """Mean (J, 3) and covariance (J, 3, 3) of unweighted clouds (J, 3, M)."""
+    n = particles.shape[2]
+    for j in range(particles.shape[0]):
+        for i in range(3):
+            mean[j, i] = particles[j, i].mean()
+        for i in range(3):
+            for k in range(i + 1):
+                total = 0.0
+                for m in range(n):
+                    total += (particles[j, i, m] - mean[j, i]) * (particles[j, k, m] - mean[j, k])
+                cov[j, i, k] = cov[j, k, i] = total / n
+
+
+@kernel(makes_arrays=True)
+def add_log_likelihood(camera, u, v, sigma, particles, log_weights):
+    """Add one camera's log-likelihood of pixel (u, v) to the log-weights of particles (3, M)."""
+    for m in range(particles.shape[1]):
+        expected_u, expected_v, depth = pixel_of(
+            camera, particles[0, m], particles[1, m], particles[2, m]
+        )
+        if depth > NEAREST_DEPTH_M:
+            distance_squared = (u - expected_u) ** 2 + (v - expected_v) ** 2
+            log_weights[m] += -0.5 * distance_squared / (sigma * sigma)
+        else:
+            log_weights[m] += BEHIND
+
+
+@kernel(makes_arrays=True)
+def normalise(log_weights, weights):
+    """Weights that sum to one."""
+    largest = log_weights.max()
+    total = 0.0
+    for m in range(len(log_weights)):
+        weights[m] = math.exp(log_weights[m] - largest)
+        total += weights[m]
+    for m in range(len(weights)):
+        weights[m] /= total
+
+
+@kernel(makes_arrays=True)
+def multinomial(weights, waits, ancestors):
+    """M independent choices, sorted.
+
+    Args:
+        weights: (M,) summing to one.
+        waits: (M + 1,) standard exponential variates: their normalised cumulative sums are
+            M sorted uniform variates (Devroye, Non-Uniform Random Variate Generation, V.3).
+        ancestors: (M,) int, filled.
+    """
+    total = waits.sum()
+    particle, cumulative, position = 0, weights[0], 0.0
+    for m in range(len(ancestors)):
+        position += waits[m] / total
+        while cumulative < position and particle < len(weights) - 1:
+            particle += 1
+            cumulative += weights[particle]
+        ancestors[m] = particle
+
+
+@kernel(makes_arrays=True)
+def systematic(weights, start, ancestors):
+    """Choices at even distances (Kitagawa, 1996): the counts differ from M w_m by less than one.
+
+    Args:
+        weights: (M,) summing to one.
+        start: one uniform variate in [0, 1).
+        ancestors: (M,) int, filled.
+    """
+    n = len(ancestors)
+    particle, cumulative = 0, weights[0]
+    for m in range(n):
+        while cumulative < (m + start) / n and particle < len(weights) - 1:
+            particle += 1
+            cumulative += weights[particle]
+        ancestors[m] = particle

@@ -28,6 +28,7 @@ from hrc_env.tracking.models.noise import noise_model
 from hrc_env.tracking.settings import settings_of
 from hrc_env.tracking.tracks import blank, gaussian_tracks, report
 from hrc_env.tracking.tree.state import forget_trees, make_trees, motion
+from hrc_env.tracking.tree.work import WORK
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +69,7 @@ class ParticleEstimator:
         """Move every hypothesis by its motion model; draws nothing."""
         del rngs
         model = motion(dt_s, self.config.damping, self.config.root_acceleration)
-        predict_all(plain(state), model, dt_s, *self.constants[:2])
+        predict_all(plain(state), model, dt_s, *self.constants[:2], np.empty(1, WORK))
 
     def update(
         self, state: Hypotheses, keypoints: Keypoints, rngs: list[np.random.Generator]
@@ -78,7 +79,7 @@ class ParticleEstimator:
         batch, n_workers = state.n_alive.shape
         shape = (batch, len(self.P), n_workers, N_JOINTS)
         measured = (self.P, *arrays_of(keypoints, shape))
-        update_all(plain(state), *measured, STANDING_M, *self.constants)
+        update_all(plain(state), *measured, STANDING_M, *self.constants, np.empty(1, WORK))
 
     def estimate(self, state: Hypotheses) -> PoseEstimate:
         """Mean and covariance of the mixture; ages are the heaviest hypothesis's."""

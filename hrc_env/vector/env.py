@@ -28,7 +28,7 @@ from hrc_env.env import RENDER_MODES, PlainSpec, check_render_mode, spaces
 from hrc_env.render.views import PICTURE_SIZE, Views, picture_size
 from hrc_env.rewards import RewardConfig
 from hrc_env.simulation import Simulation, checked_action
-from hrc_env.step import StepResult
+from hrc_env.step import StepResult, objects
 from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import task_called
 from hrc_env.vector.infos import InfoTable, blank, table
@@ -56,20 +56,13 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
     """`num_envs` robots, each beside a worker of its own, stepped at once.
 
     Args:
-        num_envs: how many.
         perception: "keypoints", "truth" or "none"; pictures have no batched form.
-        render_mode: "rgb_array", "depth_array" or None.
-        width, height: of what `render` gives [px].
         max_episode_steps: the time limit; None is the task's, -1 none.
         autoreset_mode: when an environment whose episode is over starts anew: at the next
             step (default), in the same step, or not by itself ("Disabled").
         num_threads: threads that share the environments; all cores if None.
         backend: "threads"; there is no other.
-        arguments: of `HRCEnv`: task, estimator, cameras, scene, robot, n_workers, people,
-            motions, faults, appearance, control, shield, config.
-
-    Raises:
-        ConfigError: an argument that cannot work, with what would.
+        arguments: of `HRCEnv`, as are `render_mode`, `width` and `height`.
     """
 
     CHANGES = ("shards", "_streams", "_steps", "_ended", "_observation")
@@ -133,10 +126,9 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
             seed: environment k gets `seed + k`, or the k-th of a list; with None its random
                 stream goes on.
             options: "reset_mask", (num_envs,) bool: only these environments start anew.
-                "steps_left", a whole number or (num_envs,) of them: after so many steps these
-                first episodes are truncated, if their time limit does not end them before, so
-                that not all of them end at once. Or "elapsed_steps", (num_envs,) int: how much of
-                the time limit they have behind them.
+                "steps_left", one or (num_envs,) int: after so many steps these first episodes are
+                truncated, if not before. Or "elapsed_steps", (num_envs,) int: how much of the
+                time limit they have behind them.
 
         Returns:
             Observations of all environments, and infos of those that started.
@@ -161,15 +153,10 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         return self._observation.copy(), info.arrays(mask)
 
     def step(self, actions: NDArray[np.float32]) -> Step:
-        """One control step of every environment.
+        """One control step of every environment; actions (num_envs, n) in [-1, 1].
 
-        Args:
-            actions: (num_envs, n) in [-1, 1]. In the mode NEXT_STEP those of environments
-                whose episode has just ended are ignored: these start anew instead.
-
-        Returns:
-            Observations (num_envs, m) float32; rewards, terminations and truncations
-            (num_envs,); infos as arrays (num_envs,), each with a mask "_name".
+        In the mode NEXT_STEP those of environments whose episode has just ended are ignored:
+        these start anew instead. Infos are arrays (num_envs,), each with a mask "_name".
         """
         outcome = self.shards.step(self._checked(actions))
         observation, info = outcome.observation.copy(), table(outcome)
@@ -240,11 +227,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         info.write(ids, fresh)
 
     def _checked(self, actions: Any) -> Floats:
-        """Actions (num_envs, n) clipped to [-1, 1]; zero for environments that start anew.
-
-        Raises:
-            ConfigError: other shapes, no finite numbers, or not the time for a step.
-        """
+        """Actions (num_envs, n) clipped to [-1, 1]; zero for environments that start anew."""
         self._refuse_closed()
         if self._observation is None:
             raise ConfigError("Call reset() before step().")
@@ -266,31 +249,21 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
 
 def _finals(observation: Observations, info: InfoTable, who: Bools) -> dict[str, Any]:
     """The last observations and infos of the episodes of environments `who` (B,)."""
-    last = np.full(len(who), None, dtype=object)
-    for k in np.flatnonzero(who).tolist():
-        last[k] = observation[k].copy()
-    return {
-        "final_obs": last,
-        "_final_obs": who.copy(),
-        "final_info": info.arrays(who),
-        "_final_info": who.copy(),
-    }
+    last = objects(
+        [row.copy() if ended else None for row, ended in zip(observation, who, strict=True)]
+    )
+    final_info = {"final_info": info.arrays(who), "_final_info": who.copy()}
+    return {"final_obs": last, "_final_obs": who.copy(), **final_info}
 
 
 def make_vector(
     num_envs: int = 1, *, perception: str = "pixels", force: bool = False, **kwargs: Any
 ) -> VectorEnv[Any, Any, Any]:
-    """A vector environment.
+    """An `HRCVectorEnv`; for "pixels" gymnasium's `AsyncVectorEnv`, a process an environment.
 
     Args:
-        num_envs: how many environments.
-        perception: "pixels" is gymnasium's `AsyncVectorEnv`, a process for each environment;
-            the other levels are an `HRCVectorEnv`.
         force: allow more processes than two for each core.
         kwargs: of `HRCVectorEnv`; no `num_threads` with "pixels".
-
-    Raises:
-        ConfigError: too many processes, or arguments that cannot work.
     """
     if perception != "pixels":
         return HRCVectorEnv(num_envs, perception=perception, **kwargs)

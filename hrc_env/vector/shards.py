@@ -22,13 +22,7 @@ class Shards:
     """`batch` environments in `n_shards` simulations; the calling thread works on the first."""
 
     def __init__(self, batch: int, n_shards: int, make: Callable[[int], Simulation]) -> None:
-        """Make them.
-
-        Args:
-            batch: how many environments.
-            n_shards: in how many ranges.
-            make: gives a simulation of so many environments, always of the same kind.
-        """
+        """`make` gives a simulation of so many environments, always of the same kind."""
         self.bounds = [batch * k // n_shards for k in range(n_shards + 1)]
         self.parts = [make(high - low) for low, high in pairwise(self.bounds)]
         self._pool: ThreadPoolExecutor | None = None
@@ -39,26 +33,36 @@ class Shards:
         return self.parts[0]
 
     def reset(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> StepResult:
-        """Start environments `ids` (sorted) anew, one generator each; their rows."""
-        rows = pairwise(np.searchsorted(ids, self.bounds).tolist())
-        given = zip(self.bounds[:-1], rows, strict=True)
-        arguments = ((ids[low:high] - first, rngs[low:high]) for first, (low, high) in given)
-        return self._run("reset", [each if len(each[0]) > 0 else None for each in arguments])
+        """Start environments `ids` (sorted) anew, one generator each; their rows.
+
+        In one thread: this is Python for the most part, in which others would only wait.
+        """
+        cuts = pairwise(np.searchsorted(ids, self.bounds).tolist())
+        parts = zip(self.parts, self.bounds[:-1], cuts, strict=True)
+        jobs = [
+            (first, partial(part.reset, ids[low:high] - first, rngs[low:high]))
+            for part, first, (low, high) in parts
+            if low < high
+        ]
+        return joined(_all_done(jobs))
 
     def step(self, action: Floats) -> StepResult:
         """One control step of every environment; action (B, A) in [-1, 1]."""
-        return self._run("step", [(action[low:high],) for low, high in pairwise(self.bounds)])
+        own, *theirs = [
+            (low, partial(part.step, action[low:high]))
+            for part, (low, high) in zip(self.parts, pairwise(self.bounds), strict=True)
+        ]
+        if theirs and self._pool is None:
+            self._pool = ThreadPoolExecutor(len(theirs), thread_name_prefix="hrc_env-shard")
+        started = [(low, self._pool.submit(job).result) for low, job in theirs if self._pool]
+        return joined(_all_done([own, *started]))
 
     def get_state(self) -> list[State]:
         """A copy of everything that changes, part by part."""
         return [part.get_state() for part in self.parts]
 
     def set_state(self, state: list[State]) -> None:
-        """Continue from a state.
-
-        Raises:
-            ConfigError: it was taken with other settings or another number of parts.
-        """
+        """Continue from a state of as many parts with the same settings."""
         if len(state) != len(self.parts):
             raise ConfigError(
                 f"The state was taken with {len(state)} threads; here there are "
@@ -78,36 +82,10 @@ class Shards:
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_pool": None}
 
-    def _run(self, name: str, arguments: Sequence[tuple[Any, ...] | None]) -> StepResult:
-        """What a method of all parts gives, of those but for which the arguments are None.
-
-        The others are set to work first. Nobody works on any more when this returns or raises.
-        """
-        mine, *theirs = arguments
-        others = [
-            (first, self._start(part, name, each))
-            for part, first, each in zip(self.parts[1:], self.bounds[1:-1], theirs, strict=True)
-            if each is not None
-        ]
-        own = [] if mine is None else [(0, partial(getattr(self.first, name), *mine))]
-        return joined(_all_done([*own, *others]))
-
-    def _start(
-        self, part: Simulation, name: str, arguments: tuple[Any, ...]
-    ) -> Callable[[], StepResult]:
-        """Have a thread work on a part; but a reset is Python for the most part, in which threads
-        would only wait for each other."""
-        if name == "reset":
-            return partial(getattr(part, name), *arguments)
-        if self._pool is None:
-            n_helpers = len(self.parts) - 1
-            self._pool = ThreadPoolExecutor(n_helpers, thread_name_prefix="hrc_env-shard")
-        return self._pool.submit(getattr(part, name), *arguments).result
-
 
 def _all_done(jobs: Iterable[tuple[int, Callable[[], StepResult]]]) -> list[StepResult]:
-    """What jobs give, each with the number of its first environment; or, once all are done, the
-    first error."""
+    """What jobs give, each with the number of its first environment; or, once all are done and
+    nobody works on any more, the first error."""
     outcomes, errors = [], []
     for first, job in jobs:
         try:

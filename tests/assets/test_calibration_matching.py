@@ -16,8 +16,9 @@ from assets.emulator.validate import (
     outcome,
 )
 from assets.emulator.watch import watch
+from assets.emulator.writing import write_calibration
 from hrc_env.config import HRCConfig
-from hrc_env.perception.calibration import POSTURES, read_calibration, write_calibration
+from hrc_env.perception.calibration import POSTURES, read_calibration
 from hrc_env.perception.emulator import EmulatorConfig
 
 ALL = [clip for clip in fit_clips(0, 3) if family_of(clip.motion) in ("stand", "walk", "fold")]

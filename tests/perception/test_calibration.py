@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 
+from assets.emulator.writing import write_calibration
 from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError
 from hrc_env.perception.calibration import (
@@ -13,7 +14,6 @@ from hrc_env.perception.calibration import (
     SHAPES,
     VERSION,
     read_calibration,
-    write_calibration,
 )
 
 

@@ -213,7 +213,7 @@ def test_folded_workers_have_a_network_of_their_own(four, monkeypatch):
         landmark = load_landmarker("full", runtime)
         return lambda image: asked.append(network) or landmark(image)
 
-    monkeypatch.setattr(detector_module, "load_landmarker", load)
+    monkeypatch.setattr(detector_module.network, "load_landmarker", load)
     monkeypatch.setattr(detector_module, "find_weights", lambda name: name)
     detector = new_detector(4, DetectorConfig(folded="heavy"))
     detector.detect(stills, [WINDOW] * 4)

@@ -9,11 +9,12 @@ import pytest
 from people import truth
 from scipy.stats import multivariate_normal, norm
 
+from assets.emulator.writing import write_calibration
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import JOINT, MIRROR, N_JOINTS
 from hrc_env.geometry.cameras import pinhole, project, projections
 from hrc_env.geometry.sight import Surroundings, nothing
-from hrc_env.perception.calibration import KINDS, SHAPES, read_calibration, write_calibration
+from hrc_env.perception.calibration import KINDS, SHAPES, read_calibration
 from hrc_env.perception.emulator import (
     EmulatorConfig,
     emulate,

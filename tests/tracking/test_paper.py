@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from simulated import DT, LAB, Damage, detections, generators, keypoints, track, walk
 
-from hrc_env.tracking.clouds.moments import roll
 from hrc_env.tracking.config import PaperConfig
 from hrc_env.tracking.estimators import make_estimator
+from hrc_env.tracking.paper import roll
 
 SIGMA_PX, FOCAL_PX = 3.0, 100.0
 AFFINE = np.array(

@@ -13,7 +13,7 @@ from hrc_env.tracking.hypotheses.slots import exchange_slots, merge, normalise
 from hrc_env.tracking.hypotheses.yaw_flip import heads_like, turn_body, turn_of
 from hrc_env.tracking.tree.evidence import tree_measure
 from hrc_env.tracking.tree.gaussian import ORDER, PARENT
-from hrc_env.tracking.tree.work import make_work
+from hrc_env.tracking.tree.work import WORK
 
 EYES = -np.linalg.solve(LAB[:, :, :3], LAB[:, :, 3:])[..., 0]
 
@@ -259,7 +259,9 @@ def test_the_trees_determinant_and_square_are_those_of_the_whole_matrix():
         whole[j, j] = cov[j]
     matrix = whole.transpose(0, 2, 1, 3).reshape(90, 90)
     change = np.random.default_rng(0).normal(0, 0.05, (15, 6))
-    square, log_det = tree_measure(cov, slope, change.copy(), make_work(4))
+    square, log_det = tree_measure(
+        cov, slope, change.copy(), np.zeros(1, WORK).view(np.recarray)[0]
+    )
     assert log_det == pytest.approx(np.linalg.slogdet(matrix)[1], rel=1e-6)
     expected = change.ravel() @ np.linalg.solve(matrix, change.ravel())
     assert square == pytest.approx(expected, rel=1e-5)
@@ -273,7 +275,7 @@ def test_hypotheses_that_have_come_close_are_one_and_light_ones_are_dropped():
     state.slots.body[0, 2, :, 0] += 1.0
     state.n_alive[0, 0] = 3
     state.log_weight[0, :3] = np.log([0.3, 0.4, 0.3])
-    merge(state, 0, 0, 4.0, make_work(4))
+    merge(state, 0, 0, 4.0, np.zeros(1, WORK).view(np.recarray)[0])
     normalise(state, 0, 0, np.log(1e-3))
     assert state.n_alive[0, 0] == 2
     np.testing.assert_allclose(np.exp(state.log_weight[0, :2]), [0.7, 0.3])

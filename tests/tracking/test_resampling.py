@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hrc_env.tracking.clouds.resampling import multinomial, systematic
+from hrc_env.tracking.paper import multinomial, systematic
 
 WEIGHTS = np.array([0.05, 0.4, 0.0, 0.3, 0.25])
 

@@ -9,11 +9,10 @@ from hrc_env.core.skeleton import BONES, N_JOINTS, TORSO
 from hrc_env.tracking.models.acquisition import STANDING_M
 from hrc_env.tracking.models.motion import damped_joints, whole_body_noise
 from hrc_env.tracking.tree.bone_lengths import learn_lengths, population_edges
-from hrc_env.tracking.tree.gaussian import EDGE_BONE, ORDER, PARENT, ROOT
+from hrc_env.tracking.tree.gaussian import EDGE_BONE, ORDER, PARENT, ROOT, invert
 from hrc_env.tracking.tree.predict import predict_tree
-from hrc_env.tracking.tree.quads import HESSIAN, INVERSE, PROPER, QUAD, invert_rows, load_tree
 from hrc_env.tracking.tree.update import update_tree
-from hrc_env.tracking.tree.work import make_work
+from hrc_env.tracking.tree.work import WORK
 
 J = N_JOINTS
 _I3 = np.eye(3)
@@ -68,27 +67,15 @@ def test_every_edge_is_a_bone_and_parents_come_first():
             assert ORDER.index(PARENT[j]) < ORDER.index(j)
 
 
-def invert_four(matrices):
-    """Inverses of four 6x6 matrices at once, and which of them are positive definite."""
-    rows = np.zeros(QUAD)
-    rows[HESSIAN : HESSIAN + 144] = matrices.transpose(1, 2, 0).ravel()
-    invert_rows(rows, 0)
-    inverse = rows[INVERSE : INVERSE + 144].reshape(6, 6, 4).transpose(2, 0, 1)
-    return inverse, rows[PROPER : PROPER + 4]
-
-
 @settings(max_examples=20, deadline=None)
 @given(seed=seeds)
 def test_the_inverse_is_the_inverse_and_says_when_there_is_none(seed):
-    rng = np.random.default_rng(seed)
-    matrices = np.stack([random_covariance(rng) for _ in range(4)])
-    inverse, proper = invert_four(matrices)
-    np.testing.assert_allclose(inverse @ matrices, np.tile(np.eye(6), (4, 1, 1)), atol=1e-6)
-    np.testing.assert_array_equal(proper, 1.0)
-    matrices[1, 2, 2], matrices[3] = -1e-3, np.nan
-    beside, proper = invert_four(matrices)
-    np.testing.assert_array_equal(proper, [1.0, 0.0, 1.0, 0.0])
-    np.testing.assert_array_equal(beside[::2], inverse[::2])  # nobody's neighbour matters
+    matrix, inverse = random_covariance(np.random.default_rng(seed)), np.empty((6, 6))
+    assert invert(matrix, inverse)
+    np.testing.assert_allclose(inverse @ matrix, np.eye(6), atol=1e-6)
+    matrix[2, 2] = -1e-3
+    assert not invert(matrix, inverse)
+    assert not invert(np.full((6, 6), np.nan), inverse)
 
 
 @settings(max_examples=15, deadline=None)
@@ -96,7 +83,7 @@ def test_the_inverse_is_the_inverse_and_says_when_there_is_none(seed):
 def test_an_update_is_the_dense_gaussian_update(seed):
     rng = np.random.default_rng(seed)
     body, cov, slope = random_tree(rng)
-    prior, mean, w = dense(cov, slope), body.copy().ravel(), make_work(4)
+    prior, mean, w = dense(cov, slope), body.copy().ravel(), np.zeros(1, WORK).view(np.recarray)[0]
     precision, gradient = np.linalg.inv(prior), np.zeros(6 * J)
     for j in range(J):
         w.camera_information[j] = random_covariance(rng, 3, 5.0) * rng.integers(0, 2)
@@ -110,7 +97,8 @@ def test_an_update_is_the_dense_gaussian_update(seed):
             w.edge_information[j], w.edge_gradient[j] = information, rng.normal(size=3)
             precision += difference.T @ information @ difference
             gradient += difference.T @ w.edge_gradient[j]
-    load_tree(cov, slope, w.rows)
+    for j in ORDER[1:]:
+        w.edge[j] = slope[j] @ cov[PARENT[j]]
     update_tree(body, cov, slope, w)
     posterior = np.linalg.inv(precision)
     np.testing.assert_allclose(body.ravel(), mean + posterior @ gradient, atol=1e-7)
@@ -128,7 +116,16 @@ def test_a_prediction_is_the_dense_one_projected_on_the_tree(seed):
     shared = whole_body_noise(DT, 4.0)
     travel = np.array([[1, DT], [0, 1]]) - F
     offset, count = STANDING_M.copy(), np.full(J, 5.0)
-    predict_tree(body, cov, slope, offset, count, (F, travel, Q, shared), DT, make_work(4))
+    predict_tree(
+        body,
+        cov,
+        slope,
+        offset,
+        count,
+        (F, travel, Q, shared),
+        DT,
+        np.zeros(1, WORK).view(np.recarray)[0],
+    )
     moves, noise = np.zeros((J, 6, J, 6)), np.zeros((J, 6, J, 6))
     for j in range(J):
         moves[j, :, j] += np.kron(F[j], _I3)
@@ -154,7 +151,9 @@ def test_a_body_that_nobody_sees_keeps_its_shape_but_not_its_place():
     model = (*_model(), whole_body_noise(DT, 4.0))
     offset, count = STANDING_M.copy(), np.full(J, 5.0)
     for _ in range(50):
-        predict_tree(body, cov, slope, offset, count, model, DT, make_work(4))
+        predict_tree(
+            body, cov, slope, offset, count, model, DT, np.zeros(1, WORK).view(np.recarray)[0]
+        )
     full = dense(cov, slope)
     spread = np.sqrt(np.diagonal(full).reshape(J, 6)[:, :3].mean(-1))
     assert (spread > 2.0).all()  # two seconds of 4 m^2/s^3: sqrt(4 * 8 / 3) = 3.3 m

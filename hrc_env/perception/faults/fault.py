@@ -1,8 +1,7 @@
 """Faults of cameras by name: what each does, how much, and when.
 
-Whatever is drawn for a fault comes from the episode's number for faults, spawned from the
-sensor's generator without touching what that one draws: workers, goals and the detector's errors
-are those of the same seed without faults.
+What is drawn for a fault comes from the episode's number for faults: workers, goals and the
+detector's errors are those of the same seed without faults.
 """
 
 import numbers
@@ -19,14 +18,10 @@ TIMING, PLACE, IMAGE = "timing", "place", "image"
 class Kind(NamedTuple):
     """One kind of fault."""
 
-    group: str
-    """When images come (`TIMING`), where the camera really is (`PLACE`), how an image looks."""
-    unit: str
-    """Of the amount."""
-    usual: float
-    """The amount if none is given: clearly visible, not absurd; a judgement."""
-    bounds: tuple[float, float]
-    """Least and greatest amount."""
+    group: str  # when images come, where the camera really is, how an image looks
+    unit: str  # of the amount
+    usual: float  # the amount if none is given: clearly visible, not absurd; a judgement
+    bounds: tuple[float, float]  # least and greatest amount
     says: str
 
 

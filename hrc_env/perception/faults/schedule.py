@@ -1,7 +1,7 @@
 """Which image a camera gives at which step, and where the camera then really is.
 
-Everything here follows from an episode's number for faults (its seed), the step and the camera:
-nothing is remembered. Step 0 is the reset's; images are taken at the end of control steps.
+All follows from an episode's number for faults (its seed), the step and the camera. Step 0 is the
+reset's; images are taken at the end of control steps.
 """
 
 import functools
@@ -26,22 +26,17 @@ _EARLY = 1e-6
 class Frame(NamedTuple):
     """An image that arrives."""
 
-    shows: int
-    """The step whose scene it shows."""
-    taken: int
-    """The step at which it was taken, as it says."""
+    shows: int  # the step whose scene it shows
+    taken: int  # the step at which it was taken, as it says
 
 
 @dataclass(frozen=True, slots=True)
 class Schedule:
     """What cameras do over an episode."""
 
-    cameras: tuple[CameraConfig, ...]
-    """The rig in use, as it is told."""
+    cameras: tuple[CameraConfig, ...]  # the rig in use, as it is told
     faults: tuple[FaultConfig, ...]
-    """What goes wrong."""
-    dt_s: float
-    """Time between steps [s]."""
+    dt_s: float  # time between steps [s]
 
     def __post_init__(self) -> None:
         check_cameras(self.faults, [camera.name for camera in self.cameras])
@@ -148,8 +143,7 @@ class Recent(Stateful):
         self._pinned = schedule.frozen_steps
 
     def reset(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> None:
-        """Begin environments `ids` anew; of each one's generator a child is asked, and nothing of
-        itself."""
+        """Begin environments `ids` anew, with a child of each one's generator."""
         for b in ids.tolist():
             child = rngs[b].spawn(1)[0]
             self.steps[b], self.seeds[b], self._kept[b] = -1, int(child.integers(2**31)), {}

@@ -19,7 +19,6 @@ from hrc_env.tracking.hypotheses.depth_flip import (
 )
 from hrc_env.tracking.hypotheses.slots import copy_slot, slot_distance
 from hrc_env.tracking.hypotheses.yaw_flip import heads_like, turn_body, turn_of
-from hrc_env.tracking.models.proposal import inlier_odds_of
 from hrc_env.tracking.tree.bone_lengths import stiff_lengths
 from hrc_env.tracking.tree.evidence import log_evidence
 from hrc_env.tracking.tree.filter import condition, correct_mean
@@ -56,7 +55,7 @@ def camera_of(part, P, body, cov, ok, m):
 
 
 @kernel
-def branch(state, b, w, prior, evidence, seen, s, m, scratch):
+def branch(state, b, w, prior, evidence, seen, s, m, work):
     """Look for other bodies beside the heaviest hypothesis, and keep them as hypotheses.
 
     Args:
@@ -64,24 +63,24 @@ def branch(state, b, w, prior, evidence, seen, s, m, scratch):
         b, w: environment, worker.
         prior: its body (J, 6), cov, slope (J, 6, 6) before the update.
         evidence: log-evidence of that update.
-        seen: P (C, 3, 4), z (J, C, 2), sigma (J, C), ok (J, C).
+        seen: `measurements.Seen`.
         s, m: settings.
-        scratch: belief, variances of the bones, `work.Work`.
+        work: scratch, a record of `WORK`.
     """
     limit = state.log_weight.shape[1] // state.n_alive.shape[1]
     own = w * limit
     for part in range(N_MIRRORS):
         n = state.n_alive[b, w]
-        camera = camera_of(part, seen[0], prior[0], prior[1], seen[3], m) if n < limit else -1
+        camera = camera_of(part, seen.P, prior[0], prior[1], seen.ok, m) if n < limit else -1
         if camera < 0:
             continue
         new = own + n
         copy_slot(state.slots, b, own, new)
         if part == WHOLE_BODY:
-            penalty = _turn(state.slots, b, own, n, camera, prior, seen, s, m, scratch)
+            penalty = _turn(state.slots, b, own, n, camera, prior, seen, s, m, work)
         else:
             where = (part, camera, prior, evidence)
-            penalty = _reflect(state.slots, b, own, n, where, seen, s, m, scratch)
+            penalty = _reflect(state.slots, b, own, n, where, seen, s, m, work)
         if penalty < np.inf:
             pose_log_prior = m.anatomy * anatomy(state.slots.body[b, new])
             state.log_weight[b, new] = (
@@ -91,23 +90,23 @@ def branch(state, b, w, prior, evidence, seen, s, m, scratch):
 
 
 @kernel(makes_arrays=True)
-def _turn(slots, b, own, n, camera, prior, seen, s, m, scratch):
+def _turn(slots, b, own, n, camera, prior, seen, s, m, work):
     """Make slot own + n the body that is turned the other way; its penalty [nat].
 
     It is infinite where one of the n hypotheses is turned alike.
     """
     new = own + n
-    turn = turn_of(seen[0][camera], prior[0])
+    turn = turn_of(seen.P[camera], prior[0])
     penalty = 0.5 * (turn / m.turn) ** 2
     if penalty > m.most_penalty:
         return np.inf
     body, cov, slope = slots.body[b, new], slots.cov[b, new], slots.slope[b, new]
     body[:], cov[:], slope[:] = prior[0], prior[1], prior[2]
-    turn_body(seen[0][camera], turn, body, cov, slope)
+    turn_body(seen.P[camera], turn, body, cov, slope)
     if _turned_alike(slots, b, own, n):
         return np.inf
-    condition(slots, b, new, seen, s, scratch)
-    correct_mean(slots, b, new, seen, s, scratch)
+    condition(slots, b, new, seen, s, work)
+    correct_mean(slots, b, new, seen, s, work)
     return np.inf if _turned_alike(slots, b, own, n) else penalty
 
 
@@ -121,23 +120,22 @@ def _turned_alike(slots, b, own, n):
 
 
 @kernel(makes_arrays=True)
-def _reflect(slots, b, own, n, where, seen, s, m, scratch):
+def _reflect(slots, b, own, n, where, seen, s, m, work):
     """Condition slot own + n at the mode next to a reflected limb; 0, or infinity for none.
 
     There is none where the search ends at one of the n hypotheses, or where the evidence is
     negligible beside that of the search from the prediction.
     """
     part, camera, prior, evidence = where
-    belief, give, work = scratch
+    give = work.bone_variance
     new = own + n
     body, cov, slope = slots.body[b, new], slots.cov[b, new], slots.slope[b, new]
-    if not reflect(part, seen[0][camera], body, work.point):
+    if not reflect(part, seen.P[camera], body, work.point):
         return np.inf
-    inlier_odds = inlier_odds_of(s.outlier_weight, s.image_area_px)
     stiff_lengths(slots.bone_variance[b, new], s.bone_give, give)
     bones = (slots.bone_length[b, new], give)
-    how = (inlier_odds, s.floor_std_m, m.search_steps, 0.0)
-    find_pose_near(prior[0], prior[1], prior[2], seen, bones, *how, belief, work)
+    how = (s.inlier_odds, s.floor_std_m, m.search_steps, 0.0)
+    find_pose_near(prior[0], prior[1], prior[2], seen, bones, *how, work)
     moved = 0.0
     for j in range(len(body)):
         for i in range(3):
@@ -146,10 +144,10 @@ def _reflect(slots, b, own, n, where, seen, s, m, scratch):
         return np.inf
     body[:], cov[:], slope[:] = prior[0], prior[1], prior[2]
     update_tree(body, cov, slope, work)
-    found = log_evidence(prior, (body, cov, slope), seen, bones, inlier_odds, s.floor_std_m, work)
+    found = log_evidence(prior, (body, cov, slope), seen, bones, s.inlier_odds, s.floor_std_m, work)
     if not found - evidence > m.log_least:
         return np.inf
-    correct_mean(slots, b, new, seen, s, scratch)
+    correct_mean(slots, b, new, seen, s, work)
     for k in range(own, own + n):
         if not slot_distance(slots, b, k, new, work) > m.distinct:
             return np.inf

@@ -11,10 +11,9 @@ from hrc_env.tracking.hypotheses.anatomy import anatomy
 from hrc_env.tracking.hypotheses.branching import branch, is_ambiguous
 from hrc_env.tracking.hypotheses.mixture import MixtureSettings
 from hrc_env.tracking.hypotheses.slots import drop, hypotheses, merge, normalise
-from hrc_env.tracking.measurements import read_worker
+from hrc_env.tracking.measurements import make_seen, read_worker
 from hrc_env.tracking.models.acquisition import heading
 from hrc_env.tracking.models.noise import NoiseModel, learn_noise, scale_sigma
-from hrc_env.tracking.models.proposal import inlier_odds_of
 from hrc_env.tracking.models.swaps import undo_swaps
 from hrc_env.tracking.models.track_management import acquire, grow_older
 from hrc_env.tracking.settings import Settings
@@ -22,17 +21,16 @@ from hrc_env.tracking.tracks import count_up
 from hrc_env.tracking.tree.evidence import log_evidence
 from hrc_env.tracking.tree.filter import condition, correct_mean, follow, keep_positions, recover
 from hrc_env.tracking.tree.predict import predict_tree
-from hrc_env.tracking.tree.work import make_work
 
 _TORSO = (1, 2, 7, 8)
 
 
 @kernel(makes_arrays=True)
-def predict_all(state, model, dt, s, m):
+def predict_all(state, model, dt, s, m, works):
     """Let dt [s] pass: hypotheses move and age; `model` as in `tree.predict.predict_tree`, the rest
     as in `update_all`."""
     state, s, m = hypotheses(state), Settings(*s), MixtureSettings(*m)
-    work, slots = make_work(0), state.slots
+    work, slots = works[0], state.slots
     n_joints = slots.body.shape[2]
     held = (np.empty((n_joints, 3)), np.empty(n_joints))
     limit = slots.tracked.shape[1] // state.n_alive.shape[1]
@@ -95,7 +93,7 @@ def forwards(body):
 
 
 @kernel(makes_arrays=True)
-def update_all(state, P, px, confidence, sigma_px, standing, s, m, noise):
+def update_all(state, P, px, confidence, sigma_px, standing, s, m, noise, works):
     """Take one set of frames in.
 
     Args:
@@ -107,60 +105,57 @@ def update_all(state, P, px, confidence, sigma_px, standing, s, m, noise):
         noise: of `noise.NoiseModel`.
     """
     state, s, m, noise = hypotheses(state), Settings(*s), MixtureSettings(*m), NoiseModel(*noise)
-    n_batch, n_cameras, n_workers, n_joints = confidence.shape
-    z, sigma = np.empty((n_joints, n_cameras, 2)), np.empty((n_joints, n_cameras))
-    ok, belief = np.empty((n_joints, n_cameras), np.bool_), np.empty((n_joints, n_cameras))
-    scratch = (belief, np.empty(n_joints), make_work(n_cameras))
-    placed, predicted = np.empty(n_joints, np.bool_), np.empty((n_joints, 3, 3))
+    n_batch, _, n_workers, n_joints = confidence.shape
     prior = (np.empty((n_joints, 6)), np.empty((n_joints, 6, 6)), np.empty((n_joints, 6, 6)))
-    kept = (scratch, prior, placed, predicted)
     slots, limit = state.slots, state.slots.tracked.shape[1] // n_workers
-    seen = (P, z, sigma, ok)
+    seen, work = make_seen(P), works[0]
+    measured = (seen.z, seen.sigma, seen.ok)
     for b in range(n_batch):
         for w in range(n_workers):
             first = w * limit
-            read_worker(px, confidence, sigma_px, b, w, s.sigma_scale, z, sigma, ok)
+            read_worker(px, confidence, sigma_px, b, w, s.sigma_scale, *measured)
             if not slots.tracked[b, first]:
-                scale_sigma(slots.noise_factor[b, first], sigma)
-                if acquire(slots, b, first, *seen, standing, s):
+                scale_sigma(slots.noise_factor[b, first], seen.sigma)
+                if acquire(slots, b, first, P, seen.z, seen.sigma, seen.ok, standing, s):
                     slots.slope[b, first] = 0.0
                 continue
             several = state.n_alive[b, w] > 1
             look = limit > 1 and state.waited_s[b, w] >= m.look_every_s
-            look &= is_ambiguous(P, slots.body[b, first], slots.cov[b, first], ok, m)
+            look &= is_ambiguous(P, slots.body[b, first], slots.cov[b, first], seen.ok, m)
             for h in range(state.n_alive[b, w]):
                 if h > 0:
-                    read_worker(px, confidence, sigma_px, b, w, s.sigma_scale, z, sigma, ok)
+                    read_worker(
+                        px, confidence, sigma_px, b, w, s.sigma_scale, seen.z, seen.sigma, seen.ok
+                    )
                 searches = look and h == 0
-                _follow(state, b, w, h, several, searches, seen, standing, s, m, noise, kept)
+                _follow(state, b, w, h, several, searches, seen, standing, s, m, noise, prior, work)
             if state.n_alive[b, w] > 1:
-                _tidy(state, b, w, m, scratch[2])
+                _tidy(state, b, w, m, work)
 
 
 @kernel(makes_arrays=True)
-def _follow(state, b, w, h, several, look, seen, standing, s, m, noise, kept):
+def _follow(state, b, w, h, several, look, seen, standing, s, m, noise, prior, work):
     """What one set of frames does to one hypothesis; `look` for others beside it."""
-    scratch, prior, placed, predicted = kept
-    P, z, sigma, ok = seen
+    P, z, sigma, ok = seen.P, seen.z, seen.sigma, seen.ok
     slots = state.slots
     k = w * (slots.tracked.shape[1] // state.n_alive.shape[1]) + h
     scale_sigma(slots.noise_factor[b, k], sigma)
     swaps = (slots.swap_chance[b, k], slots.blind[b, k], slots.believed[b, k])
     undo_swaps(P, slots.body[b, k], slots.cov[b, k], z, sigma, ok, *swaps, s)
-    keep_positions(slots.cov[b, k], predicted)
+    keep_positions(slots.cov[b, k], work.predicted)
     evidence = 0.0
     if several or look:
-        evidence = _weigh(slots, b, k, seen, s, prior, scratch)
+        evidence = _weigh(slots, b, k, seen, s, prior, work)
         _weight_form(state, b, k, several, m.trust * evidence, m)
     else:
-        follow(slots, b, k, seen, s, scratch)
+        follow(slots, b, k, seen, s, work)
     known = (slots.noise_factor[b, k], slots.noise_sums[b, k], slots.noise_last[b, k])
-    body = (slots.body[b, k], slots.cov[b, k], predicted)
-    learn_noise(seen, scratch[0], body, *known, noise, scratch[2])
+    body = (slots.body[b, k], slots.cov[b, k], work.predicted)
+    learn_noise(seen, body, *known, noise, work)
     if look:
         state.waited_s[b, w] = 0.0
-        branch(state, b, w, prior, evidence, seen, s, m, scratch)
-    recover(slots, b, k, seen, standing, s, placed, scratch[2].a)
+        branch(state, b, w, prior, evidence, seen, s, m, work)
+    recover(slots, b, k, seen, standing, s, work)
 
 
 @kernel
@@ -173,18 +168,17 @@ def _weight_form(state, b, k, several, gain, m):
 
 
 @kernel(makes_arrays=True)
-def _weigh(slots, b, k, seen, s, prior, scratch):
+def _weigh(slots, b, k, seen, s, prior, work):
     """Update a hypothesis, keep what it was before in `prior`; its log-evidence."""
     body, cov, slope = slots.body[b, k], slots.cov[b, k], slots.slope[b, k]
     prior[0][:], prior[1][:], prior[2][:] = body, cov, slope
-    condition(slots, b, k, seen, s, scratch)
-    inlier_odds = inlier_odds_of(s.outlier_weight, s.image_area_px)
-    bones = (slots.bone_length[b, k], scratch[1])
+    condition(slots, b, k, seen, s, work)
+    bones = (slots.bone_length[b, k], work.bone_variance)
     # the mean correction needs the factors that the evidence leaves alone
     evidence = log_evidence(
-        prior, (body, cov, slope), seen, bones, inlier_odds, s.floor_std_m, scratch[2]
+        prior, (body, cov, slope), seen, bones, s.inlier_odds, s.floor_std_m, work
     )
-    correct_mean(slots, b, k, seen, s, scratch)
+    correct_mean(slots, b, k, seen, s, work)
     return evidence
 
 

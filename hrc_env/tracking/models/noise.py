@@ -85,29 +85,28 @@ def scale_sigma(factor, sigma):
 
 
 @kernel
-def learn_noise(seen, belief, body, factor, sums, last, model, w):
+def learn_noise(seen, body, factor, sums, last, model, w):
     """Learn the factors (J, C) from one update, in place.
 
     Args:
-        seen: P (C, 3, 4), z (J, C, 2), sigma (J, C) as scaled by `scale_sigma`, ok (J, C).
-        belief: (J, C) how far the update believed each measurement.
+        seen: `measurements.Seen`, sigma as scaled by `scale_sigma`.
         body: mean (J, 6) and covariance (J, 6, 6) after the update, (J, 3, 3) before it.
         factor: (J, C).
         sums: (J, C, 5) see `N_SUMS`.
         last: (J, C, 2) last residuals in reported standard deviations, fading; 0: none.
         model: constants.
-        w: scratch, `tree.work.Work`.
+        w: scratch, a record of `WORK`.
     """
     if model.least == model.most:
         return
     mean, cov, predicted = body
-    view, spread, grows = w.looks, w.spread, w.grows
+    view, spread, grows = seen.looks, w.spread, w.grows
     turn = sums[0, 0, 4]
     sums[0, 0, 4] = (turn + 1.0) % _TURNS
     for j in range(len(mean)):
         n_views, grows[j] = 0, -1.0
         if j % _TURNS == turn:
-            n_views = _look(seen, belief, mean[j], j, view, spread)
+            n_views = _look(seen, mean[j], j, view, spread)
         if n_views < 2:
             for c in range(factor.shape[1]):
                 last[j, c, 0] *= model.persists
@@ -121,14 +120,14 @@ def learn_noise(seen, belief, body, factor, sums, last, model, w):
 
 
 @kernel(fastmath=_REORDER)
-def _look(seen, belief, body, j, view, spread):
+def _look(seen, body, j, view, spread):
     """Triangulate joint j linearly about `body`, from the cameras that are believed; how many.
 
     Fills view (C, 8): Jacobians of u and of v and the residuals of both, all over sigma; a
     residual of infinity says that the camera does not count. Fills spread (3, 4): covariance of
     the triangulated point, and in the last column where it is from `body`.
     """
-    P, px, sigma, ok = seen
+    P, px, sigma, ok, belief = seen.P, seen.z, seen.sigma, seen.ok, seen.belief
     x, y, z = body[0], body[1], body[2]
     h00 = h11 = h22 = 1.0 / _OPEN_M**2
     h01 = h02 = h12 = g0 = g1 = g2 = 0.0

@@ -13,7 +13,6 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.skeleton import MIRROR
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
 from hrc_env.tracking.measurements import pixel_spread
-from hrc_env.tracking.models.proposal import inlier_odds_of
 
 _MIRROR = tuple(int(j) for j in MIRROR)
 _BLIND_UPDATES, _BELIEVED_UPDATES = 8, 5
@@ -28,7 +27,7 @@ def undo_swaps(P, body, cov, z, sigma, ok, chance, blind, believed, s):
     `chance` (C,) is the probability of being swapped, `blind` and `believed` (C,) count
     updates; `s` are the `settings.Settings`.
     """
-    inlier_odds, n_seeing, n_swapped = inlier_odds_of(s.outlier_weight, s.image_area_px), 0, 0
+    inlier_odds, n_seeing, n_swapped = s.inlier_odds, 0, 0
     for c in range(len(P)):
         sees = False
         for j in range(len(_MIRROR)):

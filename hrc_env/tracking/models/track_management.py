@@ -18,7 +18,7 @@ from hrc_env.tracking.models.acquisition import (
     triangulate_body,
 )
 from hrc_env.tracking.tracks import age_worker
-from hrc_env.tracking.tree.gaussian import halves_of
+from hrc_env.tracking.tree.gaussian import is_positive_definite
 
 _FOUND_SPEED_STD_M_S = 1.0
 _FURTHEST_STD = 8.0
@@ -97,15 +97,14 @@ def acquire_anew(state, b, w, P, z, sigma, ok, standing, s):
 
 
 @kernel
-def check(state, b, w, s, factor):
+def check(state, b, w, s):
     """Keep covariances positive definite; a body that has left the world is lost.
 
-    Returns whether all was well. `factor` (6, 6) is scratch.
+    Returns whether all was well.
     """
     body, cov, inside, well = state.body[b, w], state.cov[b, w], True, True
     for j in range(len(body)):
-        given, rest = halves_of(cov[j], factor)
-        if not (given[6] and rest[6]):
+        if not is_positive_definite(cov[j]):
             well = False
             for i in range(6):
                 variance = cov[j, i, i]

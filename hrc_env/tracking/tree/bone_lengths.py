@@ -9,11 +9,16 @@ import math
 import numpy as np
 
 from hrc_env.core.kernels import kernel
-from hrc_env.core.skeleton import BONE_LENGTH_M
+from hrc_env.core.skeleton import BONE_LENGTH_M, BONES, JOINT
 from hrc_env.core.typing import Floats
-from hrc_env.tracking.models.bones import POPULATION_SHARE, STIFFNESS_M, learn_length
 from hrc_env.tracking.tree.gaussian import EDGE_BONE, PARENT, ROOT
 
+POPULATION_SHARE = 0.10
+"""Standard deviation of a bone's length over people, as a share of it."""
+STIFFNESS_M: Floats = np.where(np.any(JOINT["nose"] == BONES, axis=-1), 0.05, 0.02)
+"""How much a distance changes in one person [m]: the head turns on its neck."""
+_CORRELATED_UPDATES = 10.0
+_GATE_SIGMA, _LEAST_VARIANCE = 3.0, 1e-5
 _STIFFNESS = tuple(0.0 if j == ROOT else float(STIFFNESS_M[k]) for j, k in enumerate(EDGE_BONE))
 
 
@@ -50,4 +55,16 @@ def learn_lengths(body, cov, slope, n_views, length, variance):
                 spread += along[i] * along[k] * difference
                 total += difference if i == k else 0.0
         measured = now - 0.5 * (total - spread) / now  # errors across a bone lengthen it
-        learn_length(measured, max(spread, _STIFFNESS[j] ** 2), j, length, variance)
+        _learn_length(measured, max(spread, _STIFFNESS[j] ** 2), j, length, variance)
+
+
+@kernel
+def _learn_length(measured, spread, k, length, variance):
+    """Kalman update of length[k] by a measurement whose errors last for several updates."""
+    noise = _CORRELATED_UPDATES * spread
+    miss = measured - length[k]
+    if miss * miss > _GATE_SIGMA**2 * (noise + variance[k]):
+        return
+    gain = variance[k] / (variance[k] + noise)
+    length[k] += gain * miss
+    variance[k] = max((1.0 - gain) * variance[k], _LEAST_VARIANCE)

@@ -29,11 +29,11 @@ def log_evidence(prior, posterior, seen, bones, inlier_odds, floor_std_m, w):
     Args:
         prior: body (J, 6), cov, slope (J, 6, 6) before the update.
         posterior: the same after `tree.update.update_tree` and before the mean correction.
-        seen: P (C, 3, 4), z (J, C, 2), sigma (J, C), ok (J, C).
+        seen: `measurements.Seen`.
         bones: lengths (J,) [m] and their variances as measurements (J,) [m^2].
-        inlier_odds: as `proposal.inlier_odds_of` gives.
+        inlier_odds: as in `Settings`.
         floor_std_m: as in `tree.search.find_pose`.
-        w: scratch `work.Work`; a, b, c, d and step are used.
+        w: scratch, a record of `WORK`; a, b, c, d and step are used.
     """
     body = posterior[0]
     for j in range(len(body)):
@@ -52,7 +52,7 @@ def log_evidence(prior, posterior, seen, bones, inlier_odds, floor_std_m, w):
 @kernel
 def log_likelihood(body, seen, inlier_odds):
     """Log-likelihood of all pixels at positions (J, 6), relative to all being outliers."""
-    P, z, sigma, ok = seen
+    P, z, sigma, ok = seen.P, seen.z, seen.sigma, seen.ok
     total = 0.0
     for j in range(len(ok)):
         for c in range(len(P)):

@@ -6,7 +6,6 @@ z (J, C, 2), sigma (J, C), ok (J, C) as `measurements.read_worker` fills them.
 
 from hrc_env.core.kernels import kernel
 from hrc_env.tracking.models.acquisition import count_conflict
-from hrc_env.tracking.models.proposal import inlier_odds_of
 from hrc_env.tracking.models.track_management import (
     acquire_anew,
     check,
@@ -28,45 +27,37 @@ def keep_positions(cov, out):
 
 
 @kernel
-def follow(state, b, w, seen, s, scratch):
+def follow(state, b, w, seen, s, work):
     """Update a tracked worker: search, condition, correct the mean, learn the bones."""
-    condition(state, b, w, seen, s, scratch)
-    correct_mean(state, b, w, seen, s, scratch)
+    condition(state, b, w, seen, s, work)
+    correct_mean(state, b, w, seen, s, work)
 
 
 @kernel
-def condition(state, b, w, seen, s, scratch):
-    """Search the mode and condition the tree there; belief (J, C) says what was believed.
-
-    `scratch` is belief (J, C), variances of the bones as measurements (J,), and `work.Work`.
-    """
-    belief, give, work = scratch
+def condition(state, b, w, seen, s, work):
+    """Search the mode and condition the tree there; seen.belief says what was believed."""
+    give = work.bone_variance
     body, cov, slope = state.body[b, w], state.cov[b, w], state.slope[b, w]
-    inlier_odds = inlier_odds_of(s.outlier_weight, s.image_area_px)
     stiff_lengths(state.bone_variance[b, w], s.bone_give, give)
     bones = (state.bone_length[b, w], give)
-    how = (inlier_odds, s.floor_std_m, s.gauss_newton_steps)
-    find_pose(body, cov, slope, seen, bones, *how, belief, work)
+    how = (s.inlier_odds, s.floor_std_m, s.gauss_newton_steps)
+    find_pose(body, cov, slope, seen, bones, *how, work)
     update_tree(body, cov, slope, work)
 
 
 @kernel
-def correct_mean(state, b, w, seen, s, scratch):
+def correct_mean(state, b, w, seen, s, work):
     """Go from the mode to the mean, and learn what is to be learnt from it."""
-    belief, _, work = scratch
     if s.mean_correction > 0.0:
         gaussian = (state.body[b, w], state.cov[b, w], state.slope[b, w])
-        shift_to_mean(*gaussian, seen, belief, s.mean_correction, work)
-    update_ages(state, b, w, seen, belief, work.n_views)
+        shift_to_mean(*gaussian, seen, s.mean_correction, work)
+    update_ages(state, b, w, seen, work.n_views)
 
 
 @kernel
-def update_ages(state, b, w, seen, belief, n_views):
-    """Ages, conflicts and bone lengths of a worker who has been updated.
-
-    `belief` (J, C) is how far each measurement was believed; `n_views` (J,) is scratch.
-    """
-    ok = seen[3]
+def update_ages(state, b, w, seen, n_views):
+    """Ages, conflicts and bone lengths of a worker who has been updated."""
+    ok, belief = seen.ok, seen.belief
     for j in range(len(ok)):
         n_views[j], n_supporting = 0, 0
         for c in range(ok.shape[1]):
@@ -81,17 +72,16 @@ def update_ages(state, b, w, seen, belief, n_views):
 
 
 @kernel
-def recover(state, b, w, seen, standing, s, placed, factor):
+def recover(state, b, w, seen, standing, s, work):
     """Find joints or the whole body again where the views say so; notice a body that is lost.
 
-    `placed` (J,) and `factor` (6, 6) are scratch. What is known of a joint that was put
-    somewhere is its own.
+    What is known of a joint that was put somewhere is its own.
     """
-    P, z, sigma, ok = seen
+    P, z, sigma, ok, placed = seen.P, seen.z, seen.sigma, seen.ok, work.placed
     placed[:] = acquire_anew(state, b, w, P, z, sigma, ok, standing, s)
     find_joints_again(state, b, w, P, z, sigma, ok, s, placed)
     for j in range(len(placed)):
         if placed[j] or (PARENT[j] >= 0 and placed[PARENT[j]]):
             state.slope[b, w, j] = 0.0
-    if not check(state, b, w, s, factor):
+    if not check(state, b, w, s):
         state.slope[b, w] = 0.0

@@ -11,40 +11,9 @@ divergence).
 from hrc_env.core.kernels import kernel
 from hrc_env.tracking.models.acquisition import heading
 from hrc_env.tracking.models.motion import learn_offsets
-from hrc_env.tracking.tree.gaussian import multiply, multiply_transposed
-from hrc_env.tracking.tree.lanes import JOINT_OF_LANE, LANE_OF_JOINT, LANES
-from hrc_env.tracking.tree.quads import (
-    ABOVE,
-    COV,
-    EDGE,
-    HESSIAN,
-    INVERSE,
-    KNOWN,
-    MESSAGE,
-    OWN,
-    POSITIONS,
-    PROPER,
-    PULL,
-    QUAD,
-    QUADS,
-    SLOPE,
-    fetch_above,
-    invert_rows,
-    load_tree,
-    multiply_rows,
-    store_tree,
-)
-from hrc_env.tracking.tree.vectors import moved
+from hrc_env.tracking.tree.gaussian import ORDER, PARENT, invert, multiply, multiply_transposed
 
 _LEFT, _RIGHT, _LEFT_HIP, _RIGHT_HIP = 1, 2, 7, 8  # shoulders: _RIGHT, _LEFT_HIP hang on _LEFT
-_ROOT, _ROOT_ABOVE = OWN, PULL
-"""Covariance with the mean of the torso; the parent's."""
-_TORSO = MESSAGE
-"""Covariance of that mean, four times over, in the first quad."""
-_MOVED, _MOVED_EDGE = HESSIAN, KNOWN
-"""Covariances of a joint and with its parent, a moment later."""
-_HERE, _THERE = POSITIONS, POSITIONS + 32
-"""F and travel of a joint, of its parent: four rows each."""
 _REORDER = {"reassoc", "contract", "nsz"}
 
 
@@ -64,28 +33,23 @@ def predict_tree(body, cov, slope, offset, offset_count, model, dt, w):
     """
     F, travel, Q, shared = model
     _move_means(body, cov, offset, offset_count, F, travel, dt)
-    rows = w.rows
-    load_tree(cov, slope, rows)
+    torso = w.a
     _relate_torso(cov, slope, w)
-    for quad in range(QUADS - 1, -1, -1):
-        at = quad * QUAD
-        fetch_above(rows, quad, _ROOT, _ROOT_ABOVE, 36)
-        if quad < QUADS - 1:
-            multiply_rows(rows, at + SLOPE, at + _ROOT_ABOVE, at + _ROOT)
-    _load_model(F, travel, rows)
-    for quad in range(QUADS):
-        at = quad * QUAD
-        _move(rows, at + COV, at + _ROOT, at + _ROOT, at + _HERE, at + _HERE, at + _MOVED)
-        blocks = (at + EDGE, at + _ROOT, at + _ROOT_ABOVE)
-        _move(rows, *blocks, at + _HERE, at + _THERE, at + _MOVED_EDGE)
-    _add_noise(Q, shared, rows)
-    for quad in range(QUADS):
-        _invert(rows, quad * QUAD)
-    for quad in range(QUADS):
-        at = quad * QUAD
-        fetch_above(rows, quad, INVERSE, ABOVE, 36)
-        multiply_rows(rows, at + _MOVED_EDGE, at + ABOVE, at + SLOPE)
-    store_tree(rows, _MOVED, cov, slope)
+    for j in ORDER:
+        q = PARENT[j]
+        _move(cov[j], w.root[j], w.root[j], torso, F, travel, (j, j), w.moved[j])
+        _add_noise(Q[j], w.moved[j])
+        if q >= 0:
+            _move(w.edge[j], w.root[j], w.root[q], torso, F, travel, (j, q), w.moved_edge[j])
+            _add_noise(shared, w.moved_edge[j])
+    for j in ORDER:
+        for i in range(6):
+            for k in range(i + 1):
+                cov[j, i, k] = cov[j, k, i] = w.moved[j, i, k]
+        if not invert(cov[j], w.inverse[j]):
+            w.inverse[j] = 0.0
+        if PARENT[j] >= 0:
+            multiply(w.moved_edge[j], w.inverse[PARENT[j]], slope[j])
 
 
 @kernel
@@ -117,84 +81,62 @@ def _move_means(body, cov, offset, offset_count, F, travel, dt):
 
 @kernel
 def _relate_torso(cov, slope, w):
-    """Cov(x_j, r) of the torso's four joints into their rows, and Cov(r, r)."""
-    X, rows = w.d, w.rows
-    multiply(slope[_RIGHT], cov[_LEFT], X)  # right shoulder with left
-    multiply(slope[_RIGHT_HIP], X, w.b)  # right hip with left shoulder
-    multiply_transposed(slope[_LEFT_HIP], X, w.c)  # left hip with right shoulder
-    multiply_transposed(slope[_RIGHT_HIP], w.c, w.a)  # right hip with left hip
-    left, right = _place(_LEFT), _place(_RIGHT)
-    left_hip, right_hip = _place(_LEFT_HIP), _place(_RIGHT_HIP)
+    """Fill w.edge, w.root = Cov(x_j, r) and w.a = Cov(r, r)."""
+    for j in ORDER:
+        if PARENT[j] >= 0:
+            multiply(slope[j], cov[PARENT[j]], w.edge[j])
+    right, root = w.edge[_RIGHT], w.root  # right shoulder with left
+    hip = w.edge[_LEFT_HIP]  # left hip with left shoulder
+    multiply(slope[_RIGHT_HIP], right, w.b)  # right hip with left shoulder
+    multiply_transposed(slope[_LEFT_HIP], right, w.c)  # left hip with right shoulder
+    multiply_transposed(slope[_RIGHT_HIP], w.c, w.d)  # right hip with left hip
+    other = w.edge[_RIGHT_HIP]  # right hip with right shoulder
     for i in range(6):
         for k in range(6):
-            n, m = 24 * i + 4 * k, 24 * k + 4 * i
-            own = cov[_LEFT, i, k] + X[k, i] + w.b[k, i]
-            rows[left + _ROOT + n] = 0.25 * (own + rows[left_hip + EDGE + m])
-            own = cov[_RIGHT, i, k] + X[i, k] + w.c[k, i]
-            rows[right + _ROOT + n] = 0.25 * (own + rows[right_hip + EDGE + m])
-            own = cov[_LEFT_HIP, i, k] + w.c[i, k] + w.a[k, i]
-            rows[left_hip + _ROOT + n] = 0.25 * (own + rows[left_hip + EDGE + n])
-            own = cov[_RIGHT_HIP, i, k] + w.b[i, k] + w.a[i, k]
-            rows[right_hip + _ROOT + n] = 0.25 * (own + rows[right_hip + EDGE + n])
+            own = cov[_LEFT, i, k] + right[k, i] + w.b[k, i]
+            root[_LEFT, i, k] = 0.25 * (own + hip[k, i])
+            own = cov[_RIGHT, i, k] + right[i, k] + w.c[k, i]
+            root[_RIGHT, i, k] = 0.25 * (own + other[k, i])
+            own = cov[_LEFT_HIP, i, k] + w.c[i, k] + w.d[k, i]
+            root[_LEFT_HIP, i, k] = 0.25 * (own + hip[i, k])
+            own = cov[_RIGHT_HIP, i, k] + w.b[i, k] + w.d[i, k]
+            root[_RIGHT_HIP, i, k] = 0.25 * (own + other[i, k])
     for i in range(6):
         for k in range(6):
-            n = _ROOT + 24 * i + 4 * k
-            shoulders = rows[left + n] + rows[right + n]
-            mean = 0.25 * (shoulders + rows[left_hip + n] + rows[right_hip + n])
-            for lane in range(4):
-                rows[_TORSO + 24 * i + 4 * k + lane] = mean
+            shoulders = root[_LEFT, i, k] + root[_RIGHT, i, k]
+            w.a[i, k] = 0.25 * (shoulders + root[_LEFT_HIP, i, k] + root[_RIGHT_HIP, i, k])
+    for j in ORDER:
+        if j not in (_LEFT, _RIGHT, _LEFT_HIP, _RIGHT_HIP):
+            multiply(slope[j], root[PARENT[j]], root[j])
 
 
-@kernel(forceinline=True)
-def _place(j):
-    return LANE_OF_JOINT[j] // 4 * QUAD + LANE_OF_JOINT[j] % 4
+@kernel(fastmath=_REORDER)
+def _move(edge, own, other, torso, F, travel, joints, out):
+    """f edge g' + f own e' + d other' g' + d S e' for 6x6 matrices, axes of space left alone.
 
-
-@kernel
-def _load_model(F, travel, rows):
-    """F and travel of every joint and its parent in lanes."""
-    for lane in range(LANES):
-        j = max(JOINT_OF_LANE[lane], 0)
-        at = lane // 4 * QUAD + lane % 4 + _HERE
-        for i in range(2):
-            for k in range(2):
-                rows[at + 8 * i + 4 * k] = F[j, i, k]
-                rows[at + 16 + 8 * i + 4 * k] = travel[j, i, k]
-    for quad in range(QUADS):
-        fetch_above(rows, quad, _HERE, _THERE, 8)
-
-
-@kernel
-def _move(rows, edge, own, other, here, there, out):
-    """f edge g' + f own e' + d other' g' + d S e' for a quad, axes of space left alone.
-
-    f, d are a joint's F and travel, which begin at `here`; g, e those at `there`.
+    f, d are F and travel of the first of `joints`, g, e those of the second.
     """
+    f, g, d, e = F[joints[0]], F[joints[1]], travel[joints[0]], travel[joints[1]]
     for i in range(3):
-        for k in range(3):
-            n = 24 * i + 4 * k
-            t = 24 * k + 4 * i
-            moved(rows, edge + n, own + n, other + t, _TORSO + n, here, there, out + n)
+        for q in range(2):
+            g0, g1, e0, e1 = g[q, 0], g[q, 1], e[q, 0], e[q, 1]
+            for k in range(3):
+                m, v = 3 + i, 3 + k
+                near_p = edge[i, k] * g0 + edge[i, v] * g1 + own[i, k] * e0 + own[i, v] * e1
+                near_v = edge[m, k] * g0 + edge[m, v] * g1 + own[m, k] * e0 + own[m, v] * e1
+                far_p = other[k, i] * g0 + other[v, i] * g1 + torso[i, k] * e0 + torso[i, v] * e1
+                far_v = other[k, m] * g0 + other[v, m] * g1 + torso[m, k] * e0 + torso[m, v] * e1
+                to = 3 * q + k
+                p = f[0, 0] * near_p + f[0, 1] * near_v + d[0, 0] * far_p + d[0, 1] * far_v
+                out[i, to] = p
+                out[m, to] = f[1, 0] * near_p + f[1, 1] * near_v + d[1, 0] * far_p + d[1, 1] * far_v
 
 
 @kernel
-def _add_noise(Q, shared, rows):
-    """Noise (2, 2) x I3: a joint's Q, and what it shares with its parent."""
-    for j in range(len(Q)):
-        at = _place(j)
-        for i in range(3):
-            m = at + 28 * i
-            for a in range(2):
-                for b in range(2):
-                    rows[m + 72 * a + 12 * b + _MOVED] += Q[j, a, b]
-                    rows[m + 72 * a + 12 * b + _MOVED_EDGE] += shared[a, b]
-
-
-@kernel
-def _invert(rows, at):
-    """Inverse marginals of a quad; 0 where there is none."""
-    invert_rows(rows, at)
-    for lane in range(4):
-        if rows[at + PROPER + lane] == 0.0:
-            for n in range(36):
-                rows[at + INVERSE + lane + 4 * n] = 0.0
+def _add_noise(noise, out):
+    """Add noise (2, 2) x I3."""
+    for i in range(3):
+        out[i, i] += noise[0, 0]
+        out[i, 3 + i] += noise[0, 1]
+        out[3 + i, i] += noise[1, 0]
+        out[3 + i, 3 + i] += noise[1, 1]

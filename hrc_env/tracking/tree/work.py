@@ -1,80 +1,49 @@
-"""Scratch of one body's prediction and update, made once for all bodies."""
+"""Scratch of one body's prediction and update: a record, made once for all bodies.
 
-from typing import NamedTuple
+Fields of a record have sizes and places that the compiler knows, so that it sees what overlaps and
+makes vector instructions of plain loops.
+"""
 
 import numpy as np
 
-from hrc_env.core.kernels import kernel
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Floats, Ints
-from hrc_env.tracking.tree.lanes import LANES, N_JOINT_ROWS, N_SUM_ROWS, N_VIEW_ROWS
-from hrc_env.tracking.tree.quads import QUAD, QUADS
+from hrc_env.tracking.tree.cameras import LANES, N_IMAGE, N_POINT, N_SUM
 
-
-class Work(NamedTuple):
-    """Scratch of one body's prediction and update."""
-
-    a: Floats
-    b: Floats
-    c: Floats
-    d: Floats
-    """Four times (6, 6)."""
-    step: Floats
-    """(J, 6) change of the mean."""
-    gradient: Floats
-    """(J, 6) what the means are pulled by."""
-    camera_information: Floats
-    """(J, 3, 3) [1/m^2]."""
-    camera_gradient: Floats
-    """(J, 3) [1/m]."""
-    edge_information: Floats
-    """(J, 3, 3) what bones say of x_j - x_parent [1/m^2]; 0 at the root."""
-    edge_gradient: Floats
-    """(J, 3) [1/m]."""
-    point: Floats
-    """(J, 3) where the cameras are linearised [m]."""
-    rows: Floats
-    """The joints' matrices, as in `quads`."""
-    joints: Floats
-    """Positions and their covariances in rows of `lanes`."""
-    seen: Floats
-    """One camera's rows of `lanes`."""
-    sums: Floats
-    """All cameras' rows of `lanes`."""
-    views: Floats
-    """(C, 3 rows) measurements in rows of `lanes`."""
-    looks: Floats
-    """(C, 8) what each camera says of one joint, for `models.noise`."""
-    spread: Floats
-    """(3, 4) where the cameras together see that joint, for the same."""
-    grows: Floats
-    """(J,) how errors that persist add up, for the same."""
-    n_views: Ints
-    """(J,) cameras that measured a joint."""
-
-
-@kernel(makes_arrays=True)
-def make_work(n_cameras):
-    """Scratch with room for one body and its measurements, made inside a kernel."""
-    return Work(
-        a=np.empty((6, 6)),
-        b=np.empty((6, 6)),
-        c=np.empty((6, 6)),
-        d=np.empty((6, 6)),
-        step=np.empty((N_JOINTS, 6)),
-        gradient=np.empty((N_JOINTS, 6)),
-        camera_information=np.zeros((N_JOINTS, 3, 3)),
-        camera_gradient=np.zeros((N_JOINTS, 3)),
-        edge_information=np.zeros((N_JOINTS, 3, 3)),
-        edge_gradient=np.zeros((N_JOINTS, 3)),
-        point=np.empty((N_JOINTS, 3)),
-        rows=np.zeros(QUADS * QUAD),
-        joints=np.ones(N_JOINT_ROWS * LANES),
-        seen=np.zeros(N_VIEW_ROWS * LANES),
-        sums=np.zeros(N_SUM_ROWS * LANES),
-        views=np.empty((n_cameras, 3 * LANES)),
-        looks=np.empty((n_cameras, 8)),
-        spread=np.empty((3, 4)),
-        grows=np.empty(N_JOINTS),
-        n_views=np.empty(N_JOINTS, np.int64),
-    )
+_J = N_JOINTS
+WORK = np.dtype(
+    [
+        ("a", "f8", (6, 6)), ("b", "f8", (6, 6)), ("c", "f8", (6, 6)), ("d", "f8", (6, 6)),
+        # covariance of a joint with its parent, and with the mean of the torso
+        ("edge", "f8", (_J, 6, 6)), ("root", "f8", (_J, 6, 6)),
+        # a moment later: covariance of a joint, and with its parent
+        ("moved", "f8", (_J, 6, 6)), ("moved_edge", "f8", (_J, 6, 6)),
+        # precision given the parent; times the slope; the slope's transpose times that
+        ("own", "f8", (_J, 6, 6)), ("pull", "f8", (_J, 6, 6)), ("back", "f8", (_J, 6, 6)),
+        # what cameras and subtree say of a joint; inverse Hessian given the parent
+        ("known", "f8", (_J, 6, 6)), ("inverse", "f8", (_J, 6, 6)),
+        # change of the means; what they are pulled by
+        ("step", "f8", (_J, 6)), ("gradient", "f8", (_J, 6)),
+        # of positions alone: precision given the parent's, slope on it, the two products as above
+        ("precision", "f8", (_J, 3, 3)), ("follow", "f8", (_J, 3, 3)),
+        ("pull_position", "f8", (_J, 3, 3)), ("back_position", "f8", (_J, 3, 3)),
+        # inverse Hessian of a position given its parent's; what cameras and subtree say of it
+        ("inverse_position", "f8", (_J, 3, 3)),
+        ("node", "f8", (_J, 3, 3)), ("node_gradient", "f8", (_J, 3)),
+        # where the likelihood is linearised [m], and how far that is from the predicted mean
+        ("point", "f8", (_J, 3)), ("shift", "f8", (_J, 3)),
+        # cameras' log-likelihood as a function of shifts, at none: [1/m^2] and [1/m]
+        ("camera_information", "f8", (_J, 3, 3)), ("camera_gradient", "f8", (_J, 3)),
+        # the same of the bones', of x_j - x_parent; of no meaning at the root
+        ("edge_information", "f8", (_J, 3, 3)), ("edge_gradient", "f8", (_J, 3)),
+        # as in `tree.cameras`
+        ("points", "f8", (N_POINT, LANES)), ("image", "f8", (N_IMAGE, LANES)),
+        ("sums", "f8", (N_SUM, LANES)),
+        # for `models.noise`: where the cameras see a joint together, how lasting errors add up
+        ("spread", "f8", (3, 4)), ("grows", "f8", (_J,)),
+        # cameras that measured a joint; variances of the bones' lengths as measurements [m^2]
+        ("n_views", "i8", (_J,)), ("bone_variance", "f8", (_J,)),
+        # positions before the update, for `models.noise`; joints that were put somewhere
+        ("predicted", "f8", (_J, 3, 3)), ("placed", "i1", (_J,)),
+    ],
+    align=True,
+)  # fmt: skip

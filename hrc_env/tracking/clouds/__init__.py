@@ -1,1 +1,0 @@
-"""Clouds of particles: the parts of the paper's Algorithm 1."""
