@@ -61,7 +61,6 @@ check: $(DEV)
 bench: $(DEV)
 	$(RUN) -m hrc_env bench speed
 	$(RUN) -m hrc_env bench perception
-	$(RUN) benchmarks/pixels.py
 	$(RUN) benchmarks/soak.py
 	$(RUN) -m benchmarks.sim_dt
 	$(RUN) benchmarks/prediction.py

@@ -6,36 +6,35 @@ it is judged at; at `pixels`, which is too slow for that, the policy of `keypoin
 is judged by the default reward, safety term included.
 
 Policies and finished parts stay in the folder: a run that was stopped goes on where it was.
-docs/baselines.json is a copy of results.json, from which `python docs/generate.py` writes the
-tables in README.md and docs/learning.md.
+`python -m docs.generate --renew baselines out/baselines/results.json` puts them into the docs.
 """
 
 import hashlib
 import os
 import subprocess
 import sys
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import torch
 import tyro
 from rich.console import Console
-from rich.markdown import Markdown
 
 from agents import ppo
 from agents.evaluate import EVALUATION_SEED, judged
 from agents.registry import AGENTS, make_agent
+from benchmarks.common import publish
 from hrc_env.cli.checks import at_least, writable_folder
 from hrc_env.cli.progress import progress_bar
-from hrc_env.core.results import Metric, write_results, write_whole
+from hrc_env.core.results import Metric
 from hrc_env.experiments.study.cache import PartCache, PartProgress
 from hrc_env.experiments.study.fingerprint import fingerprint_of
 from hrc_env.experiments.study.intervals import mean_over, ratio_over
+from hrc_env.experiments.study.report import Column, Report, table_of
 
-ROOT = Path(__file__).resolve().parent.parent
 PPO = {"ppo": 0.0, "ppo_safety": 2.0}
 """The weight of the safety term in what each of them learns from."""
 ROWS = {
@@ -45,13 +44,15 @@ ROWS = {
 }
 """Agents, as the table calls them."""
 ORDER = ("truth", "keypoints", "none", "pixels")
-COLUMNS = {
-    "return": ("return", 1),
-    "goals_per_minute": ("goals a minute", 1),
-    "cost_per_episode": ("cost", 2),
-    "contacts_per_episode": ("contacts", 2),
-}
-"""Metrics: their heading, and how many decimals are shown."""
+COLUMNS = (
+    Column("{}.return", "return"),
+    Column("{}.goals_per_minute", "goals a minute"),
+    Column("{}.cost_per_episode", "cost", 2),
+    Column("{}.contacts_per_episode", "contacts", 2),
+)
+ABOUT = """\
+Means over episodes of 10 s. Cost and contacts are counted on the truth; the return is what the
+robot is rewarded for, by its estimate: compare it within a level only. PPO: one policy each."""
 
 
 @dataclass(frozen=True)
@@ -82,20 +83,19 @@ def main(arguments: Arguments) -> None:
     torch.set_num_threads(1)  # two are slower in networks as small as these
     settings = {name: value for name, value in asdict(arguments).items() if name != "out"}
     policies = {(level, agent): learnt(arguments, level, agent) for level in ORDER for agent in PPO}
-    console, metrics = Console(), dict[str, Metric]()
+    metrics: dict[str, Metric] = {}
     mark = fingerprint_of(settings, "benchmarks.baselines", "agents.scripted", "agents.ppo")
-    with progress_bar(console, "baselines") as say:
-        cache = PartCache(arguments.out / "parts", mark, len(ORDER) * len(ROWS), say)
-        for level in ORDER:
-            for agent in ROWS:
-                done = played(cache, arguments, level, agent, policies.get((level, agent)))
-                metrics |= {f"{level}.{agent}.{key}": each for key, each in worth(done).items()}
+    with progress_bar(Console(), "baselines") as progress:
+        parts = PartCache(arguments.out / "parts", mark, len(ORDER) * len(ROWS), progress)
+        for level, agent in product(ORDER, ROWS):
+            done = played(parts, arguments, level, agent, policies.get((level, agent)))
+            metrics |= {f"{level}.{agent}.{key}": each for key, each in worth(done).items()}
+    rows = {
+        f"{level}.{agent}": f"`{level}`, {ROWS[agent]}" for level, agent in product(ORDER, ROWS)
+    }
+    report = Report("Baselines", ABOUT, [table_of("", rows, COLUMNS, metrics)])
     seeds = list(range(EVALUATION_SEED, EVALUATION_SEED + arguments.episodes))
-    write_results(arguments.out / "results.json", settings, seeds, metrics)
-    said = table(settings, {name: asdict(metric) for name, metric in metrics.items()})
-    write_whole(arguments.out / "baselines.md", said)
-    console.print(Markdown(said))
-    console.print(f"In [bold]{arguments.out}[/]: results.json, baselines.md, policies/")
+    publish(arguments.out, report, settings, seeds, metrics)
 
 
 def learnt(arguments: Arguments, level: str, agent: str) -> Path:
@@ -125,7 +125,7 @@ def learnt(arguments: Arguments, level: str, agent: str) -> Path:
 
 
 def played(
-    cache: PartCache, arguments: Arguments, level: str, agent: str, policy: Path | None
+    parts: PartCache, arguments: Arguments, level: str, agent: str, policy: Path | None
 ) -> list[dict[str, float]]:
     """Statistics of an agent's episodes at a level, from the cache or anew."""
     label, make = f"{level}.{agent}", partial(make_agent, str(policy or agent))
@@ -139,7 +139,7 @@ def played(
     def play(tick: PartProgress) -> dict[str, Any]:
         return {"episodes": judged(make, n_episodes, tick=tick, **kwargs)}
 
-    return cache.part(label, play)["episodes"]
+    return parts.part(label, play)["episodes"]
 
 
 def worth(episodes: list[dict[str, float]]) -> dict[str, Metric]:
@@ -152,31 +152,6 @@ def worth(episodes: list[dict[str, float]]) -> dict[str, Metric]:
         "cost_per_episode": mean_over(column["cost"], "1"),
         "contacts_per_episode": mean_over(column["contacts"], "1"),
     }
-
-
-def table(config: Mapping[str, Any], metrics: Mapping[str, Mapping[str, Any]]) -> str:
-    """The table in Markdown, from what results.json holds."""
-    lines = [
-        "| perception | agent | " + " | ".join(title for title, _ in COLUMNS.values()) + " |",
-        "|---" * (len(COLUMNS) + 2) + "|",
-    ]
-    for level in ORDER:
-        for agent, name in ROWS.items():
-            cells = []
-            for key, (_, digits) in COLUMNS.items():
-                each = metrics[f"{level}.{agent}.{key}"]
-                value, low, high = (f"{each[k]:.{digits}f}" for k in ("value", "low", "high"))
-                cells.append(f"{value} [{low}, {high}]")
-            lines.append(f"| `{level}` | {name} | " + " | ".join(cells) + " |")
-    lines += [
-        "",
-        f"Means of {config['episodes']} episodes of 10 s ({config['pixel_episodes']} at `pixels`), "
-        "in brackets 95 % bootstrap intervals over episodes. Cost and contacts are counted on "
-        "the truth; the return is what the robot is rewarded for, by its estimate: compare it "
-        f"within a level only. PPO: one policy each, {config['timesteps']:,} steps. Made by "
-        f"`python -m benchmarks.baselines{' --quick' if config['quick'] else ''}`.",
-    ]
-    return "\n".join(lines) + "\n"
 
 
 if __name__ == "__main__":

@@ -8,8 +8,6 @@ has it; not the workers themselves. The paper's site hides a head from at least 
 in 30 % of frames, from two or more in 10 %.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 import tyro
 
@@ -18,33 +16,26 @@ from hrc_env.core.typing import Bools, Floats
 from hrc_env.geometry.sight import hidden
 from hrc_env.scene.build import Scene, build
 
-HEAD_M = (1.60, 1.75)
-"""Heights of the heads' middles [m]."""
-BODY_M = 0.25
-"""Half a person [m]."""
+HEAD_M, BODY_M = (1.60, 1.75), 0.25
+"""Heights of the heads' middles; half a person [m]."""
 
 
-@dataclass(frozen=True)
-class Occlusion:
-    """Shares of random heads that are hidden from 1, 2, ... cameras."""
+def main(scene: str = "site", n_heads: int = 20000, seed: int = 0) -> None:
+    """Print the shares of random heads that are hidden from 1, 2, ... cameras.
 
-    scene: str = "site"
-    """Which scene."""
-    n_heads: int = 20000
-    """How many places are tried."""
-    seed: int = 0
-    """Of the places."""
-
-    def run(self) -> None:
-        """Print the shares."""
-        scene = build(name=self.scene)
-        heads = random_heads(scene.grounds, self.n_heads, np.random.default_rng(self.seed))
-        blind = hidden_from(scene, heads)
-        print(f"scene {self.scene}, seed {self.seed}: {len(heads)} heads that fit")
-        for camera, share in zip(scene.cameras, blind.mean(1), strict=True):
-            print(f"hidden from {camera.name}: {100 * share:5.1f} %")
-        for n in range(1, len(blind) + 1):
-            print(f"hidden from {n} or more: {100 * (blind.sum(0) >= n).mean():5.1f} %")
+    Args:
+        scene: which scene.
+        n_heads: how many places are tried.
+        seed: of the places.
+    """
+    place = build(name=scene)
+    heads = random_heads(place.grounds, n_heads, np.random.default_rng(seed))
+    blind = hidden_from(place, heads)
+    print(f"scene {scene}, seed {seed}: {len(heads)} heads that fit")
+    for camera, share in zip(place.cameras, blind.mean(1), strict=True):
+        print(f"hidden from {camera.name}: {100 * share:5.1f} %")
+    for n in range(1, len(blind) + 1):
+        print(f"hidden from {n} or more: {100 * (blind.sum(0) >= n).mean():5.1f} %")
 
 
 def random_heads(grounds: Grounds, n: int, rng: np.random.Generator) -> Floats:
@@ -67,4 +58,4 @@ def hidden_from(scene: Scene, heads: Floats) -> Bools:
 
 
 if __name__ == "__main__":
-    tyro.cli(Occlusion).run()
+    tyro.cli(main)

@@ -5,23 +5,22 @@ bodies it takes how deep they ever are in what stands there and in each other; h
 who wants to be elsewhere, or cannot begin a task, stays within 5 cm; and what is not a number.
 """
 
-import math
 import time
-from collections import Counter
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
+from itertools import combinations
 from pathlib import Path
 
-import numba
 import numpy as np
 import tyro
-from rich.console import Console
-from rich.table import Table
 
+from benchmarks.common import exactly, publish, table
 from hrc_env.cli.progress import track
-from hrc_env.core.results import Metric, write_results
+from hrc_env.core.results import Metric
+from hrc_env.core.typing import Floats, Points3
+from hrc_env.experiments.study.report import Report
 from hrc_env.geometry import chains
 from hrc_env.geometry.distances import least_separation
-from hrc_env.geometry.shapes import AXES, BOX, CAPSULE, CENTRE, HALF_SIZE, KIND, PLANE, REACH
+from hrc_env.geometry.shapes import AXES, BOX, CAPSULE, CENTRE, HALF_SIZE, KIND, PLANE
 from hrc_env.motion import generator
 from hrc_env.motion.state import CLIMB, THERE
 from hrc_env.scene.build import Scene, build
@@ -41,8 +40,8 @@ BATCH = 20
 class Arguments:
     """Let workers work among each other."""
 
-    out: Path = Path("out/people/results.json")
-    """Where to write the results."""
+    out: Path = Path("out/people")
+    """Folder for results.json and a report."""
     episodes: int = 100
     """Episodes in each scene."""
     seconds: float = 60.0
@@ -61,86 +60,77 @@ class Arguments:
 
 @dataclass
 class Notes:
-    """What one scene gave."""
+    """What one scene gave, a number an episode."""
 
-    in_solids_m: list[float]
-    """Deepest of each episode [m]; negative: by how much they stayed clear."""
-    in_each_other_m: list[float]
-    stuck_s: list[float]
-    """Longest of each episode [s]."""
-    worst: dict[str, tuple[float, str]]
-    """By what was being done: deepest beyond the limit [m], and of what where."""
-    doing: Counter[str]
-    """Moments looked at by activity."""
+    in_solids_m: list[float] = field(default_factory=list)
+    """Deepest [m]; negative: by how much they stayed clear."""
+    in_each_other_m: list[float] = field(default_factory=list)
+    stuck_s: list[float] = field(default_factory=list)
+    """Longest [s]."""
+    frame_us: list[float] = field(default_factory=list)
+    """A worker's control step [us], planning and watching the robot included; a number a batch."""
     nans: int = 0
-    frame_us: float = 0.0
-    """Time of a worker's control step [us], planning and watching the robot included."""
+    worst: dict[str, float] = field(default_factory=dict)
+    """By what was being done: deepest beyond the limit [m]."""
+
+    def deep(self, doing: str, depth_m: float) -> None:
+        """Keep what is the worst of its kind."""
+        if depth_m > max(DEEPEST_M, self.worst.get(doing, 0.0)):
+            self.worst[doing] = depth_m
 
 
 def main(arguments: Arguments) -> None:
     """Run, print, write."""
     metrics: dict[str, Metric] = {}
-    table = Table("scene", "in solids", "in each other", "stuck", "NaN", "frame")
+    lines, said = [], []
     for name in arguments.scenes:
-        notes = episodes(name, arguments)
-        for what, values, unit in (
-            ("in_solids", notes.in_solids_m, "m"),
-            ("in_each_other", notes.in_each_other_m, "m"),
-            ("stuck", notes.stuck_s, "s"),
-        ):
-            metrics[f"{name}/{what}"] = Metric(
-                max(values), min(values), max(values), unit, len(values)
-            )
+        notes, scene = Notes(), build(name=name)
+        firsts = range(0, arguments.episodes, BATCH)
+        for first in track(firsts, f"{name}, {arguments.workers} workers"):
+            _play(scene, arguments, first, notes)
         n = len(notes.stuck_s)
-        metrics[f"{name}/nan"] = Metric(notes.nans, notes.nans, notes.nans, "steps", n)
-        us = notes.frame_us
-        metrics[f"{name}/frame"] = Metric(us, us, us, "us", n)
-        table.add_row(
-            name,
-            f"{100 * max(notes.in_solids_m):.1f} cm ({_beyond(notes.in_solids_m, DEEPEST_M)})",
-            f"{100 * max(notes.in_each_other_m):.1f} cm "
-            f"({_beyond(notes.in_each_other_m, DEEPEST_M)})",
-            f"{max(notes.stuck_s):.1f} s ({_beyond(notes.stuck_s, STUCK_S)})",
-            str(notes.nans),
-            f"{notes.frame_us:.1f} us",
-        )
-        total = sum(notes.doing.values())
-        shares = ", ".join(f"{k} {v / total:.1%}" for k, v in notes.doing.most_common(12))
-        Console().print(f"{name}: {shares}", soft_wrap=True)
-        for what, (deep, where) in sorted(notes.worst.items(), key=lambda each: -each[1][0]):
-            Console().print(f"  {100 * deep:.1f} cm: {what}: {where}", soft_wrap=True)
-    Console().print(table)
-    Console().print(f"In brackets: of {arguments.episodes} episodes beyond 3 cm, 3 cm and 10 s.")
-    config = {name: str(value) for name, value in vars(arguments).items()}
-    write_results(arguments.out, config, [arguments.seed], metrics)
+        metrics |= {
+            f"{name}/in_solids": _extremes(notes.in_solids_m, "m"),
+            f"{name}/in_each_other": _extremes(notes.in_each_other_m, "m"),
+            f"{name}/stuck": _extremes(notes.stuck_s, "s"),
+            f"{name}/nan": exactly(notes.nans, "steps", n),
+            f"{name}/frame": exactly(float(np.median(notes.frame_us)), "us", n),
+        }
+        lines.append([
+            name, _beyond(notes.in_solids_m, DEEPEST_M, 100), _beyond(notes.stuck_s, STUCK_S),
+            _beyond(notes.in_each_other_m, DEEPEST_M, 100), str(notes.nans),
+            f"{metrics[f'{name}/frame'].value:.1f}",
+        ])  # fmt: skip
+        worst = sorted(notes.worst.items(), key=lambda each: -each[1])
+        deep = (f"{doing} {100 * depth:.1f} cm" for doing, depth in worst)
+        said.append(f"{name}, deepest beyond 3 cm: {'; '.join(deep) or 'none'}.")
+    header = ("scene", "in solids [cm]", "stuck [s]", "in each other [cm]", "NaN", "frame [us]")
+    limits = f"In brackets: of {arguments.episodes} episodes beyond 3 cm, 10 s and 3 cm."
+    report = Report("People", (__doc__ or "").strip(), [table(header, lines), limits, *said])
+    publish(arguments.out, report, asdict(arguments), [arguments.seed], metrics)
 
 
-def _beyond(values: list[float], limit: float) -> int:
-    return sum(value > limit for value in values)
+def _extremes(values: list[float], unit: str) -> Metric:
+    return Metric(max(values), min(values), max(values), unit, len(values))
 
 
-def episodes(name: str, arguments: Arguments) -> Notes:
-    """All episodes in one scene."""
-    scene, notes = build(name=name), Notes([], [], [], {}, Counter())
-    firsts = range(0, arguments.episodes, BATCH)
-    times = []
-    for first in track(firsts, description=f"{name}, {arguments.workers} workers"):
-        batch = min(BATCH, arguments.episodes - first)
-        times.append(_some(scene, arguments.seed + first, batch, arguments, notes))
-    notes.frame_us = float(np.median(times))
-    return notes
+def _beyond(values: list[float], limit: float, scale: float = 1.0) -> str:
+    return f"{scale * max(values):.1f} ({sum(value > limit for value in values)})"
 
 
-def _some(scene: Scene, first: int, batch: int, arguments: Arguments, notes: Notes) -> float:
-    """A batch of episodes; microseconds of a worker's control step."""
+def _play(scene: Scene, arguments: Arguments, first: int, notes: Notes) -> None:
+    """A batch of episodes."""
+    batch, n_workers = min(BATCH, arguments.episodes - first), arguments.workers
+    first += arguments.seed
     body = stack(pool(arguments.body))
     config = generator.MotionConfig(people=generator.PEOPLE[arguments.people])
-    state = generator.make_state(batch, arguments.workers, body, config, scene.grounds)
+    state = generator.make_state(batch, n_workers, body, config, scene.grounds)
     rngs = [np.random.default_rng([first + b]) for b in range(batch)]
     generator.reset(state, np.arange(batch), rngs)
-    solids = scene.obstacles[~_is_floor(scene.obstacles)]
+    is_floor = (scene.obstacles[:, KIND] == PLANE) & (scene.obstacles[:, AXES + 8] > 0.9)
     deepest = np.full((2, batch), -np.inf)
-    stuck = _Stuck(generator.current(state).position_world[:, :, 0, :2])
+    place = generator.current(state).position_world[:, :, 0, :2].copy()
+    since_s, stuck_s = np.zeros((2, batch, n_workers))
     swing = np.random.default_rng(first).uniform(0.3, 1.2, (batch, 2, scene.chain.n_joints))
     n_steps, spent = round(arguments.seconds / CTRL_DT_S), 0.0
     for step in range(1, n_steps + 1):
@@ -151,119 +141,64 @@ def _some(scene: Scene, first: int, batch: int, arguments: Arguments, notes: Not
         generator.watch(state, robot, motion, CTRL_DT_S)
         spent += time.thread_time() - began
         notes.nans += int(not np.isfinite(motion.position_world).all())
-        stuck.look(motion.position_world[:, :, 0, :2], state.workers["going"] != THERE)
+        now = motion.position_world[:, :, 0, :2]
+        fine = (np.linalg.norm(now - place, axis=-1) > STILL_M) | (state.workers["going"] == THERE)
+        since_s = np.where(fine, 0.0, since_s + CTRL_DT_S)
+        place = np.where(fine[..., None], now, place)
+        stuck_s = np.maximum(stuck_s, since_s)
         if step % LOOK_EVERY == 0:
-            _measure(scene, body, motion, solids, state, deepest, notes)
+            _measure(body, motion, scene.obstacles[~is_floor], state, deepest, notes)
     notes.in_solids_m += deepest[0].tolist()
     notes.in_each_other_m += deepest[1].tolist()
-    notes.stuck_s += stuck.longest_s.max(1).tolist()
-    return 1e6 * spent / (n_steps * batch * arguments.workers)
+    notes.stuck_s += stuck_s.max(1).tolist()
+    notes.frame_us.append(1e6 * spent / (n_steps * batch * n_workers))
 
 
-class _Stuck:
-    """How long each of (B, W) workers has wanted to be elsewhere and not moved."""
-
-    def __init__(self, place: np.ndarray) -> None:
-        self.place = place.copy()
-        self.since_s, self.longest_s = np.zeros(place.shape[:2]), np.zeros(place.shape[:2])
-
-    def look(self, place: np.ndarray, wants: np.ndarray) -> None:
-        moved = np.linalg.norm(place - self.place, axis=-1) > STILL_M
-        self.since_s = np.where(moved | ~wants, 0.0, self.since_s + CTRL_DT_S)
-        self.place = np.where((moved | ~wants)[..., None], place, self.place)
-        self.longest_s = np.maximum(self.longest_s, self.since_s)
-
-
-def _measure(scene, body, motion, solids, state, deepest, notes) -> None:
+def _measure(body, motion, solids, state, deepest, notes) -> None:
     """Note how deep anybody is in what."""
-    truth = worker_truth(body, motion)
+    truth, names = worker_truth(body, motion), generator.activity_names
     capsules, radius = truth.capsules_world, truth.capsule_radius_m
-    names = generator.activity_names
-    for doing in state.workers["activity"].ravel().tolist():
-        notes.doing[names[doing]] += 1
     feet = np.array(["foot" in part or "toes" in part for part in body.capsule_names])
-    depth, part, solid = _in_solids(
-        capsules, radius, solids, state.workers["activity"] == CLIMB, feet
-    )
-    worst = depth.max(1)
-    for b in np.flatnonzero(worst > DEEPEST_M):
-        w = int(depth[b].argmax())
-        what = names[state.workers["activity"][b, w]]
-        if worst[b] > notes.worst.get(what, (0.0, ""))[0]:
-            at = np.round(solids[solid[b, w], CENTRE : CENTRE + 3], 2).tolist()
-            spot = np.round(state.workers["spot"][b, w, :2], 2).tolist()
-            part_name = body.capsule_names[part[b, w]]
-            notes.worst[what] = worst[b], f"{part_name}, place {spot}, solid at {at}"
-    deepest[0] = np.maximum(deepest[0], worst)
-    n_workers = capsules.shape[1]
+    share = np.linspace(0.0, 1.0, 5)[:, None]
+    points = capsules[..., :1, :] * (1 - share) + capsules[..., 1:, :] * share
+    inside = radius - _away(points, solids).min((-1, -2))
+    inside[(state.workers["activity"] == CLIMB)[..., None] & feet] = -np.inf  # on what they climb
+    depth = inside.max(-1)
+    deepest[0] = np.maximum(deepest[0], depth.max(1))
+    for b, w in np.argwhere(depth > DEEPEST_M):
+        notes.deep(names[state.workers["activity"][b, w]], float(depth[b, w]))
     root = motion.position_world[:, :, 0, :2]
-    for i in range(n_workers):
-        for j in range(i):
-            near = np.flatnonzero(np.linalg.norm(root[:, i] - root[:, j], axis=-1) < 2.6)
-            if not len(near):
-                continue
-            gap = -least_separation(
-                capsules[near, i], radius[near, i], capsules[near, j], radius[near, j]
-            ).distance_m
+    for i, j in combinations(range(capsules.shape[1]), 2):
+        apart = np.linalg.norm(root[:, i] - root[:, j], axis=-1)
+        near = np.flatnonzero(apart < 2.6)
+        if len(near):
+            ends = (capsules[near, i], radius[near, i], capsules[near, j], radius[near, j])
+            gap = -least_separation(*ends).distance_m
             k = int(gap.argmax())
             both = " beside ".join(names[state.workers["activity"][near[k], w]] for w in (i, j))
-            if gap[k] > max(DEEPEST_M, notes.worst.get(both, (0.0, ""))[0]):
-                apart = float(np.linalg.norm(root[near[k], i] - root[near[k], j]))
-                notes.worst[both] = float(gap[k]), f"{apart:.2f} m apart"
+            notes.deep(both, float(gap[k]))
             deepest[1, near] = np.maximum(deepest[1, near], gap)
 
 
-def _is_floor(solids: np.ndarray) -> np.ndarray:
-    return (solids[:, KIND] == PLANE) & (solids[:, AXES + 8] > 0.9)
+def _away(points: Points3, solids: Floats) -> Floats:
+    """(..., G) signed distances of points (..., 3) from shapes (G, ...) [m]; of planes within
+    their edges."""
+    axes = solids[:, AXES : AXES + 9].reshape(-1, 3, 3)
+    offset = points[..., None, :] - solids[:, CENTRE : CENTRE + 3]
+    local = np.einsum("gij,...gj->...gi", axes, offset)
+    half, kind, up = solids[:, HALF_SIZE : HALF_SIZE + 3], solids[:, KIND], local[..., 2]
+    side, beyond = np.hypot(local[..., 0], local[..., 1]), np.abs(local) - half
+    over = np.abs(up) - half[:, 1]  # of what is round: radius, then half its length
+    plane = np.where((beyond[..., :2] < 0).all(-1), up, 9.0)
+    capsule = np.hypot(side, np.maximum(over, 0.0)) - half[:, 0]
+    cylinder = _outside(np.stack([side - half[:, 0], over], -1))
+    kinds = [kind == PLANE, kind == BOX, kind == CAPSULE]
+    return np.select(kinds, [plane, _outside(beyond), capsule], cylinder)
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _in_solids(capsules, radius, solids, climbing, feet):
-    """How deep each of (B, W) workers is in a solid [m], with which capsule, in which solid.
-
-    Feet (K,) of who is climbing stand on one, as others' on the floor, and are left out.
-    """
-    n_b, n_w, n_k = capsules.shape[:3]
-    depth = np.full((n_b, n_w), -np.inf)
-    part, solid = np.zeros((n_b, n_w), np.int64), np.zeros((n_b, n_w), np.int64)
-    for b in range(n_b):
-        for w in range(n_w):
-            for g in range(solids.shape[0]):
-                dx = capsules[b, w, 0, 0, 0] - solids[g, CENTRE]
-                dy = capsules[b, w, 0, 0, 1] - solids[g, CENTRE + 1]
-                if solids[g, KIND] != PLANE and math.hypot(dx, dy) > solids[g, REACH] + 1.6:
-                    continue
-                for k in range(n_k):
-                    if climbing[b, w] and feet[k]:
-                        continue
-                    for i in range(5):
-                        away = _distance(capsules[b, w, k], 0.25 * i, solids[g])
-                        inside = radius[b, w, k] - away
-                        if inside > depth[b, w]:
-                            depth[b, w], part[b, w], solid[b, w] = inside, k, g
-    return depth, part, solid
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _distance(ends, u, row):
-    """Signed distance of a point of a segment from a shape [m]; of planes within their edges."""
-    local = np.zeros(3)
-    for axis in range(3):
-        for i in range(3):
-            p = ends[0, i] + u * (ends[1, i] - ends[0, i]) - row[CENTRE + i]
-            local[axis] += p * row[AXES + 3 * axis + i]
-    hx, hy, hz = row[HALF_SIZE], row[HALF_SIZE + 1], row[HALF_SIZE + 2]
-    if row[KIND] == PLANE:
-        return local[2] if abs(local[0]) < hx and abs(local[1]) < hy else 9.0
-    if row[KIND] == BOX:
-        ox, oy, oz = abs(local[0]) - hx, abs(local[1]) - hy, abs(local[2]) - hz
-        outside = math.sqrt(max(ox, 0.0) ** 2 + max(oy, 0.0) ** 2 + max(oz, 0.0) ** 2)
-        return outside + min(max(ox, oy, oz), 0.0)
-    side = math.hypot(local[0], local[1])
-    if row[KIND] == CAPSULE:
-        return math.hypot(side, max(abs(local[2]) - hy, 0.0)) - hx
-    ox, oz = side - hx, abs(local[2]) - hy
-    return math.hypot(max(ox, 0.0), max(oz, 0.0)) + min(max(ox, oz), 0.0)
+def _outside(beyond: Floats) -> Floats:
+    """Signed distance from how far a point is beyond each pair of faces (..., n)."""
+    return np.linalg.norm(np.maximum(beyond, 0.0), axis=-1) + np.minimum(beyond.max(-1), 0.0)
 
 
 if __name__ == "__main__":

@@ -17,10 +17,11 @@ import gymnasium
 import numpy as np
 import tyro
 from rich.console import Console
-from rich.progress import Progress, track
 
 import hrc_env  # noqa: F401  registers the ids
-from hrc_env.core.results import Metric, over, write_results
+from benchmarks.common import exactly
+from hrc_env.cli.progress import track
+from hrc_env.core.results import Metric, write_results
 from hrc_env.step import ACTIVITY, BODY, MISCALIBRATED
 from hrc_env.vector.env import HRCVectorEnv
 
@@ -69,69 +70,49 @@ class Notes:
         return [mib for steps, mib in self.resident if steps >= start]
 
 
-def main(arguments: Arguments) -> None:
-    """Soak, print, write."""
-    warnings.simplefilter("error")
-    lengths = single(arguments.episodes)
-    notes = vector(arguments)
-    report(arguments, lengths, notes)
-
-
-def single(n_episodes: int) -> list[int]:
-    """Steps of episodes of the single environment at level truth."""
-    env = gymnasium.make("HRCReach-v0", perception="truth")
-    rng = np.random.default_rng(0)
-    lengths = [episode(env, s, rng) for s in track(range(n_episodes), description="episodes")]
+def single(n_episodes: int) -> int:
+    """Steps of episodes of the single environment at level truth; raises if one has no number."""
+    env, rng = gymnasium.make("HRCReach-v0", perception="truth"), np.random.default_rng(0)
+    n_steps = 0
+    for seed in track(range(n_episodes), "episodes"):
+        env.reset(seed=seed)
+        ended = False
+        while not ended:
+            action = rng.uniform(-1, 1, env.action_space.shape).astype(np.float32)
+            observation, reward, terminated, truncated, info = env.step(action)
+            numbers = np.array([reward, *(info[name] for name in info if name not in NAMES)], float)
+            if not_numbers(observation) + not_numbers(numbers):
+                raise FloatingPointError(f"Not a number in episode {seed}: {info}")
+            n_steps, ended = n_steps + 1, terminated or truncated
     env.close()
-    return lengths
-
-
-def episode(env: gymnasium.Env, seed: int, rng: np.random.Generator) -> int:
-    """Steps of one episode; raises where anything is not a number."""
-    observation, _ = env.reset(seed=seed)
-    n_steps, ended = 0, False
-    while not ended:
-        action = rng.uniform(-1, 1, env.action_space.shape).astype(np.float32)
-        observation, reward, terminated, truncated, info = env.step(action)
-        numbers = np.array([reward, *(info[name] for name in info if name not in NAMES)], float)
-        if not (np.isfinite(observation).all() and np.isfinite(numbers).all()):
-            raise FloatingPointError(f"Not a number in episode {seed}, step {n_steps}: {info}")
-        n_steps, ended = n_steps + 1, terminated or truncated
     return n_steps
 
 
 def vector(arguments: Arguments) -> Notes:
     """Step the vector environment."""
-    env = HRCVectorEnv(
-        arguments.num_envs, perception=arguments.perception, num_threads=arguments.threads
-    )
+    n_envs, level = arguments.num_envs, arguments.perception
+    env = HRCVectorEnv(n_envs, perception=level, num_threads=arguments.threads)
     rng, notes = np.random.default_rng(0), Notes()
-    n_calls = max(arguments.steps // env.num_envs, 1)
+    n_calls = max(arguments.steps // n_envs, 1)
     every = max(n_calls // READINGS, 1)
     env.reset(seed=0)
-    ended, started_s = np.zeros(env.num_envs, bool), time.monotonic()
-    with Progress() as progress:
-        task = progress.add_task("steps", total=n_calls)
-        for call in range(1, n_calls + 1):
-            action = rng.uniform(-1, 1, env.action_space.shape).astype(np.float32)
-            observation, reward, terminated, truncated, infos = env.step(action)
-            notes.nans += not_numbers(observation) + not_numbers(reward)
-            notes.nans += lacking(infos, ~ended)
-            ended = terminated | truncated
-            notes.episodes += int(ended.sum())
-            progress.advance(task)
-            if call % every == 0 or call == n_calls:
-                steps, mib = call * env.num_envs, resident_mib()
-                notes.resident.append((steps, mib))
-                progress.console.print(f"{steps:>11,} steps {mib:8.1f} MiB {notes.nans} NaN")
+    ended, started_s = np.zeros(n_envs, bool), time.monotonic()
+    for call in track(range(1, n_calls + 1), f"steps of {n_envs} environments"):
+        action = rng.uniform(-1, 1, env.action_space.shape).astype(np.float32)
+        observation, reward, terminated, truncated, infos = env.step(action)
+        notes.nans += not_numbers(observation) + not_numbers(reward) + lacking(infos, ~ended)
+        ended = terminated | truncated
+        notes.episodes += int(ended.sum())
+        if call % every == 0 or call == n_calls:
+            notes.resident.append((call * n_envs, resident_mib()))
     notes.seconds = time.monotonic() - started_s
     env.close()
     return notes
 
 
-def not_numbers(values: np.ndarray) -> int:
+def not_numbers(values: Any) -> int:
     """How many values are NaN or infinite."""
-    return int(values.size - np.isfinite(values).sum())
+    return int(np.size(values) - np.isfinite(values).sum())
 
 
 def lacking(infos: Mapping[str, Any], stepped: np.ndarray) -> int:
@@ -152,28 +133,23 @@ def resident_mib() -> float:
     return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
 
 
-def report(arguments: Arguments, lengths: list[int], notes: Notes) -> None:
-    """A few lines and results.json."""
-    warm = notes.warm()
-    growth = max(warm) / warm[0] - 1
-    steps = notes.resident[-1][0]
-    peak_mib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    Console().print(
-        f"{len(lengths)} single episodes, {sum(lengths)} steps at truth: no NaN, no warning.\n"
-        f"{steps} steps of {arguments.num_envs} environments at {arguments.perception}, "
-        f"{notes.episodes} episodes: {notes.nans} NaN, no warning; "
-        f"{steps / notes.seconds:.0f} steps/s; resident {warm[-1]:.0f} MiB, at most "
-        f"{growth:.2%} above what it was when warm; peak {peak_mib:.0f} MiB"
-    )
+def main(arguments: Arguments) -> None:
+    """Soak, print, write."""
+    warnings.simplefilter("error")
+    single_steps, notes = single(arguments.episodes), vector(arguments)
+    warm, (steps, _) = notes.warm(), notes.resident[-1]
     metrics = {
-        "steps": over([steps], "1"),
-        "single_steps": over([sum(lengths)], "1"),
-        "nans": over([notes.nans], "1"),
+        "steps": exactly(steps, "1"),
+        "episodes": exactly(notes.episodes, "1"),
+        "single_steps": exactly(single_steps, "1"),
+        "nans": exactly(notes.nans, "1"),
         "resident_memory": Metric(warm[-1], min(warm), max(warm), "MiB", len(warm)),
-        "resident_growth": over([growth], "share"),
-        "peak_memory": over([peak_mib], "MiB"),
-        "env_steps_per_s": over([steps / notes.seconds], "1/s"),
+        "resident_growth": exactly(max(warm) / warm[0] - 1, "share"),
+        "peak_memory": exactly(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, "MiB"),
+        "env_steps_per_s": exactly(steps / notes.seconds, "1/s"),
     }
+    for name, metric in metrics.items():
+        Console().print(f"{name}: {metric.value:,.4g} {metric.unit}")
     config = {**asdict(arguments), "out": str(arguments.out), "readings": notes.resident}
     write_results(arguments.out, config, list(range(arguments.num_envs)), metrics)
 

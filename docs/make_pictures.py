@@ -178,5 +178,5 @@ if __name__ == "__main__":
     faults()
     appearance()
     clip()
-    if Path("out/learning/curves.png").exists():
-        shutil.copy("out/learning/curves.png", PICTURES / "learning.png")
+    if Path("out/learning/figures/curves.png").exists():
+        shutil.copy("out/learning/figures/curves.png", PICTURES / "learning.png")

@@ -45,7 +45,7 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
         "Train PPO, evaluate it on fixed seeds, draw its curve, film it.",
     ),
     "bench": (
-        "benchmarks.commands.bench", "Bench",
+        "benchmarks.commands", "Bench",
         "Measure the estimators (tracking), the eyes (perception), the environment (speed) or the "
         "workers (motion).",
     ),
@@ -55,7 +55,7 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
         "ablations of rigs and estimators (ablations).",
     ),
     "gallery": (
-        "benchmarks.commands.gallery", "Gallery",
+        "benchmarks.commands", "Gallery",
         "Draw every worker, a film strip of every motion, and both scenes from all cameras.",
     ),
     "import-motion": (

@@ -58,7 +58,7 @@ def register_estimator(spec: "EstimatorSpec") -> None:
     Raises:
         ConfigError: also for an estimate of a wrong shape, without finite numbers or covariance.
     """
-    from hrc_env.tracking.checks import check_estimator
+    from hrc_env.tracking.estimators import check_estimator
 
     check_estimator(spec)
     _add("estimator", spec.name, spec)

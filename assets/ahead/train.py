@@ -16,7 +16,7 @@ import numpy as np
 import torch
 from torch import nn
 
-from benchmarks.tracking.tracks import Tracks, follow_own
+from benchmarks.tracking.tracks import Tracks, follow_env
 from benchmarks.tracking.rigs import DT_S
 from hrc_env.core.skeleton import MIRROR, N_JOINTS, TORSO
 from hrc_env.tracking.forecast import N_INPUTS, describe
@@ -223,7 +223,7 @@ def main() -> None:
     options = parser.parse_args()
     sets = []
     for seeds, lively, failing in SETS:
-        sets.append(follow_own(list(seeds), N_FRAMES, lively, failing))
+        sets.append(follow_env(list(seeds), N_FRAMES, lively, failing))
         print(f"{len(seeds)} workers followed", flush=True)
     samples = gather(sets)
     print(f"{len(samples.start)} moments", flush=True)

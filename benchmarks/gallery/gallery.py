@@ -1,23 +1,49 @@
 """All pictures and the page: every body, every motion, every scene."""
 
-from collections.abc import Callable
+import html
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 
 import imageio.v2 as imageio
 
 from benchmarks.gallery.motions import strip
-from benchmarks.gallery.page import Exhibit, write_page
 from benchmarks.gallery.still import CASTS, portrait, views
 from hrc_env.core.errors import unknown
 from hrc_env.core.typing import Image
+from hrc_env.experiments.study.cache import Progress
 from hrc_env.motion.repertoire import REPERTOIRE
 from hrc_env.worker.body import load_body, worker_names
 
-Say = Callable[[float, str], None]
-"""Told by how much the share that is done grew, and what is being done."""
 VIEWS = 5
 """Pictures of a scene."""
+
+
+STYLE = """
+:root { color-scheme: light dark; }
+body { max-width: 1240px; margin: 40px auto; padding: 24px; font: 16px/1.5 system-ui, sans-serif; }
+.grid { display: grid; grid-template-columns: repeat(auto-fill, minmax(240px, 1fr)); gap: 18px; }
+figure { margin: 0; } .wide { grid-column: 1 / -1; }
+img { display: block; width: 100%; height: auto; border-radius: 8px; }
+figcaption { padding: 6px 2px; } figcaption span { opacity: .7; }
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Exhibit:
+    """A picture in the gallery."""
+
+    section: str
+    """The heading that it stands under."""
+    file: str
+    """Path of the PNG, relative to the page."""
+    title: str
+    """One or two words."""
+    caption: str
+    """One sentence."""
+    wide: bool
+    """Whether it takes a row of its own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,64 +68,56 @@ class GalleryConfig:
                     raise unknown(name, each, known)
 
 
-def run(config: GalleryConfig, out: Path, say: Say) -> list[Exhibit]:
-    """Draw everything into a folder, with an `index.html`; returns what the page shows.
-
-    Args:
-        config: what is drawn.
-        out: the folder, made if it is not there.
-        say: hears of the progress.
-    """
+def run(config: GalleryConfig, out: Path, say: Progress) -> list[Exhibit]:
+    """Draw everything into a folder, with an `index.html`; returns what the page shows."""
     out.mkdir(parents=True, exist_ok=True)
     share = 1.0 / max(len(config.bodies) + len(config.motions) + VIEWS * len(config.scenes), 1)
-    exhibits = [
-        *_places(config, out, lambda name: say(VIEWS * share, name)),
-        *_workers(config, out, lambda name: say(share, name)),
-        *_motions(config, out, lambda name: say(share, name)),
-    ]
-    write_page(exhibits, out, "python -m hrc_env gallery")
-    return exhibits
+    shown: list[Exhibit] = []
 
+    def hang(picture: Image, section: str, title: str, caption: str, wide: bool) -> None:
+        words = "".join(x if x.isalnum() else " " for x in f"{section} {title}").split()
+        file = "_".join(words).lower() + ".png"
+        imageio.imwrite(out / file, picture)
+        shown.append(Exhibit(section, file, title, caption, wide))
+        say(share, title)
 
-def _places(config: GalleryConfig, out: Path, done: Callable[[str], None]) -> list[Exhibit]:
-    shown = []
     for k, name in enumerate(config.scenes):
         body = worker_names()[k % len(worker_names())]
         for i, (view, picture) in enumerate(views(name, body).items()):
             seen = "for people" if i == 0 else "what this camera of the rig sees"
-            title = f"{name}, {view.replace('_', ' ')}"
-            file = _save(picture, out, f"place {name} {view}")
-            shown.append(Exhibit("Places", file, title, seen, i == 0))
-        done(name)
-    return shown
-
-
-def _workers(config: GalleryConfig, out: Path, done: Callable[[str], None]) -> list[Exhibit]:
-    shown = []
+            hang(picture, "Places", f"{name}, {view.replace('_', ' ')}", seen, i == 0)
     for name in config.bodies:
-        file = _save(portrait(name), out, f"body {name}")
         caption = f"{load_body(name).stature_m:.2f} m tall"
-        shown.append(Exhibit("Workers", file, name.replace("_", " "), caption, False))
-        done(name)
+        hang(portrait(name), "Workers", name.replace("_", " "), caption, False)
+    bodies = config.bodies or worker_names()
+    for k, body in enumerate(bodies):  # strips of one worker are drawn one after another
+        for name in config.motions[k :: len(bodies)]:
+            hang(strip(name, body), "Motions", name, f"by {body.replace('_', ' ')}", True)
+    write_page(shown, out, "python -m hrc_env gallery")
     return shown
 
 
-def _motions(config: GalleryConfig, out: Path, done: Callable[[str], None]) -> list[Exhibit]:
-    """Every worker plays in turn; strips of one worker are drawn one after another."""
-    bodies, files = config.bodies or worker_names(), {}
-    for k, body in enumerate(bodies):
-        for name in config.motions[k :: len(bodies)]:
-            files[name] = body, _save(strip(name, body), out, f"motion {name}")
-            done(name)
-    return [
-        Exhibit("Motions", files[name][1], name, f"by {files[name][0].replace('_', ' ')}", True)
-        for name in config.motions
-    ]
+def write_page(exhibits: Sequence[Exhibit], out: Path, command: str) -> None:
+    """Write `index.html` into a folder that has the pictures; those of a section come together."""
+    sections = groupby(exhibits, lambda exhibit: exhibit.section)
+    body = "".join(
+        f'<h2>{html.escape(name)}</h2><div class="grid">{"".join(map(_figure, some))}</div>\n'
+        for name, some in sections
+    )
+    text = (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>hrc_env: gallery</title><style>{STYLE}</style></head><body>\n"
+        f"<h1>People beside a robot</h1>\n{body}"
+        f"<footer>Made by <code>{html.escape(command)}</code></footer></body></html>\n"
+    )
+    (out / "index.html").write_text(text, encoding="utf-8")
 
 
-def _save(picture: Image, out: Path, title: str) -> str:
-    """Write a PNG; its name."""
-    words = "".join(letter if letter.isalnum() else " " for letter in title).split()
-    file = "_".join(words) + ".png"
-    imageio.imwrite(out / file, picture)
-    return file
+def _figure(exhibit: Exhibit) -> str:
+    title, caption = html.escape(exhibit.title), html.escape(exhibit.caption)
+    return (
+        f"<figure{' class=wide' if exhibit.wide else ''}>"
+        f'<img src="{html.escape(exhibit.file)}" alt="{title}: {caption}" loading="lazy">'
+        f"<figcaption><b>{title}</b> <span>{caption}</span></figcaption></figure>\n"
+    )

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.gallery.aim import camera_at
+from benchmarks.gallery.still import camera_at
 from hrc_env.core.batching import one
 from hrc_env.core.typing import Image
 from hrc_env.motion.repertoire import REPERTOIRE, alone, perform
@@ -55,13 +55,7 @@ STAGED: dict[str, tuple[str, float, float]] = {
 
 
 def strip(name: str, body_name: str, seed: int = 0) -> Image:
-    """A scene of the repertoire played by a worker, (420, about 1800, 3).
-
-    Args:
-        name: of the scene.
-        body_name: of the worker.
-        seed: of what the scene leaves open.
-    """
+    """A scene of the repertoire played by a worker, (420, about 1800, 3)."""
     scene = build(name="site", n_workers=1, bodies=body_name)
     stage = stage_of(name)
     me = alone(load_body(body_name), stage.xy_m, stage.yaw_rad)

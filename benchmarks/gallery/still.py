@@ -5,15 +5,17 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.gallery.aim import camera_at
 from hrc_env.core.batching import one
 from hrc_env.core.records import Held, WorkerMotion, Workplace
-from hrc_env.core.typing import Floats, Image
+from hrc_env.core.typing import Image, Points3
+from hrc_env.geometry.cameras import PinholeCamera, pinhole
 from hrc_env.motion.repertoire import REPERTOIRE, alone, perform
 from hrc_env.scene.build import Scene, build
 from hrc_env.scene.render import PictureRenderer
 from hrc_env.worker.body import load_body
 
+EYE_M = 1.45
+"""How high above the floor the cameras that look at somebody are [m]."""
 PORTRAIT_PX = (600, 900)
 SITTING = (0.75, -0.6, -0.2)
 """Where workers stand for their portrait, and which way they look: x, y [m], yaw [rad]."""
@@ -28,6 +30,16 @@ CASTS: dict[str, tuple[tuple[str, str, float], ...]] = {
 """Who stands in the pictures of a scene: workplace, scene of the repertoire, share of it."""
 OVERVIEW = {"lab": "room", "site": "overview"}
 """The view for people that shows most of a scene."""
+
+
+def camera_at(
+    target_world: Points3, turn_rad: float, away_m: float, hfov_deg: float, size_px: tuple[int, int]
+) -> PinholeCamera:
+    """A camera that looks at a point (3,) [m] from a direction (from world +x) and level distance;
+    its horizontal field of view, width and height."""
+    x, y, _ = target_world
+    eye = np.array([x + away_m * np.cos(turn_rad), y + away_m * np.sin(turn_rad), EYE_M])
+    return pinhole("follower", eye, np.asarray(target_world, float), hfov_deg, *size_px)
 
 
 def portrait(body_name: str, seed: int = 1) -> Image:
@@ -71,18 +83,10 @@ def _at_work(
 def _together(workers: list[WorkerMotion]) -> WorkerMotion:
     """Several workers, each with arrays (1, ...), as one record (W, ...)."""
 
-    def joined(records: Sequence[Any], name: str) -> Floats:
-        return np.concatenate([getattr(record, name) for record in records])
+    def joined(records: Sequence[Any], *names: str) -> list[Any]:
+        return [np.concatenate([getattr(each, name) for each in records]) for name in names]
 
-    things = [worker.held for worker in workers]
-    return WorkerMotion(
-        joined(workers, "position_world"),
-        joined(workers, "quaternion_wxyz"),
-        joined(workers, "velocity_world"),
-        joined(workers, "angular_velocity_world"),
-        Held(
-            joined(things, "kind").astype(np.int64),
-            joined(things, "position_world"),
-            joined(things, "quaternion_wxyz"),
-        ),
-    )
+    place, turn = "position_world", "quaternion_wxyz"
+    held = Held(*joined([worker.held for worker in workers], "kind", place, turn))
+    rates = ("velocity_world", "angular_velocity_world")
+    return WorkerMotion(*joined(workers, place, turn, *rates), held)

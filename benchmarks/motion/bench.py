@@ -3,17 +3,15 @@
 import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
-from benchmarks.motion.gait import gait_of
-from benchmarks.motion.plot import plot_targets
-from benchmarks.motion.report import write_report
-from benchmarks.motion.statistics import statistics_of
+from benchmarks.motion.report import report
+from benchmarks.motion.statistics import gait_of, statistics_of
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.results import Metric, over, write_results
-from hrc_env.experiments.study.cache import Progress
+from hrc_env.core.results import Metric, over
+from hrc_env.experiments.study.cache import PartCache
+from hrc_env.experiments.study.runner import Study, at_least_one
 from hrc_env.motion import state as st
 from hrc_env.motion.generator import MotionConfig, advance, make_state, reset
 from hrc_env.motion.repertoire import REPERTOIRE, Film, alone, perform
@@ -23,8 +21,6 @@ DT_S = 0.01
 """Between the frames of a film [s]: fast enough for accelerations."""
 BATCH, STEPS, POSES = 64, 60, 5
 """Environments, control steps and poses a step with which a frame's cost is taken, 40 ms a step."""
-_FRAMES = 0.05
-"""The share of the progress that goes to the cost of a frame."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,8 +34,7 @@ class MotionBenchConfig:
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for numbers that cannot work."""
-        if self.n_seeds < 1:
-            raise ConfigError(f"n_seeds must be at least 1, got {self.n_seeds}.")
+        at_least_one(self, "n_seeds")
         if not self.bodies:
             raise ConfigError(f"bodies must name some of {worker_names()}.")
 
@@ -48,28 +43,15 @@ QUICK = MotionBenchConfig(n_seeds=2, bodies=("worker_1",))
 """Every number, from little."""
 
 
-def run(config: MotionBenchConfig, out: Path, say: Progress) -> dict[str, Metric]:
-    """Measure; writes results.json, motion.md and motion.png into `out`.
-
-    Args:
-        config: how much.
-        out: a folder.
-        say: hears of the progress: shares that sum to 1.
-    """
+def play(config: MotionBenchConfig, parts: PartCache) -> dict[str, Metric]:
+    """Play and measure every scene."""
     metrics: dict[str, Metric] = {}
-    share = (1 - _FRAMES) / len(REPERTOIRE)
+    share = 1 / (len(REPERTOIRE) + 1)
     for scene in REPERTOIRE:
-        say(0.0, scene)
         metrics |= _measure(scene, config)
-        say(share, scene)
-    say(0.0, "cost of a frame")
+        parts.progress(share, scene)
     metrics["us_per_control_step"] = _cost_us(load_body(config.bodies[0]))
-    say(_FRAMES, "cost of a frame")
-    write_results(
-        out / "results.json", {"bench": asdict(config)}, list(range(config.n_seeds)), metrics
-    )
-    write_report(out, metrics)
-    plot_targets(out / "motion.png", metrics)
+    parts.progress(share, "cost of a frame")
     return metrics
 
 
@@ -93,11 +75,9 @@ def _measure(scene: str, config: MotionBenchConfig) -> dict[str, Metric]:
             gaits = [gait_of(film) for film in films]
             numbers |= {key: float(np.median([g[key] for g in gaits])) for key in gaits[0]}
         by_body.append(numbers)
+    n = config.n_seeds * len(config.bodies)
     return {
-        f"{scene}.{key}": replace(
-            over([numbers[key] for numbers in by_body], _unit(key)),
-            n=config.n_seeds * len(config.bodies),
-        )
+        f"{scene}.{key}": replace(over([numbers[key] for numbers in by_body], _unit(key)), n=n)
         for key in by_body[0]
     }
 
@@ -131,3 +111,15 @@ def _cost_us(body: Body) -> Metric:
         advance(state, rngs, 0.04 / POSES, POSES)
         found.append(1e6 * (time.thread_time() - started) / BATCH)
     return over(found, "us")
+
+
+MOTION = Study(
+    name="bench motion",
+    modules=("benchmarks.motion.statistics",),
+    settings=lambda config: {"bench": asdict(config)},
+    seeds=lambda config: list(range(config.n_seeds)),
+    n_parts=lambda _: 1,
+    play=play,
+    metrics=lambda _, played: played,
+    report=lambda _, played, metrics, figures: report(metrics),
+)

@@ -1,52 +1,250 @@
-"""The perception bench: how fast the eyes are, how well they see, and what goes wrong.
+"""The perception bench: how fast detection is, how well workers are seen, and what goes wrong.
 
 Each part is written to DIR/parts as soon as it is done, so that a bench that was stopped goes on
 where it was; parts made by other code or settings are made anew. Times are taken last.
 """
 
-from dataclasses import asdict
-from pathlib import Path
+import zlib
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks.perception import loops, sheet
-from benchmarks.perception.measured import NO_FAULT, PIXELS, Measured, metrics_of
-from benchmarks.perception.parts import FIRST_SEED, tasks_of
-from benchmarks.perception.report import write_report
-from benchmarks.perception.settings import PerceptionBenchConfig
-from benchmarks.perception.views import PLAIN
-from hrc_env.core.results import Metric, write_results
-from hrc_env.experiments.study.cache import PartCache, Progress
-from hrc_env.experiments.study.fingerprint import fingerprint_of
+from assets.emulator.validate import error_ratios
+from benchmarks.perception import episodes, speed
+from benchmarks.perception.crops import Looker, instants
+from benchmarks.perception.metrics import EMULATED, NO_FAULT, PIXELS, metrics_of
+from benchmarks.perception.report import report
+from benchmarks.perception.views import PLAIN, View, in_turns
+from hrc_env.core.errors import ConfigError
+from hrc_env.experiments.study.cache import PartCache, PartProgress
+from hrc_env.experiments.study.runner import Study, at_least_one
+from hrc_env.perception import vino
+from hrc_env.perception.faults.fault import IMAGE, KINDS, FaultConfig
+from hrc_env.scene.build import SCENES, Scene, SceneConfig, build
+from hrc_env.scene.domain_randomization import APPEARANCES, AS_BUILT, draw_look
+from hrc_env.scene.rigs import RIGS
+from hrc_env.worker.body import worker_names
+
+LENSES = {"pinhole": "lab", "fisheye": "lab_gopro"}
+"""Rigs that hang in the same places, by the rows that their crops make."""
+FIRST_SEED, FIRST_RESET = 500, 1000
+"""Of episodes, and of resets after which the worker is looked for; the others count up."""
+BLOCK = 5
+"""Episodes of a part: so many are lost at most when the bench is stopped."""
 
 
-def run(config: PerceptionBenchConfig, out: Path, say: Progress) -> dict[str, Metric]:
-    """Measure what is not yet there.
+@dataclass(frozen=True, slots=True)
+class PerceptionBenchConfig:
+    """How much is measured."""
 
-    Writes results.json, perception.md, plots and the sheet of the worst crops into `out`.
+    episodes: tuple[tuple[str, int], ...] = (("lab", 30), ("site", 15))
+    """Episodes at `pixels`, scene by scene; faults are compared with the lab's first ones."""
+    n_steps: int = 250
+    """Steps of each."""
+    n_resets: int = 100
+    """Resets after which the worker is looked for."""
+    n_faults: int = 8
+    """Episodes of every fault at `pixels`; the four cameras have it in turns."""
+    fault_steps: int = 150
+    """Steps of each."""
+    n_emulated: int = 40
+    """Episodes of every fault at `keypoints`, of `n_steps` each."""
+    kinds: tuple[str, ...] = tuple(KINDS)
+    """Which faults."""
+    bodies: tuple[str, ...] = worker_names()
+    """Whose crops are looked at."""
+    n_instants: int = 30
+    """Moments of each body in each scene, and of each lens; four crops each."""
+    n_empty: int = 1000
+    """Steps in each scene without anybody."""
+    emulator_rounds: int | None = 4
+    """How often each motion is rendered in each scene to hold the emulator against pixels; 0: once,
+    in one of them; None: not at all."""
+    cameras: tuple[int, ...] = (1, 2, 4)
+    """Numbers of cameras whose speed is taken."""
+    workers: tuple[int, ...] = (1, 2)
+    """Numbers of workers likewise."""
+    speed_steps: int = 200
+    """Steps by which it is."""
 
-    Args:
-        config: how much.
-        out: a folder.
-        say: hears of the progress: shares that sum to 1.
-    """
-    tasks = list(tasks_of(config, out))
-    settings, found = asdict(config), Measured()
-    fingerprint = fingerprint_of(settings, "benchmarks.perception.parts")
+    def __post_init__(self) -> None:
+        """Raise `ConfigError` for numbers that cannot work."""
+        counts = ("n_steps", "n_resets", "n_faults", "fault_steps", "n_emulated", "n_instants")
+        at_least_one(self, *counts, "n_empty", "speed_steps")
+        if self.n_faults > dict(self.episodes).get("lab", 0) or self.fault_steps > self.n_steps:
+            raise ConfigError(
+                "Faults are compared with the lab's first episodes: n_faults must not exceed their "
+                f"number nor fault_steps n_steps, got {self.n_faults} and {self.fault_steps}."
+            )
+        if not self.bodies:
+            raise ConfigError(f"bodies must name some of {worker_names()}.")
+
+
+QUICK = PerceptionBenchConfig(
+    episodes=(("lab", 4), ("site", 2)), n_steps=80, n_resets=8, n_faults=4, fault_steps=40,
+    n_emulated=8, bodies=("worker_1", "worker_2"), n_instants=10, n_empty=40, emulator_rounds=0,
+    speed_steps=30,
+)  # fmt: skip
+"""Every number, from little."""
+
+
+class Task(NamedTuple):
+    """One part of the bench."""
+
+    label: str
+    cost: float
+    """How long it takes beside the others, roughly [s]."""
+    make: Callable[[PartProgress], dict[str, Any]]
+
+
+def tasks_of(config: PerceptionBenchConfig) -> Iterator[Task]:
+    """All parts, times last."""
+    yield from _crops(config)
+    yield Task("acquired", 0.5 * config.n_resets, partial(_acquired, config.n_resets))
+    yield from _episodes(config)
+    yield from _faults(config)
+    for scene, _ in config.episodes:
+        make = partial(episodes.phantoms, scene, config.n_empty, FIRST_SEED)
+        yield Task(f"empty.{scene}", 0.1 * config.n_empty, make)
+    if config.emulator_rounds is not None:
+        make = partial(_emulator, config.emulator_rounds)
+        yield Task("emulator", 40.0 * max(2 * config.emulator_rounds, 1), make)
+    yield from _speeds(config)
+
+
+def _speeds(config: PerceptionBenchConfig) -> Iterator[Task]:
+    """The lab in all sizes; its largest rig once more on the site and on the other runtime."""
+    most, fewest = max(config.cameras), min(config.workers)
+    runtimes = (speed.LITERT, speed.OPENVINO) if vino.installed() else (speed.LITERT,)
+    settings = [
+        *(speed.Setting(c, w) for c in config.cameras for w in config.workers),
+        speed.Setting(most, fewest, scene="site"),
+        *(speed.Setting(most, fewest, runtime=runtime) for runtime in runtimes[1:]),
+    ]
+    for setting in settings:
+        make = partial(speed.measure, setting, config.speed_steps, FIRST_SEED)
+        cost = 2 + 0.02 * config.speed_steps * setting.cameras * setting.workers
+        yield Task(f"speed.{setting.name}", cost, make)
+    for runtime in runtimes:
+        yield Task(f"network.{runtime}", 3, partial(speed.network_ms, runtime))
+
+
+def _episodes(config: PerceptionBenchConfig) -> Iterator[Task]:
+    for scene, n in config.episodes:
+        for first in range(0, n, BLOCK):
+            seeds = [FIRST_SEED + k for k in range(first, min(first + BLOCK, n))]
+            make = partial(_play, seeds, config.n_steps, scene=scene, perception=PIXELS)
+            cost = 2 + 0.05 * config.n_steps * len(seeds)
+            yield Task(f"loop.{scene}.{first}", cost, make)
+
+
+def _faults(config: PerceptionBenchConfig) -> Iterator[Task]:
+    """Every fault at the levels that know it; at `keypoints` also the same without."""
+    for kind in config.kinds:
+        make = partial(_play_fault, kind, config.n_faults, config.fault_steps, PIXELS)
+        slow = 3.0 if kind == "motion_blur" else 1.2
+        cost = 8 + slow * 0.05 * config.fault_steps * config.n_faults
+        yield Task(f"fault.{PIXELS}.{kind}", cost, make)
+    emulated = [kind for kind in config.kinds if KINDS[kind].group != IMAGE]
+    for kind in (*emulated, NO_FAULT):
+        make = partial(_play_fault, kind, config.n_emulated, config.n_steps, EMULATED)
+        cost = 1 + 0.0015 * config.n_steps * config.n_emulated
+        yield Task(f"fault.{EMULATED}.{kind}", cost, make)
+
+
+def _play(seeds: list[int], n_steps: int, tick: PartProgress, **arguments: Any) -> dict[str, Any]:
+    played = episodes.play(seeds, n_steps, tick, **arguments)
+    return {"episodes": [episode.to_json() for episode in played]}
+
+
+def _play_fault(kind: str, n: int, n_steps: int, level: str, tick: PartProgress) -> dict[str, Any]:
+    """Episodes in which the cameras have a fault in turns."""
+    played: list[dict[str, Any]] = [{}] * n
+    n_cameras = len(SCENES["lab"].cameras)
+    for c in range(min(n_cameras, n)):
+        mine = list(range(c, n, n_cameras))
+        faults = [] if kind == NO_FAULT else [FaultConfig(kind, (f"camera_{c + 1}",))]
+        seeds, part = [FIRST_SEED + k for k in mine], len(mine) / n
+        told = lambda share, part=part: tick(part * share)  # noqa: E731
+        some = _play(seeds, n_steps, told, perception=level, faults=faults)["episodes"]
+        for k, episode in zip(mine, some, strict=True):
+            played[k] = episode
+    return {"episodes": played}
+
+
+def _crops(config: PerceptionBenchConfig) -> Iterator[Task]:
+    """Crops of every body in every scene; of one body through every lens, in every appearance."""
+    n, first = config.n_instants, config.bodies[0]
+    cost = 3 + 0.12 * n
+    for name, _ in config.episodes:
+        for body in config.bodies:
+            scene = partial(build, SceneConfig(), name, 1, body)
+            yield Task(f"crops.{PLAIN}.{name}.{body}", cost, partial(_look, PLAIN, scene, n))
+    for row, rig in LENSES.items():
+        scene = partial(build, SceneConfig(cameras=RIGS[rig]), "lab", 1, first)
+        yield Task(f"crops.lens.{row}", 2 * cost, partial(_look, f"lens {row}", scene, 2 * n))
+    for row in APPEARANCES:
+        scene = partial(build, SceneConfig(), "lab", 1, first)
+        yield Task(f"crops.appearance.{row}", cost, partial(_look, f"appearance {row}", scene, n))
+
+
+def _look(variant: str, make: Callable[[], Scene], n: int, tick: PartProgress) -> dict[str, Any]:
+    """n moments; every activity has its turn."""
+    scene, views = make(), list[View]()
+    rng = np.random.default_rng(zlib.crc32(f"{scene.name} {scene.bodies[0]}".encode()))
+    appearance = APPEARANCES.get(variant.removeprefix("appearance "), AS_BUILT)
+    looker = Looker(scene)
+    for k, now in enumerate(instants(scene, n, rng, in_turns())):
+        if appearance != AS_BUILT:
+            looker.randomize(draw_look(appearance, 1, np.random.default_rng([FIRST_SEED, k])))
+        looked = looker.detect(now)
+        for c in np.flatnonzero(looked.in_view).tolist():
+            error = float(looked.error[c])
+            views.append(
+                View(
+                    variant=variant,
+                    scene=scene.name,
+                    body=scene.bodies[0],
+                    activity=now.activity,
+                    distance_m=float(looked.distance_m[c]),
+                    angle_deg=float(looked.angle_deg[c]),
+                    error=error if np.isfinite(error) else None,
+                )
+            )
+        tick(1 / n)
+    looker.close()
+    return {"views": [asdict(view) for view in views]}
+
+
+def _acquired(n: int, tick: PartProgress) -> dict[str, Any]:
+    return {"acquired": episodes.acquisition(range(FIRST_RESET, FIRST_RESET + n), tick)}
+
+
+def _emulator(rounds: int, tick: PartProgress) -> dict[str, Any]:
+    ratios = error_ratios(rounds, say=lambda share, label: tick(share))
+    return {name: asdict(metric) for name, metric in ratios.items()}
+
+
+def play(config: PerceptionBenchConfig, parts: PartCache) -> dict[str, dict[str, Any]]:
+    """All parts by their labels."""
+    tasks = list(tasks_of(config))
     total = sum(task.cost for task in tasks)
-    for task in tasks:
-        n_parts = total / task.cost
-        cache = PartCache(out / "parts", fingerprint, n_parts, say)
-        task.take(cache.part(task.label, task.make), found)
-    base = found.loops["lab"][: config.n_faults]
-    first = slice(config.fault_steps)
-    found.faults[PIXELS, NO_FAULT] = [loops.some_steps(each, first) for each in base]
-    metrics = metrics_of(found)
-    seeds = [FIRST_SEED + k for k in range(max(n for _, n in config.episodes))]
-    write_results(out / "results.json", {"bench": asdict(config)}, seeds, metrics)
-    write_report(out, metrics)
-    plain = [view for view in found.views if view.variant == PLAIN]
-    worst = sheet.worst_of([np.nan if v.error is None else v.error for v in plain])
-    kept = [plain[k].picture for k in worst]
-    sheet.write_sheet(out / "worst_crops.png", [out / name for name in kept if name])
-    return metrics
+    return {
+        task.label: replace(parts, n_parts=total / task.cost).part(task.label, task.make)
+        for task in tasks
+    }
+
+
+PERCEPTION = Study(
+    name="bench perception",
+    modules=("benchmarks.perception.bench",),
+    settings=lambda config: {"bench": asdict(config)},
+    seeds=lambda config: [FIRST_SEED + k for k in range(max(n for _, n in config.episodes))],
+    n_parts=lambda config: len(list(tasks_of(config))),
+    play=play,
+    metrics=lambda config, found: metrics_of(found, config.n_faults, config.fault_steps),
+    report=report,
+)

@@ -12,9 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from hrc_env.config import HRCConfig
-from hrc_env.core.records import Held, Roi, WorkerMotion
+from hrc_env.core.batching import one
+from hrc_env.core.records import WorkerMotion
 from hrc_env.core.skeleton import JOINT
-from hrc_env.core.typing import Bools, Floats, Image, JointAngles, Points2, Points3
+from hrc_env.core.typing import Bools, Floats, JointAngles, Points2, Points3
 from hrc_env.geometry.cameras import (
     image_from_pinhole,
     inside_image,
@@ -32,8 +33,6 @@ from hrc_env.scene.domain_randomization import Look
 from hrc_env.scene.render import CropRenderer
 from hrc_env.worker.body import load_body, worker_truth
 
-GOOD_SHARE = 0.10
-"""Joints that are on average this share of the stature from the truth are still good."""
 STEP_S = 0.04
 PAUSE_STEPS = (20, 80)
 """Between two looks pass 0.8 to 3.2 s: another moment of the work, or other work."""
@@ -53,21 +52,16 @@ class Instant(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Looked:
-    """What the cameras made of one instant; arrays (C, ...)."""
+    """What the cameras made of one instant; arrays (C,)."""
 
     in_view: Bools
-    """(C,) all joints in the image, nothing of room or robot before them."""
-    windows: list[Roi | None]
-    found_px: Points2
-    """(C, J, 2) pinhole pixels; NaN where nobody was found."""
-    true_px: Points2
-    """(C, J, 2) the same of the truth."""
+    """All joints in the image, nothing of room or robot before them."""
     error: Floats
-    """(C,) mean distance of the joints from the truth as a share of the stature; NaN: missed."""
+    """Mean distance of the joints from the truth as a share of the stature; NaN: missed."""
     distance_m: Floats
-    """(C,) from the camera to the middle of the body [m]."""
+    """From the camera to the middle of the body [m]."""
     angle_deg: Floats
-    """(C,) between where the worker faces and the direction to the camera, seen from above: 0 from
+    """Between where the worker faces and the direction to the camera, seen from above: 0 from
     the front, 180 from behind."""
 
 
@@ -80,7 +74,7 @@ class Looker:
         self.source = Lensed(self.renderer, scene.cameras)
         self.detector = PoseDetector(scene.cameras)
 
-    def dress(self, look: Look) -> None:
+    def randomize(self, look: Look) -> None:
         """Let everything look so from the next look on."""
         self.renderer.randomize(look)
 
@@ -89,69 +83,45 @@ class Looker:
         scene = self.scene
         joints = worker_truth(self.body, now.motion).joints_world[0]
         px, depth_m = (values[0] for values in project(projections(scene.cameras), joints))
-        views = zip(px, depth_m, scene.cameras, strict=True)
-        windows = [window_from_joints(*view) for view in views]
-        found = self._found(now, windows)
+        found = self._found(now, px, depth_m)
         stature_px = np.array([camera.K[0, 0] for camera in scene.cameras]) * self.body.stature_m
         off_px = np.linalg.norm(found - px, axis=-1).mean(1)
         eyes = np.stack([camera.eye_world for camera in scene.cameras])
+        blocked = hidden(scene.surroundings(now.q[None]), eyes, joints)[0].any(1)
+        inside = [
+            inside_image(camera, image_from_pinhole(camera, px[c])).all()
+            for c, camera in enumerate(scene.cameras)
+        ]
         return Looked(
-            in_view=self._in_view(now, joints, px),
-            windows=windows,
-            found_px=found,
-            true_px=px,
+            in_view=np.array(inside) & ~blocked,
             error=off_px * depth_m.mean(1) / stature_px,
             distance_m=np.linalg.norm(eyes - joints[0].mean(0), axis=-1),
             angle_deg=view_angle_deg(joints[0], eyes),
         )
-
-    def crop(self, camera: int, window: Roi) -> Image:
-        """A copy of a crop of the last instant."""
-        return np.array(self.source.crop(camera, window))
-
-    def image_px(self, camera: int, pinhole_px: Points2) -> Points2:
-        """Pixels of a camera's image, as its lens distorts it, of pinhole ones."""
-        return image_from_pinhole(self.scene.cameras[camera], pinhole_px)
 
     def close(self) -> None:
         """Free threads and the graphics context."""
         self.detector.close()
         self.renderer.close()
 
-    def _found(self, now: Instant, windows: list[Roi | None]) -> Points2:
-        """(C, J, 2) pinhole pixels."""
-        found = np.full((len(windows), len(JOINT), 2), np.nan)
-        if not any(windows):
-            return found
-        self.renderer.draw(now.q, alone(now.motion))
-        self.detector.forget(0)  # as at a first look: the detector stage must agree
-        sight = self.detector.detect(self.source, windows)
-        for c, camera in enumerate(self.scene.cameras):
-            found[c] = pinhole_from_image(camera, sight.px[c])
-        return found
-
-    def _in_view(self, now: Instant, joints: Points3, px: Points2) -> Bools:
+    def _found(self, now: Instant, true_px: Points2, depth_m: Floats) -> Points2:
+        """(C, J, 2) pinhole pixels; NaN where nobody was found."""
         cameras = self.scene.cameras
-        eyes = np.stack([camera.eye_world for camera in cameras])
-        blocked = hidden(self.scene.surroundings(now.q[None]), eyes, joints)[0]
-        inside = [
-            inside_image(camera, self.image_px(c, px[c])).all() for c, camera in enumerate(cameras)
-        ]
-        return np.array(inside) & ~blocked.any(1)
+        views = zip(true_px, depth_m, cameras, strict=True)
+        windows = [window_from_joints(*view) for view in views]
+        if not any(windows):
+            return np.full_like(true_px, np.nan)
+        self.renderer.draw(now.q, one(now.motion, 0))
+        self.detector.forget(0)  # as at a first look: the detector stage must agree
+        px = self.detector.detect(self.source, windows).px
+        return np.stack([pinhole_from_image(camera, px[c]) for c, camera in enumerate(cameras)])
 
 
 def instants(
-    scene: Scene, n: int, rng: np.random.Generator, wanted: Sequence[str] = ()
+    scene: Scene, n: int, rng: np.random.Generator, wanted: Sequence[str]
 ) -> Iterator[Instant]:
-    """n moments of a worker's day in a scene.
-
-    Args:
-        scene: where; the worker has its first body.
-        n: how many.
-        rng: draws the day and the arm.
-        wanted: moments of these activities, in turns, where one comes within some minutes, else
-            as they come; none takes every moment as it comes.
-    """
+    """n moments of a worker's day in a scene, of whose first body they are: of the activities that
+    are wanted, in turns, where one comes within some minutes, else as they come."""
     body = load_body(scene.bodies[0])
     state = generator.make_state(1, 1, body, HRCConfig().motion, scene.grounds)
     streams = [np.random.default_rng(rng.integers(2**63))]
@@ -162,29 +132,14 @@ def instants(
             steps = int(rng.integers(*PAUSE_STEPS))
             generator.advance(state, streams, STEP_S, steps)
             name = generator.activity_names[generator.activity(state)[0, 0]]
-            if not wanted or name == wanted[k % len(wanted)]:
+            if name == wanted[k % len(wanted)]:
                 break
         q = scene.home_q + rng.uniform(-1, 1, len(spread)) * spread
         yield Instant(name, q, generator.current(state))
 
 
-def alone(motion: WorkerMotion) -> WorkerMotion:
-    """The first environment's part of a motion, as the renderer takes it: (W, S, ...)."""
-    held = motion.held
-    return WorkerMotion(
-        motion.position_world[0], motion.quaternion_wxyz[0], motion.velocity_world[0],
-        motion.angular_velocity_world[0],
-        held and Held(held.kind[0], held.position_world[0], held.quaternion_wxyz[0]),
-    )  # fmt: skip
-
-
 def view_angle_deg(joints_world: Points3, eyes_world: Points3) -> Floats:
-    """(C,) see `Looked.angle_deg`.
-
-    Args:
-        joints_world: (J, 3) of one worker.
-        eyes_world: (C, 3).
-    """
+    """(C,) see `Looked.angle_deg`, of one worker's joints (J, 3) from eyes (C, 3)."""
     left = joints_world[[JOINT["left_shoulder"], JOINT["left_hip"]]].mean(0)
     right = joints_world[[JOINT["right_shoulder"], JOINT["right_hip"]]].mean(0)
     across = (left - right)[:2]

@@ -2,10 +2,22 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
-from benchmarks.perception.families import FAMILY_OF
+from hrc_env.motion.generator import activity_names
 
+FAMILIES: dict[str, tuple[str, ...]] = {
+    "stand": ("stand", "look round", "turn", "point"),
+    "walk": ("walk", "stumble", "step back", "lunge"),
+    "carry": ("carry", "push", "hand over", "receive"),
+    "work": ("reach", "hammer", "drill", "saw", "measure", "clip"),
+    "raise": ("drill overhead", "climb"),
+    "fold": ("lift", "pick up", "set down", "squat", "kneel"),
+}
+"""Motion families and the activities in them; every activity is in one. A judgement: `fold` are
+those in which trunk or knees are bent far, where the network is weak."""
+FAMILY_OF: dict[str, str] = {
+    activity: family for family, activities in FAMILIES.items() for activity in activities
+}
 DISTANCES_M = (0, 3, 4, 6, 9, 13)
 """Lower bounds of the rows by distance; the last one is open."""
 ANGLES_DEG = (0, 45, 90, 135)
@@ -21,13 +33,10 @@ class View:
     scene: str
     body: str
     activity: str
-    camera: str
     distance_m: float
     angle_deg: float
     error: float | None
     """Mean distance of the joints from the truth as a share of the stature; None: missed."""
-    picture: str | None
-    """File name of the crop, if it was kept."""
 
 
 ROWS: Mapping[str, Callable[[View], str]] = {
@@ -55,9 +64,16 @@ def rows_of(views: list[View], kind: str) -> dict[str, list[View]]:
     return {row: [view for view in chosen if name(view) == row] for row in found}
 
 
-def view_of(content: dict[str, Any]) -> View:
-    """From what `dataclasses.asdict` gave."""
-    return View(**content)
+def in_turns() -> tuple[str, ...]:
+    """Every activity that a worker does on their own account, the families in turns."""
+    kinds = [[each for each in names if each != "clip"] for names in FAMILIES.values()]
+    longest = max(map(len, kinds))
+    return tuple(names[k] for k in range(longest) for names in kinds if k < len(names))
+
+
+def family_index(activity: int) -> int:
+    """The family of an activity: an index of `FAMILIES`."""
+    return list(FAMILIES).index(FAMILY_OF[activity_names[activity]])
 
 
 def _band(value: float, bounds: tuple[float, ...], unit: str) -> str:

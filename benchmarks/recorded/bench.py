@@ -1,15 +1,14 @@
-"""The tracking bench on real footage: every estimator on the same detections."""
+"""The tracking bench on recorded films: every estimator on the same detections."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import asdict
+from dataclasses import replace
 from pathlib import Path
 
+from benchmarks.common import exactly
 from benchmarks.recorded.calibration import read_calibration, tracker_config
-from benchmarks.recorded.detections import FOLLOWER, Detections, detections_of
-from benchmarks.recorded.fetch import WHEEL, fetch_footage
+from benchmarks.recorded.detections import FOLLOWER, Detections, detections_of, lag_of
+from benchmarks.recorded.fetch import WHEEL, fetch_recording
 from benchmarks.recorded.film import film_track
 from benchmarks.recorded.films import Films
-from benchmarks.recorded.lag import lag_of
 from benchmarks.recorded.metrics import (
     NAMES,
     bone_std,
@@ -20,68 +19,79 @@ from benchmarks.recorded.metrics import (
     two_camera_share,
 )
 from benchmarks.tracking.names import DEFAULT
-from hrc_env.core.results import Metric, write_results
+from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats
+from hrc_env.experiments.study.cache import PartCache
+from hrc_env.experiments.study.report import Column, Metrics, Picture, Report, table_of
+from hrc_env.experiments.study.runner import Study
 from hrc_env.geometry.cameras import projections
 from hrc_env.tracking.config import TrackerConfig
 
-Say = Callable[[float, str], None]
-"""Told by how much the share that is done grew, and what is being done."""
+FILM = "recorded.mp4"
 _DETECTING, _ESTIMATING, _FILMING = 0.35, 0.35, 0.25
+_LEAD = """\
+Leave-one-camera-out reprojection [px]; `renamed`: where it fits better, the held-out detector is
+taken to have exchanged left and right; `in step`: frames shifted by the lags below. Coverage: share
+of held-out detections within the 95 % region of belief and detector. Bones and jerk with all
+cameras; the last column is the mean share of frames in which two cameras, any pair, kept all joints
+fresh. The smoother is offline: it sees the whole recording at once. Intervals are of blocks of
+frames; of bones, jerk and pairs of cameras, the least and the largest."""
+_COLUMNS = [
+    *(
+        Column(f"real_{kind}_px.{{}}.{part}", f"{words}{part}")
+        for kind, words in (
+            ("reprojection", ""),
+            ("reprojection_either", "renamed, "),
+            ("in_step_reprojection", "in step, "),
+        )
+        for part in ("median", "p95")
+    ),
+    Column("real_coverage95.{}", "coverage", 3),
+    Column("real_bone_std_m.{}", "bone std [cm]", 2, 100),
+    Column("real_jerk.{}", "jerk [m/s³]", 0),
+    Column("real_two_camera_share.{}", "two cameras", 3),
+]
 
 
-def run(out: Path, say: Say) -> dict[str, Metric]:
-    """Run on the footage; writes results.json, real.md, real.mp4 and detections.npz into `out`.
-
-    Args:
-        out: a folder; detections that are there already are not made again.
-        say: hears of the progress: shares that sum to 1.
+def play(config: None, parts: PartCache) -> dict[str, Metric]:
+    """Fetch, detect, estimate, film; detections that are there already are not made again.
 
     Raises:
-        DownloadError: the footage is not there and cannot be fetched.
+        DownloadError: the recording is not there and cannot be fetched.
         WeightsError: the pose network's weights are not there.
     """
-    footage = fetch_footage(lambda sentence: say(0.0, sentence))
-    say(0.05, "looking at the films")
-    films = Films(footage.films)
+    recording = fetch_recording(lambda sentence: parts.progress(0.0, sentence))
+    parts.progress(0.05, "detecting")
+    films = Films(recording.films)
     try:
-        cameras = read_calibration(footage.calibration, films.sizes_px)
+        cameras = read_calibration(recording.calibration, films.sizes_px)
         detections = detections_of(
             films,
             cameras,
-            out / "detections.npz",
-            lambda share: say(_DETECTING * share, "looking at the films"),
+            parts.folder / "detections.npz",
+            lambda share: parts.progress(_DETECTING * share, "detecting"),
         )
     finally:
         films.close()
-    pinholes = [camera.pinhole for camera in cameras]
-    P, config = projections(tuple(pinholes)), tracker_config(pinholes)
+    pinholes = [replace(camera, lens=None) for camera in cameras]
+    P, tracker = projections(tuple(pinholes)), tracker_config(pinholes)
     lags = lag_of(P, detections)
     in_step = detections.shifted(lags)
     metrics: dict[str, Metric] = {}
     for name in NAMES:
-        say(_ESTIMATING / len(NAMES), name)
-        metrics |= _of_estimator(name, P, config, detections, in_step)
+        parts.progress(_ESTIMATING / len(NAMES), name)
+        metrics |= _of_estimator(name, P, tracker, detections, in_step)
     for camera, lag in zip(pinholes, lags, strict=True):
-        metrics[f"real_lag_frames.{camera.name}"] = Metric(lag, lag, lag, "frames", 1)
-    settings = {
-        "footage": WHEEL,
-        "follower": FOLLOWER,
-        "dt_s": detections.dt_s,
-        "tracker": asdict(config),
-    }
-    write_results(out / "results.json", settings, [0], dict(sorted(metrics.items())))
-    (out / "real.md").write_text(markdown(metrics, NAMES))
-    track = follow(DEFAULT, P, config, in_step, list(range(len(P))))
+        metrics[f"real_lag_frames.{camera.name}"] = exactly(lag, "frames")
     film_track(
-        out / "real.mp4",
-        footage.films,
+        parts.folder.parent / "figures" / FILM,
+        recording.films,
         pinholes,
         lags,
-        track,
-        lambda share: say(_FILMING * share, "drawing the film"),
+        follow(DEFAULT, P, tracker, in_step, list(range(len(P)))),
+        lambda share: parts.progress(_FILMING * share, "drawing the film"),
     )
-    return metrics
+    return dict(sorted(metrics.items()))
 
 
 def _of_estimator(
@@ -101,52 +111,27 @@ def _of_estimator(
     return metrics
 
 
-def markdown(metrics: Mapping[str, Metric], names: list[str]) -> str:
-    """The table, a row an estimator, and what it says."""
+def report(metrics: Metrics, figures: Path) -> Report:
+    """The table, a row an estimator, and what it says; the film is there."""
     lags = [
         f"{name.rsplit('.', 1)[1]} {metric.value:+.0f}"
         for name, metric in metrics.items()
         if name.startswith("real_lag_frames.")
     ]
-    header = ["", *(title for title, *_ in _COLUMNS)]
-    rows = [[name, *(_cell(metrics, column, name) for column in _COLUMNS)] for name in names]
-    rule = ["---", *["---:"] * len(_COLUMNS)]
-    table = "\n".join("| " + " | ".join(row) + " |" for row in (header, rule, *rows))
-    return (
-        "# Tracking on real footage\n\n"
-        "Leave-one-camera-out reprojection [px], median / 95th percentile; `renamed`: where it "
-        "fits better, the held-out detector is taken to have exchanged left and right; `in "
-        "step`: frames shifted by the lags below. Coverage: share of held-out detections within "
-        "the 95 % region of belief and detector. Bones and jerk with all cameras; the last "
-        "column is the mean share of frames in which two cameras, any pair, kept all joints "
-        "fresh. The smoother is offline: it sees the whole recording at once.\n\n"
-        f"{table}\n\n"
-        f"Lag in frames: {', '.join(lags)}.\n"
-    )
+    return Report("Tracking on recorded films", _LEAD, [
+        table_of("", {name: name for name in NAMES}, _COLUMNS, metrics),
+        f"Lag in frames: {', '.join(lags)}.",
+        Picture(figures / Path(FILM).with_suffix(".png"), f"The middle frame of {FILM}."),
+    ])  # fmt: skip
 
 
-_Column = tuple[str, tuple[str, ...], float, int]
-_COLUMNS: tuple[_Column, ...] = (
-    ("reprojection", ("real_reprojection_px.{}.median", "real_reprojection_px.{}.p95"), 1, 1),
-    (
-        "renamed",
-        ("real_reprojection_either_px.{}.median", "real_reprojection_either_px.{}.p95"),
-        1,
-        1,
-    ),
-    (
-        "in step",
-        ("real_in_step_reprojection_px.{}.median", "real_in_step_reprojection_px.{}.p95"),
-        1,
-        1,
-    ),
-    ("coverage", ("real_coverage95.{}",), 1, 3),
-    ("bone std [cm]", ("real_bone_std_m.{}",), 100, 2),
-    ("jerk [m/s³]", ("real_jerk.{}",), 1, 0),
-    ("two cameras", ("real_two_camera_share.{}",), 1, 3),
+RECORDED = Study(
+    name="bench recorded",
+    modules=("benchmarks.recorded.metrics",),
+    settings=lambda _: {"recording": WHEEL, "follower": FOLLOWER},
+    seeds=lambda _: [0],
+    n_parts=lambda _: 1,
+    play=play,
+    metrics=lambda _, played: played,
+    report=lambda _, played, *rest: report(*rest),
 )
-
-
-def _cell(metrics: Mapping[str, Metric], column: _Column, name: str) -> str:
-    _, keys, scale, digits = column
-    return " / ".join(f"{scale * metrics[key.format(name)].value:.{digits}f}" for key in keys)

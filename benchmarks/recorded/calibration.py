@@ -1,4 +1,4 @@
-"""The calibration of recorded footage: Qualisys' XML to pinhole cameras with a lens.
+"""The calibration of a recording: Qualisys' XML to pinhole cameras with a lens.
 
 Frames: the file's world is right-handed, +Z up, in millimetres, and becomes `world` in metres.
 Its matrix has the camera's axes in its rows (+X right, +Y up, -Z forward), so that OpenCV's
@@ -9,14 +9,14 @@ says the right margin was cut off: moving or stretching it makes the views agree
 """
 
 import xml.etree.ElementTree as ElementTree
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.typing import Floats, Points3
+from hrc_env.core.typing import Points3
 from hrc_env.geometry.cameras import PinholeCamera
+from hrc_env.geometry.lens import Lens
 from hrc_env.tracking.config import ParticleConfig
 
 _PER_PX = 64.0
@@ -25,22 +25,8 @@ _PARALLEL = 1e9
 _HALF_TURN_ABOUT_X = np.diag([1.0, -1.0, -1.0])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class FilmedCamera:
-    """A real camera."""
-
-    pinhole: PinholeCamera
-    """What it is without the lens' distortion."""
-    distortion: Floats
-    """(4,) Brown's k1, k2, p1, p2."""
-
-
-def read_calibration(path: Path, sizes_px: list[tuple[int, int]]) -> list[FilmedCamera]:
-    """The cameras of a Qualisys calibration file.
-
-    Args:
-        path: the file.
-        sizes_px: width and height of each camera's film, in the file's order.
+def read_calibration(path: Path, sizes_px: list[tuple[int, int]]) -> list[PinholeCamera]:
+    """The cameras of a Qualisys calibration file, whose films have these widths and heights.
 
     Raises:
         ConfigError: the file is no such calibration, or has another number of cameras.
@@ -96,7 +82,7 @@ def tracker_config(cameras: list[PinholeCamera]) -> ParticleConfig:
     )
 
 
-def _camera(node: ElementTree.Element, size_px: tuple[int, int]) -> FilmedCamera:
+def _camera(node: ElementTree.Element, size_px: tuple[int, int]) -> PinholeCamera:
     place, lens = _numbers(node, "transform"), _numbers(node, "intrinsic")
     rows = np.array([[place[f"r{i}{k}"] for k in (1, 2, 3)] for i in (1, 2, 3)])
     T_world_from_cam = np.eye(4)
@@ -110,8 +96,8 @@ def _camera(node: ElementTree.Element, size_px: tuple[int, int]) -> FilmedCamera
         ]
     )
     names = [f"{kind}Distortion{k}" for kind in ("radial", "tangental") for k in (1, 2)]
-    pinhole = PinholeCamera(node.attrib["serial"], K, T_world_from_cam, *size_px)
-    return FilmedCamera(pinhole, np.array([lens[name] for name in names]))
+    brown = Lens("brown_conrady", tuple(lens[name] for name in names))
+    return PinholeCamera(node.attrib["serial"], K, T_world_from_cam, *size_px, brown)
 
 
 def _numbers(node: ElementTree.Element, tag: str) -> dict[str, float]:

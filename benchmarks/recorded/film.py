@@ -31,13 +31,7 @@ def film_track(
 ) -> None:
     """Write an .mp4 of the films with a track drawn in, and its middle frame as .png.
 
-    Args:
-        path: of the .mp4.
-        films: (C,) files.
-        cameras: (C,) pinholes.
-        lag_frames: (C,) the track's first frame is each camera's frame lag - min(lag).
-        track: (T, ...) with the films in step.
-        tick: told the share that is done.
+    The track's first frame is each camera's frame lag - min(lag).
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_suffix(".draft.mp4")

@@ -8,15 +8,12 @@ import numpy as np
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Roi
-from hrc_env.core.typing import Floats, Image, Points2
+from hrc_env.core.typing import Image
 from hrc_env.perception.blazepose import sample_window
 
 
 class Films:
-    """Films of a rig, read side by side; an `ImageSource` of the frames that are open.
-
-    Only one frame a camera is kept.
-    """
+    """Films of a rig, read side by side; an `ImageSource` of the frames that are open."""
 
     def __init__(self, paths: Sequence[Path]) -> None:
         """Open the films; raises `ConfigError` for a file that is none."""
@@ -72,15 +69,3 @@ class Films:
         """Close the files."""
         for film in self._films:
             film.release()
-
-
-def undistort(px: Points2, K: Floats, distortion: Floats) -> Points2:
-    """Pixels (..., 2) as a pinhole camera with the same K would see them.
-
-    Args:
-        px: as the lens shows them; NaN stays NaN.
-        K: (3, 3), pixels continuous from the image's corner.
-        distortion: (4,) Brown's k1, k2, p1, p2, in OpenCV's order.
-    """
-    flat = np.ascontiguousarray(px, float).reshape(-1, 1, 2)
-    return np.asarray(cv2.undistortPoints(flat, K, distortion, P=K), float).reshape(px.shape)

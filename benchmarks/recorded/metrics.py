@@ -1,21 +1,20 @@
-"""How good an estimator is where nobody knows the truth: real footage.
+"""How good an estimator is where nobody knows the truth: recorded films.
 
 A camera is held out and must be foretold; bones must not change; motion must be smooth; and
 two cameras must be enough to go on with every joint.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import combinations
 
 import numpy as np
 
-from benchmarks.recorded.detections import Detections
-from benchmarks.recorded.lag import SURE
+from benchmarks.recorded.detections import SURE, Detections
 from hrc_env.core.records import PoseEstimate
 from hrc_env.core.results import Metric
 from hrc_env.core.skeleton import BONES, MIRROR
 from hrc_env.core.typing import Bools, Covariances3, Floats, Points3
+from hrc_env.experiments.study.intervals import quantile_over, ratio_over
 from hrc_env.geometry.cameras import project
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import ESTIMATORS, make_estimator
@@ -24,14 +23,13 @@ from hrc_env.tracking.smoother import smooth
 SMOOTHER = "smoother"
 """Offline: it sees the whole recording at once."""
 NAMES = [*ESTIMATORS, SMOOTHER]
-"""Who runs on real footage."""
+"""Who runs on a recording."""
 FRESH_S = 0.2
 """A joint counts as updated when a measurement supported it within so many seconds."""
 CHI2_95_2D = 5.991
 """95 % of a two-dimensional normal variable lies within this squared distance."""
 _BLOCK = 10
 """Neighbouring frames are alike: intervals come from drawing blocks of this many."""
-_N_DRAWN = 300
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,35 +50,22 @@ def follow(
     name: str, P: Floats, config: TrackerConfig, detections: Detections, cameras: list[int]
 ) -> Track:
     """Run an estimator, or the smoother, on some of the cameras of a recording."""
+    clip = [detections.keypoints(t, cameras) for t in range(len(detections.px))]
     if name == SMOOTHER:
-        clip = [detections.keypoints(t, cameras) for t in range(len(detections.px))]
         belief = smooth(P[cameras], clip, detections.dt_s, config)
-        return Track(
-            belief.mean_world[:, 0, 0],
-            belief.cov_world[:, 0, 0],
-            belief.age_s[:, 0, 0],
-            belief.tracked[:, 0, 0],
-        )
-    rows = list(_follow(name, P, config, detections, cameras))
-    return Track(
-        np.stack([row.mean_world[0, 0] for row in rows]),
-        np.stack([row.cov_world[0, 0] for row in rows]),
-        np.stack([row.age_s[0, 0] for row in rows]),
-        np.stack([row.tracked[0, 0] for row in rows]),
-    )
-
-
-def _follow(
-    name: str, P: Floats, config: TrackerConfig, detections: Detections, cameras: list[int]
-) -> Iterator[PoseEstimate]:
+        return Track(*(getattr(belief, each.name)[:, 0, 0] for each in fields(Track)))
     estimator = make_estimator(name, P[cameras], detections.dt_s, config)
     rngs = [np.random.default_rng([0, 7])]
     state = estimator.init(1, 1)
     estimator.reset(state, np.arange(1), rngs)
-    for t in range(len(detections.px)):
+    said: list[PoseEstimate] = []
+    for keypoints in clip:
         estimator.predict(state, detections.dt_s, rngs)
-        estimator.update(state, detections.keypoints(t, cameras), rngs)
-        yield estimator.estimate(state)
+        estimator.update(state, keypoints, rngs)
+        said.append(estimator.estimate(state))
+    return Track(
+        *(np.stack([getattr(row, each.name)[0, 0] for row in said]) for each in fields(Track))
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -130,30 +115,18 @@ def _inside(P: Floats, track: Track, detections: Detections, camera: int) -> Boo
 
 
 def foretold_metrics(foretold: Foretold) -> dict[str, Metric]:
-    """Median and 95th percentile [px], also with sides renamed, and coverage, with intervals."""
-    out = {}
-    for kind, off in (("px", foretold.off_px), ("either_px", foretold.off_either_px)):
-        for part, share in (("median", 50), ("p95", 95)):
-            values = [float(np.nanpercentile(some, share)) for some in _drawn(off)]
-            out[f"{kind}.{part}"] = _interval(values, "px", off)
-    values = [float(np.nanmean(some)) for some in _drawn(foretold.inside)]
-    out["coverage95"] = _interval(values, "share", foretold.inside)
+    """Median and 95th percentile [px], also with sides renamed, and coverage; blocks of frames are
+    drawn anew."""
+    n_blocks = max(len(foretold.inside) // _BLOCK, 1)
+    out = {
+        f"{kind}.{part}": quantile_over(np.array_split(off, n_blocks), q, "px")
+        for kind, off in (("px", foretold.off_px), ("either_px", foretold.off_either_px))
+        for part, q in (("median", 0.5), ("p95", 0.95))
+    }
+    inside = np.array_split(foretold.inside, n_blocks)
+    counts = [np.isfinite(each).sum() for each in inside]
+    out["coverage95"] = ratio_over([np.nansum(each) for each in inside], counts, "share")
     return out
-
-
-def _drawn(values: Floats) -> Iterator[Floats]:
-    """All frames, then 300 times as many blocks of frames, drawn with replacement."""
-    yield values
-    blocks = np.array_split(np.arange(len(values)), max(len(values) // _BLOCK, 1))
-    rng = np.random.default_rng(0)
-    for _ in range(_N_DRAWN):
-        drawn = rng.integers(len(blocks), size=len(blocks))
-        yield values[np.concatenate([blocks[k] for k in drawn])]
-
-
-def _interval(values: list[float], unit: str, counted: Floats) -> Metric:
-    low, high = np.percentile(values[1:], (2.5, 97.5))
-    return Metric(values[0], float(low), float(high), unit, int(np.isfinite(counted).sum()))
 
 
 def bone_std(track: Track) -> Metric:

@@ -9,25 +9,18 @@ import os
 from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
-from pathlib import Path
 
-from benchmarks.speed.contenders import OURS, PEER, Contender, Single, Vector
-from benchmarks.speed.measured import (
-    REACHER,
-    SINGLE,
-    Measured,
-    metrics_of,
-)
+from benchmarks.speed.contenders import OURS, PEER, Contender, Single, Starts, Vector
 from benchmarks.speed.organs import Organs
-from benchmarks.speed.report import write_report
-from benchmarks.speed.starts import Starts
+from benchmarks.speed.report import REACHER, SINGLE, report
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.results import Metric, write_results
-from hrc_env.experiments.study.cache import Progress
+from hrc_env.core.results import Metric, over
+from hrc_env.experiments.study.cache import PartCache, Progress
+from hrc_env.experiments.study.runner import Study, at_least_one
 
 WATCHED = "keypoints"
 """The level whose organs are timed."""
-_PEERS = 64
+_REACHERS = 64
 """How many Reachers are one vector."""
 _MAKING = 0.1
 """The share of the progress that goes to making environments."""
@@ -52,9 +45,7 @@ class SpeedBenchConfig:
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for numbers that cannot work."""
-        for name in ("n_rounds", "least_steps", "n_resets"):
-            if getattr(self, name) < 1:
-                raise ConfigError(f"{name} must be at least 1, got {getattr(self, name)}.")
+        at_least_one(self, "n_rounds", "least_steps", "n_resets")
         if WATCHED not in self.levels:
             raise ConfigError(f"levels must have {WATCHED!r} in them, got {self.levels}.")
 
@@ -63,75 +54,66 @@ QUICK = SpeedBenchConfig(n_rounds=1, least_steps=1000)
 """Every number, from one short turn."""
 
 
+class Measured:
+    """One number a round, by kind and name; configurations: "single" and "<num_envs>.<threads>"."""
+
+    def __init__(self) -> None:
+        self.load_before = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
+        """Load average before it began; None where nobody knows."""
+        self.values: dict[str, dict[str, list[float]]] = {}
+
+    def add(self, kind: str, name: str, value: float) -> None:
+        """One more."""
+        self.values.setdefault(kind, {}).setdefault(name, []).append(value)
+
+
 @dataclass(frozen=True, slots=True)
 class Turn:
     """What somebody does in each round."""
 
     level: str
     configuration: str
-    """"single" or "<num_envs>.<threads>"."""
     n_threads: int
     contender: Contender
     n_episodes: int
     cost: float
     """What share of a round it takes, roughly and in any unit."""
 
-    @property
-    def is_watched(self) -> bool:
-        """Whether its organs are timed."""
-        return self.level == WATCHED
 
-
-def run(config: SpeedBenchConfig, out: Path, say: Progress) -> dict[str, Metric]:
-    """Measure; writes results.json, speed.md and organs.png into `out`.
-
-    Args:
-        config: how much.
-        out: a folder.
-        say: hears of the progress: shares that sum to 1.
+def play(config: SpeedBenchConfig, parts: PartCache) -> Measured:
+    """All rounds; nothing is kept between runs.
 
     Raises:
         HRCError: an organ's function is no longer called, so that its time would be missed.
     """
-    load_before = load_average()
+    measured, organs = Measured(), Organs()
     with ExitStack() as closing:
-        turns = [*_turns(config, closing, say)]
+        turns = [*_turns(config, closing, parts.progress)]
         starts = Starts()
         closing.callback(starts.close)
-        measured, organs = Measured(), Organs()
         share = (1 - _MAKING) / (config.n_rounds * sum(turn.cost for turn in turns))
         for _ in range(config.n_rounds):
             for turn in turns:
                 _take(turn, measured, organs)
-                say(share * turn.cost, f"{turn.level} {turn.configuration}")
+                parts.progress(share * turn.cost, f"{turn.level} {turn.configuration}")
             organs.check_all_called()
             for name, ms in starts.run(config.n_resets).items():
-                measured.reset_ms.setdefault(name, []).append(ms)
-    metrics = metrics_of(measured)
-    settings = {"bench": asdict(config), "load_before": load_before}
-    write_results(out / "results.json", settings, [0], metrics)
-    write_report(out, metrics, load_before)
-    return metrics
-
-
-def load_average() -> float | None:
-    """How many others want to run, over the last minute; None where nobody knows."""
-    return round(os.getloadavg()[0], 1) if hasattr(os, "getloadavg") else None
+                measured.add("reset_ms", name, ms)
+    return measured
 
 
 def _take(turn: Turn, measured: Measured, organs: Organs) -> None:
     """Run as it is; then, where organs are timed, with the stopwatch round them."""
     pace = turn.contender.run(turn.n_episodes)
     name = f"{turn.level}.{turn.configuration}"
-    measured.env_steps_per_s.setdefault(name, []).append(pace.env_steps / pace.seconds)
-    if turn.is_watched:
+    measured.add("env_steps_per_s", name, pace.env_steps / pace.seconds)
+    if turn.level == WATCHED:
         shares = organs.us_per_env_step(turn.contender, turn.n_episodes, turn.n_threads)
         for organ, us in shares.items():
-            name = f"{organ}.{turn.configuration}"
-            measured.us_per_env_step.setdefault(name, []).append(us)
+            measured.add("us_per_env_step", f"{organ}.{turn.configuration}", us)
 
 
-def _turns(config: SpeedBenchConfig, closing: ExitStack, say: Progress) -> Iterator[Turn]:
+def _turns(config: SpeedBenchConfig, closing: ExitStack, progress: Progress) -> Iterator[Turn]:
     """Make everybody, ready to run, to be closed in the end."""
     known = [
         (size, threads) for size in config.sizes for threads in config.threads if threads <= size
@@ -140,16 +122,43 @@ def _turns(config: SpeedBenchConfig, closing: ExitStack, say: Progress) -> Itera
 
     def turn(level: str, configuration: str, threads: int, contender: Contender) -> Turn:
         closing.callback(contender.close)
-        say(_MAKING / n_contenders, f"making {level} {configuration}")
+        progress(_MAKING / n_contenders, f"making {level} {configuration}")
         n_episodes = math.ceil(config.least_steps / contender.episode_env_steps)
         cost = n_episodes * contender.episode_env_steps / threads
         times = 2 if level == WATCHED else 0.1 if level == REACHER else 1
         return Turn(level, configuration, threads, contender, n_episodes, times * cost)
 
     yield turn(REACHER, SINGLE, 1, Single(PEER))
-    yield turn(REACHER, f"{_PEERS}.1", 1, Vector(PEER, _PEERS))
+    yield turn(REACHER, f"{_REACHERS}.1", 1, Vector(PEER, _REACHERS))
     for level in config.levels:
         yield turn(level, SINGLE, 1, Single(OURS, perception=level))
         for size, threads in known:
             contender = Vector(OURS, size, perception=level, num_threads=threads)
             yield turn(level, f"{size}.{threads}", threads, contender)
+
+
+def metrics_of(measured: Measured) -> dict[str, Metric]:
+    """Medians over rounds with smallest and largest; ratios to Reacher, round by round."""
+    single = f"{REACHER}.{SINGLE}"
+    steps = measured.values["env_steps_per_s"]
+    for name, values in steps.items():
+        for ours, theirs in zip(values, steps[single], strict=True) if name != single else ():
+            measured.add("ratio_to_reacher", name, ours / theirs)
+    units = {"env_steps_per_s": "1/s", "us_per_env_step": "us", "reset_ms": "ms"}
+    return {
+        f"{kind}.{name}": over(values, units.get(kind, ""))
+        for kind, found in measured.values.items()
+        for name, values in found.items()
+    }
+
+
+SPEED = Study(
+    name="bench speed",
+    modules=("benchmarks.speed.contenders",),
+    settings=lambda config: {"bench": asdict(config)},
+    seeds=lambda _: [0],
+    n_parts=lambda _: 1,
+    play=play,
+    metrics=lambda _, measured: metrics_of(measured),
+    report=lambda _, measured, *rest: report(measured.load_before, *rest),
+)

@@ -1,9 +1,9 @@
-"""Who is timed: the environment in all its sizes, and Gymnasium's Reacher, by public doors."""
+"""Who is timed, by public doors: the environment in all sizes, Gymnasium's Reacher, resets."""
 
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -24,33 +24,17 @@ class Pace:
     """From the first action to the last info, resets inside."""
 
 
-class Contender(Protocol):
-    """An environment that can be run for some episodes, again and again."""
-
-    episode_env_steps: int
-    """Environment steps when everybody runs one episode."""
-
-    def run(self, n_episodes: int) -> Pace:
-        """Random actions for whole episodes; every info is read."""
-        ...
-
-    def close(self) -> None:
-        """Release what it holds."""
-        ...
-
-
 class Single:
     """`gymnasium.make`: one environment, reset where its episode ends."""
 
     def __init__(self, id: str, **arguments: Any) -> None:
-        self.env = gymnasium.make(id, **arguments)
-        self.episode_env_steps = _time_limit(self.env.spec)
+        self.env: Any = gymnasium.make(id, **arguments)
+        self.episode_env_steps: int = self.env.spec.max_episode_steps
         self.env.reset(seed=0)
 
     def run(self, n_episodes: int) -> Pace:
         """Random actions for whole episodes; every info is read."""
-        shape: tuple[int, ...] = self.env.action_space.shape  # type: ignore[assignment]
-        actions = _actions((n_episodes * self.episode_env_steps, *shape))
+        actions = _actions(self.env, n_episodes * self.episode_env_steps)
         started_s = time.perf_counter()
         for action in actions:
             _, _, terminated, truncated, info = self.env.step(action)
@@ -68,16 +52,15 @@ class Vector:
     """`gymnasium.make_vec`: episodes start anew in the step after their end, its default."""
 
     def __init__(self, id: str, num_envs: int, **arguments: Any) -> None:
-        self.env, self.num_envs = gymnasium.make_vec(id, num_envs, **arguments), num_envs
-        self.episode_steps = _time_limit(self.env.spec)
+        self.env: Any = gymnasium.make_vec(id, num_envs, **arguments)
+        self.num_envs, self.episode_steps = num_envs, self.env.spec.max_episode_steps
         self.episode_env_steps = num_envs * self.episode_steps
         self.env.reset(seed=0)
         self._ended: Bools = np.zeros(num_envs, bool)
 
     def run(self, n_episodes: int) -> Pace:
         """Random actions for whole episodes; every info is read."""
-        shape: tuple[int, ...] = self.env.action_space.shape  # type: ignore[assignment]
-        actions = _actions((n_episodes * (self.episode_steps + 1), *shape))
+        actions = _actions(self.env, n_episodes * (self.episode_steps + 1))
         n_starts, ended = 0, self._ended
         started_s = time.perf_counter()
         for action in actions:
@@ -93,16 +76,47 @@ class Vector:
         self.env.close()
 
 
+SOME, MANY = 8, 64
+
+
+class Starts:
+    """A single environment and a vector of 64 on one thread, both at level `keypoints`."""
+
+    def __init__(self) -> None:
+        self.single = gymnasium.make(OURS, perception="keypoints")
+        self.vector = gymnasium.make_vec(OURS, MANY, perception="keypoints", num_threads=1)
+        self.single.reset(seed=0)
+        self.vector.reset(seed=0)
+
+    def run(self, n_resets: int) -> dict[str, float]:
+        """Milliseconds of `reset()` of one, and of 8 of 64 (who they are goes round); means."""
+        started_s = time.perf_counter()
+        for _ in range(n_resets):
+            self.single.reset()
+        between_s = time.perf_counter()
+        for k in range(n_resets):
+            mask = (np.arange(MANY) + k) % (MANY // SOME) == 0
+            self.vector.reset(options={"reset_mask": mask})
+        seconds = between_s - started_s, time.perf_counter() - between_s
+        names = "1_of_1", f"{SOME}_of_{MANY}"
+        return {name: 1e3 * each / n_resets for name, each in zip(names, seconds, strict=True)}
+
+    def close(self) -> None:
+        """Close the environments."""
+        self.single.close()
+        self.vector.close()
+
+
+Contender = Single | Vector
+"""What can be run for some episodes, again and again."""
+
+
 def read(info: Mapping[str, Any]) -> None:
     """Ask for every value, as whoever logs infos does."""
     for name in info:
         _ = info[name]
 
 
-def _actions(shape: tuple[int, ...]) -> Any:
+def _actions(env: Any, n: int) -> Any:
+    shape = (n, *env.action_space.shape)
     return np.random.default_rng(0).uniform(-1, 1, shape).astype(np.float32)
-
-
-def _time_limit(spec: Any) -> int:
-    limit: int = spec.max_episode_steps
-    return limit

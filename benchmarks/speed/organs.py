@@ -7,7 +7,6 @@ bench: no organ can become free of charge by moving elsewhere.
 from collections.abc import Mapping, Sequence
 
 from benchmarks.speed.contenders import Contender
-from benchmarks.speed.measured import RESET, REST, TOTAL
 from benchmarks.speed.stopwatch import Place, Stopwatch
 from hrc_env import metrics, observations, rewards, simulation
 from hrc_env.core.errors import HRCError
@@ -18,6 +17,8 @@ from hrc_env.pipeline.tracking import PoseTracking
 from hrc_env.scene.physics import Physics
 from hrc_env.vector import env, infos
 
+RESET, REST, TOTAL = "reset", "rest", "total"
+"""What stands in the organs' table besides organs: resets, what nobody does, and the sum."""
 ORGANS: Mapping[str, Sequence[Place]] = {
     "physics": ((simulation, "joint_command"), (Physics, "step")),
     "motion": (

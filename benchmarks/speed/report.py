@@ -1,86 +1,73 @@
-"""The speed bench as people read it: Markdown tables, and a picture of where the time goes."""
+"""The speed bench as people read it: tables, and a picture of where the time goes."""
 
-from collections.abc import Mapping
 from pathlib import Path
 
-from benchmarks.speed.measured import (
-    REACHER,
-    REST,
-    SINGLE,
-    TOTAL,
-    configurations_of,
-    title,
-)
-from benchmarks.speed.organs import ORGANS
-from benchmarks.speed.plot import plot_organs
-from hrc_env.core.provenance import provenance
-from hrc_env.core.results import Metric
+import numpy as np
+from matplotlib.axes import Axes
 
-_Metrics = Mapping[str, Metric]
+from benchmarks.common import keys
+from benchmarks.speed.organs import ORGANS, REST, TOTAL
+from hrc_env.experiments.study.plots import label, new_figure, save
+from hrc_env.experiments.study.report import Column, Metrics, Picture, Report, table_of
+
+SINGLE = "single"
+"""The environment that `gymnasium.make` gives, as opposed to a vector of one."""
+REACHER = "reacher"
+"""Gymnasium's Reacher where levels are named."""
+_COLOURS = (*(f"C{k}" for k in range(7)), "gold", "C9", "0.75")
+"""Of the organs, of resets and of the rest."""
+_ABOUT_THE_ORGANS = """\
+Taken in runs of their own with a stopwatch round each organ's functions, which itself costs about
+half a microsecond a call. With two threads an organ's time is divided by two: columns are time on
+the wall, and half of the column for one thread would be perfect. Time in which a thread waits is
+the waiting organ's, or the rest's. `physics` includes the controller, `distances` the robot's own
+bodies, `reward` the task, `reset` all organs' work in resets, `rest` everything else."""
 
 
-def write_report(out: Path, metrics: _Metrics, load_before: float | None) -> None:
-    """Write speed.md and organs.png into `out`; `load_before` is the machine's before it began."""
-    (out / "speed.md").write_text(markdown(metrics, load_before))
-    plot_organs(out / "organs.png", metrics)
+def report(load_before: float | None, metrics: Metrics, figures: Path) -> Report:
+    """What is to be read; organs.png is drawn into `figures`."""
+    plot_organs(figures / "organs.png", metrics)
+    pairs = [name.split(".", 1) for name in keys(metrics, "env_steps_per_s.")]
+    levels = dict.fromkeys(level for level, _ in pairs)
+    sizes = sorted({configuration for _, configuration in pairs}, key=_size)
+    rows = {each: title(each) for each in sizes}
+    timed = {each: title(each) for each in keys(metrics, f"us_per_env_step.{TOTAL}.")}
+    organs = [Column(f"us_per_env_step.{name}.{{}}", name) for name in (*ORGANS, REST, TOTAL)]
+    resets = {name: name.replace("_", " ") for name in keys(metrics, "reset_ms.")}
 
+    def by_level(kind: str, digits: int) -> list[Column]:
+        return [Column(f"{kind}.{level}.{{}}", level, digits) for level in levels]
 
-def markdown(metrics: _Metrics, load_before: float | None) -> str:
-    """Steps a second, beside Reacher's; the organs; resets."""
-    blocks = [
-        "# Speed bench",
-        _introduction(metrics, load_before),
+    return Report("Speed bench", _lead(metrics, load_before), (
         "## Environment steps a second",
-        _by_level(metrics, "env_steps_per_s", 0),
+        table_of("", rows, by_level("env_steps_per_s", 0), metrics),
         "## The same, divided by the single Reacher's",
-        _by_level(metrics, "ratio_to_reacher", 3),
+        table_of("", rows, by_level("ratio_to_reacher", 3), metrics),
         "## Microseconds per environment and step, level `keypoints`",
-        _organs(metrics),
-        _ABOUT_THE_ORGANS,
+        table_of("", timed, organs, metrics), _ABOUT_THE_ORGANS,
+        Picture(figures / "organs.png", "What a step costs, level `keypoints` (on the wall)."),
         "## Milliseconds of a reset, level `keypoints`",
-        _resets(metrics),
-    ]
-    return "\n\n".join(blocks) + "\n"
+        table_of("", resets, [Column("reset_ms.{}", "ms", 2)], metrics),
+    ))  # fmt: skip
 
 
-def _introduction(metrics: _Metrics, load_before: float | None) -> str:
-    made = provenance()
+def _lead(metrics: Metrics, load_before: float | None) -> str:
     n_rounds = metrics[f"env_steps_per_s.{REACHER}.{SINGLE}"].n
-    rounds = (
-        f"Medians of {n_rounds} rounds in which everybody takes turns, smallest and largest in "
-        "brackets."
-        if n_rounds > 1
-        else "A single round: nothing says how far to trust a number."
-    )
-    busy = "" if load_before is None else f", load average {load_before} before it began"
+    busy = "" if load_before is None else f" Load average {load_before:.1f} before it began."
     return (
-        f"Commit {made['git']}, {made['machine']['cores']} cores{busy}. Random actions for whole "
-        f"episodes, resets inside, every info read. {rounds} `{SINGLE}` is `gymnasium.make`, the "
-        f"others are `gymnasium.make_vec`; `{REACHER}` is Gymnasium's Reacher-v5 in the same "
-        "rounds (64 of it: its SyncVectorEnv)."
+        "Random actions for whole episodes, resets inside, every info read. Medians of "
+        f"{n_rounds} rounds in which everybody takes turns, in brackets the smallest and the "
+        f"largest. `{SINGLE}` is `gymnasium.make`, the others are `gymnasium.make_vec`; "
+        f"`{REACHER}` is Gymnasium's Reacher-v5 (64 of it: its SyncVectorEnv).{busy}"
     )
 
 
-_ABOUT_THE_ORGANS = (
-    "Taken in runs of their own with a stopwatch round each organ's functions, which itself costs "
-    "about half a microsecond a call. With two threads an organ's time is divided by two: columns "
-    "are time on the wall, and half of the column for one thread would be perfect. Time in which "
-    "a thread waits for the other is the waiting organ's, or the rest's. `physics` includes the "
-    "controller, `distances` the robot's own bodies, `reward` the task, `reset` all organs' work "
-    "in resets, `rest` everything else."
-)
-
-
-def _by_level(metrics: _Metrics, kind: str, digits: int) -> str:
-    """One row per configuration, one column per level."""
-    names = [name.split(".", 2)[1:] for name in metrics if name.startswith(f"{kind}.")]
-    levels = dict.fromkeys(level for level, _ in names)
-    lines = []
-    for configuration in sorted({configuration for _, configuration in names}, key=_size):
-        found = [metrics.get(f"{kind}.{level}.{configuration}") for level in levels]
-        cells = ["" if m is None else _cell(m, digits, spread=True) for m in found]
-        lines.append([title(configuration), *cells])
-    return _table(["", *levels], lines)
+def title(configuration: str) -> str:
+    """A configuration as people say it."""
+    if configuration == SINGLE:
+        return SINGLE
+    size, threads = configuration.split(".")
+    return f"{size} on {threads} thread{'s' if threads != '1' else ''}"
 
 
 def _size(configuration: str) -> tuple[int, str]:
@@ -89,32 +76,32 @@ def _size(configuration: str) -> tuple[int, str]:
     return (0, "") if configuration == SINGLE else (int(size), how)
 
 
-def _organs(metrics: _Metrics) -> str:
-    """One row per organ, one column per configuration."""
-    configurations = configurations_of(metrics)
-    lines = [
-        [organ, *(_cell(metrics[f"us_per_env_step.{organ}.{each}"], 1) for each in configurations)]
-        for organ in (*ORGANS, REST, TOTAL)
-    ]
-    return _table(["", *map(title, configurations)], lines)
+def plot_organs(path: Path, metrics: Metrics) -> None:
+    """Bars of microseconds per environment and step; one environment apart from many."""
+    groups: tuple[list[str], list[str]] = ([], [])
+    for each in keys(metrics, f"us_per_env_step.{TOTAL}."):
+        groups[each != SINGLE and not each.startswith("1.")].append(each)
+    shown = [group for group in groups if group]
+    figure = new_figure(12.5, 7)
+    axes = figure.subplots(
+        1, len(shown), squeeze=False, width_ratios=[len(group) + 0.6 for group in shown]
+    )[0]
+    for axis, group in zip(axes, shown, strict=True):
+        _stack(axis, group, metrics)
+    label(axes[0], y="microseconds per environment and step", grid="y")
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles[::-1], labels[::-1], loc="outside right center", frameon=False)
+    save(figure, path)
 
 
-def _resets(metrics: _Metrics) -> str:
-    found = {name: metric for name, metric in metrics.items() if name.startswith("reset_ms.")}
-    lines = [
-        [name.split(".")[1].replace("_", " "), _cell(metric, 2, spread=True)]
-        for name, metric in found.items()
-    ]
-    return _table(["", "ms"], lines)
-
-
-def _cell(metric: Metric, digits: int, spread: bool = False) -> str:
-    text = f"{metric.value:,.{digits}f}"
-    if not spread or metric.n == 1:
-        return text
-    return text + f" ({metric.low:,.{digits}f}-{metric.high:,.{digits}f})"
-
-
-def _table(header: list[str], lines: list[list[str]]) -> str:
-    rows = [header, ["---", *["---:"] * (len(header) - 1)], *lines]
-    return "\n".join("| " + " | ".join(row) + " |" for row in rows)
+def _stack(axis: Axes, group: list[str], metrics: Metrics) -> None:
+    """A bar for each configuration, organ upon organ, the sum above it."""
+    x, foot = np.arange(len(group)), np.zeros(len(group))
+    for organ, colour in zip((*ORGANS, REST), _COLOURS, strict=True):
+        us = np.array([metrics[f"us_per_env_step.{organ}.{each}"].value for each in group])
+        axis.bar(x, us, 0.72, foot, label=organ, color=colour, edgecolor="white", linewidth=0.5)
+        foot += us
+    for place, total in enumerate(foot):
+        axis.text(place, total, f"{total:.0f}", ha="center", va="bottom", fontsize=12)
+    axis.set_xticks(x, [title(each).replace(" on ", " in one\n") for each in group], fontsize=11)
+    axis.margins(y=0.08)

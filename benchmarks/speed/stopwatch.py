@@ -28,11 +28,8 @@ class Stopwatch:
     """Seconds of each organ by itself, on whatever threads it runs.
 
     What a timed call spends in other timed calls counts for those only, so that organs add up.
-    Time that a thread waits for another one counts for the organ that waits.
-
-    Args:
-        organs: where each organ's work is done.
-        whole: organs in which nothing is told apart.
+    Time that a thread waits for another one counts for the organ that waits. In the organs named
+    `whole` nothing is told apart.
     """
 
     def __init__(self, organs: Mapping[str, Sequence[Place]], whole: Sequence[str] = ()) -> None:

@@ -4,28 +4,23 @@ Each (rig, condition, estimator) is written to DIR/parts as soon as it is done, 
 that was stopped goes on where it was; parts made by other code or settings are made anew.
 """
 
-import functools
 import multiprocessing
-from collections import Counter
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import asdict, dataclass
-from functools import partial
-from pathlib import Path
+from dataclasses import asdict, dataclass, replace
+from functools import cache, partial
 from typing import Any
 
 from benchmarks.tracking.cells import run_cell
 from benchmarks.tracking.detections import CONDITIONS
+from benchmarks.tracking.env_sequences import ENV, make_env_rig
 from benchmarks.tracking.metrics import ASSOCIATION, TIMING, Parts, metrics_of
-from benchmarks.tracking.names import DEFAULT, SMOOTHER, cells, names_of
-from benchmarks.tracking.own import OWN, make_own_rig
-from benchmarks.tracking.report import write_report
+from benchmarks.tracking.names import DEFAULT, SMOOTHER, conditions, names_of
+from benchmarks.tracking.report import report
 from benchmarks.tracking.rigs import RIGS, SIGMA_PX, Rig, make_rig
-from benchmarks.tracking.sequences import BOUNDED, Sequences, make_sequences
+from benchmarks.tracking.sequences import MATCHED, Sequences, make_sequences
 from benchmarks.tracking.timing import BATCH, time_association, time_estimator
-from hrc_env.core.errors import ConfigError
-from hrc_env.core.results import Metric, write_results
-from hrc_env.experiments.study.cache import PartCache, PartProgress, Progress
-from hrc_env.experiments.study.fingerprint import fingerprint_of
+from hrc_env.experiments.study.cache import PartCache, PartProgress
+from hrc_env.experiments.study.runner import Study, at_least_one
 from hrc_env.tracking.estimators import ESTIMATORS
 
 
@@ -44,102 +39,75 @@ class TrackingBenchConfig:
     """Sequences per rig and condition for the smoother, which is slow; the first ones."""
     timing_repeats: int = 7
     """How often the time per update is taken."""
+    processes: int = 1
+    """How many conditions are run at once; times are taken alone, at the end."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for numbers that cannot work."""
-        for name in ("n_seeds", "n_matched", "n_smoothed", "timing_repeats"):
-            if getattr(self, name) < 1:
-                raise ConfigError(f"{name} must be at least 1, got {getattr(self, name)}.")
+        at_least_one(self, "n_seeds", "n_matched", "n_smoothed", "timing_repeats", "processes")
 
 
 QUICK = TrackingBenchConfig(n_seeds=8, n_matched=30, n_smoothed=2, timing_repeats=2)
 """Every number, from fewer sequences."""
 
 
-def run(
-    config: TrackingBenchConfig, out: Path, say: Progress, processes: int = 1
-) -> dict[str, Metric]:
-    """Run what is not yet there; writes results.json, tracking.md and two plots into `out`.
-
-    Args:
-        config: how much.
-        out: a folder.
-        say: hears of the progress: shares that sum to 1.
-        processes: how many conditions are run at once; times are taken alone, at the end.
-    """
-    asked = cells()
-    n_parts = len(asked) + len(ESTIMATORS) + 1
-    cache = PartCache(
-        out / "parts", fingerprint_of(asdict(config), "benchmarks.tracking.cells"), n_parts, say
-    )
-    if processes > 1:
-        _run_conditions(config, cache, processes)
-        cache = PartCache(cache.folder, cache.fingerprint, n_parts, _silent)
-    parts: Parts = {}
-    for rig, condition in dict.fromkeys(cell[:2] for cell in asked):
-        parts |= make_condition(config, cache, rig, condition)
-    cache = PartCache(cache.folder, cache.fingerprint, n_parts, say)
-    parts |= _timing(config, cache)
-    metrics = metrics_of(parts)
-    settings = {
-        "bench": asdict(config),
+def settings(config: TrackingBenchConfig) -> dict[str, Any]:
+    """What all numbers depend on."""
+    bench = {name: value for name, value in asdict(config).items() if name != "processes"}
+    return {
+        "bench": bench,
         "default": DEFAULT,
         "sigma_px": SIGMA_PX,
-        "tracker": {name: asdict(_rig(name).tracker) for name in (*RIGS, OWN)},
+        "tracker": {name: asdict(_rig(name).tracker) for name in (*RIGS, ENV)},
         "conditions": {name: asdict(damage) for name, damage in CONDITIONS.items()},
-        "fingerprint": cache.fingerprint,
     }
-    write_results(out / "results.json", settings, _seeds(config, "clean"), metrics)
-    write_report(out, parts, metrics)
-    return metrics
 
 
-def make_condition(
-    config: TrackingBenchConfig, cache: PartCache, rig_name: str, condition: str
+def play(config: TrackingBenchConfig, parts: PartCache) -> Parts:
+    """Every estimator on everything; several processes first leave their parts in the cache."""
+    asked, quiet = conditions(), replace(parts, progress=_silent)
+    if config.processes > 1:
+        context = multiprocessing.get_context("spawn")
+        with ProcessPoolExecutor(config.processes, mp_context=context) as pool:
+            running = {pool.submit(play_condition, config, quiet, *each): each for each in asked}
+            for done in as_completed(running):
+                done.result()
+                share = len(names_of(running[done][1])) / parts.n_parts
+                parts.progress(share, ".".join(running[done]))
+    played: Parts = {}
+    for each in asked:
+        played |= play_condition(config, quiet if config.processes > 1 else parts, *each)
+    return played | _timing(config, parts)
+
+
+def play_condition(
+    config: TrackingBenchConfig, parts: PartCache, rig_name: str, condition: str
 ) -> Parts:
     """Everybody on one rig and condition; the sequences are made if a part is missing."""
-    seeds = _seeds(config, condition)
+    seeds = seeds_of(config, condition)
 
-    @functools.cache
+    @cache
     def sequences() -> tuple[Rig, Sequences]:
         rig = _rig(rig_name)
         return rig, make_sequences(rig, condition, seeds)
 
     def make(name: str, tick: PartProgress) -> dict[str, Any]:
         rig, given = sequences()
-        if name == SMOOTHER:
-            n = min(config.n_smoothed, len(seeds))
-            return run_cell(name, rig, given.first(n), seeds[:n], tick)
-        return run_cell(name, rig, given, seeds, tick)
+        n = min(config.n_smoothed, len(seeds)) if name == SMOOTHER else len(seeds)
+        return run_cell(name, rig, given.first(n), seeds[:n], tick)
 
     return {
-        (rig_name, condition, name): cache.part(
+        (rig_name, condition, name): parts.part(
             f"{rig_name}.{condition}.{name}", partial(make, name)
         )
-        for name in names_of(rig_name, condition)
+        for name in names_of(condition)
     }
 
 
-def _run_conditions(config: TrackingBenchConfig, cache: PartCache, processes: int) -> None:
-    """Let several processes put the parts of whole conditions in the cache."""
-    todo = Counter((rig, condition) for rig, condition, _ in cells())
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(processes, mp_context=context) as pool:
-        running = {
-            pool.submit(_in_process, config, cache.folder, cache.fingerprint, *what): what
-            for what in todo
-        }
-        for done in as_completed(running):
-            done.result()
-            what = running[done]
-            cache.progress(todo[what] / cache.n_parts, ".".join(what))
-
-
-def _in_process(
-    config: TrackingBenchConfig, folder: Path, fingerprint: str, rig: str, condition: str
-) -> None:
-    """What another process does: the parts stay in the cache."""
-    make_condition(config, PartCache(folder, fingerprint, 1, _silent), rig, condition)
+def seeds_of(config: TrackingBenchConfig, condition: str = "clean") -> list[int]:
+    """Of a condition's sequences."""
+    n = config.n_matched if condition == MATCHED else config.n_seeds
+    return [config.first_seed + k for k in range(n)]
 
 
 def _silent(share: float, label: str) -> None:
@@ -147,15 +115,10 @@ def _silent(share: float, label: str) -> None:
 
 
 def _rig(name: str) -> Rig:
-    return make_own_rig() if name == OWN else make_rig(name)
+    return make_env_rig() if name == ENV else make_rig(name)
 
 
-def _seeds(config: TrackingBenchConfig, condition: str) -> list[int]:
-    n = config.n_matched if condition in BOUNDED else config.n_seeds
-    return [config.first_seed + k for k in range(n)]
-
-
-def _timing(config: TrackingBenchConfig, cache: PartCache) -> Parts:
+def _timing(config: TrackingBenchConfig, parts: PartCache) -> Parts:
     """Microseconds per update of every estimator, on the lab's sequences, and of association."""
     rig = make_rig("lab")
     frames = cache(lambda kind: make_sequences(rig, kind, list(range(BATCH))))
@@ -164,12 +127,23 @@ def _timing(config: TrackingBenchConfig, cache: PartCache) -> Parts:
     def make(name: str, tick: PartProgress) -> dict[str, Any]:
         return time_estimator(name, rig, frames("clean"), frames("hard"), repeats, tick)
 
-    parts: Parts = {
-        ("lab", TIMING, name): cache.part(f"{TIMING}.{name}", partial(make, name))
+    played: Parts = {
+        ("lab", TIMING, name): parts.part(f"{TIMING}.{name}", partial(make, name))
         for name in ESTIMATORS
     }
-    site = make_rig("site")
-    parts["site", TIMING, ASSOCIATION] = cache.part(
-        f"{TIMING}.{ASSOCIATION}", partial(time_association, site, repeats)
+    played["site", TIMING, ASSOCIATION] = parts.part(
+        f"{TIMING}.{ASSOCIATION}", partial(time_association, make_rig("site"), repeats)
     )
-    return parts
+    return played
+
+
+TRACKING = Study(
+    name="bench tracking",
+    modules=("benchmarks.tracking.cells",),
+    settings=settings,
+    seeds=seeds_of,
+    n_parts=lambda _: sum(len(names_of(each)) for _, each in conditions()) + len(ESTIMATORS) + 1,
+    play=play,
+    metrics=lambda _, played: metrics_of(played),
+    report=lambda _, played, metrics, figures: report(metrics),
+)

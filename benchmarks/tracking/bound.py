@@ -5,43 +5,25 @@ squared error is below the inverse of the information J, which grows by
 
     J' = (A J^-1 A' + Q)^-1 + sum over cameras H'H / sigma^2,
 
-with A, Q (of the transition, bones included) and H taken at the truth of each drawn sequence,
-as is usual; written here in covariances.
+with A, Q (of the transition) and H taken at the truth of each drawn sequence, as is usual;
+written here in covariances.
 """
 
 import numpy as np
 
-from benchmarks.tracking.matched import (
-    N_PLACES,
-    MatchedModel,
-    tilted,
-)
+from benchmarks.tracking.matched import N_PLACES, MatchedModel, transition
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Bools, Covariances3, Floats, Points3
 from hrc_env.geometry.cameras import project
 
 
 def camera_information(P: Floats, joints: Points3, seen: Bools, sigma_px: float) -> Covariances3:
-    """What one frame tells of each joint alone, (S, J, 3, 3) [1/m^2].
-
-    Args:
-        P: (C, 3, 4) projections.
-        joints: (S, J, 3) true points [m].
-        seen: (S, C, J) which detections there are.
-        sigma_px: standard deviation of each coordinate [px].
-    """
+    """What one frame of detections (S, C, J) tells of each joint (S, J, 3) alone, (S, J, 3, 3)
+    [1/m^2]."""
     px, depth = project(P, joints)
     rows = P[:, None, :2, :3] - px[..., None] * P[:, None, 2:, :3]
     rows = np.where(seen[..., None, None], rows / depth[..., None, None], 0.0)
     return np.einsum("scjki,scjkl->sjil", rows, rows) / sigma_px**2
-
-
-def shrink(cov: Floats, information: Floats) -> Floats:
-    """Covariances (S, n, n) after (S, m, m) of information on the first m states."""
-    m = information.shape[-1]
-    gain = np.linalg.solve(np.eye(m) + information @ cov[:, :m, :m], information)
-    after = cov - cov[:, :, :m] @ gain @ cov[:, :m]
-    return (after + after.swapaxes(1, 2)) / 2
 
 
 def posterior_bound(
@@ -54,13 +36,8 @@ def posterior_bound(
 ) -> Covariances3:
     """Bound on the covariance of each joint's estimate, (T, S, J, 3, 3) [m^2].
 
-    Args:
-        P: (C, 3, 4) projections.
-        model: what the sequences were drawn from.
-        joints: (T, S, J, 3) the sequences [m].
-        seen: (T, S, C, J) which detections there are.
-        sigma_px: their standard deviation [px].
-        start_std: of positions [m] and velocities [m/s] before the first frame.
+    Of sequences (T, S, J, 3) [m] drawn from the model, with detections where they were `seen` (T,
+    S, C, J); `start_std` of positions [m] and velocities [m/s] is before the first frame.
     """
     n_frames, n_sequences = joints.shape[:2]
     start = np.repeat(np.square(start_std), N_PLACES)
@@ -68,14 +45,22 @@ def posterior_bound(
     out = np.empty((n_frames, n_sequences, N_JOINTS, 3, 3))
     for t in range(n_frames):
         if t:
-            move, Q = tilted(model, joints[t - 1], joints[t])
-            cov = move @ cov @ move.swapaxes(1, 2) + Q
-        cov = shrink(cov, block_diagonal(camera_information(P, joints[t], seen[t], sigma_px)))
-        out[t] = joint_blocks(cov)
+            move = transition(model, joints[t - 1])
+            cov = move @ cov @ move.swapaxes(1, 2) + model.Q
+        cov = _shrink(cov, _block_diagonal(camera_information(P, joints[t], seen[t], sigma_px)))
+        out[t] = _joint_blocks(cov)
     return out
 
 
-def block_diagonal(blocks: Covariances3) -> Floats:
+def _shrink(cov: Floats, information: Floats) -> Floats:
+    """Covariances (S, n, n) after (S, m, m) of information on the first m states."""
+    m = information.shape[-1]
+    gain = np.linalg.solve(np.eye(m) + information @ cov[:, :m, :m], information)
+    after = cov - cov[:, :, :m] @ gain @ cov[:, :m]
+    return (after + after.swapaxes(1, 2)) / 2
+
+
+def _block_diagonal(blocks: Covariances3) -> Floats:
     """(S, 45, 45) from (S, J, 3, 3)."""
     whole = np.zeros((len(blocks), N_JOINTS, 3, N_JOINTS, 3))
     each = np.arange(N_JOINTS)
@@ -83,7 +68,7 @@ def block_diagonal(blocks: Covariances3) -> Floats:
     return whole.reshape(len(blocks), N_PLACES, N_PLACES)
 
 
-def joint_blocks(cov: Floats) -> Covariances3:
+def _joint_blocks(cov: Floats) -> Covariances3:
     """(S, J, 3, 3) of the positions from (S, 90, 90)."""
     places = cov[:, :N_PLACES, :N_PLACES].reshape(len(cov), N_JOINTS, 3, N_JOINTS, 3)
     each = np.arange(N_JOINTS)

@@ -5,23 +5,28 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy import stats
 
+from benchmarks.common import CHI2_95_3D
 from benchmarks.tracking.arrivals import in_time
 from benchmarks.tracking.couples import identities
 from benchmarks.tracking.dlt import triangulate_frame
-from benchmarks.tracking.full_state import filter_matched
-from benchmarks.tracking.names import DEFAULT, DLT, FULL_STATE, SMOOTHER, UNBUFFERED
-from benchmarks.tracking.rigs import DT_S, SIGMA_PX, Rig
+from benchmarks.tracking.names import DEFAULT, DLT, SMOOTHER, UNBUFFERED
+from benchmarks.tracking.rigs import DT_S, Rig
 from benchmarks.tracking.sequences import Sequences
-from benchmarks.tracking.tally import tally
 from hrc_env.core.batching import rows
 from hrc_env.core.records import Keypoints, PoseEstimate
-from hrc_env.core.typing import Covariances3, Points3
+from hrc_env.core.skeleton import TORSO
+from hrc_env.core.typing import Bools, Covariances3, Floats, Ints, Points3
 from hrc_env.experiments.study.cache import PartProgress
 from hrc_env.tracking.estimators import make_estimator
 from hrc_env.tracking.people.association import associate
 from hrc_env.tracking.smoother import smooth
 
+N_LEVELS = 20
+"""Bins of the probability that the reported Gaussian gives to a nearer joint."""
+CHI2_LEVELS: Floats = stats.chi2(3).ppf(np.arange(1, N_LEVELS) / N_LEVELS)
+"""(19,) limits of the 20 equally likely classes of a normalised squared error."""
 UNKNOWN_M2 = 1e6
 """Variance of a bone's length of which nothing is known [m^2]."""
 _AT_ONCE = 10
@@ -34,11 +39,6 @@ def beliefs(
     """Mean (S, W, J, 3) and covariance (S, W, J, 3, 3) after each frame; DLT has none."""
     if name == DLT:
         yield from _triangulated(rig, sequences)
-    elif name == FULL_STATE:
-        if sequences.model is None:
-            raise ValueError(f"{FULL_STATE} runs on sequences whose model is known.")
-        for mean, cov in filter_matched(rig.P, sequences.model, sequences.px[:, :, :, 0], SIGMA_PX):
-            yield mean[:, None], cov[:, None]
     elif name == SMOOTHER:
         yield from _smoothed(rig, sequences, seeds)
     else:
@@ -111,9 +111,9 @@ def _smoothed(
 
 def _forget_bones(state: Any) -> None:
     """Tell an estimator, or each of its hypotheses, that nothing is known of bones' lengths."""
-    for record in (state, getattr(state, "slots", state)):
-        if hasattr(record, "bone_variance"):
-            record.bone_variance[...] = UNKNOWN_M2
+    trees = getattr(state, "trees", None)
+    if trees is not None:
+        trees["bone_variance"][...] = UNKNOWN_M2
 
 
 def run_cell(
@@ -146,9 +146,43 @@ def _window(
         mean = np.take_along_axis(mean, track[None, :, :, None, None], 2)
         if cov is not None:
             cov = np.take_along_axis(cov, track[None, :, :, None, None, None], 2)
-    sums = tally(truth, mean, cov, np.isfinite(sequences.px[frames, ..., 0]))
+    sums = tally(truth, mean, cov)
     if swaps is not None:
         sums["identity_swaps"] = swaps.tolist()
     if sequences.bound_m2 is not None:
         sums["bound"] = sequences.bound_m2[frames].sum((0, 2)).tolist()
     return sums
+
+
+def tally(truth: Points3, mean: Points3, cov: Covariances3 | None) -> dict[str, Any]:
+    """Sums by name, each a list over sequences, of joints (T, S, W, J, 3) [m] and what is claimed
+    of them [m^2], if anything is."""
+    n_frames, n_sequences = truth.shape[:2]
+    offset = mean - truth
+    squared = (offset**2).sum(-1)
+    out: dict[str, Floats] = {
+        "n": np.full(n_sequences, float(squared[:, 0].size)),
+        "n_frames": np.full(n_sequences, float(n_frames * truth.shape[2])),
+        "squared": _total(squared),
+        "wrong_way": _total(((_left(mean) * _left(truth)).sum(-1) < 0)[..., None]),
+        "median": np.median(np.sqrt(squared), axis=(0, 2, 3)),
+    }
+    if cov is not None:
+        nees = np.einsum("...i,...i->...", offset, np.linalg.solve(cov, offset[..., None])[..., 0])
+        level = np.searchsorted(CHI2_LEVELS, nees)
+        out["inside"] = _total(nees < CHI2_95_3D)
+        out["nees"] = _total(nees)
+        out["trace"] = _total(np.trace(cov, axis1=-2, axis2=-1))
+        out["levels"] = np.stack([_total(level == k) for k in range(N_LEVELS)], -1)
+    return {name: value.tolist() for name, value in out.items()}
+
+
+def _total(values: Floats | Bools | Ints) -> Floats:
+    """(S,) from (T, S, W, J)."""
+    return values.sum(axis=(0, 2, 3), dtype=float)
+
+
+def _left(joints: Points3) -> Floats:
+    """(..., 2) from right to left across the torso, on the ground."""
+    a, b, c, d = (joints[..., j, :2] for j in TORSO)
+    return a - b + c - d

@@ -72,16 +72,8 @@ def shuffles(seeds: list[int], n_frames: int, n_cameras: int, n_people: int) -> 
 
 
 def identities(truth: Points3, mean: Points3) -> tuple[Ints, Floats]:
-    """Which track is whom, and how often that changes.
-
-    Args:
-        truth: (T, S, W, J, 3) people.
-        mean: (T, S, W, J, 3) tracks.
-
-    Returns:
-        track (S, W) that is nearest to each person in the first frame, all together, and (S,) how
-        often the nearest change hands by more than 0.3 m from then on.
-    """
+    """Which track (S, W) is nearest to each person in the first frame, all together, and (S,) how
+    often that changes by more than 0.3 m from then on; of people and tracks (T, S, W, J, 3)."""
     n_sequences, n_people = truth.shape[1:3]
     orders = np.array(list(itertools.permutations(range(n_people))))
     apart = np.linalg.norm((mean[:, :, :, None] - truth[:, :, None]).mean(-2), axis=-1)

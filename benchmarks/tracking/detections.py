@@ -43,11 +43,8 @@ CONDITIONS: dict[str, Damage] = {
 
 
 def detect(P: Floats, joints: Points3, damage: Damage, seeds: list[int]) -> Points2:
-    """Pixels (T, S, C, J, 2) of joints (T, S, J, 3), NaN where a joint was not found.
-
-    Seeds as for the walks: sequence s depends on seeds[s] only, and each kind of damage has
-    its own stream, so that conditions differ by their damage alone.
-    """
+    """Pixels (T, S, C, J, 2) of joints (T, S, J, 3), NaN where a joint was not found; each seed and
+    each kind of damage has its own stream, so that conditions differ by their damage alone."""
     exact, depth = project(P, joints)
     exact, depth = exact.swapaxes(1, 2), depth.swapaxes(1, 2)
     inside = (exact >= 0).all(-1) & (exact[..., 0] < WIDTH_PX) & (exact[..., 1] < HEIGHT_PX)

@@ -11,13 +11,8 @@ from hrc_env.core.typing import Floats, Points2, Points3
 
 
 def triangulate_frame(P: Floats, px: Points2, last: Points3) -> Points3:
-    """(S, J, 3) points of one frame of S sequences.
-
-    Args:
-        P: (C, 3, 4) projections.
-        px: (S, C, J, 2) pixels, NaN where missing.
-        last: (S, J, 3) what is held where fewer than two cameras see a joint.
-    """
+    """(S, J, 3) points from one frame of pixels (S, C, J, 2), NaN where missing; the `last` ones
+    where fewer than two cameras see a joint."""
     seen = np.isfinite(px[..., 0])
     px = np.where(seen[..., None], px, 0.0)
     rows = px[..., None] * P[:, None, None, 2] - P[:, None, :2]

@@ -7,7 +7,7 @@ import numpy as np
 
 from benchmarks.tracking.names import DEFAULT, RIVALS, names_of, rows
 from benchmarks.tracking.rigs import RIGS
-from benchmarks.tracking.sequences import MATCHED, MATCHED_BONES
+from benchmarks.tracking.sequences import MATCHED
 from hrc_env.core.results import Metric, over
 from hrc_env.core.typing import Floats
 
@@ -26,19 +26,19 @@ def metrics_of(parts: Parts) -> dict[str, Metric]:
     metrics = _times(parts)
     for rig, condition, window in rows():
         drawn = {
-            name: _drawn(parts[rig, condition, name][window]) for name in names_of(rig, condition)
+            name: drawn_sums(parts[rig, condition, name][window]) for name in names_of(condition)
         }
         for name, sums in drawn.items():
-            for kind, (unit, statistic) in _KINDS.items():
+            for kind, (unit, statistic) in STATISTICS.items():
                 if _NEEDS.get(kind, "n") in sums:
-                    metrics[f"{kind}.{rig}.{window}.{name}"] = _metric(statistic(sums), unit, sums)
+                    metrics[f"{kind}.{rig}.{window}.{name}"] = metric(statistic(sums), unit, sums)
         default = _rmse(drawn[DEFAULT])
         for name in RIVALS:
             ratio = default / _rmse(drawn[name])
-            metrics[f"default_over.{rig}.{window}.{name}"] = _metric(ratio, "-", drawn[name])
+            metrics[f"default_over.{rig}.{window}.{name}"] = metric(ratio, "-", drawn[name])
     for rig in RIGS:
         metrics |= _after_return(parts, rig)
-    for name in names_of(RIGS[0], MATCHED):
+    for name in names_of(MATCHED):
         metrics |= _bounds(parts, name)
     return dict(sorted(metrics.items()))
 
@@ -52,7 +52,7 @@ def _calibration_gap(sums: _Sums) -> Floats:
     return np.abs(held - np.arange(1, held.shape[1] + 1) / held.shape[1]).max(-1)
 
 
-_KINDS: dict[str, tuple[str, Callable[[_Sums], Floats]]] = {
+STATISTICS: dict[str, tuple[str, Callable[[_Sums], Floats]]] = {
     "rmse_m": ("m", _rmse),
     "median_m": ("m", lambda sums: sums["median"] / sums["one"]),
     "facing_wrong": ("share", lambda sums: sums["wrong_way"] / sums["n_frames"]),
@@ -76,7 +76,7 @@ _NEEDS = {
 }
 
 
-def _drawn(sums: Mapping[str, Any]) -> dict[str, Floats]:
+def drawn_sums(sums: Mapping[str, Any]) -> dict[str, Floats]:
     """Sums over all sequences, and over 1000 draws of as many with replacement: (1001, ...).
 
     The draws depend on the number of sequences only, so that two estimators' are the same.
@@ -91,7 +91,7 @@ def _drawn(sums: Mapping[str, Any]) -> dict[str, Floats]:
     return {name: np.tensordot(counts, values, 1) for name, values in arrays.items()}
 
 
-def _metric(values: Floats, unit: str, sums: _Sums, factor: int = 1) -> Metric:
+def metric(values: Floats, unit: str, sums: _Sums, factor: int = 1) -> Metric:
     """The first value, with the middle 95 % of the others."""
     low, high = np.percentile(values[1:], (2.5, 97.5))
     n = factor * round(float(sums["one"][0]))
@@ -112,14 +112,14 @@ def _times(parts: Parts) -> dict[str, Metric]:
 def _after_return(parts: Parts, rig: str) -> dict[str, Metric]:
     """How the estimators are a second after the other cameras' return."""
     metrics = {}
-    for name in names_of(rig, "one_camera"):
+    for name in names_of("one_camera"):
         cell = parts[rig, "one_camera", name]["after_return"]
-        after = _drawn(cell)
-        ratio = _rmse(after) / _rmse(_drawn(parts[rig, "clean", name]["clean"]))
-        metrics[f"after_return_over_clean.{rig}.{name}"] = _metric(ratio, "-", after)
+        after = drawn_sums(cell)
+        ratio = _rmse(after) / _rmse(drawn_sums(parts[rig, "clean", name]["clean"]))
+        metrics[f"after_return_over_clean.{rig}.{name}"] = metric(ratio, "-", after)
         mirrored = np.array(cell["wrong_way"]) > 0.5 * np.array(cell["n_frames"])
-        share = _drawn({"n": cell["n"], "mirrored": mirrored})
-        metrics[f"mirrored_returns.{rig}.one_camera.{name}"] = _metric(
+        share = drawn_sums({"n": cell["n"], "mirrored": mirrored})
+        metrics[f"mirrored_returns.{rig}.one_camera.{name}"] = metric(
             100 * share["mirrored"] / share["one"], "per 100 sequences", share
         )
     return metrics
@@ -127,12 +127,13 @@ def _after_return(parts: Parts, rig: str) -> dict[str, Metric]:
 
 def _bounds(parts: Parts, name: str) -> dict[str, Metric]:
     """RMSE over its bound: root of the mean of the squared ratios over rigs, and of each."""
-    metrics = {}
-    for condition, kind in ((MATCHED, "ratio_to_bound"), (MATCHED_BONES, "ratio_to_bound_bones")):
-        drawn = {rig: _drawn(parts[rig, condition, name][condition]) for rig in RIGS}
-        squared = {rig: sums["squared"] / sums["bound"] for rig, sums in drawn.items()}
-        for rig, values in squared.items():
-            metrics[f"{kind}_in.{rig}.{name}"] = _metric(np.sqrt(values), "-", drawn[rig])
-        both = np.sqrt(np.mean(list(squared.values()), axis=0))
-        metrics[f"{kind}.{name}"] = _metric(both, "-", drawn[RIGS[0]], len(RIGS))
-    return metrics
+    drawn = {rig: drawn_sums(parts[rig, MATCHED, name][MATCHED]) for rig in RIGS}
+    squared = {rig: sums["squared"] / sums["bound"] for rig, sums in drawn.items()}
+    both = np.sqrt(np.mean(list(squared.values()), axis=0))
+    return {
+        **{
+            f"ratio_to_bound_in.{rig}.{name}": metric(np.sqrt(values), "-", drawn[rig])
+            for rig, values in squared.items()
+        },
+        f"ratio_to_bound.{name}": metric(both, "-", drawn[RIGS[0]], len(RIGS)),
+    }

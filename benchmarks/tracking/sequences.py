@@ -8,26 +8,22 @@ from benchmarks.tracking.arrivals import LONGEST_DELAY_S, delivered
 from benchmarks.tracking.bound import posterior_bound
 from benchmarks.tracking.couples import couples, detect_couples, shuffles
 from benchmarks.tracking.detections import CONDITIONS, Damage, detect
-from benchmarks.tracking.matched import MatchedModel, draw, matched_model
-from benchmarks.tracking.own import OWN, OWN_CONDITIONS, OWN_FRAMES, record
+from benchmarks.tracking.env_sequences import ENV, ENV_CONDITIONS, ENV_FRAMES, record
+from benchmarks.tracking.matched import draw, matched_model
 from benchmarks.tracking.rigs import SIGMA_PX, Rig
 from benchmarks.tracking.walks import walk
 from hrc_env.core.records import Keypoints
-from hrc_env.core.skeleton import BONES
 from hrc_env.core.typing import Floats, Ints, Points2, Points3
 from hrc_env.tracking.config import TrackerConfig
 
-MATCHED, MATCHED_BONES = "matched", "matched_bones"
-TWO_WORKERS, LATE = "two_workers", "late"
-SIMULATED = (*CONDITIONS, LATE, TWO_WORKERS)
-"""Conditions of the rigs lab and site, beside those that have a bound."""
-BOUNDED = (MATCHED, MATCHED_BONES)
-"""Conditions for which the least mean squared error is known."""
+MATCHED, TWO_WORKERS, LATE = "matched", "two_workers", "late"
+SIMULATED = (*CONDITIONS, LATE, TWO_WORKERS, MATCHED)
+"""Conditions of the rigs lab and site; of `matched` the least mean squared error is known."""
 MATCHED_ROOT_ACCELERATION = 0.05
 """Of the matched sequences and of the estimators on them, so that they stay in view [m^2/s^3]."""
 N_FRAMES = {
     **dict.fromkeys(("clean", "occluded", "hard", "drifting"), 500),
-    "one_camera": 175, LATE: 175, TWO_WORKERS: 125, MATCHED: 40, MATCHED_BONES: 40,
+    "one_camera": 175, LATE: 175, TWO_WORKERS: 125, MATCHED: 40,
 }  # fmt: skip
 _ALONE = {
     "one_camera_half_second": (25, 38),
@@ -41,13 +37,12 @@ WINDOWS: dict[str, dict[str, tuple[int, int]]] = {
     LATE: {LATE: (25, 175)},
     TWO_WORKERS: {TWO_WORKERS: (25, 125)},
     MATCHED: {MATCHED: (15, 40)},
-    MATCHED_BONES: {MATCHED_BONES: (15, 40)},
 }
 """Frames that count: after the first second; while one camera sees, and from one second after
 the others' return; matched sequences are short, lest the drifting body leave the images."""
-OWN_WINDOWS = {
-    **{name: {name: (25, OWN_FRAMES)} for name in OWN_CONDITIONS},
-    "one_camera": {"one_camera": (25, 125), "after_return": (135, OWN_FRAMES)},
+ENV_WINDOWS = {
+    **{name: {name: (25, ENV_FRAMES)} for name in ENV_CONDITIONS},
+    "one_camera": {"one_camera": (25, 125), "after_return": (135, ENV_FRAMES)},
 }
 """The same of the environment's own motion; its return is looked at after 0.4 s."""
 
@@ -73,15 +68,13 @@ class Sequences:
     time_s: Floats | None = None
     """(T, S, C) when the frame was taken that each camera delivers [s], as in `Keypoints`; None:
     all are of now."""
-    model: MatchedModel | None = None
-    """What the sequences were drawn from, if an estimator can know it."""
     bound_m2: Floats | None = None
     """(T, S, J) the least mean squared error, where it is known."""
 
     @property
     def has_bones(self) -> bool:
         """Whether distances between neighbouring joints stay as they are."""
-        return self.model is None or len(self.model.bones) > 0
+        return self.bound_m2 is None
 
     def first(self, n: int) -> "Sequences":
         """The first n sequences."""
@@ -111,12 +104,12 @@ class Sequences:
 
 def make_sequences(rig: Rig, condition: str, seeds: list[int]) -> Sequences:
     """Sequences of a rig and a condition, one per seed, each depending on its own seed only."""
-    if rig.name == OWN:
+    if rig.name == ENV:
         joints, seen = record(condition, seeds)
         given = (seen.confidence, seen.sigma_px)
-        return Sequences(joints, seen.px, OWN_WINDOWS[condition], rig.tracker, *given)
-    if condition in BOUNDED:
-        return _matched(rig, condition, seeds)
+        return Sequences(joints, seen.px, ENV_WINDOWS[condition], rig.tracker, *given)
+    if condition == MATCHED:
+        return _matched(rig, seeds)
     n_frames, windows = N_FRAMES[condition], WINDOWS[condition]
     if condition == TWO_WORKERS:
         joints = couples(seeds, n_frames)
@@ -132,14 +125,12 @@ def make_sequences(rig: Rig, condition: str, seeds: list[int]) -> Sequences:
     return Sequences(joints[:, :, None], px[:, :, :, None], windows, rig.tracker)
 
 
-def _matched(rig: Rig, condition: str, seeds: list[int]) -> Sequences:
+def _matched(rig: Rig, seeds: list[int]) -> Sequences:
     """Sequences from the estimators' own model, of which they are told what can be told.
 
     That is: the shared acceleration, no outliers, no exchanged sides, detections as good as they
-    say, bones that give what they are drawn with, no floor; and without bones, that a body may be
-    of any size.
+    say, no bones, no floor, and that a body may be of any size.
     """
-    n_bones = len(BONES) if condition == MATCHED_BONES else 0
     config = replace(
         rig.tracker,
         root_acceleration=MATCHED_ROOT_ACCELERATION,
@@ -148,17 +139,12 @@ def _matched(rig: Rig, condition: str, seeds: list[int]) -> Sequences:
         noise_bounds=(1.0, 1.0),
         bone_give=1.0,
         floor_std_m=np.inf,
-        body_radius_m=rig.tracker.body_radius_m if n_bones else 10.0,
+        body_radius_m=10.0,
     )
-    model = matched_model(config.damping, config.root_acceleration, n_bones)
-    joints = draw(model, seeds, N_FRAMES[condition])
+    model = matched_model(config.damping, config.root_acceleration)
+    joints = draw(model, seeds, N_FRAMES[MATCHED])
     px = detect(rig.P, joints, Damage(), seeds)
     bound = posterior_bound(rig.P, model, joints, np.isfinite(px[..., 0]), SIGMA_PX)
-    return Sequences(
-        joints[:, :, None],
-        px[:, :, :, None],
-        WINDOWS[condition],
-        config,
-        model=model,
-        bound_m2=np.trace(bound, axis1=-2, axis2=-1),
-    )
+    bound_m2 = np.trace(bound, axis1=-2, axis2=-1)
+    people, seen = joints[:, :, None], px[:, :, :, None]
+    return Sequences(people, seen, WINDOWS[MATCHED], config, bound_m2=bound_m2)

@@ -23,16 +23,8 @@ _N_PEOPLE = 4
 def time_estimator(
     name: str, rig: Rig, clean: Sequences, hard: Sequences, n_repeats: int, tick: PartProgress
 ) -> dict[str, list[float]]:
-    """Microseconds per worker and update, one number per repeat.
-
-    Args:
-        name: an estimator.
-        rig: of the sequences.
-        clean: at least 64 sequences; the median over frames at batch 1 and 64 ("1", "64").
-        hard: the same for the mean over frames at batch 64 ("hard_64").
-        n_repeats: how often.
-        tick: told the share that is done.
-    """
+    """Microseconds per worker and update, one number per repeat: medians over frames of `clean` at
+    batch 1 and 64 ("1", "64"), the mean of `hard` at batch 64 ("hard_64")."""
     times: dict[str, list[float]] = {"1": [], "64": [], "hard_64": []}
     _frame_times(name, rig, clean, 1, 2)  # compiles
     for _ in range(n_repeats):

@@ -5,29 +5,26 @@ about, with or without cameras failing; and the tracking bench's walkers, of who
 predicts was ever told.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from benchmarks.tracking.detections import CONDITIONS, detect
+from benchmarks.tracking.env_sequences import EmulatedDetector, simulate, watch, without
 from benchmarks.tracking.rigs import DT_S, SIGMA_PX, make_rig
 from benchmarks.tracking.walks import walk
-from hrc_env.config import HRCConfig, settle
+from hrc_env.config import HRCConfig
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Bools, Points3, Velocities3
+from hrc_env.core.typing import Bools, Floats, Points3, Velocities3
 from hrc_env.geometry.cameras import projections
-from hrc_env.motion import generator
-from hrc_env.perception import emulator
-from hrc_env.simulation import Simulation
+from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import Estimator, make_estimator
-from hrc_env.worker.body import worker_truth
 
 LIVELY = {"dwell_s": (0.5, 4.0), "near_probability": 0.5}
 """Changes to `MotionConfig` that make a worker walk for about half of the time."""
-_SLOWNESS = 0.95
 _FAILURE_S, _BETWEEN_S = (0.4, 3.0), 1.5
 Look = Callable[[Estimator[Any], Any], Any]
 
@@ -47,94 +44,73 @@ class Tracks:
 
 
 def _nothing(estimator: Estimator[Any], state: Any) -> None:
-    del estimator, state
+    """Say nothing."""
+
+
+class _Follower:
+    """An estimator that is given one frame after the other."""
+
+    def __init__(self, tracks: Tracks, look: Look, P: Floats, config: TrackerConfig,
+                 rngs: list[np.random.Generator]) -> None:  # fmt: skip
+        self.tracks, self.look, self.rngs = tracks, look, rngs
+        self.estimator = make_estimator("kalman", P, DT_S, config)
+        self.state = self.estimator.init(len(rngs), 1)
+        self.estimator.reset(self.state, np.arange(len(rngs)), rngs)
+
+    def take(self, seen: Keypoints) -> None:
+        """One frame into the estimator, what it says into the tracks."""
+        self.estimator.predict(self.state, DT_S, self.rngs)
+        self.estimator.update(self.state, seen, self.rngs)
+        self.tracks.estimates.append(self.estimator.estimate(self.state))
+        self.tracks.looks.append(self.look(self.estimator, self.state))
 
 
 def follow_walkers(
-    seeds: list[int], n_frames: int, condition: str, name: str = "kalman", look: Look = _nothing
+    seeds: list[int], n_frames: int, condition: str, look: Look = _nothing
 ) -> Tracks:
     """The bench's walkers in its lab, under one of `tracking.detections.CONDITIONS`."""
     rig = make_rig("lab")
     joints = walk(rig.walk_m, seeds, n_frames)
-    pixels = detect(rig.P, joints, CONDITIONS[condition], seeds)
-    estimator = make_estimator(name, rig.P, DT_S, rig.tracker)
-    rngs = [np.random.default_rng([seed, 4]) for seed in seeds]
-    state = estimator.init(len(seeds), 1)
-    estimator.reset(state, np.arange(len(seeds)), rngs)
     tracks = Tracks(joints, np.full_like(joints, np.nan))
-    for px in pixels[:, :, :, None]:
+    rngs = [np.random.default_rng([seed, 4]) for seed in seeds]
+    follower = _Follower(tracks, look, rig.P, rig.tracker, rngs)
+    for px in detect(rig.P, joints, CONDITIONS[condition], seeds)[:, :, :, None]:
         seen = np.isfinite(px[..., 0])
-        sigma = np.where(seen, SIGMA_PX, np.inf)
-        _take(tracks, estimator, state, Keypoints(px, np.where(seen, 0.9, 0.0), sigma), rngs, look)
+        sigma_px = np.where(seen, SIGMA_PX, np.inf)
+        follower.take(Keypoints(px, np.where(seen, 0.9, 0.0), sigma_px))
     return tracks
 
 
-def follow_own(
+def follow_env(
     seeds: list[int],
     n_frames: int,
     lively: bool = False,
     failing: bool = False,
-    name: str = "kalman",
     look: Look = _nothing,
 ) -> Tracks:
     """The environment's own worker at the level `keypoints`, one episode per seed.
 
-    Args:
-        seeds: one per sequence.
-        n_frames: how many frames.
-        lively: workers walk more than the environment's.
-        failing: after the first second cameras fail for up to 3 s, all but one or two at once.
-        name: the estimator.
-        look: asked after every frame.
+    Lively workers walk more than the environment's. Failing cameras do so after the first second,
+    for up to 3 s, all but one or two at once; `look` is asked after every frame.
     """
     config = HRCConfig()
     if lively:
         config = replace(config, motion=replace(config.motion, **LIVELY))  # type: ignore[arg-type]
-    scene = Simulation(len(seeds), settle(perception="none", estimator="kalman", config=config))
-    cameras = scene.scene.cameras
-    blind = _failures(seeds, n_frames, len(cameras), failing)[..., None, None]
-    estimator = make_estimator(name, projections(cameras), config.ctrl_dt, config.tracker)
-    rngs = [np.random.default_rng([seed, 12]) for seed in seeds]
-    state = estimator.init(len(seeds), 1)
-    estimator.reset(state, np.arange(len(seeds)), rngs)
+    simulation = simulate(len(seeds), config)
+    pushes, sensors, rngs = (
+        [np.random.default_rng([seed, kind]) for seed in seeds] for kind in (10, 11, 12)
+    )
+    detector = EmulatedDetector(simulation, sensors)
     shape = (n_frames, len(seeds), N_JOINTS, 3)
     tracks = Tracks(np.empty(shape), np.empty(shape))
-    for t, (joints, speed, seen) in enumerate(_frames(scene, seeds, n_frames)):
-        tracks.truth[t], tracks.speed[t] = joints, speed
-        _take(tracks, estimator, state, _without(seen, blind[t]), rngs, look)
-    scene.close()
+    P = projections(detector.cameras)
+    follower = _Follower(tracks, look, P, config.tracker, rngs)
+    blind = _failures(seeds, n_frames, len(P), failing)[..., None, None]
+    for t, (truth, between) in enumerate(watch(simulation, seeds, pushes, n_frames)):
+        tracks.truth[t], tracks.speed[t] = truth.joints_world[:, 0], truth.velocity_world[:, 0]
+        follower.take(without(detector.detect(truth, between), blind[t]))
+    simulation.close()
     return tracks
-
-
-def _frames(
-    scene: Simulation, seeds: list[int], n_frames: int
-) -> Iterator[tuple[Points3, Velocities3, Keypoints]]:
-    """True joints, their velocities (S, J, 3) and what the emulated detector reports of them."""
-    config, cameras, everyone = scene.config, scene.scene.cameras, np.arange(len(seeds))
-    scene.reset(everyone, [np.random.default_rng([seed, 9]) for seed in seeds])
-    pushes, sensors = ([np.random.default_rng([seed, kind]) for seed in seeds] for kind in (10, 11))
-    errors = emulator.make_state(len(seeds), len(cameras), 1, config.ctrl_dt, config.emulator)
-    emulator.reset(errors, everyone, sensors)
-    action = np.zeros((len(seeds), scene.n_actions))
-    for _ in range(n_frames):
-        push = np.stack([rng.standard_normal(scene.n_actions) for rng in pushes])
-        action = _SLOWNESS * action + np.sqrt(1 - _SLOWNESS**2) * push
-        scene.step(np.clip(action, -1, 1))
-        motion = generator.current(scene.motion)
-        now = worker_truth(scene.bodies, motion)
-        between = scene.scene.surroundings(scene.physics.q, motion.held)
-        seen = emulator.emulate(errors, sensors, now, between, cameras, config.emulator)
-        yield now.joints_world[:, 0], now.velocity_world[:, 0], seen
-
-
-def _take(
-    tracks: Tracks, estimator: Estimator[Any], state: Any, seen: Keypoints, rngs: Any, look: Look
-) -> None:
-    """One frame into the estimator, what it says into the tracks."""
-    estimator.predict(state, DT_S, rngs)
-    estimator.update(state, seen, rngs)
-    tracks.estimates.append(estimator.estimate(state))
-    tracks.looks.append(look(estimator, state))
 
 
 def _failures(seeds: list[int], n_frames: int, n_cameras: int, failing: bool) -> Bools:
@@ -150,12 +126,3 @@ def _failures(seeds: list[int], n_frames: int, n_cameras: int, failing: bool) ->
             blind[round(time_s / DT_S) : round(end_s / DT_S), s, lost] = True
             time_s = end_s + rng.exponential(_BETWEEN_S)
     return blind
-
-
-def _without(seen: Keypoints, blind: Bools) -> Keypoints:
-    """Keypoints of cameras that see; `blind` broadcasts to (S, C, 1, J)."""
-    return Keypoints(
-        np.where(blind[..., None], np.nan, seen.px),
-        np.where(blind, 0.0, seen.confidence),
-        np.where(blind, np.inf, seen.sigma_px),
-    )

@@ -39,13 +39,8 @@ class Path:
 
 
 def walk(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
-    """Joints (T, S, J, 3) [m] of one walker per seed, T = n_frames at 25 Hz.
-
-    Args:
-        walk_m: half the length and width of the area about the origin [m].
-        seeds: one per sequence; a sequence depends on its own seed only.
-        n_frames: how many frames.
-    """
+    """Joints (T, S, J, 3) [m] of one walker per seed, which depends on that only, at 25 Hz in an
+    area about the origin of twice `walk_m` (length, width)."""
     return bodies_along(_steer(walk_m, seeds, max(n_frames, _SHORTEST)))[:n_frames]
 
 

@@ -8,8 +8,8 @@ from typing import Annotated, ClassVar
 
 import tyro
 
-from benchmarks.commands.bench import show
 from hrc_env.cli.checks import at_least
+from hrc_env.cli.progress import show
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class AnyExperiment:
         out, overwrite = asked.pop("out"), asked.pop("overwrite")
         config = experiment.config_for(**asked)
         run = partial(runner.run, experiment.STUDY, config, overwrite=overwrite)
-        return show(run, out, "report.md", "report.html, results.json, figures/")
+        return show(run, out, "experiment", "report.html, results.json, figures/")
 
 
 @dataclass(frozen=True)

@@ -4,10 +4,14 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sized
 from contextlib import contextmanager
 from datetime import timedelta
+from pathlib import Path
 from typing import Any, Self, TypeVar
 
 from rich.console import Console
+from rich.markdown import Markdown
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from hrc_env.cli.checks import writable_folder
 
 EVERY_S = 10.0
 """Between two lines in a log file [s]."""
@@ -82,6 +86,19 @@ def progress_bar(console: Console, name: str) -> Iterator[Callable[[float, str],
     """Tell it by how much the share that is done grew, and what is being done."""
     with Meter(console, name) as meter:
         yield lambda share, label: meter.show(meter.done + share, label)
+
+
+def show(
+    run: Callable[[Path, Callable[[float, str], None]], object], out: Path, name: str, written: str
+) -> int:
+    """Run a bench or an experiment under a progress bar, then show its report.md."""
+    writable_folder(out)
+    console = Console()
+    with progress_bar(console, name) as say:
+        run(out, say)
+    console.print(Markdown((out / "report.md").read_text()))
+    console.print(f"In [bold]{out}[/]: {written}")
+    return 0
 
 
 def track(

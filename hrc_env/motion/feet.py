@@ -12,7 +12,7 @@ from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import ANKLE_Z, BALL_X, BALL_Z, HEEL_X
 from hrc_env.motion.curves import about, cruise, hump, min_jerk
-from hrc_env.motion.state import Worker
+from hrc_env.motion.state import Pair, Worker
 
 STRIKE_PITCH, PUSH_PITCH = -0.35, 1.0
 """Foot's pitch at heel strike and push-off of a full stride [rad] (Winter, Biomechanics)."""
@@ -25,7 +25,7 @@ LIFT_BASE_M, LIFT_STRIDE_M = 0.025, 0.045
 
 
 @kernel
-def _roll(t: float, lift: float, land: float, period: float, stride: float) -> tuple[float, float]:
+def _roll(t: float, lift: float, land: float, period: float, stride: float) -> Pair:
     """Pitch that one step adds: heel up round the ball, then toes up round the heel."""
     swing = land - lift
     rising = min(ROLL_SHARE * period, lift)  # the first step's heel stays down until time 0

@@ -8,7 +8,7 @@ from hrc_env.motion.anatomy import ARM, HAND, LEFT, SIDE_STRIDE, UPPER_ARM
 from hrc_env.motion.curves import hump, min_jerk
 from hrc_env.motion.kinematics import ARM_KNEE
 from hrc_env.motion.posture import MOST_LEAN, beyond, farthest, from_here, lean, stand
-from hrc_env.motion.state import Worker
+from hrc_env.motion.state import Pair, Triple, Worker
 
 GAZE_LEAD_S = 0.25
 """Eyes and head set off before the hand (Land & Hayhoe 2001: about half a second at most)."""
@@ -119,12 +119,7 @@ def _settle_lean(me: Worker) -> None:
 
 @kernel
 def plan_reach(
-    target: tuple[float, float, float],
-    used: tuple[float, float],
-    peak_m_s: float,
-    hold_s: float,
-    fidget: tuple[float, float],
-    me: Worker,
+    target: Triple, used: Pair, peak_m_s: float, hold_s: float, fidget: Pair, me: Worker
 ) -> float:
     """Plan to reach a world point with the used hands; returns the duration [s]."""
     yaw = me.start_yaw
@@ -155,7 +150,7 @@ def plan_reach(
 
 
 @kernel
-def plan_lift(ahead: float, z: float, times: tuple[float, float, float], me: Worker) -> float:
+def plan_lift(ahead: float, z: float, times: Triple, me: Worker) -> float:
     """Plan to lift a load `ahead` of the feet at height z; times: bend, raise, carry [s]."""
     for side in range(2):
         left = (1.0 - 2.0 * side) * LOAD_HALF_WIDTH_M

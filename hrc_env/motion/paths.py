@@ -9,7 +9,7 @@ import math
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
 from hrc_env.motion.curves import wrap
-from hrc_env.motion.state import MAX_VIA, Worker
+from hrc_env.motion.state import MAX_VIA, Pair, Worker
 
 HEADING_WINDOW_M = 0.3
 """Walkers face the mean direction of so much of the path behind and ahead (Grasso et al. 1998)."""
@@ -18,7 +18,7 @@ OWN_EDGE, SHARED_EDGE = 0.9, 0.5
 
 
 @kernel
-def lay_path(start: tuple[float, float], via: Floats, end: tuple[float, float], me: Worker) -> None:
+def lay_path(start: Pair, via: Floats, end: Pair, me: Worker) -> None:
     """Write the path past corners `via` (n, 3): x, y, and how far from it its arc may begin [m]."""
     n = min(via.shape[0], MAX_VIA)
     x, y, s, total, count = start[0], start[1], 0.0, 0.0, 0
@@ -36,36 +36,23 @@ def lay_path(start: tuple[float, float], via: Floats, end: tuple[float, float], 
             own = OWN_EDGE if k == 0 else 1.0  # what the corner before has left is all its own
             arm = min(via[k, 2], own * before, (SHARED_EDGE if k + 1 < n else OWN_EDGE) * after)
         straight = max(math.hypot(to_x - x, to_y - y) - arm, 0.0)
-        count = _piece(count, s, x, y, heading, 0.0, total, me)
+        piece, count = me.path[count], count + 1
+        piece[0], piece[1], piece[2] = s, x, y
+        piece[3], piece[4], piece[5] = heading, 0.0, total
         s, total = s + straight, total + heading * straight
         x, y = x + straight * math.cos(heading), y + straight * math.sin(heading)
         if arm > 1e-6 and abs(turn) > 1e-6:
             radius = arm / math.tan(0.5 * abs(turn))
             curvature, length = math.copysign(1.0 / radius, turn), radius * abs(turn)
-            count = _piece(count, s, x, y, heading, curvature, total, me)
+            piece, count = me.path[count], count + 1
+            piece[0], piece[1], piece[2] = s, x, y
+            piece[3], piece[4], piece[5] = heading, curvature, total
             me.sharpest = max(me.sharpest, 1.0 / radius)
             s, total = s + length, total + (heading + 0.5 * turn) * length
             heading += turn
             x = to_x + arm * math.cos(heading)
             y = to_y + arm * math.sin(heading)
     me.length, me.n_pieces = max(s, 1e-6), count
-
-
-@kernel
-def _piece(
-    count: int,
-    s: float,
-    x: float,
-    y: float,
-    heading: float,
-    curvature: float,
-    total: float,
-    me: Worker,
-) -> int:
-    """Append a piece; how many there are then."""
-    piece = me.path[count]
-    piece[0], piece[1], piece[2], piece[3], piece[4], piece[5] = s, x, y, heading, curvature, total
-    return count + 1
 
 
 @kernel
@@ -78,7 +65,7 @@ def _find(s: float, me: Worker) -> int:
 
 
 @kernel
-def along(s: float, me: Worker) -> tuple[float, float]:
+def along(s: float, me: Worker) -> Pair:
     """Point of the path after s metres, held at its ends."""
     s = min(max(s, 0.0), me.length)
     piece = me.path[_find(s, me)]

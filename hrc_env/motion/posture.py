@@ -8,9 +8,8 @@ from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import ARM, FOREARM_GRIP, LEFT, SIDE_STRIDE, STAND_Z, UPPER_ARM
 from hrc_env.motion.curves import wrap
 from hrc_env.motion.kinematics import ARM_KNEE, pose
-from hrc_env.motion.state import Worker
+from hrc_env.motion.state import Pair, Triple, Worker
 
-Triple = tuple[float, float, float]
 STANCE_HALF_WIDTH_M = 0.10
 """Ankles' distance from the middle when standing [m]; shoulder-wide for the baked bodies."""
 TOE_OUT_RAD = 0.12
@@ -103,14 +102,14 @@ def lean(amount: float, squat: float, twist: float, me: Worker) -> None:
 
 
 @kernel
-def beyond(used: tuple[float, float], me: Worker) -> float:
+def beyond(used: Pair, me: Worker) -> float:
     """How far the targets lie beyond what the used arms reach from this posture [m]."""
     far = farthest(UPPER_ARM, me.q[c.HAND_TARGET :], used, me)
     return max(far - ARM_KNEE * me.size[ARM], -1.0)
 
 
 @kernel
-def farthest(segment: int, goals: Floats, used: tuple[float, float], me: Worker) -> float:
+def farthest(segment: int, goals: Floats, used: Pair, me: Worker) -> float:
     """From a segment of the used arms, posed as q says, to the farther goal (6,) [m]; -1: none."""
     pose(me)
     far = -1.0

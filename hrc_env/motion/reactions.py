@@ -12,7 +12,7 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
 from hrc_env.motion import state as st
 from hrc_env.motion.anatomy import CHEST, HAND, HEAD, LEFT, SIDE_STRIDE
-from hrc_env.motion.state import WORKER, Worker, Workers
+from hrc_env.motion.state import WORKER, Triple, Worker, Workers
 from hrc_env.motion.traffic import goes, meets
 from hrc_env.motion.walk import brake
 
@@ -20,7 +20,7 @@ BODY_POINTS = (CHEST, HEAD, LEFT + HAND, LEFT + SIDE_STRIDE + HAND)
 """Segments that people guard."""
 WITHDRAW = -1.6
 """Hands come back so much faster than they went."""
-People = tuple[float, float, float]
+People = Triple
 """`PeopleConfig.notice_m`, `.fast_m_s`, `.calm_s`."""
 
 

@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Floats
+from hrc_env.core.typing import Floats, Ints
 from hrc_env.motion.floorplan import CELL_M, slack_at
 from hrc_env.motion.paths import along, lay_path
-from hrc_env.motion.state import Worker
+from hrc_env.motion.state import Pair, Worker
 
 STRIDE = 3
 """Grid points of the field to a node of the search: 15 cm."""
@@ -72,7 +72,7 @@ def clear(x0: float, y0: float, x1: float, y1: float, margin: float, ground: Gro
 
 @kernel(makes_arrays=True)
 def route(
-    start: tuple[float, float], end: tuple[float, float], bow: float, discs: Floats,
+    start: Pair, end: Pair, bow: float, discs: Floats,
     slack: Floats, origin: Floats, via: Floats, me: Worker,
 ) -> int:  # fmt: skip
     """Find a way and lay the path; the number of its corners `via` (MAX_VIA, 3), -1: there is none.
@@ -119,9 +119,7 @@ def walkable(ground: Ground, me: Worker) -> bool:
 
 
 @kernel(makes_arrays=True)
-def _search(
-    start: tuple[float, float], end: tuple[float, float], ground: Ground, via: Floats,
-) -> int:  # fmt: skip
+def _search(start: Pair, end: Pair, ground: Ground, via: Floats) -> int:
     """Corners of a short way by A* (`route`); -1 where there is none, or it has too many."""
     h, origin = STRIDE * CELL_M, ground.origin
     n_x = (ground.slack.shape[0] + STRIDE - 1) // STRIDE
@@ -167,16 +165,15 @@ def _search(
                     heapq.heappush(queue, (longer + math.hypot(end[0] - ox, end[1] - oy), other))
     if goal < 0:
         return -1
-    return _pull(goal, parent, n_y, h, start, end, ground, via)
+    return _pull(goal, parent, n_y, start, end, ground, via)
 
 
 @kernel
 def _pull(
-    goal: int, parent: Floats, n_y: int, h: float, start: tuple[float, float],
-    end: tuple[float, float], ground: Ground, via: Floats,
-) -> int:  # fmt: skip
+    goal: int, parent: Ints, n_y: int, start: Pair, end: Pair, ground: Ground, via: Floats
+) -> int:
     """Pull a chain of nodes tight, from its end to its start, into at most MAX_VIA corners."""
-    origin = ground.origin
+    origin, h = ground.origin, STRIDE * CELL_M
     at_x, at_y, last_x, last_y = end[0], end[1], end[0], end[1]
     node, count = goal, 0
     while True:

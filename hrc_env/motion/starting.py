@@ -21,7 +21,7 @@ from hrc_env.motion.config import Numbers
 from hrc_env.motion.curves import wrap
 from hrc_env.motion.feet import feet
 from hrc_env.motion.hands import plan_lift, plan_reach
-from hrc_env.motion.state import Place, Worker
+from hrc_env.motion.state import Pair, Place, Triple, Worker
 
 BODY_M = 0.36
 """Hands reach no nearer to their own root than this [m]."""
@@ -91,7 +91,7 @@ def start_here(
 
 
 @kernel
-def own_side(x: float, y: float, others: Floats, me: Worker) -> tuple[float, float]:
+def own_side(x: float, y: float, others: Floats, me: Worker) -> Pair:
     """A target, moved over to the worker's own side of the middle to every other worker."""
     mx, my = me.start_x, me.start_y
     for k in range(others.shape[0]):
@@ -106,9 +106,7 @@ def own_side(x: float, y: float, others: Floats, me: Worker) -> tuple[float, flo
 
 
 @kernel
-def _target(
-    draws: Floats, config: Numbers, near: bool, height: float, me: Worker
-) -> tuple[float, float, float]:
+def _target(draws: Floats, config: Numbers, near: bool, height: float, me: Worker) -> Triple:
     """A world point for the hands: in the robot's workspace, or ahead of the worker."""
     z = between(draws[3], *config.target_z_m)
     x, y = me.start_x, me.start_y

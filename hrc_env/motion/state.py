@@ -104,6 +104,8 @@ WORKER = np.dtype((np.record, np.dtype(_EPISODE + _NOW + _PLAN + _SCRATCH, align
 Worker: TypeAlias = Any
 Workers: TypeAlias = Any
 """A record of WORKER, and an array of them."""
+Pair = tuple[float, float]
+Triple = tuple[float, float, float]
 Place = tuple[float, float, float, float]
 """x, y [m], yaw [rad], height of the work [m]."""
 N_START = 16

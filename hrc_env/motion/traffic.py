@@ -9,7 +9,7 @@ from hrc_env.core.kernels import kernel
 from hrc_env.motion import state as st
 from hrc_env.motion.activities.playing import clip_root
 from hrc_env.motion.paths import along
-from hrc_env.motion.state import Worker, Workers
+from hrc_env.motion.state import Pair, Triple, Worker, Workers
 from hrc_env.motion.walk import travelled
 
 APART_M = 0.80
@@ -31,7 +31,7 @@ def goes(activity: int) -> bool:
 
 
 @kernel
-def ahead_of(activity: int) -> tuple[float, float]:
+def ahead_of(activity: int) -> Pair:
     """How far ahead of the root someone is in the way with what, and how near one may go [m]."""
     if activity == st.PUSH:
         return CART_M, CART_APART_M
@@ -43,7 +43,7 @@ def ahead_of(activity: int) -> tuple[float, float]:
 
 
 @kernel
-def root_at(t: float, me: Worker) -> tuple[float, float]:
+def root_at(t: float, me: Worker) -> Pair:
     """Where someone's root is on the floor at time t of their activity, and after it."""
     if goes(me.activity):
         return along(travelled(t - me.taken_s, me), me)
@@ -69,7 +69,7 @@ def gap_to(x: float, y: float, t: float, me: Worker) -> float:
 
 
 @kernel
-def meets(w: int, workers: Workers) -> tuple[float, float, float]:
+def meets(w: int, workers: Workers) -> Triple:
     """When worker w first comes too near to another, from now [s] (-1: never), and x, y."""
     found, fx, fy = -1.0, 0.0, 0.0
     me = workers[w]

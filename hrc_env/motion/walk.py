@@ -22,7 +22,7 @@ from hrc_env.motion.posture import (
     hang,
     stand,
 )
-from hrc_env.motion.state import MAX_STEPS, Worker
+from hrc_env.motion.state import MAX_STEPS, Triple, Worker
 
 CADENCE_PER_MIN, CADENCE_POWER, SLOWEST_M_S = 96.2, 0.468, 0.65
 """Fit above; slower starts and turns keep the cadence of the slowest speed [m/s]."""
@@ -72,7 +72,7 @@ def speed(t: float, me: Worker) -> float:
 
 
 @kernel
-def root(t: float, me: Worker) -> tuple[float, float, float]:
+def root(t: float, me: Worker) -> Triple:
     """Where the walker's middle is at time t, and their heading (continuous, not wrapped)."""
     s = travelled(t, me)
     x, y = along(s, me)
@@ -147,13 +147,7 @@ def _lurch(t: float, trip: float, me: Worker) -> None:
 
 
 @kernel
-def plan_walk(
-    start: tuple[float, float, float],
-    via: Floats,
-    end: tuple[float, float, float],
-    wished_m_s: float,
-    me: Worker,
-) -> float:
+def plan_walk(start: Triple, via: Floats, end: Triple, wished_m_s: float, me: Worker) -> float:
     """Plan to go from (x, y, yaw) to (x, y, yaw) past corners (`lay_path`); the duration [s]."""
     me.start_x, me.start_y, me.start_yaw = start
     me.end_x, me.end_y = end[0], end[1]
@@ -167,7 +161,7 @@ def plan_walk(
 
 
 @kernel
-def plan_pace(pace: tuple[float, float, float], end_yaw: float, me: Worker) -> float:
+def plan_pace(pace: Triple, end_yaw: float, me: Worker) -> float:
     """Plan speed, turns and steps along the path that is laid; returns the duration [s].
 
     `pace`: whether to face along the path (1) or keep the heading (0); top speed [m/s]; time of a

@@ -140,7 +140,7 @@ class PoseTracking(PerceptionPipeline):
 
     def suspected(self, ids: Ints) -> Bools:
         """(B, C) which cameras of environments `ids` are thought to be miscalibrated."""
-        return self.monitored.suspected[ids]
+        return self.monitored["suspected"][ids]
 
     def _age_s(self, ids: Ints, keypoints: Keypoints) -> Floats:
         """(B, C) how old the images of this update are, as they say [s]; NaN: none."""

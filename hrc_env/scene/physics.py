@@ -84,7 +84,7 @@ class Physics:
         self._qpos[ids, : self._n] = q
         self._act[ids, : self._n] = q
         self._body[ids] = 0 if body is None else body
-        self._dress(ids)
+        self._set_capsules(ids)
 
     def step(
         self, qd_command: JointVelocities, workers: WorkerPath, out_of_reach: Bools | None = None
@@ -128,7 +128,7 @@ class Physics:
         """Continue from a state that `get_state` gave (same scene and batch)."""
         check_shape("state", np.shape(state), self._sims.state.shape, "batch, state")
         self._sims.state[:] = state
-        self._dress(np.arange(self.batch))
+        self._set_capsules(np.arange(self.batch))
 
     def __getstate__(self) -> tuple[Scene, int, Floats]:
         return self.scene, self.batch, self.get_state()
@@ -138,7 +138,7 @@ class Physics:
         self.__init__(scene, batch)
         self.set_state(state)
 
-    def _dress(self, ids: Ints) -> None:
+    def _set_capsules(self, ids: Ints) -> None:
         """Give the workers of environments `ids` the capsules of their bodies."""
         body, geoms = self._body[ids].astype(np.int64), self.scene.worker_capsules
         known = capsule_shapes(self.scene.bodies) if self._shapes else {}

@@ -13,15 +13,6 @@ from hrc_env.scene.build import Scene, drawing_model, visuals
 from hrc_env.scene.worker_visuals import show_workers
 
 
-def viewing_model(scene: Scene) -> mujoco.MjModel:
-    """The painted model, its own copy, with everything that is drawn in groups that are shown.
-
-    MuJoCo's window shows groups 0 to 2 at first; lamps and ceiling stay hidden, so that one can
-    look in from above.
-    """
-    return copy.copy(drawing_model(scene))
-
-
 class Viewer:
     """A window that shows one environment; drag to look round, close it to go on without."""
 
@@ -31,7 +22,7 @@ class Viewer:
         Raises:
             RenderingError: no display, or the viewer cannot run here.
         """
-        self._scene, self._model = scene, viewing_model(scene)
+        self._scene, self._model = scene, copy.copy(drawing_model(scene))
         self._data = mujoco.MjData(self._model)
         self._visuals = visuals(scene)
         try:

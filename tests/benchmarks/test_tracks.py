@@ -3,7 +3,7 @@
 import numpy as np
 
 from benchmarks.tracking.rigs import DT_S
-from benchmarks.tracking.tracks import follow_own, follow_walkers
+from benchmarks.tracking.tracks import follow_env, follow_walkers
 
 CHI2_95_3D = 7.815
 WARM_UP, FRAMES_AHEAD = 25, 10
@@ -28,7 +28,7 @@ def rmse(errors):
 
 def test_on_the_environments_own_worker_it_is_accurate_and_means_what_it_says():
     """Seeds that the network was not trained on."""
-    go, stay, cov = misses(follow_own(list(range(2000, 2012)), 150, look=predicted))
+    go, stay, cov = misses(follow_env(list(range(2000, 2012)), 150, look=predicted))
     assert rmse(go) < 0.8 * rmse(stay)  # it learnt from walks and reaches only
     nees = np.einsum("...i,...ij,...j", go, np.linalg.inv(cov), go)
     assert 0.90 < (nees < CHI2_95_3D).mean() < 0.985
@@ -41,8 +41,8 @@ def test_walkers_of_whom_it_never_heard_are_predicted_too():
 
 
 def test_a_sequence_depends_on_its_own_seed_only():
-    several = follow_own([5, 6], 40, failing=True)
-    alone = follow_own([6], 40, failing=True)
+    several = follow_env([5, 6], 40, failing=True)
+    alone = follow_env([6], 40, failing=True)
     np.testing.assert_array_equal(several.truth[:, 1:], alone.truth)
     np.testing.assert_array_equal(
         several.estimates[-1].mean_world[1:], alone.estimates[-1].mean_world
@@ -52,6 +52,6 @@ def test_a_sequence_depends_on_its_own_seed_only():
 def test_failing_cameras_cost_certainty():
     spread = [
         np.mean([np.trace(each.cov_world, axis1=-2, axis2=-1).mean() for each in tracks.estimates])
-        for tracks in (follow_own([5, 6], 100, failing=failing) for failing in (False, True))
+        for tracks in (follow_env([5, 6], 100, failing=failing) for failing in (False, True))
     ]
     assert spread[1] > spread[0]

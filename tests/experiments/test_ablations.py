@@ -205,16 +205,16 @@ def test_tracks_are_compared_with_the_workers_whom_they_fit():
 def test_bones_are_given_and_taken_away():
     state, lengths = state_of(Setting("x", "x"))
     handicap(state, "known", "model", lengths)
-    assert np.array_equal(state.slots.bone_length, np.repeat(lengths, 8, axis=1))
+    assert np.array_equal(state.trees.bone_length, np.repeat(lengths, 8, axis=1))
     handicap(state, "none", "model", lengths)
-    assert (state.slots.bone_variance == 1e6).all()
+    assert (state.trees.bone_variance == 1e6).all()
     with pytest.raises(ConfigError, match="body on a tree"):
         handicap(object(), "known", "model", lengths)
 
 
 def test_a_forgotten_velocity_leaves_the_positions_as_they_are():
     state, lengths = state_of(Setting("x", "x"))
-    trees = state.slots
+    trees = state.trees
     parent = np.where(np.arange(N_JOINTS) == ROOT, ROOT, PARENT)
     positions = trees.cov[:, 0, :, :3, :3].copy()
     together = (trees.slope @ trees.cov[:, :, parent])[:, 0, :, :3, :3].copy()

@@ -6,12 +6,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from benchmarks.motion.gait import knee_flexion_deg
 from benchmarks.motion.statistics import (
     ANKLES,
     HEAD,
     WRISTS,
     grips,
+    knee_flexion_deg,
     misses,
     slips,
     wholly_there,

@@ -53,9 +53,8 @@ def test_a_vector_names_what_its_environments_would():
     cameras = single.simulation.settings["cameras"]
     assert infos[MISCALIBRATED][1] == miscalibration_info(cameras, suspected)[MISCALIBRATED][0]
     assert infos[f"_{MISCALIBRATED}"].all()
-    one, many = single.simulation.pipeline.watched, env.shards.parts[0].pipeline.watched
-    for alone, together in zip(one, many, strict=True):
-        np.testing.assert_array_equal(alone[0], together[1])
+    one, many = single.simulation.pipeline.monitored, env.shards.parts[0].pipeline.monitored
+    np.testing.assert_array_equal(one[0], many[1])
 
 
 def test_what_is_suspected_is_part_of_the_state():

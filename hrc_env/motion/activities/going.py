@@ -13,7 +13,7 @@ from hrc_env.motion.curves import min_jerk
 from hrc_env.motion.holding import GRIPS, drop_load, grip_load, place_load
 from hrc_env.motion.paths import lay_path
 from hrc_env.motion.posture import lean
-from hrc_env.motion.state import Place, Worker
+from hrc_env.motion.state import Pair, Place, Worker
 from hrc_env.motion.walk import plan_pace, plan_walk, root, speed, walk
 from hrc_env.worker.props import prop_index
 
@@ -146,7 +146,7 @@ def _tip(back_rad: float, yaw: float, me: Worker) -> None:
 
 
 @kernel
-def _tipped(back_rad: float, z: float) -> tuple[float, float]:
+def _tipped(back_rad: float, z: float) -> Pair:
     """How far ahead and up a point goes at height z over the wheelbarrow's origin."""
     cos, sin = math.cos(back_rad), math.sin(back_rad)
     above = z - WHEEL_UP_M

@@ -24,7 +24,7 @@ from hrc_env.motion.curves import hump, min_jerk
 from hrc_env.motion.holding import GRIPS, grip, place_load
 from hrc_env.motion.kinematics import pose
 from hrc_env.motion.posture import from_here, lean, look_at, stand
-from hrc_env.motion.state import Place, Worker
+from hrc_env.motion.state import Place, Triple, Worker
 from hrc_env.worker.props import prop_index
 
 BOX, BOARD = prop_index("box"), prop_index("board")
@@ -66,8 +66,7 @@ def pick_up(t: float, clock_s: float, me: Worker) -> None:
     for i in range(6):
         at, mid = me.tool_pose[i], me.midway[i]
         q[c.PROP_POSE + i] = at + up * (mid - at) + turned * (q[c.PROP_POSE + i] - mid)
-    bulge = 0.06 * hump(up)
-    bulge += 0.15 * hump(turned)
+    bulge = 0.06 * hump(up) + 0.15 * hump(turned)
     q[c.PROP_POSE] += math.cos(yaw) * bulge
     q[c.PROP_POSE + 1] += math.sin(yaw) * bulge
     q[c.PROP_POSE + 2] += 0.10 * hump(turned)
@@ -75,13 +74,8 @@ def pick_up(t: float, clock_s: float, me: Worker) -> None:
     q[c.PROP] = prop if t >= gripped or me.hidden == 0.0 else 0.0
     for side in range(2):
         here, own = GRIPS[prop, side], me.load_grip[3 * side : 3 * side + 3]
-        grip(
-            side,
-            here[0] + turned * (own[0] - here[0]),
-            here[1] + turned * (own[1] - here[1]),
-            here[2] + turned * (own[2] - here[2]),
-            me,
-        )
+        x, y = here[0] + turned * (own[0] - here[0]), here[1] + turned * (own[1] - here[1])
+        grip(side, x, y, here[2] + turned * (own[2] - here[2]), me)
         used = 1.0 + turned * (me.load_used[side] - 1.0)
         q[c.HAND_SHARE + side] = down * used
 
@@ -108,22 +102,20 @@ def plan_receive(draws: Floats, place: Place, me: Worker) -> float:
 def plan_set_down(draws: Floats, place: Place, me: Worker) -> float:
     """Plan to set down what is held, onto the place's height; its pace [s]."""
     z = place[3] if place[3] > 0.0 else between(draws[1], 0.18, 0.45)
-    prop = me.load_prop
-    _lay_out(prop, (AWAY_M, 0.0, z), me)
+    _lay_out(me.load_prop, (AWAY_M, 0.0, z), me)
     return between(draws[2], 1.0, 1.35)
 
 
 @kernel
 def plan_hand_over(draws: Floats, place: Place, me: Worker) -> float:
     """Plan to hold out what is carried until somebody has it; its pace [s]."""
-    prop = me.load_prop
-    _lay_out(prop, _given(place, me), me)
+    _lay_out(me.load_prop, _given(place, me), me)
     me.hidden = 1.0
     return between(draws[2], 0.9, 1.1)
 
 
 @kernel
-def _given(place: Place, me: Worker) -> tuple[float, float, float]:
+def _given(place: Place, me: Worker) -> Triple:
     """Where loads change hands."""
     z = place[3] if place[3] > 0.0 else GIVEN_SHARE * me.size[STAND_Z]
     return GIVEN_AHEAD_M, 0.0, z
@@ -156,7 +148,7 @@ def _hold(prop: int, on_shoulder: bool, side: int, me: Worker) -> None:
 
 
 @kernel
-def _lay_out(prop: int, at: tuple[float, float, float], me: Worker) -> None:
+def _lay_out(prop: int, at: Triple, me: Worker) -> None:
     """Plan where the load stands: ahead, left [m], height."""
     blank(me)
     put_tool(prop, 1, at, (0.0, 0.0, 0.0), me)

@@ -9,8 +9,8 @@ from hrc_env.motion.activities.strokes import PAUSE_S, stroke
 from hrc_env.motion.activities.work import FRONT_LEG, REAR_LEG, extend, hands_on, step_into
 from hrc_env.motion.feet import feet
 from hrc_env.motion.holding import TWO_HANDED
-from hrc_env.motion.posture import MOST_LEAN, Triple, beyond, farthest, from_here, stand
-from hrc_env.motion.state import Worker
+from hrc_env.motion.posture import MOST_LEAN, beyond, farthest, from_here, stand
+from hrc_env.motion.state import Triple, Worker
 
 TAKE_S = 0.55
 """For a hand to go to the belt [s]."""

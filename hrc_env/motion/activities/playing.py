@@ -20,7 +20,7 @@ from hrc_env.motion.clip import RECORDED, Clip, fitted_to, footprints, placed_at
 from hrc_env.motion.curves import min_jerk, ramp
 from hrc_env.motion.feet import foot, raise_heel
 from hrc_env.motion.posture import STANCE_HALF_WIDTH_M, stand
-from hrc_env.motion.state import N_ROOTS, Worker
+from hrc_env.motion.state import N_ROOTS, Pair, Worker
 from hrc_env.motion.walk import footprint
 
 STEP_AT_S, PERIOD_S, SWING_S = 0.12, 0.50, 0.42
@@ -211,7 +211,7 @@ def _placed_foot(f: float, side: int, frames: Floats, me: Worker) -> None:
 
 
 @kernel
-def clip_root(t: float, me: Worker) -> tuple[float, float]:
+def clip_root(t: float, me: Worker) -> Pair:
     """About where the root of someone who plays a clip is on the floor at time t, and after."""
     lasts = me.clip_s + 2.0 * SETTLE_S
     u = min(max(t / lasts, 0.0), 1.0) * (N_ROOTS - 1)

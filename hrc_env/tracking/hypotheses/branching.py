@@ -54,7 +54,7 @@ def camera_of(part, P, body, cov, ok, m):
     return camera if camera >= 0 and open_depth(part, P[camera], body, cov) > m.open_m else -1
 
 
-@kernel
+@kernel(makes_arrays=True)
 def branch(state, b, w, prior, evidence, seen, s, m, work):
     """Look for other bodies beside the heaviest hypothesis, and keep them as hypotheses.
 
@@ -67,73 +67,73 @@ def branch(state, b, w, prior, evidence, seen, s, m, work):
         s, m: settings.
         work: scratch, a record of `WORK`.
     """
-    limit = state.log_weight.shape[1] // state.n_alive.shape[1]
+    limit = state.trees.shape[1] // state.n_alive.shape[1]
     own = w * limit
+    trees = state.trees[b, own:]
     for part in range(N_MIRRORS):
         n = state.n_alive[b, w]
         camera = camera_of(part, seen.P, prior[0], prior[1], seen.ok, m) if n < limit else -1
         if camera < 0:
             continue
         new = own + n
-        copy_slot(state.slots, b, own, new)
+        copy_slot(state, b, own, new)
         if part == WHOLE_BODY:
-            penalty = _turn(state.slots, b, own, n, camera, prior, seen, s, m, work)
+            penalty = _turn(trees, n, camera, prior, seen, s, m, work)
         else:
             where = (part, camera, prior, evidence)
-            penalty = _reflect(state.slots, b, own, n, where, seen, s, m, work)
+            penalty = _reflect(trees, n, where, seen, s, m, work)
         if penalty < np.inf:
-            pose_log_prior = m.anatomy * anatomy(state.slots.body[b, new])
-            state.log_weight[b, new] = (
-                state.log_weight[b, own] + pose_log_prior - state.pose_log_prior[b, own] - penalty
-            )
-            state.pose_log_prior[b, new], state.n_alive[b, w] = pose_log_prior, n + 1
+            tree = trees[n]
+            before, tree.pose_log_prior = tree.pose_log_prior, m.anatomy * anatomy(tree.body)
+            tree.log_weight += tree.pose_log_prior - before - penalty
+            state.n_alive[b, w] = n + 1
 
 
 @kernel(makes_arrays=True)
-def _turn(slots, b, own, n, camera, prior, seen, s, m, work):
-    """Make slot own + n the body that is turned the other way; its penalty [nat].
+def _turn(trees, n, camera, prior, seen, s, m, work):
+    """Make tree n the body that is turned the other way; its penalty [nat].
 
     It is infinite where one of the n hypotheses is turned alike.
     """
-    new = own + n
+    new = trees[n]
     turn = turn_of(seen.P[camera], prior[0])
     penalty = 0.5 * (turn / m.turn) ** 2
     if penalty > m.most_penalty:
         return np.inf
-    body, cov, slope = slots.body[b, new], slots.cov[b, new], slots.slope[b, new]
+    body, cov, slope = new.body, new.cov, new.slope
     body[:], cov[:], slope[:] = prior[0], prior[1], prior[2]
     turn_body(seen.P[camera], turn, body, cov, slope)
-    if _turned_alike(slots, b, own, n):
+    if _turned_alike(trees, n):
         return np.inf
-    condition(slots, b, new, seen, s, work)
-    correct_mean(slots, b, new, seen, s, work)
-    return np.inf if _turned_alike(slots, b, own, n) else penalty
+    condition(new, seen, s, work)
+    correct_mean(new, seen, s, work)
+    return np.inf if _turned_alike(trees, n) else penalty
 
 
 @kernel
-def _turned_alike(slots, b, own, n):
-    """Whether slot own + n is turned as one of the n slots before it."""
+def _turned_alike(trees, n):
+    """Whether tree n is turned as one of those before it."""
     alike = False
-    for k in range(own, own + n):
-        alike |= heads_like(slots.body[b, own + n], slots.body[b, k])
+    for k in range(n):
+        alike |= heads_like(trees[n].body, trees[k].body)
     return alike
 
 
 @kernel(makes_arrays=True)
-def _reflect(slots, b, own, n, where, seen, s, m, work):
-    """Condition slot own + n at the mode next to a reflected limb; 0, or infinity for none.
+def _reflect(trees, n, where, seen, s, m, work):
+    """Condition tree n at the mode next to a reflected limb; 0, or infinity for none.
 
     There is none where the search ends at one of the n hypotheses, or where the evidence is
     negligible beside that of the search from the prediction.
     """
     part, camera, prior, evidence = where
     give = work.bone_variance
-    new = own + n
-    body, cov, slope = slots.body[b, new], slots.cov[b, new], slots.slope[b, new]
+    new = trees[n]
+    body, cov, slope = new.body, new.cov, new.slope
     if not reflect(part, seen.P[camera], body, work.point):
         return np.inf
-    stiff_lengths(slots.bone_variance[b, new], s.bone_give, give)
-    bones = (slots.bone_length[b, new], give)
+    stiff_lengths(new.bone_variance, s.bone_give, give)
+    bones = (new.bone_length, give)
     how = (s.inlier_odds, s.floor_std_m, m.search_steps, 0.0)
     find_pose_near(prior[0], prior[1], prior[2], seen, bones, *how, work)
     moved = 0.0
@@ -147,8 +147,8 @@ def _reflect(slots, b, own, n, where, seen, s, m, work):
     found = log_evidence(prior, (body, cov, slope), seen, bones, s.inlier_odds, s.floor_std_m, work)
     if not found - evidence > m.log_least:
         return np.inf
-    correct_mean(slots, b, new, seen, s, work)
-    for k in range(own, own + n):
-        if not slot_distance(slots, b, k, new, work) > m.distinct:
+    correct_mean(new, seen, s, work)
+    for k in range(n):
+        if not slot_distance(trees[k], new, work) > m.distinct:
             return np.inf
     return 0.0

@@ -77,23 +77,21 @@ def first_factor(config: ParticleConfig) -> float:
 
 
 @kernel
-def scale_sigma(factor, sigma):
-    """Multiply sigma (J, C) by the root of the factors (J, C), in place."""
+def scale_sigma(learnt, sigma):
+    """Multiply sigma (J, C) by the roots of the learnt factors (J, C), in place."""
     for j in range(len(sigma)):
         for c in range(sigma.shape[1]):
-            sigma[j, c] *= math.sqrt(factor[j, c])
+            sigma[j, c] *= math.sqrt(learnt[j, c].factor)
 
 
 @kernel
-def learn_noise(seen, body, factor, sums, last, model, w):
+def learn_noise(seen, body, learnt, model, w):
     """Learn the factors (J, C) from one update, in place.
 
     Args:
         seen: `measurements.Seen`, sigma as scaled by `scale_sigma`.
         body: mean (J, 6) and covariance (J, 6, 6) after the update, (J, 3, 3) before it.
-        factor: (J, C).
-        sums: (J, C, 5) see `N_SUMS`.
-        last: (J, C, 2) last residuals in reported standard deviations, fading; 0: none.
+        learnt: (J, C) records of `tree.state.NOISE`.
         model: constants.
         w: scratch, a record of `WORK`.
     """
@@ -101,22 +99,22 @@ def learn_noise(seen, body, factor, sums, last, model, w):
         return
     mean, cov, predicted = body
     view, spread, grows = seen.looks, w.spread, w.grows
-    turn = sums[0, 0, 4]
-    sums[0, 0, 4] = (turn + 1.0) % _TURNS
+    turn = learnt[0, 0].sums[4]
+    learnt[0, 0].sums[4] = (turn + 1.0) % _TURNS
     for j in range(len(mean)):
         n_views, grows[j] = 0, -1.0
         if j % _TURNS == turn:
             n_views = _look(seen, mean[j], j, view, spread)
         if n_views < 2:
-            for c in range(factor.shape[1]):
-                last[j, c, 0] *= model.persists
-                last[j, c, 1] *= model.persists
+            for c in range(learnt.shape[1]):
+                learnt[j, c].last[0] *= model.persists
+                learnt[j, c].last[1] *= model.persists
         else:
-            _compare(view, spread, factor[j], sums[j], last[j], model)
+            _compare(view, spread, learnt[j], model)
         if n_views > 0:
             follows = min(_remembered(cov[j], predicted[j], spread), 1.0) * model.persists
             grows[j] = (1.0 + follows) / (1.0 - follows)
-    _set_factors(factor, sums, grows, model)
+    _set_factors(learnt, grows, model)
 
 
 @kernel(fastmath=_REORDER)
@@ -172,7 +170,7 @@ def _look(seen, body, j, view, spread):
 
 
 @kernel(fastmath=_REORDER)
-def _compare(view, spread, factor, sums, last, model):
+def _compare(view, spread, learnt, model):
     """Add one joint's residuals about its triangulated point to its sums (C, 5), which fade.
 
     What is left of the last residuals are those, faded as errors that persist would: products
@@ -184,23 +182,23 @@ def _compare(view, spread, factor, sums, last, model):
     x, y, z = spread[0, 3], spread[1, 3], spread[2, 3]
     for c in range(len(view)):
         if not view[c, 6] < np.inf:
-            last[c, 0] *= persists
-            last[c, 1] *= persists
+            learnt[c].last[0] *= persists
+            learnt[c].last[1] *= persists
             continue
         a0, a1, a2 = view[c, 0], view[c, 1], view[c, 2]
         b0, b1, b2 = view[c, 3], view[c, 4], view[c, 5]
-        scale = math.sqrt(factor[c])  # to reported standard deviations
+        scale = math.sqrt(learnt[c].factor)  # to reported standard deviations
         du = scale * (view[c, 6] - a0 * x - a1 * y - a2 * z)
         dv = scale * (view[c, 7] - b0 * x - b1 * y - b2 * z)
         absorbed = s00 * (a0 * a0 + b0 * b0) + s11 * (a1 * a1 + b1 * b1)
         absorbed += s22 * (a2 * a2 + b2 * b2) + s01 * (a0 * a1 + b0 * b1)
         absorbed += s02 * (a0 * a2 + b0 * b2) + s12 * (a1 * a2 + b1 * b2)
-        u, v = last[c, 0], last[c, 1]
-        sums[c, 0] = keep * sums[c, 0] + du * du + dv * dv
-        sums[c, 1] = keep * sums[c, 1] + 2.0 - absorbed
-        sums[c, 2] = keep * sums[c, 2] + du * u + dv * v
-        sums[c, 3] = keep * sums[c, 3] + u * u + v * v
-        last[c, 0], last[c, 1] = du, dv
+        u, v = learnt[c].last[0], learnt[c].last[1]
+        learnt[c].sums[0] = keep * learnt[c].sums[0] + du * du + dv * dv
+        learnt[c].sums[1] = keep * learnt[c].sums[1] + 2.0 - absorbed
+        learnt[c].sums[2] = keep * learnt[c].sums[2] + du * u + dv * v
+        learnt[c].sums[3] = keep * learnt[c].sums[3] + u * u + v * v
+        learnt[c].last[0], learnt[c].last[1] = du, dv
 
 
 @kernel(fastmath=_REORDER)
@@ -213,25 +211,25 @@ def _remembered(cov, predicted, work):
 
 
 @kernel(fastmath=_REORDER)
-def _set_factors(factor, sums, grows, model):
+def _set_factors(learnt, grows, model):
     """The factors (J, C) that the sums ask for.
 
     `grows` (J,) is the last bracket of the module's formula; less than 0: the factor stays.
     """
-    for c in range(factor.shape[1]):
+    for c in range(learnt.shape[1]):
         squares = redundancy = _CAMERA_WEIGHT
         products, unchanged = model.persists * model.share * _SHARE_WEIGHT, _SHARE_WEIGHT
-        for j in range(len(factor)):
-            squares += sums[j, c, 0]
-            redundancy += sums[j, c, 1]
-            products += sums[j, c, 2]
-            unchanged += sums[j, c, 3]
+        for j in range(len(learnt)):
+            squares += learnt[j, c].sums[0]
+            redundancy += learnt[j, c].sums[1]
+            products += learnt[j, c].sums[2]
+            unchanged += learnt[j, c].sums[3]
         of_camera = squares / redundancy
         share = products / (unchanged * model.persists)
         share = min(max((share - _CHANCE) / (1.0 - _CHANCE), 0.0), 1.0)
-        for j in range(len(factor)):
+        for j in range(len(learnt)):
             if grows[j] > 0.0:
-                own = sums[j, c, 0] + _JOINT_WEIGHT * of_camera
-                variance = own / (sums[j, c, 1] + _JOINT_WEIGHT)
+                own = learnt[j, c].sums[0] + _JOINT_WEIGHT * of_camera
+                variance = own / (learnt[j, c].sums[1] + _JOINT_WEIGHT)
                 wanted = variance * (1.0 - share + share * grows[j])
-                factor[j, c] = min(max(wanted, model.least), model.most)
+                learnt[j, c].factor = min(max(wanted, model.least), model.most)

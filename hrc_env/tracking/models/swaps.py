@@ -21,35 +21,37 @@ _REORDER = {"reassoc", "contract", "nsz"}
 
 
 @kernel
-def undo_swaps(P, body, cov, z, sigma, ok, chance, blind, believed, s):
+def undo_swaps(P, body, cov, z, sigma, ok, views, s):
     """Mirror z, sigma, ok (J, C) of the cameras that are probably swapped, in place.
 
-    `chance` (C,) is the probability of being swapped, `blind` and `believed` (C,) count
-    updates; `s` are the `settings.Settings`.
+    `views` (C,) are records of `tree.state.VIEW`, `s` the `settings.Settings`.
     """
     inlier_odds, n_seeing, n_swapped = s.inlier_odds, 0, 0
     for c in range(len(P)):
-        sees = False
+        sees, view = False, views[c]
         for j in range(len(_MIRROR)):
             sees |= ok[j, c]
         if not sees:
-            blind[c] += 1
+            view.blind += 1
             continue
-        believed[c] = _BELIEVED_UPDATES if blind[c] > _BLIND_UPDATES else max(believed[c] - 1, 0)
-        blind[c] = 0
+        back = view.blind > _BLIND_UPDATES
+        view.believed = _BELIEVED_UPDATES if back else max(view.believed - 1, 0)
+        view.blind = 0
         n_seeing += 1
-        if believed[c] > 0:
-            chance[c] = _LEAST_CHANCE
+        if view.believed > 0:
+            view.swap_chance = _LEAST_CHANCE
             continue
-        prior = chance[c] * (1.0 - s.swap_ends) + (1.0 - chance[c]) * s.swap_begins
+        prior = view.swap_chance * (1.0 - s.swap_ends) + (1.0 - view.swap_chance) * s.swap_begins
         evidence = swap_evidence(P[c], c, body, cov, z, sigma, ok, inlier_odds)
         odds = math.log(prior / (1.0 - prior)) + evidence
-        chance[c] = min(max(1.0 / (1.0 + math.exp(-odds)), _LEAST_CHANCE), 1.0 - _LEAST_CHANCE)
-        n_swapped += chance[c] > 0.5
+        chance = min(max(1.0 / (1.0 + math.exp(-odds)), _LEAST_CHANCE), 1.0 - _LEAST_CHANCE)
+        view.swap_chance = chance
+        n_swapped += chance > 0.5
     if n_swapped == n_seeing > 1:  # it is the body that has its sides exchanged
-        chance[:] = _LEAST_CHANCE
+        for c in range(len(P)):
+            views[c].swap_chance = _LEAST_CHANCE
     for c in range(len(P)):
-        if chance[c] > 0.5 and blind[c] == 0:
+        if views[c].swap_chance > 0.5 and views[c].blind == 0:
             _mirror(c, z, sigma, ok)
 
 

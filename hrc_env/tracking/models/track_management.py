@@ -1,8 +1,7 @@
 """What Gaussian estimators do for a track besides filtering: begin it, repair it, give it up.
 
-`state` is any record with body (B, W, J, 6), cov (B, W, J, 6, 6), age_s, conflict (B, W, J) and
-tracked (B, W); `s` are `settings.Settings`; measurements are as `measurements.read_worker`
-fills them.
+`tree` is a record of `tree.state.TREE`, `s` are `settings.Settings`; measurements are as
+`measurements.read_worker` fills them.
 """
 
 import math
@@ -26,15 +25,15 @@ _FURTHEST_STD = 8.0
 
 
 @kernel
-def grow_older(state, b, w, dt, s):
+def grow_older(tree, dt, s):
     """Count ages up by dt [s]; give up a track that nothing supports, let a lost one relax."""
-    body, ages = state.body[b, w], (state.age_s[b, w], state.conflict[b, w])
-    gaussian = (body[:, :3], state.cov[b, w, :, :3, :3], body[:, 3:])
-    state.tracked[b, w] = age_worker(*gaussian, *ages, state.tracked[b, w], dt, s)
+    body, ages = tree.body, (tree.age_s, tree.conflict)
+    gaussian = (body[:, :3], tree.cov[:, :3, :3], body[:, 3:])
+    tree.tracked = age_worker(*gaussian, *ages, tree.tracked, dt, s)
 
 
 @kernel(makes_arrays=True)
-def acquire(state, b, w, P, z, sigma, ok, standing, s):
+def acquire(tree, P, z, sigma, ok, standing, s):
     """Start a track when two views agree on enough joints; whether one was started."""
     n_joints = len(ok)
     points, spread = np.empty((n_joints, 3)), np.ones((n_joints, 3, 3))
@@ -45,10 +44,10 @@ def acquire(state, b, w, P, z, sigma, ok, standing, s):
         return False
     complete_body(standing, points, spread, found)
     for j in range(n_joints):
-        place(state.body[b, w, j], state.cov[b, w, j], points[j], spread[j])
+        place(tree.body[j], tree.cov[j], points[j], spread[j])
         if found[j]:
-            state.age_s[b, w, j] = 0.0
-    state.tracked[b, w] = True
+            tree.age_s[j] = 0.0
+    tree.tracked = True
     return True
 
 
@@ -63,7 +62,7 @@ def place(body, cov, point, spread):
 
 
 @kernel(makes_arrays=True)
-def find_joints_again(state, b, w, P, z, sigma, ok, s, placed):
+def find_joints_again(tree, P, z, sigma, ok, s, placed):
     """Joints that have been elsewhere for a while, as two views say, are put there.
 
     Sets `placed` (J,) where that happened.
@@ -71,17 +70,17 @@ def find_joints_again(state, b, w, P, z, sigma, ok, s, placed):
     everyone, middle = np.ones(len(ok), np.bool_), np.empty(3)
     point, spread = np.empty(3), np.empty((3, 3))
     for j in range(len(ok)):
-        if state.conflict[b, w, j] < s.conflict_frames:
+        if tree.conflict[j] < s.conflict_frames:
             continue
-        middle_of(state.body[b, w], everyone, middle)
+        middle_of(tree.body, everyone, middle)
         gate, radius = s.gate_sigma, s.body_radius_m
         if find_again(P, z[j], sigma[j], ok[j], gate, radius, middle, point, spread):
-            place(state.body[b, w, j], state.cov[b, w, j], point, spread)
-            state.age_s[b, w, j], state.conflict[b, w, j], placed[j] = 0.0, 0, True
+            place(tree.body[j], tree.cov[j], point, spread)
+            tree.age_s[j], tree.conflict[j], placed[j] = 0.0, 0, True
 
 
 @kernel
-def acquire_anew(state, b, w, P, z, sigma, ok, standing, s):
+def acquire_anew(tree, P, z, sigma, ok, standing, s):
     """Start over when the views have long agreed on another body; whether that happened.
 
     Joints are found again near the body only; a body that is somewhere else altogether, as
@@ -89,20 +88,20 @@ def acquire_anew(state, b, w, P, z, sigma, ok, standing, s):
     """
     n_wrong = 0
     for j in range(len(ok)):
-        n_wrong += state.conflict[b, w, j] >= s.conflict_frames
-    if n_wrong < s.acquire_min_joints or not acquire(state, b, w, P, z, sigma, ok, standing, s):
+        n_wrong += tree.conflict[j] >= s.conflict_frames
+    if n_wrong < s.acquire_min_joints or not acquire(tree, P, z, sigma, ok, standing, s):
         return False
-    state.conflict[b, w] = 0
+    tree.conflict[:] = 0
     return True
 
 
 @kernel
-def check(state, b, w, s):
+def check(tree, s):
     """Keep covariances positive definite; a body that has left the world is lost.
 
     Returns whether all was well.
     """
-    body, cov, inside, well = state.body[b, w], state.cov[b, w], True, True
+    body, cov, inside, well = tree.body, tree.cov, True, True
     for j in range(len(body)):
         if not is_positive_definite(cov[j]):
             well = False
@@ -118,17 +117,17 @@ def check(state, b, w, s):
         inside &= away < _FURTHEST_STD * s.prior_std_m and math.isfinite(variances + numbers)
     if inside:
         return well
-    _lose(state, b, w, s)
+    _lose(tree, s)
     return False
 
 
 @kernel
-def _lose(state, b, w, s):
+def _lose(tree, s):
     """Put a worker who has left the world back to the prior."""
-    body, cov = state.body[b, w], state.cov[b, w]
-    state.tracked[b, w] = False
+    body, cov = tree.body, tree.cov
+    tree.tracked = False
     for j in range(len(body)):
-        state.age_s[b, w, j] = s.max_age_s
+        tree.age_s[j] = s.max_age_s
         for i in range(6):
             body[j, i] = s.prior_mean_world[i] if i < 3 else 0.0
             for k in range(6):

@@ -9,93 +9,69 @@ every edge (`bone_lengths`) and a noise of every camera that is learnt (`models.
 """
 
 import functools
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Bools, Floats, Ints
+from hrc_env.core.typing import Floats, Ints
 from hrc_env.tracking.config import ParticleConfig
 from hrc_env.tracking.models.acquisition import STANDING_M
 from hrc_env.tracking.models.motion import STANDING_COUNT, damped_joints, whole_body_noise
 from hrc_env.tracking.models.noise import N_SUMS, first_factor
-from hrc_env.tracking.tracks import forget, gaussian_tracks
 from hrc_env.tracking.tree.bone_lengths import population_edges
 
-
-class Trees(NamedTuple):
-    """The Gaussian and what is learnt of each worker; arrays changed in place."""
-
-    body: Floats
-    """(B, W, J, 6) mean position [m] and velocity [m/s] in the world."""
-    cov: Floats
-    """(B, W, J, 6, 6) marginal covariances."""
-    slope: Floats
-    """(B, W, J, 6, 6) slopes on the parent, as in `tree`."""
-    age_s: Floats
-    """(B, W, J)."""
-    tracked: Bools
-    """(B, W)."""
-    conflict: Ints
-    """(B, W, J), as in `tracks.Tracks`."""
-    offset: Floats
-    """(B, W, J, 3) mean place of a joint on the body [m]: forward, left, up of the torso."""
-    offset_count: Floats
-    """(B, W, J) updates that went into it."""
-    bone_length: Floats
-    """(B, W, J) from each joint to its parent [m]."""
-    bone_variance: Floats
-    """(B, W, J) [m^2]."""
-    swap_chance: Floats
-    """(B, W, C) probability that the camera exchanges left and right."""
-    blind: Ints
-    """(B, W, C) updates since the camera saw the worker."""
-    believed: Ints
-    """(B, W, C) updates for which it is still not asked about swaps."""
-    noise_factor: Floats
-    """(B, W, J, C) learnt factors on the variance that the detector reports, as in `noise`."""
-    noise_sums: Floats
-    """(B, W, J, C, 5) what they are learnt from."""
-    noise_last: Floats
-    """(B, W, J, C, 2) last residuals in reported standard deviations, fading; 0: none."""
-
-
-def make_trees(batch: int, n_bodies: int, n_cameras: int, config: ParticleConfig) -> Trees:
-    """Bodies whom nobody has seen."""
-    shape = (batch, n_bodies)
-    state = Trees(
-        body=np.zeros((*shape, N_JOINTS, 6)),
-        cov=np.zeros((*shape, N_JOINTS, 6, 6)),
-        slope=np.zeros((*shape, N_JOINTS, 6, 6)),
-        age_s=np.zeros((*shape, N_JOINTS)),
-        tracked=np.zeros(shape, bool),
-        conflict=np.zeros((*shape, N_JOINTS), np.int64),
-        offset=np.zeros((*shape, N_JOINTS, 3)),
-        offset_count=np.zeros((*shape, N_JOINTS)),
-        bone_length=np.zeros((*shape, N_JOINTS)),
-        bone_variance=np.zeros((*shape, N_JOINTS)),
-        swap_chance=np.zeros((*shape, n_cameras)),
-        blind=np.zeros((*shape, n_cameras), np.int64),
-        believed=np.zeros((*shape, n_cameras), np.int64),
-        noise_factor=np.ones((*shape, N_JOINTS, n_cameras)),
-        noise_sums=np.zeros((*shape, N_JOINTS, n_cameras, N_SUMS)),
-        noise_last=np.zeros((*shape, N_JOINTS, n_cameras, 2)),
-    )
-    forget_trees(state, np.arange(batch), config)
-    return state
+_J = N_JOINTS
+TREE = np.dtype(
+    [
+        # mean position [m] and velocity [m/s] in the world, marginal covariances, slopes on parents
+        ("body", "f8", (_J, 6)), ("cov", "f8", (_J, 6, 6)), ("slope", "f8", (_J, 6, 6)),
+        # since a measurement supported the joint [s]; updates in a row in which views did not
+        ("age_s", "f8", (_J,)), ("conflict", "i8", (_J,)), ("tracked", "?"),
+        # mean place on the body [m]: forward, left, up of the torso; updates that went into it
+        ("offset", "f8", (_J, 3)), ("offset_count", "f8", (_J,)),
+        # from each joint to its parent [m], [m^2]
+        ("bone_length", "f8", (_J,)), ("bone_variance", "f8", (_J,)),
+        # log-probability of the hypothesis; what `anatomy` says of its pose, a part of that
+        ("log_weight", "f8"), ("pose_log_prior", "f8"),
+    ],
+    align=True,
+)  # fmt: skip
+"""The Gaussian of one hypothesis about one worker, and what it has learnt of them."""
+VIEW = np.dtype(
+    [
+        # probability that the camera exchanges left and right
+        ("swap_chance", "f8"),
+        # updates since it saw the worker; for which it is still not asked about swaps
+        ("blind", "i8"), ("believed", "i8"),
+    ],
+    align=True,
+)  # fmt: skip
+"""What a hypothesis holds of one camera."""
+NOISE = np.dtype(
+    [
+        # learnt factor on the variance that the detector reports; what it is learnt from
+        ("factor", "f8"), ("sums", "f8", (N_SUMS,)),
+        # last residuals in reported standard deviations, fading; 0: none
+        ("last", "f8", (2,)),
+    ],
+    align=True,
+)  # fmt: skip
+"""What a hypothesis holds of one joint in one camera, as in `models.noise`."""
 
 
-def forget_trees(state: Trees, ids: Ints, config: ParticleConfig) -> None:
-    """Put environments `ids` back to the prior."""
-    length, variance = population_edges()
-    state.cov[ids], state.slope[ids] = np.eye(6), 0.0
-    state.offset[ids], state.offset_count[ids] = STANDING_M, STANDING_COUNT
-    state.bone_length[ids], state.bone_variance[ids] = length, variance
-    state.swap_chance[ids] = config.swap_begins
-    state.blind[ids], state.believed[ids] = 0, 0
-    state.noise_factor[ids] = first_factor(config)
-    state.noise_sums[ids], state.noise_last[ids] = 0.0, 0.0
-    forget(gaussian_tracks(state), ids, config)
+def forget_trees(trees: Any, views: Any, noise: Any, ids: Ints, config: ParticleConfig) -> None:
+    """Put environments `ids` of trees (B, K), views (B, K, C), noise (B, K, J, C) to the prior."""
+    fresh = np.zeros((), TREE)
+    fresh["body"][:, :3] = config.prior_mean_world
+    fresh["cov"] = np.eye(6)
+    fresh["cov"][:, :3, :3] = config.prior_std_m**2 * np.eye(3)
+    fresh["age_s"] = config.max_age_s
+    fresh["offset"], fresh["offset_count"] = STANDING_M, STANDING_COUNT
+    fresh["bone_length"], fresh["bone_variance"] = population_edges()
+    trees[ids] = fresh
+    views[ids] = np.array((config.swap_begins, 0, 0), VIEW)
+    noise[ids] = np.array((first_factor(config), np.zeros(N_SUMS), np.zeros(2)), NOISE)
 
 
 @functools.lru_cache(maxsize=16)

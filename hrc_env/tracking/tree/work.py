@@ -42,7 +42,9 @@ WORK = np.dtype(
         ("spread", "f8", (3, 4)), ("grows", "f8", (_J,)),
         # cameras that measured a joint; variances of the bones' lengths as measurements [m^2]
         ("n_views", "i8", (_J,)), ("bone_variance", "f8", (_J,)),
-        # positions before the update, for `models.noise`; joints that were put somewhere
+        # places on the body that are not learnt; covariances before the update, for `models.noise`;
+        # joints that were put somewhere
+        ("offset", "f8", (_J, 3)), ("offset_count", "f8", (_J,)),
         ("predicted", "f8", (_J, 3, 3)), ("placed", "i1", (_J,)),
     ],
     align=True,

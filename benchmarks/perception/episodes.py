@@ -10,18 +10,19 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.perception.families import family_index
+from benchmarks.common import CHI2_95_3D, normalised_square
+from benchmarks.perception.views import family_index
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.env import HRCEnv
 from hrc_env.geometry.cameras import project
 from hrc_env.motion import generator
-from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.worker.body import worker_truth
 
-CHI2_95_3D = 7.815
-"""95 % of a three-dimensional normal variable lies within this squared distance."""
-TENTH_MM = 1e-4
+PATIENCE_FRAMES = 5
+"""A worker who is tracked by then counts as acquired."""
+EMPTY_STEPS = 250
+"""Of an episode without workers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,32 +38,20 @@ class Episode:
     off_px: Floats
     """(T, C) mean distance of a camera's keypoints from the true joints; NaN: nothing found."""
     family: Ints
-    """(T,) what the worker did, an index of `families.NAMES`."""
+    """(T,) what the worker did, an index of `views.FAMILIES`."""
     named: Bools
     """(T, C) whether a camera was named in info as miscalibrated."""
 
     def to_json(self) -> dict[str, Any]:
-        """Plain lists: whole tenths of millimetres and of pixels, -1 where unknown."""
-        return {
-            "error": _whole(self.error_m, TENTH_MM),
-            "std": _whole(self.std_m, TENTH_MM),
-            "inside95": self.inside95.tolist(),
-            "off_px": _whole(self.off_px, 0.1),
-            "family": self.family.tolist(),
-            "named": self.named.astype(int).tolist(),
-        }
+        """Lists of numbers, lengths to a tenth of a millimetre; NaN where unknown."""
+        arrays = {each.name: np.asarray(getattr(self, each.name), float) for each in fields(self)}
+        return {name: np.round(values, 4).tolist() for name, values in arrays.items()}
 
 
 def episode_of(content: dict[str, Any]) -> Episode:
-    """What `Episode.to_json` wrote."""
-    return Episode(
-        error_m=_lengths(content["error"], TENTH_MM),
-        std_m=_lengths(content["std"], TENTH_MM),
-        inside95=np.array(content["inside95"], np.int64),
-        off_px=_lengths(content["off_px"], 0.1),
-        family=np.array(content["family"], np.int64),
-        named=np.array(content["named"], np.bool_),
-    )
+    """What `Episode.to_json` gave."""
+    arrays = {name: np.array(values, float) for name, values in content.items()}
+    return Episode(**{**arrays, "named": arrays["named"] > 0})
 
 
 def some_steps(episode: Episode, steps: Bools | slice) -> Episode:
@@ -74,14 +63,7 @@ def some_steps(episode: Episode, steps: Bools | slice) -> Episode:
 def play(
     seeds: Sequence[int], n_steps: int, tick: Callable[[float], None], **arguments: Any
 ) -> list[Episode]:
-    """Episodes of an environment whose arm rests.
-
-    Args:
-        seeds: one an episode.
-        n_steps: of each.
-        tick: told of the share that is done after each.
-        arguments: of `HRCEnv`.
-    """
+    """An episode a seed of an environment, made with these arguments, whose arm rests."""
     env = HRCEnv(n_workers=1, **arguments)
     try:
         episodes = []
@@ -93,14 +75,45 @@ def play(
         env.close()
 
 
-def rotated(kind: str, episode: int, n_cameras: int) -> FaultConfig:
-    """A fault for an episode: the cameras have it in turns."""
-    return FaultConfig(kind, (camera_name(episode % n_cameras),))
+def acquisition(seeds: Sequence[int], tick: Callable[[float], None]) -> list[bool]:
+    """Whether each reset finds the worker within `PATIENCE_FRAMES`, its own look counted."""
+    env, found = HRCEnv(), []
+    for seed in seeds:
+        env.reset(seed=seed)
+        for _ in range(PATIENCE_FRAMES - 1):
+            if env.simulation.estimate.tracked.all():
+                break
+            env.step(np.zeros(env.action_space.shape or (0,), np.float32))
+        found.append(bool(env.simulation.estimate.tracked.all()))
+        tick(1 / len(seeds))
+    env.close()
+    return found
 
 
-def camera_name(c: int) -> str:
-    """Camera c of the scenes' own rigs."""
-    return f"camera_{c + 1}"
+def phantoms(scene: str, n_steps: int, seed: int, tick: Callable[[float], None]) -> dict[str, int]:
+    """Look for workers in a scene that has none, while the arm moves at random: "images" that were
+    looked at, "phantoms" of them with somebody in them, "tracked" steps. Episodes from `seed` on in
+    which somebody comes are passed over."""
+    counts = {"images": 0, "phantoms": 0, "tracked": 0}
+    env, actions, steps = HRCEnv(scene=scene, n_workers=(0, 1)), np.random.default_rng(seed), 0
+    while steps < n_steps:
+        env.reset(seed=seed)
+        seed += 1
+        if env.simulation.present.any():
+            continue
+        n = min(EMPTY_STEPS, n_steps - steps)
+        for _ in range(n):
+            env.step(actions.uniform(-1, 1, env.simulation.n_actions).astype(np.float32))
+            keypoints, _ = env.simulation.pipeline.last_detections(0)
+            if keypoints is not None:
+                somebody = (keypoints.confidence[0] > 0).any((1, 2))
+                counts["images"] += len(somebody)
+                counts["phantoms"] += int(somebody.sum())
+            counts["tracked"] += int(env.simulation.estimate.tracked.any())
+            tick(1 / n_steps)
+        steps += n
+    env.close()
+    return counts
 
 
 def _episode(env: HRCEnv, seed: int, n_steps: int) -> Episode:
@@ -120,10 +133,9 @@ def _episode(env: HRCEnv, seed: int, n_steps: int) -> Episode:
         named[t] = simulation.pipeline.suspected(np.array([0]))[0]
         if estimate.tracked[0, 0]:
             offset, cov = estimate.mean_world[0, 0] - joints, estimate.cov_world[0, 0]
-            squared = np.einsum("ji,jik,jk->j", offset, np.linalg.inv(cov), offset)
             error[t] = np.linalg.norm(offset, axis=-1)
             std[t] = np.sqrt(np.trace(cov, axis1=-2, axis2=-1))
-            inside[t] = np.count_nonzero(squared < CHI2_95_3D)
+            inside[t] = np.count_nonzero(normalised_square(offset, cov) < CHI2_95_3D)
     return Episode(error, std, inside, off_px, family, named)
 
 
@@ -138,13 +150,3 @@ def _off_px(env: HRCEnv, joints_world: Floats) -> Floats:
     seen: Bools = np.isfinite(away)
     total = np.where(seen, away, 0.0).sum(-1)
     return np.where(seen.any(-1), total / np.maximum(seen.sum(-1), 1), np.nan)
-
-
-def _whole(values: Floats, unit: float) -> list[Any]:
-    """Whole multiples of a unit as nested lists; -1 where there is no value."""
-    return np.round(np.nan_to_num(values / unit, nan=-1.0)).astype(int).tolist()
-
-
-def _lengths(values: list[Any], unit: float) -> Floats:
-    whole = np.array(values, float)
-    return np.where(whole < 0, np.nan, whole * unit)

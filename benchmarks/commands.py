@@ -1,0 +1,169 @@
+"""python -m hrc_env bench and gallery: what is measured, and pictures of workers and scenes."""
+
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+from rich.console import Console
+
+from hrc_env.cli.checks import at_least, writable_folder
+from hrc_env.cli.progress import progress_bar, show
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.machine import n_cores
+from hrc_env.experiments.study.runner import Study, changed, run
+
+
+@dataclass(frozen=True)
+class AnyBench:
+    """What every bench is asked; one that was stopped goes on where it was in the same folder."""
+
+    out: Path
+    """Folder for report.html, results.json, figures and the parts that are done."""
+    quick: bool = False
+    """Every number, from less: minutes, not hours."""
+
+    def shown(self, study: Study[Any, Any], config: Any) -> int:
+        """Run a study, show its tables."""
+        written = "report.html, results.json, figures/"
+        return show(partial(run, study, config), self.out, "bench", written)
+
+
+@dataclass(frozen=True)
+class TrackingBench(AnyBench):
+    """Run every estimator on the same simulated sequences; tables, plots and results.json."""
+
+    out: Path = Path("out/bench_tracking")
+    """Folder; of --real and --baselines, which are parts of their own, with that word after it."""
+    seeds: int | None = None
+    """Sequences per rig and condition, instead of 100 (8 if quick)."""
+    processes: int | None = None
+    """Conditions that are run at once; as many as there are cores if not given. Times are taken
+    alone, at the end."""
+    real: bool = False
+    """On recorded films instead, which are fetched once (51 MB): four calibrated cameras."""
+    baselines: bool = False
+    """Other people's code instead, on the same sequences (5 per rig and condition, 1 if quick),
+    as far as it is installed."""
+    peers: Annotated[bool, tyro.conf.Suppress] = False
+    """The former name of --baselines."""
+
+    def run(self) -> int:
+        """Run, show the tables."""
+        at_least("--seeds", self.seeds, 1)
+        if self.peers:
+            raise ConfigError("--peers is called --baselines now.")
+        if self.real and self.baselines:
+            raise ConfigError("--real and --baselines are two parts of the bench; choose one.")
+        if self.baselines:
+            from benchmarks.tracking.baselines.bench import BASELINES, BaselinesConfig
+
+            n_seeds = self.seeds or (1 if self.quick else 5)
+            return self._beside("_baselines").shown(BASELINES, BaselinesConfig(n_seeds))
+        if self.real:
+            from benchmarks.recorded.bench import RECORDED
+
+            return self._beside("_real").shown(RECORDED, None)
+        from benchmarks.tracking.bench import QUICK, TRACKING, TrackingBenchConfig
+
+        config = QUICK if self.quick else TrackingBenchConfig()
+        processes = self.processes or n_cores()
+        return self.shown(TRACKING, changed(config, n_seeds=self.seeds, processes=processes))
+
+    def _beside(self, ending: str) -> AnyBench:
+        """The same in a folder of its own, unless one was given."""
+        is_usual = self.out == TrackingBench.out
+        return AnyBench(Path(f"{self.out}{ending}") if is_usual else self.out)
+
+
+@dataclass(frozen=True)
+class SpeedBench(AnyBench):
+    """Steps a second, what each organ takes of a step, and resets; beside Gymnasium's Reacher.
+
+    Everybody takes turns: nothing else should run on the machine.
+    """
+
+    out: Path = Path("out/bench_speed")
+    rounds: int | None = None
+    """In how many rounds everybody has a turn, instead of 7 (1 if quick); medians count."""
+
+    def run(self) -> int:
+        """Run, show the tables."""
+        at_least("--rounds", self.rounds, 1)
+        from benchmarks.speed.bench import QUICK, SPEED, SpeedBenchConfig
+
+        config = QUICK if self.quick else SpeedBenchConfig()
+        return self.shown(SPEED, changed(config, n_rounds=self.rounds))
+
+
+@dataclass(frozen=True)
+class MotionBench(AnyBench):
+    """Play everything that workers can do; statistics beside those of people."""
+
+    out: Path = Path("out/bench_motion")
+    seeds: int | None = None
+    """How often each worker plays a scene, instead of 12 (2 if quick)."""
+
+    def run(self) -> int:
+        """Run, show the tables."""
+        at_least("--seeds", self.seeds, 1)
+        from benchmarks.motion.bench import MOTION, QUICK, MotionBenchConfig
+
+        config = QUICK if self.quick else MotionBenchConfig()
+        return self.shown(MOTION, changed(config, n_seeds=self.seeds))
+
+
+@dataclass(frozen=True)
+class PerceptionBench(AnyBench):
+    """Level `pixels`: steps a second and what takes them, how well workers are seen by pose,
+    distance, view angle and lens, what every fault of a camera costs, ghosts in empty rooms."""
+
+    out: Path = Path("out/bench_perception")
+
+    def run(self) -> int:
+        """Run, show the tables."""
+        from benchmarks.perception.bench import PERCEPTION, QUICK, PerceptionBenchConfig
+
+        return self.shown(PERCEPTION, QUICK if self.quick else PerceptionBenchConfig())
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Measure the estimators (tracking), the detector (perception), the environment (speed) or the
+    workers (motion).
+
+    Each takes --quick (minutes, not hours) and --out DIR, where it writes report.html, results.json
+    and figures; `bench tracking --help` and so on say the rest.
+    """
+
+    what: (
+        Annotated[TrackingBench, tyro.conf.subcommand("tracking")]
+        | Annotated[PerceptionBench, tyro.conf.subcommand("perception")]
+        | Annotated[SpeedBench, tyro.conf.subcommand("speed")]
+        | Annotated[MotionBench, tyro.conf.subcommand("motion")]
+    )
+    """Which bench."""
+
+    def run(self) -> int:
+        """Run it."""
+        return self.what.run()
+
+
+@dataclass(frozen=True)
+class Gallery:
+    """Draw every worker, a film strip of every motion, and both scenes from all cameras."""
+
+    out: Path = Path("out/gallery")
+    """Folder for the pictures (PNG) and `index.html`."""
+
+    def run(self) -> int:
+        """Draw, tell where."""
+        writable_folder(self.out)
+        from benchmarks.gallery.gallery import GalleryConfig, run
+
+        console = Console()
+        with progress_bar(console, "gallery") as say:
+            exhibits = run(GalleryConfig(), self.out, say)
+        console.print(f"{len(exhibits)} pictures; open [bold]{self.out / 'index.html'}[/]")
+        return 0

@@ -1,1 +1,0 @@
-"""The commands that want a checkout: bench and gallery."""

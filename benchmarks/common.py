@@ -1,0 +1,87 @@
+"""What the benches share: shares, normalised errors, cells of tables, a way to show results."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.markdown import Markdown
+
+from hrc_env.core.results import Metric
+from hrc_env.core.typing import Covariances3, Floats, Points3
+from hrc_env.experiments.study.plots import label, new_figure, points, save
+from hrc_env.experiments.study.report import Column, Metrics, Report, Table
+
+CHI2_95_3D = 7.815
+"""95 % of a three-dimensional normal variable lies within this squared distance."""
+
+
+def exactly(value: float, unit: str, n: int = 1) -> Metric:
+    """A number without a spread."""
+    return Metric(float(value), float(value), float(value), unit, n)
+
+
+def share(seen: Sequence[bool]) -> Metric:
+    """A share with Wilson's 95 % interval; NaN of nothing."""
+    n = len(seen)
+    if n == 0:
+        return exactly(math.nan, "share", 0)
+    p, z = float(np.mean(seen)), 1.96
+    middle = (p + z * z / (2 * n)) / (1 + z * z / n)
+    half = z * math.sqrt(p * (1 - p) / n + (z / (2 * n)) ** 2) / (1 + z * z / n)
+    return Metric(p, middle - half, middle + half, "share", n)
+
+
+def normalised_square(offset: Points3, cov: Covariances3) -> Floats:
+    """Squared errors (...,) of (..., 3) in units of covariances (..., 3, 3)."""
+    return np.einsum("...i,...ij,...j->...", offset, np.linalg.inv(cov), offset)
+
+
+def keys(metrics: Iterable[str], start: str) -> list[str]:
+    """What comes after `start` in the names that begin so."""
+    return [name.removeprefix(start) for name in metrics if name.startswith(start)]
+
+
+def cell(metric: Metric | None, scale: float = 1.0, digits: int = 1, interval: bool = False) -> str:
+    """A number as tables show it, with its interval if asked; nothing of what is not known."""
+    if metric is None:
+        return ""
+    value, low, high = (
+        f"{scale * each:,.{digits}f}" for each in (metric.value, metric.low, metric.high)
+    )
+    return f"{value} ({low}-{high})" if interval else value
+
+
+def table(header: Iterable[str], rows: Iterable[Iterable[str]]) -> Table:
+    """A table from whatever holds its words."""
+    return Table(tuple(header), tuple(tuple(row) for row in rows))
+
+
+def plot_rows(
+    path: Path, rows: Mapping[str, str], columns: Sequence[Column], metrics: Metrics
+) -> None:
+    """Columns of a table as pictures side by side: values with intervals, a line a row."""
+    figure = new_figure(4 + 2.6 * len(columns), 1.5 + 0.3 * len(rows))
+    panels = figure.subplots(1, len(columns), sharey=True, squeeze=False)[0]
+    y = np.arange(len(rows))[::-1]
+    for axis, column in zip(panels, columns, strict=True):
+        known = [(k, metrics[key]) for k, row in zip(y, rows, strict=True)
+                 if (key := column.key.format(row)) in metrics]  # fmt: skip
+        points(axis, [k for k, _ in known], [m for _, m in known], column.scale, sideways=True)
+        label(axis, column.words)
+    panels[0].set_yticks(y, list(rows.values()))
+    save(figure, path)
+
+
+def publish(
+    out: Path,
+    report: Report,
+    config: Mapping[str, Any],
+    seeds: Sequence[int],
+    metrics: Metrics,
+) -> None:
+    """Write results.json, report.html and report.md into a folder; show the report."""
+    report.write(out, {**config, "out": str(out)}, seeds, metrics)
+    Console().print(Markdown((out / "report.md").read_text()))

@@ -1,0 +1,129 @@
+"""A second, independent source of motion: the environment's own worker and its detector.
+
+The bench's walkers (`walks`) and the environment's worker (`hrc_env.motion`) share no
+code, and neither do the bench's white detections and the environment's emulator, whose errors
+last for half a second, have heavy tails and come with honest or dishonest confidence.
+"""
+
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+
+import numpy as np
+
+from benchmarks.tracking.rigs import Rig
+from hrc_env.config import HRCConfig, settle
+from hrc_env.core.records import Keypoints, WorkerTruth
+from hrc_env.core.typing import Bools, Points3
+from hrc_env.geometry.cameras import projections
+from hrc_env.geometry.sight import Surroundings, nothing
+from hrc_env.motion import generator
+from hrc_env.perception import emulator
+from hrc_env.simulation import Simulation
+from hrc_env.tracking.config import ParticleConfig, of_kind
+from hrc_env.worker.body import worker_truth
+
+ENV = "env"
+"""Name of the rig: the environment's room and its four cameras."""
+ENV_CONDITIONS = ("four_cameras", "two_cameras", "one_camera", "occluded")
+"""With nothing in the way: all cameras, the first two, and all but for 4 s, in which one is
+left; then all with the room and a moving robot in the way of their lines of sight."""
+ENV_FRAMES = 150
+ALONE_FRAMES = slice(25, 125)
+_SLOWNESS = 0.95
+
+
+def make_env_rig() -> Rig:
+    """The environment's cameras and tracker settings."""
+    simulation = simulate(1)
+    P = projections(simulation.scene.cameras)
+    simulation.close()
+    return Rig(ENV, P, (np.nan, np.nan), of_kind(HRCConfig().tracker, ParticleConfig))
+
+
+def record(condition: str, seeds: list[int]) -> tuple[Points3, Keypoints]:
+    """Joints (T, S, 1, J, 3) [m] and keypoints (T, S, C, 1, J, ...), one episode per seed."""
+    joints, free, hidden = _episodes(tuple(seeds))
+    if condition == "occluded":
+        return joints, hidden
+    blind: Bools = np.zeros(free.confidence.shape, bool)
+    if condition == "two_cameras":
+        blind[:, :, 2:] = True
+    elif condition == "one_camera":
+        left = np.array(seeds) % blind.shape[2]
+        others = np.arange(blind.shape[2]) != left[:, None]
+        blind[ALONE_FRAMES] = others[:, :, None, None]
+    return joints, without(free, blind)
+
+
+def without(keypoints: Keypoints, blind: Bools) -> Keypoints:
+    """Keypoints less those that are `blind` (..., C, W, J)."""
+    return Keypoints(
+        np.where(blind[..., None], np.nan, keypoints.px),
+        np.where(blind, 0.0, keypoints.confidence),
+        np.where(blind, np.inf, keypoints.sigma_px),
+    )
+
+
+def watch(
+    simulation: Simulation, seeds: Sequence[int], pushes: list[np.random.Generator], n_frames: int
+) -> Iterator[tuple[WorkerTruth, Surroundings]]:
+    """The workers, and what hides them, while the robot moves about slowly, as `pushes` draw."""
+    simulation.reset(np.arange(len(seeds)), [np.random.default_rng([seed, 9]) for seed in seeds])
+    action = np.zeros((len(seeds), simulation.n_actions))
+    for _ in range(n_frames):
+        push = np.stack([rng.standard_normal(simulation.n_actions) for rng in pushes])
+        action = _SLOWNESS * action + np.sqrt(1 - _SLOWNESS**2) * push
+        simulation.step(np.clip(action, -1, 1))
+        motion = generator.current(simulation.motion)
+        truth = worker_truth(simulation.bodies, motion)
+        yield truth, simulation.scene.surroundings(simulation.physics.q, motion.held)
+
+
+class EmulatedDetector:
+    """The emulator for some seeds: keypoints of the truth, frame by frame."""
+
+    def __init__(self, simulation: Simulation, rngs: list[np.random.Generator]) -> None:
+        self.config, self.cameras, self.rngs = simulation.config, simulation.scene.cameras, rngs
+        self.state = emulator.make_state(
+            len(rngs), len(self.cameras), 1, self.config.ctrl_dt, self.config.emulator
+        )
+        emulator.reset(self.state, np.arange(len(rngs)), rngs)
+
+    def detect(self, truth: WorkerTruth, between: Surroundings) -> Keypoints:
+        """What the detector would say, with so much in the way."""
+        settings = self.config.emulator
+        return emulator.emulate(self.state, self.rngs, truth, between, self.cameras, settings)
+
+
+@lru_cache(maxsize=1)
+def _episodes(seeds: tuple[int, ...]) -> tuple[Points3, Keypoints, Keypoints]:
+    """Joints, keypoints with free lines of sight, and keypoints with the robot in the way."""
+    simulation = simulate(len(seeds))
+    free, hidden, pushes = (
+        [np.random.default_rng([seed, 10, k]) for seed in seeds] for k in range(3)
+    )
+    detectors = [EmulatedDetector(simulation, rngs) for rngs in (free, hidden)]
+    joints: list[Points3] = []
+    seen: tuple[list[Keypoints], list[Keypoints]] = ([], [])
+    for truth, lab in watch(simulation, seeds, pushes, ENV_FRAMES):
+        joints.append(truth.joints_world.copy())
+        for said, detector, between in zip(
+            seen, detectors, (nothing(len(seeds)), lab), strict=True
+        ):
+            said.append(detector.detect(truth, between))
+    simulation.close()
+    return np.stack(joints), _stacked(seen[0]), _stacked(seen[1])
+
+
+def _stacked(records: list[Keypoints]) -> Keypoints:
+    px, confidence, sigma_px = (
+        np.stack([getattr(each, name) for each in records])
+        for name in ("px", "confidence", "sigma_px")
+    )
+    return Keypoints(px, confidence, sigma_px)
+
+
+def simulate(batch: int, config: HRCConfig | None = None) -> Simulation:
+    """Environments whose cameras nobody looks through."""
+    config = config or HRCConfig()
+    return Simulation(batch, settle(perception="none", estimator="triangulation", config=config))
