@@ -5,7 +5,7 @@ import signal
 import threading
 import time
 from collections import deque
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from types import FrameType
 from typing import Any, Self
@@ -88,15 +88,8 @@ class Interrupt:
         self.asked = True
 
 
-@dataclass(slots=True)
-class Curve:
-    """A learning curve: one entry a rollout."""
-
-    points: list[dict[str, float]] = field(default_factory=list)
-
-    def write(self, path: Path) -> None:
-        """As JSON, whole or not at all."""
-        write_whole(path, json.dumps(self.points, indent=1))
+Curve = list[dict[str, float]]
+"""A learning curve: one entry a rollout."""
 
 
 class TrainingMonitor(BaseCallback):
@@ -118,7 +111,7 @@ class TrainingMonitor(BaseCallback):
         self.folder, self.facts, self.curve, self.ramp = folder, facts, curve, ramp
         self.interrupt, self.meter = interrupt, meter
         self.recent: deque[dict[str, float]] = deque(maxlen=RECENT_EPISODES)
-        self.before_s = curve.points[-1]["wall_s"] if curve.points else 0.0
+        self.before_s = curve[-1]["wall_s"] if curve else 0.0
 
     def _on_training_start(self) -> None:
         self.started_s = self.saved_s = time.monotonic()
@@ -144,7 +137,7 @@ class TrainingMonitor(BaseCallback):
             wall_s = self.before_s + time.monotonic() - self.started_s
             share = self.ramp.at(self.num_timesteps)
             point = {"steps": float(self.num_timesteps), "wall_s": wall_s, "safety_share": share}
-            self.curve.points.append(point | score)
+            self.curve.append(point | score)
             for name, value in score.items():
                 self.logger.record(f"episode/{name}", value)
             contacts = score["contacts_per_episode"]
@@ -154,13 +147,13 @@ class TrainingMonitor(BaseCallback):
     def _save(self) -> None:
         self.saved_s = time.monotonic()
         ppo.save(self.model, self.folder / "policy.zip", self.facts)  # type: ignore[arg-type]
-        self.curve.write(self.folder / "curve.json")
+        write_whole(self.folder / "curve.json", json.dumps(self.curve, indent=1))
 
 
 def plot_curve(curve: Curve, path: Path, title: str) -> None:
     """Goals, contacts and cost over environment steps as a PNG."""
-    steps = np.array([point["steps"] for point in curve.points])
-    share = np.array([point.get("safety_share", 1.0) for point in curve.points])
+    steps = np.array([point["steps"] for point in curve])
+    share = np.array([point.get("safety_share", 1.0) for point in curve])
     growing = steps[(share > 0) & (share < 1)]
     panels = {
         "success_rate": ("goals reached (share)", "tab:green"),
@@ -171,7 +164,7 @@ def plot_curve(curve: Curve, path: Path, title: str) -> None:
     figure = new_figure(9, 6)
     axes = figure.subplots(2, 2, sharex=True)
     for axis, (name, (words, colour)) in zip(axes.ravel(), panels.items(), strict=True):
-        axis.plot(steps, [point[name] for point in curve.points], color=colour)
+        axis.plot(steps, [point[name] for point in curve], color=colour)
         label(axis, "environment steps", words)
         axis.set_ylim(bottom=0)
         axis.xaxis.set_major_formatter(EngFormatter(sep=" "))

@@ -149,11 +149,11 @@ def _learner(
 ) -> tuple[Any, Curve]:
     """A learner and its curve: new ones, or those of the run that is resumed."""
     if arguments.resume is None:
-        return ppo.make_learner(env, settings, arguments.seed, folder / "tensorboard"), Curve()
+        return ppo.make_learner(env, settings, arguments.seed, folder / "tensorboard"), []
     learner = ppo.resume(folder / "policy.zip", env, folder / "tensorboard")
     env.seed(arguments.seed + learner.num_timesteps)  # other episodes than the first ones
     path = folder / "curve.json"
-    return learner, Curve(json.loads(path.read_text()) if path.exists() else [])
+    return learner, json.loads(path.read_text()) if path.exists() else []
 
 
 def film(folder: Path, arguments: Train, console: Console) -> bool:

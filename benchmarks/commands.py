@@ -46,14 +46,10 @@ class TrackingBench(AnyBench):
     baselines: bool = False
     """Other people's code instead, on the same sequences (5 per rig and condition, 1 if quick),
     as far as it is installed."""
-    peers: Annotated[bool, tyro.conf.Suppress] = False
-    """The former name of --baselines."""
 
     def run(self) -> int:
         """Run, show the tables."""
         at_least("--seeds", self.seeds, 1)
-        if self.peers:
-            raise ConfigError("--peers is called --baselines now.")
         if self.real and self.baselines:
             raise ConfigError("--real and --baselines are two parts of the bench; choose one.")
         if self.baselines:

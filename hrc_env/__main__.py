@@ -46,8 +46,8 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     ),
     "bench": (
         "benchmarks.commands", "Bench",
-        "Measure the estimators (tracking), the eyes (perception), the environment (speed) or the "
-        "workers (motion).",
+        "Measure the estimators (tracking), the detector (perception), the environment (speed) or "
+        "the workers (motion).",
     ),
     "experiment": (
         "hrc_env.cli.experiment", "Experiment",

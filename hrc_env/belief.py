@@ -10,8 +10,7 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.records import PoseEstimate, RobotState
 from hrc_env.core.skeleton import SEGMENT_RADIUS_M
 from hrc_env.core.typing import Floats
-from hrc_env.geometry.distances import Separation, least_separation
-from hrc_env.geometry.segments import segments
+from hrc_env.geometry.distances import Separation, least_separation, segments
 
 
 @dataclass(frozen=True, slots=True)

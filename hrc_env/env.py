@@ -152,8 +152,8 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         steps_left = _steps_left(options or {})
         super().reset(seed=seed)
         self._begun, self._steps_left = True, steps_left
-        outcome = self.simulation.reset(np.array([0]), [self.np_random])
-        return outcome.observation[0], outcome.info_of(0)
+        result = self.simulation.reset(np.array([0]), [self.np_random])
+        return result.observation[0], result.info_of(0)
 
     def step(
         self, action: NDArray[np.float32]
@@ -163,14 +163,14 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         if not self._begun:
             raise ConfigError("Call reset() before step().")
         values = checked_action(action, (self.simulation.n_actions,))
-        outcome = self.simulation.step(values[None])
+        result = self.simulation.step(values[None])
         self._steps_left -= 1
         return (
-            outcome.observation[0],
-            float(outcome.reward[0]),
-            bool(outcome.terminated[0]),
+            result.observation[0],
+            float(result.reward[0]),
+            bool(result.terminated[0]),
             self._steps_left <= 0,  # the time limit itself is gymnasium's TimeLimit
-            outcome.info_of(0),
+            result.info_of(0),
         )
 
     def set_reward(self, weights: RewardConfig) -> None:

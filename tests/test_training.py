@@ -14,7 +14,7 @@ from commands import ROOT, called
 from matplotlib.figure import Figure
 
 from agents import ppo
-from agents.callbacks import Curve, Interrupt, Ramp, TrainingMonitor, plot_curve
+from agents.callbacks import Interrupt, Ramp, TrainingMonitor, plot_curve
 from agents.env_info import env_info
 from agents.evaluate import evaluate, judged, one_by_one
 from agents.registry import make_agent
@@ -225,7 +225,7 @@ def test_the_learning_curve_is_drawn_over_environment_steps(run, tmp_path, monke
     scores |= dict.fromkeys(("contacts_per_episode", "close_steps_per_episode"), 1.0)
     steps = [100_000.0, 200_000.0]
     points = [{"steps": each, "wall_s": 7.0, "safety_share": 1.0, **scores} for each in steps]
-    plot_curve(Curve(points), tmp_path / "curve.png", "PPO")
+    plot_curve(points, tmp_path / "curve.png", "PPO")
     (figure,) = drawn
     assert all(list(axis.lines[0].get_xdata()) == steps for axis in figure.axes)
     assert figure.axes[-1].get_xlabel() == "environment steps"

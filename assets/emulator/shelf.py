@@ -10,8 +10,7 @@ from assets.emulator.clips import Clip
 from assets.emulator.watch import Watched, load, save, watch
 from hrc_env.config import HRCConfig
 from hrc_env.experiments.study.fingerprint import fingerprint_of
-from hrc_env.perception.noise import ERROR
-from hrc_env.perception.offsets import OFFSET_M
+from hrc_env.perception.noise import ERROR, OFFSET_M
 
 
 def kept(

@@ -39,7 +39,7 @@ ORGANS: Mapping[str, Sequence[Place]] = {
     "info": (
         (simulation, "tracking_info"),
         (simulation, "cost_info"),
-        (simulation.Simulation, "_tally"),
+        (simulation.Simulation, "_episode_info"),
         (simulation.StepResult, "info_of"),
         (env, "table"),
         (infos.InfoTable, "arrays"),

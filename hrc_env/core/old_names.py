@@ -4,6 +4,7 @@ from typing import Any
 
 OLD_NAMES = {
     "beyond": "ablations",
+    "--peers": "--baselines",
     "eyes": "detector",
     "horizons_s": "forecast_s",
     "per_joint": "particle",

@@ -89,11 +89,7 @@ def _refuse(camera: CameraConfig, expected: str, got: object) -> NoReturn:
 
 
 def intrinsics(camera: CameraConfig) -> Floats:
-    """(3, 3) K [px], pixels continuous from the image's corner.
-
-    Raises:
-        ConfigError: a field of view that the lens cannot have.
-    """
+    """(3, 3) K [px], pixels continuous from the image's corner."""
     fx, fy = camera.focal_px or (_focal_px(camera),) * 2
     cx, cy = camera.centre_px or (camera.width_px / 2, camera.height_px / 2)
     return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]])
@@ -140,11 +136,8 @@ def _edge_rays(camera: CameraConfig, K: Floats) -> Floats:
 
 MAKES: dict[str, CameraConfig] = {
     "gopro_hero8_wide": CameraConfig(
-        "gopro_hero8_wide",
-        (0.0, 0.0, 2.4),
-        hfov_deg=118.2,
-        lens=Lens("kannala_brandt", (0.0667,)),
-    ),
+        "gopro_hero8_wide", (0.0, 0.0, 2.4), hfov_deg=118.2, lens=Lens("kannala_brandt", (0.0667,))
+    )
 }
 """Cameras as they are made, to be hung up with `made`. The GoPro HERO8 Black with its wide lens
 is the paper's: 118.2 x 69.5 degrees on 1920 x 1080. No pinhole with square pixels has both; the
@@ -157,22 +150,14 @@ def made(
     eye_world: tuple[float, float, float],
     target_world: tuple[float, float, float] = (0.2, 0.0, 1.0),
 ) -> CameraConfig:
-    """A camera of a make, hung up somewhere.
-
-    Raises:
-        ConfigError: a make that there is not.
-    """
+    """A camera of a make (a key of `MAKES`), hung up somewhere."""
     if make not in MAKES:
         raise unknown("make of camera", make, MAKES)
     return replace(MAKES[make], name=name, eye_world=eye_world, target_world=target_world)
 
 
 def read_rig(path: Path | str) -> tuple[CameraConfig, ...]:
-    """The cameras of a rig file.
-
-    Raises:
-        ConfigError: no such file, no TOML, or a field that is unknown, missing or wrong.
-    """
+    """The cameras of a rig file. Raises `ConfigError` for a bad file or a bad field."""
     content = read_toml(path)
     others, entries = sorted(set(content) - {"camera"}), content.get("camera", [])
     tables = isinstance(entries, list) and all(isinstance(entry, dict) for entry in entries)

@@ -3,9 +3,8 @@
 A camera with a lens has two kinds of pixels: `pinhole` ones, in which projection is linear and the
 trackers think, and those of the `image`, which detectors find. Without a lens they are the same.
 
-Pixels are continuous from the image's top-left corner, so that pixel centres lie at
-half-integers and the principal point of a symmetric image is (W/2, H/2). Camera axes are
-OpenCV's: +X right, +Y down, +Z forward.
+Pixels are continuous from the image's top-left corner: pixel centres lie at half-integers, the
+middle at (W/2, H/2). Camera axes are OpenCV's: +X right, +Y down, +Z forward.
 """
 
 from dataclasses import dataclass
@@ -76,8 +75,8 @@ def project(P: Floats, points_world: Points3) -> tuple[Points2, Floats]:
         points_world: (B, ..., 3) [m].
 
     Returns:
-        pinhole pixels (B, C, ..., 2) and depth along the optical axis (B, C, ...) [m]. Pixels of
-        points at or behind the camera's plane (depth <= 0) mean nothing: look at the depth.
+        pinhole pixels (B, C, ..., 2), which mean nothing where depth <= 0, and depth along the
+        optical axis (B, C, ...) [m].
     """
     rotated = np.einsum("cij,b...j->bc...i", P[:, :, :3], points_world)
     shape = (1, len(P)) + (1,) * (points_world.ndim - 2) + (3,)

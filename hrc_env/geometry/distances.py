@@ -9,12 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Capsules, Floats, Points3
+from hrc_env.core.skeleton import HAND_SEGMENTS, SEGMENT_ENDS, SEGMENT_RADIUS_M
+from hrc_env.core.typing import Capsules, Floats, Ints, Points3
 
 SLACK_M = 1e-9
 """Far more than the rounding of a sphere's bound."""
 _PARALLEL = 1e-13
 """Squared sine of an angle between segments that are parallel: a micrometre over their length."""
+_ENDS: Ints = np.array([[(e[0], e[-1]) for e in ends[:2]] for ends in SEGMENT_ENDS])
+"""(K, 2, 2) the two joints whose mean is each end (one twice where it is a joint itself)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +95,16 @@ def _spheres(capsules, radius, spheres):
         spheres[3, k] = 0.5 * math.sqrt(squared) + radius[k % len(radius)]
 
 
+@kernel
+def _sphere_gaps(a, b, least):
+    """least[k, m] = gap of sphere k of one set and sphere m of the other."""
+    for k in range(a.shape[1]):
+        x, y, z, reach = a[0, k], a[1, k], a[2, k], a[3, k]
+        for m in range(b.shape[1]):
+            dx, dy, dz = b[0, m] - x, b[1, m] - y, b[2, m] - z
+            least[k, m] = math.sqrt(dx * dx + dy * dy + dz * dz) - reach - b[3, m]
+
+
 @kernel(makes_arrays=True)
 def _narrowest(a, radius_a, b, radius_b, gap, points):
     """Spheres bound the gaps from below: only pairs that they leave open are measured."""
@@ -99,26 +112,61 @@ def _narrowest(a, radius_a, b, radius_b, gap, points):
     per_a, per_b = len(b) // max(len(a), 1), len(b) // max(len(radius_b), 1)
     per_first = len(b) // max(len(radius_a), 1)
     spheres_a, spheres_b = np.empty((4, n_a)), np.empty((4, n_b))
+    least = np.empty((n_a, n_b))
     for n in range(len(b)):
         first, first_m, second_m = a[n // per_a], radius_a[n // per_first], radius_b[n // per_b]
         _spheres(first, first_m, spheres_a)
         _spheres(b[n], second_m, spheres_b)
-        gap[n], points[n] = np.inf, 0.0
-        for k in range(n_a):
-            for m in range(n_b):
-                if _bound(spheres_a, k, spheres_b, m) > gap[n] + SLACK_M:
-                    continue
-                squared, s, t = closest_parameters(first[k, 0], first[k, 1], b[n, m, 0], b[n, m, 1])
-                distance = math.sqrt(squared) - first_m[k] - second_m[m % len(second_m)]
-                if distance < gap[n]:
-                    gap[n] = distance
-                    for i in range(3):
-                        points[n, 0, i] = first[k, 0, i] + s * (first[k, 1, i] - first[k, 0, i])
-                        points[n, 1, i] = b[n, m, 0, i] + t * (b[n, m, 1, i] - b[n, m, 0, i])
+        _sphere_gaps(spheres_a, spheres_b, least)
+        points[n] = 0.0
+        gap[n] = _search(first, first_m, b[n], second_m, least, points[n])
+
+
+@kernel(makes_arrays=True)
+def _search(a, radius_a, b, radius_b, least, points):
+    """The narrowest gap, the most promising pair first; of equal ones the first pair's."""
+    best, at, bounds = np.inf, 0, least.ravel()
+    if bounds.size == 0:
+        return best
+    likely = np.argmin(bounds)
+    for i in range(-1, bounds.size):
+        pair = likely if i < 0 else i
+        if bounds[pair] > best + SLACK_M or i == likely:
+            continue
+        k, m = pair // len(b), pair % len(b)
+        squared, s, t = closest_parameters(a[k, 0], a[k, 1], b[m, 0], b[m, 1])
+        distance = math.sqrt(squared) - radius_a[k] - radius_b[m % len(radius_b)]
+        if distance < best or (distance == best and pair < at):
+            best, at = distance, pair
+            for axis in range(3):
+                points[0, axis] = a[k, 0, axis] + s * (a[k, 1, axis] - a[k, 0, axis])
+                points[1, axis] = b[m, 0, axis] + t * (b[m, 1, axis] - b[m, 0, axis])
+    return best
+
+
+def segments(joints_world: Floats) -> Floats:
+    """(..., 16, 2, 3) end points of a body's segments, the hands last, of joints (..., 15, 3) [m];
+    radii are `SEGMENT_RADIUS_M`."""
+    flat = _flat(joints_world, 2)
+    ends = np.empty((len(flat), len(SEGMENT_RADIUS_M), 2, 3))
+    _segments(flat, ends)
+    return ends.reshape(*joints_world.shape[:-2], *ends.shape[1:])
 
 
 @kernel
-def _bound(a, k, b, m):
-    """The gap of two spheres."""
-    dx, dy, dz = b[0, m] - a[0, k], b[1, m] - a[1, k], b[2, m] - a[2, k]
-    return math.sqrt(dx * dx + dy * dy + dz * dz) - a[3, k] - b[3, m]
+def _segments(joints, ends):
+    for b in range(joints.shape[0]):
+        for k in range(len(_ENDS)):
+            for e in range(2):
+                first, second = joints[b, _ENDS[k, e, 0]], joints[b, _ENDS[k, e, 1]]
+                for i in range(3):
+                    ends[b, k, e, i] = 0.5 * (first[i] + second[i])
+        for h in range(len(HAND_SEGMENTS)):
+            elbow, wrist = joints[b, HAND_SEGMENTS[h][0]], joints[b, HAND_SEGMENTS[h][1]]
+            squared, k = 0.0, len(_ENDS) + h
+            for i in range(3):
+                squared += (wrist[i] - elbow[i]) ** 2
+            share = HAND_SEGMENTS[h][2] / max(math.sqrt(squared), 1e-6)
+            for i in range(3):
+                ends[b, k, 0, i] = wrist[i]
+                ends[b, k, 1, i] = wrist[i] + share * (wrist[i] - elbow[i])

@@ -99,10 +99,8 @@ def undistort(lens: Lens, distorted: Floats) -> Floats:
 
 
 def rays_cam(lens: Lens, distorted: Floats) -> Floats:
-    """(..., 3) unit directions in the camera's axes of distorted places (..., 2).
-
-    NaN where the lens lets nothing through.
-    """
+    """(..., 3) unit directions in the camera's axes of distorted places (..., 2); NaN where the
+    lens lets nothing through."""
     flat = np.ascontiguousarray(distorted, float).reshape(-1, 2)
     out = np.empty((len(flat), 3))
     _rays_all(lens_row(lens), flat, out)

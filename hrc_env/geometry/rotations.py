@@ -42,10 +42,8 @@ def about_axis(axis: str, angle_rad: Floats | float) -> Rotations:
 
 
 def look_at(eye_world: Points3, target_world: Points3) -> Rotations:
-    """R_world_from_cam (OpenCV: +X right, +Y down, +Z forward), the image upright.
-
-    Degenerate when the line of sight is vertical: then +Y of the image is world -Y.
-    """
+    """R_world_from_cam (OpenCV: +X right, +Y down, +Z forward), the image upright; of a vertical
+    line of sight +Y of the image is world -Y."""
     forward = np.asarray(target_world, float) - np.asarray(eye_world, float)
     forward = forward / np.linalg.norm(forward)
     right = np.cross(forward, [0.0, 0.0, 1.0])

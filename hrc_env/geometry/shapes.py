@@ -74,13 +74,17 @@ def set_capsules(table, first, ends, radius):
 def passage(table, row, px, py, pz, dx, dy, dz):
     """Where a line enters and leaves the shape of a row."""
     kind = table[row, KIND]
-    if kind == CAPSULE:
-        return _through_capsule(table, row, px, py, pz, dx, dy, dz)
     if kind == BOX:
         return _through_box(table, row, px, py, pz, dx, dy, dz)
-    if kind == CYLINDER:
-        return _through_cylinder(table, row, px, py, pz, dx, dy, dz)
-    return _through_plane(table, row, px, py, pz, dx, dy, dz)
+    if kind == PLANE:
+        return _through_plane(table, row, px, py, pz, dx, dy, dz)
+    rise, height, ahead, excess = against_axis(table, row, px, py, pz, dx, dy, dz)
+    enter, leave = through_tube(rise, height, ahead, excess)
+    half = table[row, HALF_SIZE + 1]
+    if kind == CAPSULE:
+        return rounded(enter, leave, half, rise, height, ahead, excess)
+    low, high = _between(height, rise, half)
+    return max(enter, low), min(leave, high)
 
 
 @kernel
@@ -125,21 +129,6 @@ def rounded(enter, leave, half, rise, height, ahead, excess):
     if abs(at) > half:
         _, leave = _through_ball(math.copysign(half, at), rise, height, ahead, excess)
     return enter, leave
-
-
-@kernel
-def _through_capsule(table, row, px, py, pz, dx, dy, dz):
-    rise, height, ahead, excess = against_axis(table, row, px, py, pz, dx, dy, dz)
-    enter, leave = through_tube(rise, height, ahead, excess)
-    return rounded(enter, leave, table[row, HALF_SIZE + 1], rise, height, ahead, excess)
-
-
-@kernel
-def _through_cylinder(table, row, px, py, pz, dx, dy, dz):
-    rise, height, ahead, excess = against_axis(table, row, px, py, pz, dx, dy, dz)
-    enter, leave = through_tube(rise, height, ahead, excess)
-    low, high = _between(height, rise, table[row, HALF_SIZE + 1])
-    return max(enter, low), min(leave, high)
 
 
 @kernel

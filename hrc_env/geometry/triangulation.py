@@ -209,10 +209,8 @@ def misfit(camera, u, v, sigma, point):
 
 @kernel(makes_arrays=True)
 def consensus_point(P, z, sigma, ok, gate_sigma, point, cov, use):
-    """Point of the largest agreeing set of views among `ok`, found from pairs of cameras.
-
-    Fills `point`, `cov` and `use`; returns the number of agreeing views, 0 if fewer than two.
-    """
+    """Fill `point`, `cov` and `use` of the largest agreeing set of views among `ok`, found from
+    pairs of cameras; returns their number, 0 if fewer than two."""
     n_cameras, gate = len(P), gate_sigma * gate_sigma
     best, best_cost = np.zeros(3), np.inf
     for first in range(n_cameras):

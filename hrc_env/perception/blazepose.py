@@ -12,8 +12,7 @@ import numpy as np
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Roi
-from hrc_env.core.typing import Floats, Image, Points2
-from hrc_env.perception.litert import Tensor
+from hrc_env.core.typing import Floats, Image, Points2, Tensor
 from hrc_env.perception.network import DETECTOR_SIDE, LANDMARK_SIDE
 
 MIN_SCORE = 0.5
@@ -137,10 +136,7 @@ def person_window(person: Person, window: Roi) -> Roi:
 
 def decode_landmarks(points: Tensor, heat: Tensor) -> Floats:
     """(35, 3) x, y in units of the crop's side and visibility in [0, 1]: 33 body landmarks, mid-hip
-    and rim.
-
-    Where the heatmap is sure (above 0.5 in the neighbourhood) a point becomes the neighbourhood's
-    mean weighted by it.
+    and rim. Where the heatmap is sure, a point becomes its neighbourhood's mean weighted by it.
 
     Args:
         points: (39, 5) x, y, z in crop pixels, logits of visibility and presence.

@@ -20,7 +20,6 @@ from hrc_env.core.typing import Floats, Ints
 FORMAT, VERSION = "hrc_env keypoints", 5
 """Version: what the tables mean. A file of another one is refused."""
 PACKAGED = Path(__file__).with_name("keypoints.json")
-
 KINDS = ("nose", "shoulder", "elbow", "wrist", "hip", "knee", "ankle", "foot")
 """Kinds of joints: left and right err alike, mirrored."""
 POSTURES = ("standing", "walking", "handling", "folded", "kneeling")
@@ -37,7 +36,6 @@ N_SEEN = len(JOINTS) + 1
 """From none to all."""
 VISIBILITY: Floats = np.array([0.10, 0.35, 0.65, 0.875, 0.975])
 """Where the standard deviation is given as a function of the reported visibility."""
-
 KIND: Ints = np.array([KINDS.index(name.rsplit("_", 1)[-1]) for name in JOINTS])
 """(J,) kind of every joint."""
 HAND: Floats = np.where(np.arange(len(JOINTS)) > MIRROR, -1.0, 1.0)
@@ -46,7 +44,6 @@ INNER: Ints = np.array([0, 1, 2, 1, 2, 3, 4, 7, 8, 7, 8, 9, 10, 11, 12])
 """(J,) the next joint towards the trunk; itself for those of the trunk."""
 NEXT: Ints = np.where(np.arange(len(JOINTS)) == INNER, np.minimum(MIRROR, INNER), INNER)
 """(J,) the same, and of the trunk's right joints the left one."""
-
 _P, _K, _S, _Z = len(POSTURES), len(KINDS), len(SIGHTS), len(KNOTS)
 _Q = len(BODY_KNOTS)
 

@@ -36,7 +36,6 @@ from hrc_env.perception.weights import find_weights
 SIDE = network.LANDMARK_SIDE
 STATURE_OF_SIDE = 0.75
 """Stature of an upright worker as a share of the side of BlazePose's window round them."""
-
 ResultT = TypeVar("ResultT")
 KeypointFunction = Callable[[Image], Floats | None]
 """A crop (256, 256, 3) RGB uint8 -> (J, 3): x and y in pixels of the crop, continuous from its

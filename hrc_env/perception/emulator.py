@@ -10,22 +10,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hrc_env.core.errors import ConfigError, check_shape
 from hrc_env.core.records import Keypoints, WorkerTruth
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Floats, Ints
+from hrc_env.core.typing import Floats, Ints, Records
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.geometry.lens import lens_row
 from hrc_env.geometry.sight import Surroundings
 from hrc_env.perception import emulator_kernel as kernels
-from hrc_env.perception.calibration import (
-    POSTURED,
-    Calibration,
-    changed_ns,
-    read_calibration,
-)
+from hrc_env.perception.calibration import POSTURED, Calibration, changed_ns, read_calibration
 from hrc_env.perception.detector import STATURE_OF_SIDE
 from hrc_env.perception.sightlines import CAMERA, N_LOOK, World, sight_batch
 
@@ -79,7 +73,7 @@ class EmulatorConfig:
 class EmulatorState:
     """What the detector's errors remember from image to image, in standard deviations."""
 
-    errors: NDArray[np.void]  # (B, C, W) `emulator_kernel.ERRORS`
+    errors: Records  # (B, C, W) `emulator_kernel.ERRORS`
     wander: Floats  # (B, W, J, 3) the same in every camera, a joint's own: ahead, aside, up
     dt_s: float  # time between images [s]
 
@@ -123,8 +117,7 @@ def emulate(
         config: as given to `make_state`.
 
     Returns:
-        Keypoints in pixels of the images, as lenses distort them, with NaN, 0 and infinity where a
-        camera does not see a worker.
+        Keypoints in pixels of the images; NaN, 0 and infinity of a worker who is not seen.
     """
     batch, n_cameras, n_workers = state.errors.shape
     shape = (batch, n_cameras, n_workers, N_JOINTS)
@@ -175,7 +168,7 @@ def without_names(keypoints: Keypoints, rngs: Generators) -> Keypoints:
 
 
 @functools.lru_cache(maxsize=16)
-def _rig(cameras: tuple[PinholeCamera, ...]) -> NDArray[np.void]:
+def _rig(cameras: tuple[PinholeCamera, ...]) -> Records:
     """(C,) `CAMERA`."""
     rig = np.zeros(len(cameras), CAMERA)
     for row, camera in zip(rig, cameras, strict=True):
@@ -188,9 +181,7 @@ def _rig(cameras: tuple[PinholeCamera, ...]) -> NDArray[np.void]:
 
 
 @functools.lru_cache(maxsize=16)
-def _settings(
-    config: EmulatorConfig, dt_s: float, written_ns: int
-) -> tuple[Floats, NDArray[np.void]]:
+def _settings(config: EmulatorConfig, dt_s: float, written_ns: int) -> tuple[Floats, Records]:
     """A calibration as the kernel takes it: (P, N) postures, (1,) `SETTINGS`; read again if its
     file has been written anew."""
     known = config.calibrated()

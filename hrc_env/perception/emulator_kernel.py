@@ -42,7 +42,6 @@ N_OF_BODY = 4
 """Normal variables of a worker in an image: one for the errors' size, one for each happening."""
 FIRST_OF_LEGS = JOINT["left_knee"]
 """From this joint on left and right are exchanged where the legs are."""
-
 ERRORS = np.dtype(
     [
         ("lasting", "f8", (N_JOINTS, 2, 2)),  # of an episode: of cosine and sine of the view; x, y

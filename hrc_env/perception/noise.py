@@ -1,18 +1,27 @@
-"""How far a joint may be off, by which it is and how visible the network says it is: one mapping
-for the real pipeline and for its emulator."""
+"""The network's joints against ours: how far one may be off, and where it is meant to be; the same
+numbers for the real pipeline and for its emulator.
+
+A hip of BlazePose is 17 mm above ours, and 60 mm ahead of it in who bends. Trackers follow what the
+network means; estimates are of our joints.
+"""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from hrc_env.core.errors import check_shape
 from hrc_env.core.kernels import kernel
+from hrc_env.core.records import PoseEstimate
 from hrc_env.core.typing import Floats
-from hrc_env.perception.calibration import KIND, POSTURES, VISIBILITY, read_calibration
+from hrc_env.perception.calibration import HAND, KIND, POSTURES, VISIBILITY, read_calibration
+from hrc_env.perception.outline import facing, mix, posture_of
 
 ERROR: Floats = read_calibration().sigma
 """(P, K, V) standard deviation of each image coordinate, a share of stature, by posture and kind of
 joint (`calibration.KINDS`) at `VISIBILITY`; see docs/emulator.md."""
+OFFSET_M: Floats = read_calibration().offset_m
+"""(P, K, 3) where the network means a joint to be: ahead, to its own side, up [m]."""
 STANDING = (1.0, *(0.0,) * (len(POSTURES) - 1))
 
 
@@ -22,12 +31,9 @@ def sigma_px(
     """Standard deviation of each coordinate of a detected joint [px].
 
     Args:
-        confidence: (..., J) visibility in [0, 1]; 0 means that there is no measurement.
+        confidence: (..., J) visibility in [0, 1]; of 0 the deviation is infinite.
         stature_px: how long the worker's stature is at their distance [px]; broadcasts.
         posture: how far the body counts as each of `calibration.POSTURES` (`outline.posture_of`).
-
-    Returns:
-        (..., J) finite and positive, infinite where the confidence is 0.
     """
     confidence = np.asarray(confidence, float)
     check_shape("confidence", confidence.shape[-1:], (len(KIND),), "one a joint")
@@ -49,3 +55,31 @@ def error_share(confidence: float, visibility: Floats, error: Floats) -> float:
             part = (confidence - visibility[k - 1]) / (visibility[k] - visibility[k - 1])
             return error[k - 1] + part * (error[k] - error[k - 1])
     return error[-1]
+
+
+def our_joints(estimate: PoseEstimate) -> PoseEstimate:
+    """An estimate (B, W, ...) of what the network means, as one of joints; the prior of who is not
+    tracked, covariances and velocities stay."""
+    mean_world = estimate.mean_world.copy()
+    offset_of = OFFSET_M.reshape(len(OFFSET_M), -1)
+    _put_right(mean_world, estimate.velocity_world, estimate.tracked, offset_of, KIND, HAND)
+    return replace(estimate, mean_world=mean_world)
+
+
+@kernel(makes_arrays=True)
+def _put_right(mean, velocity, tracked, offset_of, kinds, hands):
+    row = np.empty(offset_of.shape[1])
+    offset = row.reshape(-1, 3)
+    for b in range(len(mean)):
+        for w in range(mean.shape[1]):
+            if not tracked[b, w]:
+                continue
+            joints = mean[b, w]
+            front_x, front_y = facing(joints)
+            mix(posture_of(joints, velocity[b, w]), offset_of, row)
+            for j in range(len(joints)):
+                ahead, up = offset[kinds[j], 0], offset[kinds[j], 2]
+                left = hands[j] * offset[kinds[j], 1]
+                joints[j, 0] -= front_x * ahead - front_y * left
+                joints[j, 1] -= front_y * ahead + front_x * left
+                joints[j, 2] -= up

@@ -135,10 +135,8 @@ def seen_from(joints, front_x, front_y, eye):
 
 
 def is_folded(joints_world: Points3) -> bool:
-    """Whether a body (J, 3) is bent, squatting or kneeling; z is up, NaN is not folded.
-
-    Joints hide each other then: `full` errs by a median of 68 mm, `heavy` by 52 mm (docs/speed.md).
-    """
+    """Whether a body (J, 3) is bent, squatting or kneeling: its joints hide each other, and the
+    network errs much more. z is up, NaN is not folded."""
     shoulders, hips, knees, ankles = (joints_world[k : k + 2] for k in (1, 7, 9, 11))
     torso = shoulders.mean(0) - hips.mean(0)
     limbs_m = np.linalg.norm(np.stack([knees - hips, ankles - knees]), axis=-1).mean(-1)

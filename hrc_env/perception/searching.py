@@ -5,6 +5,7 @@ differs from the empty scene where a camera's source knows it; else squares as l
 are. The lines of sight to one person's hips meet; those to two people, or to a mistake, rarely do.
 """
 
+import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import Protocol
@@ -176,17 +177,16 @@ def _crossings(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Iter
         for c, (camera, found) in enumerate(zip(cameras, candidates, strict=True))
         for window in found
     ]
-    for k, (first, eye_1, along_1) in enumerate(lines):
-        for second, eye_2, along_2 in lines[k + 1 :]:
-            cosine = float(along_1 @ along_2)
-            crossing = 1 - cosine**2
-            if first == second or not crossing >= MIN_CROSSING**2:
-                continue
-            between = eye_2 - eye_1
-            a, b = float(between @ along_1), float(between @ along_2)
-            far_1, far_2 = (a - b * cosine) / crossing, (a * cosine - b) / crossing
-            if far_1 > 0 and far_2 > 0:
-                yield (eye_1 + far_1 * along_1 + eye_2 + far_2 * along_2) / 2
+    for (first, eye_1, along_1), (second, eye_2, along_2) in itertools.combinations(lines, 2):
+        cosine = float(along_1 @ along_2)
+        crossing = 1 - cosine**2
+        if first == second or not crossing >= MIN_CROSSING**2:
+            continue
+        between = eye_2 - eye_1
+        a, b = float(between @ along_1), float(between @ along_2)
+        far_1, far_2 = (a - b * cosine) / crossing, (a * cosine - b) / crossing
+        if far_1 > 0 and far_2 > 0:
+            yield (eye_1 + far_1 * along_1 + eye_2 + far_2 * along_2) / 2
 
 
 def _support(
@@ -199,9 +199,8 @@ def _support(
         px, depth_m = project(camera.P[None], point_world[None])
         if not found or depth_m[0, 0] <= 0:
             continue
-        m_per_px = (
-            float(depth_m[0, 0]) / camera.K[0, 0] * float(pinhole_magnification(camera, px[0, 0]))
-        )
+        magnified = float(pinhole_magnification(camera, px[0, 0]))
+        m_per_px = float(depth_m[0, 0]) / camera.K[0, 0] * magnified
         hips_px = image_from_pinhole(camera, px[0, 0])
         off_m = [
             math.dist(window.centre_px, hips_px) * m_per_px

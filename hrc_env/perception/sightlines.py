@@ -10,6 +10,7 @@ from hrc_env.core.typing import Floats
 from hrc_env.geometry.lens import FOLD, distorted, magnification_at
 from hrc_env.geometry.shapes import set_capsules, set_rows
 from hrc_env.geometry.sight import is_hidden, look, make_occluders
+from hrc_env.geometry.triangulation import pixel_of
 from hrc_env.perception import outline
 from hrc_env.perception.windows import MIN_DEPTH_M, window_round
 
@@ -20,7 +21,6 @@ SIDE, TURN, VIEW, FOLDING, KNEELING, HANDLING, STEPPING = range(N_LOOK := 7)
 """How a camera sees a worker: side [px] and turn [rad] of the window round them, from where
 (`outline.seen_from`) [rad], how folded they are, whether they then kneel, whether their hands are
 busy, whether they walk."""
-
 CAMERA = np.dtype(
     [
         ("P", "f8", (3, 4)),  # projection
@@ -102,7 +102,9 @@ def fill(table, world, b):
 def see(camera, joints, meant, occluders, seen):
     """Project what is meant (J, 3), find out what hides the joints. How many of these are seen."""
     uv, depth = seen.uv, seen.depth
-    _project(camera.P, meant, uv, depth)
+    for j in range(len(meant)):
+        x, y, z = meant[j, 0], meant[j, 1], meant[j, 2]
+        uv[j, 0], uv[j, 1], depth[j] = pixel_of(camera.P, x, y, z)
     total = 0.0
     for j in range(1, 3):
         total += depth[j] + depth[j + 6]
@@ -119,16 +121,6 @@ def see(camera, joints, meant, occluders, seen):
             else:
                 n_seen += 1
     return n_seen
-
-
-@kernel
-def _project(P, joints, uv, depth):
-    for j in range(len(joints)):
-        x, y, z = joints[j, 0], joints[j, 1], joints[j, 2]
-        depth[j] = P[2, 0] * x + P[2, 1] * y + P[2, 2] * z + P[2, 3]
-        safe = depth[j] if abs(depth[j]) > 1e-9 else 1e-9
-        uv[j, 0] = (P[0, 0] * x + P[0, 1] * y + P[0, 2] * z + P[0, 3]) / safe
-        uv[j, 1] = (P[1, 0] * x + P[1, 1] * y + P[1, 2] * z + P[1, 3]) / safe
 
 
 @kernel

@@ -8,15 +8,17 @@ landmarks move by a quarter of a pixel of 256; elsewhere it computes in 32 bits.
 import functools
 import importlib.util
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.perception.litert import Network, Tensor
+from hrc_env.core.typing import Tensor
 
+Network: TypeAlias = Callable[[Tensor], list[Tensor]]
+"""An image (H, W, 3) -> copies of the outputs that were asked for; for one thread at a time."""
 INSTALL = 'pip install "hrc_env[openvino]"'
 
 

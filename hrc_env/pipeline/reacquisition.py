@@ -24,7 +24,6 @@ FOLLOWED = 5
 """Steps for which it then looks there: estimators begin anew after three that contradict them."""
 ENOUGH = 2
 """So many cameras that show a worker hold the track where it is."""
-
 Views = list[Roi | None]
 """A window a camera."""
 
@@ -109,8 +108,7 @@ class Reacquisition(Stateful):
         """Learn what a search of the blind cameras gave for a worker of environment b.
 
         Args:
-            b: the environment.
-            worker: the worker.
+            b, worker: whose search.
             people: (C,) whom each blind camera shows.
             windows: (C,) where the track has the cameras look.
             others: windows (C,) of other workers, who are not taken for this one.

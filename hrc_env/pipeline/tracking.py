@@ -13,7 +13,7 @@ from hrc_env.core.typing import Bools, Floats, Image, Ints
 from hrc_env.geometry.cameras import projections
 from hrc_env.perception.faults.schedule import Recent, Schedule
 from hrc_env.perception.lensed import pinhole_keypoints
-from hrc_env.perception.offsets import our_joints
+from hrc_env.perception.noise import our_joints
 from hrc_env.pipeline.sensor_input import Generators, SensorInput, Windows
 from hrc_env.scene.build import Scene
 from hrc_env.scene.domain_randomization import Look
@@ -120,15 +120,8 @@ class PoseTracking(PerceptionPipeline):
         return our_joints(self.tracker.forecast(state, horizon_s))
 
     def detect(self, now: SensorInput, predicted: Any, sensor_rngs: Generators) -> Keypoints:
-        """Keypoints of this moment, by whatever detector the level has; whose they are is open.
-
-        They are in pixels of the images, as the lenses distort them.
-
-        Args:
-            now: the scene.
-            predicted: the tracker's state before the measurement.
-            sensor_rngs: one generator a row.
-        """
+        """Keypoints of `now` in pixels of the images, by the level's detector; whose they are is
+        open. `predicted` is the tracker's state before the measurement."""
         raise NotImplementedError
 
     def _sorted(self, keypoints: Keypoints, predicted: Any) -> Keypoints:

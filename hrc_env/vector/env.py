@@ -158,9 +158,9 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         In the mode NEXT_STEP those of environments whose episode has just ended are ignored:
         these start anew instead. Infos are arrays (num_envs,), each with a mask "_name".
         """
-        outcome = self.shards.step(self._checked(actions))
-        observation, info = outcome.observation.copy(), table(outcome)
-        reward, terminated, over = outcome.reward.copy(), outcome.terminated.copy(), self._ended
+        result = self.shards.step(self._checked(actions))
+        observation, info = result.observation.copy(), table(result)
+        reward, terminated, over = result.reward.copy(), result.terminated.copy(), self._ended
         self._steps += 1
         if over.any():  # only where the mode is NEXT_STEP
             self._restart(over, observation, info)

@@ -86,14 +86,14 @@ class Shards:
 def _all_done(jobs: Iterable[tuple[int, Callable[[], StepResult]]]) -> list[StepResult]:
     """What jobs give, each with the number of its first environment; or, once all are done and
     nobody works on any more, the first error."""
-    outcomes, errors = [], []
+    results, errors = [], []
     for first, job in jobs:
         try:
-            outcomes.append(job())
+            results.append(job())
         except BaseException as error:
             errors.append(error)
             if isinstance(error, HRCError) and first > 0:
                 error.add_note(f"Environments are counted from number {first} of the vector here.")
     if errors:
         raise errors[0]
-    return outcomes
+    return results

@@ -56,7 +56,9 @@ def test_a_half_written_part_is_made_anew(tmp_path):
 
 def test_parts_of_other_code_do_not_count(tmp_path):
     PartCache(tmp_path, "old", 1, silent).part("one", lambda tick: {"x": 1})
-    assert not PartCache(tmp_path, "new", 1, silent).has("one")
+    cache = PartCache(tmp_path, "new", 1, silent)
+    assert cache.part("one", lambda tick: {"x": 2}) == {"x": 2}
+    assert cache.part("one", lambda tick: {"x": 3}, key="other") == {"x": 3}
 
 
 def test_the_progress_of_parts_sums_to_one(tmp_path):

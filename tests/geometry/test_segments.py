@@ -3,7 +3,7 @@
 import numpy as np
 
 from hrc_env.core.skeleton import HAND_SEGMENTS, JOINT, SEGMENT_ENDS, SEGMENT_RADIUS_M
-from hrc_env.geometry.segments import segments
+from hrc_env.geometry.distances import segments
 
 JOINTS_WORLD = np.random.default_rng(0).normal(size=(4, 2, 15, 3))
 

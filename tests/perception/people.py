@@ -4,7 +4,7 @@ import numpy as np
 
 from hrc_env.core.records import WorkerTruth
 from hrc_env.core.skeleton import SEGMENT_RADIUS_M
-from hrc_env.geometry.segments import segments
+from hrc_env.geometry.distances import segments
 
 STANDING = np.array(
     [

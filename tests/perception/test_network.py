@@ -3,7 +3,7 @@
 import numpy as np
 
 from hrc_env.core.records import Roi
-from hrc_env.perception import litert
+from hrc_env.perception import network
 from hrc_env.perception.blazepose import detector_input, landmark_input, sample_window
 from hrc_env.perception.network import LANDMARK_OUTPUTS, load_landmarker, load_person_detector
 
@@ -12,8 +12,8 @@ MIDDLE = Roi((118.0, 138.0), 220.0, 0.1)
 
 def test_the_pruned_network_gives_the_bits_of_the_whole_one(weights, pictures):
     content = weights["pose_landmark_full"].read_bytes()
-    whole = litert.load(content, LANDMARK_OUTPUTS)
-    pruned = litert.load(litert.prune(content, LANDMARK_OUTPUTS), LANDMARK_OUTPUTS)
+    whole = network.load_tflite(content, LANDMARK_OUTPUTS)
+    pruned = network.load_tflite(network.prune(content, LANDMARK_OUTPUTS), LANDMARK_OUTPUTS)
     for picture in pictures.values():
         image = landmark_input(sample_window(picture, MIDDLE))
         for ours, theirs in zip(pruned(image), whole(image), strict=True):
@@ -22,7 +22,7 @@ def test_the_pruned_network_gives_the_bits_of_the_whole_one(weights, pictures):
 
 def test_pruning_leaves_a_smaller_file(weights):
     content = weights["pose_landmark_full"].read_bytes()
-    assert len(litert.prune(content, LANDMARK_OUTPUTS)) < len(content)
+    assert len(network.prune(content, LANDMARK_OUTPUTS)) < len(content)
 
 
 def test_two_copies_of_a_network_agree_bit_for_bit(weights, pictures):

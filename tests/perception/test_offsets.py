@@ -7,7 +7,7 @@ from people import truth
 from hrc_env.core.records import PoseEstimate
 from hrc_env.core.skeleton import JOINT, N_JOINTS
 from hrc_env.perception.calibration import HAND, KIND, POSTURES
-from hrc_env.perception.offsets import OFFSET_M, our_joints
+from hrc_env.perception.noise import OFFSET_M, our_joints
 
 
 def turned(joints, yaw_rad):

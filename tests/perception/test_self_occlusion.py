@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from people import STANDING
 
 from hrc_env.core.skeleton import JOINT, SEGMENT_RADIUS_M
-from hrc_env.geometry.segments import segments
+from hrc_env.geometry.distances import segments
 from hrc_env.geometry.shapes import CENTRE, WIDTH, set_capsules
 from hrc_env.geometry.sight import body_blocks, line
 

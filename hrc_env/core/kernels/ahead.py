@@ -69,8 +69,10 @@ def _serve(wanted: "SimpleQueue[Signature]", total_s: float, say: Say) -> None:
             each = wanted.get_nowait()
             with contextlib.suppress(OSError):  # of a process that has died
                 process.stdin.write(json.dumps([each.kernel, each.args]) + "\n")
-            if process.stdout.readline() != "done\n":
+            answer = process.stdout.readline()
+            if answer != "done\n":
                 log.warning("Compiling %s failed; it is tried when called.", each.kernel)
+            if not answer:
                 break
             say(each.seconds / total_s, each.kernel.partition(":")[2])
     with contextlib.suppress(OSError):
@@ -119,8 +121,12 @@ def main() -> None:
     """
     for line in sys.stdin:
         name, args = json.loads(line)
-        kernel_named(name).compile(tuple(decode(each) for each in args))
-        sys.stdout.write("done\n")
+        try:
+            kernel_named(name).compile(tuple(decode(each) for each in args))
+            answer = "done"
+        except (TypeError, KeyError) as error:  # it has other arguments, or another name, now
+            answer = f"failed: {error!r}".replace("\n", " ")
+        sys.stdout.write(f"{answer}\n")
         sys.stdout.flush()
 
 

@@ -1,6 +1,7 @@
 """What perception is worth in safety: every policy with every setup, on the same workers."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from typing import Any
@@ -75,13 +76,12 @@ class ImpactConfig:
         n = min(self.n_seeds, self.n_pixels) if level == "pixels" else self.n_seeds
         return [FIRST_SEED + k for k in range(n)]
 
-    def rows(self) -> Iterator[tuple[PerceptionSetup, Policy]]:
-        """What is played, setup by setup."""
+    def rows(self) -> Iterator[tuple[PerceptionSetup, list[Policy]]]:
+        """Every setup, and who is played with it."""
         for name in self.setups:
-            setup = setup_called(name)
-            yield from ((setup, Policy(policy)) for policy in self.policies)
-            if SLOWED in self.policies and name in SWEPT:
-                yield from ((setup, Policy(SLOWED, margin_m)) for margin_m in self.margins_m)
+            margins_m = self.margins_m if SLOWED in self.policies and name in SWEPT else ()
+            policies = [Policy(policy) for policy in self.policies]
+            yield setup_called(name), policies + [Policy(SLOWED, m) for m in margins_m]
 
 
 QUICK: dict[str, Any] = {"n_seeds": 8, "n_pixels": 1, "n_steps": 100, "learning_steps": 65_536}
@@ -110,26 +110,22 @@ def play(config: ImpactConfig, cache: PartCache) -> Table:
     if PPO in config.policies:
         learnt = {"people": PEOPLE, "learning_steps": config.learning_steps}
         ppo = trained(cache, config.learning_steps, checkpoint, fingerprint_of(learnt, *PARTS_FROM))
-    stage: Stage | None = None
-    for setup, policy in config.rows():
-        if stage is None or stage.setup != setup:
-            if stage is not None:
-                stage.close()
-            stage = Stage(setup, config.seeds(setup.level), config.n_steps)
+    for setup, policies in config.rows():
         made_of = {
             "people": PEOPLE,
-            "seeds": stage.seeds,
+            "seeds": config.seeds(setup.level),
             "n_steps": config.n_steps,
             "setup": asdict(setup),
-            "policy": asdict(policy),
-            "ppo": ppo if policy.name == PPO else "",
             "estimator": source_digest(estimator_called(setup.estimator).make),
         }
-        make = partial(stage.play, maker(policy, checkpoint), policy.margin_m)
-        key = fingerprint_of(made_of, *PARTS_FROM)
-        table[policy.label, setup.name] = cache.part(f"{policy.label}.{setup.name}", make, key)
-    if stage is not None:
-        stage.close()
+        with closing(Stage(setup, made_of["seeds"], config.n_steps)) as stage:
+            for policy in policies:
+                who = {"policy": asdict(policy), "ppo": ppo if policy.name == PPO else ""}
+                table[policy.label, setup.name] = cache.part(
+                    f"{policy.label}.{setup.name}",
+                    partial(stage.play, maker(policy, checkpoint), policy.margin_m),
+                    fingerprint_of(made_of | who, *PARTS_FROM),
+                )
     check_walks(table)
     return table
 
@@ -150,7 +146,9 @@ STUDY = Study(
     modules=PARTS_FROM,
     settings=lambda config: {"people": PEOPLE, **asdict(config)},
     seeds=lambda config: config.seeds(),
-    n_parts=lambda config: len(list(config.rows())) + (PPO in config.policies),
+    n_parts=lambda config: (
+        sum(len(policies) for _, policies in config.rows()) + (PPO in config.policies)
+    ),
     play=play,
     metrics=lambda config, table: metrics_of(table, config.margins_m),
     report=lambda config, table, metrics, figures: report(figures, table, metrics),

@@ -32,6 +32,7 @@ class PartCache:
         self, label: str, make: Callable[[PartProgress], dict[str, Any]], key: str | None = None
     ) -> dict[str, Any]:
         """The part called `label`: the one that is there if its key is the same, or a new one."""
+        key = key or self.fingerprint
         part = self._load(label, key)
         if part is not None:
             self.progress(1 / self.n_parts, label)
@@ -45,21 +46,17 @@ class PartCache:
             self.progress(share / self.n_parts, label)
 
         part = make(tick)
-        content = json.dumps({"fingerprint": key or self.fingerprint, "part": part})
+        content = json.dumps({"fingerprint": key, "part": part})
         write_whole(self.folder / f"{label}.json", content)
         self.progress(max(1.0 - told, 0.0) / self.n_parts, label)
         return part
 
-    def has(self, label: str) -> bool:
-        """Whether a part is there."""
-        return self._load(label, None) is not None
-
-    def _load(self, label: str, key: str | None) -> dict[str, Any] | None:
+    def _load(self, label: str, key: str) -> dict[str, Any] | None:
         try:
             content: Mapping[str, Any] = json.loads((self.folder / f"{label}.json").read_text())
         except (FileNotFoundError, json.JSONDecodeError):
             return None
-        return content["part"] if content["fingerprint"] == (key or self.fingerprint) else None
+        return content["part"] if content["fingerprint"] == key else None
 
 
 def own_folder(out: Path, name: str, overwrite: bool = False) -> None:

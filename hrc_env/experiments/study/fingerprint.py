@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import hrc_env
-from hrc_env.worker.body import assets_dir
 
 LIBRARIES = ("numpy", "numba", "scipy", "mujoco", "gymnasium", "opencv-python-headless",
              "ai-edge-litert", "openvino", "torch", "stable-baselines3")  # fmt: skip
@@ -97,6 +96,8 @@ def source_digest(made: Any) -> str:
 @cache
 def _data() -> str:
     """The content of every data file: bodies, calibrations, scenery, networks of our own."""
+    from hrc_env.worker.body import assets_dir  # here: --help of a command imports no compiler
+
     digest = hashlib.sha256()
     for root in sorted({assets_dir(), _PACKAGE}):
         for path in sorted(root.rglob("*")):

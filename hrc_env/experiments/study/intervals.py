@@ -92,11 +92,6 @@ def counted_quantile_over(
     return bootstrap(lambda w: np.minimum(bins.quantile(w @ rows, q), most), len(rows), unit, 1000)
 
 
-def apart(one: Metric, other: Metric) -> bool:
-    """Whether two intervals do not touch."""
-    return one.high < other.low or other.high < one.low
-
-
 def _usable(*samples: Sequence[float] | Floats) -> list[Floats]:
     """(n,) each: the seeds of which every number is finite."""
     arrays = [np.asarray(each, float) for each in samples]

@@ -32,16 +32,11 @@ class Stage(Protocol):
 class Shot:
     """A scene of which images may be wanted later."""
 
-    step: int
-    """When it was."""
-    q: JointAngles
-    """(N,) the arm [rad]."""
-    motion: WorkerMotion
-    """(W, S, ...)."""
-    before: tuple[JointAngles, WorkerMotion]
-    """Arm and workers one step earlier."""
-    cameras: tuple[PinholeCamera, ...]
-    """Where the cameras really were."""
+    step: int  # when it was
+    q: JointAngles  # (N,) the arm [rad]
+    motion: WorkerMotion  # (W, S, ...)
+    before: tuple[JointAngles, WorkerMotion]  # one step earlier
+    cameras: tuple[PinholeCamera, ...]  # where they really were
 
 
 class CameraFilm:
