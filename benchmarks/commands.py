@@ -50,6 +50,7 @@ class TrackingBench(AnyBench):
     def run(self) -> int:
         """Run, show the tables."""
         at_least("--seeds", self.seeds, 1)
+        at_least("--processes", self.processes, 1)
         if self.real and self.baselines:
             raise ConfigError("--real and --baselines are two parts of the bench; choose one.")
         if self.baselines:

@@ -44,7 +44,7 @@ def copied(tmp_path, monkeypatch):
     assets.mkdir(parents=True)
     (assets / "worker_1.npz").write_bytes(b"painted")
     monkeypatch.setattr(fingerprint, "_PACKAGE", package)
-    monkeypatch.setattr(fingerprint, "assets_dir", lambda: tmp_path / "assets")
+    monkeypatch.setattr("hrc_env.worker.body.assets_dir", lambda: tmp_path / "assets")
     yield tmp_path
     shutil.rmtree(tmp_path)
     fingerprint._imports.cache_clear()

@@ -42,12 +42,14 @@ def fingerprint_of(settings: Mapping[str, Any], *modules: str) -> str:
 def sources_of(*modules: str) -> set[Path]:
     """The files of modules and of everything of this repository that they import, in time."""
     found: set[Path] = set()
-    todo = list(modules)
+    todo, asked = list(modules), set[str]()
     for name in modules:
         if _file(name) is None:
             raise ModuleNotFoundError(f"{name} is no module of this repository.", name=name)
     while todo:
-        path = _file(todo.pop())
+        name = todo.pop()
+        path = None if name in asked else _file(name)
+        asked.add(name)
         if path is not None and path not in found:
             found.add(path)
             todo.extend(_imports(path))
