@@ -89,4 +89,5 @@ def _together(workers: list[WorkerMotion]) -> WorkerMotion:
     place, turn = "position_world", "quaternion_wxyz"
     held = Held(*joined([worker.held for worker in workers], "kind", place, turn))
     rates = ("velocity_world", "angular_velocity_world")
-    return WorkerMotion(*joined(workers, place, turn, *rates), held)
+    position, quaternion, velocity, turning = joined(workers, place, turn, *rates)
+    return WorkerMotion(position, quaternion, velocity, turning, held)

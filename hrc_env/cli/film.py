@@ -116,7 +116,7 @@ def _filmed(
             diary.note(info, float(believed.min(initial=np.inf)), env.simulation.task.counts(info))
             if step % STEPS_PER_FRAME == 0:
                 frame = compose(env, diary)
-                writer.append_data(frame)
+                writer.append_data(frame)  # type: ignore[attr-defined]
                 if step == 0 or CLOSE_M < diary.true_m[-1] < closest_m:
                     still = frame
                     closest_m = diary.true_m[-1] if diary.true_m[-1] > CLOSE_M else np.inf

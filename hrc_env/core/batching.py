@@ -12,12 +12,12 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from hrc_env.core.typing import Ints
+from hrc_env.core.typing import Bools, Ints
 
 RecordT = TypeVar("RecordT")
 
 
-def rows(record: RecordT, ids: Ints) -> RecordT:
+def rows(record: RecordT, ids: Ints | Bools) -> RecordT:
     """A copy of rows `ids` of every array of a (nested) record."""
     return mapped(record, lambda array: array[ids])
 
@@ -27,8 +27,8 @@ def one(record: RecordT, b: int) -> RecordT:
     return mapped(record, lambda array: array[b])
 
 
-def write_rows(record: object, ids: Ints, part: object) -> None:
-    """Write a record of rows back into rows `ids` of a record, in place."""
+def write_rows(record: object, ids: Any, part: object) -> None:
+    """Write a record of rows back into rows `ids` (integers, a mask, `...`) of a record."""
     for name in _names(type(record)):
         value, new = getattr(record, name), getattr(part, name)
         if isinstance(value, np.ndarray):

@@ -55,8 +55,8 @@ def triangulate(P: Floats, px: Points2, sigma_px: Floats, gate_sigma: float = 0.
     points = np.full((n_batch, n_workers, n_joints, 3), np.nan)
     cov = np.full((n_batch, n_workers, n_joints, 3, 3), np.nan)
     used = np.zeros(px.shape[:-1], bool)
-    arrays = map(np.ascontiguousarray, (np.asarray(P, float), px, sigma_px))
-    _triangulate_all(*arrays, gate_sigma, points, cov, used)
+    P, px, sigma_px = (np.ascontiguousarray(each, float) for each in (P, px, sigma_px))
+    _triangulate_all(P, px, sigma_px, gate_sigma, points, cov, used)
     return Triangulation(points, cov, used)
 
 

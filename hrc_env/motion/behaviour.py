@@ -73,7 +73,8 @@ def begin_episode(state: MotionState, b: int, n_present: int, bodies: Ints, draw
             take_first_place(who)
         else:
             me["spot"][:2] = PARKED_M + 3.0 * who.w, PARKED_M
-        settle(*me["spot"][:3].tolist(), me)
+        x, y, yaw = me["spot"][:3].tolist()
+        settle(x, y, yaw, me)
     for who in everyone[:n_present]:
         share = who.draws.item(dc.PLACES - 1)
         who.draws = draws[who.w, 1]

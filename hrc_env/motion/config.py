@@ -65,7 +65,7 @@ def _check_ranges(config: Any) -> None:
         value = getattr(config, item.name)
         if item.name.endswith(("_m", "_s")) and isinstance(value, tuple) and value[0] > value[1]:
             raise ConfigError(f"{item.name} must be (low, high), got {value}.")
-        if item.name.endswith("_probability") and not 0.0 <= value <= 1.0:
+        if item.name.endswith("_probability") and not 0 <= getattr(config, item.name) <= 1:
             raise ConfigError(f"{item.name} must lie in [0, 1], got {value}.")
 
 

@@ -124,7 +124,8 @@ def advance(
     batch, n_workers = workers.shape
     done, ticked = np.zeros(batch, np.int64), np.zeros(batch, np.bool_)
     path = _blank((batch, n_steps, n_workers), 3, 4)
-    now = (*_blank((batch, n_workers), 3, 3), np.empty((batch, n_workers, N_HELD)))
+    velocity, angular = _blank((batch, n_workers), 3, 3)
+    now = velocity, angular, np.empty((batch, n_workers, N_HELD))
     while _move_on(float(dt_s), n_steps, done, ticked, workers, frames, path, now):
         for b in np.flatnonzero(ticked).tolist():
             for w in np.flatnonzero(_over(workers[b])).tolist():

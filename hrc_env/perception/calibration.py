@@ -129,7 +129,7 @@ def _read(path: Path, changed: int) -> Calibration:
         )
     tables = content.get("tables")
     given = set(tables) if isinstance(tables, dict) else set()
-    if given != set(SHAPES):
+    if not isinstance(tables, dict) or given != set(SHAPES):
         raise ConfigError(
             f"{path} must have the tables {', '.join(SHAPES)}; missing: "
             f"{', '.join(sorted(set(SHAPES) - given)) or 'none'}; unknown: "

@@ -223,8 +223,8 @@ class Views:
 
     def _renderer(self, purpose: str, size: tuple[int, int], seen: Glance) -> Any:
         """What draws for a purpose, posed; made anew where pictures have another size."""
-        had, renderer = self._renderers.get(purpose, (None, None))
-        if had != size:
+        had, renderer = self._renderers.get(purpose, (size, None))
+        if renderer is None or had != size:
             if renderer is not None:
                 renderer.close()
             renderer = _MAKERS[purpose](self.simulation.scene, *size)
@@ -236,8 +236,8 @@ class Views:
 
 _MAKERS: dict[str, Callable[..., Canvas]] = {
     "stage": Stage,
-    "depth": lambda scene, *size: PictureRenderer(scene, *size, DEPTH_QUALITY),
-    "square": lambda scene, *size: CropRenderer(scene, size[0]),
+    "depth": lambda scene, width, height: PictureRenderer(scene, width, height, DEPTH_QUALITY),
+    "square": lambda scene, width, _: CropRenderer(scene, width),
 }
 
 

@@ -38,7 +38,7 @@ class ParticleEstimator:
     P: Floats
     ctrl_dt: float
     config: ParticleConfig
-    constants: tuple[tuple[Any, ...], ...] = field(init=False, repr=False)
+    constants: tuple[Any, Any, Any] = field(init=False, repr=False)
     """Settings of one hypothesis, of the mixture, and its model of noise, as kernels take them."""
 
     def __post_init__(self) -> None:

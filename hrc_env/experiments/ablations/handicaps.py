@@ -46,7 +46,7 @@ def handicap(state: Any, bones: str, motion: str, lengths: Floats) -> None:
     """
     if (bones, motion) == (BONES[0], MOTION[0]):
         return
-    trees = getattr(state, "trees", None)
+    trees: Any = getattr(state, "trees", None)
     if not hasattr(trees, "bone_variance"):
         raise ConfigError(f"Expected a state with a body on a tree, got {type(state).__name__}.")
     if bones == "none":

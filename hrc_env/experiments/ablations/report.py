@@ -48,7 +48,7 @@ def report(figures: Path, ablations: Sequence[Ablation], metrics: Metrics) -> Re
 
 def draw(path: Path, key: str, rows: Mapping[str, str], metrics: Metrics) -> None:
     """Errors of all rows with intervals, and coverage as numbers at the right."""
-    places = np.arange(len(rows))[::-1]
+    places = np.arange(len(rows), dtype=float)[::-1]
     figure = new_figure(9, 0.3 * len(rows) + 1.6)
     axis = figure.subplots()
     across = axis.get_yaxis_transform()

@@ -59,11 +59,10 @@ def maker(policy: Policy, checkpoint: Path) -> MakeAgent:
 def trained(cache: PartCache, n_steps: int, path: Path, key: str) -> str:
     """The digest of PPO's checkpoint: of the one that is there, or of a new one where it is not
     what the part says."""
-    for _ in range(2):
-        part = cache.part(PPO, lambda tick: _train(n_steps, path, tick), key)
-        if path.exists() and _digest(path) == part["sha256"]:
-            break
+    part = cache.part(PPO, lambda tick: _train(n_steps, path, tick), key)
+    if not path.exists() or _digest(path) != part["sha256"]:
         (cache.folder / f"{PPO}.json").unlink(missing_ok=True)
+        part = cache.part(PPO, lambda tick: _train(n_steps, path, tick), key)
     return part["sha256"]
 
 
