@@ -62,7 +62,11 @@ class Meter:
         """So much is done; `name` is what is being done now, `note` how it goes."""
         self.done, self.name, self.note = done, name or self.name, note
         if self._bar is not None:
-            said: dict[str, Any] = {"description": self.name, "counted": self._counted(), "note": note}
+            said: dict[str, Any] = {
+                "description": self.name,
+                "counted": self._counted(),
+                "note": note,
+            }
             self._bar.update(self._task, completed=done, **said)
         elif self._clock() - self._line_s >= EVERY_S:
             self._say()

@@ -96,7 +96,9 @@ def _of_row(row: Row) -> dict[str, Metric]:
     for what, name in A_MINUTE.items():
         found[what] = ratio_over(row[name], row["minutes"], "1/min")
     for what in PER_1000:
-        found[what] = ratio_over(1000 * np.array(row[what]), np.asarray(steps, float), "per 1000 steps")
+        found[what] = ratio_over(
+            1000 * np.array(row[what]), np.asarray(steps, float), "per 1000 steps"
+        )
     for what, (bins, name, q, unit) in QUANTILES.items():
         found[what] = counted_quantile_over(bins, row[f"{name}_counts"], q, unit)
     return found
