@@ -49,8 +49,10 @@ class PeopleConfig:
     def __post_init__(self) -> None:
         """Check ranges and probabilities."""
         _check_ranges(self)
-        if any(np.min(getattr(self, item.name)) < 0.0 for item in fields(self)):
-            raise ConfigError(f"Settings of people must be 0 or more, got {self}.")
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if np.min(value) < 0.0:
+                raise ConfigError(f"{item.name} must be 0 or more, got {value}.")
         if self.pause_probability + self.step_back_probability > 1.0:
             raise ConfigError("pause_probability + step_back_probability must be at most 1.")
         if not 0.3 <= self.speed_m_s[0] <= self.speed_m_s[1] <= 2.0:

@@ -38,7 +38,7 @@ def deviation(estimate):
 def test_a_horizon_that_is_none_is_refused_in_words(horizon_s):
     with pytest.raises(ConfigError, match=r"horizon must be in \(0, 1\] s, got"):
         check_horizon(horizon_s)
-    with pytest.raises(ConfigError, match="horizon"):
+    with pytest.raises(ConfigError, match="forecast_s must be"):
         HRCConfig(forecast_s=(0.2, horizon_s))
 
 
