@@ -1,8 +1,11 @@
 """Films of an agent: played, drawn and encoded; and which episode is worth one."""
 
+import copy
 import os
 import time
+from collections import deque
 from collections.abc import Callable, Iterable
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +19,7 @@ from hrc_env.cli.progress import compile_kernels, track
 from hrc_env.core.checkout import agents
 from hrc_env.core.typing import Image
 from hrc_env.env import HRCEnv
+from hrc_env.render.views import Glance
 
 STEPS_PER_FRAME = 2
 """A film shows every second step, in real time."""
@@ -23,6 +27,8 @@ CLOSE_M = 0.1
 """The still shows the closest moment that is not yet closer than this [m]."""
 H264 = ("-preset", "superfast", "-crf", "18")
 """A fifth of the usual preset's time; sharp."""
+FRAMES_BEHIND = 2
+"""So many frames may wait to be drawn."""
 
 Make = Callable[[Any], Any]
 """Builds the agent for an `EnvInfo`."""
@@ -101,28 +107,63 @@ def _closest_m(env: HRCEnv, make: Make, seed: int, n_steps: int) -> float:
 def _filmed(
     env: HRCEnv, make: Make, path: Path, seed: int, n_steps: int
 ) -> tuple[dict[str, float], Image]:
-    """Play, draw every second step; what came of it, and the still."""
+    """Play, have every second step drawn; what came of it, and the still."""
     agent = make(agents("env_info").env_info(env.simulation))
     observation, info = env.reset(seed=seed)
     diary, closest_m, started_s = Diary(), np.inf, time.monotonic()
-    still = np.zeros((1, 1, 3), np.uint8)
-    fps = 1 / env.config.ctrl_dt / STEPS_PER_FRAME
-    with imageio.get_writer(
-        path, fps=fps, quality=None, macro_block_size=4, output_params=list(H264)
-    ) as writer:
+    with _Studio(env, path) as studio:
         for step in track(range(n_steps), "filming"):
             observation, _, terminated, _, info = env.step(agent.act(observation))
             believed = env.simulation.belief.separation.distance_m
             diary.note(info, float(believed.min(initial=np.inf)), env.simulation.task.counts(info))
             if step % STEPS_PER_FRAME == 0:
-                frame = compose(env, diary)
-                writer.append_data(frame)  # type: ignore[attr-defined]
-                if step == 0 or CLOSE_M < diary.true_m[-1] < closest_m:
-                    still = frame
-                    closest_m = diary.true_m[-1] if diary.true_m[-1] > CLOSE_M else np.inf
+                closer = CLOSE_M < diary.true_m[-1] < closest_m
+                closest_m = diary.true_m[-1] if closer else closest_m
+                studio.add(diary, is_still=closer or step == 0)
             if terminated:
                 break
-    return _totals(env, diary, info, time.monotonic() - started_s), still
+        studio.finish()
+        seconds = time.monotonic() - started_s
+    return _totals(env, diary, info, seconds), studio.still
+
+
+class _Studio:
+    """Draws frames and hands them to ffmpeg in a thread, while the environment goes on."""
+
+    def __init__(self, env: HRCEnv, path: Path) -> None:
+        self.still: Image = np.zeros((1, 1, 3), np.uint8)
+        """The last frame that was asked to be one."""
+        self._env, fps = env, 1 / env.config.ctrl_dt / STEPS_PER_FRAME
+        self._writer: Any = imageio.get_writer(
+            path, fps=fps, quality=None, macro_block_size=4, output_params=list(H264)
+        )
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="hrc_env-film")
+        self._waiting: deque[Future[None]] = deque()
+
+    def add(self, diary: Diary, is_still: bool) -> None:
+        """Draw this moment some time."""
+        moment = copy.deepcopy(diary), self._env.views.glance(), is_still
+        self._waiting.append(self._thread.submit(self._draw, *moment))
+        self.finish(FRAMES_BEHIND)
+
+    def finish(self, n_behind: int = 0) -> None:
+        """Wait until no more than so many frames wait."""
+        while len(self._waiting) > n_behind:
+            self._waiting.popleft().result()
+
+    def _draw(self, diary: Diary, seen: Glance, is_still: bool) -> None:
+        frame = compose(self._env, diary, seen)
+        self.still = frame if is_still else self.still
+        self._writer.append_data(frame)
+
+    def __enter__(self) -> "_Studio":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Free what was made in the thread, there."""
+        self._thread.submit(self._env.views.close).result()
+        self._thread.shutdown()
+        self._writer.close()
 
 
 def _totals(env: HRCEnv, diary: Diary, info: dict[str, Any], seconds: float) -> dict[str, float]:
@@ -134,5 +175,5 @@ def _totals(env: HRCEnv, diary: Diary, info: dict[str, Any], seconds: float) -> 
         "minimum separation [m]": min(diary.true_m),
         **{f"{name} [count]": n for name, n in env.simulation.task.counts(info).items()},
         "cost [count]": info["episode_cost"],
-        "steps played and drawn [steps/s]": len(errors_m) / seconds,
+        "film drawn [frames/s]": len(errors_m) / STEPS_PER_FRAME / seconds,
     }

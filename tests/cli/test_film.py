@@ -25,7 +25,7 @@ def test_a_film_has_a_frame_for_every_second_step(tmp_path):
     assert imageio.imread(path.with_suffix(".png")).shape == (900, 1600, 3)
     assert sorted(each.name for each in tmp_path.iterdir()) == ["film.mp4", "film.png"]
     assert totals["lost steps [%]"] == 0.0
-    assert totals["steps played and drawn [steps/s]"] > 0
+    assert totals["film drawn [frames/s]"] > 0
 
 
 def test_a_film_that_cannot_be_drawn_leaves_nothing_behind(tmp_path, monkeypatch):
