@@ -4,7 +4,6 @@ The space, the environment's page, `split` and the tests all derive from `TERMS`
 they cannot drift apart. Terms read the *estimate* of the worker, never the truth.
 """
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -12,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.belief import Belief, standard_deviation_m
-from hrc_env.core.errors import check_shape
+from hrc_env.core.errors import Named, check_shape
 from hrc_env.core.kernels import kernel
-from hrc_env.core.old_names import Named
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats
 
@@ -52,20 +50,14 @@ class ObservationTerm:
 
 
 def _nearest_direction(now: Belief) -> Floats:
-    direction = (now.separation.point_b_world - now.separation.point_a_world).reshape(-1, 3)
-    shorten(direction, 1e-3)
+    to_worker = now.separation.point_b_world - now.separation.point_a_world
     near = now.separation.distance_m < FAR_SEPARATION_M
-    return np.where(near.reshape(-1, 1), direction, 0.0)
+    return np.where(near[..., None], directions(to_worker, 1e-3), 0.0)
 
 
-@kernel
-def shorten(vectors: Floats, softening: float) -> None:
-    """Divide vectors (n, 3) by their length plus a little: unit vectors, but 0 stays 0."""
-    for k in range(len(vectors)):
-        x, y, z = vectors[k]
-        divisor = math.sqrt(x * x + y * y + z * z) + softening
-        for i in range(3):
-            vectors[k, i] /= divisor
+def directions(vectors: Floats, softening: float) -> Floats:
+    """Vectors (..., 3) divided by their length plus a little: unit vectors, but 0 stays 0."""
+    return vectors / (np.linalg.norm(vectors, axis=-1, keepdims=True) + softening)
 
 
 def _joints_forecast(now: Belief) -> Floats:

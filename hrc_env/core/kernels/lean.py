@@ -1,9 +1,8 @@
 """A cheaper way through numba's compiler: callees are lowered, only the kernel itself is compiled.
 
-numba links the code of every callee into its caller, optimises all of it and emits machine code
-for all of it, and does so again at every level of calls. Here a callee is translated to LLVM's
-intermediate form and left as it is; the kernel that Python calls links each of them once, optimises
-once and emits once. That halves the time to compile and the memory that it takes.
+numba links, optimises and emits the code of every callee again at every level of calls. Here a
+callee is left in LLVM's intermediate form; the kernel that Python calls links each of them once,
+optimises once and emits once: half the time and memory to compile.
 
 Everything is done by subclasses, so that other people's numba functions are compiled as ever. What
 is subclassed is numba's inside: `pyproject.toml` admits the versions with which this is tested.
