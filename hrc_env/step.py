@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import compress
 from typing import Any
 
@@ -53,10 +54,9 @@ def joined(results: Sequence[StepResult]) -> StepResult:
     """Results of ranges of a batch, one after the other."""
     if len(results) == 1:
         return results[0]
+    names = "observation", "reward", "terminated"
     return StepResult(
-        np.concatenate([each.observation for each in results]),
-        np.concatenate([each.reward for each in results]),
-        np.concatenate([each.terminated for each in results]),
+        *[np.concatenate([getattr(each, name) for each in results]) for name in names],
         {name: np.concatenate([each.info[name] for each in results]) for name in results[0].info},
     )
 
@@ -98,6 +98,11 @@ def miscalibration_info(cameras: tuple[str, ...], suspected: Bools) -> Info:
     return {MISCALIBRATED: np.fromiter(named, object)}
 
 
-def _named(indices: Ints, names: Sequence[str]) -> NDArray[np.object_]:
+def _named(indices: Ints, names: tuple[str, ...]) -> NDArray[np.object_]:
     """(B,) tuples of the names of indices (B, W); `ABSENT` for `generator.ABSENT`, which is -1."""
-    return np.fromiter(map(tuple, np.array([*names, ABSENT], object)[indices].tolist()), object)
+    return np.fromiter(map(tuple, _table(names)[indices].tolist()), object)
+
+
+@cache
+def _table(names: tuple[str, ...]) -> NDArray[np.object_]:
+    return np.array([*names, ABSENT], object)

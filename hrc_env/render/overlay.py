@@ -19,7 +19,6 @@ from hrc_env.geometry.cameras import (
 )
 
 Colour = tuple[int, int, int]
-
 LEFT: Colour = (66, 165, 245)
 RIGHT: Colour = (255, 138, 60)
 MIDDLE: Colour = (235, 235, 235)
@@ -32,8 +31,6 @@ GRID: Colour = (46, 53, 61)
 ARM: Colour = (150, 158, 168)
 BELIEF: Colour = (90, 230, 160)
 COST: Colour = (255, 110, 120)
-
-
 SIDE_COLOURS = {("left", "left"): LEFT, ("right", "right"): RIGHT}
 """Of bones by the sides of their ends; those across are `MIDDLE`."""
 
@@ -50,10 +47,9 @@ def draw_estimate(
     scale = image.shape[1] / camera.width_px
     for worker in np.flatnonzero(estimate.tracked[row]):
         joints = estimate.mean_world[row, worker]
-        px, depth_m = project(camera.P[None], joints[None])
+        points, depth_m = _projected(image, camera, joints)
         if (depth_m < 0.1).any():
             continue
-        points = image_from_pinhole(camera, px[0, 0]) * scale
         _ellipses(image, camera, joints, estimate.cov_world[row, worker], scale)
         _draw_bones(image, points, thickness)
         _lines(image, np.stack([points[0], points[[1, 2]].mean(0)]), MIDDLE, thickness)
@@ -64,12 +60,10 @@ def draw_keypoints(
 ) -> None:
     """The joints that camera `index` detected, in place; faint where it was not sure."""
     scale = image.shape[1] / camera.width_px
-    for worker in range(keypoints.px.shape[2]):
-        px = image_from_pinhole(camera, keypoints.px[row, index, worker])
-        confidence = keypoints.confidence[row, index, worker]
-        known = np.isfinite(px).all(-1)
-        radius = max(2, round(image.shape[1] / 200))
-        _draw_joints(image, px[known] * scale, confidence[known], radius)
+    px = image_from_pinhole(camera, keypoints.px[row, index].reshape(-1, 2)) * scale
+    known = np.isfinite(px).all(-1)
+    confidence = keypoints.confidence[row, index].reshape(-1)
+    _draw_joints(image, px[known], confidence[known], max(2, round(image.shape[1] / 200)))
 
 
 def draw_window(image: Image, camera: PinholeCamera, window: Roi) -> None:
@@ -108,23 +102,20 @@ def draw_path(
     image: Image, camera: PinholeCamera, points: Floats, colour: Colour, thickness: int
 ) -> None:
     """Straight lines from point to point (N, 3) [m], in place; none where one is behind."""
-    px, depth_m = project(camera.P[None], points[None])
-    if (depth_m < 0.1).any():
-        return
-    _lines(image, px[0, 0] * (image.shape[1] / camera.width_px), colour, thickness)
+    px, depth_m = _projected(image, camera, points)
+    if (depth_m >= 0.1).all():
+        _lines(image, px, colour, thickness)
 
 
 def draw_markers(image: Image, camera: PinholeCamera, markers_world: Floats) -> None:
     """A ring round each point (M, 3), in place; drawn over whatever stands before it."""
-    px, depth_m = project(camera.P[None], markers_world[None])
-    scale = image.shape[1] / camera.width_px
-    for middle_px, away_m in zip(px[0, 0], depth_m[0, 0].tolist(), strict=True):
-        if away_m < 0.1:
-            continue
-        radius = max(4, round(0.05 * camera.K[0, 0] * scale / away_m))
-        (middle,) = _fixed(middle_px[None] * scale)
-        cv2.circle(image, middle, radius * 16, GOAL, 2, cv2.LINE_AA, 4)
-        cv2.circle(image, middle, 2 * 16, GOAL, -1, cv2.LINE_AA, 4)
+    px, depth_m = _projected(image, camera, markers_world)
+    focal_px = camera.K[0, 0] * image.shape[1] / camera.width_px
+    for middle, away_m in zip(_fixed(px), depth_m.tolist(), strict=True):
+        if away_m >= 0.1:
+            radius = max(4, round(0.05 * focal_px / away_m))
+            cv2.circle(image, middle, radius * 16, GOAL, 2, cv2.LINE_AA, 4)
+            cv2.circle(image, middle, 2 * 16, GOAL, -1, cv2.LINE_AA, 4)
 
 
 def label(
@@ -182,6 +173,13 @@ def middle_rows(image: Image, height: int) -> Image:
     """The middle `height` rows."""
     top = (image.shape[0] - height) // 2
     return image[top : top + height]
+
+
+def _projected(image: Image, camera: PinholeCamera, points: Floats) -> tuple[Points2, Floats]:
+    """(N, 2) where points (N, 3) are in a picture of the camera, and (N,) how far ahead [m]."""
+    px, depth_m = project(camera.P[None], points[None])
+    scale = image.shape[1] / camera.width_px
+    return image_from_pinhole(camera, px[0, 0]) * scale, depth_m[0, 0]
 
 
 def _ellipses(

@@ -90,16 +90,19 @@ def reset(state: Records, ids: Ints, rngs: Rngs, world: World, config: ReachConf
 def advance(state: Records, rngs: Rngs, world: World, dt_s: float, config: ReachConfig) -> Records:
     """Judge the tool's new place and replace goals that are done; (B,) of `REACH_STEP`."""
     tool_world, step = world.robot.tool_world, np.zeros(len(state), REACH_STEP)
-    distance_m = np.linalg.norm(state["goal_world"] - tool_world, axis=-1)
-    state["goal_age_s"] += dt_s
+    offset = state["goal_world"] - tool_world
+    distance_m = np.sqrt(np.add.reduce(offset * offset, axis=1))
+    age_s = state["goal_age_s"] + dt_s
+    reached = distance_m < config.radius_m
+    missed = ~reached & (age_s >= config.time_limit_s - 1e-9)
     step["progress_m"] = state["distance_m"] - distance_m
-    step["reached"] = distance_m < config.radius_m
-    step["missed"] = ~step["reached"] & (state["goal_age_s"] >= config.time_limit_s - 1e-9)
-    state["distance_m"] = distance_m
-    state["n_reached"] += step["reached"]
-    state["n_missed"] += step["missed"]
-    done = np.flatnonzero(step["reached"] | step["missed"])
-    _new_goals(state, done, rngs, tool_world[done], config)
+    step["reached"], step["missed"] = reached, missed
+    state["distance_m"], state["goal_age_s"] = distance_m, age_s
+    if (done := reached | missed).any():
+        state["n_reached"] += reached
+        state["n_missed"] += missed
+        ids = np.flatnonzero(done)
+        _new_goals(state, ids, rngs, tool_world[ids], config)
     return step
 
 

@@ -144,7 +144,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         """
         result = self.shards.step(self._checked(actions))
         observation = result.observation.copy()
-        info = table(result, np.arange(self.num_envs), self.num_envs)
+        info = table(result, slice(None), self.num_envs)
         reward, terminated, over = result.reward.copy(), result.terminated.copy(), self._ended
         self._steps += 1
         if over.any():  # only where the mode is NEXT_STEP

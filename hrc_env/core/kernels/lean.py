@@ -10,6 +10,7 @@ is subclassed is numba's inside: `pyproject.toml` admits the versions with which
 
 import copy
 from collections.abc import Callable, Iterator
+from functools import cache
 from typing import Any
 
 import llvmlite.binding as llvm
@@ -90,7 +91,9 @@ class LeanContext(cpu.CPUContext):
         )
 
 
+@cache
 def _lean_context() -> LeanContext:
+    """One for all kernels."""
     usual: Any = registry.cpu_target.target_context
     generator = copy.copy(usual.codegen())
     generator._library_class = LeanLibrary
@@ -104,19 +107,8 @@ def _lean_context() -> LeanContext:
 class LeanTarget(registry.CPUTarget):
     """numba's own target with the lean context."""
 
-    _context: LeanContext | None = None
-
-    @property
-    def target_context(self) -> Any:
-        """One for all kernels."""
-        if LeanTarget._context is None:
-            LeanTarget._context = _lean_context()
-        return LeanTarget._context
-
-    @property
-    def typing_context(self) -> Any:
-        """numba's own."""
-        return registry.cpu_target.typing_context
+    target_context = property(lambda self: _lean_context())
+    typing_context = property(lambda self: registry.cpu_target.typing_context)
 
 
 class CalleeDispatcher(registry.CPUDispatcher):
