@@ -52,7 +52,7 @@ def select(
 
 def _index(choice: int | str, names: list[str]) -> int:
     if not isinstance(choice, str):
-        return whole("Camera index", choice, 0, len(names) - 1)
+        return whole(f"Camera index (of {', '.join(names)})", choice, 0, len(names) - 1)
     if choice not in names:
         raise unknown("camera", choice, names)
     return names.index(choice)

@@ -58,7 +58,7 @@ def test_looks_stay_between_what_was_asked_for(name):
     ("field", "value", "words"),
     [
         ("light", (1.2, 0.4), "two factors"),
-        ("hat", 1.5, "share"),
+        ("hat", 1.5, "from 0 to 1"),
         ("litter", 1000, "litter must be"),
         ("light_tilt_deg", 80.0, "from 0 to 60"),
     ],

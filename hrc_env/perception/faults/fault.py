@@ -105,7 +105,8 @@ def check_cameras(faults: Sequence[FaultConfig], names: Sequence[str]) -> None:
     for fault in faults:
         for camera in fault.cameras:
             if not isinstance(camera, str):
-                whole(f"A camera's index of fault {fault.kind!r}", camera, 0, len(names) - 1)
+                what = f"Camera index of fault {fault.kind!r} (of {', '.join(names)})"
+                whole(what, camera, 0, len(names) - 1)
             elif camera not in (*names, ALL):
                 raise unknown(f"camera of fault {fault.kind!r}:", camera, (*names, ALL))
 
