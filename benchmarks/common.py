@@ -12,7 +12,7 @@ from rich.markdown import Markdown
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Covariances3, Floats, Points3
 from hrc_env.experiments.study.plots import label, new_figure, points, save
-from hrc_env.experiments.study.report import Column, Metrics, Report, Table
+from hrc_env.experiments.study.report import Column, Metrics, Report
 
 CHI2_95_3D = 7.815
 """95 % of a three-dimensional normal variable lies within this squared distance."""
@@ -52,11 +52,6 @@ def cell(metric: Metric | None, scale: float = 1.0, digits: int = 1, interval: b
         f"{scale * each:,.{digits}f}" for each in (metric.value, metric.low, metric.high)
     )
     return f"{value} ({low}-{high})" if interval else value
-
-
-def table(header: Iterable[str], rows: Iterable[Iterable[str]]) -> Table:
-    """A table from whatever holds its words."""
-    return Table(tuple(header), tuple(tuple(row) for row in rows))
 
 
 def plot_rows(

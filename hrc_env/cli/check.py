@@ -1,7 +1,7 @@
 """python -m hrc_env check: is this machine ready? Each line is ok or says what to do.
 
-Whatever is wrong must end up in its line. So what it asks about is imported inside the check,
-and what may take a process with it (drivers, libraries that clash) is tried in one of its own.
+Whatever is wrong must end up in its line: imports are inside the checks, and what may take a
+process with it (drivers, libraries that clash) is tried in one of its own.
 """
 
 import importlib.util

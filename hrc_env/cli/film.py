@@ -4,8 +4,9 @@ import copy
 import os
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -37,15 +38,11 @@ Make = Callable[[Any], Any]
 def film_episode(
     make: Make, path: Path, seed: int = 0, n_steps: int = 250, **kwargs: Any
 ) -> dict[str, float]:
-    """Film `n_steps` of an agent; returns what came of them, by name and [unit].
+    """Film `n_steps` of an agent, every second one, into an .mp4 file; returns what came of them,
+    by name and [unit].
 
-    Args:
-        make: builds the agent for an `EnvInfo`.
-        path: an .mp4 file; a still of the closest moment that is no near miss yet (or of the
-            first step) is written beside it as .png.
-        seed: of the episode.
-        n_steps: how many steps; every second one is a frame.
-        kwargs: as of `HRCEnv`.
+    A still of the closest moment that is no near miss yet (or of the first step) is written beside
+    it as .png. `kwargs` are those of `HRCEnv`.
     """
     level = kwargs.get("perception", "pixels")
     compile_kernels(Console(), level)
@@ -70,16 +67,29 @@ def nearest_seed(make: Make, seeds: Iterable[int], n_steps: int = 250, **kwargs:
     """
     if kwargs.get("perception", "pixels") == "pixels":
         kwargs = {**kwargs, "perception": "keypoints", "appearance": None}
-    env = HRCEnv(**kwargs)
-    try:
+    with closing(HRCEnv(**kwargs)) as env:
         tried = track(list(seeds), "looking for an encounter")
         closest_m = {seed: _closest_m(env, make, seed, n_steps) for seed in tried}
-    finally:
-        env.close()
-    free = {seed: metres for seed, metres in closest_m.items() if metres > CLOSE_M}
+    free = [seed for seed, metres in closest_m.items() if metres > CLOSE_M]
     if free:
-        return min(free, key=lambda seed: free[seed])
-    return max(closest_m, key=lambda seed: closest_m[seed])  # all are near misses: the least one
+        return min(free, key=closest_m.__getitem__)
+    return max(closest_m, key=closest_m.__getitem__)  # all are near misses: the least one
+
+
+def begun(env: Any, make: Make, seed: int, n_steps: int) -> Iterator[tuple[float, dict[str, Any]]]:
+    """An agent's episode, which has begun: reward and info of each step up to its end."""
+    agent = make(agents("env_info").env_info(env.unwrapped.simulation))
+    return _steps(env, agent, env.reset(seed=seed)[0], n_steps)
+
+
+def _steps(
+    env: Any, agent: Any, observation: Any, n_steps: int
+) -> Iterator[tuple[float, dict[str, Any]]]:
+    for _ in range(n_steps):
+        observation, reward, terminated, truncated, info = env.step(agent.act(observation))
+        yield float(reward), info
+        if terminated or truncated:
+            break
 
 
 def table(totals: dict[str, float], title: str = "") -> Table:
@@ -93,38 +103,27 @@ def table(totals: dict[str, float], title: str = "") -> Table:
 
 
 def _closest_m(env: HRCEnv, make: Make, seed: int, n_steps: int) -> float:
-    agent = make(agents("env_info").env_info(env.simulation))
-    observation, _ = env.reset(seed=seed)
-    closest_m = np.inf
-    for _ in range(n_steps):
-        observation, _, terminated, _, info = env.step(agent.act(observation))
-        closest_m = min(closest_m, float(info.get("safety/min_separation_m", np.inf)))
-        if terminated:
-            break
-    return closest_m
+    played = begun(env, make, seed, n_steps)
+    return min(float(info.get("safety/min_separation_m", np.inf)) for _, info in played)
 
 
 def _filmed(
     env: HRCEnv, make: Make, path: Path, seed: int, n_steps: int
 ) -> tuple[dict[str, float], Image]:
     """Play, have every second step drawn; what came of it, and the still."""
-    agent = make(agents("env_info").env_info(env.simulation))
-    observation, info = env.reset(seed=seed)
+    played = begun(env, make, seed, n_steps)
     diary, closest_m, started_s = Diary(), np.inf, time.monotonic()
     with _Studio(env, path) as studio:
-        for step in track(range(n_steps), "filming"):
-            observation, _, terminated, _, info = env.step(agent.act(observation))
+        for step, (_, info) in enumerate(track(played, "filming", n_steps)):
             believed = env.simulation.belief.separation.distance_m
             diary.note(info, float(believed.min(initial=np.inf)), env.simulation.task.counts(info))
             if step % STEPS_PER_FRAME == 0:
                 closer = CLOSE_M < diary.true_m[-1] < closest_m
                 closest_m = diary.true_m[-1] if closer else closest_m
                 studio.add(diary, is_still=closer or step == 0)
-            if terminated:
-                break
         studio.finish()
         seconds = time.monotonic() - started_s
-    return _totals(env, diary, info, seconds), studio.still
+    return _totals(diary, seconds), studio.still
 
 
 class _Studio:
@@ -166,14 +165,14 @@ class _Studio:
         self._writer.close()
 
 
-def _totals(env: HRCEnv, diary: Diary, info: dict[str, Any], seconds: float) -> dict[str, float]:
+def _totals(diary: Diary, seconds: float) -> dict[str, float]:
     errors_m = np.array(diary.error_m)
     known = errors_m[np.isfinite(errors_m)]
     return {
         "median tracking error [mm]": 1e3 * float(np.median(known)) if len(known) else np.nan,
         "lost steps [%]": 100 * (1 - len(known) / len(errors_m)),
         "minimum separation [m]": min(diary.true_m),
-        **{f"{name} [count]": n for name, n in env.simulation.task.counts(info).items()},
-        "cost [count]": info["episode_cost"],
+        **{f"{name} [count]": n for name, n in diary.counts.items()},
+        "cost [count]": sum(diary.cost),
         "film drawn [frames/s]": len(errors_m) / STEPS_PER_FRAME / seconds,
     }

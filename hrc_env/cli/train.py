@@ -52,16 +52,10 @@ class Train(EnvironmentArguments):
 
     def check(self) -> None:
         """Raise `ConfigError` for a number or a name that cannot be learnt with."""
-        for option, value, low in (
-            ("--timesteps", self.timesteps, 1),
-            ("--num-envs", self.num_envs, 1),
-            ("--seed", self.seed, 0),
-            ("--proximity", self.proximity, 0),
-            ("--ramp", self.ramp, 0),
-            ("--threads", self.threads, 1),
-            ("--episodes", self.episodes, 1),
-        ):
-            at_least(option, value, low)
+        for name in ("timesteps", "num_envs", "threads", "episodes"):
+            at_least(f"--{name.replace('_', '-')}", getattr(self, name), 1)
+        for name in ("seed", "proximity", "ramp"):
+            at_least(f"--{name}", getattr(self, name), 0)
         if self.perception == "pixels":
             raise ConfigError(
                 "--perception pixels is too slow to learn on: learn on keypoints, which emulates "

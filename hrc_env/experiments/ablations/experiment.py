@@ -99,9 +99,8 @@ def play_all(config: AblationsConfig, cache: PartCache) -> Played:
     played: dict[str, dict[str, Sums]] = {ablation.name: {} for ablation in config.asked}
     for name, setting in order:
         depends = settings_of(config) | {"setting": asdict(setting) | {"words": ""}}
-        key = fingerprint_of(depends, *PARTS_FROM)
-        label = f"{name}.{setting.name}"
-        played[name][setting.name] = cache.part(label, partial(part, config, setting), key)
+        key, make = fingerprint_of(depends, *PARTS_FROM), partial(part, config, setting)
+        played[name][setting.name] = cache.part(f"{name}.{setting.name}", make, key)
     return played
 
 
@@ -153,11 +152,10 @@ def _by_sight(of_settings: Mapping[str, Sums]) -> dict[str, dict[str, Any]]:
                 _, k, name = what.split("_")
                 together = found.setdefault(f"{setting.split('_')[0]}_seen_{k}", {})
                 together[name] = np.array(values) + together.get(name, 0)
-    kept = {name: sums["joints"] > 0 for name, sums in found.items()}
     return {
-        name: {what: values[kept[name]] for what, values in sums.items()}
+        name: {what: values[sums["joints"] > 0] for what, values in sums.items()}
         for name, sums in sorted(found.items())
-        if kept[name].any()
+        if sums["joints"].any()
     }
 
 

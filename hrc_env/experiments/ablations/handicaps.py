@@ -11,8 +11,8 @@ from hrc_env.tracking.tree.gaussian import PARENT, ROOT
 BONES = ("learnt", "known", "none")
 """Lengths as the filter learns them; the true ones, given; nothing is expected of any."""
 MOTION = ("model", "forgotten")
-"""As the filter has it; every velocity is forgotten after every image, so that a joint may set
-off at any speed that joints have, as in line 7 of the paper's Algorithm 1."""
+"""As the filter has it; velocities are forgotten after every image, so that a joint may set off at
+any speed that joints have, as in line 7 of the paper's Algorithm 1."""
 TREES = ("particle", "kalman")
 """Estimators that can be handicapped so."""
 KNOWN_M2 = 1e-5
@@ -33,13 +33,9 @@ def lengths_m(joints_world: Points3) -> Floats:
 
 
 def handicap(state: Any, bones: str, motion: str, lengths: Floats) -> None:
-    """Change what a tracker knows, in place, before its next prediction.
+    """Change what a tracker of one of `TREES` knows, in place, before its next prediction.
 
-    Args:
-        state: of one of `TREES`.
-        bones: one of `BONES`.
-        motion: one of `MOTION`.
-        lengths: (B, W, J) the true ones [m].
+    `bones` is one of `BONES`, `motion` of `MOTION`, `lengths` (B, W, J) are the true ones [m].
 
     Raises:
         ConfigError: a state of something else.

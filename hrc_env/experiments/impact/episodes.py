@@ -1,8 +1,8 @@
 """Episodes of one policy with one perception setup: always the same seeds and the same workers.
 
-What is counted is the truth. Distances are between the robot's capsules and the worker's true
-capsules, as in the cost. A directed speed is by how much one body's motion of a step narrowed the
-separation while the other is held where it is at its end: positive is towards the other.
+What is counted is the truth: distances are between the robot's and the worker's true capsules, as
+in the cost. A directed speed is by how much one body's motion of a step narrowed the separation
+while the other is held where it is at its end: positive is towards the other.
 """
 
 import hashlib
@@ -18,7 +18,7 @@ from gymnasium.utils import seeding
 from hrc_env.config import settle
 from hrc_env.core.machine import n_cores
 from hrc_env.core.records import WorkerTruth
-from hrc_env.core.typing import Bools, Capsules, Floats, Points3
+from hrc_env.core.typing import Bools, Capsules, Floats, Ints, Points3
 from hrc_env.experiments.impact.setups import PerceptionSetup
 from hrc_env.experiments.study.cache import PartProgress
 from hrc_env.experiments.study.counts import ERRORS_M, GAPS_M, SPEEDS_MPS
@@ -57,9 +57,8 @@ class Step:
     believed_separation_m: Floats
     """The same as the robot believes it; infinite where it knows of nobody."""
     robot_mps: Floats
-    """The robot's speed towards the worker."""
     worker_mps: Floats
-    """The worker's speed towards the robot."""
+    """Speeds towards the other."""
     error_m: Floats
     """(..., J) between the estimated and the true joints."""
     joints_world: Points3
@@ -69,10 +68,7 @@ class Step:
 class Stage:
     """The environments of one setup, built when they are needed, used by every policy.
 
-    Args:
-        setup: how the robots perceive.
-        seeds: one an episode; the k-th episode has turn k modulo the number of turns.
-        n_steps: control steps of an episode.
+    An episode a seed, of `n_steps` control steps; the k-th has turn k modulo the number of turns.
     """
 
     def __init__(self, setup: PerceptionSetup, seeds: Sequence[int], n_steps: int) -> None:
@@ -82,24 +78,18 @@ class Stage:
     def play(self, make_agent: MakeAgent, margin_m: float, tick: PartProgress) -> Rows:
         """Sums of every episode, in the order of the seeds.
 
-        Args:
-            make_agent: the policy; it gets observations only.
-            margin_m: what it adds to the distances that it keeps [m].
-            tick: told the share that is done.
+        Of a policy, which gets observations only and adds `margin_m` to the distances that it
+        keeps; `tick` is told the share that is done.
         """
         rows: Rows = {}
         n, n_turns = len(self.seeds), len(self.setup.turns)
         for k, turn in enumerate(self.setup.turns[:n]):
-            mine = range(k, n, n_turns)
+            mine = self.seeds[k::n_turns]
             if k not in self._built:
                 self._built[k] = _build(self.setup, turn, len(mine))
-            share = len(mine) / n / self.n_steps
-            steps, infos = run(
-                self._built[k], make_agent, [self.seeds[b] for b in mine], self.n_steps,
-                partial(tick, share),
-            )  # fmt: skip
-            dt_s = self._built[k].first.config.ctrl_dt
-            for name, values in sums_of(steps, infos, margin_m, dt_s).items():
+            env, stepped = self._built[k], partial(tick, len(mine) / n / self.n_steps)
+            steps, infos = run(env, make_agent, mine, self.n_steps, stepped)
+            for name, values in sums_of(steps, infos, margin_m, env.first.config.ctrl_dt).items():
                 rows.setdefault(name, [None] * n)[k::n_turns] = values
         return rows
 
@@ -132,11 +122,10 @@ def run(
     """One episode of every seed, side by side: what happened (T, B, ...), the infos of T steps."""
     agent, shape = make_agent(env.first), (len(seeds), env.first.n_actions)
     result = env.reset(np.arange(len(seeds)), [seeding.np_random(seed)[0] for seed in seeds])
-    steps, infos = [], []
-    before = [bodies_of(part) for part in env.parts]
+    steps, infos, before = [], [], list(map(bodies_of, env.parts))
     for _ in range(n_steps):
         result = env.step(checked_action(agent.act(result.observation), shape))
-        now = [bodies_of(part) for part in env.parts]
+        now = list(map(bodies_of, env.parts))
         steps.append(concatenated(list(map(judge, env.parts, before, now))))
         infos.append(result.info)
         before = now
@@ -174,11 +163,7 @@ def judge(part: Simulation, before: Bodies, now: Bodies) -> Step:
 def sums_of(steps: Step, infos: Sequence[Info], margin_m: float, dt_s: float) -> Rows:
     """Everything that numbers are made of, a list over episodes each.
 
-    Args:
-        steps: (T, B, ...).
-        infos: of the same T steps, values (B,).
-        margin_m: by how much the robot adds to every distance that it keeps.
-        dt_s: of a step.
+    Steps are (T, B, ...), infos of the same T steps have values (B,).
     """
     touching = np.stack([info["cost_contact"] for info in infos]) > 0
     nearest_m = np.stack([info["safety/min_separation_m"] for info in infos])
@@ -188,8 +173,8 @@ def sums_of(steps: Step, infos: Sequence[Info], margin_m: float, dt_s: float) ->
         "goals": infos[-1]["task/goals_reached"],
         "goals_missed": infos[-1]["task/goals_missed"],
         "minutes": np.full(touching.shape[1], len(infos) * dt_s / 60),
-        **{name: marked.sum(0) for name, marked in _decisions(steps, margin_m).items()},
-        **{name: marked.sum(0) for name, marked in _contacts(steps, touching).items()},
+        **_decisions(steps, margin_m),
+        **_contacts(steps, touching),
         **_counts(steps),
     }
     rows = {name: value.tolist() for name, value in sums.items()}
@@ -198,30 +183,28 @@ def sums_of(steps: Step, infos: Sequence[Info], margin_m: float, dt_s: float) ->
     return rows
 
 
-def _decisions(steps: Step, margin_m: float) -> dict[str, Bools]:
-    """(T, B) where the belief decides otherwise than the truth, and what came of it."""
+def _decisions(steps: Step, margin_m: float) -> dict[str, Ints]:
+    """(B,) how often the belief decides otherwise than the truth, and what came of it."""
     found = {}
     for name, limit_m in (("stops", STOP_M), ("slowings", SLOW_M)):
-        called, given = (
-            steps.true_separation_m < limit_m,
-            steps.believed_separation_m - margin_m < limit_m,
-        )
-        found[f"called_{name}"] = called
-        found[f"missed_{name}"] = called & ~given
-        found[f"false_{name}"] = given & ~called
-    found["approaches"] = (steps.robot_mps > MOVING_MPS) & (steps.true_separation_m < STOP_M)
-    return found
+        called = steps.true_separation_m < limit_m
+        given = steps.believed_separation_m - margin_m < limit_m
+        found[f"called_{name}"] = called.sum(0)
+        found[f"missed_{name}"] = (called & ~given).sum(0)
+        found[f"false_{name}"] = (given & ~called).sum(0)
+    approaches = (steps.robot_mps > MOVING_MPS) & (steps.true_separation_m < STOP_M)
+    return found | {"approaches": approaches.sum(0)}
 
 
-def _contacts(steps: Step, touching: Bools) -> dict[str, Bools]:
-    """(T, B) where touches begin; one that lasts counts once."""
+def _contacts(steps: Step, touching: Bools) -> dict[str, Ints]:
+    """(B,) how many touches begin; one that lasts counts once."""
     begins = touching.copy()
     begins[1:] &= ~touching[:-1]
     towards, flees = steps.robot_mps > MOVING_MPS, steps.robot_mps < -MOVING_MPS
     return {
-        "contacts_towards": begins & towards,
-        "contacts_fleeing": begins & flees,
-        "contacts_standing": begins & ~towards & ~flees,
+        "contacts_towards": (begins & towards).sum(0),
+        "contacts_fleeing": (begins & flees).sum(0),
+        "contacts_standing": (begins & ~towards & ~flees).sum(0),
     }
 
 

@@ -24,13 +24,10 @@ from hrc_env.experiments.study.runner import Study, at_least_one, changed
 from hrc_env.tracking.estimators import estimator_called
 
 PARTS_FROM = (
-    "hrc_env.experiments.impact.episodes",
-    "hrc_env.experiments.impact.policies",
-    "agents.registry",
-    "agents.ppo",
-    "agents.callbacks",
-)
-"""The modules that finished parts are made by."""
+    "hrc_env.experiments.impact.episodes", "hrc_env.experiments.impact.policies",
+    "agents.registry", "agents.ppo", "agents.callbacks",
+)  # fmt: skip
+"""Those that make finished parts."""
 FIRST_SEED = 1_000_000
 """Of the episodes, far from those that the policy learns in."""
 SWEPT = (REFERENCE, *(setup.name for setup in LATE))

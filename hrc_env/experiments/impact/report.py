@@ -6,7 +6,7 @@ from pathlib import Path
 from matplotlib.axes import Axes
 
 from hrc_env.experiments.impact.episodes import MOVING_MPS, SLOW_M, STOP_M
-from hrc_env.experiments.impact.metrics import NOMINAL_MPS, Table
+from hrc_env.experiments.impact.metrics import COMPARED, NOMINAL_MPS, Table
 from hrc_env.experiments.impact.policies import POLICIES, SCRIPTED, SLOWED
 from hrc_env.experiments.impact.setups import (
     LATE,
@@ -16,7 +16,7 @@ from hrc_env.experiments.impact.setups import (
     setup_called,
 )
 from hrc_env.experiments.study.plots import ends, label, new_figure, save
-from hrc_env.experiments.study.report import Column, Metrics, Picture, Report, table_of
+from hrc_env.experiments.study.report import Column, Metrics, Report, picture, table_of
 from hrc_env.tracking.estimators import ESTIMATORS
 
 WORDS = {
@@ -26,10 +26,6 @@ WORDS = {
     "approaches": ("approaches", 1), "missed_stops": ("missed stops", 1),
     "false_stops": ("false stops", 1), "z_d_m": ("Z_d [m]", 3), "tax_m": ("tax [m]", 2),
 }  # fmt: skip
-COMPARED = (
-    "goals_per_min", "cost", "separation_min_m", "contacts_towards", "approaches", "missed_stops",
-    "false_stops",
-)  # fmt: skip
 ASKED = f"""\
 A robot keeps away from a worker whom it knows through cameras only. What is a better estimator, one
 more camera or a shorter delay worth, in goals reached and in safety? Only perception is exchanged;
@@ -76,7 +72,7 @@ def report(figures: Path, table: Table, metrics: Metrics) -> Report:
         "interval are the bars: up is more goals, left is safer. Below: approaches instead of "
         "cost, without setups that track nobody."
     )
-    parts: list = [Picture(figures / "tradeoff.png", caption)]
+    parts = [picture(figures / "tradeoff.png", caption)]
     for policy in policies:
         columns = [Column(f"{policy}.{{}}.{what}", *words) for what, words in WORDS.items()]
         parts.append(table_of(policy, setups, columns, metrics))

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
-from itertools import combinations
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
@@ -95,8 +95,8 @@ CHOICES: dict[str, tuple[int, ...]] = {
 """Cameras by name: `camera_1`, `camera_1+camera_3`, `multi`."""
 ROWS = tuple(SPOKEN)
 """Each camera alone, and all four."""
-Said = Mapping[str, Any]
-Played = tuple[Mapping[int, Said], Mapping[tuple[str, int], Said]]
+Part = Mapping[str, Any]
+Played = tuple[Mapping[int, Part], Mapping[str, Mapping[int, Part]]]
 """What everybody made of the shared film, and the truth, by seed; what came of crops of one's own
 in some walks, by row and seed."""
 
@@ -104,14 +104,12 @@ in some walks, by row and seed."""
 def play(config: SiteConfig, cache: PartCache) -> Played:
     """All walks, filmed once for everybody; some again with everybody's own crops."""
     films = {seed: cache.part(f"film.{seed}", partial(film, config, seed)) for seed in config.seeds}
-    closed = {
-        (f"{name}.{row}", seed): cache.part(
-            f"closed.{name}.{row}.{seed}", partial(closed_loop, config, name, row, seed)
-        )
-        for name in config.estimators
-        for row in ROWS
-        for seed in config.seeds[: config.n_closed]
-    }
+    closed: dict[str, dict[int, Part]] = {}
+    for name, row in product(config.estimators, ROWS):
+        for seed in config.seeds[: config.n_closed]:
+            make = partial(closed_loop, config, name, row, seed)
+            part = cache.part(f"closed.{name}.{row}.{seed}", make)
+            closed.setdefault(f"{name}.{row}", {})[seed] = part
     return films, closed
 
 
@@ -127,10 +125,10 @@ def film(config: SiteConfig, seed: int, tick: PartProgress) -> dict[str, Any]:
         beliefs = replay(taken, name, CHOICES[row], N_WARM_UP, settings, seed)
         said[f"{name}.{row}"] = _head_path(beliefs)
         tick(0.3 / len(asked))
-    confidence = np.stack([each.confidence[0, :, 0, HEAD] for each in taken.keypoints])
+    found = taken.keypoints.confidence[:, :, 0, HEAD] > 0
     return {
         "truth": np.round(taken.joints_world[:, HEAD], 4).tolist(),
-        "found": np.round((confidence > 0).mean(0), 4).tolist(),
+        "found": np.round(found.mean(0), 4).tolist(),
         "rows": said,
     }
 
@@ -159,49 +157,48 @@ def _head_path(beliefs: PoseEstimate) -> dict[str, Any]:
 
 def metrics_of(config: SiteConfig, played: Played) -> dict[str, Metric]:
     """Every number of results.json."""
-    films = played[0].values()
+    films, closed = played
 
-    def squared(name: str, *rows: str) -> list[Floats]:
-        """Of all frames of some rows together, walk by walk [m^2]."""
-        return [
-            np.concatenate([_squared_m2(each, each["rows"][f"{name}.{row}"]) for row in rows])
-            for each in films
-        ]
+    def squared(name: str, *rows: str) -> Floats:
+        """(walks, T) of all frames of some rows together [m^2]."""
+        keys = [f"{name}.{row}" for row in rows]
+        return np.array(
+            [_squared_m2(each, *map(each["rows"].get, keys)) for each in films.values()]
+        )
 
     metrics = {}
-    for name in config.everybody:
-        multi = [each.sum() for each in squared(name, MULTI)]
-        for row in ROWS:
-            metrics[f"rmse_m.{name}.{row}"] = _rmse(squared(name, row))
-            tracked = [float(np.mean(each["rows"][f"{name}.{row}"]["tracked"])) for each in films]
-            metrics[f"tracked.{name}.{row}"] = mean_over(tracked, "share")
-            if row != MULTI:
-                alone = [each.sum() for each in squared(name, row)]
-                metrics[f"over_multi.{name}.{row}"] = rmse_over(alone, multi, "ratio")
+    for name, row in product(config.everybody, ROWS):
+        key, squares = f"{name}.{row}", squared(name, row)
+        metrics[f"rmse_m.{key}"] = _rmse(squares)
+        tracked = [float(np.mean(each["rows"][key]["tracked"])) for each in films.values()]
+        metrics[f"tracked.{key}"] = mean_over(tracked, "share")
+        if row != MULTI:
+            multi = squared(name, MULTI).sum(1)
+            metrics[f"over_multi.{key}"] = rmse_over(squares.sum(1), multi, "ratio")
     for name in config.estimators:
         for size, word in ((2, "two"), (3, "three")):
             rows = [row for row, cameras in CHOICES.items() if len(cameras) == size]
             metrics[f"rmse_m.{name}.{word}"] = _rmse(squared(name, *rows))
-        for row in ROWS:
-            own = [(k, said) for (key, k), said in played[1].items() if key == f"{name}.{row}"]
-            squares = [_squared_m2(played[0][seed], said) for seed, said in own]
-            metrics[f"closed_rmse_m.{name}.{row}"] = _rmse(squares)
+    for key, own in closed.items():
+        squares = np.array([_squared_m2(films[seed], said) for seed, said in own.items()])
+        metrics[f"closed_rmse_m.{key}"] = _rmse(squares)
     for k in range(4):
-        metrics[f"found.camera_{k + 1}"] = mean_over([each["found"][k] for each in films], "share")
+        found = [each["found"][k] for each in films.values()]
+        metrics[f"found.camera_{k + 1}"] = mean_over(found, "share")
     return metrics
 
 
-def _squared_m2(part: Said, row: Said) -> Floats:
-    """(T,) squared distance of the head from the truth, after the warm-up [m^2].
+def _squared_m2(film: Part, *rows: Part) -> Floats:
+    """(T,) squared distances of the head from the truth, after the warm-up, row after row [m^2].
 
     Frames without a track count: the estimator's last word, or its prior, is its answer.
     """
-    off = np.asarray(row["head"], float) - np.asarray(part["truth"], float)
-    return (off**2).sum(-1)[N_WARM_UP:]
+    off = np.array([row["head"] for row in rows], float) - np.array(film["truth"], float)
+    return (off**2).sum(-1)[:, N_WARM_UP:].ravel()
 
 
-def _rmse(squares: Sequence[Floats]) -> Metric:
-    return rmse_over([each.sum() for each in squares], [each.size for each in squares], "m")
+def _rmse(squares: Floats) -> Metric:
+    return rmse_over(squares.sum(1), np.full(len(squares), squares.shape[1]), "m")
 
 
 STUDY = Study(

@@ -22,10 +22,8 @@ _CODE = {".py", ".pyc"}
 def fingerprint_of(settings: Mapping[str, Any], *modules: str) -> str:
     """What a part depends on, as a word: it is made anew when any of it changes.
 
-    Args:
-        settings: numbers and words.
-        modules: dotted names of those that make the part. What they import, directly or not, of
-            this repository counts too, and so do all data files and the libraries' versions.
+    That are numbers and words, the modules that make it (dotted names), what these import of this
+    repository, directly or not, all data files and the libraries' versions.
 
     Raises:
         ModuleNotFoundError: a module is not of this repository.
@@ -41,34 +39,24 @@ def fingerprint_of(settings: Mapping[str, Any], *modules: str) -> str:
 
 def sources_of(*modules: str) -> set[Path]:
     """The files of modules and of everything of this repository that they import, in time."""
-    found: set[Path] = set()
-    todo, asked = list(modules), set[str]()
-    for name in modules:
-        if _file(name) is None:
-            raise ModuleNotFoundError(f"{name} is no module of this repository.", name=name)
+    found, todo, asked = set[Path](), set(modules), set[str]()
     while todo:
-        name = todo.pop()
-        path = None if name in asked else _file(name)
-        asked.add(name)
-        if path is not None and path not in found:
+        asked.add(name := todo.pop())
+        if path := _file(name):
             found.add(path)
-            todo.extend(_imports(path))
+            todo |= _imports(path) - asked
+        elif name in modules:
+            raise ModuleNotFoundError(f"{name} is no module of this repository.", name=name)
     return found
 
 
 def _file(name: str) -> Path | None:
     """The source of a module, in a clone or an installed package; None if it is another's."""
-    top, *rest = name.split(".")
-    if top == "hrc_env":
-        path = _PACKAGE.joinpath(*rest)
-    elif top == "agents" and (_PACKAGE / "agents").is_dir():
-        path = _PACKAGE.joinpath(top, *rest)
-    else:
-        path = _PACKAGE.parent.joinpath(top, *rest)
-    for each in (path.with_suffix(".py"), path / "__init__.py"):
-        if each.is_file():
-            return each
-    return None
+    parts = name.split(".")
+    is_inside = parts[0] == "agents" and (_PACKAGE / "agents").is_dir()
+    path = (_PACKAGE if is_inside else _PACKAGE.parent).joinpath(*parts)
+    files = path.with_suffix(".py"), path / "__init__.py"
+    return next(filter(Path.is_file, files), None)
 
 
 @cache
@@ -87,8 +75,7 @@ def _imports(path: Path) -> frozenset[str]:
 
 
 def source_digest(made: Any) -> str:
-    """Of the file that defines a function or class, which somebody may have registered; "" where
-    nobody can tell."""
+    """Of the file that defines what somebody may have registered; "" where nobody can tell."""
     try:
         return hashlib.sha256(Path(inspect.getfile(made)).read_bytes()).hexdigest()
     except (OSError, TypeError):

@@ -1,7 +1,6 @@
-"""Numbers with 95 % intervals: one bootstrap over seeds.
+"""Numbers with 95 % intervals: one bootstrap over seeds, of which frames are no independent part.
 
-Frames of one episode depend on each other, episodes do not: what is drawn anew is the seed with
-all that belongs to it. Rows that share their seeds are compared seed by seed.
+Rows that share their seeds are compared seed by seed.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,6 +13,7 @@ from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.experiments.study.counts import Bins
 
+Numbers = Sequence[float] | Floats
 Statistic = Callable[[Ints], Floats]
 """From how often each seed is drawn (R, n) to a number for each draw (R,)."""
 
@@ -32,29 +32,25 @@ def bootstrap(statistic: Statistic, n: int, unit: str, n_draws: int = 4000) -> M
     return Metric(point, float(low), float(high), unit, n)
 
 
-def ratio_over(
-    above: Sequence[float] | Floats, below: Sequence[float] | Floats, unit: str
-) -> Metric:
+def ratio_over(above: Numbers, below: Numbers, unit: str) -> Metric:
     """Sum of one number a seed over the sum of another: rates, shares, ratios of paired rows."""
     x, y = _usable(above, below)
     return bootstrap(lambda w: (w @ x) / (w @ y), len(x), unit)
 
 
-def mean_over(values: Sequence[float] | Floats, unit: str) -> Metric:
+def mean_over(values: Numbers, unit: str) -> Metric:
     """The mean of one number a seed."""
     return ratio_over(values, np.ones(len(values)), unit)
 
 
-def rmse_over(
-    squared: Sequence[float] | Floats, counts: Sequence[float] | Floats, unit: str
-) -> Metric:
+def rmse_over(squared: Numbers, counts: Numbers, unit: str) -> Metric:
     """Root of the mean square, from each seed's sum of squares and number of frames; of two sums
     of squares, the ratio of their roots."""
     x, y = _usable(squared, counts)
     return bootstrap(lambda w: np.sqrt((w @ x) / (w @ y)), len(x), unit)
 
 
-def iqm_over(values: Sequence[float] | Floats, unit: str) -> Metric:
+def iqm_over(values: Numbers, unit: str) -> Metric:
     """The interquartile mean: of the middle half of the seeds (Agarwal et al. 2021,
     arXiv:2108.13264)."""
     (x,) = _usable(values)
@@ -66,10 +62,9 @@ def iqm_over(values: Sequence[float] | Floats, unit: str) -> Metric:
     return bootstrap(iqm, len(x), unit)
 
 
-def quantile_over(values: Sequence[Sequence[float] | Floats], q: float, unit: str) -> Metric:
+def quantile_over(values: Sequence[Numbers], q: float, unit: str) -> Metric:
     """A quantile of all values of all seeds together; its n is their number."""
-    groups = [np.asarray(each, float) for each in values]
-    groups = [each[np.isfinite(each)] for each in groups]
+    groups = [_usable(each)[0] for each in values]
     sizes = [each.size for each in groups]
     together, owner = np.concatenate([*groups, []]), np.repeat(np.arange(len(groups)), sizes)
     if not together.size:
@@ -92,7 +87,7 @@ def counted_quantile_over(
     return bootstrap(lambda w: np.minimum(bins.quantile(w @ rows, q), most), len(rows), unit, 1000)
 
 
-def _usable(*samples: Sequence[float] | Floats) -> list[Floats]:
+def _usable(*samples: Numbers) -> list[Floats]:
     """(n,) each: the seeds of which every number is finite."""
     arrays = [np.asarray(each, float) for each in samples]
     finite = np.all(np.isfinite(arrays), axis=0)

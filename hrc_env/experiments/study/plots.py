@@ -37,12 +37,10 @@ def points(
     sideways: bool = False, **style: Any,
 ) -> None:  # fmt: skip
     """Values with intervals, above x or, sideways, beside it."""
-    values, bars = [scale * each.value for each in metrics], ends(metrics, scale)
-    style = {"fmt": "o", "capsize": 3} | style
-    if sideways:
-        axis.errorbar(values, x, xerr=bars, **style)
-    else:
-        axis.errorbar(x, values, yerr=bars, **style)
+    values = [scale * each.value for each in metrics]
+    place = (values, x) if sideways else (x, values)
+    bars = {"xerr" if sideways else "yerr": ends(metrics, scale)}
+    axis.errorbar(*place, **bars, **{"fmt": "o", "capsize": 3} | style)
 
 
 def label(axis: Axes, x: str = "", y: str = "", title: str = "", grid: str = "both") -> None:

@@ -1,7 +1,7 @@
 """Which cameras hang in episodes: settings take turns in rigs, so that no number hangs on a place.
 
-No estimator begins a track with one camera: where fewer than four are asked about, the others
-are there at first and are then lost.
+Where fewer than four are asked about, the others are lost only after a while: no estimator begins
+a track with one camera.
 """
 
 from collections.abc import Sequence

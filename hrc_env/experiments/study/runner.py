@@ -43,12 +43,8 @@ def run(
 ) -> dict[str, Metric]:
     """Play what is not there yet; results.json, figures/, report.html and report.md into `out`.
 
-    Args:
-        study: what is asked.
-        config: how much is played.
-        out: a folder; what an earlier run with the same settings and code finished is used.
-        progress: told of shares that sum to 1.
-        overwrite: delete what something else left there.
+    Of an earlier run there with the same settings and code, what is finished is used; what
+    something else left there is deleted if asked to `overwrite`.
 
     Raises:
         ConfigError: the folder holds other results.
