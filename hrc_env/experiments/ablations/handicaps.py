@@ -25,17 +25,15 @@ _PARENT = np.where(np.arange(len(PARENT)) == ROOT, ROOT, PARENT)
 
 
 def lengths_m(joints_world: Points3) -> Floats:
-    """(B, W, J) from each joint to its parent on the filter's tree [m]; 1 at the root, which has
-    none."""
+    """(B, W, J) from each joint to its parent on the filter's tree [m]; 1 at the root."""
     lengths = np.linalg.norm(joints_world - joints_world[:, :, _PARENT], axis=-1)
     lengths[..., ROOT] = 1.0
     return lengths
 
 
 def handicap(state: Any, bones: str, motion: str, lengths: Floats) -> None:
-    """Change what a tracker of one of `TREES` knows, in place, before its next prediction.
-
-    `bones` is one of `BONES`, `motion` of `MOTION`, `lengths` (B, W, J) are the true ones [m].
+    """Change what a tracker of one of `TREES` knows, in place, before its next prediction; the true
+    lengths are (B, W, J) [m].
 
     Raises:
         ConfigError: a state of something else.

@@ -1,7 +1,6 @@
 """A setting's detections and estimator on walks: what is believed beside what is true.
 
-Workers walk once: every setting is given the same walks of the same seeds, before an arm that
-rests, so that nobody has a reason to react to it.
+Workers walk once, for all settings, before an arm that rests: nobody reacts to it.
 """
 
 import time
@@ -200,10 +199,8 @@ def scene_of(setting: Setting, turn: Turn) -> Scene:
 
 
 def matched(mean_world: Points3, tracked: Bools, joints_world: Points3) -> Ints:
-    """(B, W) the track of each worker: those that fit best together, no track twice.
-
-    Of tracks and workers (B, W, J, 3) [m]; those that are `tracked` (B, W) choose first.
-    """
+    """(B, W) the track of each worker, both (B, W, J, 3) [m]: those that fit best together, no
+    track twice; those that are `tracked` (B, W) choose first."""
     n_workers = tracked.shape[1]
     off = np.linalg.norm(mean_world[:, None] - joints_world[:, :, None], axis=-1).mean(-1)
     cost = np.where(tracked[:, None], off, 0.0)  # (B, worker, track)

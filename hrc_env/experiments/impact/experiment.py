@@ -88,8 +88,8 @@ QUICK: dict[str, Any] = {"n_seeds": 8, "n_pixels": 1, "n_steps": 100, "learning_
 def config_for(
     quick: bool = False, seeds: int | None = None, estimator: Sequence[str] = ()
 ) -> ImpactConfig:
-    """The settings that the command line asks for; if estimators are named, only these are
-    compared, with the reference, the truth and nothing."""
+    """The settings that the command line asks for; if estimators are named, only these, the
+    reference, the truth and nothing are compared."""
     config = ImpactConfig(**QUICK) if quick else ImpactConfig()
     asked = [PerceptionSetup(estimator=estimator_called(name).name).name for name in estimator]
     setups = tuple(dict.fromkeys(("truth", "none", REFERENCE, *asked))) if asked else None
@@ -97,11 +97,7 @@ def config_for(
 
 
 def play(config: ImpactConfig, cache: PartCache) -> Table:
-    """Every row, by policy and setup.
-
-    Raises:
-        HRCError: workers did not walk the same way in all rows.
-    """
+    """Every row, by policy and setup; an `HRCError` if workers walked otherwise in some."""
     table: dict[tuple[str, str], dict[str, list[Any]]] = {}
     checkpoint, ppo = cache.folder / "ppo.zip", ""
     if PPO in config.policies:

@@ -143,8 +143,7 @@ def _lateness(
 
 
 def margin_needed(rows: Sequence[Row], margins_m: Floats, reference: Row) -> Metric:
-    """The margin with which no greater share of stops is missed than in the reference; the
-    interval draws seeds anew, all rows together."""
+    """The margin with which no greater share of stops is missed than in the reference [m]."""
     missed, called = (
         np.array([row[what] for row in (*rows, reference)], float).T
         for what in ("missed_stops", "called_stops")

@@ -104,11 +104,7 @@ def usual_setups() -> tuple[str, ...]:
 
 
 def setup_called(name: str) -> PerceptionSetup:
-    """A setup by name.
-
-    Raises:
-        ConfigError: there is none of that name.
-    """
+    """A setup by name, or a `ConfigError`."""
     setups = all_setups()
     if name not in setups:
         raise unknown("perception setup", name, setups)

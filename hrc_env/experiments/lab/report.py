@@ -8,7 +8,6 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
-from hrc_env.config import HRCConfig
 from hrc_env.core.batching import one
 from hrc_env.core.skeleton import BONES, JOINTS
 from hrc_env.core.typing import Image, Points3
@@ -17,6 +16,7 @@ from hrc_env.experiments.lab.motions import MOTIONS
 from hrc_env.experiments.study.plots import new_figure, save
 from hrc_env.experiments.study.recording import Recording, replay
 from hrc_env.experiments.study.report import Column, Metrics, Report, picture, table, table_of
+from hrc_env.experiments.study.rigs import SPOKEN
 from hrc_env.geometry.cameras import image_from_pinhole
 from hrc_env.perception.lensed import Lensed
 from hrc_env.render import overlay
@@ -24,10 +24,11 @@ from hrc_env.scene.render import CropRenderer
 
 ESTIMATORS = ("particle", "paper", "kalman")
 """Who is given the films; misses are told of the first."""
-COLUMNS = (*(f"camera_{k + 1}" for k in range(4)), "multi")
-SPOKEN = {column: column.replace("_", " ").replace("multi", "all four") for column in COLUMNS}
+COLUMNS = tuple(SPOKEN)
 ALL = "all"
 """All motions together."""
+WARM_UP = 12
+"""At first everybody has all cameras, and is not judged [frames]."""
 SHOWN = (("standing", "(a) standing"), ("bending", "(b) bending"), ("lifting", "(c) lifting"))
 CROP_PX = 512
 TRUTH, SINGLE, MULTI = "#9aa3ad", "#e65100", "#1565c0"
@@ -46,9 +47,9 @@ whose estimate is further from the truth than that. A side is *turned away* when
 hip are further from the camera by 8 cm than the other's."""
 
 
-def report(figures: Path, take: Take, warm_up: int, metrics: Metrics) -> Report:
+def report(figures: Path, take: Take, metrics: Metrics) -> Report:
     """Draw the figure; the tables beside it."""
-    draw_poses(figures / "figure_6.png", take, warm_up)
+    draw_poses(figures / "figure_6.png", take)
     motions = {motion: motion.replace("_", " ") for motion in (*MOTIONS, ALL)}
     far = [
         Column(f"{what}.{c}.{{}}", f"{word}, {SPOKEN[c]} [%]", 0, 100)
@@ -84,9 +85,9 @@ def _errors(estimator: str, motions: dict[str, str], metrics: Metrics) -> str:
     return table((f"`{estimator}` [mm]", *SPOKEN.values()), rows)
 
 
-def draw_poses(path: Path, take: Take, warm_up: int) -> None:
+def draw_poses(path: Path, take: Take) -> None:
     """A row a motion: a camera's crop with what it found, then the body from one and from four."""
-    figure, config = new_figure(13, 14), HRCConfig()
+    figure = new_figure(13, 14)
     for row, (motion, title) in enumerate(SHOWN):
         recording = take(motion)
         t, c = telling(recording)
@@ -95,7 +96,7 @@ def draw_poses(path: Path, take: Take, warm_up: int) -> None:
         axis.set_title(f"{title}: camera {c + 1}", fontsize=13)
         axis.axis("off")
         for k, cameras in enumerate(((c,), (0, 1, 2, 3))):
-            said = replay(recording, ESTIMATORS[0], cameras, warm_up, config, 0).mean_world[t, 0]
+            said = replay(recording, ESTIMATORS[0], cameras, WARM_UP, 0).mean_world[t, 0]
             _draw_body(figure, 3 * row + 2 + k, recording, said, (t, c))
     save(figure, path, dpi=100)
 

@@ -14,12 +14,12 @@ from hrc_env.core.records import PoseEstimate
 from hrc_env.core.results import Metric
 from hrc_env.core.skeleton import JOINT
 from hrc_env.core.typing import Floats
-from hrc_env.experiments.site.report import MULTI, SPOKEN, report, site
+from hrc_env.experiments.site.report import report, site
 from hrc_env.experiments.site.walk import walk
 from hrc_env.experiments.study.cache import PartCache, PartProgress
 from hrc_env.experiments.study.intervals import mean_over, rmse_over
 from hrc_env.experiments.study.recording import record, replay
-from hrc_env.experiments.study.rigs import WARM_UP_S, left_of
+from hrc_env.experiments.study.rigs import MULTI, SPOKEN, WARM_UP_S, left_of
 from hrc_env.experiments.study.runner import Study, at_least_one, changed
 from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.tracking.config import TrackerConfig
@@ -30,8 +30,7 @@ HEAD = JOINT["nose"]
 CROPS = "particle"
 """The estimator that the crops of the shared film follow."""
 PRIOR_STD_M = 3.0
-"""How far people may be from the middle of the work when nothing is known of them [m]: the walks go
-all over the place."""
+"""How far from the middle of the work unknown people may be [m]: walks go all over the place."""
 ALSO = ("kalman",)
 """These are given the film, too: single cameras get the best estimator that there is."""
 DT_S = HRCConfig().ctrl_dt
@@ -97,8 +96,7 @@ ROWS = tuple(SPOKEN)
 """Each camera alone, and all four."""
 Part = Mapping[str, Any]
 Played = tuple[Mapping[int, Part], Mapping[str, Mapping[int, Part]]]
-"""What everybody made of the shared film, and the truth, by seed; what came of crops of one's own
-in some walks, by row and seed."""
+"""Shared films, with what everybody made of them, by seed; own crops in some, by row and seed."""
 
 
 def play(config: SiteConfig, cache: PartCache) -> Played:
@@ -122,7 +120,7 @@ def film(config: SiteConfig, seed: int, tick: PartProgress) -> dict[str, Any]:
     asked += [(name, row) for name in ALSO if name not in config.estimators for row in ROWS]
     said: dict[str, Any] = {}
     for name, row in asked:
-        beliefs = replay(taken, name, CHOICES[row], N_WARM_UP, settings, seed)
+        beliefs = replay(taken, name, CHOICES[row], N_WARM_UP, seed)
         said[f"{name}.{row}"] = _head_path(beliefs)
         tick(0.3 / len(asked))
     found = taken.keypoints.confidence[:, :, 0, HEAD] > 0
@@ -189,10 +187,8 @@ def metrics_of(config: SiteConfig, played: Played) -> dict[str, Metric]:
 
 
 def _squared_m2(film: Part, *rows: Part) -> Floats:
-    """(T,) squared distances of the head from the truth, after the warm-up, row after row [m^2].
-
-    Frames without a track count: the estimator's last word, or its prior, is its answer.
-    """
+    """(T,) squared errors of the head after the warm-up, row after row [m^2]; where the track is
+    lost, the estimator's last word, or its prior, is its answer."""
     off = np.array([row["head"] for row in rows], float) - np.array(film["truth"], float)
     return (off**2).sum(-1)[:, N_WARM_UP:].ravel()
 

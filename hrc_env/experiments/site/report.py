@@ -15,17 +15,15 @@ from hrc_env.core.typing import Floats
 from hrc_env.experiments.site.walk import walk
 from hrc_env.experiments.study.plots import label, new_figure, save
 from hrc_env.experiments.study.report import Column, Metrics, Report, picture, table_of
+from hrc_env.experiments.study.rigs import MULTI, SPOKEN
 from hrc_env.geometry.cameras import pinhole, project
 from hrc_env.scene.build import Scene, build
 from hrc_env.scene.render import PictureRenderer
 
-MULTI = "multi"
-"""All four cameras."""
 PAPER_RMSE_M = {
     "camera_1": 6.771, "camera_2": 3.763, "camera_3": 5.630, "camera_4": 12.814, MULTI: 0.133,
 }  # fmt: skip
 """What the paper reports; its unit is not printed, metres are meant."""
-SPOKEN = {name: name.replace("_", " ").replace(MULTI, "all four") for name in PAPER_RMSE_M}
 ABOVE_PX, VIEW_PX = (1100, 1100), (960, 540)
 LIMIT_M = 10.0
 ASKED = """\

@@ -57,12 +57,10 @@ class PartCache:
 
 
 def own_folder(out: Path, name: str, overwrite: bool = False) -> None:
-    """Make `out` the folder of a study, and delete what something else left there if asked to
-    `overwrite`; what an earlier run of the study finished there stays.
+    """Make `out` the folder of a study; what an earlier run of it finished there stays.
 
     Raises:
-        ConfigError: it is a file, or holds the results of something else.
-        HRCError: it cannot be written.
+        ConfigError: a file, or a folder with other results, unless these are to be deleted.
     """
     if out.exists() and not out.is_dir():
         raise ConfigError(f"--out must be a folder; {out} is a file.")

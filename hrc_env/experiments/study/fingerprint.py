@@ -6,6 +6,7 @@ import inspect
 import json
 import sys
 from collections.abc import Mapping
+from contextlib import suppress
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -20,10 +21,8 @@ _CODE = {".py", ".pyc"}
 
 
 def fingerprint_of(settings: Mapping[str, Any], *modules: str) -> str:
-    """What a part depends on, as a word: it is made anew when any of it changes.
-
-    That are numbers and words, the modules that make it (dotted names), what these import of this
-    repository, directly or not, all data files and the libraries' versions.
+    """What a part depends on, as a word: settings, the modules that make it (dotted names), what
+    these import of this repository, directly or not, all data files and the libraries' versions.
 
     Raises:
         ModuleNotFoundError: a module is not of this repository.
@@ -31,9 +30,7 @@ def fingerprint_of(settings: Mapping[str, Any], *modules: str) -> str:
     digest = hashlib.sha256(json.dumps(settings, sort_keys=True).encode())
     for path in sorted(sources_of(*modules)):
         digest.update(path.read_bytes())
-    digest.update(_data().encode())
-    digest.update(json.dumps([_version(name) for name in LIBRARIES]).encode())
-    digest.update(sys.version.encode())
+    digest.update(_surroundings().encode())
     return digest.hexdigest()[:16]
 
 
@@ -83,20 +80,18 @@ def source_digest(made: Any) -> str:
 
 
 @cache
-def _data() -> str:
-    """The content of every data file: bodies, calibrations, scenery, networks of our own."""
+def _surroundings() -> str:
+    """The versions of Python and libraries, and the content of every data file: bodies,
+    calibrations, scenery, networks of our own."""
     from hrc_env.worker.body import assets_dir  # here: --help of a command imports no compiler
 
-    digest = hashlib.sha256()
+    versions = {"python": sys.version}
+    for name in LIBRARIES:
+        with suppress(PackageNotFoundError):
+            versions[name] = version(name)
+    digest = hashlib.sha256(json.dumps(versions).encode())
     for root in sorted({assets_dir(), _PACKAGE}):
         for path in sorted(root.rglob("*")):
             if path.is_file() and path.suffix not in _CODE and "__pycache__" not in path.parts:
                 digest.update(path.name.encode() + path.read_bytes())
     return digest.hexdigest()
-
-
-def _version(package: str) -> str | None:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return None

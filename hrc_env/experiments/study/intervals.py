@@ -4,6 +4,7 @@ Rows that share their seeds are compared seed by seed.
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -44,15 +45,13 @@ def mean_over(values: Numbers, unit: str) -> Metric:
 
 
 def rmse_over(squared: Numbers, counts: Numbers, unit: str) -> Metric:
-    """Root of the mean square, from each seed's sum of squares and number of frames; of two sums
-    of squares, the ratio of their roots."""
+    """Root of the mean of squares, from their sum and number a seed; or the ratio of two RMSEs."""
     x, y = _usable(squared, counts)
     return bootstrap(lambda w: np.sqrt((w @ x) / (w @ y)), len(x), unit)
 
 
 def iqm_over(values: Numbers, unit: str) -> Metric:
-    """The interquartile mean: of the middle half of the seeds (Agarwal et al. 2021,
-    arXiv:2108.13264)."""
+    """The mean of the middle half of the seeds (Agarwal et al. 2021, arXiv:2108.13264)."""
     (x,) = _usable(values)
 
     def iqm(weights: Ints) -> Floats:
@@ -67,22 +66,18 @@ def quantile_over(values: Sequence[Numbers], q: float, unit: str) -> Metric:
     groups = [_usable(each)[0] for each in values]
     sizes = [each.size for each in groups]
     together, owner = np.concatenate([*groups, []]), np.repeat(np.arange(len(groups)), sizes)
-    if not together.size:
-        return Metric(np.nan, np.nan, np.nan, unit, 0)
 
     def quantile(weights: Ints) -> Floats:
         drawn = (np.repeat(together, each[owner]) for each in weights)
         return np.array([np.quantile(each, q) if each.size else np.nan for each in drawn])
 
-    found = bootstrap(quantile, len(groups), unit, 400)
-    return Metric(found.value, found.low, found.high, unit, together.size)
+    return replace(bootstrap(quantile, len(groups), unit, 400), n=together.size)
 
 
 def counted_quantile_over(
     bins: Bins, counts: Sequence[Sequence[int]] | Ints, q: float, unit: str
 ) -> Metric:
-    """A quantile of counted values, a row of counts (n, bins) a seed; what lies beyond the last
-    limit is that limit."""
+    """A quantile of counts (n, bins), a row a seed; what is beyond the last limit is that limit."""
     rows, most = np.asarray(counts, float), bins.edges[-1]
     return bootstrap(lambda w: np.minimum(bins.quantile(w @ rows, q), most), len(rows), unit, 1000)
 

@@ -1,7 +1,6 @@
-"""What cameras saw of a worker, once; then every estimator on the very same detections.
+"""What cameras saw of a worker beside a resting arm, once; then every estimator on just that.
 
-The arm rests. Crops follow the estimator that the film is taken with (closed loop); whoever is
-given the recording afterwards has nothing to do with where the cameras looked.
+Crops follow the estimator that the film is taken with, and nobody who is given it afterwards.
 """
 
 from collections.abc import Sequence
@@ -31,7 +30,7 @@ class Recording:
     """T frames of one worker before a rig."""
 
     scene: Scene
-    dt_s: float
+    config: HRCConfig
     motions: WorkerMotion
     """(T, 1, S, ...) truth."""
     joints_world: Points3
@@ -52,11 +51,8 @@ def record(
     seed: int,
     tick: PartProgress,
 ) -> Recording:
-    """Film the worker of a scene with all its cameras.
-
-    The motions (T, 1, S, ...) are `config.ctrl_dt` apart; crops follow what the estimator, whose
-    random numbers are of the seed, predicts.
-    """
+    """Film the worker of a scene with all its cameras, whose crops follow what an estimator
+    predicts; the motions (T, 1, S, ...) are `config.ctrl_dt` apart."""
     truth = worker_truth(stack(scene.bodies), motions)
     pipeline = make_pipeline("pixels", estimator, scene, 1, config)
     rngs = [[np.random.default_rng([seed, k])] for k in range(2)]
@@ -73,35 +69,31 @@ def record(
             windows.append([list(of_worker) for of_worker in looked])
             tick(1.0 / len(truth.joints_world))
     return Recording(
-        scene, config.ctrl_dt, motions, truth.joints_world[:, 0],
+        scene, config, motions, truth.joints_world[:, 0],
         concatenated(keypoints), tuple(windows), concatenated(said),
     )  # fmt: skip
 
 
 def replay(
-    recording: Recording,
-    estimator: str,
-    cameras: Sequence[int],
-    n_start: int,
-    config: HRCConfig,
-    seed: int,
+    recording: Recording, estimator: str, cameras: Sequence[int], n_start: int, seed: int
 ) -> PoseEstimate:
     """(T, 1, ...) what an estimator makes of the detections of some of the cameras.
 
     The first `n_start` frames are given of all cameras: no estimator begins a track with one.
     """
     P, found = projections(recording.scene.cameras), recording.keypoints
+    dt_s = recording.config.ctrl_dt
     px, confidence, sigma_px = map(np.array, (found.px, found.confidence, found.sigma_px))
     unused = np.setdiff1d(np.arange(len(P)), cameras)
     px[n_start:, unused] = np.nan
     confidence[n_start:, unused], sigma_px[n_start:, unused] = 0.0, np.inf
     given = Keypoints(px, confidence, sigma_px)
-    tracker = make_estimator(estimator, P, recording.dt_s, config.tracker)
+    tracker = make_estimator(estimator, P, dt_s, recording.config.tracker)
     state, rngs = tracker.init(1, 1), [np.random.default_rng([seed, 1])]
     tracker.reset(state, np.zeros(1, int), rngs)
     said = []
     for frame in range(len(px)):
-        tracker.predict(state, recording.dt_s, rngs)
+        tracker.predict(state, dt_s, rngs)
         tracker.update(state, rows(given, np.array([frame])), rngs)
         said.append(tracker.estimate(state))
     return concatenated(said)

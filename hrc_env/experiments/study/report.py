@@ -89,8 +89,7 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 def table_of(
     name: str, rows: Mapping[str, str], columns: Sequence[Column], metrics: Metrics
 ) -> str:
-    """A table of metrics: by the part of their keys that stands for a row, what the row is called;
-    `name` is the first column's."""
+    """A table of metrics; `rows` by the part of their keys in place of `{}`, with their words."""
     lines = ((words, *(each.cell(metrics, row) for each in columns)) for row, words in rows.items())
     return table((name, *(each.words for each in columns)), lines)
 
