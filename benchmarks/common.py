@@ -64,7 +64,7 @@ def plot_rows(
     for axis, column in zip(panels, columns, strict=True):
         known = [(k, metrics[key]) for k, row in zip(y, rows, strict=True)
                  if (key := column.key.format(row)) in metrics]  # fmt: skip
-        points(axis, [k for k, _ in known], [m for _, m in known], column.scale, sideways=True)
+        points(axis, [k for k, _ in known], [m for _, m in known], column.scale)
         label(axis, column.words)
     panels[0].set_yticks(y, list(rows.values()))
     save(figure, path)

@@ -102,21 +102,22 @@ def merged(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
 def _assigned(word: str) -> dict[str, Any]:
     """The nested mapping that a.b=VALUE is."""
     path, _, text = word.partition("=")
-    value = _json(text, text)
+    value = _value(text)
     for name in reversed(path.split(".")):
         value = {name: value}
     return value
 
 
 def _fault(text: str) -> dict[str, Any]:
-    fault = _json(text, None)
+    fault = _value(text)
     if not isinstance(fault, dict):
         raise ConfigError(f"--faults takes JSON objects, as {FAULT}, got {text!r}.")
     return fault
 
 
-def _json(text: str, otherwise: Any) -> Any:
+def _value(text: str) -> Any:
+    """What JSON it is, or else the text."""
     try:
         return json.loads(text)
     except json.JSONDecodeError:
-        return otherwise
+        return text

@@ -86,17 +86,13 @@ def legend(level: str) -> Image:
     """(28, 792, 3) what the colours mean at a perception level."""
     image = _panel(LEGEND_HEIGHT, ROOM[0])
     marks = [
-        ("worker's left", overlay.LEFT, "line"),
-        ("right", overlay.RIGHT, "line"),
-        ("estimate, 2 sigma", overlay.BELIEF, "dot"),
-        ("goal", overlay.GOAL, "ring"),
-    ]
-    if level in CAMERA_LEVELS:
-        marks.append(("detected joint", overlay.DETECTED, "dot"))
-    if level == "pixels":
-        marks.append(("crop", overlay.WINDOW, "box"))
+        ("worker's left", overlay.LEFT, "line"), ("right", overlay.RIGHT, "line"),
+        ("estimate, 2 sigma", overlay.BELIEF, "dot"), ("goal", overlay.GOAL, "ring"),
+        ("detected joint", overlay.DETECTED, "dot"), ("crop", overlay.WINDOW, "box"),
+    ]  # fmt: skip
+    n_shown = 6 if level == "pixels" else 5 if level in CAMERA_LEVELS else 4
     x, y = 12, LEGEND_HEIGHT // 2
-    for text, colour, shape in marks:
+    for text, colour, shape in marks[:n_shown]:
         if shape == "line":
             cv2.line(image, (x, y), (x + 18, y), colour, 3, cv2.LINE_AA)
         elif shape == "box":

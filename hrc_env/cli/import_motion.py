@@ -116,11 +116,7 @@ def tell_error(console: Console, capture: "Capture", clip: "Clip", error: "Retar
 
 
 def _film_strip(clip: "Clip", worker: str) -> "Image":
-    """Moments of a clip at equal intervals, each with its time.
-
-    Raises:
-        RenderingError: this machine has no OpenGL.
-    """
+    """Moments of a clip at equal intervals, each with its time."""
     import numpy as np  # here: --help imports no simulator
 
     from hrc_env.core.records import WorkerMotion

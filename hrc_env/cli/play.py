@@ -14,7 +14,7 @@ from hrc_env.cli.checks import at_least, writable_file
 from hrc_env.cli.environment import EnvironmentArguments
 from hrc_env.cli.progress import compile_kernels, track
 from hrc_env.core.checkout import agents
-from hrc_env.core.errors import unknown
+from hrc_env.core.errors import check_names
 from hrc_env.tasks import DEFAULT
 
 if TYPE_CHECKING:
@@ -40,8 +40,7 @@ class Play(EnvironmentArguments):
 
     def run(self) -> int:
         """Play."""
-        if self.task not in hrc_env.IDS:
-            raise unknown("environment", self.task, hrc_env.IDS)
+        check_names("environment", [self.task], hrc_env.IDS)
         at_least("--episodes", self.episodes, 1)
         at_least("--seed", self.seed, 0)
         if self.video is not None:

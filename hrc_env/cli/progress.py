@@ -16,14 +16,12 @@ from hrc_env.cli.checks import writable_folder
 EVERY_S = 10.0
 """Between two lines in a log file [s]."""
 T = TypeVar("T")
+Say = Callable[[float, str], None]
 
 
 class Meter:
-    """Shows how much of something is done, of how much, and how long the rest will take.
-
-    A console that is no terminal gets plain lines. What is counted is said if it has a unit; some
-    may be done already. The clock tells the seconds since some moment.
-    """
+    """Shows how much of something is done, of how much, and how long the rest will take; counts
+    are said where they have a unit. What is no terminal gets plain lines."""
 
     def __init__(
         self,
@@ -75,22 +73,20 @@ class Meter:
 
 
 @contextmanager
-def progress_bar(console: Console, name: str) -> Iterator[Callable[[float, str], None]]:
+def progress_bar(console: Console, name: str) -> Iterator[Say]:
     """Tell it by how much the share that is done grew, and what is being done."""
     with Meter(console, name) as meter:
         yield lambda share, label: meter.show(meter.done + share, label)
 
 
-def show(
-    run: Callable[[Path, Callable[[float, str], None]], object], out: Path, name: str, written: str
-) -> int:
+def show(run: Callable[[Path, Say], object], out: Path, name: str) -> int:
     """Run a bench or an experiment under a progress bar, then show its report.md."""
     writable_folder(out)
     console = Console()
     with progress_bar(console, name) as say:
         run(out, say)
     console.print(Markdown((out / "report.md").read_text()))
-    console.print(f"In [bold]{out}[/]: {written}")
+    console.print(f"In [bold]{out}[/]: report.html, results.json, figures/")
     return 0
 
 

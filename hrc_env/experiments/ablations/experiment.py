@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, check_names
 from hrc_env.core.results import Metric, over
 from hrc_env.experiments.ablations.ablation import Ablation, Setting
 from hrc_env.experiments.ablations.play import DT_S, N_WARM_UP, Sums, play, update_us, walks_of
@@ -58,9 +58,7 @@ class AblationsConfig:
             )
         if not self.studies:
             raise ConfigError(f"--studies needs a name of {', '.join(ABLATIONS)}.")
-        for name in self.studies:
-            if name not in ABLATIONS:
-                raise unknown("study", name, ABLATIONS)
+        check_names("study", self.studies, ABLATIONS)
 
     @property
     def seeds(self) -> tuple[int, ...]:

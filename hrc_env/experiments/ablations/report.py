@@ -55,7 +55,7 @@ def draw(path: Path, key: str, rows: Mapping[str, str], metrics: Metrics) -> Non
     across = axis.get_yaxis_transform()
     for quantile, (words, mark, colour) in QUANTILES.items():
         found = [metrics[f"error_m.{key}.{row}.{quantile}"] for row in rows]
-        points(axis, places, found, 1000, sideways=True, fmt=mark, color=colour, label=words)
+        points(axis, places, found, 1000, fmt=mark, color=colour, label=words)
     for place, row in zip(places, rows, strict=True):
         inside = f"{100 * metrics[f'coverage95.{key}.{row}'].value:.0f} %"
         axis.text(1.02, place, inside, transform=across, fontsize=11, va="center", color="0.3")

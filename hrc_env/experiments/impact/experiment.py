@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, field
 from functools import partial
 from typing import Any
 
-from hrc_env.core.errors import ConfigError, HRCError, unknown
+from hrc_env.core.errors import ConfigError, HRCError, check_names
 from hrc_env.experiments.impact.episodes import PEOPLE, Stage
 from hrc_env.experiments.impact.metrics import Table, metrics_of
 from hrc_env.experiments.impact.policies import POLICIES, PPO, SLOWED, Policy, maker, trained
@@ -15,6 +15,7 @@ from hrc_env.experiments.impact.setups import (
     LATE,
     REFERENCE,
     PerceptionSetup,
+    all_setups,
     setup_called,
     usual_setups,
 )
@@ -56,11 +57,8 @@ class ImpactConfig:
     def __post_init__(self) -> None:
         """Raise `ConfigError` for what cannot work."""
         at_least_one(self, "n_seeds", "n_pixels", "n_steps", "learning_steps")
-        for name in self.policies:
-            if name not in POLICIES:
-                raise unknown("policy", name, POLICIES)
-        for name in self.setups:
-            setup_called(name)
+        check_names("policy", self.policies, POLICIES)
+        check_names("perception setup", self.setups, all_setups())
         if REFERENCE not in self.setups or not self.policies:
             raise ConfigError(
                 f"setups must hold the reference {REFERENCE!r}; policies at least one."

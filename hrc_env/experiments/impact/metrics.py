@@ -150,20 +150,17 @@ def margin_needed(rows: Sequence[Row], margins_m: Floats, reference: Row) -> Met
     )
 
     def needed(weights: Ints) -> Floats:
-        share = np.nan_to_num((weights @ missed) / (weights @ called)).T
-        return _crossing(margins_m, share[:-1], share[-1])
+        shares = np.nan_to_num((weights @ missed) / (weights @ called))
+        return np.array([_crossing(margins_m, share[:-1], share[-1]) for share in shares])
 
     return intervals.bootstrap(needed, len(missed), "m", 1000)
 
 
-def _crossing(x: Floats, y: Floats, level: Floats) -> Floats:
-    """Where falling values y (n, ...) at x (n,) first come down to a level (...): linearly between
-    the two nearest, the last x if they never do."""
-    reached = y <= level
-    first = np.where(reached.any(0), reached.argmax(0), len(x) - 1)
-    before = np.maximum(first - 1, 0)
-    high, low = (np.take_along_axis(y, k[None], 0)[0] for k in (before, first))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        into = np.clip((high - level) / (high - low), 0.0, 1.0)
-    into = np.where(first == before, 0.0, np.nan_to_num(into, nan=1.0))
-    return x[before] + into * (x[first] - x[before])
+def _crossing(x: Floats, y: Floats, level: float) -> float:
+    """Where falling values y (n,) at x (n,) first come down to a level: linearly between the two
+    nearest, the last x if they never do."""
+    reached = np.flatnonzero(y <= level)
+    if not reached.size or reached[0] == 0:
+        return x[0] if reached.size else x[-1]
+    nearest = slice(reached[0] - 1, reached[0] + 1)
+    return float(np.interp(-level, -y[nearest], x[nearest]))

@@ -8,13 +8,7 @@ from matplotlib.axes import Axes
 from hrc_env.experiments.impact.episodes import MOVING_MPS, SLOW_M, STOP_M
 from hrc_env.experiments.impact.metrics import COMPARED, NOMINAL_MPS, Table
 from hrc_env.experiments.impact.policies import POLICIES, SCRIPTED, SLOWED
-from hrc_env.experiments.impact.setups import (
-    LATE,
-    LATE_S,
-    REFERENCE,
-    PerceptionSetup,
-    setup_called,
-)
+from hrc_env.experiments.impact.setups import LATE, LATE_S, REFERENCE, setup_called
 from hrc_env.experiments.study.plots import ends, label, new_figure, save
 from hrc_env.experiments.study.report import Column, Metrics, Report, picture, table_of
 from hrc_env.tracking.estimators import ESTIMATORS
@@ -120,7 +114,7 @@ def _panel(axis: Axes, metrics: Metrics, policy: str, setups: Sequence[str], acr
                 place[-1] += difference.value
             bars.append(None if difference is None else ends([difference]))
         mark = "X" if setup.is_alone else LATE_MARKS[setup.latency_s]
-        is_check, colour = setup.level == "pixels", _colour(setup)
+        is_check, colour = setup.level == "pixels", _colour(name)
         axis.errorbar(
             *place, xerr=bars[0], yerr=bars[1], fmt="*" if is_check else mark, color=colour,
             markersize=14 if is_check else 9, markeredgewidth=1.6, elinewidth=0.9, alpha=0.9,
@@ -130,11 +124,10 @@ def _panel(axis: Axes, metrics: Metrics, policy: str, setups: Sequence[str], acr
     axis.margins(0.08)
 
 
-def _colour(setup: PerceptionSetup) -> str:
+def _colour(setup_name: str) -> str:
+    setup, others = setup_called(setup_name), [each for each in ESTIMATORS if each not in COLOURS]
     if setup.n_cameras < 4:
         return CAMERA_COLOURS[setup.n_cameras]
-    name = setup.level if setup.level in COLOURS else setup.estimator
-    if name in COLOURS:
-        return COLOURS[name]
-    others = [each for each in ESTIMATORS if each not in COLOURS]
-    return FREE_COLOURS[others.index(name) % len(FREE_COLOURS)]
+    if setup.level in COLOURS or setup.estimator in COLOURS:
+        return COLOURS.get(setup.level) or COLOURS[setup.estimator]
+    return FREE_COLOURS[others.index(setup.estimator) % len(FREE_COLOURS)]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hrc_env.config import HRCConfig
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, check_names
 from hrc_env.core.records import PoseEstimate
 from hrc_env.core.results import Metric
 from hrc_env.core.skeleton import JOINT
@@ -57,9 +57,7 @@ class SiteConfig:
         at_least_one(self, "n_seeds", "n_closed")
         if not self.estimators:
             raise ConfigError(f"--estimator needs a name of {', '.join(ESTIMATORS)}.")
-        for name in self.estimators:
-            if name not in ESTIMATORS:
-                raise unknown("estimator", name, ESTIMATORS)
+        check_names("estimator", self.estimators, ESTIMATORS)
         if not self.seconds >= 2.0:
             raise ConfigError(f"Walks must be at least 2 s long, got {self.seconds}.")
 
@@ -156,44 +154,41 @@ def _head_path(beliefs: PoseEstimate) -> dict[str, Any]:
 def metrics_of(config: SiteConfig, played: Played) -> dict[str, Metric]:
     """Every number of results.json."""
     films, closed = played
-
-    def squared(name: str, *rows: str) -> Floats:
-        """(walks, T) of all frames of some rows together [m^2]."""
-        keys = [f"{name}.{row}" for row in rows]
-        return np.array(
-            [_squared_m2(each, *map(each["rows"].get, keys)) for each in films.values()]
-        )
-
+    squared = {
+        key: np.array([_squared_m2(each, each["rows"][key]) for each in films.values()])
+        for key in films[config.first_seed]["rows"]
+    }
     metrics = {}
     for name, row in product(config.everybody, ROWS):
-        key, squares = f"{name}.{row}", squared(name, row)
-        metrics[f"rmse_m.{key}"] = _rmse(squares)
+        key = f"{name}.{row}"
+        metrics[f"rmse_m.{key}"] = _rmse(squared[key])
         tracked = [float(np.mean(each["rows"][key]["tracked"])) for each in films.values()]
         metrics[f"tracked.{key}"] = mean_over(tracked, "share")
         if row != MULTI:
-            multi = squared(name, MULTI).sum(1)
-            metrics[f"over_multi.{key}"] = rmse_over(squares.sum(1), multi, "ratio")
+            multi = squared[f"{name}.{MULTI}"].sum(1)
+            metrics[f"over_multi.{key}"] = rmse_over(squared[key].sum(1), multi, "ratio")
     for name in config.estimators:
         for size, word in ((2, "two"), (3, "three")):
-            rows = [row for row, cameras in CHOICES.items() if len(cameras) == size]
-            metrics[f"rmse_m.{name}.{word}"] = _rmse(squared(name, *rows))
+            rows = [squared[f"{name}.{row}"] for row, rig in CHOICES.items() if len(rig) == size]
+            metrics[f"rmse_m.{name}.{word}"] = _rmse(np.concatenate(rows, axis=1))
     for key, own in closed.items():
-        squares = np.array([_squared_m2(films[seed], said) for seed, said in own.items()])
-        metrics[f"closed_rmse_m.{key}"] = _rmse(squares)
+        squares = [_squared_m2(films[seed], said) for seed, said in own.items()]
+        metrics[f"closed_rmse_m.{key}"] = _rmse(np.array(squares))
     for k in range(4):
         found = [each["found"][k] for each in films.values()]
         metrics[f"found.camera_{k + 1}"] = mean_over(found, "share")
     return metrics
 
 
-def _squared_m2(film: Part, *rows: Part) -> Floats:
-    """(T,) squared errors of the head after the warm-up, row after row [m^2]; where the track is
-    lost, the estimator's last word, or its prior, is its answer."""
-    off = np.array([row["head"] for row in rows], float) - np.array(film["truth"], float)
-    return (off**2).sum(-1)[:, N_WARM_UP:].ravel()
+def _squared_m2(film: Part, row: Part) -> Floats:
+    """(T,) squared errors of the head after the warm-up [m^2]; where the track is lost, the
+    estimator's last word, or its prior, is its answer."""
+    off_m = np.array(row["head"], float) - np.array(film["truth"], float)
+    return (off_m**2).sum(-1)[N_WARM_UP:]
 
 
 def _rmse(squares: Floats) -> Metric:
+    """Of squared errors (walks, T)."""
     return rmse_over(squares.sum(1), np.full(len(squares), squares.shape[1]), "m")
 
 
