@@ -9,14 +9,13 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import islice, permutations
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from scipy.stats import chi2
 
 from hrc_env.config import HRCConfig
 from hrc_env.core.batching import rows
-from hrc_env.core.errors import ConfigError
 from hrc_env.core.machine import n_cores
 from hrc_env.core.records import Keypoints, PoseEstimate, WorkerMotion
 from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, Points3
@@ -186,10 +185,8 @@ def update_us(setting: Setting, walks: Walks, seeds: tuple[int, ...], n_frames: 
 def pipeline_of(setting: Setting, turn: Turn, batch: int) -> PoseTracking:
     """The emulator and the estimator of a setting, for so many episodes."""
     config = HRCConfig(worker=BODIES, tracker=setting.tracker, faults=turn.faults)
-    pipeline: Any = make_pipeline(LEVEL, setting.estimator, scene_of(setting, turn), batch, config)
-    if not isinstance(pipeline, PoseTracking):
-        raise ConfigError(f"Level {LEVEL!r} must have cameras and a tracker; it has none.")
-    return pipeline
+    scene = scene_of(setting, turn)
+    return cast(PoseTracking, make_pipeline(LEVEL, setting.estimator, scene, batch, config))
 
 
 def scene_of(setting: Setting, turn: Turn) -> Scene:

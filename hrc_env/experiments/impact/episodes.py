@@ -61,28 +61,30 @@ class Stage:
 
     def __init__(self, setup: PerceptionSetup, seeds: Sequence[int], n_steps: int) -> None:
         self.setup, self.seeds, self.n_steps = setup, seeds, n_steps
-        self._built: dict[int, Shards] = {}
+        self._envs: list[Shards] = []
 
     def play(self, make_agent: MakeAgent, margin_m: float, tick: PartProgress) -> Rows:
         """Sums of every episode, in the order of the seeds; the policy, which gets observations
         only, adds `margin_m` to the distances that it keeps."""
-        rows: Rows = {}
-        n, n_turns = len(self.seeds), len(self.setup.turns)
-        for k, turn in enumerate(self.setup.turns[:n]):
-            mine = self.seeds[k::n_turns]
-            if k not in self._built:
-                self._built[k] = _build(self.setup, turn, len(mine))
-            env, stepped = self._built[k], partial(tick, len(mine) / n / self.n_steps)
-            steps, infos = run(env, make_agent, mine, self.n_steps, stepped)
+        rows, n = Rows(), len(self.seeds)
+        turns = self.setup.turns[:n]
+        in_turns = [slice(k, None, len(turns)) for k in range(len(turns))]
+        self._envs = self._envs or [
+            _build(self.setup, turn, len(self.seeds[mine]))
+            for turn, mine in zip(turns, in_turns, strict=True)
+        ]
+        for env, mine in zip(self._envs, in_turns, strict=True):
+            seeds = self.seeds[mine]
+            stepped = partial(tick, len(seeds) / n / self.n_steps)
+            steps, infos = run(env, make_agent, seeds, self.n_steps, stepped)
             for name, values in sums_of(steps, infos, margin_m, env.first.config.ctrl_dt).items():
-                rows.setdefault(name, [None] * n)[k::n_turns] = values
+                rows.setdefault(name, [None] * n)[mine] = values
         return rows
 
     def close(self) -> None:
         """Release threads and graphics contexts."""
-        for env in self._built.values():
+        for env in self._envs:
             env.close()
-        self._built.clear()
 
 
 def _build(setup: PerceptionSetup, turn: Turn, n_episodes: int) -> Shards:
