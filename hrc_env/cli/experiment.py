@@ -53,7 +53,7 @@ class SiteExperiment(AnyExperiment):
 
 @dataclass(frozen=True)
 class LabExperiment(AnyExperiment):
-    """The paper's laboratory: all joints, five kinds of motion, one camera against four."""
+    """The paper's laboratory: all joints, six kinds of motion, one camera against four."""
 
     name = "lab"
     out: Path = Path("out/lab")
