@@ -36,7 +36,7 @@ class AnyExperiment:
         out, overwrite = asked.pop("out"), asked.pop("overwrite")
         config = experiment.config_for(**asked)
         run = partial(runner.run, experiment.STUDY, config, overwrite=overwrite)
-        return show(run, out, "experiment", "report.html, results.json, figures/")
+        return show(run, out, "experiment")
 
 
 @dataclass(frozen=True)
