@@ -6,7 +6,7 @@ of them from the sun.
 """
 
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import cv2
 import numpy as np
@@ -19,7 +19,6 @@ from hrc_env.render.overlay import shrink
 from hrc_env.scene import gl
 from hrc_env.scene.build import Scene
 from hrc_env.scene.canvas import BEFORE_THE_SUN, IN_THE_SHADE, MOVING, STILL, Canvas
-from hrc_env.scene.domain_randomization import Look
 
 SMOOTHING = 2
 """All is drawn so many times as large, for smooth edges."""
@@ -76,15 +75,8 @@ class Stage(Canvas):
         gl.draw_on_one_thread()
         size = max(SMOOTHING * width, SUN_PX), max(SMOOTHING * height, SUN_PX)
         super().__init__(scene, *size, QUALITY)
-        self._kept: dict[Any, _Backdrop] = {}
         self._shade: Shade | None = None
         """Of this pose, once it was asked for."""
-
-    def randomize(self, look: Look | None) -> bool:
-        """Draw with an episode's look from the next pose on; whether that is another one."""
-        if changed := super().randomize(look):
-            self._kept.clear()
-        return changed
 
     def pose(self, q: JointAngles, motion: WorkerMotion | None) -> None:
         """Pose what moves: arm q (N,), the workers of one environment (W, S, ...)."""
