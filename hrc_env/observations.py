@@ -152,11 +152,6 @@ SHARED_TERMS: tuple[ObservationTerm, ...] = (
 """What closes it: the last action, and the workers as they are estimated."""
 
 
-def terms_of(task_terms: tuple[ObservationTerm, ...]) -> tuple[ObservationTerm, ...]:
-    """All terms of a task's observation, in their order: the robot, the task, the workers."""
-    return (*ROBOT_TERMS, *task_terms, *SHARED_TERMS)
-
-
 @dataclass(frozen=True, slots=True)
 class ObservationLayout:
     """Which entries of the flat observation belong to which term."""

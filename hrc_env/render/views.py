@@ -64,31 +64,30 @@ class Glance:
 
 
 class Views:
-    """Pictures of one environment of a simulation; graphics contexts are made when asked for.
+    """Pictures of a simulation's environments; graphics contexts are made when asked for.
 
     One thread must ask for all of them and call `close`; with a `glance` taken before, that may
     be another one than the simulation's.
     """
 
-    def __init__(self, simulation: Simulation, b: int = 0) -> None:
-        self.simulation, self.b = simulation, b
+    def __init__(self, simulation: Simulation) -> None:
+        self.simulation = simulation
         self._renderers: dict[str, tuple[tuple[int, int], Any]] = {}
         """By purpose: the size of their pictures, and themselves."""
 
     def picture(
-        self, depth: bool = False, b: int | None = None, size: tuple[int, int] = PICTURE_SIZE
+        self, depth: bool = False, b: int = 0, size: tuple[int, int] = PICTURE_SIZE
     ) -> NDArray[Any]:
-        """Robot and worker, (height, width, 3) uint8, or distances (height, width) float32 [m];
-        of another environment than usual with `b`."""
+        """Robot and worker, (height, width, 3) uint8, or distances (height, width) float32 [m]."""
         seen = self.glance(b)
         if depth:
             renderer = self._renderer("depth", size, seen)
             return renderer.picture(seen.q, seen.motion, VIEWPOINT, depth=True)
         return self._drawn([viewpoint_camera(VIEWPOINT, *size)], seen, shadows=True)[0]
 
-    def glance(self, b: int | None = None) -> Glance:
-        """All that there is to draw now, of another environment than usual with `b`."""
-        b, simulation = self.b if b is None else b, self.simulation
+    def glance(self, b: int = 0) -> Glance:
+        """All that there is to draw of environment `b` now."""
+        simulation = self.simulation
         keypoints, windows = simulation.pipeline.last_detections(b)
         return Glance(
             *self.pose(b),
@@ -99,6 +98,11 @@ class Views:
             [list(of_worker) for of_worker in windows],
             list(simulation.pipeline.crops(b)),
         )
+
+    def pose(self, b: int = 0) -> tuple[JointAngles, WorkerMotion]:
+        """The arm (N,) and the workers (W, S, ...) of environment `b` now."""
+        motion = one(generator.current(self.simulation.motion, np.array([b])), 0)
+        return self.simulation.physics.q[b].copy(), motion
 
     def room(self, width: int, height: int, seen: Glance | None = None) -> Image:
         """The room with the estimated skeleton over it."""
@@ -173,12 +177,6 @@ class Views:
         joints_px = image_from_pinhole(self.simulation.scene.cameras[c], keypoints.px[0, c, 0])
         overlay.draw_landmarks(image, window, joints_px, keypoints.confidence[0, c, 0])
         return image
-
-    def pose(self, b: int | None = None) -> tuple[JointAngles, WorkerMotion]:
-        """The arm (N,) and the workers (W, S, ...) now, of another environment with `b`."""
-        b = self.b if b is None else b
-        motion = one(generator.current(self.simulation.motion, np.array([b])), 0)
-        return self.simulation.physics.q[b].copy(), motion
 
     def _through_cameras(self, width: int, height: int, seen: Glance) -> list[Image]:
         """What every camera sees, without shadows."""
