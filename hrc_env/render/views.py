@@ -130,9 +130,21 @@ class Views:
     def crops(self, size: int, seen: Glance | None = None) -> list[Image]:
         """What the pose network was given: each camera's crop, with its landmarks."""
         seen = seen or self.glance()
-        if seen.keypoints is None or not seen.windows:
+        keypoints, images = seen.keypoints, []
+        if keypoints is None or not seen.windows:
             return []
-        return [self._crop(seen, seen.keypoints, c, size) for c in range(len(seen.crops))]
+        cameras = self.simulation.scene.cameras
+        parts = zip(cameras, seen.crops, seen.windows[0], strict=True)
+        for c, (camera, crop, window) in enumerate(parts):
+            if crop is None or window is None:
+                image = overlay.panel(size, size)
+                overlay.write(image, "no worker in view", (10, size // 2 - 10), 13)
+            else:
+                image = overlay.shrink(crop, size, size)
+                joints_px = image_from_pinhole(camera, keypoints.px[0, c, 0])
+                overlay.draw_landmarks(image, window, joints_px, keypoints.confidence[0, c, 0])
+            images.append(image)
+        return images
 
     def beliefs(self, width: int, height: int, seen: Glance | None = None) -> list[Image]:
         """What the robot knows, seen from above and from the side: itself, its task, its estimate
@@ -166,17 +178,6 @@ class Views:
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_renderers": {}}
-
-    def _crop(self, seen: Glance, keypoints: Keypoints, c: int, size: int) -> Image:
-        crop, window = seen.crops[c], seen.windows[0][c]
-        if window is None or crop is None:
-            image = overlay.panel(size, size)
-            overlay.write(image, "no worker in view", (10, size // 2 - 10), 13)
-            return image
-        image = overlay.shrink(crop, size, size)
-        joints_px = image_from_pinhole(self.simulation.scene.cameras[c], keypoints.px[0, c, 0])
-        overlay.draw_landmarks(image, window, joints_px, keypoints.confidence[0, c, 0])
-        return image
 
     def _through_cameras(self, width: int, height: int, seen: Glance) -> list[Image]:
         """What every camera sees, without shadows."""
