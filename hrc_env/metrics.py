@@ -70,13 +70,8 @@ def cost(
 def tracking_error(
     estimate: PoseEstimate, truth: WorkerTruth, present: Bools
 ) -> tuple[Floats, Bools]:
-    """Mean joint position error of the tracked workers: of tracks and the workers whom they fit
-    best, none with two, as nothing tells a camera who of several is called the first.
-
-    Returns:
-        (B,) mean over tracked workers and joints [m], NaN where nobody is tracked, and
-        (B,) whether a worker is there (`present` (B, W)) whom the estimator does not track.
-    """
+    """(B,) mean error of joints between tracks and the workers whom they fit best [m], NaN where
+    nobody is tracked; and (B,) whether a worker who is there (`present` (B, W)) has no track."""
     tracked = estimate.tracked
     error_m, lost = np.empty(len(tracked)), np.zeros(len(tracked), np.bool_)
     _tracking_error(estimate.mean_world, truth.joints_world, tracked, present, error_m, lost)

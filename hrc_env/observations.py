@@ -1,6 +1,6 @@
 """What the robot sees: one declaration per observation term.
 
-The space, the environment's page, `split` and the tests all derive from `TERMS`, so that
+The space, the environment's page, `split` and the tests all derive from the terms, so that
 they cannot drift apart. Terms read the *estimate* of the worker, never the truth.
 """
 

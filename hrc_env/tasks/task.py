@@ -120,15 +120,11 @@ def check_task(task: Task) -> None:
         task.config()
     except TypeError as error:
         raise ConfigError(f"{task.id}: every field of config needs a default ({error}).") from error
-    _check_terms(task)
-    _check_state(task)
-
-
-def _check_terms(task: Task) -> None:
     for terms in (task.observation_terms, task.reward_terms):
         name, times = Counter(term.name for term in terms).most_common(1)[0]
         if times > 1:
             raise ConfigError(f"{task.id}: there is a term {name!r} already; choose another name.")
+    _check_state(task)
 
 
 def _check_state(task: Task) -> None:
