@@ -29,19 +29,19 @@ def one(record: RecordT, b: int) -> RecordT:
 
 def write_rows(record: object, ids: Any, part: object) -> None:
     """Write a record of rows back into rows `ids` (integers, a mask, `...`) of a record."""
+    if isinstance(record, np.ndarray):
+        record[ids] = part
     for name in _names(type(record)):
-        value, new = getattr(record, name), getattr(part, name)
-        if isinstance(value, np.ndarray):
-            value[ids] = new
-        else:
-            write_rows(value, ids, new)
+        write_rows(getattr(record, name), ids, getattr(part, name))
 
 
 def mapped(record: RecordT, change: Callable[[Any], Any]) -> RecordT:
     """A (nested) record of the same kind with `change` applied to every array."""
-    kind = type(record)
-    values = [getattr(record, name) for name in _names(kind)]
-    return kind(*[change(v) if isinstance(v, np.ndarray) else _mapped(v, change) for v in values])
+    if isinstance(record, np.ndarray):
+        return change(record)
+    names = _names(type(record))
+    values = [mapped(getattr(record, name), change) for name in names]
+    return type(record)(*values) if names else record
 
 
 def copied(value: Any) -> Any:
@@ -66,7 +66,3 @@ def _names(kind: type) -> tuple[str, ...]:
     if dataclasses.is_dataclass(kind):
         return tuple(each.name for each in dataclasses.fields(kind))
     return getattr(kind, "_fields", ())
-
-
-def _mapped(value: Any, change: Callable[[Any], Any]) -> Any:
-    return mapped(value, change) if _names(type(value)) else value
