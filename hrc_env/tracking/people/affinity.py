@@ -22,7 +22,7 @@ _ISOTROPIC = np.eye(3)
 POSE = np.dtype(
     [
         # pixels, standard deviations [px], and which of them are measurements
-        ("px", "f8", (N_JOINTS, 2)), ("sigma_px", "f8", (N_JOINTS,)), ("ok", "?", (N_JOINTS,)),
+        ("px", "f8", (N_JOINTS, 2)), ("sigma_px", "f8", (N_JOINTS,)), ("ok", "i1", (N_JOINTS,)),
         # unit directions to the joints, from the camera; whether the pose is nobody's yet
         ("sight", "f8", (N_JOINTS, 3)), ("free", "?"),
     ],
