@@ -1,8 +1,5 @@
-"""Keypoints without pixels: the projected truth with BlazePose's errors.
-
-The errors are drawn from a calibration, numbers fitted to what the network made of rendered workers
-(`perception.calibration`, docs/emulator.md).
-"""
+"""Keypoints without pixels: the projected truth with BlazePose's errors, drawn from a calibration
+that was fitted to what the network made of rendered workers (docs/emulator.md)."""
 
 import functools
 import math
@@ -106,7 +103,8 @@ def emulate(
     cameras: tuple[PinholeCamera, ...],
     config: EmulatorConfig,
 ) -> Keypoints:
-    """What the detector would report of the workers in one image of every camera.
+    """What the detector would report of the workers in one image of every camera, in its pixels;
+    NaN, 0 and infinity of a worker who is not seen.
 
     Args:
         state: of the errors, advanced by one image in place.
@@ -115,9 +113,6 @@ def emulate(
         surroundings: (B, ...) the room, what is carried and the robot, which hide joints too.
         cameras: the rig (C).
         config: as given to `make_state`.
-
-    Returns:
-        Keypoints in pixels of the images; NaN, 0 and infinity of a worker who is not seen.
     """
     batch, n_cameras, n_workers = state.errors.shape
     shape = (batch, n_cameras, n_workers, N_JOINTS)

@@ -86,17 +86,11 @@ class Report(NamedTuple):
 
 @kernel(makes_arrays=True)
 def emulate_batch(errors, wander, normals, world, rig, postures, settings, report):
-    """Advance the errors by one image and write keypoints.
+    """Advance errors (B, C, W; `ERRORS`) and wander (B, W, J, 3; the same in every camera) by one
+    image, and write a `Report`.
 
-    Args:
-        errors: (B, C, W) `ERRORS`.
-        wander: (B, W, J, 3) what is the same in every camera, as far as it is the joint's own.
-        normals: (B, N) normal variables, in the order bodies, then images.
-        world: `World`.
-        rig: (C,) `CAMERA`.
-        postures: (P, N) the numbers of a `POSTURE` each.
-        settings: (1,) `SETTINGS`.
-        report: `Report`, written.
+    normals (B, N) are of bodies, then of images; world is a `World`, rig (C,) `CAMERA`, postures
+    (P, N) the numbers of a `POSTURE` each, settings (1,) `SETTINGS`.
     """
     batch, n_cameras, n_workers = errors.shape
     occluders, room = occluders_of(world), np.empty(1, JOINTS_SEEN)
@@ -147,12 +141,9 @@ def _wander(wander, normals, joints, front, keep, here, common, meant):
 
 @kernel
 def _happen(mine, normals, n_seen, look_of, here, common):
-    """Whether left and right are exchanged now, of all joints and of the legs; whether the worker
-    is found.
-
-    Each happens while a normal variable that changes slowly is in its lower tail, which is as
-    large as the share of the time that it happens when so many joints are seen from here.
-    """
+    """Whether left and right are exchanged now, of all joints and of the legs, and whether the
+    worker is found. Each happens while a slow normal variable is in its lower tail, as large as the
+    share of the time that it happens when so many joints are seen from here."""
     low, high, part = _between(look_of[VIEW], N_VIEWS)
     share = here.swap_share
     swap = _lerp(share[low, 0], share[high, 0], part)

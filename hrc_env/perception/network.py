@@ -1,8 +1,8 @@
 """The BlazePose networks as plain functions from an image to raw tensors, on LiteRT or OpenVINO.
 
-Each function belongs to one thread at a time; load one per thread. LiteRT gives the same bits on
-every machine with the same instructions, whatever the number of threads. The official landmark file
-also computes a segmentation mask and world landmarks, 40 % of its time, which `prune` drops.
+Load one function per thread. LiteRT gives the same bits on every machine with the same
+instructions. The official landmark file also computes a segmentation mask and world landmarks, 40 %
+of its time, which `prune` drops.
 """
 
 import functools

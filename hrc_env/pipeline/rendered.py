@@ -52,7 +52,7 @@ class PixelPipeline(PoseTracking):
             else:
                 time_s[row] = self._take_images(now, row, b, self.recent)
                 has_image = np.isfinite(time_s[row]).tolist()
-            self.looking.look(self.images, expected, row, b, has_image, seen)
+            self.looking.look(self.images, one(expected, row), b, has_image, one(seen, row))
         return replace(seen, time_s=time_s)
 
     def _take_images(self, now: SensorInput, row: int, b: int, recent: Recent) -> Floats:
