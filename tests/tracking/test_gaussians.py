@@ -33,7 +33,7 @@ def test_swapped_views_are_undone(name):
         e.update(state, keypoints(frame), rngs)
         if t == 75:
             assert state.views.swap_chance[0, 0, 0, 1] > 0.9
-            assert state.views.swap_chance[0, 0, [0, 2, 3]].max() < 0.1
+            assert state.views.swap_chance[0, 0, 0, [0, 2, 3]].max() < 0.1
     assert state.views.swap_chance.max() < 0.1
 
 

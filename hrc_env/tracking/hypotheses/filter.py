@@ -46,7 +46,8 @@ def _move(own, model, dt, s, work):
     several = own.n_alive[0] > 1
     for h in range(own.n_alive[0]):
         tree = own.trees[h]
-        work.offset[:], work.offset_count[:] = tree.offset, tree.offset_count
+        if several:
+            work.offset[:], work.offset_count[:] = tree.offset, tree.offset_count
         predict_tree(tree, model, dt, work)
         if several:
             tree.offset[:], tree.offset_count[:] = work.offset, work.offset_count
