@@ -81,8 +81,7 @@ def source_digest(made: Any) -> str:
 
 @cache
 def _surroundings() -> str:
-    """The versions of Python and libraries, and the content of every data file: bodies,
-    calibrations, scenery, networks of our own."""
+    """Versions of Python and libraries, and the content of every data file."""
     from hrc_env.worker.body import assets_dir  # here: --help of a command imports no compiler
 
     versions = {"python": sys.version}
