@@ -38,11 +38,9 @@ Steps = Iterator[tuple[float, dict[str, Any]]]
 def film_episode(
     make: Make, path: Path, seed: int = 0, n_steps: int = 250, **kwargs: Any
 ) -> dict[str, float]:
-    """Film `n_steps` of an agent, every second one, into an .mp4 file; returns what came of them,
-    by name and [unit].
+    """Film an agent in the `HRCEnv` of `kwargs` into an .mp4 file; what came of it, by name [unit].
 
-    A still of the closest moment that is no near miss yet (or of the first step) is written beside
-    it as .png. `kwargs` are those of `HRCEnv`.
+    A still of the closest moment that is no near miss yet, or of the first, is written beside it.
     """
     level = kwargs.get("perception", "pixels")
     compile_kernels(Console(), level)
