@@ -16,6 +16,8 @@ import hrc_env
 
 LIBRARIES = ("numpy", "numba", "scipy", "mujoco", "gymnasium", "opencv-python-headless",
              "ai-edge-litert", "openvino", "torch", "stable-baselines3")  # fmt: skip
+OURS = ("hrc_env", "agents", "benchmarks", "assets")
+"""Packages of this repository; where it is installed, others lie beside them."""
 _PACKAGE = Path(hrc_env.__file__).resolve().parent
 _CODE = {".py", ".pyc"}
 
@@ -50,6 +52,8 @@ def sources_of(*modules: str) -> set[Path]:
 def _file(name: str) -> Path | None:
     """The source of a module, in a clone or an installed package; None if it is another's."""
     parts = name.split(".")
+    if parts[0] not in OURS:
+        return None
     is_inside = parts[0] == "agents" and (_PACKAGE / "agents").is_dir()
     path = (_PACKAGE if is_inside else _PACKAGE.parent).joinpath(*parts)
     files = path.with_suffix(".py"), path / "__init__.py"
