@@ -78,8 +78,7 @@ def project(P: Floats, points_world: Points3) -> tuple[Points2, Floats]:
 
 
 def rays(camera: PinholeCamera, pixels: Points2) -> Points3:
-    """Unit directions in the world, (..., 3), of pixels (..., 2) of one camera's image; NaN where
-    its lens lets nothing through."""
+    """Unit directions in the world, (..., 3), of image pixels (..., 2); NaN where none is seen."""
     if camera.lens is None:
         homogeneous = np.concatenate([pixels, np.ones((*pixels.shape[:-1], 1))], -1)
         direction_cam = homogeneous @ np.linalg.inv(camera.K).T
@@ -97,8 +96,7 @@ def image_from_pinhole(camera: PinholeCamera, pixels: Points2) -> Points2:
 
 
 def pinhole_from_image(camera: PinholeCamera, pixels: Points2) -> Points2:
-    """Where a pinhole would show what the image shows at pixels (..., 2); NaN beyond
-    `geometry.lens.PINHOLE_RAD` from the axis."""
+    """Where a pinhole would show what the image shows at pixels (..., 2); NaN where nowhere."""
     if camera.lens is None:
         return pixels
     return _in_pixels(camera, undistort(camera.lens, _normalised(camera, pixels)))
