@@ -1,4 +1,4 @@
-"""Some rows of a batch: states are records of arrays whose first axis is the environment.
+"""States: records of arrays whose first axis is the environment; their rows, copies, saved ones.
 
 An organ that works on a few environments only (a reset of 3 of 64) works on a record of
 their rows; as no result depends on the size of the batch, that is the same computation.
@@ -8,13 +8,14 @@ import copy
 import dataclasses
 import functools
 from collections.abc import Callable, Sequence
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
 from hrc_env.core.typing import Bools, Ints
 
 RecordT = TypeVar("RecordT")
+State = dict[str, Any]
 
 
 def rows(record: RecordT, ids: Ints | Bools) -> RecordT:
@@ -58,6 +59,29 @@ def copied(value: Any) -> Any:
 def picked(streams: Sequence[np.random.Generator], ids: Ints) -> list[np.random.Generator]:
     """The generators of environments `ids`."""
     return [streams[b] for b in ids]
+
+
+class Stateful:
+    """Saves and brings back the attributes in `CHANGES`; the others are settings and constants."""
+
+    CHANGES: ClassVar[tuple[str, ...]] = ()
+
+    def get_state(self) -> Any:
+        """A copy of everything that changes; `set_state` brings it back bit for bit."""
+        parts = {name: getattr(self, name) for name in self.CHANGES}
+        return {
+            name: part.get_state() if hasattr(part, "get_state") else copied(part)
+            for name, part in parts.items()
+        }
+
+    def set_state(self, state: Any) -> None:
+        """Continue from a state of a thing with the same settings; the state stays as it is."""
+        for name in self.CHANGES:
+            part = getattr(self, name)
+            if hasattr(part, "set_state"):
+                part.set_state(state[name])
+            else:
+                setattr(self, name, copied(state[name]))
 
 
 @functools.cache

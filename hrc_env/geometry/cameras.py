@@ -6,7 +6,7 @@ Pixels are continuous from the image's top-left corner: pixel centres lie at hal
 axes are OpenCV's: +X right, +Y down, +Z forward.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -61,6 +61,14 @@ def pinhole(
     return PinholeCamera(name, K, T_world_from_cam, width_px, height_px)
 
 
+def resized(camera: PinholeCamera, width_px: int, height_px: int) -> PinholeCamera:
+    """The camera with an image so wide; of its height as much as fits, round the middle."""
+    K = camera.K * width_px / camera.width_px
+    K[1, 2] += (height_px - camera.height_px * width_px / camera.width_px) / 2
+    K[2, 2] = 1.0
+    return replace(camera, K=K, width_px=width_px, height_px=height_px)
+
+
 def projections(cameras: tuple[PinholeCamera, ...]) -> Floats:
     """(C, 3, 4) projection matrices of a rig."""
     return np.stack([camera.P for camera in cameras])
@@ -78,8 +86,7 @@ def project(P: Floats, points_world: Points3) -> tuple[Points2, Floats]:
 
 
 def rays(camera: PinholeCamera, pixels: Points2) -> Points3:
-    """Unit directions in the world, (..., 3), of pixels (..., 2) of one camera's image; NaN where
-    its lens lets nothing through."""
+    """Unit directions in the world, (..., 3), of image pixels (..., 2); NaN where none is seen."""
     if camera.lens is None:
         homogeneous = np.concatenate([pixels, np.ones((*pixels.shape[:-1], 1))], -1)
         direction_cam = homogeneous @ np.linalg.inv(camera.K).T
@@ -97,8 +104,7 @@ def image_from_pinhole(camera: PinholeCamera, pixels: Points2) -> Points2:
 
 
 def pinhole_from_image(camera: PinholeCamera, pixels: Points2) -> Points2:
-    """Where a pinhole would show what the image shows at pixels (..., 2); NaN beyond
-    `geometry.lens.PINHOLE_RAD` from the axis."""
+    """Where a pinhole would show what the image shows at pixels (..., 2); NaN where nowhere."""
     if camera.lens is None:
         return pixels
     return _in_pixels(camera, undistort(camera.lens, _normalised(camera, pixels)))

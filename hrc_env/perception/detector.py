@@ -14,10 +14,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from hrc_env.core.batching import Stateful
 from hrc_env.core.errors import ConfigError, check_shape, unknown
 from hrc_env.core.records import Roi
 from hrc_env.core.skeleton import BLAZEPOSE_INDEX, N_JOINTS
-from hrc_env.core.stateful import Stateful
 from hrc_env.core.typing import Floats, Image, Points2
 from hrc_env.geometry.cameras import PinholeCamera, inside_image
 from hrc_env.perception import blazepose, network
@@ -55,8 +55,7 @@ class DetectorConfig:
     gate_every: int = 25
     """The detector stage is also asked once in so many looks: a second at 25 Hz."""
     max_offset: float = 0.25
-    """The detector stage must find the hips within this share of the window's side from its
-    middle: else it is somebody else."""
+    """Hips further from the window's middle, as a share of its side, are somebody else's."""
     outside_confidence: float = 0.1
     """Joints that the network places outside the image are guesses: at most this visible."""
     search_step: float = 0.5
@@ -72,8 +71,7 @@ class DetectorConfig:
     """What finds joints in crops: BlazePose's landmark network, or another function that was
     registered (`hrc_env.register_detector`); people are always searched for by BlazePose."""
     folded: str = "full"
-    """The landmark network for workers who are bent, squatting or kneeling; "heavy" is more exact
-    there, and three times as slow."""
+    """The landmark network for who is bent, squats or kneels; "heavy" is more exact, and slower."""
 
     def __post_init__(self) -> None:
         if self.runtime not in network.RUNTIMES:

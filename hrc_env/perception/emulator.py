@@ -34,11 +34,9 @@ class EmulatorConfig:
     max_error: float = 0.4
     """No camera's error is larger than this share of the window's side: it holds one body."""
     swap_share: float | None = None
-    """Share of the time that a camera exchanges left and right, whatever the view; None: as
-    calibrated."""
+    """Share of the time that a camera exchanges left and right; None: as calibrated, by view."""
     miss_share: float | None = None
-    """Share of the time that a camera loses a worker, however much of them is seen; None: as
-    calibrated."""
+    """Share of the time that a camera loses a worker; None: as calibrated, by joints in sight."""
     min_joints: int = 1
     """Fewer joints (of 15) in sight of a camera, and it does not see the worker."""
     outside_confidence: float = 0.1

@@ -30,8 +30,7 @@ SEARCH_RAD = math.radians(75.0)
 DIFFERENCE = 20
 """Grey levels by which a pixel must differ from the empty place, in one colour at least."""
 MEND_PX, MEDIAN_PX = 7, 3
-"""Of a crop: parts of one thing are less than the first apart; a median over the second removes
-noise."""
+"""Of a crop: parts of one thing are less than the first apart; a median over the second smooths."""
 LEAST_PX, MOST_SHARE, MOST_PLACES = 40, 0.7, 5
 """Least area of a change [px of a crop]; share of a crop above which it is looked at as a whole;
 places in a window."""
@@ -79,8 +78,7 @@ def search_jobs(
 
 
 def changed(crop: Image, empty: Image, window: Roi) -> list[Roi]:
-    """Upright windows round what is in a crop of `window` and not in the same of the empty place,
-    the largest first."""
+    """Windows round what differs between a crop of `window` and the empty place, largest first."""
     differs = cv2.absdiff(crop, empty).max(-1)
     mask = (cv2.medianBlur(differs, MEDIAN_PX) > DIFFERENCE).astype(np.uint8)
     mask = cv2.dilate(mask, np.ones((MEND_PX, MEND_PX), np.uint8))
@@ -107,8 +105,7 @@ def people(detect: PersonDetector, crop: Image) -> list[blazepose.Person]:
 
 
 def search_windows(camera: PinholeCamera, step: float = 0.5) -> list[Roi]:
-    """Upright squares that overlap and together cover a camera's image: as large as fit, through a
-    lens no larger than `SEARCH_RAD`."""
+    """Upright squares, as large as image and lens (`SEARCH_RAD`) allow, that cover the image."""
     side = float(min(camera.width_px, camera.height_px))
     if camera.lens is not None:
         side = min(side, SEARCH_RAD * float(camera.K[0, 0]))

@@ -79,8 +79,7 @@ def cache_dir() -> Path:
 
 
 def find_weights(name: str) -> Path:
-    """The path of a weights file, its checksum verified (once per process). Raises `WeightsError`
-    where it is missing or not the official one."""
+    """A weights file, checked once per process. Raises `WeightsError` if missing or another."""
     if name not in WEIGHTS:
         raise unknown("weights", name, WEIGHTS)
     path = cache_dir() / f"{name}.tflite"
@@ -94,8 +93,7 @@ def find_weights(name: str) -> Path:
 
 
 def fetch_weights(names: Iterable[str] = ALWAYS) -> dict[str, Path]:
-    """Weights by name in the cache folder, downloading only what is not there yet. Raises
-    `WeightsError` where that does not succeed."""
+    """Weights by name; downloads what is not there yet. Raises `WeightsError` where that fails."""
     found, missing = {}, []
     for name in names:
         try:

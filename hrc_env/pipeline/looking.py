@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
+from hrc_env.core.batching import Stateful
 from hrc_env.core.records import Keypoints, PoseEstimate, Roi
-from hrc_env.core.stateful import Stateful
 from hrc_env.core.typing import Image
 from hrc_env.geometry.cameras import PinholeCamera, project, projections
 from hrc_env.perception.detector import Detection, DetectorConfig, PoseDetector
@@ -72,9 +72,7 @@ class Looking(Stateful):
             taken.append(seen.windows)
             self.reacquisition.saw(b, worker, seen.confidence.max(-1) > 0.0)
             missed |= not any(windows) and not seen.confidence.any()
-            self._keep(b, worker, seen, has_image)
-            out.px[:, worker], out.confidence[:, worker] = seen.px, seen.confidence
-            out.sigma_px[:, worker] = seen.sigma_px
+            self._keep(b, worker, seen, has_image, out)
         if missed:
             self.schedule.rest(b)
 
@@ -92,7 +90,11 @@ class Looking(Stateful):
         current = self.windows[b][0] if self.windows[b] else []
         return crops if windows == current else [None] * len(current)
 
-    def _keep(self, b: int, worker: int, seen: Detection, has_image: Sequence[bool]) -> None:
+    def _keep(
+        self, b: int, worker: int, seen: Detection, has_image: Sequence[bool], out: Keypoints
+    ) -> None:
+        out.px[:, worker], out.confidence[:, worker] = seen.px, seen.confidence
+        out.sigma_px[:, worker] = seen.sigma_px
         for c, has in enumerate(has_image):
             if has:
                 self.windows[b][worker][c] = seen.windows[c]

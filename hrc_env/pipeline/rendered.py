@@ -61,12 +61,10 @@ class PixelPipeline(PoseTracking):
         before = recent.at(b, step - 1)
         actual = recent.schedule.actual(self.scene.cameras, recent.seeds[b], step)
         last = pose if before is None else (before.q, before.motion)
-        recent.keep(b, Shot(step, *pose, last, actual))
-        frames = recent.frames(b)
-        shots = [None if frame is None else recent.at(b, frame.shows) for frame in frames]
+        shots, times_s = recent.arrived(b, Shot(step, *pose, last, actual))
         if isinstance(self.images, CameraFilm):
             self.images.show(shots, recent.seeds[b])
-        return recent.times_s(frames)
+        return times_s
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
         """Forget the tracks, and who was followed."""

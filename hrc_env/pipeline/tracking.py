@@ -5,10 +5,9 @@ from typing import Any
 import numpy as np
 
 from hrc_env.config import HRCConfig
-from hrc_env.core.batching import rows, write_rows
+from hrc_env.core.batching import Stateful, rows, write_rows
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.stateful import Stateful
 from hrc_env.core.typing import Bools, Floats, Image, Ints
 from hrc_env.geometry.cameras import projections
 from hrc_env.perception.faults.schedule import Recent, Schedule
@@ -24,8 +23,7 @@ from hrc_env.tracking.people.association import associate
 
 
 class PerceptionPipeline(Stateful):
-    """One perception level with its estimator, for a batch of environments; here, one without
-    cameras and memory."""
+    """One perception level with its estimator, for a batch; here, without cameras and memory."""
 
     NEEDS_TRUTH: bool = False
     """Whether `perceive` is to be given a `TrueSensorInput`."""
@@ -48,8 +46,7 @@ class PerceptionPipeline(Stateful):
         return None, []
 
     def crops(self, b: int) -> list[Image | None]:
-        """What the network was given of environment `b`'s first worker, one a camera (for
-        pictures); none where there is no network."""
+        """What the network was given of `b`'s first worker, one a camera (for pictures)."""
         return []
 
     def look_of(self, b: int) -> Look | None:

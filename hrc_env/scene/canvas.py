@@ -179,8 +179,7 @@ class Canvas:
         return np.stack([right, np.cross(along, right), along], -1)
 
     def movers(self) -> tuple[Floats, Floats]:
-        """Spheres round all that moves, a worker's capsules for the skin: middles (N, 3) and radii
-        (N,) [m]."""
+        """Middles (N, 3) and radii (N,) [m] of spheres round all that moves; skins by capsules."""
         model, of = self._model, self._model.geom_bodyid
         moving = (model.body_weldid[of] != 0) | (model.body_mocapid[of] >= 0)
         moving &= self._data.geom_xpos[:, 2] > PARKED_M[2] / 2

@@ -64,11 +64,8 @@ def draw_on_one_thread() -> None:
 
 @functools.cache
 def load_triton_first() -> None:
-    """Load the library of triton, if it is installed, before Mesa's first context or window.
-
-    Mesa opens its drivers, and libLLVM with them, for all to see; triton's library, loaded after
-    that (`torch.optim` does it), takes that LLVM for its own and crashes.
-    """
+    """Load the library of triton, if it is installed, before Mesa's first context or window: loaded
+    after that (`torch.optim` does it), it takes Mesa's LLVM for its own and crashes."""
     with contextlib.suppress(OSError, ValueError):  # no triton that anybody could load later
         triton = importlib.util.find_spec("triton")
         late = "libLLVM" in Path("/proc/self/maps").read_text()  # somebody has drawn already

@@ -17,14 +17,10 @@ from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, JointVelocitie
 from hrc_env.scene.build import Scene, without_workers
 from hrc_env.scene.worker import CAPSULE_FIELDS, capsule_shapes
 
-INPUTS = int(
-    mujoco.mjtState.mjSTATE_CTRL
-    | mujoco.mjtState.mjSTATE_MOCAP_POS
-    | mujoco.mjtState.mjSTATE_MOCAP_QUAT
-)
-"""What a substep is given: servo commands, then places, then turns of the workers' bodies."""
 COMMANDS = int(mujoco.mjtState.mjSTATE_CTRL)
-"""The same without workers."""
+"""What a substep without workers is given: servo commands."""
+INPUTS = COMMANDS | int(mujoco.mjtState.mjSTATE_MOCAP_POS | mujoco.mjtState.mjSTATE_MOCAP_QUAT)
+"""And with workers: then the places, then the turns of their bodies."""
 OF_THE_ARM = ("time", "qpos", "qvel", "act", "qacc_warmstart")
 """What of an environment's state the arm's motion hangs on, and changes."""
 SERVO = np.dtype(

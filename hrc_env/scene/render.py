@@ -52,11 +52,8 @@ def viewpoint_camera(name: str, width: int, height: int) -> PinholeCamera:
 
 
 class CropRenderer(Canvas):
-    """Square crops of the cameras' images: what the detector sees.
-
-    What never moves is drawn once for a window that comes again: then only the arm and the
-    workers are drawn and laid over it by depth, the same pixels in half the time.
-    """
+    """Square crops of the cameras' images: what the detector sees. Where a window comes again, what
+    moves is laid by depth over what does not, drawn once: the same pixels in half the time."""
 
     def __init__(self, scene: Scene, size_px: int = CROP_PX) -> None:
         gl.draw_on_one_thread()

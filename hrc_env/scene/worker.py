@@ -19,8 +19,7 @@ CAPSULE_FIELDS = ("geom_pos", "geom_quat", "geom_size", "geom_rbound", "geom_aab
 
 
 def add_worker(spec: Any, body: Body, prefix: str) -> None:
-    """Add a worker in its rest pose to a model that is being built; every name begins with the
-    prefix, for example "worker_1/"."""
+    """Add a worker in its rest pose to a model being built; names begin with the prefix."""
     segments = {
         name: spec.worldbody.add_body(name=prefix + name, pos=position, mocap=True)
         for name, position in zip(SEGMENTS, body.rest_position, strict=True)

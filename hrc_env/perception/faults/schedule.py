@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import cv2
 import numpy as np
 
-from hrc_env.core.stateful import Stateful
+from hrc_env.core.batching import Stateful
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.geometry.cameras import PinholeCamera
@@ -156,24 +156,19 @@ class Recent(Stateful):
                 del self._kept[b][old]
         return step
 
-    def keep(self, b: int, record: Any) -> None:
-        """Keep a record of the present step."""
-        self._kept[b][int(self.steps[b])] = record
-
     def at(self, b: int, step: int) -> Any:
         """The record of a step; None if it was never kept."""
         return self._kept[b].get(step)
 
-    def frames(self, b: int) -> list[Frame | None]:
-        """What each camera gives environment b at its present step."""
-        frame, seed, step = self.schedule.frame, self.seeds[b], int(self.steps[b])
-        return [frame(seed, step, c) for c in range(len(self.schedule.cameras))]
-
-    def times_s(self, frames: Sequence[Frame | None]) -> Floats:
-        """(C,) when images were taken, as they say, on the tracker's clock, on which the reset's
-        image is one step old [s]; NaN: no image."""
-        dt_s = self.schedule.dt_s
-        return np.array([np.nan if f is None else (f.taken + 1) * dt_s for f in frames])
+    def arrived(self, b: int, record: Any) -> tuple[list[Any], Floats]:
+        """Keep a record of the present step; those that the cameras (C,) show now, None without an
+        image, and (C,) when these were taken, as they say [s; the reset's at `dt_s`]; NaN: none."""
+        schedule, seed, step = self.schedule, self.seeds[b], int(self.steps[b])
+        self._kept[b][step] = record
+        frames = [schedule.frame(seed, step, c) for c in range(len(schedule.cameras))]
+        records = [None if frame is None else self.at(b, frame.shows) for frame in frames]
+        times_s = [np.nan if f is None else (f.taken + 1) * schedule.dt_s for f in frames]
+        return records, np.array(times_s)
 
 
 def draws(*numbers: int) -> np.random.Generator:
