@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
+from hrc_env.core.batching import Stateful
 from hrc_env.core.records import Keypoints, PoseEstimate, Roi
-from hrc_env.core.stateful import Stateful
 from hrc_env.core.typing import Image
 from hrc_env.geometry.cameras import PinholeCamera, project, projections
 from hrc_env.perception.detector import Detection, DetectorConfig, PoseDetector

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from hrc_env.core.batching import Stateful
 from hrc_env.core.records import Roi
-from hrc_env.core.stateful import Stateful
 from hrc_env.core.typing import Bools
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.perception.searching import Candidates, agreed_windows, apart_from
