@@ -72,8 +72,8 @@ class Play(EnvironmentArguments):
             window.close()
         counts = inner.simulation.task.counts(info).items()
         said = [f"return {total:.1f}", *(f"{name} {n:.0f}" for name, n in counts)]
-        said += [f"cost {info['episode_cost']:.0f}"]
-        said += [f"{step / (time.monotonic() - started_s):.0f} steps/s"]
+        pace = step / (time.monotonic() - started_s)
+        said += [f"cost {info['episode_cost']:.0f}", f"{pace:.0f} steps/s"]
         Console().print(f"seed {seed}: {', '.join(said)}")
 
 
