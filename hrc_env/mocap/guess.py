@@ -1,4 +1,4 @@
-"""A first control vector from joints, by geometry alone; `fit` improves it."""
+"""A first control vector from joints, by geometry alone; `retarget.fitted` improves it."""
 
 import numpy as np
 
@@ -49,9 +49,7 @@ def first_guess(joints: Points3, fps: float, marks: Marks) -> Floats:
 
 def _arm(q: Floats, side: int, name: str, joints: Points3, chest_yaw: Floats) -> None:
     """Where the grip is from the shoulder, and the elbow's swivel, in the chest's level frame."""
-    shoulder, elbow, wrist = (
-        joints[:, JOINT[name + part]] for part in ("shoulder", "elbow", "wrist")
-    )
+    shoulder, elbow, wrist = (joints[:, JOINT[name + p]] for p in ("shoulder", "elbow", "wrist"))
     fore = wrist - elbow
     grip = wrist + GRIP_M * fore / np.linalg.norm(fore, axis=-1, keepdims=True)
     reach = _turned(grip - shoulder, -chest_yaw)
@@ -74,8 +72,7 @@ def _swivel(reach: Points3, elbow: Points3, hanging: Floats, outward: Floats) ->
 
 
 def _foot(q: Floats, side: int, name: str, joints: Points3, marks: Marks) -> None:
-    """Ankle, heading and pitch of a foot; who kneels on its back pitches it beyond the vertical,
-    rather than turn it round."""
+    """Ankle, heading and pitch of a foot; beyond the vertical for who kneels on its back."""
     ankle, tip = JOINT[name + "ankle"], JOINT[name + "foot"]
     way, rest = joints[:, tip] - joints[:, ankle], marks.rest[tip] - marks.rest[ankle]
     pelvis = q[:, c.HEADING] + q[:, c.PELVIS_YAW]
@@ -102,5 +99,4 @@ def _turned(points: Points3, yaw: Floats) -> Points3:
 
 
 def _wrapped(angle: Floats) -> Floats:
-    """In [-pi, pi)."""
     return (angle + np.pi) % (2 * np.pi) - np.pi

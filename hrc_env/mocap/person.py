@@ -7,10 +7,9 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import BONE_LENGTH_M, BONES, JOINT, JOINTS
 from hrc_env.core.typing import Bools, Floats, Points3
 
-MEASURED_SHARE = 0.755
-"""Shank, thigh and trunk together as a share of stature (the baked bodies)."""
-STRANGE = 2.0
-"""A bone so many times longer or shorter than of an adult of the same stature is a mistake."""
+MEASURED_SHARE, STRANGE = 0.755, 2.0
+"""Shank, thigh and trunk together as a share of stature (the baked bodies); a bone so many times
+longer or shorter than of an adult of the same stature is a mistake."""
 
 
 def middle(joints: Points3, part: str) -> Points3:

@@ -1,7 +1,7 @@
 """Feet that stand: found in a fitted motion, and locked so that they do not slide.
 
-A foot stands whose footprint rests: where the ankle would be if it were flat. That is set to one
-place then, and what that changes fades out in the swings before and after.
+A foot stands while its footprint, where a flat foot's ankle would be, rests. That is set to one
+place then, and the change fades out in the swings before and after.
 """
 
 import numpy as np
@@ -92,10 +92,7 @@ def _corrections(
 
 def _fading(n: int, value: Floats, rate: Floats, fps: float) -> Floats:
     """(n, 4) the frames after one with a value and a rate, falling to zero within them."""
-    lasts = min(FADE_S, (n + 1) / fps)
-    return np.array(
-        [
-            [decay((k + 1) / fps / lasts, lasts, v, r) for v, r in zip(value, rate, strict=True)]
-            for k in range(n)
-        ]
-    ).reshape(n, 4)
+    lasts, out = min(FADE_S, (n + 1) / fps), np.empty((n, 4))
+    for k, i in np.ndindex(out.shape):
+        out[k, i] = decay((k + 1) / fps / lasts, lasts, value[i], rate[i])
+    return out

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError
+from hrc_env.core.errors import ConfigError, check_shape
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import ANKLE_Z, ARM, BALL_X, BALL_Z, HEEL_X, LEG, N_SIZES, STAND_Z
@@ -17,10 +17,8 @@ VERSION = 1
 """Of the file; raised when its columns or fields change."""
 RECORDED = np.array([*range(c.N_BLENDED), *range(c.ANKLE, c.ANKLE + 12)])
 """(32,) columns of the control vector that a recording fills: all that is blended, both feet."""
-SLOWEST_HZ, FASTEST_HZ = 5.0, 1000.0
-"""Frame rates between which a recording is believed; judgement: below, a step is lost."""
-FARTHEST_M, FASTEST_M_S = 200.0, 15.0
-"""Clips whose root goes beyond these are damaged; judgement."""
+SLOWEST_HZ, FASTEST_HZ, FARTHEST_M, FASTEST_M_S = 5.0, 1000.0, 200.0, 15.0
+"""Frame rates between which a recording is believed, and how far and fast its root; judgement."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,7 +40,6 @@ class Clip:
         _check(self)
 
     def __eq__(self, other: object) -> bool:
-        """Whether it is the same motion, number by number."""
         return isinstance(other, Clip) and all(
             np.array_equal(getattr(self, item.name), getattr(other, item.name))
             for item in fields(self)
@@ -53,7 +50,6 @@ class Clip:
 
     @property
     def duration_s(self) -> float:
-        """From the first frame to the last [s]."""
         return (len(self.controls) - 1) / self.fps
 
 
@@ -139,12 +135,10 @@ def _check(clip: Clip) -> None:
     """Refuse shapes, numbers or speeds that no recording has."""
     q, source = clip.controls, clip.source
     check_rate(clip.fps, source)
-    expected = {"contacts": (len(q), 2), "size": (N_SIZES,)}
     if q.ndim != 2 or len(q) < 2 or q.shape[1] != c.N_CONTROLS:
         raise ConfigError(f"{source}: controls must be (T >= 2, {c.N_CONTROLS}), got {q.shape}.")
-    for name, shape in expected.items():
-        if getattr(clip, name).shape != shape:
-            raise ConfigError(f"{source}: {name} must be {shape}, got {getattr(clip, name).shape}.")
+    check_shape(f"{source}: contacts", clip.contacts.shape, (len(q), 2), "frames, feet")
+    check_shape(f"{source}: size", clip.size.shape, (N_SIZES,), "lengths")
     if not (np.isfinite(q).all() and np.isfinite(clip.size).all() and clip.size[LEG] > 0.0):
         raise ConfigError(f"{source}: controls and size must be finite numbers.")
     root = q[:, [c.ROOT_X, c.ROOT_Y]]

@@ -1,8 +1,9 @@
-"""Smooth scalar curves that every activity is made of; never `fastmath`, or bits would move."""
+"""Smooth curves and places on the floor that every activity is made of; never `fastmath`."""
 
 import math
 
 from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 
 
 @kernel
@@ -81,6 +82,19 @@ def decay(u: float, duration: float, value: float, rate: float) -> float:
 def wrap(angle: float) -> float:
     """The same direction in (-pi, pi]."""
     return math.atan2(math.sin(angle), math.cos(angle))
+
+
+@kernel
+def placed(x: float, y: float, yaw: float, ahead: float, left: float) -> tuple[float, float]:
+    """The point so far ahead and to the left of who is at (x, y) and faces yaw."""
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    return x + cos * ahead - sin * left, y + sin * ahead + cos * left
+
+
+@kernel
+def shift(q: Floats, at: int, yaw: float, ahead: float, left: float) -> None:
+    """Move the point (q[at], q[at + 1]) ahead and to the left of who faces yaw."""
+    q[at], q[at + 1] = placed(q[at], q[at + 1], yaw, ahead, left)
 
 
 @kernel

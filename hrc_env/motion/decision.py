@@ -69,7 +69,6 @@ class Decision:
 
     @property
     def me(self) -> Worker:
-        """Their record."""
         return self.workers[self.w]
 
     def go(self, going: int) -> None:
@@ -91,7 +90,6 @@ class Decision:
 
     @property
     def loaded(self) -> bool:
-        """Whether they hold something."""
         return bool(self.me["load_prop"] > 0)
 
     def draw(self, index: int, limits: tuple[float, float]) -> float:
@@ -133,14 +131,14 @@ def _candidates(who: Decision, kind: str) -> Iterator[Place]:
     if kind == HERE:
         yield tuple(who.me["spot"].tolist())  # type: ignore[misc]
     elif kind == "robot":
-        config, ground = mind.config, mind.plan
+        config, plan, grounds = mind.config, mind.plan, mind.plan.grounds
         for radius, azimuth, turn in zip(draws[::3], draws[1::3], draws[2::3], strict=True):
             low, high = config.near_radius_m
             r = low + radius * (high - low)
-            angle = ground.robot_front_rad + config.near_azimuth_rad * (2.0 * azimuth - 1.0)
-            x = ground.robot_xy_m[0] + r * math.cos(angle)
-            y = ground.robot_xy_m[1] + r * math.sin(angle)
-            if slack_at(x, y, ground.slack, ground.origin) >= 0.0:
+            angle = grounds.robot_front_rad + config.near_azimuth_rad * (2.0 * azimuth - 1.0)
+            x = grounds.robot_xy_m[0] + r * math.cos(angle)
+            y = grounds.robot_xy_m[1] + r * math.sin(angle)
+            if slack_at(x, y, plan.slack, plan.origin) >= 0.0:
                 yield x, y, angle + math.pi + 0.15 * (2.0 * turn - 1.0), ROBOT_WORK_M
     else:
         places = mind.places[kind]

@@ -4,14 +4,13 @@ import math
 
 from hrc_env.core.kernels import kernel
 from hrc_env.motion import controls as c
+from hrc_env.motion.activities.work import GAZE_LEAD_S
 from hrc_env.motion.anatomy import ARM, HAND, LEFT, SIDE_STRIDE, UPPER_ARM
-from hrc_env.motion.curves import hump, min_jerk
+from hrc_env.motion.curves import hump, min_jerk, shift
 from hrc_env.motion.kinematics import ARM_KNEE
 from hrc_env.motion.posture import MOST_LEAN, beyond, farthest, from_here, lean, stand
 from hrc_env.motion.state import Pair, Triple, Worker
 
-GAZE_LEAD_S = 0.25
-"""Eyes and head set off before the hand (Land & Hayhoe 2001: about half a second at most)."""
 SPARE_LEAN = 0.04
 """Lean beyond the least, because the sway of a standing body may take as much away."""
 CARRY_FORWARD_M, CARRY_Z_M, LOAD_HALF_WIDTH_M = 0.36, 1.05, 0.20
@@ -72,13 +71,10 @@ def lift(t: float, clock_s: float, me: Worker) -> None:
     away = min_jerk((t - leave) / me.back_s)
     lean(me.lean * (down - up - away), me.squat, 0.0, me)
     _look(down - 0.6 * up - away, me)
-    bulge = 0.06 * hump(up)
-    cos, sin = math.cos(me.start_yaw), math.sin(me.start_yaw)
     for i in range(6):
         q[c.HAND_TARGET + i] = me.target[i] + up * (me.raised[i] - me.target[i])
     for side in range(2):
-        q[c.HAND_TARGET + 3 * side] += cos * bulge
-        q[c.HAND_TARGET + 3 * side + 1] += sin * bulge
+        shift(q, c.HAND_TARGET + 3 * side, me.start_yaw, 0.06 * hump(up), 0.0)
         q[c.HAND_SHARE + side] = down - away
 
 
@@ -95,24 +91,20 @@ def _settle_lean(me: Worker) -> None:
         far = beyond(used, me)
         if attempt == 0 and far <= 0.0:
             return
-        if attempt > 0:
-            if far > 0.0:
-                low = me.lean
-            else:
-                high = me.lean
+        if far > 0.0:  # at first from `low` itself
+            low = me.lean
+        else:
+            high = me.lean
         me.lean = 0.5 * (low + high)
     me.lean = high + SPARE_LEAN
     if high < MOST_LEAN:
         return
     for side in range(2):
         upper = LEFT + SIDE_STRIDE * side + UPPER_ARM
-        target = me.target[3 * side : 3 * side + 3]
-        d = math.sqrt(
-            (target[0] - p[upper, 0]) ** 2
-            + (target[1] - p[upper, 1]) ** 2
-            + (target[2] - p[upper, 2]) ** 2
-        )
-        nearer = min(1.0, ARM_KNEE * me.size[ARM] / d)
+        target, squared = me.target[3 * side : 3 * side + 3], 0.0
+        for i in range(3):
+            squared += (target[i] - p[upper, i]) ** 2
+        nearer = min(1.0, ARM_KNEE * me.size[ARM] / math.sqrt(squared))
         for i in range(3):
             target[i] = p[upper, i] + nearer * (target[i] - p[upper, i])
 
@@ -139,8 +131,6 @@ def plan_reach(
     me.gaze_pitch = 0.25 + 0.4 * min(max(1.4 - target[2], -0.3), 0.6)
     _settle_lean(me)
     stand(me.start_x, me.start_y, me.start_yaw, 0.0, me)
-    for i in range(6):
-        me.q[c.HAND_TARGET + i] = me.target[i]
     way = max(0.1, farthest(HAND, me.target, used, me))
     me.out_s = max(1.875 * way / peak_m_s, 0.3)
     me.back_s = max(1.875 * way / min(peak_m_s, 1.2), 0.45)

@@ -6,7 +6,7 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion.activities.planning import between, blank
-from hrc_env.motion.curves import cruise, min_jerk
+from hrc_env.motion.curves import cruise, min_jerk, shift
 from hrc_env.motion.feet import step_time
 from hrc_env.motion.posture import RELAXED_ELBOW, RELAXED_PITCH, hang, stand
 from hrc_env.motion.state import Place, Worker
@@ -16,7 +16,7 @@ HIGHEST_RISER_M = 0.32
 FIRST_M, TREAD_M = 0.40, 0.24
 """Where a foot goes on the first tread, and from tread to tread [m]."""
 STEP_AT_S, PERIOD_S, SWING_S = 0.12, 0.72, 0.56
-"""First lift-off, then the times of `plans` of a climber's steps [s]; judgement."""
+"""First lift-off, period and swing of a climber's steps [s]; judgement."""
 TURN_S = 0.75
 """To turn the head across [s]; about 1.5 rad/s."""
 
@@ -31,9 +31,7 @@ def climb(t: float, clock_s: float, me: Worker) -> None:
     when = step_time(t, me)
     along = cruise((when - 0.25) / (up_s - 0.25), 0.4)
     risen = cruise((when - 0.50) / (up_s - 0.55), 0.4)
-    ahead = (FIRST_M + TREAD_M * (treads - 1.0)) * along
-    q[c.ROOT_X] += math.cos(yaw) * ahead
-    q[c.ROOT_Y] += math.sin(yaw) * ahead
+    shift(q, c.ROOT_X, yaw, (FIRST_M + TREAD_M * (treads - 1.0)) * along, 0.0)
     q[c.PELVIS_Z] += treads * me.riser_m * risen
     going = min_jerk(when / 0.5) - min_jerk((when - up_s + 0.3) / 0.6)
     q[c.SPINE_FLEX] += 0.14 * going
@@ -54,14 +52,11 @@ def start_climb(draws: Floats, place: Place, me: Worker) -> float:
     first = 1 if draws[1] < 0.5 else 0
     me.step_start, me.step_period, me.step_swing = STEP_AT_S, PERIOD_S, SWING_S
     me.step_first, me.step_count = first, treads + 1
-    cos, sin = math.cos(me.start_yaw), math.sin(me.start_yaw)
     for k in range(treads + 1):
         side, tread = (k + first) % 2, min(k + 1, treads)
-        ahead = FIRST_M + TREAD_M * (tread - 1.0)
         for i in range(3):
             prints[k, i] = me.stance[side, i]
-        prints[k, 0] += cos * ahead
-        prints[k, 1] += sin * ahead
+        shift(prints[k], 0, me.start_yaw, FIRST_M + TREAD_M * (tread - 1.0), 0.0)
         prints[k, 3], prints[k, 4] = 0.25, tread * me.riser_m
     me.up_s = STEP_AT_S + treads * PERIOD_S + SWING_S + 0.1
     me.undo_at = me.up_s + 0.5 * between(draws[2], 0.5, 4.0)

@@ -1,7 +1,6 @@
 """Plans of work in place: with tools, pointing, a lunge, with both hands at floor height.
 
-`plan_...` returns how fast hands may go to the work [m/s], for `planning.finish`. Wrists in the
-recordings: light hammering at 1.4 m/s (95th percentile), driving nails and sawing 1.25 to 2.0.
+`plan_...` returns how fast hands may go to the work [m/s], for `planning.finish`.
 """
 
 import math
@@ -13,29 +12,23 @@ from hrc_env.motion.activities import strokes
 from hrc_env.motion.activities.planning import CALM_M_S, between, dominant
 from hrc_env.motion.activities.work import LOW_M
 from hrc_env.motion.anatomy import ARM, STAND_Z
+from hrc_env.motion.curves import placed
 from hrc_env.motion.state import Place, Worker
 from hrc_env.worker.props import prop_index
 
-HAMMER = prop_index("hammer")
+HAMMER, DRILL, HAND_SAW, TAPE = map(prop_index, ("hammer", "drill", "saw", "tape_measure"))
 HEAD_M, FACE_M = 0.25, 0.05
 """From the fist to the hammer's head along the handle, and to its face [m]; `props`."""
 LIGHT_HZ, LIGHT_M = 5.6, 0.060
 """Light taps: to and fro by 6 cm, at most 1.1 m/s and a little more on the way forward."""
 LOW_SHARE = 0.7
 """Share of a blow's size at floor height, where the trunk is in its way; judgement."""
-WALL_M = 1.2
-"""Nails at this height or higher are driven into a wall, lower ones downwards [m]."""
-DRILL = prop_index("drill")
-BIT_M, BIT_UP_M = 0.22, 0.09
-"""Tip of the bit: ahead of the fist and above it [m]; `props`."""
-THRUST_M = 0.04
-"""How far the drill goes in [m]; a screw."""
-OVERHEAD_M = 1.7
-"""From this height on people work above their head [m]."""
-HAND_SAW = prop_index("saw")
+WALL_M, OVERHEAD_M = 1.2, 1.7
+"""From these heights on nails go into a wall, not downwards; people work above their head [m]."""
+BIT_M, BIT_UP_M, THRUST_M = 0.22, 0.09, 0.04
+"""Tip of the bit: ahead of the fist and above it (`props`); how far it goes in: a screw [m]."""
 CUT_RAD = 0.6
 """How steeply the blade goes into the board [rad]; 45 to 60 degrees to it is usual, judgement."""
-TAPE = prop_index("tape_measure")
 SHOULDER_SHARE, SHOULDER_M = 1.50, 0.19
 """Height of the shoulder in heights of the pelvis, and its distance from the middle [m]."""
 POINT_M_S = 1.5
@@ -98,14 +91,8 @@ def plan_drill(draws: Floats, place: Place, me: Worker) -> float:
     to.put_tool(DRILL, side, at, turn, me)
     to.put_other((beside[0], aside - (0.22 if overhead else 0.12) * sign, beside[1]), me)
     to.look_to((ahead, aside, z), me)
-    to.strokes(
-        strokes.PRESS if overhead else strokes.BORE,
-        THRUST_M,
-        0.0,
-        between(draws[2], 1.5, 1.8),
-        2 + int(3.0 * draws[3]),
-        me,
-    )
+    kind, burst_s = strokes.PRESS if overhead else strokes.BORE, between(draws[2], 1.5, 1.8)
+    to.strokes(kind, THRUST_M, 0.0, burst_s, 2 + int(3.0 * draws[3]), me)
     me.wander_m = 0.12 * sign
     return CALM_M_S
 
@@ -152,15 +139,10 @@ def plan_point(draws: Floats, place: Place, me: Worker) -> float:
     up = between(draws[2], -0.25, 0.25)
     reach = 0.95 * me.size[ARM]
     shoulder_z = SHOULDER_SHARE * me.size[STAND_Z]
-    at = (
-        reach * math.cos(up) * math.cos(aside),
-        SHOULDER_M * sign + reach * math.cos(up) * math.sin(aside),
-        shoulder_z + reach * math.sin(up),
-    )
-    to.put_tool(0, side, at, (0.0, 0.0, 0.0), me)
-    to.look_to(
-        (10.0 * math.cos(aside), 10.0 * math.sin(aside), shoulder_z + 10.0 * math.tan(up)), me
-    )
+    x, y = placed(0.0, SHOULDER_M * sign, aside, reach * math.cos(up), 0.0)
+    to.put_tool(0, side, (x, y, shoulder_z + reach * math.sin(up)), (0.0, 0.0, 0.0), me)
+    x, y = placed(0.0, 0.0, aside, 10.0, 0.0)
+    to.look_to((x, y, shoulder_z + 10.0 * math.tan(up)), me)
     to.strokes(strokes.JAB, 0.03, between(draws[3], 1.2, 1.8), between(draws[4], 0.8, 2.2), 1, me)
     me.twist = 0.35 * aside
     return POINT_M_S
