@@ -54,6 +54,6 @@ def walk_straight(speed_m_s, length_m=6.0, dt_s=0.005):
     state, rngs = started(1)
     me = standing(state)
     lay_path((0.0, 0.0), np.zeros((0, 3)), (length_m, 0.0), me)
-    begin(me, st.WALK, plan_walk((length_m, 0.0, 0.0), speed_m_s, me))
+    begin(me, st.WALK, plan_walk(0.0, speed_m_s, me))
     motion = watched(state, rngs, dt_s, int(me["duration_s"] / dt_s) - 1)
     return SimpleNamespace(motion=motion, plan=me, prints=me["prints"], dt_s=dt_s)

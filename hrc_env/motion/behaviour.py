@@ -17,7 +17,6 @@ from hrc_env.motion.schedule import HERE, picked
 from hrc_env.motion.setting_out import arrived, go, meets_somebody, play, stay, step_back
 from hrc_env.motion.starting import start_here
 from hrc_env.motion.state import NOWHERE, THERE, UNDER_WAY, WAITING
-from hrc_env.worker.props import prop_index
 
 WAIT_S, CHANGE_S, GIVE_UP_S = (0.5, 1.1), 1.5, 4.5
 """After so long who finds no way looks again; does something else; gives up [s]; judgement."""
@@ -161,7 +160,7 @@ def _work(who: Decision, activity: int) -> tuple[int, float]:
     if activity == st.STAND:
         pause_s = config.near_pause_s if near else config.away_pause_s
         return _stand(who.draw(dc.LASTS, pause_s) * config.people.tempo)
-    x, y, yaw, height = me["spot"].tolist()
+    height = me["spot"].item(3)
     if activity in st.GIVING:
         height = min(height, CHEST_M)
     if who.kind_here == "bench":
@@ -169,9 +168,7 @@ def _work(who: Decision, activity: int) -> tuple[int, float]:
     lunges = who.draws[dc.EVENT] > 1.0 - config.people.lunge_probability
     if near and activity == st.REACH and lunges:
         activity = st.LUNGE
-    others, prop = who.workers["spot"][who.others(), :2], prop_index(who.job.prop)
-    place = (x, y, yaw, height)
-    lasts = start_here(activity, who.draws, place, near, others, prop, who.mind.numbers, me)
+    lasts = start_here(who, activity, height)
     if meets_somebody(who, activity, lasts)[0] >= 0.0:
         stay(who)
         if who.kind_here:

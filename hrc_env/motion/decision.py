@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.core.records import WORKPLACE_KINDS, Workplace
+from hrc_env.core.records import WORKPLACE_KINDS
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.motion.activities.playing import Clips
 from hrc_env.motion.anatomy import Anatomy
@@ -34,8 +34,6 @@ class BehaviourParams:
     numbers: Numbers
     plan: Floorplan
     schedule: Schedule
-    places: dict[str, tuple[Workplace, ...]]
-    """By kind."""
     clips: Clips
     anatomy: Anatomy
     """(N, ...) of the bodies that there are."""
@@ -127,11 +125,11 @@ def wished(who: Decision) -> Iterator[Place]:
 
 def _candidates(who: Decision, kind: str) -> Iterator[Place]:
     """Places of a kind: drawn round the robot, the scene's elsewhere, or where the worker is."""
-    mind, draws = who.mind, who.draws[PLACES:].tolist()
+    draws, config, plan = who.draws[PLACES:].tolist(), who.mind.config, who.mind.plan
     if kind == HERE:
         yield tuple(who.me["spot"].tolist())  # type: ignore[misc]
     elif kind == "robot":
-        config, plan, grounds = mind.config, mind.plan, mind.plan.grounds
+        grounds = plan.grounds
         for radius, azimuth, turn in zip(draws[::3], draws[1::3], draws[2::3], strict=True):
             low, high = config.near_radius_m
             r = low + radius * (high - low)
@@ -141,7 +139,7 @@ def _candidates(who: Decision, kind: str) -> Iterator[Place]:
             if slack_at(x, y, plan.slack, plan.origin) >= 0.0:
                 yield x, y, angle + math.pi + 0.15 * (2.0 * turn - 1.0), ROBOT_WORK_M
     else:
-        places = mind.places[kind]
+        places = [place for place in plan.places if place.kind == kind]
         first = int(draws[0] * len(places))
         for place in (*places[first:], *places[:first]):
             yield *place.xy_m, place.yaw_rad, place.height_m

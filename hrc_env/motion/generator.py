@@ -79,12 +79,10 @@ def make_state(
             f"n_workers={n_workers}: no more than {fit} fit on these grounds, "
             f"{config.spacing_m} m from each other."
         )
-    kinds = dict.fromkeys(place.kind for place in plan.places)
-    places = {kind: tuple(p for p in plan.places if p.kind == kind) for kind in kinds}
     clips = stocked([opened(motion) for motion in config.motions], bones.size)
-    schedule = schedule_at(config.jobs, tuple(places))
+    schedule = schedule_at(config.jobs, {place.kind for place in plan.places})
     values = numbers(config, grounds.robot_xy_m)
-    mind = BehaviourParams(config, values, plan, schedule, places, clips, bones, fewest)
+    mind = BehaviourParams(config, values, plan, schedule, clips, bones, fewest)
     return MotionState(np.zeros((batch, n_workers), st.WORKER), mind)
 
 

@@ -20,6 +20,7 @@ OWN_EDGE, SHARED_EDGE = 0.9, 0.5
 @kernel
 def lay_path(start: Pair, via: Floats, end: Pair, me: Worker) -> None:
     """Write the path past corners `via` (n, 3): x, y, and how far from it its arc may begin [m]."""
+    me.end_x, me.end_y = end
     n = min(via.shape[0], MAX_VIA)
     x, y, s, total, count = start[0], start[1], 0.0, 0.0, 0
     me.sharpest, heading, first = 0.0, 0.0, True

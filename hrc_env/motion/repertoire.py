@@ -15,10 +15,9 @@ from hrc_env.motion.blending import settle, stop
 from hrc_env.motion.curves import placed
 from hrc_env.motion.feet import feet
 from hrc_env.motion.generator import bodies_of
-from hrc_env.motion.holding import drop_load
 from hrc_env.motion.paths import lay_path
 from hrc_env.motion.starting import STARTS, Start, start_going
-from hrc_env.motion.state import N_START, WORKER, Place, Worker
+from hrc_env.motion.state import N_START, WORKER, Worker
 from hrc_env.worker.body import Body
 
 Act = tuple[int, Start, float]
@@ -61,13 +60,10 @@ def perform(acts: Sequence[Act], me: Worker, rng: np.random.Generator, dt_s: flo
     """Films of acts in their order, at intervals of dt_s; the worker stands where they end."""
     films, clock_s = [], 10.0 * float(rng.random())
     for activity, start, height_m in acts:
-        place = (float(me["start_x"]), float(me["start_y"]), float(me["start_yaw"]), height_m)
         me["activity"] = activity
-        lasts_s = start(rng.random(N_START), place, me)
+        lasts_s = start(rng.random(N_START), height_m, me)
         films.append(_film(me, np.arange(0.0, lasts_s, dt_s), clock_s))
         stop(me)
-        if activity in st.GIVING or activity == st.PUSH:
-            drop_load(me)
         feet(0.0, me)
         clock_s += lasts_s
     return films
@@ -85,32 +81,31 @@ def _film(me: Worker, time_s: Floats, clock_s: float) -> Film:
 def _going(activity: int, speed_m_s: float = 1.1, prop: int = 0, way_m: float = AWAY_M) -> Act:
     """Go some way ahead."""
 
-    def start(draws: Floats, place: Place, me: Worker) -> float:
-        x, y, yaw, z = place
-        ahead = *placed(x, y, yaw, way_m, 0.0), yaw, z
-        lay_path((x, y), np.zeros((0, 3)), ahead[:2], me)
-        return start_going(activity, draws, ahead, speed_m_s, prop, me)
+    def start(draws: Floats, height_m: float, me: Worker) -> float:
+        x, y, yaw = (float(me[name]) for name in ("start_x", "start_y", "start_yaw"))
+        lay_path((x, y), np.zeros((0, 3)), placed(x, y, yaw, way_m, 0.0), me)
+        return start_going(activity, draws, yaw, speed_m_s, prop, me)
 
     return activity, start, 0.0
 
 
 def _hammer(lightly: bool, height_m: float) -> tuple[Act]:
-    def start(draws: Floats, place: Place, me: Worker) -> float:
+    def start(draws: Floats, height_m: float, me: Worker) -> float:
         chosen = draws.copy()
         chosen[LIGHT_DRAW] = 0.0 if lightly else 1.0
-        return STARTS[st.HAMMER](chosen, place, me)
+        return STARTS[st.HAMMER](chosen, height_m, me)
 
     return ((st.HAMMER, start, height_m),)
 
 
-def _turn(draws: Floats, place: Place, me: Worker) -> float:
+def _turn(draws: Floats, height_m: float, me: Worker) -> float:
     turn = (1.0 if draws[0] < 0.5 else -1.0) * (0.8 + 2.0 * draws[1])
-    return start_turn((place[0], place[1], place[2] + turn, 0.0), me)
+    return start_turn(float(me["start_yaw"]) + turn, me)
 
 
 def _take(prop: int, on_shoulder: bool, height_m: float) -> Act:
-    def start(draws: Floats, place: Place, me: Worker) -> float:
-        return finish_lift(plan_pick_up(draws, place, prop, on_shoulder, me), me)
+    def start(draws: Floats, height_m: float, me: Worker) -> float:
+        return finish_lift(plan_pick_up(draws, height_m, prop, on_shoulder, me), me)
 
     return st.PICK_UP, start, height_m
 
@@ -119,7 +114,7 @@ def _here(activity: int, height_m: float = 0.0) -> tuple[Act]:
     return ((activity, STARTS[activity], height_m),)
 
 
-def _stand(draws: Floats, place: Place, me: Worker) -> float:
+def _stand(draws: Floats, height_m: float, me: Worker) -> float:
     return 4.0
 
 

@@ -1,7 +1,7 @@
 """What workers do, one thing after another: a small graph of jobs at kinds of workplaces."""
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from hrc_env.core.errors import ConfigError, unknown
@@ -112,7 +112,7 @@ class Schedule:
     """How errands elsewhere begin, with running shares; empty where there is nowhere else."""
 
 
-def schedule_at(jobs: Sequence[Job], kinds: Sequence[str]) -> Schedule:
+def schedule_at(jobs: Sequence[Job], kinds: Collection[str]) -> Schedule:
     """The jobs that can be done at these kinds of places; places at the robot always are."""
     kept = tuple(job for job in jobs if job.at in (*kinds, "robot", HERE))
     index = {job.name: k for k, job in enumerate(kept)}

@@ -33,7 +33,6 @@ def go(who: Decision) -> Begun:
     """Begin to walk to a place of the job, if there is a free one and a free way to it."""
     mind, job, me = who.mind, who.job, who.me
     for place in wished(who):
-        me["end_x"], me["end_y"] = place[:2]
         obstacles = in_the_way(who)
         for share in HURRY:
             begun = _set_out(who, place, obstacles, share)
@@ -69,7 +68,7 @@ def _set_out(who: Decision, place: Place, obstacles: Floats, share: float) -> Be
     elif who.job.at in STUMBLE_TO and stumbles:
         activity = st.STUMBLE
     pace = share * float(me["speed_m_s"])
-    return activity, start_going(activity, who.draws, place, pace, prop, me)
+    return activity, start_going(activity, who.draws, place[2], pace, prop, me)
 
 
 def step_back(who: Decision) -> Begun:
@@ -77,8 +76,7 @@ def step_back(who: Decision) -> Begun:
     if who.loaded:
         return None
     plan, me = who.mind.plan, who.me
-    nowhere, nobody = (0.0, 0.0, 0.0, 0.0), np.zeros((0, 2))
-    lasts = start_here(st.STEP_BACK, who.draws, nowhere, False, nobody, 0, who.mind.numbers, me)
+    lasts = start_here(who, st.STEP_BACK, 0.0)
     room = slack_at(float(me["end_x"]), float(me["end_y"]), plan.slack, plan.origin)
     if room < 0.0 or meets_somebody(who, st.STEP_BACK, lasts)[0] >= 0.0:
         stay(who)

@@ -13,37 +13,39 @@ from hrc_env.motion.activities.going import start_push, start_step_back, start_s
 from hrc_env.motion.activities.planning import between, finish
 from hrc_env.motion.config import Numbers
 from hrc_env.motion.curves import wrap
+from hrc_env.motion.decision import Decision
 from hrc_env.motion.feet import feet
 from hrc_env.motion.hands import plan_lift, plan_reach
 from hrc_env.motion.posture import from_here
-from hrc_env.motion.state import Pair, Place, Triple, Worker
+from hrc_env.motion.state import Pair, Triple, Worker
 from hrc_env.motion.walk import plan_walk
+from hrc_env.worker.props import prop_index
 
 BODY_M, OWN_SIDE_M = 0.36, 0.30
 """Hands keep so far from their own root, and from the middle to another worker [m]."""
 
 
 def start_going(
-    activity: int, draws: Floats, place: Place, pace_m_s: float, prop: int, me: Worker
+    activity: int, draws: Floats, end_yaw: float, pace_m_s: float, prop: int, me: Worker
 ) -> float:
-    """Start to walk, carry, push or stumble to a place along the laid path; how long [s]."""
+    """Start to walk, carry, push or stumble along the path that is laid; how long [s]."""
     if activity == st.PUSH:
-        return start_push(place, pace_m_s, prop, me)
+        return start_push(end_yaw, pace_m_s, prop, me)
     if activity == st.STUMBLE:
-        return start_stumble(draws, place, pace_m_s, me)
-    return plan_walk(place[:3], pace_m_s, me)
+        return start_stumble(draws, end_yaw, pace_m_s, me)
+    return plan_walk(end_yaw, pace_m_s, me)
 
 
-Start = Callable[[Floats, Place, Worker], float]
-"""Begins an activity at a place from N_START draws in [0, 1); how long it lasts [s]."""
+Start = Callable[[Floats, float, Worker], float]
+"""Begins an activity from N_START draws in [0, 1) at a height [m]; how long it lasts [s]."""
 
 
 def _work(plan: Start) -> Start:
-    return lambda draws, place, me: finish(plan(draws, place, me), me)
+    return lambda draws, height, me: finish(plan(draws, height, me), me)
 
 
 def _load(plan: Start) -> Start:
-    return lambda draws, place, me: loads.finish_lift(plan(draws, place, me), me)
+    return lambda draws, height, me: loads.finish_lift(plan(draws, height, me), me)
 
 
 STARTS: dict[int, Start] = {
@@ -58,28 +60,23 @@ STARTS: dict[int, Start] = {
 """What is begun where the worker stands: each compiled by itself when it is first wanted."""
 
 
-def start_here(
-    activity: int, draws: Floats, place: Place, near: bool, others: Floats, prop: int,
-    config: Numbers, me: Worker,
-) -> float:  # fmt: skip
-    """Start an activity where the worker stands; how long it takes [s], 0 of standing.
-
-    Hands reach into the robot's workspace if `near`, and stay on the worker's own side of the
-    middle to others (n, 2); `prop` is what is picked up.
-    """
+def start_here(who: Decision, activity: int, height: float) -> float:
+    """Start an activity where the worker stands; how long it takes [s], 0 of standing."""
+    draws, config, me = who.draws, who.mind.numbers, who.me
     feet(0.0, me)
     if activity == st.REACH:
-        return start_reach(draws, config, near, place[3], others, me)
+        others = who.workers["spot"][who.others(), :2]
+        return start_reach(draws, config, who.kind_here == "robot", height, others, me)
     if activity == st.LIFT:
         return start_lift(draws, config, me)
     if activity == st.PICK_UP:
-        pace_s = loads.plan_pick_up(draws, place, prop, bool(draws[8] < 0.5), me)
-        return loads.finish_lift(pace_s, me)
+        prop, on_shoulder = prop_index(who.job.prop), bool(draws[8] < 0.5)
+        return loads.finish_lift(loads.plan_pick_up(draws, height, prop, on_shoulder, me), me)
     if activity == st.DRILL:  # below the head, and above it for drilling overhead
-        place = (*place[:3], min(place[3], wp.OVERHEAD_M - 0.1))
+        height = min(height, wp.OVERHEAD_M - 0.1)
     elif activity == st.OVERHEAD:
-        place = (*place[:3], max(place[3], wp.OVERHEAD_M + 0.1))
-    return STARTS[activity](draws, place, me) if activity in STARTS else 0.0
+        height = max(height, wp.OVERHEAD_M + 0.1)
+    return STARTS[activity](draws, height, me) if activity in STARTS else 0.0
 
 
 @kernel
@@ -99,7 +96,7 @@ def own_side(x: float, y: float, others: Floats, me: Worker) -> Pair:
 
 @kernel
 def _target(draws: Floats, config: Numbers, near: bool, height: float, me: Worker) -> Triple:
-    """A world point for the hands: in the robot's workspace, or ahead of the worker."""
+    """A world point for the hands: in the robot's workspace if `near`, else ahead."""
     z = between(draws[3], *config.target_z_m)
     if not near:
         return from_here((0.36 + 0.3 * draws[1], 0.7 * (draws[2] - 0.5), max(z, height)), me)

@@ -35,8 +35,8 @@ WALK_HALF_WIDTH_M = 0.04
 """Half the step width at full speed [m]; 5 to 9 cm measured."""
 SHIFT_S, TURN_S, TURN_RATE = 0.28, 0.5, 1.7
 """Weight shift before the first step [s]; duration of a turn: TURN_S + angle / TURN_RATE."""
-SIDE_STEP_M_S, SIDE_STEP_PERIOD_S, SIDE_STEP_M = 0.2, 0.52, 0.5
-"""Nearer than SIDE_STEP_M people do not turn, but take small steps; judgement."""
+SIDE_STEP_M, SIDE_STEP_PACE = 0.5, (0.0, 0.2, 0.52)
+"""Nearer than this people do not turn, but take small steps: their pace (`plan_pace`); judgement."""
 CORNER_M_S2 = 1.6
 """Walkers slow down so that corners accelerate them sideways by no more [m/s^2]; judgement."""
 NORMAL_M_S = 1.3
@@ -142,15 +142,13 @@ def _lurch(t: float, trip: float, me: Worker) -> None:
 
 
 @kernel
-def plan_walk(end: Triple, wished_m_s: float, me: Worker) -> float:
-    """Plan to go along the path that is laid and end at (x, y, yaw); the duration [s]."""
-    me.end_x, me.end_y = end[0], end[1]
+def plan_walk(end_yaw: float, wished_m_s: float, me: Worker) -> float:
+    """Plan to go along the path that is laid; returns the duration [s]."""
     if me.length <= SIDE_STEP_M:
-        pace = (0.0, SIDE_STEP_M_S, SIDE_STEP_PERIOD_S)
-        return plan_pace(pace, end[2], me)
+        return plan_pace(SIDE_STEP_PACE, end_yaw, me)
     bend = math.sqrt(CORNER_M_S2 / max(me.sharpest, 1e-6))
     wished = min(wished_m_s, max(bend, SLOWEST_M_S))
-    return plan_pace((1.0, wished, 0.0), end[2], me)
+    return plan_pace((1.0, wished, 0.0), end_yaw, me)
 
 
 @kernel

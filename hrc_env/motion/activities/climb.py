@@ -9,7 +9,7 @@ from hrc_env.motion.activities.planning import between, blank
 from hrc_env.motion.curves import cruise, min_jerk, shift
 from hrc_env.motion.feet import step_time
 from hrc_env.motion.posture import RELAXED_ELBOW, RELAXED_PITCH, hang, stand
-from hrc_env.motion.state import Place, Worker
+from hrc_env.motion.state import Worker
 
 HIGHEST_RISER_M = 0.32
 """Greatest rise of one step [m]; ladders have rungs 0.25 to 0.30 m apart (EN 131-1)."""
@@ -42,11 +42,11 @@ def climb(t: float, clock_s: float, me: Worker) -> None:
 
 
 @kernel
-def start_climb(draws: Floats, place: Place, me: Worker) -> float:
-    """Plan to climb to the place's height; returns how long it takes [s]."""
+def start_climb(draws: Floats, height: float, me: Worker) -> float:
+    """Plan to climb to the height; returns how long it takes [s]."""
     blank(me)
     prints = me.prints
-    high = place[3] if place[3] > 0.0 else between(draws[0], 0.18, 0.30)
+    high = height if height > 0.0 else between(draws[0], 0.18, 0.30)
     treads = max(1, math.ceil(high / HIGHEST_RISER_M))
     me.treads, me.riser_m = treads, high / treads
     first = 1 if draws[1] < 0.5 else 0
@@ -77,7 +77,7 @@ def look_round(t: float, clock_s: float, me: Worker) -> None:
 
 
 @kernel
-def start_look_round(draws: Floats, place: Place, me: Worker) -> float:
+def start_look_round(draws: Floats, height: float, me: Worker) -> float:
     """Plan to look round; returns how long it takes [s]."""
     blank(me)
     first = 1.0 if draws[0] < 0.5 else -1.0

@@ -13,7 +13,7 @@ from hrc_env.motion.curves import min_jerk, placed, shift
 from hrc_env.motion.holding import grip_load, place_load, take_load
 from hrc_env.motion.paths import lay_path
 from hrc_env.motion.posture import lean
-from hrc_env.motion.state import Pair, Place, Worker
+from hrc_env.motion.state import Pair, Worker
 from hrc_env.motion.walk import plan_pace, plan_walk, root, speed, walk
 from hrc_env.worker.props import prop_index
 
@@ -35,26 +35,26 @@ CAUGHT_LEGS = 0.115
 
 
 @kernel(makes_arrays=True)
-def start_turn(place: Place, me: Worker) -> float:
-    """Plan to turn on the spot to the place's yaw; returns how long it takes [s]."""
+def start_turn(yaw: float, me: Worker) -> float:
+    """Plan to turn on the spot to a yaw; returns how long it takes [s]."""
     here = (me.start_x, me.start_y)
     lay_path(here, np.empty((0, 3)), here, me)
-    return plan_pace(TURN_PACE, place[2], me)
+    return plan_pace(TURN_PACE, yaw, me)
 
 
 @kernel(makes_arrays=True)
-def start_step_back(draws: Floats, place: Place, me: Worker) -> float:
+def start_step_back(draws: Floats, height: float, me: Worker) -> float:
     """Plan to step straight back without looking; returns how long it takes [s]."""
     x, y, yaw = me.start_x, me.start_y, me.start_yaw
-    me.end_x, me.end_y = placed(x, y, yaw, -between(draws[0], 0.30, 0.75), 0.0)
-    lay_path((x, y), np.empty((0, 3)), (me.end_x, me.end_y), me)
+    end = placed(x, y, yaw, -between(draws[0], 0.30, 0.75), 0.0)
+    lay_path((x, y), np.empty((0, 3)), end, me)
     return plan_pace(STEP_BACK_PACE, yaw, me)
 
 
 @kernel
-def start_stumble(draws: Floats, place: Place, speed_m_s: float, me: Worker) -> float:
-    """Plan a walk to the place in which a foot catches; returns how long it takes [s]."""
-    lasts = plan_walk(place[:3], speed_m_s, me)
+def start_stumble(draws: Floats, end_yaw: float, speed_m_s: float, me: Worker) -> float:
+    """Plan a walk in which a foot catches; returns how long it takes [s]."""
+    lasts = plan_walk(end_yaw, speed_m_s, me)
     count = me.step_count
     if me.follow == 0.0 or count < 6:
         return lasts
@@ -66,10 +66,10 @@ def start_stumble(draws: Floats, place: Place, speed_m_s: float, me: Worker) -> 
 
 
 @kernel
-def start_push(place: Place, speed_m_s: float, prop: int, me: Worker) -> float:
-    """Plan to push a cart or wheelbarrow to the place; returns how long it takes [s]."""
+def start_push(end_yaw: float, speed_m_s: float, prop: int, me: Worker) -> float:
+    """Plan to push a cart or wheelbarrow; returns how long it takes [s]."""
     take_load(prop, me)
-    lasts = plan_walk(place[:3], speed_m_s, me)
+    lasts = plan_walk(end_yaw, speed_m_s, me)
     me.taken_s = TAKE_S + (LIFT_S if prop == WHEELBARROW else 0.0)
     _to_handles(prop, me)
     me.lasts = lasts + 2.0 * me.taken_s

@@ -15,7 +15,7 @@ from hrc_env.motion.curves import hump, min_jerk, shift
 from hrc_env.motion.holding import GRIPS, grip, place_load, take_load
 from hrc_env.motion.kinematics import pose
 from hrc_env.motion.posture import from_here, lean, look_at, stand
-from hrc_env.motion.state import Place, Triple, Worker
+from hrc_env.motion.state import Triple, Worker
 from hrc_env.worker.props import prop_index
 
 BOX, BOARD = prop_index("box"), prop_index("board")
@@ -63,43 +63,43 @@ def pick_up(t: float, clock_s: float, me: Worker) -> None:
 
 
 @kernel
-def plan_pick_up(draws: Floats, place: Place, prop: int, on_shoulder: bool, me: Worker) -> float:
-    """Plan to pick a box or board up, gripped at the place's height; its pace [s]."""
+def plan_pick_up(draws: Floats, height: float, prop: int, on_shoulder: bool, me: Worker) -> float:
+    """Plan to pick a box or board up, gripped at the height; its pace [s]."""
     _hold(prop, on_shoulder and prop == BOARD, to.dominant(draws[0], me), me)
-    z = place[3] if place[3] > 0.0 else between(draws[1], 0.18, 0.45)
+    z = height if height > 0.0 else between(draws[1], 0.18, 0.45)
     _lay_out(prop, (AWAY_M, 0.0, z), me)
     return between(draws[2], 1.0, 1.35)
 
 
 @kernel
-def plan_receive(draws: Floats, place: Place, me: Worker) -> float:
+def plan_receive(draws: Floats, height: float, me: Worker) -> float:
     """Plan to take a box that somebody ahead holds out; its pace [s]."""
     _hold(BOX, False, 1, me)
-    _lay_out(BOX, _given(place, me), me)
+    _lay_out(BOX, _given(height, me), me)
     me.hidden = 1.0
     return between(draws[2], 0.9, 1.1)
 
 
 @kernel
-def plan_set_down(draws: Floats, place: Place, me: Worker) -> float:
-    """Plan to set down what is held, onto the place's height; its pace [s]."""
-    z = place[3] if place[3] > 0.0 else between(draws[1], 0.18, 0.45)
+def plan_set_down(draws: Floats, height: float, me: Worker) -> float:
+    """Plan to set down what is held, onto the height; its pace [s]."""
+    z = height if height > 0.0 else between(draws[1], 0.18, 0.45)
     _lay_out(me.load_prop, (AWAY_M, 0.0, z), me)
     return between(draws[2], 1.0, 1.35)
 
 
 @kernel
-def plan_hand_over(draws: Floats, place: Place, me: Worker) -> float:
+def plan_hand_over(draws: Floats, height: float, me: Worker) -> float:
     """Plan to hold out what is carried until somebody has it; its pace [s]."""
-    _lay_out(me.load_prop, _given(place, me), me)
+    _lay_out(me.load_prop, _given(height, me), me)
     me.hidden = 1.0
     return between(draws[2], 0.9, 1.1)
 
 
 @kernel
-def _given(place: Place, me: Worker) -> Triple:
+def _given(height: float, me: Worker) -> Triple:
     """Where loads change hands."""
-    return GIVEN[0], 0.0, place[3] if place[3] > 0.0 else GIVEN[1] * me.size[STAND_Z]
+    return GIVEN[0], 0.0, height if height > 0.0 else GIVEN[1] * me.size[STAND_Z]
 
 
 @kernel

@@ -13,7 +13,7 @@ from hrc_env.motion.activities.planning import CALM_M_S, between, dominant
 from hrc_env.motion.activities.work import LOW_M
 from hrc_env.motion.anatomy import ARM, STAND_Z
 from hrc_env.motion.curves import placed
-from hrc_env.motion.state import Place, Worker
+from hrc_env.motion.state import Worker
 from hrc_env.worker.props import prop_index
 
 HAMMER, DRILL, HAND_SAW, TAPE = map(prop_index, ("hammer", "drill", "saw", "tape_measure"))
@@ -38,12 +38,12 @@ AHEAD_ARMS = (1.2, 1.5)
 
 
 @kernel
-def plan_hammer(draws: Floats, place: Place, me: Worker) -> float:
-    """Plan to drive nails at the place's height."""
+def plan_hammer(draws: Floats, height: float, me: Worker) -> float:
+    """Plan to drive nails at the height."""
     to.blank(me)
     side = dominant(draws[0], me)
     sign = 1.0 - 2.0 * side
-    z = place[3] if place[3] > 0.0 else between(draws[1], 0.85, 1.4)
+    z = height if height > 0.0 else between(draws[1], 0.85, 1.4)
     if z < LOW_M:
         to.kneel_down(side, me)
     else:
@@ -69,12 +69,12 @@ def plan_hammer(draws: Floats, place: Place, me: Worker) -> float:
 
 
 @kernel
-def plan_drill(draws: Floats, place: Place, me: Worker) -> float:
-    """Plan to drill at the place's height."""
+def plan_drill(draws: Floats, height: float, me: Worker) -> float:
+    """Plan to drill at the height."""
     to.blank(me)
     side = dominant(draws[0], me)
     sign = 1.0 - 2.0 * side
-    z = place[3] if place[3] > 0.0 else between(draws[1], 1.1, 1.4)
+    z = height if height > 0.0 else between(draws[1], 1.1, 1.4)
     overhead = z >= OVERHEAD_M
     if z < LOW_M:
         to.kneel_down(side, me)
@@ -98,12 +98,12 @@ def plan_drill(draws: Floats, place: Place, me: Worker) -> float:
 
 
 @kernel
-def plan_saw(draws: Floats, place: Place, me: Worker) -> float:
-    """Plan to saw a board at the place's height."""
+def plan_saw(draws: Floats, height: float, me: Worker) -> float:
+    """Plan to saw a board at the height."""
     to.blank(me)
     side = dominant(draws[0], me)
     sign = 1.0 - 2.0 * side
-    z = place[3] if place[3] > 0.0 else between(draws[1], 0.75, 0.95)
+    z = height if height > 0.0 else between(draws[1], 0.75, 0.95)
     to.step_ahead(1 - side, 0.26, me)
     to.put_tool(HAND_SAW, side, (0.52, 0.17 * sign, z + 0.17), (0.0, CUT_RAD, 0.0), me)
     to.put_other((0.58, -0.12 * sign, z + 0.03), me)
@@ -114,10 +114,10 @@ def plan_saw(draws: Floats, place: Place, me: Worker) -> float:
 
 
 @kernel
-def plan_measure(draws: Floats, place: Place, me: Worker) -> float:
-    """Plan to measure at the place's height."""
+def plan_measure(draws: Floats, height: float, me: Worker) -> float:
+    """Plan to measure at the height."""
     to.blank(me)
-    z = place[3] if place[3] > 0.0 else between(draws[1], 0.85, 1.3)
+    z = height if height > 0.0 else between(draws[1], 0.85, 1.3)
     if z < LOW_M:
         to.kneel_down(1, me)
     else:
@@ -130,7 +130,7 @@ def plan_measure(draws: Floats, place: Place, me: Worker) -> float:
 
 
 @kernel
-def plan_point(draws: Floats, place: Place, me: Worker) -> float:
+def plan_point(draws: Floats, height: float, me: Worker) -> float:
     """Plan to point somewhere ahead, at its height if it has one."""
     to.blank(me)
     side = dominant(draws[0], me)
@@ -149,12 +149,12 @@ def plan_point(draws: Floats, place: Place, me: Worker) -> float:
 
 
 @kernel
-def plan_lunge(draws: Floats, place: Place, me: Worker) -> float:
-    """Plan to snatch at something ahead, at the place's height."""
+def plan_lunge(draws: Floats, height: float, me: Worker) -> float:
+    """Plan to snatch at something ahead, at the height."""
     to.blank(me)
     side = dominant(draws[0], me)
     sign = 1.0 - 2.0 * side
-    z = place[3] if place[3] > 0.0 else between(draws[1], 0.9, 1.3)
+    z = height if height > 0.0 else between(draws[1], 0.9, 1.3)
     to.step_ahead(side, between(draws[2], 0.32, 0.42), me)
     ahead = me.size[ARM] * between(draws[3], *AHEAD_ARMS)
     at = (ahead, sign * between(draws[4], -0.1, 0.25), z)
@@ -168,28 +168,28 @@ def plan_lunge(draws: Floats, place: Place, me: Worker) -> float:
 
 
 @kernel
-def plan_kneel(draws: Floats, place: Place, me: Worker) -> float:
+def plan_kneel(draws: Floats, height: float, me: Worker) -> float:
     """Plan to kneel and work low."""
     to.blank(me)
     side = dominant(draws[0], me)
     to.kneel_down(side, me)
-    return _hands_low(0.42, side, draws, place, me)
+    return _hands_low(0.42, side, draws, height, me)
 
 
 @kernel
-def plan_squat(draws: Floats, place: Place, me: Worker) -> float:
+def plan_squat(draws: Floats, height: float, me: Worker) -> float:
     """Plan to work low on the haunches."""
     to.blank(me)
     me.crouch, me.ahead = 1.0, 0.02
     me.settle_s, me.out_at = to.CROUCH_S, 0.1
-    return _hands_low(0.50, dominant(draws[0], me), draws, place, me)
+    return _hands_low(0.50, dominant(draws[0], me), draws, height, me)
 
 
 @kernel
-def _hands_low(ahead: float, side: int, draws: Floats, place: Place, me: Worker) -> float:
+def _hands_low(ahead: float, side: int, draws: Floats, height: float, me: Worker) -> float:
     """Plan what both hands do at floor height."""
     sign = 1.0 - 2.0 * side
-    z = place[3] if place[3] > 0.0 else between(draws[1], 0.12, 0.35)
+    z = height if height > 0.0 else between(draws[1], 0.12, 0.35)
     aside = to.before_knee(me)
     to.put_tool(0, side, (ahead, aside + 0.10 * sign, z), (0.0, 0.0, 0.0), me)
     to.put_other((ahead + 0.03, aside - 0.12 * sign, z), me)
