@@ -31,11 +31,15 @@ def length(joints: Points3, first: str, second: str) -> float:
     return float(np.mean(np.nanmedian(each, axis=1)))
 
 
+def legs(joints: Points3) -> float:
+    """Length of thigh and shank."""
+    return length(joints, "hip", "knee") + length(joints, "knee", "ankle")
+
+
 def stature(joints: Points3) -> float:
     """Estimate of the person's stature, in the unit of the joints (T, 15, 3)."""
     trunk = np.linalg.norm(middle(joints, "shoulder") - middle(joints, "hip"), axis=-1)
-    legs = length(joints, "hip", "knee") + length(joints, "knee", "ankle")
-    return (legs + float(np.nanmedian(trunk))) / MEASURED_SHARE
+    return (legs(joints) + float(np.nanmedian(trunk))) / MEASURED_SHARE
 
 
 def check_person(joints: Points3, source: str) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 from hrc_env.core.skeleton import JOINT, JOINTS
 from hrc_env.core.typing import Bools, Floats, Points3
 from hrc_env.mocap.guess import PELVIS_SHARE, first_guess
-from hrc_env.mocap.person import across, length, middle, smoothed
+from hrc_env.mocap.person import across, legs, middle, smoothed
 from hrc_env.mocap.poses import Marks, joints_in, marks_of
 from hrc_env.mocap.record import Capture
 from hrc_env.mocap.stance import locked, slip
@@ -100,14 +100,10 @@ def aligned_errors(source: Points3, done: Points3) -> tuple[float, Floats]:
     return scale, np.linalg.norm(moved - b0, axis=-1).reshape(source.shape[:2])
 
 
-def _legs(joints: Points3) -> float:
-    return length(joints, "hip", "knee") + length(joints, "knee", "ankle")
-
-
 def adapted(joints: Points3, fps: float, marks: Marks) -> Points3:
     """(T, 15, 3) where the worker's joints should be [m]."""
     standing = [_standing(joints[:, JOINT[f"{side}_ankle"]], fps) for side in ("left", "right")]
-    scaled = _legs(marks.rest[None]) / _legs(joints) * joints
+    scaled = legs(marks.rest[None]) / legs(joints) * joints
     scaled[..., 2] += marks.rest[JOINT["left_ankle"], 2] - np.mean(
         [np.median(scaled[on, JOINT[f"{side}_ankle"], 2])
          for side, on in zip(("left", "right"), standing, strict=True)]

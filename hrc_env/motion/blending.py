@@ -12,7 +12,7 @@ from hrc_env.motion.activities.work import work
 from hrc_env.motion.curves import decay, wrap
 from hrc_env.motion.feet import feet, step_time
 from hrc_env.motion.hands import lift, reach
-from hrc_env.motion.holding import drop_load, hold_load
+from hrc_env.motion.holding import hold_load
 from hrc_env.motion.posture import STANCE_HALF_WIDTH_M, stand
 from hrc_env.motion.state import Worker
 from hrc_env.motion.walk import footprint, walk
@@ -61,7 +61,7 @@ def evaluate(t: float, clock_s: float, frames: Floats, me: Worker) -> None:
 def stop(me: Worker) -> float:
     """Begin where the last activity ended, let go of what is; by how much its heading unwinds."""
     if me.activity in st.GIVING or me.activity == st.PUSH:
-        drop_load(me)
+        me.load_prop = 0
     count = me.step_count if me.undo_at == 0.0 else 0
     for k in range(max(count - 2, 0), count):
         side = (k + me.step_first) % 2

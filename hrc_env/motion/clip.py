@@ -117,11 +117,6 @@ def load_clip(path: Path) -> Clip:
     )  # fmt: skip
 
 
-def opened(motion: str | Path | Clip) -> Clip:
-    """A clip, or the one at a path."""
-    return motion if isinstance(motion, Clip) else load_clip(Path(motion))
-
-
 def check_rate(fps: float, source: str) -> None:
     """Refuse a frame rate that cannot be."""
     if not SLOWEST_HZ <= fps <= FASTEST_HZ:

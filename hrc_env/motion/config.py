@@ -47,7 +47,6 @@ class PeopleConfig:
     """Chance that a worker takes a few steps back between two things to do, without looking."""
 
     def __post_init__(self) -> None:
-        """Check ranges and probabilities."""
         _check_ranges(self)
         for name, value in asdict(self).items():
             if np.min(value) < 0.0:
@@ -134,7 +133,6 @@ class MotionConfig:
     """Chance that a worker with empty hands plays one next, where there is room for it."""
 
     def __post_init__(self) -> None:
-        """Check ranges and probabilities."""
         _check_ranges(self)
         if self.spacing_m < 0.8:
             raise ConfigError(

@@ -9,10 +9,7 @@ from hrc_env.core.typing import Floats
 @kernel
 def min_jerk(u: float) -> float:
     """0 to 1 over u, at rest at both ends, else held; peak rate 1.875 (Flash & Hogan 1985)."""
-    if u <= 0.0:
-        return 0.0
-    if u >= 1.0:
-        return 1.0
+    u = min(max(u, 0.0), 1.0)
     return u * u * u * (10.0 - 15.0 * u + 6.0 * u * u)
 
 
@@ -29,11 +26,7 @@ def ramp(u: float) -> float:
 @kernel
 def cruise(u: float, share: float) -> float:
     """0 to 1 over u in [0, 1] at constant speed but for smooth ramps of `share` at each end."""
-    if u <= 0.0:
-        return 0.0
-    if u >= 1.0:
-        return 1.0
-    top = share / (1.0 - share)
+    u, top = min(max(u, 0.0), 1.0), share / (1.0 - share)
     if u < 0.5:
         return top * ramp(u / share)
     return 1.0 - top * ramp((1.0 - u) / share)
@@ -42,8 +35,7 @@ def cruise(u: float, share: float) -> float:
 @kernel
 def hump(u: float) -> float:
     """0 at the ends of [0, 1], 1 in the middle, flat to second order at the ends; 0 outside."""
-    if u <= 0.0 or u >= 1.0:
-        return 0.0
+    u = min(max(u, 0.0), 1.0)
     v = 4.0 * u * (1.0 - u)
     return v * v * v
 
@@ -51,9 +43,7 @@ def hump(u: float) -> float:
 @kernel
 def soft_min(a: float, b: float, width: float) -> float:
     """The smaller one, rounded off (downwards) where the two differ by less than `width`."""
-    closeness = 1.0 - abs(a - b) / width
-    if closeness <= 0.0:
-        return min(a, b)
+    closeness = max(1.0 - abs(a - b) / width, 0.0)
     return min(a, b) - width * closeness * closeness * closeness / 6.0
 
 

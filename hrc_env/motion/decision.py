@@ -118,8 +118,14 @@ def wished(who: Decision) -> Iterator[Place]:
     """Places for the job that nobody else has, the one last chosen first."""
     if who.me["going"] == UNDER_WAY:
         yield tuple(who.me["spot"].tolist())  # type: ignore[misc]
-    for place in _candidates(who, who.job.at):
-        if _is_free(who, place):
+    yield from _free_places(who, who.job.at)
+
+
+def _free_places(who: Decision, kind: str) -> Iterator[Place]:
+    """Places of a kind that no other worker's is near."""
+    apart_m, spots = who.mind.config.spacing_m, who.workers["spot"][who.others(), :2].tolist()
+    for place in _candidates(who, kind):
+        if all(math.dist(spot, place[:2]) >= apart_m for spot in spots):
             yield place
 
 
@@ -145,12 +151,6 @@ def _candidates(who: Decision, kind: str) -> Iterator[Place]:
             yield *place.xy_m, place.yaw_rad, place.height_m
 
 
-def _is_free(who: Decision, place: Place) -> bool:
-    """Whether no other worker has a place near this one."""
-    apart_m, spots = who.mind.config.spacing_m, who.workers["spot"][who.others(), :2].tolist()
-    return all(math.dist(spot, place[:2]) >= apart_m for spot in spots)
-
-
 def take_first_place(who: Decision) -> None:
     """A place to begin at, and the job there; where all are taken, the loneliest that is free."""
     mind, me, draw = who.mind, who.me, who.draws.item(NEXT)
@@ -159,12 +159,11 @@ def take_first_place(who: Decision) -> None:
     first = mind.schedule.robot if near else begins[int(who.draws[BOW] * len(begins))]
     for job in (first, mind.schedule.robot, *begins):
         kind = mind.schedule.jobs[job].at
-        for place in _candidates(who, kind):
-            if _is_free(who, place):
-                me["job"], me["at"], me["spot"] = job, WORKPLACE_KINDS.index(kind), place
-                dwell = who.draw(DWELL, mind.config.dwell_s) * mind.config.people.tempo
-                me["until_s"] = max(0.05, dwell * who.draws.item(LASTS))
-                return
+        for place in _free_places(who, kind):
+            me["job"], me["at"], me["spot"] = job, WORKPLACE_KINDS.index(kind), place
+            dwell = who.draw(DWELL, mind.config.dwell_s) * mind.config.people.tempo
+            me["until_s"] = max(0.05, dwell * who.draws.item(LASTS))
+            return
     me["job"], me["at"], me["spot"] = mind.schedule.robot, NOWHERE, _loneliest(who)
 
 

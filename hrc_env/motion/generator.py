@@ -4,6 +4,7 @@ Every activity is a closed form in the time since it began; velocities are its d
 """
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from hrc_env.motion.activities.playing import stocked
 from hrc_env.motion.anatomy import anatomies
 from hrc_env.motion.behaviour import begin_episode, follow_up
 from hrc_env.motion.blending import RATE_H_S, evaluate
-from hrc_env.motion.clip import Clip, opened
+from hrc_env.motion.clip import Clip, load_clip
 from hrc_env.motion.config import PEOPLE, MotionConfig, PeopleConfig, numbers
 from hrc_env.motion.decision import N_DRAWS, BehaviourParams, MotionState
 from hrc_env.motion.floorplan import floorplan, room_for
@@ -79,10 +80,11 @@ def make_state(
             f"n_workers={n_workers}: no more than {fit} fit on these grounds, "
             f"{config.spacing_m} m from each other."
         )
-    clips = stocked([opened(motion) for motion in config.motions], bones.size)
+    clips = [m if isinstance(m, Clip) else load_clip(Path(m)) for m in config.motions]
     schedule = schedule_at(config.jobs, {place.kind for place in plan.places})
     values = numbers(config, grounds.robot_xy_m)
-    mind = BehaviourParams(config, values, plan, schedule, clips, bones, fewest)
+    pieces = stocked(clips, bones.size)
+    mind = BehaviourParams(config, values, plan, schedule, pieces, bones, fewest)
     return MotionState(np.zeros((batch, n_workers), st.WORKER), mind)
 
 
@@ -149,19 +151,19 @@ def activity(state: MotionState) -> Ints:
     return np.where(state.workers["present"], state.workers["activity"], ABSENT)
 
 
-Path = tuple[Floats, ...]
+Places = tuple[Floats, ...]
 """Positions and quaternions (..., 22, 3 or 4)."""
 Now = tuple[Floats, ...]
 """Velocities, angular velocities (..., 22, 3), what is held (..., N_HELD)."""
 
 
-def _motion(workers: Workers, place: Path, now: Now) -> WorkerMotion:
+def _motion(workers: Workers, place: Places, now: Now) -> WorkerMotion:
     velocity, turning, rows = now
     held = Held(rows[..., 0].astype(np.int64), rows[..., 1:4].copy(), rows[..., 4:].copy())
     return WorkerMotion(*place, velocity, turning, held, workers["body"].copy())
 
 
-def _blank(lead: tuple[int, ...], *widths: int) -> Path:
+def _blank(lead: tuple[int, ...], *widths: int) -> Places:
     """An array (*lead, 22, n) for each width n."""
     return tuple(np.empty((*lead, N_SEGMENTS, n)) for n in widths)
 
@@ -173,7 +175,7 @@ def _blank_now(workers: Workers) -> Now:
 @kernel
 def _move_on(
     dt_s: float, n_steps: int, done: Ints, over: Bools, workers: Workers, frames: Floats,
-    path: Path, now: Now,
+    path: Places, now: Now,
 ) -> bool:  # fmt: skip
     """Move every environment on until done or someone must decide; whether anyone must.
 
@@ -207,7 +209,7 @@ def _move_on(
 
 
 @kernel
-def _bodies_now(workers: Workers, frames: Floats, path: Path, now: Now) -> None:
+def _bodies_now(workers: Workers, frames: Floats, path: Places, now: Now) -> None:
     """Bodies as they are, into arrays (B, W, ...)."""
     for b, w in np.ndindex(workers.shape):
         me = workers[b, w]

@@ -82,13 +82,11 @@ def lift(t: float, clock_s: float, me: Worker) -> None:
 def _settle_lean(me: Worker) -> None:
     """Smallest lean that brings the targets within reach; else the targets come nearer."""
     p = me.p
-    used = (me.used[0], me.used[1])
-    low, high = 0.0, MOST_LEAN
-    me.lean = 0.0
+    low, high, me.lean = 0.0, MOST_LEAN, 0.0
     for attempt in range(12):
         stand(me.start_x, me.start_y, me.start_yaw, 0.0, me)
         _extend(1.0, me)
-        far = beyond(used, me)
+        far = beyond(me)
         if attempt == 0 and far <= 0.0:
             return
         if far > 0.0:  # at first from `low` itself

@@ -89,10 +89,3 @@ def take_load(prop: int, me: Worker) -> None:
     for i in range(6):
         me.load_grip[i] = GRIPS[prop, i // 3, i % 3]
     me.load_used[:] = 1.0
-
-
-@kernel
-def drop_load(me: Worker) -> None:
-    """Empty hands."""
-    me.load_prop = 0
-    me.load_at[:] = me.load_grip[:] = me.load_used[:] = 0.0

@@ -23,12 +23,11 @@ def lay_path(start: Pair, via: Floats, end: Pair, me: Worker) -> None:
     me.end_x, me.end_y = end
     n = min(via.shape[0], MAX_VIA)
     x, y, s, total, count = start[0], start[1], 0.0, 0.0, 0
-    me.sharpest, heading, first = 0.0, 0.0, True
+    me.sharpest = heading = 0.0
     for k in range(n + 1):
         to_x, to_y = (via[k, 0], via[k, 1]) if k < n else end
         direction = math.atan2(to_y - y, to_x - x)
-        heading = direction if first else heading + wrap(direction - heading)
-        first = False
+        heading = direction if k == 0 else heading + wrap(direction - heading)
         arm, turn = 0.0, 0.0
         if k < n:
             next_x, next_y = (via[k + 1, 0], via[k + 1, 1]) if k + 1 < n else end

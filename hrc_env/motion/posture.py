@@ -89,8 +89,9 @@ def lean(amount: float, squat: float, twist: float, me: Worker) -> None:
 
 
 @kernel
-def beyond(used: Pair, me: Worker) -> float:
-    """How far the targets lie beyond what the used arms reach from this posture [m]."""
+def beyond(me: Worker) -> float:
+    """How far the targets in q lie beyond what the used arms reach from this posture [m]."""
+    used = (me.q[c.HAND_SHARE], me.q[c.HAND_SHARE + 1])
     far = farthest(UPPER_ARM, me.q[c.HAND_TARGET :], used, me)
     return max(far - ARM_KNEE * me.size[ARM], -1.0)
 

@@ -108,20 +108,14 @@ def push(t: float, clock_s: float, me: Worker) -> None:
     if me.load_prop == WHEELBARROW:
         low = 1.0 - min_jerk((near_end - TAKE_S) / LIFT_S)
         lean((BEND * low + stooped * (1.0 - low)) * held, 0.1, 0.0, me)
-        _tip(STANDS_RAD * low - me.tipped * (1.0 - low), yaw, me)
+        tipped = STANDS_RAD * low - me.tipped * (1.0 - low)  # back about its axle, handles down
+        ahead, up = _tipped(tipped, 0.0)
+        shift(q, c.PROP_POSE, yaw, ahead, 0.0)
+        q[c.PROP_POSE + 2] += up
+        q[c.PROP_POSE + 4] -= tipped
     else:
         lean((CART_LEAN + stooped) * held, 0.0, 0.0, me)
     grip_load(held * (2.0 - held), me)  # before the bent trunk takes them to the knees
-
-
-@kernel
-def _tip(back_rad: float, yaw: float, me: Worker) -> None:
-    """Tip the wheelbarrow back about its axle, handles down."""
-    q = me.q
-    ahead, up = _tipped(back_rad, 0.0)
-    shift(q, c.PROP_POSE, yaw, ahead, 0.0)
-    q[c.PROP_POSE + 2] += up
-    q[c.PROP_POSE + 4] -= back_rad
 
 
 @kernel

@@ -6,7 +6,7 @@ from hrc_env.core.kernels import kernel
 from hrc_env.motion import anatomy as an
 from hrc_env.motion import controls as c
 from hrc_env.motion.activities.strokes import PAUSE_S, stroke
-from hrc_env.motion.activities.work import FRONT_LEG, REAR_LEG, extend, hands_on, step_into
+from hrc_env.motion.activities.work import FRONT_LEG, LOW_M, REAR_LEG, extend, hands_on, step_into
 from hrc_env.motion.feet import feet
 from hrc_env.motion.holding import TWO_HANDED
 from hrc_env.motion.posture import MOST_LEAN, beyond, farthest, from_here, stand
@@ -53,6 +53,14 @@ def blank(me: Worker) -> None:
 
 
 @kernel
+def begin(draw: float, me: Worker) -> tuple[int, float]:
+    """A blank plan; the side that holds the tool, and 1 if that is the left one, else -1."""
+    blank(me)
+    side = dominant(draw, me)
+    return side, 1.0 - 2.0 * side
+
+
+@kernel
 def kneel_down(side: int, me: Worker) -> None:
     """Plan to kneel on the knee of that side."""
     leg = me.size[an.LEG]
@@ -73,6 +81,16 @@ def step_ahead(side: int, ahead: float, me: Worker) -> None:
     """Plan to work with the foot of that side ahead."""
     step_into(side, ahead, 0.0, 0.02, me)
     me.ahead, me.settle_s = 0.45 * ahead, STEP_S
+
+
+@kernel
+def get_ready(z: float, knee: int, foot: int, ahead: float, me: Worker) -> float:
+    """Plan to kneel for low work, else to step ahead; how far to the left hands work then [m]."""
+    if z < LOW_M:
+        kneel_down(knee, me)
+    else:
+        step_ahead(foot, ahead, me)
+    return before_knee(me)
 
 
 @kernel
@@ -181,9 +199,7 @@ def settle_lean(me: Worker) -> None:
 def _short(me: Worker) -> float:
     """By how much an arm is too short for the work that is planned [m]."""
     at_work(me)
-    used = (me.q[c.HAND_SHARE], me.q[c.HAND_SHARE + 1])
-    spare = SPARE_M + 0.4 * abs(me.wander_m)
-    return beyond(used, me) + spare
+    return beyond(me) + (SPARE_M + 0.4 * abs(me.wander_m))
 
 
 @kernel

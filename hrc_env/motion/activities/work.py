@@ -73,14 +73,17 @@ def step_into(first: int, ahead: float, other: float, out: float, me: Worker) ->
 
 @kernel
 def extend(down: float, out: float, me: Worker) -> None:
-    """A standing body's q at a share of getting down, and of reaching out from there."""
-    q = me.q
+    """A standing body's q at a share of getting down, and of reaching out to the work from there,
+    with the tool from the belt."""
+    q, at = me.q, c.PROP_POSE
     get_down(down, me)
-    belt(me.side, c.PROP_POSE, me)
+    q[at], q[at + 1] = from_root(BELT_AHEAD_M, (1.0 - 2.0 * me.side) * BELT_SIDE_M, me)
+    q[at + 2] = q[c.PELVIS_Z] + BELT_UP_M
+    q[at + 3], q[at + 4], q[at + 5] = q[c.HEADING], BELT_PITCH_RAD, 0.0
     lean(me.lean * out, me.squat, me.twist * out, me)
     for i in range(6):
-        q[c.PROP_POSE + i] += out * (me.tool_pose[i] - q[c.PROP_POSE + i])
-    _round(c.PROP_POSE, me.tool_pose[2], out, me)
+        q[at + i] += out * (me.tool_pose[i] - q[at + i])
+    _round(at, me.tool_pose[2], out, me)
 
 
 @kernel
@@ -91,15 +94,6 @@ def _round(at: int, goal_z: float, out: float, me: Worker) -> None:
     bulge = max(high, OVER_KNEE_M if goal_z < LOW_M else 0.0) * 4.0 * out * (1.0 - out)
     shift(q, at, q[c.HEADING], bulge, 0.0)
     q[at + 2] += bulge if goal_z < LOW_M else 0.0
-
-
-@kernel
-def belt(side: int, at: int, me: Worker) -> None:
-    """Write the pose of a tool on the belt, on that side, into q[at:]."""
-    q = me.q
-    q[at], q[at + 1] = from_root(BELT_AHEAD_M, (1.0 - 2.0 * side) * BELT_SIDE_M, me)
-    q[at + 2] = q[c.PELVIS_Z] + BELT_UP_M
-    q[at + 3], q[at + 4], q[at + 5] = q[c.HEADING], BELT_PITCH_RAD, 0.0
 
 
 @kernel

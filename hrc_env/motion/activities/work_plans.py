@@ -40,15 +40,9 @@ AHEAD_ARMS = (1.2, 1.5)
 @kernel
 def plan_hammer(draws: Floats, height: float, me: Worker) -> float:
     """Plan to drive nails at the height."""
-    to.blank(me)
-    side = dominant(draws[0], me)
-    sign = 1.0 - 2.0 * side
+    side, sign = to.begin(draws[0], me)
     z = height if height > 0.0 else between(draws[1], 0.85, 1.4)
-    if z < LOW_M:
-        to.kneel_down(side, me)
-    else:
-        to.step_ahead(1 - side, 0.16, me)
-    aside = to.before_knee(me)
+    aside = to.get_ready(z, side, 1 - side, 0.16, me)
     if z < WALL_M:
         ahead, turn = (0.62 if z < LOW_M else 0.72), (0.0, 0.5 * math.pi, 0.0)
         at = (ahead - HEAD_M, aside + 0.06 * sign, z + FACE_M + 0.02)
@@ -71,16 +65,10 @@ def plan_hammer(draws: Floats, height: float, me: Worker) -> float:
 @kernel
 def plan_drill(draws: Floats, height: float, me: Worker) -> float:
     """Plan to drill at the height."""
-    to.blank(me)
-    side = dominant(draws[0], me)
-    sign = 1.0 - 2.0 * side
+    side, sign = to.begin(draws[0], me)
     z = height if height > 0.0 else between(draws[1], 1.1, 1.4)
     overhead = z >= OVERHEAD_M
-    if z < LOW_M:
-        to.kneel_down(side, me)
-    else:
-        to.step_ahead(1 - side, 0.10 if overhead else 0.18, me)
-    aside = to.before_knee(me)
+    aside = to.get_ready(z, side, 1 - side, 0.10 if overhead else 0.18, me)
     if overhead:
         ahead, turn = 0.34, (0.0, -0.5 * math.pi, 0.0)
         at, beside = (ahead + BIT_UP_M, 0.10 * sign, z - BIT_M - THRUST_M), (ahead, z - 0.04)
@@ -100,9 +88,7 @@ def plan_drill(draws: Floats, height: float, me: Worker) -> float:
 @kernel
 def plan_saw(draws: Floats, height: float, me: Worker) -> float:
     """Plan to saw a board at the height."""
-    to.blank(me)
-    side = dominant(draws[0], me)
-    sign = 1.0 - 2.0 * side
+    side, sign = to.begin(draws[0], me)
     z = height if height > 0.0 else between(draws[1], 0.75, 0.95)
     to.step_ahead(1 - side, 0.26, me)
     to.put_tool(HAND_SAW, side, (0.52, 0.17 * sign, z + 0.17), (0.0, CUT_RAD, 0.0), me)
@@ -118,11 +104,8 @@ def plan_measure(draws: Floats, height: float, me: Worker) -> float:
     """Plan to measure at the height."""
     to.blank(me)
     z = height if height > 0.0 else between(draws[1], 0.85, 1.3)
-    if z < LOW_M:
-        to.kneel_down(1, me)
-    else:
-        to.step_ahead(dominant(draws[0], me), 0.12, me)
-    to.put_tool(TAPE, 1, (0.48, to.before_knee(me), z + 0.04), (0.0, 0.0, 0.0), me)
+    aside = to.get_ready(z, 1, dominant(draws[0], me), 0.12, me)
+    to.put_tool(TAPE, 1, (0.48, aside, z + 0.04), (0.0, 0.0, 0.0), me)
     to.look_to((0.46, 0.12, z), me)
     to.strokes(strokes.SHIFT, 0.0, 0.0, between(draws[2], 0.8, 1.6), 2 + int(3.0 * draws[3]), me)
     me.wander_m = between(draws[4], 0.10, 0.18)
@@ -132,9 +115,7 @@ def plan_measure(draws: Floats, height: float, me: Worker) -> float:
 @kernel
 def plan_point(draws: Floats, height: float, me: Worker) -> float:
     """Plan to point somewhere ahead, at its height if it has one."""
-    to.blank(me)
-    side = dominant(draws[0], me)
-    sign = 1.0 - 2.0 * side
+    side, sign = to.begin(draws[0], me)
     aside = sign * between(draws[1], -0.4, 0.7)
     up = between(draws[2], -0.25, 0.25)
     reach = 0.95 * me.size[ARM]
@@ -151,9 +132,7 @@ def plan_point(draws: Floats, height: float, me: Worker) -> float:
 @kernel
 def plan_lunge(draws: Floats, height: float, me: Worker) -> float:
     """Plan to snatch at something ahead, at the height."""
-    to.blank(me)
-    side = dominant(draws[0], me)
-    sign = 1.0 - 2.0 * side
+    side, sign = to.begin(draws[0], me)
     z = height if height > 0.0 else between(draws[1], 0.9, 1.3)
     to.step_ahead(side, between(draws[2], 0.32, 0.42), me)
     ahead = me.size[ARM] * between(draws[3], *AHEAD_ARMS)
@@ -170,24 +149,23 @@ def plan_lunge(draws: Floats, height: float, me: Worker) -> float:
 @kernel
 def plan_kneel(draws: Floats, height: float, me: Worker) -> float:
     """Plan to kneel and work low."""
-    to.blank(me)
-    side = dominant(draws[0], me)
+    side, _ = to.begin(draws[0], me)
     to.kneel_down(side, me)
-    return _hands_low(0.42, side, draws, height, me)
+    return _hands_low(0.42, draws, height, me)
 
 
 @kernel
 def plan_squat(draws: Floats, height: float, me: Worker) -> float:
     """Plan to work low on the haunches."""
     to.blank(me)
-    me.crouch, me.ahead = 1.0, 0.02
-    me.settle_s, me.out_at = to.CROUCH_S, 0.1
-    return _hands_low(0.50, dominant(draws[0], me), draws, height, me)
+    me.crouch, me.ahead, me.settle_s = 1.0, 0.02, to.CROUCH_S
+    return _hands_low(0.50, draws, height, me)
 
 
 @kernel
-def _hands_low(ahead: float, side: int, draws: Floats, height: float, me: Worker) -> float:
+def _hands_low(ahead: float, draws: Floats, height: float, me: Worker) -> float:
     """Plan what both hands do at floor height."""
+    side = dominant(draws[0], me)
     sign = 1.0 - 2.0 * side
     z = height if height > 0.0 else between(draws[1], 0.12, 0.35)
     aside = to.before_knee(me)
