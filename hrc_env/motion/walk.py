@@ -36,7 +36,7 @@ WALK_HALF_WIDTH_M = 0.04
 SHIFT_S, TURN_S, TURN_RATE = 0.28, 0.5, 1.7
 """Weight shift before the first step [s]; duration of a turn: TURN_S + angle / TURN_RATE."""
 SIDE_STEP_M, SIDE_STEP_PACE = 0.5, (0.0, 0.2, 0.52)
-"""Nearer than this people do not turn, but take small steps: their pace (`plan_pace`); judgement."""
+"""Nearer than this people do not turn, but take small steps; their `plan_pace`; judgement."""
 CORNER_M_S2 = 1.6
 """Walkers slow down so that corners accelerate them sideways by no more [m/s^2]; judgement."""
 NORMAL_M_S = 1.3
