@@ -20,12 +20,10 @@ N_SIZES = 12
 """Columns of `Anatomy.size`: shoulder and elbow to grip, hip to ankle and its bones, heights of
 ankle and standing pelvis, ankle from pelvis, ball and heel from ankle, upper arm [m]."""
 
-GRIP_M = 0.08
-"""How far beyond the wrist a hand grips (half a hand's length, a judgement)."""
+GRIP_M, HEEL_M = 0.08, -0.045
+"""Hands grip half a hand beyond the wrist; heels touch a quarter of a foot behind the ankle [m]."""
 FOREARM_TWIST_RAD, HAND_TWIST_RAD = 0.15, 0.35
 """Outward turns about the forearm from the rest pose, so that a hanging palm faces the thigh."""
-HEEL_M = -0.045
-"""Heel's contact behind the ankle (a quarter of a foot, a judgement)."""
 STAND_SHARE = 0.994
 """Standing hip height as a share of the leg's length: knees just unlocked."""
 

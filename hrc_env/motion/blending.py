@@ -30,26 +30,26 @@ def evaluate(t: float, clock_s: float, frames: Floats, me: Worker) -> None:
     feet(step_time(t, me) - (me.taken_s if activity == st.PUSH else 0.0), me)
     if activity in st.GOING:
         walk(t, clock_s, me)
-    elif activity == st.REACH:
-        reach(t, clock_s, me)
-    elif activity == st.LIFT:
-        lift(t, clock_s, me)
     elif activity == st.PUSH:
         push(t, clock_s, me)
-    elif activity in st.TAKING:
-        pick_up(t, clock_s, me)
-    elif activity in st.GIVING:
-        pick_up(me.lasts - t, clock_s, me)
-    elif st.SQUATTING <= activity <= st.LUNGE:
-        work(t, clock_s, me)
-    elif activity == st.CLIMB:
-        climb(t, clock_s, me)
     elif activity == st.CLIP:
         play(t, clock_s, frames, me)
-    elif activity == st.LOOK_ROUND:
-        look_round(t, clock_s, me)
     else:
         stand(me.start_x, me.start_y, me.start_yaw, clock_s, me)
+    if activity == st.REACH:
+        reach(t, me)
+    elif activity == st.LIFT:
+        lift(t, me)
+    elif activity in st.TAKING:
+        pick_up(t, me)
+    elif activity in st.GIVING:
+        pick_up(me.lasts - t, me)
+    elif st.SQUATTING <= activity <= st.LUNGE:
+        work(t, me)
+    elif activity == st.CLIMB:
+        climb(t, me)
+    elif activity == st.LOOK_ROUND:
+        look_round(t, me)
     if me.load_prop > 0 and activity in st.IDLE:
         hold_load(me.start_x, me.start_y, me.start_yaw, 0.0, me)
     if t < BLEND_S:

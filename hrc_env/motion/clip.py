@@ -37,7 +37,22 @@ class Clip:
     """Name of the recording."""
 
     def __post_init__(self) -> None:
-        _check(self)
+        """Refuse shapes, numbers or speeds that no recording has."""
+        q, source = self.controls, self.source
+        check_rate(self.fps, source)
+        if q.ndim != 2 or len(q) < 2 or q.shape[1] != c.N_CONTROLS:
+            raise ConfigError(f"{source}: controls must be (T >= 2, {c.N_CONTROLS}): {q.shape}.")
+        check_shape(f"{source}: contacts", self.contacts.shape, (len(q), 2), "frames, feet")
+        check_shape(f"{source}: size", self.size.shape, (N_SIZES,), "lengths")
+        if not (np.isfinite(q).all() and np.isfinite(self.size).all() and self.size[LEG] > 0.0):
+            raise ConfigError(f"{source}: controls and size must be finite numbers.")
+        root = q[:, [c.ROOT_X, c.ROOT_Y]]
+        speed = np.linalg.norm(np.diff(root, axis=0), axis=-1).max() * self.fps
+        if np.abs(root).max() > FARTHEST_M or speed > FASTEST_M_S:
+            raise ConfigError(
+                f"{source}: the root goes {np.abs(root).max():.0f} m far at up to {speed:.0f} m/s; "
+                f"at most {FARTHEST_M:g} m and {FASTEST_M_S:g} m/s are expected of a person."
+            )
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Clip) and all(
@@ -123,25 +138,6 @@ def check_rate(fps: float, source: str) -> None:
         raise ConfigError(
             f"{source}: a frame rate between {SLOWEST_HZ:g} and {FASTEST_HZ:g} frames a second is "
             f"expected, the file has {fps:g}. If you know the true one, give it (--source-fps)."
-        )
-
-
-def _check(clip: Clip) -> None:
-    """Refuse shapes, numbers or speeds that no recording has."""
-    q, source = clip.controls, clip.source
-    check_rate(clip.fps, source)
-    if q.ndim != 2 or len(q) < 2 or q.shape[1] != c.N_CONTROLS:
-        raise ConfigError(f"{source}: controls must be (T >= 2, {c.N_CONTROLS}), got {q.shape}.")
-    check_shape(f"{source}: contacts", clip.contacts.shape, (len(q), 2), "frames, feet")
-    check_shape(f"{source}: size", clip.size.shape, (N_SIZES,), "lengths")
-    if not (np.isfinite(q).all() and np.isfinite(clip.size).all() and clip.size[LEG] > 0.0):
-        raise ConfigError(f"{source}: controls and size must be finite numbers.")
-    root = q[:, [c.ROOT_X, c.ROOT_Y]]
-    speed = np.linalg.norm(np.diff(root, axis=0), axis=-1).max() * clip.fps
-    if np.abs(root).max() > FARTHEST_M or speed > FASTEST_M_S:
-        raise ConfigError(
-            f"{source}: the root goes {np.abs(root).max():.0f} m far at up to {speed:.0f} m/s; "
-            f"at most {FARTHEST_M:g} m and {FASTEST_M_S:g} m/s are expected of a person."
         )
 
 

@@ -20,9 +20,8 @@ CARRY_FORWARD_M, CARRY_Z_M, LOAD_HALF_WIDTH_M = 0.36, 1.05, 0.20
 @kernel
 def _look(share: float, me: Worker) -> None:
     """Turn the head to the work."""
-    q = me.q
-    q[c.HEAD_YAW] += share * (me.gaze_yaw - q[c.HEAD_YAW])
-    q[c.HEAD_PITCH] += share * me.gaze_pitch
+    me.q[c.HEAD_YAW] += share * (me.gaze_yaw - me.q[c.HEAD_YAW])
+    me.q[c.HEAD_PITCH] += share * me.gaze_pitch
 
 
 @kernel
@@ -37,10 +36,9 @@ def _extend(out: float, me: Worker) -> None:
 
 
 @kernel
-def reach(t: float, clock_s: float, me: Worker) -> None:
-    """The control vector of someone who reaches out, works there, and takes the hands back."""
+def reach(t: float, me: Worker) -> None:
+    """Let a standing q reach out, work there, and take the hands back."""
     q = me.q
-    stand(me.start_x, me.start_y, me.start_yaw, clock_s, me)
     there = me.out_at + me.out_s
     leave = there + me.hold_s
     out = min_jerk((t - me.out_at) / me.out_s)
@@ -58,10 +56,9 @@ def reach(t: float, clock_s: float, me: Worker) -> None:
 
 
 @kernel
-def lift(t: float, clock_s: float, me: Worker) -> None:
-    """The control vector of someone who picks a load up, holds it, and puts it back."""
+def lift(t: float, me: Worker) -> None:
+    """Let a standing q pick a load up, hold it, and put it back."""
     q = me.q
-    stand(me.start_x, me.start_y, me.start_yaw, clock_s, me)
     grip = me.out_at + me.out_s
     rise = grip + me.hold_s
     lower = rise + me.raise_s + me.carry_s

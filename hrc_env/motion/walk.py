@@ -118,7 +118,6 @@ def walk(t: float, clock_s: float, me: Worker) -> None:
         _lurch(t - me.trip_at, me.trip, me)
     if me.load_prop > 0.0:
         q[c.SPINE_TWIST] *= LOADED_TWIST
-        x, y, yaw = root(t, me)
         hold_load(x, y, yaw, q[c.PELVIS_Z] - me.size[STAND_Z], me)
 
 

@@ -8,7 +8,7 @@ from hrc_env.motion import controls as c
 from hrc_env.motion.activities.planning import between, blank
 from hrc_env.motion.curves import cruise, min_jerk, shift
 from hrc_env.motion.feet import step_time
-from hrc_env.motion.posture import RELAXED_ELBOW, RELAXED_PITCH, hang, stand
+from hrc_env.motion.posture import RELAXED_ELBOW, RELAXED_PITCH, hang
 from hrc_env.motion.state import Worker
 
 HIGHEST_RISER_M = 0.32
@@ -22,16 +22,14 @@ TURN_S = 0.75
 
 
 @kernel
-def climb(t: float, clock_s: float, me: Worker) -> None:
-    """The control vector of someone who climbs, stays, and comes down as they went up."""
+def climb(t: float, me: Worker) -> None:
+    """Let a standing q climb, stay, and come down as it went up."""
     q = me.q
-    x, y, yaw = me.start_x, me.start_y, me.start_yaw
-    stand(x, y, yaw, clock_s, me)
     up_s, treads = me.up_s, me.treads
     when = step_time(t, me)
     along = cruise((when - 0.25) / (up_s - 0.25), 0.4)
     risen = cruise((when - 0.50) / (up_s - 0.55), 0.4)
-    shift(q, c.ROOT_X, yaw, (FIRST_M + TREAD_M * (treads - 1.0)) * along, 0.0)
+    shift(q, c.ROOT_X, me.start_yaw, (FIRST_M + TREAD_M * (treads - 1.0)) * along, 0.0)
     q[c.PELVIS_Z] += treads * me.riser_m * risen
     going = min_jerk(when / 0.5) - min_jerk((when - up_s + 0.3) / 0.6)
     q[c.SPINE_FLEX] += 0.14 * going
@@ -64,10 +62,9 @@ def start_climb(draws: Floats, height: float, me: Worker) -> float:
 
 
 @kernel
-def look_round(t: float, clock_s: float, me: Worker) -> None:
-    """The control vector of someone who looks about."""
+def look_round(t: float, me: Worker) -> None:
+    """Let a standing q look about."""
     q = me.q
-    stand(me.start_x, me.start_y, me.start_yaw, clock_s, me)
     there, across = min_jerk(t / TURN_S), min_jerk((t - me.left_s) / TURN_S)
     back = min_jerk((t - me.right_s) / TURN_S)
     gaze = me.left_rad * (there - across) + me.right_rad * (across - back)

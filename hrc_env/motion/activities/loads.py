@@ -33,11 +33,9 @@ AWAY_M = 0.43
 
 
 @kernel
-def pick_up(t: float, clock_s: float, me: Worker) -> None:
-    """The control vector of someone who bends down to a load, grips it and comes up with it."""
-    q = me.q
-    x, y, yaw = me.start_x, me.start_y, me.start_yaw
-    stand(x, y, yaw, clock_s, me)
+def pick_up(t: float, me: Worker) -> None:
+    """Let a standing q bend down to a load, grip it and come up with it."""
+    q, yaw = me.q, me.start_yaw
     gripped = me.out_at + me.out_s
     rise = gripped + GRIP_S
     down = min_jerk((t - me.out_at) / me.out_s)
@@ -46,7 +44,7 @@ def pick_up(t: float, clock_s: float, me: Worker) -> None:
     turned = min_jerk(onto / me.shoulder_s) if me.shoulder_s > 0.0 else 0.0
     lean(me.lean * (down - up), me.squat, 0.0, me)
     look_at(me.gaze[0], me.gaze[1], me.gaze[2], down - up, me)
-    place_load(x, y, yaw, 0.0, me)
+    place_load(me.start_x, me.start_y, yaw, 0.0, me)
     for i in range(6):
         at, mid = me.tool_pose[i], me.midway[i]
         q[c.PROP_POSE + i] = at + up * (mid - at) + turned * (q[c.PROP_POSE + i] - mid)

@@ -9,7 +9,7 @@ from hrc_env.motion.anatomy import ANKLE_Z, LEG, STAND_SHARE, STAND_Z, THIGH_LEN
 from hrc_env.motion.curves import min_jerk, shift
 from hrc_env.motion.feet import raise_heel
 from hrc_env.motion.holding import GRIPS, TWO_HANDED, grip
-from hrc_env.motion.posture import from_root, lean, look_at, stand
+from hrc_env.motion.posture import from_root, lean, look_at
 from hrc_env.motion.state import Worker
 
 GAZE_LEAD_S = 0.25
@@ -133,9 +133,8 @@ def _from_belly(hand: int, at: int, share: float, me: Worker) -> None:
 
 
 @kernel
-def work(t: float, clock_s: float, me: Worker) -> None:
-    """The control vector of someone who works in place with a tool, or empty hands."""
-    stand(me.start_x, me.start_y, me.start_yaw, clock_s, me)
+def work(t: float, me: Worker) -> None:
+    """Let a standing q work in place with a tool, or empty hands."""
     near_end = min(t, me.lasts - t)
     down = min_jerk(near_end / me.settle_s)
     since = near_end - me.out_at - me.take_s
