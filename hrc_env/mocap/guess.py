@@ -9,10 +9,9 @@ from hrc_env.mocap.poses import Marks
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import GRIP_M
 
-HEADING_S = 0.25
-"""The heading is the pelvis' direction, smoothed over about this time [s]."""
-PELVIS_SHARE = 0.45
-"""Share of the trunk's pitch that the pelvis takes (as in `posture.lean`)."""
+HEADING_S, PELVIS_SHARE = 0.25, 0.45
+"""The heading is the pelvis's direction, smoothed over about this time [s]; the pelvis's share of
+the trunk's pitch (as in `posture.lean`)."""
 VERTICAL_SHARE = 0.2
 """A foot that is nearly vertical heads where the pelvis does: by this share of its length."""
 NOSE_PITCH_RAD = 0.6
@@ -36,7 +35,7 @@ def first_guess(joints: Points3, fps: float, marks: Marks) -> Floats:
     q[:, c.PELVIS_PITCH] = PELVIS_SHARE * pitch
     q[:, c.SPINE_FLEX] = 2.0 * (1.0 - PELVIS_SHARE) * pitch
     q[:, c.SPINE_SIDE] = -1.5 * lateral - q[:, c.PELVIS_ROLL]
-    twist = _wrapped(_yaw(across(joints, "shoulder")) - yaw)
+    twist = (_yaw(across(joints, "shoulder")) - yaw + np.pi) % (2 * np.pi) - np.pi
     q[:, c.SPINE_TWIST] = twist
     nose = _turned(joints[:, 0] - middle(joints, "shoulder"), -yaw - twist)
     q[:, c.HEAD_YAW] = np.arctan2(nose[:, 1], np.maximum(nose[:, 0], 0.05))
@@ -96,7 +95,3 @@ def _turned(points: Points3, yaw: Floats) -> Points3:
     cos, sin = np.cos(yaw), np.sin(yaw)
     x, y, z = points.T
     return np.stack([cos * x - sin * y, sin * x + cos * y, z], -1)
-
-
-def _wrapped(angle: Floats) -> Floats:
-    return (angle + np.pi) % (2 * np.pi) - np.pi

@@ -27,10 +27,9 @@ SIDED: dict[str, tuple[str, ...]] = {
 HEAD: tuple[str, ...] = ("head", "skull", "face")
 """Names of the node that turns with the face."""
 SIDES = {"left": ("left", "l"), "right": ("right", "r")}
-NOSE_SHARE = 0.065
-"""From the head's joint forward to the nose, as a share of stature (the baked bodies)."""
-STANDS = -0.7
-"""A rest pose stands if the cosine between trunk and thighs is below this."""
+NOSE_SHARE, STANDS = 0.065, -0.7
+"""From the head's joint forward to the nose, as a share of stature (the baked bodies); a rest pose
+stands if the cosine between trunk and thighs is below this."""
 
 
 def find_joints(names: tuple[str, ...], source: str) -> tuple[dict[str, int], int]:

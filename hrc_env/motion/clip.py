@@ -63,10 +63,6 @@ class Clip:
     def __hash__(self) -> int:
         return hash((self.source, self.fps, len(self.controls)))
 
-    @property
-    def duration_s(self) -> float:
-        return (len(self.controls) - 1) / self.fps
-
 
 def placed_at_origin(controls: Floats) -> Floats:
     """Control vectors moved and turned so that the first root is at the origin, towards +x."""
@@ -126,10 +122,8 @@ def load_clip(path: Path) -> Clip:
         raise ConfigError(f"{path}: controls must be (T, {len(RECORDED)}), got {recorded.shape}.")
     controls = np.zeros((len(recorded), c.N_CONTROLS))
     controls[:, RECORDED] = recorded
-    return Clip(
-        controls, float(arrays["fps"]), np.asarray(arrays["contacts"], bool),
-        np.asarray(arrays["size"], float), str(arrays["source"]),
-    )  # fmt: skip
+    contacts, size = np.asarray(arrays["contacts"], bool), np.asarray(arrays["size"], float)
+    return Clip(controls, float(arrays["fps"]), contacts, size, str(arrays["source"]))
 
 
 def check_rate(fps: float, source: str) -> None:
@@ -149,9 +143,6 @@ def footprints(feet: Floats, size: Floats) -> Floats:
 
 def rolled(yaw: Floats, pitch: Floats, size: Floats) -> Floats:
     """(T, 3) how far a foot's pitch takes its ankle: heel up round the ball, toes up."""
-    moved = [
-        about(p, size[BALL_X], size[BALL_Z]) if p > 0.0 else about(p, size[HEEL_X], -size[ANKLE_Z])
-        for p in pitch.tolist()
-    ]
-    ahead, above = np.array(moved).T
+    ball, heel = (size[BALL_X], size[BALL_Z]), (size[HEEL_X], -size[ANKLE_Z])
+    ahead, above = np.array([about(p, *(ball if p > 0.0 else heel)) for p in pitch.tolist()]).T
     return np.stack([np.cos(yaw) * ahead, np.sin(yaw) * ahead, above], -1)

@@ -18,10 +18,8 @@ from hrc_env.motion.traffic import AHEAD_M, APART_M, HANDS_M
 
 NEXT, BOW, LASTS, DELAY, REACTION, REACTION_S, EVENT, DWELL = range(N_START, N_START + 8)
 """Which draw decides what; the first N_START are the activity's own."""
-PLACES, N_TRIED = N_START + 8, 5
-"""First of the draws for places, three a place, and how many are tried."""
-N_DRAWS = PLACES + 3 * N_TRIED
-"""Uniform numbers of one decision."""
+PLACES, N_DRAWS = N_START + 8, N_START + 8 + 3 * 5
+"""First of the draws for places, three for each of five; uniform numbers of one decision."""
 ROBOT_WORK_M = 1.1
 """Height of the work at the robot [m]."""
 

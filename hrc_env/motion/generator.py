@@ -37,10 +37,8 @@ activity_names: tuple[str, ...] = st.ACTIVITY_NAMES
 """Names of the values of `activity`."""
 ABSENT = -1
 """The activity of who is not in an episode."""
-PARKED_Z_M = -100.0
-"""Who is not in an episode is so far below the floor, where no camera looks [m]."""
-HALT_S = 0.3
-"""Time in which hands come to a halt, and go on [s]."""
+PARKED_Z_M, HALT_S = -100.0, 0.3
+"""Where no camera looks: the floor of who is not in an episode [m]; time in which hands halt [s]."""
 
 OPEN_FLOOR = Grounds(
     walkable_x_m=(-0.1, 2.4),

@@ -21,10 +21,9 @@ RELAXED_PITCH, RELAXED_ELBOW, RELAXED_OUT, HAND_OUT_M = 0.02, 0.38, 0.26, 0.05
 farther out than the elbow [m]: beside broad hips, too; judgement."""
 MOST_LEAN = 1.3
 """Lean beyond which a person would step instead."""
-NECK_SHARE = 0.70
-"""Height of the eyes above the pelvis as a share of the pelvis's; from the baked bodies."""
-HEAD_SHARE = 0.75
-"""The head's share of a turn of gaze, the eyes do the rest (Freedman & Sparks 1997: 70-80 %)."""
+NECK_SHARE, HEAD_SHARE = 0.70, 0.75
+"""Height of the eyes above the pelvis as a share of the pelvis's, from the baked bodies; the head's
+share of a turn of gaze, the eyes do the rest (Freedman & Sparks 1997: 70-80 %)."""
 MOST_YAW_RAD, MOST_DOWN_RAD, MOST_UP_RAD = 1.2, 0.75, 0.75
 """How far neck and head turn from the chest; comfortable ranges, judgement."""
 

@@ -24,8 +24,6 @@ Act = tuple[int, Start, float]
 """An activity, what begins it, the height of its place [m]."""
 AWAY_M, FAR_M = 3.0, 8.0
 """Length of a way, and of the walks that are measured [m]."""
-LIGHT_DRAW = 2
-"""Which draw of `plan_hammer` decides between taps and blows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +90,7 @@ def _going(activity: int, speed_m_s: float = 1.1, prop: int = 0, way_m: float = 
 def _hammer(lightly: bool, height_m: float) -> tuple[Act]:
     def start(draws: Floats, height_m: float, me: Worker) -> float:
         chosen = draws.copy()
-        chosen[LIGHT_DRAW] = 0.0 if lightly else 1.0
+        chosen[2] = 0.0 if lightly else 1.0  # which decides between taps and blows
         return STARTS[st.HAMMER](chosen, height_m, me)
 
     return ((st.HAMMER, start, height_m),)

@@ -12,14 +12,12 @@ from hrc_env.motion.floorplan import CELL_M, slack_at
 from hrc_env.motion.paths import along, lay_path
 from hrc_env.motion.state import MAX_VIA, Pair, Worker
 
-STRIDE = 3
-"""Grid points of the field to a node of the search: 15 cm."""
+STRIDE, SAMPLE_M = 3, 0.06
+"""Grid points of the field to a node of the search: 15 cm; lines are looked at in such steps."""
 EASE_M = 0.7
 """So near its ends a way may be as near to things as its ends are [m]."""
 SEARCHED_M, PULLED_M, WALKED_M = 0.05, 0.03, -0.02
 """Slack that nodes, straight lines and the arcs at last must have [m]."""
-SAMPLE_M = 0.06
-"""Lines are looked at in steps of this length [m]."""
 ARMS_M = (1.2, 0.7, 0.35, 0.15, 0.02)
 """How far before a corner an arc begins at most [m], tried in turn."""
 BOW_SHARE = 0.12

@@ -19,10 +19,8 @@ from hrc_env.worker.props import prop_index
 
 WISHED_CLIP, WHICH_CLIP = N_START - 2, N_START - 1
 """Of an activity's own draws: whether to play a clip instead of it, and which."""
-ARRIVED_M = 0.12
-"""So near to a place a worker is there [m]."""
-HURRY = (1.0, 0.75)
-"""Shares of their pace at which walkers try to get past each other."""
+ARRIVED_M, HURRY = 0.12, (1.0, 0.75)
+"""So near to a place a worker is there [m]; shares of their pace at which walkers set out."""
 STUMBLE_TO = ("robot", "open", "floor")
 """Kinds of places with room ahead for the arms of who stumbles."""
 Begun = tuple[int, float] | None

@@ -14,10 +14,8 @@ APART_M = 0.80
 """Roots keep so far from each other [m]: two half widths of people with arms, and some."""
 AHEAD_M, HANDS_M = 0.48, 0.76
 """Who works has hands and head so far ahead [m]; others' roots keep so far from there."""
-CART_M, CART_APART_M = 1.0, 0.95
-"""The same of who pushes a cart."""
-CLIP_M, CLIP_APART_M = 0.01, 1.15
-"""The same of who plays a clip: an arm's length more than APART_M to any side."""
+PUSHING_M, CLIP_M = (1.0, 0.95), (0.01, 1.15)
+"""The same of who pushes a cart, and of who plays a clip: an arm's length more to any side."""
 LOOK_S = 0.12
 """Meetings are looked for in steps of this length [s]; at 2.8 m/s to each other 0.3 m."""
 
@@ -32,9 +30,9 @@ def goes(activity: int) -> bool:
 def ahead_of(activity: int) -> Pair:
     """How far ahead of the root hands or cart are, and how near others may come to there [m]."""
     if activity == st.PUSH:
-        return CART_M, CART_APART_M
+        return PUSHING_M
     if activity == st.CLIP:
-        return CLIP_M, CLIP_APART_M
+        return CLIP_M
     if activity in st.IDLE or goes(activity):
         return 0.0, 0.0
     return AHEAD_M, HANDS_M

@@ -15,10 +15,8 @@ HIGHEST_RISER_M = 0.32
 """Greatest rise of one step [m]; ladders have rungs 0.25 to 0.30 m apart (EN 131-1)."""
 FIRST_M, TREAD_M = 0.40, 0.24
 """Where a foot goes on the first tread, and from tread to tread [m]."""
-STEP_AT_S, PERIOD_S, SWING_S = 0.12, 0.72, 0.56
-"""First lift-off, period and swing of a climber's steps [s]; judgement."""
-TURN_S = 0.75
-"""To turn the head across [s]; about 1.5 rad/s."""
+STEP_AT_S, PERIOD_S, SWING_S, TURN_S = 0.12, 0.72, 0.56, 0.75
+"""First lift-off, period and swing of a climber's steps; to turn the head across [s]; judgement."""
 
 
 @kernel

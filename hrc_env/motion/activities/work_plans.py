@@ -19,10 +19,8 @@ from hrc_env.worker.props import prop_index
 HAMMER, DRILL, HAND_SAW, TAPE = map(prop_index, ("hammer", "drill", "saw", "tape_measure"))
 HEAD_M, FACE_M = 0.25, 0.05
 """From the fist to the hammer's head along the handle, and to its face [m]; `props`."""
-LIGHT_HZ, LIGHT_M = 5.6, 0.060
-"""Light taps: to and fro by 6 cm, at most 1.1 m/s and a little more on the way forward."""
-LOW_SHARE = 0.7
-"""Share of a blow's size at floor height, where the trunk is in its way; judgement."""
+LIGHT_HZ, LIGHT_M, LOW_SHARE = 5.6, 0.060, 0.7
+"""Light taps: to and fro by 6 cm, at most 1.1 m/s; size of blows at floor height; judgement."""
 WALL_M, OVERHEAD_M = 1.2, 1.7
 """From these heights on nails go into a wall, not downwards; people work above their head [m]."""
 BIT_M, BIT_UP_M, THRUST_M = 0.22, 0.09, 0.04
@@ -31,10 +29,8 @@ CUT_RAD = 0.6
 """How steeply the blade goes into the board [rad]; 45 to 60 degrees to it is usual, judgement."""
 SHOULDER_SHARE, SHOULDER_M = 1.50, 0.19
 """Height of the shoulder in heights of the pelvis, and its distance from the middle [m]."""
-POINT_M_S = 1.5
-"""Peak speed of the pointing hand [m/s]; a quick reach."""
-AHEAD_ARMS = (1.2, 1.5)
-"""How far ahead it is, in lengths of the arm: a step and a bow away; judgement."""
+POINT_M_S, AHEAD_ARMS = 1.5, (1.2, 1.5)
+"""Peak speed of a pointing hand [m/s]; where one lunges to, in lengths of the arm; judgement."""
 
 
 @kernel
