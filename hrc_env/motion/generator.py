@@ -38,7 +38,7 @@ activity_names: tuple[str, ...] = st.ACTIVITY_NAMES
 ABSENT = -1
 """The activity of who is not in an episode."""
 PARKED_Z_M, HALT_S = -100.0, 0.3
-"""Where no camera looks: the floor of who is not in an episode [m]; time in which hands halt [s]."""
+"""Height of who is not in an episode, where no camera looks [m]; hands halt within so long [s]."""
 
 OPEN_FLOOR = Grounds(
     walkable_x_m=(-0.1, 2.4),
