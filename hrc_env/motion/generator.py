@@ -156,9 +156,9 @@ Now = tuple[Floats, ...]
 
 
 def _motion(workers: Workers, place: Places, now: Now) -> WorkerMotion:
-    velocity, turning, rows = now
+    (position, turn), (velocity, turning, rows) = place, now
     held = Held(rows[..., 0].astype(np.int64), rows[..., 1:4].copy(), rows[..., 4:].copy())
-    return WorkerMotion(*place, velocity, turning, held, workers["body"].copy())
+    return WorkerMotion(position, turn, velocity, turning, held, workers["body"].copy())
 
 
 def _blank(lead: tuple[int, ...], *widths: int) -> Places:
