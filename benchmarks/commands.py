@@ -26,8 +26,7 @@ class AnyBench:
 
     def shown(self, study: Study[Any, Any], config: Any) -> int:
         """Run a study, show its tables."""
-        written = "report.html, results.json, figures/"
-        return show(partial(run, study, config), self.out, "bench", written)
+        return show(partial(run, study, config), self.out, "bench")
 
 
 @dataclass(frozen=True)

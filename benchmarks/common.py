@@ -12,7 +12,7 @@ from rich.markdown import Markdown
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Covariances3, Floats, Points3
 from hrc_env.experiments.study.plots import label, new_figure, points, save
-from hrc_env.experiments.study.report import Column, Metrics, Report, Table
+from hrc_env.experiments.study.report import Column, Metrics, Report
 
 CHI2_95_3D = 7.815
 """95 % of a three-dimensional normal variable lies within this squared distance."""
@@ -54,11 +54,6 @@ def cell(metric: Metric | None, scale: float = 1.0, digits: int = 1, interval: b
     return f"{value} ({low}-{high})" if interval else value
 
 
-def table(header: Iterable[str], rows: Iterable[Iterable[str]]) -> Table:
-    """A table from whatever holds its words."""
-    return Table(tuple(header), tuple(tuple(row) for row in rows))
-
-
 def plot_rows(
     path: Path, rows: Mapping[str, str], columns: Sequence[Column], metrics: Metrics
 ) -> None:
@@ -69,7 +64,7 @@ def plot_rows(
     for axis, column in zip(panels, columns, strict=True):
         known = [(k, metrics[key]) for k, row in zip(y, rows, strict=True)
                  if (key := column.key.format(row)) in metrics]  # fmt: skip
-        points(axis, [k for k, _ in known], [m for _, m in known], column.scale, sideways=True)
+        points(axis, [k for k, _ in known], [m for _, m in known], column.scale)
         label(axis, column.words)
     panels[0].set_yticks(y, list(rows.values()))
     save(figure, path)

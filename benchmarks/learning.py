@@ -18,7 +18,7 @@ import tyro
 from benchmarks.common import publish
 from hrc_env.core.results import Metric, over
 from hrc_env.experiments.study.plots import label, new_figure, save
-from hrc_env.experiments.study.report import Column, Picture, Report, table_of
+from hrc_env.experiments.study.report import Column, Report, picture, table_of
 
 ROOT = Path(__file__).resolve().parent.parent
 GOOD = 0.8
@@ -56,9 +56,9 @@ def main(arguments: Arguments) -> None:
     rows = {name: f"{name} [{metric.unit}]" for name, metric in metrics.items()}
     parts = [
         table_of("", rows, [Column("{}", "median (lowest-highest)", 3)], metrics),
-        Picture(curves, f"PPO on the emulator; safety grows over {arguments.ramp:,} steps."),
+        picture(curves, f"PPO on the emulator; safety grows over {arguments.ramp:,} steps."),
     ]
-    report = Report("Learning", (__doc__ or "").strip(), parts)
+    report = Report("Learning", (__doc__ or "").strip(), parts, "the lowest and the highest run")
     publish(arguments.out, report, asdict(arguments), arguments.seeds, metrics)
 
 

@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 import tyro
 
-from benchmarks.common import exactly, publish, table
+from benchmarks.common import exactly, publish
 from hrc_env.cli.progress import track
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats, Points3
-from hrc_env.experiments.study.report import Report
+from hrc_env.experiments.study.report import Report, table
 from hrc_env.geometry import chains
 from hrc_env.geometry.distances import least_separation
 from hrc_env.geometry.shapes import AXES, BOX, CAPSULE, CENTRE, HALF_SIZE, KIND, PLANE
@@ -106,7 +106,8 @@ def main(arguments: Arguments) -> None:
         said.append(f"{name}, deepest beyond 3 cm: {'; '.join(deep) or 'none'}.")
     header = ("scene", "in solids [cm]", "stuck [s]", "in each other [cm]", "NaN", "frame [us]")
     limits = f"In brackets: of {arguments.episodes} episodes beyond 3 cm, 10 s and 3 cm."
-    report = Report("People", (__doc__ or "").strip(), [table(header, lines), limits, *said])
+    report = Report("People", (__doc__ or "").strip(), [table(header, lines), limits, *said],
+                    "the least and the largest of all episodes")  # fmt: skip
     publish(arguments.out, report, asdict(arguments), [arguments.seed], metrics)
 
 

@@ -156,7 +156,8 @@ def main() -> None:
     rows = {row: f"{row} [{metrics[f'{row}.{names[0]}'].unit}]" for row in rows}
     columns = [Column(f"{{}}.{name}", name, 3) for name in names]
     lead = (__doc__ or "").strip() + " Medians over seeds, in brackets the least and the largest."
-    report = Report("Physics substeps", lead, [table_of("", rows, columns, metrics)])
+    parts = [table_of("", rows, columns, metrics)]
+    report = Report("Physics substeps", lead, parts, "the least and the largest over seeds")
     publish(OUT, report, {"ctrl_dt": CTRL_DT}, list(SEEDS), metrics)
 
 

@@ -1,14 +1,13 @@
 """The motion bench as people read it."""
 
-from benchmarks.common import table
 from benchmarks.motion.targets import ANY, Target, targets_of
 from hrc_env.core.results import Metric
 from hrc_env.experiments.study.report import (
     Column,
     Metrics,
     Report,
-    Table,
     said,
+    table,
     table_of,
 )
 
@@ -43,7 +42,7 @@ def report(metrics: Metrics) -> Report:
         "## Beside what is known of people", _targets(scenes, metrics),
         "## Every scene", table_of("scene", {each: each for each in scenes}, COLUMNS, metrics),
         f"Everywhere: {'; '.join(asked)}.",
-    ))  # fmt: skip
+    ), "the smallest and the largest body's")  # fmt: skip
 
 
 def inside(target: Target, metric: Metric) -> bool:
@@ -51,7 +50,7 @@ def inside(target: Target, metric: Metric) -> bool:
     return target.low <= metric.value <= target.high
 
 
-def _targets(scenes: list[str], metrics: Metrics) -> Table:
+def _targets(scenes: list[str], metrics: Metrics) -> str:
     lines = []
     for scene in scenes:
         for target in targets_of(scene):

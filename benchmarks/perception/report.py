@@ -6,7 +6,7 @@ from typing import Any
 from benchmarks.common import keys, plot_rows
 from benchmarks.perception.speed import REST, STAGES
 from benchmarks.perception.views import ROWS
-from hrc_env.experiments.study.report import Column, Metrics, Picture, Report, table_of
+from hrc_env.experiments.study.report import Column, Metrics, Report, picture, table_of
 from hrc_env.perception.faults.fault import KINDS
 
 _LEAD = """\
@@ -65,7 +65,7 @@ def report(config: Any, found: Any, metrics: Metrics, figures: Path) -> Report:
         "## Error of the estimate", table_of("", _estimates(metrics), _belief_columns(), metrics),
         _ABOUT_ERRORS, _acquired(metrics),
         "## Faults of one of four cameras, lab", fault_table(every, metrics), _ABOUT_FAULTS,
-        Picture(figures / "faults.png", "One of four cameras has a fault."),
+        picture(figures / "faults.png", "One of four cameras has a fault."),
         "Median error with one camera lost, over that with all of them:",
         table_of("", cameras, [Column(f"{start}error_ratio.lost.{{}}", words + "ratio", 2)
                                for start, words in _LEVELS.items()], metrics),
@@ -76,7 +76,7 @@ def report(config: Any, found: Any, metrics: Metrics, figures: Path) -> Report:
                 ("others", "others [%]", 100))
         ], metrics), _ABOUT_NAMED,
         "## Single crops", table_of("", views, _crop_columns(), metrics), _ABOUT_CROPS,
-        Picture(figures / "detection.png", "Single crops."),
+        picture(figures / "detection.png", "Single crops."),
         "## The emulator beside the pixels", table_of("", families, [
             Column("emulator_error_ratio.{}", "median", 2),
             Column("emulator_error_ratio.{}.p95", "p95", 2),
@@ -85,7 +85,7 @@ def report(config: Any, found: Any, metrics: Metrics, figures: Path) -> Report:
         "## Nobody there", f"{metrics['empty.phantoms'].value:.0f} of "
         f"{metrics['empty.phantoms'].n} images of empty scenes were said to show somebody; "
         f"{metrics['empty.tracked'].value:.0f} steps had a track.",
-    ))  # fmt: skip
+    ), "95 % intervals over episodes, crops or clips")  # fmt: skip
 
 
 def _named(metrics: Metrics, start: str) -> dict[str, str]:
@@ -121,7 +121,7 @@ def _crop_columns() -> list[Column]:
     ]
 
 
-def fault_table(kinds: dict[str, str], metrics: Metrics) -> Any:
+def fault_table(kinds: dict[str, str], metrics: Metrics) -> str:
     """A row for every fault."""
     columns = []
     for start, words in _LEVELS.items():

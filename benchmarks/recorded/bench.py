@@ -22,7 +22,7 @@ from benchmarks.tracking.names import DEFAULT
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats
 from hrc_env.experiments.study.cache import PartCache
-from hrc_env.experiments.study.report import Column, Metrics, Picture, Report, table_of
+from hrc_env.experiments.study.report import Column, Metrics, Report, picture, table_of
 from hrc_env.experiments.study.runner import Study
 from hrc_env.geometry.cameras import projections
 from hrc_env.tracking.config import TrackerConfig
@@ -121,8 +121,8 @@ def report(metrics: Metrics, figures: Path) -> Report:
     return Report("Tracking on recorded films", _LEAD, [
         table_of("", {name: name for name in NAMES}, _COLUMNS, metrics),
         f"Lag in frames: {', '.join(lags)}.",
-        Picture(figures / Path(FILM).with_suffix(".png"), f"The middle frame of {FILM}."),
-    ])  # fmt: skip
+        picture(figures / Path(FILM).with_suffix(".png"), f"The middle frame of {FILM}."),
+    ], "95 % intervals over stretches of the film, or the smallest and the largest")  # fmt: skip
 
 
 RECORDED = Study(

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from benchmarks.common import keys
 from benchmarks.speed.organs import ORGANS, REST, TOTAL
 from hrc_env.experiments.study.plots import label, new_figure, save
-from hrc_env.experiments.study.report import Column, Metrics, Picture, Report, table_of
+from hrc_env.experiments.study.report import Column, Metrics, Report, picture, table_of
 
 SINGLE = "single"
 """The environment that `gymnasium.make` gives, as opposed to a vector of one."""
@@ -45,10 +45,10 @@ def report(load_before: float | None, metrics: Metrics, figures: Path) -> Report
         table_of("", rows, by_level("ratio_to_reacher", 3), metrics),
         "## Microseconds per environment and step, level `keypoints`",
         table_of("", timed, organs, metrics), _ABOUT_THE_ORGANS,
-        Picture(figures / "organs.png", "What a step costs, level `keypoints` (on the wall)."),
+        picture(figures / "organs.png", "What a step costs, level `keypoints` (on the wall)."),
         "## Milliseconds of a reset, level `keypoints`",
         table_of("", resets, [Column("reset_ms.{}", "ms", 2)], metrics),
-    ))  # fmt: skip
+    ), "the smallest and the largest of all rounds")  # fmt: skip
 
 
 def _lead(metrics: Metrics, load_before: float | None) -> str:

@@ -1,7 +1,7 @@
 """python -m hrc_env check: is this machine ready? Each line is ok or says what to do.
 
-Whatever is wrong must end up in its line. So what it asks about is imported inside the check,
-and what may take a process with it (drivers, libraries that clash) is tried in one of its own.
+Whatever is wrong must end up in its line: imports are inside the checks, and what may take a
+process with it (drivers, libraries that clash) is tried in one of its own.
 """
 
 import importlib.util
@@ -89,12 +89,12 @@ def _opengl() -> Finding:
 def _triton() -> Finding:
     if importlib.util.find_spec("triton") is None:
         return True, "not installed (torch's CPU build has none): nothing that clashes with Mesa"
+    ours = version("triton")
     if not _in_a_process(DRAW)[0]:
-        return True, f"{version('triton')}; OpenGL does not draw, so that they cannot clash"
+        return True, f"{ours}; OpenGL does not draw, so that they cannot clash"
     ok, said = _in_a_process(f"{DRAW}; import triton")
-    if ok:
-        return True, f"{version('triton')} can be imported after OpenGL has drawn"
-    return False, f"{version('triton')} after OpenGL has drawn: {said}"
+    said = "can be imported after OpenGL has drawn" if ok else f"after OpenGL has drawn: {said}"
+    return ok, f"{ours} {said}"
 
 
 def _in_a_process(code: str) -> Finding:

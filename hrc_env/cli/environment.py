@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -52,20 +52,12 @@ class EnvironmentArguments:
 
     def keywords(self) -> dict[str, Any]:
         """Keyword arguments of `HRCEnv`, of lists, mappings, text and numbers only."""
-        given = {
-            "cameras": cameras_named(self.cameras),
-            "people": self.people,
-            "motions": [str(path) for path in self.motions],
-            "faults": [_fault(text) for text in self.faults],
-            "appearance": self.appearance,
-            "shield": self.shield,
-            "config": read_config(self.config or ()),
-        }
-        names = "task", "perception", "estimator", "scene", "robot", "n_workers", "control"
-        return {
-            **{name: getattr(self, name) for name in names},
-            **{name: value for name, value in given.items() if value},
-        }
+        given = {each.name: getattr(self, each.name) for each in fields(EnvironmentArguments)}
+        given["cameras"] = cameras_named(self.cameras)
+        given["motions"] = [str(path) for path in self.motions]
+        given["faults"] = [_fault(text) for text in self.faults]
+        given["config"] = read_config(self.config or ())
+        return {name: value for name, value in given.items() if value not in (None, [], {})}
 
 
 def cameras_named(words: Sequence[str]) -> str | list[int | str]:
@@ -102,21 +94,22 @@ def merged(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
 def _assigned(word: str) -> dict[str, Any]:
     """The nested mapping that a.b=VALUE is."""
     path, _, text = word.partition("=")
-    value = _json(text, text)
+    value = _value(text)
     for name in reversed(path.split(".")):
         value = {name: value}
     return value
 
 
 def _fault(text: str) -> dict[str, Any]:
-    fault = _json(text, None)
+    fault = _value(text)
     if not isinstance(fault, dict):
         raise ConfigError(f"--faults takes JSON objects, as {FAULT}, got {text!r}.")
     return fault
 
 
-def _json(text: str, otherwise: Any) -> Any:
+def _value(text: str) -> Any:
+    """What JSON it is, or else the text."""
     try:
         return json.loads(text)
     except json.JSONDecodeError:
-        return otherwise
+        return text

@@ -36,7 +36,7 @@ class AnyExperiment:
         out, overwrite = asked.pop("out"), asked.pop("overwrite")
         config = experiment.config_for(**asked)
         run = partial(runner.run, experiment.STUDY, config, overwrite=overwrite)
-        return show(run, out, "experiment", "report.html, results.json, figures/")
+        return show(run, out, "experiment")
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class SiteExperiment(AnyExperiment):
 
 @dataclass(frozen=True)
 class LabExperiment(AnyExperiment):
-    """The paper's laboratory: all joints, five kinds of motion, one camera against four."""
+    """The paper's laboratory: all joints, six kinds of motion, one camera against four."""
 
     name = "lab"
     out: Path = Path("out/lab")

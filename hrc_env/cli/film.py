@@ -4,8 +4,9 @@ import copy
 import os
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Any
 
@@ -32,20 +33,18 @@ FRAMES_BEHIND = 2
 
 Make = Callable[[Any], Any]
 """Builds the agent for an `EnvInfo`."""
+Steps = Iterator[tuple[float, dict[str, Any]]]
+"""Reward and info."""
 
 
 def film_episode(
     make: Make, path: Path, seed: int = 0, n_steps: int = 250, **kwargs: Any
 ) -> dict[str, float]:
-    """Film `n_steps` of an agent; returns what came of them, by name and [unit].
+    """Film `n_steps` of an agent, every second one, into an .mp4 file; returns what came of them,
+    by name and [unit].
 
-    Args:
-        make: builds the agent for an `EnvInfo`.
-        path: an .mp4 file; a still of the closest moment that is no near miss yet (or of the
-            first step) is written beside it as .png.
-        seed: of the episode.
-        n_steps: how many steps; every second one is a frame.
-        kwargs: as of `HRCEnv`.
+    A still of the closest moment that is no near miss yet (or of the first step) is written beside
+    it as .png. `kwargs` are those of `HRCEnv`.
     """
     level = kwargs.get("perception", "pixels")
     compile_kernels(Console(), level)
@@ -70,16 +69,27 @@ def nearest_seed(make: Make, seeds: Iterable[int], n_steps: int = 250, **kwargs:
     """
     if kwargs.get("perception", "pixels") == "pixels":
         kwargs = {**kwargs, "perception": "keypoints", "appearance": None}
-    env = HRCEnv(**kwargs)
-    try:
+    with closing(HRCEnv(**kwargs)) as env:
         tried = track(list(seeds), "looking for an encounter")
         closest_m = {seed: _closest_m(env, make, seed, n_steps) for seed in tried}
-    finally:
-        env.close()
-    free = {seed: metres for seed, metres in closest_m.items() if metres > CLOSE_M}
+    free = [seed for seed, metres in closest_m.items() if metres > CLOSE_M]
     if free:
-        return min(free, key=lambda seed: free[seed])
-    return max(closest_m, key=lambda seed: closest_m[seed])  # all are near misses: the least one
+        return min(free, key=closest_m.__getitem__)
+    return max(closest_m, key=closest_m.__getitem__)  # all are near misses: the least one
+
+
+def begun(env: Any, make: Make, seed: int, n_steps: int) -> Steps:
+    """The steps of an agent's episode, which has begun, up to its end."""
+    agent = make(agents("env_info").env_info(env.unwrapped.simulation))
+    return _steps(env, agent, env.reset(seed=seed)[0], n_steps)
+
+
+def _steps(env: Any, agent: Any, observation: Any, n_steps: int) -> Steps:
+    for _ in range(n_steps):
+        observation, reward, terminated, truncated, info = env.step(agent.act(observation))
+        yield float(reward), info
+        if terminated or truncated:
+            break
 
 
 def table(totals: dict[str, float], title: str = "") -> Table:
@@ -93,87 +103,53 @@ def table(totals: dict[str, float], title: str = "") -> Table:
 
 
 def _closest_m(env: HRCEnv, make: Make, seed: int, n_steps: int) -> float:
-    agent = make(agents("env_info").env_info(env.simulation))
-    observation, _ = env.reset(seed=seed)
-    closest_m = np.inf
-    for _ in range(n_steps):
-        observation, _, terminated, _, info = env.step(agent.act(observation))
-        closest_m = min(closest_m, float(info.get("safety/min_separation_m", np.inf)))
-        if terminated:
-            break
-    return closest_m
+    played = begun(env, make, seed, n_steps)
+    return min(float(info.get("safety/min_separation_m", np.inf)) for _, info in played)
 
 
 def _filmed(
     env: HRCEnv, make: Make, path: Path, seed: int, n_steps: int
 ) -> tuple[dict[str, float], Image]:
-    """Play, have every second step drawn; what came of it, and the still."""
-    agent = make(agents("env_info").env_info(env.simulation))
-    observation, info = env.reset(seed=seed)
+    """Play, while a thread draws and encodes every second step; what came of it, and the still."""
+    played, waiting = begun(env, make, seed, n_steps), deque[Future[Image]]()
+    writer: Any = imageio.get_writer(
+        path, fps=1 / env.config.ctrl_dt / STEPS_PER_FRAME,
+        quality=None, macro_block_size=4, output_params=list(H264),
+    )  # fmt: skip
+
+    def draw(diary: Diary, seen: Glance) -> Image:
+        frame = compose(env, diary, seen)
+        writer.append_data(frame)
+        return frame
+
+    still: Future[Image] = Future()
     diary, closest_m, started_s = Diary(), np.inf, time.monotonic()
-    with _Studio(env, path) as studio:
-        for step in track(range(n_steps), "filming"):
-            observation, _, terminated, _, info = env.step(agent.act(observation))
+    with closing(writer), ThreadPoolExecutor(1, "hrc_env-film") as thread, ExitStack() as after:
+        after.callback(lambda: thread.submit(env.views.close).result())  # where they were made
+        for step, (_, info) in enumerate(track(played, "filming", n_steps)):
             believed = env.simulation.belief.separation.distance_m
             diary.note(info, float(believed.min(initial=np.inf)), env.simulation.task.counts(info))
             if step % STEPS_PER_FRAME == 0:
+                waiting.append(thread.submit(draw, copy.deepcopy(diary), env.views.glance()))
                 closer = CLOSE_M < diary.true_m[-1] < closest_m
                 closest_m = diary.true_m[-1] if closer else closest_m
-                studio.add(diary, is_still=closer or step == 0)
-            if terminated:
-                break
-        studio.finish()
+                still = waiting[-1] if closer or step == 0 else still
+                if len(waiting) > FRAMES_BEHIND:
+                    waiting.popleft().result()
+        for drawn in waiting:
+            drawn.result()
         seconds = time.monotonic() - started_s
-    return _totals(env, diary, info, seconds), studio.still
+    return _totals(diary, seconds), still.result()
 
 
-class _Studio:
-    """Draws frames and hands them to ffmpeg in a thread, while the environment goes on."""
-
-    def __init__(self, env: HRCEnv, path: Path) -> None:
-        self.still: Image = np.zeros((1, 1, 3), np.uint8)
-        """The last frame that was asked to be one."""
-        self._env, fps = env, 1 / env.config.ctrl_dt / STEPS_PER_FRAME
-        self._writer: Any = imageio.get_writer(
-            path, fps=fps, quality=None, macro_block_size=4, output_params=list(H264)
-        )
-        self._thread = ThreadPoolExecutor(1, thread_name_prefix="hrc_env-film")
-        self._waiting: deque[Future[None]] = deque()
-
-    def add(self, diary: Diary, is_still: bool) -> None:
-        """Draw this moment some time."""
-        moment = copy.deepcopy(diary), self._env.views.glance(), is_still
-        self._waiting.append(self._thread.submit(self._draw, *moment))
-        self.finish(FRAMES_BEHIND)
-
-    def finish(self, n_behind: int = 0) -> None:
-        """Wait until no more than so many frames wait."""
-        while len(self._waiting) > n_behind:
-            self._waiting.popleft().result()
-
-    def _draw(self, diary: Diary, seen: Glance, is_still: bool) -> None:
-        frame = compose(self._env, diary, seen)
-        self.still = frame if is_still else self.still
-        self._writer.append_data(frame)
-
-    def __enter__(self) -> "_Studio":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Free what was made in the thread, there."""
-        self._thread.submit(self._env.views.close).result()
-        self._thread.shutdown()
-        self._writer.close()
-
-
-def _totals(env: HRCEnv, diary: Diary, info: dict[str, Any], seconds: float) -> dict[str, float]:
+def _totals(diary: Diary, seconds: float) -> dict[str, float]:
     errors_m = np.array(diary.error_m)
     known = errors_m[np.isfinite(errors_m)]
     return {
         "median tracking error [mm]": 1e3 * float(np.median(known)) if len(known) else np.nan,
         "lost steps [%]": 100 * (1 - len(known) / len(errors_m)),
         "minimum separation [m]": min(diary.true_m),
-        **{f"{name} [count]": n for name, n in env.simulation.task.counts(info).items()},
-        "cost [count]": info["episode_cost"],
+        **{f"{name} [count]": n for name, n in diary.counts.items()},
+        "cost [count]": sum(diary.cost),
         "film drawn [frames/s]": len(errors_m) / STEPS_PER_FRAME / seconds,
     }

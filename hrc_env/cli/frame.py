@@ -57,15 +57,17 @@ class Diary:
 def compose(env: HRCEnv, diary: Diary, seen: Glance | None = None) -> Image:
     """One frame (900, 1600, 3): room, cameras, crops or belief, strip.
 
-    Of the moment `seen` (None: now), after which the environment may have gone on; `diary` ends
-    there and must not be written to meanwhile.
+    Of the moment `seen` (None: now), with which the diary ends; the environment may have gone on.
     """
     seen = seen or env.views.glance()
     level, views = env.simulation.perception, env.views
     frame = _panel(HEIGHT, WIDTH)
-    title = f"what the robot believes (perception: {level}), from above and from the side"
     if level == "pixels":
         title = "what the pose network is given: crops round the predicted worker"
+        pictures = views.crops(CROP, seen)[:4]
+    else:
+        title = f"what the robot believes (perception: {level}), from above and from the side"
+        pictures = views.beliefs(*BELIEF, seen)
     overlay.write(frame, title, (RIGHT_X + 4, TITLE_Y), 16)
     room = views.room(*ROOM, seen)
     overlay.label(room, "what happens", (10, 10), 18)
@@ -74,7 +76,6 @@ def compose(env: HRCEnv, diary: Diary, seen: Glance | None = None) -> Image:
     _paste(frame, room, (0, 0))
     for k, view in enumerate(views.cameras(*TILE, seen)[:4]):
         _paste(frame, view, (RIGHT_X + k % 2 * (TILE[0] + 4), k // 2 * (TILE[1] + 4)))
-    pictures = views.crops(CROP, seen)[:4] if level == "pixels" else views.beliefs(*BELIEF, seen)
     for k, picture in enumerate(pictures):
         _paste(frame, picture, (RIGHT_X + k * (picture.shape[1] + 4), TITLE_Y + 30))
     _paste(frame, strip(diary, env.config.ctrl_dt, env.config.cost.proximity_m), (0, 720))
@@ -85,17 +86,13 @@ def legend(level: str) -> Image:
     """(28, 792, 3) what the colours mean at a perception level."""
     image = _panel(LEGEND_HEIGHT, ROOM[0])
     marks = [
-        ("worker's left", overlay.LEFT, "line"),
-        ("right", overlay.RIGHT, "line"),
-        ("estimate, 2 sigma", overlay.BELIEF, "dot"),
-        ("goal", overlay.GOAL, "ring"),
-    ]
-    if level in CAMERA_LEVELS:
-        marks.append(("detected joint", overlay.DETECTED, "dot"))
-    if level == "pixels":
-        marks.append(("crop", overlay.WINDOW, "box"))
+        ("worker's left", overlay.LEFT, "line"), ("right", overlay.RIGHT, "line"),
+        ("estimate, 2 sigma", overlay.BELIEF, "dot"), ("goal", overlay.GOAL, "ring"),
+        ("detected joint", overlay.DETECTED, "dot"), ("crop", overlay.WINDOW, "box"),
+    ]  # fmt: skip
+    n_shown = 6 if level == "pixels" else 5 if level in CAMERA_LEVELS else 4
     x, y = 12, LEGEND_HEIGHT // 2
-    for text, colour, shape in marks:
+    for text, colour, shape in marks[:n_shown]:
         if shape == "line":
             cv2.line(image, (x, y), (x + 18, y), colour, 3, cv2.LINE_AA)
         elif shape == "box":

@@ -1,5 +1,6 @@
 """python -m hrc_env import-motion: a recording of a person becomes a clip that workers play."""
 
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -78,25 +79,19 @@ class ImportMotion:
         save_clip(clip, self.out)
         console.print(f"In [bold]{self.out}[/]: play it with motions=[{str(self.out)!r}]")
         if self.picture is not None:
-            self._draw(clip, self.picture)
+            import imageio.v2 as imageio
+
+            self.picture.parent.mkdir(parents=True, exist_ok=True)
+            imageio.imwrite(self.picture, _film_strip(clip, self.worker))
             console.print(f"In [bold]{self.picture}[/]: a film strip")
         return 0
-
-    def _draw(self, clip: "Clip", picture: Path) -> None:
-        import imageio.v2 as imageio
-
-        picture.parent.mkdir(parents=True, exist_ok=True)
-        imageio.imwrite(picture, _film_strip(clip, self.worker))
 
 
 def tell_capture(console: Console, capture: "Capture") -> None:
     """What was found and what was mended."""
     n_frames = len(capture.joints_world)
-    console.print(
-        f"[bold]{capture.source}[/]: {n_frames} frames at {capture.fps:g} a second, "
-        f"{(n_frames - 1) / capture.fps:.1f} s",
-        highlight=False,
-    )
+    said = f"[bold]{capture.source}[/]: {n_frames} frames at {capture.fps:g} a second, "
+    console.print(said + f"{(n_frames - 1) / capture.fps:.1f} s", highlight=False)
     for sentence in capture.repaired:
         console.print(f"[yellow]Repaired:[/] {sentence}", highlight=False)
 
@@ -110,24 +105,18 @@ def tell_error(console: Console, capture: "Capture", clip: "Clip", error: "Retar
     table.add_section()
     overall = 100 * error.mean_m.mean(), 100 * error.p95_m.mean()
     table.add_row("all", "", *(f"{value:.1f}" for value in overall))
-    console.print(table)
-    console.print(
-        f"Errors after one alignment of the whole clip (scale {error.scale:.2f}).", highlight=False
-    )
     left, right = 100 * clip.contacts.mean(0)
     console.print(
+        table,
+        f"Errors after one alignment of the whole clip (scale {error.scale:.2f}).",
         f"The left foot stands for {left:.0f} % of the time, the right for {right:.0f} %; "
         f"standing feet slide by {100 * error.slip_m_s:.1f} cm/s (p95).",
-        highlight=False,
-    )
+        sep="\n", highlight=False,
+    )  # fmt: skip
 
 
 def _film_strip(clip: "Clip", worker: str) -> "Image":
-    """Moments of a clip at equal intervals, each with its time.
-
-    Raises:
-        RenderingError: this machine has no OpenGL.
-    """
+    """Moments of a clip at equal intervals, each with its time."""
     import numpy as np  # here: --help imports no simulator
 
     from hrc_env.core.records import WorkerMotion
@@ -142,7 +131,7 @@ def _film_strip(clip: "Clip", worker: str) -> "Image":
     from hrc_env.worker.body import load_body
 
     scene = build(SceneConfig(), "lab", 1, worker)
-    renderer, bones = PictureRenderer(scene, *TILE), anatomy(load_body(worker))
+    bones = anatomy(load_body(worker))
     eye = np.array([STAGE_M[0] + EYE_M[0], STAGE_M[1] + EYE_M[1], EYE_M[2]])
     target = np.array([*STAGE_M, TARGET_Z_M])
     camera = pinhole("strip", eye, target, HFOV_DEG, *TILE)
@@ -154,12 +143,10 @@ def _film_strip(clip: "Clip", worker: str) -> "Image":
     position, turn = segments_in(q, bones)
     still = np.zeros((1, *position.shape[1:]))
     tiles = []
-    try:
+    with closing(PictureRenderer(scene, *TILE)) as renderer:
         for k, row in enumerate(rows):
             motion = WorkerMotion(position[k : k + 1], turn[k : k + 1], still, still)
             tile = np.array(renderer.picture(scene.home_q, motion, camera), np.uint8)
             overlay.label(tile, f"{row / clip.fps:.1f} s", (6, 6), 14)
             tiles.append(tile)
-    finally:
-        renderer.close()
     return overlay.tile(tiles, COLUMNS)

@@ -32,17 +32,12 @@ class List(EnvironmentArguments):
         from hrc_env.tracking.estimators import ESTIMATORS
 
         table = Table("argument", "names", title="hrc_env")
-        cameras = [camera.name for camera in LAB_CAMERAS]
-        for argument, names in (
-            ("id", IDS),
-            ("perception", LEVELS),
-            ("estimator", ESTIMATORS),
-            ("scene", SCENES),
-            ("robot", ROBOTS),
-            ("cameras", cameras),
-            ("control", CONTROLS),
-            ("agent", (*agents("registry").AGENTS, "a checkpoint: PATH.zip")),
-        ):
+        known = {
+            "id": IDS, "perception": LEVELS, "estimator": ESTIMATORS, "scene": SCENES,
+            "robot": ROBOTS, "cameras": [camera.name for camera in LAB_CAMERAS],
+            "control": CONTROLS, "agent": (*agents("registry").AGENTS, "a checkpoint: PATH.zip"),
+        }  # fmt: skip
+        for argument, names in known.items():
             table.add_row(argument, ", ".join(names))
         Console().print(table)
         return 0

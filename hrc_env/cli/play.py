@@ -1,6 +1,7 @@
 """python -m hrc_env play, demo: let an agent loose, in the terminal, a film or a window."""
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,7 +14,7 @@ from hrc_env.cli.checks import at_least, writable_file
 from hrc_env.cli.environment import EnvironmentArguments
 from hrc_env.cli.progress import compile_kernels, track
 from hrc_env.core.checkout import agents
-from hrc_env.core.errors import unknown
+from hrc_env.core.errors import check_names
 from hrc_env.tasks import DEFAULT
 
 if TYPE_CHECKING:
@@ -39,8 +40,7 @@ class Play(EnvironmentArguments):
 
     def run(self) -> int:
         """Play."""
-        if self.task not in hrc_env.IDS:
-            raise unknown("environment", self.task, hrc_env.IDS)
+        check_names("environment", [self.task], hrc_env.IDS)
         at_least("--episodes", self.episodes, 1)
         at_least("--seed", self.seed, 0)
         if self.video is not None:
@@ -59,32 +59,26 @@ class Play(EnvironmentArguments):
         return 0
 
     def _play(self, env: "gymnasium.Env[Any, Any]", seed: int) -> None:
-        from hrc_env.env import HRCEnv
+        from hrc_env.cli import film
         from hrc_env.scene.viewer import Viewer
 
-        inner = env.unwrapped
-        assert isinstance(inner, HRCEnv)
-        env_info = agents("env_info").env_info(inner.simulation)
-        agent = agents("registry").make_agent(self.agent, env_info, seed)
-        observation, info = env.reset(seed=seed)
+        inner: Any = env.unwrapped
         window = Viewer(inner.simulation.scene) if self.viewer else None
-        started_s, total, steps = time.monotonic(), 0.0, 0
-        limit = env.spec.max_episode_steps if env.spec else None
-        for _ in track(range(limit or 250), description=f"episode {seed}"):
-            observation, reward, terminated, truncated, info = env.step(agent.act(observation))
-            total, steps = total + float(reward), steps + 1
+        limit = (env.spec.max_episode_steps if env.spec else None) or 250
+        played = film.begun(env, named(self.agent, seed), seed, limit)
+        started_s, total, step, info = time.monotonic(), 0.0, 0, {}
+        for step, (reward, told) in enumerate(track(played, f"episode {seed}", limit), 1):
+            total, info = total + reward, told
             if window is not None:
                 window.show(*inner.views.pose())
-                due_s = started_s + steps * inner.config.ctrl_dt
+                due_s = started_s + step * inner.config.ctrl_dt
                 time.sleep(max(0.0, due_s - time.monotonic()))
-            if terminated or truncated:
-                break
         if window is not None:
             window.close()
         counts = inner.simulation.task.counts(info).items()
         said = [f"return {total:.1f}", *(f"{name} {n:.0f}" for name, n in counts)]
         said += [f"cost {info['episode_cost']:.0f}"]
-        said += [f"{steps / (time.monotonic() - started_s):.0f} steps/s"]
+        said += [f"{step / (time.monotonic() - started_s):.0f} steps/s"]
         Console().print(f"seed {seed}: {', '.join(said)}")
 
 
@@ -118,9 +112,11 @@ def filmed(asked: Play | Demo, agent: str, path: Path, n_steps: int = 250, title
     """Film an episode of an agent by its name; show what came of it."""
     from hrc_env.cli import film
 
-    registry = agents("registry")
-    totals = film.film_episode(
-        lambda env_info: registry.make_agent(agent, env_info, asked.seed),
-        path, asked.seed, n_steps=n_steps, **asked.keywords(),
-    )  # fmt: skip
+    make, keywords = named(agent, asked.seed), asked.keywords()
+    totals = film.film_episode(make, path, asked.seed, n_steps=n_steps, **keywords)
     Console().print(film.table(totals, title))
+
+
+def named(agent: str, seed: int) -> Callable[[Any], Any]:
+    """What makes an agent, by its name, for an `EnvInfo`."""
+    return lambda env_info: agents("registry").make_agent(agent, env_info, seed)

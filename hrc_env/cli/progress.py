@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Iterator, Sized
 from contextlib import contextmanager
 from datetime import timedelta
 from pathlib import Path
-from typing import Any, Self, TypeVar
+from typing import Self, TypeVar
 
 from rich.console import Console
 from rich.markdown import Markdown
@@ -16,19 +16,12 @@ from hrc_env.cli.checks import writable_folder
 EVERY_S = 10.0
 """Between two lines in a log file [s]."""
 T = TypeVar("T")
+Say = Callable[[float, str], None]
 
 
 class Meter:
-    """Shows how much of something is done, of how much, and how long the rest will take.
-
-    Args:
-        console: where to; what is no terminal gets plain lines.
-        name: what is being done.
-        total: when it is done.
-        unit: of what is counted; nothing is counted aloud without one.
-        done: how much is done already.
-        clock: seconds that have passed since some moment.
-    """
+    """Shows how much of something is done, of how much, and how long the rest will take; counts
+    are said where they have a unit. What is no terminal gets plain lines."""
 
     def __init__(
         self,
@@ -39,69 +32,61 @@ class Meter:
         done: float = 0.0,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self.console, self.name, self.total, self.unit = console, name, total, unit
-        self.done = self._before = done
-        self.note, self._clock, self._said = "", clock, False
-        self._bar = _bar(console) if console.is_terminal else None
+        self.name, self.total, self.done, self.note = name, total, done, ""
+        self._before, self._clock = done, clock
+        self._counted = f"{{task.completed:,.0f}} of {{task.total:,.0f}} {unit}" if unit else ""
+        self._bar = Progress(
+            TextColumn("{task.description:30s}"), BarColumn(),
+            TextColumn("{task.percentage:3.0f} %"), TextColumn(self._counted),
+            TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn(),
+            TextColumn("{task.fields[note]}"), console=console, disable=not console.is_terminal,
+        )  # fmt: skip
 
     def __enter__(self) -> Self:
         self._began_s = self._line_s = self._clock()
-        if self._bar is not None:
-            self._bar.start()
-            self._task = self._bar.add_task(self.name, total=self.total, counted="", note="")
-            self.show(self.done)
+        self._task = self._bar.add_task(self.name, total=self.total, note="")
+        self._bar.start()
+        self.show(self.done)
         return self
 
-    def __exit__(self, *_: Any) -> None:
-        if self._bar is not None:
-            self._bar.stop()
-        elif self._said:
+    def __exit__(self, *_: object) -> None:
+        self._bar.stop()
+        if self._line_s > self._began_s:
             self._say()
 
     def show(self, done: float, name: str | None = None, note: str = "") -> None:
         """So much is done; `name` is what is being done now, `note` how it goes."""
         self.done, self.name, self.note = done, name or self.name, note
-        if self._bar is not None:
-            said: dict[str, Any] = {
-                "description": self.name,
-                "counted": self._counted(),
-                "note": note,
-            }
-            self._bar.update(self._task, completed=done, **said)
-        elif self._clock() - self._line_s >= EVERY_S:
+        self._bar.update(self._task, completed=done, description=self.name, note=note)
+        if self._bar.disable and self._clock() - self._line_s >= EVERY_S:
             self._say()
 
     def _say(self) -> None:
         """One line: share, count, time that has passed and that is left."""
-        self._said, self._line_s = True, self._clock()
+        self._line_s, task = self._clock(), self._bar.tasks[0]
         passed_s, since = self._line_s - self._began_s, self.done - self._before
         left = _time(max(self.total - self.done, 0.0) / since * passed_s) if since > 0 else "?"
-        share = 100 * min(self.done / self.total, 1.0) if self.total else 100.0
-        parts = [f"{share:.0f} %", self._counted(), f"{_time(passed_s)} passed, {left} left"]
-        said = ", ".join(part for part in (*parts, self.note) if part)
-        self.console.print(f"{self.name}: {said}", markup=False, highlight=False, soft_wrap=True)
-
-    def _counted(self) -> str:
-        return f"{self.done:,.0f} of {self.total:,.0f} {self.unit}" if self.unit else ""
+        parts = f"{task.percentage:.0f} %", self._counted.format(task=task)
+        parts = *parts, f"{_time(passed_s)} passed, {left} left", self.note
+        said = f"{self.name}: {', '.join(filter(None, parts))}"
+        self._bar.console.print(said, markup=False, highlight=False, soft_wrap=True)
 
 
 @contextmanager
-def progress_bar(console: Console, name: str) -> Iterator[Callable[[float, str], None]]:
+def progress_bar(console: Console, name: str) -> Iterator[Say]:
     """Tell it by how much the share that is done grew, and what is being done."""
     with Meter(console, name) as meter:
         yield lambda share, label: meter.show(meter.done + share, label)
 
 
-def show(
-    run: Callable[[Path, Callable[[float, str], None]], object], out: Path, name: str, written: str
-) -> int:
+def show(run: Callable[[Path, Say], object], out: Path, name: str) -> int:
     """Run a bench or an experiment under a progress bar, then show its report.md."""
     writable_folder(out)
     console = Console()
     with progress_bar(console, name) as say:
         run(out, say)
     console.print(Markdown((out / "report.md").read_text()))
-    console.print(f"In [bold]{out}[/]: {written}")
+    console.print(f"In [bold]{out}[/]: report.html, results.json, figures/")
     return 0
 
 
@@ -124,20 +109,6 @@ def compile_kernels(console: Console, level: str | None = None) -> None:
         console.print(f"Compiling {n_missing} kernels for this machine, once ...")
         with progress_bar(console, "kernels") as say:
             ahead.compile_missing(level, say)
-
-
-def _bar(console: Console) -> Progress:
-    return Progress(
-        TextColumn("{task.description:30s}"),
-        BarColumn(),
-        TextColumn("{task.percentage:3.0f} %"),
-        TextColumn("{task.fields[counted]}"),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[note]}"),
-        console=console,
-    )
 
 
 def _time(seconds: float) -> str:

@@ -44,29 +44,19 @@ class Train(EnvironmentArguments):
     """A folder of an earlier run to go on with; its environment and seed stay what they were."""
 
     def run(self) -> int:
-        """Check, then train."""
-        self.check()
-        training = agents("training")
-        writable_folder(self.resume or self.out, "--out" if self.resume is None else "--resume")
-        return training.run(self)
-
-    def check(self) -> None:
-        """Raise `ConfigError` for a number or a name that cannot be learnt with."""
-        for option, value, low in (
-            ("--timesteps", self.timesteps, 1),
-            ("--num-envs", self.num_envs, 1),
-            ("--seed", self.seed, 0),
-            ("--proximity", self.proximity, 0),
-            ("--ramp", self.ramp, 0),
-            ("--threads", self.threads, 1),
-            ("--episodes", self.episodes, 1),
-        ):
-            at_least(option, value, low)
+        """Train; a `ConfigError` for a number or a name that cannot be learnt with."""
+        for name in ("timesteps", "num_envs", "threads", "episodes"):
+            at_least(f"--{name.replace('_', '-')}", getattr(self, name), 1)
+        for name in ("seed", "proximity", "ramp"):
+            at_least(f"--{name}", getattr(self, name), 0)
         if self.perception == "pixels":
             raise ConfigError(
                 "--perception pixels is too slow to learn on: learn on keypoints, which emulates "
                 "it, and play the policy on pixels."
             )
+        training = agents("training")
+        writable_folder(self.resume or self.out, "--out" if self.resume is None else "--resume")
+        return training.run(self)
 
     def keywords(self) -> dict[str, Any]:
         """Keyword arguments of the environment that a run learns and is judged in."""

@@ -6,7 +6,7 @@ A worker who is not seen is data (growing covariance, a flag), never one of thes
 import contextlib
 import difflib
 import numbers
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from typing import Any
 
 from hrc_env.core.old_names import OLD_NAMES
@@ -65,6 +65,13 @@ def unknown(what: str, got: object, valid: Iterable[str]) -> ConfigError:
     near = difflib.get_close_matches(str(got), names, n=1)
     hint = f" Did you mean {near[0]!r}?" if near else ""
     return ConfigError(f"Unknown {what} {got!r}.{hint} Valid: {', '.join(map(repr, names))}.")
+
+
+def check_names(what: str, names: Iterable[object], valid: Collection[str]) -> None:
+    """Raise the error for the first of the names that is not in a list, if there is one."""
+    for name in names:
+        if name not in valid:
+            raise unknown(what, name, valid)
 
 
 def check_shape(what: str, got: tuple[int, ...], expected: tuple[int, ...], meaning: str) -> None:

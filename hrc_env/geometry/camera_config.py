@@ -44,8 +44,7 @@ class CameraConfig:
     target_world: tuple[float, float, float] = (0.2, 0.0, 1.0)
     """What it looks at [m]: by default the middle of the space that robot and worker share."""
     hfov_deg: float = 90.0
-    """Horizontal field of view through the lens [degrees]; without meaning if `focal_px` is
-    given."""
+    """Horizontal field of view through the lens [degrees], unless `focal_px` is given."""
     width_px: int = 1920
     """Width of its images [px]."""
     height_px: int = 1080
@@ -117,21 +116,15 @@ def _check_image(camera: CameraConfig, K: Floats) -> None:
         _refuse(camera, "focal lengths must be positive and finite", f"{focal} px")
     if not ((centre > 0) & (centre < size)).all():
         _refuse(camera, f"the principal point must lie in the image of {size} px", centre)
-    if np.isnan(_edge_rays(camera, K)).any():
+    (cx, cy), (right, low) = centre, size
+    middles = np.array([[0, cy], [right, cy], [cx, 0], [cx, low]])  # of the edges
+    if np.isnan(rays_cam(camera.lens, (middles - centre) / focal * (1 - 1e-9))).any():
         _refuse(
             camera,
             "its lens must let light through to the middle of each of the image's edges (weaker "
             "coefficients or longer focal lengths)",
             f"{camera.lens} with focal lengths {focal} px",
         )
-
-
-def _edge_rays(camera: CameraConfig, K: Floats) -> Floats:
-    """(4, 3) directions of the image's left, right, upper and lower edge beside the centre."""
-    (fx, fy), (cx, cy) = K[[0, 1], [0, 1]], K[:2, 2]
-    right, low = (camera.width_px - cx) / fx, (camera.height_px - cy) / fy
-    edges = np.array([[-cx / fx, 0], [right, 0], [0, -cy / fy], [0, low]])
-    return rays_cam(camera.lens, edges * (1 - 1e-9))
 
 
 MAKES: dict[str, CameraConfig] = {

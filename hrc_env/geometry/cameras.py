@@ -2,9 +2,8 @@
 
 A camera with a lens has two kinds of pixels: `pinhole` ones, in which projection is linear and the
 trackers think, and those of the `image`, which detectors find. Without a lens they are the same.
-
-Pixels are continuous from the image's top-left corner: pixel centres lie at half-integers, the
-middle at (W/2, H/2). Camera axes are OpenCV's: +X right, +Y down, +Z forward.
+Pixels are continuous from the image's top-left corner: pixel centres lie at half-integers. Camera
+axes are OpenCV's: +X right, +Y down, +Z forward.
 """
 
 from dataclasses import dataclass
@@ -68,16 +67,8 @@ def projections(cameras: tuple[PinholeCamera, ...]) -> Floats:
 
 
 def project(P: Floats, points_world: Points3) -> tuple[Points2, Floats]:
-    """Points into every camera (Algorithm 1, line 11).
-
-    Args:
-        P: (C, 3, 4) projections.
-        points_world: (B, ..., 3) [m].
-
-    Returns:
-        pinhole pixels (B, C, ..., 2), which mean nothing where depth <= 0, and depth along the
-        optical axis (B, C, ...) [m].
-    """
+    """Points (B, ..., 3) [m] into every camera (C, 3, 4) (Algorithm 1, line 11): pinhole pixels
+    (B, C, ..., 2), without meaning where depth <= 0, and depths along the axes (B, C, ...) [m]."""
     rotated = np.einsum("cij,b...j->bc...i", P[:, :, :3], points_world)
     shape = (1, len(P)) + (1,) * (points_world.ndim - 2) + (3,)
     homogeneous = rotated + P[:, :, 3].reshape(shape)
@@ -87,8 +78,7 @@ def project(P: Floats, points_world: Points3) -> tuple[Points2, Floats]:
 
 
 def rays(camera: PinholeCamera, pixels: Points2) -> Points3:
-    """Unit directions in the world, (..., 3), of pixels (..., 2) of one camera's image; NaN where
-    its lens lets nothing through."""
+    """Unit directions in the world, (..., 3), of image pixels (..., 2); NaN where none is seen."""
     if camera.lens is None:
         homogeneous = np.concatenate([pixels, np.ones((*pixels.shape[:-1], 1))], -1)
         direction_cam = homogeneous @ np.linalg.inv(camera.K).T
@@ -106,8 +96,7 @@ def image_from_pinhole(camera: PinholeCamera, pixels: Points2) -> Points2:
 
 
 def pinhole_from_image(camera: PinholeCamera, pixels: Points2) -> Points2:
-    """Where a pinhole would show what the image shows at pixels (..., 2); NaN beyond
-    `geometry.lens.PINHOLE_RAD` from the axis."""
+    """Where a pinhole would show what the image shows at pixels (..., 2); NaN where nowhere."""
     if camera.lens is None:
         return pixels
     return _in_pixels(camera, undistort(camera.lens, _normalised(camera, pixels)))

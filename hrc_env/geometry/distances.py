@@ -37,8 +37,8 @@ def least_separation(
     Args:
         capsules_a: (..., Ka, 2, 3) end points [m].
         radius_a_m: (..., Ka) with the first of its leading axes, or none [m].
-        capsules_b: (..., Kb, 2, 3), the same leading axes and perhaps more after them: then
-            each first set is held against several second ones.
+        capsules_b: (..., Kb, 2, 3) with the same leading axes, or more after them: each first set
+            is then held against several second ones.
         radius_b_m: (..., Kb) likewise; or those of one body where the second sets are several.
     """
     lead = capsules_b.shape[:-3]

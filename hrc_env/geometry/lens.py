@@ -32,8 +32,7 @@ COEFFICIENTS = {
 """Models and what their coefficients are called, in order; those left out are 0."""
 NONE, BROWN_CONRADY, KANNALA_BRANDT = range(3)
 LIMIT, FOLD = 6, 7
-"""Columns of a lens' row behind model and coefficients: the distorted radius from which on nothing
-is seen, and its angle."""
+"""Columns of a lens' row: the distorted radius from which on nothing is seen, and its angle."""
 WIDEST_RAD = math.radians(175.0)
 """No lens sees further from its axis."""
 PINHOLE_RAD = math.radians(80.0)
@@ -99,8 +98,7 @@ def undistort(lens: Lens, distorted: Floats) -> Floats:
 
 
 def rays_cam(lens: Lens, distorted: Floats) -> Floats:
-    """(..., 3) unit directions in the camera's axes of distorted places (..., 2); NaN where the
-    lens lets nothing through."""
+    """(..., 3) unit directions, camera axes, of distorted places (..., 2); NaN where none is."""
     flat = np.ascontiguousarray(distorted, float).reshape(-1, 2)
     out = np.empty((len(flat), 3))
     _rays_all(lens_row(lens), flat, out)
@@ -108,8 +106,7 @@ def rays_cam(lens: Lens, distorted: Floats) -> Floats:
 
 
 def distorted_radius(lens: Lens, angle_rad: float) -> float:
-    """How far from the middle, in focal lengths, light arrives that comes at an angle to the axis;
-    NaN beyond what the lens can do."""
+    """Where light at an angle to the axis arrives [focal lengths]; NaN beyond the lens."""
     row = lens_row(lens)
     return float(_radius_of(row, angle_rad)) if angle_rad <= row[FOLD] else math.nan
 

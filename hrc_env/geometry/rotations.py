@@ -53,7 +53,7 @@ def look_at(eye_world: Points3, target_world: Points3) -> Rotations:
 
 
 @kernel
-def turned(quaternion, offset):  # pragma: no cover - compiled
+def turned(quaternion, offset):
     """An offset (3,) turned by a unit quaternion: v + 2 w (u x v) + 2 u x (u x v)."""
     w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     a = 2.0 * (y * offset[2] - z * offset[1])

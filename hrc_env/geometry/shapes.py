@@ -1,8 +1,7 @@
-"""Convex shapes as rows of numbers, and where a line passes through them, exactly.
+"""Convex shapes as rows of tables (n, `WIDTH`), and where a line passes through them, exactly.
 
-A table (n, `WIDTH`) has a shape a row. A line starts at an eye and has a unit direction d; its
-passage is the interval of the way from the eye [m] that lies in the shape, negative behind the
-eye; `NEVER` has its entry after its exit. p is the eye less the shape's centre.
+A line starts at an eye, p from the shape's centre, and has a unit direction d; its passage is the
+interval of the way [m] that lies in the shape; `NEVER` has its entry after its exit.
 """
 
 import math
@@ -15,22 +14,17 @@ from hrc_env.core.typing import Floats
 PLANE, BOX, CYLINDER, CAPSULE = range(4)
 """Kinds of shapes; a sphere is a capsule without length."""
 KIND, CENTRE, AXES, HALF_SIZE, REACH, WIDTH = 0, 1, 4, 13, 16, 17
-"""Columns of a table and their number: the centre [m], the shape's x, y and z axes, its half
-edges (or its radius and half length along z) and the radius of the sphere that holds it [m]."""
+"""Columns of a table and their number: centre [m], x, y and z axes, half edges (or radius and half
+length along z) and the radius of the sphere that holds it [m]."""
 NEVER = (math.inf, -math.inf)
 PARALLEL = 1e-12
 """Square of the sine below which a line counts as parallel to an axis."""
 
 
 def shape(kind: int, centre: Floats, axes: Floats, half_size: Floats) -> Floats:
-    """The row (`WIDTH`,) of a shape of a kind.
-
-    Args:
-        kind: `PLANE`, `BOX`, `CYLINDER` or `CAPSULE`.
-        centre: (3,) [m].
-        axes: (3, 3) world_from_shape; cylinders and capsules lie along z, planes face z.
-        half_size: (3,) half edges (infinite: endless), else radius, half length and 0 [m].
-    """
+    """The row (`WIDTH`,) of a shape of a kind with a centre (3,) [m], axes (3, 3) world_from_shape
+    (cylinders and capsules lie along z, planes face z) and half_size (3,): half edges (infinite:
+    endless), else radius, half length and 0 [m]."""
     row = np.empty(WIDTH)
     row[KIND], row[CENTRE:AXES], row[AXES:HALF_SIZE] = kind, centre, axes.T.ravel()
     row[HALF_SIZE:REACH] = half_size
@@ -71,42 +65,43 @@ def set_capsules(table, first, ends, radius):
 
 
 @kernel
-def passage(table, row, px, py, pz, dx, dy, dz):
+def passage(table, row, p, d):
     """Where a line enters and leaves the shape of a row."""
     kind = table[row, KIND]
     if kind == BOX:
-        return _through_box(table, row, px, py, pz, dx, dy, dz)
+        return _through_box(table, row, p, d)
     if kind == PLANE:
-        return _through_plane(table, row, px, py, pz, dx, dy, dz)
-    rise, height, ahead, excess = against_axis(table, row, px, py, pz, dx, dy, dz)
-    enter, leave = through_tube(rise, height, ahead, excess)
+        return _through_plane(table, row, p, d)
+    against = against_axis(table, row, p, d)
+    enter, leave = through_tube(against)
     half = table[row, HALF_SIZE + 1]
     if kind == CAPSULE:
-        return rounded(enter, leave, half, rise, height, ahead, excess)
-    low, high = _between(height, rise, half)
+        return rounded(enter, leave, half, against)
+    low, high = _between(against[1], against[0], half)
     return max(enter, low), min(leave, high)
 
 
 @kernel
-def on_axis(table, row, axis, x, y, z):
+def on_axis(table, row, axis, v):
     """A vector's part along an axis of a shape."""
     at = AXES + 3 * axis
-    return table[row, at] * x + table[row, at + 1] * y + table[row, at + 2] * z
+    return table[row, at] * v[0] + table[row, at + 1] * v[1] + table[row, at + 2] * v[2]
 
 
 @kernel
-def against_axis(table, row, px, py, pz, dx, dy, dz):
-    """A line against a shape's z axis and radius, as the functions below are given it: d and p
-    along the axis, p along d [m], p squared less the radius squared [m^2]."""
+def against_axis(table, row, p, d):
+    """A line against a shape's z axis and radius: rise and height (d and p along the axis), p
+    along d [m], and p squared less the radius squared [m^2]."""
     radius = table[row, HALF_SIZE]
-    rise, height = on_axis(table, row, 2, dx, dy, dz), on_axis(table, row, 2, px, py, pz)
-    ahead = px * dx + py * dy + pz * dz
-    return rise, height, ahead, px * px + py * py + pz * pz - radius * radius
+    ahead = p[0] * d[0] + p[1] * d[1] + p[2] * d[2]
+    excess = p[0] * p[0] + p[1] * p[1] + p[2] * p[2] - radius * radius
+    return on_axis(table, row, 2, d), on_axis(table, row, 2, p), ahead, excess
 
 
 @kernel
-def through_tube(rise, height, ahead, excess):
+def through_tube(against):
     """Through an endless cylinder."""
+    rise, height, ahead, excess = against
     a, b, c = 1.0 - rise * rise, ahead - height * rise, excess - height * height
     if a < PARALLEL:
         return NEVER if c > 0.0 else (-math.inf, math.inf)
@@ -118,46 +113,48 @@ def through_tube(rise, height, ahead, excess):
 
 
 @kernel
-def rounded(enter, leave, half, rise, height, ahead, excess):
+def rounded(enter, leave, half, against):
     """What is left of a passage through a tube when it ends at +-half in balls: a capsule."""
     if enter > leave:
         return NEVER
+    rise, height = against[0], against[1]
     at = height + enter * rise
     if abs(at) > half:
-        enter, _ = _through_ball(math.copysign(half, at), rise, height, ahead, excess)
+        enter, _ = _through_ball(math.copysign(half, at), against)
     at = height + leave * rise
     if abs(at) > half:
-        _, leave = _through_ball(math.copysign(half, at), rise, height, ahead, excess)
+        _, leave = _through_ball(math.copysign(half, at), against)
     return enter, leave
 
 
 @kernel
-def _through_box(table, row, px, py, pz, dx, dy, dz):
+def _through_box(table, row, p, d):
     enter, leave = -math.inf, math.inf
     for i in range(3):
-        height, rise = on_axis(table, row, i, px, py, pz), on_axis(table, row, i, dx, dy, dz)
+        height, rise = on_axis(table, row, i, p), on_axis(table, row, i, d)
         low, high = _between(height, rise, table[row, HALF_SIZE + i])
         enter, leave = max(enter, low), min(leave, high)
     return enter, leave
 
 
 @kernel
-def _through_plane(table, row, px, py, pz, dx, dy, dz):
+def _through_plane(table, row, p, d):
     """A rectangle stops only what comes from its front, where its z points."""
-    height, rise = on_axis(table, row, 2, px, py, pz), on_axis(table, row, 2, dx, dy, dz)
+    height, rise = on_axis(table, row, 2, p), on_axis(table, row, 2, d)
     if height < 0.0 or rise >= 0.0:
         return NEVER
     way = -height / rise
     for i in range(2):
-        at = on_axis(table, row, i, px, py, pz) + way * on_axis(table, row, i, dx, dy, dz)
+        at = on_axis(table, row, i, p) + way * on_axis(table, row, i, d)
         if abs(at) > table[row, HALF_SIZE + i]:
             return NEVER
     return way, way
 
 
 @kernel
-def _through_ball(end, rise, height, ahead, excess):
+def _through_ball(end, against):
     """Through the ball at `end` [m] on the axis."""
+    rise, height, ahead, excess = against
     nearest = end * rise - ahead
     room = nearest * nearest - (excess - 2.0 * end * height + end * end)
     if room <= 0.0:

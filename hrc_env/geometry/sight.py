@@ -1,8 +1,5 @@
-"""Lines of sight: what stands between an eye and points.
-
-Of a table of shapes, an eye that looks at a group of points needs those in the cone round them;
-only shapes whose bounding spheres a line meets are asked exactly.
-"""
+"""Lines of sight: what stands between an eye and points. Of a table of shapes, only those in the
+cone round the points whose bounding spheres a line meets are asked exactly."""
 
 import math
 from dataclasses import dataclass
@@ -16,11 +13,9 @@ from hrc_env.core.typing import Bools, Capsules, Floats, Ints, Points3
 from hrc_env.geometry import shapes
 
 NEAR_POINT_M = 0.08
-"""A line of sight ends this far before the point, so that what a joint touches (the table
-under a wrist, the floor under a foot) does not hide it."""
+"""A line of sight ends so far before the point: what a joint touches does not hide it."""
 BLOCKING_CHORD = 1.4
-"""A line that runs through a body's capsule for more than this many of its radii is blocked: it
-then passes the axis within 0.7 radii."""
+"""A line that runs so many radii through a body's capsule, past the axis within 0.7, is blocked."""
 OWN_CAPSULE_M = 0.06
 """So much longer may the way out of a capsule be that the joint itself lies in [m]."""
 
@@ -37,8 +32,8 @@ class Surroundings:
 
 def nothing(batch: int) -> Surroundings:
     """Free lines of sight."""
-    nobody = (np.zeros((batch, 0, 2, 3)), np.zeros(0))
-    return Surroundings(np.zeros((0, shapes.WIDTH)), np.zeros((batch, 0, shapes.WIDTH)), *nobody)
+    still, moving = np.zeros((0, shapes.WIDTH)), np.zeros((batch, 0, shapes.WIDTH))
+    return Surroundings(still, moving, np.zeros((batch, 0, 2, 3)), np.zeros(0))
 
 
 def hidden(surroundings: Surroundings, eyes_world: Points3, points_world: Points3) -> Bools:
@@ -119,21 +114,19 @@ def _ball_round(eye, points):
 @kernel
 def _is_between(eye, points, table, row):
     """Whether an eye is in front of a plane and any of the points is not."""
-    centre = table[row, shapes.CENTRE : shapes.AXES]
-    level = shapes.on_axis(table, row, 2, centre[0], centre[1], centre[2])
-    if shapes.on_axis(table, row, 2, eye[0], eye[1], eye[2]) < level:
+    level = shapes.on_axis(table, row, 2, table[row, shapes.CENTRE : shapes.AXES])
+    if shapes.on_axis(table, row, 2, eye) < level:
         return False
     lowest = math.inf
     for j in range(len(points)):
-        x, y, z = points[j, 0], points[j, 1], points[j, 2]
-        lowest = min(lowest, shapes.on_axis(table, row, 2, x, y, z))
+        lowest = min(lowest, shapes.on_axis(table, row, 2, points[j]))
     return lowest < level
 
 
 @kernel
-def meets(view, i, dx, dy, dz, length):
+def meets(view, i, d, length):
     """Whether a line of a length and unit direction d meets the i-th sphere in view."""
-    along = view[0, i] * dx + view[1, i] * dy + view[2, i] * dz
+    along = view[0, i] * d[0] + view[1, i] * d[1] + view[2, i] * d[2]
     reach = view[4, i]
     return along * along >= view[3, i] and along >= -reach and along <= length + reach
 
@@ -153,7 +146,7 @@ def line(eye, points, j):
     dx, dy, dz = points[j, 0] - eye[0], points[j, 1] - eye[1], points[j, 2] - eye[2]
     length = math.sqrt(dx * dx + dy * dy + dz * dz)
     scale = 1.0 / max(length, 1e-9)
-    return scale * dx, scale * dy, scale * dz, length
+    return (scale * dx, scale * dy, scale * dz), length
 
 
 @kernel(makes_arrays=True)
@@ -173,34 +166,34 @@ def _hidden(still, moving, capsules, radius, eyes, points, hidden):
 def is_hidden(eye, points, j, occluders, n_view):
     """Whether one of the `n_view` shapes in view stands between an eye and one of the points."""
     table, view = occluders.table, occluders.spheres
-    dx, dy, dz, length = line(eye, points, j)
+    d, length = line(eye, points, j)
     for i in range(n_view):
-        if meets(view, i, dx, dy, dz, length):
-            row, px, py, pz = occluders.rows[i], -view[0, i], -view[1, i], -view[2, i]
+        if meets(view, i, d, length):
+            row, p = occluders.rows[i], (-view[0, i], -view[1, i], -view[2, i])
             if row >= occluders.first_body:
-                if body_blocks(table, row, px, py, pz, dx, dy, dz, length):
+                if body_blocks(table, row, p, d, length):
                     return True
                 continue
-            enter, leave = shapes.passage(table, row, px, py, pz, dx, dy, dz)
+            enter, leave = shapes.passage(table, row, p, d)
             if blocks(enter, leave, length):
                 return True
     return False
 
 
 @kernel
-def body_blocks(table, row, px, py, pz, dx, dy, dz, length):
-    """Whether a body's capsule, a row of shapes, hides what is at `length` [m] on a line.
+def body_blocks(table, row, p, d, length):
+    """Whether a body's capsule, a row of shapes, hides what is at `length` [m] on a line; p is the
+    eye less the capsule's centre, d the line's unit direction.
 
     A joint lies inside the body, and so do the ends of the capsules that meet there: it is hidden
-    where the line's way through a capsule is much longer than from its axis to its surface. p is
-    the eye less the capsule's centre, d the line's unit direction.
+    where the line's way through a capsule is much longer than from its axis to its surface.
     """
     radius, half = table[row, shapes.HALF_SIZE], table[row, shapes.HALF_SIZE + 1]
-    rise, height, ahead, excess = shapes.against_axis(table, row, px, py, pz, dx, dy, dz)
-    enter, leave = shapes.through_tube(rise, height, ahead, excess)
+    against = shapes.against_axis(table, row, p, d)
+    enter, leave = shapes.through_tube(against)
     if min(leave, length) - max(enter, 0.0) <= BLOCKING_CHORD * radius:
         return False  # and the way through the capsule is no longer
-    enter, leave = shapes.rounded(enter, leave, half, rise, height, ahead, excess)
+    enter, leave = shapes.rounded(enter, leave, half, against)
     within = enter < length and leave >= length
     chord = min(leave, length) - max(enter, 0.0)
     return chord > BLOCKING_CHORD * radius + (OWN_CAPSULE_M if within else 0.0)

@@ -1,9 +1,8 @@
 """Triangulation: pixels of one point in several cameras to a point with its covariance.
 
-A linear start (planes through the optical centres, least squares) is refined by Gauss-Newton
-on the reprojection error (Hartley and Zisserman, Multiple View Geometry, 2nd ed., chapter 12).
-With a gate, the two cameras whose point the most cameras agree with come first, so that a wrong
-detection in one view does no harm. The kernels work on one point.
+A linear start is refined by Gauss-Newton on the reprojection error (Hartley and Zisserman, Multiple
+View Geometry, 2nd ed., chapter 12). With a gate, the two cameras whose point most cameras agree
+with come first: a wrong detection in one view does no harm. The kernels work on one point.
 """
 
 import math
@@ -41,8 +40,8 @@ def triangulate(P: Floats, px: Points2, sigma_px: Floats, gate_sigma: float = 0.
     Args:
         P: (C, 3, 4) projections.
         px: (B, C, W, J, 2) pixels; NaN where missing.
-        sigma_px: (B, C, W, J) standard deviations [px]; a view counts with 1 / sigma^2, and
-            not at all where this is not finite and positive.
+        sigma_px: (B, C, W, J) standard deviations [px]; views whose is not finite and positive do
+            not count.
         gate_sigma: within how many standard deviations views must agree; 0: all are used.
     """
     px, sigma_px = np.asarray(px, float), np.asarray(sigma_px, float)

@@ -103,7 +103,7 @@ def landmark_input(crop: Image) -> Tensor:
 
 def decode_people(boxes: Tensor, logits: Tensor, min_score: float = MIN_SCORE) -> list[Person]:
     """People from the detector's boxes (2254, 12) and score logits (2254,), best first."""
-    score = _sigmoid(logits.astype(float))
+    score = 1 / (1 + np.exp(-np.clip(logits.astype(float), -80, 80)))
     kept = np.flatnonzero(score >= min_score)
     raw, score, anchor = boxes[kept].astype(float) / DETECTOR_SIDE, score[kept], ANCHORS[kept]
     centre, half = raw[:, 0:2] + anchor, raw[:, 2:4] / 2
@@ -135,13 +135,9 @@ def person_window(person: Person, window: Roi) -> Roi:
 
 
 def decode_landmarks(points: Tensor, heat: Tensor) -> Floats:
-    """(35, 3) x, y in units of the crop's side and visibility in [0, 1]: 33 body landmarks, mid-hip
-    and rim. Where the heatmap is sure, a point becomes its neighbourhood's mean weighted by it.
-
-    Args:
-        points: (39, 5) x, y, z in crop pixels, logits of visibility and presence.
-        heat: (64, 64, 39) logits.
-    """
+    """(35, 3) x, y in units of the crop's side and visibility in [0, 1] of 33 landmarks, mid-hip
+    and rim, of points (39, 5): x, y, z in crop pixels, logits of visibility and presence. Where
+    heat (64, 64, 39), logits, is sure, a point becomes its neighbourhood's mean weighted by it."""
     out = np.empty((_N_USED, 3))
     refine(np.ascontiguousarray(points), np.ascontiguousarray(heat), out)
     return out
@@ -182,7 +178,3 @@ def _overlap(box: Floats, boxes: Floats) -> Floats:
     area = (boxes[:, 2:] - boxes[:, :2]).prod(1)
     union = (box[2:] - box[:2]).prod() + area - shared
     return shared / np.maximum(union, 1e-12)
-
-
-def _sigmoid(x: Floats) -> Floats:
-    return 1 / (1 + np.exp(-np.clip(x, -80, 80)))

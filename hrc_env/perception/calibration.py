@@ -1,8 +1,5 @@
-"""What is known of the detector's errors: numbers fitted to renders, in a small JSON file.
-
-`python -m hrc_env calibrate-keypoints` writes it, docs/emulator.md says what the model is;
-`keypoints.json` is the package's own.
-"""
+"""What is known of the detector's errors: numbers fitted to renders, in a small JSON file, which
+`python -m hrc_env calibrate-keypoints` writes (docs/emulator.md)."""
 
 import functools
 import json

@@ -38,9 +38,8 @@ STATURE_OF_SIDE = 0.75
 """Stature of an upright worker as a share of the side of BlazePose's window round them."""
 ResultT = TypeVar("ResultT")
 KeypointFunction = Callable[[Image], Floats | None]
-"""A crop (256, 256, 3) RGB uint8 -> (J, 3): x and y in pixels of the crop, continuous from its
-top-left corner, and confidence in [0, 1], joints as in `core.skeleton.JOINTS`; NaN with confidence
-0 where a joint was not found. None: nobody is there."""
+"""A crop (256, 256, 3) RGB uint8 -> (J, 3): x, y [px] from its corner and confidence in [0, 1] of
+`core.skeleton.JOINTS`; NaN, NaN, 0 of a joint that was not found. None: nobody is there."""
 DETECTORS: dict[str, Callable[[], KeypointFunction] | None] = {"blazepose": None}
 """By name: what makes the function, once for every thread that calls it."""
 
@@ -56,8 +55,7 @@ class DetectorConfig:
     gate_every: int = 25
     """The detector stage is also asked once in so many looks: a second at 25 Hz."""
     max_offset: float = 0.25
-    """The detector stage must find the hips within this share of the window's side from its
-    middle: else it is somebody else."""
+    """Hips further from the window's middle, as a share of its side, are somebody else's."""
     outside_confidence: float = 0.1
     """Joints that the network places outside the image are guesses: at most this visible."""
     search_step: float = 0.5
@@ -65,8 +63,7 @@ class DetectorConfig:
     search_every: int = 5
     """A camera whose whole image was searched for nobody is searched again so many steps later."""
     runtime: str = "litert"
-    """What the networks run on: "litert", "openvino" (an extra, faster) or "auto"
-    (docs/perception_and_estimators.md)."""
+    """What the networks run on: "litert", "openvino" (an extra, faster) or "auto"."""
     network: str = "full"
     """The landmark network: "lite", "full" or "heavy"; all but "full" are fetched once with
     `python -m hrc_env setup --networks lite heavy`."""
@@ -74,8 +71,7 @@ class DetectorConfig:
     """What finds joints in crops: BlazePose's landmark network, or another function that was
     registered (`hrc_env.register_detector`); people are always searched for by BlazePose."""
     folded: str = "full"
-    """The landmark network for workers who are bent, squatting or kneeling; "heavy" is more exact
-    there, and three times as slow."""
+    """The landmark network for who is bent, squats or kneels; "heavy" is more exact, and slower."""
 
     def __post_init__(self) -> None:
         if self.runtime not in network.RUNTIMES:
@@ -151,8 +147,7 @@ class PoseDetector(Stateful):
             track: who is followed: a number of the worker's own.
             others: windows (C,) of other workers; a search does not find these again.
             found: what `search` found in these very images, if it was asked already.
-            folded: whether the worker is expected to be folded up (`outline.is_folded`).
-            posture: how far they are expected to count as each posture (`outline.posture_of`).
+            folded, posture: what is expected of the worker (`outline.is_folded`, `posture_of`).
         """
         check_shape("windows", (len(windows),), (len(self.cameras),), "one a camera")
         looks = self._looks.setdefault(track, [0] * len(self.cameras))
@@ -161,17 +156,14 @@ class PoseDetector(Stateful):
             known = self.search(source) if found is None else found
             windows = agreed_windows(apart_from(known, others), self.cameras)
         used = [(c, window) for c, window in enumerate(windows) if window is not None]
-        shape = (len(self.cameras), N_JOINTS)
-        nothing = np.full((*shape, 2), np.nan), np.zeros(shape), np.full(shape, np.inf)
-        sight = Detection(*nothing, list(windows), [None] * len(windows))
+        sight = _nobody(windows)
 
         def job(c: int, window: Roi) -> Callable[[_Networks], Floats | None]:
-            """Draw a crop; it comes with the work that is to be done on it."""
             crop = sight.crops[c] = _seen(source.crop(c, window), window, self.cameras[c])
             ask = not searched and self._is_turn(looks[c], c)
             return functools.partial(_joints, crop, window, ask, folded, self.config)
 
-        joints_of = self._share(job(c, window) for c, window in used)
+        joints_of = self._share(job(c, window) for c, window in used)  # drawn one after the other
         before, looks[:] = list(looks), [0] * len(looks)  # 0: the detector stage is asked next
         for (c, window), joints in zip(used, joints_of, strict=True):
             if joints is not None:
@@ -238,6 +230,12 @@ class PoseDetector(Stateful):
         confidence[outside] = np.minimum(confidence[outside], self.config.outside_confidence)
         sight.px[c], sight.confidence[c] = joints[:, :2], confidence
         sight.sigma_px[c] = sigma_px(confidence, STATURE_OF_SIDE * window.side_px, posture)
+
+
+def _nobody(windows: Sequence[Roi | None]) -> Detection:
+    shape = (len(windows), N_JOINTS)
+    nothing = np.full((*shape, 2), np.nan), np.zeros(shape), np.full(shape, np.inf)
+    return Detection(*nothing, list(windows), [None] * len(windows))
 
 
 def _networks(config: DetectorConfig) -> _Networks:

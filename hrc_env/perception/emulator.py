@@ -1,8 +1,5 @@
-"""Keypoints without pixels: the projected truth with BlazePose's errors.
-
-The errors are drawn from a calibration, numbers fitted to what the network made of rendered workers
-(`perception.calibration`, docs/emulator.md).
-"""
+"""Keypoints without pixels: the projected truth with BlazePose's errors, drawn from a calibration
+that was fitted to what the network made of rendered workers (docs/emulator.md)."""
 
 import functools
 import math
@@ -37,11 +34,9 @@ class EmulatorConfig:
     max_error: float = 0.4
     """No camera's error is larger than this share of the window's side: it holds one body."""
     swap_share: float | None = None
-    """Share of the time that a camera exchanges left and right, whatever the view; None: as
-    calibrated."""
+    """Share of the time that a camera exchanges left and right; None: as calibrated, by view."""
     miss_share: float | None = None
-    """Share of the time that a camera loses a worker, however much of them is seen; None: as
-    calibrated."""
+    """Share of the time that a camera loses a worker; None: as calibrated, by joints in sight."""
     min_joints: int = 1
     """Fewer joints (of 15) in sight of a camera, and it does not see the worker."""
     outside_confidence: float = 0.1
@@ -106,7 +101,8 @@ def emulate(
     cameras: tuple[PinholeCamera, ...],
     config: EmulatorConfig,
 ) -> Keypoints:
-    """What the detector would report of the workers in one image of every camera.
+    """What the detector would report of the workers in one image of every camera, in its pixels;
+    NaN, 0 and infinity of a worker who is not seen.
 
     Args:
         state: of the errors, advanced by one image in place.
@@ -115,9 +111,6 @@ def emulate(
         surroundings: (B, ...) the room, what is carried and the robot, which hide joints too.
         cameras: the rig (C).
         config: as given to `make_state`.
-
-    Returns:
-        Keypoints in pixels of the images; NaN, 0 and infinity of a worker who is not seen.
     """
     batch, n_cameras, n_workers = state.errors.shape
     shape = (batch, n_cameras, n_workers, N_JOINTS)

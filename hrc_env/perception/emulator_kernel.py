@@ -33,11 +33,9 @@ from hrc_env.perception.sightlines import (
 )
 
 N_NORMALS = 6
-"""Normal variables of a joint in an image: two for errors that last a while, two for new ones,
-one for their size, one for the confidence."""
+"""Normal variables of a joint in an image: two of lasting errors, two of new ones, size, doubt."""
 SWAPPED, CROSSED, MISSED = range(3)
-"""What may happen to a worker in an image: left and right of all joints exchanged, of the legs
-alone, nobody found."""
+"""What may happen: left and right of all joints exchanged, of the legs alone, nobody found."""
 N_OF_BODY = 4
 """Normal variables of a worker in an image: one for the errors' size, one for each happening."""
 FIRST_OF_LEGS = JOINT["left_knee"]
@@ -86,17 +84,11 @@ class Report(NamedTuple):
 
 @kernel(makes_arrays=True)
 def emulate_batch(errors, wander, normals, world, rig, postures, settings, report):
-    """Advance the errors by one image and write keypoints.
+    """Advance errors (B, C, W; `ERRORS`) and wander (B, W, J, 3; the same in every camera) by one
+    image, and write a `Report`.
 
-    Args:
-        errors: (B, C, W) `ERRORS`.
-        wander: (B, W, J, 3) what is the same in every camera, as far as it is the joint's own.
-        normals: (B, N) normal variables, in the order bodies, then images.
-        world: `World`.
-        rig: (C,) `CAMERA`.
-        postures: (P, N) the numbers of a `POSTURE` each.
-        settings: (1,) `SETTINGS`.
-        report: `Report`, written.
+    normals (B, N) are of bodies, then of images; world is a `World`, rig (C,) `CAMERA`, postures
+    (P, N) the numbers of a `POSTURE` each, settings (1,) `SETTINGS`.
     """
     batch, n_cameras, n_workers = errors.shape
     occluders, room = occluders_of(world), np.empty(1, JOINTS_SEEN)
@@ -147,11 +139,8 @@ def _wander(wander, normals, joints, front, keep, here, common, meant):
 
 @kernel
 def _happen(mine, normals, n_seen, look_of, here, common):
-    """Whether left and right are exchanged now, of all joints and of the legs; whether the worker
-    is found.
-
-    Each happens while a normal variable that changes slowly is in its lower tail, which is as
-    large as the share of the time that it happens when so many joints are seen from here.
+    """Whether left and right of all joints and of the legs are exchanged, and the worker is found;
+    each happens while a slow normal variable is in its lower tail, as large as its share of time.
     """
     low, high, part = _between(look_of[VIEW], N_VIEWS)
     share = here.swap_share
@@ -173,8 +162,7 @@ def _goes_on(mine, which, normals, keeps):
 
 @kernel
 def _between(angle, n):
-    """Of n directions round the circle the two on either side of an angle [rad], and how far it
-    is from the first to the second."""
+    """Of n directions round the circle those beside an angle [rad], and how far it is between."""
     place = angle * n / (2.0 * math.pi)
     low = math.floor(place)
     return int(low) % n, (int(low) + 1) % n, place - low

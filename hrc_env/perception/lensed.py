@@ -1,8 +1,7 @@
 """Lenses before a renderer that draws like a pinhole, and behind the detector.
 
-A window of a distorted image is resampled from a pinhole's picture, drawn from the same eye, turned
-to the window's middle and just wide enough to cover it. Keypoints of a distorted image go to the
-tracker in pinhole pixels.
+A window of a distorted image is resampled from a pinhole's picture, turned to the window's middle
+and just wide enough to cover it. Keypoints go to the tracker in pinhole pixels.
 """
 
 import functools
@@ -26,8 +25,7 @@ from hrc_env.geometry.cameras import (
 from hrc_env.perception.blazepose import to_image
 
 WIDEST = float(np.tan(np.radians(78.0)))
-"""A pinhole's picture reaches no further from its middle than this, in focal lengths; what a
-window shows beyond is black."""
+"""A pinhole's picture reaches so far from its middle [focal lengths]; beyond, a window is black."""
 MAPS_KEPT = 64
 """Windows whose resampling is kept."""
 

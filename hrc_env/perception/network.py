@@ -1,8 +1,8 @@
 """The BlazePose networks as plain functions from an image to raw tensors, on LiteRT or OpenVINO.
 
-Each function belongs to one thread at a time; load one per thread. LiteRT gives the same bits on
-every machine with the same instructions, whatever the number of threads. The official landmark file
-also computes a segmentation mask and world landmarks, 40 % of its time, which `prune` drops.
+Load one function per thread. LiteRT gives the same bits on every machine with the same
+instructions. The official landmark file also computes a segmentation mask and world landmarks, 40 %
+of its time, which `prune` drops.
 """
 
 import functools
@@ -37,8 +37,7 @@ Landmarker: TypeAlias = Callable[[Tensor], tuple[Tensor, float, Tensor]]
 
 
 def chosen_runtime(name: str) -> str:
-    """Which runtime `name` comes to here: "litert" or "openvino". Raises `ConfigError` for one that
-    is not known or not installed."""
+    """The runtime that `name` comes to here. Raises `ConfigError` for one unknown or missing."""
     if name not in RUNTIMES:
         raise unknown("runtime", name, RUNTIMES)
     if name == "openvino":
@@ -100,8 +99,7 @@ def load_tflite(content: bytes, outputs: Sequence[str]) -> Network:
 
 
 def prune(content: bytes, outputs: Sequence[str]) -> bytes:
-    """A .tflite model without whatever the named outputs do not need: one pass from the end, as
-    operators are stored in topological order."""
+    """A .tflite model, operators in topological order, without what the outputs do not need."""
     model: Any = schema.ModelT.InitFromPackedBuf(content, 0)  # generated code, loosely typed
     graph = model.subgraphs[0]
     by_name = {graph.tensors[k].name.decode(): int(k) for k in graph.outputs}

@@ -28,13 +28,8 @@ STANDING = (1.0, *(0.0,) * (len(POSTURES) - 1))
 def sigma_px(
     confidence: Floats, stature_px: Floats | float, posture: Sequence[float] = STANDING
 ) -> Floats:
-    """Standard deviation of each coordinate of a detected joint [px].
-
-    Args:
-        confidence: (..., J) visibility in [0, 1]; of 0 the deviation is infinite.
-        stature_px: how long the worker's stature is at their distance [px]; broadcasts.
-        posture: how far the body counts as each of `calibration.POSTURES` (`outline.posture_of`).
-    """
+    """Standard deviation of each coordinate of joints with these visibilities (..., J) [px],
+    infinite of 0; statures at their distance [px] broadcast; posture: `outline.posture_of`."""
     confidence = np.asarray(confidence, float)
     check_shape("confidence", confidence.shape[-1:], (len(KIND),), "one a joint")
     error = np.tensordot(np.asarray(posture, float), ERROR, 1)

@@ -94,8 +94,7 @@ def handling(joints):
 
 @kernel
 def weigh(folding, kneels, hands, steps):
-    """How far a body counts as standing, walking, handling something, folded over its feet and
-    kneeling; together 1."""
+    """How far a body counts as each of `calibration.POSTURES`; together 1."""
     up = 1.0 - folding
     free = up * (1.0 - hands)
     folded_up = folding * (1.0 - kneels), folding * kneels

@@ -1,8 +1,8 @@
 """Detects people without a prior: searches of whole images, and who is the same in several.
 
 The detector stage needs a person to be a quarter of its window high. Windows are laid round what
-differs from the empty scene where a camera's source knows it; else squares as large as the image
-are. The lines of sight to one person's hips meet; those to two people, or to a mistake, rarely do.
+differs from the empty scene where that is known; else squares as large as the image are. The lines
+of sight to one person's hips meet; those to two people, or to a mistake, rarely do.
 """
 
 import itertools
@@ -30,18 +30,16 @@ SEARCH_RAD = math.radians(75.0)
 DIFFERENCE = 20
 """Grey levels by which a pixel must differ from the empty place, in one colour at least."""
 MEND_PX, MEDIAN_PX = 7, 3
-"""Of a crop: parts of one thing are less than the first apart; a median over the second removes
-noise."""
+"""Of a crop: parts of one thing are less than the first apart; a median over the second smooths."""
 LEAST_PX, MOST_SHARE, MOST_PLACES = 40, 0.7, 5
-"""Smaller changes [px of a crop's area] are not looked at; larger than this share of a crop, it is
-looked at as a whole; so many places in a window at most."""
+"""Least area of a change [px of a crop]; share of a crop above which it is looked at as a whole;
+places in a window."""
 ROOM = 1.6
 """Windows round what has changed are so many times as large."""
 MEETING_M = 0.3
 """Lines of sight that pass a point within this distance [m] see the same hips there."""
 SIDE_M = (1.1, 3.6)
-"""The detector stage's window round a person has sides of this length at their distance [m]: from
-somebody folded up to somebody tall who reaches up."""
+"""Sides of the detector stage's window at a person's distance [m]: folded up, tall and reaching."""
 MIN_CROSSING = 0.1
 """Sine of the smallest angle between two lines that fixes a point."""
 Candidates = Sequence[Sequence[Roi]]
@@ -80,8 +78,7 @@ def search_jobs(
 
 
 def changed(crop: Image, empty: Image, window: Roi) -> list[Roi]:
-    """Upright windows round what is in a crop of `window` and not in the same of the empty place,
-    the largest first."""
+    """Windows round what differs between a crop of `window` and the empty place, largest first."""
     differs = cv2.absdiff(crop, empty).max(-1)
     mask = (cv2.medianBlur(differs, MEDIAN_PX) > DIFFERENCE).astype(np.uint8)
     mask = cv2.dilate(mask, np.ones((MEND_PX, MEND_PX), np.uint8))
@@ -108,8 +105,7 @@ def people(detect: PersonDetector, crop: Image) -> list[blazepose.Person]:
 
 
 def search_windows(camera: PinholeCamera, step: float = 0.5) -> list[Roi]:
-    """Upright squares that overlap and together cover a camera's image: as large as fit, through a
-    lens no larger than `SEARCH_RAD`."""
+    """Upright squares, as large as image and lens (`SEARCH_RAD`) allow, that cover the image."""
     side = float(min(camera.width_px, camera.height_px))
     if camera.lens is not None:
         side = min(side, SEARCH_RAD * float(camera.K[0, 0]))
@@ -133,16 +129,9 @@ def _middles(length_px: int, side_px: float, step: float) -> list[float]:
 
 
 def agreed_windows(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> list[Roi | None]:
-    """One person's window a camera: those whose hips' lines of sight meet best.
-
-    Args:
-        candidates: (C,) windows of the people found by each camera, best first.
-        cameras: (C,) the rig.
-
-    Returns:
-        (C,) None where a camera has not found that person. Of several cameras, two must have found
-        the same person, and not too small or large a one: else nobody.
-    """
+    """One person's window a camera (C,), None where it has not found them: those of the candidates
+    (C,), best first, whose hips' lines of sight meet best. Of several cameras, two must have found
+    the same person, and not too small or large a one: else nobody."""
     if len(cameras) == 1:
         return [found[0] if found else None for found in candidates]
     best: list[Roi | None] = [None] * len(cameras)

@@ -15,12 +15,10 @@ from hrc_env.perception import outline
 from hrc_env.perception.windows import MIN_DEPTH_M, window_round
 
 SEEN, HIDDEN, OUTSIDE, BEHIND = range(4)
-"""How a camera sees a joint: nothing before it, something before it, outside the image, behind
-the camera."""
+"""How a camera sees a joint: free, behind something, outside the image, behind the camera."""
 SIDE, TURN, VIEW, FOLDING, KNEELING, HANDLING, STEPPING = range(N_LOOK := 7)
 """How a camera sees a worker: side [px] and turn [rad] of the window round them, from where
-(`outline.seen_from`) [rad], how folded they are, whether they then kneel, whether their hands are
-busy, whether they walk."""
+(`outline.seen_from`) [rad], and what `outline` says of their posture."""
 CAMERA = np.dtype(
     [
         ("P", "f8", (3, 4)),  # projection

@@ -1,8 +1,7 @@
 """Networks on OpenVINO, an optional extra: pip install "hrc_env[openvino]".
 
-It reads the same files and computes only what the wanted outputs need. Where the processor
-multiplies 16-bit floats (bf16: AVX512_BF16 or AMX) it takes half of LiteRT's time, and
-landmarks move by a quarter of a pixel of 256; elsewhere it computes in 32 bits.
+It computes only what the wanted outputs need. Where the processor multiplies 16-bit floats (bf16:
+AVX512_BF16 or AMX) it takes half of LiteRT's time, and landmarks move by a quarter of a pixel.
 """
 
 import functools
@@ -44,20 +43,12 @@ def precision() -> str:
 def load(path: Path, outputs: Sequence[str], bits: str | None = None) -> Network:
     """A .tflite file as a function from an image to the named outputs, on one thread, computed in
     `bits` ("f32" or "bf16"; `precision()` unless given)."""
-    openvino = _openvino()
     whole = _core().read_model(path)
     wanted = [out.node for name in outputs for out in whole.outputs if name in out.names]
-    compiled = _core().compile_model(
-        openvino.Model(wanted, whole.get_parameters()),
-        "CPU",
-        {
-            "INFERENCE_NUM_THREADS": 1,
-            "NUM_STREAMS": 1,
-            "ENABLE_CPU_PINNING": False,
-            "INFERENCE_PRECISION_HINT": bits or precision(),
-        },
-    )
-    request = compiled.create_infer_request()
+    model = _openvino().Model(wanted, whole.get_parameters())
+    one_thread = {"INFERENCE_NUM_THREADS": 1, "NUM_STREAMS": 1, "ENABLE_CPU_PINNING": False}
+    settings = {**one_thread, "INFERENCE_PRECISION_HINT": bits or precision()}
+    request = _core().compile_model(model, "CPU", settings).create_infer_request()
     image_in = request.get_input_tensor().data
     said = [request.get_output_tensor(k).data for k in range(len(outputs))]
 
@@ -75,8 +66,7 @@ def _core() -> Any:
 
 
 def _openvino() -> Any:
-    """The package, without its telemetry: that would keep a client's number and usage counts in
-    the user's home."""
+    """The package, without its telemetry, which would keep usage counts in the user's home."""
     require()
     sys.modules.setdefault("openvino_telemetry", None)  # type: ignore[arg-type]
     return importlib.import_module("openvino")

@@ -1,8 +1,7 @@
 """The pose network's weights: fetched once, checked always, kept in the user's cache folder.
 
-The files are Google's BlazePose (Apache-2.0). Detector and `full` are read out of the official
-`mediapipe` wheel, which is unzipped and never installed; `lite` and `heavy`, which are fetched only
-when asked for, out of Google's package on npm. See docs/third_party_perception.md.
+Google's BlazePose (Apache-2.0): detector and `full` out of the official `mediapipe` wheel, which is
+never installed; `lite` and `heavy`, when asked for, out of Google's package on npm.
 """
 
 import functools
@@ -15,7 +14,7 @@ import tarfile
 import tempfile
 import urllib.request
 import zipfile
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,8 +24,6 @@ WHEEL = "mediapipe==0.10.21"
 """The last release of mediapipe that carries both files."""
 TARBALL = "https://registry.npmjs.org/@mediapipe/pose/-/pose-0.5.1675469404.tgz"
 """The package `@mediapipe/pose`, which carries all landmark networks."""
-SIZE_MB = {WHEEL: 36, TARBALL: 41}
-"""What a download takes."""
 PATIENCE_S = 60.0
 """How long the server of npm may be silent."""
 SETUP = "python -m hrc_env setup"
@@ -74,18 +71,15 @@ def cache_dir() -> Path:
     """The folder that keeps the weights: $HRC_ENV_CACHE, or `hrc_env` in the user's caches."""
     if chosen := os.environ.get("HRC_ENV_CACHE"):
         return Path(chosen).expanduser()
-    home = Path.home()
-    usual = {"darwin": home / "Library/Caches", "win32": home / "AppData/Local"}
     chosen = os.environ.get("XDG_CACHE_HOME")
     if sys.platform == "win32":
         chosen = chosen or os.environ.get("LOCALAPPDATA")
-    folder = Path(chosen).expanduser() if chosen else usual.get(sys.platform, home / ".cache")
-    return folder / "hrc_env"
+    usual = {"darwin": "~/Library/Caches", "win32": "~/AppData/Local"}.get(sys.platform, "~/.cache")
+    return Path(chosen or usual).expanduser() / "hrc_env"
 
 
 def find_weights(name: str) -> Path:
-    """The path of a weights file, its checksum verified (once per process). Raises `WeightsError`
-    where it is missing or not the official one."""
+    """A weights file, checked once per process. Raises `WeightsError` if missing or another."""
     if name not in WEIGHTS:
         raise unknown("weights", name, WEIGHTS)
     path = cache_dir() / f"{name}.tflite"
@@ -98,12 +92,8 @@ def find_weights(name: str) -> Path:
     return path
 
 
-def fetch_weights(
-    progress: Callable[[str], None] | None = None, names: Iterable[str] = ALWAYS
-) -> dict[str, Path]:
-    """Weights by name in the cache folder, downloading only what is not there yet; `progress` is
-    told what is being done. Raises `WeightsError` where that does not succeed."""
-    tell = progress or (lambda _sentence: None)
+def fetch_weights(names: Iterable[str] = ALWAYS) -> dict[str, Path]:
+    """Weights by name; downloads what is not there yet. Raises `WeightsError` where that fails."""
     found, missing = {}, []
     for name in names:
         try:
@@ -111,13 +101,11 @@ def fetch_weights(
         except WeightsError:
             missing.append(name)
     for archive in dict.fromkeys(WEIGHTS[name].archive for name in missing):
-        tell(f"Downloading weights from {archive} ({SIZE_MB[archive]} MB, once) ...")
         with tempfile.TemporaryDirectory() as folder:
             place = _download(archive, Path(folder), setup_for(missing))
             for name in (each for each in missing if WEIGHTS[each].archive == archive):
                 _unpack(place, name)
                 found[name] = find_weights(name)
-    tell(f"The pose network's weights are in {cache_dir()}.")
     return found
 
 

@@ -1,8 +1,7 @@
 """Where to look: the crop round a worker whose joints are predicted.
 
-The square that BlazePose's detector stage gives the landmark stage: round mid-hip, turned so that
-the torso is upright, as large as the body. The landmark stage forgives a shift of 0.2 of the side,
-a scale of 0.8 to 1.25 and a turn of 20 degrees.
+As BlazePose's detector stage has it: round mid-hip, the torso upright, as large as the body. The
+landmark stage forgives a shift of 0.2 of the side, a scale of 0.8 to 1.25, a turn of 20 degrees.
 """
 
 import math
@@ -39,24 +38,14 @@ logarithm of its size and this turn: half of what the landmark stage forgives.""
 
 
 def window_from_joints(joints_px: Points2, depth_m: Floats, camera: PinholeCamera) -> Roi | None:
-    """The region of interest of a camera's image round projected joints.
-
-    Args:
-        joints_px: (J, 2) projected joints, pinhole pixels.
-        depth_m: (J,) their depth along the optical axis [m].
-        camera: whose image it is.
-
-    Returns:
-        In pixels of the image; None if the worker is behind, very close or outside.
-    """
+    """The region of interest of a camera's image [px of the image] round joints (J, 2) [pinhole
+    px] with depths (J,) [m]; None if the worker is behind, very close or outside."""
     if depth_m[TORSO].min() < MIN_DEPTH_M:
         return None
     magnification = pinhole_magnification(camera, joints_px[TORSO].mean(0))
     joints_px = image_from_pinhole(camera, joints_px)
-    if (
-        np.count_nonzero((depth_m > MIN_DEPTH_M) & inside_image(camera, joints_px))
-        < MIN_JOINTS_INSIDE
-    ):
+    inside = (depth_m > MIN_DEPTH_M) & inside_image(camera, joints_px)
+    if np.count_nonzero(inside) < MIN_JOINTS_INSIDE:
         return None
     px_per_m = camera.K[0, 0] / (depth_m[TORSO].mean() * magnification)
     side_px, turn_rad = window_round(
@@ -101,11 +90,9 @@ def steady_window(kept: Roi | None, wanted: Roi | None) -> Roi | None:
     steady crops make steady landmarks, and need not be drawn again."""
     if kept is None or wanted is None:
         return wanted
-    shift_px = math.dist(kept.centre_px, wanted.centre_px)
-    turn_rad = wrap_angle(wanted.rotation_rad - kept.rotation_rad)
     steady = (
-        shift_px < STEADY_SHIFT * kept.side_px
+        math.dist(kept.centre_px, wanted.centre_px) < STEADY_SHIFT * kept.side_px
         and abs(math.log(wanted.side_px / kept.side_px)) < STEADY_SCALE
-        and abs(turn_rad) < STEADY_TURN_RAD
+        and abs(wrap_angle(wanted.rotation_rad - kept.rotation_rad)) < STEADY_TURN_RAD
     )
     return kept if steady else wanted

@@ -79,10 +79,8 @@ class EmulatorPipeline(PoseTracking):
         came = no_keypoints(len(ids), len(rig), self.scene.n_workers)
         time_s = np.full(came.px.shape[:2], np.nan)
         for row, b in enumerate(ids):
-            recent.keep(b, one(shown, row))
-            frames = recent.frames(b)
-            time_s[row] = recent.times_s(frames)
-            for c, frame in enumerate(frames):
-                if frame is not None:
-                    write_rows(one(one(came, row), c), ..., one(recent.at(b, frame.shows), c))
+            records, time_s[row] = recent.arrived(b, one(shown, row))
+            for c, record in enumerate(records):
+                if record is not None:
+                    write_rows(one(one(came, row), c), ..., one(record, c))
         return replace(came, time_s=time_s)

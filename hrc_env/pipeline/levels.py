@@ -37,12 +37,8 @@ CAMERA_LEVELS = LEVELS[:2]
 def make_pipeline(
     level: str, estimator: EstimatorChoice, scene: Scene, batch: int, config: HRCConfig
 ) -> PerceptionPipeline:
-    """The pipeline of a perception level.
-
-    Raises:
-        ConfigError: `level` is not a name of one, or cannot have what `config` wants.
-        WeightsError: `pixels` without the network's weights.
-        RenderingError: `pixels` without OpenGL.
+    """The pipeline of a perception level. Raises `ConfigError` for an unknown one, or one that
+    cannot have what `config` wants; `WeightsError`, `RenderingError` where `pixels` is impossible.
     """
     if level not in LEVELS:
         raise unknown("perception", level, LEVELS)

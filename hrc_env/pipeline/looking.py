@@ -38,7 +38,6 @@ class Looking(Stateful):
         self,
         source: ImageSource,
         expected: PoseEstimate,
-        row: int,
         b: int,
         has_image: Sequence[bool],
         out: Keypoints,
@@ -47,14 +46,11 @@ class Looking(Stateful):
         the others. Who is in view of cameras without an image only is not looked for.
 
         Args:
-            source: the images.
-            expected: where the tracker expects the workers.
-            row: environment b's row there and in `out`.
-            b: which environment.
-            has_image: (C,) whether each camera has an image now.
-            out: is filled.
+            source: the images, of which cameras (C,) that `has_image` have one now.
+            expected: where the tracker expects the workers, (W, ...).
+            out: (C, W, ...) is filled.
         """
-        wanted = [self._windows(expected, row, w) for w in range(self.n_workers)]
+        wanted = [self._windows(expected, w) for w in range(self.n_workers)]
         taken: Windows = []
         people, missed = None, False
         self.schedule.tick(b)
@@ -63,22 +59,20 @@ class Looking(Stateful):
             windows = [w if has else None for w, has in zip(steady, has_image, strict=True)]
             if not any(has_image) or (any(steady) and not any(windows)):
                 continue
-            if not any(windows) and people is None:
+            if any(windows):
+                windows = self._followed(source, b, worker, windows, taken, has_image)
+            elif people is None:
                 due = self.schedule.due(b, has_image)
                 if not due:
                     continue
                 people = self.schedule.remember(b, due, self.detector.search(source, due))
-            if any(windows):
-                windows = self._followed(source, b, worker, windows, taken, has_image)
             track = self._track(b, worker)
-            folded, posture = _expected_posture(expected, row, worker)
+            folded, posture = _expected_posture(expected, worker)
             seen = self.detector.detect(source, windows, track, taken, people, folded, posture)
             taken.append(seen.windows)
             self.reacquisition.saw(b, worker, seen.confidence.max(-1) > 0.0)
             missed |= not any(windows) and not seen.confidence.any()
-            self._keep(b, worker, seen, has_image)
-            out.px[row, :, worker], out.sigma_px[row, :, worker] = seen.px, seen.sigma_px
-            out.confidence[row, :, worker] = seen.confidence
+            self._keep(b, worker, seen, has_image, out)
         if missed:
             self.schedule.rest(b)
 
@@ -96,7 +90,11 @@ class Looking(Stateful):
         current = self.windows[b][0] if self.windows[b] else []
         return crops if windows == current else [None] * len(current)
 
-    def _keep(self, b: int, worker: int, seen: Detection, has_image: Sequence[bool]) -> None:
+    def _keep(
+        self, b: int, worker: int, seen: Detection, has_image: Sequence[bool], out: Keypoints
+    ) -> None:
+        out.px[:, worker], out.confidence[:, worker] = seen.px, seen.confidence
+        out.sigma_px[:, worker] = seen.sigma_px
         for c, has in enumerate(has_image):
             if has:
                 self.windows[b][worker][c] = seen.windows[c]
@@ -124,19 +122,17 @@ class Looking(Stateful):
         """The number by which the detector knows a worker of an environment."""
         return b * self.n_workers + worker
 
-    def _windows(self, predicted: PoseEstimate, row: int, worker: int) -> list[Roi | None]:
+    def _windows(self, predicted: PoseEstimate, worker: int) -> list[Roi | None]:
         """A window a camera; None where the worker is unknown or out of view: search."""
-        if not predicted.tracked[row, worker]:
+        if not predicted.tracked[worker]:
             return [None] * len(self.cameras)
-        px, depth_m = project(self.P, predicted.mean_world[row : row + 1, worker])
+        px, depth_m = project(self.P, predicted.mean_world[worker : worker + 1])
         return list(map(window_from_joints, px[0], depth_m[0], self.cameras))
 
 
-def _expected_posture(
-    expected: PoseEstimate, row: int, worker: int
-) -> tuple[bool, Sequence[float]]:
+def _expected_posture(expected: PoseEstimate, worker: int) -> tuple[bool, Sequence[float]]:
     """Whether a worker is expected to be folded up; how far they count as each posture."""
-    if not expected.tracked[row, worker]:
+    if not expected.tracked[worker]:
         return False, STANDING
-    joints = expected.mean_world[row, worker]
-    return is_folded(joints), posture_of(joints, expected.velocity_world[row, worker])
+    joints = expected.mean_world[worker]
+    return is_folded(joints), posture_of(joints, expected.velocity_world[worker])

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from hrc_env.core.batching import one
 from hrc_env.core.records import PoseEstimate
 from hrc_env.geometry.cameras import PinholeCamera, projections
 from hrc_env.perception.detector import DetectorConfig
@@ -23,18 +24,15 @@ from hrc_env.tracking.people.association import AssociationConfig, associate
 
 
 class PoseTracker:
-    """Follows the workers before a rig; what level `pixels` does, for one place.
+    """Follows the workers before a rig; what level `pixels` does, for one place. Raises
+    `WeightsError` without the network's weights.
 
     Args:
         cameras: the rig, as of `geometry.cameras.pinhole`.
         n_workers: how many are followed at most.
         dt_s: the usual time between two sets of frames [s].
         estimator: as of an environment.
-        tracker: settings of the estimator; None: its defaults.
-        detector: settings of the detector; None: the defaults.
-
-    Raises:
-        WeightsError: without the network's weights.
+        tracker, detector: settings; None: the defaults.
     """
 
     def __init__(
@@ -58,22 +56,19 @@ class PoseTracker:
         dt_s: float | None = None,
         rngs: Sequence[np.random.Generator] = (),
     ) -> PoseEstimate:
-        """Take the present frames in.
+        """Take the present frames in; workers (1, W, J, ...) in the frame of the cameras' poses.
 
         Args:
             source: the images of all cameras.
             dt_s: time since the last frames [s]; None: the usual.
             rngs: one generator, for estimators that draw; none: one with seed 0.
-
-        Returns:
-            The workers, arrays (1, W, J, ...), in the frame of the cameras' poses.
         """
         drawn = list(rngs) or [np.random.default_rng(0)]
         self.estimator.predict(self.state, self.dt_s if dt_s is None else dt_s, drawn)
         expected = self.estimator.estimate(self.state)
         seen = no_keypoints(1, len(self.cameras), self.n_workers)
         has_image = [True] * len(self.cameras)
-        self.looking.look(source, expected, 0, 0, has_image, seen)
+        self.looking.look(source, one(expected, 0), 0, has_image, one(seen, 0))
         keypoints = pinhole_keypoints(seen, self.cameras)
         if self.n_workers > 1:
             keypoints = associate(self.P, keypoints, expected, AssociationConfig()).keypoints

@@ -1,8 +1,8 @@
 """Searches of whole images: when they are due, and for workers whose track has gone astray.
 
-A search costs as much as several steps: a camera in whose image nobody was believed rests for a
-while. Where fewer than two cameras have shown a tracked worker for some steps, the images of the
-others are searched; where these agree on a person, they look there until the estimator follows.
+A camera in whose image nobody was believed rests for a while. Where fewer than two cameras have
+shown a tracked worker for some steps, the images of the others are searched; where these agree on a
+person, they look there until the estimator follows.
 """
 
 from collections.abc import Sequence
@@ -105,15 +105,8 @@ class Reacquisition(Stateful):
         others: Windows,
         cameras: Sequence[PinholeCamera],
     ) -> None:
-        """Learn what a search of the blind cameras gave for a worker of environment b.
-
-        Args:
-            b, worker: whose search.
-            people: (C,) whom each blind camera shows.
-            windows: (C,) where the track has the cameras look.
-            others: windows (C,) of other workers, who are not taken for this one.
-            cameras: the rig.
-        """
+        """Learn whom (C,) a search of the blind cameras of a rig shows for a worker of environment
+        b, where the track has cameras look (C,), and windows (C,) of others, whom it is not."""
         blind = self.unseen[b, worker] >= PATIENCE
         candidates = [
             people[c] if blind[c] else [window for window in [windows[c]] if window is not None]

@@ -52,7 +52,7 @@ class PixelPipeline(PoseTracking):
             else:
                 time_s[row] = self._take_images(now, row, b, self.recent)
                 has_image = np.isfinite(time_s[row]).tolist()
-            self.looking.look(self.images, expected, row, b, has_image, seen)
+            self.looking.look(self.images, one(expected, row), b, has_image, one(seen, row))
         return replace(seen, time_s=time_s)
 
     def _take_images(self, now: SensorInput, row: int, b: int, recent: Recent) -> Floats:
@@ -61,12 +61,10 @@ class PixelPipeline(PoseTracking):
         before = recent.at(b, step - 1)
         actual = recent.schedule.actual(self.scene.cameras, recent.seeds[b], step)
         last = pose if before is None else (before.q, before.motion)
-        recent.keep(b, Shot(step, *pose, last, actual))
-        frames = recent.frames(b)
-        shots = [None if frame is None else recent.at(b, frame.shows) for frame in frames]
+        shots, times_s = recent.arrived(b, Shot(step, *pose, last, actual))
         if isinstance(self.images, CameraFilm):
             self.images.show(shots, recent.seeds[b])
-        return recent.times_s(frames)
+        return times_s
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
         """Forget the tracks, and who was followed."""

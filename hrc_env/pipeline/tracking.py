@@ -24,8 +24,7 @@ from hrc_env.tracking.people.association import associate
 
 
 class PerceptionPipeline(Stateful):
-    """One perception level with its estimator, for a batch of environments; here, one without
-    cameras and memory."""
+    """One perception level with its estimator, for a batch; here, without cameras and memory."""
 
     NEEDS_TRUTH: bool = False
     """Whether `perceive` is to be given a `TrueSensorInput`."""
@@ -48,8 +47,7 @@ class PerceptionPipeline(Stateful):
         return None, []
 
     def crops(self, b: int) -> list[Image | None]:
-        """What the network was given of environment `b`'s first worker, one a camera (for
-        pictures); none where there is no network."""
+        """What the network was given of `b`'s first worker, one a camera (for pictures)."""
         return []
 
     def look_of(self, b: int) -> Look | None:

@@ -24,7 +24,6 @@ from hrc_env.scene.canvas import (
     STILL,
     Canvas,
 )
-from hrc_env.scene.domain_randomization import Look
 
 SMOOTHING = 2
 """All is drawn so many times as large, for smooth edges."""
@@ -112,15 +111,8 @@ class Stage(Canvas):
         gl.draw_on_one_thread()
         size = max(SMOOTHING * width, SUN_PX), max(SMOOTHING * height, SUN_PX)
         super().__init__(scene, *size, QUALITY)
-        self._kept: dict[Any, _Backdrop] = {}
         self._shade: Shade | None = None
         self._shade_known = False
-
-    def randomize(self, look: Look | None) -> bool:
-        """Draw with an episode's look from the next pose on; whether that is another one."""
-        if changed := super().randomize(look):
-            self._kept.clear()
-        return changed
 
     def pose(self, q: JointAngles, motion: WorkerMotion | None) -> None:
         """Pose what moves: arm q (N,), the workers of one environment (W, S, ...)."""

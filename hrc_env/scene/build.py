@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -16,7 +16,7 @@ from hrc_env.geometry.chains import SerialChain, capsules
 from hrc_env.geometry.shapes import WIDTH
 from hrc_env.geometry.sight import Surroundings
 from hrc_env.scene.places import SCENES, obstacles
-from hrc_env.scene.primitives import DECORATION, OVERHEAD, ROBOT_BIT, ROBOT_LOOKS
+from hrc_env.scene.primitives import ROBOT_BIT, SCENE_BIT, SOLID
 from hrc_env.scene.rig import CameraConfig, add_cameras, pinholes, select
 from hrc_env.scene.robot import (
     DEFAULT,
@@ -47,21 +47,30 @@ class SceneConfig:
     clutter: bool = True
     """Whether furniture and building material stand in the room."""
     sim_dt: float = 0.008
-    """Seconds a physics substep takes [s]: of 4, 5, 8 and 10 ms the coarsest that keeps the tool
-    within 1 mm (95 %) of the integral of smooth commands for every seed tried, with contacts that
-    stay shallow and calm; at 10 ms one seed of eight is beyond (`benchmarks/sim_dt.py`)."""
+    """Length of a physics substep [s]: the coarsest tried that keeps the tool within 1 mm (95 %) of
+    the integral of smooth commands, and contacts shallow and calm (`benchmarks/sim_dt.py`)."""
     slew_rad_s2: float = 8.0
     """Fastest change of a commanded joint velocity [rad/s^2]; keeps the overshoot below 5 %."""
     integrator_clamp_rad: float = 0.05
     """How far the holding servo's angle may be ahead of a blocked joint [rad]."""
     cameras: tuple[CameraConfig, ...] = ()
-    """All cameras that hang in the scene, of which `build` says which are switched on; none: the
-    scene's own four."""
+    """All that hang in the scene, of which `build` switches some on; none: the scene's own four."""
 
     def __post_init__(self) -> None:
         for name in ("sim_dt", "slew_rad_s2", "integrator_clamp_rad"):
             if not getattr(self, name) > 0:
                 raise ConfigError(f"{name} must be positive, got {getattr(self, name)}.")
+
+
+class Recipe(NamedTuple):
+    """What `build` makes a scene from, in the order of its arguments."""
+
+    config: SceneConfig
+    name: str
+    n_workers: int
+    bodies: tuple[str, ...]
+    cameras: tuple[str, ...]
+    robot: Robot
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,13 +114,13 @@ class Scene:
         return Surroundings(self.obstacles, moving, capsules(chain, q), chain.capsule_radius_m)
 
     @property
-    def recipe(self) -> tuple[Any, ...]:
+    def recipe(self) -> Recipe:
         """What `build` makes it from."""
         use = tuple(camera.name for camera in self.cameras)
-        return self.config, self.name, self.n_workers, self.bodies, use, self.robot
+        return Recipe(self.config, self.name, self.n_workers, self.bodies, use, self.robot)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return build, self.recipe
+        return build, tuple(self.recipe)
 
 
 def build(
@@ -125,12 +134,12 @@ def build(
     """The scene of these settings, compiled once and kept.
 
     Args:
-        config: settings; None takes the defaults.
+        config: settings; None: the defaults.
         name: which scene, a key of `SCENES`.
         n_workers: how many workers it has room for, 0 or more.
         bodies: the baked body of all of them, or those that they can have; "any": all.
-        cameras: names or indices of the cameras that are used; None uses all.
-        robot: which one works there, a name or itself.
+        cameras: names or indices of the cameras that are used; None: all.
+        robot: a name or itself.
 
     Raises:
         ConfigError: an unknown scene, body, camera or robot, or a negative number of workers.
@@ -144,21 +153,15 @@ def build(
     if not config.cameras:
         config = replace(config, cameras=SCENES[name].cameras)
     use = tuple(camera.name for camera in select(config.cameras, cameras))
-    return _build(config, name, n_workers, pool(bodies), use, robot_called(robot))
+    return _build(Recipe(config, name, n_workers, pool(bodies), use, robot_called(robot)))
 
 
 @lru_cache(maxsize=8)
-def _build(
-    config: SceneConfig,
-    name: str,
-    n_workers: int,
-    bodies: tuple[str, ...],
-    use: tuple[str, ...],
-    robot: Robot,
-) -> Scene:
+def _build(recipe: Recipe) -> Scene:
+    config, name, n_workers, bodies, use, robot = recipe
     room = SCENES[name]
     chain = chain_of(robot, room.mount_world)
-    spec = _spec(config, name, n_workers, bodies, use, robot)
+    spec = _spec(recipe)
     _strip(spec)
     _pair(spec, robot, chain)
     model = spec.compile()
@@ -187,18 +190,14 @@ def _build(
 
 def without_workers(scene: Scene) -> Scene:
     """The same scene with nobody in it."""
-    config, name, _, *rest = scene.recipe
-    return _build(config, name, 0, *rest)
+    return _build(scene.recipe._replace(n_workers=0))
 
 
 @lru_cache(maxsize=4)
 def drawing_model(scene: Scene) -> mujoco.MjModel:
-    """The scene with everything that only the eye needs: looks, and what workers hold.
-
-    The physics' joints and its mocap rows come first, in the same order, so that its state fits.
-    """
-    prefixes = _prefixes(scene.n_workers)
-    spec = _spec(*scene.recipe)
+    """The scene with everything that only the eye needs: looks, and what workers hold. The physics'
+    joints and mocap rows come first, in the same order: its state fits."""
+    prefixes, spec = _prefixes(scene.n_workers), _spec(scene.recipe)
     for prefix in prefixes:
         for name in scene.bodies:
             add_visuals(spec, load_body(name), load_mesh(name), prefix)
@@ -211,15 +210,9 @@ def visuals(scene: Scene) -> WorkerVisuals:
     return visuals_of(drawing_model(scene), _prefixes(scene.n_workers), scene.bodies)
 
 
-def _spec(
-    config: SceneConfig,
-    name: str,
-    n_workers: int,
-    bodies: tuple[str, ...],
-    use: tuple[str, ...],
-    robot: Robot,
-) -> mujoco.MjSpec:
+def _spec(recipe: Recipe) -> mujoco.MjSpec:
     """Everything but the workers' looks and what they hold."""
+    config, name, n_workers, bodies, use, robot = recipe
     path = assets_dir() / "scenes" / f"{name}{'' if config.clutter else '_bare'}.xml"
     spec = mujoco.MjSpec.from_file(str(path))
     spec.option.timestep = config.sim_dt
@@ -235,25 +228,23 @@ def _spec(
 
 
 def _strip(spec: mujoco.MjSpec) -> None:
-    """Take away what only the eye needs: geoms, meshes, pictures, lights, cameras, and bodies of
-    nothing else. Twice as fast."""
-    for geom in spec.geoms:
-        if geom.group in (DECORATION, ROBOT_LOOKS, OVERHEAD):
-            spec.delete(geom)
-        else:
-            geom.material = ""
-    for body in spec.worldbody.bodies:
-        if not (body.mocap or body.geoms or body.bodies):
-            spec.delete(body)
-    for unseen in (*spec.meshes, *spec.materials, *spec.textures, *spec.lights, *spec.cameras):
+    """Take away what only the eye needs: the physics is then twice as fast."""
+    hiding = [geom for geom in spec.geoms if geom.group == SOLID and not geom.contype]
+    for geom in hiding:
+        geom.contype = SCENE_BIT  # else the compiler would discard these as well
+    spec.compiler.discardvisual = True
+    spec.compile()
+    spec.compiler.discardvisual = False
+    for geom in hiding:
+        geom.contype = 0
+    empty = [b for b in spec.worldbody.bodies if not (b.mocap or b.geoms or b.bodies)]
+    for unseen in (*empty, *spec.lights, *spec.cameras):
         spec.delete(unseen)
 
 
 def _pair(spec: mujoco.MjSpec, robot: Robot, chain: SerialChain) -> None:
-    """Say pair by pair what may touch the robot: quicker than to look for it in every substep.
-
-    What stands still out of a link's reach is no pair of it: the physics is the same.
-    """
+    """Say pair by pair what may touch the robot, which is quicker than to look for it in every
+    substep; what stands still out of a link's reach cannot."""
     reach = dict(zip(robot.capsules, reach_m(chain).tolist(), strict=True))
     foot_world = chain.T_world_from_base[:3, 3]
     parts = [geom for geom in spec.geoms if geom.contype & ROBOT_BIT]

@@ -1,8 +1,7 @@
 """One OpenGL context with a scene in it: pose it, aim it, read the picture.
 
-Drawing happens on the CPU or the GPU, whatever `gl` finds. The context is made when the
-first picture is drawn, in the thread that draws it, and made current before every call,
-so that several canvases never draw into each other.
+The context is made when the first picture is drawn, in the thread that draws it, and made current
+before every call: several canvases never draw into each other.
 """
 
 import contextlib
@@ -21,7 +20,7 @@ from hrc_env.core.typing import Floats, Image, JointAngles
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.scene import gl
 from hrc_env.scene.build import Scene, drawing_model, visuals
-from hrc_env.scene.domain_randomization import Look, as_built, randomize, strew, take_off_hats
+from hrc_env.scene.domain_randomization import Look, randomize, strew, take_off_hats
 from hrc_env.scene.primitives import DECORATION, OVERHEAD, ROBOT_CAPSULES, ROBOT_LOOKS, SOLID
 from hrc_env.scene.rig import glcam_axes
 from hrc_env.scene.worker_visuals import PARKED_M, show_bodies, show_workers
@@ -55,22 +54,17 @@ class Canvas:
     """A picture of fixed size; `quality` are fields of MuJoCo's visual.quality."""
 
     def __init__(
-        self,
-        scene: Scene,
-        width_px: int,
-        height_px: int,
-        quality: dict[str, int],
+        self, scene: Scene, width_px: int, height_px: int, quality: dict[str, int]
     ) -> None:
-        self.width_px, self.height_px = width_px, height_px
-        self.scene = scene
-        self._model = copy.copy(drawing_model(scene))  # its own drawing settings
+        self.scene, self.width_px, self.height_px = scene, width_px, height_px
+        self._built = drawing_model(scene)
+        self._model = copy.copy(self._built)  # its own looks and drawing settings
         for name, value in quality.items():
             setattr(self._model.vis.quality, name, value)
         view = self._model.vis.global_
         view.offwidth, view.offheight = width_px, height_px
         self._data = mujoco.MjData(self._model)
         self._visuals = visuals(scene)
-        self._built = as_built(self._model)
         self._look: Look | None = None
         show_bodies(self._model, self._visuals, None)
         self._option = mujoco.MjvOption()
@@ -82,6 +76,7 @@ class Canvas:
         self._lists: dict[Part, Any] = {}
         self._shown: Any = None
         self._fresh: set[Part] = set()
+        self._kept: dict[Any, Any] = {}  # what stands still, for subclasses; looks change it
         self._closed = False
         self.groups(ALL_GROUPS)
 
@@ -90,6 +85,7 @@ class Canvas:
         if look is None or look is self._look:
             return False
         self._look = look
+        self._kept.clear()
         randomize(self._model, self._built, self._visuals, look)
         return True
 
@@ -108,10 +104,7 @@ class Canvas:
         self._fresh.clear()
 
     def show(self, what: Part = EVERYTHING, shadows: bool = False) -> None:
-        """Choose what the next pictures hold.
-
-        The pose is taken over (skins included) when it has changed since.
-        """
+        """Choose what the next pictures hold; the pose is taken over if it has changed since."""
         self._open()
         if what not in self._lists:
             self._lists[what] = mujoco.MjvScene(self._model, maxgeom=self._model.ngeom + 64)
@@ -150,13 +143,8 @@ class Canvas:
         return option
 
     def aim(self, camera: PinholeCamera, window: Roi, height_px: float) -> None:
-        """Look through a turned rectangle of a camera's image, `side_px` wide.
-
-        Args:
-            camera: whose image it is.
-            window: the rectangle's centre, width and turn.
-            height_px: the rectangle's height [px of the camera's image].
-        """
+        """Look through a turned rectangle of a camera's image, `side_px` wide and `height_px` high
+        [px of that image]."""
         c, s = np.cos(window.rotation_rad), np.sin(window.rotation_rad)
         dx = window.centre_px[0] - camera.K[0, 2]
         dy = window.centre_px[1] - camera.K[1, 2]
@@ -170,14 +158,8 @@ class Canvas:
             eye.frustum_bottom = (-height_px / 2 - v) * scale
 
     def aim_along(self, axes: Floats, middle_world: Floats, half_m: float, far_m: float) -> None:
-        """Look along parallel rays, as a sun shines: a square of 2 `half_m` round a point.
-
-        Args:
-            axes: (3, 3) columns right, down and along the rays.
-            middle_world: (3,) the point in the middle of the near plane [m].
-            half_m: half of the square's side [m].
-            far_m: how far is drawn [m].
-        """
+        """Look along parallel rays, as a sun shines, `far_m` far: a square of 2 `half_m` round the
+        point `middle_world` (3,) of the near plane; axes (3, 3) are right, down and along."""
         _, down, direction = axes.T
         for eye in self._shown.camera:
             eye.orthographic = 1
@@ -197,8 +179,7 @@ class Canvas:
         return np.stack([right, np.cross(along, right), along], -1)
 
     def movers(self) -> tuple[Floats, Floats]:
-        """Spheres round all that moves, a worker's capsules for the skin: middles (N, 3) and radii
-        (N,) [m]."""
+        """Middles (N, 3) and radii (N,) [m] of spheres round all that moves; skins by capsules."""
         model, of = self._model, self._model.geom_bodyid
         moving = (model.body_weldid[of] != 0) | (model.body_mocapid[of] >= 0)
         moving &= self._data.geom_xpos[:, 2] > PARKED_M[2] / 2
@@ -206,10 +187,8 @@ class Canvas:
         return self._data.geom_xpos[moving], model.geom_rbound[moving]
 
     def read(self, rgb: NDArray[np.uint8] | None, z: NDArray[np.float32] | None) -> None:
-        """Draw into rgb (H, W, 3) and z (H, W), bottom row first as OpenGL has them.
-
-        z is 1 at the near plane and 0 at the far one. Both may be smaller than the canvas.
-        """
+        """Draw into rgb (H, W, 3) and z (H, W; 1 near, 0 far), which may be smaller than the
+        canvas, bottom row first as OpenGL has them."""
         self._open()
         self._gl.make_current()
         shapes = [each.shape for each in (rgb, z) if each is not None]
@@ -224,16 +203,15 @@ class Canvas:
         return np.ascontiguousarray(rgb[::-1])
 
     def depth_m(self) -> NDArray[np.float32]:
-        """(H, W) distance along the optical axis [m], top row first; nothing there is the
-        far plane."""
+        """(H, W) distance along the optical axis [m], top row first; of nothing the far plane's."""
         z = np.empty((self.height_px, self.width_px), np.float32)
         self.read(None, z)
         return self.distance_m(z[::-1])
 
     def distance_m(self, z: NDArray[np.float32]) -> NDArray[np.float32]:
         """Distance along the optical axis [m] of what `read` has found."""
-        near = float(self._shown.camera[0].frustum_near)
-        far = float(self._shown.camera[0].frustum_far)
+        eye = self._shown.camera[0]
+        near, far = float(eye.frustum_near), float(eye.frustum_far)
         return (near * far / (near + z.astype(float) * (far - near))).astype(np.float32)
 
     def close(self) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Grounds
-from hrc_env.core.typing import Floats, Ints
+from hrc_env.core.typing import Floats
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.scene.worker_visuals import HIDDEN, WorkerVisuals
 
@@ -61,14 +61,11 @@ class AppearanceConfig:
                 "light must be two factors from 0.05 to 3, the lesser one first, got "
                 f"{self.light}; (0.5, 1.3) is from half the light to a third more."
             )
-        for name, most in (("light_turn_deg", 180.0), ("light_tilt_deg", 60.0)):
+        bounds = {"light_turn_deg": 180.0, "light_tilt_deg": 60.0, "litter": MOST_LITTER}
+        shares = dict.fromkeys(("warmth", "plain", "tint", "clothing", "skin", "hat"), 1)
+        for name, most in (bounds | shares).items():
             if not 0 <= getattr(self, name) <= most:
-                raise ConfigError(f"{name} must be from 0 to {most}, got {getattr(self, name)}.")
-        for name in ("warmth", "plain", "tint", "clothing", "skin", "hat"):
-            if not 0 <= getattr(self, name) <= 1:
-                raise ConfigError(f"{name} must be a share from 0 to 1, got {getattr(self, name)}.")
-        if not 0 <= self.litter <= MOST_LITTER:
-            raise ConfigError(f"litter must be from 0 to {MOST_LITTER}, got {self.litter}.")
+                raise ConfigError(f"{name} must be from 0 to {most:g}, got {getattr(self, name)}.")
 
 
 MOST_LITTER = 60
@@ -118,13 +115,8 @@ class Look(NamedTuple):
 
 
 def draw_look(config: AppearanceConfig, n_workers: int, rng: np.random.Generator) -> Look:
-    """An episode's looks.
-
-    Args:
-        config: between what.
-        n_workers: how many workers there is room for.
-        rng: the environment's sensor generator, at the episode's beginning: it stays as it is.
-    """
+    """An episode's looks, for as many workers as there is room for; `rng` is the environment's
+    sensor generator and stays as it is."""
     own = _own_stream(rng)
     low, high = config.light
     warmth = config.warmth * own.uniform(-1, 1)
@@ -144,49 +136,16 @@ def draw_look(config: AppearanceConfig, n_workers: int, rng: np.random.Generator
     )
 
 
-@dataclass(frozen=True, slots=True)
-class AsBuilt:
-    """What of a drawing model a look changes, as it was built."""
-
-    light_dir: Floats
-    light_diffuse: Floats
-    light_specular: Floats
-    headlight: tuple[Floats, Floats]
-    """Ambient and diffuse."""
-    material_rgba: Floats
-    material_texture: Ints
-    skin_rgba: Floats
-    surfaces: Ints
-    """Materials of what stands still."""
-    clothes: Ints
-    """(nskin,) 1 for clothes, 0 for a body's own skin."""
-
-
-def as_built(model: mujoco.MjModel) -> AsBuilt:
-    """What a look changes of a model that nobody has dressed yet."""
-    still = model.geom_matid[(model.geom_bodyid == 0) & (model.geom_matid >= 0)]
-    names = [model.skin(k).name for k in range(model.nskin)]
-    headlight = model.vis.headlight
-    return AsBuilt(
-        light_dir=model.light_dir.copy(),
-        light_diffuse=model.light_diffuse.copy(),
-        light_specular=model.light_specular.copy(),
-        headlight=(np.array(headlight.ambient), np.array(headlight.diffuse)),
-        material_rgba=model.mat_rgba.copy(),
-        material_texture=model.mat_texid.copy(),
-        skin_rgba=model.skin_rgba.copy(),
-        surfaces=np.unique(still),
-        clothes=np.array([name.endswith(CLOTH) for name in names], np.int64),
-    )
-
-
-def randomize(model: mujoco.MjModel, built: AsBuilt, visuals: WorkerVisuals, look: Look) -> None:
-    """Put a look on a drawing model of the caller's own."""
+def randomize(
+    model: mujoco.MjModel, built: mujoco.MjModel, visuals: WorkerVisuals, look: Look
+) -> None:
+    """Put a look on a drawing model of the caller's own, of which `built` is the original."""
     _randomize_light(model, built, look)
     _randomize_surfaces(model, built, look)
-    whose = visuals.skins[:, 0]
-    factors = np.where(built.clothes[:, None] > 0, look.clothing_rgb[whose], look.skin_rgb[whose])
-    model.skin_rgba[:, :3] = built.skin_rgba[:, :3] * factors
+    for k, worker in enumerate(visuals.skins[:, 0]):
+        is_cloth = built.skin(k).name.endswith(CLOTH)
+        factor = look.clothing_rgb[worker] if is_cloth else look.skin_rgb[worker]
+        model.skin_rgba[k, :3] = built.skin_rgba[k, :3] * factor
 
 
 def take_off_hats(model: mujoco.MjModel, visuals: WorkerVisuals, look: Look) -> None:
@@ -213,7 +172,7 @@ def strew(scene: Any, grounds: Grounds, look: Look) -> None:
         scene.ngeom += 1
 
 
-def _randomize_light(model: mujoco.MjModel, built: AsBuilt, look: Look) -> None:
+def _randomize_light(model: mujoco.MjModel, built: mujoco.MjModel, look: Look) -> None:
     """Strength, colour and direction of all light."""
     factor = look.light * look.light_rgb
     axis = np.array([np.cos(look.tilt_about_rad), np.sin(look.tilt_about_rad), 0.0])
@@ -225,21 +184,21 @@ def _randomize_light(model: mujoco.MjModel, built: AsBuilt, look: Look) -> None:
     model.light_dir[:] = towards / np.linalg.norm(towards, axis=-1, keepdims=True)
     model.light_diffuse[:] = built.light_diffuse * factor
     model.light_specular[:] = built.light_specular * factor
-    model.vis.headlight.ambient[:] = built.headlight[0] * factor
-    model.vis.headlight.diffuse[:] = built.headlight[1] * factor
+    model.vis.headlight.ambient[:] = built.vis.headlight.ambient * factor
+    model.vis.headlight.diffuse[:] = built.vis.headlight.diffuse * factor
 
 
-def _randomize_surfaces(model: mujoco.MjModel, built: AsBuilt, look: Look) -> None:
-    """Tints, and surfaces without pictures."""
+def _randomize_surfaces(model: mujoco.MjModel, built: mujoco.MjModel, look: Look) -> None:
+    """Tints of the materials of what stands still, and some of them without pictures."""
     draws = np.random.default_rng([look.seed, 1])
-    n = len(built.surfaces)
-    tint = 1.0 - look.tint * draws.uniform(0, 1, (n, 3))
-    has_picture = (built.material_texture[built.surfaces] >= 0).any(1)
-    plain = has_picture & (draws.uniform(0, 1, n) < look.plain)
-    colour = np.where(plain[:, None], PLAIN_RGB, built.material_rgba[built.surfaces, :3])
-    model.mat_rgba[built.surfaces, :3] = colour * tint
-    model.mat_texid[:] = built.material_texture
-    model.mat_texid[built.surfaces[plain]] = -1
+    still = np.unique(built.geom_matid[(built.geom_bodyid == 0) & (built.geom_matid >= 0)])
+    tint = 1.0 - look.tint * draws.uniform(0, 1, (len(still), 3))
+    has_picture = (built.mat_texid[still] >= 0).any(1)
+    plain = has_picture & (draws.uniform(0, 1, len(still)) < look.plain)
+    colour = np.where(plain[:, None], PLAIN_RGB, built.mat_rgba[still, :3])
+    model.mat_rgba[still, :3] = colour * tint
+    model.mat_texid[:] = built.mat_texid
+    model.mat_texid[still[plain]] = -1
 
 
 def _own_stream(rng: np.random.Generator) -> np.random.Generator:

@@ -1,8 +1,7 @@
 """The one door to OpenGL: which there is, contexts of it, and what to do where there is none.
 
 mujoco reads MUJOCO_GL when it is imported. Unless the user has set it, Linux draws through EGL
-where its library is (with or without a GPU, a display is not needed), otherwise through OSMesa,
-otherwise in a hidden window.
+where its library is (no display is needed), else through OSMesa, else in a hidden window.
 """
 
 import contextlib
@@ -58,20 +57,15 @@ def choose_backend() -> str:
 
 
 def draw_on_one_thread() -> None:
-    """Let Mesa's software OpenGL draw in the thread that asks, unless LP_NUM_THREADS is set.
-
-    Its own threads, one a core, take turns with the thread that detects.
-    """
+    """Let Mesa's software OpenGL draw in the thread that asks, unless LP_NUM_THREADS is set: its
+    own threads, one a core, would take turns with the thread that detects."""
     os.environ.setdefault("LP_NUM_THREADS", "0")
 
 
 @functools.cache
 def load_triton_first() -> None:
-    """Load the library of triton, if it is installed, before Mesa's first context or window.
-
-    Mesa opens its drivers, and libLLVM with them, for all to see; triton's library, loaded after
-    that (`torch.optim` does it), takes that LLVM for its own and crashes.
-    """
+    """Load the library of triton, if it is installed, before Mesa's first context or window: loaded
+    after that (`torch.optim` does it), it takes Mesa's LLVM for its own and crashes."""
     with contextlib.suppress(OSError, ValueError):  # no triton that anybody could load later
         triton = importlib.util.find_spec("triton")
         late = "libLLVM" in Path("/proc/self/maps").read_text()  # somebody has drawn already
@@ -117,10 +111,7 @@ def new_context(
     width_px: int, height_px: int, model: "mujoco.MjModel"
 ) -> tuple[Any, "mujoco.MjrContext"]:
     """A GL context of the chosen backend, current on this thread, with the model's looks in it.
-
-    Raises:
-        RenderingError: no context can be made; the message says how to get OpenGL.
-    """
+    Raises `RenderingError`, which says how to get OpenGL."""
     import mujoco
 
     backend = choose_backend()
@@ -142,19 +133,15 @@ def new_context(
 def _context_class(backend: str) -> Any:
     """The backend's class itself: mujoco.GLContext is fixed at mujoco's first import."""
     if not sys.platform.startswith("linux"):
-        from mujoco import GLContext
-    elif backend in WINDOWS:
+        return importlib.import_module("mujoco").GLContext
+    if backend in WINDOWS:
         require_display()
-        from mujoco.glfw import GLContext
-    elif backend not in LIBRARIES:
+        return importlib.import_module("mujoco.glfw").GLContext
+    if backend not in LIBRARIES:
         raise unknown("MUJOCO_GL", backend, [*LIBRARIES, "glfw"])
-    elif not _has_library(LIBRARIES[backend]):
+    if not _has_library(LIBRARIES[backend]):
         raise OSError(f"there is no library lib{LIBRARIES[backend]}")
-    elif backend == "egl":
-        from mujoco.egl import GLContext
-    else:
-        from mujoco.osmesa import GLContext
-    return GLContext
+    return importlib.import_module(f"mujoco.{backend}").GLContext
 
 
 def _renderer() -> str:

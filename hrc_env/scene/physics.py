@@ -1,8 +1,7 @@
 """Many copies of one scene, stepped together: the arm obeys, the workers walk.
 
-One `mujoco.batch.Batch` for every batch size, the single environment too. Everything that
-changes lives in the batch's state rows, so that copying them copies the simulation, and
-results do not depend on neighbours; threads are a matter of `shards`.
+Everything that changes lives in the state rows of one `mujoco.batch.Batch`, whatever the batch
+size: copying them copies the simulation, and results do not depend on neighbours.
 """
 
 import math
@@ -14,22 +13,21 @@ from mujoco.batch import Batch
 from hrc_env.core.errors import ConfigError, HRCError, check_shape
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import WorkerPath
-from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, JointVelocities
+from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, JointVelocities, Records
 from hrc_env.scene.build import Scene, without_workers
 from hrc_env.scene.worker import CAPSULE_FIELDS, capsule_shapes
 
-INPUTS = int(
-    mujoco.mjtState.mjSTATE_CTRL
-    | mujoco.mjtState.mjSTATE_MOCAP_POS
-    | mujoco.mjtState.mjSTATE_MOCAP_QUAT
-)
-"""What a substep is given: servo commands, then places, then turns of the workers' bodies."""
 COMMANDS = int(mujoco.mjtState.mjSTATE_CTRL)
-"""The same without workers."""
+"""What a substep without workers is given: servo commands."""
+INPUTS = COMMANDS | int(mujoco.mjtState.mjSTATE_MOCAP_POS | mujoco.mjtState.mjSTATE_MOCAP_QUAT)
+"""And with workers: then the places, then the turns of their bodies."""
 OF_THE_ARM = ("time", "qpos", "qvel", "act", "qacc_warmstart")
 """What of an environment's state the arm's motion hangs on, and changes."""
-
-
+SERVO = np.dtype(
+    [(name, "f8") for name in ("low", "high", "fastest", "slew", "lead", "clamp")], align=True
+)
+"""A joint's lowest and highest angle [rad], velocity limit [rad/s], fastest change of the command
+[rad/s^2], lead of its rate servo [s], and how far its holding servo may be ahead [rad]."""
 END_MARGIN_RAD = 0.02
 """Where the arm comes to rest before the end of a joint's range."""
 BRAKE_SHARE = 0.7
@@ -48,9 +46,8 @@ class Physics:
                 "The workers' segments must be the scene's only mocap bodies, in order; "
                 f"expected rows 0 to {scene.model.nmocap - 1}, got {rows.ravel()}."
             )
-        self.scene = scene
-        self.batch = batch
-        self._n = scene.chain.n_joints
+        self.scene, self.batch = scene, batch
+        self._n, self._servos = scene.chain.n_joints, _servos(scene)
         self._sims = Batch(scene.model, nsim=batch, nthread=1)
         self._alone = Batch(without_workers(scene).model, nsim=batch, nthread=1)
         self._shared = [(self._alone.bind(f), self._sims.bind(f)) for f in OF_THE_ARM]
@@ -73,10 +70,8 @@ class Physics:
         return self._qvel[:, : self._n].copy()
 
     def reset(self, ids: Ints, q: JointAngles, body: Ints | None = None) -> None:
-        """Put environments `ids` (sorted) to rest at angles q (len(ids), N) [rad].
-
-        Their workers have bodies (len(ids), W) of the scene's; None: the first.
-        """
+        """Put environments `ids` (sorted) to rest at angles q (len(ids), N) [rad]; their workers
+        have bodies (len(ids), W) of the scene's, None: the first."""
         ids = np.asarray(ids, int)
         check_shape("q", np.shape(q), (len(ids), self._n), "one row per id, one angle per joint")
         for sims in (self._sims, self._alone):
@@ -89,19 +84,14 @@ class Physics:
     def step(
         self, qd_command: JointVelocities, workers: WorkerPath, out_of_reach: Bools | None = None
     ) -> JointAngles:
-        """One control step of every environment.
-
-        An arm that no worker can touch moves as it would alone, bit for bit, and is quicker so.
+        """One control step of every environment: (B, T, N) angles after every substep [rad].
 
         Args:
             qd_command: (B, N) wanted joint velocities [rad/s]; limited in size and slew, and
                 braked before the joints' ends, here.
-            workers: after every substep, arrays (B, T, W, S, ...); T is the number of substeps.
-                W = 0 in a scene without workers.
-            out_of_reach: (B,) where no worker can touch the arm in this step; None: nowhere.
-
-        Returns:
-            (B, T, N) the arm's angles after every substep [rad].
+            workers: after every substep, arrays (B, T, W, S, ...); W may be 0.
+            out_of_reach: (B,) where no worker can touch the arm in this step (None: nowhere); it
+                then moves as it would alone, bit for bit, and is quicker so.
 
         Raises:
             ConfigError: wrong shapes. HRCError: the physics broke down, with the reason.
@@ -109,14 +99,13 @@ class Physics:
         check_shape("qd_command", np.shape(qd_command), (self.batch, self._n), "batch, joints")
         self._fit(workers)
         n = self._n
-        substep_commands(
-            self.scene, self._qpos[:, :n], self._qvel[:, :n], self._act[:, :n], self._command,
-            np.asarray(qd_command, float), hold=self._control[:, :, :n],
-            rate=self._control[:, :, n : 2 * n],
+        _substep_commands(
+            self._qpos[:, :n], self._qvel[:, :n], self._act[:, :n], self._command,
+            np.asarray(qd_command, float), self._servos, self.scene.config.sim_dt, self._control,
         )  # fmt: skip
         alone = np.zeros(self.batch, bool) if out_of_reach is None else out_of_reach
-        self._roll_beside(~alone, workers)
-        self._roll_alone(alone)
+        self._roll(~alone, workers)
+        self._roll(alone, None)
         self._check_health()
         return self._trace[:, :, :n].copy()
 
@@ -156,28 +145,24 @@ class Physics:
             self._control = np.zeros((self.batch, n_substeps, model.nu))
             self._trace = np.zeros((self.batch, n_substeps, model.nq))
 
-    def _roll_beside(self, which: Bools, workers: WorkerPath) -> None:
-        """The substeps of some environments (B,), beside workers."""
-        rows, ids = _chosen(which)
-        if ids is not None and len(ids) == 0:
+    def _roll(self, which: Bools, workers: WorkerPath | None) -> None:
+        """The substeps of some environments (B,), beside workers or (None) with nobody there."""
+        n = np.count_nonzero(which)
+        if n == 0:
             return
-        places, turns = workers.position_world[rows], workers.quaternion_wxyz[rows]
-        lead = (*places.shape[:2], -1)
-        parts = (self._control[rows], places.reshape(lead), turns.reshape(lead))
-        control = np.concatenate(parts, axis=2)
-        self._trace[rows] = self._sims.rollout(lead[1], control, INPUTS, ("qpos",), ids)["qpos"]
-
-    def _roll_alone(self, which: Bools) -> None:
-        """The substeps of some environments (B,), with nobody there."""
-        rows, ids = _chosen(which)
-        if ids is not None and len(ids) == 0:
-            return
-        for alone, beside in self._shared:
+        ids = None if n == len(which) else np.flatnonzero(which)
+        rows = slice(None) if ids is None else ids  # all need no copy
+        sims, inputs, control = self._alone, COMMANDS, self._control[rows]
+        shared = self._shared if workers is None else []
+        if workers is not None:
+            lead, sims, inputs = (*control.shape[:2], -1), self._sims, INPUTS
+            paths = workers.position_world[rows], workers.quaternion_wxyz[rows]
+            control = np.concatenate([control, *(path.reshape(lead) for path in paths)], axis=2)
+        for alone, beside in shared:
             alone[rows] = beside[rows]
-        control = self._control[rows]
-        trace = self._alone.rollout(control.shape[1], control, COMMANDS, ("qpos",), ids)
+        trace = sims.rollout(control.shape[1], control, inputs, ("qpos",), ids)
         self._trace[rows] = trace["qpos"]
-        for alone, beside in self._shared:
+        for alone, beside in shared:
             beside[rows] = alone[rows]
 
     def _check_health(self) -> None:
@@ -192,83 +177,59 @@ class Physics:
                 )
 
 
-def _chosen(which: Bools) -> tuple[slice | Ints, Ints | None]:
-    """Rows of some environments (B,), and their numbers as MuJoCo has them; all need no copy."""
-    if np.count_nonzero(which) == len(which):
-        return slice(None), None
-    ids = np.flatnonzero(which)
-    return ids, ids
-
-
 def no_workers(batch: int, n_substeps: int) -> WorkerPath:
     """The path of nobody, for scenes without workers: arrays (B, T, 0, 22, ...)."""
     lead = (batch, n_substeps, 0, 22)
     return WorkerPath(np.zeros((*lead, 3)), np.zeros((*lead, 4)))
 
 
-def substep_commands(
-    scene: Scene,
-    q: JointAngles,
-    qd: JointVelocities,
-    held: JointAngles,
-    command: JointVelocities,
-    wanted: JointVelocities,
-    hold: Floats,
-    rate: Floats,
-) -> None:
+def _servos(scene: Scene) -> Records:
+    """(N,) `SERVO` of a scene's arm."""
+    servos, config, chain = np.zeros(scene.chain.n_joints, SERVO), scene.config, scene.chain
+    servos["low"], servos["high"] = chain.range_rad.T
+    servos["fastest"], servos["lead"] = chain.velocity_limit_rad_s, scene.servo_lead_s
+    servos["slew"], servos["clamp"] = config.slew_rad_s2, config.integrator_clamp_rad
+    return servos
+
+
+@kernel
+def _substep_commands(q, qd, held, command, wanted, servos, sim_dt, control):
     """Commands of one control step: limited in size, slew and before the joints' ends.
 
-    The rate servo's command runs ahead by `scene.servo_lead_s`: its torque then pays for the
-    acceleration, and the holding servo need not lag.
+    The rate servo's command runs ahead by its lead: its torque then pays for the acceleration, and
+    the holding servo need not lag.
 
     Args:
-        scene: for its settings, ranges and velocity limits.
         q, qd: (B, N) angles [rad] and velocities [rad/s] now.
-        held: (B, N) angles that the holding servos hold [rad]; kept near a blocked arm, as are the
-            commands, so that it leaves at once.
-        command: (B, N) the command in force; at the end of the step on return [rad/s].
+        held, command: (B, N) angles that the holding servos hold [rad] and the command in force
+            [rad/s], kept near a blocked arm so that it leaves at once; the command is advanced.
         wanted: (B, N) wanted velocities [rad/s]; what is not finite counts as 0.
-        hold: (B, T, N) written: mean velocity in each substep, so that the holding servo's
-            integral is exact however time is cut [rad/s].
-        rate: (B, T, N) written: velocity at the end of each substep, with the lead [rad/s].
+        servos: (N,) `SERVO`.
+        sim_dt: how long a substep is [s].
+        control: (B, T, 2 N) written [rad/s]: each substep's mean velocity for the holding servos,
+            so that their integral is exact however time is cut; that at its end for the others.
     """
-    config, chain = scene.config, scene.chain
-    slew, sim_dt = config.slew_rad_s2, config.sim_dt
-    reach = slew * sim_dt * rate.shape[1]
-    _clamp_integrators(q, qd, held, command, config.integrator_clamp_rad, reach)
-    ranges, limits = chain.range_rad, chain.velocity_limit_rad_s
-    _ramp(q, command, wanted, ranges, limits, slew, sim_dt, scene.servo_lead_s, hold, rate)
-
-
-@kernel
-def _clamp_integrators(q, qd, held, command, clamp, reach):
+    n_substeps, n = control.shape[1], q.shape[1]
+    ctrl_dt = sim_dt * n_substeps
     for b in range(q.shape[0]):
-        for i in range(q.shape[1]):
-            held[b, i] = min(max(held[b, i], q[b, i] - clamp), q[b, i] + clamp)
-            command[b, i] = min(max(command[b, i], qd[b, i] - reach), qd[b, i] + reach)
-
-
-@kernel
-def _ramp(q, command, wanted, ranges, limits, slew, sim_dt, lead_s, hold, rate):
-    brake, ctrl_dt = BRAKE_SHARE * slew, sim_dt * rate.shape[1]
-    for b in range(q.shape[0]):
-        for i in range(q.shape[1]):
-            target = wanted[b, i]
-            if not math.isfinite(target):
-                target = 0.0
-            target = min(limits[i], max(-limits[i], target))
+        for i in range(n):
+            servo, at = servos[i], q[b, i]
+            held[b, i] = min(max(held[b, i], at - servo.clamp), at + servo.clamp)
+            most, brake = servo.slew * sim_dt, BRAKE_SHARE * servo.slew
+            reach = most * n_substeps
+            now = min(max(command[b, i], qd[b, i] - reach), qd[b, i] + reach)
+            target = wanted[b, i] if math.isfinite(wanted[b, i]) else 0.0
+            target = min(servo.fastest, max(-servo.fastest, target))
             # v ctrl_dt + v^2 / (2 brake) = room: the speed that still stops in time.
-            room_up = max(0.0, ranges[i, 1] - END_MARGIN_RAD - q[b, i])
-            room_down = max(0.0, q[b, i] - ranges[i, 0] - END_MARGIN_RAD)
+            room_up = max(0.0, servo.high - END_MARGIN_RAD - at)
+            room_down = max(0.0, at - servo.low - END_MARGIN_RAD)
             fastest_up = brake * (math.sqrt(ctrl_dt**2 + 2 * room_up / brake) - ctrl_dt)
             fastest_down = brake * (math.sqrt(ctrl_dt**2 + 2 * room_down / brake) - ctrl_dt)
             target = min(fastest_up, max(-fastest_down, target))
-            now = command[b, i]
-            for t in range(rate.shape[1]):
-                change = min(slew * sim_dt, max(-slew * sim_dt, target - now))
+            for t in range(n_substeps):
+                change = min(most, max(-most, target - now))
                 # Ramp for |change| / slew, then constant: the mean over the substep.
-                ramped = abs(change) / (slew * sim_dt)
-                hold[b, t, i] = now + change * (1.0 - 0.5 * ramped)
+                control[b, t, i] = now + change * (1.0 - 0.5 * (abs(change) / most))
                 now += change
-                rate[b, t, i] = now + lead_s[i] * change / sim_dt
+                control[b, t, n + i] = now + servo.lead * change / sim_dt
             command[b, i] = now

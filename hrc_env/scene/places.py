@@ -92,11 +92,8 @@ SCENES: dict[str, Room] = {
 
 
 def obstacles(model: mujoco.MjModel) -> Floats:
-    """The solid geoms of a scene, (G, `shapes.WIDTH`).
-
-    Raises:
-        HRCError: one that moves, or of a kind that `KINDS` does not have.
-    """
+    """The solid geoms of a scene, (G, `shapes.WIDTH`). Raises `HRCError` for one that moves, or of
+    a kind that `KINDS` does not have."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     solid = np.flatnonzero(model.geom_group == SOLID)
@@ -124,11 +121,8 @@ def _shape_of(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Floats:
 
 
 def footprints(obstacles: Floats, robot_xy_m: tuple[float, float]) -> Floats:
-    """(N, 5) of shapes (G, `shapes.WIDTH`) that stand in the way: see `Grounds.blocked`.
-
-    A box that stands upright is given exactly, anything else by a rectangle along x and y that
-    holds it. What stands on the robot's axis is the robot's and left out.
-    """
+    """(N, 5) of shapes (G, `shapes.WIDTH`) that stand in the way, as `Grounds.blocked`: upright
+    boxes exactly, all else as rectangles along x and y. What stands on the robot's axis is its."""
     rows = []
     for row in obstacles[obstacles[:, KIND] != PLANE]:
         half = _half_extent(row)

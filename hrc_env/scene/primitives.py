@@ -1,8 +1,7 @@
 """Groups and collision bits of geoms, and capsules.
 
-Geom groups of every scene: 0 solid (drawn, collides, hides), 1 decoration (drawn only),
-2 the robot's looks, 3 the robot's capsules (not drawn, hide), 4 the workers' capsules
-(not drawn, do not hide), 5 what a view from above leaves out (ceiling, lamps).
+Groups: 0 solid (drawn, collides, hides), 1 decoration (drawn only), 2 the robot's looks, 3 the
+robot's capsules (not drawn, hide), 4 the workers' (not drawn, do not hide), 5 ceiling and lamps.
 """
 
 from collections.abc import Sequence
@@ -24,16 +23,13 @@ LOOKS_ONLY = {"contype": 0, "conaffinity": 0, "density": 0, "group": DECORATION}
 def rod_pose(start: Vector, end: Vector) -> tuple[np.ndarray, np.ndarray, float]:
     """Centre, quaternion (z along the rod) and half length of a rod between two points."""
     start, end = np.asarray(start, float), np.asarray(end, float)
-    axis = end - start
-    length = float(np.linalg.norm(axis))
-    quaternion = np.zeros(4)
-    mujoco.mju_quatZ2Vec(quaternion, axis / max(length, 1e-9))
+    length, quaternion = float(np.linalg.norm(end - start)), np.zeros(4)
+    mujoco.mju_quatZ2Vec(quaternion, (end - start) / max(length, 1e-9))
     return (start + end) / 2, quaternion, length / 2
 
 
 def capsule(body: Any, start: Vector, end: Vector, radius: float, **more: Any):
     """A capsule whose axis runs between two points."""
     pos, quat, half = rod_pose(start, end)
-    return body.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_CAPSULE, size=[radius, half, 0], pos=pos, quat=quat, **more
-    )
+    kind, size = mujoco.mjtGeom.mjGEOM_CAPSULE, [radius, half, 0]
+    return body.add_geom(type=kind, size=size, pos=pos, quat=quat, **more)

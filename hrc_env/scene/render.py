@@ -1,18 +1,15 @@
 """Pictures of the scene: plain crops for the detector, pretty ones for people.
 
-A crop is drawn as such, through an off-centre frustum; it is the same light on the same
-pixels as if it were cut from the camera's whole image. Crops have neither shadows nor
-antialiasing, which cost two thirds of the time and change no landmark.
+A crop is drawn through an off-centre frustum: the same pixels as if cut from the camera's whole
+image. Shadows and antialiasing, two thirds of the time, would change no landmark.
 """
 
-from collections import OrderedDict
-from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import unknown, whole
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Roi, WorkerMotion
 from hrc_env.core.typing import Image, JointAngles
@@ -20,7 +17,6 @@ from hrc_env.geometry.cameras import PinholeCamera, pinhole
 from hrc_env.scene import gl
 from hrc_env.scene.build import Scene
 from hrc_env.scene.canvas import ALL_GROUPS, EVERYTHING, MOVING, ROBOT, STILL, Canvas, Part
-from hrc_env.scene.domain_randomization import Look
 from hrc_env.scene.primitives import OVERHEAD
 
 CROP_PX = 256
@@ -56,11 +52,8 @@ def viewpoint_camera(name: str, width: int, height: int) -> PinholeCamera:
 
 
 class CropRenderer(Canvas):
-    """Square crops of the cameras' images: what the detector sees.
-
-    What never moves is drawn once for a window that comes again: then only the arm and the
-    workers are drawn and laid over it by depth, the same pixels in half the time.
-    """
+    """Square crops of the cameras' images: what the detector sees. Where a window comes again, what
+    moves is laid by depth over what does not, drawn once: the same pixels in half the time."""
 
     def __init__(self, scene: Scene, size_px: int = CROP_PX) -> None:
         gl.draw_on_one_thread()
@@ -68,29 +61,14 @@ class CropRenderer(Canvas):
         self.size_px = size_px
         self._rgb = np.empty((size_px, size_px, 3), np.uint8)
         self._z = np.empty((size_px, size_px), np.float32)
-        self._kept: OrderedDict[Key, _Background | None] = OrderedDict()
-
-    def randomize(self, look: Look | None) -> bool:
-        """Draw with an episode's look from the next pose on; whether that is another one."""
-        if changed := super().randomize(look):
-            self._kept.clear()
-        return changed
 
     draw = Canvas.pose
 
     def crop(self, camera_index: int, window: Roi) -> Image:
-        """(size, size, 3) of a turned square of a camera's image, top row first.
-
-        Lenses are left out: `perception.lensed` puts them before.
-
-        Raises:
-            ConfigError: no such camera. RenderingError: no OpenGL here, or closed.
-        """
-        if not 0 <= camera_index < len(self.scene.cameras):
-            raise ConfigError(
-                f"Camera index must be 0 to {len(self.scene.cameras) - 1}, got {camera_index}."
-            )
-        return self.view(self.scene.cameras[camera_index], window)
+        """(size, size, 3) of a turned square of a camera's image, top row first, as without its
+        lens. Raises `ConfigError` for no such camera, `RenderingError` without OpenGL."""
+        index = whole("Camera index", camera_index, 0, len(self.scene.cameras) - 1)
+        return self.view(self.scene.cameras[index], window)
 
     def view(self, camera: PinholeCamera, window: Roi) -> Image:
         """The same of any camera, as a pinhole sees."""
@@ -99,58 +77,42 @@ class CropRenderer(Canvas):
             self._remember(key, None)
             self._show(EVERYTHING, camera, window)
             return self.paint()
-        return self._laid_over(MOVING, self._background(key, camera, window), camera, window)
+        return self._before_the_still(MOVING, camera, window)
 
     def unpeopled(self, camera: PinholeCamera, window: Roi) -> Image:
         """The same without people and what they hold: the place, and the robot as it stands."""
-        key = _key(camera, window)
-        if key not in self._kept:
-            self._remember(key, None)
-        return self._laid_over(ROBOT, self._background(key, camera, window), camera, window)
+        return self._before_the_still(ROBOT, camera, window)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return CropRenderer, (self.scene, self.size_px)
 
-    def _laid_over(
-        self, part: Part, background: "_Background", camera: PinholeCamera, window: Roi
-    ) -> Image:
-        """A part of what moves before what stands still."""
+    def _before_the_still(self, part: Part, camera: PinholeCamera, window: Roi) -> Image:
+        """A part of what moves before what stands still, which is drawn at its first use."""
+        key = _key(camera, window)
+        still = self._kept.get(key)
+        if still is None:
+            z = np.empty_like(self._z)
+            self._show(STILL, camera, window)
+            self.read(self._rgb, z)
+            still = np.ascontiguousarray(self._rgb[::-1]), z
+        self._remember(key, still)
         self._show(part, camera, window)
         self.read(self._rgb, self._z)
-        crop = background.rgb.copy()
-        _lay_over(self._rgb, self._z, background.z, crop)
+        crop = still[0].copy()
+        _lay_over(self._rgb, self._z, still[1], crop)
         return crop
 
     def _show(self, what: Part, camera: PinholeCamera, window: Roi) -> None:
         self.show(what)
         self.aim(camera, window, window.side_px)
 
-    def _background(self, key: Key, camera: PinholeCamera, window: Roi) -> "_Background":
-        """What stands still in this window, drawn when it is first asked for."""
-        background = self._kept[key]
-        if background is None:
-            z = np.empty_like(self._z)
-            self._show(STILL, camera, window)
-            self.read(self._rgb, z)
-            background = _Background(np.ascontiguousarray(self._rgb[::-1]), z)
-        self._remember(key, background)
-        return background
-
-    def _remember(self, key: Key, background: "_Background | None") -> None:
-        self._kept[key] = background
-        self._kept.move_to_end(key)
+    def _remember(self, key: Key, still: tuple[Image, NDArray[np.float32]] | None) -> None:
+        """Keep a window, the latest last: colours (top row first) and depths (bottom row first) of
+        what stands still; None until it comes again."""
+        self._kept.pop(key, None)
+        self._kept[key] = still
         while len(self._kept) > WINDOWS_KEPT * len(self.scene.cameras):
-            self._kept.popitem(last=False)
-
-
-@dataclass(frozen=True, slots=True)
-class _Background:
-    """What stands still in a window."""
-
-    rgb: NDArray[np.uint8]
-    """Top row first."""
-    z: NDArray[np.float32]
-    """Bottom row first."""
+            del self._kept[next(iter(self._kept))]
 
 
 def _key(camera: PinholeCamera, window: Roi) -> Key:
@@ -183,11 +145,11 @@ class PictureRenderer(Canvas):
         scene: Scene,
         width_px: int = 1280,
         height_px: int = 720,
-        quality: dict[str, int] | None = None,
+        quality: dict[str, int] = PICTURE_QUALITY,
     ) -> None:
-        """A renderer of pictures of one size; quality is `PICTURE_QUALITY` unless given."""
-        self.quality = PICTURE_QUALITY if quality is None else quality
-        super().__init__(scene, width_px, height_px, self.quality)
+        """A renderer of pictures of one size."""
+        self.quality = quality
+        super().__init__(scene, width_px, height_px, quality)
 
     def viewpoints(self) -> tuple[str, ...]:
         """What `picture` takes: named views and the cameras of the rig."""
@@ -201,19 +163,16 @@ class PictureRenderer(Canvas):
         depth: bool = False,
         shadows: bool = True,
     ) -> Image | NDArray[np.float32]:
-        """The scene from a viewpoint.
+        """The scene from a viewpoint: (H, W, 3) uint8, or (H, W) float32 `depth` along the optical
+        axis [m].
 
         Args:
             q: (N,) angles of the arm [rad].
             motion: the workers of one environment, arrays (W, S, ...).
-            viewpoint: a name from `viewpoints()`, or any camera. A rig's camera keeps its
-                horizontal field of view; the picture's shape decides how much of its
-                height is seen.
+            viewpoint: a name from `viewpoints()`, or any camera, which keeps its horizontal field
+                of view; the picture's shape decides how much of its height is seen.
             depth: distances instead of colours.
             shadows: whether lamps cast them; without is several times faster in software.
-
-        Returns:
-            (H, W, 3) uint8, or (H, W) float32 distance along the optical axis [m].
         """
         camera = self.camera(viewpoint)
         self.pose(q, motion)

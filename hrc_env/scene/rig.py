@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, unknown, whole
 from hrc_env.core.typing import Floats, Rotations
 from hrc_env.geometry.camera_config import MOST_CAMERAS, CameraConfig, intrinsics
 from hrc_env.geometry.cameras import PinholeCamera
@@ -18,8 +18,6 @@ from hrc_env.scene.places import SCENES
 
 OPENCV_FROM_OPENGL: Floats = np.diag([1.0, -1.0, -1.0])
 """Its own inverse."""
-
-
 LAB_CAMERAS, SITE_CAMERAS = (SCENES[name].cameras for name in ("lab", "site"))
 """Under the ceiling, one in each corner, as in the paper's laboratory; on masts in the corners."""
 
@@ -27,15 +25,8 @@ LAB_CAMERAS, SITE_CAMERAS = (SCENES[name].cameras for name in ("lab", "site"))
 def select(
     cameras: tuple[CameraConfig, ...], use: Sequence[int | str] | None = None
 ) -> tuple[CameraConfig, ...]:
-    """The cameras that are switched on, in the order of `use`.
-
-    Args:
-        cameras: all that hang in the room.
-        use: names or indices from 0; None uses all.
-
-    Raises:
-        ConfigError: an unknown name, an index outside the rig, a camera twice, or none.
-    """
+    """The cameras that are switched on, in the order of `use`: names or indices from 0; None: all.
+    Raises `ConfigError` for an unknown name, an index outside the rig, a camera twice, or none."""
     names = [camera.name for camera in cameras]
     for name in names:
         if names.count(name) > 1:
@@ -60,17 +51,11 @@ def select(
 
 
 def _index(choice: int | str, names: list[str]) -> int:
-    if isinstance(choice, str):
-        if choice not in names:
-            raise unknown("camera", choice, names)
-        return names.index(choice)
-    whole = isinstance(choice, int | np.integer) and not isinstance(choice, bool)
-    if not whole or not 0 <= choice < len(names):
-        raise ConfigError(
-            f"Camera index {choice!r} is outside the rig: valid indices are 0 to {len(names) - 1}, "
-            f"valid names {', '.join(names)}."
-        )
-    return int(choice)
+    if not isinstance(choice, str):
+        return whole(f"Camera index (of {', '.join(names)})", choice, 0, len(names) - 1)
+    if choice not in names:
+        raise unknown("camera", choice, names)
+    return names.index(choice)
 
 
 def pinholes(cameras: tuple[CameraConfig, ...]) -> tuple[PinholeCamera, ...]:

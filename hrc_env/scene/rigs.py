@@ -72,7 +72,7 @@ def _inside_something(camera: PinholeCamera, still: Floats) -> bool:
     """Whether an eye is inside a box or behind a plane that stands still."""
     for row in range(len(still)):
         offset = camera.eye_world - still[row, CENTRE : CENTRE + 3]
-        away = np.array([on_axis(still, row, axis, *offset) for axis in range(3)])
+        away = np.array([on_axis(still, row, axis, offset) for axis in range(3)])
         half = still[row, HALF_SIZE : HALF_SIZE + 3]
         if still[row, KIND] == BOX and (np.abs(away) < half).all():
             return True

@@ -1,9 +1,8 @@
 """Robots: an MJCF file and a record that says what in it the environment moves and watches.
 
 A robot's file has the middle of its foot at the origin, looks to +x, and holds for each joint two
-servos on one command [rad/s], first all that hold the command's integral (`intvelocity`), then all
-that follow the command itself (`velocity`). Measured against one servo of either kind: 0.1 mm of
-tool error instead of 3-20, no sag under load. Links have explicit inertials.
+servos on one command [rad/s]: first all that hold its integral (`intvelocity`), then all that
+follow it (`velocity`); one of them alone has 3-20 mm of tool error instead of 0.1.
 """
 
 import tomllib
@@ -80,11 +79,7 @@ ROBOTS: dict[str, Robot] = {
 
 
 def robot_called(robot: str | Robot) -> Robot:
-    """A robot by its name, or itself.
-
-    Raises:
-        ConfigError: a name that there is not, or no robot.
-    """
+    """A robot by its name, or itself. Raises `ConfigError` for a name that there is not."""
     if isinstance(robot, Robot):
         return robot
     if not isinstance(robot, str):
@@ -108,11 +103,8 @@ def add_robot(spec: Any, robot: Robot, mount_world: Sequence[float]) -> None:
 
 @lru_cache(maxsize=8)
 def chain_of(robot: Robot, mount_world: tuple[float, float, float]) -> SerialChain:
-    """A robot's numbers as a chain of hinges.
-
-    Raises:
-        ConfigError: something that `Robot` names is missing in the MJCF or of another kind.
-    """
+    """A robot's numbers as a chain of hinges. Raises `ConfigError` where something that `Robot`
+    names is missing in the MJCF or of another kind."""
     try:
         return _chain(robot, mount_world)
     except ConfigError as error:

@@ -17,11 +17,7 @@ class Viewer:
     """A window that shows one environment; drag to look round, close it to go on without."""
 
     def __init__(self, scene: Scene) -> None:
-        """Open the window.
-
-        Raises:
-            RenderingError: no display, or the viewer cannot run here.
-        """
+        """Open the window. Raises `RenderingError` where there is no display."""
         self._scene, self._model = scene, copy.copy(drawing_model(scene))
         self._data = mujoco.MjData(self._model)
         self._visuals = visuals(scene)

@@ -1,8 +1,7 @@
 """Put a baked worker into a MuJoCo model: mocap bodies, and capsules round them.
 
-The worker is moved, not simulated: 22 mocap bodies take positions and rotations straight
-from `WorkerMotion`. What one sees (`worker_visuals`) nobody can touch; what touches the worker are
-capsules that no camera draws and that meet only geoms whose conaffinity has the workers' bit.
+The worker is moved, not simulated: 22 mocap bodies take positions and rotations from
+`WorkerMotion`. Nobody can touch what one sees (`worker_visuals`); no camera draws the capsules.
 """
 
 from functools import lru_cache
@@ -20,13 +19,7 @@ CAPSULE_FIELDS = ("geom_pos", "geom_quat", "geom_size", "geom_rbound", "geom_aab
 
 
 def add_worker(spec: Any, body: Body, prefix: str) -> None:
-    """Add a worker in its rest pose to a model that is being built.
-
-    Args:
-        spec: the model.
-        body: measures.
-        prefix: what every name of this worker starts with, for example "worker_1/".
-    """
+    """Add a worker in its rest pose to a model being built; names begin with the prefix."""
     segments = {
         name: spec.worldbody.add_body(name=prefix + name, pos=position, mocap=True)
         for name, position in zip(SEGMENTS, body.rest_position, strict=True)
@@ -46,11 +39,7 @@ def add_worker(spec: Any, body: Body, prefix: str) -> None:
 
 
 def mocap_ids(model: Any, prefix: str) -> Ints:
-    """(22,) rows of `data.mocap_pos` and `data.mocap_quat` that move a worker's segments.
-
-    `data.mocap_pos[ids] = motion.position_world` and
-    `data.mocap_quat[ids] = motion.quaternion_wxyz` pose the worker.
-    """
+    """(22,) rows of `data.mocap_pos` and `data.mocap_quat` that move a worker's segments."""
     return np.array([model.body(prefix + name).mocapid[0] for name in SEGMENTS], dtype=np.int64)
 
 

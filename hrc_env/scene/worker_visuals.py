@@ -1,8 +1,7 @@
 """What workers look like and hold, in the drawing model; physics knows capsules only.
 
 All of a worker's bodies hang on the same 22 mocap bodies, and a mocap body for each thing that can
-be held follows them. Bodies that nobody has and things that nobody holds are in a group that is
-not drawn, and cost a picture nothing.
+be held follows them. What nobody has or holds is in a group that is not drawn.
 """
 
 from dataclasses import dataclass
@@ -39,16 +38,8 @@ class WorkerVisuals:
 
 
 def add_visuals(spec: Any, body: Body, looks: WorkerMesh, prefix: str) -> None:
-    """Add the skins and the hat of a body to a worker whom `add_worker` has added.
-
-    Workers who have the same body share its textures.
-
-    Args:
-        spec: the model.
-        body: measures.
-        looks: surfaces and textures.
-        prefix: what the names of this worker's bodies start with.
-    """
+    """Add the skins and the hat of a body to the worker whom `add_worker` has added with this
+    prefix; workers who have the same body share its textures."""
     for skin in looks.skins:
         _add_skin(spec, skin, body, prefix)
     if looks.hat is not None:
@@ -85,13 +76,7 @@ def visuals_of(
 
 
 def show_bodies(model: mujoco.MjModel, visuals: WorkerVisuals, body: Ints | None) -> None:
-    """Show each worker in one of their bodies.
-
-    Args:
-        model: a drawing model of the caller's own; groups of its skins and hats are changed.
-        visuals: of that model.
-        body: (W,) which body each has; None: all have the first.
-    """
+    """Show each worker in a body (W,), None: the first, in a drawing model of the caller's own."""
     if not len(visuals.skins):
         return
     chosen = np.zeros(visuals.skins[:, 0].max() + 1, np.int64) if body is None else body
@@ -110,8 +95,7 @@ def show_workers(
     """Pose the workers of one environment, in their bodies and with what they hold.
 
     Args:
-        model: a drawing model of the caller's own.
-        data: of that model.
+        model, data: a drawing model of the caller's own and its state; both are changed.
         visuals: of that model.
         rows: (W, S) mocap row of every body segment.
         motion: arrays (W, S, ...).
@@ -123,14 +107,8 @@ def show_workers(
 
 
 def show_props(model: mujoco.MjModel, data: mujoco.MjData, rows: Ints, held: Held | None) -> None:
-    """Put into the hands what is held, all else under the floor, where no camera draws it.
-
-    Args:
-        model: a drawing model of the caller's own; its things' groups are changed.
-        data: of that model; its mocap poses are changed.
-        rows: `WorkerVisuals.props`.
-        held: of one environment, arrays (W, ...); None: nothing is held.
-    """
+    """Put into the hands what is held (W, ...), all else under the floor, where no camera draws
+    it; rows: `WorkerVisuals.props`."""
     if not rows.size:
         return
     data.mocap_pos[rows] = PARKED_M

@@ -48,12 +48,12 @@ def copied(tmp_path, monkeypatch):
     yield tmp_path
     shutil.rmtree(tmp_path)
     fingerprint._imports.cache_clear()
-    fingerprint._data.cache_clear()
+    fingerprint._surroundings.cache_clear()
 
 
 def of_now() -> str:
     fingerprint._imports.cache_clear()
-    fingerprint._data.cache_clear()
+    fingerprint._surroundings.cache_clear()
     return fingerprint_of({}, "hrc_env.maker")
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.experiments.impact import episodes, policies
-from hrc_env.experiments.impact.episodes import Stage, Step, _build, bodies_of, judge, sums_of
+from hrc_env.experiments.impact.episodes import STEP, Stage, _build, bodies_of, judge, sums_of
 from hrc_env.experiments.impact.experiment import STUDY, ImpactConfig, check_walks, config_for, play
 from hrc_env.experiments.impact.metrics import margin_needed
 from hrc_env.experiments.impact.policies import Policy, maker, trained
@@ -42,11 +42,9 @@ def silent(share, label):
 
 def sums(*steps, margin_m=0.0):
     """What steps (true gap, believed gap, robot's speed, touching) of one episode come to."""
-    true_m, believed_m, robot_mps, touching = np.array(steps, float).T[..., None]
-    played = Step(
-        true_m, believed_m, robot_mps, np.zeros_like(true_m),
-        np.zeros((len(steps), 1, 15)), np.zeros((len(steps), 1, 15, 3)),
-    )  # fmt: skip
+    played, touching = np.zeros((len(steps), 1), STEP), np.array(steps, float)[:, 3:]
+    for k, name in enumerate(("true_separation_m", "believed_separation_m", "robot_mps")):
+        played[name] = np.array(steps, float)[:, k : k + 1]
     info = {"safety/min_separation_m": np.array([0.5])}
     info |= {f"task/goals_{what}": np.zeros(1) for what in ("reached", "missed")}
     infos = [info | {"cost": touch, "cost_contact": touch} for touch in touching]
@@ -142,12 +140,12 @@ def test_directed_speeds_add_up_to_how_the_gap_closes(monkeypatch):
         now = bodies_of(part)
         steps.append(judge(part, before, now))
         before = now
-    gaps = np.array([step.true_separation_m for step in steps])
+    gaps = np.array([step["true_separation_m"] for step in steps])
     closing = -np.diff(gaps, axis=0) / part.config.ctrl_dt
-    both = np.array([step.robot_mps + step.worker_mps for step in steps[1:]])
+    both = np.array([step["robot_mps"] + step["worker_mps"] for step in steps[1:]])
     assert np.abs(closing).max() > 0.05
     assert np.allclose(both, closing, atol=0.05)
-    assert np.abs(steps[-1].error_m).max() == 0.0
+    assert np.abs(steps[-1]["error_m"]).max() == 0.0
     env.close()
 
 

@@ -123,7 +123,7 @@ def test_a_report_holds_its_pictures_its_origin_and_all_numbers(tmp_path):
                report.Column("x.{}", "not measured"))  # fmt: skip
     table = report.table_of("who", {"a": "a < b"}, columns, metrics)
     asked = "run `make`"
-    page = report.Report("Title", asked, ("## Found", table, report.Picture(figure, "seen")))
+    page = report.Report("Title", asked, ("## Found", table, report.picture(figure, "seen")))
     page.write(tmp_path, {"n": 1}, [3, 4], metrics)
     html, text = ((tmp_path / f"report.{kind}").read_text() for kind in ("html", "md"))
     assert 'src="data:image/png;base64,' in html

@@ -18,9 +18,9 @@ def hidden(eye, joint, capsules=POST, radius=(0.1,)):
     table = np.empty((len(radius), WIDTH))
     set_capsules(table, 0, capsules, np.asarray(radius, float))
     eye, joints = np.asarray(eye, float), np.asarray(joint, float)[None]
-    dx, dy, dz, length = line(eye, joints, 0)
+    d, length = line(eye, joints, 0)
     p = eye - table[:, CENTRE : CENTRE + 3]
-    return any(body_blocks(table, k, x, y, z, dx, dy, dz, length) for k, (x, y, z) in enumerate(p))
+    return any(body_blocks(table, k, tuple(row), d, length) for k, row in enumerate(p))
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.common import cell, table
+from benchmarks.common import cell
 from benchmarks.tracking.cells import beliefs
 from benchmarks.tracking.names import DEFAULT, DLT
 from benchmarks.tracking.rigs import RIGS, Rig, make_rig
@@ -32,7 +32,7 @@ from benchmarks.tracking.sequences import Sequences, make_sequences
 from hrc_env.core.results import Metric, over
 from hrc_env.core.typing import Floats, Points2, Points3
 from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.report import Metrics, Report
+from hrc_env.experiments.study.report import Metrics, Report, table
 from hrc_env.experiments.study.runner import Study, at_least_one
 
 LIBRARIES = ("aniposelib", "particles", "filterpy")
@@ -143,7 +143,7 @@ def report(config: Any, played: Played, metrics: Metrics, figures: Path) -> Repo
         "aniposelib is offline: it sees the whole clip at once, frames to come included; its time "
         "is the clip's over its frames. Low and high in results.json are the best and the worst "
         "sequence.",
-    ])  # fmt: skip
+    ], "the best and the worst sequence")  # fmt: skip
 
 
 def missing() -> list[str]:

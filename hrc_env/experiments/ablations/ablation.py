@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, check_names
 from hrc_env.experiments.ablations.handicaps import BONES, MOTION, TREES
 from hrc_env.experiments.study.rigs import Turn
 from hrc_env.tracking.config import TrackerConfig
@@ -36,8 +36,7 @@ class Setting:
         """Raise `ConfigError` for what cannot be played."""
         for name, valid in (("bones", BONES), ("motion", MOTION)):
             given = getattr(self, name)
-            if given not in valid:
-                raise unknown(name, given, valid)
+            check_names(name, [given], valid)
             if given != valid[0] and self.estimator not in TREES:
                 raise ConfigError(
                     f"Setting {self.name!r}: {name}={given!r} is for {' and '.join(TREES)}, which "

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, check_names
 from hrc_env.core.results import Metric, over
 from hrc_env.experiments.ablations.ablation import Ablation, Setting
 from hrc_env.experiments.ablations.play import DT_S, N_WARM_UP, Sums, play, update_us, walks_of
@@ -58,9 +58,7 @@ class AblationsConfig:
             )
         if not self.studies:
             raise ConfigError(f"--studies needs a name of {', '.join(ABLATIONS)}.")
-        for name in self.studies:
-            if name not in ABLATIONS:
-                raise unknown("study", name, ABLATIONS)
+        check_names("study", self.studies, ABLATIONS)
 
     @property
     def seeds(self) -> tuple[int, ...]:
@@ -99,9 +97,8 @@ def play_all(config: AblationsConfig, cache: PartCache) -> Played:
     played: dict[str, dict[str, Sums]] = {ablation.name: {} for ablation in config.asked}
     for name, setting in order:
         depends = settings_of(config) | {"setting": asdict(setting) | {"words": ""}}
-        key = fingerprint_of(depends, *PARTS_FROM)
-        label = f"{name}.{setting.name}"
-        played[name][setting.name] = cache.part(label, partial(part, config, setting), key)
+        key, make = fingerprint_of(depends, *PARTS_FROM), partial(part, config, setting)
+        played[name][setting.name] = cache.part(f"{name}.{setting.name}", make, key)
     return played
 
 
@@ -153,11 +150,10 @@ def _by_sight(of_settings: Mapping[str, Sums]) -> dict[str, dict[str, Any]]:
                 _, k, name = what.split("_")
                 together = found.setdefault(f"{setting.split('_')[0]}_seen_{k}", {})
                 together[name] = np.array(values) + together.get(name, 0)
-    kept = {name: sums["joints"] > 0 for name, sums in found.items()}
     return {
-        name: {what: values[kept[name]] for what, values in sums.items()}
+        name: {what: values[sums["joints"] > 0] for what, values in sums.items()}
         for name, sums in sorted(found.items())
-        if kept[name].any()
+        if sums["joints"].any()
     }
 
 

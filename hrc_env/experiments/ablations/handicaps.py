@@ -11,8 +11,8 @@ from hrc_env.tracking.tree.gaussian import PARENT, ROOT
 BONES = ("learnt", "known", "none")
 """Lengths as the filter learns them; the true ones, given; nothing is expected of any."""
 MOTION = ("model", "forgotten")
-"""As the filter has it; every velocity is forgotten after every image, so that a joint may set
-off at any speed that joints have, as in line 7 of the paper's Algorithm 1."""
+"""As the filter has it; velocities are forgotten after every image, so that a joint may set off at
+any speed that joints have, as in line 7 of the paper's Algorithm 1."""
 TREES = ("particle", "kalman")
 """Estimators that can be handicapped so."""
 KNOWN_M2 = 1e-5
@@ -25,21 +25,15 @@ _PARENT = np.where(np.arange(len(PARENT)) == ROOT, ROOT, PARENT)
 
 
 def lengths_m(joints_world: Points3) -> Floats:
-    """(B, W, J) from each joint to its parent on the filter's tree [m]; 1 at the root, which has
-    none."""
+    """(B, W, J) from each joint to its parent on the filter's tree [m]; 1 at the root."""
     lengths = np.linalg.norm(joints_world - joints_world[:, :, _PARENT], axis=-1)
     lengths[..., ROOT] = 1.0
     return lengths
 
 
 def handicap(state: Any, bones: str, motion: str, lengths: Floats) -> None:
-    """Change what a tracker knows, in place, before its next prediction.
-
-    Args:
-        state: of one of `TREES`.
-        bones: one of `BONES`.
-        motion: one of `MOTION`.
-        lengths: (B, W, J) the true ones [m].
+    """Change what a tracker of one of `TREES` knows, in place, before its next prediction; the true
+    lengths are (B, W, J) [m].
 
     Raises:
         ConfigError: a state of something else.

@@ -1,7 +1,6 @@
 """A setting's detections and estimator on walks: what is believed beside what is true.
 
-Workers walk once: every setting is given the same walks of the same seeds, before an arm that
-rests, so that nobody has a reason to react to it.
+Workers walk once, for all settings, before an arm that rests: nobody reacts to it.
 """
 
 import time
@@ -10,14 +9,13 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import islice, permutations
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from scipy.stats import chi2
 
 from hrc_env.config import HRCConfig
 from hrc_env.core.batching import rows
-from hrc_env.core.errors import ConfigError
 from hrc_env.core.machine import n_cores
 from hrc_env.core.records import Keypoints, PoseEstimate, WorkerMotion
 from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, Points3
@@ -77,21 +75,15 @@ def walks_of(scene: str, n_workers: int, seeds: tuple[int, ...], n_steps: int) -
 
 
 def play(setting: Setting, walks: Walks, seeds: Sequence[int], tick: PartProgress) -> Sums:
-    """Sums of every episode, in the order of the seeds.
+    """Sums of every episode, in the order of the seeds: of the walks, the detector's errors and the
+    estimator. Episode k has turn k modulo the number of turns."""
+    jobs, found = _jobs(setting.turns, len(seeds)), Sums()
 
-    Args:
-        setting: what is played; episode k has turn k modulo the number of turns.
-        walks: of the setting's scene and workers, one a seed.
-        seeds: of the detector's errors and the estimator.
-        tick: told the share that is done.
-    """
-    found: Sums = {}
-
-    def job(job: tuple[Turn, Ints]) -> tuple[Ints, Sums]:
-        return job[1], _episodes(setting, job[0], walks, seeds, job[1])
+    def sums_of(job: tuple[Turn, Ints]) -> Sums:
+        return _episodes(setting, job[0], walks, seeds, job[1])
 
     with ThreadPoolExecutor(n_cores()) as threads:
-        for ids, sums in threads.map(job, _jobs(setting.turns, len(seeds))):
+        for (_, ids), sums in zip(jobs, threads.map(sums_of, jobs), strict=True):
             for name, values in sums.items():
                 row = found.setdefault(name, [None] * len(seeds))
                 for b, value in zip(ids.tolist(), values, strict=True):
@@ -112,20 +104,16 @@ def _jobs(turns: Sequence[Turn], n_episodes: int) -> list[tuple[Turn, Ints]]:
 
 def _episodes(setting: Setting, turn: Turn, walks: Walks, seeds: Sequence[int], ids: Ints) -> Sums:
     """Sums of some of the episodes, with these cameras, after the warm-up."""
-    errors, inside, lost, seeing = [], [], [], []
-    scene = scene_of(setting, turn)
+    errors, inside, lost, seeing, scene = [], [], [], [], scene_of(setting, turn)
     for said, now, _ in islice(watch(setting, turn, walks, seeds, ids), N_WARM_UP, None):
         joints_world = now.truth.joints_world
         order = matched(said.mean_world, said.tracked, joints_world)
-        mean, cov = (
-            np.take_along_axis(each, order.reshape(*order.shape, *[1] * (each.ndim - 2)), 1)
-            for each in (said.mean_world, said.cov_world)
-        )
-        off = mean - joints_world
+        episode = np.arange(len(ids))[:, None]
+        off, cov = said.mean_world[episode, order] - joints_world, said.cov_world[episode, order]
         errors.append(np.linalg.norm(off, axis=-1))
         squares = np.einsum("...i,...i->...", off, np.linalg.solve(cov, off[..., None])[..., 0])
         inside.append(squares < INSIDE_95)
-        lost.append(~np.take_along_axis(said.tracked, order, 1))
+        lost.append(~said.tracked[episode, order])
         if setting.by_sight:
             seeing.append(n_seeing(now, scene, turn))
     error_m, is_inside, is_lost = (np.stack(each, 1) for each in (errors, inside, lost))
@@ -170,8 +158,8 @@ def watch(
 
 
 def update_us(setting: Setting, walks: Walks, seeds: tuple[int, ...], n_frames: int) -> list[float]:
-    """Microseconds per worker and update after the warm-up, the median over n_frames, a number
-    for each repetition: processor time of one thread on a few of the walks, side by side."""
+    """Microseconds of processor time per worker and update after the warm-up, the median over
+    n_frames of a few of the walks, side by side: a number for each repetition."""
     turn, ids = setting.turns[0], np.arange(min(len(seeds), 4))
     short = replace(walks, motions=walks.motions[: N_WARM_UP + n_frames])
     recorded_by = replace(setting, estimator=RECORDED_BY, bones=BONES[0], motion=MOTION[0])
@@ -197,10 +185,8 @@ def update_us(setting: Setting, walks: Walks, seeds: tuple[int, ...], n_frames: 
 def pipeline_of(setting: Setting, turn: Turn, batch: int) -> PoseTracking:
     """The emulator and the estimator of a setting, for so many episodes."""
     config = HRCConfig(worker=BODIES, tracker=setting.tracker, faults=turn.faults)
-    pipeline: Any = make_pipeline(LEVEL, setting.estimator, scene_of(setting, turn), batch, config)
-    if not isinstance(pipeline, PoseTracking):
-        raise ConfigError(f"Level {LEVEL!r} must have cameras and a tracker; it has none.")
-    return pipeline
+    scene = scene_of(setting, turn)
+    return cast(PoseTracking, make_pipeline(LEVEL, setting.estimator, scene, batch, config))
 
 
 def scene_of(setting: Setting, turn: Turn) -> Scene:
@@ -210,13 +196,8 @@ def scene_of(setting: Setting, turn: Turn) -> Scene:
 
 
 def matched(mean_world: Points3, tracked: Bools, joints_world: Points3) -> Ints:
-    """(B, W) the track of each worker: those that fit best together, no track twice.
-
-    Args:
-        mean_world: (B, W, J, 3) tracks [m].
-        tracked: (B, W) whether they follow anybody; those that do choose first.
-        joints_world: (B, W, J, 3) workers [m].
-    """
+    """(B, W) the track of each worker, both (B, W, J, 3) [m]: those that fit best together, no
+    track twice; those that are `tracked` (B, W) choose first."""
     n_workers = tracked.shape[1]
     off = np.linalg.norm(mean_world[:, None] - joints_world[:, :, None], axis=-1).mean(-1)
     cost = np.where(tracked[:, None], off, 0.0)  # (B, worker, track)

@@ -7,7 +7,7 @@ import numpy as np
 
 from hrc_env.experiments.ablations.ablation import Ablation
 from hrc_env.experiments.study.plots import label, new_figure, plain_log, points, save
-from hrc_env.experiments.study.report import Column, Metrics, Picture, Report, table_of
+from hrc_env.experiments.study.report import Column, Metrics, Report, picture, table_of
 
 QUANTILES = {"median": ("median", "o", "#1565c0"), "p95": ("95th percentile", "s", "#e65100")}
 ASKED = """\
@@ -23,7 +23,7 @@ region; *lost*: the share of time without a track; *us an update*: processor tim
 
 def report(figures: Path, ablations: Sequence[Ablation], metrics: Metrics) -> Report:
     """A figure and a table for each question."""
-    parts: list = []
+    parts: list[str] = []
     for ablation in ablations:
         key, path = ablation.name, figures / f"{ablation.name}.png"
         rows = {setting.name: setting.words for setting in ablation.settings}
@@ -40,10 +40,11 @@ def report(figures: Path, ablations: Sequence[Ablation], metrics: Metrics) -> Re
             columns.append(Column(f"update_us.{key}.{{}}", "us an update", 0))
         parts += [
             f"## {ablation.title}\n\n{ablation.asked}",
-            Picture(path, "Error of a joint in each setting."),
+            picture(path, "Error of a joint in each setting."),
             table_of("setting", rows, columns, metrics),
         ]
-    return Report("Ablations of rigs, detections and estimators", ASKED, parts)
+    spread = "95 % intervals over seeds, times with the smallest and the largest"
+    return Report("Ablations of rigs, detections and estimators", ASKED, parts, spread)
 
 
 def draw(path: Path, key: str, rows: Mapping[str, str], metrics: Metrics) -> None:
@@ -54,7 +55,7 @@ def draw(path: Path, key: str, rows: Mapping[str, str], metrics: Metrics) -> Non
     across = axis.get_yaxis_transform()
     for quantile, (words, mark, colour) in QUANTILES.items():
         found = [metrics[f"error_m.{key}.{row}.{quantile}"] for row in rows]
-        points(axis, places, found, 1000, sideways=True, fmt=mark, color=colour, label=words)
+        points(axis, places, found, 1000, fmt=mark, color=colour, label=words)
     for place, row in zip(places, rows, strict=True):
         inside = f"{100 * metrics[f'coverage95.{key}.{row}'].value:.0f} %"
         axis.text(1.02, place, inside, transform=across, fontsize=11, va="center", color="0.3")

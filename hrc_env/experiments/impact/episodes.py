@@ -1,28 +1,28 @@
 """Episodes of one policy with one perception setup: always the same seeds and the same workers.
 
-What is counted is the truth. Distances are between the robot's capsules and the worker's true
-capsules, as in the cost. A directed speed is by how much one body's motion of a step narrowed the
-separation while the other is held where it is at its end: positive is towards the other.
+What is counted is the truth: distances are between the robot's and the worker's true capsules, as
+in the cost. A directed speed is by how much one body's motion of a step narrowed the separation
+while the other is held where it is at its end: positive is towards the other.
 """
 
 import hashlib
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
 from functools import partial
 from typing import Any
 
 import numpy as np
 from gymnasium.utils import seeding
+from numpy.typing import NDArray
 
 from hrc_env.config import settle
 from hrc_env.core.machine import n_cores
 from hrc_env.core.records import WorkerTruth
-from hrc_env.core.typing import Bools, Capsules, Floats, Points3
+from hrc_env.core.skeleton import N_JOINTS
+from hrc_env.core.typing import Bools, Capsules, Floats, Ints
 from hrc_env.experiments.impact.setups import PerceptionSetup
 from hrc_env.experiments.study.cache import PartProgress
 from hrc_env.experiments.study.counts import ERRORS_M, GAPS_M, SPEEDS_MPS
-from hrc_env.experiments.study.recording import concatenated
 from hrc_env.experiments.study.rigs import Turn
 from hrc_env.geometry import chains
 from hrc_env.geometry.distances import least_separation
@@ -35,8 +35,7 @@ from hrc_env.worker.body import worker_truth
 PEOPLE = "unaware"
 """Workers who take no notice of the robot: their walk is then the same whatever it does."""
 STOP_M, SLOW_M = 0.10, 0.60
-"""A separation below the first calls for standing still, below the second for slowing down [m]: the
-distances of `agents.scripted.Yielding`, judgement."""
+"""Separations that call for standing still and for slowing down [m]: `agents.scripted.Yielding`."""
 MOVING_MPS = 0.05
 """From this directed speed on a robot moves towards the worker or flees [m/s]; judgement. No
 shield can help it when somebody walks into a robot that stands, or catches one that flees."""
@@ -46,68 +45,46 @@ Rows = dict[str, list[Any]]
 """Sums by name, one an episode."""
 Bodies = tuple[Capsules, WorkerTruth]
 """Where the robot's capsules (B, K, 2, 3) [m] and the workers truly are."""
-
-
-@dataclass(frozen=True, slots=True)
-class Step:
-    """What happened in a step (B, ...), or in all steps of episodes (T, B, ...)."""
-
-    true_separation_m: Floats
-    """At the end of the step."""
-    believed_separation_m: Floats
-    """The same as the robot believes it; infinite where it knows of nobody."""
-    robot_mps: Floats
-    """The robot's speed towards the worker."""
-    worker_mps: Floats
-    """The worker's speed towards the robot."""
-    error_m: Floats
-    """(..., J) between the estimated and the true joints."""
-    joints_world: Points3
-    """(..., J, 3) true joints [m]."""
+STEP = np.dtype([
+    ("true_separation_m", float), ("believed_separation_m", float),
+    ("robot_mps", float), ("worker_mps", float),
+    ("error_m", float, N_JOINTS), ("joints_world", float, (N_JOINTS, 3)),
+])  # fmt: skip
+"""What happened in a step: the separation at its end, truly and as the robot believes it (infinite
+where it knows of nobody), speeds towards the other, errors of the estimated joints, true joints."""
+Steps = NDArray[np.void]
 
 
 class Stage:
-    """The environments of one setup, built when they are needed, used by every policy.
-
-    Args:
-        setup: how the robots perceive.
-        seeds: one an episode; the k-th episode has turn k modulo the number of turns.
-        n_steps: control steps of an episode.
-    """
+    """The environments of one setup, built when they are needed, used by every policy: an episode
+    a seed, of which the k-th has turn k modulo the number of turns."""
 
     def __init__(self, setup: PerceptionSetup, seeds: Sequence[int], n_steps: int) -> None:
         self.setup, self.seeds, self.n_steps = setup, seeds, n_steps
-        self._built: dict[int, Shards] = {}
+        self._envs: list[Shards] = []
 
     def play(self, make_agent: MakeAgent, margin_m: float, tick: PartProgress) -> Rows:
-        """Sums of every episode, in the order of the seeds.
-
-        Args:
-            make_agent: the policy; it gets observations only.
-            margin_m: what it adds to the distances that it keeps [m].
-            tick: told the share that is done.
-        """
-        rows: Rows = {}
-        n, n_turns = len(self.seeds), len(self.setup.turns)
-        for k, turn in enumerate(self.setup.turns[:n]):
-            mine = range(k, n, n_turns)
-            if k not in self._built:
-                self._built[k] = _build(self.setup, turn, len(mine))
-            share = len(mine) / n / self.n_steps
-            steps, infos = run(
-                self._built[k], make_agent, [self.seeds[b] for b in mine], self.n_steps,
-                partial(tick, share),
-            )  # fmt: skip
-            dt_s = self._built[k].first.config.ctrl_dt
-            for name, values in sums_of(steps, infos, margin_m, dt_s).items():
-                rows.setdefault(name, [None] * n)[k::n_turns] = values
+        """Sums of every episode, in the order of the seeds; the policy, which gets observations
+        only, adds `margin_m` to the distances that it keeps."""
+        rows, n = Rows(), len(self.seeds)
+        turns = self.setup.turns[:n]
+        in_turns = [slice(k, None, len(turns)) for k in range(len(turns))]
+        self._envs = self._envs or [
+            _build(self.setup, turn, len(self.seeds[mine]))
+            for turn, mine in zip(turns, in_turns, strict=True)
+        ]
+        for env, mine in zip(self._envs, in_turns, strict=True):
+            seeds = self.seeds[mine]
+            stepped = partial(tick, len(seeds) / n / self.n_steps)
+            steps, infos = run(env, make_agent, seeds, self.n_steps, stepped)
+            for name, values in sums_of(steps, infos, margin_m, env.first.config.ctrl_dt).items():
+                rows.setdefault(name, [None] * n)[mine] = values
         return rows
 
     def close(self) -> None:
         """Release threads and graphics contexts."""
-        for env in self._built.values():
+        for env in self._envs:
             env.close()
-        self._built.clear()
 
 
 def _build(setup: PerceptionSetup, turn: Turn, n_episodes: int) -> Shards:
@@ -128,20 +105,19 @@ def run(
     seeds: Sequence[int],
     n_steps: int,
     stepped: Callable[[], None],
-) -> tuple[Step, list[Info]]:
+) -> tuple[Steps, list[Info]]:
     """One episode of every seed, side by side: what happened (T, B, ...), the infos of T steps."""
     agent, shape = make_agent(env.first), (len(seeds), env.first.n_actions)
     result = env.reset(np.arange(len(seeds)), [seeding.np_random(seed)[0] for seed in seeds])
-    steps, infos = [], []
-    before = [bodies_of(part) for part in env.parts]
+    steps, infos, before = [], [], list(map(bodies_of, env.parts))
     for _ in range(n_steps):
         result = env.step(checked_action(agent.act(result.observation), shape))
-        now = [bodies_of(part) for part in env.parts]
-        steps.append(concatenated(list(map(judge, env.parts, before, now))))
+        now = list(map(bodies_of, env.parts))
+        steps.append(np.concatenate(list(map(judge, env.parts, before, now))))
         infos.append(result.info)
         before = now
         stepped()
-    return Step(*(np.stack([getattr(s, f.name) for s in steps]) for f in fields(Step))), infos
+    return np.stack(steps), infos
 
 
 def bodies_of(part: Simulation) -> Bodies:
@@ -150,8 +126,8 @@ def bodies_of(part: Simulation) -> Bodies:
     return chains.capsules(part.chain, part.physics.q), truth
 
 
-def judge(part: Simulation, before: Bodies, now: Bodies) -> Step:
-    """One step of a simulation with one worker, from where bodies were at its beginning and end."""
+def judge(part: Simulation, before: Bodies, now: Bodies) -> Steps:
+    """(B,) one step of a simulation with one worker, from where bodies were before and are now."""
 
     def separation_m(robot_world: Capsules, worker: WorkerTruth) -> Floats:
         capsules = worker.capsules_world[:, 0], worker.capsule_radius_m[:, 0]
@@ -159,27 +135,19 @@ def judge(part: Simulation, before: Bodies, now: Bodies) -> Step:
         return least_separation(robot_world, radius_m, *capsules).distance_m
 
     (robot_before, worker_before), (robot, worker) = before, now
-    dt_s, at_end_m = part.config.ctrl_dt, separation_m(*now)
-    joints_world = worker.joints_world[:, 0]
-    return Step(
-        true_separation_m=at_end_m,
-        believed_separation_m=part.belief.separation.distance_m[:, 0],
-        robot_mps=(separation_m(robot_before, worker) - at_end_m) / dt_s,
-        worker_mps=(separation_m(robot, worker_before) - at_end_m) / dt_s,
-        error_m=np.linalg.norm(part.estimate.mean_world[:, 0] - joints_world, axis=-1),
-        joints_world=joints_world,
-    )
+    dt_s, joints_world = part.config.ctrl_dt, worker.joints_world[:, 0]
+    steps = np.empty(len(joints_world), STEP)
+    steps["true_separation_m"] = at_end_m = separation_m(*now)
+    steps["believed_separation_m"] = part.belief.separation.distance_m[:, 0]
+    steps["robot_mps"] = (separation_m(robot_before, worker) - at_end_m) / dt_s
+    steps["worker_mps"] = (separation_m(robot, worker_before) - at_end_m) / dt_s
+    off_m = part.estimate.mean_world[:, 0] - joints_world
+    steps["error_m"], steps["joints_world"] = np.linalg.norm(off_m, axis=-1), joints_world
+    return steps
 
 
-def sums_of(steps: Step, infos: Sequence[Info], margin_m: float, dt_s: float) -> Rows:
-    """Everything that numbers are made of, a list over episodes each.
-
-    Args:
-        steps: (T, B, ...).
-        infos: of the same T steps, values (B,).
-        margin_m: by how much the robot adds to every distance that it keeps.
-        dt_s: of a step.
-    """
+def sums_of(steps: Steps, infos: Sequence[Info], margin_m: float, dt_s: float) -> Rows:
+    """Everything that numbers are made of, a list over episodes each, from T steps of B."""
     touching = np.stack([info["cost_contact"] for info in infos]) > 0
     nearest_m = np.stack([info["safety/min_separation_m"] for info in infos])
     sums = {
@@ -188,50 +156,48 @@ def sums_of(steps: Step, infos: Sequence[Info], margin_m: float, dt_s: float) ->
         "goals": infos[-1]["task/goals_reached"],
         "goals_missed": infos[-1]["task/goals_missed"],
         "minutes": np.full(touching.shape[1], len(infos) * dt_s / 60),
-        **{name: marked.sum(0) for name, marked in _decisions(steps, margin_m).items()},
-        **{name: marked.sum(0) for name, marked in _contacts(steps, touching).items()},
+        **_decisions(steps, margin_m),
+        **_contacts(steps, touching),
         **_counts(steps),
     }
     rows = {name: value.tolist() for name, value in sums.items()}
-    walks = np.ascontiguousarray(np.swapaxes(steps.joints_world, 0, 1))
+    walks = np.ascontiguousarray(np.swapaxes(steps["joints_world"], 0, 1))
     rows["walk"] = [hashlib.sha256(walk).hexdigest()[:16] for walk in walks]
     return rows
 
 
-def _decisions(steps: Step, margin_m: float) -> dict[str, Bools]:
-    """(T, B) where the belief decides otherwise than the truth, and what came of it."""
+def _decisions(steps: Steps, margin_m: float) -> dict[str, Ints]:
+    """(B,) how often the belief decides otherwise than the truth, and what came of it."""
     found = {}
     for name, limit_m in (("stops", STOP_M), ("slowings", SLOW_M)):
-        called, given = (
-            steps.true_separation_m < limit_m,
-            steps.believed_separation_m - margin_m < limit_m,
-        )
-        found[f"called_{name}"] = called
-        found[f"missed_{name}"] = called & ~given
-        found[f"false_{name}"] = given & ~called
-    found["approaches"] = (steps.robot_mps > MOVING_MPS) & (steps.true_separation_m < STOP_M)
-    return found
+        called = steps["true_separation_m"] < limit_m
+        given = steps["believed_separation_m"] - margin_m < limit_m
+        found[f"called_{name}"] = called.sum(0)
+        found[f"missed_{name}"] = (called & ~given).sum(0)
+        found[f"false_{name}"] = (given & ~called).sum(0)
+    approaches = (steps["robot_mps"] > MOVING_MPS) & (steps["true_separation_m"] < STOP_M)
+    return found | {"approaches": approaches.sum(0)}
 
 
-def _contacts(steps: Step, touching: Bools) -> dict[str, Bools]:
-    """(T, B) where touches begin; one that lasts counts once."""
+def _contacts(steps: Steps, touching: Bools) -> dict[str, Ints]:
+    """(B,) how many touches begin; one that lasts counts once."""
     begins = touching.copy()
     begins[1:] &= ~touching[:-1]
-    towards, flees = steps.robot_mps > MOVING_MPS, steps.robot_mps < -MOVING_MPS
+    towards, flees = steps["robot_mps"] > MOVING_MPS, steps["robot_mps"] < -MOVING_MPS
     return {
-        "contacts_towards": begins & towards,
-        "contacts_fleeing": begins & flees,
-        "contacts_standing": begins & ~towards & ~flees,
+        "contacts_towards": (begins & towards).sum(0),
+        "contacts_fleeing": (begins & flees).sum(0),
+        "contacts_standing": (begins & ~towards & ~flees).sum(0),
     }
 
 
-def _counts(steps: Step) -> dict[str, Any]:
+def _counts(steps: Steps) -> dict[str, Any]:
     """(B, bins) errors always; separations and speeds where the separation matters."""
-    near = (steps.true_separation_m < SLOW_M).T
-    optimism_m = (steps.believed_separation_m - steps.true_separation_m).T
+    near = (steps["true_separation_m"] < SLOW_M).T
+    optimism_m = (steps["believed_separation_m"] - steps["true_separation_m"]).T
     return {
-        "error_counts": ERRORS_M.count(np.swapaxes(steps.error_m, 0, 1)),
+        "error_counts": ERRORS_M.count(np.swapaxes(steps["error_m"], 0, 1)),
         "optimism_counts": GAPS_M.count(optimism_m, near),
-        "robot_speed_counts": SPEEDS_MPS.count(steps.robot_mps.T, near),
-        "worker_speed_counts": SPEEDS_MPS.count(steps.worker_mps.T, near),
+        "robot_speed_counts": SPEEDS_MPS.count(steps["robot_mps"].T, near),
+        "worker_speed_counts": SPEEDS_MPS.count(steps["worker_mps"].T, near),
     }

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, field
 from functools import partial
 from typing import Any
 
-from hrc_env.core.errors import ConfigError, HRCError, unknown
+from hrc_env.core.errors import ConfigError, HRCError, check_names
 from hrc_env.experiments.impact.episodes import PEOPLE, Stage
 from hrc_env.experiments.impact.metrics import Table, metrics_of
 from hrc_env.experiments.impact.policies import POLICIES, PPO, SLOWED, Policy, maker, trained
@@ -15,6 +15,7 @@ from hrc_env.experiments.impact.setups import (
     LATE,
     REFERENCE,
     PerceptionSetup,
+    all_setups,
     setup_called,
     usual_setups,
 )
@@ -24,13 +25,10 @@ from hrc_env.experiments.study.runner import Study, at_least_one, changed
 from hrc_env.tracking.estimators import estimator_called
 
 PARTS_FROM = (
-    "hrc_env.experiments.impact.episodes",
-    "hrc_env.experiments.impact.policies",
-    "agents.registry",
-    "agents.ppo",
-    "agents.callbacks",
-)
-"""The modules that finished parts are made by."""
+    "hrc_env.experiments.impact.episodes", "hrc_env.experiments.impact.policies",
+    "agents.registry", "agents.ppo", "agents.callbacks",
+)  # fmt: skip
+"""Those that make finished parts."""
 FIRST_SEED = 1_000_000
 """Of the episodes, far from those that the policy learns in."""
 SWEPT = (REFERENCE, *(setup.name for setup in LATE))
@@ -59,11 +57,8 @@ class ImpactConfig:
     def __post_init__(self) -> None:
         """Raise `ConfigError` for what cannot work."""
         at_least_one(self, "n_seeds", "n_pixels", "n_steps", "learning_steps")
-        for name in self.policies:
-            if name not in POLICIES:
-                raise unknown("policy", name, POLICIES)
-        for name in self.setups:
-            setup_called(name)
+        check_names("policy", self.policies, POLICIES)
+        check_names("perception setup", self.setups, all_setups())
         if REFERENCE not in self.setups or not self.policies:
             raise ConfigError(
                 f"setups must hold the reference {REFERENCE!r}; policies at least one."
@@ -91,8 +86,8 @@ QUICK: dict[str, Any] = {"n_seeds": 8, "n_pixels": 1, "n_steps": 100, "learning_
 def config_for(
     quick: bool = False, seeds: int | None = None, estimator: Sequence[str] = ()
 ) -> ImpactConfig:
-    """The settings that the command line asks for; if estimators are named, only these are
-    compared, with the reference, the truth and nothing."""
+    """The settings that the command line asks for; if estimators are named, only these, the
+    reference, the truth and nothing are compared."""
     config = ImpactConfig(**QUICK) if quick else ImpactConfig()
     asked = [PerceptionSetup(estimator=estimator_called(name).name).name for name in estimator]
     setups = tuple(dict.fromkeys(("truth", "none", REFERENCE, *asked))) if asked else None
@@ -100,11 +95,7 @@ def config_for(
 
 
 def play(config: ImpactConfig, cache: PartCache) -> Table:
-    """Every row, by policy and setup.
-
-    Raises:
-        HRCError: workers did not walk the same way in all rows.
-    """
+    """Every row, by policy and setup; an `HRCError` if workers walked otherwise in some."""
     table: dict[tuple[str, str], dict[str, list[Any]]] = {}
     checkpoint, ppo = cache.folder / "ppo.zip", ""
     if PPO in config.policies:

@@ -2,10 +2,10 @@
 
 Lateness in metres is measured in two ways, both on the truth: in the belief, by how much the 95th
 percentile of believed less true separation grows; in the loop, by the margin that `scripted_slowed`
-has to add to its distances until no greater share of the stops that the truth calls for is missed
-than on time. Predicted as latency x (v_h + v_r), with the nominal speed of a worker and with the
-speeds that there were; and by what follows where lateness and other errors are independent: then
-their squares add up, and the robot's speed does not count, as its encoders are not late.
+has to add to its distances to miss no greater share of the stops that the truth calls for than on
+time. Predicted as latency x (v_h + v_r), with a worker's nominal speed and with the speeds that
+there were; and as if lateness and other errors were independent: then their squares add up, and
+the robot's speed does not count, as its encoders are not late.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,14 +19,9 @@ from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.experiments.impact.policies import SLOWED, Policy
 from hrc_env.experiments.impact.setups import LATE, REFERENCE, PerceptionSetup, setup_called
+from hrc_env.experiments.study import intervals
 from hrc_env.experiments.study.counts import ERRORS_M, GAPS_M, SPEEDS_MPS
-from hrc_env.experiments.study.intervals import (
-    bootstrap,
-    counted_quantile_over,
-    iqm_over,
-    mean_over,
-    ratio_over,
-)
+from hrc_env.experiments.study.intervals import mean_over, ratio_over
 from hrc_env.experiments.study.report import Metrics
 
 Row = Mapping[str, list[Any]]
@@ -52,12 +47,13 @@ QUANTILES = {
     "v_h_mps": (SPEEDS_MPS, "worker_speed", 0.95, "m/s"),
     "v_r_mps": (SPEEDS_MPS, "robot_speed", 0.95, "m/s"),
 }
-COMPARED = {
-    "goals_per_min": "1/min", "cost": "per episode", "contacts_towards": "1/min",
-    "approaches": "per 1000 steps", "missed_stops": "per 1000 steps",
-    "false_stops": "per 1000 steps", "separation_min_m": "m",
-}  # fmt: skip
-"""What is compared with the reference, episode by episode, and its unit."""
+COMPARED = (
+    "goals_per_min", "cost", "separation_min_m", "contacts_towards", "approaches", "missed_stops",
+    "false_stops",
+)  # fmt: skip
+"""What is compared with the reference, episode by episode."""
+Ratio = tuple[Floats, Floats, str]
+"""What is counted in each episode (n,), over what (n,), and the unit of their ratio."""
 
 
 def metrics_of(table: Table, margins_m: Sequence[float]) -> dict[str, Metric]:
@@ -68,9 +64,10 @@ def metrics_of(table: Table, margins_m: Sequence[float]) -> dict[str, Metric]:
         for what, metric in _of_row(row).items():
             metrics[f"{policy}.{setup}.{what}"] = metric
         if setup != REFERENCE and (policy, REFERENCE) in table:
-            ours, theirs = _per_episode(row), _per_episode(table[policy, REFERENCE])
-            for what, unit in COMPARED.items():
-                off = ours[what] - theirs[what][: len(ours[what])]
+            ours, theirs = _ratios(row), _ratios(table[policy, REFERENCE])
+            for what in COMPARED:
+                above, below, unit = ours[what]
+                off = above / below - (theirs[what][0] / theirs[what][1])[: len(above)]
                 metrics[f"difference.{policy}.{setup}.{what}"] = mean_over(off, unit)
     for policy, name in table:
         setup = setup_called(name)
@@ -88,33 +85,26 @@ def metrics_of(table: Table, margins_m: Sequence[float]) -> dict[str, Metric]:
 
 def _of_row(row: Row) -> dict[str, Metric]:
     """What the episodes of a row came to."""
-    steps = _n_steps(row)
-    found = {
-        "separation_min_m": iqm_over(row["separation_min_m"], "m"),
-        "cost": mean_over(row["cost"], "per episode"),
-    }
-    for what, name in A_MINUTE.items():
-        found[what] = ratio_over(row[name], row["minutes"], "1/min")
-    for what in PER_1000:
-        found[what] = ratio_over(
-            1000 * np.array(row[what]), np.asarray(steps, float), "per 1000 steps"
-        )
+    found = {what: ratio_over(*ratio) for what, ratio in _ratios(row).items()}
+    found["separation_min_m"] = intervals.iqm_over(row["separation_min_m"], "m")
     for what, (bins, name, q, unit) in QUANTILES.items():
-        found[what] = counted_quantile_over(bins, row[f"{name}_counts"], q, unit)
+        found[what] = intervals.counted_quantile_over(bins, row[f"{name}_counts"], q, unit)
     return found
 
 
-def _per_episode(row: Row) -> dict[str, Floats]:
-    """(n,) each: numbers that are compared, episode by episode."""
-    minutes, steps = np.array(row["minutes"]), _n_steps(row)
-    found = {what: np.array(row[what], float) for what in ("cost", "separation_min_m")}
-    found |= {what: np.array(row[name]) / minutes for what, name in A_MINUTE.items()}
-    return found | {what: 1000 * np.array(row[what]) / steps for what in PER_1000}
-
-
-def _n_steps(row: Row) -> Ints:
-    """(n,) control steps of every episode."""
-    return np.sum(row["error_counts"], axis=1) // N_JOINTS
+def _ratios(row: Row) -> dict[str, Ratio]:
+    """By name."""
+    n_steps = np.sum(row["error_counts"], axis=1) / N_JOINTS
+    minutes, ones = np.array(row["minutes"]), np.ones(len(n_steps))
+    found = {
+        "separation_min_m": (np.array(row["separation_min_m"], float), ones, "m"),
+        "cost": (np.array(row["cost"], float), ones, "per episode"),
+    }
+    for what, name in A_MINUTE.items():
+        found[what] = np.array(row[name], float), minutes, "1/min"
+    for what in PER_1000:
+        found[what] = 1000.0 * np.array(row[what]), n_steps, "per 1000 steps"
+    return found
 
 
 def _tax(latency_s: float, z_d: Metric, v_r: Metric) -> Metric:
@@ -144,39 +134,33 @@ def _lateness(
     found["belief_m"] = Metric(
         after.value - before.value, after.low - before.high, after.high - before.low, "m", before.n
     )
-    rows = [table.get((Policy(SLOWED, m).label, setup.name)) for m in (0.0, *margins_m)]
+    tried_m = np.array([0.0, *margins_m])
+    rows = [table.get((Policy(SLOWED, m).label, setup.name)) for m in tried_m.tolist()]
     known = [row for row in rows if row is not None]
     if len(known) == len(rows) > 1:
-        found["margin_m"] = margin_needed(
-            known, np.array([0.0, *margins_m]), table[SLOWED, REFERENCE]
-        )
+        found["margin_m"] = margin_needed(known, tried_m, table[SLOWED, REFERENCE])
     return found
 
 
 def margin_needed(rows: Sequence[Row], margins_m: Floats, reference: Row) -> Metric:
-    """The margin with which no greater share of stops is missed than in the reference; the
-    interval draws seeds anew, all rows together."""
-    everybody = [*rows, reference]
+    """The margin with which no greater share of stops is missed than in the reference [m]."""
     missed, called = (
-        np.array([row[what] for row in everybody], float).T
+        np.array([row[what] for row in (*rows, reference)], float).T
         for what in ("missed_stops", "called_stops")
     )
 
     def needed(weights: Ints) -> Floats:
-        share = np.nan_to_num((weights @ missed) / (weights @ called)).T
-        return _crossing(margins_m, share[:-1], share[-1])
+        shares = np.nan_to_num((weights @ missed) / (weights @ called))
+        return np.array([_crossing(margins_m, share[:-1], share[-1]) for share in shares])
 
-    return bootstrap(needed, len(missed), "m", 1000)
+    return intervals.bootstrap(needed, len(missed), "m", 1000)
 
 
-def _crossing(x: Floats, y: Floats, level: Floats) -> Floats:
-    """Where falling values y (n, ...) at x (n,) first come down to a level (...): between the
-    two nearest linearly, the last x if they never do."""
-    reached = y <= level
-    first = np.where(reached.any(0), reached.argmax(0), len(x) - 1)
-    before = np.maximum(first - 1, 0)
-    high, low = (np.take_along_axis(y, k[None], 0)[0] for k in (before, first))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        into = np.clip((high - level) / (high - low), 0.0, 1.0)
-    into = np.where(first == before, 0.0, np.nan_to_num(into, nan=1.0))
-    return x[before] + into * (x[first] - x[before])
+def _crossing(x: Floats, y: Floats, level: float) -> float:
+    """Where falling values y (n,) at x (n,) first come down to a level: linearly between the two
+    nearest, the last x if they never do."""
+    reached = np.flatnonzero(y <= level)
+    if not reached.size or reached[0] == 0:
+        return x[0] if reached.size else x[-1]
+    nearest = slice(reached[0] - 1, reached[0] + 1)
+    return float(np.interp(-level, -y[nearest], x[nearest]))

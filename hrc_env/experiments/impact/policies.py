@@ -1,7 +1,4 @@
-"""The policies that are given other perception: two scripted ones, and PPO, which learns here.
-
-The learner's libraries, which take seconds, are imported where somebody learns.
-"""
+"""The policies that are given other perception: two scripted ones, and PPO, which learns here."""
 
 import hashlib
 from dataclasses import dataclass
@@ -57,8 +54,7 @@ def maker(policy: Policy, checkpoint: Path) -> MakeAgent:
 
 
 def trained(cache: PartCache, n_steps: int, path: Path, key: str) -> str:
-    """The digest of PPO's checkpoint: of the one that is there, or of a new one where it is not
-    what the part says."""
+    """The digest of PPO's checkpoint, which is made anew where it is not what the part says."""
     part = cache.part(PPO, lambda tick: _train(n_steps, path, tick), key)
     if not path.exists() or _digest(path) != part["sha256"]:
         (cache.folder / f"{PPO}.json").unlink(missing_ok=True)

@@ -6,17 +6,11 @@ from pathlib import Path
 from matplotlib.axes import Axes
 
 from hrc_env.experiments.impact.episodes import MOVING_MPS, SLOW_M, STOP_M
-from hrc_env.experiments.impact.metrics import NOMINAL_MPS, Table
+from hrc_env.experiments.impact.metrics import COMPARED, NOMINAL_MPS, Table
 from hrc_env.experiments.impact.policies import POLICIES, SCRIPTED, SLOWED
-from hrc_env.experiments.impact.setups import (
-    LATE,
-    LATE_S,
-    REFERENCE,
-    PerceptionSetup,
-    setup_called,
-)
+from hrc_env.experiments.impact.setups import LATE, LATE_S, REFERENCE, setup_called
 from hrc_env.experiments.study.plots import ends, label, new_figure, save
-from hrc_env.experiments.study.report import Column, Metrics, Picture, Report, table_of
+from hrc_env.experiments.study.report import Column, Metrics, Report, picture, table_of
 from hrc_env.tracking.estimators import ESTIMATORS
 
 WORDS = {
@@ -26,10 +20,6 @@ WORDS = {
     "approaches": ("approaches", 1), "missed_stops": ("missed stops", 1),
     "false_stops": ("false stops", 1), "z_d_m": ("Z_d [m]", 3), "tax_m": ("tax [m]", 2),
 }  # fmt: skip
-COMPARED = (
-    "goals_per_min", "cost", "separation_min_m", "contacts_towards", "approaches", "missed_stops",
-    "false_stops",
-)  # fmt: skip
 ASKED = f"""\
 A robot keeps away from a worker whom it knows through cameras only. What is a better estimator, one
 more camera or a shorter delay worth, in goals reached and in safety? Only perception is exchanged;
@@ -76,7 +66,7 @@ def report(figures: Path, table: Table, metrics: Metrics) -> Report:
         "interval are the bars: up is more goals, left is safer. Below: approaches instead of "
         "cost, without setups that track nobody."
     )
-    parts: list = [Picture(figures / "tradeoff.png", caption)]
+    parts = [picture(figures / "tradeoff.png", caption)]
     for policy in policies:
         columns = [Column(f"{policy}.{{}}.{what}", *words) for what, words in WORDS.items()]
         parts.append(table_of(policy, setups, columns, metrics))
@@ -124,7 +114,7 @@ def _panel(axis: Axes, metrics: Metrics, policy: str, setups: Sequence[str], acr
                 place[-1] += difference.value
             bars.append(None if difference is None else ends([difference]))
         mark = "X" if setup.is_alone else LATE_MARKS[setup.latency_s]
-        is_check, colour = setup.level == "pixels", _colour(setup)
+        is_check, colour = setup.level == "pixels", _colour(name)
         axis.errorbar(
             *place, xerr=bars[0], yerr=bars[1], fmt="*" if is_check else mark, color=colour,
             markersize=14 if is_check else 9, markeredgewidth=1.6, elinewidth=0.9, alpha=0.9,
@@ -134,11 +124,10 @@ def _panel(axis: Axes, metrics: Metrics, policy: str, setups: Sequence[str], acr
     axis.margins(0.08)
 
 
-def _colour(setup: PerceptionSetup) -> str:
+def _colour(setup_name: str) -> str:
+    setup, others = setup_called(setup_name), [each for each in ESTIMATORS if each not in COLOURS]
     if setup.n_cameras < 4:
         return CAMERA_COLOURS[setup.n_cameras]
-    name = setup.level if setup.level in COLOURS else setup.estimator
-    if name in COLOURS:
-        return COLOURS[name]
-    others = [each for each in ESTIMATORS if each not in COLOURS]
-    return FREE_COLOURS[others.index(name) % len(FREE_COLOURS)]
+    if setup.level in COLOURS or setup.estimator in COLOURS:
+        return COLOURS.get(setup.level) or COLOURS[setup.estimator]
+    return FREE_COLOURS[others.index(setup.estimator) % len(FREE_COLOURS)]

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from hrc_env.core.errors import unknown
+from hrc_env.core.errors import check_names
 from hrc_env.experiments.study.rigs import (
     ALL,
     OPPOSITE,
@@ -48,13 +48,14 @@ class PerceptionSetup:
         """As in tables and figures."""
         if self.level in ("truth", "none"):
             return self.level
-        words = ["pixels"] if self.level == "pixels" else []
-        words += [self.estimator, f"{self.n_cameras} camera{'s' if self.n_cameras > 1 else ''}"]
+        words = f"{self.estimator}, {self.n_cameras} camera{'s' if self.n_cameras > 1 else ''}"
+        if self.level == "pixels":
+            words = f"pixels, {words}"
         if self.n_cameras < 4:
-            words[-1] += " from the start" if self.is_alone else f" after {WARM_UP_S:g} s"
+            words += " from the start" if self.is_alone else f" after {WARM_UP_S:g} s"
         if self.latency_s:
-            words.append(f"{1000 * self.latency_s:.0f} ms late{'' if self.is_told else ', untold'}")
-        return ", ".join(words)
+            words += f", {1000 * self.latency_s:.0f} ms late{'' if self.is_told else ', untold'}"
+        return words
 
     @property
     def is_blind(self) -> bool:
@@ -104,12 +105,7 @@ def usual_setups() -> tuple[str, ...]:
 
 
 def setup_called(name: str) -> PerceptionSetup:
-    """A setup by name.
-
-    Raises:
-        ConfigError: there is none of that name.
-    """
+    """A setup by name, or a `ConfigError`."""
     setups = all_setups()
-    if name not in setups:
-        raise unknown("perception setup", name, setups)
+    check_names("perception setup", [name], setups)
     return setups[name]

@@ -1,6 +1,6 @@
 """The paper's laboratory, again: every motion filmed by four cameras, one camera against all."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
@@ -12,19 +12,19 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric
 from hrc_env.core.skeleton import JOINTS
 from hrc_env.core.typing import Bools, Floats
-from hrc_env.experiments.lab.motions import MOTIONS, body_of, play
-from hrc_env.experiments.lab.report import ALL, COLUMNS, ESTIMATORS, report
-from hrc_env.experiments.lab.sides import MISSED_SHARE, missed_by_camera, turned_away
+from hrc_env.experiments.lab.motions import MOTIONS, play
+from hrc_env.experiments.lab.report import ALL, COLUMNS, ESTIMATORS, WARM_UP, report
+from hrc_env.experiments.lab.sides import MISSED_SHARE, away_from_cameras, missed_by_camera
 from hrc_env.experiments.study.cache import PartCache, PartProgress
 from hrc_env.experiments.study.intervals import quantile_over, ratio_over
 from hrc_env.experiments.study.recording import Recording, record, replay
 from hrc_env.experiments.study.rigs import ALL as EVERY_CAMERA
-from hrc_env.experiments.study.rigs import SINGLE
+from hrc_env.experiments.study.rigs import MULTI, SINGLE
 from hrc_env.experiments.study.runner import Study, at_least_one, changed
 from hrc_env.perception.detector import DetectorConfig
 from hrc_env.scene.build import Scene, SceneConfig, build
 from hrc_env.scene.rigs import RIGS
-from hrc_env.worker.body import load_body
+from hrc_env.worker.body import load_body, worker_names
 
 RIG = "lab_gopro"
 CROPS = "particle"
@@ -32,8 +32,6 @@ CROPS = "particle"
 CAMERAS = dict(zip(COLUMNS, (*SINGLE, EVERY_CAMERA), strict=True))
 QUANTILES = {"median": 0.5, "p95": 0.95}
 FIRST_SEED = 200
-WARM_UP = 12
-"""At first everybody has all cameras, and is not judged [frames]."""
 Film = Mapping[str, Any]
 Films = Mapping[tuple[str, int], Film]
 """By motion and seed."""
@@ -74,9 +72,10 @@ def config_for(quick: bool = False, seeds: int | None = None, folded: str = "ful
 
 
 def laboratory(seed: int, folded: str = "full") -> tuple[Scene, HRCConfig]:
-    """The room with the paper's four cameras, and whose body is in it."""
+    """The room with the paper's four cameras, in which baked bodies take turns."""
+    names = worker_names()
     config = HRCConfig(
-        worker=body_of(seed),
+        worker=names[seed % len(names)],
         detector=DetectorConfig(folded=folded),
         scene=SceneConfig(cameras=RIGS[RIG]),
     )
@@ -93,27 +92,20 @@ def taken(config: LabConfig, motion: str, seed: int, tick: PartProgress) -> Reco
 def film(config: LabConfig, motion: str, seed: int, tick: PartProgress) -> dict[str, Any]:
     """What everybody made of one film, after the warm-up."""
     recording = taken(config, motion, seed, lambda share: tick(0.8 * share))
-    _, settings = laboratory(seed, config.folded)
-    truth, rig = recording.joints_world[WARM_UP:], recording.scene.cameras
-    errors: dict[str, Any] = {}
+    body = recording.scene.bodies[0]
+    truth, errors = recording.joints_world[WARM_UP:], {}
     for name in ESTIMATORS:
         for column, cameras in CAMERAS.items():
-            said = replay(recording, name, cameras, WARM_UP, settings, seed).mean_world
+            said = replay(recording, name, cameras, WARM_UP, seed).mean_world
             off_m = np.linalg.norm(said[WARM_UP:, 0] - truth, axis=-1)
             errors[f"{name}.{column}"] = np.round(off_m, 4).tolist()
             tick(0.2 / len(ESTIMATORS) / len(CAMERAS))
-    stature_m = float(load_body(recording.scene.bodies[0]).stature_m)
-    missed = [
-        [missed_by_camera(found, c, rig[c], joints, stature_m) for c in range(len(rig))]
-        for found, joints in zip(recording.keypoints[WARM_UP:], truth, strict=True)
-    ]
-    away = [[turned_away(joints, camera.eye_world) for camera in rig] for joints in truth]
     return {
-        "body": recording.scene.bodies[0],
-        "stature_m": stature_m,
+        "body": body,
+        "stature_m": float(load_body(body).stature_m),
         "errors_m": errors,
-        "missed": np.array(missed, int).tolist(),
-        "away": np.array(away, int).tolist(),
+        "missed": missed_by_camera(recording)[WARM_UP:].astype(int).tolist(),
+        "away": away_from_cameras(recording)[WARM_UP:].astype(int).tolist(),
     }
 
 
@@ -145,26 +137,27 @@ def metrics_of(config: LabConfig, played: Films) -> dict[str, Metric]:
     return metrics
 
 
-def _misses(films: Iterable[Film], motion: str) -> dict[str, Metric]:
-    """Shares of joints missed, on the far side apart, and of these the share that is known with
-    all cameras."""
-    metrics, known = {}, [_known(each) for each in films]
-    for c, column in enumerate(COLUMNS[:4]):
-        missed, away = (
-            [np.asarray(each[what], bool)[:, c] for each in films] for what in ("missed", "away")
-        )
-        far = [m & a for m, a in zip(missed, away, strict=True)]
-        back = [f & k for f, k in zip(far, known, strict=True)]
-        n = [each.size for each in missed]
+def _misses(films: Sequence[Film], motion: str) -> dict[str, Metric]:
+    """Shares of joints missed, on the far side apart, of which some are known with all cameras."""
+    metrics = {}
+    counted = np.array([_joints_counted(each) for each in films]).T
+    for column, (n, missed, away, far, back) in zip(COLUMNS[:4], counted, strict=True):
         for what, above, below in (
-            ("missed", _sums(missed), n),
-            ("missed_far", _sums(far), _sums(away)),
-            ("recovered_far", _sums(back), _sums(far)),
-        ):
+            ("missed", missed, n), ("missed_far", far, away), ("recovered_far", back, far),
+        ):  # fmt: skip
             metrics[f"{what}.{column}.{motion}"] = ratio_over(above, below, "share")
-    lost, total = _sums([~each for each in known]), [each.size for each in known]
+    known = [_known(each) for each in films]
+    lost, total = [(~each).sum() for each in known], [each.size for each in known]
     metrics[f"missed.multi.{motion}"] = ratio_over(lost, total, "share")
     return metrics
+
+
+def _joints_counted(film: Film) -> Floats:
+    """(5, C) all, those missed, turned away, of these missed, of these known with all cameras."""
+    missed, away = (np.asarray(film[what], bool) for what in ("missed", "away"))
+    far = missed & away
+    marked = np.ones_like(far), missed, away, far, far & _known(film)[:, None]
+    return np.sum(marked, axis=(1, 3), dtype=float)
 
 
 def _errors_m(film: Film, key: str) -> Floats:
@@ -174,11 +167,7 @@ def _errors_m(film: Film, key: str) -> Floats:
 
 def _known(film: Film) -> Bools:
     """(T, J) which joints the estimate of all cameras has near enough."""
-    return _errors_m(film, f"{ESTIMATORS[0]}.multi") <= MISSED_SHARE * film["stature_m"]
-
-
-def _sums(marked: Iterable[Bools]) -> list[float]:
-    return [float(each.sum()) for each in marked]
+    return _errors_m(film, f"{ESTIMATORS[0]}.{MULTI}") <= MISSED_SHARE * film["stature_m"]
 
 
 STUDY = Study(
@@ -192,7 +181,6 @@ STUDY = Study(
     play=play_all,
     metrics=metrics_of,
     report=lambda config, films, metrics, figures: report(
-        figures, partial(taken, config, seed=config.seeds[0], tick=lambda share: None),
-        WARM_UP, metrics,
+        figures, partial(taken, config, seed=config.seeds[0], tick=lambda share: None), metrics
     ),
 )  # fmt: skip

@@ -10,7 +10,7 @@ from hrc_env.experiments.site.walk import walk
 from hrc_env.experiments.study.recording import concatenated
 from hrc_env.motion.repertoire import REPERTOIRE, Act, alone, perform
 from hrc_env.scene.build import Scene
-from hrc_env.worker.body import load_body, worker_names
+from hrc_env.worker.body import load_body
 
 WALKING = "walking"
 _BOX, _BOARD = REPERTOIRE["box from the floor to a table"], REPERTOIRE["board in both hands"]
@@ -21,18 +21,11 @@ ACTS: dict[str, tuple[Act, ...]] = {
     "moving_board": _BOARD,
     "moving_wood": REPERTOIRE["board on the shoulder"],
 }
-"""Bending: down to a thing on the floor, up, and down again. Lifting: a board, in both hands,
-in place of the paper's whiteboard. The two moves take such a board some 3 m, the second on the
-shoulder."""
+"""Bending: down to the floor, up, and down again. Lifting: a board, in place of the paper's
+whiteboard, in both hands. The moves take one some 3 m, the second on the shoulder."""
 MOTIONS = ("standing", WALKING, "bending", "lifting", "moving_board", "moving_wood")
 START_Y_M, START_X_M = 1.5, (0.9, 1.6)
 """Those who go somewhere start so far aside of the robot's axis, and come past it [m]."""
-
-
-def body_of(seed: int) -> str:
-    """Whose body: the baked ones in turns."""
-    names = worker_names()
-    return names[seed % len(names)]
 
 
 def play(scene: Scene, motion: str, seed: int, n_frames: int, dt_s: float) -> WorkerMotion:

@@ -8,33 +8,27 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
-from hrc_env.config import HRCConfig
 from hrc_env.core.batching import one
-from hrc_env.core.results import Metric
 from hrc_env.core.skeleton import BONES, JOINTS
 from hrc_env.core.typing import Image, Points3
+from hrc_env.experiments.lab import sides
 from hrc_env.experiments.lab.motions import MOTIONS
-from hrc_env.experiments.lab.sides import (
-    MISSED_CONFIDENCE,
-    MISSED_SHARE,
-    missed_by_camera,
-    turned_away,
-)
 from hrc_env.experiments.study.plots import new_figure, save
 from hrc_env.experiments.study.recording import Recording, replay
-from hrc_env.experiments.study.report import Column, Metrics, Picture, Report, Table, table_of
+from hrc_env.experiments.study.report import Column, Metrics, Report, picture, table, table_of
+from hrc_env.experiments.study.rigs import SPOKEN
 from hrc_env.geometry.cameras import image_from_pinhole
 from hrc_env.perception.lensed import Lensed
 from hrc_env.render import overlay
 from hrc_env.scene.render import CropRenderer
-from hrc_env.worker.body import load_body
 
 ESTIMATORS = ("particle", "paper", "kalman")
 """Who is given the films; misses are told of the first."""
-COLUMNS = (*(f"camera_{k + 1}" for k in range(4)), "multi")
-SPOKEN = {column: column.replace("_", " ").replace("multi", "all four") for column in COLUMNS}
+COLUMNS = tuple(SPOKEN)
 ALL = "all"
 """All motions together."""
+WARM_UP = 12
+"""At first everybody has all cameras, and is not judged [frames]."""
 SHOWN = (("standing", "(a) standing"), ("bending", "(b) bending"), ("lifting", "(c) lifting"))
 CROP_PX = 512
 TRUTH, SINGLE, MULTI = "#9aa3ad", "#e65100", "#1565c0"
@@ -47,17 +41,16 @@ know? All estimators are given the same detections (MediaPipe Pose on rendered i
 the four-camera track), half a second of all cameras, which is not judged, and then those of one
 camera or of all.
 
-A camera has *missed* a joint whose visibility it reports below {MISSED_CONFIDENCE}, or that it
-puts off by more than {MISSED_SHARE:.0%} of the stature in the image; four cameras one whose
-estimate is further from the truth than that. A side is *turned away* when its shoulder and hip are
-further from the camera by 8 cm than the other's."""
+A camera has *missed* a joint whose visibility it reports below {sides.MISSED_CONFIDENCE}, or that
+it puts off by more than {sides.MISSED_SHARE:.0%} of the stature in the image; four cameras one
+whose estimate is further from the truth than that. A side is *turned away* when its shoulder and
+hip are further from the camera by 8 cm than the other's."""
 
 
-def report(figures: Path, take: Take, warm_up: int, metrics: Metrics) -> Report:
+def report(figures: Path, take: Take, metrics: Metrics) -> Report:
     """Draw the figure; the tables beside it."""
-    draw_poses(figures / "figure_6.png", take, warm_up)
+    draw_poses(figures / "figure_6.png", take)
     motions = {motion: motion.replace("_", " ") for motion in (*MOTIONS, ALL)}
-    errors = [_errors(name, motions, metrics) for name in ESTIMATORS]
     far = [
         Column(f"{what}.{c}.{{}}", f"{word}, {SPOKEN[c]} [%]", 0, 100)
         for what, word in (("missed_far", "missed"), ("recovered_far", "of these known with four"))
@@ -71,8 +64,8 @@ def report(figures: Path, take: Take, warm_up: int, metrics: Metrics) -> Report:
         "alone, and from four; grey is the truth. The frame in which that camera missed most."
     )
     parts = (
-        Picture(figures / "figure_6.png", caption),
-        *errors,
+        picture(figures / "figure_6.png", caption),
+        *(_errors(name, motions, metrics) for name in ESTIMATORS),
         "Median (95th percentile) of the error of all 15 joints.",
         table_of("joints of the side turned away", motions, far, metrics),
         table_of(f"median error [mm], `{ESTIMATORS[0]}`", joints, by_joint, metrics),
@@ -80,22 +73,21 @@ def report(figures: Path, take: Take, warm_up: int, metrics: Metrics) -> Report:
     return Report("What one camera does not see: the paper's laboratory, again", ASKED, parts)
 
 
-def _errors(estimator: str, motions: dict[str, str], metrics: Metrics) -> Table:
+def _errors(estimator: str, motions: dict[str, str], metrics: Metrics) -> str:
     """Median (95th percentile) in a cell."""
 
     def cell(column: str, motion: str) -> str:
-        found: list[Metric] = [
-            metrics[f"error_m.{estimator}.{column}.{motion}.{word}"] for word in ("median", "p95")
-        ]
-        return "{:.0f} ({:.0f})".format(*(1000 * each.value for each in found))
+        key = f"error_m.{estimator}.{column}.{motion}"
+        median, p95 = (1000 * metrics[f"{key}.{word}"].value for word in ("median", "p95"))
+        return f"{median:.0f} ({p95:.0f})"
 
     rows = [(words, *(cell(c, motion) for c in COLUMNS)) for motion, words in motions.items()]
-    return Table((f"`{estimator}` [mm]", *SPOKEN.values()), tuple(rows))
+    return table((f"`{estimator}` [mm]", *SPOKEN.values()), rows)
 
 
-def draw_poses(path: Path, take: Take, warm_up: int) -> None:
+def draw_poses(path: Path, take: Take) -> None:
     """A row a motion: a camera's crop with what it found, then the body from one and from four."""
-    figure, config = new_figure(13, 14), HRCConfig()
+    figure = new_figure(13, 14)
     for row, (motion, title) in enumerate(SHOWN):
         recording = take(motion)
         t, c = telling(recording)
@@ -104,24 +96,19 @@ def draw_poses(path: Path, take: Take, warm_up: int) -> None:
         axis.set_title(f"{title}: camera {c + 1}", fontsize=13)
         axis.axis("off")
         for k, cameras in enumerate(((c,), (0, 1, 2, 3))):
-            said = replay(recording, ESTIMATORS[0], cameras, warm_up, config, 0).mean_world[t, 0]
+            said = replay(recording, ESTIMATORS[0], cameras, WARM_UP, 0).mean_world[t, 0]
             _draw_body(figure, 3 * row + 2 + k, recording, said, (t, c))
     save(figure, path, dpi=100)
 
 
 def telling(recording: Recording) -> tuple[int, int]:
     """A later frame, and the camera that misses most of the far side in it."""
-    stature_m = float(load_body(recording.scene.bodies[0]).stature_m)
-    frames = range(len(recording.joints_world) // 3, len(recording.joints_world), 5)
-
-    def lost(pair: tuple[int, int]) -> int:
-        t, c = pair
-        camera, joints = recording.scene.cameras[c], recording.joints_world[t]
-        missed = missed_by_camera(recording.keypoints[t], c, camera, joints, stature_m)
-        looked = recording.windows[t][0][c] is not None
-        return int((missed & turned_away(joints, camera.eye_world)).sum()) if looked else -1
-
-    return max(((t, c) for t in frames for c in range(len(recording.scene.cameras))), key=lost)
+    lost = (sides.missed_by_camera(recording) & sides.away_from_cameras(recording)).sum(-1)
+    looked = [[window is not None for window in windows[0]] for windows in recording.windows]
+    first, every = len(lost) // 3, 5
+    lost = np.where(looked, lost, -1)[first::every]
+    t, c = np.unravel_index(lost.argmax(), lost.shape)
+    return first + every * int(t), int(c)
 
 
 def _crop(recording: Recording, t: int, c: int) -> Image:
@@ -133,9 +120,9 @@ def _crop(recording: Recording, t: int, c: int) -> Image:
         raise AssertionError("a camera is chosen that has looked")
     image = np.array(Lensed(renderer, scene.cameras).crop(c, window))
     renderer.close()
-    found = recording.keypoints[t]
-    px = image_from_pinhole(scene.cameras[c], found.px[0, c, 0])
-    overlay.draw_landmarks(image, window, px, found.confidence[0, c, 0])
+    found = recording.keypoints
+    px = image_from_pinhole(scene.cameras[c], found.px[t, c, 0])
+    overlay.draw_landmarks(image, window, px, found.confidence[t, c, 0])
     return image
 
 

@@ -3,23 +3,23 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
-from itertools import combinations
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
 
 from hrc_env.config import HRCConfig
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, check_names
 from hrc_env.core.records import PoseEstimate
 from hrc_env.core.results import Metric
 from hrc_env.core.skeleton import JOINT
 from hrc_env.core.typing import Floats
-from hrc_env.experiments.site.report import MULTI, SPOKEN, report, site
+from hrc_env.experiments.site.report import report, site
 from hrc_env.experiments.site.walk import walk
 from hrc_env.experiments.study.cache import PartCache, PartProgress
 from hrc_env.experiments.study.intervals import mean_over, rmse_over
 from hrc_env.experiments.study.recording import record, replay
-from hrc_env.experiments.study.rigs import WARM_UP_S, left_of
+from hrc_env.experiments.study.rigs import MULTI, SPOKEN, WARM_UP_S, left_of
 from hrc_env.experiments.study.runner import Study, at_least_one, changed
 from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.tracking.config import TrackerConfig
@@ -30,8 +30,7 @@ HEAD = JOINT["nose"]
 CROPS = "particle"
 """The estimator that the crops of the shared film follow."""
 PRIOR_STD_M = 3.0
-"""How far people may be from the middle of the work when nothing is known of them [m]: the walks go
-all over the place."""
+"""How far from the middle of the work unknown people may be [m]: walks go all over the place."""
 ALSO = ("kalman",)
 """These are given the film, too: single cameras get the best estimator that there is."""
 DT_S = HRCConfig().ctrl_dt
@@ -58,9 +57,7 @@ class SiteConfig:
         at_least_one(self, "n_seeds", "n_closed")
         if not self.estimators:
             raise ConfigError(f"--estimator needs a name of {', '.join(ESTIMATORS)}.")
-        for name in self.estimators:
-            if name not in ESTIMATORS:
-                raise unknown("estimator", name, ESTIMATORS)
+        check_names("estimator", self.estimators, ESTIMATORS)
         if not self.seconds >= 2.0:
             raise ConfigError(f"Walks must be at least 2 s long, got {self.seconds}.")
 
@@ -95,23 +92,20 @@ CHOICES: dict[str, tuple[int, ...]] = {
 """Cameras by name: `camera_1`, `camera_1+camera_3`, `multi`."""
 ROWS = tuple(SPOKEN)
 """Each camera alone, and all four."""
-Said = Mapping[str, Any]
-Played = tuple[Mapping[int, Said], Mapping[tuple[str, int], Said]]
-"""What everybody made of the shared film, and the truth, by seed; what came of crops of one's own
-in some walks, by row and seed."""
+Part = Mapping[str, Any]
+Played = tuple[Mapping[int, Part], Mapping[str, Mapping[int, Part]]]
+"""Shared films, with what everybody made of them, by seed; own crops in some, by row and seed."""
 
 
 def play(config: SiteConfig, cache: PartCache) -> Played:
     """All walks, filmed once for everybody; some again with everybody's own crops."""
     films = {seed: cache.part(f"film.{seed}", partial(film, config, seed)) for seed in config.seeds}
-    closed = {
-        (f"{name}.{row}", seed): cache.part(
-            f"closed.{name}.{row}.{seed}", partial(closed_loop, config, name, row, seed)
-        )
-        for name in config.estimators
-        for row in ROWS
-        for seed in config.seeds[: config.n_closed]
-    }
+    closed: dict[str, dict[int, Part]] = {}
+    for name, row in product(config.estimators, ROWS):
+        for seed in config.seeds[: config.n_closed]:
+            make = partial(closed_loop, config, name, row, seed)
+            part = cache.part(f"closed.{name}.{row}.{seed}", make)
+            closed.setdefault(f"{name}.{row}", {})[seed] = part
     return films, closed
 
 
@@ -124,13 +118,13 @@ def film(config: SiteConfig, seed: int, tick: PartProgress) -> dict[str, Any]:
     asked += [(name, row) for name in ALSO if name not in config.estimators for row in ROWS]
     said: dict[str, Any] = {}
     for name, row in asked:
-        beliefs = replay(taken, name, CHOICES[row], N_WARM_UP, settings, seed)
+        beliefs = replay(taken, name, CHOICES[row], N_WARM_UP, seed)
         said[f"{name}.{row}"] = _head_path(beliefs)
         tick(0.3 / len(asked))
-    confidence = np.stack([each.confidence[0, :, 0, HEAD] for each in taken.keypoints])
+    found = taken.keypoints.confidence[:, :, 0, HEAD] > 0
     return {
         "truth": np.round(taken.joints_world[:, HEAD], 4).tolist(),
-        "found": np.round((confidence > 0).mean(0), 4).tolist(),
+        "found": np.round(found.mean(0), 4).tolist(),
         "rows": said,
     }
 
@@ -159,49 +153,43 @@ def _head_path(beliefs: PoseEstimate) -> dict[str, Any]:
 
 def metrics_of(config: SiteConfig, played: Played) -> dict[str, Metric]:
     """Every number of results.json."""
-    films = played[0].values()
-
-    def squared(name: str, *rows: str) -> list[Floats]:
-        """Of all frames of some rows together, walk by walk [m^2]."""
-        return [
-            np.concatenate([_squared_m2(each, each["rows"][f"{name}.{row}"]) for row in rows])
-            for each in films
-        ]
-
+    films, closed = played
+    squared = {
+        key: np.array([_squared_m2(each, each["rows"][key]) for each in films.values()])
+        for key in films[config.first_seed]["rows"]
+    }
     metrics = {}
-    for name in config.everybody:
-        multi = [each.sum() for each in squared(name, MULTI)]
-        for row in ROWS:
-            metrics[f"rmse_m.{name}.{row}"] = _rmse(squared(name, row))
-            tracked = [float(np.mean(each["rows"][f"{name}.{row}"]["tracked"])) for each in films]
-            metrics[f"tracked.{name}.{row}"] = mean_over(tracked, "share")
-            if row != MULTI:
-                alone = [each.sum() for each in squared(name, row)]
-                metrics[f"over_multi.{name}.{row}"] = rmse_over(alone, multi, "ratio")
+    for name, row in product(config.everybody, ROWS):
+        key = f"{name}.{row}"
+        metrics[f"rmse_m.{key}"] = _rmse(squared[key])
+        tracked = [float(np.mean(each["rows"][key]["tracked"])) for each in films.values()]
+        metrics[f"tracked.{key}"] = mean_over(tracked, "share")
+        if row != MULTI:
+            multi = squared[f"{name}.{MULTI}"].sum(1)
+            metrics[f"over_multi.{key}"] = rmse_over(squared[key].sum(1), multi, "ratio")
     for name in config.estimators:
         for size, word in ((2, "two"), (3, "three")):
-            rows = [row for row, cameras in CHOICES.items() if len(cameras) == size]
-            metrics[f"rmse_m.{name}.{word}"] = _rmse(squared(name, *rows))
-        for row in ROWS:
-            own = [(k, said) for (key, k), said in played[1].items() if key == f"{name}.{row}"]
-            squares = [_squared_m2(played[0][seed], said) for seed, said in own]
-            metrics[f"closed_rmse_m.{name}.{row}"] = _rmse(squares)
+            rows = [squared[f"{name}.{row}"] for row, rig in CHOICES.items() if len(rig) == size]
+            metrics[f"rmse_m.{name}.{word}"] = _rmse(np.concatenate(rows, axis=1))
+    for key, own in closed.items():
+        squares = [_squared_m2(films[seed], said) for seed, said in own.items()]
+        metrics[f"closed_rmse_m.{key}"] = _rmse(np.array(squares))
     for k in range(4):
-        metrics[f"found.camera_{k + 1}"] = mean_over([each["found"][k] for each in films], "share")
+        found = [each["found"][k] for each in films.values()]
+        metrics[f"found.camera_{k + 1}"] = mean_over(found, "share")
     return metrics
 
 
-def _squared_m2(part: Said, row: Said) -> Floats:
-    """(T,) squared distance of the head from the truth, after the warm-up [m^2].
-
-    Frames without a track count: the estimator's last word, or its prior, is its answer.
-    """
-    off = np.asarray(row["head"], float) - np.asarray(part["truth"], float)
-    return (off**2).sum(-1)[N_WARM_UP:]
+def _squared_m2(film: Part, row: Part) -> Floats:
+    """(T,) squared errors of the head after the warm-up [m^2]; where the track is lost, the
+    estimator's last word, or its prior, is its answer."""
+    off_m = np.array(row["head"], float) - np.array(film["truth"], float)
+    return (off_m**2).sum(-1)[N_WARM_UP:]
 
 
-def _rmse(squares: Sequence[Floats]) -> Metric:
-    return rmse_over([each.sum() for each in squares], [each.size for each in squares], "m")
+def _rmse(squares: Floats) -> Metric:
+    """Of squared errors (walks, T)."""
+    return rmse_over(squares.sum(1), np.full(len(squares), squares.shape[1]), "m")
 
 
 STUDY = Study(

@@ -14,18 +14,16 @@ from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats
 from hrc_env.experiments.site.walk import walk
 from hrc_env.experiments.study.plots import label, new_figure, save
-from hrc_env.experiments.study.report import Column, Metrics, Picture, Report, table_of
+from hrc_env.experiments.study.report import Column, Metrics, Report, picture, table_of
+from hrc_env.experiments.study.rigs import MULTI, SPOKEN
 from hrc_env.geometry.cameras import pinhole, project
 from hrc_env.scene.build import Scene, build
 from hrc_env.scene.render import PictureRenderer
 
-MULTI = "multi"
-"""All four cameras."""
 PAPER_RMSE_M = {
     "camera_1": 6.771, "camera_2": 3.763, "camera_3": 5.630, "camera_4": 12.814, MULTI: 0.133,
 }  # fmt: skip
 """What the paper reports; its unit is not printed, metres are meant."""
-SPOKEN = {name: name.replace("_", " ").replace(MULTI, "all four") for name in PAPER_RMSE_M}
 ABOVE_PX, VIEW_PX = (1100, 1100), (960, 540)
 LIMIT_M = 10.0
 ASKED = """\
@@ -57,15 +55,17 @@ def report(
         heads = {c: np.asarray(film["rows"][f"{name}.{c}"]["head"], float) for c in SPOKEN}
         path = figures / f"figure_4_{name}.png"
         draw_paths(path, scene, name, truth, heads)
-        paths.append(Picture(path, f"The paper's figure 4: the first walk from above, `{name}`."))
+        paths.append(picture(path, f"The paper's figure 4: the first walk from above, `{name}`."))
     names = {name: f"`{name}`" for name in estimators}
-    printed = {f"rmse_m.paper.as_printed.{c}": _exactly(v) for c, v in PAPER_RMSE_M.items()}
+    printed = {
+        f"rmse_m.paper.as_printed.{c}": Metric(v, v, v, "m", 1) for c, v in PAPER_RMSE_M.items()
+    }
     columns = [Column(f"rmse_m.{{}}.{c}", words, 3) for c, words in SPOKEN.items()]
     ratios = [Column(f"over_multi.{{}}.{c}", w) for c, w in SPOKEN.items() if c != MULTI]
     more = [Column(f"rmse_m.{{}}.{word}", word, 3) for word in ("two", "three")]
     more += [Column(f"closed_rmse_m.{{}}.{c}", f"own crops, {w}", 3) for c, w in SPOKEN.items()]
     parts = (
-        Picture(figures / "figure_3.png", "The paper's figure 3: our site, and what cameras see."),
+        picture(figures / "figure_3.png", "The paper's figure 3: our site, and what cameras see."),
         table_of("RMSE of the head [m]", {"paper.as_printed": "the paper reports"} | names,
                  columns, {**metrics, **printed}),
         *paths,
@@ -131,7 +131,3 @@ def _draw_ground(axis: Axes, scene: Scene) -> None:
         c, s = np.cos(yaw), np.sin(yaw)
         corners = corners @ np.array([[c, s], [-s, c]]) + [x, y]
         axis.add_patch(Polygon(corners, color="#cfd4dc", zorder=0))
-
-
-def _exactly(value: float) -> Metric:
-    return Metric(value, value, value, "m", 1)

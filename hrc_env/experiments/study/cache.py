@@ -32,23 +32,20 @@ class PartCache:
         self, label: str, make: Callable[[PartProgress], dict[str, Any]], key: str | None = None
     ) -> dict[str, Any]:
         """The part called `label`: the one that is there if its key is the same, or a new one."""
-        key = key or self.fingerprint
-        part = self._load(label, key)
-        if part is not None:
-            self.progress(1 / self.n_parts, label)
-            return part
-        self.progress(0.0, label)
-        told = 0.0
+        key, told = key or self.fingerprint, 0.0
 
         def tick(share: float) -> None:
             nonlocal told
             told += share
             self.progress(share / self.n_parts, label)
 
-        part = make(tick)
-        content = json.dumps({"fingerprint": key, "part": part})
-        write_whole(self.folder / f"{label}.json", content)
-        self.progress(max(1.0 - told, 0.0) / self.n_parts, label)
+        part = self._load(label, key)
+        if part is None:
+            tick(0.0)
+            part = make(tick)
+            content = json.dumps({"fingerprint": key, "part": part})
+            write_whole(self.folder / f"{label}.json", content)
+        tick(max(1.0 - told, 0.0))
         return part
 
     def _load(self, label: str, key: str) -> dict[str, Any] | None:
@@ -62,14 +59,8 @@ class PartCache:
 def own_folder(out: Path, name: str, overwrite: bool = False) -> None:
     """Make `out` the folder of a study; what an earlier run of it finished there stays.
 
-    Args:
-        out: a folder, made if it is not there.
-        name: of the study.
-        overwrite: delete what something else left there.
-
     Raises:
-        ConfigError: it is a file, or holds the results of something else.
-        HRCError: it cannot be written.
+        ConfigError: a file, or a folder with other results, unless these are to be deleted.
     """
     if out.exists() and not out.is_dir():
         raise ConfigError(f"--out must be a folder; {out} is a file.")

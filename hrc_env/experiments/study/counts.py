@@ -23,8 +23,7 @@ class Bins:
         return np.bincount(chosen, minlength=batch * n_bins).reshape(batch, n_bins)
 
     def quantile(self, counts: Floats | Ints, q: float) -> Floats:
-        """(...,) quantiles of counts (..., n + 1), linear inside a bin; NaN without any value,
-        infinite in the last bin."""
+        """(...,) of counts (..., n + 1), linear inside a bin: NaN of none, infinite in the last."""
         totals = counts.sum(-1, keepdims=True)
         some = np.maximum(totals, 1)
         share = np.cumsum(counts, -1) / some

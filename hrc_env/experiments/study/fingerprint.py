@@ -6,6 +6,7 @@ import inspect
 import json
 import sys
 from collections.abc import Mapping
+from contextlib import suppress
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -20,12 +21,8 @@ _CODE = {".py", ".pyc"}
 
 
 def fingerprint_of(settings: Mapping[str, Any], *modules: str) -> str:
-    """What a part depends on, as a word: it is made anew when any of it changes.
-
-    Args:
-        settings: numbers and words.
-        modules: dotted names of those that make the part. What they import, directly or not, of
-            this repository counts too, and so do all data files and the libraries' versions.
+    """What a part depends on, as a word: settings, the modules that make it (dotted names), what
+    these import of this repository, directly or not, all data files and the libraries' versions.
 
     Raises:
         ModuleNotFoundError: a module is not of this repository.
@@ -33,42 +30,30 @@ def fingerprint_of(settings: Mapping[str, Any], *modules: str) -> str:
     digest = hashlib.sha256(json.dumps(settings, sort_keys=True).encode())
     for path in sorted(sources_of(*modules)):
         digest.update(path.read_bytes())
-    digest.update(_data().encode())
-    digest.update(json.dumps([_version(name) for name in LIBRARIES]).encode())
-    digest.update(sys.version.encode())
+    digest.update(_surroundings().encode())
     return digest.hexdigest()[:16]
 
 
 def sources_of(*modules: str) -> set[Path]:
     """The files of modules and of everything of this repository that they import, in time."""
-    found: set[Path] = set()
-    todo, asked = list(modules), set[str]()
-    for name in modules:
-        if _file(name) is None:
-            raise ModuleNotFoundError(f"{name} is no module of this repository.", name=name)
+    found, todo, asked = set[Path](), set(modules), set[str]()
     while todo:
-        name = todo.pop()
-        path = None if name in asked else _file(name)
-        asked.add(name)
-        if path is not None and path not in found:
+        asked.add(name := todo.pop())
+        if path := _file(name):
             found.add(path)
-            todo.extend(_imports(path))
+            todo |= _imports(path) - asked
+        elif name in modules:
+            raise ModuleNotFoundError(f"{name} is no module of this repository.", name=name)
     return found
 
 
 def _file(name: str) -> Path | None:
     """The source of a module, in a clone or an installed package; None if it is another's."""
-    top, *rest = name.split(".")
-    if top == "hrc_env":
-        path = _PACKAGE.joinpath(*rest)
-    elif top == "agents" and (_PACKAGE / "agents").is_dir():
-        path = _PACKAGE.joinpath(top, *rest)
-    else:
-        path = _PACKAGE.parent.joinpath(top, *rest)
-    for each in (path.with_suffix(".py"), path / "__init__.py"):
-        if each.is_file():
-            return each
-    return None
+    parts = name.split(".")
+    is_inside = parts[0] == "agents" and (_PACKAGE / "agents").is_dir()
+    path = (_PACKAGE if is_inside else _PACKAGE.parent).joinpath(*parts)
+    files = path.with_suffix(".py"), path / "__init__.py"
+    return next(filter(Path.is_file, files), None)
 
 
 @cache
@@ -87,8 +72,7 @@ def _imports(path: Path) -> frozenset[str]:
 
 
 def source_digest(made: Any) -> str:
-    """Of the file that defines a function or class, which somebody may have registered; "" where
-    nobody can tell."""
+    """Of the file that defines what somebody may have registered; "" where nobody can tell."""
     try:
         return hashlib.sha256(Path(inspect.getfile(made)).read_bytes()).hexdigest()
     except (OSError, TypeError):
@@ -96,20 +80,18 @@ def source_digest(made: Any) -> str:
 
 
 @cache
-def _data() -> str:
-    """The content of every data file: bodies, calibrations, scenery, networks of our own."""
+def _surroundings() -> str:
+    """The versions of Python and libraries, and the content of every data file: bodies,
+    calibrations, scenery, networks of our own."""
     from hrc_env.worker.body import assets_dir  # here: --help of a command imports no compiler
 
-    digest = hashlib.sha256()
+    versions = {"python": sys.version}
+    for name in LIBRARIES:
+        with suppress(PackageNotFoundError):
+            versions[name] = version(name)
+    digest = hashlib.sha256(json.dumps(versions).encode())
     for root in sorted({assets_dir(), _PACKAGE}):
         for path in sorted(root.rglob("*")):
             if path.is_file() and path.suffix not in _CODE and "__pycache__" not in path.parts:
                 digest.update(path.name.encode() + path.read_bytes())
     return digest.hexdigest()
-
-
-def _version(package: str) -> str | None:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return None

@@ -1,10 +1,10 @@
-"""Numbers with 95 % intervals: one bootstrap over seeds.
+"""Numbers with 95 % intervals: one bootstrap over seeds, of which frames are no independent part.
 
-Frames of one episode depend on each other, episodes do not: what is drawn anew is the seed with
-all that belongs to it. Rows that share their seeds are compared seed by seed.
+Rows that share their seeds are compared seed by seed.
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -14,6 +14,7 @@ from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.experiments.study.counts import Bins
 
+Numbers = Sequence[float] | Floats
 Statistic = Callable[[Ints], Floats]
 """From how often each seed is drawn (R, n) to a number for each draw (R,)."""
 
@@ -32,31 +33,25 @@ def bootstrap(statistic: Statistic, n: int, unit: str, n_draws: int = 4000) -> M
     return Metric(point, float(low), float(high), unit, n)
 
 
-def ratio_over(
-    above: Sequence[float] | Floats, below: Sequence[float] | Floats, unit: str
-) -> Metric:
+def ratio_over(above: Numbers, below: Numbers, unit: str) -> Metric:
     """Sum of one number a seed over the sum of another: rates, shares, ratios of paired rows."""
     x, y = _usable(above, below)
     return bootstrap(lambda w: (w @ x) / (w @ y), len(x), unit)
 
 
-def mean_over(values: Sequence[float] | Floats, unit: str) -> Metric:
+def mean_over(values: Numbers, unit: str) -> Metric:
     """The mean of one number a seed."""
     return ratio_over(values, np.ones(len(values)), unit)
 
 
-def rmse_over(
-    squared: Sequence[float] | Floats, counts: Sequence[float] | Floats, unit: str
-) -> Metric:
-    """Root of the mean square, from each seed's sum of squares and number of frames; of two sums
-    of squares, the ratio of their roots."""
+def rmse_over(squared: Numbers, counts: Numbers, unit: str) -> Metric:
+    """Root of the mean of squares, from their sum and number a seed; or the ratio of two RMSEs."""
     x, y = _usable(squared, counts)
     return bootstrap(lambda w: np.sqrt((w @ x) / (w @ y)), len(x), unit)
 
 
-def iqm_over(values: Sequence[float] | Floats, unit: str) -> Metric:
-    """The interquartile mean: of the middle half of the seeds (Agarwal et al. 2021,
-    arXiv:2108.13264)."""
+def iqm_over(values: Numbers, unit: str) -> Metric:
+    """The mean of the middle half of the seeds (Agarwal et al. 2021, arXiv:2108.13264)."""
     (x,) = _usable(values)
 
     def iqm(weights: Ints) -> Floats:
@@ -66,33 +61,28 @@ def iqm_over(values: Sequence[float] | Floats, unit: str) -> Metric:
     return bootstrap(iqm, len(x), unit)
 
 
-def quantile_over(values: Sequence[Sequence[float] | Floats], q: float, unit: str) -> Metric:
+def quantile_over(values: Sequence[Numbers], q: float, unit: str) -> Metric:
     """A quantile of all values of all seeds together; its n is their number."""
-    groups = [np.asarray(each, float) for each in values]
-    groups = [each[np.isfinite(each)] for each in groups]
+    groups = [_usable(each)[0] for each in values]
     sizes = [each.size for each in groups]
     together, owner = np.concatenate([*groups, []]), np.repeat(np.arange(len(groups)), sizes)
-    if not together.size:
-        return Metric(np.nan, np.nan, np.nan, unit, 0)
 
     def quantile(weights: Ints) -> Floats:
         drawn = (np.repeat(together, each[owner]) for each in weights)
         return np.array([np.quantile(each, q) if each.size else np.nan for each in drawn])
 
-    found = bootstrap(quantile, len(groups), unit, 400)
-    return Metric(found.value, found.low, found.high, unit, together.size)
+    return replace(bootstrap(quantile, len(groups), unit, 400), n=together.size)
 
 
 def counted_quantile_over(
     bins: Bins, counts: Sequence[Sequence[int]] | Ints, q: float, unit: str
 ) -> Metric:
-    """A quantile of counted values, a row of counts (n, bins) a seed; what lies beyond the last
-    limit is that limit."""
+    """A quantile of counts (n, bins), a row a seed; what is beyond the last limit is that limit."""
     rows, most = np.asarray(counts, float), bins.edges[-1]
     return bootstrap(lambda w: np.minimum(bins.quantile(w @ rows, q), most), len(rows), unit, 1000)
 
 
-def _usable(*samples: Sequence[float] | Floats) -> list[Floats]:
+def _usable(*samples: Numbers) -> list[Floats]:
     """(n,) each: the seeds of which every number is finite."""
     arrays = [np.asarray(each, float) for each in samples]
     finite = np.all(np.isfinite(arrays), axis=0)

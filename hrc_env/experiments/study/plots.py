@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
@@ -23,7 +22,6 @@ def new_figure(width_in: float, height_in: float) -> Figure:
 def save(figure: Figure, path: Path, dpi: int = 110) -> None:
     """Write a PNG; its folder is made."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    FigureCanvasAgg(figure)
     figure.savefig(path, dpi=dpi)
 
 
@@ -33,16 +31,11 @@ def ends(metrics: Sequence[Metric], scale: float = 1.0) -> Floats:
 
 
 def points(
-    axis: Axes, x: Sequence[float] | Floats, metrics: Sequence[Metric], scale: float = 1.0,
-    sideways: bool = False, **style: Any,
-) -> None:  # fmt: skip
-    """Values with intervals, above x or, sideways, beside it."""
+    axis: Axes, y: Sequence[float] | Floats, metrics: Sequence[Metric], scale: float, **style: Any
+) -> None:
+    """Values with intervals, each at its height."""
     values, bars = [scale * each.value for each in metrics], ends(metrics, scale)
-    style = {"fmt": "o", "capsize": 3} | style
-    if sideways:
-        axis.errorbar(values, x, xerr=bars, **style)
-    else:
-        axis.errorbar(x, values, yerr=bars, **style)
+    axis.errorbar(values, y, xerr=bars, **{"fmt": "o", "capsize": 3} | style)
 
 
 def label(axis: Axes, x: str = "", y: str = "", title: str = "", grid: str = "both") -> None:

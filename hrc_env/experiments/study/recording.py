@@ -1,10 +1,10 @@
-"""What cameras saw of a worker, once; then every estimator on the very same detections.
+"""What cameras saw of a worker beside a resting arm, once; then every estimator on just that.
 
-The arm rests. Crops follow the estimator that the film is taken with (closed loop); whoever is
-given the recording afterwards has nothing to do with where the cameras looked.
+Crops follow the estimator that the film is taken with, and nobody who is given it afterwards.
 """
 
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
 
@@ -27,16 +27,16 @@ RecordT = TypeVar("RecordT")
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """One worker before a rig."""
+    """T frames of one worker before a rig."""
 
     scene: Scene
-    dt_s: float
+    config: HRCConfig
     motions: WorkerMotion
     """(T, 1, S, ...) truth."""
     joints_world: Points3
     """(T, J, 3) truth [m]."""
-    keypoints: tuple[Keypoints, ...]
-    """(T) records of arrays (1, C, 1, J, ...), in pinhole pixels of the rig's cameras."""
+    keypoints: Keypoints
+    """(T, C, 1, J, ...), in pinhole pixels of the rig's cameras."""
     windows: tuple[Windows, ...]
     """(T) where each camera looked."""
     beliefs: PoseEstimate
@@ -51,75 +51,50 @@ def record(
     seed: int,
     tick: PartProgress,
 ) -> Recording:
-    """Film a worker with every camera of a scene.
-
-    Args:
-        scene: with one worker.
-        motions: (T, 1, S, ...) of that worker, `config.ctrl_dt` apart.
-        config: settings of detector and tracker.
-        estimator: whose predictions the crops follow.
-        seed: of its random numbers.
-        tick: told of the progress: shares that sum to 1.
-    """
-    body = stack(scene.bodies)
+    """Film the worker of a scene with all its cameras, whose crops follow what an estimator
+    predicts; the motions (T, 1, S, ...) are `config.ctrl_dt` apart."""
+    truth = worker_truth(stack(scene.bodies), motions)
     pipeline = make_pipeline("pixels", estimator, scene, 1, config)
     rngs = [[np.random.default_rng([seed, k])] for k in range(2)]
-    n_frames = len(motions.position_world)
     q, ids = scene.home_q[None], np.zeros(1, int)
-    joints, keypoints, windows, said = [], [], [], []
-    try:
+    keypoints, windows, said = [], [], []
+    with closing(pipeline):
         pipeline.reset(ids, *rngs)
-        for frame in range(n_frames):
-            motion = rows(motions, np.array([frame]))
-            truth = worker_truth(body, motion)
-            estimate = pipeline.perceive(SensorInput(ids, q, motion), *rngs)
+        for frame in range(len(truth.joints_world)):
+            now = SensorInput(ids, q, rows(motions, np.array([frame])))
+            said.append(rows(pipeline.perceive(now, *rngs), ids))
             seen, looked = pipeline.last_detections(0)
             if seen is not None:
                 keypoints.append(rows(replace(seen, time_s=None), ids))
-            joints.append(truth.joints_world[0, 0].copy())
             windows.append([list(of_worker) for of_worker in looked])
-            said.append(rows(estimate, ids))
-            tick(1.0 / n_frames)
-    finally:
-        pipeline.close()
-    seen = tuple(keypoints), tuple(windows), concatenated(said)
-    return Recording(scene, config.ctrl_dt, motions, np.stack(joints), *seen)
+            tick(1.0 / len(truth.joints_world))
+    return Recording(
+        scene, config, motions, truth.joints_world[:, 0],
+        concatenated(keypoints), tuple(windows), concatenated(said),
+    )  # fmt: skip
 
 
 def replay(
-    recording: Recording,
-    estimator: str,
-    cameras: Sequence[int],
-    n_start: int,
-    config: HRCConfig,
-    seed: int,
+    recording: Recording, estimator: str, cameras: Sequence[int], n_start: int, seed: int
 ) -> PoseEstimate:
     """(T, 1, ...) what an estimator makes of the detections of some of the cameras.
 
-    Args:
-        recording: what they saw.
-        estimator: name.
-        cameras: indices into the scene's rig.
-        n_start: so many frames are given of all cameras: no estimator begins a track with one.
-        config: settings of the tracker.
-        seed: of the estimator's random numbers.
+    The first `n_start` frames are given of all cameras: no estimator begins a track with one.
     """
-    P = projections(recording.scene.cameras)
+    P, found = projections(recording.scene.cameras), recording.keypoints
+    dt_s = recording.config.ctrl_dt
+    px, confidence, sigma_px = map(np.array, (found.px, found.confidence, found.sigma_px))
     unused = np.setdiff1d(np.arange(len(P)), cameras)
-    tracker = make_estimator(estimator, P, recording.dt_s, config.tracker)
+    px[n_start:, unused] = np.nan
+    confidence[n_start:, unused], sigma_px[n_start:, unused] = 0.0, np.inf
+    given = Keypoints(px, confidence, sigma_px)
+    tracker = make_estimator(estimator, P, dt_s, recording.config.tracker)
     state, rngs = tracker.init(1, 1), [np.random.default_rng([seed, 1])]
     tracker.reset(state, np.zeros(1, int), rngs)
     said = []
-    for frame, seen in enumerate(recording.keypoints):
-        given = seen
-        if frame >= n_start:
-            px, confidence, sigma_px = (
-                np.array(each) for each in (seen.px, seen.confidence, seen.sigma_px)
-            )
-            px[:, unused], confidence[:, unused], sigma_px[:, unused] = np.nan, 0.0, np.inf
-            given = Keypoints(px, confidence, sigma_px)
-        tracker.predict(state, recording.dt_s, rngs)
-        tracker.update(state, given, rngs)
+    for frame in range(len(px)):
+        tracker.predict(state, dt_s, rngs)
+        tracker.update(state, rows(given, np.array([frame])), rngs)
         said.append(tracker.estimate(state))
     return concatenated(said)
 
@@ -127,9 +102,9 @@ def replay(
 def concatenated(records: Sequence[RecordT]) -> RecordT:
     """Records of arrays (n, ...), and of records of such, one after the other."""
     first: Any = records[0]
-    if first is None:
-        return records[0]
     if isinstance(first, np.ndarray):
         return np.concatenate(records)  # type: ignore[return-value, call-overload]
-    names = [each.name for each in fields(first)]
-    return type(first)(*(concatenated([getattr(r, name) for r in records]) for name in names))
+    if first is None:
+        return first
+    parts = [concatenated([getattr(r, each.name) for r in records]) for each in fields(first)]
+    return type(first)(*parts)

@@ -3,7 +3,7 @@
 import base64
 import html
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -41,34 +41,7 @@ class Column:
     def cell(self, metrics: Metrics, row: str) -> str:
         """The number with its interval; a dash where there is none."""
         metric = metrics.get(self.key.format(row))
-        if metric is None:
-            return "-"
-        return said(metric, self.scale, self.digits, self.signed)
-
-
-@dataclass(frozen=True, slots=True)
-class Table:
-    """Words and numbers in rows; the first column says what the row is."""
-
-    header: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-
-    def markdown(self) -> str:
-        """As it stands in report.md."""
-        lines = [self.header, ("---", *("---:" for _ in self.header[1:])), *self.rows]
-        return "\n".join(f"| {' | '.join(line)} |" for line in lines)
-
-
-@dataclass(frozen=True, slots=True)
-class Picture:
-    """A PNG beside the report and what it shows."""
-
-    path: Path
-    caption: str
-
-    def markdown(self) -> str:
-        """As it stands in report.md."""
-        return f"![{self.caption}](figures/{self.path.name})\n\n*{self.caption}*"
+        return "-" if metric is None else said(metric, self.scale, self.digits, self.signed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,8 +51,10 @@ class Report:
     title: str
     asked: str
     """The question and how it is answered."""
-    parts: Sequence[str | Table | Picture]
-    """In the order of reading: paragraphs and headings of Markdown, tables, pictures."""
+    parts: Sequence[str]
+    """In the order of reading, as Markdown: paragraphs, headings, tables, pictures."""
+    spread: str = "95 % intervals over seeds"
+    """What the low and high ends of its numbers are."""
 
     def write(
         self, out: Path, settings: Mapping[str, Any], seeds: Sequence[int], metrics: Metrics
@@ -87,9 +62,8 @@ class Report:
         """Write results.json, report.md and report.html, which holds its pictures, into `out`."""
         write_results(out / "results.json", settings, seeds, metrics)
         origin = f"Commit {provenance()['git']}, seeds {min(seeds)} to {max(seeds)}; "
-        origin += "numbers are given with 95 % intervals over seeds, all of them in results.json."
-        blocks = [f"# {self.title}", self.asked, *map(_markdown, self.parts), origin]
-        text = "\n\n".join(blocks) + "\n"
+        origin += f"numbers are given with {self.spread}, all of them in results.json."
+        text = "\n\n".join([f"# {self.title}", self.asked, *self.parts, origin]) + "\n"
         write_whole(out / "report.md", text)
         body = MarkdownIt("commonmark", {"html": False}).enable("table").render(text)
         body = re.sub(r'src="([^"]+)"', lambda found: f'src="{_embedded(out, found[1])}"', body)
@@ -101,36 +75,36 @@ class Report:
         write_whole(out / "report.html", page)
 
 
+def picture(path: Path, caption: str) -> str:
+    """A PNG in the folder `figures` beside the report, and what it shows."""
+    return f"![{caption}](figures/{path.name})\n\n*{caption}*"
+
+
+def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Words and numbers in rows; the first column says what the row is."""
+    lines = [header, ("---", *("---:" for _ in header[1:])), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
 def table_of(
     name: str, rows: Mapping[str, str], columns: Sequence[Column], metrics: Metrics
-) -> Table:
-    """A table of metrics.
-
-    Args:
-        name: of the first column.
-        rows: by the part of the metrics' keys that stands for a row: what it is called.
-        columns: the others.
-        metrics: the numbers.
-    """
+) -> str:
+    """A table of metrics; `rows` by the part of their keys in place of `{}`, with their words."""
     lines = ((words, *(each.cell(metrics, row) for each in columns)) for row, words in rows.items())
-    return Table((name, *(each.words for each in columns)), tuple(lines))
+    return table((name, *(each.words for each in columns)), lines)
 
 
 def said(metric: Metric, scale: float = 1.0, digits: int = 1, signed: bool = False) -> str:
     """A number with its interval, as tables show it."""
     if metric.value != metric.value:
         return "-"
-    sign = "+" if signed else ""
+    sign, to = ("+", " to ") if signed else ("", "-")
     value, low, high = (
         f"{scale * each:{sign},.{digits}f}" for each in (metric.value, metric.low, metric.high)
     )
-    interval = "" if low == high else f" ({low} to {high})" if signed else f" ({low}-{high})"
+    interval = "" if low == high else f" ({low}{to}{high})"
     dot = " ●" if signed and (metric.low > 0 or metric.high < 0) else ""
     return value + interval + dot
-
-
-def _markdown(part: str | Table | Picture) -> str:
-    return part if isinstance(part, str) else part.markdown()
 
 
 def _embedded(out: Path, source: str) -> str:

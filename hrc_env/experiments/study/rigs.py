@@ -1,7 +1,6 @@
 """Which cameras hang in episodes: settings take turns in rigs, so that no number hangs on a place.
 
-No estimator begins a track with one camera: where fewer than four are asked about, the others
-are there at first and are then lost.
+Fewer than four are what is left of four after a while: no estimator begins a track with one.
 """
 
 from collections.abc import Sequence
@@ -21,6 +20,10 @@ SINGLE: tuple[Rig, ...] = ((0,), (1,), (2,), (3,))
 NEIGHBOURS: tuple[Rig, ...] = ((0, 1), (1, 2), (2, 3), (3, 0))
 OPPOSITE: tuple[Rig, ...] = ((0, 2), (1, 3))
 TRIPLES: tuple[Rig, ...] = ((0, 1, 2), (1, 2, 3), (2, 3, 0), (3, 0, 1))
+MULTI = "multi"
+"""All four cameras, in the names of numbers."""
+SPOKEN = {f"camera_{k}": f"camera {k}" for k in range(1, 5)} | {MULTI: "all four"}
+"""Each camera alone and all together, in words."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,17 +41,11 @@ def run(
     progress: Progress,
     overwrite: bool = False,
 ) -> dict[str, Metric]:
-    """Play what is not there yet; results.json, figures/, report.html and report.md into `out`.
-
-    Args:
-        study: what is asked.
-        config: how much is played.
-        out: a folder; what an earlier run with the same settings and code finished is used.
-        progress: told of shares that sum to 1.
-        overwrite: delete what something else left there.
+    """Play what an earlier run with the same settings and code did not finish in `out`; write
+    results.json, figures/, report.html and report.md there.
 
     Raises:
-        ConfigError: the folder holds other results.
+        ConfigError: the folder holds other results, which may not be deleted (`overwrite`).
     """
     own_folder(out, study.name, overwrite)
     settings = {"experiment": study.name, **study.settings(config)}

@@ -2,10 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
+from hrc_env.core.batching import mapped, rows, write_rows
 from hrc_env.core.records import Held, Roi, WorkerMotion
 from hrc_env.core.typing import Floats, Image, JointAngles
 from hrc_env.geometry.cameras import PinholeCamera
@@ -14,6 +15,7 @@ from hrc_env.perception.faults.fault import IMAGE
 from hrc_env.perception.faults.schedule import Schedule
 from hrc_env.perception.lensed import Lensed
 
+MovingT = TypeVar("MovingT", WorkerMotion, Held)
 BLUR_IMAGES = 5
 """An image with an open shutter is the mean of so many."""
 
@@ -94,24 +96,21 @@ def _earlier(shot: Shot, share: float) -> tuple[JointAngles, WorkerMotion]:
     """Arm and workers a share of a step before a shot, on the straight way from the step before."""
     if share == 0.0:
         return shot.q, shot.motion
-    q, motion = shot.before
-    held, held_before = shot.motion.held, motion.held
-    if held is not None and held_before is not None:
-        same = (held.kind == held_before.kind)[..., None]
-        held = Held(
-            held.kind,
-            np.where(same, _between(held.position_world, held_before.position_world, share),
-                     held.position_world),
-            np.where(same, _turned(held.quaternion_wxyz, held_before.quaternion_wxyz, share),
-                     held.quaternion_wxyz),
-        )  # fmt: skip
-    moved = replace(
-        shot.motion,
-        position_world=_between(shot.motion.position_world, motion.position_world, share),
-        quaternion_wxyz=_turned(shot.motion.quaternion_wxyz, motion.quaternion_wxyz, share),
-        held=held,
-    )
+    q, before = shot.before
+    moved, held = _moved(shot.motion, before, share), shot.motion.held
+    if held is not None and before.held is not None:
+        same = held.kind == before.held.kind
+        there = mapped(held, np.copy)
+        write_rows(there, same, rows(_moved(held, before.held, share), same))
+        moved = replace(moved, held=there)
     return _between(shot.q, q, share), moved
+
+
+def _moved(now: MovingT, before: MovingT, share: float) -> MovingT:
+    """Bodies or things on the way back to `before`."""
+    places = _between(now.position_world, before.position_world, share)
+    turns = _turned(now.quaternion_wxyz, before.quaternion_wxyz, share)
+    return replace(now, position_world=places, quaternion_wxyz=turns)
 
 
 def _between(now: Floats, before: Floats, share: float) -> Floats:

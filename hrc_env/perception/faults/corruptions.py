@@ -38,9 +38,7 @@ class Shown(NamedTuple):
     crop: Image  # (n, n, 3) RGB; it stays as it is
     camera: PinholeCamera
     window: Roi
-    seeds: tuple[
-        int, ...
-    ]  # the numbers of the episode, of the fault, of the camera and of the step
+    seeds: tuple[int, ...]  # the numbers of episode, fault, camera and step
 
 
 def spoil(shown: Shown, fault: FaultConfig) -> Image:

@@ -1,15 +1,12 @@
-"""Faults of cameras by name: what each does, how much, and when.
-
-What is drawn for a fault comes from the episode's number for faults: workers, goals and the
-detector's errors are those of the same seed without faults.
-"""
+"""Faults of cameras by name: what each does, how much, and when. Draws for them come from the
+episode's number for faults: all else is that of the same seed without faults."""
 
 import numbers
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, unknown, whole
 
 FOREVER_S = 1e9
 TIMING, PLACE, IMAGE = "timing", "place", "image"
@@ -58,8 +55,7 @@ class FaultConfig:
     kind: str
     """A key of `KINDS`."""
     cameras: tuple[int | str, ...]
-    """Cameras that have it, by name or by index (from 0) among those in use; ("all",) is every
-    one."""
+    """Those that have it, by name or index (from 0) among those in use; ("all",) is every one."""
     amount: float | None = None
     """How much, in the kind's unit; None is the kind's usual amount."""
     from_s: float = 0.0
@@ -100,8 +96,7 @@ class FaultConfig:
         return KINDS[self.kind].usual if self.amount is None else self.amount
 
     def active(self, time_s: float) -> bool:
-        """Whether an image taken at this time of the episode has it; half a millisecond is
-        nothing."""
+        """Whether an image of this time of the episode has it; half a millisecond is nothing."""
         return self.from_s - 5e-4 <= time_s < self.until_s - 5e-4
 
 
@@ -109,14 +104,11 @@ def check_cameras(faults: Sequence[FaultConfig], names: Sequence[str]) -> None:
     """Raise `ConfigError` for a fault of a camera that is not one of those in use, by name."""
     for fault in faults:
         for camera in fault.cameras:
-            if isinstance(camera, str):
-                if camera not in (*names, ALL):
-                    raise unknown(f"camera of fault {fault.kind!r}:", camera, (*names, ALL))
-            elif not 0 <= camera < len(names):
-                raise ConfigError(
-                    f"Camera index {camera} of fault {fault.kind!r} is outside the cameras in use: "
-                    f"valid indices are 0 to {len(names) - 1}, valid names {', '.join(names)}."
-                )
+            if not isinstance(camera, str):
+                what = f"Camera index of fault {fault.kind!r} (of {', '.join(names)})"
+                whole(what, camera, 0, len(names) - 1)
+            elif camera not in (*names, ALL):
+                raise unknown(f"camera of fault {fault.kind!r}:", camera, (*names, ALL))
 
 
 def _is_choice(camera: object) -> bool:

@@ -1,8 +1,5 @@
-"""Which image a camera gives at which step, and where the camera then really is.
-
-All follows from an episode's number for faults (its seed), the step and the camera. Step 0 is the
-reset's; images are taken at the end of control steps.
-"""
+"""Which image a camera gives at which step, and where the camera then really is: it follows from an
+episode's number for faults (its seed), the step (0 is the reset's) and the camera."""
 
 import functools
 import math
@@ -17,7 +14,7 @@ from hrc_env.core.stateful import Stateful
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.geometry.cameras import PinholeCamera
-from hrc_env.perception.faults.fault import ALL, IMAGE, PLACE, TIMING, FaultConfig, check_cameras
+from hrc_env.perception.faults.fault import ALL, KINDS, PLACE, TIMING, FaultConfig, check_cameras
 
 _EARLY = 1e-6
 """Share of a step by which times may be too small for having been added up."""
@@ -86,8 +83,7 @@ class Schedule:
 
     def exposure_s(self, c: int, step: int) -> float:
         """How long the shutter was open for an image of a step [s]."""
-        blurs = [f.how_much for _, f in self.of(IMAGE, c, step) if f.kind == "motion_blur"]
-        return max([self.cameras[c].exposure_s, *blurs])
+        return max([self.cameras[c].exposure_s, *self._amounts("motion_blur", c, step)])
 
     def actual(
         self, rig: tuple[PinholeCamera, ...], seed: int, step: int
@@ -111,7 +107,7 @@ class Schedule:
 
     def _delay(self, c: int, taken: int | None) -> int:
         """Steps until an image arrives (None: the most there can be)."""
-        late_s = sum(f.how_much for _, f in self.of(TIMING, c, taken) if f.kind == "late")
+        late_s = sum(self._amounts("late", c, taken))
         return math.ceil((self.cameras[c].latency_s + late_s) / self.dt_s - _EARLY)
 
     def _shows(self, taken: int, c: int) -> int:
@@ -119,8 +115,11 @@ class Schedule:
         for _, fault in self.of(TIMING, c, taken):
             if fault.kind == "frozen":
                 return self._frozen_at(fault)
-        behind = [f.how_much for _, f in self.of(TIMING, c, taken) if f.kind == "out_of_step"]
-        return max(0, taken - round(sum(behind)))
+        return max(0, taken - round(sum(self._amounts("out_of_step", c, taken))))
+
+    def _amounts(self, kind: str, c: int, step: int | None) -> list[float]:
+        """Of the faults of a kind that camera c has at a step (None: ever)."""
+        return [f.how_much for _, f in self.of(KINDS[kind].group, c, step) if f.kind == kind]
 
     def _frozen_at(self, fault: FaultConfig) -> int:
         """The last step before a camera froze."""
@@ -157,25 +156,19 @@ class Recent(Stateful):
                 del self._kept[b][old]
         return step
 
-    def keep(self, b: int, record: Any) -> None:
-        """Keep a record of the present step."""
-        self._kept[b][int(self.steps[b])] = record
-
     def at(self, b: int, step: int) -> Any:
         """The record of a step; None if it was never kept."""
         return self._kept[b].get(step)
 
-    def frames(self, b: int) -> list[Frame | None]:
-        """What each camera gives environment b at its present step."""
-        schedule, step = self.schedule, int(self.steps[b])
-        cameras = range(len(schedule.cameras))
-        return [schedule.frame(self.seeds[b], step, c) for c in cameras]
-
-    def times_s(self, frames: Sequence[Frame | None]) -> Floats:
-        """(C,) when images were taken, as they say, on the tracker's clock, on which the reset's
-        image is one step old [s]; NaN: no image."""
-        dt_s = self.schedule.dt_s
-        return np.array([np.nan if f is None else (f.taken + 1) * dt_s for f in frames])
+    def arrived(self, b: int, record: Any) -> tuple[list[Any], Floats]:
+        """Keep a record of the present step; those that the cameras (C,) show now, None without an
+        image, and (C,) when these were taken, as they say [s; the reset's at `dt_s`]; NaN: none."""
+        schedule, seed, step = self.schedule, self.seeds[b], int(self.steps[b])
+        self._kept[b][step] = record
+        frames = [schedule.frame(seed, step, c) for c in range(len(schedule.cameras))]
+        records = [None if frame is None else self.at(b, frame.shows) for frame in frames]
+        times_s = [np.nan if f is None else (f.taken + 1) * schedule.dt_s for f in frames]
+        return records, np.array(times_s)
 
 
 def draws(*numbers: int) -> np.random.Generator:

@@ -62,7 +62,7 @@ def test_cameras_of_a_fault_are_named_or_counted_among_those_in_use():
 
 @pytest.mark.parametrize("choice", [2, -1, 7])
 def test_an_index_of_no_camera_is_refused_with_those_that_are(choice):
-    with pytest.raises(ConfigError, match="indices are 0 to 1, valid names camera_1, camera_2"):
+    with pytest.raises(ConfigError, match=r"camera_1, camera_2.* 0 to 1"):
         schedule(FaultConfig("lost", (choice,)))
 
 

@@ -28,24 +28,12 @@ ALGORITHM_1 = Ablation(
     ),
 )
 
-VARIANTS: dict[str, dict[str, Any]] = {
-    "kalman": {},
-    "one hypothesis": {"n_hypotheses": 1},
-    "all": {},
-    "no turned body": {"mirrored_parts": ("limbs",)},
-    "no limbs": {"mirrored_parts": ("body",)},
-    "no anatomy": {"anatomy_trust": 0.0},
-    "no walking direction": {"walking_odds": 0.0},
-    "evidence in full": {"evidence_trust": 1.0},
-    "4 hypotheses": {"n_hypotheses": 4},
-    "16 hypotheses": {"n_hypotheses": 16},
-}
-"""What hypotheses buy: changes of the tracker's settings; `kalman` is that estimator."""
 WHOLE = "all"
 """The variant that is the default filter."""
 WITHOUT: dict[str, tuple[str, dict[str, Any]]] = {
-    "velocity forgotten": ("no motion model (velocity forgotten)", {}),
-    "bones of any length": ("no bones (any length)", {}),
+    WHOLE: ("the default filter", {}),
+    "velocity forgotten": ("no motion model (velocity forgotten)", {"motion": "forgotten"}),
+    "bones of any length": ("no bones (any length)", {"bones": "none"}),
     "no outliers": ("no outliers in the likelihood", {"outlier_weight": 1e-9}),
     "no swaps": ("no exchanged sides", {"swap_begins": 1e-30, "swap_ends": 1.0 - 1e-16}),
     "noise as told": ("no learnt noise (as the detector tells)", {"noise_bounds": (1.0, 1.0)}),
@@ -53,22 +41,24 @@ WITHOUT: dict[str, tuple[str, dict[str, Any]]] = {
     "no widening": ("no wider report for one view", {"one_view_inflation": 1.0}),
     "no floor": ("no floor", {"floor_std_m": math.inf}),
     "stiff bones": ("stiff bones (that give no more than people's)", {"bone_give": 1.0}),
+    "kalman": ("no mixture (kalman)", {"estimator": "kalman"}),
+    "one hypothesis": ("no mixture (one hypothesis)", {"n_hypotheses": 1}),
+    "no turned body": ("no turned body", {"mirrored_parts": ("limbs",)}),
+    "no limbs": ("no limbs", {"mirrored_parts": ("body",)}),
+    "no anatomy": ("no anatomy", {"anatomy_trust": 0.0}),
+    "no walking direction": ("no walking direction", {"walking_odds": 0.0}),
+    "evidence in full": ("evidence in full", {"evidence_trust": 1.0}),
+    "4 hypotheses": ("4 hypotheses", {"n_hypotheses": 4}),
+    "16 hypotheses": ("16 hypotheses", {"n_hypotheses": 16}),
+    "paper": ("paper: Algorithm 1", {"estimator": "paper"}),
+    "ransac": ("ransac: no motion, no body", {"estimator": "ransac"}),
 }
-"""Parts beside the hypotheses: words, and the settings that take them away."""
-HANDICAPS = {
-    "velocity forgotten": ("learnt", "forgotten"),
-    "bones of any length": ("none", "model"),
-}
-"""Those that no setting of the filter takes away: what becomes of bones and motion."""
-WORDS = {
-    WHOLE: "the default filter",
-    "kalman": "no mixture (kalman)",
-    "one hypothesis": "no mixture (one hypothesis)",
-    "paper": "paper: Algorithm 1",
-    "ransac": "ransac: no motion, no body",
-} | {name: words for name, (words, _) in WITHOUT.items()}
-RIVALS = ("paper", "ransac")
-HANGING_ON_ONE_VIEW = ("no widening", *(name for name in VARIANTS if name not in (WHOLE, "kalman")))
+"""The default filter without one of its parts, and rivals: words, and what takes the part away,
+fields of `Setting` or of the tracker's settings."""
+OF_ONE_VIEW = (
+    "no widening", "one hypothesis", "no turned body", "no limbs", "no anatomy",
+    "no walking direction", "evidence in full", "4 hypotheses", "16 hypotheses",
+)  # fmt: skip
 """Parts that do nothing while several cameras look."""
 CAMERAS: dict[str, tuple[str, tuple[Rig, ...]]] = {
     "4cam": ("four cameras", (ALL,)),
@@ -77,28 +67,21 @@ CAMERAS: dict[str, tuple[str, tuple[Rig, ...]]] = {
 }
 
 
-def estimator_of(variant: str) -> str:
-    """Whose settings are changed."""
-    return "kalman" if variant == "kalman" else "particle"
-
-
 def _part(cameras: str, name: str) -> Setting:
     """The default filter without a part, or a rival."""
-    spoken, rigs = CAMERAS[cameras]
-    bones, motion = HANDICAPS.get(name, ("learnt", "model"))
+    (spoken, rigs), (words, changes) = CAMERAS[cameras], WITHOUT[name]
+    of_setting = {key: value for key, value in changes.items() if key in Setting.__slots__}
+    of_tracker = {key: value for key, value in changes.items() if key not in of_setting}
     return Setting(
         f"{cameras}_{name.replace(' ', '_')}",
-        f"{spoken}: {WORDS.get(name, name)}",
-        estimator=name if name in RIVALS else estimator_of(name),
-        tracker=ParticleConfig(**WITHOUT[name][1] if name in WITHOUT else VARIANTS.get(name, {})),
-        bones=bones,
-        motion=motion,
+        f"{spoken}: {words}",
+        tracker=ParticleConfig(**of_tracker),
         turns=left_of("lab", rigs),
         is_timed=True,
+        **of_setting,
     )
 
 
-ONE = tuple(dict.fromkeys((WHOLE, *WITHOUT, *VARIANTS, *RIVALS)))
 FILTER = Ablation(
     "filter",
     "What each part of the default filter contributes",
@@ -106,8 +89,8 @@ FILTER = Ablation(
     "detections: with all four cameras of the laboratory, and with one that is left after the "
     "warm-up. Times are those of the settings with their cameras.",
     (
-        *(_part("4cam", name) for name in ONE if name not in HANGING_ON_ONE_VIEW),
-        *(_part("1cam", name) for name in ONE),
+        *(_part("4cam", name) for name in WITHOUT if name not in OF_ONE_VIEW),
+        *(_part("1cam", name) for name in WITHOUT),
     ),
 )
 

@@ -36,10 +36,8 @@ def hung(places: tuple[Place, ...], height_m: float = UNDER_CEILING_M) -> tuple[
 
 
 def spread_over(n_cameras: int) -> tuple[Turn, ...]:
-    """So many of the eight places, as evenly round the room as possible, in every way to do that.
-
-    One camera is what is left of four after the warm-up: of the corners, or of the walls.
-    """
+    """So many of the eight places, as evenly round the room as possible, in every way to do that;
+    one camera is what is left of four in the corners, or on the walls, after the warm-up."""
     if n_cameras == 1:
         return tuple(left_with(hung(four), kept) for four in (CORNERS, WALLS) for kept in SINGLE)
     n = len(ROUND)
