@@ -15,8 +15,7 @@ from hrc_env.cli.train import Train
 from hrc_env.config import settle
 from hrc_env.core.errors import CheckpointError, RenderingError, learner
 from hrc_env.core.mapping import restored
-from hrc_env.core.provenance import provenance
-from hrc_env.core.results import write_whole
+from hrc_env.core.results import provenance, write_whole
 from hrc_env.sb3 import HRCVecEnv
 
 from . import ppo

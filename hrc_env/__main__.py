@@ -13,8 +13,7 @@ from pathlib import Path
 
 from hrc_env import __version__
 from hrc_env.core.checkout import module_of
-from hrc_env.core.errors import ConfigError, HRCError, unknown
-from hrc_env.core.old_names import OLD_NAMES
+from hrc_env.core.errors import OLD_NAMES, ConfigError, HRCError, unknown
 from hrc_env.registration import IMPORT, import_files
 
 PROGRAM = "python -m hrc_env"
@@ -105,22 +104,18 @@ def main(words: Sequence[str] | None = None) -> int:
 
 def overview() -> str:
     """What there is to call."""
-    lines = [
+    commands = "\n".join(
         textwrap.fill(f"  {name:21s}{says}", 80, subsequent_indent=" " * 23)
         for name, (_, _, says) in COMMANDS.items()
-    ]
-    return "\n".join(
-        (
-            f"usage: {PROGRAM} [--help] [--version] COMMAND ...",
-            "",
-            "A robot, a worker, and the cameras between them.",
-            "",
-            *lines,
-            "",
-            f"{PROGRAM} COMMAND --help says what a command takes. Every command takes",
-            "--import FILE, too: a Python file that registers a task, an estimator or more.",
-        )
     )
+    return f"""usage: {PROGRAM} [--help] [--version] COMMAND ...
+
+A robot, a worker, and the cameras between them.
+
+{commands}
+
+{PROGRAM} COMMAND --help says what a command takes. Every command takes
+--import FILE, too: a Python file that registers a task, an estimator or more."""
 
 
 def versions() -> str:
@@ -132,18 +127,17 @@ def versions() -> str:
 
 def _imported(words: list[str]) -> list[str]:
     """The words without `--import FILE`, here or in a process that this one starts imported."""
-    if "--import" not in words:
-        return words
-    at = words.index("--import")
-    if at + 1 == len(words):
-        raise ConfigError("--import wants a Python file, as in --import my_task.py.")
-    known = os.environ.get(IMPORT, "")
-    os.environ[IMPORT] = os.pathsep.join(filter(None, (known, str(Path(words[at + 1]).resolve()))))
+    while "--import" in words:
+        at = words.index("--import")
+        if at + 1 == len(words):
+            raise ConfigError("--import wants a Python file, as in --import my_task.py.")
+        known, file = os.environ.get(IMPORT, ""), str(Path(words[at + 1]).resolve())
+        os.environ[IMPORT] = os.pathsep.join(filter(None, (known, file)))
+        words = words[:at] + words[at + 2 :]
     import_files()
-    rest = _imported(words[:at] + words[at + 2 :])
-    if not rest:
+    if not words:
         raise ConfigError(f"--import goes with a command; {PROGRAM} --help names them.")
-    return rest
+    return words
 
 
 def _refuse_old_words(words: list[str]) -> None:

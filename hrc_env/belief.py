@@ -1,12 +1,10 @@
 """What a robot believes in one step: itself, its task and the estimate. No truth in here."""
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from hrc_env.core.kernels import kernel
 from hrc_env.core.records import PoseEstimate, RobotState
 from hrc_env.core.skeleton import SEGMENT_RADIUS_M
 from hrc_env.core.typing import Floats
@@ -47,13 +45,5 @@ def estimated_separation(robot: RobotState, estimate: PoseEstimate) -> Separatio
 
 def standard_deviation_m(estimate: PoseEstimate) -> Floats:
     """(B, W, J) root of the mean variance over the axes [m]."""
-    cov = np.ascontiguousarray(estimate.cov_world)
-    std = np.empty(cov.shape[:-2])
-    _root_mean(cov.reshape(-1, 3, 3), std.reshape(-1))
-    return std
-
-
-@kernel
-def _root_mean(cov: Floats, std: Floats) -> None:
-    for k in range(len(std)):
-        std[k] = math.sqrt((cov[k, 0, 0] + cov[k, 1, 1] + cov[k, 2, 2]) / 3.0)
+    cov = estimate.cov_world
+    return np.sqrt((cov[..., 0, 0] + cov[..., 1, 1] + cov[..., 2, 2]) / 3.0)

@@ -4,7 +4,6 @@
 `gymnasium.make("HRCReach-v0", config={"reward": {"proximity": 0.0}})`.
 """
 
-import inspect
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -15,9 +14,8 @@ import numpy as np
 
 from hrc_env.control import ControlConfig
 from hrc_env.core.errors import ConfigError, unknown
-from hrc_env.core.mapping import PRESETS, from_mapping, plain, restored
+from hrc_env.core.mapping import PRESETS, from_mapping, plain, read_toml, restored, to_toml
 from hrc_env.core.results import write_whole
-from hrc_env.core.toml import read_toml, to_toml
 from hrc_env.geometry.camera_config import CameraConfig, read_rig
 from hrc_env.metrics import CostConfig
 from hrc_env.motion.generator import PEOPLE, MotionConfig, PeopleConfig
@@ -84,12 +82,11 @@ class HRCConfig:
             raise ConfigError(f"ctrl_dt must be a positive time [s], got {self.ctrl_dt}.")
         if min(self.start_spread_rad, default=0.0) < 0:
             raise ConfigError(f"start_spread_rad must be >= 0, got {self.start_spread_rad}.")
+        if not all(0 < time_s <= LONGEST_S for time_s in self.forecast_s):
+            raise ConfigError(
+                f"forecast_s must be in (0, {LONGEST_S:g}] s each, got {self.forecast_s}."
+            )
         pool(self.worker)
-        for horizon_s in self.forecast_s:
-            if not 0 < horizon_s <= LONGEST_S:
-                raise ConfigError(
-                    f"forecast_s must be in (0, {LONGEST_S:g}] s each, got {self.forecast_s}."
-                )
         substeps = self.ctrl_dt / self.scene.sim_dt
         if substeps < 0.5 or abs(substeps - round(substeps)) > 1e-6:
             near = max(round(substeps), 1) * self.scene.sim_dt
@@ -111,7 +108,13 @@ PARTS = {
     "faults": "faults",
     "appearance": "appearance",
 }
-"""Keyword arguments that are parts of the config: chosen often."""
+"""Arguments of an environment that are parts of the config: chosen often."""
+ARGUMENTS: dict[str, Any] = {
+    "task": DEFAULT, "perception": "pixels", "estimator": "particle", "cameras": None,
+    "scene": "lab", "robot": DEFAULT_ROBOT, "n_workers": 1, "control": "joint", "shield": None,
+    "config": None, **dict.fromkeys(PARTS),
+}  # fmt: skip
+"""The arguments of an environment that decide what happens in it (`HRCEnv`): their defaults."""
 PRESETS.update({AppearanceConfig: APPEARANCES, PeopleConfig: PEOPLE})
 
 
@@ -133,55 +136,37 @@ class Settings:
     config: HRCConfig
 
 
-def settle(
-    *,
-    task: str | Task = DEFAULT,
-    perception: str = "pixels",
-    estimator: EstimatorChoice = "particle",
-    scene: str = "lab",
-    robot: str | Robot = DEFAULT_ROBOT,
-    n_workers: int | tuple[int, int] = 1,
-    control: str = "joint",
-    shield: "str | Shield | None" = None,
-    config: ConfigChoice = None,
-    cameras: "str | Path | Sequence[Any] | np.ndarray | None" = None,
-    **parts: Any,
-) -> Settings:
-    """Settings from the keyword arguments of an environment; see `HRCEnv`.
-
-    Args:
-        parts: people, motions, faults, appearance: parts of the config (`PARTS`).
+def settle(**arguments: Any) -> Settings:
+    """Settings from keyword arguments of an environment (`ARGUMENTS`); see `HRCEnv`.
 
     Raises:
         ConfigError: an argument that there is not, or a value that cannot be.
     """
-    chosen, spec = task_called(task), estimator_called(estimator)
+    for name in arguments:
+        if name not in ARGUMENTS:
+            raise unknown("argument", name, ARGUMENTS)
+    given = {**ARGUMENTS, **arguments}
+    task, estimator = task_called(given["task"]), estimator_called(given["estimator"])
+    config, cameras = resolve(given["config"], task, estimator), given["cameras"]
     if isinstance(cameras, np.ndarray):
         cameras = cameras.tolist()
-    whole, rig = resolve(config, chosen, spec), rig_of(cameras)
-    if rig is not None:
-        whole, cameras = replace(whole, scene=replace(whole.scene, cameras=rig)), None
-    for name, value in parts.items():
-        if name not in PARTS:
-            raise unknown("argument", name, [*_keywords(), *PARTS])
-        if value is not None:
-            whole = _with_part(whole, PARTS[name], value, name)
+    if (rig := rig_of(cameras)) is not None:
+        config, cameras = replace(config, scene=replace(config.scene, cameras=rig)), None
+    for name, path in PARTS.items():
+        if given[name] is not None:
+            config = _with_part(config, path, given[name], name)
     return Settings(
-        chosen, perception, spec, cameras, scene, robot_called(robot), _worker_counts(n_workers),
-        control, shield_called(shield), whole,
+        task, given["perception"], estimator, cameras, given["scene"],
+        robot_called(given["robot"]), _worker_counts(given["n_workers"]), given["control"],
+        shield_called(given["shield"]), config,
     )  # fmt: skip
-
-
-def _keywords() -> list[str]:
-    return [name for name in inspect.signature(settle).parameters if name != "parts"]
 
 
 def resolve(config: ConfigChoice, task: Task, estimator: EstimatorSpec) -> HRCConfig:
     """A config from what a user gave: itself, a (nested) mapping of changes, a TOML file, nothing.
 
     Raises:
-        ConfigError: a field that does not exist, with the nearest that does; a bad value; the
-            settings of another task.
+        ConfigError: a field that does not exist, a bad value, or the settings of another task.
     """
     if isinstance(config, str | Path):
         config = read_toml(config)
@@ -227,11 +212,7 @@ def load_config(
 
 
 def rig_of(cameras: Any) -> tuple[CameraConfig, ...] | None:
-    """The rig that `cameras=` says (`HRCEnv`); None if it chooses among the scene's cameras.
-
-    Raises:
-        ConfigError: no rig of that name, no such file, or a mixture of names and cameras.
-    """
+    """The rig that `cameras=` says (`HRCEnv`); None if it chooses among the scene's cameras."""
     if isinstance(cameras, str | Path):
         if str(cameras).endswith(".toml"):
             return read_rig(cameras)

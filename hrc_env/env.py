@@ -16,10 +16,10 @@ from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
 from hrc_env import observations
-from hrc_env.config import ConfigChoice, settle
+from hrc_env.config import ConfigChoice, Settings, settle
+from hrc_env.core.batching import Stateful
 from hrc_env.core.errors import ConfigError, unknown, whole
 from hrc_env.core.mapping import plain
-from hrc_env.core.stateful import Stateful
 from hrc_env.core.typing import Floats
 from hrc_env.motion.generator import Clip, PeopleConfig
 from hrc_env.perception.faults.fault import FaultConfig
@@ -40,14 +40,22 @@ ENDLESS = 2**62
 """Steps that are left where nobody said otherwise; time limits are gymnasium's `TimeLimit`."""
 
 
-class PlainSpec:
-    """An environment whose `spec`, which gymnasium writes, holds its arguments as JSON has them."""
+class Door(Stateful):
+    """What a single and a vector environment have in common: states, pictures' form, `spec`."""
 
     _spec: EnvSpec | None = None
 
+    def _open(self, settings: Settings, render_mode: str | None, width: int, height: int) -> None:
+        """Keep settings, and a form of pictures once it is known to be one."""
+        check_render_mode(render_mode)
+        self._size = picture_size(width, height)
+        self.render_mode, self.config = render_mode, settings.config
+        fps = round(1 / self.config.ctrl_dt)
+        self.metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": fps}
+
     @property
     def spec(self) -> EnvSpec | None:
-        """What `gymnasium.make` made this from; `EnvSpec.to_json` writes it."""
+        """What `gymnasium.make` made this from; its arguments are as JSON has them."""
         return self._spec
 
     @spec.setter
@@ -56,7 +64,7 @@ class PlainSpec:
 
 
 class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
-    PlainSpec, Stateful, gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]
+    Door, gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]
 ):
     """A robot works beside people whom it knows through cameras only.
 
@@ -119,19 +127,15 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         height: int = PICTURE_SIZE[1],
         config: ConfigChoice = None,
     ) -> None:
-        check_render_mode(render_mode)
-        self._size = picture_size(width, height)
-        self.render_mode = render_mode
         settings = settle(
             task=task, perception=perception, estimator=estimator, cameras=cameras, scene=scene,
             robot=robot, n_workers=n_workers, people=people, motions=motions, faults=faults,
             appearance=appearance, control=control, shield=shield, config=config,
         )  # fmt: skip
-        self.config = settings.config
+        self._open(settings, render_mode, width, height)
         self.simulation = Simulation(1, settings)
         self.views = Views(self.simulation)
         self.observation_space, self.action_space = spaces(self.simulation)
-        self.metadata = {**self.metadata, "render_fps": round(1 / self.config.ctrl_dt)}
         self._begun = self._closed = False
         self._steps_left = ENDLESS
 
@@ -144,9 +148,6 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
             seed: of its random stream; with None the stream goes on.
             options: "steps_left": after so many steps this episode is truncated, if its time
                 limit does not end it before.
-
-        Raises:
-            ConfigError: an option that there is not, or a value that cannot work.
         """
         self._refuse_closed()
         steps_left = _steps_left(options or {})
@@ -217,11 +218,7 @@ def _steps_left(options: Mapping[str, Any]) -> int:
 
 
 def check_render_mode(render_mode: str | None) -> None:
-    """Refuse render modes that there are not.
-
-    Raises:
-        ConfigError: with those that there are, and how to get a window.
-    """
+    """Raise a `ConfigError` for a render mode that there is not, with those that there are."""
     if render_mode == "human":
         raise ConfigError(
             "render_mode='human' is a window round an environment that draws: gymnasium.make("

@@ -49,22 +49,16 @@ def cost(
     worker_radius_m: Floats,
     config: CostConfig,
 ) -> Cost:
-    """Cost of a step from the true bodies at every substep.
+    """Cost of a step: of the robot's capsules (B, T, K, 2, 3) and radii (K,), and of the workers'
+    true ones (B, T, W, L, 2, 3) and (B, W, L), at every substep [m].
 
     Contact is decided by distance: a mocap hand can pass through a thin arm between two
     substeps of the contact solver.
-
-    Args:
-        robot_world: (B, T, K, 2, 3) the robot's capsules at every substep [m].
-        robot_radius_m: (K,).
-        workers_world: (B, T, W, L, 2, 3) the workers' true capsules at the same times [m].
-        worker_radius_m: (B, W, L) of each worker.
     """
     batch, steps = robot_world.shape[:2]
     bodies = workers_world.reshape(batch, steps, -1, 2, 3)
-    nearest = least_separation(
-        robot_world, robot_radius_m, bodies, worker_radius_m.reshape(batch, -1)
-    )
+    radii_m = worker_radius_m.reshape(batch, -1)
+    nearest = least_separation(robot_world, robot_radius_m, bodies, radii_m)
     nearest_m = nearest.distance_m.min(axis=1)
     return Cost(
         proximity=(nearest_m < config.proximity_m).astype(float),
@@ -76,10 +70,8 @@ def cost(
 def tracking_error(
     estimate: PoseEstimate, truth: WorkerTruth, present: Bools | None = None
 ) -> tuple[Floats, Bools]:
-    """Mean joint position error of the tracked workers.
-
-    Nothing tells a camera who of several workers is called the first: tracks are compared
-    with the workers whom they fit best, none with two.
+    """Mean joint position error of the tracked workers: of tracks and the workers whom they fit
+    best, none with two, as nothing tells a camera who of several is called the first.
 
     Returns:
         (B,) mean over tracked workers and joints [m], NaN where nobody is tracked, and

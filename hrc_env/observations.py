@@ -4,19 +4,16 @@ The space, the environment's page, `split` and the tests all derive from `TERMS`
 they cannot drift apart. Terms read the *estimate* of the worker, never the truth.
 """
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hrc_env.belief import Belief, standard_deviation_m
-from hrc_env.core.errors import check_shape
+from hrc_env.core.errors import Named, check_shape
 from hrc_env.core.kernels import kernel
-from hrc_env.core.old_names import Named
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Floats
+from hrc_env.core.typing import Floats, Tensor
 
 FAR_SEPARATION_M = 1.0
 """Larger separations are reported as this: nothing near, or nobody known of."""
@@ -52,20 +49,15 @@ class ObservationTerm:
 
 
 def _nearest_direction(now: Belief) -> Floats:
-    direction = (now.separation.point_b_world - now.separation.point_a_world).reshape(-1, 3)
-    shorten(direction, 1e-3)
+    to_worker = now.separation.point_b_world - now.separation.point_a_world
     near = now.separation.distance_m < FAR_SEPARATION_M
-    return np.where(near.reshape(-1, 1), direction, 0.0)
+    return np.where(near[..., None], directions(to_worker, 1e-3), 0.0)
 
 
-@kernel
-def shorten(vectors: Floats, softening: float) -> None:
-    """Divide vectors (n, 3) by their length plus a little: unit vectors, but 0 stays 0."""
-    for k in range(len(vectors)):
-        x, y, z = vectors[k]
-        divisor = math.sqrt(x * x + y * y + z * z) + softening
-        for i in range(3):
-            vectors[k, i] /= divisor
+def directions(vectors: Floats, softening: float) -> Floats:
+    """Vectors (..., 3) divided by their length plus a little: unit vectors, but 0 stays 0."""
+    length = np.sqrt(np.add.reduce(vectors * vectors, axis=-1, keepdims=True))
+    return vectors / (length + softening)
 
 
 def _joints_forecast(now: Belief) -> Floats:
@@ -173,30 +165,24 @@ class ObservationLayout:
     """Which of all terms have entries, in their order."""
     slices: dict[str, slice]
     """Of every term."""
-    low: NDArray[np.float32]
-    high: NDArray[np.float32]
+    low: Tensor
+    high: Tensor
     scale: Floats
     """(n,) what one unit of each entry stands for, in the term's unit."""
 
 
 def layout(terms: tuple[ObservationTerm, ...], of: Sizes) -> ObservationLayout:
     """The layout of terms for an arm, an action space, a number of workers and of times ahead."""
-    slices: dict[str, slice] = {}
-    high, scale, start = [], [], 0
-    for term in terms:
-        size = term.size(of)
-        slices[term.name] = slice(start, start + size)
-        high.append(np.full(size, term.bound / term.scale))
-        scale.append(np.full(size, term.scale))
-        start += size
-    bound = np.concatenate(high).astype(np.float32)
-    present = tuple(k for k, term in enumerate(terms) if term.size(of))
-    return ObservationLayout(present, slices, -bound, bound, np.concatenate(scale))
+    sizes = [term.size(of) for term in terms]
+    ends = np.cumsum(sizes).tolist()
+    slices = {t.name: slice(end - n, end) for t, n, end in zip(terms, sizes, ends, strict=True)}
+    bound = np.repeat([term.bound / term.scale for term in terms], sizes).astype(np.float32)
+    scale = np.repeat([term.scale for term in terms], sizes)
+    present = tuple(np.flatnonzero(sizes).tolist())
+    return ObservationLayout(present, slices, -bound, bound, scale)
 
 
-def observe(
-    now: Belief, where: ObservationLayout, terms: tuple[ObservationTerm, ...]
-) -> NDArray[np.float32]:
+def observe(now: Belief, where: ObservationLayout, terms: tuple[ObservationTerm, ...]) -> Tensor:
     """(B, n) flat observations of `terms`; cast to float32 once, here.
 
     Raises:
@@ -219,13 +205,7 @@ def observe(
 
 
 @kernel
-def _scale(
-    physical: Floats,
-    scale: Floats,
-    low: NDArray[np.float32],
-    high: NDArray[np.float32],
-    observation: NDArray[np.float32],
-) -> bool:
+def _scale(physical: Floats, scale: Floats, low: Tensor, high: Tensor, observation: Tensor) -> bool:
     """Entries (B, n) in units to clipped ones in units of `scale`; whether all are numbers."""
     numbers = True
     for b in range(physical.shape[0]):
@@ -236,7 +216,7 @@ def _scale(
     return numbers
 
 
-def split(observation: NDArray[np.float32], where: ObservationLayout) -> dict[str, Floats]:
+def split(observation: Tensor, where: ObservationLayout) -> dict[str, Floats]:
     """A flat observation (..., n) as named terms in their units."""
     physical = observation * where.scale
     return Named((name, physical[..., part]) for name, part in where.slices.items())

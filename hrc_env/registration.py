@@ -53,11 +53,8 @@ def register_task(task: "Task") -> None:
 
 
 def register_estimator(spec: "EstimatorSpec") -> None:
-    """Make an estimator known by its name: wherever `estimator=` or `--estimator` is taken.
-
-    Raises:
-        ConfigError: also for an estimate of a wrong shape, without finite numbers or covariance.
-    """
+    """Make an estimator known by its name: wherever `estimator=` or `--estimator` is taken. Its
+    estimates must be finite and of the right shapes."""
     from hrc_env.tracking.estimators import check_estimator
 
     check_estimator(spec)
@@ -74,10 +71,7 @@ def register_robot(robot: "Robot") -> None:
 
 def register_detector(name: str, make: "Callable[[], KeypointFunction]") -> None:
     """Make a pose detector known: `config={"detector": {"keypoints": name}}`, level "pixels".
-
-    `make` gives the function from a crop to keypoints (`hrc_env.perception.detector`'s
-    `KeypointFunction`); it is called once for each thread that detects.
-    """
+    `make` is called once for each thread that detects."""
     _add("detector", name, make, is_function=True)
 
 
@@ -105,10 +99,8 @@ def known(what: str) -> dict[str, Any]:
 
 
 def import_files(paths: str | None = None) -> None:
-    """Import Python files, each once; their calls of `register_...` take effect.
-
-    They are separated as in PATH; None: those of the environment variable `IMPORT`.
-    """
+    """Import Python files, each once, which register things; separated as in PATH; None: those
+    of the environment variable `IMPORT`."""
     given = os.environ.get(IMPORT, "") if paths is None else paths
     for path in (Path(each).resolve() for each in given.split(os.pathsep) if each):
         name = f"hrc_env_import_{path.stem}"
@@ -128,8 +120,9 @@ def import_files(paths: str | None = None) -> None:
 def _add(
     what: str, name: str, thing: Any, taken: Collection[str] = (), is_function: bool = False
 ) -> None:
+    table = known(what)
     if is_function and not callable(thing):
         raise ConfigError(f"{name}: a {what} must be a function, got {thing!r}.")
-    if name in taken or name in known(what):
+    if name in taken or name in table:
         raise ConfigError(f"There is the {what} {name!r} already; choose another name.")
-    known(what)[name] = thing
+    table[name] = thing

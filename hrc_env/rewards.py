@@ -8,7 +8,6 @@ import numpy as np
 
 from hrc_env.belief import Belief
 from hrc_env.core.errors import ConfigError, check_shape
-from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
 
 
@@ -49,15 +48,9 @@ def closeness(separation_m: Floats, reach_m: float) -> Floats:
     return share * share
 
 
-@kernel(makes_arrays=True)
 def _mean_square(vectors: Floats) -> Floats:
     """(B,) of (B, n)."""
-    mean = np.zeros(len(vectors))
-    for b in range(len(vectors)):
-        for value in vectors[b]:
-            mean[b] += value * value
-        mean[b] /= vectors.shape[1]
-    return mean
+    return np.add.reduce(vectors * vectors, axis=1) / vectors.shape[1]
 
 
 def _proximity(now: Belief, step: Any, previous: Floats, config: RewardConfig) -> Floats:

@@ -23,6 +23,10 @@ with learner():
 
 COSTS = ("cost", "cost_proximity", "cost_contact")
 """Infos whose sums over an episode are kept."""
+SO_FAR = np.dtype(
+    [(name, "f8") for name in ("steps", "reward", *COSTS, "contacts", "touching", "nearest_m")]
+)
+"""What an episode has come to so far; a long touch is one contact."""
 ACHIEVED, FAILED = "goals_reached", "goals_missed"
 """What an episode's statistics call the attempts of every task (`Task.achieved`, `Task.failed`)."""
 
@@ -31,14 +35,12 @@ class HRCVecEnv(VecEnv):
     """An `HRCVectorEnv` as SB3 expects environments, with episode statistics.
 
     Environment k of `seed(s)` and then `reset()` is the single environment after
-    `reset(seed=s + k)`. The info of a step holds its "cost", of which `costs` is the array, and
-    nothing else but where an episode ended: there it is the whole, with what SB3 reads
-    ("terminal_observation", "TimeLimit.truncated") and the episode's statistics ("episode").
+    `reset(seed=s + k)`. The info of a step holds its "cost" only, but where an episode ended the
+    whole, with "terminal_observation", "TimeLimit.truncated" and the statistics, "episode".
 
     Args:
-        stagger: after the first `reset()` and after those that follow a `seed()`, let each
-            environment's first episode end early at a random time, so that a short rollout of a
-            learner sees all phases of an episode and not one. Not for evaluation.
+        stagger: after a `seed()`, let each environment's first episode end early at a random
+            time, so that a short rollout sees all phases of an episode. Not for evaluation.
         seed: of the first reset.
         kwargs: as of `HRCVectorEnv`.
     """
@@ -55,10 +57,7 @@ class HRCVecEnv(VecEnv):
         self.costs: Floats = np.zeros(num_envs)
         """(num_envs,) the cost of the last step; 0 after a reset."""
         self._action = np.zeros((num_envs, *(actions.shape or ())), np.float32)
-        self._sums = {name: np.zeros(num_envs) for name in ("reward", "contacts", *COSTS)}
-        self._touching = np.zeros(num_envs, bool)
-        self._nearest_m = np.full(num_envs, np.inf)
-        self._steps = np.zeros(num_envs, int)
+        self._so_far = np.zeros(num_envs, SO_FAR)
 
     @property
     def simulation(self) -> Simulation:
@@ -78,9 +77,9 @@ class HRCVecEnv(VecEnv):
 
     def reset(self) -> NDArray[np.float32]:
         """Start every environment: from its seed the first time, then on with its stream."""
-        options, phases = None, self._phases
-        if phases is not None:
-            elapsed = phases.integers(self.env.max_episode_steps, size=self.num_envs)
+        options = None
+        if self._phases is not None:
+            elapsed = self._phases.integers(self.env.max_episode_steps, size=self.num_envs)
             options, self._phases = {"elapsed_steps": elapsed}, None
         seeds = None if None in self._seeds else self._seeds
         observation, infos = self.env.reset(seed=seeds, options=options)
@@ -125,36 +124,36 @@ class HRCVecEnv(VecEnv):
         return list(self.env.render() or ())
 
     def _begin(self, ids: Ints) -> None:
-        for total in self._sums.values():
-            total[ids] = 0.0
-        self._steps[ids], self._touching[ids], self._nearest_m[ids] = 0, False, np.inf
+        self._so_far[ids] = np.zeros(1, SO_FAR)
+        self._so_far["nearest_m"][ids] = np.inf
 
     def _count(self, reward: Floats, infos: Mapping[str, Any]) -> None:
-        self._steps += 1
-        self._sums["reward"] += reward
+        now = self._so_far
+        now["steps"] += 1
+        now["reward"] += reward
         costs = {name: _of_step(infos, name, self.num_envs) for name in COSTS}
         for name, cost in costs.items():
-            self._sums[name] += cost
+            now[name] += cost
         self.costs, touching = costs["cost"], costs["cost_contact"] > 0
-        self._sums["contacts"] += touching & ~self._touching  # a long touch is one contact
-        self._touching = touching
+        now["contacts"] += touching > now["touching"]
+        now["touching"] = touching
         separation_m = _of_step(infos, "safety/min_separation_m", self.num_envs)
-        self._nearest_m = np.fmin(self._nearest_m, separation_m)
+        now["nearest_m"] = np.fmin(now["nearest_m"], separation_m)
 
     def _episode(self, b: int, info: Mapping[str, Any]) -> dict[str, float]:
         """Statistics of an episode under the names of SB3's Monitor, and ours."""
-        task, sums = self.simulation.task, self._sums
+        task, episode = self.simulation.task, self._so_far[b]
         return {
-            "r": float(sums["reward"][b]),
-            "l": int(self._steps[b]),
-            "seconds": float(self._steps[b] * self.env.config.ctrl_dt),
+            "r": float(episode["reward"]),
+            "l": int(episode["steps"]),
+            "seconds": float(episode["steps"] * self.env.config.ctrl_dt),
             "t": time.time() - self.started_s,
-            "cost": float(sums["cost"][b]),
-            "cost_steps": float(sums["cost_proximity"][b]),
-            "contacts": float(sums["contacts"][b]),
+            "cost": float(episode["cost"]),
+            "cost_steps": float(episode["cost_proximity"]),
+            "contacts": float(episode["contacts"]),
             ACHIEVED: info[task.achieved],
             FAILED: info[task.failed],
-            "min_separation_m": float(self._nearest_m[b]),
+            "min_separation_m": float(episode["nearest_m"]),
         }
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:

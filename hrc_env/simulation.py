@@ -6,20 +6,20 @@ streams only, never on the size of the batch.
 
 import warnings
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hrc_env import metrics, observations, rewards
+from hrc_env import metrics, observations, rewards, step
 from hrc_env.belief import Belief, estimated_separation
 from hrc_env.config import Settings
 from hrc_env.control import joint_command, n_actions
-from hrc_env.core.batching import picked, write_rows
+from hrc_env.core.batching import State, Stateful, picked, write_rows
 from hrc_env.core.errors import ConfigError, check_shape
 from hrc_env.core.kernels import ahead
 from hrc_env.core.records import PoseEstimate, RobotState, WorkerMotion, WorkerTruth
-from hrc_env.core.stateful import State, Stateful
 from hrc_env.core.streams import children
 from hrc_env.core.typing import Bools, Floats, Ints, JointVelocities, Points3
 from hrc_env.geometry import chains
@@ -28,20 +28,10 @@ from hrc_env.pipeline.levels import CAMERA_LEVELS, make_pipeline
 from hrc_env.pipeline.sensor_input import SensorInput, TrueSensorInput
 from hrc_env.rewards import RewardConfig
 from hrc_env.safety.shield import shielded
-from hrc_env.scene.build import build
+from hrc_env.scene.build import Scene, build
 from hrc_env.scene.physics import Physics
 from hrc_env.scene.rigs import findings
-from hrc_env.step import (
-    Info,
-    StepResult,
-    body_names,
-    cost_info,
-    miscalibration_info,
-    no_cost,
-    rows_of,
-    tracking_info,
-    worker_info,
-)
+from hrc_env.step import Info, StepResult
 from hrc_env.tasks.task import World
 from hrc_env.tracking import oracle
 from hrc_env.worker.body import pool, stack, worker_capsules, worker_truth
@@ -61,45 +51,36 @@ class Simulation(Stateful):
 
     CHANGES = (
         "physics", "pipeline", "motion", "task_state", "streams", "action", "episode_cost",
-        "separation_m", "estimates", "body_names", "reward_weights",
+        "separation_m", "estimates", "reward_weights",
     )  # fmt: skip
 
     def __init__(self, batch: int, settings: Settings) -> None:
-        config, perception, scene = settings.config, settings.perception, settings.scene
+        config, perception = settings.config, settings.perception
         ahead.ensure(perception)
         self.batch, self.config, self.control = batch, config, settings.control
         self.perception, self.shield, self.task = perception, settings.shield, settings.task
         self.bodies = stack(pool(config.worker))
         fewest, most = settings.n_workers
-        empty = build(config.scene, scene, 0, self.bodies.names, settings.cameras, settings.robot)
+        scene_for = partial(
+            build, config.scene, settings.scene,
+            bodies=self.bodies.names, cameras=settings.cameras, robot=settings.robot,
+        )  # fmt: skip
         self.motion = generator.make_state(
-            batch, most, self.bodies, config.motion, empty.grounds, fewest
+            batch, most, self.bodies, config.motion, scene_for(n_workers=0).grounds, fewest
         )  # first, as it knows how many workers there is room for
-        self.scene = build(
-            config.scene, scene, most, self.bodies.names, settings.cameras, settings.robot
-        )
+        self.scene = scene_for(n_workers=most)
         if perception in CAMERA_LEVELS:
             for finding in findings(self.scene):
                 warnings.warn(finding, stacklevel=3)
-        self.settings = {
-            "batch": batch, "task": settings.task.id, "perception": perception,
-            "estimator": settings.estimator.name, "scene": scene, "robot": settings.robot.name,
-            "cameras": tuple(camera.name for camera in self.scene.cameras),
-            "n_workers": (fewest, most) if fewest < most else most, "control": settings.control,
-            "config": config,
-        }  # fmt: skip
-        self.chain = self.scene.chain
+        self.settings = _recorded(batch, settings, self.scene)
+        self.chain, n_joints = self.scene.chain, self.scene.chain.n_joints
         self._spread_rad = np.array(config.start_spread_rad or settings.robot.spread_rad)
-        joints = (self.chain.n_joints,)
-        check_shape("start_spread_rad", self._spread_rad.shape, joints, "one a joint")
+        check_shape("start_spread_rad", self._spread_rad.shape, (n_joints,), "one a joint")
         self.n_actions = n_actions(settings.control, self.chain)
-        sizes = observations.Sizes(
-            self.chain.n_joints, self.n_actions, most, len(config.forecast_s)
-        )
+        sizes = observations.Sizes(n_joints, self.n_actions, most, len(config.forecast_s))
         self.layout = observations.layout(self.terms, sizes)
         self.physics = Physics(self.scene, batch)
         self.pipeline = make_pipeline(perception, settings.estimator, self.scene, batch, config)
-        self.body_names = np.full(batch, None, object)
         self.task_state = self.task.init(batch)
         self.reward_weights = config.reward
         self._everyone = np.arange(batch)
@@ -118,11 +99,7 @@ class Simulation(Stateful):
             for name, stream in zip(STREAMS, children(rng, len(STREAMS)), strict=True):
                 streams[name][b] = stream
         generator.reset(self.motion, ids, streams["motion"])
-        bodies = self.motion.workers["body"][ids]
-        self.body_names[ids] = body_names(
-            bodies, self.motion.workers["present"][ids], self.bodies.names
-        )
-        self.physics.reset(ids, self._starting_angles(ids), bodies)
+        self.physics.reset(ids, self._starting_angles(ids), self.motion.workers["body"][ids])
         self.action[ids], self.episode_cost[ids], self.separation_m[ids] = 0.0, 0.0, 0.0
         robot = chains.robot_state(self.chain, self.physics.q[ids], self.physics.qd[ids])
         self.task.reset(self.task_state, ids, streams["task"], World(robot), self.config.task)
@@ -133,8 +110,8 @@ class Simulation(Stateful):
         belief = self._believed(ids, robot, estimates)
         observation = observations.observe(belief, self.layout, self.terms)
         info = {
-            **no_cost(len(ids)),
-            **tracking_info(estimates[0], truth, self.present[ids]),
+            **step.no_cost(len(ids)),
+            **step.tracking_info(estimates[0], truth, self.present[ids]),
             **self._episode_info(ids),
         }
         return StepResult(observation, np.zeros(len(ids)), np.zeros(len(ids), bool), info)
@@ -167,8 +144,8 @@ class Simulation(Stateful):
         self.separation_m = cost.min_separation_m
         info = {
             **{f"reward/{name}": value for name, value in terms.items()},
-            **cost_info(cost, self.present),
-            **tracking_info(estimates[0], truth, self.present),
+            **step.cost_info(cost, self.present),
+            **step.tracking_info(estimates[0], truth, self.present),
             **shield_info,
             **self._episode_info(self._everyone),
         }
@@ -286,11 +263,24 @@ class Simulation(Stateful):
     def _episode_info(self, ids: Ints) -> Info:
         """What the episodes of environments `ids` have come to so far, and who is there."""
         tally = {"episode_cost": self.episode_cost, **self.task.info(self.task_state)}
+        activity, body = generator.activity(self.motion)[ids], self.motion.workers["body"][ids]
         return {
-            **rows_of(tally, ids),
-            **worker_info(generator.activity(self.motion)[ids], self.body_names[ids]),
-            **miscalibration_info(self.settings["cameras"], self.pipeline.suspected(ids)),
+            **{name: value[ids] for name, value in tally.items()},
+            **step.worker_info(activity, body, self.bodies.names),
+            **step.miscalibration_info(self.settings["cameras"], self.pipeline.suspected(ids)),
         }
+
+
+def _recorded(batch: int, settings: Settings, scene: Scene) -> dict[str, Any]:
+    """What a state must have been taken with to be set."""
+    fewest, most = settings.n_workers
+    return {
+        "batch": batch, "task": settings.task.id, "perception": settings.perception,
+        "estimator": settings.estimator.name, "scene": settings.scene,
+        "robot": settings.robot.name, "cameras": tuple(camera.name for camera in scene.cameras),
+        "n_workers": (fewest, most) if fewest < most else most, "control": settings.control,
+        "config": settings.config,
+    }  # fmt: skip
 
 
 def checked_action(action: ArrayLike, shape: tuple[int, ...]) -> Floats:

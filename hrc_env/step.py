@@ -1,8 +1,8 @@
 """What a step or a reset gives: observation, reward, end, and infos by name."""
 
-import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import compress
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env import metrics
-from hrc_env.core.old_names import Named
+from hrc_env.core.errors import Named
 from hrc_env.core.records import PoseEstimate, WorkerTruth
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.motion import generator
@@ -54,17 +54,11 @@ def joined(results: Sequence[StepResult]) -> StepResult:
     """Results of ranges of a batch, one after the other."""
     if len(results) == 1:
         return results[0]
+    names = "observation", "reward", "terminated"
     return StepResult(
-        np.concatenate([each.observation for each in results]),
-        np.concatenate([each.reward for each in results]),
-        np.concatenate([each.terminated for each in results]),
+        *[np.concatenate([getattr(each, name) for each in results]) for name in names],
         {name: np.concatenate([each.info[name] for each in results]) for name in results[0].info},
     )
-
-
-def rows_of(info: Info, ids: Ints) -> Info:
-    """Rows `ids` of every value of an info."""
-    return {name: value[ids] for name, value in info.items()}
 
 
 def cost_info(cost: metrics.Cost, present: Bools) -> Info:
@@ -90,39 +84,25 @@ def tracking_info(estimate: PoseEstimate, truth: WorkerTruth, present: Bools) ->
     return {"tracking/mpjpe_m": error_m, "tracking/lost": lost.astype(float)}
 
 
-def worker_info(activity: Ints, body_names: NDArray[np.object_]) -> Info:
-    """What workers (B, W) do, and whose bodies (B,) they have, by name."""
-    doing = [_activity_names(tuple(row)) for row in activity.tolist()]
-    return {ACTIVITY: objects(doing), BODY: body_names.copy()}
+def worker_info(activity: Ints, body: Ints, bodies: tuple[str, ...]) -> Info:
+    """What workers (B, W) do, and which of the `bodies` (B, W) they have, by name."""
+    worn = np.where(activity == generator.ABSENT, generator.ABSENT, body)
+    return {ACTIVITY: _named(activity, generator.activity_names), BODY: _named(worn, bodies)}
 
 
 def miscalibration_info(cameras: tuple[str, ...], suspected: Bools) -> Info:
     """Which of the cameras (B, C) contradict the others; nothing where there are no cameras."""
     if not suspected.shape[1]:
         return {}
-    return {MISCALIBRATED: objects([tuple(compress(cameras, row)) for row in suspected.tolist()])}
+    named = (tuple(compress(cameras, row)) for row in suspected.tolist())
+    return {MISCALIBRATED: np.fromiter(named, object)}
 
 
-def body_names(bodies: Ints, present: Bools, names: tuple[str, ...]) -> NDArray[np.object_]:
-    """(B,) the names of the workers' bodies (B, W), a tuple each."""
-    rows = zip(bodies.tolist(), present.tolist(), strict=True)
-    return objects(
-        [
-            tuple(names[k] if there else ABSENT for k, there in zip(*row, strict=True))
-            for row in rows
-        ]
-    )
+def _named(indices: Ints, names: tuple[str, ...]) -> NDArray[np.object_]:
+    """(B,) tuples of the names of indices (B, W); `ABSENT` for `generator.ABSENT`, which is -1."""
+    return np.fromiter(map(tuple, _table(names)[indices].tolist()), object)
 
 
-def objects(values: Sequence[Any]) -> NDArray[np.object_]:
-    """(B,) things of any kind, tuples too."""
-    array = np.empty(len(values), object)
-    for k, value in enumerate(values):
-        array[k] = value
-    return array
-
-
-@functools.lru_cache(maxsize=4096)
-def _activity_names(activity: tuple[int, ...]) -> tuple[str, ...]:
-    names = generator.activity_names
-    return tuple(ABSENT if k == generator.ABSENT else names[k] for k in activity)
+@cache
+def _table(names: tuple[str, ...]) -> NDArray[np.object_]:
+    return np.array([*names, ABSENT], object)

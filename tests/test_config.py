@@ -7,8 +7,7 @@ import pytest
 
 from hrc_env.__main__ import main
 from hrc_env.config import HRCConfig, load_config, save_config, settle
-from hrc_env.core.errors import ConfigError
-from hrc_env.core.old_names import OLD_NAMES, Named
+from hrc_env.core.errors import OLD_NAMES, ConfigError, Named
 from hrc_env.env import HRCEnv
 from hrc_env.motion.clip import Clip
 from hrc_env.motion.config import PEOPLE

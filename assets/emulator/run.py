@@ -15,7 +15,7 @@ from assets.emulator.validate import Compared, compared
 from assets.emulator.writing import write_calibration
 from hrc_env.config import HRCConfig
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.provenance import provenance
+from hrc_env.core.results import provenance
 from hrc_env.perception.calibration import Calibration
 from hrc_env.perception.emulator import EmulatorConfig
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 
 from benchmarks.speed.contenders import Contender
 from benchmarks.speed.stopwatch import Place, Stopwatch
-from hrc_env import metrics, observations, rewards, simulation
+from hrc_env import metrics, observations, rewards, simulation, step
 from hrc_env.core.errors import HRCError
 from hrc_env.geometry import chains
 from hrc_env.motion import generator
@@ -37,8 +37,8 @@ ORGANS: Mapping[str, Sequence[Place]] = {
     "observation": ((observations, "observe"),),
     "reward": ((rewards, "evaluated"), (rewards, "total")),
     "info": (
-        (simulation, "tracking_info"),
-        (simulation, "cost_info"),
+        (step, "tracking_info"),
+        (step, "cost_info"),
         (simulation.Simulation, "_episode_info"),
         (simulation.StepResult, "info_of"),
         (env, "table"),

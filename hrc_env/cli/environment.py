@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.toml import read_toml
+from hrc_env.core.mapping import read_toml
 from hrc_env.tasks import DEFAULT
 
 FAULT = """'{"kind": "late", "cameras": ["camera_1"], "amount": 0.2}'"""

@@ -44,8 +44,7 @@ class List(EnvironmentArguments):
 
     def _show_config(self) -> int:
         from hrc_env.config import settle
-        from hrc_env.core.mapping import plain
-        from hrc_env.core.toml import to_toml
+        from hrc_env.core.mapping import plain, to_toml
 
         print(to_toml(plain(asdict(settle(**self.keywords()).config))), end="")
         return 0

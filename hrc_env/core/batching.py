@@ -1,4 +1,4 @@
-"""Some rows of a batch: states are records of arrays whose first axis is the environment.
+"""States: records of arrays whose first axis is the environment; their rows, copies, saved ones.
 
 An organ that works on a few environments only (a reset of 3 of 64) works on a record of
 their rows; as no result depends on the size of the batch, that is the same computation.
@@ -8,13 +8,14 @@ import copy
 import dataclasses
 import functools
 from collections.abc import Callable, Sequence
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
 from hrc_env.core.typing import Bools, Ints
 
 RecordT = TypeVar("RecordT")
+State = dict[str, Any]
 
 
 def rows(record: RecordT, ids: Ints | Bools) -> RecordT:
@@ -29,19 +30,19 @@ def one(record: RecordT, b: int) -> RecordT:
 
 def write_rows(record: object, ids: Any, part: object) -> None:
     """Write a record of rows back into rows `ids` (integers, a mask, `...`) of a record."""
+    if isinstance(record, np.ndarray):
+        record[ids] = part
     for name in _names(type(record)):
-        value, new = getattr(record, name), getattr(part, name)
-        if isinstance(value, np.ndarray):
-            value[ids] = new
-        else:
-            write_rows(value, ids, new)
+        write_rows(getattr(record, name), ids, getattr(part, name))
 
 
 def mapped(record: RecordT, change: Callable[[Any], Any]) -> RecordT:
     """A (nested) record of the same kind with `change` applied to every array."""
-    kind = type(record)
-    values = [getattr(record, name) for name in _names(kind)]
-    return kind(*[change(v) if isinstance(v, np.ndarray) else _mapped(v, change) for v in values])
+    if isinstance(record, np.ndarray):
+        return change(record)
+    names = _names(type(record))
+    values = [mapped(getattr(record, name), change) for name in names]
+    return type(record)(*values) if names else record
 
 
 def copied(value: Any) -> Any:
@@ -60,13 +61,32 @@ def picked(streams: Sequence[np.random.Generator], ids: Ints) -> list[np.random.
     return [streams[b] for b in ids]
 
 
+class Stateful:
+    """Saves and brings back the attributes in `CHANGES`; the others are settings and constants."""
+
+    CHANGES: ClassVar[tuple[str, ...]] = ()
+
+    def get_state(self) -> Any:
+        """A copy of everything that changes; `set_state` brings it back bit for bit."""
+        parts = {name: getattr(self, name) for name in self.CHANGES}
+        return {
+            name: part.get_state() if hasattr(part, "get_state") else copied(part)
+            for name, part in parts.items()
+        }
+
+    def set_state(self, state: Any) -> None:
+        """Continue from a state of a thing with the same settings; the state stays as it is."""
+        for name in self.CHANGES:
+            part = getattr(self, name)
+            if hasattr(part, "set_state"):
+                part.set_state(state[name])
+            else:
+                setattr(self, name, copied(state[name]))
+
+
 @functools.cache
 def _names(kind: type) -> tuple[str, ...]:
     """The fields of a dataclass or a named tuple; whatever else there is has none."""
     if dataclasses.is_dataclass(kind):
         return tuple(each.name for each in dataclasses.fields(kind))
     return getattr(kind, "_fields", ())
-
-
-def _mapped(value: Any, change: Callable[[Any], Any]) -> Any:
-    return mapped(value, change) if _names(type(value)) else value

@@ -17,20 +17,15 @@ def agents(module: str) -> ModuleType:
     return importlib.import_module(f"{package}.{module}")
 
 
-def from_clone(module: str) -> ModuleType:
-    """A module of the benchmarks or of the assets' makers; an error if only a wheel is here."""
-    try:
-        return importlib.import_module(module)
-    except ModuleNotFoundError as error:
-        missing = error.name or ""
-        if not (module == missing or module.startswith(f"{missing}.")):
-            raise
-        raise HRCError(
-            f"{module} is a part of the repository, not of the installed package. Clone the "
-            "repository, run `pip install -e .` in it, and call this again."
-        ) from error
-
-
 def module_of(name: str) -> ModuleType:
     """A module by its dotted name: of this package, or of the clone around it."""
-    return from_clone(name) if name.startswith(CLONE_ONLY) else importlib.import_module(name)
+    try:
+        return importlib.import_module(name)
+    except ModuleNotFoundError as error:
+        itself = f"{name}.".startswith(f"{error.name}.")
+        if not (itself and name.startswith(CLONE_ONLY)):
+            raise
+        raise HRCError(
+            f"{name} is a part of the repository, not of the installed package. Clone the "
+            "repository, run `pip install -e .` in it, and call this again."
+        ) from error

@@ -1,9 +1,11 @@
-"""Frozen settings from plain mappings and back: what JSON or a notebook gives, field by field."""
+"""Frozen settings from plain mappings or TOML files, field by field, and back."""
 
 import dataclasses
 import enum
+import json
 import math
 import re
+import tomllib
 import types
 import typing
 from collections.abc import Mapping
@@ -17,6 +19,7 @@ from hrc_env.core.errors import ConfigError, unknown
 RecordT = TypeVar("RecordT")
 PRESETS: dict[type, Mapping[str, Any]] = {}
 """Records that have names, by their type: a name stands for the record."""
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def from_mapping(
@@ -28,15 +31,12 @@ def from_mapping(
     """A dataclass from a mapping; what it nests may be mappings too, tuples may be lists.
 
     Args:
-        kind: of the record.
-        mapping: values by field, as `dataclasses.asdict` and JSON have them.
         path: what comes before the fields' names in errors.
         kinds: types of fields where the record's own hints leave them open.
 
     Raises:
-        ConfigError: a field that does not exist, with the nearest that does; one that is
-            missing; a value of another type or length than the field's, or one that the
-            dataclass refuses. Fields are called by their path, as in `scene.cameras[0].name`.
+        ConfigError: a field that does not exist or is missing, a value of another type or length,
+            or one that the dataclass refuses; by the path, as in `scene.cameras[0].name`.
     """
     hints = {**typing.get_type_hints(kind), **(kinds or {})}
     fields = dataclasses.fields(kind)  # type: ignore[arg-type]
@@ -129,6 +129,43 @@ def plain(value: Any) -> Any:
     if isinstance(value, enum.Enum):
         return value.value
     return str(value) if isinstance(value, Path) else value
+
+
+def read_toml(path: str | Path) -> dict[str, Any]:
+    """The content of a TOML file; `ConfigError` without one."""
+    try:
+        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigError(f"The file {path} cannot be read: {error}.") from error
+    except ValueError as error:  # what tomllib and the decoder raise
+        raise ConfigError(f"{path} must be TOML; reading it ended with: {error}") from error
+
+
+def to_toml(content: Mapping[str, Any], path: str = "") -> str:
+    """TOML of nested mappings, lists, text, numbers and truth values; None is left out."""
+    lines, tables = [], []
+    for name, value in content.items():
+        key = name if _BARE.fullmatch(name) else json.dumps(name)
+        if isinstance(value, Mapping):
+            tables.append(f"[{path}{key}]\n{to_toml(value, f'{path}{key}.')}")
+        elif isinstance(value, list | tuple) and value and isinstance(value[0], Mapping):
+            for each in value:
+                tables.append(f"[[{path}{key}]]\n{to_toml(each, f'{path}{key}.')}")
+        elif value is not None:
+            lines.append(f"{key} = {_value(value, path + key)}\n")
+    return "\n".join(["".join(lines), *tables] if lines else tables)
+
+
+def _value(value: Any, where: str) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, int | float):
+        return repr(value)
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(_value(each, where) for each in value)}]"
+    raise ConfigError(f"{where} cannot be written to a file: {value!r}.")
 
 
 def _located(error: ConfigError, kind: type, path: str) -> ConfigError:

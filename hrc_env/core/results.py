@@ -1,17 +1,23 @@
-"""results.json: the one form in which every benchmark and experiment writes its numbers."""
+"""results.json: the one form in which benchmarks and experiments write numbers and their origin."""
 
 import contextlib
 import json
 import os
+import platform
+import subprocess
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from hrc_env.core.errors import HRCError
-from hrc_env.core.provenance import provenance
+
+PACKAGES = ("numpy", "numba", "mujoco", "gymnasium", "stable-baselines3", "torch",
+            "opencv-python-headless", "ai-edge-litert")  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +39,20 @@ def over(values: Sequence[float], unit: str) -> Metric:
     return Metric(
         float(np.median(values)), float(np.min(values)), float(np.max(values)), unit, len(values)
     )
+
+
+def provenance() -> dict[str, Any]:
+    """Where a result comes from: versions, the checkout's commit (if it is one), the machine."""
+    return {
+        "hrc_env": _version("hrc_env"),
+        "git": _commit(),
+        "versions": {name: _version(name) for name in PACKAGES},
+        "machine": {
+            "python": platform.python_version(),
+            "system": platform.platform(),
+            "cores": os.cpu_count(),
+        },
+    }
 
 
 def write_results(
@@ -62,3 +82,24 @@ def write_whole(path: Path, content: str) -> None:
             f"{path} cannot be written: {error.strerror}. What is finished is kept; make room, "
             "or choose another folder, and start the same command again."
         ) from error
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
+
+
+def _commit() -> str | None:
+    """The commit, with "+changes" where the working tree differs; None outside a checkout."""
+    root = Path(__file__).resolve().parents[2]
+    if not (root / ".git").exists():
+        return None
+    git = partial(subprocess.run, cwd=root, capture_output=True, text=True, check=True)
+    try:
+        commit = git(["git", "rev-parse", "--short", "HEAD"]).stdout.strip()
+        changes = git(["git", "status", "--porcelain"]).stdout
+    except (OSError, subprocess.CalledProcessError):
+        return None
+    return commit + ("+changes" if changes else "")

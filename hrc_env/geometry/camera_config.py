@@ -18,8 +18,7 @@ from typing import NoReturn
 import numpy as np
 
 from hrc_env.core.errors import ConfigError, unknown
-from hrc_env.core.mapping import from_mapping
-from hrc_env.core.toml import read_toml, to_toml
+from hrc_env.core.mapping import from_mapping, read_toml, to_toml
 from hrc_env.core.typing import Floats
 from hrc_env.geometry.lens import Lens, distorted_radius, rays_cam
 

@@ -6,7 +6,7 @@ Pixels are continuous from the image's top-left corner: pixel centres lie at hal
 axes are OpenCV's: +X right, +Y down, +Z forward.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -59,6 +59,14 @@ def pinhole(
     T_world_from_cam[:3, :3] = look_at(eye_world, target_world)
     T_world_from_cam[:3, 3] = eye_world
     return PinholeCamera(name, K, T_world_from_cam, width_px, height_px)
+
+
+def resized(camera: PinholeCamera, width_px: int, height_px: int) -> PinholeCamera:
+    """The camera with an image so wide; of its height as much as fits, round the middle."""
+    K = camera.K * width_px / camera.width_px
+    K[1, 2] += (height_px - camera.height_px * width_px / camera.width_px) / 2
+    K[2, 2] = 1.0
+    return replace(camera, K=K, width_px=width_px, height_px=height_px)
 
 
 def projections(cameras: tuple[PinholeCamera, ...]) -> Floats:

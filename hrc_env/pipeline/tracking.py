@@ -5,10 +5,9 @@ from typing import Any
 import numpy as np
 
 from hrc_env.config import HRCConfig
-from hrc_env.core.batching import rows, write_rows
+from hrc_env.core.batching import Stateful, rows, write_rows
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.stateful import Stateful
 from hrc_env.core.typing import Bools, Floats, Image, Ints
 from hrc_env.geometry.cameras import projections
 from hrc_env.perception.faults.schedule import Recent, Schedule

@@ -1,6 +1,6 @@
 """Pictures for people: what the cameras see and what is made of it, drawn over a render."""
 
-from functools import cache, lru_cache
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -19,7 +19,6 @@ from hrc_env.geometry.cameras import (
 )
 
 Colour = tuple[int, int, int]
-
 LEFT: Colour = (66, 165, 245)
 RIGHT: Colour = (255, 138, 60)
 MIDDLE: Colour = (235, 235, 235)
@@ -32,15 +31,8 @@ GRID: Colour = (46, 53, 61)
 ARM: Colour = (150, 158, 168)
 BELIEF: Colour = (90, 230, 160)
 COST: Colour = (255, 110, 120)
-
-
-@cache
-def bone_colour(first: int, second: int) -> Colour:
-    """Blue on the worker's left, orange on the right, white across."""
-    sides = {JOINTS[first].split("_")[0], JOINTS[second].split("_")[0]}
-    if sides == {"left"}:
-        return LEFT
-    return RIGHT if sides == {"right"} else MIDDLE
+SIDE_COLOURS = {("left", "left"): LEFT, ("right", "right"): RIGHT}
+"""Of bones by the sides of their ends; those across are `MIDDLE`."""
 
 
 def draw_estimate(
@@ -55,10 +47,9 @@ def draw_estimate(
     scale = image.shape[1] / camera.width_px
     for worker in np.flatnonzero(estimate.tracked[row]):
         joints = estimate.mean_world[row, worker]
-        px, depth_m = project(camera.P[None], joints[None])
+        points, depth_m = _projected(image, camera, joints)
         if (depth_m < 0.1).any():
             continue
-        points = image_from_pinhole(camera, px[0, 0]) * scale
         _ellipses(image, camera, joints, estimate.cov_world[row, worker], scale)
         _draw_bones(image, points, thickness)
         _lines(image, np.stack([points[0], points[[1, 2]].mean(0)]), MIDDLE, thickness)
@@ -69,12 +60,10 @@ def draw_keypoints(
 ) -> None:
     """The joints that camera `index` detected, in place; faint where it was not sure."""
     scale = image.shape[1] / camera.width_px
-    for worker in range(keypoints.px.shape[2]):
-        px = image_from_pinhole(camera, keypoints.px[row, index, worker])
-        confidence = keypoints.confidence[row, index, worker]
-        known = np.isfinite(px).all(-1)
-        radius = max(2, round(image.shape[1] / 200))
-        _draw_joints(image, px[known] * scale, confidence[known], radius)
+    px = image_from_pinhole(camera, keypoints.px[row, index].reshape(-1, 2)) * scale
+    known = np.isfinite(px).all(-1)
+    confidence = keypoints.confidence[row, index].reshape(-1)
+    _draw_joints(image, px[known], confidence[known], max(2, round(image.shape[1] / 200)))
 
 
 def draw_window(image: Image, camera: PinholeCamera, window: Roi) -> None:
@@ -102,34 +91,31 @@ def draw_landmarks(image: Image, window: Roi, joints_px: Points2, confidence: Fl
 
 def draw_floor(image: Image, camera: PinholeCamera, middle: Floats, reach_m: int = 3) -> None:
     """A grid of metres on the floor round a point (3,), in place."""
-    along = np.linspace(-reach_m, reach_m, 2)
+    foot = np.array([middle[0], middle[1], 0.0])
     for k in range(-reach_m, reach_m + 1):
-        for line in ([(x, k) for x in along], [(k, y) for y in along]):
-            ends = np.array([(middle[0] + x, middle[1] + y, 0.0) for x, y in line])
-            draw_path(image, camera, ends, GRID, 1)
+        line = np.array([(-reach_m, k, 0), (reach_m, k, 0)])
+        draw_path(image, camera, foot + line, GRID, 1)
+        draw_path(image, camera, foot + line[:, [1, 0, 2]], GRID, 1)
 
 
 def draw_path(
     image: Image, camera: PinholeCamera, points: Floats, colour: Colour, thickness: int
 ) -> None:
     """Straight lines from point to point (N, 3) [m], in place; none where one is behind."""
-    px, depth_m = project(camera.P[None], points[None])
-    if (depth_m < 0.1).any():
-        return
-    _lines(image, px[0, 0] * (image.shape[1] / camera.width_px), colour, thickness)
+    px, depth_m = _projected(image, camera, points)
+    if (depth_m >= 0.1).all():
+        _lines(image, px, colour, thickness)
 
 
 def draw_markers(image: Image, camera: PinholeCamera, markers_world: Floats) -> None:
     """A ring round each point (M, 3), in place; drawn over whatever stands before it."""
-    px, depth_m = project(camera.P[None], markers_world[None])
-    scale = image.shape[1] / camera.width_px
-    for middle_px, away_m in zip(px[0, 0], depth_m[0, 0].tolist(), strict=True):
-        if away_m < 0.1:
-            continue
-        radius = max(4, round(0.05 * camera.K[0, 0] * scale / away_m))
-        (middle,) = _fixed(middle_px[None] * scale)
-        cv2.circle(image, middle, radius * 16, GOAL, 2, cv2.LINE_AA, 4)
-        cv2.circle(image, middle, 2 * 16, GOAL, -1, cv2.LINE_AA, 4)
+    px, depth_m = _projected(image, camera, markers_world)
+    focal_px = camera.K[0, 0] * image.shape[1] / camera.width_px
+    for middle, away_m in zip(_fixed(px), depth_m.tolist(), strict=True):
+        if away_m >= 0.1:
+            radius = max(4, round(0.05 * focal_px / away_m))
+            cv2.circle(image, middle, radius * 16, GOAL, 2, cv2.LINE_AA, 4)
+            cv2.circle(image, middle, 2 * 16, GOAL, -1, cv2.LINE_AA, 4)
 
 
 def label(
@@ -162,12 +148,16 @@ def text_width(text: str, size: int = 16) -> int:
     return round(_font(size).getbbox(text)[2])
 
 
+def panel(width: int, height: int) -> Image:
+    """A dark picture to draw on."""
+    return np.full((height, width, 3), PANEL, np.uint8)
+
+
 def tile(pictures: list[Image], columns: int, gap: int = 4) -> Image:
     """Pictures of one size in rows, with dark seams."""
     height, width = pictures[0].shape[:2]
     rows = -(-len(pictures) // columns)
-    sheet = np.empty((rows * (height + gap) - gap, columns * (width + gap) - gap, 3), np.uint8)
-    sheet[:] = PANEL
+    sheet = panel(columns * (width + gap) - gap, rows * (height + gap) - gap)
     for k, picture in enumerate(pictures):
         y, x = (k // columns) * (height + gap), (k % columns) * (width + gap)
         sheet[y : y + height, x : x + width] = picture
@@ -185,6 +175,13 @@ def middle_rows(image: Image, height: int) -> Image:
     return image[top : top + height]
 
 
+def _projected(image: Image, camera: PinholeCamera, points: Floats) -> tuple[Points2, Floats]:
+    """(N, 2) where points (N, 3) are in a picture of the camera, and (N,) how far ahead [m]."""
+    px, depth_m = project(camera.P[None], points[None])
+    scale = image.shape[1] / camera.width_px
+    return image_from_pinhole(camera, px[0, 0]) * scale, depth_m[0, 0]
+
+
 def _ellipses(
     image: Image, camera: PinholeCamera, joints: Floats, covariances: Floats, scale: float
 ) -> None:
@@ -200,35 +197,27 @@ def _ellipses(
     axes = 2 * np.sqrt(np.maximum(values, 0.25)) / magnification
     angles = np.degrees(np.arctan2(vectors[:, 1, 1], vectors[:, 0, 1]))
     centres = image_from_pinhole(camera, pinhole_px) * scale
-    fit = np.flatnonzero((axes.max(-1) <= 4 * image.shape[1]) & np.isfinite(centres).all(-1))
-    if not len(fit):
-        return
-    reach = axes[fit].max(-1, keepdims=True) + 2
-    size = np.array(image.shape[1::-1])
-    low = np.clip(np.floor((centres[fit] - reach).min(0)), 0, size).astype(int)
-    high = np.clip(np.ceil((centres[fit] + reach).max(0)), 0, size).astype(int)
-    part = image[low[1] : high[1], low[0] : high[0]]
-    if not part.size:
-        return
-    overlay = part.copy()
-    for j in fit.tolist():
-        centre = int(centres[j, 0]) - int(low[0]), int(centres[j, 1]) - int(low[1])
+    covered = image.copy()
+    for j in np.flatnonzero((axes.max(-1) <= 4 * image.shape[1]) & np.isfinite(centres).all(-1)):
+        centre = int(centres[j, 0]), int(centres[j, 1])
         radii = max(1, round(axes[j, 1])), max(1, round(axes[j, 0]))
-        cv2.ellipse(overlay, centre, radii, angles[j], 0, 360, BELIEF, -1, cv2.LINE_AA)
-    part[:] = cv2.addWeighted(overlay, 0.35, part, 0.65, 0)
+        cv2.ellipse(covered, centre, radii, angles[j], 0, 360, BELIEF, -1, cv2.LINE_AA)
+    image[:] = cv2.addWeighted(covered, 0.35, image, 0.65, 0)
 
 
 def _draw_bones(image: Image, points: Points2, thickness: int) -> None:
     spots = _fixed(points)
     for first, second in BONES[:-2]:
-        colour = bone_colour(first, second)
+        sides = JOINTS[first].split("_")[0], JOINTS[second].split("_")[0]
+        colour = SIDE_COLOURS.get(sides, MIDDLE)
         cv2.line(image, spots[first], spots[second], colour, thickness, cv2.LINE_AA, 4)
 
 
 def _draw_joints(image: Image, points: Points2, confidence: Floats, radius: int) -> None:
     """Joints (N, 2) [px], faint where nobody was sure."""
     for spot, sure in zip(_fixed(points), confidence.tolist(), strict=True):
-        colour = _mix(PANEL, DETECTED, 0.35 + 0.65 * sure)
+        share = 0.35 + 0.65 * sure
+        colour = [round(p + share * (q - p)) for p, q in zip(PANEL, DETECTED, strict=True)]
         cv2.circle(image, spot, radius * 16, colour, -1, cv2.LINE_AA, 4)
 
 
@@ -242,11 +231,6 @@ def _fixed(points: Points2) -> list[tuple[int, int]]:
     """Sub-pixel coordinates (N, 2) for OpenCV, which counts from pixel centres: 4 binary places."""
     limited = np.clip(points - 0.5, -30000, 30000)
     return [(x, y) for x, y in np.round(limited * 16).astype(int).tolist()]
-
-
-def _mix(a: Colour, b: Colour, share: float) -> Colour:
-    red, green, blue = (round(p + share * (q - p)) for p, q in zip(a, b, strict=True))
-    return red, green, blue
 
 
 @lru_cache(maxsize=256)

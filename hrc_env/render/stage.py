@@ -6,7 +6,7 @@ of them from the sun.
 """
 
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import cv2
 import numpy as np
@@ -15,15 +15,10 @@ from numpy.typing import NDArray
 from hrc_env.core.records import Roi, WorkerMotion
 from hrc_env.core.typing import Floats, Image, JointAngles
 from hrc_env.geometry.cameras import PinholeCamera
+from hrc_env.render.overlay import shrink
 from hrc_env.scene import gl
 from hrc_env.scene.build import Scene
-from hrc_env.scene.canvas import (
-    BEFORE_THE_SUN,
-    IN_THE_SHADE,
-    MOVING,
-    STILL,
-    Canvas,
-)
+from hrc_env.scene.canvas import BEFORE_THE_SUN, IN_THE_SHADE, MOVING, STILL, Canvas
 
 SMOOTHING = 2
 """All is drawn so many times as large, for smooth edges."""
@@ -44,43 +39,12 @@ Depths = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
-    """From where a picture is taken: an upright rectangle of a camera's image."""
-
-    camera: PinholeCamera
-    middle_px: tuple[float, float]
-    """In the camera's image, as is the next."""
-    wide_px: float
-    width: int
-    """Of the picture [px], as is the next."""
-    height: int
-    shadows: bool = False
-
-    @property
-    def key(self) -> tuple[Any, ...]:
-        """What tells places apart."""
-        camera = self.camera
-        view = (camera.K.tobytes(), camera.T_world_from_cam.tobytes())
-        return (*view, self.middle_px, self.wide_px, self.width, self.height, self.shadows)
-
-    @property
-    def whole(self) -> Box:
-        """All of the picture."""
-        return 0, 0, self.width, self.height
-
-    def pixels(self, image_px: Floats) -> Floats:
-        """Pixels of the camera's image (..., 2) as pixels of the picture."""
-        size = np.array([self.width, self.height])
-        return (image_px - self.middle_px) * (self.width / self.wide_px) + size / 2
-
-
-@dataclass(frozen=True, slots=True)
 class Shade:
     """What moves, seen from the sun."""
 
     z: Depths
     """(SUN_PX, SUN_PX) how near to the sun: 1 `begin_m` along the light, 0 `deep_m` further and
-    where nothing is; top row first."""
+    where nothing is."""
     begin_m: float
     deep_m: float
     corner: tuple[float, float]
@@ -112,50 +76,50 @@ class Stage(Canvas):
         size = max(SMOOTHING * width, SUN_PX), max(SMOOTHING * height, SUN_PX)
         super().__init__(scene, *size, QUALITY)
         self._shade: Shade | None = None
-        self._shade_known = False
+        """Of this pose, once it was asked for."""
 
     def pose(self, q: JointAngles, motion: WorkerMotion | None) -> None:
         """Pose what moves: arm q (N,), the workers of one environment (W, S, ...)."""
         super().pose(q, motion)
-        self._shade_known = False
+        self._shade = None
 
-    def picture(self, place: Place) -> Image:
-        """(height, width, 3) RGB."""
-        if place.key not in self._kept:
-            self._kept[place.key] = self._still(place)
-        backdrop = self._kept[place.key]
+    def picture(self, camera: PinholeCamera, shadows: bool = False) -> Image:
+        """What a pinhole camera sees, in the size of its image."""
+        view = camera.K.tobytes(), camera.T_world_from_cam.tobytes()
+        key = (*view, camera.width_px, camera.height_px, shadows)
+        if key not in self._kept:
+            self._kept[key] = self._still(camera, shadows)
+        backdrop = self._kept[key]
         image = backdrop.rgb.copy()
         if backdrop.dark is not None:
             self._cast_shadows(image, backdrop, backdrop.dark)
-        box = self.box(place)
+        box = self.box(camera)
         if box[2] > box[0] and box[3] > box[1]:
-            _lay_over(image, backdrop, box, *self.moving(place, box))
+            _lay_over(image, backdrop, box, *self.moving(camera, box))
         return image
 
-    def moving(self, place: Place, box: Box) -> tuple[Image, Depths]:
+    def moving(self, camera: PinholeCamera, box: Box) -> tuple[Image, Depths]:
         """What moves within a box of the picture: rgb and z, `SMOOTHING` times as large,
         top row first; black and 0 where nothing is."""
         self.show(MOVING)
-        return self._read(place, box)
+        return self._read(camera, box)
 
-    def box(self, place: Place) -> Box:
+    def box(self, camera: PinholeCamera) -> Box:
         """Where in the picture things that move are, and maybe a little more."""
         middles, radii_m = self.movers()
-        camera = place.camera
+        size = camera.width_px, camera.height_px
         x, y, depth = ((middles - camera.eye_world) @ camera.T_world_from_cam[:3, :3]).T
         ahead = depth > -radii_m
         x, y, depth, radii_m = x[ahead], y[ahead], depth[ahead], radii_m[ahead]
         if not len(depth):
             return 0, 0, 0, 0
         if (depth < radii_m + 0.1).any():
-            return place.whole
+            return 0, 0, *size
         corners = np.stack([_reach(x, depth, radii_m), _reach(y, depth, radii_m)], -1)
-        corners_px = corners * camera.K[[0, 1], [0, 1]] + camera.K[:2, 2]
-        low, high = place.pixels(corners_px)
-        size = [place.width, place.height]
-        left, top = np.clip(np.floor(low - 2), 0, size).astype(int)
-        right, bottom = np.clip(np.ceil(high + 2), 0, size).astype(int)
-        return int(left), int(top), int(right), int(bottom)
+        low, high = corners * camera.K[[0, 1], [0, 1]] + camera.K[:2, 2]
+        left, top = np.clip(np.floor(low - 2), 0, size).astype(int).tolist()
+        right, bottom = np.clip(np.ceil(high + 2), 0, size).astype(int).tolist()
+        return left, top, right, bottom
 
     def shade(self) -> Shade | None:
         """What moves, as the sun sees it; None without a sun or without anything that moves."""
@@ -176,27 +140,24 @@ class Stage(Canvas):
         upright = np.ascontiguousarray(z[::-1])
         return Shade(upright, float(low[2]), deep_m, corner, 2 * half_m / SUN_PX)
 
-    def _still(self, place: Place) -> _Backdrop:
-        size, axes = (place.width, place.height), self.sun_axes()
-        self.show(STILL, shadows=place.shadows)
-        rgb, z = self._read(place, place.whole)
+    def _still(self, camera: PinholeCamera, shadows: bool) -> _Backdrop:
+        size, axes = (camera.width_px, camera.height_px), self.sun_axes()
+        self.show(STILL, shadows=shadows)
+        rgb, z = self._read(camera, (0, 0, *size))
         dark, spots = None, ()
-        if place.shadows and axes is not None:
-            points = _points(place, self.distance_m(z[::SMOOTHING, ::SMOOTHING]))
+        if shadows and axes is not None:
+            points = _points(camera, self.distance_m(z[::SMOOTHING, ::SMOOTHING]))
             at = points[::COARSE, ::COARSE] @ axes.astype(np.float32)
             spots = tuple(np.ascontiguousarray(at[..., k]) for k in range(3))
             self.show(IN_THE_SHADE)
-            dark = _shrunk(self._read(place, place.whole)[0], size)
-        return _Backdrop(_shrunk(rgb, size), z, dark, spots)
+            dark = shrink(self._read(camera, (0, 0, *size))[0], *size)
+        return _Backdrop(shrink(rgb, *size), z, dark, spots)
 
-    def _read(self, place: Place, box: Box) -> tuple[Image, Depths]:
+    def _read(self, camera: PinholeCamera, box: Box) -> tuple[Image, Depths]:
         """What is shown within a box of the picture, `SMOOTHING` times as large, top row first."""
         left, top, right, bottom = box
-        scale = place.wide_px / place.width
-        x = place.middle_px[0] + ((left + right) / 2 - place.width / 2) * scale
-        y = place.middle_px[1] + ((top + bottom) / 2 - place.height / 2) * scale
-        window = Roi((x, y), (right - left) * scale, 0.0)
-        self.aim(place.camera, window, (bottom - top) * scale)
+        window = Roi(((left + right) / 2, (top + bottom) / 2), float(right - left), 0.0)
+        self.aim(camera, window, bottom - top)
         shape = SMOOTHING * (bottom - top), SMOOTHING * (right - left)
         rgb, z = np.empty((*shape, 3), np.uint8), np.empty(shape, np.float32)
         self.read(rgb, z)
@@ -204,9 +165,8 @@ class Stage(Canvas):
 
     def _cast_shadows(self, image: Image, backdrop: _Backdrop, dark: Image) -> None:
         """Show the backdrop without the sun where something that moves keeps it off, in place."""
-        if not self._shade_known:
-            self._shade, self._shade_known = self.shade(), True
-        if (shade := self._shade) is None:
+        shade = self._shade = self._shade or self.shade()
+        if shade is None:
             return
         right, down, along = backdrop.spots
         x = (right - shade.corner[0]) / shade.step_m - 0.5
@@ -233,19 +193,12 @@ def _reach(x: Floats, depth: Floats, radii_m: Floats) -> Floats:
     return np.array([low.min(), high.max()])
 
 
-def _points(place: Place, depth_m: Depths) -> Depths:
+def _points(camera: PinholeCamera, depth_m: Depths) -> Depths:
     """(H, W, 3) points in the world that the picture shows [m]."""
-    scale, camera = place.wide_px / place.width, place.camera
-    u = place.middle_px[0] + (np.arange(place.width) + 0.5 - place.width / 2) * scale
-    v = place.middle_px[1] + (np.arange(place.height) + 0.5 - place.height / 2) * scale
-    x = (u - camera.K[0, 2]) / camera.K[0, 0] * depth_m
-    y = (v - camera.K[1, 2])[:, None] / camera.K[1, 1] * depth_m
+    x = (np.arange(camera.width_px) + 0.5 - camera.K[0, 2]) / camera.K[0, 0] * depth_m
+    y = (np.arange(camera.height_px) + 0.5 - camera.K[1, 2])[:, None] / camera.K[1, 1] * depth_m
     points = np.stack([x, y, depth_m], -1) @ camera.T_world_from_cam[:3, :3].T + camera.eye_world
     return points.astype(np.float32)
-
-
-def _shrunk(image: Any, size: tuple[int, int]) -> Image:
-    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
 def _lay_over(image: Image, backdrop: _Backdrop, box: Box, rgb: Image, z: Depths) -> None:
@@ -255,7 +208,7 @@ def _lay_over(image: Image, backdrop: _Backdrop, box: Box, rgb: Image, z: Depths
     behind = np.ascontiguousarray(backdrop.z[fine[1] : fine[3], fine[0] : fine[2]])
     nearer = cv2.compare(z, behind, cv2.CMP_GT)
     shown = cv2.bitwise_and(rgb, rgb, mask=nearer)
-    free = 255 - _shrunk(nearer, (right - left, bottom - top))
+    free = 255 - shrink(nearer, right - left, bottom - top)
     part = image[top:bottom, left:right]
     through = cv2.multiply(part, cv2.cvtColor(free, cv2.COLOR_GRAY2RGB), scale=1 / 255)
-    part[:] = cv2.add(through, _shrunk(shown, (right - left, bottom - top)))
+    part[:] = cv2.add(through, shrink(shown, right - left, bottom - top))

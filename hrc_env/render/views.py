@@ -11,12 +11,12 @@ from hrc_env.core.batching import one, rows
 from hrc_env.core.errors import whole
 from hrc_env.core.records import Keypoints, PoseEstimate, Roi, WorkerMotion
 from hrc_env.core.typing import Image, JointAngles, Points3
-from hrc_env.geometry.cameras import PinholeCamera, image_from_pinhole, pinhole
+from hrc_env.geometry.cameras import PinholeCamera, image_from_pinhole, pinhole, resized
 from hrc_env.geometry.chains import capsules
 from hrc_env.motion import generator
 from hrc_env.perception.lensed import Lensed
 from hrc_env.render import overlay
-from hrc_env.render.stage import SMOOTHING, Place, Stage
+from hrc_env.render.stage import SMOOTHING, Stage
 from hrc_env.scene.canvas import Canvas
 from hrc_env.scene.domain_randomization import Look
 from hrc_env.scene.render import PICTURE_QUALITY, CropRenderer, PictureRenderer, viewpoint_camera
@@ -38,15 +38,9 @@ SIDES_HFOV_DEG = 55.0
 
 
 def picture_size(width: Any, height: Any) -> tuple[int, int]:
-    """A picture's width and height [px].
-
-    Raises:
-        ConfigError: no whole numbers from 16 to 4096.
-    """
-    return (
-        whole("width [px]", width, SMALLEST_PX, LARGEST_PX),
-        whole("height [px]", height, SMALLEST_PX, LARGEST_PX),
-    )
+    """A picture's width and height [px]; `ConfigError` unless whole numbers from 16 to 4096."""
+    limits = SMALLEST_PX, LARGEST_PX
+    return whole("width [px]", width, *limits), whole("height [px]", height, *limits)
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,8 +66,8 @@ class Glance:
 class Views:
     """Pictures of one environment of a simulation; graphics contexts are made when asked for.
 
-    All pictures must be asked for, and `close` called, in one thread; with a `glance` taken before
-    that may be another one than the simulation's.
+    One thread must ask for all of them and call `close`; with a `glance` taken before, that may
+    be another one than the simulation's.
     """
 
     def __init__(self, simulation: Simulation, b: int = 0) -> None:
@@ -84,16 +78,13 @@ class Views:
     def picture(
         self, depth: bool = False, b: int | None = None, size: tuple[int, int] = PICTURE_SIZE
     ) -> NDArray[Any]:
-        """Robot and worker, (height, width, 3) uint8, or distances (height, width) float32 [m].
-
-        Of another environment than usual with `b`; `size` is width and height [px].
-        """
+        """Robot and worker, (height, width, 3) uint8, or distances (height, width) float32 [m];
+        of another environment than usual with `b`."""
         seen = self.glance(b)
         if depth:
             renderer = self._renderer("depth", size, seen)
             return renderer.picture(seen.q, seen.motion, VIEWPOINT, depth=True)
-        place = _whole(viewpoint_camera(VIEWPOINT, *size), *size, shadows=True)
-        return self._drawn([place], seen)[0]
+        return self._drawn([viewpoint_camera(VIEWPOINT, *size)], seen, shadows=True)[0]
 
     def glance(self, b: int | None = None) -> Glance:
         """All that there is to draw now, of another environment than usual with `b`."""
@@ -112,16 +103,14 @@ class Views:
     def room(self, width: int, height: int, seen: Glance | None = None) -> Image:
         """The room with the estimated skeleton over it."""
         seen, camera = seen or self.glance(), viewpoint_camera(VIEWPOINT, width, height)
-        (image,) = self._drawn([_whole(camera, width, height, shadows=True)], seen)
+        (image,) = self._drawn([camera], seen, shadows=True)
         overlay.draw_estimate(image, camera, seen.estimate)
         overlay.draw_markers(image, camera, seen.markers_world)
         return image
 
     def cameras(self, width: int, height: int, seen: Glance | None = None) -> list[Image]:
-        """Every camera's picture with crops, detected keypoints and the estimate.
-
-        Without shadows, as the detector sees the scene; what stands still is drawn once.
-        """
+        """Every camera's picture, without shadows, as the detector sees the scene, with crops,
+        detected keypoints and the estimate."""
         seen = seen or self.glance()
         views = self._through_cameras(width, height, seen)
         for c, (camera, image) in enumerate(zip(self.simulation.scene.cameras, views, strict=True)):
@@ -139,10 +128,7 @@ class Views:
         seen = seen or self.glance()
         if seen.keypoints is None or not seen.windows:
             return []
-        return [
-            self._crop(crop, c, window, seen.keypoints, size)
-            for c, (crop, window) in enumerate(zip(seen.crops, seen.windows[0], strict=True))
-        ]
+        return [self._crop(seen, seen.keypoints, c, size) for c in range(len(seen.crops))]
 
     def beliefs(self, width: int, height: int, seen: Glance | None = None) -> list[Image]:
         """What the robot knows, seen from above and from the side: itself, its task, its estimate
@@ -153,8 +139,7 @@ class Views:
         images = []
         for name, eye, target in SIDES:
             camera = pinhole(name, foot + eye, foot + target, SIDES_HFOV_DEG, width, height)
-            image = np.empty((height, width, 3), np.uint8)
-            image[:] = overlay.PANEL
+            image = overlay.panel(width, height)
             overlay.draw_floor(image, camera, foot)
             for ends in ([foot, arm[0, 0]], *arm):
                 overlay.draw_path(image, camera, np.array(ends), overlay.ARM, 5)
@@ -178,12 +163,10 @@ class Views:
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_renderers": {}}
 
-    def _crop(
-        self, crop: Image | None, c: int, window: Roi | None, keypoints: Keypoints, size: int
-    ) -> Image:
+    def _crop(self, seen: Glance, keypoints: Keypoints, c: int, size: int) -> Image:
+        crop, window = seen.crops[c], seen.windows[0][c]
         if window is None or crop is None:
-            image = np.empty((size, size, 3), np.uint8)
-            image[:] = overlay.PANEL
+            image = overlay.panel(size, size)
             overlay.write(image, "no worker in view", (10, size // 2 - 10), 13)
             return image
         image = overlay.shrink(crop, size, size)
@@ -201,25 +184,26 @@ class Views:
         """What every camera sees, without shadows."""
         cameras = self.simulation.scene.cameras
         if all(camera.lens is None for camera in cameras):
-            return self._drawn([_whole(camera, width, height) for camera in cameras], seen)
+            return self._drawn([resized(camera, width, height) for camera in cameras], seen)
         size = (SMOOTHING * width, SMOOTHING * width)
         images = Lensed(self._renderer("square", size, seen), cameras)
-        squares = [
-            images.crop(c, Roi(_middle(camera), float(camera.width_px), 0.0))
-            for c, camera in enumerate(cameras)
-        ]
-        return [
-            overlay.shrink(overlay.middle_rows(square, SMOOTHING * height), width, height)
-            for square in squares
-        ]
+        views = []
+        for c, camera in enumerate(cameras):
+            middle_px = camera.width_px / 2, camera.height_px / 2
+            square = images.crop(c, Roi(middle_px, float(camera.width_px), 0.0))
+            middle = overlay.middle_rows(square, SMOOTHING * height)
+            views.append(overlay.shrink(middle, width, height))
+        return views
 
-    def _drawn(self, places: list[Place], seen: Glance) -> list[Image]:
-        """Pictures from places that stay."""
+    def _drawn(
+        self, cameras: list[PinholeCamera], seen: Glance, shadows: bool = False
+    ) -> list[Image]:
+        """What cameras see that stay where they are."""
         largest = self._renderers["stage"][0] if "stage" in self._renderers else (0, 0)
-        sizes = [largest, *((place.width, place.height) for place in places)]
-        width, height = (max(size[k] for size in sizes) for k in range(2))
+        sizes = [largest, *((camera.width_px, camera.height_px) for camera in cameras)]
+        width, height = np.max(sizes, axis=0).tolist()
         stage = self._renderer("stage", (width, height), seen)
-        return [stage.picture(place) for place in places]
+        return [stage.picture(camera, shadows) for camera in cameras]
 
     def _renderer(self, purpose: str, size: tuple[int, int], seen: Glance) -> Any:
         """What draws for a purpose, posed; made anew where pictures have another size."""
@@ -239,12 +223,3 @@ _MAKERS: dict[str, Callable[..., Canvas]] = {
     "depth": lambda scene, width, height: PictureRenderer(scene, width, height, DEPTH_QUALITY),
     "square": lambda scene, width, _: CropRenderer(scene, width),
 }
-
-
-def _middle(camera: PinholeCamera) -> tuple[float, float]:
-    return camera.width_px / 2, camera.height_px / 2
-
-
-def _whole(camera: PinholeCamera, width: int, height: int, shadows: bool = False) -> Place:
-    """A camera's whole width; the picture's shape decides how much of its height."""
-    return Place(camera, _middle(camera), float(camera.width_px), width, height, shadows)

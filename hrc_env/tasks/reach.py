@@ -7,9 +7,8 @@ import numpy as np
 
 from hrc_env.belief import Belief
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records
-from hrc_env.observations import ObservationTerm, shorten
+from hrc_env.observations import ObservationTerm, directions
 from hrc_env.rewards import RewardTerm
 from hrc_env.tasks.task import Rngs, Task, World
 
@@ -91,9 +90,19 @@ def reset(state: Records, ids: Ints, rngs: Rngs, world: World, config: ReachConf
 def advance(state: Records, rngs: Rngs, world: World, dt_s: float, config: ReachConfig) -> Records:
     """Judge the tool's new place and replace goals that are done; (B,) of `REACH_STEP`."""
     tool_world, step = world.robot.tool_world, np.zeros(len(state), REACH_STEP)
-    if _judge(tool_world, dt_s, config.radius_m, config.time_limit_s, state, step):
-        done = np.flatnonzero(step["reached"] | step["missed"])
-        _new_goals(state, done, rngs, tool_world[done], config)
+    offset = state["goal_world"] - tool_world
+    distance_m = np.sqrt(np.add.reduce(offset * offset, axis=1))
+    age_s = state["goal_age_s"] + dt_s
+    reached = distance_m < config.radius_m
+    missed = ~reached & (age_s >= config.time_limit_s - 1e-9)
+    step["progress_m"] = state["distance_m"] - distance_m
+    step["reached"], step["missed"] = reached, missed
+    state["distance_m"], state["goal_age_s"] = distance_m, age_s
+    if (done := reached | missed).any():
+        state["n_reached"] += reached
+        state["n_missed"] += missed
+        ids = np.flatnonzero(done)
+        _new_goals(state, ids, rngs, tool_world[ids], config)
     return step
 
 
@@ -116,62 +125,24 @@ def info(state: Records) -> dict[str, Floats]:
     }
 
 
-@kernel
-def _judge(
-    tool_world: Points3,
-    dt_s: float,
-    radius_m: float,
-    time_limit_s: float,
-    state: Records,
-    step: Records,
-) -> bool:
-    """Move the state on and write what it brought; whether any goal is done."""
-    done = False
-    for b in range(len(state)):
-        now, brought = state[b], step[b]
-        squared = 0.0
-        for i in range(3):
-            squared += (now.goal_world[i] - tool_world[b, i]) ** 2
-        distance_m = math.sqrt(squared)
-        brought.progress_m = now.distance_m - distance_m
-        now.distance_m = distance_m
-        now.goal_age_s += dt_s
-        brought.reached = distance_m < radius_m
-        brought.missed = not brought.reached and now.goal_age_s >= time_limit_s - 1e-9
-        now.n_reached += brought.reached
-        now.n_missed += brought.missed
-        done |= brought.reached or brought.missed
-    return done
-
-
 def _new_goals(
     state: Records, ids: Ints, rngs: Rngs, tool_world: Points3, config: ReachConfig
 ) -> None:
     x, y = config.base_xy_world
     for b, tool in zip(ids.tolist(), tool_world.tolist(), strict=True):
-        share = rngs[b].random(3).tolist()
-        distance = _between(config.distance_m, share[0])
-        azimuth = _between(config.azimuth_rad, share[1])
-        goal = (
-            x + distance * math.cos(azimuth),
-            y + distance * math.sin(azimuth),
-            _between(config.height_m, share[2]),
+        limits = config.distance_m, config.azimuth_rad, config.height_m
+        distance_m, azimuth_rad, z = (
+            low + (high - low) * share
+            for (low, high), share in zip(limits, rngs[b].random(3).tolist(), strict=True)
         )
+        goal = x + distance_m * math.cos(azimuth_rad), y + distance_m * math.sin(azimuth_rad), z
         state["goal_world"][b] = goal
         state["goal_age_s"][b] = 0.0
         state["distance_m"][b] = math.dist(goal, tool)
 
 
-def _between(limits: tuple[float, float], share: float) -> float:
-    """The value at a share in [0, 1] of the way from the low to the high limit."""
-    low, high = limits
-    return low + (high - low) * share
-
-
 def _goal_direction(now: Belief) -> Floats:
-    offset = now.task.goal_world - now.robot.tool_world
-    shorten(offset, 0.05)
-    return offset
+    return directions(now.task.goal_world - now.robot.tool_world, 0.05)
 
 
 TASK = Task(

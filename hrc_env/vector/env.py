@@ -22,16 +22,15 @@ from numpy.typing import NDArray
 from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError, unknown, whole
 from hrc_env.core.machine import n_cores
-from hrc_env.core.stateful import Stateful
 from hrc_env.core.typing import Bools, Floats, Ints
-from hrc_env.env import RENDER_MODES, PlainSpec, check_render_mode, spaces
-from hrc_env.render.views import PICTURE_SIZE, Views, picture_size
+from hrc_env.env import Door, spaces
+from hrc_env.render.views import PICTURE_SIZE, Views
 from hrc_env.rewards import RewardConfig
 from hrc_env.simulation import Simulation, checked_action
-from hrc_env.step import StepResult, objects
+from hrc_env.step import StepResult
 from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import task_called
-from hrc_env.vector.infos import InfoTable, blank, table
+from hrc_env.vector.infos import InfoTable, table
 from hrc_env.vector.options import (
     MAX_ENVS,
     autoreset_of,
@@ -51,7 +50,7 @@ Step = tuple[Observations, NDArray[np.float64], Bools, Bools, dict[str, Any]]
 
 
 class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
-    PlainSpec, Stateful, VectorEnv[Observations, Observations, NDArray[Any]]
+    Door, VectorEnv[Observations, Observations, NDArray[Any]]
 ):
     """`num_envs` robots, each beside a worker of its own, stepped at once.
 
@@ -81,31 +80,18 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         backend: str = "threads",
         **arguments: Any,
     ) -> None:
-        if perception == "pixels":
-            raise ConfigError(
-                'perception="pixels" has no batched form: gymnasium.make_vec makes it with a '
-                'process for each environment. perception="keypoints" emulates it, batched.'
-            )
-        if backend != "threads":
-            raise unknown("backend", backend, ("threads",))
-        check_render_mode(render_mode)
-        self._size = picture_size(width, height)
+        _refuse(perception, backend)
+        settings = settle(perception=perception, **arguments)
+        self._open(settings, render_mode, width, height)
         self.num_envs = whole("num_envs", num_envs, 1, MAX_ENVS)
         self.autoreset_mode = autoreset_of(autoreset_mode)
-        self.render_mode = render_mode
-        settings = settle(perception=perception, **arguments)
-        self.config = settings.config
+        self.metadata["autoreset_mode"] = self.autoreset_mode
         n_shards = min(threads_of(num_threads), self.num_envs)
         self.shards = Shards(self.num_envs, n_shards, partial(Simulation, settings=settings))
         self.views = [Views(part) for part in self.shards.parts]
         self.single_observation_space, self.single_action_space = spaces(self.shards.first)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self.metadata = {
-            "render_modes": list(RENDER_MODES),
-            "render_fps": round(1 / self.config.ctrl_dt),
-            "autoreset_mode": self.autoreset_mode,
-        }
         self._streams: list[Stream | None] = [None] * self.num_envs
         self._action_shape = (self.num_envs, self.shards.first.n_actions)
         limit = settings.task.max_episode_steps if max_episode_steps is None else max_episode_steps
@@ -148,9 +134,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
             self._observation = fresh.observation.copy()
         self._observation[ids] = fresh.observation
         self._ended = self._ended & ~mask
-        info = blank(fresh, self.num_envs)
-        info.write(ids, fresh)
-        return self._observation.copy(), info.arrays(mask)
+        return self._observation.copy(), table(fresh, ids, self.num_envs).arrays(mask)
 
     def step(self, actions: NDArray[np.float32]) -> Step:
         """One control step of every environment; actions (num_envs, n) in [-1, 1].
@@ -159,7 +143,8 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         these start anew instead. Infos are arrays (num_envs,), each with a mask "_name".
         """
         result = self.shards.step(self._checked(actions))
-        observation, info = result.observation.copy(), table(result)
+        observation = result.observation.copy()
+        info = table(result, slice(None), self.num_envs)
         reward, terminated, over = result.reward.copy(), result.terminated.copy(), self._ended
         self._steps += 1
         if over.any():  # only where the mode is NEXT_STEP
@@ -249,11 +234,22 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
 
 def _finals(observation: Observations, info: InfoTable, who: Bools) -> dict[str, Any]:
     """The last observations and infos of the episodes of environments `who` (B,)."""
-    last = objects(
-        [row.copy() if ended else None for row, ended in zip(observation, who, strict=True)]
-    )
+    last = np.full(len(who), None, object)
+    for b in np.flatnonzero(who):
+        last[b] = observation[b].copy()
     final_info = {"final_info": info.arrays(who), "_final_info": who.copy()}
     return {"final_obs": last, "_final_obs": who.copy(), **final_info}
+
+
+def _refuse(perception: str, backend: str) -> None:
+    """Raise a `ConfigError` for what has no batched form."""
+    if perception == "pixels":
+        raise ConfigError(
+            'perception="pixels" has no batched form: gymnasium.make_vec makes it with a '
+            'process for each environment. perception="keypoints" emulates it, batched.'
+        )
+    if backend != "threads":
+        raise unknown("backend", backend, ("threads",))
 
 
 def make_vector(
@@ -267,17 +263,6 @@ def make_vector(
     """
     if perception != "pixels":
         return HRCVectorEnv(num_envs, perception=perception, **kwargs)
-    return _processes(num_envs, force, **kwargs)
-
-
-def _processes(
-    num_envs: int,
-    force: bool,
-    autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
-    num_threads: int | None = None,
-    **kwargs: Any,
-) -> AsyncVectorEnv[Any, Any]:
-    """A process for each environment."""
     limit = PROCESSES_PER_CORE * n_cores()
     if num_envs > limit and not force:
         raise ConfigError(
@@ -286,8 +271,9 @@ def _processes(
             'Use perception="keypoints", which emulates the detector and steps thousands of '
             "environments in one process, or force=True."
         )
-    if num_threads is not None:
+    if kwargs.pop("num_threads", None) is not None:
         raise ConfigError('perception="pixels" is processes, not threads: leave out num_threads.')
+    mode = kwargs.pop("autoreset_mode", AutoresetMode.NEXT_STEP)
     task = task_called(kwargs.pop("task", DEFAULT)).id
     make = partial(gymnasium.make, f"hrc_env:{task}", perception="pixels", **kwargs)
-    return AsyncVectorEnv([make] * num_envs, context="spawn", autoreset_mode=autoreset_mode)
+    return AsyncVectorEnv([make] * num_envs, context="spawn", autoreset_mode=mode)

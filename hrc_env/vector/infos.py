@@ -5,6 +5,7 @@ zero or None, and a name that nobody has is left out.
 """
 
 from dataclasses import dataclass
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -24,26 +25,22 @@ class InfoTable:
     words: dict[str, NDArray[np.object_]]
     """(B,) tuples of words by name; of environments that have no values yet, None."""
 
-    def write(self, ids: Ints, result: StepResult) -> None:
+    def write(self, ids: Ints | slice, result: StepResult) -> None:
         """Give environments `ids` the values of a result of them, and no more than these."""
-        self.values[:, ids] = np.nan
-        for name, value in result.info.items():
-            if name in self.words:
-                self.words[name][ids] = value
-            else:
-                self.values[self.names.index(name), ids] = value
+        absent = np.full(len(result.reward), np.nan)
+        self.values[:, ids] = [result.info.get(name, absent) for name in self.names]
+        for name, said in self.words.items():
+            said[ids] = result.info[name]
 
     def arrays(self, who: Bools) -> dict[str, Any]:
         """Values and masks for the environments `who` (B,); the others have none."""
         known = (self.values == self.values) & who
         values = np.where(known, self.values, 0.0)
         infos: dict[str, Any] = {}
-        for name, value, mask, anybody in zip(
-            self.names, values, known, known.any(1).tolist(), strict=True
-        ):
-            if anybody:
-                infos[name] = value.astype(bool) if name in FLAGS else value
-                infos[f"_{name}"] = mask
+        somebody = known.any(axis=1).tolist()
+        for name, value, mask in compress(zip(self.names, values, known, strict=True), somebody):
+            infos[name] = value.astype(bool) if name in FLAGS else value
+            infos[f"_{name}"] = mask
         if who.any():
             for name, said in self.words.items():
                 infos[name], infos[f"_{name}"] = np.full(len(who), None, object), who.copy()
@@ -51,15 +48,11 @@ class InfoTable:
         return infos
 
 
-def table(result: StepResult) -> InfoTable:
-    """A copy of a result's info as a table."""
-    numbers = {name: value for name, value in result.info.items() if value.dtype != object}
-    words = {name: v.copy() for name, v in result.info.items() if name not in numbers}
-    return InfoTable(tuple(numbers), np.array(list(numbers.values())), words)
-
-
-def blank(result: StepResult, batch: int) -> InfoTable:
-    """A table of the names of a result's info in which nobody has a value."""
-    of = table(result)
-    values = np.full((len(of.names), batch), np.nan)
-    return InfoTable(of.names, values, {name: np.full(batch, None, object) for name in of.words})
+def table(result: StepResult, ids: Ints | slice, batch: int) -> InfoTable:
+    """The info of a result of environments `ids` as a table; the others have no values."""
+    info = result.info
+    words = {name: np.full(batch, None) for name, value in info.items() if value.dtype == object}
+    numbers = tuple(name for name in info if name not in words)
+    made = InfoTable(numbers, np.full((len(numbers), batch), np.nan), words)
+    made.write(ids, result)
+    return made

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from hrc_env.core.batching import State
 from hrc_env.core.errors import ConfigError, HRCError
-from hrc_env.core.stateful import State
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.simulation import Simulation
 from hrc_env.step import StepResult, joined

@@ -21,18 +21,10 @@ from hrc_env.experiments.ablations.experiment import (
     metrics_of,
 )
 from hrc_env.experiments.ablations.handicaps import handicap, lengths_m
-from hrc_env.experiments.ablations.play import (
-    DT_S,
-    N_WARM_UP,
-    matched,
-    pipeline_of,
-    play,
-    walks_of,
-    watch,
-)
+from hrc_env.experiments.ablations.play import matched, pipeline_of, play, walks_of, watch
 from hrc_env.experiments.ablations.questions.rigs import CORNERS, WALLS, spread_over
 from hrc_env.experiments.study.report import Report
-from hrc_env.experiments.study.rigs import left_of
+from hrc_env.experiments.study.rigs import DT_S, N_WARM_UP, left_of
 from hrc_env.experiments.study.runner import run
 from hrc_env.tracking.tree.gaussian import PARENT, ROOT
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from hrc_env.env import HRCEnv
-from hrc_env.geometry.cameras import project
-from hrc_env.render.stage import QUALITY, Place, Stage
+from hrc_env.geometry.cameras import PinholeCamera, project
+from hrc_env.render.stage import QUALITY, Stage
 from hrc_env.scene.render import PictureRenderer, viewpoint_camera
 
 SIZE = (240, 180)
@@ -30,9 +30,8 @@ def stage(env):
     stage.close()
 
 
-def place(name: str = "beside", shadows: bool = True) -> Place:
-    camera = viewpoint_camera(name, *SIZE)
-    return Place(camera, (SIZE[0] / 2, SIZE[1] / 2), SIZE[0], *SIZE, shadows)
+def camera(name: str = "beside") -> PinholeCamera:
+    return viewpoint_camera(name, *SIZE)
 
 
 def difference(a: np.ndarray, b: np.ndarray) -> float:
@@ -43,7 +42,7 @@ def test_it_is_the_picture_that_all_at_once_would_be_shadows_included(env, stage
     quality = {**QUALITY, "offsamples": 4}
     renderer = PictureRenderer(env.simulation.scene, *SIZE, quality)
     stage.pose(*env.views.pose())
-    drawn = stage.picture(place())
+    drawn = stage.picture(camera(), shadows=True)
     whole = renderer.picture(*env.views.pose(), "beside")
     unshaded = renderer.picture(*env.views.pose(), "beside", shadows=False)
     renderer.close()
@@ -55,10 +54,10 @@ def test_shadows_of_what_moves_darken_the_floor(env, stage):
     q, motion = env.views.pose()
     away = replace(motion, position_world=motion.position_world + np.array([0.0, 0.0, 20.0]))
     stage.pose(q, away)
-    without = stage.picture(place("top")).astype(int)
+    without = stage.picture(camera("top"), shadows=True).astype(int)
     stage.pose(q, motion)
-    with_worker = stage.picture(place("top")).astype(int)
-    lit = stage.picture(place("top", shadows=False)).astype(int)
+    with_worker = stage.picture(camera("top"), shadows=True).astype(int)
+    lit = stage.picture(camera("top")).astype(int)
     darker = ((without - with_worker) > 15).all(-1) & (np.abs(with_worker - lit).max(-1) > 15)
     assert darker.sum() > 20
 
@@ -66,17 +65,17 @@ def test_shadows_of_what_moves_darken_the_floor(env, stage):
 def test_the_same_pose_is_the_same_picture_whatever_was_drawn_between(env, stage):
     q, motion = env.views.pose()
     stage.pose(q, motion)
-    before = stage.picture(place())
+    before = stage.picture(camera(), shadows=True)
     stage.pose(q + 0.5, motion)
-    other = stage.picture(place())
-    stage.picture(place("top"))
+    other = stage.picture(camera(), shadows=True)
+    stage.picture(camera("top"), shadows=True)
     stage.pose(q, motion)
-    np.testing.assert_array_equal(stage.picture(place()), before)
+    np.testing.assert_array_equal(stage.picture(camera(), shadows=True), before)
     assert difference(before, other) > 0.5
 
 
 def test_nothing_that_moves_is_outside_the_box(env):
-    layers, here = Stage(env.simulation.scene, *SIZE), place()
+    layers, here = Stage(env.simulation.scene, *SIZE), camera()
     layers.pose(*env.views.pose())
     left, top, right, bottom = layers.box(here)
     _, z = layers.moving(here, (0, 0, *SIZE))
@@ -104,6 +103,5 @@ def test_the_picture_from_the_sun_has_things_where_they_are(env):
 
 
 def test_a_viewpoint_sees_what_it_looks_at_in_the_middle():
-    camera = viewpoint_camera("beside", *SIZE)
-    px, _ = project(camera.P[None], np.array([[[0.12, 0.0, 0.95]]]))
+    px, _ = project(camera().P[None], np.array([[[0.12, 0.0, 0.95]]]))
     np.testing.assert_allclose(px[0, 0, 0], (120, 90), atol=1e-9)

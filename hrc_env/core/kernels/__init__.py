@@ -40,11 +40,10 @@ def kernel(
     """Compile a function when it is first called; dividing by zero gives infinity, as in NumPy.
 
     Args:
-        makes_arrays: it makes arrays or gives them back. In all others arrays are not counted by
-            reference: numba pays two locked instructions for every row that a kernel takes of an
-            array, a fifth of the tracker's time. The compiler refuses to make an array where this
-            is not said; a kernel that does not say it must not call one that gives an array back,
-            whose memory nobody would free.
+        makes_arrays: it makes arrays or gives them back; the compiler refuses where this is not
+            said. In all others arrays are not counted by reference, which numba does with two
+            locked instructions for every row, a fifth of the tracker's time; they must not call
+            a kernel that gives an array back, whose memory nobody would free.
         fastmath: which liberties the optimiser has with sums and products (LLVM's flags).
         forceinline: always part of its callers.
 

@@ -8,8 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from functools import lru_cache
-from queue import Empty, SimpleQueue
+from functools import lru_cache, partial
 from typing import Any
 
 from hrc_env.core.kernels.cache import folder
@@ -42,21 +41,17 @@ def compile_missing(level: str | None, say: Say) -> int:
     Where no process can be started, or one dies, kernels are compiled when they are called.
     """
     with _alone(say):
-        wanted: SimpleQueue[Signature] = SimpleQueue()
         todo = missing(level)
-        total_s = sum(each.seconds for each in todo)
-        for each in todo:
-            wanted.put(each)
-        n_workers = min(n_cores(), len(todo))
-        with ThreadPoolExecutor(max(n_workers, 1)) as threads:
-            workers = [threads.submit(_serve, wanted, total_s, say) for _ in range(n_workers)]
-            for worker in workers:
-                worker.result()
+        wanted, total_s = iter(todo), sum(each.seconds for each in todo)
+        with ThreadPoolExecutor(n_cores()) as threads:
+            serve = partial(_serve, wanted, total_s, say)
+            for served in [threads.submit(serve) for _ in todo[: n_cores()]]:
+                served.result()
     return len(todo)
 
 
-def _serve(wanted: "SimpleQueue[Signature]", total_s: float, say: Say) -> None:
-    """Let one process compile until nothing is left."""
+def _serve(wanted: Iterator[Signature], total_s: float, say: Say) -> None:
+    """Let one process compile until nothing is left, beside others that take of the same."""
     command = [sys.executable, "-m", "hrc_env.core.kernels.ahead"]
     pipes: Any = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True, "bufsize": 1}
     try:
@@ -64,17 +59,15 @@ def _serve(wanted: "SimpleQueue[Signature]", total_s: float, say: Say) -> None:
     except OSError as error:
         log.warning("Kernels cannot be compiled ahead (%s); they are when called.", error)
         return
-    with contextlib.suppress(Empty):
-        while True:
-            each = wanted.get_nowait()
-            with contextlib.suppress(OSError):  # of a process that has died
-                process.stdin.write(json.dumps([each.kernel, each.args]) + "\n")
-            answer = process.stdout.readline()
-            if answer != "done\n":
-                log.warning("Compiling %s failed; it is tried when called.", each.kernel)
-            if not answer:
-                break
-            say(each.seconds / total_s, each.kernel.partition(":")[2])
+    for each in wanted:
+        with contextlib.suppress(OSError):  # of a process that has died
+            process.stdin.write(json.dumps([each.kernel, each.args]) + "\n")
+        answer = process.stdout.readline()
+        if answer != "done\n":
+            log.warning("Compiling %s failed; it is tried when called.", each.kernel)
+        if not answer:
+            break
+        say(each.seconds / total_s, each.kernel.partition(":")[2])
     with contextlib.suppress(OSError):
         process.communicate()
 

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numba
+from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
@@ -31,18 +32,21 @@ SUFFIX = ".nbc"
 
 @lru_cache(maxsize=1)
 def folder() -> Path:
-    """Where compiled kernels are kept: NUMBA_CACHE_DIR if that is set; else beside the package's
-    bytecode, so that a copied tree keeps them; else, where nobody may write there, the user's
-    cache folder."""
+    """Where compiled kernels are kept: in NUMBA_CACHE_DIR; else beside the package's bytecode, so
+    that a copied tree keeps them; where nobody may write there, in the user's cache folder."""
     chosen = os.environ.get("NUMBA_CACHE_DIR")
     if chosen:
         return Path(chosen) / "hrc_env"
     beside = PACKAGE / "__pycache__" / "kernels"
-    if (beside.is_dir() and os.access(beside, os.W_OK)) or _can_make(beside):
+    if _can_make(beside):
         return beside
-    name = hashlib.sha256(str(PACKAGE).encode()).hexdigest()[:12]
+    name = _hashed(str(PACKAGE))[:12]
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     return cache / "hrc_env" / f"kernels-{name}"
+
+
+def _hashed(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _can_make(path: Path) -> bool:
@@ -54,41 +58,27 @@ def _can_make(path: Path) -> bool:
         return False
 
 
-class KernelCache:
-    """The compiled forms of one kernel; the methods are those that numba calls."""
+class KernelCache(NullCache):
+    """The compiled forms of one kernel."""
 
     def __init__(self, dispatcher: "KernelDispatcher") -> None:
         self._dispatcher = dispatcher
-        self._enabled = True
 
-    @property
-    def cache_path(self) -> str:
-        """The folder."""
-        return str(folder())
-
-    def path(self, args: tuple[Any, ...], target_context: Any) -> Path:
+    def path(self, args: tuple[Any, ...]) -> Path:
         """The file of a signature."""
-        kind = hashlib.sha256(
-            repr((str(args), target_context.codegen().magic_tuple())).encode()
-        ).hexdigest()[:10]
-        made_of = hashlib.sha256(
-            f"{digest_of(self._dispatcher)} {numba.__version__} {sys.version_info[:2]}".encode()
-        ).hexdigest()[:16]
+        processor = self._dispatcher.targetctx.codegen().magic_tuple()
+        kind = _hashed(repr((str(args), processor)))[:10]
+        versions = f"{numba.__version__} {sys.version_info[:2]}"
+        made_of = _hashed(f"{digest_of(self._dispatcher)} {versions}")[:16]
         function = self._dispatcher.py_func
         name = f"{function.__module__.removeprefix('hrc_env.')}.{function.__qualname__}"
         return folder() / f"{name}-{kind}-{made_of}{SUFFIX}"
 
-    def has(self, args: tuple[Any, ...]) -> bool:
-        """Whether a signature's file is there."""
-        return self.path(args, self._dispatcher.targetctx).exists()
-
     def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
         """A compiled form, if there is one."""
         target_context.refresh()
-        if not self._enabled:
-            return None
         try:
-            parts = pickle.loads(self.path(_args(sig), target_context).read_bytes())
+            parts = pickle.loads(self.path(_args(sig)).read_bytes())
         except (OSError, EOFError, pickle.UnpicklingError):
             return None
         return CompileResult._rebuild(target_context, *parts)
@@ -98,7 +88,7 @@ class KernelCache:
 
         Older ones go, but not from a folder of the user's choice, which several checkouts may use.
         """
-        path = self.path(_args(sig), self._dispatcher.targetctx)
+        path = self.path(_args(sig))
         draft = path.with_name(f"{uuid.uuid4().hex}.tmp")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -112,17 +102,6 @@ class KernelCache:
         except OSError:
             with contextlib.suppress(OSError):
                 draft.unlink()
-
-    def enable(self) -> None:
-        """Use it."""
-        self._enabled = True
-
-    def disable(self) -> None:
-        """Load nothing."""
-        self._enabled = False
-
-    def flush(self) -> None:
-        """Nothing: what is on disk fits."""
 
 
 def _args(sig: Any) -> tuple[Any, ...]:

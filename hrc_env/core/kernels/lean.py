@@ -1,9 +1,8 @@
 """A cheaper way through numba's compiler: callees are lowered, only the kernel itself is compiled.
 
-numba links the code of every callee into its caller, optimises all of it and emits machine code
-for all of it, and does so again at every level of calls. Here a callee is translated to LLVM's
-intermediate form and left as it is; the kernel that Python calls links each of them once, optimises
-once and emits once. That halves the time to compile and the memory that it takes.
+numba links, optimises and emits the code of every callee again at every level of calls. Here a
+callee is left in LLVM's intermediate form; the kernel that Python calls links each of them once,
+optimises once and emits once: half the time and memory to compile.
 
 Everything is done by subclasses, so that other people's numba functions are compiled as ever. What
 is subclassed is numba's inside: `pyproject.toml` admits the versions with which this is tested.
@@ -11,6 +10,7 @@ is subclassed is numba's inside: `pyproject.toml` admits the versions with which
 
 import copy
 from collections.abc import Callable, Iterator
+from functools import cache
 from typing import Any
 
 import llvmlite.binding as llvm
@@ -91,7 +91,9 @@ class LeanContext(cpu.CPUContext):
         )
 
 
+@cache
 def _lean_context() -> LeanContext:
+    """One for all kernels."""
     usual: Any = registry.cpu_target.target_context
     generator = copy.copy(usual.codegen())
     generator._library_class = LeanLibrary
@@ -105,19 +107,8 @@ def _lean_context() -> LeanContext:
 class LeanTarget(registry.CPUTarget):
     """numba's own target with the lean context."""
 
-    _context: LeanContext | None = None
-
-    @property
-    def target_context(self) -> Any:
-        """One for all kernels."""
-        if LeanTarget._context is None:
-            LeanTarget._context = _lean_context()
-        return LeanTarget._context
-
-    @property
-    def typing_context(self) -> Any:
-        """numba's own."""
-        return registry.cpu_target.typing_context
+    target_context = property(lambda self: _lean_context())
+    typing_context = property(lambda self: registry.cpu_target.typing_context)
 
 
 class CalleeDispatcher(registry.CPUDispatcher):

@@ -39,7 +39,7 @@ class Signature:
     def is_compiled(self) -> bool:
         """Whether it lies on disk, or there is no such kernel any more."""
         try:
-            return kernel_named(self.kernel)._cache.has(self.types())
+            return kernel_named(self.kernel)._cache.path(self.types()).exists()
         except (ImportError, KeyError, AttributeError):
             return True
 

@@ -10,8 +10,7 @@ from typing import Any
 
 from markdown_it import MarkdownIt
 
-from hrc_env.core.provenance import provenance
-from hrc_env.core.results import Metric, write_results, write_whole
+from hrc_env.core.results import Metric, provenance, write_results, write_whole
 
 _STYLE = """
 body { font: 17px/1.55 system-ui, sans-serif; color: #1c2430; max-width: 66rem;

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import cv2
 import numpy as np
 
-from hrc_env.core.stateful import Stateful
+from hrc_env.core.batching import Stateful
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.geometry.cameras import PinholeCamera
