@@ -15,6 +15,8 @@ from importlib.metadata import version
 from rich.console import Console
 from rich.markup import escape
 
+from hrc_env.core.errors import HRCError, MissingExtraError, learner
+
 Finding = tuple[bool, str]
 
 PACKAGES = ("mujoco", "gymnasium", "numpy", "numba")
@@ -39,6 +41,8 @@ class Check:
         for name in NAMES:
             try:
                 ok, message = globals()[f"_{name.lower()}"]()
+            except HRCError as error:
+                ok, message = False, str(error)
             except Exception as error:  # whatever is wrong with this machine, say it
                 ok, message = False, f"{type(error).__name__}: {error}"
             fine &= ok
@@ -59,8 +63,6 @@ def _packages() -> Finding:
 
 
 def _torch() -> Finding:
-    from hrc_env.core.errors import MissingExtraError, learner
-
     try:
         with learner():
             import stable_baselines3
@@ -121,14 +123,10 @@ def _kernels() -> Finding:
 
 
 def _weights() -> Finding:
-    from hrc_env.core.errors import HRCError
     from hrc_env.perception import weights
 
-    try:
-        for name in weights.ALWAYS:
-            weights.find_weights(name)
-    except HRCError as error:
-        return False, str(error)
+    for name in weights.ALWAYS:
+        weights.find_weights(name)
     return True, f"official, in {weights.cache_dir()}"
 
 

@@ -1,10 +1,9 @@
 """Films of an agent: played, drawn and encoded; and which episode is worth one."""
 
-import copy
 import os
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, closing
 from pathlib import Path
@@ -15,12 +14,11 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from hrc_env.cli.frame import Diary, compose
+from hrc_env.cli.frame import MOMENT, Diary, compose
 from hrc_env.cli.progress import compile_kernels, track
 from hrc_env.core.checkout import agents
 from hrc_env.core.typing import Image
 from hrc_env.env import HRCEnv
-from hrc_env.render.views import Glance
 
 STEPS_PER_FRAME = 2
 """A film shows every second step, in real time."""
@@ -40,11 +38,9 @@ Steps = Iterator[tuple[float, dict[str, Any]]]
 def film_episode(
     make: Make, path: Path, seed: int = 0, n_steps: int = 250, **kwargs: Any
 ) -> dict[str, float]:
-    """Film `n_steps` of an agent, every second one, into an .mp4 file; returns what came of them,
-    by name and [unit].
+    """Film an agent in the `HRCEnv` of `kwargs` into an .mp4 file; what came of it, by name [unit].
 
-    A still of the closest moment that is no near miss yet (or of the first step) is written beside
-    it as .png. `kwargs` are those of `HRCEnv`.
+    A still of the closest moment that is no near miss yet, or of the first, is written beside it.
     """
     level = kwargs.get("perception", "pixels")
     compile_kernels(Console(), level)
@@ -117,39 +113,43 @@ def _filmed(
         quality=None, macro_block_size=4, output_params=list(H264),
     )  # fmt: skip
 
-    def draw(diary: Diary, seen: Glance) -> Image:
-        frame = compose(env, diary, seen)
+    def draw(*moment: Any) -> Image:
+        frame = compose(env, *moment)
         writer.append_data(frame)
         return frame
 
     still: Future[Image] = Future()
-    diary, closest_m, started_s = Diary(), np.inf, time.monotonic()
+    diary, closest_m, started_s = np.zeros(n_steps, MOMENT), np.inf, time.monotonic()
+    step, counts = 0, {}
     with closing(writer), ThreadPoolExecutor(1, "hrc_env-film") as thread, ExitStack() as after:
         after.callback(lambda: thread.submit(env.views.close).result())  # where they were made
         for step, (_, info) in enumerate(track(played, "filming", n_steps)):
             believed = env.simulation.belief.separation.distance_m
-            diary.note(info, float(believed.min(initial=np.inf)), env.simulation.task.counts(info))
+            true_m = info.get("safety/min_separation_m", np.inf)
+            error_m = info.get("tracking/mpjpe_m", np.nan)
+            diary[step] = true_m, believed.min(initial=np.inf), error_m, info["cost"]
+            counts = env.simulation.task.counts(info)
             if step % STEPS_PER_FRAME == 0:
-                waiting.append(thread.submit(draw, copy.deepcopy(diary), env.views.glance()))
-                closer = CLOSE_M < diary.true_m[-1] < closest_m
-                closest_m = diary.true_m[-1] if closer else closest_m
+                glance = env.views.glance()
+                waiting.append(thread.submit(draw, diary[: step + 1], counts, glance))
+                closer = CLOSE_M < true_m < closest_m
+                closest_m = true_m if closer else closest_m
                 still = waiting[-1] if closer or step == 0 else still
                 if len(waiting) > FRAMES_BEHIND:
                     waiting.popleft().result()
         for drawn in waiting:
             drawn.result()
         seconds = time.monotonic() - started_s
-    return _totals(diary, seconds), still.result()
+    return _totals(diary[: step + 1], counts, seconds), still.result()
 
 
-def _totals(diary: Diary, seconds: float) -> dict[str, float]:
-    errors_m = np.array(diary.error_m)
-    known = errors_m[np.isfinite(errors_m)]
+def _totals(diary: Diary, counts: Mapping[str, float], seconds: float) -> dict[str, float]:
+    known = diary["error_m"][np.isfinite(diary["error_m"])]
     return {
         "median tracking error [mm]": 1e3 * float(np.median(known)) if len(known) else np.nan,
-        "lost steps [%]": 100 * (1 - len(known) / len(errors_m)),
-        "minimum separation [m]": min(diary.true_m),
-        **{f"{name} [count]": n for name, n in diary.counts.items()},
-        "cost [count]": sum(diary.cost),
-        "film drawn [frames/s]": len(errors_m) / STEPS_PER_FRAME / seconds,
+        "lost steps [%]": 100 * (1 - len(known) / len(diary)),
+        "minimum separation [m]": float(diary["true_m"].min()),
+        **{f"{name} [count]": n for name, n in counts.items()},
+        "cost [count]": float(diary["cost"].sum()),
+        "film drawn [frames/s]": len(diary) / STEPS_PER_FRAME / seconds,
     }

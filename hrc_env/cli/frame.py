@@ -1,7 +1,6 @@
 """A film's frame: the room beside the four cameras, what is believed, and the separation."""
 
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Mapping
 
 import cv2
 import numpy as np
@@ -31,33 +30,20 @@ LEFT, RIGHT, TOP, BOTTOM = 290, WIDTH - 20, 14, STRIP_HEIGHT - 14
 """Where in the strip the curves are."""
 NEAR, TOUCHING = (150, 30, 40), (255, 40, 60)
 """Colours of steps that cost."""
+MOMENT = np.dtype([("true_m", float), ("estimated_m", float), ("error_m", float), ("cost", float)])
+"""What the strip shows of a step: the separation, truly and as the robot believes it, the error of
+the tracked joints (NaN: nobody was tracked), and what it cost."""
+Diary = NDArray[np.void]
+"""(T,) moments."""
 
 
-@dataclass(slots=True)
-class Diary:
-    """What the strip shows: one entry a step."""
-
-    true_m: list[float] = field(default_factory=list)
-    estimated_m: list[float] = field(default_factory=list)
-    error_m: list[float] = field(default_factory=list)
-    """Of the tracked joints; NaN where nobody was tracked."""
-    cost: list[float] = field(default_factory=list)
-    counts: dict[str, Any] = field(default_factory=dict)
-    """What was achieved and what failed so far."""
-
-    def note(self, info: dict[str, Any], estimated_m: float, counts: dict[str, Any]) -> None:
-        """Add a step."""
-        self.true_m.append(info.get("safety/min_separation_m", np.inf))
-        self.estimated_m.append(estimated_m)
-        self.error_m.append(info.get("tracking/mpjpe_m", np.nan))
-        self.cost.append(info["cost"])
-        self.counts = counts
-
-
-def compose(env: HRCEnv, diary: Diary, seen: Glance | None = None) -> Image:
+def compose(
+    env: HRCEnv, diary: Diary, counts: Mapping[str, float], seen: Glance | None = None
+) -> Image:
     """One frame (900, 1600, 3): room, cameras, crops or belief, strip.
 
     Of the moment `seen` (None: now), with which the diary ends; the environment may have gone on.
+    `counts` are what was achieved and what failed so far.
     """
     seen = seen or env.views.glance()
     level, views = env.simulation.perception, env.views
@@ -78,7 +64,7 @@ def compose(env: HRCEnv, diary: Diary, seen: Glance | None = None) -> Image:
         _paste(frame, view, (RIGHT_X + k % 2 * (TILE[0] + 4), k // 2 * (TILE[1] + 4)))
     for k, picture in enumerate(pictures):
         _paste(frame, picture, (RIGHT_X + k * (picture.shape[1] + 4), TITLE_Y + 30))
-    _paste(frame, strip(diary, env.config.ctrl_dt, env.config.cost.proximity_m), (0, 720))
+    _paste(frame, strip(diary, counts, env.config.ctrl_dt, env.config.cost.proximity_m), (0, 720))
     return frame
 
 
@@ -104,24 +90,23 @@ def legend(level: str) -> Image:
     return image
 
 
-def strip(diary: Diary, dt_s: float, limit_m: float) -> Image:
+def strip(diary: Diary, counts: Mapping[str, float], dt_s: float, limit_m: float) -> Image:
     """True and estimated separation over the last seconds; red where a step cost."""
     image = _axes(limit_m)
     n_shown = round(STRIP_S / dt_s)
-    first = max(0, len(diary.cost) - n_shown)
-    x = np.round(LEFT + (RIGHT - LEFT) * np.arange(len(diary.cost) - first) / n_shown).astype(int)
-    cost = np.array(diary.cost[first:])
-    for k in np.flatnonzero(cost > 0).tolist():
-        colour = NEAR if cost[k] < 2 else TOUCHING
-        cv2.rectangle(image, (int(x[k]), TOP), (int(x[k]) + 6, BOTTOM), colour, -1)
-    series = (diary.true_m, overlay.INK), (diary.estimated_m, overlay.BELIEF)
-    for values, colour in series:
-        points = np.stack([x, _y_of(np.array(values[first:]))], -1).astype(np.int32)
+    shown = diary[-n_shown:]
+    x = np.round(LEFT + (RIGHT - LEFT) * np.arange(len(shown)) / n_shown).astype(int)
+    for at, cost in zip(x.tolist(), shown["cost"].tolist(), strict=True):
+        if cost > 0:
+            colour = NEAR if cost < 2 else TOUCHING
+            cv2.rectangle(image, (at, TOP), (at + 6, BOTTOM), colour, -1)
+    for name, colour in (("true_m", overlay.INK), ("estimated_m", overlay.BELIEF)):
+        points = np.stack([x, _y_of(shown[name])], -1).astype(np.int32)
         cv2.polylines(image, [points], False, colour, 2, cv2.LINE_AA)
-    for row, (name, count) in enumerate(diary.counts.items()):
+    for row, (name, count) in enumerate(counts.items()):
         overlay.write(image, f"{name}: {count:.0f}", (14, 100 + 20 * row), 15, overlay.GOAL)
-    overlay.write(image, f"cost: {sum(diary.cost):.0f}", (14, 142), 15, overlay.COST)
-    overlay.write(image, f"{len(diary.cost) * dt_s:.1f} s", (140, 142), 15)
+    overlay.write(image, f"cost: {diary['cost'].sum():.0f}", (14, 142), 15, overlay.COST)
+    overlay.write(image, f"{len(diary) * dt_s:.1f} s", (140, 142), 15)
     return image
 
 

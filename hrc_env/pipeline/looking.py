@@ -30,7 +30,7 @@ class Looking(Stateful):
             [[None] * len(self.cameras) for _ in range(n_workers)] for _ in range(batch)
         ]
         self.schedule = SearchSchedule(batch, len(self.cameras), config.search_every)
-        self.reacquisition = Reacquisition(batch, n_workers, len(self.cameras))
+        self.reacquisition = Reacquisition(batch, n_workers, self.cameras)
         self.seen: dict[int, tuple[list[Roi | None], list[Image | None]]] = {}
         """Windows and crops of each environment's first worker: for pictures, no state."""
 
@@ -114,7 +114,7 @@ class Looking(Stateful):
         blind = self.reacquisition.blind(b, worker, has_image)
         if blind:
             people = self.detector.search(source, blind)
-            self.reacquisition.found(b, worker, people, windows, taken, self.cameras)
+            self.reacquisition.found(b, worker, people, windows, taken)
         there = self.reacquisition.windows(b, worker, windows)
         return [window if has else None for window, has in zip(there, has_image, strict=True)]
 

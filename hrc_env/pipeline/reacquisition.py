@@ -74,11 +74,12 @@ class Reacquisition(Stateful):
 
     CHANGES = ("unseen", "elsewhere", "left")
 
-    def __init__(self, batch: int, n_workers: int, n_cameras: int) -> None:
-        self.unseen = np.zeros((batch, n_workers, n_cameras), int)
+    def __init__(self, batch: int, n_workers: int, cameras: Sequence[PinholeCamera]) -> None:
+        self.cameras = cameras
+        self.unseen = np.zeros((batch, n_workers, len(cameras)), int)
         """(B, W, C) steps in a row in which a camera showed nobody."""
         self.elsewhere: list[Windows] = [
-            [[None] * n_cameras for _ in range(n_workers)] for _ in range(batch)
+            [[None] * len(cameras) for _ in range(n_workers)] for _ in range(batch)
         ]
         """Where a search found them."""
         self.left = np.zeros((batch, n_workers), int)
@@ -97,22 +98,16 @@ class Reacquisition(Stateful):
         return np.flatnonzero(np.array(has_image) & missing).tolist()
 
     def found(
-        self,
-        b: int,
-        worker: int,
-        people: Candidates,
-        windows: Views,
-        others: Windows,
-        cameras: Sequence[PinholeCamera],
+        self, b: int, worker: int, people: Candidates, windows: Views, others: Windows
     ) -> None:
-        """Learn whom (C,) a search of the blind cameras of a rig shows for a worker of environment
-        b, where the track has cameras look (C,), and windows (C,) of others, whom it is not."""
+        """Learn whom (C,) a search of the blind cameras shows for a worker of environment b, where
+        the track has cameras look (C,), and windows (C,) of others, whom it is not."""
         blind = self.unseen[b, worker] >= PATIENCE
         candidates = [
             people[c] if blind[c] else [window for window in [windows[c]] if window is not None]
-            for c in range(len(cameras))
+            for c in range(len(self.cameras))
         ]
-        agreed = agreed_windows(apart_from(candidates, others), cameras)
+        agreed = agreed_windows(apart_from(candidates, others), self.cameras)
         self.unseen[b, worker, blind] = 0
         if any(agreed[c] is not None for c in np.flatnonzero(blind)):
             self.elsewhere[b][worker], self.left[b, worker] = agreed, FOLLOWED

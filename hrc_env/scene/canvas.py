@@ -93,9 +93,8 @@ class Canvas:
         """Put the arm at q (N,), the workers and what they hold where `motion` (W, S, ...) says."""
         check_shape("q", np.shape(q), self.scene.home_q.shape, "one angle per joint")
         self._data.qpos[: len(q)] = q
-        rows = self.scene.worker_mocap
-        if rows.size and motion is not None:
-            show_workers(self._model, self._data, self._visuals, rows, motion)
+        if motion is not None:
+            show_workers(self._model, self._data, self._visuals, motion)
             if self._look is not None:
                 take_off_hats(self._model, self._visuals, self._look)
         mujoco.mj_kinematics(self._model, self._data)

@@ -154,29 +154,29 @@ def _parsed(robot: Robot) -> Any:
 
 def _chain(robot: Robot, mount_world: tuple[float, float, float]) -> SerialChain:
     model, n = _parsed(robot).compile(), len(robot.joints)
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)  # all joints at 0
     joints = [_id(model, "joint", name) for name in robot.joints]
     _check_servos(model, joints)
     bodies = model.jnt_bodyid[joints].tolist()
-    turned = [_joint_frame(model, joint) for joint in joints]
-    foot, fixed = int(model.body_parentid[bodies[0]]), np.zeros((n, 4, 4))
-    above, before = foot, np.eye(4)
-    for i, (body, frame) in enumerate(zip(bodies, turned, strict=True)):
-        fixed[i] = before @ _between(model, above, body) @ frame
-        above, before = body, np.linalg.inv(frame)
-    last, tool = _carried(model, bodies, turned, "site", robot.tool_site)
-    if last != n - 1:
+    parents = model.body_parentid[bodies].tolist()
+    if [_link(model, bodies, parent) for parent in parents] != list(range(-1, n - 1)):
+        raise ConfigError("its joints must be a single chain.")
+    site = _id(model, "site", robot.tool_site)
+    if _link(model, bodies, model.site_bodyid[site]) != n - 1:
         raise ConfigError(f"site {robot.tool_site!r} must be on the last link.")
-    links, ends, radius_m = _capsules(model, bodies, turned, robot.capsules)
-    T_world_from_foot = _transform(mount_world, np.array([1.0, 0, 0, 0]))
+    foot = _pose(data.xpos[parents[0]], data.xmat[parents[0]])
+    links = np.stack([_joint_frame(model, data, joint) for joint in joints])
+    carriers, ends, radius_m = _capsules(model, data, bodies, links, robot)
     return SerialChain(
         joint_names=robot.joints,
-        T_world_from_base=T_world_from_foot @ _between(model, 0, foot),
-        parent_from_joint=fixed,
-        link_from_tool=tool,
+        T_world_from_base=_pose(mount_world, np.eye(3)) @ foot,
+        parent_from_joint=np.linalg.inv([foot, *links[:-1]]) @ links,
+        link_from_tool=np.linalg.inv(links[-1]) @ _pose(data.site_xpos[site], data.site_xmat[site]),
         range_rad=model.jnt_range[joints],
         velocity_limit_rad_s=model.actuator_ctrlrange[n:, 1].copy(),
         capsule_names=robot.capsules,
-        capsule_link=links,
+        capsule_link=carriers,
         capsule_ends=ends,
         capsule_radius_m=radius_m,
     )
@@ -206,64 +206,43 @@ def _check_servos(model: mujoco.MjModel, joints: list[int]) -> None:
         )
 
 
-def _joint_frame(model: mujoco.MjModel, joint: int) -> Transforms:
-    """(4, 4) in its body's frame: z is the axis."""
-    quaternion = np.zeros(4)
-    mujoco.mju_quatZ2Vec(quaternion, model.jnt_axis[joint])
-    return _transform(model.jnt_pos[joint], quaternion)
-
-
-def _transform(pos: Any, quaternion_wxyz: Floats) -> Transforms:
-    """(4, 4); by the angle, whose cosine is then as exact as the MJCF's numbers are."""
-    sine, T = np.linalg.norm(quaternion_wxyz[1:]), np.eye(4)
-    angle = 2 * np.arctan2(sine, quaternion_wxyz[0])
-    axis = quaternion_wxyz[1:] / sine if sine else np.zeros(3)
-    c, s = np.cos(angle), np.sin(angle)
-    T[:3, :3] = c * np.eye(3) + s * np.cross(np.eye(3), axis) + (1 - c) * np.outer(axis, axis)
-    T[:3, 3] = pos
-    return T
-
-
-def _between(model: mujoco.MjModel, above: int, body: int) -> Transforms:
-    """(4, 4) a body's frame in that of one above it, all joints at 0."""
-    T = np.eye(4)
-    while body != above:
-        if body == 0:
-            raise ConfigError("its joints must be a single chain, with all capsules and the tool.")
-        T = _transform(model.body_pos[body], model.body_quat[body]) @ T
+def _link(model: mujoco.MjModel, bodies: list[int], body: int) -> int:
+    """Which of the links, whose bodies are given, carries a body; -1: none."""
+    while body and body not in bodies:
         body = model.body_parentid[body]
+    return bodies.index(body) if body in bodies else -1
+
+
+def _pose(pos: Any, rotation: Floats) -> Transforms:
+    """(4, 4) of a place (3,) and a rotation of 9 numbers."""
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = rotation.reshape(3, 3), pos
     return T
 
 
-def _carried(
-    model: mujoco.MjModel, bodies: list[int], turned: list[Transforms], kind: str, name: str
-) -> tuple[int, Transforms]:
-    """The link that carries a geom or a site, and (4, 4) its frame there."""
-    number = _id(model, kind, name)
-    carrier = own = int(getattr(model, f"{kind}_bodyid")[number])
-    while own not in bodies and own:
-        own = int(model.body_parentid[own])
-    if own not in bodies:
-        raise ConfigError(f"{kind} {name!r} is on no link.")
-    link = bodies.index(own)
-    pos, quat = getattr(model, f"{kind}_pos")[number], getattr(model, f"{kind}_quat")[number]
-    inside = _between(model, own, carrier) @ _transform(pos, quat)
-    return link, np.linalg.inv(turned[link]) @ inside
+def _joint_frame(model: mujoco.MjModel, data: mujoco.MjData, joint: int) -> Transforms:
+    """(4, 4) in the world: z is the axis."""
+    quaternion, turn = np.zeros(4), np.zeros(9)
+    mujoco.mju_quatZ2Vec(quaternion, model.jnt_axis[joint])
+    mujoco.mju_quat2Mat(turn, quaternion)
+    body = data.xmat[model.jnt_bodyid[joint]].reshape(3, 3)
+    return _pose(data.xanchor[joint], body @ turn.reshape(3, 3))
 
 
 def _capsules(
-    model: mujoco.MjModel, bodies: list[int], turned: list[Transforms], names: tuple[str, ...]
+    model: mujoco.MjModel, data: mujoco.MjData, bodies: list[int], links: Transforms, robot: Robot
 ) -> tuple[Ints, Floats, Floats]:
     """Links (K,), ends (K, 2, 3) and radii (K,) of the capsules."""
-    links, ends, radii_m = [], [], []
-    for name in names:
-        geom = model.geom(_id(model, "geom", name))
-        if geom.type[0] != mujoco.mjtGeom.mjGEOM_CAPSULE:
+    geoms = [_id(model, "geom", name) for name in robot.capsules]
+    carriers = [_link(model, bodies, model.geom_bodyid[geom]) for geom in geoms]
+    ends = np.empty((len(geoms), 2, 3))
+    for k, (name, geom, link) in enumerate(zip(robot.capsules, geoms, carriers, strict=True)):
+        if model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_CAPSULE:
             raise ConfigError(f"geom {name!r} must be a capsule.")
-        link, T = _carried(model, bodies, turned, "geom", name)
-        along = T[:3, 2] * geom.size[1]
-        links.append(link)
-        ends.append((T[:3, 3] - along, T[:3, 3] + along))
-        radii_m.append(geom.size[0])
-    rounded = np.round(np.array(ends, float), 12)  # as the quaternions are
-    return np.array(links), np.asarray(rounded, np.float64), np.array(radii_m, np.float64)
+        if link < 0:
+            raise ConfigError(f"geom {name!r} is on no link.")
+        T = np.linalg.inv(links[link]) @ _pose(data.geom_xpos[geom], data.geom_xmat[geom])
+        along = T[:3, 2] * model.geom_size[geom, 1]
+        ends[k] = T[:3, 3] - along, T[:3, 3] + along
+    # As the MJCF's quaternions are rounded.
+    return np.array(carriers), np.round(ends, 12), model.geom_size[geoms, 0].copy()

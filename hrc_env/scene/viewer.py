@@ -18,7 +18,7 @@ class Viewer:
 
     def __init__(self, scene: Scene) -> None:
         """Open the window. Raises `RenderingError` where there is no display."""
-        self._scene, self._model = scene, copy.copy(drawing_model(scene))
+        self._model = copy.copy(drawing_model(scene))
         self._data = mujoco.MjData(self._model)
         self._visuals = visuals(scene)
         try:
@@ -37,11 +37,9 @@ class Viewer:
         """Pose the scene: arm q (N,) and the workers of one environment (W, S, ...)."""
         if not self._window.is_running():
             return
-        rows = self._scene.worker_mocap
         with self._window.lock():
             self._data.qpos[: len(q)] = q
-            if rows.size:
-                show_workers(self._model, self._data, self._visuals, rows, motion)
+            show_workers(self._model, self._data, self._visuals, motion)
             mujoco.mj_forward(self._model, self._data)
         self._window.sync()
 

@@ -13,6 +13,7 @@ import numpy as np
 from hrc_env.core.records import Held, WorkerMotion
 from hrc_env.core.typing import Ints
 from hrc_env.scene.primitives import DECORATION, LOOKS_ONLY, WORKER_CAPSULES
+from hrc_env.scene.worker import mocap_ids
 from hrc_env.worker.body import SEGMENTS, Body, assets_dir
 from hrc_env.worker.mesh import HatMesh, SkinMesh, WorkerMesh
 from hrc_env.worker.props import PROP_NAMES
@@ -29,6 +30,8 @@ PARKED_M = (0.0, 0.0, -30.0)
 class WorkerVisuals:
     """Where the looks of W workers' N bodies, and what they can hold, are in a model."""
 
+    segments: Ints
+    """(W, S) mocap row of every body segment."""
     skins: Ints
     """(nskin, 2) whose each skin is, and of which body."""
     hats: Ints
@@ -68,7 +71,9 @@ def visuals_of(
     hats = [(*pair, known[f"{start}hat"]) for pair, start in of.items() if f"{start}hat" in known]
     names = PROP_NAMES[1:]
     props = [model.body(prefix + name).mocapid[0] for prefix in prefixes for name in names]
+    rows = [mocap_ids(model, prefix) for prefix in prefixes]
     return WorkerVisuals(
+        np.array(rows, np.int64),
         skins,
         np.array(hats, np.int64).reshape(-1, 3),
         np.array(props, np.int64).reshape(len(prefixes), len(names)),
@@ -86,20 +91,13 @@ def show_bodies(model: mujoco.MjModel, visuals: WorkerVisuals, body: Ints | None
 
 
 def show_workers(
-    model: mujoco.MjModel,
-    data: mujoco.MjData,
-    visuals: WorkerVisuals,
-    rows: Ints,
-    motion: WorkerMotion,
+    model: mujoco.MjModel, data: mujoco.MjData, visuals: WorkerVisuals, motion: WorkerMotion
 ) -> None:
-    """Pose the workers of one environment, in their bodies and with what they hold.
-
-    Args:
-        model, data: a drawing model of the caller's own and its state; both are changed.
-        visuals: of that model.
-        rows: (W, S) mocap row of every body segment.
-        motion: arrays (W, S, ...).
-    """
+    """Pose the workers of one environment (W, S, ...), in their bodies and with what they hold, in
+    a drawing model of the caller's own and its state."""
+    rows = visuals.segments
+    if not rows.size:
+        return
     data.mocap_pos[rows] = np.reshape(motion.position_world, (*rows.shape, 3))
     data.mocap_quat[rows] = np.reshape(motion.quaternion_wxyz, (*rows.shape, 4))
     show_props(model, data, visuals.props, motion.held)
@@ -124,7 +122,7 @@ def show_props(model: mujoco.MjModel, data: mujoco.MjData, rows: Ints, held: Hel
 
 
 def _add_skin(spec: Any, skin: SkinMesh, body: Body, prefix: str) -> None:
-    material = f"{body.name}_{skin.name}"
+    material = f"{body.names[0]}_{skin.name}"
     if spec.material(material) is None:
         _add_cloth(spec, skin, material)
     moved = np.flatnonzero(skin.weights.any(0))
@@ -155,7 +153,7 @@ def _add_cloth(spec: Any, skin: SkinMesh, name: str) -> None:
 
 
 def _add_hat(spec: Any, hat: HatMesh, body: Body, prefix: str) -> None:
-    name = f"{body.name}_hat"
+    name = f"{body.names[0]}_hat"
     if spec.mesh(name) is None:
         spec.add_mesh(
             name=name,

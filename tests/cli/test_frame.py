@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hrc_env.cli.frame import LEGEND_HEIGHT, RIGHT_X, TITLE_Y, Diary, compose, legend, strip
+from hrc_env.cli.frame import LEGEND_HEIGHT, MOMENT, RIGHT_X, TITLE_Y, compose, legend, strip
 from hrc_env.env import HRCEnv
 from hrc_env.render import overlay
 
@@ -12,11 +12,8 @@ def colours(image: np.ndarray) -> set[tuple[int, ...]]:
     return set(map(tuple, image.reshape(-1, 3).tolist()))
 
 
-def a_diary(n_steps: int = 20, **changes) -> Diary:
-    diary = Diary(**changes)
-    diary.true_m, diary.estimated_m = [0.8] * n_steps, [0.7] * n_steps
-    diary.cost = [0.0] * n_steps
-    return diary
+def a_diary(n_steps: int = 20) -> np.ndarray:
+    return np.full(n_steps, np.array((0.8, 0.7, 0.0, 0.0), MOMENT))
 
 
 def test_the_legend_names_what_a_level_shows():
@@ -30,23 +27,21 @@ def test_the_legend_names_what_a_level_shows():
 
 
 def test_the_strip_counts_goals_and_marks_steps_that_cost():
-    plain = strip(a_diary(), 0.04, 0.15)
-    scored = strip(a_diary(counts={"goals reached": 3.0, "goals missed": 1.0}), 0.04, 0.15)
+    plain = strip(a_diary(), {}, 0.04, 0.15)
+    scored = strip(a_diary(), {"goals reached": 3.0, "goals missed": 1.0}, 0.04, 0.15)
     assert not np.array_equal(plain[:, :280], scored[:, :280])
     np.testing.assert_array_equal(plain[:, 280:], scored[:, 280:])
     costly = a_diary()
-    costly.cost[-1] = 1.0
-    assert not np.array_equal(plain[:, 280:], strip(costly, 0.04, 0.15)[:, 280:])
+    costly["cost"][-1] = 1.0
+    assert not np.array_equal(plain[:, 280:], strip(costly, {}, 0.04, 0.15)[:, 280:])
 
 
 @pytest.mark.parametrize("level", ["keypoints", "none"])
 def test_a_frame_is_full_at_levels_without_crops(level):
     env = HRCEnv(perception=level)
     env.reset(seed=7)
-    *_, info = env.step(np.zeros(6))
-    diary = Diary()
-    diary.note(info, 0.5, {})
-    frame = compose(env, diary)
+    env.step(np.zeros(6))
+    frame = compose(env, a_diary(1), {})
     env.close()
     assert frame.shape == (900, 1600, 3)
     for x in (RIGHT_X, RIGHT_X + 404):

@@ -71,6 +71,15 @@ def test_deep_imports_are_followed_even_from_inside_a_function(copied):
     assert of_now() != before
 
 
+def test_what_lies_beside_an_installed_package_does_not_count(copied):
+    (copied / "numpy.py").write_text("this is no Python that could be read")
+    assert {path.name for path in sources_of("hrc_env.maker")} == {
+        "maker.py",
+        "organ.py",
+        "deep.py",
+    }
+
+
 def test_the_file_of_what_somebody_registered_counts():
     here = Path(__file__).read_bytes()
     assert source_digest(test_settings_and_makers_count) == hashlib.sha256(here).hexdigest()

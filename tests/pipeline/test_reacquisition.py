@@ -25,7 +25,7 @@ def windows(place, side_m=2.3) -> list[Roi | None]:
 
 def astray(shown: list[bool], n_steps: int = PATIENCE) -> Reacquisition:
     """One worker whom these cameras have shown in each of so many steps."""
-    strays = Reacquisition(1, 1, len(shown))
+    strays = Reacquisition(1, 1, CAMERAS[: len(shown)])
     for _ in range(n_steps):
         strays.saw(0, 0, np.array(shown))
     return strays
@@ -58,7 +58,7 @@ def test_it_takes_patience_and_one_sight_begins_it_anew():
 
 def test_who_is_found_elsewhere_is_looked_at_there_for_a_while():
     strays, expected = astray([False] * 4), windows(EXPECTED)
-    strays.found(0, 0, people([0, 1, 2]), expected, [], CAMERAS)
+    strays.found(0, 0, people([0, 1, 2]), expected, [])
     there = windows(WORKER)
     for _ in range(FOLLOWED):
         assert strays.blind(0, 0, HAS_IMAGE) == []
@@ -70,7 +70,7 @@ def test_what_one_camera_finds_alone_and_whom_others_follow_changes_nothing():
     expected = windows(EXPECTED)
     for found, others in ((people([2]), []), (people([0, 1, 2], OTHER), [windows(OTHER)])):
         strays = astray([False] * 4)
-        strays.found(0, 0, found, expected, others, CAMERAS)
+        strays.found(0, 0, found, expected, others)
         assert strays.windows(0, 0, expected) == expected
         assert strays.blind(0, 0, HAS_IMAGE) == []  # and the next search is not at once
 
@@ -79,7 +79,7 @@ def test_a_camera_that_shows_the_worker_helps_to_find_them():
     """One camera still shows the worker; a blind one finds the same hips: two that agree."""
     strays, expected = astray([True, False, False, False]), windows(EXPECTED)
     expected[0] = windows(WORKER)[0]
-    strays.found(0, 0, people([1]), expected, [], CAMERAS)
+    strays.found(0, 0, people([1]), expected, [])
     assert strays.windows(0, 0, expected)[:2] == windows(WORKER)[:2]
     strays.reset(0, 0)
     assert strays.windows(0, 0, expected) == expected

@@ -10,7 +10,7 @@ import numpy as np
 from hrc_env.core.errors import ConfigError, check_names
 from hrc_env.core.results import Metric, over
 from hrc_env.experiments.ablations.ablation import Ablation, Setting
-from hrc_env.experiments.ablations.play import DT_S, N_WARM_UP, Sums, play, update_us, walks_of
+from hrc_env.experiments.ablations.play import Sums, play, update_us, walks_of
 from hrc_env.experiments.ablations.questions.faults import CALIBRATION, LATENCY
 from hrc_env.experiments.ablations.questions.filters import ALGORITHM_1, FILTER, KINEMATICS
 from hrc_env.experiments.ablations.questions.rigs import CAMERAS, OCCLUSION, WORKERS
@@ -19,7 +19,7 @@ from hrc_env.experiments.study.cache import PartCache, PartProgress
 from hrc_env.experiments.study.counts import ERRORS_M
 from hrc_env.experiments.study.fingerprint import fingerprint_of
 from hrc_env.experiments.study.intervals import counted_quantile_over, ratio_over, rmse_over
-from hrc_env.experiments.study.rigs import WARM_UP_S
+from hrc_env.experiments.study.rigs import DT_S, N_WARM_UP, WARM_UP_S
 from hrc_env.experiments.study.runner import Study, at_least_one, changed
 
 ABLATIONS: dict[str, Ablation] = {
@@ -139,10 +139,8 @@ def _of_joints(key: str, sums: Mapping[str, Any]) -> dict[str, Metric]:
 
 
 def _by_sight(of_settings: Mapping[str, Sums]) -> dict[str, dict[str, Any]]:
-    """Settings of a scene together, by how many cameras see a joint: `<scene>_seen_<k>`.
-
-    An episode of one setting and that of another are of the same seed: they count as one.
-    """
+    """Settings of a scene together, by how many cameras see a joint, as `<scene>_seen_<k>`;
+    their episodes of one seed count as one."""
     found: dict[str, dict[str, Any]] = {}
     for setting, sums in of_settings.items():
         for what, values in sums.items():

@@ -23,7 +23,7 @@ from hrc_env.experiments.ablations.ablation import Setting
 from hrc_env.experiments.ablations.handicaps import BONES, MOTION, handicap, lengths_m
 from hrc_env.experiments.study.cache import PartProgress
 from hrc_env.experiments.study.counts import ERRORS_M
-from hrc_env.experiments.study.rigs import WARM_UP_S, Turn
+from hrc_env.experiments.study.rigs import DT_S, N_WARM_UP, Turn
 from hrc_env.motion import generator
 from hrc_env.perception.emulator import lines_of_sight
 from hrc_env.perception.sightlines import SEEN
@@ -36,8 +36,6 @@ from hrc_env.worker.body import Body, pool, stack, worker_truth
 LEVEL = "keypoints"
 BODIES = "any"
 """Every episode gives each worker one of the baked bodies."""
-DT_S = HRCConfig().ctrl_dt
-N_WARM_UP = round(WARM_UP_S / DT_S)
 INSIDE_95 = float(chi2.ppf(0.95, 3))
 """Squares of errors in units of their covariance are below this in 95 % of all cases."""
 RECORDED_BY, N_TIMED = "triangulation", 3
@@ -211,5 +209,5 @@ def n_seeing(now: TrueSensorInput, scene: Scene, turn: Turn) -> Ints:
     surroundings = scene.surroundings(now.q, now.motion.held)
     sight, _ = lines_of_sight(now.truth, surroundings, scene.cameras)
     gone = {name for fault in turn.faults if fault.kind == "lost" for name in fault.cameras}
-    left = np.array([camera.name not in gone for camera in scene.cameras])
+    left = [camera.name not in gone for camera in scene.cameras]
     return (sight[:, left] == SEEN).sum(1)

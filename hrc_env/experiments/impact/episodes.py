@@ -1,8 +1,7 @@
 """Episodes of one policy with one perception setup: always the same seeds and the same workers.
 
-What is counted is the truth: distances are between the robot's and the worker's true capsules, as
-in the cost. A directed speed is by how much one body's motion of a step narrowed the separation
-while the other is held where it is at its end: positive is towards the other.
+Distances are between true capsules, as in the cost. A directed speed is by how much one body's
+motion of a step narrowed them while the other is held where it is at its end.
 """
 
 import hashlib
@@ -37,8 +36,8 @@ PEOPLE = "unaware"
 STOP_M, SLOW_M = 0.10, 0.60
 """Separations that call for standing still and for slowing down [m]: `agents.scripted.Yielding`."""
 MOVING_MPS = 0.05
-"""From this directed speed on a robot moves towards the worker or flees [m/s]; judgement. No
-shield can help it when somebody walks into a robot that stands, or catches one that flees."""
+"""From this directed speed on a robot moves towards the worker or flees [m/s]; judgement. One that
+stands or flees cannot help it when somebody walks into it."""
 MakeAgent = Callable[[Simulation], Any]
 """The agent for a simulation's robot (`agents.env_info.Agent`)."""
 Rows = dict[str, list[Any]]

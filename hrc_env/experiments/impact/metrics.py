@@ -52,8 +52,6 @@ COMPARED = (
     "false_stops",
 )  # fmt: skip
 """What is compared with the reference, episode by episode."""
-Ratio = tuple[Floats, Floats, str]
-"""What is counted in each episode (n,), over what (n,), and the unit of their ratio."""
 
 
 def metrics_of(table: Table, margins_m: Sequence[float]) -> dict[str, Metric]:
@@ -92,8 +90,8 @@ def _of_row(row: Row) -> dict[str, Metric]:
     return found
 
 
-def _ratios(row: Row) -> dict[str, Ratio]:
-    """By name."""
+def _ratios(row: Row) -> dict[str, tuple[Floats, Floats, str]]:
+    """What is counted in each episode (n,), over what (n,), and the unit of their ratio."""
     n_steps = np.sum(row["error_counts"], axis=1) / N_JOINTS
     minutes, ones = np.array(row["minutes"]), np.ones(len(n_steps))
     found = {
@@ -131,9 +129,8 @@ def _lateness(
         "squares_m": float(np.hypot(spread, setup.latency_s * v_h)) - spread,
     }
     found = {how: Metric(m, m, m, "m", before.n) for how, m in predicted.items()}
-    found["belief_m"] = Metric(
-        after.value - before.value, after.low - before.high, after.high - before.low, "m", before.n
-    )
+    off = after.value - before.value, after.low - before.high, after.high - before.low
+    found["belief_m"] = Metric(*off, "m", before.n)
     tried_m = np.array([0.0, *margins_m])
     rows = [table.get((Policy(SLOWED, m).label, setup.name)) for m in tried_m.tolist()]
     known = [row for row in rows if row is not None]
@@ -144,10 +141,8 @@ def _lateness(
 
 def margin_needed(rows: Sequence[Row], margins_m: Floats, reference: Row) -> Metric:
     """The margin with which no greater share of stops is missed than in the reference [m]."""
-    missed, called = (
-        np.array([row[what] for row in (*rows, reference)], float).T
-        for what in ("missed_stops", "called_stops")
-    )
+    missed = np.array([row["missed_stops"] for row in (*rows, reference)], float).T
+    called = np.array([row["called_stops"] for row in (*rows, reference)], float).T
 
     def needed(weights: Ints) -> Floats:
         shares = np.nan_to_num((weights @ missed) / (weights @ called))

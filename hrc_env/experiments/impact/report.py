@@ -73,10 +73,8 @@ def report(figures: Path, table: Table, metrics: Metrics) -> Report:
     parts.append(f"Less {setups[REFERENCE]}, paired; a dot where the interval leaves out zero.")
     others = {name: words for name, words in setups.items() if name != REFERENCE}
     for policy in policies:
-        columns = [
-            Column(f"difference.{policy}.{{}}.{what}", *WORDS[what], signed=True)
-            for what in COMPARED
-        ]
+        key = f"difference.{policy}.{{}}."
+        columns = [Column(key + what, *WORDS[what], signed=True) for what in COMPARED]
         parts.append(table_of(policy, others, columns, metrics))
     late = {each.name: each.words for each in LATE if (SLOWED, each.name) in table}
     columns = [Column(f"lateness.{{}}.{how}", words, 3) for how, words in LATENESS]

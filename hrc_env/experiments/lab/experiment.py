@@ -18,7 +18,6 @@ from hrc_env.experiments.lab.sides import MISSED_SHARE, away_from_cameras, misse
 from hrc_env.experiments.study.cache import PartCache, PartProgress
 from hrc_env.experiments.study.intervals import quantile_over, ratio_over
 from hrc_env.experiments.study.recording import Recording, record, replay
-from hrc_env.experiments.study.rigs import ALL as EVERY_CAMERA
 from hrc_env.experiments.study.rigs import MULTI, SINGLE
 from hrc_env.experiments.study.runner import Study, at_least_one, changed
 from hrc_env.perception.detector import DetectorConfig
@@ -29,7 +28,7 @@ from hrc_env.worker.body import load_body, worker_names
 RIG = "lab_gopro"
 CROPS = "particle"
 """The estimator that the crops follow."""
-CAMERAS = dict(zip(COLUMNS, (*SINGLE, EVERY_CAMERA), strict=True))
+CAMERAS = dict(zip(COLUMNS, (*SINGLE, (0, 1, 2, 3)), strict=True))
 QUANTILES = {"median": 0.5, "p95": 0.95}
 FIRST_SEED = 200
 Film = Mapping[str, Any]
@@ -118,9 +117,8 @@ def play_all(config: LabConfig, cache: PartCache) -> Films:
     }
 
 
-def metrics_of(config: LabConfig, played: Films) -> dict[str, Metric]:
+def metrics_of(played: Films) -> dict[str, Metric]:
     """Every number of results.json."""
-    del config
     metrics: dict[str, Metric] = {}
     for motion in (*MOTIONS, ALL):
         films = [each for (name, _), each in played.items() if motion in (name, ALL)]
@@ -148,8 +146,7 @@ def _misses(films: Sequence[Film], motion: str) -> dict[str, Metric]:
             metrics[f"{what}.{column}.{motion}"] = ratio_over(above, below, "share")
     known = [_known(each) for each in films]
     lost, total = [(~each).sum() for each in known], [each.size for each in known]
-    metrics[f"missed.multi.{motion}"] = ratio_over(lost, total, "share")
-    return metrics
+    return metrics | {f"missed.multi.{motion}": ratio_over(lost, total, "share")}
 
 
 def _joints_counted(film: Film) -> Floats:
@@ -179,7 +176,7 @@ STUDY = Study(
     seeds=lambda config: config.seeds,
     n_parts=lambda config: config.n_seeds * len(MOTIONS),
     play=play_all,
-    metrics=metrics_of,
+    metrics=lambda config, films: metrics_of(films),
     report=lambda config, films, metrics, figures: report(
         figures, partial(taken, config, seed=config.seeds[0], tick=lambda share: None), metrics
     ),

@@ -1,7 +1,7 @@
 """The paper's simulation, again: walks are filmed once, everybody is given the same film."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import combinations, product
 from typing import Any
@@ -19,9 +19,8 @@ from hrc_env.experiments.site.walk import walk
 from hrc_env.experiments.study.cache import PartCache, PartProgress
 from hrc_env.experiments.study.intervals import mean_over, rmse_over
 from hrc_env.experiments.study.recording import record, replay
-from hrc_env.experiments.study.rigs import MULTI, SPOKEN, WARM_UP_S, left_of
+from hrc_env.experiments.study.rigs import DT_S, MULTI, N_WARM_UP, SPOKEN, left_of
 from hrc_env.experiments.study.runner import Study, at_least_one, changed
-from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import ESTIMATORS
 
@@ -29,12 +28,10 @@ HEAD = JOINT["nose"]
 """The paper's "head"; MediaPipe has no joint of that name (judgement: the nose)."""
 CROPS = "particle"
 """The estimator that the crops of the shared film follow."""
-PRIOR_STD_M = 3.0
-"""How far from the middle of the work unknown people may be [m]: walks go all over the place."""
+SETTINGS = HRCConfig(tracker=TrackerConfig(prior_std_m=3.0))
+"""Unknown people may be far from the middle of the work: walks go all over the place."""
 ALSO = ("kalman",)
 """These are given the film, too: single cameras get the best estimator that there is."""
-DT_S = HRCConfig().ctrl_dt
-N_WARM_UP = round(WARM_UP_S / DT_S)
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,9 +108,8 @@ def play(config: SiteConfig, cache: PartCache) -> Played:
 
 def film(config: SiteConfig, seed: int, tick: PartProgress) -> dict[str, Any]:
     """One walk, filmed with the crops of the four-camera track, and everybody's word on it."""
-    settings = _settings_with(())
     motions = walk(site(), seed, round(config.seconds / DT_S), DT_S)
-    taken = record(site(), motions, settings, CROPS, seed, lambda share: tick(0.7 * share))
+    taken = record(site(), motions, SETTINGS, CROPS, seed, lambda share: tick(0.7 * share))
     asked = [(name, row) for name in config.estimators for row in CHOICES]
     asked += [(name, row) for name in ALSO if name not in config.estimators for row in ROWS]
     said: dict[str, Any] = {}
@@ -133,14 +129,9 @@ def closed_loop(
     config: SiteConfig, estimator: str, row: str, seed: int, tick: PartProgress
 ) -> dict[str, Any]:
     """The same walk with crops of one's own; after a second some cameras are lost."""
-    settings = _settings_with(left_of("site", [CHOICES[row]])[0].faults)
+    settings = replace(SETTINGS, faults=left_of("site", [CHOICES[row]])[0].faults)
     motions = walk(site(), seed, round(config.seconds / DT_S), DT_S)
     return _head_path(record(site(), motions, settings, estimator, seed, tick).beliefs)
-
-
-def _settings_with(faults: tuple[FaultConfig, ...]) -> HRCConfig:
-    """Settings under which workers are expected anywhere on the site."""
-    return HRCConfig(faults=faults, tracker=TrackerConfig(prior_std_m=PRIOR_STD_M))
 
 
 def _head_path(beliefs: PoseEstimate) -> dict[str, Any]:

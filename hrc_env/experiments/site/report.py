@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.patches import Polygon
+from matplotlib.patches import Rectangle
 
 from hrc_env.config import HRCConfig
 from hrc_env.core.batching import one
@@ -126,8 +126,7 @@ def draw_paths(
 
 def _draw_ground(axis: Axes, scene: Scene) -> None:
     """What stands on the floor."""
-    for x, y, half_length, half_width, yaw in scene.grounds.blocked:
-        corners = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * [half_length, half_width]
-        c, s = np.cos(yaw), np.sin(yaw)
-        corners = corners @ np.array([[c, s], [-s, c]]) + [x, y]
-        axis.add_patch(Polygon(corners, color="#cfd4dc", zorder=0))
+    for x, y, half_x, half_y, yaw in scene.grounds.blocked:
+        corner, turn_deg = (x - half_x, y - half_y), float(np.degrees(yaw))
+        axis.add_patch(Rectangle(corner, 2 * half_x, 2 * half_y, angle=turn_deg,
+                                 rotation_point="center", color="#cfd4dc", zorder=0))  # fmt: skip

@@ -16,6 +16,8 @@ import hrc_env
 
 LIBRARIES = ("numpy", "numba", "scipy", "mujoco", "gymnasium", "opencv-python-headless",
              "ai-edge-litert", "openvino", "torch", "stable-baselines3")  # fmt: skip
+OURS = ("hrc_env", "agents", "benchmarks", "assets")
+"""Packages of this repository; where it is installed, others lie beside them."""
 _PACKAGE = Path(hrc_env.__file__).resolve().parent
 _CODE = {".py", ".pyc"}
 
@@ -50,6 +52,8 @@ def sources_of(*modules: str) -> set[Path]:
 def _file(name: str) -> Path | None:
     """The source of a module, in a clone or an installed package; None if it is another's."""
     parts = name.split(".")
+    if parts[0] not in OURS:
+        return None
     is_inside = parts[0] == "agents" and (_PACKAGE / "agents").is_dir()
     path = (_PACKAGE if is_inside else _PACKAGE.parent).joinpath(*parts)
     files = path.with_suffix(".py"), path / "__init__.py"
@@ -81,8 +85,7 @@ def source_digest(made: Any) -> str:
 
 @cache
 def _surroundings() -> str:
-    """The versions of Python and libraries, and the content of every data file: bodies,
-    calibrations, scenery, networks of our own."""
+    """Versions of Python and libraries, and the content of every data file."""
     from hrc_env.worker.body import assets_dir  # here: --help of a command imports no compiler
 
     versions = {"python": sys.version}

@@ -11,8 +11,9 @@ from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.scene.rigs import RIGS
 
-WARM_UP_S = 1.0
-"""Cameras that a setting takes away are there until then [s]."""
+WARM_UP_S, DT_S = 1.0, HRCConfig().ctrl_dt
+"""Until when cameras that a setting takes away are there, and a control step [s]."""
+N_WARM_UP = round(WARM_UP_S / DT_S)
 Rig = tuple[int, ...]
 """Cameras of a scene, counted from 0."""
 ALL: Rig = (0, 1, 2, 3)
@@ -51,6 +52,6 @@ def late(turn: Turn, latency_s: float, is_told: bool) -> Turn:
     if latency_s and is_told:
         cameras = tuple(replace(camera, latency_s=latency_s) for camera in turn.cameras)
         return Turn(cameras, turn.faults)
-    n_steps = round(latency_s / HRCConfig().ctrl_dt)
+    n_steps = round(latency_s / DT_S)
     wrong = (FaultConfig("out_of_step", ("all",), float(n_steps)),) if n_steps else ()
     return Turn(turn.cameras, (*turn.faults, *wrong))

@@ -42,11 +42,7 @@ def run(
     overwrite: bool = False,
 ) -> dict[str, Metric]:
     """Play what an earlier run with the same settings and code did not finish in `out`; write
-    results.json, figures/, report.html and report.md there.
-
-    Raises:
-        ConfigError: the folder holds other results, which may not be deleted (`overwrite`).
-    """
+    results.json, figures/, report.html and report.md there, over other results only if asked."""
     own_folder(out, study.name, overwrite)
     settings = {"experiment": study.name, **study.settings(config)}
     key = fingerprint_of(settings, *study.modules)

@@ -30,9 +30,8 @@ PAIRS: tuple[Rig, ...] = (NEIGHBOURS[0], OPPOSITE[0], NEIGHBOURS[1], OPPOSITE[1]
 
 def hung(places: tuple[Place, ...], height_m: float = UNDER_CEILING_M) -> tuple[CameraConfig, ...]:
     """Cameras at places, all at one height, which look at the shared space."""
-    return tuple(
-        CameraConfig(f"place_{k + 1}", (x, y, height_m)) for k, (x, y) in enumerate(places)
-    )
+    numbered = enumerate(places, 1)
+    return tuple(CameraConfig(f"place_{k}", (x, y, height_m)) for k, (x, y) in numbered)
 
 
 def spread_over(n_cameras: int) -> tuple[Turn, ...]:
