@@ -1,8 +1,7 @@
 """Acclaim: a skeleton (ASF) and its motion (AMC), as the CMU database has them.
 
 A bone's rotation is C M C^-1 in its parent's frame: C turns the file's axes to the bone's own
-("axis"), M is what a frame says of its degrees of freedom. Rotations are about fixed axes in
-the order in which they are written.
+("axis"), M is of its degrees of freedom; about fixed axes in the order in which they are written.
 """
 
 from dataclasses import dataclass, field
@@ -13,7 +12,7 @@ import numpy as np
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.typing import Floats, Ints, Rotations
 from hrc_env.geometry.rotations import about_axis
-from hrc_env.mocap.record import FEWEST_FRAMES, Moving, Rows, forward
+from hrc_env.mocap.record import FEWEST_FRAMES, Moving, Rows, at_rest, forward
 
 ROOT = "root"
 FREEDOMS = ("tx", "ty", "tz", "rx", "ry", "rz")
@@ -168,16 +167,15 @@ def _moving(skeleton: _Skeleton, values: dict[str, Floats], repaired: tuple[str,
         if freedom[0] == "t":
             axis = "xyz".index(freedom[1])
             offset[:, 0, axis] = values[ROOT][:, column] / skeleton.per_inch
-    still = np.repeat(np.eye(3)[None], len(names), axis=0)
-    rotation = np.repeat(still[None], len(offset), axis=0)
+    rotation = np.tile(np.eye(3), (*offset.shape[:2], 1, 1))
     for node, name in enumerate(names):
         if name in values:
             bone = skeleton.bones[name]
             turn = _turn(bone.freedoms, values[name], skeleton.radians)
             rotation[:, node] = bone.axis @ turn @ bone.axis.T
     position, turned = forward(parent, offset, rotation)
-    rest, _ = forward(parent, along[None] / skeleton.per_inch, still[None])
-    return Moving(tuple(names), position, turned, rest[0], float("nan"), repaired)
+    rest = at_rest(parent, along / skeleton.per_inch)
+    return Moving(tuple(names), position, turned, rest, float("nan"), repaired)
 
 
 def _tree(skeleton: _Skeleton) -> tuple[list[str], Ints, Floats]:
@@ -197,7 +195,7 @@ def _tree(skeleton: _Skeleton) -> tuple[list[str], Ints, Floats]:
 
 def _turn(freedoms: tuple[str, ...], values: Floats, radians: bool) -> Rotations:
     """(T, 3, 3) turns about fixed axes, the first written is done first."""
-    turned = np.repeat(np.eye(3)[None], len(values), axis=0)
+    turned = np.tile(np.eye(3), (len(values), 1, 1))
     for freedom, value in zip(freedoms, values.T, strict=True):
         if freedom[0] == "r":
             turned = about_axis(freedom[1], value if radians else np.radians(value)) @ turned

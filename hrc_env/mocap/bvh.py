@@ -8,7 +8,7 @@ import numpy as np
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.typing import Floats, Rotations
 from hrc_env.geometry.rotations import about_axis
-from hrc_env.mocap.record import FEWEST_FRAMES, Moving, Rows, forward
+from hrc_env.mocap.record import FEWEST_FRAMES, Moving, Rows, at_rest, forward
 
 CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "xyz")
 LEAST_SHARE = 0.5
@@ -16,58 +16,54 @@ LEAST_SHARE = 0.5
 
 
 @dataclass(slots=True)
-class _Tree:
-    """The hierarchy as it is being read."""
+class _Node:
+    """One node of the hierarchy as it is being read; parent -1: none."""
 
-    names: list[str] = field(default_factory=list)
-    parent: list[int] = field(default_factory=list)
-    offset: list[list[float]] = field(default_factory=list)
-    channels: list[list[str]] = field(default_factory=list)
+    name: str
+    parent: int
+    offset: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+    channels: list[str] = field(default_factory=list)
 
 
 def read_bvh(path: Path) -> Moving:
     """A BVH file's skeleton over time; `ConfigError` where it is none, or cut off too early."""
     rows = Rows(path)
-    tree = _read_tree(rows)
+    nodes = _read_tree(rows)
     count, step = rows.next("Frames:"), rows.next("Frame Time:")
     if count[0].lower() != "frames:" or [w.lower() for w in step[:2]] != ["frame", "time:"]:
         raise rows.wrong('expected "Frames: N" and "Frame Time: seconds" after MOTION')
     announced, seconds = rows.numbers([count[-1], step[-1]])
-    values, repaired = _frames(rows, sum(map(len, tree.channels)), int(announced))
-    parent = np.array(tree.parent)
-    position, rotation = forward(parent, *_moved(tree, values))
-    still = np.broadcast_to(np.eye(3), (1, len(parent), 3, 3))
-    rest, _ = forward(parent, np.array(tree.offset)[None], still)
+    values, repaired = _frames(rows, sum(len(node.channels) for node in nodes), int(announced))
+    parent = np.array([node.parent for node in nodes])
+    position, rotation = forward(parent, *_moved(nodes, values))
+    rest = at_rest(parent, np.array([node.offset for node in nodes]))
     fps = round(1.0 / seconds, 2) if seconds > 0.0 else 0.0  # 0.033333 s is 30 Hz
-    return Moving(tuple(tree.names), position, rotation, rest[0], fps, repaired)
+    return Moving(tuple(node.name for node in nodes), position, rotation, rest, fps, repaired)
 
 
-def _read_tree(rows: Rows) -> _Tree:
+def _read_tree(rows: Rows) -> list[_Node]:
     """Everything before MOTION."""
     if rows.next("HIERARCHY")[0].upper() != "HIERARCHY":
         raise rows.wrong("a BVH file begins with the word HIERARCHY")
-    tree, open_nodes = _Tree(), list[int]()
+    nodes, open_nodes = list[_Node](), list[int]()
     while True:
         words = rows.next("the skeleton")
         word = words[0].upper()
         if word in ("ROOT", "JOINT", "END"):
             above = open_nodes[-1] if open_nodes else -1
-            called = " ".join(words[1:]) if word != "END" else f"{tree.names[above]} end"
-            tree.names.append(called)
-            tree.parent.append(above)
-            tree.offset.append([0.0, 0.0, 0.0])
-            tree.channels.append([])
+            called = " ".join(words[1:]) if word != "END" else f"{nodes[above].name} end"
+            nodes.append(_Node(called, above))
             words = words[-1:] if words[-1] == "{" else [""]
         if words[0] == "{":
-            open_nodes.append(len(tree.names) - 1)
+            open_nodes.append(len(nodes) - 1)
         elif word == "}" and open_nodes:
             open_nodes.pop()
         elif word == "OFFSET" and open_nodes:
-            tree.offset[open_nodes[-1]] = rows.numbers(words[1:4])
+            nodes[open_nodes[-1]].offset = rows.numbers(words[1:4])
         elif word == "CHANNELS" and open_nodes:
-            tree.channels[open_nodes[-1]] = _channels(words, rows)
-        elif word == "MOTION" and tree.names and not open_nodes:
-            return tree
+            nodes[open_nodes[-1]].channels = _channels(words, rows)
+        elif word == "MOTION" and nodes and not open_nodes:
+            return nodes
         elif words[0]:
             raise rows.wrong("expected ROOT, JOINT, End Site, OFFSET, CHANNELS, braces or MOTION")
 
@@ -107,13 +103,12 @@ def _frames(rows: Rows, width: int, announced: int) -> tuple[Floats, tuple[str, 
     return values[:kept], (told,)
 
 
-def _moved(tree: _Tree, values: Floats) -> tuple[Floats, Rotations]:
+def _moved(nodes: list[_Node], values: Floats) -> tuple[Floats, Rotations]:
     """Offsets (T, N, 3) and rotations (T, N, 3, 3) of every node in its parent's frame."""
-    offset = np.repeat(np.array(tree.offset)[None], len(values), axis=0)
-    rotation = np.empty((*offset.shape[:2], 3, 3))
-    rotation[:] = np.eye(3)
+    offset = np.repeat(np.array([node.offset for node in nodes])[None], len(values), axis=0)
+    rotation = np.tile(np.eye(3), (*offset.shape[:2], 1, 1))
     columns = iter(values.T)
-    for node, channels in enumerate(tree.channels):
+    for node, channels in enumerate(each.channels for each in nodes):
         placed = np.zeros((len(values), 3))
         for channel in channels:
             if channel.endswith("position"):

@@ -1,4 +1,4 @@
-"""A first control vector from joints, by geometry alone; `fit` improves it."""
+"""A first control vector from joints, by geometry alone; `retarget.fitted` improves it."""
 
 import numpy as np
 
@@ -9,10 +9,9 @@ from hrc_env.mocap.poses import Marks
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import GRIP_M
 
-HEADING_S = 0.25
-"""The heading is the pelvis' direction, smoothed over about this time [s]."""
-PELVIS_SHARE = 0.45
-"""Share of the trunk's pitch that the pelvis takes (as in `posture.lean`)."""
+HEADING_S, PELVIS_SHARE = 0.25, 0.45
+"""The heading is the pelvis's direction, smoothed over about this time [s]; the pelvis's share of
+the trunk's pitch (as in `posture.lean`)."""
 VERTICAL_SHARE = 0.2
 """A foot that is nearly vertical heads where the pelvis does: by this share of its length."""
 NOSE_PITCH_RAD = 0.6
@@ -36,7 +35,7 @@ def first_guess(joints: Points3, fps: float, marks: Marks) -> Floats:
     q[:, c.PELVIS_PITCH] = PELVIS_SHARE * pitch
     q[:, c.SPINE_FLEX] = 2.0 * (1.0 - PELVIS_SHARE) * pitch
     q[:, c.SPINE_SIDE] = -1.5 * lateral - q[:, c.PELVIS_ROLL]
-    twist = _wrapped(_yaw(across(joints, "shoulder")) - yaw)
+    twist = (_yaw(across(joints, "shoulder")) - yaw + np.pi) % (2 * np.pi) - np.pi
     q[:, c.SPINE_TWIST] = twist
     nose = _turned(joints[:, 0] - middle(joints, "shoulder"), -yaw - twist)
     q[:, c.HEAD_YAW] = np.arctan2(nose[:, 1], np.maximum(nose[:, 0], 0.05))
@@ -49,9 +48,7 @@ def first_guess(joints: Points3, fps: float, marks: Marks) -> Floats:
 
 def _arm(q: Floats, side: int, name: str, joints: Points3, chest_yaw: Floats) -> None:
     """Where the grip is from the shoulder, and the elbow's swivel, in the chest's level frame."""
-    shoulder, elbow, wrist = (
-        joints[:, JOINT[name + part]] for part in ("shoulder", "elbow", "wrist")
-    )
+    shoulder, elbow, wrist = (joints[:, JOINT[name + p]] for p in ("shoulder", "elbow", "wrist"))
     fore = wrist - elbow
     grip = wrist + GRIP_M * fore / np.linalg.norm(fore, axis=-1, keepdims=True)
     reach = _turned(grip - shoulder, -chest_yaw)
@@ -74,8 +71,7 @@ def _swivel(reach: Points3, elbow: Points3, hanging: Floats, outward: Floats) ->
 
 
 def _foot(q: Floats, side: int, name: str, joints: Points3, marks: Marks) -> None:
-    """Ankle, heading and pitch of a foot; who kneels on its back pitches it beyond the vertical,
-    rather than turn it round."""
+    """Ankle, heading and pitch of a foot; beyond the vertical for who kneels on its back."""
     ankle, tip = JOINT[name + "ankle"], JOINT[name + "foot"]
     way, rest = joints[:, tip] - joints[:, ankle], marks.rest[tip] - marks.rest[ankle]
     pelvis = q[:, c.HEADING] + q[:, c.PELVIS_YAW]
@@ -99,8 +95,3 @@ def _turned(points: Points3, yaw: Floats) -> Points3:
     cos, sin = np.cos(yaw), np.sin(yaw)
     x, y, z = points.T
     return np.stack([cos * x - sin * y, sin * x + cos * y, z], -1)
-
-
-def _wrapped(angle: Floats) -> Floats:
-    """In [-pi, pi)."""
-    return (angle + np.pi) % (2 * np.pi) - np.pi

@@ -7,10 +7,9 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import BONE_LENGTH_M, BONES, JOINT, JOINTS
 from hrc_env.core.typing import Bools, Floats, Points3
 
-MEASURED_SHARE = 0.755
-"""Shank, thigh and trunk together as a share of stature (the baked bodies)."""
-STRANGE = 2.0
-"""A bone so many times longer or shorter than of an adult of the same stature is a mistake."""
+MEASURED_SHARE, STRANGE = 0.755, 2.0
+"""Shank, thigh and trunk together as a share of stature (the baked bodies); a bone so many times
+longer or shorter than of an adult of the same stature is a mistake."""
 
 
 def middle(joints: Points3, part: str) -> Points3:
@@ -32,11 +31,15 @@ def length(joints: Points3, first: str, second: str) -> float:
     return float(np.mean(np.nanmedian(each, axis=1)))
 
 
+def legs(joints: Points3) -> float:
+    """Length of thigh and shank."""
+    return length(joints, "hip", "knee") + length(joints, "knee", "ankle")
+
+
 def stature(joints: Points3) -> float:
     """Estimate of the person's stature, in the unit of the joints (T, 15, 3)."""
     trunk = np.linalg.norm(middle(joints, "shoulder") - middle(joints, "hip"), axis=-1)
-    legs = length(joints, "hip", "knee") + length(joints, "knee", "ankle")
-    return (legs + float(np.nanmedian(trunk))) / MEASURED_SHARE
+    return (legs(joints) + float(np.nanmedian(trunk))) / MEASURED_SHARE
 
 
 def check_person(joints: Points3, source: str) -> None:

@@ -25,18 +25,16 @@ class Marks:
 
     anatomy: Anatomy
     segment: Ints
-    """(15,) segment that carries each."""
+    """(15,) that carries each."""
     offset: Floats
     """(15, 3) in that segment's frame [m]."""
     rest: Points3
-    """(15, 3) at rest [m]."""
+    """(15, 3) [m]."""
 
 
 def marks_of(body: Body, landmarks: bool) -> Marks:
-    """A body's joints as BlazePose means them (landmarks) or where its bones turn (centres).
-
-    Noses and foot tips, which are no centres, are BlazePose's in both senses.
-    """
+    """A body's joints as BlazePose means them (landmarks) or where its bones turn; noses and foot
+    tips are BlazePose's in both senses."""
     segment, offset = body.joint_segment.copy(), body.joint_offset.copy()
     if not landmarks:
         for j, joint in enumerate(JOINTS):

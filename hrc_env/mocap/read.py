@@ -17,23 +17,21 @@ from hrc_env.mocap.skeleton import find_joints, joints_of
 from hrc_env.motion.clip import check_rate
 
 SUFFIXES = (".bvh", ".amc", ".npz")
-CMU_HZ = 120.0
-"""AMC files hold no frame rate; those of the CMU database are of 120 Hz."""
-LEAST_S = 0.5
-"""Shortest clip [s]."""
+CMU_HZ, LEAST_S = 120.0, 0.5
+"""Rate of the CMU database's AMC files, which do not hold it; shortest clip [s]."""
 
 
 def read_capture(
     path: Path, fps: float | None = None, source_fps: float | None = None,
     skeleton: Path | None = None,
 ) -> Capture:  # fmt: skip
-    """Read, mend and resample a recording: a .bvh, .amc or .npz file.
+    """Read, mend and resample a recording: a .bvh, .amc or .npz file of a person in motion.
 
-    Args:
-        path: the file; `ConfigError` where it is no person in motion, or damaged beyond repair.
-        fps: rate of the result; None keeps the file's.
-        source_fps: the file's own rate, where it has none or a wrong one.
-        skeleton: the .asf file of an .amc file; None looks beside it.
+    `fps` is the result's rate (None: the file's), `source_fps` the file's own, where it has none or
+    a wrong one; `skeleton` the .asf file of an .amc file (None: looked for beside it).
+
+    Raises:
+        ConfigError: it is no such file, or damaged beyond repair.
     """
     source = path.name
     joints, rate_hz, landmarks, found, repaired = _read(path, skeleton)
@@ -43,10 +41,9 @@ def read_capture(
         rate_hz, repaired = CMU_HZ, (*repaired, f"No frame rate: taken to be {CMU_HZ:g} Hz.")
     check_rate(rate_hz, source)
     joints, notes = mended(joints, rate_hz, source)
-    if (len(joints) - 1) / rate_hz < LEAST_S:
-        raise ConfigError(
-            f"{source}: {(len(joints) - 1) / rate_hz:.2f} s of motion; {LEAST_S} s is the least."
-        )
+    lasts_s = (len(joints) - 1) / rate_hz
+    if lasts_s < LEAST_S:
+        raise ConfigError(f"{source}: {lasts_s:.2f} s of motion; {LEAST_S} s is the least.")
     if fps is not None and fps != rate_hz:
         check_rate(fps, "the wished rate")
         joints = resampled(joints, rate_hz, fps)
@@ -58,7 +55,7 @@ def read_capture(
 def _read(
     path: Path, skeleton: Path | None
 ) -> tuple[Points3, float, bool, tuple[str, ...], tuple[str, ...]]:
-    """Joints as the file has them, its rate, their meaning, their names, and what was mended."""
+    """Joints, frame rate, `Capture.landmarks`, `.found` and `.repaired`, as the file has them."""
     if not path.is_file():
         raise ConfigError(f"{path} is no file.")
     suffix = path.suffix.lower()

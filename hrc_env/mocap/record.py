@@ -55,10 +55,8 @@ class Moving:
 
 
 def forward(parent: Ints, offset: Floats, rotation: Rotations) -> tuple[Points3, Rotations]:
-    """Origins (T, N, 3) and rotations (T, N, 3, 3) of a tree whose parents come first (-1: none).
-
-    From offsets (T or 1, N, 3) and rotations (T, N, 3, 3) in the parent's frame.
-    """
+    """Origins (T, N, 3) and rotations (T, N, 3, 3) of a tree whose parents come first (-1: none),
+    from those in the parent's frame."""
     position = np.broadcast_to(offset, (*rotation.shape[:2], 3)).copy()
     turned = rotation.copy()
     for node, above in enumerate(parent):
@@ -67,6 +65,11 @@ def forward(parent: Ints, offset: Floats, rotation: Rotations) -> tuple[Points3,
             arm = turned[:, above] @ position[:, node, :, None]
             position[:, node] = position[:, above] + arm[..., 0]
     return position, turned
+
+
+def at_rest(parent: Ints, offset: Floats) -> Points3:
+    """Origins (N, 3) of a tree without rotations."""
+    return forward(parent, offset[None], np.tile(np.eye(3), (1, len(offset), 1, 1)))[0][0]
 
 
 class Rows:

@@ -1,44 +1,40 @@
-"""What goes wrong in files of motion capture, mended where it can be told, refused where not.
-
-Functions take joints (T, 15, 3) and return them with a sentence for each thing that they changed.
-"""
+"""What goes wrong in files of motion capture, mended where it can be told, refused where not."""
 
 import numpy as np
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import JOINT, JOINTS
-from hrc_env.core.typing import Bools, Floats, Points3
+from hrc_env.core.typing import Bools, Points3
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.mocap.person import across, check_person, length, middle, runs, stature
 
 STATURES_M = (1.3, 2.2)
 """Statures of people who are believed [m]."""
 UNITS: dict[str, float] = {
-    "metres": 1.0,
-    "units of 1/0.45 inch (CMU)": 0.0254 / 0.45,
-    "inches": 0.0254,
-    "centimetres": 0.01,
-    "millimetres": 0.001,
-}
+    "metres": 1.0, "units of 1/0.45 inch (CMU)": 0.0254 / 0.45, "inches": 0.0254,
+    "centimetres": 0.01, "millimetres": 0.001,
+}  # fmt: skip
 """Units that files are in [m]; the person's stature tells which."""
 LONGEST_GAP_S = 0.25
 """Longest time that a joint may be missing [s]: about half a step; judgement."""
 STEADY = 0.8
 """Least share of one axis in the mean direction from ankles to shoulders."""
-FLOOR_M = (-0.06, 0.14)
-"""Where the lowest joint of the feet may be for the file's floor to be believed [m]."""
-SOLE_M = 0.03
-"""Height of the lowest joint of a foot on the floor [m]; the baked bodies' is 0.04."""
+FLOOR_M, SOLE_M = (-0.06, 0.14), 0.03
+"""Where the lowest joint of the feet may be for the file's floor to be believed; its height on a
+floor that was found [m]; the baked bodies' is 0.04."""
 KNEES = 0.1
 """Legs bent by less than this share of a shank, on the mean, are straight."""
-JUMP = 6.0
-"""A first frame is another pose if the jump from it is so many times those that follow."""
-AFTER = 6
-"""Up to this frame."""
-JUMP_M = 0.03
-"""And if joints move this much on the mean [m]."""
-
+JUMP, AFTER, JUMP_M = 6.0, 6, 0.03
+"""A first frame is another pose if the jump from it is so many times those up to frame AFTER, and
+joints move this much on the mean [m]."""
+UPRIGHT = {
+    "+x": about_axis("y", -np.pi / 2), "-x": about_axis("y", np.pi / 2),
+    "+y": about_axis("x", np.pi / 2), "-y": about_axis("x", -np.pi / 2),
+    "-z": about_axis("x", np.pi),
+}  # fmt: skip
+"""Rotations that take an axis to +z."""
 Mended = tuple[Points3, tuple[str, ...]]
+"""Joints (T, 15, 3), and a sentence for each thing that was changed."""
 
 
 def mended(joints: Points3, fps: float, source: str) -> Mended:
@@ -98,19 +94,10 @@ def z_up(joints: Points3, source: str) -> Mended:
             f"{np.round(up, 2).tolist()} on the mean; at least {STEADY} along one axis is "
             "expected, as of somebody who is mostly on their feet."
         )
-    if axis == 2 and up[2] > 0.0:
+    name = ("+" if up[axis] > 0.0 else "-") + "xyz"[axis]
+    if name == "+z":
         return joints, ()
-    turned = joints @ _to_z(axis, up[axis] > 0.0).T
-    return turned, (f"The file's {'+' if up[axis] > 0 else '-'}{'xyz'[axis]} axis is up.",)
-
-
-def _to_z(axis: int, positive: bool) -> Floats:
-    """(3, 3) a rotation that takes an axis, or its opposite, to +z."""
-    if axis == 2:
-        return about_axis("x", np.pi)
-    if axis == 1:
-        return about_axis("x", np.pi / 2 if positive else -np.pi / 2)
-    return about_axis("y", -np.pi / 2 if positive else np.pi / 2)
+    return joints @ UPRIGHT[name].T, (f"The file's {name} axis is up.",)
 
 
 def unmirrored(joints: Points3, source: str) -> Mended:
@@ -129,10 +116,8 @@ def unmirrored(joints: Points3, source: str) -> Mended:
 
 
 def _forwards(joints: Points3) -> tuple[float, float]:
-    """How far feet point, and knees bend, to where left-hand and up say that forward is.
-
-    In shares of the bones: positive for a person, negative for their mirror image.
-    """
+    """How far feet point, and knees bend, to where left-hand and up say that forward is, in shares
+    of the bones: positive for a person, negative for their mirror image."""
     ahead = np.cross(across(joints, "hip") + across(joints, "shoulder"), np.array([0.0, 0.0, 1.0]))
     ahead /= np.linalg.norm(ahead, axis=-1, keepdims=True)
     foot = middle(joints, "foot") - middle(joints, "ankle")

@@ -1,8 +1,8 @@
 """A recording to a clip for a worker, and how far their joints are apart then.
 
 Ways scale with the legs; trunk, arms and head keep their directions and take the worker's lengths.
-Then the control vector is found whose pose comes nearest: damped least squares a frame. What 15
-joints do not tell is held near what people do and near the frames before and after.
+Then damped least squares find each frame's control vector. What 15 joints do not tell is held near
+what people do and near the frames before and after.
 """
 
 from collections.abc import Callable
@@ -14,7 +14,7 @@ import numpy as np
 from hrc_env.core.skeleton import JOINT, JOINTS
 from hrc_env.core.typing import Bools, Floats, Points3
 from hrc_env.mocap.guess import PELVIS_SHARE, first_guess
-from hrc_env.mocap.person import across, length, middle, smoothed
+from hrc_env.mocap.person import across, legs, middle, smoothed
 from hrc_env.mocap.poses import Marks, joints_in, marks_of
 from hrc_env.mocap.record import Capture
 from hrc_env.mocap.stance import locked, slip
@@ -22,20 +22,14 @@ from hrc_env.motion import controls as c
 from hrc_env.motion.clip import Clip, placed_at_origin
 from hrc_env.worker.body import Body
 
-STILL_M_S = 0.15
-"""An ankle slower than this stands, if it is low [m/s]."""
-LOW_SHARE = 40.0
-"""Percentile of an ankle's heights below which it is low."""
+STILL_M_S, LOW_SHARE = 0.15, 40.0
+"""An ankle slower than this [m/s] and below this percentile of its heights stands."""
 Say: TypeAlias = Callable[[float], None]
 """Told by how much the share that is done grew."""
-ROUNDS = 12
-"""Steps of the fit; after eight it changes by less than a millimetre."""
-FRAMES = 256
-"""Frames that are worked on together: bounds the memory."""
-STEP = 1e-4
-"""Step of the difference quotients [m or rad]."""
-FARTHEST = 0.25
-"""A column changes by at most this in a round [m or rad]."""
+ROUNDS, FRAMES = 12, 256
+"""Steps of the fit; after eight it changes by less than a millimetre; frames done together."""
+STEP, FARTHEST = 1e-4, 0.25
+"""Step of the difference quotients; most that a column changes in a round [m or rad]."""
 SMOOTH_S = 0.05
 """Time over which neighbours pull [s]."""
 
@@ -51,7 +45,7 @@ PULL: dict[int, float] = {
 }  # fmt: skip
 """How strongly a column is held near what is usual: metres of joint error that one rad is worth."""
 SLIGHT = 1e-3
-"""The pull on every other column [m per m or rad]."""
+"""The same of every other column."""
 FITTED = np.array(
     [c.ROOT_X, c.ROOT_Y, *range(c.PELVIS_Z, c.N_BLENDED)]
     + [c.ANKLE + 6 * side + k for side in range(2) for k in range(5)]
@@ -94,10 +88,8 @@ def retarget(
 
 
 def aligned_errors(source: Points3, done: Points3) -> tuple[float, Floats]:
-    """Distances (T, 15) after the best similarity of the whole recording, and its scale.
-
-    One scale, rotation and translation for all frames: S. Umeyama, IEEE PAMI 13(4), 1991.
-    """
+    """Scale of, and distances (T, 15) after, the best similarity of the whole recording: Umeyama,
+    IEEE PAMI 13(4), 1991."""
     a, b = source.reshape(-1, 3), done.reshape(-1, 3)
     a0, b0 = a - a.mean(0), b - b.mean(0)
     u, s, vt = np.linalg.svd(b0.T @ a0)
@@ -108,14 +100,10 @@ def aligned_errors(source: Points3, done: Points3) -> tuple[float, Floats]:
     return scale, np.linalg.norm(moved - b0, axis=-1).reshape(source.shape[:2])
 
 
-def _legs(joints: Points3) -> float:
-    return length(joints, "hip", "knee") + length(joints, "knee", "ankle")
-
-
 def adapted(joints: Points3, fps: float, marks: Marks) -> Points3:
     """(T, 15, 3) where the worker's joints should be [m]."""
     standing = [_standing(joints[:, JOINT[f"{side}_ankle"]], fps) for side in ("left", "right")]
-    scaled = _legs(marks.rest[None]) / _legs(joints) * joints
+    scaled = legs(marks.rest[None]) / legs(joints) * joints
     scaled[..., 2] += marks.rest[JOINT["left_ankle"], 2] - np.mean(
         [np.median(scaled[on, JOINT[f"{side}_ankle"], 2])
          for side, on in zip(("left", "right"), standing, strict=True)]
@@ -168,16 +156,11 @@ def _foot_way(way: Points3, standing: Bools, rest: Floats) -> Points3:
     pitch += flat - np.median(pitch[standing])
     heading = way[:, :2] / np.maximum(level, 1e-9)[:, None]
     metres = float(np.linalg.norm(rest))
-    return metres * np.concatenate(
-        [np.cos(pitch)[:, None] * heading, np.sin(pitch)[:, None]], axis=1
-    )
+    return metres * np.column_stack([np.cos(pitch)[:, None] * heading, np.sin(pitch)])
 
 
 def fitted(joints: Points3, fps: float, marks: Marks, say: Say = lambda share: None) -> Floats:
-    """(T, N_CONTROLS) the poses of a worker whose joints (T, 15, 3) should be there.
-
-    `say` is told the share of the work that each part of it was.
-    """
+    """(T, N_CONTROLS) the poses of a worker whose joints (T, 15, 3) should be there."""
     q = first_guess(joints, fps, marks)
     weight = np.array([WEIGHT[joint.split("_")[-1]] for joint in JOINTS])[:, None]
     pull = np.array([PULL.get(int(column), SLIGHT) for column in FITTED])

@@ -22,22 +22,20 @@ SIDED: dict[str, tuple[str, ...]] = {
         "toebase", "toes", "toe0", "toe", "ball", "ankle end", "foot end", "foot",
     ),
 }  # fmt: skip
-"""Names of a joint, best first, without "left" or "right" (which may stand before or behind, as
-a word or as l and r) and without prefixes; "x end" is the tip (End Site) of joint x."""
+"""Names of a joint, best first, without prefixes and sides (which may stand before or behind);
+"x end" is the tip (End Site) of joint x."""
 HEAD: tuple[str, ...] = ("head", "skull", "face")
 """Names of the node that turns with the face."""
 SIDES = {"left": ("left", "l"), "right": ("right", "r")}
-NOSE_SHARE = 0.065
-"""From the head's joint forward to the nose, as a share of stature (the baked bodies)."""
-STANDS = -0.7
-"""A rest pose stands if the cosine between trunk and thighs is below this."""
+NOSE_SHARE, STANDS = 0.065, -0.7
+"""From the head's joint forward to the nose, as a share of stature (the baked bodies); a rest pose
+stands if the cosine between trunk and thighs is below this."""
 
 
 def find_joints(names: tuple[str, ...], source: str) -> tuple[dict[str, int], int]:
-    """Which node each joint is, {joint: node}, and the head's node.
+    """Which node each joint is, {joint: node}, the nose only if the file has one; the head's node.
 
-    The nose is among them only if the file has one. "foot" is the ankle where there is no
-    ankle, and never both. `ConfigError`, with what was found, where a joint is missing.
+    "foot" is the ankle where there is none. `ConfigError`, with what was found: a joint is missing.
     """
     known: dict[str, int] = {}
     for node, name in enumerate(_plain(names)):
@@ -96,8 +94,8 @@ def joints_of(moving: Moving, found: dict[str, int], head: int) -> Points3:
 
 
 def _facing(joints: Points3, moving: Moving, rest: Points3, head: int) -> Floats:
-    """(3,) the face's direction in the head's frame: from the rest pose if that one stands,
-    else as people look on the average, straight ahead of their chest."""
+    """(3,) the face's direction in the head's frame: from the rest pose if that one stands, else
+    straight ahead of the chest, on the mean."""
     if _stands(rest):
         return _ahead(rest)
     local = np.swapaxes(moving.rotation[:, head], -1, -2) @ _ahead(joints)[..., None]

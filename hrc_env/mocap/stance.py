@@ -1,7 +1,7 @@
 """Feet that stand: found in a fitted motion, and locked so that they do not slide.
 
-A foot stands whose footprint rests: where the ankle would be if it were flat. That is set to one
-place then, and what that changes fades out in the swings before and after.
+A foot stands while its footprint, where a flat foot's ankle would be, rests. That is set to one
+place then, and the change fades out in the swings before and after.
 """
 
 import numpy as np
@@ -17,16 +17,12 @@ from hrc_env.worker.body import SEGMENT
 
 RESTS_M_S = 0.2
 """A footprint slower than this rests [m/s]: a small step moves it at 0.3, a stride at 2."""
-LEAST_S = 0.1
-"""Shortest stance [s]; stances nearer to each other than half of it are one."""
-FADE_S = 0.25
-"""Time in which a correction fades out in a swing [s]; a swing lasts 0.4 s."""
-FLOOR_M = 0.06
-"""A foot that rests lower than this stands on the floor, else on something of its height [m]."""
-FLAT_RAD = 0.01
-"""A foot whose toes are up by more stands on its heel."""
-SMOOTH_S = 0.02
-"""Smoothing of the speed, against the jitter of recordings [s]."""
+LEAST_S, FADE_S, SMOOTH_S = 0.1, 0.25, 0.02
+"""Shortest stance, and twice the shortest gap; in which a correction fades out in a swing; speed is
+smoothed against the jitter of recordings [s]."""
+FLOOR_M, FLAT_RAD = 0.06, 0.01
+"""A foot that rests lower stands on the floor, else on something of its height [m]; one whose toes
+are up by more on its heel."""
 
 
 def locked(q: Floats, fps: float, size: Floats) -> tuple[Floats, Bools]:
@@ -92,10 +88,7 @@ def _corrections(
 
 def _fading(n: int, value: Floats, rate: Floats, fps: float) -> Floats:
     """(n, 4) the frames after one with a value and a rate, falling to zero within them."""
-    lasts = min(FADE_S, (n + 1) / fps)
-    return np.array(
-        [
-            [decay((k + 1) / fps / lasts, lasts, v, r) for v, r in zip(value, rate, strict=True)]
-            for k in range(n)
-        ]
-    ).reshape(n, 4)
+    lasts, out = min(FADE_S, (n + 1) / fps), np.empty((n, 4))
+    for k, i in np.ndindex(out.shape):
+        out[k, i] = decay((k + 1) / fps / lasts, lasts, value[i], rate[i])
+    return out

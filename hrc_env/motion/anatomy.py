@@ -1,6 +1,6 @@
 """A worker's bones as the kinematics want them: rest offsets, rest frames and lengths."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -17,22 +17,20 @@ CLAVICLE, UPPER_ARM, FOREARM, HAND, THIGH, SHANK, FOOT, TOES = range(8)
 ARM, FOREARM_GRIP, LEG, THIGH_LENGTH, SHANK_LENGTH, ANKLE_Z, STAND_Z = range(7)
 ANKLE_X, BALL_X, BALL_Z, HEEL_X, UPPER_LENGTH = range(7, 12)
 N_SIZES = 12
-"""Columns of `Anatomy.size` [m]: shoulder to grip, elbow to grip, hip to ankle, its bones, heights
-of ankle and standing pelvis; ankle ahead of it; ball ahead of and above the ankle; heel; arm."""
+"""Columns of `Anatomy.size`: shoulder and elbow to grip, hip to ankle and its bones, heights of
+ankle and standing pelvis, ankle from pelvis, ball and heel from ankle, upper arm [m]."""
 
-GRIP_M = 0.08
-"""How far beyond the wrist a hand grips (half a hand's length, a judgement)."""
+GRIP_M, HEEL_M = 0.08, -0.045
+"""Hands grip half a hand beyond the wrist; heels touch a quarter of a foot behind the ankle [m]."""
 FOREARM_TWIST_RAD, HAND_TWIST_RAD = 0.15, 0.35
 """Outward turns about the forearm from the rest pose, so that a hanging palm faces the thigh."""
-HEEL_M = -0.045
-"""Heel's contact behind the ankle (a quarter of a foot, a judgement)."""
 STAND_SHARE = 0.994
 """Standing hip height as a share of the leg's length: knees just unlocked."""
 
 
 @dataclass(frozen=True, slots=True)
 class Anatomy:
-    """Constants of one body, or of N bodies: then with a first axis of N."""
+    """Constants of one body, or of N bodies with a first axis of N."""
 
     offset: Floats
     """(22, 3) origin of each segment in its parent's frame at rest [m]."""
@@ -44,17 +42,14 @@ class Anatomy:
 
 def anatomies(bodies: Body) -> Anatomy:
     """Measure N bodies, or one: arrays (N, ...), each row as `anatomy` of that body alone."""
-    each = [_measured(rest) for rest in bodies.rest_position.reshape(-1, N_SEGMENTS, 3)]
+    rests = bodies.rest_position.reshape(-1, N_SEGMENTS, 3)
+    each = [anatomy(replace(bodies, rest_position=rest)) for rest in rests]
     return Anatomy(*(np.stack([getattr(a, f.name) for a in each]) for f in fields(Anatomy)))
 
 
 def anatomy(body: Body) -> Anatomy:
     """Measure a body; the right side's lengths are taken to equal the left side's."""
-    return _measured(np.asarray(body.rest_position, float))
-
-
-def _measured(rest: Floats) -> Anatomy:
-    """Measure a body from the segments' origins (22, 3) at rest."""
+    rest = np.asarray(body.rest_position, float)
     offset = rest - rest[np.maximum(PARENT, 0)]
     offset[0] = rest[0]
     frame = np.zeros((len(rest), 3, 3))
@@ -80,7 +75,8 @@ def _rest_frame(along: Floats, pole: Floats) -> Floats:
 
 def _sizes(rest: Floats) -> Floats:
     """The lengths of `Anatomy.size`."""
-    at = {name: rest[LEFT + index] for index, name in enumerate(_SIDE)}
+    names = ("clavicle", "arm", "elbow", "wrist", "hip", "knee", "ankle", "ball")
+    at = {name: rest[LEFT + index] for index, name in enumerate(names)}
     upper, fore, thigh, shank = (
         float(np.linalg.norm(at[b] - at[a]))
         for a, b in (("arm", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle"))
@@ -94,6 +90,3 @@ def _sizes(rest: Floats) -> Floats:
     size[BALL_X], size[BALL_Z] = (at["ball"] - at["ankle"])[[0, 2]]
     size[HEEL_X] = HEEL_M
     return size
-
-
-_SIDE = ("clavicle", "arm", "elbow", "wrist", "hip", "knee", "ankle", "ball")

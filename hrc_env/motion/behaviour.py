@@ -1,7 +1,7 @@
 """What a worker does next: decided when an activity has ended, from uniform draws in [0, 1).
 
-Jobs at places follow each other (`schedule`); who wants to go somewhere looks for a way that meets
-nobody, takes another place of the kind if there is none, or waits.
+Jobs at places follow each other (`schedule`). Who finds no way to a place that meets nobody takes
+another one of its kind, or waits.
 """
 
 import math
@@ -17,20 +17,15 @@ from hrc_env.motion.schedule import HERE, picked
 from hrc_env.motion.setting_out import arrived, go, meets_somebody, play, stay, step_back
 from hrc_env.motion.starting import start_here
 from hrc_env.motion.state import NOWHERE, THERE, UNDER_WAY, WAITING
-from hrc_env.worker.props import prop_index
 
-WAIT_S = (0.5, 1.1)
-"""Who finds no way looks again after so long [s]; judgement."""
-CHANGE_S, GIVE_UP_S = 1.5, 4.5
-"""After so long they think of something else to do, and at last give up [s]; judgement."""
+WAIT_S, CHANGE_S, GIVE_UP_S = (0.5, 1.1), 1.5, 4.5
+"""After so long who finds no way looks again; does something else; gives up [s]; judgement."""
 PARKED_M = 60.0
-"""Who is not in an episode stands this far away along x and y [m], and deep below."""
-WITH_LOAD = (st.STAND, st.LOOK_ROUND, st.SET_DOWN, st.HAND_OVER)
+"""Who is not in an episode stands this far away along x and y [m]."""
+WITH_LOAD = (*st.IDLE, *st.GIVING)
 """What one does with something in one's hands; before anything else it is set down."""
-ABOVE_M = 0.17
-"""Hands work so far above a bench [m]: a hand and a workpiece are as thick; judgement."""
-CHEST_M = 1.2
-"""Loads are set down or leant against something no higher than this [m]."""
+ABOVE_M, CHEST_M = 0.17, 1.2
+"""Hands work so far above a bench; loads are set down no higher than this [m]; judgement."""
 
 
 def follow_up(state: MotionState, b: int, w: int, draws: Floats) -> None:
@@ -52,7 +47,7 @@ def follow_up(state: MotionState, b: int, w: int, draws: Floats) -> None:
 def begin_episode(state: MotionState, b: int, n_present: int, bodies: Ints, draws: Floats) -> None:
     """Put n_present workers of environment b at places of theirs, in the middle of something.
 
-    They have `bodies` (W,); draws (W, 2, N_DRAWS) are of their beginning and their first activity.
+    They have `bodies` (W,); draws (W, 2, N_DRAWS) are for places and first activities.
     """
     mind, workers = state.mind, state.workers[b]
     workers[...] = np.zeros((), st.WORKER)
@@ -88,20 +83,18 @@ def next_activity(who: Decision) -> tuple[int, float]:
     doing, left = me["doing"], float(me["doing_until"]) - who.now
     me["doing"] = st.NO_REACTION
     if doing == st.BACK_AWAY:
-        return step_back(who) or _stand(who, float(me["reaction_s"]))
+        return step_back(who) or _stand(float(me["reaction_s"]))
     if doing == st.PAUSE and me["going"] == UNDER_WAY and me["doing_until"] > who.now:
-        return _stand(who, left)
-    played = play(who)
-    if played:
+        return _stand(left)
+    if played := play(who):
         return played
     if me["going"] == UNDER_WAY and arrived(who):
         who.go(THERE)
         return _do_job(who)
     if me["going"] == THERE:
-        if who.draws[dc.EVENT] < who.mind.config.people.careless_probability:
-            stepped = step_back(who)
-            if stepped:
-                return stepped
+        careless = who.draws[dc.EVENT] < who.mind.config.people.careless_probability
+        if careless and (stepped := step_back(who)):
+            return stepped
         _choose_job(who)
         if who.job.at in (HERE, who.kind_here):
             return _do_job(who)
@@ -119,8 +112,7 @@ def _begin(who: Decision, activity: int, lasts: float) -> None:
     draw = who.draws.item(dc.REACTION)
     pauses = draw < people.pause_probability
     backs = draw < people.pause_probability + people.step_back_probability
-    if activity == st.CLIP and backs:
-        pauses = True  # what was recorded may go anywhere, but not backwards
+    pauses |= activity == st.CLIP and backs  # a recording may go anywhere, but not backwards
     me["reaction"] = st.PAUSE if pauses else st.BACK_AWAY if backs else st.NO_REACTION
     me["delay_s"] = who.draw(dc.DELAY, people.delay_s)
     me["reaction_s"] = who.draw(dc.REACTION_S, people.pause_s)
@@ -167,27 +159,25 @@ def _work(who: Decision, activity: int) -> tuple[int, float]:
     near = who.kind_here == "robot"
     if activity == st.STAND:
         pause_s = config.near_pause_s if near else config.away_pause_s
-        return _stand(who, who.draw(dc.LASTS, pause_s) * config.people.tempo)
-    x, y, yaw, height = me["spot"].tolist()
-    if activity in (st.SET_DOWN, st.HAND_OVER):
+        return _stand(who.draw(dc.LASTS, pause_s) * config.people.tempo)
+    height = me["spot"].item(3)
+    if activity in st.GIVING:
         height = min(height, CHEST_M)
     if who.kind_here == "bench":
         height += ABOVE_M
-    if near and activity == st.REACH:
-        lunges = who.draws[dc.EVENT] > 1.0 - config.people.lunge_probability
-        activity = st.LUNGE if lunges else st.REACH
-    others, prop = who.workers["spot"][who.others(), :2], prop_index(who.job.prop)
-    place = (x, y, yaw, height)
-    lasts = start_here(activity, who.draws, place, near, others, prop, who.mind.numbers, me)
+    lunges = who.draws[dc.EVENT] > 1.0 - config.people.lunge_probability
+    if near and activity == st.REACH and lunges:
+        activity = st.LUNGE
+    lasts = start_here(who, activity, height)
     if meets_somebody(who, activity, lasts)[0] >= 0.0:
         stay(who)
         if who.kind_here:
             who.go(UNDER_WAY)  # that is, the job comes next
-        return _stand(who, who.draw(dc.LASTS, WAIT_S))
+        return _stand(who.draw(dc.LASTS, WAIT_S))
     return activity, lasts
 
 
-def _stand(who: Decision, lasts: float) -> tuple[int, float]:
+def _stand(lasts: float) -> tuple[int, float]:
     return st.STAND, max(lasts, 0.05)
 
 
@@ -205,4 +195,4 @@ def _wait(who: Decision) -> tuple[int, float]:
         return _work(who, st.SET_DOWN if who.loaded else st.LOOK_ROUND)
     if waited_s > CHANGE_S and not who.loaded:
         _new_errand(who)
-    return _stand(who, who.draw(dc.LASTS, WAIT_S))
+    return _stand(who.draw(dc.LASTS, WAIT_S))

@@ -12,7 +12,7 @@ from hrc_env.motion.activities.work import work
 from hrc_env.motion.curves import decay, wrap
 from hrc_env.motion.feet import feet, step_time
 from hrc_env.motion.hands import lift, reach
-from hrc_env.motion.holding import drop_load, hold_load
+from hrc_env.motion.holding import hold_load
 from hrc_env.motion.posture import STANCE_HALF_WIDTH_M, stand
 from hrc_env.motion.state import Worker
 from hrc_env.motion.walk import footprint, walk
@@ -30,43 +30,38 @@ def evaluate(t: float, clock_s: float, frames: Floats, me: Worker) -> None:
     feet(step_time(t, me) - (me.taken_s if activity == st.PUSH else 0.0), me)
     if activity in st.GOING:
         walk(t, clock_s, me)
-    elif activity == st.REACH:
-        reach(t, clock_s, me)
-    elif activity == st.LIFT:
-        lift(t, clock_s, me)
     elif activity == st.PUSH:
         push(t, clock_s, me)
-    elif activity in st.TAKING:
-        pick_up(t, clock_s, me)
-    elif activity in st.GIVING:
-        pick_up(me.lasts - t, clock_s, me)
-    elif st.SQUATTING <= activity <= st.LUNGE:
-        work(t, clock_s, me)
-    elif activity == st.CLIMB:
-        climb(t, clock_s, me)
     elif activity == st.CLIP:
         play(t, clock_s, frames, me)
     else:
-        _stay(t, clock_s, me)
+        stand(me.start_x, me.start_y, me.start_yaw, clock_s, me)
+    if activity == st.REACH:
+        reach(t, me)
+    elif activity == st.LIFT:
+        lift(t, me)
+    elif activity in st.TAKING:
+        pick_up(t, me)
+    elif activity in st.GIVING:
+        pick_up(me.lasts - t, me)
+    elif st.SQUATTING <= activity <= st.LUNGE:
+        work(t, me)
+    elif activity == st.CLIMB:
+        climb(t, me)
+    elif activity == st.LOOK_ROUND:
+        look_round(t, me)
+    if me.load_prop > 0 and activity in st.IDLE:
+        hold_load(me.start_x, me.start_y, me.start_yaw, 0.0, me)
     if t < BLEND_S:
         for i in range(c.N_BLENDED):
             me.q[i] += decay(t / BLEND_S, BLEND_S, me.blend[i, 0], me.blend[i, 1])
 
 
 @kernel
-def _stay(t: float, clock_s: float, me: Worker) -> None:
-    """The control vector of someone who stands, perhaps looking round or with a load."""
-    if me.activity == st.LOOK_ROUND:
-        look_round(t, clock_s, me)
-    else:
-        stand(me.start_x, me.start_y, me.start_yaw, clock_s, me)
-    if me.load_prop > 0:
-        hold_load(me.start_x, me.start_y, me.start_yaw, 0.0, me)
-
-
-@kernel
 def stop(me: Worker) -> float:
-    """Begin where the last activity ended; returns by how much its heading was unwound."""
+    """Begin where the last activity ended, let go of what is; by how much its heading unwinds."""
+    if me.activity in st.GIVING or me.activity == st.PUSH:
+        me.load_prop = 0
     count = me.step_count if me.undo_at == 0.0 else 0
     for k in range(max(count - 2, 0), count):
         side = (k + me.step_first) % 2
@@ -78,22 +73,20 @@ def stop(me: Worker) -> float:
     me.stance[1, 2] += unwound
     me.start_x, me.start_y = me.end_x, me.end_y
     me.start_yaw = me.end_yaw = yaw
-    me.step_count, me.step_first, me.undo_at = 0, 0, 0.0
+    me.step_count = me.step_first = me.undo_at = 0
     me.step_start, me.step_period, me.step_swing = 0.0, 1.0, 0.5
     return unwound
 
 
 @kernel
 def leave(t: float, clock_s: float, frames: Floats, me: Worker) -> None:
-    """End an activity at its time t: note q then and a little later, stop, let go of what is."""
+    """End an activity at its time t: note q then and a little later, and stop."""
     for i in range(2):
         later = i * RATE_H_S
         evaluate(t + me.pace * later, clock_s + later, frames, me)
         for k in range(c.N_BLENDED):
             me.handover[i, k] = me.q[k]
     unwound = stop(me)
-    if me.activity in st.GIVING or me.activity == st.PUSH:
-        drop_load(me)
     me.handover[0, c.HEADING] += unwound
     me.handover[1, c.HEADING] += unwound
 

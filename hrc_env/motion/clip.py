@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError
+from hrc_env.core.errors import ConfigError, check_shape
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import ANKLE_Z, ARM, BALL_X, BALL_Z, HEEL_X, LEG, N_SIZES, STAND_Z
@@ -17,10 +17,8 @@ VERSION = 1
 """Of the file; raised when its columns or fields change."""
 RECORDED = np.array([*range(c.N_BLENDED), *range(c.ANKLE, c.ANKLE + 12)])
 """(32,) columns of the control vector that a recording fills: all that is blended, both feet."""
-SLOWEST_HZ, FASTEST_HZ = 5.0, 1000.0
-"""Frame rates between which a recording is believed; judgement: below, a step is lost."""
-FARTHEST_M, FASTEST_M_S = 200.0, 15.0
-"""Clips whose root goes beyond these are damaged; judgement."""
+SLOWEST_HZ, FASTEST_HZ, FARTHEST_M, FASTEST_M_S = 5.0, 1000.0, 200.0, 15.0
+"""Frame rates between which a recording is believed, and how far and fast its root; judgement."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,10 +37,24 @@ class Clip:
     """Name of the recording."""
 
     def __post_init__(self) -> None:
-        _check(self)
+        """Refuse shapes, numbers or speeds that no recording has."""
+        q, source = self.controls, self.source
+        check_rate(self.fps, source)
+        if q.ndim != 2 or len(q) < 2 or q.shape[1] != c.N_CONTROLS:
+            raise ConfigError(f"{source}: controls must be (T >= 2, {c.N_CONTROLS}): {q.shape}.")
+        check_shape(f"{source}: contacts", self.contacts.shape, (len(q), 2), "frames, feet")
+        check_shape(f"{source}: size", self.size.shape, (N_SIZES,), "lengths")
+        if not (np.isfinite(q).all() and np.isfinite(self.size).all() and self.size[LEG] > 0.0):
+            raise ConfigError(f"{source}: controls and size must be finite numbers.")
+        root = q[:, [c.ROOT_X, c.ROOT_Y]]
+        speed = np.linalg.norm(np.diff(root, axis=0), axis=-1).max() * self.fps
+        if np.abs(root).max() > FARTHEST_M or speed > FASTEST_M_S:
+            raise ConfigError(
+                f"{source}: the root goes {np.abs(root).max():.0f} m far at up to {speed:.0f} m/s; "
+                f"at most {FARTHEST_M:g} m and {FASTEST_M_S:g} m/s are expected of a person."
+            )
 
     def __eq__(self, other: object) -> bool:
-        """Whether it is the same motion, number by number."""
         return isinstance(other, Clip) and all(
             np.array_equal(getattr(self, item.name), getattr(other, item.name))
             for item in fields(self)
@@ -50,11 +62,6 @@ class Clip:
 
     def __hash__(self) -> int:
         return hash((self.source, self.fps, len(self.controls)))
-
-    @property
-    def duration_s(self) -> float:
-        """From the first frame to the last [s]."""
-        return (len(self.controls) - 1) / self.fps
 
 
 def placed_at_origin(controls: Floats) -> Floats:
@@ -115,15 +122,8 @@ def load_clip(path: Path) -> Clip:
         raise ConfigError(f"{path}: controls must be (T, {len(RECORDED)}), got {recorded.shape}.")
     controls = np.zeros((len(recorded), c.N_CONTROLS))
     controls[:, RECORDED] = recorded
-    return Clip(
-        controls, float(arrays["fps"]), np.asarray(arrays["contacts"], bool),
-        np.asarray(arrays["size"], float), str(arrays["source"]),
-    )  # fmt: skip
-
-
-def opened(motion: str | Path | Clip) -> Clip:
-    """A clip, or the one at a path."""
-    return motion if isinstance(motion, Clip) else load_clip(Path(motion))
+    contacts, size = np.asarray(arrays["contacts"], bool), np.asarray(arrays["size"], float)
+    return Clip(controls, float(arrays["fps"]), contacts, size, str(arrays["source"]))
 
 
 def check_rate(fps: float, source: str) -> None:
@@ -135,27 +135,6 @@ def check_rate(fps: float, source: str) -> None:
         )
 
 
-def _check(clip: Clip) -> None:
-    """Refuse shapes, numbers or speeds that no recording has."""
-    q, source = clip.controls, clip.source
-    check_rate(clip.fps, source)
-    expected = {"contacts": (len(q), 2), "size": (N_SIZES,)}
-    if q.ndim != 2 or len(q) < 2 or q.shape[1] != c.N_CONTROLS:
-        raise ConfigError(f"{source}: controls must be (T >= 2, {c.N_CONTROLS}), got {q.shape}.")
-    for name, shape in expected.items():
-        if getattr(clip, name).shape != shape:
-            raise ConfigError(f"{source}: {name} must be {shape}, got {getattr(clip, name).shape}.")
-    if not (np.isfinite(q).all() and np.isfinite(clip.size).all() and clip.size[LEG] > 0.0):
-        raise ConfigError(f"{source}: controls and size must be finite numbers.")
-    root = q[:, [c.ROOT_X, c.ROOT_Y]]
-    speed = np.linalg.norm(np.diff(root, axis=0), axis=-1).max() * clip.fps
-    if np.abs(root).max() > FARTHEST_M or speed > FASTEST_M_S:
-        raise ConfigError(
-            f"{source}: the root goes {np.abs(root).max():.0f} m far at up to {speed:.0f} m/s; "
-            f"at most {FARTHEST_M:g} m and {FASTEST_M_S:g} m/s are expected of a person."
-        )
-
-
 def footprints(feet: Floats, size: Floats) -> Floats:
     """(T, 4) flat feet's ankles and headings, from (T, 5 or more): ankle, heading, pitch."""
     flat = feet[:, :3] - rolled(feet[:, 3], feet[:, 4], size)
@@ -164,9 +143,6 @@ def footprints(feet: Floats, size: Floats) -> Floats:
 
 def rolled(yaw: Floats, pitch: Floats, size: Floats) -> Floats:
     """(T, 3) how far a foot's pitch takes its ankle: heel up round the ball, toes up."""
-    moved = [
-        about(p, size[BALL_X], size[BALL_Z]) if p > 0.0 else about(p, size[HEEL_X], -size[ANKLE_Z])
-        for p in pitch.tolist()
-    ]
-    ahead, above = np.array(moved).T
+    ball, heel = (size[BALL_X], size[BALL_Z]), (size[HEEL_X], -size[ANKLE_Z])
+    ahead, above = np.array([about(p, *(ball if p > 0.0 else heel)) for p in pitch.tolist()]).T
     return np.stack([np.cos(yaw) * ahead, np.sin(yaw) * ahead, above], -1)

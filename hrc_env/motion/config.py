@@ -1,7 +1,7 @@
 """Settings of the workers' behaviour, and how people are with the robot: presets by name."""
 
 from collections import namedtuple
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -47,12 +47,10 @@ class PeopleConfig:
     """Chance that a worker takes a few steps back between two things to do, without looking."""
 
     def __post_init__(self) -> None:
-        """Check ranges and probabilities."""
         _check_ranges(self)
-        for item in fields(self):
-            value = getattr(self, item.name)
+        for name, value in asdict(self).items():
             if np.min(value) < 0.0:
-                raise ConfigError(f"{item.name} must be 0 or more, got {value}.")
+                raise ConfigError(f"{name} must be 0 or more, got {value}.")
         if self.pause_probability + self.step_back_probability > 1.0:
             raise ConfigError("pause_probability + step_back_probability must be at most 1.")
         if not 0.3 <= self.speed_m_s[0] <= self.speed_m_s[1] <= 2.0:
@@ -63,12 +61,11 @@ class PeopleConfig:
 
 def _check_ranges(config: Any) -> None:
     """Refuse ranges that are not (low, high), and probabilities outside [0, 1]."""
-    for item in fields(config):
-        value = getattr(config, item.name)
-        if item.name.endswith(("_m", "_s")) and isinstance(value, tuple) and value[0] > value[1]:
-            raise ConfigError(f"{item.name} must be (low, high), got {value}.")
-        if item.name.endswith("_probability") and not 0 <= getattr(config, item.name) <= 1:
-            raise ConfigError(f"{item.name} must lie in [0, 1], got {value}.")
+    for name, value in [(item.name, getattr(config, item.name)) for item in fields(config)]:
+        if name.endswith(("_m", "_s")) and isinstance(value, tuple) and value[0] > value[1]:
+            raise ConfigError(f"{name} must be (low, high), got {value}.")
+        if name.endswith("_probability") and not 0 <= value <= 1:
+            raise ConfigError(f"{name} must lie in [0, 1], got {value}.")
 
 
 PEOPLE: dict[str, PeopleConfig] = {
@@ -136,7 +133,6 @@ class MotionConfig:
     """Chance that a worker with empty hands plays one next, where there is room for it."""
 
     def __post_init__(self) -> None:
-        """Check ranges and probabilities."""
         _check_ranges(self)
         if self.spacing_m < 0.8:
             raise ConfigError(
@@ -148,16 +144,15 @@ class MotionConfig:
                 raise ConfigError(f"motions must hold paths or clips, got {motion!r}.")
 
 
-COMPILED = (
+Numbers = namedtuple("Numbers", (
     "target_radius_m", "target_z_m", "target_spread_rad", "hand_speed_m_s", "sudden_speed_m_s",
-    "two_hands_probability", "hold_s", "lift_s", "load_z_m",
-)  # fmt: skip
-"""The settings that compiled code reads."""
-Numbers = namedtuple("Numbers", (*COMPILED, "robot_xy_m", "sudden_probability"))
+    "two_hands_probability", "hold_s", "lift_s", "load_z_m", "robot_xy_m", "sudden_probability",
+))  # fmt: skip
+"""The settings that compiled code reads, which takes named tuples."""
 
 
 def numbers(config: MotionConfig, robot_xy_m: Range) -> Numbers:
-    """What compiled code reads, as a named tuple, which it can take."""
-    values = [getattr(config, name) for name in COMPILED]
-    values += [robot_xy_m, config.people.sudden_probability]
+    """The settings as compiled code takes them, of floats."""
+    known = {**vars(config), **asdict(config.people), "robot_xy_m": robot_xy_m}
+    values = [known[name] for name in Numbers._fields]
     return Numbers(*(tuple(map(float, v)) if isinstance(v, tuple) else float(v) for v in values))

@@ -1,17 +1,15 @@
-"""Smooth scalar curves that every activity is made of; never `fastmath`, or bits would move."""
+"""Smooth curves and places on the floor that every activity is made of; never `fastmath`."""
 
 import math
 
 from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 
 
 @kernel
 def min_jerk(u: float) -> float:
     """0 to 1 over u, at rest at both ends, else held; peak rate 1.875 (Flash & Hogan 1985)."""
-    if u <= 0.0:
-        return 0.0
-    if u >= 1.0:
-        return 1.0
+    u = min(max(u, 0.0), 1.0)
     return u * u * u * (10.0 - 15.0 * u + 6.0 * u * u)
 
 
@@ -28,11 +26,7 @@ def ramp(u: float) -> float:
 @kernel
 def cruise(u: float, share: float) -> float:
     """0 to 1 over u in [0, 1] at constant speed but for smooth ramps of `share` at each end."""
-    if u <= 0.0:
-        return 0.0
-    if u >= 1.0:
-        return 1.0
-    top = share / (1.0 - share)
+    u, top = min(max(u, 0.0), 1.0), share / (1.0 - share)
     if u < 0.5:
         return top * ramp(u / share)
     return 1.0 - top * ramp((1.0 - u) / share)
@@ -41,8 +35,7 @@ def cruise(u: float, share: float) -> float:
 @kernel
 def hump(u: float) -> float:
     """0 at the ends of [0, 1], 1 in the middle, flat to second order at the ends; 0 outside."""
-    if u <= 0.0 or u >= 1.0:
-        return 0.0
+    u = min(max(u, 0.0), 1.0)
     v = 4.0 * u * (1.0 - u)
     return v * v * v
 
@@ -50,9 +43,7 @@ def hump(u: float) -> float:
 @kernel
 def soft_min(a: float, b: float, width: float) -> float:
     """The smaller one, rounded off (downwards) where the two differ by less than `width`."""
-    closeness = 1.0 - abs(a - b) / width
-    if closeness <= 0.0:
-        return min(a, b)
+    closeness = max(1.0 - abs(a - b) / width, 0.0)
     return min(a, b) - width * closeness * closeness * closeness / 6.0
 
 
@@ -81,6 +72,19 @@ def decay(u: float, duration: float, value: float, rate: float) -> float:
 def wrap(angle: float) -> float:
     """The same direction in (-pi, pi]."""
     return math.atan2(math.sin(angle), math.cos(angle))
+
+
+@kernel
+def placed(x: float, y: float, yaw: float, ahead: float, left: float) -> tuple[float, float]:
+    """The point so far ahead and to the left of who is at (x, y) and faces yaw."""
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    return x + cos * ahead - sin * left, y + sin * ahead + cos * left
+
+
+@kernel
+def shift(q: Floats, at: int, yaw: float, ahead: float, left: float) -> None:
+    """Move the point (q[at], q[at + 1]) ahead and to the left of who faces yaw."""
+    q[at], q[at + 1] = placed(q[at], q[at + 1], yaw, ahead, left)
 
 
 @kernel

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.core.records import WORKPLACE_KINDS, Workplace
+from hrc_env.core.records import WORKPLACE_KINDS
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.motion.activities.playing import Clips
 from hrc_env.motion.anatomy import Anatomy
@@ -18,10 +18,8 @@ from hrc_env.motion.traffic import AHEAD_M, APART_M, HANDS_M
 
 NEXT, BOW, LASTS, DELAY, REACTION, REACTION_S, EVENT, DWELL = range(N_START, N_START + 8)
 """Which draw decides what; the first N_START are the activity's own."""
-PLACES, N_TRIED = N_START + 8, 5
-"""First of the draws for places, three a place, and how many are tried."""
-N_DRAWS = PLACES + 3 * N_TRIED
-"""Uniform numbers of one decision."""
+PLACES, N_DRAWS = N_START + 8, N_START + 8 + 3 * 5
+"""First of the draws for places, three for each of five; uniform numbers of one decision."""
 ROBOT_WORK_M = 1.1
 """Height of the work at the robot [m]."""
 
@@ -34,8 +32,6 @@ class BehaviourParams:
     numbers: Numbers
     plan: Floorplan
     schedule: Schedule
-    places: dict[str, tuple[Workplace, ...]]
-    """By kind."""
     clips: Clips
     anatomy: Anatomy
     """(N, ...) of the bodies that there are."""
@@ -69,7 +65,6 @@ class Decision:
 
     @property
     def me(self) -> Worker:
-        """Their record."""
         return self.workers[self.w]
 
     def go(self, going: int) -> None:
@@ -91,7 +86,6 @@ class Decision:
 
     @property
     def loaded(self) -> bool:
-        """Whether they hold something."""
         return bool(self.me["load_prop"] > 0)
 
     def draw(self, index: int, limits: tuple[float, float]) -> float:
@@ -122,37 +116,37 @@ def wished(who: Decision) -> Iterator[Place]:
     """Places for the job that nobody else has, the one last chosen first."""
     if who.me["going"] == UNDER_WAY:
         yield tuple(who.me["spot"].tolist())  # type: ignore[misc]
-    for place in _candidates(who, who.job.at):
-        if _is_free(who, place):
+    yield from _free_places(who, who.job.at)
+
+
+def _free_places(who: Decision, kind: str) -> Iterator[Place]:
+    """Places of a kind that no other worker's is near."""
+    apart_m, spots = who.mind.config.spacing_m, who.workers["spot"][who.others(), :2].tolist()
+    for place in _candidates(who, kind):
+        if all(math.dist(spot, place[:2]) >= apart_m for spot in spots):
             yield place
 
 
 def _candidates(who: Decision, kind: str) -> Iterator[Place]:
     """Places of a kind: drawn round the robot, the scene's elsewhere, or where the worker is."""
-    mind, draws = who.mind, who.draws[PLACES:].tolist()
+    draws, config, plan = who.draws[PLACES:].tolist(), who.mind.config, who.mind.plan
     if kind == HERE:
         yield tuple(who.me["spot"].tolist())  # type: ignore[misc]
     elif kind == "robot":
-        config, ground = mind.config, mind.plan
+        grounds = plan.grounds
         for radius, azimuth, turn in zip(draws[::3], draws[1::3], draws[2::3], strict=True):
             low, high = config.near_radius_m
             r = low + radius * (high - low)
-            angle = ground.robot_front_rad + config.near_azimuth_rad * (2.0 * azimuth - 1.0)
-            x = ground.robot_xy_m[0] + r * math.cos(angle)
-            y = ground.robot_xy_m[1] + r * math.sin(angle)
-            if slack_at(x, y, ground.slack, ground.origin) >= 0.0:
+            angle = grounds.robot_front_rad + config.near_azimuth_rad * (2.0 * azimuth - 1.0)
+            x = grounds.robot_xy_m[0] + r * math.cos(angle)
+            y = grounds.robot_xy_m[1] + r * math.sin(angle)
+            if slack_at(x, y, plan.slack, plan.origin) >= 0.0:
                 yield x, y, angle + math.pi + 0.15 * (2.0 * turn - 1.0), ROBOT_WORK_M
     else:
-        places = mind.places[kind]
+        places = [place for place in plan.places if place.kind == kind]
         first = int(draws[0] * len(places))
         for place in (*places[first:], *places[:first]):
             yield *place.xy_m, place.yaw_rad, place.height_m
-
-
-def _is_free(who: Decision, place: Place) -> bool:
-    """Whether no other worker has a place near this one."""
-    apart_m, spots = who.mind.config.spacing_m, who.workers["spot"][who.others(), :2].tolist()
-    return all(math.dist(spot, place[:2]) >= apart_m for spot in spots)
 
 
 def take_first_place(who: Decision) -> None:
@@ -163,12 +157,11 @@ def take_first_place(who: Decision) -> None:
     first = mind.schedule.robot if near else begins[int(who.draws[BOW] * len(begins))]
     for job in (first, mind.schedule.robot, *begins):
         kind = mind.schedule.jobs[job].at
-        for place in _candidates(who, kind):
-            if _is_free(who, place):
-                me["job"], me["at"], me["spot"] = job, WORKPLACE_KINDS.index(kind), place
-                dwell = who.draw(DWELL, mind.config.dwell_s) * mind.config.people.tempo
-                me["until_s"] = max(0.05, dwell * who.draws.item(LASTS))
-                return
+        for place in _free_places(who, kind):
+            me["job"], me["at"], me["spot"] = job, WORKPLACE_KINDS.index(kind), place
+            dwell = who.draw(DWELL, mind.config.dwell_s) * mind.config.people.tempo
+            me["until_s"] = max(0.05, dwell * who.draws.item(LASTS))
+            return
     me["job"], me["at"], me["spot"] = mind.schedule.robot, NOWHERE, _loneliest(who)
 
 

@@ -1,8 +1,7 @@
 """Feet: locked to their footprint while loaded, rolling from heel to ball, swinging between.
 
 Step k is taken by foot (first + k) % 2, leaves the floor at start + k * period and lands a fixed
-swing later. Footprints: the ankle's x, y, heading; the share of a full stride of the step that
-made it; height of the ground. Steps may be gone back: then their time runs backwards.
+swing later. Steps may be gone back: then their time runs backwards.
 """
 
 import math
@@ -11,17 +10,16 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import ANKLE_Z, BALL_X, BALL_Z, HEEL_X
-from hrc_env.motion.curves import about, cruise, hump, min_jerk
+from hrc_env.motion.curves import about, cruise, hump, min_jerk, placed, shift
 from hrc_env.motion.state import Pair, Worker
 
 STRIKE_PITCH, PUSH_PITCH = -0.35, 1.0
 """Foot's pitch at heel strike and push-off of a full stride [rad] (Winter, Biomechanics)."""
 FLAT_S, ROLL_SHARE = 0.10, 0.62
 """Heel strike to foot flat [s]; heel-off to toe-off as a share of the period of a step."""
-RAMP_SHARE = 0.29
-"""Share of a swing in which the foot gathers (and again loses) speed."""
-LIFT_BASE_M, LIFT_STRIDE_M = 0.025, 0.045
-"""Rise of the foot above its roll: of any step, and more with the stride [m]."""
+RAMP_SHARE, LIFT_BASE_M, LIFT_STRIDE_M = 0.29, 0.025, 0.045
+"""Share of a swing in which the foot gathers (and again loses) speed; its rise above its roll: of
+any step, and more with the stride [m]."""
 
 
 @kernel
@@ -80,15 +78,13 @@ def foot(t: float, side: int, prints: Floats, stance: Floats, me: Worker) -> Non
     at = c.ANKLE + 6 * side
     ahead, above = about(heel_up, me.size[BALL_X], me.size[BALL_Z])
     behind, below = about(toes_up, me.size[HEEL_X], -me.size[ANKLE_Z])
-    q[at] = x + math.cos(yaw) * (ahead + behind)
-    q[at + 1] = y + math.sin(yaw) * (ahead + behind)
+    q[at], q[at + 1] = placed(x, y, yaw, ahead + behind, 0.0)
     q[at + 2] = me.size[ANKLE_Z] + above + below + rise + ground
     q[at + 3], q[at + 4], q[at + 5] = yaw, heel_up + toes_up, heel_up * flown + toes_up
 
 
 @kernel
 def feet(t: float, me: Worker) -> None:
-    """Both."""
     for side in range(2):
         foot(t, side, me.prints, me.stance, me)
 
@@ -101,7 +97,6 @@ def raise_heel(side: int, pitch: float, me: Worker) -> None:
     ahead, above = about(pitch, me.size[BALL_X], me.size[BALL_Z])
     if pitch < 0.0:
         ahead, above = about(pitch, me.size[HEEL_X], -me.size[ANKLE_Z])
-    q[at] += math.cos(q[at + 3]) * ahead
-    q[at + 1] += math.sin(q[at + 3]) * ahead
+    shift(q, at, q[at + 3], ahead, 0.0)
     q[at + 2] += above
     q[at + 4] += pitch

@@ -1,8 +1,6 @@
-"""Where a worker's root may be: the slack [m] on a grid, to what stands there and the edge.
+"""Where a worker's root may be: the slack [m] on a grid, to what stands there and the edge."""
 
-Workplaces may lie nearer to things, for who works at a wall stands before it.
-"""
-
+import math
 import warnings
 from dataclasses import dataclass, replace
 
@@ -13,14 +11,11 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Grounds, Workplace
 from hrc_env.core.typing import Floats
 
-BODY_M = 0.40
-"""Walkers keep so far from what stands there: half their width, arms swinging included [m]."""
-STAND_M = 0.22
-"""Those who stand and work keep so far: half the depth of a trunk and its sway [m]; judgement."""
-CELL_M = 0.05
-"""Grid of the field [m]."""
-MENDED_M = 0.3
-"""A place that is inside something is moved by as much at most [m]."""
+BODY_M, STAND_M = 0.40, 0.22
+"""Walkers keep so far from what stands there: half their width, swinging arms included; those who
+work there, half the depth of a trunk and its sway [m]; judgement."""
+CELL_M, MENDED_M = 0.05, 0.3
+"""Grid of the field; a place that is inside something is moved by as much at most [m]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,11 +27,8 @@ class Floorplan:
     origin: Floats
     """(2,) first grid point [m]."""
     places: tuple[Workplace, ...]
-    """Where there is work."""
-    robot_xy_m: tuple[float, float]
-    """Axis of the robot's first joint [m]."""
-    robot_front_rad: float
-    """Where the robot's front looks to [rad]."""
+    """Where there is work, and room to stand."""
+    grounds: Grounds
 
 
 def floorplan(grounds: Grounds) -> Floorplan:
@@ -49,15 +41,11 @@ def floorplan(grounds: Grounds) -> Floorplan:
         )
     xs = np.arange(x0, x1 + 0.5 * CELL_M, CELL_M)
     ys = np.arange(y0, y1 + 0.5 * CELL_M, CELL_M)
-    slack = np.empty((len(xs), len(ys)))
-    robot = np.array([*grounds.robot_xy_m, grounds.robot_clearance_m])
-    _measure(xs, ys, np.ascontiguousarray(grounds.blocked, float), robot, slack)
-    if slack.max() < 0.0:
+    plan = Floorplan(_slack(xs[:, None], ys, grounds), np.array([xs[0], ys[0]]), (), grounds)
+    if plan.slack.max() < 0.0:
         raise ConfigError("The grounds leave no room for a worker: everything is blocked.")
-    origin = np.array([xs[0], ys[0]])
-    for array in (slack, origin):
+    for array in (plan.slack, plan.origin):
         array.flags.writeable = False
-    plan = Floorplan(slack, origin, (), grounds.robot_xy_m, grounds.robot_front_rad)
     return replace(plan, places=tuple(mended(plan, place) for place in grounds.places))
 
 
@@ -94,23 +82,17 @@ def room_for(plan: Floorplan, apart_m: float) -> int:
     return len(taken)
 
 
-@kernel
-def _measure(xs: Floats, ys: Floats, blocked: Floats, robot: Floats, slack: Floats) -> None:
-    """Fill the field: the distance from footprints (N, 5), the robot (x, y, radius) and edges."""
-    n_x, n_y = slack.shape
-    for i in range(n_x):
-        for j in range(n_y):
-            slack[i, j] = np.hypot(xs[i] - robot[0], ys[j] - robot[1]) - robot[2]
-    for k in range(blocked.shape[0]):
-        cos, sin = np.cos(blocked[k, 4]), np.sin(blocked[k, 4])
-        for i in range(n_x):
-            for j in range(n_y):
-                dx, dy = xs[i] - blocked[k, 0], ys[j] - blocked[k, 1]
-                along = abs(cos * dx + sin * dy) - blocked[k, 2]
-                across = abs(cos * dy - sin * dx) - blocked[k, 3]
-                outside = np.hypot(max(along, 0.0), max(across, 0.0))
-                away = outside + min(max(along, across), 0.0)
-                slack[i, j] = min(slack[i, j], away - BODY_M)
+def _slack(xs: Floats, ys: Floats, grounds: Grounds) -> Floats:
+    """(X, Y) distance of xs (X, 1) and ys (Y,) from footprints and the robot, less half a body."""
+    robot_x, robot_y = grounds.robot_xy_m
+    slack = np.hypot(xs - robot_x, ys - robot_y) - grounds.robot_clearance_m
+    for x, y, half_length, half_width, yaw in np.asarray(grounds.blocked, float).tolist():
+        cos, sin, dx, dy = math.cos(yaw), math.sin(yaw), xs - x, ys - y
+        along = np.abs(cos * dx + sin * dy) - half_length
+        across = np.abs(cos * dy - sin * dx) - half_width
+        outside = np.hypot(np.maximum(along, 0.0), np.maximum(across, 0.0))
+        slack = np.minimum(slack, outside + np.minimum(np.maximum(along, across), 0.0) - BODY_M)
+    return slack
 
 
 @kernel

@@ -1,10 +1,10 @@
-"""The procedural worker: behaviour, activities and kinematics as one moving batch.
+"""The procedural workers: behaviour, activities and kinematics as one moving batch.
 
-Every activity is a closed form in the time since it began, so that a moment can be evaluated
-anywhere, nothing is precomputed, and velocities come from the closed form itself.
+Every activity is a closed form in the time since it began; velocities are its difference quotients.
 """
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from hrc_env.motion.activities.playing import stocked
 from hrc_env.motion.anatomy import anatomies
 from hrc_env.motion.behaviour import begin_episode, follow_up
 from hrc_env.motion.blending import RATE_H_S, evaluate
-from hrc_env.motion.clip import Clip, opened
+from hrc_env.motion.clip import Clip, load_clip
 from hrc_env.motion.config import PEOPLE, MotionConfig, PeopleConfig, numbers
 from hrc_env.motion.decision import N_DRAWS, BehaviourParams, MotionState
 from hrc_env.motion.floorplan import floorplan, room_for
@@ -37,10 +37,8 @@ activity_names: tuple[str, ...] = st.ACTIVITY_NAMES
 """Names of the values of `activity`."""
 ABSENT = -1
 """The activity of who is not in an episode."""
-PARKED_Z_M = -100.0
-"""Who is not in an episode is so far below the floor, where no camera looks [m]."""
-HALT_S = 0.3
-"""Time in which hands come to a halt, and go on [s]."""
+PARKED_Z_M, HALT_S = -100.0, 0.3
+"""Height of who is not in an episode, where no camera looks [m]; hands halt within so long [s]."""
 
 OPEN_FLOOR = Grounds(
     walkable_x_m=(-0.1, 2.4),
@@ -65,12 +63,8 @@ def make_state(
 ) -> MotionState:  # fmt: skip
     """Workers of `batch` environments, `n_workers` each; call `reset` before use.
 
-    Args:
-        batch, n_workers: how many environments, and workers whom each has room for.
-        body: of all of them, or those of which each episode gives each worker one.
-        config: settings.
-        grounds: where they walk and work.
-        fewest: so many are in an episode at least, drawn at its beginning; None: all.
+    They have the `body`, or each episode gives each one of several, and walk on the `grounds`. At
+    least `fewest` of them are in an episode, drawn at its beginning; None: all.
     """
     if batch < 1 or n_workers < 0:
         raise ConfigError(f"Need batch >= 1 and n_workers >= 0, got {batch} and {n_workers}.")
@@ -84,13 +78,11 @@ def make_state(
             f"n_workers={n_workers}: no more than {fit} fit on these grounds, "
             f"{config.spacing_m} m from each other."
         )
-    places: dict[str, tuple[Workplace, ...]] = {}
-    for place in plan.places:
-        places[place.kind] = (*places.get(place.kind, ()), place)
-    clips = stocked([opened(motion) for motion in config.motions], bones.size)
-    schedule = schedule_at(config.jobs, tuple(places))
+    clips = [m if isinstance(m, Clip) else load_clip(Path(m)) for m in config.motions]
+    schedule = schedule_at(config.jobs, {place.kind for place in plan.places})
     values = numbers(config, grounds.robot_xy_m)
-    mind = BehaviourParams(config, values, plan, schedule, places, clips, bones, fewest)
+    pieces = stocked(clips, bones.size)
+    mind = BehaviourParams(config, values, plan, schedule, pieces, bones, fewest)
     return MotionState(np.zeros((batch, n_workers), st.WORKER), mind)
 
 
@@ -122,23 +114,12 @@ def advance(
     """
     workers, frames = state.workers, state.mind.clips.frames
     batch, n_workers = workers.shape
-    done, ticked = np.zeros(batch, np.int64), np.zeros(batch, np.bool_)
-    path = _blank((batch, n_steps, n_workers), 3, 4)
-    velocity, angular = _blank((batch, n_workers), 3, 3)
-    now = velocity, angular, np.empty((batch, n_workers, N_HELD))
-    while _move_on(float(dt_s), n_steps, done, ticked, workers, frames, path, now):
-        for b in np.flatnonzero(ticked).tolist():
-            for w in np.flatnonzero(_over(workers[b])).tolist():
-                follow_up(state, b, w, rngs[b].random(N_DRAWS))
-    bodies = workers["body"].copy()
-    last = WorkerMotion(path[0][:, -1], path[1][:, -1], now[0], now[1], _held(now[2]), bodies)
-    return WorkerPath(*path), last
-
-
-def _over(workers: Workers) -> Bools:
-    """(W,) whose activity is over: done, or taken back to its beginning."""
-    time_s = workers["time_s"]
-    return (time_s >= workers["duration_s"]) | ((time_s <= 0.0) & (workers["pace"] < 0.0))
+    done, over = np.zeros(batch, np.int64), np.zeros(workers.shape, np.bool_)
+    path, now = _blank((batch, n_steps, n_workers), 3, 4), _blank_now(workers)
+    while _move_on(float(dt_s), n_steps, done, over, workers, frames, path, now):
+        for b, w in np.argwhere(over).tolist():
+            follow_up(state, b, w, rngs[b].random(N_DRAWS))
+    return WorkerPath(*path), _motion(workers, (path[0][:, -1], path[1][:, -1]), now)
 
 
 def watch(
@@ -152,14 +133,15 @@ def watch(
 
 def current(state: MotionState, ids: Ints | None = None) -> WorkerMotion:
     """The bodies now: arrays (B, W, 22, ...), or of environments `ids` only (len(ids), W, ...)."""
-    batch, n_workers = state.workers.shape
-    rows = np.arange(batch) if ids is None else np.asarray(ids, np.int64)
-    position, turn, velocity, turning = _blank((len(rows), n_workers), 3, 4, 3, 3)
-    held = np.empty((len(rows), n_workers, N_HELD))
-    now = (velocity, turning, held)
-    _bodies_now(rows, state.workers, state.mind.clips.frames, (position, turn), now)
-    bodies = state.workers["body"][rows]
-    return WorkerMotion(position, turn, velocity, turning, _held(held), bodies)
+    workers = state.workers if ids is None else state.workers[np.asarray(ids, np.int64)]
+    return bodies_of(workers, state.mind.clips.frames)
+
+
+def bodies_of(workers: Workers, frames: Floats) -> WorkerMotion:
+    """The bodies of workers (B, W) at their times; `frames` are of the clips."""
+    place, now = _blank(workers.shape, 3, 4), _blank_now(workers)
+    _bodies_now(workers, frames, place, now)
+    return _motion(workers, place, now)
 
 
 def activity(state: MotionState) -> Ints:
@@ -167,39 +149,47 @@ def activity(state: MotionState) -> Ints:
     return np.where(state.workers["present"], state.workers["activity"], ABSENT)
 
 
-def _held(rows: Floats) -> Held:
-    """What `prop_pose` wrote into rows (B, W, N_HELD)."""
-    return Held(rows[..., 0].astype(np.int64), rows[..., 1:4].copy(), rows[..., 4:].copy())
+Places = tuple[Floats, ...]
+"""Positions and quaternions (..., 22, 3 or 4)."""
+Now = tuple[Floats, ...]
+"""Velocities, angular velocities (..., 22, 3), what is held (..., N_HELD)."""
 
 
-def _blank(lead: tuple[int, ...], *widths: int) -> tuple[Floats, ...]:
+def _motion(workers: Workers, place: Places, now: Now) -> WorkerMotion:
+    (position, turn), (velocity, turning, rows) = place, now
+    held = Held(rows[..., 0].astype(np.int64), rows[..., 1:4].copy(), rows[..., 4:].copy())
+    return WorkerMotion(position, turn, velocity, turning, held, workers["body"].copy())
+
+
+def _blank(lead: tuple[int, ...], *widths: int) -> Places:
     """An array (*lead, 22, n) for each width n."""
     return tuple(np.empty((*lead, N_SEGMENTS, n)) for n in widths)
 
 
-Path = tuple[Floats, ...]
-"""Positions and quaternions (..., 22, 3 or 4)."""
-Now = tuple[Floats, Floats, Floats]
-"""Velocities, angular velocities (..., 22, 3), what is held (..., N_HELD)."""
+def _blank_now(workers: Workers) -> Now:
+    return *_blank(workers.shape, 3, 3), np.empty((*workers.shape, N_HELD))
 
 
 @kernel
 def _move_on(
-    dt_s: float, n_steps: int, done: Ints, ticked: Bools, workers: Workers, frames: Floats,
-    path: Path, now: Now,
+    dt_s: float, n_steps: int, done: Ints, over: Bools, workers: Workers, frames: Floats,
+    path: Places, now: Now,
 ) -> bool:  # fmt: skip
-    """Move every environment on until done or someone must decide; whether anyone must."""
+    """Move every environment on until done or someone must decide; whether anyone must.
+
+    Whose activities are `over` (B, W), done or taken back to their beginning, have decided.
+    """
     waiting = False
     for b in range(done.shape[0]):
         while done[b] < n_steps:
-            t, due = done[b], False
+            t, ticked, due = done[b], over[b].any(), False
             for w in range(workers.shape[1]):
                 me = workers[b, w]
-                if not ticked[b]:
+                if not ticked:
                     _tick(dt_s, me)
                 back = me.pace < 0.0 and me.time_s <= 0.0
-                due = due or back or me.time_s >= me.duration_s
-            ticked[b] = due
+                over[b, w] = back or me.time_s >= me.duration_s
+                due = due or over[b, w]
             if due:
                 waiting = True
                 break
@@ -217,14 +207,13 @@ def _move_on(
 
 
 @kernel
-def _bodies_now(rows: Ints, workers: Workers, frames: Floats, path: Path, now: Now) -> None:
-    """Bodies of some environments as they are, into arrays (rows, W, ...)."""
-    for row in range(rows.shape[0]):
-        for w in range(workers.shape[1]):
-            me = workers[rows[row], w]
-            _rates_of(frames, now[0][row, w], now[1][row, w], me)
-            prop_pose(now[2][row, w], me)
-            _place(path[0][row, w], path[1][row, w], me)
+def _bodies_now(workers: Workers, frames: Floats, path: Places, now: Now) -> None:
+    """Bodies as they are, into arrays (B, W, ...)."""
+    for b, w in np.ndindex(workers.shape):
+        me = workers[b, w]
+        _rates_of(frames, now[0][b, w], now[1][b, w], me)
+        prop_pose(now[2][b, w], me)
+        _place(path[0][b, w], path[1][b, w], me)
 
 
 @kernel

@@ -4,14 +4,13 @@ import math
 
 from hrc_env.core.kernels import kernel
 from hrc_env.motion import controls as c
+from hrc_env.motion.activities.work import GAZE_LEAD_S
 from hrc_env.motion.anatomy import ARM, HAND, LEFT, SIDE_STRIDE, UPPER_ARM
-from hrc_env.motion.curves import hump, min_jerk
+from hrc_env.motion.curves import hump, min_jerk, shift
 from hrc_env.motion.kinematics import ARM_KNEE
 from hrc_env.motion.posture import MOST_LEAN, beyond, farthest, from_here, lean, stand
 from hrc_env.motion.state import Pair, Triple, Worker
 
-GAZE_LEAD_S = 0.25
-"""Eyes and head set off before the hand (Land & Hayhoe 2001: about half a second at most)."""
 SPARE_LEAN = 0.04
 """Lean beyond the least, because the sway of a standing body may take as much away."""
 CARRY_FORWARD_M, CARRY_Z_M, LOAD_HALF_WIDTH_M = 0.36, 1.05, 0.20
@@ -21,9 +20,8 @@ CARRY_FORWARD_M, CARRY_Z_M, LOAD_HALF_WIDTH_M = 0.36, 1.05, 0.20
 @kernel
 def _look(share: float, me: Worker) -> None:
     """Turn the head to the work."""
-    q = me.q
-    q[c.HEAD_YAW] += share * (me.gaze_yaw - q[c.HEAD_YAW])
-    q[c.HEAD_PITCH] += share * me.gaze_pitch
+    me.q[c.HEAD_YAW] += share * (me.gaze_yaw - me.q[c.HEAD_YAW])
+    me.q[c.HEAD_PITCH] += share * me.gaze_pitch
 
 
 @kernel
@@ -38,10 +36,9 @@ def _extend(out: float, me: Worker) -> None:
 
 
 @kernel
-def reach(t: float, clock_s: float, me: Worker) -> None:
-    """The control vector of someone who reaches out, works there, and takes the hands back."""
+def reach(t: float, me: Worker) -> None:
+    """Let a standing q reach out, work there, and take the hands back."""
     q = me.q
-    stand(me.start_x, me.start_y, me.start_yaw, clock_s, me)
     there = me.out_at + me.out_s
     leave = there + me.hold_s
     out = min_jerk((t - me.out_at) / me.out_s)
@@ -59,10 +56,9 @@ def reach(t: float, clock_s: float, me: Worker) -> None:
 
 
 @kernel
-def lift(t: float, clock_s: float, me: Worker) -> None:
-    """The control vector of someone who picks a load up, holds it, and puts it back."""
+def lift(t: float, me: Worker) -> None:
+    """Let a standing q pick a load up, hold it, and put it back."""
     q = me.q
-    stand(me.start_x, me.start_y, me.start_yaw, clock_s, me)
     grip = me.out_at + me.out_s
     rise = grip + me.hold_s
     lower = rise + me.raise_s + me.carry_s
@@ -72,13 +68,10 @@ def lift(t: float, clock_s: float, me: Worker) -> None:
     away = min_jerk((t - leave) / me.back_s)
     lean(me.lean * (down - up - away), me.squat, 0.0, me)
     _look(down - 0.6 * up - away, me)
-    bulge = 0.06 * hump(up)
-    cos, sin = math.cos(me.start_yaw), math.sin(me.start_yaw)
     for i in range(6):
         q[c.HAND_TARGET + i] = me.target[i] + up * (me.raised[i] - me.target[i])
     for side in range(2):
-        q[c.HAND_TARGET + 3 * side] += cos * bulge
-        q[c.HAND_TARGET + 3 * side + 1] += sin * bulge
+        shift(q, c.HAND_TARGET + 3 * side, me.start_yaw, 0.06 * hump(up), 0.0)
         q[c.HAND_SHARE + side] = down - away
 
 
@@ -86,33 +79,27 @@ def lift(t: float, clock_s: float, me: Worker) -> None:
 def _settle_lean(me: Worker) -> None:
     """Smallest lean that brings the targets within reach; else the targets come nearer."""
     p = me.p
-    used = (me.used[0], me.used[1])
-    low, high = 0.0, MOST_LEAN
-    me.lean = 0.0
+    low, high, me.lean = 0.0, MOST_LEAN, 0.0
     for attempt in range(12):
         stand(me.start_x, me.start_y, me.start_yaw, 0.0, me)
         _extend(1.0, me)
-        far = beyond(used, me)
+        far = beyond(me)
         if attempt == 0 and far <= 0.0:
             return
-        if attempt > 0:
-            if far > 0.0:
-                low = me.lean
-            else:
-                high = me.lean
+        if far > 0.0:  # at first from `low` itself
+            low = me.lean
+        else:
+            high = me.lean
         me.lean = 0.5 * (low + high)
     me.lean = high + SPARE_LEAN
     if high < MOST_LEAN:
         return
     for side in range(2):
         upper = LEFT + SIDE_STRIDE * side + UPPER_ARM
-        target = me.target[3 * side : 3 * side + 3]
-        d = math.sqrt(
-            (target[0] - p[upper, 0]) ** 2
-            + (target[1] - p[upper, 1]) ** 2
-            + (target[2] - p[upper, 2]) ** 2
-        )
-        nearer = min(1.0, ARM_KNEE * me.size[ARM] / d)
+        target, squared = me.target[3 * side : 3 * side + 3], 0.0
+        for i in range(3):
+            squared += (target[i] - p[upper, i]) ** 2
+        nearer = min(1.0, ARM_KNEE * me.size[ARM] / math.sqrt(squared))
         for i in range(3):
             target[i] = p[upper, i] + nearer * (target[i] - p[upper, i])
 
@@ -139,8 +126,6 @@ def plan_reach(
     me.gaze_pitch = 0.25 + 0.4 * min(max(1.4 - target[2], -0.3), 0.6)
     _settle_lean(me)
     stand(me.start_x, me.start_y, me.start_yaw, 0.0, me)
-    for i in range(6):
-        me.q[c.HAND_TARGET + i] = me.target[i]
     way = max(0.1, farthest(HAND, me.target, used, me))
     me.out_s = max(1.875 * way / peak_m_s, 0.3)
     me.back_s = max(1.875 * way / min(peak_m_s, 1.2), 0.45)

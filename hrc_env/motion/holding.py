@@ -7,6 +7,7 @@ import numpy as np
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
+from hrc_env.motion.curves import placed
 from hrc_env.motion.state import Worker
 from hrc_env.worker.props import PROPS
 
@@ -22,13 +23,13 @@ N_HELD = 8
 @kernel
 def prop_pose(out: Floats, me: Worker) -> None:
     """Write what q holds and where into out (N_HELD,)."""
-    q = me.q
-    out[0] = q[c.PROP]
-    for i in range(3):
-        out[1 + i] = q[c.PROP_POSE + i] if q[c.PROP] > 0.0 else 0.0
-    yaw, pitch, roll = q[c.PROP_POSE + 3], q[c.PROP_POSE + 4], q[c.PROP_POSE + 5]
-    if q[c.PROP] == 0.0:
-        yaw = pitch = roll = 0.0
+    out[:] = 0.0
+    out[0], out[4] = me.q[c.PROP], 1.0
+    if out[0] == 0.0:
+        return
+    pose = me.q[c.PROP_POSE :]
+    yaw, pitch, roll = pose[3], pose[4], pose[5]
+    out[1], out[2], out[3] = pose[0], pose[1], pose[2]
     cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)
     cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
     cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
@@ -64,12 +65,9 @@ def hold_load(x: float, y: float, yaw: float, up: float, me: Worker) -> None:
 @kernel
 def place_load(x: float, y: float, yaw: float, up: float, me: Worker) -> None:
     """Put the load where it is of someone at (x, y) facing yaw, `up` higher than standing."""
-    q = me.q
-    cos, sin = math.cos(yaw), math.sin(yaw)
-    at = me.load_at
+    q, at = me.q, me.load_at
     q[c.PROP] = me.load_prop
-    q[c.PROP_POSE] = x + cos * at[0] - sin * at[1]
-    q[c.PROP_POSE + 1] = y + sin * at[0] + cos * at[1]
+    q[c.PROP_POSE], q[c.PROP_POSE + 1] = placed(x, y, yaw, at[0], at[1])
     q[c.PROP_POSE + 2], q[c.PROP_POSE + 3] = up + at[2], yaw + at[3]
     q[c.PROP_POSE + 4], q[c.PROP_POSE + 5] = at[4], at[5]
 
@@ -84,8 +82,10 @@ def grip_load(share: float, me: Worker) -> None:
 
 
 @kernel
-def drop_load(me: Worker) -> None:
-    """Empty hands."""
-    me.load_prop = 0
-    me.load_at[:] = me.load_grip[:] = 0.0
-    me.load_used[:] = 0.0
+def take_load(prop: int, me: Worker) -> None:
+    """Both hands hold the prop, where it is made to be held."""
+    me.load_prop = prop
+    me.load_at[:] = 0.0
+    for i in range(6):
+        me.load_grip[i] = GRIPS[prop, i // 3, i % 3]
+    me.load_used[:] = 1.0

@@ -13,12 +13,9 @@ ARM_KNEE, ARM_LIMIT = 0.97, 0.998
 """Shares of the arm's length where stretching begins to resist, and that it never passes."""
 SHOULDER_RAD = 0.22
 """How far a clavicle turns forward, and up, at most."""
-LEG_LIMIT = 0.998
-"""Share of the leg's length that a walking or standing leg uses at most (knees never lock)."""
-LEG_SOFTNESS_M = 0.05
-"""Width over which the longest possible leg takes over from the wished pelvis height."""
-
-
+LEG_LIMIT, LEG_SOFTNESS_M = 0.998, 0.05
+"""Share of its length that a leg uses at most (knees never lock), and the width over which that
+takes over from the wished height of the pelvis."""
 TARGET, POLE, HINGE, GRIP = range(22, 26)
 TURN = 22
 """Rows after the 22 segments that the kinematics work in: points and vectors, a rotation."""
@@ -143,7 +140,7 @@ def shoulder(side: int, cos: float, sin: float, me: Worker) -> None:
     q, p, r = me.q, me.p, me.r
     sign = 1.0 - 2.0 * side
     clavicle = an.LEFT + side * an.SIDE_STRIDE + an.CLAVICLE
-    upper = clavicle + an.UPPER_ARM - an.CLAVICLE
+    upper = clavicle + 1
     attach(clavicle, an.CHEST, me)
     for i in range(3):
         for j in range(3):
@@ -175,7 +172,7 @@ def arm(side: int, cos: float, sin: float, me: Worker) -> None:
     shoulder(side, cos, sin, me)
     sign = 1.0 - 2.0 * side
     upper = an.LEFT + side * an.SIDE_STRIDE + an.UPPER_ARM
-    fore, hand = upper + an.FOREARM - an.UPPER_ARM, upper + an.HAND - an.UPPER_ARM
+    fore, hand = upper + 1, upper + 2
     swivel = me.q[c.SWIVEL + side]
     level, out = math.cos(swivel), math.sin(swivel)
     back, left = -0.7 * level, sign * (0.45 * level + out)
@@ -194,11 +191,7 @@ def leg(side: int, me: Worker) -> None:
     """Hip to toes; the knee over the foot."""
     q, p, r = me.q, me.p, me.r
     thigh, ankle = an.LEFT + side * an.SIDE_STRIDE + an.THIGH, c.ANKLE + 6 * side
-    shank, foot, toes = (
-        thigh + an.SHANK - an.THIGH,
-        thigh + an.FOOT - an.THIGH,
-        thigh + an.TOES - an.THIGH,
-    )
+    shank, foot, toes = thigh + 1, thigh + 2, thigh + 3
     attach(thigh, 0, me)
     cos, sin = math.cos(q[ankle + 3]), math.sin(q[ankle + 3])
     pitched(cos, sin, q[ankle + 4], foot, me)
@@ -227,7 +220,7 @@ def pitched(cos: float, sin: float, pitch: float, s: int, me: Worker) -> None:
 
 @kernel
 def pose(me: Worker) -> None:
-    """Fill the first 22 rows of p (N_POINTS, 3) and r (N_FRAMES, 3, 3) from q."""
+    """Fill the first 22 rows of p and r from q."""
     q = me.q
     trunk(me)
     yaw = q[c.HEADING] + q[c.PELVIS_YAW] + q[c.SPINE_TWIST]

@@ -1,14 +1,14 @@
 """A way over the floor: straight lines joined by arcs, by the metres walked along it.
 
-Pieces: where each begins [m], its point, direction there [rad] (not wrapped), curvature [1/m], and
-the integral of the direction up to it [rad m].
+Pieces (rows of `path`): metres before it, x, y, direction there [rad] (not wrapped), curvature
+[1/m], integral of the direction up to it [rad m].
 """
 
 import math
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
-from hrc_env.motion.curves import wrap
+from hrc_env.motion.curves import placed, wrap
 from hrc_env.motion.state import MAX_VIA, Pair, Worker
 
 HEADING_WINDOW_M = 0.3
@@ -20,14 +20,14 @@ OWN_EDGE, SHARED_EDGE = 0.9, 0.5
 @kernel
 def lay_path(start: Pair, via: Floats, end: Pair, me: Worker) -> None:
     """Write the path past corners `via` (n, 3): x, y, and how far from it its arc may begin [m]."""
+    me.end_x, me.end_y = end
     n = min(via.shape[0], MAX_VIA)
     x, y, s, total, count = start[0], start[1], 0.0, 0.0, 0
-    me.sharpest, heading, first = 0.0, 0.0, True
+    me.sharpest = heading = 0.0
     for k in range(n + 1):
         to_x, to_y = (via[k, 0], via[k, 1]) if k < n else end
         direction = math.atan2(to_y - y, to_x - x)
-        heading = direction if first else heading + wrap(direction - heading)
-        first = False
+        heading = direction if k == 0 else heading + wrap(direction - heading)
         arm, turn = 0.0, 0.0
         if k < n:
             next_x, next_y = (via[k + 1, 0], via[k + 1, 1]) if k + 1 < n else end
@@ -36,19 +36,15 @@ def lay_path(start: Pair, via: Floats, end: Pair, me: Worker) -> None:
             own = OWN_EDGE if k == 0 else 1.0  # what the corner before has left is all its own
             arm = min(via[k, 2], own * before, (SHARED_EDGE if k + 1 < n else OWN_EDGE) * after)
         straight = max(math.hypot(to_x - x, to_y - y) - arm, 0.0)
-        piece, count = me.path[count], count + 1
-        piece[0], piece[1], piece[2] = s, x, y
-        piece[3], piece[4], piece[5] = heading, 0.0, total
-        s, total = s + straight, total + heading * straight
+        me.path[count, :] = (s, x, y, heading, 0.0, total)
+        s, total, count = s + straight, total + heading * straight, count + 1
         x, y = x + straight * math.cos(heading), y + straight * math.sin(heading)
         if arm > 1e-6 and abs(turn) > 1e-6:
             radius = arm / math.tan(0.5 * abs(turn))
             curvature, length = math.copysign(1.0 / radius, turn), radius * abs(turn)
-            piece, count = me.path[count], count + 1
-            piece[0], piece[1], piece[2] = s, x, y
-            piece[3], piece[4], piece[5] = heading, curvature, total
+            me.path[count, :] = (s, x, y, heading, curvature, total)
             me.sharpest = max(me.sharpest, 1.0 / radius)
-            s, total = s + length, total + (heading + 0.5 * turn) * length
+            s, total, count = s + length, total + (heading + 0.5 * turn) * length, count + 1
             heading += turn
             x = to_x + arm * math.cos(heading)
             y = to_y + arm * math.sin(heading)
@@ -73,10 +69,7 @@ def along(s: float, me: Worker) -> Pair:
     half = 0.5 * curvature * way
     if abs(half) > 1e-9:  # the chord of an arc
         way *= math.sin(half) / half
-    return (
-        piece[1] + way * math.cos(heading + half),
-        piece[2] + way * math.sin(heading + half),
-    )
+    return placed(piece[1], piece[2], heading + half, way, 0.0)
 
 
 @kernel

@@ -6,7 +6,7 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import ARM, FOREARM_GRIP, LEFT, SIDE_STRIDE, STAND_Z, UPPER_ARM
-from hrc_env.motion.curves import wrap
+from hrc_env.motion.curves import placed, shift, wrap
 from hrc_env.motion.kinematics import ARM_KNEE, pose
 from hrc_env.motion.state import Pair, Triple, Worker
 
@@ -14,27 +14,23 @@ STANCE_HALF_WIDTH_M = 0.10
 """Ankles' distance from the middle when standing [m]; shoulder-wide for the baked bodies."""
 TOE_OUT_RAD = 0.12
 """Feet turn out by about 7 degrees, standing and walking."""
-SWAY_HZ = (0.11, 0.17, 0.29, 0.41, 0.23)
-"""Rates of the slow sway of a standing person, incommensurable so that it does not repeat."""
-SHIFT_M = 0.018
-"""Weight shifts from leg to leg by about this much [m]; judgement."""
-RELAXED_PITCH, RELAXED_ELBOW, RELAXED_OUT = 0.02, 0.38, 0.26
-"""Hanging arms: upper arm forward, elbow bent, upper arm away from the trunk [rad]."""
-HAND_OUT_M = 0.05
-"""The hand is so much farther out than the elbow [m]: beside broad hips, too; judgement."""
+SWAY_HZ, SHIFT_M = (0.11, 0.17, 0.29, 0.41, 0.23), 0.018
+"""Rates of a standing person's sway, incommensurable; weight shifts by so much [m]; judgement."""
+RELAXED_PITCH, RELAXED_ELBOW, RELAXED_OUT, HAND_OUT_M = 0.02, 0.38, 0.26, 0.05
+"""Hanging arms: upper arm forward, elbow bent, upper arm away from the trunk [rad], and the hand
+farther out than the elbow [m]: beside broad hips, too; judgement."""
 MOST_LEAN = 1.3
 """Lean beyond which a person would step instead."""
-NECK_SHARE = 0.70
-"""Height of the eyes above the pelvis as a share of the pelvis's; from the baked bodies."""
-HEAD_SHARE = 0.75
-"""The head's share of a turn of gaze, the eyes do the rest (Freedman & Sparks 1997: 70-80 %)."""
+NECK_SHARE, HEAD_SHARE = 0.70, 0.75
+"""Height of the eyes above the pelvis as a share of the pelvis's, from the baked bodies; the head's
+share of a turn of gaze, the eyes do the rest (Freedman & Sparks 1997: 70-80 %)."""
 MOST_YAW_RAD, MOST_DOWN_RAD, MOST_UP_RAD = 1.2, 0.75, 0.75
 """How far neck and head turn from the chest; comfortable ranges, judgement."""
 
 
 @kernel
 def sway(clock_s: float, i: int, me: Worker) -> float:
-    """A slow wave of the worker's own, between -1 and 1; i in 0..4."""
+    """A slow wave of the worker's own, between -1 and 1."""
     return math.sin(2.0 * math.pi * (SWAY_HZ[i] * clock_s + me.phases[i]))
 
 
@@ -57,16 +53,10 @@ def hang(side: int, pitch: float, elbow: float, me: Worker) -> None:
 def stand(x: float, y: float, yaw: float, clock_s: float, me: Worker) -> None:
     """Fill every column but the feet: at ease at (x, y), shifting weight, looking about."""
     q = me.q
-    first, second, third = (
-        sway(clock_s, 0, me),
-        sway(clock_s, 1, me),
-        sway(clock_s, 2, me),
-    )
+    first, second, third = sway(clock_s, 0, me), sway(clock_s, 1, me), sway(clock_s, 2, me)
     fourth, fifth = sway(clock_s, 3, me), sway(clock_s, 4, me)
     side_shift, ahead = SHIFT_M * (0.7 * first + 0.3 * third), 0.006 * fourth
-    cos, sin = math.cos(yaw), math.sin(yaw)
-    q[c.ROOT_X] = x + cos * ahead - sin * side_shift
-    q[c.ROOT_Y] = y + sin * ahead + cos * side_shift
+    q[c.ROOT_X], q[c.ROOT_Y] = placed(x, y, yaw, ahead, side_shift)
     q[c.HEADING], q[c.PELVIS_Z] = yaw, me.size[STAND_Z]
     q[c.PELVIS_PITCH] = 0.02 + 0.01 * fourth
     q[c.PELVIS_ROLL] = 1.2 * side_shift
@@ -81,18 +71,14 @@ def stand(x: float, y: float, yaw: float, clock_s: float, me: Worker) -> None:
         wave = 0.04 * (third if side else fourth)
         hang(side, RELAXED_PITCH + wave, RELAXED_ELBOW + wave, me)
         q[c.HAND_SHARE + side] = 0.0
-    for i in range(6):
-        q[c.HAND_TARGET + i] = 0.0
-    q[c.PROP] = 0.0
+    q[c.HAND_TARGET : c.HAND_TARGET + 6] = q[c.PROP] = 0.0
 
 
 @kernel
 def lean(amount: float, squat: float, twist: float, me: Worker) -> None:
     """Bend the trunk forward (1: a deep bow), the pelvis going back, knees by `squat`, and turn."""
     q = me.q
-    back = (0.07 + 0.10 * squat) * amount
-    q[c.ROOT_X] -= math.cos(q[c.HEADING]) * back
-    q[c.ROOT_Y] -= math.sin(q[c.HEADING]) * back
+    shift(q, c.ROOT_X, q[c.HEADING], -(0.07 + 0.10 * squat) * amount, 0.0)
     q[c.PELVIS_Z] -= (0.03 + 0.28 * squat) * amount
     q[c.PELVIS_PITCH] += (0.62 - 0.12 * squat) * amount
     q[c.SPINE_FLEX] += (0.72 - 0.25 * squat) * amount
@@ -102,8 +88,9 @@ def lean(amount: float, squat: float, twist: float, me: Worker) -> None:
 
 
 @kernel
-def beyond(used: Pair, me: Worker) -> float:
-    """How far the targets lie beyond what the used arms reach from this posture [m]."""
+def beyond(me: Worker) -> float:
+    """How far the targets in q lie beyond what the used arms reach from this posture [m]."""
+    used = (me.q[c.HAND_SHARE], me.q[c.HAND_SHARE + 1])
     far = farthest(UPPER_ARM, me.q[c.HAND_TARGET :], used, me)
     return max(far - ARM_KNEE * me.size[ARM], -1.0)
 
@@ -125,8 +112,15 @@ def farthest(segment: int, goals: Floats, used: Pair, me: Worker) -> float:
 @kernel
 def from_here(at: Triple, me: Worker) -> Triple:
     """A point ahead, left [m] of where the worker stands, at a height, in the world."""
-    cos, sin = math.cos(me.start_yaw), math.sin(me.start_yaw)
-    return me.start_x + cos * at[0] - sin * at[1], me.start_y + sin * at[0] + cos * at[1], at[2]
+    x, y = placed(me.start_x, me.start_y, me.start_yaw, at[0], at[1])
+    return x, y, at[2]
+
+
+@kernel
+def from_root(ahead: float, left: float, me: Worker) -> Pair:
+    """A point of the floor so far ahead and left of the root [m], as q has it."""
+    q = me.q
+    return placed(q[c.ROOT_X], q[c.ROOT_Y], q[c.HEADING], ahead, left)
 
 
 @kernel

@@ -1,7 +1,7 @@
 """What workers notice of the robot: they pause, or take their hands away and step back.
 
-Hands pause by their activity's time coming to a halt, and are taken away by its going backwards;
-walkers brake. What they would do, and how late, is drawn when an activity begins.
+Hands pause or are taken away by their activity's time halting or going backwards; walkers brake.
+What they would do, and how late, is drawn when an activity begins.
 """
 
 import math
@@ -19,7 +19,7 @@ from hrc_env.motion.walk import brake
 BODY_POINTS = (CHEST, HEAD, LEFT + HAND, LEFT + SIDE_STRIDE + HAND)
 """Segments that people guard."""
 WITHDRAW = -1.6
-"""Hands come back so much faster than they went."""
+"""Pace at which hands come back."""
 People = Triple
 """`PeopleConfig.notice_m`, `.fast_m_s`, `.calm_s`."""
 
@@ -71,14 +71,14 @@ def _react(w: int, workers: Workers) -> None:
     """Do what worker w does about the robot, if what they are at allows it."""
     me = workers[w]
     kind = me.activity
-    upright = kind <= st.REACH or kind == st.LOOK_ROUND or st.HAMMER <= kind <= st.POINT
+    upright = kind == st.REACH or kind in st.IDLE or st.HAMMER <= kind <= st.POINT
     if goes(kind):
-        if (kind == st.WALK or kind == st.CARRY) and _brake(w, workers):
+        if kind in (st.WALK, st.CARRY) and _brake(w, workers):
             me.doing = st.PAUSE
             me.doing_until = me.clock_s + me.duration_s - me.time_s + me.reaction_s
     elif me.reaction == st.BACK_AWAY and upright:
         me.doing = st.BACK_AWAY
-        if kind == st.STAND or kind == st.LOOK_ROUND:
+        if kind in st.IDLE:
             me.duration_s = me.time_s
         else:
             me.pace_wished = WITHDRAW

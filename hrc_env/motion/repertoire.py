@@ -1,34 +1,29 @@
 """Everything that workers can do, in scenes of one or a few activities: for reports, pictures."""
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hrc_env.core.kernels import kernel
-from hrc_env.core.records import Held, WorkerMotion
+from hrc_env.core.records import WorkerMotion
 from hrc_env.core.typing import Floats
-from hrc_env.motion import controls as c
 from hrc_env.motion import state as st
 from hrc_env.motion.activities.going import CART, WHEELBARROW, start_turn
 from hrc_env.motion.activities.loads import BOARD, BOX, finish_lift, plan_pick_up
 from hrc_env.motion.anatomy import anatomy
-from hrc_env.motion.blending import RATE_H_S, evaluate, settle, stop
+from hrc_env.motion.blending import settle, stop
+from hrc_env.motion.curves import placed
 from hrc_env.motion.feet import feet
-from hrc_env.motion.holding import N_HELD, drop_load, prop_pose
-from hrc_env.motion.kinematics import pose, quaternion
+from hrc_env.motion.generator import bodies_of
+from hrc_env.motion.paths import lay_path
 from hrc_env.motion.starting import STARTS, Start, start_going
-from hrc_env.motion.state import N_START, WORKER, Place, Worker
-from hrc_env.worker.body import N_SEGMENTS, Body
+from hrc_env.motion.state import N_START, WORKER, Worker
+from hrc_env.worker.body import Body
 
 Act = tuple[int, Start, float]
 """An activity, what begins it, the height of its place [m]."""
-NO_CORNERS = np.zeros((0, 3))
 AWAY_M, FAR_M = 3.0, 8.0
-"""How far those who go somewhere go, and how long the walks are that are measured [m]."""
-LIGHT_DRAW = 2
-"""Which draw of `plan_hammer` decides between taps and blows."""
+"""Length of a way, and of the walks that are measured [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,81 +58,52 @@ def perform(acts: Sequence[Act], me: Worker, rng: np.random.Generator, dt_s: flo
     """Films of acts in their order, at intervals of dt_s; the worker stands where they end."""
     films, clock_s = [], 10.0 * float(rng.random())
     for activity, start, height_m in acts:
-        place = (float(me["start_x"]), float(me["start_y"]), float(me["start_yaw"]), height_m)
         me["activity"] = activity
-        lasts_s = start(rng.random(N_START), place, me)
+        lasts_s = start(rng.random(N_START), height_m, me)
         films.append(_film(me, np.arange(0.0, lasts_s, dt_s), clock_s))
         stop(me)
-        if activity in st.GIVING or activity == st.PUSH:
-            drop_load(me)
         feet(0.0, me)
         clock_s += lasts_s
     return films
 
 
 def _film(me: Worker, time_s: Floats, clock_s: float) -> Film:
-    """The worker at the times (T,) of an activity that began at a clock."""
-    controls = np.empty((len(time_s), c.N_CONTROLS))
-    place, turn = np.empty((len(time_s), N_SEGMENTS, 3)), np.empty((len(time_s), N_SEGMENTS, 4))
-    rate, held = np.empty_like(place), np.empty((len(time_s), N_HELD))
-    _fill(clock_s, time_s, controls, place, turn, rate, held, me)
-    things = Held(held[:, None, 0].astype(int), held[:, None, 1:4], held[:, None, 4:])
-    spin = np.zeros_like(rate)[:, None]
-    motion = WorkerMotion(place[:, None], turn[:, None], rate[:, None], spin, things)
-    return Film(int(me["activity"]), time_s, controls, motion, me.copy())
-
-
-@kernel(makes_arrays=True)
-def _fill(
-    clock_s: float, time_s: Floats, controls: Floats, place: Floats, turn: Floats, rate: Floats,
-    held: Floats, me: Worker,
-) -> None:  # fmt: skip
-    """Fill the arrays of a film."""
-    frames = np.zeros((1, 1))
-    for k in range(len(time_s)):
-        for i in range(1, -1, -1):
-            t = time_s[k] + i * RATE_H_S
-            evaluate(t, clock_s + time_s[k] + i * RATE_H_S, frames, me)
-            pose(me)
-            if i == 1:
-                me.later_p = me.p
-        controls[k] = me.q
-        for s in range(place.shape[1]):
-            for i in range(3):
-                place[k, s, i] = me.p[s, i]
-                rate[k, s, i] = (me.later_p[s, i] - me.p[s, i]) / RATE_H_S
-            quaternion(me.r, s, turn[k])
-        prop_pose(held[k], me)
+    """The worker at times (T,) of an activity begun at a clock; without angular velocities."""
+    moments = np.full((len(time_s), 1), me, WORKER)
+    moments["time_s"][:, 0], moments["clock_s"][:, 0] = time_s, clock_s + time_s
+    motion = bodies_of(moments, np.zeros((1, 1)))
+    motion = replace(motion, angular_velocity_world=np.zeros_like(motion.velocity_world), body=None)
+    return Film(int(me["activity"]), time_s, moments["q"][:, 0].copy(), motion, me.copy())
 
 
 def _going(activity: int, speed_m_s: float = 1.1, prop: int = 0, way_m: float = AWAY_M) -> Act:
     """Go some way ahead."""
 
-    def start(draws: Floats, place: Place, me: Worker) -> float:
-        x, y, yaw, z = place
-        ahead = x + way_m * math.cos(yaw), y + way_m * math.sin(yaw), yaw, z
-        return start_going(activity, draws, ahead, NO_CORNERS, speed_m_s, prop, me)
+    def start(draws: Floats, height_m: float, me: Worker) -> float:
+        x, y, yaw = (float(me[name]) for name in ("start_x", "start_y", "start_yaw"))
+        lay_path((x, y), np.zeros((0, 3)), placed(x, y, yaw, way_m, 0.0), me)
+        return start_going(activity, draws, yaw, speed_m_s, prop, me)
 
     return activity, start, 0.0
 
 
 def _hammer(lightly: bool, height_m: float) -> tuple[Act]:
-    def start(draws: Floats, place: Place, me: Worker) -> float:
+    def start(draws: Floats, height_m: float, me: Worker) -> float:
         chosen = draws.copy()
-        chosen[LIGHT_DRAW] = 0.0 if lightly else 1.0
-        return STARTS[st.HAMMER](chosen, place, me)
+        chosen[2] = 0.0 if lightly else 1.0  # which decides between taps and blows
+        return STARTS[st.HAMMER](chosen, height_m, me)
 
     return ((st.HAMMER, start, height_m),)
 
 
-def _turn(draws: Floats, place: Place, me: Worker) -> float:
+def _turn(draws: Floats, height_m: float, me: Worker) -> float:
     turn = (1.0 if draws[0] < 0.5 else -1.0) * (0.8 + 2.0 * draws[1])
-    return start_turn((place[0], place[1], place[2] + turn, 0.0), me)
+    return start_turn(float(me["start_yaw"]) + turn, me)
 
 
 def _take(prop: int, on_shoulder: bool, height_m: float) -> Act:
-    def start(draws: Floats, place: Place, me: Worker) -> float:
-        return finish_lift(plan_pick_up(draws, place, prop, on_shoulder, me), me)
+    def start(draws: Floats, height_m: float, me: Worker) -> float:
+        return finish_lift(plan_pick_up(draws, height_m, prop, on_shoulder, me), me)
 
     return st.PICK_UP, start, height_m
 
@@ -146,7 +112,7 @@ def _here(activity: int, height_m: float = 0.0) -> tuple[Act]:
     return ((activity, STARTS[activity], height_m),)
 
 
-def _stand(draws: Floats, place: Place, me: Worker) -> float:
+def _stand(draws: Floats, height_m: float, me: Worker) -> float:
     return 4.0
 
 
@@ -156,11 +122,7 @@ REPERTOIRE: dict[str, tuple[Act, ...]] = {
     "stand": ((st.STAND, _stand, 0.0),),
     "look round": _here(st.LOOK_ROUND),
     "point": _here(st.POINT),
-    "walk 0.8 m/s": (_going(st.WALK, 0.8, way_m=FAR_M),),
-    "walk 1.1 m/s": (_going(st.WALK, 1.1, way_m=FAR_M),),
-    "walk 1.3 m/s": (_going(st.WALK, 1.3, way_m=FAR_M),),
-    "walk 1.4 m/s": (_going(st.WALK, 1.4, way_m=FAR_M),),
-    "walk 1.8 m/s": (_going(st.WALK, 1.8, way_m=FAR_M),),
+    **{f"walk {v} m/s": (_going(st.WALK, v, way_m=FAR_M),) for v in (0.8, 1.1, 1.3, 1.4, 1.8)},
     "turn": ((st.TURN, _turn, 0.0),),
     "step back": _here(st.STEP_BACK),
     "stumble": (_going(st.STUMBLE, 1.2),),

@@ -1,6 +1,4 @@
-"""Ways round what stands there and other people: A* on a grid (Hart, Nilsson and Raphael 1968),
-pulled tight; corners are where a pulled string would touch, and arcs round them (`paths`).
-"""
+"""Ways round things and people: A* on a grid (Hart, Nilsson and Raphael 1968), pulled tight."""
 
 import heapq
 import math
@@ -12,16 +10,14 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.motion.floorplan import CELL_M, slack_at
 from hrc_env.motion.paths import along, lay_path
-from hrc_env.motion.state import Pair, Worker
+from hrc_env.motion.state import MAX_VIA, Pair, Worker
 
-STRIDE = 3
-"""Grid points of the field to a node of the search: 15 cm."""
+STRIDE, SAMPLE_M = 3, 0.06
+"""Grid points of the field to a node of the search: 15 cm; lines are looked at in such steps."""
 EASE_M = 0.7
 """So near its ends a way may be as near to things as its ends are [m]."""
 SEARCHED_M, PULLED_M, WALKED_M = 0.05, 0.03, -0.02
 """Slack that nodes, straight lines and the arcs at last must have [m]."""
-SAMPLE_M = 0.06
-"""Lines are looked at in steps of this length [m]."""
 ARMS_M = (1.2, 0.7, 0.35, 0.15, 0.02)
 """How far before a corner an arc begins at most [m], tried in turn."""
 BOW_SHARE = 0.12
@@ -34,10 +30,10 @@ class Ground(NamedTuple):
     ends: Floats
     """(2, 3) x, y and slack of the way's ends."""
     discs: Floats
-    """(n, 3) x, y, radius of what is in the way for now, people above all."""
+    """(n, 3) x, y, radius of what is in the way for now."""
     slack: Floats
     origin: Floats
-    """The field of a `Floorplan`."""
+    """Of a `Floorplan`."""
 
 
 @kernel
@@ -45,11 +41,10 @@ def roomy(x: float, y: float, margin: float, ground: Ground) -> bool:
     """Whether a point of a way is free, with `margin` [m] of slack far from the ends."""
     need = margin
     for k in range(2):
-        if ground.ends[k, 2] < margin:
+        own = ground.ends[k, 2]
+        if own < margin:
             away = math.hypot(x - ground.ends[k, 0], y - ground.ends[k, 1]) / EASE_M
-            need = min(
-                need, ground.ends[k, 2] - 0.005 + (margin - ground.ends[k, 2]) * min(away, 1.0)
-            )
+            need = min(need, own - 0.005 + (margin - own) * min(away, 1.0))
     if slack_at(x, y, ground.slack, ground.origin) < need:
         return False
     for k in range(ground.discs.shape[0]):
@@ -72,15 +67,13 @@ def clear(x0: float, y0: float, x1: float, y1: float, margin: float, ground: Gro
 
 @kernel(makes_arrays=True)
 def route(
-    start: Pair, end: Pair, bow: float, discs: Floats,
-    slack: Floats, origin: Floats, via: Floats, me: Worker,
-) -> int:  # fmt: skip
-    """Find a way and lay the path; the number of its corners `via` (MAX_VIA, 3), -1: there is none.
+    start: Pair, end: Pair, bow: float, discs: Floats, slack: Floats, origin: Floats, me: Worker
+) -> bool:
+    """Find a way and lay the path, if there is one; whether there is.
 
-    `bow` in [-1, 1] is how a free way bends; discs (n, 3), x, y, radius, are kept away from, but
-    give way where they hold an end; slack and origin are a `Floorplan`'s field.
+    `bow` in [-1, 1] is how a free way bends; discs (n, 3), x, y, radius, give way to its ends.
     """
-    ends, own = np.empty((2, 3)), discs.copy()
+    ends, own, via = np.empty((2, 3)), discs.copy(), np.empty((MAX_VIA, 3))
     for k in range(2):
         x, y = start if k == 0 else end
         ends[k, 0], ends[k, 1], ends[k, 2] = x, y, slack_at(x, y, slack, origin)
@@ -92,19 +85,17 @@ def route(
         via[0, 1] = 0.5 * (start[1] + end[1]) + BOW_SHARE * bow * (end[0] - start[0])
         via[0, 2] = 9.0
         lay_path(start, via[:1], end, me)
-        if walkable(ground, me):
-            return 1
-        lay_path(start, via[:0], end, me)
-        return 0
+        if not walkable(ground, me):
+            lay_path(start, via[:0], end, me)
+        return True
     n = _search(start, end, ground, via)
-    if n < 0:
-        return -1
     for arm in ARMS_M:
-        via[:n, 2] = arm
-        lay_path(start, via[:n], end, me)
-        if walkable(ground, me):
-            return n
-    return -1
+        if n >= 0:
+            via[:n, 2] = arm
+            lay_path(start, via[:n], end, me)
+            if walkable(ground, me):
+                return True
+    return False
 
 
 @kernel
@@ -137,7 +128,6 @@ def _search(start: Pair, end: Pair, ground: Ground, via: Floats) -> int:
                 cost[node] = math.hypot(x - start[0], y - start[1])
                 state[node] = 1
                 heapq.heappush(queue, (cost[node] + math.hypot(end[0] - x, end[1] - y), node))
-    goal = -1
     while len(queue) > 0:
         _, node = heapq.heappop(queue)
         if state[node] == 3:
@@ -147,25 +137,17 @@ def _search(start: Pair, end: Pair, ground: Ground, via: Floats) -> int:
         x, y = origin[0] + i * h, origin[1] + j * h
         near = math.hypot(end[0] - x, end[1] - y) < 2.0 * h
         if near and clear(x, y, end[0], end[1], PULLED_M, ground):
-            goal = node
-            break
-        for di in range(-1, 2):
-            for dj in range(-1, 2):
-                a, b = i + di, j + dj
-                if a < 0 or b < 0 or a >= n_x or b >= n_y:
-                    continue
-                other = a * n_y + b
-                ox, oy = origin[0] + a * h, origin[1] + b * h
+            return _pull(node, parent, n_y, start, end, ground, via)
+        for a in range(max(i - 1, 0), min(i + 2, n_x)):
+            for b in range(max(j - 1, 0), min(j + 2, n_y)):
+                other, x, y = a * n_y + b, origin[0] + a * h, origin[1] + b * h
                 if state[other] == 0:
-                    free = roomy(ox, oy, SEARCHED_M, ground)
-                    state[other] = 1 if free else 2
-                longer = cost[node] + h * math.hypot(di, dj)
+                    state[other] = 1 if roomy(x, y, SEARCHED_M, ground) else 2
+                longer = cost[node] + h * math.hypot(a - i, b - j)
                 if state[other] == 1 and longer < cost[other] - 1e-9:
                     cost[other], parent[other] = longer, node
-                    heapq.heappush(queue, (longer + math.hypot(end[0] - ox, end[1] - oy), other))
-    if goal < 0:
-        return -1
-    return _pull(goal, parent, n_y, start, end, ground, via)
+                    heapq.heappush(queue, (longer + math.hypot(end[0] - x, end[1] - y), other))
+    return -1
 
 
 @kernel

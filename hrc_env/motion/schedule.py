@@ -1,6 +1,7 @@
 """What workers do, one thing after another: a small graph of jobs at kinds of workplaces."""
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from hrc_env.core.errors import ConfigError, unknown
@@ -8,10 +9,8 @@ from hrc_env.core.records import WORKPLACE_KINDS
 from hrc_env.motion.state import ACTIVITY_NAMES
 from hrc_env.worker.props import PROP_NAMES
 
-HERE = "here"
-"""As a kind of place: wherever the worker is."""
-ROUTES = ("walk", "push")
-"""How workers go to a job."""
+HERE, ROUTES = "here", ("walk", "push")
+"""As a kind of place: wherever the worker is; how workers go to a job."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,7 +19,7 @@ class Job:
 
     name: str
     activity: str
-    """One of `plans.ACTIVITY_NAMES`."""
+    """One of `state.ACTIVITY_NAMES`."""
     at: str
     """Kind of workplace (`WORKPLACE_KINDS`), or "here"."""
     then: tuple[tuple[str, float], ...] = ()
@@ -113,27 +112,24 @@ class Schedule:
     """How errands elsewhere begin, with running shares; empty where there is nowhere else."""
 
 
-def schedule_at(jobs: Sequence[Job], kinds: Sequence[str]) -> Schedule:
+def schedule_at(jobs: Sequence[Job], kinds: Collection[str]) -> Schedule:
     """The jobs that can be done at these kinds of places; places at the robot always are."""
-    there = {*kinds, "robot", HERE}
-    kept = tuple(job for job in jobs if job.at in there)
+    kept = tuple(job for job in jobs if job.at in (*kinds, "robot", HERE))
     index = {job.name: k for k, job in enumerate(kept)}
     then = tuple(
         _shares([(index[name], weight) for name, weight in job.then if name in index])
         for job in kept
     )
     robot = next(k for k, job in enumerate(kept) if job.at == "robot")
-    return Schedule(kept, then, robot, _shares([(index[job.name], job.begins) for job in kept]))
+    begins = [(index[job.name], job.begins) for job in kept if job.begins > 0.0]
+    return Schedule(kept, then, robot, _shares(begins))
 
 
 def _shares(weights: list[tuple[int, float]]) -> tuple[tuple[int, float], ...]:
-    """Weights as running shares of their sum; those of weight 0 are left out."""
-    total, running, shares = sum(weight for _, weight in weights), 0.0, []
-    for k, weight in weights:
-        if weight > 0.0:
-            running += weight / total
-            shares.append((k, running))
-    return tuple(shares)
+    """Weights as running shares of their sum."""
+    total = sum(weight for _, weight in weights)
+    running = itertools.accumulate(weight / total for _, weight in weights)
+    return tuple((k, share) for (k, _), share in zip(weights, running, strict=True))
 
 
 def picked(shares: tuple[tuple[int, float], ...], draw: float) -> int:

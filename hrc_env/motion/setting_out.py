@@ -13,25 +13,24 @@ from hrc_env.motion.floorplan import slack_at
 from hrc_env.motion.routes import route
 from hrc_env.motion.schedule import HERE
 from hrc_env.motion.starting import start_going, start_here
-from hrc_env.motion.state import MAX_VIA, N_START, THERE, UNDER_WAY, Place
+from hrc_env.motion.state import N_START, THERE, UNDER_WAY, Place
 from hrc_env.motion.traffic import APART_M, meets
 from hrc_env.worker.props import prop_index
 
 WISHED_CLIP, WHICH_CLIP = N_START - 2, N_START - 1
 """Of an activity's own draws: whether to play a clip instead of it, and which."""
-ARRIVED_M = 0.12
-"""So near to a place a worker is there [m]."""
-HURRY = (1.0, 0.75)
-"""Shares of their pace at which walkers try to get past each other."""
+ARRIVED_M, HURRY = 0.12, (1.0, 0.75)
+"""So near to a place a worker is there [m]; shares of their pace at which walkers set out."""
 STUMBLE_TO = ("robot", "open", "floor")
-"""Kinds of places with room ahead for the arms of somebody who stumbles."""
+"""Kinds of places with room ahead for the arms of who stumbles."""
+Begun = tuple[int, float] | None
+"""The activity that was begun and how long it takes [s]; None: it cannot be."""
 
 
-def go(who: Decision) -> tuple[int, float] | None:
+def go(who: Decision) -> Begun:
     """Begin to walk to a place of the job, if there is a free one and a free way to it."""
     mind, job, me = who.mind, who.job, who.me
     for place in wished(who):
-        me["end_x"], me["end_y"] = place[:2]
         obstacles = in_the_way(who)
         for share in HURRY:
             begun = _set_out(who, place, obstacles, share)
@@ -51,15 +50,12 @@ def go(who: Decision) -> tuple[int, float] | None:
     return None
 
 
-def _set_out(
-    who: Decision, place: Place, obstacles: Floats, share: float
-) -> tuple[int, float] | None:
+def _set_out(who: Decision, place: Place, obstacles: Floats, share: float) -> Begun:
     """Plan to go to a place round obstacles (n, 3) at a share of one's pace, if there is a way."""
     mind, me = who.mind, who.me
     start, end = (float(me["start_x"]), float(me["start_y"])), (place[0], place[1])
-    via, bow = np.empty((MAX_VIA, 3)), 2.0 * who.draws.item(BOW) - 1.0
-    n = route(start, end, bow, obstacles, mind.plan.slack, mind.plan.origin, via, me)
-    if n < 0:
+    bow = 2.0 * who.draws.item(BOW) - 1.0
+    if not route(start, end, bow, obstacles, mind.plan.slack, mind.plan.origin, me):
         return None
     activity, prop = st.WALK, 0
     stumbles = who.draws[EVENT] > 1.0 - mind.config.people.stumble_probability
@@ -70,16 +66,15 @@ def _set_out(
     elif who.job.at in STUMBLE_TO and stumbles:
         activity = st.STUMBLE
     pace = share * float(me["speed_m_s"])
-    return activity, start_going(activity, who.draws, place, via[:n], pace, prop, me)
+    return activity, start_going(activity, who.draws, place[2], pace, prop, me)
 
 
-def step_back(who: Decision) -> tuple[int, float] | None:
+def step_back(who: Decision) -> Begun:
     """Begin to step back, if there is room behind."""
     if who.loaded:
         return None
     plan, me = who.mind.plan, who.me
-    nowhere, nobody = (0.0, 0.0, 0.0, 0.0), np.zeros((0, 2))
-    lasts = start_here(st.STEP_BACK, who.draws, nowhere, False, nobody, 0, who.mind.numbers, me)
+    lasts = start_here(who, st.STEP_BACK, 0.0)
     room = slack_at(float(me["end_x"]), float(me["end_y"]), plan.slack, plan.origin)
     if room < 0.0 or meets_somebody(who, st.STEP_BACK, lasts)[0] >= 0.0:
         stay(who)
@@ -112,7 +107,7 @@ def meets_somebody(who: Decision, activity: int, lasts: float) -> tuple[float, f
     return meets(who.w, who.workers)
 
 
-def play(who: Decision) -> tuple[int, float] | None:
+def play(who: Decision) -> Begun:
     """Begin to play a clip, if it is wished and there is room; after one follows the next."""
     mind, me, n_clips = who.mind, who.me, len(who.mind.clips.count)
     was_clip = me["activity"] == st.CLIP

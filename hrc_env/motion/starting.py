@@ -6,88 +6,77 @@ from collections.abc import Callable
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
 from hrc_env.motion import state as st
+from hrc_env.motion.activities import loads
 from hrc_env.motion.activities import work_plans as wp
 from hrc_env.motion.activities.climb import start_climb, start_look_round
-from hrc_env.motion.activities.going import start_push, start_step_back, start_stumble, start_walk
-from hrc_env.motion.activities.loads import (
-    finish_lift,
-    plan_hand_over,
-    plan_pick_up,
-    plan_receive,
-    plan_set_down,
-)
+from hrc_env.motion.activities.going import start_push, start_step_back, start_stumble
 from hrc_env.motion.activities.planning import between, finish
 from hrc_env.motion.config import Numbers
 from hrc_env.motion.curves import wrap
+from hrc_env.motion.decision import Decision
 from hrc_env.motion.feet import feet
 from hrc_env.motion.hands import plan_lift, plan_reach
-from hrc_env.motion.state import Pair, Place, Triple, Worker
+from hrc_env.motion.posture import from_here
+from hrc_env.motion.state import Pair, Triple, Worker
+from hrc_env.motion.walk import plan_walk
+from hrc_env.worker.props import prop_index
 
-BODY_M = 0.36
-"""Hands reach no nearer to their own root than this [m]."""
-OWN_SIDE_M = 0.30
-"""Hands keep so far from the middle between their worker and another [m]."""
+BODY_M, OWN_SIDE_M = 0.36, 0.30
+"""Hands keep so far from their own root, and from the middle to another worker [m]."""
 
 
 def start_going(
-    activity: int, draws: Floats, place: Place, via: Floats, pace_m_s: float, prop: int, me: Worker
+    activity: int, draws: Floats, end_yaw: float, pace_m_s: float, prop: int, me: Worker
 ) -> float:
-    """Start to walk, carry, push or stumble to a place past corners via (n, 3); how long [s]."""
+    """Start to walk, carry, push or stumble along the path that is laid; how long [s]."""
     if activity == st.PUSH:
-        return start_push(place, via, pace_m_s, prop, me)
+        return start_push(end_yaw, pace_m_s, prop, me)
     if activity == st.STUMBLE:
-        return start_stumble(draws, place, via, pace_m_s, me)
-    return start_walk(place, via, pace_m_s, me)
+        return start_stumble(draws, end_yaw, pace_m_s, me)
+    return plan_walk(end_yaw, pace_m_s, me)
 
 
-Start = Callable[[Floats, Place, Worker], float]
-"""Begins an activity at a place from N_START draws in [0, 1); how long it lasts [s]."""
+Start = Callable[[Floats, float, Worker], float]
+"""Begins an activity from N_START draws in [0, 1) at a height [m]; how long it lasts [s]."""
 
 
 def _work(plan: Start) -> Start:
-    """Work in place that is planned so."""
-    return lambda draws, place, me: finish(plan(draws, place, me), me)
+    return lambda draws, height, me: finish(plan(draws, height, me), me)
 
 
 def _load(plan: Start) -> Start:
-    """The way of a load that is planned so."""
-    return lambda draws, place, me: finish_lift(plan(draws, place, me), me)
+    return lambda draws, height, me: loads.finish_lift(plan(draws, height, me), me)
 
 
 STARTS: dict[int, Start] = {
     st.LOOK_ROUND: start_look_round, st.CLIMB: start_climb, st.STEP_BACK: start_step_back,
-    st.SET_DOWN: _load(plan_set_down), st.HAND_OVER: _load(plan_hand_over),
-    st.RECEIVE: _load(plan_receive), st.HAMMER: _work(wp.plan_hammer),
+    st.SET_DOWN: _load(loads.plan_set_down), st.HAND_OVER: _load(loads.plan_hand_over),
+    st.RECEIVE: _load(loads.plan_receive), st.HAMMER: _work(wp.plan_hammer),
     st.DRILL: _work(wp.plan_drill), st.OVERHEAD: _work(wp.plan_drill), st.SAW: _work(wp.plan_saw),
     st.MEASURE: _work(wp.plan_measure), st.POINT: _work(wp.plan_point),
     st.SQUATTING: _work(wp.plan_squat), st.KNEELING: _work(wp.plan_kneel),
     st.LUNGE: _work(wp.plan_lunge),
 }  # fmt: skip
-"""What is begun where the worker stands, by activity: each compiled by itself and when it is first
-wanted. A kernel that calls all of them would be compiled with all of them, a minute."""
+"""What is begun where the worker stands: each compiled by itself when it is first wanted."""
 
 
-def start_here(
-    activity: int, draws: Floats, place: Place, near: bool, others: Floats, prop: int,
-    config: Numbers, me: Worker,
-) -> float:  # fmt: skip
-    """Start an activity where the worker stands; how long it takes [s], 0 of standing.
-
-    Hands reach into the robot's workspace if `near`, and stay on the worker's own side of the
-    middle to others (n, 2); `prop` is what is picked up; of the place the height counts.
-    """
+def start_here(who: Decision, activity: int, height: float) -> float:
+    """Start an activity where the worker stands; how long it takes [s], 0 of standing."""
+    draws, config, me = who.draws, who.mind.numbers, who.me
     feet(0.0, me)
     if activity == st.REACH:
-        return start_reach(draws, config, near, place[3], others, me)
+        others = who.workers["spot"][who.others(), :2]
+        return start_reach(draws, config, who.kind_here == "robot", height, others, me)
     if activity == st.LIFT:
         return start_lift(draws, config, me)
     if activity == st.PICK_UP:
-        return finish_lift(plan_pick_up(draws, place, prop, bool(draws[8] < 0.5), me), me)
+        prop, on_shoulder = prop_index(who.job.prop), bool(draws[8] < 0.5)
+        return loads.finish_lift(loads.plan_pick_up(draws, height, prop, on_shoulder, me), me)
     if activity == st.DRILL:  # below the head, and above it for drilling overhead
-        place = (*place[:3], min(place[3], wp.OVERHEAD_M - 0.1))
+        height = min(height, wp.OVERHEAD_M - 0.1)
     elif activity == st.OVERHEAD:
-        place = (*place[:3], max(place[3], wp.OVERHEAD_M + 0.1))
-    return STARTS[activity](draws, place, me) if activity in STARTS else 0.0
+        height = max(height, wp.OVERHEAD_M + 0.1)
+    return STARTS[activity](draws, height, me) if activity in STARTS else 0.0
 
 
 @kernel
@@ -107,19 +96,16 @@ def own_side(x: float, y: float, others: Floats, me: Worker) -> Pair:
 
 @kernel
 def _target(draws: Floats, config: Numbers, near: bool, height: float, me: Worker) -> Triple:
-    """A world point for the hands: in the robot's workspace, or ahead of the worker."""
+    """A world point for the hands: in the robot's workspace if `near`, else ahead."""
     z = between(draws[3], *config.target_z_m)
-    x, y = me.start_x, me.start_y
     if not near:
-        z = max(z, height)
-        ahead, left = 0.36 + 0.3 * draws[1], 0.7 * (draws[2] - 0.5)
-        cos, sin = math.cos(me.start_yaw), math.sin(me.start_yaw)
-        return x + cos * ahead - sin * left, y + sin * ahead + cos * left, z
+        return from_here((0.36 + 0.3 * draws[1], 0.7 * (draws[2] - 0.5), max(z, height)), me)
     bx, by = config.robot_xy_m
-    own = math.hypot(x - bx, y - by)
+    dx, dy = me.start_x - bx, me.start_y - by
+    farthest = math.hypot(dx, dy) - BODY_M
     low, high = config.target_radius_m
-    radius = between(draws[1], min(low, own - BODY_M), min(high, own - BODY_M))
-    azimuth = math.atan2(y - by, x - bx) + config.target_spread_rad * (2.0 * draws[2] - 1.0)
+    radius = between(draws[1], min(low, farthest), min(high, farthest))
+    azimuth = math.atan2(dy, dx) + config.target_spread_rad * (2.0 * draws[2] - 1.0)
     return bx + radius * math.cos(azimuth), by + radius * math.sin(azimuth), z
 
 

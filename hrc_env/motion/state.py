@@ -1,8 +1,7 @@
 """The state of the workers' motion: one structured array, rows are environments and workers.
 
-Metres, seconds, radians. Kernels take one worker's record (`Worker`) and read and write its fields.
-Fields below "The activity's plan" are written when an activity begins (`activities`), and its
-closed form reads them.
+Metres, seconds, radians. Kernels take one worker's record (`Worker`). The fields of `_PLAN` are
+written when an activity begins (`activities`), and its closed form reads them.
 """
 
 from typing import Any, TypeAlias
@@ -13,10 +12,9 @@ from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import N_SIZES
 from hrc_env.worker.body import N_SEGMENTS
 
-MAX_VIA, N_ROOTS = 8, 48
-"""Most corners of a path; moments at which a clip's root is noted."""
-MAX_STEPS = 72
-"""Most steps of one walk: 30 m at the pace of 0.8 m/s, and turns at its ends."""
+MAX_VIA, MAX_STEPS, N_ROOTS = 8, 72, 48
+"""Most corners of a path, and steps of one walk: 30 m at 0.8 m/s, and turns at its ends; moments
+at which a clip's root is noted."""
 N_POINTS, N_FRAMES = N_SEGMENTS + 4, N_SEGMENTS + 1
 """Rows that the kinematics work in: the segments', then some of their own (`kinematics`)."""
 
@@ -119,7 +117,7 @@ ACTIVITY_NAMES = (
     "look round", "pick up", "set down", "hand over", "receive", "squat", "kneel", "hammer",
     "drill", "drill overhead", "saw", "measure", "point", "lunge", "climb", "clip",
 )  # fmt: skip
-GOING = (WALK, TURN, CARRY, STUMBLE, STEP_BACK)
+GOING, IDLE = (WALK, TURN, CARRY, STUMBLE, STEP_BACK), (STAND, LOOK_ROUND)
 TAKING, GIVING = (PICK_UP, RECEIVE), (SET_DOWN, HAND_OVER)
 """Activities that share a closed form."""
 NOWHERE = -1

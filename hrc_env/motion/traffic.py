@@ -1,13 +1,11 @@
-"""Who is where when: nobody begins what meets somebody on theirs, so everybody stays clear.
-
-Motion is a closed form of time until the activity ends; then workers stay where it ended.
-"""
+"""Who is where when: nobody begins what meets somebody on theirs, so everybody stays clear."""
 
 import math
 
 from hrc_env.core.kernels import kernel
 from hrc_env.motion import state as st
 from hrc_env.motion.activities.playing import clip_root
+from hrc_env.motion.curves import placed
 from hrc_env.motion.paths import along
 from hrc_env.motion.state import Pair, Triple, Worker, Workers
 from hrc_env.motion.walk import travelled
@@ -16,10 +14,8 @@ APART_M = 0.80
 """Roots keep so far from each other [m]: two half widths of people with arms, and some."""
 AHEAD_M, HANDS_M = 0.48, 0.76
 """Who works has hands and head so far ahead [m]; others' roots keep so far from there."""
-CART_M, CART_APART_M = 1.0, 0.95
-"""The same of who pushes a cart."""
-CLIP_M, CLIP_APART_M = 0.01, 1.15
-"""The same of who plays a clip and may reach to any side: an arm's length more than APART_M."""
+PUSHING_M, CLIP_M = (1.0, 0.95), (0.01, 1.15)
+"""The same of who pushes a cart, and of who plays a clip: an arm's length more to any side."""
 LOOK_S = 0.12
 """Meetings are looked for in steps of this length [s]; at 2.8 m/s to each other 0.3 m."""
 
@@ -27,17 +23,17 @@ LOOK_S = 0.12
 @kernel
 def goes(activity: int) -> bool:
     """Whether it moves along a path."""
-    return activity == st.WALK or st.TURN <= activity <= st.STEP_BACK
+    return activity in st.GOING or activity == st.PUSH
 
 
 @kernel
 def ahead_of(activity: int) -> Pair:
-    """How far ahead of the root someone is in the way with what, and how near one may go [m]."""
+    """How far ahead of the root hands or cart are, and how near others may come to there [m]."""
     if activity == st.PUSH:
-        return CART_M, CART_APART_M
+        return PUSHING_M
     if activity == st.CLIP:
-        return CLIP_M, CLIP_APART_M
-    if activity == st.STAND or activity == st.LOOK_ROUND or goes(activity):
+        return CLIP_M
+    if activity in st.IDLE or goes(activity):
         return 0.0, 0.0
     return AHEAD_M, HANDS_M
 
@@ -63,7 +59,7 @@ def gap_to(x: float, y: float, t: float, me: Worker) -> float:
         yaw = me.start_yaw
         if math.hypot(nx - ox, ny - oy) > 0.01:
             yaw = math.atan2(ny - oy, nx - ox)
-        hx, hy = ox + ahead * math.cos(yaw), oy + ahead * math.sin(yaw)
+        hx, hy = placed(ox, oy, yaw, ahead, 0.0)
         gap = min(gap, math.hypot(x - hx, y - hy) - apart)
     return gap
 

@@ -10,10 +10,10 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import ANKLE_X, LEG, STAND_Z
-from hrc_env.motion.curves import hump, min_jerk, ramp, wrap
+from hrc_env.motion.curves import hump, min_jerk, placed, ramp, shift, wrap
 from hrc_env.motion.feet import FLAT_S
 from hrc_env.motion.holding import hold_load
-from hrc_env.motion.paths import along, facing, lay_path
+from hrc_env.motion.paths import along, facing
 from hrc_env.motion.posture import (
     RELAXED_ELBOW,
     RELAXED_PITCH,
@@ -28,16 +28,15 @@ CADENCE_PER_MIN, CADENCE_POWER, SLOWEST_M_S = 96.2, 0.468, 0.65
 """Fit above; slower starts and turns keep the cadence of the slowest speed [m/s]."""
 LEG_M = 0.8685772217237624
 """Leg of a worker who walks just so; others step by the square root of their legs' ratio."""
-SWING_SHARE, SWING_FAST_SHARE, FASTEST_M_S = 0.80, 0.02, 1.8
-"""Time in the air in periods of a step; up to so much more from 1 m/s to FASTEST_M_S."""
-MID_STANCE = 0.46
-"""When the root passes over a footprint, in periods of a step after its landing."""
+SWING_SHARE, SWING_FAST_SHARE, FASTEST_M_S, MID_STANCE = 0.80, 0.02, 1.8, 0.46
+"""Time in the air in periods of a step, up to so much more from 1 m/s to FASTEST_M_S; when the
+root passes over a footprint, in periods after its landing."""
 WALK_HALF_WIDTH_M = 0.04
 """Half the step width at full speed [m]; 5 to 9 cm measured."""
 SHIFT_S, TURN_S, TURN_RATE = 0.28, 0.5, 1.7
 """Weight shift before the first step [s]; duration of a turn: TURN_S + angle / TURN_RATE."""
-SIDE_STEP_M_S, SIDE_STEP_PERIOD_S, SIDE_STEP_M = 0.2, 0.52, 0.5
-"""Nearer than SIDE_STEP_M people do not turn, but take small steps; judgement."""
+SIDE_STEP_M, SIDE_STEP_PACE = 0.5, (0.0, 0.2, 0.52)
+"""Nearer than this people do not turn, but take small steps; their `plan_pace`; judgement."""
 CORNER_M_S2 = 1.6
 """Walkers slow down so that corners accelerate them sideways by no more [m/s^2]; judgement."""
 NORMAL_M_S = 1.3
@@ -48,10 +47,8 @@ BENT_M, BENT_FAST_M = 0.026, 0.10
 """Lower than standing [m]: with the pace, with the square of the hurry; judgement."""
 SWING_SLOW_RAD, SWING_FAST_RAD, FULL_SWING, ELBOW_SWING = 0.05, 0.104, 1.1, 0.73
 """Swing of the upper arm to each side [rad]: at any pace, with its cube; the elbow's share."""
-LOADED_TWIST = 0.4
-"""Share of the trunk's turning that is left with something in the hands; judgement."""
-LURCH_S = 1.4
-"""From a foot's catching to the walk's going on [s]; judgement."""
+LOADED_TWIST, LURCH_S = 0.4, 1.4
+"""The trunk's share of turning that a load leaves; time that a stumble takes [s]; judgement."""
 
 
 @kernel
@@ -99,9 +96,7 @@ def walk(t: float, clock_s: float, me: Worker) -> None:
     over = -lead * math.cos(math.pi * (phase - 0.5 * aloft)) * going
     left_ahead = lead * math.cos(math.pi * (phase - aloft)) * pace
     both_down = math.cos(2.0 * math.pi * (phase - 0.5 * (1.0 + aloft)))
-    shift = (0.028 - 0.008 * min(pace, 1.0)) * over
-    q[c.ROOT_X] -= math.sin(yaw) * shift
-    q[c.ROOT_Y] += math.cos(yaw) * shift
+    shift(q, c.ROOT_X, yaw, 0.0, (0.028 - 0.008 * min(pace, 1.0)) * over)
     bob = BOB_M * going + BOB_PACE_M * pace
     hurry = max(pace * math.sqrt(LEG_M / me.size[LEG]) - 1.0, 0.0)
     q[c.PELVIS_Z] -= 0.006 * going + BENT_M * pace + BENT_FAST_M * hurry * hurry
@@ -123,7 +118,6 @@ def walk(t: float, clock_s: float, me: Worker) -> None:
         _lurch(t - me.trip_at, me.trip, me)
     if me.load_prop > 0.0:
         q[c.SPINE_TWIST] *= LOADED_TWIST
-        x, y, yaw = root(t, me)
         hold_load(x, y, yaw, q[c.PELVIS_Z] - me.size[STAND_Z], me)
 
 
@@ -147,17 +141,13 @@ def _lurch(t: float, trip: float, me: Worker) -> None:
 
 
 @kernel
-def plan_walk(start: Triple, via: Floats, end: Triple, wished_m_s: float, me: Worker) -> float:
-    """Plan to go from (x, y, yaw) to (x, y, yaw) past corners (`lay_path`); the duration [s]."""
-    me.start_x, me.start_y, me.start_yaw = start
-    me.end_x, me.end_y = end[0], end[1]
-    lay_path((start[0], start[1]), via, (end[0], end[1]), me)
+def plan_walk(end_yaw: float, wished_m_s: float, me: Worker) -> float:
+    """Plan to go along the path that is laid; returns the duration [s]."""
     if me.length <= SIDE_STEP_M:
-        pace = (0.0, SIDE_STEP_M_S, SIDE_STEP_PERIOD_S)
-        return plan_pace(pace, end[2], me)
+        return plan_pace(SIDE_STEP_PACE, end_yaw, me)
     bend = math.sqrt(CORNER_M_S2 / max(me.sharpest, 1e-6))
     wished = min(wished_m_s, max(bend, SLOWEST_M_S))
-    return plan_pace((1.0, wished, 0.0), end[2], me)
+    return plan_pace((1.0, wished, 0.0), end_yaw, me)
 
 
 @kernel
@@ -167,13 +157,11 @@ def plan_pace(pace: Triple, end_yaw: float, me: Worker) -> float:
     `pace`: whether to face along the path (1) or keep the heading (0); top speed [m/s]; time of a
     step [s], 0: that of people at this speed.
     """
-    follow, wished, period = pace
-    length = me.length
-    me.follow = follow
+    me.follow, wished, period = pace
     me.undo_at = me.trip = me.taken_s = 0.0
     me.ramp = 0.45 + 0.4 * wished
-    me.top_m_s = min(wished, length / me.ramp)
-    me.travel_s = length / me.top_m_s + me.ramp
+    me.top_m_s = min(wished, me.length / me.ramp)
+    me.travel_s = me.length / me.top_m_s + me.ramp
     _plan_turns(end_yaw, me)
     if period == 0.0:
         period = 60.0 / (CADENCE_PER_MIN * max(me.top_m_s, SLOWEST_M_S) ** CADENCE_POWER)
@@ -188,10 +176,8 @@ def plan_pace(pace: Triple, end_yaw: float, me: Worker) -> float:
 
 @kernel
 def brake(t: float, me: Worker) -> float:
-    """Come to a stand on the path as soon as a walker can from time t; the new duration [s].
-
-    Landings of feet in the air stay as they were. -1: about to arrive, and goes on.
-    """
+    """Come to a stand on the path as soon as a walker can from time t; the new duration [s], -1:
+    about to arrive, and goes on. Landings of feet in the air stay as they were."""
     t -= me.taken_s
     going = max(t - me.depart, me.ramp)
     if me.follow == 0.0 or going + me.ramp >= me.travel_s:
@@ -241,9 +227,8 @@ def _plan_steps(first: int, me: Worker) -> float:
         x, y = me.stance[side, 0], me.stance[side, 1]
         if k >= 2:
             x, y = me.prints[k - 2, 0], me.prints[k - 2, 1]
-        me.prints[k, 3] = min(
-            math.hypot(me.prints[k, 0] - x, me.prints[k, 1] - y) / NORMAL_M_S, 1.1
-        )
+        stride = math.hypot(me.prints[k, 0] - x, me.prints[k, 1] - y)
+        me.prints[k, 3] = min(stride / NORMAL_M_S, 1.1)
     return start + (count - 1) * period + me.step_swing + FLAT_S
 
 
@@ -263,9 +248,6 @@ def footprint(
 ) -> None:
     """x, y, heading of a foot of someone whose middle is over (x, y)."""
     sign = 1.0 - 2.0 * side
-    cos, sin = math.cos(yaw), math.sin(yaw)
-    ahead, left = me.size[ANKLE_X], sign * half_width
-    out[0] = x + cos * ahead - sin * left
-    out[1] = y + sin * ahead + cos * left
+    out[0], out[1] = placed(x, y, yaw, me.size[ANKLE_X], sign * half_width)
     out[2] = yaw + sign * TOE_OUT_RAD
     out[4] = 0.0

@@ -122,7 +122,7 @@ def show_props(model: mujoco.MjModel, data: mujoco.MjData, rows: Ints, held: Hel
 
 
 def _add_skin(spec: Any, skin: SkinMesh, body: Body, prefix: str) -> None:
-    material = f"{body.name}_{skin.name}"
+    material = f"{body.names[0]}_{skin.name}"
     if spec.material(material) is None:
         _add_cloth(spec, skin, material)
     moved = np.flatnonzero(skin.weights.any(0))
@@ -153,7 +153,7 @@ def _add_cloth(spec: Any, skin: SkinMesh, name: str) -> None:
 
 
 def _add_hat(spec: Any, hat: HatMesh, body: Body, prefix: str) -> None:
-    name = f"{body.name}_hat"
+    name = f"{body.names[0]}_hat"
     if spec.mesh(name) is None:
         spec.add_mesh(
             name=name,

@@ -20,11 +20,7 @@ from hrc_env.geometry.rotations import turned
 
 TRUNK = ("pelvis", "abdomen", "torso", "chest", "neck", "head")
 LIMBS = ("clavicle", "upper_arm", "forearm", "hand", "thigh", "shank", "foot", "toes")
-SEGMENTS: tuple[str, ...] = (
-    *TRUNK,
-    *(f"left_{part}" for part in LIMBS),
-    *(f"right_{part}" for part in LIMBS),
-)
+SEGMENTS = (*TRUNK, *(f"{side}_{part}" for side in ("left", "right") for part in LIMBS))
 N_SEGMENTS = len(SEGMENTS)
 SEGMENT: dict[str, int] = {name: index for index, name in enumerate(SEGMENTS)}
 
@@ -55,14 +51,10 @@ class Body:
     capsule_radius_m: Floats
     """(..., K)."""
 
-    @property
-    def name(self) -> str:
-        """The first one's."""
-        return self.names[0]
-
 
 OWN = ("stature_m", "rest_position", "joint_offset", "capsule_ends", "capsule_radius_m")
-"""What differs from body to body."""
+SHARED = ("capsule_names", "capsule_segment", "joint_segment")
+"""What differs from body to body, and what does not."""
 
 
 def assets_dir() -> Path:
@@ -83,7 +75,7 @@ def load_body(name: str = "worker_1") -> Body:
     with np.load(baked_path(name)) as baked:
         return Body(
             names=(name,),
-            capsule_names=tuple(str(capsule) for capsule in baked["capsule_names"]),
+            capsule_names=tuple(map(str, baked["capsule_names"])),
             joint_segment=fixed(baked["joint_segment"], np.int64),
             capsule_segment=fixed(baked["capsule_segment"], np.int64),
             **{field: fixed(baked[field], np.float64) for field in OWN},
@@ -98,9 +90,9 @@ def stack(names: tuple[str, ...]) -> Body:
     bodies = [load_body(name) for name in names]
     first = bodies[0]
     for body in bodies:
-        if not _same_rows(body, first):
+        if not all(np.array_equal(getattr(body, f), getattr(first, f)) for f in SHARED):
             raise ConfigError(
-                f"{body.name} has other capsules or joints than {first.name}; expected the same "
+                f"{body.names[0]} has other capsules or joints than {names[0]}; expected the same "
                 "names on the same segments. Bake both with the same assets/workers/bake.py."
             )
     own = {f: fixed(np.stack([getattr(body, f) for body in bodies]), np.float64) for f in OWN}
@@ -139,20 +131,17 @@ def rest_motion(body: Body) -> WorkerMotion:
 def worker_truth(body: Body, motion: WorkerMotion) -> WorkerTruth:
     """Where the joints and capsules of bodies in motion are, and how fast the joints.
 
-    `motion` has segments (..., S, 3 or 4); its `body` says rows of several bodies. A joint moves
-    with its segment: v + omega x r (rigid body kinematics).
+    `motion` has segments (..., S, 3 or 4); its `body` says rows of several bodies.
     """
     position, quaternion = motion.position_world, motion.quaternion_wxyz
     lead, n_joints = position.shape[:-2], len(body.joint_segment)
     rows = _rows(body, motion.body, lead)
     capsules = _capsules_of(body, position, quaternion, rows)
-    joints, velocity = np.empty((*lead, n_joints, 3)), np.empty((*lead, n_joints, 3))
-    _joints(
-        _flat(position), _flat(quaternion),
-        _flat(motion.velocity_world), _flat(motion.angular_velocity_world), rows,
-        body.joint_segment, body.joint_offset.reshape(-1, n_joints, 3),
-        _flat(joints), _flat(velocity),
-    )  # fmt: skip
+    segments = (position, quaternion, motion.velocity_world, motion.angular_velocity_world)
+    offset = body.joint_offset.reshape(-1, n_joints, 3)
+    joints, velocity = np.empty((2, *lead, n_joints, 3))
+    out = _flat(joints), _flat(velocity)
+    _joints(tuple(map(_flat, segments)), rows, body.joint_segment, offset, out)
     radius = body.capsule_radius_m.reshape(-1, len(body.capsule_names))[rows]
     return WorkerTruth(joints, velocity, capsules, radius.reshape(*lead, radius.shape[1]))
 
@@ -165,37 +154,19 @@ def worker_capsules(body: Body, path: WorkerPath, which: Ints | None = None) -> 
     return _capsules_of(body, position, path.quaternion_wxyz, rows)
 
 
-def _same_rows(body: Body, other: Body) -> bool:
-    return (
-        body.capsule_names == other.capsule_names
-        and np.array_equal(body.capsule_segment, other.capsule_segment)
-        and np.array_equal(body.joint_segment, other.joint_segment)
-    )
-
-
 def _rows(body: Body, which: Ints | None, lead: tuple[int, ...]) -> Ints:
     """(count,) row of every body in motion."""
-    if which is None or len(body.names) == 1:
-        return _first(math.prod(lead))
-    last = len(body.names) - 1
-    if which.size and not 0 <= which.min() <= which.max() <= last:
-        raise ConfigError(f"Bodies must be rows 0 to {last} of {body.names}, got {which}.")
-    rows = np.empty(lead, np.int64)
-    rows[...] = which
-    rows.setflags(write=False)  # as `_first`'s: one compiled function takes both
+    rows, last = np.zeros(lead, np.int64), len(body.names) - 1
+    if which is not None and last > 0:
+        if which.size and not 0 <= which.min() <= which.max() <= last:
+            raise ConfigError(f"Bodies must be rows 0 to {last} of {body.names}, got {which}.")
+        rows[...] = which
     return rows.reshape(-1)
-
-
-@functools.lru_cache(maxsize=16)
-def _first(count: int) -> Ints:
-    """(count,) zeros."""
-    return fixed(np.zeros(count), np.int64)
 
 
 def _capsules_of(
     body: Body, position: Points3, quaternion: QuaternionsWxyz, rows: Ints
 ) -> Capsules:
-    """Capsules (..., K, 2, 3) of bodies with any leading axes."""
     check_shape("position_world", position.shape[-2:], (N_SEGMENTS, 3), "segments, xyz")
     flat, shape = _flat(position), (len(body.capsule_segment), 2, 3)
     ends = np.empty((len(flat), *shape))
@@ -211,10 +182,10 @@ def _flat(array: Floats) -> Floats:
 
 
 @kernel
-def _joints(
-    position, quaternion, linear, angular, rows, segment, offset, joints, velocity
-):  # pragma: no cover - compiled
-    """Joints, and how fast the segments carry them, one body after the other."""
+def _joints(segments, rows, segment, offset, out):  # pragma: no cover - compiled
+    """Joints, and how fast their segments carry them: v + omega x r (rigid body kinematics)."""
+    position, quaternion, linear, angular = segments
+    joints, velocity = out
     for b in range(position.shape[0]):
         mine = offset[rows[b]]
         for j in range(len(segment)):

@@ -1,7 +1,4 @@
-"""What a worker looks like: textured surfaces that follow the segments, and a hard hat.
-
-Read from the same file as the worker's measures (`body`); the room `scene` draws it.
-"""
+"""What a worker looks like: textured surfaces that follow the segments, and a hard hat."""
 
 import functools
 from dataclasses import dataclass

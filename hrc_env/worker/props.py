@@ -1,7 +1,7 @@
-"""What workers hold: tools, boards, boxes, things on wheels. Shapes and grips, no looks.
+"""What workers hold: shapes and grips of tools, boards, boxes, things on wheels.
 
 A prop's frame is the worker's (x ahead, y left, z up) when it is held in front and upright: origin
-in the fist (the right hand's grip is the left's as well), between two hands, or on the floor below.
+in the fist, between two hands, or on the floor below.
 """
 
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ import numpy as np
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Held
-from hrc_env.core.typing import Floats, Ints, Points3
+from hrc_env.core.typing import Floats, Points3
 from hrc_env.geometry.rotations import turned
 from hrc_env.geometry.shapes import BOX, CAPSULE, CENTRE, HALF_SIZE, WIDTH, absent, shape
 
@@ -20,13 +20,13 @@ Triple = Sequence[float]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prop:
-    """A thing that can be held."""
+    """A thing that can be held; all in its own frame [m]."""
 
     name: str
     shapes: Floats
-    """(G, `shapes.WIDTH`) its solid parts, capsules and boxes, in its own frame [m]."""
+    """(G, `shapes.WIDTH`) its solid parts, capsules and boxes."""
     grips: Points3
-    """(2, 3) where the left and the right hand hold it, own frame [m]; NaN: that hand does not."""
+    """(2, 3) where the left and the right hand hold it; NaN: that hand does not."""
 
 
 def prop_index(name: str) -> int:
@@ -35,12 +35,10 @@ def prop_index(name: str) -> int:
 
 
 def _box(centre: Triple, size: Triple) -> Floats:
-    """A box of full edge lengths."""
     return shape(BOX, np.array(centre, float), np.eye(3), np.array(size) / 2)
 
 
 def _rod(start: Triple, end: Triple, radius: float) -> Floats:
-    """A capsule between two points."""
     ends = np.array([start, end], float)
     along = ends[1] - ends[0]
     length = float(np.linalg.norm(along))
@@ -117,12 +115,11 @@ PROPS: tuple[Prop, ...] = (
 )  # fmt: skip
 """Everything that can be held; the first is nothing."""
 PROP_NAMES: tuple[str, ...] = tuple(prop.name for prop in PROPS)
-
-_N_PARTS: Ints = np.array([len(prop.shapes) for prop in PROPS])
-_PARTS: Floats = np.stack(
-    [np.resize(np.vstack([prop.shapes, absent()]), (_N_PARTS.max(), WIDTH)) for prop in PROPS]
-)
-"""(P, n, `shapes.WIDTH`) the parts of every prop, `_N_PARTS` of them, then anything."""
+_N_PARTS = max(len(prop.shapes) for prop in PROPS)
+_PARTS = np.tile(absent(), (len(PROPS), _N_PARTS, 1))
+"""(P, n, `shapes.WIDTH`) the parts of every prop; rows that it leaves over are absent."""
+for _parts, _each in zip(_PARTS, PROPS, strict=True):
+    _parts[: len(_each.shapes)] = _each.shapes
 
 
 def held_shapes(held: Held) -> Floats:
@@ -131,24 +128,19 @@ def held_shapes(held: Held) -> Floats:
     There are rows for the prop of most parts; those that are left over are absent.
     """
     batch, n_workers = held.kind.shape
-    rows = np.empty((batch, n_workers * _PARTS.shape[1], WIDTH))
-    _place(held.kind, held.position_world, held.quaternion_wxyz, _PARTS, _N_PARTS, absent(), rows)
+    rows = np.empty((batch, n_workers * _N_PARTS, WIDTH))
+    _place(held.kind, held.position_world, held.quaternion_wxyz, _PARTS, rows)
     return rows
 
 
 @kernel
-def _place(kind, position, quaternion, parts, n_parts, nothing, rows):
+def _place(kind, position, quaternion, parts, rows):
     """Parts of the props of B environments, of W workers each, from their frames to the world."""
     most = parts.shape[1]
     for b in range(len(kind)):
         for k in range(rows.shape[1]):
-            w, part, row = k // most, k % most, rows[b, k]
-            prop = kind[b, w]
-            if part >= n_parts[prop]:
-                for i in range(WIDTH):
-                    row[i] = nothing[i]
-                continue
-            own = parts[prop, part]
+            w, row = k // most, rows[b, k]
+            own = parts[kind[b, w], k % most]
             for i in range(WIDTH):
                 row[i] = own[i]
             for at in range(CENTRE, HALF_SIZE, 3):

@@ -131,8 +131,8 @@ def test_what_is_no_clip_is_refused_in_words(imported, tmp_path):
     [
         ("fps", 0.0, "frame rate"),
         ("controls", np.zeros((5, 39)), r"\(5, 39\)"),
-        ("controls", np.full((5, c.N_CONTROLS), np.nan), "contacts must be|finite"),
-        ("size", np.zeros(3), "size must be"),
+        ("controls", np.full((5, c.N_CONTROLS), np.nan), "contacts must have|finite"),
+        ("size", np.zeros(3), "size must have"),
     ],
 )
 def test_a_clip_that_cannot_be_played_is_refused(imported, field, value, told):

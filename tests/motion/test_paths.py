@@ -54,8 +54,8 @@ def test_corners_too_near_each_other_share_the_way_between_them():
 def test_a_walker_who_brakes_stands_soon_and_never_jumps(when_s):
     state, rngs = started(1)
     me = standing(state)
-    via, end = np.array([[2.5, 0.0, 0.8]]), (2.5, 4.0, 0.0)
-    begin(me, st.WALK, plan_walk((0.0, 0.0, 0.0), via, end, 1.2, me))
+    lay_path((0.0, 0.0), np.array([[2.5, 0.0, 0.8]]), (2.5, 4.0), me)
+    begin(me, st.WALK, plan_walk(0.0, 1.2, me))
     before = watched(state, rngs, 0.01, round(when_s / 0.01))
     me["duration_s"] = brake(when_s, me)
     assert me["duration_s"] < max(when_s, 1.5) + 2.6

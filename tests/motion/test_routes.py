@@ -23,9 +23,8 @@ def grounds(*blocked, places=()):
 
 def way(plan, start, end, people=NOBODY, bow=0.0):
     """Points of the way every 2 cm; None where there is none."""
-    row, via = np.zeros(1, st.WORKER)[0], np.zeros((st.MAX_VIA, 3))
-    n = route(start, end, bow, people, plan.slack, plan.origin, via, row)
-    if n < 0:
+    row = np.zeros(1, st.WORKER)[0]
+    if not route(start, end, bow, people, plan.slack, plan.origin, row):
         return None
     return np.array([along(s, row) for s in np.arange(0.0, row["length"] + 0.02, 0.02)])
 

@@ -9,17 +9,17 @@ from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion.activities.planning import between, in_reach, shoulders
 from hrc_env.motion.anatomy import LEG, STAND_Z
-from hrc_env.motion.curves import min_jerk
-from hrc_env.motion.holding import GRIPS, drop_load, grip_load, place_load
+from hrc_env.motion.curves import min_jerk, placed, shift
+from hrc_env.motion.holding import grip_load, place_load, take_load
 from hrc_env.motion.paths import lay_path
 from hrc_env.motion.posture import lean
-from hrc_env.motion.state import Pair, Place, Worker
+from hrc_env.motion.state import Pair, Worker
 from hrc_env.motion.walk import plan_pace, plan_walk, root, speed, walk
 from hrc_env.worker.props import prop_index
 
 CART, WHEELBARROW = prop_index("cart"), prop_index("wheelbarrow")
 CART_AHEAD_M, WHEELBARROW_AHEAD_LEGS = 0.47, 0.26
-"""Handles ahead of the root: [m]; and in lengths of the leg while the wheelbarrow is level."""
+"""Handles ahead of the root: a cart's [m]; a level wheelbarrow's in lengths of the leg."""
 PUSHING_SHARE, STOOPED_M, CART_LEAN = 0.99, 0.4, 0.06
 """Arms push stretched to this share, then trunks lean: 1 brings shoulders so far [m]; always."""
 WHEEL_AHEAD_M, WHEEL_UP_M, STANDS_RAD = 1.2, 0.17, 0.2
@@ -28,68 +28,48 @@ KNUCKLES_SHARE, BEND = 0.97, 1.3
 """Handles are carried as high as this share of the pelvis; the bow to take them; judgement."""
 TAKE_S, LIFT_S = 0.7, 0.5
 """For the hands to go to the handles; to lift a wheelbarrow by them [s]."""
-BACK_M_S, BACK_PERIOD_S = 0.62, 0.42
-"""Quick steps back: speed and time of a step; judgement."""
-TURN_M_S, TURN_PERIOD_S = 0.2, 0.36
-"""Turning on the spot: steps so short that no foot steps on the other; judgement."""
+STEP_BACK_PACE, TURN_PACE = (0.0, 0.62, 0.42), (0.0, 0.2, 0.36)
+"""Of `plan_pace`: quick steps back; turning without one foot stepping on the other; judgement."""
 CAUGHT_LEGS = 0.115
 """How much too short the step is in which a foot catches, in lengths of the leg; judgement."""
 
 
-@kernel
-def start_walk(place: Place, via: Floats, speed_m_s: float, me: Worker) -> float:
-    """Plan to walk to the place by way of a point; returns how long it takes [s]."""
-    start = (me.start_x, me.start_y, me.start_yaw)
-    end = (place[0], place[1], place[2])
-    return plan_walk(start, via, end, speed_m_s, me)
-
-
 @kernel(makes_arrays=True)
-def start_turn(place: Place, me: Worker) -> float:
-    """Plan to turn on the spot to the place's yaw; returns how long it takes [s]."""
+def start_turn(yaw: float, me: Worker) -> float:
+    """Plan to turn on the spot to a yaw; returns how long it takes [s]."""
     here = (me.start_x, me.start_y)
     lay_path(here, np.empty((0, 3)), here, me)
-    pace = (0.0, TURN_M_S, TURN_PERIOD_S)
-    return plan_pace(pace, place[2], me)
+    return plan_pace(TURN_PACE, yaw, me)
 
 
 @kernel(makes_arrays=True)
-def start_step_back(draws: Floats, place: Place, me: Worker) -> float:
+def start_step_back(draws: Floats, height: float, me: Worker) -> float:
     """Plan to step straight back without looking; returns how long it takes [s]."""
     x, y, yaw = me.start_x, me.start_y, me.start_yaw
-    way = between(draws[0], 0.30, 0.75)
-    me.end_x, me.end_y = x - math.cos(yaw) * way, y - math.sin(yaw) * way
-    lay_path((x, y), np.empty((0, 3)), (me.end_x, me.end_y), me)
-    pace = (0.0, BACK_M_S, BACK_PERIOD_S)
-    return plan_pace(pace, yaw, me)
+    end = placed(x, y, yaw, -between(draws[0], 0.30, 0.75), 0.0)
+    lay_path((x, y), np.empty((0, 3)), end, me)
+    return plan_pace(STEP_BACK_PACE, yaw, me)
 
 
 @kernel
-def start_stumble(draws: Floats, place: Place, via: Floats, speed_m_s: float, me: Worker) -> float:
-    """Plan a walk to the place in which a foot catches; returns how long it takes [s]."""
-    lasts = start_walk(place, via, speed_m_s, me)
+def start_stumble(draws: Floats, end_yaw: float, speed_m_s: float, me: Worker) -> float:
+    """Plan a walk in which a foot catches; returns how long it takes [s]."""
+    lasts = plan_walk(end_yaw, speed_m_s, me)
     count = me.step_count
     if me.follow == 0.0 or count < 6:
         return lasts
     step = 2 + int(draws[0] * (count - 5))
     me.trip_at = me.step_start + step * me.step_period + 0.35 * me.step_swing
     me.trip = between(draws[1], 0.7, 1.0)
-    yaw = me.prints[step, 2]
-    caught = CAUGHT_LEGS * me.size[LEG]
-    me.prints[step, 0] -= caught * math.cos(yaw)
-    me.prints[step, 1] -= caught * math.sin(yaw)
+    shift(me.prints[step], 0, me.prints[step, 2], -CAUGHT_LEGS * me.size[LEG], 0.0)
     return lasts
 
 
 @kernel
-def start_push(place: Place, via: Floats, speed_m_s: float, prop: int, me: Worker) -> float:
-    """Plan to push a cart or wheelbarrow to the place; returns how long it takes [s]."""
-    drop_load(me)
-    me.load_prop = prop
-    for i in range(6):
-        me.load_grip[i] = GRIPS[prop, i // 3, i % 3]
-    me.load_used[0] = me.load_used[1] = 1.0
-    lasts = start_walk(place, via, speed_m_s, me)
+def start_push(end_yaw: float, speed_m_s: float, prop: int, me: Worker) -> float:
+    """Plan to push a cart or wheelbarrow; returns how long it takes [s]."""
+    take_load(prop, me)
+    lasts = plan_walk(end_yaw, speed_m_s, me)
     me.taken_s = TAKE_S + (LIFT_S if prop == WHEELBARROW else 0.0)
     _to_handles(prop, me)
     me.lasts = lasts + 2.0 * me.taken_s
@@ -128,21 +108,14 @@ def push(t: float, clock_s: float, me: Worker) -> None:
     if me.load_prop == WHEELBARROW:
         low = 1.0 - min_jerk((near_end - TAKE_S) / LIFT_S)
         lean((BEND * low + stooped * (1.0 - low)) * held, 0.1, 0.0, me)
-        _tip(STANDS_RAD * low - me.tipped * (1.0 - low), yaw, me)
+        tipped = STANDS_RAD * low - me.tipped * (1.0 - low)  # back about its axle, handles down
+        ahead, up = _tipped(tipped, 0.0)
+        shift(q, c.PROP_POSE, yaw, ahead, 0.0)
+        q[c.PROP_POSE + 2] += up
+        q[c.PROP_POSE + 4] -= tipped
     else:
         lean((CART_LEAN + stooped) * held, 0.0, 0.0, me)
     grip_load(held * (2.0 - held), me)  # before the bent trunk takes them to the knees
-
-
-@kernel
-def _tip(back_rad: float, yaw: float, me: Worker) -> None:
-    """Tip the wheelbarrow back about its axle, handles down."""
-    q = me.q
-    ahead, up = _tipped(back_rad, 0.0)
-    q[c.PROP_POSE] += math.cos(yaw) * ahead
-    q[c.PROP_POSE + 1] += math.sin(yaw) * ahead
-    q[c.PROP_POSE + 2] += up
-    q[c.PROP_POSE + 4] -= back_rad
 
 
 @kernel

@@ -1,7 +1,6 @@
 """Loads: picked up and set down (that backwards), taken from somebody and handed over.
 
-Recorded lifts: pelvis 0.57 to 1.01 m high, wrists at 1.3 m/s at most in the median trial, 2.1 in
-the 95th percentile, heads at 1.6.
+Recorded lifts: pelvis 0.57 to 1.01 m high, wrists at 1.3 m/s at most in the median trial.
 """
 
 import math
@@ -9,66 +8,47 @@ import math
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
-from hrc_env.motion.activities.planning import (
-    between,
-    blank,
-    dominant,
-    in_reach,
-    look_to,
-    put_tool,
-    settle_lean,
-    shoulders,
-)
+from hrc_env.motion.activities import planning as to
+from hrc_env.motion.activities.planning import between
 from hrc_env.motion.anatomy import LEFT, SIDE_STRIDE, STAND_Z, UPPER_ARM
-from hrc_env.motion.curves import hump, min_jerk
-from hrc_env.motion.holding import GRIPS, grip, place_load
+from hrc_env.motion.curves import hump, min_jerk, shift
+from hrc_env.motion.holding import GRIPS, grip, place_load, take_load
 from hrc_env.motion.kinematics import pose
 from hrc_env.motion.posture import from_here, lean, look_at, stand
-from hrc_env.motion.state import Place, Triple, Worker
+from hrc_env.motion.state import Triple, Worker
 from hrc_env.worker.props import prop_index
 
 BOX, BOARD = prop_index("box"), prop_index("board")
-BOX_AHEAD_M, BOX_SHARE = 0.37, 1.10
-BOARD_AHEAD_M, BOARD_SHARE = 0.27, 0.96
-"""A held load's middle: ahead of the root [m], height in heights of the pelvis; judgement."""
+BOX_HELD, BOARD_HELD, GIVEN = (0.37, 1.10), (0.27, 0.96), (0.60, 1.14)
+"""A load's middle when held or handed over: ahead [m], height in the pelvis's; judgement."""
 CARRYING_SHARE = 0.95
 """Arms carry stretched to this share at most: swinging trunks need the rest; judgement."""
-ON_SHOULDER = (0.12, 0.165, 0.075)
-"""A board on the shoulder: ahead and aside of the root, above the shoulder's joint [m]."""
-STEADY_M = 0.26
-"""The hand that steadies it: ahead of the root [m]."""
-NOSE_UP_RAD = 0.08
-"""How much its front is higher; judgement."""
+ON_SHOULDER, STEADY_M, NOSE_UP_RAD = (0.12, 0.165, 0.075), 0.26, 0.08
+"""A board on the shoulder: ahead and aside of the root, above the shoulder's joint [m]; the hand
+that steadies it: ahead of the root [m]; how much its front is higher; judgement."""
 GRIP_S, SHOULDER_S = 0.3, 1.0
 """To grip; from before the body to the shoulder [s]."""
-GIVEN_AHEAD_M, GIVEN_SHARE = 0.60, 1.14
-"""Where loads change hands: ahead of the root [m], in heights of the pelvis; judgement."""
 AWAY_M = 0.43
 """A load on the floor or a table is this far ahead [m]."""
 
 
 @kernel
-def pick_up(t: float, clock_s: float, me: Worker) -> None:
-    """The control vector of someone who bends down to a load, grips it and comes up with it."""
-    q = me.q
-    x, y, yaw = me.start_x, me.start_y, me.start_yaw
-    stand(x, y, yaw, clock_s, me)
+def pick_up(t: float, me: Worker) -> None:
+    """Let a standing q bend down to a load, grip it and come up with it."""
+    q, yaw = me.q, me.start_yaw
     gripped = me.out_at + me.out_s
     rise = gripped + GRIP_S
     down = min_jerk((t - me.out_at) / me.out_s)
     up = min_jerk((t - rise) / me.raise_s)
-    turned = 0.0
-    if me.shoulder_s > 0.0:
-        turned = min_jerk((t - rise - me.raise_s) / me.shoulder_s)
+    onto = t - rise - me.raise_s
+    turned = min_jerk(onto / me.shoulder_s) if me.shoulder_s > 0.0 else 0.0
     lean(me.lean * (down - up), me.squat, 0.0, me)
     look_at(me.gaze[0], me.gaze[1], me.gaze[2], down - up, me)
-    place_load(x, y, yaw, 0.0, me)
+    place_load(me.start_x, me.start_y, yaw, 0.0, me)
     for i in range(6):
         at, mid = me.tool_pose[i], me.midway[i]
         q[c.PROP_POSE + i] = at + up * (mid - at) + turned * (q[c.PROP_POSE + i] - mid)
-    bulge = 0.06 * hump(up) + 0.15 * hump(turned)
-    q[c.PROP_POSE] += math.cos(yaw) * bulge
-    q[c.PROP_POSE + 1] += math.sin(yaw) * bulge
+    shift(q, c.PROP_POSE, yaw, 0.06 * hump(up) + 0.15 * hump(turned), 0.0)
     q[c.PROP_POSE + 2] += 0.10 * hump(turned)
     prop = me.tool
     q[c.PROP] = prop if t >= gripped or me.hidden == 0.0 else 0.0
@@ -81,58 +61,53 @@ def pick_up(t: float, clock_s: float, me: Worker) -> None:
 
 
 @kernel
-def plan_pick_up(draws: Floats, place: Place, prop: int, on_shoulder: bool, me: Worker) -> float:
-    """Plan to pick a box or board up, gripped at the place's height; its pace [s]."""
-    _hold(prop, on_shoulder and prop == BOARD, dominant(draws[0], me), me)
-    z = place[3] if place[3] > 0.0 else between(draws[1], 0.18, 0.45)
+def plan_pick_up(draws: Floats, height: float, prop: int, on_shoulder: bool, me: Worker) -> float:
+    """Plan to pick a box or board up, gripped at the height; its pace [s]."""
+    _hold(prop, on_shoulder and prop == BOARD, to.dominant(draws[0], me), me)
+    z = height if height > 0.0 else between(draws[1], 0.18, 0.45)
     _lay_out(prop, (AWAY_M, 0.0, z), me)
     return between(draws[2], 1.0, 1.35)
 
 
 @kernel
-def plan_receive(draws: Floats, place: Place, me: Worker) -> float:
+def plan_receive(draws: Floats, height: float, me: Worker) -> float:
     """Plan to take a box that somebody ahead holds out; its pace [s]."""
     _hold(BOX, False, 1, me)
-    _lay_out(BOX, _given(place, me), me)
+    _lay_out(BOX, _given(height, me), me)
     me.hidden = 1.0
     return between(draws[2], 0.9, 1.1)
 
 
 @kernel
-def plan_set_down(draws: Floats, place: Place, me: Worker) -> float:
-    """Plan to set down what is held, onto the place's height; its pace [s]."""
-    z = place[3] if place[3] > 0.0 else between(draws[1], 0.18, 0.45)
+def plan_set_down(draws: Floats, height: float, me: Worker) -> float:
+    """Plan to set down what is held, onto the height; its pace [s]."""
+    z = height if height > 0.0 else between(draws[1], 0.18, 0.45)
     _lay_out(me.load_prop, (AWAY_M, 0.0, z), me)
     return between(draws[2], 1.0, 1.35)
 
 
 @kernel
-def plan_hand_over(draws: Floats, place: Place, me: Worker) -> float:
+def plan_hand_over(draws: Floats, height: float, me: Worker) -> float:
     """Plan to hold out what is carried until somebody has it; its pace [s]."""
-    _lay_out(me.load_prop, _given(place, me), me)
+    _lay_out(me.load_prop, _given(height, me), me)
     me.hidden = 1.0
     return between(draws[2], 0.9, 1.1)
 
 
 @kernel
-def _given(place: Place, me: Worker) -> Triple:
+def _given(height: float, me: Worker) -> Triple:
     """Where loads change hands."""
-    z = place[3] if place[3] > 0.0 else GIVEN_SHARE * me.size[STAND_Z]
-    return GIVEN_AHEAD_M, 0.0, z
+    return GIVEN[0], 0.0, height if height > 0.0 else GIVEN[1] * me.size[STAND_Z]
 
 
 @kernel
 def _hold(prop: int, on_shoulder: bool, side: int, me: Worker) -> None:
     """Write how a load will be carried into `load_at` and on."""
     at = me.load_at
-    me.load_prop = prop
-    for i in range(6):
-        at[i] = 0.0
-        me.load_grip[i] = GRIPS[prop, i // 3, i % 3]
-    me.load_used[0] = me.load_used[1] = 1.0
-    ahead, share = (BOX_AHEAD_M, BOX_SHARE) if prop == BOX else (BOARD_AHEAD_M, BOARD_SHARE)
-    forward, aside, up = shoulders(me)
-    lowest = up - in_reach(CARRYING_SHARE, ahead - forward, GRIPS[prop, 0, 1] - aside, me)
+    take_load(prop, me)
+    ahead, share = BOX_HELD if prop == BOX else BOARD_HELD
+    forward, aside, up = to.shoulders(me)
+    lowest = up - to.in_reach(CARRYING_SHARE, ahead - forward, GRIPS[prop, 0, 1] - aside, me)
     at[0], at[2] = ahead, max(share * me.size[STAND_Z], lowest)
     if not on_shoulder:
         return
@@ -150,19 +125,18 @@ def _hold(prop: int, on_shoulder: bool, side: int, me: Worker) -> None:
 @kernel
 def _lay_out(prop: int, at: Triple, me: Worker) -> None:
     """Plan where the load stands: ahead, left [m], height."""
-    blank(me)
-    put_tool(prop, 1, at, (0.0, 0.0, 0.0), me)
-    look_to(at, me)
+    to.blank(me)
+    to.put_tool(prop, 1, at, (0.0, 0.0, 0.0), me)
+    to.look_to(at, me)
 
 
 @kernel
 def finish_lift(raise_s: float, me: Worker) -> float:
     """Settle trunk, way and times of a load; from the time to raise it by a metre, how long [s]."""
-    size = me.size
-    z = me.tool_pose[2]
+    size, z = me.size, me.tool_pose[2]
     low = min(max((size[STAND_Z] - z) / 0.6, 0.0), 1.0)
     me.squat = me.squat_share * low
-    settle_lean(me)
+    to.settle_lean(me)
     shoulder = me.load_at[3] != 0.0
     mid_z = 1.15 * size[STAND_Z] if shoulder else me.load_at[2]
     ahead = 0.36 if shoulder else me.load_at[0]

@@ -6,30 +6,23 @@ from hrc_env.core.kernels import kernel
 from hrc_env.motion import anatomy as an
 from hrc_env.motion import controls as c
 from hrc_env.motion.activities.strokes import PAUSE_S, stroke
-from hrc_env.motion.activities.work import FRONT_LEG, REAR_LEG, extend, hands_on, step_into
+from hrc_env.motion.activities.work import FRONT_LEG, LOW_M, REAR_LEG, extend, hands_on, step_into
 from hrc_env.motion.feet import feet
 from hrc_env.motion.holding import TWO_HANDED
 from hrc_env.motion.posture import MOST_LEAN, beyond, farthest, from_here, stand
 from hrc_env.motion.state import Triple, Worker
 
-TAKE_S = 0.55
-"""For a hand to go to the belt [s]."""
-KNEEL_S, CROUCH_S = 1.5, 1.1
-"""To get down on a knee, on the haunches [s]; judgement."""
+TAKE_S, STEP_S, KNEEL_S, CROUCH_S = 0.55, 0.9, 1.5, 1.1
+"""To reach the belt, step into a stance, get down on a knee, on the haunches [s]; judgement."""
 KNEEL_STEPS_S = (0.15, 0.62, 0.60)
 """First lift-off, period and swing of the steps onto a knee [s], slow or the knee would jerk."""
-STEP_S = 0.9
-"""To step into a stance [s]."""
 CALM_M_S = 1.1
 """Peak speed of hands that go to their work [m/s]; calm manual work."""
-KNEE_ASIDE_M = 0.17
-"""Aside of the middle: where the other leg is not in the way [m]."""
-SPARE_M = 0.03
-"""Arms keep this much in hand when the trunk has settled [m]: bodies sway."""
+KNEE_ASIDE_M, SPARE_M, SLUMP_M = 0.17, 0.03, 0.01
+"""Kneeling hands work so far aside of the other leg; arms keep so much in hand, for bodies sway;
+a standing trunk brings shoulders so far forward [m]."""
 TO_SHOULDER = (*range(1, an.CHEST + 1), an.LEFT + an.CLAVICLE, an.LEFT + an.UPPER_ARM)
 """The segments from the pelvis on, each the child of the one before."""
-SLUMP_M = 0.01
-"""How far a standing trunk brings the shoulders forward [m]."""
 FAR = 1e3
 """A time by which every step is done [s]."""
 
@@ -52,13 +45,19 @@ def blank(me: Worker) -> None:
     me.lean = me.twist = me.squat = me.kneel = me.crouch = me.ahead = 0.0
     me.hold_s = me.take_s = me.wander_m = me.stroke_m = me.stroke_hz = me.burst_s = 0.0
     me.tool = me.side = me.stroke = 0
-    me.target[:] = 0.0
-    me.used[:] = 0.0
+    me.target[:] = me.used[:] = 0.0
     me.hidden = False
     me.undo_at = me.step_count = 0.0
     me.step_start, me.step_period, me.step_swing = 0.0, 1.0, 0.5
-    me.settle_s = 0.1
-    me.out_at = 0.1
+    me.settle_s = me.out_at = 0.1
+
+
+@kernel
+def begin(draw: float, me: Worker) -> tuple[int, float]:
+    """A blank plan; the side that holds the tool, and 1 if that is the left one, else -1."""
+    blank(me)
+    side = dominant(draw, me)
+    return side, 1.0 - 2.0 * side
 
 
 @kernel
@@ -74,15 +73,24 @@ def kneel_down(side: int, me: Worker) -> None:
 @kernel
 def before_knee(me: Worker) -> float:
     """How far to the left the hands work of one who kneels: before the knee that is down [m]."""
-    kneeling = me.kneel > 0.0
-    return KNEE_ASIDE_M * (1.0 - 2.0 * me.step_first) if kneeling else 0.0
+    return KNEE_ASIDE_M * (1.0 - 2.0 * me.step_first) if me.kneel > 0.0 else 0.0
 
 
 @kernel
 def step_ahead(side: int, ahead: float, me: Worker) -> None:
-    """Plan to work with the foot of that side a little ahead."""
+    """Plan to work with the foot of that side ahead."""
     step_into(side, ahead, 0.0, 0.02, me)
     me.ahead, me.settle_s = 0.45 * ahead, STEP_S
+
+
+@kernel
+def get_ready(z: float, knee: int, foot: int, ahead: float, me: Worker) -> float:
+    """Plan to kneel for low work, else to step ahead; how far to the left hands work then [m]."""
+    if z < LOW_M:
+        kneel_down(knee, me)
+    else:
+        step_ahead(foot, ahead, me)
+    return before_knee(me)
 
 
 @kernel
@@ -155,11 +163,10 @@ def finish(peak_m_s: float, me: Worker) -> float:
     No plan function calls it: each would be compiled with all of it once more.
     """
     low = min(max((0.95 * me.size[an.STAND_Z] - me.tool_pose[2]) / 0.5, 0.0), 1.0)
-    me.squat = 0.0 if me.kneel + me.crouch > 0.0 else 0.8 * low
+    is_down = me.kneel + me.crouch > 0.0
+    me.squat = 0.0 if is_down else 0.8 * low
     settle_lean(me)
-    down_s = me.settle_s - me.out_at - me.take_s
-    if me.kneel + me.crouch == 0.0:
-        down_s = 0.35
+    down_s = me.settle_s - me.out_at - me.take_s if is_down else 0.35
     slowly = 1.7 if TWO_HANDED[me.tool] else 1.0
     me.out_s = max(1.875 * slowly * _way(me) / peak_m_s, down_s)
     done = me.out_at + me.take_s + me.out_s
@@ -175,15 +182,12 @@ def settle_lean(me: Worker) -> None:
     upright = _short(me)
     if upright <= 0.0:
         return
-    far = upright
-    for attempt in range(10):
-        if attempt > 0:
-            far = _short(me)
-        if far > 0.0:
+    for _ in range(9):
+        me.lean = 0.5 * (low + high)
+        if _short(me) > 0.0:
             low = me.lean
         else:
             high = me.lean
-        me.lean = 0.5 * (low + high)
     me.lean = high
     far = _short(me)
     if far > 0.0:
@@ -195,9 +199,7 @@ def settle_lean(me: Worker) -> None:
 def _short(me: Worker) -> float:
     """By how much an arm is too short for the work that is planned [m]."""
     at_work(me)
-    used = (me.q[c.HAND_SHARE], me.q[c.HAND_SHARE + 1])
-    spare = SPARE_M + 0.4 * abs(me.wander_m)
-    return beyond(used, me) + spare
+    return beyond(me) + (SPARE_M + 0.4 * abs(me.wander_m))
 
 
 @kernel

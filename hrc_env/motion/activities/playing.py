@@ -1,7 +1,6 @@
 """Playing a clip: two steps into its first pose, the recording, two steps out of its last.
 
-The recording's time gathers pace and loses it again. Frames hold `clip.RECORDED`: the columns up to
-the hands' shift, then both feet. Long clips are cut into pieces, fitted to every body there is.
+Frames hold `clip.RECORDED`. Long clips are cut into pieces, fitted to every body there is.
 """
 
 import itertools
@@ -17,7 +16,7 @@ from hrc_env.core.typing import Floats, Ints
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import ANKLE_Z
 from hrc_env.motion.clip import RECORDED, Clip, fitted_to, footprints, placed_at_origin
-from hrc_env.motion.curves import min_jerk, ramp
+from hrc_env.motion.curves import min_jerk, placed, ramp
 from hrc_env.motion.feet import foot, raise_heel
 from hrc_env.motion.posture import STANCE_HALF_WIDTH_M, stand
 from hrc_env.motion.state import N_ROOTS, Pair, Worker
@@ -25,12 +24,10 @@ from hrc_env.motion.walk import footprint
 
 STEP_AT_S, PERIOD_S, SWING_S = 0.12, 0.50, 0.42
 """First lift-off, from one to the next, in the air: steps into a clip and out of it [s]."""
-TILT_S = 0.25
-"""Time in which standing feet take the pitch that they have in the clip [s]."""
+TILT_S, PACE_S = 0.25, 0.6
+"""In which standing feet take their pitch in the clip; the recording gathers and loses pace [s]."""
 SETTLE_S = STEP_AT_S + PERIOD_S + SWING_S + 0.1 + TILT_S
 """Steps and pitch together [s]."""
-PACE_S = 0.6
-"""Time in which the recording gathers pace, and loses it [s]."""
 END, BEGIN, LAST = 0, 2, 4
 """First of the two footprints where the activity ends, where the clip begins, where it ends."""
 LONGEST_S, SHORTEST_S = 20.0, 0.5
@@ -52,11 +49,11 @@ class Clips:
     count: Ints
     """(n,) its rows."""
     fps: Floats
-    """(n,) its frames a second."""
+    """(n,)."""
 
     @property
     def n_rows(self) -> int:
-        """N: rows of one body."""
+        """N."""
         return int(self.count.sum())
 
 
@@ -130,12 +127,16 @@ def start_clip(piece: int, turn_rad: float, clips: Clips, me: Worker) -> float:
             prints[at + side, 2] = foot_[3] + yaw
             prints[at + side, 4] = foot_[2] - size[ANKLE_Z]
     whole = lasts + 2.0 * SETTLE_S
-    pace_s = whole - 2.0 * SETTLE_S - (n - 1) / fps
-    slow = whole - 2.0 * SETTLE_S - pace_s
-    for k, t in enumerate(np.linspace(0.0, whole, N_ROOTS) - SETTLE_S):
-        gone_s = pace_s * (ramp(t / pace_s) - ramp((t - slow) / pace_s))
-        me["roots"][k] = way[min(round(gone_s * fps), n - 1)]
+    for k, since in enumerate(np.linspace(0.0, whole, N_ROOTS) - SETTLE_S):
+        me["roots"][k] = way[min(round(_gone_s(since, me) * fps), n - 1)]
     return whole
+
+
+@kernel
+def _gone_s(since: float, me: Worker) -> float:
+    """Time of the recording that is over: it gathers pace and loses it again."""
+    slow = me.clip_s - PACE_S
+    return PACE_S * (ramp(since / PACE_S) - ramp((since - slow) / PACE_S))
 
 
 @kernel
@@ -148,12 +149,9 @@ def play(t: float, clock_s: float, frames: Floats, me: Worker) -> None:
     else:
         stand(me.end_x, me.end_y, me.end_yaw, clock_s, me)
     share = min_jerk(t / SETTLE_S) * min_jerk(1.0 + left / SETTLE_S)
-    n = me.clip_frames
-    slow = me.clip_s - PACE_S
-    gone_s = PACE_S * (ramp(since / PACE_S) - ramp((since - slow) / PACE_S))
-    f = min(max(gone_s * me.clip_fps, 0.0), n - 1.0)
+    first, n = me.clip_row, me.clip_frames
+    f = min(max(_gone_s(since, me) * me.clip_fps, 0.0), n - 1.0)
     _body(f, share, frames, me)
-    first = me.clip_row
     for side in range(2):
         pitch = c.N_BLENDED + 6 * side + 4
         if since < 0.0:
@@ -184,10 +182,8 @@ def _between(f: float, column: int, frames: Floats, me: Worker) -> float:
 def _body(f: float, share: float, frames: Floats, me: Worker) -> None:
     """Let a share of a standing q become the clip's root, trunk, head and arms at frame f."""
     q = me.q
-    cos, sin = math.cos(me.clip_yaw), math.sin(me.clip_yaw)
     ahead, left = _between(f, c.ROOT_X, frames, me), _between(f, c.ROOT_Y, frames, me)
-    x = me.start_x + cos * ahead - sin * left
-    y = me.start_y + sin * ahead + cos * left
+    x, y = placed(me.start_x, me.start_y, me.clip_yaw, ahead, left)
     q[c.ROOT_X] += share * (x - q[c.ROOT_X])
     q[c.ROOT_Y] += share * (y - q[c.ROOT_Y])
     yaw = me.clip_yaw + _between(f, c.HEADING, frames, me)
@@ -199,12 +195,9 @@ def _body(f: float, share: float, frames: Floats, me: Worker) -> None:
 @kernel
 def _placed_foot(f: float, side: int, frames: Floats, me: Worker) -> None:
     """The clip's foot at frame f, where the clip is placed."""
-    q = me.q
-    cos, sin = math.cos(me.clip_yaw), math.sin(me.clip_yaw)
-    at, of = c.ANKLE + 6 * side, c.N_BLENDED + 6 * side
+    q, at, of = me.q, c.ANKLE + 6 * side, c.N_BLENDED + 6 * side
     ahead, left = _between(f, of, frames, me), _between(f, of + 1, frames, me)
-    q[at] = me.start_x + cos * ahead - sin * left
-    q[at + 1] = me.start_y + sin * ahead + cos * left
+    q[at], q[at + 1] = placed(me.start_x, me.start_y, me.clip_yaw, ahead, left)
     q[at + 3] = me.clip_yaw + _between(f, of + 3, frames, me)
     for i in (2, 4, 5):
         q[at + i] = _between(f, of + i, frames, me)

@@ -1,31 +1,27 @@
-"""What hands and tools do at work: strokes in bursts, moving along the work between them.
-
-A stroke moves the tool's pose in q, and writes how far the other hand is from its target.
-"""
+"""What hands and tools do at work: strokes in bursts, moving along the work between them."""
 
 import math
 
 from hrc_env.core.kernels import kernel
 from hrc_env.motion import controls as c
-from hrc_env.motion.curves import min_jerk
+from hrc_env.motion.curves import min_jerk, shift
+from hrc_env.motion.posture import from_root
 from hrc_env.motion.state import Worker
 
 STILL, STRIKE, BORE, PRESS, SAW, SHIFT, BUSY, JAB = range(8)
 """Nothing; hammer; drill, the other hand fetching screws or not; saw; still; busy hands; a beat."""
-PAUSE_S = 0.7
-"""Between two bursts [s]: time to go on to the next nail; judgement."""
-EASE_S = 0.25
-"""In which strokes begin and end [s]."""
+PAUSE_S, EASE_S, FETCH_S = 0.7, 0.25, 0.55
+"""Between two bursts; in which strokes begin and end; from a screw's place to the pouch [s]."""
 
 
 @kernel
 def stroke(t: float, me: Worker) -> None:
-    """Add what the stroke does at time t of the work (0 to HOLD_S)."""
+    """Add what the stroke does at time t of the work (0 to `hold_s`) to the tool's pose in q, and
+    write how far the other hand is from its target."""
     q = me.q
     kind, side = me.stroke, me.side
     other = c.HAND_TARGET + 3 * (1 - side)
-    for i in range(3):
-        q[other + i] = 0.0
+    q[other : other + 3] = 0.0
     cycle = me.burst_s + PAUSE_S
     n = math.floor(t / cycle)
     u = t - n * cycle
@@ -55,12 +51,8 @@ def _wander(n: int, u: float, other: int, me: Worker) -> None:
     on = min_jerk((u - me.burst_s) / PAUSE_S)
     here = n % 2
     share = here + on * (1.0 - 2.0 * here)
-    left = me.wander_m * share
-    x, y = -math.sin(me.start_yaw) * left, math.cos(me.start_yaw) * left
-    q[c.PROP_POSE] += x
-    q[c.PROP_POSE + 1] += y
-    q[other] += x
-    q[other + 1] += y
+    shift(q, c.PROP_POSE, me.start_yaw, 0.0, me.wander_m * share)
+    shift(q, other, me.start_yaw, 0.0, me.wander_m * share)
 
 
 @kernel
@@ -76,15 +68,13 @@ def _along(way: float, me: Worker) -> None:
 @kernel
 def _strike(ease: float, turn: float, me: Worker) -> None:
     """Swing the hammer back slowly and forward faster, round the wrist and with the arm."""
-    q = me.q
-    size = me.stroke_m
+    q, size = me.q, me.stroke_m
     skew = min(1.5 * size, 0.35)
     back = 0.5 * ease * (1.0 - math.cos(turn + skew * math.sin(turn)))
     _along(-size * back, me)
     q[c.PROP_POSE + 2] += 0.35 * size * back
-    out = (1.0 - 2.0 * me.side) * 0.6 * size * back  # past the shoulder
-    q[c.PROP_POSE] -= math.sin(me.start_yaw) * out
-    q[c.PROP_POSE + 1] += math.cos(me.start_yaw) * out
+    past_shoulder = (1.0 - 2.0 * me.side) * 0.6 * size * back
+    shift(q, c.PROP_POSE, me.start_yaw, 0.0, past_shoulder)
     q[c.PROP_POSE + 4] -= min(0.3 + 2.2 * size, 1.1) * back
 
 
@@ -97,25 +87,17 @@ def _fetch(u: float, other: int, me: Worker) -> None:
     if fetch <= 0.0:
         return
     hand = (other - c.HAND_TARGET) // 3
-    cos, sin = math.cos(q[c.HEADING]), math.sin(q[c.HEADING])
-    ahead, left = 0.17, (1.0 - 2.0 * hand) * 0.34
     target = me.target[3 * hand : 3 * hand + 3]
-    x = q[c.ROOT_X] + cos * ahead - sin * left
-    y = q[c.ROOT_Y] + sin * ahead + cos * left
+    x, y = from_root(0.17, (1.0 - 2.0 * hand) * 0.34, me)
     q[other] += fetch * (x - target[0])
     q[other + 1] += fetch * (y - target[1])
     q[other + 2] += fetch * (q[c.PELVIS_Z] + 0.06 - target[2])
 
 
-FETCH_S = 0.55
-"""From a screw's place to the pouch [s]: at 0.4 m about 1.4 m/s at most."""
-
-
 @kernel
 def _busy(ease: float, turn: float, other: int, me: Worker) -> None:
     """Small movements of both hands, or of the pointing one alone."""
-    q = me.q
-    size = ease * me.stroke_m
+    q, size = me.q, ease * me.stroke_m
     if me.stroke == JAB:
         q[c.PROP_POSE + 2] += size * math.sin(turn)
         return

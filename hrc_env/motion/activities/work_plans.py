@@ -1,7 +1,6 @@
 """Plans of work in place: with tools, pointing, a lunge, with both hands at floor height.
 
-`plan_...` returns how fast hands may go to the work [m/s], for `planning.finish`. Wrists in the
-recordings: light hammering at 1.4 m/s (95th percentile), driving nails and sawing 1.25 to 2.0.
+`plan_...` returns how fast hands may go to the work [m/s], for `planning.finish`.
 """
 
 import math
@@ -13,49 +12,33 @@ from hrc_env.motion.activities import strokes
 from hrc_env.motion.activities.planning import CALM_M_S, between, dominant
 from hrc_env.motion.activities.work import LOW_M
 from hrc_env.motion.anatomy import ARM, STAND_Z
-from hrc_env.motion.state import Place, Worker
+from hrc_env.motion.curves import placed
+from hrc_env.motion.state import Worker
 from hrc_env.worker.props import prop_index
 
-HAMMER = prop_index("hammer")
+HAMMER, DRILL, HAND_SAW, TAPE = map(prop_index, ("hammer", "drill", "saw", "tape_measure"))
 HEAD_M, FACE_M = 0.25, 0.05
 """From the fist to the hammer's head along the handle, and to its face [m]; `props`."""
-LIGHT_HZ, LIGHT_M = 5.6, 0.060
-"""Light taps: to and fro by 6 cm, at most 1.1 m/s and a little more on the way forward."""
-LOW_SHARE = 0.7
-"""Share of a blow's size at floor height, where the trunk is in its way; judgement."""
-WALL_M = 1.2
-"""Nails at this height or higher are driven into a wall, lower ones downwards [m]."""
-DRILL = prop_index("drill")
-BIT_M, BIT_UP_M = 0.22, 0.09
-"""Tip of the bit: ahead of the fist and above it [m]; `props`."""
-THRUST_M = 0.04
-"""How far the drill goes in [m]; a screw."""
-OVERHEAD_M = 1.7
-"""From this height on people work above their head [m]."""
-HAND_SAW = prop_index("saw")
+LIGHT_HZ, LIGHT_M, LOW_SHARE = 5.6, 0.060, 0.7
+"""Light taps: to and fro by 6 cm, at most 1.1 m/s; size of blows at floor height; judgement."""
+WALL_M, OVERHEAD_M = 1.2, 1.7
+"""From these heights on nails go into a wall, not downwards; people work above their head [m]."""
+BIT_M, BIT_UP_M, THRUST_M = 0.22, 0.09, 0.04
+"""Tip of the bit: ahead of the fist and above it (`props`); how far it goes in: a screw [m]."""
 CUT_RAD = 0.6
 """How steeply the blade goes into the board [rad]; 45 to 60 degrees to it is usual, judgement."""
-TAPE = prop_index("tape_measure")
 SHOULDER_SHARE, SHOULDER_M = 1.50, 0.19
 """Height of the shoulder in heights of the pelvis, and its distance from the middle [m]."""
-POINT_M_S = 1.5
-"""Peak speed of the pointing hand [m/s]; a quick reach."""
-AHEAD_ARMS = (1.2, 1.5)
-"""How far ahead it is, in lengths of the arm: a step and a bow away; judgement."""
+POINT_M_S, AHEAD_ARMS = 1.5, (1.2, 1.5)
+"""Peak speed of a pointing hand [m/s]; where one lunges to, in lengths of the arm; judgement."""
 
 
 @kernel
-def plan_hammer(draws: Floats, place: Place, me: Worker) -> float:
-    """Plan to drive nails at the place's height."""
-    to.blank(me)
-    side = dominant(draws[0], me)
-    sign = 1.0 - 2.0 * side
-    z = place[3] if place[3] > 0.0 else between(draws[1], 0.85, 1.4)
-    if z < LOW_M:
-        to.kneel_down(side, me)
-    else:
-        to.step_ahead(1 - side, 0.16, me)
-    aside = to.before_knee(me)
+def plan_hammer(draws: Floats, height: float, me: Worker) -> float:
+    """Plan to drive nails at the height."""
+    side, sign = to.begin(draws[0], me)
+    z = height if height > 0.0 else between(draws[1], 0.85, 1.4)
+    aside = to.get_ready(z, side, 1 - side, 0.16, me)
     if z < WALL_M:
         ahead, turn = (0.62 if z < LOW_M else 0.72), (0.0, 0.5 * math.pi, 0.0)
         at = (ahead - HEAD_M, aside + 0.06 * sign, z + FACE_M + 0.02)
@@ -76,18 +59,12 @@ def plan_hammer(draws: Floats, place: Place, me: Worker) -> float:
 
 
 @kernel
-def plan_drill(draws: Floats, place: Place, me: Worker) -> float:
-    """Plan to drill at the place's height."""
-    to.blank(me)
-    side = dominant(draws[0], me)
-    sign = 1.0 - 2.0 * side
-    z = place[3] if place[3] > 0.0 else between(draws[1], 1.1, 1.4)
+def plan_drill(draws: Floats, height: float, me: Worker) -> float:
+    """Plan to drill at the height."""
+    side, sign = to.begin(draws[0], me)
+    z = height if height > 0.0 else between(draws[1], 1.1, 1.4)
     overhead = z >= OVERHEAD_M
-    if z < LOW_M:
-        to.kneel_down(side, me)
-    else:
-        to.step_ahead(1 - side, 0.10 if overhead else 0.18, me)
-    aside = to.before_knee(me)
+    aside = to.get_ready(z, side, 1 - side, 0.10 if overhead else 0.18, me)
     if overhead:
         ahead, turn = 0.34, (0.0, -0.5 * math.pi, 0.0)
         at, beside = (ahead + BIT_UP_M, 0.10 * sign, z - BIT_M - THRUST_M), (ahead, z - 0.04)
@@ -98,25 +75,17 @@ def plan_drill(draws: Floats, place: Place, me: Worker) -> float:
     to.put_tool(DRILL, side, at, turn, me)
     to.put_other((beside[0], aside - (0.22 if overhead else 0.12) * sign, beside[1]), me)
     to.look_to((ahead, aside, z), me)
-    to.strokes(
-        strokes.PRESS if overhead else strokes.BORE,
-        THRUST_M,
-        0.0,
-        between(draws[2], 1.5, 1.8),
-        2 + int(3.0 * draws[3]),
-        me,
-    )
+    kind, burst_s = strokes.PRESS if overhead else strokes.BORE, between(draws[2], 1.5, 1.8)
+    to.strokes(kind, THRUST_M, 0.0, burst_s, 2 + int(3.0 * draws[3]), me)
     me.wander_m = 0.12 * sign
     return CALM_M_S
 
 
 @kernel
-def plan_saw(draws: Floats, place: Place, me: Worker) -> float:
-    """Plan to saw a board at the place's height."""
-    to.blank(me)
-    side = dominant(draws[0], me)
-    sign = 1.0 - 2.0 * side
-    z = place[3] if place[3] > 0.0 else between(draws[1], 0.75, 0.95)
+def plan_saw(draws: Floats, height: float, me: Worker) -> float:
+    """Plan to saw a board at the height."""
+    side, sign = to.begin(draws[0], me)
+    z = height if height > 0.0 else between(draws[1], 0.75, 0.95)
     to.step_ahead(1 - side, 0.26, me)
     to.put_tool(HAND_SAW, side, (0.52, 0.17 * sign, z + 0.17), (0.0, CUT_RAD, 0.0), me)
     to.put_other((0.58, -0.12 * sign, z + 0.03), me)
@@ -127,15 +96,12 @@ def plan_saw(draws: Floats, place: Place, me: Worker) -> float:
 
 
 @kernel
-def plan_measure(draws: Floats, place: Place, me: Worker) -> float:
-    """Plan to measure at the place's height."""
+def plan_measure(draws: Floats, height: float, me: Worker) -> float:
+    """Plan to measure at the height."""
     to.blank(me)
-    z = place[3] if place[3] > 0.0 else between(draws[1], 0.85, 1.3)
-    if z < LOW_M:
-        to.kneel_down(1, me)
-    else:
-        to.step_ahead(dominant(draws[0], me), 0.12, me)
-    to.put_tool(TAPE, 1, (0.48, to.before_knee(me), z + 0.04), (0.0, 0.0, 0.0), me)
+    z = height if height > 0.0 else between(draws[1], 0.85, 1.3)
+    aside = to.get_ready(z, 1, dominant(draws[0], me), 0.12, me)
+    to.put_tool(TAPE, 1, (0.48, aside, z + 0.04), (0.0, 0.0, 0.0), me)
     to.look_to((0.46, 0.12, z), me)
     to.strokes(strokes.SHIFT, 0.0, 0.0, between(draws[2], 0.8, 1.6), 2 + int(3.0 * draws[3]), me)
     me.wander_m = between(draws[4], 0.10, 0.18)
@@ -143,36 +109,27 @@ def plan_measure(draws: Floats, place: Place, me: Worker) -> float:
 
 
 @kernel
-def plan_point(draws: Floats, place: Place, me: Worker) -> float:
+def plan_point(draws: Floats, height: float, me: Worker) -> float:
     """Plan to point somewhere ahead, at its height if it has one."""
-    to.blank(me)
-    side = dominant(draws[0], me)
-    sign = 1.0 - 2.0 * side
+    side, sign = to.begin(draws[0], me)
     aside = sign * between(draws[1], -0.4, 0.7)
     up = between(draws[2], -0.25, 0.25)
     reach = 0.95 * me.size[ARM]
     shoulder_z = SHOULDER_SHARE * me.size[STAND_Z]
-    at = (
-        reach * math.cos(up) * math.cos(aside),
-        SHOULDER_M * sign + reach * math.cos(up) * math.sin(aside),
-        shoulder_z + reach * math.sin(up),
-    )
-    to.put_tool(0, side, at, (0.0, 0.0, 0.0), me)
-    to.look_to(
-        (10.0 * math.cos(aside), 10.0 * math.sin(aside), shoulder_z + 10.0 * math.tan(up)), me
-    )
+    x, y = placed(0.0, SHOULDER_M * sign, aside, reach * math.cos(up), 0.0)
+    to.put_tool(0, side, (x, y, shoulder_z + reach * math.sin(up)), (0.0, 0.0, 0.0), me)
+    x, y = placed(0.0, 0.0, aside, 10.0, 0.0)
+    to.look_to((x, y, shoulder_z + 10.0 * math.tan(up)), me)
     to.strokes(strokes.JAB, 0.03, between(draws[3], 1.2, 1.8), between(draws[4], 0.8, 2.2), 1, me)
     me.twist = 0.35 * aside
     return POINT_M_S
 
 
 @kernel
-def plan_lunge(draws: Floats, place: Place, me: Worker) -> float:
-    """Plan to snatch at something ahead, at the place's height."""
-    to.blank(me)
-    side = dominant(draws[0], me)
-    sign = 1.0 - 2.0 * side
-    z = place[3] if place[3] > 0.0 else between(draws[1], 0.9, 1.3)
+def plan_lunge(draws: Floats, height: float, me: Worker) -> float:
+    """Plan to snatch at something ahead, at the height."""
+    side, sign = to.begin(draws[0], me)
+    z = height if height > 0.0 else between(draws[1], 0.9, 1.3)
     to.step_ahead(side, between(draws[2], 0.32, 0.42), me)
     ahead = me.size[ARM] * between(draws[3], *AHEAD_ARMS)
     at = (ahead, sign * between(draws[4], -0.1, 0.25), z)
@@ -186,28 +143,27 @@ def plan_lunge(draws: Floats, place: Place, me: Worker) -> float:
 
 
 @kernel
-def plan_kneel(draws: Floats, place: Place, me: Worker) -> float:
+def plan_kneel(draws: Floats, height: float, me: Worker) -> float:
     """Plan to kneel and work low."""
-    to.blank(me)
-    side = dominant(draws[0], me)
+    side, _ = to.begin(draws[0], me)
     to.kneel_down(side, me)
-    return _hands_low(0.42, side, draws, place, me)
+    return _hands_low(0.42, draws, height, me)
 
 
 @kernel
-def plan_squat(draws: Floats, place: Place, me: Worker) -> float:
+def plan_squat(draws: Floats, height: float, me: Worker) -> float:
     """Plan to work low on the haunches."""
     to.blank(me)
-    me.crouch, me.ahead = 1.0, 0.02
-    me.settle_s, me.out_at = to.CROUCH_S, 0.1
-    return _hands_low(0.50, dominant(draws[0], me), draws, place, me)
+    me.crouch, me.ahead, me.settle_s = 1.0, 0.02, to.CROUCH_S
+    return _hands_low(0.50, draws, height, me)
 
 
 @kernel
-def _hands_low(ahead: float, side: int, draws: Floats, place: Place, me: Worker) -> float:
+def _hands_low(ahead: float, draws: Floats, height: float, me: Worker) -> float:
     """Plan what both hands do at floor height."""
+    side = dominant(draws[0], me)
     sign = 1.0 - 2.0 * side
-    z = place[3] if place[3] > 0.0 else between(draws[1], 0.12, 0.35)
+    z = height if height > 0.0 else between(draws[1], 0.12, 0.35)
     aside = to.before_knee(me)
     to.put_tool(0, side, (ahead, aside + 0.10 * sign, z), (0.0, 0.0, 0.0), me)
     to.put_other((ahead + 0.03, aside - 0.12 * sign, z), me)
