@@ -17,7 +17,6 @@ class AnyExperiment:
     """What every experiment is asked."""
 
     name: ClassVar[str]
-    """Of its folder."""
     out: Path
     """Folder for report.html, results.json and figures; a run that was stopped goes on there."""
     quick: bool = False

@@ -2,9 +2,10 @@
 
 import time
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import tyro
 from rich.console import Console
@@ -16,9 +17,6 @@ from hrc_env.cli.progress import compile_kernels, track
 from hrc_env.core.checkout import agents
 from hrc_env.core.errors import check_names
 from hrc_env.tasks import DEFAULT
-
-if TYPE_CHECKING:
-    import gymnasium
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,19 +48,16 @@ class Play(EnvironmentArguments):
         import gymnasium  # here: --help imports no simulator
 
         compile_kernels(Console(), self.perception)
-        env = gymnasium.make(self.task, **self.keywords())
-        try:
+        with closing(gymnasium.make(self.task, **self.keywords())) as env:
             for episode in range(self.episodes):
                 self._play(env, self.seed + episode)
-        finally:
-            env.close()
         return 0
 
-    def _play(self, env: "gymnasium.Env[Any, Any]", seed: int) -> None:
+    def _play(self, env: Any, seed: int) -> None:
         from hrc_env.cli import film
         from hrc_env.scene.viewer import Viewer
 
-        inner: Any = env.unwrapped
+        inner = env.unwrapped
         window = Viewer(inner.simulation.scene) if self.viewer else None
         limit = (env.spec.max_episode_steps if env.spec else None) or 250
         played = film.begun(env, named(self.agent, seed), seed, limit)
@@ -77,8 +72,8 @@ class Play(EnvironmentArguments):
             window.close()
         counts = inner.simulation.task.counts(info).items()
         said = [f"return {total:.1f}", *(f"{name} {n:.0f}" for name, n in counts)]
-        said += [f"cost {info['episode_cost']:.0f}"]
-        said += [f"{step / (time.monotonic() - started_s):.0f} steps/s"]
+        pace = step / (time.monotonic() - started_s)
+        said += [f"cost {info['episode_cost']:.0f}", f"{pace:.0f} steps/s"]
         Console().print(f"seed {seed}: {', '.join(said)}")
 
 

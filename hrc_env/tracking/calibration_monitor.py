@@ -1,23 +1,19 @@
 """Which cameras are not where they are said to be: what cameras say of each other, over seconds.
 
 A camera that is turned, moved or zoomed against its calibration sees every body displaced in the
-same way, joint after joint and second after second; a detector's errors do not last. To first order
-all of it is four numbers of its image: a shift (2), a growth and a turn about the principal point.
-For each camera they are estimated from the residuals between what it reports and what the *other*
-cameras say (the estimate serves as the point of linearisation, so that a camera does not vote for
-itself), by least squares with exponential forgetting, together with a delay in the direction in
-which joints move, so that a camera that is merely late is not taken for a displaced one. What they
-explain, in units of their covariance, to which an allowance for the lasting bias of a detector is
-added, is a generalised likelihood ratio (Willsky and Jones, IEEE Transactions on Automatic Control
-21, 1976; Basseville and Nikiforov, Detection of Abrupt Changes, 1993, chapter 7). The fewer numbers
-are needed, the less has to be there to be noticed: growth alone (another focal length), shift and
-growth (a camera that was moved or turned aside), and the turn as well are three hypotheses; each
-pays for its numbers, and the best counts.
+same way, second after second. To first order that is four numbers of its image: a shift (2), a
+growth and a turn about the principal point. They are estimated for each camera from the residuals
+between what it reports and what the *other* cameras say, by least squares with exponential
+forgetting, together with a delay, so that a camera that is merely late is not taken for a displaced
+one. What they explain, in units of their covariance with an allowance for the detector's lasting
+bias, is a generalised likelihood ratio (Willsky and Jones, IEEE Transactions on Automatic Control
+21, 1976; Basseville and Nikiforov, Detection of Abrupt Changes, 1993, chapter 7). Growth alone,
+shift and growth, and the turn as well are three hypotheses; each pays for its numbers, and the best
+counts.
 
-Each ratio supposes that one camera alone is wrong. What is wrong with it shows, less, in what all
-others say: it is named when its ratio is clearly the largest. Of several wrong ones the worst may
-be named, or nobody. A joint must be seen by three cameras: of two that contradict each other nobody
-knows which is wrong.
+Each ratio supposes that one camera alone is wrong: it is named when its ratio is clearly the
+largest. A joint must be seen by three cameras: of two that contradict each other nobody knows which
+is wrong.
 """
 
 import math
@@ -37,16 +33,14 @@ KEPT = 0.96
 NAMED_AT, CLEARED_AT = 7.0, 3.5
 """A camera is named when its ratio exceeds the one, and cleared when it is below the other."""
 DECIDED = 1.3
-"""And only if it is so many times every other's: what is wrong with one camera shows, less, in what
-all others say."""
+"""And only if it is so many times every other's, where its error shows, too, but less."""
 SHIFT_COSTS, TURN_COSTS = 3.0, 7.0
 """So much more than growth alone, shift and growth have to explain, and all with the turn: more
 numbers explain more where nothing is wrong, and a body that leans looks like a turn."""
 LEAST_CONFIDENCE = 0.5
 CAUCHY = 0.7
 """Deviations at which a residual has half its weight (Cauchy): no view, however far off, says more
-than a bounded amount, and many have to agree. A detector that sees a whole body badly is far off
-in all directions, one that exchanges left and right in two that cancel."""
+than a bounded amount, and many have to agree."""
 LEAST_VIEWS = 3
 LEAST_DEPTH_M = 0.3
 U, V, WEIGHT, DU, DV = 0, 1, 2, 3, 4
@@ -166,8 +160,8 @@ def _view(px, confidence, sigma_px, age_s, mean, velocity, p, out):
 def _triangulate(view, seen, axes, cameras, small):
     """Add what the views of one joint say of the cameras that it is seen by.
 
-    All of them triangulate the joint; the residual of each counts with the information that is left
-    when the others are asked, which is the same as to leave it out (Woodbury).
+    All triangulate the joint; the residual of each counts with the information that is left when
+    the others are asked, which is the same as to leave it out (Woodbury).
     """
     for i in range(3):
         for j in range(4):

@@ -96,8 +96,7 @@ class ParticleConfig(TrackerConfig):
     """Share of Laplace's step from the mode to the mean; without it the depth that one
     camera leaves open runs to the lens, the whole of it overshoots a little."""
     one_view_inflation: float = 1.21
-    """Factor on the reported covariance of a worker whom one camera alone has seen for a while
-   ."""
+    """Factor on the reported covariance of a worker whom one camera alone has seen for a while."""
     n_hypotheses: int = 8
     """Most hypotheses about one worker; one is a Gaussian (estimator="kalman")."""
     mirrored_parts: tuple[str, ...] = ("body", "limbs")
@@ -199,12 +198,7 @@ ConfigT = TypeVar("ConfigT", bound=TrackerConfig)
 
 
 def of_kind(config: TrackerConfig | None, kind: type[ConfigT]) -> ConfigT:
-    """The settings of one estimator: these, or what they share with it and its defaults.
-
-    Args:
-        config: any estimator's settings; None: the defaults.
-        kind: of the estimator in question.
-    """
+    """The settings of one estimator: these, or what they share with it and its defaults."""
     if isinstance(config, kind):
         return config
     shared = {each.name for each in fields(TrackerConfig)}

@@ -42,9 +42,9 @@ Rngs = list[np.random.Generator]
 class Estimator(Protocol[State]):
     """From keypoints to a belief, for B environments with W workers each.
 
-    The state is a record of arrays with leading axes (B, W), changed in place: copying the
-    arrays copies it. Random numbers for environment b come from `rngs[b]` only, and nothing
-    that happens in one environment depends on the others or on how many there are.
+    The state is an array, or a record of arrays, with leading axes (B, W), changed in place:
+    copying the arrays copies it. Random numbers for environment b come from `rngs[b]` only, and
+    nothing that happens in one environment depends on the others or on how many there are.
     """
 
     @property
@@ -124,11 +124,7 @@ EstimatorChoice = str | EstimatorSpec | Callable[..., Any]
 
 
 def estimator_called(estimator: EstimatorChoice) -> EstimatorSpec:
-    """The spec of an estimator: by its name, itself, or of a function that makes one.
-
-    Raises:
-        ConfigError: a name that is unknown or `OFFLINE`, or nothing of these.
-    """
+    """The spec of an estimator; `ConfigError` for a name that is unknown or `OFFLINE`."""
     if isinstance(estimator, EstimatorSpec):
         return estimator
     if callable(estimator):
@@ -184,8 +180,7 @@ _P = np.array([[[900.0, 640, 0, 0], [0, 360, -900, 0], [0, 1, 0, 3]],
 def check_estimator(spec: EstimatorSpec) -> None:
     """Raise `ConfigError` for what an estimator lacks, or for estimates that are none.
 
-    It is made for two cameras and asked about three environments with two workers of whom nobody
-    sees anything: those must have an estimate, too.
+    It is asked about workers of whom nobody sees anything: those must have an estimate, too.
     """
     if not isinstance(spec, EstimatorSpec):
         raise ConfigError(f"An estimator must be an EstimatorSpec, got {type(spec).__name__}.")
@@ -214,14 +209,9 @@ def _check_estimate(name: str, what: str, estimate: Any, shape: tuple[int, int, 
         raise ConfigError(
             f"{name}: {what} must give a PoseEstimate, got {type(estimate).__name__}."
         )
-    shapes = {
-        "mean_world": (*shape, 3),
-        "cov_world": (*shape, 3, 3),
-        "velocity_world": (*shape, 3),
-        "age_s": shape,
-        "tracked": shape[:2],
-    }
-    for field, expected in shapes.items():
+    point, matrix = (*shape, 3), (*shape, 3, 3)
+    shapes = {"mean_world": point, "cov_world": matrix, "velocity_world": point, "age_s": shape}
+    for field, expected in (shapes | {"tracked": shape[:2]}).items():
         value = np.asarray(getattr(estimate, field))
         check_shape(f"{name}: {what}.{field}", value.shape, expected, "B, W, J, ...")
         if not np.isfinite(value).all():

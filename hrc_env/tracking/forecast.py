@@ -1,12 +1,10 @@
 """Where a worker will be, up to a second from now, if nobody looks.
 
-A small network knows how workers move; `assets/ahead/train.py` made it from the environment's own
-motions. It looks at one body in the frame of that body's heading: joints about the middle of the
-torso, their velocities, the torso's velocity and height, and how well each joint is known. It
-answers, for a few horizons, with each joint's displacement and the standard deviation of what it
-cannot know; between the horizons both are interpolated. That and what is known of a joint now add
-up to the covariance. A body whose heading is unknown moves on with constant velocity and the whole
-body's random acceleration; nobody's body relaxes to the prior (docs/tracking.md, "Ahead").
+A small network, made by `assets/ahead/train.py` from the environment's own motions, looks at one
+body in the frame of its heading. For a few horizons it says each joint's displacement and the
+standard deviation of what it cannot know, which is added to what is not known now. A body whose
+heading is unknown moves on with constant velocity and random acceleration; one that is not tracked
+relaxes to the prior (docs/tracking.md, "Ahead").
 """
 
 import functools
@@ -23,7 +21,7 @@ from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.models.acquisition import heading
-from hrc_env.tracking.tracks import Tracks, relax, report
+from hrc_env.tracking.tracks import bounded, relax
 from hrc_env.worker.body import assets_dir
 
 LONGEST_S = 1.0
@@ -67,12 +65,8 @@ def load_network() -> ForecastNetwork:
 def describe(points, velocity, cov, log_std, out):
     """What the network looks at: out (N_INPUTS,) float32; cosine, sine of the heading, known.
 
-    Args:
-        points, velocity: (J, 3) [m], [m/s] in the world.
-        cov: (J, 3, 3) [m^2].
-        log_std: (2,) bounds, as in `ForecastNetwork`.
-        out: filled with joints about the torso (J, 3), velocities about the torso's (J, 3), both
-            forward, left, up; the torso's velocity (3,) and height; ln of deviations (J,).
+    Joints about the torso (J, 3), velocities about the torso's (J, 3), both forward, left, up; the
+    torso's velocity (3,) and height; ln of the joints' deviations (J,) within the bounds `log_std`.
     """
     cos, sin, known = heading(points)
     root, speed = np.zeros(3), np.zeros(3)
@@ -120,14 +114,8 @@ def _hidden(inputs, weight, bias, out):
 def run_network(network, inputs, horizon, scratch, moved, rate, std):
     """The network's answer at `horizon` [s], interpolated between those that it knows.
 
-    Args:
-        network: a `ForecastNetwork`.
-        inputs: (N_INPUTS,) from `describe`.
-        horizon: in (0, the last of its horizons] [s].
-        scratch: (n,), (m,), (60,), (60,) float32, as `make_scratch`.
-        moved: (J, 3) filled with displacements in the body's frame [m].
-        rate: (J, 3) filled with how fast they grow at that time [m/s].
-        std: (J,) filled with deviations [m].
+    `inputs` are from `describe`, `scratch` from `make_scratch`. Fills displacements in the body's
+    frame moved (J, 3) [m], how fast they grow rate (J, 3) [m/s], and deviations std (J,) [m].
     """
     first, second, before, after = scratch
     _hidden(inputs, network.weight_1, network.bias_1, first)
@@ -159,11 +147,7 @@ def make_scratch(network):
 
 
 def check_horizon(horizon_s: float) -> None:
-    """See that a horizon is one.
-
-    Raises:
-        ConfigError: it is not in (0, 1] s.
-    """
+    """Raise `ConfigError` for a horizon that is not in (0, 1] s."""
     if not 0 < horizon_s <= LONGEST_S:
         raise ConfigError(f"A horizon must be in (0, {LONGEST_S:g}] s, got {horizon_s}.")
 
@@ -176,35 +160,23 @@ def forecast(now: PoseEstimate, horizon_s: float, config: TrackerConfig) -> Pose
         horizon_s: in (0, 1] [s].
         config: settings of the estimator that said so.
 
-    Returns:
-        Means and covariances of the joints then; velocities then; ages grow with the horizon;
-        who is tracked now is tracked.
-
     Raises:
         ConfigError: a horizon that is none.
     """
     check_horizon(horizon_s)
-    later = Tracks(
+    later = PoseEstimate(
         mean_world=now.mean_world.copy(),
         cov_world=now.cov_world.copy(),
         velocity_world=now.velocity_world.copy(),
         age_s=np.minimum(now.age_s + horizon_s, config.max_age_s),
-        tracked=now.tracked,
-        conflict=np.zeros(now.age_s.shape, np.int64),
+        tracked=now.tracked.copy(),
     )
-    _forecast(
-        load_network(),
-        later.mean_world,
-        later.cov_world,
-        later.velocity_world,
-        later.tracked,
-        horizon_s,
-        config.root_acceleration * horizon_s**3 / 3,
-        float(np.exp(-horizon_s / config.forget_s)),
-        config.prior_mean_world,
-        config.prior_std_m,
-    )
-    return report(later, config)
+    workers = (later.mean_world, later.cov_world, later.velocity_world, later.tracked)
+    unknown_heading = config.root_acceleration * horizon_s**3 / 3
+    keep = float(np.exp(-horizon_s / config.forget_s))
+    prior = (keep, config.prior_mean_world, config.prior_std_m)
+    _forecast(load_network(), workers, horizon_s, unknown_heading, prior)
+    return bounded(later, config)
 
 
 def mixed(later: PoseEstimate, log_weight: Floats, n_alive: Ints) -> PoseEstimate:
@@ -212,23 +184,21 @@ def mixed(later: PoseEstimate, log_weight: Floats, n_alive: Ints) -> PoseEstimat
 
     Args:
         later: what each of them expects, (B, W H, J, ...); a worker's H columns side by side.
-        log_weight: (B, W H) their log-probabilities.
+        log_weight: (B, W, H) their log-probabilities.
         n_alive: (B, W) how many of a worker's columns count, the heaviest first.
 
     Returns:
         (B, W, J, ...); ages and tracks are the heaviest hypothesis's.
     """
-    batch, n_workers = n_alive.shape
-    n_slots = max(log_weight.shape[1] // max(n_workers, 1), 1)
-    alive = np.arange(n_slots) < n_alive[..., None]
-    share = np.where(alive, np.exp(log_weight.reshape(batch, n_workers, n_slots)), 0.0)
+    alive = np.arange(log_weight.shape[2]) < n_alive[..., None]
+    share = np.where(alive, np.exp(log_weight), 0.0)
     share = (share / share.sum(-1, keepdims=True))[..., None, None]
 
     def split(array: Floats) -> Floats:
-        whole = array.reshape(batch, n_workers, n_slots, *array.shape[2:])
+        whole = array.reshape(*alive.shape, *array.shape[2:])
         return np.where(alive.reshape(*alive.shape, *[1] * (array.ndim - 2)), whole, 0.0)
 
-    each, best = split(later.mean_world), slice(None, None, n_slots)
+    each, best = split(later.mean_world), slice(None, None, log_weight.shape[2])
     mean = (share * each).sum(2)
     apart = np.where(share > 0, each - mean[:, :, None], 0.0)
     spread = split(later.cov_world) + apart[..., :, None] * apart[..., None, :]
@@ -242,18 +212,19 @@ def mixed(later: PoseEstimate, log_weight: Floats, n_alive: Ints) -> PoseEstimat
 
 
 @kernel(makes_arrays=True)
-def _forecast(
-    network, mean, cov, velocity, tracked, horizon, unknown_heading, keep, home, home_std
-):  # fmt: skip
-    """Move every worker by `horizon` [s], in place; `unknown_heading` [m^2] as in `_go_on`."""
-    n_joints = mean.shape[2]
+def _forecast(network, workers, horizon, unknown_heading, prior):
+    """Move every worker (mean, cov, velocity, tracked) by `horizon` [s], in place.
+
+    `unknown_heading` [m^2] is as in `_go_on`, `prior` the last arguments of `relax`.
+    """
+    mean, cov, velocity, tracked = workers
     scratch, inputs = make_scratch(network), np.empty(N_INPUTS, np.float32)
-    moved, rate, std = np.empty((n_joints, 3)), np.empty((n_joints, 3)), np.empty(n_joints)
+    moved, rate, std = np.empty((N_JOINTS, 3)), np.empty((N_JOINTS, 3)), np.empty(N_JOINTS)
     for b in range(mean.shape[0]):
         for w in range(mean.shape[1]):
             body = (mean[b, w], cov[b, w], velocity[b, w])
             if not tracked[b, w]:
-                relax(*body, keep, home, home_std)
+                relax(*body, *prior)
                 continue
             cos, sin, known = describe(body[0], body[2], body[1], network.log_std, inputs)
             if not known:

@@ -5,9 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hrc_env.core.batching import mapped, write_rows
 from hrc_env.core.records import Keypoints
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Bools, Floats, Ints, Points2
+from hrc_env.core.typing import Bools, Floats, Ints
 
 SAME_S = 5e-5
 """Times that differ by no more are the same."""
@@ -26,12 +27,8 @@ _DRIFT_PX_S = 300.0
 class Frames(NamedTuple):
     """N frames of each camera of each environment, a ring; arrays changed in place."""
 
-    px: Points2
-    """(B, C, N, W, J, 2)."""
-    confidence: Floats
-    """(B, C, N, W, J)."""
-    sigma_px: Floats
-    """(B, C, N, W, J)."""
+    keypoints: Keypoints
+    """(B, C, N, W, J, ...)."""
     time_s: Floats
     """(B, C, N) when they were taken [s]; NaN: no frame."""
     n_taken: Ints
@@ -57,9 +54,7 @@ def make_frames(batch: int, n_cameras: int, n_frames: int, n_workers: int) -> Fr
     """Room for frames, and none yet."""
     shape = (batch, n_cameras, n_frames, n_workers, N_JOINTS)
     return Frames(
-        px=np.full((*shape, 2), np.nan),
-        confidence=np.zeros(shape),
-        sigma_px=np.full(shape, np.inf),
+        keypoints=Keypoints(np.full((*shape, 2), np.nan), np.zeros(shape), np.full(shape, np.inf)),
         time_s=np.full(shape[:3], np.nan),
         n_taken=np.zeros(shape[:2], np.int64),
         newest_s=np.full(shape[:2], -np.inf),
@@ -79,9 +74,7 @@ def remember(frames: Frames, keypoints: Keypoints, time_s: Floats, use: Bools) -
     n = frames.n_taken[b, c] % frames.time_s.shape[2]
     old_s = frames.time_s[b, c, n]
     np.maximum.at(frames.forgotten_s, b, np.where(np.isfinite(old_s), old_s, -np.inf))
-    frames.px[b, c, n] = keypoints.px[b, c]
-    frames.confidence[b, c, n] = keypoints.confidence[b, c]
-    frames.sigma_px[b, c, n] = keypoints.sigma_px[b, c]
+    write_rows(frames.keypoints, (b, c, n), mapped(keypoints, lambda array: array[b, c]))
     frames.time_s[b, c, n] = frames.newest_s[b, c] = time_s[b, c]
     frames.n_taken[b, c] += 1
 
@@ -126,16 +119,12 @@ def beside(frames: Frames, ids: Ints, frame_set: FrameSet, wanted: Bools) -> Key
     held = _frame_set(frames, ids, recent, frame_set.at_s)
     youngest_s = np.where(recent, age_s, np.inf).min(2)
     drift_px = _DRIFT_PX_S * np.where(held.has, youngest_s, 0.0)
-    use = held.has[:, :, None] & wanted[:, None]
-    shown = frame_set.keypoints
+    sigma_px = np.hypot(held.keypoints.sigma_px, drift_px[:, :, None, None])
+    use, shown = (held.has[:, :, None] & wanted[:, None])[..., None], frame_set.keypoints
     return Keypoints(
-        np.where(use[..., None, None], held.keypoints.px, shown.px),
-        np.where(use[..., None], held.keypoints.confidence, shown.confidence),
-        np.where(
-            use[..., None],
-            np.hypot(held.keypoints.sigma_px, drift_px[:, :, None, None]),
-            shown.sigma_px,
-        ),
+        np.where(use[..., None], held.keypoints.px, shown.px),
+        np.where(use, held.keypoints.confidence, shown.confidence),
+        np.where(use, sigma_px, shown.sigma_px),
     )
 
 
@@ -190,6 +179,6 @@ def _frame_set(frames: Frames, ids: Ints, among: Bools, at_s: Floats) -> FrameSe
     """The newest frame of each camera `among` (G, C, N)."""
     n = np.where(among, frames.time_s[ids], -np.inf).argmax(2)
     b, c = ids[:, None], np.arange(n.shape[1])
-    keypoints = Keypoints(frames.px[b, c, n], frames.confidence[b, c, n], frames.sigma_px[b, c, n])
+    keypoints = mapped(frames.keypoints, lambda array: array[b, c, n])
     has = np.asarray(among.any(2))
     return FrameSet(keypoints if has.all() else without(keypoints, ~has), has, at_s)

@@ -1,8 +1,8 @@
 """Keypoints as the kernels take them: one worker's usable measurements, and their noise.
 
-Whatever a detector reports is data. Pixels that are not finite or absurdly far, confidences
-that are not in (0, 1] and standard deviations that are not finite and positive mean that
-there is no measurement; wrong pixels that look like pixels are left to the robust likelihoods.
+Pixels that are not finite or absurdly far, confidences outside (0, 1] and standard deviations that
+are not finite and positive mean that there is no measurement; wrong pixels that look like pixels
+are left to the robust likelihoods.
 """
 
 from typing import NamedTuple
@@ -14,11 +14,7 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Keypoints
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Bools, Floats
-from hrc_env.geometry.triangulation import (
-    FURTHEST_PX,
-    NEAREST_DEPTH_M,
-    pixel_of,
-)
+from hrc_env.geometry.triangulation import FURTHEST_PX, NEAREST_DEPTH_M, pixel_of
 from hrc_env.tracking.tree.cameras import LANES, N_VIEW
 
 MIN_SIGMA_PX = 0.25
@@ -86,11 +82,14 @@ def make_seen(P):
 
 
 @kernel
-def read_worker(px, confidence, sigma_px, b, w, scale, z, sigma, ok):
-    """Worker w of environment b: pixels z (J, C, 2), sigma (J, C), ok (J, C); whether any is ok.
+def read_worker(measured, b, w, scale, seen):
+    """Put what was measured of worker w of environment b into `seen`; whether there is anything.
 
-    Missing measurements get pixel 0 and sigma 1, so that no NaN enters the arithmetic.
+    `measured` is as `arrays_of` gives it, `scale` a factor on sigma. Missing measurements get
+    pixel 0 and sigma 1, so that no NaN enters the arithmetic.
     """
+    px, confidence, sigma_px = measured
+    z, sigma, ok = seen.z, seen.sigma, seen.ok
     any_ok = False
     for c in range(px.shape[1]):
         for j in range(px.shape[3]):
@@ -107,10 +106,9 @@ def read_worker(px, confidence, sigma_px, b, w, scale, z, sigma, ok):
 
 @kernel(fastmath=_REORDER)
 def pixel_spread(p, u, v, depth, cov):
-    """Mean variance of a coordinate of the pixel [px^2] of a point with covariance `cov` (3, 3).
+    """Mean variance of a coordinate of the pixel [px^2] of a point with covariance `cov` (3+, 3+).
 
-    `p` is the (3, 4) camera, (u, v, depth) where it sees the point; more than the first three
-    rows and columns of `cov` are not looked at.
+    `p` is the (3, 4) camera, (u, v, depth) where it sees the point.
     """
     near = 1.0 / depth
     a0, b0 = (p[0, 0] - u * p[2, 0]) * near, (p[1, 0] - v * p[2, 0]) * near

@@ -28,11 +28,8 @@ def estimate_from_truth(truth: WorkerTruth) -> PoseEstimate:
 
 
 def prior(batch: int, n_workers: int, config: TrackerConfig) -> PoseEstimate:
-    """What is believed of workers that nobody has seen.
-
-    Every joint is at `prior_mean_world` with `prior_std_m` on each axis, at rest, as old as
-    ages get, and not tracked.
-    """
+    """What is believed of workers that nobody has seen: at `prior_mean_world`, at rest, not
+    tracked."""
     shape = (batch, n_workers, N_JOINTS)
     return PoseEstimate(
         mean_world=np.tile(np.array(config.prior_mean_world, float), (*shape, 1)),

@@ -1,15 +1,12 @@
 """Frames that arrive late are used at their own time: a short memory, and replay.
 
 `OutOfSequence` wraps any estimator. It keeps what the inner one believed at the end of every
-control step, and the frames of every camera with their times. A frame that was taken before
-now is put where it belongs: the belief before it is restored, and what came after is lived
-through again, each step's prediction split at the exact times of its frames.
+control step, and the frames of every camera with their times. Before a frame that was taken before
+now the belief of then is restored, and what came after is lived through again (with new random
+numbers), each step's prediction split at the exact times of its frames.
 
-Times are whatever the cameras say, so they are data. Frames from the future, too old for the
-memory, not newer than a frame of the same camera that was used already, or without a finite
-time are left out and counted (`LateState.ignored`).
-
-An estimator that draws random numbers draws new ones when it lives through something again.
+Frames from the future, too old for the memory, not newer than a frame of the same camera that was
+used already, or without a finite time are left out and counted (`LateState.ignored`).
 """
 
 from dataclasses import dataclass
@@ -47,8 +44,7 @@ Rngs = list[np.random.Generator]
 class LateState(NamedTuple):
     """What is believed, what was believed, and the frames between; arrays changed in place.
 
-    K slots form a ring; a control step ends in a slot. The slot that is open holds no belief
-    yet: that is `now`.
+    K slots form a ring; a control step ends in a slot. The open slot's belief is `now`.
     """
 
     now: Any
@@ -75,8 +71,7 @@ class LateState(NamedTuple):
 class OutOfSequence:
     """An estimator with a memory of `longest_delay_s`; see `tracking.estimators.Estimator`.
 
-    It holds a copy of the inner state for every control step of that time: with `paper`, whose
-    clouds are large, that is megabytes a worker.
+    It holds a copy of the inner state for every control step of that time: of `paper`'s, megabytes.
     """
 
     inner: Any
@@ -87,8 +82,8 @@ class OutOfSequence:
     longest_delay_s: float
     """Frames older than this are too old [s]."""
     needs_pairs: bool = False
-    """Whether the inner estimator makes nothing of a camera alone: then the last frames of the
-    others are shown to it beside a frame that came out of step, as of the same set."""
+    """Whether the inner estimator makes nothing of a camera alone: then it is shown the others'
+    last frames beside one that came out of step."""
 
     @property
     def config(self) -> TrackerConfig:
@@ -131,7 +126,7 @@ class OutOfSequence:
 
     def update(self, state: LateState, keypoints: Keypoints, rngs: Rngs) -> None:
         """Take frames in, each at its time (`Keypoints.time_s`); draws what the inner one does."""
-        batch, n_workers = len(state.clock_s), state.frames.px.shape[3]
+        batch, n_workers = len(state.clock_s), state.frames.keypoints.px.shape[3]
         shape = (batch, self.n_cameras, n_workers, N_JOINTS)
         check_shape("Keypoints.px", keypoints.px.shape, (*shape, 2), "B, C, W, J, 2")
         time_s = np.repeat(state.clock_s[:, None], self.n_cameras, 1)
@@ -176,10 +171,7 @@ class OutOfSequence:
         self._write(state, ids, part)
 
     def _relive(self, state: LateState, ids: Ints, age: int, rngs: Rngs) -> None:
-        """Let environments `ids` live again through the step that ended `age` - 1 slots back.
-
-        Those whose frames have the same times within the step go together.
-        """
+        """Let environments `ids` live again through the step that ended `age` - 1 slots back."""
         slot = (state.slot[ids] - age + 1) % state.end_s.shape[1]
         steps = (state.end_s[ids, slot], state.step_s[ids, slot])
         for members, step_s, frame_sets in frame_sets_of(state.frames, ids, *steps):

@@ -15,30 +15,22 @@
 
 import math
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any
 
 import numpy as np
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Bools, Covariances3, Floats, Ints, Points3
+from hrc_env.core.typing import Covariances3, Floats, Ints, Points3
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
 from hrc_env.tracking.config import PaperConfig
 from hrc_env.tracking.forecast import forecast
-from hrc_env.tracking.measurements import arrays_of, read_worker, supports
-from hrc_env.tracking.models.acquisition import (
-    STANDING_M,
-    complete_body,
-    count_conflict,
-    find_again,
-    middle_of,
-    triangulate_body,
-)
-from hrc_env.tracking.tracks import Tracks, forget, grow_older, make_tracks, report
+from hrc_env.tracking.measurements import Seen, arrays_of, make_seen, read_worker, supports
+from hrc_env.tracking.models.acquisition import count_conflict, find_again, find_body, middle_of
+from hrc_env.tracking.settings import Settings, settings_of
+from hrc_env.tracking.tracks import forget, grow_older, make_tracks, report
 
-Measured: TypeAlias = tuple[Floats, Floats, Bools]
-"""One worker's pixels (J, C, 2), sigma (J, C) and whether there are any (J, C)."""
 BEHIND = -1e12
 """Log-likelihood of a particle behind the camera that saw the joint: the last to be chosen."""
 
@@ -47,7 +39,8 @@ BEHIND = -1e12
 class PaperState:
     """The clouds, and what is said of them."""
 
-    tracks: Tracks
+    tracks: Any
+    """(B, W) records of `tracks.TRACK`."""
     particles: Floats
     """(B, W, J, 3, M) [m]; of a worker who is not tracked: without meaning."""
     elapsed_s: Floats
@@ -75,33 +68,29 @@ class PaperEstimator:
         state.elapsed_s[ids] = 0.0
 
     def predict(self, state: PaperState, dt_s: float, rngs: list[np.random.Generator]) -> None:
-        """Line 7; the walk's variance is proportional to time.
-
-        The estimate keeps its mean (the walk has none) and its covariance grows by the walk's.
-        """
+        """Line 7; the walk's variance, by which the estimate's covariance grows, is proportional to
+        time."""
         sigma_m = self.config.sigma_m * np.sqrt(dt_s / self.ctrl_dt)
         state.elapsed_s[:] += dt_s
-        for b, w in np.argwhere(state.tracks.tracked):
+        for b, w in np.argwhere(state.tracks["tracked"]):
             roll(state.particles[b, w], sigma_m, rngs[b])  # line 7
-            state.tracks.cov_world[b, w] += sigma_m**2 * np.eye(3)
+            state.tracks["cov_world"][b, w] += sigma_m**2 * np.eye(3)
         grow_older(state.tracks, dt_s, self.config)
 
     def update(
         self, state: PaperState, keypoints: Keypoints, rngs: list[np.random.Generator]
     ) -> None:
         """Lines 8 to 17 for workers with a track; line 1 for those without."""
-        batch, n_workers = state.tracks.tracked.shape
-        n_cameras, scale = len(self.P), self.config.sigma_scale
-        px, confidence, sigma_px = arrays_of(keypoints, (batch, n_cameras, n_workers, N_JOINTS))
-        z, sigma = np.empty((N_JOINTS, n_cameras, 2)), np.empty((N_JOINTS, n_cameras))
-        ok = np.empty((N_JOINTS, n_cameras), bool)
-        for b in range(batch):
-            for w in range(n_workers):
-                read_worker(px, confidence, sigma_px, b, w, scale, z, sigma, ok)
-                if state.tracks.tracked[b, w]:
-                    self._follow(state, b, w, (z, sigma, ok), rngs[b])
-                elif ok.any():
-                    self._initialize(state, b, w, (z, sigma, ok), rngs[b])
+        batch, n_workers = state.tracks.shape
+        measured = arrays_of(keypoints, (batch, len(self.P), n_workers, N_JOINTS))
+        s, seen = settings_of(self.config), make_seen(self.P)
+        for b, w in np.ndindex(batch, n_workers):
+            any_seen = read_worker(measured, b, w, s.sigma_scale, seen)
+            track, particles = state.tracks[b, w], state.particles[b, w]
+            if track["tracked"]:
+                self._follow(track, particles, seen, s, state.elapsed_s[b], rngs[b])
+            elif any_seen:
+                _initialize(track, particles, seen, s, rngs[b])
         state.elapsed_s[:] = 0.0
 
     def estimate(self, state: PaperState) -> PoseEstimate:
@@ -112,60 +101,49 @@ class PaperEstimator:
         """What is expected in `horizon_s`; see `tracking.forecast`."""
         return forecast(self.estimate(state), horizon_s, self.config)
 
-    def _initialize(
-        self, state: PaperState, b: int, w: int, measured: Measured, rng: np.random.Generator
-    ) -> None:
-        """Line 1, initialize_particle(M): clouds round the points on which views agree."""
-        config, tracks = self.config, state.tracks
-        points, cov = np.empty((N_JOINTS, 3)), np.ones((N_JOINTS, 3, 3))
-        found = np.empty(N_JOINTS, bool)
-        gate, radius = config.gate_sigma, config.body_radius_m
-        n_found = triangulate_body(self.P, *measured, gate, radius, points, cov, found)
-        if n_found < config.acquire_min_joints:
-            return
-        complete_body(STANDING_M, points, cov, found)
-        scatter(state.particles[b, w], points, cov, rng)
-        tracks.mean_world[b, w], tracks.cov_world[b, w] = points, cov
-        tracks.velocity_world[b, w] = 0.0
-        tracks.age_s[b, w, found] = 0.0
-        tracks.tracked[b, w] = True
-
     def _follow(
-        self, state: PaperState, b: int, w: int, measured: Measured, rng: np.random.Generator
+        self,
+        track: Any,
+        particles: Floats,
+        seen: Seen,
+        s: Settings,
+        elapsed_s: float,
+        rng: np.random.Generator,
     ) -> None:
         """The loop of lines 2 to 18 for one worker, then the estimate of line 19."""
-        config, tracks, particles = self.config, state.tracks, state.particles[b, w]
+        config = self.config
         for n in range(config.n_iterations):  # line 2: for n = 1 to N
             if n > 0:
                 roll(particles, config.sigma_m, rng)  # line 7, of further passes
             by_weight = config.resampling == "multinomial"
             chance = _chance(by_weight, particles.shape[-1], rng)
-            weigh_and_resample(self.P, *measured, particles, by_weight, chance)
+            weigh_and_resample(seen, particles, by_weight, chance)
         mean, cov = np.empty((N_JOINTS, 3)), np.empty((N_JOINTS, 3, 3))
         moments(particles, mean, cov)  # line 19
-        elapsed_s = max(state.elapsed_s[b], 1e-6)
-        change = (mean - tracks.mean_world[b, w]) / elapsed_s - tracks.velocity_world[b, w]
-        trust = elapsed_s / (config.velocity_tau_s + elapsed_s)
-        tracks.velocity_world[b, w] += trust * change
-        tracks.mean_world[b, w], tracks.cov_world[b, w] = mean, cov
+        elapsed_s = max(elapsed_s, 1e-6)
+        change = (mean - track["mean_world"]) / elapsed_s - track["velocity_world"]
+        track["velocity_world"] += elapsed_s / (config.velocity_tau_s + elapsed_s) * change
+        track["mean_world"], track["cov_world"] = mean, cov
         again = np.zeros(N_JOINTS, bool)
-        _look_after(
-            self.P,
-            *measured,
-            config.gate_sigma,
-            config.body_radius_m,
-            config.conflict_frames,
-            tracks.mean_world[b, w],
-            tracks.cov_world[b, w],
-            tracks.age_s[b, w],
-            tracks.conflict[b, w],
-            again,
-        )
+        _look_after(track, seen, s, again)
         if again.any():
             cloud = np.empty((int(again.sum()), *particles.shape[1:]))
-            scatter(cloud, tracks.mean_world[b, w, again], tracks.cov_world[b, w, again], rng)
+            scatter(cloud, track["mean_world"][again], track["cov_world"][again], rng)
             particles[again] = cloud
-            tracks.velocity_world[b, w, again] = 0.0
+            track["velocity_world"][again] = 0.0
+
+
+def _initialize(
+    track: Any, particles: Floats, seen: Seen, s: Settings, rng: np.random.Generator
+) -> None:
+    """Line 1, initialize_particle(M): clouds round the points on which views agree."""
+    points, cov = np.empty((N_JOINTS, 3)), np.empty((N_JOINTS, 3, 3))
+    found = np.empty(N_JOINTS, bool)
+    if find_body(seen, s, points, cov, found):
+        scatter(particles, points, cov, rng)
+        track["mean_world"], track["cov_world"], track["velocity_world"] = points, cov, 0.0
+        track["age_s"][found] = 0.0
+        track["tracked"] = True
 
 
 def _chance(by_weight: bool, n_particles: int, rng: np.random.Generator) -> Floats:
@@ -176,8 +154,9 @@ def _chance(by_weight: bool, n_particles: int, rng: np.random.Generator) -> Floa
 
 
 @kernel(makes_arrays=True)
-def weigh_and_resample(P, z, sigma, ok, particles, by_weight, chance):
+def weigh_and_resample(seen, particles, by_weight, chance):
     """Lines 8 to 17 for the clouds (J, 3, M) of one worker, in place."""
+    P, z, sigma, ok = seen.P, seen.z, seen.sigma, seen.ok
     n_joints, n_cameras = ok.shape
     n_particles = particles.shape[2]
     log_weights, weights = np.empty(n_particles), np.empty(n_particles)
@@ -201,25 +180,23 @@ def weigh_and_resample(P, z, sigma, ok, particles, by_weight, chance):
 
 
 @kernel(makes_arrays=True)
-def _look_after(
-    P, z, sigma, ok, gate_sigma, radius, conflict_frames, mean, cov, age, conflict, again
-):
+def _look_after(track, seen, s, again):
     """Ages and conflicts of one worker; joints that views agree on elsewhere are found again."""
-    n_joints, n_cameras = ok.shape
+    mean, cov, age, conflict = track.mean_world, track.cov_world, track.age_s, track.conflict
+    n_joints, n_cameras = seen.ok.shape
     middle, point, spread = np.empty(3), np.empty(3), np.empty((3, 3))
     middle_of(mean, np.ones(n_joints, np.bool_), middle)
     for j in range(n_joints):
         n_ok, n_supporting = 0, 0
         for c in range(n_cameras):
-            if ok[j, c]:
+            if seen.ok[j, c]:
+                z, sigma = seen.z[j, c], seen.sigma[j, c]
                 n_ok += 1
-                n_supporting += supports(P[c], z[j, c], sigma[j, c], gate_sigma, mean[j], cov[j])
+                n_supporting += supports(seen.P[c], z, sigma, s.gate_sigma, mean[j], cov[j])
         conflict[j] = count_conflict(n_ok, n_supporting, conflict[j])
         if n_supporting > 0:
             age[j] = 0.0
-        if conflict[j] < conflict_frames:
-            continue
-        if find_again(P, z[j], sigma[j], ok[j], gate_sigma, radius, middle, point, spread):
+        if conflict[j] >= s.conflict_frames and find_again(seen, j, s, middle, point, spread):
             mean[j], cov[j], age[j], conflict[j], again[j] = point, spread, 0.0, 0, True
 
 
@@ -285,13 +262,10 @@ def normalise(log_weights, weights):
 
 @kernel(makes_arrays=True)
 def multinomial(weights, waits, ancestors):
-    """M independent choices, sorted.
+    """M independent choices `ancestors` (M,), sorted, by weights (M,) that sum to one.
 
-    Args:
-        weights: (M,) summing to one.
-        waits: (M + 1,) standard exponential variates: their normalised cumulative sums are
-            M sorted uniform variates (Devroye, Non-Uniform Random Variate Generation, V.3).
-        ancestors: (M,) int, filled.
+    The normalised cumulative sums of `waits` (M + 1,), standard exponential variates, are M sorted
+    uniform ones (Devroye, Non-Uniform Random Variate Generation, V.3).
     """
     total = waits.sum()
     particle, cumulative, position = 0, weights[0], 0.0
@@ -305,12 +279,9 @@ def multinomial(weights, waits, ancestors):
 
 @kernel(makes_arrays=True)
 def systematic(weights, start, ancestors):
-    """Choices at even distances (Kitagawa, 1996): the counts differ from M w_m by less than one.
+    """Choices at even distances after one uniform variate `start` (Kitagawa, 1996).
 
-    Args:
-        weights: (M,) summing to one.
-        start: one uniform variate in [0, 1).
-        ancestors: (M,) int, filled.
+    How often each is chosen differs from M w_m by less than one.
     """
     n = len(ancestors)
     particle, cumulative = 0, weights[0]

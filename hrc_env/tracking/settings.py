@@ -1,9 +1,12 @@
-"""The settings that the kernels of the Gaussian estimators take."""
+"""The settings that the kernels take."""
 
 import math
 from typing import NamedTuple
 
 from hrc_env.tracking.config import ParticleConfig, TrackerConfig, of_kind
+
+_TICK_S = 1e-6
+"""Sums of time steps that are short by no more are whole."""
 
 
 class Settings(NamedTuple):
@@ -29,12 +32,29 @@ class Settings(NamedTuple):
     min_std_m: float
     floor_std_m: float
     bone_give: float
+    mirrors_body: bool
+    """Whether a whole body may be turned the other way."""
+    mirrors_limbs: bool
+    """Whether a limb may be reflected in depth."""
+    look_every_s: float
+    open_depth_m: float
+    turn_std_rad: float
+    evidence_trust: float
+    anatomy_trust: float
+    walking_odds: float
+    log_least_weight: float
 
 
 def settings_of(config: TrackerConfig) -> Settings:
     """The kernels' part of the configuration; of another estimator's, what all share."""
     config = of_kind(config, ParticleConfig)
     weight, area_px = config.outlier_weight, config.image_area_px
-    inlier_odds = (1.0 - weight) * area_px / (2.0 * math.pi * weight)
-    names = set(Settings._fields) - {"inlier_odds"}
-    return Settings(inlier_odds=inlier_odds, **{name: getattr(config, name) for name in names})
+    derived = {
+        "inlier_odds": (1.0 - weight) * area_px / (2.0 * math.pi * weight),
+        "mirrors_body": "body" in config.mirrored_parts,
+        "mirrors_limbs": "limbs" in config.mirrored_parts,
+        "look_every_s": config.look_every_s - _TICK_S,
+        "log_least_weight": math.log(config.least_weight),
+    }
+    names = set(Settings._fields) - set(derived)
+    return Settings(**derived, **{name: getattr(config, name) for name in names})

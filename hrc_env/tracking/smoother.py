@@ -1,20 +1,15 @@
 """What could have been known: a whole clip, smoothed after the fact.
 
-The filter on the kinematic tree goes through the clip, with one hypothesis, and decides who is
-where, which camera is swapped and what is an outlier; then a Rauch-Tung-Striebel pass (AIAA
-Journal 3, 1965) goes back over the filter's own linear motion, on all 90 numbers of a body at
-once. With P the covariance of the belief at t, F and Q the motion to t + 1, x- and
+The filter on the kinematic tree goes through the clip with one hypothesis; then a
+Rauch-Tung-Striebel pass (AIAA Journal 3, 1965) goes back over its linear motion, on all 90 numbers
+of a body at once. With P the covariance of the belief at t, F and Q the motion to t + 1, x- and
 P- = F P F' + Q the prediction:
 
     G = P F' (P-)^-1,   x_s = x + G (x_s' - x-),   P_s = P + G (P_s' - P-) G'.
 
-Where a track was begun anew, nothing is carried back across its beginning.
-
-That would be all if the filter were linear. But with one camera it may have taken the body's
-mirror in depth, and no such pass turns a body round. The clip read backwards is as good a clip,
-and its filter comes to the same frames from the other side: the answer is the mixture of both,
-each with the certainty its filter had there, in mean and covariance. Where they disagree, the
-covariance says so.
+Nothing is carried back across the beginning of a track. As no such pass turns a body round that one
+camera has mirrored in depth, the clip is also read backwards: the answer is the mixture of both,
+each with the certainty its filter had there.
 
 Needing the future, this is no estimator of an environment; it is offline, and in plain numpy.
 """
@@ -32,7 +27,7 @@ from hrc_env.core.skeleton import N_JOINTS, TORSO
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.tracking.config import ParticleConfig, TrackerConfig, of_kind
 from hrc_env.tracking.particle import ParticleEstimator
-from hrc_env.tracking.tracks import Tracks, report
+from hrc_env.tracking.tracks import bounded
 from hrc_env.tracking.tree.gaussian import ORDER, PARENT
 from hrc_env.tracking.tree.state import motion
 
@@ -40,20 +35,12 @@ _N = 6 * N_JOINTS
 
 
 class _Passed(NamedTuple):
-    """What the filter believed in a frame; n = B W workers."""
+    """What the filter believed in a frame of n = B W workers."""
 
     predicted: Floats
     """(n, 90) means before the frame."""
-    mean: Floats
-    """(n, 90) and after it."""
-    cov: Floats
-    """(n, J, 6, 6)."""
-    slope: Floats
-    """(n, J, 6, 6)."""
-    age_s: Floats
-    """(n, J)."""
-    tracked: Bools
-    """(n,)."""
+    trees: Any
+    """(n,) records of `tree.state.TREE` after it."""
     follows: Bools
     """(n,) whether the track is the last frame's."""
 
@@ -109,16 +96,13 @@ def rts_step(
     F: Floats,
     Q: Floats,
 ) -> tuple[Floats, Floats]:
-    """One step back, for n Gaussians of d numbers.
+    """One step back, for n Gaussians of d numbers: mean and covariance, smoothed.
 
     Args:
         belief: mean (n, d) and covariance (n, d, d) as filtered.
         predicted: (n, d) mean of the next frame as predicted from it.
         later: the next frame, smoothed.
         F, Q: (d, d) motion from one to the other, and its noise.
-
-    Returns:
-        Mean and covariance, smoothed.
     """
     (mean, cov), (mean_later, cov_later) = belief, later
     moved = F @ cov
@@ -163,56 +147,46 @@ def _one_way(estimator: ParticleEstimator, clip: Sequence[Keypoints], dt_s: floa
     """Filter through a clip, smooth back."""
     passed = _filtered(estimator, clip, dt_s)
     F, Q = linear_motion(dt_s, estimator.config)
-    last = passed[-1]
-    mean, cov = last.mean, dense(last.cov, last.slope)
+    mean, cov = _moments(passed[-1].trees)
     means, covs = [mean], [_own(cov)]
     for here, later in zip(passed[-2::-1], passed[:0:-1], strict=True):
         on = later.follows
-        x, spread = here.mean.copy(), dense(here.cov, here.slope)
+        x, spread = _moments(here.trees)
         now, then = (x[on], spread[on]), (mean[on], cov[on])
         x[on], spread[on] = rts_step(now, later.predicted[on], then, F, Q)
         mean, cov = x, spread
         means.append(mean)
         covs.append(_own(cov))
-    position = np.stack([each.cov for each in passed])[..., :3, :3]
+    trees = np.stack([each.trees for each in passed])
     return _Smoothed(
         mean=np.stack(means[::-1]).reshape(len(passed), -1, N_JOINTS, 6),
         cov=np.stack(covs[::-1]),
-        doubt=np.trace(position, axis1=-2, axis2=-1).mean(-1),
-        age_s=np.stack([each.age_s for each in passed]),
-        tracked=np.stack([each.tracked for each in passed]),
+        doubt=np.trace(trees["cov"][..., :3, :3], axis1=-2, axis2=-1).mean(-1),
+        age_s=trees["age_s"],
+        tracked=trees["tracked"],
     )
 
 
 def _filtered(
     estimator: ParticleEstimator, clip: Sequence[Keypoints], dt_s: float
 ) -> list[_Passed]:
+    """What the filter believed in every frame."""
     batch, _, n_workers = clip[0].px.shape[:3]
-    hypotheses, passed = estimator.init(batch, n_workers), []
-    state = hypotheses.trees
-    blocks = (-1, N_JOINTS, 6, 6)
+    state, passed = estimator.init(batch, n_workers), []
     for keypoints in clip:
-        estimator.predict(hypotheses, dt_s, [])
-        predicted, before = state.body.reshape(-1, _N).copy(), state.tracked.ravel().copy()
-        estimator.update(hypotheses, keypoints, [])
-        tracked = state.tracked.ravel().copy()
-        passed.append(
-            _Passed(
-                predicted=predicted,
-                mean=state.body.reshape(-1, _N).copy(),
-                cov=state.cov.reshape(blocks).copy(),
-                slope=state.slope.reshape(blocks).copy(),
-                age_s=state.age_s.reshape(-1, N_JOINTS).copy(),
-                tracked=tracked,
-                follows=before & tracked & ~_began(state),
-            )
-        )
+        estimator.predict(state, dt_s, [])
+        before = state.trees.view(np.ndarray).flatten()
+        estimator.update(state, keypoints, [])
+        trees = state.trees.view(np.ndarray).flatten()
+        began = ~trees["body"][..., 3:].any((-2, -1))  # at rest: in the first frame, and only then
+        follows = before["tracked"] & trees["tracked"] & ~began
+        passed.append(_Passed(before["body"].reshape(-1, _N), trees, follows))
     return passed
 
 
-def _began(state: Any) -> Bools:
-    """(n,) whether a track was begun in this frame: then the body is at rest, and only then."""
-    return ~state.body[..., 3:].any((-2, -1)).ravel()
+def _moments(trees: Any) -> tuple[Floats, Floats]:
+    """Mean (n, 90) and covariance (n, 90, 90) of trees (n,)."""
+    return trees["body"].reshape(-1, _N).copy(), dense(trees["cov"], trees["slope"])
 
 
 def _own(cov: Floats) -> Floats:
@@ -254,12 +228,11 @@ def _reported(
     n_frames, batch, n_workers = shape
     tracked = smoothed.tracked.reshape(-1, n_workers)
     joints = (*tracked.shape, N_JOINTS)
-    tracks = Tracks(
+    estimate = PoseEstimate(
         mean_world=smoothed.mean[..., :3].reshape(*joints, 3),
         cov_world=smoothed.cov.reshape(*joints, 3, 3),
         velocity_world=smoothed.mean[..., 3:].reshape(*joints, 3),
         age_s=smoothed.age_s.reshape(joints),
         tracked=tracked,
-        conflict=np.zeros(joints, np.int64),
     )
-    return mapped(report(tracks, config), lambda a: a.reshape(n_frames, batch, *a.shape[1:]))
+    return mapped(bounded(estimate, config), lambda a: a.reshape(n_frames, batch, *a.shape[1:]))

@@ -1,7 +1,7 @@
-"""What every estimator keeps of a worker, and how it ages, is lost and is reported."""
+"""What the estimators without hypotheses keep of a worker, and how all of them age and report."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -9,85 +9,58 @@ import numpy as np
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Bools, Covariances3, Floats, Ints, Points3, Velocities3
+from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.oracle import prior
 from hrc_env.tracking.settings import settings_of
 
+_J = N_JOINTS
+TRACK = np.dtype(
+    [
+        # position [m], its covariance [m^2] and velocity [m/s]
+        ("mean_world", "f8", (_J, 3)), ("cov_world", "f8", (_J, 3, 3)),
+        ("velocity_world", "f8", (_J, 3)),
+        # since a measurement supported the joint [s]; updates in a row in which views did not
+        ("age_s", "f8", (_J,)), ("conflict", "i8", (_J,)), ("tracked", "?"),
+    ],
+    align=True,
+)  # fmt: skip
+"""What is believed of one worker."""
 _ROUNDING = 1e-6
 """Least eigenvalues may be wrong by no more than this share of the largest."""
 
 
-@dataclass(frozen=True, slots=True)
-class Tracks:
-    """One track per worker; the arrays are changed in place."""
-
-    mean_world: Points3
-    """(B, W, J, 3) [m]."""
-    cov_world: Covariances3
-    """(B, W, J, 3, 3) [m^2]."""
-    velocity_world: Velocities3
-    """(B, W, J, 3) [m/s]."""
-    age_s: Floats
-    """(B, W, J) seconds since a measurement supported the joint."""
-    tracked: Bools
-    """(B, W)."""
-    conflict: Ints
-    """(B, W, J) updates in a row in which views were there and did not support the joint."""
+def make_tracks(batch: int, n_workers: int, config: TrackerConfig) -> Any:
+    """(B, W) records of `TRACK`, of workers whom nobody has seen."""
+    tracks = np.zeros((batch, n_workers), TRACK)
+    forget(tracks, np.arange(batch), config)
+    return tracks
 
 
-def make_tracks(batch: int, n_workers: int, config: TrackerConfig) -> Tracks:
-    """Tracks of workers whom nobody has seen: the prior."""
-    start = prior(batch, n_workers, config)
-    return Tracks(
-        mean_world=start.mean_world,
-        cov_world=start.cov_world,
-        velocity_world=start.velocity_world,
-        age_s=start.age_s,
-        tracked=start.tracked,
-        conflict=np.zeros(start.age_s.shape, np.int64),
-    )
-
-
-def gaussian_tracks(trees: Any) -> Tracks:
-    """The part of trees (B, W), records of `TREE`, that all estimators share, as views."""
-    return Tracks(
-        mean_world=trees["body"][..., :3],
-        cov_world=trees["cov"][..., :3, :3],
-        velocity_world=trees["body"][..., 3:],
-        age_s=trees["age_s"],
-        tracked=trees["tracked"],
-        conflict=trees["conflict"],
-    )
-
-
-def forget(tracks: Tracks, ids: Ints, config: TrackerConfig) -> None:
+def forget(tracks: Any, ids: Ints, config: TrackerConfig) -> None:
     """Put environments `ids` back to the prior."""
-    tracks.mean_world[ids] = config.prior_mean_world
-    tracks.cov_world[ids] = config.prior_std_m**2 * np.eye(3)
-    tracks.velocity_world[ids] = 0.0
-    tracks.age_s[ids] = config.max_age_s
-    tracks.tracked[ids] = False
-    tracks.conflict[ids] = 0
+    fresh = np.zeros((), TRACK)
+    fresh["mean_world"] = config.prior_mean_world
+    fresh["cov_world"] = config.prior_std_m**2 * np.eye(3)
+    fresh["age_s"] = config.max_age_s
+    tracks[ids] = fresh
 
 
-def grow_older(tracks: Tracks, dt_s: float, config: TrackerConfig) -> None:
+def grow_older(tracks: Any, dt_s: float, config: TrackerConfig) -> None:
     """Count ages up, give up tracks that nothing supports, let lost ones relax to the prior.
 
     A lost worker's mean and covariance follow an Ornstein-Uhlenbeck process whose stationary
-    distribution is the prior: the longer ago, the more it is the prior that is reported.
+    distribution is the prior.
     """
-    gaussian = (tracks.mean_world, tracks.cov_world, tracks.velocity_world)
-    _grow_older(*gaussian, tracks.age_s, tracks.conflict, tracks.tracked, dt_s, settings_of(config))
+    _grow_older(tracks, dt_s, settings_of(config))
 
 
 @kernel
-def _grow_older(mean, cov, velocity, age, conflict, tracked, dt, s):
-    for b in range(mean.shape[0]):
-        for w in range(mean.shape[1]):
-            gaussian = (mean[b, w], cov[b, w], velocity[b, w])
-            still = age_worker(*gaussian, age[b, w], conflict[b, w], tracked[b, w], dt, s)
-            tracked[b, w] = still
+def _grow_older(tracks, dt, s):
+    for b in range(tracks.shape[0]):
+        for w in range(tracks.shape[1]):
+            t = tracks[b, w]
+            gaussian = (t.mean_world, t.cov_world, t.velocity_world)
+            t.tracked = age_worker(*gaussian, t.age_s, t.conflict, t.tracked, dt, s)
 
 
 @kernel
@@ -129,22 +102,21 @@ def relax(mean, cov, velocity, keep, home, std):
 
 def blank(shape: tuple[int, ...]) -> tuple[Floats, Floats, Floats, Floats, Bools]:
     """The arrays of a `PoseEstimate` of (B, W) workers, for a kernel to fill in."""
-    joints = (*shape, N_JOINTS)
+    joints = (*shape, _J)
     moments = np.empty((*joints, 3)), np.empty((*joints, 3, 3)), np.empty((*joints, 3))
     return (*moments, np.empty(joints), np.empty(shape, bool))
 
 
-def report(tracks: Tracks, config: TrackerConfig) -> PoseEstimate:
-    """The tracks as others may see them: copies, covariances no less than the floor allows."""
-    cov = tracks.cov_world.copy()
-    _bound_all(cov, config.min_std_m, config.prior_std_m)
-    return PoseEstimate(
-        mean_world=tracks.mean_world.copy(),
-        cov_world=cov,
-        velocity_world=tracks.velocity_world.copy(),
-        age_s=tracks.age_s.copy(),
-        tracked=tracks.tracked.copy(),
-    )
+def report(tracks: Any, config: TrackerConfig) -> PoseEstimate:
+    """The tracks as others may see them, in arrays of their own."""
+    names = [each.name for each in fields(PoseEstimate)]
+    return bounded(PoseEstimate(*(tracks[name].copy() for name in names)), config)
+
+
+def bounded(estimate: PoseEstimate, config: TrackerConfig) -> PoseEstimate:
+    """An estimate whose covariances were put, in place, between the floor and the prior."""
+    _bound_all(estimate.cov_world, config.min_std_m, config.prior_std_m)
+    return estimate
 
 
 @kernel

@@ -197,7 +197,7 @@ def test_tracks_are_compared_with_the_workers_whom_they_fit():
 def test_bones_are_given_and_taken_away():
     state, lengths = state_of(Setting("x", "x"))
     handicap(state, "known", "model", lengths)
-    assert np.array_equal(state.trees.bone_length, np.repeat(lengths, 8, axis=1))
+    assert (state.trees.bone_length == lengths[:, :, None]).all()
     handicap(state, "none", "model", lengths)
     assert (state.trees.bone_variance == 1e6).all()
     with pytest.raises(ConfigError, match="body on a tree"):
@@ -208,12 +208,12 @@ def test_a_forgotten_velocity_leaves_the_positions_as_they_are():
     state, lengths = state_of(Setting("x", "x"))
     trees = state.trees
     parent = np.where(np.arange(N_JOINTS) == ROOT, ROOT, PARENT)
-    positions = trees.cov[:, 0, :, :3, :3].copy()
-    together = (trees.slope @ trees.cov[:, :, parent])[:, 0, :, :3, :3].copy()
+    positions = trees.cov[:, 0, 0, :, :3, :3].copy()
+    together = (trees.slope @ trees.cov[..., parent, :, :])[:, 0, 0, :, :3, :3].copy()
     handicap(state, "learnt", "forgotten", lengths)
     assert (trees.body[..., 3:] == 0).all()
-    assert np.array_equal(trees.cov[:, 0, :, :3, :3], positions)
-    now = (trees.slope @ trees.cov[:, :, parent])[:, 0, :, :3, :3]
+    assert np.array_equal(trees.cov[:, 0, 0, :, :3, :3], positions)
+    now = (trees.slope @ trees.cov[..., parent, :, :])[:, 0, 0, :, :3, :3]
     others = np.arange(N_JOINTS) != ROOT
     assert np.allclose(now[:, others], together[:, others], atol=1e-12)
     assert np.linalg.eigvalsh(trees.cov).min() > 0

@@ -171,8 +171,8 @@ def test_one_hypothesis_is_its_own_mixture_and_two_that_differ_spread():
     both = PoseEstimate(
         *(np.concatenate([getattr(one, f), getattr(two, f)], 1) for f in PoseEstimate.__slots__)
     )
-    weights = np.log([[0.75, 0.25]])
-    alone = mixed(both, np.zeros((1, 2)), np.array([[1]]))
+    weights = np.log([[[0.75, 0.25]]])
+    alone = mixed(both, np.zeros((1, 1, 2)), np.array([[1]]))
     np.testing.assert_array_equal(alone.mean_world, one.mean_world)
     np.testing.assert_array_equal(alone.cov_world, one.cov_world)
     mixture = mixed(both, weights, np.array([[2]]))
@@ -184,5 +184,5 @@ def test_one_hypothesis_is_its_own_mixture_and_two_that_differ_spread():
 def test_where_no_workers_are_none_are_expected():
     nobody = prior(2, 0, CONFIG)
     assert forecast(nobody, 0.5, CONFIG).mean_world.shape == (2, 0, N_JOINTS, 3)
-    later = mixed(nobody, np.zeros((2, 0)), np.ones((2, 0), np.int64))
+    later = mixed(nobody, np.zeros((2, 0, 1)), np.ones((2, 0), np.int64))
     assert later.cov_world.shape == (2, 0, N_JOINTS, 3, 3)

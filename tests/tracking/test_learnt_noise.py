@@ -54,7 +54,7 @@ def judged(joints, means, covs):
 def test_white_errors_as_large_as_told_leave_the_factor_at_one_and_the_estimate_alone():
     joints, px = walks()
     state, *ours = follow(px, WHITE)
-    np.testing.assert_allclose(state.noise.factor.mean((2, 3)), 1.0, atol=0.1)
+    np.testing.assert_allclose(state.noise.factor.mean((3, 4)), 1.0, atol=0.1)
     _, *fixed = follow(px, FIXED)
     assert judged(joints, *ours)[0] < 1.01 * judged(joints, *fixed)[0]
     assert judged(joints, *ours)[1] == pytest.approx(judged(joints, *fixed)[1], abs=0.01)
@@ -77,7 +77,7 @@ def test_a_share_that_is_told_too_large_is_unlearnt():
 def test_one_camera_that_is_worse_than_the_others_is_found():
     _, px = walks()
     px[:, :, 2] += 6.0 * np.random.default_rng(1).standard_normal(px[:, :, 2].shape)
-    factor = follow(px)[0].noise.factor.mean((0, 1, 2))
+    factor = follow(px)[0].noise.factor.mean((0, 1, 2, 3))
     assert factor[2] == pytest.approx(5.0, rel=0.15)
     np.testing.assert_allclose(factor[[0, 1, 3]], 1.0, atol=0.25)
 
@@ -117,7 +117,7 @@ def test_a_camera_that_is_grossly_wrong_for_a_while_teaches_nothing():
     _, px = walks()
     px[60:110, :, 1] += 200.0
     factor = follow(px)[0].noise.factor
-    np.testing.assert_allclose(factor.mean((0, 1, 2)), 1.0, atol=0.15)
+    np.testing.assert_allclose(factor.mean((0, 1, 2, 3)), 1.0, atol=0.15)
 
 
 def test_nothing_that_a_camera_shows_makes_it_leave_its_bounds():

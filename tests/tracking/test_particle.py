@@ -9,7 +9,7 @@ from hrc_env.tracking.config import ParticleConfig
 from hrc_env.tracking.estimators import make_estimator
 from hrc_env.tracking.hypotheses.anatomy import anatomy
 from hrc_env.tracking.hypotheses.depth_flip import eye_of, lone_camera, open_depth, reflect
-from hrc_env.tracking.hypotheses.slots import exchange_slots, merge, normalise
+from hrc_env.tracking.hypotheses.slots import Hypotheses, exchange_slots, merge, normalise
 from hrc_env.tracking.hypotheses.yaw_flip import heads_like, turn_body, turn_of
 from hrc_env.tracking.tree.evidence import tree_measure
 from hrc_env.tracking.tree.gaussian import ORDER, PARENT
@@ -43,6 +43,11 @@ def followed(px, config=None):
         e.update(state, keypoints(frame), rngs)
         n_alive.append(state.n_alive[:, 0].copy())
     return e, state, np.array(n_alive)
+
+
+def slots(state):
+    """The first worker's hypotheses alone."""
+    return Hypotheses(*(array[0, 0] for array in state[:3]), state.n_alive[0], state.waited_s[0])
 
 
 def standing(heading_rad=0.0, place=(0.5, 0.2, 0.0)):
@@ -112,7 +117,7 @@ def test_predictions_without_frames_stay_where_those_of_one_hypothesis_are():
                 e.update(state, keypoints(frame), rngs)
             if name == "particle":
                 most = max(most, state.n_alive.max())
-                whole = np.exp(state.trees.log_weight[0, : state.n_alive[0, 0]]).sum()
+                whole = np.exp(state.trees.log_weight[0, 0, : state.n_alive[0, 0]]).sum()
                 assert whole == pytest.approx(1.0)
             mean.append(e.estimate(state).mean_world[:, 0])
         error[name] = np.sqrt(((np.stack(mean) - joints)[40:] ** 2).sum(-1).mean())
@@ -128,7 +133,7 @@ def test_a_worker_who_is_lost_has_one_hypothesis_which_relaxes_to_the_prior():
         e.predict(state, DT, generators(1))
     assert not e.estimate(state).tracked.any()
     assert (state.n_alive == 1).all()
-    assert (state.trees.log_weight[0, 0] == 0.0).all()
+    assert state.trees.log_weight[0, 0, 0] == 0.0
 
 
 def test_one_camera_does_not_turn_the_body_round():
@@ -176,13 +181,13 @@ def test_the_mixtures_moments_are_those_of_its_parts():
         e.update(state, keypoints(frame), rngs)
         n = state.n_alive[0, 0]
         most = max(most, n)
-        share = np.exp(state.trees.log_weight[0, :n])
+        share = np.exp(state.trees.log_weight[0, 0, :n])
         assert share.sum() == pytest.approx(1.0)
         assert share[0] == share.max()
-        points = state.trees.body[0, :n, :, :3]
+        points = state.trees.body[0, 0, :n, :, :3]
         mean = np.einsum("h,hji->ji", share, points)
         apart = points - mean
-        cov = np.einsum("h,hjik->jik", share, state.trees.cov[0, :n, :, :3, :3])
+        cov = np.einsum("h,hjik->jik", share, state.trees.cov[0, 0, :n, :, :3, :3])
         cov += np.einsum("h,hji,hjk->jik", share, apart, apart)
         estimate = e.estimate(state)
         np.testing.assert_allclose(estimate.mean_world[0, 0], mean, atol=1e-9)
@@ -250,7 +255,8 @@ def test_a_parts_depth_is_open_as_far_as_its_best_known_joint_is():
 def test_the_trees_determinant_and_square_are_those_of_the_whole_matrix():
     px = detections(walk(6, 30), HARD, 6)[:, None]
     _, state, _ = followed(px)
-    cov, slope = state.trees.cov[0, 0], state.trees.slope[0, 0]
+    tree = state.trees[0, 0, 0]
+    cov, slope = tree.cov, tree.slope
     whole = np.zeros((15, 15, 6, 6))
     for n, j in enumerate(ORDER):
         for k in ORDER[:n]:
@@ -259,9 +265,7 @@ def test_the_trees_determinant_and_square_are_those_of_the_whole_matrix():
         whole[j, j] = cov[j]
     matrix = whole.transpose(0, 2, 1, 3).reshape(90, 90)
     change = np.random.default_rng(0).normal(0, 0.05, (15, 6))
-    square, log_det = tree_measure(
-        cov, slope, change.copy(), np.zeros(1, WORK).view(np.recarray)[0]
-    )
+    square, log_det = tree_measure(tree, change.copy(), np.zeros(1, WORK).view(np.recarray)[0])
     assert log_det == pytest.approx(np.linalg.slogdet(matrix)[1], rel=1e-6)
     expected = change.ravel() @ np.linalg.solve(matrix, change.ravel())
     assert square == pytest.approx(expected, rel=1e-5)
@@ -270,17 +274,18 @@ def test_the_trees_determinant_and_square_are_those_of_the_whole_matrix():
 def test_hypotheses_that_have_come_close_are_one_and_light_ones_are_dropped():
     px = detections(walk(7, 20), Damage(), 7)[:, None]
     _, state, _ = followed(px)
-    state.trees[:, 1:3] = state.trees[:, :1]
-    state.trees.body[0, 2, :, 0] += 1.0
-    state.n_alive[0, 0] = 3
-    state.trees.log_weight[0, :3] = np.log([0.3, 0.4, 0.3])
-    merge(state, 0, 0, 4.0, np.zeros(1, WORK).view(np.recarray)[0])
-    normalise(state, 0, 0, np.log(1e-3))
-    assert state.n_alive[0, 0] == 2
-    np.testing.assert_allclose(np.exp(state.trees.log_weight[0, :2]), [0.7, 0.3])
-    state.trees.log_weight[0, 1] = -20.0
-    normalise(state, 0, 0, np.log(1e-3))
-    assert state.n_alive[0, 0] == 1
+    own = slots(state)
+    own.trees[1:3] = own.trees[:1]
+    own.trees.body[2, :, 0] += 1.0
+    own.n_alive[0] = 3
+    own.trees.log_weight[:3] = np.log([0.3, 0.4, 0.3])
+    merge(own, 4.0, np.zeros(1, WORK).view(np.recarray)[0])
+    normalise(own, np.log(1e-3))
+    assert own.n_alive[0] == 2
+    np.testing.assert_allclose(np.exp(own.trees.log_weight[:2]), [0.7, 0.3])
+    own.trees.log_weight[1] = -20.0
+    normalise(own, np.log(1e-3))
+    assert own.n_alive[0] == 1
 
 
 def test_exchanging_slots_exchanges_every_array():
@@ -289,11 +294,11 @@ def test_exchanging_slots_exchanges_every_array():
     rng = np.random.default_rng(0)
     for array in state[:3]:
         for field in array.dtype.names:
-            array[field][:, :2] = rng.integers(0, 2, array[field][:, :2].shape)
-    before = [array[0, :2].copy() for array in state[:3]]
-    exchange_slots(state, 0, 0, 1)
+            array[field][:, :, :2] = rng.integers(0, 2, array[field][:, :, :2].shape)
+    before = [array[0, 0, :2].copy() for array in state[:3]]
+    exchange_slots(slots(state), 0, 1)
     for was, array in zip(before, state[:3], strict=True):
-        np.testing.assert_array_equal(array[0, :2], was[::-1])
+        np.testing.assert_array_equal(array[0, 0, :2], was[::-1])
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from hrc_env.tracking.models.motion import damped_joints, whole_body_noise
 from hrc_env.tracking.tree.bone_lengths import learn_lengths, population_edges
 from hrc_env.tracking.tree.gaussian import EDGE_BONE, ORDER, PARENT, ROOT, invert
 from hrc_env.tracking.tree.predict import predict_tree
+from hrc_env.tracking.tree.state import TREE
 from hrc_env.tracking.tree.update import update_tree
 from hrc_env.tracking.tree.work import WORK
 
@@ -25,15 +26,21 @@ def random_covariance(rng, n=6, scale=0.2):
 
 
 def random_tree(rng):
-    """Means (J, 6), marginals and slopes (J, 6, 6) of a random Gaussian on the tree."""
-    body = np.concatenate([STANDING_M + 0.05 * rng.normal(size=(J, 3)), rng.normal(size=(J, 3))], 1)
-    cov, slope = np.zeros((J, 6, 6)), np.zeros((J, 6, 6))
+    """A random Gaussian on the tree, of a standing body."""
+    tree = np.zeros(1, TREE).view(np.recarray)[0]
+    body, cov, slope = tree.body, tree.cov, tree.slope
+    body[:, :3], body[:, 3:] = STANDING_M + 0.05 * rng.normal(size=(J, 3)), rng.normal(size=(J, 3))
+    tree.offset, tree.offset_count = STANDING_M, 5.0
     for j in ORDER:
         cov[j] = random_covariance(rng)
         if j != ROOT:
             slope[j] = 0.5 * rng.normal(size=(6, 6))
             cov[j] += slope[j] @ cov[PARENT[j]] @ slope[j].T
-    return body, cov, slope
+    return tree
+
+
+def work():
+    return np.zeros(1, WORK).view(np.recarray)[0]
 
 
 def dense(cov, slope):
@@ -82,8 +89,9 @@ def test_the_inverse_is_the_inverse_and_says_when_there_is_none(seed):
 @given(seed=seeds)
 def test_an_update_is_the_dense_gaussian_update(seed):
     rng = np.random.default_rng(seed)
-    body, cov, slope = random_tree(rng)
-    prior, mean, w = dense(cov, slope), body.copy().ravel(), np.zeros(1, WORK).view(np.recarray)[0]
+    tree, w = random_tree(rng), work()
+    body, cov, slope = tree.body, tree.cov, tree.slope
+    prior, mean = dense(cov, slope), body.copy().ravel()
     precision, gradient = np.linalg.inv(prior), np.zeros(6 * J)
     for j in range(J):
         w.camera_information[j] = random_covariance(rng, 3, 5.0) * rng.integers(0, 2)
@@ -99,7 +107,7 @@ def test_an_update_is_the_dense_gaussian_update(seed):
             gradient += difference.T @ w.edge_gradient[j]
     for j in ORDER[1:]:
         w.edge[j] = slope[j] @ cov[PARENT[j]]
-    update_tree(body, cov, slope, w)
+    update_tree(tree, w)
     posterior = np.linalg.inv(precision)
     np.testing.assert_allclose(body.ravel(), mean + posterior @ gradient, atol=1e-7)
     assert_is_projection(posterior, cov, slope)
@@ -110,22 +118,13 @@ def test_an_update_is_the_dense_gaussian_update(seed):
 @given(seed=seeds)
 def test_a_prediction_is_the_dense_one_projected_on_the_tree(seed):
     rng = np.random.default_rng(seed)
-    body, cov, slope = random_tree(rng)
+    tree = random_tree(rng)
+    body, cov, slope = tree.body, tree.cov, tree.slope
     prior, mean = dense(cov, slope), body.copy()
     F, Q = damped_joints(DT, 0.5, 4.0)
     shared = whole_body_noise(DT, 4.0)
     travel = np.array([[1, DT], [0, 1]]) - F
-    offset, count = STANDING_M.copy(), np.full(J, 5.0)
-    predict_tree(
-        body,
-        cov,
-        slope,
-        offset,
-        count,
-        (F, travel, Q, shared),
-        DT,
-        np.zeros(1, WORK).view(np.recarray)[0],
-    )
+    predict_tree(tree, (F, travel, Q, shared), DT, work())
     moves, noise = np.zeros((J, 6, J, 6)), np.zeros((J, 6, J, 6))
     for j in range(J):
         moves[j, :, j] += np.kron(F[j], _I3)
@@ -137,7 +136,7 @@ def test_a_prediction_is_the_dense_one_projected_on_the_tree(seed):
     assert_is_projection(moves @ prior @ moves.T + noise, cov, slope)
     sideways = mean[[1, 7], :2].sum(0) - mean[[2, 8], :2].sum(0)
     left = np.append(sideways / np.linalg.norm(sideways), 0)
-    place = offset @ np.array([[left[1], -left[0], 0], left, [0, 0, 1]])
+    place = tree.offset @ np.array([[left[1], -left[0], 0], left, [0, 0, 1]])
     pulled = (travel[:, :, :1] * place[:, None]).ravel()  # (J, 2, 3): damped to its place
     np.testing.assert_allclose(body.ravel(), moves @ mean.ravel() + pulled, atol=1e-9)
 
@@ -145,16 +144,13 @@ def test_a_prediction_is_the_dense_one_projected_on_the_tree(seed):
 def test_a_body_that_nobody_sees_keeps_its_shape_but_not_its_place():
     """Damping towards the torso must not make smaller what the torso does not know."""
     rng = np.random.default_rng(0)
-    body, cov, slope = random_tree(rng)
-    body[:, 3:], slope[:] = 0.0, 0.0
-    cov[:] = 1e-4 * np.eye(6)
+    tree = random_tree(rng)
+    tree.body[:, 3:], tree.slope[:] = 0.0, 0.0
+    tree.cov[:] = 1e-4 * np.eye(6)
     model = (*_model(), whole_body_noise(DT, 4.0))
-    offset, count = STANDING_M.copy(), np.full(J, 5.0)
     for _ in range(50):
-        predict_tree(
-            body, cov, slope, offset, count, model, DT, np.zeros(1, WORK).view(np.recarray)[0]
-        )
-    full = dense(cov, slope)
+        predict_tree(tree, model, DT, work())
+    full = dense(tree.cov, tree.slope)
     spread = np.sqrt(np.diagonal(full).reshape(J, 6)[:, :3].mean(-1))
     assert (spread > 2.0).all()  # two seconds of 4 m^2/s^3: sqrt(4 * 8 / 3) = 3.3 m
     q, j = 5, 6  # wrists know where the other is better than where they are
@@ -169,19 +165,21 @@ def _model():
 
 def test_lengths_are_learnt_although_errors_across_a_bone_lengthen_it():
     rng = np.random.default_rng(1)
-    length, variance = population_edges()
-    true, std = 1.07 * length, 0.03
-    cov, slope = np.tile(1e-6 * np.eye(6), (J, 1, 1)), np.zeros((J, 6, 6))
-    cov[:, range(3), range(3)] = std**2
+    tree = np.zeros(1, TREE).view(np.recarray)[0]
+    tree.bone_length, tree.bone_variance = population_edges()
+    true, std = 1.07 * tree.bone_length, 0.03
+    tree.cov = 1e-6 * np.eye(6)
+    tree.cov[:, range(3), range(3)] = std**2
     for _ in range(1500):
         body = np.zeros((J, 6))
         for j in ORDER[1:]:
             body[j, :3] = body[PARENT[j], :3] + [true[j], 0, 0]
         body[:, :3] += std * rng.normal(size=(J, 3))
-        learn_lengths(body, cov, slope, np.full(J, 4), length, variance)
-    error = np.delete(length - true, ROOT)
+        tree.body = body
+        learn_lengths(tree, np.full(J, 4))
+    error = np.delete(tree.bone_length - true, ROOT)
     assert np.abs(error).max() < 0.01
     assert np.abs(error.mean()) < 0.003
-    seen = length.copy()
-    learn_lengths(body, cov, slope, np.ones(J, int), length, variance)
-    np.testing.assert_array_equal(length, seen)  # one view teaches no length
+    seen = tree.bone_length.copy()
+    learn_lengths(tree, np.ones(J, int))
+    np.testing.assert_array_equal(tree.bone_length, seen)  # one view teaches no length

@@ -139,10 +139,8 @@ def _of_joints(key: str, sums: Mapping[str, Any]) -> dict[str, Metric]:
 
 
 def _by_sight(of_settings: Mapping[str, Sums]) -> dict[str, dict[str, Any]]:
-    """Settings of a scene together, by how many cameras see a joint: `<scene>_seen_<k>`.
-
-    An episode of one setting and that of another are of the same seed: they count as one.
-    """
+    """Settings of a scene together, by how many cameras see a joint, as `<scene>_seen_<k>`;
+    their episodes of one seed count as one."""
     found: dict[str, dict[str, Any]] = {}
     for setting, sums in of_settings.items():
         for what, values in sums.items():

@@ -46,8 +46,7 @@ def handicap(state: Any, bones: str, motion: str, lengths: Floats) -> None:
     if bones == "none":
         trees.bone_variance[...] = UNKNOWN_M2
     elif bones == "known":
-        n_slots = trees.bone_length.shape[1] // lengths.shape[1]
-        trees.bone_length[...] = np.repeat(lengths, n_slots, axis=1)
+        trees.bone_length[...] = lengths[:, :, None]
         trees.bone_variance[...] = KNOWN_M2
     if motion == "forgotten":
         _forget_velocities(trees)
@@ -56,11 +55,11 @@ def handicap(state: Any, bones: str, motion: str, lengths: Floats) -> None:
 def _forget_velocities(trees: Any) -> None:
     """Keep the marginal of all positions, which is again a Gaussian on the tree."""
     cov, slope = trees.cov, trees.slope
-    of_parent = cov[:, :, _PARENT]
+    of_parent = cov[..., _PARENT, :, :]
     together = (slope @ of_parent)[..., :3, :3]  # of a joint's position and its parent's
     positions = together @ np.linalg.inv(of_parent[..., :3, :3])
     slope[...], slope[..., :3, :3] = 0.0, positions
-    slope[:, :, ROOT] = 0.0
+    slope[..., ROOT, :, :] = 0.0
     trees.body[..., 3:] = 0.0
     cov[..., 3:, :], cov[..., :, 3:] = 0.0, 0.0
     cov[..., [3, 4, 5], [3, 4, 5]] = SPEED_MPS**2

@@ -31,8 +31,6 @@ PARTS_FROM = (
 """Those that make finished parts."""
 FIRST_SEED = 1_000_000
 """Of the episodes, far from those that the policy learns in."""
-SWEPT = (REFERENCE, *(setup.name for setup in LATE))
-"""Setups for which margins are compared."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,9 +70,10 @@ class ImpactConfig:
         return [FIRST_SEED + k for k in range(n)]
 
     def rows(self) -> Iterator[tuple[PerceptionSetup, list[Policy]]]:
-        """Every setup, and who is played with it."""
+        """Every setup, and who is played with it; late ones and the reference with all margins."""
+        swept = [REFERENCE, *(each.name for each in LATE)] if SLOWED in self.policies else []
         for name in self.setups:
-            margins_m = self.margins_m if SLOWED in self.policies and name in SWEPT else ()
+            margins_m = self.margins_m if name in swept else ()
             policies = [Policy(policy) for policy in self.policies]
             yield setup_called(name), policies + [Policy(SLOWED, m) for m in margins_m]
 

@@ -100,8 +100,7 @@ def all_setups() -> dict[str, PerceptionSetup]:
 
 def usual_setups() -> tuple[str, ...]:
     """The names of those that are compared if nobody asks for others."""
-    left_out = {PerceptionSetup(estimator=name).name for name in ON_REQUEST}
-    return tuple(name for name in all_setups() if name not in left_out)
+    return tuple(name for name, each in all_setups().items() if each.estimator not in ON_REQUEST)
 
 
 def setup_called(name: str) -> PerceptionSetup:

@@ -32,8 +32,6 @@ WARM_UP = 12
 SHOWN = (("standing", "(a) standing"), ("bending", "(b) bending"), ("lifting", "(c) lifting"))
 CROP_PX = 512
 TRUTH, SINGLE, MULTI = "#9aa3ad", "#e65100", "#1565c0"
-Take = Callable[[str], Recording]
-"""Films a motion."""
 ASKED = f"""\
 A worker stands, walks, bends, lifts and carries in a room of 6.1 x 5.5 m before four lenses of
 118.2 x 69.5 degrees: what does one camera miss on the side turned away from it, and what do four
@@ -47,7 +45,7 @@ whose estimate is further from the truth than that. A side is *turned away* when
 hip are further from the camera by 8 cm than the other's."""
 
 
-def report(figures: Path, take: Take, metrics: Metrics) -> Report:
+def report(figures: Path, take: Callable[[str], Recording], metrics: Metrics) -> Report:
     """Draw the figure; the tables beside it."""
     draw_poses(figures / "figure_6.png", take)
     motions = {motion: motion.replace("_", " ") for motion in (*MOTIONS, ALL)}
@@ -85,8 +83,8 @@ def _errors(estimator: str, motions: dict[str, str], metrics: Metrics) -> str:
     return table((f"`{estimator}` [mm]", *SPOKEN.values()), rows)
 
 
-def draw_poses(path: Path, take: Take) -> None:
-    """A row a motion: a camera's crop with what it found, then the body from one and from four."""
+def draw_poses(path: Path, take: Callable[[str], Recording]) -> None:
+    """A row a motion, filmed now: a crop with what was found in it, the body from one and four."""
     figure = new_figure(13, 14)
     for row, (motion, title) in enumerate(SHOWN):
         recording = take(motion)

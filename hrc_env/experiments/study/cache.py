@@ -57,11 +57,8 @@ class PartCache:
 
 
 def own_folder(out: Path, name: str, overwrite: bool = False) -> None:
-    """Make `out` the folder of a study; what an earlier run of it finished there stays.
-
-    Raises:
-        ConfigError: a file, or a folder with other results, unless these are to be deleted.
-    """
+    """Make `out` the folder of a study; what an earlier run of it finished there stays. Other
+    results are deleted if that is wanted, or else a `ConfigError`, as is a file."""
     if out.exists() and not out.is_dir():
         raise ConfigError(f"--out must be a folder; {out} is a file.")
     owner = owner_of(out)

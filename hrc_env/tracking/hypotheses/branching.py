@@ -6,6 +6,8 @@ frames: a mode several posterior deviations from the known ones, with evidence t
 negligible, becomes a hypothesis.
 """
 
+import math
+
 import numpy as np
 
 from hrc_env.core.kernels import kernel
@@ -17,97 +19,95 @@ from hrc_env.tracking.hypotheses.depth_flip import (
     open_depth,
     reflect,
 )
-from hrc_env.tracking.hypotheses.slots import copy_slot, slot_distance
+from hrc_env.tracking.hypotheses.slots import copy_slot
 from hrc_env.tracking.hypotheses.yaw_flip import heads_like, turn_body, turn_of
 from hrc_env.tracking.tree.bone_lengths import stiff_lengths
-from hrc_env.tracking.tree.evidence import log_evidence
+from hrc_env.tracking.tree.evidence import distance_between, log_evidence
 from hrc_env.tracking.tree.filter import condition, correct_mean
 from hrc_env.tracking.tree.search import find_pose_near
 from hrc_env.tracking.tree.update import update_tree
 
+_LOG_LEAST_EVIDENCE = math.log(0.01)
+"""A limb's other mode with less evidence than this beside the known one's is none."""
+_MOST_PENALTY = 10.0
+"""A turned body that is less likely than this is not tried [nat]."""
+_DISTINCT = 3.0
+"""A mode beyond so many posterior deviations is new."""
+_SEARCH_STEPS = 4
+"""Gauss-Newton steps from a mirror image."""
 _NEARER_M = 0.05
 """A search that ends with every joint nearer than this has found nothing new [m]."""
 
 
 @kernel
-def is_ambiguous(P, body, cov, ok, m):
-    """Whether one view alone carries a part of the body whose depth is open.
-
-    `P` (C, 3, 4); `body` (J, 6) and `cov` (J, 6, 6) are what is predicted, `ok` (J, C) is what
-    is seen, `m` the `mixture.MixtureSettings`.
-    """
+def is_ambiguous(tree, seen, s):
+    """Whether one view alone carries a part of the body whose depth is open in a prediction."""
     ambiguous = False
     for part in range(N_MIRRORS):
-        ambiguous = ambiguous or camera_of(part, P, body, cov, ok, m) >= 0
+        ambiguous = ambiguous or _camera_of(part, tree, seen, s) >= 0
     return ambiguous
 
 
 @kernel
-def camera_of(part, P, body, cov, ok, m):
-    """The camera that leaves the depth of a part open that is asked about, or -1.
+def _camera_of(part, tree, seen, s):
+    """The camera that leaves the depth of a part open that may be mirrored, or -1.
 
     One view in this update is not enough: what other views said a moment ago is still known.
     """
-    if not (m.mirror_body if part == WHOLE_BODY else m.mirror_limbs):
+    if not (s.mirrors_body if part == WHOLE_BODY else s.mirrors_limbs):
         return -1
-    camera = lone_camera(part, ok)
-    return camera if camera >= 0 and open_depth(part, P[camera], body, cov) > m.open_m else -1
+    c = lone_camera(part, seen.ok)
+    return c if c >= 0 and open_depth(part, seen.P[c], tree.body, tree.cov) > s.open_depth_m else -1
 
 
 @kernel(makes_arrays=True)
-def branch(state, b, w, prior, evidence, seen, s, m, work):
+def branch(own, prior, evidence, seen, s, work):
     """Look for other bodies beside the heaviest hypothesis, and keep them as hypotheses.
 
-    Args:
-        state: `hypotheses.slots.Hypotheses`; the worker's first hypothesis has been updated.
-        b, w: environment, worker.
-        prior: its body (J, 6), cov, slope (J, 6, 6) before the update.
-        evidence: log-evidence of that update.
-        seen: `measurements.Seen`.
-        s, m: settings.
-        work: scratch, a record of `WORK`.
+    `own` are a worker's `slots.Hypotheses`, of which the first has been updated: `prior` is what it
+    was before, `evidence` the update's log-evidence.
     """
-    limit = state.trees.shape[1] // state.n_alive.shape[1]
-    own = w * limit
-    trees = state.trees[b, own:]
+    trees = own.trees
     for part in range(N_MIRRORS):
-        n = state.n_alive[b, w]
-        camera = camera_of(part, seen.P, prior[0], prior[1], seen.ok, m) if n < limit else -1
+        n = own.n_alive[0]
+        camera = _camera_of(part, prior, seen, s) if n < len(trees) else -1
         if camera < 0:
             continue
-        new = own + n
-        copy_slot(state, b, own, new)
+        copy_slot(own, 0, n)
+        penalty = np.inf
         if part == WHOLE_BODY:
-            penalty = _turn(trees, n, camera, prior, seen, s, m, work)
-        else:
-            where = (part, camera, prior, evidence)
-            penalty = _reflect(trees, n, where, seen, s, m, work)
+            penalty = _turn(trees, n, camera, prior, seen, s, work)
+        elif reflect(part, seen.P[camera], trees[0].body, work.point):
+            penalty = _settle(trees, n, prior, evidence, seen, s, work)
         if penalty < np.inf:
             tree = trees[n]
-            before, tree.pose_log_prior = tree.pose_log_prior, m.anatomy * anatomy(tree.body)
+            before, tree.pose_log_prior = tree.pose_log_prior, s.anatomy_trust * anatomy(tree.body)
             tree.log_weight += tree.pose_log_prior - before - penalty
-            state.n_alive[b, w] = n + 1
+            own.n_alive[0] = n + 1
 
 
 @kernel(makes_arrays=True)
-def _turn(trees, n, camera, prior, seen, s, m, work):
-    """Make tree n the body that is turned the other way; its penalty [nat].
-
-    It is infinite where one of the n hypotheses is turned alike.
-    """
+def _turn(trees, n, camera, prior, seen, s, work):
+    """Make tree n the body that is turned the other way; its penalty [nat], infinite if it is
+    known."""
     new = trees[n]
-    turn = turn_of(seen.P[camera], prior[0])
-    penalty = 0.5 * (turn / m.turn) ** 2
-    if penalty > m.most_penalty:
+    turn = turn_of(seen.P[camera], prior.body)
+    penalty = 0.5 * (turn / s.turn_std_rad) ** 2
+    if penalty > _MOST_PENALTY:
         return np.inf
-    body, cov, slope = new.body, new.cov, new.slope
-    body[:], cov[:], slope[:] = prior[0], prior[1], prior[2]
-    turn_body(seen.P[camera], turn, body, cov, slope)
+    _predict_again(new, prior)
+    turn_body(seen.P[camera], turn, new.body, new.cov, new.slope)
     if _turned_alike(trees, n):
         return np.inf
     condition(new, seen, s, work)
     correct_mean(new, seen, s, work)
     return np.inf if _turned_alike(trees, n) else penalty
+
+
+@kernel(makes_arrays=True)
+def _predict_again(tree, prior):
+    """Give a tree that was updated the Gaussian from before, but not what was learnt before."""
+    tree.body[:], tree.cov[:], tree.slope[:] = prior.body, prior.cov, prior.slope
 
 
 @kernel
@@ -120,35 +120,26 @@ def _turned_alike(trees, n):
 
 
 @kernel(makes_arrays=True)
-def _reflect(trees, n, where, seen, s, m, work):
-    """Condition tree n at the mode next to a reflected limb; 0, or infinity for none.
+def _settle(trees, n, prior, evidence, seen, s, work):
+    """Condition tree n at the mode next to a reflected limb (work.point); 0, or infinity for none.
 
-    There is none where the search ends at one of the n hypotheses, or where the evidence is
-    negligible beside that of the search from the prediction.
+    There is none where the search ends at a known hypothesis, or with negligible evidence.
     """
-    part, camera, prior, evidence = where
-    give = work.bone_variance
-    new = trees[n]
-    body, cov, slope = new.body, new.cov, new.slope
-    if not reflect(part, seen.P[camera], body, work.point):
-        return np.inf
-    stiff_lengths(new.bone_variance, s.bone_give, give)
-    bones = (new.bone_length, give)
-    how = (s.inlier_odds, s.floor_std_m, m.search_steps, 0.0)
-    find_pose_near(prior[0], prior[1], prior[2], seen, bones, *how, work)
+    new, known = trees[n], trees[0].body
+    _predict_again(new, prior)
+    stiff_lengths(new.bone_variance, s.bone_give, work.bone_variance)
+    find_pose_near(new, seen, s, _SEARCH_STEPS, 0.0, work)
     moved = 0.0
-    for j in range(len(body)):
+    for j in range(len(known)):
         for i in range(3):
-            moved = max(moved, abs(work.point[j, i] - body[j, i]))
+            moved = max(moved, abs(work.point[j, i] - known[j, i]))
     if not moved > _NEARER_M:
         return np.inf
-    body[:], cov[:], slope[:] = prior[0], prior[1], prior[2]
-    update_tree(body, cov, slope, work)
-    found = log_evidence(prior, (body, cov, slope), seen, bones, s.inlier_odds, s.floor_std_m, work)
-    if not found - evidence > m.log_least:
+    update_tree(new, work)
+    if not log_evidence(prior, new, seen, s, work) - evidence > _LOG_LEAST_EVIDENCE:
         return np.inf
     correct_mean(new, seen, s, work)
     for k in range(n):
-        if not slot_distance(trees[k], new, work) > m.distinct:
+        if not distance_between(trees[k], new, work) > _DISTINCT**2:
             return np.inf
     return 0.0

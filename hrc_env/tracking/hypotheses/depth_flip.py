@@ -40,10 +40,7 @@ _MOST_SEEN_TWICE = 2
 
 @kernel
 def lone_camera(part, ok):
-    """The camera that alone sees a part of the body, or -1.
-
-    `part` is a row of the mirrors; `ok` (J, C) says what is seen.
-    """
+    """The camera that alone sees a part of the body, of which `ok` (J, C) is seen, or -1."""
     n_cameras, seen_twice, best, most = ok.shape[1], 0, -1, 0
     for c in range(n_cameras):
         n = 0
@@ -61,10 +58,8 @@ def lone_camera(part, ok):
 
 @kernel(makes_arrays=True)
 def open_depth(part, camera, body, cov):
-    """How little is known of a part's depth from a camera [m].
-
-    The least standard deviation along its ray of any joint of the part, whose means are `body`
-    (J, 6) and covariances `cov` (J, 6, 6). `camera` (3, 4) is a projection.
+    """How little is known of a part's depth from a camera (3, 4), for a body (J, 6), cov (J, 6, 6)
+    [m]: the least standard deviation along its ray of any joint of the part.
     """
     eye, ray, least = eye_of(camera), np.empty(3), np.inf
     for j in range(len(body)):
@@ -85,7 +80,7 @@ def open_depth(part, camera, body, cov):
 def reflect(part, camera, body, out):
     """Positions (J, 3) of a body (J, 6) whose `part` is reflected along a camera's rays.
 
-    Returns False where that would bring a joint to the camera or behind it.
+    False where that would bring a joint to the camera or behind it.
     """
     eye, middle, n = eye_of(camera), np.zeros(3), 0
     for j in range(len(body)):

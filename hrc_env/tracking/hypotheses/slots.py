@@ -1,7 +1,6 @@
 """Hypotheses about one body: slots with a Gaussian tree each, weighted, merged and dropped.
 
-A worker has H slots, of which the first `n_alive` are in use, the heaviest first: worker w's are
-the columns w H to (w + 1) H of the arrays.
+A worker has H slots, of which the first `n_alive` are in use, the heaviest first.
 """
 
 import math
@@ -18,11 +17,11 @@ class Hypotheses(NamedTuple):
     """Hypotheses about each worker; arrays changed in place."""
 
     trees: Any
-    """(B, W H) records of `tree.state.TREE`; log-weights of those in use sum to one."""
+    """(B, W, H) records of `tree.state.TREE`; log-weights of those in use sum to one."""
     views: Any
-    """(B, W H, C) records of `tree.state.VIEW`."""
+    """(B, W, H, C) records of `tree.state.VIEW`."""
     noise: Any
-    """(B, W H, J, C) records of `tree.state.NOISE`."""
+    """(B, W, H, J, C) records of `tree.state.NOISE`."""
     n_alive: Ints
     """(B, W) slots in use, at least one."""
     waited_s: Floats
@@ -30,48 +29,55 @@ class Hypotheses(NamedTuple):
 
 
 @kernel(makes_arrays=True)
-def copy_slot(state, b, source, target):
-    """Make slot `target` of environment b a copy of `source`."""
-    state.trees[b, target] = state.trees[b, source]
-    state.views[b, target] = state.views[b, source]
-    state.noise[b, target] = state.noise[b, source]
+def worker_slots(state, b, w):
+    """Worker w of environment b alone: views (H, ...), `n_alive` and `waited_s` (1,)."""
+    trees, views, noise = state.trees[b, w], state.views[b, w], state.noise[b, w]
+    return Hypotheses(
+        trees, views, noise, state.n_alive[b, w : w + 1], state.waited_s[b, w : w + 1]
+    )
 
 
 @kernel(makes_arrays=True)
-def exchange_slots(state, b, one, other):
-    """Exchange two slots of environment b."""
-    tree = state.trees[b, one : one + 1].copy()
-    views, noise = state.views[b, one].copy(), state.noise[b, one].copy()
-    copy_slot(state, b, other, one)
-    state.trees[b, other] = tree[0]
-    state.views[b, other], state.noise[b, other] = views, noise
+def copy_slot(own, source, target):
+    """Make slot `target` of a worker a copy of `source`."""
+    own.trees[target] = own.trees[source]
+    own.views[target] = own.views[source]
+    own.noise[target] = own.noise[source]
 
 
 @kernel(makes_arrays=True)
-def drop(state, b, w, h):
+def exchange_slots(own, one, other):
+    """Exchange two slots of a worker."""
+    tree = own.trees[one : one + 1].copy()
+    views, noise = own.views[one].copy(), own.noise[one].copy()
+    copy_slot(own, other, one)
+    own.trees[other] = tree[0]
+    own.views[other], own.noise[other] = views, noise
+
+
+@kernel(makes_arrays=True)
+def drop(own, h):
     """Drop hypothesis h of a worker who has others; the last one takes its place."""
-    first = w * (state.trees.shape[1] // state.n_alive.shape[1])
-    last = state.n_alive[b, w] - 1
+    last = own.n_alive[0] - 1
     if h != last:
-        copy_slot(state, b, first + last, first + h)
-    state.n_alive[b, w] = last
+        copy_slot(own, last, h)
+    own.n_alive[0] = last
 
 
 @kernel(makes_arrays=True)
-def normalise(state, b, w, log_least):
+def normalise(own, log_least):
     """Drop what is lighter than `log_least`; the weights of the others sum to one, best first."""
-    first = w * (state.trees.shape[1] // state.n_alive.shape[1])
-    trees = state.trees[b, first:]
-    _share_out(trees, state.n_alive[b, w])
-    for h in range(state.n_alive[b, w] - 1, -1, -1):
-        if trees[h].log_weight < log_least and state.n_alive[b, w] > 1:
-            drop(state, b, w, h)
-    _share_out(trees, state.n_alive[b, w])
+    trees = own.trees
+    _share_out(trees, own.n_alive[0])
+    for h in range(own.n_alive[0] - 1, -1, -1):
+        if trees[h].log_weight < log_least and own.n_alive[0] > 1:
+            drop(own, h)
+    _share_out(trees, own.n_alive[0])
     best = 0
-    for h in range(state.n_alive[b, w]):
+    for h in range(own.n_alive[0]):
         best = h if trees[h].log_weight > trees[best].log_weight else best
     if best > 0:
-        exchange_slots(state, b, first, first + best)
+        exchange_slots(own, 0, best)
 
 
 @kernel
@@ -87,29 +93,18 @@ def _share_out(trees, n):
 
 
 @kernel(makes_arrays=True)
-def merge(state, b, w, least_distance, work):
+def merge(own, least_distance, work):
     """Hypotheses that have come close are one: the heavier stays, with the weight of both.
 
     `least_distance` is squared, in posterior deviations.
     """
-    first = w * (state.trees.shape[1] // state.n_alive.shape[1])
-    trees = state.trees[b, first:]
-    h = 0
-    while h < state.n_alive[b, w]:
-        k = state.n_alive[b, w] - 1
-        while k > h:
-            if slot_distance(trees[h], trees[k], work) < least_distance:
+    trees, h = own.trees, 0
+    while h < own.n_alive[0]:
+        for k in range(own.n_alive[0] - 1, h, -1):
+            if distance_between(trees[h], trees[k], work) < least_distance:
                 both = np.logaddexp(trees[h].log_weight, trees[k].log_weight)
                 if trees[k].log_weight > trees[h].log_weight:
-                    exchange_slots(state, b, first + h, first + k)
+                    exchange_slots(own, h, k)
                 trees[h].log_weight = both
-                drop(state, b, w, k)
-            k -= 1
+                drop(own, k)
         h += 1
-
-
-@kernel
-def slot_distance(one, other, work):
-    """Squared distance of two hypotheses, in deviations of the wider."""
-    a, b = (one.body, one.cov, one.slope), (other.body, other.cov, other.slope)
-    return distance_between(a, b, work)

@@ -1,7 +1,6 @@
-"""Finding a worker, and finding a joint again: always from views that agree, never from truth.
+"""Finding a worker, and finding a joint again, from views that agree.
 
-The kernels work on one worker: z (J, C, 2) pixels, sigma (J, C), ok (J, C) as
-`measurements.read_worker` fills them.
+`seen` is `measurements.Seen`, `s` are `settings.Settings`.
 """
 
 import math
@@ -31,25 +30,40 @@ _GUESS_STD_M, _GUESS_STD_WITHOUT_HEADING_M = 0.3, 0.6
 
 
 @kernel(makes_arrays=True)
-def triangulate_body(P, z, sigma, ok, gate_sigma, radius, points, cov, found):
-    """Joints on which at least two views agree, near each other as a body is.
+def find_body(seen, s, points, cov, found):
+    """Find joints on which two views agree, and guess the others; whether there are enough.
 
-    Fills points (J, 3), cov (J, 3, 3), found (J,) and returns how many joints were found.
+    Fills points (J, 3), cov (J, 3, 3) and which joints were found (J,).
     """
-    n_joints, n_cameras = ok.shape
-    use = np.empty(n_cameras, np.bool_)
-    for j in range(n_joints):
-        n_views = consensus_point(P, z[j], sigma[j], ok[j], gate_sigma, points[j], cov[j], use)
-        found[j] = n_views >= 2
-    return keep_one_body(points, cov, found, radius)
+    use = np.empty(len(seen.P), np.bool_)
+    for j in range(len(points)):
+        cov[j] = 1.0
+        found[j] = _agreed_point(seen, j, s, points[j], cov[j], use) >= 2
+    if keep_one_body(points, cov, found, s.body_radius_m) < s.acquire_min_joints:
+        return False
+    complete_body(points, cov, found)
+    return True
+
+
+@kernel(makes_arrays=True)
+def find_again(seen, j, s, middle, point, cov):
+    """Fill `point` (3,) and `cov` (3, 3) of joint j, if two views agree near the body's middle."""
+    use = np.empty(len(seen.P), np.bool_)
+    if _agreed_point(seen, j, s, point, cov, use) < 2:
+        return False
+    widest = max(cov[0, 0], cov[1, 1], cov[2, 2])
+    return widest < WIDEST_STD_M**2 and distance(point, middle) < s.body_radius_m
+
+
+@kernel(makes_arrays=True)
+def _agreed_point(seen, j, s, point, cov, use):
+    z, sigma, ok = seen.z[j], seen.sigma[j], seen.ok[j]
+    return consensus_point(seen.P, z, sigma, ok, s.gate_sigma, point, cov, use)
 
 
 @kernel(makes_arrays=True)
 def keep_one_body(points, cov, found, radius):
-    """Drop points that are too uncertain, or not near the others as a body's are.
-
-    Changes found (J,) and returns how many joints are left.
-    """
+    """Drop points that are too uncertain, or not near the others as a body's are; how many stay."""
     middle, n_found = np.empty(3), 0
     for j in range(len(points)):
         widest = max(cov[j, 0, 0], cov[j, 1, 1], cov[j, 2, 2])
@@ -87,13 +101,13 @@ def distance(a, b):
 
 
 @kernel(makes_arrays=True)
-def complete_body(standing, points, cov, found):
+def complete_body(points, cov, found):
     """Guess the joints that were not found, from a standing body turned as the torso is."""
-    cos, sin, known = _heading_of(points, found)
+    cos, sin, known = _across(points, found[1] and found[2], found[7] and found[8])
     root, n_found = np.zeros(3), 0
     for j in range(len(points)):
         if found[j]:
-            forward, left, up = standing[j, 0], standing[j, 1], standing[j, 2]
+            forward, left, up = STANDING_M[j]
             root[0] += points[j, 0] - (cos * forward - sin * left)
             root[1] += points[j, 1] - (sin * forward + cos * left)
             root[2] += points[j, 2] - up
@@ -102,7 +116,7 @@ def complete_body(standing, points, cov, found):
     std = _GUESS_STD_M if known else _GUESS_STD_WITHOUT_HEADING_M
     for j in range(len(points)):
         if not found[j]:
-            forward, left, up = standing[j, 0], standing[j, 1], standing[j, 2]
+            forward, left, up = STANDING_M[j]
             points[j, 0] = root[0] + cos * forward - sin * left
             points[j, 1] = root[1] + sin * forward + cos * left
             points[j, 2] = root[2] + up
@@ -116,13 +130,8 @@ def heading(points):
 
 
 @kernel
-def _heading_of(points, found):
-    """The same, of those joints that were found."""
-    return _across(points, found[1] and found[2], found[7] and found[8])
-
-
-@kernel
 def _across(points, shoulders, hips):
+    """The heading, from the shoulders or hips that are known."""
     x, y = 0.0, 0.0
     for left, known in ((1, shoulders), (7, hips)):
         if known:
@@ -140,13 +149,3 @@ def count_conflict(n_ok, n_supporting, conflict):
     if n_ok < 2 or n_supporting >= 2:
         return 0 if n_supporting >= 2 or n_ok == 0 else conflict
     return conflict + 1
-
-
-@kernel(makes_arrays=True)
-def find_again(P, z, sigma, ok, gate_sigma, radius, middle, point, cov):
-    """One joint (z (C, 2), sigma, ok (C,)) on which two views agree, near the body's middle."""
-    use = np.empty(len(P), np.bool_)
-    if consensus_point(P, z, sigma, ok, gate_sigma, point, cov, use) < 2:
-        return False
-    widest = max(cov[0, 0], cov[1, 1], cov[2, 2])
-    return widest < WIDEST_STD_M**2 and distance(point, middle) < radius

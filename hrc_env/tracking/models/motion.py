@@ -29,16 +29,10 @@ _OFFSET_TAU_S, _OFFSET_STD_M = 2.0, 0.06
 
 @functools.lru_cache(maxsize=16)
 def damped_joints(dt_s: float, damping: float, root_acceleration: float) -> tuple[Floats, Floats]:
-    """Exact discretisation over `dt_s`.
+    """Exact discretisation over `dt_s` [s] of damped joints, `damping` in (0, 1).
 
-    Args:
-        dt_s: time step [s].
-        damping: ratio in (0, 1).
-        root_acceleration: spectral density of the whole body's acceleration [m^2/s^3].
-
-    Returns:
-        F (J, 2, 2), which moves (position, velocity) relative to the anchor, and Q (J, 2, 2),
-        the process noise: what keeps the stationary spreads, plus the body's acceleration.
+    F (J, 2, 2) moves (position, velocity) relative to the anchor; the process noise Q (J, 2, 2)
+    keeps the stationary spreads and adds the whole body's acceleration [m^2/s^3].
     """
     frequency = SPEED_M_S / SPREAD_M
     damped = frequency * np.sqrt(1 - damping**2)
@@ -64,8 +58,9 @@ def whole_body_noise(dt_s: float, root_acceleration: float) -> Floats:
 
 
 @kernel
-def learn_offsets(body, cov, root, cos, sin, dt, offset, offset_count):
+def learn_offsets(tree, root, cos, sin, dt):
     """Joints that are known well teach their mean places (J, 3) on the body, in place."""
+    body, cov, offset, offset_count = tree.body, tree.cov, tree.offset, tree.offset_count
     for j in range(len(body)):
         if cov[j, 0, 0] + cov[j, 1, 1] + cov[j, 2, 2] > 3.0 * _OFFSET_STD_M**2:
             continue

@@ -1,9 +1,8 @@
 """How noisy a camera's detections really are: learnt while tracking, from what views disagree on.
 
-A detector reports a standard deviation; its true errors may be larger or smaller, and they may
-persist: wrong in the same way for about half a second. A filter that takes them as white
-believes too much. Per worker and camera this learns a factor on the reported variance with
-which a filter for white noise is honest (docs/tracking.md, "Errors that persist"):
+True errors may be larger or smaller than a detector reports, and they may persist for about half a
+second. Per worker and camera this learns a factor on the reported variance with which a filter for
+white noise is honest (docs/tracking.md, "Errors that persist"):
 
     factor = V (1 - L + L (1 + a r) / (1 - a r)).
 
@@ -14,8 +13,6 @@ its redundancy (Foerstner, Zeitschrift fuer Vermessungswesen 104, 1979). L is th
 variance that persists, from the products of these residuals with those of the update before;
 r the correlation of that part over one update; a the weight of the prediction in the estimate,
 the mean over joints of tr(posterior covariance, predicted covariance^-1) / 3.
-The second bracket is how much more an average with weights a^k leaves of such noise than of
-white noise.
 """
 
 import math
@@ -85,19 +82,16 @@ def scale_sigma(learnt, sigma):
 
 
 @kernel
-def learn_noise(seen, body, learnt, model, w):
-    """Learn the factors (J, C) from one update, in place.
+def learn_noise(seen, tree, learnt, model, w):
+    """Learn the factors of `learnt` (J, C), records of `tree.state.NOISE`, from one update, in
+    place.
 
-    Args:
-        seen: `measurements.Seen`, sigma as scaled by `scale_sigma`.
-        body: mean (J, 6) and covariance (J, 6, 6) after the update, (J, 3, 3) before it.
-        learnt: (J, C) records of `tree.state.NOISE`.
-        model: constants.
-        w: scratch, a record of `WORK`.
+    `seen` has sigma as scaled by `scale_sigma`, w.predicted (J, 3, 3) the covariances before the
+    update.
     """
     if model.least == model.most:
         return
-    mean, cov, predicted = body
+    mean, cov, predicted = tree.body, tree.cov, w.predicted
     view, spread, grows = seen.looks, w.spread, w.grows
     turn = learnt[0, 0].sums[4]
     learnt[0, 0].sums[4] = (turn + 1.0) % _TURNS
@@ -121,35 +115,21 @@ def learn_noise(seen, body, learnt, model, w):
 def _look(seen, body, j, view, spread):
     """Triangulate joint j linearly about `body`, from the cameras that are believed; how many.
 
-    Fills view (C, 8): Jacobians of u and of v and the residuals of both, all over sigma; a
-    residual of infinity says that the camera does not count. Fills spread (3, 4): covariance of
-    the triangulated point, and in the last column where it is from `body`.
+    Fills view (C, 8) by `_linearise` (a residual of infinity: the camera does not count) and spread
+    (3, 4): covariance of the point, and in the last column where it is from `body`.
     """
-    P, px, sigma, ok, belief = seen.P, seen.z, seen.sigma, seen.ok, seen.belief
-    x, y, z = body[0], body[1], body[2]
     h00 = h11 = h22 = 1.0 / _OPEN_M**2
     h01 = h02 = h12 = g0 = g1 = g2 = 0.0
     n_views = 0
-    for c in range(len(P)):
+    for c in range(len(seen.P)):
         view[c, 6] = np.inf
-        if not (ok[j, c] and belief[j, c] > _LEAST_BELIEF):
+        if not (seen.ok[j, c] and seen.belief[j, c] > _LEAST_BELIEF):
             continue
-        p = P[c]
-        depth = p[2, 0] * x + p[2, 1] * y + p[2, 2] * z + p[2, 3]
-        if not depth > NEAREST_DEPTH_M:
+        if not _linearise(seen.P[c], body, seen.z[j, c], seen.sigma[j, c], view[c]):
             continue
         n_views += 1
-        near = 1.0 / (depth * sigma[j, c])  # over sigma; the only division
-        nearer, inverse = near * sigma[j, c], near * depth
-        u = (p[0, 0] * x + p[0, 1] * y + p[0, 2] * z + p[0, 3]) * nearer
-        v = (p[1, 0] * x + p[1, 1] * y + p[1, 2] * z + p[1, 3]) * nearer
-        a0, b0 = (p[0, 0] - u * p[2, 0]) * near, (p[1, 0] - v * p[2, 0]) * near
-        a1, b1 = (p[0, 1] - u * p[2, 1]) * near, (p[1, 1] - v * p[2, 1]) * near
-        a2, b2 = (p[0, 2] - u * p[2, 2]) * near, (p[1, 2] - v * p[2, 2]) * near
-        du, dv = (px[j, c, 0] - u) * inverse, (px[j, c, 1] - v) * inverse
-        view[c, 0], view[c, 1], view[c, 2] = a0, a1, a2
-        view[c, 3], view[c, 4], view[c, 5] = b0, b1, b2
-        view[c, 6], view[c, 7] = du, dv
+        a0, a1, a2, du = view[c, 0], view[c, 1], view[c, 2], view[c, 6]
+        b0, b1, b2, dv = view[c, 3], view[c, 4], view[c, 5], view[c, 7]
         h00 += a0 * a0 + b0 * b0
         h11 += a1 * a1 + b1 * b1
         h22 += a2 * a2 + b2 * b2
@@ -167,6 +147,24 @@ def _look(seen, body, j, view, spread):
     for i in range(3):
         spread[i, 3] = spread[i, 0] * g0 + spread[i, 1] * g1 + spread[i, 2] * g2
     return n_views
+
+
+@kernel(fastmath=_REORDER)
+def _linearise(p, body, pixel, sigma, out):
+    """Jacobians of u and of v and the residuals of both, all over sigma, into out (8,), if it
+    sees."""
+    x, y, z = body[0], body[1], body[2]
+    depth = p[2, 0] * x + p[2, 1] * y + p[2, 2] * z + p[2, 3]
+    if not depth > NEAREST_DEPTH_M:
+        return False
+    near = 1.0 / (depth * sigma)  # over sigma; the only division
+    nearer, inverse = near * sigma, near * depth
+    u = (p[0, 0] * x + p[0, 1] * y + p[0, 2] * z + p[0, 3]) * nearer
+    v = (p[1, 0] * x + p[1, 1] * y + p[1, 2] * z + p[1, 3]) * nearer
+    for i in range(3):
+        out[i], out[3 + i] = (p[0, i] - u * p[2, i]) * near, (p[1, i] - v * p[2, i]) * near
+    out[6], out[7] = (pixel[0] - u) * inverse, (pixel[1] - v) * inverse
+    return True
 
 
 @kernel(fastmath=_REORDER)

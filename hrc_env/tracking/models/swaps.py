@@ -1,10 +1,8 @@
 """Cameras that exchange left and right: noticed over the whole body, and undone.
 
-A two-state hidden Markov model per camera: detections as they are, or mirrored. Its evidence
-is how much better one of the two explains all paired joints. A camera that comes back after
-having seen nothing is believed at first: the body may have been tracked mirrored in depth
-meanwhile, and then it is not the camera that is wrong. Nor is it when all of several cameras
-seem to be wrong.
+A two-state hidden Markov model per camera: detections as they are, or mirrored. A camera that comes
+back after having seen nothing is believed at first, for the body may have been tracked mirrored in
+depth meanwhile; so are several cameras that all seem to be wrong.
 """
 
 import math
@@ -21,16 +19,16 @@ _REORDER = {"reassoc", "contract", "nsz"}
 
 
 @kernel
-def undo_swaps(P, body, cov, z, sigma, ok, views, s):
-    """Mirror z, sigma, ok (J, C) of the cameras that are probably swapped, in place.
+def undo_swaps(tree, seen, views, s):
+    """Mirror what was seen by the cameras that are probably swapped, in place.
 
-    `views` (C,) are records of `tree.state.VIEW`, `s` the `settings.Settings`.
+    `views` (C,) are a hypothesis's records of `tree.state.VIEW`.
     """
-    inlier_odds, n_seeing, n_swapped = s.inlier_odds, 0, 0
-    for c in range(len(P)):
+    n_seeing, n_swapped = 0, 0
+    for c in range(len(views)):
         sees, view = False, views[c]
         for j in range(len(_MIRROR)):
-            sees |= ok[j, c]
+            sees |= seen.ok[j, c]
         if not sees:
             view.blind += 1
             continue
@@ -42,22 +40,23 @@ def undo_swaps(P, body, cov, z, sigma, ok, views, s):
             view.swap_chance = _LEAST_CHANCE
             continue
         prior = view.swap_chance * (1.0 - s.swap_ends) + (1.0 - view.swap_chance) * s.swap_begins
-        evidence = swap_evidence(P[c], c, body, cov, z, sigma, ok, inlier_odds)
-        odds = math.log(prior / (1.0 - prior)) + evidence
+        odds = math.log(prior / (1.0 - prior)) + _swap_evidence(tree, seen, c, s.inlier_odds)
         chance = min(max(1.0 / (1.0 + math.exp(-odds)), _LEAST_CHANCE), 1.0 - _LEAST_CHANCE)
         view.swap_chance = chance
         n_swapped += chance > 0.5
     if n_swapped == n_seeing > 1:  # it is the body that has its sides exchanged
-        for c in range(len(P)):
+        for c in range(len(views)):
             views[c].swap_chance = _LEAST_CHANCE
-    for c in range(len(P)):
+    for c in range(len(views)):
         if views[c].swap_chance > 0.5 and views[c].blind == 0:
-            _mirror(c, z, sigma, ok)
+            _mirror(c, seen.z, seen.sigma, seen.ok)
 
 
 @kernel
-def swap_evidence(camera, c, body, cov, z, sigma, ok, inlier_odds):
+def _swap_evidence(tree, seen, c, inlier_odds):
     """Log-likelihood ratio of camera c being swapped, bounded."""
+    camera, body, cov = seen.P[c], tree.body, tree.cov
+    z, sigma, ok = seen.z, seen.sigma, seen.ok
     swapped, right = 1.0, 1.0  # products: no term is more than 1e10
     for j in range(len(_MIRROR)):
         m = _MIRROR[j]

@@ -1,7 +1,6 @@
 """What Gaussian estimators do for a track besides filtering: begin it, repair it, give it up.
 
-`tree` is a record of `tree.state.TREE`, `s` are `settings.Settings`; measurements are as
-`measurements.read_worker` fills them.
+`tree` is a record of `tree.state.TREE`, `seen` is `measurements.Seen`, `s` are `settings.Settings`.
 """
 
 import math
@@ -9,13 +8,7 @@ import math
 import numpy as np
 
 from hrc_env.core.kernels import kernel
-from hrc_env.tracking.models.acquisition import (
-    complete_body,
-    distance,
-    find_again,
-    middle_of,
-    triangulate_body,
-)
+from hrc_env.tracking.models.acquisition import distance, find_again, find_body, middle_of
 from hrc_env.tracking.tracks import age_worker
 from hrc_env.tracking.tree.gaussian import is_positive_definite
 
@@ -33,16 +26,13 @@ def grow_older(tree, dt, s):
 
 
 @kernel(makes_arrays=True)
-def acquire(tree, P, z, sigma, ok, standing, s):
+def acquire(tree, seen, s):
     """Start a track when two views agree on enough joints; whether one was started."""
-    n_joints = len(ok)
-    points, spread = np.empty((n_joints, 3)), np.ones((n_joints, 3, 3))
+    n_joints = len(tree.body)
+    points, spread = np.empty((n_joints, 3)), np.empty((n_joints, 3, 3))
     found = np.empty(n_joints, np.bool_)
-    gate, radius = s.gate_sigma, s.body_radius_m
-    n_found = triangulate_body(P, z, sigma, ok, gate, radius, points, spread, found)
-    if n_found < s.acquire_min_joints:
+    if not find_body(seen, s, points, spread, found):
         return False
-    complete_body(standing, points, spread, found)
     for j in range(n_joints):
         place(tree.body[j], tree.cov[j], points[j], spread[j])
         if found[j]:
@@ -62,34 +52,26 @@ def place(body, cov, point, spread):
 
 
 @kernel(makes_arrays=True)
-def find_joints_again(tree, P, z, sigma, ok, s, placed):
-    """Joints that have been elsewhere for a while, as two views say, are put there.
-
-    Sets `placed` (J,) where that happened.
-    """
-    everyone, middle = np.ones(len(ok), np.bool_), np.empty(3)
+def find_joints_again(tree, seen, s, placed):
+    """Put joints where two views have seen them for a while; `placed` (J,) says which."""
+    everyone, middle = np.ones(len(placed), np.bool_), np.empty(3)
     point, spread = np.empty(3), np.empty((3, 3))
-    for j in range(len(ok)):
+    for j in range(len(placed)):
         if tree.conflict[j] < s.conflict_frames:
             continue
         middle_of(tree.body, everyone, middle)
-        gate, radius = s.gate_sigma, s.body_radius_m
-        if find_again(P, z[j], sigma[j], ok[j], gate, radius, middle, point, spread):
+        if find_again(seen, j, s, middle, point, spread):
             place(tree.body[j], tree.cov[j], point, spread)
             tree.age_s[j], tree.conflict[j], placed[j] = 0.0, 0, True
 
 
 @kernel
-def acquire_anew(tree, P, z, sigma, ok, standing, s):
-    """Start over when the views have long agreed on another body; whether that happened.
-
-    Joints are found again near the body only; a body that is somewhere else altogether, as
-    after a mistaken depth, has to be given up as a whole.
-    """
+def acquire_anew(tree, seen, s):
+    """Start over when the views have long agreed on another body; whether that happened."""
     n_wrong = 0
-    for j in range(len(ok)):
+    for j in range(len(tree.conflict)):
         n_wrong += tree.conflict[j] >= s.conflict_frames
-    if n_wrong < s.acquire_min_joints or not acquire(tree, P, z, sigma, ok, standing, s):
+    if n_wrong < s.acquire_min_joints or not acquire(tree, seen, s):
         return False
     tree.conflict[:] = 0
     return True
@@ -97,10 +79,7 @@ def acquire_anew(tree, P, z, sigma, ok, standing, s):
 
 @kernel
 def check(tree, s):
-    """Keep covariances positive definite; a body that has left the world is lost.
-
-    Returns whether all was well.
-    """
+    """Keep covariances positive definite, lose a body that has left the world; was all well?"""
     body, cov, inside, well = tree.body, tree.cov, True, True
     for j in range(len(body)):
         if not is_positive_definite(cov[j]):

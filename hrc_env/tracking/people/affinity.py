@@ -1,9 +1,8 @@
 """How well a 2D pose fits a body whose joints are predicted, in one camera.
 
-A joint counts with the logarithm of its likelihood ratio: near where the body is expected, or
-anywhere in the image. One gross error costs no more than the gate. Errors of a body's joints
-go together, so that a pose counts with the mean over its joints, not with the sum. Left and
-right may be exchanged: the better reading counts.
+A joint counts with its log likelihood ratio, near where the body is expected or anywhere in the
+image; one gross error costs no more than the gate. Errors of a body's joints go together, so a pose
+counts with the mean over its joints. Left and right may be exchanged: the better reading counts.
 """
 
 import math
@@ -11,6 +10,7 @@ import math
 import numpy as np
 
 from hrc_env.core.kernels import kernel
+from hrc_env.core.skeleton import MIRROR, N_JOINTS
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
 from hrc_env.tracking.measurements import pixel_spread
 
@@ -19,18 +19,24 @@ LEAST_JOINTS = 3
 FULL_JOINTS = 6
 """Poses of fewer joints than this count for less."""
 _ISOTROPIC = np.eye(3)
+POSE = np.dtype(
+    [
+        # pixels, standard deviations [px], and which of them are measurements
+        ("px", "f8", (N_JOINTS, 2)), ("sigma_px", "f8", (N_JOINTS,)), ("ok", "i1", (N_JOINTS,)),
+        # unit directions to the joints, from the camera; whether the pose is nobody's yet
+        ("sight", "f8", (N_JOINTS, 3)), ("free", "?"),
+    ],
+    align=True,
+)  # fmt: skip
+"""A 2D pose that a camera has found."""
 
 
 @kernel(makes_arrays=True)
 def expect(camera, mean, cov, known, slack_m, image):
-    """Where a camera should see a body's joints: image (J, 3) of u, v and variance [px^2].
+    """Where a camera (3, 4) should see a body's joints: image (J, 3) of u, v and variance [px^2].
 
-    Args:
-        camera: (3, 4).
-        mean, cov: (J, 3) [m] and (J, 3, 3) [m^2].
-        known: (J,) which joints there is an expectation of.
-        slack_m: what a body may have done besides, a standard deviation [m].
-        image: filled; the variance is -1 where nothing is expected.
+    The variance is -1 where nothing is expected: what is not `known` (J,), or not before the lens.
+    `slack_m` is a standard deviation of what the body may have done besides [m].
     """
     for j in range(len(mean)):
         image[j, 2] = -1.0
@@ -45,18 +51,17 @@ def expect(camera, mean, cov, known, slack_m, image):
 
 
 @kernel(makes_arrays=True)
-def affinity(image, z, sigma, ok, mirror, gate_sigma, area_px):
-    """Mean log likelihood ratio of a pose z (J, 2), sigma, ok (J,); 0 where it does not fit."""
-    plain = _one_reading(image, z, sigma, ok, mirror, False, gate_sigma, area_px)
-    swapped = _one_reading(image, z, sigma, ok, mirror, True, gate_sigma, area_px)
-    return max(plain, swapped)
+def affinity(image, pose, s):
+    """Mean log likelihood ratio of a `POSE`; 0 where it does not fit. `s` as in `association`."""
+    return max(_one_reading(image, pose, False, s), _one_reading(image, pose, True, s))
 
 
 @kernel(makes_arrays=True)
-def _one_reading(image, z, sigma, ok, mirror, swapped, gate_sigma, area_px):
+def _one_reading(image, pose, swapped, s):
+    z, sigma, ok, gate_sigma = pose.px, pose.sigma_px, pose.ok, s.gate_sigma
     n, n_near, total, product, gate = 0, 0, 0.0, 1.0, gate_sigma * gate_sigma
     for j in range(len(image)):
-        k = mirror[j] if swapped else j
+        k = MIRROR[j] if swapped else j
         if not ok[k] or image[j, 2] < 0.0:
             continue
         variance = sigma[k] * sigma[k] + image[j, 2]
@@ -67,5 +72,5 @@ def _one_reading(image, z, sigma, ok, mirror, swapped, gate_sigma, area_px):
         n_near += misfit < gate
     if n < LEAST_JOINTS or 2 * n_near < n:
         return 0.0
-    total += n * math.log(area_px / (2.0 * math.pi)) - math.log(product)
+    total += n * math.log(s.image_area_px / (2.0 * math.pi)) - math.log(product)
     return max(total / max(n, FULL_JOINTS), 0.0)

@@ -1,31 +1,30 @@
 """Which detection belongs to whom: 2D poses of every camera to workers who are followed.
 
-A camera that sees several people does not know who they are, and it sees people who are not
-there. Poses that fit where a worker is predicted go to that worker, in each camera so that all
-together fit best, and no pose to two workers. What is left is compared across cameras: poses of
-at least two cameras that are one body go to a worker who was lost from sight nearby, else to a
-place that nobody has; poses that no other camera confirms go to nobody. Whatever the cameras
-report is data: poses that are no measurement are left out.
+Poses that fit where a worker is predicted go to that worker, in each camera so that all together
+fit best, and no pose to two workers. What is left is compared across cameras: poses of at least two
+cameras that are one body go to a worker who was lost from sight nearby, else to a place that nobody
+has; poses that no other camera confirms go to nobody.
 """
 
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections import namedtuple
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from hrc_env.core.errors import ConfigError, check_shape
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Keypoints, PoseEstimate
-from hrc_env.core.skeleton import BONE_LENGTH_M, BONES, MIRROR, N_JOINTS
+from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.geometry.assignment import assign_rows
 from hrc_env.tracking.measurements import arrays_of, is_measurement
-from hrc_env.tracking.people.affinity import LEAST_JOINTS, affinity, expect
+from hrc_env.tracking.people.affinity import LEAST_JOINTS, POSE, affinity, expect
 from hrc_env.tracking.people.track_initiation import (
-    camera_model,
+    CAMERA,
     fit_cameras,
-    lines_of_sight,
+    look_along,
     meeting,
+    model_cameras,
     propose,
 )
 
@@ -68,15 +67,8 @@ class Association:
     """(B, C, W) which of the camera's poses it is, -1 for none."""
 
 
-class _Settings(NamedTuple):
-    """`AssociationConfig` for the kernels, under the same names."""
-
-    gate_sigma: float
-    slack_m: float
-    min_joints: int
-    apart_m: float
-    rejoin_m: float
-    image_area_px: float
+_Settings = namedtuple("_Settings", [each.name for each in fields(AssociationConfig)])
+"""`AssociationConfig` for the kernels, under the same names."""
 
 
 def associate(
@@ -102,35 +94,31 @@ def associate(
     settings = _Settings(*(getattr(config, name) for name in _Settings._fields))
     shape = (batch, len(P), n_workers, N_JOINTS)
     pose = np.full(shape[:3], -1, np.int64)
-    px, confidence = np.full((*shape, 2), np.nan), np.zeros(shape)
-    sigma_px = np.full(shape, np.inf)
+    keypoints = Keypoints(
+        np.full((*shape, 2), np.nan), np.zeros(shape), np.full(shape, np.inf), found.time_s
+    )
     belief = (
         np.ascontiguousarray(predicted.mean_world, np.float64),
         np.ascontiguousarray(predicted.cov_world, np.float64),
         np.ascontiguousarray(predicted.tracked),
     )
-    tables = (MIRROR, BONES, BONE_LENGTH_M)
-    _associate_all(P, *measured, *belief, tables, settings, pose, px, confidence, sigma_px)
-    return Association(Keypoints(px, confidence, sigma_px, found.time_s), pose)
+    cameras, poses = np.empty(len(P), CAMERA), np.empty((len(P), n_poses), POSE)
+    model_cameras(P, cameras)
+    sorted_into = (keypoints.px, keypoints.confidence, keypoints.sigma_px)
+    _associate_all(cameras, poses, measured, belief, settings, pose, sorted_into)
+    return Association(keypoints, pose)
 
 
 @kernel(makes_arrays=True)
-def _associate_all(
-    P, found_px, found_confidence, found_sigma, mean, cov, tracked, tables, s,
-    pose, px, confidence, sigma_px,
-):  # fmt: skip
-    n_cameras, n_poses, n_joints = found_confidence.shape[1:]
-    eye, back, focal = np.empty((n_cameras, 3)), np.empty((n_cameras, 3, 3)), np.empty(n_cameras)
-    camera_model(P, eye, back, focal)
-    rig = (P, eye, back, focal)
-    ok = np.empty((n_cameras, n_poses, n_joints), np.bool_)
-    free = np.empty((n_cameras, n_poses), np.bool_)
+def _associate_all(cameras, poses, measured, belief, s, pose, sorted_into):
+    """Sort what was measured into arrays by worker, and fill in which pose it was."""
+    (found_px, found_confidence, found_sigma), (mean, cov, tracked) = measured, belief
+    px, confidence, sigma_px = sorted_into
     for b in range(len(pose)):
-        _read(found_px[b], found_confidence[b], found_sigma[b], ok, free)
-        poses = (found_px[b], found_sigma[b], ok)
-        _follow(P, poses, free, mean[b], cov[b], tracked[b], tables[0], s, pose[b])
-        _welcome(rig, poses, free, mean[b], tracked[b], tables, s, pose[b])
-        for c in range(n_cameras):
+        _read(found_px[b], found_confidence[b], found_sigma[b], poses)
+        _follow(cameras, poses, (mean[b], cov[b], tracked[b]), s, pose[b])
+        _welcome(cameras, poses, mean[b], tracked[b], s, pose[b])
+        for c in range(len(cameras)):
             for w in range(pose.shape[2]):
                 d = pose[b, c, w]
                 if d >= 0:
@@ -140,81 +128,79 @@ def _associate_all(
 
 
 @kernel(makes_arrays=True)
-def _read(px, confidence, sigma_px, ok, free):
+def _read(px, confidence, sigma_px, poses):
     """Which joints are measurements, and which poses have enough of them to be somebody's."""
-    for c in range(ok.shape[0]):
-        for d in range(ok.shape[1]):
-            n = 0
-            for j in range(ok.shape[2]):
+    for c in range(poses.shape[0]):
+        for d in range(poses.shape[1]):
+            pose, n = poses[c, d], 0
+            pose.px[:], pose.sigma_px[:] = px[c, d], sigma_px[c, d]
+            for j in range(N_JOINTS):
                 u, v = px[c, d, j, 0], px[c, d, j, 1]
-                ok[c, d, j] = is_measurement(u, v, confidence[c, d, j], sigma_px[c, d, j])
-                n += ok[c, d, j]
-            free[c, d] = n >= LEAST_JOINTS
+                pose.ok[j] = is_measurement(u, v, confidence[c, d, j], sigma_px[c, d, j])
+                n += pose.ok[j]
+            pose.free = n >= LEAST_JOINTS
 
 
 @kernel(makes_arrays=True)
-def _follow(P, poses, free, mean, cov, tracked, mirror, s, pose):
+def _follow(cameras, poses, belief, s, chosen):
     """Give tracked workers the poses that fit their predictions best, camera by camera."""
-    (z, sigma, ok), n_workers = poses, len(tracked)
-    n_cameras, n_poses, n_joints = ok.shape
+    (mean, cov, tracked), n_poses = belief, poses.shape[1]
+    n_workers = len(tracked)
     size = max(n_workers, n_poses)
     fit, column = np.empty((size, size)), np.empty(size, np.int64)
-    image, known = np.empty((n_joints, 3)), np.ones(n_joints, np.bool_)
-    for c in range(n_cameras):
+    image, known = np.empty((N_JOINTS, 3)), np.ones(N_JOINTS, np.bool_)
+    for c in range(len(cameras)):
         fit[:] = 0.0
         for w in range(n_workers):
             if not tracked[w]:
                 continue
-            expect(P[c], mean[w], cov[w], known, s.slack_m, image)
+            expect(cameras[c].P, mean[w], cov[w], known, s.slack_m, image)
             for d in range(n_poses):
-                if free[c, d]:
-                    fit[w, d] = -affinity(
-                        image, z[c, d], sigma[c, d], ok[c, d], mirror,
-                        s.gate_sigma, s.image_area_px,
-                    )  # fmt: skip
+                if poses[c, d].free:
+                    fit[w, d] = -affinity(image, poses[c, d], s)
         assign_rows(fit, column)
         for w in range(n_workers):
             if fit[w, column[w]] < 0.0:  # 0: no pose fits, or it fits another better
-                pose[c, w] = column[w]
-                free[c, column[w]] = False
+                chosen[c, w] = column[w]
+                poses[c, column[w]].free = False
 
 
 @kernel(makes_arrays=True)
-def _welcome(rig, poses, free, mean, tracked, tables, s, pose):
+def _welcome(cameras, poses, mean, tracked, s, chosen):
     """Give poses that several cameras have of one body to whom it can be."""
-    n_cameras, n_poses = free.shape
-    n_workers = len(tracked)
+    (n_cameras, n_poses), n_workers = poses.shape, len(tracked)
     vacant, unseen = np.empty(n_workers, np.bool_), np.empty(n_workers, np.bool_)
     wanted = False
     for w in range(n_workers):
         n_views = 0
         for c in range(n_cameras):
-            n_views += pose[c, w] >= 0
+            n_views += chosen[c, w] >= 0
         vacant[w], unseen[w] = not tracked[w], tracked[w] and n_views == 0
         wanted |= vacant[w] or n_views < min(2, n_cameras)
     if not wanted:
         return
     most = n_cameras * (n_cameras - 1) // 2 * n_poses * n_poses
     seeds = np.empty((most, 4), np.int64)
-    members, scores = np.empty((most, n_cameras), np.int64), np.empty((most, n_cameras))
-    sight = np.empty((*poses[2].shape, 3))
-    lines_of_sight(rig[2], poses[0], poses[2], free, sight)
-    n = propose(rig, poses, sight, free, tables, s, seeds, members, scores)
+    proposals = (seeds, np.empty((most, n_cameras), np.int64), np.empty((most, n_cameras)))
+    look_along(cameras, poses)
+    n = propose(cameras, poses, s, proposals)
     mean, tracked = mean.copy(), tracked.copy()  # newcomers are followed from here on
     member, score = np.empty(n_cameras, np.int64), np.empty(n_cameras)
     while True:
-        best = _best(seeds, members, scores, free, n)
+        best = _best(proposals, poses, n)
         if best < 0:
             return
-        body = _body_of(rig, poses, sight, seeds[best], s)
-        fit_cameras(rig[0], poses, free, body, tables, s, member, score)
+        c1, d1, c2, d2 = seeds[best]
+        body = np.empty((N_JOINTS, 3)), np.empty(N_JOINTS, np.bool_)
+        meeting(cameras[c1], cameras[c2], poses[c1, d1], poses[c2, d2], s.gate_sigma, body)
+        fit_cameras(cameras, poses, body, s, member, score)
         w = _whose(body, mean, tracked, vacant, unseen, s)
         for c in range(n_cameras):
             if member[c] < 0:
                 continue
-            free[c, member[c]] = False
-            if w >= 0 and pose[c, w] < 0:
-                pose[c, w] = member[c]
+            poses[c, member[c]].free = False
+            if w >= 0 and chosen[c, w] < 0:
+                chosen[c, w] = member[c]
         if w >= 0:
             if vacant[w]:
                 _place(body, mean[w])
@@ -222,15 +208,15 @@ def _welcome(rig, poses, free, mean, tracked, tables, s, pose):
 
 
 @kernel(makes_arrays=True)
-def _best(seeds, members, scores, free, n):
+def _best(proposals, poses, n):
     """The proposal that the cameras fit best with poses that are still free, or -1."""
-    best, best_total = -1, 0.0
+    (seeds, members, scores), best, best_total = proposals, -1, 0.0
     for k in range(n):
-        if not (free[seeds[k, 0], seeds[k, 1]] and free[seeds[k, 2], seeds[k, 3]]):
+        if not (poses[seeds[k, 0], seeds[k, 1]].free and poses[seeds[k, 2], seeds[k, 3]].free):
             continue
         total, n_views = 0.0, 0
-        for c in range(free.shape[0]):
-            if members[k, c] >= 0 and free[c, members[k, c]]:
+        for c in range(poses.shape[0]):
+            if members[k, c] >= 0 and poses[c, members[k, c]].free:
                 total += scores[k, c]
                 n_views += 1
         if n_views >= 2 and total > best_total:
@@ -239,24 +225,10 @@ def _best(seeds, members, scores, free, n):
 
 
 @kernel(makes_arrays=True)
-def _body_of(rig, poses, sight, seed, s):
-    """(points (J, 3), met (J,)) of a proposal."""
-    (P, eye, _, focal), (_, sigma, ok) = rig, poses
-    c1, d1, c2, d2 = seed
-    points, met = np.empty((ok.shape[2], 3)), np.empty(ok.shape[2], np.bool_)
-    camera_1 = (eye[c1], focal[c1], P[c1])
-    camera_2 = (eye[c2], focal[c2], P[c2])
-    pose_1 = (sight[c1, d1], sigma[c1, d1], ok[c1, d1])
-    pose_2 = (sight[c2, d2], sigma[c2, d2], ok[c2, d2])
-    meeting(camera_1, camera_2, pose_1, pose_2, s.gate_sigma, points, met)
-    return points, met
-
-
-@kernel(makes_arrays=True)
 def _whose(body, mean, tracked, vacant, unseen, s):
     """The worker that a body is, or -1: one who is followed there, is missed near, or is nobody.
 
-    Of vacant places the one whose last belief is nearest, so that who comes back is known again.
+    Of vacant places the one whose last belief is nearest: who comes back is known again.
     """
     distance = np.empty(len(tracked))
     for w in range(len(tracked)):

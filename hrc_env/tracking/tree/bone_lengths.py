@@ -36,8 +36,9 @@ def stiff_lengths(variance, give, out):
 
 
 @kernel
-def learn_lengths(body, cov, slope, n_views, length, variance):
-    """Learn lengths (J,) and variances (J,), in place, from the joints that two views see."""
+def learn_lengths(tree, n_views):
+    """Learn a tree's bone lengths, in place, from the joints that two views see (J,)."""
+    body, cov, slope = tree.body, tree.cov, tree.slope
     for j in range(len(body)):
         q = PARENT[j]
         if q < 0 or n_views[j] < 2 or n_views[q] < 2:
@@ -55,16 +56,17 @@ def learn_lengths(body, cov, slope, n_views, length, variance):
                 spread += along[i] * along[k] * difference
                 total += difference if i == k else 0.0
         measured = now - 0.5 * (total - spread) / now  # errors across a bone lengthen it
-        _learn_length(measured, max(spread, _STIFFNESS[j] ** 2), j, length, variance)
+        _learn_length(tree, j, measured, max(spread, _STIFFNESS[j] ** 2))
 
 
 @kernel
-def _learn_length(measured, spread, k, length, variance):
-    """Kalman update of length[k] by a measurement whose errors last for several updates."""
+def _learn_length(tree, j, measured, spread):
+    """Kalman update of one length by a measurement whose errors last for several updates."""
+    length, variance = tree.bone_length, tree.bone_variance
     noise = _CORRELATED_UPDATES * spread
-    miss = measured - length[k]
-    if miss * miss > _GATE_SIGMA**2 * (noise + variance[k]):
+    miss = measured - length[j]
+    if miss * miss > _GATE_SIGMA**2 * (noise + variance[j]):
         return
-    gain = variance[k] / (variance[k] + noise)
-    length[k] += gain * miss
-    variance[k] = max((1.0 - gain) * variance[k], _LEAST_VARIANCE)
+    gain = variance[j] / (variance[j] + noise)
+    length[j] += gain * miss
+    variance[j] = max((1.0 - gain) * variance[j], _LEAST_VARIANCE)

@@ -23,29 +23,24 @@ _NOSE, _RIGHT_SHOULDER = JOINT["nose"], JOINT["right_shoulder"]
 
 
 @kernel
-def log_evidence(prior, posterior, seen, bones, inlier_odds, floor_std_m, w):
+def log_evidence(prior, tree, seen, s, w):
     """Log of the evidence of one update, up to what all hypotheses share.
 
-    Args:
-        prior: body (J, 6), cov, slope (J, 6, 6) before the update.
-        posterior: the same after `tree.update.update_tree` and before the mean correction.
-        seen: `measurements.Seen`.
-        bones: lengths (J,) [m] and their variances as measurements (J,) [m^2].
-        inlier_odds: as in `Settings`.
-        floor_std_m: as in `tree.search.find_pose`.
-        w: scratch, a record of `WORK`; a, b, c, d and step are used.
+    `prior` is the tree before the update, `tree` what `tree.update.update_tree` made of it, before
+    the mean correction; `w` has the variances of the bones as measurements, its a, b, c, d and step
+    are used.
     """
-    body = posterior[0]
+    body = tree.body
     for j in range(len(body)):
         for i in range(6):
-            w.step[j, i] = body[j, i] - prior[0][j, i]
-    square, log_det = tree_measure(prior[1], prior[2], w.step, w)
+            w.step[j, i] = body[j, i] - prior.body[j, i]
+    square, log_det = tree_measure(prior, w.step, w)
     for j in range(len(body)):
         for i in range(6):
             w.step[j, i] = 0.0
-    _, log_det_after = tree_measure(posterior[1], posterior[2], w.step, w)
-    likelihood = log_likelihood(body, seen, inlier_odds) + _bones(body, bones)
-    likelihood += _floor(body, floor_std_m)
+    _, log_det_after = tree_measure(tree, w.step, w)
+    likelihood = log_likelihood(body, seen, s.inlier_odds)
+    likelihood += _bones(body, tree.bone_length, w.bone_variance) + _floor(body, s.floor_std_m)
     return likelihood - 0.5 * square + 0.5 * (log_det_after - log_det)
 
 
@@ -67,12 +62,12 @@ def log_likelihood(body, seen, inlier_odds):
 
 
 @kernel(makes_arrays=True)
-def tree_measure(cov, slope, change, w):
+def tree_measure(tree, change, w):
     """Squared Mahalanobis length of `change` (J, 6) under a tree, and log det of the tree.
 
     A conditional covariance that is not positive definite counts by its diagonal.
     """
-    square, log_det = 0.0, 0.0
+    cov, slope, square, log_det = tree.cov, tree.slope, 0.0, 0.0
     for m in range(len(ORDER)):
         j = ORDER[m]
         q = PARENT[j]
@@ -127,9 +122,8 @@ def _measure_diagonal(a, x):
 
 
 @kernel
-def _bones(body, bones):
+def _bones(body, length, variance):
     """Log-likelihood of the bones' lengths, those of the tree's edges and the nose's second."""
-    length, variance = bones
     total = _bone(body, _NOSE, _RIGHT_SHOULDER, length[_NOSE], variance[_NOSE])
     for m in range(1, len(ORDER)):
         j = ORDER[m]
@@ -154,12 +148,12 @@ def _bone(body, j, q, length, variance):
 
 @kernel
 def distance_between(one, other, w):
-    """Squared Mahalanobis distance of two bodies (body, cov, slope) under the wider of them."""
+    """Squared Mahalanobis distance of two trees under the wider of them."""
     least = np.inf
     for tree in (one, other):
-        for j in range(len(one[0])):
+        for j in range(len(one.body)):
             for i in range(6):
-                w.step[j, i] = one[0][j, i] - other[0][j, i]
-        square, _ = tree_measure(tree[1], tree[2], w.step, w)
+                w.step[j, i] = one.body[j, i] - other.body[j, i]
+        square, _ = tree_measure(tree, w.step, w)
         least = min(least, square)
     return least

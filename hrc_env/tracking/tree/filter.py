@@ -1,16 +1,12 @@
 """An update of one Gaussian on the tree, step by step.
 
-`state` and `s` are `state.Trees` and `settings.Settings`; a worker's measurements are
-z (J, C, 2), sigma (J, C), ok (J, C) as `measurements.read_worker` fills them.
+`tree` is a record of `tree.state.TREE`, `seen` is `measurements.Seen`, `s` are `settings.Settings`
+and `work` is a record of `tree.work.WORK`.
 """
 
 from hrc_env.core.kernels import kernel
 from hrc_env.tracking.models.acquisition import count_conflict
-from hrc_env.tracking.models.track_management import (
-    acquire_anew,
-    check,
-    find_joints_again,
-)
+from hrc_env.tracking.models.track_management import acquire_anew, check, find_joints_again
 from hrc_env.tracking.tree.bone_lengths import learn_lengths, stiff_lengths
 from hrc_env.tracking.tree.gaussian import PARENT
 from hrc_env.tracking.tree.search import find_pose
@@ -27,36 +23,25 @@ def keep_positions(cov, out):
 
 
 @kernel
-def follow(tree, seen, s, work):
-    """Update a tracked worker: search, condition, correct the mean, learn the bones."""
-    condition(tree, seen, s, work)
-    correct_mean(tree, seen, s, work)
-
-
-@kernel
 def condition(tree, seen, s, work):
     """Search the mode and condition the tree there; seen.belief says what was believed."""
-    give = work.bone_variance
-    body, cov, slope = tree.body, tree.cov, tree.slope
-    stiff_lengths(tree.bone_variance, s.bone_give, give)
-    bones = (tree.bone_length, give)
-    how = (s.inlier_odds, s.floor_std_m, s.gauss_newton_steps)
-    find_pose(body, cov, slope, seen, bones, *how, work)
-    update_tree(body, cov, slope, work)
+    stiff_lengths(tree.bone_variance, s.bone_give, work.bone_variance)
+    find_pose(tree, seen, s, work)
+    update_tree(tree, work)
 
 
 @kernel
 def correct_mean(tree, seen, s, work):
     """Go from the mode to the mean, and learn what is to be learnt from it."""
     if s.mean_correction > 0.0:
-        gaussian = (tree.body, tree.cov, tree.slope)
-        shift_to_mean(*gaussian, seen, s.mean_correction, work)
-    update_ages(tree, seen, work.n_views)
+        shift_to_mean(tree, seen, s.mean_correction, work)
+    _update_ages(tree, seen, work.n_views)
+    learn_lengths(tree, work.n_views)
 
 
 @kernel
-def update_ages(tree, seen, n_views):
-    """Ages, conflicts and bone lengths of a worker who has been updated."""
+def _update_ages(tree, seen, n_views):
+    """Ages and conflicts of a worker who has been updated, and how many cameras saw each joint."""
     ok, belief = seen.ok, seen.belief
     for j in range(len(ok)):
         n_views[j], n_supporting = 0, 0
@@ -65,21 +50,15 @@ def update_ages(tree, seen, n_views):
             n_supporting += belief[j, c] > 0.5
         if n_supporting > 0:
             tree.age_s[j] = 0.0
-        conflict = tree.conflict[j]
-        tree.conflict[j] = count_conflict(n_views[j], n_supporting, conflict)
-    bones = (tree.bone_length, tree.bone_variance)
-    learn_lengths(tree.body, tree.cov, tree.slope, n_views, *bones)
+        tree.conflict[j] = count_conflict(n_views[j], n_supporting, tree.conflict[j])
 
 
 @kernel
-def recover(tree, seen, standing, s, work):
-    """Find joints or the whole body again where the views say so; notice a body that is lost.
-
-    What is known of a joint that was put somewhere is its own.
-    """
-    P, z, sigma, ok, placed = seen.P, seen.z, seen.sigma, seen.ok, work.placed
-    placed[:] = acquire_anew(tree, P, z, sigma, ok, standing, s)
-    find_joints_again(tree, P, z, sigma, ok, s, placed)
+def recover(tree, seen, s, work):
+    """Find joints or the whole body again where the views say so; notice a body that is lost."""
+    placed = work.placed
+    placed[:] = acquire_anew(tree, seen, s)
+    find_joints_again(tree, seen, s, placed)
     for j in range(len(placed)):
         if placed[j] or (PARENT[j] >= 0 and placed[PARENT[j]]):
             tree.slope[j] = 0.0

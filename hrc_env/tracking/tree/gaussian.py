@@ -71,9 +71,8 @@ def multiply_transposed(a, b, out):
 def inverse_of(a00, a10, a11, a20, a21, a22):
     """Inverse of a symmetric 3x3 matrix by its L D L' factors; whether it is positive definite.
 
-    Six numbers in, six and the answer out: 00, 10, 11, 20, 21, 22. Unlike by cofactors, a
-    matrix that is nearly singular (a depth known far worse than what is across it) costs no
-    digits.
+    Six numbers in, six and the answer out: 00, 10, 11, 20, 21, 22. Unlike cofactors it loses no
+    digits where a matrix is nearly singular.
     """
     d0 = 1.0 / a00
     l10, l20 = a10 * d0, a20 * d0

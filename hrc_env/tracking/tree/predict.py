@@ -18,21 +18,15 @@ _REORDER = {"reassoc", "contract", "nsz"}
 
 
 @kernel
-def predict_tree(body, cov, slope, offset, offset_count, model, dt, w):
-    """Move one worker by dt [s], in place.
+def predict_tree(tree, model, dt, w):
+    """Move one worker by dt [s], in place, and learn their joints' places on the body.
 
-    Args:
-        body: (J, 6) means.
-        cov: (J, 6, 6) marginals C_j.
-        slope: (J, 6, 6) slopes B_j.
-        offset, offset_count: (J, 3), (J,) places on the body, learnt here.
-        model: F (J, 2, 2), travel (J, 2, 2), Q (J, 2, 2) noise of a joint, shared (2, 2) part of it
-            that is the whole body's.
-        dt: time step [s].
-        w: scratch.
+    `model` is F (J, 2, 2), travel (J, 2, 2), Q (J, 2, 2) noise of a joint, shared (2, 2) part of it
+    that is the whole body's; `w` is scratch.
     """
     F, travel, Q, shared = model
-    _move_means(body, cov, offset, offset_count, F, travel, dt)
+    cov, slope = tree.cov, tree.slope
+    _move_means(tree, F, travel, dt)
     torso = w.a
     _relate_torso(cov, slope, w)
     for j in ORDER:
@@ -59,14 +53,15 @@ def _torso_of(body, i):
 
 
 @kernel
-def _move_means(body, cov, offset, offset_count, F, travel, dt):
+def _move_means(tree, F, travel, dt):
+    body, offset = tree.body, tree.offset
     root = (
         _torso_of(body, 0), _torso_of(body, 1), _torso_of(body, 2),
         _torso_of(body, 3), _torso_of(body, 4), _torso_of(body, 5),
     )  # fmt: skip
     cos, sin, known = heading(body)
     if known:
-        learn_offsets(body, cov, root, cos, sin, dt, offset, offset_count)
+        learn_offsets(tree, root, cos, sin, dt)
     for j in range(len(body)):
         forward, left = offset[j, 0], offset[j, 1]
         place = (cos * forward - sin * left, sin * forward + cos * left, offset[j, 2])

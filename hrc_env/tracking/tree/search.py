@@ -1,9 +1,8 @@
 """Where the whole body probably is: robust Gauss-Newton on the positions of the tree.
 
-The prior of the positions alone is taken as a tree of 3-vectors; cameras inform single joints
-(`tree.cameras`), bones inform edges. The search begins with the likelihood widened by the prior's
-own uncertainty, so that good measurements of a badly predicted joint are not taken for outliers
-(graduated non-convexity), and ends with the likelihood as it is. Each step solves one 45x45 system
+Cameras inform single joints (`tree.cameras`), bones inform edges. The search begins with the
+likelihood widened by the prior's own uncertainty, so that good measurements of a badly predicted
+joint are not taken for outliers (graduated non-convexity). Each step solves one 45x45 system
 exactly by elimination from the leaves to the root and substitution back.
 """
 
@@ -19,33 +18,27 @@ _REORDER = {"reassoc", "contract", "nsz"}
 
 
 @kernel
-def find_pose(body, cov, slope, seen, bones, inlier_odds, floor_std_m, n_steps, w):
-    """Search the most probable positions and leave everything linearised there.
+def find_pose(tree, seen, s, w):
+    """Search the most probable positions of a predicted tree and leave everything linearised there.
 
-    Args:
-        body, cov, slope: the prediction (J, 6), (J, 6, 6), (J, 6, 6).
-        seen: `measurements.Seen`, of which belief is filled.
-        bones: lengths (J,) to the parent [m] and their variances as measurements (J,) [m^2].
-        inlier_odds: as in `Settings`.
-        floor_std_m: of the floor, as a measurement of whatever is below it [m].
-        n_steps: Gauss-Newton steps.
-        w: scratch, in which the point and what cameras and bones say there stay: information and
-            gradient of the log-likelihood as a function of the positions (of joints, and of joints
-            less their parents') minus their predicted means, at 0.
+    `w` has the variances of the bones as measurements. In it stay the point and what cameras and
+    bones say there: information and gradient of the log-likelihood as a function of the positions
+    (of joints, and of joints less their parents') minus their predicted means, at 0. Fills
+    seen.belief.
     """
-    for j in range(len(body)):
+    for j in range(len(tree.body)):
         for i in range(3):
-            w.point[j, i] = body[j, i]
-    how = (inlier_odds, floor_std_m, n_steps, 1.0)
-    find_pose_near(body, cov, slope, seen, bones, *how, w)
+            w.point[j, i] = tree.body[j, i]
+    find_pose_near(tree, seen, s, s.gauss_newton_steps, 1.0, w)
 
 
 @kernel
-def find_pose_near(body, cov, slope, seen, bones, inlier_odds, floor_std_m, n_steps, widen, w):
+def find_pose_near(tree, seen, s, n_steps, widen, w):
     """As `find_pose`, but the search begins at w.point (J, 3) instead of the predicted means.
 
     `widen` times the prior's own image variance is added to the detector's in the first step.
     """
+    body, cov, slope = tree.body, tree.cov, tree.slope
     for j in ORDER:
         if PARENT[j] >= 0:
             multiply(slope[j], cov[PARENT[j]], w.edge[j])
@@ -56,10 +49,10 @@ def find_pose_near(body, cov, slope, seen, bones, inlier_odds, floor_std_m, n_st
     set_views(seen)
     for step in range(n_steps + 1):
         widening = widen if step < n_steps - 1 else 0.0
-        _linearise_cameras(seen, inlier_odds, widening, w)
-        _stand_on_the_floor(body, 1.0 / floor_std_m**2, w)
-        _linearise_bones(bones, w)
-        _add_second_bone(cov, bones, w)
+        _linearise_cameras(seen, s.inlier_odds, widening, w)
+        _stand_on_the_floor(body, 1.0 / s.floor_std_m**2, w)
+        _linearise_bones(tree.bone_length, w)
+        _add_second_bone(cov, tree.bone_length, w)
         if step < n_steps:
             _solve_positions(body, w)
         widen *= 0.5
@@ -121,11 +114,7 @@ def _linearise_cameras(seen, inlier_odds, widening, w):
 
 @kernel
 def _stand_on_the_floor(body, information, w):
-    """Joints that are below the floor are measured to be on it; the others hear nothing of it.
-
-    One view leaves the depth open, and a body that looks small is as well a far one. It would go
-    through the floor for that.
-    """
+    """Joints below the floor are measured to be on it: one view leaves open how far a body is."""
     for j in range(len(body)):
         if w.point[j, 2] < 0.0:
             w.camera_information[j, 2, 2] += information
@@ -133,48 +122,38 @@ def _stand_on_the_floor(body, information, w):
 
 
 @kernel(fastmath=_REORDER)
-def _linearise_bones(bones, w):
+def _linearise_bones(length, w):
     """What the bones from joints to their parents say, at the points."""
-    length, variance = bones
     for j in ORDER:
-        q = PARENT[j]
+        q, a, b = PARENT[j], w.point[j], w.point[PARENT[j]]
         if q < 0:
             continue
-        x, y, z = (
-            w.point[j, 0] - w.point[q, 0],
-            w.point[j, 1] - w.point[q, 1],
-            w.point[j, 2] - w.point[q, 2],
-        )
+        x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
         now = math.sqrt(x * x + y * y + z * z) + 1e-9
         along = (x / now, y / now, z / now)
         miss = length[j] - now
         for i in range(3):
             miss += along[i] * (w.shift[j, i] - w.shift[q, i])
         for i in range(3):
-            known = along[i] / variance[j]
+            known = along[i] / w.bone_variance[j]
             w.edge_gradient[j, i] = known * miss
             for k in range(3):
                 w.edge_information[j, i, k] = known * along[k]
 
 
 @kernel(fastmath=_REORDER)
-def _add_second_bone(cov, bones, w):
-    """The bone from the nose to the right shoulder.
+def _add_second_bone(cov, length, w):
+    """The bone from the nose to the right shoulder: one alone would hold the nose's mirror image.
 
-    One bone would hold the nose's mirror image in depth as gladly as the nose: it has two. The
-    second is no edge of the tree; the right shoulder counts as a point that the left one
-    carries, and what is not known of where it carries it counts as noise.
+    It is no edge of the tree: the right shoulder counts as a point that the left one carries, and
+    what is not known of where it carries it counts as noise.
     """
-    length, variance = bones
     nose, right, left = _NOSE, _RIGHT_SHOULDER, PARENT[_RIGHT_SHOULDER]
-    x, y, z = (
-        w.point[nose, 0] - w.point[right, 0],
-        w.point[nose, 1] - w.point[right, 1],
-        w.point[nose, 2] - w.point[right, 2],
-    )
+    a, b = w.point[nose], w.point[right]
+    x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
     now = math.sqrt(x * x + y * y + z * z) + 1e-9
     along = (x / now, y / now, z / now)
-    miss, spread = length[nose] - now, variance[nose]
+    miss, spread = length[nose] - now, w.bone_variance[nose]
     for i in range(3):
         miss += along[i] * (w.shift[nose, i] - w.shift[PARENT[nose], i])
         for k in range(3):

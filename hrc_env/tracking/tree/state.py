@@ -1,11 +1,9 @@
 """The state of Gaussians on the kinematic tree, one for every hypothesis about every worker.
 
-The joints of a body share their errors: with one view the depth of all of them is wrong
-together. A filter that keeps each joint for itself counts one shared uncertainty fifteen times
-over and believes what it should not. Here the whole body is one Gaussian whose dependencies
-are the kinematic tree's: a prediction with exact moments (`predict`), a robust search (`search`),
-one exact update and a step from the mode to the mean (`update`), with bones of known length on
-every edge (`bone_lengths`) and a noise of every camera that is learnt (`models.noise`).
+The joints of a body share their errors: with one view the depth of all of them is wrong together.
+So the whole body is one Gaussian whose dependencies are the kinematic tree's: a prediction with
+exact moments (`predict`), a robust search (`search`), one exact update and a step from the mode to
+the mean (`update`), with bones of known length on every edge (`bone_lengths`).
 """
 
 import functools
@@ -61,7 +59,7 @@ NOISE = np.dtype(
 
 
 def forget_trees(trees: Any, views: Any, noise: Any, ids: Ints, config: ParticleConfig) -> None:
-    """Put environments `ids` of trees (B, K), views (B, K, C), noise (B, K, J, C) to the prior."""
+    """Put environments `ids` of trees (B, W, H), and of what they hold of cameras, to the prior."""
     fresh = np.zeros((), TREE)
     fresh["body"][:, :3] = config.prior_mean_world
     fresh["cov"] = np.eye(6)

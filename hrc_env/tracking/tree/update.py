@@ -24,13 +24,13 @@ _REORDER = {"reassoc", "contract", "nsz"}
 
 
 @kernel
-def update_tree(body, cov, slope, w):
-    """Condition (J, 6), (J, 6, 6), (J, 6, 6) on cameras and bones, in place.
+def update_tree(tree, w):
+    """Condition a tree on cameras and bones, in place.
 
-    Covariances with the parents are in w.edge, and what cameras and bones say in
-    w.camera_information, camera_gradient, edge_information and edge_gradient, as
-    `tree.search.find_pose` leaves all that. Keeps the factors for `shift_to_mean`.
+    Covariances with the parents (edge) and what cameras and bones say (information and gradient)
+    are in `w` as `tree.search.find_pose` leaves them. Keeps the factors for `shift_to_mean`.
     """
+    body, cov, slope = tree.body, tree.cov, tree.slope
     for j in LEAVES_FIRST:
         _split(j, cov, slope, w)
         _load_measurements(j, w)
@@ -135,15 +135,16 @@ def _substitute(body, slope, w):
 
 
 @kernel
-def shift_to_mean(body, cov, slope, seen, share, w):
+def shift_to_mean(tree, seen, share, w):
     """Lead the means from the mode towards the mean of the posterior (Laplace's next term).
 
-    A camera's information on a position falls with the square of the depth, so that there is
-    more room behind the mode than before it. With J the Jacobian of joint j's pixel, n the
-    camera's optical axis (both in the world), d the depth and S_j the posterior covariance,
-    mean - mode = H^-1 g with g_j = sum over cameras of n tr(S_j J'J / sigma^2) / d, H being the
-    Hessian of all joints, whose factors `update_tree` left. `share` of it is applied.
+    A camera's information falls with the square of the depth: there is more room behind the mode
+    than before it. With J the Jacobian of joint j's pixel, n the camera's optical axis (both in the
+    world), d the depth and S_j the posterior covariance, mean - mode = H^-1 g with g_j = sum over
+    cameras of n tr(S_j J'J / sigma^2) / d, H being the Hessian of all joints, whose factors
+    `update_tree` left. `share` of it is applied.
     """
+    body, cov, slope = tree.body, tree.cov, tree.slope
     P, sigma, ok, belief = seen.P, seen.sigma, seen.ok, seen.belief
     for j in range(len(ok)):
         for i in range(6):

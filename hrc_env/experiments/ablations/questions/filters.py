@@ -28,10 +28,8 @@ ALGORITHM_1 = Ablation(
     ),
 )
 
-WHOLE = "all"
-"""The variant that is the default filter."""
 WITHOUT: dict[str, tuple[str, dict[str, Any]]] = {
-    WHOLE: ("the default filter", {}),
+    "all": ("the default filter", {}),
     "velocity forgotten": ("no motion model (velocity forgotten)", {"motion": "forgotten"}),
     "bones of any length": ("no bones (any length)", {"bones": "none"}),
     "no outliers": ("no outliers in the likelihood", {"outlier_weight": 1e-9}),
