@@ -178,12 +178,8 @@ def layout(terms: tuple[ObservationTerm, ...], of: Sizes) -> ObservationLayout:
 
 
 def observe(now: Belief, where: ObservationLayout, terms: tuple[ObservationTerm, ...]) -> Tensor:
-    """(B, n) flat observations of `terms`; cast to float32 once, here.
-
-    Raises:
-        ConfigError: a term has another number of entries than it says.
-        FloatingPointError: a term is not a number; a fault of the code, never of a camera.
-    """
+    """(B, n) flat observations of `terms`; `ConfigError` for one with other entries than it says,
+    `FloatingPointError` for one that is no number, a fault of the code, never of a camera."""
     batch = len(now.action)
     present = [terms[k] for k in where.terms]
     parts = [term.function(now).reshape(batch, -1) for term in present]

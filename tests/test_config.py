@@ -1,12 +1,13 @@
 """One way to configure: keyword arguments for what is chosen often, `config=` for the rest."""
 
 from dataclasses import replace
+from inspect import signature
 
 import numpy as np
 import pytest
 
 from hrc_env.__main__ import main
-from hrc_env.config import HRCConfig, load_config, save_config, settle
+from hrc_env.config import ARGUMENTS, HRCConfig, load_config, save_config, settle
 from hrc_env.core.errors import OLD_NAMES, ConfigError, Named
 from hrc_env.env import HRCEnv
 from hrc_env.motion.clip import Clip
@@ -118,3 +119,8 @@ def test_no_name_of_today_is_an_old_one():
     env = HRCEnv(perception="none")
     observation, info = env.reset(seed=0)
     assert not OLD_NAMES.keys() & {*info, *env.split_observation(observation)}
+
+
+def test_settings_have_the_defaults_of_the_environment():
+    parameters = signature(HRCEnv).parameters
+    assert {name: parameters[name].default for name in ARGUMENTS} == ARGUMENTS

@@ -61,11 +61,7 @@ class MissingExtraError(HRCError, ImportError):
 
 @contextlib.contextmanager
 def learner() -> Iterator[None]:
-    """Round imports of the learner's libraries, which the extra `train` brings.
-
-    Raises:
-        MissingExtraError: one is not installed; the message has the line to type.
-    """
+    """Round imports of the learner's libraries: a `MissingExtraError` has the line to type."""
     try:
         yield
     except ModuleNotFoundError as error:

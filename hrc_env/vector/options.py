@@ -63,11 +63,8 @@ def seeds_of(seed: int | Sequence[int | None] | None, num_envs: int) -> list[int
 def read_options(
     options: Mapping[str, Any] | None, num_envs: int, max_episode_steps: int
 ) -> tuple[Bools, Ints]:
-    """Which environments a reset is for, and steps that their episodes have behind them: (B,).
-
-    Raises:
-        ConfigError: an option that there is not, or a value that cannot work.
-    """
+    """(B,) which environments a reset is for, and steps that their episodes have behind them;
+    `ConfigError` for an option that there is not, or a value that cannot work."""
     given = dict(options or {})
     for name in sorted(set(given) - set(RESET_OPTIONS)):
         raise unknown("reset option", name, RESET_OPTIONS)

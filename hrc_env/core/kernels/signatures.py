@@ -66,10 +66,7 @@ def write(signatures: Sequence[Signature]) -> None:
 def encode(kind: Any) -> Any:
     """A type of numba's as JSON: "float64", "float64[3C]" ("!" behind it: not to be written),
     "module:DTYPE" for a record and "module:DTYPE[2C]" for a structured array, a list for a tuple,
-    {"module:name": [...]} for a named one.
-
-    Raises:
-        TypeError: a type that no kernel has been called with so far.
+    {"module:name": [...]} for a named one; `TypeError` for others, which no kernel has had so far.
     """
     text: Any = str(kind)
     inside = [encode(each) for each in getattr(kind, "types", ())]
