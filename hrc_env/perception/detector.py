@@ -105,7 +105,7 @@ class _Networks:
     """One thread's interpreters."""
 
     detect: network.PersonDetector
-    landmark: tuple[network.Landmarker, network.Landmarker]  # for upright workers, for folded ones
+    landmark: dict[str, network.Landmarker]  # by name
     own: KeypointFunction | None  # what finds joints instead of these
 
 
@@ -240,12 +240,10 @@ def _nobody(windows: Sequence[Roi | None]) -> Detection:
 
 def _networks(config: DetectorConfig) -> _Networks:
     runtime = network.chosen_runtime(config.runtime)
-    landmark = network.load_landmarker(config.network, runtime)
-    same = config.folded == config.network
-    folded = landmark if same else network.load_landmarker(config.folded, runtime)
+    landmark = {k: network.load_landmarker(k, runtime) for k in {config.network, config.folded}}
     make = DETECTORS[config.keypoints]
     own = None if make is None else make()
-    return _Networks(network.load_person_detector(runtime), (landmark, folded), own)
+    return _Networks(network.load_person_detector(runtime), landmark, own)
 
 
 def own_joints(find: KeypointFunction, crop: Image, window: Roi) -> Floats | None:
@@ -269,7 +267,8 @@ def _joints(
     """(J, 3) pixels and visibility, or None where there is no worker; `ask` the detector stage?"""
     if nets.own is not None:
         return own_joints(nets.own, crop, window)
-    points, presence, heat = nets.landmark[folded](blazepose.landmark_input(crop))
+    landmark = nets.landmark[config.folded if folded else config.network]
+    points, presence, heat = landmark(blazepose.landmark_input(crop))
     if presence < config.min_presence:
         return None
     if ask or presence < config.sure_presence:

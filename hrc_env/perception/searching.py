@@ -145,10 +145,9 @@ def agreed_windows(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> 
 
 def apart_from(candidates: Candidates, others: Sequence[Sequence[Roi | None]]) -> Candidates:
     """Candidates (C,) without those who are in a window (C,) of somebody else already."""
-    known = [[windows[c] for windows in others] for c in range(len(candidates))]
     return [
-        [window for window in found if not any(same_person(window, other) for other in taken)]
-        for found, taken in zip(candidates, known, strict=True)
+        [window for window in found if not any(same_person(window, w[c]) for w in others)]
+        for c, found in enumerate(candidates)
     ]
 
 

@@ -42,18 +42,17 @@ class PixelPipeline(PoseTracking):
     def detect(self, now: SensorInput, predicted: Any, sensor_rngs: Generators) -> Keypoints:
         """Landmarks of crops round the predicted worker, or of a search where there is none."""
         seen = no_keypoints(len(now.ids), len(self.scene.cameras), self.scene.n_workers)
-        time_s = None if self.recent is None else np.empty(seen.px.shape[:2])
+        time_s = np.zeros(seen.px.shape[:2])
         expected = self.tracker.estimate(predicted)
         for row, b in enumerate(now.ids.tolist()):
             self.renderer.randomize(self.worn[b])
-            if self.recent is None or time_s is None:
+            if self.recent is None:
                 self.renderer.draw(now.q[row], one(now.motion, row))
-                has_image = [True] * len(self.scene.cameras)
             else:
                 time_s[row] = self._take_images(now, row, b, self.recent)
-                has_image = np.isfinite(time_s[row]).tolist()
+            has_image = np.isfinite(time_s[row]).tolist()
             self.looking.look(self.images, one(expected, row), b, has_image, one(seen, row))
-        return replace(seen, time_s=time_s)
+        return replace(seen, time_s=None if self.recent is None else time_s)
 
     def _take_images(self, now: SensorInput, row: int, b: int, recent: Recent) -> Floats:
         """Let every camera show what has come of it. (C,) its time; NaN for nothing."""

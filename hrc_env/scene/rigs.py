@@ -6,7 +6,7 @@ from hrc_env.core.records import Grounds
 from hrc_env.core.typing import Bools, Floats, Points3
 from hrc_env.geometry.camera_config import CameraConfig, made
 from hrc_env.geometry.cameras import PinholeCamera, image_from_pinhole, inside_image, project
-from hrc_env.geometry.shapes import BOX, CENTRE, HALF_SIZE, KIND, PLANE, on_axis
+from hrc_env.geometry.shapes import AXES, BOX, CENTRE, HALF_SIZE, KIND, PLANE, REACH
 from hrc_env.geometry.sight import Surroundings, hidden, nothing
 from hrc_env.scene.build import Scene
 from hrc_env.scene.rig import LAB_CAMERAS, SITE_CAMERAS
@@ -70,12 +70,9 @@ def findings(scene: Scene) -> list[str]:
 
 def _inside_something(camera: PinholeCamera, still: Floats) -> bool:
     """Whether an eye is inside a box or behind a plane that stands still."""
-    for row in range(len(still)):
-        offset = camera.eye_world - still[row, CENTRE : CENTRE + 3]
-        away = np.array([on_axis(still, row, axis, offset) for axis in range(3)])
-        half = still[row, HALF_SIZE : HALF_SIZE + 3]
-        if still[row, KIND] == BOX and (np.abs(away) < half).all():
-            return True
-        if still[row, KIND] == PLANE and away[2] < 0 and (np.abs(away[:2]) < half[:2]).all():
-            return True
-    return False
+    axes = still[:, AXES:HALF_SIZE].reshape(-1, 3, 3)
+    away = np.einsum("gij,gj->gi", axes, camera.eye_world - still[:, CENTRE:AXES])
+    within = np.abs(away) < still[:, HALF_SIZE:REACH]
+    in_box = (still[:, KIND] == BOX) & within.all(1)
+    behind = (still[:, KIND] == PLANE) & (away[:, 2] < 0) & within[:, :2].all(1)
+    return bool((in_box | behind).any())
