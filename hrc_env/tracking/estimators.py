@@ -73,11 +73,7 @@ class Estimator(Protocol[State]):
         ...
 
     def forecast(self, state: State, horizon_s: float) -> PoseEstimate:
-        """What is expected in `horizon_s`, in (0, 1] [s], if nobody looks; the state stays.
-
-        Raises:
-            ConfigError: a horizon that is none.
-        """
+        """What is expected in `horizon_s`, in (0, 1] [s], if nobody looks; the state stays."""
         ...
 
 

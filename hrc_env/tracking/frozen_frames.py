@@ -40,12 +40,9 @@ def forget_frozen(state: Any, ids: Ints) -> None:
 
 
 def leave_out_frozen(state: Any, ids: Ints, keypoints: Keypoints) -> None:
-    """Make what stuck cameras report of environments `ids` missing, in place.
+    """Make what stuck cameras report missing, in place, in keypoints of environments `ids`.
 
-    Args:
-        state: (B, C) records of the whole batch.
-        ids: (B,) environments, whose rows the keypoints are.
-        keypoints: whose they are is open; cameras without an image report nothing.
+    `state` is of the whole batch; cameras without an image report nothing.
     """
     _leave_out(state, ids, keypoints.px, keypoints.confidence, keypoints.sigma_px)
 

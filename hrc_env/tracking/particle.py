@@ -23,7 +23,7 @@ from hrc_env.tracking.hypotheses.slots import Hypotheses
 from hrc_env.tracking.measurements import arrays_of
 from hrc_env.tracking.models.noise import noise_model
 from hrc_env.tracking.settings import settings_of
-from hrc_env.tracking.tracks import blank, bounded
+from hrc_env.tracking.tracks import bounded
 from hrc_env.tracking.tree.state import NOISE, TREE, VIEW, forget_trees, motion
 from hrc_env.tracking.tree.work import WORK
 
@@ -82,7 +82,10 @@ class ParticleEstimator:
 
     def estimate(self, state: Hypotheses) -> PoseEstimate:
         """Mean and covariance of the mixture; ages are the heaviest hypothesis's."""
-        out = blank(state.n_alive.shape)
+        tracked = np.empty(state.n_alive.shape, bool)
+        age_s = np.empty((*tracked.shape, N_JOINTS))
+        mean, velocity = np.empty((2, *age_s.shape, 3))
+        out = mean, np.empty((*age_s.shape, 3, 3)), velocity, age_s, tracked
         estimate_all(_plain(state), self.settings, out)
         return PoseEstimate(*out)
 

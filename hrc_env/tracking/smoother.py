@@ -16,7 +16,7 @@ Needing the future, this is no estimator of an environment; it is offline, and i
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -32,6 +32,8 @@ from hrc_env.tracking.tree.gaussian import ORDER, PARENT
 from hrc_env.tracking.tree.state import motion
 
 _N = 6 * N_JOINTS
+Moments: TypeAlias = tuple[Floats, Floats]
+"""Means and covariances."""
 
 
 class _Passed(NamedTuple):
@@ -89,13 +91,7 @@ def smooth(
     return _reported(_mixture(forth, back), (len(clip), batch, n_workers), config)
 
 
-def rts_step(
-    belief: tuple[Floats, Floats],
-    predicted: Floats,
-    later: tuple[Floats, Floats],
-    F: Floats,
-    Q: Floats,
-) -> tuple[Floats, Floats]:
+def rts_step(belief: Moments, predicted: Floats, later: Moments, F: Floats, Q: Floats) -> Moments:
     """One step back, for n Gaussians of d numbers: mean and covariance, smoothed.
 
     Args:
@@ -184,7 +180,7 @@ def _filtered(
     return passed
 
 
-def _moments(trees: Any) -> tuple[Floats, Floats]:
+def _moments(trees: Any) -> Moments:
     """Mean (n, 90) and covariance (n, 90, 90) of trees (n,)."""
     return trees["body"].reshape(-1, _N).copy(), dense(trees["cov"], trees["slope"])
 

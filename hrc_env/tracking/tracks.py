@@ -9,7 +9,7 @@ import numpy as np
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Bools, Floats, Ints
+from hrc_env.core.typing import Ints
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.settings import settings_of
 
@@ -98,13 +98,6 @@ def relax(mean, cov, velocity, keep, home, std):
             for k in range(3):
                 cov[j, i, k] *= keep * keep
             cov[j, i, i] += (1.0 - keep * keep) * std * std
-
-
-def blank(shape: tuple[int, ...]) -> tuple[Floats, Floats, Floats, Floats, Bools]:
-    """The arrays of a `PoseEstimate` of (B, W) workers, for a kernel to fill in."""
-    joints = (*shape, _J)
-    moments = np.empty((*joints, 3)), np.empty((*joints, 3, 3)), np.empty((*joints, 3))
-    return (*moments, np.empty(joints), np.empty(shape, bool))
 
 
 def report(tracks: Any, config: TrackerConfig) -> PoseEstimate:
