@@ -163,11 +163,8 @@ def settle(**arguments: Any) -> Settings:
 
 
 def resolve(config: ConfigChoice, task: Task, estimator: EstimatorSpec) -> HRCConfig:
-    """A config from what a user gave: itself, a (nested) mapping of changes, a TOML file, nothing.
-
-    Raises:
-        ConfigError: a field that does not exist, a bad value, or the settings of another task.
-    """
+    """A config from what a user gave: itself, a (nested) mapping of changes, a TOML file, nothing;
+    `ConfigError` for a field that does not exist, a bad value, or the settings of another task."""
     if isinstance(config, str | Path):
         config = read_toml(config)
     if isinstance(config, Mapping):
@@ -193,11 +190,8 @@ def resolve(config: ConfigChoice, task: Task, estimator: EstimatorSpec) -> HRCCo
 
 
 def save_config(config: HRCConfig, path: str | Path) -> None:
-    """Write every setting to a TOML file, which `config=` and `--config` take.
-
-    Raises:
-        ConfigError: a clip in memory, which has no such form (give its file).
-    """
+    """Write every setting to a TOML file, which `config=` and `--config` take; `ConfigError` for a
+    clip in memory, which has no such form."""
     for motion in config.motion.motions:
         if not isinstance(motion, str):
             raise ConfigError(f"The clip {motion.source!r} cannot be written: give its file.")

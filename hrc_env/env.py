@@ -43,6 +43,7 @@ ENDLESS = 2**62
 class Door(Stateful):
     """What a single and a vector environment have in common: states, pictures' form, `spec`."""
 
+    closed = False
     _spec: EnvSpec | None = None
 
     def _open(self, settings: Settings, render_mode: str | None, width: int, height: int) -> None:
@@ -52,6 +53,10 @@ class Door(Stateful):
         self.render_mode, self.config = render_mode, settings.config
         fps = round(1 / self.config.ctrl_dt)
         self.metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": fps}
+
+    def _refuse_closed(self) -> None:
+        if self.closed:
+            raise ConfigError("This environment is closed; make a new one.")
 
     @property
     def spec(self) -> EnvSpec | None:
@@ -136,7 +141,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         self.simulation = Simulation(1, settings)
         self.views = Views(self.simulation)
         self.observation_space, self.action_space = spaces(self.simulation)
-        self._begun = self._closed = False
+        self._begun = False
         self._steps_left = ENDLESS
 
     def reset(
@@ -196,11 +201,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         """Release threads and graphics contexts."""
         self.views.close()
         self.simulation.close()
-        self._closed = True
-
-    def _refuse_closed(self) -> None:
-        if self._closed:
-            raise ConfigError("This environment is closed; make a new one.")
+        self.closed = True
 
 
 def _steps_left(options: Mapping[str, Any]) -> int:

@@ -68,18 +68,13 @@ def cost(
 
 
 def tracking_error(
-    estimate: PoseEstimate, truth: WorkerTruth, present: Bools | None = None
+    estimate: PoseEstimate, truth: WorkerTruth, present: Bools
 ) -> tuple[Floats, Bools]:
-    """Mean joint position error of the tracked workers: of tracks and the workers whom they fit
-    best, none with two, as nothing tells a camera who of several is called the first.
-
-    Returns:
-        (B,) mean over tracked workers and joints [m], NaN where nobody is tracked, and
-        (B,) whether a worker is there (`present` (B, W), or all) whom the estimator does not track.
-    """
-    error_m, lost = np.empty(len(estimate.tracked)), np.zeros(len(estimate.tracked), np.bool_)
-    there = np.ones_like(estimate.tracked) if present is None else present
-    _tracking_error(estimate.mean_world, truth.joints_world, estimate.tracked, there, error_m, lost)
+    """(B,) mean error of joints between tracks and the workers whom they fit best [m], NaN where
+    nobody is tracked; and (B,) whether a worker who is there (`present` (B, W)) has no track."""
+    tracked = estimate.tracked
+    error_m, lost = np.empty(len(tracked)), np.zeros(len(tracked), np.bool_)
+    _tracking_error(estimate.mean_world, truth.joints_world, tracked, present, error_m, lost)
     return error_m, lost
 
 

@@ -1,6 +1,6 @@
 """What the robot sees: one declaration per observation term.
 
-The space, the environment's page, `split` and the tests all derive from `TERMS`, so that
+The space, the environment's page, `split` and the tests all derive from the terms, so that
 they cannot drift apart. Terms read the *estimate* of the worker, never the truth.
 """
 
@@ -150,11 +150,6 @@ SHARED_TERMS: tuple[ObservationTerm, ...] = (
     ),
 )  # fmt: skip
 """What closes it: the last action, and the workers as they are estimated."""
-
-
-def terms_of(task_terms: tuple[ObservationTerm, ...]) -> tuple[ObservationTerm, ...]:
-    """All terms of a task's observation, in their order: the robot, the task, the workers."""
-    return (*ROBOT_TERMS, *task_terms, *SHARED_TERMS)
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,8 +7,7 @@ it starts: `python -m hrc_env --import my_file.py play MyTask-v0`, or the enviro
 
 import os
 import sys
-from collections.abc import Callable, Collection
-from importlib import import_module
+from collections.abc import Callable
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,14 +28,6 @@ IMPORT = "HRC_ENV_IMPORT"
 """Environment variable: Python files that are imported with this package, as PATH has folders."""
 IDS: list[str] = []
 """The environments that are registered."""
-REGISTRIES = {
-    "task": ("hrc_env.tasks.task", "TASKS"),
-    "estimator": ("hrc_env.tracking.estimators", "ESTIMATORS"),
-    "detector": ("hrc_env.perception.detector", "DETECTORS"),
-    "robot": ("hrc_env.scene.robot", "ROBOTS"),
-    "shield": ("hrc_env.safety.shield", "SHIELDS"),
-}
-"""What can be brought: the module and the table in which it is kept by name."""
 
 
 def register_task(task: "Task") -> None:
@@ -45,39 +36,43 @@ def register_task(task: "Task") -> None:
     Raises:
         ConfigError: here and below: the name is taken, or something is missing or of a wrong kind.
     """
-    from hrc_env.tasks.task import check_task  # here and below: kernels take time to import
+    from hrc_env.tasks.task import TASKS, check_task  # in functions: kernels take time to import
 
     check_task(task)
-    _add("task", task.id, task, taken=BUILT_IN)
+    _add(TASKS, "task", task.id, task)
     register_environment(task.id, task.max_episode_steps)
 
 
 def register_estimator(spec: "EstimatorSpec") -> None:
     """Make an estimator known by its name: wherever `estimator=` or `--estimator` is taken. Its
     estimates must be finite and of the right shapes."""
-    from hrc_env.tracking.estimators import check_estimator
+    from hrc_env.tracking.estimators import ESTIMATORS, check_estimator
 
     check_estimator(spec)
-    _add("estimator", spec.name, spec)
+    _add(ESTIMATORS, "estimator", spec.name, spec)
 
 
 def register_robot(robot: "Robot") -> None:
     """Make a robot known by its name: wherever `robot=` or `--robot` is taken."""
-    from hrc_env.scene.robot import check_robot
+    from hrc_env.scene.robot import ROBOTS, check_robot
 
     check_robot(robot)
-    _add("robot", robot.name, robot)
+    _add(ROBOTS, "robot", robot.name, robot)
 
 
 def register_detector(name: str, make: "Callable[[], KeypointFunction]") -> None:
     """Make a pose detector known: `config={"detector": {"keypoints": name}}`, level "pixels".
     `make` is called once for each thread that detects."""
-    _add("detector", name, make, is_function=True)
+    from hrc_env.perception.detector import DETECTORS
+
+    _add(DETECTORS, "detector", name, make, is_function=True)
 
 
 def register_shield(name: str, shield: "Shield") -> None:
     """Make a shield (`hrc_env.safety.shield.Shield`) known: `shield=name` of every environment."""
-    _add("shield", name, shield, is_function=True)
+    from hrc_env.safety.shield import SHIELDS
+
+    _add(SHIELDS, "shield", name, shield, is_function=True)
 
 
 def register_environment(task_id: str, max_episode_steps: int = EPISODE_STEPS) -> None:
@@ -90,12 +85,6 @@ def register_environment(task_id: str, max_episode_steps: int = EPISODE_STEPS) -
         kwargs={"task": task_id},
     )
     IDS.append(task_id)
-
-
-def known(what: str) -> dict[str, Any]:
-    """What there is of a kind in `REGISTRIES`, by name."""
-    module, table = REGISTRIES[what]
-    return getattr(import_module(module), table)
 
 
 def import_files(paths: str | None = None) -> None:
@@ -118,11 +107,11 @@ def import_files(paths: str | None = None) -> None:
 
 
 def _add(
-    what: str, name: str, thing: Any, taken: Collection[str] = (), is_function: bool = False
+    table: dict[str, Any], what: str, name: str, thing: Any, is_function: bool = False
 ) -> None:
-    table = known(what)
+    """Keep a thing in the table in which things of its kind are looked up by name."""
     if is_function and not callable(thing):
         raise ConfigError(f"{name}: a {what} must be a function, got {thing!r}.")
-    if name in taken or name in table:
+    if name in table or name in BUILT_IN:
         raise ConfigError(f"There is the {what} {name!r} already; choose another name.")
     table[name] = thing

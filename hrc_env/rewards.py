@@ -89,12 +89,8 @@ def evaluated(
 
 
 def total(terms: Mapping[str, Floats], batch: int) -> Floats:
-    """The reward (B,): the sum of its terms.
-
-    Raises:
-        ConfigError: a term has another shape.
-        FloatingPointError: a term is not finite; a fault of the code, never of a camera.
-    """
+    """The reward (B,): the sum of its terms; `ConfigError` for one of another shape,
+    `FloatingPointError` for one that is not finite, a fault of the code, never of a camera."""
     for name, value in terms.items():
         check_shape(f"reward term {name!r}", np.shape(value), (batch,), "a value an environment")
     reward: Floats = sum(terms.values(), np.zeros(batch))

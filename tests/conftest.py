@@ -12,9 +12,14 @@ import pytest
 from commands import ROOT
 
 import hrc_env
+from hrc_env.perception.detector import DETECTORS
 from hrc_env.perception.weights import fetch_weights
-from hrc_env.registration import REGISTRIES, import_files, known
+from hrc_env.registration import import_files
+from hrc_env.safety.shield import SHIELDS
+from hrc_env.scene.robot import ROBOTS
 from hrc_env.tasks import BUILT_IN
+from hrc_env.tasks.task import TASKS
+from hrc_env.tracking.estimators import ESTIMATORS
 
 SLOW = {"process", "pixels", "end_to_end"}
 """Fixtures that take their time: `make test` leaves out who asks for one. `end_to_end` is a whole
@@ -67,13 +72,14 @@ def process():
 @pytest.fixture(scope="module")
 def brought():
     """What examples/bring_your_own registers is known, for the tests of one file."""
-    before = {what: set(known(what)) for what in REGISTRIES}
+    tables: list[dict] = [TASKS, ESTIMATORS, DETECTORS, ROBOTS, SHIELDS]
+    before = [set(table) for table in tables]
     examples = sorted((ROOT / "examples" / "bring_your_own").glob("*.py"))
     import_files(os.pathsep.join(map(str, examples)))
     yield [path.stem for path in examples]
-    for what in REGISTRIES:
-        for added in set(known(what)) - before[what] - set(BUILT_IN):
-            del known(what)[added]
+    for table, had in zip(tables, before, strict=True):
+        for added in set(table) - had - set(BUILT_IN):
+            del table[added]
             gymnasium.registry.pop(added, None)
             hrc_env.IDS[:] = [each for each in hrc_env.IDS if each != added]
     for path in examples:

@@ -60,7 +60,7 @@ def estimate(offset_m: float, tracked: bool) -> PoseEstimate:
 def test_the_tracking_error_is_the_mean_distance_of_joints():
     joints = np.zeros((1, 1, 15, 3))
     truth = WorkerTruth(joints, joints, np.zeros((1, 1, 1, 2, 3)), np.array([0.1]))
-    error_m, lost = tracking_error(estimate(0.03, True), truth)
+    error_m, lost = tracking_error(estimate(0.03, True), truth, np.ones((1, 1), bool))
     assert error_m[0] == pytest.approx(0.03)
     assert not lost[0]
 
@@ -68,6 +68,6 @@ def test_the_tracking_error_is_the_mean_distance_of_joints():
 def test_a_worker_without_a_track_has_no_error_and_is_lost():
     joints = np.zeros((1, 1, 15, 3))
     truth = WorkerTruth(joints, joints, np.zeros((1, 1, 1, 2, 3)), np.array([0.1]))
-    error_m, lost = tracking_error(estimate(0.03, False), truth)
+    error_m, lost = tracking_error(estimate(0.03, False), truth, np.ones((1, 1), bool))
     assert np.isnan(error_m[0])
     assert lost[0]

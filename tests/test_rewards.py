@@ -7,11 +7,10 @@ import pytest
 
 from hrc_env.belief import Belief
 from hrc_env.core.records import PoseEstimate, RobotState
-from hrc_env.core.typing import Records
 from hrc_env.env import HRCEnv
 from hrc_env.geometry.distances import Separation
 from hrc_env.rewards import SHARED_TERMS, RewardConfig, closeness, evaluated, total
-from hrc_env.tasks.reach import REACH_STEP, TASK, ReachConfig
+from hrc_env.tasks.reach import TASK, ReachConfig
 from hrc_env.vector.env import HRCVectorEnv
 
 
@@ -41,8 +40,8 @@ def reward(now, step, before, shared, own=None):
     return total(terms, 1), terms
 
 
-def progress(metres: float = 0.0, reached: bool = False) -> Records:
-    return np.array([(metres, reached, False)], REACH_STEP)
+def progress(metres: float = 0.0, reached: bool = False) -> dict[str, np.ndarray]:
+    return {"progress_m": np.array([metres]), "reached": np.array([reached])}
 
 
 @pytest.mark.parametrize(

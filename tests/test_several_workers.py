@@ -126,14 +126,15 @@ def test_errors_do_not_depend_on_which_worker_is_called_the_first():
     truth = HRCEnv(perception="truth", n_workers=3)
     truth.reset(seed=0)
     seen = truth.simulation.estimate.mean_world
+    all_there = np.ones((1, 3), bool)
     reordered = WorkerTruth(seen[:, [2, 0, 1]], seen, np.zeros((1, 3, 1, 2, 3)), np.ones(1))
-    error_m, lost = tracking_error(truth.simulation.estimate, reordered)
+    error_m, lost = tracking_error(truth.simulation.estimate, reordered, all_there)
     assert error_m == [0.0]
     assert not lost.any()
     doubled = estimate_from_truth(
         WorkerTruth(seen[:, [0, 0, 1]], seen, np.zeros((1, 3, 1, 2, 3)), np.ones(1))
     )
-    assert tracking_error(doubled, reordered)[0] > 0.1  # two tracks on one person
+    assert tracking_error(doubled, reordered, all_there)[0] > 0.1  # two tracks on one person
 
 
 def test_in_pictures_two_different_people_are_found(pixels):

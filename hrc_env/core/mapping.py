@@ -116,10 +116,8 @@ def _tuple(inner: tuple[Any, ...], value: Any, where: str) -> tuple[Any, ...]:
 
 
 def plain(value: Any) -> Any:
-    """A value as JSON has it: paths are text, NumPy's numbers and enumerations what they hold.
-
-    What has no such form (a recorded clip, a function) stays, and JSON's writer refuses it.
-    """
+    """A value as JSON has it: paths are text, NumPy's numbers and enumerations what they hold. What
+    has no such form (a recorded clip, a function) stays, and JSON's writer refuses it."""
     if isinstance(value, Mapping):
         return {name: plain(each) for name, each in value.items()}
     if isinstance(value, list | tuple):
@@ -169,10 +167,8 @@ def _value(value: Any, where: str) -> str:
 
 
 def _located(error: ConfigError, kind: type, path: str) -> ConfigError:
-    """What a dataclass says about its fields, with the fields called by their path.
-
-    Fields are found by name: any with an underscore, others where the sentence begins with them.
-    """
+    """What a dataclass says about its fields, with these called by their path: any name with an
+    underscore, others where the sentence begins with them."""
     if not path:
         return error
     said = str(error).removeprefix(f"{kind.__name__}.")

@@ -123,12 +123,9 @@ def label(
     image: Image, text: str, at: tuple[int, int], size: int = 16, colour: Colour = INK
 ) -> None:
     """Text with its upper left corner at `at`, on a dark plate, in place."""
-    font = _font(size)
-    _, _, right, bottom = (round(value) for value in font.getbbox(text))
     x, y = at
-    pad = max(3, size // 4)
-    y1, x1 = min(y + bottom + 2 * pad, image.shape[0]), min(x + right + 2 * pad, image.shape[1])
-    plate = image[y:y1, x:x1]
+    pad, (_, _, right, bottom) = max(3, size // 4), _font(size).getbbox(text)
+    plate = image[y : y + round(bottom) + 2 * pad, x : x + round(right) + 2 * pad]
     plate[:] = (0.35 * plate + 0.65 * np.array(PANEL)).astype(np.uint8)
     write(image, text, (x + pad, y + pad), size, colour)
 
@@ -238,8 +235,8 @@ def _fixed(points: Points2) -> list[tuple[int, int]]:
 def _ink(text: str, size: int) -> NDArray[np.float32]:
     """(H, W, 1) how much ink there is where, 0 to 1."""
     font = _font(size)
-    _, _, right, bottom = (round(value) for value in font.getbbox(text))
-    drawn = PillowImage.new("L", (right + 2, bottom + 2))
+    _, _, right, bottom = font.getbbox(text)
+    drawn = PillowImage.new("L", (round(right) + 2, round(bottom) + 2))
     ImageDraw.Draw(drawn).text((0, 0), text, fill=255, font=font)
     return np.asarray(drawn, np.float32)[..., None] / np.float32(255)
 

@@ -64,31 +64,30 @@ class Glance:
 
 
 class Views:
-    """Pictures of one environment of a simulation; graphics contexts are made when asked for.
+    """Pictures of a simulation's environments; graphics contexts are made when asked for.
 
     One thread must ask for all of them and call `close`; with a `glance` taken before, that may
     be another one than the simulation's.
     """
 
-    def __init__(self, simulation: Simulation, b: int = 0) -> None:
-        self.simulation, self.b = simulation, b
+    def __init__(self, simulation: Simulation) -> None:
+        self.simulation = simulation
         self._renderers: dict[str, tuple[tuple[int, int], Any]] = {}
         """By purpose: the size of their pictures, and themselves."""
 
     def picture(
-        self, depth: bool = False, b: int | None = None, size: tuple[int, int] = PICTURE_SIZE
+        self, depth: bool = False, b: int = 0, size: tuple[int, int] = PICTURE_SIZE
     ) -> NDArray[Any]:
-        """Robot and worker, (height, width, 3) uint8, or distances (height, width) float32 [m];
-        of another environment than usual with `b`."""
+        """Robot and worker, (height, width, 3) uint8, or distances (height, width) float32 [m]."""
         seen = self.glance(b)
         if depth:
             renderer = self._renderer("depth", size, seen)
             return renderer.picture(seen.q, seen.motion, VIEWPOINT, depth=True)
         return self._drawn([viewpoint_camera(VIEWPOINT, *size)], seen, shadows=True)[0]
 
-    def glance(self, b: int | None = None) -> Glance:
-        """All that there is to draw now, of another environment than usual with `b`."""
-        b, simulation = self.b if b is None else b, self.simulation
+    def glance(self, b: int = 0) -> Glance:
+        """All that there is to draw of environment `b` now."""
+        simulation = self.simulation
         keypoints, windows = simulation.pipeline.last_detections(b)
         return Glance(
             *self.pose(b),
@@ -99,6 +98,11 @@ class Views:
             [list(of_worker) for of_worker in windows],
             list(simulation.pipeline.crops(b)),
         )
+
+    def pose(self, b: int = 0) -> tuple[JointAngles, WorkerMotion]:
+        """The arm (N,) and the workers (W, S, ...) of environment `b` now."""
+        motion = one(generator.current(self.simulation.motion, np.array([b])), 0)
+        return self.simulation.physics.q[b].copy(), motion
 
     def room(self, width: int, height: int, seen: Glance | None = None) -> Image:
         """The room with the estimated skeleton over it."""
@@ -126,9 +130,21 @@ class Views:
     def crops(self, size: int, seen: Glance | None = None) -> list[Image]:
         """What the pose network was given: each camera's crop, with its landmarks."""
         seen = seen or self.glance()
-        if seen.keypoints is None or not seen.windows:
+        keypoints, images = seen.keypoints, []
+        if keypoints is None or not seen.windows:
             return []
-        return [self._crop(seen, seen.keypoints, c, size) for c in range(len(seen.crops))]
+        cameras = self.simulation.scene.cameras
+        parts = zip(cameras, seen.crops, seen.windows[0], strict=True)
+        for c, (camera, crop, window) in enumerate(parts):
+            if crop is None or window is None:
+                image = overlay.panel(size, size)
+                overlay.write(image, "no worker in view", (10, size // 2 - 10), 13)
+            else:
+                image = overlay.shrink(crop, size, size)
+                joints_px = image_from_pinhole(camera, keypoints.px[0, c, 0])
+                overlay.draw_landmarks(image, window, joints_px, keypoints.confidence[0, c, 0])
+            images.append(image)
+        return images
 
     def beliefs(self, width: int, height: int, seen: Glance | None = None) -> list[Image]:
         """What the robot knows, seen from above and from the side: itself, its task, its estimate
@@ -162,23 +178,6 @@ class Views:
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_renderers": {}}
-
-    def _crop(self, seen: Glance, keypoints: Keypoints, c: int, size: int) -> Image:
-        crop, window = seen.crops[c], seen.windows[0][c]
-        if window is None or crop is None:
-            image = overlay.panel(size, size)
-            overlay.write(image, "no worker in view", (10, size // 2 - 10), 13)
-            return image
-        image = overlay.shrink(crop, size, size)
-        joints_px = image_from_pinhole(self.simulation.scene.cameras[c], keypoints.px[0, c, 0])
-        overlay.draw_landmarks(image, window, joints_px, keypoints.confidence[0, c, 0])
-        return image
-
-    def pose(self, b: int | None = None) -> tuple[JointAngles, WorkerMotion]:
-        """The arm (N,) and the workers (W, S, ...) now, of another environment with `b`."""
-        b = self.b if b is None else b
-        motion = one(generator.current(self.simulation.motion, np.array([b])), 0)
-        return self.simulation.physics.q[b].copy(), motion
 
     def _through_cameras(self, width: int, height: int, seen: Glance) -> list[Image]:
         """What every camera sees, without shadows."""

@@ -30,12 +30,8 @@ def shield_called(shield: str | Shield | None) -> Shield | None:
 def shielded(
     shield: Shield, now: Belief, command: JointVelocities, dt_s: float
 ) -> tuple[JointVelocities, dict[str, Floats]]:
-    """What a shield makes of a command, checked, and what it says by its name in info.
-
-    Raises:
-        ConfigError: velocities of another shape or that are no finite numbers, or values that are
-            not one an environment.
-    """
+    """What a shield makes of a command, and what it says by its name in info; `ConfigError` where
+    that has another shape or the velocities are no finite numbers."""
     allowed, said = shield(now, command.copy(), dt_s)
     check_shape("A shield's velocities", np.shape(allowed), command.shape, "B, joints")
     if not np.isfinite(allowed).all():

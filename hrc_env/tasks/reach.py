@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -55,15 +56,6 @@ REACH = np.dtype(
     align=True,
 )
 """The task of one environment."""
-REACH_STEP = np.dtype(
-    [
-        ("progress_m", "f8"),  # by how much the tool came nearer to the goal it had
-        ("reached", "?"),  # whether that goal was reached in this step
-        ("missed", "?"),  # whether it ran out of time in this step
-    ],
-    align=True,
-)
-"""What one step brought one environment."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,23 +79,28 @@ def reset(state: Records, ids: Ints, rngs: Rngs, world: World, config: ReachConf
     _new_goals(state, ids, rngs, world.robot.tool_world, config)
 
 
-def advance(state: Records, rngs: Rngs, world: World, dt_s: float, config: ReachConfig) -> Records:
-    """Judge the tool's new place and replace goals that are done; (B,) of `REACH_STEP`."""
-    tool_world, step = world.robot.tool_world, np.zeros(len(state), REACH_STEP)
-    offset = state["goal_world"] - tool_world
+def advance(
+    state: Records, rngs: Rngs, world: World, dt_s: float, config: ReachConfig
+) -> dict[str, Any]:
+    """Judge the tool's new place and replace goals that are done.
+
+    Returns:
+        (B,) each: by how much the tool came nearer to its goal, whether that was reached in this
+        step, whether it ran out of time.
+    """
+    offset = state["goal_world"] - world.robot.tool_world
     distance_m = np.sqrt(np.add.reduce(offset * offset, axis=1))
+    progress_m = state["distance_m"] - distance_m
     age_s = state["goal_age_s"] + dt_s
     reached = distance_m < config.radius_m
     missed = ~reached & (age_s >= config.time_limit_s - 1e-9)
-    step["progress_m"] = state["distance_m"] - distance_m
-    step["reached"], step["missed"] = reached, missed
     state["distance_m"], state["goal_age_s"] = distance_m, age_s
     if (done := reached | missed).any():
         state["n_reached"] += reached
         state["n_missed"] += missed
         ids = np.flatnonzero(done)
-        _new_goals(state, ids, rngs, tool_world[ids], config)
-    return step
+        _new_goals(state, ids, rngs, world.robot.tool_world[ids], config)
+    return {"progress_m": progress_m, "reached": reached, "missed": missed}
 
 
 def view(state: Records, ids: Ints, config: ReachConfig) -> ReachView:

@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from hrc_env import observations, rewards
 from hrc_env.core.errors import ConfigError, check_shape, unknown
 from hrc_env.core.records import RobotState
 from hrc_env.core.typing import Floats, Ints, Points3
-from hrc_env.observations import ObservationTerm, terms_of
-from hrc_env.rewards import SHARED_TERMS, RewardTerm
+from hrc_env.observations import ObservationTerm
+from hrc_env.rewards import RewardTerm
 from hrc_env.tasks import BUILT_IN, EPISODE_STEPS
 
 _ID = re.compile(r"[A-Za-z]\w*-v\d+")
@@ -67,12 +68,12 @@ class Task:
     @property
     def observation_terms(self) -> tuple[ObservationTerm, ...]:
         """All of the observation, in its order: the robot, the task, the workers."""
-        return terms_of(self.observations)
+        return (*observations.ROBOT_TERMS, *self.observations, *observations.SHARED_TERMS)
 
     @property
     def reward_terms(self) -> tuple[RewardTerm, ...]:
         """All of the reward: the task's, and those that every task shares."""
-        return (*self.rewards, *SHARED_TERMS)
+        return (*self.rewards, *rewards.SHARED_TERMS)
 
     def counts(self, info: Mapping[str, Any]) -> dict[str, Any]:
         """What an info says of attempts, in words: {"goals reached": 3.0, "goals missed": 1.0}."""
@@ -119,15 +120,11 @@ def check_task(task: Task) -> None:
         task.config()
     except TypeError as error:
         raise ConfigError(f"{task.id}: every field of config needs a default ({error}).") from error
-    _check_terms(task)
-    _check_state(task)
-
-
-def _check_terms(task: Task) -> None:
     for terms in (task.observation_terms, task.reward_terms):
         name, times = Counter(term.name for term in terms).most_common(1)[0]
         if times > 1:
             raise ConfigError(f"{task.id}: there is a term {name!r} already; choose another name.")
+    _check_state(task)
 
 
 def _check_state(task: Task) -> None:

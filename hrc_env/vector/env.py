@@ -42,8 +42,6 @@ from hrc_env.vector.options import (
 from hrc_env.vector.shards import Shards
 
 Observations = NDArray[np.float32]
-Stream = tuple[np.random.Generator, int]
-"""An environment's generator, and what it was made from."""
 PROCESSES_PER_CORE = 2
 """More processes that render and run networks only wait for each other."""
 Step = tuple[Observations, NDArray[np.float64], Bools, Bools, dict[str, Any]]
@@ -92,7 +90,8 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         self.single_observation_space, self.single_action_space = spaces(self.shards.first)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self._streams: list[Stream | None] = [None] * self.num_envs
+        self._streams = [seeding.np_random() for _ in range(self.num_envs)]
+        """Each environment's generator, and what it was made from."""
         self._action_shape = (self.num_envs, self.shards.first.n_actions)
         limit = settings.task.max_episode_steps if max_episode_steps is None else max_episode_steps
         self.max_episode_steps = time_limit(limit)
@@ -131,7 +130,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         fresh = self._begin(ids)
         self._steps[ids] = elapsed_steps[ids]
         if self._observation is None:
-            self._observation = fresh.observation.copy()
+            self._observation = np.empty_like(fresh.observation)
         self._observation[ids] = fresh.observation
         self._ended = self._ended & ~mask
         return self._observation.copy(), table(fresh, ids, self.num_envs).arrays(mask)
@@ -180,12 +179,12 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
     @property
     def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
         """The environments' random generators."""
-        return tuple(self._stream(k)[0] for k in range(self.num_envs))
+        return tuple(generator for generator, _ in self._streams)
 
     @property
     def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
         """What the environments' random generators were made from."""
-        return tuple(self._stream(k)[1] for k in range(self.num_envs))
+        return tuple(seed for _, seed in self._streams)
 
     def close_extras(self, **kwargs: Any) -> None:
         """Stop the threads and release graphics contexts."""
@@ -196,13 +195,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
     def _begin(self, ids: Ints) -> StepResult:
         """Start environments `ids` anew; their random streams go on."""
         self._steps[ids] = 0
-        return self.shards.reset(ids, [self._stream(k)[0] for k in ids.tolist()])
-
-    def _stream(self, k: int) -> Stream:
-        """The generator of environment k; from the system's entropy if nobody gave a seed."""
-        stream = self._streams[k] or seeding.np_random()
-        self._streams[k] = stream
-        return stream
+        return self.shards.reset(ids, [self._streams[k][0] for k in ids.tolist()])
 
     def _restart(self, who: Bools, observation: Observations, info: InfoTable) -> None:
         """Start environments `who` (B,) anew and write what they see over what they saw."""
@@ -226,10 +219,6 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
             actions = np.array(actions)
             actions[over] = 0.0
         return checked_action(actions, self._action_shape)
-
-    def _refuse_closed(self) -> None:
-        if self.closed:
-            raise ConfigError("This vector environment is closed; make a new one.")
 
 
 def _finals(observation: Observations, info: InfoTable, who: Bools) -> dict[str, Any]:

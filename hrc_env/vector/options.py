@@ -26,10 +26,10 @@ def time_limit(max_episode_steps: int) -> int:
 
 def autoreset_of(mode: str | AutoresetMode) -> AutoresetMode:
     """When environments start anew."""
-    names = [each.value for each in AutoresetMode]
-    if not isinstance(mode, AutoresetMode) and mode not in names:
-        raise unknown("autoreset_mode", mode, names)
-    return AutoresetMode(mode)
+    try:
+        return AutoresetMode(mode)
+    except ValueError as error:
+        raise unknown("autoreset_mode", mode, [each.value for each in AutoresetMode]) from error
 
 
 def threads_of(num_threads: int | None) -> int:

@@ -25,18 +25,13 @@ class Shards:
         """`make` gives a simulation of so many environments, always of the same kind."""
         self.bounds = [batch * k // n_shards for k in range(n_shards + 1)]
         self.parts = [make(high - low) for low, high in pairwise(self.bounds)]
+        self.first = self.parts[0]
+        """That of the calling thread."""
         self._pool: ThreadPoolExecutor | None = None
 
-    @property
-    def first(self) -> Simulation:
-        """That of the calling thread."""
-        return self.parts[0]
-
     def reset(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> StepResult:
-        """Start environments `ids` (sorted) anew, one generator each; their rows.
-
-        In one thread: this is Python for the most part, in which others would only wait.
-        """
+        """Start environments `ids` (sorted) anew, one generator each; their rows. In one thread:
+        this is Python for the most part, in which others would only wait."""
         cuts = pairwise(np.searchsorted(ids, self.bounds).tolist())
         parts = zip(self.parts, self.bounds[:-1], cuts, strict=True)
         jobs = [

@@ -36,10 +36,8 @@ def ensure(level: str) -> None:
 
 
 def compile_missing(level: str | None, say: Say) -> int:
-    """Compile what is missing in as many processes as there are cores; how many there were.
-
-    Where no process can be started, or one dies, kernels are compiled when they are called.
-    """
+    """Compile what is missing in as many processes as there are cores; how many there were. Where
+    no process can be started, or one dies, kernels are compiled when they are called."""
     with _alone(say):
         todo = missing(level)
         wanted, total_s = iter(todo), sum(each.seconds for each in todo)
@@ -108,10 +106,7 @@ def _logged() -> Say:
 
 
 def main() -> None:
-    """What a process does that compiles: kernels by lines of JSON [kernel, args], answering each.
-
-    In a process of its own, so that several compile at once and their memory goes back.
-    """
+    """Compile kernels by lines of JSON [kernel, args], answering each: what `_serve` starts."""
     for line in sys.stdin:
         name, args = json.loads(line)
         try:
