@@ -54,9 +54,14 @@ def joined(results: Sequence[StepResult]) -> StepResult:
     """Results of ranges of a batch, one after the other."""
     if len(results) == 1:
         return results[0]
-    names = "observation", "reward", "terminated"
+
+    def of_all(name: str) -> NDArray[Any]:
+        return np.concatenate([getattr(each, name) for each in results])
+
     return StepResult(
-        *[np.concatenate([getattr(each, name) for each in results]) for name in names],
+        of_all("observation"),
+        of_all("reward"),
+        of_all("terminated"),
         {name: np.concatenate([each.info[name] for each in results]) for name in results[0].info},
     )
 

@@ -90,5 +90,5 @@ def _fading(n: int, value: Floats, rate: Floats, fps: float) -> Floats:
     """(n, 4) the frames after one with a value and a rate, falling to zero within them."""
     lasts, out = min(FADE_S, (n + 1) / fps), np.empty((n, 4))
     for k, i in np.ndindex(out.shape):
-        out[k, i] = decay((k + 1) / fps / lasts, lasts, value[i], rate[i])
+        out[k, i] = decay((k + 1) / fps / lasts, lasts, value.item(i), rate.item(i))
     return out

@@ -1,6 +1,7 @@
 """Pictures for people: what the cameras see and what is made of it, drawn over a render."""
 
 from functools import lru_cache
+from typing import Any
 
 import cv2
 import numpy as np
@@ -161,7 +162,7 @@ def tile(pictures: list[Image], columns: int, gap: int = 4) -> Image:
     return sheet
 
 
-def shrink(image: Image, width: int, height: int) -> Image:
+def shrink(image: NDArray[Any], width: int, height: int) -> Image:
     """The image in another size; every pixel is the mean of those it stands for."""
     return np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
 

@@ -88,7 +88,7 @@ class PaperEstimator:
             any_seen = read_worker(measured, b, w, s.sigma_scale, seen)
             track, particles = state.tracks[b, w], state.particles[b, w]
             if track["tracked"]:
-                self._follow(track, particles, seen, s, state.elapsed_s[b], rngs[b])
+                self._follow(track, particles, seen, s, state.elapsed_s.item(b), rngs[b])
             elif any_seen:
                 _initialize(track, particles, seen, s, rngs[b])
         state.elapsed_s[:] = 0.0

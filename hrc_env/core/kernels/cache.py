@@ -66,7 +66,8 @@ class KernelCache(NullCache):
 
     def path(self, args: tuple[Any, ...]) -> Path:
         """The file of a signature."""
-        processor = self._dispatcher.targetctx.codegen().magic_tuple()
+        context: Any = self._dispatcher.targetctx
+        processor = context.codegen().magic_tuple()
         kind = _hashed(repr((str(args), processor)))[:10]
         versions = f"{numba.__version__} {sys.version_info[:2]}"
         made_of = _hashed(f"{digest_of(self._dispatcher)} {versions}")[:16]
@@ -74,7 +75,9 @@ class KernelCache(NullCache):
         name = f"{function.__module__.removeprefix('hrc_env.')}.{function.__qualname__}"
         return folder() / f"{name}-{kind}-{made_of}{SUFFIX}"
 
-    def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
+    def load_overload(  # type: ignore[override]
+        self, sig: Any, target_context: Any
+    ) -> CompileResult | None:
         """A compiled form, if there is one."""
         target_context.refresh()
         try:
@@ -83,7 +86,7 @@ class KernelCache(NullCache):
             return None
         return CompileResult._rebuild(target_context, *parts)
 
-    def save_overload(self, sig: Any, data: CompileResult) -> None:
+    def save_overload(self, sig: Any, data: CompileResult) -> None:  # type: ignore[override]
         """Keep a compiled form; where nothing can be written, nowhere.
 
         Older ones go, but not from a folder of the user's choice, which several checkouts may use.

@@ -107,8 +107,8 @@ def _lean_context() -> LeanContext:
 class LeanTarget(registry.CPUTarget):
     """numba's own target with the lean context."""
 
-    target_context = property(lambda self: _lean_context())
-    typing_context = property(lambda self: registry.cpu_target.typing_context)
+    target_context: Any = property(lambda self: _lean_context())  # type: ignore[override]
+    typing_context: Any = property(lambda self: registry.cpu_target.typing_context)  # type: ignore[override]
 
 
 class CalleeDispatcher(registry.CPUDispatcher):

@@ -105,6 +105,6 @@ def concatenated(records: Sequence[RecordT]) -> RecordT:
     if isinstance(first, np.ndarray):
         return np.concatenate(records)  # type: ignore[return-value, call-overload]
     if first is None:
-        return first
+        return records[0]
     parts = [concatenated([getattr(r, each.name) for r in records]) for each in fields(first)]
     return type(first)(*parts)
