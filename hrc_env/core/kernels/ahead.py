@@ -112,9 +112,7 @@ def main() -> None:
         try:
             kernel_named(name).compile(tuple(decode(each) for each in args))
             answer = "done"
-        except (
-            Exception
-        ) as error:  # numba raises many: it has other arguments, or another name, now
+        except Exception as error:  # numba has many: it has other arguments, or another name, now
             answer = f"failed: {error!r}".replace("\n", " ")
         sys.stdout.write(f"{answer}\n")
         sys.stdout.flush()
