@@ -4,6 +4,7 @@ The space, the environment's page, `split` and the tests all derive from the ter
 they cannot drift apart. Terms read the *estimate* of the worker, never the truth.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -56,8 +57,18 @@ def _nearest_direction(now: Belief) -> Floats:
 
 def directions(vectors: Floats, softening: float) -> Floats:
     """Vectors (..., 3) divided by their length plus a little: unit vectors, but 0 stays 0."""
-    length = np.sqrt(np.add.reduce(vectors * vectors, axis=-1, keepdims=True))
-    return vectors / (length + softening)
+    shortened = np.array(vectors)
+    _shorten(shortened.reshape(-1, 3), softening)
+    return shortened
+
+
+@kernel
+def _shorten(vectors, softening):
+    for k in range(len(vectors)):
+        x, y, z = vectors[k]
+        divisor = math.sqrt(x * x + y * y + z * z) + softening
+        for i in range(3):
+            vectors[k, i] /= divisor
 
 
 def _joints_forecast(now: Belief) -> Floats:

@@ -8,6 +8,7 @@ import numpy as np
 
 from hrc_env.belief import Belief
 from hrc_env.core.errors import ConfigError, check_shape
+from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
 
 
@@ -48,9 +49,15 @@ def closeness(separation_m: Floats, reach_m: float) -> Floats:
     return share * share
 
 
-def _mean_square(vectors: Floats) -> Floats:
+@kernel(makes_arrays=True)
+def _mean_square(vectors):
     """(B,) of (B, n)."""
-    return np.add.reduce(vectors * vectors, axis=1) / vectors.shape[1]
+    mean = np.zeros(len(vectors))
+    for b in range(len(vectors)):
+        for value in vectors[b]:
+            mean[b] += value * value
+        mean[b] /= vectors.shape[1]
+    return mean
 
 
 def _proximity(now: Belief, step: Any, previous: Floats, config: RewardConfig) -> Floats:

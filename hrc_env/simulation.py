@@ -112,7 +112,7 @@ class Simulation(Stateful):
         info = {
             **step.no_cost(len(ids)),
             **step.tracking_info(estimates[0], truth, self.present[ids]),
-            **self._episode_info(ids),
+            **self._episode_info(ids, generator.activity(self.motion)),
         }
         return StepResult(observation, np.zeros(len(ids)), np.zeros(len(ids), bool), info)
 
@@ -142,12 +142,14 @@ class Simulation(Stateful):
         )
         self.episode_cost += cost.total
         self.separation_m = cost.min_separation_m
+        activity = generator.activity(self.motion)
+        present = activity != generator.ABSENT
         info = {
             **{f"reward/{name}": value for name, value in terms.items()},
-            **step.cost_info(cost, self.present),
-            **step.tracking_info(estimates[0], truth, self.present),
+            **step.cost_info(cost, present),
+            **step.tracking_info(estimates[0], truth, present),
             **shield_info,
-            **self._episode_info(self._everyone),
+            **self._episode_info(self._everyone, activity),
         }
         return StepResult(
             observations.observe(belief, self.layout, self.terms),
@@ -260,13 +262,13 @@ class Simulation(Stateful):
             **rewards.evaluated(shared, belief, progress, previous, self.reward_weights),
         }
 
-    def _episode_info(self, ids: Ints) -> Info:
+    def _episode_info(self, ids: Ints, activity: Ints) -> Info:
         """What the episodes of environments `ids` have come to so far, and who is there."""
         tally = {"episode_cost": self.episode_cost, **self.task.info(self.task_state)}
-        activity, body = generator.activity(self.motion)[ids], self.motion.workers["body"][ids]
+        body = self.motion.workers["body"]
         return {
             **{name: value[ids] for name, value in tally.items()},
-            **step.worker_info(activity, body, self.bodies.names),
+            **step.worker_info(activity[ids], body[ids], self.bodies.names),
             **step.miscalibration_info(self.settings["cameras"], self.pipeline.suspected(ids)),
         }
 

@@ -2,12 +2,12 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from hrc_env.belief import Belief
 from hrc_env.core.errors import ConfigError
+from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records
 from hrc_env.observations import ObservationTerm, directions
 from hrc_env.rewards import RewardTerm
@@ -56,6 +56,15 @@ REACH = np.dtype(
     align=True,
 )
 """The task of one environment."""
+REACH_STEP = np.dtype(
+    [
+        ("progress_m", "f8"),  # by how much the tool came nearer to the goal it had
+        ("reached", "?"),  # whether that goal was reached in this step
+        ("missed", "?"),  # whether it ran out of time in this step
+    ],
+    align=True,
+)
+"""What one step brought one environment."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,28 +88,13 @@ def reset(state: Records, ids: Ints, rngs: Rngs, world: World, config: ReachConf
     _new_goals(state, ids, rngs, world.robot.tool_world, config)
 
 
-def advance(
-    state: Records, rngs: Rngs, world: World, dt_s: float, config: ReachConfig
-) -> dict[str, Any]:
-    """Judge the tool's new place and replace goals that are done.
-
-    Returns:
-        (B,) each: by how much the tool came nearer to its goal, whether that was reached in this
-        step, whether it ran out of time.
-    """
-    offset = state["goal_world"] - world.robot.tool_world
-    distance_m = np.sqrt(np.add.reduce(offset * offset, axis=1))
-    progress_m = state["distance_m"] - distance_m
-    age_s = state["goal_age_s"] + dt_s
-    reached = distance_m < config.radius_m
-    missed = ~reached & (age_s >= config.time_limit_s - 1e-9)
-    state["distance_m"], state["goal_age_s"] = distance_m, age_s
-    if (done := reached | missed).any():
-        state["n_reached"] += reached
-        state["n_missed"] += missed
-        ids = np.flatnonzero(done)
-        _new_goals(state, ids, rngs, world.robot.tool_world[ids], config)
-    return {"progress_m": progress_m, "reached": reached, "missed": missed}
+def advance(state: Records, rngs: Rngs, world: World, dt_s: float, config: ReachConfig) -> Records:
+    """Judge the tool's new place and replace goals that are done; (B,) of `REACH_STEP`."""
+    tool_world, step = world.robot.tool_world, np.zeros(len(state), REACH_STEP)
+    if _judge(tool_world, dt_s, config.radius_m, config.time_limit_s, state, step):
+        done = np.flatnonzero(step["reached"] | step["missed"])
+        _new_goals(state, done, rngs, tool_world[done], config)
+    return step
 
 
 def view(state: Records, ids: Ints, config: ReachConfig) -> ReachView:
@@ -120,6 +114,27 @@ def info(state: Records) -> dict[str, Floats]:
         "task/goals_missed": state["n_missed"].astype(float),
         "is_success": succeeded(state).astype(float),
     }
+
+
+@kernel
+def _judge(tool_world, dt_s, radius_m, time_limit_s, state, step):
+    """Move the state on and write what it brought; whether any goal is done."""
+    done = False
+    for b in range(len(state)):
+        now, brought = state[b], step[b]
+        squared = 0.0
+        for i in range(3):
+            squared += (now.goal_world[i] - tool_world[b, i]) ** 2
+        distance_m = math.sqrt(squared)
+        brought.progress_m = now.distance_m - distance_m
+        now.distance_m = distance_m
+        now.goal_age_s += dt_s
+        brought.reached = distance_m < radius_m
+        brought.missed = not brought.reached and now.goal_age_s >= time_limit_s - 1e-9
+        now.n_reached += brought.reached
+        now.n_missed += brought.missed
+        done |= brought.reached or brought.missed
+    return done
 
 
 def _new_goals(

@@ -48,9 +48,9 @@ class ParticleEstimator:
         """Workers whom nobody has seen."""
         lead, n_cameras = (batch, n_workers, self.config.n_hypotheses), len(self.P)
         state = Hypotheses(
-            trees=np.zeros(lead, TREE).view(np.recarray),
-            views=np.zeros((*lead, n_cameras), VIEW).view(np.recarray),
-            noise=np.zeros((*lead, N_JOINTS, n_cameras), NOISE).view(np.recarray),
+            trees=np.zeros(lead, TREE),
+            views=np.zeros((*lead, n_cameras), VIEW),
+            noise=np.zeros((*lead, N_JOINTS, n_cameras), NOISE),
             n_alive=np.ones((batch, n_workers), np.int64),
             waited_s=np.zeros((batch, n_workers)),
         )
@@ -67,7 +67,7 @@ class ParticleEstimator:
         """Move every hypothesis by its motion model; draws nothing."""
         del rngs
         model = motion(dt_s, self.config.damping, self.config.root_acceleration)
-        predict_all(_plain(state), model, dt_s, self.settings, np.empty(1, WORK))
+        predict_all(tuple(state), model, dt_s, self.settings, np.empty(1, WORK))
 
     def update(
         self, state: Hypotheses, keypoints: Keypoints, rngs: list[np.random.Generator]
@@ -78,7 +78,7 @@ class ParticleEstimator:
         measured = arrays_of(keypoints, (batch, len(self.P), n_workers, N_JOINTS))
         constants = (self.settings, self.noise)
         scratch = np.empty(1, WORK), np.empty(1, TREE)
-        update_all(_plain(state), self.P, measured, *constants, *scratch)
+        update_all(tuple(state), self.P, measured, *constants, *scratch)
 
     def estimate(self, state: Hypotheses) -> PoseEstimate:
         """Mean and covariance of the mixture; ages are the heaviest hypothesis's."""
@@ -86,7 +86,7 @@ class ParticleEstimator:
         age_s = np.empty((*tracked.shape, N_JOINTS))
         mean, velocity = np.empty((2, *age_s.shape, 3))
         out = mean, np.empty((*age_s.shape, 3, 3)), velocity, age_s, tracked
-        estimate_all(_plain(state), self.settings, out)
+        estimate_all(tuple(state), self.settings, out)
         return PoseEstimate(*out)
 
     def forecast(self, state: Hypotheses, horizon_s: float) -> PoseEstimate:
@@ -102,8 +102,3 @@ class ParticleEstimator:
         )
         later = forecast(bounded(each, self.config), horizon_s, self.config)
         return mixed(later, state.trees["log_weight"], state.n_alive)
-
-
-def _plain(state: Hypotheses) -> tuple[Any, ...]:
-    """Hypotheses as kernels take them."""
-    return tuple(each.view(np.ndarray) for each in state)

@@ -171,9 +171,9 @@ def _filtered(
     state, passed = estimator.init(batch, n_workers), []
     for keypoints in clip:
         estimator.predict(state, dt_s, [])
-        before = state.trees.view(np.ndarray).flatten()
+        before = state.trees.flatten()
         estimator.update(state, keypoints, [])
-        trees = state.trees.view(np.ndarray).flatten()
+        trees = state.trees.flatten()
         began = ~trees["body"][..., 3:].any((-2, -1))  # at rest: in the first frame, and only then
         follows = before["tracked"] & trees["tracked"] & ~began
         passed.append(_Passed(before["body"].reshape(-1, _N), trees, follows))

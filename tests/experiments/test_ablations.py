@@ -197,9 +197,9 @@ def test_tracks_are_compared_with_the_workers_whom_they_fit():
 def test_bones_are_given_and_taken_away():
     state, lengths = state_of(Setting("x", "x"))
     handicap(state, "known", "model", lengths)
-    assert (state.trees.bone_length == lengths[:, :, None]).all()
+    assert (state.trees["bone_length"] == lengths[:, :, None]).all()
     handicap(state, "none", "model", lengths)
-    assert (state.trees.bone_variance == 1e6).all()
+    assert (state.trees["bone_variance"] == 1e6).all()
     with pytest.raises(ConfigError, match="body on a tree"):
         handicap(object(), "known", "model", lengths)
 
@@ -208,15 +208,15 @@ def test_a_forgotten_velocity_leaves_the_positions_as_they_are():
     state, lengths = state_of(Setting("x", "x"))
     trees = state.trees
     parent = np.where(np.arange(N_JOINTS) == ROOT, ROOT, PARENT)
-    positions = trees.cov[:, 0, 0, :, :3, :3].copy()
-    together = (trees.slope @ trees.cov[..., parent, :, :])[:, 0, 0, :, :3, :3].copy()
+    positions = trees["cov"][:, 0, 0, :, :3, :3].copy()
+    together = (trees["slope"] @ trees["cov"][..., parent, :, :])[:, 0, 0, :, :3, :3].copy()
     handicap(state, "learnt", "forgotten", lengths)
-    assert (trees.body[..., 3:] == 0).all()
-    assert np.array_equal(trees.cov[:, 0, 0, :, :3, :3], positions)
-    now = (trees.slope @ trees.cov[..., parent, :, :])[:, 0, 0, :, :3, :3]
+    assert (trees["body"][..., 3:] == 0).all()
+    assert np.array_equal(trees["cov"][:, 0, 0, :, :3, :3], positions)
+    now = (trees["slope"] @ trees["cov"][..., parent, :, :])[:, 0, 0, :, :3, :3]
     others = np.arange(N_JOINTS) != ROOT
     assert np.allclose(now[:, others], together[:, others], atol=1e-12)
-    assert np.linalg.eigvalsh(trees.cov).min() > 0
+    assert np.linalg.eigvalsh(trees["cov"]).min() > 0
 
 
 def test_the_old_name_is_answered_with_the_new_one(capsys):

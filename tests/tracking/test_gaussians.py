@@ -32,9 +32,9 @@ def test_swapped_views_are_undone(name):
         e.predict(state, DT, rngs)
         e.update(state, keypoints(frame), rngs)
         if t == 75:
-            assert state.views.swap_chance[0, 0, 0, 1] > 0.9
-            assert state.views.swap_chance[0, 0, 0, [0, 2, 3]].max() < 0.1
-    assert state.views.swap_chance.max() < 0.1
+            assert state.views["swap_chance"][0, 0, 0, 1] > 0.9
+            assert state.views["swap_chance"][0, 0, 0, [0, 2, 3]].max() < 0.1
+    assert state.views["swap_chance"].max() < 0.1
 
 
 @gaussian
@@ -67,19 +67,19 @@ def test_a_joint_that_was_followed_wrongly_is_found_again(name):
     state = e.init(1, 1)
     for t, frame in enumerate(px):
         if t == 40:
-            state.trees.body[0, 0, 0, 5, :3] += [0.4, 0.4, 0.3]
+            state.trees["body"][0, 0, 0, 5, :3] += [0.4, 0.4, 0.3]
         e.predict(state, DT, rngs)
         e.update(state, keypoints(frame), rngs)
         if t == 40:
-            assert np.linalg.norm(state.trees.body[0, 0, 0, 5, :3] - joints[t, 5]) > 0.2
-    assert np.linalg.norm(state.trees.body[0, 0, 0, 5, :3] - joints[-1, 5]) < 0.05
+            assert np.linalg.norm(state.trees["body"][0, 0, 0, 5, :3] - joints[t, 5]) > 0.2
+    assert np.linalg.norm(state.trees["body"][0, 0, 0, 5, :3] - joints[-1, 5]) < 0.05
 
 
 def test_bone_lengths_are_learnt_from_population_values():
     joints = walk(4, 250) * 1.08  # a tall worker in a room as much larger
     e, rngs = make_estimator("kalman", LAB, DT), generators(1)
     state = e.init(1, 1)
-    first = state.trees.bone_length[0, 0, 0].copy()
+    first = state.trees["bone_length"][0, 0, 0].copy()
     for frame in detections(joints, Damage(), 4)[:, None]:
         e.predict(state, DT, rngs)
         e.update(state, keypoints(frame), rngs)
@@ -90,7 +90,7 @@ def test_bone_lengths_are_learnt_from_population_values():
     true = dict(zip(bones.tolist(), true.mean(0), strict=True))
     before, after = (
         np.array([abs(lengths[j] - true[j]) for j in rigid])
-        for lengths in (first, state.trees.bone_length[0, 0, 0])
+        for lengths in (first, state.trees["bone_length"][0, 0, 0])
     )
     assert len(rigid) > 4
     assert after.max() < 0.015

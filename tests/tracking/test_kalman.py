@@ -92,7 +92,7 @@ def test_joints_share_the_depth_that_one_camera_leaves_open():
     for frame in px:
         e.predict(state, DT, rngs)
         e.update(state, keypoints(frame), rngs)
-    cov, slope, ray = state.trees.cov[0, 0, 0], state.trees.slope[0, 0, 0], LAB[0, 2, :3]
+    cov, slope, ray = state.trees["cov"][0, 0, 0], state.trees["slope"][0, 0, 0], LAB[0, 2, :3]
     q, j = 1, 7  # left shoulder, left hip
     own = [ray @ cov[k, :3, :3] @ ray for k in (q, j)]
     shared = ray @ (slope[j] @ cov[q])[:3, :3] @ ray
@@ -106,7 +106,7 @@ def test_what_a_joint_does_not_share_with_its_parent_stays_positive_definite():
     for frame in px:
         e.predict(state, DT, rngs)
         e.update(state, keypoints(frame), rngs)
-        cov, slope = state.trees.cov[0, 0, 0], state.trees.slope[0, 0, 0]
+        cov, slope = state.trees["cov"][0, 0, 0], state.trees["slope"][0, 0, 0]
         for j in ORDER[1:]:
             rest = cov[j] - slope[j] @ cov[PARENT[j]] @ slope[j].T
             assert np.linalg.eigvalsh(rest).min() > 0
@@ -135,7 +135,7 @@ def test_a_worker_who_is_left_to_one_camera_is_reported_as_less_certain_than_is_
     for frame in px:
         e.predict(state, DT, rngs)
         e.update(state, keypoints(frame), rngs)
-        kept = np.trace(state.trees.cov[0, 0, 0, :, :3, :3], axis1=-2, axis2=-1)
+        kept = np.trace(state.trees["cov"][0, 0, 0, :, :3, :3], axis1=-2, axis2=-1)
         ratios.append(np.trace(e.estimate(state).cov_world[0, 0], axis1=-2, axis2=-1) / kept)
     assert ratios[29][5] == pytest.approx(1.0)
     assert ratios[37][5] == pytest.approx(1.0)  # cameras may be out of step: not at once
@@ -162,7 +162,7 @@ def test_a_body_that_is_believed_elsewhere_altogether_is_acquired_anew():
     state = e.init(1, 1)
     for t, frame in enumerate(px):
         if t == 40:
-            state.trees.body[0, 0, 0, :, :3] += [1.5, -1.5, 0.0]
+            state.trees["body"][0, 0, 0, :, :3] += [1.5, -1.5, 0.0]
         e.predict(state, DT, rngs)
         e.update(state, keypoints(frame), rngs)
-    assert rmse(state.trees.body[0, 0, 0, :, :3] - joints[-1, 0]) < 0.03
+    assert rmse(state.trees["body"][0, 0, 0, :, :3] - joints[-1, 0]) < 0.03

@@ -97,7 +97,7 @@ def test_once_all_have_arrived_their_order_of_arrival_does_not_matter():
             )
         e.update(state, replace(keypoints(frame), time_s=time_s), rngs)
     assert_same([e.estimate(state)], expected[-1:])
-    np.testing.assert_array_equal(state.now.trees.bone_length, inner.trees.bone_length)
+    np.testing.assert_array_equal(state.now.trees["bone_length"], inner.trees["bone_length"])
     assert not state.ignored.any()
 
 

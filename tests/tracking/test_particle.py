@@ -117,7 +117,7 @@ def test_predictions_without_frames_stay_where_those_of_one_hypothesis_are():
                 e.update(state, keypoints(frame), rngs)
             if name == "particle":
                 most = max(most, state.n_alive.max())
-                whole = np.exp(state.trees.log_weight[0, 0, : state.n_alive[0, 0]]).sum()
+                whole = np.exp(state.trees["log_weight"][0, 0, : state.n_alive[0, 0]]).sum()
                 assert whole == pytest.approx(1.0)
             mean.append(e.estimate(state).mean_world[:, 0])
         error[name] = np.sqrt(((np.stack(mean) - joints)[40:] ** 2).sum(-1).mean())
@@ -133,7 +133,7 @@ def test_a_worker_who_is_lost_has_one_hypothesis_which_relaxes_to_the_prior():
         e.predict(state, DT, generators(1))
     assert not e.estimate(state).tracked.any()
     assert (state.n_alive == 1).all()
-    assert state.trees.log_weight[0, 0, 0] == 0.0
+    assert state.trees["log_weight"][0, 0, 0] == 0.0
 
 
 def test_one_camera_does_not_turn_the_body_round():
@@ -181,13 +181,13 @@ def test_the_mixtures_moments_are_those_of_its_parts():
         e.update(state, keypoints(frame), rngs)
         n = state.n_alive[0, 0]
         most = max(most, n)
-        share = np.exp(state.trees.log_weight[0, 0, :n])
+        share = np.exp(state.trees["log_weight"][0, 0, :n])
         assert share.sum() == pytest.approx(1.0)
         assert share[0] == share.max()
-        points = state.trees.body[0, 0, :n, :, :3]
+        points = state.trees["body"][0, 0, :n, :, :3]
         mean = np.einsum("h,hji->ji", share, points)
         apart = points - mean
-        cov = np.einsum("h,hjik->jik", share, state.trees.cov[0, 0, :n, :, :3, :3])
+        cov = np.einsum("h,hjik->jik", share, state.trees["cov"][0, 0, :n, :, :3, :3])
         cov += np.einsum("h,hji,hjk->jik", share, apart, apart)
         estimate = e.estimate(state)
         np.testing.assert_allclose(estimate.mean_world[0, 0], mean, atol=1e-9)
@@ -256,7 +256,7 @@ def test_the_trees_determinant_and_square_are_those_of_the_whole_matrix():
     px = detections(walk(6, 30), HARD, 6)[:, None]
     _, state, _ = followed(px)
     tree = state.trees[0, 0, 0]
-    cov, slope = tree.cov, tree.slope
+    cov, slope = tree["cov"], tree["slope"]
     whole = np.zeros((15, 15, 6, 6))
     for n, j in enumerate(ORDER):
         for k in ORDER[:n]:
@@ -276,14 +276,14 @@ def test_hypotheses_that_have_come_close_are_one_and_light_ones_are_dropped():
     _, state, _ = followed(px)
     own = slots(state)
     own.trees[1:3] = own.trees[:1]
-    own.trees.body[2, :, 0] += 1.0
+    own.trees["body"][2, :, 0] += 1.0
     own.n_alive[0] = 3
-    own.trees.log_weight[:3] = np.log([0.3, 0.4, 0.3])
+    own.trees["log_weight"][:3] = np.log([0.3, 0.4, 0.3])
     merge(own, 4.0, np.zeros(1, WORK).view(np.recarray)[0])
     normalise(own, np.log(1e-3))
     assert own.n_alive[0] == 2
-    np.testing.assert_allclose(np.exp(own.trees.log_weight[:2]), [0.7, 0.3])
-    own.trees.log_weight[1] = -20.0
+    np.testing.assert_allclose(np.exp(own.trees["log_weight"][:2]), [0.7, 0.3])
+    own.trees["log_weight"][1] = -20.0
     normalise(own, np.log(1e-3))
     assert own.n_alive[0] == 1
 

@@ -96,12 +96,12 @@ def test_its_motion_is_the_filters():
         e.predict(state, DT, [])
         e.update(state, keypoints(frame), [])
     F, Q = linear_motion(DT, ParticleConfig())
-    before = dense(state.trees.cov[0, 0], state.trees.slope[0, 0])[0]
+    before = dense(state.trees["cov"][0, 0], state.trees["slope"][0, 0])[0]
     e.predict(state, DT, [])
     after = F @ before @ F.T + Q
     for j in range(15):
         own = after[6 * j : 6 * j + 6, 6 * j : 6 * j + 6]
-        np.testing.assert_allclose(own, state.trees.cov[0, 0, 0, j], atol=1e-12)
+        np.testing.assert_allclose(own, state.trees["cov"][0, 0, 0, j], atol=1e-12)
 
 
 @pytest.mark.parametrize("damage", [Damage(), Damage(occlusions=True), HARD])

@@ -6,6 +6,7 @@ import numpy as np
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.typing import Floats, Points3
+from hrc_env.tracking.hypotheses.slots import Hypotheses
 from hrc_env.tracking.tree.gaussian import PARENT, ROOT
 
 BONES = ("learnt", "known", "none")
@@ -40,26 +41,26 @@ def handicap(state: Any, bones: str, motion: str, lengths: Floats) -> None:
     """
     if (bones, motion) == (BONES[0], MOTION[0]):
         return
-    trees: Any = getattr(state, "trees", None)
-    if not hasattr(trees, "bone_variance"):
+    if not isinstance(state, Hypotheses):
         raise ConfigError(f"Expected a state with a body on a tree, got {type(state).__name__}.")
+    trees = state.trees
     if bones == "none":
-        trees.bone_variance[...] = UNKNOWN_M2
+        trees["bone_variance"] = UNKNOWN_M2
     elif bones == "known":
-        trees.bone_length[...] = lengths[:, :, None]
-        trees.bone_variance[...] = KNOWN_M2
+        trees["bone_length"] = lengths[:, :, None]
+        trees["bone_variance"] = KNOWN_M2
     if motion == "forgotten":
         _forget_velocities(trees)
 
 
 def _forget_velocities(trees: Any) -> None:
     """Keep the marginal of all positions, which is again a Gaussian on the tree."""
-    cov, slope = trees.cov, trees.slope
+    cov, slope = trees["cov"], trees["slope"]
     of_parent = cov[..., _PARENT, :, :]
     together = (slope @ of_parent)[..., :3, :3]  # of a joint's position and its parent's
     positions = together @ np.linalg.inv(of_parent[..., :3, :3])
     slope[...], slope[..., :3, :3] = 0.0, positions
     slope[..., ROOT, :, :] = 0.0
-    trees.body[..., 3:] = 0.0
+    trees["body"][..., 3:] = 0.0
     cov[..., 3:, :], cov[..., :, 3:] = 0.0, 0.0
     cov[..., [3, 4, 5], [3, 4, 5]] = SPEED_MPS**2
