@@ -1,4 +1,4 @@
-"""The whole configuration: one frozen tree, a branch for each organ.
+"""The whole configuration: one frozen tree, a branch for each component.
 
 `HRCConfig()` is the default; `dataclasses.replace`, a nested mapping or a TOML file changes it:
 `gymnasium.make("HRCReach-v0", config={"reward": {"proximity": 0.0}})`.

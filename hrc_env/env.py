@@ -40,7 +40,7 @@ ENDLESS = 2**62
 """Steps that are left where nobody said otherwise; time limits are gymnasium's `TimeLimit`."""
 
 
-class Door(Stateful):
+class EnvBase(Stateful):
     """What a single and a vector environment have in common: states, pictures' form, `spec`."""
 
     closed = False
@@ -69,7 +69,7 @@ class Door(Stateful):
 
 
 class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
-    Door, gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]
+    EnvBase, gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]
 ):
     """A robot works beside people whom it knows through cameras only.
 

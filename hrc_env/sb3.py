@@ -1,4 +1,4 @@
-"""Stable-Baselines3 door: the vector environment as a `VecEnv`.
+"""For Stable-Baselines3: the vector environment as a `VecEnv`.
 
 from hrc_env.sb3 import HRCVecEnv
 PPO("MlpPolicy", HRCVecEnv(64, stagger=True, perception="keypoints"))

@@ -1,6 +1,6 @@
 """States: records of arrays whose first axis is the environment; their rows, copies, saved ones.
 
-An organ that works on a few environments only (a reset of 3 of 64) works on a record of
+A component that works on a few environments only (a reset of 3 of 64) works on a record of
 their rows; as no result depends on the size of the batch, that is the same computation.
 """
 

@@ -1,4 +1,4 @@
-"""What the organs hand to each other: frozen records of arrays, the batch axis first.
+"""What the components hand to each other: frozen records of arrays, the batch axis first.
 
 B environments, W workers, C cameras, J = 15 joints, S = 22 body segments, K capsules,
 N arm joints. World frame: +Z up, origin on the floor, metres, seconds, radians.

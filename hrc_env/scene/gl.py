@@ -1,4 +1,4 @@
-"""The one door to OpenGL: which there is, contexts of it, and what to do where there is none.
+"""The only access to OpenGL: which there is, contexts of it, and what to do where there is none.
 
 mujoco reads MUJOCO_GL when it is imported. Unless the user has set it, Linux draws through EGL
 where its library is (no display is needed), else through OSMesa, else in a hidden window.

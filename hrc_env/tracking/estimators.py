@@ -1,4 +1,4 @@
-"""The door of the room: estimators by name, and what each of them can do.
+"""Estimators by name, and what each of them can do.
 
 | name | what it is |
 |---|---|

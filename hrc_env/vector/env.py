@@ -23,7 +23,7 @@ from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError, unknown, whole
 from hrc_env.core.machine import n_cores
 from hrc_env.core.typing import Bools, Floats, Ints
-from hrc_env.env import Door, spaces
+from hrc_env.env import EnvBase, spaces
 from hrc_env.render.views import PICTURE_SIZE, Views
 from hrc_env.rewards import RewardConfig
 from hrc_env.simulation import Simulation, checked_action
@@ -48,7 +48,7 @@ Step = tuple[Observations, NDArray[np.float64], Bools, Bools, dict[str, Any]]
 
 
 class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
-    Door, VectorEnv[Observations, Observations, NDArray[Any]]
+    EnvBase, VectorEnv[Observations, Observations, NDArray[Any]]
 ):
     """`num_envs` robots, each beside a worker of its own, stepped at once.
 
