@@ -18,7 +18,12 @@ from hrc_env.experiments.ablations.report import report
 from hrc_env.experiments.study.cache import PartCache, PartProgress
 from hrc_env.experiments.study.counts import ERRORS_M
 from hrc_env.experiments.study.fingerprint import fingerprint_of
-from hrc_env.experiments.study.intervals import counted_quantile_over, ratio_over, rmse_over
+from hrc_env.experiments.study.intervals import (
+    counted_quantile_over,
+    mean_over,
+    ratio_over,
+    rmse_over,
+)
 from hrc_env.experiments.study.rigs import DT_S, N_WARM_UP, WARM_UP_S
 from hrc_env.experiments.study.runner import Study, at_least_one, changed
 
@@ -121,6 +126,10 @@ def metrics_of(played: Played) -> dict[str, Metric]:
             key = f"{name}.{setting}"
             metrics |= _of_joints(key, sums)
             metrics[f"lost.{key}"] = ratio_over(sums["lost"], sums["frames"], "share")
+            if "idf1" in sums:
+                minutes = np.array(sums["frames"]) * DT_S / 60
+                metrics[f"id_switches.{key}"] = ratio_over(sums["id_switches"], minutes, "1/min")
+                metrics[f"idf1.{key}"] = mean_over(sums["idf1"], "share")
             if "update_us" in sums:
                 metrics[f"update_us.{key}"] = over(sums["update_us"], "us")
         for seen, sums in _by_sight(of_settings).items():
