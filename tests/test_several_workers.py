@@ -76,7 +76,9 @@ def test_many_environments_are_the_single_one_bit_for_bit(n_workers):
             alone, _ = one.reset()
 
 
-@pytest.mark.parametrize("estimator", ["particle", "kalman", "paper", "triangulation"])
+@pytest.mark.parametrize(
+    "estimator", ["particle", "kalman", "paper", "paper_restarts", "triangulation"]
+)
 def test_two_workers_without_names_are_both_followed(estimator):
     """Four seconds of keypoints that each camera reports in an order of its own."""
     for seed in range(3):
