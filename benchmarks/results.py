@@ -72,6 +72,10 @@ STUDIES: dict[str, Study] = {
         "python -m benchmarks.prediction", ("benchmarks.prediction",), 1, ("forecast",),
         goes_on=False,
     ),
+    "work": Study(
+        "python -m benchmarks.work_mix", ("benchmarks.work_mix", "agents.scripted"), 10,
+        ("people", "activities"), quick="--episodes 4", goes_on=False,
+    ),
     "speed": Study(
         BENCH + "speed", ("benchmarks.speed.bench",), 5, ("speed", "speed_organs"),
         {"speed_organs.png": "organs.png"}, goes_on=False,

@@ -21,6 +21,7 @@ from hrc_env.experiments.study.fingerprint import fingerprint_of
 from hrc_env.experiments.study.intervals import (
     counted_quantile_of,
     counted_quantile_over,
+    mean_over,
     paired,
     ratio_over,
     rmse_over,
@@ -127,6 +128,10 @@ def metrics_of(played: Played) -> dict[str, Metric]:
             key = f"{name}.{setting}"
             metrics |= _of_joints(key, sums)
             metrics[f"lost.{key}"] = ratio_over(sums["lost"], sums["frames"], "share")
+            if "idf1" in sums:
+                minutes = np.array(sums["frames"]) * DT_S / 60
+                metrics[f"id_switches.{key}"] = ratio_over(sums["id_switches"], minutes, "1/min")
+                metrics[f"idf1.{key}"] = mean_over(sums["idf1"], "share")
             if "update_us" in sums:
                 metrics[f"update_us.{key}"] = over(sums["update_us"], "us")
         for each in ABLATIONS[name].settings:
