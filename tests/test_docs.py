@@ -137,7 +137,6 @@ def test_a_file_holds_what_its_study_found_last(name):
         renewed = tables.renewed(table, results.WHOLE / f"{study}.json")
         for part in ("rows", "numbers", "commit"):
             assert table.get(part) == renewed.get(part), part
-        assert table["depends"] == results.digest(found["depends"])
 
 
 def test_every_picture_is_made_by_a_command():
