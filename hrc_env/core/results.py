@@ -92,14 +92,15 @@ def _version(package: str) -> str | None:
 
 
 def _commit() -> str | None:
-    """The commit, with "+changes" where the working tree differs; None outside a checkout."""
+    """The commit, with "+changes" where the working tree differs, docs apart; None outside a
+    checkout."""
     root = Path(__file__).resolve().parents[2]
     if not (root / ".git").exists():
         return None
     git = partial(subprocess.run, cwd=root, capture_output=True, text=True, check=True)
     try:
         commit = git(["git", "rev-parse", "--short", "HEAD"]).stdout.strip()
-        changes = git(["git", "status", "--porcelain"]).stdout
+        changes = git(["git", "status", "--porcelain", "--", ".", ":!docs"]).stdout
     except (OSError, subprocess.CalledProcessError):
         return None
     return commit + ("+changes" if changes else "")
