@@ -86,7 +86,9 @@ axes, 1 is {tool} m/s (`control="tool"`). The change of a command is limited. 25
 `Box({size},)` float32 for one worker, flat and finite. An entry is the value in its unit,
 clipped to the bound, divided by the scale; `env.unwrapped.split_observation` inverts this.
 Everything about a worker is the *estimate*. With `config={{"forecast_s": (0.2, 0.4)}}` it also
-holds the [forecast](../tracking.md#forecast) of each joint, worker by worker, horizon by horizon.
+holds the [forecast](../tracking.md#forecast) of each joint, worker by worker, horizon by horizon;
+with `config={{"uncertainty": ("towards_robot", "factor")}}` more of the covariance than its root
+mean, which hides the depth that one camera does not know.
 
 {observations}
 

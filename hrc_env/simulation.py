@@ -77,7 +77,9 @@ class Simulation(Stateful):
         self._spread_rad = np.array(config.start_spread_rad or settings.robot.spread_rad)
         check_shape("start_spread_rad", self._spread_rad.shape, (n_joints,), "one a joint")
         self.n_actions = n_actions(settings.control, self.chain)
-        sizes = observations.Sizes(n_joints, self.n_actions, most, len(config.forecast_s))
+        sizes = observations.Sizes(
+            n_joints, self.n_actions, most, len(config.forecast_s), config.uncertainty
+        )
         self.layout = observations.layout(self.terms, sizes)
         self.physics = Physics(self.scene, batch)
         self.pipeline = make_pipeline(perception, settings.estimator, self.scene, batch, config)
