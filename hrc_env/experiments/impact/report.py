@@ -55,7 +55,7 @@ FREE_COLOURS = ("C3", "C5", "C8", "C9")
 CAMERA_COLOURS = {4: "C0", 3: "#5aa2d6", 2: "#e8a33d", 1: "#d1495b"}
 LATE_MARKS = {0.0: "o", LATE_S[0]: "s", LATE_S[1]: "^"}
 ACROSS = {
-    "cost_towards": "true cost while the robot moves towards the worker  (less is safer)",
+    "cost_towards": "true cost while moving towards the worker  (less is safer)",
     "approaches": "approaches per 1,000 steps  (less is safer)",
 }
 
