@@ -16,8 +16,8 @@ import numpy as np
 
 from hrc_env.core.errors import HRCError
 
-PACKAGES = ("numpy", "numba", "mujoco", "gymnasium", "stable-baselines3", "torch",
-            "opencv-python-headless", "ai-edge-litert")  # fmt: skip
+PACKAGES = ("numpy", "numba", "scipy", "mujoco", "gymnasium", "stable-baselines3", "torch",
+            "opencv-python-headless", "ai-edge-litert", "openvino")  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ def provenance() -> dict[str, Any]:
     return {
         "hrc_env": _version("hrc_env"),
         "git": _commit(),
-        "versions": {name: _version(name) for name in PACKAGES},
+        "versions": versions(),
         "machine": {
             "python": platform.python_version(),
             "system": platform.platform(),
@@ -82,6 +82,11 @@ def write_whole(path: Path, content: str) -> None:
             f"{path} cannot be written: {error.strerror}. What is finished is kept; make room, "
             "or choose another folder, and start the same command again."
         ) from error
+
+
+def versions() -> dict[str, str | None]:
+    """Of the libraries that numbers depend on; None: it is not installed."""
+    return {name: _version(name) for name in PACKAGES}
 
 
 def _version(package: str) -> str | None:

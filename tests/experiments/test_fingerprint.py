@@ -71,20 +71,6 @@ def test_deep_imports_are_followed_even_from_inside_a_function(copied):
     assert of_now() != before
 
 
-def test_what_is_said_of_code_does_not_count(copied):
-    before = of_now()
-    deep = copied / "hrc_env" / "deep.py"
-    deep.write_text('"""What this is."""\n\nX =   1  # one\n"""Of X."""\n')
-    assert of_now() == before
-    deep.write_text('"""What this is."""\n\nX = "one"\n')
-    assert of_now() != before
-
-
-def test_what_is_left_out_is_not_followed(copied):
-    found = sources_of("hrc_env.maker", without=("hrc_env.room",))
-    assert {path.name for path in found} == {"maker.py"}
-
-
 def test_what_lies_beside_an_installed_package_does_not_count(copied):
     (copied / "numpy.py").write_text("this is no Python that could be read")
     assert {path.name for path in sources_of("hrc_env.maker")} == {

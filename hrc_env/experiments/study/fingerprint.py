@@ -6,16 +6,13 @@ import inspect
 import json
 import sys
 from collections.abc import Mapping
-from contextlib import suppress
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 import hrc_env
+from hrc_env.core.results import versions
 
-LIBRARIES = ("numpy", "numba", "scipy", "mujoco", "gymnasium", "opencv-python-headless",
-             "ai-edge-litert", "openvino", "torch", "stable-baselines3")  # fmt: skip
 OURS = ("hrc_env", "agents", "benchmarks", "assets")
 """Packages of this repository; where it is installed, others lie beside them."""
 _PACKAGE = Path(hrc_env.__file__).resolve().parent
@@ -31,19 +28,16 @@ def fingerprint_of(settings: Mapping[str, Any], *modules: str) -> str:
     """
     digest = hashlib.sha256(json.dumps(settings, sort_keys=True).encode())
     for path in sorted(sources_of(*modules)):
-        digest.update(code_of(path.read_text()))
+        digest.update(path.read_bytes())
     digest.update(_surroundings().encode())
     return digest.hexdigest()[:16]
 
 
-def sources_of(*modules: str, without: tuple[str, ...] = ()) -> set[Path]:
-    """The files of modules and of everything of this repository that they import, in time; nothing
-    of what begins `without`."""
+def sources_of(*modules: str) -> set[Path]:
+    """The files of modules and of everything of this repository that they import, in time."""
     found, todo, asked = set[Path](), set(modules), set[str]()
     while todo:
         asked.add(name := todo.pop())
-        if name.startswith(without):
-            continue
         if path := _file(name):
             found.add(path)
             todo |= _imports(path) - asked
@@ -78,17 +72,6 @@ def _imports(path: Path) -> frozenset[str]:
     return frozenset(found)
 
 
-@cache
-def code_of(text: str) -> bytes:
-    """What a module's text does: without comments, docstrings and layout."""
-    tree = ast.parse(text)
-    for node in ast.walk(tree):
-        if isinstance(body := getattr(node, "body", None), list):
-            body[:] = [each for each in body if not isinstance(each, ast.Expr)
-                       or not isinstance(each.value, ast.Constant)] or [ast.Pass()]  # fmt: skip
-    return ast.unparse(tree).encode()
-
-
 def source_digest(made: Any) -> str:
     """Of the file that defines what somebody may have registered; "" where nobody can tell."""
     try:
@@ -100,23 +83,11 @@ def source_digest(made: Any) -> str:
 @cache
 def _surroundings() -> str:
     """Versions of Python and libraries, and the content of every data file."""
-    versions = {"python": sys.version}
-    for name in LIBRARIES:
-        with suppress(PackageNotFoundError):
-            versions[name] = version(name)
-    digest = hashlib.sha256(json.dumps(versions).encode())
-    for path in data_files():
-        digest.update(path.name.encode() + path.read_bytes())
-    return digest.hexdigest()
-
-
-def data_files() -> list[Path]:
-    """Everything in package and assets that is no code."""
     from hrc_env.worker.body import assets_dir  # here: --help of a command imports no compiler
 
-    return [
-        path
-        for root in sorted({assets_dir(), _PACKAGE})
-        for path in sorted(root.rglob("*"))
-        if path.is_file() and path.suffix not in _CODE and "__pycache__" not in path.parts
-    ]
+    digest = hashlib.sha256(json.dumps({"python": sys.version} | versions()).encode())
+    for root in sorted({assets_dir(), _PACKAGE}):
+        for path in sorted(root.rglob("*")):
+            if path.is_file() and path.suffix not in _CODE and "__pycache__" not in path.parts:
+                digest.update(path.name.encode() + path.read_bytes())
+    return digest.hexdigest()
