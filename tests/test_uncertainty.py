@@ -21,7 +21,7 @@ STD, TOWARDS, FACTOR = (
     "worker_joints_std_towards_robot",
     "worker_joints_factor",
 )
-STRAIGHT = np.eye(3)
+UNTURNED = np.eye(3)
 TURN = matrix_from_quaternion(np.array([0.5, 0.1, -0.7, 0.5]))
 
 
@@ -32,7 +32,7 @@ def rolled(env, n_steps=10):
     return seen
 
 
-def robot(turn=STRAIGHT) -> RobotState:
+def robot(turn=UNTURNED) -> RobotState:
     """Two upright links of 1 m: at the origin, and a thicker one at (1, 1.05)."""
     links = np.zeros((1, 2, 2, 3))
     links[..., 1, 2], links[0, 1, :, :2] = 1.0, (1.0, 1.05)
@@ -40,7 +40,7 @@ def robot(turn=STRAIGHT) -> RobotState:
     return RobotState(*still, links @ turn.T, np.array([0.05, 0.2]))
 
 
-def estimate(place, cov, turn=STRAIGHT) -> PoseEstimate:
+def estimate(place, cov, turn=UNTURNED) -> PoseEstimate:
     """A body whose joints are all in one place, as surely."""
     shape = (1, 1, N_JOINTS)
     return PoseEstimate(
@@ -58,7 +58,7 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("turn", [STRAIGHT, TURN], ids=["as it stands", "all turned"])
+@pytest.mark.parametrize("turn", [np.eye(3), TURN], ids=["as it stands", "all turned"])
 @pytest.mark.parametrize(("place", "expected_m"), CASES.values(), ids=CASES)
 def test_the_deviation_is_that_along_the_line_to_the_robot(place, expected_m, turn):
     """Of a covariance with known axes; turned together, robot and worker have the same one."""
