@@ -18,7 +18,7 @@ from hrc_env.core.batching import Stateful
 from hrc_env.core.errors import ConfigError, check_shape, unknown
 from hrc_env.core.records import Roi
 from hrc_env.core.skeleton import BLAZEPOSE_INDEX, N_JOINTS
-from hrc_env.core.typing import Floats, Image, Points2
+from hrc_env.core.typing import Floats, Image, Points2, Points3
 from hrc_env.geometry.cameras import PinholeCamera, inside_image
 from hrc_env.perception import blazepose, network
 from hrc_env.perception.noise import STANDING, sigma_px
@@ -30,6 +30,7 @@ from hrc_env.perception.searching import (
     distinct,
     people,
     search_jobs,
+    search_windows,
 )
 from hrc_env.perception.weights import find_weights
 
@@ -116,15 +117,21 @@ class PoseDetector(Stateful):
     CHANGES = ("_looks",)
 
     def __init__(
-        self, cameras: Sequence[PinholeCamera], config: DetectorConfig | None = None
+        self,
+        cameras: Sequence[PinholeCamera],
+        config: DetectorConfig | None = None,
+        floor_world: Points3 | None = None,
     ) -> None:
-        """Raises `WeightsError` without the weights, `ConfigError` without the runtime."""
+        """Searches are laid out for people who stand at points (N, 3) [m], if these are known.
+        Raises `WeightsError` without the weights, `ConfigError` without the runtime."""
         self.cameras = tuple(cameras)
         self.config = config or DetectorConfig()
         find_weights("pose_detection")
         for name in (self.config.network, self.config.folded):
             find_weights(f"pose_landmark_{name}")
         network.chosen_runtime(self.config.runtime)
+        step = self.config.search_step
+        self._search = [search_windows(camera, floor_world, step) for camera in self.cameras]
         self._looks: dict[int, list[int]] = {}
         self._networks: tuple[_Networks, _Networks] | None = None
         self._helper: ThreadPoolExecutor | None = None
@@ -175,7 +182,7 @@ class PoseDetector(Stateful):
         """Regions of interest of the people in whole images of cameras `which` (None: all), best
         first; empty for the others."""
         which = range(len(self.cameras)) if which is None else which
-        jobs = search_jobs(source, self.cameras, which, self.config.search_step)
+        jobs = search_jobs(source, self._search, which)
         found = self._share(lambda nets, job=job: job(nets.detect) for job in jobs)
         return distinct([one for some in found for one in some], len(self.cameras))
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from hrc_env.core.batching import Stateful
 from hrc_env.core.records import Keypoints, PoseEstimate, Roi
-from hrc_env.core.typing import Image
+from hrc_env.core.typing import Image, Points3
 from hrc_env.geometry.cameras import PinholeCamera, project, projections
 from hrc_env.perception.detector import Detection, DetectorConfig, PoseDetector
 from hrc_env.perception.noise import STANDING
@@ -21,11 +21,17 @@ class Looking(Stateful):
     CHANGES = ("detector", "windows", "schedule", "reacquisition")
 
     def __init__(
-        self, batch: int, cameras: Sequence[PinholeCamera], n_workers: int, config: DetectorConfig
+        self,
+        batch: int,
+        cameras: Sequence[PinholeCamera],
+        n_workers: int,
+        config: DetectorConfig,
+        floor_world: Points3 | None = None,
     ) -> None:
+        """`floor_world` (N, 3) [m]: where people may stand, if that is known."""
         self.cameras, self.n_workers = tuple(cameras), n_workers
         self.P = projections(self.cameras)
-        self.detector = PoseDetector(self.cameras, config)
+        self.detector = PoseDetector(self.cameras, config, floor_world)
         self.windows: list[Windows] = [
             [[None] * len(self.cameras) for _ in range(n_workers)] for _ in range(batch)
         ]

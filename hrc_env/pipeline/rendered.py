@@ -18,6 +18,7 @@ from hrc_env.pipeline.tracking import PoseTracking, no_keypoints
 from hrc_env.scene.build import Scene
 from hrc_env.scene.domain_randomization import AS_BUILT, Look, draw_look
 from hrc_env.scene.render import CropRenderer
+from hrc_env.scene.rigs import floor
 from hrc_env.tracking.estimators import Estimator
 
 
@@ -37,7 +38,8 @@ class PixelPipeline(PoseTracking):
         self.appearance = config.appearance
         self.worn: list[Look | None] = [None] * batch
         """How each environment looks in its episode; None: as it was built."""
-        self.looking = Looking(batch, scene.cameras, scene.n_workers, config.detector)
+        rig, floor_world = scene.cameras, floor(scene.grounds)
+        self.looking = Looking(batch, rig, scene.n_workers, config.detector, floor_world)
 
     def detect(self, now: SensorInput, predicted: Any, sensor_rngs: Generators) -> Keypoints:
         """Landmarks of crops round the predicted worker, or of a search where there is none."""
