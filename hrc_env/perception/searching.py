@@ -39,6 +39,8 @@ MIN_CROSSING = 0.1
 """Sine of the smallest angle between two lines that fixes a point."""
 Candidates = Sequence[Sequence[Roi]]
 """(C,) the people found by each camera."""
+Windows = list[Roi | None]
+"""One person's window a camera (C,)."""
 Found = tuple[int, float, Roi]
 """Which camera, how sure, where."""
 
@@ -144,6 +146,18 @@ def agreed_windows(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> 
         if rank > best_rank:
             best, best_rank = windows, rank
     return best
+
+
+def proposals(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Iterator[Windows]:
+    """Who it may be, best first, a window a camera (C,): whom several cameras agree on, then whom
+    only one has found."""
+    left = candidates
+    while any(agreed := agreed_windows(left, cameras)):
+        yield agreed
+        left = apart_from(left, [agreed])
+    for c, found in enumerate(left):
+        for window in found:
+            yield [window if k == c else None for k in range(len(cameras))]
 
 
 def apart_from(candidates: Candidates, others: Sequence[Sequence[Roi | None]]) -> Candidates:
