@@ -10,11 +10,13 @@ import numpy as np
 
 from hrc_env.core.records import Keypoints
 from hrc_env.core.skeleton import BONE_LENGTH_M, BONES, JOINT
-from hrc_env.core.typing import Points2, Points3
+from hrc_env.core.typing import Floats, Points2, Points3
 from hrc_env.geometry.cameras import PinholeCamera, projections, rays
 from hrc_env.geometry.triangulation import triangulate
 from hrc_env.perception.lensed import pinhole_keypoints
 
+VISIBLE = 0.7
+"""Mean confidence of the joints of who is seen by one camera only."""
 NEAR_M = 0.5
 """Who stands is so near to a place where people may [m]."""
 GATE_SIGMA = 4.0
@@ -39,15 +41,18 @@ def is_body(found: Keypoints, cameras: Sequence[PinholeCamera]) -> bool:
     return bool(np.mean((ratio < OFF) & (ratio > 1 / OFF)) >= LEAST_SHARE)
 
 
-def stands(joints_px: Points2, camera: PinholeCamera, floor_world: Points3) -> bool:
-    """Whether somebody with joints (J, 2) [image px] stands upright at some of the points (N, 3) of
-    the floor [m]."""
+def stands(
+    joints_px: Points2, confidence: Floats, camera: PinholeCamera, floor_world: Points3
+) -> bool:
+    """Whether somebody with joints (J, 2) [image px] and confidence (J,) is mostly visible and
+    stands upright near one of the points (N, 3) of the floor [m]."""
     levels_px = [joints_px[pair].mean(0) for pair in LEVELS]
     ray = rays(camera, np.stack([*levels_px, joints_px[JOINT["nose"]]]))
     eye, level = camera.eye_world, np.linalg.norm(ray[:, :2], axis=-1)
     away_m = (ANKLE_M - eye[2]) / ray[0, 2] * level[0]  # along the floor
     height_m = eye[2] + away_m * ray[1:, 2] / level[1:]
-    if not (away_m > 0 and ((height_m > LEVELS_M[:, 0]) & (height_m < LEVELS_M[:, 1])).all()):
+    upright = away_m > 0 and ((height_m > LEVELS_M[:, 0]) & (height_m < LEVELS_M[:, 1])).all()
+    if not upright or confidence.mean() < VISIBLE:
         return False
     place = eye[:2] + away_m * ray[0, :2] / level[0]
     return bool(np.linalg.norm(floor_world[:, :2] - place, axis=-1).min() < NEAR_M)

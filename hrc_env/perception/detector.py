@@ -233,7 +233,8 @@ class PoseDetector(Stateful):
             return is_body(Keypoints(*(each[None, :, None] for each in joints)), self.cameras)
         if not shown or self.floor_world is None:
             return shown == [0] and len(self.cameras) == 1
-        return stands(sight.px[shown[0]], self.cameras[shown[0]], self.floor_world)
+        (c,) = shown
+        return stands(sight.px[c], sight.confidence[c], self.cameras[c], self.floor_world)
 
     def _crop(self, source: ImageSource, c: int, window: Roi) -> Image:
         """A copy of the crop, black where the camera does not see: renderers go on drawing."""

@@ -11,7 +11,7 @@ from hrc_env.perception.noise import STANDING
 from hrc_env.perception.outline import is_folded, posture_of
 from hrc_env.perception.searching import ImageSource
 from hrc_env.perception.windows import steady_window, window_from_joints
-from hrc_env.pipeline.reacquisition import Reacquisition, SearchSchedule
+from hrc_env.pipeline.reacquisition import ENOUGH, Reacquisition, SearchSchedule
 from hrc_env.pipeline.sensor_input import Windows
 
 
@@ -76,8 +76,9 @@ class Looking(Stateful):
             folded, posture = _expected_posture(expected, worker)
             seen = self.detector.detect(source, windows, track, taken, people, folded, posture)
             taken.append(seen.windows)
-            self.reacquisition.saw(b, worker, seen.confidence.max(-1) > 0.0)
-            missed |= not any(windows) and not seen.confidence.any()
+            shown = seen.confidence.max(-1) > 0.0
+            self.reacquisition.saw(b, worker, shown)
+            missed |= not any(windows) and shown.sum() < min(ENOUGH, len(shown))
             self._keep(b, worker, seen, has_image, out)
         if missed:
             self.schedule.rest(b)
