@@ -19,6 +19,7 @@ from hrc_env.core.results import write_whole
 from hrc_env.geometry.camera_config import CameraConfig, read_rig
 from hrc_env.metrics import CostConfig
 from hrc_env.motion.generator import PEOPLE, MotionConfig, PeopleConfig
+from hrc_env.motion.schedule import WORK, Job
 from hrc_env.perception.detector import DetectorConfig
 from hrc_env.perception.emulator import EmulatorConfig
 from hrc_env.perception.faults.fault import FaultConfig
@@ -115,7 +116,7 @@ ARGUMENTS: dict[str, Any] = {
     "config": None, **dict.fromkeys(PARTS),
 }  # fmt: skip
 """The arguments of an environment that decide what happens in it (`HRCEnv`): their defaults."""
-PRESETS.update({AppearanceConfig: APPEARANCES, PeopleConfig: PEOPLE})
+PRESETS.update({AppearanceConfig: APPEARANCES, PeopleConfig: PEOPLE, tuple[Job, ...]: WORK})
 
 
 @dataclass(frozen=True, slots=True)

@@ -76,7 +76,9 @@ def test_many_environments_are_the_single_one_bit_for_bit(n_workers):
             alone, _ = one.reset()
 
 
-@pytest.mark.parametrize("estimator", ["particle", "kalman", "paper", "triangulation"])
+@pytest.mark.parametrize(
+    "estimator", ["particle", "kalman", "paper", "paper_restarts", "triangulation"]
+)
 def test_two_workers_without_names_are_both_followed(estimator):
     """Four seconds of keypoints that each camera reports in an order of its own."""
     for seed in range(3):
@@ -162,7 +164,7 @@ def test_an_empty_room_in_pictures_is_quiet():
 def test_who_comes_in_late_is_found_and_nobody_is_taken_for_them(pixels):
     """SearchSchedule for the second worker see the first one only, until the second is there."""
     env = HRCEnv(perception="pixels", n_workers=2)
-    renderer = env.simulation.pipeline.renderer
+    renderer = env.simulation.pipeline.cameras.renderer
     draw = renderer.draw
     renderer.draw = lambda q, motion: draw(q, without_the_second(motion))
     env.reset(seed=1)

@@ -52,6 +52,7 @@ def test_the_single_environment_goes_on_from_a_state(level, n_steps):
     [
         {"estimator": "kalman"},
         {"estimator": "paper"},
+        {"estimator": "paper_restarts"},
         {"estimator": "triangulation"},
         {"n_workers": 2, "control": "tool"},
         {"config": {"forecast_s": (0.2,), "tracker": {"longest_delay_s": 0.2}}},

@@ -26,6 +26,7 @@ ALGORITHM_1 = Ablation(
         *(_paper(f"sigma_{cm}cm", 1, 1000, cm) for cm in (1, 2, 10)),
         Setting("particle", "the default filter", is_timed=True),
     ),
+    against=("particle",),
 )
 
 WITHOUT: dict[str, tuple[str, dict[str, Any]]] = {
@@ -48,7 +49,8 @@ WITHOUT: dict[str, tuple[str, dict[str, Any]]] = {
     "evidence in full": ("evidence in full", {"evidence_trust": 1.0}),
     "4 hypotheses": ("4 hypotheses", {"n_hypotheses": 4}),
     "16 hypotheses": ("16 hypotheses", {"n_hypotheses": 16}),
-    "paper": ("paper: Algorithm 1", {"estimator": "paper"}),
+    "paper": ("paper: Algorithm 1 as printed", {"estimator": "paper"}),
+    "paper restarts": ("paper_restarts: with restarts", {"estimator": "paper_restarts"}),
     "ransac": ("ransac: no motion, no body", {"estimator": "ransac"}),
 }
 """The default filter without one of its parts, and rivals: words, and what takes the part away,
@@ -90,11 +92,12 @@ FILTER = Ablation(
         *(_part("4cam", name) for name in WITHOUT if name not in OF_ONE_VIEW),
         *(_part("1cam", name) for name in WITHOUT),
     ),
+    against=("4cam_all", "1cam_all"),
 )
 
 KNOWING = {
-    "known": ("bone lengths known", "particle", "known"),
     "learnt": ("bone lengths learnt (the default)", "particle", "learnt"),
+    "known": ("bone lengths known", "particle", "known"),
     "none": ("bones of any length", "particle", "none"),
     "points": ("points without a body (ransac)", "ransac", "learnt"),
 }
@@ -116,4 +119,5 @@ KINEMATICS = Ablation(
         for cameras, (spoken, rigs) in CAMERAS.items()
         for name, (words, estimator, bones) in KNOWING.items()
     ),
+    against=tuple(f"{cameras}_learnt" for cameras in CAMERAS),
 )
