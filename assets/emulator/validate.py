@@ -76,6 +76,7 @@ def error_ratios(
     say: Say = lambda share, label: None,
     config: HRCConfig | None = None,
     store: Path | None = None,
+    picture: Path | None = None,
 ) -> dict[str, Metric]:
     """Error of the emulator over that of the pixels, by family of motions.
 
@@ -86,19 +87,37 @@ def error_ratios(
         say: hears of the progress: shares that sum to 1.
         config: settings; its `emulator` is judged.
         store: a folder in which what was rendered stays, and is taken from; None: nothing stays.
+        picture: where a plot of both is drawn (PNG); None: nowhere.
 
     Returns:
         `emulator_error_ratio.<family>` for medians, `.<family>.p95`, and
-        `emulator_coverage_difference.<family>`; their 95 % intervals draw clips anew.
+        `emulator_coverage_difference.<family>`; their 95 % intervals draw clips anew. What they are
+        made of: `emulator_<median_m|p95_m|coverage95>.<family>.<pixels|keypoints>` and
+        `emulator_clips.<family>`.
     """
     seen = compared(rounds, seed, say, config or HRCConfig(), store)
+    if picture is not None:
+        from assets.emulator.plot import plot_comparison  # which imports this module
+
+        plot_comparison(picture, seen)
     pixels = [_in_space([each]) for each in seen.pixels]
     emulated = [_in_space(each) for each in seen.emulated]
     metrics: dict[str, Metric] = {}
-    for family in seen.outcomes:
+    for family, outcomes in seen.outcomes.items():
         mine = _of_family(seen.clips, family)
+        metrics[f"emulator_clips.{family}"] = _exactly(len(mine), "", len(mine))
+        for level, found in zip(("pixels", "keypoints"), outcomes, strict=True):
+            for what, value, unit in (
+                ("median_m", found.median_m, "m"), ("p95_m", found.p95_m, "m"),
+                ("coverage95", found.coverage, "share"),
+            ):  # fmt: skip
+                metrics[f"emulator_{what}.{family}.{level}"] = _exactly(value, unit, found.n)
         metrics |= _apart(family, [pixels[k] for k in mine], [emulated[k] for k in mine])
     return metrics
+
+
+def _exactly(value: float, unit: str, n: int) -> Metric:
+    return Metric(value, value, value, unit, n)
 
 
 def _apart(
