@@ -201,6 +201,8 @@ def publish(name: str) -> None:
     study, out = STUDIES[name], OUT / name
     content = json.loads((out / "results.json").read_text()) if study.tables else provenance()
     content |= json.loads((out / "depends.json").read_text())
+    content.get("config", {}).pop("out", None)  # of this machine
+    content["machine"].pop("system", None)
     content["date"] = datetime.date.today().isoformat()
     for metric in content.get("metrics", {}).values():
         metric |= {end: float(f"{metric[end]:.6g}") for end in ("value", "low", "high")}
