@@ -100,7 +100,7 @@ def draw_tradeoff(
     the policy that does not look."""
     figure = new_figure(5.4 * len(policies) + 1, 12)
     axes = figure.subplots(2, len(policies), squeeze=False)
-    seeing = [name for name in setups if not setup_called(name).is_blind]
+    seeing = [name for name in setups if setup_called(name).level != "none"]
     for (above, below), policy in zip(axes.T, policies, strict=True):
         _panel(above, metrics, policy, setups, "cost_towards")
         if policy == SCRIPTED:
