@@ -12,6 +12,7 @@ clean commit; changes in `docs/` do not count.
 """
 
 import ast
+import datetime
 import hashlib
 import json
 import os
@@ -200,11 +201,17 @@ def publish(name: str) -> None:
     study, out = STUDIES[name], OUT / name
     content = json.loads((out / "results.json").read_text()) if study.tables else provenance()
     content |= json.loads((out / "depends.json").read_text())
+    content.get("config", {}).pop("out", None)  # of this machine
+    content["machine"].pop("system", None)
+    content["date"] = datetime.date.today().isoformat()
+    for metric in content.get("metrics", {}).values():
+        metric |= {end: float(f"{metric[end]:.6g}") for end in ("value", "low", "high")}
     WHOLE.mkdir(exist_ok=True)
-    (WHOLE / f"{name}.json").write_text(tables.written(content))
+    kept = WHOLE / f"{name}.json"
+    kept.write_text(tables.written(content))
     word = hashlib.sha256(json.dumps(content["depends"]).encode()).hexdigest()[:12]
     for each in study.tables:
-        table = tables.renewed(tables.read(each), out / "results.json", depends=word)
+        table = tables.renewed(tables.read(each), kept, depends=word)
         (tables.RESULTS / f"{each}.json").write_text(tables.written(table))
     for picture, figure in study.pictures.items():
         drawn = out / "figures" / figure

@@ -126,7 +126,7 @@ def renewed(table: Mapping[str, Any], path: Path, **more: Any) -> dict[str, Any]
         which: number | {"value": _measured(metrics, number, number["value"], ())}
         for which, number in table.get("numbers", {}).items()
     }
-    date = datetime.date.fromtimestamp(path.stat().st_mtime).isoformat()
+    date = found.get("date") or datetime.date.fromtimestamp(path.stat().st_mtime).isoformat()
     machine = f"{found['machine']['cores']} cores, no GPU"
     new = {"commit": found["git"], "date": date, "machine": machine, **more, "rows": rows}
     return {**table, **new, **({"numbers": numbers} if numbers else {})}
