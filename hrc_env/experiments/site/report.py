@@ -53,7 +53,8 @@ def report(
     draw_place(figures / "figure_3.png", scene, seed, truth)
     paths = []
     for name in estimators:
-        heads = {c: np.asarray(film["rows"][f"alone.{name}.{c}"]["head"], float) for c in SPOKEN}
+        rows = {c: film["rows"][f"alone.{name}.{c}"] for c in SPOKEN}
+        heads = {c: np.where(np.c_[row["tracked"]], row["head"], np.nan) for c, row in rows.items()}
         path = figures / f"figure_4_{name}.png"
         draw_paths(path, scene, name, truth, heads)
         paths.append(picture(path, f"The paper's figure 4: the first walk from above, `{name}`."))
