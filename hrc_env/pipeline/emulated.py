@@ -41,37 +41,49 @@ class EmulatedCameras(TrueState):
         now, whole = with_truth(self.now), len(self.now.ids) == self._batch
         state = self.emulator if whole else rows(self.emulator, now.ids)
         if self.recent is None:
-            keypoints = self._emulated(now, state, rngs, self.scene.cameras)
+            keypoints = self._emulated(now, state, expected, rngs, self.scene.cameras)
         else:
-            keypoints = self._arrived(now, state, rngs, self.recent)
+            keypoints = self._arrived(now, state, expected, rngs, self.recent)
         if not whole:
             write_rows(self.emulator, now.ids, state)
         return keypoints
 
     def _emulated(
-        self, now: TrueSensorInput, state: Any, rngs: Generators, cameras: tuple[PinholeCamera, ...]
+        self,
+        now: TrueSensorInput,
+        state: Any,
+        expected: PoseEstimate,
+        rngs: Generators,
+        cameras: tuple[PinholeCamera, ...],
     ) -> Keypoints:
         """What cameras show now; `state` of the errors goes on."""
         surroundings = self.scene.surroundings(now.q, now.motion.held)
-        keypoints = emulator.emulate(state, rngs, now.truth, surroundings, cameras, self.config)
+        keypoints = emulator.emulate(
+            state, rngs, now.truth, surroundings, cameras, self.config, expected
+        )
         if self.scene.n_workers < 2:
             return keypoints
         return emulator.without_names(keypoints, rngs)
 
     def _arrived(
-        self, now: TrueSensorInput, state: Any, rngs: Generators, recent: Recent
+        self,
+        now: TrueSensorInput,
+        state: Any,
+        expected: PoseEstimate,
+        rngs: Generators,
+        recent: Recent,
     ) -> Keypoints:
         """What has come of every camera: images of now, older ones, or none."""
         rig, ids = self.scene.cameras, now.ids.tolist()
         actual = [recent.schedule.actual(rig, recent.seeds[b], recent.begin(b)) for b in ids]
         if all(cameras is rig for cameras in actual):
-            shown = self._emulated(now, state, rngs, rig)
+            shown = self._emulated(now, state, expected, rngs, rig)
         else:
             shown = no_keypoints(len(ids), len(rig), self.scene.n_workers)
             for row, cameras in enumerate(actual):
                 here = np.array([row])
-                part = rows(state, here)
-                seen = self._emulated(rows(now, here), part, [rngs[row]], cameras)
+                part, alone = rows(state, here), (rows(now, here), rows(expected, here))
+                seen = self._emulated(alone[0], part, alone[1], [rngs[row]], cameras)
                 write_rows(state, here, part)
                 write_rows(shown, here, seen)
         came = no_keypoints(len(ids), len(rig), self.scene.n_workers)
