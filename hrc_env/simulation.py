@@ -106,7 +106,8 @@ class Simulation(Stateful):
         self.pipeline.reset(ids, streams["sensor"], streams["tracker"])
         motion = generator.current(self.motion, ids)
         truth = worker_truth(self.bodies, motion)
-        estimates = self._perceive(ids, motion, truth)
+        self._expose(ids, motion, truth)
+        estimates = self._perceive(ids)
         belief = self._believed(ids, robot, estimates)
         observation = observations.observe(belief, self.layout, self.terms)
         info = {
@@ -127,7 +128,8 @@ class Simulation(Stateful):
         far = self.separation_m > CLOSING_M_S * config.ctrl_dt
         q_path = self.physics.step(command, path, far)
         truth = worker_truth(self.bodies, motion)
-        estimates = self._perceive(self._everyone, motion, truth)
+        self._expose(self._everyone, motion, truth)
+        estimates = self._perceive(self._everyone)
         robot, arm = chains.robot_along(self.chain, q_path, self.physics.qd)
         seen_world = robot.capsules_world[:, self.scene.watched, 1]
         generator.watch(self.motion, seen_world, motion, config.ctrl_dt)
@@ -222,15 +224,17 @@ class Simulation(Stateful):
             return command, {}
         return shielded(self.shield, self.belief, command, self.config.ctrl_dt)
 
-    def _perceive(
-        self, ids: Ints, motion: WorkerMotion, truth: WorkerTruth
-    ) -> tuple[PoseEstimate, ...]:
-        """Let the pipeline look at environments `ids`: their rows of `estimates`."""
+    def _expose(self, ids: Ints, motion: WorkerMotion, truth: WorkerTruth) -> None:
+        """Show environments `ids` to the sensor, which alone sees them."""
         now = SensorInput(ids, self.physics.q[ids], motion)
-        if self.pipeline.NEEDS_TRUTH:
+        if self.pipeline.sensor.NEEDS_TRUTH:
             now = TrueSensorInput(ids, now.q, motion, truth, self.motion.workers["present"][ids])
+        self.pipeline.sensor.expose(now)
+
+    def _perceive(self, ids: Ints) -> tuple[PoseEstimate, ...]:
+        """Let the pipeline perceive what was shown of environments `ids`: their `estimates`."""
         sensor, tracker = (picked(self.streams[name], ids) for name in ("sensor", "tracker"))
-        estimate = self.pipeline.perceive(now, sensor, tracker)
+        estimate = self.pipeline.perceive(ids, sensor, tracker)
         later = (self.pipeline.forecast(estimate, ids, t) for t in self.config.forecast_s)
         estimates = (estimate, *later)
         if ids is self._everyone:

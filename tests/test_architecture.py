@@ -21,7 +21,7 @@ TRUTH_READERS = {
     "hrc_env/worker/body.py": "makes it from the worker's motion",
     "hrc_env/step.py": "gives errors against it their names",
     "hrc_env/simulation.py": "carries it to cost, metrics and perception",
-    "hrc_env/pipeline/sensor_input.py": "hands it to the emulator and to the level `truth`",
+    "hrc_env/pipeline/sensor_input.py": "hands it to the sensors of `keypoints` and `truth`",
     "hrc_env/metrics.py": "counts cost and errors",
     "hrc_env/experiments/impact/episodes.py": "counts what came of beliefs",
     "hrc_env/perception/emulator.py": "projects it into emulated cameras",
@@ -86,6 +86,22 @@ def test_what_the_robot_reads_knows_no_truth(name):
     path = PACKAGE / f"{name}.py"
     assert not {each for each in identifiers(path) if "truth" in each or "_true" in each}
     assert "WorkerMotion" not in identifiers(path)
+
+
+def test_who_chooses_windows_and_tracks_is_not_shown_the_world():
+    """Sensors are; what looks through them and believes names neither their input nor bodies."""
+    looks = ["looking", "reacquisition", "tracking", "pose_tracker"]
+    finds = ["detector", "searching", "windows", "blazepose", "network"]
+    paths = [PACKAGE / "pipeline" / f"{name}.py" for name in looks]
+    paths += [PACKAGE / "perception" / f"{name}.py" for name in finds]
+    paths += [path for path in (PACKAGE / "tracking").rglob("*.py") if path.stem != "oracle"]
+    world = {"SensorInput", "TrueSensorInput", "WorkerMotion", "WorkerTruth", "worker_truth"}
+    for path in paths:
+        assert not identifiers(path) & world, relative(path)
+    rendered = nodes(PACKAGE / "pipeline" / "rendered.py")
+    (pipeline,) = [node for node in rendered if getattr(node, "name", "") == "PixelPipeline"]
+    used = {node.attr for node in ast.walk(pipeline) if isinstance(node, ast.Attribute)}
+    assert not used & {"now", "motion", "truth"}
 
 
 def test_agents_do_not_touch_simulator_state():

@@ -162,7 +162,7 @@ def test_an_empty_room_in_pictures_is_quiet():
 def test_who_comes_in_late_is_found_and_nobody_is_taken_for_them(pixels):
     """SearchSchedule for the second worker see the first one only, until the second is there."""
     env = HRCEnv(perception="pixels", n_workers=2)
-    renderer = env.simulation.pipeline.renderer
+    renderer = env.simulation.pipeline.cameras.renderer
     draw = renderer.draw
     renderer.draw = lambda q, motion: draw(q, without_the_second(motion))
     env.reset(seed=1)

@@ -105,7 +105,8 @@ def _watched(
         motion = rows(staged.motion, np.array([t]))
         truth = worker_truth(staged.body, motion)
         now = TrueSensorInput(np.arange(1), q, motion, truth, np.ones((1, 1), bool))
-        estimate = pipeline.perceive(now, *rngs)
+        pipeline.sensor.expose(now)
+        estimate = pipeline.perceive(now.ids, *rngs)
         keypoints, windows = pipeline.keypoints, pipeline.last_detections(0)[1]
         true_px, depth_m = project(P, truth.joints_world[:, 0])
         sight, look_of = lines_of_sight(truth, scene.surroundings(q, motion.held), scene.cameras)

@@ -7,45 +7,43 @@ import numpy as np
 
 from hrc_env.config import HRCConfig
 from hrc_env.core.batching import one, rows, write_rows
-from hrc_env.core.records import Keypoints
+from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.typing import Ints
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.perception import emulator
 from hrc_env.perception.faults.schedule import Recent, Schedule
-from hrc_env.pipeline.sensor_input import Generators, SensorInput, TrueSensorInput, with_truth
+from hrc_env.pipeline.sensor_input import Generators, TrueSensorInput, TrueState, with_truth
 from hrc_env.pipeline.tracking import PoseTracking, no_keypoints
 from hrc_env.scene.build import Scene
 from hrc_env.tracking.estimators import Estimator
 
 
-class EmulatorPipeline(PoseTracking):
-    """Level `keypoints`: the detector's errors on the projected truth."""
+class EmulatedCameras(TrueState):
+    """Cameras and detector in one: what is true goes in, keypoints come out."""
 
-    CHANGES = (*PoseTracking.CHANGES, "emulator")
-    NEEDS_TRUTH = True
+    CHANGES = ("recent", "emulator")
 
-    def __init__(
-        self, scene: Scene, batch: int, tracker: Estimator, config: HRCConfig, schedule: Schedule
-    ) -> None:
-        super().__init__(batch, scene, tracker, config, schedule)
-        self.config = config.emulator
+    def __init__(self, scene: Scene, batch: int, config: HRCConfig, schedule: Schedule) -> None:
+        self.scene, self.config, self._batch = scene, config.emulator, batch
+        self.recent = None if schedule.is_plain else Recent(batch, schedule)
         self.emulator = emulator.make_state(
             batch, len(scene.cameras), scene.n_workers, config.ctrl_dt, config.emulator
         )
 
-    def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
-        """Forget the tracks and the detector's slow errors."""
-        super().reset(ids, sensor_rngs, tracker_rngs)
-        emulator.reset(self.emulator, ids, sensor_rngs)
+    def reset(self, ids: Ints, rngs: Generators) -> None:
+        """Forget images; draw faults and the detector's slow errors."""
+        if self.recent is not None:
+            self.recent.reset(ids, rngs)
+        emulator.reset(self.emulator, ids, rngs)
 
-    def detect(self, now: SensorInput, predicted: Any, sensor_rngs: Generators) -> Keypoints:
-        """Emulated keypoints; room, robot and bodies stand in the lines of sight."""
-        known, whole = with_truth(now), len(now.ids) == len(self.keypoints.px)
+    def keypoints(self, expected: PoseEstimate, rngs: Generators) -> Keypoints:
+        """What is reported of the scene; room, robot and bodies stand in the lines of sight."""
+        now, whole = with_truth(self.now), len(self.now.ids) == self._batch
         state = self.emulator if whole else rows(self.emulator, now.ids)
         if self.recent is None:
-            keypoints = self._emulated(known, state, sensor_rngs, self.scene.cameras)
+            keypoints = self._emulated(now, state, rngs, self.scene.cameras)
         else:
-            keypoints = self._arrived(known, state, sensor_rngs, self.recent)
+            keypoints = self._arrived(now, state, rngs, self.recent)
         if not whole:
             write_rows(self.emulator, now.ids, state)
         return keypoints
@@ -84,3 +82,17 @@ class EmulatorPipeline(PoseTracking):
                 if record is not None:
                     write_rows(one(one(came, row), c), ..., one(record, c))
         return replace(came, time_s=time_s)
+
+
+class EmulatorPipeline(PoseTracking):
+    """Level `keypoints`: the detector's errors on the projected truth."""
+
+    def __init__(
+        self, scene: Scene, batch: int, tracker: Estimator, config: HRCConfig, schedule: Schedule
+    ) -> None:
+        self.cameras = EmulatedCameras(scene, batch, config, schedule)
+        super().__init__(batch, scene, tracker, config, self.cameras)
+
+    def detect(self, ids: Ints, expected: PoseEstimate, sensor_rngs: Generators) -> Keypoints:
+        """What the emulated cameras report of the environments that they were shown."""
+        return self.cameras.keypoints(expected, sensor_rngs)

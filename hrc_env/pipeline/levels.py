@@ -20,7 +20,7 @@ from hrc_env.perception.faults.fault import IMAGE, KINDS
 from hrc_env.perception.faults.schedule import Schedule
 from hrc_env.pipeline.emulated import EmulatorPipeline
 from hrc_env.pipeline.rendered import PixelPipeline
-from hrc_env.pipeline.sensor_input import Generators, SensorInput, with_truth
+from hrc_env.pipeline.sensor_input import Generators, Sensor, TrueState, with_truth
 from hrc_env.pipeline.tracking import PerceptionPipeline
 from hrc_env.scene.build import Scene
 from hrc_env.scene.domain_randomization import AS_BUILT
@@ -81,20 +81,19 @@ def _schedule(scene: Scene, level: str, config: HRCConfig) -> Schedule:
 class Oracle(PerceptionPipeline):
     """Level `truth`: the worker as they are."""
 
-    NEEDS_TRUTH = True
-
     def __init__(self, config: TrackerConfig, prior: PoseEstimate) -> None:
+        self.sensor = TrueState()
         self.config, self.prior = config, prior
 
     def perceive(
-        self, now: SensorInput, sensor_rngs: Generators, tracker_rngs: Generators
+        self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators
     ) -> PoseEstimate:
         """The truth, as an estimate; of who is not there, the prior."""
-        known = with_truth(now)
+        known = with_truth(self.sensor.now)
         seen = oracle.estimate_from_truth(known.truth)
         if known.present.all():
             return seen
-        believed = rows(self.prior, now.ids)
+        believed = rows(self.prior, ids)
         write_rows(believed, known.present, rows(seen, known.present))
         return believed
 
@@ -107,13 +106,13 @@ class NoPerception(PerceptionPipeline):
     """Level `none`: the prior, whatever happens."""
 
     def __init__(self, prior: PoseEstimate) -> None:
-        self.prior = prior
+        self.sensor, self.prior = Sensor(), prior
 
     def perceive(
-        self, now: SensorInput, sensor_rngs: Generators, tracker_rngs: Generators
+        self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators
     ) -> PoseEstimate:
         """The prior."""
-        return rows(self.prior, now.ids)
+        return rows(self.prior, ids)
 
     def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
         """The prior, then as now."""

@@ -1,77 +1,90 @@
 """Level `pixels`: rendered crops through the pose network."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from hrc_env.config import HRCConfig
 from hrc_env.core.batching import copied, one
-from hrc_env.core.records import Keypoints
+from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.typing import Floats, Image, Ints
 from hrc_env.perception.faults.camera_film import CameraFilm, Shot
 from hrc_env.perception.faults.schedule import Recent, Schedule
 from hrc_env.perception.lensed import Lensed
 from hrc_env.pipeline.looking import Looking
-from hrc_env.pipeline.sensor_input import Generators, SensorInput, Windows
+from hrc_env.pipeline.sensor_input import Generators, Sensor, Windows
 from hrc_env.pipeline.tracking import PoseTracking, no_keypoints
 from hrc_env.scene.build import Scene
-from hrc_env.scene.domain_randomization import AS_BUILT, Look, draw_look
+from hrc_env.scene.domain_randomization import AS_BUILT, AppearanceConfig, Look, draw_look
 from hrc_env.scene.render import CropRenderer
 from hrc_env.tracking.estimators import Estimator
+
+
+class RenderedCameras(Sensor):
+    """Cameras whose images are drawn of the scene that they are shown, where somebody looks."""
+
+    CHANGES = ("recent", "worn")
+
+    def __init__(
+        self, scene: Scene, batch: int, appearance: AppearanceConfig, schedule: Schedule
+    ) -> None:
+        self.scene, self.appearance = scene, appearance
+        self.renderer = CropRenderer(scene)
+        self.images = CameraFilm(self.renderer, Lensed(self.renderer, scene.cameras), schedule)
+        """An `ImageSource` of what `show` has made present."""
+        self.recent = Recent(batch, schedule)
+        self.worn: list[Look | None] = [None] * batch
+        """How each environment looks in its episode; None: as it was built."""
+
+    def reset(self, ids: Ints, rngs: Generators) -> None:
+        """Forget images; draw faults and looks of environments `ids`."""
+        self.recent.reset(ids, rngs)
+        if self.appearance != AS_BUILT:
+            for b in ids:
+                self.worn[b] = draw_look(self.appearance, self.scene.n_workers, rngs[b])
+
+    def show(self, b: int) -> Floats:
+        """Make the images present that have come of environment b. (C,) when each was taken [s], by
+        the clock of `Keypoints.time_s`; NaN: there is none."""
+        row, recent = self.now.ids.tolist().index(b), self.recent
+        pose = self.now.q[row].copy(), copied(one(self.now.motion, row))
+        step = recent.begin(b)
+        before = recent.at(b, step - 1)
+        actual = recent.schedule.actual(self.scene.cameras, recent.seeds[b], step)
+        last = pose if before is None else (before.q, before.motion)
+        shots, times_s = recent.arrived(b, Shot(step, *pose, last, actual))
+        self.renderer.randomize(self.worn[b])
+        self.images.show(shots, recent.seeds[b])
+        return times_s
 
 
 class PixelPipeline(PoseTracking):
     """Level `pixels`: rendered crops through the pose network."""
 
-    CHANGES = (*PoseTracking.CHANGES, "looking", "worn")
+    CHANGES = (*PoseTracking.CHANGES, "looking")
 
     def __init__(
         self, scene: Scene, batch: int, tracker: Estimator, config: HRCConfig, schedule: Schedule
     ) -> None:
-        super().__init__(batch, scene, tracker, config, schedule)
-        self.renderer = CropRenderer(scene)
-        self.lensed = Lensed(self.renderer, scene.cameras)
-        film = None if schedule.is_plain else CameraFilm(self.renderer, self.lensed, schedule)
-        self.images = film or self.lensed
-        self.appearance = config.appearance
-        self.worn: list[Look | None] = [None] * batch
-        """How each environment looks in its episode; None: as it was built."""
+        self.cameras = RenderedCameras(scene, batch, config.appearance, schedule)
+        super().__init__(batch, scene, tracker, config, self.cameras)
         self.looking = Looking(batch, scene.cameras, scene.n_workers, config.detector)
 
-    def detect(self, now: SensorInput, predicted: Any, sensor_rngs: Generators) -> Keypoints:
-        """Landmarks of crops round the predicted worker, or of a search where there is none."""
-        seen = no_keypoints(len(now.ids), len(self.scene.cameras), self.scene.n_workers)
-        time_s = np.zeros(seen.px.shape[:2])
-        expected = self.tracker.estimate(predicted)
-        for row, b in enumerate(now.ids.tolist()):
-            self.renderer.randomize(self.worn[b])
-            if self.recent is None:
-                self.renderer.draw(now.q[row], one(now.motion, row))
-            else:
-                time_s[row] = self._take_images(now, row, b, self.recent)
+    def detect(self, ids: Ints, expected: PoseEstimate, sensor_rngs: Generators) -> Keypoints:
+        """Landmarks of crops round the expected workers, or of a search where there are none."""
+        seen = no_keypoints(len(ids), len(self.scene.cameras), self.scene.n_workers)
+        time_s, images = np.zeros(seen.px.shape[:2]), self.cameras.images
+        for row, b in enumerate(ids.tolist()):
+            time_s[row] = self.cameras.show(b)
             has_image = np.isfinite(time_s[row]).tolist()
-            self.looking.look(self.images, one(expected, row), b, has_image, one(seen, row))
-        return replace(seen, time_s=None if self.recent is None else time_s)
-
-    def _take_images(self, now: SensorInput, row: int, b: int, recent: Recent) -> Floats:
-        """Let every camera show what has come of it. (C,) its time; NaN for nothing."""
-        step, pose = recent.begin(b), (now.q[row].copy(), copied(one(now.motion, row)))
-        before = recent.at(b, step - 1)
-        actual = recent.schedule.actual(self.scene.cameras, recent.seeds[b], step)
-        last = pose if before is None else (before.q, before.motion)
-        shots, times_s = recent.arrived(b, Shot(step, *pose, last, actual))
-        if isinstance(self.images, CameraFilm):
-            self.images.show(shots, recent.seeds[b])
-        return times_s
+            self.looking.look(images, one(expected, row), b, has_image, one(seen, row))
+        return replace(seen, time_s=None if images.schedule.is_plain else time_s)
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
         """Forget the tracks, and who was followed."""
         super().reset(ids, sensor_rngs, tracker_rngs)
         for b in ids:
             self.looking.forget(int(b))
-            if self.appearance != AS_BUILT:
-                self.worn[b] = draw_look(self.appearance, self.scene.n_workers, sensor_rngs[b])
 
     def last_detections(self, b: int) -> tuple[Keypoints | None, Windows]:
         """The keypoints of environment `b` and the windows they were found in."""
@@ -83,9 +96,9 @@ class PixelPipeline(PoseTracking):
 
     def look_of(self, b: int) -> Look | None:
         """How environment b looks in its episode."""
-        return self.worn[b]
+        return self.cameras.worn[b]
 
     def close(self) -> None:
         """Stop the detector's thread and free the graphics context."""
         self.looking.detector.close()
-        self.renderer.close()
+        self.cameras.renderer.close()

@@ -10,10 +10,9 @@ from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Bools, Floats, Image, Ints
 from hrc_env.geometry.cameras import projections
-from hrc_env.perception.faults.schedule import Recent, Schedule
 from hrc_env.perception.lensed import pinhole_keypoints
 from hrc_env.perception.noise import our_joints
-from hrc_env.pipeline.sensor_input import Generators, SensorInput, Windows
+from hrc_env.pipeline.sensor_input import Generators, Sensor, Windows
 from hrc_env.scene.build import Scene
 from hrc_env.scene.domain_randomization import Look
 from hrc_env.tracking.calibration_monitor import forget_monitor, make_monitor, monitor
@@ -25,16 +24,16 @@ from hrc_env.tracking.people.association import associate
 class PerceptionPipeline(Stateful):
     """One perception level with its estimator, for a batch; here, without cameras and memory."""
 
-    NEEDS_TRUTH: bool = False
-    """Whether `perceive` is to be given a `TrueSensorInput`."""
+    sensor: Sensor
+    """To be shown the scene (`Sensor.expose`) before `perceive`, which is not."""
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
         """Forget environments `ids`; there is a generator for each environment of the batch."""
 
     def perceive(
-        self, now: SensorInput, sensor_rngs: Generators, tracker_rngs: Generators
+        self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators
     ) -> PoseEstimate:
-        """Look at `now`; what is believed of it, in its rows."""
+        """What is believed of environments `ids` after what the sensor measures of them."""
         raise NotImplementedError
 
     def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
@@ -64,17 +63,17 @@ class PerceptionPipeline(Stateful):
 class PoseTracking(PerceptionPipeline):
     """What the levels with cameras share: predict, get keypoints, update."""
 
-    CHANGES = ("state", "keypoints", "recent", "frozen", "monitored")
+    CHANGES = ("state", "keypoints", "sensor", "steps", "frozen", "monitored")
 
     def __init__(
-        self, batch: int, scene: Scene, tracker: Estimator, config: HRCConfig, schedule: Schedule
+        self, batch: int, scene: Scene, tracker: Estimator, config: HRCConfig, sensor: Sensor
     ) -> None:
         self.scene, self.tracker, self.dt_s = scene, tracker, config.ctrl_dt
+        self.sensor, self.steps = sensor, np.zeros(batch, int)
         self.association = config.association
         self.P = projections(scene.cameras)
         self.state: Any = tracker.init(batch, scene.n_workers)
         self.keypoints = no_keypoints(batch, len(scene.cameras), scene.n_workers)
-        self.recent = None if schedule.is_plain else Recent(batch, schedule)
         self.frozen = make_frozen(batch, len(scene.cameras))
         self.monitored = make_monitor(batch, len(scene.cameras))
         self.axes = np.array([(*camera.K[:2, 2], camera.K[0, 0]) for camera in scene.cameras])
@@ -84,30 +83,32 @@ class PoseTracking(PerceptionPipeline):
         """Forget the tracks of environments `ids`, and what their cameras gave."""
         self.tracker.reset(self.state, ids, tracker_rngs)
         forget_monitor(self.monitored, ids)
-        if self.recent is not None:
-            self.recent.reset(ids, sensor_rngs)
-            forget_frozen(self.frozen, ids)
+        forget_frozen(self.frozen, ids)
+        self.sensor.reset(ids, sensor_rngs)
+        self.steps[ids] = 0
 
     def perceive(
-        self, now: SensorInput, sensor_rngs: Generators, tracker_rngs: Generators
+        self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators
     ) -> PoseEstimate:
         """Predict the workers, look at them where they should be, and update."""
-        whole = len(now.ids) == len(self.keypoints.px)
-        state = self.state if whole else rows(self.state, now.ids)
+        whole = len(ids) == len(self.keypoints.px)
+        state = self.state if whole else rows(self.state, ids)
         self.tracker.predict(state, self.dt_s, tracker_rngs)
-        found = pinhole_keypoints(self.detect(now, state, sensor_rngs), self.scene.cameras)
-        if self.recent is not None:
-            leave_out_frozen(self.frozen, now.ids, found)
-        keypoints = self._sorted(found, state)
+        expected = self.tracker.estimate(state)
+        found = pinhole_keypoints(self.detect(ids, expected, sensor_rngs), self.scene.cameras)
+        self.steps[ids] += 1
+        if found.time_s is not None:
+            leave_out_frozen(self.frozen, ids, found)
+        keypoints = self._sorted(found, expected)
         self.tracker.update(state, keypoints, tracker_rngs)
         if whole:
             self.keypoints = keypoints
         else:
-            write_rows(self.keypoints, now.ids, keypoints)
-            write_rows(self.state, now.ids, state)
+            write_rows(self.keypoints, ids, keypoints)
+            write_rows(self.state, ids, state)
         estimate = self.tracker.estimate(state)
-        age_s = self._age_s(now.ids, keypoints)
-        monitor(self.monitored, now.ids, keypoints, age_s, estimate, self.P, self.axes)
+        age_s = self._age_s(ids, keypoints)
+        monitor(self.monitored, ids, keypoints, age_s, estimate, self.P, self.axes)
         return our_joints(estimate)
 
     def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
@@ -116,16 +117,15 @@ class PoseTracking(PerceptionPipeline):
         state = self.state if whole else rows(self.state, ids)
         return our_joints(self.tracker.forecast(state, horizon_s))
 
-    def detect(self, now: SensorInput, predicted: Any, sensor_rngs: Generators) -> Keypoints:
-        """Keypoints of `now` in pixels of the images, by the level's detector; whose they are is
-        open. `predicted` is the tracker's state before the measurement."""
+    def detect(self, ids: Ints, expected: PoseEstimate, sensor_rngs: Generators) -> Keypoints:
+        """Keypoints of environments `ids` in pixels of the images, by the level's detector; whose
+        they are is open. `expected` is what the tracker predicts before the measurement."""
         raise NotImplementedError
 
-    def _sorted(self, keypoints: Keypoints, predicted: Any) -> Keypoints:
+    def _sorted(self, keypoints: Keypoints, expected: PoseEstimate) -> Keypoints:
         """Keypoints by worker; where there is one worker, whatever was found is theirs."""
         if self.scene.n_workers < 2:
             return keypoints
-        expected = self.tracker.estimate(predicted)
         return associate(self.P, keypoints, expected, self.association).keypoints
 
     def suspected(self, ids: Ints) -> Bools:
@@ -134,9 +134,9 @@ class PoseTracking(PerceptionPipeline):
 
     def _age_s(self, ids: Ints, keypoints: Keypoints) -> Floats:
         """(B, C) how old the images of this update are, as they say [s]; NaN: none."""
-        if self.recent is None or keypoints.time_s is None:
+        if keypoints.time_s is None:
             return np.zeros(keypoints.px.shape[:2])
-        return (self.recent.steps[ids, None] + 1) * self.dt_s - keypoints.time_s
+        return self.steps[ids, None] * self.dt_s - keypoints.time_s
 
     def last_detections(self, b: int) -> tuple[Keypoints | None, Windows]:
         """The keypoints of environment `b`."""

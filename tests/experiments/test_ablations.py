@@ -73,6 +73,9 @@ def test_every_number_of_every_setting_is_there_and_finite(end_to_end):
             key = f"{study.name}.{setting.name}"
             assert f"error_m.{key}.median" in metrics
             assert f"error_m.{key}.p95" in metrics
+            is_compared = study.reference(setting) not in ("", setting.name)
+            assert (f"difference.error_m.{key}.median" in metrics) == is_compared
+            assert (f"p.error_m.{key}.p95" in metrics) == is_compared
             assert {f"{what}.{key}" for what in ("rmse_m", "coverage95", "lost")} <= metrics.keys()
             assert (f"update_us.{key}" in metrics) == setting.is_timed
     for name, metric in metrics.items():
@@ -85,6 +88,21 @@ def test_names_are_said_once_and_have_no_dots():
         names = [setting.name for setting in study.settings]
         assert len(set(names)) == len(names)
         assert not any("." in name for name in names)
+
+
+def test_settings_are_compared_with_what_was_changed_in_them():
+    found = {
+        (study.name, setting.name): study.reference(setting)
+        for study in ABLATIONS.values()
+        for setting in study.settings
+    }
+    assert found["cameras", "n1"] == found["cameras", "low"] == "corners"
+    assert found["cameras", "site_one"] == "site_four"
+    assert found["calibration", "site_all_rotation_1deg"] == "site_as_told"
+    assert found["filter", "4cam_no_outliers"] == "4cam_all"
+    assert found["filter", "1cam_no_floor"] == "1cam_all"
+    assert found["kinematics", "2cam_none"] == "2cam_learnt"
+    assert found["workers", "lab_2"] == ""
 
 
 def test_report_and_figures_are_written_and_the_progress_is_complete(end_to_end):

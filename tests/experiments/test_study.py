@@ -11,6 +11,7 @@ from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.core.results import Metric, write_results, write_whole
 from hrc_env.experiments.study import intervals, report, runner
 from hrc_env.experiments.study.cache import PartCache, own_folder, owner_of
+from hrc_env.experiments.study.counts import ERRORS_M
 
 
 @dataclass(frozen=True)
@@ -112,6 +113,46 @@ def test_a_quantile_draws_whole_seeds():
     same = [[1.0, 2.0, 3.0]] * 5
     found = intervals.quantile_over(same, 0.5, "m")
     assert (found.value, found.low, found.high) == (2.0, 2.0, 2.0)
+
+
+def test_pairs_tell_a_difference_that_strangers_do_not():
+    rng = np.random.default_rng(1)
+    walks = rng.uniform(1, 9, 20)
+    ours, theirs = walks, walks + rng.uniform(0.0, 0.4, 20)
+    mean = intervals.ratio_of([*ours, *theirs], np.ones(40))
+    found = intervals.paired("head", mean, 20, "m")
+    assert found["difference.head"].value == pytest.approx((ours - theirs).mean())
+    assert found["difference.head"].high < 0
+    assert found["p.head"].value < 0.001
+    assert intervals.mean_over(ours, "m").low < intervals.mean_over(theirs, "m").value
+
+
+def test_the_test_of_pairs_is_wrong_as_often_as_it_says():
+    rng = np.random.default_rng(2)
+    p = []
+    for _ in range(200):
+        squares = rng.exponential(1.0, 24)
+        rmse = intervals.rmse_of(squares, np.ones(24))
+        p.append(intervals.paired("x", rmse, 12, "m", 400)["p.x"].value)
+    assert 0.02 <= np.mean(np.array(p) <= 0.05) <= 0.09
+    assert 0.4 <= np.mean(np.array(p) <= 0.5) <= 0.6
+
+
+@pytest.mark.parametrize("of", ["ratio", "rmse", "quantile", "counted"])
+def test_a_row_does_not_differ_from_itself(of):
+    values = np.random.default_rng(3).uniform(0.1, 2.0, (8, 5))
+    both = [*values, *values]
+    statistic = {
+        "ratio": lambda: intervals.ratio_of(np.sum(both, 1), np.full(16, 5)),
+        "rmse": lambda: intervals.rmse_of(np.sum(both, 1), np.full(16, 5)),
+        "quantile": lambda: intervals.quantile_of(both, 0.5),
+        "counted": lambda: intervals.counted_quantile_of(ERRORS_M, ERRORS_M.count(np.array(both)),
+                                                         0.5),
+    }[of]()  # fmt: skip
+    found = intervals.paired("x", statistic, 8, "m", 200)
+    off = found["difference.x"]
+    assert (off.value, off.low, off.high) == (0.0, 0.0, 0.0)
+    assert found["p.x"].value == 1.0
 
 
 def test_a_report_holds_its_pictures_its_origin_and_all_numbers(tmp_path):

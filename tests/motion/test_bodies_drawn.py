@@ -66,9 +66,9 @@ def test_one_name_is_the_same_however_it_is_written():
 def test_the_truth_has_the_measures_of_the_body():
     env = made()
     names = env.reset(seed=1)[1][BODY]
-    pipeline, looks = env.simulation.pipeline, []
-    sense = pipeline.perceive
-    pipeline.perceive = lambda now, *rngs: looks.append(now.truth) or sense(now, *rngs)
+    sensor, looks = env.simulation.pipeline.sensor, []
+    expose = sensor.expose
+    sensor.expose = lambda now: looks.append(now.truth) or expose(now)
     env.step(PUSH)
     truth = one(looks[0], 0)
     for w, body in enumerate(map(load_body, names)):

@@ -108,7 +108,7 @@ def test_crops_are_what_the_network_was_given(weights):
     assert sum(crop is not None for crop in given) >= 2
     for crop, window, c in zip(given, windows, range(4), strict=True):
         if crop is not None and window is not None:
-            again = env.simulation.pipeline.lensed.crop(c, window)
+            again = env.simulation.pipeline.cameras.images.crop(c, window)
             assert np.abs(crop.astype(int) - again).max(-1).mean() < 30  # black outside the image
     pictures = env.views.crops(64)
     assert [picture.shape for picture in pictures] == [(64, 64, 3)] * 4

@@ -56,3 +56,12 @@ class Ablation:
     settings: tuple[Setting, ...]
     also: Mapping[str, str] = field(default_factory=dict)
     """What is sorted out of the settings' joints, and its words."""
+    against: tuple[str, ...] = ()
+    """Settings with which others of their scene are compared: each with the last before it."""
+
+    def reference(self, setting: Setting) -> str:
+        """What a setting is compared with, walk by walk; "" if with nothing."""
+        alike = [each for each in self.settings if each.scene == setting.scene]
+        known = [k for k, each in enumerate(alike) if each.name in self.against]
+        before = [k for k in known if k <= alike.index(setting)]
+        return alike[(before[-1:] or known)[0]].name if known else ""

@@ -14,11 +14,17 @@ from hrc_env.experiments.ablations.play import Sums, play, update_us, walks_of
 from hrc_env.experiments.ablations.questions.faults import CALIBRATION, LATENCY
 from hrc_env.experiments.ablations.questions.filters import ALGORITHM_1, FILTER, KINEMATICS
 from hrc_env.experiments.ablations.questions.rigs import CAMERAS, OCCLUSION, WORKERS
-from hrc_env.experiments.ablations.report import report
+from hrc_env.experiments.ablations.report import QUANTILES, report
 from hrc_env.experiments.study.cache import PartCache, PartProgress
 from hrc_env.experiments.study.counts import ERRORS_M
 from hrc_env.experiments.study.fingerprint import fingerprint_of
-from hrc_env.experiments.study.intervals import counted_quantile_over, ratio_over, rmse_over
+from hrc_env.experiments.study.intervals import (
+    counted_quantile_of,
+    counted_quantile_over,
+    paired,
+    ratio_over,
+    rmse_over,
+)
 from hrc_env.experiments.study.rigs import DT_S, N_WARM_UP, WARM_UP_S
 from hrc_env.experiments.study.runner import Study, at_least_one, changed
 
@@ -123,16 +129,31 @@ def metrics_of(played: Played) -> dict[str, Metric]:
             metrics[f"lost.{key}"] = ratio_over(sums["lost"], sums["frames"], "share")
             if "update_us" in sums:
                 metrics[f"update_us.{key}"] = over(sums["update_us"], "us")
+        for each in ABLATIONS[name].settings:
+            pair = each.name, ABLATIONS[name].reference(each)
+            if pair[0] != pair[1] and set(pair) <= of_settings.keys():
+                metrics |= _differences(f"{name}.{each.name}", *(of_settings[k] for k in pair))
         for seen, sums in _by_sight(of_settings).items():
             metrics |= _of_joints(f"{name}.{seen}", sums)
     return metrics
 
 
+def _differences(key: str, ours: Sums, theirs: Sums) -> dict[str, Metric]:
+    """Errors less those of another setting on the same walks."""
+    found: dict[str, Metric] = {}
+    for word, (*_, q) in QUANTILES.items():
+        both = counted_quantile_of(ERRORS_M, [*ours["errors"], *theirs["errors"]], q)
+        found |= paired(f"error_m.{key}.{word}", both, len(ours["errors"]), "m", 1000)
+    return found
+
+
 def _of_joints(key: str, sums: Mapping[str, Any]) -> dict[str, Metric]:
     """Errors of joints and how well they are reported."""
-    return {
-        f"error_m.{key}.median": counted_quantile_over(ERRORS_M, sums["errors"], 0.5, "m"),
-        f"error_m.{key}.p95": counted_quantile_over(ERRORS_M, sums["errors"], 0.95, "m"),
+    quantiles = {
+        f"error_m.{key}.{word}": counted_quantile_over(ERRORS_M, sums["errors"], q, "m")
+        for word, (*_, q) in QUANTILES.items()
+    }
+    return quantiles | {
         f"rmse_m.{key}": rmse_over(sums["squares"], sums["joints"], "m"),
         f"coverage95.{key}": ratio_over(sums["inside"], sums["joints"], "share"),
     }

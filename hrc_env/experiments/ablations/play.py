@@ -151,7 +151,8 @@ def watch(
         truth = worker_truth(walks.bodies, motion)
         handicap(pipeline.state, setting.bones, setting.motion, lengths)
         now = TrueSensorInput(everyone, walks.q[ids], motion, truth, present)
-        yield pipeline.perceive(now, *rngs), now, pipeline.keypoints
+        pipeline.sensor.expose(now)
+        yield pipeline.perceive(everyone, *rngs), now, pipeline.keypoints
     pipeline.close()
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from hrc_env.experiments.lab.motions import MOTIONS, play
 from hrc_env.experiments.lab.report import ALL, COLUMNS, ESTIMATORS, WARM_UP, report
 from hrc_env.experiments.lab.sides import MISSED_SHARE, away_from_cameras, missed_by_camera
 from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.intervals import quantile_over, ratio_over
+from hrc_env.experiments.study.intervals import paired, quantile_of, quantile_over, ratio_over
 from hrc_env.experiments.study.recording import Recording, record, replay
 from hrc_env.experiments.study.rigs import MULTI, SINGLE
 from hrc_env.experiments.study.runner import Study, at_least_one, changed
@@ -132,6 +133,10 @@ def metrics_of(played: Films) -> dict[str, Metric]:
         for j, joint in enumerate(JOINTS):
             found = quantile_over([each[:, j] for each in errors], 0.5, "m")
             metrics[f"error_m.by_joint.{column}.{joint}.median"] = found
+        for other, (word, q) in product(ESTIMATORS[1:], QUANTILES.items()):
+            theirs = [_errors_m(each, f"{other}.{column}") for each in played.values()]
+            both = quantile_of([each.ravel() for each in (*errors, *theirs)], q)
+            metrics |= paired(f"error_m.{other}.{column}.{word}", both, len(errors), "m", 400)
     return metrics
 
 

@@ -61,8 +61,8 @@ def record(
     with closing(pipeline):
         pipeline.reset(ids, *rngs)
         for frame in range(len(truth.joints_world)):
-            now = SensorInput(ids, q, rows(motions, np.array([frame])))
-            said.append(rows(pipeline.perceive(now, *rngs), ids))
+            pipeline.sensor.expose(SensorInput(ids, q, rows(motions, np.array([frame]))))
+            said.append(rows(pipeline.perceive(ids, *rngs), ids))
             seen, looked = pipeline.last_detections(0)
             if seen is not None:
                 keypoints.append(rows(replace(seen, time_s=None), ids))

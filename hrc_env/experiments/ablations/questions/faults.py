@@ -28,6 +28,7 @@ LATENCY = Ablation(
             for ms in LATE_MS
         ),
     ),
+    against=("on_time",),
 )
 
 KINDS = {
@@ -68,4 +69,5 @@ CALIBRATION = Ablation(
         Setting("site_as_told", "site, as told", "site"),
         *(_wrong(which, "rotation", amount, "site") for which in WHOSE for amount in (0.3, 1)),
     ),
+    against=("as_told", "site_as_told"),
 )

@@ -26,6 +26,7 @@ ALGORITHM_1 = Ablation(
         *(_paper(f"sigma_{cm}cm", 1, 1000, cm) for cm in (1, 2, 10)),
         Setting("particle", "the default filter", is_timed=True),
     ),
+    against=("particle",),
 )
 
 WITHOUT: dict[str, tuple[str, dict[str, Any]]] = {
@@ -90,11 +91,12 @@ FILTER = Ablation(
         *(_part("4cam", name) for name in WITHOUT if name not in OF_ONE_VIEW),
         *(_part("1cam", name) for name in WITHOUT),
     ),
+    against=("4cam_all", "1cam_all"),
 )
 
 KNOWING = {
-    "known": ("bone lengths known", "particle", "known"),
     "learnt": ("bone lengths learnt (the default)", "particle", "learnt"),
+    "known": ("bone lengths known", "particle", "known"),
     "none": ("bones of any length", "particle", "none"),
     "points": ("points without a body (ransac)", "ransac", "learnt"),
 }
@@ -116,4 +118,5 @@ KINEMATICS = Ablation(
         for cameras, (spoken, rigs) in CAMERAS.items()
         for name, (words, estimator, bones) in KNOWING.items()
     ),
+    against=tuple(f"{cameras}_learnt" for cameras in CAMERAS),
 )

@@ -94,6 +94,7 @@ CAMERAS = Ablation(
             )
         ),
     ),
+    against=("corners", "site_four"),
 )
 
 SCENES = {"lab": "laboratory", "site": "site"}
@@ -129,6 +130,7 @@ OCCLUSION = Ablation(
         for scene in SCENES
         for n in range(5)
     },
+    against=("lab_lost_0", "site_lost_0"),
 )
 
 WORKERS = Ablation(
