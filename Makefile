@@ -4,6 +4,7 @@
 # make test-stock   all of it in a fresh environment with the packages that everybody gets
 # make test-long    what a release needs: that, and what takes longest
 # make train-quick  a policy
+# make results      all numbers and pictures of the documentation that are older than the code (hours)
 # make check        style, types, floors
 PYTHON ?= python3
 VENV ?= .venv
@@ -15,7 +16,7 @@ TRAIN := $(VENV)/.train
 DEV := $(VENV)/.dev
 PYTEST := $(RUN) -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
-.PHONY: demo test test-all test-stock test-long check bench train-quick clean
+.PHONY: demo test test-all test-stock test-long check bench train-quick results clean
 .DEFAULT_GOAL := demo
 
 $(CORE): NEEDED := .
@@ -67,6 +68,10 @@ bench: $(DEV)
 
 train-quick: $(TRAIN)
 	$(RUN) train.py
+
+results: $(TRAIN)
+	$(RUN) -m hrc_env setup --networks heavy
+	$(RUN) -m benchmarks.results
 
 clean:
 	rm -rf $(VENV) out

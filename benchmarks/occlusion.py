@@ -1,41 +1,58 @@
-"""How often a scene hides a walking worker's head from its cameras.
-
-    python benchmarks/occlusion.py --scene site
+"""How often a scene hides a walking worker's head from its cameras: python -m benchmarks.occlusion
 
 Heads stand at random in the walkable area, 1.60 to 1.75 m high, half a body clear of what stands
 there and of the robot. What hides: the scene's solid things and the robot at rest, as the emulator
-has it; not the workers themselves. The paper's site hides a head from at least one of four cameras
-in 30 % of frames, from two or more in 10 %.
+has it; not the workers themselves.
 """
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
 
 import numpy as np
 import tyro
 
+from benchmarks.common import keys, publish, share
 from hrc_env.core.records import Grounds
+from hrc_env.core.results import Metric
 from hrc_env.core.typing import Bools, Floats
+from hrc_env.experiments.study.report import Column, Report, table_of
 from hrc_env.geometry.sight import hidden
-from hrc_env.scene.build import Scene, build
+from hrc_env.scene.build import SCENES, Scene, build
 
 HEAD_M, BODY_M = (1.60, 1.75), 0.25
 """Heights of the heads' middles; half a person [m]."""
 
 
-def main(scene: str = "site", n_heads: int = 20000, seed: int = 0) -> None:
-    """Print the shares of random heads that are hidden from 1, 2, ... cameras.
+@dataclass(frozen=True)
+class Arguments:
+    """Count heads that cameras do not see."""
 
-    Args:
-        scene: which scene.
-        n_heads: how many places are tried.
-        seed: of the places.
-    """
-    place = build(name=scene)
-    heads = random_heads(place.grounds, n_heads, np.random.default_rng(seed))
-    blind = hidden_from(place, heads)
-    print(f"scene {scene}, seed {seed}: {len(heads)} heads that fit")
-    for camera, share in zip(place.cameras, blind.mean(1), strict=True):
-        print(f"hidden from {camera.name}: {100 * share:5.1f} %")
-    for n in range(1, len(blind) + 1):
-        print(f"hidden from {n} or more: {100 * (blind.sum(0) >= n).mean():5.1f} %")
+    out: Path = Path("out/occlusion")
+    """Folder for results.json and a report."""
+    quick: bool = False
+    """500 heads."""
+    n_heads: int = 20000
+    """How many places are tried in each scene."""
+    seed: int = 0
+    """Of the places."""
+
+
+def main(arguments: Arguments) -> None:
+    """Count, write, show."""
+    metrics: dict[str, Metric] = {}
+    n_heads = 500 if arguments.quick else arguments.n_heads
+    for scene in SCENES:
+        place = build(name=scene)
+        heads = random_heads(place.grounds, n_heads, np.random.default_rng(arguments.seed))
+        blind = hidden_from(place, heads)
+        for camera, unseen in zip(place.cameras, blind, strict=True):
+            metrics[f"hidden.{scene}.{camera.name}"] = share(unseen.tolist())
+        for n in range(1, len(blind) + 1):
+            metrics[f"hidden.{scene}.{n}"] = share((blind.sum(0) >= n).tolist())
+    rows = {name: name.replace(".", ", ") for name in keys(metrics, "hidden.")}
+    parts = [table_of("hidden from", rows, [Column("hidden.{}", "heads [%]", 1, 100)], metrics)]
+    report = Report("Hidden heads", (__doc__ or "").strip(), parts, "95 % intervals over heads")
+    publish(arguments.out, report, asdict(arguments), [arguments.seed], metrics)
 
 
 def random_heads(grounds: Grounds, n: int, rng: np.random.Generator) -> Floats:
@@ -58,4 +75,4 @@ def hidden_from(scene: Scene, heads: Floats) -> Bools:
 
 
 if __name__ == "__main__":
-    tyro.cli(main)
+    main(tyro.cli(Arguments, description=__doc__))

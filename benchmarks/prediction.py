@@ -5,7 +5,8 @@
 "env" is the environment's worker at the level `keypoints` (seeds that the network was not trained
 on), "env_failing" the same while cameras fail, "walkers" and "walkers_hard" the tracking bench's,
 of whom nothing here was told. All start from the same estimate, of `kalman`: `hold` stays there,
-`constant_velocity` goes on, `forecast` is what `Estimator.forecast` gives.
+`constant_velocity` goes on, `motion_model` is the filter's own prediction, `forecast` is what
+`Estimator.forecast` gives.
 """
 
 import time
@@ -20,6 +21,7 @@ import tyro
 from benchmarks.common import CHI2_95_3D, cell, exactly, normalised_square, publish
 from benchmarks.tracking.rigs import DT_S
 from benchmarks.tracking.tracks import Tracks, follow_env, follow_walkers
+from hrc_env.core.batching import copied
 from hrc_env.core.records import PoseEstimate
 from hrc_env.core.results import Metric
 from hrc_env.experiments.study.intervals import mean_over, ratio_over, rmse_over
@@ -30,7 +32,7 @@ from hrc_env.tracking.forecast import forecast
 HORIZONS_S = (0.1, 0.2, 0.4, 0.6, 1.0)
 FIELDS = ("mean_world", "cov_world", "velocity_world", "age_s", "tracked")
 WARM_UP, EVERY = 25, 2
-NAMES = ("hold", "constant_velocity", "forecast")
+NAMES = ("hold", "constant_velocity", "motion_model", "forecast")
 
 
 @dataclass(frozen=True)
@@ -50,15 +52,18 @@ class Forecasts:
         self.frame = 0
 
     def __call__(self, estimator: Any, state: Any) -> Any:
-        """(S, J, 3) and (S, J, 3, 3) by horizon, in float32; None between."""
+        """Forecasts (S, J, 3) and (S, J, 3, 3), and what the motion model says (S, J, 3), by
+        horizon, in float32; None between."""
         self.frame += 1
         if self.frame % EVERY:
             return None
-        later = (estimator.forecast(state, horizon_s) for horizon_s in HORIZONS_S)
-        return [
-            [part[:, 0].astype(np.float32) for part in (each.mean_world, each.cov_world)]
-            for each in later
-        ]
+        found = []
+        for horizon_s in HORIZONS_S:
+            later, moved = estimator.forecast(state, horizon_s), copied(state)
+            estimator.predict(moved, horizon_s, [])
+            parts = later.mean_world, later.cov_world, estimator.estimate(moved).mean_world
+            found.append([part[:, 0].astype(np.float32) for part in parts])
+        return found
 
 
 def sources(quick: bool) -> dict[str, Callable[[], Tracks]]:
@@ -87,9 +92,11 @@ def metrics_of(source: str, tracks: Tracks) -> dict[str, Metric]:
         use = np.stack([each.tracked[:, 0] for each in now])
         place = np.stack([each.mean_world[:, 0] for each in now])
         speed = np.stack([each.velocity_world[:, 0] for each in now])
-        mean, cov = (np.stack([tracks.looks[t][k][i] for t in frames], dtype=float) for i in (0, 1))
-        means = {"hold": place, "constant_velocity": place + horizon_s * speed, "forecast": mean}
-        for name, guess in means.items():
+        mean, cov, moved = (
+            np.stack([tracks.looks[t][k][i] for t in frames], dtype=float) for i in range(3)
+        )
+        means = place, place + horizon_s * speed, moved, mean
+        for name, guess in zip(NAMES, means, strict=True):
             key = f"{source}.{horizon_s:g}.{name}"
             error = np.where(use[..., None, None], guess - then, np.nan)
             squared = (error**2).sum(-1)

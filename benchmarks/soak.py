@@ -31,8 +31,8 @@ READINGS = 40
 """How often a run reads the memory."""
 NAMES = (ACTIVITY, BODY, MISCALIBRATED)
 """The infos that are no numbers."""
-NOT_WHEN_LOST = "tracking/mpjpe_m"
-"""The one info that a step may lack: nobody is tracked, so nobody is wrong."""
+NOT_WHEN_LOST, NOT_BEFORE_A_MATCH = "tracking/mpjpe_m", "tracking/mpjpe_by_identity_m"
+"""What a step may lack: nobody is tracked, so nobody is wrong; no track was ever near a worker."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +47,8 @@ class Arguments:
     """Environments that step together."""
     threads: int | None = None
     """Threads; all cores by default."""
+    workers: int = 1
+    """In each of them."""
     perception: str = "keypoints"
     """keypoints, truth or none."""
     episodes: int = 1000
@@ -61,6 +63,10 @@ class Notes:
     """Steps taken and resident memory [MiB]."""
     nans: int = 0
     episodes: int = 0
+    switches: int = 0
+    """Of workers from one track to another, in whole episodes."""
+    idf1: list[float] = field(default_factory=list)
+    """An episode."""
     seconds: float = 0.0
 
     def warm(self) -> list[float]:
@@ -91,7 +97,9 @@ def single(n_episodes: int) -> int:
 def vector(arguments: Arguments) -> Notes:
     """Step the vector environment."""
     n_envs, level = arguments.num_envs, arguments.perception
-    env = HRCVectorEnv(n_envs, perception=level, num_threads=arguments.threads)
+    env = HRCVectorEnv(
+        n_envs, perception=level, n_workers=arguments.workers, num_threads=arguments.threads
+    )
     rng, notes = np.random.default_rng(0), Notes()
     n_calls = max(arguments.steps // n_envs, 1)
     every = max(n_calls // READINGS, 1)
@@ -103,6 +111,9 @@ def vector(arguments: Arguments) -> Notes:
         notes.nans += not_numbers(observation) + not_numbers(reward) + lacking(infos, ~ended)
         ended = terminated | truncated
         notes.episodes += int(ended.sum())
+        if ended.any() and arguments.workers > 1:
+            notes.switches += int(infos["tracking/id_switches"][ended].sum())
+            notes.idf1 += infos["tracking/idf1"][ended].tolist()
         if call % every == 0 or call == n_calls:
             notes.resident.append((call * n_envs, resident_mib()))
     notes.seconds = time.monotonic() - started_s
@@ -123,7 +134,7 @@ def lacking(infos: Mapping[str, Any], stepped: np.ndarray) -> int:
             known = infos[f"_{name}"]
             count += not_numbers(infos[name][known].astype(float))
             wanted = stepped & (infos["tracking/lost"] == 0) if name == NOT_WHEN_LOST else stepped
-            count += int((wanted & ~known).sum())
+            count += int((wanted & ~known).sum()) if name != NOT_BEFORE_A_MATCH else 0
     return count
 
 
@@ -148,6 +159,9 @@ def main(arguments: Arguments) -> None:
         "peak_memory": exactly(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, "MiB"),
         "env_steps_per_s": exactly(steps / notes.seconds, "1/s"),
     }
+    if notes.idf1:
+        metrics["id_switches"] = exactly(notes.switches / notes.episodes, "1/episode")
+        metrics["idf1"] = exactly(float(np.mean(notes.idf1)), "share", len(notes.idf1))
     for name, metric in metrics.items():
         Console().print(f"{name}: {metric.value:,.4g} {metric.unit}")
     config = {**asdict(arguments), "out": str(arguments.out), "readings": notes.resident}

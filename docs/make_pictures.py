@@ -1,17 +1,18 @@
-"""Make the pictures of README and docs: python docs/make_pictures.py
+"""Make the pictures of README and docs: python -m docs.make_pictures
 
 loop.jpg      the still of `python -m hrc_env demo`
 room.jpg      the lab from beside and from outside
 site.jpg      the construction site
+site_work.jpg  people at work on it
 workers.jpg   three workers of different bodies on it
 faults.jpg    what faults do to an image
 appearance.jpg  both scenes as they were built, and in five looks
 cameras.jpg   the laboratory through a pinhole and through the paper's GoPro
 clip.jpg      a film strip of a walk that was written to a BVH file and imported
-learning.png  the curves of `python benchmarks/learning.py`, if out/learning is there
+
+Those with measurements in them come from the studies of `benchmarks/results.py`.
 """
 
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -20,6 +21,7 @@ import cv2
 import imageio.v2 as imageio
 import numpy as np
 
+from benchmarks.gallery.still import views
 from hrc_env.core.batching import copied
 from hrc_env.core.records import Roi
 from hrc_env.env import HRCEnv
@@ -32,6 +34,7 @@ from hrc_env.perception.windows import window_from_joints
 from hrc_env.render.overlay import label, middle_rows, shrink, tile
 from hrc_env.scene.domain_randomization import VARIED, draw_look
 from hrc_env.scene.render import CropRenderer, PictureRenderer
+from hrc_env.worker.body import worker_names
 
 PICTURES = Path(__file__).parent / "pictures"
 JPEG_QUALITY = 88
@@ -154,6 +157,12 @@ def site() -> None:
     env.close()
 
 
+def site_work() -> None:
+    """A view of the gallery."""
+    picture = next(iter(views("site", worker_names()[1]).values()))
+    save(shrink(picture, 1280, 720), "site_work.jpg")
+
+
 def workers() -> None:
     """Three workers of different bodies, near the robot on the site."""
     env = HRCEnv(perception="truth", scene="site", n_workers=3, config={"worker": "any"})
@@ -173,10 +182,9 @@ if __name__ == "__main__":
     loop()
     room()
     site()
+    site_work()
     workers()
     cameras()
     faults()
     appearance()
     clip()
-    if Path("out/learning/figures/curves.png").exists():
-        shutil.copy("out/learning/figures/curves.png", PICTURES / "learning.png")

@@ -32,6 +32,18 @@ INFOS = {
         "m", "mean joint error of the estimate; absent where nobody is tracked. Tracks are "
         "compared with the workers whom they fit best",
     ),
+    "tracking/mpjpe_by_identity_m": (
+        "m", "mean joint error of workers from the tracks that they were matched with last, "
+        "wherever these are now. A match lasts while it is within 0.5 m (CLEAR MOT)",
+    ),
+    "tracking/id_switches": (
+        "-", "how often in this episode so far a worker was matched with another slot of the "
+        "observation than the time before; two who are exchanged are two",
+    ),
+    "tracking/idf1": (
+        "0 to 1", "IDF1 of the episode so far: 2 m / n, m steps in which a worker and a track were "
+        "within 0.5 m, each worker with one slot all along, n steps of workers and of tracks",
+    ),
     "tracking/lost": ("0 or 1", "a worker is there who is not tracked"),
     "task/goals_reached": ("-", "goals of this episode reached so far"),
     "task/goals_missed": ("-", "goals of this episode that ran out of time"),
@@ -74,7 +86,9 @@ axes, 1 is {tool} m/s (`control="tool"`). The change of a command is limited. 25
 `Box({size},)` float32 for one worker, flat and finite. An entry is the value in its unit,
 clipped to the bound, divided by the scale; `env.unwrapped.split_observation` inverts this.
 Everything about a worker is the *estimate*. With `config={{"forecast_s": (0.2, 0.4)}}` it also
-holds the [forecast](../tracking.md#forecast) of each joint, worker by worker, horizon by horizon.
+holds the [forecast](../tracking.md#forecast) of each joint, worker by worker, horizon by horizon;
+with `config={{"uncertainty": ("towards_robot", "factor")}}` more of the covariance than its root
+mean, which hides the depth that one camera does not know.
 
 {observations}
 

@@ -1,15 +1,28 @@
-"""Tables of measurements: from `docs/results/NAME.json` into the pages that ask for them.
+"""Tables and numbers that were measured: from `docs/results/NAME.json` into the pages that ask.
 
 A page asks with `<!-- results: NAME -->`, or `<!-- results: NAME without intervals -->`, and the
-table stands between that and `<!-- end of results -->`. Where it comes from stands once a page,
-between `<!-- provenance -->` and `<!-- end of provenance -->`.
+table stands between that and `<!-- end of results -->`; for a number in a sentence with
+`<!-- number: NAME.WHICH -->`, and it stands between that and `<!-- end -->`. Where all this comes
+from stands once a page, between `<!-- provenance -->` and `<!-- end of provenance -->`.
 
-A file holds title, command, commit, date, machine, note, columns (name, unit, digits) and rows. A
-cell is a text, a number, or [value, low, high]; null is an empty cell.
+A file holds title, command, commit, date, machine, note, columns, rows, "keys" (a list of words a
+row; null: the row is not measured), "numbers" by name, how many minutes its study takes and what it
+depends on. A cell is a text, a number, or [value, low, high]; null is an empty cell. A column has
+name, unit and digits, and so has a number, whose "value" is a cell; both may have
+
+- "metric": which of the command's results.json it is, where a row's words fill in {0}, {1}, ...;
+  a cell that is empty stays so while the command has no such metric;
+- "factor": from the metric's unit;
+- "plain": its interval is not shown;
+- "form": "count" (the share as "8 of 9"), "n" (how many observations it is made of);
+- "beside": another metric that stands behind it, "85 (190)".
+
+A note shows a number where it says {NAME}.
 """
 
 import datetime
 import json
+import math
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -20,8 +33,9 @@ BLOCK = re.compile(
     r"<!-- results: (?P<name>\w+)(?P<plain> without intervals)? -->\n.*?<!-- end of results -->",
     re.S,
 )
+NUMBER = re.compile(r"<!-- number: (?P<name>\w+)\.(?P<which>\w+) -->.*?<!-- end -->", re.S)
 PROVENANCE = re.compile(r"<!-- provenance -->\n.*?<!-- end of provenance -->", re.S)
-GENERATED = (BLOCK, PROVENANCE)
+GENERATED = (BLOCK, NUMBER, PROVENANCE)
 
 
 def read(name: str) -> dict[str, Any]:
@@ -39,8 +53,9 @@ def read(name: str) -> dict[str, Any]:
 
 def filled(page: str) -> str:
     """A page with its tables and its line of provenance."""
-    names = [found["name"] for found in BLOCK.finditer(page)]
+    names = [found["name"] for asked in (BLOCK, NUMBER) for found in asked.finditer(page)]
     page = BLOCK.sub(lambda found: _block(found), page)
+    page = NUMBER.sub(lambda found: _number(found), page)
     line = f"<!-- provenance -->\n{provenance(names)}\n<!-- end of provenance -->"
     return PROVENANCE.sub(lambda _: line, page)
 
@@ -49,6 +64,16 @@ def _block(found: re.Match[str]) -> str:
     first = found[0].split("\n", 1)[0]
     table = markdown(read(found["name"]), intervals=not found["plain"])
     return f"{first}\n{table}\n<!-- end of results -->"
+
+
+def _number(found: re.Match[str]) -> str:
+    return f"{found[0].split('>', 1)[0]}>{said(read(found['name']), found['which'])}<!-- end -->"
+
+
+def said(table: Mapping[str, Any], which: str) -> str:
+    """One of the numbers of a file, as sentences have it."""
+    number = table["numbers"][which]
+    return _cell(number["value"], number, intervals=True)
 
 
 def markdown(table: Mapping[str, Any], intervals: bool = True) -> str:
@@ -66,8 +91,8 @@ def markdown(table: Mapping[str, Any], intervals: bool = True) -> str:
             for row in table["rows"]
         ),
     ]
-    note = [f"\n{table['note']}"] if table.get("note") else []
-    return "\n".join([f"**{table['title']}**\n", *lines, *note])
+    note = re.sub(r"\{(\w+)\}", lambda found: said(table, found[1]), table.get("note", ""))
+    return "\n".join([f"**{table['title']}**\n", *lines, *([f"\n{note}"] if note else [])])
 
 
 def provenance(names: list[str]) -> str:
@@ -85,23 +110,48 @@ def provenance(names: list[str]) -> str:
     return f"*Measured on {machines}: {'; '.join(parts)}.*"
 
 
-def renewed(table: Mapping[str, Any], path: Path) -> dict[str, Any]:
-    """A table with the numbers of a `results.json` that its command wrote.
+def renewed(table: Mapping[str, Any], path: Path, **more: Any) -> dict[str, Any]:
+    """A file with the numbers of a `results.json` that its command wrote, and with `more` fields.
 
-    Columns that are filled have a "metric", a template of the metric's name, as
-    "{0}.{1}.return", and may have a "factor" from the metric's unit to the column's; "keys" holds
-    a list of words for each row, which fill the template.
+    Raises:
+        KeyError: a metric is not there.
     """
     found = json.loads(path.read_text())
+    metrics, columns = found["metrics"], table["columns"]
     rows = [
-        [_metric(found["metrics"], column, key, cell) for column, cell in zip(*pair, strict=True)]
-        for key, pair in (
-            (key, (table["columns"], row))
-            for key, row in zip(table["keys"], table["rows"], strict=True)
-        )
+        [_measured(metrics, *part) for part in zip(columns, row, [key] * len(row), strict=True)]
+        for key, row in _keyed(table)
     ]
-    date = datetime.date.fromtimestamp(path.stat().st_mtime).isoformat()
-    return {**table, "commit": found["git"], "date": date, "rows": rows}
+    numbers = {
+        which: number | {"value": _measured(metrics, number, number["value"], ())}
+        for which, number in table.get("numbers", {}).items()
+    }
+    date = found.get("date") or datetime.date.fromtimestamp(path.stat().st_mtime).isoformat()
+    machine = f"{found['machine']['cores']} cores, no GPU"
+    new = {"commit": found["git"], "date": date, "machine": machine, **more, "rows": rows}
+    return {**table, **new, **({"numbers": numbers} if numbers else {})}
+
+
+def asked(table: Mapping[str, Any]) -> set[str]:
+    """The metrics that a file needs of its command's results.json."""
+    cells = [
+        (part, key, cell)
+        for key, row in _keyed(table)
+        for part, cell in zip(table["columns"], row, strict=True)
+    ]
+    cells += [(each, (), each["value"]) for each in table.get("numbers", {}).values()]
+    return {
+        part[name].format(*key)
+        for part, key, cell in cells
+        for name in ("metric", "beside")
+        if name in part and cell is not None and key is not None
+    }
+
+
+def _keyed(table: Mapping[str, Any]) -> list[tuple[Any, list[Any]]]:
+    """Keys with their rows."""
+    rows = table["rows"]
+    return list(zip(table.get("keys", [()] * len(rows)), rows, strict=True))
 
 
 def written(table: Mapping[str, Any]) -> str:
@@ -112,15 +162,34 @@ def written(table: Mapping[str, Any]) -> str:
         if isinstance(value, list):
             each = ",\n  ".join(json.dumps(item, ensure_ascii=False) for item in value)
             text = f"[\n  {each}\n ]"
+        elif isinstance(value, dict):
+            pairs = (
+                f"{json.dumps(k)}: {json.dumps(v, ensure_ascii=False)}" for k, v in value.items()
+            )
+            text = "{\n  " + ",\n  ".join(pairs) + "\n }"
         parts.append(f" {json.dumps(name)}: {text}")
     return "{\n" + ",\n".join(parts) + "\n}\n"
 
 
-def _metric(metrics: Mapping[str, Any], column: Mapping[str, Any], key: Any, cell: Any) -> Any:
-    if "metric" not in column:
-        return cell
-    metric, factor = metrics[column["metric"].format(*key)], column.get("factor", 1)
-    return [round(factor * metric[part], column["digits"] + 2) for part in ("value", "low", "high")]
+def _measured(metrics: Mapping[str, Any], part: Mapping[str, Any], old: Any, key: Any) -> Any:
+    """What comes for an old cell of a column, or for a number."""
+    if "metric" not in part or key is None:
+        return old
+    name, digits = part["metric"].format(*key), part.get("digits", 0)
+    if name not in metrics and old is None:
+        return None
+    metric, form = metrics[name], part.get("form")
+    if form == "n":
+        return metric["n"]
+    if not math.isfinite(metric["value"]):
+        return None
+    if form == "count":
+        return f"{round(metric['value'] * metric['n'])} of {metric['n']}"
+    scaled = [part.get("factor", 1) * metric[end] for end in ("value", "low", "high")]
+    if "beside" in part:
+        other = part.get("factor", 1) * metrics[part["beside"].format(*key)]["value"]
+        return f"{scaled[0]:,.{digits}f} ({other:,.{digits}f})"
+    return [round(each, digits + 2) for each in (scaled[0], *sorted(scaled[1:]))]
 
 
 def _heading(column: Mapping[str, Any]) -> str:
@@ -132,7 +201,7 @@ def _cell(cell: Any, column: Mapping[str, Any], intervals: bool) -> str:
         return cell or ""
     value, *ends = cell if isinstance(cell, list) else [cell]
     digits = column.get("digits", 0)
-    if not (ends and intervals):
+    if not (ends and intervals) or column.get("plain"):
         return f"{value:,.{digits}f}"
     return f"{value:,.{digits}f} ({' to '.join(f'{end:,.{digits}f}' for end in ends)})"
 

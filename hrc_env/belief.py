@@ -47,3 +47,24 @@ def standard_deviation_m(estimate: PoseEstimate) -> Floats:
     """(B, W, J) root of the mean variance over the axes [m]."""
     cov = estimate.cov_world
     return np.sqrt((cov[..., 0, 0] + cov[..., 1, 1] + cov[..., 2, 2]) / 3.0)
+
+
+def deviation_towards_robot_m(robot: RobotState, estimate: PoseEstimate) -> Floats:
+    """(B, W, J) sqrt(n' C n) [m]: n is the unit vector from a joint's mean to the nearest point on
+    the axes of the robot's capsules, of that whose surface is nearest; C is its covariance. A joint
+    on an axis has no such direction: there the root of the mean variance."""
+    points = np.repeat(estimate.mean_world[..., None, None, :], 2, axis=-2)
+    nearest = least_separation(robot.capsules_world, robot.capsule_radius_m, points, np.zeros(1))
+    towards = nearest.point_a_world - estimate.mean_world
+    away_m = np.linalg.norm(towards, axis=-1)
+    squared = (towards[..., None, :] @ estimate.cov_world @ towards[..., None])[..., 0, 0]
+    along = np.sqrt(squared) / np.where(away_m > 0, away_m, 1.0)
+    return np.where(away_m > 0, along, standard_deviation_m(estimate))
+
+
+def covariance_factor_m(estimate: PoseEstimate) -> Floats:
+    """(B, W, J, 6) Cholesky factor L of each covariance L L' [m]: xx, yx, yy, zx, zy, zz.
+
+    Six numbers that hold all of it and, unlike axes and their deviations, change continuously.
+    """
+    return np.linalg.cholesky(estimate.cov_world)[..., *np.tril_indices(3)]

@@ -13,12 +13,14 @@ from typing import Any, get_type_hints
 import numpy as np
 
 from hrc_env.control import ControlConfig
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, check_names, unknown
 from hrc_env.core.mapping import PRESETS, from_mapping, plain, read_toml, restored, to_toml
 from hrc_env.core.results import write_whole
 from hrc_env.geometry.camera_config import CameraConfig, read_rig
 from hrc_env.metrics import CostConfig
 from hrc_env.motion.generator import PEOPLE, MotionConfig, PeopleConfig
+from hrc_env.motion.schedule import WORK, Job
+from hrc_env.observations import UNCERTAINTY
 from hrc_env.perception.detector import DetectorConfig
 from hrc_env.perception.emulator import EmulatorConfig
 from hrc_env.perception.faults.fault import FaultConfig
@@ -49,6 +51,9 @@ class HRCConfig:
     forecast_s: tuple[float, ...] = ()
     """Times ahead at which the observation also holds where the workers' joints are expected,
     each in (0, 1] [s]; none by default. (0.2, 0.4) adds 120 entries a worker."""
+    uncertainty: tuple[str, ...] = ()
+    """What the observation holds of each joint's covariance beside its root mean: "towards_robot",
+    the deviation along the line to the robot; "factor", all of it as 6 numbers; or both."""
     worker: str | tuple[str, ...] = "worker_1"
     """Which baked body the workers have: a name; several, or "any" for all that there are: then
     every episode gives each worker one of them, no two the same as long as there are others."""
@@ -86,6 +91,7 @@ class HRCConfig:
             raise ConfigError(
                 f"forecast_s must be in (0, {LONGEST_S:g}] s each, got {self.forecast_s}."
             )
+        check_names("uncertainty", self.uncertainty, UNCERTAINTY)
         pool(self.worker)
         substeps = self.ctrl_dt / self.scene.sim_dt
         if substeps < 0.5 or abs(substeps - round(substeps)) > 1e-6:
@@ -115,7 +121,7 @@ ARGUMENTS: dict[str, Any] = {
     "config": None, **dict.fromkeys(PARTS),
 }  # fmt: skip
 """The arguments of an environment that decide what happens in it (`HRCEnv`): their defaults."""
-PRESETS.update({AppearanceConfig: APPEARANCES, PeopleConfig: PEOPLE})
+PRESETS.update({AppearanceConfig: APPEARANCES, PeopleConfig: PEOPLE, tuple[Job, ...]: WORK})
 
 
 @dataclass(frozen=True, slots=True)

@@ -78,8 +78,9 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         perception: "pixels" (rendered images through MediaPipe Pose), "keypoints" (an
             emulator of that), "truth" (the worker as they are) or "none".
         estimator: "particle" (default), "kalman" (the same with one hypothesis), "paper"
-            (Algorithm 1), "triangulation" or "ransac"; one that was registered, an
-            `EstimatorSpec`, or a function that makes an estimator (docs/bring_your_own.md).
+            (Algorithm 1 as printed), "paper_restarts" (with what it lacks), "triangulation" or
+            "ransac"; one that was registered, an `EstimatorSpec`, or a function that makes an
+            estimator (docs/bring_your_own.md).
         cameras: indices or names of the scene's cameras to use; or a rig of your own: its name
             ("lab_gopro"), a TOML file's path, or a list of places (x, y, z) [m],
             `CameraConfig`s or mappings. None is all cameras of the scene.

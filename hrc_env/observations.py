@@ -10,12 +10,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.belief import Belief, standard_deviation_m
+from hrc_env.belief import (
+    Belief,
+    covariance_factor_m,
+    deviation_towards_robot_m,
+    standard_deviation_m,
+)
 from hrc_env.core.errors import Named, check_shape
 from hrc_env.core.kernels import kernel
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats, Tensor
 
+TOWARDS_ROBOT, FACTOR = UNCERTAINTY = ("towards_robot", "factor")
+"""What else can be asked for of each joint's covariance."""
 FAR_SEPARATION_M = 1.0
 """Larger separations are reported as this: nothing near, or nobody known of."""
 
@@ -29,6 +36,8 @@ class Sizes:
     workers: int
     horizons: int = 0
     """How many times ahead were asked for."""
+    uncertainty: tuple[str, ...] = ()
+    """Which of `UNCERTAINTY` were asked for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,6 +167,20 @@ SHARED_TERMS: tuple[ObservationTerm, ...] = (
         "m", "world", 1.0, 0.25,
         "Standard deviation of each of these (root mean over the axes).",
         _std_forecast,
+    ),
+    ObservationTerm(
+        "worker_joints_std_towards_robot",
+        lambda of: of.workers * N_JOINTS * (TOWARDS_ROBOT in of.uncertainty),
+        "m", "-", 1.0, 0.25,
+        "Standard deviation of each joint along the line to the nearest point of the robot.",
+        lambda now: deviation_towards_robot_m(now.robot, now.estimate),
+    ),
+    ObservationTerm(
+        "worker_joints_factor",
+        lambda of: of.workers * N_JOINTS * 6 * (FACTOR in of.uncertainty),
+        "m", "world", 1.0, 0.25,
+        "Cholesky factor L of each joint's covariance L L': xx, yx, yy, zx, zy, zz.",
+        lambda now: covariance_factor_m(now.estimate),
     ),
 )  # fmt: skip
 """What closes it: the last action, and the workers as they are estimated."""

@@ -51,7 +51,7 @@ class Simulation(Stateful):
 
     CHANGES = (
         "physics", "pipeline", "motion", "task_state", "streams", "action", "episode_cost",
-        "separation_m", "estimates", "reward_weights",
+        "separation_m", "estimates", "reward_weights", "identities",
     )  # fmt: skip
 
     def __init__(self, batch: int, settings: Settings) -> None:
@@ -77,7 +77,9 @@ class Simulation(Stateful):
         self._spread_rad = np.array(config.start_spread_rad or settings.robot.spread_rad)
         check_shape("start_spread_rad", self._spread_rad.shape, (n_joints,), "one a joint")
         self.n_actions = n_actions(settings.control, self.chain)
-        sizes = observations.Sizes(n_joints, self.n_actions, most, len(config.forecast_s))
+        sizes = observations.Sizes(
+            n_joints, self.n_actions, most, len(config.forecast_s), config.uncertainty
+        )
         self.layout = observations.layout(self.terms, sizes)
         self.physics = Physics(self.scene, batch)
         self.pipeline = make_pipeline(perception, settings.estimator, self.scene, batch, config)
@@ -90,6 +92,7 @@ class Simulation(Stateful):
             oracle.prior(batch, most, config.tracker) for _ in (0.0, *config.forecast_s)
         )
         """What is believed of the workers now, and expected at each of `forecast_s`."""
+        self.identities = metrics.no_identities(batch, most)
         self.streams = {name: [np.random.default_rng(0)] * batch for name in STREAMS}
 
     def reset(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> StepResult:
@@ -110,11 +113,13 @@ class Simulation(Stateful):
         estimates = self._perceive(ids)
         belief = self._believed(ids, robot, estimates)
         observation = observations.observe(belief, self.layout, self.terms)
+        identities = metrics.no_identities(*self.present[ids].shape)
         info = {
             **step.no_cost(len(ids)),
-            **step.tracking_info(estimates[0], truth, self.present[ids]),
+            **step.tracking_info(estimates[0], truth, self.present[ids], identities),
             **self._episode_info(ids, generator.activity(self.motion)),
         }
+        write_rows(self.identities, ids, identities)
         return StepResult(observation, np.zeros(len(ids)), np.zeros(len(ids), bool), info)
 
     def step(self, action: Floats) -> StepResult:
@@ -149,7 +154,7 @@ class Simulation(Stateful):
         info = {
             **{f"reward/{name}": value for name, value in terms.items()},
             **step.cost_info(cost, present),
-            **step.tracking_info(estimates[0], truth, present),
+            **step.tracking_info(estimates[0], truth, present, self.identities),
             **shield_info,
             **self._episode_info(self._everyone, activity),
         }

@@ -83,10 +83,13 @@ def no_cost(n: int) -> Info:
     return {name: np.zeros(n) for name in ("cost", "cost_sum", "cost_proximity", "cost_contact")}
 
 
-def tracking_info(estimate: PoseEstimate, truth: WorkerTruth, present: Bools) -> Info:
-    """How far the belief is from the truth; no error is given where nobody is tracked."""
-    error_m, lost = metrics.tracking_error(estimate, truth, present)
-    return {"tracking/mpjpe_m": error_m, "tracking/lost": lost.astype(float)}
+def tracking_info(
+    estimate: PoseEstimate, truth: WorkerTruth, present: Bools, identities: metrics.Identities
+) -> Info:
+    """How far the belief is from the truth, and whether it takes one worker for another; no error
+    is given where nobody is tracked."""
+    found = metrics.tracking_error(estimate, truth, present, identities)
+    return {f"tracking/{name}": found[name] for name in metrics.TRACKING.names or ()}
 
 
 def worker_info(activity: Ints, body: Ints, bodies: tuple[str, ...]) -> Info:

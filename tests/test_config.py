@@ -12,6 +12,7 @@ from hrc_env.core.errors import OLD_NAMES, ConfigError, Named
 from hrc_env.env import HRCEnv
 from hrc_env.motion.clip import Clip
 from hrc_env.motion.config import PEOPLE
+from hrc_env.motion.schedule import WORK
 from hrc_env.scene.domain_randomization import APPEARANCES
 from hrc_env.scene.rigs import RIGS
 
@@ -72,6 +73,8 @@ def test_a_clip_in_memory_is_not_written(tmp_path):
         ("reward = [", "must be TOML"),
         ('[motion]\npeople = "hurrid"\n', "motion.people 'hurrid'. Did you mean 'hurried'"),
         ("appearance = 3\n", "appearance must be a name ('as_built'"),
+        ('[motion]\njobs = "lowwork"\n', "motion.jobs 'lowwork'. Did you mean 'low_work'"),
+        ("[motion]\njobs = 3\n", "motion.jobs must be a name ('framing', 'low_work') or a list"),
     ],
 )
 def test_a_file_that_cannot_be_is_answered_with_what_would_do(text, said, tmp_path):
@@ -86,6 +89,9 @@ def test_the_list_shows_the_configuration_that_arguments_make(tmp_path, capsys):
     (tmp_path / "mine.toml").write_text(capsys.readouterr().out)
     said = settle(people="hurried", config={"reward": {"proximity": 0.5}}).config
     assert load_config(tmp_path / "mine.toml") == said
+    assert main(["list", "--config", "motion.jobs=low_work"]) == 0
+    (tmp_path / "mine.toml").write_text(capsys.readouterr().out)
+    assert load_config(tmp_path / "mine.toml").motion.jobs == WORK["low_work"]
     assert main(["list", "--config"]) == 0
     (tmp_path / "mine.toml").write_text(capsys.readouterr().out)
     assert load_config(tmp_path / "mine.toml") == settle().config

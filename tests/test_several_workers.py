@@ -11,7 +11,7 @@ from stable_baselines3.common.env_checker import check_env
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import WorkerTruth
 from hrc_env.env import HRCEnv
-from hrc_env.metrics import tracking_error
+from hrc_env.metrics import no_identities, tracking_error
 from hrc_env.motion.generator import PeopleConfig, activity_names, current
 from hrc_env.sb3 import HRCVecEnv
 from hrc_env.tracking.oracle import estimate_from_truth
@@ -76,7 +76,9 @@ def test_many_environments_are_the_single_one_bit_for_bit(n_workers):
             alone, _ = one.reset()
 
 
-@pytest.mark.parametrize("estimator", ["particle", "kalman", "paper", "triangulation"])
+@pytest.mark.parametrize(
+    "estimator", ["particle", "kalman", "paper", "paper_restarts", "triangulation"]
+)
 def test_two_workers_without_names_are_both_followed(estimator):
     """Four seconds of keypoints that each camera reports in an order of its own."""
     for seed in range(3):
@@ -126,15 +128,15 @@ def test_errors_do_not_depend_on_which_worker_is_called_the_first():
     truth = HRCEnv(perception="truth", n_workers=3)
     truth.reset(seed=0)
     seen = truth.simulation.estimate.mean_world
-    all_there = np.ones((1, 3), bool)
+    all_there, unknown = np.ones((1, 3), bool), no_identities(1, 3)
     reordered = WorkerTruth(seen[:, [2, 0, 1]], seen, np.zeros((1, 3, 1, 2, 3)), np.ones(1))
-    error_m, lost = tracking_error(truth.simulation.estimate, reordered, all_there)
-    assert error_m == [0.0]
-    assert not lost.any()
+    found = tracking_error(truth.simulation.estimate, reordered, all_there, unknown)
+    assert found["mpjpe_m"] == found["lost"] == [0.0]
     doubled = estimate_from_truth(
         WorkerTruth(seen[:, [0, 0, 1]], seen, np.zeros((1, 3, 1, 2, 3)), np.ones(1))
     )
-    assert tracking_error(doubled, reordered, all_there)[0] > 0.1  # two tracks on one person
+    found = tracking_error(doubled, reordered, all_there, unknown)
+    assert found["mpjpe_m"] > 0.1  # two tracks on one person
 
 
 def test_in_pictures_two_different_people_are_found(pixels):

@@ -9,6 +9,15 @@ from benchmarks import soak
 from hrc_env.step import MISCALIBRATED
 
 
+def test_a_soak_of_several_workers_says_how_well_they_are_told_apart(tmp_path):
+    out = tmp_path / "results.json"
+    soak.main(soak.Arguments(out, 600, 2, workers=2, perception="truth", episodes=1))
+    metrics = json.loads(out.read_text())["metrics"]
+    assert metrics["id_switches"]["value"] == 0
+    assert metrics["idf1"]["value"] == 1
+    assert metrics["nans"]["value"] == 0
+
+
 @pytest.mark.parametrize(
     ("steps", "num_envs", "perception"),
     [(1200, 4, "truth"), pytest.param(320_000, 64, "keypoints", marks=pytest.mark.long)],

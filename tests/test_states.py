@@ -52,6 +52,7 @@ def test_the_single_environment_goes_on_from_a_state(level, n_steps):
     [
         {"estimator": "kalman"},
         {"estimator": "paper"},
+        {"estimator": "paper_restarts"},
         {"estimator": "triangulation"},
         {"n_workers": 2, "control": "tool"},
         {"config": {"forecast_s": (0.2,), "tracker": {"longest_delay_s": 0.2}}},
@@ -66,6 +67,19 @@ def test_every_estimators_state_is_in_it(kwargs):
     first = go_on(env, 8, seed=1)
     env.set_state(state)
     assert same(first, go_on(env, 8, seed=1))
+
+
+def test_who_was_whose_track_is_in_the_state_and_ends_with_the_episode():
+    env = HRCVectorEnv(3, perception="truth", n_workers=2)
+    env.reset(seed=0)
+    env.shards.first.identities.workers["switches"][:] = 2
+    state, still = env.get_state(), np.zeros((3, 6))
+    env.step(still)
+    mask = np.array([True, False, True])
+    _, begun = env.reset(options={"reset_mask": mask})
+    assert begun["tracking/id_switches"][mask].tolist() == [0, 0]
+    env.set_state(state)
+    assert env.step(still)[4]["tracking/id_switches"][0] == 4
 
 
 @pytest.mark.parametrize(("level", "n_steps"), STEPS[1:])

@@ -80,6 +80,7 @@ def error_ratios(
     say: Say = lambda share, label: None,
     config: HRCConfig | None = None,
     store: Path | None = None,
+    picture: Path | None = None,
 ) -> dict[str, Metric]:
     """`ratios_of` clips that no fit has seen.
 
@@ -90,9 +91,14 @@ def error_ratios(
         say: hears of the progress: shares that sum to 1.
         config: settings; its `emulator` is judged.
         store: a folder in which what was rendered stays, and is taken from; None: nothing stays.
+        picture: where a plot of both is drawn (PNG); None: nowhere.
     """
-    clips = unseen_clips(rounds, seed)
-    return ratios_of(compared(clips, say, config or HRCConfig(), store))
+    seen = compared(unseen_clips(rounds, seed), say, config or HRCConfig(), store)
+    if picture is not None:
+        from assets.emulator.plot import plot_comparison  # which imports this module
+
+        plot_comparison(picture, seen)
+    return ratios_of(seen)
 
 
 def ratios_of(seen: Compared) -> dict[str, Metric]:
@@ -100,15 +106,28 @@ def ratios_of(seen: Compared) -> dict[str, Metric]:
 
     Returns:
         `emulator_error_ratio.<family>` for medians, `.<family>.p95`, and
-        `emulator_coverage_difference.<family>`; their 95 % intervals draw clips anew.
+        `emulator_coverage_difference.<family>`; their 95 % intervals draw clips anew. What they are
+        made of: `emulator_<median_m|p95_m|coverage95>.<family>.<pixels|keypoints>` and
+        `emulator_clips.<family>`.
     """
     pixels = [in_space([each]) for each in seen.pixels]
     emulated = [in_space(each) for each in seen.emulated]
     metrics: dict[str, Metric] = {}
-    for family in seen.outcomes:
+    for family, outcomes in seen.outcomes.items():
         mine = of_family(seen.clips, family)
+        metrics[f"emulator_clips.{family}"] = _exactly(len(mine), "", len(mine))
+        for level, found in zip(("pixels", "keypoints"), outcomes, strict=True):
+            for what, value, unit in (
+                ("median_m", found.median_m, "m"), ("p95_m", found.p95_m, "m"),
+                ("coverage95", found.coverage, "share"),
+            ):  # fmt: skip
+                metrics[f"emulator_{what}.{family}.{level}"] = _exactly(value, unit, found.n)
         metrics |= _apart(family, [pixels[k] for k in mine], [emulated[k] for k in mine])
     return metrics
+
+
+def _exactly(value: float, unit: str, n: int) -> Metric:
+    return Metric(value, value, value, unit, n)
 
 
 def _apart(

@@ -8,6 +8,7 @@ import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, replace
 from functools import partial
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -100,8 +101,8 @@ class Task(NamedTuple):
     make: Callable[[PartProgress], dict[str, Any]]
 
 
-def tasks_of(config: PerceptionBenchConfig) -> Iterator[Task]:
-    """All parts, times last."""
+def tasks_of(config: PerceptionBenchConfig, figures: Path | None = None) -> Iterator[Task]:
+    """All parts, times last; the emulator's plot is drawn into a folder."""
     yield from _crops(config)
     yield Task("acquired", 0.5 * config.n_resets, partial(_acquired, config.n_resets))
     yield from _episodes(config)
@@ -110,7 +111,7 @@ def tasks_of(config: PerceptionBenchConfig) -> Iterator[Task]:
         make = partial(episodes.phantoms, scene, config.n_empty, FIRST_SEED)
         yield Task(f"empty.{scene}", 0.1 * config.n_empty, make)
     if config.emulator_rounds is not None:
-        make = partial(_emulator, config.emulator_rounds)
+        make = partial(_emulator, config.emulator_rounds, figures and figures / "emulator.png")
         yield Task("emulator", 40.0 * max(2 * config.emulator_rounds, 1), make)
     yield from _speeds(config)
 
@@ -223,14 +224,14 @@ def _acquired(n: int, tick: PartProgress) -> dict[str, Any]:
     return {"acquired": episodes.acquisition(range(FIRST_RESET, FIRST_RESET + n), tick)}
 
 
-def _emulator(rounds: int, tick: PartProgress) -> dict[str, Any]:
-    ratios = error_ratios(rounds, say=lambda share, label: tick(share))
+def _emulator(rounds: int, picture: Path | None, tick: PartProgress) -> dict[str, Any]:
+    ratios = error_ratios(rounds, say=lambda share, label: tick(share), picture=picture)
     return {name: asdict(metric) for name, metric in ratios.items()}
 
 
 def play(config: PerceptionBenchConfig, parts: PartCache) -> dict[str, dict[str, Any]]:
     """All parts by their labels."""
-    tasks = list(tasks_of(config))
+    tasks = list(tasks_of(config, parts.folder.parent / "figures"))
     total = sum(task.cost for task in tasks)
     return {
         task.label: replace(parts, n_parts=total / task.cost).part(task.label, task.make)

@@ -58,6 +58,7 @@ def _speed(found: Found) -> Metrics:
             metrics[f"network_ms.{key}"] = exactly(part["ms"], "ms", ROUNDS)
         elif kind == "speed":
             metrics[f"steps_per_s.{key}"] = exactly(part["steps_per_s"], "1/s", part["n"])
+            metrics[f"step_ms.{key}"] = exactly(1e3 / part["steps_per_s"], "ms", part["n"])
             for stage, ms in part["stages"].items():
                 metrics[f"stage_ms.{stage}.{key}"] = exactly(ms, "ms", part["n"])
     return metrics

@@ -22,7 +22,7 @@ class EnvironmentArguments:
     perception: str = "pixels"
     """What the robot sees with: pixels, keypoints, truth or none."""
     estimator: str = "particle"
-    """particle, kalman, paper, triangulation or ransac."""
+    """particle, kalman, paper, paper_restarts, triangulation or ransac."""
     cameras: tuple[str, ...] = ()
     """Names or numbers of cameras of the scene; or a rig: its name or a .toml file. All cameras
     of the scene if not given."""

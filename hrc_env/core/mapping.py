@@ -17,8 +17,8 @@ import numpy as np
 from hrc_env.core.errors import ConfigError, unknown
 
 RecordT = TypeVar("RecordT")
-PRESETS: dict[type, Mapping[str, Any]] = {}
-"""Records that have names, by their type: a name stands for the record."""
+PRESETS: dict[Any, Mapping[str, Any]] = {}
+"""Values that have names, by the type hint of their field: a name stands for the value."""
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -59,12 +59,16 @@ def from_mapping(
 
 def restored(hint: Any, value: Any, where: str) -> Any:
     """A field's value as its type hint wants it, or a `ConfigError` that says so."""
+    if isinstance(value, str) and (presets := PRESETS.get(hint)):
+        if value not in presets:
+            raise unknown(where, value, presets)
+        return presets[value]
     if dataclasses.is_dataclass(hint):
         return _record(typing.cast(type, hint), value, where)
     if isinstance(hint, types.UnionType):
         return _one_of(typing.get_args(hint), value, where)
     if typing.get_origin(hint) is tuple:
-        return _tuple(typing.get_args(hint), value, where)
+        return _tuple(hint, value, where)
     if isinstance(value, np.generic):
         value = value.item()
     if hint is str and isinstance(value, Path):
@@ -81,16 +85,16 @@ def restored(hint: Any, value: Any, where: str) -> Any:
 
 
 def _record(kind: type[RecordT], value: Any, where: str) -> RecordT:
-    """A record by the name of a preset, from a mapping, or itself."""
-    presets = PRESETS.get(kind, {})
+    """A record from a mapping, or itself."""
     if isinstance(value, Mapping):
         return from_mapping(kind, value, f"{where}.")
-    if isinstance(value, str) and presets:
-        if value not in presets:
-            raise unknown(where, value, presets)
-        return presets[value]
-    name = f"a name ({', '.join(map(repr, presets))}) or " if presets else ""
-    return _checked(isinstance(value, kind), f"{name}a mapping", value, where)
+    return _checked(isinstance(value, kind), f"{_name_or(kind)}a mapping", value, where)
+
+
+def _name_or(hint: Any) -> str:
+    """How errors begin to say what is valid: the names that a field of this hint takes."""
+    presets = PRESETS.get(hint, {})
+    return f"a name ({', '.join(map(repr, presets))}) or " if presets else ""
 
 
 def _one_of(hints: tuple[Any, ...], value: Any, where: str) -> Any:
@@ -104,9 +108,10 @@ def _one_of(hints: tuple[Any, ...], value: Any, where: str) -> Any:
     raise ConfigError(" Or: ".join(refused))
 
 
-def _tuple(inner: tuple[Any, ...], value: Any, where: str) -> tuple[Any, ...]:
+def _tuple(hint: Any, value: Any, where: str) -> tuple[Any, ...]:
     """Every part as its own hint wants it, and as many as there are hints."""
-    _checked(isinstance(value, list | tuple), "a list", value, where)
+    _checked(isinstance(value, list | tuple), f"{_name_or(hint)}a list", value, where)
+    inner = typing.get_args(hint)
     hints = [inner[0]] * len(value) if inner[-1] is Ellipsis else list(inner)
     _checked(len(value) == len(hints), f"{len(hints)} values", value, where)
     return tuple(

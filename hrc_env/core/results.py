@@ -16,8 +16,8 @@ import numpy as np
 
 from hrc_env.core.errors import HRCError
 
-PACKAGES = ("numpy", "numba", "mujoco", "gymnasium", "stable-baselines3", "torch",
-            "opencv-python-headless", "ai-edge-litert")  # fmt: skip
+PACKAGES = ("numpy", "numba", "scipy", "mujoco", "gymnasium", "stable-baselines3", "torch",
+            "opencv-python-headless", "ai-edge-litert", "openvino")  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ def provenance() -> dict[str, Any]:
     return {
         "hrc_env": _version("hrc_env"),
         "git": _commit(),
-        "versions": {name: _version(name) for name in PACKAGES},
+        "versions": versions(),
         "machine": {
             "python": platform.python_version(),
             "system": platform.platform(),
@@ -84,6 +84,11 @@ def write_whole(path: Path, content: str) -> None:
         ) from error
 
 
+def versions() -> dict[str, str | None]:
+    """Of the libraries that numbers depend on; None: it is not installed."""
+    return {name: _version(name) for name in PACKAGES}
+
+
 def _version(package: str) -> str | None:
     try:
         return version(package)
@@ -92,14 +97,15 @@ def _version(package: str) -> str | None:
 
 
 def _commit() -> str | None:
-    """The commit, with "+changes" where the working tree differs; None outside a checkout."""
+    """The commit, with "+changes" where the working tree differs, docs apart; None outside a
+    checkout."""
     root = Path(__file__).resolve().parents[2]
     if not (root / ".git").exists():
         return None
     git = partial(subprocess.run, cwd=root, capture_output=True, text=True, check=True)
     try:
         commit = git(["git", "rev-parse", "--short", "HEAD"]).stdout.strip()
-        changes = git(["git", "status", "--porcelain"]).stdout
+        changes = git(["git", "status", "--porcelain", "--", ".", ":!docs"]).stdout
     except (OSError, subprocess.CalledProcessError):
         return None
     return commit + ("+changes" if changes else "")

@@ -13,6 +13,9 @@ from hrc_env.core.kernels import kernel
 def assign_rows(cost, column):
     """Write the column of each row of a finite cost (n, m), m >= n, into column (n,)."""
     n_rows, n_columns = cost.shape
+    if n_columns == 1:
+        column[:n_rows] = 0
+        return
     # Rows and columns count from 1 here; column 0 stands for "the row that is being placed".
     row_price, column_price = np.zeros(n_rows + 1), np.zeros(n_columns + 1)
     owner, before = np.zeros(n_columns + 1, np.int64), np.zeros(n_columns + 1, np.int64)

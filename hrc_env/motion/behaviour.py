@@ -160,7 +160,7 @@ def _work(who: Decision, activity: int) -> tuple[int, float]:
     if activity == st.STAND:
         pause_s = config.near_pause_s if near else config.away_pause_s
         return _stand(who.draw(dc.LASTS, pause_s) * config.people.tempo)
-    height = me["spot"].item(3)
+    height = who.job.height_m or me["spot"].item(3)
     if activity in st.GIVING:
         height = min(height, CHEST_M)
     if who.kind_here == "bench":

@@ -130,7 +130,9 @@ class MotionConfig:
     people: PeopleConfig = field(default_factory=PeopleConfig)
     """How the workers are with the robot and their work; the environment's `people` by name."""
     jobs: tuple[Job, ...] = JOBS
-    """What they do, and what follows what."""
+    """What they do, and what follows what; the name "framing" (this) or "low_work" stands for a
+    choice of jobs: with the second some are at the robot's foot, kneeling, on the haunches, bent
+    (docs/people_and_scenes.md)."""
     motions: tuple[str | Clip, ...] = ()
     """Clips of recorded motion that workers play, too (docs/people_and_scenes.md)."""
     motions_probability: float = 0.5

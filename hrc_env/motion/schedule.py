@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.core.records import WORKPLACE_KINDS
@@ -11,6 +11,8 @@ from hrc_env.worker.props import PROP_NAMES
 
 HERE, ROUTES = "here", ("walk", "push")
 """As a kind of place: wherever the worker is; how workers go to a job."""
+HIGHEST_M = 2.2
+"""Hands work no higher [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +32,8 @@ class Job:
     """What is picked up, or pushed on the way."""
     by: str = "walk"
     """How workers go there: "walk", or "push" the prop."""
+    height_m: float = 0.0
+    """How high above the floor the work is [m]; 0: as high as the place says."""
 
 
 JOBS: tuple[Job, ...] = (
@@ -74,9 +78,27 @@ JOBS: tuple[Job, ...] = (
 )  # fmt: skip
 """Judgement: framing work beside a robot that holds what is worked on."""
 
+_LOW = tuple(
+    Job(name, activity, "robot", ((JOBS[0].name, 1.0),), height_m=height_m)
+    for name, activity, height_m in (
+        ("screw it on below", "drill", 0.35), ("nail it below", "hammer", 0.3),
+        ("fit it below", "kneel", 0.25), ("sort what lies there", "squat", 0.2),
+        ("lift what lies there", "lift", 0.0),
+    )
+)  # fmt: skip
+"""What hands do at knee height or lower: kneeling, on the haunches, bent."""
+WORK: dict[str, tuple[Job, ...]] = {
+    "framing": JOBS,
+    "low_work": (
+        replace(JOBS[0], then=(*JOBS[0].then, *((job.name, 0.06) for job in _LOW))),
+        *_LOW, *JOBS[1:],
+    ),
+}  # fmt: skip
+"""Named choices of jobs: upright at the robot, or now and then at its foot, too (judgement)."""
+
 
 def check_jobs(jobs: Sequence[Job]) -> None:
-    """Refuse unknown names of activities, places, jobs and props, bad weights, and no robot."""
+    """Refuse unknown names of activities, places, jobs and props, bad numbers, and no robot."""
     names = [job.name for job in jobs]
     if len(set(names)) < len(names):
         raise ConfigError(f"Jobs must have different names, got {names}.")
@@ -92,6 +114,10 @@ def check_jobs(jobs: Sequence[Job]) -> None:
         ):
             if got not in valid:
                 raise unknown(f"{what} {job.name!r}", got, valid)
+        if not 0.0 <= job.height_m <= HIGHEST_M:
+            raise ConfigError(
+                f"{job.name!r}: height_m must be 0 to {HIGHEST_M} m, got {job.height_m}."
+            )
         if job.begins < 0.0 or not all(weight > 0.0 for _, weight in job.then):
             raise ConfigError(
                 f"{job.name!r}: begins must be 0 or more, weights must be > 0, got "

@@ -3,6 +3,8 @@
 from dataclasses import dataclass, fields
 from typing import TypeVar
 
+import numpy as np
+
 from hrc_env.core.errors import ConfigError, unknown
 
 _SCHEMES = ("multinomial", "systematic")
@@ -161,6 +163,9 @@ class PaperConfig(TrackerConfig):
     """The paper's Sigma: random walk per frame and axis [m]; the paper gives no number."""
     n_iterations: int = 1
     """The paper's N: passes of Algorithm 1 over one set of frames."""
+    place_m: tuple[tuple[float, float], ...] = ()
+    """Over which line 1 draws particles: least and most x, y and z [m]. Empty: what the cameras
+    stand round, from the floor to 2.2 m."""
     resampling: str = "multinomial"
     """"multinomial" as in the paper's line 17, or "systematic" (less noise)."""
 
@@ -174,6 +179,14 @@ class PaperConfig(TrackerConfig):
             raise ConfigError(
                 f"n_particles must be at least 10, got {self.n_particles}: after a resampling "
                 "fewer have no covariance."
+            )
+        if self.place_m and not (
+            np.shape(self.place_m) == (3, 2) and np.isfinite(self.place_m).all()
+            and (np.diff(self.place_m) > 0).all()
+        ):  # fmt: skip
+            raise ConfigError(
+                "place_m must be empty or hold the least and the most x, y and z, as "
+                f"((-3, 3), (-3, 3), (0, 2.2)), got {self.place_m}."
             )
         if self.sigma_m < 0:
             raise ConfigError(f"sigma_m must not be negative, got {self.sigma_m}.")

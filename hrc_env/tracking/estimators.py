@@ -4,7 +4,8 @@
 |---|---|
 | `particle` | the default: hypotheses about what is discrete, each with one Gaussian on the body |
 | `kalman` | the same with one hypothesis: a Gaussian on the kinematic tree |
-| `paper` | the paper's Algorithm 1 as printed |
+| `paper` | the paper's Algorithm 1 as printed: particles begin all over the place |
+| `paper_restarts` | the same, begun, repaired and given up as the others are |
 | `triangulation` | every frame by itself, all views by weighted least squares; gaps are held |
 | `ransac` | the same from the views that agree |
 
@@ -32,6 +33,7 @@ from hrc_env.tracking.config import (
 )
 from hrc_env.tracking.out_of_sequence import OutOfSequence
 from hrc_env.tracking.paper import PaperEstimator
+from hrc_env.tracking.paper_restarts import PaperRestarts
 from hrc_env.tracking.particle import ParticleEstimator
 from hrc_env.tracking.triangulating import ransac, triangulation
 
@@ -106,6 +108,7 @@ ESTIMATORS: dict[str, EstimatorSpec] = {
         EstimatorSpec("particle", ParticleEstimator, ParticleConfig),
         EstimatorSpec("kalman", _kalman, ParticleConfig),
         EstimatorSpec("paper", PaperEstimator, PaperConfig),
+        EstimatorSpec("paper_restarts", PaperRestarts, PaperConfig),
         EstimatorSpec("triangulation", triangulation, TriangulationConfig, needs_pairs=True),
         EstimatorSpec("ransac", ransac, TriangulationConfig, needs_pairs=True),
     )

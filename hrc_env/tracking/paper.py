@@ -1,16 +1,21 @@
-"""The paper's Algorithm 1, EstimatePose(N, M, C), as printed.
+"""The paper's Algorithm 1, EstimatePose(N, M, C), as printed, and nothing else.
 
 "Line" in a comment is a line of that listing. What the listing leaves open is read so:
 
 - every joint has its own cloud (line 1 speaks of "the i-th joint"; one cloud for all 45
   coordinates does not work with any number of particles that one can afford);
+- clouds begin uniform over the place (line 1, `place_of`) and are never begun again: who comes
+  back elsewhere is reached by line 7 alone;
 - a step of the simulation is one pass of the loop of line 2: line 7 happens in `predict`,
   lines 8 to 17 in `update`; more passes over the same frames (`n_iterations`) repeat both;
 - the likelihoods of cameras are multiplied (line 13), that of one camera is a Gaussian of the
   pixel distance with the detector's sigma; a joint that a camera does not see multiplies by 1;
-- a cloud starts round a triangulated point (line 1), as `acquisition` finds it: a start all
-  over the room never locks on;
 - the estimate (line 19) is the mean and the covariance of the resampled cloud.
+
+What a report needs besides moves no particle: a joint's age is the time since a detection lay where
+its cloud may be seen; a worker is `tracked` once `acquire_min_joints` joints have age 0, while one
+age is below `lost_after_s`; velocities, 0 until then, are filtered differences of the means.
+`paper_restarts` has what the listing lacks.
 """
 
 import math
@@ -22,17 +27,20 @@ import numpy as np
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Covariances3, Floats, Ints, Points3
+from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
 from hrc_env.tracking.config import PaperConfig
 from hrc_env.tracking.forecast import forecast
 from hrc_env.tracking.measurements import Seen, arrays_of, make_seen, read_worker, supports
-from hrc_env.tracking.models.acquisition import count_conflict, find_again, find_body, middle_of
-from hrc_env.tracking.settings import Settings, settings_of
-from hrc_env.tracking.tracks import forget, grow_older, make_tracks, report
+from hrc_env.tracking.models.acquisition import count_conflict
+from hrc_env.tracking.tracks import forget, make_tracks, report
 
 BEHIND = -1e12
 """Log-likelihood of a particle behind the camera that saw the joint: the last to be chosen."""
+HEIGHTS_M = (0.0, 2.2)
+"""Between these joints are expected where `PaperConfig.place_m` does not say."""
+_NARROWEST_M = 1.0
+"""Cameras that hang nearer together along an axis do not say how long the place is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +50,7 @@ class PaperState:
     tracks: Any
     """(B, W) records of `tracks.TRACK`."""
     particles: Floats
-    """(B, W, J, 3, M) [m]; of a worker who is not tracked: without meaning."""
+    """(B, W, J, 3, M) [m]."""
     elapsed_s: Floats
     """(B,) time since the last update [s]."""
 
@@ -56,41 +64,41 @@ class PaperEstimator:
     config: PaperConfig
 
     def init(self, batch: int, n_workers: int) -> PaperState:
-        """Workers whom nobody has seen."""
+        """Workers whom nobody has seen; `reset` draws their clouds anew."""
         shape = (batch, n_workers, N_JOINTS, 3, self.config.n_particles)
         tracks = make_tracks(batch, n_workers, self.config)
-        return PaperState(tracks, np.zeros(shape), np.zeros(batch))
+        state = PaperState(tracks, np.zeros(shape), np.zeros(batch))
+        self.reset(state, np.arange(batch), [np.random.default_rng(b) for b in range(batch)])
+        return state
 
     def reset(self, state: PaperState, ids: Ints, rngs: list[np.random.Generator]) -> None:
-        """Forget environments `ids`; draws nothing."""
-        del rngs
+        """Line 1, initialize_particle(M): clouds all over the place, in environments `ids`."""
         forget(state.tracks, ids, self.config)
         state.elapsed_s[ids] = 0.0
+        place = place_of(self.P, self.config)
+        for b in ids:
+            drawn = rngs[b].random(state.particles.shape[1:])
+            state.particles[b] = place[:, :1] + np.diff(place) * drawn
+            for track, particles in zip(state.tracks[b], state.particles[b], strict=True):
+                moments(particles, track["mean_world"], track["cov_world"])
 
     def predict(self, state: PaperState, dt_s: float, rngs: list[np.random.Generator]) -> None:
-        """Line 7; the walk's variance, by which the estimate's covariance grows, is proportional to
-        time."""
-        sigma_m = self.config.sigma_m * np.sqrt(dt_s / self.ctrl_dt)
-        state.elapsed_s[:] += dt_s
-        for b, w in np.argwhere(state.tracks["tracked"]):
-            roll(state.particles[b, w], sigma_m, rngs[b])  # line 7
-            state.tracks["cov_world"][b, w] += sigma_m**2 * np.eye(3)
-        grow_older(state.tracks, dt_s, self.config)
+        """Line 7."""
+        self.walk(state, np.ones_like(state.tracks["tracked"]), dt_s, rngs)
+        age_s = state.tracks["age_s"]
+        age_s[...] = np.minimum(age_s + dt_s, self.config.max_age_s)
+        state.tracks["tracked"] &= (age_s < self.config.lost_after_s - 1e-9).any(-1)
 
     def update(
         self, state: PaperState, keypoints: Keypoints, rngs: list[np.random.Generator]
     ) -> None:
-        """Lines 8 to 17 for workers with a track; line 1 for those without."""
+        """Lines 8 to 17."""
         batch, n_workers = state.tracks.shape
         measured = arrays_of(keypoints, (batch, len(self.P), n_workers, N_JOINTS))
-        s, seen = settings_of(self.config), make_seen(self.P)
-        for b, w in np.ndindex(batch, n_workers):
-            any_seen = read_worker(measured, b, w, s.sigma_scale, seen)
-            track, particles = state.tracks[b, w], state.particles[b, w]
-            if track["tracked"]:
-                self._follow(track, particles, seen, s, state.elapsed_s.item(b), rngs[b])
-            elif any_seen:
-                _initialize(track, particles, seen, s, rngs[b])
+        seen = make_seen(self.P)
+        for b, w in np.ndindex(state.tracks.shape):
+            read_worker(measured, b, w, self.config.sigma_scale, seen)
+            self.take(state, (b, w), seen, rngs[b])
         state.elapsed_s[:] = 0.0
 
     def estimate(self, state: PaperState) -> PoseEstimate:
@@ -101,17 +109,22 @@ class PaperEstimator:
         """What is expected in `horizon_s`; see `tracking.forecast`."""
         return forecast(self.estimate(state), horizon_s, self.config)
 
-    def _follow(
-        self,
-        track: Any,
-        particles: Floats,
-        seen: Seen,
-        s: Settings,
-        elapsed_s: float,
-        rng: np.random.Generator,
+    def walk(
+        self, state: PaperState, who: Bools, dt_s: float, rngs: list[np.random.Generator]
     ) -> None:
-        """The loop of lines 2 to 18 for one worker, then the estimate of line 19."""
-        config = self.config
+        """Line 7 for workers `who` (B, W); the walk's variance, by which the estimate's covariance
+        grows, is proportional to time."""
+        sigma_m = self.config.sigma_m * np.sqrt(dt_s / self.ctrl_dt)
+        state.elapsed_s[:] += dt_s
+        for b, w in np.argwhere(who):
+            roll(state.particles[b, w], sigma_m, rngs[b])  # line 7
+            state.tracks["cov_world"][b, w] += sigma_m**2 * np.eye(3)
+
+    def take(
+        self, state: PaperState, who: tuple[int, int], seen: Seen, rng: np.random.Generator
+    ) -> None:
+        """What one set of frames does to a worker: the loop of lines 2 to 18, then line 19."""
+        track, particles, config = state.tracks[who], state.particles[who], self.config
         for n in range(config.n_iterations):  # line 2: for n = 1 to N
             if n > 0:
                 roll(particles, config.sigma_m, rng)  # line 7, of further passes
@@ -120,30 +133,26 @@ class PaperEstimator:
             weigh_and_resample(seen, particles, by_weight, chance)
         mean, cov = np.empty((N_JOINTS, 3)), np.empty((N_JOINTS, 3, 3))
         moments(particles, mean, cov)  # line 19
-        elapsed_s = max(elapsed_s, 1e-6)
-        change = (mean - track["mean_world"]) / elapsed_s - track["velocity_world"]
-        track["velocity_world"] += elapsed_s / (config.velocity_tau_s + elapsed_s) * change
+        elapsed_s = max(state.elapsed_s.item(who[0]), 1e-6)
+        if track["tracked"]:
+            change = (mean - track["mean_world"]) / elapsed_s - track["velocity_world"]
+            track["velocity_world"] += elapsed_s / (config.velocity_tau_s + elapsed_s) * change
         track["mean_world"], track["cov_world"] = mean, cov
-        again = np.zeros(N_JOINTS, bool)
-        _look_after(track, seen, s, again)
-        if again.any():
-            cloud = np.empty((int(again.sum()), *particles.shape[1:]))
-            scatter(cloud, track["mean_world"][again], track["cov_world"][again], rng)
-            particles[again] = cloud
-            track["velocity_world"][again] = 0.0
+        n_supported = note_support(track, seen, config.gate_sigma)
+        track["tracked"] |= n_supported >= config.acquire_min_joints
 
 
-def _initialize(
-    track: Any, particles: Floats, seen: Seen, s: Settings, rng: np.random.Generator
-) -> None:
-    """Line 1, initialize_particle(M): clouds round the points on which views agree."""
-    points, cov = np.empty((N_JOINTS, 3)), np.empty((N_JOINTS, 3, 3))
-    found = np.empty(N_JOINTS, bool)
-    if find_body(seen, s, points, cov, found):
-        scatter(particles, points, cov, rng)
-        track["mean_world"], track["cov_world"], track["velocity_world"] = points, cov, 0.0
-        track["age_s"][found] = 0.0
-        track["tracked"] = True
+def place_of(P: Floats, config: PaperConfig) -> Floats:
+    """(3, 2) least and most x, y, z of the first particles [m]: as configured, else what the
+    cameras P (C, 3, 4) stand round or, along an axis on which they do not, two standard deviations
+    about the prior."""
+    if config.place_m:
+        return np.array(config.place_m)
+    eyes = -np.linalg.solve(P[:, :, :3], P[:, :, 3:])[:, :2, 0]
+    place = np.array([*zip(eyes.min(0), eyes.max(0), strict=True), HEIGHTS_M])
+    for i in np.flatnonzero(np.diff(place)[:, 0] < _NARROWEST_M):
+        place[i] = config.prior_mean_world[i] + 2 * config.prior_std_m * np.array([-1, 1])
+    return place
 
 
 def _chance(by_weight: bool, n_particles: int, rng: np.random.Generator) -> Floats:
@@ -180,30 +189,21 @@ def weigh_and_resample(seen, particles, by_weight, chance):
 
 
 @kernel(makes_arrays=True)
-def _look_after(track, seen, s, again):
-    """Ages and conflicts of one worker; joints that views agree on elsewhere are found again."""
-    mean, cov, age, conflict = track.mean_world, track.cov_world, track.age_s, track.conflict
-    n_joints, n_cameras = seen.ok.shape
-    middle, point, spread = np.empty(3), np.empty(3), np.empty((3, 3))
-    middle_of(mean, np.ones(n_joints, np.bool_), middle)
-    for j in range(n_joints):
+def note_support(track, seen, gate_sigma):
+    """Count ages and conflicts of one worker's joints; how many of these a view supports."""
+    mean, cov, n_supported = track.mean_world, track.cov_world, 0
+    for j in range(len(mean)):
         n_ok, n_supporting = 0, 0
-        for c in range(n_cameras):
+        for c in range(seen.ok.shape[1]):
             if seen.ok[j, c]:
                 z, sigma = seen.z[j, c], seen.sigma[j, c]
                 n_ok += 1
-                n_supporting += supports(seen.P[c], z, sigma, s.gate_sigma, mean[j], cov[j])
-        conflict[j] = count_conflict(n_ok, n_supporting, conflict[j])
+                n_supporting += supports(seen.P[c], z, sigma, gate_sigma, mean[j], cov[j])
+        track.conflict[j] = count_conflict(n_ok, n_supporting, track.conflict[j])
         if n_supporting > 0:
-            age[j] = 0.0
-        if conflict[j] >= s.conflict_frames and find_again(seen, j, s, middle, point, spread):
-            mean[j], cov[j], age[j], conflict[j], again[j] = point, spread, 0.0, 0, True
-
-
-def scatter(particles: Floats, mean: Points3, cov: Covariances3, rng: np.random.Generator) -> None:
-    """Draw clouds (..., 3, M) from Gaussians with mean (..., 3) and cov (..., 3, 3), in place."""
-    root = np.linalg.cholesky(cov)
-    particles[:] = mean[..., None] + root @ rng.standard_normal(particles.shape)
+            track.age_s[j] = 0.0
+            n_supported += 1
+    return n_supported
 
 
 def roll(particles: Floats, sigma_m: float, rng: np.random.Generator) -> None:

@@ -17,6 +17,7 @@ from assets.emulator.validate import (
 )
 from assets.emulator.watch import watch
 from assets.emulator.writing import write_calibration
+from docs import tables
 from hrc_env.config import HRCConfig
 from hrc_env.perception.calibration import POSTURES, read_calibration
 from hrc_env.perception.emulator import EmulatorConfig
@@ -73,6 +74,8 @@ def test_ratios_of_errors_have_intervals_over_clips(played, monkeypatch):
     seen = Compared(CLIPS, played, twice, families)
     monkeypatch.setattr(validate, "compared", lambda *_: seen)
     metrics = error_ratios()
+    asked = tables.asked(tables.read("emulator"))
+    assert {name for name in asked if name.split(".")[1] in families} <= metrics.keys()
     for family in families:
         for name in (f"emulator_error_ratio.{family}", f"emulator_error_ratio.{family}.p95"):
             exact = [metrics[name].value, metrics[name].low, metrics[name].high]

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from benchmarks import baselines
+from docs import tables
 from hrc_env.core.results import Metric
 
 
@@ -52,6 +53,8 @@ def test_every_agent_gets_a_row_with_intervals_and_where_it_came_from(end_to_end
             metric = results["metrics"][f"truth.{agent}.{key}"]
             assert metric["low"] <= metric["value"] <= metric["high"]
             assert metric["n"] == 2
+    asked = tables.asked(tables.read("baselines"))
+    assert {name for name in asked if name.startswith("truth.")} <= results["metrics"].keys()
     assert results["config"]["timesteps"] == 256
     assert results["versions"]["mujoco"].startswith("4")
     assert (out / "report.md").read_text().count("| `truth`, ") == 5

@@ -11,12 +11,13 @@ import pytest
 from recorded_stored import calibration
 
 from benchmarks.recorded import detections, fetch
-from benchmarks.recorded.bench import report
+from benchmarks.recorded.bench import _COLUMNS, report
 from benchmarks.recorded.calibration import read_calibration
 from benchmarks.recorded.detections import detections_of
 from benchmarks.recorded.film import film_track
 from benchmarks.recorded.films import Films
 from benchmarks.recorded.metrics import NAMES, Track
+from docs import tables
 from hrc_env.core.errors import ConfigError, DownloadError
 from hrc_env.core.records import Roi
 from hrc_env.core.results import Metric
@@ -173,6 +174,8 @@ def test_the_film_shows_all_views_of_every_frame(films, tmp_path):
 
 def test_the_table_has_a_row_for_every_estimator_and_the_lags():
     kinds = ("real_reprojection_px", "real_reprojection_either_px", "real_in_step_reprojection_px")
+    columns = {column.key.format(name) for column in _COLUMNS for name in NAMES}
+    assert tables.asked(tables.read("footage")) <= columns
     metrics = {"real_lag_frames.cam02": Metric(-2, -2, -2, "frames", 1)}
     for name in NAMES:
         keys = [f"{kind}.{name}.{part}" for kind in kinds for part in ("median", "p95")]

@@ -14,6 +14,7 @@ from benchmarks.tracking.names import DLT, rows
 from benchmarks.tracking.rigs import RIGS, make_rig
 from benchmarks.tracking.sequences import make_sequences
 from benchmarks.tracking.timing import time_association, time_estimator
+from docs import tables
 from hrc_env.core.errors import ConfigError
 from hrc_env.experiments.study import runner
 from hrc_env.tracking.estimators import ESTIMATORS
@@ -61,6 +62,8 @@ def test_every_key_is_written_in_the_shared_form(end_to_end):
     results = json.loads((out / "results.json").read_text())
     assert set(results) >= {"config", "git", "versions", "machine", "seeds", "metrics"}
     metrics = results["metrics"]
+    for name in ("tracking", "tracking_cost"):
+        assert tables.asked(tables.read(name)) <= metrics.keys()
     for name in ESTIMATORS:
         assert f"ratio_to_bound.{name}" in metrics
         for batch in ("1", "64", "hard_64"):

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from docs import tables
 from hrc_env.__main__ import main
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import N_JOINTS
@@ -67,7 +68,7 @@ def end_to_end(tmp_path_factory):
 def test_every_number_of_every_setting_is_there_and_finite(end_to_end):
     out, metrics, _ = end_to_end
     written = json.loads((out / "results.json").read_text())["metrics"]
-    assert written.keys() == metrics.keys()
+    assert tables.asked(tables.read("ablations")) <= written.keys() == metrics.keys()
     for study in ABLATIONS.values():
         for setting in study.settings:
             key = f"{study.name}.{setting.name}"
@@ -78,6 +79,8 @@ def test_every_number_of_every_setting_is_there_and_finite(end_to_end):
             assert (f"p.error_m.{key}.p95" in metrics) == is_compared
             assert {f"{what}.{key}" for what in ("rmse_m", "coverage95", "lost")} <= metrics.keys()
             assert (f"update_us.{key}" in metrics) == setting.is_timed
+            for what in ("id_switches", "idf1"):
+                assert (f"{what}.{key}" in metrics) == (setting.n_workers > 1)
     for name, metric in metrics.items():
         assert np.isfinite([metric.value, metric.low, metric.high]).all(), name
     assert all(setting.is_timed for setting in ABLATIONS["algorithm1"].settings)

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from docs import tables
 from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.experiments.impact import episodes, policies
 from hrc_env.experiments.impact.episodes import STEP, Stage, _build, bodies_of, judge, sums_of
@@ -183,6 +184,10 @@ def test_every_row_says_everything(end_to_end):
                 assert np.isfinite(metrics[f"{policy}.{setup}.{key}"].value), (policy, setup, key)
     written = json.loads((out / "results.json").read_text())
     assert set(written["metrics"]) == set(metrics)
+    asked = tables.asked(tables.read("impact")) | tables.asked(tables.read("lateness"))
+    asked = {name for name in asked if name.split(".")[-2] in TINY.setups and "ppo" not in name}
+    assert len(asked) > 20
+    assert asked <= metrics.keys()
     assert written["seeds"] == [1_000_000, 1_000_001]
 
 

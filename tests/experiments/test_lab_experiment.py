@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from docs import tables
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import JOINT
 from hrc_env.experiments.lab import experiment
@@ -27,7 +28,7 @@ def end_to_end(weights, tmp_path_factory):
 def test_every_number_is_there(end_to_end):
     out, metrics = end_to_end
     written = json.loads((out / "results.json").read_text())["metrics"]
-    assert written.keys() == metrics.keys()
+    assert tables.asked(tables.read("lab")) <= written.keys() == metrics.keys()
     for motion in MOTIONS:
         for camera in CAMERAS:
             for word in ("median", "p95"):

@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from docs import tables
 from hrc_env.core.errors import ConfigError
 from hrc_env.experiments.site import experiment
 from hrc_env.experiments.site.experiment import STUDY, SiteConfig, config_for
@@ -31,6 +32,8 @@ def test_every_number_is_there(end_to_end):
     for camera in CAMERAS:
         assert metrics[f"closed_rmse_m.particle.{camera}"].value > 0
     assert {"rmse_m.particle.two", "rmse_m.particle.three"} <= written.keys() == metrics.keys()
+    asked = tables.asked(tables.read("site"))
+    assert {name for name in asked if name.split(".")[1] in TINY.estimators} <= metrics.keys()
 
 
 def test_four_cameras_know_the_head_and_one_does_not(end_to_end):

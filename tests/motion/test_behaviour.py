@@ -10,9 +10,10 @@ from recorded import started
 from hrc_env.core.errors import ConfigError
 from hrc_env.motion import generator
 from hrc_env.motion import state as st
-from hrc_env.motion.schedule import JOBS, Job, picked, schedule_at
+from hrc_env.motion.schedule import JOBS, WORK, Job, picked, schedule_at
 from hrc_env.motion.traffic import APART_M
-from hrc_env.worker.body import load_body
+from hrc_env.worker.body import load_body, worker_truth
+from hrc_env.worker.props import PROP_NAMES
 
 NO_REACTIONS = generator.PEOPLE["unaware"]
 
@@ -74,12 +75,39 @@ def test_a_task_of_ones_own_is_what_workers_do():
 
 @pytest.mark.parametrize(
     ("change", "message"),
-    [({"activity": "hamer"}, "hammer"), ({"at": "roof"}, "robot"), ({"prop": "piano"}, "prop")],
+    [
+        ({"activity": "hamer"}, "hammer"),
+        ({"at": "roof"}, "robot"),
+        ({"prop": "piano"}, "prop"),
+        ({"height_m": -0.1}, "height_m must be 0 to 2.2 m"),
+    ],
 )
 def test_a_task_that_cannot_be_is_refused_with_what_can(change, message):
     job = dataclasses.replace(Job("work", "reach", "robot", (("work", 1.0),)), **change)
     with pytest.raises(ConfigError, match=message):
         generator.MotionConfig(jobs=(Job("x", "reach", "robot"), job))
+
+
+def test_who_works_at_the_robots_foot_kneels_clear_of_its_pedestal_and_uses_tools():
+    config = generator.MotionConfig(jobs=WORK["low_work"], near_probability=1.0)
+    state, rngs = started(24, seed=2, config=config)
+    body, axis_m = load_body(), np.array(state.mind.plan.grounds.robot_xy_m)
+    is_leg = [name.endswith(("thigh", "shank", "foot")) for name in body.capsule_names]
+    lowest_m, held, done = np.inf, set(), set()
+    for _ in range(300):
+        _, motion = generator.advance(state, rngs, 0.1, 1)
+        truth = worker_truth(body, motion)
+        legs, radius_m = truth.capsules_world[:, 0, is_leg], truth.capsule_radius_m[:, 0, is_leg]
+        for share in (0.0, 0.5, 1.0):
+            along = legs[..., 0, :2] * (1.0 - share) + legs[..., 1, :2] * share
+            away_m = np.abs(along - axis_m).max(-1) - radius_m
+            assert away_m.min() > 0.28  # half the foot plate's side
+        lowest_m = min(lowest_m, truth.joints_world[:, 0, 9:11, 2].min())
+        held |= set(np.unique(motion.held.kind).tolist())
+        done |= {state.mind.schedule.jobs[k].name for k in state.workers["job"][:, 0].tolist()}
+    assert lowest_m < 0.1  # a knee is on the floor
+    assert {PROP_NAMES.index("drill"), PROP_NAMES.index("hammer")} <= held
+    assert {name for name, _ in WORK["low_work"][0].then} <= done
 
 
 def test_more_workers_than_fit_are_refused():

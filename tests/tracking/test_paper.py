@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from simulated import DT, LAB, Damage, detections, generators, keypoints, track, walk
 
+from hrc_env.core.errors import ConfigError
 from hrc_env.tracking.config import PaperConfig
 from hrc_env.tracking.estimators import make_estimator
-from hrc_env.tracking.paper import roll
+from hrc_env.tracking.paper import place_of, roll
 
 SIGMA_PX, FOCAL_PX = 3.0, 100.0
 AFFINE = np.array(
@@ -42,7 +43,7 @@ def test_it_converges_to_the_kalman_filter_on_a_linear_gaussian_problem(n_partic
     px = np.stack([truth[..., [0, 2]], truth[..., [1, 2]]], 1) * FOCAL_PX + 500
     px += SIGMA_PX * rng.standard_normal(px.shape)
     config = PaperConfig(n_particles=n_particles, sigma_m=walk_m, min_std_m=1e-6, gate_sigma=20.0)
-    estimates = track(make_estimator("paper", AFFINE, DT, config), px[:, None], SIGMA_PX)
+    estimates = track(make_estimator("paper_restarts", AFFINE, DT, config), px[:, None], SIGMA_PX)
     mean = np.stack([e.mean_world[0, 0] for e in estimates])
     exact, variance = kalman(px[1:], mean[0], walk_m)
     error = np.sqrt(np.mean((mean[1:] - exact) ** 2 / variance))
@@ -100,9 +101,61 @@ def test_other_resampling_and_more_passes_follow_too(setting):
 
 
 def test_walking_for_a_longer_time_spreads_the_particles_more():
-    estimator = make_estimator("paper", LAB, DT)
+    estimator = make_estimator("paper_restarts", LAB, DT)
     px, rngs, state = detections(walk(3, 1), Damage(), 3), generators(1), estimator.init(1, 1)
     estimator.update(state, keypoints(px), rngs)
     before = state.particles.var(-1)
     estimator.predict(state, 4 * DT, rngs)
     np.testing.assert_allclose((state.particles.var(-1) - before).mean(), 4 * 0.05**2, rtol=0.05)
+
+
+def test_particles_begin_all_over_the_room_that_the_cameras_stand_round():
+    estimator = make_estimator("paper", LAB, DT)
+    state = estimator.init(1, 1)
+    low, high = (side(state.particles[0, 0], axis=(0, 2)) for side in (np.min, np.max))
+    np.testing.assert_allclose(low, [-2.9, -2.6, 0.0], atol=0.01)
+    np.testing.assert_allclose(high, [2.9, 2.6, 2.2], atol=0.01)
+    estimate = estimator.estimate(state)
+    assert not estimate.tracked.any()
+    assert (np.linalg.norm(estimate.mean_world - [0, 0, 1.1], axis=-1) < 0.3).all()
+
+
+def test_cameras_on_one_wall_leave_the_depth_of_the_place_to_the_prior():
+    wall = make_estimator("paper", LAB[[0, 3]], DT, PaperConfig(prior_std_m=1.0))
+    np.testing.assert_allclose(place_of(wall.P, wall.config)[0], [-0.7, 3.3])
+    told = PaperConfig(place_m=((-1, 2), (-3, 4), (0, 1)))
+    np.testing.assert_array_equal(place_of(LAB, told), told.place_m)
+
+
+@pytest.mark.parametrize("place_m", [((0, 1), (0, 1)), ((0, 1), (0, 1), (2, 2)), (1, 2, 3)])
+def test_a_place_that_is_none_is_refused(place_m):
+    with pytest.raises(ConfigError, match="place_m must be empty or hold the least"):
+        PaperConfig(place_m=place_m)
+
+
+def test_clouds_from_all_over_the_room_find_the_body_and_are_tracked_from_then_on():
+    joints = np.repeat(walk(4, 1), 40, axis=0)
+    estimates = track(make_estimator("paper", LAB, DT), detections(joints, Damage(), 4)[:, None])
+    error = [np.median(np.linalg.norm(e.mean_world[0, 0] - joints[0], axis=-1)) for e in estimates]
+    tracked = [bool(e.tracked[0, 0]) for e in estimates]
+    begun = tracked.index(True)
+    assert all(tracked[begun:])
+    assert max(error[4:]) < 0.1
+    assert error[begun] < 0.2
+    assert error[0] > 0.2
+    assert not np.any(estimates[0].velocity_world)
+
+
+def test_the_printed_algorithm_only_walks_to_a_worker_who_is_elsewhere_and_restarts_jump():
+    """The listing has no line that begins a cloud anew."""
+    joints = np.repeat(walk(5, 1), 40, axis=0)
+    joints[20:] += [-2.0, 0.0, 0.0]
+    px = detections(joints, Damage(), 5)[:, None]
+    moved = {}
+    for name in ("paper", "paper_restarts"):
+        estimates = track(make_estimator(name, LAB, DT), px)
+        moved[name] = [np.median(e.mean_world[0, 0, :, 0] - joints[0, :, 0]) for e in estimates]
+    jumps = {name: np.abs(np.diff(x[20:])).max() for name, x in moved.items()}
+    assert jumps["paper"] < 0.4
+    assert jumps["paper_restarts"] > 1.0
+    assert moved["paper"][-1] < -1.9

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -14,17 +15,13 @@ from hrc_env.experiments.ablations.play import Sums, play, update_us, walks_of
 from hrc_env.experiments.ablations.questions.faults import CALIBRATION, LATENCY
 from hrc_env.experiments.ablations.questions.filters import ALGORITHM_1, FILTER, KINEMATICS
 from hrc_env.experiments.ablations.questions.rigs import CAMERAS, OCCLUSION, WORKERS
-from hrc_env.experiments.ablations.report import QUANTILES, report
+from hrc_env.experiments.ablations.report import report
 from hrc_env.experiments.study.cache import PartCache, PartProgress
 from hrc_env.experiments.study.counts import ERRORS_M
 from hrc_env.experiments.study.fingerprint import fingerprint_of
-from hrc_env.experiments.study.intervals import (
-    counted_quantile_of,
-    counted_quantile_over,
-    paired,
-    ratio_over,
-    rmse_over,
-)
+from hrc_env.experiments.study.intervals import counted_quantile_of as quantile_of
+from hrc_env.experiments.study.intervals import counted_quantile_over as quantile_over
+from hrc_env.experiments.study.intervals import mean_over, paired, ratio_over, rmse_over
 from hrc_env.experiments.study.rigs import DT_S, N_WARM_UP, WARM_UP_S
 from hrc_env.experiments.study.runner import Study, at_least_one, changed
 
@@ -127,33 +124,28 @@ def metrics_of(played: Played) -> dict[str, Metric]:
             key = f"{name}.{setting}"
             metrics |= _of_joints(key, sums)
             metrics[f"lost.{key}"] = ratio_over(sums["lost"], sums["frames"], "share")
+            if "idf1" in sums:
+                minutes = np.array(sums["frames"]) * DT_S / 60
+                metrics[f"id_switches.{key}"] = ratio_over(sums["id_switches"], minutes, "1/min")
+                metrics[f"idf1.{key}"] = mean_over(sums["idf1"], "share")
             if "update_us" in sums:
                 metrics[f"update_us.{key}"] = over(sums["update_us"], "us")
-        for each in ABLATIONS[name].settings:
+        for each, word in product(ABLATIONS[name].settings, ("median", "p95")):
             pair = each.name, ABLATIONS[name].reference(each)
             if pair[0] != pair[1] and set(pair) <= of_settings.keys():
-                metrics |= _differences(f"{name}.{each.name}", *(of_settings[k] for k in pair))
+                ours, theirs = (of_settings[setting]["errors"] for setting in pair)
+                off = quantile_of(ERRORS_M, [*ours, *theirs], 0.5 if word == "median" else 0.95)
+                metrics |= paired(f"error_m.{name}.{each.name}.{word}", off, len(ours), "m", 1000)
         for seen, sums in _by_sight(of_settings).items():
             metrics |= _of_joints(f"{name}.{seen}", sums)
     return metrics
 
 
-def _differences(key: str, ours: Sums, theirs: Sums) -> dict[str, Metric]:
-    """Errors less those of another setting on the same walks."""
-    found: dict[str, Metric] = {}
-    for word, (*_, q) in QUANTILES.items():
-        both = counted_quantile_of(ERRORS_M, [*ours["errors"], *theirs["errors"]], q)
-        found |= paired(f"error_m.{key}.{word}", both, len(ours["errors"]), "m", 1000)
-    return found
-
-
 def _of_joints(key: str, sums: Mapping[str, Any]) -> dict[str, Metric]:
     """Errors of joints and how well they are reported."""
-    quantiles = {
-        f"error_m.{key}.{word}": counted_quantile_over(ERRORS_M, sums["errors"], q, "m")
-        for word, (*_, q) in QUANTILES.items()
-    }
-    return quantiles | {
+    return {
+        f"error_m.{key}.median": quantile_over(ERRORS_M, sums["errors"], 0.5, "m"),
+        f"error_m.{key}.p95": quantile_over(ERRORS_M, sums["errors"], 0.95, "m"),
         f"rmse_m.{key}": rmse_over(sums["squares"], sums["joints"], "m"),
         f"coverage95.{key}": ratio_over(sums["inside"], sums["joints"], "share"),
     }

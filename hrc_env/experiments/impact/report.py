@@ -43,7 +43,7 @@ LATENESS = (
     ("belief_m", "measured in the belief"), ("margin_m", "measured as a margin in the loop"),
 )  # fmt: skip
 COLOURS = {
-    "particle": "C0", "kalman": "C2", "triangulation": "C4", "paper": "C6",
+    "particle": "C0", "kalman": "C2", "triangulation": "C4", "paper_restarts": "C6",
     "truth": "black", "none": "0.55", "pixels": "C1",
 }  # fmt: skip
 """Of perception levels, and of estimators with four cameras."""

@@ -22,7 +22,7 @@ from hrc_env.perception.lensed import Lensed
 from hrc_env.render import overlay
 from hrc_env.scene.render import CropRenderer
 
-ESTIMATORS = ("particle", "paper", "kalman")
+ESTIMATORS = ("particle", "paper", "paper_restarts", "kalman")
 """Who is given the films; misses are told of the first."""
 COLUMNS = tuple(SPOKEN)
 ALL = "all"

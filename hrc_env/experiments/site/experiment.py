@@ -30,7 +30,7 @@ CROPS = "particle"
 """The estimator that the crops of the shared film follow."""
 SETTINGS = HRCConfig(tracker=TrackerConfig(prior_std_m=3.0))
 """Unknown people may be far from the middle of the work: walks go all over the place."""
-ALSO = ("kalman",)
+ALSO = ("kalman", "paper_restarts")
 """These are given the film, too: single cameras get the best estimator that there is."""
 
 

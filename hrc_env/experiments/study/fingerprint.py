@@ -6,16 +6,13 @@ import inspect
 import json
 import sys
 from collections.abc import Mapping
-from contextlib import suppress
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 import hrc_env
+from hrc_env.core.results import versions
 
-LIBRARIES = ("numpy", "numba", "scipy", "mujoco", "gymnasium", "opencv-python-headless",
-             "ai-edge-litert", "openvino", "torch", "stable-baselines3")  # fmt: skip
 OURS = ("hrc_env", "agents", "benchmarks", "assets")
 """Packages of this repository; where it is installed, others lie beside them."""
 _PACKAGE = Path(hrc_env.__file__).resolve().parent
@@ -88,11 +85,7 @@ def _surroundings() -> str:
     """Versions of Python and libraries, and the content of every data file."""
     from hrc_env.worker.body import assets_dir  # here: --help of a command imports no compiler
 
-    versions = {"python": sys.version}
-    for name in LIBRARIES:
-        with suppress(PackageNotFoundError):
-            versions[name] = version(name)
-    digest = hashlib.sha256(json.dumps(versions).encode())
+    digest = hashlib.sha256(json.dumps({"python": sys.version} | versions()).encode())
     for root in sorted({assets_dir(), _PACKAGE}):
         for path in sorted(root.rglob("*")):
             if path.is_file() and path.suffix not in _CODE and "__pycache__" not in path.parts:

@@ -6,6 +6,7 @@ Rows that share their seeds are compared seed by seed (`paired`).
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from scipy import stats
@@ -61,8 +62,7 @@ def ratio_of(above: Numbers, below: Numbers) -> Statistic:
 
 def rmse_of(squared: Numbers, counts: Numbers) -> Statistic:
     """Root of the mean of squares, from their sum and number a seed."""
-    ratio = ratio_of(squared, counts)
-    return lambda weights: np.sqrt(ratio(weights))
+    return lambda weights: np.sqrt(ratio_of(squared, counts)(weights))
 
 
 def quantile_of(values: Sequence[Numbers], q: float) -> Statistic:
@@ -77,7 +77,7 @@ def quantile_of(values: Sequence[Numbers], q: float) -> Statistic:
     return quantile
 
 
-def counted_quantile_of(bins: Bins, counts: Sequence[Sequence[int]] | Ints, q: float) -> Statistic:
+def counted_quantile_of(bins: Bins, counts: Any, q: float) -> Statistic:
     """A quantile of counts (n, bins), a row a seed; what is beyond the last limit is that limit."""
     rows, most = np.asarray(counts, float), bins.edges[-1]
     return lambda weights: np.minimum(bins.quantile(weights @ rows, q), most)
@@ -118,10 +118,8 @@ def quantile_over(values: Sequence[Numbers], q: float, unit: str) -> Metric:
     return replace(found, n=sum(each.size for each in groups))
 
 
-def counted_quantile_over(
-    bins: Bins, counts: Sequence[Sequence[int]] | Ints, q: float, unit: str
-) -> Metric:
-    """A quantile of counts (n, bins), a row a seed: `counted_quantile_of`."""
+def counted_quantile_over(bins: Bins, counts: Any, q: float, unit: str) -> Metric:
+    """A quantile of counts (n, bins), a row a seed."""
     return bootstrap(counted_quantile_of(bins, counts, q), len(counts), unit, 1000)
 
 

@@ -49,7 +49,8 @@ WITHOUT: dict[str, tuple[str, dict[str, Any]]] = {
     "evidence in full": ("evidence in full", {"evidence_trust": 1.0}),
     "4 hypotheses": ("4 hypotheses", {"n_hypotheses": 4}),
     "16 hypotheses": ("16 hypotheses", {"n_hypotheses": 16}),
-    "paper": ("paper: Algorithm 1", {"estimator": "paper"}),
+    "paper": ("paper: Algorithm 1 as printed", {"estimator": "paper"}),
+    "paper restarts": ("paper_restarts: with restarts", {"estimator": "paper_restarts"}),
     "ransac": ("ransac: no motion, no body", {"estimator": "ransac"}),
 }
 """The default filter without one of its parts, and rivals: words, and what takes the part away,
