@@ -61,10 +61,6 @@ class Films:
         """The window of a camera's open frame, upright, (256, 256, 3) RGB."""
         return sample_window(self.frames[camera_index], window)
 
-    def empty(self, camera_index: int, window: Roi) -> Image | None:
-        """Nobody knows what a film would show without people."""
-        return None
-
     def close(self) -> None:
         """Close the files."""
         for film in self._films:

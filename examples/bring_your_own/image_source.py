@@ -24,9 +24,6 @@ class Frames:
     def crop(self, camera_index, window):
         return sample_window(self.images[camera_index], window)
 
-    def empty(self, camera_index, window):
-        return None  # nobody knows what they would show without people
-
 
 def poses(rig, films):
     """The middle of the body (3,) and its deviation [m] in every set of frames; None: nobody."""

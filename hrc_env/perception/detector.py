@@ -7,7 +7,7 @@ queue. Each has its own interpreters: what is seen does not depend on who came f
 import functools
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 import cv2
@@ -16,20 +16,22 @@ from numpy.typing import NDArray
 
 from hrc_env.core.batching import Stateful
 from hrc_env.core.errors import ConfigError, check_shape, unknown
-from hrc_env.core.records import Roi
+from hrc_env.core.records import Keypoints, Roi
 from hrc_env.core.skeleton import BLAZEPOSE_INDEX, N_JOINTS
-from hrc_env.core.typing import Floats, Image, Points2
+from hrc_env.core.typing import Floats, Image, Points2, Points3
 from hrc_env.geometry.cameras import PinholeCamera, inside_image
 from hrc_env.perception import blazepose, network
+from hrc_env.perception.believing import is_body, stands
 from hrc_env.perception.noise import STANDING, sigma_px
 from hrc_env.perception.searching import (
     Candidates,
     ImageSource,
-    agreed_windows,
     apart_from,
     distinct,
     people,
+    proposals,
     search_jobs,
+    search_windows,
 )
 from hrc_env.perception.weights import find_weights
 
@@ -116,15 +118,21 @@ class PoseDetector(Stateful):
     CHANGES = ("_looks",)
 
     def __init__(
-        self, cameras: Sequence[PinholeCamera], config: DetectorConfig | None = None
+        self,
+        cameras: Sequence[PinholeCamera],
+        config: DetectorConfig | None = None,
+        floor_world: Points3 | None = None,
     ) -> None:
-        """Raises `WeightsError` without the weights, `ConfigError` without the runtime."""
+        """Searches are laid out for people who stand at points (N, 3) [m], if these are known.
+        Raises `WeightsError` without the weights, `ConfigError` without the runtime."""
         self.cameras = tuple(cameras)
         self.config = config or DetectorConfig()
         find_weights("pose_detection")
         for name in (self.config.network, self.config.folded):
             find_weights(f"pose_landmark_{name}")
         network.chosen_runtime(self.config.runtime)
+        self.floor_world, step = floor_world, self.config.search_step
+        self._search = [search_windows(camera, floor_world, step) for camera in self.cameras]
         self._looks: dict[int, list[int]] = {}
         self._networks: tuple[_Networks, _Networks] | None = None
         self._helper: ThreadPoolExecutor | None = None
@@ -150,34 +158,32 @@ class PoseDetector(Stateful):
             folded, posture: what is expected of the worker (`outline.is_folded`, `posture_of`).
         """
         check_shape("windows", (len(windows),), (len(self.cameras),), "one a camera")
-        looks = self._looks.setdefault(track, [0] * len(self.cameras))
-        searched = all(window is None for window in windows)
-        if searched:
-            known = self.search(source) if found is None else found
-            windows = agreed_windows(apart_from(known, others), self.cameras)
-        used = [(c, window) for c, window in enumerate(windows) if window is not None]
-        sight = _nobody(windows)
-
-        def job(c: int, window: Roi) -> Callable[[_Networks], Floats | None]:
-            crop = sight.crops[c] = _seen(source.crop(c, window), window, self.cameras[c])
-            ask = not searched and self._is_turn(looks[c], c)
-            return functools.partial(_joints, crop, window, ask, folded, self.config)
-
-        joints_of = self._share(job(c, window) for c, window in used)  # drawn one after the other
-        before, looks[:] = list(looks), [0] * len(looks)  # 0: the detector stage is asked next
-        for (c, window), joints in zip(used, joints_of, strict=True):
-            if joints is not None:
-                looks[c] = before[c] + 1
-                self._write(sight, c, window, joints, posture)
-        return sight
+        if any(windows):
+            return self._look(source, windows, track, folded, posture)
+        known = self.search(source) if found is None else found
+        for proposal in proposals(apart_from(known, others), self.cameras):
+            self.forget(track)
+            sight = self._look(source, proposal, track, folded, posture)
+            if self._is_somebody(sight):
+                return sight
+        self.forget(track)
+        return _nobody([None] * len(windows))
 
     def search(self, source: ImageSource, which: Sequence[int] | None = None) -> list[list[Roi]]:
         """Regions of interest of the people in whole images of cameras `which` (None: all), best
-        first; empty for the others."""
+        first; empty for the others. Both networks are sure of them."""
         which = range(len(self.cameras)) if which is None else which
-        jobs = search_jobs(source, self.cameras, which, self.config.search_step)
+        jobs = search_jobs(source, self._search, which)
         found = self._share(lambda nets, job=job: job(nets.detect) for job in jobs)
-        return distinct([one for some in found for one in some], len(self.cameras))
+        people = distinct([one for some in found for one in some], len(self.cameras))
+        asked = [(c, window) for c, windows in enumerate(people) for window in windows]
+        sure = replace(self.config, min_presence=self.config.sure_presence)
+        joints_of = self._share(
+            functools.partial(_joints, self._crop(source, *one), one[1], True, False, sure)
+            for one in asked
+        )
+        known = [one for one, joints in zip(asked, joints_of, strict=True) if joints is not None]
+        return [[window for k, window in known if k == c] for c in range(len(self.cameras))]
 
     def forget(self, track: int) -> None:
         """Treat this track as new: the detector stage is asked at its next look."""
@@ -191,6 +197,53 @@ class PoseDetector(Stateful):
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_helper": None, "_networks": None}
+
+    def _look(
+        self,
+        source: ImageSource,
+        windows: Sequence[Roi | None],
+        track: int,
+        folded: bool,
+        posture: Sequence[float],
+    ) -> Detection:
+        """One worker's joints in these windows."""
+        looks = self._looks.setdefault(track, [0] * len(self.cameras))
+        used = [(c, window) for c, window in enumerate(windows) if window is not None]
+        sight = _nobody(windows)
+
+        def job(c: int, window: Roi) -> Callable[[_Networks], Floats | None]:
+            crop = sight.crops[c] = self._crop(source, c, window)
+            ask = self._is_turn(looks[c], c)
+            return functools.partial(_joints, crop, window, ask, folded, self.config)
+
+        joints_of = self._share(job(c, window) for c, window in used)  # drawn one after the other
+        before, looks[:] = list(looks), [0] * len(looks)  # 0: the detector stage is asked next
+        for (c, window), joints in zip(used, joints_of, strict=True):
+            if joints is not None:
+                looks[c] = before[c] + 1
+                self._write(sight, c, window, joints, posture)
+        return sight
+
+    def _is_somebody(self, sight: Detection) -> bool:
+        """Whether what a search has found is a person; of a floor that is not known, a camera that
+        is the only one is believed."""
+        shown = np.flatnonzero(sight.confidence.any(1)).tolist()
+        if len(shown) > 1:
+            joints = (sight.px, sight.confidence, sight.sigma_px)
+            return is_body(Keypoints(*(each[None, :, None] for each in joints)), self.cameras)
+        if not shown or self.floor_world is None:
+            return shown == [0] and len(self.cameras) == 1
+        (c,) = shown
+        return stands(sight.px[c], sight.confidence[c], self.cameras[c], self.floor_world)
+
+    def _crop(self, source: ImageSource, c: int, window: Roi) -> Image:
+        """A copy of the crop, black where the camera does not see: renderers go on drawing."""
+        crop, camera = source.crop(c, window), self.cameras[c]
+        check_shape("crop", crop.shape, (SIDE, SIDE, 3), "rows, columns, RGB")
+        mask = _frame_mask(window, camera.width_px, camera.height_px)
+        if mask is None:
+            return np.array(crop)
+        return np.asarray(cv2.bitwise_and(crop, crop, mask=mask), np.uint8)
 
     def _is_turn(self, looks: int, camera: int) -> bool:
         """Whether the detector stage is due; the cameras take turns to spread its cost."""
@@ -278,15 +331,6 @@ def _joints(
     joints = blazepose.decode_landmarks(points, heat)[BLAZEPOSE_INDEX]
     joints[:, :2] = blazepose.to_image(joints[:, :2], window)
     return joints
-
-
-def _seen(crop: Image, window: Roi, camera: PinholeCamera) -> Image:
-    """A copy of the crop, black where the camera does not see: renderers go on drawing."""
-    check_shape("crop", crop.shape, (SIDE, SIDE, 3), "rows, columns, RGB")
-    mask = _frame_mask(window, camera.width_px, camera.height_px)
-    if mask is None:
-        return np.array(crop)
-    return np.asarray(cv2.bitwise_and(crop, crop, mask=mask), np.uint8)
 
 
 @functools.lru_cache(maxsize=64)

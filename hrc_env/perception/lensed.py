@@ -5,7 +5,7 @@ and just wide enough to cover it. Keypoints go to the tracker in pinhole pixels.
 """
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -39,10 +39,6 @@ class Drawer(Protocol):
         """The window of what a pinhole would see, (size, size, 3) RGB, top row first."""
         ...
 
-    def unpeopled(self, camera: PinholeCamera, window: Roi) -> Image:
-        """The same without people."""
-        ...
-
 
 @dataclass(frozen=True, slots=True)
 class _Cover:
@@ -66,21 +62,12 @@ class Lensed:
 
     def view(self, camera: PinholeCamera, window: Roi) -> Image:
         """The same of any camera."""
-        return self._distorted(camera, window, self.drawer.view)
-
-    def empty(self, camera_index: int, window: Roi) -> Image:
-        """The window of a camera's image, were nobody there: the robot knows where it is itself."""
-        return self._distorted(self.cameras[camera_index], window, self.drawer.unpeopled)
-
-    def _distorted(
-        self, camera: PinholeCamera, window: Roi, draw: Callable[[PinholeCamera, Roi], Image]
-    ) -> Image:
         if camera.lens is None:
-            return draw(camera, window)
+            return self.drawer.view(camera, window)
         cover = _cover(camera, window, self.drawer.size_px)
         if cover is None:
             return np.zeros((self.drawer.size_px, self.drawer.size_px, 3), np.uint8)
-        drawn = draw(cover.camera, cover.window)
+        drawn = self.drawer.view(cover.camera, cover.window)
         return np.asarray(cv2.remap(drawn, cover.x, cover.y, cv2.INTER_LINEAR), np.uint8)
 
 

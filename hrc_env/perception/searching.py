@@ -1,8 +1,8 @@
 """Detects people without a prior: searches of whole images, and who is the same in several.
 
-The detector stage needs a person to be a quarter of its window high. Windows are laid round what
-differs from the empty scene where that is known; else squares as large as the image are. The lines
-of sight to one person's hips meet; those to two people, or to a mistake, rarely do.
+It sees pictures only. The detector stage needs a person to be a third of its window high. Where the
+floor is known, windows are as large as people on it need; else as large as the image. The lines of
+sight to one person's hips meet; those to two people, or to a mistake, rarely do.
 """
 
 import itertools
@@ -10,14 +10,14 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import Protocol
 
-import cv2
 import numpy as np
 
 from hrc_env.core.records import Roi
-from hrc_env.core.typing import Image, Points3
+from hrc_env.core.typing import Floats, Image, Points2, Points3
 from hrc_env.geometry.cameras import (
     PinholeCamera,
     image_from_pinhole,
+    inside_image,
     pinhole_magnification,
     project,
     rays,
@@ -27,15 +27,10 @@ from hrc_env.perception.network import PersonDetector
 
 SEARCH_RAD = math.radians(75.0)
 """In a wider search window people are too small for the detector stage."""
-DIFFERENCE = 20
-"""Grey levels by which a pixel must differ from the empty place, in one colour at least."""
-MEND_PX, MEDIAN_PX = 7, 3
-"""Of a crop: parts of one thing are less than the first apart; a median over the second smooths."""
-LEAST_PX, MOST_SHARE, MOST_PLACES = 40, 0.7, 5
-"""Least area of a change [px of a crop]; share of a crop above which it is looked at as a whole;
-places in a window."""
-ROOM = 1.6
-"""Windows round what has changed are so many times as large."""
+STATURE_M = 1.75
+"""Of the people for whom a search is laid out [m]."""
+ROOM, FITTING = 2.1, (1.25, 2.8)
+"""Sides of search windows in heights of a person, and where the detector stage still finds most."""
 MEETING_M = 0.3
 """Lines of sight that pass a point within this distance [m] see the same hips there."""
 SIDE_M = (1.1, 3.6)
@@ -44,6 +39,8 @@ MIN_CROSSING = 0.1
 """Sine of the smallest angle between two lines that fixes a point."""
 Candidates = Sequence[Sequence[Roi]]
 """(C,) the people found by each camera."""
+Windows = list[Roi | None]
+"""One person's window a camera (C,)."""
 Found = tuple[int, float, Roi]
 """Which camera, how sure, where."""
 
@@ -55,47 +52,18 @@ class ImageSource(Protocol):
         """The window of a camera's present image, upright, (256, 256, 3) RGB."""
         ...
 
-    def empty(self, camera_index: int, window: Roi) -> Image | None:
-        """The same if nobody were there, robot and all; None where that is not known."""
-        ...
-
 
 def search_jobs(
-    source: ImageSource, cameras: Sequence[PinholeCamera], which: Sequence[int], step: float
+    source: ImageSource, windows: Sequence[Sequence[Roi]], which: Sequence[int]
 ) -> Iterator[Callable[[PersonDetector], list[Found]]]:
-    """Draw one place after the other; each comes with the work that is to be done on it."""
+    """Draw one window (C, ...) after the other; each comes with the work that is to be done."""
     for c in which:
-        for window in search_windows(cameras[c], step):
+        for window in windows[c]:
             crop = np.array(source.crop(c, window))
-            empty = source.empty(c, window)
-            places = [window] if empty is None else changed(crop, empty, window)
-            for place in places:
-                picture = crop if place == window else np.array(source.crop(c, place))
-                yield lambda detect, c=c, k=picture, w=place: [
-                    (c, person.score, blazepose.person_window(person, w))
-                    for person in people(detect, k)
-                ]
-
-
-def changed(crop: Image, empty: Image, window: Roi) -> list[Roi]:
-    """Windows round what differs between a crop of `window` and the empty place, largest first."""
-    differs = cv2.absdiff(crop, empty).max(-1)
-    mask = (cv2.medianBlur(differs, MEDIAN_PX) > DIFFERENCE).astype(np.uint8)
-    mask = cv2.dilate(mask, np.ones((MEND_PX, MEND_PX), np.uint8))
-    _, _, stats, _ = cv2.connectedComponentsWithStats(mask)
-    blobs = sorted(stats[1:].tolist(), key=lambda blob: -blob[cv2.CC_STAT_AREA])
-    size, places = len(crop), []
-    for left, top, width, height, area in blobs[:MOST_PLACES]:
-        if area < LEAST_PX:
-            break
-        side = ROOM * max(width, height) / size
-        if side > MOST_SHARE:
-            places.append(window)
-            continue
-        middle = np.array([[left + width / 2, top + height / 2]]) / size
-        x, y = blazepose.to_image(middle, window)[0].tolist()
-        places.append(Roi((x, y), side * window.side_px, window.rotation_rad))
-    return list(dict.fromkeys(places))
+            yield lambda detect, c=c, k=crop, w=window: [
+                (c, person.score, blazepose.person_window(person, w))
+                for person in people(detect, k)
+            ]
 
 
 def people(detect: PersonDetector, crop: Image) -> list[blazepose.Person]:
@@ -104,13 +72,50 @@ def people(detect: PersonDetector, crop: Image) -> list[blazepose.Person]:
     return blazepose.decode_people(*detect(image))
 
 
-def search_windows(camera: PinholeCamera, step: float = 0.5) -> list[Roi]:
-    """Upright squares, as large as image and lens (`SEARCH_RAD`) allow, that cover the image."""
+def search_windows(
+    camera: PinholeCamera, floor_world: Points3 | None = None, step: float = 0.5
+) -> list[Roi]:
+    """Upright squares in which the detector stage finds whoever is there.
+
+    Args:
+        camera: whose image is searched.
+        floor_world: (N, 3) where people may stand [m]: as few windows as show each of them large
+            enough. None, as for films: squares as large as image and lens (`SEARCH_RAD`) allow.
+        step: then they follow each other by at most this share of their side.
+    """
+    if floor_world is not None:
+        return _covering(*_standing(camera, floor_world))
     side = float(min(camera.width_px, camera.height_px))
     if camera.lens is not None:
         side = min(side, SEARCH_RAD * float(camera.K[0, 0]))
     columns = _middles(camera.width_px, side, step)
     return [Roi((x, y), side, 0.0) for y in _middles(camera.height_px, side, step) for x in columns]
+
+
+def _standing(camera: PinholeCamera, floor_world: Points3) -> tuple[Points2, Floats]:
+    """Middles (N, 2) and heights (N,) [px of the image] of people on the floor who are in it."""
+    heights_m = np.array([[0.0], [0.5], [1.0]]) * (0.0, 0.0, STATURE_M)
+    px, depth_m = project(camera.P[None], (floor_world + heights_m[:, None])[None])
+    feet, middle, head = image_from_pinhole(camera, px[0, 0])
+    seen = (depth_m[0, 0] > 0).all(0) & inside_image(camera, middle)
+    return middle[seen], np.linalg.norm(head - feet, axis=-1)[seen]
+
+
+def _covering(middle_px: Points2, height_px: Floats) -> list[Roi]:
+    """Few windows so that everybody is well inside one that fits: the most useful one each time,
+    of those round somebody."""
+    side_px = ROOM * height_px
+    fits = side_px[:, None] / height_px
+    off_px = np.abs(middle_px[:, None] - middle_px).max(-1)
+    covers = (off_px <= (side_px[:, None] - height_px) / 2) & (fits >= FITTING[0])
+    covers &= fits <= FITTING[1]
+    windows = []
+    while covers.any():
+        best = int(np.argmax(covers.sum(1)))
+        (x, y), side = middle_px[best].tolist(), float(side_px[best])
+        windows.append(Roi((x, y), side, 0.0))
+        covers[:, covers[best]] = False
+    return windows
 
 
 def distinct(found: Sequence[Found], n_cameras: int) -> list[list[Roi]]:
@@ -141,6 +146,18 @@ def agreed_windows(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> 
         if rank > best_rank:
             best, best_rank = windows, rank
     return best
+
+
+def proposals(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Iterator[Windows]:
+    """Who it may be, best first, a window a camera (C,): whom several cameras agree on, then whom
+    only one has found."""
+    left = candidates
+    while any(agreed := agreed_windows(left, cameras)):
+        yield agreed
+        left = apart_from(left, [agreed])
+    for c, found in enumerate(left):
+        for window in found:
+            yield [window if k == c else None for k in range(len(cameras))]
 
 
 def apart_from(candidates: Candidates, others: Sequence[Sequence[Roi | None]]) -> Candidates:

@@ -4,14 +4,14 @@ from collections.abc import Sequence
 
 from hrc_env.core.batching import Stateful
 from hrc_env.core.records import Keypoints, PoseEstimate, Roi
-from hrc_env.core.typing import Image
+from hrc_env.core.typing import Image, Points3
 from hrc_env.geometry.cameras import PinholeCamera, project, projections
 from hrc_env.perception.detector import Detection, DetectorConfig, PoseDetector
 from hrc_env.perception.noise import STANDING
 from hrc_env.perception.outline import is_folded, posture_of
 from hrc_env.perception.searching import ImageSource
 from hrc_env.perception.windows import steady_window, window_from_joints
-from hrc_env.pipeline.reacquisition import Reacquisition, SearchSchedule
+from hrc_env.pipeline.reacquisition import ENOUGH, Reacquisition, SearchSchedule
 from hrc_env.pipeline.sensor_input import Windows
 
 
@@ -21,11 +21,17 @@ class Looking(Stateful):
     CHANGES = ("detector", "windows", "schedule", "reacquisition")
 
     def __init__(
-        self, batch: int, cameras: Sequence[PinholeCamera], n_workers: int, config: DetectorConfig
+        self,
+        batch: int,
+        cameras: Sequence[PinholeCamera],
+        n_workers: int,
+        config: DetectorConfig,
+        floor_world: Points3 | None = None,
     ) -> None:
+        """`floor_world` (N, 3) [m]: where people may stand, if that is known."""
         self.cameras, self.n_workers = tuple(cameras), n_workers
         self.P = projections(self.cameras)
-        self.detector = PoseDetector(self.cameras, config)
+        self.detector = PoseDetector(self.cameras, config, floor_world)
         self.windows: list[Windows] = [
             [[None] * len(self.cameras) for _ in range(n_workers)] for _ in range(batch)
         ]
@@ -70,8 +76,9 @@ class Looking(Stateful):
             folded, posture = _expected_posture(expected, worker)
             seen = self.detector.detect(source, windows, track, taken, people, folded, posture)
             taken.append(seen.windows)
-            self.reacquisition.saw(b, worker, seen.confidence.max(-1) > 0.0)
-            missed |= not any(windows) and not seen.confidence.any()
+            shown = seen.confidence.max(-1) > 0.0
+            self.reacquisition.saw(b, worker, shown)
+            missed |= not any(windows) and shown.sum() < min(ENOUGH, len(shown))
             self._keep(b, worker, seen, has_image, out)
         if missed:
             self.schedule.rest(b)

@@ -17,6 +17,7 @@ from hrc_env.pipeline.tracking import PoseTracking, no_keypoints
 from hrc_env.scene.build import Scene
 from hrc_env.scene.domain_randomization import AS_BUILT, AppearanceConfig, Look, draw_look
 from hrc_env.scene.render import CropRenderer
+from hrc_env.scene.rigs import floor
 from hrc_env.tracking.estimators import Estimator
 
 
@@ -68,7 +69,8 @@ class PixelPipeline(PoseTracking):
     ) -> None:
         self.cameras = RenderedCameras(scene, batch, config.appearance, schedule)
         super().__init__(batch, scene, tracker, config, self.cameras)
-        self.looking = Looking(batch, scene.cameras, scene.n_workers, config.detector)
+        rig, floor_world = scene.cameras, floor(scene.grounds)
+        self.looking = Looking(batch, rig, scene.n_workers, config.detector, floor_world)
 
     def detect(self, ids: Ints, expected: PoseEstimate, sensor_rngs: Generators) -> Keypoints:
         """Landmarks of crops round the expected workers, or of a search where there are none."""

@@ -35,8 +35,6 @@ class Part:
     category: mujoco.mjtCatBit
     sky: bool
     """Behind all else; False: black."""
-    group: int | None = None
-    """Geoms of this group only, and no skins."""
     sunny: bool = True
     """With the light that casts shadows."""
 
@@ -46,8 +44,6 @@ STILL = Part(mujoco.mjtCatBit.mjCAT_STATIC, True)
 MOVING = Part(mujoco.mjtCatBit.mjCAT_DYNAMIC, False)
 IN_THE_SHADE = Part(mujoco.mjtCatBit.mjCAT_STATIC, True, sunny=False)
 BEFORE_THE_SUN = Part(mujoco.mjtCatBit.mjCAT_DYNAMIC, False, sunny=False)
-ROBOT = Part(mujoco.mjtCatBit.mjCAT_DYNAMIC, False, ROBOT_LOOKS)
-"""The arm alone: the part that needs no camera to be known."""
 
 
 class Canvas:
@@ -112,7 +108,7 @@ class Canvas:
             return
         self._fresh.add(what)
         mujoco.mjv_updateScene(
-            self._model, self._data, self._chosen(what), None, self._camera,
+            self._model, self._data, self._option, None, self._camera,
             int(what.category), self._shown,
         )  # fmt: skip
         if self._look is not None and what.sky:
@@ -131,15 +127,6 @@ class Canvas:
         self._option.geomgroup[:] = 0
         self._option.geomgroup[list(groups)] = 1
         self._fresh.clear()
-
-    def _chosen(self, what: Part) -> mujoco.MjvOption:
-        if what.group is None:
-            return self._option
-        option = copy.copy(self._option)
-        option.geomgroup[:] = 0
-        option.geomgroup[what.group] = 1
-        option.flags[mujoco.mjtVisFlag.mjVIS_SKIN.value] = 0
-        return option
 
     def aim(self, camera: PinholeCamera, window: Roi, height_px: float) -> None:
         """Look through a turned rectangle of a camera's image, `side_px` wide and `height_px` high

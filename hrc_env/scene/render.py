@@ -16,7 +16,7 @@ from hrc_env.core.typing import Image, JointAngles
 from hrc_env.geometry.cameras import PinholeCamera, pinhole
 from hrc_env.scene import gl
 from hrc_env.scene.build import Scene
-from hrc_env.scene.canvas import ALL_GROUPS, EVERYTHING, MOVING, ROBOT, STILL, Canvas, Part
+from hrc_env.scene.canvas import ALL_GROUPS, EVERYTHING, MOVING, STILL, Canvas, Part
 from hrc_env.scene.primitives import OVERHEAD
 
 CROP_PX = 256
@@ -26,8 +26,8 @@ CROP_QUALITY = {
 PICTURE_QUALITY = {
     "offsamples": 4, "shadowsize": 8192, "numslices": 40, "numstacks": 20, "numquads": 4,
 }  # fmt: skip
-WINDOWS_KEPT = 4
-"""Windows per camera whose background is kept."""
+WINDOWS_KEPT = 40
+"""Windows per camera whose background is kept: those of a search too."""
 Key: TypeAlias = tuple[float, ...]
 """The numbers of a camera and of a window."""
 
@@ -77,17 +77,13 @@ class CropRenderer(Canvas):
             self._remember(key, None)
             self._show(EVERYTHING, camera, window)
             return self.paint()
-        return self._before_the_still(MOVING, camera, window)
-
-    def unpeopled(self, camera: PinholeCamera, window: Roi) -> Image:
-        """The same without people and what they hold: the place, and the robot as it stands."""
-        return self._before_the_still(ROBOT, camera, window)
+        return self._before_the_still(camera, window)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return CropRenderer, (self.scene, self.size_px)
 
-    def _before_the_still(self, part: Part, camera: PinholeCamera, window: Roi) -> Image:
-        """A part of what moves before what stands still, which is drawn at its first use."""
+    def _before_the_still(self, camera: PinholeCamera, window: Roi) -> Image:
+        """What moves before what stands still, which is drawn at its first use."""
         key = _key(camera, window)
         still = self._kept.get(key)
         if still is None:
@@ -96,7 +92,7 @@ class CropRenderer(Canvas):
             self.read(self._rgb, z)
             still = np.ascontiguousarray(self._rgb[::-1]), z
         self._remember(key, still)
-        self._show(part, camera, window)
+        self._show(MOVING, camera, window)
         self.read(self._rgb, self._z)
         crop = still[0].copy()
         _lay_over(self._rgb, self._z, still[1], crop)

@@ -26,6 +26,18 @@ HEIGHTS_M = (0.2, 0.6, 1.0, 1.4, 1.8)
 SPACING_M = 0.5
 
 
+def floor(grounds: Grounds) -> Points3:
+    """(N, 3) points all over the walkable floor [m], without those in the robot or other things."""
+    points = workspace(grounds)
+    points = points[points[:, 2] == HEIGHTS_M[0]] * (1.0, 1.0, 0.0)
+    away = points[:, None, :2] - grounds.blocked[:, :2]
+    c, s = np.cos(grounds.blocked[:, 4]), np.sin(grounds.blocked[:, 4])
+    along, across = away[..., 0] * c + away[..., 1] * s, away[..., 1] * c - away[..., 0] * s
+    inside = (abs(along) < grounds.blocked[:, 2]) & (abs(across) < grounds.blocked[:, 3])
+    from_robot_m = np.linalg.norm(points[:, :2] - grounds.robot_xy_m, axis=-1)
+    return points[~inside.any(1) & (from_robot_m > grounds.robot_clearance_m)]
+
+
 def workspace(grounds: Grounds) -> Points3:
     """(P, 3) points all over the walkable area, from ankles to heads [m]."""
     (x0, x1), (y0, y1) = grounds.walkable_x_m, grounds.walkable_y_m

@@ -19,9 +19,6 @@ class Stills:
     def crop(self, camera_index, window):
         return sample_window(self.images[camera_index], window)
 
-    def empty(self, camera_index, window):
-        return None
-
 
 def hung_in_a_room(picture, left, top, width=1920, height=1080):
     """A large grey image with the picture at a place, enlarged twice."""

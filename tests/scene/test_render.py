@@ -113,33 +113,6 @@ def test_drawing_twice_gives_the_same_bits(lab, person, crops):
     other.close()
 
 
-def away(person):
-    """Where no camera sees the worker: under the ground."""
-    return replace(person, position_world=person.position_world - np.array([0.0, 0.0, 100.0]))
-
-
-@pytest.mark.parametrize("place", ["lab", "site"])
-def test_the_unpeopled_place_is_what_is_seen_when_nobody_is_there(place, person):
-    """To the bit, the arm included: what differs from it are people and what they hold."""
-    scene = build(name=place, n_workers=1)
-    renderer = CropRenderer(scene)
-    for camera, turn in enumerate(np.linspace(0.0, 1.1, 4)):
-        renderer.draw(scene.home_q + turn, away(person))
-        direct = renderer.crop(camera, WINDOW)
-        np.testing.assert_array_equal(renderer.unpeopled(scene.cameras[camera], WINDOW), direct)
-    renderer.close()
-
-
-def test_people_are_left_out_of_the_unpeopled_place(lab, person):
-    renderer = CropRenderer(lab)
-    renderer.draw(lab.home_q, away(person))
-    nobody = renderer.crop(0, WINDOW)
-    renderer.draw(lab.home_q, person)
-    assert (renderer.crop(0, WINDOW) != nobody).any()
-    np.testing.assert_array_equal(renderer.unpeopled(lab.cameras[0], WINDOW), nobody)
-    renderer.close()
-
-
 @pytest.mark.parametrize("place", ["lab", "site"])
 def test_a_kept_background_changes_no_pixel(place, person):
     """Twelve poses, four cameras, windows upright, turned, and beyond the image's border."""

@@ -66,13 +66,6 @@ class CameraFilm:
                 image = spoil(Shown(image, shot.cameras[camera_index], window, seeds), fault)
         return image
 
-    def empty(self, camera_index: int, window: Roi) -> Image:
-        """What the window would show if the camera were well and nobody there."""
-        shot = self._shots[camera_index]
-        if shot is not None:
-            self._pose(shot, 0.0)
-        return self.viewer.empty(camera_index, window)
-
     def _taken(self, shot: Shot, c: int, window: Roi) -> Image:
         """The light that came while the shutter was open."""
         camera, open_s = shot.cameras[c], self.schedule.exposure_s(c, shot.step)
