@@ -16,7 +16,11 @@ from hrc_env.sb3 import HRCVecEnv
 from hrc_env.scene.rigs import RIGS
 
 ASKED = {"uncertainty": UNCERTAINTY}
-STD, TOWARDS, FACTOR = "worker_joints_std", "worker_joints_std_towards_robot", "worker_joints_factor"
+STD, TOWARDS, FACTOR = (
+    "worker_joints_std",
+    "worker_joints_std_towards_robot",
+    "worker_joints_factor",
+)
 TURN = matrix_from_quaternion(np.array([0.5, 0.1, -0.7, 0.5]))
 
 
