@@ -21,6 +21,7 @@ STD, TOWARDS, FACTOR = (
     "worker_joints_std_towards_robot",
     "worker_joints_factor",
 )
+UNTURNED = np.eye(3)
 TURN = matrix_from_quaternion(np.array([0.5, 0.1, -0.7, 0.5]))
 
 
@@ -31,7 +32,7 @@ def rolled(env, n_steps=10):
     return seen
 
 
-def robot(turn=np.eye(3)) -> RobotState:
+def robot(turn=UNTURNED) -> RobotState:
     """Two upright links of 1 m: at the origin, and a thicker one at (1, 1.05)."""
     links = np.zeros((1, 2, 2, 3))
     links[..., 1, 2], links[0, 1, :, :2] = 1.0, (1.0, 1.05)
@@ -39,7 +40,7 @@ def robot(turn=np.eye(3)) -> RobotState:
     return RobotState(*still, links @ turn.T, np.array([0.05, 0.2]))
 
 
-def estimate(place, cov, turn=np.eye(3)) -> PoseEstimate:
+def estimate(place, cov, turn=UNTURNED) -> PoseEstimate:
     """A body whose joints are all in one place, as surely."""
     shape = (1, 1, N_JOINTS)
     return PoseEstimate(
@@ -117,7 +118,7 @@ def test_each_can_be_asked_for_alone_and_others_are_refused():
     env = HRCEnv(perception="none", n_workers=2, config={"uncertainty": ("towards_robot",)})
     terms = env.split_observation(env.reset(seed=0)[0])
     assert (len(terms[TOWARDS]), len(terms[FACTOR])) == (2 * N_JOINTS, 0)
-    with pytest.raises(ConfigError, match="uncertainty 'axes'.*towards_robot"):
+    with pytest.raises(ConfigError, match=r"uncertainty 'axes'.*towards_robot"):
         HRCEnv(perception="none", config={"uncertainty": ("axes",)})
 
 
