@@ -69,7 +69,7 @@ bench: $(DEV)
 train-quick: $(TRAIN)
 	$(RUN) train.py
 
-results: $(TRAIN)
+results: $(DEV)
 	$(RUN) -m hrc_env setup --networks heavy
 	$(RUN) -m benchmarks.results
 

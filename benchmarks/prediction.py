@@ -60,6 +60,7 @@ class Forecasts:
         found = []
         for horizon_s in HORIZONS_S:
             later, moved = estimator.forecast(state, horizon_s), copied(state)
+            moved.trees["age_s"] -= horizon_s  # nobody is given up meanwhile
             estimator.predict(moved, horizon_s, [])
             parts = later.mean_world, later.cov_world, estimator.estimate(moved).mean_world
             found.append([part[:, 0].astype(np.float32) for part in parts])

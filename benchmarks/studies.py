@@ -32,6 +32,10 @@ STUDIES: dict[str, Study] = {
         "python -m benchmarks.occlusion", 0.2, ("benchmarks.occlusion",), ("occlusion",),
         goes_on=False,
     ),
+    "starts": Study(
+        "python -m benchmarks.tracking.starts", 4, ("benchmarks.tracking.starts",),
+        ("starts", "locks"), quick="--seeds 4", goes_on=False,
+    ),
     "forecast": Study(
         "python -m benchmarks.prediction", 1, ("benchmarks.prediction",), ("forecast",),
         goes_on=False,
@@ -41,11 +45,11 @@ STUDIES: dict[str, Study] = {
         ("people", "activities"), quick="--episodes 4", goes_on=False,
     ),
     "speed": Study(
-        BENCH + "speed", 5, ("benchmarks.speed.bench",), ("speed", "speed_organs"),
+        BENCH + "speed", 7, ("benchmarks.speed.bench",), ("speed", "speed_organs"),
         {"speed_organs.png": "organs.png"}, goes_on=False,
     ),
     "footage": Study(
-        BENCH + "tracking --real", 2, ("benchmarks.recorded.bench",), ("footage",), quick="",
+        BENCH + "tracking --real", 3, ("benchmarks.recorded.bench",), ("footage",), quick="",
         goes_on=False,
     ),
     "learning": Study(
@@ -62,23 +66,23 @@ STUDIES: dict[str, Study] = {
         {"lab_figure_6.jpg": "figure_6.png"},
     ),
     "tracking": Study(
-        BENCH + "tracking", 60, ("benchmarks.tracking.bench",), ("tracking", "tracking_cost"),
+        BENCH + "tracking", 35, ("benchmarks.tracking.bench",), ("tracking", "tracking_cost"),
     ),
     "perception": Study(
-        BENCH + "perception", 60, ("benchmarks.perception.bench",),
+        BENCH + "perception", 50, ("benchmarks.perception.bench",),
         ("pixels_accuracy", "faults", "miscalibration", "appearance", "emulator", "speed_pixels"),
         {"emulator.png": "emulator.png"},
     ),
     "baselines": Study(
-        "python -m benchmarks.baselines", 60,
+        "python -m benchmarks.baselines", 30,
         ("benchmarks.baselines", "agents.training", "agents.ppo"), ("baselines",), is_keyed=False,
     ),
     "ablations": Study(
-        EXPERIMENT + "ablations", 60, ("hrc_env.experiments.ablations.experiment",), ("ablations",),
+        EXPERIMENT + "ablations", 45, ("hrc_env.experiments.ablations.experiment",), ("ablations",),
         {f"ablations_{name}.png": f"{name}.png" for name in ("cameras", "occlusion", "filter")},
     ),
     "impact": Study(
-        EXPERIMENT + "impact", 90, ("hrc_env.experiments.impact.experiment",),
+        EXPERIMENT + "impact", 60, ("hrc_env.experiments.impact.experiment",),
         ("impact", "lateness"), {"impact_tradeoff.png": "tradeoff.png"},
     ),
     "pictures": Study(

@@ -101,6 +101,15 @@ class ParticleConfig(TrackerConfig):
     """Factor on the reported covariance of a worker whom one camera alone has seen for a while."""
     n_hypotheses: int = 8
     """Most hypotheses about one worker; one is a Gaussian (estimator="kalman")."""
+    wait_updates: int = 5
+    """Where one view alone shows somebody new, so many updates are waited for a second one before
+    the track is begun from it; a rig of one camera does not wait."""
+    size_std: float = 0.06
+    """Standard deviation of people's size as a share of it, as of adults' statures: how little the
+    depth is known of a body that one view has begun."""
+    stands_std_m: float = float("inf")
+    """Such a body's lowest joint is thought to be on the floor, z = 0, within this, which measures
+    its size [m]; infinity: people may be anywhere above it."""
     mirrored_parts: tuple[str, ...] = ("body", "limbs")
     """What may be turned or reflected in depth when one view carries it."""
     look_every_s: float = 0.12

@@ -9,11 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.core.kernels import kernel
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Covariances3, Floats, Ints, Points3
+from hrc_env.core.typing import Ints
 from hrc_env.tracking.measurements import Seen
-from hrc_env.tracking.models.acquisition import find_again, find_body, middle_of
+from hrc_env.tracking.models.acquisition import find_again, find_body
 from hrc_env.tracking.paper import PaperEstimator, PaperState
 from hrc_env.tracking.settings import settings_of
 from hrc_env.tracking.tracks import forget, grow_older
@@ -38,39 +37,20 @@ class PaperRestarts(PaperEstimator):
         self, state: PaperState, who: tuple[int, int], seen: Seen, rng: np.random.Generator
     ) -> None:
         """Lines 2 to 19 for a worker with a track, and what it needs; line 1 for one without."""
-        track, particles, s = state.tracks[who], state.particles[who], settings_of(self.config)
-        anew = np.zeros(N_JOINTS, bool)
+        track, s, anew = state.tracks[who], settings_of(self.config), np.zeros(N_JOINTS, bool)
+        points, cov = np.empty((N_JOINTS, 3)), np.empty((N_JOINTS, 3, 3))
         if track["tracked"]:
             PaperEstimator.take(self, state, who, seen, rng)
-            find_joints_again(track, seen, s, anew)
-        elif seen.ok.any():
-            points, cov = np.empty((N_JOINTS, 3)), np.empty((N_JOINTS, 3, 3))
-            if not find_body(seen, s, points, cov, anew):
-                return
-            track["mean_world"], track["cov_world"], track["tracked"] = points, cov, True
+            middle = np.median(track["mean_world"], axis=0)
+            for j in np.flatnonzero(track["conflict"] >= s.conflict_frames):
+                anew[j] = find_again(seen, j, s, middle, points[j], cov[j])
+            track["age_s"][anew], track["conflict"][anew] = 0.0, 0
+        elif seen.ok.any() and find_body(seen, s, points, cov, anew):
             track["age_s"][anew] = 0.0
-            anew[:] = True
+            track["tracked"], anew[:] = True, True
         if anew.any():
-            cloud = np.empty((int(anew.sum()), *particles.shape[1:]))
-            scatter(cloud, track["mean_world"][anew], track["cov_world"][anew], rng)
-            particles[anew], track["velocity_world"][anew] = cloud, 0.0
-
-
-@kernel(makes_arrays=True)
-def find_joints_again(track, seen, s, anew):
-    """Put joints where two views have seen them for a while; `anew` (J,) says which."""
-    mean, cov, middle = track.mean_world, track.cov_world, np.empty(3)
-    point, spread = np.empty(3), np.empty((3, 3))
-    middle_of(mean, np.ones(len(mean), np.bool_), middle)
-    for j in range(len(mean)):
-        if track.conflict[j] < s.conflict_frames:
-            continue
-        if find_again(seen, j, s, middle, point, spread):
-            mean[j], cov[j], anew[j] = point, spread, True
-            track.age_s[j], track.conflict[j] = 0.0, 0
-
-
-def scatter(particles: Floats, mean: Points3, cov: Covariances3, rng: np.random.Generator) -> None:
-    """Draw clouds (..., 3, M) from Gaussians with mean (..., 3) and cov (..., 3, 3), in place."""
-    root = np.linalg.cholesky(cov)
-    particles[:] = mean[..., None] + root @ rng.standard_normal(particles.shape)
+            track["mean_world"][anew], track["cov_world"][anew] = points[anew], cov[anew]
+            track["velocity_world"][anew] = 0.0
+            root, n_particles = np.linalg.cholesky(cov[anew]), self.config.n_particles
+            steps = rng.standard_normal((len(root), 3, n_particles))
+            state.particles[who][anew] = points[anew, :, None] + root @ steps

@@ -87,7 +87,7 @@ class ParticleEstimator:
         mean, velocity = np.empty((2, *age_s.shape, 3))
         out = mean, np.empty((*age_s.shape, 3, 3)), velocity, age_s, tracked
         estimate_all(tuple(state), self.settings, out)
-        return PoseEstimate(*out)
+        return self._of_unknown_size(state, PoseEstimate(*out))
 
     def forecast(self, state: Hypotheses, horizon_s: float) -> PoseEstimate:
         """What is expected in `horizon_s`, hypothesis by hypothesis; see `tracking.forecast`."""
@@ -101,4 +101,17 @@ class ParticleEstimator:
             tracked=trees["tracked"].copy(),
         )
         later = forecast(bounded(each, self.config), horizon_s, self.config)
-        return mixed(later, state.trees["log_weight"], state.n_alive)
+        whole = mixed(later, state.trees["log_weight"], state.n_alive)
+        return self._of_unknown_size(state, whole)
+
+    def _of_unknown_size(self, state: Hypotheses, estimate: PoseEstimate) -> PoseEstimate:
+        """Widen, in place, what is said of workers whom one view has begun: they may be larger, and
+        farther from the camera that has them, by the same share."""
+        size_std = np.where(estimate.tracked, state.trees["size_std"][:, :, 0], 0.0)
+        if not size_std.any():
+            return estimate
+        eyes = -np.linalg.solve(self.P[:, :, :3], self.P[:, :, 3:])[..., 0]
+        eye = eyes[state.views["blind"][:, :, 0].argmin(-1)]
+        grown = size_std[..., None, None] * (estimate.mean_world - eye[:, :, None])
+        estimate.cov_world[...] += grown[..., :, None] * grown[..., None, :]
+        return bounded(estimate, self.config)

@@ -17,6 +17,9 @@ class Settings(NamedTuple):
     body_radius_m: float
     acquire_min_joints: int
     conflict_frames: int
+    wait_updates: int
+    size_std: float
+    stands_std_m: float
     inlier_odds: float
     """Of a perfect inlier against an outlier, times the variance of its pixel [px^2]."""
     swap_begins: float

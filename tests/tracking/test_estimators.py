@@ -69,8 +69,8 @@ def test_a_worker_is_acquired_from_nothing_within_five_frames(name):
         assert np.median(error) < 0.1
 
 
-@all_but_paper
-def test_one_camera_alone_acquires_nobody(name):
+@pytest.mark.parametrize("name", ["paper_restarts", "ransac", "triangulation"])
+def test_one_camera_alone_acquires_nobody_where_nothing_is_known_of_bodies(name):
     px = detections(walk(0, 10), Damage(), 0)[:, None]
     px[:, :, 1:] = np.nan
     assert not track(estimator(name), px)[-1].tracked.any()

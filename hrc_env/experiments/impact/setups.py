@@ -58,11 +58,6 @@ class PerceptionSetup:
         return words
 
     @property
-    def is_blind(self) -> bool:
-        """Whether nobody is ever tracked: one camera begins no track."""
-        return self.level == "none" or self.is_alone
-
-    @property
     def turns(self) -> tuple[Turn, ...]:
         """Cameras and their faults, in which episodes take turns."""
         rig = RIGS["lab"]

@@ -7,6 +7,7 @@
 from hrc_env.core.kernels import kernel
 from hrc_env.tracking.hypotheses.anatomy import anatomy
 from hrc_env.tracking.hypotheses.branching import branch, is_ambiguous
+from hrc_env.tracking.hypotheses.one_view import begin_from_one
 from hrc_env.tracking.hypotheses.slots import Hypotheses, drop, merge, normalise, worker_slots
 from hrc_env.tracking.measurements import make_seen, read_worker
 from hrc_env.tracking.models.acquisition import heading
@@ -100,8 +101,10 @@ def update_all(state, P, measured, s, noise, works, prior):
             tree = own.trees[0]
             if not tree.tracked:
                 scale_sigma(own.noise[0], seen.sigma)
-                if acquire(tree, seen, s):
-                    tree.slope[:] = 0.0
+                if not _begin(own, seen, s):
+                    _wait(own, seen, s, (work, prior))
+                continue
+            if tree.size_std > 0.0 and _begin(own, seen, s):
                 continue
             look = len(own.trees) > 1 and own.waited_s[0] >= s.look_every_s
             look &= is_ambiguous(tree, seen, s)
@@ -111,6 +114,30 @@ def update_all(state, P, measured, s, noise, works, prior):
                 _follow(own, h, look and h == 0, seen, s, noise, (work, prior))
             if own.n_alive[0] > 1:
                 _tidy(own, s, work)
+
+
+@kernel(makes_arrays=True)
+def _begin(own, seen, s):
+    """Begin a track where two views agree on a worker; whether they did."""
+    tree = own.trees[0]
+    if not acquire(tree, seen, s):
+        return False
+    tree.slope[:], tree.waited, tree.size_std, own.n_alive[0] = 0.0, 0, 0.0, 1
+    tree.log_weight, tree.pose_log_prior = 0.0, 0.0
+    return True
+
+
+@kernel(makes_arrays=True)
+def _wait(own, seen, s, scratch):
+    """Begin a track from one view where no second one has come for a while."""
+    tree, lone, n_views = own.trees[0], 0, 0
+    for c in range(len(seen.P)):
+        if seen.ok[:, c].sum() >= s.acquire_min_joints:
+            lone, n_views = c, n_views + 1
+    tree.waited = tree.waited + 1 if n_views == 1 else max(tree.waited - 1, 0)
+    if n_views == 1 and (tree.waited > s.wait_updates or len(seen.P) == 1):
+        begin_from_one(own, lone, seen, s, scratch)
+        tree.waited, own.waited_s[0] = 0, s.look_every_s
 
 
 @kernel(makes_arrays=True)

@@ -3,7 +3,9 @@
 Poses that fit where a worker is predicted go to that worker, in each camera so that all together
 fit best, and no pose to two workers. What is left is compared across cameras: poses of at least two
 cameras that are one body go to a worker who was lost from sight nearby, else to a place that nobody
-has; poses that no other camera confirms go to nobody.
+has; poses that no other camera confirms go to nobody: views that do not fit their worker look like
+somebody new. Where there is no other camera, they go to vacant places while all who are followed
+are seen.
 """
 
 from collections import namedtuple
@@ -177,7 +179,12 @@ def _welcome(cameras, poses, mean, tracked, s, chosen):
             n_views += chosen[c, w] >= 0
         vacant[w], unseen[w] = not tracked[w], tracked[w] and n_views == 0
         wanted |= vacant[w] or n_views < min(2, n_cameras)
-    if not wanted:
+    if n_cameras == 1 and not unseen.any():
+        for w in np.flatnonzero(vacant):
+            for d in range(n_poses):
+                if chosen[0, w] < 0 and poses[0, d].free:
+                    chosen[0, w], poses[0, d].free = d, False
+    if n_cameras == 1 or not wanted:
         return
     most = n_cameras * (n_cameras - 1) // 2 * n_poses * n_poses
     seeds = np.empty((most, 4), np.int64)

@@ -26,6 +26,9 @@ TREE = np.dtype(
         ("body", "f8", (_J, 6)), ("cov", "f8", (_J, 6, 6)), ("slope", "f8", (_J, 6, 6)),
         # since a measurement supported the joint [s]; updates in a row in which views did not
         ("age_s", "f8", (_J,)), ("conflict", "i8", (_J,)), ("tracked", "?"),
+        # of who is not tracked: updates in which one view alone has shown somebody; of who is: how
+        # much larger and farther off, as a share, the body that one view has begun may be, or 0
+        ("waited", "i8"), ("size_std", "f8"),
         # mean place on the body [m]: forward, left, up of the torso; updates that went into it
         ("offset", "f8", (_J, 3)), ("offset_count", "f8", (_J,)),
         # from each joint to its parent [m], [m^2]
