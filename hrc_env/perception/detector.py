@@ -124,8 +124,7 @@ class PoseDetector(Stateful):
         floor_world: Points3 | None = None,
         error: Floats = ERROR,
     ) -> None:
-        """Searches are laid out for people who stand at points (N, 3) [m], if these are known;
-        `error`, a calibration's `sigma`, says how far detections may be off.
+        """`floor_world` (N, 3) [m], `error`: as of `pipeline.looking.Looking`.
         Raises `WeightsError` without the weights, `ConfigError` without the runtime."""
         self.cameras = tuple(cameras)
         self.config = config or DetectorConfig()
@@ -133,8 +132,7 @@ class PoseDetector(Stateful):
         for name in (self.config.network, self.config.folded):
             find_weights(f"pose_landmark_{name}")
         network.chosen_runtime(self.config.runtime)
-        self.floor_world, self.error = floor_world, error
-        step = self.config.search_step
+        self.floor_world, self.error, step = floor_world, error, self.config.search_step
         self._search = [search_windows(camera, floor_world, step) for camera in self.cameras]
         self._looks: dict[int, list[int]] = {}
         self._networks: tuple[_Networks, _Networks] | None = None

@@ -29,8 +29,8 @@ class Looking(Stateful):
         floor_world: Points3 | None = None,
         error: Floats = ERROR,
     ) -> None:
-        """`floor_world` (N, 3) [m]: where people may stand, if that is known; `error`: how far
-        detections may be off, a calibration's `sigma`."""
+        """Searches are laid out for people who stand at points `floor_world` (N, 3) [m], if these
+        are known; `error`, a calibration's `sigma`, says how far detections may be off."""
         self.cameras, self.n_workers = tuple(cameras), n_workers
         self.P = projections(self.cameras)
         self.detector = PoseDetector(self.cameras, config, floor_world, error)
