@@ -73,6 +73,10 @@ STUDIES: dict[str, Study] = {
         ("pixels_accuracy", "faults", "miscalibration", "appearance", "emulator", "speed_pixels"),
         {"emulator.png": "emulator.png"},
     ),
+    "trueness": Study(
+        "python -m assets.emulator.holdout", 40, ("assets.emulator.holdout",), ("trueness",),
+        quick="--rounds 1", is_keyed=False,
+    ),
     "baselines": Study(
         "python -m benchmarks.baselines", 30,
         ("benchmarks.baselines", "agents.training", "agents.ppo"), ("baselines",), is_keyed=False,
