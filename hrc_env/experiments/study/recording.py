@@ -80,7 +80,7 @@ def replay(
 ) -> PoseEstimate:
     """(T, 1, ...) what an estimator makes of the detections of some of the cameras.
 
-    The first `n_start` frames are given of all cameras: no estimator begins a track with one.
+    The first `n_start` frames are given of all cameras, by which every estimator begins a track.
     """
     P, found = projections(recording.scene.cameras), recording.keypoints
     dt_s = recording.config.ctrl_dt
