@@ -33,8 +33,11 @@ def test_every_number_is_there(end_to_end):
         assert metrics[f"rmse_m.alone.particle.{camera}"].value > 0
         assert metrics[f"closed_rmse_m.particle.{camera}"].value > 0
     assert {"rmse_m.particle.two", "rmse_m.particle.three"} <= written.keys() == metrics.keys()
+    for name in ("kalman", "paper_restarts"):
+        assert f"difference.rmse_m.{name}.multi" in metrics
+        assert 0 < metrics[f"p.rmse_m.{name}.camera_1"].value <= 1
     asked = tables.asked(tables.read("site"))
-    assert {name for name in asked if name.split(".")[1] in TINY.estimators} <= metrics.keys()
+    assert {name for name in asked if name.split(".")[-2] in TINY.estimators} <= metrics.keys()
 
 
 def test_four_cameras_know_the_head_and_one_does_not(end_to_end):

@@ -17,7 +17,7 @@ from hrc_env.core.typing import Floats
 from hrc_env.experiments.site.report import report, site
 from hrc_env.experiments.site.walk import walk
 from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.intervals import mean_over, rmse_over
+from hrc_env.experiments.study.intervals import mean_over, paired, rmse_of, rmse_over
 from hrc_env.experiments.study.recording import record, replay
 from hrc_env.experiments.study.rigs import DT_S, MULTI, N_WARM_UP, SPOKEN, left_of
 from hrc_env.experiments.study.runner import Study, at_least_one, changed
@@ -167,6 +167,13 @@ def metrics_of(config: SiteConfig, played: Played) -> dict[str, Metric]:
         if row != MULTI:
             multi = squared[f"{name}.{MULTI}"].sum(1)
             metrics[f"over_multi.{key}"] = rmse_over(squared[key].sum(1), multi, "ratio")
+    first, *others = config.everybody
+    for name, row, start in product(others, ROWS, ("", ALONE)):
+        ours, theirs = f"{start}{first}.{row}", f"{start}{name}.{row}"
+        if theirs in squared:
+            both = np.concatenate([squared[ours], squared[theirs]])
+            off = rmse_of(both.sum(1), np.full(len(both), both.shape[1]))
+            metrics |= paired(f"rmse_m.{theirs}", off, len(films), "m")
     for name in config.estimators:
         for size, word in ((2, "two"), (3, "three")):
             rows = [squared[f"{name}.{row}"] for row, rig in CHOICES.items() if len(rig) == size]

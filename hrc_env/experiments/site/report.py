@@ -67,6 +67,9 @@ def report(
     ratios = [Column(f"over_multi.{{}}.{c}", w) for c, w in SPOKEN.items() if c != MULTI]
     more = [Column(f"rmse_m.{{}}.{word}", word, 3) for word in ("two", "three")]
     more += [Column(f"closed_rmse_m.{{}}.{c}", f"own crops, {w}", 3) for c, w in SPOKEN.items()]
+    rivals = {f"{start}{name}": f"{words}`{name}`" for name in everybody[1:]
+              for start, words in (("alone.", "from the first frame: "), ("", ""))}  # fmt: skip
+    less = [Column(f"difference.rmse_m.{{}}.{c}", w, 3, signed=True) for c, w in SPOKEN.items()]
     parts = (
         picture(figures / "figure_3.png", "The paper's figure 3: our site, and what cameras see."),
         table_of("RMSE of the head [m], from the first frame on",
@@ -75,6 +78,7 @@ def report(
         *paths,
         table_of("RMSE of the head [m], of four cameras for a second, then",
                  {name: f"`{name}`" for name in everybody}, columns, metrics),
+        table_of(f"RMSE [m] of `{everybody[0]}` less that of", rivals, less, metrics),
         table_of("RMSE of one camera over that of four, walk by walk",
                  {name: f"`{name}`" for name in everybody}, ratios, metrics),
         table_of("RMSE [m] of two and three cameras, all choices together; with crops that follow "
