@@ -137,8 +137,10 @@ def _known(expected: PoseEstimate | None, shape: tuple[int, ...]) -> kernels.Exp
     if expected is None:
         nowhere = np.zeros(shape)
         return kernels.Expected(nowhere, nowhere, np.zeros(shape[:2], np.bool_))
-    of_tracks = expected.mean_world, expected.velocity_world, expected.tracked
-    return kernels.Expected(*map(np.ascontiguousarray, of_tracks))
+    mean_world, velocity_world = map(
+        np.ascontiguousarray, (expected.mean_world, expected.velocity_world)
+    )
+    return kernels.Expected(mean_world, velocity_world, np.ascontiguousarray(expected.tracked))
 
 
 def lines_of_sight(
