@@ -32,8 +32,12 @@ ANKLE_M, LEVELS_M = 0.1, np.array([(0.3, 0.7), (0.7, 1.2), (1.1, 1.75), (1.3, 2.
 """the height of the first above the floor, and bounds of the others' and of the nose's [m]."""
 
 
-def is_body(found: Keypoints, cameras: Sequence[PinholeCamera]) -> bool:
-    """Whether two or more cameras show a person's bones: keypoints (1, C, 1, J), in image px."""
+def is_body(
+    px: Points2, confidence: Floats, sigma_px: Floats, cameras: Sequence[PinholeCamera]
+) -> bool:
+    """Whether cameras C, two at least, show a person's bones: joints (C, J, 2) and what is known of
+    them (C, J), in pixels of the images."""
+    found = Keypoints(*(each[None, :, None] for each in (px, confidence, sigma_px)))
     seen = pinhole_keypoints(found, cameras)
     joints = triangulate(projections(tuple(cameras)), seen.px, seen.sigma_px, GATE_SIGMA)
     start, end = np.moveaxis(joints.points_world[0, 0, BONES], 1, 0)
