@@ -22,6 +22,7 @@ from hrc_env.geometry import chains
 from hrc_env.geometry.distances import least_separation
 from hrc_env.geometry.shapes import AXES, BOX, CAPSULE, CENTRE, HALF_SIZE, KIND, PLANE
 from hrc_env.motion import generator
+from hrc_env.motion.schedule import WORK
 from hrc_env.motion.state import CLIMB, THERE
 from hrc_env.scene.build import Scene, build
 from hrc_env.worker.body import pool, stack, worker_truth
@@ -54,6 +55,8 @@ class Arguments:
     """Which body they have; "any": each one of their own."""
     people: str = "attentive"
     """How they are: a name of `generator.PEOPLE`."""
+    jobs: str = "framing"
+    """What they do: a name of `schedule.WORK`."""
     seed: int = 0
     """Of the first episode."""
 
@@ -124,7 +127,8 @@ def _play(scene: Scene, arguments: Arguments, first: int, notes: Notes) -> None:
     batch, n_workers = min(BATCH, arguments.episodes - first), arguments.workers
     first += arguments.seed
     body = stack(pool(arguments.body))
-    config = generator.MotionConfig(people=generator.PEOPLE[arguments.people])
+    people, jobs = generator.PEOPLE[arguments.people], WORK[arguments.jobs]
+    config = generator.MotionConfig(people=people, jobs=jobs)
     state = generator.make_state(batch, n_workers, body, config, scene.grounds)
     rngs = [np.random.default_rng([first + b]) for b in range(batch)]
     generator.reset(state, np.arange(batch), rngs)

@@ -22,6 +22,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -41,6 +42,8 @@ from hrc_env.experiments.study.fingerprint import sources_of
 ROOT = Path(__file__).resolve().parent.parent
 OUT, QUICK_OUT = ROOT / "out" / "results", ROOT / "out" / "results_quick"
 WHOLE, PICTURES = tables.RESULTS / "whole", ROOT / "docs" / "pictures"
+STOPPING_S = 3.0
+"""What is asked to stop is killed after so long [s]."""
 NO_NUMBERS = ("hrc_env/cli", "hrc_env/core/kernels/signatures.json")
 """What changes no number: command lines, what is compiled ahead."""
 
@@ -190,6 +193,9 @@ def call(study: Study, out: Path, more: str, until_s: float = float("inf")) -> i
         return process.wait(left_s if left_s < float("inf") else None)
     except (subprocess.TimeoutExpired, KeyboardInterrupt) as stopped:
         os.killpg(process.pid, signal.SIGINT)
+        time.sleep(STOPPING_S)  # parts are written whole or not at all
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
         process.wait()
         if isinstance(stopped, KeyboardInterrupt):
             raise

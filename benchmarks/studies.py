@@ -32,6 +32,10 @@ STUDIES: dict[str, Study] = {
         "python -m benchmarks.occlusion", 0.2, ("benchmarks.occlusion",), ("occlusion",),
         goes_on=False,
     ),
+    "starts": Study(
+        "python -m benchmarks.tracking.starts", 4, ("benchmarks.tracking.starts",),
+        ("starts", "locks"), quick="--seeds 4", goes_on=False,
+    ),
     "forecast": Study(
         "python -m benchmarks.prediction", 1, ("benchmarks.prediction",), ("forecast",),
         goes_on=False,

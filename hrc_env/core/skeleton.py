@@ -1,8 +1,9 @@
-"""The 15 joints of the paper (figure 1): names, pairs, bones. The one place that knows.
+"""The 15 joints, as we read the paper's figure 1: names, pairs, bones. The one place that knows.
 
-The paper takes 15 of BlazePose's 33 landmarks. A joint here means what BlazePose means by
-it (a "hip" is where BlazePose puts a hip), which is not the anatomical centre; how far
-the worker's true joints are from the detector's is documented with the baked bodies.
+The paper takes 15 of BlazePose's 33 landmarks, which its text does not name. A joint here means
+what BlazePose means by it (a "hip" is where BlazePose puts a hip), which is not the anatomical
+centre; how far the worker's true joints are from the detector's is documented with the baked
+bodies.
 """
 
 import numpy as np

@@ -16,6 +16,8 @@ AHEAD_M, HANDS_M = 0.48, 0.76
 """Who works has hands and head so far ahead [m]; others' roots keep so far from there."""
 PUSHING_M, CLIP_M = (1.0, 0.95), (0.01, 1.15)
 """The same of who pushes a cart, and of who plays a clip: an arm's length more to any side."""
+BEHIND_M, SHANK_M = 0.40, 0.66
+"""Who kneels has a shank so far behind [m]; others' roots keep so far from there."""
 LOOK_S = 0.12
 """Meetings are looked for in steps of this length [s]; at 2.8 m/s to each other 0.3 m."""
 
@@ -61,6 +63,9 @@ def gap_to(x: float, y: float, t: float, me: Worker) -> float:
             yaw = math.atan2(ny - oy, nx - ox)
         hx, hy = placed(ox, oy, yaw, ahead, 0.0)
         gap = min(gap, math.hypot(x - hx, y - hy) - apart)
+        if st.KNEELING <= me.activity <= st.POINT and me.kneel > 0.0:
+            hx, hy = placed(ox, oy, yaw, -BEHIND_M, 0.0)
+            gap = min(gap, math.hypot(x - hx, y - hy) - SHANK_M)
     return gap
 
 

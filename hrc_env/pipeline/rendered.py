@@ -80,7 +80,7 @@ class PixelPipeline(PoseTracking):
             time_s[row] = self.cameras.show(b)
             has_image = np.isfinite(time_s[row]).tolist()
             self.looking.look(images, one(expected, row), b, has_image, one(seen, row))
-        return replace(seen, time_s=None if images.schedule.is_plain else time_s)
+        return replace(seen, time_s=None if self.cameras.recent.schedule.is_plain else time_s)
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
         """Forget the tracks, and who was followed."""

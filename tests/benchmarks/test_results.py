@@ -38,7 +38,7 @@ def desk(tmp_path, monkeypatch):
     """A study of its own, and folders that are nobody's: a function to give it a duration."""
     for name, value in {
         "ROOT": results.ROOT, "OUT": tmp_path / "out", "QUICK_OUT": tmp_path / "quick",
-        "WHOLE": tmp_path / "whole", "PICTURES": tmp_path,
+        "WHOLE": tmp_path / "whole", "PICTURES": tmp_path, "STOPPING_S": 0.2,
     }.items():  # fmt: skip
         monkeypatch.setattr(results, name, value)
     monkeypatch.setattr(tables, "RESULTS", tmp_path)
@@ -99,6 +99,17 @@ def test_a_run_that_is_out_of_time_is_stopped_and_goes_on(desk):
     main(Arguments())
     assert n_runs(folder) == 2
     assert json.loads((folder / "whole" / "one.json").read_text())["minutes"] > spent > 0
+
+
+def test_what_does_not_stop_when_asked_is_killed(desk):
+    folder = desk(60.0)
+    script = folder / "made.py"
+    script.write_text(
+        "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)\n" + script.read_text()
+    )
+    main(Arguments(hours=5.0 / 3600))
+    assert n_runs(folder) == 1
+    assert not (folder / "whole").exists()
 
 
 def test_what_keeps_nothing_is_not_begun_without_the_time_for_it(desk):

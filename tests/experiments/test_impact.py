@@ -13,7 +13,7 @@ from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.experiments.impact import episodes, policies
 from hrc_env.experiments.impact.episodes import STEP, Stage, _build, bodies_of, judge, sums_of
 from hrc_env.experiments.impact.experiment import STUDY, ImpactConfig, check_walks, config_for, play
-from hrc_env.experiments.impact.metrics import margin_needed
+from hrc_env.experiments.impact.metrics import COMPARED, margin_needed
 from hrc_env.experiments.impact.policies import Policy, maker, trained
 from hrc_env.experiments.impact.report import report
 from hrc_env.experiments.impact.setups import (
@@ -119,12 +119,32 @@ def test_a_worker_whom_the_robot_knows_nothing_of_is_a_missed_stop():
     assert sums((0.05, np.inf, 0, 0))["missed_stops"] == 1
 
 
-def test_a_touch_counts_once_by_what_the_robot_did():
+def contacts(found):
+    """How many began while the robot moved towards the worker, stood, moved away."""
+    return [found[f"contacts_{how}"] for how in ("towards", "standing", "away")]
+
+
+def test_a_touch_counts_once_by_what_the_robot_did_in_the_step_before():
     touched = sums(
-        (0.0, 0.0, 0.3, 1), (0.0, 0.0, -0.3, 1), (0.1, 0.1, 0, 0),
-        (0.0, 0.0, -0.3, 1), (0.1, 0.1, 0, 0), (0.0, 0.0, 0.01, 1),
+        (0.1, 0.1, 0.3, 0), (0.0, 0.0, 0.0, 1), (0.0, 0.0, -0.3, 1), (0.1, 0.1, -0.3, 0),
+        (0.0, 0.0, 0.3, 1), (0.1, 0.1, 0.01, 0), (0.0, 0.0, 0.3, 1),
     )  # fmt: skip
-    assert [touched[f"contacts_{how}"] for how in ("towards", "fleeing", "standing")] == [1, 1, 1]
+    assert contacts(touched) == [1, 1, 1]
+
+
+def test_a_standing_arm_that_is_pushed_does_not_move_away():
+    assert contacts(sums((0.1, 0.1, 0.0, 0), (0.0, 0.0, -0.5, 1))) == [0, 1, 0]
+
+
+def test_a_touch_in_the_first_step_is_no_contact_but_is_counted_apart():
+    touched = sums((0.0, 0.0, 0.3, 1), (0.0, 0.0, 0.3, 1), (0.1, 0.1, 0.3, 0), (0.0, 0.0, 0.3, 1))
+    assert touched["starts_in_contact"] == 1
+    assert contacts(touched) == [1, 0, 0]
+
+
+def test_cost_is_split_by_whether_the_robot_moves_towards_the_worker():
+    found = sums((0.0, 0.0, 0.3, 1), (0.0, 0.0, -0.3, 1), (0.0, 0.0, 0.0, 1), (0.5, 0.5, 0.3, 0))
+    assert (found["cost"], found["cost_towards"]) == (3, 1)
 
 
 def test_directed_speeds_add_up_to_how_the_gap_closes(monkeypatch):
@@ -176,12 +196,26 @@ def test_the_margin_is_where_no_more_stops_are_missed_than_on_time():
 
 def test_every_row_says_everything(end_to_end):
     out, metrics = end_to_end
-    keys = ("separation_min_m", "contacts_towards", "contacts_fleeing", "contacts_standing",
-            "cost", "goals_per_min", "missed_stops", "false_stops", "z_d_m", "tax_m")  # fmt: skip
+    keys = ("separation_min_m", "contacts_towards", "contacts_away", "contacts_standing",
+            "starts_in_contact", "cost", "cost_towards", "goals_per_min", "missed_stops",
+            "false_stops", "z_d_m", "tax_m")  # fmt: skip
     for policy in TINY.policies:
         for setup in TINY.setups:
             for key in keys:
                 assert np.isfinite(metrics[f"{policy}.{setup}.{key}"].value), (policy, setup, key)
+    for policy in TINY.policies:
+        for what in (*COMPARED, "z_d_m"):
+            less, ours, theirs = (
+                metrics[f"{name}.{what}"].value
+                for name in (
+                    f"difference.{policy}.truth",
+                    f"{policy}.truth",
+                    f"{policy}.{REFERENCE}",
+                )
+            )
+            if what != "separation_min_m":  # which rows give as a mean of the middle half
+                assert less == pytest.approx(ours - theirs, abs=1e-9)
+            assert 0 < metrics[f"p.{policy}.truth.{what}"].value <= 1
     written = json.loads((out / "results.json").read_text())
     assert set(written["metrics"]) == set(metrics)
     asked = tables.asked(tables.read("impact")) | tables.asked(tables.read("lateness"))

@@ -12,6 +12,7 @@ from hrc_env.experiments.lab import experiment
 from hrc_env.experiments.lab.experiment import STUDY, LabConfig, config_for, laboratory
 from hrc_env.experiments.lab.motions import MOTIONS, play
 from hrc_env.experiments.lab.sides import LEFT, RIGHT, turned_away
+from hrc_env.experiments.study.recording import replay
 from hrc_env.experiments.study.report import Report
 from hrc_env.experiments.study.runner import run
 
@@ -88,3 +89,11 @@ def test_what_cannot_work_is_explained():
         config_for(True, 0)
     with pytest.raises(ConfigError, match="Films need"):
         LabConfig(max_frames=5)
+
+
+def test_a_replay_with_all_cameras_believes_what_was_believed_when_filming(pixels):
+    """The same joints too: those of the body, without the detector's mean offsets."""
+    taken = experiment.taken(TINY, "standing", 3, lambda share: None)
+    said = replay(taken, experiment.CROPS, range(4), 0, 3)
+    assert said.tracked[-1].all()
+    np.testing.assert_allclose(said.mean_world, taken.beliefs.mean_world, atol=1e-9)

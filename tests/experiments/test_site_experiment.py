@@ -30,10 +30,14 @@ def test_every_number_is_there(end_to_end):
         for camera in CAMERAS:
             assert metrics[f"rmse_m.{name}.{camera}"].value > 0
     for camera in CAMERAS:
+        assert metrics[f"rmse_m.alone.particle.{camera}"].value > 0
         assert metrics[f"closed_rmse_m.particle.{camera}"].value > 0
     assert {"rmse_m.particle.two", "rmse_m.particle.three"} <= written.keys() == metrics.keys()
+    for name in ("kalman", "paper_restarts"):
+        assert f"difference.rmse_m.{name}.multi" in metrics
+        assert 0 < metrics[f"p.rmse_m.{name}.camera_1"].value <= 1
     asked = tables.asked(tables.read("site"))
-    assert {name for name in asked if name.split(".")[1] in TINY.estimators} <= metrics.keys()
+    assert {name for name in asked if name.split(".")[-2] in TINY.estimators} <= metrics.keys()
 
 
 def test_four_cameras_know_the_head_and_one_does_not(end_to_end):
@@ -41,6 +45,14 @@ def test_four_cameras_know_the_head_and_one_does_not(end_to_end):
     four = metrics["rmse_m.particle.multi"].value
     assert four < 0.1
     assert metrics["rmse_m.kalman.camera_1"].value > 2 * four
+
+
+def test_a_camera_that_was_alone_from_the_first_frame_follows_too(end_to_end):
+    _, metrics, _ = end_to_end
+    alone = [metrics[f"tracked.alone.particle.camera_{k}"].value for k in range(1, 5)]
+    assert max(alone) > 0.8
+    four = metrics["rmse_m.particle.multi"].value
+    assert metrics["rmse_m.alone.particle.multi"].value == four
 
 
 def test_report_and_figures_are_written_and_the_progress_is_complete(end_to_end):

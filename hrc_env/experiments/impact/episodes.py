@@ -36,8 +36,8 @@ PEOPLE = "unaware"
 STOP_M, SLOW_M = 0.10, 0.60
 """Separations that call for standing still and for slowing down [m]: `agents.scripted.Yielding`."""
 MOVING_MPS = 0.05
-"""From this directed speed on a robot moves towards the worker or flees [m/s]; judgement. One that
-stands or flees cannot help it when somebody walks into it."""
+"""From this directed speed on a robot moves towards the worker or away [m/s]; judgement. One that
+stands or moves away cannot help it when somebody walks into it."""
 MakeAgent = Callable[[Simulation], Any]
 """The agent for a simulation's robot (`agents.env_info.Agent`)."""
 Rows = dict[str, list[Any]]
@@ -149,8 +149,10 @@ def sums_of(steps: Steps, infos: Sequence[Info], margin_m: float, dt_s: float) -
     """Everything that numbers are made of, a list over episodes each, from T steps of B."""
     touching = np.stack([info["cost_contact"] for info in infos]) > 0
     nearest_m = np.stack([info["safety/min_separation_m"] for info in infos])
+    cost = np.stack([info["cost"] for info in infos])
     sums = {
-        "cost": np.sum([info["cost"] for info in infos], axis=0),
+        "cost": cost.sum(0),
+        "cost_towards": (cost * (steps["robot_mps"] > MOVING_MPS)).sum(0),
         "separation_min_m": np.fmin.reduce(nearest_m, axis=0, initial=np.inf),
         "goals": infos[-1]["task/goals_reached"],
         "goals_missed": infos[-1]["task/goals_missed"],
@@ -179,14 +181,19 @@ def _decisions(steps: Steps, margin_m: float) -> dict[str, Ints]:
 
 
 def _contacts(steps: Steps, touching: Bools) -> dict[str, Ints]:
-    """(B,) how many touches begin; one that lasts counts once."""
-    begins = touching.copy()
-    begins[1:] &= ~touching[:-1]
-    towards, flees = steps["robot_mps"] > MOVING_MPS, steps["robot_mps"] < -MOVING_MPS
+    """(B,) how many touches begin; one that lasts counts once.
+
+    What the robot did is its speed in the step before: in the step itself the impact changes it. A
+    touch in the first step began before the robot could do anything, and is counted apart.
+    """
+    begins = touching[1:] & ~touching[:-1]
+    before = steps["robot_mps"][:-1]
+    towards, away = before > MOVING_MPS, before < -MOVING_MPS
     return {
         "contacts_towards": (begins & towards).sum(0),
-        "contacts_fleeing": (begins & flees).sum(0),
-        "contacts_standing": (begins & ~towards & ~flees).sum(0),
+        "contacts_standing": (begins & ~towards & ~away).sum(0),
+        "contacts_away": (begins & away).sum(0),
+        "starts_in_contact": touching[0].astype(int),
     }
 
 

@@ -21,7 +21,7 @@ from hrc_env.experiments.impact.policies import SLOWED, Policy
 from hrc_env.experiments.impact.setups import LATE, REFERENCE, PerceptionSetup, setup_called
 from hrc_env.experiments.study import intervals
 from hrc_env.experiments.study.counts import ERRORS_M, GAPS_M, SPEEDS_MPS
-from hrc_env.experiments.study.intervals import mean_over, ratio_over
+from hrc_env.experiments.study.intervals import paired, ratio_of, ratio_over
 from hrc_env.experiments.study.report import Metrics
 
 Row = Mapping[str, list[Any]]
@@ -32,14 +32,16 @@ NOMINAL_MPS = 1.6
 PMC5117641; verify against the standard before certification) [m/s]."""
 A_MINUTE = {
     "goals_per_min": "goals",
-    **{name: name for name in ("contacts_towards", "contacts_fleeing", "contacts_standing")},
+    **{name: name for name in ("contacts_towards", "contacts_standing", "contacts_away")},
 }
 """What is counted a minute, and from which sum."""
 PER_1000 = (
     "missed_stops", "false_stops", "called_stops", "missed_slowings", "false_slowings",
     "called_slowings", "approaches",
 )  # fmt: skip
-"""What is counted in a thousand control steps."""
+"""What is counted in a thousand control steps; `called_slowings`: somebody is near."""
+AN_EPISODE = {"cost": "per episode", "cost_towards": "per episode", "starts_in_contact": "share"}
+"""What is counted in an episode, and its unit."""
 QUANTILES = {
     "z_d_m": (ERRORS_M, "error", 0.95, "m"),
     "optimism_p50_m": (GAPS_M, "optimism", 0.5, "m"),
@@ -48,25 +50,21 @@ QUANTILES = {
     "v_r_mps": (SPEEDS_MPS, "robot_speed", 0.95, "m/s"),
 }
 COMPARED = (
-    "goals_per_min", "cost", "separation_min_m", "contacts_towards", "approaches", "missed_stops",
-    "false_stops",
+    "goals_per_min", "cost", "cost_towards", "called_slowings", "separation_min_m",
+    "contacts_towards", "contacts_standing", "approaches", "missed_stops", "false_stops",
 )  # fmt: skip
-"""What is compared with the reference, episode by episode."""
+"""What is compared with the reference, episode by episode; and Z_d."""
 
 
 def metrics_of(table: Table, margins_m: Sequence[float]) -> dict[str, Metric]:
-    """By `<policy>.<setup>.<what>`, `difference.<policy>.<setup>.<what>` and
-    `lateness.<setup>.<how>`."""
+    """By `<policy>.<setup>.<what>`, `difference.<policy>.<setup>.<what>`, `p.` the same (see
+    `intervals.paired`) and `lateness.<setup>.<how>`."""
     metrics: dict[str, Metric] = {}
     for (policy, setup), row in table.items():
         for what, metric in _of_row(row).items():
             metrics[f"{policy}.{setup}.{what}"] = metric
         if setup != REFERENCE and (policy, REFERENCE) in table:
-            ours, theirs = _ratios(row), _ratios(table[policy, REFERENCE])
-            for what in COMPARED:
-                above, below, unit = ours[what]
-                off = above / below - (theirs[what][0] / theirs[what][1])[: len(above)]
-                metrics[f"difference.{policy}.{setup}.{what}"] = mean_over(off, unit)
+            metrics |= _differences(f"{policy}.{setup}", row, table[policy, REFERENCE])
     for policy, name in table:
         setup = setup_called(name)
         on_time = replace(setup, latency_s=0.0, is_told=True).name
@@ -79,6 +77,19 @@ def metrics_of(table: Table, margins_m: Sequence[float]) -> dict[str, Metric]:
                 for how, metric in _lateness(setup, table, metrics, margins_m).items():
                     metrics[f"lateness.{setup.name}.{how}"] = metric
     return metrics
+
+
+def _differences(name: str, row: Row, reference: Row) -> Metrics:
+    """A row less the reference, over the episodes of both: same seeds, same workers."""
+    n, ours, theirs = len(row["walk"]), _ratios(row), _ratios(reference)
+    found: dict[str, Metric] = {}
+    for what in COMPARED:
+        above, below = ([*ours[what][k], *theirs[what][k][:n]] for k in range(2))
+        found |= paired(f"{name}.{what}", ratio_of(above, below), n, ours[what][2], 2000)
+    bins, counted, q, unit = QUANTILES["z_d_m"]
+    counts = [*row[f"{counted}_counts"], *reference[f"{counted}_counts"][:n]]
+    both = intervals.counted_quantile_of(bins, counts, q)
+    return found | paired(f"{name}.z_d_m", both, n, unit, 400)
 
 
 def _of_row(row: Row) -> dict[str, Metric]:
@@ -94,10 +105,9 @@ def _ratios(row: Row) -> dict[str, tuple[Floats, Floats, str]]:
     """What is counted in each episode (n,), over what (n,), and the unit of their ratio."""
     n_steps = np.sum(row["error_counts"], axis=1) / N_JOINTS
     minutes, ones = np.array(row["minutes"]), np.ones(len(n_steps))
-    found = {
-        "separation_min_m": (np.array(row["separation_min_m"], float), ones, "m"),
-        "cost": (np.array(row["cost"], float), ones, "per episode"),
-    }
+    found = {"separation_min_m": (np.array(row["separation_min_m"], float), ones, "m")}
+    for what, unit in AN_EPISODE.items():
+        found[what] = np.array(row[what], float), ones, unit
     for what, name in A_MINUTE.items():
         found[what] = np.array(row[name], float), minutes, "1/min"
     for what in PER_1000:

@@ -15,8 +15,9 @@ from hrc_env.tracking.estimators import ESTIMATORS
 
 WORDS = {
     "goals_per_min": ("goals / min", 1), "cost": ("true cost", 1),
+    "cost_towards": ("of it moving towards", 1), "called_slowings": ("near", 0),
     "separation_min_m": ("least separation [m]", 3), "contacts_towards": ("contacts towards", 2),
-    "contacts_fleeing": ("fleeing", 2), "contacts_standing": ("standing", 2),
+    "contacts_standing": ("standing arm pushed", 2), "contacts_away": ("moving away", 2),
     "approaches": ("approaches", 1), "missed_stops": ("missed stops", 1),
     "false_stops": ("false stops", 1), "z_d_m": ("Z_d [m]", 3), "tax_m": ("tax [m]", 2),
 }  # fmt: skip
@@ -27,13 +28,16 @@ robots, goals and workers, who take no notice of the robot, are the same in ever
 `scripted` drives to its goals whoever is near; `scripted_slowed` slows down from {SLOW_M:g} m of
 estimated separation and stands still at {STOP_M:g} m; `ppo` was trained here on the reference.
 
-Counted is the truth. *True cost*: steps nearer than 0.15 m, and steps in touch, an episode.
-*Contacts* a minute begin while the robot moves *towards* the touched worker at more than
-{MOVING_MPS} m/s, *flees*, or neither (*standing*). In 1,000 steps, *approaches*: it moves towards a
-worker nearer than {STOP_M:g} m; *missed stops*: the true separation is below {STOP_M:g} m and the
-believed one is not; *false stops*: the other way round. *Z_d*: 95th percentile of the error of all
-joints, also where the track is lost. *Tax*: Z_d on time + latency x (v_h + v_r), v_h =
-{NOMINAL_MPS} m/s, v_r the 95th percentile of the robot's speed towards the worker.
+Counted is the truth. *True cost*: steps nearer than 0.15 m, and steps in touch, an episode; *of it
+moving towards*: while the robot moves towards the worker at more than {MOVING_MPS} m/s. The rest
+comes of workers who walk up to a robot that stands, and depends on where it stands. *Contacts* a
+minute are named by what the robot did in the step before: *towards* the worker, *standing arm
+pushed*, *moving away*. In 1,000 steps, *near*: nearer than {SLOW_M:g} m, the exposure;
+*approaches*: the robot moves towards a worker nearer than {STOP_M:g} m; *missed stops*: the true
+separation is below {STOP_M:g} m and the believed one is not; *false stops*: the other way round.
+*Z_d*: 95th percentile of the error of all joints, also where the track is lost. *Tax*: Z_d on time
++ latency x (v_h + v_r), v_h = {NOMINAL_MPS} m/s, v_r the 95th percentile of the robot's speed
+towards the worker.
 
 Fewer than four cameras: the others fail after a second; which are left goes round. Late images say
 when they were taken, and the tracker predicts from there; untold ones claim to be new."""
@@ -51,7 +55,7 @@ FREE_COLOURS = ("C3", "C5", "C8", "C9")
 CAMERA_COLOURS = {4: "C0", 3: "#5aa2d6", 2: "#e8a33d", 1: "#d1495b"}
 LATE_MARKS = {0.0: "o", LATE_S[0]: "s", LATE_S[1]: "^"}
 ACROSS = {
-    "cost": "true cost per episode  (less is safer)",
+    "cost_towards": "true cost while moving towards the worker  (less is safer)",
     "approaches": "approaches per 1,000 steps  (less is safer)",
 }
 
@@ -59,6 +63,7 @@ ACROSS = {
 def report(figures: Path, table: Table, metrics: Metrics) -> Report:
     """Draw the figure; the tables beside it."""
     policies = [name for name in POLICIES if (name, REFERENCE) in table]
+    starts = table[policies[0], REFERENCE]["starts_in_contact"]
     setups = {name: setup_called(name).words for _, name in table}
     draw_tradeoff(figures / "tradeoff.png", metrics, policies, list(setups))
     caption = (
@@ -70,11 +75,16 @@ def report(figures: Path, table: Table, metrics: Metrics) -> Report:
     for policy in policies:
         columns = [Column(f"{policy}.{{}}.{what}", *words) for what, words in WORDS.items()]
         parts.append(table_of(policy, setups, columns, metrics))
-    parts.append(f"Less {setups[REFERENCE]}, paired; a dot where the interval leaves out zero.")
+    parts += [
+        f"In {sum(starts)} of {len(starts)} episodes worker and arm touch in the first step, in "
+        "every row alike: the environment draws both without regard to each other. No contact is "
+        "counted there, as nothing that is seen could prevent it.",
+        f"Less {setups[REFERENCE]}, paired; a dot where the interval leaves out zero.",
+    ]
     others = {name: words for name, words in setups.items() if name != REFERENCE}
     for policy in policies:
         key = f"difference.{policy}.{{}}."
-        columns = [Column(key + what, *WORDS[what], signed=True) for what in COMPARED]
+        columns = [Column(key + what, *WORDS[what], signed=True) for what in (*COMPARED, "z_d_m")]
         parts.append(table_of(policy, others, columns, metrics))
     late = {each.name: each.words for each in LATE if (SLOWED, each.name) in table}
     columns = [Column(f"lateness.{{}}.{how}", words, 3) for how, words in LATENESS]
@@ -85,13 +95,14 @@ def report(figures: Path, table: Table, metrics: Metrics) -> Report:
 def draw_tradeoff(
     path: Path, metrics: Metrics, policies: Sequence[str], setups: Sequence[str]
 ) -> None:
-    """Goals a minute against true cost: a column for each policy, a point for each setup; below
-    against approaches, without setups that track nobody and the policy that does not look."""
+    """Goals a minute against true cost while the robot moves towards the worker: a column for each
+    policy, a point for each setup; below against approaches, without setups that track nobody and
+    the policy that does not look."""
     figure = new_figure(5.4 * len(policies) + 1, 12)
     axes = figure.subplots(2, len(policies), squeeze=False)
     seeing = [name for name in setups if setup_called(name).level != "none"]
     for (above, below), policy in zip(axes.T, policies, strict=True):
-        _panel(above, metrics, policy, setups, "cost")
+        _panel(above, metrics, policy, setups, "cost_towards")
         if policy == SCRIPTED:
             below.set_axis_off()
         else:

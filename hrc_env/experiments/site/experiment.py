@@ -17,7 +17,7 @@ from hrc_env.core.typing import Floats
 from hrc_env.experiments.site.report import report, site
 from hrc_env.experiments.site.walk import walk
 from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.intervals import mean_over, rmse_over
+from hrc_env.experiments.study.intervals import mean_over, paired, rmse_of, rmse_over
 from hrc_env.experiments.study.recording import record, replay
 from hrc_env.experiments.study.rigs import DT_S, MULTI, N_WARM_UP, SPOKEN, left_of
 from hrc_env.experiments.study.runner import Study, at_least_one, changed
@@ -30,6 +30,8 @@ CROPS = "particle"
 """The estimator that the crops of the shared film follow."""
 SETTINGS = HRCConfig(tracker=TrackerConfig(prior_std_m=3.0))
 """Unknown people may be far from the middle of the work: walks go all over the place."""
+ALONE = "alone."
+"""In keys: cameras that are alone from the first frame on, as the paper's were."""
 ALSO = ("kalman", "paper_restarts")
 """These are given the film, too: single cameras get the best estimator that there is."""
 
@@ -110,12 +112,13 @@ def film(config: SiteConfig, seed: int, tick: PartProgress) -> dict[str, Any]:
     """One walk, filmed with the crops of the four-camera track, and everybody's word on it."""
     motions = walk(site(), seed, round(config.seconds / DT_S), DT_S)
     taken = record(site(), motions, SETTINGS, CROPS, seed, lambda share: tick(0.7 * share))
-    asked = [(name, row) for name in config.estimators for row in CHOICES]
-    asked += [(name, row) for name in ALSO if name not in config.estimators for row in ROWS]
+    asked = [(name, row, "") for name in config.estimators for row in CHOICES]
+    asked += [(name, row, "") for name in ALSO if name not in config.estimators for row in ROWS]
+    asked += [(name, row, ALONE) for name in config.estimators for row in ROWS]
     said: dict[str, Any] = {}
-    for name, row in asked:
-        beliefs = replay(taken, name, CHOICES[row], N_WARM_UP, seed)
-        said[f"{name}.{row}"] = _head_path(beliefs)
+    for name, row, protocol in asked:
+        beliefs = replay(taken, name, CHOICES[row], 0 if protocol else N_WARM_UP, seed)
+        said[f"{protocol}{name}.{row}"] = _head_path(beliefs)
         tick(0.3 / len(asked))
     found = taken.keypoints.confidence[:, :, 0, HEAD] > 0
     return {
@@ -155,9 +158,22 @@ def metrics_of(config: SiteConfig, played: Played) -> dict[str, Metric]:
         metrics[f"rmse_m.{key}"] = _rmse(squared[key])
         tracked = [float(np.mean(each["rows"][key]["tracked"])) for each in films.values()]
         metrics[f"tracked.{key}"] = mean_over(tracked, "share")
+        if name in config.estimators:
+            metrics[f"rmse_m.{ALONE}{key}"] = _rmse(squared[ALONE + key])
+            tracked = [
+                float(np.mean(each["rows"][ALONE + key]["tracked"])) for each in films.values()
+            ]
+            metrics[f"tracked.{ALONE}{key}"] = mean_over(tracked, "share")
         if row != MULTI:
             multi = squared[f"{name}.{MULTI}"].sum(1)
             metrics[f"over_multi.{key}"] = rmse_over(squared[key].sum(1), multi, "ratio")
+    first, *others = config.everybody
+    for name, row, start in product(others, ROWS, ("", ALONE)):
+        ours, theirs = f"{start}{first}.{row}", f"{start}{name}.{row}"
+        if theirs in squared:
+            both = np.concatenate([squared[ours], squared[theirs]])
+            off = rmse_of(both.sum(1), np.full(len(both), both.shape[1]))
+            metrics |= paired(f"rmse_m.{theirs}", off, len(films), "m")
     for name in config.estimators:
         for size, word in ((2, "two"), (3, "three")):
             rows = [squared[f"{name}.{row}"] for row, rig in CHOICES.items() if len(rig) == size]

@@ -16,6 +16,7 @@ from hrc_env.core.records import Keypoints, PoseEstimate, WorkerMotion
 from hrc_env.core.typing import Points3
 from hrc_env.experiments.study.cache import PartProgress
 from hrc_env.geometry.cameras import projections
+from hrc_env.perception.noise import our_joints
 from hrc_env.pipeline.levels import make_pipeline
 from hrc_env.pipeline.sensor_input import SensorInput, Windows
 from hrc_env.scene.build import Scene
@@ -79,7 +80,7 @@ def replay(
 ) -> PoseEstimate:
     """(T, 1, ...) what an estimator makes of the detections of some of the cameras.
 
-    The first `n_start` frames are given of all cameras: no estimator begins a track with one.
+    The first `n_start` frames are given of all cameras, by which every estimator begins a track.
     """
     P, found = projections(recording.scene.cameras), recording.keypoints
     dt_s = recording.config.ctrl_dt
@@ -95,7 +96,7 @@ def replay(
     for frame in range(len(px)):
         tracker.predict(state, dt_s, rngs)
         tracker.update(state, rows(given, np.array([frame])), rngs)
-        said.append(tracker.estimate(state))
+        said.append(our_joints(tracker.estimate(state)))
     return concatenated(said)
 
 

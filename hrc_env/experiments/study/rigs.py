@@ -1,6 +1,6 @@
 """Which cameras hang in episodes: settings take turns in rigs, so that no number hangs on a place.
 
-Fewer than four are what is left of four after a while: no estimator begins a track with one.
+Fewer than four are what is left of four after a while, so that every estimator begins a track.
 """
 
 from collections.abc import Sequence
