@@ -15,7 +15,7 @@ from hrc_env.geometry.cameras import PinholeCamera, projections, rays
 from hrc_env.geometry.triangulation import triangulate
 from hrc_env.perception.lensed import pinhole_keypoints
 
-VISIBLE = 0.7
+VISIBLE = 0.6
 """Mean confidence of the joints of who is seen by one camera only."""
 NEAR_M = 0.5
 """Who stands is so near to a place where people may [m]."""
@@ -28,7 +28,7 @@ LEVELS = tuple(
     for name in ("ankle", "knee", "hip", "shoulder")
 )
 """Joints by which it is seen whether somebody stands,"""
-ANKLE_M, LEVELS_M = 0.1, np.array([(0.3, 0.7), (0.7, 1.2), (1.1, 1.75), (1.3, 2.1)])
+ANKLE_M, LEVELS_M = 0.1, np.array([(0.2, 0.9), (0.6, 1.4), (1.0, 2.0), (1.2, 2.3)])
 """the height of the first above the floor, and bounds of the others' and of the nose's [m]."""
 
 
