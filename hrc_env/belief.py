@@ -67,4 +67,4 @@ def covariance_factor_m(estimate: PoseEstimate) -> Floats:
 
     Six numbers that hold all of it and, unlike axes and their deviations, change continuously.
     """
-    return np.linalg.cholesky(estimate.cov_world)[..., *np.tril_indices(3)]
+    return np.asarray(np.linalg.cholesky(estimate.cov_world)[..., *np.tril_indices(3)], float)

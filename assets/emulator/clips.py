@@ -1,6 +1,7 @@
 """Clips: one motion of one worker somewhere in a scene, with the arm somewhere near home."""
 
 import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -98,23 +99,31 @@ def family_of(motion: str) -> str:
 
 
 def fit_clips(rounds: int, seed: int) -> list[Clip]:
-    """Every motion, `rounds` times in each scene, or (0 rounds) in one; bodies and rigs in turn."""
-    return _clips(rounds, seed, FIT_RIGS)
+    """Those that the emulator is fitted to (`clips_of`)."""
+    return clips_of(rounds, seed, FIT_RIGS)
 
 
 def unseen_clips(rounds: int, seed: int) -> list[Clip]:
     """As many others: other seeds and pairs of motion and body, cameras elsewhere."""
-    return _clips(rounds, seed + UNSEEN_SEEDS, (UNSEEN_RIG,))
+    return clips_of(rounds, seed + UNSEEN_SEEDS, (UNSEEN_RIG,))
 
 
-def _clips(rounds: int, seed: int, rigs: tuple[Moved, ...]) -> list[Clip]:
-    names, clips = worker_names(), []
-    for k, motion in enumerate(REPERTOIRE):
+def clips_of(
+    rounds: int,
+    seed: int,
+    rigs: Sequence[Moved],
+    bodies: Sequence[str] = worker_names(),
+    motions: Sequence[str] = tuple(REPERTOIRE),
+    scenes: Sequence[str] = tuple(SCENES),
+) -> list[Clip]:
+    """Every motion, `rounds` times in each scene, or (0 rounds) in one; bodies and rigs in turn."""
+    clips = []
+    for k, motion in enumerate(motions):
         for round_ in range(max(rounds, 1) * TIMES.get(family_of(motion), 1)):
-            for i, scene in enumerate(SCENES):
-                if rounds == 0 and i != (k + round_) % len(SCENES):
+            for i, scene in enumerate(scenes):
+                if rounds == 0 and i != (k + round_) % len(scenes):
                     continue
-                body = names[(3 * k + 5 * i + 2 * round_ + seed) % len(names)]
+                body = bodies[(3 * k + 5 * i + 2 * round_ + seed) % len(bodies)]
                 rig = rigs[(round_ + k) % len(rigs)]
                 clips.append(Clip(scene, motion, body, seed + round_, rig))
     return sorted(clips, key=lambda clip: (clip.scene, clip.body, clip.rig))

@@ -2,10 +2,9 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
-from assets.emulator.clips import fit_clips
+from assets.emulator.clips import fit_clips, unseen_clips
 from assets.emulator.fit.fit import fit
 from assets.emulator.matching import matched
 from assets.emulator.plot import plot_comparison
@@ -49,21 +48,22 @@ def calibrate(run: CalibrationRun, out: Path, say: Say) -> Calibration:
     for clip, seen in zip(clips, kept("pixels", clips, HRCConfig(), folder_of(out)), strict=True):
         pixels.append(seen)
         say(0.85 / len(clips), f"{clip.scene}: {clip.motion}")
-    rest = partial(_part, say, 0.15)
-    calibration = matched(fit(samples_of(pixels)), clips, pixels, out.with_suffix(".fit"), rest)
+    draft, rest = fit(samples_of(pixels)), part_of(say, 0.15)
+    calibration = matched(draft, clips, pixels, out.with_suffix(".fit"), rest)
     write_calibration(out, calibration, _made(run, out, len(clips)))
     return calibration
 
 
-def _part(say: Say, part: float, share: float, label: str) -> None:
-    """Tell of progress in a part of the whole."""
-    say(part * share, label)
+def part_of(say: Say, part: float) -> Say:
+    """What a part of the whole tells its progress."""
+    return lambda share, label: say(part * share, label)
 
 
 def compare(run: CalibrationRun, out: Path, say: Say) -> Compared:
     """Pixels beside the emulator with this file, on clips that the fit has not seen; a plot."""
     config = replace(HRCConfig(), emulator=EmulatorConfig(calibration=str(out)))
-    seen = compared(run.rounds, run.seed, say, config, folder_of(out))
+    clips = unseen_clips(run.rounds, run.seed)
+    seen = compared(clips, say, config, folder_of(out))
     plot_comparison(out.with_suffix(".png"), seen)
     return seen
 

@@ -7,33 +7,44 @@ from dataclasses import asdict
 from pathlib import Path
 
 from assets.emulator.clips import Clip
-from assets.emulator.watch import Watched, load, save, watch
+from assets.emulator.watch import BodyOf, Watched, load, save, watch
 from hrc_env.config import HRCConfig
+from hrc_env.core.typing import Floats
 from hrc_env.experiments.study.fingerprint import fingerprint_of
-from hrc_env.perception.noise import ERROR, OFFSET_M
+from hrc_env.worker.body import load_body
 
 
 def kept(
-    level: str, clips: Sequence[Clip], config: HRCConfig, folder: Path | None
+    level: str,
+    clips: Sequence[Clip],
+    config: HRCConfig,
+    folder: Path | None,
+    body_of: BodyOf = load_body,
 ) -> Iterator[Watched]:
     """What a level saw of clips, from the folder where it is there, else played and put there.
 
     What other code or settings saw does not count, nor what was seen when the tracker was told
-    other deviations or offsets of joints.
+    other deviations or offsets of joints, or that these are elsewhere in a body (`watch`).
     """
     if folder is None:
-        yield from watch(level, clips, config)
+        yield from watch(level, clips, config, body_of)
         return
-    told = hashlib.sha256(ERROR.tobytes() + OFFSET_M.tobytes()).hexdigest()
+    known = config.emulator.calibrated()
+    told = _digest(known.sigma, known.offset_m)
     settings = {"level": level, "detector": asdict(config.detector), "told": told}
     code = fingerprint_of(settings, "assets.emulator.watch")
-    paths = [folder / f"{_name(clip, code)}.npz" for clip in clips]
+    joints = {clip.body: _digest(body_of(clip.body).joint_offset) for clip in clips}
+    paths = [folder / f"{_name(clip, code + joints[clip.body])}.npz" for clip in clips]
     todo = [clip for clip, path in zip(clips, paths, strict=True) if not path.exists()]
-    fresh = watch(level, todo, config)
+    fresh = watch(level, todo, config, body_of)
     for path in paths:
         if not path.exists():
             save(path, next(fresh))
         yield load(path)
+
+
+def _digest(*arrays: Floats) -> str:
+    return hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest()
 
 
 def _name(clip: Clip, code: str) -> str:

@@ -12,14 +12,18 @@ import numpy as np
 
 from assets.emulator.clips import FAMILIES, WARM_UP, Clip, family_of, unseen_clips
 from assets.emulator.shelf import kept
-from assets.emulator.watch import Watched, watch
+from assets.emulator.watch import BodyOf, Watched, watch
 from hrc_env.config import HRCConfig
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.perception.sightlines import SEEN
+from hrc_env.worker.body import load_body
 
 CHI2_95_3D = 7.815
 """95 % of a three-dimensional normal variable lies within this squared distance."""
+GROUPS = {name: (name,) for name in FAMILIES}
+GROUPS |= {"upright": tuple(name for name in FAMILIES if name != "fold"), "all": tuple(FAMILIES)}
+"""Families of motions of which there are numbers, each alone and some together."""
 HALF_SEEN = 8
 """So many joints of 15."""
 DRAWS = 4
@@ -67,7 +71,7 @@ class Compared:
     emulated: Sequence[Sequence[Watched]]
     """(K, `DRAWS`)."""
     outcomes: dict[str, tuple[StepResult, StepResult]]
-    """Of pixels and emulator, by family and for "all"."""
+    """Of pixels and emulator, by the names of `GROUPS`."""
 
 
 def error_ratios(
@@ -78,7 +82,7 @@ def error_ratios(
     store: Path | None = None,
     picture: Path | None = None,
 ) -> dict[str, Metric]:
-    """Error of the emulator over that of the pixels, by family of motions.
+    """`ratios_of` clips that no fit has seen.
 
     Args:
         rounds: how often each motion is rendered in each scene: 82 clips a round; 0: once, in
@@ -88,6 +92,17 @@ def error_ratios(
         config: settings; its `emulator` is judged.
         store: a folder in which what was rendered stays, and is taken from; None: nothing stays.
         picture: where a plot of both is drawn (PNG); None: nowhere.
+    """
+    seen = compared(unseen_clips(rounds, seed), say, config or HRCConfig(), store)
+    if picture is not None:
+        from assets.emulator.plot import plot_comparison  # which imports this module
+
+        plot_comparison(picture, seen)
+    return ratios_of(seen)
+
+
+def ratios_of(seen: Compared) -> dict[str, Metric]:
+    """Error of the emulator over that of the pixels, by family of motions.
 
     Returns:
         `emulator_error_ratio.<family>` for medians, `.<family>.p95`, and
@@ -95,16 +110,11 @@ def error_ratios(
         made of: `emulator_<median_m|p95_m|coverage95>.<family>.<pixels|keypoints>` and
         `emulator_clips.<family>`.
     """
-    seen = compared(rounds, seed, say, config or HRCConfig(), store)
-    if picture is not None:
-        from assets.emulator.plot import plot_comparison  # which imports this module
-
-        plot_comparison(picture, seen)
-    pixels = [_in_space([each]) for each in seen.pixels]
-    emulated = [_in_space(each) for each in seen.emulated]
+    pixels = [in_space([each]) for each in seen.pixels]
+    emulated = [in_space(each) for each in seen.emulated]
     metrics: dict[str, Metric] = {}
     for family, outcomes in seen.outcomes.items():
-        mine = _of_family(seen.clips, family)
+        mine = of_family(seen.clips, family)
         metrics[f"emulator_clips.{family}"] = _exactly(len(mine), "", len(mine))
         for level, found in zip(("pixels", "keypoints"), outcomes, strict=True):
             for what, value, unit in (
@@ -124,38 +134,50 @@ def _apart(
     family: str, pixels: Sequence[InSpace], emulated: Sequence[InSpace]
 ) -> dict[str, Metric]:
     """How far both levels are apart on K clips of a family."""
-    draws, n = np.random.default_rng(0), len(pixels)
 
     def apart(ks: Ints) -> list[float]:
-        (a, a_inside), (b, b_inside) = (
-            [np.concatenate(part) for part in zip(*(level[k] for k in ks.tolist()), strict=True)]
-            for level in (pixels, emulated)
-        )
+        (a, a_inside), (b, b_inside) = (_of(ks, level) for level in (pixels, emulated))
         ratios = np.percentile(b, [50, 95]) / np.percentile(a, [50, 95])
         return [*ratios.tolist(), float(b_inside.mean() - a_inside.mean())]
 
-    again = [apart(draws.integers(0, n, n)) for _ in range(RESAMPLES)]
-    lows, highs = np.percentile(again, [2.5, 97.5], axis=0).tolist()
-    ratio = f"emulator_error_ratio.{family}"
+    ratio, n_joints = f"emulator_error_ratio.{family}", sum(error.size for error, _ in pixels)
     names = (ratio, f"{ratio}.p95", f"emulator_coverage_difference.{family}")
-    n_joints = sum(error.size for error, _ in pixels)
-    return {
-        name: Metric(value, low, high, "", n_joints)
-        for name, value, low, high in zip(names, apart(np.arange(n)), lows, highs, strict=True)
-    }
+    return dict(zip(names, over_clips(apart, len(pixels), ("", "", ""), n_joints), strict=True))
 
 
-def compared(rounds: int, seed: int, say: Say, config: HRCConfig, store: Path | None) -> Compared:
-    """What pixels and emulator make of clips that no fit has seen."""
-    clips = unseen_clips(rounds, seed)
+def over_clips(
+    numbers: Callable[[Ints], list[float]], n_clips: int, units: Sequence[str], n: int
+) -> list[Metric]:
+    """Numbers of clips (K,), with 95 % intervals that draw the clips anew; `n` observations."""
+    draws = np.random.default_rng(0)
+    again = [numbers(draws.integers(0, n_clips, n_clips)) for _ in range(RESAMPLES)]
+    lows, highs = np.percentile(again, [2.5, 97.5], axis=0).tolist()
+    values = numbers(np.arange(n_clips))
+    return [Metric(*each, n) for each in zip(values, lows, highs, units, strict=True)]
+
+
+def _of(ks: Ints, level: Sequence[InSpace]) -> InSpace:
+    """Some clips of a level, together."""
+    errors, inside = zip(*(level[k] for k in ks.tolist()), strict=True)
+    return np.concatenate(errors), np.concatenate(inside)
+
+
+def compared(
+    clips: Sequence[Clip],
+    say: Say,
+    config: HRCConfig,
+    store: Path | None,
+    body_of: BodyOf = load_body,
+) -> Compared:
+    """What pixels and emulator make of clips; see `error_ratios`, `watch`."""
     pixels: list[Watched] = []
-    for clip, watched in zip(clips, kept("pixels", clips, config, store), strict=True):
+    for clip, watched in zip(clips, kept("pixels", clips, config, store, body_of), strict=True):
         pixels.append(watched)
         say(0.9 / len(clips), f"pixels: {clip.motion}")
     emulated: list[list[Watched]] = [[] for _ in clips]
     for draw in range(DRAWS):
         others = [replace(clip, draw=draw) for clip in clips]
-        for k, watched in enumerate(watch("keypoints", others, config)):
+        for k, watched in enumerate(watch("keypoints", others, config, body_of)):
             emulated[k].append(watched)
             say(0.1 / DRAWS / len(clips), f"emulator: {clips[k].motion}")
     outcomes = by_family(clips, [[each] for each in pixels], emulated)
@@ -165,24 +187,24 @@ def compared(rounds: int, seed: int, say: Say, config: HRCConfig, store: Path | 
 def by_family(
     clips: Sequence[Clip], pixels: Sequence[list[Watched]], emulated: Sequence[list[Watched]]
 ) -> dict[str, tuple[StepResult, StepResult]]:
-    """Outcomes of both levels for each family that occurs, and for "all"."""
+    """Outcomes of both levels for each of `GROUPS` that occurs."""
     result = {}
-    for family in (*FAMILIES, "all"):
-        mine = _of_family(clips, family)
+    for family in GROUPS:
+        mine = of_family(clips, family)
         if mine:
             parts = [[each for k in mine for each in level[k]] for level in (pixels, emulated)]
             result[family] = (outcome(parts[0]), outcome(parts[1]))
     return result
 
 
-def _of_family(clips: Sequence[Clip], family: str) -> list[int]:
-    """Which of the clips are of a family; of "all" every one is."""
-    return [k for k, clip in enumerate(clips) if family in ("all", family_of(clip.motion))]
+def of_family(clips: Sequence[Clip], group: str) -> list[int]:
+    """Which of the clips are of one of `GROUPS`."""
+    return [k for k, clip in enumerate(clips) if family_of(clip.motion) in GROUPS[group]]
 
 
 def outcome(watched: Sequence[Watched]) -> StepResult:
     """Numbers of some clips."""
-    error, inside = _in_space(watched)
+    error, inside = in_space(watched)
     px = np.concatenate([errors_in_image(each).ravel() for each in watched])
     px = px[np.isfinite(px)]
     looked = np.concatenate(
@@ -197,12 +219,13 @@ def outcome(watched: Sequence[Watched]) -> StepResult:
     )  # fmt: skip
 
 
-def _in_space(watched: Sequence[Watched]) -> InSpace:
-    """Errors of the tracked joints [m], and whether the reported region held them."""
+def in_space(watched: Sequence[Watched], truth: str = "joints_world") -> InSpace:
+    """Errors of the tracked joints [m], and whether the reported region held them; the truth is
+    one of `Watched`'s."""
     errors, inside = [], []
     for each in watched:
         tracked = np.flatnonzero(each.tracked[WARM_UP:]) + WARM_UP
-        offset = (each.mean_world - each.joints_world)[tracked]
+        offset = (each.mean_world - getattr(each, truth))[tracked]
         squared = np.einsum(
             "tji,tjik,tjk->tj", offset, np.linalg.inv(each.cov_world[tracked]), offset
         )

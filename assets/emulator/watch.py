@@ -1,12 +1,13 @@
 """What is seen of clips: by the pose network in rendered pictures, or by its emulator."""
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from assets.emulator.bodies import anatomical
 from assets.emulator.clips import DT_S, Clip, Staged, number_of, scene_of, stage
 from hrc_env.config import HRCConfig
 from hrc_env.core.batching import rows
@@ -19,7 +20,7 @@ from hrc_env.pipeline.levels import make_pipeline
 from hrc_env.pipeline.sensor_input import Generators, TrueSensorInput
 from hrc_env.pipeline.tracking import PoseTracking
 from hrc_env.scene.build import Scene
-from hrc_env.worker.body import worker_truth
+from hrc_env.worker.body import Body, load_body, worker_truth
 
 INTRODUCED, INTRODUCED_PX = 3, 10.0
 """So many frames of true joints the tracker is given first, as known to so many pixels [px]."""
@@ -53,14 +54,27 @@ class Watched:
     """(T, J, 3, 3) [m^2]."""
     tracked: Bools
     """(T,)."""
+    landmarks_world: Points3
+    """(T, J, 3) the anatomical landmarks of the joints [m]."""
     P: Floats
     """(C, 3, 4) the cameras."""
 
 
+BodyOf = Callable[[str], Body]
+"""A body by its name."""
+
+
 def watch(
-    level: str, clips: Iterable[Clip], config: HRCConfig, estimator: str = "particle"
+    level: str, clips: Iterable[Clip], config: HRCConfig, body_of: BodyOf = load_body
 ) -> Iterator[Watched]:
-    """Play clips before the pipeline of a perception level; those of one scene together."""
+    """Play clips before the pipeline of a perception level; those of one scene together.
+
+    Args:
+        level: "pixels" or "keypoints".
+        clips: in an order in which those of one scene follow each other.
+        config: settings.
+        body_of: where the joints of a body by name are.
+    """
     pipeline, known = None, None
     try:
         for clip in clips:
@@ -68,10 +82,11 @@ def watch(
             if pipeline is None or scene is not known:
                 if pipeline is not None:
                     pipeline.close()
-                pipeline, known = make_pipeline(level, estimator, scene, 1, config), scene
+                pipeline, known = make_pipeline(level, "particle", scene, 1, config), scene
             if not isinstance(pipeline, PoseTracking):
                 raise ConfigError(f"Clips are for levels with cameras, not for {level!r}.")
-            yield _watched(pipeline, scene, stage(clip, scene), (number_of(clip), clip.draw))
+            staged = replace(stage(clip, scene), body=body_of(clip.body))
+            yield _watched(pipeline, scene, staged, (number_of(clip), clip.draw))
     finally:
         if pipeline is not None:
             pipeline.close()
@@ -84,6 +99,7 @@ def _watched(
     pipeline.reset(np.arange(1), *rngs)
     P, frames = projections(scene.cameras), []
     _introduce(pipeline, worker_truth(staged.body, staged.motion).joints_world[:1], P, rngs[1])
+    landmarks_world = worker_truth(anatomical(staged.body), staged.motion).joints_world[:, 0]
     q = staged.q[None]
     for t in range(len(staged.motion.position_world)):
         motion = rows(staged.motion, np.array([t]))
@@ -104,7 +120,7 @@ def _watched(
             )
         )  # fmt: skip
     columns: list[Any] = [np.array(column) for column in zip(*frames, strict=True)]
-    return Watched(*[*columns, P])
+    return Watched(*[*columns, landmarks_world, P])
 
 
 def _introduce(pipeline: PoseTracking, joints_world: Points3, P: Floats, rngs: Generators) -> None:

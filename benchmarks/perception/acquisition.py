@@ -70,7 +70,8 @@ def phantoms(env: HRCEnv, seed: int, reach: float) -> dict[str, float]:
         assert keypoints is not None
         assert not env.simulation.present.any()
         somebody = keypoints.confidence[0].any((1, 2))
-        counts += len(somebody), somebody.sum(), env.simulation.estimate.tracked.any()
+        followed = env.simulation.estimate.tracked.any()
+        counts += np.array([len(somebody), somebody.sum(), followed])
         env.step(rng.uniform(-reach, reach, env.simulation.n_actions).astype(np.float32))
     return dict(zip(("images", "believed", "followed"), counts.tolist(), strict=True))
 
@@ -89,7 +90,7 @@ def empty_seeds(arguments: Arguments, n: int) -> list[int]:
 def _play(arguments: Arguments, parts: PartCache) -> dict[str, list[dict[str, float]]]:
     seeds = [arguments.first + k for k in range(arguments.seeds)]
     empty = empty_seeds(arguments, max(arguments.still, arguments.moving))
-    jobs: dict[str, Any] = {"found": (seeds, looks_until_found, 1)}
+    jobs: dict[str, tuple[list[int], Any, Any]] = {"found": (seeds, looks_until_found, 1)}
     for name, n in (("still", arguments.still), ("moving", arguments.moving)):
         jobs[name] = (empty[:n], partial(phantoms, reach=REACH[name]), (0, 1))
     return {name: _blocks(name, *job, arguments, parts) for name, job in jobs.items()}

@@ -82,7 +82,7 @@ def locks(rig: Rig, seeds: list[int]) -> dict[str, Metric]:
         near = np.median(np.linalg.norm(off, axis=-1), axis=(2, 3)) < within_m
         first = np.where(near.any(0), near.argmax(0) + 1, len(near))
         key = f"{rig.name}.{name}"
-        metrics[f"locks.{key}"] = share(near[after - 1 :].all(0).tolist())
+        metrics[f"locks.{key}"] = share([*near[after - 1 :].all(0)])
         metrics[f"frames.{key}"] = exactly(float(np.median(first)), "frames", len(seeds))
         metrics[f"frames_most.{key}"] = exactly(float(first.max()), "frames", len(seeds))
     return metrics

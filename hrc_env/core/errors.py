@@ -21,7 +21,6 @@ OLD_NAMES = {
     "scene.leash_rad": "scene.integrator_clamp_rad",
     "tracker.paper_iterations": "tracker.n_iterations",
     "tracker.paper_particles": "tracker.n_particles",
-    "tracker.paper_resampling": "tracker.resampling",
     "tracker.paper_sigma_m": "tracker.sigma_m",
     "worker_gap": "worker_separation",
     "worker_joints_ahead": "worker_joints_forecast",

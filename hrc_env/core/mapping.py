@@ -74,8 +74,9 @@ def restored(hint: Any, value: Any, where: str) -> Any:
     if hint is str and isinstance(value, Path):
         return str(value)
     if hint is float:
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        return float(_checked(number and math.isfinite(value), "a finite number", value, where))
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        finite = is_number and math.isfinite(typing.cast(float, value))
+        return float(_checked(finite, "a finite number", value, where))
     if hint is int:
         whole = isinstance(value, int) and not isinstance(value, bool)
         return _checked(whole, "a whole number", value, where)

@@ -22,7 +22,7 @@ from hrc_env.core.typing import Floats, Image, Points2, Points3
 from hrc_env.geometry.cameras import PinholeCamera, inside_image
 from hrc_env.perception import blazepose, network
 from hrc_env.perception.believing import is_body, stands
-from hrc_env.perception.noise import STANDING, sigma_px
+from hrc_env.perception.noise import ERROR, STANDING, sigma_px
 from hrc_env.perception.searching import (
     Candidates,
     ImageSource,
@@ -120,8 +120,9 @@ class PoseDetector(Stateful):
         cameras: Sequence[PinholeCamera],
         config: DetectorConfig | None = None,
         floor_world: Points3 | None = None,
+        error: Floats = ERROR,
     ) -> None:
-        """Searches are laid out for people who stand at points (N, 3) [m], if these are known.
+        """`floor_world` (N, 3) [m], `error`: as of `pipeline.looking.Looking`.
         Raises `WeightsError` without the weights, `ConfigError` without the runtime."""
         self.cameras = tuple(cameras)
         self.config = config or DetectorConfig()
@@ -129,7 +130,7 @@ class PoseDetector(Stateful):
         for name in (self.config.network, self.config.folded):
             find_weights(f"pose_landmark_{name}")
         network.chosen_runtime(self.config.runtime)
-        self.floor_world = floor_world
+        self.floor_world, self.error = floor_world, error
         self._search = [search_windows(camera, floor_world) for camera in self.cameras]
         self._looks: dict[int, list[int]] = {}
         self._networks: tuple[_Networks, _Networks] | None = None
@@ -279,7 +280,8 @@ class PoseDetector(Stateful):
         confidence = joints[:, 2].copy()
         confidence[outside] = np.minimum(confidence[outside], self.config.outside_confidence)
         sight.px[c], sight.confidence[c] = joints[:, :2], confidence
-        sight.sigma_px[c] = sigma_px(confidence, STATURE_OF_SIDE * window.side_px, posture)
+        stature_px = STATURE_OF_SIDE * window.side_px
+        sight.sigma_px[c] = sigma_px(confidence, stature_px, posture, self.error)
 
 
 def _nobody(windows: Sequence[Roi | None]) -> Detection:

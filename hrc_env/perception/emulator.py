@@ -25,10 +25,11 @@ Generators = Sequence[np.random.Generator]
 
 @dataclass(frozen=True, slots=True)
 class EmulatorConfig:
-    """Which calibration the detector's errors are drawn from, and what is different."""
+    """What is known of the detector's errors, and what is different where they are drawn."""
 
     calibration: str = ""
-    """A file that `python -m hrc_env calibrate-keypoints` wrote; empty: the package's own."""
+    """A file that `python -m hrc_env calibrate-keypoints` wrote; empty: the package's own. What it
+    says of deviations and offsets the tracker is told at `pixels` too."""
     error_scale: float = 1.0
     """Factor on all errors of position; 0: the projected truth. What is told of them stays."""
     max_error: float = 0.4

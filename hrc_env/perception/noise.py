@@ -26,13 +26,17 @@ STANDING = (1.0, *(0.0,) * (len(POSTURES) - 1))
 
 
 def sigma_px(
-    confidence: Floats, stature_px: Floats | float, posture: Sequence[float] = STANDING
+    confidence: Floats,
+    stature_px: Floats | float,
+    posture: Sequence[float] = STANDING,
+    known: Floats = ERROR,
 ) -> Floats:
     """Standard deviation of each coordinate of joints with these visibilities (..., J) [px],
-    infinite of 0; statures at their distance [px] broadcast; posture: `outline.posture_of`."""
+    infinite of 0; statures at their distance [px] broadcast; posture: `outline.posture_of`;
+    known: a calibration's `sigma`."""
     confidence = np.asarray(confidence, float)
     check_shape("confidence", confidence.shape[-1:], (len(KIND),), "one a joint")
-    error = np.tensordot(np.asarray(posture, float), ERROR, 1)
+    error = np.tensordot(np.asarray(posture, float), known, 1)
     parts = [np.interp(confidence[..., j], VISIBILITY, error[k]) for j, k in enumerate(KIND)]
     share = np.stack(parts, -1)
     return np.where(confidence > 0, share * stature_px, np.inf)
@@ -52,11 +56,11 @@ def error_share(confidence: float, visibility: Floats, error: Floats) -> float:
     return error[-1]
 
 
-def our_joints(estimate: PoseEstimate) -> PoseEstimate:
+def our_joints(estimate: PoseEstimate, offset_m: Floats = OFFSET_M) -> PoseEstimate:
     """An estimate (B, W, ...) of what the network means, as one of joints; the prior of who is not
-    tracked, covariances and velocities stay."""
+    tracked, covariances and velocities stay. offset_m: a calibration's."""
     mean_world = estimate.mean_world.copy()
-    offset_of = OFFSET_M.reshape(len(OFFSET_M), -1)
+    offset_of = offset_m.reshape(len(offset_m), -1)
     _put_right(mean_world, estimate.velocity_world, estimate.tracked, offset_of, KIND, HAND)
     return replace(estimate, mean_world=mean_world)
 

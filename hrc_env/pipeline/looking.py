@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 from hrc_env.core.batching import Stateful
 from hrc_env.core.records import Keypoints, PoseEstimate, Roi
-from hrc_env.core.typing import Image, Points3
+from hrc_env.core.typing import Floats, Image, Points3
 from hrc_env.geometry.cameras import PinholeCamera, project, projections
 from hrc_env.perception.detector import Detection, DetectorConfig, PoseDetector
-from hrc_env.perception.noise import STANDING
+from hrc_env.perception.noise import ERROR, STANDING
 from hrc_env.perception.outline import is_folded, posture_of
 from hrc_env.perception.searching import ImageSource
 from hrc_env.perception.windows import steady_window, window_from_joints
@@ -27,11 +27,13 @@ class Looking(Stateful):
         n_workers: int,
         config: DetectorConfig,
         floor_world: Points3 | None = None,
+        error: Floats = ERROR,
     ) -> None:
-        """`floor_world` (N, 3) [m]: where people may stand, if that is known."""
+        """Searches are laid out for people who stand at points `floor_world` (N, 3) [m], if these
+        are known; `error`, a calibration's `sigma`, says how far detections may be off."""
         self.cameras, self.n_workers = tuple(cameras), n_workers
         self.P = projections(self.cameras)
-        self.detector = PoseDetector(self.cameras, config, floor_world)
+        self.detector = PoseDetector(self.cameras, config, floor_world, error)
         self.windows: list[Windows] = [
             [[None] * len(self.cameras) for _ in range(n_workers)] for _ in range(batch)
         ]

@@ -69,8 +69,8 @@ class PixelPipeline(PoseTracking):
     ) -> None:
         self.cameras = RenderedCameras(scene, batch, config.appearance, schedule)
         super().__init__(batch, scene, tracker, config, self.cameras)
-        rig, floor_world = scene.cameras, floor(scene.grounds)
-        self.looking = Looking(batch, rig, scene.n_workers, config.detector, floor_world)
+        known = floor(scene.grounds), self.calibration.sigma
+        self.looking = Looking(batch, scene.cameras, scene.n_workers, config.detector, *known)
 
     def detect(self, ids: Ints, expected: PoseEstimate, sensor_rngs: Generators) -> Keypoints:
         """Landmarks of crops round the expected workers, or of a search where there are none."""

@@ -7,7 +7,6 @@ import numpy as np
 
 from hrc_env.core.errors import ConfigError, unknown
 
-_SCHEMES = ("multinomial", "systematic")
 _MIRRORED = ("body", "limbs")
 
 
@@ -107,9 +106,9 @@ class ParticleConfig(TrackerConfig):
     size_std: float = 0.06
     """Standard deviation of people's size as a share of it, as of adults' statures: how little the
     depth is known of a body that one view has begun."""
-    stands_std_m: float = float("inf")
+    stands_std_m: float = 0.0
     """Such a body's lowest joint is thought to be on the floor, z = 0, within this, which measures
-    its size [m]; infinity: people may be anywhere above it."""
+    its size [m], as .1; 0: people may be anywhere above it."""
     mirrored_parts: tuple[str, ...] = ("body", "limbs")
     """What may be turned or reflected in depth when one view carries it."""
     look_every_s: float = 0.12
@@ -139,7 +138,7 @@ class ParticleConfig(TrackerConfig):
         self.check_positive(
             "floor_std_m", "bone_give", "noise_tau_s", "noise_persists_s",
             "gauss_newton_steps", "image_area_px", "one_view_inflation", "n_hypotheses",
-            "look_every_s", "open_depth_m", "turn_std_rad", "evidence_trust",
+            "look_every_s", "open_depth_m", "turn_std_rad", "evidence_trust", "size_std",
         )  # fmt: skip
         for name in ("least_weight", "outlier_weight", "damping", "swap_begins", "swap_ends"):
             if not 0 < getattr(self, name) < 1:
@@ -152,7 +151,10 @@ class ParticleConfig(TrackerConfig):
             )
         if not 0 <= self.noise_share < 1:
             raise ConfigError(f"noise_share must be in [0, 1), got {self.noise_share}.")
-        for name in ("mean_correction", "anatomy_trust", "walking_odds"):
+        for name in (
+            "mean_correction", "anatomy_trust", "walking_odds",
+            "wait_updates", "stands_std_m",
+        ):  # fmt: skip
             if not getattr(self, name) >= 0:
                 raise ConfigError(f"{name} must not be negative, got {getattr(self, name)}.")
         for part in self.mirrored_parts:
@@ -175,15 +177,11 @@ class PaperConfig(TrackerConfig):
     place_m: tuple[tuple[float, float], ...] = ()
     """Over which line 1 draws particles: least and most x, y and z [m]. Empty: what the cameras
     stand round, from the floor to 2.2 m."""
-    resampling: str = "multinomial"
-    """"multinomial" as in the paper's line 17, or "systematic" (less noise)."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for values that cannot work."""
         TrackerConfig.__post_init__(self)
         self.check_positive("velocity_tau_s", "n_iterations")
-        if self.resampling not in _SCHEMES:
-            raise unknown("resampling", self.resampling, _SCHEMES)
         if self.n_particles < 10:
             raise ConfigError(
                 f"n_particles must be at least 10, got {self.n_particles}: after a resampling "

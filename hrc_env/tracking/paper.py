@@ -128,9 +128,8 @@ class PaperEstimator:
         for n in range(config.n_iterations):  # line 2: for n = 1 to N
             if n > 0:
                 roll(particles, config.sigma_m, rng)  # line 7, of further passes
-            by_weight = config.resampling == "multinomial"
-            chance = _chance(by_weight, particles.shape[-1], rng)
-            weigh_and_resample(seen, particles, by_weight, chance)
+            waits = rng.standard_exponential((N_JOINTS, particles.shape[-1] + 1))
+            weigh_and_resample(seen, particles, waits)
         mean, cov = np.empty((N_JOINTS, 3)), np.empty((N_JOINTS, 3, 3))
         moments(particles, mean, cov)  # line 19
         elapsed_s = max(state.elapsed_s.item(who[0]), 1e-6)
@@ -155,16 +154,9 @@ def place_of(P: Floats, config: PaperConfig) -> Floats:
     return place
 
 
-def _chance(by_weight: bool, n_particles: int, rng: np.random.Generator) -> Floats:
-    """(J, M + 1) random numbers that the resampling of one frame takes."""
-    if by_weight:
-        return rng.standard_exponential((N_JOINTS, n_particles + 1))
-    return np.repeat(rng.random((N_JOINTS, 1)), n_particles + 1, axis=1)
-
-
 @kernel(makes_arrays=True)
-def weigh_and_resample(seen, particles, by_weight, chance):
-    """Lines 8 to 17 for the clouds (J, 3, M) of one worker, in place."""
+def weigh_and_resample(seen, particles, waits):
+    """Lines 8 to 17 for clouds (J, 3, M) of one worker, in place; `waits` are `multinomial`'s."""
     P, z, sigma, ok = seen.P, seen.z, seen.sigma, seen.ok
     n_joints, n_cameras = ok.shape
     n_particles = particles.shape[2]
@@ -178,10 +170,7 @@ def weigh_and_resample(seen, particles, by_weight, chance):
                 u, v = z[j, c, 0], z[j, c, 1]
                 add_log_likelihood(P[c], u, v, sigma[j, c], particles[j], log_weights)
         normalise(log_weights, weights)  # line 16
-        if by_weight:
-            multinomial(weights, chance[j], ancestors)  # line 17
-        else:
-            systematic(weights, chance[j, 0], ancestors)
+        multinomial(weights, waits[j], ancestors)  # line 17
         before[:] = particles[j]
         for i in range(3):
             for m in range(n_particles):
@@ -272,21 +261,6 @@ def multinomial(weights, waits, ancestors):
     for m in range(len(ancestors)):
         position += waits[m] / total
         while cumulative < position and particle < len(weights) - 1:
-            particle += 1
-            cumulative += weights[particle]
-        ancestors[m] = particle
-
-
-@kernel(makes_arrays=True)
-def systematic(weights, start, ancestors):
-    """Choices at even distances after one uniform variate `start` (Kitagawa, 1996).
-
-    How often each is chosen differs from M w_m by less than one.
-    """
-    n = len(ancestors)
-    particle, cumulative = 0, weights[0]
-    for m in range(n):
-        while cumulative < (m + start) / n and particle < len(weights) - 1:
             particle += 1
             cumulative += weights[particle]
         ancestors[m] = particle

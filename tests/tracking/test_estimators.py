@@ -224,7 +224,6 @@ def test_keypoints_of_another_rig_are_refused(name):
         (PaperConfig, {"n_particles": 9}),
         (ParticleConfig, {"lost_after_s": 6.0}),
         (PaperConfig, {"sigma_m": -0.1}),
-        (PaperConfig, {"resampling": "systematical"}),
     ],
 )
 def test_settings_that_cannot_work_are_refused(kind, setting):

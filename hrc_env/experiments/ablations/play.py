@@ -104,7 +104,7 @@ def _jobs(turns: Sequence[Turn], n_episodes: int) -> list[tuple[Turn, Ints]]:
 def _episodes(setting: Setting, turn: Turn, walks: Walks, seeds: Sequence[int], ids: Ints) -> Sums:
     """Sums of some of the episodes, with these cameras, after the warm-up."""
     errors, inside, lost, seeing, scene = [], [], [], [], scene_of(setting, turn)
-    identities = no_identities(len(ids), setting.n_workers)
+    known, identities = [], no_identities(len(ids), setting.n_workers)
     for said, now, _ in islice(watch(setting, turn, walks, seeds, ids), N_WARM_UP, None):
         joints_world = now.truth.joints_world
         order = matched(said.mean_world, said.tracked, joints_world)
@@ -114,7 +114,7 @@ def _episodes(setting: Setting, turn: Turn, walks: Walks, seeds: Sequence[int], 
         squares = np.einsum("...i,...i->...", off, np.linalg.solve(cov, off[..., None])[..., 0])
         inside.append(squares < INSIDE_95)
         lost.append(~said.tracked[episode, order])
-        known = tracking_error(said, now.truth, now.present, identities)
+        known.append(tracking_error(said, now.truth, now.present, identities))
         if setting.by_sight:
             seeing.append(n_seeing(now, scene, turn))
     error_m, is_inside, is_lost = (np.stack(each, 1) for each in (errors, inside, lost))
@@ -122,7 +122,7 @@ def _episodes(setting: Setting, turn: Turn, walks: Walks, seeds: Sequence[int], 
     sums["lost"] = is_lost.sum((1, 2)).tolist()
     sums["frames"] = [is_lost[0].size] * len(ids)
     if setting.n_workers > 1:
-        sums |= {name: known[name].tolist() for name in ("id_switches", "idf1")}
+        sums |= {name: known[-1][name].tolist() for name in ("id_switches", "idf1")}
     if seeing:
         for k in range(len(scene.cameras) + 1):
             sums |= _sums(error_m, is_inside, np.stack(seeing, 1) == k, f"seen_{k}_")

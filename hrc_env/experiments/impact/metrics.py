@@ -84,8 +84,9 @@ def _differences(name: str, row: Row, reference: Row) -> Metrics:
     n, ours, theirs = len(row["walk"]), _ratios(row), _ratios(reference)
     found: dict[str, Metric] = {}
     for what in COMPARED:
-        above, below = ([*ours[what][k], *theirs[what][k][:n]] for k in range(2))
-        found |= paired(f"{name}.{what}", ratio_of(above, below), n, ours[what][2], 2000)
+        (above, below, unit), (above_1, below_1, _) = ours[what], theirs[what]
+        ratio = ratio_of([*above, *above_1[:n]], [*below, *below_1[:n]])
+        found |= paired(f"{name}.{what}", ratio, n, unit, 2000)
     bins, counted, q, unit = QUANTILES["z_d_m"]
     counts = [*row[f"{counted}_counts"], *reference[f"{counted}_counts"][:n]]
     both = intervals.counted_quantile_of(bins, counts, q)

@@ -55,7 +55,7 @@ def begin_from_one(own, camera, seen, s, scratch):
         tree.tracked, tree.size_std = True, s.size_std
         own.views[0].blind[:] = _BLIND
         own.views[0, camera].blind = 0
-        if s.stands_std_m < np.inf:
+        if s.stands_std_m > 0.0:
             _measure_size(tree, eye_of(seen.P[camera]), s)
 
 

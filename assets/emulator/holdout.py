@@ -1,0 +1,150 @@
+"""Trueness: errors of people, motions and a place that nothing was fitted on.
+
+    python -m assets.emulator.holdout --out out/trueness
+
+Fitted to what is detected of rendered workers are: where the joints of a body are
+(assets/workers/calibrate_joints.py), and the calibration: offsets, deviations that the tracker is
+told, and all that the emulator draws. Here the calibration is fitted anew to six bodies, all
+motions but one of each family, and one scene. Pixels and emulator are then compared on the rest;
+the joints of the other bodies lie where those of the six do on average (`bodies.not_looked_at`).
+Clips and fit are kept in the folder, so that a run that was stopped goes on.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import tyro
+from rich.console import Console
+
+from assets.emulator.bodies import not_looked_at
+from assets.emulator.clips import FAMILIES, FIT_RIGS, UNSEEN_RIG, UNSEEN_SEEDS, Clip, clips_of
+from assets.emulator.fit.fit import fit
+from assets.emulator.matching import matched
+from assets.emulator.run import part_of
+from assets.emulator.samples import samples_of
+from assets.emulator.shelf import kept
+from assets.emulator.validate import (
+    Compared,
+    InSpace,
+    Say,
+    compared,
+    in_space,
+    of_family,
+    over_clips,
+    ratios_of,
+)
+from assets.emulator.writing import write_calibration
+from hrc_env.cli.progress import progress_bar
+from hrc_env.config import HRCConfig
+from hrc_env.core.results import Metric, write_results
+from hrc_env.core.typing import Ints
+from hrc_env.perception.emulator import EmulatorConfig
+from hrc_env.worker.body import Body, load_body, worker_names
+
+N_HELD = 2
+"""Bodies that are held out: the last."""
+FITTED_BODIES, HELD_BODIES = worker_names()[:-N_HELD], worker_names()[-N_HELD:]
+HELD_MOTIONS = tuple(motions[1] for motions in FAMILIES.values())
+FITTED_MOTIONS = tuple(m for motions in FAMILIES.values() for m in motions if m not in HELD_MOTIONS)
+FITTED_SCENE, HELD_SCENE = "lab", "site"
+
+
+TRUTHS = {"joint": "joints_world", "landmark": "landmarks_world"}
+"""What errors are taken from: where BlazePose means a joint to be, or anatomical landmarks."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """Clips by what of them was held out."""
+
+    rounds: int
+    """How often each motion is played, so that there are some 30 clips or more."""
+    bodies: tuple[str, ...] = FITTED_BODIES
+    motions: tuple[str, ...] = FITTED_MOTIONS
+    scene: str = FITTED_SCENE
+
+    def clips(self, most: int) -> list[Clip]:
+        """At most so many rounds of them, seen by cameras that hang elsewhere."""
+        where = (self.bodies, self.motions, (self.scene,))
+        return clips_of(min(self.rounds, most), UNSEEN_SEEDS, (UNSEEN_RIG,), *where)
+
+
+SAMPLES = {
+    "nothing": Sample(1),
+    "bodies": Sample(1, bodies=HELD_BODIES),
+    "motions": Sample(2, motions=HELD_MOTIONS),
+    "scene": Sample(1, scene=HELD_SCENE),
+    "everything": Sample(4, HELD_BODIES, HELD_MOTIONS, HELD_SCENE),
+}
+
+
+def main(out: Path = Path("out/trueness"), rounds: int = 4) -> None:
+    """Fit to a part, compare on the rest; writes results.json.
+
+    Args:
+        out: folder of clips, calibration and results.
+        rounds: how often each motion is played for the fit, and at most for the rest.
+    """
+    console, metrics = Console(), dict[str, Metric]()
+    with progress_bar(console, "trueness") as say:
+        config = fitted(out, rounds, part_of(say, 0.5))
+        for name, sample in SAMPLES.items():
+            rest = part_of(say, 0.5 / len(SAMPLES))
+            seen = compared(sample.clips(rounds), rest, config, out, joints_of)
+            metrics |= {f"{name}.{key}": metric for key, metric in metrics_of(seen)}
+    settings = {"rounds": rounds, "bodies": HELD_BODIES, "motions": HELD_MOTIONS}
+    write_results(out / "results.json", {**settings, "scene": HELD_SCENE}, [0], metrics)
+    for key, each in metrics.items():
+        console.print(f"{key:55s} {each.value:8.3f} ({each.low:.3f} to {each.high:.3f})")
+
+
+def joints_of(name: str) -> Body:
+    """A body; of those that are held out without what was detected of it."""
+    return not_looked_at(name, FITTED_BODIES) if name in HELD_BODIES else load_body(name)
+
+
+def fitted(out: Path, rounds: int, say: Say) -> HRCConfig:
+    """Settings with a calibration that is fitted to what is not held out, made if need be."""
+    path = out / "keypoints.json"
+    config = HRCConfig()
+    where = (FITTED_BODIES, FITTED_MOTIONS, (FITTED_SCENE,))
+    clips, pixels = clips_of(rounds, 0, FIT_RIGS, *where), []
+    for clip, watched in zip(clips, kept("pixels", clips, config, out), strict=True):
+        pixels.append(watched)
+        say(0.7 / len(clips), f"fit: {clip.motion}")
+    if not path.exists():
+        draft = fit(samples_of(pixels))
+        made = matched(draft, clips, pixels, path.with_suffix(".fit"), part_of(say, 0.3))
+        write_calibration(path, made, {"clips": len(clips), "bodies": FITTED_BODIES})
+    return replace(config, emulator=EmulatorConfig(calibration=str(path)))
+
+
+def metrics_of(seen: Compared) -> Iterator[tuple[str, Metric]]:
+    """Medians, 95th percentiles [mm] and coverage of pixels by group, from both truths, and how far
+    the emulator is from them."""
+    for word, truth in TRUTHS.items():
+        each = [in_space([watched], truth) for watched in seen.pixels]
+        for group in seen.outcomes:
+            mine = of_family(seen.clips, group)
+            found = _accuracy([each[k] for k in mine])
+            for what, metric in zip(("median", "p95", "coverage"), found, strict=True):
+                yield f"{word}.{what}.{group}", metric
+    yield from ratios_of(seen).items()
+
+
+def _accuracy(each: Sequence[InSpace]) -> list[Metric]:
+    """Median and 95th percentile of errors, and coverage, of clips."""
+
+    def numbers(ks: Ints) -> list[float]:
+        errors, inside = zip(*(each[k] for k in ks.tolist()), strict=True)
+        middle, most = 1e3 * np.percentile(np.concatenate(errors), [50, 95])
+        return [middle, most, float(np.concatenate(inside).mean())]
+
+    n = sum(errors.size for errors, _ in each)
+    return over_clips(numbers, len(each), ("mm", "mm", "share"), n)
+
+
+if __name__ == "__main__":
+    tyro.cli(main)
