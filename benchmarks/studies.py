@@ -57,6 +57,9 @@ STUDIES: dict[str, Study] = {
         ("benchmarks.learning", "agents.training", "agents.ppo"), ("learning",),
         {"learning.png": "curves.png"}, quick="--timesteps 8192", is_keyed=False,
     ),
+    "facing": Study(
+        "python -m benchmarks.facing", 12, ("benchmarks.facing",), ("facing",), goes_on=False,
+    ),
     "site": Study(
         EXPERIMENT + "site", 15, ("hrc_env.experiments.site.experiment",), ("site",),
         {"site_figure_3.jpg": "figure_3.png", "site_figure_4.png": "figure_4_particle.png"},
@@ -72,6 +75,10 @@ STUDIES: dict[str, Study] = {
         BENCH + "perception", 50, ("benchmarks.perception.bench",),
         ("pixels_accuracy", "faults", "miscalibration", "appearance", "emulator", "speed_pixels"),
         {"emulator.png": "emulator.png"},
+    ),
+    "trueness": Study(
+        "python -m assets.emulator.holdout", 40, ("assets.emulator.holdout",), ("trueness",),
+        quick="--rounds 1", is_keyed=False,
     ),
     "baselines": Study(
         "python -m benchmarks.baselines", 30,

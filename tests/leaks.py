@@ -66,15 +66,9 @@ class Film:
         self.tape, self.images = tape, images
 
     def crop(self, camera: int, window: Any) -> Any:
-        return self._picture("crop", camera, window)
-
-    def empty(self, camera: int, window: Any) -> Any:
-        return self._picture("empty", camera, window)
-
-    def _picture(self, kind: str, camera: int, window: Any) -> Any:
-        tape, key, draw = self.tape, (self.tape.turn, kind, camera, window), None
+        tape, key, draw = self.tape, (self.tape.turn, camera, window), None
         if not tape.plays or (key in tape.shown and not tape.unlike):
-            draw = np.array(getattr(self.images, kind)(camera, window))
+            draw = np.array(self.images.crop(camera, window))
         if not tape.plays:
             tape.shown[key] = draw
         elif draw is not None:

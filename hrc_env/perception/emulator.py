@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hrc_env.core.errors import ConfigError, check_shape
-from hrc_env.core.records import Keypoints, WorkerTruth
+from hrc_env.core.records import Keypoints, PoseEstimate, WorkerTruth
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats, Ints, Records
 from hrc_env.geometry.cameras import PinholeCamera
@@ -101,6 +101,7 @@ def emulate(
     surroundings: Surroundings,
     cameras: tuple[PinholeCamera, ...],
     config: EmulatorConfig,
+    expected: PoseEstimate | None = None,
 ) -> Keypoints:
     """What the detector would report of the workers in one image of every camera, in its pixels;
     NaN, 0 and infinity of a worker who is not seen.
@@ -112,6 +113,8 @@ def emulate(
         surroundings: (B, ...) the room, what is carried and the robot, which hide joints too.
         cameras: the rig (C).
         config: as given to `make_state`.
+        expected: (B, W, ...) what the tracker predicts, which decides what is told of errors; None,
+            and where there is no track near: what a search assumes, somebody who stands.
     """
     batch, n_cameras, n_workers = state.errors.shape
     shape = (batch, n_cameras, n_workers, N_JOINTS)
@@ -122,11 +125,20 @@ def emulate(
     for rng, normal in zip(rngs, normals, strict=True):
         rng.standard_normal(out=normal)
     written_ns = changed_ns(config.calibration) if config.calibration else 0
-    postures, settings = _settings(config, state.dt_s, written_ns)
+    calibration = _settings(config, state.dt_s, written_ns)
     out = kernels.Report(np.empty((*shape, 2)), np.empty(shape), np.empty(shape))
     world, rig = _world(truth, surroundings), _rig(cameras)
-    kernels.emulate_batch(state.errors, state.wander, normals, world, rig, postures, settings, out)
+    known = _known(expected, truth.joints_world.shape)
+    kernels.emulate_batch(state.errors, state.wander, normals, world, known, rig, calibration, out)
     return Keypoints(*out)
+
+
+def _known(expected: PoseEstimate | None, shape: tuple[int, ...]) -> kernels.Expected:
+    if expected is None:
+        nowhere = np.zeros(shape)
+        return kernels.Expected(nowhere, nowhere, np.zeros(shape[:2], np.bool_))
+    of_tracks = expected.mean_world, expected.velocity_world, expected.tracked
+    return kernels.Expected(*map(np.ascontiguousarray, of_tracks))
 
 
 def lines_of_sight(

@@ -7,7 +7,7 @@ import numpy as np
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.skeleton import JOINT, MIRROR, N_JOINTS
-from hrc_env.core.typing import Floats
+from hrc_env.core.typing import Bools, Floats
 from hrc_env.perception.calibration import (
     HAND,
     INNER,
@@ -18,7 +18,7 @@ from hrc_env.perception.calibration import (
     SHAPES,
     VISIBILITY,
 )
-from hrc_env.perception.noise import error_share
+from hrc_env.perception.noise import STANDING, error_share
 from hrc_env.perception.outline import facing, mix, posture_of, seen_from, speed
 from hrc_env.perception.sightlines import (
     BEHIND,
@@ -28,6 +28,7 @@ from hrc_env.perception.sightlines import (
     TURN,
     VIEW,
     fill,
+    frame,
     occluders_of,
     see,
 )
@@ -38,6 +39,9 @@ SWAPPED, CROSSED, MISSED = range(3)
 """What may happen: left and right of all joints exchanged, of the legs alone, nobody found."""
 N_OF_BODY = 4
 """Normal variables of a worker in an image: one for the errors' size, one for each happening."""
+FOLLOWED_M = 0.5
+"""A track whose hips are nearer than this to a worker's [m] has its windows round them: about
+`DetectorConfig.max_offset` of a window's side."""
 FIRST_OF_LEGS = JOINT["left_knee"]
 """From this joint on left and right are exchanged where the legs are."""
 ERRORS = np.dtype(
@@ -82,25 +86,39 @@ class Report(NamedTuple):
     sigma_px: Floats  # (B, C, W, J)
 
 
+class Expected(NamedTuple):
+    """What the tracker predicts."""
+
+    joints: Floats  # (B, W, J, 3) [m]
+    velocity: Floats  # (B, W, J, 3) [m/s]
+    tracked: Bools  # (B, W)
+
+
 @kernel(makes_arrays=True)
-def emulate_batch(errors, wander, normals, world, rig, postures, settings, report):
+def emulate_batch(errors, wander, normals, world, expected, rig, calibration, report):
     """Advance errors (B, C, W; `ERRORS`) and wander (B, W, J, 3; the same in every camera) by one
     image, and write a `Report`.
 
-    normals (B, N) are of bodies, then of images; world is a `World`, rig (C,) `CAMERA`, postures
-    (P, N) the numbers of a `POSTURE` each, settings (1,) `SETTINGS`.
+    normals (B, N) are of bodies, then of images; world is a `World`, expected an `Expected`, rig
+    (C,) `CAMERA`, calibration a pair: (P, N) the numbers of a `POSTURE` each, (1,) `SETTINGS`.
     """
     batch, n_cameras, n_workers = errors.shape
-    occluders, room = occluders_of(world), np.empty(1, JOINTS_SEEN)
-    mixed, meant, off = np.zeros(1, POSTURE), np.zeros((N_JOINTS, 3)), np.zeros((N_JOINTS, 2))
-    row, n_image = mixed.view(np.float64), N_NORMALS * N_JOINTS + N_OF_BODY
+    postures, settings = calibration
+    occluders, room = occluders_of(world), np.empty(2, JOINTS_SEEN)
+    mixed, meant, off = np.zeros(2, POSTURE), np.zeros((N_JOINTS, 3)), np.zeros((N_JOINTS, 2))
+    numbers, n_image = mixed.view(np.float64).reshape(2, -1), N_NORMALS * N_JOINTS + N_OF_BODY
     for b in range(batch):
         fill(occluders.table, world, b)
         for w in range(n_workers):
             joints, here, common = world.joints[b, w], mixed[0], settings[0]
             keep = math.exp(-common.at_rest - common.per_speed * speed(world.velocity[b, w]))
             front = facing(joints)
-            mix(posture_of(joints, world.velocity[b, w]), postures, row)
+            mix(posture_of(joints, world.velocity[b, w]), postures, numbers[0])
+            track = _track_of(joints, expected.joints[b], expected.tracked[b])
+            posture = STANDING
+            if track >= 0:
+                posture = posture_of(expected.joints[b, track], expected.velocity[b, track])
+            mix(posture, postures, numbers[1])
             drawn = normals[b, 3 * N_JOINTS * w :]
             _wander(wander[b, w], drawn, joints, front, keep, here, common, meant)
             for c in range(n_cameras):
@@ -112,6 +130,33 @@ def emulate_batch(errors, wander, normals, world, rig, postures, settings, repor
                 happens = _happen(mine, drawn, n_seen, seen.look, here, common)
                 _errors(mine, drawn, keep, seen.look, common, off)
                 _write(report, (b, c, w), mine, seen, off, here, common, happens)
+                side = seen.look[SIDE]  # a search's window is round whom the image shows
+                if track >= 0:
+                    side, _ = frame(rig[c], expected.joints[b, track], room[1].uv, room[1].depth)
+                stature_px = common.stature_of_side * side
+                _say(report.confidence[b, c, w], stature_px, mixed[1], report.sigma_px[b, c, w])
+
+
+@kernel
+def _track_of(joints, expected, tracked):
+    """The track (W) whose windows show a worker (J, 3): the nearest by the hips; -1: none."""
+    nearest, track = FOLLOWED_M, -1
+    for t in range(len(tracked)):
+        squared = 0.0
+        for i in range(3):
+            off = joints[7, i] + joints[8, i] - expected[t, 7, i] - expected[t, 8, i]
+            squared += 0.25 * off * off
+        if tracked[t] and squared < nearest * nearest:
+            nearest, track = math.sqrt(squared), t
+    return track
+
+
+@kernel
+def _say(confidence, stature_px, expected, sigma):
+    """Write sigma (J,) as the detector does: what it knows is the confidence (J,), the stature in
+    its window [px] and the posture that is expected."""
+    for j in range(N_JOINTS):
+        sigma[j] = stature_px * error_share(confidence[j], VISIBILITY, expected.sigma[KIND[j]])
 
 
 @kernel
@@ -190,7 +235,7 @@ def _errors(mine, normals, keep, look_of, common, off):
 @kernel
 def _write(report, at, mine, seen, off, here, common, happens):
     """What is reported of each joint of the worker in the image `at` (b, c, w)."""
-    px, confidence, sigma = report.px[at], report.confidence[at], report.sigma_px[at]
+    px, confidence = report.px[at], report.confidence[at]
     swapped, crossed, found = happens
     side, badly = seen.look[SIDE], _quantile(here.body, mine.body)
     turn_cos, turn_sin = math.cos(seen.look[TURN]), math.sin(seen.look[TURN])
@@ -201,7 +246,7 @@ def _write(report, at, mine, seen, off, here, common, happens):
         label = MIRROR[j] if swapped != (crossed and j >= FIRST_OF_LEGS) else j
         if not found or sight == BEHIND:
             px[label, 0] = px[label, 1] = np.nan
-            confidence[label], sigma[label] = 0.0, np.inf
+            confidence[label] = 0.0
             continue
         z = common.common * mine.body + common.own * mine.size[j]
         spread = here.spread[sight, kind] * mine.size[j]
@@ -221,8 +266,6 @@ def _write(report, at, mine, seen, off, here, common, happens):
         if sight == OUTSIDE:
             visible = min(visible, common.outside_confidence)
         confidence[label] = visible
-        share = error_share(visible, VISIBILITY, here.sigma[kind])
-        sigma[label] = common.stature_of_side * side * share
 
 
 @kernel

@@ -100,16 +100,7 @@ def fill(table, world, b):
 def see(camera, joints, meant, occluders, seen):
     """Project what is meant (J, 3), find out what hides the joints. How many of these are seen."""
     uv, depth = seen.uv, seen.depth
-    for j in range(len(meant)):
-        x, y, z = meant[j, 0], meant[j, 1], meant[j, 2]
-        uv[j, 0], uv[j, 1], depth[j] = pixel_of(camera.P, x, y, z)
-    total = 0.0
-    for j in range(1, 3):
-        total += depth[j] + depth[j + 6]
-    px_per_m = 4.0 * camera.focal_px[0] / max(total, 4.0 * MIN_DEPTH_M)
-    if camera.has_lens:
-        px_per_m /= _distort(camera, uv, depth)
-    seen.look[SIDE], seen.look[TURN] = window_round(uv, depth, px_per_m, MIN_DEPTH_M)
+    seen.look[SIDE], seen.look[TURN] = frame(camera, meant, uv, depth)
     n_view, n_seen = look(camera.eye, joints, occluders), 0
     for j in range(len(joints)):
         seen.sight[j] = _in_image(camera, uv[j], depth[j])
@@ -119,6 +110,22 @@ def see(camera, joints, meant, occluders, seen):
             else:
                 n_seen += 1
     return n_seen
+
+
+@kernel
+def frame(camera, joints, uv, depth):
+    """Side [px] and turn [rad] of the window round joints (J, 3); where in the image these are
+    (J, 2) and their depths (J,) are written."""
+    for j in range(len(joints)):
+        x, y, z = joints[j, 0], joints[j, 1], joints[j, 2]
+        uv[j, 0], uv[j, 1], depth[j] = pixel_of(camera.P, x, y, z)
+    total = 0.0
+    for j in range(1, 3):
+        total += depth[j] + depth[j + 6]
+    px_per_m = 4.0 * camera.focal_px[0] / max(total, 4.0 * MIN_DEPTH_M)
+    if camera.has_lens:
+        px_per_m /= _distort(camera, uv, depth)
+    return window_round(uv, depth, px_per_m, MIN_DEPTH_M)
 
 
 @kernel

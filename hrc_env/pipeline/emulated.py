@@ -1,7 +1,7 @@
 """Level `keypoints`: the detector's errors on the projected truth."""
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,11 @@ from hrc_env.pipeline.sensor_input import Generators, TrueSensorInput, TrueState
 from hrc_env.pipeline.tracking import PoseTracking, no_keypoints
 from hrc_env.scene.build import Scene
 from hrc_env.tracking.estimators import Estimator
+
+
+class _Look(NamedTuple):
+    now: TrueSensorInput
+    expected: PoseEstimate
 
 
 class EmulatedCameras(TrueState):
@@ -38,40 +43,40 @@ class EmulatedCameras(TrueState):
 
     def keypoints(self, expected: PoseEstimate, rngs: Generators) -> Keypoints:
         """What is reported of the scene; room, robot and bodies stand in the lines of sight."""
-        now, whole = with_truth(self.now), len(self.now.ids) == self._batch
-        state = self.emulator if whole else rows(self.emulator, now.ids)
+        ids, look = self.now.ids, _Look(with_truth(self.now), expected)
+        whole = len(ids) == self._batch
+        state = self.emulator if whole else rows(self.emulator, ids)
         if self.recent is None:
-            keypoints = self._emulated(now, state, rngs, self.scene.cameras)
+            keypoints = self._emulated(look, state, rngs, self.scene.cameras)
         else:
-            keypoints = self._arrived(now, state, rngs, self.recent)
+            keypoints = self._arrived(look, state, rngs, self.recent)
         if not whole:
-            write_rows(self.emulator, now.ids, state)
+            write_rows(self.emulator, ids, state)
         return keypoints
 
     def _emulated(
-        self, now: TrueSensorInput, state: Any, rngs: Generators, cameras: tuple[PinholeCamera, ...]
+        self, look: _Look, state: Any, rngs: Generators, cameras: tuple[PinholeCamera, ...]
     ) -> Keypoints:
         """What cameras show now; `state` of the errors goes on."""
-        surroundings = self.scene.surroundings(now.q, now.motion.held)
-        keypoints = emulator.emulate(state, rngs, now.truth, surroundings, cameras, self.config)
+        now, config = look.now, self.config
+        around = self.scene.surroundings(now.q, now.motion.held)
+        keypoints = emulator.emulate(state, rngs, now.truth, around, cameras, config, look.expected)
         if self.scene.n_workers < 2:
             return keypoints
         return emulator.without_names(keypoints, rngs)
 
-    def _arrived(
-        self, now: TrueSensorInput, state: Any, rngs: Generators, recent: Recent
-    ) -> Keypoints:
+    def _arrived(self, look: _Look, state: Any, rngs: Generators, recent: Recent) -> Keypoints:
         """What has come of every camera: images of now, older ones, or none."""
-        rig, ids = self.scene.cameras, now.ids.tolist()
+        rig, ids = self.scene.cameras, look.now.ids.tolist()
         actual = [recent.schedule.actual(rig, recent.seeds[b], recent.begin(b)) for b in ids]
         if all(cameras is rig for cameras in actual):
-            shown = self._emulated(now, state, rngs, rig)
+            shown = self._emulated(look, state, rngs, rig)
         else:
             shown = no_keypoints(len(ids), len(rig), self.scene.n_workers)
             for row, cameras in enumerate(actual):
                 here = np.array([row])
                 part = rows(state, here)
-                seen = self._emulated(rows(now, here), part, [rngs[row]], cameras)
+                seen = self._emulated(rows(look, here), part, [rngs[row]], cameras)
                 write_rows(state, here, part)
                 write_rows(shown, here, seen)
         came = no_keypoints(len(ids), len(rig), self.scene.n_workers)

@@ -11,10 +11,12 @@ from scipy.stats import multivariate_normal, norm
 
 from assets.emulator.writing import write_calibration
 from hrc_env.core.errors import ConfigError
+from hrc_env.core.records import PoseEstimate
 from hrc_env.core.skeleton import JOINT, MIRROR, N_JOINTS
 from hrc_env.geometry.cameras import pinhole, project, projections
 from hrc_env.geometry.sight import Surroundings, nothing
 from hrc_env.perception.calibration import KINDS, SHAPES, read_calibration
+from hrc_env.perception.detector import STATURE_OF_SIDE
 from hrc_env.perception.emulator import (
     EmulatorConfig,
     emulate,
@@ -22,7 +24,10 @@ from hrc_env.perception.emulator import (
     make_state,
     reset,
 )
+from hrc_env.perception.noise import sigma_px
+from hrc_env.perception.outline import posture_of
 from hrc_env.perception.sightlines import HIDDEN, SEEN, SIDE
+from hrc_env.perception.windows import window_from_joints
 
 DT = 0.04
 CONFIG = EmulatorConfig()
@@ -213,6 +218,71 @@ def test_what_it_reports_as_sigma_is_about_what_it_errs():
         seen = emulate(state, rngs, true, nothing(64), FRONT, STEADY)
         whitened.append((seen.px - px) / seen.sigma_px[..., None])
     assert 0.3 < np.std(whitened) < 1.2  # with room for errors that last and that cameras share
+
+
+def believed(joints, velocity=0.0, tracked=True):
+    """What a tracker expects of bodies (B, W, J, 3)."""
+    shape = joints.shape[:3]
+    cov = np.tile(np.eye(3), (*shape, 1, 1))
+    moves = np.full(joints.shape, velocity)
+    return PoseEstimate(joints, cov, moves, np.zeros(shape), np.full(shape[:2], tracked))
+
+
+def as_the_detector_says(seen, expected, cameras):
+    """(C, J) sigma as `PoseDetector` makes it of confidences and windows round the expected."""
+    joints, velocity = expected.mean_world[0, 0], expected.velocity_world[0, 0]
+    px, depth_m = project(projections(cameras), joints[None])
+    windows = map(window_from_joints, px[0], depth_m[0], cameras)
+    posture = posture_of(joints, velocity)
+    sides = [STATURE_OF_SIDE * window.side_px for window in windows]
+    return [
+        sigma_px(k, side, posture) for k, side in zip(seen.confidence[0, :, 0], sides, strict=True)
+    ]
+
+
+@pytest.mark.parametrize("bent", [False, True])
+def test_sigma_is_what_the_detector_says_of_whom_the_tracker_expects(bent):
+    """Whatever is true: somebody larger is expected 20 cm away, walking, or with raised hands."""
+    joints = truth().joints_world
+    joints[..., :2] += 0.2 - 0.1 * joints[..., :2]
+    joints[..., 5:7, 2] += 0.6 * bent
+    expected = believed(joints, velocity=0.0 if bent else 0.5)
+    state, rngs = start(1, STEADY)
+    seen = emulate(state, rngs, truth(), nothing(1), CAMERAS, STEADY, expected)
+    told = as_the_detector_says(seen, expected, CAMERAS)
+    np.testing.assert_allclose(seen.sigma_px[0, :, 0], told, rtol=1e-6)
+
+
+def test_whose_track_it_is_decides_and_not_its_number():
+    joints = truth(n_workers=2).joints_world
+    joints[0, 1, 5:7, 2] += 0.6
+    told = []
+    for order in ([0, 1], [1, 0]):
+        state, rngs = start(1, STEADY, n_workers=2)
+        expected = believed(joints[:, order])
+        seen = emulate(state, rngs, truth(n_workers=2), nothing(1), CAMERAS, STEADY, expected)
+        told.append(seen.sigma_px)
+    np.testing.assert_array_equal(told[0], told[1])
+
+
+def test_who_is_not_followed_is_told_of_as_a_search_does():
+    """As of somebody who stands, in the window round them; a track elsewhere changes nothing."""
+    true, told = truth(), []
+    true.joints_world[..., 5:7, 2] += 0.6
+    for expected in (
+        None,
+        believed(truth().joints_world, 1.0, False),
+        believed(truth().joints_world + 1.0),
+    ):
+        state, rngs = start(1, EXACT)
+        seen = emulate(state, rngs, true, nothing(1), CAMERAS, EXACT, expected)
+        told.append(seen.sigma_px)
+    np.testing.assert_array_equal(told[0], told[1])
+    np.testing.assert_array_equal(told[0], told[2])
+    side_px = lines_of_sight(true, nothing(1), CAMERAS)[1][0, :, 0, SIDE]
+    for c, side in enumerate(side_px):
+        known = sigma_px(seen.confidence[0, c, 0], STATURE_OF_SIDE * side)
+        np.testing.assert_allclose(told[0][0, c, 0], known)
 
 
 def test_a_blocked_camera_is_nan_without_confidence_and_with_infinite_sigma():
