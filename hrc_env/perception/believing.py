@@ -15,7 +15,7 @@ from hrc_env.geometry.cameras import PinholeCamera, projections, rays
 from hrc_env.geometry.triangulation import triangulate
 from hrc_env.perception.lensed import pinhole_keypoints
 
-VISIBLE = 0.7
+VISIBLE = 0.6
 """Mean confidence of the joints of who is seen by one camera only."""
 NEAR_M = 0.5
 """Who stands is so near to a place where people may [m]."""
@@ -28,12 +28,16 @@ LEVELS = tuple(
     for name in ("ankle", "knee", "hip", "shoulder")
 )
 """Joints by which it is seen whether somebody stands,"""
-ANKLE_M, LEVELS_M = 0.1, np.array([(0.3, 0.7), (0.7, 1.2), (1.1, 1.75), (1.3, 2.1)])
+ANKLE_M, LEVELS_M = 0.1, np.array([(0.2, 0.9), (0.6, 1.4), (1.0, 2.0), (1.2, 2.3)])
 """the height of the first above the floor, and bounds of the others' and of the nose's [m]."""
 
 
-def is_body(found: Keypoints, cameras: Sequence[PinholeCamera]) -> bool:
-    """Whether two or more cameras show a person's bones: keypoints (1, C, 1, J), in image px."""
+def is_body(
+    px: Points2, confidence: Floats, sigma_px: Floats, cameras: Sequence[PinholeCamera]
+) -> bool:
+    """Whether cameras C, two at least, show a person's bones: joints (C, J, 2) and what is known of
+    them (C, J), in pixels of the images."""
+    found = Keypoints(*(each[None, :, None] for each in (px, confidence, sigma_px)))
     seen = pinhole_keypoints(found, cameras)
     joints = triangulate(projections(tuple(cameras)), seen.px, seen.sigma_px, GATE_SIGMA)
     start, end = np.moveaxis(joints.points_world[0, 0, BONES], 1, 0)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from hrc_env.core.batching import Stateful
 from hrc_env.core.errors import ConfigError, check_shape, unknown
-from hrc_env.core.records import Keypoints, Roi
+from hrc_env.core.records import Roi
 from hrc_env.core.skeleton import BLAZEPOSE_INDEX, N_JOINTS
 from hrc_env.core.typing import Floats, Image, Points2, Points3
 from hrc_env.geometry.cameras import PinholeCamera, inside_image
@@ -60,8 +60,6 @@ class DetectorConfig:
     """Hips further from the window's middle, as a share of its side, are somebody else's."""
     outside_confidence: float = 0.1
     """Joints that the network places outside the image are guesses: at most this visible."""
-    search_step: float = 0.5
-    """Search windows follow each other by at most this share of their side."""
     search_every: int = 5
     """A camera whose whole image was searched for nobody is searched again so many steps later."""
     runtime: str = "litert"
@@ -86,7 +84,7 @@ class DetectorConfig:
         for name in ("min_presence", "sure_presence", "outside_confidence"):
             if not 0 < getattr(self, name) <= 1:
                 raise ConfigError(f"{name} must be in (0, 1], got {getattr(self, name)}.")
-        for name in ("gate_every", "search_step", "search_every", "max_offset"):
+        for name in ("gate_every", "search_every", "max_offset"):
             if not getattr(self, name) > 0:
                 raise ConfigError(f"{name} must be positive, got {getattr(self, name)}.")
 
@@ -132,8 +130,8 @@ class PoseDetector(Stateful):
         for name in (self.config.network, self.config.folded):
             find_weights(f"pose_landmark_{name}")
         network.chosen_runtime(self.config.runtime)
-        self.floor_world, self.error, step = floor_world, error, self.config.search_step
-        self._search = [search_windows(camera, floor_world, step) for camera in self.cameras]
+        self.floor_world, self.error = floor_world, error
+        self._search = [search_windows(camera, floor_world) for camera in self.cameras]
         self._looks: dict[int, list[int]] = {}
         self._networks: tuple[_Networks, _Networks] | None = None
         self._helper: ThreadPoolExecutor | None = None
@@ -230,8 +228,7 @@ class PoseDetector(Stateful):
         is the only one is believed."""
         shown = np.flatnonzero(sight.confidence.any(1)).tolist()
         if len(shown) > 1:
-            joints = (sight.px, sight.confidence, sight.sigma_px)
-            return is_body(Keypoints(*(each[None, :, None] for each in joints)), self.cameras)
+            return is_body(sight.px, sight.confidence, sight.sigma_px, self.cameras)
         if not shown or self.floor_world is None:
             return shown == [0] and len(self.cameras) == 1
         (c,) = shown

@@ -72,24 +72,16 @@ def people(detect: PersonDetector, crop: Image) -> list[blazepose.Person]:
     return blazepose.decode_people(*detect(image))
 
 
-def search_windows(
-    camera: PinholeCamera, floor_world: Points3 | None = None, step: float = 0.5
-) -> list[Roi]:
-    """Upright squares in which the detector stage finds whoever is there.
-
-    Args:
-        camera: whose image is searched.
-        floor_world: (N, 3) where people may stand [m]: as few windows as show each of them large
-            enough. None, as for films: squares as large as image and lens (`SEARCH_RAD`) allow.
-        step: then they follow each other by at most this share of their side.
-    """
+def search_windows(camera: PinholeCamera, floor_world: Points3 | None = None) -> list[Roi]:
+    """Upright squares: as few as show whoever stands at points (N, 3) [m] large enough. Where these
+    are not known, as in films, as large as image and lens (`SEARCH_RAD`) allow, overlapping."""
     if floor_world is not None:
         return _covering(*_standing(camera, floor_world))
     side = float(min(camera.width_px, camera.height_px))
     if camera.lens is not None:
         side = min(side, SEARCH_RAD * float(camera.K[0, 0]))
-    columns = _middles(camera.width_px, side, step)
-    return [Roi((x, y), side, 0.0) for y in _middles(camera.height_px, side, step) for x in columns]
+    columns = _middles(camera.width_px, side)
+    return [Roi((x, y), side, 0.0) for y in _middles(camera.height_px, side) for x in columns]
 
 
 def _standing(camera: PinholeCamera, floor_world: Points3) -> tuple[Points2, Floats]:
@@ -127,9 +119,9 @@ def distinct(found: Sequence[Found], n_cameras: int) -> list[list[Roi]]:
     return kept
 
 
-def _middles(length_px: int, side_px: float, step: float) -> list[float]:
-    """Middles of spans of a side that together cover a length, at most `step` sides apart."""
-    n = 1 + math.ceil((length_px / side_px - 1) / step)
+def _middles(length_px: int, side_px: float) -> list[float]:
+    """Middles of spans of a side that together cover a length, at most half a side apart."""
+    n = 1 + math.ceil(2 * (length_px / side_px - 1))
     return np.linspace(side_px / 2, length_px - side_px / 2, n).tolist()
 
 

@@ -71,8 +71,6 @@ class Looking(Stateful):
                 windows = self._followed(source, b, worker, windows, taken, has_image)
             elif people is None:
                 due = self.schedule.due(b, has_image)
-                if not due:
-                    continue
                 people = self.schedule.remember(b, due, self.detector.search(source, due))
             track = self._track(b, worker)
             folded, posture = _expected_posture(expected, worker)

@@ -34,7 +34,7 @@ def camera(**other):
         ),
         ({"tracker": {"mirrored_parts": ["x"]}}, r"Unknown part in tracker\.mirrored_parts 'x'"),
         ({"detector": {"runtime": "x"}}, r"^Unknown detector\.runtime 'x'"),
-        ({"detector": {"search_step": 0}}, r"^detector\.search_step must be positive"),
+        ({"detector": {"search_every": 0}}, r"^detector\.search_every must be positive"),
         ({"motion": {"spacing_m": 0.1}}, r"^motion\.spacing_m must be 0\.8 or more"),
         ({"motion": {"people": {"tempo": -1}}}, r"^motion\.people\.tempo must be"),
         ({"appearance": {"light": [3, 1]}}, r"^appearance\.light must be two factors"),

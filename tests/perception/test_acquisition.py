@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hrc_env.core.records import Keypoints, Roi
+from hrc_env.core.records import Roi
 from hrc_env.geometry.cameras import pinhole, project, projections
 from hrc_env.perception.believing import is_body, stands
 from hrc_env.perception.searching import agreed_windows, apart_from, proposals
@@ -92,27 +92,26 @@ UPRIGHT = STANDING_M + np.array([*ANNA[:2], 1.2])
 def keypoints(joints_world, n_cameras=4):
     """What the first cameras see of joints (J, 3), to the pixel."""
     px, _ = project(projections(CAMERAS), joints_world[None])
-    shape = (1, len(CAMERAS), 1, len(joints_world))
-    blind = np.arange(len(CAMERAS))[:, None, None, None] >= n_cameras
-    px = np.where(blind, np.nan, px[0][:, None])[None]
-    return Keypoints(px, np.full(shape, 0.9), np.full(shape, 3.0))
+    shape = len(CAMERAS), len(joints_world)
+    px = np.where(np.arange(len(CAMERAS))[:, None, None] < n_cameras, px[0], np.nan)
+    return px, np.full(shape, 0.9), np.full(shape, 3.0)
 
 
 def test_a_person_is_a_body_and_what_has_other_bones_is_not():
     rng = np.random.default_rng(0)
-    assert is_body(keypoints(UPRIGHT), CAMERAS)
-    assert is_body(keypoints(UPRIGHT, 2), CAMERAS)
-    assert not is_body(keypoints(UPRIGHT, 1), CAMERAS)
+    assert is_body(*keypoints(UPRIGHT), CAMERAS)
+    assert is_body(*keypoints(UPRIGHT, 2), CAMERAS)
+    assert not is_body(*keypoints(UPRIGHT, 1), CAMERAS)
     shrunk = ANNA + 0.5 * (UPRIGHT - ANNA)
     scattered = ANNA + rng.uniform(-0.6, 0.6, UPRIGHT.shape)
     for nobody in (shrunk, scattered):
-        assert not is_body(keypoints(nobody), CAMERAS)
+        assert not is_body(*keypoints(nobody), CAMERAS)
 
 
 def test_one_camera_is_believed_of_who_stands_on_the_floor():
     sure, floor_world = np.full(len(UPRIGHT), 0.9), np.array([[*ANNA[:2], 0.0]])
     half, above = UPRIGHT * [1, 1, 0.5], UPRIGHT + np.array([0, 0, 1.0])
-    px = {name: keypoints(body).px[0, 0, 0] for name, body in
+    px = {name: keypoints(body)[0][0] for name, body in
           (("upright", UPRIGHT), ("half", half), ("above", above))}  # fmt: skip
     assert stands(px["upright"], sure, CAMERAS[0], floor_world)
     assert not stands(px["half"], sure, CAMERAS[0], floor_world)
