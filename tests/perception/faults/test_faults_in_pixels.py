@@ -35,7 +35,7 @@ def test_where_nobody_is_found_a_search_comes_only_now_and_then():
     searched = []
 
     def nobody(source, which):
-        searched.append(which)
+        searched.extend([which] if which else [])
         return [[] for _ in env.simulation.scene.cameras]
 
     env.simulation.pipeline.looking.detector.search = nobody
