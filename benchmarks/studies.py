@@ -76,6 +76,10 @@ STUDIES: dict[str, Study] = {
         ("pixels_accuracy", "faults", "miscalibration", "appearance", "emulator", "speed_pixels"),
         {"emulator.png": "emulator.png"},
     ),
+    "acquisition": Study(
+        "python -m benchmarks.perception.acquisition", 60, ("benchmarks.perception.acquisition",),
+        ("acquisition",), quick="--seeds 2 --still 1 --moving 1",
+    ),
     "trueness": Study(
         "python -m assets.emulator.holdout", 40, ("assets.emulator.holdout",), ("trueness",),
         quick="--rounds 1", is_keyed=False,

@@ -1,6 +1,6 @@
 """How soon a search finds people at level `pixels`, and how often somebody who is not there.
 
-    python -m benchmarks.perception.acquisition --scene site --seeds 200
+    python -m benchmarks.perception.acquisition --scenes site --seeds 200
 
 After each reset the arm rests until the estimator follows the worker. Empty scenes are episodes of
 `EMPTY_STEPS` steps, each in a light of its own, the arm at rest or moving at random. Parts of
@@ -10,6 +10,7 @@ After each reset the arm rests until the estimator follows the worker. Empty sce
 import time
 from dataclasses import dataclass
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,7 @@ from hrc_env.experiments.study.runner import Study, run
 BLOCK, EMPTY_STEPS = 10, 25
 LOOKS = (1, 6, 25)
 """By these looks a worker should have been found; a reset's own is the first."""
+Played = dict[str, list[dict[str, float]]]
 REACH = {"still": 0.0, "moving": 1.0}
 """Random actions of the arm in empty scenes."""
 
@@ -36,7 +38,7 @@ class Arguments:
     """Measure how people are found."""
 
     out: Path = Path("out/acquisition")
-    scene: str = "site"
+    scenes: tuple[str, ...] = ("lab", "site")
     appearance: str = "varied"
     seeds: int = 200
     """Resets with a worker."""
@@ -76,68 +78,75 @@ def phantoms(env: HRCEnv, seed: int, reach: float) -> dict[str, float]:
     return dict(zip(("images", "believed", "followed"), counts.tolist(), strict=True))
 
 
-def empty_seeds(arguments: Arguments, n: int) -> list[int]:
+def empty_seeds(scene: str, first: int, n: int) -> list[int]:
     """The first n seeds of whose episodes in a scene for one worker or none none is there."""
-    env, found, seed = HRCEnv(scene=arguments.scene, n_workers=(0, 1), perception="none"), [], 0
+    env, found, seed = HRCEnv(scene=scene, n_workers=(0, 1), perception="none"), [], first
     while len(found) < n:
-        env.reset(seed=arguments.first + seed)
-        found += [] if env.simulation.present.any() else [arguments.first + seed]
+        env.reset(seed=seed)
+        found += [] if env.simulation.present.any() else [seed]
         seed += 1
     env.close()
     return found
 
 
-def _play(arguments: Arguments, parts: PartCache) -> dict[str, list[dict[str, float]]]:
+def _play(arguments: Arguments, parts: PartCache) -> Played:
+    played: Played = {}
     seeds = [arguments.first + k for k in range(arguments.seeds)]
-    empty = empty_seeds(arguments, max(arguments.still, arguments.moving))
-    jobs: dict[str, tuple[list[int], Any, Any]] = {"found": (seeds, looks_until_found, 1)}
-    for name, n in (("still", arguments.still), ("moving", arguments.moving)):
-        jobs[name] = (empty[:n], partial(phantoms, reach=REACH[name]), (0, 1))
-    return {name: _blocks(name, *job, arguments, parts) for name, job in jobs.items()}
+    for scene in arguments.scenes:
+        empty = empty_seeds(scene, arguments.first, max(arguments.still, arguments.moving))
+        jobs: dict[str, tuple[list[int], Any, Any]] = {"found": (seeds, looks_until_found, 1)}
+        for name, n in (("still", arguments.still), ("moving", arguments.moving)):
+            jobs[name] = (empty[:n], partial(phantoms, reach=REACH[name]), (0, 1))
+        for name, (some, what, n_workers) in jobs.items():
+            made = {"scene": scene, "n_workers": n_workers, "appearance": arguments.appearance}
+            played[f"{scene}.{name}"] = _blocks(f"{scene}.{name}", some, what, made, parts)
+    return played
 
 
 def _blocks(
-    name: str, seeds: list[int], what: Any, n_workers: Any, arguments: Arguments, parts: PartCache
+    name: str, seeds: list[int], what: Any, made: dict[str, Any], parts: PartCache
 ) -> list[dict[str, float]]:
-    """`what` of every seed, block by block."""
+    """`what` of every seed, block by block, in environments that are `made` so."""
 
     def make(tick: PartProgress, some: list[int]) -> dict[str, Any]:
-        made = []
-        env = HRCEnv(scene=arguments.scene, n_workers=n_workers, perception="pixels",
-                     appearance=arguments.appearance)  # fmt: skip
+        found, env = [], HRCEnv(perception="pixels", **made)
         for seed in some:
-            made.append({"seed": seed, **what(env, seed)})
+            found.append({"seed": seed, **what(env, seed)})
             tick(1 / len(some))
         env.close()
-        return {"made": made}
+        return {"made": found}
 
     blocks = (seeds[k : k + BLOCK] for k in range(0, len(seeds), BLOCK))
     done = (parts.part(f"{name}.{some[0]}", partial(make, some=some)) for some in blocks)
     return [one for part in done for one in part["made"]]
 
 
-def _metrics(_: Arguments, played: dict[str, list[dict[str, float]]]) -> dict[str, Metric]:
-    looks = [each["looks"] for each in played["found"]]
-    found = {f"found.{n}": share([0 < k <= n for k in looks]) for n in LOOKS}
-    found["first_s"] = over([each["first_s"] for each in played["found"]], "s")
-    for name in REACH:
-        for what in ("images", "believed", "followed"):
-            found[f"{name}.{what}"] = exactly(sum(each[what] for each in played[name]), "1")
+def _metrics(arguments: Arguments, played: Played) -> dict[str, Metric]:
+    found = {}
+    for scene in arguments.scenes:
+        looks = [each["looks"] for each in played[f"{scene}.found"]]
+        found |= {f"{scene}.found.{n}": share([0 < k <= n for k in looks]) for n in LOOKS}
+        found[f"{scene}.first_s"] = over(
+            [each["first_s"] for each in played[f"{scene}.found"]], "s"
+        )
+        for name, what in product(REACH, ("images", "believed", "followed")):
+            total = sum(each[what] for each in played[f"{scene}.{name}"])
+            found[f"{scene}.{name}.{what}"] = exactly(total, "1")
     return found
 
 
 def _report(arguments: Arguments, _: Any, metrics: Metrics, __: Path) -> Report:
     rows = [(name, cell(metric, 1, 3, interval=True)) for name, metric in metrics.items()]
-    asked = f"Scene {arguments.scene}, appearance {arguments.appearance}: how soon is who found?"
+    asked = f"Appearance {arguments.appearance}: how soon is who found?"
     return Report("Acquisition", asked, [table(("what", "how much"), rows)])
 
 
 ACQUISITION = Study(
     name="acquisition",
     modules=("benchmarks.perception.acquisition",),
-    settings=lambda a: {"scene": a.scene, "appearance": a.appearance, "first": a.first},
+    settings=lambda a: {"appearance": a.appearance, "first": a.first},
     seeds=lambda a: [a.first, a.first + a.seeds - 1],
-    n_parts=lambda a: (a.seeds + a.still + a.moving) / BLOCK,
+    n_parts=lambda a: len(a.scenes) * (a.seeds + a.still + a.moving) / BLOCK,
     play=_play,
     metrics=_metrics,
     report=_report,

@@ -31,7 +31,7 @@ from hrc_env.worker.body import worker_names
 
 LENSES = {"pinhole": "lab", "fisheye": "lab_gopro"}
 """Rigs that hang in the same places, by the rows that their crops make."""
-FIRST_SEED, FIRST_RESET = 500, 1000
+FIRST_SEED = 500
 """Of episodes, and of resets after which the worker is looked for; the others count up."""
 BLOCK = 5
 """Episodes of a part: so many are lost at most when the bench is stopped."""
@@ -45,8 +45,6 @@ class PerceptionBenchConfig:
     """Episodes at `pixels`, scene by scene; faults are compared with the lab's first ones."""
     n_steps: int = 250
     """Steps of each."""
-    n_resets: int = 100
-    """Resets after which the worker is looked for."""
     n_faults: int = 8
     """Episodes of every fault at `pixels`; the four cameras have it in turns."""
     fault_steps: int = 150
@@ -59,8 +57,6 @@ class PerceptionBenchConfig:
     """Whose crops are looked at."""
     n_instants: int = 30
     """Moments of each body in each scene, and of each lens; four crops each."""
-    n_empty: int = 1000
-    """Steps in each scene without anybody."""
     emulator_rounds: int | None = 4
     """How often each motion is rendered in each scene to hold the emulator against pixels; 0: once,
     in one of them; None: not at all."""
@@ -73,8 +69,8 @@ class PerceptionBenchConfig:
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for numbers that cannot work."""
-        counts = ("n_steps", "n_resets", "n_faults", "fault_steps", "n_emulated", "n_instants")
-        at_least_one(self, *counts, "n_empty", "speed_steps")
+        counts = ("n_steps", "n_faults", "fault_steps", "n_emulated", "n_instants", "speed_steps")
+        at_least_one(self, *counts)
         if self.n_faults > dict(self.episodes).get("lab", 0) or self.fault_steps > self.n_steps:
             raise ConfigError(
                 "Faults are compared with the lab's first episodes: n_faults must not exceed their "
@@ -85,8 +81,8 @@ class PerceptionBenchConfig:
 
 
 QUICK = PerceptionBenchConfig(
-    episodes=(("lab", 4), ("site", 2)), n_steps=80, n_resets=8, n_faults=4, fault_steps=40,
-    n_emulated=8, bodies=("worker_1", "worker_2"), n_instants=10, n_empty=40, emulator_rounds=0,
+    episodes=(("lab", 4), ("site", 2)), n_steps=80, n_faults=4, fault_steps=40,
+    n_emulated=8, bodies=("worker_1", "worker_2"), n_instants=10, emulator_rounds=0,
     speed_steps=30,
 )  # fmt: skip
 """Every number, from little."""
@@ -104,12 +100,8 @@ class Task(NamedTuple):
 def tasks_of(config: PerceptionBenchConfig, figures: Path | None = None) -> Iterator[Task]:
     """All parts, times last; the emulator's plot is drawn into a folder."""
     yield from _crops(config)
-    yield Task("acquired", 0.5 * config.n_resets, partial(_acquired, config.n_resets))
     yield from _episodes(config)
     yield from _faults(config)
-    for scene, _ in config.episodes:
-        make = partial(episodes.phantoms, scene, config.n_empty, FIRST_SEED)
-        yield Task(f"empty.{scene}", 0.1 * config.n_empty, make)
     if config.emulator_rounds is not None:
         make = partial(_emulator, config.emulator_rounds, figures and figures / "emulator.png")
         yield Task("emulator", 40.0 * max(2 * config.emulator_rounds, 1), make)
@@ -218,10 +210,6 @@ def _look(variant: str, make: Callable[[], Scene], n: int, tick: PartProgress) -
         tick(1 / n)
     looker.close()
     return {"views": [asdict(view) for view in views]}
-
-
-def _acquired(n: int, tick: PartProgress) -> dict[str, Any]:
-    return {"acquired": episodes.acquisition(range(FIRST_RESET, FIRST_RESET + n), tick)}
 
 
 def _emulator(rounds: int, picture: Path | None, tick: PartProgress) -> dict[str, Any]:

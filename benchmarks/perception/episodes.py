@@ -19,11 +19,6 @@ from hrc_env.geometry.cameras import project
 from hrc_env.motion import generator
 from hrc_env.worker.body import worker_truth
 
-PATIENCE_FRAMES = 5
-"""A worker who is tracked by then counts as acquired."""
-EMPTY_STEPS = 250
-"""Of an episode without workers."""
-
 
 @dataclass(frozen=True, slots=True)
 class Episode:
@@ -73,47 +68,6 @@ def play(
         return episodes
     finally:
         env.close()
-
-
-def acquisition(seeds: Sequence[int], tick: Callable[[float], None]) -> list[bool]:
-    """Whether each reset finds the worker within `PATIENCE_FRAMES`, its own look counted."""
-    env, found = HRCEnv(), []
-    for seed in seeds:
-        env.reset(seed=seed)
-        for _ in range(PATIENCE_FRAMES - 1):
-            if env.simulation.estimate.tracked.all():
-                break
-            env.step(np.zeros(env.action_space.shape or (0,), np.float32))
-        found.append(bool(env.simulation.estimate.tracked.all()))
-        tick(1 / len(seeds))
-    env.close()
-    return found
-
-
-def phantoms(scene: str, n_steps: int, seed: int, tick: Callable[[float], None]) -> dict[str, int]:
-    """Look for workers in a scene that has none, while the arm moves at random: "images" that were
-    looked at, "phantoms" of them with somebody in them, "tracked" steps. Episodes from `seed` on in
-    which somebody comes are passed over."""
-    counts = {"images": 0, "phantoms": 0, "tracked": 0}
-    env, actions, steps = HRCEnv(scene=scene, n_workers=(0, 1)), np.random.default_rng(seed), 0
-    while steps < n_steps:
-        env.reset(seed=seed)
-        seed += 1
-        if env.simulation.present.any():
-            continue
-        n = min(EMPTY_STEPS, n_steps - steps)
-        for _ in range(n):
-            env.step(actions.uniform(-1, 1, env.simulation.n_actions).astype(np.float32))
-            keypoints, _ = env.simulation.pipeline.last_detections(0)
-            if keypoints is not None:
-                somebody = (keypoints.confidence[0] > 0).any((1, 2))
-                counts["images"] += len(somebody)
-                counts["phantoms"] += int(somebody.sum())
-            counts["tracked"] += int(env.simulation.estimate.tracked.any())
-            tick(1 / n_steps)
-        steps += n
-    env.close()
-    return counts
 
 
 def _episode(env: HRCEnv, seed: int, n_steps: int) -> Episode:

@@ -41,11 +41,6 @@ def metrics_of(found: Found, n_faults: int, fault_steps: int) -> Metrics:
     faults[PIXELS, NO_FAULT] = base
     views = [View(**view) for part in found.values() for view in part.get("views", ())]
     metrics = {**_speed(found), **_loops(loops), **_faults(faults), **_views(views)}
-    metrics["acquired"] = share(found["acquired"]["acquired"])
-    empty = [part for label, part in found.items() if label.startswith("empty.")]
-    images = sum(part["images"] for part in empty)
-    for name, unit in (("phantoms", "images"), ("tracked", "steps")):
-        metrics[f"empty.{name}"] = exactly(sum(part[name] for part in empty), unit, images)
     emulator = found.get("emulator", {})
     return metrics | {name: Metric(**metric) for name, metric in emulator.items()}
 

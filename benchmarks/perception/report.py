@@ -63,7 +63,7 @@ def report(config: Any, found: Any, metrics: Metrics, figures: Path) -> Report:
         _ABOUT_SPEED + ", ".join(f"{metrics[f'network_ms.{name}'].value:.1f} ms ({name})"
                                  for name in keys(metrics, "network_ms.")) + ".",
         "## Error of the estimate", table_of("", _estimates(metrics), _belief_columns(), metrics),
-        _ABOUT_ERRORS, _acquired(metrics),
+        _ABOUT_ERRORS,
         "## Faults of one of four cameras, lab", fault_table(every, metrics), _ABOUT_FAULTS,
         picture(figures / "faults.png", "One of four cameras has a fault."),
         "Median error with one camera lost, over that with all of them:",
@@ -82,9 +82,6 @@ def report(config: Any, found: Any, metrics: Metrics, figures: Path) -> Report:
             Column("emulator_error_ratio.{}.p95", "p95", 2),
             Column("emulator_coverage_difference.{}", "coverage less pixels'", 3, signed=True),
         ], metrics), _ABOUT_THE_EMULATOR,
-        "## Nobody there", f"{metrics['empty.phantoms'].value:.0f} of "
-        f"{metrics['empty.phantoms'].n} images of empty scenes were said to show somebody; "
-        f"{metrics['empty.tracked'].value:.0f} steps had a track.",
     ), "95 % intervals over episodes, crops or clips")  # fmt: skip
 
 
@@ -95,11 +92,6 @@ def _named(metrics: Metrics, start: str) -> dict[str, str]:
 def _estimates(metrics: Metrics) -> dict[str, str]:
     names = keys(metrics, "lost_steps.")
     return {name: name.replace(".", ": ") for name in names if not name.startswith("fault.")}
-
-
-def _acquired(metrics: Metrics) -> str:
-    found, said = metrics["acquired"], "The worker is tracked within five frames of"
-    return f"{said} {100 * found.value:.0f} % of {found.n} resets."
 
 
 def _belief_columns(start: str = "", words: str = "", row: str = "{}") -> list[Column]:

@@ -18,8 +18,8 @@ from hrc_env.experiments.study.runner import run
 from hrc_env.motion.generator import activity_names
 
 TINY = PerceptionBenchConfig(
-    episodes=(("lab", 1),), n_steps=4, n_resets=1, n_faults=1, fault_steps=3, n_emulated=1,
-    kinds=("lost",), bodies=("worker_1",), n_instants=1, n_empty=1, emulator_rounds=None,
+    episodes=(("lab", 1),), n_steps=4, n_faults=1, fault_steps=3, n_emulated=1,
+    kinds=("lost",), bodies=("worker_1",), n_instants=1, emulator_rounds=None,
     cameras=(1,), workers=(1,), speed_steps=2,
 )  # fmt: skip
 
@@ -47,14 +47,11 @@ def found():
     ratio = asdict(Metric(1.1, 1.0, 1.2, "", 9))
     return {
         "crops.plain.lab.worker_1": {"views": [asdict(view) for view in VIEWS]},
-        "acquired": {"acquired": [True] * 4},
         "loop.lab.0": base,
         f"fault.{PIXELS}.lost": twice,
         f"fault.{PIXELS}.glare": twice,
         f"fault.{EMULATED}.{NO_FAULT}": base,
         f"fault.{EMULATED}.lost": twice,
-        "empty.lab": {"images": 8, "phantoms": 1, "tracked": 0},
-        "empty.site": {"images": 8, "phantoms": 1, "tracked": 0},
         "emulator": {
             "emulator_error_ratio.walk": ratio,
             "emulator_error_ratio.walk.p95": ratio,
@@ -99,9 +96,6 @@ def test_numbers_say_what_was_found():
     assert metrics["detected.pose.fold"].value == 0.0
     assert metrics["error_share.lens.fisheye.median"].value == pytest.approx(0.04)
     assert metrics["detected.distance.6_9_m"].n == 1
-    assert metrics["empty.phantoms"].value == 2
-    assert metrics["empty.phantoms"].n == 16
-    assert metrics["acquired"].value == 1.0
     assert metrics["steps_per_s.4.1"].value == 50.0
     assert metrics["network_ms.litert"].value == 20.0
 
