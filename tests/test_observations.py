@@ -1,14 +1,13 @@
 """What the robot sees of the future, if it is asked for."""
 
-import gymnasium
 import numpy as np
 import pytest
+from alone import check_observations_alone
 
 import hrc_env  # noqa: F401  registers the ids
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.env import HRCEnv
 from hrc_env.observations import Sizes, layout
-from hrc_env.sb3 import HRCVecEnv
 from hrc_env.tasks.reach import TASK
 
 TERMS = TASK.observation_terms
@@ -63,20 +62,7 @@ def test_of_nobody_the_prior_is_expected():
 
 
 def test_many_environments_expect_what_each_alone_expects():
-    """Bit for bit, and over a reset of some of them."""
-    actions = np.random.default_rng(0).uniform(-1, 1, (14, 3, 6)).astype(np.float32)
-    asked = {"perception": "keypoints", "config": ASKED, "max_episode_steps": 9}
-    many = HRCVecEnv(3, **asked, stagger=False, seed=7)
-    batch = [many.reset(), *(many.step(action)[0] for action in actions)]
-    for k in range(3):
-        one = gymnasium.make("HRCReach-v0", **asked)
-        observation, _ = one.reset(seed=7 + k)
-        np.testing.assert_array_equal(observation, batch[0][k])
-        for step, action in enumerate(actions[:, k], start=1):
-            observation, _, terminated, truncated, _ = one.step(action)
-            if terminated or truncated:
-                observation, _ = one.reset()
-            np.testing.assert_array_equal(observation, batch[step][k])
+    check_observations_alone(config=ASKED)
 
 
 def test_two_workers_have_their_own_futures():

@@ -1,8 +1,8 @@
 """What the observation says of a joint's covariance beside its root mean, if it is asked for."""
 
-import gymnasium
 import numpy as np
 import pytest
+from alone import check_observations_alone
 
 import hrc_env  # noqa: F401  registers the ids
 from hrc_env.belief import covariance_factor_m, deviation_towards_robot_m, standard_deviation_m
@@ -12,7 +12,6 @@ from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.env import HRCEnv
 from hrc_env.geometry.rotations import matrix_from_quaternion
 from hrc_env.observations import UNCERTAINTY
-from hrc_env.sb3 import HRCVecEnv
 from hrc_env.scene.rigs import RIGS
 
 ASKED = {"uncertainty": UNCERTAINTY}
@@ -123,16 +122,4 @@ def test_each_can_be_asked_for_alone_and_others_are_refused():
 
 
 def test_many_environments_say_what_each_alone_says():
-    actions = np.random.default_rng(0).uniform(-1, 1, (14, 3, 6)).astype(np.float32)
-    asked = {"perception": "keypoints", "n_workers": 2, "config": ASKED, "max_episode_steps": 9}
-    many = HRCVecEnv(3, **asked, stagger=False, seed=7)
-    batch = [many.reset(), *(many.step(action)[0] for action in actions)]
-    for k in range(3):
-        one = gymnasium.make("HRCReach-v0", **asked)
-        observation, _ = one.reset(seed=7 + k)
-        np.testing.assert_array_equal(observation, batch[0][k])
-        for step, action in enumerate(actions[:, k], start=1):
-            observation, _, terminated, truncated, _ = one.step(action)
-            if terminated or truncated:
-                observation, _ = one.reset()
-            np.testing.assert_array_equal(observation, batch[step][k])
+    check_observations_alone(config=ASKED, n_workers=2)
