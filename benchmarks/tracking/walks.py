@@ -25,6 +25,29 @@ _HIP_HEIGHT_M, _GROUND_M = 0.92, 0.02
 
 
 @dataclass(frozen=True, slots=True)
+class Gait:
+    """How somebody goes."""
+
+    speed_m_s: tuple[float, float, float]
+    """Least, usual, most."""
+    cycles_per_m: float = 0.72
+    """Of both legs."""
+    thigh_rad: float = 0.45
+    """How far thighs swing to either side."""
+    knee_rad: float = 0.55
+    """How much more knees bend where a leg swings forward."""
+    arm_rad: float = 0.4
+    """How far upper arms swing to either side."""
+    elbow_rad: float = 0.3
+    """How much elbows are bent."""
+    bounce_m: float = 0.02
+    """How far the hips go up and down, to either side."""
+
+
+WALKING = Gait((0.9, 1.25, 1.5))
+
+
+@dataclass(frozen=True, slots=True)
 class Path:
     """A walk on the ground, and what the limbs make of it; all (T, S), T in frames of 0.04 s."""
 
@@ -36,12 +59,15 @@ class Path:
     lean: Floats
     gesture: Floats
     """(T, S, 2) how much the left and right arm gesture, in [0, 1]."""
+    gait: Gait = WALKING
 
 
-def walk(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
+def walk(
+    walk_m: tuple[float, float], seeds: list[int], n_frames: int, gait: Gait = WALKING
+) -> Points3:
     """Joints (T, S, J, 3) [m] of one walker per seed, which depends on that only, at 25 Hz in an
     area about the origin of twice `walk_m` (length, width)."""
-    return bodies_along(_steer(walk_m, seeds, max(n_frames, _SHORTEST)))[:n_frames]
+    return bodies_along(steer(walk_m, seeds, max(n_frames, _SHORTEST), gait))[:n_frames]
 
 
 def bodies_along(path: Path) -> Points3:
@@ -49,19 +75,22 @@ def bodies_along(path: Path) -> Points3:
     body = _body(path)
     joints = np.einsum("tsij,tskj->tski", about_axis("z", path.heading), body)
     joints[..., :2] += path.ground[:, :, None]
-    joints[..., 2] += (_HIP_HEIGHT_M + 0.02 * np.cos(2 * path.stride))[..., None]
+    joints[..., 2] += (_HIP_HEIGHT_M + path.gait.bounce_m * np.cos(2 * path.stride))[..., None]
     below = _GROUND_M - joints[..., 2].min(-1)
     joints[..., 2] += np.maximum(below, 0.0)[..., None]  # the whole body, so that bones stay rigid
     return joints
 
 
-def _steer(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Path:
+def steer(
+    walk_m: tuple[float, float], seeds: list[int], n_frames: int, gait: Gait = WALKING
+) -> Path:
     """Walk in substeps; returns every frame."""
     dt, n_steps = DT_S / _SUBSTEPS, n_frames * _SUBSTEPS
     rngs = [np.random.default_rng([seed, 1]) for seed in seeds]
     starts = np.stack([rng.uniform(-0.5, 0.5, 3) for rng in rngs])
     noise = np.stack([_smooth(rng, n_steps, dt) for rng in rngs], -1)  # (5, n, S)
-    speed = np.clip(1.25 + 0.2 * noise[0], 0.9, 1.5)
+    least, usual, most = gait.speed_m_s
+    speed = np.clip(usual + 0.2 * noise[0], least, most)
     wander = 0.8 * noise[1]
     place, heading = starts[:, :2].copy(), 2 * np.pi * (starts[:, 2] + 0.5)
     turning = np.zeros(len(seeds))
@@ -77,7 +106,7 @@ def _steer(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Path
         direction = np.stack([np.cos(heading), np.sin(heading)], -1)
         place = place + (speed[k] * dt)[:, None] * direction
         places[k], headings[k] = place, heading
-    stride = 2 * np.pi * np.cumsum(0.9 * speed / 1.25, 0) * dt
+    stride = 2 * np.pi * np.cumsum(gait.cycles_per_m * speed, 0) * dt
     shown = slice(None, None, _SUBSTEPS)
     return Path(
         ground=places[shown],
@@ -85,6 +114,7 @@ def _steer(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Path
         stride=stride[shown],
         lean=(0.08 + 0.25 * np.clip(noise[2] - 0.8, 0, 1.5))[shown],
         gesture=np.moveaxis(np.clip(noise[3:] - 0.3, 0, 1.2) / 1.2, 0, -1)[shown],
+        gait=gait,
     )
 
 
@@ -116,20 +146,20 @@ def _body(path: Path) -> Points3:
     time_s = DT_S * np.arange(len(lean), dtype=float)[:, None]
     for side, sign in (("left", 1.0), ("right", -1.0)):
         swing = path.stride + (0.0 if sign > 0 else np.pi)
-        leg = _leg(swing, sign)
+        leg = _leg(swing, sign, path.gait)
         for name, points in zip(("hip", "knee", "ankle", "foot"), leg, strict=True):
             body[..., JOINT[f"{side}_{name}"], :] = points
         gesture = path.gesture[..., 0 if sign > 0 else 1]
-        arm = _arm(chest + sign * across, swing, gesture, sign, time_s)
+        arm = _arm(chest + sign * across, swing, gesture, sign, time_s, path.gait)
         for name, points in zip(("shoulder", "elbow", "wrist"), arm, strict=True):
             body[..., JOINT[f"{side}_{name}"], :] = points
     return body
 
 
-def _leg(swing: Floats, sign: float) -> tuple[Points3, ...]:
+def _leg(swing: Floats, sign: float, gait: Gait) -> tuple[Points3, ...]:
     """Hip, knee, ankle and foot of one side."""
-    thigh = 0.45 * np.sin(swing)
-    shank = thigh - 0.15 - 0.55 * np.clip(np.cos(swing), 0, 1) ** 2
+    thigh = gait.thigh_rad * np.sin(swing)
+    shank = thigh - 0.15 - gait.knee_rad * np.clip(np.cos(swing), 0, 1) ** 2
     hip = np.broadcast_to(np.array([0.0, 0.11 * sign, 0.0]), (*swing.shape, 3))
     knee = hip + _limb(thigh, _THIGH_M)
     ankle = knee + _limb(shank, _SHANK_M)
@@ -137,14 +167,14 @@ def _leg(swing: Floats, sign: float) -> tuple[Points3, ...]:
 
 
 def _arm(
-    shoulder: Points3, swing: Floats, gesture: Floats, sign: float, time_s: Floats
+    shoulder: Points3, swing: Floats, gesture: Floats, sign: float, time_s: Floats, gait: Gait
 ) -> tuple[Points3, ...]:
     """Shoulder, elbow and wrist of one side; a gesture lifts, spreads and shakes the arm."""
     pace = 2 * np.pi * (0.7 if sign > 0 else 0.95)
     start = 0.0 if sign > 0 else 1.0
     shake = gesture * (0.9 + 0.75 * np.sin(pace * time_s + start))
-    upper = -0.4 * np.sin(swing) + shake
-    fore = upper + 0.3 + gesture * (0.6 + 0.5 * np.sin(1.3 * pace * time_s))
+    upper = -gait.arm_rad * np.sin(swing) + shake
+    fore = upper + gait.elbow_rad + gesture * (0.6 + 0.5 * np.sin(1.3 * pace * time_s))
     outward = about_axis("x", sign * (0.1 + 0.5 * gesture))
     elbow = shoulder + np.einsum("tsij,tsj->tsi", outward, _limb(upper, _UPPER_ARM_M))
     return shoulder, elbow, elbow + np.einsum("tsij,tsj->tsi", outward, _limb(fore, _FOREARM_M))

@@ -9,6 +9,7 @@ from hrc_env.tracking.models.acquisition import count_conflict
 from hrc_env.tracking.models.track_management import acquire_anew, check, find_joints_again
 from hrc_env.tracking.tree.bone_lengths import learn_lengths, stiff_lengths
 from hrc_env.tracking.tree.gaussian import PARENT
+from hrc_env.tracking.tree.jumps import widen_jumped
 from hrc_env.tracking.tree.search import find_pose
 from hrc_env.tracking.tree.update import shift_to_mean, update_tree
 
@@ -22,11 +23,13 @@ def keep_positions(cov, out):
                 out[j, i, k] = cov[j, i, k]
 
 
-@kernel
+@kernel(makes_arrays=True)
 def condition(tree, seen, s, work):
     """Search the mode and condition the tree there; seen.belief says what was believed."""
     stiff_lengths(tree.bone_variance, s.bone_give, work.bone_variance)
     find_pose(tree, seen, s, work)
+    if widen_jumped(tree, seen, s, work):
+        find_pose(tree, seen, s, work)
     update_tree(tree, work)
 
 

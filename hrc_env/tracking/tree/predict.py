@@ -9,8 +9,7 @@ divergence).
 """
 
 from hrc_env.core.kernels import kernel
-from hrc_env.tracking.models.acquisition import heading
-from hrc_env.tracking.models.motion import learn_offsets
+from hrc_env.tracking.models.motion import IS_LEG, learn_offsets, legs_follow, set_axes
 from hrc_env.tracking.tree.gaussian import ORDER, PARENT, invert, multiply, multiply_transposed
 
 _LEFT, _RIGHT, _LEFT_HIP, _RIGHT_HIP = 1, 2, 7, 8  # shoulders: _RIGHT, _LEFT_HIP hang on _LEFT
@@ -26,7 +25,7 @@ def predict_tree(tree, model, dt, w):
     """
     F, travel, Q, shared = model
     cov, slope = tree.cov, tree.slope
-    _move_means(tree, F, travel, dt)
+    _move_means(tree, F, travel, dt, w)
     torso = w.a
     _relate_torso(cov, slope, w)
     for j in ORDER:
@@ -53,25 +52,37 @@ def _torso_of(body, i):
 
 
 @kernel
-def _move_means(tree, F, travel, dt):
-    body, offset = tree.body, tree.offset
+def _move_means(tree, F, travel, dt, w):
+    body, offset, axes, place = tree.body, tree.offset, w.axes, w.place
     root = (
         _torso_of(body, 0), _torso_of(body, 1), _torso_of(body, 2),
         _torso_of(body, 3), _torso_of(body, 4), _torso_of(body, 5),
     )  # fmt: skip
-    cos, sin, known = heading(body)
-    if known:
-        learn_offsets(tree, root, cos, sin, dt)
-    for j in range(len(body)):
-        forward, left = offset[j, 0], offset[j, 1]
-        place = (cos * forward - sin * left, sin * forward + cos * left, offset[j, 2])
-        for i in range(3):
-            p, v = body[j, i], body[j, 3 + i]
-            at, speed = root[i], root[3 + i]
-            p_new = F[j, 0, 0] * p + F[j, 0, 1] * v + travel[j, 0, 0] * at + travel[j, 0, 1] * speed
-            v_new = F[j, 1, 0] * p + F[j, 1, 1] * v + travel[j, 1, 0] * at + travel[j, 1, 1] * speed
-            body[j, i] = p_new + travel[j, 0, 0] * place[i]
-            body[j, 3 + i] = v_new + travel[j, 1, 0] * place[i]
+    if set_axes(body, axes):
+        legs = legs_follow(body, root, offset, axes)
+        learn_offsets(tree, root, axes, legs, dt)
+        for j in range(len(body)):
+            own = axes[0] if legs or not IS_LEG[j] else axes[1]
+            for i in range(3):
+                place[i] = 0.0
+                for k in range(3):
+                    place[i] += own[i, k] * offset[j, k]
+            _move_mean(body[j], root, F[j], travel[j], place)
+    else:
+        for j in range(len(body)):
+            place[0], place[1], place[2] = 0.0, 0.0, offset[j, 2]
+            _move_mean(body[j], root, F[j], travel[j], place)
+
+
+@kernel
+def _move_mean(joint, root, F, travel, place):
+    for i in range(3):
+        p, v = joint[i], joint[3 + i]
+        at, speed = root[i], root[3 + i]
+        p_new = F[0, 0] * p + F[0, 1] * v + travel[0, 0] * at + travel[0, 1] * speed
+        v_new = F[1, 0] * p + F[1, 1] * v + travel[1, 0] * at + travel[1, 1] * speed
+        joint[i] = p_new + travel[0, 0] * place[i]
+        joint[3 + i] = v_new + travel[1, 0] * place[i]
 
 
 @kernel

@@ -46,6 +46,8 @@ WORK = np.dtype(
         # joints that were put somewhere
         ("offset", "f8", (_J, 3)), ("offset_count", "f8", (_J,)),
         ("predicted", "f8", (_J, 3, 3)), ("placed", "i1", (_J,)),
+        # axes of the torso, of a body upright; a place on the body [m]
+        ("axes", "f8", (2, 3, 3)), ("place", "f8", (3,)),
     ],
     align=True,
 )  # fmt: skip

@@ -1,0 +1,114 @@
+"""People who run, turn over and fall: motions that no setting of the estimators was chosen on.
+
+Bodies are those of `walks`; who turns over or falls is turned about the middle of the hips.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from benchmarks.tracking.rigs import DT_S
+from benchmarks.tracking.walks import Gait, bodies_along, steer, walk
+from hrc_env.core.skeleton import JOINT
+from hrc_env.core.typing import Floats, Points3
+from hrc_env.geometry.rotations import about_axis
+
+FALLS_S, LIES_S = 2.0, 3.0
+"""When people fall, and by when they lie."""
+_GROUND_M, _HOP_M = 0.02, 0.4
+_PAUSE_S, _TRICK_S = (0.5, 1.5), (1.0, 1.4)
+"""Between two tricks; how long one takes."""
+_LIES_PACE, _ROLL_RAD, _ROLL_S = 0.4, 1.5, (2.5, 5.0)
+"""Limbs of who lies go on so much slower; they roll over so far to either side, in such a time."""
+_LIES_LOWER_M = 0.75
+
+
+@dataclass(frozen=True, slots=True)
+class Turns:
+    """How bodies (T, S) are turned about their hips [rad], and how much higher these are [m]."""
+
+    forward: Floats
+    aside: Floats
+    roll: Floats
+    """About the line from the feet to the head."""
+    up_m: Floats
+
+
+def run(walk_m: tuple[float, float], seeds: list[int], n_frames: int, speed_m_s: float) -> Points3:
+    """Joints (T, S, J, 3) [m] of runners; wrists and feet have 30 m/s2 and more."""
+    gait = Gait(
+        (speed_m_s - 0.3, speed_m_s, speed_m_s + 0.3), cycles_per_m=1.45 / speed_m_s,
+        thigh_rad=0.55, knee_rad=0.4, arm_rad=0.7, elbow_rad=1.4, bounce_m=0.04,
+    )  # fmt: skip
+    return walk(walk_m, seeds, n_frames, gait)
+
+
+def tumble(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
+    """Joints (T, S, J, 3) [m] of walkers who turn over in the air every second or so."""
+    joints = walk(walk_m, seeds, n_frames)
+    tricks = [_tricks(np.random.default_rng([seed, 7]), n_frames) for seed in seeds]
+    return turned(joints, Turns(*np.stack(tricks, -1)))
+
+
+def fall(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
+    """Joints (T, S, J, 3) [m] of walkers who fall, lie there and roll from side to side."""
+    path = steer(walk_m, seeds, n_frames)
+    time_s = DT_S * np.arange(n_frames)[:, None]
+    lying = _eased((time_s - FALLS_S) / (LIES_S - FALLS_S))
+    walked = np.cumsum(1 - lying[:, 0]) - 1  # so many frames of their walk, then no further
+    path = replace(
+        path,
+        ground=_at(path.ground, walked),
+        heading=_at(path.heading, walked),
+        stride=_at(path.stride, np.cumsum(1 - (1 - _LIES_PACE) * lying[:, 0]) - 1),
+    )
+    rngs = [np.random.default_rng([seed, 8]) for seed in seeds]
+    way = np.array([rng.uniform(-np.pi, np.pi) for rng in rngs])
+    period_s = np.array([rng.uniform(*_ROLL_S) for rng in rngs])
+    down = 0.5 * np.pi * lying
+    roll = _ROLL_RAD * lying * np.sin(2 * np.pi * np.maximum(time_s - LIES_S, 0.0) / period_s)
+    low = np.broadcast_to(-_LIES_LOWER_M * lying, roll.shape)
+    return turned(bodies_along(path), Turns(down * np.cos(way), down * np.sin(way), roll, low))
+
+
+def turned(joints: Points3, turns: Turns) -> Points3:
+    """Joints (T, S, J, 3) turned, and lifted where they would be below the ground."""
+    left, right = joints[..., JOINT["left_hip"], :], joints[..., JOINT["right_hip"], :]
+    hips, across = 0.5 * (left + right)[..., None, :], left - right
+    level = about_axis("z", np.arctan2(across[..., 1], across[..., 0]) - np.pi / 2)
+    angle = np.hypot(turns.forward, turns.aside)
+    heading = about_axis("z", np.arctan2(turns.aside, turns.forward))
+    over = heading @ about_axis("y", angle) @ heading.swapaxes(-1, -2)
+    turn = level @ over @ about_axis("z", turns.roll) @ level.swapaxes(-1, -2)
+    body = np.einsum("tsij,tskj->tski", turn, joints - hips) + hips
+    body[..., 2] += turns.up_m[..., None]
+    body[..., 2] += np.maximum(_GROUND_M - body[..., 2].min(-1), 0.0)[..., None]
+    return body
+
+
+def _eased(share: Floats) -> Floats:
+    """From 0 to 1, at rest at both ends."""
+    share = np.clip(share, 0.0, 1.0)
+    return share**2 * (3 - 2 * share)
+
+
+def _at(values: Floats, frame: Floats) -> Floats:
+    """(T, ...) values at frames (T,) that are no whole numbers."""
+    whole = frame.astype(int)
+    part = (frame - whole).reshape(-1, *(1,) * (values.ndim - 1))
+    return (1 - part) * values[whole] + part * values[np.minimum(whole + 1, len(values) - 1)]
+
+
+def _tricks(rng: np.random.Generator, n_frames: int) -> Floats:
+    """(4, T) `Turns` of one body."""
+    turns = np.zeros((4, n_frames))
+    begin_s = rng.uniform(*_PAUSE_S)
+    while begin_s < n_frames * DT_S:
+        lasts_s, way = rng.uniform(*_TRICK_S), rng.choice([-np.pi, -np.pi / 2, 0.0, np.pi / 2])
+        share = (DT_S * np.arange(n_frames) - begin_s) / lasts_s
+        over = 2 * np.pi * _eased(share) * (share < 1)
+        turns[0] += over * np.cos(way)
+        turns[1] += over * np.sin(way)
+        turns[3] += _HOP_M * np.sin(np.pi * np.clip(share, 0.0, 1.0)) ** 2
+        begin_s += lasts_s + rng.uniform(*_PAUSE_S)
+    return turns
