@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.core.batching import Stateful
-from hrc_env.core.errors import ConfigError, check_shape, unknown
+from hrc_env.core.errors import ConfigError, check_fields, check_names, check_shape
 from hrc_env.core.records import Roi
 from hrc_env.core.skeleton import BLAZEPOSE_INDEX, N_JOINTS
 from hrc_env.core.typing import Floats, Image, Points2, Points3
@@ -74,19 +74,12 @@ class DetectorConfig:
     """The landmark network for who is bent, squats or kneels; "heavy" is more exact, and slower."""
 
     def __post_init__(self) -> None:
-        if self.runtime not in network.RUNTIMES:
-            raise unknown("detector.runtime", self.runtime, network.RUNTIMES)
-        if self.keypoints not in DETECTORS:
-            raise unknown("detector.keypoints", self.keypoints, DETECTORS)
-        for name in ("network", "folded"):
-            if getattr(self, name) not in network.NETWORKS:
-                raise unknown(f"detector.{name}", getattr(self, name), network.NETWORKS)
-        for name in ("min_presence", "sure_presence", "outside_confidence"):
-            if not 0 < getattr(self, name) <= 1:
-                raise ConfigError(f"{name} must be in (0, 1], got {getattr(self, name)}.")
-        for name in ("gate_every", "search_every", "max_offset"):
-            if not getattr(self, name) > 0:
-                raise ConfigError(f"{name} must be positive, got {getattr(self, name)}.")
+        check_names("detector.runtime", [self.runtime], network.RUNTIMES)
+        check_names("detector.keypoints", [self.keypoints], DETECTORS)
+        check_names("detector.network", [self.network], network.NETWORKS)
+        check_names("detector.folded", [self.folded], network.NETWORKS)
+        check_fields(self, "be in (0, 1]", "min_presence", "sure_presence", "outside_confidence")
+        check_fields(self, "be positive", "gate_every", "search_every", "max_offset")
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError, check_shape
+from hrc_env.core.errors import ConfigError, check_fields, check_shape
 from hrc_env.core.records import Keypoints, PoseEstimate, WorkerTruth
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats, Ints, Records
@@ -44,13 +44,9 @@ class EmulatorConfig:
     """Joints outside the image are guesses, at most this visible; as in `DetectorConfig`."""
 
     def __post_init__(self) -> None:
-        for name in ("error_scale", "max_error"):
-            if not getattr(self, name) >= 0:
-                raise ConfigError(f"{name} must not be negative, got {getattr(self, name)}.")
-        for name in ("swap_share", "miss_share", "outside_confidence"):
-            value = getattr(self, name)
-            if value is not None and not 0 <= value <= 1:
-                raise ConfigError(f"{name} must be in [0, 1], got {value}.")
+        check_fields(self, "not be negative", "error_scale", "max_error")
+        chosen = [n for n in ("swap_share", "miss_share") if getattr(self, n) is not None]
+        check_fields(self, "be in [0, 1]", "outside_confidence", *chosen)
         self.calibrated()
 
     def calibrated(self) -> Calibration:

@@ -9,11 +9,13 @@ relaxes to the prior (docs/tracking.md, "Ahead").
 
 import functools
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hrc_env.core.batching import mapped
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import PoseEstimate
@@ -164,13 +166,8 @@ def forecast(now: PoseEstimate, horizon_s: float, config: TrackerConfig) -> Pose
         ConfigError: a horizon that is none.
     """
     check_horizon(horizon_s)
-    later = PoseEstimate(
-        mean_world=now.mean_world.copy(),
-        cov_world=now.cov_world.copy(),
-        velocity_world=now.velocity_world.copy(),
-        age_s=np.minimum(now.age_s + horizon_s, config.max_age_s),
-        tracked=now.tracked.copy(),
-    )
+    age_s = np.minimum(now.age_s + horizon_s, config.max_age_s)
+    later = replace(mapped(now, lambda array: array.copy()), age_s=age_s)
     workers = (later.mean_world, later.cov_world, later.velocity_world, later.tracked)
     unknown_heading = config.root_acceleration * horizon_s**3 / 3
     keep = float(np.exp(-horizon_s / config.forget_s))
