@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from assets.rotations import matrix_from_quaternion
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import WorkerMotion, WorkerPath
 from hrc_env.core.skeleton import MIRROR, N_JOINTS
-from hrc_env.geometry.rotations import matrix_from_quaternion
 from hrc_env.motion import generator
 from hrc_env.motion.anatomy import anatomies, anatomy
 from hrc_env.worker.body import (

@@ -17,7 +17,7 @@ from poses import POSES, posed
 
 from hrc_env.worker.body import SEGMENTS, Body, assets_dir, load_body, worker_names, worker_truth
 from hrc_env.geometry.cameras import project, projections
-from hrc_env.geometry.rotations import matrix_from_quaternion
+from assets.rotations import matrix_from_quaternion
 from hrc_env.geometry.triangulation import triangulate
 from hrc_env.perception.blazepose import decode_landmarks, landmark_input, to_image
 from hrc_env.perception.detector import STATURE_OF_SIDE

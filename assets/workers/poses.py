@@ -3,7 +3,8 @@
 import numpy as np
 
 from hrc_env.worker.body import N_SEGMENTS, PARENT, SEGMENT, Body
-from hrc_env.geometry.rotations import about_axis, quaternion_from_matrix
+from hrc_env.geometry.rotations import about_axis
+from assets.rotations import quaternion_from_matrix
 from hrc_env.core.records import WorkerMotion
 
 HANGING, ALONG, STRAIGHT = (5, 10), (18, 6), (2, 4, 4)

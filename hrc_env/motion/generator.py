@@ -51,7 +51,6 @@ OPEN_FLOOR = Grounds(
         Workplace("behind", "open", (1.9, 0.0), 0.0, 0.0),
     ),
     robot_xy_m=(-0.75, 0.0),
-    robot_front_rad=0.0,
     robot_clearance_m=0.8,
 )
 """Where workers are whom no scene holds: the laboratory's walkway without its furniture."""
@@ -79,7 +78,7 @@ def make_state(
             f"{config.spacing_m} m from each other."
         )
     clips = [m if isinstance(m, Clip) else load_clip(Path(m)) for m in config.motions]
-    schedule = schedule_at(config.jobs, {place.kind for place in plan.places})
+    schedule = schedule_at(config.jobs, {place.kind for place in grounds.places})
     values = numbers(config, grounds.robot_xy_m)
     pieces = stocked(clips, bones.size)
     mind = BehaviourParams(config, values, plan, schedule, pieces, bones, fewest)

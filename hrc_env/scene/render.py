@@ -77,15 +77,7 @@ class CropRenderer(Canvas):
             self._remember(key, None)
             self._show(EVERYTHING, camera, window)
             return self.paint()
-        return self._before_the_still(camera, window)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return CropRenderer, (self.scene, self.size_px)
-
-    def _before_the_still(self, camera: PinholeCamera, window: Roi) -> Image:
-        """What moves before what stands still, which is drawn at its first use."""
-        key = _key(camera, window)
-        still = self._kept.get(key)
+        still = self._kept[key]
         if still is None:
             z = np.empty_like(self._z)
             self._show(STILL, camera, window)
@@ -97,6 +89,9 @@ class CropRenderer(Canvas):
         crop = still[0].copy()
         _lay_over(self._rgb, self._z, still[1], crop)
         return crop
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return CropRenderer, (self.scene, self.size_px)
 
     def _show(self, what: Part, camera: PinholeCamera, window: Roi) -> None:
         self.show(what)
