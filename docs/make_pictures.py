@@ -101,7 +101,7 @@ def faults() -> None:
         env.step(np.zeros(6))
         renderer = CropRenderer(scene)
         schedule = Schedule(scene.rig, tuple(given), env.config.ctrl_dt)
-        film = CameraFilm(renderer, Lensed(renderer, scene.cameras), schedule)
+        film = CameraFilm(Lensed(renderer, scene.cameras), schedule)
         shot = Shot(0, *copied(env.views.pose()), before, scene.cameras)
         film.show([shot] * 4, seed=4)
         joints = env.simulation.estimate.mean_world[:, 0]

@@ -59,8 +59,7 @@ def _mean_square(vectors):
 
 def _proximity(now: Belief, step: Any, previous: Floats, config: RewardConfig) -> Floats:
     nearest_m = np.minimum.reduce(now.separation.distance_m, axis=-1, initial=np.inf)
-    penalty: Floats = -config.proximity * closeness(nearest_m, config.proximity_reach_m)
-    return penalty
+    return -config.proximity * closeness(nearest_m, config.proximity_reach_m)
 
 
 SHARED_TERMS: tuple[RewardTerm, ...] = (

@@ -133,10 +133,8 @@ def _known(expected: PoseEstimate | None, shape: tuple[int, ...]) -> kernels.Exp
     if expected is None:
         nowhere = np.zeros(shape)
         return kernels.Expected(nowhere, nowhere, np.zeros(shape[:2], np.bool_))
-    mean_world, velocity_world = map(
-        np.ascontiguousarray, (expected.mean_world, expected.velocity_world)
-    )
-    return kernels.Expected(mean_world, velocity_world, np.ascontiguousarray(expected.tracked))
+    known = expected.mean_world, expected.velocity_world, expected.tracked
+    return kernels.Expected(*map(np.ascontiguousarray, known))
 
 
 def lines_of_sight(
@@ -152,12 +150,10 @@ def lines_of_sight(
 
 
 def _world(truth: WorkerTruth, surroundings: Surroundings) -> World:
-    return World(
-        np.ascontiguousarray(truth.joints_world), np.ascontiguousarray(truth.velocity_world),
-        np.ascontiguousarray(truth.capsules_world),
-        np.ascontiguousarray(truth.capsule_radius_m), surroundings.still, surroundings.moving,
-        surroundings.capsules_world, surroundings.capsule_radius_m,
-    )  # fmt: skip
+    workers = truth.joints_world, truth.velocity_world, truth.capsules_world, truth.capsule_radius_m
+    robot = surroundings.capsules_world, surroundings.capsule_radius_m
+    bodies = map(np.ascontiguousarray, workers)
+    return World(*bodies, surroundings.still, surroundings.moving, *robot)
 
 
 def without_names(keypoints: Keypoints, rngs: Generators) -> Keypoints:

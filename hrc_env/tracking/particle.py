@@ -88,13 +88,8 @@ class ParticleEstimator:
         """What is expected in `horizon_s`, hypothesis by hypothesis; see `tracking.forecast`."""
         trees = state.trees.reshape(len(state.trees), state.trees[0].size)
         body, cov = trees["body"], trees["cov"]
-        each = PoseEstimate(
-            mean_world=body[..., :3].copy(),
-            cov_world=cov[..., :3, :3].copy(),
-            velocity_world=body[..., 3:].copy(),
-            age_s=trees["age_s"].copy(),
-            tracked=trees["tracked"].copy(),
-        )
+        where = body[..., :3], cov[..., :3, :3].copy(), body[..., 3:]
+        each = PoseEstimate(*where, trees["age_s"], trees["tracked"])
         later = forecast(bounded(each, self.config), horizon_s, self.config)
         whole = mixed(later, state.trees["log_weight"], state.n_alive)
         return self._of_unknown_size(state, whole)

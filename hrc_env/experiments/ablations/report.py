@@ -19,9 +19,8 @@ all bodies work beside an arm that rests, on the same walks in every setting of 
 Every joint of every frame after the first second counts, also where the track is lost: the last
 word, or the prior, is then the answer. *Coverage*: the share of joints within the reported 95 %
 region; *lost*: the share of time without a track; *switches*: of a worker from one track to
-another, a minute, and *IDF1*: how well workers keep theirs (`hrc_env/metrics.py`); *us an update*:
-processor time of one thread; *less*: less the setting that was changed, walk by walk; a dot where
-the interval leaves out zero."""
+another, a minute, and *IDF1*: how well workers keep theirs (`hrc_env/metrics.py`); *less*: less the
+setting that was changed, walk by walk; a dot where the interval leaves out zero."""
 
 
 def report(figures: Path, ablations: Sequence[Ablation], metrics: Metrics) -> Report:
@@ -44,15 +43,12 @@ def report(figures: Path, ablations: Sequence[Ablation], metrics: Metrics) -> Re
         if any(setting.n_workers > 1 for setting in ablation.settings):
             columns.append(Column(f"id_switches.{key}.{{}}", "switches [1/min]", 2))
             columns.append(Column(f"idf1.{key}.{{}}", "IDF1 [%]", 1, 100))
-        if any(setting.is_timed for setting in ablation.settings):
-            columns.append(Column(f"update_us.{key}.{{}}", "us an update", 0))
         parts += [
             f"## {ablation.title}\n\n{ablation.asked}",
             picture(path, "Error of a joint in each setting."),
             table_of("setting", rows, columns, metrics),
         ]
-    spread = "95 % intervals over seeds, times with the smallest and the largest"
-    return Report("Ablations of rigs, detections and estimators", ASKED, parts, spread)
+    return Report("Ablations of rigs, detections and estimators", ASKED, parts)
 
 
 def draw(path: Path, key: str, rows: Mapping[str, str], metrics: Metrics) -> None:

@@ -10,6 +10,7 @@ from hrc_env.perception.faults.camera_film import BLUR_IMAGES, CameraFilm, Shot
 from hrc_env.perception.faults.corruptions import Shown, spoil
 from hrc_env.perception.faults.fault import KINDS, FaultConfig
 from hrc_env.perception.faults.schedule import Schedule
+from hrc_env.perception.lensed import Lensed
 from hrc_env.scene.rig import LAB_CAMERAS, pinholes
 from hrc_env.worker.body import load_body
 
@@ -108,8 +109,8 @@ def film(*faults):
     body = load_body("worker_1")
     motions = [mapped(rest_motion(body), lambda a: a[None].copy()) for _ in range(2)]
     motions[0].position_world[..., 0], motions[1].position_world[..., 0] = 0.4, 0.8
-    stage, rig = FakeStage(), pinholes(LAB_CAMERAS)
-    shown = CameraFilm(stage, stage, Schedule(LAB_CAMERAS, faults, 0.04))
+    rig = pinholes(LAB_CAMERAS)
+    shown = CameraFilm(Lensed(FakeStage(), rig), Schedule(LAB_CAMERAS, faults, 0.04))
     q = np.zeros(6)
     shown.show([Shot(5, q, motions[1], (q, motions[0]), rig), None, None, None], seed=1)
     return shown
