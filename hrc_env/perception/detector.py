@@ -27,6 +27,7 @@ from hrc_env.perception.noise import ERROR, STANDING, sigma_px
 from hrc_env.perception.searching import (
     Candidates,
     ImageSource,
+    Views,
     apart_from,
     distinct,
     people,
@@ -92,7 +93,7 @@ class Detection:
     px: Points2  # (C, J, 2) [px] in the whole image, as its lens distorts it
     confidence: Floats  # (C, J) visibility in [0, 1]
     sigma_px: Floats  # (C, J) standard deviation of each coordinate [px]
-    windows: list[Roi | None]  # where each camera looked
+    windows: Views  # where each camera looked
     crops: list[Image | None] = field(default_factory=list)  # what the network was given of each
 
 
@@ -264,11 +265,10 @@ def _nobody(windows: Sequence[Roi | None]) -> Detection:
 
 
 def _networks(config: DetectorConfig) -> _Networks:
-    runtime = network.chosen_runtime(config.runtime)
-    landmark = {k: network.load_landmarker(k, runtime) for k in {config.network, config.folded}}
+    names, runtime = {config.network, config.folded}, config.runtime
+    landmark = {name: network.load_landmarker(name, runtime) for name in names}
     make = DETECTORS[config.keypoints]
-    own = None if make is None else make()
-    return _Networks(network.load_person_detector(runtime), landmark, own)
+    return _Networks(network.load_person_detector(runtime), landmark, make and make())
 
 
 def own_joints(find: KeypointFunction, crop: Image, window: Roi) -> Floats | None:

@@ -7,7 +7,7 @@ import numpy as np
 
 from hrc_env.core.errors import ConfigError, check_fields
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records
+from hrc_env.core.typing import Floats, Ints, Points3, Records
 from hrc_env.observations import ObservationTerm, directions
 from hrc_env.rewards import RewardTerm
 from hrc_env.tasks.task import Rngs, Task, World
@@ -99,17 +99,14 @@ def view(state: Records, ids: Ints, config: ReachConfig) -> ReachView:
     return ReachView(state["goal_world"][ids], config.time_limit_s - state["goal_age_s"][ids])
 
 
-def succeeded(state: Records) -> Bools:
-    """(B,) whether so far every goal of the episode, and at least one, was reached in time."""
-    return (state["n_reached"] > 0) & (state["n_missed"] == 0)
-
-
 def info(state: Records) -> dict[str, Floats]:
-    """What the episode has come to so far, (B,) each."""
+    """What the episode has come to so far, (B,) each; it is a success if every goal, and at least
+    one, was reached in time."""
+    succeeded = (state["n_reached"] > 0) & (state["n_missed"] == 0)
     return {
         "task/goals_reached": state["n_reached"].astype(float),
         "task/goals_missed": state["n_missed"].astype(float),
-        "is_success": succeeded(state).astype(float),
+        "is_success": succeeded.astype(float),
     }
 
 

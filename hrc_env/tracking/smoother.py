@@ -207,10 +207,9 @@ def _mixture(a: _Smoothed, b: _Smoothed) -> _Smoothed:
     apart = (a.mean - b.mean)[..., :3]
     between = apart[..., :, None] * apart[..., None, :]
     one, other = share[..., None], 1.0 - share[..., None]
-    return _Smoothed(
+    return a._replace(
         mean=share * a.mean + (1.0 - share) * b.mean,
         cov=one * a.cov + other * b.cov + one * other * between,
-        doubt=np.minimum(a.doubt, b.doubt),
         age_s=np.minimum(a.age_s, b.age_s),
         tracked=a.tracked | b.tracked,
     )
