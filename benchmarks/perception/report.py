@@ -47,7 +47,6 @@ def report(config: Any, found: Any, metrics: Metrics, figures: Path) -> Report:
         for row in keys(metrics, f"detected.{kind}.")
     }
     every = {"none": "no fault", **kinds}
-    cameras = {name: name for name in keys(metrics, "error_ratio.lost.")}
     families = {name: name for name in keys(metrics, "emulator_coverage_difference.")}
     return Report("Perception bench", _LEAD, (
         "## Speed", table_of("cameras.workers", _named(metrics, "steps_per_s."), [
@@ -59,9 +58,6 @@ def report(config: Any, found: Any, metrics: Metrics, figures: Path) -> Report:
         "## Error of the estimate", table_of("", _estimates(metrics), _belief_columns(), metrics),
         _ABOUT_ERRORS,
         "## Faults of one of four cameras, lab", fault_table(every, metrics), _ABOUT_FAULTS,
-        "Median error with one camera lost, over that with all of them:",
-        table_of("", cameras, [Column(f"{start}error_ratio.lost.{{}}", words + "ratio", 2)
-                               for start, words in _LEVELS.items()], metrics),
         "## Cameras named as miscalibrated", table_of("", every, [
             Column(f"{start}miscalibrated.{{}}.{key}", words + title, 1, scale)
             for start, words in _LEVELS.items() for key, title, scale in (

@@ -10,7 +10,7 @@ from benchmarks.common import CHI2_95_3D
 from benchmarks.tracking.arrivals import in_time
 from benchmarks.tracking.couples import identities
 from benchmarks.tracking.dlt import triangulate_frame
-from benchmarks.tracking.names import DEFAULT, DLT, SMOOTHER, UNBUFFERED
+from benchmarks.tracking.names import DLT, SMOOTHER
 from benchmarks.tracking.rigs import DT_S, Rig
 from benchmarks.tracking.sequences import Sequences
 from hrc_env.core.batching import rows
@@ -57,11 +57,6 @@ def _estimated(
     With several people, poses are given to the tracks whose predictions they fit.
     """
     n_sequences, n_people = sequences.joints.shape[1:3]
-    if name == UNBUFFERED:  # frames are taken as of the moment at which they arrive
-        name = DEFAULT
-        sequences = replace(
-            sequences, time_s=None, config=replace(sequences.config, longest_delay_s=0.0)
-        )
     estimator = make_estimator(name, rig.P, DT_S, sequences.config)
     rngs = [np.random.default_rng([seed, 4]) for seed in seeds]
     state = estimator.init(n_sequences, n_people)

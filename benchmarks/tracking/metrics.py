@@ -34,8 +34,6 @@ def metrics_of(parts: Parts) -> dict[str, Metric]:
         for name in RIVALS:
             ratio = default / _rmse(drawn[name])
             metrics[f"default_over.{rig}.{window}.{name}"] = metric(ratio, "-", drawn[name])
-    for rig in RIGS:
-        metrics |= _after_return(parts, rig)
     for name in names_of(MATCHED):
         metrics |= _bounds(parts, name)
     return dict(sorted(metrics.items()))
@@ -95,16 +93,6 @@ def _times(parts: Parts) -> dict[str, Metric]:
         if condition == TIMING
         for batch, times in part.items()
     }
-
-
-def _after_return(parts: Parts, rig: str) -> dict[str, Metric]:
-    """How the estimators are a second after the other cameras' return."""
-    metrics = {}
-    for name in names_of("one_camera"):
-        after = drawn_sums(parts[rig, "one_camera", name]["after_return"])
-        ratio = _rmse(after) / _rmse(drawn_sums(parts[rig, "clean", name]["clean"]))
-        metrics[f"after_return_over_clean.{rig}.{name}"] = metric(ratio, "-", after)
-    return metrics
 
 
 def _bounds(parts: Parts, name: str) -> dict[str, Metric]:

@@ -87,7 +87,6 @@ def test_numbers_say_what_was_found():
     assert metrics["error_m.lab.median"].value == pytest.approx(0.02)
     assert metrics["coverage95.lab"].value == pytest.approx(14 / 15)
     assert metrics["error_ratio.lost"].value == pytest.approx(2.0)
-    assert metrics["error_ratio.lost.camera_3"].value == pytest.approx(2.0)
     assert metrics["std_over_error.fault.glare"].value == pytest.approx(1.0)
     assert metrics["detected.fault.glare"].value == 1.0
     assert metrics["miscalibrated.lost.named"].value == 0.25

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from hrc_env.experiments.ablations.ablation import Ablation
-from hrc_env.experiments.study.plots import label, new_figure, plain_log, points, save
+from hrc_env.experiments.study.plots import ends, label, new_figure, plain_log, save
 from hrc_env.experiments.study.report import Column, Metrics, Report, picture, table_of
 
 QUANTILES = {"median": ("median", "o", "#1565c0"), "p95": ("95th percentile", "s", "#e65100")}
@@ -59,7 +59,8 @@ def draw(path: Path, key: str, rows: Mapping[str, str], metrics: Metrics) -> Non
     across = axis.get_yaxis_transform()
     for quantile, (words, mark, colour) in QUANTILES.items():
         found = [metrics[f"error_m.{key}.{row}.{quantile}"] for row in rows]
-        points(axis, places, found, 1000, fmt=mark, color=colour, label=words)
+        errors_mm, bars = [1000 * each.value for each in found], ends(found, 1000)
+        axis.errorbar(errors_mm, places, xerr=bars, fmt=mark, capsize=3, color=colour, label=words)
     for place, row in zip(places, rows, strict=True):
         inside = f"{100 * metrics[f'coverage95.{key}.{row}'].value:.0f} %"
         axis.text(1.02, place, inside, transform=across, fontsize=11, va="center", color="0.3")

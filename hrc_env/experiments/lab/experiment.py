@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from hrc_env.config import HRCConfig
-from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.experiments.lab.motions import MOTIONS, play
@@ -50,8 +49,6 @@ class LabConfig:
     def __post_init__(self) -> None:
         """Raise `ConfigError` for what cannot work."""
         at_least_one(self, "n_seeds")
-        if self.max_frames < 2 * WARM_UP:
-            raise ConfigError(f"Films need at least {2 * WARM_UP} frames, got {self.max_frames}.")
         DetectorConfig(folded=self.folded)
 
     @property

@@ -57,8 +57,6 @@ class SiteConfig:
         if not self.estimators:
             raise ConfigError(f"--estimator needs a name of {', '.join(ESTIMATORS)}.")
         check_names("estimator", self.estimators, ESTIMATORS)
-        if not self.seconds >= 2.0:
-            raise ConfigError(f"Walks must be at least 2 s long, got {self.seconds}.")
 
     @property
     def seeds(self) -> list[int]:
