@@ -10,7 +10,7 @@ import imageio.v2 as imageio
 
 from benchmarks.gallery.motions import strip
 from benchmarks.gallery.still import CASTS, portrait, views
-from hrc_env.core.errors import unknown
+from hrc_env.core.errors import check_names
 from hrc_env.core.typing import Image
 from hrc_env.experiments.study.cache import Progress
 from hrc_env.motion.repertoire import REPERTOIRE
@@ -21,12 +21,9 @@ VIEWS = 5
 
 
 STYLE = """
-:root { color-scheme: light dark; }
 body { max-width: 1240px; margin: 40px auto; padding: 24px; font: 16px/1.5 system-ui, sans-serif; }
 .grid { display: grid; grid-template-columns: repeat(auto-fill, minmax(240px, 1fr)); gap: 18px; }
-figure { margin: 0; } .wide { grid-column: 1 / -1; }
-img { display: block; width: 100%; height: auto; border-radius: 8px; }
-figcaption { padding: 6px 2px; } figcaption span { opacity: .7; }
+figure { margin: 0; } .wide { grid-column: 1 / -1; } img { width: 100%; }
 """
 
 
@@ -63,9 +60,7 @@ class GalleryConfig:
             ("motion", self.motions, REPERTOIRE),
             ("scene", self.scenes, CASTS),
         ):
-            for each in chosen:
-                if each not in known:
-                    raise unknown(name, each, known)
+            check_names(name, chosen, known)
 
 
 def run(config: GalleryConfig, out: Path, say: Progress) -> list[Exhibit]:

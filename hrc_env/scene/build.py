@@ -142,13 +142,10 @@ def build(
         robot: a name or itself.
 
     Raises:
-        ConfigError: an unknown scene, body, camera or robot, or a negative number of workers.
+        ConfigError: an unknown scene, body, camera or robot.
     """
     if name not in SCENES:
         raise unknown("scene", name, SCENES)
-    whole = isinstance(n_workers, int | np.integer) and not isinstance(n_workers, bool)
-    if not whole or n_workers < 0:
-        raise ConfigError(f"n_workers must be a whole number, 0 or more, got {n_workers!r}.")
     config = config or SceneConfig()
     if not config.cameras:
         config = replace(config, cameras=SCENES[name].cameras)

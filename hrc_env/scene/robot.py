@@ -169,13 +169,11 @@ def _chain(robot: Robot, mount_world: tuple[float, float, float]) -> SerialChain
     links = np.stack([_joint_frame(model, data, joint) for joint in joints])
     carriers, ends, radius_m = _capsules(model, data, bodies, links, robot)
     return SerialChain(
-        joint_names=robot.joints,
         T_world_from_base=_pose(mount_world, np.eye(3)) @ foot,
         parent_from_joint=np.linalg.inv([foot, *links[:-1]]) @ links,
         link_from_tool=np.linalg.inv(links[-1]) @ _pose(data.site_xpos[site], data.site_xmat[site]),
         range_rad=model.jnt_range[joints],
         velocity_limit_rad_s=model.actuator_ctrlrange[n:, 1].copy(),
-        capsule_names=robot.capsules,
         capsule_link=carriers,
         capsule_ends=ends,
         capsule_radius_m=radius_m,

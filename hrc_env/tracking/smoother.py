@@ -196,8 +196,7 @@ def _turned(there: _Smoothed) -> _Smoothed:
     """The answer for a clip that was read backwards, in the clip's order."""
     mean = there.mean[::-1].copy()
     mean[..., 3:] *= -1.0
-    rest = (there.cov[::-1], there.doubt[::-1], there.age_s[::-1])
-    return _Smoothed(mean, *rest, there.tracked[::-1])
+    return _Smoothed(mean, *(each[::-1] for each in there[1:]))
 
 
 def _mixture(a: _Smoothed, b: _Smoothed) -> _Smoothed:
@@ -208,10 +207,9 @@ def _mixture(a: _Smoothed, b: _Smoothed) -> _Smoothed:
     apart = (a.mean - b.mean)[..., :3]
     between = apart[..., :, None] * apart[..., None, :]
     one, other = share[..., None], 1.0 - share[..., None]
-    return _Smoothed(
+    return a._replace(
         mean=share * a.mean + (1.0 - share) * b.mean,
         cov=one * a.cov + other * b.cov + one * other * between,
-        doubt=np.minimum(a.doubt, b.doubt),
         age_s=np.minimum(a.age_s, b.age_s),
         tracked=a.tracked | b.tracked,
     )
