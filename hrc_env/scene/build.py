@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from hrc_env.core.errors import ConfigError, check_fields, unknown
+from hrc_env.core.errors import check_fields, unknown
 from hrc_env.core.records import Grounds, Held
 from hrc_env.core.typing import Floats, Ints, JointAngles
 from hrc_env.geometry.cameras import PinholeCamera
