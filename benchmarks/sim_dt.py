@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from assets.workers.poses import rest_motion
 from benchmarks.common import exactly, publish
 from hrc_env.core.records import WorkerPath
 from hrc_env.core.results import Metric, over
@@ -23,7 +24,7 @@ from hrc_env.geometry import chains
 from hrc_env.geometry.distances import least_separation
 from hrc_env.scene.build import Scene, SceneConfig, build
 from hrc_env.scene.physics import Physics, no_workers
-from hrc_env.worker.body import load_body, rest_motion, worker_capsules
+from hrc_env.worker.body import load_body, worker_capsules
 
 CTRL_DT = 0.04
 SEEDS = range(8)

@@ -8,6 +8,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from assets.rotations import matrix_from_quaternion
+from assets.workers.poses import rest_motion
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import WorkerMotion, WorkerPath
 from hrc_env.core.skeleton import MIRROR, N_JOINTS
@@ -18,7 +19,6 @@ from hrc_env.worker.body import (
     SEGMENT,
     assets_dir,
     load_body,
-    rest_motion,
     stack,
     worker_capsules,
     worker_names,

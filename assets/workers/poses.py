@@ -1,4 +1,4 @@
-"""A dozen working poses, to photograph a worker in: joint angles to 22 segments."""
+"""At rest, and a dozen working poses to photograph a worker in: joint angles to 22 segments."""
 
 import numpy as np
 
@@ -33,6 +33,14 @@ POSES: dict[str, dict] = {
 }  # fmt: skip
 """lean: trunk forward; arms: (upper arm, forearm), each (forward, outward) from hanging down;
 legs: left and right (forward, outward, knee flexion). All in degrees."""
+
+
+def rest_motion(body: Body) -> WorkerMotion:
+    """The body at rest and still, without leading axes: (S, ...)."""
+    upright = np.zeros((N_SEGMENTS, 4))
+    upright[:, 0] = 1.0
+    still = np.zeros((N_SEGMENTS, 3))
+    return WorkerMotion(body.rest_position.copy(), upright, still, still.copy())
 
 
 def posed(

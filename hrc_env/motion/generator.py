@@ -65,11 +65,7 @@ def make_state(
     They have the `body`, or each episode gives each one of several, and walk on the `grounds`. At
     least `fewest` of them are in an episode, drawn at its beginning; None: all.
     """
-    if batch < 1 or n_workers < 0:
-        raise ConfigError(f"Need batch >= 1 and n_workers >= 0, got {batch} and {n_workers}.")
     fewest = n_workers if fewest is None else fewest
-    if not 0 <= fewest <= n_workers:
-        raise ConfigError(f"The fewest workers must be 0 to {n_workers}, got {fewest}.")
     bones, plan = anatomies(body), floorplan(grounds)
     fit = room_for(plan, config.spacing_m)
     if n_workers > fit:

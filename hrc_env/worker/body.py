@@ -112,14 +112,6 @@ def pool(worker: str | tuple[str, ...]) -> tuple[str, ...]:
     return names
 
 
-def rest_motion(body: Body) -> WorkerMotion:
-    """The body at rest and still, without leading axes: (S, ...)."""
-    upright = np.zeros((N_SEGMENTS, 4))
-    upright[:, 0] = 1.0
-    still = np.zeros((N_SEGMENTS, 3))
-    return WorkerMotion(body.rest_position.copy(), upright, still, still.copy())
-
-
 def worker_truth(body: Body, motion: WorkerMotion) -> WorkerTruth:
     """Where the joints and capsules of bodies in motion are, and how fast the joints.
 

@@ -209,5 +209,3 @@ def test_impossible_settings_are_refused_with_what_would_do():
         generator.MotionConfig(near_probability=1.5)
     with pytest.raises(ConfigError, match="sudden_probability"):
         generator.PeopleConfig(sudden_probability=1.5)
-    with pytest.raises(ConfigError, match="batch"):
-        generator.make_state(0, 1, load_body(), generator.MotionConfig())

@@ -41,7 +41,7 @@ class Search:
 
     def detect(self, q, motion, look=None):
         self.renderer.randomize(look)
-        self.renderer.draw(q, motion)
+        self.renderer.pose(q, motion)
         return self.detector.detect(self.source, [None] * len(self.scene.cameras))
 
     def close(self):

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from assets.rotations import matrix_from_quaternion, quaternion_from_matrix
+from assets.workers.poses import rest_motion
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import WorkerMotion
 from hrc_env.core.skeleton import JOINT, MIRROR, N_JOINTS
@@ -17,7 +18,6 @@ from hrc_env.worker.body import (
     SEGMENTS,
     assets_dir,
     load_body,
-    rest_motion,
     worker_names,
     worker_truth,
 )

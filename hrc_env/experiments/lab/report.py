@@ -118,7 +118,7 @@ def _crop(recording: Recording, t: int, c: int) -> Image:
     """What camera c gave the network, larger, with what was found."""
     scene, window = recording.scene, recording.windows[t][0][c]
     renderer = CropRenderer(scene, CROP_PX)
-    renderer.draw(scene.home_q, one(recording.motions, t))
+    renderer.pose(scene.home_q, one(recording.motions, t))
     if window is None:
         raise AssertionError("a camera is chosen that has looked")
     image = np.array(Lensed(renderer, scene.cameras).crop(c, window))

@@ -71,7 +71,7 @@ class CameraFilm:
     def _pose(self, shot: Shot, ago_s: float) -> None:
         """Draw a scene as it was, a moment before the shutter closed."""
         if self._drawn != (shot.step, ago_s):
-            self.stage.draw(*_earlier(shot, ago_s / self.schedule.dt_s))
+            self.stage.pose(*_earlier(shot, ago_s / self.schedule.dt_s))
             self._drawn = (shot.step, ago_s)
 
 

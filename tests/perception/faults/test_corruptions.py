@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from assets.workers.poses import rest_motion
 from hrc_env.core.batching import mapped
 from hrc_env.core.records import Roi
 from hrc_env.perception.faults.camera_film import BLUR_IMAGES, CameraFilm, Shot
@@ -11,7 +12,7 @@ from hrc_env.perception.faults.fault import KINDS, FaultConfig
 from hrc_env.perception.faults.schedule import Schedule
 from hrc_env.perception.lensed import Lensed
 from hrc_env.scene.rig import LAB_CAMERAS, pinholes
-from hrc_env.worker.body import load_body, rest_motion
+from hrc_env.worker.body import load_body
 
 CAMERA = pinholes(LAB_CAMERAS[:1])[0]
 WHOLE = Roi((960.0, 540.0), 1920.0, 0.0)
@@ -97,7 +98,7 @@ class FakeStage:
 
     size_px = 8
 
-    def draw(self, q, motion):
+    def pose(self, q, motion):
         self.level = motion.position_world[0, 0, 0] * 100
 
     def view(self, camera, window):
