@@ -52,8 +52,8 @@ def detections_of(films: Films, cameras: list[PinholeCamera], parts: PartCache) 
         return {name: np.asarray(value).tolist() for name, value in found.items()}
 
     made = parts.part("detections", make)
-    arrays = (np.array(made[name], float) for name in ("px", "confidence", "sigma_px"))
-    return Detections(*arrays, made["dt_s"])
+    px, confidence, sigma_px = (np.array(made[name]) for name in ("px", "confidence", "sigma_px"))
+    return Detections(px, confidence, sigma_px, made["dt_s"])
 
 
 def _detect(films: Films, cameras: list[PinholeCamera], tick: PartProgress) -> Detections:
