@@ -36,14 +36,14 @@ def floorplan(grounds: Grounds) -> Floorplan:
     slack, origin = _slack(xs[:, None], ys, grounds), np.array([xs[0], ys[0]])
     if slack.max() < 0.0:
         raise ConfigError("The grounds leave no room for a worker: everything is blocked.")
+    for array in (slack, origin):
+        array.flags.writeable = False
     for place in grounds.places:
         if slack_at(*place.xy_m, slack, origin) < STAND_M - BODY_M:
             raise ConfigError(
                 f"Workplace {place.name!r} at {place.xy_m} leaves no room to stand: expected "
                 f"{STAND_M} m at least from what stands there and inside the walkable area."
             )
-    for array in (slack, origin):
-        array.flags.writeable = False
     return Floorplan(slack, origin, grounds)
 
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from hrc_env.core.errors import ConfigError, check_names
+from hrc_env.core.errors import check_fields, check_names
 from hrc_env.core.records import Grounds, Held
 from hrc_env.core.typing import Floats, Ints, JointAngles
 from hrc_env.geometry.cameras import PinholeCamera
@@ -57,9 +57,7 @@ class SceneConfig:
     """All that hang in the scene, of which `build` switches some on; none: the scene's own four."""
 
     def __post_init__(self) -> None:
-        for name in ("sim_dt", "slew_rad_s2", "integrator_clamp_rad"):
-            if not getattr(self, name) > 0:
-                raise ConfigError(f"{name} must be positive, got {getattr(self, name)}.")
+        check_fields(self, "be positive", "sim_dt", "slew_rad_s2", "integrator_clamp_rad")
 
 
 class Recipe(NamedTuple):

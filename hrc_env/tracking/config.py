@@ -42,7 +42,6 @@ class TrackerConfig:
     """Spectral density of the whole body's acceleration [m^2/s^3]."""
 
     def __post_init__(self) -> None:
-        """Raise `ConfigError` for values that cannot work."""
         check_fields(
             self, "be positive", "prior_std_m", "max_age_s", "lost_after_s", "forget_s",
             "acquire_min_joints", "body_radius_m", "conflict_frames", "gate_sigma", "sigma_scale",
@@ -124,7 +123,6 @@ class ParticleConfig(TrackerConfig):
     """Probability per update that it stops."""
 
     def __post_init__(self) -> None:
-        """Raise `ConfigError` for values that cannot work."""
         TrackerConfig.__post_init__(self)
         check_fields(
             self, "be positive", "floor_std_m", "bone_give", "noise_tau_s", "noise_persists_s",
@@ -166,7 +164,6 @@ class PaperConfig(TrackerConfig):
     stand round, from the floor to 2.2 m."""
 
     def __post_init__(self) -> None:
-        """Raise `ConfigError` for values that cannot work."""
         TrackerConfig.__post_init__(self)
         check_fields(self, "be positive", "velocity_tau_s", "n_iterations")
         check_fields(self, "not be negative", "sigma_m")
@@ -195,7 +192,6 @@ class TriangulationConfig(TrackerConfig):
     """How fast a held point loses its worth in gaps [m/s]."""
 
     def __post_init__(self) -> None:
-        """Raise `ConfigError` for values that cannot work."""
         TrackerConfig.__post_init__(self)
         check_fields(self, "be positive", "velocity_tau_s", "hold_speed_m_s")
 

@@ -142,7 +142,8 @@ class OutOfSequence:
         back = np.where(late, 1 + (ends_s >= first_s[:, None] - SAME_S).sum(1), 0)
         self._take_in(state, keypoints, use & ~late[:, None], rngs)
         for age in range(int(back.max(initial=0)), 0, -1):
-            self._restore(state, np.flatnonzero(back == age), age)
+            begins = np.flatnonzero(back == age)
+            write_rows(state.now, begins, rows(_flat(state.kept), _places(state, begins, age)))
             ids = np.flatnonzero(back >= age)
             self._relive(state, ids, age, rngs)
             if age > 1:
@@ -204,10 +205,6 @@ class OutOfSequence:
     def _keep(self, state: LateState, ids: Ints, age: int) -> None:
         """Put what is believed into the slot `age` before the open one."""
         write_rows(_flat(state.kept), _places(state, ids, age), self._part(state, ids))
-
-    def _restore(self, state: LateState, ids: Ints, age: int) -> None:
-        if len(ids) > 0:
-            write_rows(state.now, ids, rows(_flat(state.kept), _places(state, ids, age)))
 
 
 def _near_now(time_s: Floats, now_s: Floats) -> Floats:
