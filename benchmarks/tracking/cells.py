@@ -160,7 +160,6 @@ def tally(truth: Points3, mean: Points3, cov: Covariances3 | None) -> dict[str, 
     if cov is not None:
         nees = np.einsum("...i,...i->...", offset, np.linalg.solve(cov, offset[..., None])[..., 0])
         out["inside"] = _total(nees < CHI2_95_3D)
-        out["nees"] = _total(nees)
         out["trace"] = _total(np.trace(cov, axis1=-2, axis2=-1))
     return {name: value.tolist() for name, value in out.items()}
 

@@ -49,17 +49,15 @@ STATISTICS: dict[str, tuple[str, Callable[[_Sums], Floats]]] = {
     "facing_wrong": ("share", lambda sums: sums["wrong_way"] / sums["n_frames"]),
     "coverage95": ("share", lambda sums: sums["inside"] / sums["n"]),
     "std_over_rmse": ("-", lambda sums: np.sqrt(sums["trace"] / sums["squared"])),
-    "nees": ("-", lambda sums: sums["nees"] / sums["n"] / 3),
     "identity_swaps": (
         "per 100 sequences",
         lambda sums: 100 * sums["identity_swaps"] / sums["one"],
     ),
 }
 """Each as a function of sums over sequences. The median is the mean of the sequences' medians;
-NEES is per degree of freedom, 1 if the covariance is right; facing wrong is the share of frames in
-which the torso's left is where its right is."""
+facing wrong is the share of frames in which the torso's left is where its right is."""
 _NEEDS = {
-    **dict.fromkeys(("coverage95", "std_over_rmse", "nees"), "inside"),
+    **dict.fromkeys(("coverage95", "std_over_rmse"), "inside"),
     "identity_swaps": "identity_swaps",
 }
 

@@ -29,7 +29,6 @@ _TABLES: dict[str, tuple[str, int]] = {
     "median_m": ("Median error in cm", 100),
     "coverage95": ("Coverage of the reported 95 % region", 1),
     "std_over_rmse": ("Reported standard deviation / RMSE", 1),
-    "nees": ("Normalised estimation error squared per degree of freedom", 1),
     "facing_wrong": ("Percent of frames in which the torso faces the wrong way", 100),
 }
 """Title and scale of every table with a row a window."""

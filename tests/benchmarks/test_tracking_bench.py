@@ -64,7 +64,7 @@ def test_every_key_is_written_in_the_shared_form(end_to_end):
         for rig in RIGS:
             assert f"identity_swaps.{rig}.two_workers.{name}" in metrics
         for rig, _, window in rows():
-            for kind in ("rmse_m", "coverage95", "std_over_rmse", "nees", "facing_wrong"):
+            for kind in ("rmse_m", "coverage95", "std_over_rmse", "facing_wrong"):
                 assert f"{kind}.{rig}.{window}.{name}" in metrics
     assert f"rmse_m.lab.clean.{DLT}" in metrics
     assert f"default_over.env.four_cameras.{DLT}" in metrics
@@ -117,7 +117,7 @@ def test_sizes_that_cannot_work_are_answered():
 
 
 def test_a_right_covariance_is_found_calibrated():
-    """Errors drawn from the reported Gaussian: 95 % inside, NEES of 1."""
+    """Errors drawn from the reported Gaussian: 95 % inside, as large as told."""
     rng = np.random.default_rng(0)
     factor = rng.normal(size=(3, 3))
     truth = rng.normal(size=(50, 20, 1, 15, 3))
@@ -126,5 +126,4 @@ def test_a_right_covariance_is_found_calibrated():
     sums = tally(truth, mean, cov)
     n = np.sum(sums["n"])
     assert np.sum(sums["inside"]) / n == pytest.approx(0.95, abs=0.01)
-    assert np.sum(sums["nees"]) / n / 3 == pytest.approx(1.0, abs=0.03)
     assert np.sqrt(np.sum(sums["trace"]) / np.sum(sums["squared"])) == pytest.approx(1.0, abs=0.03)
