@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from hrc_env.core.errors import check_fields, unknown
+from hrc_env.core.errors import check_fields, check_names
 from hrc_env.core.records import Grounds, Held
 from hrc_env.core.typing import Floats, Ints, JointAngles
 from hrc_env.geometry.cameras import PinholeCamera
@@ -142,8 +142,7 @@ def build(
     Raises:
         ConfigError: an unknown scene, body, camera or robot.
     """
-    if name not in SCENES:
-        raise unknown("scene", name, SCENES)
+    check_names("scene", [name], SCENES)
     config = config or SceneConfig()
     if not config.cameras:
         config = replace(config, cameras=SCENES[name].cameras)

@@ -2,14 +2,13 @@
 what stands still in them as plain numbers."""
 
 import math
-import tomllib
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
 from hrc_env.core.errors import HRCError
-from hrc_env.core.mapping import from_mapping
+from hrc_env.core.mapping import from_mapping, read_toml
 from hrc_env.core.records import Grounds, Workplace
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.geometry.camera_config import CameraConfig
@@ -83,7 +82,7 @@ class Room:
 
 
 SCENES: dict[str, Room] = {
-    path.stem: from_mapping(Room, tomllib.loads(path.read_text(encoding="utf-8")))
+    path.stem: from_mapping(Room, read_toml(path))
     for path in sorted((assets_dir() / "scenes").glob("*.toml"))
 }
 
