@@ -143,11 +143,8 @@ class Settings:
 
 
 def settle(**arguments: Any) -> Settings:
-    """Settings from keyword arguments of an environment (`ARGUMENTS`); see `HRCEnv`.
-
-    Raises:
-        ConfigError: an argument that there is not, or a value that cannot be.
-    """
+    """Settings from keyword arguments of an environment (`ARGUMENTS`); see `HRCEnv`. Raises
+    `ConfigError` for an argument that there is not, or a value that cannot be."""
     for name in arguments:
         if name not in ARGUMENTS:
             raise unknown("argument", name, ARGUMENTS)

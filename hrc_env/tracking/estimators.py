@@ -148,18 +148,11 @@ def make_estimator(
     ctrl_dt: float,
     config: TrackerConfig | None = None,
 ) -> Estimator[Any]:
-    """An estimator for a rig.
+    """An estimator for cameras with projections P (C, 3, 4), usually updated every `ctrl_dt` [s].
 
-    Args:
-        estimator: a name in `ESTIMATORS`, a spec, or a function that makes one.
-        P: (C, 3, 4) projections of the cameras.
-        ctrl_dt: the usual time between two updates [s].
-        config: settings; of another estimator's, those that all share count. The defaults if
-            None. With `longest_delay_s` an `out_of_sequence.OutOfSequence` uses late frames at
-            their own time.
-
-    Raises:
-        ConfigError: an estimator that there is not, a rig of another shape, or no positive time.
+    Of another estimator's settings those that all share count; None: the defaults. With
+    `longest_delay_s` an `out_of_sequence.OutOfSequence` uses late frames at their own time. Raises
+    `ConfigError` for an estimator that there is not, a rig of another shape, or no positive time.
     """
     spec = estimator_called(estimator)
     P = np.ascontiguousarray(P, dtype=float)

@@ -72,7 +72,6 @@ def smooth(
         clip: keypoints of T frames, each (B, C, W, J, ...), in order of time; their `time_s` is
             not looked at.
         dt_s: time between two frames [s].
-        config: settings; the defaults if None.
 
     Returns:
         Arrays (T, B, W, ...). A worker whom the filter followed in neither direction is where

@@ -78,7 +78,6 @@ def associate(
         P: (C, 3, 4) projections.
         found: (B, C, D, J, ...) D poses a camera in any order; those that are not are NaN.
         predicted: (B, W, ...) where the workers should be, before these frames were taken in.
-        config: settings; the defaults if None.
 
     Raises:
         ConfigError: arrays of other shapes. Never because of what they hold.
