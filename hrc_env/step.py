@@ -56,7 +56,8 @@ def joined(results: Sequence[StepResult]) -> StepResult:
         return results[0]
     parts = zip(*((r.observation, r.reward, r.terminated) for r in results), strict=True)
     info = {name: np.concatenate([each.info[name] for each in results]) for name in results[0].info}
-    return StepResult(*map(np.concatenate, parts), info)
+    observation, reward, terminated = map(np.concatenate, parts)
+    return StepResult(observation, reward, terminated, info)
 
 
 def cost_info(cost: metrics.Cost, present: Bools) -> Info:

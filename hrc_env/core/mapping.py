@@ -66,7 +66,8 @@ def restored(hint: Any, value: Any, where: str) -> Any:
     if dataclasses.is_dataclass(hint):
         if isinstance(value, Mapping):
             return from_mapping(typing.cast(type, hint), value, f"{where}.")
-        return _checked(isinstance(value, hint), f"{_name_or(hint)}a mapping", value, where)
+        is_it = isinstance(value, typing.cast(type, hint))
+        return _checked(is_it, f"{_name_or(hint)}a mapping", value, where)
     if isinstance(hint, types.UnionType):
         return _one_of(typing.get_args(hint), value, where)
     if typing.get_origin(hint) is tuple:

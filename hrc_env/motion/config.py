@@ -65,7 +65,7 @@ def _check_ranges(config: Any) -> None:
         value = getattr(config, name)
         if name.endswith(("_m", "_s")) and isinstance(value, tuple) and value[0] > value[1]:
             raise ConfigError(f"{name} must be (low, high), got {value}.")
-        if name.endswith("_probability") and not 0 <= value <= 1:
+        if name.endswith("_probability") and not 0 <= getattr(config, name) <= 1:
             raise ConfigError(f"{name} must lie in [0, 1], got {value}.")
 
 

@@ -159,8 +159,8 @@ class PoseDetector(Stateful):
         for proposal in proposals(apart_from(known, others), self.cameras):
             self.forget(track)
             sight = self._look(source, proposal, track, folded, posture)
-            found = sight.px, sight.confidence, sight.sigma_px
-            if is_somebody(*found, self.cameras, self.floor_world):
+            joints = sight.px, sight.confidence, sight.sigma_px
+            if is_somebody(*joints, self.cameras, self.floor_world):
                 return sight
         self.forget(track)
         return _nobody([None] * len(windows))

@@ -128,8 +128,8 @@ def _known(expected: PoseEstimate | None, shape: tuple[int, ...]) -> kernels.Exp
     if expected is None:
         nowhere = np.zeros(shape)
         return kernels.Expected(nowhere, nowhere, np.zeros(shape[:2], np.bool_))
-    known = expected.mean_world, expected.velocity_world, expected.tracked
-    return kernels.Expected(*map(np.ascontiguousarray, known))
+    joints, velocity = map(np.ascontiguousarray, (expected.mean_world, expected.velocity_world))
+    return kernels.Expected(joints, velocity, np.ascontiguousarray(expected.tracked))
 
 
 def lines_of_sight(
@@ -147,8 +147,9 @@ def lines_of_sight(
 def _world(truth: WorkerTruth, surroundings: Surroundings) -> World:
     workers = truth.joints_world, truth.velocity_world, truth.capsules_world, truth.capsule_radius_m
     robot = surroundings.capsules_world, surroundings.capsule_radius_m
-    bodies = map(np.ascontiguousarray, workers)
-    return World(*bodies, surroundings.still, surroundings.moving, *robot)
+    joints, velocity, capsules, radius = map(np.ascontiguousarray, workers)
+    obstacles = surroundings.still, surroundings.moving
+    return World(joints, velocity, capsules, radius, *obstacles, *robot)
 
 
 def without_names(keypoints: Keypoints, rngs: Rngs) -> Keypoints:

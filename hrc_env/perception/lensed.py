@@ -35,7 +35,7 @@ class Drawer(Protocol):
 
     size_px: int
 
-    def draw(self, q: JointAngles, motion: WorkerMotion) -> None:
+    def pose(self, q: JointAngles, motion: WorkerMotion) -> None:
         """Pose the scene for the views that follow."""
         ...
 

@@ -1,7 +1,7 @@
 """The settings that the kernels take."""
 
 import math
-from collections import namedtuple
+from typing import NamedTuple
 
 from hrc_env.tracking.config import ParticleConfig, TrackerConfig, of_kind
 
@@ -9,18 +9,43 @@ _TICK_S = 1e-6
 """Sums of time steps that are short by no more are whole."""
 
 
-Settings = namedtuple(
-    "Settings",
-    "sigma_scale gate_sigma body_radius_m acquire_min_joints conflict_frames wait_updates size_std "
-    "stands_std_m inlier_odds swap_begins swap_ends gauss_newton_steps prior_mean_world "
-    "prior_std_m max_age_s lost_after_s forget_s mean_correction one_view_inflation min_std_m "
-    "floor_std_m bone_give mirrors_body mirrors_limbs look_every_s open_depth_m turn_std_rad "
-    "evidence_trust anatomy_trust walking_odds log_least_weight",
-)
-"""What the kernels need of `ParticleConfig`, under the same names but for: `inlier_odds`, of a
-perfect inlier against an outlier, times the variance of its pixel [px^2]; `mirrors_body`, whether a
-whole body may be turned the other way; `mirrors_limbs`, whether a limb may be reflected in depth;
-and `log_least_weight`."""
+class Settings(NamedTuple):
+    """What the kernels need of `ParticleConfig`, under the same names if not described."""
+
+    sigma_scale: float
+    gate_sigma: float
+    body_radius_m: float
+    acquire_min_joints: int
+    conflict_frames: int
+    wait_updates: int
+    size_std: float
+    stands_std_m: float
+    inlier_odds: float
+    """Of a perfect inlier against an outlier, times the variance of its pixel [px^2]."""
+    swap_begins: float
+    swap_ends: float
+    gauss_newton_steps: int
+    prior_mean_world: tuple[float, float, float]
+    prior_std_m: float
+    max_age_s: float
+    lost_after_s: float
+    forget_s: float
+    mean_correction: float
+    one_view_inflation: float
+    min_std_m: float
+    floor_std_m: float
+    bone_give: float
+    mirrors_body: bool
+    """Whether a whole body may be turned the other way."""
+    mirrors_limbs: bool
+    """Whether a limb may be reflected in depth."""
+    look_every_s: float
+    open_depth_m: float
+    turn_std_rad: float
+    evidence_trust: float
+    anatomy_trust: float
+    walking_odds: float
+    log_least_weight: float
 
 
 def settings_of(config: TrackerConfig) -> Settings:

@@ -195,7 +195,8 @@ def _turned(there: _Smoothed) -> _Smoothed:
     """The answer for a clip that was read backwards, in the clip's order."""
     mean = there.mean[::-1].copy()
     mean[..., 3:] *= -1.0
-    return _Smoothed(mean, *(each[::-1] for each in there[1:]))
+    rest = (there.cov[::-1], there.doubt[::-1], there.age_s[::-1])
+    return _Smoothed(mean, *rest, there.tracked[::-1])
 
 
 def _mixture(a: _Smoothed, b: _Smoothed) -> _Smoothed:
