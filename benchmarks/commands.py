@@ -31,7 +31,7 @@ class AnyBench:
 
 @dataclass(frozen=True)
 class TrackingBench(AnyBench):
-    """Run every estimator on the same simulated sequences; tables, plots and results.json."""
+    """Run every estimator on the same simulated sequences; tables and results.json."""
 
     out: Path = Path("out/bench_tracking")
     """Folder; of --real and --baselines, which are parts of their own, with that word after it."""
@@ -113,7 +113,7 @@ class MotionBench(AnyBench):
 @dataclass(frozen=True)
 class PerceptionBench(AnyBench):
     """Level `pixels`: steps a second and what takes them, how well workers are seen by pose,
-    distance, view angle and lens, what every fault of a camera costs, ghosts in empty rooms."""
+    distance, view angle and lens, and what every fault of a camera costs."""
 
     out: Path = Path("out/bench_perception")
 

@@ -11,8 +11,7 @@ from rich.markdown import Markdown
 
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Covariances3, Floats, Points3
-from hrc_env.experiments.study.plots import label, new_figure, points, save
-from hrc_env.experiments.study.report import Column, Metrics, Report
+from hrc_env.experiments.study.report import Metrics, Report
 
 CHI2_95_3D = 7.815
 """95 % of a three-dimensional normal variable lies within this squared distance."""
@@ -52,22 +51,6 @@ def cell(metric: Metric | None, scale: float = 1.0, digits: int = 1, interval: b
         f"{scale * each:,.{digits}f}" for each in (metric.value, metric.low, metric.high)
     )
     return f"{value} ({low}-{high})" if interval else value
-
-
-def plot_rows(
-    path: Path, rows: Mapping[str, str], columns: Sequence[Column], metrics: Metrics
-) -> None:
-    """Columns of a table as pictures side by side: values with intervals, a line a row."""
-    figure = new_figure(4 + 2.6 * len(columns), 1.5 + 0.3 * len(rows))
-    panels = figure.subplots(1, len(columns), sharey=True, squeeze=False)[0]
-    y = np.arange(len(rows))[::-1]
-    for axis, column in zip(panels, columns, strict=True):
-        known = [(k, metrics[key]) for k, row in zip(y, rows, strict=True)
-                 if (key := column.key.format(row)) in metrics]  # fmt: skip
-        points(axis, [k for k, _ in known], [m for _, m in known], column.scale)
-        label(axis, column.words)
-    panels[0].set_yticks(y, list(rows.values()))
-    save(figure, path)
 
 
 def publish(

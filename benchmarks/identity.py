@@ -8,7 +8,6 @@ terminations, truncations and infos are compared number by number, their types a
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -19,7 +18,6 @@ from rich.console import Console
 
 import hrc_env  # noqa: F401  registers the ids
 from hrc_env.cli.progress import track
-from hrc_env.core.results import Metric, write_results
 
 RESET_SHARE = 0.01
 """Chance that an environment is reset after a step."""
@@ -29,8 +27,6 @@ RESET_SHARE = 0.01
 class Arguments:
     """Compare the batch with single environments."""
 
-    out: Path = Path("out/identity.json")
-    """Where to write the results."""
     num_envs: int = 64
     """Environments."""
     steps: int = 500
@@ -101,8 +97,7 @@ def differences(a: Any, b: Any) -> int:
 
 
 def main(arguments: Arguments) -> None:
-    """Compare, print, write."""
-    metrics: dict[str, Metric] = {}
+    """Compare, print."""
     n_envs, console = arguments.num_envs, Console()
     for level in arguments.perception:
         for mode in AutoresetMode:
@@ -113,12 +108,8 @@ def main(arguments: Arguments) -> None:
                     f"{level}, {mode.value}, {n_envs} environments, {arguments.steps} steps, "
                     f"{threads} threads: {count} differences"
                 )
-                name = f"differences.{level}.{mode.value}.{n_envs}.{threads}"
-                metrics[name] = Metric(count, count, count, "1", arguments.steps)
             for env in envs:
                 env.close()
-    config = {"num_envs": n_envs, "steps": arguments.steps}
-    write_results(arguments.out, config, [arguments.seed], metrics)
 
 
 if __name__ == "__main__":

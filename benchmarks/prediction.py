@@ -9,7 +9,6 @@ of whom nothing here was told. All start from the same estimate, of `kalman`: `h
 `Estimator.forecast` gives.
 """
 
-import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -18,19 +17,15 @@ from typing import Any
 import numpy as np
 import tyro
 
-from benchmarks.common import CHI2_95_3D, cell, exactly, normalised_square, publish
+from benchmarks.common import CHI2_95_3D, normalised_square, publish
 from benchmarks.tracking.rigs import DT_S
 from benchmarks.tracking.tracks import Tracks, follow_env, follow_walkers
 from hrc_env.core.batching import copied
-from hrc_env.core.records import PoseEstimate
 from hrc_env.core.results import Metric
-from hrc_env.experiments.study.intervals import mean_over, ratio_over, rmse_over
+from hrc_env.experiments.study.intervals import ratio_over, rmse_over
 from hrc_env.experiments.study.report import Column, Report, table_of
-from hrc_env.tracking.config import ParticleConfig
-from hrc_env.tracking.forecast import forecast
 
 HORIZONS_S = (0.1, 0.2, 0.4, 0.6, 1.0)
-FIELDS = ("mean_world", "cov_world", "velocity_world", "age_s", "tracked")
 WARM_UP, EVERY = 25, 2
 NAMES = ("hold", "constant_velocity", "motion_model", "forecast")
 
@@ -103,28 +98,11 @@ def metrics_of(source: str, tracks: Tracks) -> dict[str, Metric]:
             squared = (error**2).sum(-1)
             sums, n = np.nansum(squared, (0, 2)), np.isfinite(squared).sum((0, 2))
             metrics[f"rmse_m.{key}"] = rmse_over(sums, n, "m")
-            median = [float(np.median(each[np.isfinite(each)])) for each in
-                      np.sqrt(squared).swapaxes(0, 1)[n > 0]]  # fmt: skip
-            metrics[f"median_m.{key}"] = mean_over(median, "m")
             if name == "forecast":
                 inside = (normalised_square(error, cov) < CHI2_95_3D).sum((0, 2))
                 spread = np.trace(cov, axis1=-2, axis2=-1) * use[..., None]
                 metrics[f"coverage95.{key}"] = ratio_over(inside, n, "share")
                 metrics[f"std_over_rmse.{key}"] = rmse_over(spread.sum((0, 2)), sums, "-")
-    return metrics
-
-
-def costs_us() -> dict[str, Metric]:
-    """Time of `forecast` per worker, alone and with 63 others: the least of many."""
-    metrics, now = {}, follow_env([7], 30).estimates[-1]
-    for batch in (1, 64):
-        whole = PoseEstimate(*(np.repeat(getattr(now, name), batch, 0) for name in FIELDS))
-        times = []
-        for _ in range(300):
-            begin = time.perf_counter()
-            forecast(whole, 0.4, ParticleConfig())
-            times.append(1e6 * (time.perf_counter() - begin) / batch)
-        metrics[f"forecast_us.{batch}"] = exactly(min(times), "us", len(times))
     return metrics
 
 
@@ -134,16 +112,13 @@ def main(arguments: Arguments) -> None:
     asked = sources(arguments.quick)
     for source, follow in asked.items():
         metrics |= metrics_of(source, follow())
-    metrics |= costs_us()
     rows = {f"{name}.{s:g}": f"{name}, {s:g} s" for name in asked for s in HORIZONS_S}
     columns = [
         *(Column(f"rmse_m.{{}}.{name}", f"{name}, RMSE [cm]", 1, 100) for name in NAMES),
         Column("coverage95.{}.forecast", "coverage", 3),
         Column("std_over_rmse.{}.forecast", "std/RMSE", 2),
     ]
-    us = [cell(metrics[f"forecast_us.{batch}"]) for batch in (1, 64)]
-    said = f"`forecast` takes {us[0]} us alone, {us[1]} us a worker at batch 64."
-    parts = [table_of("", rows, columns, metrics), said]
+    parts = [table_of("", rows, columns, metrics)]
     report = Report("Prediction", (__doc__ or "").strip(), parts)
     publish(arguments.out, report, asdict(arguments), [1000, 500], metrics)
 

@@ -9,12 +9,12 @@ the floor and into a worker for two seconds and then away again; penetration com
 capsules' geometry.
 """
 
-import time
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
+from assets.workers.poses import rest_motion
 from benchmarks.common import exactly, publish
 from hrc_env.core.records import WorkerPath
 from hrc_env.core.results import Metric, over
@@ -24,7 +24,7 @@ from hrc_env.geometry import chains
 from hrc_env.geometry.distances import least_separation
 from hrc_env.scene.build import Scene, SceneConfig, build
 from hrc_env.scene.physics import Physics, no_workers
-from hrc_env.worker.body import load_body, rest_motion, worker_capsules
+from hrc_env.worker.body import load_body, worker_capsules
 
 CTRL_DT = 0.04
 SEEDS = range(8)
@@ -38,14 +38,6 @@ EXCURSION = np.array([1.0, 1.0, 1.0, 1.0, 0.6, 1.0])
 def substeps(scene: Scene) -> int:
     """Substeps of a control step."""
     return round(CTRL_DT / scene.config.sim_dt)
-
-
-def standing(scene: Scene, batch: int, xy: tuple[float, float]) -> WorkerPath:
-    """A worker who stands still at `xy`, for every environment and substep."""
-    rest = rest_motion(load_body(scene.bodies[0]))
-    position = rest.position_world + np.array([*xy, 0.0])
-    lead = (batch, substeps(scene), 1, 1, 1)
-    return WorkerPath(np.tile(position, lead), np.tile(rest.quaternion_wxyz, lead))
 
 
 def targets(kind: str, seed: int, n_steps: int = 150, batch: int = 32) -> Floats:
@@ -105,8 +97,11 @@ def floor_contact(scene: Scene) -> dict[str, Metric]:
 
 
 def worker_contact(scene: Scene) -> dict[str, Metric]:
-    """Turn the stretched arm into a standing worker at 1 rad/s."""
-    path, body = standing(scene, 1, (0.45, 0.0)), load_body(scene.bodies[0])
+    """Turn the stretched arm into a worker who stands still, at 1 rad/s."""
+    body, lead = load_body(scene.bodies[0]), (1, substeps(scene), 1, 1, 1)
+    rest = rest_motion(body)
+    position = rest.position_world + np.array([0.45, 0.0, 0.0])
+    path = WorkerPath(np.tile(position, lead), np.tile(rest.quaternion_wxyz, lead))
     person = worker_capsules(body, path)[:, -1].reshape(1, -1, 2, 3)
 
     def gap_m(arm: Floats) -> float:
@@ -115,17 +110,6 @@ def worker_contact(scene: Scene) -> dict[str, Metric]:
 
     q, pushed = [-1.2, -0.9, 1.2, -1.87, -1.57, 0.0], [1.0, 0, 0, 0, 0, 0.0]
     return contact(scene, q, pushed, path, gap_m)
-
-
-def step_us(scene: Scene, batch: int) -> float:
-    """Microseconds of one control step of one environment, the worker walking along."""
-    physics, path = Physics(scene, batch), standing(scene, batch, (1.6, 0.4))
-    command, times = np.full((batch, 6), 0.3), []
-    for step in range(300 if batch == 1 else 40):
-        begin = time.perf_counter()
-        physics.step(command * (1 if step % 20 < 10 else -1), path)
-        times.append(time.perf_counter() - begin)
-    return 1e6 * float(np.median(times)) / batch
 
 
 def measure(sim_dt: float) -> dict[str, Metric]:
@@ -141,8 +125,6 @@ def measure(sim_dt: float) -> dict[str, Metric]:
             metrics[f"tool_error_p{share}.{kind}.{name}"] = over(each, "mm")
     for what, found in (("floor", floor_contact(empty)), ("worker", worker_contact(scene))):
         metrics |= {f"contact_{key}.{what}.{name}": metric for key, metric in found.items()}
-    for batch in (1, 64):
-        metrics[f"step_us.{batch}.{name}"] = exactly(step_us(scene, batch), "us")
     return metrics
 
 

@@ -76,7 +76,7 @@ def cameras() -> None:
     gopro = env.simulation.scene.cameras[2]
     wide = pinhole("wide", gopro.eye_world, np.array([0.2, 0.0, 1.0]), 118.2, 1920, 1080)
     renderer = CropRenderer(env.simulation.scene, 1920)
-    renderer.draw(*env.views.pose())
+    renderer.pose(*env.views.pose())
     whole = Roi((960.0, 540.0), 1920.0, 0.0)
     images = [Lensed(renderer, (gopro,)).view(each, whole) for each in (wide, gopro)]
     shown = [shrink(middle_rows(image, 1080), 800, 450) for image in images]
@@ -101,7 +101,7 @@ def faults() -> None:
         env.step(np.zeros(6))
         renderer = CropRenderer(scene)
         schedule = Schedule(scene.rig, tuple(given), env.config.ctrl_dt)
-        film = CameraFilm(renderer, Lensed(renderer, scene.cameras), schedule)
+        film = CameraFilm(Lensed(renderer, scene.cameras), schedule)
         shot = Shot(0, *copied(env.views.pose()), before, scene.cameras)
         film.show([shot] * 4, seed=4)
         joints = env.simulation.estimate.mean_world[:, 0]

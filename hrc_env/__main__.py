@@ -70,14 +70,9 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Run a command; errors that explain themselves are shown without a traceback.
-
-    Args:
-        words: the command and its arguments; those of the process if None.
-
-    Returns:
-        The exit status: 2 for what was asked wrongly, 130 for what was stopped by Ctrl-C.
-    """
+    """Run a command, of the process's words if none are given; errors that explain themselves are
+    shown without a traceback. Returns the exit status: 2 for what was asked wrongly, 130 for what
+    was stopped by Ctrl-C."""
     given = list(sys.argv[1:] if words is None else words)
     if not given or given[0] in ("-h", "--help"):
         print(overview())

@@ -1,6 +1,6 @@
 """What a robot believes in one step: itself, its task and the estimate. No truth in here."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -36,11 +36,7 @@ def estimated_separation(robot: RobotState, estimate: PoseEstimate) -> Separatio
     nearest = least_separation(
         robot.capsules_world, robot.capsule_radius_m, bodies, SEGMENT_RADIUS_M
     )
-    return Separation(
-        np.where(estimate.tracked, nearest.distance_m, np.inf),
-        nearest.point_a_world,
-        nearest.point_b_world,
-    )
+    return replace(nearest, distance_m=np.where(estimate.tracked, nearest.distance_m, np.inf))
 
 
 def standard_deviation_m(estimate: PoseEstimate) -> Floats:

@@ -34,7 +34,7 @@ from hrc_env.scene.robot import Robot, robot_called
 from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import Task, task_called
 from hrc_env.tracking.config import ParticleConfig, TrackerConfig, of_kind
-from hrc_env.tracking.estimators import EstimatorChoice, EstimatorSpec, estimator_called
+from hrc_env.tracking.estimators import EstimatorSpec, estimator_called
 from hrc_env.tracking.forecast import LONGEST_S
 from hrc_env.tracking.people.association import AssociationConfig
 from hrc_env.worker.body import pool
@@ -143,11 +143,8 @@ class Settings:
 
 
 def settle(**arguments: Any) -> Settings:
-    """Settings from keyword arguments of an environment (`ARGUMENTS`); see `HRCEnv`.
-
-    Raises:
-        ConfigError: an argument that there is not, or a value that cannot be.
-    """
+    """Settings from keyword arguments of an environment (`ARGUMENTS`); see `HRCEnv`. Raises
+    `ConfigError` for an argument that there is not, or a value that cannot be."""
     for name in arguments:
         if name not in ARGUMENTS:
             raise unknown("argument", name, ARGUMENTS)
@@ -202,13 +199,6 @@ def save_config(config: HRCConfig, path: str | Path) -> None:
         if not isinstance(motion, str):
             raise ConfigError(f"The clip {motion.source!r} cannot be written: give its file.")
     write_whole(Path(path), to_toml(plain(asdict(config))))
-
-
-def load_config(
-    path: str | Path, task: str | Task = DEFAULT, estimator: EstimatorChoice = "particle"
-) -> HRCConfig:
-    """A config from a TOML file, which may hold changes to the default only."""
-    return resolve(Path(path), task_called(task), estimator_called(estimator))
 
 
 def rig_of(cameras: Any) -> tuple[CameraConfig, ...] | None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import check_fields, unknown
 from hrc_env.core.typing import Floats, JointAngles, JointVelocities, Velocities3
 from hrc_env.geometry.chains import SerialChain, jacobian
 
@@ -31,13 +31,8 @@ class ControlConfig:
     """`tool`: how fast the joints return to the rest posture where the tool allows [1/s]."""
 
     def __post_init__(self) -> None:
-        if not 0 < self.joint_speed_share <= 1:
-            raise ConfigError(
-                f"ControlConfig.joint_speed_share must be in (0, 1], got {self.joint_speed_share}."
-            )
-        for name in ("tool_speed_mps", "damping", "posture_gain_hz"):
-            if not getattr(self, name) > 0:
-                raise ConfigError(f"ControlConfig.{name} must be > 0, got {getattr(self, name)}.")
+        check_fields(self, "be in (0, 1]", "joint_speed_share")
+        check_fields(self, "be positive", "tool_speed_mps", "damping", "posture_gain_hz")
 
 
 def n_actions(control: str, chain: SerialChain) -> int:

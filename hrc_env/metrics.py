@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError
+from hrc_env.core.errors import check_fields
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import PoseEstimate, WorkerTruth
 from hrc_env.core.skeleton import N_JOINTS
@@ -49,8 +49,7 @@ class CostConfig:
     """Whether a contact ends the episode."""
 
     def __post_init__(self) -> None:
-        if self.proximity_m < 0:
-            raise ConfigError(f"CostConfig.proximity_m must be >= 0, got {self.proximity_m}.")
+        check_fields(self, "not be negative", "proximity_m")
 
 
 @dataclass(frozen=True, slots=True)

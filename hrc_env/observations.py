@@ -86,11 +86,6 @@ def _joints_forecast(now: Belief) -> Floats:
     return joints - now.robot.tool_world[:, None, None, None]
 
 
-def _std_forecast(now: Belief) -> Floats:
-    """(B, W, H, J)."""
-    return np.stack([standard_deviation_m(later) for later in now.forecast], axis=2)
-
-
 ROBOT_TERMS: tuple[ObservationTerm, ...] = (
     ObservationTerm(
         "joint_angle_sin", lambda of: of.arm_joints, "-", "base", 1.0, 1.0,
@@ -166,7 +161,7 @@ SHARED_TERMS: tuple[ObservationTerm, ...] = (
         "worker_joints_forecast_std", lambda of: of.workers * of.horizons * N_JOINTS,
         "m", "world", 1.0, 0.25,
         "Standard deviation of each of these (root mean over the axes).",
-        _std_forecast,
+        lambda now: np.stack([standard_deviation_m(later) for later in now.forecast], axis=2),
     ),
     ObservationTerm(
         "worker_joints_std_towards_robot",

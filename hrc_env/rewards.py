@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from hrc_env.belief import Belief
-from hrc_env.core.errors import ConfigError, check_shape
+from hrc_env.core.errors import check_fields, check_shape
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
 
@@ -26,10 +26,7 @@ class RewardConfig:
     """Closeness begins to count below this separation of the surfaces [m]."""
 
     def __post_init__(self) -> None:
-        if self.proximity_reach_m <= 0:
-            raise ConfigError(
-                f"RewardConfig.proximity_reach_m must be positive, got {self.proximity_reach_m}."
-            )
+        check_fields(self, "be positive", "proximity_reach_m")
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,8 +59,7 @@ def _mean_square(vectors):
 
 def _proximity(now: Belief, step: Any, previous: Floats, config: RewardConfig) -> Floats:
     nearest_m = np.minimum.reduce(now.separation.distance_m, axis=-1, initial=np.inf)
-    penalty: Floats = -config.proximity * closeness(nearest_m, config.proximity_reach_m)
-    return penalty
+    return -config.proximity * closeness(nearest_m, config.proximity_reach_m)
 
 
 SHARED_TERMS: tuple[RewardTerm, ...] = (

@@ -54,16 +54,10 @@ def joined(results: Sequence[StepResult]) -> StepResult:
     """Results of ranges of a batch, one after the other."""
     if len(results) == 1:
         return results[0]
-
-    def of_all(name: str) -> NDArray[Any]:
-        return np.concatenate([getattr(each, name) for each in results])
-
-    return StepResult(
-        of_all("observation"),
-        of_all("reward"),
-        of_all("terminated"),
-        {name: np.concatenate([each.info[name] for each in results]) for name in results[0].info},
-    )
+    parts = zip(*((r.observation, r.reward, r.terminated) for r in results), strict=True)
+    info = {name: np.concatenate([each.info[name] for each in results]) for name in results[0].info}
+    observation, reward, terminated = map(np.concatenate, parts)
+    return StepResult(observation, reward, terminated, info)
 
 
 def cost_info(cost: metrics.Cost, present: Bools) -> Info:

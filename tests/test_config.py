@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hrc_env.__main__ import main
-from hrc_env.config import ARGUMENTS, HRCConfig, load_config, save_config, settle
+from hrc_env.config import ARGUMENTS, HRCConfig, save_config, settle
 from hrc_env.core.errors import OLD_NAMES, ConfigError, Named
 from hrc_env.env import HRCEnv
 from hrc_env.motion.clip import Clip
@@ -29,7 +29,6 @@ ODD = {
 def test_a_config_that_is_saved_and_loaded_is_the_same(estimator, tmp_path):
     config = settle(estimator=estimator, **ODD).config
     save_config(config, tmp_path / "mine.toml")
-    assert load_config(tmp_path / "mine.toml", estimator=estimator) == config
     assert settle(estimator=estimator, config=tmp_path / "mine.toml").config == config
 
 
@@ -80,7 +79,7 @@ def test_a_clip_in_memory_is_not_written(tmp_path):
 def test_a_file_that_cannot_be_is_answered_with_what_would_do(text, said, tmp_path):
     (tmp_path / "mine.toml").write_text(text)
     with pytest.raises(ConfigError) as refused:
-        load_config(tmp_path / "mine.toml")
+        settle(config=tmp_path / "mine.toml")
     assert said in str(refused.value)
 
 
@@ -88,13 +87,13 @@ def test_the_list_shows_the_configuration_that_arguments_make(tmp_path, capsys):
     assert main(["list", "--config", "reward.proximity=0.5", "--people", "hurried"]) == 0
     (tmp_path / "mine.toml").write_text(capsys.readouterr().out)
     said = settle(people="hurried", config={"reward": {"proximity": 0.5}}).config
-    assert load_config(tmp_path / "mine.toml") == said
+    assert settle(config=tmp_path / "mine.toml").config == said
     assert main(["list", "--config", "motion.jobs=low_work"]) == 0
     (tmp_path / "mine.toml").write_text(capsys.readouterr().out)
-    assert load_config(tmp_path / "mine.toml").motion.jobs == WORK["low_work"]
+    assert settle(config=tmp_path / "mine.toml").config.motion.jobs == WORK["low_work"]
     assert main(["list", "--config"]) == 0
     (tmp_path / "mine.toml").write_text(capsys.readouterr().out)
-    assert load_config(tmp_path / "mine.toml") == settle().config
+    assert settle(config=tmp_path / "mine.toml").config == settle().config
 
 
 @pytest.mark.parametrize("old", [{"estimator": "per_joint"}, {"config": {"eyes": {}}}])

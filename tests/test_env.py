@@ -309,7 +309,7 @@ def test_a_large_site_has_room_and_memory_for_many_workers():
 @pytest.mark.parametrize(
     ("kwargs", "said"),
     [
-        ({"config": {"task": {"radius_m": -1}}}, r"^task\.radius_m must be > 0"),
+        ({"config": {"task": {"radius_m": -1}}}, r"^task\.radius_m must be positive"),
         ({"people": {"tempo": -1.0}}, r"^people\.tempo must be"),
         ({"people": {"temp": 1.0}}, r"Did you mean 'people\.tempo'"),
         ({"people": ["hurried"]}, "a name.*'unaware'.*a mapping"),
@@ -334,7 +334,7 @@ def test_a_large_site_has_room_and_memory_for_many_workers():
         ({"config": {"task": {"height_m": [0.8, 1.4, 9]}}}, "must be 2 values"),
         ({"config": {"scene": {"sim_dt": "fast"}}}, "must be a finite number"),
         ({"config": {"scene": {"cameras": [{"name": "a"}]}}}, "eye_world is missing"),
-        ({"config": {"control": {"tool_speed_mps": -1.0}}}, "tool_speed_mps must be > 0"),
+        ({"config": {"control": {"tool_speed_mps": -1.0}}}, "tool_speed_mps must be positive"),
         ({"config": {"start_spread_rad": [1.0, 2.0]}}, "start_spread_rad must have shape"),
         ({"cameras": "camera_1"}, "is no rig.*list of names, indices"),
         ({"cameras": [0.5]}, "Camera index .* 0 to 3, got 0.5"),

@@ -157,7 +157,7 @@ def test_an_empty_room_in_pictures_is_quiet():
     env = HRCEnv(perception="pixels", n_workers=0)
     assert all(info["tracking/lost"] == 0.0 for *_, info in walk(env, 2))
     assert env.mosaic().shape == (724, 1284, 3)
-    assert env.views.crops(64) == []
+    assert env.views.crops(64, env.views.glance()) == []
     env.close()
 
 

@@ -5,12 +5,12 @@ import pytest
 from alone import check_observations_alone
 
 import hrc_env  # noqa: F401  registers the ids
+from assets.rotations import matrix_from_quaternion
 from hrc_env.belief import covariance_factor_m, deviation_towards_robot_m, standard_deviation_m
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import PoseEstimate, RobotState
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.env import HRCEnv
-from hrc_env.geometry.rotations import matrix_from_quaternion
 from hrc_env.observations import UNCERTAINTY
 from hrc_env.scene.rigs import RIGS
 

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from assets.rotations import matrix_from_quaternion
+from assets.workers.poses import rest_motion
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import WorkerMotion, WorkerPath
 from hrc_env.core.skeleton import MIRROR, N_JOINTS
-from hrc_env.geometry.rotations import matrix_from_quaternion
 from hrc_env.motion import generator
 from hrc_env.motion.anatomy import anatomies, anatomy
 from hrc_env.worker.body import (
@@ -18,7 +19,6 @@ from hrc_env.worker.body import (
     SEGMENT,
     assets_dir,
     load_body,
-    rest_motion,
     stack,
     worker_capsules,
     worker_names,

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from hrc_env.core.typing import Points3
+from hrc_env.core.typing import Floats, Points3
+from hrc_env.perception.calibration import KIND, KINDS
 from hrc_env.worker.body import Body, baked_path, load_body
 
 
@@ -17,8 +18,19 @@ def anatomical(body: Body) -> Body:
 def not_looked_at(name: str, others: Sequence[str]) -> Body:
     """A body whose joints lie as far from its landmarks as those of others do on average, so that
     nothing of it is fitted to what was detected of it (assets/workers/calibrate_joints.py)."""
-    moved = [load_body(other).joint_offset - _landmarks(other) for other in others]
-    return replace(load_body(name), joint_offset=_landmarks(name) + np.mean(moved, 0))
+    return replace(load_body(name), joint_offset=_landmarks(name) + np.mean(_moved(others), 0))
+
+
+def apart(names: Sequence[str]) -> Floats:
+    """(K, 3) how far it differs between bodies where joints lie from their landmarks, a standard
+    deviation [m]: ahead, to the side, up, in the frames of the segments that carry the joints."""
+    variance_m2 = np.var(_moved(names), 0, ddof=1)
+    return np.sqrt([variance_m2[kind == KIND].mean(0) for kind in range(len(KINDS))])
+
+
+def _moved(names: Sequence[str]) -> Floats:
+    """(N, J, 3) from landmarks to where joints of bodies lie [m]."""
+    return np.array([load_body(name).joint_offset - _landmarks(name) for name in names])
 
 
 def _landmarks(name: str) -> Points3:

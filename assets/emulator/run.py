@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from assets.emulator.bodies import apart
 from assets.emulator.clips import fit_clips, unseen_clips
 from assets.emulator.fit.fit import fit
 from assets.emulator.matching import matched
@@ -17,6 +18,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import provenance
 from hrc_env.perception.calibration import Calibration
 from hrc_env.perception.emulator import EmulatorConfig
+from hrc_env.worker.body import worker_names
 
 Say = Callable[[float, str], None]
 """Told by how much the share that is done grew, and what is being done."""
@@ -48,7 +50,7 @@ def calibrate(run: CalibrationRun, out: Path, say: Say) -> Calibration:
     for clip, seen in zip(clips, kept("pixels", clips, HRCConfig(), folder_of(out)), strict=True):
         pixels.append(seen)
         say(0.85 / len(clips), f"{clip.scene}: {clip.motion}")
-    draft, rest = fit(samples_of(pixels)), part_of(say, 0.15)
+    draft, rest = fit(samples_of(pixels), apart(worker_names())), part_of(say, 0.15)
     calibration = matched(draft, clips, pixels, out.with_suffix(".fit"), rest)
     write_calibration(out, calibration, _made(run, out, len(clips)))
     return calibration

@@ -30,7 +30,7 @@ def kept(
         yield from watch(level, clips, config, body_of)
         return
     known = config.emulator.calibrated()
-    told = _digest(known.sigma, known.offset_m)
+    told = _digest(known.sigma, known.offset_m, known.wander_m, known.between_m)
     settings = {"level": level, "detector": asdict(config.detector), "told": told}
     code = fingerprint_of(settings, "assets.emulator.watch")
     joints = {clip.body: _digest(body_of(clip.body).joint_offset) for clip in clips}

@@ -9,6 +9,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from assets.rotations import quaternion_from_matrix
 from assets.scenes import furniture, textures
 from assets.scenes.markings import WHITE, blend, mark_cell
 from assets.scenes.pedestal import MOUNT_WORLD
@@ -22,7 +23,6 @@ from assets.scenes.primitives import (
     paint_materials,
 )
 from assets.scenes.textures import Paint
-from hrc_env.geometry.rotations import quaternion_from_matrix
 from hrc_env.scene.primitives import LOOKS_ONLY, OVERHEAD
 
 LENGTH_M, DEPTH_M, HEIGHT_M = 6.09, 5.48, 2.59

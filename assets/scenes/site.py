@@ -11,6 +11,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from assets.rotations import quaternion_from_matrix
 from assets.scenes import arena, furniture, site_house, site_stock, site_vehicles, textures
 from assets.scenes.markings import mark_cell
 from assets.scenes.pedestal import MOUNT_WORLD
@@ -25,7 +26,6 @@ from assets.scenes.primitives import (
     paint_materials,
 )
 from assets.scenes.textures import Paint
-from hrc_env.geometry.rotations import quaternion_from_matrix
 from hrc_env.scene.primitives import LOOKS_ONLY, capsule
 from hrc_env.scene.rig import SITE_CAMERAS
 

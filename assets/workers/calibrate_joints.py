@@ -17,7 +17,7 @@ from poses import POSES, posed
 
 from hrc_env.worker.body import SEGMENTS, Body, assets_dir, load_body, worker_names, worker_truth
 from hrc_env.geometry.cameras import project, projections
-from hrc_env.geometry.rotations import matrix_from_quaternion
+from assets.rotations import matrix_from_quaternion
 from hrc_env.geometry.triangulation import triangulate
 from hrc_env.perception.blazepose import decode_landmarks, landmark_input, to_image
 from hrc_env.perception.detector import STATURE_OF_SIDE
@@ -57,7 +57,7 @@ def observe(name: str) -> tuple[list[WorkerMotion], np.ndarray, np.ndarray]:
         for turn, (xy, yaw) in enumerate(PLACES):
             jitter = rng.normal(0, JITTER_DEG, 12)
             motion = posed(body, pose, xy, yaw + 0.7 * number + 0.3 * turn, jitter)
-            renderer.draw(scene.home_q, _one_worker(motion))
+            renderer.pose(scene.home_q, _one_worker(motion))
             joints_px, depth_m = project(P, worker_truth(body, motion).joints_world[None])
             found = []
             for c, camera in enumerate(scene.cameras):

@@ -1,9 +1,10 @@
-"""A dozen working poses, to photograph a worker in: joint angles to 22 segments."""
+"""At rest, and a dozen working poses to photograph a worker in: joint angles to 22 segments."""
 
 import numpy as np
 
 from hrc_env.worker.body import N_SEGMENTS, PARENT, SEGMENT, Body
-from hrc_env.geometry.rotations import about_axis, quaternion_from_matrix
+from hrc_env.geometry.rotations import about_axis
+from assets.rotations import quaternion_from_matrix
 from hrc_env.core.records import WorkerMotion
 
 HANGING, ALONG, STRAIGHT = (5, 10), (18, 6), (2, 4, 4)
@@ -32,6 +33,14 @@ POSES: dict[str, dict] = {
 }  # fmt: skip
 """lean: trunk forward; arms: (upper arm, forearm), each (forward, outward) from hanging down;
 legs: left and right (forward, outward, knee flexion). All in degrees."""
+
+
+def rest_motion(body: Body) -> WorkerMotion:
+    """The body at rest and still, without leading axes: (S, ...)."""
+    upright = np.zeros((N_SEGMENTS, 4))
+    upright[:, 0] = 1.0
+    still = np.zeros((N_SEGMENTS, 3))
+    return WorkerMotion(body.rest_position.copy(), upright, still, still.copy())
 
 
 def posed(

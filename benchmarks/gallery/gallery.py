@@ -5,12 +5,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
+from typing import NamedTuple
 
 import imageio.v2 as imageio
 
 from benchmarks.gallery.motions import strip
 from benchmarks.gallery.still import CASTS, portrait, views
-from hrc_env.core.errors import unknown
+from hrc_env.core.errors import check_names
 from hrc_env.core.typing import Image
 from hrc_env.experiments.study.cache import Progress
 from hrc_env.motion.repertoire import REPERTOIRE
@@ -21,28 +22,21 @@ VIEWS = 5
 
 
 STYLE = """
-:root { color-scheme: light dark; }
 body { max-width: 1240px; margin: 40px auto; padding: 24px; font: 16px/1.5 system-ui, sans-serif; }
 .grid { display: grid; grid-template-columns: repeat(auto-fill, minmax(240px, 1fr)); gap: 18px; }
-figure { margin: 0; } .wide { grid-column: 1 / -1; }
-img { display: block; width: 100%; height: auto; border-radius: 8px; }
-figcaption { padding: 6px 2px; } figcaption span { opacity: .7; }
+figure { margin: 0; } .wide { grid-column: 1 / -1; } img { width: 100%; }
 """
 
 
-@dataclass(frozen=True, slots=True)
-class Exhibit:
+class Exhibit(NamedTuple):
     """A picture in the gallery."""
 
     section: str
-    """The heading that it stands under."""
     file: str
     """Path of the PNG, relative to the page."""
     title: str
-    """One or two words."""
     caption: str
-    """One sentence."""
-    wide: bool
+    is_wide: bool
     """Whether it takes a row of its own."""
 
 
@@ -51,21 +45,13 @@ class GalleryConfig:
     """What is drawn."""
 
     bodies: tuple[str, ...] = worker_names()
-    """Which workers."""
     motions: tuple[str, ...] = tuple(REPERTOIRE)
-    """Which scenes of the repertoire."""
     scenes: tuple[str, ...] = tuple(CASTS)
-    """Which places."""
 
     def __post_init__(self) -> None:
-        for name, chosen, known in (
-            ("worker", self.bodies, worker_names()),
-            ("motion", self.motions, REPERTOIRE),
-            ("scene", self.scenes, CASTS),
-        ):
-            for each in chosen:
-                if each not in known:
-                    raise unknown(name, each, known)
+        check_names("worker", self.bodies, worker_names())
+        check_names("motion", self.motions, REPERTOIRE)
+        check_names("scene", self.scenes, CASTS)
 
 
 def run(config: GalleryConfig, out: Path, say: Progress) -> list[Exhibit]:
@@ -117,7 +103,7 @@ def write_page(exhibits: Sequence[Exhibit], out: Path, command: str) -> None:
 def _figure(exhibit: Exhibit) -> str:
     title, caption = html.escape(exhibit.title), html.escape(exhibit.caption)
     return (
-        f"<figure{' class=wide' if exhibit.wide else ''}>"
+        f"<figure{' class=wide' if exhibit.is_wide else ''}>"
         f'<img src="{html.escape(exhibit.file)}" alt="{title}: {caption}" loading="lazy">'
         f"<figcaption><b>{title}</b> <span>{caption}</span></figcaption></figure>\n"
     )

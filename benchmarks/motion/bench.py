@@ -1,7 +1,6 @@
 """The motion bench: every scene of the repertoire, played by several workers, and measured."""
 
-import time
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
@@ -13,14 +12,11 @@ from hrc_env.core.results import Metric, over
 from hrc_env.experiments.study.cache import PartCache
 from hrc_env.experiments.study.runner import Study, at_least_one
 from hrc_env.motion import state as st
-from hrc_env.motion.generator import MotionConfig, advance, make_state, reset
 from hrc_env.motion.repertoire import REPERTOIRE, Film, alone, perform
 from hrc_env.worker.body import Body, load_body, worker_names
 
 DT_S = 0.01
 """Between the frames of a film [s]: fast enough for accelerations."""
-BATCH, STEPS, POSES = 64, 60, 5
-"""Environments, control steps and poses a step with which a frame's cost is taken, 40 ms a step."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,12 +42,9 @@ QUICK = MotionBenchConfig(n_seeds=2, bodies=("worker_1",))
 def play(config: MotionBenchConfig, parts: PartCache) -> dict[str, Metric]:
     """Play and measure every scene."""
     metrics: dict[str, Metric] = {}
-    share = 1 / (len(REPERTOIRE) + 1)
     for scene in REPERTOIRE:
         metrics |= _measure(scene, config)
-        parts.progress(share, scene)
-    metrics["us_per_control_step"] = _cost_us(load_body(config.bodies[0]))
-    parts.progress(share, "cost of a frame")
+        parts.progress(1 / len(REPERTOIRE), scene)
     return metrics
 
 
@@ -60,17 +53,9 @@ def _measure(scene: str, config: MotionBenchConfig) -> dict[str, Metric]:
     by_body: list[dict[str, float]] = []
     for name in config.bodies:
         body = load_body(name)
-        films, us = [], []
-        list(_play(scene, 0, body))  # compiled
-        for seed in range(config.n_seeds):
-            started = time.thread_time()
-            played = list(_play(scene, seed, body))
-            frames = sum(len(film.time_s) for film in played)
-            us.append(1e6 * (time.thread_time() - started) / frames)
-            films += played
+        films = [film for seed in range(config.n_seeds) for film in _play(scene, seed, body)]
         numbers = statistics_of(films, body)
         numbers["seconds"] = sum(film.time_s[-1] for film in films) / config.n_seeds
-        numbers["us_per_frame"] = float(np.median(us))
         if films[0].activity == st.WALK:
             gaits = [gait_of(film) for film in films]
             numbers |= {key: float(np.median([g[key] for g in gaits])) for key in gaits[0]}
@@ -82,35 +67,21 @@ def _measure(scene: str, config: MotionBenchConfig) -> dict[str, Metric]:
     }
 
 
-def _play(scene: str, seed: int, body: Body) -> Iterator[Film]:
+def _play(scene: str, seed: int, body: Body) -> Sequence[Film]:
     """A scene's films."""
     me = alone(body, right=seed % 2 == 0)
-    yield from perform(REPERTOIRE[scene], me, np.random.default_rng([17, seed]), DT_S)
+    return perform(REPERTOIRE[scene], me, np.random.default_rng([17, seed]), DT_S)
 
 
 def _unit(key: str) -> str:
     """Of a statistic, from its name."""
     for ending, unit in (
         ("_m_s2", "m/s^2"), ("_m_s", "m/s"), ("_m", "m"), ("_deg", "deg"), ("seconds", "s"),
-        ("_per_min", "1/min"), ("us_per_frame", "us"),
+        ("_per_min", "1/min"),
     ):  # fmt: skip
         if key.endswith(ending):
             return unit
     return ""
-
-
-def _cost_us(body: Body) -> Metric:
-    """Microseconds of an environment's control step: poses, velocities and planning [us]."""
-    state = make_state(BATCH, 1, body, MotionConfig())
-    rngs = [np.random.default_rng([29, b]) for b in range(BATCH)]
-    reset(state, np.arange(BATCH), rngs)
-    advance(state, rngs, 0.04 / POSES, POSES)
-    found = []
-    for _ in range(STEPS):
-        started = time.thread_time()
-        advance(state, rngs, 0.04 / POSES, POSES)
-        found.append(1e6 * (time.thread_time() - started) / BATCH)
-    return over(found, "us")
 
 
 MOTION = Study(

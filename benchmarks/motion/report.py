@@ -2,14 +2,7 @@
 
 from benchmarks.motion.targets import ANY, Target, targets_of
 from hrc_env.core.results import Metric
-from hrc_env.experiments.study.report import (
-    Column,
-    Metrics,
-    Report,
-    said,
-    table,
-    table_of,
-)
+from hrc_env.experiments.study.report import Column, Metrics, Report, said, table, table_of
 
 COLUMNS = (
     Column("{}.seconds", "s"),
@@ -22,20 +15,16 @@ COLUMNS = (
     Column("{}.slip_p95_m_s", "slip p95", 3),
     Column("{}.grip_missed_share", "grips missed", 3),
     Column("{}.inside_itself_share", "in itself", 3),
-    Column("{}.us_per_frame", "µs a frame"),
 )
 """Of the table of everything."""
 
 
 def report(metrics: Metrics) -> Report:
     """What is to be read."""
-    cost = metrics["us_per_control_step"].value
     scenes = [name.rsplit(".", 1)[0] for name in metrics if name.endswith(".seconds")]
     lead = (
         "Medians over bodies, smallest and largest in brackets; the first table has the targets of "
-        "single scenes, the second what all scenes have (speeds in m/s). A control step of the "
-        f"environment (five poses, velocities, planning): {cost:.1f} µs a worker, batched, on one "
-        "thread."
+        "single scenes, the second what all scenes have (speeds in m/s)."
     )
     asked = (f"`{each.statistic}` <= {each.high:g} ({each.source})" for each in targets_of(ANY))
     return Report("Motion bench", lead, (

@@ -33,13 +33,12 @@ def statistics_of(films: Sequence[Film], body: Body) -> dict[str, float]:
         speeds = np.concatenate([_speeds(film, which) for film in films])
         alike = name == "ankle" or films[0].activity == st.WALK
         speeds = speeds.ravel() if alike else speeds.max(1)  # at work the busier hand counts
-        numbers[f"{name}_p50_m_s"] = float(np.percentile(speeds, 50))
         numbers[f"{name}_p95_m_s"] = float(np.percentile(speeds, 95))
         numbers[f"{name}_max_m_s"] = float(speeds.max())
         rates = np.concatenate([_accelerations(film, which) for film in films])
         numbers[f"{name}_p999_m_s2"] = float(np.percentile(rates, 99.9))
     pelvis = np.concatenate([film.motion.position_world[:, 0, 0, 2] for film in films])
-    numbers["pelvis_low_m"], numbers["pelvis_high_m"] = float(pelvis.min()), float(pelvis.max())
+    numbers["pelvis_low_m"] = float(pelvis.min())
     numbers["slip_p95_m_s"] = _percentile(np.concatenate([slips(film) for film in films]), 95)
     missed = np.concatenate([misses(film) for film in films])
     numbers["grip_missed_share"] = float((missed > MISSED_M).mean()) if missed.size else 0.0

@@ -1,1 +1,1 @@
-"""How fast the eyes are, how well they see, what faults cost them, and when they see ghosts."""
+"""How fast the eyes are, how well they see, and what faults cost them."""

@@ -111,7 +111,7 @@ class Looker:
         windows = [window_from_joints(*view) for view in views]
         if not any(windows):
             return np.full_like(true_px, np.nan)
-        self.renderer.draw(now.q, one(now.motion, 0))
+        self.renderer.pose(now.q, one(now.motion, 0))
         self.detector.forget(0)  # as at a first look: the detector stage must agree
         px = self.detector.detect(self.source, windows).px
         return np.stack([pinhole_from_image(camera, px[c]) for c, camera in enumerate(cameras)])

@@ -103,10 +103,6 @@ def _faults(faults: dict[tuple[str, str], list[Episode]]) -> Metrics:
             found[f"error_ratio.{kind}"] = _ratio(episodes, base)
             found[f"detected.fault.{kind}"] = _detected(episodes, own)
         found |= _named(f"miscalibrated.{kind}", episodes, own)
-        for c in sorted(set(own)) if kind == "lost" else ():
-            mine = [k for k, camera in enumerate(own) if camera == c]
-            ratio = _ratio([episodes[k] for k in mine], [base[k] for k in mine])
-            found[f"error_ratio.lost.camera_{c + 1}"] = ratio
         metrics |= {start + name: metric for name, metric in found.items()}
     return metrics
 

@@ -1,12 +1,12 @@
-"""The perception bench as people read it: tables, and two pictures."""
+"""The perception bench as people read it."""
 
 from pathlib import Path
 from typing import Any
 
-from benchmarks.common import keys, plot_rows
+from benchmarks.common import keys
 from benchmarks.perception.speed import REST, STAGES
 from benchmarks.perception.views import ROWS
-from hrc_env.experiments.study.report import Column, Metrics, Report, picture, table_of
+from hrc_env.experiments.study.report import Column, Metrics, Report, table_of
 from hrc_env.perception.faults.fault import KINDS
 
 _LEAD = """\
@@ -38,8 +38,8 @@ _LEVELS = {"": "", "keypoints.": "`keypoints`: "}
 
 
 def report(config: Any, found: Any, metrics: Metrics, figures: Path) -> Report:
-    """What is to be read; two pictures are drawn into `figures`."""
-    del config, found
+    """What is to be read."""
+    del config, found, figures
     kinds = {kind: f"`{kind}`" for kind in KINDS if f"error_ratio.{kind}" in metrics}
     views = {
         f"{kind}.{row}": f"{kind}: {row.replace('_', ' ')}"
@@ -47,14 +47,7 @@ def report(config: Any, found: Any, metrics: Metrics, figures: Path) -> Report:
         for row in keys(metrics, f"detected.{kind}.")
     }
     every = {"none": "no fault", **kinds}
-    cameras = {name: name for name in keys(metrics, "error_ratio.lost.")}
     families = {name: name for name in keys(metrics, "emulator_coverage_difference.")}
-    plot_rows(figures / "detection.png", views, _crop_columns()[:2], metrics)
-    plot_rows(figures / "faults.png", kinds, [
-        Column(f"{start}{key}.{{}}", words + title)
-        for key, title in (("error_ratio", "median error with / without"), ("coverage95.fault",
-                           "coverage")) for start, words in _LEVELS.items()
-    ], metrics)  # fmt: skip
     return Report("Perception bench", _LEAD, (
         "## Speed", table_of("cameras.workers", _named(metrics, "steps_per_s."), [
             Column("steps_per_s.{}", "steps a second"),
@@ -65,18 +58,17 @@ def report(config: Any, found: Any, metrics: Metrics, figures: Path) -> Report:
         "## Error of the estimate", table_of("", _estimates(metrics), _belief_columns(), metrics),
         _ABOUT_ERRORS,
         "## Faults of one of four cameras, lab", fault_table(every, metrics), _ABOUT_FAULTS,
-        picture(figures / "faults.png", "One of four cameras has a fault."),
-        "Median error with one camera lost, over that with all of them:",
-        table_of("", cameras, [Column(f"{start}error_ratio.lost.{{}}", words + "ratio", 2)
-                               for start, words in _LEVELS.items()], metrics),
         "## Cameras named as miscalibrated", table_of("", every, [
             Column(f"{start}miscalibrated.{{}}.{key}", words + title, 1, scale)
             for start, words in _LEVELS.items() for key, title, scale in (
                 ("named", "named [%]", 100), ("after_s", "after [s]", 1),
                 ("others", "others [%]", 100))
         ], metrics), _ABOUT_NAMED,
-        "## Single crops", table_of("", views, _crop_columns(), metrics), _ABOUT_CROPS,
-        picture(figures / "detection.png", "Single crops."),
+        "## Single crops", table_of("", views, [
+            Column("detected.{}", "detected [%]", 1, 100),
+            Column("error_share.{}.median", "median error [%]", 1, 100),
+            Column("error_share.{}.p95", "p95 [%]", 1, 100),
+        ], metrics), _ABOUT_CROPS,
         "## The emulator beside the pixels", table_of("", families, [
             Column("emulator_error_ratio.{}", "median", 2),
             Column("emulator_error_ratio.{}.p95", "p95", 2),
@@ -102,14 +94,6 @@ def _belief_columns(start: str = "", words: str = "", row: str = "{}") -> list[C
         Column(f"{start}coverage95.{row}", f"{words}coverage", 2),
         Column(f"{start}std_over_error.{row}", f"{words}std/error", 2),
         Column(f"{start}lost_steps.{row}", f"{words}steps lost [%]", 1, 100),
-    ]
-
-
-def _crop_columns() -> list[Column]:
-    return [
-        Column("detected.{}", "detected [%]", 1, 100),
-        Column("error_share.{}.median", "median error [%]", 1, 100),
-        Column("error_share.{}.p95", "p95 [%]", 1, 100),
     ]
 
 

@@ -14,11 +14,12 @@ from hrc_env.motion import generator
 from hrc_env.perception.network import LANDMARK_SIDE, load_landmarker
 from hrc_env.pipeline.rendered import PixelPipeline
 from hrc_env.pipeline.tracking import PoseTracking
+from hrc_env.scene.canvas import Canvas
 from hrc_env.scene.physics import Physics
 from hrc_env.scene.render import CropRenderer
 
 STAGES: Mapping[str, Sequence[Place]] = {
-    "draw": ((CropRenderer, "draw"), (CropRenderer, "view")),
+    "draw": ((Canvas, "pose"), (CropRenderer, "view")),
     "detect": ((PixelPipeline, "detect"),),
     "track": ((PoseTracking, "perceive"),),
     "physics": ((Physics, "step"),),

@@ -52,11 +52,6 @@ class Films:
         ]
         return True
 
-    def skip(self, camera_index: int, n_frames: int) -> None:
-        """Leave frames of one camera out, unseen."""
-        for _ in range(n_frames):
-            self._films[camera_index].grab()
-
     def crop(self, camera_index: int, window: Roi) -> Image:
         """The window of a camera's open frame, upright, (256, 256, 3) RGB."""
         return sample_window(self.frames[camera_index], window)

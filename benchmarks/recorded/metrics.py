@@ -1,11 +1,9 @@
 """How good an estimator is where nobody knows the truth: recorded films.
 
-A camera is held out and must be foretold; bones must not change; motion must be smooth; and
-two cameras must be enough to go on with every joint.
+A camera is held out and must be foretold; bones must not change; motion must be smooth.
 """
 
 from dataclasses import dataclass, fields
-from itertools import combinations
 
 import numpy as np
 
@@ -24,8 +22,6 @@ SMOOTHER = "smoother"
 """Offline: it sees the whole recording at once."""
 NAMES = [*ESTIMATORS, SMOOTHER]
 """Who runs on a recording."""
-FRESH_S = 0.2
-"""A joint counts as updated when a measurement supported it within so many seconds."""
 CHI2_95_2D = 5.991
 """95 % of a two-dimensional normal variable lies within this squared distance."""
 _BLOCK = 10
@@ -40,8 +36,6 @@ class Track:
     """(T, J, 3) [m]."""
     cov_world: Covariances3
     """(T, J, 3, 3) [m^2]."""
-    age_s: Floats
-    """(T, J)."""
     tracked: Bools
     """(T,)."""
 
@@ -103,7 +97,7 @@ def foretell(name: str, P: Floats, config: TrackerConfig, detections: Detections
 
 def _inside(P: Floats, track: Track, detections: Detections, camera: int) -> Bools:
     """(T, J) whether a detection lies in the 95 % region that belief and detector claim."""
-    points = np.concatenate([track.mean_world, np.ones((*track.age_s.shape, 1))], -1)
+    points = np.concatenate([track.mean_world, np.ones((*track.mean_world.shape[:-1], 1))], -1)
     u, v, w = np.moveaxis(points @ P.T, -1, 0)
     px = np.stack([u / w, v / w], -1)
     slope = (P[:2, :3] - px[..., None] * P[2, :3]) / w[..., None, None]
@@ -140,15 +134,6 @@ def jerk(track: Track, dt_s: float) -> Metric:
     """Root mean squared third difference [m/s^3]: all joints, the calmest and the wildest."""
     squared = (np.diff(track.mean_world[track.tracked], 3, axis=0) ** 2).sum(-1) / dt_s**6
     return _over(np.sqrt(squared.mean(0)), float(np.sqrt(squared.mean())), "m/s^3")
-
-
-def two_camera_share(name: str, P: Floats, config: TrackerConfig, detections: Detections) -> Metric:
-    """Share of frames in which two cameras kept every joint fresh: mean, worst and best pair."""
-    shares = []
-    for pair in combinations(range(len(P)), 2):
-        track = follow(name, P, config, detections, list(pair))
-        shares.append(float(((track.age_s <= FRESH_S).all(1) & track.tracked).mean()))
-    return _over(np.array(shares), float(np.mean(shares)), "share")
 
 
 def _over(values: Floats, value: float, unit: str) -> Metric:

@@ -5,7 +5,7 @@ stopwatch round their organs, and resets. Medians over rounds count.
 """
 
 import math
-import os
+from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
@@ -54,17 +54,10 @@ QUICK = SpeedBenchConfig(n_rounds=1, least_steps=1000)
 """Every number, from one short turn."""
 
 
-class Measured:
-    """One number a round, by kind and name; configurations: "single" and "<num_envs>.<threads>"."""
-
-    def __init__(self) -> None:
-        self.load_before = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
-        """Load average before it began; None where nobody knows."""
-        self.values: dict[str, dict[str, list[float]]] = {}
-
-    def add(self, kind: str, name: str, value: float) -> None:
-        """One more."""
-        self.values.setdefault(kind, {}).setdefault(name, []).append(value)
+Measured = defaultdict[str, list[float]]
+"""One number a round, by "<kind>.<name>"; configurations: "single" and "<num_envs>.<threads>"."""
+UNITS = {"env_steps_per_s": "1/s", "us_per_env_step": "us", "reset_ms": "ms"}
+"""By kind."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +79,7 @@ def play(config: SpeedBenchConfig, parts: PartCache) -> Measured:
     Raises:
         HRCError: an organ's function is no longer called, so that its time would be missed.
     """
-    measured, organs = Measured(), Organs()
+    measured, organs = Measured(list), Organs()
     with ExitStack() as closing:
         turns = [*_turns(config, closing, parts.progress)]
         starts = Starts()
@@ -98,7 +91,7 @@ def play(config: SpeedBenchConfig, parts: PartCache) -> Measured:
                 parts.progress(share * turn.cost, f"{turn.level} {turn.configuration}")
             organs.check_all_called()
             for name, ms in starts.run(config.n_resets).items():
-                measured.add("reset_ms", name, ms)
+                measured[f"reset_ms.{name}"].append(ms)
     return measured
 
 
@@ -106,11 +99,11 @@ def _take(turn: Turn, measured: Measured, organs: Organs) -> None:
     """Run as it is; then, where organs are timed, with the stopwatch round them."""
     pace = turn.contender.run(turn.n_episodes)
     name = f"{turn.level}.{turn.configuration}"
-    measured.add("env_steps_per_s", name, pace.env_steps / pace.seconds)
+    measured[f"env_steps_per_s.{name}"].append(pace.env_steps / pace.seconds)
     if turn.level == WATCHED:
         shares = organs.us_per_env_step(turn.contender, turn.n_episodes, turn.n_threads)
         for organ, us in shares.items():
-            measured.add("us_per_env_step", f"{organ}.{turn.configuration}", us)
+            measured[f"us_per_env_step.{organ}.{turn.configuration}"].append(us)
 
 
 def _turns(config: SpeedBenchConfig, closing: ExitStack, progress: Progress) -> Iterator[Turn]:
@@ -138,18 +131,8 @@ def _turns(config: SpeedBenchConfig, closing: ExitStack, progress: Progress) -> 
 
 
 def metrics_of(measured: Measured) -> dict[str, Metric]:
-    """Medians over rounds with smallest and largest; ratios to Reacher, round by round."""
-    single = f"{REACHER}.{SINGLE}"
-    steps = measured.values["env_steps_per_s"]
-    for name, values in steps.items():
-        for ours, theirs in zip(values, steps[single], strict=True) if name != single else ():
-            measured.add("ratio_to_reacher", name, ours / theirs)
-    units = {"env_steps_per_s": "1/s", "us_per_env_step": "us", "reset_ms": "ms"}
-    return {
-        f"{kind}.{name}": over(values, units.get(kind, ""))
-        for kind, found in measured.values.items()
-        for name, values in found.items()
-    }
+    """Medians over rounds with smallest and largest."""
+    return {name: over(values, UNITS[name.split(".")[0]]) for name, values in measured.items()}
 
 
 SPEED = Study(
@@ -160,5 +143,5 @@ SPEED = Study(
     n_parts=lambda _: 1,
     play=play,
     metrics=lambda _, measured: metrics_of(measured),
-    report=lambda _, measured, *rest: report(measured.load_before, *rest),
+    report=lambda _, __, *rest: report(*rest),
 )

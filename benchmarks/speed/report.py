@@ -24,7 +24,7 @@ the waiting organ's, or the rest's. `physics` includes the controller, `distance
 bodies, `reward` the task, `reset` all organs' work in resets, `rest` everything else."""
 
 
-def report(load_before: float | None, metrics: Metrics, figures: Path) -> Report:
+def report(metrics: Metrics, figures: Path) -> Report:
     """What is to be read; organs.png is drawn into `figures`."""
     plot_organs(figures / "organs.png", metrics)
     pairs = [name.split(".", 1) for name in keys(metrics, "env_steps_per_s.")]
@@ -34,15 +34,11 @@ def report(load_before: float | None, metrics: Metrics, figures: Path) -> Report
     timed = {each: title(each) for each in keys(metrics, f"us_per_env_step.{TOTAL}.")}
     organs = [Column(f"us_per_env_step.{name}.{{}}", name) for name in (*ORGANS, REST, TOTAL)]
     resets = {name: name.replace("_", " ") for name in keys(metrics, "reset_ms.")}
+    steps = [Column(f"env_steps_per_s.{level}.{{}}", level, 0) for level in levels]
 
-    def by_level(kind: str, digits: int) -> list[Column]:
-        return [Column(f"{kind}.{level}.{{}}", level, digits) for level in levels]
-
-    return Report("Speed bench", _lead(metrics, load_before), (
+    return Report("Speed bench", _lead(metrics), (
         "## Environment steps a second",
-        table_of("", rows, by_level("env_steps_per_s", 0), metrics),
-        "## The same, divided by the single Reacher's",
-        table_of("", rows, by_level("ratio_to_reacher", 3), metrics),
+        table_of("", rows, steps, metrics),
         "## Microseconds per environment and step, level `keypoints`",
         table_of("", timed, organs, metrics), _ABOUT_THE_ORGANS,
         picture(figures / "organs.png", "What a step costs, level `keypoints` (on the wall)."),
@@ -51,14 +47,13 @@ def report(load_before: float | None, metrics: Metrics, figures: Path) -> Report
     ), "the smallest and the largest of all rounds")  # fmt: skip
 
 
-def _lead(metrics: Metrics, load_before: float | None) -> str:
+def _lead(metrics: Metrics) -> str:
     n_rounds = metrics[f"env_steps_per_s.{REACHER}.{SINGLE}"].n
-    busy = "" if load_before is None else f" Load average {load_before:.1f} before it began."
     return (
         "Random actions for whole episodes, resets inside, every info read. Medians of "
         f"{n_rounds} rounds in which everybody takes turns, in brackets the smallest and the "
         f"largest. `{SINGLE}` is `gymnasium.make`, the others are `gymnasium.make_vec`; "
-        f"`{REACHER}` is Gymnasium's Reacher-v5 (64 of it: its SyncVectorEnv).{busy}"
+        f"`{REACHER}` is Gymnasium's Reacher-v5 (64 of it: its SyncVectorEnv)."
     )
 
 

@@ -13,12 +13,12 @@ from typing import Any
 from benchmarks.tracking.cells import run_cell
 from benchmarks.tracking.detections import CONDITIONS
 from benchmarks.tracking.env_sequences import ENV, make_env_rig
-from benchmarks.tracking.metrics import ASSOCIATION, TIMING, Parts, metrics_of
+from benchmarks.tracking.metrics import TIMING, Parts, metrics_of
 from benchmarks.tracking.names import DEFAULT, SMOOTHER, conditions, names_of
 from benchmarks.tracking.report import report
 from benchmarks.tracking.rigs import RIGS, SIGMA_PX, Rig, make_rig
 from benchmarks.tracking.sequences import MATCHED, Sequences, make_sequences
-from benchmarks.tracking.timing import BATCH, time_association, time_estimator
+from benchmarks.tracking.timing import BATCH, time_estimator
 from hrc_env.experiments.study.cache import PartCache, PartProgress
 from hrc_env.experiments.study.runner import Study, at_least_one
 from hrc_env.tracking.estimators import ESTIMATORS
@@ -119,7 +119,7 @@ def _rig(name: str) -> Rig:
 
 
 def _timing(config: TrackingBenchConfig, parts: PartCache) -> Parts:
-    """Microseconds per update of every estimator, on the lab's sequences, and of association."""
+    """Microseconds per update of every estimator, on the lab's sequences."""
     rig = make_rig("lab")
     frames = cache(lambda kind: make_sequences(rig, kind, list(range(BATCH))))
     repeats = config.timing_repeats
@@ -127,14 +127,10 @@ def _timing(config: TrackingBenchConfig, parts: PartCache) -> Parts:
     def make(name: str, tick: PartProgress) -> dict[str, Any]:
         return time_estimator(name, rig, frames("clean"), frames("hard"), repeats, tick)
 
-    played: Parts = {
+    return {
         ("lab", TIMING, name): parts.part(f"{TIMING}.{name}", partial(make, name))
         for name in ESTIMATORS
     }
-    played["site", TIMING, ASSOCIATION] = parts.part(
-        f"{TIMING}.{ASSOCIATION}", partial(time_association, make_rig("site"), repeats)
-    )
-    return played
 
 
 TRACKING = Study(
@@ -142,7 +138,7 @@ TRACKING = Study(
     modules=("benchmarks.tracking.cells",),
     settings=settings,
     seeds=seeds_of,
-    n_parts=lambda _: sum(len(names_of(each)) for _, each in conditions()) + len(ESTIMATORS) + 1,
+    n_parts=lambda _: sum(len(names_of(each)) for _, each in conditions()) + len(ESTIMATORS),
     play=play,
     metrics=lambda _, played: metrics_of(played),
     report=lambda _, played, metrics, figures: report(metrics),

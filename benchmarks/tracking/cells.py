@@ -5,28 +5,23 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
 from benchmarks.common import CHI2_95_3D
 from benchmarks.tracking.arrivals import in_time
 from benchmarks.tracking.couples import identities
 from benchmarks.tracking.dlt import triangulate_frame
-from benchmarks.tracking.names import DEFAULT, DLT, SMOOTHER, UNBUFFERED
+from benchmarks.tracking.names import DLT, SMOOTHER
 from benchmarks.tracking.rigs import DT_S, Rig
 from benchmarks.tracking.sequences import Sequences
 from hrc_env.core.batching import rows
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import TORSO
-from hrc_env.core.typing import Bools, Covariances3, Floats, Ints, Points3
+from hrc_env.core.typing import Bools, Covariances3, Floats, Points3
 from hrc_env.experiments.study.cache import PartProgress
 from hrc_env.tracking.estimators import make_estimator
 from hrc_env.tracking.people.association import associate
 from hrc_env.tracking.smoother import smooth
 
-N_LEVELS = 20
-"""Bins of the probability that the reported Gaussian gives to a nearer joint."""
-CHI2_LEVELS: Floats = stats.chi2(3).ppf(np.arange(1, N_LEVELS) / N_LEVELS)
-"""(19,) limits of the 20 equally likely classes of a normalised squared error."""
 UNKNOWN_M2 = 1e6
 """Variance of a bone's length of which nothing is known [m^2]."""
 _AT_ONCE = 10
@@ -62,11 +57,6 @@ def _estimated(
     With several people, poses are given to the tracks whose predictions they fit.
     """
     n_sequences, n_people = sequences.joints.shape[1:3]
-    if name == UNBUFFERED:  # frames are taken as of the moment at which they arrive
-        name = DEFAULT
-        sequences = replace(
-            sequences, time_s=None, config=replace(sequences.config, longest_delay_s=0.0)
-        )
     estimator = make_estimator(name, rig.P, DT_S, sequences.config)
     rngs = [np.random.default_rng([seed, 4]) for seed in seeds]
     state = estimator.init(n_sequences, n_people)
@@ -169,15 +159,12 @@ def tally(truth: Points3, mean: Points3, cov: Covariances3 | None) -> dict[str, 
     }
     if cov is not None:
         nees = np.einsum("...i,...i->...", offset, np.linalg.solve(cov, offset[..., None])[..., 0])
-        level = np.searchsorted(CHI2_LEVELS, nees)
         out["inside"] = _total(nees < CHI2_95_3D)
-        out["nees"] = _total(nees)
         out["trace"] = _total(np.trace(cov, axis1=-2, axis2=-1))
-        out["levels"] = np.stack([_total(level == k) for k in range(N_LEVELS)], -1)
     return {name: value.tolist() for name, value in out.items()}
 
 
-def _total(values: Floats | Bools | Ints) -> Floats:
+def _total(values: Floats | Bools) -> Floats:
     """(S,) from (T, S, W, J)."""
     return values.sum(axis=(0, 2, 3), dtype=float)
 

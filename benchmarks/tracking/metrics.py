@@ -13,8 +13,6 @@ from hrc_env.core.typing import Floats
 
 TIMING = "timing"
 """The condition under which `Parts` holds microseconds."""
-ASSOCIATION = "association"
-"""The name under which it holds those of association."""
 Parts: TypeAlias = dict[tuple[str, str, str], dict[str, Any]]
 """(rig, condition, name) to what the cell gave."""
 N_RESAMPLED = 1000
@@ -36,8 +34,6 @@ def metrics_of(parts: Parts) -> dict[str, Metric]:
         for name in RIVALS:
             ratio = default / _rmse(drawn[name])
             metrics[f"default_over.{rig}.{window}.{name}"] = metric(ratio, "-", drawn[name])
-    for rig in RIGS:
-        metrics |= _after_return(parts, rig)
     for name in names_of(MATCHED):
         metrics |= _bounds(parts, name)
     return dict(sorted(metrics.items()))
@@ -47,31 +43,21 @@ def _rmse(sums: _Sums) -> Floats:
     return np.sqrt(sums["squared"] / sums["n"])
 
 
-def _calibration_gap(sums: _Sums) -> Floats:
-    held = np.cumsum(sums["levels"], -1) / sums["n"][:, None]
-    return np.abs(held - np.arange(1, held.shape[1] + 1) / held.shape[1]).max(-1)
-
-
 STATISTICS: dict[str, tuple[str, Callable[[_Sums], Floats]]] = {
     "rmse_m": ("m", _rmse),
     "median_m": ("m", lambda sums: sums["median"] / sums["one"]),
     "facing_wrong": ("share", lambda sums: sums["wrong_way"] / sums["n_frames"]),
     "coverage95": ("share", lambda sums: sums["inside"] / sums["n"]),
     "std_over_rmse": ("-", lambda sums: np.sqrt(sums["trace"] / sums["squared"])),
-    "nees": ("-", lambda sums: sums["nees"] / sums["n"] / 3),
-    "calibration_gap": ("share", _calibration_gap),
     "identity_swaps": (
         "per 100 sequences",
         lambda sums: 100 * sums["identity_swaps"] / sums["one"],
     ),
 }
 """Each as a function of sums over sequences. The median is the mean of the sequences' medians;
-NEES is per degree of freedom, 1 if the covariance is right; the calibration gap is the largest
-difference between the share of joints that the reported regions of 5, 10, ... 95 % hold and what
-they claim (the distance of Kolmogorov from chi-square); facing wrong is the share of frames in
-which the torso's left is where its right is."""
+facing wrong is the share of frames in which the torso's left is where its right is."""
 _NEEDS = {
-    **dict.fromkeys(("coverage95", "std_over_rmse", "nees", "calibration_gap"), "inside"),
+    **dict.fromkeys(("coverage95", "std_over_rmse"), "inside"),
     "identity_swaps": "identity_swaps",
 }
 
@@ -99,30 +85,12 @@ def metric(values: Floats, unit: str, sums: _Sums, factor: int = 1) -> Metric:
 
 
 def _times(parts: Parts) -> dict[str, Metric]:
-    metrics = {}
-    for (_, condition, name), part in parts.items():
-        if condition != TIMING:
-            continue
-        for batch, times in part.items():
-            key = "association_us" if name == ASSOCIATION else f"update_us.{name}.{batch}"
-            metrics[key] = over(times, "us")
-    return metrics
-
-
-def _after_return(parts: Parts, rig: str) -> dict[str, Metric]:
-    """How the estimators are a second after the other cameras' return."""
-    metrics = {}
-    for name in names_of("one_camera"):
-        cell = parts[rig, "one_camera", name]["after_return"]
-        after = drawn_sums(cell)
-        ratio = _rmse(after) / _rmse(drawn_sums(parts[rig, "clean", name]["clean"]))
-        metrics[f"after_return_over_clean.{rig}.{name}"] = metric(ratio, "-", after)
-        mirrored = np.array(cell["wrong_way"]) > 0.5 * np.array(cell["n_frames"])
-        share = drawn_sums({"n": cell["n"], "mirrored": mirrored})
-        metrics[f"mirrored_returns.{rig}.one_camera.{name}"] = metric(
-            100 * share["mirrored"] / share["one"], "per 100 sequences", share
-        )
-    return metrics
+    return {
+        f"update_us.{name}.{batch}": over(times, "us")
+        for (_, condition, name), part in parts.items()
+        if condition == TIMING
+        for batch, times in part.items()
+    }
 
 
 def _bounds(parts: Parts, name: str) -> dict[str, Metric]:

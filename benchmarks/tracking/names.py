@@ -2,7 +2,7 @@
 
 from benchmarks.tracking.env_sequences import ENV, ENV_CONDITIONS
 from benchmarks.tracking.rigs import RIGS
-from benchmarks.tracking.sequences import ENV_WINDOWS, LATE, MATCHED, SIMULATED, WINDOWS
+from benchmarks.tracking.sequences import ENV_WINDOWS, MATCHED, SIMULATED, WINDOWS
 from hrc_env.tracking.estimators import ESTIMATORS
 
 DEFAULT = "particle"
@@ -11,8 +11,6 @@ DLT = "dlt"
 """Plain per-frame triangulation; where cameras do not know names, it is told them."""
 SMOOTHER = "smoother"
 """What could have been known in view of the whole clip; not where the bound is a filter's."""
-UNBUFFERED = f"{DEFAULT}_unbuffered"
-"""The default without a memory for late frames; runs on these only."""
 RIVALS = (*(name for name in ESTIMATORS if name != DEFAULT), DLT)
 """Who else there is, of those that know no more than the frames so far."""
 
@@ -25,8 +23,7 @@ def conditions() -> list[tuple[str, str]]:
 
 def names_of(condition: str) -> list[str]:
     """Who runs on a condition, the default first."""
-    others = {MATCHED: [], LATE: [SMOOTHER, UNBUFFERED]}.get(condition, [SMOOTHER])
-    return [DEFAULT, *RIVALS, *others]
+    return [DEFAULT, *RIVALS, *([] if condition == MATCHED else [SMOOTHER])]
 
 
 def rows() -> list[tuple[str, str, str]]:

@@ -5,9 +5,9 @@ from itertools import product
 
 from benchmarks.common import cell
 from benchmarks.tracking.env_sequences import ENV
-from benchmarks.tracking.names import DEFAULT, DLT, RIVALS, SMOOTHER, UNBUFFERED, names_of, rows
+from benchmarks.tracking.names import DEFAULT, DLT, RIVALS, SMOOTHER, names_of, rows
 from benchmarks.tracking.rigs import RIGS
-from benchmarks.tracking.sequences import LATE, MATCHED, TWO_WORKERS
+from benchmarks.tracking.sequences import MATCHED, TWO_WORKERS
 from hrc_env.experiments.study.report import Metrics, Report, table
 from hrc_env.tracking.estimators import ESTIMATORS
 
@@ -15,7 +15,8 @@ _LEAD = f"""\
 Numbers in brackets are 95 % bootstrap intervals over sequences. `lab` and `site` are the bench's
 walkers and white detections of 3 px; `{ENV}` is the environment's worker seen through its
 emulator of the detector. `hard` is occlusion, gross errors and exchanged sides; in `drifting`
-detections err in the same way for half a second, of which nobody is told. `one_camera_...` are
+detections err in the same way for half a second, of which nobody is told; in `late` cameras are 40
+to 220 ms late, one has half the rate, one frame in twenty is lost. `one_camera_...` are
 the first half second, second and two seconds of the four in which one camera is left,
 `after_return` is what comes a second later. `{DLT}` is plain triangulation of every frame by
 itself; `{SMOOTHER}` knows the whole clip and is no rival."""
@@ -28,14 +29,9 @@ _TABLES: dict[str, tuple[str, int]] = {
     "median_m": ("Median error in cm", 100),
     "coverage95": ("Coverage of the reported 95 % region", 1),
     "std_over_rmse": ("Reported standard deviation / RMSE", 1),
-    "nees": ("Normalised estimation error squared per degree of freedom", 1),
-    "calibration_gap": ("Calibration gap: largest error of what regions claim to hold", 1),
     "facing_wrong": ("Percent of frames in which the torso faces the wrong way", 100),
 }
 """Title and scale of every table with a row a window."""
-_ABOUT_LATE = f"""\
-Cameras are 40 to 220 ms late, one has half the rate, one frame in twenty is lost. `{UNBUFFERED}`
-takes frames as of the moment at which they arrive."""
 _BATCHES = {"1": "batch 1", "64": "batch 64", "hard_64": "batch 64, mean over hard"}
 
 
@@ -43,22 +39,12 @@ def report(metrics: Metrics) -> Report:
     """What is to be read."""
     rivals = [DEFAULT, *RIVALS]
     swaps = {"": f"identity_swaps.{{rig}}.{TWO_WORKERS}.{{name}}"}
-    returns = {
-        ": RMSE after the return / clean": "after_return_over_clean.{rig}.{name}",
-        ": facing the wrong way, per 100": "mirrored_returns.{rig}.one_camera.{name}",
-    }
-    late = {
-        ": RMSE, cm": f"rmse_m.{{rig}}.{LATE}.{{name}}",
-        ": coverage": f"coverage95.{{rig}}.{LATE}.{{name}}",
-    }
     return Report("Tracking bench", _LEAD, (
-        f"## {DEFAULT}, the default, and the best of the others", _lead(metrics), _beaten(metrics),
+        f"## {DEFAULT}, the default, and the best of the others", _lead(metrics),
         "## RMSE / posterior Cramer-Rao bound", _bound(metrics), _ABOUT_THE_BOUND,
-        "## Microseconds per worker and update, one core", *_cost(metrics),
+        "## Microseconds per worker and update, one core", _cost(metrics),
         *(part for kind, (title, scale) in _TABLES.items()
           for part in (f"## {title}", _by_row(metrics, kind, scale))),
-        "## After one camera", _by_rig(metrics, rivals, returns),
-        "## Late frames", _ABOUT_LATE, _by_rig(metrics, (DEFAULT, UNBUFFERED), late),
         "## Two workers: changes of identity per 100 sequences",
         _by_rig(metrics, [name for name in rivals if name != DLT], swaps),
     ), "95 % intervals over seeds, times with the smallest and the largest")  # fmt: skip
@@ -81,20 +67,6 @@ def _lead(metrics: Metrics) -> str:
         ])  # fmt: skip
     header = ("", "RMSE, cm", "coverage", "std/RMSE", "paper, cm", "best other, cm", "default/best")
     return table(header, lines)
-
-
-def _beaten(metrics: Metrics) -> str:
-    """Where another is below the default, and whether by more than chance."""
-    said = []
-    for rig, _, window in rows():
-        for name in RIVALS:
-            ratio = metrics[f"default_over.{rig}.{window}.{name}"]
-            if ratio.value > 1:
-                surely = "" if ratio.low > 1 else " (the interval holds 1)"
-                said.append(f"{rig} {window}: {name}, default {ratio.value:.3f} x{surely}")
-    if not said:
-        return f"`{DEFAULT}` has the least error in every row."
-    return f"Where another's error is less than that of `{DEFAULT}`: " + "; ".join(said) + "."
 
 
 def _by_row(metrics: Metrics, kind: str, scale: int) -> str:
@@ -130,13 +102,9 @@ def _bound(metrics: Metrics) -> str:
     return _by_rig(metrics, names, kinds, both)
 
 
-def _cost(metrics: Metrics) -> tuple[str, str]:
+def _cost(metrics: Metrics) -> str:
     lines = [
         [title, *(cell(metrics[f"update_us.{name}.{batch}"], 1, 1, True) for name in ESTIMATORS)]
         for batch, title in _BATCHES.items()
     ]
-    association = cell(metrics["association_us"], 1, 0, True)
-    return table(["", *ESTIMATORS], lines), (
-        "Smallest and largest of the repeats in brackets. To tell four people apart in four "
-        f"cameras takes {association} microseconds a frame."
-    )
+    return table(["", *ESTIMATORS], lines)

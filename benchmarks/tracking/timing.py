@@ -5,19 +5,14 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.tracking.couples import shuffles
-from benchmarks.tracking.detections import Damage, detect
 from benchmarks.tracking.rigs import DT_S, Rig
 from benchmarks.tracking.sequences import Sequences
-from benchmarks.tracking.walks import walk
 from hrc_env.core.typing import Floats
 from hrc_env.experiments.study.cache import PartProgress
 from hrc_env.tracking.estimators import make_estimator
-from hrc_env.tracking.people.association import associate
 
 BATCH = 64
 _N_FRAMES, _FIRST = 75, 25
-_N_PEOPLE = 4
 
 
 def time_estimator(
@@ -51,35 +46,3 @@ def _frame_times(
         estimator.update(state, keypoints, rngs)
         seconds[t] = time.perf_counter() - started_s
     return 1e6 * seconds[min(_FIRST, n_frames - 1) :] / batch
-
-
-def time_association(rig: Rig, n_repeats: int, tick: PartProgress) -> dict[str, list[float]]:
-    """Microseconds to tell four people apart in one frame of four cameras, one per repeat."""
-    sequences = _crowd(rig)
-    estimator: Any = make_estimator("kalman", rig.P, DT_S, sequences.config)
-    times: list[float] = []
-    for _ in range(n_repeats + 1):  # the first compiles
-        rngs = [np.random.default_rng(5)]
-        state = estimator.init(1, _N_PEOPLE)
-        estimator.reset(state, np.arange(1), rngs)
-        seconds = np.empty(_N_FRAMES)
-        for t in range(_N_FRAMES):
-            keypoints = sequences.keypoints(t)
-            estimator.predict(state, DT_S, rngs)
-            predicted = estimator.estimate(state)
-            started_s = time.perf_counter()
-            found = associate(rig.P, keypoints, predicted)
-            seconds[t] = time.perf_counter() - started_s
-            estimator.update(state, found.keypoints, rngs)
-        times.append(1e6 * float(np.median(seconds[_FIRST:])))
-        tick(1 / (n_repeats + 1))
-    return {"us": times[1:]}
-
-
-def _crowd(rig: Rig) -> Sequences:
-    """One sequence of four walkers, each on a way of their own."""
-    seeds = list(range(_N_PEOPLE))
-    joints = walk(rig.walk_m, seeds, _N_FRAMES)
-    px = detect(rig.P, joints, Damage(occluded=True), seeds)  # (T, 4, C, J, 2)
-    order = shuffles([0], _N_FRAMES, len(rig.P), _N_PEOPLE)
-    return Sequences(joints[:, None], px.swapaxes(1, 2)[:, None], {}, rig.tracker, order=order)

@@ -121,7 +121,7 @@ def _film_strip(clip: "Clip", worker: str) -> "Image":
 
     from hrc_env.core.records import WorkerMotion
     from hrc_env.geometry.cameras import pinhole
-    from hrc_env.mocap.poses import segments_in
+    from hrc_env.mocap.poses import posed
     from hrc_env.motion import controls as c
     from hrc_env.motion.anatomy import anatomy
     from hrc_env.motion.clip import fitted_to
@@ -140,7 +140,7 @@ def _film_strip(clip: "Clip", worker: str) -> "Image":
     shift = np.array(STAGE_M) - q[:, [c.ROOT_X, c.ROOT_Y]]
     for at in (c.ROOT_X, c.ANKLE, c.ANKLE + 6):
         q[:, at : at + 2] += shift
-    position, turn = segments_in(q, bones)
+    position, turn, _ = posed(q, bones)
     still = np.zeros((1, *position.shape[1:]))
     tiles = []
     with closing(PictureRenderer(scene, *TILE)) as renderer:

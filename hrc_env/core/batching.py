@@ -7,12 +7,13 @@ their rows; as no result depends on the size of the batch, that is the same comp
 import copy
 import dataclasses
 import functools
+import math
 from collections.abc import Callable, Sequence
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from hrc_env.core.typing import Bools, Ints
+from hrc_env.core.typing import Bools, Floats, Ints
 
 RecordT = TypeVar("RecordT")
 State = dict[str, Any]
@@ -54,6 +55,12 @@ def copied(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return type(value)(copied(each) for each in value)
     return copy.deepcopy(value)
+
+
+def flat(array: Floats, n_last: int) -> Floats:
+    """(..., *last) as (count, *last), contiguous, where there are n_last axes in `last`."""
+    last = array.shape[-n_last:]
+    return np.ascontiguousarray(array).reshape(math.prod(array.shape[:-n_last]), *last)
 
 
 def picked(streams: Sequence[np.random.Generator], ids: Ints) -> list[np.random.Generator]:

@@ -6,7 +6,7 @@ A worker who is not seen is data (growing covariance, a flag), never one of thes
 import contextlib
 import difflib
 import numbers
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from typing import Any
 
 OLD_NAMES = {
@@ -94,6 +94,24 @@ def check_names(what: str, names: Iterable[object], valid: Collection[str]) -> N
     for name in names:
         if name not in valid:
             raise unknown(what, name, valid)
+
+
+_MUST: dict[str, Callable[[float], bool]] = {
+    "be positive": lambda value: value > 0,
+    "not be negative": lambda value: value >= 0,
+    "be in (0, 1)": lambda value: 0 < value < 1,
+    "be in (0, 1]": lambda value: 0 < value <= 1,
+    "be in [0, 1)": lambda value: 0 <= value < 1,
+    "be in [0, 1]": lambda value: 0 <= value <= 1,
+}
+
+
+def check_fields(record: object, must: str, *names: str) -> None:
+    """Raise `ConfigError` for the first field of these names that is not as it `must` (`_MUST`)."""
+    for name in names:
+        value = getattr(record, name)
+        if not _MUST[must](value):
+            raise ConfigError(f"{name} must {must}, got {value}.")
 
 
 def check_shape(what: str, got: tuple[int, ...], expected: tuple[int, ...], meaning: str) -> None:

@@ -64,7 +64,10 @@ def restored(hint: Any, value: Any, where: str) -> Any:
             raise unknown(where, value, presets)
         return presets[value]
     if dataclasses.is_dataclass(hint):
-        return _record(typing.cast(type, hint), value, where)
+        if isinstance(value, Mapping):
+            return from_mapping(typing.cast(type, hint), value, f"{where}.")
+        is_it = isinstance(value, typing.cast(type, hint))
+        return _checked(is_it, f"{_name_or(hint)}a mapping", value, where)
     if isinstance(hint, types.UnionType):
         return _one_of(typing.get_args(hint), value, where)
     if typing.get_origin(hint) is tuple:
@@ -83,13 +86,6 @@ def restored(hint: Any, value: Any, where: str) -> Any:
     if hint in (bool, str):
         return _checked(isinstance(value, hint), f"a {hint.__name__}", value, where)
     return value
-
-
-def _record(kind: type[RecordT], value: Any, where: str) -> RecordT:
-    """A record from a mapping, or itself."""
-    if isinstance(value, Mapping):
-        return from_mapping(kind, value, f"{where}.")
-    return _checked(isinstance(value, kind), f"{_name_or(kind)}a mapping", value, where)
 
 
 def _name_or(hint: Any) -> str:

@@ -177,8 +177,6 @@ class Grounds:
     places: tuple[Workplace, ...]
     """Where there is work, all of them inside the walkable area and outside `blocked`."""
     robot_xy_m: tuple[float, float]
-    """The axis of the robot's first joint [m]."""
-    robot_front_rad: float
-    """Where the robot's front looks to, from world +x [rad]."""
+    """The axis of the robot's first joint [m]; its front looks to world +x."""
     robot_clearance_m: float
     """Paths keep so far from that axis [m]: a pedestal's radius and half a person."""

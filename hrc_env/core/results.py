@@ -68,12 +68,12 @@ def write_results(
     write_whole(path, json.dumps(content, indent=1))
 
 
-def write_whole(path: Path, content: str) -> None:
-    """Write a text file, whole or not at all (what was there stays); its folder is made."""
+def write_whole(path: Path, content: str | bytes) -> None:
+    """Write a file, whole or not at all (what was there stays); its folder is made."""
     draft = path.with_name(path.name + ".draft")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        draft.write_text(content)
+        draft.write_bytes(content.encode() if isinstance(content, str) else content)
         os.replace(draft, path)
     except OSError as error:
         with contextlib.suppress(OSError):

@@ -1,5 +1,6 @@
 """Random generators that come of others, quickly: an episode takes five."""
 
+import functools
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,6 @@ class _Words(ISpawnableSeedSequence):
     as everything else. Has its attributes, of which other streams are made (`appearance`)."""
 
     spawn_key = ()
-    hashed: SeedSequence | None = None
 
     def __init__(self, words: NDArray[np.uint64]) -> None:
         self.words = words
@@ -29,15 +29,15 @@ class _Words(ISpawnableSeedSequence):
         """The words, as they are, to the generator they were drawn for."""
         if n_words == WORDS and np.dtype(dtype) == np.uint64:
             return self.words
-        return self._sequence().generate_state(n_words, dtype)
+        return self._sequence.generate_state(n_words, dtype)
 
     def spawn(self, n_children: int) -> list[Any]:
         """What children start from; nothing is drawn for them."""
-        return self._sequence().spawn(n_children)
+        return self._sequence.spawn(n_children)
 
+    @functools.cached_property
     def _sequence(self) -> SeedSequence:
-        self.hashed = self.hashed or SeedSequence(self.entropy)
-        return self.hashed
+        return SeedSequence(self.entropy)
 
 
 def children(rng: np.random.Generator, n: int) -> list[np.random.Generator]:

@@ -28,3 +28,5 @@ JointAngles: TypeAlias = Annotated[Floats, "(..., N) [rad]"]
 JointVelocities: TypeAlias = Annotated[Floats, "(..., N) [rad/s]"]
 Image: TypeAlias = Annotated[NDArray[np.uint8], "(H, W, 3) RGB"]
 Tensor: TypeAlias = NDArray[np.float32]
+Rngs: TypeAlias = list[np.random.Generator]
+"""One for each environment of a batch."""

@@ -17,7 +17,7 @@ from typing import NoReturn
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, check_names
 from hrc_env.core.mapping import from_mapping, read_toml, to_toml
 from hrc_env.core.typing import Floats
 from hrc_env.geometry.lens import Lens, distorted_radius, rays_cam
@@ -143,8 +143,7 @@ def made(
     target_world: tuple[float, float, float] = (0.2, 0.0, 1.0),
 ) -> CameraConfig:
     """A camera of a make (a key of `MAKES`), hung up somewhere."""
-    if make not in MAKES:
-        raise unknown("make of camera", make, MAKES)
+    check_names("make of camera", [make], MAKES)
     return replace(MAKES[make], name=name, eye_world=eye_world, target_world=target_world)
 
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError
 from hrc_env.core.typing import Floats, Points2, Points3, Transforms
 from hrc_env.geometry.lens import Lens, distort, magnification, rays_cam, undistort
 from hrc_env.geometry.rotations import look_at
@@ -48,11 +47,6 @@ def pinhole(
     height_px: int,
 ) -> PinholeCamera:
     """A camera with square pixels at `eye_world` that looks at `target_world`."""
-    if not 1.0 <= hfov_deg < 179.0:
-        raise ConfigError(
-            f"Camera {name!r}: horizontal field of view must be in [1, 179) degrees, "
-            f"got {hfov_deg}."
-        )
     focal_px = width_px / 2 / np.tan(np.radians(hfov_deg) / 2)
     K = np.array([[focal_px, 0, width_px / 2], [0, focal_px, height_px / 2], [0, 0, 1.0]])
     T_world_from_cam = np.eye(4)

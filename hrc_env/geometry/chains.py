@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hrc_env.core.batching import flat
 from hrc_env.core.errors import check_shape
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import RobotState
@@ -19,13 +20,11 @@ from hrc_env.core.typing import Capsules, Floats, Ints, JointAngles, JointVeloci
 class SerialChain:
     """An arm as its maker's data sheet has it: numbers only."""
 
-    joint_names: tuple[str, ...]
     T_world_from_base: Transforms  # (4, 4) where the arm is bolted down
     parent_from_joint: Transforms  # (N, 4, 4) each joint in the previous link (or base) at q = 0
     link_from_tool: Transforms  # (4, 4) the tool point's frame in the last link
     range_rad: Floats  # (N, 2) lowest and highest angle
     velocity_limit_rad_s: Floats  # (N,)
-    capsule_names: tuple[str, ...]
     capsule_link: Ints  # (K,) index of the link that carries each capsule
     capsule_ends: Capsules  # (K, 2, 3) end points in the frame of that link [m]
     capsule_radius_m: Floats  # (K,)
@@ -33,14 +32,14 @@ class SerialChain:
     @property
     def n_joints(self) -> int:
         """N, the number of hinges."""
-        return len(self.joint_names)
+        return len(self.range_rad)
 
 
 def forward(chain: SerialChain, q: JointAngles) -> Transforms:
     """Frames of all links, (..., N, 4, 4) world_from_link, at angles q (..., N)."""
-    flat, lead = _flat(chain, "q", q)
-    frames = np.empty((len(flat), chain.n_joints, 4, 4))
-    _forward(flat, chain.T_world_from_base, chain.parent_from_joint, frames)
+    angles, lead = _rows(chain, "q", q)
+    frames = np.empty((len(angles), chain.n_joints, 4, 4))
+    _forward(angles, chain.T_world_from_base, chain.parent_from_joint, frames)
     return frames.reshape(*lead, chain.n_joints, 4, 4)
 
 
@@ -51,9 +50,9 @@ def tool(chain: SerialChain, q: JointAngles) -> Transforms:
 
 def jacobian(chain: SerialChain, q: JointAngles) -> Floats:
     """Tool velocity per joint velocity, (..., 3, N) [m/rad], world axes, at q (..., N)."""
-    flat, lead = _flat(chain, "q", q)
-    result = np.empty((len(flat), 3, chain.n_joints))
-    _jacobian(forward(chain, flat), chain.link_from_tool, result)
+    angles, lead = _rows(chain, "q", q)
+    result = np.empty((len(angles), 3, chain.n_joints))
+    _jacobian(forward(chain, angles), chain.link_from_tool, result)
     return result.reshape(*lead, 3, chain.n_joints)
 
 
@@ -74,8 +73,8 @@ def robot_along(
     along them, (..., T, K, 2, 3)."""
     frames = forward(chain, q_path)
     ends = _carried(chain, frames)
-    rates, lead = _flat(chain, "qd", qd)
-    last = np.ascontiguousarray(frames[..., -1, :, :, :]).reshape(len(rates), *frames.shape[-3:])
+    rates, lead = _rows(chain, "qd", qd)
+    last = flat(frames[..., -1, :, :, :], 3)
     tool_world, velocity = np.empty((len(rates), 3)), np.empty((len(rates), 3))
     _tool_motion(last, rates, chain.link_from_tool, tool_world, velocity)
     tool_world, velocity = tool_world.reshape(*lead, 3), velocity.reshape(*lead, 3)
@@ -87,17 +86,17 @@ def robot_along(
 def _carried(chain: SerialChain, frames: Transforms) -> Capsules:
     """The capsules on links whose frames (..., N, 4, 4) are known."""
     lead, shape = frames.shape[:-3], chain.capsule_ends.shape
-    stacked = frames.reshape(math.prod(lead), *frames.shape[-3:])
+    stacked = flat(frames, 3)
     ends = np.empty((len(stacked), *shape))
     _capsules(stacked, chain.capsule_link, chain.capsule_ends, ends)
     return ends.reshape(*lead, *shape)
 
 
-def _flat(chain: SerialChain, name: str, values: Floats) -> tuple[Floats, tuple[int, ...]]:
+def _rows(chain: SerialChain, name: str, values: Floats) -> tuple[Floats, tuple[int, ...]]:
     """Values (..., N) as (B, N), contiguous, and the leading axes they had."""
     array = np.asarray(values, float)
     check_shape(f"The last axis of {name}", array.shape[-1:], (chain.n_joints,), "one per joint")
-    return np.ascontiguousarray(array.reshape(-1, chain.n_joints)), array.shape[:-1]
+    return flat(array, 1), array.shape[:-1]
 
 
 @kernel

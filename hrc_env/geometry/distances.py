@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hrc_env.core.batching import flat
 from hrc_env.core.kernels import kernel
 from hrc_env.core.skeleton import HAND_SEGMENTS, SEGMENT_ENDS, SEGMENT_RADIUS_M
 from hrc_env.core.typing import Capsules, Floats, Ints, Points3
@@ -42,17 +43,11 @@ def least_separation(
         radius_b_m: (..., Kb) likewise; or those of one body where the second sets are several.
     """
     lead = capsules_b.shape[:-3]
-    flat_a, flat_b = _flat(capsules_a, 3), _flat(capsules_b, 3)
+    flat_a, flat_b = flat(capsules_a, 3), flat(capsules_b, 3)
     gap, points = np.empty(len(flat_b)), np.empty((len(flat_b), 2, 3))
-    _narrowest(flat_a, _flat(radius_a_m, 1), flat_b, _flat(radius_b_m, 1), gap, points)
+    _narrowest(flat_a, flat(radius_a_m, 1), flat_b, flat(radius_b_m, 1), gap, points)
     points = points.reshape(*lead, 2, 3)
     return Separation(gap.reshape(lead), points[..., 0, :], points[..., 1, :])
-
-
-def _flat(array: Floats, n_last: int) -> Floats:
-    """(..., *last) as (count, *last), contiguous."""
-    shape = array.shape[-n_last:]
-    return np.ascontiguousarray(array).reshape(math.prod(array.shape[:-n_last]), *shape)
 
 
 @kernel
@@ -147,9 +142,9 @@ def _search(a, radius_a, b, radius_b, least, points):
 def segments(joints_world: Floats) -> Floats:
     """(..., 16, 2, 3) end points of a body's segments, the hands last, of joints (..., 15, 3) [m];
     radii are `SEGMENT_RADIUS_M`."""
-    flat = _flat(joints_world, 2)
-    ends = np.empty((len(flat), len(SEGMENT_RADIUS_M), 2, 3))
-    _segments(flat, ends)
+    joints = flat(joints_world, 2)
+    ends = np.empty((len(joints), len(SEGMENT_RADIUS_M), 2, 3))
+    _segments(joints, ends)
     return ends.reshape(*joints_world.shape[:-2], *ends.shape[1:])
 
 

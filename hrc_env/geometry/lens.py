@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, check_names
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
 
@@ -53,8 +53,7 @@ class Lens:
     """The model's, in OpenCV's order: k1, k2, p1, p2, k3, or k1, k2, k3, k4; the rest is 0."""
 
     def __post_init__(self) -> None:
-        if self.model not in COEFFICIENTS:
-            raise unknown("lens model", self.model, COEFFICIENTS)
+        check_names("lens model", [self.model], COEFFICIENTS)
         names = COEFFICIENTS[self.model]
         if len(self.coefficients) > len(names) or not np.isfinite(self.coefficients).all():
             raise ConfigError(

@@ -12,7 +12,7 @@ import numpy as np
 
 from hrc_env.core.errors import ConfigError, check_shape
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Bools, Covariances3, Floats, Ints, Points2, Points3
+from hrc_env.core.typing import Bools, Covariances3, Floats, Points2, Points3
 
 NEAREST_DEPTH_M = 0.05
 """Points nearer to a camera's plane than this have no usable pixel."""
@@ -27,11 +27,6 @@ class Triangulation:
     points_world: Points3  # (B, W, J, 3) [m]
     cov_world: Covariances3  # (B, W, J, 3, 3) [m^2], inverse information of the views used
     used: Bools  # (B, C, W, J) the views that the point was made from
-
-    @property
-    def n_views(self) -> Ints:
-        """(B, W, J) number of views that were used."""
-        return self.used.sum(1)
 
 
 def triangulate(P: Floats, px: Points2, sigma_px: Floats, gate_sigma: float = 0.0) -> Triangulation:

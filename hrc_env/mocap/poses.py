@@ -6,7 +6,7 @@ import numpy as np
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.skeleton import JOINTS
-from hrc_env.core.typing import Floats, Ints, Points3, QuaternionsWxyz
+from hrc_env.core.typing import Floats, Ints, Points3, QuaternionsWxyz, Rotations
 from hrc_env.motion.anatomy import Anatomy, anatomy
 from hrc_env.motion.kinematics import pose, quaternion
 from hrc_env.motion.state import WORKER, Worker
@@ -46,17 +46,14 @@ def marks_of(body: Body, landmarks: bool) -> Marks:
 
 def joints_in(q: Floats, marks: Marks) -> Points3:
     """(N, 15, 3) joints of poses (N, N_CONTROLS)."""
-    position, _, turn = _posed(q, marks.anatomy)
+    position, _, turn = posed(q, marks.anatomy)
     arm = turn[:, marks.segment] @ marks.offset[..., None]
     return position[:, marks.segment] + arm[..., 0]
 
 
-def segments_in(controls: Floats, anatomy: Anatomy) -> tuple[Points3, QuaternionsWxyz]:
-    """Origins (T, 22, 3) [m] and turns (T, 22, 4) of control vectors (T, N_CONTROLS)."""
-    return _posed(controls, anatomy)[:2]
-
-
-def _posed(q: Floats, bones: Anatomy) -> tuple[Points3, QuaternionsWxyz, Floats]:
+def posed(q: Floats, bones: Anatomy) -> tuple[Points3, QuaternionsWxyz, Rotations]:
+    """Origins (T, 22, 3) [m] of control vectors (T, N_CONTROLS), and turns, (T, 22, 4) as
+    quaternions and (T, 22, 3, 3)."""
     position, turn = np.empty((len(q), N_SEGMENTS, 3)), np.empty((len(q), N_SEGMENTS, 4))
     matrix = np.empty((len(q), N_SEGMENTS, 3, 3))
     me = np.zeros(1, WORKER)[0]

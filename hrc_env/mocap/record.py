@@ -6,10 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError, check_shape
-from hrc_env.core.skeleton import N_JOINTS
+from hrc_env.core.errors import ConfigError
 from hrc_env.core.typing import Floats, Ints, Points3, Rotations
-from hrc_env.motion.clip import check_rate
 
 FEWEST_FRAMES = 2
 
@@ -30,10 +28,6 @@ class Capture:
     """Name of the file."""
     repaired: tuple[str, ...] = ()
     """What was guessed or mended, a sentence each."""
-
-    def __post_init__(self) -> None:
-        check_shape("joints", self.joints_world.shape[1:], (N_JOINTS, 3), "joints, xyz")
-        check_rate(self.fps, self.source)
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ import numpy as np
 
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.mocap.person import runs, smoothed
-from hrc_env.mocap.poses import segments_in
+from hrc_env.mocap.poses import posed
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import ANKLE_Z, Anatomy
 from hrc_env.motion.clip import footprints, rolled
@@ -46,7 +46,7 @@ def locked(q: Floats, fps: float, size: Floats) -> tuple[Floats, Bools]:
 
 def slip(q: Floats, stands: Bools, fps: float, anatomy: Anatomy) -> Floats:
     """Speeds along the floor of the balls of standing feet [m/s], one a frame and foot."""
-    position, _ = segments_in(q, anatomy)
+    position, _, _ = posed(q, anatomy)
     speeds = []
     for side, name in enumerate(("left_toes", "right_toes")):
         on = stands[:, side] & (q[:, c.ANKLE + 6 * side + 4] > -FLAT_RAD)

@@ -1,6 +1,6 @@
 """A clip: recorded motion as control vectors, in a file of its own that any worker plays."""
 
-import os
+import io
 import zipfile
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from hrc_env.core.errors import ConfigError, check_shape
+from hrc_env.core.results import write_whole
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import ANKLE_Z, ARM, BALL_X, BALL_Z, HEEL_X, LEG, N_SIZES, STAND_Z
@@ -91,13 +92,11 @@ def fitted_to(clip: Clip, size: Floats) -> Floats:
 
 def save_clip(clip: Clip, path: Path) -> None:
     """Write a clip; the file is there whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    draft = path.with_name(path.name + ".draft")
     arrays = {item.name: getattr(clip, item.name) for item in fields(clip)}
     arrays["controls"] = clip.controls[:, RECORDED]
-    with draft.open("wb") as file:
-        np.savez_compressed(file, version=VERSION, **arrays)
-    os.replace(draft, path)
+    file = io.BytesIO()
+    np.savez_compressed(file, version=VERSION, **arrays)
+    write_whole(path, file.getvalue())
 
 
 def load_clip(path: Path) -> Clip:

@@ -61,15 +61,12 @@ class PeopleConfig:
 
 def _check_ranges(config: Any) -> None:
     """Refuse ranges that are not (low, high), and probabilities outside [0, 1]."""
-    for name, value in [(each.name, getattr(config, each.name)) for each in fields(config)]:
-        if name.endswith(("_m", "_s")) and _descends(value):
+    for name in (each.name for each in fields(config)):
+        value = getattr(config, name)
+        if name.endswith(("_m", "_s")) and isinstance(value, tuple) and value[0] > value[1]:
             raise ConfigError(f"{name} must be (low, high), got {value}.")
-        if name.endswith("_probability") and not 0 <= value <= 1:
+        if name.endswith("_probability") and not 0 <= getattr(config, name) <= 1:
             raise ConfigError(f"{name} must lie in [0, 1], got {value}.")
-
-
-def _descends(value: Any) -> bool:
-    return isinstance(value, tuple) and value[0] > value[1]
 
 
 PEOPLE: dict[str, PeopleConfig] = {

@@ -137,13 +137,13 @@ def _candidates(who: Decision, kind: str) -> Iterator[Place]:
         for radius, azimuth, turn in zip(draws[::3], draws[1::3], draws[2::3], strict=True):
             low, high = config.near_radius_m
             r = low + radius * (high - low)
-            angle = grounds.robot_front_rad + config.near_azimuth_rad * (2.0 * azimuth - 1.0)
+            angle = config.near_azimuth_rad * (2.0 * azimuth - 1.0)
             x = grounds.robot_xy_m[0] + r * math.cos(angle)
             y = grounds.robot_xy_m[1] + r * math.sin(angle)
             if slack_at(x, y, plan.slack, plan.origin) >= 0.0:
                 yield x, y, angle + math.pi + 0.15 * (2.0 * turn - 1.0), ROBOT_WORK_M
     else:
-        places = [place for place in plan.places if place.kind == kind]
+        places = [place for place in plan.grounds.places if place.kind == kind]
         first = int(draws[0] * len(places))
         for place in (*places[first:], *places[:first]):
             yield *place.xy_m, place.yaw_rad, place.height_m

@@ -1,21 +1,20 @@
 """Where a worker's root may be: the slack [m] on a grid, to what stands there and the edge."""
 
 import math
-import warnings
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.kernels import kernel
-from hrc_env.core.records import Grounds, Workplace
+from hrc_env.core.records import Grounds
 from hrc_env.core.typing import Floats
 
 BODY_M, STAND_M = 0.40, 0.22
 """Walkers keep so far from what stands there: half their width, swinging arms included; those who
 work there, half the depth of a trunk and its sway [m]; judgement."""
-CELL_M, MENDED_M = 0.05, 0.3
-"""Grid of the field; a place that is inside something is moved by as much at most [m]."""
+CELL_M = 0.05
+"""Grid of the field [m]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,50 +25,26 @@ class Floorplan:
     """(X, Y) of grid points [m]: where it is 0 or more a walker has room."""
     origin: Floats
     """(2,) first grid point [m]."""
-    places: tuple[Workplace, ...]
-    """Where there is work, and room to stand."""
     grounds: Grounds
 
 
 def floorplan(grounds: Grounds) -> Floorplan:
-    """Measure the grounds; `ConfigError`: nowhere to walk, or a workplace inside something."""
+    """Measure the grounds; `ConfigError`: nowhere to walk, or no room at a workplace."""
     (x0, x1), (y0, y1) = grounds.walkable_x_m, grounds.walkable_y_m
-    if not (x0 < x1 and y0 < y1):
-        raise ConfigError(
-            "The walkable area must be (low, high) along x and y, got "
-            f"{grounds.walkable_x_m} and {grounds.walkable_y_m}."
-        )
     xs = np.arange(x0, x1 + 0.5 * CELL_M, CELL_M)
     ys = np.arange(y0, y1 + 0.5 * CELL_M, CELL_M)
-    plan = Floorplan(_slack(xs[:, None], ys, grounds), np.array([xs[0], ys[0]]), (), grounds)
-    if plan.slack.max() < 0.0:
+    slack, origin = _slack(xs[:, None], ys, grounds), np.array([xs[0], ys[0]])
+    if slack.max() < 0.0:
         raise ConfigError("The grounds leave no room for a worker: everything is blocked.")
-    for array in (plan.slack, plan.origin):
+    for array in (slack, origin):
         array.flags.writeable = False
-    return replace(plan, places=tuple(mended(plan, place) for place in grounds.places))
-
-
-def mended(plan: Floorplan, place: Workplace) -> Workplace:
-    """A workplace where there is room to stand; moved a little, with a warning, if need be."""
-    if slack_at(*place.xy_m, plan.slack, plan.origin) >= STAND_M - BODY_M:
-        return place
-    xs, ys = (plan.origin[i] + CELL_M * np.arange(plan.slack.shape[i]) for i in range(2))
-    away = np.hypot(xs[:, None] - place.xy_m[0], ys[None] - place.xy_m[1])
-    away[plan.slack < STAND_M - BODY_M] = np.inf
-    i, j = np.unravel_index(np.argmin(away), away.shape)
-    x, y = float(xs[i]), float(ys[j])
-    if away[i, j] > MENDED_M:
-        raise ConfigError(
-            f"Workplace {place.name!r} at {place.xy_m} is inside something or beyond the walkable "
-            f"area: expected {STAND_M} m from both at least; the nearest such point is "
-            f"({x:.2f}, {y:.2f})."
-        )
-    warnings.warn(
-        f"Workplace {place.name!r} at {place.xy_m} leaves no room to stand: moved to "
-        f"({x:.2f}, {y:.2f}).",
-        stacklevel=2,
-    )
-    return replace(place, xy_m=(x, y))
+    for place in grounds.places:
+        if slack_at(*place.xy_m, slack, origin) < STAND_M - BODY_M:
+            raise ConfigError(
+                f"Workplace {place.name!r} at {place.xy_m} leaves no room to stand: expected "
+                f"{STAND_M} m at least from what stands there and inside the walkable area."
+            )
+    return Floorplan(slack, origin, grounds)
 
 
 def room_for(plan: Floorplan, apart_m: float) -> int:

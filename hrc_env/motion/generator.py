@@ -51,7 +51,6 @@ OPEN_FLOOR = Grounds(
         Workplace("behind", "open", (1.9, 0.0), 0.0, 0.0),
     ),
     robot_xy_m=(-0.75, 0.0),
-    robot_front_rad=0.0,
     robot_clearance_m=0.8,
 )
 """Where workers are whom no scene holds: the laboratory's walkway without its furniture."""
@@ -66,11 +65,7 @@ def make_state(
     They have the `body`, or each episode gives each one of several, and walk on the `grounds`. At
     least `fewest` of them are in an episode, drawn at its beginning; None: all.
     """
-    if batch < 1 or n_workers < 0:
-        raise ConfigError(f"Need batch >= 1 and n_workers >= 0, got {batch} and {n_workers}.")
     fewest = n_workers if fewest is None else fewest
-    if not 0 <= fewest <= n_workers:
-        raise ConfigError(f"The fewest workers must be 0 to {n_workers}, got {fewest}.")
     bones, plan = anatomies(body), floorplan(grounds)
     fit = room_for(plan, config.spacing_m)
     if n_workers > fit:
@@ -79,7 +74,7 @@ def make_state(
             f"{config.spacing_m} m from each other."
         )
     clips = [m if isinstance(m, Clip) else load_clip(Path(m)) for m in config.motions]
-    schedule = schedule_at(config.jobs, {place.kind for place in plan.places})
+    schedule = schedule_at(config.jobs, {place.kind for place in grounds.places})
     values = numbers(config, grounds.robot_xy_m)
     pieces = stocked(clips, bones.size)
     mind = BehaviourParams(config, values, plan, schedule, pieces, bones, fewest)

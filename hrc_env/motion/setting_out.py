@@ -15,7 +15,7 @@ from hrc_env.motion.schedule import HERE
 from hrc_env.motion.starting import start_going, start_here
 from hrc_env.motion.state import N_START, THERE, UNDER_WAY, Place
 from hrc_env.motion.traffic import APART_M, meets
-from hrc_env.worker.props import prop_index
+from hrc_env.worker.props import PROP_NAMES
 
 WISHED_CLIP, WHICH_CLIP = N_START - 2, N_START - 1
 """Of an activity's own draws: whether to play a clip instead of it, and which."""
@@ -62,7 +62,7 @@ def _set_out(who: Decision, place: Place, obstacles: Floats, share: float) -> Be
     if who.loaded:
         activity = st.CARRY
     elif who.job.by == "push":
-        activity, prop = st.PUSH, prop_index(who.job.prop)
+        activity, prop = st.PUSH, PROP_NAMES.index(who.job.prop)
     elif who.job.at in STUMBLE_TO and stumbles:
         activity = st.STUMBLE
     pace = share * float(me["speed_m_s"])

@@ -19,7 +19,7 @@ from hrc_env.motion.hands import plan_lift, plan_reach
 from hrc_env.motion.posture import from_here
 from hrc_env.motion.state import Pair, Triple, Worker
 from hrc_env.motion.walk import plan_walk
-from hrc_env.worker.props import prop_index
+from hrc_env.worker.props import PROP_NAMES
 
 BODY_M, OWN_SIDE_M = 0.36, 0.30
 """Hands keep so far from their own root, and from the middle to another worker [m]."""
@@ -70,7 +70,7 @@ def start_here(who: Decision, activity: int, height: float) -> float:
     if activity == st.LIFT:
         return start_lift(draws, config, me)
     if activity == st.PICK_UP:
-        prop, on_shoulder = prop_index(who.job.prop), bool(draws[8] < 0.5)
+        prop, on_shoulder = PROP_NAMES.index(who.job.prop), bool(draws[8] < 0.5)
         return loads.finish_lift(loads.plan_pick_up(draws, height, prop, on_shoulder, me), me)
     if activity == st.DRILL:  # below the head, and above it for drilling overhead
         height = min(height, wp.OVERHEAD_M - 0.1)

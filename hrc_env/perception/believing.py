@@ -32,6 +32,24 @@ ANKLE_M, LEVELS_M = 0.1, np.array([(0.2, 0.9), (0.6, 1.4), (1.0, 2.0), (1.2, 2.3
 """the height of the first above the floor, and bounds of the others' and of the nose's [m]."""
 
 
+def is_somebody(
+    px: Points2,
+    confidence: Floats,
+    sigma_px: Floats,
+    cameras: Sequence[PinholeCamera],
+    floor_world: Points3 | None,
+) -> bool:
+    """Whether what a search has found is a person: joints and floor as below; of a floor that is
+    not known, a camera that is the only one is believed."""
+    shown = np.flatnonzero(confidence.any(1)).tolist()
+    if len(shown) > 1:
+        return is_body(px, confidence, sigma_px, cameras)
+    if not shown or floor_world is None:
+        return shown == [0] and len(cameras) == 1
+    (c,) = shown
+    return stands(px[c], confidence[c], cameras[c], floor_world)
+
+
 def is_body(
     px: Points2, confidence: Floats, sigma_px: Floats, cameras: Sequence[PinholeCamera]
 ) -> bool:

@@ -14,7 +14,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import JOINTS, MIRROR
 from hrc_env.core.typing import Floats, Ints
 
-FORMAT, VERSION = "hrc_env keypoints", 5
+FORMAT, VERSION = "hrc_env keypoints", 6
 """Version: what the tables mean. A file of another one is refused."""
 PACKAGED = Path(__file__).with_name("keypoints.json")
 KINDS = ("nose", "shoulder", "elbow", "wrist", "hip", "knee", "ankle", "foot")
@@ -54,6 +54,7 @@ class Calibration:
     offset_m: Floats  # where the detector means a joint to be: ahead, to its own side, up [m]
     wander_m: Floats  # how far that varies, a standard deviation [m]
     space_limb: Floats  # its correlation with what varies of the `NEXT` joint, axis by axis
+    between_m: Floats  # how far `offset_m` differs from body to body, a standard deviation [m]
     tail: Floats  # now and then further: a normal vector n is lengthened by 1 + tail n.n / 3
     bias: Floats  # mean error in a camera by the view, of side
     size: Floats  # median over time of the standard deviation of each coordinate, of side
@@ -75,7 +76,7 @@ class Calibration:
 
 SHAPES: dict[str, tuple[int, ...]] = {
     "offset_m": (_P, _K, 3), "wander_m": (_P, _K, 3), "space_limb": (_K, 3),
-    "tail": (_P,), "bias": (N_VIEWS, _K, 2),
+    "between_m": (_K, 3), "tail": (_P,), "bias": (N_VIEWS, _K, 2),
     "size": (_P, _S, _K), "spread": (_P, _S, _K), "body": (_P, _Q),
     "common": (), "shares": (_K, 3),
     "slow_s": (), "slow_m": (), "limb": (_K,), "confidence": (_P, _S, _K, _Z), "follows": (_S, _K),

@@ -1,10 +1,11 @@
 """Pixels to keypoints: crops of every camera through BlazePose, two at a time.
 
-The calling thread draws crops while a helper thread runs the network on them; then both empty the
-queue. Each has its own interpreters: what is seen does not depend on who came first.
+The calling thread draws crops while two others run the networks on them. Each of these has its own
+interpreters: what is seen does not depend on who came first.
 """
 
 import functools
+import threading
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
@@ -15,17 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.core.batching import Stateful
-from hrc_env.core.errors import ConfigError, check_shape, unknown
+from hrc_env.core.errors import ConfigError, check_fields, check_names, check_shape
 from hrc_env.core.records import Roi
 from hrc_env.core.skeleton import BLAZEPOSE_INDEX, N_JOINTS
 from hrc_env.core.typing import Floats, Image, Points2, Points3
 from hrc_env.geometry.cameras import PinholeCamera, inside_image
 from hrc_env.perception import blazepose, network
-from hrc_env.perception.believing import is_body, stands
+from hrc_env.perception.believing import is_somebody
 from hrc_env.perception.noise import ERROR, STANDING, sigma_px
 from hrc_env.perception.searching import (
     Candidates,
     ImageSource,
+    Views,
     apart_from,
     distinct,
     people,
@@ -39,6 +41,8 @@ SIDE = network.LANDMARK_SIDE
 STATURE_OF_SIDE = 0.75
 """Stature of an upright worker as a share of the side of BlazePose's window round them."""
 ResultT = TypeVar("ResultT")
+_THREAD = threading.local()
+"""Its `networks`: those of one of a detector's two threads."""
 KeypointFunction = Callable[[Image], Floats | None]
 """A crop (256, 256, 3) RGB uint8 -> (J, 3): x, y [px] from its corner and confidence in [0, 1] of
 `core.skeleton.JOINTS`; NaN, NaN, 0 of a joint that was not found. None: nobody is there."""
@@ -74,19 +78,12 @@ class DetectorConfig:
     """The landmark network for who is bent, squats or kneels; "heavy" is more exact, and slower."""
 
     def __post_init__(self) -> None:
-        if self.runtime not in network.RUNTIMES:
-            raise unknown("detector.runtime", self.runtime, network.RUNTIMES)
-        if self.keypoints not in DETECTORS:
-            raise unknown("detector.keypoints", self.keypoints, DETECTORS)
-        for name in ("network", "folded"):
-            if getattr(self, name) not in network.NETWORKS:
-                raise unknown(f"detector.{name}", getattr(self, name), network.NETWORKS)
-        for name in ("min_presence", "sure_presence", "outside_confidence"):
-            if not 0 < getattr(self, name) <= 1:
-                raise ConfigError(f"{name} must be in (0, 1], got {getattr(self, name)}.")
-        for name in ("gate_every", "search_every", "max_offset"):
-            if not getattr(self, name) > 0:
-                raise ConfigError(f"{name} must be positive, got {getattr(self, name)}.")
+        check_names("detector.runtime", [self.runtime], network.RUNTIMES)
+        check_names("detector.keypoints", [self.keypoints], DETECTORS)
+        check_names("detector.network", [self.network], network.NETWORKS)
+        check_names("detector.folded", [self.folded], network.NETWORKS)
+        check_fields(self, "be in (0, 1]", "min_presence", "sure_presence", "outside_confidence")
+        check_fields(self, "be positive", "gate_every", "search_every", "max_offset")
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +93,7 @@ class Detection:
     px: Points2  # (C, J, 2) [px] in the whole image, as its lens distorts it
     confidence: Floats  # (C, J) visibility in [0, 1]
     sigma_px: Floats  # (C, J) standard deviation of each coordinate [px]
-    windows: list[Roi | None]  # where each camera looked
+    windows: Views  # where each camera looked
     crops: list[Image | None] = field(default_factory=list)  # what the network was given of each
 
 
@@ -110,8 +107,8 @@ class _Networks:
 
 
 class PoseDetector(Stateful):
-    """Finds the joints of workers in the images of a rig; networks and the helper thread are made
-    at the first look and left out of a pickle."""
+    """Finds the joints of workers in the images of a rig; networks and their threads are made at
+    the first look and left out of a pickle."""
 
     CHANGES = ("_looks",)
 
@@ -133,8 +130,7 @@ class PoseDetector(Stateful):
         self.floor_world, self.error = floor_world, error
         self._search = [search_windows(camera, floor_world) for camera in self.cameras]
         self._looks: dict[int, list[int]] = {}
-        self._networks: tuple[_Networks, _Networks] | None = None
-        self._helper: ThreadPoolExecutor | None = None
+        self._threads: ThreadPoolExecutor | None = None
 
     def detect(
         self,
@@ -163,7 +159,8 @@ class PoseDetector(Stateful):
         for proposal in proposals(apart_from(known, others), self.cameras):
             self.forget(track)
             sight = self._look(source, proposal, track, folded, posture)
-            if self._is_somebody(sight):
+            joints = sight.px, sight.confidence, sight.sigma_px
+            if is_somebody(*joints, self.cameras, self.floor_world):
                 return sight
         self.forget(track)
         return _nobody([None] * len(windows))
@@ -189,13 +186,13 @@ class PoseDetector(Stateful):
         self._looks.pop(track, None)
 
     def close(self) -> None:
-        """Stop the helper thread and free the networks; the next look makes them anew."""
-        if self._helper is not None:
-            self._helper.shutdown(wait=True, cancel_futures=True)
-        self._helper = self._networks = None
+        """Stop the threads and free their networks; the next look makes them anew."""
+        if self._threads is not None:
+            self._threads.shutdown(wait=True, cancel_futures=True)
+        self._threads = None
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_helper": None, "_networks": None}
+        return {**self.__dict__, "_threads": None}
 
     def _look(
         self,
@@ -223,17 +220,6 @@ class PoseDetector(Stateful):
                 self._write(sight, c, window, joints, posture)
         return sight
 
-    def _is_somebody(self, sight: Detection) -> bool:
-        """Whether what a search has found is a person; of a floor that is not known, a camera that
-        is the only one is believed."""
-        shown = np.flatnonzero(sight.confidence.any(1)).tolist()
-        if len(shown) > 1:
-            return is_body(sight.px, sight.confidence, sight.sigma_px, self.cameras)
-        if not shown or self.floor_world is None:
-            return shown == [0] and len(self.cameras) == 1
-        (c,) = shown
-        return stands(sight.px[c], sight.confidence[c], self.cameras[c], self.floor_world)
-
     def _crop(self, source: ImageSource, c: int, window: Roi) -> Image:
         """A copy of the crop, black where the camera does not see: renderers go on drawing."""
         crop, camera = source.crop(c, window), self.cameras[c]
@@ -249,29 +235,17 @@ class PoseDetector(Stateful):
         return looks == 0 or (looks + camera * every // len(self.cameras)) % every == 0
 
     def _share(self, jobs: Iterable[Callable[[_Networks], ResultT]]) -> list[ResultT]:
-        """Results in order; the helper works from the front, this thread from the back."""
-        helper, (mine, helpers) = self._open()
-        given = []
-        try:
-            for job in jobs:
-                given.append((job, helper.submit(job, helpers)))
-        except BaseException:
-            for _, future in given:
-                future.cancel()
-            raise
-        taken = {}
-        for k in reversed(range(len(given))):
-            job, future = given[k]
-            if future.cancel():
-                taken[k] = job(mine)
-        return [taken[k] if k in taken else given[k][1].result() for k in range(len(given))]
+        """Results in order."""
+        if self._threads is None:
+            self._threads = ThreadPoolExecutor(2, thread_name_prefix="hrc_env-detector")
+        given = [self._threads.submit(self._done, job) for job in jobs]
+        return [future.result() for future in given]
 
-    def _open(self) -> tuple[ThreadPoolExecutor, tuple[_Networks, _Networks]]:
-        if self._networks is None:
-            self._networks = (_networks(self.config), _networks(self.config))
-        if self._helper is None:
-            self._helper = ThreadPoolExecutor(1, thread_name_prefix="hrc_env-detector")
-        return self._helper, self._networks
+    def _done(self, job: Callable[[_Networks], ResultT]) -> ResultT:
+        """What a job gives with this thread's networks."""
+        if not hasattr(_THREAD, "networks"):
+            _THREAD.networks = _networks(self.config)
+        return job(_THREAD.networks)
 
     def _write(
         self, sight: Detection, c: int, window: Roi, joints: Floats, posture: Sequence[float]
@@ -291,11 +265,10 @@ def _nobody(windows: Sequence[Roi | None]) -> Detection:
 
 
 def _networks(config: DetectorConfig) -> _Networks:
-    runtime = network.chosen_runtime(config.runtime)
-    landmark = {k: network.load_landmarker(k, runtime) for k in {config.network, config.folded}}
+    names, runtime = {config.network, config.folded}, config.runtime
+    landmark = {name: network.load_landmarker(name, runtime) for name in names}
     make = DETECTORS[config.keypoints]
-    own = None if make is None else make()
-    return _Networks(network.load_person_detector(runtime), landmark, own)
+    return _Networks(network.load_person_detector(runtime), landmark, make and make())
 
 
 def own_joints(find: KeypointFunction, crop: Image, window: Roi) -> Floats | None:

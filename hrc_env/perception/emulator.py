@@ -3,15 +3,14 @@ that was fitted to what the network made of rendered workers (docs/emulator.md).
 
 import functools
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError, check_shape
+from hrc_env.core.errors import ConfigError, check_fields, check_shape
 from hrc_env.core.records import Keypoints, PoseEstimate, WorkerTruth
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Floats, Ints, Records
+from hrc_env.core.typing import Floats, Ints, Records, Rngs
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.geometry.lens import lens_row
 from hrc_env.geometry.sight import Surroundings
@@ -19,8 +18,6 @@ from hrc_env.perception import emulator_kernel as kernels
 from hrc_env.perception.calibration import POSTURED, Calibration, changed_ns, read_calibration
 from hrc_env.perception.detector import STATURE_OF_SIDE
 from hrc_env.perception.sightlines import CAMERA, N_LOOK, World, sight_batch
-
-Generators = Sequence[np.random.Generator]
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,13 +41,9 @@ class EmulatorConfig:
     """Joints outside the image are guesses, at most this visible; as in `DetectorConfig`."""
 
     def __post_init__(self) -> None:
-        for name in ("error_scale", "max_error"):
-            if not getattr(self, name) >= 0:
-                raise ConfigError(f"{name} must not be negative, got {getattr(self, name)}.")
-        for name in ("swap_share", "miss_share", "outside_confidence"):
-            value = getattr(self, name)
-            if value is not None and not 0 <= value <= 1:
-                raise ConfigError(f"{name} must be in [0, 1], got {value}.")
+        check_fields(self, "not be negative", "error_scale", "max_error")
+        chosen = [n for n in ("swap_share", "miss_share") if getattr(self, n) is not None]
+        check_fields(self, "be in [0, 1]", "outside_confidence", *chosen)
         self.calibrated()
 
     def calibrated(self) -> Calibration:
@@ -84,7 +77,7 @@ def make_state(
     return EmulatorState(errors, np.zeros((batch, n_workers, N_JOINTS, 3)), dt_s)
 
 
-def reset(state: EmulatorState, ids: Ints, rngs: Generators) -> None:
+def reset(state: EmulatorState, ids: Ints, rngs: Rngs) -> None:
     """Begin environments `ids` anew with errors drawn from how they are in the long run."""
     *names, last = (state.errors[name] for name in kernels.ERRORS.names or ())
     arrays = (*names, state.wander, last)
@@ -96,7 +89,7 @@ def reset(state: EmulatorState, ids: Ints, rngs: Generators) -> None:
 
 def emulate(
     state: EmulatorState,
-    rngs: Generators,
+    rngs: Rngs,
     truth: WorkerTruth,
     surroundings: Surroundings,
     cameras: tuple[PinholeCamera, ...],
@@ -108,10 +101,8 @@ def emulate(
 
     Args:
         state: of the errors, advanced by one image in place.
-        rngs: one generator per environment.
         truth: (B, W, ...) the workers; their capsules hide joints of their own and of others.
         surroundings: (B, ...) the room, what is carried and the robot, which hide joints too.
-        cameras: the rig (C).
         config: as given to `make_state`.
         expected: (B, W, ...) what the tracker predicts, which decides what is told of errors; None,
             and where there is no track near: what a search assumes, somebody who stands.
@@ -137,10 +128,8 @@ def _known(expected: PoseEstimate | None, shape: tuple[int, ...]) -> kernels.Exp
     if expected is None:
         nowhere = np.zeros(shape)
         return kernels.Expected(nowhere, nowhere, np.zeros(shape[:2], np.bool_))
-    mean_world, velocity_world = map(
-        np.ascontiguousarray, (expected.mean_world, expected.velocity_world)
-    )
-    return kernels.Expected(mean_world, velocity_world, np.ascontiguousarray(expected.tracked))
+    joints, velocity = map(np.ascontiguousarray, (expected.mean_world, expected.velocity_world))
+    return kernels.Expected(joints, velocity, np.ascontiguousarray(expected.tracked))
 
 
 def lines_of_sight(
@@ -156,15 +145,14 @@ def lines_of_sight(
 
 
 def _world(truth: WorkerTruth, surroundings: Surroundings) -> World:
-    return World(
-        np.ascontiguousarray(truth.joints_world), np.ascontiguousarray(truth.velocity_world),
-        np.ascontiguousarray(truth.capsules_world),
-        np.ascontiguousarray(truth.capsule_radius_m), surroundings.still, surroundings.moving,
-        surroundings.capsules_world, surroundings.capsule_radius_m,
-    )  # fmt: skip
+    workers = truth.joints_world, truth.velocity_world, truth.capsules_world, truth.capsule_radius_m
+    robot = surroundings.capsules_world, surroundings.capsule_radius_m
+    joints, velocity, capsules, radius = map(np.ascontiguousarray, workers)
+    obstacles = surroundings.still, surroundings.moving
+    return World(joints, velocity, capsules, radius, *obstacles, *robot)
 
 
-def without_names(keypoints: Keypoints, rngs: Generators) -> Keypoints:
+def without_names(keypoints: Keypoints, rngs: Rngs) -> Keypoints:
     """The same poses, in every camera in an order of its own: nobody wears a name."""
     batch, n_cameras, n_workers = keypoints.confidence.shape[:3]
     order = np.tile(np.arange(n_workers), (batch, n_cameras, 1))

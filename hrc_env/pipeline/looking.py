@@ -3,13 +3,13 @@
 from collections.abc import Sequence
 
 from hrc_env.core.batching import Stateful
-from hrc_env.core.records import Keypoints, PoseEstimate, Roi
+from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.typing import Floats, Image, Points3
 from hrc_env.geometry.cameras import PinholeCamera, project, projections
 from hrc_env.perception.detector import Detection, DetectorConfig, PoseDetector
 from hrc_env.perception.noise import ERROR, STANDING
 from hrc_env.perception.outline import is_folded, posture_of
-from hrc_env.perception.searching import ImageSource
+from hrc_env.perception.searching import ImageSource, Views
 from hrc_env.perception.windows import steady_window, window_from_joints
 from hrc_env.pipeline.reacquisition import ENOUGH, Reacquisition, SearchSchedule
 from hrc_env.pipeline.sensor_input import Windows
@@ -39,7 +39,7 @@ class Looking(Stateful):
         ]
         self.schedule = SearchSchedule(batch, len(self.cameras), config.search_every)
         self.reacquisition = Reacquisition(batch, n_workers, self.cameras)
-        self.seen: dict[int, tuple[list[Roi | None], list[Image | None]]] = {}
+        self.seen: dict[int, tuple[Views, list[Image | None]]] = {}
         """Windows and crops of each environment's first worker: for pictures, no state."""
 
     def look(
@@ -113,10 +113,10 @@ class Looking(Stateful):
         source: ImageSource,
         b: int,
         worker: int,
-        windows: list[Roi | None],
+        windows: Views,
         taken: Windows,
         has_image: Sequence[bool],
-    ) -> list[Roi | None]:
+    ) -> Views:
         """Where to look for a worker with a track: elsewhere if most cameras have missed them."""
         blind = self.reacquisition.blind(b, worker, has_image)
         if blind:
@@ -129,7 +129,7 @@ class Looking(Stateful):
         """The number by which the detector knows a worker of an environment."""
         return b * self.n_workers + worker
 
-    def _windows(self, predicted: PoseEstimate, worker: int) -> list[Roi | None]:
+    def _windows(self, predicted: PoseEstimate, worker: int) -> Views:
         """A window a camera; None where the worker is unknown or out of view: search."""
         if not predicted.tracked[worker]:
             return [None] * len(self.cameras)

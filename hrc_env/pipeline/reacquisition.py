@@ -13,7 +13,7 @@ from hrc_env.core.batching import Stateful
 from hrc_env.core.records import Roi
 from hrc_env.core.typing import Bools
 from hrc_env.geometry.cameras import PinholeCamera
-from hrc_env.perception.searching import Candidates, agreed_windows, apart_from
+from hrc_env.perception.searching import Candidates, Views, agreed_windows, apart_from
 from hrc_env.pipeline.sensor_input import Windows
 
 REMEMBERED = 10
@@ -24,8 +24,6 @@ FOLLOWED = 5
 """Steps for which it then looks there: estimators begin anew after three that contradict them."""
 ENOUGH = 2
 """So many cameras that show a worker hold the track where it is."""
-Views = list[Roi | None]
-"""A window a camera."""
 
 
 class SearchSchedule(Stateful):

@@ -31,7 +31,7 @@ class RenderedCameras(Sensor):
     ) -> None:
         self.scene, self.appearance = scene, appearance
         self.renderer = CropRenderer(scene)
-        self.images = CameraFilm(self.renderer, Lensed(self.renderer, scene.cameras), schedule)
+        self.images = CameraFilm(Lensed(self.renderer, scene.cameras), schedule)
         """An `ImageSource` of what `show` has made present."""
         self.recent = Recent(batch, schedule)
         self.worn: list[Look | None] = [None] * batch

@@ -109,13 +109,13 @@ class PoseTracking(PerceptionPipeline):
         estimate = self.tracker.estimate(state)
         age_s = self._age_s(ids, keypoints)
         monitor(self.monitored, ids, keypoints, age_s, estimate, self.P, self.axes)
-        return our_joints(estimate, self.calibration.offset_m)
+        return our_joints(estimate, self.calibration)
 
     def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
         """What the estimator expects."""
         whole = len(ids) == len(self.keypoints.px)
         state = self.state if whole else rows(self.state, ids)
-        return our_joints(self.tracker.forecast(state, horizon_s), self.calibration.offset_m)
+        return our_joints(self.tracker.forecast(state, horizon_s), self.calibration)
 
     def detect(self, ids: Ints, expected: PoseEstimate, sensor_rngs: Generators) -> Keypoints:
         """Keypoints of environments `ids` in pixels of the images, by the level's detector; whose

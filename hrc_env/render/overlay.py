@@ -32,38 +32,34 @@ GRID: Colour = (46, 53, 61)
 ARM: Colour = (150, 158, 168)
 BELIEF: Colour = (90, 230, 160)
 COST: Colour = (255, 110, 120)
+FLOOR_M = 3
+"""The floor is drawn so far [m]."""
 SIDE_COLOURS = {("left", "left"): LEFT, ("right", "right"): RIGHT}
 """Of bones by the sides of their ends; those across are `MIDDLE`."""
 
 
 def draw_estimate(
-    image: Image, camera: PinholeCamera, estimate: PoseEstimate, row: int = 0, thickness: int = 2
+    image: Image, camera: PinholeCamera, estimate: PoseEstimate, thickness: int = 2
 ) -> None:
-    """The estimated skeletons of one environment with 2-sigma ellipses, in place.
-
-    Args:
-        image: (H, W, 3) a render of `camera`, of any size with its aspect.
-        estimate: belief; row `row` is drawn, workers without a track are not.
-    """
+    """The estimated skeletons of a batch of one with 2-sigma ellipses, in place; workers without a
+    track are not drawn. `image` (H, W, 3) is a render of `camera`, of any size with its aspect."""
     scale = image.shape[1] / camera.width_px
-    for worker in np.flatnonzero(estimate.tracked[row]):
-        joints = estimate.mean_world[row, worker]
+    for worker in np.flatnonzero(estimate.tracked[0]):
+        joints = estimate.mean_world[0, worker]
         points, depth_m = _projected(image, camera, joints)
         if (depth_m < 0.1).any():
             continue
-        _ellipses(image, camera, joints, estimate.cov_world[row, worker], scale)
+        _ellipses(image, camera, joints, estimate.cov_world[0, worker], scale)
         _draw_bones(image, points, thickness)
         _lines(image, np.stack([points[0], points[[1, 2]].mean(0)]), MIDDLE, thickness)
 
 
-def draw_keypoints(
-    image: Image, camera: PinholeCamera, keypoints: Keypoints, index: int, row: int = 0
-) -> None:
+def draw_keypoints(image: Image, camera: PinholeCamera, keypoints: Keypoints, index: int) -> None:
     """The joints that camera `index` detected, in place; faint where it was not sure."""
     scale = image.shape[1] / camera.width_px
-    px = image_from_pinhole(camera, keypoints.px[row, index].reshape(-1, 2)) * scale
+    px = image_from_pinhole(camera, keypoints.px[0, index].reshape(-1, 2)) * scale
     known = np.isfinite(px).all(-1)
-    confidence = keypoints.confidence[row, index].reshape(-1)
+    confidence = keypoints.confidence[0, index].reshape(-1)
     _draw_joints(image, px[known], confidence[known], max(2, round(image.shape[1] / 200)))
 
 
@@ -90,11 +86,11 @@ def draw_landmarks(image: Image, window: Roi, joints_px: Points2, confidence: Fl
     _draw_joints(image, points, confidence, 3)
 
 
-def draw_floor(image: Image, camera: PinholeCamera, middle: Floats, reach_m: int = 3) -> None:
+def draw_floor(image: Image, camera: PinholeCamera, middle: Floats) -> None:
     """A grid of metres on the floor round a point (3,), in place."""
     foot = np.array([middle[0], middle[1], 0.0])
-    for k in range(-reach_m, reach_m + 1):
-        line = np.array([(-reach_m, k, 0), (reach_m, k, 0)])
+    for k in range(-FLOOR_M, FLOOR_M + 1):
+        line = np.array([(-FLOOR_M, k, 0), (FLOOR_M, k, 0)])
         draw_path(image, camera, foot + line, GRID, 1)
         draw_path(image, camera, foot + line[:, [1, 0, 2]], GRID, 1)
 
@@ -119,15 +115,13 @@ def draw_markers(image: Image, camera: PinholeCamera, markers_world: Floats) -> 
             cv2.circle(image, middle, 2 * 16, GOAL, -1, cv2.LINE_AA, 4)
 
 
-def label(
-    image: Image, text: str, at: tuple[int, int], size: int = 16, colour: Colour = INK
-) -> None:
+def label(image: Image, text: str, at: tuple[int, int], size: int = 16) -> None:
     """Text with its upper left corner at `at`, on a dark plate, in place."""
     x, y = at
     pad, (_, _, right, bottom) = max(3, size // 4), _font(size).getbbox(text)
     plate = image[y : y + round(bottom) + 2 * pad, x : x + round(right) + 2 * pad]
     plate[:] = (0.35 * plate + 0.65 * np.array(PANEL)).astype(np.uint8)
-    write(image, text, (x + pad, y + pad), size, colour)
+    write(image, text, (x + pad, y + pad), size)
 
 
 def write(

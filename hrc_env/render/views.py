@@ -104,18 +104,17 @@ class Views:
         motion = one(generator.current(self.simulation.motion, np.array([b])), 0)
         return self.simulation.physics.q[b].copy(), motion
 
-    def room(self, width: int, height: int, seen: Glance | None = None) -> Image:
+    def room(self, width: int, height: int, seen: Glance) -> Image:
         """The room with the estimated skeleton over it."""
-        seen, camera = seen or self.glance(), viewpoint_camera(VIEWPOINT, width, height)
+        camera = viewpoint_camera(VIEWPOINT, width, height)
         (image,) = self._drawn([camera], seen, shadows=True)
         overlay.draw_estimate(image, camera, seen.estimate)
         overlay.draw_markers(image, camera, seen.markers_world)
         return image
 
-    def cameras(self, width: int, height: int, seen: Glance | None = None) -> list[Image]:
+    def cameras(self, width: int, height: int, seen: Glance) -> list[Image]:
         """Every camera's picture, without shadows, as the detector sees the scene, with crops,
         detected keypoints and the estimate."""
-        seen = seen or self.glance()
         views = self._through_cameras(width, height, seen)
         for c, (camera, image) in enumerate(zip(self.simulation.scene.cameras, views, strict=True)):
             for window in (of_worker[c] for of_worker in seen.windows):
@@ -127,9 +126,8 @@ class Views:
             overlay.label(image, camera.name.replace("_", " "), (6, 6), 13)
         return views
 
-    def crops(self, size: int, seen: Glance | None = None) -> list[Image]:
+    def crops(self, size: int, seen: Glance) -> list[Image]:
         """What the pose network was given: each camera's crop, with its landmarks."""
-        seen = seen or self.glance()
         keypoints, images = seen.keypoints, []
         if keypoints is None or not seen.windows:
             return []
@@ -146,10 +144,9 @@ class Views:
             images.append(image)
         return images
 
-    def beliefs(self, width: int, height: int, seen: Glance | None = None) -> list[Image]:
+    def beliefs(self, width: int, height: int, seen: Glance) -> list[Image]:
         """What the robot knows, seen from above and from the side: itself, its task, its estimate
         of the workers. No truth in here."""
-        seen = seen or self.glance()
         arm = capsules(self.simulation.chain, seen.q)
         foot = np.array([*arm[0, 0, :2], 0.0])
         images = []
@@ -168,7 +165,7 @@ class Views:
 
     def mosaic(self) -> Image:
         """The cameras in two columns."""
-        return overlay.tile(self.cameras(*MOSAIC_TILE), 2)
+        return overlay.tile(self.cameras(*MOSAIC_TILE, self.glance()), 2)
 
     def close(self) -> None:
         """Free the graphics contexts."""

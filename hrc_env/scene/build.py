@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import check_fields, check_names
 from hrc_env.core.records import Grounds, Held
 from hrc_env.core.typing import Floats, Ints, JointAngles
 from hrc_env.geometry.cameras import PinholeCamera
@@ -57,9 +57,7 @@ class SceneConfig:
     """All that hang in the scene, of which `build` switches some on; none: the scene's own four."""
 
     def __post_init__(self) -> None:
-        for name in ("sim_dt", "slew_rad_s2", "integrator_clamp_rad"):
-            if not getattr(self, name) > 0:
-                raise ConfigError(f"{name} must be positive, got {getattr(self, name)}.")
+        check_fields(self, "be positive", "sim_dt", "slew_rad_s2", "integrator_clamp_rad")
 
 
 class Recipe(NamedTuple):
@@ -142,13 +140,9 @@ def build(
         robot: a name or itself.
 
     Raises:
-        ConfigError: an unknown scene, body, camera or robot, or a negative number of workers.
+        ConfigError: an unknown scene, body, camera or robot.
     """
-    if name not in SCENES:
-        raise unknown("scene", name, SCENES)
-    whole = isinstance(n_workers, int | np.integer) and not isinstance(n_workers, bool)
-    if not whole or n_workers < 0:
-        raise ConfigError(f"n_workers must be a whole number, 0 or more, got {n_workers!r}.")
+    check_names("scene", [name], SCENES)
     config = config or SceneConfig()
     if not config.cameras:
         config = replace(config, cameras=SCENES[name].cameras)

@@ -76,14 +76,12 @@ class Canvas:
         self._closed = False
         self.groups(ALL_GROUPS)
 
-    def randomize(self, look: Look | None) -> bool:
-        """Draw with this look from the next pose on; None leaves it. Whether it is another one."""
-        if look is None or look is self._look:
-            return False
-        self._look = look
-        self._kept.clear()
-        randomize(self._model, self._built, self._visuals, look)
-        return True
+    def randomize(self, look: Look | None) -> None:
+        """Draw with this look from the next pose on; None leaves it."""
+        if look is not None and look is not self._look:
+            self._look = look
+            self._kept.clear()
+            randomize(self._model, self._built, self._visuals, look)
 
     def pose(self, q: JointAngles, motion: WorkerMotion | None) -> None:
         """Put the arm at q (N,), the workers and what they hold where `motion` (W, S, ...) says."""

@@ -40,12 +40,6 @@ class Physics:
     def __init__(self, scene: Scene, batch: int) -> None:
         if batch < 1:
             raise ConfigError(f"Physics needs at least one environment, got {batch}.")
-        rows = scene.worker_mocap
-        if not np.array_equal(rows.ravel(), np.arange(scene.model.nmocap)):
-            raise HRCError(
-                "The workers' segments must be the scene's only mocap bodies, in order; "
-                f"expected rows 0 to {scene.model.nmocap - 1}, got {rows.ravel()}."
-            )
         self.scene, self.batch = scene, batch
         self._n, self._servos = scene.chain.n_joints, _servos(scene)
         self._sims = Batch(scene.model, nsim=batch, nthread=1)

@@ -2,14 +2,13 @@
 what stands still in them as plain numbers."""
 
 import math
-import tomllib
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
 from hrc_env.core.errors import HRCError
-from hrc_env.core.mapping import from_mapping
+from hrc_env.core.mapping import from_mapping, read_toml
 from hrc_env.core.records import Grounds, Workplace
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.geometry.camera_config import CameraConfig
@@ -28,8 +27,6 @@ from hrc_env.geometry.shapes import (
 from hrc_env.scene.primitives import SOLID
 from hrc_env.worker.body import assets_dir
 
-ROBOT_FRONT_RAD = 0.0
-"""Robots look to world +x."""
 ROBOT_CLEARANCE_M = 0.8
 HEADROOM_M = 2.1
 """What begins higher than this does not stand in anybody's way [m]; a tall worker with a hat."""
@@ -73,20 +70,19 @@ class Room:
         blocked = footprints(obstacles, robot_xy_m)
         if clutter:
             walls, flat = (np.reshape(each, (-1, 5)) for each in (self.open_walls, self.flat))
-            blocked = np.concatenate([blocked[~_inside(blocked, walls)], walls, flat])
+            blocked = np.concatenate([blocked[~within(blocked, walls)], walls, flat])
         return Grounds(
             walkable_x_m=self.walkable_x_m,
             walkable_y_m=self.walkable_y_m,
             blocked=blocked,
             places=self.places + (self.clutter_places if clutter else ()),
             robot_xy_m=robot_xy_m,
-            robot_front_rad=ROBOT_FRONT_RAD,
             robot_clearance_m=ROBOT_CLEARANCE_M,
         )
 
 
 SCENES: dict[str, Room] = {
-    path.stem: from_mapping(Room, tomllib.loads(path.read_text(encoding="utf-8")))
+    path.stem: from_mapping(Room, read_toml(path))
     for path in sorted((assets_dir() / "scenes").glob("*.toml"))
 }
 
@@ -144,9 +140,9 @@ def _half_extent(row: Floats) -> Floats:
     return half[1] * axes[2] + half[0]
 
 
-def _inside(footprints_: Floats, wholes: Floats) -> Bools:
-    """(N,) which footprints have their middle in one of the wholes (M, 5)."""
+def within(points: Floats, wholes: Floats) -> Bools:
+    """(N,) which points x, y, ... (N, 2 or more) are in one of the footprints (M, 5)."""
     x, y, half_length, half_width, yaw = wholes.T
-    dx, dy = footprints_[:, :1] - x, footprints_[:, 1:2] - y
+    dx, dy = points[:, :1] - x, points[:, 1:2] - y
     along, aside = np.cos(yaw) * dx + np.sin(yaw) * dy, np.cos(yaw) * dy - np.sin(yaw) * dx
     return ((np.abs(along) <= half_length) & (np.abs(aside) <= half_width)).any(1)

@@ -4,7 +4,7 @@ A crop is drawn through an off-centre frustum: the same pixels as if cut from th
 image. Shadows and antialiasing, two thirds of the time, would change no landmark.
 """
 
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,8 +28,6 @@ PICTURE_QUALITY = {
 }  # fmt: skip
 WINDOWS_KEPT = 40
 """Windows per camera whose background is kept: those of a search too."""
-Key: TypeAlias = tuple[float, ...]
-"""The numbers of a camera and of a window."""
 
 VIEWPOINTS: dict[str, tuple[tuple[float, float, float], tuple[float, float, float], float]] = {
     "beside": ((0.45, -2.62, 1.95), (0.12, 0.0, 0.95), 68.0),
@@ -62,8 +60,6 @@ class CropRenderer(Canvas):
         self._rgb = np.empty((size_px, size_px, 3), np.uint8)
         self._z = np.empty((size_px, size_px), np.float32)
 
-    draw = Canvas.pose
-
     def crop(self, camera_index: int, window: Roi) -> Image:
         """(size, size, 3) of a turned square of a camera's image, top row first, as without its
         lens. Raises `ConfigError` for no such camera, `RenderingError` without OpenGL."""
@@ -77,15 +73,7 @@ class CropRenderer(Canvas):
             self._remember(key, None)
             self._show(EVERYTHING, camera, window)
             return self.paint()
-        return self._before_the_still(camera, window)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return CropRenderer, (self.scene, self.size_px)
-
-    def _before_the_still(self, camera: PinholeCamera, window: Roi) -> Image:
-        """What moves before what stands still, which is drawn at its first use."""
-        key = _key(camera, window)
-        still = self._kept.get(key)
+        still = self._kept[key]
         if still is None:
             z = np.empty_like(self._z)
             self._show(STILL, camera, window)
@@ -98,11 +86,16 @@ class CropRenderer(Canvas):
         _lay_over(self._rgb, self._z, still[1], crop)
         return crop
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return CropRenderer, (self.scene, self.size_px)
+
     def _show(self, what: Part, camera: PinholeCamera, window: Roi) -> None:
         self.show(what)
         self.aim(camera, window, window.side_px)
 
-    def _remember(self, key: Key, still: tuple[Image, NDArray[np.float32]] | None) -> None:
+    def _remember(
+        self, key: tuple[float, ...], still: tuple[Image, NDArray[np.float32]] | None
+    ) -> None:
         """Keep a window, the latest last: colours (top row first) and depths (bottom row first) of
         what stands still; None until it comes again."""
         self._kept.pop(key, None)
@@ -111,7 +104,8 @@ class CropRenderer(Canvas):
             del self._kept[next(iter(self._kept))]
 
 
-def _key(camera: PinholeCamera, window: Roi) -> Key:
+def _key(camera: PinholeCamera, window: Roi) -> tuple[float, ...]:
+    """The numbers of a camera and of a window."""
     numbers = (*camera.K.ravel(), *camera.T_world_from_cam.ravel())
     side = (*window.centre_px, window.side_px, window.rotation_rad)
     return tuple(map(float, (*numbers, *side)))
@@ -144,12 +138,7 @@ class PictureRenderer(Canvas):
         quality: dict[str, int] = PICTURE_QUALITY,
     ) -> None:
         """A renderer of pictures of one size."""
-        self.quality = quality
         super().__init__(scene, width_px, height_px, quality)
-
-    def viewpoints(self) -> tuple[str, ...]:
-        """What `picture` takes: named views and the cameras of the rig."""
-        return (*VIEWPOINTS, *(camera.name for camera in self.scene.cameras))
 
     def picture(
         self,
@@ -165,8 +154,8 @@ class PictureRenderer(Canvas):
         Args:
             q: (N,) angles of the arm [rad].
             motion: the workers of one environment, arrays (W, S, ...).
-            viewpoint: a name from `viewpoints()`, or any camera, which keeps its horizontal field
-                of view; the picture's shape decides how much of its height is seen.
+            viewpoint: a name of `VIEWPOINTS` or of the rig, or any camera, which keeps its
+                horizontal field of view; the picture's shape says how much of its height is seen.
             depth: distances instead of colours.
             shadows: whether lamps cast them; without is several times faster in software.
         """
@@ -183,13 +172,9 @@ class PictureRenderer(Canvas):
         """The camera of a viewpoint; its image is as wide as the picture, or the rig's own."""
         if isinstance(viewpoint, PinholeCamera):
             return viewpoint
-        for camera in self.scene.cameras:
-            if camera.name == viewpoint:
-                return camera
+        rig = {camera.name: camera for camera in self.scene.cameras}
+        if viewpoint in rig:
+            return rig[viewpoint]
         if viewpoint not in VIEWPOINTS:
-            raise unknown("viewpoint", viewpoint, self.viewpoints())
+            raise unknown("viewpoint", viewpoint, [*VIEWPOINTS, *rig])
         return viewpoint_camera(viewpoint, self.width_px, self.height_px)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        size = self.width_px, self.height_px
-        return PictureRenderer, (self.scene, *size, self.quality)

@@ -7,13 +7,14 @@ OpenGL's (+X right, +Y up, -Z forward).
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+import mujoco
 import numpy as np
 
 from hrc_env.core.errors import ConfigError, unknown, whole
 from hrc_env.core.typing import Floats, Rotations
 from hrc_env.geometry.camera_config import MOST_CAMERAS, CameraConfig, intrinsics
 from hrc_env.geometry.cameras import PinholeCamera
-from hrc_env.geometry.rotations import about_axis, look_at, quaternion_from_matrix
+from hrc_env.geometry.rotations import about_axis, look_at
 from hrc_env.scene.places import SCENES
 
 OPENCV_FROM_OPENGL: Floats = np.diag([1.0, -1.0, -1.0])
@@ -83,11 +84,13 @@ def glcam_axes(camera: PinholeCamera) -> Rotations:
 
 def add_cameras(spec: Any, cameras: tuple[PinholeCamera, ...]) -> None:
     """Hang the cameras into a MuJoCo scene, under their names."""
+    quaternion = np.zeros(4)
     for camera in cameras:
+        mujoco.mju_mat2Quat(quaternion, glcam_axes(camera).ravel())
         spec.worldbody.add_camera(
             name=camera.name,
             pos=camera.eye_world,
-            quat=quaternion_from_matrix(glcam_axes(camera)),
+            quat=quaternion,
             fovy=np.degrees(2 * np.arctan(camera.height_px / 2 / camera.K[1, 1])),
             resolution=[camera.width_px, camera.height_px],
         )

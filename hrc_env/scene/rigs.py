@@ -1,5 +1,7 @@
 """Rigs by name, and what a rig sees of the place where people are."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from hrc_env.core.records import Grounds
@@ -7,8 +9,9 @@ from hrc_env.core.typing import Bools, Floats, Points3
 from hrc_env.geometry.camera_config import CameraConfig, made
 from hrc_env.geometry.cameras import PinholeCamera, image_from_pinhole, inside_image, project
 from hrc_env.geometry.shapes import AXES, BOX, CENTRE, HALF_SIZE, KIND, PLANE, REACH
-from hrc_env.geometry.sight import Surroundings, hidden, nothing
+from hrc_env.geometry.sight import hidden, nothing
 from hrc_env.scene.build import Scene
+from hrc_env.scene.places import within
 from hrc_env.scene.rig import LAB_CAMERAS, SITE_CAMERAS
 
 RIGS: dict[str, tuple[CameraConfig, ...]] = {
@@ -30,12 +33,8 @@ def floor(grounds: Grounds) -> Points3:
     """(N, 3) points all over the walkable floor [m], without those in the robot or other things."""
     points = workspace(grounds)
     points = points[points[:, 2] == HEIGHTS_M[0]] * (1.0, 1.0, 0.0)
-    away = points[:, None, :2] - grounds.blocked[:, :2]
-    c, s = np.cos(grounds.blocked[:, 4]), np.sin(grounds.blocked[:, 4])
-    along, across = away[..., 0] * c + away[..., 1] * s, away[..., 1] * c - away[..., 0] * s
-    inside = (abs(along) < grounds.blocked[:, 2]) & (abs(across) < grounds.blocked[:, 3])
     from_robot_m = np.linalg.norm(points[:, :2] - grounds.robot_xy_m, axis=-1)
-    return points[~inside.any(1) & (from_robot_m > grounds.robot_clearance_m)]
+    return points[~within(points, grounds.blocked) & (from_robot_m > grounds.robot_clearance_m)]
 
 
 def workspace(grounds: Grounds) -> Points3:
@@ -49,9 +48,7 @@ def workspace(grounds: Grounds) -> Points3:
 def sees(cameras: tuple[PinholeCamera, ...], still: Floats, points_world: Points3) -> Bools:
     """(C, P) which points are in a camera's image and not behind what stands still (G, WIDTH)."""
     eyes_world = np.stack([camera.eye_world for camera in cameras])
-    empty = nothing(1)
-    room = Surroundings(still, empty.moving, empty.capsules_world, empty.capsule_radius_m)
-    seen = ~hidden(room, eyes_world, points_world[None])[0]
+    seen = ~hidden(replace(nothing(1), still=still), eyes_world, points_world[None])[0]
     for c, camera in enumerate(cameras):
         px, depth_m = project(camera.P[None], points_world[None])
         seen[c] &= inside_image(camera, image_from_pinhole(camera, px[0, 0])) & (depth_m[0, 0] > 0)

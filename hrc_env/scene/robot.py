@@ -5,7 +5,6 @@ servos on one command [rad/s]: first all that hold its integral (`intvelocity`),
 follow it (`velocity`); one of them alone has 3-20 mm of tool error instead of 0.1.
 """
 
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -15,8 +14,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from hrc_env.core.errors import ConfigError, unknown
-from hrc_env.core.mapping import from_mapping
+from hrc_env.core.errors import ConfigError, check_names
+from hrc_env.core.mapping import from_mapping, read_toml
 from hrc_env.core.typing import Floats, Ints, Transforms
 from hrc_env.geometry.chains import SerialChain
 from hrc_env.scene.primitives import (
@@ -69,7 +68,7 @@ class Robot:
 def _read(path: Path) -> Robot:
     """A robot that comes with the package: a record in TOML beside its MJCF."""
     own = {"name": path.stem, "mjcf": str(path.with_suffix(".xml"))}
-    return from_mapping(Robot, tomllib.loads(path.read_text(encoding="utf-8")) | own)
+    return from_mapping(Robot, read_toml(path) | own)
 
 
 ROBOTS: dict[str, Robot] = {
@@ -84,8 +83,7 @@ def robot_called(robot: str | Robot) -> Robot:
         return robot
     if not isinstance(robot, str):
         raise ConfigError(f"robot must be a name or a Robot, got {robot!r}.")
-    if robot not in ROBOTS:
-        raise unknown("robot", robot, ROBOTS)
+    check_names("robot", [robot], ROBOTS)
     return ROBOTS[robot]
 
 
@@ -135,9 +133,7 @@ def check_robot(robot: Robot) -> None:
     if not isinstance(robot, Robot):
         raise ConfigError(f"A robot must be a Robot, got {type(robot).__name__}.")
     chain = chain_of(robot, (0.0, 0.0, 0.0))
-    for name in robot.watched:
-        if name not in robot.capsules:
-            raise unknown(f"watched capsule of {robot.name}", name, robot.capsules)
+    check_names(f"watched capsule of {robot.name}", robot.watched, robot.capsules)
     low, high = chain.range_rad.T
     if ((robot.home_q < low) | (robot.home_q > high)).any():
         raise ConfigError(f"{robot.name}: home_q {robot.home_q} is outside of the joints' ranges.")
@@ -169,13 +165,11 @@ def _chain(robot: Robot, mount_world: tuple[float, float, float]) -> SerialChain
     links = np.stack([_joint_frame(model, data, joint) for joint in joints])
     carriers, ends, radius_m = _capsules(model, data, bodies, links, robot)
     return SerialChain(
-        joint_names=robot.joints,
         T_world_from_base=_pose(mount_world, np.eye(3)) @ foot,
         parent_from_joint=np.linalg.inv([foot, *links[:-1]]) @ links,
         link_from_tool=np.linalg.inv(links[-1]) @ _pose(data.site_xpos[site], data.site_xmat[site]),
         range_rad=model.jnt_range[joints],
         velocity_limit_rad_s=model.actuator_ctrlrange[n:, 1].copy(),
-        capsule_names=robot.capsules,
         capsule_link=carriers,
         capsule_ends=ends,
         capsule_radius_m=radius_m,

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.belief import Belief
-from hrc_env.core.errors import ConfigError
+from hrc_env.core.errors import ConfigError, check_fields
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records
+from hrc_env.core.typing import Floats, Ints, Points3, Records
 from hrc_env.observations import ObservationTerm, directions
 from hrc_env.rewards import RewardTerm
 from hrc_env.tasks.task import Rngs, Task, World
@@ -40,9 +39,7 @@ class ReachConfig:
             low, high = getattr(self, name)
             if not low < high:
                 raise ConfigError(f"ReachConfig.{name} must be (low, high), got {(low, high)}.")
-        for name in ("radius_m", "time_limit_s"):
-            if not getattr(self, name) > 0:
-                raise ConfigError(f"ReachConfig.{name} must be > 0, got {getattr(self, name)}.")
+        check_fields(self, "be positive", "radius_m", "time_limit_s")
 
 
 REACH = np.dtype(
@@ -102,17 +99,14 @@ def view(state: Records, ids: Ints, config: ReachConfig) -> ReachView:
     return ReachView(state["goal_world"][ids], config.time_limit_s - state["goal_age_s"][ids])
 
 
-def succeeded(state: Records) -> Bools:
-    """(B,) whether so far every goal of the episode, and at least one, was reached in time."""
-    return (state["n_reached"] > 0) & (state["n_missed"] == 0)
-
-
 def info(state: Records) -> dict[str, Floats]:
-    """What the episode has come to so far, (B,) each."""
+    """What the episode has come to so far, (B,) each; it is a success if every goal, and at least
+    one, was reached in time."""
+    succeeded = (state["n_reached"] > 0) & (state["n_missed"] == 0)
     return {
         "task/goals_reached": state["n_reached"].astype(float),
         "task/goals_missed": state["n_missed"].astype(float),
-        "is_success": succeeded(state).astype(float),
+        "is_success": succeeded.astype(float),
     }
 
 
@@ -153,10 +147,6 @@ def _new_goals(
         state["distance_m"][b] = math.dist(goal, tool)
 
 
-def _goal_direction(now: Belief) -> Floats:
-    return directions(now.task.goal_world - now.robot.tool_world, 0.05)
-
-
 TASK = Task(
     id="HRCReach-v0",
     says="Touch goals one after another with the tool, in a volume shared with a worker.",
@@ -174,7 +164,7 @@ TASK = Task(
         ObservationTerm(
             "goal_direction", lambda of: 3, "-", "world", 1.0, 1.0,
             "The same, divided by its length plus 5 cm.",
-            _goal_direction,
+            lambda now: directions(now.task.goal_world - now.robot.tool_world, 0.05),
         ),
         ObservationTerm(
             "goal_time_left", lambda of: 1, "s", "-", 10.0, 4.0,

@@ -5,9 +5,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError, unknown
-
-_MIRRORED = ("body", "limbs")
+from hrc_env.core.errors import ConfigError, check_fields, check_names
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,24 +42,16 @@ class TrackerConfig:
     """Spectral density of the whole body's acceleration [m^2/s^3]."""
 
     def __post_init__(self) -> None:
-        """Raise `ConfigError` for values that cannot work."""
-        self.check_positive(
-            "prior_std_m", "max_age_s", "lost_after_s", "forget_s", "acquire_min_joints",
-            "body_radius_m", "conflict_frames", "gate_sigma", "sigma_scale", "min_std_m",
-            "root_acceleration",
+        check_fields(
+            self, "be positive", "prior_std_m", "max_age_s", "lost_after_s", "forget_s",
+            "acquire_min_joints", "body_radius_m", "conflict_frames", "gate_sigma", "sigma_scale",
+            "min_std_m", "root_acceleration",
         )  # fmt: skip
-        if not 0 <= self.longest_delay_s <= 1:
-            raise ConfigError(f"longest_delay_s must be in [0, 1], got {self.longest_delay_s}.")
+        check_fields(self, "be in [0, 1]", "longest_delay_s")
         if self.lost_after_s > self.max_age_s:
             raise ConfigError(
                 f"lost_after_s ({self.lost_after_s}) must not exceed max_age_s ({self.max_age_s})."
             )
-
-    def check_positive(self, *names: str) -> None:
-        """Raise `ConfigError` unless these fields are > 0."""
-        for name in names:
-            if not getattr(self, name) > 0:
-                raise ConfigError(f"{name} must be positive, got {getattr(self, name)}.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,33 +123,28 @@ class ParticleConfig(TrackerConfig):
     """Probability per update that it stops."""
 
     def __post_init__(self) -> None:
-        """Raise `ConfigError` for values that cannot work."""
         TrackerConfig.__post_init__(self)
-        self.check_positive(
-            "floor_std_m", "bone_give", "noise_tau_s", "noise_persists_s",
+        check_fields(
+            self, "be positive", "floor_std_m", "bone_give", "noise_tau_s", "noise_persists_s",
             "gauss_newton_steps", "image_area_px", "one_view_inflation", "n_hypotheses",
             "look_every_s", "open_depth_m", "turn_std_rad", "evidence_trust", "size_std",
         )  # fmt: skip
-        for name in ("least_weight", "outlier_weight", "damping", "swap_begins", "swap_ends"):
-            if not 0 < getattr(self, name) < 1:
-                raise ConfigError(f"{name} must be in (0, 1), got {getattr(self, name)}.")
+        check_fields(
+            self, "not be negative", "mean_correction", "anatomy_trust", "walking_odds",
+            "wait_updates", "stands_std_m",
+        )  # fmt: skip
+        check_fields(
+            self, "be in (0, 1)", "least_weight", "outlier_weight", "damping", "swap_begins",
+            "swap_ends",
+        )  # fmt: skip
+        check_fields(self, "be in [0, 1)", "noise_share")
         least, most = self.noise_bounds
         if not 0 < least <= most < float("inf"):
             raise ConfigError(
                 "noise_bounds must be positive, finite and ordered, as (1.0, 6.0), "
                 f"got {self.noise_bounds}."
             )
-        if not 0 <= self.noise_share < 1:
-            raise ConfigError(f"noise_share must be in [0, 1), got {self.noise_share}.")
-        for name in (
-            "mean_correction", "anatomy_trust", "walking_odds",
-            "wait_updates", "stands_std_m",
-        ):  # fmt: skip
-            if not getattr(self, name) >= 0:
-                raise ConfigError(f"{name} must not be negative, got {getattr(self, name)}.")
-        for part in self.mirrored_parts:
-            if part not in _MIRRORED:
-                raise unknown("part in mirrored_parts", part, _MIRRORED)
+        check_names("part in mirrored_parts", self.mirrored_parts, ("body", "limbs"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,9 +164,9 @@ class PaperConfig(TrackerConfig):
     stand round, from the floor to 2.2 m."""
 
     def __post_init__(self) -> None:
-        """Raise `ConfigError` for values that cannot work."""
         TrackerConfig.__post_init__(self)
-        self.check_positive("velocity_tau_s", "n_iterations")
+        check_fields(self, "be positive", "velocity_tau_s", "n_iterations")
+        check_fields(self, "not be negative", "sigma_m")
         if self.n_particles < 10:
             raise ConfigError(
                 f"n_particles must be at least 10, got {self.n_particles}: after a resampling "
@@ -195,8 +180,6 @@ class PaperConfig(TrackerConfig):
                 "place_m must be empty or hold the least and the most x, y and z, as "
                 f"((-3, 3), (-3, 3), (0, 2.2)), got {self.place_m}."
             )
-        if self.sigma_m < 0:
-            raise ConfigError(f"sigma_m must not be negative, got {self.sigma_m}.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,9 +192,8 @@ class TriangulationConfig(TrackerConfig):
     """How fast a held point loses its worth in gaps [m/s]."""
 
     def __post_init__(self) -> None:
-        """Raise `ConfigError` for values that cannot work."""
         TrackerConfig.__post_init__(self)
-        self.check_positive("velocity_tau_s", "hold_speed_m_s")
+        check_fields(self, "be positive", "velocity_tau_s", "hold_speed_m_s")
 
 
 ConfigT = TypeVar("ConfigT", bound=TrackerConfig)

@@ -23,7 +23,7 @@ import numpy as np
 from hrc_env.core.errors import ConfigError, check_shape, unknown
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Floats, Ints
+from hrc_env.core.typing import Floats, Ints, Rngs
 from hrc_env.tracking.config import (
     PaperConfig,
     ParticleConfig,
@@ -35,10 +35,9 @@ from hrc_env.tracking.out_of_sequence import OutOfSequence
 from hrc_env.tracking.paper import PaperEstimator
 from hrc_env.tracking.paper_restarts import PaperRestarts
 from hrc_env.tracking.particle import ParticleEstimator
-from hrc_env.tracking.triangulating import ransac, triangulation
+from hrc_env.tracking.triangulating import TriangulationEstimator
 
 State = TypeVar("State")
-Rngs = list[np.random.Generator]
 
 
 class Estimator(Protocol[State]):
@@ -102,6 +101,10 @@ def _kalman(P: Floats, ctrl_dt: float, config: ParticleConfig) -> ParticleEstima
     return ParticleEstimator(P, ctrl_dt, replace(config, n_hypotheses=1))
 
 
+def _ransac(P: Floats, ctrl_dt: float, config: TriangulationConfig) -> TriangulationEstimator:
+    return TriangulationEstimator(P, ctrl_dt, config, config.gate_sigma)
+
+
 ESTIMATORS: dict[str, EstimatorSpec] = {
     spec.name: spec
     for spec in (
@@ -109,8 +112,10 @@ ESTIMATORS: dict[str, EstimatorSpec] = {
         EstimatorSpec("kalman", _kalman, ParticleConfig),
         EstimatorSpec("paper", PaperEstimator, PaperConfig),
         EstimatorSpec("paper_restarts", PaperRestarts, PaperConfig),
-        EstimatorSpec("triangulation", triangulation, TriangulationConfig, needs_pairs=True),
-        EstimatorSpec("ransac", ransac, TriangulationConfig, needs_pairs=True),
+        EstimatorSpec(
+            "triangulation", TriangulationEstimator, TriangulationConfig, needs_pairs=True
+        ),
+        EstimatorSpec("ransac", _ransac, TriangulationConfig, needs_pairs=True),
     )
 }
 """By name: those of this package, and those that were registered."""
@@ -143,18 +148,11 @@ def make_estimator(
     ctrl_dt: float,
     config: TrackerConfig | None = None,
 ) -> Estimator[Any]:
-    """An estimator for a rig.
+    """An estimator for cameras with projections P (C, 3, 4), usually updated every `ctrl_dt` [s].
 
-    Args:
-        estimator: a name in `ESTIMATORS`, a spec, or a function that makes one.
-        P: (C, 3, 4) projections of the cameras.
-        ctrl_dt: the usual time between two updates [s].
-        config: settings; of another estimator's, those that all share count. The defaults if
-            None. With `longest_delay_s` an `out_of_sequence.OutOfSequence` uses late frames at
-            their own time.
-
-    Raises:
-        ConfigError: an estimator that there is not, a rig of another shape, or no positive time.
+    Of another estimator's settings those that all share count; None: the defaults. With
+    `longest_delay_s` an `out_of_sequence.OutOfSequence` uses late frames at their own time. Raises
+    `ConfigError` for an estimator that there is not, a rig of another shape, or no positive time.
     """
     spec = estimator_called(estimator)
     P = np.ascontiguousarray(P, dtype=float)

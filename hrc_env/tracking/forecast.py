@@ -9,11 +9,13 @@ relaxes to the prior (docs/tracking.md, "Ahead").
 
 import functools
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hrc_env.core.batching import mapped
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import PoseEstimate
@@ -146,31 +148,14 @@ def make_scratch(network):
     return first, second, np.empty(_N_OUTPUTS, np.float32), np.empty(_N_OUTPUTS, np.float32)
 
 
-def check_horizon(horizon_s: float) -> None:
-    """Raise `ConfigError` for a horizon that is not in (0, 1] s."""
+def forecast(now: PoseEstimate, horizon_s: float, config: TrackerConfig) -> PoseEstimate:
+    """What is expected of the workers in `horizon_s`, if no camera sees them until then; `now`
+    stays, `config` is of the estimator that said so. Raises `ConfigError` unless it is in (0, 1] s.
+    """
     if not 0 < horizon_s <= LONGEST_S:
         raise ConfigError(f"A horizon must be in (0, {LONGEST_S:g}] s, got {horizon_s}.")
-
-
-def forecast(now: PoseEstimate, horizon_s: float, config: TrackerConfig) -> PoseEstimate:
-    """What is expected of the workers in `horizon_s`, if no camera sees them until then.
-
-    Args:
-        now: what is believed now; not changed.
-        horizon_s: in (0, 1] [s].
-        config: settings of the estimator that said so.
-
-    Raises:
-        ConfigError: a horizon that is none.
-    """
-    check_horizon(horizon_s)
-    later = PoseEstimate(
-        mean_world=now.mean_world.copy(),
-        cov_world=now.cov_world.copy(),
-        velocity_world=now.velocity_world.copy(),
-        age_s=np.minimum(now.age_s + horizon_s, config.max_age_s),
-        tracked=now.tracked.copy(),
-    )
+    age_s = np.minimum(now.age_s + horizon_s, config.max_age_s)
+    later = replace(mapped(now, lambda array: array.copy()), age_s=age_s)
     workers = (later.mean_world, later.cov_world, later.velocity_world, later.tracked)
     unknown_heading = config.root_acceleration * horizon_s**3 / 3
     keep = float(np.exp(-horizon_s / config.forget_s))

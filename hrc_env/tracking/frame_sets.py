@@ -82,18 +82,9 @@ def remember(frames: Frames, keypoints: Keypoints, time_s: Floats, use: Bools) -
 def frame_sets_of(
     frames: Frames, ids: Ints, end_s: Floats, step_s: Floats
 ) -> Iterator[tuple[Ints, float, list[tuple[float, FrameSet]]]]:
-    """What was seen within a step of environments `ids`, by groups with equal times.
-
-    Args:
-        frames: what is remembered.
-        ids: (G,) environments.
-        end_s: (G,) when each one's step ended.
-        step_s: (G,) how long it was.
-
-    Yields:
-        members (M,) of `ids`; the step [s]; and its frame sets in order of time, each with the
-        time since the step began [s].
-    """
+    """What was seen in a step of environments `ids` (G,) that ended at `end_s` and was `step_s`
+    (G,) long, by groups with equal times: members (M,) of `ids`; the step [s]; and its frame sets
+    in order of time, each with the time since the step began [s]."""
     ticks = _ticks(frames.time_s[ids], end_s, step_s)
     times = np.sort(ticks.reshape(len(ids), -1), axis=1)
     times = times[:, : int((times < _NEVER).sum(1).max(initial=0))]

@@ -8,8 +8,8 @@ before it has seen anything.
 import numpy as np
 
 from hrc_env.core.records import PoseEstimate, WorkerTruth
-from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.tracks import as_estimate, make_tracks
 
 ORACLE_STD_M = 1e-3
 """Standard deviation that is reported with the truth [m]: small, and invertible."""
@@ -30,11 +30,4 @@ def estimate_from_truth(truth: WorkerTruth) -> PoseEstimate:
 def prior(batch: int, n_workers: int, config: TrackerConfig) -> PoseEstimate:
     """What is believed of workers that nobody has seen: at `prior_mean_world`, at rest, not
     tracked."""
-    shape = (batch, n_workers, N_JOINTS)
-    return PoseEstimate(
-        mean_world=np.tile(np.array(config.prior_mean_world, float), (*shape, 1)),
-        cov_world=np.tile(config.prior_std_m**2 * np.eye(3), (*shape, 1, 1)),
-        velocity_world=np.zeros((*shape, 3)),
-        age_s=np.full(shape, config.max_age_s),
-        tracked=np.zeros(shape[:-1], bool),
-    )
+    return as_estimate(make_tracks(batch, n_workers, config))

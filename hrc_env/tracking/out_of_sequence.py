@@ -19,7 +19,7 @@ from hrc_env.core.batching import mapped, picked, rows, write_rows
 from hrc_env.core.errors import check_shape
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Bools, Floats, Ints
+from hrc_env.core.typing import Bools, Floats, Ints, Rngs
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.frame_sets import (
     SAME_S,
@@ -38,7 +38,6 @@ IGNORED = ("no time", "future", "not newer", "too old")
 """Why frames were left out; the last axis of `LateState.ignored`."""
 _AHEAD_S = 1e-3
 """Clocks that are no more ahead than this mean now."""
-Rngs = list[np.random.Generator]
 
 
 class LateState(NamedTuple):
@@ -101,7 +100,7 @@ class OutOfSequence:
             n_kept=np.zeros(batch, np.int64),
             end_s=np.zeros((batch, n_slots)),
             step_s=np.zeros((batch, n_slots)),
-            kept=_repeated(now, n_slots),
+            kept=mapped(now, lambda array: np.repeat(array[:, None], n_slots, axis=1)),
             frames=make_frames(batch, self.n_cameras, 2 * n_slots, n_workers),
             ignored=np.zeros((batch, len(IGNORED)), np.int64),
         )
@@ -143,7 +142,8 @@ class OutOfSequence:
         back = np.where(late, 1 + (ends_s >= first_s[:, None] - SAME_S).sum(1), 0)
         self._take_in(state, keypoints, use & ~late[:, None], rngs)
         for age in range(int(back.max(initial=0)), 0, -1):
-            self._restore(state, np.flatnonzero(back == age), age)
+            begins = np.flatnonzero(back == age)
+            write_rows(state.now, begins, rows(_flat(state.kept), _places(state, begins, age)))
             ids = np.flatnonzero(back >= age)
             self._relive(state, ids, age, rngs)
             if age > 1:
@@ -206,10 +206,6 @@ class OutOfSequence:
         """Put what is believed into the slot `age` before the open one."""
         write_rows(_flat(state.kept), _places(state, ids, age), self._part(state, ids))
 
-    def _restore(self, state: LateState, ids: Ints, age: int) -> None:
-        if len(ids) > 0:
-            write_rows(state.now, ids, rows(_flat(state.kept), _places(state, ids, age)))
-
 
 def _near_now(time_s: Floats, now_s: Floats) -> Floats:
     """Times with those that mean now put there."""
@@ -258,10 +254,6 @@ def _places(state: LateState, ids: Ints, age: int) -> Ints:
     """Rows of `_flat(kept)` that hold what environments believed `age` slots back."""
     n_slots = state.end_s.shape[1]
     return ids * n_slots + (state.slot[ids] - age) % n_slots
-
-
-def _repeated(record: Any, n: int) -> Any:
-    return mapped(record, lambda a: np.repeat(a[:, None], n, axis=1))
 
 
 def _flat(record: Any) -> Any:

@@ -27,7 +27,7 @@ import numpy as np
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Bools, Floats, Ints
+from hrc_env.core.typing import Bools, Floats, Ints, Rngs
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
 from hrc_env.tracking.config import PaperConfig
 from hrc_env.tracking.forecast import forecast
@@ -71,7 +71,7 @@ class PaperEstimator:
         self.reset(state, np.arange(batch), [np.random.default_rng(b) for b in range(batch)])
         return state
 
-    def reset(self, state: PaperState, ids: Ints, rngs: list[np.random.Generator]) -> None:
+    def reset(self, state: PaperState, ids: Ints, rngs: Rngs) -> None:
         """Line 1, initialize_particle(M): clouds all over the place, in environments `ids`."""
         forget(state.tracks, ids, self.config)
         state.elapsed_s[ids] = 0.0
@@ -82,16 +82,14 @@ class PaperEstimator:
             for track, particles in zip(state.tracks[b], state.particles[b], strict=True):
                 moments(particles, track["mean_world"], track["cov_world"])
 
-    def predict(self, state: PaperState, dt_s: float, rngs: list[np.random.Generator]) -> None:
+    def predict(self, state: PaperState, dt_s: float, rngs: Rngs) -> None:
         """Line 7."""
         self.walk(state, np.ones_like(state.tracks["tracked"]), dt_s, rngs)
         age_s = state.tracks["age_s"]
         age_s[...] = np.minimum(age_s + dt_s, self.config.max_age_s)
         state.tracks["tracked"] &= (age_s < self.config.lost_after_s - 1e-9).any(-1)
 
-    def update(
-        self, state: PaperState, keypoints: Keypoints, rngs: list[np.random.Generator]
-    ) -> None:
+    def update(self, state: PaperState, keypoints: Keypoints, rngs: Rngs) -> None:
         """Lines 8 to 17."""
         batch, n_workers = state.tracks.shape
         measured = arrays_of(keypoints, (batch, len(self.P), n_workers, N_JOINTS))
@@ -109,9 +107,7 @@ class PaperEstimator:
         """What is expected in `horizon_s`; see `tracking.forecast`."""
         return forecast(self.estimate(state), horizon_s, self.config)
 
-    def walk(
-        self, state: PaperState, who: Bools, dt_s: float, rngs: list[np.random.Generator]
-    ) -> None:
+    def walk(self, state: PaperState, who: Bools, dt_s: float, rngs: Rngs) -> None:
         """Line 7 for workers `who` (B, W); the walk's variance, by which the estimate's covariance
         grows, is proportional to time."""
         sigma_m = self.config.sigma_m * np.sqrt(dt_s / self.ctrl_dt)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Ints
+from hrc_env.core.typing import Ints, Rngs
 from hrc_env.tracking.measurements import Seen
 from hrc_env.tracking.models.acquisition import find_again, find_body
 from hrc_env.tracking.paper import PaperEstimator, PaperState
@@ -22,13 +22,12 @@ from hrc_env.tracking.tracks import forget, grow_older
 class PaperRestarts(PaperEstimator):
     """Algorithm 1 with restarts for every worker; see `tracking.estimators.Estimator`."""
 
-    def reset(self, state: PaperState, ids: Ints, rngs: list[np.random.Generator]) -> None:
+    def reset(self, state: PaperState, ids: Ints, rngs: Rngs) -> None:
         """Forget environments `ids`; draws nothing."""
-        del rngs
         forget(state.tracks, ids, self.config)
         state.elapsed_s[ids] = 0.0
 
-    def predict(self, state: PaperState, dt_s: float, rngs: list[np.random.Generator]) -> None:
+    def predict(self, state: PaperState, dt_s: float, rngs: Rngs) -> None:
         """Line 7 for workers with a track; count ages up, give tracks up."""
         self.walk(state, state.tracks["tracked"], dt_s, rngs)
         grow_older(state.tracks, dt_s, self.config)

@@ -14,7 +14,7 @@ import numpy as np
 
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Floats, Ints
+from hrc_env.core.typing import Floats, Ints, Rngs
 from hrc_env.tracking.config import ParticleConfig
 from hrc_env.tracking.forecast import forecast, mixed
 from hrc_env.tracking.hypotheses.filter import predict_all, update_all
@@ -57,23 +57,18 @@ class ParticleEstimator:
         self.reset(state, np.arange(batch), [])
         return state
 
-    def reset(self, state: Hypotheses, ids: Ints, rngs: list[np.random.Generator]) -> None:
+    def reset(self, state: Hypotheses, ids: Ints, rngs: Rngs) -> None:
         """Forget environments `ids`; draws nothing."""
-        del rngs
         forget_trees(state.trees, state.views, state.noise, ids, self.config)
         state.n_alive[ids], state.waited_s[ids] = 1, 0.0
 
-    def predict(self, state: Hypotheses, dt_s: float, rngs: list[np.random.Generator]) -> None:
+    def predict(self, state: Hypotheses, dt_s: float, rngs: Rngs) -> None:
         """Move every hypothesis by its motion model; draws nothing."""
-        del rngs
         model = motion(dt_s, self.config.damping, self.config.root_acceleration)
         predict_all(tuple(state), model, dt_s, self.settings, np.empty(1, WORK))
 
-    def update(
-        self, state: Hypotheses, keypoints: Keypoints, rngs: list[np.random.Generator]
-    ) -> None:
+    def update(self, state: Hypotheses, keypoints: Keypoints, rngs: Rngs) -> None:
         """Take one set of frames in; draws nothing."""
-        del rngs
         batch, n_workers = state.n_alive.shape
         measured = arrays_of(keypoints, (batch, len(self.P), n_workers, N_JOINTS))
         constants = (self.settings, self.noise)
@@ -93,13 +88,8 @@ class ParticleEstimator:
         """What is expected in `horizon_s`, hypothesis by hypothesis; see `tracking.forecast`."""
         trees = state.trees.reshape(len(state.trees), state.trees[0].size)
         body, cov = trees["body"], trees["cov"]
-        each = PoseEstimate(
-            mean_world=body[..., :3].copy(),
-            cov_world=cov[..., :3, :3].copy(),
-            velocity_world=body[..., 3:].copy(),
-            age_s=trees["age_s"].copy(),
-            tracked=trees["tracked"].copy(),
-        )
+        where = body[..., :3], cov[..., :3, :3].copy(), body[..., 3:]
+        each = PoseEstimate(*where, trees["age_s"], trees["tracked"])
         later = forecast(bounded(each, self.config), horizon_s, self.config)
         whole = mixed(later, state.trees["log_weight"], state.n_alive)
         return self._of_unknown_size(state, whole)

@@ -72,7 +72,6 @@ def smooth(
         clip: keypoints of T frames, each (B, C, W, J, ...), in order of time; their `time_s` is
             not looked at.
         dt_s: time between two frames [s].
-        config: settings; the defaults if None.
 
     Returns:
         Arrays (T, B, W, ...). A worker whom the filter followed in neither direction is where
@@ -208,10 +207,9 @@ def _mixture(a: _Smoothed, b: _Smoothed) -> _Smoothed:
     apart = (a.mean - b.mean)[..., :3]
     between = apart[..., :, None] * apart[..., None, :]
     one, other = share[..., None], 1.0 - share[..., None]
-    return _Smoothed(
+    return a._replace(
         mean=share * a.mean + (1.0 - share) * b.mean,
         cov=one * a.cov + other * b.cov + one * other * between,
-        doubt=np.minimum(a.doubt, b.doubt),
         age_s=np.minimum(a.age_s, b.age_s),
         tracked=a.tracked | b.tracked,
     )

@@ -100,10 +100,14 @@ def relax(mean, cov, velocity, keep, home, std):
             cov[j, i, i] += (1.0 - keep * keep) * std * std
 
 
+def as_estimate(tracks: Any) -> PoseEstimate:
+    """The tracks in arrays of their own."""
+    return PoseEstimate(*(tracks[each.name].copy() for each in fields(PoseEstimate)))
+
+
 def report(tracks: Any, config: TrackerConfig) -> PoseEstimate:
-    """The tracks as others may see them, in arrays of their own."""
-    names = [each.name for each in fields(PoseEstimate)]
-    return bounded(PoseEstimate(*(tracks[name].copy() for name in names)), config)
+    """The tracks as others may see them."""
+    return bounded(as_estimate(tracks), config)
 
 
 def bounded(estimate: PoseEstimate, config: TrackerConfig) -> PoseEstimate:

@@ -5,42 +5,22 @@ by trying every pair of cameras (after Fischler and Bolles, Comm. ACM 24, 1981).
 when two views make a point.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Floats, Ints, Points2
-from hrc_env.geometry.triangulation import FURTHEST_PX, Triangulation, triangulate
+from hrc_env.core.typing import Floats, Ints, Points2, Rngs
+from hrc_env.geometry.triangulation import FURTHEST_PX, triangulate
 from hrc_env.tracking.config import TriangulationConfig
 from hrc_env.tracking.forecast import forecast
 from hrc_env.tracking.measurements import MIN_SIGMA_PX, arrays_of
 from hrc_env.tracking.models.acquisition import complete_body, keep_one_body
 from hrc_env.tracking.settings import settings_of
 from hrc_env.tracking.tracks import forget, grow_older, make_tracks, report
-
-Solve: TypeAlias = Callable[[Floats, Points2, Floats], Triangulation]
-"""From P (C, 3, 4), px (B, C, W, J, 2) and sigma (B, C, W, J) to points."""
-
-
-def triangulation(
-    P: Floats, ctrl_dt: float, config: TriangulationConfig
-) -> "TriangulationEstimator":
-    """Weighted least squares from all views."""
-    return TriangulationEstimator(P, ctrl_dt, config, triangulate)
-
-
-def ransac(P: Floats, ctrl_dt: float, config: TriangulationConfig) -> "TriangulationEstimator":
-    """Least squares from the views that agree within `gate_sigma`."""
-
-    def solve(P: Floats, px: Points2, sigma_px: Floats) -> Triangulation:
-        return triangulate(P, px, sigma_px, config.gate_sigma)
-
-    return TriangulationEstimator(P, ctrl_dt, config, solve)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,30 +30,28 @@ class TriangulationEstimator:
     P: Floats
     ctrl_dt: float
     config: TriangulationConfig
-    solve: Solve
-    """How points are made of pixels."""
+    gate_sigma: float = 0.0
+    """Within how many standard deviations views must agree; 0: all are used."""
 
     def init(self, batch: int, n_workers: int) -> Any:
         """(B, W) records of `tracks.TRACK`, of workers whom nobody has seen."""
         return make_tracks(batch, n_workers, self.config)
 
-    def reset(self, state: Any, ids: Ints, rngs: list[np.random.Generator]) -> None:
+    def reset(self, state: Any, ids: Ints, rngs: Rngs) -> None:
         """Forget environments `ids`; draws nothing."""
-        del rngs
         forget(state, ids, self.config)
 
-    def predict(self, state: Any, dt_s: float, rngs: list[np.random.Generator]) -> None:
+    def predict(self, state: Any, dt_s: float, rngs: Rngs) -> None:
         """Hold every joint where it was; its covariance grows with the square of the age."""
-        del rngs
         _hold(state, dt_s, self.config.hold_speed_m_s)
         grow_older(state, dt_s, self.config)
 
-    def update(self, state: Any, keypoints: Keypoints, rngs: list[np.random.Generator]) -> None:
+    def update(self, state: Any, keypoints: Keypoints, rngs: Rngs) -> None:
         """Put every joint where its views see it."""
-        del rngs
         config, (batch, n_workers) = self.config, state.shape
         measured = arrays_of(keypoints, (batch, len(self.P), n_workers, N_JOINTS))
-        made = self.solve(self.P, *_believed(*measured, config.sigma_scale))
+        believed = _believed(*measured, config.sigma_scale)
+        made = triangulate(self.P, *believed, self.gate_sigma)
         points = np.ascontiguousarray(made.points_world), np.ascontiguousarray(made.cov_world)
         _update(state, *points, settings_of(config), config.velocity_tau_s)
 

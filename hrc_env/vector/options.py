@@ -10,18 +10,18 @@ from gymnasium.vector import AutoresetMode
 from hrc_env.core.errors import ConfigError, check_shape, unknown, whole
 from hrc_env.core.machine import n_cores
 from hrc_env.core.typing import Bools, Ints
+from hrc_env.env import ENDLESS
 
 MAX_ENVS = 16_384
 """More would be gigabytes of filters' states, and no faster."""
-NO_LIMIT = 2**62
 RESET_OPTIONS = ("reset_mask", "steps_left", "elapsed_steps")
 
 
 def time_limit(max_episode_steps: int) -> int:
     """Steps of an episode; -1 is as good as infinitely many."""
     if max_episode_steps == -1:
-        return NO_LIMIT
-    return whole("max_episode_steps", max_episode_steps, 1, NO_LIMIT)
+        return ENDLESS
+    return whole("max_episode_steps", max_episode_steps, 1, ENDLESS)
 
 
 def autoreset_of(mode: str | AutoresetMode) -> AutoresetMode:
@@ -74,7 +74,7 @@ def read_options(
     if "steps_left" in given:
         left = given["steps_left"]
         left = np.full(num_envs, left) if np.ndim(left) == 0 else left
-        steps_left = _steps("steps_left", left, num_envs, 1, NO_LIMIT)
+        steps_left = _steps("steps_left", left, num_envs, 1, ENDLESS)
         return mask, np.maximum(max_episode_steps - steps_left, 0)
     elapsed_steps = given.get("elapsed_steps", np.zeros(num_envs, int))
     return mask, _steps("elapsed_steps", elapsed_steps, num_envs, 0, max_episode_steps - 1)

@@ -5,13 +5,13 @@ y left, z up, origin on the floor below the pelvis; all segments are world-align
 """
 
 import functools
-import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from hrc_env.core.batching import flat
 from hrc_env.core.errors import ConfigError, check_shape, unknown
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import WorkerMotion, WorkerPath, WorkerTruth
@@ -53,8 +53,7 @@ class Body:
 
 
 OWN = ("stature_m", "rest_position", "joint_offset", "capsule_ends", "capsule_radius_m")
-SHARED = ("capsule_names", "capsule_segment", "joint_segment")
-"""What differs from body to body, and what does not."""
+"""What differs from body to body."""
 
 
 def assets_dir() -> Path:
@@ -84,19 +83,12 @@ def load_body(name: str = "worker_1") -> Body:
 
 @functools.cache
 def stack(names: tuple[str, ...]) -> Body:
-    """Read several baked workers; `ConfigError` where their rows would mean different things."""
+    """Read several baked workers."""
     if not names:
         raise ConfigError(f"Expected at least one worker of {', '.join(worker_names())}; got none.")
     bodies = [load_body(name) for name in names]
-    first = bodies[0]
-    for body in bodies:
-        if not all(np.array_equal(getattr(body, f), getattr(first, f)) for f in SHARED):
-            raise ConfigError(
-                f"{body.names[0]} has other capsules or joints than {names[0]}; expected the same "
-                "names on the same segments. Bake both with the same assets/workers/bake.py."
-            )
     own = {f: fixed(np.stack([getattr(body, f) for body in bodies]), np.float64) for f in OWN}
-    return replace(first, names=names, **own)
+    return replace(bodies[0], names=names, **own)
 
 
 ANY = "any"
@@ -120,14 +112,6 @@ def pool(worker: str | tuple[str, ...]) -> tuple[str, ...]:
     return names
 
 
-def rest_motion(body: Body) -> WorkerMotion:
-    """The body at rest and still, without leading axes: (S, ...)."""
-    upright = np.zeros((N_SEGMENTS, 4))
-    upright[:, 0] = 1.0
-    still = np.zeros((N_SEGMENTS, 3))
-    return WorkerMotion(body.rest_position.copy(), upright, still, still.copy())
-
-
 def worker_truth(body: Body, motion: WorkerMotion) -> WorkerTruth:
     """Where the joints and capsules of bodies in motion are, and how fast the joints.
 
@@ -140,8 +124,8 @@ def worker_truth(body: Body, motion: WorkerMotion) -> WorkerTruth:
     segments = (position, quaternion, motion.velocity_world, motion.angular_velocity_world)
     offset = body.joint_offset.reshape(-1, n_joints, 3)
     joints, velocity = np.empty((2, *lead, n_joints, 3))
-    out = _flat(joints), _flat(velocity)
-    _joints(tuple(map(_flat, segments)), rows, body.joint_segment, offset, out)
+    out = flat(joints, 2), flat(velocity, 2)
+    _joints(tuple(flat(each, 2) for each in segments), rows, body.joint_segment, offset, out)
     radius = body.capsule_radius_m.reshape(-1, len(body.capsule_names))[rows]
     return WorkerTruth(joints, velocity, capsules, radius.reshape(*lead, radius.shape[1]))
 
@@ -168,17 +152,11 @@ def _capsules_of(
     body: Body, position: Points3, quaternion: QuaternionsWxyz, rows: Ints
 ) -> Capsules:
     check_shape("position_world", position.shape[-2:], (N_SEGMENTS, 3), "segments, xyz")
-    flat, shape = _flat(position), (len(body.capsule_segment), 2, 3)
-    ends = np.empty((len(flat), *shape))
+    shape = (len(body.capsule_segment), 2, 3)
+    ends = np.empty((len(rows), *shape))
     known = body.capsule_ends.reshape(-1, *shape)
-    _capsules(flat, _flat(quaternion), rows, body.capsule_segment, known, ends)
+    _capsules(flat(position, 2), flat(quaternion, 2), rows, body.capsule_segment, known, ends)
     return ends.reshape(*position.shape[:-2], *shape)
-
-
-def _flat(array: Floats) -> Floats:
-    """(..., n, m) as (count, n, m), contiguous."""
-    whole = np.ascontiguousarray(array)
-    return whole.reshape(math.prod(whole.shape[:-2]), *whole.shape[-2:])
 
 
 @kernel

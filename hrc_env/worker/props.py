@@ -29,11 +29,6 @@ class Prop:
     """(2, 3) where the left and the right hand hold it; NaN: that hand does not."""
 
 
-def prop_index(name: str) -> int:
-    """Where `PROPS` has the prop of a name."""
-    return PROP_NAMES.index(name)
-
-
 def _box(centre: Triple, size: Triple) -> Floats:
     return shape(BOX, np.array(centre, float), np.eye(3), np.array(size) / 2)
 

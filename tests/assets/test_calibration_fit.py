@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from assets.emulator.clips import FAMILIES, TIMES, fit_clips, unseen_clips
-from assets.emulator.fit.fit import fit
+from assets.emulator.fit.fit import fit as fit_of
 from assets.emulator.samples import Samples
 from hrc_env.motion.repertoire import REPERTOIRE
 from hrc_env.perception.calibration import INNER, KIND, KINDS, N_VIEWS, NEXT, POSTURES
@@ -15,6 +15,7 @@ L, T, C, J = 24, 50, 4, 15
 STANDING, FOLDED, KNEELING = (
     np.eye(len(POSTURES))[POSTURES.index(name)] for name in ("standing", "folded", "kneeling")
 )
+BETWEEN_M = np.full((len(KINDS), 3), 0.007)
 HIP, ELBOW = KINDS.index("hip"), KINDS.index("elbow")
 
 
@@ -32,6 +33,10 @@ def made(error, **changes):
         "offset_m": nowhere, "counts": np.ones((L, T), bool),
     }  # fmt: skip
     return Samples(**(parts | changes))
+
+
+def fit(samples):
+    return fit_of(samples, BETWEEN_M)
 
 
 def white(size=0.01, seed=1):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from assets.emulator import holdout
-from assets.emulator.bodies import anatomical, not_looked_at
+from assets.emulator.bodies import anatomical, apart, not_looked_at
 from assets.emulator.clips import FIT_RIGS, clips_of, family_of
 from assets.emulator.validate import Compared, by_family
 from assets.emulator.watch import watch
@@ -45,6 +45,12 @@ def test_joints_of_a_body_that_was_not_looked_at_follow_from_the_others():
     assert 0 < apart_m.max() < 0.03
     np.testing.assert_array_equal(body.capsule_ends, load_body(name).capsule_ends)
     assert holdout.joints_of("worker_1") is load_body("worker_1")
+
+
+def test_how_far_bodies_are_apart_is_of_those_that_were_fitted():
+    fitted_m, both_m = apart(holdout.FITTED_BODIES), apart(holdout.HELD_BODIES)
+    assert 1e-3 < np.median(fitted_m) < 0.01
+    assert np.abs(fitted_m - both_m).max() > 1e-4
 
 
 def test_errors_are_of_the_joints_that_are_asked_for():

@@ -31,13 +31,12 @@ def calibration(path, places=(AT_FRONT, AT_RIGHT)):
     return path
 
 
-def recording(lag_frames=(0, 0, 0, 0), n_frames=100):
+def recording(n_frames):
     """(P, joints (T, J, 3), detections) of a walk seen by the lab's cameras."""
     rig = make_rig("lab")
-    joints = walk(rig.walk_m, [1000], n_frames + 20)[:, 0]
+    joints = walk(rig.walk_m, [1000], n_frames)[:, 0]
     px = np.stack([project(rig.P, frame[None])[0][0] for frame in joints])
     px = px + SIGMA_PX * np.random.default_rng(0).standard_normal(px.shape)
-    px = np.stack([px[10 - lag :][:n_frames, c] for c, lag in enumerate(lag_frames)], axis=1)
     shape = px.shape[:-1]
     detections = Detections(px, np.full(shape, 0.9), np.full(shape, SIGMA_PX), 0.04)
-    return rig, joints[10 : 10 + n_frames], detections
+    return rig, joints, detections

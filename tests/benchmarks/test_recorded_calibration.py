@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
-from recorded_stored import AT_FRONT, calibration
+from recorded_stored import calibration
 
 from benchmarks.recorded.calibration import (
     meeting_point,
     read_calibration,
     tracker_config,
 )
-from hrc_env.core.errors import ConfigError
 from hrc_env.geometry.cameras import pinhole, pinhole_from_image, project
 
 SIZES = [(1000, 2000), (1000, 2000)]
@@ -55,19 +54,3 @@ def test_somebody_is_expected_where_the_cameras_look():
     config = tracker_config(cameras)
     assert np.allclose(config.prior_mean_world, target)
     assert 1.5 < config.prior_std_m < 1.8
-
-
-def test_cameras_that_look_the_same_way_meet_nowhere(tmp_path):
-    path = calibration(tmp_path / "c.txt", [AT_FRONT] * 2)
-    cameras = read_calibration(path, SIZES)
-    with pytest.raises(ConfigError, match="parallel"):
-        meeting_point(cameras)
-
-
-def test_a_file_that_is_no_calibration_is_refused_in_words(tmp_path):
-    path = tmp_path / "c.txt"
-    path.write_text("not xml")
-    with pytest.raises(ConfigError, match="Qualisys"):
-        read_calibration(path, SIZES)
-    with pytest.raises(ConfigError, match=r"as many cameras as there are films \(2\), got 3"):
-        read_calibration(calibration(path, [AT_FRONT] * 3), SIZES)

@@ -9,11 +9,11 @@ import pytest
 from benchmarks.tracking import bench as tracking_bench
 from benchmarks.tracking import sequences
 from benchmarks.tracking.bench import TRACKING, TrackingBenchConfig
-from benchmarks.tracking.cells import CHI2_95_3D, CHI2_LEVELS, tally
+from benchmarks.tracking.cells import tally
 from benchmarks.tracking.names import DLT, rows
 from benchmarks.tracking.rigs import RIGS, make_rig
 from benchmarks.tracking.sequences import make_sequences
-from benchmarks.tracking.timing import time_association, time_estimator
+from benchmarks.tracking.timing import time_estimator
 from docs import tables
 from hrc_env.core.errors import ConfigError
 from hrc_env.experiments.study import runner
@@ -28,12 +28,6 @@ def no_time(name, rig, clean, hard, n_repeats, tick):
     return {"1": [2.0], "64": [1.0], "hard_64": [1.5]}
 
 
-def no_association_time(rig, n_repeats, tick):
-    """The same."""
-    tick(1.0)
-    return {"us": [9.0]}
-
-
 @contextmanager
 def small():
     """Few frames, no clock, and code that nobody edits meanwhile."""
@@ -43,7 +37,6 @@ def small():
         patch.setattr(sequences, "N_FRAMES", short)
         patch.setattr(sequences, "WINDOWS", windows)
         patch.setattr(tracking_bench, "time_estimator", no_time)
-        patch.setattr(tracking_bench, "time_association", no_association_time)
         patch.setattr(runner, "fingerprint_of", lambda settings, *modules: "the same code")
         yield patch
 
@@ -70,11 +63,9 @@ def test_every_key_is_written_in_the_shared_form(end_to_end):
             assert f"update_us.{name}.{batch}" in metrics
         for rig in RIGS:
             assert f"identity_swaps.{rig}.two_workers.{name}" in metrics
-            assert f"mirrored_returns.{rig}.one_camera.{name}" in metrics
         for rig, _, window in rows():
-            for kind in ("rmse_m", "coverage95", "std_over_rmse", "nees", "facing_wrong"):
+            for kind in ("rmse_m", "coverage95", "std_over_rmse", "facing_wrong"):
                 assert f"{kind}.{rig}.{window}.{name}" in metrics
-    assert "association_us" in metrics
     assert f"rmse_m.lab.clean.{DLT}" in metrics
     assert f"default_over.env.four_cameras.{DLT}" in metrics
     for metric in metrics.values():
@@ -126,7 +117,7 @@ def test_sizes_that_cannot_work_are_answered():
 
 
 def test_a_right_covariance_is_found_calibrated():
-    """Errors drawn from the reported Gaussian: 95 % inside, NEES of 1, levels equally filled."""
+    """Errors drawn from the reported Gaussian: 95 % inside, as large as told."""
     rng = np.random.default_rng(0)
     factor = rng.normal(size=(3, 3))
     truth = rng.normal(size=(50, 20, 1, 15, 3))
@@ -135,12 +126,4 @@ def test_a_right_covariance_is_found_calibrated():
     sums = tally(truth, mean, cov)
     n = np.sum(sums["n"])
     assert np.sum(sums["inside"]) / n == pytest.approx(0.95, abs=0.01)
-    assert np.sum(sums["nees"]) / n / 3 == pytest.approx(1.0, abs=0.03)
     assert np.sqrt(np.sum(sums["trace"]) / np.sum(sums["squared"])) == pytest.approx(1.0, abs=0.03)
-    np.testing.assert_allclose(np.sum(sums["levels"], 0) / n, 0.05, atol=0.007)
-    assert CHI2_LEVELS[-1] == pytest.approx(CHI2_95_3D, abs=1e-3)
-
-
-def test_the_association_of_four_people_takes_time():
-    times = time_association(make_rig("site"), 1, lambda share: None)
-    assert min(times["us"]) > 0

@@ -21,10 +21,10 @@ def camera(**other):
 @pytest.mark.parametrize(
     ("config", "said"),
     [
-        ({"task": {"radius_m": -1}}, r"^task\.radius_m must be > 0, got -1\.0\.$"),
+        ({"task": {"radius_m": -1}}, r"^task\.radius_m must be positive, got -1\.0\.$"),
         ({"task": {"height_m": [2, 1]}}, r"^task\.height_m must be \(low, high\)"),
         ({"control": {"joint_speed_share": 2}}, r"^control\.joint_speed_share must"),
-        ({"cost": {"proximity_m": -1}}, r"^cost\.proximity_m must be >= 0"),
+        ({"cost": {"proximity_m": -1}}, r"^cost\.proximity_m must not be negative"),
         ({"reward": {"proximity_reach_m": 0}}, r"^reward\.proximity_reach_m must"),
         ({"scene": {"sim_dt": 0}}, r"^scene\.sim_dt must be positive"),
         ({"tracker": {"n_hypotheses": 0}}, r"^tracker\.n_hypotheses must be positive"),

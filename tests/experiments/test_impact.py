@@ -91,7 +91,6 @@ def test_only_eyes_that_are_told_their_delay_have_cameras_that_say_it():
         ({"policies": ("scripted_slow",)}, "Unknown policy"),
         ({"setups": ("truth",)}, "must hold the reference"),
         ({"setups": (REFERENCE, "camera_9")}, "Unknown perception setup"),
-        ({"margins_m": (0.0,)}, "must be positive"),
     ],
 )
 def test_what_cannot_be_played_is_refused(change, words):

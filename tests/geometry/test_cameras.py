@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hrc_env.core.errors import ConfigError
 from hrc_env.geometry.cameras import inside_image, pinhole, project, projections, rays
 from hrc_env.geometry.rotations import about_axis
 
@@ -57,8 +56,3 @@ def test_moving_world_and_camera_together_changes_no_pixel(angle, shift):
 def test_the_image_ends_at_its_size():
     corners = np.array([[0.0, 0.0], [1919.9, 1079.9], [1920.0, 5.0], [5.0, -0.1]])
     assert inside_image(CAMERA, corners).tolist() == [True, True, False, False]
-
-
-def test_a_field_of_view_of_half_the_world_is_refused():
-    with pytest.raises(ConfigError, match="field of view"):
-        pinhole("wide", np.zeros(3), np.ones(3), 180.0, 100, 100)

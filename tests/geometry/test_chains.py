@@ -46,7 +46,7 @@ def test_numbers_and_mujoco_agree_on_every_link_and_capsule(q):
             data.body(f"robot/{name}").xmat, frame[:3, :3].ravel(), atol=1e-9
         )
     middles = chains.capsules(scene.chain, q).mean(-2)
-    for name, middle in zip(scene.chain.capsule_names, middles, strict=True):
+    for name, middle in zip(scene.robot.capsules, middles, strict=True):
         np.testing.assert_allclose(data.geom(f"robot/{name}").xpos, middle, atol=1e-9)
     tool = chains.tool(scene.chain, q)[:3, 3]
     np.testing.assert_allclose(data.site("robot/tool_point").xpos, tool, atol=1e-9)

@@ -5,12 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hrc_env.geometry.rotations import (
-    about_axis,
-    look_at,
-    matrix_from_quaternion,
-    quaternion_from_matrix,
-)
+from assets.rotations import matrix_from_quaternion, quaternion_from_matrix
+from hrc_env.geometry.rotations import about_axis, look_at
 
 components = st.lists(st.floats(-1, 1), min_size=4, max_size=4).filter(
     lambda values: np.linalg.norm(values) > 0.1

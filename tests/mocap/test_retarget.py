@@ -7,7 +7,7 @@ import pytest
 from written import BODY, write_bvh
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.mocap.poses import joints_in, marks_of, segments_in
+from hrc_env.mocap.poses import joints_in, marks_of, posed
 from hrc_env.mocap.read import read_capture
 from hrc_env.mocap.retarget import aligned_errors, retarget
 from hrc_env.motion import controls as c
@@ -50,7 +50,7 @@ def test_joints_of_the_projects_own_sense_are_followed_in_that_sense(work, tmp_p
 def test_standing_feet_do_not_slide(imported, capture):
     clip, error = imported
     assert error.slip_m_s < 0.05
-    position, _ = segments_in(clip.controls, anatomy(BODY))
+    position, _, _ = posed(clip.controls, anatomy(BODY))
     for side, name in enumerate(("left", "right")):
         ball = position[:, SEGMENT[f"{name}_toes"]]
         stands = clip.contacts[1:, side] & clip.contacts[:-1, side]
@@ -70,7 +70,7 @@ def test_nothing_jumps_where_feet_were_locked(imported, capture):
 
 def test_feet_do_not_go_through_the_floor(imported):
     clip, _ = imported
-    position, _ = segments_in(clip.controls, anatomy(BODY))
+    position, _, _ = posed(clip.controls, anatomy(BODY))
     resting = BODY.rest_position[[SEGMENT["left_toes"], SEGMENT["right_toes"]], 2]
     toes = position[:, [SEGMENT["left_toes"], SEGMENT["right_toes"]], 2]
     assert (toes > resting - 0.01).mean() > 0.99

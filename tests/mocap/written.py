@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from assets.rotations import matrix_from_quaternion
 from hrc_env.core.records import WorkerMotion
-from hrc_env.geometry.rotations import about_axis, matrix_from_quaternion
+from hrc_env.geometry.rotations import about_axis
 from hrc_env.mocap.poses import marks_of
 from hrc_env.worker.body import PARENT, SEGMENT, SEGMENTS, load_body, worker_truth
 

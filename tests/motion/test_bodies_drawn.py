@@ -6,6 +6,7 @@ import pickle
 import numpy as np
 import pytest
 
+from assets.workers.poses import rest_motion
 from hrc_env.config import settle
 from hrc_env.core.batching import mapped, one
 from hrc_env.core.errors import ConfigError
@@ -17,7 +18,7 @@ from hrc_env.scene.physics import Physics
 from hrc_env.scene.render import CropRenderer
 from hrc_env.step import ABSENT, ACTIVITY, BODY
 from hrc_env.vector.env import HRCVectorEnv
-from hrc_env.worker.body import SEGMENT, load_body, rest_motion, worker_names
+from hrc_env.worker.body import SEGMENT, load_body, worker_names
 
 SHANK, FOOT = SEGMENT["left_shank"], SEGMENT["left_foot"]
 ANY = {"worker": "any"}
@@ -160,7 +161,7 @@ def test_a_picture_shows_the_body_that_is_there():
         motion = dataclasses.replace(rest, position_world=place, body=np.array([row]))
         alone = CropRenderer(build(n_workers=1, bodies=name))
         for renderer in (drawn, alone):
-            renderer.draw(drawn.scene.home_q, motion if renderer is drawn else rest_of(motion))
+            renderer.pose(drawn.scene.home_q, motion if renderer is drawn else rest_of(motion))
         seen.append(drawn.crop(0, window))
         np.testing.assert_array_equal(seen[-1], alone.crop(0, window))
         alone.close()

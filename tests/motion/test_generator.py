@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from recorded import started, watched
 
+from assets.rotations import matrix_from_quaternion
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import WorkerMotion
-from hrc_env.geometry.rotations import matrix_from_quaternion
 from hrc_env.motion import anatomy, generator
 from hrc_env.worker.body import PARENT, SEGMENT, SEGMENTS, load_body, worker_truth
 
@@ -209,5 +209,3 @@ def test_impossible_settings_are_refused_with_what_would_do():
         generator.MotionConfig(near_probability=1.5)
     with pytest.raises(ConfigError, match="sudden_probability"):
         generator.PeopleConfig(sudden_probability=1.5)
-    with pytest.raises(ConfigError, match="batch"):
-        generator.make_state(0, 1, load_body(), generator.MotionConfig())

@@ -6,8 +6,11 @@ from people import truth
 
 from hrc_env.core.records import PoseEstimate
 from hrc_env.core.skeleton import JOINT, N_JOINTS
-from hrc_env.perception.calibration import HAND, KIND, POSTURES
-from hrc_env.perception.noise import OFFSET_M, our_joints
+from hrc_env.perception.calibration import HAND, KIND, POSTURES, read_calibration
+from hrc_env.perception.noise import our_joints
+
+KNOWN = read_calibration()
+OFFSET_M = KNOWN.offset_m
 
 
 def turned(joints, yaw_rad):
@@ -62,7 +65,19 @@ def test_nothing_else_changes():
     told = our_joints(said)
     np.testing.assert_array_equal(told.mean_world[1], before[1])
     np.testing.assert_array_equal(said.mean_world, before)
-    assert told.cov_world is said.cov_world
+    np.testing.assert_array_equal(told.cov_world[1], said.cov_world[1])
+    np.testing.assert_array_equal(told.velocity_world, said.velocity_world)
+
+
+@pytest.mark.parametrize("yaw_rad", [0.0, 1.0, -2.5])
+def test_what_is_not_known_of_the_offset_is_in_the_covariance(yaw_rad):
+    said = estimate_of(turned(facing_x(), yaw_rad)[None, None])
+    grown = (our_joints(said).cov_world - said.cov_world)[0, 0]
+    axes = turned(np.eye(3), yaw_rad)  # ahead, left, up
+    unknown_m2 = (KNOWN.wander_m[0] ** 2 + KNOWN.between_m**2)[KIND]
+    expected = np.einsum("ak,ja,al->jkl", axes, unknown_m2, axes)
+    np.testing.assert_allclose(grown, expected, atol=1e-7)
+    assert np.linalg.eigvalsh(grown).min() > 0
 
 
 def facing_x():

@@ -41,7 +41,7 @@ class Search:
 
     def detect(self, q, motion, look=None):
         self.renderer.randomize(look)
-        self.renderer.draw(q, motion)
+        self.renderer.pose(q, motion)
         return self.detector.detect(self.source, [None] * len(self.scene.cameras))
 
     def close(self):
@@ -109,7 +109,7 @@ def test_a_worker_far_away_is_found_in_any_light(search):
 def test_a_worker_at_the_robot_is_found(search):
     """Half a metre from its pedestal, in front."""
     motion, grounds = moment(search.scene, 3), search.scene.grounds
-    front = np.array([np.cos(grounds.robot_front_rad), np.sin(grounds.robot_front_rad), 0.0])
+    front = np.array([1.0, 0.0, 0.0])
     joints = worker_truth(load_body("worker_1"), motion).joints_world[0]
     at = np.append(grounds.robot_xy_m, 0.0) + (grounds.robot_clearance_m + 0.1) * front
     motion = moved(motion, (at - joints[HIPS].mean(0)) * [1, 1, 0])

@@ -80,7 +80,7 @@ def test_a_glance_stays_while_the_environment_goes_on():
     after = env.views.room(160, 120, seen), env.views.cameras(160, 90, seen)
     np.testing.assert_array_equal(before[0], after[0])
     np.testing.assert_array_equal(before[1], after[1])
-    assert not np.array_equal(env.views.room(160, 120), before[0])
+    assert not np.array_equal(env.views.room(160, 120, env.views.glance()), before[0])
     env.close()
 
 
@@ -110,7 +110,7 @@ def test_crops_are_what_the_network_was_given(weights):
         if crop is not None and window is not None:
             again = env.simulation.pipeline.cameras.images.crop(c, window)
             assert np.abs(crop.astype(int) - again).max(-1).mean() < 30  # black outside the image
-    pictures = env.views.crops(64)
+    pictures = env.views.crops(64, env.views.glance())
     assert [picture.shape for picture in pictures] == [(64, 64, 3)] * 4
     before = env.simulation.get_state()
     env.simulation.pipeline.looking.windows[0][0] = [None] * 4  # as after `set_state`

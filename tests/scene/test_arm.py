@@ -74,7 +74,7 @@ def test_a_folded_arm_touches_itself():
 def test_mujoco_and_the_geometry_room_agree_on_the_gap_between_tool_and_upper_arm():
     data = at_home()
     ends, radius = chains.capsules(SCENE.chain, HOME_Q), SCENE.chain.capsule_radius_m
-    names = SCENE.chain.capsule_names
+    names = SCENE.robot.capsules
     first, second = names.index("tool"), names.index("upper_arm")
     fromto = np.zeros(6)
     expected = mujoco.mj_geomDistance(

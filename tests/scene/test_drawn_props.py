@@ -12,7 +12,7 @@ from hrc_env.geometry.shapes import AXES, BOX, CENTRE, HALF_SIZE, KIND
 from hrc_env.scene.build import build, drawing_model, visuals
 from hrc_env.scene.primitives import DECORATION
 from hrc_env.scene.worker_visuals import PARKED_M, show_props
-from hrc_env.worker.props import PROP_NAMES, PROPS, prop_index
+from hrc_env.worker.props import PROP_NAMES, PROPS
 
 SCENE = build(n_workers=2)
 
@@ -50,7 +50,7 @@ def test_what_is_not_held_is_under_the_floor(drawn):
 def test_what_is_held_is_where_the_record_says_and_is_put_away_after(drawn):
     model, data = drawn
     rows, quaternion = visuals(SCENE).props, np.array([[1.0, 0, 0, 0], [0, 0, 0, 1.0]])
-    kinds = np.array([prop_index("saw"), prop_index("box")])
+    kinds = np.array([PROP_NAMES.index("saw"), PROP_NAMES.index("box")])
     show_props(model, data, rows, Held(kinds, np.array([[1.0, 2, 3], [4, 5, 6]]), quaternion))
     assert (data.mocap_pos[rows][..., 2] > 0).sum() == 2
     seen = model.geom_bodyid[model.geom_group == DECORATION]
@@ -84,5 +84,5 @@ def test_a_prop_looks_as_large_as_it_is(drawn, name):
         corners = model.geom_pos[geom] + outermost(model, geom) @ turn.reshape(3, 3).T
         lowest = np.minimum(lowest, corners.min(0))
         highest = np.maximum(highest, corners.max(0))
-    expected = bounds_of_shapes(PROPS[prop_index(name)])
+    expected = bounds_of_shapes(PROPS[PROP_NAMES.index(name)])
     np.testing.assert_allclose([lowest, highest], expected, atol=0.05)

@@ -5,11 +5,12 @@ import pickle
 import numpy as np
 import pytest
 
+from assets.workers.poses import rest_motion
 from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.core.records import WorkerPath
 from hrc_env.scene.build import build
 from hrc_env.scene.physics import Physics, no_workers
-from hrc_env.worker.body import load_body, rest_motion
+from hrc_env.worker.body import load_body
 
 LAB = build()
 T = 5

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from assets.workers.poses import rest_motion
 from hrc_env.core.batching import mapped
 from hrc_env.core.errors import ConfigError, RenderingError
 from hrc_env.core.records import Roi, WorkerMotion
@@ -17,7 +18,7 @@ from hrc_env.scene import gl
 from hrc_env.scene.build import SceneConfig, build
 from hrc_env.scene.canvas import Canvas
 from hrc_env.scene.render import CROP_QUALITY, CropRenderer, PictureRenderer
-from hrc_env.worker.body import load_body, rest_motion
+from hrc_env.worker.body import load_body
 
 BALLS = np.array([[0.6, 0.2, 1.2], [0.1, -0.5, 1.6], [1.4, 0.9, 0.7]])
 
@@ -98,7 +99,7 @@ WINDOW = Roi((900.0, 560.0), 500.0, 0.1)
 
 
 def test_a_crop_is_a_picture_of_the_asked_size_and_not_empty(lab, person, crops):
-    crops.draw(lab.home_q, person)
+    crops.pose(lab.home_q, person)
     crop = crops.crop(0, WINDOW)
     assert crop.shape == (256, 256, 3)
     assert crop.dtype == np.uint8
@@ -108,7 +109,7 @@ def test_a_crop_is_a_picture_of_the_asked_size_and_not_empty(lab, person, crops)
 def test_drawing_twice_gives_the_same_bits(lab, person, crops):
     other = CropRenderer(lab)
     for renderer in (other, crops):
-        renderer.draw(lab.home_q, person)
+        renderer.pose(lab.home_q, person)
     np.testing.assert_array_equal(other.crop(1, WINDOW), crops.crop(1, WINDOW))
     other.close()
 
@@ -127,7 +128,7 @@ def test_a_kept_background_changes_no_pixel(place, person):
         shift = np.array([-turn, 0.4 * turn, 0.0])
         moved = replace(person, position_world=person.position_world + shift)
         for renderer in (fresh, keeping):
-            renderer.draw(scene.home_q + turn, moved)
+            renderer.pose(scene.home_q + turn, moved)
         fresh._kept.clear()
         window = windows[look % 3]
         for camera in range(4):
@@ -142,13 +143,13 @@ def test_a_kept_background_changes_no_pixel(place, person):
 def test_a_renderer_survives_pickling(lab, person, crops):
     twin = pickle.loads(pickle.dumps(crops))
     for renderer in (twin, crops):
-        renderer.draw(lab.home_q, person)
+        renderer.pose(lab.home_q, person)
     np.testing.assert_array_equal(twin.crop(1, WINDOW), crops.crop(1, WINDOW))
     twin.close()
 
 
 def test_a_turned_window_shows_the_picture_turned(lab, person, crops):
-    crops.draw(lab.home_q, person)
+    crops.pose(lab.home_q, person)
     upright = crops.crop(2, Roi((900.0, 560.0), 500.0, 0.0)).astype(int)
     turned = crops.crop(2, Roi((900.0, 560.0), 500.0, np.pi / 2)).astype(int)
     # A window turned clockwise shows its content turned anticlockwise.
@@ -158,10 +159,10 @@ def test_a_turned_window_shows_the_picture_turned(lab, person, crops):
 
 
 def test_the_worker_is_in_the_picture(lab, person, crops):
-    crops.draw(lab.home_q, person)
+    crops.pose(lab.home_q, person)
     there = crops.crop(3, WINDOW)
     away = replace(person, position_world=person.position_world + np.array([0, 0, -9.0]))
-    crops.draw(lab.home_q, away)
+    crops.pose(lab.home_q, away)
     assert (there != crops.crop(3, WINDOW)).any(-1).mean() > 0.02
 
 
@@ -174,7 +175,7 @@ def test_a_closed_renderer_says_so(lab, person):
     renderer = CropRenderer(lab)
     renderer.close()
     renderer.close()
-    renderer.draw(lab.home_q, person)
+    renderer.pose(lab.home_q, person)
     with pytest.raises(RenderingError, match="closed"):
         renderer.crop(0, WINDOW)
 
@@ -210,7 +211,7 @@ def test_an_unknown_viewpoint_is_told_the_valid_ones(lab, person, pictures):
 
 
 def test_two_renderers_take_turns_without_drawing_into_each_other(lab, person, crops, pictures):
-    crops.draw(lab.home_q, person)
+    crops.pose(lab.home_q, person)
     alone = crops.crop(0, WINDOW)
     before = pictures.picture(lab.home_q, person, "room")
     np.testing.assert_array_equal(crops.crop(0, WINDOW), alone)

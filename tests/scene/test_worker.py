@@ -4,10 +4,11 @@ import mujoco
 import numpy as np
 import pytest
 
+from assets.workers.poses import rest_motion
 from hrc_env.core.records import WorkerMotion
 from hrc_env.scene.worker import add_worker, capsule_geom_ids, mocap_ids
 from hrc_env.scene.worker_visuals import add_visuals
-from hrc_env.worker.body import SEGMENT, SEGMENTS, load_body, rest_motion, worker_truth
+from hrc_env.worker.body import SEGMENT, SEGMENTS, load_body, worker_truth
 from hrc_env.worker.mesh import load_mesh
 
 PREFIX = "worker_1/"

@@ -64,7 +64,7 @@ def test_a_goal_is_missed_after_its_time_and_not_a_step_earlier():
     ]
     assert [bool(each[0]) for each in missed] == [False] * 99 + [True]
     assert state["n_missed"].tolist() == [1, 1]
-    assert not reach.succeeded(state).any()
+    assert not reach.info(state)["is_success"].any()
 
 
 def test_an_environment_draws_from_its_own_stream_only():

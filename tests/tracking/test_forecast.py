@@ -11,7 +11,7 @@ from hrc_env.core.skeleton import MIRROR, N_JOINTS
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import ESTIMATORS, make_estimator
-from hrc_env.tracking.forecast import check_horizon, forecast, mixed
+from hrc_env.tracking.forecast import forecast, mixed
 from hrc_env.tracking.models.acquisition import STANDING_M
 from hrc_env.tracking.oracle import prior
 
@@ -37,7 +37,7 @@ def deviation(estimate):
 @pytest.mark.parametrize("horizon_s", [0.0, -0.1, 1.01, np.nan, np.inf])
 def test_a_horizon_that_is_none_is_refused_in_words(horizon_s):
     with pytest.raises(ConfigError, match=r"horizon must be in \(0, 1\] s, got"):
-        check_horizon(horizon_s)
+        forecast(standing(), horizon_s, CONFIG)
     with pytest.raises(ConfigError, match="forecast_s must be"):
         HRCConfig(forecast_s=(0.2, horizon_s))
 

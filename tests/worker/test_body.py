@@ -5,10 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from assets.rotations import matrix_from_quaternion, quaternion_from_matrix
+from assets.workers.poses import rest_motion
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import WorkerMotion
 from hrc_env.core.skeleton import JOINT, MIRROR, N_JOINTS
-from hrc_env.geometry.rotations import about_axis, matrix_from_quaternion, quaternion_from_matrix
+from hrc_env.geometry.rotations import about_axis
 from hrc_env.worker.body import (
     N_SEGMENTS,
     PARENT,
@@ -16,7 +18,6 @@ from hrc_env.worker.body import (
     SEGMENTS,
     assets_dir,
     load_body,
-    rest_motion,
     worker_names,
     worker_truth,
 )

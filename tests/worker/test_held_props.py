@@ -5,7 +5,7 @@ import pytest
 
 from hrc_env.core.records import Held
 from hrc_env.geometry.shapes import AXES, BOX, CAPSULE, CENTRE, KIND, REACH
-from hrc_env.worker.props import PROP_NAMES, PROPS, held_shapes, prop_index
+from hrc_env.worker.props import PROP_NAMES, PROPS, held_shapes
 
 HELD = PROPS[1:]
 
@@ -17,7 +17,7 @@ def test_the_first_prop_is_nothing():
 
 def test_names_are_unique_and_find_their_prop():
     assert len(set(PROP_NAMES)) == len(PROPS)
-    assert PROPS[prop_index("hammer")].name == "hammer"
+    assert PROPS[PROP_NAMES.index("hammer")].name == "hammer"
 
 
 @pytest.mark.parametrize("prop", HELD, ids=lambda prop: prop.name)
@@ -48,7 +48,7 @@ def test_what_is_held_cannot_be_changed_by_accident():
 
 def test_what_is_held_goes_where_it_is_held():
     """A board that is turned by a quarter lies along world x; nobody holds the other one."""
-    kind = np.array([[prop_index("board"), 0]])
+    kind = np.array([[PROP_NAMES.index("board"), 0]])
     quarter = np.array([np.cos(np.pi / 4), 0, 0, np.sin(np.pi / 4)])
     held = Held(kind, np.full((1, 2, 3), (1.0, 2.0, 3.0)), np.tile(quarter, (1, 2, 1)))
     rows = held_shapes(held)[0]

@@ -19,11 +19,12 @@ from assets.emulator.fit.space import (
     wander_of,
 )
 from assets.emulator.samples import Samples
+from hrc_env.core.typing import Floats
 from hrc_env.perception.calibration import Calibration
 
 
-def fit(samples: Samples) -> Calibration:
-    """A calibration that draws errors like these."""
+def fit(samples: Samples, between_m: Floats) -> Calibration:
+    """A calibration that draws errors like these; between_m: of the bodies (`bodies.apart`)."""
     s = Cells(samples)
     offset = offsets_of(samples)
     wander, space_limb = wander_of(samples, offset)
@@ -38,7 +39,7 @@ def fit(samples: Samples) -> Calibration:
     swap_share, swap_s = swaps_of(samples)
     miss_share, miss_s = misses_of(samples)
     return Calibration(
-        offset, wander, space_limb, np.zeros(N_P), bias, size, spread, body,
+        offset, wander, space_limb, between_m, np.zeros(N_P), bias, size, spread, body,
         np.array(common), shares, slow_s, slow_m, limbs_of(s, unit), confidences_of(s),
         follows_of(s, left_over, spread, common), swap_share, swap_s, miss_share, miss_s,
         sigma_table(s, samples),

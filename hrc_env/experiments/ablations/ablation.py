@@ -29,8 +29,6 @@ class Setting:
     """Episodes take turns in them, so that nothing hangs on one camera's place."""
     by_sight: bool = False
     """Whether errors are also kept by how many cameras see the joint."""
-    is_timed: bool = False
-    """Whether updates are timed."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for what cannot be played."""

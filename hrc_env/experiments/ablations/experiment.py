@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from hrc_env.core.errors import ConfigError, check_names
-from hrc_env.core.results import Metric, over
+from hrc_env.core.results import Metric
 from hrc_env.experiments.ablations.ablation import Ablation, Setting
-from hrc_env.experiments.ablations.play import Sums, play, update_us, walks_of
+from hrc_env.experiments.ablations.play import Sums, play, walks_of
 from hrc_env.experiments.ablations.questions.faults import CALIBRATION, LATENCY
 from hrc_env.experiments.ablations.questions.filters import ALGORITHM_1, FILTER, KINEMATICS
 from hrc_env.experiments.ablations.questions.rigs import CAMERAS, OCCLUSION, WORKERS
@@ -22,7 +22,7 @@ from hrc_env.experiments.study.fingerprint import fingerprint_of
 from hrc_env.experiments.study.intervals import counted_quantile_of as quantile_of
 from hrc_env.experiments.study.intervals import counted_quantile_over as quantile_over
 from hrc_env.experiments.study.intervals import mean_over, paired, ratio_over, rmse_over
-from hrc_env.experiments.study.rigs import DT_S, N_WARM_UP, WARM_UP_S
+from hrc_env.experiments.study.rigs import DT_S, WARM_UP_S
 from hrc_env.experiments.study.runner import Study, at_least_one, changed
 
 ABLATIONS: dict[str, Ablation] = {
@@ -47,14 +47,12 @@ class AblationsConfig:
     """Seed of the first episode; the others count up."""
     seconds: float = 10.0
     """How long each is, the warm-up included."""
-    n_timed: int = 50
-    """Updates that are timed, where they are."""
     studies: tuple[str, ...] = tuple(ABLATIONS)
     """Which questions are asked."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for what cannot work."""
-        at_least_one(self, "n_seeds", "n_timed")
+        at_least_one(self, "n_seeds")
         if not self.seconds > WARM_UP_S:
             raise ConfigError(
                 f"Episodes must be longer than the warm-up of {WARM_UP_S:g} s, got {self.seconds}."
@@ -74,7 +72,7 @@ class AblationsConfig:
         return tuple(each for name, each in ABLATIONS.items() if name in self.studies)
 
 
-QUICK = AblationsConfig(n_seeds=4, seconds=5.0, n_timed=20)
+QUICK = AblationsConfig(n_seeds=4, seconds=5.0)
 """Every number, from little."""
 
 
@@ -106,14 +104,10 @@ def play_all(config: AblationsConfig, cache: PartCache) -> Played:
 
 
 def part(config: AblationsConfig, setting: Setting, tick: PartProgress) -> Sums:
-    """Sums of one setting's episodes, and the time that its updates take."""
+    """Sums of one setting's episodes."""
     n_steps = round(config.seconds / DT_S)
     walks = walks_of(setting.scene, setting.n_workers, config.seeds, n_steps)
-    sums = play(setting, walks, config.seeds, tick)
-    if setting.is_timed:
-        n_frames = min(config.n_timed, n_steps - N_WARM_UP)
-        sums["update_us"] = update_us(setting, walks, config.seeds, n_frames)
-    return sums
+    return play(setting, walks, config.seeds, tick)
 
 
 def metrics_of(played: Played) -> dict[str, Metric]:
@@ -128,8 +122,6 @@ def metrics_of(played: Played) -> dict[str, Metric]:
                 minutes = np.array(sums["frames"]) * DT_S / 60
                 metrics[f"id_switches.{key}"] = ratio_over(sums["id_switches"], minutes, "1/min")
                 metrics[f"idf1.{key}"] = mean_over(sums["idf1"], "share")
-            if "update_us" in sums:
-                metrics[f"update_us.{key}"] = over(sums["update_us"], "us")
         for each, word in product(ABLATIONS[name].settings, ("median", "p95")):
             pair = each.name, ABLATIONS[name].reference(each)
             if pair[0] != pair[1] and set(pair) <= of_settings.keys():

@@ -4,9 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError
 from hrc_env.core.typing import Floats, Points3
-from hrc_env.tracking.hypotheses.slots import Hypotheses
 from hrc_env.tracking.tree.gaussian import PARENT, ROOT
 
 BONES = ("learnt", "known", "none")
@@ -34,15 +32,9 @@ def lengths_m(joints_world: Points3) -> Floats:
 
 def handicap(state: Any, bones: str, motion: str, lengths: Floats) -> None:
     """Change what a tracker of one of `TREES` knows, in place, before its next prediction; the true
-    lengths are (B, W, J) [m].
-
-    Raises:
-        ConfigError: a state of something else.
-    """
+    lengths are (B, W, J) [m]."""
     if (bones, motion) == (BONES[0], MOTION[0]):
         return
-    if not isinstance(state, Hypotheses):
-        raise ConfigError(f"Expected a state with a body on a tree, got {type(state).__name__}.")
     trees = state.trees
     if bones == "none":
         trees["bone_variance"] = UNKNOWN_M2

@@ -3,7 +3,6 @@
 Workers walk once, for all settings, before an arm that rests: nobody reacts to it.
 """
 
-import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -20,10 +19,10 @@ from hrc_env.core.machine import n_cores
 from hrc_env.core.records import Keypoints, PoseEstimate, WorkerMotion
 from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, Points3
 from hrc_env.experiments.ablations.ablation import Setting
-from hrc_env.experiments.ablations.handicaps import BONES, MOTION, handicap, lengths_m
+from hrc_env.experiments.ablations.handicaps import handicap, lengths_m
 from hrc_env.experiments.study.cache import PartProgress
 from hrc_env.experiments.study.counts import ERRORS_M
-from hrc_env.experiments.study.rigs import DT_S, N_WARM_UP, Turn
+from hrc_env.experiments.study.rigs import N_WARM_UP, Turn
 from hrc_env.metrics import no_identities, tracking_error
 from hrc_env.motion import generator
 from hrc_env.perception.emulator import lines_of_sight
@@ -39,8 +38,6 @@ BODIES = "any"
 """Every episode gives each worker one of the baked bodies."""
 INSIDE_95 = float(chi2.ppf(0.95, 3))
 """Squares of errors in units of their covariance are below this in 95 % of all cases."""
-RECORDED_BY, N_TIMED = "triangulation", 3
-"""Detections do not depend on who follows them: the quickest does. Times are taken so often."""
 Sums = dict[str, list[Any]]
 """By name, one an episode."""
 
@@ -159,31 +156,6 @@ def watch(
         pipeline.sensor.expose(now)
         yield pipeline.perceive(everyone, *rngs), now, pipeline.keypoints
     pipeline.close()
-
-
-def update_us(setting: Setting, walks: Walks, seeds: tuple[int, ...], n_frames: int) -> list[float]:
-    """Microseconds of processor time per worker and update after the warm-up, the median over
-    n_frames of a few of the walks, side by side: a number for each repetition."""
-    turn, ids = setting.turns[0], np.arange(min(len(seeds), 4))
-    short = replace(walks, motions=walks.motions[: N_WARM_UP + n_frames])
-    recorded_by = replace(setting, estimator=RECORDED_BY, bones=BONES[0], motion=MOTION[0])
-    shown = [seen for _, _, seen in watch(recorded_by, turn, short, seeds, ids)]
-    tracker: Any = pipeline_of(setting, turn, len(ids)).tracker
-    found = []
-    for _ in range(N_TIMED):
-        rngs = [np.random.default_rng([seeds[b], 3]) for b in ids.tolist()]
-        state = tracker.init(len(ids), setting.n_workers)
-        tracker.reset(state, ids, rngs)
-        spent_s = []
-        for keypoints in shown:
-            seen = rows(keypoints, ids)
-            begun_s = time.thread_time()
-            tracker.predict(state, DT_S, rngs)
-            tracker.update(state, seen, rngs)
-            spent_s.append(time.thread_time() - begun_s)
-        median_s = float(np.median(spent_s[N_WARM_UP:]))
-        found.append(1e6 * median_s / (len(ids) * setting.n_workers))
-    return found
 
 
 def pipeline_of(setting: Setting, turn: Turn, batch: int) -> PoseTracking:

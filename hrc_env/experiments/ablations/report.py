@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from hrc_env.experiments.ablations.ablation import Ablation
-from hrc_env.experiments.study.plots import label, new_figure, plain_log, points, save
+from hrc_env.experiments.study.plots import ends, label, new_figure, plain_log, save
 from hrc_env.experiments.study.report import Column, Metrics, Report, picture, table_of
 
 QUANTILES = {"median": ("median", "o", "#1565c0"), "p95": ("95th percentile", "s", "#e65100")}
@@ -19,9 +19,8 @@ all bodies work beside an arm that rests, on the same walks in every setting of 
 Every joint of every frame after the first second counts, also where the track is lost: the last
 word, or the prior, is then the answer. *Coverage*: the share of joints within the reported 95 %
 region; *lost*: the share of time without a track; *switches*: of a worker from one track to
-another, a minute, and *IDF1*: how well workers keep theirs (`hrc_env/metrics.py`); *us an update*:
-processor time of one thread; *less*: less the setting that was changed, walk by walk; a dot where
-the interval leaves out zero."""
+another, a minute, and *IDF1*: how well workers keep theirs (`hrc_env/metrics.py`); *less*: less the
+setting that was changed, walk by walk; a dot where the interval leaves out zero."""
 
 
 def report(figures: Path, ablations: Sequence[Ablation], metrics: Metrics) -> Report:
@@ -44,15 +43,12 @@ def report(figures: Path, ablations: Sequence[Ablation], metrics: Metrics) -> Re
         if any(setting.n_workers > 1 for setting in ablation.settings):
             columns.append(Column(f"id_switches.{key}.{{}}", "switches [1/min]", 2))
             columns.append(Column(f"idf1.{key}.{{}}", "IDF1 [%]", 1, 100))
-        if any(setting.is_timed for setting in ablation.settings):
-            columns.append(Column(f"update_us.{key}.{{}}", "us an update", 0))
         parts += [
             f"## {ablation.title}\n\n{ablation.asked}",
             picture(path, "Error of a joint in each setting."),
             table_of("setting", rows, columns, metrics),
         ]
-    spread = "95 % intervals over seeds, times with the smallest and the largest"
-    return Report("Ablations of rigs, detections and estimators", ASKED, parts, spread)
+    return Report("Ablations of rigs, detections and estimators", ASKED, parts)
 
 
 def draw(path: Path, key: str, rows: Mapping[str, str], metrics: Metrics) -> None:
@@ -63,7 +59,8 @@ def draw(path: Path, key: str, rows: Mapping[str, str], metrics: Metrics) -> Non
     across = axis.get_yaxis_transform()
     for quantile, (words, mark, colour) in QUANTILES.items():
         found = [metrics[f"error_m.{key}.{row}.{quantile}"] for row in rows]
-        points(axis, places, found, 1000, fmt=mark, color=colour, label=words)
+        errors_mm, bars = [1000 * each.value for each in found], ends(found, 1000)
+        axis.errorbar(errors_mm, places, xerr=bars, fmt=mark, capsize=3, color=colour, label=words)
     for place, row in zip(places, rows, strict=True):
         inside = f"{100 * metrics[f'coverage95.{key}.{row}'].value:.0f} %"
         axis.text(1.02, place, inside, transform=across, fontsize=11, va="center", color="0.3")

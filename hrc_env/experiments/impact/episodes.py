@@ -155,7 +155,6 @@ def sums_of(steps: Steps, infos: Sequence[Info], margin_m: float, dt_s: float) -
         "cost_towards": (cost * (steps["robot_mps"] > MOVING_MPS)).sum(0),
         "separation_min_m": np.fmin.reduce(nearest_m, axis=0, initial=np.inf),
         "goals": infos[-1]["task/goals_reached"],
-        "goals_missed": infos[-1]["task/goals_missed"],
         "minutes": np.full(touching.shape[1], len(infos) * dt_s / 60),
         **_decisions(steps, margin_m),
         **_contacts(steps, touching),

@@ -61,8 +61,6 @@ class ImpactConfig:
             raise ConfigError(
                 f"setups must hold the reference {REFERENCE!r}; policies at least one."
             )
-        if any(margin <= 0 for margin in self.margins_m):
-            raise ConfigError(f"margins_m must be positive, got {self.margins_m}.")
 
     def seeds(self, level: str = "keypoints") -> list[int]:
         """One an episode."""

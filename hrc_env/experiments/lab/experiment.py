@@ -9,9 +9,7 @@ from typing import Any
 import numpy as np
 
 from hrc_env.config import HRCConfig
-from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric
-from hrc_env.core.skeleton import JOINTS
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.experiments.lab.motions import MOTIONS, play
 from hrc_env.experiments.lab.report import ALL, COLUMNS, ESTIMATORS, WARM_UP, report
@@ -19,7 +17,7 @@ from hrc_env.experiments.lab.sides import MISSED_SHARE, away_from_cameras, misse
 from hrc_env.experiments.study.cache import PartCache, PartProgress
 from hrc_env.experiments.study.intervals import paired, quantile_of, quantile_over, ratio_over
 from hrc_env.experiments.study.recording import Recording, record, replay
-from hrc_env.experiments.study.rigs import MULTI, SINGLE
+from hrc_env.experiments.study.rigs import CHOICES, MULTI
 from hrc_env.experiments.study.runner import Study, at_least_one, changed
 from hrc_env.perception.detector import DetectorConfig
 from hrc_env.scene.build import Scene, SceneConfig, build
@@ -29,7 +27,6 @@ from hrc_env.worker.body import load_body, worker_names
 RIG = "lab_gopro"
 CROPS = "particle"
 """The estimator that the crops follow."""
-CAMERAS = dict(zip(COLUMNS, (*SINGLE, (0, 1, 2, 3)), strict=True))
 QUANTILES = {"median": 0.5, "p95": 0.95}
 FIRST_SEED = 200
 Film = Mapping[str, Any]
@@ -52,8 +49,6 @@ class LabConfig:
     def __post_init__(self) -> None:
         """Raise `ConfigError` for what cannot work."""
         at_least_one(self, "n_seeds")
-        if self.max_frames < 2 * WARM_UP:
-            raise ConfigError(f"Films need at least {2 * WARM_UP} frames, got {self.max_frames}.")
         DetectorConfig(folded=self.folded)
 
     @property
@@ -95,11 +90,11 @@ def film(config: LabConfig, motion: str, seed: int, tick: PartProgress) -> dict[
     body = recording.scene.bodies[0]
     truth, errors = recording.joints_world[WARM_UP:], {}
     for name in ESTIMATORS:
-        for column, cameras in CAMERAS.items():
+        for column, cameras in CHOICES.items():
             said = replay(recording, name, cameras, WARM_UP, seed).mean_world
             off_m = np.linalg.norm(said[WARM_UP:, 0] - truth, axis=-1)
             errors[f"{name}.{column}"] = np.round(off_m, 4).tolist()
-            tick(0.2 / len(ESTIMATORS) / len(CAMERAS))
+            tick(0.2 / len(ESTIMATORS) / len(CHOICES))
     return {
         "body": body,
         "stature_m": float(load_body(body).stature_m),
@@ -130,9 +125,6 @@ def metrics_of(played: Films) -> dict[str, Metric]:
         metrics |= _misses(films, motion)
     for column in COLUMNS:
         errors = [_errors_m(each, f"{ESTIMATORS[0]}.{column}") for each in played.values()]
-        for j, joint in enumerate(JOINTS):
-            found = quantile_over([each[:, j] for each in errors], 0.5, "m")
-            metrics[f"error_m.by_joint.{column}.{joint}.median"] = found
         for other, (word, q) in product(ESTIMATORS[1:], QUANTILES.items()):
             theirs = [_errors_m(each, f"{other}.{column}") for each in played.values()]
             both = quantile_of([each.ravel() for each in (*errors, *theirs)], q)

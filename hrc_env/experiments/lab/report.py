@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from hrc_env.core.batching import one
-from hrc_env.core.skeleton import BONES, JOINTS
+from hrc_env.core.skeleton import BONES
 from hrc_env.core.typing import Image, Points3
 from hrc_env.experiments.lab import sides
 from hrc_env.experiments.lab.motions import MOTIONS
@@ -55,8 +55,6 @@ def report(figures: Path, take: Callable[[str], Recording], metrics: Metrics) ->
         for c in COLUMNS[:4]
     ]
     far.append(Column("missed.multi.{}", "four miss, of all joints [%]", 1, 100))
-    joints = {joint: joint.replace("_", " ") for joint in JOINTS}
-    by_joint = [Column(f"error_m.by_joint.{c}.{{}}.median", w, 0, 1000) for c, w in SPOKEN.items()]
     less = [
         Column(f"difference.error_m.{{}}.{c}.median", w, 1, 1000, signed=True)
         for c, w in SPOKEN.items()
@@ -74,7 +72,6 @@ def report(figures: Path, take: Callable[[str], Recording], metrics: Metrics) ->
             f"`{ESTIMATORS[0]}` less others, film by film, median [mm]", others, less, metrics
         ),
         table_of("joints of the side turned away", motions, far, metrics),
-        table_of(f"median error [mm], `{ESTIMATORS[0]}`", joints, by_joint, metrics),
     )
     return Report("What one camera does not see: the paper's laboratory, again", ASKED, parts)
 
@@ -121,7 +118,7 @@ def _crop(recording: Recording, t: int, c: int) -> Image:
     """What camera c gave the network, larger, with what was found."""
     scene, window = recording.scene, recording.windows[t][0][c]
     renderer = CropRenderer(scene, CROP_PX)
-    renderer.draw(scene.home_q, one(recording.motions, t))
+    renderer.pose(scene.home_q, one(recording.motions, t))
     if window is None:
         raise AssertionError("a camera is chosen that has looked")
     image = np.array(Lensed(renderer, scene.cameras).crop(c, window))

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -28,14 +27,6 @@ def save(figure: Figure, path: Path, dpi: int = 110) -> None:
 def ends(metrics: Sequence[Metric], scale: float = 1.0) -> Floats:
     """(2, n) how far the intervals go to either side of the values."""
     return scale * np.abs([[m.value - m.low, m.high - m.value] for m in metrics]).T
-
-
-def points(
-    axis: Axes, y: Sequence[float] | Floats, metrics: Sequence[Metric], scale: float, **style: Any
-) -> None:
-    """Values with intervals, each at its height."""
-    values, bars = [scale * each.value for each in metrics], ends(metrics, scale)
-    axis.errorbar(values, y, xerr=bars, **{"fmt": "o", "capsize": 3} | style)
 
 
 def label(axis: Axes, x: str = "", y: str = "", title: str = "", grid: str = "both") -> None:

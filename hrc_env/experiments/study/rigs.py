@@ -25,6 +25,8 @@ MULTI = "multi"
 """All four cameras, in the names of numbers."""
 SPOKEN = {f"camera_{k}": f"camera {k}" for k in range(1, 5)} | {MULTI: "all four"}
 """Each camera alone and all together, in words."""
+CHOICES: dict[str, Rig] = dict(zip(SPOKEN, (*SINGLE, ALL), strict=True))
+"""The same, as rigs."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,9 +15,9 @@ from hrc_env.motion.paths import lay_path
 from hrc_env.motion.posture import lean
 from hrc_env.motion.state import Pair, Worker
 from hrc_env.motion.walk import plan_pace, plan_walk, root, speed, walk
-from hrc_env.worker.props import prop_index
+from hrc_env.worker.props import PROP_NAMES
 
-CART, WHEELBARROW = prop_index("cart"), prop_index("wheelbarrow")
+CART, WHEELBARROW = PROP_NAMES.index("cart"), PROP_NAMES.index("wheelbarrow")
 CART_AHEAD_M, WHEELBARROW_AHEAD_LEGS = 0.47, 0.26
 """Handles ahead of the root: a cart's [m]; a level wheelbarrow's in lengths of the leg."""
 PUSHING_SHARE, STOOPED_M, CART_LEAN = 0.99, 0.4, 0.06

@@ -16,9 +16,9 @@ from hrc_env.motion.holding import GRIPS, grip, place_load, take_load
 from hrc_env.motion.kinematics import pose
 from hrc_env.motion.posture import from_here, lean, look_at, stand
 from hrc_env.motion.state import Triple, Worker
-from hrc_env.worker.props import prop_index
+from hrc_env.worker.props import PROP_NAMES
 
-BOX, BOARD = prop_index("box"), prop_index("board")
+BOX, BOARD = PROP_NAMES.index("box"), PROP_NAMES.index("board")
 BOX_HELD, BOARD_HELD, GIVEN = (0.37, 1.10), (0.27, 0.96), (0.60, 1.14)
 """A load's middle when held or handed over: ahead [m], height in the pelvis's; judgement."""
 CARRYING_SHARE = 0.95

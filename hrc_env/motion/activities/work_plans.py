@@ -14,9 +14,9 @@ from hrc_env.motion.activities.work import LOW_M
 from hrc_env.motion.anatomy import ARM, STAND_Z
 from hrc_env.motion.curves import placed
 from hrc_env.motion.state import Worker
-from hrc_env.worker.props import prop_index
+from hrc_env.worker.props import PROP_NAMES
 
-HAMMER, DRILL, HAND_SAW, TAPE = map(prop_index, ("hammer", "drill", "saw", "tape_measure"))
+HAMMER, DRILL, HAND_SAW, TAPE = map(PROP_NAMES.index, ("hammer", "drill", "saw", "tape_measure"))
 HEAD_M, FACE_M = 0.25, 0.05
 """From the fist to the hammer's head along the handle, and to its face [m]; `props`."""
 LIGHT_HZ, LIGHT_M, LOW_SHARE = 5.6, 0.060, 0.7

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -20,16 +20,6 @@ BLUR_IMAGES = 5
 """An image with an open shutter is the mean of so many."""
 
 
-class Stage(Protocol):
-    """What poses and draws a scene."""
-
-    size_px: int
-
-    def draw(self, q: JointAngles, motion: WorkerMotion) -> None:
-        """Pose the scene for the views that follow."""
-        ...
-
-
 @dataclass(frozen=True, slots=True)
 class Shot:
     """A scene of which images may be wanted later."""
@@ -44,8 +34,8 @@ class Shot:
 class CameraFilm:
     """An `ImageSource` of what each camera gives now; black where it gives nothing."""
 
-    def __init__(self, stage: Stage, viewer: Lensed, schedule: Schedule) -> None:
-        self.stage, self.viewer, self.schedule = stage, viewer, schedule
+    def __init__(self, viewer: Lensed, schedule: Schedule) -> None:
+        self.stage, self.viewer, self.schedule = viewer.drawer, viewer, schedule
         self._shots: Sequence[Shot | None] = ()
         self._seed = 0
         self._drawn: Any = None
@@ -81,7 +71,7 @@ class CameraFilm:
     def _pose(self, shot: Shot, ago_s: float) -> None:
         """Draw a scene as it was, a moment before the shutter closed."""
         if self._drawn != (shot.step, ago_s):
-            self.stage.draw(*_earlier(shot, ago_s / self.schedule.dt_s))
+            self.stage.pose(*_earlier(shot, ago_s / self.schedule.dt_s))
             self._drawn = (shot.step, ago_s)
 
 

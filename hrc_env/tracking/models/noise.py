@@ -68,11 +68,6 @@ def noise_model(config: ParticleConfig, ctrl_dt: float) -> NoiseModel:
     return NoiseModel(keep**_TURNS, persists, config.noise_share, least, most)
 
 
-def first_factor(config: ParticleConfig) -> float:
-    """The factor before anything was learnt: the detector is believed."""
-    return min(max(1.0, config.noise_bounds[0]), config.noise_bounds[1])
-
-
 @kernel
 def scale_sigma(learnt, sigma):
     """Multiply sigma (J, C) by the roots of the learnt factors (J, C), in place."""

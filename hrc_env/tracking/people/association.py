@@ -13,7 +13,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError, check_shape
+from hrc_env.core.errors import check_fields, check_shape
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
@@ -51,12 +51,8 @@ class AssociationConfig:
     """Area of an image [px^2]: the inverse is the density of poses that are nobody's."""
 
     def __post_init__(self) -> None:
-        for name in ("gate_sigma", "min_joints", "image_area_px"):
-            if not getattr(self, name) > 0:
-                raise ConfigError(f"{name} must be positive, got {getattr(self, name)}.")
-        for name in ("slack_m", "apart_m", "rejoin_m"):
-            if not getattr(self, name) >= 0:
-                raise ConfigError(f"{name} must not be negative, got {getattr(self, name)}.")
+        check_fields(self, "be positive", "gate_sigma", "min_joints", "image_area_px")
+        check_fields(self, "not be negative", "slack_m", "apart_m", "rejoin_m")
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +78,6 @@ def associate(
         P: (C, 3, 4) projections.
         found: (B, C, D, J, ...) D poses a camera in any order; those that are not are NaN.
         predicted: (B, W, ...) where the workers should be, before these frames were taken in.
-        config: settings; the defaults if None.
 
     Raises:
         ConfigError: arrays of other shapes. Never because of what they hold.

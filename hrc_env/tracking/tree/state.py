@@ -16,7 +16,7 @@ from hrc_env.core.typing import Floats, Ints
 from hrc_env.tracking.config import ParticleConfig
 from hrc_env.tracking.models.acquisition import STANDING_M
 from hrc_env.tracking.models.motion import STANDING_COUNT, damped_joints, whole_body_noise
-from hrc_env.tracking.models.noise import N_SUMS, first_factor
+from hrc_env.tracking.models.noise import N_SUMS
 from hrc_env.tracking.tree.bone_lengths import population_edges
 
 _J = N_JOINTS
@@ -72,7 +72,8 @@ def forget_trees(trees: Any, views: Any, noise: Any, ids: Ints, config: Particle
     fresh["bone_length"], fresh["bone_variance"] = population_edges()
     trees[ids] = fresh
     views[ids] = np.array((config.swap_begins, 0, 0), VIEW)
-    noise[ids] = np.array((first_factor(config), np.zeros(N_SUMS), np.zeros(2)), NOISE)
+    factor = np.clip(1.0, *config.noise_bounds)  # the detector is believed
+    noise[ids] = np.array((factor, np.zeros(N_SUMS), np.zeros(2)), NOISE)
 
 
 @functools.lru_cache(maxsize=16)

@@ -3,14 +3,16 @@
 import numpy as np
 import pytest
 
+from assets.workers.poses import rest_motion
 from hrc_env.core.batching import mapped
 from hrc_env.core.records import Roi
 from hrc_env.perception.faults.camera_film import BLUR_IMAGES, CameraFilm, Shot
 from hrc_env.perception.faults.corruptions import Shown, spoil
 from hrc_env.perception.faults.fault import KINDS, FaultConfig
 from hrc_env.perception.faults.schedule import Schedule
+from hrc_env.perception.lensed import Lensed
 from hrc_env.scene.rig import LAB_CAMERAS, pinholes
-from hrc_env.worker.body import load_body, rest_motion
+from hrc_env.worker.body import load_body
 
 CAMERA = pinholes(LAB_CAMERAS[:1])[0]
 WHOLE = Roi((960.0, 540.0), 1920.0, 0.0)
@@ -96,7 +98,7 @@ class FakeStage:
 
     size_px = 8
 
-    def draw(self, q, motion):
+    def pose(self, q, motion):
         self.level = motion.position_world[0, 0, 0] * 100
 
     def view(self, camera, window):
@@ -107,8 +109,8 @@ def film(*faults):
     body = load_body("worker_1")
     motions = [mapped(rest_motion(body), lambda a: a[None].copy()) for _ in range(2)]
     motions[0].position_world[..., 0], motions[1].position_world[..., 0] = 0.4, 0.8
-    stage, rig = FakeStage(), pinholes(LAB_CAMERAS)
-    shown = CameraFilm(stage, stage, Schedule(LAB_CAMERAS, faults, 0.04))
+    rig = pinholes(LAB_CAMERAS)
+    shown = CameraFilm(Lensed(FakeStage(), rig), Schedule(LAB_CAMERAS, faults, 0.04))
     q = np.zeros(6)
     shown.show([Shot(5, q, motions[1], (q, motions[0]), rig), None, None, None], seed=1)
     return shown

@@ -59,7 +59,7 @@ def draw(name: str, renderer: CropRenderer, motion: WorkerMotion, camera: int) -
     if window is None:
         raise SystemExit(f"Camera {camera} does not see the worker of {name!r}: choose another.")
     x, y = window.centre_px
-    renderer.draw(renderer.scene.home_q, now)
+    renderer.pose(renderer.scene.home_q, now)
     picture = renderer.crop(camera, Roi((x + 15, y - 10), 1.15 * window.side_px, 0.0))
     cv2.imwrite(str(DATA / f"{name}.png"), picture[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 9])
 

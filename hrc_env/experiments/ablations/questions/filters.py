@@ -12,7 +12,7 @@ from hrc_env.tracking.config import PaperConfig, ParticleConfig
 def _paper(name: str, n: int, m: int, sigma_cm: float = 5) -> Setting:
     tracker = PaperConfig(n_iterations=n, n_particles=m, sigma_m=sigma_cm / 100)
     words = f"N = {n}, M = {m:,}, noise {sigma_cm:g} cm"
-    return Setting(name, words, estimator="paper", tracker=tracker, is_timed=True)
+    return Setting(name, words, estimator="paper", tracker=tracker)
 
 
 ALGORITHM_1 = Ablation(
@@ -24,7 +24,7 @@ ALGORITHM_1 = Ablation(
         *(_paper(f"n1_m{m}", 1, m) for m in (30, 100, 300, 1000, 3000, 10_000)),
         *(_paper(f"n{n}_m1000", n, 1000) for n in (2, 5, 10)),
         *(_paper(f"sigma_{cm}cm", 1, 1000, cm) for cm in (1, 2, 10)),
-        Setting("particle", "the default filter", is_timed=True),
+        Setting("particle", "the default filter"),
     ),
     against=("particle",),
 )
@@ -77,7 +77,6 @@ def _part(cameras: str, name: str) -> Setting:
         f"{spoken}: {words}",
         tracker=ParticleConfig(**of_tracker),
         turns=left_of("lab", rigs),
-        is_timed=True,
         **of_setting,
     )
 
@@ -87,7 +86,7 @@ FILTER = Ablation(
     "What each part of the default filter contributes",
     "The default filter without one of its parts, and rivals that have fewer, on the same "
     "detections: with all four cameras of the laboratory, and with one that is left after the "
-    "warm-up. Times are those of the settings with their cameras.",
+    "warm-up.",
     (
         *(_part("4cam", name) for name in WITHOUT if name not in OF_ONE_VIEW),
         *(_part("1cam", name) for name in WITHOUT),
