@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from benchmarks.tracking.athletes import FALLS_S
 from benchmarks.tracking.rigs import DT_S, HEIGHT_PX, SIGMA_PX, WIDTH_PX
 from hrc_env.core.skeleton import MIRROR
 from hrc_env.core.typing import Bools, Floats, Points2, Points3
@@ -29,6 +30,8 @@ class Damage:
     """Share of detections that are errors, as wide as a third of the body."""
     swapped: float = 0.0
     """Share of the time in which a camera exchanges left and right, 6 frames at a time."""
+    mirrored_start: bool = False
+    """Two cameras exchange left and right in the first frame."""
     alone_s: tuple[float, float] | None = None
     """Begin and end of the time in which one camera sees the body, the others nothing [s]."""
 
@@ -39,6 +42,9 @@ CONDITIONS: dict[str, Damage] = {
     "hard": Damage(occluded=True, gross=0.10, swapped=0.05),
     "one_camera": Damage(alone_s=(1.0, 5.0)),
     "drifting": Damage(drift_px=4.0),
+    "mirrored_start": Damage(mirrored_start=True),
+    **dict.fromkeys(("running", "running_fast", "acrobat", "fallen"), Damage()),
+    "fallen_one_camera": Damage(alone_s=(FALLS_S, 6.0)),
 }
 
 
@@ -72,6 +78,10 @@ def _damaged(exact: Points2, in_view: Bools, damage: Damage, seed: int) -> Point
         now = _swaps(rngs[2], in_view.shape[:2], damage.swapped)[..., None]
         px = np.where(now[..., None], px[:, :, MIRROR], px)
         seen = np.where(now, seen[:, :, MIRROR], seen)
+    if damage.mirrored_start:
+        two = np.random.default_rng([seed, 9]).permutation(px.shape[1])[:2]
+        px[0, two], seen = px[0, two][:, MIRROR], seen.copy()
+        seen[0, two] = seen[0, two][:, MIRROR]
     if damage.gross:
         size = np.linalg.norm(exact.max(2) - exact.min(2), axis=-1)[..., None, None]
         wrong = rngs[3].random(seen.shape) < damage.gross

@@ -1,10 +1,13 @@
 """The sequences of the tracking bench: what all estimators are given and held against."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
+from functools import partial
 
 import numpy as np
 
 from benchmarks.tracking.arrivals import LONGEST_DELAY_S, delivered
+from benchmarks.tracking.athletes import fall, run, tumble
 from benchmarks.tracking.bound import posterior_bound
 from benchmarks.tracking.couples import couples, detect_couples, shuffles
 from benchmarks.tracking.detections import CONDITIONS, Damage, detect
@@ -21,9 +24,18 @@ SIMULATED = (*CONDITIONS, LATE, TWO_WORKERS, MATCHED)
 """Conditions of the rigs lab and site; of `matched` the least mean squared error is known."""
 MATCHED_ROOT_ACCELERATION = 0.05
 """Of the matched sequences and of the estimators on them, so that they stay in view [m^2/s^3]."""
+MOTIONS: dict[str, Callable[[tuple[float, float], list[int], int], Points3]] = {
+    "running": partial(run, speed_m_s=3.0),
+    "running_fast": partial(run, speed_m_s=3.5),
+    "acrobat": tumble,
+    "fallen": fall,
+    "fallen_one_camera": fall,
+}
+"""What people do where they do not walk."""
 N_FRAMES = {
     **dict.fromkeys(("clean", "occluded", "hard", "drifting"), 500),
-    "one_camera": 175, LATE: 175, TWO_WORKERS: 125, MATCHED: 40,
+    "one_camera": 175, LATE: 175, TWO_WORKERS: 125, MATCHED: 40, "mirrored_start": 50,
+    **dict.fromkeys(MOTIONS, 200),
 }  # fmt: skip
 _ALONE = {
     "one_camera_half_second": (25, 38),
@@ -37,9 +49,14 @@ WINDOWS: dict[str, dict[str, tuple[int, int]]] = {
     LATE: {LATE: (25, 175)},
     TWO_WORKERS: {TWO_WORKERS: (25, 125)},
     MATCHED: {MATCHED: (15, 40)},
+    "mirrored_start": {"mirrored_start": (12, 25)},
+    **{name: {name: (25, 200)} for name in ("running", "running_fast", "acrobat")},
+    "fallen": {"fallen": (50, 200)},
+    "fallen_one_camera": {"fallen_one_camera": (50, 150), "fallen_after_return": (160, 200)},
 }
 """Frames that count: after the first second; while one camera sees, and from one second after
-the others' return; matched sequences are short, lest the drifting body leave the images."""
+the others' return; from half a second on after a mirrored start; from the fall on; matched
+sequences are short, lest the drifting body leave the images."""
 ENV_WINDOWS = {
     **{name: {name: (25, ENV_FRAMES)} for name in ENV_CONDITIONS},
     "one_camera": {"one_camera": (25, 125), "after_return": (135, ENV_FRAMES)},
@@ -116,7 +133,7 @@ def make_sequences(rig: Rig, condition: str, seeds: list[int]) -> Sequences:
         px = detect_couples(rig.P, joints, seeds)
         order = shuffles(seeds, n_frames, len(rig.P), joints.shape[2])
         return Sequences(joints, px, windows, rig.tracker, order=order)
-    joints = walk(rig.walk_m, seeds, n_frames)
+    joints = MOTIONS.get(condition, walk)(rig.walk_m, seeds, n_frames)
     if condition == LATE:
         px, time_s = delivered(detect(rig.P, joints, Damage(), seeds), seeds)
         config = replace(rig.tracker, longest_delay_s=LONGEST_DELAY_S)

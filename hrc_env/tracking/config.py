@@ -88,6 +88,8 @@ class ParticleConfig(TrackerConfig):
     camera leaves open runs to the lens, the whole of it overshoots a little."""
     one_view_inflation: float = 1.21
     """Factor on the reported covariance of a worker whom one camera alone has seen for a while."""
+    lying_inflation: float = 7.0
+    """Further factor if the body lies: its depth is told by how people stand."""
     n_hypotheses: int = 8
     """Most hypotheses about one worker; one is a Gaussian (estimator="kalman")."""
     wait_updates: int = 5
@@ -126,8 +128,9 @@ class ParticleConfig(TrackerConfig):
         TrackerConfig.__post_init__(self)
         check_fields(
             self, "be positive", "floor_std_m", "bone_give", "noise_tau_s", "noise_persists_s",
-            "gauss_newton_steps", "image_area_px", "one_view_inflation", "n_hypotheses",
-            "look_every_s", "open_depth_m", "turn_std_rad", "evidence_trust", "size_std",
+            "gauss_newton_steps", "image_area_px", "one_view_inflation", "lying_inflation",
+            "n_hypotheses", "look_every_s", "open_depth_m", "turn_std_rad", "evidence_trust",
+            "size_std",
         )  # fmt: skip
         check_fields(
             self, "not be negative", "mean_correction", "anatomy_trust", "walking_odds",

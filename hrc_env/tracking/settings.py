@@ -32,6 +32,7 @@ class Settings(NamedTuple):
     forget_s: float
     mean_correction: float
     one_view_inflation: float
+    lying_inflation: float
     min_std_m: float
     floor_std_m: float
     bone_give: float

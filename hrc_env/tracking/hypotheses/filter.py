@@ -8,6 +8,7 @@ from hrc_env.core.kernels import kernel
 from hrc_env.tracking.hypotheses.anatomy import anatomy
 from hrc_env.tracking.hypotheses.branching import branch, is_ambiguous
 from hrc_env.tracking.hypotheses.one_view import begin_from_one
+from hrc_env.tracking.hypotheses.sides import agree_on_sides
 from hrc_env.tracking.hypotheses.slots import Hypotheses, drop, merge, normalise, worker_slots
 from hrc_env.tracking.measurements import make_seen, read_worker
 from hrc_env.tracking.models.acquisition import heading
@@ -101,6 +102,7 @@ def update_all(state, P, measured, s, noise, works, prior):
             tree = own.trees[0]
             if not tree.tracked:
                 scale_sigma(own.noise[0], seen.sigma)
+                agree_on_sides(seen, s)
                 if not _begin(own, seen, s):
                     _wait(own, seen, s, (work, prior))
                 continue
@@ -146,7 +148,8 @@ def _follow(own, h, look, seen, s, noise, scratch):
     work, prior = scratch
     tree, learnt, several = own.trees[h], own.noise[h], own.n_alive[0] > 1
     scale_sigma(learnt, seen.sigma)
-    undo_swaps(tree, seen, own.views[h], s)
+    if undo_swaps(tree, seen, own.views[h], s) and acquire(tree, seen, s):
+        tree.slope[:] = 0.0
     keep_positions(tree.cov, work.predicted)
     evidence = 0.0
     if several or look:

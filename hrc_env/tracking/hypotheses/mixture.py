@@ -4,6 +4,7 @@ import math
 
 from hrc_env.core.kernels import kernel
 from hrc_env.tracking.hypotheses.slots import Hypotheses
+from hrc_env.tracking.models.axes import leaning
 from hrc_env.tracking.settings import Settings
 from hrc_env.tracking.tracks import bound
 
@@ -23,8 +24,9 @@ def estimate_all(state, s, out):
             n_views = 0
             for c in range(state.views.shape[3]):
                 n_views += state.views[b, w, 0, c].blind <= _FORGOTTEN_UPDATES
-            if best.tracked and n_views == 1:  # the errors have heavier tails than a Gaussian's
-                _widen(cov[b, w], s.one_view_inflation)
+            if best.tracked and n_views == 1:  # the errors have heavier tails than a Gaussian's,
+                lies, _ = leaning(mean[b, w])  # and far heavier ones off the feet
+                _widen(cov[b, w], s.one_view_inflation * s.lying_inflation**lies)
             bound(cov[b, w], s.min_std_m, s.prior_std_m)
             for j in range(age.shape[2]):
                 age[b, w, j] = best.age_s[j]

@@ -14,17 +14,21 @@ from hrc_env.tracking.measurements import pixel_spread
 
 _MIRROR = tuple(int(j) for j in MIRROR)
 _BLIND_UPDATES, _BELIEVED_UPDATES = 8, 5
+_ENOUGH, _AGAINST = 3, 5.0
+"""So many cameras hardly exchange sides at once, while the others say no more than this against it
+(a log-likelihood ratio)."""
 _LEAST_CHANCE, _MOST_EVIDENCE = 1e-3, 50.0
 _REORDER = {"reassoc", "contract", "nsz"}
 
 
 @kernel
 def undo_swaps(tree, seen, views, s):
-    """Mirror what was seen by the cameras that are probably swapped, in place.
+    """Mirror what was seen by the cameras that are probably swapped, in place; whether it is rather
+    the body that has its sides exchanged, as all of several cameras say.
 
     `views` (C,) are a hypothesis's records of `tree.state.VIEW`.
     """
-    n_seeing, n_swapped = 0, 0
+    n_seeing, n_swapped, against = 0, 0, 0.0
     for c in range(len(views)):
         sees, view = False, views[c]
         for j in range(len(_MIRROR)):
@@ -40,16 +44,20 @@ def undo_swaps(tree, seen, views, s):
             view.swap_chance = _LEAST_CHANCE
             continue
         prior = view.swap_chance * (1.0 - s.swap_ends) + (1.0 - view.swap_chance) * s.swap_begins
-        odds = math.log(prior / (1.0 - prior)) + _swap_evidence(tree, seen, c, s.inlier_odds)
+        evidence = _swap_evidence(tree, seen, c, s.inlier_odds)
+        odds = math.log(prior / (1.0 - prior)) + evidence
         chance = min(max(1.0 / (1.0 + math.exp(-odds)), _LEAST_CHANCE), 1.0 - _LEAST_CHANCE)
         view.swap_chance = chance
         n_swapped += chance > 0.5
-    if n_swapped == n_seeing > 1:  # it is the body that has its sides exchanged
+        against -= min(evidence, 0.0)
+    mirrored = n_swapped >= _ENOUGH and against < _AGAINST
+    if n_swapped == n_seeing > 1 or mirrored:
         for c in range(len(views)):
             views[c].swap_chance = _LEAST_CHANCE
     for c in range(len(views)):
         if views[c].swap_chance > 0.5 and views[c].blind == 0:
-            _mirror(c, seen.z, seen.sigma, seen.ok)
+            mirror(c, seen.z, seen.sigma, seen.ok)
+    return mirrored
 
 
 @kernel
@@ -81,7 +89,8 @@ def _mixture(du, dv, sigma, spread, inlier_odds):
 
 
 @kernel
-def _mirror(c, z, sigma, ok):
+def mirror(c, z, sigma, ok):
+    """Exchange left and right of camera c, in place."""
     for j in range(len(_MIRROR)):
         m = _MIRROR[j]
         if m > j:

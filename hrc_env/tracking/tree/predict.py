@@ -9,7 +9,8 @@ divergence).
 """
 
 from hrc_env.core.kernels import kernel
-from hrc_env.tracking.models.motion import IS_LEG, learn_offsets, legs_follow, set_axes
+from hrc_env.tracking.models.axes import part_of, set_axes
+from hrc_env.tracking.models.motion import learn_offsets
 from hrc_env.tracking.tree.gaussian import ORDER, PARENT, invert, multiply, multiply_transposed
 
 _LEFT, _RIGHT, _LEFT_HIP, _RIGHT_HIP = 1, 2, 7, 8  # shoulders: _RIGHT, _LEFT_HIP hang on _LEFT
@@ -58,20 +59,16 @@ def _move_means(tree, F, travel, dt, w):
         _torso_of(body, 0), _torso_of(body, 1), _torso_of(body, 2),
         _torso_of(body, 3), _torso_of(body, 4), _torso_of(body, 5),
     )  # fmt: skip
-    if set_axes(body, axes):
-        legs = legs_follow(body, root, offset, axes)
-        learn_offsets(tree, root, axes, legs, dt)
-        for j in range(len(body)):
-            own = axes[0] if legs or not IS_LEG[j] else axes[1]
-            for i in range(3):
-                place[i] = 0.0
-                for k in range(3):
-                    place[i] += own[i, k] * offset[j, k]
-            _move_mean(body[j], root, F[j], travel[j], place)
-    else:
-        for j in range(len(body)):
-            place[0], place[1], place[2] = 0.0, 0.0, offset[j, 2]
-            _move_mean(body[j], root, F[j], travel[j], place)
+    known = set_axes(body, root, offset, axes)
+    if known:
+        learn_offsets(tree, root, axes, dt)
+    for j in range(len(body)):
+        own = axes[part_of(j)]
+        for i in range(3):
+            place[i] = 0.0
+            for k in range(3):
+                place[i] += own[i, k] * offset[j, k] if known or i == k == 2 else 0.0
+        _move_mean(body[j], root, F[j], travel[j], place)
 
 
 @kernel
