@@ -8,7 +8,7 @@ seen, C its covariance and R the part of it that is not the parent's, R is multi
     1 + (|d|^4 - d'C d) / d'R d,
 
 so that the variance along d is |d|^2, which is the likeliest (covariance matching: Mehra, IEEE
-Transactions on Automatic Control 15, 1970, doi:10.1109/TAC.1970.1099422).
+Transactions on Automatic Control 17, 1972, doi:10.1109/TAC.1972.1100100).
 """
 
 import numpy as np
