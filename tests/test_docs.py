@@ -177,6 +177,7 @@ def test_links_lead_somewhere(page):
             assert not section or section in anchors(path), f"{page.name} -> {target}#{section}"
 
 
+@pytest.mark.usefixtures("brought")  # so that what pages register is gone afterwards
 @pytest.mark.parametrize("page", [*generate.PAGES, *generate.REFERENCE], ids=name_of)
 def test_code_runs(page):
     """The blocks of a page, one after the other, as a reader would type them."""
