@@ -53,7 +53,7 @@ def tumble(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Poin
 def fall(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
     """Joints (T, S, J, 3) [m] of walkers who fall, lie there and roll from side to side."""
     path = steer(walk_m, seeds, n_frames)
-    time_s = DT_S * np.arange(n_frames)[:, None]
+    time_s = DT_S * np.arange(n_frames, dtype=float)[:, None]
     lying = _eased((time_s - FALLS_S) / (LIES_S - FALLS_S))
     walked = np.cumsum(1 - lying[:, 0]) - 1  # so many frames of their walk, then no further
     path = replace(
@@ -105,7 +105,7 @@ def _tricks(rng: np.random.Generator, n_frames: int) -> Floats:
     begin_s = rng.uniform(*_PAUSE_S)
     while begin_s < n_frames * DT_S:
         lasts_s, way = rng.uniform(*_TRICK_S), rng.choice([-np.pi, -np.pi / 2, 0.0, np.pi / 2])
-        share = (DT_S * np.arange(n_frames) - begin_s) / lasts_s
+        share = (DT_S * np.arange(n_frames, dtype=float) - begin_s) / lasts_s
         over = 2 * np.pi * _eased(share) * (share < 1)
         turns[0] += over * np.cos(way)
         turns[1] += over * np.sin(way)

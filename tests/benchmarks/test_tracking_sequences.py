@@ -1,9 +1,12 @@
 """The bench's sequences: seeded, bodily, and as hard as the published rows they stand beside."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
 from benchmarks.tracking.arrivals import delivered, in_time
+from benchmarks.tracking.athletes import FALLS_S, LIES_S, fall, run, tumble
 from benchmarks.tracking.cells import run_cell
 from benchmarks.tracking.couples import couples, detect_couples, identities
 from benchmarks.tracking.detections import CONDITIONS, Damage, detect
@@ -13,7 +16,7 @@ from benchmarks.tracking.names import DLT
 from benchmarks.tracking.rigs import RIGS, make_rig
 from benchmarks.tracking.sequences import make_sequences
 from benchmarks.tracking.walks import walk
-from hrc_env.core.skeleton import JOINT, TORSO
+from hrc_env.core.skeleton import JOINT, MIRROR, TORSO
 
 LIMBS = ("shoulder elbow", "elbow wrist", "hip knee", "knee ankle", "ankle foot")
 LAB = make_rig("lab")
@@ -198,3 +201,50 @@ def test_the_first_sequences_are_what_they_are_among_others():
     few = many.first(2)
     np.testing.assert_array_equal(few.joints, make_sequences(LAB, "two_workers", [4, 5]).joints)
     np.testing.assert_array_equal(few.keypoints(9).px, many.keypoints(9).px[:2])
+
+
+@pytest.mark.parametrize("motion", [partial(run, speed_m_s=3.5), tumble, fall])
+def test_who_runs_turns_over_or_falls_is_one_rigid_body_above_the_ground(motion):
+    joints = motion(LAB.walk_m, [3, 4], 120)
+    assert joints[..., 2].min() > 0.0
+    for limb in LIMBS:
+        for side in ("left", "right"):
+            there = lengths(joints, *(f"{side}_{name}" for name in limb.split()))
+            assert np.ptp(there) < 1e-6
+    np.testing.assert_allclose(motion(LAB.walk_m, [4], 120)[:, 0], joints[:, 1], atol=1e-9)
+
+
+def acceleration(joints, name):
+    return np.linalg.norm(np.diff(joints[..., JOINT[name], :], 2, axis=0), axis=-1) / 0.04**2
+
+
+def test_runners_are_as_fast_as_they_are_asked_to_be():
+    joints = run((6.0, 6.0), [3, 4, 5], 150, speed_m_s=3.5)
+    hips = joints[..., [JOINT["left_hip"], JOINT["right_hip"]], :2].mean(2)
+    speed_m_s = np.linalg.norm(np.diff(hips, axis=0), axis=-1) / 0.04
+    assert np.median(speed_m_s) == pytest.approx(3.5, abs=0.3)
+    assert 30 < np.percentile(acceleration(joints, "left_foot"), 95) < 90
+
+
+def trunk(joints):
+    """(..., 3) unit vector from hips to shoulders."""
+    along = joints[..., TORSO[:2], :].mean(-2) - joints[..., TORSO[2:], :].mean(-2)
+    return along / np.linalg.norm(along, axis=-1, keepdims=True)
+
+
+def test_acrobats_are_upside_down_now_and_then_and_the_fallen_lie():
+    upright = trunk(tumble(LAB.walk_m, [3, 4, 5], 150))[..., 2]
+    assert ((upright < -0.8).any(0) & (upright > 0.9).any(0)).all()
+    upright = trunk(fall(LAB.walk_m, [3, 4, 5], 150))[..., 2]
+    before, lying = round(FALLS_S / 0.04), round(LIES_S / 0.04)
+    assert upright[:before].min() > 0.85
+    assert np.abs(upright[lying:]).max() < 0.6
+
+
+def test_a_mirrored_start_exchanges_sides_of_two_cameras_in_the_first_frame_only():
+    joints = walk(LAB.walk_m, [7], 20)
+    clean, mirrored = (detect(LAB.P, joints, Damage(mirrored_start=m), [7]) for m in (False, True))
+    np.testing.assert_array_equal(clean[1:], mirrored[1:])
+    differs = [not np.array_equal(clean[0, 0, c], mirrored[0, 0, c], True) for c in range(4)]
+    assert sum(differs) == 2
+    np.testing.assert_array_equal(clean[0, 0, differs][:, MIRROR], mirrored[0, 0, differs])
