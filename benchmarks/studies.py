@@ -84,6 +84,10 @@ STUDIES: dict[str, Study] = {
         "python -m assets.emulator.holdout", 40, ("assets.emulator.holdout",), ("trueness",),
         quick="--rounds 1", is_keyed=False,
     ),
+    "fuzz": Study(
+        "python -m benchmarks.tracking.fuzz", 30, ("benchmarks.tracking.fuzz",), ("fuzz",),
+        quick="--cases 2", goes_on=False,
+    ),
     "baselines": Study(
         "python -m benchmarks.baselines", 30,
         ("benchmarks.baselines", "agents.training", "agents.ppo"), ("baselines",), is_keyed=False,

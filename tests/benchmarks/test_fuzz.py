@@ -1,0 +1,47 @@
+"""The fuzz finds an estimator that is surely wrong, and not one that says that it does not know."""
+
+import numpy as np
+import pytest
+
+from benchmarks.tracking import fuzz
+
+
+def test_a_case_is_reproduced_and_nothing_is_wrong_with_it():
+    rigs = [fuzz._rig(np.random.default_rng([3, 11])) for _ in range(2)]
+    np.testing.assert_array_equal(rigs[0][1], rigs[1][1])
+    assert np.abs(rigs[0][0].P - rigs[0][1]).max() > 0  # cameras hang a little otherwise
+    assert list(fuzz._judged(3)) == []
+
+
+def test_people_are_shaken_by_what_is_said_at_most():
+    still = np.zeros((fuzz.N_FRAMES, 200, 15, 3))
+    shaken = fuzz._shaken(np.random.default_rng(0), still)
+    acceleration = np.linalg.norm(np.diff(shaken[:, :, 0], 2, axis=0), axis=-1) / 0.04**2
+    assert 30 < np.percentile(acceleration.max(0), 95) < 90  # its envelope adds a little
+    np.testing.assert_allclose(shaken[-1], 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("off_m", "std_m", "kinds"),
+    [(0.0, 0.01, set()), (2.0, 1.0, {"not_recovered"}),
+     (2.0, 0.01, {"surely_wrong", "not_recovered"}), (np.nan, 0.01, {"not_finite"})],
+)  # fmt: skip
+def test_what_is_wrong_is_called_by_its_name(off_m, std_m, kinds, monkeypatch):
+    rng, seeds = np.random.default_rng(5), [1, 2]
+    rig, P = fuzz._rig(rng)
+    joints = fuzz.walk((0.5, 0.5), seeds, fuzz.N_FRAMES)
+    px = fuzz.detect(P, joints, fuzz.Damage(), seeds)
+
+    def beliefs(*_):
+        for joints_now in joints:
+            mean = joints_now[:, None] + off_m
+            yield mean, np.broadcast_to(std_m**2 / 3 * np.eye(3), (*mean.shape, 3))
+
+    monkeypatch.setattr(fuzz, "beliefs", beliefs)
+    assert {kind for kind, _ in fuzz._faults(rig, joints, px, seeds)} == kinds
+
+
+def test_an_exception_is_counted(monkeypatch, capsys):
+    monkeypatch.setattr(fuzz, "beliefs", lambda *_: 1 / 0)
+    assert list(fuzz._judged(0)) == [("exceptions", -1)]
+    assert "ZeroDivisionError" in capsys.readouterr().err
