@@ -12,6 +12,7 @@ joints all the time.
 """
 
 import traceback
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -59,7 +60,7 @@ class Arguments:
 def main(arguments: Arguments) -> None:
     """Draw, track, count; writes results.json, and found.txt with what was found."""
     cases = range(arguments.first_case, arguments.first_case + arguments.cases)
-    counts, found = dict.fromkeys(("exceptions", *KINDS), 0), list[str]()
+    counts, found = Counter[str](), list[str]()
     with progress_bar(Console(), "fuzz") as say:
         for case in cases:
             for kind, sequence in _judged(case):
@@ -67,8 +68,8 @@ def main(arguments: Arguments) -> None:
                 found.append(f"{kind}: case {case}, sequence {sequence}")
             say(1 / arguments.cases, f"{len(found)} found")
     n = EACH * arguments.cases
-    metrics = {name: exactly(1000 * k / n, "per 1,000", n) for name, k in counts.items()}
-    rows = {name: name.replace("_", " ") for name in counts}
+    rows = {name: name.replace("_", " ") for name in ("exceptions", *KINDS)}
+    metrics = {name: exactly(1000 * counts[name] / n, "per 1,000", n) for name in rows}
     part = table_of("Sequences", rows, [Column("{}", "per 1,000", 3)], metrics)
     report = Report("Fuzz of the default estimator", (__doc__ or "").strip(), [part])
     publish(arguments.out, report, asdict(arguments), list(cases), metrics)
