@@ -38,7 +38,8 @@ def agree_on_sides(seen, s):
         if other[c]:
             mirror(c, seen.z, seen.sigma, seen.ok)
     points, found = np.empty((n_joints, 3)), np.empty(n_joints, np.bool_)
-    find_body(seen, s, points, np.empty((n_joints, 3, 3)), found)
+    if not find_body(seen, s, points, np.empty((n_joints, 3, 3)), found):
+        return
     turned, n_seeing = np.empty((n_joints, 3)), 0
     for j in range(n_joints):
         turned[_MIRROR[j]] = points[j]
