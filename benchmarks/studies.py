@@ -36,6 +36,10 @@ STUDIES: dict[str, Study] = {
         "python -m benchmarks.tracking.starts", 4, ("benchmarks.tracking.starts",),
         ("starts", "locks"), quick="--seeds 4", goes_on=False,
     ),
+    "surprises": Study(
+        "python -m benchmarks.tracking.surprises", 3, ("benchmarks.tracking.surprises",),
+        ("surprises",), quick="--seeds 2", goes_on=False,
+    ),
     "forecast": Study(
         "python -m benchmarks.prediction", 1, ("benchmarks.prediction",), ("forecast",),
         goes_on=False,

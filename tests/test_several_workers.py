@@ -165,14 +165,14 @@ def test_who_comes_in_late_is_found_and_nobody_is_taken_for_them(pixels):
     """SearchSchedule for the second worker see the first one only, until the second is there."""
     env = HRCEnv(perception="pixels", n_workers=2)
     renderer = env.simulation.pipeline.cameras.renderer
-    draw = renderer.draw
-    renderer.draw = lambda q, motion: draw(q, without_the_second(motion))
+    pose = renderer.pose
+    renderer.pose = lambda q, motion: pose(q, without_the_second(motion))
     env.reset(seed=1)
     for _ in range(5):
         *_, info = env.step(np.zeros(6))
         assert env.simulation.estimate.tracked.sum() == 1
         assert info["tracking/lost"] == 1.0
-    renderer.draw = draw
+    renderer.pose = pose
     for _ in range(env.config.detector.search_every + 3):  # a search that has missed somebody rests
         *_, info = env.step(np.zeros(6))
     assert info["tracking/lost"] == 0.0

@@ -42,10 +42,13 @@ CONDITIONS: dict[str, Damage] = {
     "hard": Damage(occluded=True, gross=0.10, swapped=0.05),
     "one_camera": Damage(alone_s=(1.0, 5.0)),
     "drifting": Damage(drift_px=4.0),
+}
+SURPRISES: dict[str, Damage] = {
     "mirrored_start": Damage(mirrored_start=True),
     **dict.fromkeys(("running", "running_fast", "acrobat", "fallen"), Damage()),
     "fallen_one_camera": Damage(alone_s=(FALLS_S, 6.0)),
 }
+"""What `surprises` is about."""
 
 
 def detect(P: Floats, joints: Points3, damage: Damage, seeds: list[int]) -> Points2:

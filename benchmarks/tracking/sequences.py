@@ -10,7 +10,7 @@ from benchmarks.tracking.arrivals import LONGEST_DELAY_S, delivered
 from benchmarks.tracking.athletes import fall, run, tumble
 from benchmarks.tracking.bound import posterior_bound
 from benchmarks.tracking.couples import couples, detect_couples, shuffles
-from benchmarks.tracking.detections import CONDITIONS, Damage, detect
+from benchmarks.tracking.detections import CONDITIONS, SURPRISES, Damage, detect
 from benchmarks.tracking.env_sequences import ENV, ENV_CONDITIONS, ENV_FRAMES, record
 from benchmarks.tracking.matched import draw, matched_model
 from benchmarks.tracking.rigs import SIGMA_PX, Rig
@@ -138,7 +138,7 @@ def make_sequences(rig: Rig, condition: str, seeds: list[int]) -> Sequences:
         px, time_s = delivered(detect(rig.P, joints, Damage(), seeds), seeds)
         config = replace(rig.tracker, longest_delay_s=LONGEST_DELAY_S)
         return Sequences(joints[:, :, None], px[:, :, :, None], windows, config, time_s=time_s)
-    px = detect(rig.P, joints, CONDITIONS[condition], seeds)
+    px = detect(rig.P, joints, (CONDITIONS | SURPRISES)[condition], seeds)
     return Sequences(joints[:, :, None], px[:, :, :, None], windows, rig.tracker)
 
 

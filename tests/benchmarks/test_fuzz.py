@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.tracking import fuzz
+from benchmarks.tracking import fuzz, surprises
 
 
 def test_a_case_is_reproduced_and_nothing_is_wrong_with_it():
@@ -45,3 +45,24 @@ def test_an_exception_is_counted(monkeypatch, capsys):
     monkeypatch.setattr(fuzz, "beliefs", lambda *_: 1 / 0)
     assert list(fuzz._judged(0)) == [("exceptions", -1)]
     assert "ZeroDivisionError" in capsys.readouterr().err
+
+
+def test_surprises_are_held_against_triangulation_and_mirrored_bodies_are_counted(monkeypatch):
+    seeds = [1, 2]
+    metrics = surprises.of_condition("lab", "acrobat", seeds)
+    assert {key.split(".")[0] for key in metrics} == {*surprises.KINDS, "over_dlt"}
+    assert 0.3 < metrics["over_dlt.lab.acrobat"].value < 1.25
+    assert (
+        surprises.of_condition("lab", "mirrored_start", seeds)["turned.lab.mirrored_start"].value
+        == 0
+    )
+    cell = surprises.run_cell
+
+    def turned(*asked):
+        return {w: sums | {"wrong_way": [0.0, 3.0]} for w, sums in cell(*asked).items()}
+
+    monkeypatch.setattr(surprises, "run_cell", turned)
+    assert (
+        surprises.of_condition("lab", "mirrored_start", seeds)["turned.lab.mirrored_start"].value
+        == 1
+    )

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from recorded import joined, started, walk_straight, watched
 
+from benchmarks.tracking.walks import Gait, walk
 from hrc_env.config import settle
 from hrc_env.core.batching import one
 from hrc_env.core.errors import ConfigError
@@ -113,9 +114,47 @@ def test_a_long_clip_is_played_in_pieces_from_both_feet_to_both_feet(clip):
 
 
 def test_a_clip_that_is_never_on_both_feet_is_refused(clip):
-    hopping = dataclasses.replace(clip, contacts=np.zeros_like(clip.contacts))
-    with pytest.raises(ConfigError, match="on both feet at 0 frames"):
+    controls = clip.controls.copy()
+    controls[:, c.ANKLE + 2] += 0.2
+    hopping = dataclasses.replace(
+        clip, controls=controls, contacts=np.zeros_like(clip.contacts), source="hops"
+    )
+    with pytest.raises(ConfigError, match="hops: both feet are within 5 cm of the floor at 0 fra"):
         stocked([hopping], clip.size[None])
+
+
+@pytest.fixture(scope="module")
+def strides():
+    """Ten walks of 2 to 4 s, of people of several sizes and gaits, none of whom ever stands."""
+    clips = []
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        speed = rng.uniform(0.8, 1.6)
+        gait = Gait(
+            (speed - 0.1, speed, speed + 0.1), rng.uniform(0.6, 0.8), rng.uniform(0.35, 0.5),
+            rng.uniform(0.45, 0.7), rng.uniform(0.2, 0.6),
+        )  # fmt: skip
+        joints = walk((4.0, 4.0), [seed], int(rng.uniform(2.0, 4.0) * 25), gait)[:, 0]
+        capture = Capture(joints * rng.uniform(0.92, 1.08), 25.0, True, JOINTS, f"walk {seed}")
+        clips.append(retarget(capture, BODY)[0])
+    return clips
+
+
+def test_ordinary_walks_are_played_though_nobody_stands_in_them(strides):
+    for clip in strides:
+        assert not clip.contacts.all(1).any()
+        pieces = stocked([clip], clip.size[None])
+        assert pieces.count.max() > 0.6 * len(clip.controls)
+    config = generator.MotionConfig(motions=tuple(strides), motions_probability=1.0)
+    state, rngs = started(4, seed=3, config=config)
+    motions, doing = [], []
+    for _ in range(int(40 * FPS)):
+        motions.append(generator.advance(state, rngs, 1 / FPS, 1)[1])
+        doing.append(generator.activity(state)[:, 0])
+    assert (np.stack(doing) == st.CLIP).mean() > 0.2
+    position = joined(motions).position_world
+    speed = np.linalg.norm(np.diff(position, axis=1), axis=-1) * FPS
+    assert speed.max() < 12.0
 
 
 def test_motions_come_as_paths_or_clips(clip, tmp_path):

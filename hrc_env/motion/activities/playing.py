@@ -32,6 +32,9 @@ END, BEGIN, LAST = 0, 2, 4
 """First of the two footprints where the activity ends, where the clip begins, where it ends."""
 LONGEST_S, SHORTEST_S = 20.0, 0.5
 """Longer clips are played in pieces; no piece is shorter [s]."""
+LOW_M = 0.05
+"""A foot that is no higher counts as on the floor where no two feet rest: in a walk the one behind
+rolls off as the other comes down [m]."""
 TURNS_RAD = (0.0, 0.6, -0.6, 1.2, -1.2)
 """Headings, from the worker's own, that are tried for a clip: two steps turn no further."""
 STRIDE_SHARE = 0.25
@@ -73,15 +76,20 @@ def stocked(clips: Sequence[Clip], size: Floats) -> Clips:
 
 
 def _cuts(clip: Clip) -> list[tuple[int, int]]:
-    """First and last frame of each piece: both feet stand there, flat as far as they do."""
+    """First and last frame of each piece: both feet stand there, flat as far as they do, or are as
+    low as in the stride of a walk, of which a recording need not hold more."""
     tilt = np.abs(clip.controls[:, [c.ANKLE + 4, c.ANKLE + 10]]).sum(1)
-    stands = np.flatnonzero(clip.contacts.all(1))
     fewest, most = SHORTEST_S * clip.fps, LONGEST_S * clip.fps
-    if len(stands) < 2 or stands[-1] - stands[0] < fewest:
+    low = _lifted(clip).max(1) < LOW_M
+    for near in (clip.contacts.all(1), low):
+        stands = np.flatnonzero(near)
+        if len(stands) >= 2 and stands[-1] - stands[0] >= fewest:
+            break
+    else:
         raise ConfigError(
-            f"{clip.source}: the person is on both feet at {len(stands)} frames within "
-            f"{SHORTEST_S} s only; a clip is played from one such moment to another. Record them, "
-            "too, at the beginning and the end."
+            f"{clip.source}: both feet are within {100 * LOW_M:g} cm of the floor at {len(stands)} "
+            f"frames within {SHORTEST_S} s only; a clip is played from one such moment to another. "
+            "Record them, too, at the beginning and the end."
         )
     cuts = [int(stands[np.argmin(tilt[stands] + (stands > stands[0] + fewest))])]
     while stands[-1] - cuts[-1] >= fewest:
@@ -93,6 +101,12 @@ def _cuts(clip: Clip) -> list[tuple[int, int]]:
         if stands[-1] - inside[-1] < 1:
             break
     return list(itertools.pairwise(cuts))
+
+
+def _lifted(clip: Clip) -> Floats:
+    """(T, 2) how far a clip's feet are above the floor [m]."""
+    feet = [footprints(clip.controls[:, c.ANKLE + 6 * side :], clip.size) for side in range(2)]
+    return np.stack(feet, 1)[..., 2] - clip.size[ANKLE_Z]
 
 
 def following(clips: Clips, me: Worker) -> int:
