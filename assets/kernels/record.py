@@ -50,7 +50,7 @@ class Stopwatch(event.Listener):
 
 def main() -> None:
     """Each level in a process of its own."""
-    before = {(each.kernel, str(each.args)): each.seconds for each in signatures.recorded()}
+    before = {each.kernel: each.seconds for each in signatures.recorded()}
     signatures.write([])
     for level in LEVELS:
         print(f"{level} ...", flush=True)
@@ -62,7 +62,7 @@ def main() -> None:
                 each.kernel,
                 each.args,
                 each.levels,
-                each.seconds or before.get((each.kernel, str(each.args)), 1.0),
+                each.seconds or before.get(each.kernel, 1.0),
             )
             for each in found
         ]
