@@ -7,6 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from assets.emulator.recorded import perform_clip
 from hrc_env.config import HRCConfig
 from hrc_env.core.batching import rows
 from hrc_env.core.records import Held, WorkerMotion
@@ -17,6 +18,7 @@ from hrc_env.motion.repertoire import REPERTOIRE, Film, alone, perform
 from hrc_env.scene.build import SCENES, Scene, SceneConfig, build
 from hrc_env.worker.body import Body, load_body, worker_names
 
+RECORDED = {}
 DT_S = 0.04
 """Between the frames of a clip [s]: the environment's control step."""
 N_FRAMES = 60
@@ -173,7 +175,9 @@ def stage(clip: Clip, scene: Scene) -> Staged:
 def _played(
     name: str, body: Body, seed: int, xy_m: tuple[float, float] = (0.0, 0.0), yaw_rad: float = 0.0
 ) -> WorkerMotion:
-    """A whole scene of the repertoire (T, 1, ...), begun at a place."""
+    """A whole scene of the repertoire, or a recording (T, 1, ...), begun at a place."""
+    if name not in REPERTOIRE:
+        return perform_clip(RECORDED[name], body, DT_S, xy_m, yaw_rad, N_FRAMES * DT_S)
     me = alone(body, xy_m, yaw_rad, right=seed % 5 > 0)
     films = perform(REPERTOIRE[name], me, np.random.default_rng(seed), DT_S)
     return _joined(films)

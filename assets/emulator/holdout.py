@@ -21,6 +21,7 @@ from rich.console import Console
 from assets.emulator.bodies import apart, not_looked_at
 from assets.emulator.clips import FAMILIES, FIT_RIGS, UNSEEN_RIG, UNSEEN_SEEDS, Clip, clips_of
 from assets.emulator.fit.fit import fit
+from assets.emulator.fit.novelty import poses_of
 from assets.emulator.matching import matched
 from assets.emulator.run import part_of
 from assets.emulator.samples import samples_of
@@ -115,7 +116,7 @@ def fitted(out: Path, rounds: int, say: Say) -> HRCConfig:
         pixels.append(watched)
         say(0.7 / len(clips), f"fit: {clip.motion}")
     if not path.exists():
-        draft = fit(samples_of(pixels), apart(FITTED_BODIES))
+        draft = fit(samples_of(pixels), poses_of(pixels), apart(FITTED_BODIES))
         made = matched(draft, clips, pixels, path.with_suffix(".fit"), part_of(say, 0.3))
         write_calibration(path, made, {"clips": len(clips), "bodies": FITTED_BODIES})
     return replace(config, emulator=EmulatorConfig(calibration=str(path)))

@@ -23,12 +23,13 @@ from assets.emulator.fit.cells import (
     class_of,
 )
 from assets.emulator.fit.lasting import LAGS, add_lagged
+from assets.emulator.fit.novelty import new_of, novel_of
 from assets.emulator.samples import Samples, postures_of, samples_of
 from assets.emulator.watch import Watched, watch
 from assets.emulator.writing import write_calibration
 from hrc_env.config import HRCConfig
 from hrc_env.core.typing import Floats
-from hrc_env.perception.calibration import LONGEST_TAIL, Calibration
+from hrc_env.perception.calibration import KIND, LONGEST_TAIL, Calibration
 from hrc_env.perception.emulator import EmulatorConfig
 
 IN_THE_IMAGE, IN_SPACE = 3, 7
@@ -39,6 +40,8 @@ DRAWS = 3
 """How often the emulator plays every clip in a round."""
 DAMPED = 0.7
 """Power of the factors in space: what the emulator draws by chance is not to be fitted."""
+NEW_M = 0.03
+"""Who is so much further from known poses than those of the fit are tells of new ones [m]."""
 THROUGH_THE_TRACKER = 1.5
 """Power of the factors of tails, chosen by trial: with `DAMPED` they were short at the end."""
 OFTEN = 2000
@@ -48,7 +51,9 @@ USUAL = 2.366
 TAKEN_BACK = 0.5
 """How much of what a longer tail adds to the median is taken off at once, before it is measured."""
 TOLD_LAGS = (2, 5, 12)
-"""Of `LAGS`, in frames: by these it is told how long errors last."""
+"""Of `LAGS`, in frames: by these it is told how long errors last,"""
+LONG_LAGS = (25, 35)
+"""and by these how much of them stays for good."""
 Say = Callable[[float, str], None]
 """Told by how much the share that is done grew, and what is being done."""
 
@@ -77,7 +82,7 @@ def matched(
         else:
             draft = _scaled(draft, pixels, emulated)
     path.unlink()
-    return draft
+    return replace(draft, novel=novel_of(draft, pixels))
 
 
 def _emulated(clips: list[Clip], path: Path, tick: Callable[[], None]) -> list[Watched]:
@@ -99,23 +104,32 @@ def _as_in_the_image(draft: Calibration, wanted: Samples, drawn: Samples) -> Cal
     (middle, wide), (middle_drawn, wide_drawn) = _lengths(cells), _lengths(others)
     size = draft.size * _limited(middle / middle_drawn, _trust(cells))
     spread = draft.spread * _limited(wide / wide_drawn, _trust(cells))
-    longer = _limited(float(np.mean(_fading(drawn) / _fading(wanted))))
-    slow_s, slow_m = draft.slow_s * longer, draft.slow_m * longer
-    return replace(draft, size=size, spread=spread, body=body, slow_s=slow_s, slow_m=slow_m)
+    fading, fading_drawn = (np.log(_correlation(each, TOLD_LAGS)) for each in (wanted, drawn))
+    longer = _limited(float(np.mean(fading_drawn / fading)))
+    stays = _correlation(wanted, LONG_LAGS) - _correlation(drawn, LONG_LAGS)
+    return replace(
+        draft, size=size, spread=spread, body=body, slow_s=draft.slow_s * longer,
+        slow_m=draft.slow_m * longer, shares=_moved(draft.shares, float(stays.mean())),
+    )  # fmt: skip
 
 
-def _fading(samples: Samples) -> Floats:
-    """(P, n) logarithm of the correlation of errors with those `TOLD_LAGS` later, by posture."""
+def _moved(shares: Floats, more: float) -> Floats:
+    """Shares (K, 3) of what stays and what lasts for a while, of which so much more stays."""
+    more_each = np.clip(more, -shares[:, 0], shares[:, 1])
+    return shares + np.stack([more_each, -more_each, np.zeros(N_K)], -1)
+
+
+def _correlation(samples: Samples, lags: tuple[int, ...]) -> Floats:
+    """(P, n) correlation of errors with those so many frames later, by posture, .01 to .99."""
     class_ = class_of(samples.posture)[..., None, None, None]
     small = np.linalg.norm(samples.error, axis=-1, keepdims=True) < SHARP
-    fading = []
+    found = []
     for posture in range(N_P):
         mine = np.where(small & (class_ == posture), samples.error, np.nan)
         sums = [np.zeros(len(LAGS)), np.full(len(LAGS), 1e-12)]
         add_lagged(sums, mine)
-        told = (sums[0] / sums[1])[[LAGS.index(lag) for lag in TOLD_LAGS]]
-        fading.append(np.log(np.clip(told, 0.01, 0.99)))
-    return np.array(fading)
+        found.append((sums[0] / sums[1])[[LAGS.index(lag) for lag in lags]])
+    return np.clip(found, 0.01, 0.99)
 
 
 def _lengths(cells: Cells) -> tuple[Floats, Floats]:
@@ -155,7 +169,30 @@ def _as_in_space(draft: Calibration, pixels: list[Watched], emulated: list[Watch
         size[posture] *= factor
         wander[posture] *= factor / added**TAKEN_BACK
         tail[posture] = grown
-    return replace(draft, size=size, wander_m=wander, tail=tail)
+    strange = _strange(draft, pixels, emulated)
+    return replace(draft, size=size, wander_m=wander, tail=tail, strange=strange)
+
+
+def _strange(draft: Calibration, pixels: list[Watched], emulated: list[Watched]) -> Floats:
+    """What the emulator adds for poses that are new, by how much the tracker's median is off."""
+    wanted, drawn = _errors_of_new(draft, pixels), _errors_of_new(draft, emulated)
+    if min(len(wanted[0]), len(drawn[0])) < OFTEN / 15:
+        return draft.strange
+    squared = np.median(wanted[0]) ** 2 - np.median(drawn[0]) ** 2
+    added = squared / USUAL / np.mean(drawn[1] ** 2)
+    return np.sqrt(max(draft.strange**2 + DAMPED * added, 0.0))
+
+
+def _errors_of_new(known: Calibration, clips: list[Watched]) -> tuple[Floats, Floats]:
+    """Errors of the tracked joints (N, J) of bodies that are new, and by how much (N,) [m]."""
+    errors, new = [np.zeros((0, len(KIND)))], [np.zeros(0)]
+    for clip in clips:
+        new_m = new_of(clip.joints_world, known)
+        mine = clip.tracked & (new_m > NEW_M)
+        mine[:WARM_UP] = False
+        errors.append(np.linalg.norm((clip.mean_world - clip.joints_world)[mine], axis=-1))
+        new.append(new_m[mine])
+    return np.concatenate(errors), np.concatenate(new)
 
 
 def _scaled(draft: Calibration, pixels: list[Watched], emulated: list[Watched]) -> Calibration:

@@ -7,6 +7,7 @@ from pathlib import Path
 from assets.emulator.bodies import apart
 from assets.emulator.clips import fit_clips, unseen_clips
 from assets.emulator.fit.fit import fit
+from assets.emulator.fit.novelty import poses_of
 from assets.emulator.matching import matched
 from assets.emulator.plot import plot_comparison
 from assets.emulator.samples import samples_of
@@ -50,7 +51,10 @@ def calibrate(run: CalibrationRun, out: Path, say: Say) -> Calibration:
     for clip, seen in zip(clips, kept("pixels", clips, HRCConfig(), folder_of(out)), strict=True):
         pixels.append(seen)
         say(0.85 / len(clips), f"{clip.scene}: {clip.motion}")
-    draft, rest = fit(samples_of(pixels), apart(worker_names())), part_of(say, 0.15)
+    draft, rest = (
+        fit(samples_of(pixels), poses_of(pixels), apart(worker_names())),
+        part_of(say, 0.15),
+    )
     calibration = matched(draft, clips, pixels, out.with_suffix(".fit"), rest)
     write_calibration(out, calibration, _made(run, out, len(clips)))
     return calibration

@@ -58,6 +58,12 @@ class Watched:
     """(T, J, 3) the anatomical landmarks of the joints [m]."""
     P: Floats
     """(C, 3, 4) the cameras."""
+    tracker_mean_world: Points3
+    """(T, J, 3) what the tracker said, of the joints that the network means [m]."""
+    tracker_cov_world: Covariances3
+    """(T, J, 3, 3) [m^2]."""
+    tracker_velocity_world: Floats
+    """(T, J, 3) [m/s]."""
 
 
 BodyOf = Callable[[str], Body]
@@ -97,7 +103,7 @@ def _watched(
 ) -> Watched:
     rngs = [[np.random.default_rng([*seed, 71, k])] for k in range(2)]
     pipeline.reset(np.arange(1), *rngs)
-    P, frames = projections(scene.cameras), []
+    P, frames, said = projections(scene.cameras), [], []
     _introduce(pipeline, worker_truth(staged.body, staged.motion).joints_world[:1], P, rngs[1])
     landmarks_world = worker_truth(anatomical(staged.body), staged.motion).joints_world[:, 0]
     q = staged.q[None]
@@ -107,6 +113,10 @@ def _watched(
         now = TrueSensorInput(np.arange(1), q, motion, truth, np.ones((1, 1), bool))
         pipeline.sensor.expose(now)
         estimate = pipeline.perceive(now.ids, *rngs)
+        meant = pipeline.tracker.estimate(pipeline.state)
+        said.append(
+            [each[0, 0] for each in (meant.mean_world, meant.cov_world, meant.velocity_world)]
+        )
         keypoints, windows = pipeline.keypoints, pipeline.last_detections(0)[1]
         true_px, depth_m = project(P, truth.joints_world[:, 0])
         sight, look_of = lines_of_sight(truth, scene.surroundings(q, motion.held), scene.cameras)
@@ -120,7 +130,8 @@ def _watched(
             )
         )  # fmt: skip
     columns: list[Any] = [np.array(column) for column in zip(*frames, strict=True)]
-    return Watched(*[*columns, landmarks_world, P])
+    told = [np.array(column) for column in zip(*said, strict=True)]
+    return Watched(*columns, landmarks_world, P, *told)
 
 
 def _introduce(pipeline: PoseTracking, joints_world: Points3, P: Floats, rngs: Generators) -> None:

@@ -14,7 +14,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import JOINTS, MIRROR
 from hrc_env.core.typing import Floats, Ints
 
-FORMAT, VERSION = "hrc_env keypoints", 6
+FORMAT, VERSION = "hrc_env keypoints", 7
 """Version: what the tables mean. A file of another one is refused."""
 PACKAGED = Path(__file__).with_name("keypoints.json")
 KINDS = ("nose", "shoulder", "elbow", "wrist", "hip", "knee", "ankle", "foot")
@@ -29,6 +29,8 @@ KNOTS = (-2.0, -1.0, 0.0, 1.0, 2.0)
 """Quantiles that a confidence's distribution is given by, in standard deviations."""
 BODY_KNOTS = (-3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0)
 """The same of the factor that the errors of a whole body have."""
+N_POSES = 32
+"""Poses that stand for all that were fitted to."""
 N_SEEN = len(JOINTS) + 1
 """From none to all."""
 VISIBILITY: Floats = np.array([0.10, 0.35, 0.65, 0.875, 0.975])
@@ -55,6 +57,10 @@ class Calibration:
     wander_m: Floats  # how far that varies, a standard deviation [m]
     space_limb: Floats  # its correlation with what varies of the `NEXT` joint, axis by axis
     between_m: Floats  # how far `offset_m` differs from body to body, a standard deviation [m]
+    poses: Floats  # that were fitted to, or near to those (`outline.pose_of`)
+    near_m: Floats  # bodies that are no further from one of them are not new (`novelty_m`) [m]
+    novel: Floats  # deviation that each metre further adds to what is told of a joint
+    strange: Floats  # deviation that each metre further adds to `wander_m`
     tail: Floats  # now and then further: a normal vector n is lengthened by 1 + tail n.n / 3
     bias: Floats  # mean error in a camera by the view, of side
     size: Floats  # median over time of the standard deviation of each coordinate, of side
@@ -76,7 +82,8 @@ class Calibration:
 
 SHAPES: dict[str, tuple[int, ...]] = {
     "offset_m": (_P, _K, 3), "wander_m": (_P, _K, 3), "space_limb": (_K, 3),
-    "between_m": (_K, 3), "tail": (_P,), "bias": (N_VIEWS, _K, 2),
+    "between_m": (_K, 3), "poses": (N_POSES, len(JOINTS), 3), "near_m": (), "novel": (_K,),
+    "strange": (), "tail": (_P,), "bias": (N_VIEWS, _K, 2),
     "size": (_P, _S, _K), "spread": (_P, _S, _K), "body": (_P, _Q),
     "common": (), "shares": (_K, 3),
     "slow_s": (), "slow_m": (), "limb": (_K,), "confidence": (_P, _S, _K, _Z), "follows": (_S, _K),
@@ -145,7 +152,7 @@ def _table(name: str, value: Any, where: Path) -> Floats:
     expected = f"finite numbers of shape {SHAPES[name]}"
     for names, low, high in (
         (_POSITIVE, 1e-9, np.inf), (_SHARES, 0.0, 1.0), (_CORRELATIONS, -1.0, 1.0),
-        (("tail",), 0.0, LONGEST_TAIL),
+        (("tail",), 0.0, LONGEST_TAIL), (("near_m", "novel", "strange"), 0.0, np.inf),
     ):  # fmt: skip
         if good and name in names and not (low <= array.min() and array.max() <= high):
             good, expected = False, f"numbers from {low:g} to {high:g}"

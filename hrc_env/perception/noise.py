@@ -22,11 +22,13 @@ from hrc_env.perception.calibration import (
     Calibration,
     read_calibration,
 )
-from hrc_env.perception.outline import facing, mix, posture_of
+from hrc_env.perception.outline import facing, mix, novelty_m, posture_of
 
 ERROR: Floats = read_calibration().sigma
 """(P, K, V) standard deviation of each image coordinate, a share of stature, by posture and kind of
 joint (`calibration.KINDS`) at `VISIBILITY`; see docs/emulator.md."""
+FARTHEST_M = 0.4
+"""Bodies that are further from poses that are known are no less known [m]."""
 STANDING = (1.0, *(0.0,) * (len(POSTURES) - 1))
 
 
@@ -64,23 +66,25 @@ def error_share(confidence: float, visibility: Floats, error: Floats) -> float:
 def our_joints(estimate: PoseEstimate, known: Calibration | None = None) -> PoseEstimate:
     """An estimate (B, W, ...) of what the network means, as one of joints.
 
-    Means move by where the network means a joint to be (`offset_m`), covariances grow by how far
+    Means move by where the network means a joint to be (`offset_m`). Covariances grow by how far
     that differs from moment to moment and from body to body (`wander_m`, `between_m`), which no
-    number of cameras and frames averages out. The prior of who is not tracked stays, as velocities
-    do. known: a calibration; None: the package's.
+    number of cameras and frames averages out, and by how far the body is from all poses to which
+    this was fitted (`novel`): it is new, or it is wrong. The prior of who is not tracked stays, as
+    velocities do. known: a calibration; None: the package's.
     """
     known = known or read_calibration()
     variance_m2 = known.wander_m**2 + known.between_m**2
     tables = np.concatenate([known.offset_m, variance_m2], -1).reshape(len(POSTURES), -1)
     mean_world, cov_world = estimate.mean_world.copy(), estimate.cov_world.copy()
     seen = (estimate.velocity_world, estimate.tracked)
-    _put_right(mean_world, cov_world, *seen, tables, KIND, HAND)
+    new = (known.poses, float(known.near_m), known.novel)
+    _put_right(mean_world, cov_world, *seen, tables, new, (KIND, HAND))
     return replace(estimate, mean_world=mean_world, cov_world=cov_world)
 
 
 @kernel(makes_arrays=True)
-def _put_right(mean, cov, velocity, tracked, tables, kinds, hands):
-    row = np.empty(tables.shape[1])
+def _put_right(mean, cov, velocity, tracked, tables, new, of_joints):
+    row, (poses, near_m, novel), (kinds, hands) = np.empty(tables.shape[1]), new, of_joints
     told = row.reshape(-1, 6)
     for b in range(len(mean)):
         for w in range(mean.shape[1]):
@@ -89,8 +93,11 @@ def _put_right(mean, cov, velocity, tracked, tables, kinds, hands):
             joints = mean[b, w]
             front = facing(joints)
             mix(posture_of(joints, velocity[b, w]), tables, row)
+            new_m = min(max(novelty_m(joints, poses) - near_m, 0.0), FARTHEST_M)
             for j in range(len(joints)):
                 _move(joints[j], cov[b, w, j], front, told[kinds[j]], hands[j])
+                for i in range(3):
+                    cov[b, w, j, i, i] += (novel[kinds[j]] * new_m) ** 2
 
 
 @kernel

@@ -43,13 +43,10 @@ def facing(joints):
 @kernel
 def folded(joints):
     """How folded a body (J, 3) is: 0 upright, 1 folded up."""
-    length, height = 0.0, 0.0
+    height = 0.0
     for side in range(2):
-        shoulder, hip, knee, ankle = 1 + side, 7 + side, 9 + side, 11 + side
-        length += _apart(joints, shoulder, hip)
-        length += _apart(joints, hip, knee) + _apart(joints, knee, ankle)
-        height += joints[shoulder, 2] - joints[ankle, 2]
-    share = 1.0 - height / max(length, 1e-9)
+        height += joints[1 + side, 2] - joints[11 + side, 2]
+    share = 1.0 - 0.5 * height / _length_m(joints)
     return min(max((share - UPRIGHT) / (FOLDED - UPRIGHT), 0.0), 1.0)
 
 
@@ -116,6 +113,47 @@ def mix(posture, tables, out):
         if posture[p] > 0.0:
             for k in range(len(out)):
                 out[k] += posture[p] * tables[p, k]
+
+
+@kernel(makes_arrays=True)
+def pose_of(joints):
+    """A body's joints (J, 3) from between its hips: ahead, left, up; its trunk and leg are 1."""
+    x, y = facing(joints)
+    pose, length_m = np.empty((len(joints), 3)), _length_m(joints)
+    for j in range(len(joints)):
+        away_x = (joints[j, 0] - 0.5 * (joints[7, 0] + joints[8, 0])) / length_m
+        away_y = (joints[j, 1] - 0.5 * (joints[7, 1] + joints[8, 1])) / length_m
+        pose[j, 0] = x * away_x + y * away_y
+        pose[j, 1] = x * away_y - y * away_x
+        pose[j, 2] = (joints[j, 2] - 0.5 * (joints[7, 2] + joints[8, 2])) / length_m
+    return pose
+
+
+@kernel
+def novelty_m(joints, poses):
+    """How far a body (J, 3) is from the nearest of some `pose_of` (M, J, 3): root mean square over
+    its joints [m]."""
+    pose, nearest = pose_of(joints), np.inf
+    for m in range(len(poses)):
+        squared = 0.0
+        for j in range(len(pose)):
+            for i in range(3):
+                squared += (pose[j, i] - poses[m, j, i]) ** 2
+            if squared >= nearest:
+                break
+        nearest = min(nearest, squared)
+    return _length_m(joints) * math.sqrt(nearest / len(pose))
+
+
+@kernel
+def _length_m(joints):
+    """Length of a body's trunk and leg (J, 3), the mean of both sides [m]."""
+    length = 0.0
+    for side in range(2):
+        shoulder, hip, knee, ankle = 1 + side, 7 + side, 9 + side, 11 + side
+        length += _apart(joints, shoulder, hip)
+        length += _apart(joints, hip, knee) + _apart(joints, knee, ankle)
+    return max(0.5 * length, 1e-9)
 
 
 @kernel

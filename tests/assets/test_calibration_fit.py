@@ -1,20 +1,36 @@
 """The fit finds the numbers that errors were made with."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from assets.emulator.clips import FAMILIES, TIMES, fit_clips, unseen_clips
 from assets.emulator.fit.fit import fit as fit_of
+from assets.emulator.fit.novelty import new_of, novel_of
 from assets.emulator.samples import Samples
 from hrc_env.motion.repertoire import REPERTOIRE
-from hrc_env.perception.calibration import INNER, KIND, KINDS, N_VIEWS, NEXT, POSTURES
+from hrc_env.perception.calibration import (
+    INNER,
+    KIND,
+    KINDS,
+    N_POSES,
+    N_VIEWS,
+    NEXT,
+    POSTURES,
+    SHAPES,
+    read_calibration,
+)
+from hrc_env.perception.outline import pose_of
+from hrc_env.worker.body import load_body
 
 L, T, C, J = 24, 50, 4, 15
 STANDING, FOLDED, KNEELING = (
     np.eye(len(POSTURES))[POSTURES.index(name)] for name in ("standing", "folded", "kneeling")
 )
+STANDING_BODY = load_body().rest_position[load_body().joint_segment] + load_body().joint_offset
 BETWEEN_M = np.full((len(KINDS), 3), 0.007)
 HIP, ELBOW = KINDS.index("hip"), KINDS.index("elbow")
 
@@ -36,7 +52,7 @@ def made(error, **changes):
 
 
 def fit(samples):
-    return fit_of(samples, BETWEEN_M)
+    return fit_of(samples, (np.zeros((N_POSES, J, 3)), 0.05), BETWEEN_M)
 
 
 def white(size=0.01, seed=1):
@@ -138,6 +154,47 @@ def test_how_long_mishaps_last_is_found():
     one = made(white())
     four = {f.name: np.concatenate([getattr(one, f.name)] * 4) for f in fields(Samples)}
     assert fit(Samples(**{**four, "missed": missed})).miss_s == pytest.approx(0.8, rel=0.35)
+
+
+def test_what_happens_often_in_some_views_does_not_seem_to_last():
+    """It comes anew in every image, nearly always from some directions, hardly ever from others."""
+    rng = np.random.default_rng(8)
+    view = np.broadcast_to(np.where(np.arange(C) < 2, 0.0, np.pi), (L, T, C))
+    exchanged = np.zeros((L, T, C, 2), bool)
+    exchanged[..., 0] = rng.random((L, T, C)) < np.where(np.arange(C) < 2, 0.01, 0.6)
+    known = fit(made(white(), view=view, exchanged=exchanged))
+    assert known.swap_share[0, 4, 0] > 0.4
+    assert known.swap_s[0] < 0.4
+
+
+def told_clips(error_m, new_m):
+    """Clips (L) of a body whose estimates are off by so much, and its nose so much from the pose
+    that is known."""
+    rng = np.random.default_rng(2)
+    body = np.broadcast_to(STANDING_BODY, (60, J, 3)).copy()
+    body[:, 0, 2] += new_m * np.sqrt(J)
+    nothing, cov = np.zeros((60, J, 3)), np.broadcast_to(1e-4 * np.eye(3), (60, J, 3, 3))
+    for _ in range(L):
+        said = body + error_m * rng.standard_normal(body.shape)
+        yield SimpleNamespace(
+            joints_world=body, tracker_mean_world=said, tracker_cov_world=cov,
+            tracker_velocity_world=nothing, tracked=np.ones(60, bool),
+        )  # fmt: skip
+
+
+def test_what_is_told_of_new_poses_covers_their_errors():
+    zero = {"offset_m", "wander_m", "between_m"}
+    known = replace(
+        read_calibration(), poses=np.tile(pose_of(STANDING_BODY), (N_POSES, 1, 1)),
+        near_m=np.array(0.0), **{name: np.zeros(SHAPES[name]) for name in zero},
+    )  # fmt: skip
+    wrong = list(told_clips(0.05, 0.1))
+    novel = novel_of(known, [*told_clips(0.01, 0.005), *wrong])
+    variance_m2 = 0.01**2 + (novel[KIND] * new_of(wrong[0].tracker_mean_world, known)[:, None]) ** 2
+    error_m = wrong[0].tracker_mean_world - wrong[0].joints_world
+    squared = (error_m**2).sum(-1) / variance_m2
+    assert 0.88 < (squared < chi2.ppf(0.95, 3)).mean() < 0.96
+    assert novel_of(known, list(told_clips(0.008, 0.1))).max() < 0.05
 
 
 def test_every_motion_has_a_family_and_unseen_clips_are_others():

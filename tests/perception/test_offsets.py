@@ -1,13 +1,16 @@
 """What the network means by a joint becomes the joint, whichever way the worker faces."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from people import truth
 
 from hrc_env.core.records import PoseEstimate
 from hrc_env.core.skeleton import JOINT, N_JOINTS
-from hrc_env.perception.calibration import HAND, KIND, POSTURES, read_calibration
-from hrc_env.perception.noise import our_joints
+from hrc_env.perception.calibration import HAND, KIND, KINDS, POSTURES, read_calibration
+from hrc_env.perception.noise import FARTHEST_M, our_joints
+from hrc_env.perception.outline import novelty_m, pose_of
 
 KNOWN = read_calibration()
 OFFSET_M = KNOWN.offset_m
@@ -72,12 +75,34 @@ def test_nothing_else_changes():
 @pytest.mark.parametrize("yaw_rad", [0.0, 1.0, -2.5])
 def test_what_is_not_known_of_the_offset_is_in_the_covariance(yaw_rad):
     said = estimate_of(turned(facing_x(), yaw_rad)[None, None])
-    grown = (our_joints(said).cov_world - said.cov_world)[0, 0]
+    grown = (our_joints(said, without(KNOWN)).cov_world - said.cov_world)[0, 0]
     axes = turned(np.eye(3), yaw_rad)  # ahead, left, up
     unknown_m2 = (KNOWN.wander_m[0] ** 2 + KNOWN.between_m**2)[KIND]
     expected = np.einsum("ak,ja,al->jkl", axes, unknown_m2, axes)
     np.testing.assert_allclose(grown, expected, atol=1e-7)
     assert np.linalg.eigvalsh(grown).min() > 0
+
+
+def test_of_a_pose_that_is_new_less_is_known_the_further_it_is_from_others():
+    novel = np.linspace(0.2, 0.9, len(KINDS))
+    known = replace(KNOWN, near_m=np.array(0.02), novel=novel)
+    body, grown = facing_x(), []
+    body = body[None] + 0.5 * np.random.default_rng(3).standard_normal((*body.shape,))
+    for poses in (pose_of(body[0])[None], pose_of(facing_x())[None]):
+        here = replace(known, poses=np.ascontiguousarray(poses))
+        cov = [
+            our_joints(estimate_of(body[None]), each).cov_world for each in (here, without(here))
+        ]
+        grown.append((cov[0] - cov[1])[0, 0])
+    np.testing.assert_allclose(grown[0], 0.0, atol=1e-9)
+    away_m = novelty_m(body[0], pose_of(facing_x())[None]) - 0.02
+    expected = (novel[KIND] * min(away_m, FARTHEST_M)) ** 2
+    np.testing.assert_allclose(grown[1], expected[:, None, None] * np.eye(3), atol=1e-9)
+
+
+def without(known):
+    """The calibration that says nothing of new poses."""
+    return replace(known, novel=np.zeros(len(KINDS)))
 
 
 def facing_x():

@@ -7,7 +7,7 @@ from people import STANDING
 from hrc_env.core.skeleton import JOINT
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.perception.calibration import POSTURES
-from hrc_env.perception.outline import is_folded, posture_of
+from hrc_env.perception.outline import is_folded, novelty_m, pose_of, posture_of
 
 ONLY = np.eye(len(POSTURES))
 UPPER = [JOINT["nose"]] + [
@@ -112,3 +112,19 @@ def hanging():
 
 def moving(speed_m_s):
     return np.tile([speed_m_s, 0.0, 0.0], (len(STANDING), 1))
+
+
+def test_a_pose_is_the_same_wherever_and_however_large_the_body_is():
+    turn = about_axis("z", 2.0)
+    np.testing.assert_allclose(
+        pose_of(1.2 * STANDING @ turn.T + [3.0, -2.0, 0.4]), pose_of(STANDING), atol=1e-9
+    )
+
+
+def test_novelty_is_the_distance_to_the_nearest_pose():
+    poses = np.array([pose_of(squatting(0.45)), pose_of(STANDING)])
+    assert novelty_m(STANDING, poses) == pytest.approx(0.0, abs=1e-9)
+    moved = STANDING.copy()
+    moved[JOINT["left_wrist"]] += [0.0, 0.0, 0.3]
+    assert novelty_m(moved, poses) == pytest.approx(0.3 / np.sqrt(len(STANDING)))
+    assert novelty_m(1.2 * moved, poses) == pytest.approx(1.2 * novelty_m(moved, poses))

@@ -2,12 +2,12 @@
 
 import numpy as np
 from scipy.optimize import isotonic_regression
-from scipy.special import ndtri, owens_t
+from scipy.special import ndtr, ndtri
 
 from assets.emulator.clips import DT_S
 from assets.emulator.fit.cells import FEW, N_P, class_of
 from assets.emulator.samples import Samples
-from hrc_env.core.typing import Bools, Floats
+from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.perception.calibration import N_SEEN, N_VIEWS
 from hrc_env.perception.sightlines import SEEN
 
@@ -15,13 +15,20 @@ LAGS = (5, 12, 25, 40)
 """In frames, at which it is asked whether it still happens."""
 FEW_MISSES = 20
 """So many samples a guess counts for."""
+FEWEST = 30
+"""Of fewer moments at which it happens nothing is told."""
+SHARED: Floats = np.linspace(0.0, 0.999, 60)
+"""Correlations that are tried."""
+QUANTILES: Floats = (np.arange(64) + 0.5) / 64
+"""At which a normal variable in its tail is looked at."""
 
 
 def swaps_of(samples: Samples) -> tuple[Floats, Floats]:
     """(P, A, 2) shares of time by view, mirror images together; (2,) for how long [s]."""
     view = np.round(np.abs(samples.view) * N_VIEWS / (2 * np.pi)).astype(int)
     looked = ~samples.missed & samples.counts[..., None]
-    share, length = np.zeros((N_P, N_VIEWS, 2)), np.zeros(2)
+    share, found = np.zeros((2, N_P, N_VIEWS, 2))
+    length = np.zeros(2)
     for what in range(2):
         now, overall = samples.exchanged[..., what] & looked, 0.0
         for posture in range(N_P):
@@ -33,7 +40,8 @@ def swaps_of(samples: Samples) -> tuple[Floats, Floats]:
                 mine = chosen & looked & (view == bin_)
                 value = (now[mine].sum() + FEW * overall) / (mine.sum() + FEW)
                 share[posture, [bin_, -bin_], what] = value
-        length[what] = _lasts_s(now, looked)
+                found[posture, [bin_, -bin_], what] = now[mine].mean() if mine.any() else value
+        length[what] = _lasts_s(now, looked, found[_class(samples), view, what])
     return share, length
 
 
@@ -50,7 +58,15 @@ def misses_of(samples: Samples) -> tuple[Floats, Floats]:
         missed = np.array([samples.missed[each].sum() for each in mine])
         raw = (missed + FEW_MISSES * guess) / count
         share[posture] = isotonic_regression(raw, weights=count, increasing=False).x
-    return np.clip(share, 0, 1), np.array(_lasts_s(samples.missed, looked & (n_seen >= 7)))
+    share = np.clip(share, 0, 1)
+    lasts_s = _lasts_s(samples.missed, looked & (n_seen >= 7), share[_class(samples), n_seen])
+    return share, np.array(lasts_s)
+
+
+def _class(samples: Samples) -> Ints:
+    """(L, T, C) the posture that each sample is of, if of any; else the first."""
+    class_ = np.maximum(class_of(samples.posture), 0)
+    return np.broadcast_to(class_[..., None], samples.missed.shape)
 
 
 def _are(samples: Samples, posture: int) -> Bools:
@@ -58,22 +74,29 @@ def _are(samples: Samples, posture: int) -> Bools:
     return np.broadcast_to(class_of(samples.posture)[..., None] == posture, samples.missed.shape)
 
 
-def _lasts_s(now: Bools, looked: Bools) -> float:
+def _lasts_s(now: Bools, looked: Bools, share: Floats) -> float:
     """Time constant of a slow normal variable that is in its lower tail while `now` (L, T, C) [s].
 
-    From how much likelier it is some frames after it was, among samples that were looked at.
+    From how often it is some frames after it was, among samples that were looked at, beyond what
+    their shares of time (L, T, C) make likely anyway.
     """
-    share = float(now[looked].mean()) if looked.any() else 0.0
-    if share == 0.0:
-        return 0.2
-    shared = np.linspace(0.0, 0.999, 60)
-    edge = ndtri(min(share, 0.999))
-    again = 1 - 2 * owens_t(edge, np.sqrt((1 - shared) / (1 + shared))) / share
     constants = []
     for lag in LAGS:
-        both = looked[:, lag:] & looked[:, :-lag] & now[:, :-lag]
-        if both.sum() < 30:
+        both = looked[:, lag:] & looked[:, :-lag]
+        again = (now[:, lag:] & now[:, :-lag])[both].sum()
+        if (now[:, :-lag] & both).sum() < FEWEST:
             continue
-        rho = float(np.interp(now[:, lag:][both].mean(), again, shared))
+        pairs = np.stack([share[:, :-lag][both], share[:, lag:][both]], -1)
+        expected = [_both(*np.unique(pairs, axis=0, return_counts=True), rho) for rho in SHARED]
+        rho = float(np.interp(again, expected, SHARED))
         constants.append(-lag * DT_S / np.log(np.clip(rho, 1e-3, 0.9995)))
     return float(np.clip(np.median(constants), DT_S, 30.0)) if constants else 0.2
+
+
+def _both(shares: Floats, counts: Ints, rho: float) -> float:
+    """Of so many pairs of normal variables with this correlation, how many are expected to be both
+    in their lower tails, of shares (N, 2)."""
+    tail = ndtri(np.clip(shares[:, :1] * QUANTILES, 1e-12, 1.0 - 1e-12))  # the first, given it is
+    edge = ndtri(np.clip(shares[:, 1:], 1e-12, 1.0 - 1e-12))
+    second = ndtr((edge - rho * tail) / np.sqrt(1.0 - rho**2)).mean(1)
+    return float((counts * shares[:, 0] * second).sum())

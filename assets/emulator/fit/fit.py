@@ -3,7 +3,7 @@
 import numpy as np
 
 from assets.emulator.fit.body import bodies_of
-from assets.emulator.fit.cells import N_P, Cells
+from assets.emulator.fit.cells import N_K, N_P, Cells
 from assets.emulator.fit.confidence import (
     confidences_of,
     follows_of,
@@ -23,9 +23,15 @@ from hrc_env.core.typing import Floats
 from hrc_env.perception.calibration import Calibration
 
 
-def fit(samples: Samples, between_m: Floats) -> Calibration:
-    """A calibration that draws errors like these; between_m: of the bodies (`bodies.apart`)."""
-    s = Cells(samples)
+def fit(samples: Samples, known: tuple[Floats, float], between_m: Floats) -> Calibration:
+    """A draft of a calibration that draws errors like these (`matching.matched` finishes it).
+
+    Args:
+        samples: what the network saw.
+        known: poses, and how far others are from them (`novelty.poses_of`).
+        between_m: of the bodies (`bodies.apart`).
+    """
+    s, (poses, near_m) = Cells(samples), known
     offset = offsets_of(samples)
     wander, space_limb = wander_of(samples, offset)
     in_space = space_variance(samples, wander)
@@ -39,7 +45,8 @@ def fit(samples: Samples, between_m: Floats) -> Calibration:
     swap_share, swap_s = swaps_of(samples)
     miss_share, miss_s = misses_of(samples)
     return Calibration(
-        offset, wander, space_limb, between_m, np.zeros(N_P), bias, size, spread, body,
+        offset, wander, space_limb, between_m, poses, np.array(near_m), np.zeros(N_K),
+        np.array(0.0), np.zeros(N_P), bias, size, spread, body,
         np.array(common), shares, slow_s, slow_m, limbs_of(s, unit), confidences_of(s),
         follows_of(s, left_over, spread, common), swap_share, swap_s, miss_share, miss_s,
         sigma_table(s, samples),

@@ -1,0 +1,48 @@
+"""Recordings of people as motions of the emulator's clips, beside those of the repertoire."""
+
+import numpy as np
+
+from hrc_env.core.records import WorkerMotion
+from hrc_env.core.typing import Floats
+from hrc_env.mocap.poses import posed
+from hrc_env.motion import controls as c
+from hrc_env.motion.anatomy import anatomy
+from hrc_env.motion.clip import Clip, fitted_to
+from hrc_env.worker.body import Body
+
+
+def perform_clip(
+    clip: Clip, body: Body, dt_s: float, xy_m: tuple[float, float], yaw_rad: float, least_s: float
+) -> WorkerMotion:
+    """A recording (T, 1, ...) as a body plays it, begun at a place; without angular velocities.
+
+    One that is shorter than `least_s` goes forth and back, nowhere faster than it was recorded.
+    """
+    bones = anatomy(body)
+    q = _placed(fitted_to(clip, bones.size), xy_m, yaw_rad)
+    moments_s = _moments(len(q) / clip.fps, least_s, dt_s)
+    frames = np.minimum(moments_s * clip.fps, len(q) - 1.0)
+    q = np.stack([np.interp(frames, np.arange(len(q)), column) for column in q.T], -1)
+    position, turn, _ = posed(q, bones)
+    velocity = np.gradient(position, dt_s, axis=0)
+    whole = (position, turn, velocity, np.zeros_like(velocity))
+    return WorkerMotion(*(each[:, None] for each in whole))
+
+
+def _moments(lasts_s: float, least_s: float, dt_s: float) -> Floats:
+    """(T,) moments of a recording, one a frame [s]."""
+    if lasts_s >= least_s:
+        return np.arange(0.0, lasts_s, dt_s)
+    time_s = np.arange(0.0, least_s, dt_s)
+    return 0.5 * lasts_s * (1.0 - np.cos(2.0 * time_s / lasts_s))
+
+
+def _placed(controls: Floats, xy_m: tuple[float, float], yaw_rad: float) -> Floats:
+    """Control vectors (T, N_CONTROLS) of a clip, begun at a place."""
+    out, cos, sin = controls.copy(), np.cos(yaw_rad), np.sin(yaw_rad)
+    turn = np.array([[cos, sin], [-sin, cos]])
+    for at in (c.ROOT_X, c.ANKLE, c.ANKLE + 6):
+        out[:, [at, at + 1]] = controls[:, [at, at + 1]] @ turn + xy_m
+    for at in (c.HEADING, c.ANKLE + 3, c.ANKLE + 9):
+        out[:, at] += yaw_rad
+    return out
