@@ -24,9 +24,11 @@ from hrc_env.core.streams import children
 from hrc_env.core.typing import Bools, Floats, Ints, JointVelocities, Points3
 from hrc_env.geometry import chains
 from hrc_env.motion import generator
+from hrc_env.motion.activities.pieces import NoRoomError
 from hrc_env.pipeline.levels import CAMERA_LEVELS, make_pipeline
 from hrc_env.pipeline.sensor_input import SensorInput, TrueSensorInput
 from hrc_env.rewards import RewardConfig
+from hrc_env.room import told_room
 from hrc_env.safety.shield import shielded
 from hrc_env.scene.build import Scene, build
 from hrc_env.scene.physics import Physics
@@ -65,9 +67,12 @@ class Simulation(Stateful):
             build, config.scene, settings.scene,
             bodies=self.bodies.names, cameras=settings.cameras, robot=settings.robot,
         )  # fmt: skip
-        self.motion = generator.make_state(
-            batch, most, self.bodies, config.motion, scene_for(n_workers=0).grounds, fewest
-        )  # first, as it knows how many workers there is room for
+        try:  # first, as it knows how many workers and which clips there is room for
+            self.motion = generator.make_state(
+                batch, most, self.bodies, config.motion, scene_for(n_workers=0).grounds, fewest
+            )
+        except NoRoomError as error:
+            raise ConfigError(f"{error} {told_room(error.clip, config)}") from None
         self.scene = scene_for(n_workers=most)
         if perception in CAMERA_LEVELS:
             for finding in findings(self.scene):
