@@ -35,7 +35,7 @@ SOURCES: dict[str, Source] = {
                 )
             },
         ),
-        "validated", "Apache-2.0", "two people on boxes, Amazon FAR team; 120 Hz",
+        "validated", "Apache-2.0", "two people among boxes, Amazon FAR team; 120 Hz",
     ),
     "jump": Source(
         Archive(

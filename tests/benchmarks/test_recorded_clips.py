@@ -25,6 +25,7 @@ from hrc_env.core.skeleton import JOINT
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.motion import generator
 from hrc_env.motion import state as st
+from hrc_env.room import played_s
 from hrc_env.worker.body import load_body, worker_truth
 
 AGAIN = "python -m tried again"
@@ -224,6 +225,7 @@ def test_every_listed_clip_is_imported_and_near_the_person(imported):
 @pytest.mark.long
 @pytest.mark.parametrize("k", range(len(CLIPS)), ids=lambda k: CLIPS[k].name)
 def test_every_listed_clip_is_played(imported, k):
+    assert played_s(imported[k][1])["lab"] > 0.6
     config = generator.MotionConfig(motions=(imported[k][1],), motions_probability=1.0)
     state, rngs = started(8, seed=2, config=config)
     for _ in range(60 * 10):
