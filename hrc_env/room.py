@@ -26,9 +26,9 @@ def played_s(clip: Clip, config: HRCConfig | None = None) -> dict[str, float]:
     return found
 
 
-def told_room(clip: Clip, config: HRCConfig | None = None) -> str:
+def told(clip: Clip, played: dict[str, float]) -> str:
     """The same in a sentence or two."""
-    played, whole_s = played_s(clip, config), (len(clip.controls) - 1) / clip.fps
+    whole_s = (len(clip.controls) - 1) / clip.fps
     plays = [f"{name} ({s:.1f} of its {whole_s:.1f} s)" for name, s in played.items() if s > 0.0]
     lacks = [name for name, s in played.items() if s == 0.0]
     said = [f"It plays in {', '.join(plays)}."] if plays else []

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hrc_env import metrics, observations, rewards, step
+from hrc_env import metrics, observations, rewards, room, step
 from hrc_env.belief import Belief, estimated_separation
 from hrc_env.config import Settings
 from hrc_env.control import joint_command, n_actions
@@ -28,7 +28,6 @@ from hrc_env.motion.activities.pieces import NoRoomError
 from hrc_env.pipeline.levels import CAMERA_LEVELS, make_pipeline
 from hrc_env.pipeline.sensor_input import SensorInput, TrueSensorInput
 from hrc_env.rewards import RewardConfig
-from hrc_env.room import told_room
 from hrc_env.safety.shield import shielded
 from hrc_env.scene.build import Scene, build
 from hrc_env.scene.physics import Physics
@@ -72,7 +71,8 @@ class Simulation(Stateful):
                 batch, most, self.bodies, config.motion, scene_for(n_workers=0).grounds, fewest
             )
         except NoRoomError as error:
-            raise ConfigError(f"{error} {told_room(error.clip, config)}") from None
+            where = room.told(error.clip, room.played_s(error.clip, config))
+            raise ConfigError(f"{error} {where}") from None
         self.scene = scene_for(n_workers=most)
         if perception in CAMERA_LEVELS:
             for finding in findings(self.scene):

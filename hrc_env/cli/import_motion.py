@@ -65,9 +65,9 @@ class ImportMotion:
             raise ConfigError("--out is the recording itself; give the clip another name.")
         if self.picture is not None:
             writable_file(self.picture, ".png", "--picture")
+        from hrc_env import room
         from hrc_env.mocap.retarget import retarget
         from hrc_env.motion.clip import save_clip
-        from hrc_env.room import told_room
         from hrc_env.worker.body import load_body
 
         body, console = load_body(self.worker), Console()
@@ -79,9 +79,10 @@ class ImportMotion:
         with progress_bar(console, name) as say:
             clip, error = retarget(capture, body, lambda share: say(share, name))
         tell_error(console, capture, clip, error)
-        room = told_room(clip)
+        played = room.played_s(clip)
         save_clip(clip, self.out)
-        console.print(f"In [bold]{self.out}[/]: play it with motions=[{str(self.out)!r}]. {room}")
+        ready = f"play it with motions=[{str(self.out)!r}]. " if any(played.values()) else ""
+        console.print(f"In [bold]{self.out}[/]: {ready}{room.told(clip, played)}")
         if self.picture is not None:
             import imageio.v2 as imageio
 

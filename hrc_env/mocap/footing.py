@@ -47,6 +47,11 @@ def grounded(
         off = found - SOLE_M
         joints = joints - np.array([0.0, 0.0, off])
         told = (*told, f"The floor was found at {off:+.2f} m and moved to 0.")
+        if off > 0.0 and _hangs(joints):
+            faults = (
+                *faults,
+                f"Hands are above the head and feet {off:.2f} m above the file's floor (hanging?).",
+            )
         if at_zero:
             faults = (
                 *faults,
@@ -57,6 +62,12 @@ def grounded(
     if faults and not allowed:
         raise ConfigError(f"{source}: {' '.join(faults)} {ACCEPT}")
     return joints, (*told, *faults)
+
+
+def _hangs(joints: Points3) -> bool:
+    """Whether both hands are above the head for most of the time."""
+    hands = joints[:, [JOINT["left_wrist"], JOINT["right_wrist"]], 2].min(1)
+    return bool(np.median(hands - joints[:, JOINT["nose"], 2]) > 0.0)
 
 
 def supports(joints: Points3, fps: float) -> tuple[Floats, Bools]:

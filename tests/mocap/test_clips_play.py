@@ -9,14 +9,14 @@ from strides import FORMS, FPS, N_STRIDES, stride, written_as
 from benchmarks.tracking.walks import walk
 from hrc_env.cli.import_motion import ImportMotion
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.skeleton import JOINTS
+from hrc_env.core.skeleton import JOINT, JOINTS
 from hrc_env.mocap.record import Capture
 from hrc_env.mocap.retarget import retarget
 from hrc_env.motion import controls as c
 from hrc_env.motion import generator
 from hrc_env.motion import state as st
 from hrc_env.motion.clip import load_clip, placed_at_origin
-from hrc_env.room import played_s, told_room
+from hrc_env.room import played_s, told
 from hrc_env.scene.places import SCENES
 from hrc_env.worker.body import load_body
 
@@ -80,6 +80,27 @@ def test_nothing_jumps_while_walks_are_played():
     assert np.linalg.norm(np.diff(position, axis=1), axis=-1).max() / 0.02 < 12.0
 
 
+@pytest.mark.parametrize("n_frames", [14, 16, 20])
+def test_the_shortest_clips_play(tmp_path, n_frames, capsys):
+    short = stride(0)
+    clip = imported(written_as("npz", short._replace(joints=short.joints[:n_frames]), tmp_path))
+    assert "plays in lab (0." in " ".join(capsys.readouterr().out.split())
+    assert plays(clip, "lab")
+
+
+def test_a_clip_that_fits_nowhere_is_not_called_ready(tmp_path, work, capsys):
+    """Somebody hops 30 m on one leg: both feet are low at the two ends only."""
+    joints, share = work.joints.copy(), np.linspace(0.0, 1.0, len(work.joints))
+    lifted = [JOINT[f"left_{part}"] for part in ("knee", "ankle", "foot")]
+    joints[:, lifted, 2] += 0.3 * np.minimum(10.0 * np.minimum(share, 1.0 - share), 1.0)[:, None]
+    joints[..., 0] += 30.0 * share[:, None]
+    np.savez(tmp_path / "hop.npz", joints=joints, fps=work.fps)
+    imported(tmp_path / "hop.npz")
+    said = " ".join(capsys.readouterr().out.split())
+    assert "It has no room in lab, site." in said
+    assert "play it" not in said
+
+
 def retargeted(joints):
     return retarget(Capture(joints, FPS, True, JOINTS, "long"), load_body())[0]
 
@@ -110,6 +131,6 @@ def test_a_clip_without_room_is_refused_with_the_scenes_that_have_it():
         gymnasium.make("HRCReach-v0", perception="none", motions=[clip])
     assert plays(clip, "site")
     far = leap(30.0)
-    assert told_room(far) == "It has no room in lab, site."
+    assert told(far, played_s(far)) == "It has no room in lab, site."
     with pytest.raises(ConfigError, match="leap: there is no room"):
         gymnasium.make("HRCReach-v0", perception="none", scene="site", motions=[far])

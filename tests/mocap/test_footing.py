@@ -8,6 +8,7 @@ from strides import FPS, N_STRIDES, stride, written_as
 from written import write_acclaim
 
 from hrc_env.core.errors import ConfigError
+from hrc_env.core.skeleton import JOINT
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.mocap.footing import floor_height, off_floor
 from hrc_env.mocap.read import read_capture
@@ -94,6 +95,18 @@ def test_who_is_off_the_floor_is_refused_unless_that_is_accepted(work, tmp_path,
         read_capture(path)
     capture = read_capture(path, allow_off_floor=True)
     assert re.search(told, " ".join(capture.repaired))
+
+
+def test_who_hangs_above_the_files_floor_is_refused(work, tmp_path):
+    hanging = work.joints + 0.5 * UP
+    for joint, height_m in (("elbow", 0.2), ("wrist", 0.45)):
+        for side in ("left", "right"):
+            hanging[:, JOINT[f"{side}_{joint}"]] = hanging[:, JOINT[f"{side}_shoulder"]] + (
+                height_m * UP
+            )
+    with pytest.raises(ConfigError, match=r"feet 0\.5\d m above the file's floor"):
+        read_capture(saved(tmp_path, hanging))
+    read_capture(saved(tmp_path, hanging - 0.5 * UP))  # works overhead
 
 
 def test_feet_that_are_never_still_are_refused(work, tmp_path):

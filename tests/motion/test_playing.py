@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from recorded import joined, started, walk_straight, watched
+from recorded import begin, joined, started, walk_straight, watched
 
 from hrc_env.config import settle
 from hrc_env.core.batching import one
@@ -19,8 +19,13 @@ from hrc_env.motion import generator
 from hrc_env.motion import state as st
 from hrc_env.motion.activities.pieces import LONGEST_S, stage, stocked
 from hrc_env.motion.activities.playing import PACE_S, SETTLE_S
+from hrc_env.motion.blending import settle as settle_at
 from hrc_env.motion.clip import load_clip, save_clip
 from hrc_env.motion.floorplan import floorplan
+from hrc_env.motion.paths import lay_path
+from hrc_env.motion.state import N_ROOTS
+from hrc_env.motion.traffic import meets
+from hrc_env.motion.walk import plan_walk
 from hrc_env.worker.body import SEGMENT, load_body, worker_truth
 
 BODY = load_body()
@@ -123,6 +128,21 @@ def test_a_clip_that_is_never_on_both_feet_is_refused(clip):
     )
     with pytest.raises(ConfigError, match="hops: both feet are within 5 cm of the floor at 0 fra"):
         started(1, config=generator.MotionConfig(motions=(hopping,)))
+
+
+def test_who_arrives_early_does_not_stay_in_the_way_of_a_clip(clip):
+    config = generator.MotionConfig(motions=(clip,))
+    state, _ = started(1, n_workers=2, config=config)
+    player, walker = state.workers[0]
+    begin(player, st.CLIP, 20.0)
+    player["clip_s"] = 20.0 - 2.0 * SETTLE_S
+    player["roots"] = np.column_stack([np.linspace(0.0, 10.0, N_ROOTS), np.zeros(N_ROOTS)])
+    for end_y_m, early in ((-0.2, True), (-2.0, False)):
+        settle_at(8.0, -4.0, 0.0, walker)
+        lay_path((8.0, -4.0), np.zeros((0, 3)), (8.0, end_y_m), walker)
+        begin(walker, st.WALK, plan_walk(0.0, 1.2, walker))
+        assert walker["duration_s"] < 8.0  # the player comes by after 16 s
+        assert (meets(1, state.workers[0])[0] > 0.0) == early
 
 
 def test_motions_come_as_paths_or_clips(clip, tmp_path):

@@ -133,7 +133,8 @@ def _cut(clip: Clip, bodies: list[Floats], where: Stage) -> list[_Piece]:
     tilt = np.abs(clip.controls[:, [c.ANKLE + 4, c.ANKLE + 10]]).sum(1)
     fewest, most = SHORTEST_S * clip.fps, LONGEST_S * clip.fps
     stands, pieces = _stands(clip), list[_Piece]()
-    first = int(stands[np.argmin(tilt[stands] + (stands > stands[0] + fewest))])
+    early = stands[stands <= min(stands[0], stands[-1] - 2.0 * fewest) + fewest]
+    first = int(early[np.argmin(tilt[early])])
     while stands[-1] - first >= fewest:
         ends = stands[stands >= first + fewest]
         room = np.min([_room(q[first:], where) for q in bodies], axis=0)
