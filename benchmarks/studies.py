@@ -88,6 +88,10 @@ STUDIES: dict[str, Study] = {
         "python -m assets.emulator.holdout", 40, ("assets.emulator.holdout",), ("trueness",),
         quick="--rounds 1", is_keyed=False,
     ),
+    "imported": Study(
+        "python -m assets.emulator.imported", 8, ("assets.emulator.imported",),
+        ("imported", "imported_joints"), quick="--rounds 1",
+    ),
     "fuzz": Study(
         "python -m benchmarks.tracking.fuzz", 30, ("benchmarks.tracking.fuzz",), ("fuzz",),
         quick="--cases 2", goes_on=False,

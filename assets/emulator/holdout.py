@@ -10,11 +10,10 @@ the joints of the other bodies lie where those of the six do on average (`bodies
 Clips and fit are kept in the folder, so that a run that was stopped goes on.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
 import tyro
 from rich.console import Console
 
@@ -28,19 +27,17 @@ from assets.emulator.samples import samples_of
 from assets.emulator.shelf import kept
 from assets.emulator.validate import (
     Compared,
-    InSpace,
     Say,
+    accuracy,
     compared,
     in_space,
     of_family,
-    over_clips,
     ratios_of,
 )
 from assets.emulator.writing import write_calibration
 from hrc_env.cli.progress import progress_bar
 from hrc_env.config import HRCConfig
 from hrc_env.core.results import Metric, write_results
-from hrc_env.core.typing import Ints
 from hrc_env.perception.emulator import EmulatorConfig
 from hrc_env.worker.body import Body, load_body, worker_names
 
@@ -129,22 +126,10 @@ def metrics_of(seen: Compared) -> Iterator[tuple[str, Metric]]:
         each = [in_space([watched], truth) for watched in seen.pixels]
         for group in seen.outcomes:
             mine = of_family(seen.clips, group)
-            found = _accuracy([each[k] for k in mine])
+            found = accuracy([each[k] for k in mine])
             for what, metric in zip(("median", "p95", "coverage"), found, strict=True):
                 yield f"{word}.{what}.{group}", metric
     yield from ratios_of(seen).items()
-
-
-def _accuracy(each: Sequence[InSpace]) -> list[Metric]:
-    """Median and 95th percentile of errors, and coverage, of clips."""
-
-    def numbers(ks: Ints) -> list[float]:
-        errors, inside = zip(*(each[k] for k in ks.tolist()), strict=True)
-        middle, most = 1e3 * np.percentile(np.concatenate(errors), [50, 95])
-        return [middle, most, float(np.concatenate(inside).mean())]
-
-    n = sum(errors.size for errors, _ in each)
-    return over_clips(numbers, len(each), ("mm", "mm", "share"), n)
 
 
 if __name__ == "__main__":

@@ -23,13 +23,13 @@ from assets.emulator.fit.cells import (
     class_of,
 )
 from assets.emulator.fit.lasting import LAGS, add_lagged
-from assets.emulator.fit.novelty import new_of, novel_of
+from assets.emulator.fit.novelty import novel_of
 from assets.emulator.samples import Samples, postures_of, samples_of
 from assets.emulator.watch import Watched, watch
 from assets.emulator.writing import write_calibration
 from hrc_env.config import HRCConfig
 from hrc_env.core.typing import Floats
-from hrc_env.perception.calibration import KIND, LONGEST_TAIL, Calibration
+from hrc_env.perception.calibration import LONGEST_TAIL, Calibration
 from hrc_env.perception.emulator import EmulatorConfig
 
 IN_THE_IMAGE, IN_SPACE = 3, 7
@@ -40,8 +40,6 @@ DRAWS = 3
 """How often the emulator plays every clip in a round."""
 DAMPED = 0.7
 """Power of the factors in space: what the emulator draws by chance is not to be fitted."""
-NEW_M = 0.03
-"""Who is so much further from known poses than those of the fit are tells of new ones [m]."""
 THROUGH_THE_TRACKER = 1.5
 """Power of the factors of tails, chosen by trial: with `DAMPED` they were short at the end."""
 OFTEN = 2000
@@ -169,30 +167,7 @@ def _as_in_space(draft: Calibration, pixels: list[Watched], emulated: list[Watch
         size[posture] *= factor
         wander[posture] *= factor / added**TAKEN_BACK
         tail[posture] = grown
-    strange = _strange(draft, pixels, emulated)
-    return replace(draft, size=size, wander_m=wander, tail=tail, strange=strange)
-
-
-def _strange(draft: Calibration, pixels: list[Watched], emulated: list[Watched]) -> Floats:
-    """What the emulator adds for poses that are new, by how much the tracker's median is off."""
-    wanted, drawn = _errors_of_new(draft, pixels), _errors_of_new(draft, emulated)
-    if min(len(wanted[0]), len(drawn[0])) < OFTEN / 15:
-        return draft.strange
-    squared = np.median(wanted[0]) ** 2 - np.median(drawn[0]) ** 2
-    added = squared / USUAL / np.mean(drawn[1] ** 2)
-    return np.sqrt(max(draft.strange**2 + DAMPED * added, 0.0))
-
-
-def _errors_of_new(known: Calibration, clips: list[Watched]) -> tuple[Floats, Floats]:
-    """Errors of the tracked joints (N, J) of bodies that are new, and by how much (N,) [m]."""
-    errors, new = [np.zeros((0, len(KIND)))], [np.zeros(0)]
-    for clip in clips:
-        new_m = new_of(clip.joints_world, known)
-        mine = clip.tracked & (new_m > NEW_M)
-        mine[:WARM_UP] = False
-        errors.append(np.linalg.norm((clip.mean_world - clip.joints_world)[mine], axis=-1))
-        new.append(new_m[mine])
-    return np.concatenate(errors), np.concatenate(new)
+    return replace(draft, size=size, wander_m=wander, tail=tail)
 
 
 def _scaled(draft: Calibration, pixels: list[Watched], emulated: list[Watched]) -> Calibration:

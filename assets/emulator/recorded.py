@@ -1,7 +1,11 @@
 """Recordings of people as motions of the emulator's clips, beside those of the repertoire."""
 
+import functools
+
 import numpy as np
 
+from benchmarks.recorded.clips import CLIPS, Role, clips_of
+from benchmarks.recorded.synthetic import STYLES, made_of
 from hrc_env.core.records import WorkerMotion
 from hrc_env.core.typing import Floats
 from hrc_env.mocap.poses import posed
@@ -9,6 +13,19 @@ from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import anatomy
 from hrc_env.motion.clip import Clip, fitted_to
 from hrc_env.worker.body import Body
+
+RECORDINGS: dict[str, Role] = {each.name: each.role for each in (*CLIPS, *STYLES)}
+"""What each recording may serve for, by its name: to fit, or to validate."""
+
+
+def recording(name: str) -> Clip:
+    """A recording by its name; what is not there is downloaded."""
+    return _recordings(RECORDINGS[name])[name]
+
+
+@functools.cache
+def _recordings(role: Role) -> dict[str, Clip]:
+    return {each.name: clip for each, clip, _ in (*clips_of(role), *made_of(role))}
 
 
 def perform_clip(

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from assets.emulator.bodies import apart
-from assets.emulator.clips import fit_clips, unseen_clips
+from assets.emulator.clips import FIT_RIGS, fit_clips, recorded_clips, unseen_clips
 from assets.emulator.fit.fit import fit
 from assets.emulator.fit.novelty import poses_of
 from assets.emulator.matching import matched
@@ -33,6 +33,8 @@ class CalibrationRun:
     """How often each motion is played in each scene; 0: once, in one of the scenes."""
     seed: int = 0
     """Of the clips."""
+    recordings: bool = False
+    """Whether recordings of people, which are downloaded, are fitted to as well."""
 
     def __post_init__(self) -> None:
         if self.rounds < 0 or self.seed < 0:
@@ -48,13 +50,14 @@ def calibrate(run: CalibrationRun, out: Path, say: Say) -> Calibration:
         say: hears of the progress: shares that sum to 1.
     """
     clips, pixels = fit_clips(run.rounds, run.seed), []
+    n_known = len(clips)
+    if run.recordings:
+        clips += recorded_clips("fitted", 1, run.seed, FIT_RIGS)
     for clip, seen in zip(clips, kept("pixels", clips, HRCConfig(), folder_of(out)), strict=True):
         pixels.append(seen)
         say(0.85 / len(clips), f"{clip.scene}: {clip.motion}")
-    draft, rest = (
-        fit(samples_of(pixels), poses_of(pixels), apart(worker_names())),
-        part_of(say, 0.15),
-    )
+    known, rest = poses_of(pixels[:n_known]), part_of(say, 0.15)
+    draft = fit(samples_of(pixels), known, apart(worker_names()))
     calibration = matched(draft, clips, pixels, out.with_suffix(".fit"), rest)
     write_calibration(out, calibration, _made(run, out, len(clips)))
     return calibration
@@ -81,5 +84,6 @@ def folder_of(out: Path) -> Path:
 
 def _made(run: CalibrationRun, out: Path, n_clips: int) -> dict[str, object]:
     words = f"python -m hrc_env calibrate-keypoints --rounds {run.rounds} --seed {run.seed}"
+    words += " --recordings" * run.recordings
     command = f"{words} --out {out.name}"
     return {"command": command, "seed": run.seed, "git": provenance()["git"], "clips": n_clips}

@@ -122,7 +122,7 @@ def ratios_of(seen: Compared) -> dict[str, Metric]:
                 ("coverage95", found.coverage, "share"),
             ):  # fmt: skip
                 metrics[f"emulator_{what}.{family}.{level}"] = _exactly(value, unit, found.n)
-        metrics |= _apart(family, [pixels[k] for k in mine], [emulated[k] for k in mine])
+        metrics |= apart(family, [pixels[k] for k in mine], [emulated[k] for k in mine])
     return metrics
 
 
@@ -130,19 +130,17 @@ def _exactly(value: float, unit: str, n: int) -> Metric:
     return Metric(value, value, value, unit, n)
 
 
-def _apart(
-    family: str, pixels: Sequence[InSpace], emulated: Sequence[InSpace]
-) -> dict[str, Metric]:
+def apart(family: str, pixels: Sequence[InSpace], emulated: Sequence[InSpace]) -> dict[str, Metric]:
     """How far both levels are apart on K clips of a family."""
 
-    def apart(ks: Ints) -> list[float]:
+    def off(ks: Ints) -> list[float]:
         (a, a_inside), (b, b_inside) = (_of(ks, level) for level in (pixels, emulated))
         ratios = np.percentile(b, [50, 95]) / np.percentile(a, [50, 95])
         return [*ratios.tolist(), float(b_inside.mean() - a_inside.mean())]
 
     ratio, n_joints = f"emulator_error_ratio.{family}", sum(error.size for error, _ in pixels)
     names = (ratio, f"{ratio}.p95", f"emulator_coverage_difference.{family}")
-    return dict(zip(names, over_clips(apart, len(pixels), ("", "", ""), n_joints), strict=True))
+    return dict(zip(names, over_clips(off, len(pixels), ("", "", ""), n_joints), strict=True))
 
 
 def over_clips(
@@ -154,6 +152,18 @@ def over_clips(
     lows, highs = np.percentile(again, [2.5, 97.5], axis=0).tolist()
     values = numbers(np.arange(n_clips))
     return [Metric(*each, n) for each in zip(values, lows, highs, units, strict=True)]
+
+
+def accuracy(each: Sequence[InSpace]) -> list[Metric]:
+    """Median and 95th percentile [mm] of errors, and coverage, of clips."""
+
+    def numbers(ks: Ints) -> list[float]:
+        errors, inside = zip(*(each[k] for k in ks.tolist()), strict=True)
+        middle, most = 1e3 * np.percentile(np.concatenate(errors), [50, 95])
+        return [middle, most, float(np.concatenate(inside).mean())]
+
+    n = sum(errors.size for errors, _ in each)
+    return over_clips(numbers, len(each), ("mm", "mm", "share"), n)
 
 
 def _of(ks: Ints, level: Sequence[InSpace]) -> InSpace:

@@ -193,7 +193,7 @@ CLIPS: tuple[Recorded, ...] = (
         (11.4, 17.1, "crouches, jumps turning round"),
         (17.1, 22.9, "jumps forward, gestures"),
     ),
-    *_pieces("kneel", "kneel.bvh", (0.0, 15.1, "stands, kneels down, ties a shoe, gets up")),
+    *_pieces("shoelace", "kneel.bvh", (0.0, 15.1, "stands, kneels down, ties a shoe, gets up")),
     *_pieces("amp", "walk.npz", (0.0, 2.5, "walks")),
     *_pieces(
         "amp", "dance.npz", (0.0, 5.0, "dances"), (5.0, 10.0, "dances"), (10.0, 15.0, "dances")

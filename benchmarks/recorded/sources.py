@@ -51,7 +51,7 @@ SOURCES: dict[str, Source] = {
         ),
         "validated", "MIT", "subject 1 of the CMU motion capture database, free to use; 120 Hz",
     ),
-    "kneel": Source(
+    "shoelace": Source(
         Archive(
             "bvhtoolbox==0.1.3",
             "2d9dcae87cd6bfa28c89463450de84497e612682ca0697ea088fc7f2ef0f937f",

@@ -60,7 +60,6 @@ class Calibration:
     poses: Floats  # that were fitted to, or near to those (`outline.pose_of`)
     near_m: Floats  # bodies that are no further from one of them are not new (`novelty_m`) [m]
     novel: Floats  # deviation that each metre further adds to what is told of a joint
-    strange: Floats  # deviation that each metre further adds to `wander_m`
     tail: Floats  # now and then further: a normal vector n is lengthened by 1 + tail n.n / 3
     bias: Floats  # mean error in a camera by the view, of side
     size: Floats  # median over time of the standard deviation of each coordinate, of side
@@ -82,8 +81,8 @@ class Calibration:
 
 SHAPES: dict[str, tuple[int, ...]] = {
     "offset_m": (_P, _K, 3), "wander_m": (_P, _K, 3), "space_limb": (_K, 3),
-    "between_m": (_K, 3), "poses": (N_POSES, len(JOINTS), 3), "near_m": (), "novel": (_K,),
-    "strange": (), "tail": (_P,), "bias": (N_VIEWS, _K, 2),
+    "between_m": (_K, 3), "poses": (len(JOINTS), 3, N_POSES), "near_m": (), "novel": (_K,),
+    "tail": (_P,), "bias": (N_VIEWS, _K, 2),
     "size": (_P, _S, _K), "spread": (_P, _S, _K), "body": (_P, _Q),
     "common": (), "shares": (_K, 3),
     "slow_s": (), "slow_m": (), "limb": (_K,), "confidence": (_P, _S, _K, _Z), "follows": (_S, _K),
@@ -152,7 +151,7 @@ def _table(name: str, value: Any, where: Path) -> Floats:
     expected = f"finite numbers of shape {SHAPES[name]}"
     for names, low, high in (
         (_POSITIVE, 1e-9, np.inf), (_SHARES, 0.0, 1.0), (_CORRELATIONS, -1.0, 1.0),
-        (("tail",), 0.0, LONGEST_TAIL), (("near_m", "novel", "strange"), 0.0, np.inf),
+        (("tail",), 0.0, LONGEST_TAIL), (("near_m", "novel"), 0.0, np.inf),
     ):  # fmt: skip
         if good and name in names and not (low <= array.min() and array.max() <= high):
             good, expected = False, f"numbers from {low:g} to {high:g}"

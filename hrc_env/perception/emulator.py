@@ -177,11 +177,9 @@ def _rig(cameras: tuple[PinholeCamera, ...]) -> Records:
 
 
 @functools.lru_cache(maxsize=16)
-def _settings(
-    config: EmulatorConfig, dt_s: float, written_ns: int
-) -> tuple[Floats, Records, Floats]:
-    """A calibration as the kernel takes it: (P, N) postures, (1,) `SETTINGS`, (M, J, 3) poses; read
-    again if its file has been written anew."""
+def _settings(config: EmulatorConfig, dt_s: float, written_ns: int) -> tuple[Floats, Records]:
+    """A calibration as the kernel takes it: (P, N) postures, (1,) `SETTINGS`; read again if its
+    file has been written anew."""
     known = config.calibrated()
     confidence = np.clip(known.confidence, 1e-6, 1 - 1e-6)
     of_posture = {name: getattr(known, name) for name in POSTURED}
@@ -189,7 +187,7 @@ def _settings(
     of_posture["confidence"] = np.log(confidence / (1 - confidence))
     rows = [table.reshape(len(table), -1) for table in of_posture.values()]
     settings = np.zeros(1, kernels.SETTINGS)
-    for name in ("space_limb", "bias", "limb", "follows", "near_m", "strange"):
+    for name in ("space_limb", "bias", "limb", "follows"):
         settings[name] = getattr(known, name)
     for name in ("error_scale", "max_error", "min_joints", "outside_confidence"):
         settings[name] = getattr(config, name)
@@ -198,4 +196,4 @@ def _settings(
     settings["common"], settings["own"] = np.sqrt(known.common), np.sqrt(1 - known.common)
     settings["keep"] = [np.exp(-dt_s / lasts_s) for lasts_s in (*known.swap_s, known.miss_s)]
     settings["stature_of_side"] = STATURE_OF_SIDE
-    return np.concatenate(rows, 1), settings, known.poses
+    return np.concatenate(rows, 1), settings

@@ -18,8 +18,8 @@ from hrc_env.perception.calibration import (
     SHAPES,
     VISIBILITY,
 )
-from hrc_env.perception.noise import FARTHEST_M, STANDING, error_share
-from hrc_env.perception.outline import facing, mix, novelty_m, posture_of, seen_from, speed
+from hrc_env.perception.noise import STANDING, error_share
+from hrc_env.perception.outline import facing, mix, posture_of, seen_from, speed
 from hrc_env.perception.sightlines import (
     BEHIND,
     JOINTS_SEEN,
@@ -67,8 +67,6 @@ SETTINGS = np.dtype(
         ("common", "f8"),  # root of the share of the sizes' variance that is the whole body's
         ("own", "f8"),  # root of the rest
         ("keep", "f8", (3,)),  # of `SWAPPED`, `CROSSED`, `MISSED`: first-order autoregression
-        ("near_m", "f8"),
-        ("strange", "f8"),
         ("error_scale", "f8"),
         ("max_error", "f8"),  # share of the window's side
         ("min_joints", "f8"),
@@ -102,11 +100,10 @@ def emulate_batch(errors, wander, normals, world, expected, rig, calibration, re
     image, and write a `Report`.
 
     normals (B, N) are of bodies, then of images; world is a `World`, expected an `Expected`, rig
-    (C,) `CAMERA`, calibration three: (P, N) the numbers of a `POSTURE` each, (1,) `SETTINGS`, and
-    (M, J, 3) poses that are known.
+    (C,) `CAMERA`, calibration a pair: (P, N) the numbers of a `POSTURE` each, (1,) `SETTINGS`.
     """
     batch, n_cameras, n_workers = errors.shape
-    postures, settings, poses = calibration
+    postures, settings = calibration
     occluders, room = occluders_of(world), np.empty(2, JOINTS_SEEN)
     mixed, meant, off = np.zeros(2, POSTURE), np.zeros((N_JOINTS, 3)), np.zeros((N_JOINTS, 2))
     numbers, n_image = mixed.view(np.float64).reshape(2, -1), N_NORMALS * N_JOINTS + N_OF_BODY
@@ -122,9 +119,8 @@ def emulate_batch(errors, wander, normals, world, expected, rig, calibration, re
             if track >= 0:
                 posture = posture_of(expected.joints[b, track], expected.velocity[b, track])
             mix(posture, postures, numbers[1])
-            new_m = min(max(novelty_m(joints, poses) - common.near_m, 0.0), FARTHEST_M)
-            more_m, drawn = common.strange * new_m, normals[b, 3 * N_JOINTS * w :]
-            _wander(wander[b, w], drawn, joints, front, keep, more_m, here, common, meant)
+            drawn = normals[b, 3 * N_JOINTS * w :]
+            _wander(wander[b, w], drawn, joints, front, keep, here, common, meant)
             for c in range(n_cameras):
                 seen, mine = room[0], errors[b, c, w]
                 n_seen = see(rig[c], joints, meant, occluders, seen)
@@ -164,9 +160,8 @@ def _say(confidence, stature_px, expected, sigma):
 
 
 @kernel
-def _wander(wander, normals, joints, front, keep, more_m, here, common, meant):
-    """Write where in space the detector means the joints to be, whatever the camera; more_m: how
-    much further off who is new to it may be [m]."""
+def _wander(wander, normals, joints, front, keep, here, common, meant):
+    """Write where in space the detector means the joints to be, whatever the camera."""
     renew, scale = math.sqrt(1.0 - keep * keep), common.error_scale
     tail = here.tail / 3.0
     for j in range(len(joints)):
@@ -179,9 +174,9 @@ def _wander(wander, normals, joints, front, keep, more_m, here, common, meant):
         kind, n = KIND[j], meant[j]
         offset, spread = here.offset_m[kind], here.wander_m[kind]
         far = 1.0 + tail * (n[0] * n[0] + n[1] * n[1] + n[2] * n[2])
-        ahead = offset[0] + (spread[0] * far + more_m) * n[0]
-        left = HAND[j] * (offset[1] + (spread[1] * far + more_m) * n[1])
-        up = offset[2] + (spread[2] * far + more_m) * n[2]
+        ahead = offset[0] + spread[0] * far * n[0]
+        left = HAND[j] * (offset[1] + spread[1] * far * n[1])
+        up = offset[2] + spread[2] * far * n[2]
         meant[j, 0] = joints[j, 0] + scale * (front[0] * ahead - front[1] * left)
         meant[j, 1] = joints[j, 1] + scale * (front[1] * ahead + front[0] * left)
         meant[j, 2] = joints[j, 2] + scale * up

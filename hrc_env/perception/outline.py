@@ -129,20 +129,16 @@ def pose_of(joints):
     return pose
 
 
-@kernel
+@kernel(makes_arrays=True)
 def novelty_m(joints, poses):
-    """How far a body (J, 3) is from the nearest of some `pose_of` (M, J, 3): root mean square over
+    """How far a body (J, 3) is from the nearest of some `pose_of` (J, 3, M): root mean square over
     its joints [m]."""
-    pose, nearest = pose_of(joints), np.inf
-    for m in range(len(poses)):
-        squared = 0.0
-        for j in range(len(pose)):
-            for i in range(3):
-                squared += (pose[j, i] - poses[m, j, i]) ** 2
-            if squared >= nearest:
-                break
-        nearest = min(nearest, squared)
-    return _length_m(joints) * math.sqrt(nearest / len(pose))
+    pose, squared = pose_of(joints), np.zeros(poses.shape[2])
+    for j in range(len(pose)):
+        for i in range(3):
+            for m in range(len(squared)):  # innermost, so that it is done for several at once
+                squared[m] += (pose[j, i] - poses[j, i, m]) ** 2
+    return _length_m(joints) * math.sqrt(squared.min() / len(pose))
 
 
 @kernel

@@ -52,7 +52,7 @@ def made(error, **changes):
 
 
 def fit(samples):
-    return fit_of(samples, (np.zeros((N_POSES, J, 3)), 0.05), BETWEEN_M)
+    return fit_of(samples, (np.zeros((J, 3, N_POSES)), 0.05), BETWEEN_M)
 
 
 def white(size=0.01, seed=1):
@@ -185,7 +185,7 @@ def told_clips(error_m, new_m):
 def test_what_is_told_of_new_poses_covers_their_errors():
     zero = {"offset_m", "wander_m", "between_m"}
     known = replace(
-        read_calibration(), poses=np.tile(pose_of(STANDING_BODY), (N_POSES, 1, 1)),
+        read_calibration(), poses=np.repeat(pose_of(STANDING_BODY)[..., None], N_POSES, -1),
         near_m=np.array(0.0), **{name: np.zeros(SHAPES[name]) for name in zero},
     )  # fmt: skip
     wrong = list(told_clips(0.05, 0.1))

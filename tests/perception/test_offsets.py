@@ -88,14 +88,14 @@ def test_of_a_pose_that_is_new_less_is_known_the_further_it_is_from_others():
     known = replace(KNOWN, near_m=np.array(0.02), novel=novel)
     body, grown = facing_x(), []
     body = body[None] + 0.5 * np.random.default_rng(3).standard_normal((*body.shape,))
-    for poses in (pose_of(body[0])[None], pose_of(facing_x())[None]):
-        here = replace(known, poses=np.ascontiguousarray(poses))
+    for poses in (pose_of(body[0]), pose_of(facing_x())):
+        here = replace(known, poses=np.ascontiguousarray(poses[..., None]))
         cov = [
             our_joints(estimate_of(body[None]), each).cov_world for each in (here, without(here))
         ]
         grown.append((cov[0] - cov[1])[0, 0])
     np.testing.assert_allclose(grown[0], 0.0, atol=1e-9)
-    away_m = novelty_m(body[0], pose_of(facing_x())[None]) - 0.02
+    away_m = novelty_m(body[0], pose_of(facing_x())[..., None]) - 0.02
     expected = (novel[KIND] * min(away_m, FARTHEST_M)) ** 2
     np.testing.assert_allclose(grown[1], expected[:, None, None] * np.eye(3), atol=1e-9)
 

@@ -122,7 +122,7 @@ def test_a_pose_is_the_same_wherever_and_however_large_the_body_is():
 
 
 def test_novelty_is_the_distance_to_the_nearest_pose():
-    poses = np.array([pose_of(squatting(0.45)), pose_of(STANDING)])
+    poses = np.stack([pose_of(squatting(0.45)), pose_of(STANDING)], -1)
     assert novelty_m(STANDING, poses) == pytest.approx(0.0, abs=1e-9)
     moved = STANDING.copy()
     moved[JOINT["left_wrist"]] += [0.0, 0.0, 0.3]

@@ -34,13 +34,13 @@ MOST = 2.0
 
 
 def poses_of(clips: Sequence[Watched]) -> tuple[Floats, float]:
-    """(M, J, 3) poses that stand for those of clips, mirrored ones with them; how far the true
+    """(J, 3, M) poses that stand for those of clips, mirrored ones with them; how far the true
     poses are from the nearest, the median [m]."""
     bodies = np.concatenate([clip.joints_world[::EVERY] for clip in clips])
     poses = np.array([pose_of(body) for body in bodies])
     both = np.concatenate([poses, poses[:, MIRROR] * [1.0, -1.0, 1.0]]).reshape(2 * len(poses), -1)
     centres = kmeans2(both, N_POSES, minit="++", rng=np.random.default_rng(0))[0]
-    kept = np.ascontiguousarray(centres.reshape(N_POSES, *poses.shape[1:]))
+    kept = np.ascontiguousarray(centres.T.reshape(*poses.shape[1:], N_POSES))
     return kept, float(np.median([novelty_m(body, kept) for body in bodies]))
 
 
