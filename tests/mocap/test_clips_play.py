@@ -8,6 +8,7 @@ from strides import FORMS, FPS, N_STRIDES, stride, written_as
 
 from benchmarks.tracking.walks import walk
 from hrc_env.cli.import_motion import ImportMotion
+from hrc_env.config import HRCConfig
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import JOINT, JOINTS
 from hrc_env.mocap.record import Capture
@@ -31,11 +32,12 @@ def imported(path, source_fps=None):
     return out
 
 
-def plays(clip, scene):
+def plays(clip, scene, worker="worker_1"):
     """Whether a worker plays a clip in a scene."""
     env = gymnasium.make(
         "HRCReach-v0", perception="none", scene=scene, motions=[clip],
-        config={"motion": {"motions_probability": 1.0}}, max_episode_steps=100_000,
+        config={"motion": {"motions_probability": 1.0}, "worker": worker},
+        max_episode_steps=100_000,
     )  # fmt: skip
     env.reset(seed=0)
     still = np.zeros(env.action_space.shape, np.float32)
@@ -54,12 +56,12 @@ def test_every_walk_in_every_form_plays_in_every_scene(tmp_path, seed, form, cap
     path = written_as(form, stride(seed), tmp_path, seed)
     clip = imported(path, FPS if form == "amc" else None)
     said = " ".join(capsys.readouterr().out.split())
-    played = played_s(load_clip(clip))
+    played = played_s(load_clip(clip), HRCConfig(worker="any"))
     assert set(played) == set(SCENES)
     for scene, seconds in played.items():
         assert seconds > 1.0
         assert f"{scene} ({seconds:.1f} of its" in said
-        assert plays(clip, scene)
+        assert plays(clip, scene, "any")
 
 
 def test_nothing_jumps_while_walks_are_played():
