@@ -42,11 +42,11 @@ def centres(position):
     return out
 
 
-def true_joints(motion):
+def true_joints(motion, body=BODY):
     """(T, 15, 3) joints as BlazePose means them."""
     still = np.zeros_like(motion.position_world)
     record = WorkerMotion(motion.position_world, motion.quaternion_wxyz, still, still)
-    return worker_truth(BODY, record).joints_world[0, :, 0]
+    return worker_truth(body, record).joints_world[0, :, 0]
 
 
 def angles_of(rotation, order):
@@ -74,11 +74,11 @@ def cmu_name(segment, prefix=""):
 
 def write_bvh(
     path, position, rotation, fps, unit_m=1.0, axes=None, orders=("ZYX",), rest_first=False,
-    name=cmu_name,
+    name=cmu_name, body=BODY,
 ):  # fmt: skip
     """A BVH file of segments over time; `orders` are taken in turn, one a joint."""
     axes = np.eye(3) if axes is None else axes
-    offset = (BODY.rest_position - BODY.rest_position[np.maximum(PARENT, 0)]) @ axes.T / unit_m
+    offset = (body.rest_position - body.rest_position[np.maximum(PARENT, 0)]) @ axes.T / unit_m
     offset[0] = 0.0
     turned = axes @ rotation @ axes.T
     root = position[:, 0] @ axes.T / unit_m
@@ -101,7 +101,7 @@ def write_bvh(
         for child in children:
             joint(child, depth + 1)
         if not children:
-            tip = _tip(s) @ axes.T / unit_m
+            tip = _tip(s, body) @ axes.T / unit_m
             lines.extend((f"{pad}\tEnd Site", pad + "\t{", f"{pad}\t\tOFFSET {_row(tip)}"))
             lines.append(pad + "\t}")
         lines.append(pad + "}")
@@ -115,9 +115,9 @@ def write_bvh(
     return path
 
 
-def write_acclaim(folder, position, rotation):
+def write_acclaim(folder, position, rotation, body=BODY, name="walk"):
     """walk.asf and walk.amc as of the CMU database: y up, 0.45 lengths an inch; the .amc."""
-    bones = _bones()
+    bones = _bones(body)
     unit_m = 0.0254 / 0.45
     asf = [":version 1.10", ":name WALK", ":units", "  mass 1.0", "  length 0.45", "  angle deg"]
     asf += [":root", "   order TX TY TZ RX RY RZ", "   axis XYZ", "   position 0 0 0"]
@@ -142,17 +142,17 @@ def write_acclaim(folder, position, rotation):
     asf += [":hierarchy", "  begin"]
     for above in dict.fromkeys(above for _, above, _, _ in bones):
         asf += [f"    {above} {' '.join(name for name, over, _, _ in bones if over == above)}"]
-    (folder / "walk.asf").write_text("\n".join([*asf, "  end"]) + "\n")
-    amc = ["#!OML:ASF walk.asf", ":FULLY-SPECIFIED", ":DEGREES"]
+    (folder / f"{name}.asf").write_text("\n".join([*asf, "  end"]) + "\n")
+    amc = [f"#!OML:ASF {name}.asf", ":FULLY-SPECIFIED", ":DEGREES"]
     for t in range(len(position)):
         amc += [str(t + 1), *(f"{bone} {_row(row[t])}" for bone, row in rows.items())]
-    (folder / "walk.amc").write_text("\n".join(amc) + "\n")
-    return folder / "walk.amc"
+    (folder / f"{name}.amc").write_text("\n".join(amc) + "\n")
+    return folder / f"{name}.amc"
 
 
-def _bones():
+def _bones(body):
     """(name, parent, segment that it turns with, way from its start to its end) of each bone."""
-    rest = BODY.rest_position
+    rest = body.rest_position
 
     def way(first, second):
         return rest[SEGMENT[second]] - rest[SEGMENT[first]]
@@ -162,7 +162,7 @@ def _bones():
         ("upperback", "lowerback", "torso", way("torso", "chest")),
         ("thorax", "upperback", "chest", way("chest", "neck")),
         ("lowerneck", "thorax", "neck", way("neck", "head")),
-        ("head", "lowerneck", "head", _tip(SEGMENT["head"])),
+        ("head", "lowerneck", "head", _tip(SEGMENT["head"], body)),
     ]
     for s, side in (("l", "left_"), ("r", "right_")):
         bones += [
@@ -170,22 +170,22 @@ def _bones():
             (f"{s}femur", f"{s}hipjoint", f"{side}thigh", way(f"{side}thigh", f"{side}shank")),
             (f"{s}tibia", f"{s}femur", f"{side}shank", way(f"{side}shank", f"{side}foot")),
             (f"{s}foot", f"{s}tibia", f"{side}foot", way(f"{side}foot", f"{side}toes")),
-            (f"{s}toes", f"{s}foot", f"{side}toes", _tip(SEGMENT[f"{side}toes"])),
+            (f"{s}toes", f"{s}foot", f"{side}toes", _tip(SEGMENT[f"{side}toes"], body)),
             (f"{s}girdle", "upperback", "chest", way("chest", f"{side}clavicle")),
             (f"{s}clavicle", f"{s}girdle", f"{side}clavicle",
              way(f"{side}clavicle", f"{side}upper_arm")),
             (f"{s}humerus", f"{s}clavicle", f"{side}upper_arm",
              way(f"{side}upper_arm", f"{side}forearm")),
             (f"{s}radius", f"{s}humerus", f"{side}forearm", way(f"{side}forearm", f"{side}hand")),
-            (f"{s}wrist", f"{s}radius", f"{side}hand", _tip(SEGMENT[f"{side}hand"])),
+            (f"{s}wrist", f"{s}radius", f"{side}hand", _tip(SEGMENT[f"{side}hand"], body)),
         ]  # fmt: skip
     return [(name, above, SEGMENT[segment], along) for name, above, segment, along in bones]
 
 
-def _tip(s):
+def _tip(s, body):
     """(3,) end of a segment that carries no other [m]."""
     if SEGMENTS[s].endswith("toes"):
-        marks = marks_of(BODY, landmarks=True)
+        marks = marks_of(body, landmarks=True)
         return marks.offset[13 if SEGMENTS[s].startswith("left") else 14]
     return np.array([0.0, 0.0, 0.2]) if SEGMENTS[s] == "head" else np.array([0.08, 0.0, 0.0])
 
