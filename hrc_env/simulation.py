@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hrc_env import metrics, observations, rewards, step
+from hrc_env import metrics, observations, rewards, room, step
 from hrc_env.belief import Belief, estimated_separation
 from hrc_env.config import Settings
 from hrc_env.control import joint_command, n_actions
@@ -24,6 +24,7 @@ from hrc_env.core.streams import children
 from hrc_env.core.typing import Bools, Floats, Ints, JointVelocities, Points3
 from hrc_env.geometry import chains
 from hrc_env.motion import generator
+from hrc_env.motion.activities.pieces import NoRoomError
 from hrc_env.pipeline.levels import CAMERA_LEVELS, make_pipeline
 from hrc_env.pipeline.sensor_input import SensorInput, TrueSensorInput
 from hrc_env.rewards import RewardConfig
@@ -65,9 +66,13 @@ class Simulation(Stateful):
             build, config.scene, settings.scene,
             bodies=self.bodies.names, cameras=settings.cameras, robot=settings.robot,
         )  # fmt: skip
-        self.motion = generator.make_state(
-            batch, most, self.bodies, config.motion, scene_for(n_workers=0).grounds, fewest
-        )  # first, as it knows how many workers there is room for
+        try:  # first, as it knows how many workers and which clips there is room for
+            self.motion = generator.make_state(
+                batch, most, self.bodies, config.motion, scene_for(n_workers=0).grounds, fewest
+            )
+        except NoRoomError as error:
+            where = room.told(error.clip, room.played_s(error.clip, config))
+            raise ConfigError(f"{error} {where}") from None
         self.scene = scene_for(n_workers=most)
         if perception in CAMERA_LEVELS:
             for finding in findings(self.scene):

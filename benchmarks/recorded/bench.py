@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from benchmarks.recorded.calibration import read_calibration, tracker_config
 from benchmarks.recorded.detections import FOLLOWER, Detections, detections_of
-from benchmarks.recorded.fetch import WHEEL, fetch_recording
+from benchmarks.recorded.fetch import POSE2SIM, fetch_recording
 from benchmarks.recorded.films import Films
 from benchmarks.recorded.metrics import (
     NAMES,
@@ -88,7 +88,7 @@ def report(metrics: Metrics) -> Report:
 RECORDED = Study(
     name="bench recorded",
     modules=("benchmarks.recorded.metrics",),
-    settings=lambda _: {"recording": WHEEL, "follower": FOLLOWER},
+    settings=lambda _: {"recording": POSE2SIM.requirement, "follower": FOLLOWER},
     seeds=lambda _: [0],
     n_parts=lambda _: 1,
     play=play,

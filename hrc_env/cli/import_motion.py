@@ -50,6 +50,9 @@ class ImportMotion:
     """The recording's true rate, where its file has none (AMC) or a wrong one."""
     skeleton: Path | None = None
     """The .asf file of an .amc file, if it is not beside it."""
+    allow_off_floor: bool = False
+    """Accept feet that are not on one level floor: on stairs or terrain, long in the air, or above
+    the floor for want of the right .asf file. The clip is played as if all that were not so."""
     worker: str = "worker_1"
     """The body to fit; others play the clip, too, scaled to their legs and arms."""
     picture: Path | None = None
@@ -62,22 +65,24 @@ class ImportMotion:
             raise ConfigError("--out is the recording itself; give the clip another name.")
         if self.picture is not None:
             writable_file(self.picture, ".png", "--picture")
-        from hrc_env.mocap.read import read_capture
+        from hrc_env import room
         from hrc_env.mocap.retarget import retarget
         from hrc_env.motion.clip import save_clip
         from hrc_env.worker.body import load_body
 
         body, console = load_body(self.worker), Console()
-        capture = read_capture(self.file, self.fps, self.source_fps, self.skeleton)
+        capture = self._read(self.fps)
         if self.fps is None and capture.fps > USUAL_FPS:
-            capture = read_capture(self.file, USUAL_FPS, self.source_fps, self.skeleton)
+            capture = self._read(USUAL_FPS)
         tell_capture(console, capture)
         name = f"fitting {self.worker}"
         with progress_bar(console, name) as say:
             clip, error = retarget(capture, body, lambda share: say(share, name))
         tell_error(console, capture, clip, error)
+        played = room.played_s(clip)
         save_clip(clip, self.out)
-        console.print(f"In [bold]{self.out}[/]: play it with motions=[{str(self.out)!r}]")
+        ready = f"play it with motions=[{str(self.out)!r}]. " if any(played.values()) else ""
+        console.print(f"In [bold]{self.out}[/]: {ready}{room.told(clip, played)}")
         if self.picture is not None:
             import imageio.v2 as imageio
 
@@ -85,6 +90,11 @@ class ImportMotion:
             imageio.imwrite(self.picture, _film_strip(clip, self.worker))
             console.print(f"In [bold]{self.picture}[/]: a film strip")
         return 0
+
+    def _read(self, fps: float | None) -> "Capture":
+        from hrc_env.mocap.read import read_capture
+
+        return read_capture(self.file, fps, self.source_fps, self.skeleton, self.allow_off_floor)
 
 
 def tell_capture(console: Console, capture: "Capture") -> None:

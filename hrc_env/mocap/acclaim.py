@@ -4,6 +4,7 @@ A bone's rotation is C M C^-1 in its parent's frame: C turns the file's axes to 
 ("axis"), M is of its degrees of freedom; about fixed axes in the order in which they are written.
 """
 
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -50,7 +51,14 @@ def read_acclaim(path: Path, skeleton: Path | None = None) -> Moving:
     """An AMC file's motion of the skeleton in its ASF file; `ConfigError` where one is damaged."""
     if path.suffix.lower() == ".asf":
         raise ConfigError(f"{path.name} is a skeleton without motion; give its .amc file.")
-    bones = _read_asf(skeleton or _skeleton_of(path))
+    found = skeleton or _skeleton_of(path)
+    ours, theirs = _subject(path), _subject(found)
+    if ours and theirs and ours != theirs:
+        raise ConfigError(
+            f"{path.name} is of subject {ours}, {found.name} the skeleton of subject {theirs}, "
+            f"whose bones have other lengths; expected {ours}.asf beside it or as --skeleton."
+        )
+    bones = _read_asf(found)
     values, repaired = _read_amc(path, bones)
     return _moving(bones, values, repaired)
 
@@ -69,6 +77,12 @@ def _skeleton_of(path: Path) -> Path:
         f"{path.stem}.asf. Found there: {', '.join(p.name for p in beside) or 'none'}. "
         "Give it with --skeleton."
     )
+
+
+def _subject(path: Path) -> str:
+    """The subject's number, as the CMU database has it: 2 for 02.asf and 02_01.amc; or nothing."""
+    number = re.match(r"0*(\d+)(?=_|$)", path.stem)
+    return number[1] if number else ""
 
 
 def _read_asf(path: Path) -> _Skeleton:
@@ -146,13 +160,22 @@ def _read_amc(path: Path, skeleton: _Skeleton) -> tuple[dict[str, Floats], tuple
         else:
             frames[-1][words[0]] = rows.numbers(words[1:])
     moving = {name: len(bone.freedoms) for name, bone in skeleton.bones.items() if bone.freedoms}
+    if strangers := sorted(set().union(*frames) - set(skeleton.bones)):
+        raise ConfigError(
+            f"{path.name} belongs to another skeleton: it moves {', '.join(strangers)}; this one "
+            f"has {', '.join(skeleton.bones)}."
+        )
     whole = [f for f in frames if all(len(f.get(name, ())) == n for name, n in moving.items())]
     if len(whole) < FEWEST_FRAMES or whole != frames[: len(whole)] or len(frames) > len(whole) + 1:
-        lacks = [n for n in moving if frames and n not in frames[0]]
+        there = frames[0] if frames else {}
+        wrong = [
+            f"{name} has {len(there.get(name, ()))} numbers, not {n}"
+            for name, n in moving.items() if len(there.get(name, ())) != n
+        ]  # fmt: skip
         raise ConfigError(
             f"{path.name} is cut off or belongs to another skeleton: {len(whole)} of its "
-            f"{len(frames)} frames name every bone that moves"
-            + (f"; missing in the first: {', '.join(lacks)}." if lacks else ".")
+            f"{len(frames)} frames have a number for each freedom of every bone"
+            + (f"; in the first, {', '.join(wrong)}." if wrong else ".")
         )
     values = {name: np.array([frame[name] for frame in whole]) for name in moving}
     cut = f"The last frame is cut off: {len(whole)} are used."

@@ -23,15 +23,17 @@ CMU_HZ, LEAST_S = 120.0, 0.5
 
 def read_capture(
     path: Path, fps: float | None = None, source_fps: float | None = None,
-    skeleton: Path | None = None,
+    skeleton: Path | None = None, allow_off_floor: bool = False,
 ) -> Capture:  # fmt: skip
     """Read, mend and resample a recording: a .bvh, .amc or .npz file of a person in motion.
 
     `fps` is the result's rate (None: the file's), `source_fps` the file's own, where it has none or
-    a wrong one; `skeleton` the .asf file of an .amc file (None: looked for beside it).
+    a wrong one; `skeleton` the .asf file of an .amc file (None: looked for beside it). Who is not
+    on one level floor (stairs, terrain, long in the air) is refused, or accepted as if they were.
 
     Raises:
-        ConfigError: it is no such file, or damaged beyond repair.
+        ConfigError: it is no such file, damaged beyond repair, of another's skeleton or off the
+            floor.
     """
     source = path.name
     joints, rate_hz, landmarks, found, repaired = _read(path, skeleton)
@@ -40,7 +42,8 @@ def read_capture(
     elif np.isnan(rate_hz):
         rate_hz, repaired = CMU_HZ, (*repaired, f"No frame rate: taken to be {CMU_HZ:g} Hz.")
     check_rate(rate_hz, source)
-    joints, notes = mended(joints, rate_hz, source)
+    acclaim = path.suffix.lower() == ".amc"
+    joints, notes = mended(joints, rate_hz, source, acclaim, allow_off_floor)
     lasts_s = (len(joints) - 1) / rate_hz
     if lasts_s < LEAST_S:
         raise ConfigError(f"{source}: {lasts_s:.2f} s of motion; {LEAST_S} s is the least.")

@@ -6,6 +6,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import JOINT, JOINTS
 from hrc_env.core.typing import Bools, Points3
 from hrc_env.geometry.rotations import about_axis
+from hrc_env.mocap.footing import grounded
 from hrc_env.mocap.person import across, check_person, length, middle, runs, stature
 
 STATURES_M = (1.3, 2.2)
@@ -19,9 +20,6 @@ LONGEST_GAP_S = 0.25
 """Longest time that a joint may be missing [s]: about half a step; judgement."""
 STEADY = 0.8
 """Least share of one axis in the mean direction from ankles to shoulders."""
-FLOOR_M, SOLE_M = (-0.06, 0.14), 0.03
-"""Where the lowest joint of the feet may be for the file's floor to be believed; its height on a
-floor that was found [m]; the baked bodies' is 0.04."""
 KNEES = 0.1
 """Legs bent by less than this share of a shank, on the mean, are straight."""
 JUMP, AFTER, JUMP_M = 6.0, 6, 0.03
@@ -37,15 +35,18 @@ Mended = tuple[Points3, tuple[str, ...]]
 """Joints (T, 15, 3), and a sentence for each thing that was changed."""
 
 
-def mended(joints: Points3, fps: float, source: str) -> Mended:
-    """Whole, in metres, upright, not mirrored, without a rest pose, on the floor."""
+def mended(
+    joints: Points3, fps: float, source: str, at_zero: bool = False, off_floor: bool = False
+) -> Mended:
+    """Whole, in metres, upright, not mirrored, without a rest pose, on the floor: see `grounded`
+    for `at_zero`, and for what is refused unless it may be `off_floor`."""
     joints, gaps = fill_gaps(joints, fps, source)
     joints, unit = in_metres(joints, source)
     first, rest = without_rest_pose(joints)
     joints, turned = z_up(joints[first:], source)
     joints, mirrored = unmirrored(joints, source)
-    joints, floor = on_floor(joints)
     check_person(joints, source)
+    joints, floor = grounded(joints, fps, source, at_zero, off_floor)
     return joints, (*gaps, *unit, *rest, *turned, *mirrored, *floor)
 
 
@@ -134,13 +135,3 @@ def without_rest_pose(joints: Points3) -> tuple[int, tuple[str, ...]]:
     if jumps[0] > max(JUMP_M, JUMP * jumps[1:AFTER].max(initial=0.0)):
         return 1, ("The first frame is another pose than the motion (a T-pose?): left out.",)
     return 0, ()
-
-
-def on_floor(joints: Points3) -> Mended:
-    """The joints with the floor at 0, moved only where the file's own floor is elsewhere."""
-    feet = [JOINT[f"{side}_{part}"] for side in ("left", "right") for part in ("ankle", "foot")]
-    lowest = float(np.percentile(joints[:, feet, 2].min(-1), 5))
-    if FLOOR_M[0] < lowest < FLOOR_M[1]:
-        return joints, ()
-    told = f"The floor was found at {lowest - SOLE_M:+.2f} m and moved to 0."
-    return joints - np.array([0.0, 0.0, lowest - SOLE_M]), (told,)

@@ -1,7 +1,7 @@
 """What decisions of workers are made from: constants, the state, draws; and where they may go."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,18 +10,29 @@ from hrc_env.core.records import WORKPLACE_KINDS
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.motion import state as st
 from hrc_env.motion.activities.falling import fallen_root
-from hrc_env.motion.activities.playing import Clips
+from hrc_env.motion.activities.pieces import Clips
 from hrc_env.motion.anatomy import Anatomy
 from hrc_env.motion.config import MotionConfig, Numbers
-from hrc_env.motion.floorplan import CELL_M, Floorplan, slack_at
+from hrc_env.motion.floorplan import CELL_M, Floorplan, beside_robot, slack_at
 from hrc_env.motion.schedule import HERE, Job, Schedule
-from hrc_env.motion.state import N_START, NOWHERE, UNDER_WAY, WAITING, Place, Worker, Workers
+from hrc_env.motion.state import (
+    N_START,
+    NOWHERE,
+    ON_STAGE,
+    UNDER_WAY,
+    WAITING,
+    Place,
+    Worker,
+    Workers,
+)
 from hrc_env.motion.traffic import AHEAD_M, APART_M, FALL_M, HANDS_M
 
 NEXT, BOW, LASTS, DELAY, REACTION, REACTION_S, EVENT, DWELL = range(N_START, N_START + 8)
 """Which draw decides what; the first N_START are the activity's own."""
 PLACES, N_DRAWS = N_START + 8, N_START + 8 + 3 * 5
 """First of the draws for places, three for each of five; uniform numbers of one decision."""
+N_STAGES = 4
+"""So many of the places from which a clip has room are tried."""
 ROBOT_WORK_M = 1.1
 """Height of the work at the robot [m]."""
 
@@ -79,7 +90,7 @@ class Decision:
     def kind_here(self) -> str:
         """Kind of the place where they are and have something to do; else nothing."""
         at = self.me["at"]
-        return "" if at == NOWHERE else WORKPLACE_KINDS[at]
+        return "" if at in (NOWHERE, ON_STAGE) else WORKPLACE_KINDS[at]
 
     @property
     def job(self) -> Job:
@@ -123,10 +134,22 @@ def wished(who: Decision) -> Iterator[Place]:
     yield from _free_places(who, who.job.at)
 
 
+def free_stages(who: Decision, starts: Floats) -> Iterator[Place]:
+    """The nearest few of places (k, 3) to begin a clip from that no other worker's is near."""
+    away = np.hypot(*(starts[:, :2] - who.me["spot"][:2]).T)
+    nearest = starts[np.argsort(away, kind="stable")[:N_STAGES]].tolist()
+    return _free(who, ((x, y, yaw, 0.0) for x, y, yaw in nearest))
+
+
 def _free_places(who: Decision, kind: str) -> Iterator[Place]:
     """Places of a kind that no other worker's is near."""
+    return _free(who, _candidates(who, kind))
+
+
+def _free(who: Decision, places: Iterable[Place]) -> Iterator[Place]:
+    """Those of some places that no other worker's is near."""
     apart_m, spots = who.mind.config.spacing_m, who.workers["spot"][who.others(), :2].tolist()
-    for place in _candidates(who, kind):
+    for place in places:
         if all(math.dist(spot, place[:2]) >= apart_m for spot in spots):
             yield place
 
@@ -137,13 +160,11 @@ def _candidates(who: Decision, kind: str) -> Iterator[Place]:
     if kind == HERE:
         yield tuple(who.me["spot"].tolist())  # type: ignore[misc]
     elif kind == "robot":
-        grounds = plan.grounds
         for radius, azimuth, turn in zip(draws[::3], draws[1::3], draws[2::3], strict=True):
             low, high = config.near_radius_m
             r = low + radius * (high - low)
             angle = config.near_azimuth_rad * (2.0 * azimuth - 1.0)
-            x = grounds.robot_xy_m[0] + r * math.cos(angle)
-            y = grounds.robot_xy_m[1] + r * math.sin(angle)
+            x, y = beside_robot(plan.grounds, r, angle)
             if slack_at(x, y, plan.slack, plan.origin) >= 0.0:
                 yield x, y, angle + math.pi + 0.15 * (2.0 * turn - 1.0), ROBOT_WORK_M
     else:

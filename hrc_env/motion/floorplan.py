@@ -47,6 +47,12 @@ def floorplan(grounds: Grounds) -> Floorplan:
     return Floorplan(slack, origin, grounds)
 
 
+def beside_robot(grounds: Grounds, radius_m: float, angle_rad: float) -> tuple[float, float]:
+    """The point so far from the robot's axis, at an angle from its front [m]."""
+    x, y = grounds.robot_xy_m
+    return x + radius_m * math.cos(angle_rad), y + radius_m * math.sin(angle_rad)
+
+
 def room_for(plan: Floorplan, apart_m: float) -> int:
     """How many workers find a place so far apart from each other, taken as they come."""
     coarse = 4  # grid points of the field to one that is tried

@@ -13,7 +13,7 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Grounds, Held, WorkerMotion, WorkerPath, Workplace
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.motion import state as st
-from hrc_env.motion.activities.playing import stocked
+from hrc_env.motion.activities.pieces import stage, stocked
 from hrc_env.motion.anatomy import anatomies
 from hrc_env.motion.behaviour import begin_episode, follow_up
 from hrc_env.motion.blending import RATE_H_S, evaluate
@@ -76,7 +76,7 @@ def make_state(
     clips = [m if isinstance(m, Clip) else load_clip(Path(m)) for m in config.motions]
     schedule = schedule_at(config.jobs, {place.kind for place in grounds.places})
     values = numbers(config, grounds.robot_xy_m)
-    pieces = stocked(clips, bones.size)
+    pieces = stocked(clips, bones.size, stage(plan, config))
     mind = BehaviourParams(config, values, plan, schedule, pieces, bones, fewest)
     return MotionState(np.zeros((batch, n_workers), st.WORKER), mind)
 

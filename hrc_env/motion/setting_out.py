@@ -1,6 +1,7 @@
 """Setting out: to a place by a way that meets nobody, a few steps back, into a clip."""
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -8,14 +9,15 @@ from hrc_env.core.records import WORKPLACE_KINDS
 from hrc_env.core.typing import Floats
 from hrc_env.motion import state as st
 from hrc_env.motion.activities.falling import plan_fall
-from hrc_env.motion.activities.playing import TURNS_RAD, following, start_clip
+from hrc_env.motion.activities.pieces import TURNS_RAD, following, piece_of
+from hrc_env.motion.activities.playing import start_clip
 from hrc_env.motion.activities.running import fastest, plan_run
-from hrc_env.motion.decision import BOW, DWELL, EVENT, Decision, in_the_way, wished
+from hrc_env.motion.decision import BOW, DWELL, EVENT, Decision, free_stages, in_the_way, wished
 from hrc_env.motion.floorplan import slack_at
 from hrc_env.motion.routes import route
 from hrc_env.motion.schedule import HERE
 from hrc_env.motion.starting import start_going, start_here
-from hrc_env.motion.state import N_START, THERE, UNDER_WAY, Place
+from hrc_env.motion.state import N_START, NOWHERE, ON_STAGE, THERE, UNDER_WAY, WAITING, Place
 from hrc_env.motion.traffic import APART_M, meets
 from hrc_env.worker.props import PROP_NAMES
 
@@ -35,17 +37,29 @@ Begun = tuple[int, float] | None
 
 def go(who: Decision) -> Begun:
     """Begin to walk to a place of the job, if there is a free one and a free way to it."""
-    mind, job, me = who.mind, who.job, who.me
-    for place in wished(who):
+    job, me = who.job, who.me
+    if me["going"] == UNDER_WAY and me["at"] == ON_STAGE:
+        spot: Place = tuple(me["spot"].tolist())  # type: ignore[assignment]
+        if begun := _go_to(who, [spot], ON_STAGE):
+            return begun
+        me["at"] = NOWHERE
+        who.go(WAITING)
+    return _go_to(who, wished(who), WORKPLACE_KINDS.index(job.at if job.at != HERE else "open"))
+
+
+def _go_to(who: Decision, places: Iterable[Place], at: int) -> Begun:
+    """Begin to walk to one of some places, `at` which is that."""
+    mind, me = who.mind, who.me
+    for place in places:
         obstacles = in_the_way(who)
         for share in HURRY:
-            begun = _set_out(who, place, obstacles, share)
+            begun = _set_out(who, place, obstacles, share, at != ON_STAGE)
             if begun is None:
                 break
             when, at_x, at_y = meets_somebody(who, *begun)
             if when < 0.0:
                 me["spot"] = place
-                me["at"] = WORKPLACE_KINDS.index(job.at if job.at != HERE else "open")
+                me["at"] = at
                 dwell = who.draw(DWELL, mind.config.dwell_s) * mind.config.people.tempo
                 me["until_s"] = who.now + begun[1] + dwell
                 who.go(UNDER_WAY)
@@ -56,7 +70,7 @@ def go(who: Decision) -> Begun:
     return None
 
 
-def _set_out(who: Decision, place: Place, obstacles: Floats, share: float) -> Begun:
+def _set_out(who: Decision, place: Place, obstacles: Floats, share: float, to_work: bool) -> Begun:
     """Plan to go to a place round obstacles (n, 3) at a share of one's pace, if there is a way."""
     mind, job, me = who.mind, who.job, who.me
     start, end = (float(me["start_x"]), float(me["start_y"])), (place[0], place[1])
@@ -71,7 +85,7 @@ def _set_out(who: Decision, place: Place, obstacles: Floats, share: float) -> Be
     stumbles = who.draws[EVENT] > 1.0 - mind.config.people.stumble_probability
     if who.loaded:
         activity = st.CARRY
-    elif job.by == "push":
+    elif to_work and job.by == "push":
         activity, prop = st.PUSH, PROP_NAMES.index(job.prop)
     elif job.at in STUMBLE_TO and stumbles:
         activity = st.STUMBLE
@@ -134,22 +148,40 @@ def meets_somebody(who: Decision, activity: int, lasts: float) -> tuple[float, f
 
 
 def play(who: Decision) -> Begun:
-    """Begin to play a clip, if it is wished and there is room; after one follows the next."""
+    """Begin to play a clip, if it is wished, or to go where there is room for it; after one follows
+    the next, if there is room."""
     mind, me, n_clips = who.mind, who.me, len(who.mind.clips.count)
-    was_clip = me["activity"] == st.CLIP
-    if n_clips == 0 or who.loaded or not (was_clip or me["going"] == THERE):
+    was_clip, on_stage = me["activity"] == st.CLIP, me["at"] == ON_STAGE and arrived(who)
+    if n_clips == 0 or who.loaded or not (was_clip or on_stage or me["going"] == THERE):
         return None
-    if who.draws[WISHED_CLIP] >= mind.config.motions_probability:
+    if not on_stage and who.draws[WISHED_CLIP] >= mind.config.motions_probability:
         return None
     piece = int(who.draws.item(WHICH_CLIP) * n_clips)
     if was_clip:
         piece = following(mind.clips, me)
+    elif on_stage:
+        piece, me["at"] = piece_of(mind.clips, me), NOWHERE
+    if begun := _play_here(who, piece):
+        return begun
+    if was_clip or on_stage:
+        return None
+    me["clip_row"] = mind.clips.row[piece]
+    return _go_to(who, free_stages(who, mind.clips.starts[piece]), ON_STAGE)
+
+
+def _play_here(who: Decision, piece: int) -> Begun:
+    """Begin to play a piece of a clip, if there is room."""
+    mind, me = who.mind, who.me
     for turn_rad in TURNS_RAD:
         lasts = start_clip(piece, turn_rad, mind.clips, me)
         roots = me["roots"].tolist()
         room = min(slack_at(x, y, mind.plan.slack, mind.plan.origin) for x, y in roots)
         if room >= 0.0 and meets_somebody(who, st.CLIP, lasts)[0] < 0.0:
-            who.go(UNDER_WAY)  # that is, back to the place afterwards
+            if who.kind_here:
+                who.go(UNDER_WAY)  # that is, back to the place afterwards
+            else:
+                who.go(THERE)
+                me["spot"] = me["end_x"], me["end_y"], me["end_yaw"], 0.0
             return st.CLIP, lasts
     stay(who)
     return None

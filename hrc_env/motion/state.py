@@ -52,7 +52,7 @@ _NOW = [
     ("until_s", "f8"), ("since_s", "f8"),  # clock until which they stay; wait for a way (0: do not)
     ("job", "i8"),  # index into the jobs
     ("going", "i8"),  # THERE, UNDER_WAY, WAITING
-    ("at", "i8"),  # kind of the place, index into `WORKPLACE_KINDS`, or NOWHERE: done there
+    ("at", "i8"),  # kind of the place, index into `WORKPLACE_KINDS`, NOWHERE or ON_STAGE
     # What they noticed of the robot
     ("robot_world", "f8", (2, 3)),  # elbow and tool when last looked at; infinite: not yet
     ("acts_at", "f8"),  # clock at which they will react; infinite: noticed nothing
@@ -130,6 +130,7 @@ TAKING, GIVING = (PICK_UP, RECEIVE), (SET_DOWN, HAND_OVER)
 """Activities that share a closed form."""
 WAYS = (WALK, TURN, CARRY, PUSH, STUMBLE, CLIP, RUN, FALL)
 """Activities that are no job to be done at a place."""
-NOWHERE = -1
+NOWHERE, ON_STAGE = -1, -2
+"""What is at a place that is none: nothing any more; room for a clip, which is played next."""
 THERE, UNDER_WAY, WAITING = range(3)
 NO_REACTION, PAUSE, BACK_AWAY = range(3)

@@ -85,7 +85,7 @@ def meets(w: int, workers: Workers) -> Triple:
         if k == w or not other.present:
             continue
         left = me.duration_s - me.time_s
-        if goes(other.activity):
+        if goes(other.activity) or other.activity == st.CLIP:
             left = max(left, other.duration_s - other.time_s)
         allowed, n = 0.0, int(left / LOOK_S) + 1
         for i in range(n + 1):

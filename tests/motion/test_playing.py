@@ -4,9 +4,8 @@ import dataclasses
 
 import numpy as np
 import pytest
-from recorded import joined, started, walk_straight, watched
+from recorded import begin, joined, started, walk_straight, watched
 
-from benchmarks.tracking.walks import Gait, walk
 from hrc_env.config import settle
 from hrc_env.core.batching import one
 from hrc_env.core.errors import ConfigError
@@ -18,8 +17,15 @@ from hrc_env.mocap.retarget import retarget
 from hrc_env.motion import controls as c
 from hrc_env.motion import generator
 from hrc_env.motion import state as st
-from hrc_env.motion.activities.playing import LONGEST_S, PACE_S, SETTLE_S, stocked
+from hrc_env.motion.activities.pieces import LONGEST_S, stage, stocked
+from hrc_env.motion.activities.playing import PACE_S, SETTLE_S
+from hrc_env.motion.blending import settle as settle_at
 from hrc_env.motion.clip import load_clip, save_clip
+from hrc_env.motion.floorplan import floorplan
+from hrc_env.motion.paths import lay_path
+from hrc_env.motion.state import N_ROOTS
+from hrc_env.motion.traffic import meets
+from hrc_env.motion.walk import plan_walk
 from hrc_env.worker.body import SEGMENT, load_body, worker_truth
 
 BODY = load_body()
@@ -89,7 +95,7 @@ def test_the_recorded_pose_is_the_one_that_is_seen(clip):
             break
     position = generator.current(state).position_world[0, 0]
     k = round((at_s - 0.5 * PACE_S) * FPS)
-    piece = stocked([clip], state.mind.anatomy.size)
+    piece = state.mind.clips
     q = np.zeros((1, c.N_CONTROLS))
     q[0, : c.N_BLENDED] = piece.frames[k, : c.N_BLENDED]
     q[0, c.ANKLE : c.ANKLE + 12] = piece.frames[k, c.N_BLENDED :]
@@ -106,7 +112,8 @@ def test_a_long_clip_is_played_in_pieces_from_both_feet_to_both_feet(clip):
     for at in (c.ROOT_X, c.ANKLE, c.ANKLE + 6):
         again[:, at : at + 2] += step[:, None] * (clip.controls[-1, :2] - clip.controls[0, :2])
     long = dataclasses.replace(clip, controls=again, contacts=np.concatenate([clip.contacts] * 20))
-    pieces = stocked([long], clip.size[None])
+    hall = dataclasses.replace(generator.OPEN_FLOOR, walkable_x_m=(-99.0, 99.0))
+    pieces = stocked([long], clip.size[None], stage(floorplan(hall), generator.MotionConfig()))
     assert len(pieces.count) > 2
     assert (pieces.count / pieces.fps <= LONGEST_S + 1 / FPS).all()
     first = pieces.frames[pieces.row]
@@ -120,41 +127,22 @@ def test_a_clip_that_is_never_on_both_feet_is_refused(clip):
         clip, controls=controls, contacts=np.zeros_like(clip.contacts), source="hops"
     )
     with pytest.raises(ConfigError, match="hops: both feet are within 5 cm of the floor at 0 fra"):
-        stocked([hopping], clip.size[None])
+        started(1, config=generator.MotionConfig(motions=(hopping,)))
 
 
-@pytest.fixture(scope="module")
-def strides():
-    """Ten walks of 2 to 4 s, of people of several sizes and gaits, none of whom ever stands."""
-    clips = []
-    for seed in range(10):
-        rng = np.random.default_rng(seed)
-        speed = rng.uniform(0.8, 1.6)
-        gait = Gait(
-            (speed - 0.1, speed, speed + 0.1), rng.uniform(0.6, 0.8), rng.uniform(0.35, 0.5),
-            rng.uniform(0.45, 0.7), rng.uniform(0.2, 0.6),
-        )  # fmt: skip
-        joints = walk((4.0, 4.0), [seed], int(rng.uniform(2.0, 4.0) * 25), gait)[:, 0]
-        capture = Capture(joints * rng.uniform(0.92, 1.08), 25.0, True, JOINTS, f"walk {seed}")
-        clips.append(retarget(capture, BODY)[0])
-    return clips
-
-
-def test_ordinary_walks_are_played_though_nobody_stands_in_them(strides):
-    for clip in strides:
-        assert not clip.contacts.all(1).any()
-        pieces = stocked([clip], clip.size[None])
-        assert pieces.count.max() > 0.6 * len(clip.controls)
-    config = generator.MotionConfig(motions=tuple(strides), motions_probability=1.0)
-    state, rngs = started(4, seed=3, config=config)
-    motions, doing = [], []
-    for _ in range(int(40 * FPS)):
-        motions.append(generator.advance(state, rngs, 1 / FPS, 1)[1])
-        doing.append(generator.activity(state)[:, 0])
-    assert (np.stack(doing) == st.CLIP).mean() > 0.2
-    position = joined(motions).position_world
-    speed = np.linalg.norm(np.diff(position, axis=1), axis=-1) * FPS
-    assert speed.max() < 12.0
+def test_who_arrives_early_does_not_stay_in_the_way_of_a_clip(clip):
+    config = generator.MotionConfig(motions=(clip,))
+    state, _ = started(1, n_workers=2, config=config)
+    player, walker = state.workers[0]
+    begin(player, st.CLIP, 20.0)
+    player["clip_s"] = 20.0 - 2.0 * SETTLE_S
+    player["roots"] = np.column_stack([np.linspace(0.0, 10.0, N_ROOTS), np.zeros(N_ROOTS)])
+    for end_y_m, early in ((-0.2, True), (-2.0, False)):
+        settle_at(8.0, -4.0, 0.0, walker)
+        lay_path((8.0, -4.0), np.zeros((0, 3)), (8.0, end_y_m), walker)
+        begin(walker, st.WALK, plan_walk(0.0, 1.2, walker))
+        assert walker["duration_s"] < 8.0  # the player comes by after 16 s
+        assert (meets(1, state.workers[0])[0] > 0.0) == early
 
 
 def test_motions_come_as_paths_or_clips(clip, tmp_path):

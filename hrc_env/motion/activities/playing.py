@@ -1,21 +1,18 @@
 """Playing a clip: two steps into its first pose, the recording, two steps out of its last.
 
-Frames hold `clip.RECORDED`. Long clips are cut into pieces, fitted to every body there is.
+Frames hold `clip.RECORDED`, of pieces (`pieces.Clips`).
 """
 
-import itertools
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Floats, Ints
+from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
+from hrc_env.motion.activities.pieces import Clips
 from hrc_env.motion.anatomy import ANKLE_Z
-from hrc_env.motion.clip import RECORDED, Clip, fitted_to, footprints, placed_at_origin
+from hrc_env.motion.clip import footprints
 from hrc_env.motion.curves import min_jerk, placed, ramp
 from hrc_env.motion.feet import foot, raise_heel
 from hrc_env.motion.posture import STANCE_HALF_WIDTH_M, stand
@@ -30,89 +27,8 @@ SETTLE_S = STEP_AT_S + PERIOD_S + SWING_S + 0.1 + TILT_S
 """Steps and pitch together [s]."""
 END, BEGIN, LAST = 0, 2, 4
 """First of the two footprints where the activity ends, where the clip begins, where it ends."""
-LONGEST_S, SHORTEST_S = 20.0, 0.5
-"""Longer clips are played in pieces; no piece is shorter [s]."""
-LOW_M = 0.05
-"""A foot that is no higher counts as on the floor where no two feet rest: in a walk the one behind
-rolls off as the other comes down [m]."""
-TURNS_RAD = (0.0, 0.6, -0.6, 1.2, -1.2)
-"""Headings, from the worker's own, that are tried for a clip: two steps turn no further."""
 STRIDE_SHARE = 0.25
 """Share of a full stride that the steps into a clip and out of it are."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Clips:
-    """Pieces of clips, each from one moment on both feet to another, one after the other."""
-
-    frames: Floats
-    """(bodies x N, 32) of all pieces, body after body; each begins at the origin, towards +x."""
-    row: Ints
-    """(n,) first row of each piece, of the first body."""
-    count: Ints
-    """(n,) its rows."""
-    fps: Floats
-    """(n,)."""
-
-    @property
-    def n_rows(self) -> int:
-        """N."""
-        return int(self.count.sum())
-
-
-def stocked(clips: Sequence[Clip], size: Floats) -> Clips:
-    """The pieces of clips, for workers of these measures (`Anatomy.size` of each body)."""
-    cuts = [(clip, cut) for clip in clips for cut in _cuts(clip)]
-    count = np.array([last - first + 1 for _, (first, last) in cuts], np.int64)
-    row = np.cumsum(count) - count
-    frames = [np.zeros((0, len(RECORDED)))]
-    for of_body in size:
-        fitted = {id(clip): fitted_to(clip, of_body) for clip in clips}
-        for clip, (first, last) in cuts:
-            piece = fitted[id(clip)][first : last + 1]
-            frames.append(placed_at_origin(piece)[:, RECORDED])
-    rates = np.array([clip.fps for clip, _ in cuts])
-    return Clips(np.ascontiguousarray(np.concatenate(frames)), row, count, rates)
-
-
-def _cuts(clip: Clip) -> list[tuple[int, int]]:
-    """First and last frame of each piece: both feet stand there, flat as far as they do, or are as
-    low as in the stride of a walk, of which a recording need not hold more."""
-    tilt = np.abs(clip.controls[:, [c.ANKLE + 4, c.ANKLE + 10]]).sum(1)
-    fewest, most = SHORTEST_S * clip.fps, LONGEST_S * clip.fps
-    low = _lifted(clip).max(1) < LOW_M
-    for near in (clip.contacts.all(1), low):
-        stands = np.flatnonzero(near)
-        if len(stands) >= 2 and stands[-1] - stands[0] >= fewest:
-            break
-    else:
-        raise ConfigError(
-            f"{clip.source}: both feet are within {100 * LOW_M:g} cm of the floor at {len(stands)} "
-            f"frames within {SHORTEST_S} s only; a clip is played from one such moment to another. "
-            "Record them, too, at the beginning and the end."
-        )
-    cuts = [int(stands[np.argmin(tilt[stands] + (stands > stands[0] + fewest))])]
-    while stands[-1] - cuts[-1] >= fewest:
-        inside = stands[(stands >= cuts[-1] + fewest) & (stands <= cuts[-1] + most)]
-        if not len(inside):
-            inside = stands[stands >= cuts[-1] + fewest][:1]
-        late = inside[inside >= inside[-1] - fewest]
-        cuts.append(int(late[np.argmin(tilt[late])]))
-        if stands[-1] - inside[-1] < 1:
-            break
-    return list(itertools.pairwise(cuts))
-
-
-def _lifted(clip: Clip) -> Floats:
-    """(T, 2) how far a clip's feet are above the floor [m]."""
-    feet = [footprints(clip.controls[:, c.ANKLE + 6 * side :], clip.size) for side in range(2)]
-    return np.stack(feet, 1)[..., 2] - clip.size[ANKLE_Z]
-
-
-def following(clips: Clips, me: Worker) -> int:
-    """The piece after the one that was played; after the last comes the first."""
-    row = me["clip_row"] % clips.n_rows
-    return (int(np.searchsorted(clips.row, row)) + 1) % len(clips.row)
 
 
 def start_clip(piece: int, turn_rad: float, clips: Clips, me: Worker) -> float:
