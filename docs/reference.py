@@ -13,6 +13,7 @@ import numpy as np
 
 from benchmarks.recorded.clips import AGAIN, CLIPS, Recorded
 from benchmarks.recorded.sources import SOURCES
+from benchmarks.recorded.synthetic import STYLES
 from hrc_env import __main__, observations
 from hrc_env.cli.environment import EnvironmentArguments
 from hrc_env.core.checkout import module_of
@@ -248,6 +249,12 @@ def recordings() -> str:
         (f"`{clip.name}`", f"`{clip.source}`", clip.motion, _lasting(clip), clip.role)
         for clip in CLIPS
     ]
+    styles = [
+        (f"`{each.name}`", each.motion, each.body, f"{each.legs:g}", f"{each.arms:g}",
+         f"{each.trunk:g}", f"{each.stoop_rad:g}", f"{each.apart_rad:g}", f"{each.pace:g}",
+         each.role)
+        for each in STYLES
+    ]  # fmt: skip
     return "\n\n".join(
         (
             "# Recordings of people",
@@ -260,6 +267,10 @@ def recordings() -> str:
             "recordings.",
             _table(("recordings", "package", "licence", "role", "people"), packages),
             _table(("clip", "of", "motion", "seconds", "role"), clips),
+            "Synthetic ones are motions of the repertoire by people of other proportions and "
+            "styles, written as BVH and Acclaim files and imported:",
+            _table(("clip", "motion", "body", "legs", "arms", "trunk", "stoop [rad]",
+                    "arms apart [rad]", "pace", "role"), styles),
         )
     ) + "\n"  # fmt: skip
 

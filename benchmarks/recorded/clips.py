@@ -16,6 +16,7 @@ import numpy as np
 from benchmarks.recorded.archives import fetch
 from benchmarks.recorded.foreign import READERS, joints_in
 from benchmarks.recorded.sources import SOURCES
+from benchmarks.recorded.synthetic import made_of
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.typing import Points3
 from hrc_env.geometry.rotations import about_axis
@@ -216,8 +217,8 @@ another), robots and animals. Who stands on a box is put on the floor."""
 
 
 def main() -> None:
-    """Fetch and import all clips; say how near the worker comes to the person."""
-    for recorded, clip, error in clips_of():
+    """Fetch or make, and import all clips; say how near the worker comes to the person."""
+    for recorded, clip, error in (*clips_of(), *made_of()):
         mean_cm, p95_cm = 100 * error.mean_m.mean(), 100 * error.p95_m.max()
         print(
             f"{recorded.name:22} {recorded.role:10} {len(clip.controls) / clip.fps:5.2f} s  "

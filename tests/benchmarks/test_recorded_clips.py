@@ -19,10 +19,13 @@ from benchmarks.recorded.archives import Archive, fetch
 from benchmarks.recorded.clips import CLIPS, Recorded, capture_of, clips_of, repeated
 from benchmarks.recorded.fetch import POSE2SIM
 from benchmarks.recorded.sources import SOURCES
+from benchmarks.recorded.synthetic import STYLES, Style, made_of, write
 from hrc_env.core.errors import ConfigError, DownloadError
 from hrc_env.core.records import WorkerMotion
 from hrc_env.core.skeleton import JOINT
 from hrc_env.geometry.rotations import about_axis
+from hrc_env.mocap.person import length, middle
+from hrc_env.mocap.read import read_capture
 from hrc_env.motion import generator
 from hrc_env.motion import state as st
 from hrc_env.room import played_s
@@ -233,3 +236,38 @@ def test_every_listed_clip_is_played(imported, k):
         if (generator.activity(state) == st.CLIP).any():
             return
     raise AssertionError(f"{CLIPS[k].name} was not played by any of 8 workers in a minute.")
+
+
+def test_synthetic_clips_are_imported_with_their_proportions_and_played():
+    made = list(made_of())
+    assert Counter(style.role for style, _, _ in made) == {"fitted": 8, "validated": 4}
+    fitted, validated = (
+        {style.motion for style in STYLES if style.role == role} for role in ("fitted", "validated")
+    )
+    assert fitted.isdisjoint(validated)
+    for _, clip, error in made:
+        assert played_s(clip)["lab"] > 1.5
+        assert error.mean_m.mean() < 0.06
+
+
+@pytest.mark.parametrize("number", range(3))
+def test_a_synthetic_person_stands_on_the_floor_with_legs_and_arms_of_their_own(tmp_path, number):
+    style = Style("tall", "walk 1.1 m/s", "fitted", "worker_1", legs=1.2, arms=0.8, stoop_rad=0.3)
+    usual = replace(style, legs=1.0, arms=1.0, stoop_rad=0.0)
+    tall, same = (
+        read_capture(write(each, tmp_path, number)).joints_world for each in (style, usual)
+    )
+    for first, second, share in (("hip", "knee", 1.2), ("shoulder", "elbow", 0.8)):
+        assert length(tall, first, second) == pytest.approx(
+            share * length(same, first, second), rel=1e-4
+        )
+    for joints in (tall, same):
+        assert 0.0 < np.percentile(joints[:, JOINT["left_foot"], 2], 20) < 0.06
+    lean = [np.mean(uprightness(joints)) for joints in (tall, same)]
+    assert lean[0] < lean[1] - 0.02
+
+
+def uprightness(joints):
+    """(T,) cosine of the trunk with the vertical."""
+    trunk = middle(joints, "shoulder") - middle(joints, "hip")
+    return trunk[:, 2] / np.linalg.norm(trunk, axis=-1)
