@@ -18,6 +18,7 @@ from hrc_env.motion import generator
 from hrc_env.motion import state as st
 from hrc_env.motion.clip import load_clip, placed_at_origin
 from hrc_env.room import played_s, told
+from hrc_env.scene.build import build
 from hrc_env.scene.places import SCENES
 from hrc_env.worker.body import load_body
 
@@ -25,10 +26,10 @@ PATIENCE_S = 60
 """Simulated time in which a worker who always plays if there is room has played [s]."""
 
 
-def imported(path, source_fps=None):
+def imported(path, source_fps=None, **options):
     """The clip that the command makes of a recording."""
     out = path.with_name("clip.npz")
-    assert ImportMotion(path, out, source_fps=source_fps).run() == 0
+    assert ImportMotion(path, out, source_fps=source_fps, **options).run() == 0
     return out
 
 
@@ -80,6 +81,23 @@ def test_nothing_jumps_while_walks_are_played():
     assert (np.stack(doing) == st.CLIP).mean() > 0.2
     position = joined(motions).position_world
     assert np.linalg.norm(np.diff(position, axis=1), axis=-1).max() / 0.02 < 12.0
+
+
+def test_what_is_accepted_off_the_floor_is_played_from_the_floor_to_the_floor(tmp_path, work):
+    t = np.arange(len(work.joints)) / work.fps
+    joints = work.joints.copy()
+    joints[..., 2] += 0.5 * np.clip(np.minimum(t - 1.0, t[-1] - 1.0 - t) / 0.3, 0.0, 1.0)[:, None]
+    np.savez(tmp_path / "box.npz", joints=joints, fps=work.fps)
+    with pytest.raises(ConfigError, match="Feet rest at heights"):
+        imported(tmp_path / "box.npz")
+    clip = imported(tmp_path / "box.npz", allow_off_floor=True)
+    config = generator.MotionConfig(motions=(str(clip),))
+    pieces = generator.make_state(1, 1, load_body(), config, build(name="site").grounds).mind.clips
+    ankles = pieces.frames[:, [c.N_BLENDED + 2, c.N_BLENDED + 8]]
+    ends = np.concatenate([pieces.row, pieces.row + pieces.count - 1])
+    assert ankles[ends].max() < 0.2
+    assert ankles.min(1).max() > 0.4
+    assert plays(clip, "site")
 
 
 @pytest.mark.parametrize("n_frames", [14, 16, 20])
