@@ -260,7 +260,8 @@ SETTINGS = {
     "people_and_scenes.md": (
         "0.4 to 0.8 s, 1.55 to 1.92 m, 6.1 x 5.5 x 2.6 m, 20 x 20 m, 5 m, 2.5 x 4.0 m, "
         "11.6 x 12.3 m, 0.6 m, 120 Hz, 1.3 to 2.2 m, 0.25 s, 5 to 1000 Hz, 0.5 s, 20 s, "
-        "1 to 4 degrees, 8 cm, 0.7 s, 6 cm"
+        "1 to 4 degrees, 8 cm, 0.7 s, 6 cm, "
+        "2.5 to 3.5 m, 3 m, 2.4 m, 0.6 s, 0.9 s, 50 degrees, 15 to 40 s, 40 degrees"
     ),
     "perception_and_estimators.md": (
         "80 degrees, 118.2 degrees, 0.2 s, 0.02 rad, 0.05 m, 0.1 rad, 0.04 s, 8 px"

@@ -14,7 +14,7 @@ from benchmarks.gallery.still import CASTS, portrait, views
 from hrc_env.core.errors import check_names
 from hrc_env.core.typing import Image
 from hrc_env.experiments.study.cache import Progress
-from hrc_env.motion.repertoire import REPERTOIRE
+from hrc_env.motion.repertoire import SCENES
 from hrc_env.worker.body import load_body, worker_names
 
 VIEWS = 5
@@ -45,12 +45,12 @@ class GalleryConfig:
     """What is drawn."""
 
     bodies: tuple[str, ...] = worker_names()
-    motions: tuple[str, ...] = tuple(REPERTOIRE)
+    motions: tuple[str, ...] = tuple(SCENES)
     scenes: tuple[str, ...] = tuple(CASTS)
 
     def __post_init__(self) -> None:
         check_names("worker", self.bodies, worker_names())
-        check_names("motion", self.motions, REPERTOIRE)
+        check_names("motion", self.motions, SCENES)
         check_names("scene", self.scenes, CASTS)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from benchmarks.gallery.still import camera_at
 from hrc_env.core.batching import one
 from hrc_env.core.typing import Image
-from hrc_env.motion.repertoire import REPERTOIRE, alone, perform
+from hrc_env.motion.repertoire import SCENES, alone, perform
 from hrc_env.render import overlay
 from hrc_env.scene.build import build
 from hrc_env.scene.render import PictureRenderer
@@ -59,7 +59,7 @@ def strip(name: str, body_name: str, seed: int = 0) -> Image:
     scene = build(name="site", n_workers=1, bodies=body_name)
     stage = stage_of(name)
     me = alone(load_body(body_name), stage.xy_m, stage.yaw_rad)
-    films = perform(REPERTOIRE[name], me, np.random.default_rng(seed), DT_S)
+    films = perform(SCENES[name], me, np.random.default_rng(seed), DT_S)
     renderer = PictureRenderer(scene, *FRAME_PX)
     frames, turn = [], stage.yaw_rad + stage.aside_rad
     lengths = [len(film.time_s) for film in films]
@@ -83,7 +83,7 @@ def stage_of(name: str) -> Stage:
         return Stage(place.xy_m, place.yaw_rad, aside_rad, away_m)
     if name.startswith(("cart", "wheelbarrow", "board", "box")):
         return LADEN
-    return LONG if name.startswith(("walk", "stumble")) else OPEN
+    return LONG if name.startswith(("walk", "stumble", "run", "fall")) else OPEN
 
 
 def moments(lengths: Sequence[int]) -> list[tuple[int, int]]:

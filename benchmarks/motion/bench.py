@@ -12,7 +12,7 @@ from hrc_env.core.results import Metric, over
 from hrc_env.experiments.study.cache import PartCache
 from hrc_env.experiments.study.runner import Study, at_least_one
 from hrc_env.motion import state as st
-from hrc_env.motion.repertoire import REPERTOIRE, Film, alone, perform
+from hrc_env.motion.repertoire import SCENES, Film, alone, perform
 from hrc_env.worker.body import Body, load_body, worker_names
 
 DT_S = 0.01
@@ -42,9 +42,9 @@ QUICK = MotionBenchConfig(n_seeds=2, bodies=("worker_1",))
 def play(config: MotionBenchConfig, parts: PartCache) -> dict[str, Metric]:
     """Play and measure every scene."""
     metrics: dict[str, Metric] = {}
-    for scene in REPERTOIRE:
+    for scene in SCENES:
         metrics |= _measure(scene, config)
-        parts.progress(1 / len(REPERTOIRE), scene)
+        parts.progress(1 / len(SCENES), scene)
     return metrics
 
 
@@ -70,7 +70,7 @@ def _measure(scene: str, config: MotionBenchConfig) -> dict[str, Metric]:
 def _play(scene: str, seed: int, body: Body) -> Sequence[Film]:
     """A scene's films."""
     me = alone(body, right=seed % 2 == 0)
-    return perform(REPERTOIRE[scene], me, np.random.default_rng([17, seed]), DT_S)
+    return perform(SCENES[scene], me, np.random.default_rng([17, seed]), DT_S)
 
 
 def _unit(key: str) -> str:

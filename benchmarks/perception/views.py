@@ -7,11 +7,11 @@ from hrc_env.motion.generator import activity_names
 
 FAMILIES: dict[str, tuple[str, ...]] = {
     "stand": ("stand", "look round", "turn", "point"),
-    "walk": ("walk", "stumble", "step back", "lunge"),
+    "walk": ("walk", "run", "stumble", "step back", "lunge"),
     "carry": ("carry", "push", "hand over", "receive"),
     "work": ("reach", "hammer", "drill", "saw", "measure", "clip"),
     "raise": ("drill overhead", "climb"),
-    "fold": ("lift", "pick up", "set down", "squat", "kneel"),
+    "fold": ("lift", "pick up", "set down", "squat", "kneel", "fall"),
 }
 """Motion families and the activities in them; every activity is in one. A judgement: `fold` are
 those in which trunk or knees are bent far, where the network is weak."""

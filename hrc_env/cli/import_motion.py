@@ -66,9 +66,10 @@ class ImportMotion:
         if self.picture is not None:
             writable_file(self.picture, ".png", "--picture")
         from hrc_env import room
+        from hrc_env.config import HRCConfig
         from hrc_env.mocap.retarget import retarget
         from hrc_env.motion.clip import save_clip
-        from hrc_env.worker.body import load_body
+        from hrc_env.worker.body import ANY, load_body
 
         body, console = load_body(self.worker), Console()
         capture = self._read(self.fps)
@@ -79,7 +80,7 @@ class ImportMotion:
         with progress_bar(console, name) as say:
             clip, error = retarget(capture, body, lambda share: say(share, name))
         tell_error(console, capture, clip, error)
-        played = room.played_s(clip)
+        played = room.played_s(clip, HRCConfig(worker=ANY))
         save_clip(clip, self.out)
         ready = f"play it with motions=[{str(self.out)!r}]. " if any(played.values()) else ""
         console.print(f"In [bold]{self.out}[/]: {ready}{room.told(clip, played)}")

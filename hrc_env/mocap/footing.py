@@ -9,7 +9,7 @@ from hrc_env.mocap.person import runs, smoothed
 
 ANKLE_M = 0.06
 """An ankle is so much higher than the foot's tip on a foot that stands [m]; the baked bodies'."""
-RESTS_M_S, SMOOTH_S, LEAST_S = 0.15, 0.02, 0.1
+RESTS_M_S, SMOOTH_S, LEAST_S = 0.15, 0.05, 0.1
 """The lower foot rests while its height changes by less [m/s], smoothed over this time, for at
 least that [s]; recordings whose feet slide are not refused."""
 FLOOR_SHARE = 20.0

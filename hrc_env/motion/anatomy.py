@@ -19,6 +19,9 @@ ANKLE_X, BALL_X, BALL_Z, HEEL_X, UPPER_LENGTH = range(7, 12)
 N_SIZES = 12
 """Columns of `Anatomy.size`: shoulder and elbow to grip, hip to ankle and its bones, heights of
 ankle and standing pelvis, ankle from pelvis, ball and heel from ankle, upper arm [m]."""
+ROUND = ("pelvis", "abdomen", "torso", "chest", "left_shoulder", "right_shoulder")
+N_ROUND = 2 * len(ROUND)
+"""Capsules on which a trunk lies; their ends, shoulders' as if they hung on the chest."""
 
 GRIP_M, HEEL_M = 0.08, -0.045
 """Hands grip half a hand beyond the wrist; heels touch a quarter of a foot behind the ankle [m]."""
@@ -38,12 +41,19 @@ class Anatomy:
     """(22, 3, 3) of limb bones: rows bone, hinge x bone, hinge at rest (else zero)."""
     size: Floats
     """(12,) lengths [m], see the names above."""
+    round: Floats
+    """(12, 5) ends of the capsules ROUND: segment, place in its frame, radius [m]."""
 
 
 def anatomies(bodies: Body) -> Anatomy:
     """Measure N bodies, or one: arrays (N, ...), each row as `anatomy` of that body alone."""
     rests = bodies.rest_position.reshape(-1, N_SEGMENTS, 3)
-    each = [anatomy(replace(bodies, rest_position=rest)) for rest in rests]
+    ends = bodies.capsule_ends.reshape(len(rests), -1, 2, 3)
+    radii = bodies.capsule_radius_m.reshape(len(rests), -1)
+    each = [
+        anatomy(replace(bodies, rest_position=rest, capsule_ends=end, capsule_radius_m=radius))
+        for rest, end, radius in zip(rests, ends, radii, strict=True)
+    ]
     return Anatomy(*(np.stack([getattr(a, f.name) for a in each]) for f in fields(Anatomy)))
 
 
@@ -62,7 +72,19 @@ def anatomy(body: Body) -> Anatomy:
         straight = frame[first + FOREARM].copy()
         frame[first + FOREARM] = about_axis("x", outward * FOREARM_TWIST_RAD) @ straight
         frame[first + HAND] = about_axis("x", outward * HAND_TWIST_RAD) @ straight
-    return Anatomy(np.ascontiguousarray(offset), frame, _sizes(rest))
+    return Anatomy(np.ascontiguousarray(offset), frame, _sizes(rest), _round(body, rest))
+
+
+def _round(body: Body, rest: Floats) -> Floats:
+    """`Anatomy.round`."""
+    rows = []
+    for name in ROUND:
+        k = body.capsule_names.index(name)
+        segment = int(body.capsule_segment[k])
+        on = min(segment, CHEST)
+        for end in body.capsule_ends[k]:
+            rows.append((on, *(rest[segment] - rest[on] + end), body.capsule_radius_m[k]))
+    return np.array(rows)
 
 
 def _rest_frame(along: Floats, pole: Floats) -> Floats:

@@ -52,7 +52,8 @@ def begin_episode(state: MotionState, b: int, n_present: int, bodies: Ints, draw
     mind, workers = state.mind, state.workers[b]
     workers[...] = np.zeros((), st.WORKER)
     workers["present"] = np.arange(len(workers)) < n_present
-    bones, workers["body"], workers["size"] = mind.anatomy, bodies, mind.anatomy.size[bodies]
+    bones, workers["body"] = mind.anatomy, bodies
+    workers["size"], workers["round"] = bones.size[bodies], bones.round[bodies]
     workers["bones"], workers["frame"] = bones.offset[bodies], bones.frame[bodies]
     workers["acts_at"] = workers["robot_world"] = workers["duration_s"] = np.inf
     workers["spot"][:, :2] = np.inf

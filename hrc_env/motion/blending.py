@@ -5,9 +5,11 @@ from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion import state as st
 from hrc_env.motion.activities.climb import climb, look_round
+from hrc_env.motion.activities.falling import fall
 from hrc_env.motion.activities.going import push
 from hrc_env.motion.activities.loads import pick_up
 from hrc_env.motion.activities.playing import play
+from hrc_env.motion.activities.running import run
 from hrc_env.motion.activities.work import work
 from hrc_env.motion.curves import decay, wrap
 from hrc_env.motion.feet import feet, step_time
@@ -27,6 +29,7 @@ RATE_H_S = 1e-4
 def evaluate(t: float, clock_s: float, frames: Floats, me: Worker) -> None:
     """The control vector at time t of the activity: its closed form; `frames` are of the clips."""
     activity = me.activity
+    me.fallen = me.rolled = 0.0
     feet(step_time(t, me) - (me.taken_s if activity == st.PUSH else 0.0), me)
     if activity in st.GOING:
         walk(t, clock_s, me)
@@ -34,6 +37,10 @@ def evaluate(t: float, clock_s: float, frames: Floats, me: Worker) -> None:
         push(t, clock_s, me)
     elif activity == st.CLIP:
         play(t, clock_s, frames, me)
+    elif activity == st.RUN:
+        run(t, clock_s, me)
+    elif activity == st.FALL:
+        fall(t, clock_s, me)
     else:
         stand(me.start_x, me.start_y, me.start_yaw, clock_s, me)
     if activity == st.REACH:
@@ -63,6 +70,8 @@ def stop(me: Worker) -> float:
     if me.activity in st.GIVING or me.activity == st.PUSH:
         me.load_prop = 0
     count = me.step_count if me.undo_at == 0.0 else 0
+    if me.activity == st.FALL:  # the feet on which they got up
+        count += 2
     for k in range(max(count - 2, 0), count):
         side = (k + me.step_first) % 2
         for i in range(5):
@@ -73,7 +82,7 @@ def stop(me: Worker) -> float:
     me.stance[1, 2] += unwound
     me.start_x, me.start_y = me.end_x, me.end_y
     me.start_yaw = me.end_yaw = yaw
-    me.step_count = me.step_first = me.undo_at = 0
+    me.step_count = me.step_first = me.undo_at = me.flight_s = 0
     me.step_start, me.step_period, me.step_swing = 0.0, 1.0, 0.5
     return unwound
 

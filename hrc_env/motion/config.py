@@ -43,6 +43,16 @@ class PeopleConfig:
     """Chance that a reach to the robot is a lunge: a step, and the hand there in half a second."""
     stumble_probability: float = 0.01
     """Chance that a walker's foot catches on something."""
+    fall_probability: float = 0.0
+    """Chance that a walker with empty hands stumbles and falls, where there is room ahead."""
+    lie_s: Range = (1.5, 5.0)
+    """How long they lie before they get up [s]; judgement."""
+    stay_down_probability: float = 0.15
+    """Chance that who has fallen lies for 15 to 40 s."""
+    run_probability: float = 0.0
+    """Chance that someone with empty hands runs to a place, where the way is long enough."""
+    run_m_s: Range = (2.5, 3.5)
+    """Speed of those who run [m/s]; a way of 2.4 m allows 2.5, one of 4.4 m allows 3.5."""
     careless_probability: float = 0.01
     """Chance that a worker takes a few steps back between two things to do, without looking."""
 
@@ -55,6 +65,8 @@ class PeopleConfig:
             raise ConfigError("pause_probability + step_back_probability must be at most 1.")
         if not 0.3 <= self.speed_m_s[0] <= self.speed_m_s[1] <= 2.0:
             raise ConfigError(f"speed_m_s must lie in [0.3, 2], got {self.speed_m_s}.")
+        if not 2.0 <= self.run_m_s[0] <= self.run_m_s[1] <= 4.0:
+            raise ConfigError(f"run_m_s must lie in [2, 4], got {self.run_m_s}.")
         if not self.tempo > 0.0:
             raise ConfigError(f"tempo must be positive, got {self.tempo}.")
 
@@ -82,8 +94,13 @@ PEOPLE: dict[str, PeopleConfig] = {
         detour_m=0.0, sudden_probability=0.08, lunge_probability=0.02,
         stumble_probability=0.01, careless_probability=0.04,
     ),
+    "headlong": PeopleConfig(
+        speed_m_s=(1.1, 1.6), tempo=0.4, stumble_probability=0.1, fall_probability=0.3,
+        run_probability=0.6,
+    ),
 }  # fmt: skip
-"""By name: who looks out for the robot, who has no time to, who does not know that it moves."""
+"""By name: who looks out for the robot, who has no time to, who does not know that it moves; who
+does look out, but runs and falls."""
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,8 @@ import numpy as np
 
 from hrc_env.core.records import WORKPLACE_KINDS
 from hrc_env.core.typing import Bools, Floats
+from hrc_env.motion import state as st
+from hrc_env.motion.activities.falling import fallen_root
 from hrc_env.motion.activities.pieces import Clips
 from hrc_env.motion.anatomy import Anatomy
 from hrc_env.motion.config import MotionConfig, Numbers
@@ -23,7 +25,7 @@ from hrc_env.motion.state import (
     Worker,
     Workers,
 )
-from hrc_env.motion.traffic import AHEAD_M, APART_M, HANDS_M
+from hrc_env.motion.traffic import AHEAD_M, APART_M, FALL_M, HANDS_M
 
 NEXT, BOW, LASTS, DELAY, REACTION, REACTION_S, EVENT, DWELL = range(N_START, N_START + 8)
 """Which draw decides what; the first N_START are the activity's own."""
@@ -117,6 +119,8 @@ def in_the_way(who: Decision) -> Floats:
     for x, y, yaw in zip(*ends, strict=True):
         rows.append((x, y, APART_M))
         rows.append((x + AHEAD_M * math.cos(yaw), y + AHEAD_M * math.sin(yaw), HANDS_M))
+    for other in who.workers[who.others() & (who.workers["activity"] == st.FALL)]:
+        rows.append((*fallen_root(float(other["time_s"]), other), FALL_M[1]))
     robot = who.me["robot_world"]
     if people.detour_m > 0.0 and np.isfinite(robot[0, 0]):
         rows += [(x, y, people.detour_m) for x, y, _ in robot.tolist()]

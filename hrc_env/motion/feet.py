@@ -20,6 +20,9 @@ FLAT_S, ROLL_SHARE = 0.10, 0.62
 RAMP_SHARE, LIFT_BASE_M, LIFT_STRIDE_M = 0.29, 0.025, 0.045
 """Share of a swing in which the foot gathers (and again loses) speed; its rise above its roll: of
 any step, and more with the stride [m]."""
+RUN_RAMP_SHARE, KICK_M, KICK_PITCH = 0.36, 0.20, 1.3
+"""The same of runners; how far their heels come up behind; their push-off beside a walker's;
+judgement."""
 
 
 @kernel
@@ -57,24 +60,31 @@ def foot(t: float, side: int, prints: Floats, stance: Floats, me: Worker) -> Non
         k = min(k - (k - first) % 2, count - 1 - (count - 1 - first) % 2)
         coming = max(k + 2, first)
         if coming < count:
-            lift = start + coming * period
-            heel_up, toes_up = _roll(t, lift, lift + swing, period, prints[coming, 3])
+            lift, stride = start + coming * period, prints[coming, 3]
+            land = lift + swing + me.flight_s * stride
+            heel_up, toes_up = _roll(t, lift, land, period, stride)
         if k >= first:
             lift = start + k * period
-            w = (t - lift) / swing
+            aloft = swing + me.flight_s * prints[k, 3]
+            w = (t - lift) / aloft
             if k >= 2 + first:
                 x, y, yaw = prints[k - 2, 0], prints[k - 2, 1], prints[k - 2, 2]
                 ground = prints[k - 2, 4]
-            share, stride = cruise(w, RAMP_SHARE), prints[k, 3]
+            gathers = RUN_RAMP_SHARE if me.flight_s > 0.0 else RAMP_SHARE
+            share, stride = cruise(w, gathers), prints[k, 3]
             x, y = x + share * (prints[k, 0] - x), y + share * (prints[k, 1] - y)
             yaw += min_jerk(w) * (prints[k, 2] - yaw)
-            heel, toes = _roll(t, lift, lift + swing, period, stride)
+            heel, toes = _roll(t, lift, lift + aloft, period, stride)
             heel_up, toes_up = heel_up + heel, toes_up + toes
             step_up = prints[k, 4] - ground
             if step_up != 0.0:  # up early, before the foot comes over the tread; down late
                 ground += step_up * min_jerk((w if step_up > 0.0 else w - 0.4) / 0.6)
             rise = (LIFT_BASE_M + LIFT_STRIDE_M * stride) * hump(w)
             flown = min_jerk(2.0 * w) if w < 1.0 else 0.0
+            if me.flight_s > 0.0 and w < 1.0:
+                rise += KICK_M * stride * hump(w * (1.7 - 0.7 * w))
+    if me.flight_s > 0.0:
+        heel_up *= KICK_PITCH
     at = c.ANKLE + 6 * side
     ahead, above = about(heel_up, me.size[BALL_X], me.size[BALL_Z])
     behind, below = about(toes_up, me.size[HEEL_X], -me.size[ANKLE_Z])

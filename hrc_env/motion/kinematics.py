@@ -16,6 +16,13 @@ SHOULDER_RAD = 0.22
 LEG_LIMIT, LEG_SOFTNESS_M = 0.998, 0.05
 """Share of its length that a leg uses at most (knees never lock), and the width over which that
 takes over from the wished height of the pelvis."""
+REST_SOFTNESS_M = 0.06
+"""Nearer than this to the floor a trunk's fall is slowed down, so that it does not stop at once."""
+TRAILING_SHARE, TRAILING_BENT, HEEL_OFF_M = 0.12, 0.06, 0.1
+"""A runner's trailing foot does not hold the pelvis back, though the leg be too short by the first
+share, but comes along once its heel is so far up [m]: from the last of the leg's length on."""
+LOWER_KNEE_RAD = 0.5
+"""How far on a side who lies there has both knees to the same one; judgement."""
 TARGET, POLE, HINGE, GRIP = range(22, 26)
 TURN = 22
 """Rows after the 22 segments that the kinematics work in: points and vectors, a rotation."""
@@ -112,13 +119,19 @@ def trunk(me: Worker) -> None:
     q, p = me.q, me.p
     yaw = q[c.HEADING] + q[c.PELVIS_YAW]
     yaw_pitch_roll(yaw, q[c.PELVIS_PITCH], q[c.PELVIS_ROLL], 0, me)
+    if me.rolled != 0.0:
+        yaw_pitch_roll(me.rolled, 0.0, 0.0, TURN, me)
+        product(0, TURN, 0, me)
     p[0, 0], p[0, 1], p[0, 2] = q[c.ROOT_X], q[c.ROOT_Y], q[c.PELVIS_Z]
     longest = LEG_LIMIT * me.size[an.LEG]
     for side in range(2):
         thigh, ankle = an.LEFT + side * an.SIDE_STRIDE + an.THIGH, c.ANKLE + 6 * side
         attach(thigh, 0, me)
         dx, dy = q[ankle] - p[thigh, 0], q[ankle + 1] - p[thigh, 1]
-        rise = math.sqrt(max(longest * longest - dx * dx - dy * dy, 0.01))
+        may = longest
+        if me.flight_s > 0.0:
+            may *= 1.0 + TRAILING_SHARE * _heel_off(side, me)
+        rise = math.sqrt(max(may * may - dx * dx - dy * dy, 0.01))
         highest = q[ankle + 2] + rise - (p[thigh, 2] - p[0, 2])
         p[0, 2] = soft_min(p[0, 2], highest, LEG_SOFTNESS_M)
     share = 1.0 / 3.0
@@ -132,6 +145,40 @@ def trunk(me: Worker) -> None:
     for s in range(an.CHEST + 1, an.HEAD + 1):
         attach(s, s - 1, me)
         product(s - 1, TURN, s, me)
+    if me.fallen > 0.0:
+        _rest_on_floor(me)
+
+
+@kernel
+def _rest_on_floor(me: Worker) -> None:
+    """Raise a trunk, head included, out of the floor."""
+    p, r = me.p, me.r
+    low = math.inf
+    for k in range(an.N_ROUND):
+        end, s = me.round[k], int(me.round[k, 0])
+        above = p[s, 2] - end[4]
+        for i in range(3):
+            above += r[s, 2, i] * end[1 + i]
+        low = min(low, above)
+    up = -soft_min(-low, 0.0, REST_SOFTNESS_M) - low
+    for s in range(an.HEAD + 1):
+        p[s, 2] += up
+
+
+@kernel
+def _level_pole(side: int, s: int, ahead: float, out: float, me: Worker) -> None:
+    """Turn the pole to what it is of who has fallen, by that share: `ahead` of segment s, or, by a
+    share `out`, level and outwards, elbows also to the feet; the lower knee of who lies on a side
+    to where they face."""
+    p, r = me.p, me.r
+    left = 1.0 - 2.0 * side
+    if ahead > 0.0 and left * me.lie_roll < -LOWER_KNEE_RAD:
+        left = -left
+    cos, sin = math.cos(me.q[c.HEADING]), math.sin(me.q[c.HEADING])
+    back = 0.8 if ahead < 0.0 else 0.0
+    for i, level in enumerate((-left * sin - back * cos, left * cos - back * sin, 0.0)):
+        pole = (1.0 - out) * ahead * r[s, i, 0] + out * level
+        p[POLE, i] += me.fallen * (pole - p[POLE, i])
 
 
 @kernel
@@ -159,7 +206,7 @@ def shoulder(side: int, cos: float, sin: float, me: Worker) -> None:
     forward, up = min(max(ahead - 0.3, 0.0) / 0.7, 1.0), min(max(above + 0.5, 0.0), 1.0)
     if forward > 0.0 or up > 0.0:
         forward, up = forward * forward * (3.0 - 2.0 * forward), up * up * (3.0 - 2.0 * up)
-        give = sign * SHOULDER_RAD
+        give = sign * SHOULDER_RAD * (1.0 - me.fallen)
         yaw_pitch_roll(-give * forward, 0.0, give * up, TURN, me)
         product(an.CHEST, TURN, clavicle, me)
         attach(upper, clavicle, me)
@@ -179,11 +226,19 @@ def arm(side: int, cos: float, sin: float, me: Worker) -> None:
     p[POLE, 0], p[POLE, 1] = cos * back - sin * left, sin * back + cos * left
     above = (p[TARGET, 2] - p[upper, 2]) / me.size[an.ARM]
     p[POLE, 2] = -0.9 * level * (0.15 + 0.85 * min_jerk(1.2 * (above + 1.0)))
+    if me.fallen > 0.0:
+        _level_pole(side, an.CHEST, -1.0, me.elbows_out, me)
     bend(upper, GRIP, me.size[an.UPPER_LENGTH], me.size[an.FOREARM_GRIP], ARM_KNEE, ARM_LIMIT, me)
     aim(upper, fore, me.size[an.UPPER_LENGTH], me)
     aim(fore, GRIP, me.size[an.FOREARM_GRIP], me)
     attach(hand, fore, me)
     aim(hand, GRIP, an.GRIP_M, me)
+
+
+@kernel
+def _heel_off(side: int, me: Worker) -> float:
+    """How far a runner's heel has left the floor, as a share."""
+    return min_jerk((me.q[c.ANKLE + 6 * side + 2] - me.size[an.ANKLE_Z]) / HEEL_OFF_M - 0.5)
 
 
 @kernel
@@ -198,9 +253,14 @@ def leg(side: int, me: Worker) -> None:
     pitched(cos, sin, q[ankle + 5], toes, me)
     p[POLE, 0], p[POLE, 1] = 0.75 * cos + 0.25 * r[0, 0, 0], 0.75 * sin + 0.25 * r[0, 1, 0]
     p[POLE, 2] = 0.12
+    if me.fallen > 0.0:
+        _level_pole(side, 0, 1.0, me.knees_out, me)
     for i in range(3):
         p[TARGET, i] = q[ankle + i]
-    bend(thigh, foot, me.size[an.THIGH_LENGTH], me.size[an.SHANK_LENGTH], 1.0, 1.001, me)
+    straight = 1.0
+    if me.flight_s > 0.0:
+        straight -= TRAILING_BENT * _heel_off(side, me)
+    bend(thigh, foot, me.size[an.THIGH_LENGTH], me.size[an.SHANK_LENGTH], straight, 1.001, me)
     aim(thigh, shank, me.size[an.THIGH_LENGTH], me)
     aim(shank, foot, me.size[an.SHANK_LENGTH], me)
     attach(toes, foot, me)

@@ -73,7 +73,7 @@ def _react(w: int, workers: Workers) -> None:
     kind = me.activity
     upright = kind == st.REACH or kind in st.IDLE or st.HAMMER <= kind <= st.POINT
     if goes(kind):
-        if kind in (st.WALK, st.CARRY) and _brake(w, workers):
+        if kind in (st.WALK, st.CARRY, st.RUN) and _brake(w, workers):
             me.doing = st.PAUSE
             me.doing_until = me.clock_s + me.duration_s - me.time_s + me.reaction_s
     elif me.reaction == st.BACK_AWAY and upright:
@@ -82,7 +82,7 @@ def _react(w: int, workers: Workers) -> None:
             me.duration_s = me.time_s
         else:
             me.pace_wished = WITHDRAW
-    else:
+    elif kind != st.FALL:
         me.doing, me.doing_until, me.pace_wished = st.PAUSE, me.clock_s + me.reaction_s, 0.0
 
 

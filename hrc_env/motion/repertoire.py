@@ -8,8 +8,10 @@ import numpy as np
 from hrc_env.core.records import WorkerMotion
 from hrc_env.core.typing import Floats
 from hrc_env.motion import state as st
+from hrc_env.motion.activities.falling import plan_fall
 from hrc_env.motion.activities.going import CART, WHEELBARROW, start_turn
 from hrc_env.motion.activities.loads import BOARD, BOX, finish_lift, plan_pick_up
+from hrc_env.motion.activities.running import plan_run
 from hrc_env.motion.anatomy import anatomy
 from hrc_env.motion.blending import settle, stop
 from hrc_env.motion.curves import placed
@@ -24,6 +26,8 @@ Act = tuple[int, Start, float]
 """An activity, what begins it, the height of its place [m]."""
 AWAY_M, FAR_M = 3.0, 8.0
 """Length of a way, and of the walks that are measured [m]."""
+OPEN = np.full((401, 401), 9.0), np.full(2, -10.0)
+"""A floor without anything: 10 m to each side."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +52,7 @@ def alone(
     bones, me = anatomy(body), np.zeros(1, WORKER)[0]
     me["present"], me["pace"] = True, 1.0
     me["bones"], me["frame"], me["size"] = bones.offset, bones.frame, bones.size
+    me["round"] = bones.round
     me["speed_m_s"], me["squat_share"], me["right_handed"] = 1.2, 0.7, 0.9 if right else 0.1
     settle(*xy_m, yaw_rad, me)
     feet(0.0, me)
@@ -82,6 +87,11 @@ def _going(activity: int, speed_m_s: float = 1.1, prop: int = 0, way_m: float = 
     def start(draws: Floats, height_m: float, me: Worker) -> float:
         x, y, yaw = (float(me[name]) for name in ("start_x", "start_y", "start_yaw"))
         lay_path((x, y), np.zeros((0, 3)), placed(x, y, yaw, way_m, 0.0), me)
+        if activity == st.RUN:
+            return plan_run(yaw, speed_m_s, me)
+        if activity == st.FALL:
+            lie_s = 2.0 + 2.0 * float(draws[4])
+            return plan_fall(draws, yaw, speed_m_s, lie_s, *OPEN, me)
         return start_going(activity, draws, yaw, speed_m_s, prop, me)
 
     return activity, start, 0.0
@@ -148,3 +158,10 @@ REPERTOIRE: dict[str, tuple[Act, ...]] = {
     "climb": _here(st.CLIMB, 0.22),
 }  # fmt: skip
 """Scenes by name."""
+HASTY: dict[str, tuple[Act, ...]] = {
+    **{f"run {v} m/s": (_going(st.RUN, v, way_m=FAR_M),) for v in (2.5, 3.0, 3.5)},
+    "fall": (_going(st.FALL, 1.2),),
+}
+"""The same of what only those do who run and fall; no emulator is fitted to them."""
+SCENES = {**REPERTOIRE, **HASTY}
+"""Both."""

@@ -6,11 +6,13 @@ from dataclasses import dataclass, replace
 
 from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.core.records import WORKPLACE_KINDS
-from hrc_env.motion.state import ACTIVITY_NAMES
+from hrc_env.motion.state import ACTIVITY_NAMES, WAYS
 from hrc_env.worker.props import PROP_NAMES
 
 HERE, ROUTES = "here", ("walk", "push")
 """As a kind of place: wherever the worker is; how workers go to a job."""
+DONE_THERE = tuple(name for k, name in enumerate(ACTIVITY_NAMES) if k not in WAYS)
+"""What jobs can be."""
 HIGHEST_M = 2.2
 """Hands work no higher [m]."""
 
@@ -21,7 +23,7 @@ class Job:
 
     name: str
     activity: str
-    """One of `state.ACTIVITY_NAMES`."""
+    """One of `DONE_THERE`."""
     at: str
     """Kind of workplace (`WORKPLACE_KINDS`), or "here"."""
     then: tuple[tuple[str, float], ...] = ()
@@ -106,7 +108,7 @@ def check_jobs(jobs: Sequence[Job]) -> None:
         raise ConfigError("Some job must be at the robot: at='robot'.")
     for job in jobs:
         for what, got, valid in (
-            ("activity of", job.activity, ACTIVITY_NAMES),
+            ("activity of", job.activity, DONE_THERE),
             ("kind of place of", job.at, (*WORKPLACE_KINDS, HERE)),
             ("prop of", job.prop, PROP_NAMES),
             ("way to", job.by, ROUTES),

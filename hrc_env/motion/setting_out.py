@@ -8,8 +8,10 @@ import numpy as np
 from hrc_env.core.records import WORKPLACE_KINDS
 from hrc_env.core.typing import Floats
 from hrc_env.motion import state as st
+from hrc_env.motion.activities.falling import plan_fall
 from hrc_env.motion.activities.pieces import TURNS_RAD, following, piece_of
 from hrc_env.motion.activities.playing import start_clip
+from hrc_env.motion.activities.running import fastest, plan_run
 from hrc_env.motion.decision import BOW, DWELL, EVENT, Decision, free_stages, in_the_way, wished
 from hrc_env.motion.floorplan import slack_at
 from hrc_env.motion.routes import route
@@ -21,8 +23,12 @@ from hrc_env.worker.props import PROP_NAMES
 
 WISHED_CLIP, WHICH_CLIP = N_START - 2, N_START - 1
 """Of an activity's own draws: whether to play a clip instead of it, and which."""
+FALLS, RUNS, HOW_FAST, HOW_LONG, STAYS_DOWN = range(8, 13)
+"""Of a walk's own draws: whether they fall or run on it, how fast, how long they lie."""
 ARRIVED_M, HURRY = 0.12, (1.0, 0.75)
 """So near to a place a worker is there [m]; shares of their pace at which walkers set out."""
+STAY_DOWN_S = (15.0, 40.0)
+"""How long those lie who do not get up soon [s]; judgement."""
 STUMBLE_TO = ("robot", "open", "floor")
 """Kinds of places with room ahead for the arms of who stumbles."""
 Begun = tuple[int, float] | None
@@ -66,21 +72,40 @@ def _go_to(who: Decision, places: Iterable[Place], at: int) -> Begun:
 
 def _set_out(who: Decision, place: Place, obstacles: Floats, share: float, to_work: bool) -> Begun:
     """Plan to go to a place round obstacles (n, 3) at a share of one's pace, if there is a way."""
-    mind, me = who.mind, who.me
+    mind, job, me = who.mind, who.job, who.me
     start, end = (float(me["start_x"]), float(me["start_y"])), (place[0], place[1])
     bow = 2.0 * who.draws.item(BOW) - 1.0
     if not route(start, end, bow, obstacles, mind.plan.slack, mind.plan.origin, me):
         return None
+    pace = share * float(me["speed_m_s"])
+    free = not who.loaded and job.by == "walk"
+    if free and (hastened := _fall_or_run(who, place[2], pace)):
+        return hastened
     activity, prop = st.WALK, 0
     stumbles = who.draws[EVENT] > 1.0 - mind.config.people.stumble_probability
     if who.loaded:
         activity = st.CARRY
-    elif to_work and who.job.by == "push":
-        activity, prop = st.PUSH, PROP_NAMES.index(who.job.prop)
-    elif who.job.at in STUMBLE_TO and stumbles:
+    elif to_work and job.by == "push":
+        activity, prop = st.PUSH, PROP_NAMES.index(job.prop)
+    elif job.at in STUMBLE_TO and stumbles:
         activity = st.STUMBLE
-    pace = share * float(me["speed_m_s"])
     return activity, start_going(activity, who.draws, place[2], pace, prop, me)
+
+
+def _fall_or_run(who: Decision, yaw_rad: float, pace_m_s: float) -> Begun:
+    """Begin to fall on the way or to run it, if it is to be and there is room."""
+    people, plan, me, draws = who.mind.config.people, who.mind.plan, who.me, who.draws
+    if draws[FALLS] < people.fall_probability:
+        stays = draws[STAYS_DOWN] < people.stay_down_probability
+        lie_s = who.draw(HOW_LONG, STAY_DOWN_S if stays else people.lie_s)
+        lasts = plan_fall(draws, yaw_rad, pace_m_s, lie_s, plan.slack, plan.origin, me)
+        if lasts > 0.0:
+            return st.FALL, lasts
+    if draws[RUNS] < people.run_probability:
+        speed_m_s = fastest(who.draw(HOW_FAST, people.run_m_s), me)
+        if speed_m_s >= people.run_m_s[0]:
+            return st.RUN, plan_run(yaw_rad, speed_m_s, me)
+    return None
 
 
 def step_back(who: Decision) -> Begun:
@@ -102,7 +127,8 @@ def stay(who: Decision) -> None:
     """Forget what was planned: end where the worker stands, with what they hold."""
     me = who.me
     me["end_x"], me["end_y"], me["end_yaw"] = me["start_x"], me["start_y"], me["start_yaw"]
-    me["step_count"], me["undo_at"], me["load_prop"] = 0, 0.0, who.load
+    me["step_count"], me["load_prop"] = 0, who.load
+    me["undo_at"] = me["flight_s"] = 0.0
 
 
 def arrived(who: Decision) -> bool:

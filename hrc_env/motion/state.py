@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from hrc_env.motion import controls as c
-from hrc_env.motion.anatomy import N_SIZES
+from hrc_env.motion.anatomy import N_ROUND, N_SIZES
 from hrc_env.worker.body import N_SEGMENTS
 
 MAX_VIA, MAX_STEPS, N_ROOTS = 8, 72, 48
@@ -25,12 +25,15 @@ _SCRATCH = [
     ("later_p", "f8", (N_POINTS, 3)), ("later_r", "f8", (N_FRAMES, 3, 3)),
     ("goals", "f8", (6,)),  # of the hands, while work is planned
     ("handover", "f8", (2, c.N_BLENDED)),  # q where an activity ended, and a little later
+    # Of who has fallen: share of what follows, the trunk's turn about its length, shares by which
+    # elbows and knees are turned outwards
+    ("fallen", "f8"), ("rolled", "f8"), ("elbows_out", "f8"), ("knees_out", "f8"),
 ]  # fmt: skip
 _EPISODE = [
     ("present", "?"),  # whether they are in this episode
-    ("body", "i8"),  # row of the bodies that there are; the next three are its `Anatomy`
+    ("body", "i8"),  # row of the bodies that there are; the next four are its `Anatomy`
     ("bones", "f8", (N_SEGMENTS, 3)), ("frame", "f8", (N_SEGMENTS, 3, 3)),
-    ("size", "f8", (N_SIZES,)),
+    ("size", "f8", (N_SIZES,)), ("round", "f8", (N_ROUND, 5)),
     ("speed_m_s", "f8"),  # at which they walk
     ("squat_share", "f8"),  # of squatting when lifting
     ("right_handed", "f8"),  # probability of using the right hand when either would do
@@ -75,6 +78,10 @@ _PLAN = [
     ("turn_out", "f8"), ("turn_out_s", "f8"), ("turn_out_at", "f8"),  # and out of it
     ("follow", "f8"),  # whether they face along the path (1) or side-step (0)
     ("trip_at", "f8"), ("trip", "f8"),  # a foot catches; how badly (0: never)
+    ("flight_s", "f8"),  # how much longer feet are in the air at the top speed of a run
+    ("fall_yaw", "f8"), ("fall_pace", "f8"),  # which way and how fast they fall at `trip_at`
+    ("lie_s", "f8"), ("lie_roll", "f8"), ("front", "i8"),  # lying; the foot that gets up first
+    ("fall_x", "f8"), ("fall_y", "f8"),  # where it is that they stumble: balls of both feet
     ("taken_s", "f8"), ("tipped", "f8"), ("stoop", "f8"),  # pushing: to the handle; barrow; trunk
     # Reaching, lifting, work in place
     ("lean", "f8"), ("twist", "f8"), ("squat", "f8"),  # of the trunk, see `posture.lean`
@@ -111,15 +118,18 @@ N_START = 16
 
 STAND, WALK, REACH, LIFT, TURN, CARRY, PUSH, STUMBLE, STEP_BACK, LOOK_ROUND = range(10)
 PICK_UP, SET_DOWN, HAND_OVER, RECEIVE, SQUATTING, KNEELING, HAMMER, DRILL = range(10, 18)
-OVERHEAD, SAW, MEASURE, POINT, LUNGE, CLIMB, CLIP = range(18, 25)
+OVERHEAD, SAW, MEASURE, POINT, LUNGE, CLIMB, CLIP, RUN, FALL = range(18, 27)
 ACTIVITY_NAMES = (
     "stand", "walk", "reach", "lift", "turn", "carry", "push", "stumble", "step back",
     "look round", "pick up", "set down", "hand over", "receive", "squat", "kneel", "hammer",
     "drill", "drill overhead", "saw", "measure", "point", "lunge", "climb", "clip",
+    "run", "fall",
 )  # fmt: skip
 GOING, IDLE = (WALK, TURN, CARRY, STUMBLE, STEP_BACK), (STAND, LOOK_ROUND)
 TAKING, GIVING = (PICK_UP, RECEIVE), (SET_DOWN, HAND_OVER)
 """Activities that share a closed form."""
+WAYS = (WALK, TURN, CARRY, PUSH, STUMBLE, CLIP, RUN, FALL)
+"""Activities that are no job to be done at a place."""
 NOWHERE, ON_STAGE = -1, -2
 """What is at a place that is none: nothing any more; room for a clip, which is played next."""
 THERE, UNDER_WAY, WAITING = range(3)

@@ -4,6 +4,7 @@ import math
 
 from hrc_env.core.kernels import kernel
 from hrc_env.motion import state as st
+from hrc_env.motion.activities.falling import fallen_root
 from hrc_env.motion.activities.playing import clip_root
 from hrc_env.motion.curves import placed
 from hrc_env.motion.paths import along
@@ -14,8 +15,9 @@ APART_M = 0.80
 """Roots keep so far from each other [m]: two half widths of people with arms, and some."""
 AHEAD_M, HANDS_M = 0.48, 0.76
 """Who works has hands and head so far ahead [m]; others' roots keep so far from there."""
-PUSHING_M, CLIP_M = (1.0, 0.95), (0.01, 1.15)
-"""The same of who pushes a cart, and of who plays a clip: an arm's length more to any side."""
+PUSHING_M, CLIP_M, FALL_M = (1.0, 0.95), (0.01, 1.15), (0.01, 1.3)
+"""The same of who pushes a cart, of who plays a clip: an arm's length more to any side, and of who
+falls: head and feet of who lies are so far from their pelvis, and half a body."""
 BEHIND_M, SHANK_M = 0.40, 0.66
 """Who kneels has a shank so far behind [m]; others' roots keep so far from there."""
 LOOK_S = 0.12
@@ -25,7 +27,7 @@ LOOK_S = 0.12
 @kernel
 def goes(activity: int) -> bool:
     """Whether it moves along a path."""
-    return activity in st.GOING or activity == st.PUSH
+    return activity in st.GOING or activity in (st.PUSH, st.RUN)
 
 
 @kernel
@@ -35,6 +37,8 @@ def ahead_of(activity: int) -> Pair:
         return PUSHING_M
     if activity == st.CLIP:
         return CLIP_M
+    if activity == st.FALL:
+        return FALL_M
     if activity in st.IDLE or goes(activity):
         return 0.0, 0.0
     return AHEAD_M, HANDS_M
@@ -47,6 +51,8 @@ def root_at(t: float, me: Worker) -> Pair:
         return along(travelled(t - me.taken_s, me), me)
     if me.activity == st.CLIP:
         return clip_root(t, me)
+    if me.activity == st.FALL:
+        return fallen_root(t, me)
     return me.start_x, me.start_y
 
 

@@ -31,6 +31,10 @@ LEG_M = 0.8685772217237624
 SWING_SHARE, SWING_FAST_SHARE, FASTEST_M_S, MID_STANCE = 0.80, 0.02, 1.8, 0.46
 """Time in the air in periods of a step, up to so much more from 1 m/s to FASTEST_M_S; when the
 root passes over a footprint, in periods after its landing."""
+EARLIER = 0.31
+"""Runners pass over a footprint so many periods earlier than walkers, for it is left earlier."""
+RUN_WIDER_M = 0.015
+"""Runners' heels pass the other shank higher up than walkers' [m]; judgement."""
 WALK_HALF_WIDTH_M = 0.04
 """Half the step width at full speed [m]; 5 to 9 cm measured."""
 SHIFT_S, TURN_S, TURN_RATE = 0.28, 0.5, 1.7
@@ -158,20 +162,27 @@ def plan_pace(pace: Triple, end_yaw: float, me: Worker) -> float:
     step [s], 0: that of people at this speed.
     """
     me.follow, wished, period = pace
-    me.undo_at = me.trip = me.taken_s = 0.0
-    me.ramp = 0.45 + 0.4 * wished
-    me.top_m_s = min(wished, me.length / me.ramp)
-    me.travel_s = me.length / me.top_m_s + me.ramp
-    _plan_turns(end_yaw, me)
+    me.flight_s = 0.0
+    plan_way(wished, 0.45 + 0.4 * wished, end_yaw, me)
     if period == 0.0:
         period = 60.0 / (CADENCE_PER_MIN * max(me.top_m_s, SLOWEST_M_S) ** CADENCE_POWER)
         period *= math.sqrt(me.size[LEG] / LEG_M)
     fast = min(max((me.top_m_s - 1.0) / (FASTEST_M_S - 1.0), 0.0), 1.0)
     me.step_period = period
     me.step_swing = (SWING_SHARE + SWING_FAST_SHARE * fast) * period
+    return plan_steps(0, me)
+
+
+@kernel
+def plan_way(wished_m_s: float, ramp_s: float, end_yaw: float, me: Worker) -> None:
+    """Plan how fast to go along the path that is laid, the turns at its ends, the first foot."""
+    me.undo_at = me.trip = me.taken_s = 0.0
+    me.ramp = ramp_s
+    me.top_m_s = min(wished_m_s, me.length / me.ramp)
+    me.travel_s = me.length / me.top_m_s + me.ramp
+    _plan_turns(end_yaw, me)
     me.step_start = SHIFT_S
     me.step_first = _first_foot(me)
-    return _plan_steps(0, me)
 
 
 @kernel
@@ -187,7 +198,7 @@ def brake(t: float, me: Worker) -> float:
     me.turn_out_at = me.depart + me.travel_s - 1.0
     me.end_x, me.end_y, me.end_yaw = root(me.depart + me.travel_s + 1.0, me)
     lifted = math.floor((t - me.step_start) / me.step_period) + 1
-    lasts = _plan_steps(max(int(lifted), 0), me)
+    lasts = plan_steps(max(int(lifted), 0), me)
     me.lasts = lasts + 2.0 * me.taken_s
     return me.lasts
 
@@ -210,7 +221,7 @@ def _plan_turns(end_yaw: float, me: Worker) -> None:
 
 
 @kernel
-def _plan_steps(first: int, me: Worker) -> float:
+def plan_steps(first: int, me: Worker) -> float:
     """Lay footprints from a step on where the root passes at mid-stance; when all is over [s]."""
     period, start = me.step_period, me.step_start
     done = max(me.depart + me.travel_s, me.turn_out_at + me.turn_out_s)
@@ -219,16 +230,20 @@ def _plan_steps(first: int, me: Worker) -> float:
     me.step_count = count
     for k in range(first, count):
         side = (k + me.step_first) % 2
-        when = over + k * period if k < count - 2 else done + 1.0
+        when, share = over + k * period if k < count - 2 else done + 1.0, 0.0
+        if me.flight_s > 0.0:
+            share = min(speed(start + k * period, me) / me.top_m_s, 1.0)
+            when += (me.flight_s - EARLIER * period) * share
         x, y, yaw = root(when, me)
         narrow = min(speed(when, me) / 0.8, 1.0) * me.follow
         half = STANCE_HALF_WIDTH_M + (WALK_HALF_WIDTH_M - STANCE_HALF_WIDTH_M) * narrow
+        half += RUN_WIDER_M * share
         footprint(side, x, y, yaw, half, me.prints[k], me)
         x, y = me.stance[side, 0], me.stance[side, 1]
         if k >= 2:
             x, y = me.prints[k - 2, 0], me.prints[k - 2, 1]
         stride = math.hypot(me.prints[k, 0] - x, me.prints[k, 1] - y)
-        me.prints[k, 3] = min(stride / NORMAL_M_S, 1.1)
+        me.prints[k, 3] = share if me.flight_s > 0.0 else min(stride / NORMAL_M_S, 1.1)
     return start + (count - 1) * period + me.step_swing + FLAT_S
 
 

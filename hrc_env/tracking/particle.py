@@ -82,7 +82,7 @@ class ParticleEstimator:
         mean, velocity = np.empty((2, *age_s.shape, 3))
         out = mean, np.empty((*age_s.shape, 3, 3)), velocity, age_s, tracked
         estimate_all(tuple(state), self.settings, out)
-        return self._of_unknown_size(state, PoseEstimate(*out))
+        return self._widened(state, PoseEstimate(*out))
 
     def forecast(self, state: Hypotheses, horizon_s: float) -> PoseEstimate:
         """What is expected in `horizon_s`, hypothesis by hypothesis; see `tracking.forecast`."""
@@ -92,14 +92,17 @@ class ParticleEstimator:
         each = PoseEstimate(*where, trees["age_s"], trees["tracked"])
         later = forecast(bounded(each, self.config), horizon_s, self.config)
         whole = mixed(later, state.trees["log_weight"], state.n_alive)
-        return self._of_unknown_size(state, whole)
+        return self._widened(state, whole)
 
-    def _of_unknown_size(self, state: Hypotheses, estimate: PoseEstimate) -> PoseEstimate:
-        """Widen, in place, what is said of workers whom one view has begun: they may be larger, and
-        farther from the camera that has them, by the same share."""
-        size_std = np.where(estimate.tracked, state.trees["size_std"][:, :, 0], 0.0)
-        if not size_std.any():
+    def _widened(self, state: Hypotheses, estimate: PoseEstimate) -> PoseEstimate:
+        """Widen, in place, what is said of workers whom one view has begun (they may be larger, and
+        farther from the camera that has them, by the same share), or two that hang askew."""
+        best = state.trees[:, :, 0]
+        size_std = np.where(estimate.tracked, best["size_std"], 0.0)
+        askew = estimate.tracked & best["pair"]["askew"]
+        if not (size_std.any() or askew.any()):
             return estimate
+        estimate.cov_world[askew] += best["displaced_m2"][askew][:, None]
         eyes = -np.linalg.solve(self.P[:, :, :3], self.P[:, :, 3:])[..., 0]
         eye = eyes[state.views["blind"][:, :, 0].argmin(-1)]
         grown = size_std[..., None, None] * (estimate.mean_world - eye[:, :, None])

@@ -155,7 +155,7 @@ def _one_way(estimator: ParticleEstimator, clip: Sequence[Keypoints], dt_s: floa
     trees = np.stack([each.trees for each in passed])
     return _Smoothed(
         mean=np.stack(means[::-1]).reshape(len(passed), -1, N_JOINTS, 6),
-        cov=np.stack(covs[::-1]),
+        cov=np.stack(covs[::-1]) + trees["displaced_m2"][:, :, None],
         doubt=np.trace(trees["cov"][..., :3, :3], axis1=-2, axis2=-1).mean(-1),
         age_s=trees["age_s"],
         tracked=trees["tracked"],

@@ -5,12 +5,44 @@ import pytest
 
 from benchmarks.tracking import fuzz, surprises
 
+CURED = (189, 208, 223, 241, 306, 335, 387, 460, 605, 775, 995, 1120, 1132)
+"""Cases of the first 100,000 sequences in which much was surely wrong, or not recovered: rigs of
+two cameras (387: of six) of which one hangs askew. `--first-case 605 --cases 1` draws one again."""
+KNOWN = {
+    118: {"surely_wrong": {33}},
+    917: {"surely_wrong": {33}, "not_recovered": {10}},
+    1146: {"not_recovered": {4, 25}},
+    1521: {"surely_wrong": {49}},
+}
+"""What is still wrong: for more than a second one camera alone, which hangs askew, shows somebody;
+or two of three cameras, one of them askew, are believed."""
+ON_THE_EDGE = (118,)
+"""Surely wrong for one frame more than counts."""
+
 
 def test_a_case_is_reproduced_and_nothing_is_wrong_with_it():
     rigs = [fuzz._rig(np.random.default_rng([3, 11])) for _ in range(2)]
     np.testing.assert_array_equal(rigs[0][1], rigs[1][1])
     assert np.abs(rigs[0][0].P - rigs[0][1]).max() > 0  # cameras hang a little otherwise
     assert list(fuzz._judged(3)) == []
+
+
+def _found(case):
+    found = list(fuzz._judged(case))
+    return {kind: {k for each, k in found if each == kind} for kind in dict(found)}
+
+
+@pytest.mark.parametrize("case", CURED)
+def test_nothing_is_wrong_any_more_with_a_case_that_was_found(case):
+    assert _found(case) == {}
+
+
+@pytest.mark.parametrize("case", KNOWN)
+def test_what_is_known_to_be_wrong_does_not_grow_and_is_struck_off_when_it_is_cured(case):
+    found, known = _found(case), KNOWN[case]
+    assert found.keys() <= known.keys()
+    assert all(found[kind] <= known[kind] for kind in found)
+    assert found or case in ON_THE_EDGE
 
 
 def test_people_are_shaken_by_what_is_said_at_most():

@@ -11,7 +11,7 @@ from benchmarks.gallery.gallery import Exhibit, GalleryConfig, run, write_page
 from benchmarks.gallery.motions import FRAMES, STAGED, moments, stage_of
 from benchmarks.gallery.still import CASTS
 from hrc_env.core.errors import ConfigError
-from hrc_env.motion.repertoire import REPERTOIRE
+from hrc_env.motion.repertoire import SCENES
 from hrc_env.scene.build import build
 
 
@@ -32,13 +32,13 @@ def test_a_strip_has_evenly_spread_moments_of_all_its_films():
 
 
 def test_every_stage_and_cast_names_what_there_is():
-    assert set(STAGED) <= set(REPERTOIRE)
-    for name in REPERTOIRE:
+    assert set(STAGED) <= set(SCENES)
+    for name in SCENES:
         assert stage_of(name).away_m > 1.0
     for scene, cast in CASTS.items():
         places = {place.name for place in build(name=scene).grounds.places}
         assert {place for place, *_ in cast} <= places
-        assert {doing for _, doing, _ in cast} <= set(REPERTOIRE)
+        assert {doing for _, doing, _ in cast} <= set(SCENES)
 
 
 def test_an_unknown_motion_is_told_the_valid_ones():

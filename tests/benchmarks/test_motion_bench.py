@@ -10,9 +10,9 @@ from benchmarks.motion.report import inside
 from benchmarks.motion.targets import TARGETS, targets_of
 from hrc_env.core.errors import ConfigError
 from hrc_env.experiments.study.runner import run
-from hrc_env.motion.repertoire import REPERTOIRE
+from hrc_env.motion.repertoire import SCENES
 
-SCENES = ("stand", "walk 1.1 m/s", "saw")
+PLAYED = ("stand", "walk 1.1 m/s", "saw")
 TINY = bench.MotionBenchConfig(n_seeds=1, bodies=("worker_1",))
 
 
@@ -20,7 +20,7 @@ TINY = bench.MotionBenchConfig(n_seeds=1, bodies=("worker_1",))
 def done(tmp_path_factory):
     out, said = tmp_path_factory.mktemp("motion"), []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(bench, "REPERTOIRE", {name: REPERTOIRE[name] for name in SCENES})
+        patch.setattr(bench, "SCENES", {name: SCENES[name] for name in PLAYED})
         metrics = run(bench.MOTION, TINY, out, lambda share, label: said.append(share))
     return out, metrics, said
 
@@ -28,7 +28,7 @@ def done(tmp_path_factory):
 def test_every_number_is_finite_and_every_target_has_one(done):
     _, metrics, _ = done
     assert all(math.isfinite(metric.value) for metric in metrics.values())
-    for scene in SCENES:
+    for scene in PLAYED:
         assert {f"{scene}.{target.statistic}" for target in targets_of(scene)} <= set(metrics)
 
 
@@ -49,7 +49,7 @@ def test_files_are_written_and_the_progress_ends_at_one(done):
 
 
 def test_every_target_names_a_scene_that_exists():
-    assert {target.scene for target in TARGETS} - {"*"} <= set(REPERTOIRE)
+    assert {target.scene for target in TARGETS} - {"*"} <= set(SCENES)
 
 
 def test_an_empty_bench_is_refused():

@@ -8,6 +8,7 @@ from strides import FORMS, FPS, N_STRIDES, stride, written_as
 
 from benchmarks.tracking.walks import walk
 from hrc_env.cli.import_motion import ImportMotion
+from hrc_env.config import HRCConfig
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import JOINT, JOINTS
 from hrc_env.mocap.record import Capture
@@ -17,6 +18,7 @@ from hrc_env.motion import generator
 from hrc_env.motion import state as st
 from hrc_env.motion.clip import load_clip, placed_at_origin
 from hrc_env.room import played_s, told
+from hrc_env.scene.build import build
 from hrc_env.scene.places import SCENES
 from hrc_env.worker.body import load_body
 
@@ -24,18 +26,19 @@ PATIENCE_S = 60
 """Simulated time in which a worker who always plays if there is room has played [s]."""
 
 
-def imported(path, source_fps=None):
+def imported(path, source_fps=None, **options):
     """The clip that the command makes of a recording."""
     out = path.with_name("clip.npz")
-    assert ImportMotion(path, out, source_fps=source_fps).run() == 0
+    assert ImportMotion(path, out, source_fps=source_fps, **options).run() == 0
     return out
 
 
-def plays(clip, scene):
+def plays(clip, scene, worker="worker_1"):
     """Whether a worker plays a clip in a scene."""
     env = gymnasium.make(
         "HRCReach-v0", perception="none", scene=scene, motions=[clip],
-        config={"motion": {"motions_probability": 1.0}}, max_episode_steps=100_000,
+        config={"motion": {"motions_probability": 1.0}, "worker": worker},
+        max_episode_steps=100_000,
     )  # fmt: skip
     env.reset(seed=0)
     still = np.zeros(env.action_space.shape, np.float32)
@@ -54,12 +57,12 @@ def test_every_walk_in_every_form_plays_in_every_scene(tmp_path, seed, form, cap
     path = written_as(form, stride(seed), tmp_path, seed)
     clip = imported(path, FPS if form == "amc" else None)
     said = " ".join(capsys.readouterr().out.split())
-    played = played_s(load_clip(clip))
+    played = played_s(load_clip(clip), HRCConfig(worker="any"))
     assert set(played) == set(SCENES)
     for scene, seconds in played.items():
         assert seconds > 1.0
         assert f"{scene} ({seconds:.1f} of its" in said
-        assert plays(clip, scene)
+        assert plays(clip, scene, "any")
 
 
 def test_nothing_jumps_while_walks_are_played():
@@ -78,6 +81,23 @@ def test_nothing_jumps_while_walks_are_played():
     assert (np.stack(doing) == st.CLIP).mean() > 0.2
     position = joined(motions).position_world
     assert np.linalg.norm(np.diff(position, axis=1), axis=-1).max() / 0.02 < 12.0
+
+
+def test_what_is_accepted_off_the_floor_is_played_from_the_floor_to_the_floor(tmp_path, work):
+    t = np.arange(len(work.joints)) / work.fps
+    joints = work.joints.copy()
+    joints[..., 2] += 0.5 * np.clip(np.minimum(t - 1.0, t[-1] - 1.0 - t) / 0.3, 0.0, 1.0)[:, None]
+    np.savez(tmp_path / "box.npz", joints=joints, fps=work.fps)
+    with pytest.raises(ConfigError, match="Feet rest at heights"):
+        imported(tmp_path / "box.npz")
+    clip = imported(tmp_path / "box.npz", allow_off_floor=True)
+    config = generator.MotionConfig(motions=(str(clip),))
+    pieces = generator.make_state(1, 1, load_body(), config, build(name="site").grounds).mind.clips
+    ankles = pieces.frames[:, [c.N_BLENDED + 2, c.N_BLENDED + 8]]
+    ends = np.concatenate([pieces.row, pieces.row + pieces.count - 1])
+    assert ankles[ends].max() < 0.2
+    assert ankles.min(1).max() > 0.4
+    assert plays(clip, "site")
 
 
 @pytest.mark.parametrize("n_frames", [14, 16, 20])

@@ -18,7 +18,7 @@ from benchmarks.motion.statistics import (
 )
 from hrc_env.motion import controls as c
 from hrc_env.motion import state as st
-from hrc_env.motion.repertoire import REPERTOIRE, alone, perform
+from hrc_env.motion.repertoire import REPERTOIRE, SCENES, alone, perform
 from hrc_env.worker.body import SEGMENT, load_body, worker_names
 from hrc_env.worker.props import PROP_NAMES, PROPS
 
@@ -153,6 +153,6 @@ def test_nobody_falls_over(scene):
 
 
 def test_every_activity_has_a_scene():
-    shown = {activity for acts in REPERTOIRE.values() for activity, _, _ in acts}
+    shown = {activity for acts in SCENES.values() for activity, _, _ in acts}
     elsewhere = {st.REACH, st.LIFT, st.CLIP}  # test_hands.py, test_playing.py
     assert shown | elsewhere == set(range(len(st.ACTIVITY_NAMES)))

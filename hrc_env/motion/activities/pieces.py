@@ -23,9 +23,12 @@ from hrc_env.motion.state import Worker
 
 LONGEST_S, SHORTEST_S = 20.0, 0.5
 """Longer clips are played in pieces; no piece is shorter [s]."""
-LOW_M = 0.05
-"""A foot that is no higher counts as on the floor where no two feet rest: in a walk the one behind
-rolls off as the other comes down [m]."""
+EDGE_SHARE = 0.15
+"""At its ends a piece may lose so much of it, each, and SHORTEST_S at most, for feet that are flat
+there."""
+LOW_M, UNLOADED_RAD = 0.05, 0.5
+"""Pieces begin and end while no foot is higher [m]: in a walk the one behind rolls off as the other
+comes down. Both feet standing is worth that they are less flat by so much."""
 TURNS_RAD = (0.0, 0.6, -0.6, 1.2, -1.2)
 """Headings, from the worker's own, that are tried for a clip: two steps turn no further."""
 SPARE_M, ENOUGH = 0.05, 0.1
@@ -128,12 +131,13 @@ def stocked(clips: Sequence[Clip], size: Floats, where: Stage) -> Clips:
 
 
 def _cut(clip: Clip, bodies: list[Floats], where: Stage) -> list[_Piece]:
-    """The pieces of a clip: both feet stand at their ends, flat as far as they do, or are as low as
-    in the stride of a walk, of which a recording need not hold more."""
+    """The pieces of a clip: both feet are low at their ends, and stand there, and flat, if they do
+    about then."""
     tilt = np.abs(clip.controls[:, [c.ANKLE + 4, c.ANKLE + 10]]).sum(1)
+    tilt += UNLOADED_RAD * ~clip.contacts.all(1)
     fewest, most = SHORTEST_S * clip.fps, LONGEST_S * clip.fps
     stands, pieces = _stands(clip), list[_Piece]()
-    early = stands[stands <= min(stands[0], stands[-1] - 2.0 * fewest) + fewest]
+    early = stands[stands <= stands[0] + _edge(int(stands[-1] - stands[0]), fewest)]
     first = int(early[np.argmin(tilt[early])])
     while stands[-1] - first >= fewest:
         ends = stands[stands >= first + fewest]
@@ -143,7 +147,7 @@ def _cut(clip: Clip, bodies: list[Floats], where: Stage) -> list[_Piece]:
             first = int(ends[0])
             continue
         inside = fits[: max(1, np.sum(fits <= first + most))]
-        late = inside[inside >= inside[-1] - fewest]
+        late = inside[inside >= inside[-1] - _edge(int(inside[-1]) - first, fewest)]
         last = int(late[np.argmin(tilt[late])])
         pieces.append(_Piece(first, last, where.starts[room > last - first]))
         first = last
@@ -154,14 +158,18 @@ def _cut(clip: Clip, bodies: list[Floats], where: Stage) -> list[_Piece]:
     return pieces
 
 
+def _edge(n_frames: int, fewest: float) -> float:
+    """In how many frames at an end of a piece the flattest feet are looked for."""
+    return min(fewest, EDGE_SHARE * n_frames, max(0.0, 0.5 * (n_frames - fewest)))
+
+
 def _stands(clip: Clip) -> Ints:
-    """Frames in which both feet are on the floor, at least two and far enough apart for a piece."""
+    """Frames in which both feet are low, at least two and far enough apart for a piece."""
     feet = [footprints(clip.controls[:, c.ANKLE + 6 * side :], clip.size) for side in range(2)]
     low = (np.stack(feet, 1)[..., 2] - clip.size[ANKLE_Z]).max(1) < LOW_M
-    for near in (low & clip.contacts.all(1), low):
-        stands = np.flatnonzero(near)
-        if len(stands) >= 2 and stands[-1] - stands[0] >= SHORTEST_S * clip.fps:
-            return stands
+    stands = np.flatnonzero(low)
+    if len(stands) >= 2 and stands[-1] - stands[0] >= SHORTEST_S * clip.fps:
+        return stands
     raise ConfigError(
         f"{clip.source}: both feet are within {100 * LOW_M:g} cm of the floor at {len(stands)} "
         f"frames within {SHORTEST_S} s only; a clip is played from one such moment to another. "

@@ -10,7 +10,7 @@ import numpy as np
 from hrc_env.core.kernels import kernel
 from hrc_env.core.skeleton import N_JOINTS, TORSO
 from hrc_env.core.typing import Bools
-from hrc_env.geometry.triangulation import inverse3
+from hrc_env.geometry.lines_of_sight import eye_of
 
 _PARTS: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...] = (
     (tuple(int(j) for j in TORSO), tuple(range(N_JOINTS))),  # the whole body
@@ -102,22 +102,3 @@ def reflect(part, camera, body, out):
         for i in range(3):
             out[j, i] = eye[i] + (body[j, i] - eye[i]) * (2.0 * away - along) / along
     return True
-
-
-@kernel(makes_arrays=True)
-def eye_of(camera):
-    """Optical centre (3,) of a projection (3, 4)."""
-    inverse, eye = np.empty((3, 3)), np.zeros(3)
-    a, b = camera[:, :3], camera[:, 3]
-    normal = np.zeros((3, 3))
-    right = np.zeros(3)
-    for i in range(3):
-        for k in range(3):
-            right[i] -= a[k, i] * b[k]
-            for m in range(3):
-                normal[i, k] += a[m, i] * a[m, k]
-    inverse3(normal, inverse)
-    for i in range(3):
-        for k in range(3):
-            eye[i] += inverse[i, k] * right[k]
-    return eye

@@ -4,6 +4,8 @@
 `work` is a record of `tree.work.WORK`; what happens to one hypothesis is `tree.filter`'s.
 """
 
+import numpy as np
+
 from hrc_env.core.kernels import kernel
 from hrc_env.tracking.hypotheses.anatomy import anatomy
 from hrc_env.tracking.hypotheses.branching import branch, is_ambiguous
@@ -12,6 +14,14 @@ from hrc_env.tracking.hypotheses.sides import agree_on_sides
 from hrc_env.tracking.hypotheses.slots import Hypotheses, drop, merge, normalise, worker_slots
 from hrc_env.tracking.measurements import make_seen, read_worker
 from hrc_env.tracking.models.acquisition import heading
+from hrc_env.tracking.models.askew import (
+    compare,
+    count_views,
+    displacement,
+    forget_turns,
+    hang_as_known,
+    hang_askew,
+)
 from hrc_env.tracking.models.noise import NoiseModel, learn_noise, scale_sigma
 from hrc_env.tracking.models.swaps import undo_swaps
 from hrc_env.tracking.models.track_management import acquire, grow_older
@@ -94,16 +104,19 @@ def update_all(state, P, measured, s, noise, works, prior):
         prior: (1,) records of `tree.state.TREE`: room for a hypothesis before its update.
     """
     state, s, noise = Hypotheses(*state), Settings(*s), NoiseModel(*noise)
-    seen, work = make_seen(P), works[0]
+    seen, work = make_seen(P.copy()), works[0]
     for b in range(state.n_alive.shape[0]):
         for w in range(state.n_alive.shape[1]):
             own = worker_slots(state, b, w)
             read_worker(measured, b, w, s.sigma_scale, seen)
             tree = own.trees[0]
+            hang_as_known(tree.pair, P, seen.P)
             if not tree.tracked:
                 scale_sigma(own.noise[0], seen.sigma)
                 agree_on_sides(seen, s)
-                if not _begin(own, seen, s):
+                _begin(own, seen, s)
+                _doubt_cameras(own, P, seen, s)
+                if not tree.tracked:
                     _wait(own, seen, s, (work, prior))
                 continue
             if tree.size_std > 0.0 and _begin(own, seen, s):
@@ -116,6 +129,7 @@ def update_all(state, P, measured, s, noise, works, prior):
                 _follow(own, h, look and h == 0, seen, s, noise, (work, prior))
             if own.n_alive[0] > 1:
                 _tidy(own, s, work)
+            _doubt_cameras(own, P, seen, s)
 
 
 @kernel(makes_arrays=True)
@@ -125,20 +139,43 @@ def _begin(own, seen, s):
     if not acquire(tree, seen, s):
         return False
     tree.slope[:], tree.waited, tree.size_std, own.n_alive[0] = 0.0, 0, 0.0, 1
-    tree.log_weight, tree.pose_log_prior = 0.0, 0.0
+    tree.log_weight, tree.pose_log_prior, tree.pair.waited = 0.0, 0.0, 0
     return True
+
+
+@kernel(makes_arrays=True)
+def _doubt_cameras(own, P, seen, s):
+    """Ask two cameras that alone see a worker whether they hang as is said, P (C, 3, 4); if not,
+    begin the track with them turned."""
+    tree, cameras = own.trees[0], np.zeros(2, np.int64)
+    pair, n_views = tree.pair, count_views(seen, s.acquire_min_joints, cameras)
+    if n_views == 2:
+        compare(tree, cameras, P, seen, s.acquire_min_joints)
+    elif n_views > 2 and pair.askew:
+        forget_turns(pair)
+        hang_as_known(pair, P, seen.P)
+        _begin(own, seen, s)
+    if not tree.tracked:
+        pair.waited = pair.waited + 1 if n_views == 2 else max(pair.waited - 1, 0)
+    if pair.askew:
+        pair.askew = hang_askew(pair)
+    elif hang_askew(pair) and n_views == 2 and (tree.tracked or pair.waited > s.wait_updates):
+        pair.askew = True
+        hang_as_known(pair, P, seen.P)
+        pair.askew = _begin(own, seen, s)
+    tree.displaced_m2[:] = 0.0
+    if pair.askew and tree.tracked:
+        displacement(pair, P, tree.body, tree.displaced_m2)
 
 
 @kernel(makes_arrays=True)
 def _wait(own, seen, s, scratch):
     """Begin a track from one view where no second one has come for a while."""
-    tree, lone, n_views = own.trees[0], 0, 0
-    for c in range(len(seen.P)):
-        if seen.ok[:, c].sum() >= s.acquire_min_joints:
-            lone, n_views = c, n_views + 1
+    tree, cameras = own.trees[0], np.zeros(2, np.int64)
+    n_views = count_views(seen, s.acquire_min_joints, cameras)
     tree.waited = tree.waited + 1 if n_views == 1 else max(tree.waited - 1, 0)
     if n_views == 1 and (tree.waited > s.wait_updates or len(seen.P) == 1):
-        begin_from_one(own, lone, seen, s, scratch)
+        begin_from_one(own, cameras[1], seen, s, scratch)
         tree.waited, own.waited_s[0] = 0, s.look_every_s
 
 

@@ -9,9 +9,9 @@ import math
 import numpy as np
 
 from hrc_env.core.kernels import kernel
+from hrc_env.geometry.lines_of_sight import eye_of
 from hrc_env.geometry.triangulation import linear_point
 from hrc_env.tracking.hypotheses.anatomy import anatomy
-from hrc_env.tracking.hypotheses.depth_flip import eye_of
 from hrc_env.tracking.models.acquisition import STANDING_M
 from hrc_env.tracking.models.motion import SPEED_M_S
 from hrc_env.tracking.tree.bone_lengths import stiff_lengths

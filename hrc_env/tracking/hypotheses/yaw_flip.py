@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from hrc_env.core.kernels import kernel
-from hrc_env.tracking.hypotheses.depth_flip import eye_of
+from hrc_env.geometry.lines_of_sight import eye_of
 from hrc_env.tracking.models.acquisition import heading
 from hrc_env.tracking.tree.gaussian import multiply
 

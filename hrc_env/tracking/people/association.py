@@ -19,14 +19,13 @@ from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.geometry.assignment import assign_rows
+from hrc_env.geometry.lines_of_sight import CAMERA, model_cameras
 from hrc_env.tracking.measurements import arrays_of, is_measurement
 from hrc_env.tracking.people.affinity import LEAST_JOINTS, POSE, affinity, expect
 from hrc_env.tracking.people.track_initiation import (
-    CAMERA,
     fit_cameras,
     look_along,
     meeting,
-    model_cameras,
     propose,
 )
 

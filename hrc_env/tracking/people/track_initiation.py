@@ -8,53 +8,22 @@ alone has seen is nobody (after RapidPoseTriangulation, arXiv 2503.21692).
 Kernels take one environment: cameras (C,) and poses (C, D) are records of `CAMERA` and `POSE`.
 """
 
-import math
-
 import numpy as np
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.skeleton import BONE_LENGTH_M, BONES, N_JOINTS
+from hrc_env.geometry.lines_of_sight import look, nearest_places
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
 from hrc_env.tracking.people.affinity import affinity, expect
 
 MEETING_M = 0.03
 """Lines of sight may pass each other at this distance [m] for other reasons than noise."""
-MIN_CROSSING = 0.1
-"""Sine of the smallest angle between two lines that fixes a point."""
 AGREEING_SHARE = 0.6
 """Of two poses' common joints so many must meet."""
 SHORTEST, LONGEST, BONE_SLACK_M, GOOD_BONES = 0.5, 1.6, 0.08, 0.7
 """Shares of the population's length, and this much [m], that a bone may be; share of good ones."""
 BODY_SLACK_M = 0.1
 """How far the body of two lines of sight may be from what other cameras see [m]."""
-CAMERA = np.dtype(
-    [
-        # projection, rays from pixels; optical centre [m]; focal length [px]
-        ("P", "f8", (3, 4)), ("back", "f8", (3, 3)), ("eye", "f8", (3,)), ("focal", "f8"),
-    ],
-    align=True,
-)  # fmt: skip
-"""A camera of the rig."""
-
-
-@kernel(makes_arrays=True)
-def model_cameras(P, cameras):
-    """Fill cameras (C,) in from their projections P (C, 3, 4)."""
-    for c in range(len(P)):
-        a, inverse = P[c, :, :3].copy(), cameras[c].back
-        for i in range(3):
-            k, m = (i + 1) % 3, (i + 2) % 3
-            for n in range(3):
-                p, q = (n + 1) % 3, (n + 2) % 3
-                inverse[n, i] = a[k, p] * a[m, q] - a[k, q] * a[m, p]
-        inverse /= a[0, 0] * inverse[0, 0] + a[0, 1] * inverse[1, 0] + a[0, 2] * inverse[2, 0]
-        for i in range(3):
-            cameras[c].eye[i] = -(
-                inverse[i, 0] * P[c, 0, 3] + inverse[i, 1] * P[c, 1, 3] + inverse[i, 2] * P[c, 2, 3]
-            )
-        along = (a[0] * a[2]).sum()
-        cameras[c].focal = math.sqrt(max((a[0] * a[0]).sum() - along * along, 1e-12))
-        cameras[c].P[:] = P[c]
 
 
 @kernel(makes_arrays=True)
@@ -65,15 +34,8 @@ def look_along(cameras, poses):
         for d in range(poses.shape[1]):
             pose = poses[c, d]
             for j in range(N_JOINTS):
-                if not (pose.free and pose.ok[j]):
-                    continue
-                u, v, length = pose.px[j, 0], pose.px[j, 1], 0.0
-                for i in range(3):
-                    along = back[i, 0] * u + back[i, 1] * v + back[i, 2]
-                    pose.sight[j, i] = along
-                    length += along * along
-                for i in range(3):
-                    pose.sight[j, i] /= math.sqrt(length)
+                if pose.free and pose.ok[j]:
+                    look(back, pose.px[j, 0], pose.px[j, 1], pose.sight[j])
 
 
 @kernel(makes_arrays=True)
@@ -91,7 +53,7 @@ def meeting(camera_1, camera_2, pose_1, pose_2, gate_sigma, body):
         if n_common - n_met > (1.0 - AGREEING_SHARE) * len(points):
             return 0  # the rest cannot make it good
         n_common += 1
-        far_1, far_2, gap = _nearest_places(
+        far_1, far_2, gap = nearest_places(
             camera_1.eye, pose_1.sight[j], camera_2.eye, pose_2.sight[j], points[j]
         )
         if not (far_1 > 0.0 and far_2 > 0.0):
@@ -103,26 +65,6 @@ def meeting(camera_1, camera_2, pose_1, pose_2, gate_sigma, body):
             met[j] = True
             n_met += 1
     return n_met if n_met >= AGREEING_SHARE * n_common else 0
-
-
-@kernel(makes_arrays=True)
-def _nearest_places(eye_1, ray_1, eye_2, ray_2, middle):
-    """Distances along two lines to where they pass each other, their squared gap; the middle."""
-    cosine, a, b = 0.0, 0.0, 0.0
-    for i in range(3):
-        between = eye_2[i] - eye_1[i]
-        cosine += ray_1[i] * ray_2[i]
-        a += between * ray_1[i]
-        b += between * ray_2[i]
-    crossing = 1.0 - cosine * cosine
-    if crossing < MIN_CROSSING**2:
-        return -1.0, -1.0, np.inf
-    far_1, far_2, gap = (a - b * cosine) / crossing, (a * cosine - b) / crossing, 0.0
-    for i in range(3):
-        first, second = eye_1[i] + far_1 * ray_1[i], eye_2[i] + far_2 * ray_2[i]
-        middle[i] = 0.5 * (first + second)
-        gap += (first - second) ** 2
-    return far_1, far_2, gap
 
 
 @kernel(makes_arrays=True)

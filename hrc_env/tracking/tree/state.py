@@ -15,6 +15,7 @@ from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.tracking.config import ParticleConfig
 from hrc_env.tracking.models.acquisition import STANDING_M
+from hrc_env.tracking.models.askew import PAIR
 from hrc_env.tracking.models.motion import STANDING_COUNT, damped_joints, whole_body_noise
 from hrc_env.tracking.models.noise import N_SUMS
 from hrc_env.tracking.tree.bone_lengths import population_edges
@@ -29,6 +30,9 @@ TREE = np.dtype(
         # of who is not tracked: updates in which one view alone has shown somebody; of who is: how
         # much larger and farther off, as a share, the body that one view has begun may be, or 0
         ("waited", "i8"), ("size_std", "f8"),
+        # the two cameras that alone see the body; how far off it may be for what is known of their
+        # turns, as a whole [m^2]
+        ("pair", PAIR), ("displaced_m2", "f8", (3, 3)),
         # mean place on the body [m]: forward, left, up of the torso; updates that went into it
         ("offset", "f8", (_J, 3)), ("offset_count", "f8", (_J,)),
         # from each joint to its parent [m], [m^2]

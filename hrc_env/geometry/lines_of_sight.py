@@ -1,0 +1,89 @@
+"""Lines of sight: cameras as centres that look along rays, and where two rays pass each other."""
+
+import math
+
+import numpy as np
+
+from hrc_env.core.kernels import kernel
+from hrc_env.geometry.triangulation import inverse3
+
+MIN_CROSSING = 0.1
+"""Sine of the smallest angle between two lines that fixes a point."""
+CAMERA = np.dtype(
+    [
+        # projection, rays from pixels; optical centre [m]; focal length [px]
+        ("P", "f8", (3, 4)), ("back", "f8", (3, 3)), ("eye", "f8", (3,)), ("focal", "f8"),
+    ],
+    align=True,
+)  # fmt: skip
+"""A camera of the rig."""
+
+
+@kernel(makes_arrays=True)
+def model_cameras(P, cameras):
+    """Fill cameras (C,) in from their projections P (C, 3, 4)."""
+    for c in range(len(P)):
+        a, inverse = P[c, :, :3].copy(), cameras[c].back
+        for i in range(3):
+            k, m = (i + 1) % 3, (i + 2) % 3
+            for n in range(3):
+                p, q = (n + 1) % 3, (n + 2) % 3
+                inverse[n, i] = a[k, p] * a[m, q] - a[k, q] * a[m, p]
+        inverse /= a[0, 0] * inverse[0, 0] + a[0, 1] * inverse[1, 0] + a[0, 2] * inverse[2, 0]
+        for i in range(3):
+            cameras[c].eye[i] = -(
+                inverse[i, 0] * P[c, 0, 3] + inverse[i, 1] * P[c, 1, 3] + inverse[i, 2] * P[c, 2, 3]
+            )
+        along = (a[0] * a[2]).sum()
+        cameras[c].focal = math.sqrt(max((a[0] * a[0]).sum() - along * along, 1e-12))
+        cameras[c].P[:] = P[c]
+
+
+@kernel(makes_arrays=True)
+def nearest_places(eye_1, ray_1, eye_2, ray_2, middle):
+    """Distances along two lines to where they pass each other, their squared gap; the middle."""
+    cosine, a, b = 0.0, 0.0, 0.0
+    for i in range(3):
+        between = eye_2[i] - eye_1[i]
+        cosine += ray_1[i] * ray_2[i]
+        a += between * ray_1[i]
+        b += between * ray_2[i]
+    crossing = 1.0 - cosine * cosine
+    if crossing < MIN_CROSSING**2:
+        return -1.0, -1.0, np.inf
+    far_1, far_2, gap = (a - b * cosine) / crossing, (a * cosine - b) / crossing, 0.0
+    for i in range(3):
+        first, second = eye_1[i] + far_1 * ray_1[i], eye_2[i] + far_2 * ray_2[i]
+        middle[i] = 0.5 * (first + second)
+        gap += (first - second) ** 2
+    return far_1, far_2, gap
+
+
+@kernel
+def look(back, u, v, ray):
+    """Fill in the unit direction in which a pixel lies; `back` (3, 3) as in `CAMERA`."""
+    length = 0.0
+    for i in range(3):
+        ray[i] = back[i, 0] * u + back[i, 1] * v + back[i, 2]
+        length += ray[i] * ray[i]
+    for i in range(3):
+        ray[i] /= math.sqrt(length)
+
+
+@kernel(makes_arrays=True)
+def eye_of(camera):
+    """Optical centre (3,) of a projection (3, 4)."""
+    inverse, eye = np.empty((3, 3)), np.zeros(3)
+    a, b = camera[:, :3], camera[:, 3]
+    normal = np.zeros((3, 3))
+    right = np.zeros(3)
+    for i in range(3):
+        for k in range(3):
+            right[i] -= a[k, i] * b[k]
+            for m in range(3):
+                normal[i, k] += a[m, i] * a[m, k]
+    inverse3(normal, inverse)
+    for i in range(3):
+        for k in range(3):
+            eye[i] += inverse[i, k] * right[k]
+    return eye

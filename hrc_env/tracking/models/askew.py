@@ -1,0 +1,241 @@
+"""Two cameras of which one hangs askew: the turns by which their lines of sight meet.
+
+Two lines of sight with unit directions d_a, d_b from e_a, e_b, nearest to each other at distances
+r_a, r_b, pass each other at g = n . (e_b - e_a), n = d_a x d_b / |d_a x d_b|. Small turns w_a, w_b
+of the cameras about their centres change that to
+
+    g + r_b (d_b x n) . w_b - r_a (d_a x n) . w_a,
+
+which every joint of a body measures to be 0. The turns are a Gaussian of 6 numbers that begins at
+no turn and forgets within seconds. What it leaves open is how far off the body may be as a whole.
+"""
+
+import math
+
+import numpy as np
+
+from hrc_env.core.kernels import kernel
+from hrc_env.geometry.lines_of_sight import CAMERA, eye_of, look, model_cameras, nearest_places
+from hrc_env.geometry.triangulation import inverse3
+from hrc_env.tracking.tree.gaussian import invert, multiply, multiply_transposed
+
+PAIR = np.dtype(
+    [
+        # the two cameras; information and score of their turns
+        ("cameras", "i8", (2,)), ("information", "f8", (6, 6)), ("score", "f8", (6,)),
+        # the turns about the world's axes [rad], their covariance
+        ("turn", "f8", (6,)), ("turn_cov", "f8", (6, 6)),
+        # share of the last updates in which lines met; whether the two count as turned; updates in
+        # which they saw somebody whom nobody follows
+        ("fits", "f8"), ("askew", "?"), ("waited", "i8"),
+    ],
+    align=True,
+)  # fmt: skip
+"""What is remembered of two cameras that alone see a worker."""
+TURN_STD_RAD = 0.05
+"""Of a camera that was knocked, about each axis: a judgement."""
+_LEAST_TURN_RAD, _LEAST_EVIDENCE = 0.014, 25.0
+"""Two cameras whose turns are smaller together, or explain less (twice the log-likelihood), are not
+askew; those that were stay so down to half as much."""
+_MOST_TURN_RAD, _MEETING, _FORGETS, _FITS, _FITTED = 0.14, 3.0, 0.1, 0.5, 0.3
+"""What has to be turned by more is not one body, nor is what leaves larger gaps (their median
+square, in variances): of the last updates, an average that forgets so much with each, this share
+has to fit, and this one of those that count as askew."""
+_KEPT, _SHARE = 0.99, 1 / 12
+"""Share of what is known that an update leaves; what an update counts for: errors of a detector
+last for twelve."""
+_PASSING_M, _TAIL = 0.03, 4.0
+"""Lines of sight may pass each other at this distance [m] for other reasons than noise; squares so
+many times the median have half their weight."""
+
+
+@kernel
+def count_views(seen, least_joints, cameras):
+    """How many cameras show so many joints; the last two of them go to `cameras` (2,)."""
+    n = 0
+    for c in range(len(seen.P)):
+        n_joints = 0
+        for j in range(len(seen.ok)):
+            n_joints += seen.ok[j, c]
+        if n_joints >= least_joints:
+            cameras[0], cameras[1] = cameras[1], c
+            n += 1
+    return n
+
+
+@kernel(makes_arrays=True)
+def compare(tree, cameras, P, seen, least_joints):
+    """Learn the turns of two cameras from what they show now; P (C, 3, 4) is without any."""
+    pair = tree.pair
+    if pair.cameras[0] != cameras[0] or pair.cameras[1] != cameras[1]:
+        forget_turns(pair)
+        pair.cameras[0], pair.cameras[1] = cameras[0], cameras[1]
+    n_joints = len(seen.ok)
+    rows, gap, variance = np.empty((n_joints, 6)), np.empty(n_joints), np.empty(n_joints)
+    n = _gaps(tree, P, seen, rows, gap, variance)
+    if n < least_joints:
+        return
+    squares = gap[:n] ** 2 / variance[:n]
+    usual = np.median(squares)
+    pair.fits += _FORGETS * ((usual < _MEETING) - pair.fits)
+    usual = max(usual, 1.0)
+    pair.information[:] *= _KEPT
+    pair.score[:] *= _KEPT
+    for m in range(n):
+        weight = _SHARE / (variance[m] * (usual + squares[m] / _TAIL))
+        measured = -gap[m]
+        for i in range(6):
+            measured += rows[m, i] * pair.turn[i]
+        for i in range(6):
+            pair.score[i] += weight * rows[m, i] * measured
+            for k in range(6):
+                pair.information[i, k] += weight * rows[m, i] * rows[m, k]
+    _solve(pair)
+
+
+@kernel(makes_arrays=True)
+def _solve(pair):
+    precision = pair.information.copy()
+    for i in range(6):
+        precision[i, i] += TURN_STD_RAD**-2
+    invert(precision, pair.turn_cov)
+    for i in range(6):
+        pair.turn[i] = 0.0
+        for k in range(6):
+            pair.turn[i] += pair.turn_cov[i, k] * pair.score[k]
+
+
+@kernel(makes_arrays=True)
+def forget_turns(pair):
+    """Nothing is known of two cameras."""
+    pair.information[:], pair.score[:], pair.turn[:] = 0.0, 0.0, 0.0
+    pair.fits, pair.askew, pair.waited = _FITTED, False, 0
+
+
+@kernel
+def hang_askew(pair):
+    """Whether two cameras show that they are turned."""
+    squared, evidence, times = 0.0, 0.0, 0.5 if pair.askew else 1.0
+    for i in range(6):
+        squared += pair.turn[i] ** 2
+        evidence += pair.turn[i] * pair.score[i]
+    fits = pair.fits > (_FITTED if pair.askew else _FITS) and squared < _MOST_TURN_RAD**2
+    return fits and squared > (times * _LEAST_TURN_RAD) ** 2 and evidence > times * _LEAST_EVIDENCE
+
+
+@kernel(makes_arrays=True)
+def _gaps(tree, P, seen, rows, gap, variance):
+    """Gaps of the joints [m] as the cameras are turned now, their slopes on the turns [m/rad] and
+    variances [m^2]; how many joints both see.
+
+    Slopes are those at the body that is followed: at the lines themselves they would share the
+    gaps' noise, which adds up to a turn.
+    """
+    pair, n = tree.pair, 0
+    a, b = pair.cameras
+    turned, cameras = np.empty((2, 3, 4)), np.empty(2, CAMERA)
+    for k in range(2):
+        turn_camera(P[pair.cameras[k]], pair.turn[3 * k : 3 * k + 3], turned[k])
+    model_cameras(turned, cameras)
+    one, other, middle, normal = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    for j in range(len(seen.ok)):
+        if not (seen.ok[j, a] and seen.ok[j, b]):
+            continue
+        look(cameras[0].back, seen.z[j, a, 0], seen.z[j, a, 1], one)
+        look(cameras[1].back, seen.z[j, b, 0], seen.z[j, b, 1], other)
+        far_a, far_b, _ = nearest_places(cameras[0].eye, one, cameras[1].eye, other, middle)
+        if not (far_a > 0.0 and far_b > 0.0):
+            continue
+        _normal(one, other, normal)
+        gap[n] = 0.0
+        for i in range(3):
+            gap[n] += normal[i] * (cameras[1].eye[i] - cameras[0].eye[i])
+        variance[n] = (seen.sigma[j, a] * far_a / cameras[0].focal) ** 2 + _PASSING_M**2
+        variance[n] += (seen.sigma[j, b] * far_b / cameras[1].focal) ** 2
+        for i in range(3):
+            place = tree.body[j, i] if tree.tracked else middle[i]
+            one[i], other[i] = place - cameras[0].eye[i], place - cameras[1].eye[i]
+        _normal(one, other, normal)
+        cross(normal, one, rows[n, :3])
+        cross(other, normal, rows[n, 3:])
+        n += 1
+    return n
+
+
+@kernel
+def _normal(one, other, out):
+    """The unit normal of two lines."""
+    cross(one, other, out)
+    length = math.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2)
+    for i in range(3):
+        out[i] /= length
+
+
+@kernel
+def cross(a, b, out):
+    """out = a x b."""
+    x, y = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2]
+    out[2] = a[0] * b[1] - a[1] * b[0]
+    out[0], out[1] = x, y
+
+
+@kernel(makes_arrays=True)
+def turn_camera(camera, turn, out):
+    """A camera (3, 4) turned about its centre: rows of its first three columns are turned."""
+    angle, eye, first, second = 1e-12, eye_of(camera), np.empty(3), np.empty(3)
+    for i in range(3):
+        angle += turn[i] ** 2
+    angle = math.sqrt(angle)
+    sine, versine = math.sin(angle) / angle, (1.0 - math.cos(angle)) / angle**2
+    for row in range(3):
+        cross(turn, camera[row, :3], first)
+        cross(turn, first, second)
+        out[row, 3] = 0.0
+        for i in range(3):
+            out[row, i] = camera[row, i] + sine * first[i] + versine * second[i]
+            out[row, 3] -= out[row, i] * eye[i]
+
+
+@kernel(makes_arrays=True)
+def displacement(pair, P, body, out):
+    """How far off a body (J, 6) may be as a whole: covariance (3, 3) [m^2].
+
+    The point that two cameras triangulate follows their turns w_c with the slope
+    (sum M_c)^-1 M_c [d_c r_c]x', M_c = (1 - d_c d_c') / r_c^2.
+    """
+    total, inverse, own = np.zeros((3, 3)), np.empty((3, 3)), np.empty((2, 3, 3))
+    slope, half, full = np.zeros((6, 6)), np.empty((6, 6)), np.empty((6, 6))
+    line, moved, axis, middle = np.empty((2, 3)), np.empty(3), np.zeros(3), np.zeros(3)
+    for j in range(len(body)):
+        for i in range(3):
+            middle[i] += body[j, i] / len(body)
+    for k in range(2):
+        line[k] = middle - eye_of(P[pair.cameras[k]])
+        squared = line[k, 0] ** 2 + line[k, 1] ** 2 + line[k, 2] ** 2
+        for i in range(3):
+            for m in range(3):
+                own[k, i, m] = ((i == m) - line[k, i] * line[k, m] / squared) / squared
+        total += own[k]
+    inverse3(total, inverse)
+    for k in range(2):
+        for m in range(3):
+            axis[:] = 0.0
+            axis[m] = 1.0
+            cross(axis, line[k], moved)
+            for i in range(3):
+                for p in range(3):
+                    for q in range(3):
+                        slope[i, 3 * k + m] += inverse[i, p] * own[k, p, q] * moved[q]
+    multiply(slope, pair.turn_cov, half)
+    multiply_transposed(half, slope, full)
+    out[:] = full[:3, :3]
+
+
+@kernel(makes_arrays=True)
+def hang_as_known(pair, P, out):
+    """Fill in the projections (C, 3, 4) as the cameras are thought to hang, for one worker."""
+    out[:] = P
+    if pair.askew:
+        for k in range(2):
+            c = pair.cameras[k]
+            turn_camera(P[c], pair.turn[3 * k : 3 * k + 3], out[c])
