@@ -45,7 +45,8 @@ def fit(samples: Samples, known: tuple[Floats, float], between_m: Floats) -> Cal
     swap_share, swap_s = swaps_of(samples)
     miss_share, miss_s = misses_of(samples)
     return Calibration(
-        offset, wander, space_limb, between_m, poses, np.array(near_m), np.zeros(N_K), np.zeros(N_P), bias, size, spread, body,
+        offset, wander, space_limb, between_m, poses, np.array(near_m), np.zeros(N_K),
+        np.zeros(N_P), bias, size, spread, body,
         np.array(common), shares, slow_s, slow_m, limbs_of(s, unit), confidences_of(s),
         follows_of(s, left_over, spread, common), swap_share, swap_s, miss_share, miss_s,
         sigma_table(s, samples),
