@@ -15,7 +15,7 @@ import tyro
 from rich.console import Console
 
 from assets.emulator.clips import UNSEEN_RIG, UNSEEN_SEEDS, recorded_clips
-from assets.emulator.recorded import RECORDINGS
+from assets.emulator.recorded import MADE, RECORDINGS
 from assets.emulator.validate import (
     Compared,
     accuracy,
@@ -24,7 +24,6 @@ from assets.emulator.validate import (
     in_space,
     over_clips,
 )
-from benchmarks.recorded.synthetic import STYLES
 from hrc_env.cli.progress import progress_bar
 from hrc_env.config import HRCConfig
 from hrc_env.core.results import Metric, write_results
@@ -32,8 +31,6 @@ from hrc_env.core.skeleton import JOINTS
 from hrc_env.core.typing import Ints
 from hrc_env.perception.calibration import KIND, KINDS
 from hrc_env.perception.emulator import EmulatorConfig
-
-MADE = tuple(style.name for style in STYLES)
 
 
 def main(out: Path = Path("out/imported"), rounds: int = 2, calibration: str = "") -> None:
@@ -64,6 +61,8 @@ def metrics_of(seen: Compared) -> Iterator[tuple[str, Metric]]:
     emulated = [in_space(each) for each in seen.emulated]
     for group, mine in (("people", ~made), ("made", made), ("all", np.ones(len(made), bool))):
         rows = np.flatnonzero(mine).tolist()
+        if not rows:
+            continue
         yield f"clips.{group}", Metric(len(rows), len(rows), len(rows), "", len(rows))
         for what, metric in zip(
             ("median", "p95", "coverage"), accuracy([pixels[k] for k in rows]), strict=True

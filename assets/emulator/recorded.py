@@ -18,14 +18,23 @@ RECORDINGS: dict[str, Role] = {each.name: each.role for each in (*CLIPS, *STYLES
 """What each recording may serve for, by its name: to fit, or to validate."""
 
 
+MADE = tuple(style.name for style in STYLES)
+"""Those that are of nobody."""
+
+
 def recording(name: str) -> Clip:
-    """A recording by its name; what is not there is downloaded."""
-    return _recordings(RECORDINGS[name])[name]
+    """A recording by its name; what people's are not there is downloaded."""
+    return (_made if name in MADE else _of_people)(RECORDINGS[name])[name]
 
 
 @functools.cache
-def _recordings(role: Role) -> dict[str, Clip]:
-    return {each.name: clip for each, clip, _ in (*clips_of(role), *made_of(role))}
+def _of_people(role: Role) -> dict[str, Clip]:
+    return {each.name: clip for each, clip, _ in clips_of(role)}
+
+
+@functools.cache
+def _made(role: Role) -> dict[str, Clip]:
+    return {each.name: clip for each, clip, _ in made_of(role)}
 
 
 def perform_clip(
