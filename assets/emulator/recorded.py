@@ -51,8 +51,8 @@ def perform_clip(
     q = np.stack([np.interp(frames, np.arange(len(q)), column) for column in q.T], -1)
     position, turn, _ = posed(q, bones)
     velocity = np.gradient(position, dt_s, axis=0)
-    whole = (position, turn, velocity, np.zeros_like(velocity))
-    return WorkerMotion(*(each[:, None] for each in whole))
+    still = np.zeros_like(velocity)
+    return WorkerMotion(position[:, None], turn[:, None], velocity[:, None], still[:, None])
 
 
 def _moments(lasts_s: float, least_s: float, dt_s: float) -> Floats:

@@ -130,8 +130,8 @@ def _watched(
             )
         )  # fmt: skip
     columns: list[Any] = [np.array(column) for column in zip(*frames, strict=True)]
-    told = [np.array(column) for column in zip(*said, strict=True)]
-    return Watched(*columns, landmarks_world, P, *told)
+    told: list[Any] = [np.array(column) for column in zip(*said, strict=True)]
+    return Watched(*[*columns, landmarks_world, P, *told])
 
 
 def _introduce(pipeline: PoseTracking, joints_world: Points3, P: Floats, rngs: Generators) -> None:
