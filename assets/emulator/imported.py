@@ -86,7 +86,8 @@ def _of_joints(inside: list[np.ndarray]) -> Iterator[tuple[str, Metric]]:
             return [float(np.concatenate([mine[k] for k in ks.tolist()]).mean())]
 
         n = sum(each.size for each in mine)
-        yield f"coverage.joint.{word}", *over_clips(share, len(mine), ("share",), n)
+        (metric,) = over_clips(share, len(mine), ("share",), n)
+        yield f"coverage.joint.{word}", metric
 
 
 if __name__ == "__main__":
