@@ -15,7 +15,8 @@ from hrc_env.motion.repertoire import OPEN, REPERTOIRE, Act, alone, perform
 from hrc_env.motion.state import Worker
 from hrc_env.worker.body import load_body, worker_names, worker_truth
 
-_FASTEST_M_S, _WALK_M_S, _LIES_S = 3.5, 1.3, (2.0, 4.0)
+_FASTEST_M_S, _WALK_M_S, _LIES_S, _WAY_M = 3.5, 1.3, (2.0, 4.0), 4.0
+"""Speeds; how long they lie; how far they want to walk who fall."""
 
 
 def run_to_and_fro(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
@@ -32,17 +33,18 @@ def fall_and_get_up(walk_m: tuple[float, float], seeds: list[int], n_frames: int
     """Joints (T, S, J, 3) [m] of workers who walk, fall, lie for 2 to 4 s and get up."""
 
     def fall(draws: Floats, height_m: float, me: Worker) -> float:
-        yaw = _across(me)
+        yaw = _across(me, _WAY_M)
         lies_s = _LIES_S[0] + draws.item(4) * (_LIES_S[1] - _LIES_S[0])
         return plan_fall(draws, yaw, _WALK_M_S, lies_s, *OPEN, me)
 
     return _played((st.FALL, fall, 0.0), walk_m, seeds, n_frames)
 
 
-def _across(me: Worker) -> float:
+def _across(me: Worker, most_m: float = np.inf) -> float:
     """Lay a path past the middle, as far as it is to there; its direction [rad]."""
     x, y = float(me["start_x"]), float(me["start_y"])
-    lay_path((x, y), np.zeros((0, 3)), (-x, -y), me)
+    share = min(2.0, most_m / np.hypot(x, y))
+    lay_path((x, y), np.zeros((0, 3)), (x - share * x, y - share * y), me)
     return float(np.arctan2(-y, -x))
 
 
