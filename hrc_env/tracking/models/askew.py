@@ -34,7 +34,7 @@ PAIR = np.dtype(
 """What is remembered of two cameras that alone see a worker."""
 TURN_STD_RAD = 0.05
 """Of a camera that was knocked, about each axis: a judgement."""
-_LEAST_TURN_RAD, _LEAST_EVIDENCE = 0.014, 25.0
+_LEAST_TURN_RAD, _LEAST_EVIDENCE = 0.014, 16.0
 """Two cameras whose turns are smaller together, or explain less (twice the log-likelihood), are not
 askew; those that were stay so down to half as much."""
 _MOST_TURN_RAD, _MEETING, _FORGETS, _FITS, _FITTED = 0.14, 3.0, 0.1, 0.5, 0.3
