@@ -46,7 +46,10 @@ CONDITIONS: dict[str, Damage] = {
 SURPRISES: dict[str, Damage] = {
     "mirrored_start": Damage(mirrored_start=True),
     **dict.fromkeys(("running", "running_fast", "acrobat", "fallen"), Damage()),
-    "fallen_one_camera": Damage(alone_s=(FALLS_S, 6.0)),
+    **dict.fromkeys(("worker_runs", "worker_falls"), Damage()),
+    **dict.fromkeys(
+        ("fallen_one_camera", "worker_falls_one_camera"), Damage(alone_s=(FALLS_S, 6.0))
+    ),
 }
 """What `surprises` is about."""
 

@@ -15,6 +15,7 @@ from benchmarks.tracking.env_sequences import ENV, ENV_CONDITIONS, ENV_FRAMES, r
 from benchmarks.tracking.matched import draw, matched_model
 from benchmarks.tracking.rigs import SIGMA_PX, Rig
 from benchmarks.tracking.walks import walk
+from benchmarks.tracking.workers import fall_and_get_up, run_to_and_fro
 from hrc_env.core.records import Keypoints
 from hrc_env.core.typing import Floats, Ints, Points2, Points3
 from hrc_env.tracking.config import TrackerConfig
@@ -30,6 +31,9 @@ MOTIONS: dict[str, Callable[[tuple[float, float], list[int], int], Points3]] = {
     "acrobat": tumble,
     "fallen": fall,
     "fallen_one_camera": fall,
+    "worker_runs": run_to_and_fro,
+    "worker_falls": fall_and_get_up,
+    "worker_falls_one_camera": fall_and_get_up,
 }
 """What people do where they do not walk."""
 N_FRAMES = {
@@ -52,6 +56,8 @@ WINDOWS: dict[str, dict[str, tuple[int, int]]] = {
     "mirrored_start": {"mirrored_start": (12, 25)},
     **{name: {name: (25, 200)} for name in ("running", "running_fast", "acrobat")},
     "fallen": {"fallen": (50, 200)},
+    **{name: {name: (25, 200)} for name in ("worker_runs", "worker_falls")},
+    "worker_falls_one_camera": {"worker_falls_one_camera": (50, 150)},
     "fallen_one_camera": {"fallen_one_camera": (50, 150), "fallen_after_return": (160, 200)},
 }
 """Frames that count: after the first second; while one camera sees, and from one second after

@@ -3,8 +3,9 @@
     python -m benchmarks.tracking.surprises
 
 White detections of 3 px; people run at 3 and 3.5 m/s, turn over in the air every second or so, fall
-and roll on the floor, seen by four cameras, or by one while they fall and lie; two of four cameras
-exchange left and right in the first frame. No setting was chosen on these seeds.
+and roll on the floor, seen by four cameras, or by one while they fall and lie; the environment's
+workers run and fall, too; two of four cameras exchange left and right in the first frame. No
+setting was chosen on these seeds.
 """
 
 from dataclasses import asdict, dataclass

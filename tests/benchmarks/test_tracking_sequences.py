@@ -16,6 +16,7 @@ from benchmarks.tracking.names import DLT
 from benchmarks.tracking.rigs import RIGS, make_rig
 from benchmarks.tracking.sequences import make_sequences
 from benchmarks.tracking.walks import walk
+from benchmarks.tracking.workers import fall_and_get_up, run_to_and_fro
 from hrc_env.core.skeleton import JOINT, MIRROR, TORSO
 
 LIMBS = ("shoulder elbow", "elbow wrist", "hip knee", "knee ankle", "ankle foot")
@@ -248,3 +249,20 @@ def test_a_mirrored_start_exchanges_sides_of_two_cameras_in_the_first_frame_only
     differs = [not np.array_equal(clean[0, 0, c], mirrored[0, 0, c], True) for c in range(4)]
     assert sum(differs) == 2
     np.testing.assert_array_equal(clean[0, 0, differs][:, MIRROR], mirrored[0, 0, differs])
+
+
+def test_the_environments_workers_run_and_fall_inside_the_rigs():
+    for name in RIGS:
+        rig, seeds = make_rig(name), [5, 6, 7]
+        runs, falls = (play(rig.walk_m, seeds, 200) for play in (run_to_and_fro, fall_and_get_up))
+        alone = fall_and_get_up(rig.walk_m, [6], 200)
+        np.testing.assert_array_equal(alone[:, 0], falls[:, 1])
+        speed = np.linalg.norm(np.diff(runs[:, :, TORSO].mean(2)[..., :2], axis=0), axis=-1) / 0.04
+        assert 2.8 < speed.max() < 3.9
+        lowest = falls[:, :, TORSO].mean(2)[..., 2].min(0)
+        assert (lowest < 0.35).all()
+        for joints in (runs, falls):
+            assert np.isfinite(joints).all()
+            assert joints[..., 2].min() > -0.03
+            inside = np.abs(joints[..., :2]) < np.array(rig.walk_m) + 1.1
+            assert inside.all()
