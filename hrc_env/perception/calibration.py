@@ -59,7 +59,9 @@ class Calibration:
     between_m: Floats  # how far `offset_m` differs from body to body, a standard deviation [m]
     poses: Floats  # that were fitted to, or near to those (`outline.pose_of`)
     near_m: Floats  # bodies that are no further from one of them are not new (`novelty_m`) [m]
-    novel: Floats  # deviation that each metre further adds to what is told of a joint
+    novel: (
+        Floats  # times the square of how much further they are: what is added to deviations [1/m]
+    )
     tail: Floats  # now and then further: a normal vector n is lengthened by 1 + tail n.n / 3
     bias: Floats  # mean error in a camera by the view, of side
     size: Floats  # median over time of the standard deviation of each coordinate, of side

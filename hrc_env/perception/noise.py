@@ -27,7 +27,7 @@ from hrc_env.perception.outline import facing, mix, novelty_m, posture_of
 ERROR: Floats = read_calibration().sigma
 """(P, K, V) standard deviation of each image coordinate, a share of stature, by posture and kind of
 joint (`calibration.KINDS`) at `VISIBILITY`; see docs/emulator.md."""
-FARTHEST_M = 0.4
+FARTHEST_M = 0.25
 """Bodies that are further from poses that are known are no less known [m]."""
 STANDING = (1.0, *(0.0,) * (len(POSTURES) - 1))
 
@@ -97,7 +97,7 @@ def _put_right(mean, cov, velocity, tracked, tables, new, of_joints):
             for j in range(len(joints)):
                 _move(joints[j], cov[b, w, j], front, told[kinds[j]], hands[j])
                 for i in range(3):
-                    cov[b, w, j, i, i] += (novel[kinds[j]] * new_m) ** 2
+                    cov[b, w, j, i, i] += (novel[kinds[j]] * new_m**2) ** 2
 
 
 @kernel

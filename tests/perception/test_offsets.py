@@ -84,7 +84,7 @@ def test_what_is_not_known_of_the_offset_is_in_the_covariance(yaw_rad):
 
 
 def test_of_a_pose_that_is_new_less_is_known_the_further_it_is_from_others():
-    novel = np.linspace(0.2, 0.9, len(KINDS))
+    novel = np.linspace(2.0, 6.0, len(KINDS))
     known = replace(KNOWN, near_m=np.array(0.02), novel=novel)
     body, grown = facing_x(), []
     body = body[None] + 0.5 * np.random.default_rng(3).standard_normal((*body.shape,))
@@ -96,7 +96,7 @@ def test_of_a_pose_that_is_new_less_is_known_the_further_it_is_from_others():
         grown.append((cov[0] - cov[1])[0, 0])
     np.testing.assert_allclose(grown[0], 0.0, atol=1e-9)
     away_m = novelty_m(body[0], pose_of(facing_x())[..., None]) - 0.02
-    expected = (novel[KIND] * min(away_m, FARTHEST_M)) ** 2
+    expected = (novel[KIND] * min(away_m, FARTHEST_M) ** 2) ** 2
     np.testing.assert_allclose(grown[1], expected[:, None, None] * np.eye(3), atol=1e-9)
 
 

@@ -29,8 +29,8 @@ FEW = 200
 """Joints of a kind, in a class of distances, that tell something."""
 CLASS_M = 0.03
 """Width of a class of distances [m]."""
-MOST = 2.0
-"""No joint is less certain than by so many times the distance."""
+MOST = 20.0
+"""No joint is less certain than by so many times the square of the distance [1/m]."""
 
 
 def poses_of(clips: Sequence[Watched]) -> tuple[Floats, float]:
@@ -45,8 +45,9 @@ def poses_of(clips: Sequence[Watched]) -> tuple[Floats, float]:
 
 
 def novel_of(draft: Calibration, clips: Sequence[Watched]) -> Floats:
-    """(K,) deviation that is to be added for every metre that an estimate is further from known
-    poses than `near_m`: on average over all distances the region then holds what it claims."""
+    """(K,) what times the square of how much further than `near_m` an estimate is from known poses
+    is to be added to deviations [1/m]: the least with which the region holds what it claims, on
+    average over distances. The square is likelier of the fit's clips than the distance itself."""
     parts = [_told(replace(draft, novel=np.zeros(len(KINDS))), clip) for clip in clips]
     error, cov, new_m = (np.concatenate(each) for each in zip(*parts, strict=True))
     novel = np.zeros(len(KINDS))
@@ -55,7 +56,7 @@ def novel_of(draft: Calibration, clips: Sequence[Watched]) -> Floats:
         low, high = 0.0, MOST
         for _ in range(20):
             middle = 0.5 * (low + high)
-            grown = cov[:, mine] + ((middle * new_m) ** 2)[:, None, None, None] * np.eye(3)
+            grown = cov[:, mine] + ((middle * new_m**2) ** 2)[:, None, None, None] * np.eye(3)
             enough = _coverage(_inside(error[:, mine], grown), new_m) >= COVERED - SHORT
             low, high = (low, middle) if enough else (middle, high)
         novel[kind] = high
