@@ -11,10 +11,12 @@ at the end 0.5 m off, and twice as far as triangulation of that frame, although 
 joints all the time.
 """
 
+import multiprocessing
 import traceback
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass, replace
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +34,7 @@ from benchmarks.tracking.rigs import DT_S, HEIGHT_PX, WIDTH_PX, Rig
 from benchmarks.tracking.sequences import Sequences
 from benchmarks.tracking.walks import walk
 from hrc_env.cli.progress import progress_bar
+from hrc_env.core.machine import n_cores
 from hrc_env.core.typing import Bools, Floats, Points2, Points3
 from hrc_env.experiments.study.report import Column, Report, table_of
 from hrc_env.geometry.cameras import PinholeCamera, pinhole, projections
@@ -54,6 +57,8 @@ class Arguments:
     """Of 50 sequences each."""
     first_case: int = 0
     """The others count up; a case depends on its number only."""
+    processes: int = field(default_factory=n_cores)
+    """In which they are tracked; they change no number."""
     out: Path = Path("out/fuzz")
 
 
@@ -61,9 +66,13 @@ def main(arguments: Arguments) -> None:
     """Draw, track, count; writes results.json, and found.txt with what was found."""
     cases = range(arguments.first_case, arguments.first_case + arguments.cases)
     counts, found = Counter[str](), list[str]()
-    with progress_bar(Console(), "fuzz") as say:
-        for case in cases:
-            for kind, sequence in _judged(case):
+    context = multiprocessing.get_context("spawn")
+    with (
+        ProcessPoolExecutor(arguments.processes, mp_context=context) as pool,
+        progress_bar(Console(), "fuzz") as say,
+    ):
+        for case, wrong in zip(cases, pool.map(judged, cases), strict=True):
+            for kind, sequence in wrong:
                 counts[kind] += 1
                 found.append(f"{kind}: case {case}, sequence {sequence}")
             say(1 / arguments.cases, f"{len(found)} found")
@@ -76,8 +85,12 @@ def main(arguments: Arguments) -> None:
     (arguments.out / "found.txt").write_text("".join(f"{each}\n" for each in found))
 
 
-def _judged(case: int) -> Iterator[tuple[str, int]]:
+def judged(case: int) -> list[tuple[str, int]]:
     """What is wrong in a case: the kind, and in which sequence (-1: all)."""
+    return list(_judged(case))
+
+
+def _judged(case: int) -> Iterator[tuple[str, int]]:
     rng = np.random.default_rng([case, 11])
     seeds = [EACH * case + k for k in range(EACH)]
     try:

@@ -32,11 +32,11 @@ def test_a_case_is_reproduced_and_nothing_is_wrong_with_it():
     rigs = [fuzz._rig(np.random.default_rng([3, 11])) for _ in range(2)]
     np.testing.assert_array_equal(rigs[0][1], rigs[1][1])
     assert np.abs(rigs[0][0].P - rigs[0][1]).max() > 0  # cameras hang a little otherwise
-    assert list(fuzz._judged(3)) == []
+    assert fuzz.judged(3) == []
 
 
 def _found(case):
-    found = list(fuzz._judged(case))
+    found = fuzz.judged(case)
     return {kind: {k for each, k in found if each == kind} for kind in dict(found)}
 
 
@@ -83,7 +83,7 @@ def test_what_is_wrong_is_called_by_its_name(off_m, std_m, kinds, monkeypatch):
 
 def test_an_exception_is_counted(monkeypatch, capsys):
     monkeypatch.setattr(fuzz, "beliefs", lambda *_: 1 / 0)
-    assert list(fuzz._judged(0)) == [("exceptions", -1)]
+    assert fuzz.judged(0) == [("exceptions", -1)]
     assert "ZeroDivisionError" in capsys.readouterr().err
 
 
