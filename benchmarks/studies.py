@@ -77,7 +77,8 @@ STUDIES: dict[str, Study] = {
     ),
     "perception": Study(
         BENCH + "perception", 50, ("benchmarks.perception.bench",),
-        ("pixels_accuracy", "faults", "miscalibration", "appearance", "emulator", "speed_pixels"),
+        ("pixels_accuracy", "faults", "miscalibration", "appearance", "emulator",
+         "emulator_lasting", "speed_pixels"),
         {"emulator.png": "emulator.png"},
     ),
     "acquisition": Study(

@@ -74,7 +74,7 @@ def _samples(clip: Watched) -> Samples:
     late = slice(WARM_UP, None)
     look_of, sight = clip.look_of[late], clip.sight[late]
     px, true_px = clip.px[late], clip.true_px[late]
-    exchanged = _exchanged(px, true_px, look_of[..., SIDE])
+    exchanged = exchanged_sides(px, true_px, look_of[..., SIDE])
     px = np.where(exchanged[..., 0, None, None], px[..., MIRROR, :], px)
     legs = exchanged[..., 1, None, None] & (np.arange(px.shape[2]) >= FIRST_OF_LEGS)[:, None]
     px = np.where(legs, px[..., MIRROR, :], px)
@@ -105,7 +105,7 @@ def _in_window(vectors: Floats, look_of: Floats) -> Floats:
     return np.stack([cos * x + sin * y, cos * y - sin * x], 3) / side[..., None].swapaxes(3, -1)
 
 
-def _exchanged(px: Floats, true_px: Floats, side: Floats) -> Bools:
+def exchanged_sides(px: Floats, true_px: Floats, side: Floats) -> Bools:
     """(T, C, 2) whether left and right of the whole body, and of the legs alone, are exchanged."""
     here = np.linalg.norm(px - true_px, axis=-1)
     other = np.linalg.norm(px[..., MIRROR, :] - true_px, axis=-1)

@@ -11,12 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from assets.emulator.clips import FAMILIES, WARM_UP, Clip, family_of, unseen_clips
+from assets.emulator.samples import exchanged_sides
 from assets.emulator.shelf import kept
 from assets.emulator.watch import BodyOf, Watched, watch
 from hrc_env.config import HRCConfig
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Bools, Floats, Ints
-from hrc_env.perception.sightlines import SEEN
+from hrc_env.perception.sightlines import SEEN, SIDE
 from hrc_env.worker.body import load_body
 
 CHI2_95_3D = 7.815
@@ -56,6 +57,8 @@ class StepResult:
     """Correlation of these errors (without gross ones) with those 0.48 s later."""
     missed: float
     """Share of looks at a body half of which is in sight that found nobody."""
+    exchanged: float
+    """Share of looks that exchanged left and right of the body or of the legs."""
     n: int
     """Joints."""
 
@@ -107,8 +110,8 @@ def ratios_of(seen: Compared) -> dict[str, Metric]:
     Returns:
         `emulator_error_ratio.<family>` for medians, `.<family>.p95`, and
         `emulator_coverage_difference.<family>`; their 95 % intervals draw clips anew. What they are
-        made of: `emulator_<median_m|p95_m|coverage95>.<family>.<pixels|keypoints>` and
-        `emulator_clips.<family>`.
+        made of, and what lasts: `emulator_<what>.<family>.<pixels|keypoints>`, which are median_m,
+        p95_m, coverage95, lasting, exchanged; and `emulator_clips.<family>`.
     """
     pixels = [in_space([each]) for each in seen.pixels]
     emulated = [in_space(each) for each in seen.emulated]
@@ -119,7 +122,8 @@ def ratios_of(seen: Compared) -> dict[str, Metric]:
         for level, found in zip(("pixels", "keypoints"), outcomes, strict=True):
             for what, value, unit in (
                 ("median_m", found.median_m, "m"), ("p95_m", found.p95_m, "m"),
-                ("coverage95", found.coverage, "share"),
+                ("coverage95", found.coverage, "share"), ("lasting", found.lasting, ""),
+                ("exchanged", found.exchanged, "share"),
             ):  # fmt: skip
                 metrics[f"emulator_{what}.{family}.{level}"] = _exactly(value, unit, found.n)
         metrics |= apart(family, [pixels[k] for k in mine], [emulated[k] for k in mine])
@@ -225,7 +229,7 @@ def outcome(watched: Sequence[Watched]) -> StepResult:
         float(np.median(error)), float(np.percentile(error, 95)), float(inside.mean()),
         float(1 - np.concatenate([each.tracked[WARM_UP:] for each in watched]).mean()),
         float(np.median(px)), float(np.percentile(px, 95)), lasting(watched),
-        float(missed[looked].mean()), error.size,
+        float(missed[looked].mean()), exchanging(watched), error.size,
     )  # fmt: skip
 
 
@@ -263,6 +267,18 @@ def lasting(watched: Sequence[Watched], lag: int = 12, sharp: float = 0.06) -> f
     return product / square
 
 
+def exchanging(watched: Sequence[Watched]) -> float:
+    """Share of looks while somebody was tracked that exchanged left and right."""
+    exchanged, looks = 0, 0
+    for each in watched:
+        px, side = each.px[WARM_UP:], each.look_of[WARM_UP:, :, SIDE]
+        mine = each.tracked[WARM_UP:, None] & np.isfinite(px[..., 0, 0])
+        sides = np.any(exchanged_sides(px, each.true_px[WARM_UP:], side), axis=-1)
+        exchanged += int(sides[mine].sum())
+        looks += int(mine.sum())
+    return exchanged / max(looks, 1)
+
+
 def table_of(seen: dict[str, tuple[StepResult, StepResult]]) -> Iterator[tuple[str, ...]]:
     """Rows of text: family, then each number as "pixels / emulator"."""
     for family, (a, b) in seen.items():
@@ -274,10 +290,11 @@ def table_of(seen: dict[str, tuple[StepResult, StepResult]]) -> Iterator[tuple[s
             f"{100 * a.px_median:.2f} / {100 * b.px_median:.2f}",
             f"{100 * a.px_p95:.1f} / {100 * b.px_p95:.1f}",
             f"{a.lasting:.2f} / {b.lasting:.2f}", f"{a.missed:.3f} / {b.missed:.3f}",
+            f"{a.exchanged:.3f} / {b.exchanged:.3f}",
         )  # fmt: skip
 
 
 COLUMNS = (
     "family", "median [mm]", "ratio", "p95 [mm]", "ratio", "coverage", "lost",
-    "2D median [%]", "2D p95 [%]", "after 0.48 s", "missed",
+    "2D median [%]", "2D p95 [%]", "after 0.48 s", "missed", "exchanged",
 )  # fmt: skip
