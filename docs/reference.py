@@ -11,9 +11,9 @@ from typing import Any, get_args, get_origin
 
 import numpy as np
 
-from benchmarks.recorded.clips import AGAIN, CLIPS, Recorded
-from benchmarks.recorded.sources import SOURCES
-from benchmarks.recorded.synthetic import STYLES
+from assets.recordings.clips import AGAIN, CLIPS, Recorded
+from assets.recordings.sources import SOURCES
+from assets.recordings.synthetic import STYLES
 from hrc_env import __main__, observations
 from hrc_env.cli.environment import EnvironmentArguments
 from hrc_env.core.checkout import module_of

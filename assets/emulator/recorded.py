@@ -4,8 +4,8 @@ import functools
 
 import numpy as np
 
-from benchmarks.recorded.clips import CLIPS, Role, clips_of
-from benchmarks.recorded.synthetic import STYLES, made_of
+from assets.recordings.clips import CLIPS, Role, clips_of
+from assets.recordings.synthetic import STYLES, made_of
 from hrc_env.core.records import WorkerMotion
 from hrc_env.core.typing import Floats
 from hrc_env.mocap.poses import posed

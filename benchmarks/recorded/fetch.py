@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.recorded.archives import Archive, fetch
+from assets.recordings.archives import Archive, fetch
 
 AGAIN = "python -m hrc_env bench tracking --real"
 _CALIBRATION = "calibration/Calib.qca.txt"

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from assets.rotations import matrix_from_quaternion
-from benchmarks.recorded.written import (
+from assets.recordings.written import (
     BODY,
     ORDERS,
     Y_UP,
@@ -18,6 +17,7 @@ from benchmarks.recorded.written import (
     write_acclaim,
     write_bvh,
 )
+from assets.rotations import matrix_from_quaternion
 from hrc_env.core.records import WorkerMotion
 from hrc_env.mocap.poses import marks_of
 from hrc_env.worker.body import worker_truth

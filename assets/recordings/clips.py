@@ -13,10 +13,10 @@ from typing import Literal
 
 import numpy as np
 
-from benchmarks.recorded.archives import fetch
-from benchmarks.recorded.foreign import READERS, joints_in
-from benchmarks.recorded.sources import SOURCES
-from benchmarks.recorded.synthetic import made_of
+from assets.recordings.archives import fetch
+from assets.recordings.foreign import READERS, joints_in
+from assets.recordings.sources import SOURCES
+from assets.recordings.synthetic import made_of
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.typing import Points3
 from hrc_env.geometry.rotations import about_axis
@@ -27,7 +27,7 @@ from hrc_env.mocap.retarget import RetargetError, retarget
 from hrc_env.motion.clip import Clip
 from hrc_env.worker.body import Body, load_body
 
-AGAIN = "python -m benchmarks.recorded.clips"
+AGAIN = "python -m assets.recordings.clips"
 FASTEST_HZ = 60.0
 """Faster recordings are thinned out to this rate."""
 FADE_S = 0.2

@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 from recorded import started, walk_straight
 
+from assets.recordings import foreign
+from assets.recordings.archives import Archive, fetch
+from assets.recordings.clips import CLIPS, Recorded, capture_of, clips_of, repeated
+from assets.recordings.sources import SOURCES
+from assets.recordings.synthetic import STYLES, Style, made_of, write
 from assets.rotations import quaternion_from_matrix
-from benchmarks.recorded import foreign
-from benchmarks.recorded.archives import Archive, fetch
-from benchmarks.recorded.clips import CLIPS, Recorded, capture_of, clips_of, repeated
 from benchmarks.recorded.fetch import POSE2SIM
-from benchmarks.recorded.sources import SOURCES
-from benchmarks.recorded.synthetic import STYLES, Style, made_of, write
 from hrc_env.core.errors import ConfigError, DownloadError
 from hrc_env.core.records import WorkerMotion
 from hrc_env.core.skeleton import JOINT

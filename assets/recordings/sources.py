@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from benchmarks.recorded.archives import Archive
+from assets.recordings.archives import Archive
 
 _CLIMB = "holosoma_retargeting/demo_data/climb/mocap_climb_seq_{0}/mocap_climb_seq_{0}_joint_positions_{1}.npy"  # noqa: E501
 _AMP = "isaaclab_tasks/contrib/humanoid_amp/motions/humanoid_{0}.npz"

@@ -11,8 +11,8 @@ from typing import Literal
 
 import numpy as np
 
+from assets.recordings.written import ORDERS, Y_UP, write_acclaim, write_bvh
 from assets.rotations import matrix_from_quaternion
-from benchmarks.recorded.written import ORDERS, Y_UP, write_acclaim, write_bvh
 from hrc_env.core.typing import Floats, Points3, Rotations
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.mocap.read import read_capture

@@ -1,0 +1,1 @@
+"""Recordings of people that packages carry, fetched at need and imported as clips."""
