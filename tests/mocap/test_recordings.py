@@ -111,7 +111,7 @@ def test_a_wheel_that_is_none_is_refused(cache, monkeypatch):
 
 
 def test_a_missing_file_says_what_to_do(tmp_path):
-    with pytest.raises(ConfigError, match=r"climb_0\.npy is missing.*python -m benchmarks"):
+    with pytest.raises(ConfigError, match=r"climb_0\.npy is missing.*python -m assets"):
         capture_of(CLIPS[0], tmp_path)
 
 
