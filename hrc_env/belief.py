@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.core.records import PoseEstimate, RobotState
+from hrc_env.core.records import HandState, ObjectState, PoseEstimate, RobotState
 from hrc_env.core.skeleton import SEGMENT_RADIUS_M
 from hrc_env.core.typing import Floats
 from hrc_env.geometry.distances import Separation, least_separation, segments
@@ -23,6 +23,10 @@ class Belief:
     """What the task says to the robot (`Task.view`)."""
     action: Floats
     """(B, A) the last action, in [-1, 1]."""
+    hand: HandState | None = None
+    """Its gripper, if it has one."""
+    objects: ObjectState | None = None
+    """The task's loose objects as they are measured, if there are any."""
     forecast: tuple[PoseEstimate, ...] = ()
     """What is expected of the workers at each of `HRCConfig.forecast_s` from now."""
 

@@ -18,6 +18,7 @@ from hrc_env.core.mapping import PRESETS, from_mapping, plain, read_toml, restor
 from hrc_env.core.results import write_whole
 from hrc_env.geometry.camera_config import CameraConfig, read_rig
 from hrc_env.metrics import CostConfig
+from hrc_env.handling import ObjectsConfig
 from hrc_env.motion.generator import PEOPLE, MotionConfig, PeopleConfig
 from hrc_env.motion.schedule import WORK, Job
 from hrc_env.observations import UNCERTAINTY
@@ -29,8 +30,7 @@ from hrc_env.safety.shield import Shield, shield_called
 from hrc_env.scene.build import SceneConfig
 from hrc_env.scene.domain_randomization import APPEARANCES, AppearanceConfig
 from hrc_env.scene.rigs import RIGS
-from hrc_env.scene.robot import DEFAULT as DEFAULT_ROBOT
-from hrc_env.scene.robot import Robot, robot_called
+from hrc_env.scene.robot import ROBOTS, Robot, robot_called
 from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import Task, task_called
 from hrc_env.tracking.config import ParticleConfig, TrackerConfig, of_kind
@@ -75,6 +75,8 @@ class HRCConfig:
     """Which detection is of whom, where there are several workers."""
     control: ControlConfig = field(default_factory=ControlConfig)
     """What an action means."""
+    objects: ObjectsConfig = field(default_factory=ObjectsConfig)
+    """How well the robot knows the task's loose objects."""
     task: Any = None
     """The task's own settings (`Task.config`); None: its defaults."""
     reward: RewardConfig = field(default_factory=RewardConfig)
@@ -117,7 +119,7 @@ PARTS = {
 """Arguments of an environment that are parts of the config: chosen often."""
 ARGUMENTS: dict[str, Any] = {
     "task": DEFAULT, "perception": "pixels", "estimator": "particle", "cameras": None,
-    "scene": "lab", "robot": DEFAULT_ROBOT, "n_workers": 1, "control": "joint", "shield": None,
+    "scene": "lab", "robot": None, "n_workers": 1, "control": "joint", "shield": None,
     "config": None, **dict.fromkeys(PARTS),
 }  # fmt: skip
 """The arguments of an environment that decide what happens in it (`HRCEnv`): their defaults."""
@@ -158,9 +160,16 @@ def settle(**arguments: Any) -> Settings:
     for name, path in PARTS.items():
         if given[name] is not None:
             config = _with_part(config, path, given[name], name)
+    robot = robot_called(task.robot if given["robot"] is None else given["robot"])
+    if task.grips and robot.hand is None:
+        able = [name for name, each in ROBOTS.items() if each.hand]
+        raise ConfigError(
+            f"{task.id} needs a robot with a hand, and {robot.name!r} has none; there are "
+            f"{', '.join(map(repr, able))}."
+        )
     return Settings(
         task, given["perception"], estimator, cameras, given["scene"],
-        robot_called(given["robot"]), _worker_counts(given["n_workers"]), given["control"],
+        robot, _worker_counts(given["n_workers"]), given["control"],
         shield_called(given["shield"]), config,
     )  # fmt: skip
 
@@ -170,12 +179,11 @@ def resolve(config: ConfigChoice, task: Task, estimator: EstimatorSpec) -> HRCCo
     `ConfigError` for a field that does not exist, a bad value, or the settings of another task."""
     if isinstance(config, str | Path):
         config = read_toml(config)
-    if isinstance(config, Mapping):
-        said = {name: value for name, value in config.items() if (name, value) != ("task", None)}
+    if config is None or isinstance(config, Mapping):
+        said = _merged(task.defaults, config or {})
+        said = {name: value for name, value in said.items() if (name, value) != ("task", None)}
         kinds = {"task": task.config, "tracker": estimator.config}
         config = from_mapping(HRCConfig, said, kinds=kinds)
-    if config is None:
-        config = HRCConfig()
     if not isinstance(config, HRCConfig):
         raise ConfigError(
             "config must be an HRCConfig, a mapping, a TOML file's path or None, "
@@ -190,6 +198,13 @@ def resolve(config: ConfigChoice, task: Task, estimator: EstimatorSpec) -> HRCCo
             f"got {type(config.task).__name__}."
         )
     return config
+
+
+def _merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    """Nested mappings as one; what both say is as `above` has it."""
+    both = {k: v for k, v in below.items() if k in above and isinstance(v, Mapping)}
+    deeper = {k: _merged(v, above[k]) for k, v in both.items() if isinstance(above[k], Mapping)}
+    return {**below, **above, **deeper}
 
 
 def save_config(config: HRCConfig, path: str | Path) -> None:

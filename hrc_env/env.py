@@ -27,7 +27,6 @@ from hrc_env.render.views import PICTURE_SIZE, Views, picture_size
 from hrc_env.rewards import RewardConfig
 from hrc_env.safety.shield import Shield
 from hrc_env.scene.domain_randomization import AppearanceConfig
-from hrc_env.scene.robot import DEFAULT as DEFAULT_ROBOT
 from hrc_env.scene.robot import Robot
 from hrc_env.simulation import Simulation, checked_action
 from hrc_env.tasks import DEFAULT
@@ -85,7 +84,8 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
             ("lab_gopro"), a TOML file's path, or a list of places (x, y, z) [m],
             `CameraConfig`s or mappings. None is all cameras of the scene.
         scene: name of the place: "lab", a workshop, or "site", a construction site.
-        robot: a name ("ur10e_like"), one that was registered or a `hrc_env.scene.robot.Robot`.
+        robot: a name ("ur10e_like", "ur10e_gripper"), one that was registered or a
+            `hrc_env.scene.robot.Robot`; None: the one that the task is made for.
         n_workers: 0 or more workers; (fewest, most): each episode's number is drawn, and the
             observation has room for the most.
         people: how the workers are with the robot: "attentive", "hurried", "unaware", a
@@ -97,7 +97,8 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         appearance: how scene and workers look, drawn for every episode: "varied" or another of
             `hrc_env.scene.domain_randomization.APPEARANCES`, an `AppearanceConfig` or a mapping;
             None for that of the config (as built). Level "pixels" only.
-        control: "joint" (joint velocities) or "tool" (tool velocity).
+        control: "joint" (joint velocities), "tool" (tool velocity) or "twist" (that and the
+            tool's turn rate); a robot with a hand has one entry more, -1 open to 1 closed.
         shield: what may change a command before the arm gets it: a name that was registered or a
             function (`hrc_env.safety.shield.Shield`); None: nothing.
         render_mode: "rgb_array", "depth_array" or None; `gymnasium.make` also takes "human", a
@@ -120,7 +121,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         estimator: EstimatorChoice = "particle",
         cameras: str | Path | Sequence[Any] | NDArray[Any] | None = None,
         scene: str = "lab",
-        robot: str | Robot = DEFAULT_ROBOT,
+        robot: str | Robot | None = None,
         n_workers: int | tuple[int, int] = 1,
         people: str | PeopleConfig | Mapping[str, Any] | None = None,
         motions: Sequence[str | Path | Clip] | None = None,

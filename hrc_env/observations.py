@@ -18,8 +18,10 @@ from hrc_env.belief import (
 )
 from hrc_env.core.errors import Named, check_shape
 from hrc_env.core.kernels import kernel
+from hrc_env.core.records import HandState, ObjectState
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats, Tensor
+from hrc_env.geometry.rotations import matrix
 
 TOWARDS_ROBOT, FACTOR = UNCERTAINTY = ("towards_robot", "factor")
 """What else can be asked for of each joint's covariance."""
@@ -38,6 +40,10 @@ class Sizes:
     """How many times ahead were asked for."""
     uncertainty: tuple[str, ...] = ()
     """Which of `UNCERTAINTY` were asked for."""
+    hands: int = 0
+    """1 of an arm with a gripper."""
+    objects: int = 0
+    """How many are loose."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +86,16 @@ def _shorten(vectors, softening):
             vectors[k, i] /= divisor
 
 
+def _hand(now: Belief) -> HandState:
+    assert now.hand is not None  # or the term has no entries
+    return now.hand
+
+
+def _objects(now: Belief) -> ObjectState:
+    assert now.objects is not None
+    return now.objects
+
+
 def _joints_forecast(now: Belief) -> Floats:
     """(B, W, H, J, 3) from the tool point now."""
     joints = np.stack([later.mean_world for later in now.forecast], axis=2)
@@ -107,8 +123,38 @@ ROBOT_TERMS: tuple[ObservationTerm, ...] = (
         "Position of the tool point.",
         lambda now: now.robot.tool_world,
     ),
+    ObservationTerm(
+        "tool_axes", lambda of: 6 * of.hands, "-", "world", 1.0, 1.0,
+        "The tool's x axis, along which fingers move, and its z axis, away from the arm.",
+        lambda now: now.robot.tool_axes_world[..., [0, 2]].swapaxes(-1, -2),
+    ),
+    ObservationTerm(
+        "hand_opening", lambda of: of.hands, "m", "tool", 0.2, 0.05,
+        "How far each finger is from the middle.",
+        lambda now: _hand(now).opening_m,
+    ),
+    ObservationTerm(
+        "hand_force", lambda of: of.hands, "N", "tool", 300.0, 100.0,
+        "With which the fingers press together; negative: apart.",
+        lambda now: _hand(now).force_n,
+    ),
+    ObservationTerm(
+        "object_from_tool", lambda of: 3 * of.objects, "m", "world", 3.0, 0.5,
+        "From the tool point to the middle of each loose object, as measured.",
+        lambda now: _objects(now).position_world - now.robot.tool_world[:, None],
+    ),
+    ObservationTerm(
+        "object_axes", lambda of: 6 * of.objects, "-", "world", 1.0, 1.0,
+        "Each object's y axis and z axis, as measured.",
+        lambda now: matrix(_objects(now).quaternion_wxyz)[..., 1:].swapaxes(-1, -2),
+    ),
+    ObservationTerm(
+        "object_held", lambda of: of.objects, "-", "-", 1.0, 1.0,
+        "1 for an object that the fingers hold.",
+        lambda now: _objects(now).held.astype(float),
+    ),
 )  # fmt: skip
-"""The robot's own state, which opens the observation."""
+"""The robot's own state and what it handles, which open the observation."""
 
 SHARED_TERMS: tuple[ObservationTerm, ...] = (
     ObservationTerm(

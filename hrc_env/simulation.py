@@ -6,6 +6,7 @@ streams only, never on the size of the batch.
 
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -15,25 +16,26 @@ from numpy.typing import ArrayLike
 from hrc_env import metrics, observations, rewards, room, step
 from hrc_env.belief import Belief, estimated_separation
 from hrc_env.config import Settings
-from hrc_env.control import joint_command, n_actions
-from hrc_env.core.batching import State, Stateful, picked, write_rows
+from hrc_env.control import joint_command, n_actions, opening_m
+from hrc_env.core.batching import State, Stateful, picked, rows, write_rows
 from hrc_env.core.errors import ConfigError, check_shape
 from hrc_env.core.kernels import ahead
 from hrc_env.core.records import PoseEstimate, RobotState, WorkerMotion, WorkerTruth
 from hrc_env.core.streams import children
-from hrc_env.core.typing import Bools, Floats, Ints, JointVelocities, Points3
+from hrc_env.core.typing import Bools, Capsules, Floats, Ints, JointVelocities, Points3
 from hrc_env.geometry import chains
+from hrc_env.handling import World, measured
 from hrc_env.motion import generator
 from hrc_env.motion.activities.pieces import NoRoomError
 from hrc_env.pipeline.levels import CAMERA_LEVELS, make_pipeline
 from hrc_env.pipeline.sensor_input import SensorInput, TrueSensorInput
 from hrc_env.rewards import RewardConfig
 from hrc_env.safety.shield import shielded
+from hrc_env.scene import objects as loose
 from hrc_env.scene.build import Scene, build
 from hrc_env.scene.physics import Physics
 from hrc_env.scene.rigs import findings
 from hrc_env.step import Info, StepResult
-from hrc_env.tasks.task import World
 from hrc_env.tracking import oracle
 from hrc_env.worker.body import pool, stack, worker_capsules, worker_truth
 
@@ -47,12 +49,16 @@ STREAMS = ("robot", "motion", "sensor", "tracker", "task")
 the worker's walk does not depend on who looks at it."""
 
 
+MEASURING = "objects"
+"""And who measures loose objects, where there are any: from a child of the task's."""
+
+
 class Simulation(Stateful):
     """`batch` environments of the same settings that step together."""
 
     CHANGES = (
         "physics", "pipeline", "motion", "task_state", "streams", "action", "episode_cost",
-        "separation_m", "estimates", "reward_weights", "identities",
+        "separation_m", "estimates", "reward_weights", "identities", "measured",
     )  # fmt: skip
 
     def __init__(self, batch: int, settings: Settings) -> None:
@@ -65,6 +71,7 @@ class Simulation(Stateful):
         scene_for = partial(
             build, config.scene, settings.scene,
             bodies=self.bodies.names, cameras=settings.cameras, robot=settings.robot,
+            things=self.task.things(config.task),
         )  # fmt: skip
         try:  # first, as it knows how many workers and which clips there is room for
             self.motion = generator.make_state(
@@ -81,10 +88,12 @@ class Simulation(Stateful):
         self.chain, n_joints = self.scene.chain, self.scene.chain.n_joints
         self._spread_rad = np.array(config.start_spread_rad or settings.robot.spread_rad)
         check_shape("start_spread_rad", self._spread_rad.shape, (n_joints,), "one a joint")
-        self.n_actions = n_actions(settings.control, self.chain)
+        self._grips = settings.robot.hand is not None
+        self.n_actions = n_actions(settings.control, self.chain, self._grips)
         sizes = observations.Sizes(
-            n_joints, self.n_actions, most, len(config.forecast_s), config.uncertainty
-        )
+            n_joints, self.n_actions, most, len(config.forecast_s), config.uncertainty,
+            int(self._grips), len(self.scene.objects.names),
+        )  # fmt: skip
         self.layout = observations.layout(self.terms, sizes)
         self.physics = Physics(self.scene, batch)
         self.pipeline = make_pipeline(perception, settings.estimator, self.scene, batch, config)
@@ -98,7 +107,10 @@ class Simulation(Stateful):
         )
         """What is believed of the workers now, and expected at each of `forecast_s`."""
         self.identities = metrics.no_identities(batch, most)
-        self.streams = {name: [np.random.default_rng(0)] * batch for name in STREAMS}
+        self.measured = self._world(self._everyone, chains.robot_state(
+            self.chain, self.physics.q, self.physics.qd)).objects
+        """The task's loose objects as they were measured last; None: there are none."""
+        self.streams = {name: [np.random.default_rng(0)] * batch for name in (*STREAMS, MEASURING)}
 
     def reset(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> StepResult:
         """Start environments `ids` anew, one generator each; their rows of a result."""
@@ -106,17 +118,23 @@ class Simulation(Stateful):
         for b, rng in zip(ids, rngs, strict=True):
             for name, stream in zip(STREAMS, children(rng, len(STREAMS)), strict=True):
                 streams[name][b] = stream
+            if self.measured is not None:
+                streams[MEASURING][b] = streams["task"][b].spawn(1)[0]
         generator.reset(self.motion, ids, streams["motion"])
-        self.physics.reset(ids, self._starting_angles(ids), self.motion.workers["body"][ids])
         self.action[ids], self.episode_cost[ids], self.separation_m[ids] = 0.0, 0.0, 0.0
-        robot = chains.robot_state(self.chain, self.physics.q[ids], self.physics.qd[ids])
-        self.task.reset(self.task_state, ids, streams["task"], World(robot), self.config.task)
+        q, task, config = self._starting_angles(ids), self.task, self.config.task
+        robot = chains.robot_state(self.chain, q, np.zeros_like(q))
+        task.reset(self.task_state, ids, streams["task"], World(robot), config)
+        poses = None if task.poses is None else task.poses(self.task_state, ids, config)
+        self.physics.reset(ids, q, self.motion.workers["body"][ids], poses)
+        world = self._world(ids, robot)
+        self._measure(ids, world)
         self.pipeline.reset(ids, streams["sensor"], streams["tracker"])
         motion = generator.current(self.motion, ids)
         truth = worker_truth(self.bodies, motion)
         self._expose(ids, motion, truth)
         estimates = self._perceive(ids)
-        belief = self._believed(ids, robot, estimates)
+        belief = self._believed(ids, world, estimates)
         observation = observations.observe(belief, self.layout, self.terms)
         identities = metrics.no_identities(*self.present[ids].shape)
         info = {
@@ -136,17 +154,23 @@ class Simulation(Stateful):
             self.motion, self.streams["motion"], config.scene.sim_dt, config.n_substeps
         )
         far = self.separation_m > CLOSING_M_S * config.ctrl_dt
-        q_path = self.physics.step(command, path, far)
+        grip = self.scene.grip
+        opening = None if grip is None else opening_m(self.action, grip.open_m)
+        q_path = self.physics.step(command, path, far, opening)
         truth = worker_truth(self.bodies, motion)
         self._expose(self._everyone, motion, truth)
         estimates = self._perceive(self._everyone)
-        robot, arm = chains.robot_along(self.chain, q_path, self.physics.qd)
+        n = self.chain.n_joints
+        robot, arm = chains.robot_along(self.chain, q_path[..., :n], self.physics.qd)
+        world, arm = self._loaded(self._world(self._everyone, robot), arm, q_path)
+        self._measure(self._everyone, world)
+        robot = world.robot
         seen_world = robot.capsules_world[:, self.scene.watched, 1]
         generator.watch(self.motion, seen_world, motion, config.ctrl_dt)
         progress = self.task.advance(
-            self.task_state, self.streams["task"], World(robot), config.ctrl_dt, config.task
+            self.task_state, self.streams["task"], world, config.ctrl_dt, config.task
         )
-        belief = self._believed(self._everyone, robot, estimates)
+        belief = self._believed(self._everyone, world, estimates)
         terms = self._reward_terms(belief, progress, previous)
         workers = worker_capsules(self.bodies, path, motion.body)
         cost = metrics.cost(
@@ -163,12 +187,11 @@ class Simulation(Stateful):
             **shield_info,
             **self._episode_info(self._everyone, activity),
         }
-        return StepResult(
-            observations.observe(belief, self.layout, self.terms),
-            rewards.total(terms, self.batch),
-            (cost.contact > 0) & config.cost.contact_terminates,
-            info,
-        )
+        over = (cost.contact > 0) & config.cost.contact_terminates
+        if self.task.over is not None:
+            over |= self.task.over(progress)
+        observation = observations.observe(belief, self.layout, self.terms)
+        return StepResult(observation, rewards.total(terms, self.batch), over, info)
 
     def set_reward(self, weights: RewardConfig) -> None:
         """Weigh the reward's terms so from the next step on."""
@@ -211,7 +234,9 @@ class Simulation(Stateful):
     def belief(self) -> Belief:
         """What every robot believes now."""
         robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
-        return self._believed(self._everyone, robot, self.estimates)
+        world, qpos = self._world(self._everyone, robot), self.physics.qpos[:, None]
+        world, _ = self._loaded(world, robot.capsules_world[:, None], qpos)
+        return self._believed(self._everyone, world, self.estimates)
 
     def markers(self, b: int) -> Points3:
         """(M, 3) what the task of environment `b` has to show [m]."""
@@ -227,8 +252,8 @@ class Simulation(Stateful):
     def _command(self) -> tuple[JointVelocities, Info]:
         """(B, N) what the arms are to do [rad/s], and what the shield says to it."""
         command = joint_command(
-            self.control, self.action, self.physics.q, self.chain, self.scene.home_q,
-            self.config.control,
+            self.control, self.action[:, : self.n_actions - self._grips], self.physics.q,
+            self.chain, self.scene.home_q, self.config.control,
         )  # fmt: skip
         if self.shield is None:
             return command, {}
@@ -236,9 +261,9 @@ class Simulation(Stateful):
 
     def _expose(self, ids: Ints, motion: WorkerMotion, truth: WorkerTruth) -> None:
         """Show environments `ids` to the sensor, which alone sees them."""
-        now = SensorInput(ids, self.physics.q[ids], motion)
+        now = SensorInput(ids, self.physics.qpos[ids], motion)
         if self.pipeline.sensor.NEEDS_TRUTH:
-            now = TrueSensorInput(ids, now.q, motion, truth, self.motion.workers["present"][ids])
+            now = TrueSensorInput(ids, now.qpos, motion, truth, self.motion.workers["present"][ids])
         self.pipeline.sensor.expose(now)
 
     def _perceive(self, ids: Ints) -> tuple[PoseEstimate, ...]:
@@ -254,15 +279,42 @@ class Simulation(Stateful):
                 write_rows(whole, ids, part)
         return estimates
 
+    def _world(self, ids: Ints, robot: RobotState) -> World:
+        """Robots of environments `ids` with what they handle."""
+        hand, objects = self.physics.hand_state(ids), self.scene.objects
+        if not objects.names:
+            return World(robot, hand)
+        qpos, qvel = self.physics.qpos[ids], self.physics.qvel[ids]
+        held = np.zeros((len(ids), len(objects.names)), bool)
+        if hand is not None:
+            held = loose.held_by(objects, qpos, robot.tool_world, hand)
+        return World(robot, hand, loose.object_state(objects, qpos, qvel, held))
+
+    def _loaded(self, world: World, arm: Capsules, q_path: Floats) -> tuple[World, Capsules]:
+        """What a robot carries is part of it, now and along capsules (B, T, K, 2, 3)."""
+        if world.objects is None:
+            return world, arm
+        objects, held = self.scene.objects, world.objects.held
+        robot, arm = loose.with_load(world.robot, arm, objects, q_path, held)
+        return replace(world, robot=robot), arm
+
+    def _measure(self, ids: Ints, world: World) -> None:
+        """Measure the loose objects of environments `ids`."""
+        if world.objects is not None:
+            rngs = picked(self.streams["objects"], ids)
+            write_rows(self.measured, ids, measured(world.objects, rngs, self.config.objects))
+
     def _believed(
-        self, ids: Ints, robot: RobotState, estimates: tuple[PoseEstimate, ...]
+        self, ids: Ints, world: World, estimates: tuple[PoseEstimate, ...]
     ) -> Belief:
         """What the robots of environments `ids` believe; the records are of them only."""
         estimate, *later = estimates
         return Belief(
-            robot=robot,
+            robot=world.robot,
             estimate=estimate,
-            separation=estimated_separation(robot, estimate),
+            separation=estimated_separation(world.robot, estimate),
+            hand=world.hand,
+            objects=None if self.measured is None else rows(self.measured, ids),
             task=self.task.view(self.task_state, ids, self.config.task),
             action=self.action[ids],
             forecast=tuple(later),

@@ -15,12 +15,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from assets.robots.ur10e_looks import (
-    add_arm_materials,
-    add_base_looks,
-    add_link_looks,
-    add_tool_looks,
-)
+from assets.robots import hands
+from assets.robots.ur10e_looks import add_arm_materials, add_base_looks, add_link_looks
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.scene.primitives import (
     OBJECT_BIT,
@@ -60,8 +56,6 @@ UPPER_ARM_OFFSET_M = 0.1762
 FOREARM_OFFSET_M = 0.0393
 """How far the tubes stand to the side of their joints, along z."""
 
-TOOL_LENGTH_M = 0.15
-TOOL_MASS_KG = 1.2
 FLANGE = DH_D_M[5]
 
 CAPSULES: tuple[tuple[str, int, tuple[float, ...], tuple[float, ...], float], ...] = (
@@ -74,29 +68,30 @@ CAPSULES: tuple[tuple[str, int, tuple[float, ...], tuple[float, ...], float], ..
     ("wrist_1", 3, (0, 0, FOREARM_OFFSET_M), (0, 0, DH_D_M[3]), 0.053),
     ("wrist_2", 4, (0, 0, 0), (0, 0, DH_D_M[4]), 0.053),
     ("wrist_3", 5, (0, 0, -0.012), (0, 0, FLANGE - 0.045), 0.052),
-    ("tool", 5, (0, 0, FLANGE + 0.02), (0, 0, FLANGE + TOOL_LENGTH_M - 0.034), 0.034),
 )
-"""(name, link, one end, other end, radius), link frame [m]. The tool's ends at the tool point."""
+"""(name, link, one end, other end, radius), link frame [m]."""
 
 SELF_COLLISIONS = (
-    ("tool", "upper_arm"), ("tool", "shoulder"), ("tool", "shoulder_lift"), ("tool", "forearm"),
+    *(("tool", other) for other in ("upper_arm", "shoulder", "shoulder_lift", "forearm")),
     ("wrist_2", "upper_arm"), ("wrist_2", "shoulder"), ("wrist_3", "upper_arm"),
 )  # fmt: skip
-"""The pairs of the arm's own capsules that can meet in its joint ranges."""
+"""The pairs of the arm's own capsules, and of its tool's, that can meet in its joint ranges."""
 
 
-def add_arm(spec: Any) -> None:
+def add_arm(spec: Any, hand: hands.Hand = hands.SCREWDRIVER) -> None:
     """Build the arm, the middle of its foot at the origin; it reaches to +x, along its own -x."""
     add_arm_materials(spec)
     base = spec.worldbody.add_body(name="base", quat=[np.cos(HALF_TURN), 0, 0, np.sin(HALF_TURN)])
     add_base_looks(base)
     links = _add_links(base)
-    for name, link, start, end, radius in CAPSULES:
+    tool = ("tool", 5, (0, 0, FLANGE + 0.02), (0, 0, FLANGE + hand.length_m - hand.before_m), hand.radius_m)
+    for name, link, start, end, radius in (*CAPSULES, tool):
         _add_capsule(links[link], name, start, end, radius)
     for first, second in SELF_COLLISIONS:
         spec.add_pair(geomname1=first, geomname2=second, condim=3)
-    _add_tool(links[-1])
+    _add_tool(links[-1], hand)
     _add_servos(spec)
+    hand.drive(spec)
 
 
 def _add_links(base: Any) -> list[Any]:
@@ -144,15 +139,13 @@ def _add_capsule(link: Any, name: str, start: Any, end: Any, radius: float) -> N
     )
 
 
-def _add_tool(wrist: Any) -> None:
-    """A screwdriver on the flange; its mass is compensated like the arm's."""
+def _add_tool(wrist: Any, hand: hands.Hand) -> None:
+    """What is bolted to the flange; its mass is compensated like the arm's."""
     tool = wrist.add_body(name="tool", pos=[0, 0, FLANGE], gravcomp=1)
     tool.explicitinertial = 1
-    tool.mass = TOOL_MASS_KG
-    tool.ipos = [0, 0, 0.06]
-    tool.inertia = [0.0025, 0.0025, 0.0008]
-    add_tool_looks(tool, TOOL_LENGTH_M)
-    tool.add_site(name="tool_point", pos=[0, 0, TOOL_LENGTH_M], size=[0.004] * 3, group=4)
+    tool.mass, tool.ipos, tool.inertia = hand.mass_kg, [0, 0, 0.06], hand.inertia_kgm2
+    hand.build(tool)
+    tool.add_site(name="tool_point", pos=[0, 0, hand.length_m], size=[0.004] * 3, group=4)
 
 
 def _add_servos(spec: Any) -> None:

@@ -128,17 +128,3 @@ def _wrist(link: Any, z_ring: float, z_far: float, cap_side: int) -> None:
     near, far = 0.048 * cap_side, -0.058 * cap_side
     cylinder(link, (0, near, z_far), (0, far, z_far), WRIST * 0.985, "arm_joint", **LOOKS)
     _cap(link, (0, near, z_far), (0, cap_side, 0), WRIST * 0.985)
-
-
-def add_tool_looks(tool: Any, length: float) -> None:
-    """A screwdriver spindle: adapter, motor shell with a grip ring, chuck, bit."""
-    cylinder(tool, (0, 0, 0), (0, 0, 0.012), 0.040, "arm_steel", **LOOKS)
-    cylinder(tool, (0, 0, 0.012), (0, 0, 0.022), 0.034, "arm_black", **LOOKS)
-    cylinder(tool, (0, 0, 0.022), (0, 0, 0.074), 0.033, "tool_shell", **LOOKS)
-    cylinder(tool, (0, 0, 0.040), (0, 0, 0.046), 0.0338, "arm_black", **LOOKS)
-    ellipsoid(tool, (0, 0, 0.074), (0.033, 0.033, 0.014), "tool_shell", **LOOKS)
-    box(tool, (0.031, 0, 0.050), (0.022, 0.030, 0.046), "arm_dark", **LOOKS)
-    cylinder(tool, (0, 0, 0.080), (0, 0, 0.104), 0.018, "arm_dark", **LOOKS)
-    cylinder(tool, (0, 0, 0.104), (0, 0, 0.116), 0.011, "arm_steel", **LOOKS)
-    cylinder(tool, (0, 0, 0.116), (0, 0, length - 0.006), 0.005, "arm_steel", **LOOKS)
-    cylinder(tool, (0, 0, length - 0.006), (0, 0, length), 0.0032, "arm_black", **LOOKS)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import mujoco
 
+from assets.robots.hands import GRIPPER, SCREWDRIVER
 from assets.robots.ur10e_like import add_arm
 from assets.scenes import arena, prop_looks, site
 from assets.scenes.mjcf import TEXTURES, write_mjcf
@@ -17,6 +18,7 @@ from hrc_env.scene.worker_visuals import PARKED_M
 from hrc_env.worker.props import PROP_NAMES
 
 ASSETS = Path(__file__).resolve().parent.parent
+ROBOTS = {"ur10e_like": SCREWDRIVER, "ur10e_gripper": GRIPPER}
 MAKERS = {"lab": (arena.add_lab, arena.paint_lab), "site": (site.add_site, site.paint_site)}
 
 
@@ -24,9 +26,10 @@ def bake(assets: Path) -> None:
     """Write `robots/*.xml` and `scenes/*.xml` with their pictures below a folder."""
     for name in ("robots", "scenes"):
         (assets / name).mkdir(parents=True, exist_ok=True)
-    arm = mujoco.MjSpec()
-    add_arm(arm)
-    write_mjcf(arm, assets / "robots" / "ur10e_like.xml")
+    for name, hand in ROBOTS.items():
+        arm = mujoco.MjSpec()
+        add_arm(arm, hand)
+        write_mjcf(arm, assets / "robots" / f"{name}.xml")
     for name in MAKERS:
         for clutter in (False, True):
             path = assets / "scenes" / f"{name}{'' if clutter else '_bare'}.xml"

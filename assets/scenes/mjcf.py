@@ -12,7 +12,8 @@ import numpy as np
 from PIL import Image
 
 GEOM_FIELDS = (
-    "pos", "quat", "contype", "conaffinity", "condim", "group", "density", "friction", "rgba",
+    "pos", "quat", "contype", "conaffinity", "condim", "priority", "group", "density", "friction",
+    "solref", "solimp", "rgba",
 )  # fmt: skip
 KINDS = {
     getattr(mujoco.mjtGeom, f"mjGEOM_{name.upper()}"): (name, n_sizes)
@@ -45,6 +46,7 @@ def write_mjcf(spec: Any, path: Path, **compiler: str) -> None:
         _add_light(world, light)
     _add_content(world, spec.worldbody)
     _add_contacts(root, spec)
+    _add_couplings(root, spec)
     _add_actuators(root, spec)
     ElementTree.indent(root)
     path.write_text(ElementTree.tostring(root, encoding="unicode") + "\n")
@@ -119,11 +121,7 @@ def _add_light(world: ElementTree.Element, light: Any) -> None:
 def _add_content(parent: ElementTree.Element, body: Any) -> None:
     """Geoms, sites and bodies in a body."""
     for joint in body.joints:
-        low, high = joint.actfrcrange
-        ElementTree.SubElement(
-            parent, "joint", name=joint.name, axis=_text(joint.axis), range=_text(joint.range),
-            armature=_text(joint.armature), actuatorfrcrange=_text([low, high]),
-        )  # fmt: skip
+        _add_joint(parent, joint)
     for geom in body.geoms:
         _add_geom(parent, geom)
     for site in body.sites:
@@ -133,6 +131,20 @@ def _add_content(parent: ElementTree.Element, body: Any) -> None:
         )  # fmt: skip
     for child in body.bodies:
         _add_body(parent, child)
+
+
+def _add_joint(parent: ElementTree.Element, joint: Any) -> None:
+    """One that is free, a hinge or a slide with a range."""
+    if joint.type == mujoco.mjtJoint.mjJNT_FREE:
+        ElementTree.SubElement(parent, "freejoint", name=joint.name)
+        return
+    given = {"name": joint.name, "axis": _text(joint.axis), "range": _text(joint.range)}
+    given["armature"] = _text(joint.armature)
+    if joint.type == mujoco.mjtJoint.mjJNT_SLIDE:
+        given |= {"type": "slide", "damping": _text(joint.damping[0])}
+    if joint.actfrclimited == 1:
+        given["actuatorfrcrange"] = _text(joint.actfrcrange)
+    ElementTree.SubElement(parent, "joint", given)
 
 
 def _add_body(parent: ElementTree.Element, body: Any) -> None:
@@ -176,14 +188,36 @@ def _add_contacts(root: ElementTree.Element, spec: Any) -> None:
         ElementTree.SubElement(contacts, "pair", geom1=pair.geomname1, geom2=pair.geomname2)
 
 
+def _add_couplings(root: ElementTree.Element, spec: Any) -> None:
+    """Joints that move together, and tendons that are means of joints."""
+    for tendon in spec.tendons:
+        element = ElementTree.SubElement(ElementTree.SubElement(root, "tendon"), "fixed")
+        element.set("name", tendon.name)
+        for wrap in tendon.path:
+            ElementTree.SubElement(
+                element, "joint", joint=wrap.target.name, coef=_text(wrap.coef)
+            )
+    for each in spec.equalities:
+        ElementTree.SubElement(
+            ElementTree.SubElement(root, "equality"), "joint", name=each.name, joint1=each.name1,
+            joint2=each.name2, polycoef=_text(each.data[:5]), solref=_text(each.solref),
+        )  # fmt: skip
+
+
 def _add_actuators(root: ElementTree.Element, spec: Any) -> None:
-    """Those that integrate their command, and those that follow it."""
+    """Those that integrate their command, those that follow it, and those that hold a position."""
     if not spec.actuators:
         return
     actuators = ElementTree.SubElement(root, "actuator")
     for servo in spec.actuators:
-        given = {"name": servo.name, "joint": servo.target, "ctrlrange": _text(servo.ctrlrange)}
-        if servo.dyntype == mujoco.mjtDyn.mjDYN_INTEGRATOR:
+        is_tendon = servo.trntype == mujoco.mjtTrn.mjTRN_TENDON
+        given = {"name": servo.name, "tendon" if is_tendon else "joint": servo.target}
+        given["ctrlrange"] = _text(servo.ctrlrange)
+        if servo.biastype == mujoco.mjtBias.mjBIAS_AFFINE and is_tendon:
+            given |= {"kp": _text(servo.gainprm[0]), "kv": _text(-servo.biasprm[2])}
+            given["forcerange"] = _text(servo.forcerange)
+            ElementTree.SubElement(actuators, "position", given)
+        elif servo.dyntype == mujoco.mjtDyn.mjDYN_INTEGRATOR:
             given |= {"kp": _text(servo.gainprm[0]), "actrange": _text(servo.actrange)}
             ElementTree.SubElement(actuators, "intvelocity", given)
         else:

@@ -135,10 +135,38 @@ class RobotState:
     """(B, 3) [m]."""
     tool_velocity_world: Velocities3
     """(B, 3) [m/s]."""
+    tool_axes_world: Floats
+    """(B, 3, 3) the tool's x, y and z axes as columns."""
     capsules_world: Capsules
-    """(B, K, 2, 3) [m]."""
+    """(B, K, 2, 3) [m], with those of what it carries; far away where it carries nothing."""
     capsule_radius_m: Floats
     """(K,) [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class HandState:
+    """The gripper as its own encoders know it."""
+
+    opening_m: Floats
+    """(B,) how far each finger is from the middle [m]."""
+    force_n: Floats
+    """(B,) with which its motor presses the fingers together; negative: apart [N]."""
+    closed_on: Bools
+    """(B,) whether the fingers press and have come to rest on something."""
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectState:
+    """A task's loose objects: where they are, or are measured to be."""
+
+    position_world: Points3
+    """(B, O, 3) the middle of each [m]."""
+    quaternion_wxyz: QuaternionsWxyz
+    """(B, O, 4) world_from_object."""
+    velocity_world: Velocities3
+    """(B, O, 3) of its middle [m/s]."""
+    held: Bools
+    """(B, O) whether the robot holds it."""
 
 
 @dataclass(frozen=True, slots=True)

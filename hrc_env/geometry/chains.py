@@ -56,6 +56,11 @@ def jacobian(chain: SerialChain, q: JointAngles) -> Floats:
     return result.reshape(*lead, 3, chain.n_joints)
 
 
+def turning(chain: SerialChain, q: JointAngles) -> Floats:
+    """The tool's turn rate per joint velocity, (..., 3, N), world axes, at q (..., N)."""
+    return np.moveaxis(forward(chain, q)[..., :3, 2], -1, -2)
+
+
 def capsules(chain: SerialChain, q: JointAngles) -> Capsules:
     """The arm's collision capsules, (..., K, 2, 3) end points in the world [m]."""
     return _carried(chain, forward(chain, q))
@@ -78,9 +83,11 @@ def robot_along(
     tool_world, velocity = np.empty((len(rates), 3)), np.empty((len(rates), 3))
     _tool_motion(last, rates, chain.link_from_tool, tool_world, velocity)
     tool_world, velocity = tool_world.reshape(*lead, 3), velocity.reshape(*lead, 3)
+    axes = frames[..., -1, -1, :3, :3] @ chain.link_from_tool[:3, :3]
     q, qd = np.array(q_path[..., -1, :], float), np.array(qd, float)
     ended = ends[..., -1, :, :, :]
-    return RobotState(q, qd, tool_world, velocity, ended, chain.capsule_radius_m), ends
+    radius_m = chain.capsule_radius_m
+    return RobotState(q, qd, tool_world, velocity, axes, ended, radius_m), ends
 
 
 def _carried(chain: SerialChain, frames: Transforms) -> Capsules:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Floats, Points3, Rotations
+from hrc_env.core.typing import Floats, Points3, QuaternionsWxyz, Rotations
 
 
 def about_axis(axis: str, angle_rad: Floats | float) -> Rotations:
@@ -27,6 +27,17 @@ def look_at(eye_world: Points3, target_world: Points3) -> Rotations:
     length = np.linalg.norm(right)
     right = right / length if length > 1e-9 else np.array([1.0, 0.0, 0.0])
     return np.stack([right, np.cross(forward, right), forward], -1)
+
+
+def matrix(quaternion_wxyz: QuaternionsWxyz) -> Rotations:
+    """Rotations (..., 3, 3) of unit quaternions (..., 4)."""
+    w, x, y, z = np.moveaxis(np.asarray(quaternion_wxyz, float), -1, 0)
+    rows = (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+    )
+    return np.stack([np.stack(row, -1) for row in rows], -2)
 
 
 @kernel

@@ -59,7 +59,7 @@ class EmulatedCameras(TrueState):
     ) -> Keypoints:
         """What cameras show now; `state` of the errors goes on."""
         now, config = look.now, self.config
-        around = self.scene.surroundings(now.q, now.motion.held)
+        around = self.scene.surroundings(now.qpos, now.motion.held)
         keypoints = emulator.emulate(state, rngs, now.truth, around, cameras, config, look.expected)
         if self.scene.n_workers < 2:
             return keypoints

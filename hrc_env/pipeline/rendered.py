@@ -48,7 +48,7 @@ class RenderedCameras(Sensor):
         """Make the images present that have come of environment b. (C,) when each was taken [s], by
         the clock of `Keypoints.time_s`; NaN: there is none."""
         row, recent = self.now.ids.tolist().index(b), self.recent
-        pose = self.now.q[row].copy(), copied(one(self.now.motion, row))
+        pose = self.now.qpos[row].copy(), copied(one(self.now.motion, row))
         step = recent.begin(b)
         before = recent.at(b, step - 1)
         actual = recent.schedule.actual(self.scene.cameras, recent.seeds[b], step)

@@ -7,7 +7,7 @@ import numpy as np
 from hrc_env.core.batching import Stateful
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Roi, WorkerMotion, WorkerTruth
-from hrc_env.core.typing import Bools, Ints, JointAngles
+from hrc_env.core.typing import Bools, Floats, Ints
 
 Generators = list[np.random.Generator]
 Windows = list[list[Roi | None]]
@@ -20,8 +20,8 @@ class SensorInput:
 
     ids: Ints
     """(B,) environments of the batch that these rows are."""
-    q: JointAngles
-    """(B, N) the arm [rad]."""
+    qpos: Floats
+    """(B, nq) the arm [rad], then its fingers and what is loose, as `Physics.qpos` has them."""
     motion: WorkerMotion
     """(B, W, S, ...)."""
 

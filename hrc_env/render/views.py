@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from hrc_env.core.batching import one, rows
 from hrc_env.core.errors import whole
 from hrc_env.core.records import Keypoints, PoseEstimate, Roi, WorkerMotion
-from hrc_env.core.typing import Image, JointAngles, Points3
+from hrc_env.core.typing import Floats, Image, Points3
 from hrc_env.geometry.cameras import PinholeCamera, image_from_pinhole, pinhole, resized
 from hrc_env.geometry.chains import capsules
 from hrc_env.motion import generator
@@ -47,8 +47,8 @@ def picture_size(width: Any, height: Any) -> tuple[int, int]:
 class Glance:
     """One environment at one moment, apart from the simulation, which may go on."""
 
-    q: JointAngles
-    """(N,)."""
+    q: Floats
+    """(nq,) as `Physics.qpos`."""
     motion: WorkerMotion
     """The workers, arrays (W, S, ...)."""
     look: Look | None
@@ -99,10 +99,10 @@ class Views:
             list(simulation.pipeline.crops(b)),
         )
 
-    def pose(self, b: int = 0) -> tuple[JointAngles, WorkerMotion]:
-        """The arm (N,) and the workers (W, S, ...) of environment `b` now."""
+    def pose(self, b: int = 0) -> tuple[Floats, WorkerMotion]:
+        """All that moves (nq,) and the workers (W, S, ...) of environment `b` now."""
         motion = one(generator.current(self.simulation.motion, np.array([b])), 0)
-        return self.simulation.physics.q[b].copy(), motion
+        return self.simulation.physics.qpos[b], motion
 
     def room(self, width: int, height: int, seen: Glance) -> Image:
         """The room with the estimated skeleton over it."""
@@ -147,7 +147,8 @@ class Views:
     def beliefs(self, width: int, height: int, seen: Glance) -> list[Image]:
         """What the robot knows, seen from above and from the side: itself, its task, its estimate
         of the workers. No truth in here."""
-        arm = capsules(self.simulation.chain, seen.q)
+        chain = self.simulation.chain
+        arm = capsules(chain, seen.q[: chain.n_joints])
         foot = np.array([*arm[0, 0, :2], 0.0])
         images = []
         for name, eye, target in SIDES:

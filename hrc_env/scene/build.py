@@ -16,14 +16,18 @@ from hrc_env.geometry.chains import SerialChain, capsules
 from hrc_env.geometry.shapes import WIDTH
 from hrc_env.geometry.sight import Surroundings
 from hrc_env.scene.places import SCENES, obstacles
-from hrc_env.scene.primitives import ROBOT_BIT, SCENE_BIT, SOLID
+from hrc_env.scene import objects
+from hrc_env.scene.objects import Objects, objects_of, surfaces
+from hrc_env.scene.primitives import OBJECT_BIT, PAD_BIT, ROBOT_BIT, SCENE_BIT, SOLID
 from hrc_env.scene.rig import CameraConfig, add_cameras, pinholes, select
 from hrc_env.scene.robot import (
     DEFAULT,
     PREFIX,
+    Grip,
     Robot,
     add_robot,
     chain_of,
+    grip_of,
     reach_m,
     robot_called,
     servo_lead_s,
@@ -38,6 +42,16 @@ ARENA_BYTES = 2**20
 """Memory of one simulation for contacts; the arm in a pile of them takes a tenth."""
 PAIR_BYTES = 1280
 """And for who may touch whom: MuJoCo takes about 990 times the square of the number of workers."""
+
+
+GRIPPING = {
+    "condim": 4, "friction": [1.0, 1.0, 0.02, 0.0005, 0.0005], "solref": [0.008, 1.0],
+    "solimp": [0.95, 0.99, 0.001, 0.5, 2.0],
+}  # fmt: skip
+LYING = {"condim": 3, "friction": [0.6, 0.6, 0.005, 0.0001, 0.0001], "solref": [0.01, 1.0]}
+"""Contacts of rubber pads with what they grip, and of wood with whatever it lies on."""
+THROWN_M = 1.5
+"""What is loose touches what stands still so far beyond the robot's reach [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +83,7 @@ class Recipe(NamedTuple):
     bodies: tuple[str, ...]
     cameras: tuple[str, ...]
     robot: Robot
+    things: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,23 +114,35 @@ class Scene:
     """(G, `shapes.WIDTH`) what stands still and blocks sight."""
     grounds: Grounds
     """Where people can stand, walk and work."""
+    objects: Objects
+    """What is loose."""
+    grip: Grip | None
+    """The robot's hand; None: it has none."""
+    things: str
+    """The MJCF of a task: what it puts there, loose and fixed; "": nothing."""
 
     @property
     def rig(self) -> tuple[CameraConfig, ...]:
         """The settings of `cameras`."""
         return select(self.config.cameras, tuple(camera.name for camera in self.cameras))
 
-    def surroundings(self, q: JointAngles, held: Held | None = None) -> Surroundings:
-        """What can stand before cameras; the arm is at angles q (B, N) [rad]."""
+    def surroundings(self, qpos: Floats, held: Held | None = None) -> Surroundings:
+        """What can stand before cameras: the arm, at the first N of qpos (B, nq) [rad], and what is
+        loose, at the others; what is fixed; what workers hold."""
         chain = self.chain
-        moving = np.zeros((len(q), 0, WIDTH)) if held is None else held_shapes(held)
-        return Surroundings(self.obstacles, moving, capsules(chain, q), chain.capsule_radius_m)
+        moving = np.zeros((len(qpos), 0, WIDTH)) if held is None else held_shapes(held)
+        if self.objects.names:
+            moving = np.concatenate([moving, surfaces(self.objects, qpos)], axis=1)
+        arm = capsules(chain, qpos[:, : chain.n_joints])
+        return Surroundings(self.obstacles, moving, arm, chain.capsule_radius_m)
 
     @property
     def recipe(self) -> Recipe:
         """What `build` makes it from."""
         use = tuple(camera.name for camera in self.cameras)
-        return Recipe(self.config, self.name, self.n_workers, self.bodies, use, self.robot)
+        return Recipe(
+            self.config, self.name, self.n_workers, self.bodies, use, self.robot, self.things
+        )
 
     def __reduce__(self) -> tuple[Any, ...]:
         return build, tuple(self.recipe)
@@ -128,6 +155,7 @@ def build(
     bodies: str | tuple[str, ...] = "worker_1",
     cameras: Sequence[int | str] | None = None,
     robot: str | Robot = DEFAULT,
+    things: str = "",
 ) -> Scene:
     """The scene of these settings, compiled once and kept.
 
@@ -138,6 +166,7 @@ def build(
         bodies: the baked body of all of them, or those that they can have; "any": all.
         cameras: names or indices of the cameras that are used; None: all.
         robot: a name or itself.
+        things: MJCF of what a task adds, from the middle of the robot's foot on [m].
 
     Raises:
         ConfigError: an unknown scene, body, camera or robot.
@@ -147,16 +176,19 @@ def build(
     if not config.cameras:
         config = replace(config, cameras=SCENES[name].cameras)
     use = tuple(camera.name for camera in select(config.cameras, cameras))
-    return _build(Recipe(config, name, n_workers, pool(bodies), use, robot_called(robot)))
+    robot = robot_called(robot)
+    return _build(Recipe(config, name, n_workers, pool(bodies), use, robot, things))
 
 
 @lru_cache(maxsize=8)
 def _build(recipe: Recipe) -> Scene:
-    config, name, n_workers, bodies, use, robot = recipe
+    config, name, n_workers, bodies, use, robot, things = recipe
     room = SCENES[name]
     chain = chain_of(robot, room.mount_world)
     spec = _spec(recipe)
     _strip(spec)
+    n_joints = len(robot.joints) + (len(robot.hand.joints) if robot.hand else 0)
+    loose = objects_of(spec, n_joints)
     _pair(spec, robot, chain)
     model = spec.compile()
     prefixes, body = _prefixes(n_workers), load_body(bodies[0])
@@ -179,6 +211,9 @@ def _build(recipe: Recipe) -> Scene:
         worker_capsules=np.array(touched, np.int64).reshape(n_workers, len(body.capsule_names)),
         obstacles=still,
         grounds=room.grounds(still, config.clutter),
+        objects=loose,
+        grip=grip_of(robot, model),
+        things=things,
     )
 
 
@@ -206,19 +241,29 @@ def visuals(scene: Scene) -> WorkerVisuals:
 
 def _spec(recipe: Recipe) -> mujoco.MjSpec:
     """Everything but the workers' looks and what they hold."""
-    config, name, n_workers, bodies, use, robot = recipe
+    config, name, n_workers, bodies, use, robot, things = recipe
     path = assets_dir() / "scenes" / f"{name}{'' if config.clutter else '_bare'}.xml"
     spec = mujoco.MjSpec.from_file(str(path))
     spec.option.timestep = config.sim_dt
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.memory = ARENA_BYTES + PAIR_BYTES * n_workers**2
-    # The velocity command in force, and which body each worker has: part of the state.
-    spec.nuserdata = len(robot.joints) + n_workers
+    # The velocity command in force, which body each worker has, and the hand's command: state.
+    spec.nuserdata = len(robot.joints) + n_workers + (robot.hand is not None)
     add_robot(spec, robot, SCENES[name].mount_world)
+    if things:
+        _add_things(spec, things, SCENES[name].mount_world)
     add_cameras(spec, pinholes(select(config.cameras, use)))
     for prefix in _prefixes(n_workers):
         add_worker(spec, load_body(bodies[0]), prefix)
     return spec
+
+
+def _add_things(spec: mujoco.MjSpec, things: str, mount_world: Sequence[float]) -> None:
+    """What a task adds. Grips slip least with elliptic cones (5 kg shaken at 3 m/s^2: 8 mm in 6 s;
+    with MuJoCo's defaults 31)."""
+    spec.option.cone, spec.option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 10.0
+    child = mujoco.MjSpec.from_string(things)
+    spec.attach(child, prefix=objects.PREFIX, frame=spec.worldbody.add_frame(pos=list(mount_world)))
 
 
 def _strip(spec: mujoco.MjSpec) -> None:
@@ -237,22 +282,32 @@ def _strip(spec: mujoco.MjSpec) -> None:
 
 
 def _pair(spec: mujoco.MjSpec, robot: Robot, chain: SerialChain) -> None:
-    """Say pair by pair what may touch the robot, which is quicker than to look for it in every
-    substep; what stands still out of a link's reach cannot."""
+    """Say pair by pair what may touch the robot and what is loose, which is quicker than to look
+    for it in every substep; what stands still out of reach cannot."""
     reach = dict(zip(robot.capsules, reach_m(chain).tolist(), strict=True))
+    farthest = max(reach.values())
     foot_world = chain.T_world_from_base[:3, 3]
-    parts = [geom for geom in spec.geoms if geom.contype & ROBOT_BIT]
-    others = [geom for geom in spec.geoms if geom.contype & ~ROBOT_BIT]
+    own = ROBOT_BIT | PAD_BIT
+    parts = [geom for geom in spec.geoms if geom.contype & own]
+    others = [geom for geom in spec.geoms if geom.contype & ~own]
     for row, other in enumerate(others):
         other.name = other.name or f"solid_{row}"
+    loose = [geom for geom in others if geom.contype & OBJECT_BIT]
     for part in parts:
         name = part.name.removeprefix(PREFIX)
         for other in others:
             meets = part.conaffinity & other.contype
             if not meets or (name, other.name) in robot.never_touch:
                 continue
-            if _nearest_m(other, foot_world) <= reach[name]:
-                spec.add_pair(geomname1=part.name, geomname2=other.name)
+            if _nearest_m(other, foot_world) <= reach.get(name, farthest):
+                how = GRIPPING if part.contype & PAD_BIT and other in loose else {}
+                spec.add_pair(geomname1=part.name, geomname2=other.name, **how)
+    for k, thing in enumerate(loose):
+        others_loose = [each for each in loose[k + 1 :] if each.parent.name != thing.parent.name]
+        still = [geom for geom in others if geom.contype & thing.conaffinity & SCENE_BIT]
+        near = [geom for geom in still if _nearest_m(geom, foot_world) <= farthest + THROWN_M]
+        for other in (*others_loose, *near):
+            spec.add_pair(geomname1=thing.name, geomname2=other.name, **LYING)
     for geom in (*parts, *others):
         geom.contype = geom.conaffinity = 0
 

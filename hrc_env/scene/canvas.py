@@ -84,8 +84,10 @@ class Canvas:
             randomize(self._model, self._built, self._visuals, look)
 
     def pose(self, q: JointAngles, motion: WorkerMotion | None) -> None:
-        """Put the arm at q (N,), the workers and what they hold where `motion` (W, S, ...) says."""
-        check_shape("q", np.shape(q), self.scene.home_q.shape, "one angle per joint")
+        """Put the arm at q (N,), or all that moves at q (nq,), the workers and what they hold where
+        `motion` (W, S, ...) says."""
+        if len(q) != self._model.nq:
+            check_shape("q", np.shape(q), self.scene.home_q.shape, "one angle per joint")
         self._data.qpos[: len(q)] = q
         if motion is not None:
             show_workers(self._model, self._data, self._visuals, motion)

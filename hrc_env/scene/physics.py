@@ -12,7 +12,7 @@ from mujoco.batch import Batch
 
 from hrc_env.core.errors import ConfigError, HRCError, check_shape
 from hrc_env.core.kernels import kernel
-from hrc_env.core.records import WorkerPath
+from hrc_env.core.records import HandState, WorkerPath
 from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, JointVelocities, Records
 from hrc_env.scene.build import Scene, without_workers
 from hrc_env.scene.worker import CAPSULE_FIELDS, capsule_shapes
@@ -28,6 +28,8 @@ SERVO = np.dtype(
 )
 """A joint's lowest and highest angle [rad], velocity limit [rad/s], fastest change of the command
 [rad/s^2], lead of its rate servo [s], and how far its holding servo may be ahead [rad]."""
+PRESSING_N, RESTING_M_S = 40.0, 0.01
+"""Fingers that press with more [N] and move less [m/s] have closed on something."""
 END_MARGIN_RAD = 0.02
 """Where the arm comes to rest before the end of a joint's range."""
 BRAKE_SHARE = 0.7
@@ -47,7 +49,8 @@ class Physics:
         self._shared = [(self._alone.bind(f), self._sims.bind(f)) for f in OF_THE_ARM]
         self._qpos, self._qvel = self._sims.bind("qpos"), self._sims.bind("qvel")
         self._act, kept = self._sims.bind("act"), self._sims.bind("userdata")
-        self._command, self._body = kept[:, : self._n], kept[:, self._n :]
+        self._command, self._body = kept[:, : self._n], kept[:, self._n : self._n + scene.n_workers]
+        self._grip = kept[:, self._n + scene.n_workers :]
         several = len(scene.bodies) > 1
         self._shapes = {name: self._sims.expand(name) for name in CAPSULE_FIELDS if several}
         self._control, self._trace = np.zeros((batch, 0, 0)), np.zeros((batch, 0, 0))
@@ -63,22 +66,55 @@ class Physics:
         """(B, N) the arm's velocities [rad/s], a copy."""
         return self._qvel[:, : self._n].copy()
 
-    def reset(self, ids: Ints, q: JointAngles, body: Ints | None = None) -> None:
-        """Put environments `ids` (sorted) to rest at angles q (len(ids), N) [rad]; their workers
-        have bodies (len(ids), W) of the scene's, None: the first."""
+    @property
+    def qpos(self) -> Floats:
+        """(B, nq) the arm's angles [rad], its fingers' ways [m], the loose objects' poses, a copy."""
+        return self._qpos.copy()
+
+    @property
+    def qvel(self) -> Floats:
+        """(B, nv) their rates, a copy."""
+        return self._qvel.copy()
+
+    def hand_state(self, ids: Ints) -> HandState | None:
+        """What hands of environments `ids` feel; None: there are none."""
+        hand = self.scene.grip
+        if hand is None:
+            return None
+        opening_m = self._qpos[ids][:, hand.fingers].mean(1)
+        rate_m_s = self._qvel[ids][:, hand.fingers].mean(1)
+        push_n = hand.stiffness_n_m * (self._grip[ids, 0] - opening_m)
+        force_n = np.clip(hand.damping_n_s_m * rate_m_s - push_n, -hand.most_n, hand.most_n)
+        still = np.abs(rate_m_s) < RESTING_M_S
+        return HandState(opening_m, force_n, (force_n > PRESSING_N) & still)
+
+    def reset(
+        self, ids: Ints, q: JointAngles, body: Ints | None = None, poses: Floats | None = None
+    ) -> None:
+        """Put environments `ids` (sorted) to rest at angles q (len(ids), N) [rad], hands open; their
+        workers have bodies (len(ids), W) of the scene's, None: the first; loose objects lie at
+        poses (len(ids), O, 7), None: as the task's MJCF has them."""
         ids = np.asarray(ids, int)
         check_shape("q", np.shape(q), (len(ids), self._n), "one row per id, one angle per joint")
         for sims in (self._sims, self._alone):
             sims.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE.value)
         self._qpos[ids, : self._n] = q
         self._act[ids, : self._n] = q
+        if (hand := self.scene.grip) is not None:
+            self._qpos[ids[:, None], hand.fingers] = self._grip[ids] = hand.open_m
+        if poses is not None:
+            self._qpos[ids, self.scene.objects.first :] = poses.reshape(len(ids), -1)
         self._body[ids] = 0 if body is None else body
         self._set_capsules(ids)
 
     def step(
-        self, qd_command: JointVelocities, workers: WorkerPath, out_of_reach: Bools | None = None
-    ) -> JointAngles:
-        """One control step of every environment: (B, T, N) angles after every substep [rad].
+        self,
+        qd_command: JointVelocities,
+        workers: WorkerPath,
+        out_of_reach: Bools | None = None,
+        opening_m: Floats | None = None,
+    ) -> Floats:
+        """One control step of every environment: (B, T, nq), `qpos` after every substep.
 
         Args:
             qd_command: (B, N) wanted joint velocities [rad/s]; limited in size and slew, and
@@ -86,6 +122,8 @@ class Physics:
             workers: after every substep, arrays (B, T, W, S, ...); W may be 0.
             out_of_reach: (B,) where no worker can touch the arm in this step (None: nowhere); it
                 then moves as it would alone, bit for bit, and is quicker so.
+            opening_m: (B,) how far from the middle the fingers are to be [m], of arms with a hand;
+                limited here. None: open.
 
         Raises:
             ConfigError: wrong shapes. HRCError: the physics broke down, with the reason.
@@ -95,13 +133,18 @@ class Physics:
         n = self._n
         _substep_commands(
             self._qpos[:, :n], self._qvel[:, :n], self._act[:, :n], self._command,
-            np.asarray(qd_command, float), self._servos, self.scene.config.sim_dt, self._control,
+            np.asarray(qd_command, float), self._servos, self.scene.config.sim_dt,
+            self._control,
         )  # fmt: skip
+        if self.scene.grip is not None:
+            most_m = self.scene.grip.open_m
+            wanted = np.full(self.batch, most_m) if opening_m is None else opening_m
+            self._grip[:, 0] = np.clip(np.nan_to_num(wanted, nan=most_m), 0.0, most_m)
         alone = np.zeros(self.batch, bool) if out_of_reach is None else out_of_reach
         self._roll(~alone, workers)
         self._roll(alone, None)
         self._check_health()
-        return self._trace[:, :, :n].copy()
+        return self._trace.copy()
 
     def get_state(self) -> Floats:
         """(B, n) everything that changes; `set_state` brings it back bit for bit."""
@@ -136,7 +179,7 @@ class Physics:
         check_shape("workers.position_world", workers.position_world.shape[:3], expected, meaning)
         if self._control.shape[1] != n_substeps:
             model = self.scene.model
-            self._control = np.zeros((self.batch, n_substeps, model.nu))
+            self._control = np.zeros((self.batch, n_substeps, 2 * self._n))
             self._trace = np.zeros((self.batch, n_substeps, model.nq))
 
     def _roll(self, which: Bools, workers: WorkerPath | None) -> None:
@@ -147,6 +190,9 @@ class Physics:
         ids = None if n == len(which) else np.flatnonzero(which)
         rows = slice(None) if ids is None else ids  # all need no copy
         sims, inputs, control = self._alone, COMMANDS, self._control[rows]
+        if self.scene.grip is not None:
+            grip = np.broadcast_to(self._grip[rows, None], (*control.shape[:2], 1))
+            control = np.concatenate([control, grip], axis=2)
         shared = self._shared if workers is None else []
         if workers is not None:
             lead, sims, inputs = (*control.shape[:2], -1), self._sims, INPUTS

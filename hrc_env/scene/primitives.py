@@ -12,7 +12,7 @@ import numpy as np
 
 SOLID, DECORATION, ROBOT_LOOKS, ROBOT_CAPSULES, WORKER_CAPSULES, OVERHEAD = range(6)
 
-SCENE_BIT, ROBOT_BIT, WORKER_BIT, OBJECT_BIT = 1, 2, 4, 16
+SCENE_BIT, ROBOT_BIT, WORKER_BIT, PAD_BIT, OBJECT_BIT = 1, 2, 4, 8, 16
 """contype bits; what can touch what is written in the conaffinity of the second."""
 
 Vector = Sequence[float] | np.ndarray

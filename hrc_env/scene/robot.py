@@ -20,6 +20,7 @@ from hrc_env.core.typing import Floats, Ints, Transforms
 from hrc_env.geometry.chains import SerialChain
 from hrc_env.scene.primitives import (
     OBJECT_BIT,
+    PAD_BIT,
     ROBOT_BIT,
     ROBOT_CAPSULES,
     ROBOT_LOOKS,
@@ -31,6 +32,21 @@ from hrc_env.worker.body import assets_dir
 PREFIX = "robot/"
 """What the names of a robot's parts begin with in a scene."""
 DEFAULT = "ur10e_like"
+
+
+@dataclass(frozen=True, slots=True)
+class Hand:
+    """A gripper at the end of an arm, after whose joints and motors its own come in the MJCF."""
+
+    joints: tuple[str, ...]
+    """Its fingers' slides; 0 is closed, and they open by the same way."""
+    pads: tuple[str, ...]
+    """The geoms that touch what is gripped."""
+    motor: str
+    """The `position` actuator whose command is how far each finger is from the middle [m]."""
+    spans: tuple[str, ...]
+    """Those of the robot's capsules that stand for the fingers, wherever they are: in distances
+    and sight; they touch people only."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +71,8 @@ class Robot:
     """At reset each joint is drawn within so much of `home_q`."""
     never_touch: tuple[tuple[str, str], ...] = ()
     """(capsule, geom of a scene) that no pose brings together, near as they may always be."""
+    hand: Hand | None = None
+    """What it grips with; None: nothing."""
 
     def __post_init__(self) -> None:
         for name in ("home_q", "spread_rad"):
@@ -63,6 +81,20 @@ class Robot:
                 raise ConfigError(
                     f"{self.name}: {name} must be {len(self.joints)} angles [rad], got {values}."
                 )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Grip:
+    """A hand's numbers."""
+
+    fingers: Ints
+    """Columns of its fingers in `qpos` and `qvel`."""
+    open_m: float
+    """How far each finger is from the middle at most [m]."""
+    stiffness_n_m: float
+    damping_n_s_m: float
+    most_n: float
+    """Of its motor: force for a way, for a speed, and at most."""
 
 
 def _read(path: Path) -> Robot:
@@ -89,11 +121,16 @@ def robot_called(robot: str | Robot) -> Robot:
 
 def add_robot(spec: Any, robot: Robot, mount_world: Sequence[float]) -> None:
     """Put a robot into a scene that is being built, its foot at a point [m]."""
-    child = _parsed(robot)
+    child, hand = _parsed(robot), robot.hand
+    pads, spans = (hand.pads, hand.spans) if hand else ((), ())
     for geom in child.geoms:
         if geom.name in robot.capsules:
             geom.group, geom.contype = ROBOT_CAPSULES, ROBOT_BIT
-            geom.conaffinity = SCENE_BIT | WORKER_BIT | OBJECT_BIT
+            things = 0 if geom.name in spans else SCENE_BIT | OBJECT_BIT
+            geom.conaffinity = WORKER_BIT | things
+        elif geom.name in pads:
+            geom.group, geom.contype = ROBOT_CAPSULES, PAD_BIT
+            geom.conaffinity = SCENE_BIT | OBJECT_BIT
         else:
             geom.group, geom.contype, geom.conaffinity = ROBOT_LOOKS, 0, 0
     spec.attach(child, prefix=PREFIX, frame=spec.worldbody.add_frame(pos=list(mount_world)))
@@ -134,12 +171,26 @@ def check_robot(robot: Robot) -> None:
         raise ConfigError(f"A robot must be a Robot, got {type(robot).__name__}.")
     chain = chain_of(robot, (0.0, 0.0, 0.0))
     check_names(f"watched capsule of {robot.name}", robot.watched, robot.capsules)
+    if robot.hand:
+        check_names(f"capsule for fingers of {robot.name}", robot.hand.spans, robot.capsules)
     low, high = chain.range_rad.T
     if ((robot.home_q < low) | (robot.home_q > high)).any():
         raise ConfigError(f"{robot.name}: home_q {robot.home_q} is outside of the joints' ranges.")
     for body in _parsed(robot).bodies[1:]:
         if body.joints and not body.explicitinertial:
             raise ConfigError(f"{robot.name}: link {body.name!r} needs an <inertial>.")
+
+
+def grip_of(robot: Robot, model: mujoco.MjModel) -> Grip | None:
+    """The numbers of a robot's hand in a scene; None: it has none."""
+    if robot.hand is None:
+        return None
+    fingers = [model.joint(PREFIX + name).qposadr[0] for name in robot.hand.joints]
+    motor = model.actuator(PREFIX + robot.hand.motor)
+    return Grip(
+        np.array(fingers), float(motor.ctrlrange[1]), float(motor.gainprm[0]),
+        float(-motor.biasprm[2]), float(motor.forcerange[1]),
+    )  # fmt: skip
 
 
 def _parsed(robot: Robot) -> Any:
@@ -153,7 +204,7 @@ def _chain(robot: Robot, mount_world: tuple[float, float, float]) -> SerialChain
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)  # all joints at 0
     joints = [_id(model, "joint", name) for name in robot.joints]
-    _check_servos(model, joints)
+    _check_servos(model, joints, robot.hand)
     bodies = model.jnt_bodyid[joints].tolist()
     parents = model.body_parentid[bodies].tolist()
     if [_link(model, bodies, parent) for parent in parents] != list(range(-1, n - 1)):
@@ -169,7 +220,7 @@ def _chain(robot: Robot, mount_world: tuple[float, float, float]) -> SerialChain
         parent_from_joint=np.linalg.inv([foot, *links[:-1]]) @ links,
         link_from_tool=np.linalg.inv(links[-1]) @ _pose(data.site_xpos[site], data.site_xmat[site]),
         range_rad=model.jnt_range[joints],
-        velocity_limit_rad_s=model.actuator_ctrlrange[n:, 1].copy(),
+        velocity_limit_rad_s=model.actuator_ctrlrange[n : 2 * n, 1].copy(),
         capsule_link=carriers,
         capsule_ends=ends,
         capsule_radius_m=radius_m,
@@ -183,20 +234,27 @@ def _id(model: mujoco.MjModel, kind: str, name: str) -> int:
     return number
 
 
-def _check_servos(model: mujoco.MjModel, joints: list[int]) -> None:
-    """Only hinges with ranges, and their servos in order."""
-    hinges = (model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE).all() and model.jnt_limited.all()
-    if joints != list(range(model.njnt)) or not hinges:
-        raise ConfigError("joints must be all of its MJCF, in its order: hinges with a range.")
+def _check_servos(model: mujoco.MjModel, joints: list[int], hand: Hand | None) -> None:
+    """Only hinges with ranges, and their servos in order; then the hand's slides and motor."""
+    n, fingers = len(joints), [_id(model, "joint", each) for each in hand.joints] if hand else []
+    hinges = (model.jnt_type[:n] == mujoco.mjtJoint.mjJNT_HINGE).all() and model.jnt_limited.all()
+    slides = (model.jnt_type[n:] == mujoco.mjtJoint.mjJNT_SLIDE).all()
+    if joints + fingers != list(range(model.njnt)) or not (hinges and slides):
+        raise ConfigError(
+            "joints must be all of its MJCF, in its order: hinges with a range; then its hand's: "
+            "slides with a range."
+        )
+    motors = [_id(model, "actuator", hand.motor)] if hand else []
     integrates = model.actuator_dyntype == mujoco.mjtDyn.mjDYN_INTEGRATOR
     if not (
-        model.actuator_trnid[:, 0].tolist() == 2 * joints
-        and integrates.tolist() == [True] * len(joints) + [False] * len(joints)
+        model.actuator_trnid[: 2 * n, 0].tolist() == 2 * joints
+        and integrates.tolist() == [True] * n + [False] * (n + len(motors))
+        and motors == list(range(2 * n, model.nu))
         and model.actuator_ctrllimited.all()
     ):
         raise ConfigError(
             "needs an <intvelocity> for every joint in order, then a <velocity> for every joint, "
-            "each with a ctrlrange [rad/s]."
+            "each with a ctrlrange [rad/s]; then its hand's <position> with one [m]."
         )
 
 

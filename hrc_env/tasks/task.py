@@ -3,7 +3,7 @@
 import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from importlib import import_module
 from typing import Any
 
@@ -11,21 +11,15 @@ import numpy as np
 
 from hrc_env import observations, rewards
 from hrc_env.core.errors import ConfigError, check_shape, unknown
-from hrc_env.core.records import RobotState
-from hrc_env.core.typing import Floats, Ints, Points3
+from hrc_env.core.typing import Bools, Floats, Ints, Points3
+from hrc_env.handling import World
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm
+from hrc_env.scene.robot import DEFAULT as DEFAULT_ROBOT
 from hrc_env.tasks import BUILT_IN, EPISODE_STEPS
 
 _ID = re.compile(r"[A-Za-z]\w*-v\d+")
 Rngs = Sequence[np.random.Generator]
-
-
-@dataclass(frozen=True, slots=True)
-class World:
-    """What a task judges; rows are the environments in question."""
-
-    robot: RobotState
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +58,20 @@ class Task:
     markers: Callable[[Any], Points3]
     """(view) -> (B, M, 3) points that pictures show [m]."""
     max_episode_steps: int = EPISODE_STEPS
+    robot: str = DEFAULT_ROBOT
+    """Who does it unless somebody says otherwise."""
+    grips: bool = False
+    """Whether that must be a robot with a hand."""
+    things: Callable[[Any], str] = lambda config: ""
+    """(config) -> MJCF of what the task puts there, from the middle of the robot's foot on [m]:
+    bodies of boxes, loose with a free joint and contype 16, fixed with contype 1."""
+    poses: Callable[[Any, Ints, Any], Floats] | None = None
+    """(state, ids, config) -> (n, O, 7) where what is loose lies when `reset` is done: place in
+    the world [m] and quaternion; None: as in the MJCF."""
+    over: Callable[[Any], Bools] | None = None
+    """(progress) -> (B,) whether there is nothing more to do; None: there always is."""
+    defaults: Mapping[str, Any] = field(default_factory=dict)
+    """Settings of `HRCConfig` that differ from its defaults, nested, as `config=` takes them."""
 
     @property
     def observation_terms(self) -> tuple[ObservationTerm, ...]:

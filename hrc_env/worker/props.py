@@ -11,7 +11,7 @@ import numpy as np
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Held
-from hrc_env.core.typing import Floats, Points3
+from hrc_env.core.typing import Floats, Ints, Points3, QuaternionsWxyz
 from hrc_env.geometry.rotations import turned
 from hrc_env.geometry.shapes import BOX, CAPSULE, CENTRE, HALF_SIZE, WIDTH, absent, shape
 
@@ -122,9 +122,17 @@ def held_shapes(held: Held) -> Floats:
 
     There are rows for the prop of most parts; those that are left over are absent.
     """
-    batch, n_workers = held.kind.shape
-    rows = np.empty((batch, n_workers * _N_PARTS, WIDTH))
-    _place(held.kind, held.position_world, held.quaternion_wxyz, _PARTS, rows)
+    return placed(held.kind, held.position_world, held.quaternion_wxyz, _PARTS)
+
+
+def placed(
+    kind: Ints, position_world: Points3, quaternion_wxyz: QuaternionsWxyz, parts: Floats
+) -> Floats:
+    """(B, W * n, `shapes.WIDTH`) the parts (P, n, `shapes.WIDTH`) of things of kinds (B, W), each
+    where it is, in the world [m]."""
+    batch, many = kind.shape
+    rows = np.empty((batch, many * parts.shape[1], WIDTH))
+    _place(kind, position_world, quaternion_wxyz, parts, rows)
     return rows
 
 

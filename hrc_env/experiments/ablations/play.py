@@ -184,7 +184,7 @@ def matched(mean_world: Points3, tracked: Bools, joints_world: Points3) -> Ints:
 
 def n_seeing(now: TrueSensorInput, scene: Scene, turn: Turn) -> Ints:
     """(B, W, J) cameras that have a free line of sight to each joint and are not lost for good."""
-    surroundings = scene.surroundings(now.q, now.motion.held)
+    surroundings = scene.surroundings(now.qpos, now.motion.held)
     sight, _ = lines_of_sight(now.truth, surroundings, scene.cameras)
     gone = {name for fault in turn.faults if fault.kind == "lost" for name in fault.cameras}
     left = [camera.name not in gone for camera in scene.cameras]
