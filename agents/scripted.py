@@ -37,6 +37,11 @@ class Yielding:
         return np.clip((gap_m - self.stop_m) / (self.full_speed_m - self.stop_m), 0.0, 1.0)
 
 
+def speed_m_s(error_m: NDArray[np.float64], most_m_s: float) -> NDArray[np.float64]:
+    """How fast a tool goes that has so far to go [m]."""
+    return np.minimum(np.minimum(GAIN_HZ * error_m, np.sqrt(2 * BRAKE_MPS2 * error_m)), most_m_s)
+
+
 class Reacher:
     """Resolved-rate reaching, with or without yielding."""
 
@@ -57,8 +62,7 @@ class Reacher:
 
     def _tool_velocity(self, goal_from_tool: NDArray[np.float64]) -> NDArray[np.float64]:
         error_m = np.linalg.norm(goal_from_tool, axis=-1, keepdims=True)
-        speed = np.minimum(GAIN_HZ * error_m, np.sqrt(2 * BRAKE_MPS2 * error_m))
-        speed = np.minimum(speed, self.env_info.control_config.tool_speed_mps)
+        speed = speed_m_s(error_m, self.env_info.control_config.tool_speed_mps)
         return goal_from_tool / np.maximum(error_m, 1e-9) * speed
 
     def _joint_action(

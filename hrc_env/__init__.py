@@ -15,7 +15,7 @@ from hrc_env.registration import (
     register_shield,
     register_task,
 )
-from hrc_env.tasks import BUILT_IN
+from hrc_env.tasks import BUILT_IN, EPISODE_STEPS, LONGER
 
 __version__ = "0.1.0"
 __all__ = [
@@ -28,5 +28,5 @@ __all__ = [
 ]
 
 for _id in BUILT_IN:
-    register_environment(_id)
+    register_environment(_id, LONGER.get(_id, EPISODE_STEPS))
 import_files()

@@ -1,4 +1,4 @@
-"""Write robots, scenes and what workers hold as MJCF and PNG: python -m assets.scenes.bake
+"""Write robots, scenes, what tasks add and what workers hold as MJCF and PNG: python -m assets.scenes.bake
 
 The package reads these files only; run this after a change to one of the makers beside it.
 """
@@ -14,22 +14,28 @@ from assets.scenes import arena, prop_looks, site
 from assets.scenes.mjcf import TEXTURES, write_mjcf
 from assets.scenes.pedestal import add_pedestal
 from assets.scenes.primitives import add_painted, paint_materials
+from assets.tasks.pick_place import add_pick_place
 from hrc_env.scene.worker_visuals import PARKED_M
 from hrc_env.worker.props import PROP_NAMES
 
 ASSETS = Path(__file__).resolve().parent.parent
 ROBOTS = {"ur10e_like": SCREWDRIVER, "ur10e_gripper": GRIPPER}
+TASKS = {"pick_place": add_pick_place}
 MAKERS = {"lab": (arena.add_lab, arena.paint_lab), "site": (site.add_site, site.paint_site)}
 
 
 def bake(assets: Path) -> None:
-    """Write `robots/*.xml` and `scenes/*.xml` with their pictures below a folder."""
-    for name in ("robots", "scenes"):
+    """Write `robots/*.xml`, `tasks/*.xml` and `scenes/*.xml` with their pictures below a folder."""
+    for name in ("robots", "scenes", "tasks"):
         (assets / name).mkdir(parents=True, exist_ok=True)
     for name, hand in ROBOTS.items():
         arm = mujoco.MjSpec()
         add_arm(arm, hand)
         write_mjcf(arm, assets / "robots" / f"{name}.xml")
+    for name, add in TASKS.items():
+        things = mujoco.MjSpec()
+        add(things)
+        write_mjcf(things, assets / "tasks" / f"{name}.xml")
     for name in MAKERS:
         for clutter in (False, True):
             path = assets / "scenes" / f"{name}{'' if clutter else '_bare'}.xml"

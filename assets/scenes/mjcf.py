@@ -175,6 +175,8 @@ def _add_geom(parent: ElementTree.Element, geom: Any) -> None:
     if geom.material:
         given["material"] = geom.material
     given |= _changed(geom, default, GEOM_FIELDS)
+    if np.isfinite(geom.mass):
+        given["mass"] = _text(geom.mass)
     if not geom.castshadow:
         given["castshadow"] = "false"
     ElementTree.SubElement(parent, "geom", given)

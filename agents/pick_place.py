@@ -1,0 +1,159 @@
+"""Picks and places without learning: what to do next follows from the observation alone.
+
+There is no plan to remember. A piece in the fingers goes up, round the robot to above its place,
+down, and is let go; with none, the fingers go to above the first piece that is not placed, down,
+and close. Velocities of the tool are resolved to joint velocities by `hrc_env.control`.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hrc_env.control import resolved_twist
+from hrc_env.observations import split
+
+from .env_info import EnvInfo
+from .scripted import Yielding, speed_m_s
+
+Array = NDArray[np.float64]
+GAIN_HZ, TURN_HZ = 4.0, 4.0
+"""Speed per distance, turn rate per angle [1/s]."""
+ABOVE_M, CLEAR_M = 0.16, 0.11
+"""How high above pieces the tool travels; above this it may move sideways."""
+OVER_M, OVER_RAD, STILL_OVER_M = 0.006, 0.05, 0.015
+"""So near above its target the tool goes down, and goes on to while it is still so near."""
+AT_M, STILL_AT_M = 0.007, 0.014
+"""So near to a piece's middle the fingers close, and stay closed; so near to its place they open."""
+LYING = 0.8
+"""Cosine of a piece's tilt below which it lies, and is left."""
+ROUND_RAD = 0.25
+"""A target farther round the robot than this is approached along a circle."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """An observation as the policy reads it; rows are environments."""
+
+    tool: Array
+    finger_axis: Array
+    tool_axis: Array
+    opening_m: Array
+    to_piece: Array
+    along: Array
+    """(n, 3) the piece's long axis."""
+    to_place: Array
+    """From the piece."""
+    held: NDArray[np.bool_]
+    nothing: NDArray[np.bool_]
+    """Whether there is no piece left to place."""
+
+
+class PickPlacer:
+    """Resolved-rate picking and placing, with or without yielding."""
+
+    def __init__(self, env_info: EnvInfo, yielding: Yielding | None = None) -> None:
+        self.env_info, self.yielding = env_info, yielding
+        self._foot = env_info.chain.T_world_from_base[:2, 3]
+
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Actions (..., A): towards the next piece, or with it to its place."""
+        terms = split(np.atleast_2d(observation), self.env_info.layout)
+        seen = _seen(terms)
+        velocity, turn, grip = self._wanted(seen)
+        if self.yielding is not None:
+            nearest_m = terms["worker_separation"].min(axis=-1, initial=np.inf)
+            share = self.yielding.share(nearest_m)[:, None]
+            velocity, turn = velocity * share, turn * share
+        motion = self._motion(terms, velocity, turn)
+        action = np.concatenate([motion, grip[:, None]], axis=1)
+        return action.reshape(*observation.shape[:-1], -1).astype(np.float32)
+
+    def _wanted(self, seen: _Seen) -> tuple[Array, Array, Array]:
+        """Velocity and turn rate of the tool (n, 3), and what the fingers do (n,)."""
+        held, at_place = seen.held, np.linalg.norm(seen.to_place, axis=1) < AT_M
+        yaw = np.where(held, _to_y(seen.along), _between(seen.finger_axis, seen.along))
+        way = np.where(held[:, None], seen.to_place, seen.to_piece)
+        released = ~held & (np.linalg.norm(seen.to_place, axis=1) < STILL_AT_M)
+        aside_m = np.linalg.norm(way[:, :2], axis=1)
+        over = (aside_m < OVER_M) & (np.abs(yaw) < OVER_RAD)
+        down = over | ((aside_m < STILL_OVER_M) & (way[:, 2] > -0.8 * ABOVE_M))
+        low = -way[:, 2] < CLEAR_M
+        away = released | seen.nothing | (low & ~down)
+        target = way + np.where(down[:, None], 0.0, [0.0, 0.0, ABOVE_M])
+        target[away] = [0.0, 0.0, ABOVE_M]
+        near_m = np.linalg.norm(seen.to_piece, axis=1)
+        closing = near_m < np.where(seen.opening_m < 0.05, STILL_AT_M, AT_M)
+        closed = np.where(held, ~at_place, closing & ~released) & ~seen.nothing
+        yaw = np.where(away, 0.0, yaw)
+        upright = np.cross(seen.tool_axis, [0.0, 0.0, -1.0])
+        turn = TURN_HZ * (upright + yaw[:, None] * [0.0, 0.0, 1.0])
+        waits = ~held & closed
+        return np.where(waits[:, None], 0.0, self._round(seen.tool, target)), turn, 2.0 * closed - 1
+
+    def _round(self, tool: Array, target: Array) -> Array:
+        """Velocity (n, 3) to targets from the tool: round the robot's axis where they are far round
+        it, else straight."""
+        here, there = tool[:, :2] - self._foot, tool[:, :2] + target[:, :2] - self._foot
+        radius, wanted = np.linalg.norm(here, axis=1), np.linalg.norm(there, axis=1)
+        cross = here[:, 0] * there[:, 1] - here[:, 1] * there[:, 0]
+        angle = np.arctan2(cross, (here * there).sum(1))
+        outward = here / np.maximum(radius, 1e-6)[:, None]
+        aside = np.stack([-outward[:, 1], outward[:, 0]], axis=1)
+        arc = (radius * angle)[:, None] * aside + (wanted - radius)[:, None] * outward
+        far = np.abs(angle) > ROUND_RAD
+        error = np.concatenate([np.where(far[:, None], arc, target[:, :2]), target[:, 2:]], axis=1)
+        length = np.linalg.norm(error, axis=1, keepdims=True)
+        most = self.env_info.control_config.tool_speed_mps
+        return error / np.maximum(length, 1e-9) * speed_m_s(length, most)
+
+    def _motion(self, terms: dict[str, Array], velocity: Array, turn: Array) -> Array:
+        """(n, A - 1) the arm's part of the action."""
+        info, config = self.env_info, self.env_info.control_config
+        twist = np.concatenate([velocity, turn], axis=1)
+        if info.control == "twist":
+            scale = np.repeat([config.tool_speed_mps, config.tool_turn_rad_s], 3)
+            return np.clip(twist / scale, -1.0, 1.0)
+        q = np.arctan2(terms["joint_angle_sin"], terms["joint_angle_cos"])
+        qd = resolved_twist(info.chain, q, twist, config)
+        action = qd / (config.joint_speed_share * info.chain.velocity_limit_rad_s)
+        return action / np.maximum(np.abs(action).max(1, keepdims=True), 1.0)
+
+
+def _seen(terms: dict[str, Array]) -> _Seen:
+    """What matters now: the first piece that can be placed and is not."""
+    n = len(terms["object_placed"])
+    axes = terms["object_axes"].reshape(n, -1, 2, 3)
+    to_place = terms["place_from_object"].reshape(n, -1, 3)
+    out = (np.abs(axes[:, :, 1, 2]) < LYING) | (to_place[..., 2] > CLEAR_M)  # lies, fell down
+    held = terms["object_held"] > 0.5
+    done = ((terms["object_placed"] > 0.5) | out) & ~held
+    which = np.where(held.any(1), np.argmax(held, axis=1), np.argmin(done, axis=1))
+    row = np.arange(n)
+    tool_axes = terms["tool_axes"].reshape(n, 2, 3)
+    return _Seen(
+        tool=terms["tool_position"],
+        finger_axis=tool_axes[:, 0],
+        tool_axis=tool_axes[:, 1],
+        opening_m=terms["hand_opening"][:, 0],
+        to_piece=terms["object_from_tool"].reshape(n, -1, 3)[row, which],
+        along=axes[row, which, 0],
+        to_place=to_place[row, which],
+        held=held[row, which],
+        nothing=done.all(1),
+    )
+
+
+def _between(finger_axis: Array, along: Array) -> Array:
+    """(n,) angles by which to turn fingers so that they close across a piece, -90 to 90 degrees."""
+    across = np.arctan2(along[:, 1], along[:, 0]) - np.pi / 2
+    return _half_turn(across - np.arctan2(finger_axis[:, 1], finger_axis[:, 0]))
+
+
+def _to_y(along: Array) -> Array:
+    """(n,) angles by which to turn a piece so that it lies along y, either way round."""
+    return _half_turn(np.pi / 2 - np.arctan2(along[:, 1], along[:, 0]))
+
+
+def _half_turn(angle: Array) -> Array:
+    return (angle + np.pi / 2) % np.pi - np.pi / 2

@@ -1,0 +1,1 @@
+"""The makers of what tasks put beside the robot."""

@@ -1,0 +1,228 @@
+"""Picking and placing: pieces of studs lie on a table, and belong into a rack on the other side."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from hrc_env.belief import Belief
+from hrc_env.core.errors import ConfigError, check_fields
+from hrc_env.core.records import ObjectState
+from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records, Rngs
+from hrc_env.geometry.rotations import matrix
+from hrc_env.handling import World
+from hrc_env.observations import ObservationTerm
+from hrc_env.rewards import RewardTerm
+from hrc_env.tasks import LONGER
+from hrc_env.tasks.task import Task
+from hrc_env.worker.body import assets_dir
+
+STUDS = 3
+STUD_M, STUD_KG = (0.038, 0.300, 0.089), 0.5
+"""Edges of a piece that stands on edge, along its x, y and z [m]; its mass [kg]."""
+SURFACE_M = -0.02
+"""Height of table and rack above the robot's foot [m]."""
+TABLE_M = (0.36, -0.62)
+PLACES_M = tuple((x, 0.62, SURFACE_M + STUD_M[2] / 2) for x in (0.24, 0.36, 0.48))
+"""Middle of the table, and of each piece that rests in its place, from the robot's foot [m]."""
+MOUNT_WORLD = np.array([-0.75, 0.0, 0.75])
+"""The robot's foot, in every scene [m]."""
+ROW_M, ASIDE_M, TURN_RAD = 0.14, 0.02, 0.2
+"""Pieces lie in a row so far apart, each moved and turned by up to so much."""
+
+
+@dataclass(frozen=True, slots=True)
+class PickPlaceConfig:
+    """What counts as placed, and what that is worth."""
+
+    tolerance_m: float = 0.01
+    """A piece is in its place when its middle is nearer to it than this [m],"""
+    tolerance_rad: float = 0.087
+    """turned by less than this, 5 degrees [rad],"""
+    resting_m_s: float = 0.02
+    """slower than this [m/s], and let go."""
+    reward: str = "dense"
+    """"dense": coming nearer counts, too; "sparse": only pieces in their places."""
+    progress_per_m: float = 5.0
+    """Dense reward for every metre that pieces, and the tool, come nearer to where they go."""
+    placed_bonus: float = 10.0
+    """Reward for a piece that is placed; taken off again if it leaves its place."""
+
+    def __post_init__(self) -> None:
+        check_fields(self, "be positive", "tolerance_m", "tolerance_rad", "resting_m_s")
+        if self.reward not in ("dense", "sparse"):
+            raise ConfigError(
+                f'PickPlaceConfig.reward must be "dense" or "sparse", got {self.reward!r}.'
+            )
+
+
+PICK_PLACE = np.dtype(
+    [
+        ("poses", "f8", (STUDS, 7)),  # where pieces lie at first, world [m]
+        ("placed", "?", (STUDS,)),  # which are in their places now
+        ("potential_m", "f8"),  # minus the ways that are left [m]
+        ("dropped", "?"),  # whether one lies below the table
+    ],
+    align=True,
+)
+"""The task of one environment."""
+PICK_PLACE_STEP = np.dtype([("progress_m", "f8"), ("placed", "i8"), ("done", "?")], align=True)
+"""Metres that were gained in a step, pieces that were placed (less those that left), the end."""
+
+
+@dataclass(frozen=True, slots=True)
+class PickPlaceView:
+    """What robots know of their task."""
+
+    placed: Bools
+    """(B, 3)."""
+    places_world: Points3
+    """(3, 3) [m]."""
+
+
+def places_world() -> Points3:
+    """(3, 3) where the middles of placed pieces are [m]."""
+    return MOUNT_WORLD + np.array(PLACES_M)
+
+
+def things(config: PickPlaceConfig) -> str:
+    """Table, rack and pieces as MJCF."""
+    return Path(assets_dir() / "tasks" / "pick_place.xml").read_text()
+
+
+def init(batch: int) -> Records:
+    """(B,) of `PICK_PLACE`, to be filled by `reset`."""
+    return np.zeros(batch, PICK_PLACE)
+
+
+def reset(state: Records, ids: Ints, rngs: Rngs, world: World, config: PickPlaceConfig) -> None:
+    """Lay the pieces of environments `ids` out anew."""
+    state[ids] = np.zeros((), PICK_PLACE)
+    x, y = TABLE_M
+    for b in ids.tolist():
+        draws = 2.0 * rngs[b].random((STUDS, 3)) - 1.0
+        at = np.zeros((STUDS, 7))
+        at[:, 0] = x + ROW_M * (np.arange(STUDS) - 1)
+        at[:, 1] = y + ASIDE_M * draws[:, 1]
+        at[:, 2] = SURFACE_M + STUD_M[2] / 2
+        at[:, :3] += MOUNT_WORLD
+        half = 0.5 * TURN_RAD * draws[:, 2]
+        at[:, 3], at[:, 6] = np.cos(half), np.sin(half)
+        state["poses"][b] = at
+    studs, none = state["poses"][ids, :, :3], np.zeros((len(ids), STUDS), bool)
+    state["potential_m"][ids] = -_left_m(studs, world.robot.tool_world, none)
+
+
+def poses(state: Records, ids: Ints, config: PickPlaceConfig) -> Floats:
+    """(n, 3, 7) where the pieces lie at first."""
+    return state["poses"][ids]
+
+
+def advance(
+    state: Records, rngs: Rngs, world: World, dt_s: float, config: PickPlaceConfig
+) -> Records:
+    """Judge where the pieces are; (B,) of `PICK_PLACE_STEP`."""
+    objects, step = world.objects, np.zeros(len(state), PICK_PLACE_STEP)
+    assert objects is not None
+    placed = in_place(objects, config)
+    left_m = _left_m(objects.position_world, world.robot.tool_world, placed)
+    step["progress_m"] = -left_m - state["potential_m"]
+    step["placed"] = placed.sum(1) - state["placed"].sum(1)
+    step["done"] = placed.all(1)
+    state["placed"], state["potential_m"] = placed, -left_m
+    lowest_m = MOUNT_WORLD[2] + SURFACE_M
+    state["dropped"] |= (objects.position_world[..., 2] < lowest_m).any(1)
+    return step
+
+
+def in_place(objects: ObjectState, config: PickPlaceConfig) -> Bools:
+    """(B, 3) which pieces rest in their places, let go."""
+    off_m = np.linalg.norm(objects.position_world - places_world(), axis=-1)
+    R = matrix(objects.quaternion_wxyz)
+    least = np.cos(config.tolerance_rad)
+    straight = (np.abs(R[..., 1, 1]) > least) & (R[..., 2, 2] > least)
+    still = np.linalg.norm(objects.velocity_world, axis=-1) < config.resting_m_s
+    return (off_m < config.tolerance_m) & straight & still & ~objects.held
+
+
+def _left_m(studs_world: Points3, tool_world: Points3, placed: Bools) -> Floats:
+    """(B,) metres that the pieces which are not placed, and the tool to the first of them, have
+    before them."""
+    away_m = np.linalg.norm(studs_world - places_world(), axis=-1)
+    to_tool_m = np.linalg.norm(studs_world - tool_world[:, None], axis=-1)
+    first = np.argmin(placed, axis=1)
+    reach_m = np.where(placed.all(1), 0.0, to_tool_m[np.arange(len(placed)), first])
+    return np.where(placed, 0.0, away_m).sum(1) + reach_m
+
+
+def view(state: Records, ids: Ints, config: PickPlaceConfig) -> PickPlaceView:
+    """What robots `ids` know of their task."""
+    return PickPlaceView(state["placed"][ids].copy(), places_world())
+
+
+def info(state: Records) -> dict[str, Floats]:
+    """What the episode has come to so far, (B,) each; it is a success if every piece is placed."""
+    placed = state["placed"].sum(1).astype(float)
+    return {
+        "task/studs_placed": placed,
+        "task/studs_left": STUDS - placed,
+        "task/dropped": state["dropped"].astype(float),
+        "is_success": (placed == STUDS).astype(float),
+    }
+
+
+def _progress(now: Belief, step: Records, previous: Floats, config: PickPlaceConfig) -> Floats:
+    share = config.progress_per_m if config.reward == "dense" else 0.0
+    return share * step["progress_m"]
+
+
+def _objects_from_places(now: Belief) -> Points3:
+    assert now.objects is not None
+    return now.task.places_world - now.objects.position_world
+
+
+TASK = Task(
+    id="HRCPickPlace-v0",
+    says="Take pieces of studs from a table and lay them into a rack, beside a worker.",
+    config=PickPlaceConfig,
+    init=init,
+    reset=reset,
+    advance=advance,
+    view=view,
+    observations=(
+        ObservationTerm(
+            "place_from_object", lambda of: 3 * STUDS, "m", "world", 3.0, 0.5,
+            "From each piece, as measured, to its place.",
+            _objects_from_places,
+        ),
+        ObservationTerm(
+            "object_placed", lambda of: STUDS, "-", "-", 1.0, 1.0,
+            "1 for a piece that rests in its place, let go.",
+            lambda now: now.task.placed.astype(float),
+        ),
+    ),
+    rewards=(
+        RewardTerm(
+            "progress",
+            "Metres that pieces came nearer to their places, and the tool to the first that is not "
+            "placed, times `task.progress_per_m`; 0 with `task.reward` \"sparse\".",
+            _progress,
+        ),
+        RewardTerm(
+            "placed",
+            "`task.placed_bonus` for each piece that is placed in this step, less those that left.",
+            lambda now, step, previous, config: config.placed_bonus * step["placed"],
+        ),
+    ),
+    info=info,
+    achieved="task/studs_placed",
+    failed="task/studs_left",
+    markers=lambda view: np.broadcast_to(view.places_world, (len(view.placed), STUDS, 3)),
+    max_episode_steps=LONGER["HRCPickPlace-v0"],
+    robot="ur10e_gripper",
+    grips=True,
+    things=things,
+    poses=poses,
+    over=lambda step: step["done"],
+    defaults={"scene": {"sim_dt": 0.004}},
+)  # fmt: skip
