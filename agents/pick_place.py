@@ -27,8 +27,9 @@ AT_M, STILL_AT_M = 0.007, 0.014
 """So near to a piece's middle the fingers close, and stay closed; so near to its place they open."""
 LYING = 0.8
 """Cosine of a piece's tilt below which it lies, and is left."""
-ROUND_RAD = 0.25
-"""A target farther round the robot than this is approached along a circle."""
+ROUND_RAD, ROUND_M = 0.35, 0.50
+"""A target farther round the robot than this is approached along a circle of this radius, which
+leaves the place in front to people."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +101,8 @@ class PickPlacer:
         angle = np.arctan2(cross, (here * there).sum(1))
         outward = here / np.maximum(radius, 1e-6)[:, None]
         aside = np.stack([-outward[:, 1], outward[:, 0]], axis=1)
-        arc = (radius * angle)[:, None] * aside + (wanted - radius)[:, None] * outward
+        inward = np.minimum(wanted, ROUND_M) - radius
+        arc = (radius * angle)[:, None] * aside + inward[:, None] * outward
         far = np.abs(angle) > ROUND_RAD
         error = np.concatenate([np.where(far[:, None], arc, target[:, :2]), target[:, 2:]], axis=1)
         length = np.linalg.norm(error, axis=1, keepdims=True)
