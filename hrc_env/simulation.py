@@ -24,7 +24,6 @@ from hrc_env.core.records import PoseEstimate, RobotState, WorkerMotion, WorkerT
 from hrc_env.core.streams import children
 from hrc_env.core.typing import Bools, Capsules, Floats, Ints, JointVelocities, Points3
 from hrc_env.geometry import chains
-from hrc_env.handling import World, measured
 from hrc_env.motion import generator
 from hrc_env.motion.activities.pieces import NoRoomError
 from hrc_env.pipeline.levels import CAMERA_LEVELS, make_pipeline
@@ -36,6 +35,7 @@ from hrc_env.scene.build import Scene, build
 from hrc_env.scene.physics import Physics
 from hrc_env.scene.rigs import findings
 from hrc_env.step import Info, StepResult
+from hrc_env.tasks.world import World, measured
 from hrc_env.tracking import oracle
 from hrc_env.worker.body import pool, stack, worker_capsules, worker_truth
 
@@ -107,8 +107,9 @@ class Simulation(Stateful):
         )
         """What is believed of the workers now, and expected at each of `forecast_s`."""
         self.identities = metrics.no_identities(batch, most)
-        self.measured = self._world(self._everyone, chains.robot_state(
-            self.chain, self.physics.q, self.physics.qd)).objects
+        self.measured = self._world(
+            self._everyone, chains.robot_state(self.chain, self.physics.q, self.physics.qd)
+        ).objects
         """The task's loose objects as they were measured last; None: there are none."""
         self.streams = {name: [np.random.default_rng(0)] * batch for name in (*STREAMS, MEASURING)}
 
@@ -304,9 +305,7 @@ class Simulation(Stateful):
             rngs = picked(self.streams["objects"], ids)
             write_rows(self.measured, ids, measured(world.objects, rngs, self.config.objects))
 
-    def _believed(
-        self, ids: Ints, world: World, estimates: tuple[PoseEstimate, ...]
-    ) -> Belief:
+    def _believed(self, ids: Ints, world: World, estimates: tuple[PoseEstimate, ...]) -> Belief:
         """What the robots of environments `ids` believe; the records are of them only."""
         estimate, *later = estimates
         return Belief(
