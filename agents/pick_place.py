@@ -24,7 +24,7 @@ ABOVE_M, CLEAR_M = 0.16, 0.11
 OVER_M, OVER_RAD, STILL_OVER_M = 0.006, 0.05, 0.015
 """So near above its target the tool goes down, and goes on to while it is still so near."""
 AT_M, STILL_AT_M = 0.007, 0.014
-"""So near to a piece's middle the fingers close, and stay closed; so near to its place they open."""
+"""So near to a piece's middle fingers close, and stay closed; so near to its place they open."""
 LYING = 0.8
 """Cosine of a piece's tilt below which it lies, and is left."""
 ROUND_RAD, ROUND_M = 0.35, 0.50
