@@ -92,7 +92,7 @@ class Physics:
         self, ids: Ints, q: JointAngles, body: Ints | None = None, poses: Floats | None = None
     ) -> None:
         """Put environments `ids` (sorted) to rest at angles q (len(ids), N) [rad], hands open;
-        their workers have bodies (len(ids), W) of the scene's, None: the first; loose objects lie at
+        their workers have bodies (len(ids), W) of the scene's, None: the first; objects lie at
         poses (len(ids), O, 7), None: as the task's MJCF has them."""
         ids = np.asarray(ids, int)
         check_shape("q", np.shape(q), (len(ids), self._n), "one row per id, one angle per joint")
