@@ -28,12 +28,12 @@ from hrc_env.rewards import RewardConfig
 from hrc_env.safety.shield import Shield, shield_called
 from hrc_env.scene.build import SceneConfig
 from hrc_env.scene.domain_randomization import APPEARANCES, AppearanceConfig
+from hrc_env.scene.handling import ObjectsConfig
 from hrc_env.scene.rigs import RIGS
 from hrc_env.scene.robot import DEFAULT as DEFAULT_ROBOT
 from hrc_env.scene.robot import ROBOTS, Robot, robot_called
 from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import Task, task_called
-from hrc_env.tasks.world import ObjectsConfig
 from hrc_env.tracking.config import ParticleConfig, TrackerConfig, of_kind
 from hrc_env.tracking.estimators import EstimatorSpec, estimator_called
 from hrc_env.tracking.forecast import LONGEST_S

@@ -7,14 +7,13 @@ import numpy as np
 
 from hrc_env.belief import Belief
 from hrc_env.core.errors import ConfigError, check_fields, needed
-from hrc_env.core.records import ObjectState
+from hrc_env.core.records import ObjectState, World
 from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records, Rngs
 from hrc_env.geometry.rotations import matrix
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm
 from hrc_env.tasks import LONGER
 from hrc_env.tasks.task import Task
-from hrc_env.tasks.world import World
 from hrc_env.worker.body import assets_dir
 
 STUDS = 3

@@ -11,11 +11,11 @@ import numpy as np
 
 from hrc_env import observations, rewards
 from hrc_env.core.errors import ConfigError, check_shape, unknown
+from hrc_env.core.records import World
 from hrc_env.core.typing import Bools, Floats, Ints, Points3
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm
 from hrc_env.tasks import BUILT_IN, EPISODE_STEPS
-from hrc_env.tasks.world import World
 
 _ID = re.compile(r"[A-Za-z]\w*-v\d+")
 Rngs = Sequence[np.random.Generator]
