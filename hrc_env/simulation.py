@@ -19,7 +19,7 @@ from hrc_env.control import joint_command, n_actions, opening_m
 from hrc_env.core.batching import State, Stateful, picked, rows, write_rows
 from hrc_env.core.errors import ConfigError, check_shape
 from hrc_env.core.kernels import ahead
-from hrc_env.core.records import PoseEstimate, WorkerMotion, WorkerTruth
+from hrc_env.core.records import PoseEstimate, WorkerMotion, WorkerTruth, World
 from hrc_env.core.streams import children
 from hrc_env.core.typing import Bools, Floats, Ints, JointVelocities, Points3
 from hrc_env.geometry import chains
@@ -105,9 +105,8 @@ class Simulation(Stateful):
         )
         """What is believed of the workers now, and expected at each of `forecast_s`."""
         self.identities = metrics.no_identities(batch, most)
-        self.measured = self._world(
-            self._everyone, chains.robot_state(self.chain, self.physics.q, self.physics.qd)
-        ).objects
+        robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
+        self.measured = handling.world_of(self.physics, self._everyone, robot).objects
         """The task's loose objects as they were measured last; None: there are none."""
         self.streams = {name: [np.random.default_rng(0)] * batch for name in (*STREAMS, MEASURING)}
 
