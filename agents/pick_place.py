@@ -24,7 +24,7 @@ ABOVE_M, CLEAR_M = 0.16, 0.11
 OVER_M, OVER_RAD, STILL_OVER_M = 0.006, 0.05, 0.015
 """So near above its target the tool goes down, and goes on to while it is still so near."""
 AT_M, STILL_AT_M = 0.007, 0.014
-"""So near to a piece's middle the fingers close, and stay closed; so near to its place they open."""
+"""So near to a piece's middle fingers close, and stay closed; so near to its place they open."""
 LYING = 0.8
 """Cosine of a piece's tilt below which it lies, and is left."""
 ROUND_RAD, ROUND_M = 0.35, 0.50
@@ -66,8 +66,8 @@ class PickPlacer:
             nearest_m = terms["worker_separation"].min(axis=-1, initial=np.inf)
             share = self.yielding.share(nearest_m)[:, None]
             velocity, turn = velocity * share, turn * share
-        motion = self._motion(terms, velocity, turn)
-        action = np.concatenate([motion, grip[:, None]], axis=1)
+        moves = self._arm_action(terms, velocity, turn)
+        action = np.concatenate([moves, grip[:, None]], axis=1)
         return action.reshape(*observation.shape[:-1], -1).astype(np.float32)
 
     def _wanted(self, seen: _Seen) -> tuple[Array, Array, Array]:
@@ -109,7 +109,7 @@ class PickPlacer:
         most = self.env_info.control_config.tool_speed_mps
         return error / np.maximum(length, 1e-9) * speed_m_s(length, most)
 
-    def _motion(self, terms: dict[str, Array], velocity: Array, turn: Array) -> Array:
+    def _arm_action(self, terms: dict[str, Array], velocity: Array, turn: Array) -> Array:
         """(n, A - 1) the arm's part of the action."""
         info, config = self.env_info, self.env_info.control_config
         twist = np.concatenate([velocity, turn], axis=1)

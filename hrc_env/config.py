@@ -18,7 +18,6 @@ from hrc_env.core.mapping import PRESETS, from_mapping, plain, read_toml, restor
 from hrc_env.core.results import write_whole
 from hrc_env.geometry.camera_config import CameraConfig, read_rig
 from hrc_env.metrics import CostConfig
-from hrc_env.handling import ObjectsConfig
 from hrc_env.motion.generator import PEOPLE, MotionConfig, PeopleConfig
 from hrc_env.motion.schedule import WORK, Job
 from hrc_env.observations import UNCERTAINTY
@@ -29,7 +28,9 @@ from hrc_env.rewards import RewardConfig
 from hrc_env.safety.shield import Shield, shield_called
 from hrc_env.scene.build import SceneConfig
 from hrc_env.scene.domain_randomization import APPEARANCES, AppearanceConfig
+from hrc_env.scene.handling import ObjectsConfig
 from hrc_env.scene.rigs import RIGS
+from hrc_env.scene.robot import DEFAULT as DEFAULT_ROBOT
 from hrc_env.scene.robot import ROBOTS, Robot, robot_called
 from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import Task, task_called
@@ -160,7 +161,8 @@ def settle(**arguments: Any) -> Settings:
     for name, path in PARTS.items():
         if given[name] is not None:
             config = _with_part(config, path, given[name], name)
-    robot = robot_called(task.robot if given["robot"] is None else given["robot"])
+    named = task.robot if given["robot"] is None else given["robot"]
+    robot = robot_called(DEFAULT_ROBOT if named is None else named)
     if task.grips and robot.hand is None:
         able = [name for name, each in ROBOTS.items() if each.hand]
         raise ConfigError(

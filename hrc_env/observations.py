@@ -16,7 +16,7 @@ from hrc_env.belief import (
     deviation_towards_robot_m,
     standard_deviation_m,
 )
-from hrc_env.core.errors import Named, check_shape
+from hrc_env.core.errors import Named, check_shape, needed
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import HandState, ObjectState
 from hrc_env.core.skeleton import N_JOINTS
@@ -87,13 +87,11 @@ def _shorten(vectors, softening):
 
 
 def _hand(now: Belief) -> HandState:
-    assert now.hand is not None  # or the term has no entries
-    return now.hand
+    return needed(now.hand, "A hand")
 
 
 def _objects(now: Belief) -> ObjectState:
-    assert now.objects is not None
-    return now.objects
+    return needed(now.objects, "A loose object")
 
 
 def _joints_forecast(now: Belief) -> Floats:

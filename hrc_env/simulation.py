@@ -6,7 +6,6 @@ streams only, never on the size of the batch.
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -20,18 +19,17 @@ from hrc_env.control import joint_command, n_actions, opening_m
 from hrc_env.core.batching import State, Stateful, picked, rows, write_rows
 from hrc_env.core.errors import ConfigError, check_shape
 from hrc_env.core.kernels import ahead
-from hrc_env.core.records import PoseEstimate, RobotState, WorkerMotion, WorkerTruth
+from hrc_env.core.records import PoseEstimate, WorkerMotion, WorkerTruth, World
 from hrc_env.core.streams import children
-from hrc_env.core.typing import Bools, Capsules, Floats, Ints, JointVelocities, Points3
+from hrc_env.core.typing import Bools, Floats, Ints, JointVelocities, Points3
 from hrc_env.geometry import chains
-from hrc_env.handling import World, measured
 from hrc_env.motion import generator
 from hrc_env.motion.activities.pieces import NoRoomError
 from hrc_env.pipeline.levels import CAMERA_LEVELS, make_pipeline
 from hrc_env.pipeline.sensor_input import SensorInput, TrueSensorInput
 from hrc_env.rewards import RewardConfig
 from hrc_env.safety.shield import shielded
-from hrc_env.scene import objects as loose
+from hrc_env.scene import handling
 from hrc_env.scene.build import Scene, build
 from hrc_env.scene.physics import Physics
 from hrc_env.scene.rigs import findings
@@ -107,8 +105,8 @@ class Simulation(Stateful):
         )
         """What is believed of the workers now, and expected at each of `forecast_s`."""
         self.identities = metrics.no_identities(batch, most)
-        self.measured = self._world(self._everyone, chains.robot_state(
-            self.chain, self.physics.q, self.physics.qd)).objects
+        robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
+        self.measured = handling.world_of(self.physics, self._everyone, robot).objects
         """The task's loose objects as they were measured last; None: there are none."""
         self.streams = {name: [np.random.default_rng(0)] * batch for name in (*STREAMS, MEASURING)}
 
@@ -127,7 +125,7 @@ class Simulation(Stateful):
         task.reset(self.task_state, ids, streams["task"], World(robot), config)
         poses = None if task.poses is None else task.poses(self.task_state, ids, config)
         self.physics.reset(ids, q, self.motion.workers["body"][ids], poses)
-        world = self._world(ids, robot)
+        world = handling.world_of(self.physics, ids, robot)
         self._measure(ids, world)
         self.pipeline.reset(ids, streams["sensor"], streams["tracker"])
         motion = generator.current(self.motion, ids)
@@ -162,7 +160,8 @@ class Simulation(Stateful):
         estimates = self._perceive(self._everyone)
         n = self.chain.n_joints
         robot, arm = chains.robot_along(self.chain, q_path[..., :n], self.physics.qd)
-        world, arm = self._loaded(self._world(self._everyone, robot), arm, q_path)
+        world = handling.world_of(self.physics, self._everyone, robot)
+        world, arm = handling.loaded(self.scene, world, arm, q_path)
         self._measure(self._everyone, world)
         robot = world.robot
         seen_world = robot.capsules_world[:, self.scene.watched, 1]
@@ -234,8 +233,8 @@ class Simulation(Stateful):
     def belief(self) -> Belief:
         """What every robot believes now."""
         robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
-        world, qpos = self._world(self._everyone, robot), self.physics.qpos[:, None]
-        world, _ = self._loaded(world, robot.capsules_world[:, None], qpos)
+        world, arm = handling.world_of(self.physics, self._everyone, robot), robot.capsules_world
+        world, _ = handling.loaded(self.scene, world, arm[:, None], self.physics.qpos[:, None])
         return self._believed(self._everyone, world, self.estimates)
 
     def markers(self, b: int) -> Points3:
@@ -279,34 +278,15 @@ class Simulation(Stateful):
                 write_rows(whole, ids, part)
         return estimates
 
-    def _world(self, ids: Ints, robot: RobotState) -> World:
-        """Robots of environments `ids` with what they handle."""
-        hand, objects = self.physics.hand_state(ids), self.scene.objects
-        if not objects.names:
-            return World(robot, hand)
-        qpos, qvel = self.physics.qpos[ids], self.physics.qvel[ids]
-        held = np.zeros((len(ids), len(objects.names)), bool)
-        if hand is not None:
-            held = loose.held_by(objects, qpos, robot.tool_world, hand)
-        return World(robot, hand, loose.object_state(objects, qpos, qvel, held))
-
-    def _loaded(self, world: World, arm: Capsules, q_path: Floats) -> tuple[World, Capsules]:
-        """What a robot carries is part of it, now and along capsules (B, T, K, 2, 3)."""
-        if world.objects is None:
-            return world, arm
-        objects, held = self.scene.objects, world.objects.held
-        robot, arm = loose.with_load(world.robot, arm, objects, q_path, held)
-        return replace(world, robot=robot), arm
-
     def _measure(self, ids: Ints, world: World) -> None:
         """Measure the loose objects of environments `ids`."""
         if world.objects is not None:
             rngs = picked(self.streams["objects"], ids)
-            write_rows(self.measured, ids, measured(world.objects, rngs, self.config.objects))
+            write_rows(
+                self.measured, ids, handling.measured(world.objects, rngs, self.config.objects)
+            )
 
-    def _believed(
-        self, ids: Ints, world: World, estimates: tuple[PoseEstimate, ...]
-    ) -> Belief:
+    def _believed(self, ids: Ints, world: World, estimates: tuple[PoseEstimate, ...]) -> Belief:
         """What the robots of environments `ids` believe; the records are of them only."""
         estimate, *later = estimates
         return Belief(

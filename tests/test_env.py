@@ -17,6 +17,7 @@ from hrc_env.env import HRCEnv
 from hrc_env.pipeline.levels import LEVELS
 from hrc_env.rewards import RewardConfig
 from hrc_env.scene.rig import CameraConfig
+from hrc_env.tasks import BUILT_IN
 
 FAST_LEVELS = ("keypoints", "truth", "none")
 
@@ -368,7 +369,7 @@ def test_bad_actions_are_refused_in_words(action, said):
 def test_an_unknown_id_names_the_package():
     with pytest.raises(gymnasium.error.Error, match="HRCReach"):
         gymnasium.make("HRCReach-v7")
-    assert hrc_env.IDS == ["HRCReach-v0"]
+    assert list(BUILT_IN) == hrc_env.IDS
 
 
 def test_the_id_registers_itself_when_its_package_is_named():

@@ -21,7 +21,7 @@ def believed(gap_m: float, action: float = 0.0, workers: int = 1) -> Belief:
         np.ones(shape[:2], bool),
     )  # fmt: skip
     robot = RobotState(
-        np.zeros((1, 6)), np.zeros((1, 6)), np.zeros((1, 3)), np.zeros((1, 3)),
+        np.zeros((1, 6)), np.zeros((1, 6)), np.zeros((1, 3)), np.zeros((1, 3)), np.eye(3)[None],
         np.zeros((1, 9, 2, 3)), np.zeros(9),
     )  # fmt: skip
     gap = Separation(

@@ -36,7 +36,7 @@ def robot(turn=UNTURNED) -> RobotState:
     links = np.zeros((1, 2, 2, 3))
     links[..., 1, 2], links[0, 1, :, :2] = 1.0, (1.0, 1.05)
     still = np.zeros((1, 6)), np.zeros((1, 6)), np.zeros((1, 3)), np.zeros((1, 3))
-    return RobotState(*still, links @ turn.T, np.array([0.05, 0.2]))
+    return RobotState(*still, np.eye(3)[None], links @ turn.T, np.array([0.05, 0.2]))
 
 
 def estimate(place, cov, turn=UNTURNED) -> PoseEstimate:

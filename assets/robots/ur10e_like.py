@@ -84,7 +84,13 @@ def add_arm(spec: Any, hand: hands.Hand = hands.SCREWDRIVER) -> None:
     base = spec.worldbody.add_body(name="base", quat=[np.cos(HALF_TURN), 0, 0, np.sin(HALF_TURN)])
     add_base_looks(base)
     links = _add_links(base)
-    tool = ("tool", 5, (0, 0, FLANGE + 0.02), (0, 0, FLANGE + hand.length_m - hand.before_m), hand.radius_m)
+    tool = (
+        "tool",
+        5,
+        (0, 0, FLANGE + 0.02),
+        (0, 0, FLANGE + hand.length_m - hand.before_m),
+        hand.radius_m,
+    )
     for name, link, start, end, radius in (*CAPSULES, tool):
         _add_capsule(links[link], name, start, end, radius)
     for first, second in SELF_COLLISIONS:

@@ -5,7 +5,7 @@ Looks weigh nothing and touch nothing; lengths in metres, in the frames of the l
 
 from typing import Any
 
-from assets.scenes.primitives import box, cylinder, ellipsoid
+from assets.scenes.primitives import cylinder, ellipsoid
 from hrc_env.scene.primitives import ROBOT_LOOKS
 
 SHOULDER, ELBOW, WRIST = 0.076, 0.062, 0.0475

@@ -1,4 +1,4 @@
-"""Write robots, scenes, what tasks add and what workers hold as MJCF and PNG: python -m assets.scenes.bake
+"""Write robots, scenes, tasks and props as MJCF and PNG: python -m assets.scenes.bake
 
 The package reads these files only; run this after a change to one of the makers beside it.
 """

@@ -196,9 +196,7 @@ def _add_couplings(root: ElementTree.Element, spec: Any) -> None:
         element = ElementTree.SubElement(ElementTree.SubElement(root, "tendon"), "fixed")
         element.set("name", tendon.name)
         for wrap in tendon.path:
-            ElementTree.SubElement(
-                element, "joint", joint=wrap.target.name, coef=_text(wrap.coef)
-            )
+            ElementTree.SubElement(element, "joint", joint=wrap.target.name, coef=_text(wrap.coef))
     for each in spec.equalities:
         ElementTree.SubElement(
             ElementTree.SubElement(root, "equality"), "joint", name=each.name, joint1=each.name1,

@@ -46,7 +46,14 @@ def add_pick_place(spec: Any) -> None:
 
 def _add_table(world: Any) -> None:
     x, y = TABLE_M
-    box(world, (x, y, SURFACE_M - 0.015), (0.46, 0.56, 0.030), "plywood", name="table", **SOLID_SCENE)
+    box(
+        world,
+        (x, y, SURFACE_M - 0.015),
+        (0.46, 0.56, 0.030),
+        "plywood",
+        name="table",
+        **SOLID_SCENE,
+    )
     for side in (-1, 1):
         _add_trestle(world, x, y + 0.20 * side, SURFACE_M - 0.030, 0.40)
 

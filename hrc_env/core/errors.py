@@ -7,8 +7,9 @@ import contextlib
 import difflib
 import numbers
 from collections.abc import Callable, Collection, Iterable, Iterator
-from typing import Any
+from typing import Any, TypeVar
 
+T = TypeVar("T")
 OLD_NAMES = {
     "beyond": "ablations",
     "--peers": "--baselines",
@@ -112,6 +113,13 @@ def check_fields(record: object, must: str, *names: str) -> None:
         value = getattr(record, name)
         if not _MUST[must](value):
             raise ConfigError(f"{name} must {must}, got {value}.")
+
+
+def needed(value: T | None, what: str) -> T:
+    """A value that must be there, or `ConfigError`."""
+    if value is None:
+        raise ConfigError(f"{what} is asked for, and there is none here.")
+    return value
 
 
 def check_shape(what: str, got: tuple[int, ...], expected: tuple[int, ...], meaning: str) -> None:

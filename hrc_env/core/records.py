@@ -170,6 +170,17 @@ class ObjectState:
 
 
 @dataclass(frozen=True, slots=True)
+class World:
+    """What a task judges, and what the robot feels; rows are the environments in question."""
+
+    robot: RobotState
+    hand: HandState | None = None
+    """Of an arm with a gripper."""
+    objects: ObjectState | None = None
+    """The task's loose objects as they are."""
+
+
+@dataclass(frozen=True, slots=True)
 class Workplace:
     """A place where a worker stands and works."""
 

@@ -15,9 +15,9 @@ from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.geometry.chains import SerialChain, capsules
 from hrc_env.geometry.shapes import WIDTH
 from hrc_env.geometry.sight import Surroundings
-from hrc_env.scene.places import SCENES, obstacles
 from hrc_env.scene import objects
 from hrc_env.scene.objects import Objects, objects_of, surfaces
+from hrc_env.scene.places import SCENES, obstacles
 from hrc_env.scene.primitives import OBJECT_BIT, PAD_BIT, ROBOT_BIT, SCENE_BIT, SOLID
 from hrc_env.scene.rig import CameraConfig, add_cameras, pinholes, select
 from hrc_env.scene.robot import (

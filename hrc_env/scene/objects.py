@@ -107,7 +107,7 @@ def object_state(objects: Objects, qpos: Floats, qvel: Floats, held: Bools) -> O
 
 
 def held_by(objects: Objects, qpos: Floats, tool_world: Points3, hand: HandState) -> Bools:
-    """(B, O) what closed fingers hold: that in which, or next to which, the tool point (B, 3) is."""
+    """(B, O) what closed fingers hold: that in which, or nearly, the tool point (B, 3) is."""
     held = np.zeros((len(qpos), len(objects.names)), bool)
     _holding(objects.poses(qpos), objects.half_size_m, tool_world, hand.closed_on, held)
     return held

@@ -69,7 +69,7 @@ class Physics:
 
     @property
     def qpos(self) -> Floats:
-        """(B, nq) the arm's angles [rad], its fingers' ways [m], the loose objects' poses, a copy."""
+        """(B, nq) the arm's angles [rad], its fingers' ways [m], loose objects' poses, a copy."""
         return self._qpos.copy()
 
     @property
@@ -92,8 +92,8 @@ class Physics:
     def reset(
         self, ids: Ints, q: JointAngles, body: Ints | None = None, poses: Floats | None = None
     ) -> None:
-        """Put environments `ids` (sorted) to rest at angles q (len(ids), N) [rad], hands open; their
-        workers have bodies (len(ids), W) of the scene's, None: the first; loose objects lie at
+        """Put environments `ids` (sorted) to rest at angles q (len(ids), N) [rad], hands open;
+        their workers have bodies (len(ids), W) of the scene's, None: the first; objects lie at
         poses (len(ids), O, 7), None: as the task's MJCF has them."""
         ids = np.asarray(ids, int)
         check_shape("q", np.shape(q), (len(ids), self._n), "one row per id, one angle per joint")

@@ -6,11 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from hrc_env.belief import Belief
-from hrc_env.core.errors import ConfigError, check_fields
-from hrc_env.core.records import ObjectState
+from hrc_env.core.errors import ConfigError, check_fields, needed
+from hrc_env.core.records import ObjectState, World
 from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records, Rngs
 from hrc_env.geometry.rotations import matrix
-from hrc_env.handling import World
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm
 from hrc_env.tasks import LONGER
@@ -122,8 +121,8 @@ def advance(
     state: Records, rngs: Rngs, world: World, dt_s: float, config: PickPlaceConfig
 ) -> Records:
     """Judge where the pieces are; (B,) of `PICK_PLACE_STEP`."""
-    objects, step = world.objects, np.zeros(len(state), PICK_PLACE_STEP)
-    assert objects is not None
+    objects = needed(world.objects, "A loose object")
+    step = np.zeros(len(state), PICK_PLACE_STEP)
     placed = in_place(objects, config)
     left_m = _left_m(objects.position_world, world.robot.tool_world, placed)
     step["progress_m"] = -left_m - state["potential_m"]
@@ -177,8 +176,7 @@ def _progress(now: Belief, step: Records, previous: Floats, config: PickPlaceCon
 
 
 def _objects_from_places(now: Belief) -> Points3:
-    assert now.objects is not None
-    return now.task.places_world - now.objects.position_world
+    return now.task.places_world - needed(now.objects, "A loose object").position_world
 
 
 TASK = Task(

@@ -11,11 +11,10 @@ import numpy as np
 
 from hrc_env import observations, rewards
 from hrc_env.core.errors import ConfigError, check_shape, unknown
+from hrc_env.core.records import World
 from hrc_env.core.typing import Bools, Floats, Ints, Points3
-from hrc_env.handling import World
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm
-from hrc_env.scene.robot import DEFAULT as DEFAULT_ROBOT
 from hrc_env.tasks import BUILT_IN, EPISODE_STEPS
 
 _ID = re.compile(r"[A-Za-z]\w*-v\d+")
@@ -58,8 +57,8 @@ class Task:
     markers: Callable[[Any], Points3]
     """(view) -> (B, M, 3) points that pictures show [m]."""
     max_episode_steps: int = EPISODE_STEPS
-    robot: str = DEFAULT_ROBOT
-    """Who does it unless somebody says otherwise."""
+    robot: str | None = None
+    """Who does it unless somebody says otherwise; None: the default robot."""
     grips: bool = False
     """Whether that must be a robot with a hand."""
     things: Callable[[Any], str] = lambda config: ""

@@ -1,6 +1,6 @@
-"""What a robot handles: the task's loose objects, and what is measured of them.
+"""What a robot handles: the task's loose objects, and what it knows of them.
 
-Objects are not what this project asks about: the robot knows them by their true pose plus noise.
+Objects are not what this project asks about: they are known by their true pose plus noise.
 """
 
 from dataclasses import dataclass, replace
@@ -8,8 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hrc_env.core.errors import check_fields
-from hrc_env.core.records import HandState, ObjectState, RobotState
-from hrc_env.core.typing import Floats, Rngs
+from hrc_env.core.records import ObjectState, RobotState, World
+from hrc_env.core.typing import Capsules, Floats, Ints, Rngs
+from hrc_env.scene.build import Scene
+from hrc_env.scene.objects import held_by, object_state, with_load
+from hrc_env.scene.physics import Physics
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,15 +28,27 @@ class ObjectsConfig:
         check_fields(self, "not be negative", "noise_m", "noise_rad")
 
 
-@dataclass(frozen=True, slots=True)
-class World:
-    """What a task judges, and what the robot feels; rows are the environments in question."""
+def world_of(physics: Physics, ids: Ints, robot: RobotState) -> World:
+    """Robots of environments `ids` with what they handle."""
+    hand, objects = physics.hand_state(ids), physics.scene.objects
+    if not objects.names:
+        return World(robot, hand)
+    qpos, qvel = physics.qpos[ids], physics.qvel[ids]
+    held = np.zeros((len(ids), len(objects.names)), bool)
+    if hand is not None:
+        held = held_by(objects, qpos, robot.tool_world, hand)
+    return World(robot, hand, object_state(objects, qpos, qvel, held))
 
-    robot: RobotState
-    hand: HandState | None = None
-    """Of an arm with a gripper."""
-    objects: ObjectState | None = None
-    """The task's loose objects as they are."""
+
+def loaded(
+    scene: Scene, world: World, arm_world: Capsules, q_path: Floats
+) -> tuple[World, Capsules]:
+    """What a robot carries is part of it, now and along capsules (B, T, K, 2, 3) where qpos is
+    q_path (B, T, nq)."""
+    if world.objects is None:
+        return world, arm_world
+    robot, arm = with_load(world.robot, arm_world, scene.objects, q_path, world.objects.held)
+    return replace(world, robot=robot), arm
 
 
 def measured(objects: ObjectState, rngs: Rngs, config: ObjectsConfig) -> ObjectState:
