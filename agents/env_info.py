@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.control import ControlConfig
+from hrc_env.core.records import Grounds
 from hrc_env.geometry.chains import SerialChain
 from hrc_env.observations import ObservationLayout
 
@@ -34,6 +35,8 @@ class EnvInfo:
     n_actions: int
     task: str
     """The task's id."""
+    map: Grounds
+    """Of the place: where things stand, and where people walk and work."""
 
 
 def env_info(simulation: "Simulation") -> EnvInfo:
@@ -46,4 +49,5 @@ def env_info(simulation: "Simulation") -> EnvInfo:
         control_config=simulation.config.control,
         n_actions=simulation.n_actions,
         task=simulation.task.id,
+        map=simulation.scene.map,
     )

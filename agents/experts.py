@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from hrc_env.core.errors import ConfigError
 
+from .delivery import Deliverer
 from .env_info import Agent, EnvInfo
 from .pick_place import PickPlacer
 from .scripted import Reacher, Yielding
@@ -11,6 +12,7 @@ from .scripted import Reacher, Yielding
 EXPERTS: dict[str, Callable[[EnvInfo, Yielding | None], Agent]] = {
     "HRCReach-v0": Reacher,
     "HRCPickPlace-v0": PickPlacer,
+    "HRCDelivery-v0": Deliverer,
 }
 """By task: what solves it without learning."""
 

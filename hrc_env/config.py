@@ -120,7 +120,7 @@ PARTS = {
 """Arguments of an environment that are parts of the config: chosen often."""
 ARGUMENTS: dict[str, Any] = {
     "task": DEFAULT, "perception": "pixels", "estimator": "particle", "cameras": None,
-    "scene": "lab", "robot": None, "n_workers": 1, "control": "joint", "shield": None,
+    "scene": None, "robot": None, "n_workers": None, "control": "joint", "shield": None,
     "config": None, **dict.fromkeys(PARTS),
 }  # fmt: skip
 """The arguments of an environment that decide what happens in it (`HRCEnv`): their defaults."""
@@ -169,9 +169,18 @@ def settle(**arguments: Any) -> Settings:
             f"{task.id} needs a robot with a hand, and {robot.name!r} has none; there are "
             f"{', '.join(map(repr, able))}."
         )
+    if task.drives != robot.drives:
+        able = [name for name, each in ROBOTS.items() if each.drives == task.drives]
+        kind = "a robot that drives" if task.drives else "an arm on the pedestal"
+        raise ConfigError(
+            f"{task.id} needs {kind}, and {robot.name!r} is none; there are "
+            f"{', '.join(map(repr, able))}."
+        )
+    scene = task.scene if given["scene"] is None else given["scene"]
+    n_workers = task.n_workers if given["n_workers"] is None else given["n_workers"]
     return Settings(
-        task, given["perception"], estimator, cameras, given["scene"],
-        robot, _worker_counts(given["n_workers"]), given["control"],
+        task, given["perception"], estimator, cameras, scene,
+        robot, _worker_counts(n_workers), given["control"],
         shield_called(given["shield"]), config,
     )  # fmt: skip
 

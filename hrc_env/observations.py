@@ -34,6 +34,7 @@ class Sizes:
     """What the lengths of terms depend on."""
 
     arm_joints: int
+    """Hinges."""
     actions: int
     workers: int
     horizons: int = 0
@@ -44,6 +45,8 @@ class Sizes:
     """1 of an arm with a gripper."""
     objects: int = 0
     """How many are loose."""
+    slides: int = 0
+    """Of the robot's joints."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +89,17 @@ def _shorten(vectors, softening):
             vectors[k, i] /= divisor
 
 
+def _hinges(now: Belief, values: Floats) -> Floats:
+    """Those of values (B, N) of the robot's joints that are of hinges."""
+    return values if now.robot.slides is None else values[:, ~now.robot.slides]
+
+
+def _slides(now: Belief, values: Floats) -> Floats:
+    """Those that are of slides."""
+    assert now.robot.slides is not None  # or the term has no entries
+    return values[:, now.robot.slides]
+
+
 def _hand(now: Belief) -> HandState:
     return needed(now.hand, "A hand")
 
@@ -104,17 +118,27 @@ ROBOT_TERMS: tuple[ObservationTerm, ...] = (
     ObservationTerm(
         "joint_angle_sin", lambda of: of.arm_joints, "-", "base", 1.0, 1.0,
         "Sine of each arm joint's angle.",
-        lambda now: np.sin(now.robot.q),
+        lambda now: np.sin(_hinges(now, now.robot.q)),
     ),
     ObservationTerm(
         "joint_angle_cos", lambda of: of.arm_joints, "-", "base", 1.0, 1.0,
         "Cosine of each arm joint's angle.",
-        lambda now: np.cos(now.robot.q),
+        lambda now: np.cos(_hinges(now, now.robot.q)),
     ),
     ObservationTerm(
         "joint_velocity", lambda of: of.arm_joints, "rad/s", "base", 4.0, 1.0,
         "Velocity of each arm joint.",
-        lambda now: now.robot.qd,
+        lambda now: _hinges(now, now.robot.qd),
+    ),
+    ObservationTerm(
+        "slide_position", lambda of: of.slides, "m", "world", 10.0, 5.0,
+        "Where each slide is: of a base that drives, x and y of its middle.",
+        lambda now: _slides(now, now.robot.q),
+    ),
+    ObservationTerm(
+        "slide_velocity", lambda of: of.slides, "m/s", "world", 4.0, 1.0,
+        "Velocity of each slide.",
+        lambda now: _slides(now, now.robot.qd),
     ),
     ObservationTerm(
         "tool_position", lambda of: 3, "m", "world", 4.0, 1.0,

@@ -6,6 +6,7 @@ streams only, never on the size of the batch.
 
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -73,7 +74,8 @@ class Simulation(Stateful):
         )  # fmt: skip
         try:  # first, as it knows how many workers and which clips there is room for
             self.motion = generator.make_state(
-                batch, most, self.bodies, config.motion, scene_for(n_workers=0).grounds, fewest
+                batch, most, self.bodies, config.motion, scene_for(n_workers=0).grounds, fewest,
+                settings.robot.girth_m,
             )
         except NoRoomError as error:
             where = room.told(error.clip, room.played_s(error.clip, config))
@@ -88,9 +90,11 @@ class Simulation(Stateful):
         check_shape("start_spread_rad", self._spread_rad.shape, (n_joints,), "one a joint")
         self._grips = settings.robot.hand is not None
         self.n_actions = n_actions(settings.control, self.chain, self._grips)
+        n_slides = int(self.chain.slides.sum())
+        self.place = self.task.survey(self.scene.map, config.task)
         sizes = observations.Sizes(
-            n_joints, self.n_actions, most, len(config.forecast_s), config.uncertainty,
-            int(self._grips), len(self.scene.objects.names),
+            n_joints - n_slides, self.n_actions, most, len(config.forecast_s), config.uncertainty,
+            int(self._grips), len(self.scene.objects.names), n_slides,
         )  # fmt: skip
         self.layout = observations.layout(self.terms, sizes)
         self.physics = Physics(self.scene, batch)
@@ -122,7 +126,7 @@ class Simulation(Stateful):
         self.action[ids], self.episode_cost[ids], self.separation_m[ids] = 0.0, 0.0, 0.0
         q, task, config = self._starting_angles(ids), self.task, self.config.task
         robot = chains.robot_state(self.chain, q, np.zeros_like(q))
-        task.reset(self.task_state, ids, streams["task"], World(robot), config)
+        task.reset(self.task_state, ids, streams["task"], World(robot, place=self.place), config)
         poses = None if task.poses is None else task.poses(self.task_state, ids, config)
         self.physics.reset(ids, q, self.motion.workers["body"][ids], poses)
         world = handling.world_of(self.physics, ids, robot)
@@ -166,15 +170,16 @@ class Simulation(Stateful):
         robot = world.robot
         seen_world = robot.capsules_world[:, self.scene.watched, 1]
         generator.watch(self.motion, seen_world, motion, config.ctrl_dt)
-        progress = self.task.advance(
-            self.task_state, self.streams["task"], world, config.ctrl_dt, config.task
-        )
-        belief = self._believed(self._everyone, world, estimates)
-        terms = self._reward_terms(belief, progress, previous)
         workers = worker_capsules(self.bodies, path, motion.body)
         cost = metrics.cost(
             arm, robot.capsule_radius_m, workers, truth.capsule_radius_m, config.cost
         )
+        judged = replace(world, touched=cost.contact > 0, place=self.place)
+        progress = self.task.advance(
+            self.task_state, self.streams["task"], judged, config.ctrl_dt, config.task
+        )
+        belief = self._believed(self._everyone, world, estimates)
+        terms = self._reward_terms(belief, progress, previous)
         self.episode_cost += cost.total
         self.separation_m = cost.min_separation_m
         activity = generator.activity(self.motion)
@@ -243,8 +248,10 @@ class Simulation(Stateful):
         return self.task.markers(view)[0]
 
     def _starting_angles(self, ids: Ints) -> Floats:
-        """(len(ids), N) arm angles near home, turned anywhere in front of the base."""
+        """(len(ids), N) angles near home, unless the task says where robots start."""
         spread, rngs = self._spread_rad, picked(self.streams["robot"], ids)
+        if self.task.start is not None:
+            return self.task.start(rngs, self.place, self.config.task)
         angles = [self.scene.home_q + rng.uniform(-1, 1, len(spread)) * spread for rng in rngs]
         return np.array(angles).reshape(len(ids), -1)
 

@@ -9,6 +9,7 @@ cost and metrics the second (`tests/test_architecture.py` holds this).
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 from hrc_env.core.typing import (
     Bools,
@@ -141,6 +142,8 @@ class RobotState:
     """(B, K, 2, 3) [m], with those of what it carries; far away where it carries nothing."""
     capsule_radius_m: Floats
     """(K,) [m]."""
+    slides: Bools | None = None
+    """(N,) which joints are slides, whose q are in m and qd in m/s; None: none is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,6 +181,11 @@ class World:
     """Of an arm with a gripper."""
     objects: ObjectState | None = None
     """The task's loose objects as they are."""
+    touched: Bools | None = None
+    """(B,) whether the robot touched a worker in this step: true, so for success only, and for no
+    reward or observation."""
+    place: Any = None
+    """What the task made of the place (`Task.survey`)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -58,12 +58,13 @@ OPEN_FLOOR = Grounds(
 
 def make_state(
     batch: int, n_workers: int, body: Body, config: MotionConfig,
-    grounds: Grounds = OPEN_FLOOR, fewest: int | None = None,
+    grounds: Grounds = OPEN_FLOOR, fewest: int | None = None, robot_girth_m: float = 0.0,
 ) -> MotionState:  # fmt: skip
     """Workers of `batch` environments, `n_workers` each; call `reset` before use.
 
     They have the `body`, or each episode gives each one of several, and walk on the `grounds`. At
-    least `fewest` of them are in an episode, drawn at its beginning; None: all.
+    least `fewest` of them are in an episode, drawn at its beginning; None: all. A robot that drives
+    reaches `robot_girth_m` round what they watch of it; 0: it is an arm.
     """
     fewest = n_workers if fewest is None else fewest
     bones, plan = anatomies(body), floorplan(grounds)
@@ -77,7 +78,7 @@ def make_state(
     schedule = schedule_at(config.jobs, {place.kind for place in grounds.places})
     values = numbers(config, grounds.robot_xy_m)
     pieces = stocked(clips, bones.size, stage(plan, config))
-    mind = BehaviourParams(config, values, plan, schedule, pieces, bones, fewest)
+    mind = BehaviourParams(config, values, plan, schedule, pieces, bones, fewest, robot_girth_m)
     return MotionState(np.zeros((batch, n_workers), st.WORKER), mind)
 
 
@@ -120,10 +121,12 @@ def advance(
 def watch(
     state: MotionState, elbow_and_tool_world: Floats, motion: WorkerMotion, dt_s: float
 ) -> None:
-    """Let the workers see where elbow and tool (B, 2, 3) are, dt_s after the last look."""
+    """Let the workers see where elbow and tool, or front and back (B, 2, 3), of the robot are, dt_s
+    after the last look."""
     people = state.mind.config.people
-    settings = (people.notice_m, people.fast_m_s, people.calm_s)
-    notice(dt_s, settings, elbow_and_tool_world, motion.position_world, state.workers)
+    settings = (people.notice_m, people.fast_m_s, people.calm_s, state.mind.robot_girth_m)
+    bodies = motion.position_world, motion.velocity_world
+    notice(dt_s, settings, elbow_and_tool_world, *bodies, state.workers)
 
 
 def current(state: MotionState, ids: Ints | None = None) -> WorkerMotion:

@@ -114,6 +114,9 @@ class Scene:
     """(G, `shapes.WIDTH`) what stands still and blocks sight."""
     grounds: Grounds
     """Where people can stand, walk and work."""
+    map: Grounds
+    """The same with the pedestal among what is blocked, where that is not the robot's: what robots
+    know of the place."""
     objects: Objects
     """What is loose."""
     grip: Grip | None
@@ -211,6 +214,7 @@ def _build(recipe: Recipe) -> Scene:
         worker_capsules=np.array(touched, np.int64).reshape(n_workers, len(body.capsule_names)),
         obstacles=still,
         grounds=room.grounds(still, config.clutter),
+        map=room.map(still, config.clutter) if robot.drives else room.grounds(still, config.clutter),
         objects=loose,
         grip=grip_of(robot, model),
         things=things,

@@ -4,7 +4,7 @@ Free joints follow the robot's own in `qpos`, seven numbers each: place [m] and 
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import mujoco
@@ -126,13 +126,8 @@ def with_load(
     loads = loads.reshape(batch, n_steps, -1, 2, 3)
     radius_m = np.concatenate([robot.capsule_radius_m, objects.capsule_radius_m.ravel()])
     path_world = np.concatenate([path_world, loads], axis=2)
-    return (
-        RobotState(
-            robot.q, robot.qd, robot.tool_world, robot.tool_velocity_world, robot.tool_axes_world,
-            path_world[:, -1], radius_m,
-        ),
-        path_world,
-    )  # fmt: skip
+    carrying = replace(robot, capsules_world=path_world[:, -1], capsule_radius_m=radius_m)
+    return carrying, path_world
 
 
 def _is_free(body: Any) -> bool:

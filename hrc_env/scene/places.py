@@ -2,7 +2,7 @@
 what stands still in them as plain numbers."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -79,6 +79,15 @@ class Room:
             robot_xy_m=robot_xy_m,
             robot_clearance_m=ROBOT_CLEARANCE_M,
         )
+
+
+    def map(self, obstacles: Floats, clutter: bool) -> Grounds:
+        """The same for a robot that drives: what stands on the pedestal's axis is in its way."""
+        grounds = self.grounds(obstacles, clutter)
+        x, y = grounds.robot_xy_m
+        standing = footprints(obstacles, (math.inf, math.inf))
+        own = standing[np.hypot(standing[:, 0] - x, standing[:, 1] - y) < 1e-3]
+        return replace(grounds, blocked=np.concatenate([grounds.blocked, own]))
 
 
 SCENES: dict[str, Room] = {

@@ -11,8 +11,8 @@ import numpy as np
 
 from hrc_env import observations, rewards
 from hrc_env.core.errors import ConfigError, check_shape, unknown
-from hrc_env.core.records import World
-from hrc_env.core.typing import Bools, Floats, Ints, Points3
+from hrc_env.core.records import Grounds, World
+from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, Points3
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm
 from hrc_env.tasks import BUILT_IN, EPISODE_STEPS
@@ -61,6 +61,17 @@ class Task:
     """Who does it unless somebody says otherwise; None: the default robot."""
     grips: bool = False
     """Whether that must be a robot with a hand."""
+    drives: bool = False
+    """Whether it must be one that drives; others must not."""
+    scene: str = "lab"
+    """Where, unless somebody says otherwise,"""
+    n_workers: int | tuple[int, int] = 1
+    """and beside how many workers."""
+    survey: Callable[[Grounds, Any], Any] = lambda grounds, config: None
+    """(map, config) -> `World.place`: what the task makes of the place, once. It raises
+    `ConfigError` where there is no room for the task."""
+    start: Callable[[Rngs, Any, Any], JointAngles] | None = None
+    """(rngs, place, config) -> (n, N) where robots begin; None: near their pose at rest."""
     things: Callable[[Any], str] = lambda config: ""
     """(config) -> MJCF of what the task puts there, from the middle of the robot's foot on [m]:
     bodies of boxes, loose with a free joint and contype 16, fixed with contype 1."""
