@@ -109,7 +109,9 @@ class Deliverer:
     ) -> Array:  # fmt: skip
         """(n, 2) the cheapest velocity [m/s]."""
         n, away_m = len(place), np.linalg.norm(zone, axis=1)
-        straight = zone * np.minimum(NEAR_GAIN_HZ, SPEEDS_M_S[-1] / np.maximum(away_m, 1e-6))[:, None]
+        straight = (
+            zone * np.minimum(NEAR_GAIN_HZ, SPEEDS_M_S[-1] / np.maximum(away_m, 1e-6))[:, None]
+        )
         window = np.broadcast_to(self._window, (n, *self._window.shape))
         window = np.concatenate([straight[:, None], window], axis=1)
         shift = _shifts(speed[:, None], window)  # (n, C, T, 2) from the place now

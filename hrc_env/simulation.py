@@ -74,7 +74,12 @@ class Simulation(Stateful):
         )  # fmt: skip
         try:  # first, as it knows how many workers and which clips there is room for
             self.motion = generator.make_state(
-                batch, most, self.bodies, config.motion, scene_for(n_workers=0).grounds, fewest,
+                batch,
+                most,
+                self.bodies,
+                config.motion,
+                scene_for(n_workers=0).grounds,
+                fewest,
                 settings.robot.girth_m,
             )
         except NoRoomError as error:

@@ -32,7 +32,8 @@ class EnvironmentArguments:
     """ur10e_like, ur10e_gripper, or one that was registered (--import); the task's own if not
     given."""
     n_workers: int | tuple[int, int] | None = None
-    """How many workers, as the task is made for if not given; two numbers are the fewest and the most, drawn for every episode."""
+    """How many workers, as the task is made for if not given; two numbers are the
+    fewest and the most, drawn for every episode."""
     people: str | None = None
     """attentive, hurried or unaware; --config motion.people.FIELD=VALUE for more."""
     motions: tuple[Path, ...] = ()

@@ -24,8 +24,8 @@ MACHINE_S, MACHINE_CALM_S = 2.0, 0.4
 """So far ahead walkers look at a machine that drives, and so soon again after a reaction [s];
 judgement."""
 People = tuple[float, float, float, float]
-"""`PeopleConfig.notice_m`, `.fast_m_s`, `.calm_s`, and how far a robot that drives reaches round the
-points that people watch; 0: it is an arm [m]."""
+"""`PeopleConfig.notice_m`, `.fast_m_s`, `.calm_s`, and how far a robot that drives reaches round
+the points that people watch; 0: it is an arm [m]."""
 
 
 @kernel

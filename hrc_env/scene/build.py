@@ -214,7 +214,9 @@ def _build(recipe: Recipe) -> Scene:
         worker_capsules=np.array(touched, np.int64).reshape(n_workers, len(body.capsule_names)),
         obstacles=still,
         grounds=room.grounds(still, config.clutter),
-        map=room.map(still, config.clutter) if robot.drives else room.grounds(still, config.clutter),
+        map=room.map(still, config.clutter)
+        if robot.drives
+        else room.grounds(still, config.clutter),
         objects=loose,
         grip=grip_of(robot, model),
         things=things,

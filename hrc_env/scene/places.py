@@ -80,7 +80,6 @@ class Room:
             robot_clearance_m=ROBOT_CLEARANCE_M,
         )
 
-
     def map(self, obstacles: Floats, clutter: bool) -> Grounds:
         """The same for a robot that drives: what stands on the pedestal's axis is in its way."""
         grounds = self.grounds(obstacles, clutter)

@@ -312,6 +312,7 @@ TASK = Task(
     drives=True,
     scene="site",
     n_workers=4,
+    viewpoint="yard",
     survey=survey,
     start=start,
     over=lambda step: step["delivered"],

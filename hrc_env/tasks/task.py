@@ -67,6 +67,8 @@ class Task:
     """Where, unless somebody says otherwise,"""
     n_workers: int | tuple[int, int] = 1
     """and beside how many workers."""
+    viewpoint: str = "beside"
+    """From where people look on: one of `scene.render.VIEWPOINTS`."""
     survey: Callable[[Grounds, Any], Any] = lambda grounds, config: None
     """(map, config) -> `World.place`: what the task makes of the place, once. It raises
     `ConfigError` where there is no room for the task."""
