@@ -163,8 +163,8 @@ def settle(**arguments: Any) -> Settings:
             config = _with_part(config, path, given[name], name)
     named = task.robot if given["robot"] is None else given["robot"]
     robot = robot_called(DEFAULT_ROBOT if named is None else named)
-    if task.grips and robot.hand is None:
-        able = [name for name, each in ROBOTS.items() if each.hand]
+    if task.grips and not robot.grips:
+        able = [name for name, each in ROBOTS.items() if each.grips]
         raise ConfigError(
             f"{task.id} needs a robot with a hand, and {robot.name!r} has none; there are "
             f"{', '.join(map(repr, able))}."

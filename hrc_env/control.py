@@ -97,12 +97,6 @@ def resolved_twist(
     return _within((J.swapaxes(-1, -2) @ solved)[..., 0], chain)
 
 
-def opening_m(action: Floats, widest_m: float) -> Floats:
-    """(B,) how far fingers are to be from the middle [m]: the action's last entry, -1 open to 1
-    closed."""
-    return 0.5 * (1.0 - action[:, -1]) * widest_m
-
-
 def _within(qd: JointVelocities, chain: SerialChain) -> JointVelocities:
     """Scaled together to the joints' limits."""
     excess = np.max(np.abs(qd) / chain.velocity_limit_rad_s, axis=-1, keepdims=True)

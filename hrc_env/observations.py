@@ -41,7 +41,9 @@ class Sizes:
     uncertainty: tuple[str, ...] = ()
     """Which of `UNCERTAINTY` were asked for."""
     hands: int = 0
-    """1 of an arm with a gripper."""
+    """1 of an arm that can hold something,"""
+    fingers: int = 0
+    """and 1 if with fingers."""
     objects: int = 0
     """How many are loose."""
 
@@ -127,13 +129,13 @@ ROBOT_TERMS: tuple[ObservationTerm, ...] = (
         lambda now: now.robot.tool_axes_world[..., [0, 2]].swapaxes(-1, -2),
     ),
     ObservationTerm(
-        "hand_opening", lambda of: of.hands, "m", "tool", 0.2, 0.05,
+        "hand_opening", lambda of: of.fingers, "m", "tool", 0.2, 0.05,
         "How far each finger is from the middle.",
         lambda now: _hand(now).opening_m,
     ),
     ObservationTerm(
         "hand_force", lambda of: of.hands, "N", "tool", 300.0, 100.0,
-        "With which the fingers press together; negative: apart.",
+        "With which the fingers press together, negative: apart; or what hangs on the cups.",
         lambda now: _hand(now).force_n,
     ),
     ObservationTerm(

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from hrc_env import metrics, observations, rewards, room, step
 from hrc_env.belief import Belief, estimated_separation
 from hrc_env.config import Settings
-from hrc_env.control import joint_command, n_actions, opening_m
+from hrc_env.control import joint_command, n_actions
 from hrc_env.core.batching import State, Stateful, picked, rows, write_rows
 from hrc_env.core.errors import ConfigError, check_shape
 from hrc_env.core.kernels import ahead
@@ -86,11 +86,11 @@ class Simulation(Stateful):
         self.chain, n_joints = self.scene.chain, self.scene.chain.n_joints
         self._spread_rad = np.array(config.start_spread_rad or settings.robot.spread_rad)
         check_shape("start_spread_rad", self._spread_rad.shape, (n_joints,), "one a joint")
-        self._grips = settings.robot.hand is not None
+        self._grips = settings.robot.grips
         self.n_actions = n_actions(settings.control, self.chain, self._grips)
         sizes = observations.Sizes(
             n_joints, self.n_actions, most, len(config.forecast_s), config.uncertainty,
-            int(self._grips), len(self.scene.objects.names),
+            int(self._grips), int(settings.robot.hand is not None), len(self.scene.objects.names),
         )  # fmt: skip
         self.layout = observations.layout(self.terms, sizes)
         self.physics = Physics(self.scene, batch)
@@ -152,9 +152,10 @@ class Simulation(Stateful):
             self.motion, self.streams["motion"], config.scene.sim_dt, config.n_substeps
         )
         far = self.separation_m > CLOSING_M_S * config.ctrl_dt
-        grip = self.scene.grip
-        opening = None if grip is None else opening_m(self.action, grip.open_m)
-        q_path = self.physics.step(command, path, far, opening)
+        if self.task.effects is not None:
+            self.physics.apply(self.task.effects(self.task_state, config.task))
+        grip = self.action[:, -1] if self._grips else None
+        q_path = self.physics.step(command, path, far, grip)
         truth = worker_truth(self.bodies, motion)
         self._expose(self._everyone, motion, truth)
         estimates = self._perceive(self._everyone)

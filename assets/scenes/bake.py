@@ -8,7 +8,7 @@ from pathlib import Path
 
 import mujoco
 
-from assets.robots.hands import GRIPPER, SCREWDRIVER
+from assets.robots.hands import CUPS, GRIPPER, SCREWDRIVER
 from assets.robots.ur10e_like import add_arm
 from assets.scenes import arena, prop_looks, site
 from assets.scenes.mjcf import TEXTURES, write_mjcf
@@ -19,7 +19,7 @@ from hrc_env.scene.worker_visuals import PARKED_M
 from hrc_env.worker.props import PROP_NAMES
 
 ASSETS = Path(__file__).resolve().parent.parent
-ROBOTS = {"ur10e_like": SCREWDRIVER, "ur10e_gripper": GRIPPER}
+ROBOTS = {"ur10e_like": SCREWDRIVER, "ur10e_gripper": GRIPPER, "ur10e_cups": CUPS}
 TASKS = {"pick_place": add_pick_place}
 MAKERS = {"lab": (arena.add_lab, arena.paint_lab), "site": (site.add_site, site.paint_site)}
 

@@ -8,6 +8,7 @@ of a worker, `WorkerTruth` is the worker. Observations, rewards and shields take
 cost and metrics the second (`tests/test_architecture.py` holds this).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from hrc_env.core.typing import (
@@ -181,6 +182,16 @@ class World:
 
 
 @dataclass(frozen=True, slots=True)
+class Effects:
+    """What a task does to its loose objects in a step."""
+
+    welded: Mapping[str, Bools]
+    """(B,) whether each of its welds holds, by name."""
+    push_world: Floats
+    """(B, O, 6) force [N] and torque [Nm] at the middle of each."""
+
+
+@dataclass(frozen=True, slots=True)
 class Workplace:
     """A place where a worker stands and works."""
 
@@ -197,9 +208,12 @@ class Workplace:
     high a step is; 0 where there is nothing."""
 
 
-WORKPLACE_KINDS = ("robot", "bench", "floor", "wall", "overhead", "pile", "cart", "step", "open")
-"""Beside the robot, hands in its workspace; at a table; kneeling; at a wall; above the head;
-at materials to lift; where a cart is taken or left; before a tread 0.3 m ahead; nothing there."""
+WORKPLACE_KINDS = (
+    "robot", "bench", "floor", "wall", "overhead", "pile", "cart", "step", "open", "task",
+)  # fmt: skip
+"""Beside the robot, hands in its workspace; at a table; kneeling; at a wall; above the head; at
+materials to lift; where a cart is taken or left; before a tread 0.3 m ahead; nothing there; at what
+a task has put there."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

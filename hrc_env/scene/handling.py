@@ -11,7 +11,7 @@ from hrc_env.core.errors import check_fields
 from hrc_env.core.records import ObjectState, RobotState, World
 from hrc_env.core.typing import Capsules, Floats, Ints, Rngs
 from hrc_env.scene.build import Scene
-from hrc_env.scene.objects import held_by, object_state, with_load
+from hrc_env.scene.objects import object_state, with_load
 from hrc_env.scene.physics import Physics
 
 
@@ -36,7 +36,7 @@ def world_of(physics: Physics, ids: Ints, robot: RobotState) -> World:
     qpos, qvel = physics.qpos[ids], physics.qvel[ids]
     held = np.zeros((len(ids), len(objects.names)), bool)
     if hand is not None:
-        held = held_by(objects, qpos, robot.tool_world, hand)
+        held = physics.held(ids, robot.tool_world, hand)
     return World(robot, hand, object_state(objects, qpos, qvel, held))
 
 

@@ -11,7 +11,8 @@ import numpy as np
 
 from hrc_env import observations, rewards
 from hrc_env.core.errors import ConfigError, check_shape, unknown
-from hrc_env.core.records import World
+from hrc_env.core.records import Effects, World
+from hrc_env.core.things import NOTHING, Things
 from hrc_env.core.typing import Bools, Floats, Ints, Points3
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm
@@ -61,12 +62,13 @@ class Task:
     """Who does it unless somebody says otherwise; None: the default robot."""
     grips: bool = False
     """Whether that must be a robot with a hand."""
-    things: Callable[[Any], str] = lambda config: ""
-    """(config) -> MJCF of what the task puts there, from the middle of the robot's foot on [m]:
-    bodies of boxes, loose with a free joint and contype 16, fixed with contype 1."""
+    things: Callable[[Any], Things] = lambda config: NOTHING
+    """(config) -> what the task puts there."""
     poses: Callable[[Any, Ints, Any], Floats] | None = None
     """(state, ids, config) -> (n, O, 7) where what is loose lies when `reset` is done: place in
     the world [m] and quaternion; None: as in the MJCF."""
+    effects: Callable[[Any, Any], Effects] | None = None
+    """(state, config) -> what is done to objects until the next step; None: nothing."""
     over: Callable[[Any], Bools] | None = None
     """(progress) -> (B,) whether there is nothing more to do; None: there always is."""
     defaults: Mapping[str, Any] = field(default_factory=dict)
