@@ -14,13 +14,14 @@ from assets.scenes import arena, prop_looks, site
 from assets.scenes.mjcf import TEXTURES, write_mjcf
 from assets.scenes.pedestal import add_pedestal
 from assets.scenes.primitives import add_painted, paint_materials
+from assets.tasks.drywall import add_drywall
 from assets.tasks.pick_place import add_pick_place
 from hrc_env.scene.worker_visuals import PARKED_M
 from hrc_env.worker.props import PROP_NAMES
 
 ASSETS = Path(__file__).resolve().parent.parent
 ROBOTS = {"ur10e_like": SCREWDRIVER, "ur10e_gripper": GRIPPER, "ur10e_cups": CUPS}
-TASKS = {"pick_place": add_pick_place}
+TASKS = {"drywall": add_drywall, "pick_place": add_pick_place}
 MAKERS = {"lab": (arena.add_lab, arena.paint_lab), "site": (site.add_site, site.paint_site)}
 
 

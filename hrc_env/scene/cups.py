@@ -41,7 +41,7 @@ def cups_of(robot: Any, model: mujoco.MjModel, objects: Objects, prefix: str) ->
         if name.startswith(CUPS):
             rows.append(objects.names.index(name.removeprefix(CUPS)))
             welds.append(equality)
-            site = model.eq_obj2id[equality]
+            site = model.eq_obj1id[equality]
             T = np.eye(4)
             T[:3, :3], T[:3, 3] = matrix(model.site_quat[site]), model.site_pos[site]
             frames.append(T)
@@ -60,3 +60,10 @@ def seals(cups: Cups, T_world_from_tool: Transforms, poses: Floats) -> Bools:
     turned = np.einsum("bij,bcij->bc", T_world_from_tool[:, :3, :3], R)
     askew_rad = np.arccos(np.clip((turned - 1.0) / 2.0, -1.0, 1.0))
     return (off_m < NEAR_M) & (askew_rad < NEAR_RAD)
+
+
+def load_n(cups: Cups, sensordata: Floats) -> Floats:
+    """(...,) what tears at the cups [N], of sensordata (..., n): along the arm's end and aside; a
+    push does not. The hand's own weight is part of it."""
+    x, y, z = np.moveaxis(sensordata[..., cups.gauge : cups.gauge + 3], -1, 0)
+    return np.sqrt(x * x + y * y + np.square(np.minimum(z, 0.0)))

@@ -16,7 +16,7 @@ from hrc_env.core.records import Effects, HandState, WorkerPath
 from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, JointVelocities, Points3, Records
 from hrc_env.geometry.chains import tool
 from hrc_env.scene.build import Scene, without_workers
-from hrc_env.scene.cups import Cups, seals
+from hrc_env.scene.cups import Cups, load_n, seals
 from hrc_env.scene.objects import held_by
 from hrc_env.scene.worker import CAPSULE_FIELDS, capsule_shapes
 
@@ -89,8 +89,8 @@ class Physics:
         """What hands of environments `ids` feel; None: there are none."""
         hand, cups = self.scene.grip, self.scene.cups
         if cups is not None:
-            load_n, sealed = self._grip[ids, 0], self._welded[ids][:, cups.welds].any(1)
-            return HandState(np.zeros(len(ids)), load_n.copy(), sealed)
+            load, sealed = self._grip[ids, 0], self._welded[ids][:, cups.welds].any(1)
+            return HandState(np.zeros(len(ids)), load.copy(), sealed)
         if hand is None:
             return None
         opening_m = self._qpos[ids][:, hand.fingers].mean(1)
@@ -240,8 +240,7 @@ class Physics:
         trace = sims.rollout(control.shape[1], control, inputs, self._records, ids)
         self._trace[rows] = trace["qpos"]
         if (cups := self.scene.cups) is not None:
-            load = trace["sensordata"][..., cups.gauge : cups.gauge + 3]
-            self._grip[rows, 0] = np.linalg.norm(load, axis=-1).max(axis=1)
+            self._grip[rows, 0] = load_n(cups, trace["sensordata"]).max(axis=1)
         for alone, beside in shared:
             beside[rows] = alone[rows]
 
