@@ -14,7 +14,8 @@ from .manipulating import arm_action, round_the_foot, turn_towards
 from .scripted import Yielding, speed_m_s
 
 Array = NDArray[np.float64]
-HALF_THICK_M = 0.00625
+HALF_THICK_M, CUPS_M = 0.00625, (-0.12, -0.15)
+"""From the board's middle: its face, and where cups sit across and along it [m]."""
 ABOVE_M, CLEAR_M = 0.12, 0.07
 """How high above the board the cups travel; above this they may move sideways."""
 OVER_M, OVER_RAD, SUCK_M = 0.006, 0.025, 0.03
@@ -27,13 +28,15 @@ NEAR_M, FAR_M = 0.72, 1.0
 """Its distance from the robot's axis when it is upright, and on the stack."""
 BEFORE_M, ALIGNED_M, ALIGNED_RAD = 0.13, 0.012, 0.03
 """It is aligned so far before its place, and then pressed to it."""
+STAYS = 3.0
+"""It stays aligned on the way, and there, while it is off by less than so many times as much."""
 THERE_M = np.array([0.003, 0.0, 0.003])
 """So near to its place along each axis it is held where it is: noise must not move it."""
 LAST_RAD = 0.25
 """So near round the robot it goes straight."""
 CARRY_M_S, PRESS_M_S, TURN_RAD_S = 0.40, 0.12, 0.9
 """Fastest with the board, and against the studs; fastest turn."""
-STACK_RAD, PLACE_RAD = np.arctan2(-0.98, 0.26), np.arctan2(1.0, 0.37)
+STACK_RAD, PLACE_RAD = np.arctan2(-0.98, 0.26), np.arctan2(1.0, 0.29)
 """Where round the robot the stack is, and the board's place."""
 
 
@@ -75,7 +78,9 @@ class BoardHolder:
     def _fetch(self, terms: dict[str, Array]) -> tuple[Array, tuple[Array, Array], Array]:
         """Velocity to the board, the tool's axes x and z on it, and whether cups are near it."""
         along, normal = terms["object_axes"][:, :3], terms["object_axes"][:, 3:]
-        way = terms["object_from_tool"] + (HALF_THICK_M - PRESS_M) * normal
+        across = np.cross(along, normal)
+        way = terms["object_from_tool"] + CUPS_M[0] * across + CUPS_M[1] * along
+        way += (HALF_THICK_M - PRESS_M) * normal
         aside_m = np.linalg.norm(way[:, :2], axis=1)
         askew = np.linalg.norm(np.cross(terms["tool_axes"][:, 3:], -normal), axis=1)
         askew += np.linalg.norm(np.cross(terms["tool_axes"][:, :3], along), axis=1)
@@ -135,7 +140,9 @@ def _aligned(terms: dict[str, Array]) -> NDArray[np.bool_]:
     off = np.abs(to_place[:, [0, 2]]).max(1)
     askew = np.linalg.norm(np.cross(axes[:, 3:], [0.0, -1.0, 0.0]), axis=1)
     askew += np.linalg.norm(np.cross(axes[:, :3], [0.0, 0.0, 1.0]), axis=1)
-    return (off < ALIGNED_M) & (askew < ALIGNED_RAD) & (to_place[:, 1] < BEFORE_M + 0.05)
+    slack = np.where(to_place[:, 1] < 0.5 * BEFORE_M, STAYS, 1.0)
+    fine = (off < slack * ALIGNED_M) & (askew < slack * ALIGNED_RAD)
+    return fine & (to_place[:, 1] < BEFORE_M + 0.05)
 
 
 def _pressing(terms: dict[str, Array]) -> NDArray[np.bool_]:

@@ -6,6 +6,7 @@ streams only, never on the size of the batch.
 
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -162,11 +163,13 @@ class Simulation(Stateful):
         n = self.chain.n_joints
         robot, arm = chains.robot_along(self.chain, q_path[..., :n], self.physics.qd)
         world = handling.world_of(self.physics, self._everyone, robot)
-        world, arm = handling.loaded(self.scene, world, arm, q_path)
+        world, arm = handling.loaded(self.scene, world, arm, q_path, self._loads)
         self._measure(self._everyone, world)
         robot = world.robot
         seen_world = robot.capsules_world[:, self.scene.watched, 1]
-        generator.watch(self.motion, seen_world, motion, config.ctrl_dt)
+        cue = None if self.task.cue is None else self.task.cue(self.task_state)
+        generator.watch(self.motion, seen_world, motion, config.ctrl_dt, cue)
+        world = replace(world, deeds=generator.deeds(self.motion))
         progress = self.task.advance(
             self.task_state, self.streams["task"], world, config.ctrl_dt, config.task
         )
@@ -235,13 +238,18 @@ class Simulation(Stateful):
         """What every robot believes now."""
         robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
         world, arm = handling.world_of(self.physics, self._everyone, robot), robot.capsules_world
-        world, _ = handling.loaded(self.scene, world, arm[:, None], self.physics.qpos[:, None])
+        qpos = self.physics.qpos[:, None]
+        world, _ = handling.loaded(self.scene, world, arm[:, None], qpos, self._loads)
         return self._believed(self._everyone, world, self.estimates)
 
     def markers(self, b: int) -> Points3:
         """(M, 3) what the task of environment `b` has to show [m]."""
         view = self.task.view(self.task_state, np.array([b]), self.config.task)
         return self.task.markers(view)[0]
+
+    @property
+    def _loads(self) -> Bools | None:
+        return None if self.task.loads is None else self.task.loads(self.task_state)
 
     def _starting_angles(self, ids: Ints) -> Floats:
         """(len(ids), N) arm angles near home, turned anywhere in front of the base."""

@@ -13,6 +13,7 @@ from hrc_env.scene.primitives import DECORATION, OBJECT_BIT, SCENE_BIT
 from hrc_env.tasks.drywall import (
     BOARD_KG,
     BOARD_M,
+    CUPS_M,
     NEAR_STUD_M,
     PLACE_M,
     R_PLACE,
@@ -55,7 +56,12 @@ def _add_frame(world: Any) -> None:
             name=f"stud_{k + 1}", **SOLID_SCENE,
         )  # fmt: skip
     left, right = PLACE_M[0] - 0.72, NEAR_STUD_M + STUD_M[0] / 2
-    box(world, (left + 0.019, y, FLOOR_M + height / 2), (STUD_M[0], STUD_M[1], height - 0.076), "frame")
+    box(
+        world,
+        (left + 0.019, y, FLOOR_M + height / 2),
+        (STUD_M[0], STUD_M[1], height - 0.076),
+        "frame",
+    )
     for z in (FLOOR_M + 0.019, TOP_M - 0.019):
         middle = (left + right) / 2
         box(world, (middle, y, z), (right - left, STUD_M[1], 0.038), "frame")
@@ -94,6 +100,6 @@ def _add_board(world: Any) -> None:
         )  # fmt: skip
     half = np.sqrt(0.5)
     body.add_site(
-        name="board_cups", pos=[0, 0, thick / 2], quat=[0, half, half, 0], size=[0.01] * 3, group=4
+        name="board_cups", pos=[*CUPS_M, thick / 2], quat=[0, half, half, 0], size=[0.01] * 3, group=4
     )
     body.add_site(name="board_middle", pos=[0, 0, 0], size=[0.01] * 3, group=4)

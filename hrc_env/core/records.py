@@ -171,6 +171,18 @@ class ObjectState:
 
 
 @dataclass(frozen=True, slots=True)
+class Deeds:
+    """What workers have done for a task in what they are at."""
+
+    present: Bools
+    """(B, W) who is there."""
+    screws: Ints
+    """(B, W) how many they have driven,"""
+    boring: Bools
+    """(B, W) and whether they drive one."""
+
+
+@dataclass(frozen=True, slots=True)
 class World:
     """What a task judges, and what the robot feels; rows are the environments in question."""
 
@@ -179,6 +191,8 @@ class World:
     """Of an arm with a gripper."""
     objects: ObjectState | None = None
     """The task's loose objects as they are."""
+    deeds: Deeds | None = None
+    """What workers have done; None: an episode begins."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,18 +18,22 @@ from hrc_env.worker.body import assets_dir
 
 BOARD_M, BOARD_KG = (0.6, 1.2, 0.0125), 6.12
 """Edges of the board along its x, y and z, which is the normal of its front [m]; 680 kg/m^3."""
+CUPS_M = (-0.12, -0.15)
+"""Where cups sit on it, along its x and y from its middle: away from where people work [m]."""
 STACK_M = (0.26, -0.98, -0.36)
 """Where its middle lies on the stack at first, front up, from the robot's foot [m]."""
 WALL_Y_M = 1.0
 """Where the studs' faces are, which look to the robot's right [m]."""
-PLACE_M = (0.37, WALL_Y_M - BOARD_M[2] / 2, 0.34)
+PLACE_M = (0.29, WALL_Y_M - BOARD_M[2] / 2, 0.34)
 """Where its middle belongs."""
 R_PLACE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """world_from_board there: it stands on a short edge, its front to the robot."""
-NEAR_STUD_M = 0.64
+NEAR_STUD_M = 0.56
 """The stud along which screws go [m along x]."""
-SCREWS_M = tuple((NEAR_STUD_M, z) for z in (0.75, 0.60, 0.45, 0.30))
+SCREWS_M = tuple((NEAR_STUD_M, z) for z in (0.82, 0.67, 0.52, 0.37))
 """Where they go, the uppermost first: along x, and above the foot [m]."""
+BESIDE_M = (NEAR_STUD_M + 0.42, WALL_Y_M - 0.50)
+"""Where the worker stands, who looks at the board askew."""
 MOUNT_WORLD = np.array([-0.75, 0.0, 0.75])
 """The robot's foot, in every scene [m]."""
 PUSH_N, SHEAR = (20.0, 50.0), 0.2
@@ -102,7 +106,7 @@ class DrywallView:
 
 def things(config: DrywallConfig) -> Things:
     """Stack, board, studs, and where the worker stands who drives the screws."""
-    place = Workplace("board", "task", (NEAR_STUD_M + 0.06, WALL_Y_M - 0.53), np.pi / 2, 0.75)
+    place = Workplace("board", "task", BESIDE_M, 0.75 * np.pi, SCREWS_M[0][1])
     return Things(
         Path(assets_dir() / "tasks" / "drywall.xml").read_text(),
         (
@@ -155,7 +159,9 @@ def advance(
     step["driven"] = driven - state["driven"]
     state["driven"], state["boring"] = driven, boring
     state["worst_m"] = np.where(boring, np.maximum(state["worst_m"], off_m), state["worst_m"])
-    state["worst_rad"] = np.where(boring, np.maximum(state["worst_rad"], off_rad), state["worst_rad"])
+    state["worst_rad"] = np.where(
+        boring, np.maximum(state["worst_rad"], off_rad), state["worst_rad"]
+    )
     state["spoilt"] |= boring & ~fine
     done = (driven == len(SCREWS_M)) & ~board.held[:, 0] & fine & ~state["spoilt"]
     step["done"] = done & ~state["done"]
@@ -188,11 +194,14 @@ def _screwed(state: Records, world: World, dt_s: float) -> tuple[Ints, Bools]:
     """(B,) screws that are driven, and whether one is being driven: by the worker, or, where nobody
     is, by themselves while the board is pressed."""
     n, driven = len(SCREWS_M), state["driven"]
-    alone = np.ones(len(state), bool)
+    deeds = needed(world.deeds, "What workers do")
+    alone = ~deeds.present.any(axis=1)
+    theirs = np.maximum(driven, deeds.screws.max(axis=1, initial=0))
     since_s = state["pressed_s"] - PAUSE_S * (driven + 1) - ALONE_S * driven
     boring = alone & (driven < n) & (since_s > 0.0) & (state["pressed_s"] > 0.0)
     finished = boring & (since_s >= ALONE_S - 1e-9)
-    return driven + finished, boring & ~finished
+    driven, boring = np.where(alone, driven + finished, theirs), boring & ~finished
+    return driven, np.where(alone, boring, deeds.boring.any(axis=1))
 
 
 def effects(state: Records, config: DrywallConfig) -> Effects:
@@ -249,8 +258,8 @@ TASK = Task(
     rewards=(
         RewardTerm(
             "progress",
-            "Metres that the board came nearer to its place, 0.3 m for a radian, and the tool to it "
-            'until it is held, times `task.progress_per_m`; 0 with `task.reward` "sparse".',
+            "Metres that the board came nearer to its place, 0.3 m for a radian, and the tool to "
+            'it until it is held, times `task.progress_per_m`; 0 with `task.reward` "sparse".',
             lambda now, step, previous, config: (
                 (config.progress_per_m if config.reward == "dense" else 0.0) * step["progress_m"]
             ),
@@ -276,6 +285,11 @@ TASK = Task(
     things=things,
     poses=poses,
     effects=effects,
+    loads=lambda state: (state["pressed_s"] == 0.0)[:, None],  # against the studs it is a wall
+    cue=lambda state: state["pressed_s"] > 0.0,
     over=lambda step: step["done"],
-    defaults={"scene": {"sim_dt": 0.004}},
+    defaults={
+        "scene": {"sim_dt": 0.004},
+        "motion": {"jobs": "drywall", "near_probability": 1.0, "near_radius_m": (1.7, 2.1)},
+    },
 )  # fmt: skip

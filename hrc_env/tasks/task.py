@@ -67,6 +67,11 @@ class Task:
     poses: Callable[[Any, Ints, Any], Floats] | None = None
     """(state, ids, config) -> (n, O, 7) where what is loose lies when `reset` is done: place in
     the world [m] and quaternion; None: as in the MJCF."""
+    loads: Callable[[Any], Bools] | None = None
+    """(state) -> (B, O) which objects count as part of the robot while it holds them: in cost,
+    separations and belief; None: all."""
+    cue: Callable[[Any], Bools] | None = None
+    """(state) -> (B,) whether workers may go on with what waits for the task (`Job.waits`)."""
     effects: Callable[[Any, Any], Effects] | None = None
     """(state, config) -> what is done to objects until the next step; None: nothing."""
     over: Callable[[Any], Bools] | None = None
