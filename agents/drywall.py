@@ -18,7 +18,7 @@ HALF_THICK_M, CUPS_M = 0.00625, (-0.12, -0.15)
 """From the board's middle: its face, and where cups sit across and along it [m]."""
 ABOVE_M, CLEAR_M = 0.12, 0.07
 """How high above the board the cups travel; above this they may move sideways."""
-OVER_M, OVER_RAD, SUCK_M = 0.006, 0.025, 0.03
+OVER_M, OVER_RAD, SUCK_M = 0.006, 0.05, 0.03
 """So near above it they go down; so near they suck."""
 PRESS_M = 0.003
 """How far below the board's surface the cups aim."""
@@ -84,7 +84,7 @@ class BoardHolder:
         aside_m = np.linalg.norm(way[:, :2], axis=1)
         askew = np.linalg.norm(np.cross(terms["tool_axes"][:, 3:], -normal), axis=1)
         askew += np.linalg.norm(np.cross(terms["tool_axes"][:, :3], along), axis=1)
-        down = (aside_m < OVER_M) & (askew < OVER_RAD) | (aside_m < 2 * OVER_M) & (way[:, 2] > -0.1)
+        down = (aside_m < OVER_M) & (askew < OVER_RAD) | (aside_m < 2 * OVER_M) & (way[:, 2] > 0.01 - ABOVE_M)
         low = (-way[:, 2] < CLEAR_M) & ~down
         target = way + np.where(down[:, None], 0.0, [0.0, 0.0, ABOVE_M])
         target[low] = [0.0, 0.0, ABOVE_M]
