@@ -84,7 +84,9 @@ class BoardHolder:
         aside_m = np.linalg.norm(way[:, :2], axis=1)
         askew = np.linalg.norm(np.cross(terms["tool_axes"][:, 3:], -normal), axis=1)
         askew += np.linalg.norm(np.cross(terms["tool_axes"][:, :3], along), axis=1)
-        down = (aside_m < OVER_M) & (askew < OVER_RAD) | (aside_m < 2 * OVER_M) & (way[:, 2] > 0.01 - ABOVE_M)
+        down = (aside_m < OVER_M) & (askew < OVER_RAD) | (aside_m < 2 * OVER_M) & (
+            way[:, 2] > 0.01 - ABOVE_M
+        )
         low = (-way[:, 2] < CLEAR_M) & ~down
         target = way + np.where(down[:, None], 0.0, [0.0, 0.0, ABOVE_M])
         target[low] = [0.0, 0.0, ABOVE_M]

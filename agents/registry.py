@@ -4,8 +4,9 @@ from pathlib import Path
 
 from hrc_env.core.errors import ConfigError, unknown
 
-from . import random, scripted
+from . import experts, random
 from .env_info import Agent, EnvInfo
+from .scripted import Yielding
 
 AGENTS = ("random", "scripted", "scripted_slowed")
 """Names of the agents that need no checkpoint."""
@@ -22,7 +23,7 @@ def make_agent(name: str, env_info: EnvInfo, seed: int = 0) -> Agent:
     if name == "random":
         return random.RandomAgent(env_info, seed)
     if name in AGENTS:
-        return scripted.expert(env_info, scripted.Yielding() if name != "scripted" else None)
+        return experts.expert(env_info, Yielding() if name != "scripted" else None)
     if Path(name).suffix == ".zip" or Path(name).exists():
         from . import ppo  # here: torch takes seconds to import, and need not be there
 

@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.control import resolved_rate
-from hrc_env.core.errors import ConfigError
 from hrc_env.observations import split
 
-from .env_info import Agent, EnvInfo
+from .env_info import EnvInfo
 
 GAIN_HZ = 4.0
 """Approach speed per distance [1/s]."""
@@ -72,21 +71,3 @@ class Reacher:
         qd = resolved_rate(info.chain, q, velocity, info.home_q, config)
         action = qd / (config.joint_speed_share * info.chain.velocity_limit_rad_s)
         return action / np.maximum(np.abs(action).max(-1, keepdims=True), 1.0)
-
-
-EXPERTS = {"HRCReach-v0": Reacher}
-"""By task: what solves it without learning."""
-
-
-def expert(env_info: EnvInfo, yielding: Yielding | None = None) -> Agent:
-    """The scripted agent for a task, with or without yielding.
-
-    Raises:
-        ConfigError: nobody has written one.
-    """
-    if env_info.task not in EXPERTS:
-        raise ConfigError(
-            f"There is no scripted agent for {env_info.task}; there is for {', '.join(EXPERTS)}. "
-            "The agent 'random' and checkpoints work with every task."
-        )
-    return EXPERTS[env_info.task](env_info, yielding)

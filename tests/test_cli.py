@@ -53,6 +53,14 @@ def test_other_levels_need_no_opengl():
     assert "goals" in done.stdout
 
 
+def test_every_task_has_an_agent_that_plays_it():
+    """In the robot that the task is made for, which nobody names."""
+    done = hrc("play", "HRCPickPlace-v0", "--agent", "scripted", "--perception", "truth")
+    assert done.returncode == 0, done.stderr
+    assert "studs placed" in done.stdout
+    assert "studs left" in done.stdout
+
+
 def test_an_unknown_id_is_answered_without_a_traceback():
     done = hrc("play", "HRCReach-v1")
     assert done.returncode == 2

@@ -100,6 +100,10 @@ def _add_board(world: Any) -> None:
         )  # fmt: skip
     half = np.sqrt(0.5)
     body.add_site(
-        name="board_cups", pos=[*CUPS_M, thick / 2], quat=[0, half, half, 0], size=[0.01] * 3, group=4
+        name="board_cups",
+        pos=[*CUPS_M, thick / 2],
+        quat=[0, half, half, 0],
+        size=[0.01] * 3,
+        group=4,
     )
     body.add_site(name="board_middle", pos=[0, 0, 0], size=[0.01] * 3, group=4)

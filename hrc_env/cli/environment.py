@@ -28,8 +28,9 @@ class EnvironmentArguments:
     of the scene if not given."""
     scene: str = "lab"
     """lab or site."""
-    robot: str = "ur10e_like"
-    """ur10e_like, or one that was registered (--import)."""
+    robot: str | None = None
+    """ur10e_like, ur10e_gripper, or one that was registered (--import); the task's own if not
+    given."""
     n_workers: int | tuple[int, int] = 1
     """How many workers; two numbers are the fewest and the most, drawn for every episode."""
     people: str | None = None
@@ -43,7 +44,7 @@ class EnvironmentArguments:
     """as_built, varied, lights, surfaces or people (pixels only); --config appearance.FIELD=VALUE
     for more."""
     control: str = "joint"
-    """What actions are: joint or tool velocities."""
+    """What actions are: joint velocities, tool velocities, or twist, which turns the tool, too."""
     shield: str | None = None
     """A shield that was registered (--import)."""
     config: tuple[str, ...] = ()

@@ -36,11 +36,12 @@ Steps = Iterator[tuple[float, dict[str, Any]]]
 
 
 def film_episode(
-    make: Make, path: Path, seed: int = 0, n_steps: int = 250, **kwargs: Any
+    make: Make, path: Path, seed: int = 0, n_steps: int | None = None, **kwargs: Any
 ) -> dict[str, float]:
     """Film an agent in the `HRCEnv` of `kwargs` into an .mp4 file; what came of it, by name [unit].
 
-    A still of the closest moment that is no near miss yet, or of the first, is written beside it.
+    The film ends with the episode, or after `n_steps` (None: the task's time limit). A still of the
+    closest moment that is no near miss yet, or of the first, is written beside it.
     """
     level = kwargs.get("perception", "pixels")
     compile_kernels(Console(), level)
@@ -49,7 +50,7 @@ def film_episode(
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_suffix(".draft.mp4")
     try:
-        totals, still = _filmed(env, make, draft, seed, n_steps)
+        totals, still = _filmed(env, make, draft, seed, n_steps or _limit(env))
         imageio.imwrite(path.with_suffix(".png"), still)
         os.replace(draft, path)
     finally:
@@ -58,7 +59,9 @@ def film_episode(
     return totals
 
 
-def nearest_seed(make: Make, seeds: Iterable[int], n_steps: int = 250, **kwargs: Any) -> int:
+def nearest_seed(
+    make: Make, seeds: Iterable[int], n_steps: int | None = None, **kwargs: Any
+) -> int:
     """Of some seeds the one whose episode comes closest to the worker without touching them.
 
     Nothing is drawn: "pixels" is played as "keypoints", and may come out otherwise in the film.
@@ -67,7 +70,7 @@ def nearest_seed(make: Make, seeds: Iterable[int], n_steps: int = 250, **kwargs:
         kwargs = {**kwargs, "perception": "keypoints", "appearance": None}
     with closing(HRCEnv(**kwargs)) as env:
         tried = track(list(seeds), "looking for an encounter")
-        closest_m = {seed: _closest_m(env, make, seed, n_steps) for seed in tried}
+        closest_m = {seed: _closest_m(env, make, seed, n_steps or _limit(env)) for seed in tried}
     free = [seed for seed, metres in closest_m.items() if metres > CLOSE_M]
     if free:
         return min(free, key=closest_m.__getitem__)
@@ -96,6 +99,10 @@ def table(totals: dict[str, float], title: str = "") -> Table:
         what, _, unit = name.removesuffix("]").partition(" [")
         rows.add_row(what, f"{value:.{({'count': 0, 'm': 2}).get(unit, 1)}f}", unit)
     return rows
+
+
+def _limit(env: HRCEnv) -> int:
+    return env.simulation.task.max_episode_steps
 
 
 def _closest_m(env: HRCEnv, make: Make, seed: int, n_steps: int) -> float:

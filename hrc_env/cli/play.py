@@ -59,7 +59,7 @@ class Play(EnvironmentArguments):
 
         inner = env.unwrapped
         window = Viewer(inner.simulation.scene) if self.viewer else None
-        limit = (env.spec.max_episode_steps if env.spec else None) or 250
+        limit = env.spec.max_episode_steps
         played = film.begun(env, named(self.agent, seed), seed, limit)
         started_s, total, step, info = time.monotonic(), 0.0, 0, {}
         for step, (reward, told) in enumerate(track(played, f"episode {seed}", limit), 1):
@@ -103,8 +103,10 @@ class Demo(EnvironmentArguments):
         return 0
 
 
-def filmed(asked: Play | Demo, agent: str, path: Path, n_steps: int = 250, title: str = "") -> None:
-    """Film an episode of an agent by its name; show what came of it."""
+def filmed(
+    asked: Play | Demo, agent: str, path: Path, n_steps: int | None = None, title: str = ""
+) -> None:
+    """Film an episode of an agent by its name, up to its end; show what came of it."""
     from hrc_env.cli import film
 
     make, keywords = named(agent, asked.seed), asked.keywords()

@@ -44,9 +44,8 @@ def maker(policy: Policy, checkpoint: Path) -> MakeAgent:
     def make(part: Simulation) -> Any:
         env_info = agents("env_info").env_info(part)
         if policy.name == SLOWED:
-            scripted = agents("scripted")
-            yielding = scripted.Yielding(STOP_M + policy.margin_m, SLOW_M + policy.margin_m)
-            return scripted.expert(env_info, yielding)
+            limits_m = STOP_M + policy.margin_m, SLOW_M + policy.margin_m
+            return agents("experts").expert(env_info, agents("scripted").Yielding(*limits_m))
         name = str(checkpoint) if policy.name == PPO else policy.name
         return agents("registry").make_agent(name, env_info)
 
