@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.core.errors import check_fields, unknown
+from hrc_env.core.errors import ConfigError, check_fields, unknown
 from hrc_env.core.typing import Floats, JointAngles, JointVelocities, Velocities3
 from hrc_env.geometry.chains import SerialChain, jacobian, turning
 
@@ -45,6 +45,11 @@ def n_actions(control: str, chain: SerialChain, grips: bool = False) -> int:
     one for the hand of an arm that has one."""
     if control not in CONTROLS:
         raise unknown("control", control, CONTROLS)
+    if control != "joint" and chain.slides.any():
+        raise ConfigError(
+            f"control={control!r} moves the tool of an arm of hinges; this robot has slides, as "
+            'a base that drives has: valid is control="joint", a velocity for each joint.'
+        )
     return {"joint": chain.n_joints, "tool": 3, "twist": 6}[control] + grips
 
 

@@ -4,11 +4,13 @@ The package reads these files only; run this after a change to one of the makers
 """
 
 import sys
+from functools import partial
 from pathlib import Path
 
 import mujoco
 
 from assets.robots.hands import GRIPPER, SCREWDRIVER
+from assets.robots.mobile_base import add_mobile_base
 from assets.robots.ur10e_like import add_arm
 from assets.scenes import arena, prop_looks, site
 from assets.scenes.mjcf import TEXTURES, write_mjcf
@@ -19,7 +21,11 @@ from hrc_env.scene.worker_visuals import PARKED_M
 from hrc_env.worker.props import PROP_NAMES
 
 ASSETS = Path(__file__).resolve().parent.parent
-ROBOTS = {"ur10e_like": SCREWDRIVER, "ur10e_gripper": GRIPPER}
+ROBOTS = {
+    "ur10e_like": partial(add_arm, hand=SCREWDRIVER),
+    "ur10e_gripper": partial(add_arm, hand=GRIPPER),
+    "mobile_base": add_mobile_base,
+}
 TASKS = {"pick_place": add_pick_place}
 MAKERS = {"lab": (arena.add_lab, arena.paint_lab), "site": (site.add_site, site.paint_site)}
 
@@ -28,10 +34,10 @@ def bake(assets: Path) -> None:
     """Write `robots/*.xml`, `tasks/*.xml` and `scenes/*.xml` with their pictures below a folder."""
     for name in ("robots", "scenes", "tasks"):
         (assets / name).mkdir(parents=True, exist_ok=True)
-    for name, hand in ROBOTS.items():
-        arm = mujoco.MjSpec()
-        add_arm(arm, hand)
-        write_mjcf(arm, assets / "robots" / f"{name}.xml")
+    for name, add in ROBOTS.items():
+        robot = mujoco.MjSpec()
+        add(robot)
+        write_mjcf(robot, assets / "robots" / f"{name}.xml")
     for name, add in TASKS.items():
         things = mujoco.MjSpec()
         add(things)

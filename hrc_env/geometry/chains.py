@@ -1,7 +1,8 @@
-"""Serial chains of hinges: link frames, tool point, Jacobian, capsules; batched in numba.
+"""Serial chains of hinges and slides: link frames, tool point, Jacobian, capsules; in numba.
 
-Every joint turns about the z axis of its own frame. Link i's frame is joint i's frame turned
-by q_i, so T_world_from_link_i = T_world_from_base @ prod_{j <= i} (parent_from_joint_j Rz(q_j)).
+A hinge turns about the z axis of its own frame, a slide moves along it. Link i's frame is joint
+i's frame moved by q_i, so T_world_from_link_i = T_world_from_base @ prod_{j <= i}
+(parent_from_joint_j M_j(q_j)), where M is Rz of a hinge and Tz of a slide.
 """
 
 import math
@@ -13,25 +14,35 @@ from hrc_env.core.batching import flat
 from hrc_env.core.errors import check_shape
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import RobotState
-from hrc_env.core.typing import Capsules, Floats, Ints, JointAngles, JointVelocities, Transforms
+from hrc_env.core.typing import (
+    Bools,
+    Capsules,
+    Floats,
+    Ints,
+    JointAngles,
+    JointVelocities,
+    Transforms,
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SerialChain:
-    """An arm as its maker's data sheet has it: numbers only."""
+    """A robot as its maker's data sheet has it: numbers only. What is an angle [rad] of a hinge is
+    a way [m] of a slide."""
 
-    T_world_from_base: Transforms  # (4, 4) where the arm is bolted down
+    T_world_from_base: Transforms  # (4, 4) where it is bolted down, or where its slides begin
     parent_from_joint: Transforms  # (N, 4, 4) each joint in the previous link (or base) at q = 0
     link_from_tool: Transforms  # (4, 4) the tool point's frame in the last link
     range_rad: Floats  # (N, 2) lowest and highest angle
     velocity_limit_rad_s: Floats  # (N,)
+    slides: Bools  # (N,) which joints are slides; the others are hinges
     capsule_link: Ints  # (K,) index of the link that carries each capsule
     capsule_ends: Capsules  # (K, 2, 3) end points in the frame of that link [m]
     capsule_radius_m: Floats  # (K,)
 
     @property
     def n_joints(self) -> int:
-        """N, the number of hinges."""
+        """N, the number of hinges and slides."""
         return len(self.range_rad)
 
 
@@ -39,7 +50,7 @@ def forward(chain: SerialChain, q: JointAngles) -> Transforms:
     """Frames of all links, (..., N, 4, 4) world_from_link, at angles q (..., N)."""
     angles, lead = _rows(chain, "q", q)
     frames = np.empty((len(angles), chain.n_joints, 4, 4))
-    _forward(angles, chain.T_world_from_base, chain.parent_from_joint, frames)
+    _forward(angles, chain.slides, chain.T_world_from_base, chain.parent_from_joint, frames)
     return frames.reshape(*lead, chain.n_joints, 4, 4)
 
 
@@ -49,20 +60,21 @@ def tool(chain: SerialChain, q: JointAngles) -> Transforms:
 
 
 def jacobian(chain: SerialChain, q: JointAngles) -> Floats:
-    """Tool velocity per joint velocity, (..., 3, N) [m/rad], world axes, at q (..., N)."""
+    """Tool velocity per joint velocity, (..., 3, N) [m/rad, of a slide m/m], world axes, at q
+    (..., N)."""
     angles, lead = _rows(chain, "q", q)
     result = np.empty((len(angles), 3, chain.n_joints))
-    _jacobian(forward(chain, angles), chain.link_from_tool, result)
+    _jacobian(forward(chain, angles), chain.slides, chain.link_from_tool, result)
     return result.reshape(*lead, 3, chain.n_joints)
 
 
 def turning(chain: SerialChain, q: JointAngles) -> Floats:
     """The tool's turn rate per joint velocity, (..., 3, N), world axes, at q (..., N)."""
-    return np.moveaxis(forward(chain, q)[..., :3, 2], -1, -2)
+    return np.moveaxis(forward(chain, q)[..., :3, 2], -1, -2) * ~chain.slides
 
 
 def capsules(chain: SerialChain, q: JointAngles) -> Capsules:
-    """The arm's collision capsules, (..., K, 2, 3) end points in the world [m]."""
+    """The robot's collision capsules, (..., K, 2, 3) end points in the world [m]."""
     return _carried(chain, forward(chain, q))
 
 
@@ -81,7 +93,7 @@ def robot_along(
     rates, lead = _rows(chain, "qd", qd)
     last = flat(frames[..., -1, :, :, :], 3)
     tool_world, velocity = np.empty((len(rates), 3)), np.empty((len(rates), 3))
-    _tool_motion(last, rates, chain.link_from_tool, tool_world, velocity)
+    _tool_motion(last, chain.slides, rates, chain.link_from_tool, tool_world, velocity)
     tool_world, velocity = tool_world.reshape(*lead, 3), velocity.reshape(*lead, 3)
     axes = frames[..., -1, -1, :3, :3] @ chain.link_from_tool[:3, :3]
     q, qd = np.array(q_path[..., -1, :], float), np.array(qd, float)
@@ -107,22 +119,24 @@ def _rows(chain: SerialChain, name: str, values: Floats) -> tuple[Floats, tuple[
 
 
 @kernel
-def _forward(q, base, parent_from_joint, frames):
+def _forward(q, slides, base, parent_from_joint, frames):
     """Multiply the frames up; only the 3 x 4 part takes part."""
     for b in range(q.shape[0]):
         for i in range(q.shape[1]):
             parent = base if i == 0 else frames[b, i - 1]
             fixed, frame = parent_from_joint[i], frames[b, i]
-            c, s = math.cos(q[b, i]), math.sin(q[b, i])
+            turn, way = (0.0, q[b, i]) if slides[i] else (q[b, i], 0.0)
+            c, s = math.cos(turn), math.sin(turn)
             for row in range(3):
                 p0, p1, p2 = parent[row, 0], parent[row, 1], parent[row, 2]
                 x = p0 * fixed[0, 0] + p1 * fixed[1, 0] + p2 * fixed[2, 0]
                 y = p0 * fixed[0, 1] + p1 * fixed[1, 1] + p2 * fixed[2, 1]
                 frame[row, 0] = c * x + s * y
                 frame[row, 1] = c * y - s * x
-                frame[row, 2] = p0 * fixed[0, 2] + p1 * fixed[1, 2] + p2 * fixed[2, 2]
+                axis = p0 * fixed[0, 2] + p1 * fixed[1, 2] + p2 * fixed[2, 2]
                 shift = p0 * fixed[0, 3] + p1 * fixed[1, 3] + p2 * fixed[2, 3]
-                frame[row, 3] = shift + parent[row, 3]
+                frame[row, 2] = axis
+                frame[row, 3] = shift + parent[row, 3] + way * axis
                 frame[3, row] = 0.0
             frame[3, 3] = 1.0
 
@@ -139,32 +153,35 @@ def _apply(frame, point):
 
 
 @kernel
-def _lever(frame, point):
-    """axis x (point - origin): the point's velocity per turn rate of a frame's joint."""
+def _lever(frame, slides, point):
+    """A point's velocity per rate of a frame's joint: a slide's axis; a hinge's axis x (point -
+    origin)."""
+    if slides:
+        return frame[0, 2], frame[1, 2], frame[2, 2]
     rx, ry, rz = point[0] - frame[0, 3], point[1] - frame[1, 3], point[2] - frame[2, 3]
     ax, ay, az = frame[0, 2], frame[1, 2], frame[2, 2]
     return ay * rz - az * ry, az * rx - ax * rz, ax * ry - ay * rx
 
 
 @kernel
-def _jacobian(frames, link_from_tool, out):
-    """Column i is axis_i x (tool - origin_i)."""
+def _jacobian(frames, slides, link_from_tool, out):
+    """Column i is the tool's velocity per rate of joint i."""
     n = frames.shape[1]
     for b in range(frames.shape[0]):
         point = _apply(frames[b, n - 1], link_from_tool[:, 3])
         for i in range(n):
-            out[b, 0, i], out[b, 1, i], out[b, 2, i] = _lever(frames[b, i], point)
+            out[b, 0, i], out[b, 1, i], out[b, 2, i] = _lever(frames[b, i], slides[i], point)
 
 
 @kernel
-def _tool_motion(frames, qd, link_from_tool, point, velocity):
+def _tool_motion(frames, slides, qd, link_from_tool, point, velocity):
     """Where the tool points are, and how fast."""
     n = frames.shape[1]
     for b in range(frames.shape[0]):
         tool = _apply(frames[b, n - 1], link_from_tool[:, 3])
         vx, vy, vz = 0.0, 0.0, 0.0
         for i in range(n):
-            x, y, z = _lever(frames[b, i], tool)
+            x, y, z = _lever(frames[b, i], slides[i], tool)
             vx, vy, vz = vx + x * qd[b, i], vy + y * qd[b, i], vz + z * qd[b, i]
         point[b, 0], point[b, 1], point[b, 2] = tool
         velocity[b, 0], velocity[b, 1], velocity[b, 2] = vx, vy, vz

@@ -184,9 +184,9 @@ def build(
 def _build(recipe: Recipe) -> Scene:
     config, name, n_workers, bodies, use, robot, things = recipe
     room = SCENES[name]
-    chain = chain_of(robot, room.mount_world)
+    chain = chain_of(robot, _foot_world(robot, name))
     spec = _spec(recipe)
-    _strip(spec)
+    _strip(spec, robot.drives)
     n_joints = len(robot.joints) + (len(robot.hand.joints) if robot.hand else 0)
     loose = objects_of(spec, n_joints)
     _pair(spec, robot, chain)
@@ -249,25 +249,32 @@ def _spec(recipe: Recipe) -> mujoco.MjSpec:
     spec.memory = ARENA_BYTES + PAIR_BYTES * n_workers**2
     # The velocity command in force, which body each worker has, and the hand's command: state.
     spec.nuserdata = len(robot.joints) + n_workers + (robot.hand is not None)
-    add_robot(spec, robot, SCENES[name].mount_world)
+    foot_world = _foot_world(robot, name)
+    add_robot(spec, robot, foot_world)
     if things:
-        _add_things(spec, things, SCENES[name].mount_world)
+        _add_things(spec, things, foot_world)
     add_cameras(spec, pinholes(select(config.cameras, use)))
     for prefix in _prefixes(n_workers):
         add_worker(spec, load_body(bodies[0]), prefix)
     return spec
 
 
-def _add_things(spec: mujoco.MjSpec, things: str, mount_world: Sequence[float]) -> None:
+def _foot_world(robot: Robot, name: str) -> tuple[float, float, float]:
+    """Where a robot's foot is in a scene [m]."""
+    return (0.0, 0.0, 0.0) if robot.drives else SCENES[name].mount_world
+
+
+def _add_things(spec: mujoco.MjSpec, things: str, foot_world: Sequence[float]) -> None:
     """What a task adds. Grips slip least with elliptic cones (5 kg shaken at 3 m/s^2: 8 mm in 6 s;
     with MuJoCo's defaults 31)."""
     spec.option.cone, spec.option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 10.0
     child = mujoco.MjSpec.from_string(things)
-    spec.attach(child, prefix=objects.PREFIX, frame=spec.worldbody.add_frame(pos=list(mount_world)))
+    spec.attach(child, prefix=objects.PREFIX, frame=spec.worldbody.add_frame(pos=list(foot_world)))
 
 
-def _strip(spec: mujoco.MjSpec) -> None:
-    """Take away what only the eye needs: the physics is then twice as fast."""
+def _strip(spec: mujoco.MjSpec, drives: bool) -> None:
+    """Take away what only the eye needs: the physics is then twice as fast. What hides and is out
+    of an arm's reach touches only robots that drive."""
     hiding = [geom for geom in spec.geoms if geom.group == SOLID and not geom.contype]
     for geom in hiding:
         geom.contype = SCENE_BIT  # else the compiler would discard these as well
@@ -275,7 +282,7 @@ def _strip(spec: mujoco.MjSpec) -> None:
     spec.compile()
     spec.compiler.discardvisual = False
     for geom in hiding:
-        geom.contype = 0
+        geom.contype = SCENE_BIT if drives else 0
     empty = [b for b in spec.worldbody.bodies if not (b.mocap or b.geoms or b.bodies)]
     for unseen in (*empty, *spec.lights, *spec.cameras):
         spec.delete(unseen)

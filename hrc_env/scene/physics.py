@@ -27,11 +27,12 @@ SERVO = np.dtype(
     [(name, "f8") for name in ("low", "high", "fastest", "slew", "lead", "clamp")], align=True
 )
 """A joint's lowest and highest angle [rad], velocity limit [rad/s], fastest change of the command
-[rad/s^2], lead of its rate servo [s], and how far its holding servo may be ahead [rad]."""
+[rad/s^2], lead of its rate servo [s], and how far its holding servo may be ahead [rad]; a slide's
+in metres."""
 PRESSING_N, RESTING_M_S = 40.0, 0.01
 """Fingers that press with more [N] and move less [m/s] have closed on something."""
 END_MARGIN_RAD = 0.02
-"""Where the arm comes to rest before the end of a joint's range."""
+"""Where a robot comes to rest before the end of a joint's range; a slide [m]."""
 BRAKE_SHARE = 0.7
 """Share of the slew limit that stopping before an end counts on."""
 
@@ -228,7 +229,8 @@ def _servos(scene: Scene) -> Records:
     servos, config, chain = np.zeros(scene.chain.n_joints, SERVO), scene.config, scene.chain
     servos["low"], servos["high"] = chain.range_rad.T
     servos["fastest"], servos["lead"] = chain.velocity_limit_rad_s, scene.servo_lead_s
-    servos["slew"], servos["clamp"] = config.slew_rad_s2, config.integrator_clamp_rad
+    servos["slew"] = scene.robot.slew or config.slew_rad_s2
+    servos["clamp"] = config.integrator_clamp_rad
     return servos
 
 

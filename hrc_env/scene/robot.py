@@ -2,7 +2,8 @@
 
 A robot's file has the middle of its foot at the origin, looks to +x, and holds for each joint two
 servos on one command [rad/s]: first all that hold its integral (`intvelocity`), then all that
-follow it (`velocity`); one of them alone has 3-20 mm of tool error instead of 0.1.
+follow it (`velocity`); one of them alone has 3-20 mm of tool error instead of 0.1. What is an
+angle [rad] of a hinge is a way [m] of a slide, here and everywhere.
 """
 
 from collections.abc import Sequence
@@ -51,14 +52,14 @@ class Hand:
 
 @dataclass(frozen=True, slots=True)
 class Robot:
-    """A serial arm; names are those of its MJCF."""
+    """A serial arm, or a base that drives; names are those of its MJCF."""
 
     name: str
     """By which `robot=` knows it."""
     mjcf: str | Path
     """Its file's path, or the text itself."""
     joints: tuple[str, ...]
-    """Its N hinges, from the foot to the tool."""
+    """Its N hinges and slides, from the foot to the tool."""
     capsules: tuple[str, ...]
     """The capsule geoms that stand for its surface: in contacts, distances and sight."""
     watched: tuple[str, ...]
@@ -73,13 +74,25 @@ class Robot:
     """(capsule, geom of a scene) that no pose brings together, near as they may always be."""
     hand: Hand | None = None
     """What it grips with; None: nothing."""
+    drives: bool = False
+    """Whether it moves about on the floor, its foot the world's origin; else its foot is on the
+    scene's pedestal."""
+    girth_m: float = 0.0
+    """Of one that drives: how far it reaches to any side of the far ends of `watched` [m]; people
+    look out for all of it, from the floor upwards."""
+    slew: tuple[float, ...] = ()
+    """Fastest change of each joint's commanded velocity [rad/s^2]; none: `SceneConfig.slew_rad_s2`
+    for all."""
 
     def __post_init__(self) -> None:
-        for name in ("home_q", "spread_rad"):
+        for name in ("home_q", "spread_rad", "slew"):
             values = getattr(self, name)
+            if name == "slew" and not values:
+                continue
             if len(values) != len(self.joints) or not np.isfinite(values).all():
                 raise ConfigError(
-                    f"{self.name}: {name} must be {len(self.joints)} angles [rad], got {values}."
+                    f"{self.name}: {name} must be {len(self.joints)} angles [rad], of slides "
+                    f"ways [m], got {values}."
                 )
 
 
@@ -138,7 +151,7 @@ def add_robot(spec: Any, robot: Robot, mount_world: Sequence[float]) -> None:
 
 @lru_cache(maxsize=8)
 def chain_of(robot: Robot, mount_world: tuple[float, float, float]) -> SerialChain:
-    """A robot's numbers as a chain of hinges. Raises `ConfigError` where something that `Robot`
+    """A robot's numbers as a chain of joints. Raises `ConfigError` where something that `Robot`
     names is missing in the MJCF or of another kind."""
     try:
         return _chain(robot, mount_world)
@@ -150,7 +163,8 @@ def chain_of(robot: Robot, mount_world: tuple[float, float, float]) -> SerialCha
 
 def reach_m(chain: SerialChain) -> Floats:
     """(K,) no point of a capsule is ever farther from the robot's foot than this [m]."""
-    before = np.cumsum(np.linalg.norm(chain.parent_from_joint[:, :3, 3], axis=-1))
+    ways = np.where(chain.slides, np.abs(chain.range_rad).max(-1), 0.0)
+    before = np.cumsum(np.linalg.norm(chain.parent_from_joint[:, :3, 3], axis=-1) + ways)
     own = np.linalg.norm(chain.capsule_ends, axis=-1).max(-1)
     return before[chain.capsule_link] + own + chain.capsule_radius_m
 
@@ -221,6 +235,7 @@ def _chain(robot: Robot, mount_world: tuple[float, float, float]) -> SerialChain
         link_from_tool=np.linalg.inv(links[-1]) @ _pose(data.site_xpos[site], data.site_xmat[site]),
         range_rad=model.jnt_range[joints],
         velocity_limit_rad_s=model.actuator_ctrlrange[n : 2 * n, 1].copy(),
+        slides=model.jnt_type[joints] == mujoco.mjtJoint.mjJNT_SLIDE,
         capsule_link=carriers,
         capsule_ends=ends,
         capsule_radius_m=radius_m,
@@ -235,14 +250,16 @@ def _id(model: mujoco.MjModel, kind: str, name: str) -> int:
 
 
 def _check_servos(model: mujoco.MjModel, joints: list[int], hand: Hand | None) -> None:
-    """Only hinges with ranges, and their servos in order; then the hand's slides and motor."""
+    """Only hinges and slides with ranges, and their servos in order; then the hand's slides and
+    motor."""
     n, fingers = len(joints), [_id(model, "joint", each) for each in hand.joints] if hand else []
-    hinges = (model.jnt_type[:n] == mujoco.mjtJoint.mjJNT_HINGE).all() and model.jnt_limited.all()
+    kinds = {mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE}
+    own = kinds.issuperset(model.jnt_type[:n].tolist()) and model.jnt_limited.all()
     slides = (model.jnt_type[n:] == mujoco.mjtJoint.mjJNT_SLIDE).all()
-    if joints + fingers != list(range(model.njnt)) or not (hinges and slides):
+    if joints + fingers != list(range(model.njnt)) or not (own and slides):
         raise ConfigError(
-            "joints must be all of its MJCF, in its order: hinges with a range; then its hand's: "
-            "slides with a range."
+            "joints must be all of its MJCF, in its order: hinges and slides with a range; then "
+            "its hand's: slides with a range."
         )
     motors = [_id(model, "actuator", hand.motor)] if hand else []
     integrates = model.actuator_dyntype == mujoco.mjtDyn.mjDYN_INTEGRATOR
@@ -254,7 +271,7 @@ def _check_servos(model: mujoco.MjModel, joints: list[int], hand: Hand | None) -
     ):
         raise ConfigError(
             "needs an <intvelocity> for every joint in order, then a <velocity> for every joint, "
-            "each with a ctrlrange [rad/s]; then its hand's <position> with one [m]."
+            "each with a ctrlrange [rad/s, of slides m/s]; then its hand's <position> with one [m]."
         )
 
 

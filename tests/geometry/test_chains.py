@@ -1,4 +1,4 @@
-"""A chain of hinges: frames, the tool point, its Jacobian, capsules."""
+"""A chain of hinges and slides: frames, the tool point, its Jacobian, capsules."""
 
 from dataclasses import replace
 
@@ -90,3 +90,38 @@ def test_a_base_that_is_moved_moves_everything_with_it():
 def test_too_few_angles_are_refused_with_the_number_that_is_expected():
     with pytest.raises(ConfigError, match=r"\(6,\)"):
         chains.forward(ARM, np.zeros(5))
+
+
+BASE = chain_of(ROBOTS["mobile_base"], (0.0, 0.0, 0.0))
+places = st.tuples(st.floats(-8, 8), st.floats(-8, 8), st.floats(-9, 9)).map(np.array)
+
+
+@settings(max_examples=25, deadline=None)
+@given(places)
+def test_slides_and_mujoco_agree_on_the_base_and_its_capsules(q):
+    scene = build(name="site", robot="mobile_base")
+    data = mujoco.MjData(scene.model)
+    data.qpos[:3] = q
+    mujoco.mj_kinematics(scene.model, data)
+    np.testing.assert_allclose(chains.tool(scene.chain, q)[:2, 3], q[:2], atol=1e-9)
+    tool = chains.tool(scene.chain, q)[:3, 3]
+    np.testing.assert_allclose(data.site("robot/load").xpos, tool, atol=1e-9)
+    middles = chains.capsules(scene.chain, q).mean(-2)
+    for name, middle in zip(scene.robot.capsules, middles, strict=True):
+        np.testing.assert_allclose(data.geom(f"robot/{name}").xpos, middle, atol=1e-9)
+
+
+@settings(max_examples=25, deadline=None)
+@given(places)
+def test_the_jacobian_of_slides_is_the_tools_change_per_metre(q):
+    chain = replace(BASE, link_from_tool=BASE.link_from_tool.copy())
+    chain.link_from_tool[0, 3] = 0.4  # ahead of the axis, so that turning moves it
+    step = 1e-6
+    ahead = chains.tool(chain, q + step * np.eye(3))[:, :3, 3]
+    behind = chains.tool(chain, q - step * np.eye(3))[:, :3, 3]
+    slope = (ahead - behind).T / (2 * step)
+    np.testing.assert_allclose(chains.jacobian(chain, q), slope, atol=1e-7)
+    np.testing.assert_allclose(chains.turning(chain, q), [[0, 0, 0], [0, 0, 0], [0, 0, 1]])
+    moving = chains.robot_state(chain, q, np.array([0.5, -0.2, 0.3]))
+    np.testing.assert_allclose(moving.tool_velocity_world, slope @ [0.5, -0.2, 0.3], atol=1e-7)
+    np.testing.assert_array_equal(BASE.slides, [True, True, False])

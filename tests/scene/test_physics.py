@@ -162,3 +162,33 @@ def test_an_arm_out_of_reach_moves_as_it_would_alone():
         np.testing.assert_array_equal(parted.step(command, both, apart), expected)
     for name in ("q", "qd"):
         np.testing.assert_array_equal(getattr(parted, name), getattr(whole, name))
+
+
+SITE = build(name="site", robot="mobile_base")
+
+
+def test_a_base_drives_as_it_is_told_and_no_harder_than_its_slew():
+    physics = Physics(SITE, 1)
+    physics.step(np.array([[1.0, -0.5, 0.8]]), no_workers(1, T))
+    assert np.abs(physics.qd[0, :2]).max() < 1.2 * 1.5 * DT
+    for _ in range(40):
+        physics.step(np.array([[1.0, -0.5, 0.8]]), no_workers(1, T))
+    np.testing.assert_allclose(physics.qd, [[1.0, -0.5, 0.8]], atol=5e-3)
+
+
+def test_a_base_stops_before_the_end_of_its_slides():
+    physics = Physics(SITE, 1)
+    end_m = SITE.chain.range_rad[1, 1]
+    physics.reset(np.array([0]), np.array([[-1.0, end_m - 1.5, 0.0]]))
+    for _ in range(80):
+        physics.step(np.array([[0.0, 1.5, 0.0]]), no_workers(1, T))
+    assert end_m - 0.1 < physics.q[0, 1] < end_m
+    assert abs(physics.qd[0, 1]) < 1e-2
+
+
+def test_a_wall_stops_a_base():
+    physics = Physics(SITE, 1)
+    for _ in range(100):  # to the north, where the stack of boards is
+        physics.step(np.array([[-0.35, 1.5, 0.0]]), no_workers(1, T))
+    assert physics.q[0, 1] < 1.6
+    assert np.isfinite(physics.qpos).all()
