@@ -47,9 +47,11 @@ class BoardHolder:
         self.env_info, self.yielding = env_info, yielding
         self._foot = env_info.chain.T_world_from_base[:3, 3]
 
-    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+    def act(self, observation: Observation) -> NDArray[np.float32]:
         """Actions (..., A): towards the board, or with it to its place."""
-        terms = split(np.atleast_2d(observation), self.env_info.layout)
+        terms = split(observation, self.env_info.layout)
+        shape = terms["tool_position"].shape[:-1]
+        terms = {name: np.atleast_2d(term) for name, term in terms.items()}
         velocity, turn, sucks = self._wanted(terms)
         if self.yielding is not None:
             nearest_m = terms["worker_separation"].min(axis=-1, initial=np.inf)
@@ -58,7 +60,7 @@ class BoardHolder:
             velocity, turn = velocity * share, turn * share
         moves = arm_action(self.env_info, terms, velocity, turn)
         action = np.concatenate([moves, 2.0 * sucks[:, None] - 1.0], axis=1)
-        return action.reshape(*observation.shape[:-1], -1).astype(np.float32)
+        return action.reshape(*shape, -1).astype(np.float32)
 
     def _wanted(self, terms: dict[str, Array]) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Velocity and turn rate of the tool (n, 3), and whether the cups suck (n,)."""

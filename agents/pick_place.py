@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hrc_env.observations import split
 
-from .env_info import EnvInfo
+from .env_info import EnvInfo, Observation
 from .manipulating import TURN_HZ, arm_action, round_the_foot
 from .scripted import Yielding, speed_m_s
 
@@ -55,9 +55,14 @@ class PickPlacer:
         self.env_info, self.yielding = env_info, yielding
         self._foot = env_info.chain.T_world_from_base[:2, 3]
 
-    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+    def act(self, observation: Observation) -> NDArray[np.float32]:
         """Actions (..., A): towards the next piece, or with it to its place."""
-        terms = split(np.atleast_2d(observation), self.env_info.layout)
+        return self.act_on(split(observation, self.env_info.layout))
+
+    def act_on(self, terms: dict[str, Array]) -> NDArray[np.float32]:
+        """The same for an observation by its terms."""
+        shape = terms["tool_position"].shape[:-1]
+        terms = {name: np.atleast_2d(term) for name, term in terms.items()}
         seen = _seen(terms)
         velocity, turn, grip = self._wanted(seen)
         if self.yielding is not None:
@@ -66,7 +71,7 @@ class PickPlacer:
             velocity, turn = velocity * share, turn * share
         moves = arm_action(self.env_info, terms, velocity, turn)
         action = np.concatenate([moves, grip[:, None]], axis=1)
-        return action.reshape(*observation.shape[:-1], -1).astype(np.float32)
+        return action.reshape(*shape, -1).astype(np.float32)
 
     def _wanted(self, seen: _Seen) -> tuple[Array, Array, Array]:
         """Velocity and turn rate of the tool (n, 3), and what the fingers do (n,)."""

@@ -5,7 +5,7 @@ they cannot drift apart. Terms read the *estimate* of the worker, never the trut
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +25,8 @@ from hrc_env.geometry.rotations import matrix
 
 TOWARDS_ROBOT, FACTOR = UNCERTAINTY = ("towards_robot", "factor")
 """What else can be asked for of each joint's covariance."""
+FLAT = "observation"
+"""What the flat observation is called where goals stand beside it."""
 FAR_SEPARATION_M = 1.0
 """Larger separations are reported as this: nothing near, or nobody known of."""
 
@@ -282,7 +284,12 @@ def _scale(physical: Floats, scale: Floats, low: Tensor, high: Tensor, observati
     return numbers
 
 
-def split(observation: Tensor, where: ObservationLayout) -> dict[str, Floats]:
-    """A flat observation (..., n) as named terms in their units."""
+def split(
+    observation: Tensor | Mapping[str, Tensor], where: ObservationLayout
+) -> dict[str, Floats]:
+    """A flat observation (..., n) as named terms in their units; goals beside it as they are."""
+    if isinstance(observation, Mapping):
+        goals = {k: np.asarray(part, float) for k, part in observation.items() if k != FLAT}
+        return Named({**split(observation[FLAT], where), **goals})
     physical = observation * where.scale
     return Named((name, physical[..., part]) for name, part in where.slices.items())

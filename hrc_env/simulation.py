@@ -34,7 +34,8 @@ from hrc_env.scene import handling
 from hrc_env.scene.build import Scene, build
 from hrc_env.scene.physics import Physics
 from hrc_env.scene.rigs import findings
-from hrc_env.step import Info, StepResult
+from hrc_env.step import Info, Observation, StepResult
+from hrc_env.tasks import goal
 from hrc_env.tracking import oracle
 from hrc_env.worker.body import pool, stack, worker_capsules, worker_truth
 
@@ -134,7 +135,7 @@ class Simulation(Stateful):
         self._expose(ids, motion, truth)
         estimates = self._perceive(ids)
         belief = self._believed(ids, world, estimates)
-        observation = observations.observe(belief, self.layout, self.terms)
+        observation = self._observed(belief)
         identities = metrics.no_identities(*self.present[ids].shape)
         info = {
             **step.no_cost(len(ids)),
@@ -193,7 +194,7 @@ class Simulation(Stateful):
         over = (cost.contact > 0) & config.cost.contact_terminates
         if self.task.over is not None:
             over |= self.task.over(progress)
-        observation = observations.observe(belief, self.layout, self.terms)
+        observation = self._observed(belief)
         return StepResult(observation, rewards.total(terms, self.batch), over, info)
 
     def set_reward(self, weights: RewardConfig) -> None:
@@ -309,9 +310,14 @@ class Simulation(Stateful):
             forecast=tuple(later),
         )
 
+    def _observed(self, belief: Belief) -> Observation:
+        """What robots see, and their goals if the task sets them apart."""
+        flat, apart = observations.observe(belief, self.layout, self.terms), self.task.goal
+        return flat if apart is None else {**goal.parts(apart, belief), observations.FLAT: flat}
+
     def _reward_terms(self, belief: Belief, progress: Any, previous: Floats) -> dict[str, Floats]:
         """(B,) every term of the reward: the task's, then what all tasks share."""
-        own, shared = self.task.rewards, rewards.SHARED_TERMS
+        own, shared = self.task.own_rewards, rewards.SHARED_TERMS
         return {
             **rewards.evaluated(own, belief, progress, previous, self.config.task),
             **rewards.evaluated(shared, belief, progress, previous, self.reward_weights),
