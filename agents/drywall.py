@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from hrc_env.observations import split
 
-from .env_info import EnvInfo
+from .env_info import EnvInfo, Observation
 from .manipulating import arm_action, round_the_foot, turn_towards
 from .scripted import Yielding, speed_m_s
 
