@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from hrc_env import observations, rewards
 from hrc_env.config import ConfigChoice, Settings, settle
+from hrc_env.control import checked_action
 from hrc_env.core.batching import Stateful, one
 from hrc_env.core.errors import ConfigError, unknown, whole
 from hrc_env.core.mapping import plain
@@ -29,7 +30,7 @@ from hrc_env.rewards import RewardConfig
 from hrc_env.safety.shield import Shield
 from hrc_env.scene.domain_randomization import AppearanceConfig
 from hrc_env.scene.robot import Robot
-from hrc_env.simulation import Simulation, checked_action
+from hrc_env.simulation import Simulation
 from hrc_env.step import Observation
 from hrc_env.tasks import DEFAULT, goal
 from hrc_env.tasks.task import Task, goal_of

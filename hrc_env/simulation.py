@@ -11,7 +11,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from hrc_env import metrics, observations, rewards, room, step
 from hrc_env.belief import Belief, estimated_separation
@@ -344,15 +343,3 @@ def _recorded(batch: int, settings: Settings, scene: Scene) -> dict[str, Any]:
         "n_workers": (fewest, most) if fewest < most else most, "control": settings.control,
         "config": settings.config,
     }  # fmt: skip
-
-
-def checked_action(action: ArrayLike, shape: tuple[int, ...]) -> Floats:
-    """Actions as float64, clipped to [-1, 1]; `ConfigError` for other shapes or no numbers."""
-    try:
-        values = np.asarray(action, np.float64)
-    except (TypeError, ValueError) as error:
-        raise ConfigError(f"action must be numbers of shape {shape}, got {action!r}.") from error
-    check_shape("action", values.shape, shape, "(environments,) joint or tool velocities")
-    if not np.isfinite(values).all():
-        raise ConfigError(f"action must be finite numbers in [-1, 1], got {values}.")
-    return np.minimum(np.maximum(values, -1.0), 1.0)
