@@ -1,5 +1,6 @@
 """What an agent is, and what it is told about its environment."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
@@ -15,10 +16,14 @@ if TYPE_CHECKING:
     from hrc_env.simulation import Simulation
 
 
+Observation = NDArray[np.float32] | Mapping[str, NDArray[np.float32]]
+"""(..., n), or such arrays by name where goals stand apart."""
+
+
 class Agent(Protocol):
     """A policy."""
 
-    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+    def act(self, observation: Observation) -> NDArray[np.float32]:
         """Actions (..., A) in [-1, 1] for observations (..., n)."""
         ...
 
@@ -37,6 +42,8 @@ class EnvInfo:
     """The task's id."""
     map: Grounds
     """Of the place: where things stand, and where people walk and work."""
+    goal_size: int = 0
+    """Entries of a goal that stands apart from the observation; 0: there is none."""
 
 
 def env_info(simulation: "Simulation") -> EnvInfo:
@@ -50,4 +57,5 @@ def env_info(simulation: "Simulation") -> EnvInfo:
         n_actions=simulation.n_actions,
         task=simulation.task.id,
         map=simulation.scene.map,
+        goal_size=0 if simulation.task.goal is None else simulation.task.goal.size,
     )

@@ -1,9 +1,13 @@
 """Uniformly random actions: what an environment does to somebody who does not think."""
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
-from .env_info import EnvInfo
+from hrc_env.observations import FLAT
+
+from .env_info import EnvInfo, Observation
 
 
 class RandomAgent:
@@ -13,7 +17,8 @@ class RandomAgent:
         self.n_actions = env_info.n_actions
         self.rng = np.random.default_rng(seed)
 
-    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+    def act(self, observation: Observation) -> NDArray[np.float32]:
         """Actions uniform in [-1, 1]."""
-        shape = (*observation.shape[:-1], self.n_actions)
+        flat = observation[FLAT] if isinstance(observation, Mapping) else observation
+        shape = (*flat.shape[:-1], self.n_actions)
         return self.rng.uniform(-1, 1, shape).astype(np.float32)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from hrc_env.control import resolved_rate
 from hrc_env.observations import split
 
-from .env_info import EnvInfo
+from .env_info import EnvInfo, Observation
 
 GAIN_HZ = 4.0
 """Approach speed per distance [1/s]."""
@@ -47,9 +47,12 @@ class Reacher:
     def __init__(self, env_info: EnvInfo, yielding: Yielding | None = None) -> None:
         self.env_info, self.yielding = env_info, yielding
 
-    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+    def act(self, observation: Observation) -> NDArray[np.float32]:
         """Actions (..., A) that move the tool straight towards its goal."""
-        terms = split(observation, self.env_info.layout)
+        return self.act_on(split(observation, self.env_info.layout))
+
+    def act_on(self, terms: dict[str, NDArray[np.float64]]) -> NDArray[np.float32]:
+        """The same for an observation by its terms."""
         velocity = self._tool_velocity(terms["goal_from_tool"])
         if self.yielding is not None:
             nearest_m = terms["worker_separation"].min(axis=-1, initial=np.inf)

@@ -18,6 +18,7 @@ from rich.console import Console
 
 import hrc_env  # noqa: F401  registers the ids
 from hrc_env.cli.progress import track
+from hrc_env.tasks import DEFAULT
 
 RESET_SHARE = 0.01
 """Chance that an environment is reset after a step."""
@@ -27,6 +28,8 @@ RESET_SHARE = 0.01
 class Arguments:
     """Compare the batch with single environments."""
 
+    task: str = DEFAULT
+    """Which environment, by its id."""
     num_envs: int = 64
     """Environments."""
     steps: int = 500
@@ -40,14 +43,16 @@ class Arguments:
 
 
 def vectors(
-    num_envs: int, threads: Sequence[int], mode: AutoresetMode, **kwargs: Any
+    num_envs: int,
+    threads: Sequence[int],
+    mode: AutoresetMode,
+    task: str = DEFAULT,
+    **kwargs: Any,
 ) -> list[VectorEnv]:
     """Single environments in gymnasium's vector, and the batch with each number of threads."""
-    singles = gymnasium.make_vec(
-        "HRCReach-v0", num_envs, "sync", {"autoreset_mode": mode}, **kwargs
-    )
+    singles = gymnasium.make_vec(task, num_envs, "sync", {"autoreset_mode": mode}, **kwargs)
     batches = [
-        gymnasium.make_vec("HRCReach-v0", num_envs, num_threads=each, autoreset_mode=mode, **kwargs)
+        gymnasium.make_vec(task, num_envs, num_threads=each, autoreset_mode=mode, **kwargs)
         for each in threads
     ]
     return [singles, *batches]
@@ -101,7 +106,7 @@ def main(arguments: Arguments) -> None:
     n_envs, console = arguments.num_envs, Console()
     for level in arguments.perception:
         for mode in AutoresetMode:
-            envs = vectors(n_envs, arguments.threads, mode, perception=level)
+            envs = vectors(n_envs, arguments.threads, mode, arguments.task, perception=level)
             counts = compare(envs, arguments.steps, arguments.seed)
             for threads, count in zip(arguments.threads, counts, strict=True):
                 console.print(

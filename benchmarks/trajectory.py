@@ -55,10 +55,11 @@ def play(env_id: str, case: str, n_steps: int, every: int = 1) -> dict[str, list
     return {name: [moment.get(name) for moment in moments] for name in names}
 
 
-def _moment(
-    observation: np.ndarray, slices: dict[str, slice], told: dict[str, Any]
-) -> dict[str, Any]:
-    terms = {f"observation/{name}": observation[part] for name, part in slices.items()}
+def _moment(observation: Any, slices: dict[str, slice], told: dict[str, Any]) -> dict[str, Any]:
+    seen = observation if isinstance(observation, dict) else {"observation": observation}
+    flat = seen["observation"]
+    terms = {f"observation/{name}": flat[part] for name, part in slices.items()}
+    terms |= {name: part for name, part in seen.items() if part is not flat}
     return {name: _plain(value) for name, value in {**terms, **told}.items()}
 
 

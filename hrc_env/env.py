@@ -4,20 +4,22 @@ import gymnasium, hrc_env
 env = gymnasium.make("HRCReach-v0", perception="keypoints")
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import gymnasium
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
-from gymnasium.spaces import Box
+from gymnasium.spaces import Box, Dict
 from numpy.typing import NDArray
 
-from hrc_env import observations
+from hrc_env import observations, rewards
 from hrc_env.config import ConfigChoice, Settings, settle
-from hrc_env.core.batching import Stateful
+from hrc_env.control import checked_action
+from hrc_env.core.batching import Stateful, one
 from hrc_env.core.errors import ConfigError, unknown, whole
 from hrc_env.core.mapping import plain
 from hrc_env.core.typing import Floats
@@ -28,9 +30,10 @@ from hrc_env.rewards import RewardConfig
 from hrc_env.safety.shield import Shield
 from hrc_env.scene.domain_randomization import AppearanceConfig
 from hrc_env.scene.robot import Robot
-from hrc_env.simulation import Simulation, checked_action
-from hrc_env.tasks import DEFAULT
-from hrc_env.tasks.task import Task
+from hrc_env.simulation import Simulation
+from hrc_env.step import Observation
+from hrc_env.tasks import DEFAULT, goal
+from hrc_env.tasks.task import Task, goal_of
 from hrc_env.tracking.estimators import EstimatorChoice
 
 RENDER_MODES = ("rgb_array", "depth_array")
@@ -49,9 +52,25 @@ class EnvBase(Stateful):
         """Keep settings, and a form of pictures once it is known to be one."""
         check_render_mode(render_mode)
         self._size = picture_size(width, height)
-        self.render_mode, self.config = render_mode, settings.config
+        self.render_mode, self.config, self._task = render_mode, settings.config, settings.task
         fps = round(1 / self.config.ctrl_dt)
         self.metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": fps}
+
+    @property
+    def compute_reward(self) -> Callable[[Any, Any, Any], Any]:
+        """(achieved_goal, desired_goal, info) -> reward: of one pair (n,) and the info of its step,
+        or of many (B, n) with a list of infos, or a vector's; see `hrc_env.tasks.goal.judged`.
+
+        With the info of a step it is the step's reward, bit for bit: the goal's term and those that
+        every task shares. Of infos that do not hold these, as HER's own, it is the goal's alone.
+
+        Raises:
+            NoGoalError: the task has no goals apart from its observation; it is an `AttributeError`
+                too, so that `hasattr` tells who has.
+        """
+        apart, others = goal_of(self._task), [term.name for term in rewards.SHARED_TERMS]
+        others = [term.name for term in self._task.rewards] + others
+        return partial(goal.judged, apart, config=self.config.task, others=others)
 
     def _refuse_closed(self) -> None:
         if self.closed:
@@ -68,7 +87,7 @@ class EnvBase(Stateful):
 
 
 class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
-    EnvBase, gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]
+    EnvBase, gymnasium.Env[Observation, NDArray[np.float32]]
 ):
     """A robot works beside people whom it knows through cameras only.
 
@@ -149,7 +168,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+    ) -> tuple[Observation, dict[str, Any]]:
         """Start an episode.
 
         Args:
@@ -162,11 +181,11 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         super().reset(seed=seed)
         self._begun, self._steps_left = True, steps_left
         result = self.simulation.reset(np.array([0]), [self.np_random])
-        return result.observation[0], result.info_of(0)
+        return one(result.observation, 0), result.info_of(0)
 
     def step(
         self, action: NDArray[np.float32]
-    ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+    ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Act for one control step (1 / 25 s); the walk itself is `Simulation.step`."""
         self._refuse_closed()
         if not self._begun:
@@ -175,7 +194,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         result = self.simulation.step(values[None])
         self._steps_left -= 1
         return (
-            result.observation[0],
+            one(result.observation, 0),
             float(result.reward[0]),
             bool(result.terminated[0]),
             self._steps_left <= 0,  # the time limit itself is gymnasium's TimeLimit
@@ -196,8 +215,8 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         """The four cameras with crops, detected keypoints and the estimated skeleton."""
         return self.views.mosaic()
 
-    def split_observation(self, observation: NDArray[np.float32]) -> dict[str, Floats]:
-        """An observation's terms by name, in metres, seconds and radians."""
+    def split_observation(self, observation: Observation) -> dict[str, Floats]:
+        """An observation's terms by name, in metres, seconds and radians, goals too."""
         return observations.split(observation, self.simulation.layout)
 
     def close(self) -> None:
@@ -233,10 +252,12 @@ def check_render_mode(render_mode: str | None) -> None:
         raise unknown("render_mode", render_mode, RENDER_MODES)
 
 
-def spaces(simulation: Simulation) -> tuple[Box[np.float32], Box[np.float32]]:
+def spaces(simulation: Simulation) -> tuple[Box[np.float32] | Dict, Box[np.float32]]:
     """The spaces of one environment's observations and actions."""
-    where = simulation.layout
-    return (
-        Box(where.low, where.high, dtype=np.float32),
-        Box(-1.0, 1.0, (simulation.n_actions,), np.float32),
-    )
+    where, apart = simulation.layout, simulation.task.goal
+    seen = Box(where.low, where.high, dtype=np.float32)
+    actions = Box(-1.0, 1.0, (simulation.n_actions,), np.float32)
+    if apart is None:
+        return seen, actions
+    goals = Box(-apart.bound, apart.bound, (apart.size,), np.float32)
+    return Dict({goal.ACHIEVED: goals, goal.DESIRED: goals, observations.FLAT: seen}), actions

@@ -5,7 +5,7 @@ they cannot drift apart. Terms read the *estimate* of the worker, never the trut
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +25,8 @@ from hrc_env.geometry.rotations import matrix
 
 TOWARDS_ROBOT, FACTOR = UNCERTAINTY = ("towards_robot", "factor")
 """What else can be asked for of each joint's covariance."""
+FLAT = "observation"
+"""What the flat observation is called where goals stand beside it."""
 FAR_SEPARATION_M = 1.0
 """Larger separations are reported as this: nothing near, or nobody known of."""
 
@@ -42,7 +44,9 @@ class Sizes:
     uncertainty: tuple[str, ...] = ()
     """Which of `UNCERTAINTY` were asked for."""
     hands: int = 0
-    """1 of an arm with a gripper."""
+    """1 of an arm that can hold something,"""
+    fingers: int = 0
+    """and 1 if with fingers."""
     objects: int = 0
     """How many are loose."""
     slides: int = 0
@@ -151,13 +155,13 @@ ROBOT_TERMS: tuple[ObservationTerm, ...] = (
         lambda now: now.robot.tool_axes_world[..., [0, 2]].swapaxes(-1, -2),
     ),
     ObservationTerm(
-        "hand_opening", lambda of: of.hands, "m", "tool", 0.2, 0.05,
+        "hand_opening", lambda of: of.fingers, "m", "tool", 0.2, 0.05,
         "How far each finger is from the middle.",
         lambda now: _hand(now).opening_m,
     ),
     ObservationTerm(
         "hand_force", lambda of: of.hands, "N", "tool", 300.0, 100.0,
-        "With which the fingers press together; negative: apart.",
+        "With which the fingers press together, negative: apart; or what hangs on the cups.",
         lambda now: _hand(now).force_n,
     ),
     ObservationTerm(
@@ -304,7 +308,12 @@ def _scale(physical: Floats, scale: Floats, low: Tensor, high: Tensor, observati
     return numbers
 
 
-def split(observation: Tensor, where: ObservationLayout) -> dict[str, Floats]:
-    """A flat observation (..., n) as named terms in their units."""
+def split(
+    observation: Tensor | Mapping[str, Tensor], where: ObservationLayout
+) -> dict[str, Floats]:
+    """A flat observation (..., n) as named terms in their units; goals beside it as they are."""
+    if isinstance(observation, Mapping):
+        goals = {k: np.asarray(part, float) for k, part in observation.items() if k != FLAT}
+        return Named({**split(observation[FLAT], where), **goals})
     physical = observation * where.scale
     return Named((name, physical[..., part]) for name, part in where.slices.items())

@@ -16,6 +16,8 @@ from hrc_env.core.errors import ConfigError, learner
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.rewards import RewardConfig
 from hrc_env.simulation import Simulation
+from hrc_env.step import Observation
+from hrc_env.tasks.goal import TERM
 from hrc_env.vector.env import HRCVectorEnv
 
 with learner():
@@ -35,8 +37,9 @@ class HRCVecEnv(VecEnv):
     """An `HRCVectorEnv` as SB3 expects environments, with episode statistics.
 
     Environment k of `seed(s)` and then `reset()` is the single environment after
-    `reset(seed=s + k)`. The info of a step holds its "cost" only, but where an episode ended the
-    whole, with "terminal_observation", "TimeLimit.truncated" and the statistics, "episode".
+    `reset(seed=s + k)`. The info of a step holds its "cost" only (with goals also the rest of the
+    reward, for HER with `copy_info_dict`), but where an episode ended the whole, with
+    "terminal_observation", "TimeLimit.truncated" and the statistics, "episode".
 
     Args:
         stagger: after a `seed()`, let each environment's first episode end early at a random
@@ -75,7 +78,7 @@ class HRCVecEnv(VecEnv):
         if options:
             raise ConfigError(f"HRCVecEnv takes no options, got {options}; use its arguments.")
 
-    def reset(self) -> NDArray[np.float32]:
+    def reset(self) -> Observation:  # type: ignore[override]
         """Start every environment: from its seed the first time, then on with its stream."""
         options = None
         if self._phases is not None:
@@ -95,12 +98,12 @@ class HRCVecEnv(VecEnv):
 
     def step_wait(
         self,
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32], Bools, list[dict[str, Any]]]:
+    ) -> tuple[Observation, NDArray[np.float32], Bools, list[dict[str, Any]]]:
         """Step everyone; whoever is done starts anew, as SB3 expects."""
         observation, reward, terminated, truncated, fresh = self.env.step(self._action)
         self._count(reward, fresh)
         done = terminated | truncated
-        infos: list[dict[str, Any]] = [{"cost": cost} for cost in self.costs.tolist()]
+        infos = self._infos(fresh)
         ended = np.flatnonzero(done)
         for b in ended.tolist():
             infos[b] = _info_of(fresh["final_info"], b)
@@ -110,6 +113,16 @@ class HRCVecEnv(VecEnv):
             self.reset_infos[b] = _info_of(fresh, b)
         self._begin(ended)
         return observation, reward.astype(np.float32), done, infos
+
+    def _infos(self, fresh: Mapping[str, Any]) -> list[dict[str, Any]]:
+        """Of every step: its cost, and what `compute_reward` adds to a goal's term."""
+        columns = {"cost": self.costs}
+        for term in self.simulation.task.reward_terms if self.simulation.task.goal else ():
+            if term.name != TERM:
+                name = f"reward/{term.name}"
+                columns[name] = _of_step(fresh, name, self.num_envs)
+        values = zip(*(column.tolist() for column in columns.values()), strict=True)
+        return [dict(zip(columns, row, strict=True)) for row in values]
 
     def set_reward(self, weights: RewardConfig) -> None:
         """Weigh the reward's terms so from the next step on, in every environment."""
@@ -165,7 +178,15 @@ class HRCVecEnv(VecEnv):
         raise ConfigError(f"HRCVecEnv cannot set {attr_name!r} on single environments.")
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> Any:
-        """Not supported: the environments are one object."""
+        """What HER asks for: "compute_reward" of goals and infos, the same for everyone. No other
+        method: the environments are one object.
+
+        Raises:
+            NoGoalError: the task has no goals apart from its observation.
+        """
+        if method_name == "compute_reward":
+            reward = self.env.compute_reward(*args, **kwargs)
+            return [reward] * len(list(self._get_indices(indices)))
         raise ConfigError(f"HRCVecEnv cannot call {method_name!r} on single environments.")
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:

@@ -11,12 +11,11 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from hrc_env import metrics, observations, rewards, room, step
 from hrc_env.belief import Belief, estimated_separation
 from hrc_env.config import Settings
-from hrc_env.control import joint_command, n_actions, opening_m
+from hrc_env.control import joint_command, n_actions
 from hrc_env.core.batching import State, Stateful, picked, rows, write_rows
 from hrc_env.core.errors import ConfigError, check_shape
 from hrc_env.core.kernels import ahead
@@ -31,10 +30,11 @@ from hrc_env.pipeline.sensor_input import SensorInput, TrueSensorInput
 from hrc_env.rewards import RewardConfig
 from hrc_env.safety.shield import shielded
 from hrc_env.scene import handling
-from hrc_env.scene.build import Scene, build
+from hrc_env.scene.build import build
 from hrc_env.scene.physics import Physics
 from hrc_env.scene.rigs import findings
-from hrc_env.step import Info, StepResult
+from hrc_env.step import Info, Observation, StepResult
+from hrc_env.tasks import goal
 from hrc_env.tracking import oracle
 from hrc_env.worker.body import pool, stack, worker_capsules, worker_truth
 
@@ -89,17 +89,18 @@ class Simulation(Stateful):
         if perception in CAMERA_LEVELS:
             for finding in findings(self.scene):
                 warnings.warn(finding, stacklevel=3)
-        self.settings = _recorded(batch, settings, self.scene)
+        self.settings = settings.recorded(batch, self.scene)
         self.chain, n_joints = self.scene.chain, self.scene.chain.n_joints
         self._spread_rad = np.array(config.start_spread_rad or settings.robot.spread_rad)
         check_shape("start_spread_rad", self._spread_rad.shape, (n_joints,), "one a joint")
-        self._grips = settings.robot.hand is not None
+        self._grips = settings.robot.grips
         self.n_actions = n_actions(settings.control, self.chain, self._grips)
         n_slides = int(self.chain.slides.sum())
         self.place = self.task.survey(self.scene.map, config.task)
         sizes = observations.Sizes(
             n_joints - n_slides, self.n_actions, most, len(config.forecast_s), config.uncertainty,
-            int(self._grips), len(self.scene.objects.names), n_slides,
+            int(self._grips), int(settings.robot.hand is not None), len(self.scene.objects.names),
+            n_slides,
         )  # fmt: skip
         self.layout = observations.layout(self.terms, sizes)
         self.physics = Physics(self.scene, batch)
@@ -142,7 +143,7 @@ class Simulation(Stateful):
         self._expose(ids, motion, truth)
         estimates = self._perceive(ids)
         belief = self._believed(ids, world, estimates)
-        observation = observations.observe(belief, self.layout, self.terms)
+        observation = self._observed(belief)
         identities = metrics.no_identities(*self.present[ids].shape)
         info = {
             **step.no_cost(len(ids)),
@@ -161,20 +162,23 @@ class Simulation(Stateful):
             self.motion, self.streams["motion"], config.scene.sim_dt, config.n_substeps
         )
         far = self.separation_m > CLOSING_M_S * config.ctrl_dt
-        grip = self.scene.grip
-        opening = None if grip is None else opening_m(self.action, grip.open_m)
-        q_path = self.physics.step(command, path, far, opening)
+        if self.task.effects is not None:
+            self.physics.apply(self.task.effects(self.task_state, config.task))
+        grip = self.action[:, -1] if self._grips else None
+        q_path = self.physics.step(command, path, far, grip)
         truth = worker_truth(self.bodies, motion)
         self._expose(self._everyone, motion, truth)
         estimates = self._perceive(self._everyone)
         n = self.chain.n_joints
         robot, arm = chains.robot_along(self.chain, q_path[..., :n], self.physics.qd)
         world = handling.world_of(self.physics, self._everyone, robot)
-        world, arm = handling.loaded(self.scene, world, arm, q_path)
+        world, arm = handling.loaded(self.scene, world, arm, q_path, self._loads)
         self._measure(self._everyone, world)
         robot = world.robot
         seen_world = robot.capsules_world[:, self.scene.watched, 1]
-        generator.watch(self.motion, seen_world, motion, config.ctrl_dt)
+        cue = None if self.task.cue is None else self.task.cue(self.task_state)
+        generator.watch(self.motion, seen_world, motion, config.ctrl_dt, cue)
+        world = replace(world, deeds=generator.deeds(self.motion))
         workers = worker_capsules(self.bodies, path, motion.body)
         cost = metrics.cost(
             arm, robot.capsule_radius_m, workers, truth.capsule_radius_m, config.cost
@@ -199,7 +203,7 @@ class Simulation(Stateful):
         over = (cost.contact > 0) & config.cost.contact_terminates
         if self.task.over is not None:
             over |= self.task.over(progress)
-        observation = observations.observe(belief, self.layout, self.terms)
+        observation = self._observed(belief)
         return StepResult(observation, rewards.total(terms, self.batch), over, info)
 
     def set_reward(self, weights: RewardConfig) -> None:
@@ -244,13 +248,18 @@ class Simulation(Stateful):
         """What every robot believes now."""
         robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
         world, arm = handling.world_of(self.physics, self._everyone, robot), robot.capsules_world
-        world, _ = handling.loaded(self.scene, world, arm[:, None], self.physics.qpos[:, None])
+        qpos = self.physics.qpos[:, None]
+        world, _ = handling.loaded(self.scene, world, arm[:, None], qpos, self._loads)
         return self._believed(self._everyone, world, self.estimates)
 
     def markers(self, b: int) -> Points3:
         """(M, 3) what the task of environment `b` has to show [m]."""
         view = self.task.view(self.task_state, np.array([b]), self.config.task)
         return self.task.markers(view)[0]
+
+    @property
+    def _loads(self) -> Bools | None:
+        return None if self.task.loads is None else self.task.loads(self.task_state)
 
     def _starting_angles(self, ids: Ints) -> Floats:
         """(len(ids), N) angles near home, unless the task says where robots start."""
@@ -312,9 +321,14 @@ class Simulation(Stateful):
             forecast=tuple(later),
         )
 
+    def _observed(self, belief: Belief) -> Observation:
+        """What robots see, and their goals if the task sets them apart."""
+        flat, apart = observations.observe(belief, self.layout, self.terms), self.task.goal
+        return flat if apart is None else {**goal.parts(apart, belief), observations.FLAT: flat}
+
     def _reward_terms(self, belief: Belief, progress: Any, previous: Floats) -> dict[str, Floats]:
         """(B,) every term of the reward: the task's, then what all tasks share."""
-        own, shared = self.task.rewards, rewards.SHARED_TERMS
+        own, shared = self.task.own_rewards, rewards.SHARED_TERMS
         return {
             **rewards.evaluated(own, belief, progress, previous, self.config.task),
             **rewards.evaluated(shared, belief, progress, previous, self.reward_weights),
@@ -329,27 +343,3 @@ class Simulation(Stateful):
             **step.worker_info(activity[ids], body[ids], self.bodies.names),
             **step.miscalibration_info(self.settings["cameras"], self.pipeline.suspected(ids)),
         }
-
-
-def _recorded(batch: int, settings: Settings, scene: Scene) -> dict[str, Any]:
-    """What a state must have been taken with to be set."""
-    fewest, most = settings.n_workers
-    return {
-        "batch": batch, "task": settings.task.id, "perception": settings.perception,
-        "estimator": settings.estimator.name, "scene": settings.scene,
-        "robot": settings.robot.name, "cameras": tuple(camera.name for camera in scene.cameras),
-        "n_workers": (fewest, most) if fewest < most else most, "control": settings.control,
-        "config": settings.config,
-    }  # fmt: skip
-
-
-def checked_action(action: ArrayLike, shape: tuple[int, ...]) -> Floats:
-    """Actions as float64, clipped to [-1, 1]; `ConfigError` for other shapes or no numbers."""
-    try:
-        values = np.asarray(action, np.float64)
-    except (TypeError, ValueError) as error:
-        raise ConfigError(f"action must be numbers of shape {shape}, got {action!r}.") from error
-    check_shape("action", values.shape, shape, "(environments,) joint or tool velocities")
-    if not np.isfinite(values).all():
-        raise ConfigError(f"action must be finite numbers in [-1, 1], got {values}.")
-    return np.minimum(np.maximum(values, -1.0), 1.0)

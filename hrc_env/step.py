@@ -18,6 +18,8 @@ from hrc_env.motion import generator
 Info = dict[str, NDArray[Any]]
 """Named values (B,): numbers, NaN where an environment has none in this step; or tuples of words,
 as objects."""
+Observation = NDArray[np.float32] | dict[str, NDArray[np.float32]]
+"""(B, n), or such arrays by name where goals stand apart (`hrc_env.tasks.goal`)."""
 FLAGS = ("is_success",)
 """Values that are true or false."""
 ACTIVITY = "worker/activity"
@@ -33,8 +35,7 @@ MISCALIBRATED = "perception/miscalibrated"
 class StepResult:
     """What a step or a reset gives, per environment."""
 
-    observation: NDArray[np.float32]
-    """(B, n)."""
+    observation: Observation
     reward: Floats
     """(B,)."""
     terminated: Bools
@@ -56,8 +57,16 @@ def joined(results: Sequence[StepResult]) -> StepResult:
         return results[0]
     parts = zip(*((r.observation, r.reward, r.terminated) for r in results), strict=True)
     info = {name: np.concatenate([each.info[name] for each in results]) for name in results[0].info}
-    observation, reward, terminated = map(np.concatenate, parts)
-    return StepResult(observation, reward, terminated, info)
+    observations, *others = parts
+    reward, terminated = map(np.concatenate, others)
+    return StepResult(_joined(observations), reward, terminated, info)
+
+
+def _joined(parts: Sequence[Any]) -> Any:
+    """Observations one after the other."""
+    if not isinstance(parts[0], dict):
+        return np.concatenate(parts)
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 def cost_info(cost: metrics.Cost, present: Bools) -> Info:

@@ -33,6 +33,9 @@ def write_rows(record: object, ids: Any, part: object) -> None:
     """Write a record of rows back into rows `ids` (integers, a mask, `...`) of a record."""
     if isinstance(record, np.ndarray):
         record[ids] = part
+    if isinstance(record, dict):
+        for name, array in record.items():
+            write_rows(array, ids, part[name])  # type: ignore[index]
     for name in _names(type(record)):
         write_rows(getattr(record, name), ids, getattr(part, name))
 
@@ -41,6 +44,8 @@ def mapped(record: RecordT, change: Callable[[Any], Any]) -> RecordT:
     """A (nested) record of the same kind with `change` applied to every array."""
     if isinstance(record, np.ndarray):
         return change(record)
+    if isinstance(record, dict):
+        return type(record)((name, mapped(part, change)) for name, part in record.items())
     names = _names(type(record))
     values = [mapped(getattr(record, name), change) for name in names]
     return type(record)(*values) if names else record

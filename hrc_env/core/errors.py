@@ -39,6 +39,10 @@ class ConfigError(HRCError, ValueError):
     """A setting, name, shape or value that cannot work, with what would."""
 
 
+class NoGoalError(ConfigError, AttributeError):
+    """A reward by goals is asked for of a task that has none. Who asks with `hasattr` hears so."""
+
+
 class DownloadError(HRCError, RuntimeError):
     """Something that is fetched once could not be fetched, or is not what it should be."""
 

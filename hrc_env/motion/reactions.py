@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Floats
+from hrc_env.core.typing import Bools, Floats
 from hrc_env.motion import state as st
 from hrc_env.motion.anatomy import CHEST, HAND, HEAD, LEFT, SIDE_STRIDE
 from hrc_env.motion.state import WORKER, Worker, Workers
@@ -56,6 +56,18 @@ def notice(
                     me.acts_at = me.clock_s + me.delay_s
         for k, i in np.ndindex(me.robot_world.shape):
             me.robot_world[k, i] = robot_world[b, k, i]
+
+
+@kernel
+def attend(cue: Bools, workers: Workers) -> None:
+    """Tell everybody whether what they wait for has come, (B,): who is at it halts until it has."""
+    for b, w in np.ndindex(workers.shape):
+        me = workers[b, w]
+        me.cued = cue[b]
+        if me.activity == st.SCREW:
+            ready = me.out_at + me.take_s
+            works = ready < me.time_s < ready + me.out_s + me.hold_s
+            me.pace_wished = 0.0 if works and not me.cued else 1.0
 
 
 @kernel

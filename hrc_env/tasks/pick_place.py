@@ -8,12 +8,13 @@ import numpy as np
 from hrc_env.belief import Belief
 from hrc_env.core.errors import ConfigError, check_fields, needed
 from hrc_env.core.records import ObjectState, World
-from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records, Rngs
+from hrc_env.core.things import Things
+from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records
 from hrc_env.geometry.rotations import matrix
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm
 from hrc_env.tasks import LONGER
-from hrc_env.tasks.task import Task
+from hrc_env.tasks.task import Rngs, Task
 from hrc_env.worker.body import assets_dir
 
 STUDS = 3
@@ -31,8 +32,8 @@ ROW_M, ASIDE_M, TURN_RAD = 0.14, 0.02, 0.2
 
 
 @dataclass(frozen=True, slots=True)
-class PickPlaceConfig:
-    """What counts as placed, and what that is worth."""
+class PlacedConfig:
+    """What counts as placed."""
 
     tolerance_m: float = 0.01
     """A piece is in its place when its middle is nearer to it than this [m],"""
@@ -40,6 +41,15 @@ class PickPlaceConfig:
     """turned by less than this, 5 degrees [rad],"""
     resting_m_s: float = 0.02
     """slower than this [m/s], and let go."""
+
+    def __post_init__(self) -> None:
+        check_fields(self, "be positive", "tolerance_m", "tolerance_rad", "resting_m_s")
+
+
+@dataclass(frozen=True, slots=True)
+class PickPlaceConfig(PlacedConfig):
+    """What counts as placed, and what that is worth."""
+
     reward: str = "dense"
     """"dense": coming nearer counts, too; "sparse": only pieces in their places."""
     progress_per_m: float = 5.0
@@ -48,7 +58,7 @@ class PickPlaceConfig:
     """Reward for a piece that is placed; taken off again if it leaves its place."""
 
     def __post_init__(self) -> None:
-        check_fields(self, "be positive", "tolerance_m", "tolerance_rad", "resting_m_s")
+        PlacedConfig.__post_init__(self)
         if self.reward not in ("dense", "sparse"):
             raise ConfigError(
                 f'PickPlaceConfig.reward must be "dense" or "sparse", got {self.reward!r}.'
@@ -84,9 +94,9 @@ def places_world() -> Points3:
     return MOUNT_WORLD + np.array(PLACES_M)
 
 
-def things(config: PickPlaceConfig) -> str:
-    """Table, rack and pieces as MJCF."""
-    return Path(assets_dir() / "tasks" / "pick_place.xml").read_text()
+def things(config: PlacedConfig) -> Things:
+    """Table, rack and pieces."""
+    return Things(Path(assets_dir() / "tasks" / "pick_place.xml").read_text())
 
 
 def init(batch: int) -> Records:
@@ -94,7 +104,7 @@ def init(batch: int) -> Records:
     return np.zeros(batch, PICK_PLACE)
 
 
-def reset(state: Records, ids: Ints, rngs: Rngs, world: World, config: PickPlaceConfig) -> None:
+def reset(state: Records, ids: Ints, rngs: Rngs, world: World, config: PlacedConfig) -> None:
     """Lay the pieces of environments `ids` out anew."""
     state[ids] = np.zeros((), PICK_PLACE)
     x, y = TABLE_M
@@ -112,14 +122,12 @@ def reset(state: Records, ids: Ints, rngs: Rngs, world: World, config: PickPlace
     state["potential_m"][ids] = -_left_m(studs, world.robot.tool_world, none)
 
 
-def poses(state: Records, ids: Ints, config: PickPlaceConfig) -> Floats:
+def poses(state: Records, ids: Ints, config: PlacedConfig) -> Floats:
     """(n, 3, 7) where the pieces lie at first."""
     return state["poses"][ids]
 
 
-def advance(
-    state: Records, rngs: Rngs, world: World, dt_s: float, config: PickPlaceConfig
-) -> Records:
+def advance(state: Records, rngs: Rngs, world: World, dt_s: float, config: PlacedConfig) -> Records:
     """Judge where the pieces are; (B,) of `PICK_PLACE_STEP`."""
     objects = needed(world.objects, "A loose object")
     step = np.zeros(len(state), PICK_PLACE_STEP)
@@ -134,7 +142,7 @@ def advance(
     return step
 
 
-def in_place(objects: ObjectState, config: PickPlaceConfig) -> Bools:
+def in_place(objects: ObjectState, config: PlacedConfig) -> Bools:
     """(B, 3) which pieces rest in their places, let go."""
     off_m = np.linalg.norm(objects.position_world - places_world(), axis=-1)
     R = matrix(objects.quaternion_wxyz)
@@ -154,7 +162,7 @@ def _left_m(studs_world: Points3, tool_world: Points3, placed: Bools) -> Floats:
     return np.where(placed, 0.0, away_m).sum(1) + reach_m
 
 
-def view(state: Records, ids: Ints, config: PickPlaceConfig) -> PickPlaceView:
+def view(state: Records, ids: Ints, config: PlacedConfig) -> PickPlaceView:
     """What robots `ids` know of their task."""
     return PickPlaceView(state["placed"][ids].copy(), places_world())
 

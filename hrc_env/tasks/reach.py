@@ -14,13 +14,11 @@ from hrc_env.tasks.task import Rngs, Task, World
 
 
 @dataclass(frozen=True, slots=True)
-class ReachConfig:
-    """Where goals appear, what counts as reaching one, and what that is worth."""
+class TargetConfig:
+    """Where goals of the tool appear, and what counts as reaching one."""
 
     radius_m: float = 0.05
     """A goal is reached when the tool point is nearer than this [m]."""
-    time_limit_s: float = 4.0
-    """A goal not reached after this long [s] is missed, and the next one appears."""
     base_xy_world: tuple[float, float] = (-0.75, 0.0)
     """Axis of the robot's first joint [m]; goals are drawn round it."""
     distance_m: tuple[float, float] = (0.5, 0.95)
@@ -29,17 +27,30 @@ class ReachConfig:
     """Range of the goals' direction from world +X, seen from that axis [rad]."""
     height_m: tuple[float, float] = (0.8, 1.45)
     """Range of the goals' height above the floor [m]."""
+
+    def __post_init__(self) -> None:
+        for name in ("distance_m", "azimuth_rad", "height_m"):
+            low, high = getattr(self, name)
+            if not low < high:
+                field = f"{type(self).__name__}.{name}"
+                raise ConfigError(f"{field} must be (low, high), got {(low, high)}.")
+        check_fields(self, "be positive", "radius_m")
+
+
+@dataclass(frozen=True, slots=True)
+class ReachConfig(TargetConfig):
+    """Where goals appear, what counts as reaching one, and what that is worth."""
+
+    time_limit_s: float = 4.0
+    """A goal not reached after this long [s] is missed, and the next one appears."""
     progress_per_m: float = 10.0
     """Reward for every metre that the tool comes nearer to its goal."""
     goal_bonus: float = 5.0
     """Reward for reaching a goal."""
 
     def __post_init__(self) -> None:
-        for name in ("distance_m", "azimuth_rad", "height_m"):
-            low, high = getattr(self, name)
-            if not low < high:
-                raise ConfigError(f"ReachConfig.{name} must be (low, high), got {(low, high)}.")
-        check_fields(self, "be positive", "radius_m", "time_limit_s")
+        TargetConfig.__post_init__(self)
+        check_fields(self, "be positive", "time_limit_s")
 
 
 REACH = np.dtype(
@@ -134,17 +145,22 @@ def _judge(tool_world, dt_s, radius_m, time_limit_s, state, step):
 def _new_goals(
     state: Records, ids: Ints, rngs: Rngs, tool_world: Points3, config: ReachConfig
 ) -> None:
-    x, y = config.base_xy_world
     for b, tool in zip(ids.tolist(), tool_world.tolist(), strict=True):
-        limits = config.distance_m, config.azimuth_rad, config.height_m
-        distance_m, azimuth_rad, z = (
-            low + (high - low) * share
-            for (low, high), share in zip(limits, rngs[b].random(3).tolist(), strict=True)
-        )
-        goal = x + distance_m * math.cos(azimuth_rad), y + distance_m * math.sin(azimuth_rad), z
+        goal = drawn_goal(rngs[b], config)
         state["goal_world"][b] = goal
         state["goal_age_s"][b] = 0.0
         state["distance_m"][b] = math.dist(goal, tool)
+
+
+def drawn_goal(rng: np.random.Generator, config: TargetConfig) -> tuple[float, float, float]:
+    """A place for the tool [m]."""
+    x, y = config.base_xy_world
+    limits = config.distance_m, config.azimuth_rad, config.height_m
+    distance_m, azimuth_rad, z = (
+        low + (high - low) * share
+        for (low, high), share in zip(limits, rng.random(3).tolist(), strict=True)
+    )
+    return x + distance_m * math.cos(azimuth_rad), y + distance_m * math.sin(azimuth_rad), z
 
 
 TASK = Task(

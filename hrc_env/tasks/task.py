@@ -10,12 +10,14 @@ from typing import Any
 import numpy as np
 
 from hrc_env import observations, rewards
-from hrc_env.core.errors import ConfigError, check_shape, unknown
-from hrc_env.core.records import Grounds, World
+from hrc_env.core.errors import ConfigError, NoGoalError, check_shape, unknown
+from hrc_env.core.records import Effects, Grounds, World
+from hrc_env.core.things import NOTHING, Things
 from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, Points3
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm
 from hrc_env.tasks import BUILT_IN, EPISODE_STEPS
+from hrc_env.tasks.goal import Goal, reward_terms
 
 _ID = re.compile(r"[A-Za-z]\w*-v\d+")
 Rngs = Sequence[np.random.Generator]
@@ -74,16 +76,25 @@ class Task:
     `ConfigError` where there is no room for the task."""
     start: Callable[[Rngs, Any, Any], JointAngles] | None = None
     """(rngs, place, config) -> (n, N) where robots begin; None: near their pose at rest."""
-    things: Callable[[Any], str] = lambda config: ""
-    """(config) -> MJCF of what the task puts there, from the middle of the robot's foot on [m]:
-    bodies of boxes, loose with a free joint and contype 16, fixed with contype 1."""
+    things: Callable[[Any], Things] = lambda config: NOTHING
+    """(config) -> what the task puts there."""
     poses: Callable[[Any, Ints, Any], Floats] | None = None
     """(state, ids, config) -> (n, O, 7) where what is loose lies when `reset` is done: place in
     the world [m] and quaternion; None: as in the MJCF."""
+    loads: Callable[[Any], Bools] | None = None
+    """(state) -> (B, O) which objects count as part of the robot while it holds them: in cost,
+    separations and belief; None: all."""
+    cue: Callable[[Any], Bools] | None = None
+    """(state) -> (B,) whether workers may go on with what waits for the task (`Job.waits`)."""
+    effects: Callable[[Any, Any], Effects] | None = None
+    """(state, config) -> what is done to objects until the next step; None: nothing."""
     over: Callable[[Any], Bools] | None = None
     """(progress) -> (B,) whether there is nothing more to do; None: there always is."""
     defaults: Mapping[str, Any] = field(default_factory=dict)
     """Settings of `HRCConfig` that differ from its defaults, nested, as `config=` takes them."""
+
+    goal: Goal | None = None
+    """What is wanted, where it stands apart from the observation, as HER asks for."""
 
     @property
     def observation_terms(self) -> tuple[ObservationTerm, ...]:
@@ -91,9 +102,14 @@ class Task:
         return (*observations.ROBOT_TERMS, *self.observations, *observations.SHARED_TERMS)
 
     @property
+    def own_rewards(self) -> tuple[RewardTerm, ...]:
+        """The task's part of the reward, first the goal's if there is one."""
+        return (*reward_terms(self.goal), *self.rewards)
+
+    @property
     def reward_terms(self) -> tuple[RewardTerm, ...]:
         """All of the reward: the task's, and those that every task shares."""
-        return (*self.rewards, *rewards.SHARED_TERMS)
+        return (*self.own_rewards, *rewards.SHARED_TERMS)
 
     def counts(self, info: Mapping[str, Any]) -> dict[str, Any]:
         """What an info says of attempts, in words: {"goals reached": 3.0, "goals missed": 1.0}."""
@@ -122,6 +138,18 @@ def task_called(task: str | Task) -> Task:
     return TASKS[task]
 
 
+def goal_of(task: Task) -> Goal:
+    """The goal of a task, or `NoGoalError`."""
+    if task.goal is None:
+        known = [each for each in dict.fromkeys((*BUILT_IN, *TASKS)) if task_called(each).goal]
+        raise NoGoalError(
+            f"{task.id} has no goals apart from its observation, so that nothing can be judged by "
+            f"another goal (compute_reward, HER). {', '.join(known)} have: choose one of these, or "
+            "a learner without HER."
+        )
+    return task.goal
+
+
 def check_task(task: Task) -> None:
     """Raise `ConfigError` for what is missing or wrong in a task.
 
@@ -144,6 +172,8 @@ def check_task(task: Task) -> None:
         name, times = Counter(term.name for term in terms).most_common(1)[0]
         if times > 1:
             raise ConfigError(f"{task.id}: there is a term {name!r} already; choose another name.")
+    if task.goal is not None and not isinstance(task.goal, Goal):
+        raise ConfigError(f"{task.id}: goal must be a Goal, got {type(task.goal).__name__}.")
     _check_state(task)
 
 

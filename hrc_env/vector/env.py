@@ -20,14 +20,16 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from hrc_env.config import settle
+from hrc_env.control import checked_action
+from hrc_env.core.batching import copied, mapped, one, write_rows
 from hrc_env.core.errors import ConfigError, unknown, whole
 from hrc_env.core.machine import n_cores
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.env import EnvBase, spaces
 from hrc_env.render.views import PICTURE_SIZE, Views
 from hrc_env.rewards import RewardConfig
-from hrc_env.simulation import Simulation, checked_action
-from hrc_env.step import StepResult
+from hrc_env.simulation import Simulation
+from hrc_env.step import Observation, StepResult
 from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import task_called
 from hrc_env.vector.infos import InfoTable, table
@@ -41,14 +43,13 @@ from hrc_env.vector.options import (
 )
 from hrc_env.vector.shards import Shards
 
-Observations = NDArray[np.float32]
 PROCESSES_PER_CORE = 2
 """More processes that render and run networks only wait for each other."""
-Step = tuple[Observations, NDArray[np.float64], Bools, Bools, dict[str, Any]]
+Step = tuple[Observation, NDArray[np.float64], Bools, Bools, dict[str, Any]]
 
 
 class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
-    EnvBase, VectorEnv[Observations, Observations, NDArray[Any]]
+    EnvBase, VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]
 ):
     """`num_envs` robots, each beside a worker of its own, stepped at once.
 
@@ -97,14 +98,14 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         self.max_episode_steps = time_limit(limit)
         self._steps = np.zeros(self.num_envs, int)
         self._ended = np.zeros(self.num_envs, bool)
-        self._observation: Observations | None = None
+        self._observation: Observation | None = None
 
     def reset(
         self,
         *,
         seed: int | Sequence[int | None] | None = None,
         options: Mapping[str, Any] | None = None,
-    ) -> tuple[Observations, dict[str, Any]]:
+    ) -> tuple[Observation, dict[str, Any]]:
         """Start episodes.
 
         Args:
@@ -130,10 +131,10 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         fresh = self._begin(ids)
         self._steps[ids] = elapsed_steps[ids]
         if self._observation is None:
-            self._observation = np.empty_like(fresh.observation)
-        self._observation[ids] = fresh.observation
+            self._observation = mapped(fresh.observation, np.empty_like)
+        write_rows(self._observation, ids, fresh.observation)
         self._ended = self._ended & ~mask
-        return self._observation.copy(), table(fresh, ids, self.num_envs).arrays(mask)
+        return copied(self._observation), table(fresh, ids, self.num_envs).arrays(mask)
 
     def step(self, actions: NDArray[np.float32]) -> Step:
         """One control step of every environment; actions (num_envs, n) in [-1, 1].
@@ -142,7 +143,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         these start anew instead. Infos are arrays (num_envs,), each with a mask "_name".
         """
         result = self.shards.step(self._checked(actions))
-        observation = result.observation.copy()
+        observation = copied(result.observation)
         info = table(result, slice(None), self.num_envs)
         reward, terminated, over = result.reward.copy(), result.terminated.copy(), self._ended
         self._steps += 1
@@ -157,7 +158,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
             ended = np.zeros_like(ended)
         self._observation, self._ended = observation, ended
         infos = {**finals, **info.arrays(np.ones_like(ended))}
-        return observation.copy(), reward, terminated, truncated, infos
+        return copied(observation), reward, terminated, truncated, infos
 
     def set_reward(self, weights: RewardConfig) -> None:
         """Weigh the reward's terms so from the next step on, in every environment."""
@@ -197,11 +198,11 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         self._steps[ids] = 0
         return self.shards.reset(ids, [self._streams[k][0] for k in ids.tolist()])
 
-    def _restart(self, who: Bools, observation: Observations, info: InfoTable) -> None:
+    def _restart(self, who: Bools, observation: Observation, info: InfoTable) -> None:
         """Start environments `who` (B,) anew and write what they see over what they saw."""
         ids = np.flatnonzero(who)
         fresh = self._begin(ids)
-        observation[ids] = fresh.observation
+        write_rows(observation, ids, fresh.observation)
         info.write(ids, fresh)
 
     def _checked(self, actions: Any) -> Floats:
@@ -221,11 +222,11 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         return checked_action(actions, self._action_shape)
 
 
-def _finals(observation: Observations, info: InfoTable, who: Bools) -> dict[str, Any]:
+def _finals(observation: Observation, info: InfoTable, who: Bools) -> dict[str, Any]:
     """The last observations and infos of the episodes of environments `who` (B,)."""
     last = np.full(len(who), None, object)
     for b in np.flatnonzero(who):
-        last[b] = observation[b].copy()
+        last[b] = copied(one(observation, int(b)))
     final_info = {"final_info": info.arrays(who), "_final_info": who.copy()}
     return {"final_obs": last, "_final_obs": who.copy(), **final_info}
 

@@ -1,0 +1,121 @@
+"""Goals that stand apart from the observation, so that what was done can be judged by another one.
+
+Hindsight experience replay asks for this (HER; Andrychowicz et al. 2017, arXiv:1707.01495): the
+reward must follow from what is achieved and what is desired, for any number of pairs at once.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hrc_env.belief import Belief
+from hrc_env.core.errors import ConfigError, check_shape
+from hrc_env.core.typing import Floats, Tensor
+from hrc_env.rewards import RewardTerm
+
+ACHIEVED, DESIRED = "achieved_goal", "desired_goal"
+"""The parts of an observation beside the flat one, as the field calls them."""
+TERM = "goal"
+"""The reward's term that follows from a goal."""
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """What a task wants, apart from its observation. Functions are over batches (B, ...).
+
+    The observation must not tell the goal: a transition that is judged by another goal would tell
+    the old one.
+    """
+
+    size: int
+    """How many numbers it is."""
+    bound: float
+    """Largest magnitude of each; larger values are clipped."""
+    achieved: Callable[[Belief], Floats]
+    """(belief) -> (B, size) what is so far, as the robot knows it."""
+    desired: Callable[[Belief], Floats]
+    """(belief) -> (B, size) what is to be."""
+    reward: Callable[[Floats, Floats, Any], Floats]
+    """(achieved (..., size), desired (..., size), the task's settings) -> (...)."""
+    doc: str
+    """A sentence: what the reward is."""
+
+
+def parts(goal: Goal, now: Belief) -> dict[str, Tensor]:
+    """(B, size) float32 what the observation holds of a goal, by name."""
+    wanted = {ACHIEVED: goal.achieved(now), DESIRED: goal.desired(now)}
+    for name, value in wanted.items():
+        check_shape(name, np.shape(value), (len(now.action), goal.size), "its `size`")
+    clipped = {k: np.clip(value, -goal.bound, goal.bound) for k, value in wanted.items()}
+    return {name: value.astype(np.float32) for name, value in clipped.items()}
+
+
+def reward_terms(goal: Goal | None) -> tuple[RewardTerm, ...]:
+    """The term of a goal, if there is one; it judges what the observation holds."""
+    if goal is None:
+        return ()
+
+    def function(now: Belief, step: Any, previous: Floats, config: Any) -> Floats:
+        held = parts(goal, now)
+        return goal.reward(held[ACHIEVED].astype(float), held[DESIRED].astype(float), config)
+
+    return (RewardTerm(TERM, goal.doc, function),)
+
+
+def judged(
+    goal: Goal,
+    achieved: ArrayLike,
+    desired: ArrayLike,
+    info: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None,
+    config: Any,
+    others: Sequence[str] = (),
+) -> Floats | float:
+    """The reward of achieving this when that is desired.
+
+    Args:
+        goal: of the task.
+        achieved: (size,) or (B, size).
+        desired: the same.
+        info: of the step: its entries "reward/..." of the `others` are added, so that the sum is
+            the step's reward, bit for bit; what it lacks counts nothing. Of many: one a pair, or
+            arrays by name as a vector environment has them.
+        config: settings of the task.
+        others: names of the reward's other terms, in their order.
+
+    Returns:
+        A number, or (B,).
+    """
+    pair = [_numbers(name, of) for name, of in ((ACHIEVED, achieved), (DESIRED, desired))]
+    if pair[0].shape != pair[1].shape or pair[0].ndim not in (1, 2):
+        raise ConfigError(
+            f"{ACHIEVED} and {DESIRED} must both have shape ({goal.size},) or (B, {goal.size}), "
+            f"got {pair[0].shape} and {pair[1].shape}."
+        )
+    check_shape(ACHIEVED, pair[0].shape[-1:], (goal.size,), "its last axis: entries of a goal")
+    value = np.zeros(pair[0].shape[:-1]) + goal.reward(pair[0], pair[1], config)
+    for name in others:
+        value = value + _told(info, f"reward/{name}", value.shape)
+    return value if value.ndim else float(value)
+
+
+def _numbers(name: str, given: ArrayLike) -> Floats:
+    values = np.asarray(given, float)
+    if not np.isfinite(values).all():
+        raise ConfigError(f"{name} must be finite numbers, got {values}.")
+    return values
+
+
+def _told(info: Any, name: str, shape: tuple[int, ...]) -> Floats:
+    """What infos say under a name, 0 where they say nothing."""
+    if info is None:
+        return np.zeros(shape)
+    if isinstance(info, Mapping):
+        told = np.asarray(info.get(name, 0.0), float)
+    else:
+        told = np.array([each.get(name, 0.0) for each in info], float)
+    if told.shape not in ((), shape):
+        check_shape(f"info[{name!r}]", told.shape, shape, "a value a pair of goals")
+    return told

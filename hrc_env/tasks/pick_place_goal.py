@@ -1,0 +1,65 @@
+"""Picking and placing with goals apart from the observation: the form that HER learns from."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hrc_env.belief import Belief
+from hrc_env.core.errors import check_fields, needed
+from hrc_env.core.typing import Floats
+from hrc_env.tasks import LONGER
+from hrc_env.tasks.goal import Goal
+from hrc_env.tasks.pick_place import STUDS, PlacedConfig
+from hrc_env.tasks.pick_place import TASK as PICK_PLACE
+from hrc_env.tasks.task import Task
+
+
+@dataclass(frozen=True, slots=True)
+class PickPlaceGoalConfig(PlacedConfig):
+    """What counts as placed in the end, and what the reward asks of places."""
+
+    goal_m: float = 0.02
+    """The reward counts a piece whose middle, as measured, is nearer to its place than this [m]."""
+
+    def __post_init__(self) -> None:
+        PlacedConfig.__post_init__(self)
+        check_fields(self, "be positive", "goal_m")
+
+
+def near(achieved: Floats, desired: Floats, config: PickPlaceGoalConfig) -> Floats:
+    """(...) minus the share of pieces that are not near where they are to be; 0 if all are.
+
+    Places of pieces are (..., 9); with one piece it would be 0 or -1.
+    """
+    off = (achieved - desired).reshape(*achieved.shape[:-1], STUDS, 3)
+    away = np.sqrt((off**2).sum(-1)) >= config.goal_m
+    return -away.sum(-1) / STUDS
+
+
+def _measured(now: Belief) -> Floats:
+    return needed(now.objects, "A loose object").position_world.reshape(-1, 3 * STUDS)
+
+
+def _places(now: Belief) -> Floats:
+    return np.broadcast_to(now.task.places_world.ravel(), (len(now.action), 3 * STUDS))
+
+
+TASK: Task = replace(
+    PICK_PLACE,
+    id="HRCPickPlaceGoal-v0",
+    says="Bring pieces of studs from a table to where they are asked for, beside a worker.",
+    config=PickPlaceGoalConfig,
+    observations=(),
+    rewards=(),
+    max_episode_steps=LONGER["HRCPickPlaceGoal-v0"],
+    over=None,
+    goal=Goal(
+        size=3 * STUDS,
+        bound=4.0,
+        achieved=_measured,
+        desired=_places,
+        reward=near,
+        doc="Minus the share of pieces that are not within `task.goal_m` of their places, as "
+        "measured.",
+    ),
+)

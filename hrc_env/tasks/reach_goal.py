@@ -1,0 +1,100 @@
+"""Reaching one goal, which stands apart from the observation: the form that HER learns from."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hrc_env.core.records import World
+from hrc_env.core.typing import Floats, Ints, Points3, Records
+from hrc_env.tasks import LONGER
+from hrc_env.tasks.goal import Goal
+from hrc_env.tasks.reach import TargetConfig, drawn_goal
+from hrc_env.tasks.task import Rngs, Task
+
+
+@dataclass(frozen=True, slots=True)
+class ReachGoalConfig(TargetConfig):
+    """Where the goal is, and what counts as reaching it."""
+
+
+REACH_GOAL = np.dtype(
+    [
+        ("goal_world", "f8", (3,)),  # [m]
+        ("there", "?"),  # whether the tool point is within the radius now
+    ],
+    align=True,
+)
+"""The task of one environment."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReachGoalView:
+    """What robots know of their task."""
+
+    goal_world: Points3
+    """(B, 3) [m]."""
+
+
+def init(batch: int) -> Records:
+    """(B,) of `REACH_GOAL`, to be filled by `reset`."""
+    return np.zeros(batch, REACH_GOAL)
+
+
+def reset(state: Records, ids: Ints, rngs: Rngs, world: World, config: ReachGoalConfig) -> None:
+    """Give environments `ids` a goal each."""
+    for b, tool_world in zip(ids.tolist(), world.robot.tool_world, strict=True):
+        goal_world = np.array(drawn_goal(rngs[b], config))
+        there = reached(tool_world, goal_world, config) == 0.0
+        state["goal_world"][b], state["there"][b] = goal_world, there
+
+
+def advance(
+    state: Records, rngs: Rngs, world: World, dt_s: float, config: ReachGoalConfig
+) -> Records:
+    """Judge where the tool is; a copy of the state."""
+    state["there"] = reached(world.robot.tool_world, state["goal_world"], config) == 0.0
+    return state.copy()
+
+
+def reached(achieved: Floats, desired: Floats, config: ReachGoalConfig) -> Floats:
+    """(...) 0 where places (..., 3) are nearer to each other than the radius, else -1."""
+    off_m = np.sqrt(((achieved - desired) ** 2).sum(-1))
+    return np.where(off_m < config.radius_m, 0.0, -1.0)
+
+
+def view(state: Records, ids: Ints, config: ReachGoalConfig) -> ReachGoalView:
+    """What robots `ids` know of their task."""
+    return ReachGoalView(state["goal_world"][ids])
+
+
+def info(state: Records) -> dict[str, Any]:
+    """Whether the tool is at its goal, (B,) each; what counts is where it is at the end."""
+    there = state["there"].astype(float)
+    return {"task/goals_reached": there, "task/goals_missed": 1 - there, "is_success": there.copy()}
+
+
+TASK = Task(
+    id="HRCReachGoal-v0",
+    says="Bring the tool to a goal and keep it there, in a volume shared with a worker.",
+    config=ReachGoalConfig,
+    init=init,
+    reset=reset,
+    advance=advance,
+    view=view,
+    observations=(),
+    rewards=(),
+    info=info,
+    achieved="task/goals_reached",
+    failed="task/goals_missed",
+    markers=lambda view: view.goal_world[:, None],
+    max_episode_steps=LONGER["HRCReachGoal-v0"],
+    goal=Goal(
+        size=3,
+        bound=4.0,
+        achieved=lambda now: now.robot.tool_world,
+        desired=lambda now: now.task.goal_world,
+        reward=reached,
+        doc="0 while the tool point is within `task.radius_m` of its goal, else -1.",
+    ),
+)
