@@ -100,8 +100,7 @@ def _hinges(now: Belief, values: Floats) -> Floats:
 
 def _slides(now: Belief, values: Floats) -> Floats:
     """Those that are of slides."""
-    assert now.robot.slides is not None  # or the term has no entries
-    return values[:, now.robot.slides]
+    return values[:, needed(now.robot.slides, "A slide")]
 
 
 def _hand(now: Belief) -> HandState:
@@ -133,16 +132,6 @@ ROBOT_TERMS: tuple[ObservationTerm, ...] = (
         "joint_velocity", lambda of: of.arm_joints, "rad/s", "base", 4.0, 1.0,
         "Velocity of each arm joint.",
         lambda now: _hinges(now, now.robot.qd),
-    ),
-    ObservationTerm(
-        "slide_position", lambda of: of.slides, "m", "world", 10.0, 5.0,
-        "Where each slide is: of a base that drives, x and y of its middle.",
-        lambda now: _slides(now, now.robot.q),
-    ),
-    ObservationTerm(
-        "slide_velocity", lambda of: of.slides, "m/s", "world", 4.0, 1.0,
-        "Velocity of each slide.",
-        lambda now: _slides(now, now.robot.qd),
     ),
     ObservationTerm(
         "tool_position", lambda of: 3, "m", "world", 4.0, 1.0,
@@ -181,6 +170,20 @@ ROBOT_TERMS: tuple[ObservationTerm, ...] = (
     ),
 )  # fmt: skip
 """The robot's own state and what it handles, which open the observation."""
+
+SLIDE_TERMS: tuple[ObservationTerm, ...] = (
+    ObservationTerm(
+        "slide_position", lambda of: of.slides, "m", "world", 10.0, 5.0,
+        "Where each slide is: of a base that drives, x and y of its middle.",
+        lambda now: _slides(now, now.robot.q),
+    ),
+    ObservationTerm(
+        "slide_velocity", lambda of: of.slides, "m/s", "world", 4.0, 1.0,
+        "Velocity of each slide.",
+        lambda now: _slides(now, now.robot.qd),
+    ),
+)  # fmt: skip
+"""What follows of a robot that drives."""
 
 SHARED_TERMS: tuple[ObservationTerm, ...] = (
     ObservationTerm(

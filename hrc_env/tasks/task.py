@@ -99,7 +99,8 @@ class Task:
     @property
     def observation_terms(self) -> tuple[ObservationTerm, ...]:
         """All of the observation, in its order: the robot, the task, the workers."""
-        return (*observations.ROBOT_TERMS, *self.observations, *observations.SHARED_TERMS)
+        slides = observations.SLIDE_TERMS if self.drives else ()
+        return (*observations.ROBOT_TERMS, *slides, *self.observations, *observations.SHARED_TERMS)
 
     @property
     def own_rewards(self) -> tuple[RewardTerm, ...]:
