@@ -18,7 +18,7 @@ from hrc_env.core.things import Things
 from hrc_env.core.typing import Bools, Capsules, Floats, Points3
 from hrc_env.geometry.rotations import turned
 from hrc_env.geometry.shapes import BOX, WIDTH, absent, shape
-from hrc_env.scene.primitives import OBJECT_BIT
+from hrc_env.scene.primitives import DECORATION, OBJECT_BIT
 from hrc_env.worker.props import placed
 
 PREFIX = "task/"
@@ -38,8 +38,11 @@ def add_things(spec: Any, things: Things, foot_world: Sequence[float]) -> None:
     at 3 m/s^2: 8 mm in 6 s; with MuJoCo's defaults 31)."""
     if things.mjcf:
         spec.option.cone, spec.option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 10.0
+        child = mujoco.MjSpec.from_string(things.mjcf)
+        for geom in (each for body in child.bodies if _is_free(body) for each in body.geoms):
+            geom.group = DECORATION  # what is solid stands still
         frame = spec.worldbody.add_frame(pos=list(foot_world))
-        spec.attach(mujoco.MjSpec.from_string(things.mjcf), prefix=PREFIX, frame=frame)
+        spec.attach(child, prefix=PREFIX, frame=frame)
 
 
 def add_welds(spec: Any, things: Things) -> None:
