@@ -41,7 +41,7 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     ),
     "train": (
         "hrc_env.cli.train", "Train",
-        "Train PPO, evaluate it on fixed seeds, draw its curve, film it.",
+        "Train a policy, evaluate it on fixed seeds, draw its curve, film it.",
     ),
     "bench": (
         "benchmarks.commands", "Bench",
