@@ -1,8 +1,9 @@
 """Behaviour cloning: a policy learns to do what the scripted agent would do where it goes itself.
 
 The scripted agents have no memory, so that they can be asked about any observation: rounds of
-DAgger (Ross et al. 2011, arXiv:1011.0686). In the first one the expert acts, disturbed; in the
-others the policy does, and the expert only says what it would do.
+DAgger (Ross et al. 2011, arXiv:1011.0686), in which policy and expert act by turns, so that what
+comes late in an episode is seen, too; in the first round it is the expert alone, now and then
+disturbed. What is learnt is always what the expert would do.
 """
 
 import math
@@ -35,16 +36,20 @@ FLAT = ""
 class CloningSettings:
     """How much is shown, and how it is learnt."""
 
-    rounds: int = 6
-    """Of gathering and learning; in the first the expert acts."""
-    passes: int = 6
-    """Over all that has been gathered, in each round."""
-    batch_size: int = 512
+    rounds: int = 4
+    """Of gathering and learning."""
+    steps: int = 3000
+    """Gradient steps of each round, over all that has been gathered; three times as many in the
+    last."""
+    batch_size: int = 256
     """Observations in a gradient step."""
     learning_rate: float = 1e-3
     """Adam's step size; it falls to nothing within each round."""
+    stretch: float = 25.0
+    """Mean number of steps after which policy and expert take turns in an environment."""
     disturbance: float = 0.3
-    """Standard deviation of what is added to the expert's own actions while it acts."""
+    """In the first round, what is added to the expert's actions where it is the policy's turn:
+    standard deviation."""
 
 
 def clone(
@@ -66,7 +71,7 @@ def clone(
         tick: told by how much the share that is done grew.
 
     Returns:
-        The mean squared error of actions after each round.
+        The mean error of actions after each round.
     """
     rng, simulation = np.random.default_rng(seed), env.simulation
     careful = Yielding() if simulation.settings["n_workers"] != 0 else None
@@ -74,51 +79,52 @@ def clone(
     n_steps = -(-n_episodes * env.env.max_episode_steps // (settings.rounds * env.num_envs))
     env.seed(seed)
     observation, shown, errors = env.reset(), [], []
+    alone = rng.random(env.num_envs) < 0.5
     for k in range(settings.rounds):
         for _ in range(n_steps):
             told = np.clip(teacher.act(observation), -1, 1)
             shown.append((_named(observation), told))
+            alone ^= rng.random(env.num_envs) < 1 / settings.stretch
             if k == 0:
-                acts = told + settings.disturbance * rng.standard_normal(told.shape)
+                own = told + settings.disturbance * rng.standard_normal(told.shape)
             else:
-                acts = policy.predict(observation, deterministic=True)[0]  # type: ignore[arg-type]
+                own = policy.predict(observation, deterministic=True)[0]  # type: ignore[arg-type]
+            acts = np.where(alone[:, None], own, told)
             env.step_async(np.clip(acts, -1, 1).astype(np.float32))
             observation = env.step_wait()[0]
             tick(1 / (settings.rounds * n_steps))
-        errors.append(_learn(policy, _stacked(shown), settings, rng))
+        n = settings.steps if k < settings.rounds - 1 else 3 * settings.steps
+        errors.append(_learn(policy, _stacked(shown), n, settings, rng))
     if isinstance(policy, ActorCriticPolicy):  # it tries no more than it is unsure of
-        policy.log_std.data.fill_(0.5 * math.log(max(errors[-1], LEAST_SPREAD**2)))
+        policy.log_std.data.fill_(math.log(max(errors[-1], LEAST_SPREAD)))
     return errors
 
 
 def _learn(
     policy: BasePolicy,
     shown: tuple[Arrays, NDArray[np.float32]],
+    n_steps: int,
     settings: CloningSettings,
     rng: np.random.Generator,
 ) -> float:
-    """Fit the mean action; the mean squared error of the last pass."""
+    """Fit the mean action in so many gradient steps; its mean error in the last tenth of them."""
     seen, told = shown
-    n, size = len(told), min(settings.batch_size, len(told))
-    per_pass = n // size
     optimiser = torch.optim.Adam(policy.parameters(), settings.learning_rate)
-    n_batches = settings.passes * per_pass
-    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, n_batches)
+    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, n_steps)
     policy.set_training_mode(True)
     losses = []
-    for _ in range(settings.passes):
-        order = rng.permutation(n)[: per_pass * size].reshape(per_pass, size)
-        for batch in order:
-            tensors: Any = {name: torch.as_tensor(part[batch]) for name, part in seen.items()}
-            meant = policy._predict(tensors.get(FLAT, tensors), deterministic=True)
-            loss = torch.nn.functional.mse_loss(meant, torch.as_tensor(told[batch]))
-            optimiser.zero_grad()
-            loss.backward()
-            optimiser.step()
-            schedule.step()
-            losses.append(loss.item())
+    for _ in range(n_steps):
+        batch = rng.integers(len(told), size=settings.batch_size)
+        tensors: Any = {name: torch.as_tensor(part[batch]) for name, part in seen.items()}
+        meant = policy._predict(tensors.get(FLAT, tensors), deterministic=True)
+        loss = torch.nn.functional.l1_loss(meant, torch.as_tensor(told[batch]))
+        optimiser.zero_grad()
+        loss.backward()
+        optimiser.step()
+        schedule.step()
+        losses.append(loss.item())
     policy.set_training_mode(False)
-    return float(np.mean(losses[-per_pass:]))
+    return float(np.mean(losses[-max(n_steps // 10, 1) :]))
 
 
 def _named(observation: Observation) -> Arrays:

@@ -43,6 +43,10 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
         "hrc_env.cli.train", "Train",
         "Train a policy, evaluate it on fixed seeds, draw its curve, film it.",
     ),
+    "record": (
+        "hrc_env.cli.record", "Record",
+        "Record an agent's episodes as a Minari data set.",
+    ),
     "bench": (
         "benchmarks.commands", "Bench",
         "Measure the estimators (tracking), the detector (perception), the environment (speed) or "

@@ -26,7 +26,8 @@ class Train(EnvironmentArguments):
     algorithm: str = "ppo"
     """ppo; or sac, which learns with hindsight (HER) where the task has goals apart."""
     her: bool | None = None
-    """With sac: whether transitions are judged by other goals, too; by default where there are."""
+    """With sac: True or False, whether transitions are judged by other goals, too; by default where
+    there are goals."""
     demonstrations: int = 0
     """Episodes of the scripted agent that the policy learns to imitate before it learns itself."""
     timesteps: int = 1_000_000
@@ -61,7 +62,7 @@ class Train(EnvironmentArguments):
         if self.her and self.algorithm != "sac":
             raise ConfigError(
                 f"--her judges what a replay buffer holds by other goals, and {self.algorithm} has "
-                "no such buffer: --algorithm sac --her, or leave it out."
+                "no such buffer: --algorithm sac --her True, or leave it out."
             )
         if self.perception == "pixels":
             raise ConfigError(
