@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.control import ControlConfig
+from hrc_env.core.records import Grounds
 from hrc_env.geometry.chains import SerialChain
 from hrc_env.observations import ObservationLayout
 
@@ -39,6 +40,8 @@ class EnvInfo:
     n_actions: int
     task: str
     """The task's id."""
+    map: Grounds
+    """Of the place: where things stand, and where people walk and work."""
     goal_size: int = 0
     """Entries of a goal that stands apart from the observation; 0: there is none."""
 
@@ -53,5 +56,6 @@ def env_info(simulation: "Simulation") -> EnvInfo:
         control_config=simulation.config.control,
         n_actions=simulation.n_actions,
         task=simulation.task.id,
+        map=simulation.scene.map,
         goal_size=0 if simulation.task.goal is None else simulation.task.goal.size,
     )

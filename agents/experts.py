@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 from hrc_env.core.errors import ConfigError
 from hrc_env.observations import split
 
+from .delivery import Deliverer
+from .drywall import BoardHolder
 from .env_info import Agent, EnvInfo, Observation
 from .pick_place import PickPlacer
 from .scripted import Reacher, Yielding
@@ -45,6 +47,8 @@ class GoalReader:
 EXPERTS: dict[str, Callable[[EnvInfo, Yielding | None], Agent]] = {
     "HRCReach-v0": Reacher,
     "HRCPickPlace-v0": PickPlacer,
+    "HRCDelivery-v0": Deliverer,
+    "HRCDrywall-v0": BoardHolder,
     "HRCReachGoal-v0": lambda *of: GoalReader(Reacher(*of), reach_goal),
     "HRCPickPlaceGoal-v0": lambda *of: GoalReader(PickPlacer(*of), pick_place_goal),
 }

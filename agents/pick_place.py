@@ -10,15 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.control import resolved_twist
 from hrc_env.observations import split
 
 from .env_info import EnvInfo, Observation
+from .manipulating import TURN_HZ, arm_action, round_the_foot
 from .scripted import Yielding, speed_m_s
 
 Array = NDArray[np.float64]
-GAIN_HZ, TURN_HZ = 4.0, 4.0
-"""Speed per distance, turn rate per angle [1/s]."""
 ABOVE_M, CLEAR_M = 0.16, 0.11
 """How high above pieces the tool travels; above this it may move sideways."""
 OVER_M, OVER_RAD, STILL_OVER_M = 0.006, 0.05, 0.015
@@ -27,9 +25,9 @@ AT_M, STILL_AT_M = 0.007, 0.014
 """So near to a piece's middle fingers close, and stay closed; so near to its place they open."""
 LYING = 0.8
 """Cosine of a piece's tilt below which it lies, and is left."""
-ROUND_RAD, ROUND_M = 0.35, 0.50
-"""A target farther round the robot than this is approached along a circle of this radius, which
-leaves the place in front to people."""
+ROUND_M = 0.50
+"""Round the robot the tool travels on a circle of this radius, which leaves the place in front to
+people."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +69,7 @@ class PickPlacer:
             nearest_m = terms["worker_separation"].min(axis=-1, initial=np.inf)
             share = self.yielding.share(nearest_m)[:, None]
             velocity, turn = velocity * share, turn * share
-        moves = self._arm_action(terms, velocity, turn)
+        moves = arm_action(self.env_info, terms, velocity, turn)
         action = np.concatenate([moves, grip[:, None]], axis=1)
         return action.reshape(*shape, -1).astype(np.float32)
 
@@ -95,36 +93,18 @@ class PickPlacer:
         upright = np.cross(seen.tool_axis, [0.0, 0.0, -1.0])
         turn = TURN_HZ * (upright + yaw[:, None] * [0.0, 0.0, 1.0])
         waits = ~held & closed
-        return np.where(waits[:, None], 0.0, self._round(seen.tool, target)), turn, 2.0 * closed - 1
+        return (
+            np.where(waits[:, None], 0.0, self._velocity(seen.tool, target)),
+            turn,
+            2.0 * closed - 1,
+        )
 
-    def _round(self, tool: Array, target: Array) -> Array:
-        """Velocity (n, 3) to targets from the tool: round the robot's axis where they are far round
-        it, else straight."""
-        here, there = tool[:, :2] - self._foot, tool[:, :2] + target[:, :2] - self._foot
-        radius, wanted = np.linalg.norm(here, axis=1), np.linalg.norm(there, axis=1)
-        cross = here[:, 0] * there[:, 1] - here[:, 1] * there[:, 0]
-        angle = np.arctan2(cross, (here * there).sum(1))
-        outward = here / np.maximum(radius, 1e-6)[:, None]
-        aside = np.stack([-outward[:, 1], outward[:, 0]], axis=1)
-        inward = np.minimum(wanted, ROUND_M) - radius
-        arc = (radius * angle)[:, None] * aside + inward[:, None] * outward
-        far = np.abs(angle) > ROUND_RAD
-        error = np.concatenate([np.where(far[:, None], arc, target[:, :2]), target[:, 2:]], axis=1)
+    def _velocity(self, tool: Array, target: Array) -> Array:
+        """Velocity (n, 3) to targets from the tool."""
+        error = round_the_foot(tool, target, self._foot, ROUND_M)
         length = np.linalg.norm(error, axis=1, keepdims=True)
         most = self.env_info.control_config.tool_speed_mps
         return error / np.maximum(length, 1e-9) * speed_m_s(length, most)
-
-    def _arm_action(self, terms: dict[str, Array], velocity: Array, turn: Array) -> Array:
-        """(n, A - 1) the arm's part of the action."""
-        info, config = self.env_info, self.env_info.control_config
-        twist = np.concatenate([velocity, turn], axis=1)
-        if info.control == "twist":
-            scale = np.repeat([config.tool_speed_mps, config.tool_turn_rad_s], 3)
-            return np.clip(twist / scale, -1.0, 1.0)
-        q = np.arctan2(terms["joint_angle_sin"], terms["joint_angle_cos"])
-        qd = resolved_twist(info.chain, q, twist, config)
-        action = qd / (config.joint_speed_share * info.chain.velocity_limit_rad_s)
-        return action / np.maximum(np.abs(action).max(1, keepdims=True), 1.0)
 
 
 def _seen(terms: dict[str, Array]) -> _Seen:

@@ -22,7 +22,14 @@ CASES: dict[str, dict[str, Any]] = {
     "tool": {"perception": "keypoints", "control": "tool"},
 }
 """What is played: keyword arguments of `gymnasium.make`."""
+NOT_OF = {"HRCDelivery-v0": ("tool",)}
+"""Cases that there are not of an id: a base that drives has no tool."""
 SEED = 11
+
+
+def cases_of(env_id: str) -> list[str]:
+    """What can be played of an id."""
+    return [case for case in CASES if case not in NOT_OF.get(env_id, ())]
 
 
 def play(env_id: str, case: str, n_steps: int, every: int = 1) -> dict[str, list[Any]]:

@@ -26,7 +26,7 @@ from hrc_env.perception.emulator import EmulatorConfig
 from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.rewards import RewardConfig
 from hrc_env.safety.shield import Shield, shield_called
-from hrc_env.scene.build import SceneConfig
+from hrc_env.scene.build import Scene, SceneConfig
 from hrc_env.scene.domain_randomization import APPEARANCES, AppearanceConfig
 from hrc_env.scene.handling import ObjectsConfig
 from hrc_env.scene.rigs import RIGS
@@ -120,7 +120,7 @@ PARTS = {
 """Arguments of an environment that are parts of the config: chosen often."""
 ARGUMENTS: dict[str, Any] = {
     "task": DEFAULT, "perception": "pixels", "estimator": "particle", "cameras": None,
-    "scene": "lab", "robot": None, "n_workers": 1, "control": "joint", "shield": None,
+    "scene": None, "robot": None, "n_workers": None, "control": "joint", "shield": None,
     "config": None, **dict.fromkeys(PARTS),
 }  # fmt: skip
 """The arguments of an environment that decide what happens in it (`HRCEnv`): their defaults."""
@@ -144,6 +144,17 @@ class Settings:
     shield: Shield | None
     config: HRCConfig
 
+    def recorded(self, batch: int, scene: Scene) -> dict[str, Any]:
+        """What a state must have been taken with to be set."""
+        fewest, most = self.n_workers
+        return {
+            "batch": batch, "task": self.task.id, "perception": self.perception,
+            "estimator": self.estimator.name, "scene": self.scene, "robot": self.robot.name,
+            "cameras": tuple(camera.name for camera in scene.cameras),
+            "n_workers": (fewest, most) if fewest < most else most, "control": self.control,
+            "config": self.config,
+        }  # fmt: skip
+
 
 def settle(**arguments: Any) -> Settings:
     """Settings from keyword arguments of an environment (`ARGUMENTS`); see `HRCEnv`. Raises
@@ -163,15 +174,24 @@ def settle(**arguments: Any) -> Settings:
             config = _with_part(config, path, given[name], name)
     named = task.robot if given["robot"] is None else given["robot"]
     robot = robot_called(DEFAULT_ROBOT if named is None else named)
-    if task.grips and robot.hand is None:
-        able = [name for name, each in ROBOTS.items() if each.hand]
+    if task.grips and not robot.grips:
+        able = [name for name, each in ROBOTS.items() if each.grips]
         raise ConfigError(
             f"{task.id} needs a robot with a hand, and {robot.name!r} has none; there are "
             f"{', '.join(map(repr, able))}."
         )
+    if task.drives != robot.drives:
+        able = [name for name, each in ROBOTS.items() if each.drives == task.drives]
+        kind = "a robot that drives" if task.drives else "an arm on the pedestal"
+        raise ConfigError(
+            f"{task.id} needs {kind}, and {robot.name!r} is none; there are "
+            f"{', '.join(map(repr, able))}."
+        )
+    scene = task.scene if given["scene"] is None else given["scene"]
+    n_workers = task.n_workers if given["n_workers"] is None else given["n_workers"]
     return Settings(
-        task, given["perception"], estimator, cameras, given["scene"],
-        robot, _worker_counts(given["n_workers"]), given["control"],
+        task, given["perception"], estimator, cameras, scene,
+        robot, _worker_counts(n_workers), given["control"],
         shield_called(given["shield"]), config,
     )  # fmt: skip
 

@@ -9,8 +9,9 @@ near singular postures, where the tool then lags behind the command.
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from hrc_env.core.errors import ConfigError, check_fields, unknown
+from hrc_env.core.errors import ConfigError, check_fields, check_shape, unknown
 from hrc_env.core.typing import Floats, JointAngles, JointVelocities, Velocities3
 from hrc_env.geometry.chains import SerialChain, jacobian, turning
 
@@ -51,6 +52,18 @@ def n_actions(control: str, chain: SerialChain, grips: bool = False) -> int:
             'a base that drives has: valid is control="joint", a velocity for each joint.'
         )
     return {"joint": chain.n_joints, "tool": 3, "twist": 6}[control] + grips
+
+
+def checked_action(action: ArrayLike, shape: tuple[int, ...]) -> Floats:
+    """Actions as float64, clipped to [-1, 1]; `ConfigError` for other shapes or no numbers."""
+    try:
+        values = np.asarray(action, np.float64)
+    except (TypeError, ValueError) as error:
+        raise ConfigError(f"action must be numbers of shape {shape}, got {action!r}.") from error
+    check_shape("action", values.shape, shape, "(environments,) joint or tool velocities")
+    if not np.isfinite(values).all():
+        raise ConfigError(f"action must be finite numbers in [-1, 1], got {values}.")
+    return np.minimum(np.maximum(values, -1.0), 1.0)
 
 
 def joint_command(
@@ -100,12 +113,6 @@ def resolved_twist(
     damping = np.square(config.damping * np.clip(near, 0.0, 1.0)) + 1e-9
     solved = np.linalg.solve(gram + damping[..., None, None] * np.eye(6), twist_world[..., None])
     return _within((J.swapaxes(-1, -2) @ solved)[..., 0], chain)
-
-
-def opening_m(action: Floats, widest_m: float) -> Floats:
-    """(B,) how far fingers are to be from the middle [m]: the action's last entry, -1 open to 1
-    closed."""
-    return 0.5 * (1.0 - action[:, -1]) * widest_m
 
 
 def _within(qd: JointVelocities, chain: SerialChain) -> JointVelocities:

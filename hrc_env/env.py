@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from hrc_env import observations, rewards
 from hrc_env.config import ConfigChoice, Settings, settle
+from hrc_env.control import checked_action
 from hrc_env.core.batching import Stateful, one
 from hrc_env.core.errors import ConfigError, unknown, whole
 from hrc_env.core.mapping import plain
@@ -29,7 +30,7 @@ from hrc_env.rewards import RewardConfig
 from hrc_env.safety.shield import Shield
 from hrc_env.scene.domain_randomization import AppearanceConfig
 from hrc_env.scene.robot import Robot
-from hrc_env.simulation import Simulation, checked_action
+from hrc_env.simulation import Simulation
 from hrc_env.step import Observation
 from hrc_env.tasks import DEFAULT, goal
 from hrc_env.tasks.task import Task, goal_of
@@ -101,11 +102,12 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         cameras: indices or names of the scene's cameras to use; or a rig of your own: its name
             ("lab_gopro"), a TOML file's path, or a list of places (x, y, z) [m],
             `CameraConfig`s or mappings. None is all cameras of the scene.
-        scene: name of the place: "lab", a workshop, or "site", a construction site.
+        scene: name of the place: "lab", a workshop, or "site", a construction site; None: that
+            which the task is made for.
         robot: a name ("ur10e_like", "ur10e_gripper"), one that was registered or a
             `hrc_env.scene.robot.Robot`; None: the one that the task is made for.
-        n_workers: 0 or more workers; (fewest, most): each episode's number is drawn, and the
-            observation has room for the most.
+        n_workers: 0 or more workers, None: as the task is made for; (fewest, most): each
+            episode's number is drawn, and the observation has room for the most.
         people: how the workers are with the robot: "attentive", "hurried", "unaware", a
             `PeopleConfig` or a mapping; None for those of the config (attentive).
         motions: clips of recorded motion that the workers play, too, or paths of such
@@ -138,9 +140,9 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         perception: str = "pixels",
         estimator: EstimatorChoice = "particle",
         cameras: str | Path | Sequence[Any] | NDArray[Any] | None = None,
-        scene: str = "lab",
+        scene: str | None = None,
         robot: str | Robot | None = None,
-        n_workers: int | tuple[int, int] = 1,
+        n_workers: int | tuple[int, int] | None = None,
         people: str | PeopleConfig | Mapping[str, Any] | None = None,
         motions: Sequence[str | Path | Clip] | None = None,
         faults: Sequence[FaultConfig | Mapping[str, Any]] | None = None,

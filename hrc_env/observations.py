@@ -36,6 +36,7 @@ class Sizes:
     """What the lengths of terms depend on."""
 
     arm_joints: int
+    """Hinges."""
     actions: int
     workers: int
     horizons: int = 0
@@ -43,9 +44,13 @@ class Sizes:
     uncertainty: tuple[str, ...] = ()
     """Which of `UNCERTAINTY` were asked for."""
     hands: int = 0
-    """1 of an arm with a gripper."""
+    """1 of an arm that can hold something,"""
+    fingers: int = 0
+    """and 1 if with fingers."""
     objects: int = 0
     """How many are loose."""
+    slides: int = 0
+    """Of the robot's joints."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +93,16 @@ def _shorten(vectors, softening):
             vectors[k, i] /= divisor
 
 
+def _hinges(now: Belief, values: Floats) -> Floats:
+    """Those of values (B, N) of the robot's joints that are of hinges."""
+    return values if now.robot.slides is None else values[:, ~now.robot.slides]
+
+
+def _slides(now: Belief, values: Floats) -> Floats:
+    """Those that are of slides."""
+    return values[:, needed(now.robot.slides, "A slide")]
+
+
 def _hand(now: Belief) -> HandState:
     return needed(now.hand, "A hand")
 
@@ -106,17 +121,17 @@ ROBOT_TERMS: tuple[ObservationTerm, ...] = (
     ObservationTerm(
         "joint_angle_sin", lambda of: of.arm_joints, "-", "base", 1.0, 1.0,
         "Sine of each arm joint's angle.",
-        lambda now: np.sin(now.robot.q),
+        lambda now: np.sin(_hinges(now, now.robot.q)),
     ),
     ObservationTerm(
         "joint_angle_cos", lambda of: of.arm_joints, "-", "base", 1.0, 1.0,
         "Cosine of each arm joint's angle.",
-        lambda now: np.cos(now.robot.q),
+        lambda now: np.cos(_hinges(now, now.robot.q)),
     ),
     ObservationTerm(
         "joint_velocity", lambda of: of.arm_joints, "rad/s", "base", 4.0, 1.0,
         "Velocity of each arm joint.",
-        lambda now: now.robot.qd,
+        lambda now: _hinges(now, now.robot.qd),
     ),
     ObservationTerm(
         "tool_position", lambda of: 3, "m", "world", 4.0, 1.0,
@@ -129,13 +144,13 @@ ROBOT_TERMS: tuple[ObservationTerm, ...] = (
         lambda now: now.robot.tool_axes_world[..., [0, 2]].swapaxes(-1, -2),
     ),
     ObservationTerm(
-        "hand_opening", lambda of: of.hands, "m", "tool", 0.2, 0.05,
+        "hand_opening", lambda of: of.fingers, "m", "tool", 0.2, 0.05,
         "How far each finger is from the middle.",
         lambda now: _hand(now).opening_m,
     ),
     ObservationTerm(
         "hand_force", lambda of: of.hands, "N", "tool", 300.0, 100.0,
-        "With which the fingers press together; negative: apart.",
+        "With which the fingers press together, negative: apart; or what hangs on the cups.",
         lambda now: _hand(now).force_n,
     ),
     ObservationTerm(
@@ -155,6 +170,20 @@ ROBOT_TERMS: tuple[ObservationTerm, ...] = (
     ),
 )  # fmt: skip
 """The robot's own state and what it handles, which open the observation."""
+
+SLIDE_TERMS: tuple[ObservationTerm, ...] = (
+    ObservationTerm(
+        "slide_position", lambda of: of.slides, "m", "world", 10.0, 5.0,
+        "Where each slide is: of a base that drives, x and y of its middle.",
+        lambda now: _slides(now, now.robot.q),
+    ),
+    ObservationTerm(
+        "slide_velocity", lambda of: of.slides, "m/s", "world", 4.0, 1.0,
+        "Velocity of each slide.",
+        lambda now: _slides(now, now.robot.qd),
+    ),
+)  # fmt: skip
+"""What follows of a robot that drives."""
 
 SHARED_TERMS: tuple[ObservationTerm, ...] = (
     ObservationTerm(

@@ -6,16 +6,16 @@ streams only, never on the size of the batch.
 
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from hrc_env import metrics, observations, rewards, room, step
 from hrc_env.belief import Belief, estimated_separation
 from hrc_env.config import Settings
-from hrc_env.control import joint_command, n_actions, opening_m
+from hrc_env.control import joint_command, n_actions
 from hrc_env.core.batching import State, Stateful, picked, rows, write_rows
 from hrc_env.core.errors import ConfigError, check_shape
 from hrc_env.core.kernels import ahead
@@ -30,7 +30,7 @@ from hrc_env.pipeline.sensor_input import SensorInput, TrueSensorInput
 from hrc_env.rewards import RewardConfig
 from hrc_env.safety.shield import shielded
 from hrc_env.scene import handling
-from hrc_env.scene.build import Scene, build
+from hrc_env.scene.build import build
 from hrc_env.scene.physics import Physics
 from hrc_env.scene.rigs import findings
 from hrc_env.step import Info, Observation, StepResult
@@ -74,7 +74,13 @@ class Simulation(Stateful):
         )  # fmt: skip
         try:  # first, as it knows how many workers and which clips there is room for
             self.motion = generator.make_state(
-                batch, most, self.bodies, config.motion, scene_for(n_workers=0).grounds, fewest
+                batch,
+                most,
+                self.bodies,
+                config.motion,
+                scene_for(n_workers=0).grounds,
+                fewest,
+                settings.robot.girth_m,
             )
         except NoRoomError as error:
             where = room.told(error.clip, room.played_s(error.clip, config))
@@ -83,15 +89,18 @@ class Simulation(Stateful):
         if perception in CAMERA_LEVELS:
             for finding in findings(self.scene):
                 warnings.warn(finding, stacklevel=3)
-        self.settings = _recorded(batch, settings, self.scene)
+        self.settings = settings.recorded(batch, self.scene)
         self.chain, n_joints = self.scene.chain, self.scene.chain.n_joints
         self._spread_rad = np.array(config.start_spread_rad or settings.robot.spread_rad)
         check_shape("start_spread_rad", self._spread_rad.shape, (n_joints,), "one a joint")
-        self._grips = settings.robot.hand is not None
+        self._grips = settings.robot.grips
         self.n_actions = n_actions(settings.control, self.chain, self._grips)
+        n_slides = int(self.chain.slides.sum())
+        self.place = self.task.survey(self.scene.map, config.task)
         sizes = observations.Sizes(
-            n_joints, self.n_actions, most, len(config.forecast_s), config.uncertainty,
-            int(self._grips), len(self.scene.objects.names),
+            n_joints - n_slides, self.n_actions, most, len(config.forecast_s), config.uncertainty,
+            int(self._grips), int(settings.robot.hand is not None), len(self.scene.objects.names),
+            n_slides,
         )  # fmt: skip
         self.layout = observations.layout(self.terms, sizes)
         self.physics = Physics(self.scene, batch)
@@ -123,7 +132,7 @@ class Simulation(Stateful):
         self.action[ids], self.episode_cost[ids], self.separation_m[ids] = 0.0, 0.0, 0.0
         q, task, config = self._starting_angles(ids), self.task, self.config.task
         robot = chains.robot_state(self.chain, q, np.zeros_like(q))
-        task.reset(self.task_state, ids, streams["task"], World(robot), config)
+        task.reset(self.task_state, ids, streams["task"], World(robot, place=self.place), config)
         poses = None if task.poses is None else task.poses(self.task_state, ids, config)
         self.physics.reset(ids, q, self.motion.workers["body"][ids], poses)
         world = handling.world_of(self.physics, ids, robot)
@@ -153,29 +162,33 @@ class Simulation(Stateful):
             self.motion, self.streams["motion"], config.scene.sim_dt, config.n_substeps
         )
         far = self.separation_m > CLOSING_M_S * config.ctrl_dt
-        grip = self.scene.grip
-        opening = None if grip is None else opening_m(self.action, grip.open_m)
-        q_path = self.physics.step(command, path, far, opening)
+        if self.task.effects is not None:
+            self.physics.apply(self.task.effects(self.task_state, config.task))
+        grip = self.action[:, -1] if self._grips else None
+        q_path = self.physics.step(command, path, far, grip)
         truth = worker_truth(self.bodies, motion)
         self._expose(self._everyone, motion, truth)
         estimates = self._perceive(self._everyone)
         n = self.chain.n_joints
         robot, arm = chains.robot_along(self.chain, q_path[..., :n], self.physics.qd)
         world = handling.world_of(self.physics, self._everyone, robot)
-        world, arm = handling.loaded(self.scene, world, arm, q_path)
+        world, arm = handling.loaded(self.scene, world, arm, q_path, self._loads)
         self._measure(self._everyone, world)
         robot = world.robot
         seen_world = robot.capsules_world[:, self.scene.watched, 1]
-        generator.watch(self.motion, seen_world, motion, config.ctrl_dt)
-        progress = self.task.advance(
-            self.task_state, self.streams["task"], world, config.ctrl_dt, config.task
-        )
-        belief = self._believed(self._everyone, world, estimates)
-        terms = self._reward_terms(belief, progress, previous)
+        cue = None if self.task.cue is None else self.task.cue(self.task_state)
+        generator.watch(self.motion, seen_world, motion, config.ctrl_dt, cue)
+        world = replace(world, deeds=generator.deeds(self.motion))
         workers = worker_capsules(self.bodies, path, motion.body)
         cost = metrics.cost(
             arm, robot.capsule_radius_m, workers, truth.capsule_radius_m, config.cost
         )
+        judged = replace(world, touched=cost.contact > 0, place=self.place)
+        progress = self.task.advance(
+            self.task_state, self.streams["task"], judged, config.ctrl_dt, config.task
+        )
+        belief = self._believed(self._everyone, world, estimates)
+        terms = self._reward_terms(belief, progress, previous)
         self.episode_cost += cost.total
         self.separation_m = cost.min_separation_m
         activity = generator.activity(self.motion)
@@ -235,7 +248,8 @@ class Simulation(Stateful):
         """What every robot believes now."""
         robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
         world, arm = handling.world_of(self.physics, self._everyone, robot), robot.capsules_world
-        world, _ = handling.loaded(self.scene, world, arm[:, None], self.physics.qpos[:, None])
+        qpos = self.physics.qpos[:, None]
+        world, _ = handling.loaded(self.scene, world, arm[:, None], qpos, self._loads)
         return self._believed(self._everyone, world, self.estimates)
 
     def markers(self, b: int) -> Points3:
@@ -243,9 +257,15 @@ class Simulation(Stateful):
         view = self.task.view(self.task_state, np.array([b]), self.config.task)
         return self.task.markers(view)[0]
 
+    @property
+    def _loads(self) -> Bools | None:
+        return None if self.task.loads is None else self.task.loads(self.task_state)
+
     def _starting_angles(self, ids: Ints) -> Floats:
-        """(len(ids), N) arm angles near home, turned anywhere in front of the base."""
+        """(len(ids), N) angles near home, unless the task says where robots start."""
         spread, rngs = self._spread_rad, picked(self.streams["robot"], ids)
+        if self.task.start is not None:
+            return self.task.start(rngs, self.place, self.config.task)
         angles = [self.scene.home_q + rng.uniform(-1, 1, len(spread)) * spread for rng in rngs]
         return np.array(angles).reshape(len(ids), -1)
 
@@ -323,27 +343,3 @@ class Simulation(Stateful):
             **step.worker_info(activity[ids], body[ids], self.bodies.names),
             **step.miscalibration_info(self.settings["cameras"], self.pipeline.suspected(ids)),
         }
-
-
-def _recorded(batch: int, settings: Settings, scene: Scene) -> dict[str, Any]:
-    """What a state must have been taken with to be set."""
-    fewest, most = settings.n_workers
-    return {
-        "batch": batch, "task": settings.task.id, "perception": settings.perception,
-        "estimator": settings.estimator.name, "scene": settings.scene,
-        "robot": settings.robot.name, "cameras": tuple(camera.name for camera in scene.cameras),
-        "n_workers": (fewest, most) if fewest < most else most, "control": settings.control,
-        "config": settings.config,
-    }  # fmt: skip
-
-
-def checked_action(action: ArrayLike, shape: tuple[int, ...]) -> Floats:
-    """Actions as float64, clipped to [-1, 1]; `ConfigError` for other shapes or no numbers."""
-    try:
-        values = np.asarray(action, np.float64)
-    except (TypeError, ValueError) as error:
-        raise ConfigError(f"action must be numbers of shape {shape}, got {action!r}.") from error
-    check_shape("action", values.shape, shape, "(environments,) joint or tool velocities")
-    if not np.isfinite(values).all():
-        raise ConfigError(f"action must be finite numbers in [-1, 1], got {values}.")
-    return np.minimum(np.maximum(values, -1.0), 1.0)

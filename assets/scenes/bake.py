@@ -9,13 +9,14 @@ from pathlib import Path
 
 import mujoco
 
-from assets.robots.hands import GRIPPER, SCREWDRIVER
+from assets.robots.hands import CUPS, GRIPPER, SCREWDRIVER
 from assets.robots.mobile_base import add_mobile_base
 from assets.robots.ur10e_like import add_arm
 from assets.scenes import arena, prop_looks, site
 from assets.scenes.mjcf import TEXTURES, write_mjcf
 from assets.scenes.pedestal import add_pedestal
 from assets.scenes.primitives import add_painted, paint_materials
+from assets.tasks.drywall import add_drywall
 from assets.tasks.pick_place import add_pick_place
 from hrc_env.scene.worker_visuals import PARKED_M
 from hrc_env.worker.props import PROP_NAMES
@@ -24,9 +25,10 @@ ASSETS = Path(__file__).resolve().parent.parent
 ROBOTS = {
     "ur10e_like": partial(add_arm, hand=SCREWDRIVER),
     "ur10e_gripper": partial(add_arm, hand=GRIPPER),
+    "ur10e_cups": partial(add_arm, hand=CUPS),
     "mobile_base": add_mobile_base,
 }
-TASKS = {"pick_place": add_pick_place}
+TASKS = {"drywall": add_drywall, "pick_place": add_pick_place}
 MAKERS = {"lab": (arena.add_lab, arena.paint_lab), "site": (site.add_site, site.paint_site)}
 
 

@@ -48,6 +48,9 @@ def write_mjcf(spec: Any, path: Path, **compiler: str) -> None:
     _add_contacts(root, spec)
     _add_couplings(root, spec)
     _add_actuators(root, spec)
+    for sensor in spec.sensors:
+        gauges = ElementTree.SubElement(root, "sensor")
+        ElementTree.SubElement(gauges, "force", name=sensor.name, site=sensor.objname)
     ElementTree.indent(root)
     path.write_text(ElementTree.tostring(root, encoding="unicode") + "\n")
 
@@ -124,10 +127,11 @@ def _add_content(parent: ElementTree.Element, body: Any) -> None:
         _add_joint(parent, joint)
     for geom in body.geoms:
         _add_geom(parent, geom)
+    plain = mujoco.MjSpec().worldbody.add_site()
     for site in body.sites:
         ElementTree.SubElement(
             parent, "site", name=site.name, pos=_text(site.pos), size=_text(site.size[0]),
-            group=str(site.group),
+            group=str(site.group), **_changed(site, plain, ("quat",)),
         )  # fmt: skip
     for child in body.bodies:
         _add_body(parent, child)

@@ -26,13 +26,14 @@ class EnvironmentArguments:
     cameras: tuple[str, ...] = ()
     """Names or numbers of cameras of the scene; or a rig: its name or a .toml file. All cameras
     of the scene if not given."""
-    scene: str = "lab"
-    """lab or site."""
+    scene: str | None = None
+    """lab or site; the one that the task is made for if not given."""
     robot: str | None = None
     """ur10e_like, ur10e_gripper, or one that was registered (--import); the task's own if not
     given."""
-    n_workers: int | tuple[int, int] = 1
-    """How many workers; two numbers are the fewest and the most, drawn for every episode."""
+    n_workers: int | tuple[int, int] | None = None
+    """How many workers, as the task is made for if not given; two numbers are the
+    fewest and the most, drawn for every episode."""
     people: str | None = None
     """attentive, hurried or unaware; --config motion.people.FIELD=VALUE for more."""
     motions: tuple[Path, ...] = ()

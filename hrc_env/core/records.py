@@ -8,7 +8,9 @@ of a worker, `WorkerTruth` is the worker. Observations, rewards and shields take
 cost and metrics the second (`tests/test_architecture.py` holds this).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from hrc_env.core.typing import (
     Bools,
@@ -141,6 +143,8 @@ class RobotState:
     """(B, K, 2, 3) [m], with those of what it carries; far away where it carries nothing."""
     capsule_radius_m: Floats
     """(K,) [m]."""
+    slides: Bools | None = None
+    """(N,) which joints are slides, whose q are in m and qd in m/s; None: none is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,6 +174,18 @@ class ObjectState:
 
 
 @dataclass(frozen=True, slots=True)
+class Deeds:
+    """What workers have done for a task in what they are at."""
+
+    present: Bools
+    """(B, W) who is there."""
+    screws: Ints
+    """(B, W) how many they have driven,"""
+    boring: Bools
+    """(B, W) and whether they drive one."""
+
+
+@dataclass(frozen=True, slots=True)
 class World:
     """What a task judges, and what the robot feels; rows are the environments in question."""
 
@@ -178,6 +194,23 @@ class World:
     """Of an arm with a gripper."""
     objects: ObjectState | None = None
     """The task's loose objects as they are."""
+    deeds: Deeds | None = None
+    """What workers have done; None: an episode begins."""
+    touched: Bools | None = None
+    """(B,) whether the robot touched a worker in this step: true, so for success only, and for no
+    reward or observation."""
+    place: Any = None
+    """What the task made of the place (`Task.survey`)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Effects:
+    """What a task does to its loose objects in a step."""
+
+    welded: Mapping[str, Bools]
+    """(B,) whether each of its welds holds, by name."""
+    push_world: Floats
+    """(B, O, 6) force [N] and torque [Nm] at the middle of each."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,9 +230,12 @@ class Workplace:
     high a step is; 0 where there is nothing."""
 
 
-WORKPLACE_KINDS = ("robot", "bench", "floor", "wall", "overhead", "pile", "cart", "step", "open")
-"""Beside the robot, hands in its workspace; at a table; kneeling; at a wall; above the head;
-at materials to lift; where a cart is taken or left; before a tread 0.3 m ahead; nothing there."""
+WORKPLACE_KINDS = (
+    "robot", "bench", "floor", "wall", "overhead", "pile", "cart", "step", "open", "task",
+)  # fmt: skip
+"""Beside the robot, hands in its workspace; at a table; kneeling; at a wall; above the head; at
+materials to lift; where a cart is taken or left; before a tread 0.3 m ahead; nothing there; at what
+a task has put there."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -99,7 +99,8 @@ def robot_along(
     q, qd = np.array(q_path[..., -1, :], float), np.array(qd, float)
     ended = ends[..., -1, :, :, :]
     radius_m = chain.capsule_radius_m
-    return RobotState(q, qd, tool_world, velocity, axes, ended, radius_m), ends
+    robot = RobotState(q, qd, tool_world, velocity, axes, ended, radius_m, chain.slides)
+    return robot, ends
 
 
 def _carried(chain: SerialChain, frames: Transforms) -> Capsules:

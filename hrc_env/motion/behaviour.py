@@ -110,6 +110,9 @@ def _begin(who: Decision, activity: int, lasts: float) -> None:
     me["activity"], me["duration_s"] = activity, lasts
     if me["acts_at"] < np.inf:
         return
+    if activity == st.SCREW:  # beside a robot that holds what they work at
+        me["reaction"] = st.NO_REACTION
+        return
     draw = who.draws.item(dc.REACTION)
     pauses = draw < people.pause_probability
     backs = draw < people.pause_probability + people.step_back_probability
@@ -125,7 +128,9 @@ def _choose_job(who: Decision) -> None:
     then = schedule.then[me["job"]]
     stays = all(schedule.jobs[k].at in (HERE, who.kind_here) for k, _ in then)
     if then and not (stays and who.now >= me["until_s"] and not who.loaded):
-        me["job"] = picked(then, who.draws.item(dc.NEXT))
+        chosen = picked(then, who.draws.item(dc.NEXT))
+        if me["cued"] or not schedule.jobs[chosen].waits:
+            me["job"] = chosen
     else:
         _new_errand(who)
 

@@ -51,7 +51,7 @@ def evaluate(t: float, clock_s: float, frames: Floats, me: Worker) -> None:
         pick_up(t, me)
     elif activity in st.GIVING:
         pick_up(me.lasts - t, me)
-    elif st.SQUATTING <= activity <= st.LUNGE:
+    elif st.SQUATTING <= activity <= st.LUNGE or activity == st.SCREW:
         work(t, me)
     elif activity == st.CLIMB:
         climb(t, me)

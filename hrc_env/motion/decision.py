@@ -50,6 +50,8 @@ class BehaviourParams:
     """(N, ...) of the bodies that there are."""
     fewest: int
     """Workers who are in an episode at least."""
+    robot_girth_m: float = 0.0
+    """How far a robot that drives reaches round the points of it that people watch [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +125,8 @@ def in_the_way(who: Decision) -> Floats:
         rows.append((*fallen_root(float(other["time_s"]), other), FALL_M[1]))
     robot = who.me["robot_world"]
     if people.detour_m > 0.0 and np.isfinite(robot[0, 0]):
-        rows += [(x, y, people.detour_m) for x, y, _ in robot.tolist()]
+        away_m = people.detour_m + who.mind.robot_girth_m
+        rows += [(x, y, away_m) for x, y, _ in robot.tolist()]
     return np.array(rows).reshape(-1, 3)
 
 

@@ -10,10 +10,11 @@ import numpy as np
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.kernels import kernel
-from hrc_env.core.records import Grounds, Held, WorkerMotion, WorkerPath, Workplace
+from hrc_env.core.records import Deeds, Grounds, Held, WorkerMotion, WorkerPath, Workplace
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.motion import state as st
 from hrc_env.motion.activities.pieces import stage, stocked
+from hrc_env.motion.activities.strokes import screws
 from hrc_env.motion.anatomy import anatomies
 from hrc_env.motion.behaviour import begin_episode, follow_up
 from hrc_env.motion.blending import RATE_H_S, evaluate
@@ -23,7 +24,7 @@ from hrc_env.motion.decision import N_DRAWS, BehaviourParams, MotionState
 from hrc_env.motion.floorplan import floorplan, room_for
 from hrc_env.motion.holding import N_HELD, prop_pose
 from hrc_env.motion.kinematics import pose, quaternion, spin
-from hrc_env.motion.reactions import notice
+from hrc_env.motion.reactions import attend, notice
 from hrc_env.motion.schedule import schedule_at
 from hrc_env.motion.state import Worker, Workers
 from hrc_env.worker.body import N_SEGMENTS, Body
@@ -58,12 +59,13 @@ OPEN_FLOOR = Grounds(
 
 def make_state(
     batch: int, n_workers: int, body: Body, config: MotionConfig,
-    grounds: Grounds = OPEN_FLOOR, fewest: int | None = None,
+    grounds: Grounds = OPEN_FLOOR, fewest: int | None = None, robot_girth_m: float = 0.0,
 ) -> MotionState:  # fmt: skip
     """Workers of `batch` environments, `n_workers` each; call `reset` before use.
 
     They have the `body`, or each episode gives each one of several, and walk on the `grounds`. At
-    least `fewest` of them are in an episode, drawn at its beginning; None: all.
+    least `fewest` of them are in an episode, drawn at its beginning; None: all. A robot that drives
+    reaches `robot_girth_m` round what they watch of it; 0: it is an arm.
     """
     fewest = n_workers if fewest is None else fewest
     bones, plan = anatomies(body), floorplan(grounds)
@@ -77,7 +79,7 @@ def make_state(
     schedule = schedule_at(config.jobs, {place.kind for place in grounds.places})
     values = numbers(config, grounds.robot_xy_m)
     pieces = stocked(clips, bones.size, stage(plan, config))
-    mind = BehaviourParams(config, values, plan, schedule, pieces, bones, fewest)
+    mind = BehaviourParams(config, values, plan, schedule, pieces, bones, fewest, robot_girth_m)
     return MotionState(np.zeros((batch, n_workers), st.WORKER), mind)
 
 
@@ -118,12 +120,35 @@ def advance(
 
 
 def watch(
-    state: MotionState, elbow_and_tool_world: Floats, motion: WorkerMotion, dt_s: float
-) -> None:
-    """Let the workers see where elbow and tool (B, 2, 3) are, dt_s after the last look."""
+    state: MotionState, elbow_and_tool_world: Floats, motion: WorkerMotion, dt_s: float,
+    cue: Bools | None = None,
+) -> None:  # fmt: skip
+    """Let the workers see where elbow and tool, or front and back (B, 2, 3), of the robot are, dt_s
+    after the last look, and whether what they wait for has come, (B,)."""
+    if cue is not None:
+        attend(cue, state.workers)
     people = state.mind.config.people
-    settings = (people.notice_m, people.fast_m_s, people.calm_s)
-    notice(dt_s, settings, elbow_and_tool_world, motion.position_world, state.workers)
+    settings = (people.notice_m, people.fast_m_s, people.calm_s, state.mind.robot_girth_m)
+    bodies = motion.position_world, motion.velocity_world
+    notice(dt_s, settings, elbow_and_tool_world, *bodies, state.workers)
+
+
+def deeds(state: MotionState) -> Deeds:
+    """What workers have done in the activity that they are in."""
+    found = Deeds(state.workers["present"].copy(), *_no_deeds(state.workers.shape))
+    _deeds(state.workers, found.screws, found.boring)
+    return found
+
+
+def _no_deeds(shape: tuple[int, ...]) -> tuple[Ints, Bools]:
+    return np.zeros(shape, np.int64), np.zeros(shape, np.bool_)
+
+
+@kernel
+def _deeds(workers: Workers, n_screws: Ints, boring: Bools) -> None:
+    for b, w in np.ndindex(workers.shape):
+        if workers[b, w].activity == st.SCREW:
+            n_screws[b, w], boring[b, w] = screws(workers[b, w])
 
 
 def current(state: MotionState, ids: Ints | None = None) -> WorkerMotion:

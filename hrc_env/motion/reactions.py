@@ -9,10 +9,10 @@ import math
 import numpy as np
 
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Floats
+from hrc_env.core.typing import Bools, Floats
 from hrc_env.motion import state as st
 from hrc_env.motion.anatomy import CHEST, HAND, HEAD, LEFT, SIDE_STRIDE
-from hrc_env.motion.state import WORKER, Triple, Worker, Workers
+from hrc_env.motion.state import WORKER, Worker, Workers
 from hrc_env.motion.traffic import goes, meets
 from hrc_env.motion.walk import brake
 
@@ -20,15 +20,20 @@ BODY_POINTS = (CHEST, HEAD, LEFT + HAND, LEFT + SIDE_STRIDE + HAND)
 """Segments that people guard."""
 WITHDRAW = -1.6
 """Pace at which hands come back."""
-People = Triple
-"""`PeopleConfig.notice_m`, `.fast_m_s`, `.calm_s`."""
+MACHINE_S, MACHINE_CALM_S = 2.0, 0.4
+"""So far ahead walkers look at a machine that drives, and so soon again after a reaction [s];
+judgement."""
+People = tuple[float, float, float, float]
+"""`PeopleConfig.notice_m`, `.fast_m_s`, `.calm_s`, and how far a robot that drives reaches round
+the points that people watch; 0: it is an arm [m]."""
 
 
 @kernel
 def notice(
-    dt_s: float, people: People, robot_world: Floats, position_world: Floats, workers: Workers
-) -> None:
-    """Let all look at the arm (B, 2, 3), dt_s after the last look, and react when it is time."""
+    dt_s: float, people: People, robot_world: Floats, position_world: Floats,
+    velocity_world: Floats, workers: Workers,
+) -> None:  # fmt: skip
+    """Let all look at the robot (B, 2, 3), dt_s after the last look, and react when it is time."""
     for b, w in np.ndindex(workers.shape):
         me = workers[b, w]
         if me.present:
@@ -37,16 +42,32 @@ def notice(
             if me.clock_s >= me.acts_at:
                 me.acts_at = math.inf
                 _react(w, workers[b])
-                me.calm_until = me.clock_s + me.reaction_s + people[2]
-            elif (
-                me.reaction != st.NO_REACTION
-                and me.acts_at == math.inf
-                and me.clock_s > me.calm_until
-                and _startling(dt_s, people, robot_world[b], position_world[b, w], me)
-            ):
-                me.acts_at = me.clock_s + me.delay_s
+                calm_s = people[2] if people[3] == 0.0 else MACHINE_CALM_S
+                me.calm_until = me.clock_s + me.reaction_s + calm_s
+            elif me.acts_at == math.inf and me.clock_s > me.calm_until:
+                if people[3] > 0.0:
+                    chest = position_world[b, w, CHEST], velocity_world[b, w, CHEST]
+                    startled = _machine_near(dt_s, people, robot_world[b], chest, me)
+                else:
+                    startled = me.reaction != st.NO_REACTION and _startling(
+                        dt_s, people, robot_world[b], position_world[b, w], me
+                    )
+                if startled:
+                    me.acts_at = me.clock_s + me.delay_s
         for k, i in np.ndindex(me.robot_world.shape):
             me.robot_world[k, i] = robot_world[b, k, i]
+
+
+@kernel
+def attend(cue: Bools, workers: Workers) -> None:
+    """Tell everybody whether what they wait for has come, (B,): who is at it halts until it has."""
+    for b, w in np.ndindex(workers.shape):
+        me = workers[b, w]
+        me.cued = cue[b]
+        if me.activity == st.SCREW:
+            ready = me.out_at + me.take_s
+            works = ready < me.time_s < ready + me.out_s + me.hold_s
+            me.pace_wished = 0.0 if works and not me.cued else 1.0
 
 
 @kernel
@@ -63,6 +84,31 @@ def _startling(dt_s: float, people: People, robot: Floats, body: Floats, me: Wor
                 return True
             if now < 2.0 * people[0] and then - now > people[1] * dt_s:
                 return True
+    return False
+
+
+@kernel
+def _machine_near(
+    dt_s: float, people: People, robot: Floats, chest: tuple[Floats, Floats], me: Worker
+) -> bool:
+    """Whether a machine that drives is too near, seen from above; or soon will be, to walkers, none
+    of whom overlooks it who takes notice of robots at all."""
+    place, speed = chest
+    walks = goes(me.activity)
+    if people[0] == 0.0 or not (walks or me.reaction != st.NO_REACTION):
+        return False
+    for k in range(robot.shape[0]):
+        x, y = robot[k, 0] - place[0], robot[k, 1] - place[1]
+        vx, vy, later_s = 0.0, 0.0, 0.0
+        if walks and me.robot_world[k, 0] < math.inf:
+            vx = (robot[k, 0] - me.robot_world[k, 0]) / dt_s - speed[0]
+            vy = (robot[k, 1] - me.robot_world[k, 1]) / dt_s - speed[1]
+            nearest_s = -(x * vx + y * vy) / max(vx * vx + vy * vy, 1e-6)
+            later_s = min(nearest_s, MACHINE_S)
+        if later_s >= 0.0 and (
+            math.hypot(x + later_s * vx, y + later_s * vy) - people[3] < people[0]
+        ):
+            return True
     return False
 
 

@@ -36,6 +36,8 @@ class Job:
     """How workers go there: "walk", or "push" the prop."""
     height_m: float = 0.0
     """How high above the floor the work is [m]; 0: as high as the place says."""
+    waits: bool = False
+    """Whether it begins only when the task says so; until then the job before is done again."""
 
 
 JOBS: tuple[Job, ...] = (
@@ -89,7 +91,14 @@ _LOW = tuple(
     )
 )  # fmt: skip
 """What hands do at knee height or lower: kneeling, on the haunches, bent."""
+_BOARD = (
+    Job("wait for the board", "stand", "robot", (("screw the board on", 1.0),)),
+    Job("screw the board on", "screw", "task", (("step aside", 1.0),), waits=True),
+    Job("step aside", "look round", "robot", (("step aside", 1.0),)),
+)
+"""Who helps to fix a board: `HRCDrywall-v0`."""
 WORK: dict[str, tuple[Job, ...]] = {
+    "drywall": _BOARD,
     "framing": JOBS,
     "low_work": (
         replace(JOBS[0], then=(*JOBS[0].then, *((job.name, 0.06) for job in _LOW))),

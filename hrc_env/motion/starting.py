@@ -55,7 +55,7 @@ STARTS: dict[int, Start] = {
     st.DRILL: _work(wp.plan_drill), st.OVERHEAD: _work(wp.plan_drill), st.SAW: _work(wp.plan_saw),
     st.MEASURE: _work(wp.plan_measure), st.POINT: _work(wp.plan_point),
     st.SQUATTING: _work(wp.plan_squat), st.KNEELING: _work(wp.plan_kneel),
-    st.LUNGE: _work(wp.plan_lunge),
+    st.LUNGE: _work(wp.plan_lunge), st.SCREW: _work(wp.plan_screw),
 }  # fmt: skip
 """What is begun where the worker stands: each compiled by itself when it is first wanted."""
 

@@ -59,6 +59,7 @@ _NOW = [
     ("doing", "i8"), ("doing_until", "f8"),  # NO_REACTION, PAUSE or BACK_AWAY now; until when
     ("calm_until", "f8"),  # before which clock nothing startles them
     ("delay_s", "f8"), ("reaction", "i8"), ("reaction_s", "f8"),  # drawn when an activity begins
+    ("cued", "?"),  # whether what they wait for has come
 ]  # fmt: skip
 _PLAN = [
     ("start_x", "f8"), ("start_y", "f8"), ("start_yaw", "f8"),  # root on the floor, heading
@@ -96,7 +97,7 @@ _PLAN = [
     ("midway", "f8", (6,)), ("shoulder_s", "f8"),  # a load when it is up; from there to be carried
     ("hidden", "?"),  # a load that is somebody else's until it is gripped, and after
     ("stroke", "i8"), ("stroke_m", "f8"), ("stroke_hz", "f8"), ("burst_s", "f8"),  # see `strokes`
-    ("wander_m", "f8"),  # how far they move along the work between bursts
+    ("wander_m", "f8"), ("down_m", "f8"),  # how far they move between bursts: to and fro; down
     ("treads", "f8"), ("riser_m", "f8"), ("up_s", "f8"),  # climbing
     ("left_rad", "f8"), ("left_s", "f8"), ("right_rad", "f8"), ("right_s", "f8"),  # looking round
     # Playing a clip
@@ -119,11 +120,12 @@ N_START = 16
 STAND, WALK, REACH, LIFT, TURN, CARRY, PUSH, STUMBLE, STEP_BACK, LOOK_ROUND = range(10)
 PICK_UP, SET_DOWN, HAND_OVER, RECEIVE, SQUATTING, KNEELING, HAMMER, DRILL = range(10, 18)
 OVERHEAD, SAW, MEASURE, POINT, LUNGE, CLIMB, CLIP, RUN, FALL = range(18, 27)
+SCREW = 27
 ACTIVITY_NAMES = (
     "stand", "walk", "reach", "lift", "turn", "carry", "push", "stumble", "step back",
     "look round", "pick up", "set down", "hand over", "receive", "squat", "kneel", "hammer",
     "drill", "drill overhead", "saw", "measure", "point", "lunge", "climb", "clip",
-    "run", "fall",
+    "run", "fall", "screw",
 )  # fmt: skip
 GOING, IDLE = (WALK, TURN, CARRY, STUMBLE, STEP_BACK), (STAND, LOOK_ROUND)
 TAKING, GIVING = (PICK_UP, RECEIVE), (SET_DOWN, HAND_OVER)

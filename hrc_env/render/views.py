@@ -25,8 +25,6 @@ from hrc_env.simulation import Simulation
 PICTURE_SIZE = (960, 720)
 """Width and height of a picture, if nobody asks for another [px]."""
 SMALLEST_PX, LARGEST_PX = 16, 4096
-VIEWPOINT = "beside"
-"""From where people look on: robot and worker side by side."""
 DEPTH_QUALITY = {**PICTURE_QUALITY, "offsamples": 0, "shadowsize": 0}
 MOSAIC_TILE = (640, 360)
 SIDES = (
@@ -79,11 +77,11 @@ class Views:
         self, depth: bool = False, b: int = 0, size: tuple[int, int] = PICTURE_SIZE
     ) -> NDArray[Any]:
         """Robot and worker, (height, width, 3) uint8, or distances (height, width) float32 [m]."""
-        seen = self.glance(b)
+        seen, viewpoint = self.glance(b), self.simulation.task.viewpoint
         if depth:
             renderer = self._renderer("depth", size, seen)
-            return renderer.picture(seen.q, seen.motion, VIEWPOINT, depth=True)
-        return self._drawn([viewpoint_camera(VIEWPOINT, *size)], seen, shadows=True)[0]
+            return renderer.picture(seen.q, seen.motion, viewpoint, depth=True)
+        return self._drawn([viewpoint_camera(viewpoint, *size)], seen, shadows=True)[0]
 
     def glance(self, b: int = 0) -> Glance:
         """All that there is to draw of environment `b` now."""
@@ -106,7 +104,7 @@ class Views:
 
     def room(self, width: int, height: int, seen: Glance) -> Image:
         """The room with the estimated skeleton over it."""
-        camera = viewpoint_camera(VIEWPOINT, width, height)
+        camera = viewpoint_camera(self.simulation.task.viewpoint, width, height)
         (image,) = self._drawn([camera], seen, shadows=True)
         overlay.draw_estimate(image, camera, seen.estimate)
         overlay.draw_markers(image, camera, seen.markers_world)

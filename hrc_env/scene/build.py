@@ -10,14 +10,16 @@ import numpy as np
 
 from hrc_env.core.errors import check_fields, check_names
 from hrc_env.core.records import Grounds, Held
+from hrc_env.core.things import NOTHING, Things
 from hrc_env.core.typing import Floats, Ints, JointAngles
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.geometry.chains import SerialChain, capsules
 from hrc_env.geometry.shapes import WIDTH
 from hrc_env.geometry.sight import Surroundings
 from hrc_env.scene import objects
+from hrc_env.scene.cups import Cups, cups_of
 from hrc_env.scene.objects import Objects, objects_of, surfaces
-from hrc_env.scene.places import SCENES, obstacles
+from hrc_env.scene.places import SCENES, obstacles, with_pedestal
 from hrc_env.scene.primitives import OBJECT_BIT, PAD_BIT, ROBOT_BIT, SCENE_BIT, SOLID
 from hrc_env.scene.rig import CameraConfig, add_cameras, pinholes, select
 from hrc_env.scene.robot import (
@@ -83,7 +85,7 @@ class Recipe(NamedTuple):
     bodies: tuple[str, ...]
     cameras: tuple[str, ...]
     robot: Robot
-    things: str
+    things: Things
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,12 +116,19 @@ class Scene:
     """(G, `shapes.WIDTH`) what stands still and blocks sight."""
     grounds: Grounds
     """Where people can stand, walk and work."""
+    map: Grounds
+    """The same with the pedestal among what is blocked, where that is not the robot's: what robots
+    know of the place."""
     objects: Objects
     """What is loose."""
     grip: Grip | None
-    """The robot's hand; None: it has none."""
-    things: str
-    """The MJCF of a task: what it puts there, loose and fixed; "": nothing."""
+    """The robot's fingers; None: it has none."""
+    cups: Cups | None
+    """Its cups; likewise."""
+    object_bodies: Ints
+    """(O,) the loose objects' bodies in the model."""
+    things: Things
+    """What a task puts there, loose and fixed."""
 
     @property
     def rig(self) -> tuple[CameraConfig, ...]:
@@ -155,7 +164,7 @@ def build(
     bodies: str | tuple[str, ...] = "worker_1",
     cameras: Sequence[int | str] | None = None,
     robot: str | Robot = DEFAULT,
-    things: str = "",
+    things: Things = NOTHING,
 ) -> Scene:
     """The scene of these settings, compiled once and kept.
 
@@ -166,7 +175,7 @@ def build(
         bodies: the baked body of all of them, or those that they can have; "any": all.
         cameras: names or indices of the cameras that are used; None: all.
         robot: a name or itself.
-        things: MJCF of what a task adds, from the middle of the robot's foot on [m].
+        things: what a task adds.
 
     Raises:
         ConfigError: an unknown scene, body, camera or robot.
@@ -195,6 +204,7 @@ def _build(recipe: Recipe) -> Scene:
     rows = [mocap_ids(model, prefix) for prefix in prefixes]
     touched = [capsule_geom_ids(model, body, prefix) for prefix in prefixes]
     still = obstacles(model)
+    grounds = room.grounds(still, config.clutter, things.places)
     return Scene(
         config=config,
         name=name,
@@ -210,9 +220,12 @@ def _build(recipe: Recipe) -> Scene:
         worker_mocap=np.stack(rows) if rows else np.zeros((0, 0), np.int64),
         worker_capsules=np.array(touched, np.int64).reshape(n_workers, len(body.capsule_names)),
         obstacles=still,
-        grounds=room.grounds(still, config.clutter),
+        grounds=grounds,
+        map=with_pedestal(grounds, still) if robot.drives else grounds,
         objects=loose,
         grip=grip_of(robot, model),
+        cups=cups_of(robot, model, loose, PREFIX),
+        object_bodies=np.array([model.body(objects.PREFIX + name).id for name in loose.names], int),
         things=things,
     )
 
@@ -247,29 +260,21 @@ def _spec(recipe: Recipe) -> mujoco.MjSpec:
     spec.option.timestep = config.sim_dt
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.memory = ARENA_BYTES + PAIR_BYTES * n_workers**2
-    # The velocity command in force, which body each worker has, and the hand's command: state.
-    spec.nuserdata = len(robot.joints) + n_workers + (robot.hand is not None)
+    # The velocity command in force, which body each worker has, and the hand's command or load.
+    spec.nuserdata = len(robot.joints) + n_workers + robot.grips
     foot_world = _foot_world(robot, name)
     add_robot(spec, robot, foot_world)
-    if things:
-        _add_things(spec, things, foot_world)
+    objects.add_things(spec, things, foot_world)
     add_cameras(spec, pinholes(select(config.cameras, use)))
     for prefix in _prefixes(n_workers):
         add_worker(spec, load_body(bodies[0]), prefix)
+    objects.add_welds(spec, things)
     return spec
 
 
 def _foot_world(robot: Robot, name: str) -> tuple[float, float, float]:
     """Where a robot's foot is in a scene [m]."""
     return (0.0, 0.0, 0.0) if robot.drives else SCENES[name].mount_world
-
-
-def _add_things(spec: mujoco.MjSpec, things: str, foot_world: Sequence[float]) -> None:
-    """What a task adds. Grips slip least with elliptic cones (5 kg shaken at 3 m/s^2: 8 mm in 6 s;
-    with MuJoCo's defaults 31)."""
-    spec.option.cone, spec.option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 10.0
-    child = mujoco.MjSpec.from_string(things)
-    spec.attach(child, prefix=objects.PREFIX, frame=spec.worldbody.add_frame(pos=list(foot_world)))
 
 
 def _strip(spec: mujoco.MjSpec, drives: bool) -> None:

@@ -9,9 +9,9 @@ import numpy as np
 
 from hrc_env.core.errors import check_fields
 from hrc_env.core.records import ObjectState, RobotState, World
-from hrc_env.core.typing import Capsules, Floats, Ints, Rngs
+from hrc_env.core.typing import Bools, Capsules, Floats, Ints, Rngs
 from hrc_env.scene.build import Scene
-from hrc_env.scene.objects import held_by, object_state, with_load
+from hrc_env.scene.objects import object_state, with_load
 from hrc_env.scene.physics import Physics
 
 
@@ -36,18 +36,19 @@ def world_of(physics: Physics, ids: Ints, robot: RobotState) -> World:
     qpos, qvel = physics.qpos[ids], physics.qvel[ids]
     held = np.zeros((len(ids), len(objects.names)), bool)
     if hand is not None:
-        held = held_by(objects, qpos, robot.tool_world, hand)
+        held = physics.held(ids, robot.tool_world, hand)
     return World(robot, hand, object_state(objects, qpos, qvel, held))
 
 
 def loaded(
-    scene: Scene, world: World, arm_world: Capsules, q_path: Floats
+    scene: Scene, world: World, arm_world: Capsules, q_path: Floats, loads: Bools | None = None
 ) -> tuple[World, Capsules]:
     """What a robot carries is part of it, now and along capsules (B, T, K, 2, 3) where qpos is
-    q_path (B, T, nq)."""
+    q_path (B, T, nq): all objects, or those that are `loads` (B, O)."""
     if world.objects is None:
         return world, arm_world
-    robot, arm = with_load(world.robot, arm_world, scene.objects, q_path, world.objects.held)
+    held = world.objects.held if loads is None else world.objects.held & loads
+    robot, arm = with_load(world.robot, arm_world, scene.objects, q_path, held)
     return replace(world, robot=robot), arm
 
 

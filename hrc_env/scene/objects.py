@@ -4,7 +4,8 @@ Free joints follow the robot's own in `qpos`, seven numbers each: place [m] and 
 """
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import mujoco
@@ -13,10 +14,11 @@ import numpy as np
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import HandState, ObjectState, RobotState
+from hrc_env.core.things import Things
 from hrc_env.core.typing import Bools, Capsules, Floats, Points3
 from hrc_env.geometry.rotations import turned
 from hrc_env.geometry.shapes import BOX, WIDTH, absent, shape
-from hrc_env.scene.primitives import OBJECT_BIT
+from hrc_env.scene.primitives import DECORATION, OBJECT_BIT
 from hrc_env.worker.props import placed
 
 PREFIX = "task/"
@@ -29,6 +31,29 @@ AWAY_M = 1e4
 """Where the capsules are of what is not carried [m]."""
 GRIP_M = 0.01
 """What the fingers hold has the tool point inside, or so near [m]."""
+
+
+def add_things(spec: Any, things: Things, foot_world: Sequence[float]) -> None:
+    """Put them into a scene that is being built. Grips slip least with elliptic cones (5 kg shaken
+    at 3 m/s^2: 8 mm in 6 s; with MuJoCo's defaults 31)."""
+    if things.mjcf:
+        spec.option.cone, spec.option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 10.0
+        child = mujoco.MjSpec.from_string(things.mjcf)
+        for geom in (each for body in child.bodies if _is_free(body) for each in body.geoms):
+            geom.group = DECORATION  # what is solid stands still
+        frame = spec.worldbody.add_frame(pos=list(foot_world))
+        spec.attach(child, prefix=PREFIX, frame=frame)
+
+
+def add_welds(spec: Any, things: Things) -> None:
+    """Its welds, when all sites are there."""
+    kinds = {True: mujoco.mjtEq.mjEQ_WELD, False: mujoco.mjtEq.mjEQ_CONNECT}
+    for weld in things.welds:
+        one, other = weld.sites
+        spec.add_equality(
+            type=kinds[weld.turns], objtype=mujoco.mjtObj.mjOBJ_SITE, name=weld.name, name1=one,
+            name2=other, solref=list(weld.solref), active=False,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,13 +151,8 @@ def with_load(
     loads = loads.reshape(batch, n_steps, -1, 2, 3)
     radius_m = np.concatenate([robot.capsule_radius_m, objects.capsule_radius_m.ravel()])
     path_world = np.concatenate([path_world, loads], axis=2)
-    return (
-        RobotState(
-            robot.q, robot.qd, robot.tool_world, robot.tool_velocity_world, robot.tool_axes_world,
-            path_world[:, -1], radius_m,
-        ),
-        path_world,
-    )  # fmt: skip
+    carrying = replace(robot, capsules_world=path_world[:, -1], capsule_radius_m=radius_m)
+    return carrying, path_world
 
 
 def _is_free(body: Any) -> bool:

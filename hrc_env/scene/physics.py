@@ -12,9 +12,12 @@ from mujoco.batch import Batch
 
 from hrc_env.core.errors import ConfigError, HRCError, check_shape
 from hrc_env.core.kernels import kernel
-from hrc_env.core.records import HandState, WorkerPath
-from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, JointVelocities, Records
+from hrc_env.core.records import Effects, HandState, WorkerPath
+from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, JointVelocities, Points3, Records
+from hrc_env.geometry.chains import tool
 from hrc_env.scene.build import Scene, without_workers
+from hrc_env.scene.cups import Cups, load_n, seals
+from hrc_env.scene.objects import held_by
 from hrc_env.scene.worker import CAPSULE_FIELDS, capsule_shapes
 
 COMMANDS = int(mujoco.mjtState.mjSTATE_CTRL)
@@ -22,7 +25,8 @@ COMMANDS = int(mujoco.mjtState.mjSTATE_CTRL)
 INPUTS = COMMANDS | int(mujoco.mjtState.mjSTATE_MOCAP_POS | mujoco.mjtState.mjSTATE_MOCAP_QUAT)
 """And with workers: then the places, then the turns of their bodies."""
 OF_THE_ARM = ("time", "qpos", "qvel", "act", "qacc_warmstart")
-"""What of an environment's state the arm's motion hangs on, and changes."""
+OF_THINGS = ("eq_active", "xfrc_applied")
+"""What of an environment's state the motion of the arm, and of what it handles, hangs on."""
 SERVO = np.dtype(
     [(name, "f8") for name in ("low", "high", "fastest", "slew", "lead", "clamp")], align=True
 )
@@ -47,8 +51,13 @@ class Physics:
         self._n, self._servos = scene.chain.n_joints, _servos(scene)
         self._sims = Batch(scene.model, nsim=batch, nthread=1)
         self._alone = Batch(without_workers(scene).model, nsim=batch, nthread=1)
-        self._shared = [(self._alone.bind(f), self._sims.bind(f)) for f in OF_THE_ARM]
+        fields = OF_THE_ARM + (OF_THINGS if scene.objects.names else ())
+        self._shared = [_both(self._alone, self._sims, field) for field in fields]
         self._qpos, self._qvel = self._sims.bind("qpos"), self._sims.bind("qvel")
+        self._welded = self._sims.bind("eq_active")
+        self._push = self._sims.bind("xfrc_applied") if scene.objects.names else np.zeros(0)
+        self._records = ("qpos", "sensordata") if scene.cups else ("qpos",)
+        self._parts = self._alone.bind("eq_active").shape == self._welded.shape
         self._act, kept = self._sims.bind("act"), self._sims.bind("userdata")
         self._command, self._body = kept[:, : self._n], kept[:, self._n : self._n + scene.n_workers]
         self._grip = kept[:, self._n + scene.n_workers :]
@@ -79,7 +88,10 @@ class Physics:
 
     def hand_state(self, ids: Ints) -> HandState | None:
         """What hands of environments `ids` feel; None: there are none."""
-        hand = self.scene.grip
+        hand, cups = self.scene.grip, self.scene.cups
+        if cups is not None:
+            load, sealed = self._grip[ids, 0], self._welded[ids][:, cups.welds].any(1)
+            return HandState(np.zeros(len(ids)), load.copy(), sealed)
         if hand is None:
             return None
         opening_m = self._qpos[ids][:, hand.fingers].mean(1)
@@ -88,6 +100,28 @@ class Physics:
         force_n = np.clip(hand.damping_n_s_m * rate_m_s - push_n, -hand.most_n, hand.most_n)
         still = np.abs(rate_m_s) < RESTING_M_S
         return HandState(opening_m, force_n, (force_n > PRESSING_N) & still)
+
+    def held(self, ids: Ints, tool_world: Points3, hand: HandState) -> Bools:
+        """(len(ids), O) what hands hold."""
+        objects, cups = self.scene.objects, self.scene.cups
+        if cups is None:
+            return held_by(objects, self._qpos[ids], tool_world, hand)
+        held = np.zeros((len(ids), len(objects.names)), bool)
+        held[:, cups.objects] = self._welded[ids][:, cups.welds] > 0.0
+        return held
+
+    def apply(self, effects: Effects) -> None:
+        """Do to loose objects what a task does, until it does something else."""
+        for name, on in effects.welded.items():
+            self._welded[:, self.scene.model.equality(name).id] = on
+        self._push[:, self.scene.object_bodies] = effects.push_world
+
+    def _suck(self, cups: Cups, on: Bools) -> None:
+        """Vent the cups, or let them seal; what is too heavy is torn off."""
+        q, welded = self._qpos[:, : self._n], self._welded[:, cups.welds] > 0.0
+        near = seals(cups, tool(self.scene.chain, q), self.scene.objects.poses(self._qpos))
+        torn = self._grip[:, :1] > cups.limit_n
+        self._welded[:, cups.welds] = on[:, None] & (welded | near) & ~(welded & torn)
 
     def reset(
         self, ids: Ints, q: JointAngles, body: Ints | None = None, poses: Floats | None = None
@@ -113,7 +147,7 @@ class Physics:
         qd_command: JointVelocities,
         workers: WorkerPath,
         out_of_reach: Bools | None = None,
-        opening_m: Floats | None = None,
+        grip: Floats | None = None,
     ) -> Floats:
         """One control step of every environment: (B, T, nq), `qpos` after every substep.
 
@@ -123,8 +157,7 @@ class Physics:
             workers: after every substep, arrays (B, T, W, S, ...); W may be 0.
             out_of_reach: (B,) where no worker can touch the arm in this step (None: nowhere); it
                 then moves as it would alone, bit for bit, and is quicker so.
-            opening_m: (B,) how far from the middle the fingers are to be [m], of arms with a hand;
-                limited here. None: open.
+            grip: (B,) from -1, open, to 1, closed; of cups, above 0 they suck. None: open.
 
         Raises:
             ConfigError: wrong shapes. HRCError: the physics broke down, with the reason.
@@ -137,11 +170,15 @@ class Physics:
             np.asarray(qd_command, float), self._servos, self.scene.config.sim_dt,
             self._control,
         )  # fmt: skip
+        wanted = np.full(self.batch, -1.0) if grip is None else np.nan_to_num(grip, nan=-1.0)
         if self.scene.grip is not None:
-            most_m = self.scene.grip.open_m
-            wanted = np.full(self.batch, most_m) if opening_m is None else opening_m
-            self._grip[:, 0] = np.clip(np.nan_to_num(wanted, nan=most_m), 0.0, most_m)
-        alone = np.zeros(self.batch, bool) if out_of_reach is None else out_of_reach
+            share = 0.5 * (1.0 - np.clip(wanted, -1.0, 1.0))
+            self._grip[:, 0] = share * self.scene.grip.open_m
+        if self.scene.cups is not None:
+            self._suck(self.scene.cups, wanted > 0.0)
+        alone = np.zeros(self.batch, bool)
+        if out_of_reach is not None and self._parts:
+            alone = out_of_reach
         self._roll(~alone, workers)
         self._roll(alone, None)
         self._check_health()
@@ -201,8 +238,10 @@ class Physics:
             control = np.concatenate([control, *(path.reshape(lead) for path in paths)], axis=2)
         for alone, beside in shared:
             alone[rows] = beside[rows]
-        trace = sims.rollout(control.shape[1], control, inputs, ("qpos",), ids)
+        trace = sims.rollout(control.shape[1], control, inputs, self._records, ids)
         self._trace[rows] = trace["qpos"]
+        if (cups := self.scene.cups) is not None:
+            self._grip[rows, 0] = load_n(cups, trace["sensordata"]).max(axis=1)
         for alone, beside in shared:
             beside[rows] = alone[rows]
 
@@ -216,6 +255,12 @@ class Physics:
                     f"({mujoco.mjtWarning(int(kind)).name}): expected finite states and bounded "
                     "contacts; reset it, and look at what it was commanded."
                 )
+
+
+def _both(alone: Batch, beside: Batch, field: str) -> tuple[Floats, Floats]:
+    """A field of the same environments without workers and with them, whose bodies come last."""
+    less, more = alone.bind(field), beside.bind(field)
+    return less, more[:, : less.shape[1]] if less.ndim > 1 else more
 
 
 def no_workers(batch: int, n_substeps: int) -> WorkerPath:

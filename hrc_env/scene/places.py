@@ -2,7 +2,7 @@
 what stands still in them as plain numbers."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -64,18 +64,26 @@ class Room:
     flat: tuple[Footprint, ...] = ()
     """With clutter: what stands in the way and hides nobody."""
 
-    def grounds(self, obstacles: Floats, clutter: bool) -> Grounds:
-        """Where people can be between shapes (G, `shapes.WIDTH`) that stand there."""
+    def grounds(
+        self, obstacles: Floats, clutter: bool, further: tuple[Workplace, ...] = ()
+    ) -> Grounds:
+        """Where people can be between shapes (G, `shapes.WIDTH`) that stand there; `further` places
+        are given from the robot's foot on."""
         robot_xy_m = self.mount_world[:2]
         blocked = footprints(obstacles, robot_xy_m)
         if clutter:
             walls, flat = (np.reshape(each, (-1, 5)) for each in (self.open_walls, self.flat))
             blocked = np.concatenate([blocked[~within(blocked, walls)], walls, flat])
+        x, y, z = self.mount_world
+        moved = tuple(
+            replace(each, xy_m=(x + each.xy_m[0], y + each.xy_m[1]), height_m=z + each.height_m)
+            for each in further
+        )
         return Grounds(
             walkable_x_m=self.walkable_x_m,
             walkable_y_m=self.walkable_y_m,
             blocked=blocked,
-            places=self.places + (self.clutter_places if clutter else ()),
+            places=self.places + (self.clutter_places if clutter else ()) + moved,
             robot_xy_m=robot_xy_m,
             robot_clearance_m=ROBOT_CLEARANCE_M,
         )
@@ -85,6 +93,14 @@ SCENES: dict[str, Room] = {
     path.stem: from_mapping(Room, read_toml(path))
     for path in sorted((assets_dir() / "scenes").glob("*.toml"))
 }
+
+
+def with_pedestal(grounds: Grounds, obstacles: Floats) -> Grounds:
+    """The same for a robot that drives: what stands on the pedestal's axis is in its way."""
+    x, y = grounds.robot_xy_m
+    standing = footprints(obstacles, (math.inf, math.inf))
+    own = standing[np.hypot(standing[:, 0] - x, standing[:, 1] - y) < 1e-3]
+    return replace(grounds, blocked=np.concatenate([grounds.blocked, own]))
 
 
 def obstacles(model: mujoco.MjModel) -> Floats:

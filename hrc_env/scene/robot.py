@@ -51,6 +51,22 @@ class Hand:
 
 
 @dataclass(frozen=True, slots=True)
+class Suction:
+    """Cups at the end of an arm: what they touch sticks to them until it is torn off."""
+
+    site: str
+    """At the middle of the cups, z away from the arm; objects have sites of that pose."""
+    gauge: str
+    """The `force` sensor of what hangs on them."""
+    limit_n: float
+    """Above this load they let go [N]."""
+    pads: tuple[str, ...]
+    """The geoms that touch."""
+    spans: tuple[str, ...]
+    """Those of the robot's capsules that stand for the cups; they touch people only."""
+
+
+@dataclass(frozen=True, slots=True)
 class Robot:
     """A serial arm, or a base that drives; names are those of its MJCF."""
 
@@ -73,7 +89,8 @@ class Robot:
     never_touch: tuple[tuple[str, str], ...] = ()
     """(capsule, geom of a scene) that no pose brings together, near as they may always be."""
     hand: Hand | None = None
-    """What it grips with; None: nothing."""
+    suction: Suction | None = None
+    """What it grips with: fingers, or cups; None: nothing."""
     drives: bool = False
     """Whether it moves about on the floor, its foot the world's origin; else its foot is on the
     scene's pedestal."""
@@ -84,7 +101,14 @@ class Robot:
     """Fastest change of each joint's commanded velocity [rad/s^2]; none: `SceneConfig.slew_rad_s2`
     for all."""
 
+    @property
+    def grips(self) -> bool:
+        """Whether it can hold something."""
+        return bool(self.hand or self.suction)
+
     def __post_init__(self) -> None:
+        if self.hand and self.suction:
+            raise ConfigError(f"{self.name} has a hand and suction: give one of them.")
         for name in ("home_q", "spread_rad", "slew"):
             values = getattr(self, name)
             if name == "slew" and not values:
@@ -134,7 +158,7 @@ def robot_called(robot: str | Robot) -> Robot:
 
 def add_robot(spec: Any, robot: Robot, mount_world: Sequence[float]) -> None:
     """Put a robot into a scene that is being built, its foot at a point [m]."""
-    child, hand = _parsed(robot), robot.hand
+    child, hand = _parsed(robot), robot.hand or robot.suction
     pads, spans = (hand.pads, hand.spans) if hand else ((), ())
     for geom in child.geoms:
         if geom.name in robot.capsules:
@@ -185,8 +209,8 @@ def check_robot(robot: Robot) -> None:
         raise ConfigError(f"A robot must be a Robot, got {type(robot).__name__}.")
     chain = chain_of(robot, (0.0, 0.0, 0.0))
     check_names(f"watched capsule of {robot.name}", robot.watched, robot.capsules)
-    if robot.hand:
-        check_names(f"capsule for fingers of {robot.name}", robot.hand.spans, robot.capsules)
+    if grips := robot.hand or robot.suction:
+        check_names(f"capsule for the hand of {robot.name}", grips.spans, robot.capsules)
     low, high = chain.range_rad.T
     if ((robot.home_q < low) | (robot.home_q > high)).any():
         raise ConfigError(f"{robot.name}: home_q {robot.home_q} is outside of the joints' ranges.")

@@ -3,6 +3,8 @@
 BUILT_IN = {
     "HRCReach-v0": "hrc_env.tasks.reach",
     "HRCPickPlace-v0": "hrc_env.tasks.pick_place",
+    "HRCDelivery-v0": "hrc_env.tasks.delivery",
+    "HRCDrywall-v0": "hrc_env.tasks.drywall",
     "HRCReachGoal-v0": "hrc_env.tasks.reach_goal",
     "HRCPickPlaceGoal-v0": "hrc_env.tasks.pick_place_goal",
 }
@@ -10,5 +12,11 @@ BUILT_IN = {
 DEFAULT = next(iter(BUILT_IN))
 EPISODE_STEPS = 250
 """An episode's time limit, unless a task's file says otherwise: 10 s at 25 Hz."""
-LONGER = {"HRCPickPlace-v0": 750, "HRCReachGoal-v0": 100, "HRCPickPlaceGoal-v0": 750}
+LONGER = {
+    "HRCPickPlace-v0": 750,
+    "HRCDelivery-v0": 1000,
+    "HRCDrywall-v0": 1000,
+    "HRCReachGoal-v0": 100,
+    "HRCPickPlaceGoal-v0": 750,
+}
 """Those of built-in tasks that do, known before their files are imported."""

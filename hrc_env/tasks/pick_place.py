@@ -8,6 +8,7 @@ import numpy as np
 from hrc_env.belief import Belief
 from hrc_env.core.errors import ConfigError, check_fields, needed
 from hrc_env.core.records import ObjectState, World
+from hrc_env.core.things import Things
 from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records
 from hrc_env.geometry.rotations import matrix
 from hrc_env.observations import ObservationTerm
@@ -93,9 +94,9 @@ def places_world() -> Points3:
     return MOUNT_WORLD + np.array(PLACES_M)
 
 
-def things(config: PlacedConfig) -> str:
-    """Table, rack and pieces as MJCF."""
-    return Path(assets_dir() / "tasks" / "pick_place.xml").read_text()
+def things(config: PlacedConfig) -> Things:
+    """Table, rack and pieces."""
+    return Things(Path(assets_dir() / "tasks" / "pick_place.xml").read_text())
 
 
 def init(batch: int) -> Records:

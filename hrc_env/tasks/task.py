@@ -11,8 +11,9 @@ import numpy as np
 
 from hrc_env import observations, rewards
 from hrc_env.core.errors import ConfigError, NoGoalError, check_shape, unknown
-from hrc_env.core.records import World
-from hrc_env.core.typing import Bools, Floats, Ints, Points3
+from hrc_env.core.records import Effects, Grounds, World
+from hrc_env.core.things import NOTHING, Things
+from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, Points3
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm
 from hrc_env.tasks import BUILT_IN, EPISODE_STEPS
@@ -62,12 +63,31 @@ class Task:
     """Who does it unless somebody says otherwise; None: the default robot."""
     grips: bool = False
     """Whether that must be a robot with a hand."""
-    things: Callable[[Any], str] = lambda config: ""
-    """(config) -> MJCF of what the task puts there, from the middle of the robot's foot on [m]:
-    bodies of boxes, loose with a free joint and contype 16, fixed with contype 1."""
+    drives: bool = False
+    """Whether it must be one that drives; others must not."""
+    scene: str = "lab"
+    """Where, unless somebody says otherwise,"""
+    n_workers: int | tuple[int, int] = 1
+    """and beside how many workers."""
+    viewpoint: str = "beside"
+    """From where people look on: one of `scene.render.VIEWPOINTS`."""
+    survey: Callable[[Grounds, Any], Any] = lambda grounds, config: None
+    """(map, config) -> `World.place`: what the task makes of the place, once. It raises
+    `ConfigError` where there is no room for the task."""
+    start: Callable[[Rngs, Any, Any], JointAngles] | None = None
+    """(rngs, place, config) -> (n, N) where robots begin; None: near their pose at rest."""
+    things: Callable[[Any], Things] = lambda config: NOTHING
+    """(config) -> what the task puts there."""
     poses: Callable[[Any, Ints, Any], Floats] | None = None
     """(state, ids, config) -> (n, O, 7) where what is loose lies when `reset` is done: place in
     the world [m] and quaternion; None: as in the MJCF."""
+    loads: Callable[[Any], Bools] | None = None
+    """(state) -> (B, O) which objects count as part of the robot while it holds them: in cost,
+    separations and belief; None: all."""
+    cue: Callable[[Any], Bools] | None = None
+    """(state) -> (B,) whether workers may go on with what waits for the task (`Job.waits`)."""
+    effects: Callable[[Any, Any], Effects] | None = None
+    """(state, config) -> what is done to objects until the next step; None: nothing."""
     over: Callable[[Any], Bools] | None = None
     """(progress) -> (B,) whether there is nothing more to do; None: there always is."""
     defaults: Mapping[str, Any] = field(default_factory=dict)
@@ -79,7 +99,8 @@ class Task:
     @property
     def observation_terms(self) -> tuple[ObservationTerm, ...]:
         """All of the observation, in its order: the robot, the task, the workers."""
-        return (*observations.ROBOT_TERMS, *self.observations, *observations.SHARED_TERMS)
+        slides = observations.SLIDE_TERMS if self.drives else ()
+        return (*observations.ROBOT_TERMS, *slides, *self.observations, *observations.SHARED_TERMS)
 
     @property
     def own_rewards(self) -> tuple[RewardTerm, ...]:

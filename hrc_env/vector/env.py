@@ -20,6 +20,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from hrc_env.config import settle
+from hrc_env.control import checked_action
 from hrc_env.core.batching import copied, mapped, one, write_rows
 from hrc_env.core.errors import ConfigError, unknown, whole
 from hrc_env.core.machine import n_cores
@@ -27,7 +28,7 @@ from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.env import EnvBase, spaces
 from hrc_env.render.views import PICTURE_SIZE, Views
 from hrc_env.rewards import RewardConfig
-from hrc_env.simulation import Simulation, checked_action
+from hrc_env.simulation import Simulation
 from hrc_env.step import Observation, StepResult
 from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import task_called

@@ -15,6 +15,7 @@ from gymnasium.utils import seeding
 from numpy.typing import NDArray
 
 from hrc_env.config import settle
+from hrc_env.control import checked_action
 from hrc_env.core.machine import n_cores
 from hrc_env.core.records import WorkerTruth
 from hrc_env.core.skeleton import N_JOINTS
@@ -26,7 +27,7 @@ from hrc_env.experiments.study.rigs import Turn
 from hrc_env.geometry import chains
 from hrc_env.geometry.distances import least_separation
 from hrc_env.motion import generator
-from hrc_env.simulation import Simulation, checked_action
+from hrc_env.simulation import Simulation
 from hrc_env.step import Info
 from hrc_env.vector.shards import Shards
 from hrc_env.worker.body import worker_truth

@@ -43,7 +43,7 @@ def dominant(draw: float, me: Worker) -> int:
 def blank(me: Worker) -> None:
     """A plan without steps and work of its own; what is carried stays."""
     me.lean = me.twist = me.squat = me.kneel = me.crouch = me.ahead = 0.0
-    me.hold_s = me.take_s = me.wander_m = me.stroke_m = me.stroke_hz = me.burst_s = 0.0
+    me.hold_s = me.take_s = me.wander_m = me.down_m = me.stroke_m = me.stroke_hz = me.burst_s = 0.0
     me.tool = me.side = me.stroke = 0
     me.target[:] = me.used[:] = 0.0
     me.hidden = False

@@ -46,13 +46,32 @@ def stroke(t: float, me: Worker) -> None:
 
 @kernel
 def _wander(n: int, u: float, other: int, me: Worker) -> None:
-    """Go to and fro along the work, a place a burst."""
+    """Go to and fro along the work, or down, a place a burst."""
     q = me.q
     on = min_jerk((u - me.burst_s) / PAUSE_S)
+    if me.down_m > 0.0:
+        last = round(me.hold_s / (me.burst_s + PAUSE_S)) - 1.0
+        down = me.down_m * min(n + on, last)
+        q[c.PROP_POSE + 2] -= down
+        q[other + 2] -= down
     here = n % 2
     share = here + on * (1.0 - 2.0 * here)
     shift(q, c.PROP_POSE, me.start_yaw, 0.0, me.wander_m * share)
     shift(q, other, me.start_yaw, 0.0, me.wander_m * share)
+
+
+@kernel
+def screws(me: Worker) -> tuple[int, bool]:
+    """How many bursts of work are done, and whether one goes on."""
+    t = me.time_s - me.out_at - me.take_s - me.out_s
+    cycle = me.burst_s + PAUSE_S
+    if t <= 0.0:
+        return 0, False
+    if t >= me.hold_s:
+        return round(me.hold_s / cycle), False
+    n = int(t / cycle)
+    goes_on = t - n * cycle < me.burst_s
+    return (n, me.pace > 0.0) if goes_on else (n + 1, False)
 
 
 @kernel

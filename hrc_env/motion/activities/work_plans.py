@@ -25,6 +25,9 @@ WALL_M, OVERHEAD_M = 1.2, 1.7
 """From these heights on nails go into a wall, not downwards; people work above their head [m]."""
 BIT_M, BIT_UP_M, THRUST_M = 0.22, 0.09, 0.04
 """Tip of the bit: ahead of the fist and above it (`props`); how far it goes in: a screw [m]."""
+SCREWS, SCREW_PITCH_M, FIST_M, ASKEW_RAD = 4, 0.15, (0.467, 0.127), -0.25 * math.pi
+"""Of who screws beside what a robot holds: how many, how far below each other, where the fist is
+ahead and left of the feet [m], how far the drill is turned from where the worker looks."""
 CUT_RAD = 0.6
 """How steeply the blade goes into the board [rad]; 45 to 60 degrees to it is usual, judgement."""
 SHOULDER_SHARE, SHOULDER_M = 1.50, 0.19
@@ -78,6 +81,19 @@ def plan_drill(draws: Floats, height: float, me: Worker) -> float:
     kind, burst_s = strokes.PRESS if overhead else strokes.BORE, between(draws[2], 1.5, 1.8)
     to.strokes(kind, THRUST_M, 0.0, burst_s, 2 + int(3.0 * draws[3]), me)
     me.wander_m = 0.12 * sign
+    return CALM_M_S
+
+
+@kernel
+def plan_screw(draws: Floats, height: float, me: Worker) -> float:
+    """Plan to drive screws, each below the last, the first at the height."""
+    side, _ = to.begin(draws[0], me)
+    to.step_ahead(1 - side, 0.12, me)
+    ahead, left = FIST_M
+    to.put_tool(DRILL, side, (ahead, left, height - BIT_UP_M), (ASKEW_RAD, 0.0, 0.0), me)
+    to.look_to((ahead + 0.18, left - 0.18, height - 0.2), me)
+    to.strokes(strokes.PRESS, THRUST_M, 0.0, between(draws[2], 1.0, 1.3), SCREWS, me)
+    me.down_m = SCREW_PITCH_M
     return CALM_M_S
 
 

@@ -1,0 +1,198 @@
+"""Drives without learning: what to do next follows from the observation and the map alone.
+
+The way is the fall of a field of lengths (Dijkstra) from the zone, on which people who stand are
+dear ground; fields are kept, as they change only when somebody stops or sets off. Velocities are
+judged as in a dynamic window (Fox, Burgard and Thrun 1997, doi:10.1109/100.580977): where each of
+some leads in two seconds, along the field, past what stands there and past where people will be.
+Who stands and waits for the base is gone round, so that the two do not wait for each other.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hrc_env.core.skeleton import N_JOINTS
+from hrc_env.geometry.ways import gaps_m, nearest_point, ways_m
+from hrc_env.observations import split
+
+from .env_info import EnvInfo
+from .scripted import Yielding
+
+Array = NDArray[np.float64]
+CELL_M, BEYOND_M = 0.2, 3.0
+"""Grid of the fields; how far beyond where people walk the base drives [m]."""
+FREE_M, NARROW_M, DEAR = 0.68, 0.44, 4.0
+"""Room that counts as free, and that a way needs at least [m]; a metre between counts so often."""
+BODY_M, BASE_M, DISC_M, DISC_AT_M = 0.30, 0.60, 0.47, 0.22
+"""Radius of a person; of a base turned anyhow; of two discs ahead and behind that hold it [m]."""
+STANDS_M_S, STOOD_M, STOOD_DEAR, SPOT_M = 0.25, 1.1, 6.0, 0.4
+"""Who is slower stands; ground so near to them counts so many times more; places are rounded."""
+BRAKE_M_S2, GONE_S, KEEP_M = 1.5, 0.3, 0.2
+"""Towards a person no faster than sqrt(2 a (gap - 0.3 s v - 0.2 m)), v their speed."""
+SPEEDS_M_S, HEADINGS = (0.25, 0.6, 1.0, 1.35), 24
+TIMES_S = np.array([0.2, 0.5, 0.8, 1.2, 1.6, 2.0])
+NEAR_M, NEAR_GAIN_HZ, STOP_M = 1.0, 1.2, 0.15
+"""So near to its zone the base makes straight for the middle, and stops."""
+GOOD_M, PEOPLE_PRICE, TOUCH_PRICE, FAST_PRICE, WALL_PRICE = 0.7, 6.0, 60.0, 20.0, 200.0
+"""Room past people that costs nothing; prices against a metre of the way."""
+CHANGE_PRICE_S, TURN_HZ, TURN_RAD_S = 0.1, 1.5, 1.0
+FIELDS = 1024
+"""So many are kept."""
+
+
+class Deliverer:
+    """Route and dynamic window, with or without yielding."""
+
+    def __init__(self, env_info: EnvInfo, yielding: Yielding | None = None) -> None:
+        self.env_info, self.yielding = env_info, yielding
+        grounds = env_info.map
+        (x0, x1), (y0, y1) = grounds.walkable_x_m, grounds.walkable_y_m
+        self._xs = np.arange(x0 - BEYOND_M, x1 + BEYOND_M, CELL_M)
+        self._ys = np.arange(y0 - BEYOND_M, y1 + BEYOND_M, CELL_M)
+        self._origin = np.array([self._xs[0], self._ys[0]])
+        self._gaps = gaps_m(self._xs, self._ys, grounds.blocked)
+        self._price = np.where(self._gaps > FREE_M, 1.0, DEAR)
+        self._price[self._gaps < NARROW_M] = np.inf
+        self._fields = np.zeros((FIELDS, *self._gaps.shape), np.float32)
+        self._rows: dict[tuple[tuple[int, int], ...], int] = {}
+        angles = 2 * np.pi * np.arange(HEADINGS) / HEADINGS
+        heads = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        self._window = np.concatenate([np.zeros((1, 2)), *(s * heads for s in SPEEDS_M_S)])
+        fastest = env_info.chain.velocity_limit_rad_s
+        self._most = env_info.control_config.joint_speed_share * fastest
+
+    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Actions (..., 3): towards the zone, round people."""
+        terms = split(np.atleast_2d(observation), self.env_info.layout)
+        place, speed = terms["slide_position"], terms["slide_velocity"]
+        yaw = np.arctan2(terms["joint_angle_sin"], terms["joint_angle_cos"])[:, 0]
+        people, moving = _people(terms)
+        field = self._field_rows(place, terms["zone_from_base"], people, moving)
+        velocity = self._chosen(place, speed, yaw, terms["zone_from_base"], field, (people, moving))
+        turn = self._turn(place, yaw, velocity)
+        if self.yielding is not None:
+            nearest_m = terms["worker_separation"].min(axis=-1, initial=np.inf)
+            share = self.yielding.share(nearest_m)
+            velocity, turn = velocity * share[:, None], turn * share
+        action = np.concatenate([velocity, turn[:, None]], axis=1) / self._most
+        action = np.clip(action, -1.0, 1.0)
+        return action.reshape(*observation.shape[:-1], -1).astype(np.float32)
+
+    def _field_rows(self, place: Array, zone: Array, people: Array, moving: Array) -> Array:
+        """(n,) which field each base follows: of its zone, with who stands on the ground."""
+        stands = np.linalg.norm(moving, axis=-1) < STANDS_M_S
+        spots = np.rint((place[:, None] + people) / SPOT_M)
+        rows = np.empty(len(place), np.int64)
+        for b, (x, y) in enumerate((place + zone).tolist()):
+            standing = {(int(i), int(j)) for i, j in spots[b, stands[b]] if abs(i) < 1e3}
+            key = (nearest_point(x, y, self._origin, CELL_M), *sorted(standing))
+            if key not in self._rows:
+                self._keep(key)
+            rows[b] = self._rows[key]
+        return rows
+
+    def _keep(self, key: tuple[tuple[int, int], ...]) -> None:
+        """Make a field in place of the oldest."""
+        row = len(self._rows)
+        if row == FIELDS:
+            row = self._rows.pop(next(iter(self._rows)))
+        goal, *standing = key
+        price = self._price
+        for i, j in standing:
+            away = np.hypot(self._xs[:, None] - SPOT_M * i, self._ys - SPOT_M * j)
+            price = price * np.where(away < STOOD_M, STOOD_DEAR, 1.0)
+        self._fields[row] = ways_m(price, goal, CELL_M)
+        self._rows[key] = row
+
+    def _chosen(
+        self, place: Array, speed: Array, yaw: Array, zone: Array, field: Array,
+        others: tuple[Array, Array],
+    ) -> Array:  # fmt: skip
+        """(n, 2) the cheapest velocity [m/s]."""
+        n, away_m = len(place), np.linalg.norm(zone, axis=1)
+        straight = (
+            zone * np.minimum(NEAR_GAIN_HZ, SPEEDS_M_S[-1] / np.maximum(away_m, 1e-6))[:, None]
+        )
+        window = np.broadcast_to(self._window, (n, *self._window.shape))
+        window = np.concatenate([straight[:, None], window], axis=1)
+        shift = _shifts(speed[:, None], window)  # (n, C, T, 2) from the place now
+        at = place[:, None, None] + shift
+        ahead = DISC_AT_M * np.stack([np.cos(yaw), np.sin(yaw)], axis=1)[:, None, None]
+        room = np.minimum(self._at(self._gaps, at + ahead), self._at(self._gaps, at - ahead))
+        price = WALL_PRICE * np.maximum(DISC_M - room, 0.0).sum(-1)
+        price += self._left(field, at[:, :, -1]) + 0.5 * self._left(field, at[:, :, 2])
+        price += CHANGE_PRICE_S * np.linalg.norm(window - speed[:, None], axis=-1)
+        price += _people_price(shift, window, *others)
+        direct = (away_m < NEAR_M) & (price[:, 0] < price[:, 1:].min(1) + 1.0)
+        best = window[np.arange(n), np.where(direct, 0, np.argmin(price, axis=1))]
+        return np.where((away_m < STOP_M)[:, None], 0.0, best)
+
+    def _left(self, field: Array, at: Array) -> Array:
+        """(n, C) length of the way from places (n, C, 2)."""
+        i, j, u, v = self._cells(at)
+        k = field[:, None]
+        low = self._fields[k, i, j] * (1 - v) + self._fields[k, i, j + 1] * v
+        high = self._fields[k, i + 1, j] * (1 - v) + self._fields[k, i + 1, j + 1] * v
+        return low * (1 - u) + high * u
+
+    def _at(self, grid: Array, at: Array) -> Array:
+        """A grid between its points, at places (..., 2)."""
+        i, j, u, v = self._cells(at)
+        low = grid[i, j] * (1 - v) + grid[i, j + 1] * v
+        return low * (1 - u) + (grid[i + 1, j] * (1 - v) + grid[i + 1, j + 1] * v) * u
+
+    def _cells(self, at: Array) -> tuple[Array, Array, Array, Array]:
+        most = np.array(self._gaps.shape) - 1.001
+        where = np.clip((at - self._origin) / CELL_M, 0.0, most)
+        low = where.astype(np.int64)
+        share = where - low
+        return low[..., 0], low[..., 1], share[..., 0], share[..., 1]
+
+    def _turn(self, place: Array, yaw: Array, velocity: Array) -> Array:
+        """(n,) turn rate [rad/s] towards where the base drives, where there is room to turn."""
+        wanted = np.arctan2(velocity[:, 1], velocity[:, 0])
+        error = (wanted - yaw + np.pi) % (2 * np.pi) - np.pi
+        rate = np.clip(TURN_HZ * error, -TURN_RAD_S, TURN_RAD_S)
+        rate[np.linalg.norm(velocity, axis=1) < 0.2] = 0.0
+        then = yaw + 0.4 * np.sign(rate)
+        ahead = DISC_AT_M * np.stack([np.cos(then), np.sin(then)], axis=1)
+        room = np.minimum(self._at(self._gaps, place + ahead), self._at(self._gaps, place - ahead))
+        roomy = self._at(self._gaps, place) > BASE_M + 0.04
+        return np.where(roomy | (room > DISC_M), rate, 0.0)
+
+
+def _people(terms: dict[str, Array]) -> tuple[Array, Array]:
+    """(n, W, 2) from the base to the middle of each worker, and how they move; very far away who
+    is not known."""
+    n = len(terms["way_left"])
+    joints = terms["worker_joints_from_tool"].reshape(n, -1, N_JOINTS, 3)[..., :2].mean(2)
+    moving = terms["worker_joints_velocity"].reshape(n, -1, N_JOINTS, 3)[..., :2].mean(2)
+    known = (terms["worker_tracked"] > 0.5)[..., None]
+    return np.where(known, joints, 1e4), np.where(known, moving, 0.0)
+
+
+def _shifts(speed: Array, window: Array) -> Array:
+    """(n, C, T, 2) where velocities lead, which are reached at the base's slew."""
+    change = window - speed
+    ramp = np.abs(change) / BRAKE_M_S2
+    t, ramp, change = TIMES_S[:, None], ramp[:, :, None], change[:, :, None]
+    early = 0.5 * BRAKE_M_S2 * np.sign(change) * t**2 + speed[:, :, None] * t
+    late = window[:, :, None] * t - 0.5 * change * ramp
+    return np.where(t < ramp, early, late)
+
+
+def _people_price(shift: Array, window: Array, people: Array, moving: Array) -> Array:
+    """(n, C) of coming near to where people will be, and of driving at them."""
+    price = np.zeros(shift.shape[:2])
+    for w in range(people.shape[1]):
+        there = people[:, w, None] + moving[:, w, None] * TIMES_S[:, None]  # (n, T, 2)
+        gap = np.linalg.norm(there[:, None] - shift, axis=-1) - BODY_M - BASE_M
+        price += PEOPLE_PRICE * np.square(np.maximum(GOOD_M - gap, 0.0)).sum(-1)
+        price += TOUCH_PRICE * np.maximum(0.1 - gap, 0.0).sum(-1)
+        away_m = np.linalg.norm(people[:, w], axis=-1)
+        towards = people[:, w] / np.maximum(away_m, 1e-6)[:, None]
+        walking = np.linalg.norm(moving[:, w], axis=-1)
+        left_m = np.maximum(away_m - BODY_M - BASE_M - GONE_S * walking - KEEP_M, 0.0)
+        closing = (window * towards[:, None]).sum(-1)
+        most = np.sqrt(2 * BRAKE_M_S2 * left_m)[:, None]
+        price += FAST_PRICE * np.maximum(closing - most, 0.0)
+    return price
