@@ -112,19 +112,20 @@ def _learn(
     optimiser = torch.optim.Adam(policy.parameters(), settings.learning_rate)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, n_steps)
     policy.set_training_mode(True)
-    losses = []
+    errors = []
     for _ in range(n_steps):
         batch = rng.integers(len(told), size=settings.batch_size)
         tensors: Any = {name: torch.as_tensor(part[batch]) for name, part in seen.items()}
         meant = policy._predict(tensors.get(FLAT, tensors), deterministic=True)
-        loss = torch.nn.functional.l1_loss(meant, torch.as_tensor(told[batch]))
+        off = (meant - torch.as_tensor(told[batch])).abs()
+        loss = (off + off.square()).mean()  # small motions matter, and the few moments to switch
         optimiser.zero_grad()
         loss.backward()
         optimiser.step()
         schedule.step()
-        losses.append(loss.item())
+        errors.append(off.mean().item())
     policy.set_training_mode(False)
-    return float(np.mean(losses[-max(n_steps // 10, 1) :]))
+    return float(np.mean(errors[-max(n_steps // 10, 1) :]))
 
 
 def _named(observation: Observation) -> Arrays:
