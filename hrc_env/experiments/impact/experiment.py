@@ -26,7 +26,7 @@ from hrc_env.tracking.estimators import estimator_called
 
 PARTS_FROM = (
     "hrc_env.experiments.impact.episodes", "hrc_env.experiments.impact.policies",
-    "agents.registry", "agents.ppo", "agents.callbacks",
+    "agents.registry", "agents.ppo", "agents.checkpoints", "agents.callbacks",
 )  # fmt: skip
 """Those that make finished parts."""
 FIRST_SEED = 1_000_000

@@ -64,6 +64,7 @@ def trained(cache: PartCache, n_steps: int, path: Path, key: str) -> str:
 def _train(n_steps: int, path: Path, tick: PartProgress) -> dict[str, Any]:
     """Learn on the camera emulator with the default estimator; write the checkpoint."""
     ppo, callbacks = agents("ppo"), agents("callbacks")
+    checkpoints = agents("checkpoints")
     import torch
     from stable_baselines3.common.callbacks import ConvertCallback
 
@@ -84,7 +85,7 @@ def _train(n_steps: int, path: Path, tick: PartProgress) -> dict[str, Any]:
         ramp = callbacks.Ramp(round(RAMP_SHARE * n_steps))
         care = callbacks.ProximityCurriculum(ramp, env)
         learner.learn(n_steps, callback=[care, ConvertCallback(advance)])
-        ppo.save(learner, path, {"people": PEOPLE, "seed": SEED})
+        checkpoints.save(learner, path, {"people": PEOPLE, "seed": SEED})
     finally:
         env.close()
         torch.set_num_threads(threads)
