@@ -10,6 +10,7 @@ import pytest
 
 from benchmarks import results
 from docs import generate, tables
+from hrc_env.tasks import BUILT_IN
 
 ROOT = Path(__file__).resolve().parent.parent
 README = ROOT / "README.md"
