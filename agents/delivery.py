@@ -14,10 +14,11 @@ from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.geometry.ways import gaps_m, nearest_point, ways_m
 from hrc_env.observations import split
 
-from .env_info import EnvInfo
+from .env_info import EnvInfo, Observation
 from .scripted import Yielding
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 CELL_M, BEYOND_M = 0.2, 3.0
 """Grid of the fields; how far beyond where people walk the base drives [m]."""
 FREE_M, NARROW_M, DEAR = 0.68, 0.44, 4.0
@@ -60,9 +61,11 @@ class Deliverer:
         fastest = env_info.chain.velocity_limit_rad_s
         self._most = env_info.control_config.joint_speed_share * fastest
 
-    def act(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+    def act(self, observation: Observation) -> NDArray[np.float32]:
         """Actions (..., 3): towards the zone, round people."""
-        terms = split(np.atleast_2d(observation), self.env_info.layout)
+        terms = split(observation, self.env_info.layout)
+        shape = terms["slide_position"].shape[:-1]
+        terms = {name: np.atleast_2d(term) for name, term in terms.items()}
         place, speed = terms["slide_position"], terms["slide_velocity"]
         yaw = np.arctan2(terms["joint_angle_sin"], terms["joint_angle_cos"])[:, 0]
         people, moving = _people(terms)
@@ -75,9 +78,9 @@ class Deliverer:
             velocity, turn = velocity * share[:, None], turn * share
         action = np.concatenate([velocity, turn[:, None]], axis=1) / self._most
         action = np.clip(action, -1.0, 1.0)
-        return action.reshape(*observation.shape[:-1], -1).astype(np.float32)
+        return action.reshape(*shape, -1).astype(np.float32)
 
-    def _field_rows(self, place: Array, zone: Array, people: Array, moving: Array) -> Array:
+    def _field_rows(self, place: Array, zone: Array, people: Array, moving: Array) -> Ints:
         """(n,) which field each base follows: of its zone, with who stands on the ground."""
         stands = np.linalg.norm(moving, axis=-1) < STANDS_M_S
         spots = np.rint((place[:, None] + people) / SPOT_M)
@@ -104,7 +107,7 @@ class Deliverer:
         self._rows[key] = row
 
     def _chosen(
-        self, place: Array, speed: Array, yaw: Array, zone: Array, field: Array,
+        self, place: Array, speed: Array, yaw: Array, zone: Array, field: Ints,
         others: tuple[Array, Array],
     ) -> Array:  # fmt: skip
         """(n, 2) the cheapest velocity [m/s]."""
@@ -126,7 +129,7 @@ class Deliverer:
         best = window[np.arange(n), np.where(direct, 0, np.argmin(price, axis=1))]
         return np.where((away_m < STOP_M)[:, None], 0.0, best)
 
-    def _left(self, field: Array, at: Array) -> Array:
+    def _left(self, field: Ints, at: Array) -> Array:
         """(n, C) length of the way from places (n, C, 2)."""
         i, j, u, v = self._cells(at)
         k = field[:, None]
@@ -140,7 +143,7 @@ class Deliverer:
         low = grid[i, j] * (1 - v) + grid[i, j + 1] * v
         return low * (1 - u) + (grid[i + 1, j] * (1 - v) + grid[i + 1, j + 1] * v) * u
 
-    def _cells(self, at: Array) -> tuple[Array, Array, Array, Array]:
+    def _cells(self, at: Array) -> tuple[Ints, Ints, Array, Array]:
         most = np.array(self._gaps.shape) - 1.001
         where = np.clip((at - self._origin) / CELL_M, 0.0, most)
         low = where.astype(np.int64)

@@ -77,7 +77,9 @@ class BoardHolder:
         turn[fixed] = 0.0
         return velocity, turn, ~fixed & (held | near)
 
-    def _fetch(self, terms: dict[str, Array]) -> tuple[Array, tuple[Array, Array], Array]:
+    def _fetch(
+        self, terms: dict[str, Array]
+    ) -> tuple[Array, tuple[Array, Array], NDArray[np.bool_]]:
         """Velocity to the board, the tool's axes x and z on it, and whether cups are near it."""
         along, normal = terms["object_axes"][:, :3], terms["object_axes"][:, 3:]
         across = np.cross(along, normal)

@@ -49,8 +49,8 @@ EXPERTS: dict[str, Callable[[EnvInfo, Yielding | None], Agent]] = {
     "HRCPickPlace-v0": PickPlacer,
     "HRCDelivery-v0": Deliverer,
     "HRCDrywall-v0": BoardHolder,
-    "HRCReachGoal-v0": lambda *of: GoalReader(Reacher(*of), reach_goal),
-    "HRCPickPlaceGoal-v0": lambda *of: GoalReader(PickPlacer(*of), pick_place_goal),
+    "HRCReachGoal-v0": lambda of, y: GoalReader(Reacher(of, y), reach_goal),
+    "HRCPickPlaceGoal-v0": lambda of, y: GoalReader(PickPlacer(of, y), pick_place_goal),
 }
 """By task: what solves it without learning."""
 

@@ -127,7 +127,7 @@ def _seen(terms: dict[str, Array]) -> _Seen:
         along=axes[row, which, 0],
         to_place=to_place[row, which],
         held=held[row, which],
-        nothing=done.all(1),
+        nothing=np.asarray(done.all(1)),
     )
 
 

@@ -252,8 +252,8 @@ def check_render_mode(render_mode: str | None) -> None:
         raise unknown("render_mode", render_mode, RENDER_MODES)
 
 
-def spaces(simulation: Simulation) -> tuple[Box[np.float32] | Dict, Box[np.float32]]:
-    """The spaces of one environment's observations and actions."""
+def spaces(simulation: Simulation) -> tuple[Any, Box[np.float32]]:
+    """The spaces of one environment's observations, a `Box` or with goals a `Dict`, and actions."""
     where, apart = simulation.layout, simulation.task.goal
     seen = Box(where.low, where.high, dtype=np.float32)
     actions = Box(-1.0, 1.0, (simulation.n_actions,), np.float32)

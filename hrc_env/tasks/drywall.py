@@ -8,12 +8,12 @@ import numpy as np
 from hrc_env.core.errors import ConfigError, check_fields, needed
 from hrc_env.core.records import Effects, ObjectState, Workplace, World
 from hrc_env.core.things import Things, Weld
-from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records, Rngs, Rotations
+from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records, Rotations
 from hrc_env.geometry.rotations import matrix
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm
 from hrc_env.tasks import LONGER
-from hrc_env.tasks.task import Task
+from hrc_env.tasks.task import Rngs, Task
 from hrc_env.worker.body import assets_dir
 
 BOARD_M, BOARD_KG = (0.6, 1.2, 0.0125), 6.12
