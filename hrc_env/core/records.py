@@ -182,7 +182,25 @@ class Deeds:
     screws: Ints
     """(B, W) how many they have driven,"""
     boring: Bools
-    """(B, W) and whether they drive one."""
+    """(B, W) and whether they drive one,"""
+    takes: Bools
+    """(B, W) whether they put out a hand for what is brought,"""
+    side: Ints
+    """(B, W) and which: 0 the left, 1 the right."""
+    grip_world: Points3 | None = None
+    """(B, W, 3) where that hand grips [m],"""
+    grip_velocity_world: Velocities3 | None = None
+    """(B, W, 3) and how fast it is [m/s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cue:
+    """What a task says to workers who wait for it."""
+
+    stage: Ints
+    """(B,) how far it has come: 0 not yet, 1 there, 2 theirs."""
+    offered_world: Points3
+    """(B, 3) where it is offered [m]; not a number: nowhere."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -110,7 +110,7 @@ def _begin(who: Decision, activity: int, lasts: float) -> None:
     me["activity"], me["duration_s"] = activity, lasts
     if me["acts_at"] < np.inf:
         return
-    if activity == st.SCREW:  # beside a robot that holds what they work at
+    if activity in (st.SCREW, st.TAKE):  # beside a robot that holds what they work at
         me["reaction"] = st.NO_REACTION
         return
     draw = who.draws.item(dc.REACTION)
@@ -129,7 +129,7 @@ def _choose_job(who: Decision) -> None:
     stays = all(schedule.jobs[k].at in (HERE, who.kind_here) for k, _ in then)
     if then and not (stays and who.now >= me["until_s"] and not who.loaded):
         chosen = picked(then, who.draws.item(dc.NEXT))
-        if me["cued"] or not schedule.jobs[chosen].waits:
+        if me["cued"] > 0 or not schedule.jobs[chosen].waits:
             me["job"] = chosen
     else:
         _new_errand(who)

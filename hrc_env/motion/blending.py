@@ -43,7 +43,7 @@ def evaluate(t: float, clock_s: float, frames: Floats, me: Worker) -> None:
         fall(t, clock_s, me)
     else:
         stand(me.start_x, me.start_y, me.start_yaw, clock_s, me)
-    if activity == st.REACH:
+    if activity in (st.REACH, st.TAKE):
         reach(t, me)
     elif activity == st.LIFT:
         lift(t, me)

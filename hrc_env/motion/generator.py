@@ -10,7 +10,7 @@ import numpy as np
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.kernels import kernel
-from hrc_env.core.records import Deeds, Grounds, Held, WorkerMotion, WorkerPath, Workplace
+from hrc_env.core.records import Cue, Deeds, Grounds, Held, WorkerMotion, WorkerPath, Workplace
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.motion import state as st
 from hrc_env.motion.activities.pieces import stage, stocked
@@ -121,12 +121,12 @@ def advance(
 
 def watch(
     state: MotionState, elbow_and_tool_world: Floats, motion: WorkerMotion, dt_s: float,
-    cue: Bools | None = None,
+    cue: Cue | None = None,
 ) -> None:  # fmt: skip
     """Let the workers see where elbow and tool, or front and back (B, 2, 3), of the robot are, dt_s
-    after the last look, and whether what they wait for has come, (B,)."""
+    after the last look, and how far what they wait for has come."""
     if cue is not None:
-        attend(cue, state.workers)
+        attend(cue.stage, cue.offered_world, dt_s, state.workers)
     people = state.mind.config.people
     settings = (people.notice_m, people.fast_m_s, people.calm_s, state.mind.robot_girth_m)
     bodies = motion.position_world, motion.velocity_world
@@ -135,7 +135,11 @@ def watch(
 
 def deeds(state: MotionState) -> Deeds:
     """What workers have done in the activity that they are in."""
-    found = Deeds(state.workers["present"].copy(), *_no_deeds(state.workers.shape))
+    workers = state.workers
+    takes = (workers["activity"] == st.TAKE) & (workers["time_s"] > workers["out_at"])
+    found = Deeds(
+        workers["present"].copy(), *_no_deeds(workers.shape), takes, workers["side"].copy()
+    )
     _deeds(state.workers, found.screws, found.boring)
     return found
 

@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Bools, Floats
+from hrc_env.core.typing import Floats, Ints
 from hrc_env.motion import state as st
 from hrc_env.motion.anatomy import CHEST, HAND, HEAD, LEFT, SIDE_STRIDE
 from hrc_env.motion.state import WORKER, Worker, Workers
@@ -18,6 +18,8 @@ from hrc_env.motion.walk import brake
 
 BODY_POINTS = (CHEST, HEAD, LEFT + HAND, LEFT + SIDE_STRIDE + HAND)
 """Segments that people guard."""
+MEETS_M, MEETS_M_S = 0.20, 0.30
+"""Who takes something brings the hand so far to it, so fast [m, m/s]; judgement."""
 WITHDRAW = -1.6
 """Pace at which hands come back."""
 MACHINE_S, MACHINE_CALM_S = 2.0, 0.4
@@ -59,15 +61,38 @@ def notice(
 
 
 @kernel
-def attend(cue: Bools, workers: Workers) -> None:
-    """Tell everybody whether what they wait for has come, (B,): who is at it halts until it has."""
+def attend(cue: Ints, offered: Floats, dt_s: float, workers: Workers) -> None:
+    """Tell everybody how far what they wait for has come, (B,): 0 not yet, 1 there, 2 theirs. Who
+    works at it halts until it is there, who takes it until it is theirs, while the hand goes to
+    where it is offered (B, 3)."""
     for b, w in np.ndindex(workers.shape):
         me = workers[b, w]
         me.cued = cue[b]
         if me.activity == st.SCREW:
             ready = me.out_at + me.take_s
             works = ready < me.time_s < ready + me.out_s + me.hold_s
-            me.pace_wished = 0.0 if works and not me.cued else 1.0
+            me.pace_wished = 0.0 if works and me.cued < 1 else 1.0
+        elif me.activity == st.TAKE:
+            waits = me.time_s > me.out_at + me.out_s and me.cued < 2
+            me.pace_wished = 0.0 if waits else 1.0
+            if waits:
+                _meet(offered[b], dt_s, me)
+
+
+@kernel
+def _meet(offered: Floats, dt_s: float, me: Worker) -> None:
+    """Bring the hand that takes nearer to what is offered, if that is near where it was put out."""
+    goal, squared = me.target[3 * me.side : 3 * me.side + 3], 0.0
+    for i in range(3):
+        squared += (offered[i] - me.tool_pose[i]) ** 2
+    if not squared < MEETS_M**2:
+        return
+    squared = 0.0
+    for i in range(3):
+        squared += (offered[i] - goal[i]) ** 2
+    share = min(1.0, MEETS_M_S * dt_s / max(math.sqrt(squared), 1e-9))
+    for i in range(3):
+        goal[i] += share * (offered[i] - goal[i])
 
 
 @kernel

@@ -97,7 +97,14 @@ _BOARD = (
     Job("step aside", "look round", "robot", (("step aside", 1.0),)),
 )
 """Who helps to fix a board: `HRCDrywall-v0`."""
+_TOOL = (
+    Job("wait for the tool", "stand", "robot", (("take the tool", 1.0),)),
+    Job("take the tool", "take", "task", (("go on", 1.0),), waits=True),
+    Job("go on", "look round", "robot", (("go on", 1.0),)),
+)
+"""Who is brought a tool: `HRCHandover-v0`."""
 WORK: dict[str, tuple[Job, ...]] = {
+    "handover": _TOOL,
     "drywall": _BOARD,
     "framing": JOBS,
     "low_work": (

@@ -10,7 +10,7 @@ from hrc_env.motion.activities import loads
 from hrc_env.motion.activities import work_plans as wp
 from hrc_env.motion.activities.climb import start_climb, start_look_round
 from hrc_env.motion.activities.going import start_push, start_step_back, start_stumble
-from hrc_env.motion.activities.planning import between, finish
+from hrc_env.motion.activities.planning import between, blank, dominant, finish
 from hrc_env.motion.config import Numbers
 from hrc_env.motion.curves import wrap
 from hrc_env.motion.decision import Decision
@@ -21,6 +21,8 @@ from hrc_env.motion.state import Pair, Triple, Worker
 from hrc_env.motion.walk import plan_walk
 from hrc_env.worker.props import PROP_NAMES
 
+TAKE_M, TAKE_S = 0.52, 0.8
+"""Hands are put out so far ahead for what is brought [m]; they hold it there for so long [s]."""
 BODY_M, OWN_SIDE_M = 0.36, 0.30
 """Hands keep so far from their own root, and from the middle to another worker [m]."""
 
@@ -34,6 +36,20 @@ def start_going(
     if activity == st.STUMBLE:
         return start_stumble(draws, end_yaw, pace_m_s, me)
     return plan_walk(end_yaw, pace_m_s, me)
+
+
+@kernel
+def start_take(draws: Floats, height: float, me: Worker) -> float:
+    """Put out a hand at the height for what somebody brings, and hold it there."""
+    blank(me)
+    me.side = dominant(draws[0], me)
+    used = (0.0, 1.0) if me.side == 1 else (1.0, 0.0)
+    at = from_here((TAKE_M, (1.0 - 2.0 * me.side) * 0.10, height), me)
+    me.out_at = 0.1 + 0.3 * draws[1]
+    lasts = plan_reach(at, used, 1.1, TAKE_S, (0.0, 1.0), me)
+    for i in range(3):
+        me.tool_pose[i] = me.target[3 * me.side + i]
+    return lasts
 
 
 Start = Callable[[Floats, float, Worker], float]
@@ -55,7 +71,7 @@ STARTS: dict[int, Start] = {
     st.DRILL: _work(wp.plan_drill), st.OVERHEAD: _work(wp.plan_drill), st.SAW: _work(wp.plan_saw),
     st.MEASURE: _work(wp.plan_measure), st.POINT: _work(wp.plan_point),
     st.SQUATTING: _work(wp.plan_squat), st.KNEELING: _work(wp.plan_kneel),
-    st.LUNGE: _work(wp.plan_lunge), st.SCREW: _work(wp.plan_screw),
+    st.LUNGE: _work(wp.plan_lunge), st.SCREW: _work(wp.plan_screw), st.TAKE: start_take,
 }  # fmt: skip
 """What is begun where the worker stands: each compiled by itself when it is first wanted."""
 

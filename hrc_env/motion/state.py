@@ -59,7 +59,7 @@ _NOW = [
     ("doing", "i8"), ("doing_until", "f8"),  # NO_REACTION, PAUSE or BACK_AWAY now; until when
     ("calm_until", "f8"),  # before which clock nothing startles them
     ("delay_s", "f8"), ("reaction", "i8"), ("reaction_s", "f8"),  # drawn when an activity begins
-    ("cued", "?"),  # whether what they wait for has come
+    ("cued", "i8"),  # how far what they wait for has come, see `reactions.attend`
 ]  # fmt: skip
 _PLAN = [
     ("start_x", "f8"), ("start_y", "f8"), ("start_yaw", "f8"),  # root on the floor, heading
@@ -120,12 +120,12 @@ N_START = 16
 STAND, WALK, REACH, LIFT, TURN, CARRY, PUSH, STUMBLE, STEP_BACK, LOOK_ROUND = range(10)
 PICK_UP, SET_DOWN, HAND_OVER, RECEIVE, SQUATTING, KNEELING, HAMMER, DRILL = range(10, 18)
 OVERHEAD, SAW, MEASURE, POINT, LUNGE, CLIMB, CLIP, RUN, FALL = range(18, 27)
-SCREW = 27
+SCREW, TAKE = 27, 28
 ACTIVITY_NAMES = (
     "stand", "walk", "reach", "lift", "turn", "carry", "push", "stumble", "step back",
     "look round", "pick up", "set down", "hand over", "receive", "squat", "kneel", "hammer",
     "drill", "drill overhead", "saw", "measure", "point", "lunge", "climb", "clip",
-    "run", "fall", "screw",
+    "run", "fall", "screw", "take",
 )  # fmt: skip
 GOING, IDLE = (WALK, TURN, CARRY, STUMBLE, STEP_BACK), (STAND, LOOK_ROUND)
 TAKING, GIVING = (PICK_UP, RECEIVE), (SET_DOWN, HAND_OVER)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from hrc_env.core.errors import ConfigError, check_fields, needed
-from hrc_env.core.records import Effects, ObjectState, Workplace, World
+from hrc_env.core.records import Cue, Effects, ObjectState, Workplace, World
 from hrc_env.core.things import Things, Weld
 from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records, Rotations
 from hrc_env.geometry.rotations import matrix
@@ -291,7 +291,7 @@ TASK = Task(
     poses=poses,
     effects=effects,
     loads=lambda state: (state["pressed_s"] == 0.0)[:, None],  # against the studs it is a wall
-    cue=lambda state: state["pressed_s"] > 0.0,
+    cue=lambda state: Cue((state["pressed_s"] > 0.0).astype(int), np.full((len(state), 3), np.nan)),
     over=lambda step: step["done"],
     defaults={
         "scene": {"sim_dt": 0.004},

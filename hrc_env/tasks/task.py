@@ -11,7 +11,7 @@ import numpy as np
 
 from hrc_env import observations, rewards
 from hrc_env.core.errors import ConfigError, NoGoalError, check_shape, unknown
-from hrc_env.core.records import Effects, Grounds, World
+from hrc_env.core.records import Cue, Effects, Grounds, World
 from hrc_env.core.things import NOTHING, Things
 from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, Points3
 from hrc_env.observations import ObservationTerm
@@ -88,8 +88,8 @@ class Task:
     loads: Callable[[Any], Bools] | None = None
     """(state) -> (B, O) which objects count as part of the robot while it holds them: in cost,
     separations and belief; None: all."""
-    cue: Callable[[Any], Bools] | None = None
-    """(state) -> (B,) whether workers may go on with what waits for the task (`Job.waits`)."""
+    cue: Callable[[Any], Cue] | None = None
+    """(state) -> how far what workers wait for has come (`Job.waits`); None: they do not."""
     effects: Callable[[Any, Any], Effects] | None = None
     """(state, config) -> what is done to objects until the next step; None: nothing."""
     over: Callable[[Any], Bools] | None = None

@@ -31,8 +31,9 @@ def world(shift_m=(0.0, 0.0, 0.0), held=True, screws=0, boring=False, workers=0)
     )  # fmt: skip
     robot = type("Robot", (), {"tool_world": np.zeros((1, 3))})()
     deeds = Deeds(
-        np.ones((1, workers), bool), np.full((1, workers), screws), np.full((1, workers), boring)
-    )
+        np.ones((1, workers), bool), np.full((1, workers), screws), np.full((1, workers), boring),
+        np.zeros((1, workers), bool), np.ones((1, workers), int),
+    )  # fmt: skip
     return World(robot, None, board, deeds)
 
 
