@@ -11,6 +11,7 @@ from hrc_env.observations import split
 from .delivery import Deliverer
 from .drywall import BoardHolder
 from .env_info import Agent, EnvInfo, Observation
+from .handover import Bringer
 from .pick_place import PickPlacer
 from .scripted import Reacher, Yielding
 
@@ -49,6 +50,7 @@ EXPERTS: dict[str, Callable[[EnvInfo, Yielding | None], Agent]] = {
     "HRCPickPlace-v0": PickPlacer,
     "HRCDelivery-v0": Deliverer,
     "HRCDrywall-v0": BoardHolder,
+    "HRCHandover-v0": Bringer,
     "HRCReachGoal-v0": lambda of, y: GoalReader(Reacher(of, y), reach_goal),
     "HRCPickPlaceGoal-v0": lambda of, y: GoalReader(PickPlacer(of, y), pick_place_goal),
 }

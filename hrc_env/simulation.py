@@ -36,7 +36,7 @@ from hrc_env.scene.rigs import findings
 from hrc_env.step import Info, Observation, StepResult
 from hrc_env.tasks import goal
 from hrc_env.tracking import oracle
-from hrc_env.worker.body import grips, pool, stack, worker_capsules, worker_truth
+from hrc_env.worker.body import pool, stack, worker_capsules, worker_truth
 
 CLOSING_M_S = 8.0
 """Arm and worker never come nearer to each other than so fast [m/s]; 3.4 was the most in some
@@ -178,11 +178,7 @@ class Simulation(Stateful):
         seen_world = robot.capsules_world[:, self.scene.watched, 1]
         cue = None if self.task.cue is None else self.task.cue(self.task_state)
         generator.watch(self.motion, seen_world, motion, config.ctrl_dt, cue)
-        deeds = generator.deeds(self.motion)
-        if self.task.cue is not None:
-            at, speed = grips(self.bodies, motion, deeds.side)
-            deeds = replace(deeds, grip_world=at, grip_velocity_world=speed)
-        world = replace(world, deeds=deeds)
+        world = replace(world, deeds=generator.deeds(self.motion, motion))
         workers = worker_capsules(self.bodies, path, motion.body)
         cost = metrics.cost(
             arm, robot.capsule_radius_m, workers, truth.capsule_radius_m, config.cost

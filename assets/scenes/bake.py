@@ -17,6 +17,7 @@ from assets.scenes.mjcf import TEXTURES, write_mjcf
 from assets.scenes.pedestal import add_pedestal
 from assets.scenes.primitives import add_painted, paint_materials
 from assets.tasks.drywall import add_drywall
+from assets.tasks.handover import add_handover
 from assets.tasks.pick_place import add_pick_place
 from hrc_env.scene.worker_visuals import PARKED_M
 from hrc_env.worker.props import PROP_NAMES
@@ -28,7 +29,7 @@ ROBOTS = {
     "ur10e_cups": partial(add_arm, hand=CUPS),
     "mobile_base": add_mobile_base,
 }
-TASKS = {"drywall": add_drywall, "pick_place": add_pick_place}
+TASKS = {"drywall": add_drywall, "handover": add_handover, "pick_place": add_pick_place}
 MAKERS = {"lab": (arena.add_lab, arena.paint_lab), "site": (site.add_site, site.paint_site)}
 
 

@@ -169,6 +169,8 @@ class ObjectState:
     """(B, O, 4) world_from_object."""
     velocity_world: Velocities3
     """(B, O, 3) of its middle [m/s]."""
+    spin_object: Floats
+    """(B, O, 3) turn rate about its own axes [rad/s]."""
     held: Bools
     """(B, O) whether the robot holds it."""
 
@@ -184,12 +186,10 @@ class Deeds:
     boring: Bools
     """(B, W) and whether they drive one,"""
     takes: Bools
-    """(B, W) whether they put out a hand for what is brought,"""
-    side: Ints
-    """(B, W) and which: 0 the left, 1 the right."""
-    grip_world: Points3 | None = None
-    """(B, W, 3) where that hand grips [m],"""
-    grip_velocity_world: Velocities3 | None = None
+    """(B, W) whether they put out a hand for what is brought."""
+    grip_world: Points3
+    """(B, W, 3) where the hand that they use grips [m],"""
+    grip_velocity_world: Velocities3
     """(B, W, 3) and how fast it is [m/s]."""
 
 

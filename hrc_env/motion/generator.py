@@ -11,11 +11,12 @@ import numpy as np
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Cue, Deeds, Grounds, Held, WorkerMotion, WorkerPath, Workplace
-from hrc_env.core.typing import Bools, Floats, Ints
+from hrc_env.core.typing import Bools, Floats, Ints, Points3, Velocities3
+from hrc_env.geometry.rotations import matrix
 from hrc_env.motion import state as st
 from hrc_env.motion.activities.pieces import stage, stocked
 from hrc_env.motion.activities.strokes import screws
-from hrc_env.motion.anatomy import anatomies
+from hrc_env.motion.anatomy import GRIP_M, HAND, LEFT, SIDE_STRIDE, anatomies
 from hrc_env.motion.behaviour import begin_episode, follow_up
 from hrc_env.motion.blending import RATE_H_S, evaluate
 from hrc_env.motion.clip import Clip, load_clip
@@ -133,15 +134,28 @@ def watch(
     notice(dt_s, settings, elbow_and_tool_world, *bodies, state.workers)
 
 
-def deeds(state: MotionState) -> Deeds:
-    """What workers have done in the activity that they are in."""
+def deeds(state: MotionState, motion: WorkerMotion) -> Deeds:
+    """What workers, whose bodies are in `motion`, have done in the activity that they are in."""
     workers = state.workers
     takes = (workers["activity"] == st.TAKE) & (workers["time_s"] > workers["out_at"])
     found = Deeds(
-        workers["present"].copy(), *_no_deeds(workers.shape), takes, workers["side"].copy()
+        workers["present"].copy(), *_no_deeds(workers.shape), takes, *_gripping(workers, motion)
     )
     _deeds(state.workers, found.screws, found.boring)
     return found
+
+
+def _gripping(workers: Workers, motion: WorkerMotion) -> tuple[Points3, Velocities3]:
+    """(B, W, 3) where the hand that each uses grips, and how fast it is."""
+    hands = (LEFT + HAND + SIDE_STRIDE * workers["side"])[..., None, None]
+
+    def of_hand(values: Floats) -> Floats:
+        return np.take_along_axis(values, hands, axis=2)[:, :, 0]
+
+    bone = np.take_along_axis(workers["frame"][..., 0, :], hands, axis=2)[:, :, 0]
+    arm = (matrix(of_hand(motion.quaternion_wxyz)) @ (GRIP_M * bone)[..., None])[..., 0]
+    turning = np.cross(of_hand(motion.angular_velocity_world), arm)
+    return of_hand(motion.position_world) + arm, of_hand(motion.velocity_world) + turning
 
 
 def _no_deeds(shape: tuple[int, ...]) -> tuple[Ints, Bools]:

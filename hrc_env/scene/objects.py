@@ -128,7 +128,8 @@ def object_state(objects: Objects, qpos: Floats, qvel: Floats, held: Bools) -> O
     """Where objects are, of qpos (B, nq) and qvel (B, nv)."""
     poses, n = objects.poses(qpos), len(objects.names)
     rates = qvel[:, objects.first : objects.first + RATE * n].reshape(len(qvel), n, RATE)
-    return ObjectState(poses[..., :3].copy(), poses[..., 3:].copy(), rates[..., :3].copy(), held)
+    places, turns = poses[..., :3].copy(), poses[..., 3:].copy()
+    return ObjectState(places, turns, rates[..., :3].copy(), rates[..., 3:].copy(), held)
 
 
 def held_by(objects: Objects, qpos: Floats, tool_world: Points3, hand: HandState) -> Bools:

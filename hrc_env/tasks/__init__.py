@@ -5,6 +5,7 @@ BUILT_IN = {
     "HRCPickPlace-v0": "hrc_env.tasks.pick_place",
     "HRCDelivery-v0": "hrc_env.tasks.delivery",
     "HRCDrywall-v0": "hrc_env.tasks.drywall",
+    "HRCHandover-v0": "hrc_env.tasks.handover",
     "HRCReachGoal-v0": "hrc_env.tasks.reach_goal",
     "HRCPickPlaceGoal-v0": "hrc_env.tasks.pick_place_goal",
 }
@@ -16,6 +17,7 @@ LONGER = {
     "HRCPickPlace-v0": 750,
     "HRCDelivery-v0": 1000,
     "HRCDrywall-v0": 1000,
+    "HRCHandover-v0": 750,
     "HRCReachGoal-v0": 100,
     "HRCPickPlaceGoal-v0": 750,
 }

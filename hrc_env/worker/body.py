@@ -15,7 +15,7 @@ from hrc_env.core.batching import flat
 from hrc_env.core.errors import ConfigError, check_shape, unknown
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import WorkerMotion, WorkerPath, WorkerTruth
-from hrc_env.core.typing import Capsules, Floats, Ints, Points3, QuaternionsWxyz, Velocities3
+from hrc_env.core.typing import Capsules, Floats, Ints, Points3, QuaternionsWxyz
 from hrc_env.geometry.rotations import turned
 
 TRUNK = ("pelvis", "abdomen", "torso", "chest", "neck", "head")
@@ -128,22 +128,6 @@ def worker_truth(body: Body, motion: WorkerMotion) -> WorkerTruth:
     _joints(tuple(flat(each, 2) for each in segments), rows, body.joint_segment, offset, out)
     radius = body.capsule_radius_m.reshape(-1, len(body.capsule_names))[rows]
     return WorkerTruth(joints, velocity, capsules, radius.reshape(*lead, radius.shape[1]))
-
-
-def grips(body: Body, motion: WorkerMotion, side: Ints) -> tuple[Points3, Velocities3]:
-    """Where one hand of each grips, (..., W, 3) [m], and how fast; `side` (..., W), 0: left."""
-    truth = worker_truth(body, motion)
-    hands = [body.capsule_names.index(f"{name}_hand") for name in ("left", "right")]
-    segment = body.capsule_segment[hands]
-    at = truth.capsules_world[..., hands, :, :].mean(-2)
-    arm = at - motion.position_world[..., segment, :]
-    spin = motion.angular_velocity_world[..., segment, :]
-    speed = motion.velocity_world[..., segment, :] + np.cross(spin, arm)
-    which = side[..., None, None]
-    return (
-        np.take_along_axis(at, which, -2)[..., 0, :],
-        np.take_along_axis(speed, which, -2)[..., 0, :],
-    )
 
 
 def worker_capsules(body: Body, path: WorkerPath, which: Ints | None = None) -> Capsules:

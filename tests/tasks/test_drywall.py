@@ -27,12 +27,13 @@ def world(shift_m=(0.0, 0.0, 0.0), held=True, screws=0, boring=False, workers=0)
     """A board near its place, and what workers do."""
     board = ObjectState(
         (MOUNT_WORLD + PLACE_M + shift_m)[None, None], AT_PLACE[None, None], np.zeros((1, 1, 3)),
+        np.zeros((1, 1, 3)),
         np.array([[held]]),
     )  # fmt: skip
     robot = type("Robot", (), {"tool_world": np.zeros((1, 3))})()
     deeds = Deeds(
         np.ones((1, workers), bool), np.full((1, workers), screws), np.full((1, workers), boring),
-        np.zeros((1, workers), bool), np.ones((1, workers), int),
+        np.zeros((1, workers), bool), np.zeros((1, workers, 3)), np.zeros((1, workers, 3)),
     )  # fmt: skip
     return World(robot, None, board, deeds)
 

@@ -23,7 +23,7 @@ def placed_pieces():
     """(1, 3) pieces that rest in their places."""
     at, turn = np.zeros((1, 3, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (1, 3, 1))
     at[:] = pick_place.places_world()
-    return ObjectState(at, turn, np.zeros((1, 3, 3)), np.zeros((1, 3), bool))
+    return ObjectState(at, turn, np.zeros((1, 3, 3)), np.zeros((1, 3, 3)), np.zeros((1, 3), bool))
 
 
 def test_a_piece_counts_when_it_rests_in_its_place_and_is_let_go():
