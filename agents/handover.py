@@ -11,7 +11,7 @@ from hrc_env.core.skeleton import JOINT
 from hrc_env.observations import split
 
 from .env_info import EnvInfo, Observation
-from .manipulating import arm_action, turn_towards
+from .manipulating import arm_action, round_the_foot, turn_towards
 from .scripted import Yielding, speed_m_s
 
 Array = NDArray[np.float64]
@@ -22,6 +22,8 @@ BEFORE_M, LEVEL_M, AT_M, STILL_AT_M = 0.12, 0.008, 0.010, 0.018
 stay closed."""
 STAND_M, LIFTED_M = (0.30, -0.62, 0.10), 0.08
 """Where its middle stands from the robot's foot; so far above that it may leave sideways."""
+ROUND_M = 0.58
+"""Round the robot the fingers travel on a circle of this radius."""
 TURN_RAD_S, FAST_M_S, BRING_M_S, OFFER_M_S = 1.1, 0.5, 0.35, 0.15
 """Fastest turn, and way; with the tool; near the hand."""
 OFFERED_M = 0.05
@@ -76,6 +78,7 @@ class Bringer:
         target = (
             way - np.where(level | inside & (near < 2 * BEFORE_M), 0.0, BEFORE_M)[:, None] * heading
         )
+        target = round_the_foot(terms["tool_position"], target, self._foot[:2], ROUND_M)
         return np.where(closes[:, None], 0.0, _towards(target, FAST_M_S)), closes, heading
 
     def _bring(self, terms: dict[str, Array]) -> tuple[Array, Array]:

@@ -55,13 +55,16 @@ INFOS = {
     "task/goals_missed": ("-", "goals of this episode that ran out of time"),
     "task/studs_placed": ("-", "pieces that rest in their places now, let go"),
     "task/studs_left": ("-", "pieces that do not"),
-    "task/dropped": ("0 or 1", "a piece lies below the table"),
+    "task/dropped": ("0 or 1", "a piece lies below the table, or the tool was lost"),
     "task/screws_driven": ("-", "screws that hold the board"),
     "task/screws_left": ("-", "screws that do not yet"),
     "task/worst_m": (
         "m", "how far the board was off its place at most while screws were driven; absent before"
     ),
     "task/worst_rad": ("rad", "how far it was turned, likewise"),
+    "task/handed_over": ("0 or 1", "the worker has the tool, the robot has let go and left it"),
+    "task/not_handed_over": ("0 or 1", "the opposite"),
+    "task/largest_n": ("N", "the largest force that the worker's hand felt so far; absent before"),
     "task/delivered": ("0 or 1", "the base stands in its zone, and nothing was hit on the way"),
     "task/not_delivered": ("0 or 1", "the opposite"),
     "task/fixed_hits": ("-", "how often the base began to touch what stands there"),

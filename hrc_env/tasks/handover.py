@@ -26,6 +26,8 @@ BESIDE_M, HAND_UP_M, MEET_M = (1.30, 0.0), 0.40, (0.78, 0.0, 0.40)
 """Where the worker stands, how high a hand is put out, and about where, from the foot [m]."""
 MOUNT_WORLD = np.array([-0.75, 0.0, 0.75])
 """The robot's foot, in every scene [m]."""
+OFFERED_M = 0.25
+"""A handle so near to a hand that is put out is offered: the tool is then no part of the robot."""
 CLOSES_M, CLOSES_M_S, CLOSES_S = 0.02, 0.15, 0.4
 """A hand closes on the handle when it has been so near, so calm, for so long."""
 STIFFNESS_N_M, DAMPING_NS_M, CARRIES_S = 100.0, 12.0, 0.4
@@ -69,7 +71,8 @@ HANDOVER = np.dtype(
         ("pose", "f8", (7,)),  # where the tool stands at first, world [m]
         ("handle_world", "f8", (3,)),  # [m]
         ("lifted", "?"),  # whether the robot holds it above its stand
-        ("near_s", "f8"),  # for how long a hand has been at its handle
+        ("offered", "?"),  # whether a hand that is put out is near its handle
+        ("near_s", "f8"),  # for how long one has been at it
         ("taken", "?"), ("taken_s", "f8"),  # whether a worker has it; since when
         ("by", "i8"),  # who
         ("push", "f8", (6,)),  # what the hand does to it [N, Nm]
@@ -168,6 +171,7 @@ def _close(state: Records, deeds: Deeds, handle: Points3, speed: Floats, dt_s: f
     if not deeds.takes.shape[1]:
         return
     gap_m = np.linalg.norm(deeds.grip_world - handle[:, None], axis=-1)
+    state["offered"] = (deeds.takes & (gap_m < OFFERED_M)).any(1)
     apart_m_s = np.linalg.norm(deeds.grip_velocity_world - speed[:, None], axis=-1)
     ready = deeds.takes & (gap_m < CLOSES_M) & (apart_m_s < CLOSES_M_S)
     near = ready.any(1) & ~state["taken"]
@@ -292,6 +296,7 @@ TASK = Task(
     poses=poses,
     effects=effects,
     cue=cue,
+    loads=lambda state: ~(state["offered"] | state["taken"])[:, None],
     over=lambda step: step["done"],
     defaults={
         "scene": {"sim_dt": 0.004},
