@@ -20,7 +20,7 @@ from .scripted import Yielding
 Array = NDArray[np.float64]
 CELL_M, BEYOND_M = 0.2, 3.0
 """Grid of the fields; how far beyond where people walk the base drives [m]."""
-FREE_M, NARROW_M, DEAR = 0.68, 0.44, 4.0
+FREE_M, NARROW_M, DEAR = 0.68, 0.54, 4.0
 """Room that counts as free, and that a way needs at least [m]; a metre between counts so often."""
 BODY_M, BASE_M, DISC_M, DISC_AT_M = 0.30, 0.60, 0.47, 0.22
 """Radius of a person; of a base turned anyhow; of two discs ahead and behind that hold it [m]."""
@@ -34,6 +34,8 @@ NEAR_M, NEAR_GAIN_HZ, STOP_M = 1.0, 1.2, 0.15
 """So near to its zone the base makes straight for the middle, and stops."""
 GOOD_M, PEOPLE_PRICE, TOUCH_PRICE, FAST_PRICE, WALL_PRICE = 0.7, 6.0, 60.0, 20.0, 200.0
 """Room past people that costs nothing; prices against a metre of the way."""
+SLOW_M_S, STAY_M = 0.2, 0.25
+"""Who drives slower turns towards the way, so as to fit between walls; not so near to people."""
 CHANGE_PRICE_S, TURN_HZ, TURN_RAD_S = 0.1, 1.5, 1.0
 FIELDS = 1024
 """So many are kept."""
@@ -68,10 +70,13 @@ class Deliverer:
         people, moving = _people(terms)
         field = self._field_rows(place, terms["zone_from_base"], people, moving)
         velocity = self._chosen(place, speed, yaw, terms["zone_from_base"], field, (people, moving))
-        turn = self._turn(place, yaw, velocity)
+        driving = np.linalg.norm(velocity, axis=1, keepdims=True) > SLOW_M_S
+        turn = self._turn(place, yaw, np.where(driving, velocity, terms["way_direction"]))
+        near_m = terms["worker_separation"].min(axis=-1, initial=np.inf)
+        waits = (near_m < STAY_M) | (np.linalg.norm(terms["zone_from_base"], axis=1) < NEAR_M)
+        turn = np.where(waits & ~driving[:, 0], 0.0, turn)
         if self.yielding is not None:
-            nearest_m = terms["worker_separation"].min(axis=-1, initial=np.inf)
-            share = self.yielding.share(nearest_m)
+            share = self.yielding.share(near_m)
             velocity, turn = velocity * share[:, None], turn * share
         action = np.concatenate([velocity, turn[:, None]], axis=1) / self._most
         action = np.clip(action, -1.0, 1.0)
@@ -147,12 +152,11 @@ class Deliverer:
         share = where - low
         return low[..., 0], low[..., 1], share[..., 0], share[..., 1]
 
-    def _turn(self, place: Array, yaw: Array, velocity: Array) -> Array:
-        """(n,) turn rate [rad/s] towards where the base drives, where there is room to turn."""
-        wanted = np.arctan2(velocity[:, 1], velocity[:, 0])
+    def _turn(self, place: Array, yaw: Array, towards: Array) -> Array:
+        """(n,) turn rate [rad/s] towards a direction (n, 2), where there is room to turn."""
+        wanted = np.arctan2(towards[:, 1], towards[:, 0])
         error = (wanted - yaw + np.pi) % (2 * np.pi) - np.pi
         rate = np.clip(TURN_HZ * error, -TURN_RAD_S, TURN_RAD_S)
-        rate[np.linalg.norm(velocity, axis=1) < 0.2] = 0.0
         then = yaw + 0.4 * np.sign(rate)
         ahead = DISC_AT_M * np.stack([np.cos(then), np.sin(then)], axis=1)
         room = np.minimum(self._at(self._gaps, place + ahead), self._at(self._gaps, place - ahead))

@@ -70,7 +70,10 @@ def test_ways_lead_round_a_wall_and_cost_what_they_are_long():
     before = value_at(0.0, 0.0, ways, origin, 0.2)
     round_it = np.hypot(0.9, 3.4) + np.hypot(0.9, 3.4) + 0.2
     assert round_it < before < 1.15 * round_it
-    assert np.isfinite(ways).all()  # in the wall, too, as on the nearest free ground
+    assert np.isfinite(ways).all()
+    beside = value_at(0.7, 0.0, ways, origin, 0.2)  # not free: as on the nearest free ground
+    assert abs(beside - value_at(0.4, 0.0, ways, origin, 0.2)) < 0.5
+    assert value_at(1.3, 0.0, ways, origin, 0.2) < 1.2
 
 
 def test_rays_end_at_what_stands_there():
