@@ -18,6 +18,7 @@ from .env_info import EnvInfo
 from .scripted import Yielding
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 CELL_M, BEYOND_M = 0.2, 3.0
 """Grid of the fields; how far beyond where people walk the base drives [m]."""
 FREE_M, NARROW_M, DEAR = 0.68, 0.54, 4.0
@@ -82,23 +83,26 @@ class Deliverer:
         action = np.clip(action, -1.0, 1.0)
         return action.reshape(*observation.shape[:-1], -1).astype(np.float32)
 
-    def _field_rows(self, place: Array, zone: Array, people: Array, moving: Array) -> Array:
+    def _field_rows(self, place: Array, zone: Array, people: Array, moving: Array) -> Indices:
         """(n,) which field each base follows: of its zone, with who stands on the ground."""
         stands = np.linalg.norm(moving, axis=-1) < STANDS_M_S
         spots = np.rint((place[:, None] + people) / SPOT_M)
         rows = np.empty(len(place), np.int64)
+        if len(place) > len(self._fields):  # all that are followed now must fit
+            self._fields, self._rows = np.zeros((len(place), *self._gaps.shape), np.float32), {}
         for b, (x, y) in enumerate((place + zone).tolist()):
             standing = {(int(i), int(j)) for i, j in spots[b, stands[b]] if abs(i) < 1e3}
             key = (nearest_point(x, y, self._origin, CELL_M), *sorted(standing))
-            if key not in self._rows:
-                self._keep(key)
-            rows[b] = self._rows[key]
+            row = self._rows.pop(key, None)
+            self._rows[key] = rows[b] = (
+                self._made(key) if row is None else row
+            )  # the last used last
         return rows
 
-    def _keep(self, key: tuple[tuple[int, int], ...]) -> None:
-        """Make a field in place of the oldest."""
+    def _made(self, key: tuple[tuple[int, int], ...]) -> int:
+        """Make a field in place of that which was not used for longest; its row."""
         row = len(self._rows)
-        if row == FIELDS:
+        if row == len(self._fields):
             row = self._rows.pop(next(iter(self._rows)))
         goal, *standing = key
         price = self._price
@@ -106,10 +110,10 @@ class Deliverer:
             away = np.hypot(self._xs[:, None] - SPOT_M * i, self._ys - SPOT_M * j)
             price = price * np.where(away < STOOD_M, STOOD_DEAR, 1.0)
         self._fields[row] = ways_m(price, goal, CELL_M)
-        self._rows[key] = row
+        return row
 
     def _chosen(
-        self, place: Array, speed: Array, yaw: Array, zone: Array, field: Array,
+        self, place: Array, speed: Array, yaw: Array, zone: Array, field: Indices,
         others: tuple[Array, Array],
     ) -> Array:  # fmt: skip
         """(n, 2) the cheapest velocity [m/s]."""
@@ -131,7 +135,7 @@ class Deliverer:
         best = window[np.arange(n), np.where(direct, 0, np.argmin(price, axis=1))]
         return np.where((away_m < STOP_M)[:, None], 0.0, best)
 
-    def _left(self, field: Array, at: Array) -> Array:
+    def _left(self, field: Indices, at: Array) -> Array:
         """(n, C) length of the way from places (n, C, 2)."""
         i, j, u, v = self._cells(at)
         k = field[:, None]
@@ -145,7 +149,7 @@ class Deliverer:
         low = grid[i, j] * (1 - v) + grid[i, j + 1] * v
         return low * (1 - u) + (grid[i + 1, j] * (1 - v) + grid[i + 1, j + 1] * v) * u
 
-    def _cells(self, at: Array) -> tuple[Array, Array, Array, Array]:
+    def _cells(self, at: Array) -> tuple[Indices, Indices, Array, Array]:
         most = np.array(self._gaps.shape) - 1.001
         where = np.clip((at - self._origin) / CELL_M, 0.0, most)
         low = where.astype(np.int64)

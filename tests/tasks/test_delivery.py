@@ -305,3 +305,17 @@ def test_a_robot_of_ones_own_may_drive():
     env.step(np.array([1.0, 0.0, 0.0], np.float32))
     assert abs(env.unwrapped.simulation.physics.qd[0, 0]) < 0.03
     env.close()
+
+
+def test_an_experts_action_hangs_on_its_own_observation_only():
+    envs = gymnasium.make_vec(ID, num_envs=4, perception="truth", num_threads=1)
+    simulation = envs.unwrapped.shards.first
+    agent, few, alone = (expert(env_info(simulation)) for _ in range(3))
+    few._fields = few._fields[:4]  # what is not followed now is forgotten
+    observation, _ = envs.reset(seed=1)
+    for _ in range(60):
+        action = agent.act(observation)
+        np.testing.assert_array_equal(action, few.act(observation))
+        np.testing.assert_array_equal(action[2], alone.act(observation[2]))
+        observation = envs.step(action)[0]
+    envs.close()
