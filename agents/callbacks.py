@@ -1,4 +1,4 @@
-"""What happens while PPO learns: the safety term grows, progress, curves, checkpoints, Ctrl-C."""
+"""While an agent learns: the safety term grows, progress, curves, checkpoints, Ctrl-C."""
 
 import json
 import signal
@@ -13,6 +13,7 @@ from typing import Any, Self
 import numpy as np
 from matplotlib.ticker import EngFormatter
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 
 from hrc_env.cli.progress import Meter
 from hrc_env.core.errors import ConfigError
@@ -20,7 +21,7 @@ from hrc_env.core.results import write_whole
 from hrc_env.experiments.study.plots import label, new_figure, save
 from hrc_env.sb3 import HRCVecEnv
 
-from . import ppo
+from . import checkpoints
 from .evaluate import summarise
 
 RECENT_EPISODES = 64
@@ -89,7 +90,10 @@ class Interrupt:
 
 
 Curve = list[dict[str, float]]
-"""A learning curve: one entry a rollout."""
+"""A learning curve: one entry a rollout; of SAC, whose rollouts are single steps, one in
+`LEAST_STEPS`."""
+LEAST_STEPS = 2048
+"""Environment steps."""
 
 
 class TrainingMonitor(BaseCallback):
@@ -122,6 +126,10 @@ class TrainingMonitor(BaseCallback):
         return not self.interrupt.asked
 
     def _on_rollout_end(self) -> None:
+        if isinstance(self.model, OffPolicyAlgorithm):
+            noted = self.curve[-1]["steps"] if self.curve else 0
+            if self.num_timesteps - noted < LEAST_STEPS:
+                return
         self._note()
         if time.monotonic() - self.saved_s > 60:
             self._save()
@@ -146,7 +154,7 @@ class TrainingMonitor(BaseCallback):
 
     def _save(self) -> None:
         self.saved_s = time.monotonic()
-        ppo.save(self.model, self.folder / "policy.zip", self.facts)  # type: ignore[arg-type]
+        checkpoints.save(self.model, self.folder / "policy.zip", self.facts)  # type: ignore[arg-type]
         write_whole(self.folder / "curve.json", json.dumps(self.curve, indent=1))
 
 

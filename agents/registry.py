@@ -25,9 +25,9 @@ def make_agent(name: str, env_info: EnvInfo, seed: int = 0) -> Agent:
     if name in AGENTS:
         return experts.expert(env_info, Yielding() if name != "scripted" else None)
     if Path(name).suffix == ".zip" or Path(name).exists():
-        from . import ppo  # here: torch takes seconds to import, and need not be there
+        from . import checkpoints  # here: torch takes seconds to import, and need not be there
 
-        return ppo.load(Path(name), env_info)
+        return checkpoints.load(Path(name), env_info)
     error = unknown("agent", name, AGENTS)
     raise ConfigError(
         f"{error} Or the path of a checkpoint that python -m hrc_env train wrote (.zip)."

@@ -10,7 +10,7 @@ from typing import Any, get_type_hints
 
 from rich.console import Console
 
-from hrc_env.cli.progress import Meter, compile_kernels
+from hrc_env.cli.progress import Meter, compile_kernels, progress_bar
 from hrc_env.cli.train import Train
 from hrc_env.config import settle
 from hrc_env.core.errors import CheckpointError, RenderingError, learner
@@ -18,7 +18,7 @@ from hrc_env.core.mapping import restored
 from hrc_env.core.results import provenance, write_whole
 from hrc_env.sb3 import HRCVecEnv
 
-from . import ppo
+from . import checkpoints, ppo, sac
 from .callbacks import (
     Curve,
     Interrupt,
@@ -27,12 +27,20 @@ from .callbacks import (
     TrainingMonitor,
     plot_curve,
 )
+from .cloning import CloningSettings, clone
 from .env_info import EnvInfo
 from .evaluate import Score, evaluate
 
 with learner():
     import torch
 
+SETTINGS: dict[str, tuple[Any, Any]] = {
+    "ppo": (ppo.PPOSettings(), ppo.IMITATOR),
+    "sac": (sac.SACSettings(), sac.SACSettings(near_and_far=True)),
+}
+"""By algorithm: of who begins with nothing, and of who begins with what an expert does."""
+DEMONSTRATION_SEED = 2_000_000
+"""First seed of what is shown, far from those of learning and of evaluations."""
 ONLY_OF_A_RUN = ("out", "timesteps", "threads", "episodes", "film", "resume")
 """Arguments that a resumed run does not take from the run that it goes on with."""
 FILM_SEEDS = 8
@@ -60,7 +68,8 @@ def run(arguments: Train) -> int:
     score = judge(arguments, folder, console)
     _write(folder / "score.json", {**asdict(score), "training_s": seconds})
     config = settle(task=arguments.task, config=arguments.keywords()["config"]).config
-    title = f"PPO, {arguments.perception}, proximity weight {config.reward.proximity:g}"
+    title = f"{arguments.algorithm.upper()}, {arguments.perception}"
+    title += f", proximity weight {config.reward.proximity:g}"
     plot_curve(curve, folder / "curve.png", title)
     written = "policy.zip, curve.png, score.json"
     if arguments.film and film(folder, arguments, console):
@@ -74,7 +83,9 @@ def judge(arguments: Train, folder: Path, console: Console) -> Score:
     checkpoint = folder / "policy.zip"
     console.print(f"Evaluating {arguments.episodes} episodes on fixed seeds ...")
     score = evaluate(
-        lambda env_info: ppo.load(checkpoint, env_info), arguments.episodes, **arguments.keywords()
+        lambda env_info: checkpoints.load(checkpoint, env_info),
+        arguments.episodes,
+        **arguments.keywords(),
     )
     for name, value in asdict(score).items():
         console.print(f"  {name:28s} {value:.3f}", highlight=False)
@@ -99,7 +110,7 @@ def as_before(arguments: Train, folder: Path) -> Train:
     record = folder / "run.json"
     if not record.exists():
         raise CheckpointError(f"{folder} holds no run to resume: {record} is missing.")
-    learnt = ppo.describe(folder / "policy.zip")["num_timesteps"]
+    learnt = checkpoints.describe(folder / "policy.zip")["num_timesteps"]
     if learnt >= arguments.timesteps:
         raise CheckpointError(
             f"{folder} has learnt {learnt} steps already; ask for more than that with --timesteps."
@@ -116,13 +127,16 @@ def train(arguments: Train, folder: Path, console: Console) -> tuple[Curve, floa
 
     Progress survives a kill.
     """
-    kwargs, settings = arguments.keywords(), ppo.PPOSettings()
+    kwargs = arguments.keywords()
+    settings = SETTINGS[arguments.algorithm][arguments.demonstrations > 0]
     vector = HRCVecEnv(arguments.num_envs, stagger=True, seed=arguments.seed, **kwargs)
     with closing(vector) as env, Interrupt() as interrupt:
         config = asdict(env.env.config)
         record = {"arguments": asdict(arguments), "config": config, **provenance()}
         _write(folder / "run.json", record)
         learner, curve = _learner(arguments, folder, env, settings)
+        if arguments.resume is None and arguments.demonstrations:
+            _clone(learner, arguments, env, console)
         facts = {"environment": kwargs, "settings": asdict(settings)}
         ramp, total = Ramp(arguments.ramp), arguments.timesteps
         started_s = time.monotonic()
@@ -132,7 +146,7 @@ def train(arguments: Train, folder: Path, console: Console) -> tuple[Curve, floa
                 total - learner.num_timesteps,
                 callback=[ProximityCurriculum(ramp, env), monitor],
                 reset_num_timesteps=arguments.resume is None,
-                tb_log_name="ppo",
+                tb_log_name=arguments.algorithm,
             )
     if not interrupt.asked:
         return curve, time.monotonic() - started_s
@@ -143,24 +157,33 @@ def train(arguments: Train, folder: Path, console: Console) -> tuple[Curve, floa
     return curve, None
 
 
-def _learner(
-    arguments: Train, folder: Path, env: HRCVecEnv, settings: ppo.PPOSettings
-) -> tuple[Any, Curve]:
+def _learner(arguments: Train, folder: Path, env: HRCVecEnv, settings: Any) -> tuple[Any, Curve]:
     """A learner and its curve: new ones, or those of the run that is resumed."""
+    seed, log = arguments.seed, folder / "tensorboard"
+    if arguments.resume is None and arguments.algorithm == "sac":
+        return sac.make_learner(env, settings, seed, log, arguments.her), []
     if arguments.resume is None:
-        return ppo.make_learner(env, settings, arguments.seed, folder / "tensorboard"), []
-    learner = ppo.resume(folder / "policy.zip", env, folder / "tensorboard")
+        return ppo.make_learner(env, settings, seed, log), []
+    learner = checkpoints.resume(folder / "policy.zip", env, folder / "tensorboard")
     env.seed(arguments.seed + learner.num_timesteps)  # other episodes than the first ones
     path = folder / "curve.json"
     return learner, json.loads(path.read_text()) if path.exists() else []
+
+
+def _clone(learner: Any, arguments: Train, env: HRCVecEnv, console: Console) -> None:
+    """Show the policy what the scripted agent does; then the environments begin as they would."""
+    n, settings = arguments.demonstrations, CloningSettings()
+    with progress_bar(console, "cloning") as say:
+        clone(learner.policy, env, n, settings, DEMONSTRATION_SEED, lambda share: say(share, ""))
+    env.seed(arguments.seed)
 
 
 def film(folder: Path, arguments: Train, console: Console) -> bool:
     """Film the policy's closest encounter with the worker; whether this machine can draw."""
     from hrc_env.cli.film import film_episode, nearest_seed
 
-    def make(env_info: EnvInfo) -> ppo.TrainedAgent:
-        return ppo.load(folder / "policy.zip", env_info)
+    def make(env_info: EnvInfo) -> checkpoints.TrainedAgent:
+        return checkpoints.load(folder / "policy.zip", env_info)
 
     kwargs = arguments.keywords()
     del kwargs["num_threads"]

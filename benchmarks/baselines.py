@@ -23,7 +23,7 @@ import torch
 import tyro
 from rich.console import Console
 
-from agents import ppo
+from agents import checkpoints
 from agents.evaluate import EVALUATION_SEED, judged
 from agents.registry import AGENTS, make_agent
 from benchmarks.common import publish
@@ -108,7 +108,7 @@ def learnt(arguments: Arguments, level: str, agent: str) -> Path:
     folder = arguments.out / "policies" / f"{on}-{proximity:g}-{arguments.timesteps}"
     policy = folder / "policy.zip"
     begun = policy.exists()
-    if begun and ppo.describe(policy)["num_timesteps"] >= arguments.timesteps:
+    if begun and checkpoints.describe(policy)["num_timesteps"] >= arguments.timesteps:
         return policy
     options: dict[str, Any] = {"resume" if begun else "out": folder}
     options |= {"timesteps": arguments.timesteps, "episodes": 1}

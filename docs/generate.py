@@ -10,17 +10,20 @@ puts its numbers into the table of that name first.
 
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # where benchmarks/ and docs/ are
 
 from docs import reference, tables
+from hrc_env.tasks import BUILT_IN
 
 DOCS = Path(__file__).resolve().parent
 PAGES = (DOCS.parent / "README.md", *sorted(DOCS.glob("*.md")))
 """Written by hand, with tables that are filled in."""
 REFERENCE: dict[Path, Callable[[], str]] = {
     DOCS / "reference" / "environment.md": reference.environment,
+    **{DOCS / "reference" / f"{each}.md": partial(reference.task_page, each) for each in BUILT_IN},
     DOCS / "reference" / "config.md": reference.config,
     DOCS / "reference" / "infos.md": reference.infos,
     DOCS / "reference" / "command_line.md": reference.command_line,

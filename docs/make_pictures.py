@@ -8,6 +8,7 @@ workers.jpg   three workers of different bodies on it
 faults.jpg    what faults do to an image
 appearance.jpg  both scenes as they were built, and in five looks
 cameras.jpg   the laboratory through a pinhole and through the paper's GoPro
+ID.webp       an episode of the scripted agent in each environment, beside one worker or more
 clip.jpg      a film strip of a walk that was written to a BVH file and imported
 
 Those with measurements in them come from the studies of `benchmarks/results.py`.
@@ -15,12 +16,17 @@ Those with measurements in them come from the studies of `benchmarks/results.py`
 
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
+import gymnasium
 import imageio.v2 as imageio
 import numpy as np
+from PIL import Image
 
+from agents.env_info import env_info
+from agents.experts import expert
 from benchmarks.gallery.still import views
 from hrc_env.core.batching import copied
 from hrc_env.core.records import Roi
@@ -34,10 +40,15 @@ from hrc_env.perception.windows import window_from_joints
 from hrc_env.render.overlay import label, middle_rows, shrink, tile
 from hrc_env.scene.domain_randomization import VARIED, draw_look
 from hrc_env.scene.render import CropRenderer, PictureRenderer
+from hrc_env.tasks import BUILT_IN
 from hrc_env.worker.body import worker_names
 
 PICTURES = Path(__file__).parent / "pictures"
 JPEG_QUALITY = 88
+FILM_PX, SEED_FILM, MOST_STEPS = {"width": 480, "height": 360}, 1, 800
+STEPS_A_FRAME, FRAME_MS = 5, 100
+"""Of the films of episodes: size, seed and length; how many steps lie between frames, and how long
+each is shown."""
 SEED_WALK, STEPS_WALK = 3, 91
 """An episode and a step of it at which the worker walks."""
 
@@ -135,6 +146,26 @@ def appearance() -> None:
     save(tile(for_each, 3), "appearance.jpg")
 
 
+def episodes(ids: Sequence[str] = tuple(BUILT_IN)) -> None:
+    """A short film of every environment, at twice the speed."""
+    for task_id in ids:
+        env = gymnasium.make(task_id, perception="truth", render_mode="rgb_array", **FILM_PX)
+        inner = env.unwrapped
+        assert isinstance(inner, HRCEnv)
+        observation, _ = env.reset(seed=SEED_FILM)
+        agent, frames, over, n = expert(env_info(inner.simulation)), [], False, 0
+        while not over and n < MOST_STEPS:
+            if n % STEPS_A_FRAME == 0:
+                frames.append(Image.fromarray(np.asarray(env.render(), np.uint8)))
+            observation, _, terminated, truncated, _ = env.step(agent.act(observation))
+            over, n = terminated or truncated, n + 1
+        env.close()
+        frames[0].save(
+            PICTURES / f"{task_id}.webp", save_all=True, append_images=frames[1:],
+            duration=FRAME_MS, loop=0, quality=60, method=6,
+        )  # fmt: skip
+
+
 def clip() -> None:
     """A recording, imported."""
     out = Path("out/clips")
@@ -188,3 +219,4 @@ if __name__ == "__main__":
     faults()
     appearance()
     clip()
+    episodes()

@@ -41,7 +41,11 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     ),
     "train": (
         "hrc_env.cli.train", "Train",
-        "Train PPO, evaluate it on fixed seeds, draw its curve, film it.",
+        "Train a policy, evaluate it on fixed seeds, draw its curve, film it.",
+    ),
+    "record": (
+        "hrc_env.cli.record", "Record",
+        "Record an agent's episodes as a Minari data set.",
     ),
     "bench": (
         "benchmarks.commands", "Bench",

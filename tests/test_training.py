@@ -13,7 +13,7 @@ import pytest
 from commands import ROOT, called
 from matplotlib.figure import Figure
 
-from agents import ppo
+from agents import checkpoints
 from agents.callbacks import Interrupt, Ramp, TrainingMonitor, plot_curve
 from agents.env_info import env_info
 from agents.evaluate import evaluate, judged, one_by_one
@@ -58,10 +58,10 @@ def test_a_run_leaves_policy_curve_score_and_where_they_came_from(run):
 
 
 def test_resuming_goes_on_where_it_stopped(run):
-    before = ppo.describe(run / "policy.zip")["num_timesteps"]
+    before = checkpoints.describe(run / "policy.zip")["num_timesteps"]
     done = train("--timesteps", before + 256, "--resume", run)
     assert done.returncode == 0, done.stderr
-    assert ppo.describe(run / "policy.zip")["num_timesteps"] == before + 256
+    assert checkpoints.describe(run / "policy.zip")["num_timesteps"] == before + 256
     steps = [point["steps"] for point in json.loads((run / "curve.json").read_text())]
     assert steps == sorted(steps)
 
@@ -185,10 +185,10 @@ def test_ctrl_c_saves_and_says_how_to_go_on(tmp_path, monkeypatch, capsys):
     assert said.startswith("Stopped at 260 steps, which are saved. Go on with: python -m hrc_env")
     words = shlex.split(said.split("python -m hrc_env ")[1])
     assert words == ["train", "--resume", str(folder), "--timesteps", "768"]
-    assert ppo.describe(folder / "policy.zip")["num_timesteps"] == 260
+    assert checkpoints.describe(folder / "policy.zip")["num_timesteps"] == 260
     assert not (folder / "score.json").exists()
     assert main([*words, "--episodes", "2", "--no-film"]) == 0
-    assert ppo.describe(folder / "policy.zip")["num_timesteps"] >= 768
+    assert checkpoints.describe(folder / "policy.zip")["num_timesteps"] >= 768
     assert (folder / "score.json").exists()
 
 
@@ -209,7 +209,7 @@ def test_a_run_of_an_older_version_resumes_with_defaults_for_what_it_lacks(run, 
     record["arguments"]["n_workers"] = [1, 2]
     (old / "run.json").write_text(json.dumps(record))
     again = as_before(Train(scene="site", timesteps=10_000, resume=old), old)
-    assert (again.scene, again.n_workers, again.perception) == ("lab", (1, 2), "truth")
+    assert (again.scene, again.n_workers, again.perception) == (None, (1, 2), "truth")
     assert (again.timesteps, again.resume) == (10_000, old)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from leaks import PERTURBED, another_worker, differences, displaced, leaks, shifted
 
-from agents import ppo
+from agents import checkpoints, ppo
 from agents.registry import AGENTS
 from hrc_env import simulation
 from hrc_env.motion import generator
@@ -79,7 +79,7 @@ def policy(tmp_path_factory):
     envs = HRCVecEnv(1, perception="none", config={"worker": "any"})
     path = tmp_path_factory.mktemp("policy") / "policy.zip"
     learner = ppo.make_learner(envs, ppo.PPOSettings(), seed=0)
-    ppo.save(learner, path, {})
+    checkpoints.save(learner, path, {})
     envs.close()
     return str(path)
 

@@ -7,12 +7,14 @@ from typing import Any
 from hrc_env.cli.checks import at_least, writable_folder
 from hrc_env.cli.environment import EnvironmentArguments, merged
 from hrc_env.core.checkout import agents
-from hrc_env.core.errors import ConfigError
+from hrc_env.core.errors import ConfigError, check_names
+
+ALGORITHMS = ("ppo", "sac")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Train(EnvironmentArguments):
-    """Train PPO, evaluate it on fixed seeds, draw its curve, film it.
+    """Train a policy, evaluate it on fixed seeds, draw its curve, film it.
 
     Ctrl-C saves what has been learnt and says how to go on. What lies in a folder is never
     overwritten: a second run into runs/quick goes to runs/quick-2. Curves: tensorboard --logdir
@@ -21,6 +23,13 @@ class Train(EnvironmentArguments):
 
     out: Path = Path("runs/quick")
     """Folder for checkpoints, curves, TensorBoard logs and the film."""
+    algorithm: str = "ppo"
+    """ppo; or sac, which learns with hindsight (HER) where the task has goals apart."""
+    her: bool | None = None
+    """With sac: True or False, whether transitions are judged by other goals, too; by default where
+    there are goals."""
+    demonstrations: int = 0
+    """Episodes of the scripted agent that the policy learns to imitate before it learns itself."""
     timesteps: int = 1_000_000
     """Environment steps in all (with --resume: counted from the very start)."""
     num_envs: int = 64
@@ -47,8 +56,14 @@ class Train(EnvironmentArguments):
         """Train; a `ConfigError` for a number or a name that cannot be learnt with."""
         for name in ("timesteps", "num_envs", "threads", "episodes"):
             at_least(f"--{name.replace('_', '-')}", getattr(self, name), 1)
-        for name in ("seed", "proximity", "ramp"):
+        for name in ("seed", "proximity", "ramp", "demonstrations"):
             at_least(f"--{name}", getattr(self, name), 0)
+        check_names("algorithm", [self.algorithm], ALGORITHMS)
+        if self.her and self.algorithm != "sac":
+            raise ConfigError(
+                f"--her judges what a replay buffer holds by other goals, and {self.algorithm} has "
+                "no such buffer: --algorithm sac --her True, or leave it out."
+            )
         if self.perception == "pixels":
             raise ConfigError(
                 "--perception pixels is too slow to learn on: learn on keypoints, which emulates "

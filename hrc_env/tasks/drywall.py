@@ -279,6 +279,11 @@ TASK = Task(
     achieved="task/screws_driven",
     failed="task/screws_left",
     markers=lambda view: np.broadcast_to(view.place_world, (len(view.driven), 1, 3)),
+    starts="The arm is near home. The board lies on the stack, moved by up to 2 cm and turned by "
+    "up to 0.06 rad. The worker waits out of reach until it is pressed to the studs; without a "
+    "worker screws are driven by themselves.",
+    ends="When four screws hold the board and the cups have let go. A success: while screws were "
+    "driven it was never off its place by 5 mm or half a degree.",
     max_episode_steps=LONGER["HRCDrywall-v0"],
     robot="ur10e_cups",
     grips=True,

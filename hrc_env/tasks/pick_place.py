@@ -224,6 +224,9 @@ TASK = Task(
     achieved="task/studs_placed",
     failed="task/studs_left",
     markers=lambda view: np.broadcast_to(view.places_world, (len(view.placed), STUDS, 3)),
+    starts="The arm is near home, the fingers open. Three pieces stand on edge on the table, each "
+    "moved by up to 2 cm and turned by up to 0.2 rad.",
+    ends="When all three pieces rest in their places, let go: that is the success.",
     max_episode_steps=LONGER["HRCPickPlace-v0"],
     robot="ur10e_gripper",
     grips=True,

@@ -51,6 +51,7 @@ TASK: Task = replace(
     config=PickPlaceGoalConfig,
     observations=(),
     rewards=(),
+    ends="Not before the time is up. A success: all pieces rest in their places now.",
     max_episode_steps=LONGER["HRCPickPlaceGoal-v0"],
     over=None,
     goal=Goal(

@@ -204,4 +204,7 @@ TASK = Task(
     achieved="task/goals_reached",
     failed="task/goals_missed",
     markers=lambda view: view.goal_world[:, None],
+    starts="The arm is near home, turned anywhere in front of its base. A first goal appears; the "
+    "next one when it is reached, or missed after `task.time_limit_s`.",
+    ends="Not before the time is up. A success: every goal so far, and at least one, was reached.",
 )  # fmt: skip

@@ -88,6 +88,9 @@ TASK = Task(
     achieved="task/goals_reached",
     failed="task/goals_missed",
     markers=lambda view: view.goal_world[:, None],
+    starts="The arm is near home, turned anywhere in front of its base. One goal, for the whole "
+    "episode.",
+    ends="Not before the time is up. A success: the tool is at its goal now.",
     max_episode_steps=LONGER["HRCReachGoal-v0"],
     goal=Goal(
         size=3,

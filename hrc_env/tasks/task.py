@@ -58,6 +58,10 @@ class Task:
     """and what was not, of as many attempts."""
     markers: Callable[[Any], Points3]
     """(view) -> (B, M, 3) points that pictures show [m]."""
+    starts: str = ""
+    """For its page: how episodes begin,"""
+    ends: str = ""
+    """and what ends them before the time limit."""
     max_episode_steps: int = EPISODE_STEPS
     robot: str | None = None
     """Who does it unless somebody says otherwise; None: the default robot."""

@@ -121,6 +121,20 @@ def test_three_cameras_that_agree_begin_anew_without_any_turn():
     assert (said_m(estimates[-1]) < 0.05).all()
 
 
+def test_where_a_third_camera_sees_them_too_two_are_not_doubted_for_what_the_detector_does():
+    """Errors of one kind, which a turn would explain as well, and now and then a third view."""
+    joints = walkers(90)
+    rig = np.stack([TWO[0], turned(TWO[1], 0.3 * TILTED), LAB[2]])
+    px = seen_by(rig, joints)
+    alone = px.copy()
+    alone[:, :, 2] = np.nan
+    assert pairs(followed(alone, LAB[:3])[0])["askew"].all()
+    px[np.arange(90) % 15 > 0, :, 2] = np.nan
+    state, estimates = followed(px, LAB[:3])
+    assert not pairs(state)["askew"].any()
+    assert (off_m(estimates[-1], joints[-1]) < 0.05).all()
+
+
 def test_two_cameras_that_see_two_people_are_not_taken_for_askew():
     one, other = walkers(100), np.roll(walkers(100), 1, axis=1)
     px = np.stack([seen_by(TWO, one)[:, :, 0], seen_by(TWO, other)[:, :, 1]], 2)

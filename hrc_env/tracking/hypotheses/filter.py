@@ -146,15 +146,18 @@ def _begin(own, seen, s):
 @kernel(makes_arrays=True)
 def _doubt_cameras(own, P, seen, s):
     """Ask two cameras that alone see a worker whether they hang as is said, P (C, 3, 4); if not,
-    begin the track with them turned."""
+    begin the track with them turned. Where a third one sees them, too, nothing is held against two:
+    a detector's errors of one kind look like a turn before long."""
     tree, cameras = own.trees[0], np.zeros(2, np.int64)
     pair, n_views = tree.pair, count_views(seen, s.acquire_min_joints, cameras)
     if n_views == 2:
         compare(tree, cameras, P, seen, s.acquire_min_joints)
-    elif n_views > 2 and pair.askew:
+    elif n_views > 2:
+        was_askew = pair.askew
         forget_turns(pair)
-        hang_as_known(pair, P, seen.P)
-        _begin(own, seen, s)
+        if was_askew:
+            hang_as_known(pair, P, seen.P)
+            _begin(own, seen, s)
     if not tree.tracked:
         pair.waited = pair.waited + 1 if n_views == 2 else max(pair.waited - 1, 0)
     if pair.askew:

@@ -1,0 +1,30 @@
+"""What policies make of an observation before their first layer: near and far at once."""
+
+import math
+from typing import Any
+
+from gymnasium import spaces
+
+from hrc_env.core.errors import learner
+
+with learner():
+    import torch
+    from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+
+NEAR = 100.0
+"""Entries that are smaller than 1 / NEAR are spread out."""
+
+
+class NearAndFar(BaseFeaturesExtractor):
+    """Every entry x beside sign(x) log(1 + NEAR |x|): a network that sees metres, and must place to
+    millimetres, has both at its own scale. Parts of an observation are taken in their order."""
+
+    def __init__(self, observation_space: spaces.Space[Any]) -> None:
+        super().__init__(observation_space, 2 * spaces.flatdim(observation_space))
+
+    def forward(self, observations: Any) -> torch.Tensor:
+        """(B, 2 n) of observations (B, n)."""
+        parts = observations.values() if isinstance(observations, dict) else (observations,)
+        flat = torch.cat([part.flatten(1) for part in parts], dim=1)
+        near = torch.sign(flat) * torch.log1p(NEAR * flat.abs()) / math.log1p(NEAR)
+        return torch.cat([flat, near], dim=1)

@@ -1,0 +1,49 @@
+"""python -m hrc_env record: an agent's episodes as a Minari data set, by `agents/recording.py`."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import tyro
+
+import hrc_env
+from hrc_env.cli.checks import at_least
+from hrc_env.cli.environment import EnvironmentArguments
+from hrc_env.core.checkout import agents
+from hrc_env.core.errors import ConfigError, check_names
+from hrc_env.tasks import DEFAULT
+
+
+@dataclass(frozen=True, kw_only=True)
+class Record(EnvironmentArguments):
+    """Record an agent's episodes as a Minari data set.
+
+    What is finished is kept when this is stopped or killed: the same command goes on there. The
+    data set appears when it is whole, where Minari looks for it (MINARI_DATASETS_PATH).
+    """
+
+    task: Annotated[str, tyro.conf.Positional] = DEFAULT
+    """Which environment, by its id."""
+    agent: str = "scripted"
+    """random, scripted, scripted_slowed, or the path of a checkpoint of `train` (.zip)."""
+    episodes: int = 100
+    """How many episodes."""
+    seed: int = 0
+    """Seed of the first episode; the next ones count up."""
+    out: str
+    """Name of the data set, with a version: hrc/pick-place/scripted-v0."""
+    perception: str = "keypoints"
+    """What the robot sees with: keypoints (camera emulator), truth or none."""
+    num_envs: int = 16
+    """Environments that step together, and episodes that are kept at once."""
+
+    def run(self) -> int:
+        """Record; a `ConfigError` for a data set that there is, or a name that cannot be one."""
+        check_names("environment", [self.task], hrc_env.IDS)
+        at_least("--episodes", self.episodes, 1)
+        at_least("--num-envs", self.num_envs, 1)
+        at_least("--seed", self.seed, 0)
+        if self.perception == "pixels":
+            raise ConfigError(
+                "--perception pixels is too slow to record: record keypoints, which emulates it."
+            )
+        return agents("recording").run(self)
