@@ -38,7 +38,7 @@ class CloningSettings:
 
     rounds: int = 4
     """Of gathering and learning."""
-    steps: int = 3000
+    steps: int = 2000
     """Gradient steps of each round, over all that has been gathered; three times as many in the
     last."""
     batch_size: int = 256

@@ -12,6 +12,8 @@ from gymnasium.spaces import Dict
 
 from hrc_env.core.errors import learner
 
+from .features import NearAndFar
+
 with learner():
     import torch
     from stable_baselines3 import PPO
@@ -40,6 +42,12 @@ class PPOSettings:
     """Hidden layers of policy and value network (tanh)."""
     log_std_init: float = -0.5
     """Initial log standard deviation of actions."""
+    near_and_far: bool = False
+    """Whether it sees every entry at two scales (`agents.features`), through layers of ReLU."""
+
+
+IMITATOR = PPOSettings(hidden=(256, 256), near_and_far=True, learning_rate=5e-5, gamma=0.99)
+"""Of who begins with what an expert does, and keeps most of it."""
 
 
 def make_learner(
@@ -48,10 +56,12 @@ def make_learner(
     """A fresh PPO on `env`; a running estimate scales rewards, observations stay as they are."""
     normalised = VecNormalize(env, norm_obs=False, norm_reward=True, gamma=settings.gamma)
     values = asdict(settings)
+    near = values.pop("near_and_far")
     policy = {
         "net_arch": list(values.pop("hidden")),
-        "activation_fn": torch.nn.Tanh,
+        "activation_fn": torch.nn.ReLU if near else torch.nn.Tanh,
         "log_std_init": values.pop("log_std_init"),
+        **({"features_extractor_class": NearAndFar} if near else {}),
     }
     log = None if tensorboard is None else str(tensorboard)
     kind = "MultiInputPolicy" if isinstance(env.observation_space, Dict) else "MlpPolicy"

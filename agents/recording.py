@@ -115,8 +115,7 @@ def _played(asked: Record, first: int, n: int) -> list[Episode]:
         agent = make_agent(asked.agent, env_info(env.shards.first), asked.seed + first)
         seen, info = env.reset(seed=asked.seed + first)
         frames: list[Any] = [(seen, None, None, None, None, info)]
-        ended = np.zeros(n, bool)
-        last = np.zeros(n, int)
+        ended, last = np.zeros(n, bool), np.zeros(n, int)
         while not ended.all():
             action = np.clip(agent.act(seen), -1, 1)
             seen, reward, terminated, truncated, info = env.step(action)

@@ -10,6 +10,8 @@ from hrc_env.core.errors import learner
 from hrc_env.sb3 import HRCVecEnv
 from hrc_env.tasks.task import goal_of
 
+from .features import NearAndFar
+
 with learner():
     from stable_baselines3 import SAC, HerReplayBuffer
 
@@ -34,6 +36,8 @@ class SACSettings:
     """Weight of the entropy: found as it goes, from this on."""
     hidden: tuple[int, ...] = (256, 256)
     """Hidden layers of actor and critics (ReLU)."""
+    near_and_far: bool = False
+    """Whether it sees every entry at two scales (`agents.features`)."""
     relabelled: int = 4
     """With hindsight, how many transitions are judged by goals that were achieved later in their
     episode, for each that is judged by its own."""
@@ -62,7 +66,8 @@ def make_learner(
         kept = {"n_sampled_goal": settings.relabelled, "copy_info_dict": True}
         buffer = {"replay_buffer_class": HerReplayBuffer, "replay_buffer_kwargs": kept}
     del values["relabelled"]
-    policy = {"net_arch": list(values.pop("hidden"))}
+    seen = {"features_extractor_class": NearAndFar} if values.pop("near_and_far") else {}
+    policy = {"net_arch": list(values.pop("hidden")), **seen}
     return SAC(
         "MlpPolicy" if task.goal is None else "MultiInputPolicy", env, **values, **buffer,
         policy_kwargs=policy, train_freq=1, learning_starts=first_steps(env), seed=seed,

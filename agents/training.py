@@ -34,8 +34,11 @@ from .evaluate import Score, evaluate
 with learner():
     import torch
 
-SETTINGS = {"ppo": ppo.PPOSettings, "sac": sac.SACSettings}
-"""By algorithm."""
+SETTINGS: dict[str, tuple[Any, Any]] = {
+    "ppo": (ppo.PPOSettings(), ppo.IMITATOR),
+    "sac": (sac.SACSettings(), sac.SACSettings(near_and_far=True)),
+}
+"""By algorithm: of who begins with nothing, and of who begins with what an expert does."""
 DEMONSTRATION_SEED = 2_000_000
 """First seed of what is shown, far from those of learning and of evaluations."""
 ONLY_OF_A_RUN = ("out", "timesteps", "threads", "episodes", "film", "resume")
@@ -124,7 +127,8 @@ def train(arguments: Train, folder: Path, console: Console) -> tuple[Curve, floa
 
     Progress survives a kill.
     """
-    kwargs, settings = arguments.keywords(), SETTINGS[arguments.algorithm]()
+    kwargs = arguments.keywords()
+    settings = SETTINGS[arguments.algorithm][arguments.demonstrations > 0]
     vector = HRCVecEnv(arguments.num_envs, stagger=True, seed=arguments.seed, **kwargs)
     with closing(vector) as env, Interrupt() as interrupt:
         config = asdict(env.env.config)

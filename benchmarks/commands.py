@@ -81,6 +81,8 @@ class SpeedBench(AnyBench):
     """
 
     out: Path = Path("out/bench_speed")
+    task: str | None = None
+    """Which environment, by its id, instead of the first."""
     rounds: int | None = None
     """In how many rounds everybody has a turn, instead of 7 (1 if quick); medians count."""
 
@@ -90,7 +92,7 @@ class SpeedBench(AnyBench):
         from benchmarks.speed.bench import QUICK, SPEED, SpeedBenchConfig
 
         config = QUICK if self.quick else SpeedBenchConfig()
-        return self.shown(SPEED, changed(config, n_rounds=self.rounds))
+        return self.shown(SPEED, changed(config, n_rounds=self.rounds, task=self.task))
 
 
 @dataclass(frozen=True)

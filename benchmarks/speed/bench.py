@@ -17,6 +17,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric, over
 from hrc_env.experiments.study.cache import PartCache, Progress
 from hrc_env.experiments.study.runner import Study, at_least_one
+from hrc_env.tasks.task import task_called
 
 WATCHED = "keypoints"
 """The level whose organs are timed."""
@@ -30,6 +31,8 @@ _MAKING = 0.1
 class SpeedBenchConfig:
     """How much is run."""
 
+    task: str = OURS
+    """Which environment, by its id."""
     n_rounds: int = 7
     """How often everybody has a turn."""
     least_steps: int = 4000
@@ -45,6 +48,7 @@ class SpeedBenchConfig:
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for numbers that cannot work."""
+        task_called(self.task)
         at_least_one(self, "n_rounds", "least_steps", "n_resets")
         if WATCHED not in self.levels:
             raise ConfigError(f"levels must have {WATCHED!r} in them, got {self.levels}.")
@@ -82,7 +86,7 @@ def play(config: SpeedBenchConfig, parts: PartCache) -> Measured:
     measured, organs = Measured(list), Organs()
     with ExitStack() as closing:
         turns = [*_turns(config, closing, parts.progress)]
-        starts = Starts()
+        starts = Starts(config.task)
         closing.callback(starts.close)
         share = (1 - _MAKING) / (config.n_rounds * sum(turn.cost for turn in turns))
         for _ in range(config.n_rounds):
@@ -124,9 +128,9 @@ def _turns(config: SpeedBenchConfig, closing: ExitStack, progress: Progress) -> 
     yield turn(REACHER, SINGLE, 1, Single(PEER))
     yield turn(REACHER, f"{_REACHERS}.1", 1, Vector(PEER, _REACHERS))
     for level in config.levels:
-        yield turn(level, SINGLE, 1, Single(OURS, perception=level))
+        yield turn(level, SINGLE, 1, Single(config.task, perception=level))
         for size, threads in known:
-            contender = Vector(OURS, size, perception=level, num_threads=threads)
+            contender = Vector(config.task, size, perception=level, num_threads=threads)
             yield turn(level, f"{size}.{threads}", threads, contender)
 
 

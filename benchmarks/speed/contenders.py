@@ -82,9 +82,9 @@ SOME, MANY = 8, 64
 class Starts:
     """A single environment and a vector of 64 on one thread, both at level `keypoints`."""
 
-    def __init__(self) -> None:
-        self.single = gymnasium.make(OURS, perception="keypoints")
-        self.vector = gymnasium.make_vec(OURS, MANY, perception="keypoints", num_threads=1)
+    def __init__(self, id: str = OURS) -> None:
+        self.single = gymnasium.make(id, perception="keypoints")
+        self.vector = gymnasium.make_vec(id, MANY, perception="keypoints", num_threads=1)
         self.single.reset(seed=0)
         self.vector.reset(seed=0)
 

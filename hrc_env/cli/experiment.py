@@ -10,6 +10,7 @@ import tyro
 
 from hrc_env.cli.checks import at_least
 from hrc_env.cli.progress import show
+from hrc_env.tasks import DEFAULT
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,8 @@ class ImpactExperiment(AnyExperiment):
 
     name = "impact"
     out: Path = Path("out/impact")
+    task: str = DEFAULT
+    """What the robots do, by the environment's id."""
     seeds: int | None = None
     """Episodes of every row, instead of 200 (8 if quick)."""
     estimator: tuple[str, ...] = ()

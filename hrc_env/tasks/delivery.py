@@ -123,11 +123,11 @@ class DeliveryView:
 def survey(grounds: Grounds, config: DeliveryConfig) -> Site:
     """Zones of a place, and the ways to them; `ConfigError` where no two are far enough apart."""
     (x0, x1), (y0, y1) = grounds.walkable_x_m, grounds.walkable_y_m
-    xs = np.arange(x0 - AROUND_M, x1 + AROUND_M, CELL_M)
-    ys = np.arange(y0 - AROUND_M, y1 + AROUND_M, CELL_M)
+    xs = np.arange(x0 - AROUND_M, x1 + AROUND_M, CELL_M, dtype=float)
+    ys = np.arange(y0 - AROUND_M, y1 + AROUND_M, CELL_M, dtype=float)
     origin, gaps = np.array([xs[0], ys[0]]), gaps_m(xs, ys, grounds.blocked)
     roomy = (gaps > ROOMY_M) & ((xs > x0) & (xs < x1))[:, None] & ((ys > y0) & (ys < y1))
-    points: Floats = np.argwhere(roomy).astype(float) * CELL_M + origin
+    points: Floats = np.asarray(np.argwhere(roomy) * CELL_M + origin, np.float64)
     works = np.array([place.xy_m for place in grounds.places]).reshape(-1, 2)
     away = np.linalg.norm(points[:, None] - works, axis=-1).min(1, initial=np.inf)
     points = points[away > OFF_WORK_M]

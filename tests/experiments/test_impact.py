@@ -278,7 +278,7 @@ def test_a_run_that_is_killed_goes_on_to_the_same_numbers(end_to_end, process, t
 def test_a_policy_is_learnt_once_and_again_only_if_its_file_is_lost(tmp_path, monkeypatch):
     learnt = []
 
-    def learn(n_steps, path, tick):
+    def learn(n_steps, path, tick, task):
         learnt.append(1)
         path.write_bytes(b"policy")
         return {"sha256": hashlib.sha256(b"policy").hexdigest()}

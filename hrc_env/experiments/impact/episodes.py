@@ -29,6 +29,7 @@ from hrc_env.geometry.distances import least_separation
 from hrc_env.motion import generator
 from hrc_env.simulation import Simulation
 from hrc_env.step import Info
+from hrc_env.tasks import DEFAULT
 from hrc_env.vector.shards import Shards
 from hrc_env.worker.body import worker_truth
 
@@ -59,8 +60,10 @@ class Stage:
     """The environments of one setup, built when they are needed, used by every policy: an episode
     a seed, of which the k-th has turn k modulo the number of turns."""
 
-    def __init__(self, setup: PerceptionSetup, seeds: Sequence[int], n_steps: int) -> None:
-        self.setup, self.seeds, self.n_steps = setup, seeds, n_steps
+    def __init__(
+        self, setup: PerceptionSetup, seeds: Sequence[int], n_steps: int, task: str = DEFAULT
+    ) -> None:
+        self.setup, self.seeds, self.n_steps, self.task = setup, seeds, n_steps, task
         self._envs: list[Shards] = []
 
     def play(self, make_agent: MakeAgent, margin_m: float, tick: PartProgress) -> Rows:
@@ -70,14 +73,17 @@ class Stage:
         turns = self.setup.turns[:n]
         in_turns = [slice(k, None, len(turns)) for k in range(len(turns))]
         self._envs = self._envs or [
-            _build(self.setup, turn, len(self.seeds[mine]))
+            _build(self.setup, turn, len(self.seeds[mine]), self.task)
             for turn, mine in zip(turns, in_turns, strict=True)
         ]
         for env, mine in zip(self._envs, in_turns, strict=True):
             seeds = self.seeds[mine]
             stepped = partial(tick, len(seeds) / n / self.n_steps)
             steps, infos = run(env, make_agent, seeds, self.n_steps, stepped)
-            for name, values in sums_of(steps, infos, margin_m, env.first.config.ctrl_dt).items():
+            sums = sums_of(
+                steps, infos, margin_m, env.first.config.ctrl_dt, env.first.task.achieved
+            )
+            for name, values in sums.items():
                 rows.setdefault(name, [None] * n)[mine] = values
         return rows
 
@@ -87,10 +93,10 @@ class Stage:
             env.close()
 
 
-def _build(setup: PerceptionSetup, turn: Turn, n_episodes: int) -> Shards:
+def _build(setup: PerceptionSetup, turn: Turn, n_episodes: int, task: str = DEFAULT) -> Shards:
     """Environments with such a setup, through these cameras."""
     settings = settle(
-        perception=setup.level, estimator=setup.estimator, people=PEOPLE,
+        task=task, perception=setup.level, estimator=setup.estimator, people=PEOPLE,
         faults=list(turn.faults), cameras=list(turn.cameras),
     )  # fmt: skip
     threads = 1 if setup.level == "pixels" else min(n_cores(), n_episodes)
@@ -146,8 +152,15 @@ def judge(part: Simulation, before: Bodies, now: Bodies) -> Steps:
     return steps
 
 
-def sums_of(steps: Steps, infos: Sequence[Info], margin_m: float, dt_s: float) -> Rows:
-    """Everything that numbers are made of, a list over episodes each, from T steps of B."""
+def sums_of(
+    steps: Steps,
+    infos: Sequence[Info],
+    margin_m: float,
+    dt_s: float,
+    achieved: str = "task/goals_reached",
+) -> Rows:
+    """Everything that numbers are made of, a list over episodes each, from T steps of B; what was
+    `achieved` (`Task.achieved`) counts as goals."""
     touching = np.stack([info["cost_contact"] for info in infos]) > 0
     nearest_m = np.stack([info["safety/min_separation_m"] for info in infos])
     cost = np.stack([info["cost"] for info in infos])
@@ -155,7 +168,7 @@ def sums_of(steps: Steps, infos: Sequence[Info], margin_m: float, dt_s: float) -
         "cost": cost.sum(0),
         "cost_towards": (cost * (steps["robot_mps"] > MOVING_MPS)).sum(0),
         "separation_min_m": np.fmin.reduce(nearest_m, axis=0, initial=np.inf),
-        "goals": infos[-1]["task/goals_reached"],
+        "goals": infos[-1][achieved],
         "minutes": np.full(touching.shape[1], len(infos) * dt_s / 60),
         **_decisions(steps, margin_m),
         **_contacts(steps, touching),

@@ -22,6 +22,8 @@ from hrc_env.experiments.impact.setups import (
 from hrc_env.experiments.study.cache import PartCache
 from hrc_env.experiments.study.fingerprint import fingerprint_of, source_digest
 from hrc_env.experiments.study.runner import Study, at_least_one, changed
+from hrc_env.tasks import DEFAULT
+from hrc_env.tasks.task import task_called
 from hrc_env.tracking.estimators import estimator_called
 
 PARTS_FROM = (
@@ -37,12 +39,14 @@ FIRST_SEED = 1_000_000
 class ImpactConfig:
     """How much is played."""
 
+    task: str = DEFAULT
+    """What the robots do."""
     n_seeds: int = 200
     """Episodes of every row, at level `pixels` at most `n_pixels`."""
     n_pixels: int = 6
     """Episodes of a row at level `pixels`, where every image is drawn."""
     n_steps: int = 250
-    """Control steps of an episode."""
+    """Control steps of an episode; the commands say the task's."""
     learning_steps: int = 300_000
     """Environment steps in which the trained policy learns."""
     policies: tuple[str, ...] = POLICIES
@@ -54,6 +58,7 @@ class ImpactConfig:
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for what cannot work."""
+        task_called(self.task)
         at_least_one(self, "n_seeds", "n_pixels", "n_steps", "learning_steps")
         check_names("policy", self.policies, POLICIES)
         check_names("perception setup", self.setups, all_setups())
@@ -81,11 +86,15 @@ QUICK: dict[str, Any] = {"n_seeds": 8, "n_pixels": 1, "n_steps": 100, "learning_
 
 
 def config_for(
-    quick: bool = False, seeds: int | None = None, estimator: Sequence[str] = ()
+    quick: bool = False,
+    seeds: int | None = None,
+    estimator: Sequence[str] = (),
+    task: str = DEFAULT,
 ) -> ImpactConfig:
     """The settings that the command line asks for; if estimators are named, only these, the
     reference, the truth and nothing are compared."""
-    config = ImpactConfig(**QUICK) if quick else ImpactConfig()
+    whole = ImpactConfig(n_steps=task_called(task).max_episode_steps)
+    config = changed(ImpactConfig(**QUICK) if quick else whole, task=task)
     asked = [PerceptionSetup(estimator=estimator_called(name).name).name for name in estimator]
     setups = tuple(dict.fromkeys(("truth", "none", REFERENCE, *asked))) if asked else None
     return changed(config, n_seeds=seeds, setups=setups)
@@ -96,17 +105,20 @@ def play(config: ImpactConfig, cache: PartCache) -> Table:
     table: dict[tuple[str, str], dict[str, list[Any]]] = {}
     checkpoint, ppo = cache.folder / "ppo.zip", ""
     if PPO in config.policies:
-        learnt = {"people": PEOPLE, "learning_steps": config.learning_steps}
-        ppo = trained(cache, config.learning_steps, checkpoint, fingerprint_of(learnt, *PARTS_FROM))
+        n = config.learning_steps
+        learnt = {"task": config.task, "people": PEOPLE, "learning_steps": n}
+        key = fingerprint_of(learnt, *PARTS_FROM)
+        ppo = trained(cache, n, checkpoint, key, config.task)
     for setup, policies in config.rows():
         made_of = {
             "people": PEOPLE,
+            "task": config.task,
             "seeds": config.seeds(setup.level),
             "n_steps": config.n_steps,
             "setup": asdict(setup),
             "estimator": source_digest(estimator_called(setup.estimator).make),
         }
-        with closing(Stage(setup, made_of["seeds"], config.n_steps)) as stage:
+        with closing(Stage(setup, made_of["seeds"], config.n_steps, config.task)) as stage:
             for policy in policies:
                 who = {"policy": asdict(policy), "ppo": ppo if policy.name == PPO else ""}
                 table[policy.label, setup.name] = cache.part(

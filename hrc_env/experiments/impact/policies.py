@@ -2,6 +2,7 @@
 
 import hashlib
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from hrc_env.core.machine import n_cores
 from hrc_env.experiments.impact.episodes import PEOPLE, SLOW_M, STOP_M, MakeAgent
 from hrc_env.experiments.study.cache import PartCache, PartProgress
 from hrc_env.simulation import Simulation
+from hrc_env.tasks import DEFAULT
 
 SCRIPTED, SLOWED, PPO = "scripted", "scripted_slowed", "ppo"
 POLICIES = (SCRIPTED, SLOWED, PPO)
@@ -52,16 +54,17 @@ def maker(policy: Policy, checkpoint: Path) -> MakeAgent:
     return make
 
 
-def trained(cache: PartCache, n_steps: int, path: Path, key: str) -> str:
+def trained(cache: PartCache, n_steps: int, path: Path, key: str, task: str = DEFAULT) -> str:
     """The digest of PPO's checkpoint, which is made anew where it is not what the part says."""
-    part = cache.part(PPO, lambda tick: _train(n_steps, path, tick), key)
+    learn = partial(_train, n_steps, path, task=task)
+    part = cache.part(PPO, learn, key)
     if not path.exists() or _digest(path) != part["sha256"]:
         (cache.folder / f"{PPO}.json").unlink(missing_ok=True)
-        part = cache.part(PPO, lambda tick: _train(n_steps, path, tick), key)
+        part = cache.part(PPO, learn, key)
     return part["sha256"]
 
 
-def _train(n_steps: int, path: Path, tick: PartProgress) -> dict[str, Any]:
+def _train(n_steps: int, path: Path, tick: PartProgress, task: str = DEFAULT) -> dict[str, Any]:
     """Learn on the camera emulator with the default estimator; write the checkpoint."""
     ppo, callbacks = agents("ppo"), agents("callbacks")
     checkpoints = agents("checkpoints")
@@ -77,7 +80,7 @@ def _train(n_steps: int, path: Path, tick: PartProgress) -> dict[str, Any]:
     threads = torch.get_num_threads()
     torch.set_num_threads(1)  # more are slower in networks as small as these
     env = HRCVecEnv(
-        N_ENVS, stagger=True, seed=SEED, perception="keypoints", estimator="particle",
+        N_ENVS, task=task, stagger=True, seed=SEED, perception="keypoints", estimator="particle",
         people=PEOPLE, config={"reward": {"proximity": PROXIMITY}}, num_threads=n_cores(),
     )  # fmt: skip
     try:

@@ -1,0 +1,44 @@
+"""Benches and experiments take every id."""
+
+import pytest
+
+from benchmarks.speed.bench import SpeedBenchConfig
+from benchmarks.speed.contenders import Starts
+from hrc_env.core.errors import ConfigError
+from hrc_env.experiments.impact.episodes import Stage
+from hrc_env.experiments.impact.experiment import ImpactConfig, config_for
+from hrc_env.experiments.impact.policies import Policy, maker
+from hrc_env.experiments.impact.setups import REFERENCE, setup_called
+from hrc_env.tasks.task import task_called
+
+IDS = ("HRCPickPlace-v0", "HRCReachGoal-v0")
+
+
+@pytest.mark.parametrize("task", IDS)
+def test_impact_plays_it(task, tmp_path):
+    stage = Stage(setup_called(REFERENCE), [5, 6], 8, task)
+    rows = stage.play(maker(Policy("scripted_slowed"), tmp_path / "none"), 0.0, lambda share: None)
+    stage.close()
+    assert [len(values) for values in rows.values()] == [2] * len(rows)
+    assert rows["goals"] == [0.0, 0.0]
+
+
+def test_an_episode_of_impact_is_as_long_as_the_tasks():
+    for task in ("HRCReach-v0", *IDS):
+        config = config_for(task=task)
+        assert (config.task, config.n_steps) == (task, task_called(task).max_episode_steps)
+    assert config_for(quick=True, task=IDS[0]).n_steps == 100
+
+
+@pytest.mark.parametrize("task", IDS)
+def test_speed_times_its_resets(task):
+    starts = Starts(task)
+    assert set(starts.run(1)) == {"1_of_1", "8_of_64"}
+    assert starts.single.spec.id == starts.vector.spec.id == task
+    starts.close()
+
+
+@pytest.mark.parametrize("config", [SpeedBenchConfig, ImpactConfig])
+def test_a_task_that_there_is_not_is_refused_in_words(config):
+    with pytest.raises(ConfigError, match="Did you mean 'HRCReach-v0'"):
+        config(task="HRCReach-v1")
