@@ -18,9 +18,10 @@ from .env_info import EnvInfo
 from .scripted import Yielding
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 CELL_M, BEYOND_M = 0.2, 3.0
 """Grid of the fields; how far beyond where people walk the base drives [m]."""
-FREE_M, NARROW_M, DEAR = 0.68, 0.44, 4.0
+FREE_M, NARROW_M, DEAR = 0.68, 0.54, 4.0
 """Room that counts as free, and that a way needs at least [m]; a metre between counts so often."""
 BODY_M, BASE_M, DISC_M, DISC_AT_M = 0.30, 0.60, 0.47, 0.22
 """Radius of a person; of a base turned anyhow; of two discs ahead and behind that hold it [m]."""
@@ -34,6 +35,8 @@ NEAR_M, NEAR_GAIN_HZ, STOP_M = 1.0, 1.2, 0.15
 """So near to its zone the base makes straight for the middle, and stops."""
 GOOD_M, PEOPLE_PRICE, TOUCH_PRICE, FAST_PRICE, WALL_PRICE = 0.7, 6.0, 60.0, 20.0, 200.0
 """Room past people that costs nothing; prices against a metre of the way."""
+SLOW_M_S, STAY_M = 0.2, 0.25
+"""Who drives slower turns towards the way, so as to fit between walls; not so near to people."""
 CHANGE_PRICE_S, TURN_HZ, TURN_RAD_S = 0.1, 1.5, 1.0
 FIELDS = 1024
 """So many are kept."""
@@ -68,32 +71,38 @@ class Deliverer:
         people, moving = _people(terms)
         field = self._field_rows(place, terms["zone_from_base"], people, moving)
         velocity = self._chosen(place, speed, yaw, terms["zone_from_base"], field, (people, moving))
-        turn = self._turn(place, yaw, velocity)
+        driving = np.linalg.norm(velocity, axis=1, keepdims=True) > SLOW_M_S
+        turn = self._turn(place, yaw, np.where(driving, velocity, terms["way_direction"]))
+        near_m = terms["worker_separation"].min(axis=-1, initial=np.inf)
+        waits = (near_m < STAY_M) | (np.linalg.norm(terms["zone_from_base"], axis=1) < NEAR_M)
+        turn = np.where(waits & ~driving[:, 0], 0.0, turn)
         if self.yielding is not None:
-            nearest_m = terms["worker_separation"].min(axis=-1, initial=np.inf)
-            share = self.yielding.share(nearest_m)
+            share = self.yielding.share(near_m)
             velocity, turn = velocity * share[:, None], turn * share
         action = np.concatenate([velocity, turn[:, None]], axis=1) / self._most
         action = np.clip(action, -1.0, 1.0)
         return action.reshape(*observation.shape[:-1], -1).astype(np.float32)
 
-    def _field_rows(self, place: Array, zone: Array, people: Array, moving: Array) -> Array:
+    def _field_rows(self, place: Array, zone: Array, people: Array, moving: Array) -> Indices:
         """(n,) which field each base follows: of its zone, with who stands on the ground."""
         stands = np.linalg.norm(moving, axis=-1) < STANDS_M_S
         spots = np.rint((place[:, None] + people) / SPOT_M)
         rows = np.empty(len(place), np.int64)
+        if len(place) > len(self._fields):  # all that are followed now must fit
+            self._fields, self._rows = np.zeros((len(place), *self._gaps.shape), np.float32), {}
         for b, (x, y) in enumerate((place + zone).tolist()):
             standing = {(int(i), int(j)) for i, j in spots[b, stands[b]] if abs(i) < 1e3}
             key = (nearest_point(x, y, self._origin, CELL_M), *sorted(standing))
-            if key not in self._rows:
-                self._keep(key)
-            rows[b] = self._rows[key]
+            row = self._rows.pop(key, None)
+            self._rows[key] = rows[b] = (
+                self._made(key) if row is None else row
+            )  # the last used last
         return rows
 
-    def _keep(self, key: tuple[tuple[int, int], ...]) -> None:
-        """Make a field in place of the oldest."""
+    def _made(self, key: tuple[tuple[int, int], ...]) -> int:
+        """Make a field in place of that which was not used for longest; its row."""
         row = len(self._rows)
-        if row == FIELDS:
+        if row == len(self._fields):
             row = self._rows.pop(next(iter(self._rows)))
         goal, *standing = key
         price = self._price
@@ -101,10 +110,10 @@ class Deliverer:
             away = np.hypot(self._xs[:, None] - SPOT_M * i, self._ys - SPOT_M * j)
             price = price * np.where(away < STOOD_M, STOOD_DEAR, 1.0)
         self._fields[row] = ways_m(price, goal, CELL_M)
-        self._rows[key] = row
+        return row
 
     def _chosen(
-        self, place: Array, speed: Array, yaw: Array, zone: Array, field: Array,
+        self, place: Array, speed: Array, yaw: Array, zone: Array, field: Indices,
         others: tuple[Array, Array],
     ) -> Array:  # fmt: skip
         """(n, 2) the cheapest velocity [m/s]."""
@@ -126,7 +135,7 @@ class Deliverer:
         best = window[np.arange(n), np.where(direct, 0, np.argmin(price, axis=1))]
         return np.where((away_m < STOP_M)[:, None], 0.0, best)
 
-    def _left(self, field: Array, at: Array) -> Array:
+    def _left(self, field: Indices, at: Array) -> Array:
         """(n, C) length of the way from places (n, C, 2)."""
         i, j, u, v = self._cells(at)
         k = field[:, None]
@@ -140,19 +149,18 @@ class Deliverer:
         low = grid[i, j] * (1 - v) + grid[i, j + 1] * v
         return low * (1 - u) + (grid[i + 1, j] * (1 - v) + grid[i + 1, j + 1] * v) * u
 
-    def _cells(self, at: Array) -> tuple[Array, Array, Array, Array]:
+    def _cells(self, at: Array) -> tuple[Indices, Indices, Array, Array]:
         most = np.array(self._gaps.shape) - 1.001
         where = np.clip((at - self._origin) / CELL_M, 0.0, most)
         low = where.astype(np.int64)
         share = where - low
         return low[..., 0], low[..., 1], share[..., 0], share[..., 1]
 
-    def _turn(self, place: Array, yaw: Array, velocity: Array) -> Array:
-        """(n,) turn rate [rad/s] towards where the base drives, where there is room to turn."""
-        wanted = np.arctan2(velocity[:, 1], velocity[:, 0])
+    def _turn(self, place: Array, yaw: Array, towards: Array) -> Array:
+        """(n,) turn rate [rad/s] towards a direction (n, 2), where there is room to turn."""
+        wanted = np.arctan2(towards[:, 1], towards[:, 0])
         error = (wanted - yaw + np.pi) % (2 * np.pi) - np.pi
         rate = np.clip(TURN_HZ * error, -TURN_RAD_S, TURN_RAD_S)
-        rate[np.linalg.norm(velocity, axis=1) < 0.2] = 0.0
         then = yaw + 0.4 * np.sign(rate)
         ahead = DISC_AT_M * np.stack([np.cos(then), np.sin(then)], axis=1)
         room = np.minimum(self._at(self._gaps, place + ahead), self._at(self._gaps, place - ahead))

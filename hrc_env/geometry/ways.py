@@ -54,30 +54,33 @@ def ways_m(price: Floats, goal: tuple[int, int], cell: float) -> Floats:
 
 @kernel(makes_arrays=True)
 def _spread(price: Floats, goal_i: int, goal_j: int, cell: float, ways: Floats) -> None:
-    """First over free points from the goal, then from these over all others."""
+    """First over free points from the goal, in the order of their lengths; then from these over all
+    others, in the order of how far off they are: a wall's two sides do not mix."""
     n_x, n_y = price.shape
-    done = np.zeros((n_x, n_y), np.bool_)
+    order = np.full((n_x, n_y), np.inf)
     queue = [(0.0, goal_i * n_y + goal_j)]
-    ways[goal_i, goal_j] = 0.0
+    order[goal_i, goal_j] = 0.0
     for inside in range(2):
         if inside:
             for i in range(n_x):
                 for j in range(n_y):
-                    if done[i, j]:
-                        heapq.heappush(queue, (ways[i, j], i * n_y + j))
+                    ways[i, j] = order[i, j]
+                    if order[i, j] < math.inf:
+                        order[i, j] = 0.0
+                        heapq.heappush(queue, (0.0, i * n_y + j))
         while len(queue) > 0:
             length, node = heapq.heappop(queue)
             i, j = node // n_y, node % n_y
-            if length > ways[i, j]:
+            if length > order[i, j]:
                 continue
-            done[i, j] = True
             for a in range(max(i - 1, 0), min(i + 2, n_x)):
                 for b in range(max(j - 1, 0), min(j + 2, n_y)):
                     rate = 1.0 if inside else 0.5 * (price[i, j] + price[a, b])
-                    longer = length + cell * math.hypot(a - i, b - j) * rate
-                    if longer < ways[a, b] and not (inside and done[a, b]):
-                        ways[a, b] = longer
-                        heapq.heappush(queue, (longer, a * n_y + b))
+                    step = cell * math.hypot(a - i, b - j) * rate
+                    if length + step < order[a, b]:
+                        order[a, b] = length + step
+                        ways[a, b] = ways[i, j] + step
+                        heapq.heappush(queue, (order[a, b], a * n_y + b))
 
 
 def ranges_m(

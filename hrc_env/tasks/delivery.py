@@ -16,12 +16,12 @@ from hrc_env.belief import Belief
 from hrc_env.core.errors import ConfigError, check_fields
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Grounds, RobotState, World
-from hrc_env.core.typing import Floats, Ints, JointAngles, Points3, Records, Rngs
+from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, Points3, Records
 from hrc_env.geometry.ways import gaps_m, met, nearest_point, ranges_m, spread_out, value_at, ways_m
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm
 from hrc_env.tasks import LONGER
-from hrc_env.tasks.task import Task
+from hrc_env.tasks.task import Rngs, Task
 
 CELL_M, AROUND_M = 0.2, 3.0
 """Grid of the map; how far beyond where people walk the base may drive [m]."""
@@ -123,11 +123,11 @@ class DeliveryView:
 def survey(grounds: Grounds, config: DeliveryConfig) -> Site:
     """Zones of a place, and the ways to them; `ConfigError` where no two are far enough apart."""
     (x0, x1), (y0, y1) = grounds.walkable_x_m, grounds.walkable_y_m
-    xs = np.arange(x0 - AROUND_M, x1 + AROUND_M, CELL_M)
-    ys = np.arange(y0 - AROUND_M, y1 + AROUND_M, CELL_M)
+    xs = np.arange(x0 - AROUND_M, x1 + AROUND_M, CELL_M, dtype=float)
+    ys = np.arange(y0 - AROUND_M, y1 + AROUND_M, CELL_M, dtype=float)
     origin, gaps = np.array([xs[0], ys[0]]), gaps_m(xs, ys, grounds.blocked)
     roomy = (gaps > ROOMY_M) & ((xs > x0) & (xs < x1))[:, None] & ((ys > y0) & (ys < y1))
-    points = np.argwhere(roomy) * CELL_M + origin
+    points: Floats = np.asarray(np.argwhere(roomy) * CELL_M + origin, np.float64)
     works = np.array([place.xy_m for place in grounds.places]).reshape(-1, 2)
     away = np.linalg.norm(points[:, None] - works, axis=-1).min(1, initial=np.inf)
     points = points[away > OFF_WORK_M]
@@ -158,7 +158,7 @@ def start(rngs: Rngs, site: Site, config: DeliveryConfig) -> JointAngles:
     return np.array(places).reshape(-1, 3)
 
 
-def _fit(site: Site, config: DeliveryConfig) -> Floats:
+def _fit(site: Site, config: DeliveryConfig) -> Bools:
     """(Z, Z) whether the way from one zone to another has the length that is wanted."""
     low, high = config.way_m
     return (site.lengths >= low) & (site.lengths <= high)

@@ -70,7 +70,10 @@ def test_ways_lead_round_a_wall_and_cost_what_they_are_long():
     before = value_at(0.0, 0.0, ways, origin, 0.2)
     round_it = np.hypot(0.9, 3.4) + np.hypot(0.9, 3.4) + 0.2
     assert round_it < before < 1.15 * round_it
-    assert np.isfinite(ways).all()  # in the wall, too, as on the nearest free ground
+    assert np.isfinite(ways).all()
+    beside = value_at(0.7, 0.0, ways, origin, 0.2)  # not free: as on the nearest free ground
+    assert abs(beside - value_at(0.4, 0.0, ways, origin, 0.2)) < 0.5
+    assert value_at(1.3, 0.0, ways, origin, 0.2) < 1.2
 
 
 def test_rays_end_at_what_stands_there():
@@ -302,3 +305,17 @@ def test_a_robot_of_ones_own_may_drive():
     env.step(np.array([1.0, 0.0, 0.0], np.float32))
     assert abs(env.unwrapped.simulation.physics.qd[0, 0]) < 0.03
     env.close()
+
+
+def test_an_experts_action_hangs_on_its_own_observation_only():
+    envs = gymnasium.make_vec(ID, num_envs=4, perception="truth", num_threads=1)
+    simulation = envs.unwrapped.shards.first
+    agent, few, alone = (expert(env_info(simulation)) for _ in range(3))
+    few._fields = few._fields[:4]  # what is not followed now is forgotten
+    observation, _ = envs.reset(seed=1)
+    for _ in range(60):
+        action = agent.act(observation)
+        np.testing.assert_array_equal(action, few.act(observation))
+        np.testing.assert_array_equal(action[2], alone.act(observation[2]))
+        observation = envs.step(action)[0]
+    envs.close()
