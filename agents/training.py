@@ -36,7 +36,7 @@ with learner():
 
 SETTINGS: dict[str, tuple[Any, Any]] = {
     "ppo": (ppo.PPOSettings(), ppo.IMITATOR),
-    "sac": (sac.SACSettings(), sac.SACSettings(near_and_far=True)),
+    "sac": (sac.SACSettings(), sac.SACSettings(hidden=(256, 256))),
 }
 """By algorithm: of who begins with nothing, and of who begins with what an expert does."""
 DEMONSTRATION_SEED = 2_000_000

@@ -143,6 +143,10 @@ def test_near_and_far_are_both_seen():
     seen = flat(torch.tensor([[0.001, -0.001, 1.0]]))
     assert seen.shape == (1, 6) == (1, flat.features_dim)
     near, other, far = seen[0, 3:].tolist()
+    both = NearAndFar(env.observation_space)
+    parts = {k: torch.as_tensor(v[None]) for k, v in env.reset(seed=0)[0].items()}
+    way = both(parts)[0, : both.features_dim // 2][-3:]
+    assert way.tolist() == (parts["desired_goal"] - parts["achieved_goal"])[0].tolist()
     assert near == pytest.approx(-other)
     assert near > 0.02
     assert far == pytest.approx(1.0)
