@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from hrc_env.belief import Belief
-from hrc_env.core.errors import check_fields, check_shape
+from hrc_env.core.errors import ConfigError, check_fields, check_shape
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
 
@@ -29,6 +29,10 @@ class RewardConfig:
         check_fields(self, "be positive", "proximity_reach_m")
 
 
+KINDS = ("dense", "sparse")
+"""What a task's `reward` can be: whether coming nearer counts, too."""
+
+
 @dataclass(frozen=True, slots=True)
 class RewardTerm:
     """One summand of the reward."""
@@ -38,6 +42,25 @@ class RewardTerm:
     function: Callable[[Belief, Any, Floats, Any], Floats]
     """(belief, the task's progress, previous action (B, A), weights) -> (B,). The weights are a
     `RewardConfig`; those of a task's term are the task's settings."""
+
+
+def check_kind(config: Any) -> None:
+    """Raise `ConfigError` for settings of a task whose `reward` is not one of `KINDS`."""
+    if config.reward not in KINDS:
+        name = type(config).__name__
+        raise ConfigError(f'{name}.reward must be "dense" or "sparse", got {config.reward!r}.')
+
+
+def progress(says: str) -> RewardTerm:
+    """The term of a task whose steps have `progress_m`, the fall of the ways that are left: as
+    differences of a potential they sum up to no more than there was to go."""
+    said = f'{says}, times `task.progress_per_m`; 0 with `task.reward` "sparse".'
+    return RewardTerm("progress", said, _progress)
+
+
+def _progress(now: Belief, step: Any, previous: Floats, config: Any) -> Floats:
+    share = config.progress_per_m if config.reward == "dense" else 0.0
+    return np.asarray(share * step["progress_m"])
 
 
 def closeness(separation_m: Floats, reach_m: float) -> Floats:

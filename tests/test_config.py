@@ -73,7 +73,7 @@ def test_a_clip_in_memory_is_not_written(tmp_path):
         ('[motion]\npeople = "hurrid"\n', "motion.people 'hurrid'. Did you mean 'hurried'"),
         ("appearance = 3\n", "appearance must be a name ('as_built'"),
         ('[motion]\njobs = "lowwork"\n', "motion.jobs 'lowwork'. Did you mean 'low_work'"),
-        ("[motion]\njobs = 3\n", "motion.jobs must be a name ('framing', 'low_work') or a list"),
+        ("[motion]\njobs = 3\n", "motion.jobs must be a name ('framing', 'low_work'"),
     ],
 )
 def test_a_file_that_cannot_be_is_answered_with_what_would_do(text, said, tmp_path):

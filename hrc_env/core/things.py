@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from hrc_env.core.records import Workplace
 
 
@@ -29,4 +31,6 @@ class Things:
     """Where workers work at them; kind "task"."""
 
 
+FOOT_WORLD = np.array([-0.75, 0.0, 0.75])
+"""The foot of robots that do not drive, in every scene [m]."""
 NOTHING = Things()

@@ -104,15 +104,16 @@ _TOOL = (
 )
 """Who is brought a tool: `HRCHandover-v0`."""
 WORK: dict[str, tuple[Job, ...]] = {
-    "handover": _TOOL,
-    "drywall": _BOARD,
     "framing": JOBS,
     "low_work": (
         replace(JOBS[0], then=(*JOBS[0].then, *((job.name, 0.06) for job in _LOW))),
         *_LOW, *JOBS[1:],
     ),
+    "drywall": _BOARD,
+    "handover": _TOOL,
 }  # fmt: skip
-"""Named choices of jobs: upright at the robot, or now and then at its foot, too (judgement)."""
+"""Named choices of jobs: upright at the robot, or now and then at its foot, too (judgement); those
+of tasks that workers take part in."""
 
 
 def check_jobs(jobs: Sequence[Job]) -> None:

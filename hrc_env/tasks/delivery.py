@@ -12,14 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.belief import Belief
 from hrc_env.core.errors import ConfigError, check_fields
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Grounds, RobotState, World
 from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, Points3, Records
 from hrc_env.geometry.ways import gaps_m, met, nearest_point, ranges_m, spread_out, value_at, ways_m
 from hrc_env.observations import ObservationTerm
-from hrc_env.rewards import RewardTerm
+from hrc_env.rewards import RewardTerm, check_kind, progress
 from hrc_env.tasks import LONGER
 from hrc_env.tasks.task import Rngs, Task
 
@@ -63,10 +62,7 @@ class DeliveryConfig:
         low, high = self.way_m
         if not 0 < low < high:
             raise ConfigError(f"DeliveryConfig.way_m must be (low, high) [m], got {self.way_m}.")
-        if self.reward not in ("dense", "sparse"):
-            raise ConfigError(
-                f'DeliveryConfig.reward must be "dense" or "sparse", got {self.reward!r}.'
-            )
+        check_kind(self)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -244,11 +240,6 @@ def info(state: Records) -> dict[str, Floats]:
     }
 
 
-def _progress(now: Belief, step: Records, previous: Floats, config: DeliveryConfig) -> Floats:
-    share = config.progress_per_m if config.reward == "dense" else 0.0
-    return share * step["progress_m"]
-
-
 def _markers(view: DeliveryView) -> Points3:
     """(B, 1, 3) the zone, on the ground."""
     return np.concatenate([view.goal_world, np.full((len(view.way_m), 1), 0.05)], axis=1)[:, None]
@@ -286,11 +277,8 @@ TASK = Task(
         ),
     ),
     rewards=(
-        RewardTerm(
-            "progress",
-            "Metres of the way that the base left behind, times `task.progress_per_m`; 0 with "
-            "`task.reward` \"sparse\".",
-            _progress,
+        progress(
+            "Metres of the way that the base left behind"
         ),
         RewardTerm(
             "delivered",

@@ -7,11 +7,11 @@ import numpy as np
 
 from hrc_env.core.errors import ConfigError, check_fields, needed
 from hrc_env.core.records import Cue, Effects, ObjectState, Workplace, World
-from hrc_env.core.things import Things, Weld
+from hrc_env.core.things import FOOT_WORLD, Things, Weld
 from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records, Rotations
 from hrc_env.geometry.rotations import matrix
 from hrc_env.observations import ObservationTerm
-from hrc_env.rewards import RewardTerm
+from hrc_env.rewards import RewardTerm, check_kind, progress
 from hrc_env.tasks import LONGER
 from hrc_env.tasks.task import Rngs, Task
 from hrc_env.worker.body import assets_dir
@@ -34,8 +34,6 @@ SCREWS_M = tuple((NEAR_STUD_M, z) for z in (0.82, 0.67, 0.52, 0.37))
 """Where they go, the uppermost first: along x, and above the foot [m]."""
 BESIDE_M = (NEAR_STUD_M + 0.42, WALL_Y_M - 0.50)
 """Where the worker stands, who looks at the board askew."""
-MOUNT_WORLD = np.array([-0.75, 0.0, 0.75])
-"""The robot's foot, in every scene [m]."""
 PUSH_N, SHEAR = (20.0, 50.0), 0.2
 """A screwdriver pushes with so much, and aside with this share of it."""
 ALONE_S, PAUSE_S = 0.6, 0.6
@@ -68,10 +66,7 @@ class DrywallConfig:
         check_fields(self, "be positive", "tolerance_m", "tolerance_rad")
         if not 0.0 <= self.push_n[0] <= self.push_n[1]:
             raise ConfigError(f"DrywallConfig.push_n must be (low, high), got {self.push_n}.")
-        if self.reward not in ("dense", "sparse"):
-            raise ConfigError(
-                f'DrywallConfig.reward must be "dense" or "sparse", got {self.reward!r}.'
-            )
+        check_kind(self)
 
 
 DRYWALL = np.dtype(
@@ -130,7 +125,7 @@ def reset(state: Records, ids: Ints, rngs: Rngs, world: World, config: DrywallCo
         n, draws = len(SCREWS_M), rngs[b].random(3)
         off = MOVED_M * (2.0 * draws[:2] - 1.0)
         half = 0.5 * (np.pi + TURNED_RAD * (2.0 * draws[2] - 1.0))
-        at = MOUNT_WORLD + STACK_M + [*off, 0.0]
+        at = FOOT_WORLD + STACK_M + [*off, 0.0]
         state["pose"][b] = (*at, np.cos(half), 0.0, 0.0, np.sin(half))
         state["push_n"][b] = low + (high - low) * rngs[b].random(n)
         way = 2.0 * np.pi * rngs[b].random(n)
@@ -175,7 +170,7 @@ def advance(
 
 def off_place(board: ObjectState) -> tuple[Floats, Floats]:
     """(B,) how far the board is from its place [m], and turned against it [rad]."""
-    off_m = np.linalg.norm(board.position_world[:, 0] - (MOUNT_WORLD + PLACE_M), axis=-1)
+    off_m = np.linalg.norm(board.position_world[:, 0] - (FOOT_WORLD + PLACE_M), axis=-1)
     return off_m, _turned_rad(matrix(board.quaternion_wxyz[:, 0]))
 
 
@@ -186,7 +181,7 @@ def _turned_rad(R: Rotations) -> Floats:
 
 def _left_m(at: Points3, R: Rotations, tool_world: Points3, taken: Bools) -> Floats:
     """(B,) metres that the board, and the tool to it until it has it, have before them."""
-    away_m = np.linalg.norm(at - (MOUNT_WORLD + PLACE_M), axis=-1) + 0.3 * _turned_rad(R)
+    away_m = np.linalg.norm(at - (FOOT_WORLD + PLACE_M), axis=-1) + 0.3 * _turned_rad(R)
     return away_m + np.where(taken, 0.0, np.linalg.norm(at - tool_world, axis=-1))
 
 
@@ -219,7 +214,7 @@ def effects(state: Records, config: DrywallConfig) -> Effects:
 
 def view(state: Records, ids: Ints, config: DrywallConfig) -> DrywallView:
     """What robots `ids` know of their task."""
-    return DrywallView(MOUNT_WORLD + PLACE_M, state["driven"][ids].copy())
+    return DrywallView(FOOT_WORLD + PLACE_M, state["driven"][ids].copy())
 
 
 def info(state: Records) -> dict[str, Floats]:
@@ -256,13 +251,9 @@ TASK = Task(
         ),
     ),
     rewards=(
-        RewardTerm(
-            "progress",
+        progress(
             "Metres that the board came nearer to its place, 0.3 m for a radian, and the tool to "
-            'it until it is held, times `task.progress_per_m`; 0 with `task.reward` "sparse".',
-            lambda now, step, previous, config: (
-                (config.progress_per_m if config.reward == "dense" else 0.0) * step["progress_m"]
-            ),
+            "it until it is held"
         ),
         RewardTerm(
             "screws",

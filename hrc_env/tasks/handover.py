@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError, check_fields, needed
+from hrc_env.core.errors import check_fields, needed
 from hrc_env.core.records import Cue, Deeds, Effects, ObjectState, Workplace, World
-from hrc_env.core.things import Things
+from hrc_env.core.things import FOOT_WORLD, Things
 from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records
 from hrc_env.geometry.rotations import matrix
 from hrc_env.observations import ObservationTerm
-from hrc_env.rewards import RewardTerm
+from hrc_env.rewards import RewardTerm, check_kind, progress
 from hrc_env.tasks import LONGER
 from hrc_env.tasks.task import Rngs, Task
 from hrc_env.worker.body import assets_dir
@@ -24,8 +24,6 @@ GRIP_UP_M, HANDLE_UP_M = -0.08, 0.12
 """Where the robot is to grip it, and where the worker does, above its middle [m]."""
 BESIDE_M, HAND_UP_M, MEET_M = (1.30, 0.0), 0.40, (0.78, 0.0, 0.40)
 """Where the worker stands, how high a hand is put out, and about where, from the foot [m]."""
-MOUNT_WORLD = np.array([-0.75, 0.0, 0.75])
-"""The robot's foot, in every scene [m]."""
 OFFERED_M = 0.25
 """A handle so near to a hand that is put out is offered: the tool is then no part of the robot."""
 CLOSES_M, CLOSES_M_S, CLOSES_S = 0.02, 0.15, 0.4
@@ -60,10 +58,7 @@ class HandoverConfig:
 
     def __post_init__(self) -> None:
         check_fields(self, "be positive", "gentle_n")
-        if self.reward not in ("dense", "sparse"):
-            raise ConfigError(
-                f'HandoverConfig.reward must be "dense" or "sparse", got {self.reward!r}.'
-            )
+        check_kind(self)
 
 
 HANDOVER = np.dtype(
@@ -115,7 +110,7 @@ def reset(state: Records, ids: Ints, rngs: Rngs, world: World, config: HandoverC
     state[ids] = np.zeros((), HANDOVER)
     for b in ids.tolist():
         half = 0.5 * 0.05 * (2.0 * rngs[b].random() - 1.0)
-        at = MOUNT_WORLD + STAND_M + [0.0, 0.0, BAR_M[2] / 2]
+        at = FOOT_WORLD + STAND_M + [0.0, 0.0, BAR_M[2] / 2]
         state["pose"][b] = (*at, np.cos(half), 0.0, 0.0, np.sin(half))
     at = state["pose"][ids, :3]
     handle = at + np.array([0.0, 0.0, HANDLE_UP_M])
@@ -137,7 +132,7 @@ def advance(
     held, at = tool.held[:, 0], tool.position_world[:, 0]
     handle, speed = _handle(tool)
     state["handle_world"] = handle
-    stand_m = MOUNT_WORLD[2] + STAND_M[2] + BAR_M[2] / 2
+    stand_m = FOOT_WORLD[2] + STAND_M[2] + BAR_M[2] / 2
     state["lifted"] = held & (at[:, 2] > stand_m + LIFTED_M)
     before = state["taken"].copy()
     _close(state, needed(world.deeds, "What workers do"), handle, speed, dt_s)
@@ -209,7 +204,7 @@ def _pull(
 def _left_m(at: Points3, handle: Points3, tool_world: Points3, held: Bools, taken: Bools) -> Floats:
     """(B,) metres that the fingers to the tool, and its handle to the hand, have before them."""
     to_tool_m = np.linalg.norm(at + np.array([0.0, 0.0, GRIP_UP_M]) - tool_world, axis=-1)
-    to_hand_m = np.linalg.norm(handle - (MOUNT_WORLD + MEET_M), axis=-1)
+    to_hand_m = np.linalg.norm(handle - (FOOT_WORLD + MEET_M), axis=-1)
     return np.where(taken, 0.0, to_hand_m + np.where(held, 0.0, to_tool_m))
 
 
@@ -226,7 +221,7 @@ def cue(state: Records) -> Cue:
 
 def view(state: Records, ids: Ints, config: HandoverConfig) -> HandoverView:
     """What robots `ids` know of their task."""
-    return HandoverView(MOUNT_WORLD + MEET_M, state["taken"][ids].copy())
+    return HandoverView(FOOT_WORLD + MEET_M, state["taken"][ids].copy())
 
 
 def info(state: Records) -> dict[str, Floats]:
@@ -262,13 +257,9 @@ TASK = Task(
         ),
     ),
     rewards=(
-        RewardTerm(
-            "progress",
-            "Metres that the fingers came nearer to the tool, and its handle to about where a hand "
-            'is put out, times `task.progress_per_m`; 0 with `task.reward` "sparse".',
-            lambda now, step, previous, config: (
-                (config.progress_per_m if config.reward == "dense" else 0.0) * step["progress_m"]
-            ),
+        progress(
+            "Metres that the fingers came nearer to the tool, and its handle to about where a "
+            "hand is put out"
         ),
         RewardTerm(
             "taken",

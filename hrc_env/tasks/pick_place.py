@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 
 from hrc_env.belief import Belief
-from hrc_env.core.errors import ConfigError, check_fields, needed
+from hrc_env.core.errors import check_fields, needed
 from hrc_env.core.records import ObjectState, World
-from hrc_env.core.things import Things
+from hrc_env.core.things import FOOT_WORLD, Things
 from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records
 from hrc_env.geometry.rotations import matrix
 from hrc_env.observations import ObservationTerm
-from hrc_env.rewards import RewardTerm
+from hrc_env.rewards import RewardTerm, check_kind, progress
 from hrc_env.tasks import LONGER
 from hrc_env.tasks.task import Rngs, Task
 from hrc_env.worker.body import assets_dir
@@ -25,8 +25,6 @@ SURFACE_M = -0.02
 TABLE_M = (0.36, -0.62)
 PLACES_M = tuple((x, 0.62, SURFACE_M + STUD_M[2] / 2) for x in (0.24, 0.36, 0.48))
 """Middle of the table, and of each piece that rests in its place, from the robot's foot [m]."""
-MOUNT_WORLD = np.array([-0.75, 0.0, 0.75])
-"""The robot's foot, in every scene [m]."""
 ROW_M, ASIDE_M, TURN_RAD = 0.14, 0.02, 0.2
 """Pieces lie in a row so far apart, each moved and turned by up to so much."""
 
@@ -59,10 +57,7 @@ class PickPlaceConfig(PlacedConfig):
 
     def __post_init__(self) -> None:
         PlacedConfig.__post_init__(self)
-        if self.reward not in ("dense", "sparse"):
-            raise ConfigError(
-                f'PickPlaceConfig.reward must be "dense" or "sparse", got {self.reward!r}.'
-            )
+        check_kind(self)
 
 
 PICK_PLACE = np.dtype(
@@ -91,7 +86,7 @@ class PickPlaceView:
 
 def places_world() -> Points3:
     """(3, 3) where the middles of placed pieces are [m]."""
-    return MOUNT_WORLD + np.array(PLACES_M)
+    return FOOT_WORLD + np.array(PLACES_M)
 
 
 def things(config: PlacedConfig) -> Things:
@@ -114,7 +109,7 @@ def reset(state: Records, ids: Ints, rngs: Rngs, world: World, config: PlacedCon
         at[:, 0] = x + ROW_M * (np.arange(STUDS) - 1)
         at[:, 1] = y + ASIDE_M * draws[:, 1]
         at[:, 2] = SURFACE_M + STUD_M[2] / 2
-        at[:, :3] += MOUNT_WORLD
+        at[:, :3] += FOOT_WORLD
         half = 0.5 * TURN_RAD * draws[:, 2]
         at[:, 3], at[:, 6] = np.cos(half), np.sin(half)
         state["poses"][b] = at
@@ -137,7 +132,7 @@ def advance(state: Records, rngs: Rngs, world: World, dt_s: float, config: Place
     step["placed"] = placed.sum(1) - state["placed"].sum(1)
     step["done"] = placed.all(1)
     state["placed"], state["potential_m"] = placed, -left_m
-    lowest_m = MOUNT_WORLD[2] + SURFACE_M
+    lowest_m = FOOT_WORLD[2] + SURFACE_M
     state["dropped"] |= (objects.position_world[..., 2] < lowest_m).any(1)
     return step
 
@@ -178,11 +173,6 @@ def info(state: Records) -> dict[str, Floats]:
     }
 
 
-def _progress(now: Belief, step: Records, previous: Floats, config: PickPlaceConfig) -> Floats:
-    share = config.progress_per_m if config.reward == "dense" else 0.0
-    return share * step["progress_m"]
-
-
 def _objects_from_places(now: Belief) -> Points3:
     return now.task.places_world - needed(now.objects, "A loose object").position_world
 
@@ -208,11 +198,9 @@ TASK = Task(
         ),
     ),
     rewards=(
-        RewardTerm(
-            "progress",
-            "Metres that pieces came nearer to their places, and the tool to the first that is not "
-            "placed, times `task.progress_per_m`; 0 with `task.reward` \"sparse\".",
-            _progress,
+        progress(
+            "Metres that pieces came nearer to their places, and the tool to the first that is "
+            "not placed"
         ),
         RewardTerm(
             "placed",

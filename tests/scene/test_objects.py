@@ -8,12 +8,13 @@ import pytest
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import HandState
-from hrc_env.core.things import Things, Weld
+from hrc_env.core.things import FOOT_WORLD, Things, Weld
 from hrc_env.geometry.chains import robot_along, tool
 from hrc_env.scene.build import SceneConfig, build
 from hrc_env.scene.cups import seals
 from hrc_env.scene.objects import box_capsules, held_by, surfaces, with_load
 from hrc_env.scene.physics import Physics, no_workers
+from hrc_env.scene.places import SCENES
 
 TABLE = '<body pos="0.7 0 -0.02"><geom type="box" size="0.3 0.3 0.02" contype="1"/></body>'
 BLOCK = (
@@ -164,3 +165,7 @@ def test_states_with_objects_come_back():
     physics.set_state(kept)
     again = [physics.step(np.full((1, 6), 0.3), still, grip=close) for _ in range(3)]
     assert all(np.array_equal(a, b) for a, b in itertools.zip_longest(ahead, again))
+
+
+def test_tasks_know_where_robots_stand():
+    assert all(tuple(FOOT_WORLD) == room.mount_world for room in SCENES.values())

@@ -9,9 +9,10 @@ from agents.env_info import env_info
 from agents.experts import expert
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Deeds, ObjectState, World
+from hrc_env.core.things import FOOT_WORLD
 from hrc_env.motion import state as st
 from hrc_env.tasks import drywall
-from hrc_env.tasks.drywall import MOUNT_WORLD, PLACE_M, SCREWS_M, DrywallConfig
+from hrc_env.tasks.drywall import PLACE_M, SCREWS_M, DrywallConfig
 
 ID = "HRCDrywall-v0"
 DT_S = 0.04
@@ -26,7 +27,7 @@ def make(**kwargs):
 def world(shift_m=(0.0, 0.0, 0.0), held=True, screws=0, boring=False, workers=0):
     """A board near its place, and what workers do."""
     board = ObjectState(
-        (MOUNT_WORLD + PLACE_M + shift_m)[None, None], AT_PLACE[None, None], np.zeros((1, 1, 3)),
+        (FOOT_WORLD + PLACE_M + shift_m)[None, None], AT_PLACE[None, None], np.zeros((1, 1, 3)),
         np.zeros((1, 1, 3)),
         np.array([[held]]),
     )  # fmt: skip
@@ -105,7 +106,7 @@ def test_the_expert_hangs_the_board():
         env.unwrapped.step(np.append(np.zeros(6), -1.0).astype(np.float32))
     simulation = env.unwrapped.simulation
     at = simulation.scene.objects.poses(simulation.physics.qpos)[0, 0, :3]
-    np.testing.assert_allclose(at, MOUNT_WORLD + PLACE_M, atol=0.003)
+    np.testing.assert_allclose(at, FOOT_WORLD + PLACE_M, atol=0.003)
     env.close()
 
 

@@ -34,8 +34,9 @@ def worth(state, rngs, studs, tool, held=False):
     """The task's reward (B,) for pieces that are there now, at rest."""
     straight = np.zeros((*studs.shape[:2], 4))
     straight[..., 0] = 1.0
+    still = np.zeros_like(studs)
     hands = np.full(studs.shape[:2], held)
-    world = World(Robot(tool), None, ObjectState(studs, straight, np.zeros_like(studs), hands))
+    world = World(Robot(tool), None, ObjectState(studs, straight, still, still, hands))
     step = pick_place.advance(state, rngs, world, 0.04, CONFIG)
     return CONFIG.progress_per_m * step["progress_m"] + CONFIG.placed_bonus * step["placed"]
 
