@@ -104,8 +104,8 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
             `CameraConfig`s or mappings. None is all cameras of the scene.
         scene: name of the place: "lab", a workshop, or "site", a construction site; None: that
             which the task is made for.
-        robot: a name ("ur10e_like", "ur10e_gripper"), one that was registered or a
-            `hrc_env.scene.robot.Robot`; None: the one that the task is made for.
+        robot: a name ("ur10e_like", "ur10e_gripper", "ur10e_cups", "mobile_base"), one that was
+            registered or a `hrc_env.scene.robot.Robot`; None: the one that the task is made for.
         n_workers: 0 or more workers, None: as the task is made for; (fewest, most): each
             episode's number is drawn, and the observation has room for the most.
         people: how the workers are with the robot: "attentive", "hurried", "unaware", a
