@@ -9,7 +9,7 @@ FAMILIES: dict[str, tuple[str, ...]] = {
     "stand": ("stand", "look round", "turn", "point"),
     "walk": ("walk", "run", "stumble", "step back", "lunge"),
     "carry": ("carry", "push", "hand over", "receive"),
-    "work": ("reach", "hammer", "drill", "saw", "measure", "clip"),
+    "work": ("reach", "take", "hammer", "drill", "screw", "saw", "measure", "clip"),
     "raise": ("drill overhead", "climb"),
     "fold": ("lift", "pick up", "set down", "squat", "kneel", "fall"),
 }

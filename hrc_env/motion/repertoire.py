@@ -163,5 +163,10 @@ HASTY: dict[str, tuple[Act, ...]] = {
     "fall": (_going(st.FALL, 1.2),),
 }
 """The same of what only those do who run and fall; no emulator is fitted to them."""
-SCENES = {**REPERTOIRE, **HASTY}
-"""Both."""
+FOR_TASKS: dict[str, tuple[Act, ...]] = {
+    "screw below each other": _here(st.SCREW, 1.5),
+    "take what is brought": _here(st.TAKE, 1.15),
+}
+"""And of what workers do for tasks."""
+SCENES = {**REPERTOIRE, **HASTY, **FOR_TASKS}
+"""All."""
