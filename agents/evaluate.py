@@ -121,6 +121,7 @@ def _one(
         "contacts": float((touching & ~np.append(False, touching[:-1])).sum()),
         ACHIEVED: info[task.achieved],
         FAILED: info[task.failed],
+        "success": float(info["is_success"]),
         "min_separation_m": float(np.min(gaps_m)),
     }
 

@@ -166,6 +166,7 @@ class HRCVecEnv(VecEnv):
             "contacts": float(episode["contacts"]),
             ACHIEVED: info[task.achieved],
             FAILED: info[task.failed],
+            "success": float(info["is_success"]),
             "min_separation_m": float(episode["nearest_m"]),
         }
 
