@@ -19,7 +19,6 @@ from hrc_env.sb3 import HRCVecEnv
 
 from .env_info import Observation, env_info
 from .experts import expert
-from .scripted import Yielding
 
 with learner():
     import torch
@@ -60,7 +59,7 @@ def clone(
     seed: int,
     tick: Callable[[float], None] = lambda share: None,
 ) -> list[float]:
-    """Teach a policy what the task's scripted agent does, slowed where there are workers.
+    """Teach a policy what the task's scripted agent does, without yielding: care comes later.
 
     Args:
         policy: of a learner of Stable-Baselines3; its mean action is taught.
@@ -74,8 +73,7 @@ def clone(
         The mean error of actions after each round.
     """
     rng, simulation = np.random.default_rng(seed), env.simulation
-    careful = Yielding() if simulation.settings["n_workers"] != 0 else None
-    teacher = expert(env_info(simulation), careful)
+    teacher = expert(env_info(simulation))
     n_steps = -(-n_episodes * env.env.max_episode_steps // (settings.rounds * env.num_envs))
     env.seed(seed)
     observation, shown, errors = env.reset(), [], []

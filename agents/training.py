@@ -30,6 +30,7 @@ from .callbacks import (
 from .cloning import CloningSettings, clone
 from .env_info import EnvInfo
 from .evaluate import Score, evaluate
+from .recipes import Run, filled
 
 with learner():
     import torch
@@ -61,18 +62,19 @@ def run(arguments: Train) -> int:
     folder = arguments.resume or unused(arguments.out)
     if arguments.resume is not None:
         arguments = as_before(arguments, folder)
-    compile_kernels(console, arguments.perception)
-    curve, seconds = train(arguments, folder, console)
+    mine = filled(arguments)
+    compile_kernels(console, mine.perception)
+    curve, seconds = train(mine, folder, console)
     if seconds is None:
         return STOPPED
-    score = judge(arguments, folder, console)
+    score = judge(mine, folder, console)
     _write(folder / "score.json", {**asdict(score), "training_s": seconds})
-    config = settle(task=arguments.task, config=arguments.keywords()["config"]).config
-    title = f"{arguments.algorithm.upper()}, {arguments.perception}"
+    config = settle(task=mine.task, config=mine.keywords()["config"]).config
+    title = f"{mine.algorithm.upper()}, {mine.perception}"
     title += f", proximity weight {config.reward.proximity:g}"
     plot_curve(curve, folder / "curve.png", title)
     written = "policy.zip, curve.png, score.json"
-    if arguments.film and film(folder, arguments, console):
+    if mine.film and film(folder, mine, console):
         written += ", policy.mp4"
     console.print(f"In {folder}/: {written}", highlight=False, soft_wrap=True)
     return 0
@@ -110,19 +112,19 @@ def as_before(arguments: Train, folder: Path) -> Train:
     record = folder / "run.json"
     if not record.exists():
         raise CheckpointError(f"{folder} holds no run to resume: {record} is missing.")
+    before, hints = json.loads(record.read_text())["arguments"], get_type_hints(Train)
     learnt = checkpoints.describe(folder / "policy.zip")["num_timesteps"]
-    if learnt >= arguments.timesteps:
+    if learnt >= (arguments.timesteps or before["timesteps"]):
         raise CheckpointError(
             f"{folder} has learnt {learnt} steps already; ask for more than that with --timesteps."
         )
-    before, hints = json.loads(record.read_text())["arguments"], get_type_hints(Train)
     kept = {each.name: each.default for each in fields(Train) if each.name not in ONLY_OF_A_RUN}
     for name in kept.keys() & before.keys():  # what an older run lacks had its default
         kept[name] = restored(hints[name], before[name], name)
-    return replace(arguments, **kept)
+    return replace(arguments, timesteps=arguments.timesteps or before["timesteps"], **kept)
 
 
-def train(arguments: Train, folder: Path, console: Console) -> tuple[Curve, float | None]:
+def train(arguments: Run, folder: Path, console: Console) -> tuple[Curve, float | None]:
     """Learn; returns the curve and the seconds it took, None if it was stopped before the end.
 
     Progress survives a kill.
@@ -157,7 +159,7 @@ def train(arguments: Train, folder: Path, console: Console) -> tuple[Curve, floa
     return curve, None
 
 
-def _learner(arguments: Train, folder: Path, env: HRCVecEnv, settings: Any) -> tuple[Any, Curve]:
+def _learner(arguments: Run, folder: Path, env: HRCVecEnv, settings: Any) -> tuple[Any, Curve]:
     """A learner and its curve: new ones, or those of the run that is resumed."""
     seed, log = arguments.seed, folder / "tensorboard"
     if arguments.resume is None and arguments.algorithm == "sac":
@@ -170,7 +172,7 @@ def _learner(arguments: Train, folder: Path, env: HRCVecEnv, settings: Any) -> t
     return learner, json.loads(path.read_text()) if path.exists() else []
 
 
-def _clone(learner: Any, arguments: Train, env: HRCVecEnv, console: Console) -> None:
+def _clone(learner: Any, arguments: Run, env: HRCVecEnv, console: Console) -> None:
     """Show the policy what the scripted agent does; then the environments begin as they would."""
     n, settings = arguments.demonstrations, CloningSettings()
     with progress_bar(console, "cloning") as say:

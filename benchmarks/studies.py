@@ -101,6 +101,11 @@ STUDIES: dict[str, Study] = {
         "python -m benchmarks.baselines", 30,
         ("benchmarks.baselines", "agents.training", "agents.ppo"), ("baselines",), is_keyed=False,
     ),
+    "learners": Study(
+        "python -m benchmarks.learners", 240,
+        ("benchmarks.learners", "agents.training", "agents.ppo", "agents.sac", "agents.experts"),
+        ("learners",), is_keyed=False,
+    ),
     "ablations": Study(
         EXPERIMENT + "ablations", 45, ("hrc_env.experiments.ablations.experiment",), ("ablations",),
         {f"ablations_{name}.png": f"{name}.png" for name in ("cameras", "occlusion", "filter")},

@@ -12,11 +12,14 @@ from agents import checkpoints, cloning, sac
 from agents.cloning import CloningSettings, clone
 from agents.env_info import env_info
 from agents.features import NearAndFar
+from agents.recipes import Run, filled
 from agents.registry import make_agent
 from hrc_env.__main__ import main
+from hrc_env.cli.train import Train
 from hrc_env.core.errors import CheckpointError, NoGoalError
 from hrc_env.env import HRCEnv
 from hrc_env.sb3 import HRCVecEnv
+from hrc_env.tasks import BUILT_IN
 
 TINY = ["--perception", "truth", "--n-workers", "0", "--num-envs", "4", "--episodes", "2"]
 REACH = "HRCReachGoal-v0"
@@ -48,13 +51,13 @@ def test_sac_leaves_what_ppo_leaves(run):
 
 
 def test_sac_goes_on_where_it_stopped(run, tmp_path):
-    before = checkpoints.load(run / "policy.zip", told(REACH))
+    before = checkpoints.load(run / "policy.zip", told(REACH, control="tool"))
     train("--resume", run, "--timesteps", 900)
     assert checkpoints.describe(run / "policy.zip")["num_timesteps"] == 900
     steps = [point["steps"] for point in json.loads((run / "curve.json").read_text())]
     assert steps == sorted(steps)
-    after = checkpoints.load(run / "policy.zip", told(REACH))
-    env = HRCEnv(REACH, perception="truth", n_workers=0)
+    after = checkpoints.load(run / "policy.zip", told(REACH, control="tool"))
+    env = HRCEnv(REACH, perception="truth", n_workers=0, control="tool")
     observation, _ = env.reset(seed=0)
     assert not np.array_equal(before.act(observation), after.act(observation))
 
@@ -64,10 +67,10 @@ def told(task: str, **kwargs):
 
 
 def test_a_policy_for_goals_acts_where_there_are_goals_only(run):
-    agent = make_agent(str(run / "policy.zip"), told(REACH))
-    env = HRCEnv(REACH, perception="truth", n_workers=0)
+    agent = make_agent(str(run / "policy.zip"), told(REACH, control="tool"))
+    env = HRCEnv(REACH, perception="truth", n_workers=0, control="tool")
     action = agent.act(env.reset(seed=0)[0])
-    assert action.shape == (6,)
+    assert action.shape == (3,)
     with pytest.raises(CheckpointError, match="make it with the same task"):
         make_agent(str(run / "policy.zip"), told("HRCReach-v0"))
 
@@ -101,7 +104,8 @@ def test_what_cannot_be_learnt_with_is_refused_in_words(words, says, tmp_path, c
 @pytest.mark.parametrize("task", ["HRCPickPlace-v0", "HRCReachGoal-v0", "HRCPickPlaceGoal-v0"])
 def test_ppo_takes_every_id(task, tmp_path):
     folder = tmp_path / "run"
-    train("--task", task, "--timesteps", 256, "--out", folder)
+    alone = ["--algorithm", "ppo", "--demonstrations", 0]
+    train("--task", task, *alone, "--timesteps", 256, "--out", folder)
     assert checkpoints.describe(folder / "policy.zip")["environment"]["task"] == task
 
 
@@ -117,6 +121,21 @@ def test_a_policy_learns_from_the_expert_before_it_learns_itself(tmp_path, monke
     assert shown == [500, 1000]
     train("--resume", folder, "--timesteps", 512)
     assert shown == [500, 1000]
+
+
+def test_every_task_is_learnt_as_suits_it_unless_somebody_says_otherwise():
+    by_task = {task: filled(Train(task=task)) for task in BUILT_IN}
+    assert {task: run.algorithm for task, run in by_task.items() if run.algorithm != "ppo"} == {
+        REACH: "sac"
+    }
+    assert [task for task, run in by_task.items() if not run.demonstrations] == [
+        "HRCReach-v0", REACH,
+    ]  # fmt: skip
+    run = filled(Train(task="HRCPickPlace-v0", demonstrations=7, control="joint"))
+    assert (run.demonstrations, run.control, run.algorithm) == (7, "joint", "ppo")
+    run = filled(Train(task="HRCPickPlace-v0", algorithm="sac"))
+    assert (run.demonstrations, run.control) == (0, "joint")
+    assert filled(Train(task="Mine-v0")) == Run(task="Mine-v0")
 
 
 def test_cloning_brings_actions_near_the_experts():

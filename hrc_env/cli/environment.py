@@ -44,8 +44,9 @@ class EnvironmentArguments:
     appearance: str | None = None
     """as_built, varied, lights, surfaces or people (pixels only); --config appearance.FIELD=VALUE
     for more."""
-    control: str = "joint"
-    """What actions are: joint velocities, tool velocities, or twist, which turns the tool, too."""
+    control: str | None = None
+    """What actions are: joint, velocities of the joints, if not given; tool, of the tool; or twist,
+    which turns the tool, too."""
     shield: str | None = None
     """A shield that was registered (--import)."""
     config: tuple[str, ...] = ()

@@ -23,14 +23,15 @@ class Train(EnvironmentArguments):
 
     out: Path = Path("runs/quick")
     """Folder for checkpoints, curves, TensorBoard logs and the film."""
-    algorithm: str = "ppo"
-    """ppo; or sac, which learns with hindsight (HER) where the task has goals apart."""
+    algorithm: str | None = None
+    """ppo; or sac, which learns with hindsight (HER) where the task has goals apart. This, control,
+    demonstrations and timesteps are what suits the task if not given (agents/recipes.py)."""
     her: bool | None = None
     """With sac: True or False, whether transitions are judged by other goals, too; by default where
     there are goals."""
-    demonstrations: int = 0
+    demonstrations: int | None = None
     """Episodes of the scripted agent that the policy learns to imitate before it learns itself."""
-    timesteps: int = 1_000_000
+    timesteps: int | None = None
     """Environment steps in all (with --resume: counted from the very start)."""
     num_envs: int = 64
     """Environments that step together."""
@@ -58,10 +59,11 @@ class Train(EnvironmentArguments):
             at_least(f"--{name.replace('_', '-')}", getattr(self, name), 1)
         for name in ("seed", "proximity", "ramp", "demonstrations"):
             at_least(f"--{name}", getattr(self, name), 0)
-        check_names("algorithm", [self.algorithm], ALGORITHMS)
-        if self.her and self.algorithm != "sac":
+        mine = agents("recipes").filled(self)
+        check_names("algorithm", [mine.algorithm], ALGORITHMS)
+        if self.her and mine.algorithm != "sac":
             raise ConfigError(
-                f"--her judges what a replay buffer holds by other goals, and {self.algorithm} has "
+                f"--her judges what a replay buffer holds by other goals, and {mine.algorithm} has "
                 "no such buffer: --algorithm sac --her True, or leave it out."
             )
         if self.perception == "pixels":

@@ -1,0 +1,38 @@
+"""How each task is learnt, unless somebody says otherwise: python -m hrc_env train --task ID"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from hrc_env.cli.train import Train
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run(Train):
+    """Arguments that leave nothing open: what suits most tasks."""
+
+    algorithm: str = "ppo"
+    control: str = "joint"
+    demonstrations: int = 0
+    timesteps: int = 1_000_000
+
+
+IMITATION: Mapping[str, Any] = {"control": "twist", "demonstrations": 256, "timesteps": 1_500_000}
+RECIPES: Mapping[str, Mapping[str, Any]] = {
+    "HRCReachGoal-v0": {"algorithm": "sac", "control": "tool", "timesteps": 60_000},
+    "HRCPickPlace-v0": IMITATION,
+    "HRCPickPlaceGoal-v0": IMITATION,
+    "HRCHandover-v0": IMITATION,
+    "HRCDrywall-v0": IMITATION,
+    "HRCDelivery-v0": {**IMITATION, "control": "joint"},
+}
+"""By task: where that differs from `Run`."""
+
+
+def filled(arguments: Train) -> Run:
+    """The arguments with the recipe of their task for what they leave open."""
+    recipe = RECIPES.get(arguments.task, {})
+    if arguments.algorithm not in (None, recipe.get("algorithm", "ppo")):
+        recipe = {}  # another learner begins alone
+    given = {name: each for name, each in vars(arguments).items() if each is not None}
+    return Run(**{**recipe, **given})
