@@ -80,6 +80,9 @@ class Deliverer:
         turn = np.where(waits & ~driving[:, 0], 0.0, turn)
         if self.yielding is not None:
             share = self.yielding.share(near_m)
+            share *= self.yielding.blind_share(
+                terms, share * (np.linalg.norm(velocity, axis=1) + BASE_M * np.abs(turn))
+            )
             velocity, turn = velocity * share[:, None], turn * share
         action = np.concatenate([velocity, turn[:, None]], axis=1) / self._most
         action = np.clip(action, -1.0, 1.0)

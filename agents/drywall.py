@@ -11,7 +11,7 @@ from hrc_env.observations import split
 
 from .env_info import EnvInfo, Observation
 from .manipulating import arm_action, round_the_foot, turn_towards
-from .scripted import Yielding, speed_m_s
+from .scripted import Yielding, fastest_m_s, speed_m_s
 
 Array = NDArray[np.float64]
 HALF_THICK_M, CUPS_M = 0.00625, (-0.12, -0.15)
@@ -32,6 +32,8 @@ STAYS = 3.0
 """It stays aligned on the way, and there, while it is off by less than so many times as much."""
 THERE_M = np.array([0.003, 0.0, 0.003])
 """So near to its place along each axis it is held where it is: noise must not move it."""
+CORNER_M = 0.86
+"""The board's farthest corner from between the cups."""
 LAST_RAD = 0.25
 """So near round the robot it goes straight."""
 CARRY_M_S, PRESS_M_S, TURN_RAD_S = 0.40, 0.12, 0.9
@@ -59,6 +61,8 @@ class BoardHolder:
             share = np.where(_pressing(terms)[:, None], 1.0, share)
             velocity, turn = velocity * share, turn * share
         moves = arm_action(self.env_info, terms, velocity, turn)
+        if self.yielding is not None:
+            moves *= self.yielding.blind_share(terms, fastest_m_s(velocity, turn, CORNER_M))[:, None]
         action = np.concatenate([moves, 2.0 * sucks[:, None] - 1.0], axis=1)
         return action.reshape(*shape, -1).astype(np.float32)
 

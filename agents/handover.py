@@ -12,7 +12,7 @@ from hrc_env.observations import split
 
 from .env_info import EnvInfo, Observation
 from .manipulating import arm_action, round_the_foot, turn_towards
-from .scripted import Yielding, speed_m_s
+from .scripted import Yielding, fastest_m_s, speed_m_s
 
 Array = NDArray[np.float64]
 GRIP_UP_M, HANDLE_UP_M, HAND_M = -0.08, 0.12, 0.09
@@ -20,6 +20,8 @@ GRIP_UP_M, HANDLE_UP_M, HAND_M = -0.08, 0.12, 0.09
 BEFORE_M, LEVEL_M, AT_M, STILL_AT_M = 0.12, 0.008, 0.010, 0.018
 """The fingers stop so far before the tool until they are level with it; so near they close, and
 stay closed."""
+TOOL_M = 0.20
+"""The tool's farthest end from the fingers."""
 STAND_M, LIFTED_M = (0.30, -0.62, 0.10), 0.08
 """Where its middle stands from the robot's foot; so far above that it may leave sideways."""
 ROUND_M = 0.58
@@ -59,6 +61,8 @@ class Bringer:
             share = np.where(held, 1.0, self.yielding.share(nearest_m))[:, None]
             velocity, turn = velocity * share, turn * share
         moves = arm_action(self.env_info, terms, velocity, turn)
+        if self.yielding is not None:
+            moves *= self.yielding.blind_share(terms, fastest_m_s(velocity, turn, TOOL_M))[:, None]
         grip = np.where((held | closes) & ~taken, 1.0, -1.0)
         action = np.concatenate([moves, grip[:, None]], axis=1)
         return action.reshape(*shape, -1).astype(np.float32)

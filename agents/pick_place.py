@@ -14,7 +14,7 @@ from hrc_env.observations import split
 
 from .env_info import EnvInfo, Observation
 from .manipulating import TURN_HZ, arm_action, round_the_foot
-from .scripted import Yielding, speed_m_s
+from .scripted import Yielding, fastest_m_s, speed_m_s
 
 Array = NDArray[np.float64]
 ABOVE_M, CLEAR_M = 0.16, 0.11
@@ -23,6 +23,8 @@ OVER_M, OVER_RAD, STILL_OVER_M = 0.006, 0.05, 0.015
 """So near above its target the tool goes down, and goes on to while it is still so near."""
 AT_M, STILL_AT_M = 0.007, 0.014
 """So near to a piece's middle fingers close, and stay closed; so near to its place they open."""
+PIECE_M = 0.15
+"""A piece's end from the fingers."""
 LYING = 0.8
 """Cosine of a piece's tilt below which it lies, and is left."""
 ROUND_M = 0.50
@@ -70,6 +72,8 @@ class PickPlacer:
             share = self.yielding.share(nearest_m)[:, None]
             velocity, turn = velocity * share, turn * share
         moves = arm_action(self.env_info, terms, velocity, turn)
+        if self.yielding is not None:
+            moves *= self.yielding.blind_share(terms, fastest_m_s(velocity, turn, PIECE_M))[:, None]
         action = np.concatenate([moves, grip[:, None]], axis=1)
         return action.reshape(*shape, -1).astype(np.float32)
 

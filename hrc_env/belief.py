@@ -34,7 +34,8 @@ class Belief:
 def estimated_separation(robot: RobotState, estimate: PoseEstimate) -> Separation:
     """(B, W) narrowest place between the robot's capsules and each estimated body, hands included.
 
-    A worker without a track is infinitely far: the robot knows of nothing to keep away from.
+    A worker without a track is infinitely far: where they are is not known. Whether one may be
+    there all the same says `PoseEstimate.unknown`.
     """
     bodies = segments(estimate.mean_world)
     nearest = least_separation(

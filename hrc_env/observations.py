@@ -217,6 +217,16 @@ SHARED_TERMS: tuple[ObservationTerm, ...] = (
         lambda now: now.estimate.tracked.astype(float),
     ),
     ObservationTerm(
+        "worker_unknown", lambda of: of.workers, "-", "-", 1.0, 1.0,
+        "1 while somebody without a track may be there: lost, or not looked for enough.",
+        lambda now: now.estimate.unknown.astype(float),
+    ),
+    ObservationTerm(
+        "worker_blind", lambda of: of.workers, "s", "-", 5.0, 2.5,
+        "Time since cameras last saw the worker, or that nobody is there.",
+        lambda now: now.estimate.blind_s,
+    ),
+    ObservationTerm(
         "worker_separation", lambda of: of.workers, "m", "-", FAR_SEPARATION_M, 0.5,
         "Distance between the robot's surface and the estimated body's, at most 1 m.",
         lambda now: np.minimum(now.separation.distance_m, FAR_SEPARATION_M),

@@ -24,9 +24,13 @@ class RewardConfig:
     """Taken off for closeness to the *estimated* body, times the term's shape in [0, 2.25]."""
     proximity_reach_m: float = 0.3
     """Closeness begins to count below this separation of the surfaces [m]."""
+    unknown: float = 0.25
+    """Closeness that a worker counts with at least who is unknown, in [0, 1]: losing sight of them
+    is not rewarded like being alone."""
 
     def __post_init__(self) -> None:
         check_fields(self, "be positive", "proximity_reach_m")
+        check_fields(self, "be in [0, 1]", "unknown")
 
 
 KINDS = ("dense", "sparse")
@@ -82,7 +86,9 @@ def _mean_square(vectors):
 
 def _proximity(now: Belief, step: Any, previous: Floats, config: RewardConfig) -> Floats:
     nearest_m = np.minimum.reduce(now.separation.distance_m, axis=-1, initial=np.inf)
-    return -config.proximity * closeness(nearest_m, config.proximity_reach_m)
+    least = np.where(now.estimate.unknown.any(-1), config.unknown, 0.0)
+    near = np.maximum(closeness(nearest_m, config.proximity_reach_m), least)
+    return -config.proximity * near
 
 
 SHARED_TERMS: tuple[RewardTerm, ...] = (
@@ -101,7 +107,8 @@ SHARED_TERMS: tuple[RewardTerm, ...] = (
     RewardTerm(
         "proximity",
         "Minus `proximity` times clip((d0 - d) / d0, 0, 1.5)^2, where d is the distance of the "
-        "robot's surface from the nearest estimated body and d0 is `proximity_reach_m`.",
+        "robot's surface from the nearest estimated body and d0 is `proximity_reach_m`; at least "
+        "`unknown` of that while somebody may be there whom nobody sees.",
         _proximity,
     ),
 )

@@ -12,6 +12,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from hrc_env.core.typing import (
     Bools,
     Capsules,
@@ -69,6 +71,19 @@ class PoseEstimate:
     """(B, W, J) seconds since a measurement last supported the joint."""
     tracked: Bools
     """(B, W) whether there is a track; False: prior or predicting for too long (lost)."""
+    unknown: Bools = None  # type: ignore[assignment]
+    """(B, W) whether somebody without a track may be there: lost, not looked for enough, or behind
+    cameras that give no images (`tracking.presence`). Where there is neither track nor this, nobody
+    is there. Not given: nobody has looked, so whoever has no track may be there."""
+    blind_s: Floats = None  # type: ignore[assignment]
+    """(B, W) seconds since cameras last said something: saw the worker, or that nobody is there;
+    of who was never seen or looked for, since the reset. Not given: the youngest joint's age."""
+
+    def __post_init__(self) -> None:
+        if self.unknown is None:
+            object.__setattr__(self, "unknown", ~np.asarray(self.tracked, bool))
+        if self.blind_s is None:
+            object.__setattr__(self, "blind_s", np.min(self.age_s, axis=-1))
 
 
 @dataclass(frozen=True, slots=True)

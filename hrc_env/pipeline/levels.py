@@ -52,9 +52,10 @@ def make_pipeline(
     settings = replace(config.tracker, longest_delay_s=memory_s)
     tracker = make_estimator(estimator, projections(scene.cameras), config.ctrl_dt, settings)
     if level == "truth":
-        return Oracle(config.tracker, oracle.prior(batch, scene.n_workers, config.tracker))
+        return Oracle(config.tracker, oracle.nobody(batch, scene.n_workers, config.tracker))
     if level == "none":
-        return NoPerception(oracle.prior(batch, scene.n_workers, config.tracker))
+        prior = oracle.prior(batch, scene.n_workers, config.tracker)
+        return NoPerception(prior, config.ctrl_dt)
     if level == "keypoints":
         return EmulatorPipeline(scene, batch, tracker, config, schedule)
     return PixelPipeline(scene, batch, tracker, config, schedule)
@@ -81,19 +82,19 @@ def _schedule(scene: Scene, level: str, config: HRCConfig) -> Schedule:
 class Oracle(PerceptionPipeline):
     """Level `truth`: the worker as they are."""
 
-    def __init__(self, config: TrackerConfig, prior: PoseEstimate) -> None:
+    def __init__(self, config: TrackerConfig, nobody: PoseEstimate) -> None:
         self.sensor = TrueState()
-        self.config, self.prior = config, prior
+        self.config, self.nobody = config, nobody
 
     def perceive(
         self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators
     ) -> PoseEstimate:
-        """The truth, as an estimate; of who is not there, the prior."""
+        """The truth, as an estimate; of who is not there, the prior, and nobody is unknown."""
         known = with_truth(self.sensor.now)
         seen = oracle.estimate_from_truth(known.truth)
         if known.present.all():
             return seen
-        believed = rows(self.prior, ids)
+        believed = rows(self.nobody, ids)
         write_rows(believed, known.present, rows(seen, known.present))
         return believed
 
@@ -103,15 +104,22 @@ class Oracle(PerceptionPipeline):
 
 
 class NoPerception(PerceptionPipeline):
-    """Level `none`: the prior, whatever happens."""
+    """Level `none`: the prior, whatever happens, and whoever could be there is unknown."""
 
-    def __init__(self, prior: PoseEstimate) -> None:
-        self.sensor, self.prior = Sensor(), prior
+    CHANGES = ("prior",)
+
+    def __init__(self, prior: PoseEstimate, dt_s: float) -> None:
+        self.sensor, self.prior, self.dt_s = Sensor(), prior, dt_s
+
+    def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
+        """Nobody has looked since now."""
+        self.prior.blind_s[ids] = 0.0
 
     def perceive(
         self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators
     ) -> PoseEstimate:
         """The prior."""
+        self.prior.blind_s[ids] += self.dt_s
         return rows(self.prior, ids)
 
     def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:

@@ -21,6 +21,7 @@ from hrc_env.pipeline.tracking import no_keypoints
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import EstimatorChoice, make_estimator
 from hrc_env.tracking.people.association import AssociationConfig, associate
+from hrc_env.tracking.presence import forget_presence, make_presence, with_presence
 
 
 class PoseTracker:
@@ -49,6 +50,7 @@ class PoseTracker:
         self.estimator = make_estimator(estimator, self.P, dt_s, tracker)
         self.looking = Looking(1, self.cameras, n_workers, detector or DetectorConfig())
         self.state = self.estimator.init(1, n_workers)
+        self.presence = make_presence(1, n_workers, len(self.cameras))
 
     def update(
         self,
@@ -64,20 +66,26 @@ class PoseTracker:
             rngs: one generator, for estimators that draw; none: one with seed 0.
         """
         drawn = list(rngs) or [np.random.default_rng(0)]
-        self.estimator.predict(self.state, self.dt_s if dt_s is None else dt_s, drawn)
+        dt_s = self.dt_s if dt_s is None else dt_s
+        self.estimator.predict(self.state, dt_s, drawn)
         expected = self.estimator.estimate(self.state)
         seen = no_keypoints(1, len(self.cameras), self.n_workers)
         has_image = [True] * len(self.cameras)
         self.looking.look(source, one(expected, 0), 0, has_image, one(seen, 0))
-        keypoints = pinhole_keypoints(seen, self.cameras)
+        found = keypoints = pinhole_keypoints(seen, self.cameras)
         if self.n_workers > 1:
-            keypoints = associate(self.P, keypoints, expected, AssociationConfig()).keypoints
+            keypoints = associate(self.P, found, expected, AssociationConfig()).keypoints
         self.estimator.update(self.state, keypoints, drawn)
-        return our_joints(self.estimator.estimate(self.state))
+        looked = self.looking.schedule.ages == 0
+        return with_presence(
+            self.presence, np.arange(1), our_joints(self.estimator.estimate(self.state)),
+            (found, keypoints), (looked, np.zeros(looked.shape)), dt_s, self.estimator.config,
+        )  # fmt: skip
 
     def forget(self) -> None:
         """Nobody is known any more."""
         self.estimator.reset(self.state, np.arange(1), [np.random.default_rng(0)])
+        forget_presence(self.presence, np.arange(1))
         self.looking.forget(0)
 
     def close(self) -> None:

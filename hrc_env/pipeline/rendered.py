@@ -7,7 +7,7 @@ import numpy as np
 from hrc_env.config import HRCConfig
 from hrc_env.core.batching import copied, one
 from hrc_env.core.records import Keypoints, PoseEstimate
-from hrc_env.core.typing import Floats, Image, Ints
+from hrc_env.core.typing import Bools, Floats, Image, Ints
 from hrc_env.perception.faults.camera_film import CameraFilm, Shot
 from hrc_env.perception.faults.schedule import Recent, Schedule
 from hrc_env.perception.lensed import Lensed
@@ -81,6 +81,10 @@ class PixelPipeline(PoseTracking):
             has_image = np.isfinite(time_s[row]).tolist()
             self.looking.look(images, one(expected, row), b, has_image, one(seen, row))
         return replace(seen, time_s=None if self.cameras.recent.schedule.is_plain else time_s)
+
+    def looked(self, ids: Ints, age_s: Floats) -> Bools:
+        """(B, C) which cameras' whole images have been searched."""
+        return self.looking.schedule.ages[ids] == 0
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
         """Forget the tracks, and who was followed."""

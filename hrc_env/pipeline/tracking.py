@@ -1,5 +1,6 @@
 """What the levels with cameras share: predict, get keypoints, update."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,8 +18,14 @@ from hrc_env.scene.build import Scene
 from hrc_env.scene.domain_randomization import Look
 from hrc_env.tracking.calibration_monitor import forget_monitor, make_monitor, monitor
 from hrc_env.tracking.estimators import Estimator
-from hrc_env.tracking.frozen_frames import forget_frozen, leave_out_frozen, make_frozen
+from hrc_env.tracking.frozen_frames import (
+    believed,
+    forget_frozen,
+    leave_out_frozen,
+    make_frozen,
+)
 from hrc_env.tracking.people.association import associate
+from hrc_env.tracking.presence import forget_presence, make_presence, with_presence
 
 
 class PerceptionPipeline(Stateful):
@@ -63,7 +70,7 @@ class PerceptionPipeline(Stateful):
 class PoseTracking(PerceptionPipeline):
     """What the levels with cameras share: predict, get keypoints, update."""
 
-    CHANGES = ("state", "keypoints", "sensor", "steps", "frozen", "monitored")
+    CHANGES = ("state", "keypoints", "sensor", "steps", "frozen", "monitored", "presence")
 
     def __init__(
         self, batch: int, scene: Scene, tracker: Estimator, config: HRCConfig, sensor: Sensor
@@ -76,6 +83,7 @@ class PoseTracking(PerceptionPipeline):
         self.keypoints = no_keypoints(batch, len(scene.cameras), scene.n_workers)
         self.frozen = make_frozen(batch, len(scene.cameras))
         self.monitored = make_monitor(batch, len(scene.cameras))
+        self.presence = make_presence(batch, scene.n_workers, len(scene.cameras))
         self.axes = np.array([(*camera.K[:2, 2], camera.K[0, 0]) for camera in scene.cameras])
         """(C, 3) principal point and focal length [px]."""
 
@@ -84,6 +92,7 @@ class PoseTracking(PerceptionPipeline):
         self.tracker.reset(self.state, ids, tracker_rngs)
         forget_monitor(self.monitored, ids)
         forget_frozen(self.frozen, ids)
+        forget_presence(self.presence, ids)
         self.sensor.reset(ids, sensor_rngs)
         self.steps[ids] = 0
 
@@ -109,13 +118,22 @@ class PoseTracking(PerceptionPipeline):
         estimate = self.tracker.estimate(state)
         age_s = self._age_s(ids, keypoints)
         monitor(self.monitored, ids, keypoints, age_s, estimate, self.P, self.axes)
-        return our_joints(estimate, self.calibration)
+        looked = self.looked(ids, age_s) & believed(self.frozen, ids)
+        return with_presence(
+            self.presence, ids, our_joints(estimate, self.calibration), (found, keypoints),
+            (looked, age_s), self.dt_s, self.tracker.config,
+        )  # fmt: skip
+
+    def looked(self, ids: Ints, age_s: Floats) -> Bools:
+        """(B, C) which cameras have looked over whole images of these ages [s]; here, whose came."""
+        return np.isfinite(age_s)
 
     def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
         """What the estimator expects."""
         whole = len(ids) == len(self.keypoints.px)
         state = self.state if whole else rows(self.state, ids)
-        return our_joints(self.tracker.forecast(state, horizon_s), self.calibration)
+        later = our_joints(self.tracker.forecast(state, horizon_s), self.calibration)
+        return replace(later, unknown=now.unknown, blind_s=now.blind_s)
 
     def detect(self, ids: Ints, expected: PoseEstimate, sensor_rngs: Generators) -> Keypoints:
         """Keypoints of environments `ids` in pixels of the images, by the level's detector; whose

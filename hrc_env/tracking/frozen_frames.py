@@ -12,7 +12,7 @@ import numpy as np
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Keypoints
-from hrc_env.core.typing import Ints
+from hrc_env.core.typing import Bools, Ints
 
 LEAST_NEW = 3
 """So many images in a row must be new before a camera that was stuck is believed again."""
@@ -45,6 +45,11 @@ def leave_out_frozen(state: Any, ids: Ints, keypoints: Keypoints) -> None:
     `state` is of the whole batch; cameras without an image report nothing.
     """
     _leave_out(state, ids, keypoints.px, keypoints.confidence, keypoints.sigma_px)
+
+
+def believed(state: Any, ids: Ints) -> Bools:
+    """(B, C) which cameras of environments `ids` are not stuck, as far as is known."""
+    return state["n_new"][ids] >= LEAST_NEW
 
 
 @kernel

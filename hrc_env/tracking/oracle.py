@@ -5,6 +5,8 @@ for upper bounds). The prior is what is believed at the level `none`, and by eve
 before it has seen anything.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from hrc_env.core.records import PoseEstimate, WorkerTruth
@@ -25,6 +27,12 @@ def estimate_from_truth(truth: WorkerTruth) -> PoseEstimate:
         age_s=np.zeros(shape),
         tracked=np.ones(shape[:-1], bool),
     )
+
+
+def nobody(batch: int, n_workers: int, config: TrackerConfig) -> PoseEstimate:
+    """What is believed where it is known that nobody is: the prior, and nothing unknown."""
+    known = np.zeros((batch, n_workers))
+    return replace(prior(batch, n_workers, config), unknown=known > 0, blind_s=known)
 
 
 def prior(batch: int, n_workers: int, config: TrackerConfig) -> PoseEstimate:

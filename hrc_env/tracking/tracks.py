@@ -1,7 +1,6 @@
 """What the estimators without hypotheses keep of a worker, and how all of them age and report."""
 
 import math
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -25,6 +24,8 @@ TRACK = np.dtype(
     align=True,
 )  # fmt: skip
 """What is believed of one worker."""
+REPORTED = ("mean_world", "cov_world", "velocity_world", "age_s", "tracked")
+"""Fields of a `PoseEstimate` that tracks hold."""
 _ROUNDING = 1e-6
 """Least eigenvalues may be wrong by no more than this share of the largest."""
 
@@ -102,7 +103,7 @@ def relax(mean, cov, velocity, keep, home, std):
 
 def as_estimate(tracks: Any) -> PoseEstimate:
     """The tracks in arrays of their own."""
-    return PoseEstimate(*(tracks[each.name].copy() for each in fields(PoseEstimate)))
+    return PoseEstimate(*(tracks[name].copy() for name in REPORTED))
 
 
 def report(tracks: Any, config: TrackerConfig) -> PoseEstimate:
