@@ -62,7 +62,8 @@ class BoardHolder:
             velocity, turn = velocity * share, turn * share
         moves = arm_action(self.env_info, terms, velocity, turn)
         if self.yielding is not None:
-            moves *= self.yielding.blind_share(terms, fastest_m_s(velocity, turn, CORNER_M))[:, None]
+            wanted_m_s = fastest_m_s(velocity, turn, CORNER_M)
+            moves *= self.yielding.blind_share(terms, wanted_m_s)[:, None]
         action = np.concatenate([moves, 2.0 * sucks[:, None] - 1.0], axis=1)
         return action.reshape(*shape, -1).astype(np.float32)
 

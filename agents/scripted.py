@@ -87,9 +87,7 @@ class Reacher:
         speed = speed_m_s(error_m, self.env_info.control_config.tool_speed_mps)
         return goal_from_tool / np.maximum(error_m, 1e-9) * speed
 
-    def _joint_action(
-        self, q: Array, velocity: Array
-    ) -> Array:
+    def _joint_action(self, q: Array, velocity: Array) -> Array:
         info, config = self.env_info, self.env_info.control_config
         qd = resolved_rate(info.chain, q, velocity, info.home_q, config)
         action = qd / (config.joint_speed_share * info.chain.velocity_limit_rad_s)

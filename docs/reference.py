@@ -117,9 +117,10 @@ with `config={{"uncertainty": ("towards_robot", "factor")}}` more of the covaria
 mean, which hides the depth that one camera does not know.
 
 Without a track the estimate is the prior: its deviation and age are at their bounds,
-`worker_tracked` is 0 and `worker_separation` {far} m; `worker_unknown` is 1 unless cameras have looked
-and [nobody is there](../perception_and_estimators.md#unknown-is-not-absent). Loose objects are not what this project asks
-about: they are known by their true pose plus noise (`config.objects`).
+`worker_tracked` is 0 and `worker_separation` {far} m; `worker_unknown` is 1 unless cameras have
+looked, and [nobody is there](../perception_and_estimators.md#unknown-is-not-absent). Loose objects
+are not what this project asks about: they are known by their true pose plus noise
+(`config.objects`).
 
 ## Reward
 The sum of the task's terms and of those that all tasks share, each in `info["reward/<name>"]`;

@@ -34,7 +34,8 @@ def test_a_worker_whom_all_cameras_lose_is_unknown_until_they_are_seen_again(kin
     _, unknown, tracked, blind_s, _ = played(faults=[{**BLIND[0], "kind": kind}])
     assert (unknown == ~tracked).all()
     assert unknown[40:48].all()
-    assert not unknown[:30].any() and not unknown[-10:].any()
+    assert not unknown[:30].any()
+    assert not unknown[-10:].any()
     assert blind_s[45] == pytest.approx(36 * 0.04, abs=0.05)
 
 
@@ -44,7 +45,8 @@ def test_losing_sight_is_not_rewarded_like_being_alone():
     _, unknown, _, _, proximity = played(
         faults=BLIND, config={"reward": {"proximity": 3.0, "unknown": 0.0}}
     )
-    assert unknown.any() and (proximity[unknown] == 0).all()
+    assert unknown.any()
+    assert (proximity[unknown] == 0).all()
 
 
 @pytest.mark.parametrize("worth", [-0.1, 1.5, np.nan])
@@ -56,16 +58,19 @@ def test_what_an_unknown_worker_counts_must_be_a_share(worth):
 def test_an_empty_room_is_known_to_be_empty_and_blind_cameras_make_it_unknown():
     env, unknown, tracked, _, proximity = played(n_workers=(0, 1), seed=EMPTY_SEED)
     assert not env.simulation.present.any()
-    assert not tracked.any() and not unknown[1:].any()
+    assert not tracked.any()
+    assert not unknown[1:].any()
     assert (proximity[1:] == 0).all()
     _, unknown, *_ = played(n_workers=(0, 1), seed=EMPTY_SEED, faults=BLIND)
-    assert unknown[40:48].all() and not unknown[-10:].any()
+    assert unknown[40:48].all()
+    assert not unknown[-10:].any()
 
 
 def test_the_truth_is_never_unknown_and_without_cameras_everybody_is():
     for n_workers in (1, (0, 1)):
         _, unknown, _, blind_s, _ = played(5, EMPTY_SEED, perception="truth", n_workers=n_workers)
-        assert not unknown.any() and not blind_s.any()
+        assert not unknown.any()
+        assert not blind_s.any()
     env, unknown, _, blind_s, _ = played(5, perception="none")
     assert unknown.all()
     assert blind_s == pytest.approx(0.04 * np.arange(2, 7))

@@ -125,7 +125,7 @@ class PoseTracking(PerceptionPipeline):
         )  # fmt: skip
 
     def looked(self, ids: Ints, age_s: Floats) -> Bools:
-        """(B, C) which cameras have looked over whole images of these ages [s]; here, whose came."""
+        """(B, C) which cameras have looked over whole images, of these ages [s]: here, all."""
         return np.isfinite(age_s)
 
     def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:

@@ -126,9 +126,7 @@ def _search(slot, look, shown, times):
             least = min(least, look[c].since_s)
     hides = slot.lost and slot.blind_s < forgotten
     slot.absent = (
-        not shown
-        and cameras >= LEAST_CAMERAS
-        and (slot.absent or (total >= LOOKS and not hides))
+        not shown and cameras >= LEAST_CAMERAS and (slot.absent or (total >= LOOKS and not hides))
     )
     if slot.absent:
         slot.lost, slot.blind_s = False, second
@@ -146,7 +144,7 @@ def _poses(confidence):
 @kernel
 def _is_shown(confidence):
     """Whether any joint (J,) is seen."""
+    most = 0.0
     for value in confidence:
-        if value > 0.0:
-            return True
-    return False
+        most = max(most, value)
+    return most > 0.0
