@@ -117,10 +117,30 @@ with `config={{"uncertainty": ("towards_robot", "factor")}}` more of the covaria
 mean, which hides the depth that one camera does not know.
 
 Without a track the estimate is the prior: its deviation and age are at their bounds,
-`worker_tracked` is 0 and `worker_separation` {far} m; `worker_unknown` is 1 unless cameras have
-looked, and [nobody is there](../perception_and_estimators.md#unknown-is-not-absent). Loose objects
-are not what this project asks about: they are known by their true pose plus noise
-(`config.objects`).
+`worker_tracked` is 0 and `worker_separation` {far} m. Loose objects are not what this project asks
+about: they are known by their true pose plus noise (`config.objects`).
+
+### Who may be there
+| a worker's slot is | while |
+|---|---|
+| tracked | a track follows somebody |
+| unknown | nobody has looked enough yet; a camera shows somebody who has no track; a track was \
+lost; or, for `tracker.lost_after_s`, fewer than two cameras gave images that are not stuck |
+| absent | at least two cameras have looked over their whole images eight times, all together, \
+and shown nobody else; after a loss only when what was believed is forgotten, 3 times \
+`tracker.forget_s` later |
+
+`worker_blind` counts the seconds since cameras last said something: saw the worker, or that nobody
+is there. With four cameras an empty room is known to be empty after their second look: one step
+after a reset at `keypoints`, 0.2 s after it at `pixels`, where cameras search every fifth step.
+Of 2,000 workers who were there each was shown by some camera at the first look; one camera alone
+does not see 2 %, so it never says that nobody is there. Somebody who hides from all cameras for
+longer than 6 s is taken for gone. An empty image does not tell whether it is stuck, or too dark.
+At level `truth` nobody is unknown; at `none` everybody is who could be there.
+
+A reward counts an unknown worker with closeness `reward.unknown` at least, so that losing sight is
+not rewarded like being alone. `scripted_slowed` is no faster than 0.25 m/s then, or stands still
+(`agents.scripted.Yielding.unknown_m_s`); a room that is known to be empty is free.
 
 ## Reward
 The sum of the task's terms and of those that all tasks share, each in `info["reward/<name>"]`;
