@@ -126,16 +126,18 @@ about: they are known by their true pose plus noise (`config.objects`).
 | tracked | a track follows somebody |
 | unknown | nobody has looked enough yet; a camera shows somebody who has no track; a track was \
 lost; or, for `tracker.lost_after_s`, fewer than two cameras gave images that are not stuck |
-| absent | at least two cameras have looked over their whole images eight times, all together, \
-and shown nobody else; after a loss only when what was believed is forgotten, 3 times \
+| absent | at least two cameras have looked over their whole images 8 times at `keypoints`, 24 \
+times at `pixels`, all together, and shown nobody else; after a loss only when what was believed \
+is forgotten, 3 times \
 `tracker.forget_s` later |
 
 `worker_blind` counts the seconds since cameras last said something: saw the worker, or that nobody
-is there. With four cameras an empty room is known to be empty after their second look: one step
-after a reset at `keypoints`, 0.2 s after it at `pixels`, where cameras search every fifth step.
-Of 2,000 workers who were there each was shown by some camera at the first look; one camera alone
-does not see 2 %, so it never says that nobody is there. Somebody who hides from all cameras for
-longer than 6 s is taken for gone. An empty image does not tell whether it is stuck, or too dark.
+is there. With four cameras an empty room is known to be empty after two looks at `keypoints`, one
+step after the reset, and six at `pixels`, a second after it, where cameras search every fifth step.
+Of 2,000 workers each was shown by some camera's first image, and 400 of 400 were found by then. One
+camera alone does not see 2 %, so it never says that nobody is there. Somebody who hides from all
+cameras for longer than 6 s is taken for gone. An empty image does not tell whether it is stuck, or
+too dark.
 At level `truth` nobody is unknown; at `none` everybody is who could be there.
 
 A reward counts an unknown worker with closeness `reward.unknown` at least, so that losing sight is

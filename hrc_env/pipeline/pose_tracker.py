@@ -21,7 +21,7 @@ from hrc_env.pipeline.tracking import no_keypoints
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import EstimatorChoice, make_estimator
 from hrc_env.tracking.people.association import AssociationConfig, associate
-from hrc_env.tracking.presence import forget_presence, make_presence, with_presence
+from hrc_env.tracking.presence import SEARCHES, forget_presence, make_presence, with_presence
 
 
 class PoseTracker:
@@ -76,10 +76,11 @@ class PoseTracker:
         if self.n_workers > 1:
             keypoints = associate(self.P, found, expected, AssociationConfig()).keypoints
         self.estimator.update(self.state, keypoints, drawn)
-        looked = self.looking.schedule.ages == 0
+        searched = self.looking.schedule.ages == 0
+        looked = searched, np.zeros(searched.shape), SEARCHES
         return with_presence(
             self.presence, np.arange(1), our_joints(self.estimator.estimate(self.state)),
-            (found, keypoints), (looked, np.zeros(looked.shape)), dt_s, self.estimator.config,
+            (found, keypoints), looked, dt_s, self.estimator.config,
         )  # fmt: skip
 
     def forget(self) -> None:

@@ -19,6 +19,7 @@ from hrc_env.scene.domain_randomization import AS_BUILT, AppearanceConfig, Look,
 from hrc_env.scene.render import CropRenderer
 from hrc_env.scene.rigs import floor
 from hrc_env.tracking.estimators import Estimator
+from hrc_env.tracking.presence import SEARCHES
 
 
 class RenderedCameras(Sensor):
@@ -63,6 +64,7 @@ class PixelPipeline(PoseTracking):
     """Level `pixels`: rendered crops through the pose network."""
 
     CHANGES = (*PoseTracking.CHANGES, "looking")
+    LOOKS = SEARCHES
 
     def __init__(
         self, scene: Scene, batch: int, tracker: Estimator, config: HRCConfig, schedule: Schedule

@@ -25,7 +25,7 @@ from hrc_env.tracking.frozen_frames import (
     make_frozen,
 )
 from hrc_env.tracking.people.association import associate
-from hrc_env.tracking.presence import forget_presence, make_presence, with_presence
+from hrc_env.tracking.presence import IMAGES, forget_presence, make_presence, with_presence
 
 
 class PerceptionPipeline(Stateful):
@@ -71,6 +71,8 @@ class PoseTracking(PerceptionPipeline):
     """What the levels with cameras share: predict, get keypoints, update."""
 
     CHANGES = ("state", "keypoints", "sensor", "steps", "frozen", "monitored", "presence")
+    LOOKS = IMAGES
+    """So many say that nobody is there (`looked`)."""
 
     def __init__(
         self, batch: int, scene: Scene, tracker: Estimator, config: HRCConfig, sensor: Sensor
@@ -121,7 +123,7 @@ class PoseTracking(PerceptionPipeline):
         looked = self.looked(ids, age_s) & believed(self.frozen, ids)
         return with_presence(
             self.presence, ids, our_joints(estimate, self.calibration), (found, keypoints),
-            (looked, age_s), self.dt_s, self.tracker.config,
+            (looked, age_s, self.LOOKS), self.dt_s, self.tracker.config,
         )  # fmt: skip
 
     def looked(self, ids: Ints, age_s: Floats) -> Bools:

@@ -1,14 +1,14 @@
 """Whether somebody may be where nobody is tracked: unknown is not absent.
 
-Of a worker's slot that has no track one of two things is known. It is *absent*: `LEAST_CAMERAS`
-cameras or more have looked over their whole images `LOOKS` times in a row, all together, and shown
-nobody who was not tracked, and at least that many still do. Else it is *unknown*: nobody has looked
-enough yet, cameras give no images or stuck ones, one shows somebody who is not tracked yet, or a
-track was lost. Somebody lost may hide where they were believed last: they stay unknown until they
-are tracked again, or until that belief is forgotten (`FORGOTTEN` time constants `forget_s` without
-a measurement) and looks find nobody. Absence is forgotten as a track is, `lost_after_s` after
-cameras last looked. One camera alone never says that nobody is there: some 2 % of workers begin
-hidden from it; of 2,000 no pair of cameras missed one.
+Of a worker's slot that has no track one of two things is known. It is *absent*: at least
+`LEAST_CAMERAS` cameras have looked over their whole images, `IMAGES` or `SEARCHES` times in a row
+all together, and shown nobody who was not tracked, and at least that many still do. Else it is
+*unknown*: nobody has looked enough yet, cameras give no images or stuck ones, one shows somebody
+who is not tracked yet, or a track was lost. Somebody lost may hide where they were believed last:
+they stay unknown until they are tracked again, or until that belief is forgotten (`FORGOTTEN` time
+constants `forget_s` without a measurement) and looks find nobody. Absence is forgotten as a track
+is, `lost_after_s` after cameras last looked. One camera alone never says that nobody is there: some
+2 % of workers begin hidden from it.
 """
 
 from dataclasses import replace
@@ -21,8 +21,11 @@ from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.tracking.config import TrackerConfig
 
-LOOKS, LEAST_CAMERAS = 8, 2
-"""With four cameras the second look of all says that nobody is there."""
+LEAST_CAMERAS = 2
+IMAGES, SEARCHES = 8, 24
+"""So many looks say that nobody is there, of images each of which shows whoever can be seen, and of
+searches. Of 2,000 workers some of four cameras' first images showed each, of 180 one was not found
+by their first two searches; within six 400 of 400 were tracked (docs/results/acquisition.json)."""
 FORGOTTEN = 3.0
 SLOT = np.dtype(
     [
@@ -56,7 +59,7 @@ def with_presence(
     ids: Ints,
     estimate: PoseEstimate,
     views: tuple[Keypoints, Keypoints],
-    looked: tuple[Bools, Floats],
+    looked: tuple[Bools, Floats, int],
     dt_s: float,
     config: TrackerConfig,
 ) -> PoseEstimate:
@@ -65,7 +68,8 @@ def with_presence(
     Args:
         known: of the whole batch, goes on by a step in place.
         views: (B, C, W, ...) what cameras showed, as it came and worker by worker.
-        looked: (B, C) which cameras looked over whole images, and how old these are [s].
+        looked: (B, C) which cameras looked over whole images, how old these are [s], and how many
+            looks say that nobody is there.
     """
     unknown, blind_s = np.empty(estimate.tracked.shape, bool), np.empty(estimate.tracked.shape)
     seen = tuple(each.confidence for each in views)
@@ -87,7 +91,7 @@ def _note(known, ids, belief, seen, looked, times, out):
             if tracked[row, w]:
                 slot.lost, slot.absent, slot.blind_s = True, False, age_s[row, w]
             else:
-                _search(slot, look, shown, times)
+                _search(slot, look, shown, looked[2], times)
             if tracked[row, w] or shown:
                 for c in range(len(look)):
                     look[c].empty = 0
@@ -99,7 +103,7 @@ def _note(known, ids, belief, seen, looked, times, out):
 def _look(look, row, w, people, seen, looked, times):
     """Count looks (C,) for a slot; whether a camera shows its worker, or more than so many people,
     who are tracked."""
-    (dt, lost_after, _), (whole, image_age), (found, own) = times, looked, seen
+    (dt, lost_after, _), (whole, image_age, _), (found, own) = times, looked, seen
     shown = False
     for c in range(len(look)):
         look[c].since_s += dt
@@ -114,7 +118,7 @@ def _look(look, row, w, people, seen, looked, times):
 
 
 @kernel
-def _search(slot, look, shown, times):
+def _search(slot, look, shown, enough, times):
     """What is known of a slot without a track."""
     dt, _, forgotten = times
     slot.blind_s += dt
@@ -126,7 +130,7 @@ def _search(slot, look, shown, times):
             least = min(least, look[c].since_s)
     hides = slot.lost and slot.blind_s < forgotten
     slot.absent = (
-        not shown and cameras >= LEAST_CAMERAS and (slot.absent or (total >= LOOKS and not hides))
+        not shown and cameras >= LEAST_CAMERAS and (slot.absent or (total >= enough and not hides))
     )
     if slot.absent:
         slot.lost, slot.blind_s = False, second

@@ -7,7 +7,7 @@ from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.tracking import oracle
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.presence import LOOKS, forget_presence, make_presence, with_presence
+from hrc_env.tracking.presence import IMAGES, forget_presence, make_presence, with_presence
 
 DT, CONFIG = 0.04, TrackerConfig()
 LOST_AFTER = round(CONFIG.lost_after_s / DT)
@@ -42,7 +42,7 @@ class Watch:
         all_found = own if found is None else shown(found)
         said = with_presence(
             self.known, np.arange(1), belief(*tracked), (all_found, own),
-            (looked, np.full(looked.shape, age_s)), DT, CONFIG,
+            (looked, np.full(looked.shape, age_s), IMAGES), DT, CONFIG,
         )  # fmt: skip
         assert not (said.unknown & said.tracked).any()
         return said.unknown[0].tolist(), said.blind_s[0]
@@ -51,9 +51,9 @@ class Watch:
 def test_an_empty_place_is_known_to_be_empty_after_enough_looks_of_several_cameras():
     for n_cameras in (4, 2):
         watch = Watch(n_cameras=n_cameras)
-        told = [watch.look() for _ in range(LOOKS)]
-        first = LOOKS // n_cameras
-        assert [unknown for unknown, _ in told] == [[k < first - 1] for k in range(LOOKS)]
+        told = [watch.look() for _ in range(IMAGES)]
+        first = IMAGES // n_cameras
+        assert [unknown for unknown, _ in told] == [[k < first - 1] for k in range(IMAGES)]
         assert told[first - 2][1] == pytest.approx((first - 1) * DT)
         assert told[-1][1] == 0.0
 
@@ -81,7 +81,7 @@ def test_a_lost_worker_whom_one_camera_still_shows_stays_unknown():
 
 def test_absence_is_forgotten_when_cameras_give_no_images():
     watch = Watch()
-    for _ in range(LOOKS):
+    for _ in range(IMAGES):
         watch.look()
     told = [watch.look(cameras=[]) for _ in range(LOST_AFTER + 3)]
     unknown = [each[0][0] for each in told]
@@ -101,7 +101,7 @@ def test_images_are_as_old_as_they_say():
 def test_somebody_whom_a_camera_shows_beside_those_who_are_tracked_is_unknown():
     watch, both = Watch(2), [[True, True]] + 3 * [[True, False]]
     own = 4 * [[True, False]]
-    for _ in range(LOOKS):
+    for _ in range(IMAGES):
         assert watch.look((True, False), people=own)[0][0] is False
     assert watch.look((True, False), people=own)[0] == [False, False]
     assert watch.look((True, False), people=own, found=both)[0] == [False, True]
@@ -112,7 +112,7 @@ def test_a_reset_forgets_what_was_known_of_its_environment():
     looked, nobody = np.ones((2, 4), bool), shown(np.zeros((4, 1), bool).tolist())
     both = Keypoints(*(np.repeat(a, 2, 0) for a in (nobody.px, nobody.confidence, nobody.sigma_px)))
     two = oracle.prior(2, 1, CONFIG)
-    ids, times = np.arange(2), (looked, np.zeros(looked.shape))
+    ids, times = np.arange(2), (looked, np.zeros(looked.shape), IMAGES)
     for _ in range(2):
         said = with_presence(known, ids, two, (both, both), times, DT, CONFIG)
     assert not said.unknown.any()
