@@ -23,6 +23,7 @@ from hrc_env.sb3 import HRCVecEnv
 
 from . import checkpoints
 from .evaluate import summarise
+from .ppo_lagrangian import PPOLagrangian
 
 RECENT_EPISODES = 64
 """Curves average over so many finished episodes."""
@@ -44,8 +45,9 @@ class Ramp:
         return 1.0 if n_steps >= self.n_steps else n_steps / self.n_steps
 
 
-class ProximityCurriculum(BaseCallback):
-    """Sets the proximity term's weight before every rollout; a resumed run goes on in it.
+class Curriculum(BaseCallback):
+    """Before every rollout sets the proximity term's weight, and of a limit what is in force; a
+    resumed run goes on in it.
 
     With the whole weight from the start a learner first learns to stay away, and finds its goals
     about nine times later; it is then the more careful one (docs/learning.md has both).
@@ -59,6 +61,8 @@ class ProximityCurriculum(BaseCallback):
     def _on_rollout_start(self) -> None:
         share = self.ramp.at(self.num_timesteps)
         self.env.set_reward(replace(self.whole, proximity=share * self.whole.proximity))
+        if isinstance(self.model, PPOLagrangian):
+            self.model.share = share
 
     def _on_step(self) -> bool:
         return True
@@ -145,6 +149,9 @@ class TrainingMonitor(BaseCallback):
             wall_s = self.before_s + time.monotonic() - self.started_s
             share = self.ramp.at(self.num_timesteps)
             point = {"steps": float(self.num_timesteps), "wall_s": wall_s, "safety_share": share}
+            if isinstance(self.model, PPOLagrangian):
+                held = self.model.multiplier
+                point |= {"cost": held.cost, "limit": held.limit, "multiplier": held.value}
             self.curve.append(point | score)
             for name, value in score.items():
                 self.logger.record(f"episode/{name}", value)
@@ -158,21 +165,32 @@ class TrainingMonitor(BaseCallback):
         write_whole(self.folder / "curve.json", json.dumps(self.curve, indent=1))
 
 
+PANELS = {
+    "success_rate": ("goals reached (share)", "tab:green"),
+    "goals_per_minute": ("goals per minute", "tab:blue"),
+    "contacts_per_episode": ("true contacts per episode", "tab:red"),
+    "close_steps_per_episode": ("steps < 15 cm per episode", "tab:orange"),
+}
+LIMITED = {
+    "cost": ("cost per episode, smoothed (dashed: the limit)", "tab:brown"),
+    "multiplier": ("multiplier", "tab:purple"),
+}
+"""What is drawn of a run that keeps a limit, too."""
+
+
 def plot_curve(curve: Curve, path: Path, title: str) -> None:
     """Goals, contacts and cost over environment steps as a PNG."""
     steps = np.array([point["steps"] for point in curve])
     share = np.array([point.get("safety_share", 1.0) for point in curve])
     growing = steps[(share > 0) & (share < 1)]
-    panels = {
-        "success_rate": ("goals reached (share)", "tab:green"),
-        "goals_per_minute": ("goals per minute", "tab:blue"),
-        "contacts_per_episode": ("true contacts per episode", "tab:red"),
-        "close_steps_per_episode": ("steps < 15 cm per episode", "tab:orange"),
-    }
-    figure = new_figure(9, 6)
-    axes = figure.subplots(2, 2, sharex=True)
+    limited = bool(curve) and "limit" in curve[-1]
+    panels = PANELS | (LIMITED if limited else {})
+    figure = new_figure(9, 9 if limited else 6)
+    axes = figure.subplots(len(panels) // 2, 2, sharex=True)
     for axis, (name, (words, colour)) in zip(axes.ravel(), panels.items(), strict=True):
         axis.plot(steps, [point[name] for point in curve], color=colour)
+        if name == "cost":
+            axis.axhline(curve[-1]["limit"], color="grey", linestyle="--")
         label(axis, "environment steps", words)
         axis.set_ylim(bottom=0)
         axis.xaxis.set_major_formatter(EngFormatter(sep=" "))

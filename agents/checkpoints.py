@@ -17,6 +17,7 @@ from hrc_env.sb3 import HRCVecEnv
 from hrc_env.tasks.goal import ACHIEVED, DESIRED
 
 from .env_info import EnvInfo, Observation
+from .ppo_lagrangian import PPOLagrangian
 from .sac import first_steps
 
 with learner():
@@ -24,7 +25,7 @@ with learner():
     from stable_baselines3.common.vec_env import VecNormalize
 
 TRAIN = "python -m hrc_env train"
-KINDS = {"ppo": PPO, "sac": SAC}
+KINDS = {"ppo": PPO, "ppo_lagrangian": PPOLagrangian, "sac": SAC}
 """By algorithm."""
 NO_BUFFER = {"buffer_size": 1, "replay_buffer_class": None, "replay_buffer_kwargs": {}}
 """What acts needs none, and hindsight wants an environment."""
@@ -44,7 +45,7 @@ def save(learner: Learner, path: Path, facts: dict[str, Any]) -> None:
     scale = learner.get_vec_normalize_env()
     meta = {
         "hrc_env": __version__,
-        "algorithm": type(learner).__name__.lower(),
+        "algorithm": next(name for name, kind in KINDS.items() if type(learner) is kind),
         "observation_size": _size(learner.observation_space),
         "action_size": int(np.prod(learner.action_space.shape or ())),
         "num_timesteps": learner.num_timesteps,
@@ -94,7 +95,7 @@ def resume(path: Path, env: HRCVecEnv, tensorboard: Path | None = None) -> Learn
         normalised.ret_rms.mean = np.array(meta["return_mean"])
         normalised.ret_rms.var = np.array(meta["return_variance"])
         normalised.ret_rms.count = meta["return_count"]
-    learner = PPO.load(path, env=normalised, device="cpu", tensorboard_log=log)
+    learner = kind.load(path, env=normalised, device="cpu", tensorboard_log=log)
     normalised.gamma = learner.gamma
     return learner
 

@@ -5,6 +5,7 @@ Schulman et al. 2017, arXiv:1707.06347. What mattered most: no running normalisa
 phases of an episode.
 """
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -51,7 +52,11 @@ IMITATOR = PPOSettings(hidden=(256, 256), near_and_far=True, learning_rate=5e-5,
 
 
 def make_learner(
-    env: VecEnv, settings: PPOSettings, seed: int, tensorboard: Path | None = None
+    env: VecEnv,
+    settings: PPOSettings,
+    seed: int,
+    tensorboard: Path | None = None,
+    kind: Callable[..., PPO] = PPO,
 ) -> PPO:
     """A fresh PPO on `env`; a running estimate scales rewards, observations stay as they are."""
     normalised = VecNormalize(env, norm_obs=False, norm_reward=True, gamma=settings.gamma)
@@ -64,8 +69,8 @@ def make_learner(
         **({"features_extractor_class": NearAndFar} if near else {}),
     }
     log = None if tensorboard is None else str(tensorboard)
-    kind = "MultiInputPolicy" if isinstance(env.observation_space, Dict) else "MlpPolicy"
-    return PPO(
-        kind, normalised, **values, policy_kwargs=policy, tensorboard_log=log, seed=seed,
+    network = "MultiInputPolicy" if isinstance(env.observation_space, Dict) else "MlpPolicy"
+    return kind(
+        network, normalised, **values, policy_kwargs=policy, tensorboard_log=log, seed=seed,
         device="cpu",
     )  # fmt: skip

@@ -15,6 +15,7 @@ class Run(Train):
     control: str = "joint"
     demonstrations: int = 0
     timesteps: int = 1_000_000
+    proximity: float = 2.0
 
 
 IMITATION: Mapping[str, Any] = {"control": "twist", "demonstrations": 256, "timesteps": 1_500_000}
@@ -29,10 +30,16 @@ RECIPES: Mapping[str, Mapping[str, Any]] = {
 """By task: where that differs from `Run`."""
 
 
+LIMITED: Mapping[str, Any] = {"timesteps": 2_000_000, "proximity": 0.0}
+"""With a limit of cost, which then is all that keeps the robot away."""
+
+
 def filled(arguments: Train) -> Run:
     """The arguments with the recipe of their task for what they leave open."""
     recipe = RECIPES.get(arguments.task, {})
-    if arguments.algorithm not in (None, recipe.get("algorithm", "ppo")):
+    if arguments.algorithm == "ppo_lagrangian":
+        recipe = {**(recipe if recipe.get("algorithm", "ppo") == "ppo" else {}), **LIMITED}
+    elif arguments.algorithm not in (None, recipe.get("algorithm", "ppo")):
         recipe = {}  # another learner begins alone
     given = {name: each for name, each in vars(arguments).items() if each is not None}
     return Run(**{**recipe, **given})

@@ -5,6 +5,7 @@ import shlex
 import time
 from contextlib import closing
 from dataclasses import asdict, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, get_type_hints
 
@@ -20,9 +21,9 @@ from hrc_env.sb3 import HRCVecEnv
 
 from . import checkpoints, ppo, sac
 from .callbacks import (
+    Curriculum,
     Curve,
     Interrupt,
-    ProximityCurriculum,
     Ramp,
     TrainingMonitor,
     plot_curve,
@@ -30,13 +31,16 @@ from .callbacks import (
 from .cloning import CloningSettings, clone
 from .env_info import EnvInfo
 from .evaluate import Score, evaluate
+from .ppo_lagrangian import PPOLagrangian
 from .recipes import Run, filled
 
 with learner():
     import torch
+    from stable_baselines3 import PPO
 
 SETTINGS: dict[str, tuple[Any, Any]] = {
     "ppo": (ppo.PPOSettings(), ppo.IMITATOR),
+    "ppo_lagrangian": (ppo.PPOSettings(), ppo.IMITATOR),
     "sac": (sac.SACSettings(), sac.SACSettings(hidden=(256, 256))),
 }
 """By algorithm: of who begins with nothing, and of who begins with what an expert does."""
@@ -72,7 +76,12 @@ def run(arguments: Train) -> int:
     config = settle(task=mine.task, config=mine.keywords()["config"]).config
     title = f"{mine.algorithm.upper()}, {mine.perception}"
     title += f", proximity weight {config.reward.proximity:g}"
+    title += f", shield {mine.shield}" if mine.shield else ""
     plot_curve(curve, folder / "curve.png", title)
+    limit, cost = mine.cost_limit, score.cost_per_episode
+    if limit is not None and cost > 1.1 * limit:
+        said = f"The limit of {limit:g} is not kept: these episodes cost {cost:.1f} each. Learn on "
+        console.print(said + "with --resume and more --timesteps, or ask for less.")
     written = "policy.zip, curve.png, score.json"
     if mine.film and film(folder, mine, console):
         written += ", policy.mp4"
@@ -146,7 +155,7 @@ def train(arguments: Run, folder: Path, console: Console) -> tuple[Curve, float 
             monitor = TrainingMonitor(folder, facts, curve, ramp, interrupt, meter)
             learner.learn(
                 total - learner.num_timesteps,
-                callback=[ProximityCurriculum(ramp, env), monitor],
+                callback=[Curriculum(ramp, env), monitor],
                 reset_num_timesteps=arguments.resume is None,
                 tb_log_name=arguments.algorithm,
             )
@@ -165,7 +174,11 @@ def _learner(arguments: Run, folder: Path, env: HRCVecEnv, settings: Any) -> tup
     if arguments.resume is None and arguments.algorithm == "sac":
         return sac.make_learner(env, settings, seed, log, arguments.her), []
     if arguments.resume is None:
-        return ppo.make_learner(env, settings, seed, log), []
+        kind, limit = PPO, arguments.cost_limit
+        if limit is not None:
+            length = env.env.max_episode_steps
+            kind = partial(PPOLagrangian, limit=limit, episode_steps=length)
+        return ppo.make_learner(env, settings, seed, log, kind), []
     learner = checkpoints.resume(folder / "policy.zip", env, folder / "tensorboard")
     env.seed(arguments.seed + learner.num_timesteps)  # other episodes than the first ones
     path = folder / "curve.json"

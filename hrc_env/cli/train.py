@@ -1,5 +1,6 @@
 """python -m hrc_env train: learn, evaluate, draw, film. `agents/training.py` does the work."""
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,7 @@ from hrc_env.cli.environment import EnvironmentArguments, merged
 from hrc_env.core.checkout import agents
 from hrc_env.core.errors import ConfigError, check_names
 
-ALGORITHMS = ("ppo", "sac")
+ALGORITHMS = ("ppo", "ppo_lagrangian", "sac")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,8 +25,11 @@ class Train(EnvironmentArguments):
     out: Path = Path("runs/quick")
     """Folder for checkpoints, curves, TensorBoard logs and the film."""
     algorithm: str | None = None
-    """ppo; or sac, which learns with hindsight (HER) where the task has goals apart. This, control,
-    demonstrations and timesteps are what suits the task if not given (agents/recipes.py)."""
+    """ppo; ppo_lagrangian, which keeps a limit of cost; or sac, which learns with hindsight (HER)
+    where the task has goals apart. This, control, demonstrations and timesteps are what suits the
+    task if not given (agents/recipes.py)."""
+    cost_limit: float | None = None
+    """With ppo_lagrangian: what an episode may cost (info["cost"], counted on the truth)."""
     her: bool | None = None
     """With sac: True or False, whether transitions are judged by other goals, too; by default where
     there are goals."""
@@ -39,11 +43,13 @@ class Train(EnvironmentArguments):
     """Seed of the environments and of the learner."""
     perception: str = "keypoints"
     """What the robot learns on: keypoints (camera emulator), truth or none."""
-    proximity: float = 2.0
-    """Weight of closeness to the estimated body in the reward; 0 trains without it."""
+    proximity: float | None = None
+    """Weight of closeness to the estimated body in the reward; 0 trains without it. 2 if not given,
+    but 0 with a limit, which then is all that keeps the robot away."""
     ramp: int = 400_000
-    """Environment steps in which that weight grows from 0: the task first, then care. 0: all of
-    it from the start; the policy learns several times slower, and is more careful in the end."""
+    """Environment steps in which that weight grows from 0, and a limit narrows: the task first,
+    then care. 0: all of it from the start; the policy learns several times slower, and is more
+    careful in the end."""
     threads: int | None = None
     """How many ranges the environments are stepped in at once; all cores by default."""
     episodes: int = 128
@@ -61,6 +67,7 @@ class Train(EnvironmentArguments):
             at_least(f"--{name}", getattr(self, name), 0)
         mine = agents("recipes").filled(self)
         check_names("algorithm", [mine.algorithm], ALGORITHMS)
+        _check_limit(self.cost_limit, mine.algorithm)
         if self.her and mine.algorithm != "sac":
             raise ConfigError(
                 f"--her judges what a replay buffer holds by other goals, and {mine.algorithm} has "
@@ -78,6 +85,24 @@ class Train(EnvironmentArguments):
     def keywords(self) -> dict[str, Any]:
         """Keyword arguments of the environment that a run learns and is judged in."""
         given = super().keywords()
-        safety = {"reward": {"proximity": self.proximity}}
+        safety = {} if self.proximity is None else {"reward": {"proximity": self.proximity}}
         config = merged(safety, given.get("config", {}))
         return {**given, "config": config, "num_threads": self.threads}
+
+
+def _check_limit(limit: float | None, algorithm: str) -> None:
+    keeps = algorithm == "ppo_lagrangian"
+    if limit is not None and not (math.isfinite(limit) and limit > 0):
+        raise ConfigError(
+            f"--cost-limit must be above 0, got {limit:g}. Where nobody cares an episode costs "
+            "about 70; 30 can be kept. What may cost nothing wants a shield."
+        )
+    if limit is not None and not keeps:
+        raise ConfigError(
+            f"--cost-limit is kept by ppo_lagrangian only, and {algorithm} knows of no cost: "
+            "--algorithm ppo_lagrangian, or leave the limit out."
+        )
+    if keeps and limit is None:
+        raise ConfigError(
+            "--algorithm ppo_lagrangian keeps a limit: say which, as --cost-limit 30."
+        )

@@ -86,7 +86,7 @@ def _train(n_steps: int, path: Path, tick: PartProgress, task: str = DEFAULT) ->
     try:
         learner = ppo.make_learner(env, ppo.PPOSettings(), SEED)
         ramp = callbacks.Ramp(round(RAMP_SHARE * n_steps))
-        care = callbacks.ProximityCurriculum(ramp, env)
+        care = callbacks.Curriculum(ramp, env)
         learner.learn(n_steps, callback=[care, ConvertCallback(advance)])
         checkpoints.save(learner, path, {"people": PEOPLE, "seed": SEED})
     finally:
