@@ -7,7 +7,9 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from hrc_env.core.results import Metric
 from hrc_env.env import HRCEnv
+from hrc_env.experiments.study.intervals import mean_over, ratio_over
 from hrc_env.sb3 import ACHIEVED, FAILED, HRCVecEnv
 from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import Task
@@ -141,3 +143,15 @@ def summarise(episodes: list[dict[str, float]]) -> Score:
         median_min_separation_m=float(np.median(column["min_separation_m"])),
         return_mean=float(column["r"].mean()),
     )
+
+
+def worth(episodes: list[dict[str, float]]) -> dict[str, Metric]:
+    """Means over episodes with 95 % bootstrap intervals."""
+    column = {name: [each[name] for each in episodes] for name in episodes[0]}
+    minutes = [seconds / 60 for seconds in column["seconds"]]
+    return {
+        "return": mean_over(column["r"], "1"),
+        "goals_per_minute": ratio_over(column["goals_reached"], minutes, "1/min"),
+        "cost_per_episode": mean_over(column["cost"], "1"),
+        "contacts_per_episode": mean_over(column["contacts"], "1"),
+    }

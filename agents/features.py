@@ -8,12 +8,11 @@ from gymnasium import spaces
 from hrc_env.core.errors import learner
 from hrc_env.tasks.goal import ACHIEVED, DESIRED
 
+from .network import NEAR
+
 with learner():
     import torch
     from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
-
-NEAR = 100.0
-"""Entries that are smaller than 1 / NEAR are spread out."""
 
 
 class NearAndFar(BaseFeaturesExtractor):

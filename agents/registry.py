@@ -1,10 +1,10 @@
-"""Agents by name, or from a checkpoint."""
+"""Agents by name, from the policies that come with the package, or from a file."""
 
 from pathlib import Path
 
 from hrc_env.core.errors import ConfigError, unknown
 
-from . import experts, random
+from . import experts, policies, random
 from .env_info import Agent, EnvInfo
 from .scripted import Yielding
 
@@ -13,7 +13,8 @@ AGENTS = ("random", "scripted", "scripted_slowed")
 
 
 def make_agent(name: str, env_info: EnvInfo, seed: int = 0) -> Agent:
-    """An agent by name ("random", "scripted", "scripted_slowed") or from a checkpoint file.
+    """An agent by name ("random", "scripted", "scripted_slowed", "hrc://HRCReach-v0/NAME") or from
+    a file: a policy (.safetensors) or a checkpoint (.zip).
 
     Raises:
         ConfigError: neither an agent nor a file.
@@ -24,11 +25,14 @@ def make_agent(name: str, env_info: EnvInfo, seed: int = 0) -> Agent:
         return random.RandomAgent(env_info, seed)
     if name in AGENTS:
         return experts.expert(env_info, Yielding() if name != "scripted" else None)
+    if name.startswith(policies.PREFIX) or Path(name).suffix == policies.SUFFIX:
+        return policies.load(policies.path_of(name), env_info)
     if Path(name).suffix == ".zip" or Path(name).exists():
         from . import checkpoints  # here: torch takes seconds to import, and need not be there
 
         return checkpoints.load(Path(name), env_info)
     error = unknown("agent", name, AGENTS)
     raise ConfigError(
-        f"{error} Or the path of a checkpoint that python -m hrc_env train wrote (.zip)."
+        f"{error} Or {policies.PREFIX}ID/NAME, or the path of what python -m hrc_env train wrote "
+        "(.zip) or export (.safetensors)."
     )

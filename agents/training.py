@@ -118,19 +118,30 @@ def as_before(arguments: Train, folder: Path) -> Train:
     Raises:
         CheckpointError: the folder holds no run, or one that has learnt all that is asked.
     """
-    record = folder / "run.json"
-    if not record.exists():
-        raise CheckpointError(f"{folder} holds no run to resume: {record} is missing.")
-    before, hints = json.loads(record.read_text())["arguments"], get_type_hints(Train)
+    before = asked_of(folder)
+    total = arguments.timesteps or before.timesteps or 0
     learnt = checkpoints.describe(folder / "policy.zip")["num_timesteps"]
-    if learnt >= (arguments.timesteps or before["timesteps"]):
+    if learnt >= total:
         raise CheckpointError(
             f"{folder} has learnt {learnt} steps already; ask for more than that with --timesteps."
         )
-    kept = {each.name: each.default for each in fields(Train) if each.name not in ONLY_OF_A_RUN}
-    for name in kept.keys() & before.keys():  # what an older run lacks had its default
-        kept[name] = restored(hints[name], before[name], name)
-    return replace(arguments, timesteps=arguments.timesteps or before["timesteps"], **kept)
+    own = {name: getattr(arguments, name) for name in ONLY_OF_A_RUN}
+    return replace(before, **{**own, "timesteps": total})
+
+
+def asked_of(folder: Path) -> Train:
+    """What a run was asked, but for what is `ONLY_OF_A_RUN`, of which it has the steps.
+
+    Raises:
+        CheckpointError: the folder holds no run.
+    """
+    record = folder / "run.json"
+    if not record.exists():
+        raise CheckpointError(f"{folder} holds no run: {record} is missing.")
+    said, hints = json.loads(record.read_text())["arguments"], get_type_hints(Train)
+    left = {*ONLY_OF_A_RUN} - {"timesteps"}
+    names = [each.name for each in fields(Train) if each.name in said and each.name not in left]
+    return Train(**{name: restored(hints[name], said[name], name) for name in names})
 
 
 def train(arguments: Run, folder: Path, console: Console) -> tuple[Curve, float | None]:

@@ -24,7 +24,7 @@ import tyro
 from rich.console import Console
 
 from agents import checkpoints
-from agents.evaluate import EVALUATION_SEED, judged
+from agents.evaluate import EVALUATION_SEED, judged, worth
 from agents.registry import AGENTS, make_agent
 from benchmarks.common import publish
 from hrc_env.cli.checks import at_least, writable_folder
@@ -32,7 +32,6 @@ from hrc_env.cli.progress import progress_bar
 from hrc_env.core.results import Metric
 from hrc_env.experiments.study.cache import PartCache, PartProgress
 from hrc_env.experiments.study.fingerprint import fingerprint_of
-from hrc_env.experiments.study.intervals import mean_over, ratio_over
 from hrc_env.experiments.study.report import Column, Report, table_of
 
 PPO = {"ppo": 0.0, "ppo_safety": 2.0}
@@ -140,18 +139,6 @@ def played(
         return {"episodes": judged(make, n_episodes, tick=tick, **kwargs)}
 
     return parts.part(label, play)["episodes"]
-
-
-def worth(episodes: list[dict[str, float]]) -> dict[str, Metric]:
-    """Means over episodes with 95 % bootstrap intervals."""
-    column = {name: [each[name] for each in episodes] for name in episodes[0]}
-    minutes = [seconds / 60 for seconds in column["seconds"]]
-    return {
-        "return": mean_over(column["r"], "1"),
-        "goals_per_minute": ratio_over(column["goals_reached"], minutes, "1/min"),
-        "cost_per_episode": mean_over(column["cost"], "1"),
-        "contacts_per_episode": mean_over(column["contacts"], "1"),
-    }
 
 
 if __name__ == "__main__":

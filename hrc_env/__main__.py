@@ -43,6 +43,10 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
         "hrc_env.cli.train", "Train",
         "Train a policy, evaluate it on fixed seeds, draw its curve, film it.",
     ),
+    "export": (
+        "hrc_env.cli.export", "Export",
+        "Make of a run's policy a file that executes nothing, and a card of what it is worth.",
+    ),
     "record": (
         "hrc_env.cli.record", "Record",
         "Record an agent's episodes as a Minari data set.",

@@ -35,7 +35,11 @@ class List(EnvironmentArguments):
         known = {
             "id": IDS, "perception": LEVELS, "estimator": ESTIMATORS, "scene": SCENES,
             "robot": ROBOTS, "cameras": [camera.name for camera in LAB_CAMERAS],
-            "control": CONTROLS, "agent": (*agents("registry").AGENTS, "a checkpoint: PATH.zip"),
+            "control": CONTROLS,
+            "agent": (
+                *agents("registry").AGENTS, *agents("policies").names(), "a checkpoint: PATH.zip",
+                "a policy: PATH.safetensors",
+            ),
         }  # fmt: skip
         for argument, names in known.items():
             table.add_row(argument, ", ".join(names))

@@ -26,7 +26,8 @@ class Play(EnvironmentArguments):
     task: Annotated[str, tyro.conf.Positional] = DEFAULT
     """Which environment, by its id."""
     agent: str = "scripted_slowed"
-    """random, scripted, scripted_slowed, or the path of a checkpoint of `train` (.zip)."""
+    """random, scripted, scripted_slowed, hrc://ID/NAME (python -m hrc_env list), or the path of a
+    checkpoint of `train` (.zip) or a policy of `export` (.safetensors)."""
     episodes: int = 1
     """How many episodes to play."""
     seed: int = 0

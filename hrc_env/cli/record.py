@@ -24,7 +24,8 @@ class Record(EnvironmentArguments):
     task: Annotated[str, tyro.conf.Positional] = DEFAULT
     """Which environment, by its id."""
     agent: str = "scripted"
-    """random, scripted, scripted_slowed, or the path of a checkpoint of `train` (.zip)."""
+    """random, scripted, scripted_slowed, hrc://ID/NAME, or the path of a checkpoint of `train`
+    (.zip) or a policy of `export` (.safetensors)."""
     episodes: int = 100
     """How many episodes."""
     seed: int = 0

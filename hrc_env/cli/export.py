@@ -1,0 +1,38 @@
+"""python -m hrc_env export: a run's policy as safetensors with a card, by `agents/export.py`."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from hrc_env.cli.checks import at_least, writable_folder
+from hrc_env.core.checkout import agents
+from hrc_env.core.errors import ConfigError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Export:
+    """Make of a run's policy a file that executes nothing, and a card of what it is worth."""
+
+    run_folder: Annotated[Path, tyro.conf.Positional]
+    """The folder of a run of `train`."""
+    name: str
+    """What it is to be called: small letters, digits and _."""
+    out: Path = Path("policies")
+    """Folder for ID/NAME.safetensors and ID/NAME.json."""
+    episodes: int = 256
+    """Episodes of each evaluation."""
+    shields: tuple[str, ...] = ()
+    """It is judged as it learnt, and under these shields, too: none, or their names."""
+
+    def run(self) -> int:
+        """Judge and write."""
+        at_least("--episodes", self.episodes, 1)
+        if not re.fullmatch(r"[a-z][a-z0-9_]*", self.name):
+            raise ConfigError(
+                f"--name is of small letters, digits and _, as fast_shielded; got {self.name!r}."
+            )
+        writable_folder(self.out)
+        return agents("export").run(self)

@@ -1,0 +1,6 @@
+from typing import Any
+
+from numpy.typing import NDArray
+
+def load(data: bytes) -> dict[str, NDArray[Any]]: ...
+def save(tensor_dict: dict[str, NDArray[Any]]) -> bytes: ...
