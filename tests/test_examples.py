@@ -29,6 +29,18 @@ def test_the_torchrl_ppo_runs():
     assert re.search(r"3072 steps in \d+ s", run("ppo_torchrl.py", *SMALL))
 
 
+@pytest.mark.skipif(
+    importlib.util.find_spec("fsrl") is None,
+    reason="FSRL is not installed: examples/ppo_lagrangian_fsrl.py says how",
+)
+def test_fsrl_learns_with_our_cost_and_is_judged_as_ours_are():
+    words = ("--timesteps", "2000", "--perception", "truth", "--episodes", "2")
+    said = run("ppo_lagrangian_fsrl.py", *words, "--cost-limit", "1")
+    (value,) = re.findall(r"2000 steps in \d+ s, lambda ([\d.]+)", said)
+    assert float(value) > 0
+    assert len(re.findall(r"^\w+: cost [\d.]+, goals/min [\d.]+$", said, re.M)) == 2
+
+
 def load(name: str):
     spec = importlib.util.spec_from_file_location(name, ROOT / "examples" / f"{name}.py")
     module = importlib.util.module_from_spec(spec)
