@@ -70,6 +70,7 @@ def add_furniture(spec: Any) -> None:
     _cart(world)
     _controller(world)
     _cartons(world)
+    _trestles(world)
     _buckets(world)
     _window(world, -1.35)
     _window(world, 1.0)
@@ -128,16 +129,16 @@ def _table(world: Any) -> None:
                 foot = (legs_x + 0.14 * lean, y + 0.25 * sy, 0.0)
                 head = (legs_x + 0.02 * lean, y + 0.22 * sy, height - 0.05)
                 cylinder(world, foot, head, 0.022, "pine")
-    for i, (dy, length, turn) in enumerate(((0.19, 1.15, 0.01), (0.09, 1.0, -0.03))):
+    for i, (dy, length, turn) in enumerate(((0.22, 1.15, 0.01), (0.12, 1.0, -0.03))):
         box(world, (x - 0.1, y + dy, height + 0.019), (length, 0.089, 0.038), "pine", turn)
         box(world, (x - 0.2 + 0.1 * i, y + dy, height + 0.057), (0.7, 0.089, 0.038), "pine_dark")
-    box(world, (x + 0.42, y - 0.10, height + 0.05), (0.30, 0.20, 0.10), "machine_blue", 0.3)
+    box(world, (x + 0.14, y - 0.10, height + 0.05), (0.30, 0.20, 0.10), "machine_blue", 0.3)
     cylinder(
-        world, (x + 0.33, y - 0.15, height + 0.12), (x + 0.51, y - 0.05, height + 0.12),
+        world, (x + 0.05, y - 0.15, height + 0.12), (x + 0.23, y - 0.05, height + 0.12),
         0.012, "rubber",
     )  # fmt: skip
     cylinder(
-        world, (x - 0.05, y - 0.18, height), (x - 0.05, y - 0.18, height + 0.11), 0.04, "hazard_red"
+        world, (x - 0.13, y - 0.18, height), (x - 0.13, y - 0.18, height + 0.11), 0.04, "hazard_red"
     )
     box(world, (x - 0.45, y - 0.15, height + 0.003), (0.42, 0.30, 0.003), "plan", 0.15)
 
@@ -226,6 +227,17 @@ def _cartons(world: Any) -> None:
     for z in (0.06, 0.20, 0.34, 0.48):
         box(world, (2.405, -2.312, z + 0.03), (0.016, 0.64, 0.09), "pine", 0.05)
         box(world, (2.686, -1.984, z + 0.03), (0.60, 0.016, 0.09), "pine", 0.05)
+
+
+def _trestles(world: Any) -> None:
+    """Two trestles below the windows, on which boards lie."""
+    y, height = 2.45, 0.70
+    for x in (0.5, 1.9):
+        box(world, (x, y, height - 0.03), (0.09, 0.50, 0.06), "pine_dark")
+        for sy in (-1, 1):
+            for lean in (-1, 1):
+                foot = (x + 0.16 * lean, y + 0.24 * sy, 0.0)
+                cylinder(world, foot, (x + 0.02 * lean, y + 0.2 * sy, height - 0.05), 0.02, "pine")
 
 
 def _buckets(world: Any) -> None:

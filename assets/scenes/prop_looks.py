@@ -195,6 +195,12 @@ def _level(body: Any) -> None:
         box(body, (0, y, 0), (0.028, 0.010, 0.060), "prop_rubber")
 
 
+def _stud(body: Any) -> None:
+    box(body, (0, 0, 0), (0.298, 0.089, 0.038), "prop_pine", np.pi / 2)
+    for y in (-0.1495, 0.1495):
+        box(body, (0, y, 0), (0.0892, 0.0012, 0.0382), "prop_ash")
+
+
 LOOKS: dict[str, Callable[[Any], None]] = {
     "hammer": _hammer,
     "drill": _drill,
@@ -205,5 +211,6 @@ LOOKS: dict[str, Callable[[Any], None]] = {
     "cart": _cart,
     "wheelbarrow": _wheelbarrow,
     "level": _level,
+    "stud": _stud,
 }
 """By the props' names: adds the geoms to a body."""

@@ -98,14 +98,14 @@ class WorkerPath:
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """What the workers' hands hold, and where it is; see `props.PROPS`."""
+    """What the workers' hands hold, and then what lies there for them; see `props.PROPS`."""
 
     kind: Ints
-    """(B, W) index into `props.PROPS`; 0: nothing."""
+    """(B, W + L) index into `props.PROPS`; 0: nothing."""
     position_world: Points3
-    """(B, W, 3) origin of the prop's frame [m]; of no meaning where nothing is held."""
+    """(B, W + L, 3) origin of the prop's frame [m]; of no meaning where there is nothing."""
     quaternion_wxyz: QuaternionsWxyz
-    """(B, W, 4) world_from_prop."""
+    """(B, W + L, 4) world_from_prop."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +121,7 @@ class WorkerMotion:
     angular_velocity_world: Floats
     """(B, W, S, 3) [rad/s]."""
     held: Held | None = None
-    """What their hands hold; None: nothing."""
+    """What they hold and what lies there for them; None: nothing."""
     body: Ints | None = None
     """(B, W) which of the scene's bodies each has; None: all have the first."""
 
@@ -246,6 +246,10 @@ class Effects:
     """(B, O, 6) force [N] and torque [Nm] at the middle of each."""
 
 
+AWAY_M = 0.43
+"""How far ahead of who stands there loads lie on the floor or a table [m]."""
+
+
 @dataclass(frozen=True, slots=True)
 class Workplace:
     """A place where a worker stands and works."""
@@ -259,8 +263,12 @@ class Workplace:
     yaw_rad: float
     """Which way the worker looks, from world +x [rad]."""
     height_m: float
-    """How high above the floor the work is [m]: where hands work, a load is gripped, or how
+    """How high above the floor the work is [m]: where hands work, on what loads lie, or how
     high a step is; 0 where there is nothing."""
+    ahead_m: float = AWAY_M
+    """How far ahead of who stands there loads lie, or a wall is [m]."""
+    loads: tuple[str, ...] = ()
+    """What lies there at first to be taken up, from the bottom up: names of `props.PROPS`."""
 
 
 WORKPLACE_KINDS = (

@@ -39,6 +39,17 @@ def absent() -> Floats:
     return row
 
 
+def bounds(table: Floats) -> Floats:
+    """(2, 3) least and greatest corner of the box, along x, y and z, round boxes and capsules
+    (n, `WIDTH`) [m]."""
+    axes, half = np.abs(table[:, AXES:HALF_SIZE].reshape(-1, 3, 3)), table[:, HALF_SIZE:REACH]
+    boxes = np.einsum("gi,gij->gj", half, axes)
+    rods = half[:, 1:2] * axes[:, 2] + half[:, :1]
+    reach = np.where(table[:, KIND, None] == BOX, boxes, rods)
+    centre = table[:, CENTRE:AXES]
+    return np.stack([(centre - reach).min(0), (centre + reach).max(0)])
+
+
 @kernel
 def set_rows(table, first, rows):
     """Shapes into the rows of a table from `first` on."""

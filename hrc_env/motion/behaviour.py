@@ -10,6 +10,7 @@ import numpy as np
 
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.motion import decision as dc
+from hrc_env.motion import lying
 from hrc_env.motion import state as st
 from hrc_env.motion.blending import join, leave, settle
 from hrc_env.motion.decision import Decision, MotionState, take_first_place
@@ -17,6 +18,7 @@ from hrc_env.motion.schedule import HERE, picked
 from hrc_env.motion.setting_out import arrived, go, meets_somebody, play, stay, step_back
 from hrc_env.motion.starting import start_here
 from hrc_env.motion.state import NOWHERE, THERE, UNDER_WAY, WAITING
+from hrc_env.worker.props import PROP_NAMES
 
 WAIT_S, CHANGE_S, GIVE_UP_S = (0.5, 1.1), 1.5, 4.5
 """After so long who finds no way looks again; does something else; gives up [s]; judgement."""
@@ -24,8 +26,8 @@ PARKED_M = 60.0
 """Who is not in an episode stands this far away along x and y [m]."""
 WITH_LOAD = (*st.IDLE, *st.GIVING)
 """What one does with something in one's hands; before anything else it is set down."""
-ABOVE_M, CHEST_M = 0.17, 1.2
-"""Hands work so far above a bench; loads are set down no higher than this [m]; judgement."""
+ABOVE_M, CHEST_M = 0.21, 1.2
+"""Hands work so far above a bench; loads are handed over no higher than this [m]; judgement."""
 
 
 def follow_up(state: MotionState, b: int, w: int, draws: Floats) -> None:
@@ -35,8 +37,10 @@ def follow_up(state: MotionState, b: int, w: int, draws: Floats) -> None:
     pace, clock_s, time_s = float(me["pace"]), float(me["clock_s"]), float(me["time_s"])
     end = 0.0 if pace < 0.0 else float(me["duration_s"])
     over = (time_s - end) / pace if pace != 0.0 else 0.0
-    who = Decision(state.mind, workers, w, draws, clock_s - over)
+    who = Decision(state.mind, workers, w, draws, clock_s - over, state.loads[b])
     leave(end, who.now, frames, me)
+    if me["activity"] in (st.SET_DOWN, st.PUSH):
+        lying.lay_down(who.loads, state.mind.plan.grounds.places, me)
     who.load = int(me["load_prop"])
     me["pace"] = me["pace_wished"] = 1.0
     _begin(who, *next_activity(who))
@@ -58,7 +62,9 @@ def begin_episode(state: MotionState, b: int, n_present: int, bodies: Ints, draw
     workers["acts_at"] = workers["robot_world"] = workers["duration_s"] = np.inf
     workers["spot"][:, :2] = np.inf
     workers["pace"] = workers["pace_wished"] = 1.0
-    everyone = [Decision(mind, workers, w, draws[w, 0], 0.0) for w in range(len(workers))]
+    everyone = [
+        Decision(mind, workers, w, draws[w, 0], 0.0, state.loads[b]) for w in range(len(workers))
+    ]
     for who in everyone:
         d, me = who.draws, who.me
         me["speed_m_s"] = who.draw(0, mind.config.people.speed_m_s)
@@ -97,7 +103,7 @@ def next_activity(who: Decision) -> tuple[int, float]:
         if careless and (stepped := step_back(who)):
             return stepped
         _choose_job(who)
-        if who.job.at in (HERE, who.kind_here):
+        if who.job.at in (HERE, who.kind_here) and who.job.by == "walk":
             return _do_job(who)
         who.go(WAITING)
         me["since_s"] = who.now
@@ -146,6 +152,14 @@ def _new_errand(who: Decision) -> None:
     me["at"] = NOWHERE
 
 
+def _elsewhere(who: Decision) -> None:
+    """Choose anew what to do with what is held."""
+    schedule, prop = who.mind.schedule, PROP_NAMES[who.me["load_prop"]]
+    for job, then in zip(schedule.jobs, schedule.then, strict=True):
+        if job.activity == "pick up" and job.prop == prop and then:
+            who.me["job"] = picked(then, who.draws.item(dc.NEXT))
+
+
 def _do_job(who: Decision) -> tuple[int, float]:
     """Begin the job where the worker is; set down first what is in the way of it."""
     activity = st.ACTIVITY_NAMES.index(who.job.activity)
@@ -166,20 +180,28 @@ def _work(who: Decision, activity: int) -> tuple[int, float]:
     if activity == st.STAND:
         pause_s = config.near_pause_s if near else config.away_pause_s
         return _stand(who.draw(dc.LASTS, pause_s) * config.people.tempo)
-    height = who.job.height_m or me["spot"].item(3)
-    if activity in st.GIVING:
+    height, row, at_rest = who.job.height_m or me["spot"].item(3), -1, None
+    if activity == st.PICK_UP:
+        row = lying.at_hand(who.loads, PROP_NAMES.index(who.job.prop), me)
+        at_rest = who.loads["pose"][row].copy() if row >= 0 else None
+        activity = st.PICK_UP if row >= 0 else st.LOOK_ROUND
+    elif activity == st.SET_DOWN:
+        at_rest = lying.rest_here(who.loads, who.mind.plan.grounds.places, me)
+    elif activity == st.HAND_OVER:
         height = min(height, CHEST_M)
     if who.kind_here == "bench":
         height += ABOVE_M
     lunges = who.draws[dc.EVENT] > 1.0 - config.people.lunge_probability
     if near and activity == st.REACH and lunges:
         activity = st.LUNGE
-    lasts = start_here(who, activity, height)
+    lasts = start_here(who, activity, height, at_rest)
     if meets_somebody(who, activity, lasts)[0] >= 0.0:
         stay(who)
         if who.kind_here:
             who.go(UNDER_WAY)  # that is, the job comes next
         return _stand(who.draw(dc.LASTS, WAIT_S))
+    if row >= 0:
+        lying.take(who.loads, row)
     return activity, lasts
 
 
@@ -199,6 +221,6 @@ def _wait(who: Decision) -> tuple[int, float]:
         who.go(THERE)
         me["at"] = NOWHERE
         return _work(who, st.SET_DOWN if who.loaded else st.LOOK_ROUND)
-    if waited_s > CHANGE_S and not who.loaded:
-        _new_errand(who)
+    if waited_s > CHANGE_S:
+        _elsewhere(who) if who.loaded else _new_errand(who)
     return _stand(who.draw(dc.LASTS, WAIT_S))

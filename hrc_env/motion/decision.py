@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hrc_env.core.records import WORKPLACE_KINDS
-from hrc_env.core.typing import Bools, Floats
+from hrc_env.core.typing import Bools, Floats, Records
+from hrc_env.motion import lying
 from hrc_env.motion import state as st
 from hrc_env.motion.activities.falling import fallen_root
 from hrc_env.motion.activities.pieces import Clips
@@ -26,6 +27,7 @@ from hrc_env.motion.state import (
     Workers,
 )
 from hrc_env.motion.traffic import AHEAD_M, APART_M, FALL_M, HANDS_M
+from hrc_env.worker.props import PROP_NAMES
 
 NEXT, BOW, LASTS, DELAY, REACTION, REACTION_S, EVENT, DWELL = range(N_START, N_START + 8)
 """Which draw decides what; the first N_START are the activity's own."""
@@ -48,6 +50,8 @@ class BehaviourParams:
     clips: Clips
     anatomy: Anatomy
     """(N, ...) of the bodies that there are."""
+    loads: Records
+    """(L,) of `lying.LOAD`: what lies about at first."""
     fewest: int
     """Workers who are in an episode at least."""
     robot_girth_m: float = 0.0
@@ -56,10 +60,12 @@ class BehaviourParams:
 
 @dataclass(frozen=True, slots=True)
 class MotionState:
-    """All that changes is in `workers`: copying it copies the state."""
+    """All that changes is in the arrays: copying them copies the state."""
 
     workers: Workers
     """(B, W) of WORKER."""
+    loads: Records
+    """(B, L) of `lying.LOAD`."""
     mind: BehaviourParams
 
 
@@ -75,6 +81,8 @@ class Decision:
     """(N_DRAWS,)."""
     now: float
     """Clock [s]."""
+    loads: Records
+    """(L,) of their environment: what lies about."""
     load: int = 0
     """What they hold when they decide."""
 
@@ -115,7 +123,8 @@ class Decision:
 
 
 def in_the_way(who: Decision) -> Floats:
-    """(n, 3) x, y, radius of where other workers will stand and work, and of the robot's arm."""
+    """(n, 3) x, y, radius of where other workers will stand and work, of the robot's arm, and of
+    what lies about."""
     people, rows = who.mind.config.people, []
     ends = [who.workers[name][who.others()].tolist() for name in ("end_x", "end_y", "end_yaw")]
     for x, y, yaw in zip(*ends, strict=True):
@@ -127,14 +136,14 @@ def in_the_way(who: Decision) -> Floats:
     if people.detour_m > 0.0 and np.isfinite(robot[0, 0]):
         away_m = people.detour_m + who.mind.robot_girth_m
         rows += [(x, y, away_m) for x, y, _ in robot.tolist()]
-    return np.array(rows).reshape(-1, 3)
+    return np.vstack([np.reshape(rows, (-1, 3)), lying.in_the_way(who.loads)])
 
 
 def wished(who: Decision) -> Iterator[Place]:
     """Places for the job that nobody else has, the one last chosen first."""
     if who.me["going"] == UNDER_WAY:
         yield tuple(who.me["spot"].tolist())  # type: ignore[misc]
-    yield from _free_places(who, who.job.at)
+    yield from _free_places(who, who.job)
 
 
 def free_stages(who: Decision, starts: Floats) -> Iterator[Place]:
@@ -144,9 +153,13 @@ def free_stages(who: Decision, starts: Floats) -> Iterator[Place]:
     return _free(who, ((x, y, yaw, 0.0) for x, y, yaw in nearest))
 
 
-def _free_places(who: Decision, kind: str) -> Iterator[Place]:
-    """Places of a kind that no other worker's is near."""
-    return _free(who, _candidates(who, kind))
+def _free_places(who: Decision, job: Job) -> Iterator[Place]:
+    """Places for a job that no other worker's is near; of what it takes up, where that lies; for
+    what they push, where nothing is."""
+    if job.prop != PROP_NAMES[0] and job.by == "walk":
+        return _free(who, lying.stands(who.loads, PROP_NAMES.index(job.prop), job.at))
+    free = _free(who, _candidates(who, job.at))
+    return (p for p in free if not lying.is_left(who.loads, p)) if job.by == "push" else free
 
 
 def _free(who: Decision, places: Iterable[Place]) -> Iterator[Place]:
@@ -174,7 +187,7 @@ def _candidates(who: Decision, kind: str) -> Iterator[Place]:
         places = [place for place in plan.grounds.places if place.kind == kind]
         first = int(draws[0] * len(places))
         for place in (*places[first:], *places[:first]):
-            yield *place.xy_m, place.yaw_rad, place.height_m
+            yield lying.spot_of(place)
 
 
 def take_first_place(who: Decision) -> None:
@@ -184,9 +197,9 @@ def take_first_place(who: Decision) -> None:
     near = draw < mind.config.near_probability or not begins
     first = mind.schedule.robot if near else begins[int(who.draws[BOW] * len(begins))]
     for job in (first, mind.schedule.robot, *begins):
-        kind = mind.schedule.jobs[job].at
-        for place in _free_places(who, kind):
-            me["job"], me["at"], me["spot"] = job, WORKPLACE_KINDS.index(kind), place
+        chosen = mind.schedule.jobs[job]
+        for place in _free_places(who, chosen):
+            me["job"], me["at"], me["spot"] = job, WORKPLACE_KINDS.index(chosen.at), place
             dwell = who.draw(DWELL, mind.config.dwell_s) * mind.config.people.tempo
             me["until_s"] = max(0.05, dwell * who.draws.item(LASTS))
             return

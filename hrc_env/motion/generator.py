@@ -11,7 +11,7 @@ import numpy as np
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Cue, Deeds, Grounds, Held, WorkerMotion, WorkerPath, Workplace
-from hrc_env.core.typing import Bools, Floats, Ints, Points3, Velocities3
+from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records, Velocities3
 from hrc_env.geometry.rotations import matrix
 from hrc_env.motion import state as st
 from hrc_env.motion.activities.pieces import stage, stocked
@@ -25,6 +25,7 @@ from hrc_env.motion.decision import N_DRAWS, BehaviourParams, MotionState
 from hrc_env.motion.floorplan import floorplan, room_for
 from hrc_env.motion.holding import N_HELD, prop_pose
 from hrc_env.motion.kinematics import pose, quaternion, spin
+from hrc_env.motion.lying import LOAD, at_first, lay_out
 from hrc_env.motion.reactions import attend, notice
 from hrc_env.motion.schedule import schedule_at
 from hrc_env.motion.state import Worker, Workers
@@ -80,8 +81,13 @@ def make_state(
     schedule = schedule_at(config.jobs, {place.kind for place in grounds.places})
     values = numbers(config, grounds.robot_xy_m)
     pieces = stocked(clips, bones.size, stage(plan, config))
-    mind = BehaviourParams(config, values, plan, schedule, pieces, bones, fewest, robot_girth_m)
-    return MotionState(np.zeros((batch, n_workers), st.WORKER), mind)
+    loads = at_first(grounds.places, schedule.jobs)[: None if n_workers else 0]
+    mind = BehaviourParams(
+        config, values, plan, schedule, pieces, bones, loads, fewest, robot_girth_m
+    )
+    # What they bring themselves, or receive, needs room, too.
+    there = np.zeros((batch, len(loads) + n_workers), LOAD)
+    return MotionState(np.zeros((batch, n_workers), st.WORKER), there, mind)
 
 
 def reset(state: MotionState, ids: Ints, rngs: Sequence[np.random.Generator]) -> None:
@@ -90,6 +96,7 @@ def reset(state: MotionState, ids: Ints, rngs: Sequence[np.random.Generator]) ->
     for b in np.asarray(ids).tolist():
         bodies = drawn_bodies(rngs[b].random(n_workers), len(state.mind.anatomy.size))
         n = n_workers if fewest == n_workers else int(rngs[b].integers(fewest, n_workers + 1))
+        lay_out(state.loads[b], state.mind.loads, rngs[b].spawn(1)[0])
         begin_episode(state, b, n, bodies, rngs[b].random((n_workers, 2, N_DRAWS)))
 
 
@@ -117,7 +124,8 @@ def advance(
     while _move_on(float(dt_s), n_steps, done, over, workers, frames, path, now):
         for b, w in np.argwhere(over).tolist():
             follow_up(state, b, w, rngs[b].random(N_DRAWS))
-    return WorkerPath(*path), _motion(workers, (path[0][:, -1], path[1][:, -1]), now)
+    last = path[0][:, -1], path[1][:, -1]
+    return WorkerPath(*path), _motion(workers, last, now, state.loads)
 
 
 def watch(
@@ -171,15 +179,16 @@ def _deeds(workers: Workers, n_screws: Ints, boring: Bools) -> None:
 
 def current(state: MotionState, ids: Ints | None = None) -> WorkerMotion:
     """The bodies now: arrays (B, W, 22, ...), or of environments `ids` only (len(ids), W, ...)."""
-    workers = state.workers if ids is None else state.workers[np.asarray(ids, np.int64)]
-    return bodies_of(workers, state.mind.clips.frames)
+    rows = slice(None) if ids is None else np.asarray(ids, np.int64)
+    return bodies_of(state.workers[rows], state.mind.clips.frames, state.loads[rows])
 
 
-def bodies_of(workers: Workers, frames: Floats) -> WorkerMotion:
-    """The bodies of workers (B, W) at their times; `frames` are of the clips."""
+def bodies_of(workers: Workers, frames: Floats, loads: Records | None = None) -> WorkerMotion:
+    """The bodies of workers (B, W) at their times; `frames` are of the clips, loads (B, L) lie
+    about."""
     place, now = _blank(workers.shape, 3, 4), _blank_now(workers)
     _bodies_now(workers, frames, place, now)
-    return _motion(workers, place, now)
+    return _motion(workers, place, now, loads)
 
 
 def activity(state: MotionState) -> Ints:
@@ -193,8 +202,12 @@ Now = tuple[Floats, ...]
 """Velocities, angular velocities (..., 22, 3), what is held (..., N_HELD)."""
 
 
-def _motion(workers: Workers, place: Places, now: Now) -> WorkerMotion:
+def _motion(
+    workers: Workers, place: Places, now: Now, loads: Records | None = None
+) -> WorkerMotion:
     (position, turn), (velocity, turning, rows) = place, now
+    if loads is not None:
+        rows = np.concatenate([rows, loads["shown"]], axis=1)
     held = Held(rows[..., 0].astype(np.int64), rows[..., 1:4].copy(), rows[..., 4:].copy())
     return WorkerMotion(position, turn, velocity, turning, held, workers["body"].copy())
 

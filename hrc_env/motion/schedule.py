@@ -31,7 +31,8 @@ class Job:
     begins: float = 0.0
     """Weight with which an errand begins with this job; 0: none does."""
     prop: str = "nothing"
-    """What is picked up, or pushed on the way."""
+    """What is picked up, stood before, or pushed on the way; a job to which they walk is done
+    where it lies at places of its kind, as long as there is any."""
     by: str = "walk"
     """How workers go there: "walk", or "push" the prop."""
     height_m: float = 0.0
@@ -47,11 +48,9 @@ JOBS: tuple[Job, ...] = (
     Job("wait for the robot", "stand", "robot", (("work with the robot", 1.0),)),
     Job("watch the robot", "look round", "robot", (("work with the robot", 1.0),)),
     Job("show where", "point", "robot", (("work with the robot", 1.0),)),
-    Job("fetch a board", "pick up", "pile",
-         (("bring it to the wall", 0.7), ("bring it to the robot", 0.3)), 1.0, "board"),
+    Job("fetch a board", "pick up", "pile", (("bring it to the wall", 1.0),), 1.0, "board"),
     Job("bring it to the wall", "set down", "wall",
          (("nail it", 0.6), ("screw it on", 0.4))),
-    Job("bring it to the robot", "hand over", "robot", (("work with the robot", 1.0),)),
     Job("fetch a box", "pick up", "pile",
          (("put it on the bench", 0.6), ("put it on the floor", 0.4)), 0.7, "box"),
     Job("put it on the bench", "set down", "bench", (("work at the bench", 1.0),)),
@@ -72,8 +71,8 @@ JOBS: tuple[Job, ...] = (
          ("look about", 0.2)), 0.5),
     Job("work on the floor", "kneel", "floor", (("look about", 1.0),), 0.4),
     Job("look at the floor", "squat", "floor", (("look about", 1.0),), 0.3),
-    Job("take the cart", "stand", "cart", (("bring the cart", 1.0),), 0.4),
-    Job("bring the cart", "look round", "open", (("look about", 1.0),), 0.0, "cart", "push"),
+    Job("take the cart", "stand", "cart", (("bring the cart", 1.0),), 0.4, "cart"),
+    Job("bring the cart", "look round", "cart", (("look about", 1.0),), 0.0, "cart", "push"),
     Job("climb up", "climb", "step", (("look about", 0.6), ("climb up", 0.4)), 0.3),
     Job("stand about", "stand", "open", (("look about", 0.4), ("stand about", 0.3),
          ("do something", 0.3)), 0.8),

@@ -7,6 +7,7 @@ import numpy as np
 
 from hrc_env.core.records import WORKPLACE_KINDS
 from hrc_env.core.typing import Floats
+from hrc_env.motion import lying
 from hrc_env.motion import state as st
 from hrc_env.motion.activities.falling import plan_fall
 from hrc_env.motion.activities.pieces import TURNS_RAD, following, piece_of
@@ -63,6 +64,8 @@ def _go_to(who: Decision, places: Iterable[Place], at: int) -> Begun:
                 dwell = who.draw(DWELL, mind.config.dwell_s) * mind.config.people.tempo
                 me["until_s"] = who.now + begun[1] + dwell
                 who.go(UNDER_WAY)
+                if begun[0] == st.PUSH:
+                    _take_wheels(who)
                 return begun
             obstacles = np.vstack([obstacles, (at_x, at_y, APART_M + 0.1)])
             stay(who)
@@ -85,11 +88,24 @@ def _set_out(who: Decision, place: Place, obstacles: Floats, share: float, to_wo
     stumbles = who.draws[EVENT] > 1.0 - mind.config.people.stumble_probability
     if who.loaded:
         activity = st.CARRY
-    elif to_work and job.by == "push":
+    elif to_work and job.by == "push" and _has_wheels(who):
         activity, prop = st.PUSH, PROP_NAMES.index(job.prop)
     elif job.at in STUMBLE_TO and stumbles:
         activity = st.STUMBLE
     return activity, start_going(activity, who.draws, place[2], pace, prop, me)
+
+
+def _has_wheels(who: Decision) -> bool:
+    """Whether what is to be pushed is where the worker stands, or is none of what lies about."""
+    kind = PROP_NAMES.index(who.job.prop)
+    return lying.at_hand(who.loads, kind, who.me) >= 0 or not lying.is_any(who.loads, kind)
+
+
+def _take_wheels(who: Decision) -> None:
+    """What is pushed lies about no longer."""
+    row = lying.at_hand(who.loads, PROP_NAMES.index(who.job.prop), who.me)
+    if row >= 0:
+        lying.take(who.loads, row)
 
 
 def _fall_or_run(who: Decision, yaw_rad: float, pace_m_s: float) -> Begun:
@@ -134,8 +150,10 @@ def stay(who: Decision) -> None:
 def arrived(who: Decision) -> bool:
     """Whether the worker stands at their place."""
     me, (x, y, yaw, _) = who.me, who.me["spot"].tolist()
-    off = math.hypot(me["start_x"] - x, me["start_y"] - y)
-    return off < ARRIVED_M and math.cos(me["start_yaw"] - yaw) > 0.9
+    off, turned = math.hypot(me["start_x"] - x, me["start_y"] - y), me["start_yaw"] - yaw
+    if PROP_NAMES.index(who.job.prop) in lying.WHEELED and who.job.by == "walk":
+        return off < lying.EXACT_M and math.cos(turned) > lying.EXACT_COS
+    return off < ARRIVED_M and math.cos(turned) > 0.9
 
 
 def meets_somebody(who: Decision, activity: int, lasts: float) -> tuple[float, float, float]:

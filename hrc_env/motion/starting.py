@@ -76,8 +76,9 @@ STARTS: dict[int, Start] = {
 """What is begun where the worker stands: each compiled by itself when it is first wanted."""
 
 
-def start_here(who: Decision, activity: int, height: float) -> float:
-    """Start an activity where the worker stands; how long it takes [s], 0 of standing."""
+def start_here(who: Decision, activity: int, height: float, at_rest: Floats | None = None) -> float:
+    """Start an activity where the worker stands; how long it takes [s], 0 of standing. What is
+    picked up or set down is `at_rest` (6,) before or after."""
     draws, config, me = who.draws, who.mind.numbers, who.me
     feet(0.0, me)
     if activity == st.REACH:
@@ -85,14 +86,25 @@ def start_here(who: Decision, activity: int, height: float) -> float:
         return start_reach(draws, config, who.kind_here == "robot", height, others, me)
     if activity == st.LIFT:
         return start_lift(draws, config, me)
-    if activity == st.PICK_UP:
-        prop, on_shoulder = PROP_NAMES.index(who.job.prop), bool(draws[8] < 0.5)
-        return loads.finish_lift(loads.plan_pick_up(draws, height, prop, on_shoulder, me), me)
+    if at_rest is not None:
+        return _start_load(who, activity, at_rest)
     if activity == st.DRILL:  # below the head, and above it for drilling overhead
         height = min(height, wp.OVERHEAD_M - 0.1)
     elif activity == st.OVERHEAD:
         height = max(height, wp.OVERHEAD_M + 0.1)
     return STARTS[activity](draws, height, me) if activity in STARTS else 0.0
+
+
+def _start_load(who: Decision, activity: int, at_rest: Floats) -> float:
+    """Start to pick up what is at rest, or to lay it down so."""
+    draws, me = who.draws, who.me
+    if activity == st.PICK_UP:
+        prop, on_shoulder = PROP_NAMES.index(who.job.prop), bool(draws[8] < 0.5)
+        raise_s = loads.plan_pick_up(draws, 0.0, prop, on_shoulder, me)
+    else:
+        raise_s = loads.plan_set_down(draws, 0.0, me)
+    loads.put_load(at_rest, me)
+    return loads.finish_lift(raise_s, me)
 
 
 @kernel

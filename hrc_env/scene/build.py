@@ -243,7 +243,8 @@ def drawing_model(scene: Scene) -> mujoco.MjModel:
     for prefix in prefixes:
         for name in scene.bodies:
             add_visuals(spec, load_body(name), load_mesh(name), prefix)
-    add_props(spec, prefixes)
+    loads = tuple(name for place in scene.grounds.places for name in place.loads)
+    add_props(spec, prefixes, loads)
     return spec.compile()
 
 

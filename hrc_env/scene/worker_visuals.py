@@ -24,6 +24,8 @@ SHOWN, HIDDEN = DECORATION, WORKER_CAPSULES
 """Groups of skins, hats and things."""
 PARKED_M = (0.0, 0.0, -30.0)
 """Where things are that nobody holds [m]."""
+LOAD = "load_"
+"""With what the names of bodies begin that lie about."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +39,8 @@ class WorkerVisuals:
     hats: Ints
     """(H, 3) whose each hat is, of which body, and its geom."""
     props: Ints
-    """(W, len(PROPS) - 1) mocap row of every worker's things; they follow the workers' rows."""
+    """(N, len(PROPS) - 1) mocap rows of as many of each thing as are drawn at once, -1: there are
+    fewer; they follow the workers' rows."""
 
 
 def add_visuals(spec: Any, body: Body, looks: WorkerMesh, prefix: str) -> None:
@@ -49,11 +52,19 @@ def add_visuals(spec: Any, body: Body, looks: WorkerMesh, prefix: str) -> None:
         _add_hat(spec, looks.hat, body, prefix)
 
 
-def add_props(spec: Any, prefixes: tuple[str, ...]) -> None:
-    """Everything that can be held, once a worker, parked; call after the workers are added."""
+def add_props(spec: Any, prefixes: tuple[str, ...], loads: tuple[str, ...]) -> None:
+    """Everything that can be held, once a worker, and loads (names of props) that lie about, all
+    parked; call after the workers are added. Without workers there is nothing."""
     for prefix in prefixes:
         props = mujoco.MjSpec.from_file(str(assets_dir() / "scenes" / "props.xml"))
         spec.attach(props, prefix=prefix, frame=spec.worldbody.add_frame())
+    for k, name in enumerate(loads if prefixes else ()):
+        body = spec.worldbody.add_body(name=f"{LOAD}{k}/{name}", mocap=True, pos=PARKED_M)
+        for geom in spec.body(prefixes[0] + name).geoms:
+            body.add_geom(
+                type=geom.type, size=geom.size, pos=geom.pos, quat=geom.quat,
+                meshname=geom.meshname, material=geom.material, **LOOKS_ONLY,
+            )  # fmt: skip
 
 
 def visuals_of(
@@ -69,15 +80,27 @@ def visuals_of(
                 skins[k] = pair
     known = {model.geom(geom).name: geom for geom in range(model.ngeom)}
     hats = [(*pair, known[f"{start}hat"]) for pair, start in of.items() if f"{start}hat" in known]
-    names = PROP_NAMES[1:]
-    props = [model.body(prefix + name).mocapid[0] for prefix in prefixes for name in names]
     rows = [mocap_ids(model, prefix) for prefix in prefixes]
     return WorkerVisuals(
         np.array(rows, np.int64),
         skins,
         np.array(hats, np.int64).reshape(-1, 3),
-        np.array(props, np.int64).reshape(len(prefixes), len(names)),
+        _prop_rows(model),
     )
+
+
+def _prop_rows(model: mujoco.MjModel) -> Ints:
+    """`WorkerVisuals.props` of a model: a column for each thing, filled from above."""
+    moved = np.flatnonzero(model.body_mocapid >= 0)
+    names = [model.body(body).name.rpartition("/")[2] for body in moved]
+    ids = [
+        [model.body_mocapid[k] for k, found in zip(moved, names, strict=True) if found == name]
+        for name in PROP_NAMES[1:]
+    ]
+    table = np.full((max(map(len, ids)), len(ids)), -1, np.int64)
+    for column, own in enumerate(ids):
+        table[: len(own), column] = own
+    return table
 
 
 def show_bodies(model: mujoco.MjModel, visuals: WorkerVisuals, body: Ints | None) -> None:
@@ -105,19 +128,22 @@ def show_workers(
 
 
 def show_props(model: mujoco.MjModel, data: mujoco.MjData, rows: Ints, held: Held | None) -> None:
-    """Put into the hands what is held (W, ...), all else under the floor, where no camera draws
-    it; rows: `WorkerVisuals.props`."""
+    """Put what is held or lies about (W + L, ...) to where it is, all else under the floor, where
+    no camera draws it; rows: `WorkerVisuals.props`."""
     if not rows.size:
         return
-    data.mocap_pos[rows] = PARKED_M
-    shown = np.zeros(0, np.int64)
+    known = rows[rows >= 0]
+    data.mocap_pos[known] = PARKED_M
+    kind = np.zeros(0, np.int64) if held is None else held.kind
+    shown = np.full(len(kind), -1)
+    for prop in np.unique(kind[kind > 0]):
+        of_kind = np.flatnonzero(kind == prop)[: len(rows)]
+        shown[of_kind] = rows[: len(of_kind), prop - 1]
     if held is not None:
-        busy = np.flatnonzero(held.kind > 0)
-        shown = rows[busy, held.kind[busy] - 1]
-        data.mocap_pos[shown] = held.position_world[busy]
-        data.mocap_quat[shown] = held.quaternion_wxyz[busy]
+        data.mocap_pos[shown[shown >= 0]] = held.position_world[shown >= 0]
+        data.mocap_quat[shown[shown >= 0]] = held.quaternion_wxyz[shown >= 0]
     of_geom = model.body_mocapid[model.geom_bodyid]
-    things = of_geom >= rows.min()
+    things = of_geom >= known.min()
     model.geom_group[things] = np.where(np.isin(of_geom[things], shown), SHOWN, HIDDEN)
 
 

@@ -13,7 +13,16 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Held
 from hrc_env.core.typing import Floats, Ints, Points3, QuaternionsWxyz
 from hrc_env.geometry.rotations import turned
-from hrc_env.geometry.shapes import BOX, CAPSULE, CENTRE, HALF_SIZE, WIDTH, absent, shape
+from hrc_env.geometry.shapes import (
+    BOX,
+    CAPSULE,
+    CENTRE,
+    HALF_SIZE,
+    WIDTH,
+    absent,
+    bounds,
+    shape,
+)
 
 Triple = Sequence[float]
 
@@ -107,9 +116,15 @@ PROPS: tuple[Prop, ...] = (
     ),
     # A spirit level, flat to a wall ahead, in both hands.
     _prop("level", [_box(ORIGIN, (0.025, 0.80, 0.06))], (0, 0.22, 0), (0, -0.22, 0)),
+    # A piece of a stud, flat, by its ends.
+    _prop("stud", [_box(ORIGIN, (0.089, 0.30, 0.038))], (0, 0.11, 0), (0, -0.11, 0)),
 )  # fmt: skip
 """Everything that can be held; the first is nothing."""
 PROP_NAMES: tuple[str, ...] = tuple(prop.name for prop in PROPS)
+BOUNDS_M = np.zeros((len(PROPS), 2, 3))
+"""(P, 2, 3) least and greatest corner of the box round each, in its own frame [m]."""
+for _row, _each in zip(BOUNDS_M[1:], PROPS[1:], strict=True):
+    _row[:] = bounds(_each.shapes)
 _N_PARTS = max(len(prop.shapes) for prop in PROPS)
 _PARTS = np.tile(absent(), (len(PROPS), _N_PARTS, 1))
 """(P, n, `shapes.WIDTH`) the parts of every prop; rows that it leaves over are absent."""
@@ -118,7 +133,8 @@ for _parts, _each in zip(_PARTS, PROPS, strict=True):
 
 
 def held_shapes(held: Held) -> Floats:
-    """(B, W * n, `shapes.WIDTH`) the solid parts of what workers hold, in the world [m].
+    """(B, W * n, `shapes.WIDTH`) the solid parts of what workers hold, and of what lies there for
+    them, in the world [m].
 
     There are rows for the prop of most parts; those that are left over are absent.
     """

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from hrc_env.core.records import Held
-from hrc_env.geometry.shapes import AXES, BOX, CENTRE, HALF_SIZE, KIND
 from hrc_env.scene.build import build, drawing_model, visuals
 from hrc_env.scene.primitives import DECORATION
 from hrc_env.scene.worker_visuals import PARKED_M, show_props
-from hrc_env.worker.props import PROP_NAMES, PROPS
+from hrc_env.worker.props import BOUNDS_M, PROP_NAMES
 
 SCENE = build(n_workers=2)
 
@@ -21,17 +20,6 @@ SCENE = build(n_workers=2)
 def drawn():
     model = copy.copy(drawing_model(SCENE))
     return model, mujoco.MjData(model)
-
-
-def bounds_of_shapes(prop):
-    """(2, 3) least and greatest corner of a prop's shapes [m]."""
-    axes = np.abs(prop.shapes[:, AXES:HALF_SIZE].reshape(-1, 3, 3))
-    half = prop.shapes[:, HALF_SIZE : HALF_SIZE + 3]
-    boxes = np.einsum("gi,gij->gj", half, axes)
-    rods = half[:, 1:2] * axes[:, 2] + half[:, :1]
-    reach = np.where(prop.shapes[:, KIND, None] == BOX, boxes, rods)
-    centre = prop.shapes[:, CENTRE:AXES]
-    return np.stack([(centre - reach).min(0), (centre + reach).max(0)])
 
 
 def test_physics_has_the_workers_bodies_only():
@@ -84,5 +72,5 @@ def test_a_prop_looks_as_large_as_it_is(drawn, name):
         corners = model.geom_pos[geom] + outermost(model, geom) @ turn.reshape(3, 3).T
         lowest = np.minimum(lowest, corners.min(0))
         highest = np.maximum(highest, corners.max(0))
-    expected = bounds_of_shapes(PROPS[PROP_NAMES.index(name)])
+    expected = BOUNDS_M[PROP_NAMES.index(name)]
     np.testing.assert_allclose([lowest, highest], expected, atol=0.05)

@@ -6,12 +6,14 @@ Recorded lifts: pelvis 0.57 to 1.01 m high, wrists at 1.3 m/s at most in the med
 import math
 
 from hrc_env.core.kernels import kernel
+from hrc_env.core.records import AWAY_M
 from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion.activities import planning as to
 from hrc_env.motion.activities.planning import between
+from hrc_env.motion.activities.work import get_down
 from hrc_env.motion.anatomy import LEFT, SIDE_STRIDE, STAND_Z, UPPER_ARM
-from hrc_env.motion.curves import hump, min_jerk, shift
+from hrc_env.motion.curves import hump, min_jerk, shift, wrap
 from hrc_env.motion.holding import GRIPS, grip, place_load, take_load
 from hrc_env.motion.kinematics import pose
 from hrc_env.motion.posture import from_here, lean, look_at, stand
@@ -26,10 +28,10 @@ CARRYING_SHARE = 0.95
 ON_SHOULDER, STEADY_M, NOSE_UP_RAD = (0.12, 0.165, 0.075), 0.26, 0.08
 """A board on the shoulder: ahead and aside of the root, above the shoulder's joint [m]; the hand
 that steadies it: ahead of the root [m]; how much its front is higher; judgement."""
+CROUCH_M = (0.15, 0.45)
+"""A load at this height is gripped on the haunches; at that one, bent [m]; judgement."""
 GRIP_S, SHOULDER_S = 0.3, 1.0
 """To grip; from before the body to the shoulder [s]."""
-AWAY_M = 0.43
-"""A load on the floor or a table is this far ahead [m]."""
 
 
 @kernel
@@ -42,6 +44,7 @@ def pick_up(t: float, me: Worker) -> None:
     up = min_jerk((t - rise) / me.raise_s)
     onto = t - rise - me.raise_s
     turned = min_jerk(onto / me.shoulder_s) if me.shoulder_s > 0.0 else 0.0
+    get_down(down - up, me)
     lean(me.lean * (down - up), me.squat, 0.0, me)
     look_at(me.gaze[0], me.gaze[1], me.gaze[2], down - up, me)
     place_load(me.start_x, me.start_y, yaw, 0.0, me)
@@ -131,11 +134,22 @@ def _lay_out(prop: int, at: Triple, me: Worker) -> None:
 
 
 @kernel
+def put_load(pose_: Floats, me: Worker) -> None:
+    """Plan that the load that is taken up or laid down is at a pose (6,) then."""
+    for i in range(6):
+        me.tool_pose[i] = pose_[i]
+    me.tool_pose[3] = me.start_yaw + wrap(pose_[3] - me.start_yaw)
+    for i in range(3):
+        me.gaze[i] = pose_[i]
+
+
+@kernel
 def finish_lift(raise_s: float, me: Worker) -> float:
     """Settle trunk, way and times of a load; from the time to raise it by a metre, how long [s]."""
     size, z = me.size, me.tool_pose[2]
     low = min(max((size[STAND_Z] - z) / 0.6, 0.0), 1.0)
-    me.squat = me.squat_share * low
+    me.crouch = min(max((CROUCH_M[1] - z) / (CROUCH_M[1] - CROUCH_M[0]), 0.0), 1.0)
+    me.squat = me.squat_share * low * (1.0 - me.crouch)
     to.settle_lean(me)
     shoulder = me.load_at[3] != 0.0
     mid_z = 1.15 * size[STAND_Z] if shoulder else me.load_at[2]
