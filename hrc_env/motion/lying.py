@@ -31,7 +31,7 @@ LOAD = np.dtype(
     align=True,
 )
 """A load that lies somewhere; a row without one is room for another."""
-MOVED_M, TURNED_RAD = 0.015, 0.05
+MOVED_M, TURNED_RAD = 0.015, 0.03
 """In piles loads lie off their place by up to so much, each by its own."""
 HIGH = ("pile", "bench", "task")
 """Kinds of places whose height is that of a surface on which loads lie; elsewhere that is the

@@ -30,6 +30,8 @@ ON_SHOULDER, STEADY_M, NOSE_UP_RAD = (0.12, 0.165, 0.075), 0.26, 0.08
 that steadies it: ahead of the root [m]; how much its front is higher; judgement."""
 CROUCH_M = (0.15, 0.45)
 """A load at this height is gripped on the haunches; at that one, bent [m]; judgement."""
+GAZE_PAST_M = 0.35
+"""Who is on the haunches looks past the load, over which their head is [m]."""
 GRIP_S, SHOULDER_S = 0.3, 1.0
 """To grip; from before the body to the shoulder [s]."""
 
@@ -150,6 +152,7 @@ def finish_lift(raise_s: float, me: Worker) -> float:
     low = min(max((size[STAND_Z] - z) / 0.6, 0.0), 1.0)
     me.crouch = min(max((CROUCH_M[1] - z) / (CROUCH_M[1] - CROUCH_M[0]), 0.0), 1.0)
     me.squat = me.squat_share * low * (1.0 - me.crouch)
+    shift(me.gaze, 0, me.start_yaw, GAZE_PAST_M * me.crouch, 0.0)
     to.settle_lean(me)
     shoulder = me.load_at[3] != 0.0
     mid_z = 1.15 * size[STAND_Z] if shoulder else me.load_at[2]
