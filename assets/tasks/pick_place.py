@@ -11,11 +11,14 @@ from assets.scenes.primitives import LOOKS_ONLY, SOLID_SCENE, box, cylinder
 from hrc_env.scene.primitives import DECORATION, OBJECT_BIT, SCENE_BIT
 from hrc_env.tasks.pick_place import (
     PLACES_M,
+    ROW_AT_M,
+    ROW_M,
+    STACK,
     STUD_KG,
     STUD_M,
     STUDS,
     SURFACE_M,
-    TABLE_M,
+    TRESTLE,
 )
 
 FLOOR_M = -0.75
@@ -38,24 +41,23 @@ def add_pick_place(spec: Any) -> None:
     """Everything."""
     for name, (colour, specular, shininess) in COLOURS.items():
         spec.add_material(name=name, rgba=[*colour, 1], specular=specular, shininess=shininess)
-    _add_table(spec.worldbody)
+    stack_x, laid_x = STACK.xy_m[0] - STACK.ahead_m, TRESTLE.xy_m[0] + TRESTLE.ahead_m
+    span, aside = (ROW_AT_M[0] - 0.21, stack_x + 0.06), (laid_x - 0.20, laid_x + 0.20)
+    _add_table(spec.worldbody, "table", span, ROW_AT_M[1], 0.56)
+    _add_table(spec.worldbody, "trestle", aside, TRESTLE.xy_m[1], 0.36)
     _add_rack(spec.worldbody)
     for k in range(STUDS):
         _add_stud(spec.worldbody, k)
 
 
-def _add_table(world: Any) -> None:
-    x, y = TABLE_M
-    box(
-        world,
-        (x, y, SURFACE_M - 0.015),
-        (0.46, 0.56, 0.030),
-        "plywood",
-        name="table",
-        **SOLID_SCENE,
-    )
+def _add_table(world: Any, name: str, span: tuple[float, float], y: float, width: float) -> None:
+    """A board on trestles that spans some of x."""
+    middle, length = sum(span) / 2, span[1] - span[0]
+    at = middle, y, SURFACE_M - 0.015
+    box(world, at, (length, width, 0.030), "plywood", name=name, **SOLID_SCENE)
     for side in (-1, 1):
-        _add_trestle(world, x, y + 0.20 * side, SURFACE_M - 0.030, 0.40)
+        at_y = y + (width / 2 - 0.08) * side
+        _add_trestle(world, middle, at_y, SURFACE_M - 0.030, length - 0.06)
 
 
 def _add_trestle(world: Any, x: float, y: float, top: float, length: float) -> None:
@@ -96,8 +98,8 @@ def _add_rack(world: Any) -> None:
 
 def _add_stud(world: Any, k: int) -> None:
     """A piece of a stud, on edge, along its y."""
-    x, y = TABLE_M
-    at = [x + 0.14 * (k - 1), y, SURFACE_M + STUD_M[2] / 2]
+    x, y = ROW_AT_M
+    at = [x + ROW_M * (k - 1), y, SURFACE_M + STUD_M[2] / 2]
     body = world.add_body(name=f"stud_{k + 1}", pos=at)
     body.add_freejoint(name=f"stud_{k + 1}")
     body.add_geom(

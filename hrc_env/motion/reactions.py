@@ -20,6 +20,8 @@ BODY_POINTS = (CHEST, HEAD, LEFT + HAND, LEFT + SIDE_STRIDE + HAND)
 """Segments that people guard."""
 MEETS_M, MEETS_M_S = 0.20, 0.30
 """Who takes something brings the hand so far to it, so fast [m, m/s]; judgement."""
+WAITS_SHARE = 0.4
+"""Who is further on the way down to a load does not wait for the robot; judgement."""
 WITHDRAW = -1.6
 """Pace at which hands come back."""
 MACHINE_S, MACHINE_CALM_S = 2.0, 0.4
@@ -56,6 +58,8 @@ def notice(
                     )
                 if startled:
                     me.acts_at = me.clock_s + me.delay_s
+            if me.activity == st.PICK_UP and me.doing == st.NO_REACTION:
+                me.pace_wished = 0.0 if _in_use(people, robot_world[b], me) else 1.0
         for k, i in np.ndindex(me.robot_world.shape):
             me.robot_world[k, i] = robot_world[b, k, i]
 
@@ -93,6 +97,20 @@ def _meet(offered: Floats, dt_s: float, me: Worker) -> None:
     share = min(1.0, MEETS_M_S * dt_s / max(math.sqrt(squared), 1e-9))
     for i in range(3):
         goal[i] += share * (offered[i] - goal[i])
+
+
+@kernel
+def _in_use(people: People, robot: Floats, me: Worker) -> bool:
+    """Whether hands that set out for a load have to wait, as a point of the robot is near it."""
+    if me.time_s > me.out_at + WAITS_SHARE * me.out_s:
+        return False
+    for k in range(robot.shape[0]):
+        squared = 0.0
+        for i in range(3):
+            squared += (robot[k, i] - me.tool_pose[i]) ** 2
+        if squared < people[0] ** 2:
+            return True
+    return False
 
 
 @kernel

@@ -102,6 +102,17 @@ _TOOL = (
     Job("go on", "look round", "robot", (("go on", 1.0),)),
 )
 """Who is brought a tool: `HRCHandover-v0`."""
+_STACK = (
+    Job("look at the work", "look round", "robot", (("take from the stack", 1.0),)),
+    Job("take from the stack", "pick up", "task", (("lay it down", 1.0),), 1.0, "stud"),
+    Job(
+        "lay it down",
+        "set down",
+        "bench",
+        (("take from the stack", 0.9), ("look at the work", 0.1)),
+    ),
+)
+"""Who takes from the stack from which the robot takes: `HRCPickPlace-v0`."""
 WORK: dict[str, tuple[Job, ...]] = {
     "framing": JOBS,
     "low_work": (
@@ -110,6 +121,7 @@ WORK: dict[str, tuple[Job, ...]] = {
     ),
     "drywall": _BOARD,
     "handover": _TOOL,
+    "stack": _STACK,
 }  # fmt: skip
 """Named choices of jobs: upright at the robot, or now and then at its foot, too (judgement); those
 of tasks that workers take part in."""

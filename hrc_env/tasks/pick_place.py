@@ -7,7 +7,7 @@ import numpy as np
 
 from hrc_env.belief import Belief
 from hrc_env.core.errors import check_fields, needed
-from hrc_env.core.records import ObjectState, World
+from hrc_env.core.records import ObjectState, Workplace, World
 from hrc_env.core.things import FOOT_WORLD, Things
 from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records
 from hrc_env.geometry.rotations import matrix
@@ -22,10 +22,13 @@ STUD_M, STUD_KG = (0.038, 0.300, 0.089), 0.5
 """Edges of a piece that stands on edge, along its x, y and z [m]; its mass [kg]."""
 SURFACE_M = -0.02
 """Height of table and rack above the robot's foot [m]."""
-TABLE_M = (0.36, -0.62)
+ROW_AT_M = (0.34, -0.62)
 PLACES_M = tuple((x, 0.62, SURFACE_M + STUD_M[2] / 2) for x in (0.24, 0.36, 0.48))
-"""Middle of the table, and of each piece that rests in its place, from the robot's foot [m]."""
-ROW_M, ASIDE_M, TURN_RAD = 0.14, 0.02, 0.2
+"""Middle of the row of pieces, and of each that rests in its place, from the robot's foot [m]."""
+STACK = Workplace("stack", "task", (1.025, -0.62), np.pi, SURFACE_M, loads=("stud",) * 4)
+TRESTLE = Workplace("trestle", "bench", (2.10, -1.50), 0.0, SURFACE_M)
+"""Where the worker stands who takes pieces from the other end of the table, and lays them down."""
+ROW_M, ASIDE_M, TURN_RAD = 0.12, 0.02, 0.2
 """Pieces lie in a row so far apart, each moved and turned by up to so much."""
 
 
@@ -90,8 +93,9 @@ def places_world() -> Points3:
 
 
 def things(config: PlacedConfig) -> Things:
-    """Table, rack and pieces."""
-    return Things(Path(assets_dir() / "tasks" / "pick_place.xml").read_text())
+    """Table, rack and pieces, and where the worker takes from the same table."""
+    mjcf = Path(assets_dir() / "tasks" / "pick_place.xml").read_text()
+    return Things(mjcf, (), (STACK, TRESTLE))
 
 
 def init(batch: int) -> Records:
@@ -102,7 +106,7 @@ def init(batch: int) -> Records:
 def reset(state: Records, ids: Ints, rngs: Rngs, world: World, config: PlacedConfig) -> None:
     """Lay the pieces of environments `ids` out anew."""
     state[ids] = np.zeros((), PICK_PLACE)
-    x, y = TABLE_M
+    x, y = ROW_AT_M
     for b in ids.tolist():
         draws = 2.0 * rngs[b].random((STUDS, 3)) - 1.0
         at = np.zeros((STUDS, 7))
@@ -179,7 +183,8 @@ def _objects_from_places(now: Belief) -> Points3:
 
 TASK = Task(
     id="HRCPickPlace-v0",
-    says="Take pieces of studs from a table and lay them into a rack, beside a worker.",
+    says="Take pieces of studs from a table and lay them into a rack, while a worker takes from "
+    "the same table.",
     config=PickPlaceConfig,
     init=init,
     reset=reset,
@@ -213,7 +218,8 @@ TASK = Task(
     failed="task/studs_left",
     markers=lambda view: np.broadcast_to(view.places_world, (len(view.placed), STUDS, 3)),
     starts="The arm is near home, the fingers open. Three pieces stand on edge on the table, each "
-    "moved by up to 2 cm and turned by up to 0.2 rad.",
+    "moved by up to 2 cm and turned by up to 0.2 rad; four more lie beside them, of which the "
+    "worker takes one after the other away.",
     ends="When all three pieces rest in their places, let go: that is the success.",
     max_episode_steps=LONGER["HRCPickPlace-v0"],
     robot="ur10e_gripper",
@@ -221,5 +227,8 @@ TASK = Task(
     things=things,
     poses=poses,
     over=lambda step: step["done"],
-    defaults={"scene": {"sim_dt": 0.004}},
+    defaults={
+        "scene": {"sim_dt": 0.004},
+        "motion": {"jobs": "stack", "near_probability": 0.2, "near_radius_m": (1.7, 2.1)},
+    },
 )  # fmt: skip

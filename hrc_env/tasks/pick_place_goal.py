@@ -47,7 +47,8 @@ def _places(now: Belief) -> Floats:
 TASK: Task = replace(
     PICK_PLACE,
     id="HRCPickPlaceGoal-v0",
-    says="Bring pieces of studs from a table to where they are asked for, beside a worker.",
+    says="Bring pieces of studs from a table to where they are asked for, while a worker takes "
+    "from the same table.",
     config=PickPlaceGoalConfig,
     observations=(),
     rewards=(),

@@ -22,17 +22,24 @@ def drawn():
     return model, mujoco.MjData(model)
 
 
+def drawn_rows():
+    """(n,) mocap rows of all things."""
+    rows = visuals(SCENE).props
+    return np.sort(rows[rows >= 0])
+
+
 def test_physics_has_the_workers_bodies_only():
     assert SCENE.model.nmocap == SCENE.worker_mocap.size
-    assert visuals(SCENE).props.min() == SCENE.model.nmocap
+    assert drawn_rows().min() == SCENE.model.nmocap
 
 
 def test_what_is_not_held_is_under_the_floor(drawn):
     model, data = drawn
-    rows = visuals(SCENE).props
-    np.testing.assert_allclose(data.mocap_pos[rows].reshape(-1, 3), [PARKED_M] * rows.size)
-    show_props(model, data, rows, Held(np.zeros(2, int), np.ones((2, 3)), np.ones((2, 4))))
-    assert (data.mocap_pos[rows][..., 2] < -10).all()
+    rows = drawn_rows()
+    np.testing.assert_allclose(data.mocap_pos[rows], [PARKED_M] * rows.size)
+    nothing = Held(np.zeros(2, int), np.ones((2, 3)), np.ones((2, 4)))
+    show_props(model, data, visuals(SCENE).props, nothing)
+    assert (data.mocap_pos[rows][:, 2] < -10).all()
 
 
 def test_what_is_held_is_where_the_record_says_and_is_put_away_after(drawn):
@@ -40,14 +47,24 @@ def test_what_is_held_is_where_the_record_says_and_is_put_away_after(drawn):
     rows, quaternion = visuals(SCENE).props, np.array([[1.0, 0, 0, 0], [0, 0, 0, 1.0]])
     kinds = np.array([PROP_NAMES.index("saw"), PROP_NAMES.index("box")])
     show_props(model, data, rows, Held(kinds, np.array([[1.0, 2, 3], [4, 5, 6]]), quaternion))
-    assert (data.mocap_pos[rows][..., 2] > 0).sum() == 2
+    assert (data.mocap_pos[drawn_rows()][:, 2] > 0).sum() == 2
     seen = model.geom_bodyid[model.geom_group == DECORATION]
-    assert {model.body(body).name for body in seen} >= {"worker_1/saw", "worker_2/box"}
+    assert {model.body(body).name for body in seen} >= {"worker_1/saw", "worker_1/box"}
     assert "worker_2/saw" not in {model.body(body).name for body in seen}
-    np.testing.assert_array_equal(data.mocap_pos[rows[1, kinds[1] - 1]], [4, 5, 6])
-    np.testing.assert_array_equal(data.mocap_quat[rows[1, kinds[1] - 1]], quaternion[1])
+    np.testing.assert_array_equal(data.mocap_pos[rows[0, kinds[1] - 1]], [4, 5, 6])
+    np.testing.assert_array_equal(data.mocap_quat[rows[0, kinds[1] - 1]], quaternion[1])
     show_props(model, data, rows, None)
-    assert (data.mocap_pos[rows][..., 2] < 0).all()
+    assert (data.mocap_pos[drawn_rows()][:, 2] < 0).all()
+
+
+def test_all_that_lies_about_is_drawn_beside_what_everybody_holds(drawn):
+    """Two workers, each with a box, while both boxes of the laboratory lie there: four of them."""
+    model, data = drawn
+    box, places = PROP_NAMES.index("box"), np.arange(12.0).reshape(4, 3)
+    boxes = Held(np.full(4, box), places, np.tile([1.0, 0, 0, 0], (4, 1)))
+    show_props(model, data, visuals(SCENE).props, boxes)
+    shown = data.mocap_pos[drawn_rows()]
+    np.testing.assert_array_equal(shown[shown[:, 2] > 0], places)
 
 
 def outermost(model, geom):
