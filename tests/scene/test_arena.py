@@ -39,7 +39,8 @@ def test_both_models_share_one_state():
     scene = build(n_workers=1)
     drawn = drawing_model(scene)
     assert (drawn.nq, drawn.nu, scene.model.nmocap) == (scene.model.nq, scene.model.nu, 22)
-    assert drawn.nmocap == 22 + len(PROPS) - 1
+    loads = [name for place in scene.grounds.places for name in place.loads]
+    assert drawn.nmocap == 22 + len(PROPS) - 1 + len(loads)
     for segment in ("pelvis", "head", "left_hand"):
         name = f"worker_1/{segment}"
         physics_row = scene.model.body_mocapid[scene.model.body(name).id]
