@@ -40,8 +40,8 @@ class Multiplier:
 
     limit: float
     """Of the cost of an episode."""
-    kp: float = 4.0
-    ki: float = 0.01
+    kp: float = 8.0
+    ki: float = 0.05
     smoothing: float = 0.1
     """Share by which `cost` follows that of the latest rollout."""
     most: float = 20.0

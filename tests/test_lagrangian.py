@@ -32,7 +32,7 @@ def slow(multiplier: Multiplier, rng: np.random.Generator, n: int = 1200) -> np.
 
 def test_the_multiplier_brings_a_slow_policy_to_its_limit_and_holds_it_there():
     costs = slow(Multiplier(30.0), np.random.default_rng(0))
-    assert costs.min() > 0.9 * 30
+    assert costs.min() > 0.8 * 30
     assert np.abs(costs[-400:] / 30 - 1).max() < 0.1
 
 
@@ -94,17 +94,15 @@ class Greedy(VecEnv):
         return [False] * self.num_envs
 
 
-def test_it_earns_what_its_limit_allows_and_no_more():
-    costs = {}
-    for limit in (3.0, 100.0):
-        learner = PPOLagrangian(
-            "MlpPolicy", Greedy(32), n_steps=32, batch_size=256, n_epochs=5, learning_rate=1e-3,
-            gamma=0.9, seed=0, limit=limit, episode_steps=10, policy_kwargs={"net_arch": [16]},
-        )  # fmt: skip
-        learner.learn(100 * 1024)
-        costs[limit] = learner.multiplier.cost
-    assert costs[3.0] == pytest.approx(3.0, rel=0.1)
-    assert costs[100.0] > 8.0
+@pytest.mark.parametrize(("limit", "cost"), [(3.0, 3.0), (100.0, 10.0)])
+def test_it_earns_what_its_limit_allows_and_no_more(limit, cost):
+    learner = PPOLagrangian(
+        "MlpPolicy", Greedy(16), n_steps=32, batch_size=256, n_epochs=5, learning_rate=1e-3,
+        gamma=0.9, seed=0, limit=limit, episode_steps=10, policy_kwargs={"net_arch": [16]},
+    )  # fmt: skip
+    costs = []
+    learner.learn(200 * 512, callback=lambda *_: costs.append(learner.multiplier.cost) or True)
+    assert np.mean(costs[-len(costs) // 3 :]) == pytest.approx(cost, rel=0.1)
 
 
 def test_what_is_beyond_a_time_limit_counts_as_the_critic_says():

@@ -16,7 +16,7 @@ from safetensors.numpy import load, save
 from stable_baselines3 import PPO, SAC
 from test_extras import WITHOUT
 
-from agents import policies, ppo, sac
+from agents import checkpoints, policies, ppo, sac
 from agents.env_info import env_info
 from agents.export import command, taken
 from agents.network import Architecture, Network
@@ -26,6 +26,7 @@ from hrc_env.__main__ import main
 from hrc_env.cli.train import Train
 from hrc_env.core.errors import CheckpointError, ConfigError
 from hrc_env.env import HRCEnv
+from hrc_env.safety.shield import SHIELDS
 from hrc_env.sb3 import HRCVecEnv
 
 TINY = ["--perception", "truth", "--num-envs", "4", "--episodes", "2", "--no-film"]
@@ -93,6 +94,22 @@ def test_its_card_says_what_made_it_and_what_it_is_worth(run, exported):
     (worth,) = card.worth
     assert (worth.shield, worth.episodes, worth.cost_per_episode.n) == ("none", 3, 3)
     assert worth.cost_per_episode.low <= worth.cost_per_episode.value
+
+
+def test_who_learnt_under_a_shield_is_judged_under_it_and_without(tmp_path, monkeypatch):
+    """The shield lets nothing move, and is there after a pause, too."""
+    monkeypatch.setitem(SHIELDS, "still", lambda now, wanted, dt_s: (0 * wanted, {}))
+    run, words = tmp_path / "run", [*TINY, "--people", "headlong", "--timesteps"]
+    assert main(["train", *words, "256", "--shield", "still", "--out", str(run)]) == 0
+    assert main(["train", *TINY, "--resume", str(run), "--timesteps", "512"]) == 0
+    assert checkpoints.describe(run / "policy.zip")["environment"]["shield"] == "still"
+    out = ["--episodes", "8", "--shields", "none", "--out", str(tmp_path)]
+    assert main(["export", str(run), "--name", "tame", *out]) == 0
+    card, _ = policies.read(tmp_path / "HRCReach-v0" / "tame.safetensors")
+    still, free = card.worth
+    assert (still.shield, free.shield) == ("still", "none")
+    assert still.cost_per_episode != free.cost_per_episode
+    assert "--shield still" in card.command
 
 
 def test_the_command_of_a_card_asks_for_the_same():
