@@ -7,8 +7,9 @@ import numpy as np
 
 from hrc_env.core.records import HandState, ObjectState, PoseEstimate, RobotState
 from hrc_env.core.skeleton import SEGMENT_RADIUS_M
-from hrc_env.core.typing import Floats
+from hrc_env.core.typing import Floats, JointVelocities
 from hrc_env.geometry.distances import Separation, least_separation, segments
+from hrc_env.safety.robot import RobotModel
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +30,10 @@ class Belief:
     """The task's loose objects as they are measured, if there are any."""
     forecast: tuple[PoseEstimate, ...] = ()
     """What is expected of the workers at each of `HRCConfig.forecast_s` from now."""
+    command: JointVelocities | None = None
+    """(B, N) the joint velocities that are in force [rad/s]."""
+    model: RobotModel | None = None
+    """What the robot knows of itself for good."""
 
 
 def estimated_separation(robot: RobotState, estimate: PoseEstimate) -> Separation:

@@ -54,6 +54,12 @@ def n_actions(control: str, chain: SerialChain, grips: bool = False) -> int:
     return {"joint": chain.n_joints, "tool": 3, "twist": 6}[control] + grips
 
 
+def fastest(control: str, chain: SerialChain, config: ControlConfig) -> JointVelocities:
+    """(N,) the greatest velocity that an action can ask of each joint [rad/s]."""
+    share = config.joint_speed_share if control == "joint" else 1.0
+    return share * chain.velocity_limit_rad_s
+
+
 def checked_action(action: ArrayLike, shape: tuple[int, ...]) -> Floats:
     """Actions as float64, clipped to [-1, 1]; `ConfigError` for other shapes or no numbers."""
     try:
@@ -77,7 +83,7 @@ def joint_command(
     """(B, N) joint velocities [rad/s] that an action (B, A) in [-1, 1] asks for, of which an entry
     for the hand is no part."""
     if control == "joint":
-        return action * (config.joint_speed_share * chain.velocity_limit_rad_s)
+        return action * fastest(control, chain, config)
     if control == "tool":
         return resolved_rate(chain, q, action * config.tool_speed_mps, q_rest, config)
     scale = np.repeat([config.tool_speed_mps, config.tool_turn_rad_s], 3)

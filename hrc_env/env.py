@@ -27,7 +27,7 @@ from hrc_env.motion.generator import Clip, PeopleConfig
 from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.render.views import PICTURE_SIZE, Views, picture_size
 from hrc_env.rewards import RewardConfig
-from hrc_env.safety.shield import Shield
+from hrc_env.safety.shield import ShieldChoice
 from hrc_env.scene.domain_randomization import AppearanceConfig
 from hrc_env.scene.robot import Robot
 from hrc_env.simulation import Simulation
@@ -119,7 +119,8 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
             None for that of the config (as built). Level "pixels" only.
         control: "joint" (joint velocities), "tool" (tool velocity) or "twist" (that and the
             tool's turn rate); a robot with a hand has one entry more, -1 open to 1 closed.
-        shield: what may change a command before the arm gets it: a name that was registered or a
+        shield: what may change a command before the arm gets it: "qp", "ssm", "pfl", a
+            `ShieldConfig` or a mapping (docs/safety.md), a name that was registered or a
             function (`hrc_env.safety.shield.Shield`); None: nothing.
         render_mode: "rgb_array", "depth_array" or None; `gymnasium.make` also takes "human", a
             window (docs/start.md).
@@ -148,7 +149,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         faults: Sequence[FaultConfig | Mapping[str, Any]] | None = None,
         appearance: str | AppearanceConfig | Mapping[str, Any] | None = None,
         control: str = "joint",
-        shield: str | Shield | None = None,
+        shield: ShieldChoice = None,
         render_mode: str | None = None,
         width: int = PICTURE_SIZE[0],
         height: int = PICTURE_SIZE[1],

@@ -15,7 +15,7 @@ import numpy as np
 from hrc_env import metrics, observations, rewards, room, step
 from hrc_env.belief import Belief, estimated_separation
 from hrc_env.config import Settings
-from hrc_env.control import joint_command, n_actions
+from hrc_env.control import fastest, joint_command, n_actions
 from hrc_env.core.batching import State, Stateful, picked, rows, write_rows
 from hrc_env.core.errors import ConfigError, check_shape
 from hrc_env.core.kernels import ahead
@@ -28,6 +28,7 @@ from hrc_env.motion.activities.pieces import NoRoomError
 from hrc_env.pipeline.levels import CAMERA_LEVELS, make_pipeline
 from hrc_env.pipeline.sensor_input import SensorInput, TrueSensorInput
 from hrc_env.rewards import RewardConfig
+from hrc_env.safety.robot import RobotModel
 from hrc_env.safety.shield import shielded
 from hrc_env.scene import handling
 from hrc_env.scene.build import build
@@ -103,6 +104,10 @@ class Simulation(Stateful):
             n_slides,
         )  # fmt: skip
         self.layout = observations.layout(self.terms, sizes)
+        self.model = RobotModel(
+            self.chain, fastest(settings.control, self.chain, config.control),
+            self.scene.slew_rad_s2, self.scene.hitting_kg, self.scene.load_kg,
+        )  # fmt: skip
         self.physics = Physics(self.scene, batch)
         self.pipeline = make_pipeline(perception, settings.estimator, self.scene, batch, config)
         self.task_state = self.task.init(batch)
@@ -319,6 +324,8 @@ class Simulation(Stateful):
             task=self.task.view(self.task_state, ids, self.config.task),
             action=self.action[ids],
             forecast=tuple(later),
+            command=self.physics.command[ids],
+            model=self.model,
         )
 
     def _observed(self, belief: Belief) -> Observation:

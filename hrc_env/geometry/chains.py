@@ -154,7 +154,7 @@ def _apply(frame, point):
 
 
 @kernel
-def _lever(frame, slides, point):
+def lever(frame, slides, point):
     """A point's velocity per rate of a frame's joint: a slide's axis; a hinge's axis x (point -
     origin)."""
     if slides:
@@ -171,7 +171,7 @@ def _jacobian(frames, slides, link_from_tool, out):
     for b in range(frames.shape[0]):
         point = _apply(frames[b, n - 1], link_from_tool[:, 3])
         for i in range(n):
-            out[b, 0, i], out[b, 1, i], out[b, 2, i] = _lever(frames[b, i], slides[i], point)
+            out[b, 0, i], out[b, 1, i], out[b, 2, i] = lever(frames[b, i], slides[i], point)
 
 
 @kernel
@@ -182,7 +182,7 @@ def _tool_motion(frames, slides, qd, link_from_tool, point, velocity):
         tool = _apply(frames[b, n - 1], link_from_tool[:, 3])
         vx, vy, vz = 0.0, 0.0, 0.0
         for i in range(n):
-            x, y, z = _lever(frames[b, i], slides[i], tool)
+            x, y, z = lever(frames[b, i], slides[i], tool)
             vx, vy, vz = vx + x * qd[b, i], vy + y * qd[b, i], vz + z * qd[b, i]
         point[b, 0], point[b, 1], point[b, 2] = tool
         velocity[b, 0], velocity[b, 1], velocity[b, 2] = vx, vy, vz

@@ -1,41 +1,70 @@
 """Shields: what changes a command before the arm gets it. They read the belief, never the truth."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
 
 import numpy as np
 
 from hrc_env.belief import Belief
 from hrc_env.core.errors import ConfigError, check_shape, unknown
+from hrc_env.core.mapping import from_mapping
 from hrc_env.core.typing import Floats, JointVelocities
+from hrc_env.safety.config import PRESETS, ShieldConfig
+from hrc_env.safety.guard import guarded
 
-Shield = Callable[[Belief, JointVelocities, float], tuple[JointVelocities, dict[str, Floats]]]
+Shield = Callable[[Belief, JointVelocities, float], tuple[JointVelocities, Mapping[str, Floats]]]
 """(belief, joint velocities (B, N) that the agent asks for [rad/s], time until the next command
 [s]) -> the velocities that the arm gets, and what there is to say, (B,) by name, which becomes
-"shield/NAME" in info."""
-SHIELDS: dict[str, Shield] = {}
-"""By name: those that were registered."""
+"shield/NAME" in info. It keeps nothing from step to step."""
+ShieldChoice = str | ShieldConfig | Mapping[str, Any] | Shield | None
+SHIELDS: dict[str, Shield] = {
+    name: partial(guarded, config=config) for name, config in PRESETS.items()
+}
+"""By name: the built-in ones and those that were registered."""
+ACTIVE_RAD_S = 0.02
+"""A shield that changes joint velocities by more is called active."""
 
 
-def shield_called(shield: str | Shield | None) -> Shield | None:
-    """A shield by its name, itself, or none."""
+def shield_called(shield: ShieldChoice) -> Shield | None:
+    """A shield by its name, its settings, itself, or none."""
     if isinstance(shield, str):
         if shield not in SHIELDS:
             raise unknown("shield", shield, SHIELDS)
         return SHIELDS[shield]
+    if isinstance(shield, Mapping):
+        shield = from_mapping(ShieldConfig, shield, "shield.")
+    if isinstance(shield, ShieldConfig):
+        return partial(guarded, config=shield)
     if shield is not None and not callable(shield):
-        raise ConfigError(f"shield must be a name, a function or None, got {shield!r}.")
+        raise ConfigError(
+            "shield must be a name, a ShieldConfig or a mapping of its fields, a function or None, "
+            f"got {shield!r}."
+        )
     return shield
 
 
 def shielded(
     shield: Shield, now: Belief, command: JointVelocities, dt_s: float
 ) -> tuple[JointVelocities, dict[str, Floats]]:
-    """What a shield makes of a command, and what it says by its name in info; `ConfigError` where
-    that has another shape or the velocities are no finite numbers."""
+    """What a shield makes of a command, and what there is to say by its name in info: what the
+    shield says, and of any shield
+
+    - "shield/change": the length of the change [rad/s], of slides [m/s];
+    - "shield/active": 1 where that is more than `ACTIVE_RAD_S`;
+    - "shield/scale": what is left of the command along itself, 1 for all of it.
+
+    Raises:
+        ConfigError: the velocities have another shape or are no finite numbers.
+    """
     allowed, said = shield(now, command.copy(), dt_s)
     check_shape("A shield's velocities", np.shape(allowed), command.shape, "B, joints")
     if not np.isfinite(allowed).all():
         raise ConfigError(f"A shield's velocities must be finite [rad/s], got {allowed}.")
     for name, value in said.items():
         check_shape(f"A shield's {name!r}", np.shape(value), (len(command),), "B")
-    return allowed, {f"shield/{name}": np.asarray(value, float) for name, value in said.items()}
+    change = np.sqrt(np.square(allowed - command).sum(-1))
+    asked = np.square(command).sum(-1)
+    scale = np.where(asked > 0, (allowed * command).sum(-1), 1.0) / np.where(asked > 0, asked, 1.0)
+    of_any = {"change": change, "active": change > ACTIVE_RAD_S, "scale": scale}
+    return allowed, {f"shield/{k}": np.asarray(v, float) for k, v in {**of_any, **said}.items()}

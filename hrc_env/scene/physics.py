@@ -77,6 +77,11 @@ class Physics:
         return self._qvel[:, : self._n].copy()
 
     @property
+    def command(self) -> JointVelocities:
+        """(B, N) the joint velocities that are commanded now [rad/s], a copy."""
+        return self._command.copy()
+
+    @property
     def qpos(self) -> Floats:
         """(B, nq) the arm's angles [rad], its fingers' ways [m], loose objects' poses, a copy."""
         return self._qpos.copy()
@@ -274,7 +279,7 @@ def _servos(scene: Scene) -> Records:
     servos, config, chain = np.zeros(scene.chain.n_joints, SERVO), scene.config, scene.chain
     servos["low"], servos["high"] = chain.range_rad.T
     servos["fastest"], servos["lead"] = chain.velocity_limit_rad_s, scene.servo_lead_s
-    servos["slew"] = scene.robot.slew or config.slew_rad_s2
+    servos["slew"] = scene.slew_rad_s2
     servos["clamp"] = config.integrator_clamp_rad
     return servos
 

@@ -1,0 +1,81 @@
+"""Settings of the built-in shields."""
+
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from hrc_env.core.errors import ConfigError, check_fields, check_names
+from hrc_env.core.typing import Records
+
+KINDS = ("qp", "ssm", "pfl")
+NUMBERS = (
+    "margin_m", "hand_margin_m", "sigmas", "least_sigmas_m", "human_m_s", "human_margin_m_s",
+    "human_s", "latency_s", "reaction_s", "deceleration_m_s2", "gain_hz", "retreat_m_s",
+    "unknown_m_s",
+)  # fmt: skip
+SETTINGS = np.dtype([*((name, "f8") for name in NUMBERS), ("touches", "?")], align=True)
+"""The same as kernels read them; whether a touch at the region's speed is allowed."""
+
+
+@dataclass(frozen=True, slots=True)
+class ShieldConfig:
+    """What a built-in shield keeps. D is what is clear between a robot's capsule and a segment of
+    an estimated body: the gap of their surfaces, less a margin, less Z_d, less the worker's travel.
+    """
+
+    kind: str = "qp"
+    """"qp": the nearest joint velocities that keep every row; "ssm": one factor on all joints;
+    "pfl": as "qp", but touches as slow as the region of the body bears are allowed."""
+    margin_m: float = 0.05
+    """Taken off every gap: bodies are no capsules [m]."""
+    hand_margin_m: float = 0.13
+    """The same of forearms and hands, which are nearly all that is touched [m]."""
+    sigmas: float = 2.0
+    """Z_d in standard deviations of the estimate along the line between the two,"""
+    least_sigmas_m: float = 0.05
+    """and at least this [m]."""
+    human_m_s: float | None = None
+    """The worker's speed towards the robot, as 1.6 of ISO 13855; None: as it is estimated, and
+    `human_margin_m_s` more [m/s]."""
+    human_margin_m_s: float = 0.2
+    """How much faster than estimated the worker may be [m/s]."""
+    human_s: float = 0.2
+    """How long the worker is thought to come on [s],"""
+    latency_s: float = 0.0
+    """and for how long what is estimated is older than it says, as of late images that do not say
+    when they were taken [s]."""
+    reaction_s: float = 0.08
+    """Until the robot's command takes effect [s]."""
+    deceleration_m_s2: float = 3.0
+    """How fast a point of the robot comes to rest, if its joints can [m/s^2]."""
+    gain_hz: float = 4.0
+    """How fast a robot that is too near gets away: D times this [1/s],"""
+    retreat_m_s: float = 1.0
+    """at most so fast; 0: it only comes no nearer ("ssm" never does more) [m/s]."""
+    unknown_m_s: float = 0.25
+    """While it is unknown where a worker is, no point of the robot moves faster [m/s]; 0: stop."""
+
+    def __post_init__(self) -> None:
+        check_names("kind of shield", [self.kind], KINDS)
+        for each in fields(self):
+            value = getattr(self, each.name)
+            if each.name in NUMBERS and value is not None and not math.isfinite(value):
+                raise ConfigError(f"{each.name} must be a finite number, got {value}.")
+        check_fields(self, "be positive", "deceleration_m_s2", "gain_hz")
+        given = [name for name in NUMBERS if getattr(self, name) is not None]
+        check_fields(self, "not be negative", *given)
+
+    def record(self) -> Records:
+        """(1,) of `SETTINGS`; a speed that is None is not a number."""
+        numbers = (getattr(self, name) for name in NUMBERS)
+        row = [math.nan if value is None else value for value in numbers]
+        return np.array([(*row, self.kind == "pfl")], SETTINGS)
+
+
+PRESETS = {
+    "ssm": ShieldConfig("ssm"),
+    "qp": ShieldConfig("qp"),
+    "pfl": ShieldConfig("pfl", retreat_m_s=0.0),
+}
+"""By the names that `shield=` takes."""
