@@ -8,7 +8,7 @@ a hand pushes its wrist into the other.
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -32,6 +32,23 @@ HOLDS_M_S = 1e-6
 """J row that is exceeded by less holds."""
 
 
+class Constraints(NamedTuple):
+    """What commands of a step must keep, J qd <= b, and from what they can be chosen."""
+
+    J: Floats
+    """(B, M, N) of these rows the first `n_rows`,"""
+    b: Floats
+    """(B, M) [m/s]."""
+    n_rows: Ints
+    """(B,)."""
+    low: JointVelocities
+    """(B, N) the least"""
+    high: JointVelocities
+    """and the greatest command within reach [rad/s]."""
+    least_m: Floats
+    """(B,) least D of pairs that matter [m]; infinite without."""
+
+
 def guarded(
     now: Belief, wanted: JointVelocities, dt_s: float, config: ShieldConfig
 ) -> tuple[JointVelocities, Mapping[str, Floats]]:
@@ -44,30 +61,43 @@ def guarded(
     Raises:
         ConfigError: the belief has no `RobotModel` or no command in force.
     """
-    model = needed(now.model, "J robot's model (RobotModel), which a built-in shield needs,")
-    in_force = needed(now.command, "The command in force, which a built-in shield needs,")
-    settings, batch = config.record(), len(wanted)
-    if config.kind == "ssm":
-        low, high = np.minimum(wanted, 0.0), np.maximum(wanted, 0.0)
-    else:
-        low, high = _within_reach(model, in_force, dt_s)
-    frames, link = chains.forward(model.chain, now.robot.q), _links(model, now)
-    robot = frames, model.chain.slides, link, now.robot.capsules_world
-    count, least_m = np.empty(batch, np.int64), np.empty(batch)
-    J, b = np.empty((batch, MOST_ROWS, wanted.shape[1])), np.empty((batch, MOST_ROWS))
-    tightest_rows(
-        (*robot, now.robot.capsule_radius_m, low, high, model.slew_rad_s2),
-        _bodies(now, model, config), settings, (J, b, count, least_m),
-    )  # fmt: skip
+    model = _model(now)
+    robot = chains.forward(model.chain, now.robot.q), model.chain.slides, _links(model, now)
+    found = constraints(now, wanted, dt_s, config)
     unknown = somebody_unknown(now.estimate)
-    allowed, slack = np.empty_like(wanted), np.empty(batch)
-    limit = np.where(unknown, config.unknown_m_s, np.inf)
+    allowed, slack = np.empty_like(wanted), np.empty(len(wanted))
     choose = _scaled if config.kind == "ssm" else _nearest
-    choose(J, b, count, low, high, wanted, allowed)
-    _capped(robot, limit, allowed)
-    _slack(J, b, count, allowed, slack)
-    least_m[np.isinf(least_m)] = np.nan
+    choose(tuple(found), wanted, allowed)
+    limit_m_s = np.where(unknown, config.unknown_m_s, np.inf)
+    _capped((*robot, now.robot.capsules_world), limit_m_s, allowed)
+    _slack(found.J, found.b, found.n_rows, allowed, slack)
+    least_m = np.where(np.isinf(found.least_m), np.nan, found.least_m)
     return allowed, {"least_m": least_m, "slack": slack, "unknown": unknown.astype(float)}
+
+
+def constraints(
+    now: Belief, wanted: JointVelocities, dt_s: float, config: ShieldConfig
+) -> Constraints:
+    """The tightest rows of every robot. Of "ssm" only what is between rest and what is wanted
+    (B, N) [rad/s] is within reach; of others what the slew reaches until the next command."""
+    model, batch = _model(now), len(wanted)
+    low, high = np.minimum(wanted, 0.0), np.maximum(wanted, 0.0)
+    if config.kind != "ssm":
+        in_force = needed(now.command, "The command in force, which a built-in shield needs,")
+        low, high = _within_reach(model, in_force, dt_s)
+    J, b = np.empty((batch, MOST_ROWS, model.chain.n_joints)), np.empty((batch, MOST_ROWS))
+    found = Constraints(J, b, np.empty(batch, np.int64), low, high, np.empty(batch))
+    robot = now.robot
+    tightest_rows(
+        (chains.forward(model.chain, robot.q), model.chain.slides, _links(model, now),
+         robot.capsules_world, robot.capsule_radius_m, low, high, model.slew_rad_s2),
+        _bodies(now, model, config), config.record(), (J, b, found.n_rows, found.least_m),
+    )  # fmt: skip
+    return found
+
+
+def _model(now: Belief) -> RobotModel:
+    return needed(now.model, "A robot's model (RobotModel), which a built-in shield needs,")
 
 
 def somebody_unknown(estimate: PoseEstimate) -> Bools:
@@ -106,8 +136,9 @@ def _bodies(now: Belief, model: RobotModel, config: ShieldConfig) -> tuple[Any, 
 
 
 @kernel
-def _scaled(J, b, count, low, high, wanted, allowed):
+def _scaled(found, wanted, allowed):
     """One factor on all joints."""
+    J, b, count, _, _, _ = found
     for e in range(len(wanted)):
         share = 1.0
         for r in range(count[e]):
@@ -119,27 +150,38 @@ def _scaled(J, b, count, low, high, wanted, allowed):
 
 
 @kernel(makes_arrays=True)
-def _nearest(J, b, count, low, high, wanted, allowed):
+def _nearest(found, wanted, allowed):
     """The nearest within reach; what is wanted itself, beyond reach or not, where all rows hold."""
+    J, b, count, low, high, _ = found
     n = wanted.shape[1]
     rows, bound = np.empty((2 * MOST_ROWS, n)), np.empty(2 * MOST_ROWS)
     weight, work = np.empty(2 * MOST_ROWS), np.empty((n + 3, n))
     for e in range(len(wanted)):
-        m, worst, x = 0, -np.inf, allowed[e]
+        holds, x = True, allowed[e]
         for i in range(n):
             x[i] = min(high[e, i], max(low[e, i], wanted[e, i]))
         for r in range(count[e]):
-            worst = max(worst, exceeded(J[e, r], b[e, r], x))
-            rows[m], bound[m], weight[m] = J[e, r], max(b[e, r], 0.0), NO_NEARER
-            m += 1
-            if b[e, r] < 0.0:
-                rows[m], bound[m], weight[m] = J[e, r], b[e, r], AWAY
-                m += 1
-        if worst <= HOLDS_M_S:
+            holds &= exceeded(J[e, r], b[e, r], x) <= HOLDS_M_S
+        if holds:
             for i in range(n):
                 x[i] = wanted[e, i]
         else:
+            m = softened(J[e], b[e], count[e], rows, bound, weight)
             solve(rows, bound, weight, m, low[e], high[e], wanted[e], x, work)
+
+
+@kernel
+def softened(J, b, count, rows, bound, weight):
+    """Write rows with their weights, those that ask for a retreat twice (2 M); how many."""
+    m = 0
+    for r in range(count):
+        for away in range(2 if b[r] < 0.0 else 1):
+            for i in range(J.shape[1]):
+                rows[m, i] = J[r, i]
+            bound[m] = b[r] if away else max(b[r], 0.0)
+            weight[m] = AWAY if away else NO_NEARER
+            m += 1
+    return m
 
 
 @kernel
