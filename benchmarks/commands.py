@@ -83,6 +83,8 @@ class SpeedBench(AnyBench):
     out: Path = Path("out/bench_speed")
     task: str | None = None
     """Which environment, by its id, instead of the first."""
+    shield: str | None = None
+    """What may change commands: qp, ssm, pfl, or one that was registered (--import)."""
     rounds: int | None = None
     """In how many rounds everybody has a turn, instead of 7 (1 if quick); medians count."""
 
@@ -92,7 +94,9 @@ class SpeedBench(AnyBench):
         from benchmarks.speed.bench import QUICK, SPEED, SpeedBenchConfig
 
         config = QUICK if self.quick else SpeedBenchConfig()
-        return self.shown(SPEED, changed(config, n_rounds=self.rounds, task=self.task))
+        return self.shown(
+            SPEED, changed(config, n_rounds=self.rounds, task=self.task, shield=self.shield)
+        )
 
 
 @dataclass(frozen=True)

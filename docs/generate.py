@@ -28,6 +28,7 @@ REFERENCE: dict[Path, Callable[[], str]] = {
     DOCS / "reference" / "infos.md": reference.infos,
     DOCS / "reference" / "command_line.md": reference.command_line,
     DOCS / "reference" / "recordings.md": reference.recordings,
+    DOCS / "reference" / "shields.md": reference.shields,
 }
 """Generated whole."""
 

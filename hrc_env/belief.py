@@ -23,7 +23,7 @@ class Belief:
     task: Any
     """What the task says to the robot (`Task.view`)."""
     action: Floats
-    """(B, A) the last action, in [-1, 1]."""
+    """(B, A) the last action, in [-1, 1], as the agent wanted it."""
     hand: HandState | None = None
     """Its gripper, if it has one."""
     objects: ObjectState | None = None
@@ -32,6 +32,8 @@ class Belief:
     """What is expected of the workers at each of `HRCConfig.forecast_s` from now."""
     command: JointVelocities | None = None
     """(B, N) the joint velocities that are in force [rad/s]."""
+    shield_change: JointVelocities | None = None
+    """(B, N) what the shield gave in the last step less what was asked for [rad/s]; 0 without."""
     model: RobotModel | None = None
     """What the robot knows of itself for good."""
 

@@ -55,6 +55,8 @@ class HRCConfig:
     uncertainty: tuple[str, ...] = ()
     """What the observation holds of each joint's covariance beside its root mean: "towards_robot",
     the deviation along the line to the robot; "factor", all of it as 6 numbers; or both."""
+    observe_shield: bool = False
+    """Whether the observation also holds what the shield made of the last command."""
     worker: str | tuple[str, ...] = "worker_1"
     """Which baked body the workers have: a name; several, or "any" for all that there are: then
     every episode gives each worker one of them, no two the same as long as there are others."""

@@ -120,7 +120,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         control: "joint" (joint velocities), "tool" (tool velocity) or "twist" (that and the
             tool's turn rate); a robot with a hand has one entry more, -1 open to 1 closed.
         shield: what may change a command before the arm gets it: "qp", "ssm", "pfl", a
-            `ShieldConfig` or a mapping (docs/safety.md), a name that was registered or a
+            `ShieldConfig` or a mapping (docs/reference/shields.md), a name that was registered or a
             function (`hrc_env.safety.shield.Shield`); None: nothing.
         render_mode: "rgb_array", "depth_array" or None; `gymnasium.make` also takes "human", a
             window (docs/start.md).

@@ -188,7 +188,7 @@ SLIDE_TERMS: tuple[ObservationTerm, ...] = (
 SHARED_TERMS: tuple[ObservationTerm, ...] = (
     ObservationTerm(
         "last_action", lambda of: of.actions, "-", "-", 1.0, 1.0,
-        "The action of the previous step.",
+        "The action of the previous step, as it was wanted, whatever a shield made of it.",
         lambda now: now.action,
     ),
     ObservationTerm(
@@ -264,6 +264,15 @@ SHARED_TERMS: tuple[ObservationTerm, ...] = (
     ),
 )  # fmt: skip
 """What closes it: the last action, and the workers as they are estimated."""
+
+SHIELD_TERMS: tuple[ObservationTerm, ...] = (
+    ObservationTerm(
+        "shield_change", lambda of: of.arm_joints + of.slides, "rad/s", "base", 4.0, 1.0,
+        "Joint velocities that the shield gave in the previous step, less those asked for.",
+        lambda now: needed(now.shield_change, "What the shield changed"),
+    ),
+)  # fmt: skip
+"""What is added with `HRCConfig.observe_shield`."""
 
 
 @dataclass(frozen=True, slots=True)

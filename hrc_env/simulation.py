@@ -15,7 +15,7 @@ import numpy as np
 from hrc_env import metrics, observations, rewards, room, step
 from hrc_env.belief import Belief, estimated_separation
 from hrc_env.config import Settings
-from hrc_env.control import fastest, joint_command, n_actions
+from hrc_env.control import joint_command, n_actions
 from hrc_env.core.batching import State, Stateful, picked, rows, write_rows
 from hrc_env.core.errors import ConfigError, check_shape
 from hrc_env.core.kernels import ahead
@@ -28,7 +28,7 @@ from hrc_env.motion.activities.pieces import NoRoomError
 from hrc_env.pipeline.levels import CAMERA_LEVELS, make_pipeline
 from hrc_env.pipeline.sensor_input import SensorInput, TrueSensorInput
 from hrc_env.rewards import RewardConfig
-from hrc_env.safety.robot import RobotModel
+from hrc_env.safety.model import robot_model
 from hrc_env.safety.shield import shielded
 from hrc_env.scene import handling
 from hrc_env.scene.build import build
@@ -58,7 +58,7 @@ class Simulation(Stateful):
 
     CHANGES = (
         "physics", "pipeline", "motion", "task_state", "streams", "action", "episode_cost",
-        "separation_m", "estimates", "reward_weights", "identities", "measured",
+        "separation_m", "estimates", "reward_weights", "identities", "measured", "shield_change",
     )  # fmt: skip
 
     def __init__(self, batch: int, settings: Settings) -> None:
@@ -75,14 +75,9 @@ class Simulation(Stateful):
         )  # fmt: skip
         try:  # first, as it knows how many workers and which clips there is room for
             self.motion = generator.make_state(
-                batch,
-                most,
-                self.bodies,
-                config.motion,
-                scene_for(n_workers=0).grounds,
-                fewest,
+                batch, most, self.bodies, config.motion, scene_for(n_workers=0).grounds, fewest,
                 settings.robot.girth_m,
-            )
+            )  # fmt: skip
         except NoRoomError as error:
             where = room.told(error.clip, room.played_s(error.clip, config))
             raise ConfigError(f"{error} {where}") from None
@@ -104,16 +99,14 @@ class Simulation(Stateful):
             n_slides,
         )  # fmt: skip
         self.layout = observations.layout(self.terms, sizes)
-        self.model = RobotModel(
-            self.chain, fastest(settings.control, self.chain, config.control),
-            self.scene.slew_rad_s2, self.scene.hitting_kg, self.scene.load_kg,
-        )  # fmt: skip
+        self.model = robot_model(self.scene, settings.control, config.control)
         self.physics = Physics(self.scene, batch)
         self.pipeline = make_pipeline(perception, settings.estimator, self.scene, batch, config)
         self.task_state = self.task.init(batch)
         self.reward_weights = config.reward
         self._everyone = np.arange(batch)
         self.action = np.zeros((batch, self.n_actions))
+        self.shield_change = np.zeros((batch, n_joints))
         self.episode_cost, self.separation_m = np.zeros(batch), np.zeros(batch)
         self.estimates = tuple(
             oracle.prior(batch, most, config.tracker) for _ in (0.0, *config.forecast_s)
@@ -135,6 +128,7 @@ class Simulation(Stateful):
                 streams[MEASURING][b] = streams["task"][b].spawn(1)[0]
         generator.reset(self.motion, ids, streams["motion"])
         self.action[ids], self.episode_cost[ids], self.separation_m[ids] = 0.0, 0.0, 0.0
+        self.shield_change[ids] = 0.0
         q, task, config = self._starting_angles(ids), self.task, self.config.task
         robot = chains.robot_state(self.chain, q, np.zeros_like(q))
         task.reset(self.task_state, ids, streams["task"], World(robot, place=self.place), config)
@@ -241,7 +235,8 @@ class Simulation(Stateful):
     @property
     def terms(self) -> tuple[observations.ObservationTerm, ...]:
         """Of the observation, in their order."""
-        return self.task.observation_terms
+        more = observations.SHIELD_TERMS if self.config.observe_shield else ()
+        return (*self.task.observation_terms, *more)
 
     @property
     def present(self) -> Bools:
@@ -282,7 +277,9 @@ class Simulation(Stateful):
         )  # fmt: skip
         if self.shield is None:
             return command, {}
-        return shielded(self.shield, self.belief, command, self.config.ctrl_dt)
+        allowed, said = shielded(self.shield, self.belief, command, self.config.ctrl_dt)
+        self.shield_change = allowed - command
+        return allowed, said
 
     def _expose(self, ids: Ints, motion: WorkerMotion, truth: WorkerTruth) -> None:
         """Show environments `ids` to the sensor, which alone sees them."""
@@ -325,6 +322,7 @@ class Simulation(Stateful):
             action=self.action[ids],
             forecast=tuple(later),
             command=self.physics.command[ids],
+            shield_change=self.shield_change[ids],
             model=self.model,
         )
 

@@ -239,7 +239,7 @@ def test_the_vector_environment_says_what_the_single_one_says_of_its_shield():
         (lambda now, velocities, dt_s: (velocities[:, :2], {}), "velocities must have shape"),
         (lambda now, velocities, dt_s: (velocities * np.nan, {}), "velocities must be finite"),
         (lambda now, velocities, dt_s: (velocities, {"x": np.zeros(7)}), "'x' must have shape"),
-        (3, "shield must be a name, a function or None"),
+        (3, "shield must be a name, a ShieldConfig or a mapping of its fields, a function or None"),
     ],
 )
 def test_what_is_wrong_with_a_shield_is_said(shield, said):

@@ -73,6 +73,13 @@ def test_nor_does_it_where_a_worker_is_lost_and_found_again(level):
     assert followed[49]
 
 
+@pytest.mark.parametrize("make", [single, vector])
+def test_nor_does_a_built_in_shield_act_otherwise(make):
+    shielded = {"shield": "qp", "people": "unaware", "config": {"observe_shield": True}}
+    moved = differences(partial(make, "keypoints", **shielded), another_worker, n_steps=60)
+    assert_only_told(moved, "keypoints")
+
+
 @pytest.fixture(scope="module")
 def policy(tmp_path_factory):
     """A network that nobody has taught anything."""

@@ -17,6 +17,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric, over
 from hrc_env.experiments.study.cache import PartCache, Progress
 from hrc_env.experiments.study.runner import Study, at_least_one
+from hrc_env.safety.shield import shield_called
 from hrc_env.tasks.task import task_called
 
 WATCHED = "keypoints"
@@ -33,6 +34,8 @@ class SpeedBenchConfig:
 
     task: str = OURS
     """Which environment, by its id."""
+    shield: str | None = None
+    """What may change its commands, by its name."""
     n_rounds: int = 7
     """How often everybody has a turn."""
     least_steps: int = 4000
@@ -49,6 +52,7 @@ class SpeedBenchConfig:
     def __post_init__(self) -> None:
         """Raise `ConfigError` for numbers that cannot work."""
         task_called(self.task)
+        shield_called(self.shield)
         at_least_one(self, "n_rounds", "least_steps", "n_resets")
         if WATCHED not in self.levels:
             raise ConfigError(f"levels must have {WATCHED!r} in them, got {self.levels}.")
@@ -128,9 +132,11 @@ def _turns(config: SpeedBenchConfig, closing: ExitStack, progress: Progress) -> 
     yield turn(REACHER, SINGLE, 1, Single(PEER))
     yield turn(REACHER, f"{_REACHERS}.1", 1, Vector(PEER, _REACHERS))
     for level in config.levels:
-        yield turn(level, SINGLE, 1, Single(config.task, perception=level))
+        yield turn(level, SINGLE, 1, Single(config.task, perception=level, shield=config.shield))
         for size, threads in known:
-            contender = Vector(config.task, size, perception=level, num_threads=threads)
+            contender = Vector(
+                config.task, size, perception=level, num_threads=threads, shield=config.shield
+            )
             yield turn(level, f"{size}.{threads}", threads, contender)
 
 

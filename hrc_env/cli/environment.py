@@ -48,7 +48,8 @@ class EnvironmentArguments:
     """What actions are: joint, velocities of the joints, if not given; tool, of the tool; or twist,
     which turns the tool, too."""
     shield: str | None = None
-    """A shield that was registered (--import)."""
+    """qp, ssm, pfl, or one that was registered (--import); or a JSON object of changes to the
+    first: '{"kind": "qp", "margin_m": 0.1}'."""
     config: tuple[str, ...] = ()
     """Changes to the default configuration: FIELD=VALUE as in reward.proximity=0 (a value is
     JSON, or else text), or a .toml file of them. Later ones win. docs/reference/config.md"""
@@ -59,8 +60,14 @@ class EnvironmentArguments:
         given["cameras"] = cameras_named(self.cameras)
         given["motions"] = [str(path) for path in self.motions]
         given["faults"] = [_fault(text) for text in self.faults]
+        given["shield"] = shield_named(self.shield)
         given["config"] = read_config(self.config or ())
         return {name: value for name, value in given.items() if value not in (None, [], {})}
+
+
+def shield_named(word: str | None) -> str | dict[str, Any] | None:
+    """A shield's name, or what a JSON object says of its settings."""
+    return _value(word) if word and word.startswith("{") else word
 
 
 def cameras_named(words: Sequence[str]) -> str | list[int | str]:

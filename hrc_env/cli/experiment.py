@@ -72,6 +72,8 @@ class ImpactExperiment(AnyExperiment):
     out: Path = Path("out/impact")
     task: str = DEFAULT
     """What the robots do, by the environment's id."""
+    shield: str | None = None
+    """What may change their commands: qp, ssm, pfl, or one that was registered (--import)."""
     seeds: int | None = None
     """Episodes of every row, instead of 200 (8 if quick)."""
     estimator: tuple[str, ...] = ()

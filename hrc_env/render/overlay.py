@@ -18,6 +18,7 @@ from hrc_env.geometry.cameras import (
     pinhole_magnification,
     project,
 )
+from hrc_env.safety.shield import ACTIVE_RAD_S
 
 Colour = tuple[int, int, int]
 LEFT: Colour = (66, 165, 245)
@@ -32,6 +33,7 @@ GRID: Colour = (46, 53, 61)
 ARM: Colour = (150, 158, 168)
 BELIEF: Colour = (90, 230, 160)
 COST: Colour = (255, 110, 120)
+SHIELD: Colour = (255, 90, 60)
 FLOOR_M = 3
 """The floor is drawn so far [m]."""
 SIDE_COLOURS = {("left", "left"): LEFT, ("right", "right"): RIGHT}
@@ -113,6 +115,19 @@ def draw_markers(image: Image, camera: PinholeCamera, markers_world: Floats) -> 
             radius = max(4, round(0.05 * focal_px / away_m))
             cv2.circle(image, middle, radius * 16, GOAL, 2, cv2.LINE_AA, 4)
             cv2.circle(image, middle, 2 * 16, GOAL, -1, cv2.LINE_AA, 4)
+
+
+def draw_shield(image: Image, change_rad_s: float) -> None:
+    """A frame and words, in place, while a shield changes what is commanded by more than it takes
+    to be called active [rad/s]."""
+    if change_rad_s > ACTIVE_RAD_S:
+        height, width = image.shape[:2]
+        thickness = max(2, width // 240)
+        cv2.rectangle(image, (0, 0), (width - 1, height - 1), SHIELD, thickness)
+        size = max(12, width // 60)
+        text = f"shield: {change_rad_s:.1f} rad/s"
+        at = width - text_width(text, size) - 2 * size, height - 3 * size
+        write(image, text, at, size, SHIELD)
 
 
 def label(image: Image, text: str, at: tuple[int, int], size: int = 16) -> None:

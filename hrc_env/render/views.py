@@ -59,6 +59,8 @@ class Glance:
     """Of every worker, through every camera."""
     crops: list[Image | None]
     """What the pose network was given of the first worker."""
+    shield_rad_s: float = 0.0
+    """By how much the shield changed the last command."""
 
 
 class Views:
@@ -81,7 +83,9 @@ class Views:
         if depth:
             renderer = self._renderer("depth", size, seen)
             return renderer.picture(seen.q, seen.motion, viewpoint, depth=True)
-        return self._drawn([viewpoint_camera(viewpoint, *size)], seen, shadows=True)[0]
+        (image,) = self._drawn([viewpoint_camera(viewpoint, *size)], seen, shadows=True)
+        overlay.draw_shield(image, seen.shield_rad_s)
+        return image
 
     def glance(self, b: int = 0) -> Glance:
         """All that there is to draw of environment `b` now."""
@@ -95,6 +99,7 @@ class Views:
             keypoints,
             [list(of_worker) for of_worker in windows],
             list(simulation.pipeline.crops(b)),
+            float(np.linalg.norm(simulation.shield_change[b])),
         )
 
     def pose(self, b: int = 0) -> tuple[Floats, WorkerMotion]:
@@ -108,6 +113,7 @@ class Views:
         (image,) = self._drawn([camera], seen, shadows=True)
         overlay.draw_estimate(image, camera, seen.estimate)
         overlay.draw_markers(image, camera, seen.markers_world)
+        overlay.draw_shield(image, seen.shield_rad_s)
         return image
 
     def cameras(self, width: int, height: int, seen: Glance) -> list[Image]:

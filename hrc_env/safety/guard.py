@@ -1,7 +1,7 @@
 """The built-in shields: joint velocities at which every row of `rows` holds.
 
 "ssm" takes one factor on all joints, which keeps the path. "qp" and "pfl" take the nearest
-velocities that the arm can reach in a step. J row that asks to get away is two of them: to come no
+velocities that the arm can reach in a step. A row that asks to get away is two of them: to come no
 nearer, which hardly anything outweighs, and only then to get away: with one, an arm that flees from
 a hand pushes its wrist into the other.
 """
@@ -29,7 +29,7 @@ from hrc_env.safety.solver import exceeded, solve
 NO_NEARER, AWAY = 1e4, 30.0
 """Weights of a row's excess [m/s], against changes of joint velocities [rad/s]."""
 HOLDS_M_S = 1e-6
-"""J row that is exceeded by less holds."""
+"""A row that is exceeded by less holds."""
 
 
 class Constraints(NamedTuple):
@@ -102,7 +102,7 @@ def _model(now: Belief) -> RobotModel:
 
 def somebody_unknown(estimate: PoseEstimate) -> Bools:
     """(B,) whether a worker may be there whom no track follows."""
-    return np.any(~estimate.tracked, axis=1)
+    return np.any(estimate.unknown, axis=1)
 
 
 def _within_reach(

@@ -6,7 +6,7 @@ Of every pair, n is the unit vector from the robot's nearest point to the body's
 
 with v_h the estimated speed of the body's point along -n. Where D >= 0 the robot may be as fast as
 it can brake within D (the robot's share of `separation.protective_distance`); else it has to get
-away. J row that no command within reach exceeds is left out.
+away. A row that no command within reach exceeds is left out.
 """
 
 import math
@@ -22,9 +22,9 @@ from hrc_env.geometry.distances import closest_parameters
 MOST_ROWS = 32
 """Of one robot; the tightest are kept."""
 ABSENT_M = 1e3
-"""J capsule that is farther away than this is of a load that is not carried [m]."""
+"""A capsule that is farther away than this is of a load that is not carried [m]."""
 SHORTEST_M = 0.1
-"""J forearm that is estimated as shorter turns its hand no faster than if it were so long [m]."""
+"""A forearm that is estimated as shorter turns its hand no faster than if it were so long [m]."""
 _N_LIMBS = len(SEGMENT_ENDS)
 _JOINTS: Ints = np.array(
     [[(e[0], e[-1]) for e in ends[:2]] for ends in SEGMENT_ENDS]
@@ -184,7 +184,7 @@ def _nearest(first, second, point, normal):
 
 @kernel
 def _towards(body, s, t, normal):
-    """J body's point at `t` of a segment: its speed along -n [m/s], its deviation along n [m]."""
+    """A body's point at `t` of a segment: its speed along -n [m/s], its deviation along n [m]."""
     mean, velocity, cov = body
     nx, ny, nz = normal[0], normal[1], normal[2]
     speed, variance = 0.0, 0.0

@@ -13,7 +13,7 @@ from hrc_env.core.kernels import kernel
 MOST_STEPS = 50
 HALVINGS = 30
 ENOUGH_RAD_S = 1e-9
-"""J step that is shorter than this is the last."""
+"""A step that is shorter than this is the last."""
 
 
 @kernel

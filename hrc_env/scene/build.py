@@ -135,26 +135,6 @@ class Scene:
         """The settings of `cameras`."""
         return select(self.config.cameras, tuple(camera.name for camera in self.cameras))
 
-    @property
-    def slew_rad_s2(self) -> Floats:
-        """(N,) fastest change of each joint's commanded velocity [rad/s^2]."""
-        own = self.robot.slew or self.config.slew_rad_s2
-        return np.array(np.broadcast_to(own, self.chain.n_joints), float)
-
-    @property
-    def hitting_kg(self) -> float:
-        """Effective mass of the robot where it hits without a load: half of an arm's parts that
-        move (ISO/TS 15066, A.3), all of what drives [kg]."""
-        model = self.model
-        its = [model.body(b).name.startswith(PREFIX) for b in range(model.nbody)]
-        moving_kg = float(model.body_mass[np.array(its) & (model.body_weldid > 0)].sum())
-        return moving_kg if self.robot.drives else 0.5 * moving_kg
-
-    @property
-    def load_kg(self) -> Floats:
-        """(O,) masses of what is loose."""
-        return self.model.body_mass[self.object_bodies].copy()
-
     def surroundings(self, qpos: Floats, held: Held | None = None) -> Surroundings:
         """What can stand before cameras: the arm, at the first N of qpos (B, nq) [rad], and what is
         loose, at the others; what is fixed; what workers hold."""

@@ -17,6 +17,7 @@ from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, JointVelocitie
 from hrc_env.geometry.chains import tool
 from hrc_env.scene.build import Scene, without_workers
 from hrc_env.scene.cups import Cups, load_n, seals
+from hrc_env.scene.limits import slew_rad_s2
 from hrc_env.scene.objects import held_by
 from hrc_env.scene.worker import CAPSULE_FIELDS, capsule_shapes
 
@@ -279,7 +280,7 @@ def _servos(scene: Scene) -> Records:
     servos, config, chain = np.zeros(scene.chain.n_joints, SERVO), scene.config, scene.chain
     servos["low"], servos["high"] = chain.range_rad.T
     servos["fastest"], servos["lead"] = chain.velocity_limit_rad_s, scene.servo_lead_s
-    servos["slew"] = scene.slew_rad_s2
+    servos["slew"] = slew_rad_s2(scene)
     servos["clamp"] = config.integrator_clamp_rad
     return servos
 

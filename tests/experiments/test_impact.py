@@ -149,7 +149,7 @@ def test_cost_is_split_by_whether_the_robot_moves_towards_the_worker():
 def test_directed_speeds_add_up_to_how_the_gap_closes(monkeypatch):
     monkeypatch.setattr(episodes, "n_cores", lambda: 1)
     setup = setup_called("truth")
-    env = _build(setup, setup.turns[0], 2)
+    env = _build(setup, setup.turns[0], 2, {})
     part = env.first
     seeds = (2, 3)  # the same parts stay nearest to each other
     env.reset(np.arange(2), [np.random.default_rng(seed) for seed in seeds])

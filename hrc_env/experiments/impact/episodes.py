@@ -6,7 +6,7 @@ motion of a step narrowed them while the other is held where it is at its end.
 
 import hashlib
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -61,9 +61,15 @@ class Stage:
     a seed, of which the k-th has turn k modulo the number of turns."""
 
     def __init__(
-        self, setup: PerceptionSetup, seeds: Sequence[int], n_steps: int, task: str = DEFAULT
+        self,
+        setup: PerceptionSetup,
+        seeds: Sequence[int],
+        n_steps: int,
+        task: str = DEFAULT,
+        shield: str | None = None,
     ) -> None:
-        self.setup, self.seeds, self.n_steps, self.task = setup, seeds, n_steps, task
+        self.setup, self.seeds, self.n_steps = setup, seeds, n_steps
+        self.made_with = {"task": task, "shield": shield}
         self._envs: list[Shards] = []
 
     def play(self, make_agent: MakeAgent, margin_m: float, tick: PartProgress) -> Rows:
@@ -73,7 +79,7 @@ class Stage:
         turns = self.setup.turns[:n]
         in_turns = [slice(k, None, len(turns)) for k in range(len(turns))]
         self._envs = self._envs or [
-            _build(self.setup, turn, len(self.seeds[mine]), self.task)
+            _build(self.setup, turn, len(self.seeds[mine]), self.made_with)
             for turn, mine in zip(turns, in_turns, strict=True)
         ]
         for env, mine in zip(self._envs, in_turns, strict=True):
@@ -93,11 +99,13 @@ class Stage:
             env.close()
 
 
-def _build(setup: PerceptionSetup, turn: Turn, n_episodes: int, task: str = DEFAULT) -> Shards:
-    """Environments with such a setup, through these cameras."""
+def _build(
+    setup: PerceptionSetup, turn: Turn, n_episodes: int, made_with: Mapping[str, Any]
+) -> Shards:
+    """Environments with such a setup, through these cameras, with these other arguments."""
     settings = settle(
-        task=task, perception=setup.level, estimator=setup.estimator, people=PEOPLE,
-        faults=list(turn.faults), cameras=list(turn.cameras),
+        perception=setup.level, estimator=setup.estimator, people=PEOPLE,
+        faults=list(turn.faults), cameras=list(turn.cameras), **made_with,
     )  # fmt: skip
     threads = 1 if setup.level == "pixels" else min(n_cores(), n_episodes)
     with warnings.catch_warnings():

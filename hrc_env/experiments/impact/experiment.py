@@ -22,6 +22,7 @@ from hrc_env.experiments.impact.setups import (
 from hrc_env.experiments.study.cache import PartCache
 from hrc_env.experiments.study.fingerprint import fingerprint_of, source_digest
 from hrc_env.experiments.study.runner import Study, at_least_one, changed
+from hrc_env.safety.shield import shield_called
 from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import task_called
 from hrc_env.tracking.estimators import estimator_called
@@ -41,6 +42,8 @@ class ImpactConfig:
 
     task: str = DEFAULT
     """What the robots do."""
+    shield: str | None = None
+    """What may change their commands, by its name."""
     n_seeds: int = 200
     """Episodes of every row, at level `pixels` at most `n_pixels`."""
     n_pixels: int = 6
@@ -59,6 +62,7 @@ class ImpactConfig:
     def __post_init__(self) -> None:
         """Raise `ConfigError` for what cannot work."""
         task_called(self.task)
+        shield_called(self.shield)
         at_least_one(self, "n_seeds", "n_pixels", "n_steps", "learning_steps")
         check_names("policy", self.policies, POLICIES)
         check_names("perception setup", self.setups, all_setups())
@@ -90,11 +94,12 @@ def config_for(
     seeds: int | None = None,
     estimator: Sequence[str] = (),
     task: str = DEFAULT,
+    shield: str | None = None,
 ) -> ImpactConfig:
     """The settings that the command line asks for; if estimators are named, only these, the
     reference, the truth and nothing are compared."""
     whole = ImpactConfig(n_steps=task_called(task).max_episode_steps)
-    config = changed(ImpactConfig(**QUICK) if quick else whole, task=task)
+    config = changed(ImpactConfig(**QUICK) if quick else whole, task=task, shield=shield)
     asked = [PerceptionSetup(estimator=estimator_called(name).name).name for name in estimator]
     setups = tuple(dict.fromkeys(("truth", "none", REFERENCE, *asked))) if asked else None
     return changed(config, n_seeds=seeds, setups=setups)
@@ -113,12 +118,14 @@ def play(config: ImpactConfig, cache: PartCache) -> Table:
         made_of = {
             "people": PEOPLE,
             "task": config.task,
+            **({} if config.shield is None else {"shield": config.shield}),
             "seeds": config.seeds(setup.level),
             "n_steps": config.n_steps,
             "setup": asdict(setup),
             "estimator": source_digest(estimator_called(setup.estimator).make),
         }
-        with closing(Stage(setup, made_of["seeds"], config.n_steps, config.task)) as stage:
+        stage = Stage(setup, made_of["seeds"], config.n_steps, config.task, config.shield)
+        with closing(stage):
             for policy in policies:
                 who = {"policy": asdict(policy), "ppo": ppo if policy.name == PPO else ""}
                 table[policy.label, setup.name] = cache.part(

@@ -1,0 +1,148 @@
+"""Rows: what they are by their definition, which pairs may be left out, how they differentiate."""
+
+import math
+
+import numpy as np
+import pytest
+
+from hrc_env.core.records import PoseEstimate
+from hrc_env.core.skeleton import HAND_SEGMENTS, SEGMENT_ENDS, SEGMENT_RADIUS_M
+from hrc_env.geometry import chains
+from hrc_env.geometry.distances import closest_parameters, segments
+from hrc_env.safety.config import ShieldConfig
+from hrc_env.safety.rows import MOST_ROWS, tightest_rows
+from hrc_env.scene.build import build
+from hrc_env.scene.limits import slew_rad_s2
+
+RNG = np.random.default_rng(5)
+CONFIG = ShieldConfig(latency_s=0.05)
+
+
+def somebody(middle, speed_m_s=0.6):
+    """(1, 1) an estimate of somebody upright near a place [m]."""
+    heights = np.array([1.6, *np.repeat([1.4, 1.15, 1.0, 0.95, 0.5, 0.1, 0.05], 2)])
+    sides = np.array([0, *np.outer([1, 1.3, 1.5, 0.5, 0.5, 0.5, 0.5], [1, -1]).ravel()])
+    mean = np.stack([np.zeros(15), 0.18 * sides, heights], -1) + RNG.normal(0, 0.05, (15, 3))
+    mean += np.array([*middle, 0.0])
+    roots = RNG.normal(0, 0.02, (15, 3, 3))
+    cov = roots @ roots.swapaxes(-1, -2) + 1e-4 * np.eye(3)
+    velocity = RNG.normal(0, speed_m_s, (15, 3))
+    return PoseEstimate(
+        mean[None, None], cov[None, None], velocity[None, None], np.zeros((1, 1, 15)),
+        np.ones((1, 1), bool),
+    )  # fmt: skip
+
+
+def before(scene, away_m):
+    """(2,) a place so far in front of the tool."""
+    return chains.tool(scene.chain, scene.home_q)[:2, 3] + np.array([away_m, 0.0])
+
+
+def rows_of(chain, q, estimate, low, high, slew, config=CONFIG, touch_m_s=0.0):
+    q = q[None]
+    found = np.empty((1, MOST_ROWS, chain.n_joints)), np.empty((1, MOST_ROWS))
+    count, least_m = np.empty(1, np.int64), np.empty(1)
+    tightest_rows(
+        (chains.forward(chain, q), chain.slides, chain.capsule_link, chains.capsules(chain, q),
+         chain.capsule_radius_m, low[None], high[None], slew),
+        (segments(estimate.mean_world), estimate.mean_world, estimate.velocity_world,
+         estimate.cov_world, estimate.tracked, np.full((1, 16), touch_m_s)),
+        config.record(), (*found, count, least_m),
+    )  # fmt: skip
+    n = int(count[0])
+    return found[0][0, :n], found[1][0, :n], least_m[0]
+
+
+def defined(chain, q, estimate, low, high, slew, p):
+    """The rows by their definition, pair by pair, and the least D of all pairs."""
+    caps, limbs = chains.capsules(chain, q), segments(estimate.mean_world)[0, 0]
+    mean, velocity, cov = (
+        part[0, 0] for part in (estimate.mean_world, estimate.velocity_world, estimate.cov_world)
+    )
+    ends = [(list(one), list(other)) for one, other, _ in SEGMENT_ENDS]
+    ends += [([wrist], [wrist]) for _, wrist, *_ in HAND_SEGMENTS]
+    found, least_m = [], np.inf
+    for c in range(len(caps)):
+        for s, (one, other) in enumerate(ends):
+            squared, u, t = closest_parameters(*caps[c], *limbs[s])
+            at, to = (x[0] + v * (x[1] - x[0]) for x, v in ((caps[c], u), (limbs[s], t)))
+            n = (to - at) / math.sqrt(squared)
+            speeds = [velocity[one].mean(0), velocity[other].mean(0)]
+            if s >= 14:
+                elbow, wrist, reach, _ = HAND_SEGMENTS[s - 14]
+                share = reach / max(np.linalg.norm(mean[wrist] - mean[elbow]), 0.1)
+                speeds[1] = velocity[wrist] + share * (velocity[wrist] - velocity[elbow])
+            v_h = -n @ ((1 - t) * speeds[0] + t * speeds[1])
+            Sigma = (1 - t) * cov[one].mean(0) + t * cov[other].mean(0)
+            gap = math.sqrt(squared) - chain.capsule_radius_m[c] - SEGMENT_RADIUS_M[s]
+            margin = p.hand_margin_m if s in (6, 7, 14, 15) else p.margin_m
+            z_d = max(p.least_sigmas_m, p.sigmas * math.sqrt(n @ Sigma @ n))
+            travel = (max(v_h, 0) + p.human_margin_m_s) * (p.human_s + p.latency_s)
+            clear = gap - margin - z_d - travel
+            least_m = min(least_m, clear)
+            row = n @ moved(chain, q, c, u)
+            a = min(p.deceleration_m_s2, max(np.abs(row) @ slew, 1e-9))
+            bound = max(-p.retreat_m_s, p.gain_hz * clear)
+            if clear >= 0:
+                bound = a * (math.sqrt(p.reaction_s**2 + 2 * clear / a) - p.reaction_s)
+            if bound < np.maximum(row * low, row * high).sum():
+                found.append((bound, *row))
+    return np.array(sorted(found)).reshape(-1, 1 + len(q)), least_m
+
+
+def moved(chain, q, c, u, step=1e-6):
+    """(3, N) how a point of a capsule moves with the joints, by differences."""
+
+    def point(q):
+        first, second = chains.capsules(chain, q)[c]
+        return first + u * (second - first)
+
+    steps = step * np.eye(len(q))
+    return np.stack([(point(q + d) - point(q - d)) / (2 * step) for d in steps], -1)
+
+
+@pytest.mark.parametrize("robot", ["ur10e_like", "mobile_base"])
+def test_rows_are_as_they_are_defined_and_none_that_matters_is_left_out(robot):
+    scene = build(robot=robot)
+    chain, slew = scene.chain, slew_rad_s2(scene)
+    several = 0
+    for _ in range(40):
+        q = scene.home_q + RNG.uniform(-0.6, 0.6, chain.n_joints)
+        middle_m = chains.capsules(chain, q)[..., :2].reshape(-1, 2).mean(0)
+        away = RNG.uniform(0.5, 1.6) * np.array([math.cos(a := RNG.uniform(-3, 3)), math.sin(a)])
+        estimate = somebody(middle_m + away)
+        middle = RNG.uniform(-0.5, 0.5, chain.n_joints) * chain.velocity_limit_rad_s
+        low, high = middle - 0.3, middle + 0.3
+        J, b, least_m = rows_of(chain, q, estimate, low, high, slew)
+        expected, all_m = defined(chain, q, estimate, low, high, slew, CONFIG)
+        np.testing.assert_allclose(np.sort(b), expected[:MOST_ROWS, 0], atol=1e-6)
+        if len(expected) <= MOST_ROWS:
+            rows = sorted(np.column_stack([b, J]).round(4).tolist())
+            np.testing.assert_allclose(rows, sorted(expected.round(4).tolist()), atol=2e-4)
+        several += len(b) > 3
+        if len(b):
+            assert least_m == pytest.approx(all_m)
+    assert several > 5
+
+
+def test_who_is_not_tracked_has_no_rows():
+    scene = build()
+    estimate = somebody(before(scene, 0.4))
+    box = -np.ones(6), np.ones(6), slew_rad_s2(scene)
+    assert len(rows_of(scene.chain, scene.home_q, estimate, *box)[1])
+    estimate.tracked[:] = False
+    assert len(rows_of(scene.chain, scene.home_q, estimate, *box)[1]) == 0
+
+
+def test_touches_are_allowed_as_fast_as_the_region_bears_less_the_workers_speed():
+    scene = build()
+    estimate = somebody(before(scene, 0.1), speed_m_s=0.0)
+    box = -np.ones(6), np.ones(6), slew_rad_s2(scene)
+    _, strict, _ = rows_of(scene.chain, scene.home_q, estimate, *box)
+    touching = ShieldConfig("pfl")
+    _, b, _ = rows_of(scene.chain, scene.home_q, estimate, *box, touching, touch_m_s=0.4)
+    assert strict.min() < 0.0
+    assert b.min() == pytest.approx(0.4)
+    estimate.velocity_world[..., 0] = -1.0
+    _, b, _ = rows_of(scene.chain, scene.home_q, estimate, *box, touching, touch_m_s=0.4)
+    assert b.min() < 0.0

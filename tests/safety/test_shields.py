@@ -1,0 +1,228 @@
+"""The built-in shields in the environment: what they keep, leave alone, say and refuse."""
+
+import pickle
+from dataclasses import replace
+
+import gymnasium
+import numpy as np
+import pytest
+
+import hrc_env
+from agents.env_info import env_info
+from agents.registry import make_agent
+from hrc_env import simulation
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.records import WorkerPath
+from hrc_env.env import HRCEnv
+from hrc_env.geometry import chains
+from hrc_env.motion import generator
+from hrc_env.render.overlay import SHIELD
+from hrc_env.safety.config import PRESETS, ShieldConfig
+from hrc_env.safety.guard import guarded
+
+VELOCITIES = ("velocity_world", "angular_velocity_world")
+NO_DOUBT = {"sigmas": 0.0, "least_sigmas_m": 0.0, "human_m_s": 0.0}
+
+
+def vector(n, shield, **arguments):
+    arguments = {"perception": "truth", "people": "unaware", "num_threads": 1, **arguments}
+    return gymnasium.make_vec("HRCReach-v0", n, shield=shield, **arguments)
+
+
+def steps(envs, n_steps, seed=0, agent="scripted"):
+    """Infos of a scripted agent's steps, and what is believed after each."""
+    part = envs.unwrapped.shards.first
+    policy = make_agent(agent, env_info(part), seed=seed)
+    seen, _ = envs.reset(seed=seed)
+    for _ in range(n_steps):
+        seen, *_, infos = envs.step(policy.act(seen))
+        yield infos, part.belief
+
+
+@pytest.fixture
+def stand_still(monkeypatch):
+    """Everybody stands as they stood when the episode began."""
+
+    def advance(state, rngs, dt_s, n_steps):
+        motion = generator.current(state)
+        rest = {name: np.zeros_like(getattr(motion, name)) for name in VELOCITIES}
+        places = motion.position_world, motion.quaternion_wxyz
+        path = WorkerPath(*(np.repeat(each[:, None], n_steps, axis=1) for each in places))
+        return path, replace(motion, **rest)
+
+    monkeypatch.setattr(simulation.generator, "advance", advance)
+
+
+@pytest.mark.usefixtures("stand_still")
+@pytest.mark.parametrize("kind", ["qp", "ssm"])
+def test_to_a_worker_who_stands_still_the_robot_comes_no_nearer_than_the_margin(kind):
+    config = ShieldConfig(kind, margin_m=0.12, hand_margin_m=0.12, **NO_DOUBT)
+    free, kept = (
+        np.array([now.separation.distance_m[:, 0] for _, now in steps(vector(32, shield), 150)])
+        for shield in (None, config)
+    )
+    apart = kept[0] > 0.13
+    assert (free[:, apart].min(0) < 0.05).any()
+    assert kept[:, apart].min() > 0.12 - 0.002
+
+
+def test_where_no_row_is_tight_what_is_wanted_is_applied():
+    far = vector(2, "qp", n_workers=0)
+    assert all((infos["shield/change"] == 0.0).all() for infos, _ in steps(far, 20))
+    near = vector(8, "qp")
+    changes = np.array([
+        (infos["shield/change"], infos["shield/active"], infos["shield/scale"])
+        for infos, _ in steps(near, 100)
+    ])  # fmt: skip
+    change, active, scale = changes.swapaxes(0, 1)
+    assert 0.05 < active.mean() < 0.8
+    assert (active == (change > 0.02)).all()
+    np.testing.assert_array_equal(scale[change == 0.0], 1.0)
+
+
+@pytest.mark.parametrize("shield", [*PRESETS, {"kind": "qp", "margin_m": 0.2}])
+def test_a_vector_is_single_environments(shield):
+    many = vector(3, shield, perception="keypoints", num_threads=2)
+    one = gymnasium.make("HRCReach-v0", perception="keypoints", people="unaware", shield=shield)
+    many.reset(seed=[5, 6, 7])
+    one.reset(seed=7)
+    for _ in range(12):
+        actions = many.action_space.sample()
+        seen, reward, *_, infos = many.step(actions)
+        alone, alone_reward, *_, info = one.step(actions[2])
+        np.testing.assert_array_equal(seen[2], alone)
+        assert reward[2] == alone_reward
+        said = {name: infos[name][2] for name in info if name.startswith("shield/")}
+        assert said == {name: info[name] for name in said}
+        assert {"shield/change", "shield/slack", "shield/unknown"} <= said.keys()
+
+
+@pytest.mark.parametrize("control", ["joint", "tool", "twist"])
+def test_it_goes_on_from_a_state_and_through_pickle(control):
+    config = {"observe_shield": True}
+    env = HRCEnv(perception="truth", shield="qp", control=control, config=config, people="unaware")
+    env.reset(seed=2)
+    actions = [env.action_space.sample() for _ in range(30)]
+    for action in actions[:15]:
+        env.step(action)
+    state, twin = env.get_state(), pickle.loads(pickle.dumps(env))
+    first = [env.step(action)[0] for action in actions[15:]]
+    env.set_state(state)
+    for again in (env, twin):
+        np.testing.assert_array_equal(first, [again.step(action)[0] for action in actions[15:]])
+
+
+@pytest.mark.parametrize("task", hrc_env.IDS)
+def test_every_id_has_one(task):
+    for shield in PRESETS:
+        env = gymnasium.make(task, perception="truth", shield=shield)
+        policy = make_agent("scripted", env_info(env.unwrapped.simulation))
+        seen, _ = env.reset(seed=4)
+        for _ in range(10):
+            seen, *_, info = env.step(policy.act(seen))
+        assert info["shield/change"] >= 0.0
+
+
+def believed(task="HRCReach-v0", **arguments):
+    """An environment, and what its robot believes."""
+    env = HRCEnv(task, perception="truth", **arguments)
+    env.reset(seed=1)
+    return env.simulation, env.simulation.belief
+
+
+def fastest_m_s(part, command):
+    """Of the ends of capsules, by differences."""
+    chain, q = part.chain, part.physics.q
+    moved = chains.capsules(chain, q + 1e-6 * command) - chains.capsules(chain, q)
+    return np.linalg.norm(moved, axis=-1).max() / 1e-6
+
+
+@pytest.mark.parametrize("task", ["HRCReach-v0", "HRCDelivery-v0"])
+@pytest.mark.parametrize("limit_m_s", [0.25, 0.0])
+def test_while_a_worker_is_unknown_no_point_is_faster(task, limit_m_s):
+    part, now = believed(task)
+    lost = np.zeros_like(now.estimate.tracked)
+    now = replace(now, estimate=unseen(now.estimate, lost))
+    wanted = part.model.fastest_rad_s[None]
+    allowed, said = guarded(now, wanted, 0.04, ShieldConfig(unknown_m_s=limit_m_s))
+    assert said["unknown"] == 1.0
+    assert fastest_m_s(part, allowed) == pytest.approx(limit_m_s, abs=1e-4)
+    np.testing.assert_allclose(np.cross(allowed[0, :3], wanted[0, :3]), 0.0, atol=1e-12)
+
+
+def unseen(estimate, tracked):
+    return replace(estimate, tracked=tracked)
+
+
+def test_what_is_carried_counts_as_robot():
+    """A load that reaches somebody makes rows; a heavier one may touch them less fast."""
+    _, now = believed("HRCDrywall-v0", n_workers=1)
+    hand = now.robot.tool_world + np.array([0.3, 0.0, 0.0])
+    estimate = now.estimate
+    estimate.mean_world[:] = hand[:, None, None] + np.linspace(0, 1, 15)[:, None] * [0.5, 0, 0]
+    estimate.tracked[:] = True
+    capsules = now.robot.capsules_world.copy()
+    free = replace(now, robot=replace(now.robot, capsules_world=capsules))
+    capsules[:, -1] = hand[:, None]  # a board's last capsule
+    wanted = np.full((1, 6), 0.3)
+    alone, _ = guarded(now, wanted, 0.04, ShieldConfig())
+    laden, said = guarded(free, wanted, 0.04, ShieldConfig())
+    assert said["least_m"] < 0.0
+    assert np.abs(alone - laden).max() > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("shield", "said"),
+    [
+        ("cbf", "Unknown shield 'cbf'. Valid: 'ssm', 'qp', 'pfl'"),
+        ({"kind": "cbf"}, "kind of shield 'cbf'"),
+        ({"margin_m": -0.1}, r"shield\.margin_m must not be negative, got -0.1"),
+        ({"margin": 0.1}, r"shield\.margin"),
+        ({"retreat_m_s": "fast"}, r"shield\.retreat_m_s must be a finite number"),
+        ({"unknown_m_s": -1.0}, r"shield\.unknown_m_s must not be negative"),
+        ({"deceleration_m_s2": 0.0}, r"shield\.deceleration_m_s2 must be positive"),
+        (3, "shield must be a name, a ShieldConfig or a mapping"),
+    ],
+)
+def test_what_cannot_be_is_said(shield, said):
+    with pytest.raises(ConfigError, match=said):
+        HRCEnv(perception="none", shield=shield)
+
+
+def test_margins_that_are_no_numbers_are_refused():
+    with pytest.raises(ConfigError, match="margin_m must be a finite number, got nan"):
+        ShieldConfig(margin_m=np.nan)
+
+
+@pytest.mark.parametrize(
+    ("missing", "said"),
+    [("model", "A robot's model"), ("command", "The command in force")],
+)
+def test_what_a_shield_lacks_is_said(missing, said):
+    _, now = believed()
+    with pytest.raises(ConfigError, match=said):
+        guarded(replace(now, **{missing: None}), np.zeros((1, 6)), 0.04, ShieldConfig())
+
+
+def test_the_observation_ends_with_what_it_changed_if_asked():
+    config = {"observe_shield": True}
+    envs = vector(4, "qp", config=config)
+    plain = vector(4, "qp")
+    assert envs.single_observation_space.shape[0] == plain.single_observation_space.shape[0] + 6
+    part = envs.unwrapped.shards.first
+    for infos, now in steps(envs, 60):
+        norm = np.linalg.norm(now.shield_change, axis=1)
+        np.testing.assert_allclose(norm, infos["shield/change"])
+    assert list(part.layout.slices)[-1] == "shield_change"
+
+
+def test_pictures_show_when_it_acts():
+    env = HRCEnv(perception="none", shield="qp", render_mode="rgb_array")
+    env.reset(seed=1)
+    still, acting = (env.views, env.views)
+    plain = still.picture()
+    env.simulation.shield_change[:] = 0.5
+    shown = acting.picture()
+    env.close()
+    assert (shown[0, 0] == SHIELD).all()
+    assert not (plain[0, 0] == SHIELD).all()
