@@ -80,6 +80,15 @@ def test_where_no_row_is_tight_what_is_wanted_is_applied():
     np.testing.assert_array_equal(scale[change == 0.0], 1.0)
 
 
+def test_in_a_room_that_is_seen_to_be_empty_nothing_is_capped():
+    envs = vector(8, "qp", perception="keypoints", n_workers=(0, 1))
+    *_, (infos, _) = steps(envs, 20)
+    empty = np.array([activity == ("absent",) for activity in infos["worker/activity"]])
+    assert 0 < empty.sum() < 8
+    np.testing.assert_array_equal(infos["shield/unknown"][empty], 0.0)
+    np.testing.assert_array_equal(infos["shield/change"][empty], 0.0)
+
+
 @pytest.mark.parametrize("shield", [*PRESETS, {"kind": "qp", "margin_m": 0.2}])
 def test_a_vector_is_single_environments(shield):
     many = vector(3, shield, perception="keypoints", num_threads=2)
@@ -141,17 +150,13 @@ def fastest_m_s(part, command):
 @pytest.mark.parametrize("limit_m_s", [0.25, 0.0])
 def test_while_a_worker_is_unknown_no_point_is_faster(task, limit_m_s):
     part, now = believed(task)
-    lost = np.zeros_like(now.estimate.tracked)
-    now = replace(now, estimate=unseen(now.estimate, lost))
+    somewhere = np.ones_like(now.estimate.tracked)
+    now = replace(now, estimate=replace(now.estimate, tracked=~somewhere, unknown=somewhere))
     wanted = part.model.fastest_rad_s[None]
     allowed, said = guarded(now, wanted, 0.04, ShieldConfig(unknown_m_s=limit_m_s))
     assert said["unknown"] == 1.0
     assert fastest_m_s(part, allowed) == pytest.approx(limit_m_s, abs=1e-4)
     np.testing.assert_allclose(np.cross(allowed[0, :3], wanted[0, :3]), 0.0, atol=1e-12)
-
-
-def unseen(estimate, tracked):
-    return replace(estimate, tracked=tracked)
 
 
 def test_what_is_carried_counts_as_robot():
