@@ -9,10 +9,15 @@ from agents.env_info import env_info
 from agents.experts import expert
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import ObjectState
+from hrc_env.core.things import FOOT_WORLD
+from hrc_env.motion import generator
 from hrc_env.tasks import pick_place
 from hrc_env.tasks.pick_place import PickPlaceConfig
+from hrc_env.worker.body import SEGMENT
+from hrc_env.worker.props import PROP_NAMES
 
 ID = "HRCPickPlace-v0"
+HANDS = [SEGMENT["left_hand"], SEGMENT["right_hand"]]
 
 
 def make(**kwargs):
@@ -151,4 +156,58 @@ def test_an_action_without_an_entry_for_the_hand_is_refused():
     env.reset(seed=0)
     with pytest.raises(ConfigError, match=r"\(7,\)"):
         env.step(np.zeros(6, np.float32))
+    env.close()
+
+
+def studs_of(simulation):
+    """(n, 3) the pieces that the worker has or has not yet taken [m]."""
+    held = generator.current(simulation.motion).held
+    return held.position_world[0][held.kind[0] == PROP_NAMES.index("stud")]
+
+
+def test_the_worker_takes_pieces_from_the_robots_table_and_lays_them_down_elsewhere():
+    env = make(perception="none", n_workers=1)
+    env.reset(seed=5)
+    simulation, still = env.unwrapped.simulation, np.append(np.zeros(6), -1.0).astype(np.float32)
+    ahead_m, aside_m = pick_place.STACK.xy_m
+    stack = FOOT_WORLD[:2] + np.array([ahead_m - 0.43, aside_m])
+    nearest_m = np.inf
+    for _ in range(700):
+        env.step(still)
+        assert len(studs_of(simulation)) == 4
+        tips = generator.current(simulation.motion).position_world[0, 0, HANDS]
+        nearest_m = min(nearest_m, np.linalg.norm(tips[:, :2] - stack, axis=1).min())
+    left = np.linalg.norm(studs_of(simulation)[:, :2] - stack, axis=1) < 0.1
+    assert nearest_m < 0.2
+    assert left.sum() in (1, 2)
+    on_bench = np.abs(studs_of(simulation)[:, 2] - 0.75) < 0.1
+    assert (on_bench & ~left).any()
+    env.close()
+
+
+def test_the_workers_walk_depends_on_what_the_robot_does_not_on_who_looks():
+    walks = []
+    for perception in ("truth", "keypoints"):
+        env = make(perception=perception, n_workers=1)
+        env.reset(seed=6)
+        rng, walk = np.random.default_rng(0), []
+        for _ in range(60):
+            env.step(rng.uniform(-1.0, 1.0, 7).astype(np.float32))
+            walk.append(generator.current(env.unwrapped.simulation.motion).position_world.copy())
+        walks.append(np.array(walk))
+        env.close()
+    np.testing.assert_array_equal(*walks)
+
+
+@pytest.mark.parametrize("task", [ID, "HRCPickPlaceGoal-v0"])
+def test_who_works_otherwise_takes_none(task):
+    """Another mix of work, as docs/people_and_scenes.md has it."""
+    motion = {"jobs": "framing", "near_probability": 1.0, "near_radius_m": (1.0, 1.35)}
+    env = gymnasium.make(task, perception="none", n_workers=1, config={"motion": motion})
+    env.reset(seed=1)
+    simulation = env.unwrapped.simulation
+    before = studs_of(simulation)
+    for _ in range(100):
+        env.step(env.action_space.sample() * 0)
+    np.testing.assert_array_equal(studs_of(simulation), before)
     env.close()
