@@ -266,7 +266,7 @@ class Workplace:
     """How high above the floor the work is [m]: where hands work, on what loads lie, or how
     high a step is; 0 where there is nothing."""
     ahead_m: float = AWAY_M
-    """How far ahead of who stands there loads lie, or a wall is [m]."""
+    """How far ahead of who stands there loads lie, a cart's handles or a wall are [m]."""
     loads: tuple[str, ...] = ()
     """What lies there at first to be taken up, from the bottom up: names of `props.PROPS`."""
 

@@ -13,7 +13,7 @@ from hrc_env.core.errors import unknown
 from hrc_env.core.records import AWAY_M, WORKPLACE_KINDS, Workplace
 from hrc_env.core.typing import Bools, Floats, Records
 from hrc_env.motion import controls as c
-from hrc_env.motion.activities.going import CART, CART_AHEAD_M
+from hrc_env.motion.activities.going import CART
 from hrc_env.motion.activities.loads import BOARD
 from hrc_env.motion.curves import placed
 from hrc_env.motion.holding import N_HELD, prop_pose
@@ -90,8 +90,6 @@ def lay_out(loads: Records, first: Records, rng: np.random.Generator) -> None:
 def resting(kind: int, at: str, spot: Place, ahead_m: float, loads: Records) -> Floats:
     """(6,) where a load of a kind rests that is laid down `ahead_m` ahead of a spot, at a place of
     a kind ("": none): a board flat to a wall, below what is there, all else on top of it."""
-    if kind in WHEELED:
-        ahead_m = CART_AHEAD_M
     hung = at == "wall" and kind == BOARD
     low, high = _level(kind, hung)
     if hung:

@@ -19,7 +19,7 @@ from hrc_env.geometry.sight import Surroundings
 from hrc_env.scene import objects
 from hrc_env.scene.cups import Cups, cups_of
 from hrc_env.scene.objects import Objects, objects_of, surfaces
-from hrc_env.scene.places import SCENES, obstacles, with_pedestal
+from hrc_env.scene.places import SCENES, obstacles, to_drive_in
 from hrc_env.scene.primitives import OBJECT_BIT, PAD_BIT, ROBOT_BIT, SCENE_BIT, SOLID
 from hrc_env.scene.rig import CameraConfig, add_cameras, pinholes, select
 from hrc_env.scene.robot import (
@@ -117,8 +117,8 @@ class Scene:
     grounds: Grounds
     """Where people can stand, walk and work."""
     map: Grounds
-    """The same with the pedestal among what is blocked, where that is not the robot's: what robots
-    know of the place."""
+    """The same with the pedestal and loads' places among what is blocked, for robots that drive:
+    what they know of the place."""
     objects: Objects
     """What is loose."""
     grip: Grip | None
@@ -221,7 +221,7 @@ def _build(recipe: Recipe) -> Scene:
         worker_capsules=np.array(touched, np.int64).reshape(n_workers, len(body.capsule_names)),
         obstacles=still,
         grounds=grounds,
-        map=with_pedestal(grounds, still) if robot.drives else grounds,
+        map=to_drive_in(grounds, still) if robot.drives else grounds,
         objects=loose,
         grip=grip_of(robot, model),
         cups=cups_of(robot, model, loose, PREFIX),

@@ -26,6 +26,7 @@ from hrc_env.geometry.shapes import (
 )
 from hrc_env.scene.primitives import SOLID
 from hrc_env.worker.body import assets_dir
+from hrc_env.worker.props import BOUNDS_M, PROP_NAMES
 
 ROBOT_CLEARANCE_M = 0.8
 HEADROOM_M = 2.1
@@ -42,6 +43,8 @@ KINDS = {
     mujoco.mjtGeom.mjGEOM_SPHERE: CAPSULE,
 }
 """Of what blocks sight."""
+LEFT_AT = {"pile": "box", "floor": "box", "cart": "cart"}
+"""What of loads may stand on the floor, by the kinds of places."""
 Footprint = tuple[float, float, float, float, float]
 """As a row of `Grounds.blocked`."""
 
@@ -95,12 +98,23 @@ SCENES: dict[str, Room] = {
 }
 
 
-def with_pedestal(grounds: Grounds, obstacles: Floats) -> Grounds:
-    """The same for a robot that drives: what stands on the pedestal's axis is in its way."""
+def to_drive_in(grounds: Grounds, obstacles: Floats) -> Grounds:
+    """The same for a robot that drives: what stands on the pedestal's axis is in its way, and so is
+    where loads lie on the floor or may be left."""
     x, y = grounds.robot_xy_m
     standing = footprints(obstacles, (math.inf, math.inf))
     own = standing[np.hypot(standing[:, 0] - x, standing[:, 1] - y) < 1e-3]
-    return replace(grounds, blocked=np.concatenate([grounds.blocked, own]))
+    left = np.reshape([_left_at(p) for p in grounds.places if p.kind in LEFT_AT], (-1, 5))
+    return replace(grounds, blocked=np.concatenate([grounds.blocked, own, left]))
+
+
+def _left_at(place: Workplace) -> Footprint:
+    """What a load takes up that lies at a place."""
+    low, high = BOUNDS_M[PROP_NAMES.index(LEFT_AT[place.kind])]
+    middle, half = (low + high) / 2, (high - low) / 2
+    (x, y), (cos, sin) = place.xy_m, (math.cos(place.yaw_rad), math.sin(place.yaw_rad))
+    ahead = place.ahead_m + float(middle[0])
+    return x + cos * ahead, y + sin * ahead, float(half[0]), float(half[1]), place.yaw_rad
 
 
 def obstacles(model: mujoco.MjModel) -> Floats:

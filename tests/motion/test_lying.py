@@ -12,6 +12,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Workplace
 from hrc_env.motion import generator, lying
 from hrc_env.motion import state as st
+from hrc_env.motion.activities.going import CART_AHEAD_M
 from hrc_env.motion.schedule import WORK, Job
 from hrc_env.scene.build import build, drawing_model
 from hrc_env.scene.worker_visuals import PARKED_M
@@ -84,6 +85,12 @@ def test_what_lies_there_at_first_rests_on_what_is_drawn(scene):
                 gaps_m.append(way - 0.1)
         assert -0.011 < min(gaps_m) < 0.01, (row["pose"], min(gaps_m))
     assert data.mocap_pos[-1, 2] == PARKED_M[2]  # nothing of it is in the way of the rays
+
+
+@pytest.mark.parametrize("scene", ["lab", "site"])
+def test_carts_stand_where_hands_take_them(scene):
+    carts = [place for place in build(name=scene).grounds.places if place.kind == "cart"]
+    assert {place.ahead_m for place in carts} == {CART_AHEAD_M}
 
 
 def test_loads_lie_on_each_other_and_the_uppermost_is_taken_first():
