@@ -24,7 +24,11 @@ from hrc_env.core.kernels.signatures import Signature
 
 LEVELS = {"truth": 250, "keypoints": 250, "none": 250, "pixels": 40}
 """Steps of each level that are played."""
-VARIANTS: dict[str, dict[str, Any]] = {"": {}, " and more": {"scene": "site", "n_workers": 2}}
+VARIANTS: dict[str, dict[str, Any]] = {
+    "": {},
+    " and more": {"scene": "site", "n_workers": 2, "shield": "qp"},
+    " and ssm": {"shield": "ssm"},
+}
 """What else is played; what only this calls is compiled by `setup`, not by the first `make`."""
 NUM_ENVS = 8
 

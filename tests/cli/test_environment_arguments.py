@@ -15,6 +15,7 @@ from hrc_env.cli.train import Train
 from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCEnv
+from hrc_env.safety.config import ShieldConfig
 
 OF_RENDER = {"render_mode", "width", "height"}
 """What only `render` reads, which no command calls: films have a form of their own."""
@@ -37,7 +38,7 @@ def test_everything_said_reaches_the_environment():
         perception="keypoints", estimator="kalman", cameras=("camera_2", "0"), scene="site",
         n_workers=(1, 2), people="hurried", control="tool",
         faults=('{"kind": "late", "cameras": ["camera_2"], "amount": 0.2}',),
-        config=("reward.proximity=0.5", "worker=any"),
+        config=("reward.proximity=0.5", "worker=any"), shield='{"kind": "ssm", "margin_m": 0.1}',
     )  # fmt: skip
     keywords = json.loads(json.dumps(arguments.keywords()))  # as a checkpoint keeps them
     env = gymnasium.make("HRCReach-v0", **keywords)
@@ -51,6 +52,7 @@ def test_everything_said_reaches_the_environment():
     assert config.motion.people != settle().config.motion.people
     assert [(fault.kind, fault.how_much) for fault in config.faults] == [("late", 0.2)]
     assert (config.reward.proximity, config.worker) == (0.5, "any")
+    assert simulation.shield.keywords["config"] == ShieldConfig("ssm", margin_m=0.1)
     env.close()
 
 
@@ -108,6 +110,8 @@ def test_what_is_no_change_is_refused(words, says, tmp_path: Path):
         (["--faults", "late"], "JSON objects"),
         (["--motions", "nowhere.npz"], "nowhere.npz"),
         (["--appearance", "varid"], "'varied'"),
+        (["--shield", "qpp"], "'qp'"),
+        (["--shield", '{"margin": 1}'], "'shield.margin_m'"),
     ],
 )
 def test_a_wrong_word_is_answered_with_what_would_do(words, says, capsys):
