@@ -58,8 +58,8 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     ),
     "experiment": (
         "hrc_env.cli.experiment", "Experiment",
-        "The paper's two experiments (site, lab), what perception is worth in safety (impact), and "
-        "ablations of rigs and estimators (ablations).",
+        "The paper's two experiments (site, lab), what perception is worth in safety (impact), "
+        "what sight costs at equal safety (price), ablations of rigs and estimators (ablations).",
     ),
     "gallery": (
         "benchmarks.commands", "Gallery",

@@ -120,7 +120,7 @@ class HRCVecEnv(VecEnv):
         for term in self.simulation.task.reward_terms if self.simulation.task.goal else ():
             if term.name != TERM:
                 name = f"reward/{term.name}"
-                columns[name] = _of_step(fresh, name, self.num_envs)
+                columns[name] = of_step(fresh, name, self.num_envs)
         values = zip(*(column.tolist() for column in columns.values()), strict=True)
         return [dict(zip(columns, row, strict=True)) for row in values]
 
@@ -144,13 +144,13 @@ class HRCVecEnv(VecEnv):
         now = self._so_far
         now["steps"] += 1
         now["reward"] += reward
-        costs = {name: _of_step(infos, name, self.num_envs) for name in COSTS}
+        costs = {name: of_step(infos, name, self.num_envs) for name in COSTS}
         for name, cost in costs.items():
             now[name] += cost
         self.costs, touching = costs["cost"], costs["cost_contact"] > 0
         now["contacts"] += touching > now["touching"]
         now["touching"] = touching
-        separation_m = _of_step(infos, "safety/min_separation_m", self.num_envs)
+        separation_m = of_step(infos, "safety/min_separation_m", self.num_envs)
         now["nearest_m"] = np.fmin(now["nearest_m"], separation_m)
 
     def _episode(self, b: int, info: Mapping[str, Any]) -> dict[str, float]:
@@ -195,7 +195,7 @@ class HRCVecEnv(VecEnv):
         return [False] * len(list(self._get_indices(indices)))
 
 
-def _of_step(infos: Mapping[str, Any], name: str, num_envs: int) -> Floats:
+def of_step(infos: Mapping[str, Any], name: str, num_envs: int) -> Floats:
     """(B,) a value of the step itself, also where the episode ended with it; else NaN."""
     value = np.full(num_envs, np.nan)
     for part in (infos, infos.get("final_info", {})):

@@ -81,6 +81,22 @@ class ImpactExperiment(AnyExperiment):
 
 
 @dataclass(frozen=True)
+class PriceExperiment(AnyExperiment):
+    """What sight costs at equal safety: every pair of eyes with the shield margin it needs."""
+
+    name = "price"
+    out: Path = Path("out/price")
+    task: str = DEFAULT
+    """What the robots do, by the environment's id."""
+    seeds: int | None = None
+    """Episodes of every step of a search, instead of 300; then 10 for 3 of these confirm it."""
+    eyes: tuple[str, ...] = ()
+    """Compare these only, by name, as truth particle one_camera; quick: twelve."""
+    trainings: bool = False
+    """Also train robots, to see whether reward on belief teaches them to blind themselves."""
+
+
+@dataclass(frozen=True)
 class AblationsExperiment(AnyExperiment):
     """What the paper leaves open: cameras and places, N and M of Algorithm 1, latency,
     calibration, occlusion, several workers, what the parts of the default filter contribute."""
@@ -96,8 +112,8 @@ class AblationsExperiment(AnyExperiment):
 
 @dataclass(frozen=True)
 class Experiment:
-    """The paper's two experiments (site, lab), what perception is worth in safety (impact), and
-    ablations of rigs and estimators (ablations).
+    """The paper's two experiments (site, lab), what perception is worth in safety (impact), what
+    sight costs at equal safety (price), ablations of rigs and estimators (ablations).
 
     Each takes --quick (minutes) and --out DIR, where it writes report.html, results.json and
     figures; it keeps what is finished when it is stopped, and goes on there.
@@ -107,6 +123,7 @@ class Experiment:
         Annotated[SiteExperiment, tyro.conf.subcommand("site")]
         | Annotated[LabExperiment, tyro.conf.subcommand("lab")]
         | Annotated[ImpactExperiment, tyro.conf.subcommand("impact")]
+        | Annotated[PriceExperiment, tyro.conf.subcommand("price")]
         | Annotated[AblationsExperiment, tyro.conf.subcommand("ablations")]
     )
     """Which experiment."""

@@ -157,16 +157,6 @@ def margin_needed(rows: Sequence[Row], margins_m: Floats, reference: Row) -> Met
 
     def needed(weights: Ints) -> Floats:
         shares = np.nan_to_num((weights @ missed) / (weights @ called))
-        return np.array([_crossing(margins_m, share[:-1], share[-1]) for share in shares])
+        return np.array([intervals.crossing(margins_m, share[:-1], share[-1]) for share in shares])
 
     return intervals.bootstrap(needed, len(missed), "m", 1000)
-
-
-def _crossing(x: Floats, y: Floats, level: float) -> float:
-    """Where falling values y (n,) at x (n,) first come down to a level: linearly between the two
-    nearest, the last x if they never do."""
-    reached = np.flatnonzero(y <= level)
-    if not reached.size or reached[0] == 0:
-        return x[0] if reached.size else x[-1]
-    nearest = slice(reached[0] - 1, reached[0] + 1)
-    return float(np.interp(-level, -y[nearest], x[nearest]))

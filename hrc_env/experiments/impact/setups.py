@@ -1,5 +1,6 @@
 """The perception setups that are exchanged: level, estimator, cameras, lateness."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hrc_env.core.errors import check_names
@@ -13,6 +14,7 @@ from hrc_env.experiments.study.rigs import (
     late,
     left_with,
 )
+from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.scene.rigs import RIGS
 from hrc_env.tracking.estimators import ESTIMATORS
 
@@ -60,7 +62,10 @@ class PerceptionSetup:
     @property
     def turns(self) -> tuple[Turn, ...]:
         """Cameras and their faults, in which episodes take turns."""
-        rig = RIGS["lab"]
+        return self.turns_of(RIGS["lab"])
+
+    def turns_of(self, rig: Sequence[CameraConfig]) -> tuple[Turn, ...]:
+        """The same with another rig of four."""
         turns = (
             Turn(tuple(rig[c] for c in kept)) if self.is_alone else left_with(rig, kept)
             for kept in RIGS_OF[self.n_cameras]

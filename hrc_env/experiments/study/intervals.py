@@ -123,6 +123,16 @@ def counted_quantile_over(bins: Bins, counts: Any, q: float, unit: str) -> Metri
     return bootstrap(counted_quantile_of(bins, counts, q), len(counts), unit, 1000)
 
 
+def crossing(x: Floats, y: Floats, level: float) -> float:
+    """Where falling values y (n,) at x (n,) first come down to a level: linearly between the two
+    nearest, the last x if they never do."""
+    reached = np.flatnonzero(y <= level)
+    if not reached.size or reached[0] == 0:
+        return x[0] if reached.size else x[-1]
+    nearest = slice(reached[0] - 1, reached[0] + 1)
+    return float(np.interp(-level, -y[nearest], x[nearest]))
+
+
 def _usable(*samples: Numbers) -> list[Floats]:
     """(n,) each: the seeds of which every number is finite."""
     arrays = [np.asarray(each, float) for each in samples]

@@ -1,0 +1,1 @@
+"""What sight costs at equal safety: every pair of eyes with the shield margin that it needs."""

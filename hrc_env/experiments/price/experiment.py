@@ -1,0 +1,233 @@
+"""What sight costs at equal safety: every pair of eyes with the shield margin that it needs."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import closing
+from dataclasses import asdict, dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from hrc_env.core.errors import ConfigError, HRCError
+from hrc_env.experiments.impact.episodes import PEOPLE, Rows
+from hrc_env.experiments.price import blindness
+from hrc_env.experiments.price.episodes import Stage
+from hrc_env.experiments.price.eyes import (
+    ELSEWHERE,
+    FOUR,
+    QUICK,
+    TRUTH,
+    Eyes,
+    eyes_called,
+    usual_eyes,
+)
+from hrc_env.experiments.price.metrics import PER, Row, metrics_of
+from hrc_env.experiments.price.report import report
+from hrc_env.experiments.price.search import bisected
+from hrc_env.experiments.price.shield import SHIELD
+from hrc_env.experiments.study.cache import PartCache
+from hrc_env.experiments.study.fingerprint import fingerprint_of, source_digest
+from hrc_env.experiments.study.runner import Study, at_least_one, changed
+from hrc_env.tasks import BUILT_IN, DEFAULT
+from hrc_env.tasks.task import task_called
+from hrc_env.tracking.estimators import estimator_called
+
+PARTS_FROM = (
+    "hrc_env.experiments.price.episodes", "agents.registry", "agents.experts",
+)  # fmt: skip
+"""Those that make finished parts."""
+FIRST_SEED, FIRST_FRESH, FIRST_PIXELS = 3_000_000, 4_000_000, 5_000_000
+"""Of the search, of the episodes that confirm it, of those with rendered images."""
+
+
+@dataclass(frozen=True, slots=True)
+class PriceConfig:
+    """How much is played. Numbers of episodes are those of 10 s; of longer ones as much time."""
+
+    task: str = DEFAULT
+    """What the robot does."""
+    others: tuple[str, ...] = ()
+    """Other tasks, each with the eyes `ELSEWHERE`."""
+    eyes: tuple[str, ...] = field(default_factory=usual_eyes)
+    """Who is compared, by name."""
+    n_seeds: int = 300
+    """Episodes of every step of a search."""
+    n_fresh: int = 1000
+    """Episodes, on other seeds, with the margin that it found."""
+    n_search: int = 6
+    """Steps of a search."""
+    bracket_m: tuple[float, float] = (-0.4, 0.4)
+    """Least and greatest margin: unshielded robots need less than any, the blind more."""
+    level: float = 30.0
+    """Contacts towards the worker in 1,000 episodes of 10 s."""
+    n_pixels: int = 40
+    """Episodes with rendered images and a network, and as many with the emulator; 0: none."""
+    n_steps: int | None = None
+    """Control steps of an episode; None: the task's."""
+    trainings: blindness.TrainingConfig | None = None
+    """What is learnt to see whether robots blind themselves; None: nothing."""
+
+    def __post_init__(self) -> None:
+        """Raise `ConfigError` for what cannot work."""
+        at_least_one(self, "n_seeds", "n_fresh", "n_search")
+        eyes_called(self.eyes)
+        if not self.eyes:
+            raise ConfigError(f"No eyes to compare; there are {', '.join(usual_eyes())}.")
+        low, high = self.bracket_m
+        if not (low < high and self.level > 0):
+            raise ConfigError(
+                "bracket_m must be (least, greatest) and level be positive, "
+                f"got {self.bracket_m} and {self.level}."
+            )
+        for task in (self.task, *self.others):
+            _check_task(task)
+
+    def pairs(self) -> Iterator[tuple[str, Eyes]]:
+        """Every task with every pair of eyes."""
+        for name in (self.task, *self.others):
+            for eyes in eyes_called(self.eyes if name == self.task else ELSEWHERE):
+                yield name, eyes
+
+    def steps_of(self, task: str) -> int:
+        """Control steps of an episode."""
+        return self.n_steps or task_called(task).max_episode_steps
+
+    def seeds(self, task: str, n: int, first: int = FIRST_SEED) -> list[int]:
+        """One an episode: as many as last as long as `n` of the first task's."""
+        share = task_called(DEFAULT).max_episode_steps / task_called(task).max_episode_steps
+        return [first + k for k in range(max(round(n * share), 1))]
+
+
+def _check_task(task: str) -> None:
+    """Raise `ConfigError` for a task that the study cannot play."""
+    from hrc_env.core.checkout import agents
+
+    task_called(task)
+    known = agents("experts").EXPERTS
+    if task not in known:
+        raise ConfigError(
+            f"The price is that of a scripted robot, and there is none for {task}; there is for "
+            f"{', '.join(known)}."
+        )
+
+
+def config_for(
+    quick: bool = False,
+    seeds: int | None = None,
+    task: str = DEFAULT,
+    eyes: Sequence[str] = (),
+    trainings: bool = False,
+) -> PriceConfig:
+    """The settings that the command line asks for. Quick: twelve pairs of eyes, the first task. Of
+    another task than the first three pairs of eyes, if none are named."""
+    usual = PriceConfig(eyes=QUICK, n_pixels=0) if quick else PriceConfig(
+        others=tuple(each for each in BUILT_IN if each != DEFAULT)
+    )  # fmt: skip
+    if task != DEFAULT:
+        usual = changed(usual, task=task, others=(), eyes=ELSEWHERE, n_pixels=0)
+    config = changed(usual, n_seeds=seeds, eyes=tuple(dict.fromkeys(eyes)) or None)
+    if seeds is not None:
+        config = changed(config, n_fresh=-(-10 * seeds // 3), n_pixels=min(seeds, config.n_pixels))
+    return changed(config, trainings=blindness.config_for(quick) if trainings else None)
+
+
+def play(config: PriceConfig, cache: PartCache) -> dict[str, Any]:
+    """Rows by task and eyes, unshielded episodes by task, episodes with pixels, trainings."""
+    table: dict[str, dict[str, Row]] = {}
+    alone = {task: _unshielded(config, cache, task) for task in (config.task, *config.others)}
+    for task, eyes in config.pairs():
+        table.setdefault(task, {})[eyes.name] = row = _price(config, cache, task, eyes)
+        check_walks(task, alone[task], row)
+    played = {"table": table, "alone": alone, "pixels": _pixels(config, cache, table)}
+    if config.trainings is not None:
+        played["trainings"] = blindness.play(config.trainings, cache)
+    return played
+
+
+def _price(config: PriceConfig, cache: PartCache, task: str, eyes: Eyes) -> Row:
+    """Search the margin of one pair of eyes, play on with it."""
+    searched: list[Rows] = []
+    with closing(Stage(eyes, task, config.steps_of(task))) as stage:
+        part = partial(_part, config, cache, stage)
+
+        def rate(margin_m: float) -> float:
+            rows = part(config.seeds(task, config.n_seeds), margin_m)
+            searched.append(rows)
+            return float(PER * np.sum(rows["towards"]) / np.sum(rows["minutes"]))
+
+        tried = bisected(rate, *config.bracket_m, config.level, config.n_search)
+        fresh = part(config.seeds(task, config.n_fresh, FIRST_FRESH), tried[-1])
+    return Row(tried, searched, fresh)
+
+
+def _unshielded(config: PriceConfig, cache: PartCache, task: str) -> Rows:
+    (eyes,) = eyes_called([TRUTH])
+    seeds = config.seeds(task, config.n_fresh, FIRST_FRESH)
+    with closing(Stage(eyes, task, config.steps_of(task), is_shielded=False)) as stage:
+        return _part(config, cache, stage, seeds, 0.0)
+
+
+def _pixels(config: PriceConfig, cache: PartCache, table: Any) -> dict[str, Rows]:
+    """The same few episodes with the emulator and with rendered images, with one margin."""
+    if not config.n_pixels or FOUR not in table[config.task]:
+        return {}
+    margin_m, found = table[config.task][FOUR].margins_m[-1], {}
+    (eyes,) = eyes_called([FOUR])
+    for level in ("keypoints", "pixels"):
+        setup = changed(eyes.setup, level=level)
+        of_level = changed(eyes, name=f"{FOUR}_{level}", setup=setup)
+        with closing(Stage(of_level, config.task, config.steps_of(config.task))) as stage:
+            seeds = [FIRST_PIXELS + k for k in range(config.n_pixels)]
+            found[level] = _part(config, cache, stage, seeds, margin_m)
+    return found
+
+
+def _part(
+    config: PriceConfig, cache: PartCache, stage: Stage, seeds: list[int], margin_m: float
+) -> Rows:
+    """Episodes with one margin, from the cache or anew."""
+    eyes = stage.eyes
+    made_of = {
+        "people": PEOPLE, "task": stage.task, "seeds": seeds, "n_steps": stage.n_steps,
+        "eyes": asdict(eyes), "margin_m": margin_m, "shield": SHIELD if stage.is_shielded else "",
+        "estimator": source_digest(estimator_called(eyes.setup.estimator).make),
+    }  # fmt: skip
+    which = {FIRST_SEED: "searched", FIRST_FRESH: "fresh", FIRST_PIXELS: "pixels"}[seeds[0]]
+    kept = f"{1e4 * margin_m:+.0f}" if stage.is_shielded else "unshielded"
+    key = fingerprint_of(made_of, *PARTS_FROM)
+    make = partial(stage.play, seeds, margin_m)
+    return cache.part(f"{stage.task}.{eyes.name}.{which}.{kept}", make, key)
+
+
+def check_walks(task: str, alone: Rows, row: Row) -> None:
+    """Raise unless workers walked as beside the unshielded robot, where nobody waits for it."""
+    if task_called(task).cue is None and row.fresh["walk"] != alone["walk"]:
+        raise HRCError(
+            f"In {task} workers walked otherwise than beside other robots: nothing can be "
+            "compared. Delete the folder's parts and start again."
+        )
+
+
+def _n_parts(config: PriceConfig) -> float:
+    n_pairs = sum(1 for _ in config.pairs())
+    n_levels = 2 if config.n_pixels and FOUR in config.eyes else 0
+    n_trained = 0 if config.trainings is None else config.trainings.n_parts
+    return n_pairs * (config.n_search + 1) + 1 + len(config.others) + n_levels + n_trained
+
+
+STUDY = Study(
+    name="price",
+    modules=PARTS_FROM,
+    settings=lambda config: {"people": PEOPLE, "shield": SHIELD, **asdict(config)},
+    seeds=lambda config: (
+        config.seeds(config.task, config.n_seeds)
+        + config.seeds(config.task, config.n_fresh, FIRST_FRESH)
+    ),
+    n_parts=_n_parts,
+    play=play,
+    metrics=lambda config, played: {
+        **metrics_of(played["table"], played["alone"], played["pixels"], config.level),
+        **blindness.metrics_of(played.get("trainings", {})),
+    },
+    report=lambda config, played, metrics, figures: report(figures, config, played, metrics),
+)

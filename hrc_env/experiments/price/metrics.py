@@ -1,0 +1,169 @@
+"""From sums of episodes to prices: the margin of every pair of eyes at the level, what it leaves.
+
+All eyes of a task have the same seeds: what is said of two of them is compared draw by draw.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from hrc_env.core.results import Metric
+from hrc_env.core.typing import Floats
+from hrc_env.experiments.impact.episodes import Rows
+from hrc_env.experiments.price.eyes import ELSEWHERE, FOUR, ONE, TRUTH
+from hrc_env.experiments.price.search import Tried, draws
+from hrc_env.experiments.study.intervals import ratio_over
+from hrc_env.experiments.study.report import Metrics
+
+N_DRAWS = 1000
+EPISODE_MIN = 10.0 / 60.0
+"""Contacts are given in a thousand episodes of so many minutes, also where episodes are longer."""
+PER = 1000 * EPISODE_MIN
+UNIT = "per 1000 episodes of 10 s"
+CONTRASTS: dict[str, tuple[str, str]] = {
+    "three_cameras": (FOUR, "three_cameras"),
+    "two_cameras": (FOUR, "two_cameras"),
+    "one_camera": (FOUR, ONE),
+    "late_120ms": (FOUR, "late_120ms"),
+    "late_200ms": (FOUR, "late_200ms"),
+    "telling_120ms": ("late_120ms", "late_120ms_untold"),
+    "telling_200ms": ("late_200ms", "late_200ms_untold"),
+    "kalman": (FOUR, "kalman"),
+    "paper_restarts": (FOUR, "paper_restarts"),
+    "triangulation": (FOUR, "triangulation"),
+    "calibration": (FOUR, "all_turned_1deg"),
+    "half_covariance": (FOUR, "half_covariance"),
+    "twice_covariance": (FOUR, "twice_covariance"),
+    "honesty_of_one": (ONE, "one_camera_half_covariance"),
+    "truth": (TRUTH, FOUR),
+    "calibration_over_accuracy": ("triangulation", "all_turned_1deg"),
+}
+"""Questions: the share that the first eyes keep less what the second ones do."""
+
+
+class Row:
+    """What was played with one pair of eyes: the search, the fresh episodes with its last margin.
+
+    Attributes:
+        drawn: (1 + R, 2) margin [m] and goals a minute at the level, by how seeds are drawn; the
+            first of all seeds once.
+    """
+
+    def __init__(self, margins_m: Sequence[float], searched: Sequence[Rows], fresh: Rows) -> None:
+        self.margins_m, self.searched, self.fresh = margins_m, searched, fresh
+        self.drawn: Floats = np.full((1 + N_DRAWS, 2), np.nan)
+
+    def settle(self, level: float) -> None:
+        """Find what there is at a level, in `UNIT`."""
+        sums = (
+            np.array([row[name] for row in self.searched], float)
+            for name in ("towards", "achieved", "minutes")
+        )
+        fresh = (np.array(self.fresh[name], float) for name in ("towards", "achieved", "minutes"))
+        tried = Tried(np.array(self.margins_m), *sums, *fresh)
+        weights = draws(tried.events.shape[1], len(tried.fresh_events), N_DRAWS)
+        self.drawn = tried.at(level / PER, *weights)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the level lies beyond the margins that were tried."""
+        margin_m = self.drawn[0, 0]
+        return bool(margin_m in (min(self.margins_m), max(self.margins_m)))
+
+
+def metrics_of(
+    table: Mapping[str, Mapping[str, Row]],
+    alone: Mapping[str, Rows],
+    pixels: Mapping[str, Rows],
+    level: float,
+) -> dict[str, Metric]:
+    """By `<task>.<eyes>.<what>`, `<task>.unshielded.<what>`, `<task>.ranking`, `worth.<question>`
+    and `slice.<level>.<what>`, from rows by task and eyes, unshielded episodes by task, and the
+    few with the emulator and with rendered images."""
+    metrics = {
+        f"slice.{name}.{what}": metric
+        for name, rows in pixels.items()
+        for what, metric in _rates(rows).items()
+    }
+    for task, rows in table.items():
+        unshielded = _rates(alone[task])
+        metrics |= {f"{task}.unshielded.{what}": each for what, each in unshielded.items()}
+        shares = {}
+        most = _drawn_rate(alone[task])
+        for name, row in rows.items():
+            row.settle(level)
+            shares[name] = row.drawn[:, 1] / most
+            for what, metric in _of_row(row, shares[name]).items():
+                metrics[f"{task}.{name}.{what}"] = metric
+        for name, share in shares.items():
+            if TRUTH in shares:
+                n = len(rows[name].fresh["minutes"])
+                ratio = _metric(share / shares[TRUTH], "share", n)
+                metrics[f"{task}.{name}.of_truth"] = ratio
+        metrics |= _ranking(task, shares, len(alone[task]["minutes"]))
+    first = next(iter(table))
+    return metrics | _worth(table[first], _drawn_rate(alone[first]))
+
+
+def _rates(rows: Rows) -> Metrics:
+    """What is counted in episodes."""
+    per = np.array(rows["minutes"]) / PER
+    contacts = {kind: ratio_over(rows[kind], per, UNIT) for kind in ("towards", "standing", "away")}
+    goals = ratio_over(rows["achieved"], rows["minutes"], "1/min")
+    return {
+        **contacts,
+        "goals_per_min": goals,
+        "cost": ratio_over(rows["cost"], 1000 * per, "per episode of 10 s"),
+    }
+
+
+def _of_row(row: Row, share: Floats) -> Metrics:
+    n = len(row.fresh["minutes"])
+    confirmed = {f"confirmed.{what}": each for what, each in _rates(row.fresh).items()}
+    margin_m = float(row.margins_m[-1])
+    return {
+        "margin_m": _metric(row.drawn[:, 0], "m", n),
+        "goals_per_min": _metric(row.drawn[:, 1], "1/min", n),
+        "share": _metric(share, "share", n),
+        "confirmed.margin_m": Metric(margin_m, margin_m, margin_m, "m", n),
+        **confirmed,
+    }
+
+
+def _drawn_rate(rows: Rows) -> Floats:
+    """(1 + R,) achieved a minute, over the draws of fresh seeds."""
+    minutes = np.array(rows["minutes"])
+    _, fresh = draws(1, len(minutes), N_DRAWS)
+    return np.asarray((fresh @ np.array(rows["achieved"], float)) / (fresh @ minutes))
+
+
+def _worth(rows: Mapping[str, Row], most: Floats) -> dict[str, Metric]:
+    found = {}
+    for question, (ours, theirs) in CONTRASTS.items():
+        if ours in rows and theirs in rows:
+            lost = (rows[ours].drawn[:, 1] - rows[theirs].drawn[:, 1]) / most
+            found[f"worth.{question}"] = _metric(lost, "share", len(rows[ours].fresh["minutes"]))
+    return found
+
+
+def _ranking(task: str, shares: Mapping[str, Floats], n: int) -> Metrics:
+    """In which share of the draws truth keeps as much as four cameras and these as much as one."""
+    if not set(ELSEWHERE) <= shares.keys():
+        return {}
+    truth, four, one = (shares[name] for name in ELSEWHERE)
+    holds = float(((truth >= four) & (four >= one))[1:].mean())
+    return {
+        f"{task}.ranking": Metric(holds, holds, holds, "share of draws", n),
+        f"{task}.lost_by_four": _metric(truth - four, "share", n),
+        f"{task}.lost_by_one": _metric(four - one, "share", n),
+    }
+
+
+def _metric(drawn: Floats, unit: str, n: int) -> Metric:
+    """The first of the draws with the 95 % interval of the others; NaN where it has no value."""
+    known: Any = drawn[1:][np.isfinite(drawn[1:])]
+    if not (np.isfinite(drawn[0]) and known.size):
+        return Metric(np.nan, np.nan, np.nan, unit, n)
+    low, high = np.quantile(known, [0.025, 0.975])
+    return Metric(float(drawn[0]), float(low), float(high), unit, n)

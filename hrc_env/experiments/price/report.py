@@ -1,0 +1,214 @@
+"""The report: bars that say what sight costs, the margins behind them, questions, blindness."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from matplotlib.axes import Axes
+
+from hrc_env.experiments.price.blindness import MEASURED, WORDS, Learnt
+from hrc_env.experiments.price.eyes import ELSEWHERE, FOUR, GROUPS, QUICK, Eyes, all_eyes
+from hrc_env.experiments.price.trainings import TRUE
+from hrc_env.experiments.study.plots import ends, label, new_figure, save
+from hrc_env.experiments.study.report import Column, Metrics, Report, picture, table_of
+
+COLUMNS = {
+    "margin_m": ("margin [m]", 3, 1.0),
+    "goals_per_min": ("goals / min", 1, 1.0),
+    "share": ("of unshielded [%]", 0, 100.0),
+    "of_truth": ("of perfect sight's [%]", 0, 100.0),
+    "confirmed.margin_m": ("played with [m]", 4, 1.0),
+    "confirmed.towards": ("contacts towards", 0, 1.0),
+    "confirmed.standing": ("standing", 0, 1.0),
+    "confirmed.away": ("fleeing", 0, 1.0),
+    "confirmed.goals_per_min": ("goals / min", 1, 1.0),
+    "confirmed.cost": ("true cost", 1, 1.0),
+}
+"""Of the table: words, digits, factor."""
+RATES = {name: words for name, words in COLUMNS.items() if name.startswith("confirmed.")}
+QUESTIONS = {
+    "three_cameras": "the fourth camera", "two_cameras": "the third and the fourth",
+    "one_camera": "all cameras but one", "late_120ms": "images on time, not 120 ms late (known)",
+    "late_200ms": "not 200 ms late (known)", "telling_120ms": "knowing of 120 ms",
+    "telling_200ms": "knowing of 200 ms", "kalman": "particle rather than kalman",
+    "paper_restarts": "particle rather than paper_restarts",
+    "triangulation": "particle rather than triangulation",
+    "calibration": "cameras that are not turned by 1 degree",
+    "half_covariance": "covariances that are not half as large",
+    "twice_covariance": "not twice as large",
+    "honesty_of_one": "with one camera: not half as large",
+    "truth": "perfect sight rather than four cameras",
+    "calibration_over_accuracy": "calibrated cameras more than a better estimator "
+    "(triangulation less cameras turned by 1 degree)",
+}  # fmt: skip
+"""What each of `CONTRASTS` is worth, in words."""
+COLOURS = {
+    "truth": "0.25", "estimator": "#2f6db3", "cameras": "#3a9a8f", "latency": "#d1793b",
+    "calibration": "#b23a48", "covariance": "#8a6bb8", "fault": "#8c7a4f",
+}  # fmt: skip
+ASKED = """\
+Eyes that see less need more distance, and distance costs work. Every pair of eyes gets the shield
+margin with which the robot touches a worker while moving towards them {level:g} times in 1,000
+episodes of 10 s: all are equally safe then, and the goals that are left are the price of sight. The
+margin is added to all protective distances of the `{shield}` shield and may be negative: the
+shield as it comes is much safer than that. It is found by bisection on {n_seeds} episodes, the same
+for everybody, and confirmed on {n_fresh} others: what these say of the level is in the intervals,
+as is the uncertainty of the margin. The robot is the scripted one, the workers take no notice of
+it; a touch is called by what the robot did in the step before, and touches within half a second of
+each other are one. In tasks with longer episodes there are fewer, and a thousand episodes are as
+much time."""
+
+
+def report(figures: Path, config: Any, played: Mapping[str, Any], metrics: Metrics) -> Report:
+    """Draw the figures; the tables beside them."""
+    task, table = config.task, played["table"]
+    eyes = [all_eyes()[name] for name in table[task]]
+    draw_price(figures / "price.png", metrics, task, eyes)
+    parts = [
+        picture(figures / "price.png", "Goals that are left at equal safety, in per cent of those "
+                "of a robot without a shield; whiskers are 95 % intervals."),
+        _table(task, eyes, metrics), _open_ended(table[task]), _worth(metrics),
+    ]  # fmt: skip
+    if config.others:
+        parts.append("## Other tasks")
+        parts += [_other(each, metrics) for each in config.others]
+    if played["pixels"]:
+        columns = [Column("slice.{}." + name.removeprefix("confirmed."), *words)
+                   for name, words in RATES.items() if name != "confirmed.margin_m"]  # fmt: skip
+        levels = {"keypoints": "the emulator", "pixels": "rendered images and the network"}
+        parts += [
+            f"## The emulator beside images\n\n{config.n_pixels} episodes with the margin of "
+            f"`{FOUR}`; too few for a bar, the same for both.",
+            table_of("level", levels, columns, metrics),
+        ]
+    if "trainings" in played:
+        parts += blind(figures, played["trainings"], metrics)
+    asked = ASKED.format(
+        level=config.level, shield="qp", n_seeds=config.n_seeds, n_fresh=config.n_fresh
+    )
+    return Report("What sight costs at equal safety", asked, [part for part in parts if part])
+
+
+def _table(task: str, eyes: Sequence[Eyes], metrics: Metrics) -> str:
+    columns = [Column(f"{task}.{{}}.{what}", *words) for what, words in COLUMNS.items()]
+    words = {each.name: each.words for each in eyes} | {"unshielded": "no shield"}
+    none = [Column(f"{task}.{{}}.{what.removeprefix('confirmed.')}", *said)
+            for what, said in RATES.items() if what != "confirmed.margin_m"]  # fmt: skip
+    alone = table_of("without a shield", {"unshielded": words.pop("unshielded")}, none, metrics)
+    return table_of(task, words, columns, metrics) + "\n\n" + alone
+
+
+def _open_ended(rows: Mapping[str, Any]) -> str:
+    beyond = [f"`{name}`" for name, row in rows.items() if row.is_open]
+    if not beyond:
+        return ""
+    return (
+        f"The level lies beyond the margins that were tried for {', '.join(beyond)}: theirs is "
+        "the last one tried, and their price a bound."
+    )
+
+
+def _worth(metrics: Metrics) -> str:
+    asked = {key: words for key, words in QUESTIONS.items() if f"worth.{key}" in metrics}
+    if not asked:
+        return ""
+    column = Column("worth.{}", "of unshielded throughput [%]", 1, 100.0, signed=True)
+    return (
+        "## What it is worth\n\nThroughput at equal safety that is lost without it, on the same "
+        "seeds; a dot where the interval leaves out zero.\n\n"
+        + table_of("", asked, [column], metrics)
+    )
+
+
+def _other(task: str, metrics: Metrics) -> str:
+    names = ("margin_m", "goals_per_min", "share", "of_truth", "confirmed.towards")
+    columns = [Column(f"{task}.{{}}.{what}", *COLUMNS[what]) for what in names]
+    known = all_eyes()
+    text = table_of(task, {name: known[name].words for name in ELSEWHERE}, columns, metrics)
+    if f"{task}.ranking" not in metrics:
+        return text
+    holds = metrics[f"{task}.ranking"].value
+    return (
+        f"{text}\n\nPerfect sight keeps as much as four cameras, and these as much as one, in "
+        f"{holds:.0%} of the draws."
+    )
+
+
+def draw_price(path: Path, metrics: Metrics, task: str, eyes: Sequence[Eyes]) -> None:
+    """A bar for each pair of eyes, the best above; of many only those that everybody asks for."""
+    shown = [each for each in eyes if len(eyes) <= len(QUICK) or each.name in QUICK]
+    shares = {each.name: metrics[f"{task}.{each.name}.share"] for each in shown}
+    shown = sorted(shown, key=lambda each: shares[each.name].value)
+    figure = new_figure(9.2, 1.6 + 0.42 * len(shown))
+    axis = figure.subplots()
+    values = [shares[each.name] for each in shown]
+    axis.barh(
+        range(len(shown)), [100 * each.value for each in values], xerr=ends(values, 100.0),
+        color=[COLOURS[each.group] for each in shown], height=0.72, ecolor="0.35", capsize=3,
+    )  # fmt: skip
+    _say(axis, shown, values)
+    figure.suptitle("What sight costs at equal safety", fontsize=16, fontweight="bold")
+    save(figure, path)
+
+
+def _say(axis: Axes, shown: Sequence[Eyes], values: Sequence[Any]) -> None:
+    """Words at bars, numbers in them, and what they are per cent of."""
+    axis.set_yticks(range(len(shown)), [each.words for each in shown], fontsize=12)
+    for y, value in enumerate(values):
+        if value.value == value.value:
+            axis.text(1.2, y, f"{100 * value.value:.0f} %", va="center", color="white",
+                      fontsize=12, fontweight="bold")  # fmt: skip
+    label(axis, "work done, in % of a robot without a shield, when all touch people equally rarely",
+          grid="x")  # fmt: skip
+    axis.set_xlim(0, 100)
+    used = {each.group for each in shown}
+    handles = [axis.barh(0, 0, color=COLOURS[name]) for name in GROUPS if name in used]
+    axis.legend(handles, [GROUPS[name] for name in GROUPS if name in used], loc="lower right",
+                fontsize=10, framealpha=0.95)  # fmt: skip
+    for side in ("top", "right", "left"):
+        axis.spines[side].set_visible(False)
+    axis.tick_params(axis="y", length=0)
+
+
+def blind(figures: Path, learnt: Learnt, metrics: Metrics) -> list[str]:
+    """Whether robots blind themselves: curves, numbers at the end, differences from the truth."""
+    draw_learning(figures / "blindness.png", learnt)
+    rows = {f"{reward}_{n}cam": f"{WORDS[reward]}; {n} camera{'s' if n > 1 else ''}"
+            for reward, n in learnt}  # fmt: skip
+    others = {key: words for key, words in rows.items() if not key.startswith(TRUE)}
+    units = {what: (f"{what.removesuffix('_m')} [{unit}]", 3) for what, unit in MEASURED.items()}
+    columns = [Column(f"blind.{{}}.{what}", *words) for what, words in units.items()]
+    off = [Column(f"blind.difference.{{}}.{what}", *words, signed=True)
+           for what, words in units.items()]  # fmt: skip
+    return [
+        "## Does reward on belief teach a robot to blind itself?",
+        picture(figures / "blindness.png", "Over training: believed less true separation near the "
+                "worker, steps without a track, lines of sight that the robot cuts; a line a seed.",
+        ),
+        table_of("at the end, closeness rewarded by", rows, columns, metrics),
+        "Less reward on the truth, seed by seed.",
+        table_of("closeness rewarded by", others, off, metrics),
+    ]  # fmt: skip
+
+
+def draw_learning(path: Path, learnt: Learnt) -> None:
+    """Optimism, lost steps, hidden lines of sight over training; a column a number of cameras."""
+    cameras = sorted({n for _, n in learnt}, reverse=True)
+    shown = {"optimism_m": "believed less true separation [m]", "lost": "without a track (share)",
+             "hidden": "lines of sight cut by the robot (share)"}  # fmt: skip
+    figure = new_figure(4.4 * len(cameras) + 0.5, 8.5)
+    axes = figure.subplots(len(shown), len(cameras), squeeze=False, sharey="row", sharex=True)
+    for row, (what, words) in zip(axes, shown.items(), strict=True):
+        for axis, n_cameras in zip(row, cameras, strict=True):
+            for (reward, n), curves in learnt.items():
+                for k, curve in enumerate(curves if n == n_cameras else ()):
+                    colour = f"C{list(WORDS).index(reward)}"
+                    steps = [each / 1000 for each in curve["steps"]]
+                    name = WORDS[reward] if k == 0 else None
+                    axis.plot(steps, curve[what], color=colour, alpha=0.8, label=name)
+            title = f"{n_cameras} camera{'s' if n_cameras > 1 else ''}" if row is axes[0] else ""
+            label(axis, "1,000 steps" if row is axes[-1] else "",
+                  words if axis is row[0] else "", title)  # fmt: skip
+    handles, words = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, words, loc="outside lower center", ncols=1, fontsize=11)
+    save(figure, path)
