@@ -1,6 +1,7 @@
 """Trainings of PPO that differ in what closeness is rewarded by and in how many cameras there are,
 and what is measured of the robot while it learns."""
 
+import warnings
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -9,7 +10,6 @@ from typing import Any
 
 import numpy as np
 from gymnasium.utils import seeding
-from gymnasium.vector import VectorWrapper
 
 from hrc_env.config import settle
 from hrc_env.control import checked_action
@@ -72,20 +72,27 @@ class Training:
         }  # fmt: skip
 
 
-class TrueProximity(VectorWrapper):  # type: ignore[type-arg]
+class TrueProximity:
     """Environments that reward closeness by the true separation; all else reads the estimate. Only
     for this question: no reward of the library knows the truth."""
+
+    def __init__(self, env: Any) -> None:
+        self.env = env
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.env, name)
 
     def step(self, actions: Any) -> Any:
         """A step of every environment."""
         from hrc_env.sb3 import of_step
 
         observation, reward, *ends, infos = self.env.step(actions)
-        weights = self.env.shards.first.reward_weights  # type: ignore[attr-defined]
-        true_m = of_step(infos, "safety/min_separation_m", self.num_envs)
-        near = closeness(true_m, weights.proximity_reach_m)
-        believed = of_step(infos, "reward/proximity", self.num_envs)
-        return observation, reward - believed - weights.proximity * near, *ends, infos
+        weights, n = self.env.shards.first.reward_weights, self.env.num_envs
+        true_m, believed = (
+            of_step(infos, name, n) for name in ("safety/min_separation_m", "reward/proximity")
+        )
+        truly = -weights.proximity * closeness(true_m, weights.proximity_reach_m)
+        return observation, reward - believed + truly, *ends, infos
 
 
 def learn(training: Training, tick: PartProgress) -> dict[str, list[float]]:
@@ -99,7 +106,11 @@ def learn(training: Training, tick: PartProgress) -> dict[str, list[float]]:
     threads = torch.get_num_threads()
     torch.set_num_threads(1)  # more are slower in networks as small as these
     arguments, found = training.arguments(), dict[str, list[float]]()
-    env = HRCVecEnv(N_ENVS, stagger=True, seed=training.seed, num_threads=n_cores(), **arguments)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # that one camera is a poor rig is what we ask about
+        env = HRCVecEnv(
+            N_ENVS, stagger=True, seed=training.seed, num_threads=n_cores(), **arguments
+        )
     if training.reward == TRUE:
         env.env = TrueProximity(env.env)  # type: ignore[assignment]
 
@@ -134,7 +145,10 @@ def watch(act: Any, training: Training) -> dict[str, float]:
     """
     settings, n = settle(**training.arguments()), training.n_watched
     make = partial(Simulation, settings=settings)
-    with closing(Shards(n, min(n_cores(), n), make)) as env:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        shards = Shards(n, min(n_cores(), n), make)
+    with closing(shards) as env:
         seeds = [FIRST_SEED + k for k in range(n)]
         result = env.reset(np.arange(n), [seeding.np_random(seed)[0] for seed in seeds])
         n_steps, steps, touching = settings.task.max_episode_steps, [], []

@@ -1,0 +1,382 @@
+"""What sight costs at equal safety: the search, its intervals, who is compared, what is written."""
+
+import json
+import signal
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from hrc_env.config import settle
+from hrc_env.core.errors import ConfigError, HRCError
+from hrc_env.core.results import Metric
+from hrc_env.core.typing import Floats
+from hrc_env.experiments.impact.setups import PerceptionSetup
+from hrc_env.experiments.price import blindness, report, trainings
+from hrc_env.experiments.price.blindness import TrainingConfig
+from hrc_env.experiments.price.episodes import STEP, Stage, first_touches, sums_of
+from hrc_env.experiments.price.experiment import (
+    STUDY,
+    PriceConfig,
+    check_walks,
+    config_for,
+)
+from hrc_env.experiments.price.eyes import ELSEWHERE, QUICK, all_eyes, eyes_called
+from hrc_env.experiments.price.metrics import CONTRASTS, Row, metrics_of
+from hrc_env.experiments.price.report import QUESTIONS
+from hrc_env.experiments.price.search import Tried, bisected, draws
+from hrc_env.experiments.price.shield import Widened
+from hrc_env.experiments.study.cache import PartCache
+from hrc_env.experiments.study.runner import run
+from hrc_env.rewards import RewardConfig
+from hrc_env.safety.shield import SHIELDS
+from hrc_env.simulation import Simulation
+
+TINY = PriceConfig(
+    eyes=("truth", "two_cameras"), n_seeds=5, n_fresh=6, n_search=2, n_pixels=0, n_steps=30
+)
+
+
+def silent(share, label):
+    """Say nothing."""
+
+
+@pytest.fixture(scope="module")
+def end_to_end(tmp_path_factory):
+    """A run from beginning to end: its folder and its numbers."""
+    out = tmp_path_factory.mktemp("price")
+    return out, run(STUDY, TINY, out, silent)
+
+
+def contacts_at(margin_m: float) -> float:
+    """Contacts a minute that fall by a factor of e every 5 cm: 0.18 at 11 cm."""
+    return 0.18 * np.exp((0.11 - margin_m) / 0.05)
+
+
+def test_bisection_ends_next_to_where_the_level_is():
+    tried = bisected(contacts_at, -0.4, 0.4, 0.18, 12)
+    assert tried[:3] == pytest.approx([0.0, 0.2, 0.1])
+    assert tried[-1] == pytest.approx(0.11, abs=0.8 / 2**12)
+
+
+def test_bisection_goes_to_the_end_of_a_bracket_that_lacks_the_level():
+    assert bisected(lambda margin: 1.0, -0.4, 0.4, 0.5, 5)[-1] == pytest.approx(0.4, abs=0.03)
+    assert bisected(lambda margin: 0.0, -0.4, 0.4, 0.5, 5)[-1] == pytest.approx(-0.4, abs=0.03)
+
+
+def tried(rng, n: int = 300, m: int = 1000, fresh_more: float = 1.0) -> Tried:
+    """A search on a synthetic curve: contacts as `contacts_at`, goals 40 - 50 x margin a minute;
+    every seed has a number of its own, so that margins differ by what they do."""
+    margins_m = np.array(bisected(contacts_at, -0.4, 0.4, 0.18, 6))
+    expected = np.array([contacts_at(margin) for margin in margins_m]) / 6.0
+    luck, fresh_luck = rng.uniform(size=n), rng.uniform(size=m)
+    goals = (40 - 50 * margins_m) / 6.0
+    own, fresh_own = rng.normal(0, 1, n), rng.normal(0, 1, m)
+    return Tried(
+        margins_m, (luck < expected[:, None]).astype(float), goals[:, None] + own,
+        np.full((6, n), 1 / 6), (fresh_luck < fresh_more * expected[-1]).astype(float),
+        goals[-1] + fresh_own, np.full(m, 1 / 6),
+    )  # fmt: skip
+
+
+def test_what_is_found_at_the_level_is_in_its_interval():
+    inside = np.zeros(2)
+    for seed in range(40):
+        drawn = tried(np.random.default_rng(seed)).at(0.18, *draws(300, 1000, 200))[1:]
+        low, high = np.quantile(drawn, [0.025, 0.975], axis=0)
+        inside += (low <= [0.11, 34.5]) & (high >= [0.11, 34.5])
+    assert (inside >= 34).all()
+    assert 0.005 < (high - low)[0] < 0.08
+
+
+def test_fresh_seeds_that_say_otherwise_move_the_margin():
+    """Three times the contacts at that margin: it needs a wider one, at fewer goals."""
+    margins_m = {
+        more: tried(np.random.default_rng(0), fresh_more=more).at(0.18, *draws(300, 1000, 1))[0]
+        for more in (0.5, 1.0, 3.0)
+    }
+    assert margins_m[0.5][0] < margins_m[1.0][0] < margins_m[3.0][0]
+    assert margins_m[3.0][1] < margins_m[1.0][1]
+
+
+def test_draws_are_the_same_for_everybody():
+    first, second = draws(5, 7, 3)
+    assert first[0].tolist() == [1] * 5
+    assert (second[1:].sum(1) == 7).all()
+    assert np.array_equal(draws(9, 7, 3)[1], second)
+
+
+def test_touches_within_half_a_second_are_one():
+    touching = np.zeros((40, 1), bool)
+    touching[[3, 4, 10, 30], 0] = True
+    assert np.flatnonzero(first_touches(touching, 12)[:, 0]).tolist() == [3, 30]
+
+
+def played(n_steps: int = 20, **columns: Floats) -> dict[str, float]:
+    """What one episode of such steps came to."""
+    steps = np.zeros((n_steps, 1), STEP)
+    for name, values in columns.items():
+        steps[name][:, 0] = values
+    return {name: values[0] for name, values in sums_of(steps, 0.04).items()}
+
+
+def test_a_touch_is_called_by_the_step_before():
+    touching = np.arange(20) == 5
+    kinds = {}
+    for speed in (0.3, 0.0, -0.3):
+        found = played(touching=touching, towards_mps=np.where(np.arange(20) == 4, speed, 1.0))
+        kinds[speed] = [found[kind] for kind in ("towards", "standing", "away")]
+    assert kinds == {0.3: [1, 0, 0], 0.0: [0, 1, 0], -0.3: [0, 0, 1]}
+
+
+def test_nothing_counts_after_the_end_of_an_episode():
+    k = np.arange(20)
+    found = played(over=k == 9, achieved=k, cost=np.ones(20), touching=k == 12, towards_mps=k)
+    assert found["achieved"] == 9
+    assert found["cost"] == 10
+    assert found["towards"] == 0
+    assert found["minutes"] == pytest.approx(10 * 0.04 / 60)
+
+
+def test_a_touch_in_the_first_step_is_no_contact():
+    assert played(touching=np.arange(20) == 0, towards_mps=np.ones(20))["towards"] == 0
+
+
+def test_eyes_are_what_their_names_say():
+    known = all_eyes()
+    assert set(QUICK) <= known.keys()
+    assert len(QUICK) == 12
+    assert set(ELSEWHERE) <= set(QUICK)
+    assert {name for pair in CONTRASTS.values() for name in pair} <= known.keys()
+    assert QUESTIONS.keys() == CONTRASTS.keys()
+    (turned,) = known["all_turned_1deg"].turns("lab")
+    assert turned.faults[0].kind == "wrong_rotation"
+    assert turned.faults[0].how_much == pytest.approx(np.deg2rad(1))
+    assert len(known["one_frozen"].turns("lab")) == 4
+    assert known["half_covariance"].covariance == 0.5
+    assert known["paper_restarts"].setup == PerceptionSetup(estimator="paper_restarts")
+    sites = known["one_camera"].turns("site")
+    assert sites[0].cameras != known["one_camera"].turns("lab")[0].cameras
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"n_seeds": 0}, "--seeds must be at least 1"),
+        ({"eyes": ("one_camara",)}, "Unknown eyes 'one_camara'. Did you mean 'one_camera'"),
+        ({"eyes": ()}, "No eyes to compare"),
+        ({"bracket_m": (0.1, 0.1)}, "bracket_m must be"),
+        ({"level": 0.0}, "level be positive"),
+        ({"task": "HRCReach-v1"}, "Unknown task 'HRCReach-v1'"),
+    ],
+)
+def test_what_cannot_be_played_is_refused(change, words):
+    with pytest.raises(ConfigError, match=words):
+        replace(TINY, **change)
+
+
+def test_a_task_that_nobody_has_scripted_is_refused(monkeypatch):
+    from agents import experts
+
+    monkeypatch.delitem(experts.EXPERTS, "HRCHandover-v0")
+    with pytest.raises(ConfigError, match="there is none for HRCHandover-v0; there is for HRCR"):
+        replace(TINY, task="HRCHandover-v0")
+
+
+def test_a_folder_of_other_results_is_refused(tmp_path):
+    (tmp_path / "experiment.json").write_text(json.dumps({"experiment": "impact"}))
+    with pytest.raises(ConfigError, match="holds the results of 'impact'; this is 'price'"):
+        run(STUDY, TINY, tmp_path, silent)
+
+
+def test_what_the_command_asks_for():
+    full, quick = config_for(), config_for(quick=True)
+    assert quick.eyes == QUICK
+    assert (quick.others, quick.n_pixels) == ((), 0)
+    assert (quick.n_seeds, quick.n_fresh, quick.n_search) == (300, 1000, 6)
+    assert len(full.others) == 6
+    assert full.n_pixels == 40
+    assert config_for(seeds=3).n_fresh == 10
+    elsewhere = config_for(task="HRCHandover-v0")
+    assert elsewhere.eyes == ELSEWHERE
+    assert len(elsewhere.seeds("HRCHandover-v0", 300)) == 100  # as much time
+    assert config_for(eyes=("truth", "truth")).eyes == ("truth",)
+    assert config_for(trainings=True).trainings == TrainingConfig()
+
+
+def test_a_wider_shield_intervenes_more_and_covariances_are_told():
+    stage = Stage(replace(all_eyes()["truth"]), "HRCReach-v0", 60)
+    seeds = [3_000_000 + k for k in range(8)]
+    narrow, wide, again = (stage.play(seeds, m, lambda share: None) for m in (-2.0, 1.0, -2.0))
+    stage.close()
+    assert narrow == again
+    assert sum(wide["achieved"]) < sum(narrow["achieved"])
+    assert narrow["walk"] == wide["walk"]
+    alone = Stage(all_eyes()["truth"], "HRCReach-v0", 60, is_shielded=False)
+    assert alone.play(seeds, 0.0, lambda share: None) == narrow
+    alone.close()
+
+
+def test_only_the_shield_is_told_other_covariances(monkeypatch):
+    told = []
+
+    def note(now, wanted, dt_s):
+        told.append(now)
+        return wanted, {}
+
+    monkeypatch.setitem(SHIELDS, "qp", note)
+    part = Simulation(1, settle(perception="truth"))
+    part.reset(np.zeros(1, int), [np.random.default_rng(0)])
+    now = part.belief
+    Widened(2.0, -0.1)(now, np.zeros((1, 6)), 0.04)
+    assert told[0].estimate.cov_world == pytest.approx(2.0 * now.estimate.cov_world)
+    assert told[0].robot.capsule_radius_m == pytest.approx(now.robot.capsule_radius_m - 0.1)
+    part.close()
+
+
+def test_every_row_says_everything(end_to_end):
+    out, metrics = end_to_end
+    for name in TINY.eyes:
+        for what in ("margin_m", "goals_per_min", "share", "of_truth", "confirmed.margin_m",
+                     "confirmed.towards", "confirmed.standing", "confirmed.away",
+                     "confirmed.goals_per_min", "confirmed.cost"):  # fmt: skip
+            assert f"HRCReach-v0.{name}.{what}" in metrics
+        margin = metrics[f"HRCReach-v0.{name}.margin_m"]
+        assert -0.4 <= margin.low <= margin.value <= margin.high <= 0.4
+    assert metrics["HRCReach-v0.truth.of_truth"] == Metric(1.0, 1.0, 1.0, "share", 6)
+    text = (out / "report.md").read_text()
+    assert "perfect sight" in text
+    assert "The level lies beyond the margins that were tried for" in text
+    assert (out / "figures" / "price.png").exists()
+    written = json.loads((out / "results.json").read_text())
+    assert set(written["metrics"]) == set(metrics)
+    assert written["config"]["shield"] == "qp"
+
+
+def test_a_run_that_is_killed_goes_on_to_the_same_numbers(end_to_end, process, tmp_path):
+    _, metrics = end_to_end
+    script = (
+        "import os, sys; from pathlib import Path; "
+        "from hrc_env.experiments.price.experiment import STUDY, PriceConfig\n"
+        "from hrc_env.experiments.study.runner import run\n"
+        f"config = {TINY!r}\n"
+        "def say(share, label):\n"
+        "    if label.startswith('HRCReach-v0.two_cameras'): os.kill(os.getpid(), 9)\n"
+        "run(STUDY, config, Path(sys.argv[1]), say)"
+    )
+    assert process("-c", script, tmp_path).returncode == -signal.SIGKILL
+    kept = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "parts").iterdir()}
+    assert len(kept) == 4  # without a shield; of the truth two that were searched, and the fresh
+    assert run(STUDY, TINY, tmp_path, silent) == metrics
+    for name, time_ns in kept.items():
+        assert (tmp_path / "parts" / name).stat().st_mtime_ns == time_ns
+
+
+def row(rng, goals: float) -> Row:
+    """A pair of eyes whose search is `tried`, with so many goals more."""
+    found, seeds = tried(rng, 50, 60), np.arange(60)
+    searched = [
+        {"towards": e, "achieved": a + goals, "minutes": m}
+        for e, a, m in zip(found.events, found.achieved, found.minutes, strict=True)
+    ]
+    fresh = {"towards": found.fresh_events, "achieved": found.fresh_achieved + goals,
+             "minutes": found.fresh_minutes, "walk": seeds.tolist()}  # fmt: skip
+    nothing = dict.fromkeys(("standing", "away", "cost"), np.zeros(60))
+    return Row(list(found.margins_m), searched, {**fresh, **nothing})
+
+
+def test_eyes_are_compared_draw_by_draw():
+    more = {"truth": 1.0, "particle": 0.6, "one_camera": 0.0}
+    rows = {name: row(np.random.default_rng(0), goals) for name, goals in more.items()}
+    alone = {"HRCReach-v0": rows["truth"].fresh}
+    found = metrics_of({"HRCReach-v0": rows}, alone, {}, 30.0)
+    assert found["HRCReach-v0.ranking"].value == 1.0
+    assert 0 < found["worth.truth"].low < found["worth.truth"].high
+    shares = [found[f"HRCReach-v0.{name}.share"] for name in ("particle", "one_camera")]
+    worth = found["worth.one_camera"]
+    assert worth.value == pytest.approx(shares[0].value - shares[1].value)
+    assert worth.high - worth.low < shares[0].high - shares[0].low  # what is shared goes out
+
+
+def test_workers_who_walk_otherwise_are_noticed_where_nobody_waits():
+    one = row(np.random.default_rng(0), 0.0)
+    other = {**one.fresh, "walk": [0]}
+    check_walks("HRCHandover-v0", other, one)
+    with pytest.raises(HRCError, match="walked otherwise"):
+        check_walks("HRCReach-v0", other, one)
+
+
+def test_the_best_eyes_stand_above(tmp_path, monkeypatch):
+    shown = []
+    monkeypatch.setattr(report, "_say", lambda axis, eyes, values: shown.append(eyes))
+    metrics = {
+        f"HRCReach-v0.{name}.share": Metric(k / 10, k / 10, k / 10, "share", 1)
+        for k, name in enumerate(("truth", "one_camera", "particle"))
+    }
+    eyes = eyes_called(["truth", "particle", "one_camera"])
+    report.draw_price(tmp_path / "price.png", metrics, "HRCReach-v0", eyes)
+    assert [each.name for each in shown[0]] == ["truth", "one_camera", "particle"]
+
+
+class Fixed:
+    """A vector environment whose steps are always the same."""
+
+    num_envs = 2
+
+    def __init__(self):
+        weights = RewardConfig(proximity=2.0, proximity_reach_m=0.3)
+        self.shards = SimpleNamespace(first=SimpleNamespace(reward_weights=weights))
+
+    def step(self, actions):
+        known = np.ones(2, bool)
+        infos = {"reward/proximity": np.array([-0.5, 0.0]), "_reward/proximity": known,
+                 "safety/min_separation_m": np.array([0.3, 0.0]),
+                 "_safety/min_separation_m": known}  # fmt: skip
+        return None, np.array([1.0, 1.0]), None, None, infos
+
+
+def test_reward_on_the_truth_knows_the_true_separation():
+    _, reward, *_ = trainings.TrueProximity(Fixed()).step(None)
+    assert reward.tolist() == [1.5, -1.0]  # far in truth; touched in truth, nobody believed near
+    assert trainings.TrueProximity(Fixed()).num_envs == 2
+
+
+def test_optimism_counts_who_is_lost_as_a_metre_away():
+    step = {name: np.zeros(3) for name in ("hidden", "unseen")}
+    step |= {"believed_m": np.array([np.inf, 0.25, 0.1]), "true_m": np.array([0.4, 0.35, 2.0])}
+    step["tracked"] = np.array([0.0, 1.0, 1.0])
+    found = trainings._summed([step])
+    assert found["optimism_m"] == pytest.approx((0.6 - 0.1) / 2)
+    assert found["lost"] == 0.5
+
+
+def test_numbers_of_trainings_are_paired_seed_by_seed():
+    def curves(*ends):
+        return [{what: [0.0, end] for what in blindness.MEASURED} for end in ends]
+
+    learnt = {("truth", 1): curves(0.1, 0.5), ("belief", 1): curves(0.3, 0.7)}
+    found = blindness.metrics_of(learnt)
+    assert found["blind.belief_1cam.lost"].value == pytest.approx(0.5)
+    off = found["blind.difference.belief_1cam.lost"]
+    assert (off.value, off.low, off.high) == pytest.approx((0.2, 0.2, 0.2))
+
+
+def test_trainings_are_played_and_reported(tmp_path, monkeypatch):
+    measured = {what: [0.0, 1.0] for what in (*blindness.MEASURED, "steps")}
+    monkeypatch.setattr(blindness, "learn", lambda training, tick: measured)
+    config = TrainingConfig(n_seeds=2, cameras=(4, 1))
+    cache = PartCache(tmp_path / "parts", "", config.n_parts, silent)
+    learnt = blindness.play(config, cache)
+    assert len(list((tmp_path / "parts").iterdir())) == config.n_parts == 12
+    text = "\n".join(report.blind(tmp_path, learnt, blindness.metrics_of(learnt)))
+    assert (tmp_path / "blindness.png").exists()
+    assert "belief; who is lost counts as far away; 1 camera |" in text
+
+
+@pytest.mark.slow
+def test_a_robot_is_watched_before_while_and_after_it_learns():
+    training = trainings.Training("truth", 1, 0, 8192, 2, 2)
+    found = trainings.learn(training, lambda share: None)
+    assert found["steps"] == [0, 4096, 8192]
+    assert all(np.isfinite(each).all() for each in found.values())
