@@ -114,6 +114,12 @@ STUDIES: dict[str, Study] = {
         EXPERIMENT + "impact", 60, ("hrc_env.experiments.impact.experiment",),
         ("impact", "lateness"), {"impact_tradeoff.png": "tradeoff.png"},
     ),
+    "price": Study(
+        EXPERIMENT + "price --trainings", 400,
+        ("hrc_env.experiments.price.experiment", "agents.experts", "agents.ppo"),
+        ("price", "worth", "price_elsewhere", "blindness"),
+        quick="--quick --seeds 3",
+    ),
     "pictures": Study(
         "python -m docs.make_pictures", 2, ("hrc_env.env", "benchmarks.gallery.still"), quick="",
         goes_on=False,

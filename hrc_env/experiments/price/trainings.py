@@ -127,7 +127,7 @@ def learn(training: Training, tick: PartProgress) -> dict[str, list[float]]:
         learner = ppo.make_learner(env, ppo.PPOSettings(), training.seed)
         ramp = callbacks.Ramp(round(RAMP_SHARE * training.n_steps))
         note()
-        care = callbacks.ProximityCurriculum(ramp, env)
+        care = callbacks.Curriculum(ramp, env)
         learner.learn(training.n_steps, callback=[care, ConvertCallback(note)])
         torch.set_num_threads(threads)
     return found
