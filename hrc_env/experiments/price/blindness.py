@@ -42,8 +42,11 @@ class TrainingConfig:
     """How much is learnt."""
 
     rewards: tuple[str, ...] = tuple(REWARDS)
+    """What closeness is rewarded by."""
     cameras: tuple[int, ...] = (4, 2, 1)
+    """How many there are."""
     n_seeds: int = 5
+    """Of each of these with each of those."""
     n_steps: int = 500_000
     """Environment steps of each."""
     n_points: int = 10
