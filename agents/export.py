@@ -11,6 +11,7 @@ import numpy as np
 from rich.console import Console
 
 from hrc_env import __version__
+from hrc_env.cli.environment import shield_named
 from hrc_env.cli.export import Export
 from hrc_env.cli.progress import compile_kernels, progress_bar
 from hrc_env.cli.train import Train
@@ -119,7 +120,7 @@ def _worth(
     with progress_bar(console, f"judged, shield {shield}") as say:
         episodes = judged(
             lambda _: network, asked.episodes, tick=lambda share: say(share, ""),
-            **{**kwargs, "shield": None if shield == "none" else shield},
+            **{**kwargs, "shield": shield_named(None if shield == "none" else shield)},
         )  # fmt: skip
     found = worth(episodes)
     names = ("goals_per_minute", "cost_per_episode", "contacts_per_episode")

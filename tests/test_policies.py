@@ -29,6 +29,7 @@ from hrc_env.env import HRCEnv
 from hrc_env.safety.shield import SHIELDS
 from hrc_env.sb3 import HRCVecEnv
 
+NEAR_QP = '{"kind": "qp", "margin_m": 0.1}'
 TINY = ["--perception", "truth", "--num-envs", "4", "--episodes", "2", "--no-film"]
 
 
@@ -103,11 +104,11 @@ def test_who_learnt_under_a_shield_is_judged_under_it_and_without(tmp_path, monk
     assert main(["train", *words, "256", "--shield", "still", "--out", str(run)]) == 0
     assert main(["train", *TINY, "--resume", str(run), "--timesteps", "512"]) == 0
     assert checkpoints.describe(run / "policy.zip")["environment"]["shield"] == "still"
-    out = ["--episodes", "8", "--shields", "none", "--out", str(tmp_path)]
+    out = ["--episodes", "8", "--shields", "none", NEAR_QP, "--out", str(tmp_path)]
     assert main(["export", str(run), "--name", "tame", *out]) == 0
     card, _ = policies.read(tmp_path / "HRCReach-v0" / "tame.safetensors")
-    still, free = card.worth
-    assert (still.shield, free.shield) == ("still", "none")
+    still, free, near = card.worth
+    assert (still.shield, free.shield, near.shield) == ("still", "none", NEAR_QP)
     assert still.cost_per_episode != free.cost_per_episode
     assert "--shield still" in card.command
 

@@ -25,7 +25,7 @@ class Export:
     episodes: int = 256
     """Episodes of each evaluation."""
     shields: tuple[str, ...] = ()
-    """It is judged as it learnt, and under these shields, too: none, or their names."""
+    """It is judged as it learnt, and under these shields, too: none, or as of --shield."""
 
     def run(self) -> int:
         """Judge and write."""
