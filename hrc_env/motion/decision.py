@@ -156,7 +156,7 @@ def free_stages(who: Decision, starts: Floats) -> Iterator[Place]:
 def _free_places(who: Decision, job: Job) -> Iterator[Place]:
     """Places for a job that no other worker's is near; of what it takes up, where that lies; for
     what they push, where nothing is."""
-    if job.prop != PROP_NAMES[0] and job.by == "walk":
+    if job.prop != PROP_NAMES[0] and job.by == "walk" and job.at != HERE:
         return _free(who, lying.stands(who.loads, PROP_NAMES.index(job.prop), job.at))
     free = _free(who, _candidates(who, job.at))
     return (p for p in free if not lying.is_left(who.loads, p)) if job.by == "push" else free

@@ -13,7 +13,7 @@ from hrc_env.core.errors import unknown
 from hrc_env.core.records import AWAY_M, WORKPLACE_KINDS, Workplace
 from hrc_env.core.typing import Bools, Floats, Records
 from hrc_env.motion import controls as c
-from hrc_env.motion.activities.going import CART
+from hrc_env.motion.activities.going import CART, WHEELBARROW
 from hrc_env.motion.activities.loads import BOARD
 from hrc_env.motion.curves import placed
 from hrc_env.motion.holding import N_HELD, prop_pose
@@ -40,7 +40,7 @@ HUNG_M = 1.2
 """Boards are put to a wall no higher than this [m]; judgement."""
 AT_HAND_M, EXACT_M, EXACT_COS = 0.13, 0.01, 0.9999
 """Who is so near to where a load is taken up can take it; a cart, only who is exactly there."""
-WHEELED = (CART,)
+WHEELED = (CART, WHEELBARROW)
 """Props that are taken by their handles."""
 ROOM_M, TOUCH_M = 0.40, 0.01
 """Paths keep so far from what lies about, and half its shorter side, from its middle; what overlaps

@@ -158,6 +158,25 @@ def test_where_a_job_takes_up_what_no_place_has_one_lies_at_the_first():
     assert rows["shown"][:, 0].tolist() == [BOARD, BOX, BOX]
 
 
+def test_who_is_to_pick_up_where_nothing_lies_looks_round_and_who_brings_wheels_leaves_them():
+    jobs = (
+        Job("work", "reach", "robot", (("look for it", 1.0),)),
+        Job("look for it", "pick up", "here", (("bring it", 1.0),), 0.0, "board"),
+        Job("bring it", "look round", "open", (("work", 1.0),), 0.0, "wheelbarrow", "push"),
+    )
+    settings = {"jobs": jobs, "near_probability": 1.0, "dwell_s": (60.0, 60.0)}
+    state, rngs = started(2, 1, 1, generator.OPEN_FLOOR, **settings)
+    doing, n_there = set(), []
+    for _ in range(1500):
+        _, motion = generator.advance(state, rngs, 0.04, 1)
+        doing |= set(generator.activity(state).ravel().tolist())
+        n_there.append((motion.held.kind == PROP_NAMES.index("wheelbarrow")).sum(1))
+    assert st.PUSH in doing
+    assert st.PICK_UP not in doing
+    assert (np.diff(n_there, axis=0) >= 0).all()
+    assert np.max(n_there) == 1
+
+
 def test_a_load_that_there_is_not_is_refused_with_those_there_are():
     place = Workplace("pile", "pile", (1.4, 0.9), 0.6, 0.4, loads=("piano",))
     with pytest.raises(ConfigError, match=r"load at 'pile'.*piano.*box"):
