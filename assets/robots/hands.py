@@ -114,23 +114,23 @@ CUPS_M, CUP_M = (0.13, 0.10), 0.045
 
 
 def _add_cups(tool: Any) -> None:
-    """A frame with a cup at each corner, whose rims end at the tool point."""
+    """A frame with a cup at each corner, whose rims end at the tool point; one box round all of
+    them touches."""
     cylinder(tool, (0, 0, 0), (0, 0, 0.014), 0.040, "arm_steel", **LOOKS)
     cylinder(tool, (0, 0, 0.014), (0, 0, 0.060), 0.034, "tool_shell", **LOOKS)
     x, y = CUPS_M
     for side in (-1, 1):
         box(tool, (0, y * side, 0.068), (2 * x + 0.05, 0.03, 0.022), "arm_steel", **LOOKS)
         box(tool, (0.05 * side, 0, 0.066), (0.03, 2 * y, 0.020), "arm_steel", **LOOKS)
-    for k, (sx, sy) in enumerate(((-1, -1), (-1, 1), (1, -1), (1, 1))):
-        at = (x * sx, y * sy)
+    for at in ((-x, -y), (-x, y), (x, -y), (x, y)):
         cylinder(tool, (*at, 0.074), (*at, 0.094), 0.016, "arm_dark", **LOOKS)
         cylinder(tool, (*at, 0.094), (*at, 0.104), 0.030, "arm_black", **LOOKS)
         cylinder(tool, (*at, 0.104), (*at, 0.112), CUP_M, "arm_black", **LOOKS)
-        tool.add_geom(
-            name=f"cup_{k + 1}", type=mujoco.mjtGeom.mjGEOM_BOX, pos=[*at, 0.107], density=0,
-            size=[0.8 * CUP_M, 0.8 * CUP_M, 0.005], group=ROBOT_LOOKS + 1,
-            rgba=[0.4, 1.0, 0.3, 0.4],
-        )  # fmt: skip
+    tool.add_geom(
+        name="rims", type=mujoco.mjtGeom.mjGEOM_BOX, pos=[0, 0, 0.107], density=0,
+        size=[x + 0.8 * CUP_M, y + 0.8 * CUP_M, 0.005], group=ROBOT_LOOKS + 1,
+        rgba=[0.4, 1.0, 0.3, 0.4],
+    )  # fmt: skip
     capsule(
         tool, (-x, 0, 0.09), (x, 0, 0.09), 0.06, name="cups",
         group=3, density=0, contype=0, conaffinity=0, rgba=[1.0, 0.4, 0.3, 0.4],
@@ -148,5 +148,5 @@ def _gauge_cups(spec: Any) -> None:
 SCREWDRIVER = Hand(
     0.15, 0.034, 0.034, 1.2, (0.0025, 0.0025, 0.0008), _add_screwdriver, lambda spec: None
 )
-GRIPPER = Hand(0.165, 0.08, 0.048, 0.9, (0.0030, 0.0026, 0.0016), _add_gripper, _drive_gripper)
+GRIPPER = Hand(0.165, 0.1, 0.048, 0.9, (0.0030, 0.0026, 0.0016), _add_gripper, _drive_gripper)
 CUPS = Hand(0.112, 0.05, 0.046, 1.1, (0.0060, 0.0075, 0.0120), _add_cups, _gauge_cups)

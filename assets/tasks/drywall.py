@@ -8,8 +8,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from assets.scenes.primitives import LOOKS_ONLY, SOLID_SCENE, box
-from hrc_env.scene.primitives import DECORATION, OBJECT_BIT, SCENE_BIT
+from assets.scenes.primitives import HIDES, LOOKS_ONLY, SOLID_SCENE, box
+from hrc_env.scene.primitives import DECORATION, OBJECT_BIT, SCENE_BIT, WORKER_CAPSULES
 from hrc_env.tasks.drywall import (
     BOARD_KG,
     BOARD_M,
@@ -24,6 +24,8 @@ from hrc_env.tasks.drywall import (
 FLOOR_M, TOP_M = -0.75, 1.65
 """Floor and top of the frame."""
 STUD_M = (0.038, 0.089)
+WIDER_M = 0.13
+"""So much wider and longer are the boards below the loose one, wherever it lies at first."""
 COLOURS: dict[str, tuple[tuple[float, float, float], float, float]] = {
     "gypsum": ((0.86, 0.85, 0.82), 0.05, 0.1),
     "gypsum_edge": ((0.72, 0.70, 0.66), 0.05, 0.1),
@@ -47,14 +49,20 @@ def add_drywall(spec: Any) -> None:
 
 
 def _add_frame(world: Any) -> None:
-    """Five studs between two plates; the three that the board covers touch it."""
+    """Five studs between two plates. One box stands for the three that the board covers: what is
+    flat feels no gaps."""
     y, height = WALL_Y_M + STUD_M[1] / 2, TOP_M - FLOOR_M
     xs = np.array([PLACE_M[0] - 0.27, PLACE_M[0], NEAR_STUD_M])
     for k, x in enumerate(xs):
         box(
             world, (x, y, FLOOR_M + height / 2), (STUD_M[0], STUD_M[1], height - 0.076), "frame",
-            name=f"stud_{k + 1}", **SOLID_SCENE,
+            name=f"stud_{k + 1}", **HIDES,
         )  # fmt: skip
+    half = [(xs[2] - xs[0] + STUD_M[0]) / 2, STUD_M[1] / 2, height / 2 - 0.038]
+    world.add_geom(
+        name="studs", type=mujoco.mjtGeom.mjGEOM_BOX, size=half, density=0, contype=SCENE_BIT,
+        pos=[(xs[0] + xs[2]) / 2, y, FLOOR_M + height / 2], conaffinity=0, group=WORKER_CAPSULES,
+    )  # fmt: skip
     left, right = PLACE_M[0] - 0.72, NEAR_STUD_M + STUD_M[0] / 2
     box(
         world,
@@ -71,17 +79,18 @@ def _add_frame(world: Any) -> None:
 
 
 def _add_stack(world: Any) -> None:
-    """Boards on two bearers; the uppermost is loose."""
+    """Wider boards on two bearers, and a loose one: it lies on its four corners only, which is
+    quicker than edge on edge."""
     x, y, z = STACK_M
-    top = z - BOARD_M[2] / 2
+    top, wide, long = z - BOARD_M[2] / 2, BOARD_M[0] + WIDER_M, BOARD_M[1] + WIDER_M
     box(
-        world, (x, y, (FLOOR_M + 0.09 + top) / 2), (BOARD_M[0], BOARD_M[1], top - FLOOR_M - 0.09),
+        world, (x, y, (FLOOR_M + 0.09 + top) / 2), (wide, long, top - FLOOR_M - 0.09),
         "gypsum_edge", name="stack", **SOLID_SCENE,
     )  # fmt: skip
-    box(world, (x, y, top - 0.0005), (BOARD_M[0] * 0.998, BOARD_M[1] * 0.998, 0.0012), "gypsum")
+    box(world, (x, y, top - 0.0005), (wide * 0.998, long * 0.998, 0.0012), "gypsum")
     for side in (-1, 1):
         at = (x, y + 0.4 * side, FLOOR_M + 0.045)
-        box(world, at, (BOARD_M[0], 0.09, 0.09), "bearer")
+        box(world, at, (wide, 0.09, 0.09), "bearer")
 
 
 def _add_board(world: Any) -> None:

@@ -46,12 +46,12 @@ PAIR_BYTES = 1280
 """And for who may touch whom: MuJoCo takes about 990 times the square of the number of workers."""
 
 
-GRIPPING = {
-    "condim": 4, "friction": [1.0, 1.0, 0.02, 0.0005, 0.0005], "solref": [0.008, 1.0],
-    "solimp": [0.95, 0.99, 0.001, 0.5, 2.0],
-}  # fmt: skip
-LYING = {"condim": 3, "friction": [0.6, 0.6, 0.005, 0.0001, 0.0001], "solref": [0.01, 1.0]}
-"""Contacts of rubber pads with what they grip, and of wood with whatever it lies on."""
+HARD = {"solimp": [0.95, 0.99, 0.001, 0.5, 2.0]}
+"""MuJoCo's contacts are the softer the lighter things are: with its default an arm presses wood a
+centimetre into the floor."""
+GRIPPING = {"condim": 4, "friction": [1, 1, 0.02, 0.0005, 0.0005], "solref": [0.008, 1.0], **HARD}
+LYING = {"condim": 3, "friction": [0.6, 0.6, 0.005, 0.0001, 0.0001], "solref": [0.01, 1.0], **HARD}
+"""Contacts of rubber pads, and of wood with whatever it lies on or is pushed by."""
 THROWN_M = 1.5
 """What is loose touches what stands still so far beyond the robot's reach [m]."""
 
@@ -313,7 +313,7 @@ def _pair(spec: mujoco.MjSpec, robot: Robot, chain: SerialChain) -> None:
             if not meets or (name, other.name) in robot.never_touch:
                 continue
             if _nearest_m(other, foot_world) <= reach.get(name, farthest):
-                how = GRIPPING if part.contype & PAD_BIT and other in loose else {}
+                how = GRIPPING if part.contype & PAD_BIT else LYING if other in loose else {}
                 spec.add_pair(geomname1=part.name, geomname2=other.name, **how)
     for k, thing in enumerate(loose):
         others_loose = [each for each in loose[k + 1 :] if each.parent.name != thing.parent.name]
