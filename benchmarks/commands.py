@@ -75,14 +75,16 @@ class TrackingBench(AnyBench):
 
 @dataclass(frozen=True)
 class SpeedBench(AnyBench):
-    """Steps a second, what each organ takes of a step, and resets; beside Gymnasium's Reacher.
+    """Steps a second, what each organ takes of a step, and resets; beside Gymnasium's Reacher. Then
+    those of every id, beside the first's.
 
     Everybody takes turns: nothing else should run on the machine.
     """
 
     out: Path = Path("out/bench_speed")
     task: str | None = None
-    """Which environment, by its id, instead of the first."""
+    """Which environment, by its id, instead of the first; the other ids are then left out. Or
+    "every": steps a second of each id, and nothing else."""
     shield: str | None = None
     """What may change commands: qp, ssm, pfl, or one that was registered (--import)."""
     rounds: int | None = None

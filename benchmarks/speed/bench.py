@@ -1,18 +1,20 @@
 """The speed bench: everybody takes turns, so that a noisy machine slows all of them alike.
 
 A round runs every contender for whole episodes, those at level `keypoints` once more with the
-stopwatch round their organs, and resets. Medians over rounds count.
+stopwatch round their organs, and resets; then every id has a turn. Medians over rounds count.
 """
 
 import math
 from collections import defaultdict
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass
 
+from benchmarks.common import keys
 from benchmarks.speed.contenders import OURS, PEER, Contender, Single, Starts, Vector
 from benchmarks.speed.organs import Organs
 from benchmarks.speed.report import REACHER, SINGLE, report
+from benchmarks.speed.tasks import Tasks, shares
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric, over
 from hrc_env.experiments.study.cache import PartCache, Progress
@@ -20,6 +22,8 @@ from hrc_env.experiments.study.runner import Study, at_least_one
 from hrc_env.safety.shield import shield_called
 from hrc_env.tasks.task import task_called
 
+EVERY = "every"
+"""In place of an id: all of them."""
 WATCHED = "keypoints"
 """The level whose organs are timed."""
 _REACHERS = 64
@@ -33,7 +37,7 @@ class SpeedBenchConfig:
     """How much is run."""
 
     task: str = OURS
-    """Which environment, by its id."""
+    """Which environment, by its id; "every": the speed of each, and nothing else."""
     shield: str | None = None
     """What may change its commands, by its name."""
     n_rounds: int = 7
@@ -42,6 +46,8 @@ class SpeedBenchConfig:
     """Environment steps of a turn, at least; whole episodes are run."""
     n_resets: int = 25
     """Resets of each kind in a round."""
+    task_steps: int = 200
+    """Steps of each id's vector in a round; none if `task` is another one than the first."""
     levels: tuple[str, ...] = (WATCHED, "truth", "none")
     """Perception levels."""
     sizes: tuple[int, ...] = (1, 16, 64, 256)
@@ -51,19 +57,22 @@ class SpeedBenchConfig:
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for numbers that cannot work."""
-        task_called(self.task)
         shield_called(self.shield)
-        at_least_one(self, "n_rounds", "least_steps", "n_resets")
+        if self.task != EVERY:
+            task_called(self.task)
+        at_least_one(self, "n_rounds", "least_steps", "n_resets", "task_steps")
         if WATCHED not in self.levels:
             raise ConfigError(f"levels must have {WATCHED!r} in them, got {self.levels}.")
 
 
-QUICK = SpeedBenchConfig(n_rounds=1, least_steps=1000)
+QUICK = SpeedBenchConfig(n_rounds=1, least_steps=1000, task_steps=25)
 """Every number, from one short turn."""
 
 
 Measured = defaultdict[str, list[float]]
 """One number a round, by "<kind>.<name>"; configurations: "single" and "<num_envs>.<threads>"."""
+BY_TASK = "task_steps_per_s"
+"""The kind of the ids' numbers."""
 UNITS = {"env_steps_per_s": "1/s", "us_per_env_step": "us", "reset_ms": "ms"}
 """By kind."""
 
@@ -87,11 +96,31 @@ def play(config: SpeedBenchConfig, parts: PartCache) -> Measured:
     Raises:
         HRCError: an organ's function is no longer called, so that its time would be missed.
     """
-    measured, organs = Measured(list), Organs()
-    with ExitStack() as closing:
-        turns = [*_turns(config, closing, parts.progress)]
+    measured = Measured(list)
+    if config.task != EVERY:
+        _play_sizes(config, parts, measured)
+    if config.task in (OURS, EVERY):
+        _play_tasks(config, parts, measured)
+    return measured
+
+
+def _play_tasks(config: SpeedBenchConfig, parts: PartCache, measured: Measured) -> None:
+    """Every id."""
+    share = (config.task == EVERY) / config.n_rounds
+    with closing(Tasks()) as tasks:
+        for _ in range(config.n_rounds):
+            for name, pace in tasks.run(config.task_steps).items():
+                measured[f"{BY_TASK}.{name}"].append(pace)
+            parts.progress(share, "every id")
+
+
+def _play_sizes(config: SpeedBenchConfig, parts: PartCache, measured: Measured) -> None:
+    """One id in all sizes, organs, resets."""
+    organs = Organs()
+    with ExitStack() as exits:
+        turns = [*_turns(config, exits, parts.progress)]
         starts = Starts(config.task)
-        closing.callback(starts.close)
+        exits.callback(starts.close)
         share = (1 - _MAKING) / (config.n_rounds * sum(turn.cost for turn in turns))
         for _ in range(config.n_rounds):
             for turn in turns:
@@ -100,7 +129,6 @@ def play(config: SpeedBenchConfig, parts: PartCache) -> Measured:
             organs.check_all_called()
             for name, ms in starts.run(config.n_resets).items():
                 measured[f"reset_ms.{name}"].append(ms)
-    return measured
 
 
 def _take(turn: Turn, measured: Measured, organs: Organs) -> None:
@@ -114,7 +142,7 @@ def _take(turn: Turn, measured: Measured, organs: Organs) -> None:
             measured[f"us_per_env_step.{organ}.{turn.configuration}"].append(us)
 
 
-def _turns(config: SpeedBenchConfig, closing: ExitStack, progress: Progress) -> Iterator[Turn]:
+def _turns(config: SpeedBenchConfig, exits: ExitStack, progress: Progress) -> Iterator[Turn]:
     """Make everybody, ready to run, to be closed in the end."""
     known = [
         (size, threads) for size in config.sizes for threads in config.threads if threads <= size
@@ -122,7 +150,7 @@ def _turns(config: SpeedBenchConfig, closing: ExitStack, progress: Progress) -> 
     n_contenders = len(config.levels) * (1 + len(known)) + 2
 
     def turn(level: str, configuration: str, threads: int, contender: Contender) -> Turn:
-        closing.callback(contender.close)
+        exits.callback(contender.close)
         progress(_MAKING / n_contenders, f"making {level} {configuration}")
         n_episodes = math.ceil(config.least_steps / contender.episode_env_steps)
         cost = n_episodes * contender.episode_env_steps / threads
@@ -142,7 +170,10 @@ def _turns(config: SpeedBenchConfig, closing: ExitStack, progress: Progress) -> 
 
 def metrics_of(measured: Measured) -> dict[str, Metric]:
     """Medians over rounds with smallest and largest."""
-    return {name: over(values, UNITS[name.split(".")[0]]) for name, values in measured.items()}
+    own = {name: values for name, values in measured.items() if not name.startswith(BY_TASK)}
+    by_task = {name: measured[f"{BY_TASK}.{name}"] for name in keys(measured, f"{BY_TASK}.")}
+    found = {name: over(values, UNITS[name.split(".")[0]]) for name, values in own.items()}
+    return found | (shares(by_task) if by_task else {})
 
 
 SPEED = Study(

@@ -60,7 +60,11 @@ class Vector:
 
     def run(self, n_episodes: int) -> Pace:
         """Random actions for whole episodes; every info is read."""
-        actions = _actions(self.env, n_episodes * (self.episode_steps + 1))
+        return self.run_steps(n_episodes * (self.episode_steps + 1))
+
+    def run_steps(self, n_steps: int) -> Pace:
+        """The same for so many steps of the vector, wherever its episodes are."""
+        actions = _actions(self.env, n_steps)
         n_starts, ended = 0, self._ended
         started_s = time.perf_counter()
         for action in actions:

@@ -16,6 +16,13 @@ REACHER = "reacher"
 """Gymnasium's Reacher where levels are named."""
 _COLOURS = (*(f"C{k}" for k in range(7)), "gold", "C9", "0.75")
 """Of the organs, of resets and of the rest."""
+_BY_TASK = "## Every id: 64 on 2 threads, level `keypoints`, one worker each"
+_ABOUT_TASKS = "Random actions, resets inside, every info read; all take turns."
+SPREAD = "the smallest and the largest of all rounds"
+TASK_COLUMNS = (
+    Column("task_steps_per_s.{}", "steps a second", 0),
+    Column("task_share.{}", "of HRCReach-v0's [%]", 1, 100.0),
+)
 _ABOUT_THE_ORGANS = """\
 Taken in runs of their own with a stopwatch round each organ's functions, which itself costs about
 half a microsecond a call. With two threads an organ's time is divided by two: columns are time on
@@ -26,6 +33,10 @@ bodies, `reward` the task, `reset` all organs' work in resets, `rest` everything
 
 def report(metrics: Metrics, figures: Path) -> Report:
     """What is to be read; organs.png is drawn into `figures`."""
+    tasks = {name: name for name in keys(metrics, "task_share.")}
+    by_task = (_BY_TASK, table_of("", tasks, TASK_COLUMNS, metrics)) if tasks else ()
+    if f"env_steps_per_s.{REACHER}.{SINGLE}" not in metrics:
+        return Report("Speed of every id", _ABOUT_TASKS, by_task, SPREAD)
     plot_organs(figures / "organs.png", metrics)
     pairs = [name.split(".", 1) for name in keys(metrics, "env_steps_per_s.")]
     levels = dict.fromkeys(level for level, _ in pairs)
@@ -44,7 +55,8 @@ def report(metrics: Metrics, figures: Path) -> Report:
         picture(figures / "organs.png", "What a step costs, level `keypoints` (on the wall)."),
         "## Milliseconds of a reset, level `keypoints`",
         table_of("", resets, [Column("reset_ms.{}", "ms", 2)], metrics),
-    ), "the smallest and the largest of all rounds")  # fmt: skip
+        *by_task,
+    ), SPREAD)  # fmt: skip
 
 
 def _lead(metrics: Metrics) -> str:

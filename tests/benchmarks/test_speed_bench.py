@@ -11,12 +11,15 @@ from benchmarks.speed import bench, organs
 from benchmarks.speed.contenders import OURS, Pace, Single, Vector
 from benchmarks.speed.organs import REST, TOTAL
 from benchmarks.speed.stopwatch import Stopwatch
+from benchmarks.speed.tasks import shares
 from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.experiments.study.runner import run
+from hrc_env.tasks import BUILT_IN
 
 TINY = bench.SpeedBenchConfig(
-    n_rounds=1, least_steps=1, n_resets=1, levels=("keypoints",), sizes=(1, 3), threads=(1, 2)
-)
+    n_rounds=1, least_steps=1, n_resets=1, levels=("keypoints",), sizes=(1, 3), threads=(1, 2),
+    task_steps=1,
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -38,6 +41,31 @@ def test_every_number_is_there_and_finite(end_to_end):
     assert {"reset_ms.1_of_1", "reset_ms.8_of_64"} <= set(metrics)
     assert "env_steps_per_s.keypoints.1.2" not in metrics
     assert all(math.isfinite(metric.value) for metric in metrics.values())
+
+
+def test_every_id_has_its_share_of_the_firsts_speed(end_to_end):
+    out, metrics, _ = end_to_end
+    for task in BUILT_IN:
+        assert metrics[f"task_steps_per_s.{task}"].value > 0
+    assert metrics["task_share.HRCReach-v0"].value == 1.0
+    assert "| HRCDrywall-v0 | " in (out / "report.md").read_text()
+
+
+def test_of_every_id_nothing_else_is_timed(tmp_path, monkeypatch):
+    monkeypatch.setattr(bench.Tasks, "__init__", lambda self: None)
+    monkeypatch.setattr(bench.Tasks, "close", lambda self: None)
+    monkeypatch.setattr(bench.Tasks, "run", lambda self, n: {"HRCReach-v0": 10.0 * n})
+    said = []
+    config = bench.SpeedBenchConfig(task="every", n_rounds=2)
+    metrics = run(bench.SPEED, config, tmp_path, lambda share, label: said.append(share))
+    assert set(metrics) == {"task_steps_per_s.HRCReach-v0", "task_share.HRCReach-v0"}
+    assert sum(said) == pytest.approx(1.0)
+
+
+def test_shares_are_of_the_same_round():
+    found = shares({"HRCReach-v0": [100.0, 50.0, 200.0], "HRCDrywall-v0": [50.0, 50.0, 50.0]})
+    share = found["task_share.HRCDrywall-v0"]
+    assert (share.value, share.low, share.high) == (0.5, 0.25, 1.0)
 
 
 def test_organs_and_rest_are_the_whole_and_organs_are_most_of_it(end_to_end):

@@ -1,0 +1,40 @@
+"""The speed of every id beside that of the first, by the same door and in turns."""
+
+from collections.abc import Mapping, Sequence
+
+from benchmarks.speed.contenders import MANY, OURS, Vector
+from hrc_env.core.results import Metric, over
+from hrc_env.tasks import BUILT_IN
+
+WARM_STEPS, THREADS = 20, 2
+"""Steps before anything is timed; threads that the environments of an id share."""
+
+
+class Tasks:
+    """Every id as a vector of 64 on two threads, level `keypoints`, one worker each."""
+
+    def __init__(self) -> None:
+        each = {"perception": "keypoints", "num_threads": THREADS, "n_workers": 1}
+        self.vectors = {task: Vector(task, MANY, **each) for task in BUILT_IN}
+        for vector in self.vectors.values():
+            vector.run_steps(WARM_STEPS)
+
+    def run(self, n_steps: int) -> dict[str, float]:
+        """Environment steps a second, by id; everybody goes on where they were."""
+        paces = {task: vector.run_steps(n_steps) for task, vector in self.vectors.items()}
+        return {task: pace.env_steps / pace.seconds for task, pace in paces.items()}
+
+    def close(self) -> None:
+        """Close the environments."""
+        for vector in self.vectors.values():
+            vector.close()
+
+
+def shares(paces: Mapping[str, Sequence[float]]) -> dict[str, Metric]:
+    """Of steps a second by id, a number a round: medians with the smallest and the largest, and
+    the same of their shares of the first id's in the same round."""
+    found = {f"task_steps_per_s.{task}": over(values, "1/s") for task, values in paces.items()}
+    for task, values in paces.items():
+        of = [own / ours for own, ours in zip(values, paces[OURS], strict=True)]
+        found[f"task_share.{task}"] = over(of, "share")
+    return found
