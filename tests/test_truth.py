@@ -19,6 +19,7 @@ from hrc_env.pipeline.rendered import PixelPipeline
 from hrc_env.pipeline.tracking import PoseTracking
 from hrc_env.sb3 import HRCVecEnv
 from hrc_env.simulation import Simulation
+from hrc_env.tasks import BUILT_IN, DEFAULT
 
 ID = "hrc_env:HRCReach-v0"
 LEVELS = ("pixels", "keypoints", "none")
@@ -96,6 +97,31 @@ def test_no_agent_acts_otherwise(agent, policy):
     agent = policy if agent == "learner" else agent
     moved = differences(partial(single, "keypoints"), another_worker, agent=agent)
     assert_only_told(moved, "keypoints")
+
+
+def of(task: str, **arguments):
+    return gymnasium.make(f"hrc_env:{task}", perception="keypoints", **{**CHOSEN, **arguments})
+
+
+@pytest.mark.parametrize("perturb", ["another worker", "shifted"])
+@pytest.mark.parametrize("task", [each for each in BUILT_IN if each != DEFAULT])
+def test_nor_does_it_in_any_other_task(task, perturb):
+    assert_only_told(differences(partial(of, task), PERTURBED[perturb], n_steps=25), "keypoints")
+
+
+def test_the_hand_that_a_tool_is_brought_to_is_the_estimated_one():
+    """Until it is taken and let go, which the same hand does: only what is shown is elsewhere."""
+    taken, n_steps = [], 260
+
+    def watching(now, velocities, dt_s):
+        taken.append(bool(now.task.taken[0]))
+        return velocities, {}
+
+    make = partial(of, "HRCHandover-v0", shield=watching, config=None)
+    moved = differences(make, displaced(shifted), agent="scripted", n_steps=n_steps)
+    assert_only_told(moved, "keypoints")
+    assert taken[n_steps - 1]
+    assert taken[:n_steps] == taken[n_steps:]
 
 
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
@@ -211,6 +237,16 @@ CASES = [(level, leak, says) for leak, (levels, says) in LEAKS.items() for level
 @pytest.mark.parametrize(("level", "leak", "says"), CASES)
 def test_a_leak_is_seen(level, leak, says, perturb):
     moved = leaks(differences(partial(single, level), PERTURBED[perturb], leak, n_steps=5))
+    assert [name for name in moved if name.startswith(says)], moved
+
+
+@pytest.mark.parametrize("task", ["HRCHandover-v0", "HRCPickPlaceGoal-v0", "HRCDelivery-v0"])
+@pytest.mark.parametrize(
+    ("leak", "says"),
+    [(half_of_the_truth, "observation"), (a_reward_for_the_true_separation, "reward")],
+)
+def test_a_leak_is_seen_in_other_tasks(task, leak, says):
+    moved = leaks(differences(partial(of, task), PERTURBED["shifted"], leak, n_steps=3))
     assert [name for name in moved if name.startswith(says)], moved
 
 
