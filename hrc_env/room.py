@@ -1,11 +1,17 @@
-"""In which scenes a clip of recorded motion has room."""
+"""In which scenes a clip of recorded motion has room; what of a task is within an arm's reach."""
+
+from typing import Any
+
+import numpy as np
 
 from hrc_env.config import HRCConfig
 from hrc_env.motion.activities.pieces import NoRoomError, stage, stocked
 from hrc_env.motion.anatomy import anatomies
 from hrc_env.motion.clip import Clip
 from hrc_env.motion.floorplan import floorplan
-from hrc_env.scene.build import SCENES, build
+from hrc_env.scene.build import SCENES, Scene, build
+from hrc_env.tasks.spot import Spot, check_spots
+from hrc_env.tasks.task import Task
 from hrc_env.worker.body import pool, stack
 
 
@@ -33,3 +39,12 @@ def told(clip: Clip, played: dict[str, float]) -> str:
     lacks = [name for name, s in played.items() if s == 0.0]
     said = [f"It plays in {', '.join(plays)}."] if plays else []
     return " ".join([*said, f"It has no room in {', '.join(lacks)}."] if lacks else said)
+
+
+def check_reach(task: Task, config: Any, scene: Scene) -> None:
+    """Raise `ConfigError` for an arm that is too short for where a task has it get to, or for what
+    lies loose there."""
+    loose, size_m = scene.objects, np.linalg.norm(scene.objects.half_size_m, axis=1)
+    places = zip(loose.names, scene.model.body_pos[scene.object_bodies], size_m, strict=True)
+    lying = [Spot(f"object {name!r}", at, within_m=size) for name, at, size in places]
+    check_spots(task.id, scene.robot.name, scene.chain, [*task.spots(config), *lying])

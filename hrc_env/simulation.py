@@ -87,6 +87,7 @@ class Simulation(Stateful):
                 warnings.warn(finding, stacklevel=3)
         self.settings = settings.recorded(batch, self.scene)
         self.chain, n_joints = self.scene.chain, self.scene.chain.n_joints
+        room.check_reach(self.task, config.task, self.scene)
         self._spread_rad = np.array(config.start_spread_rad or settings.robot.spread_rad)
         check_shape("start_spread_rad", self._spread_rad.shape, (n_joints,), "one a joint")
         self._grips = settings.robot.grips

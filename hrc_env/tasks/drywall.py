@@ -13,6 +13,7 @@ from hrc_env.geometry.rotations import matrix
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm, check_kind, progress
 from hrc_env.tasks import LONGER
+from hrc_env.tasks.spot import Spot
 from hrc_env.tasks.task import Rngs, Task
 from hrc_env.worker.body import assets_dir
 
@@ -110,6 +111,12 @@ def things(config: DrywallConfig) -> Things:
         ),
         (place,),
     )
+
+
+def spots(config: DrywallConfig) -> list[Spot]:
+    """Where the cups are when the board is in its place."""
+    front = R_PLACE @ [*CUPS_M, BOARD_M[2] / 2]
+    return [Spot("the board's place", FOOT_WORLD + PLACE_M + front, (0.0, 1.0, 0.0))]
 
 
 def init(batch: int) -> Records:
@@ -279,6 +286,7 @@ TASK = Task(
     robot="ur10e_cups",
     grips=True,
     things=things,
+    spots=spots,
     poses=poses,
     effects=effects,
     loads=lambda state: (state["pressed_s"] == 0.0)[:, None],  # against the studs it is a wall

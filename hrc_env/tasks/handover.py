@@ -13,6 +13,7 @@ from hrc_env.geometry.rotations import matrix
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm, check_kind, progress
 from hrc_env.tasks import LONGER
+from hrc_env.tasks.spot import Spot
 from hrc_env.tasks.task import Rngs, Task
 from hrc_env.worker.body import assets_dir
 
@@ -284,6 +285,7 @@ TASK = Task(
     robot="ur10e_gripper",
     grips=True,
     things=things,
+    spots=lambda config: [Spot("the place to meet", FOOT_WORLD + MEET_M)],
     poses=poses,
     effects=effects,
     cue=cue,

@@ -14,6 +14,7 @@ from hrc_env.geometry.rotations import matrix
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm, check_kind, progress
 from hrc_env.tasks import LONGER
+from hrc_env.tasks.spot import Spot
 from hrc_env.tasks.task import Rngs, Task
 from hrc_env.worker.body import assets_dir
 
@@ -96,6 +97,12 @@ def things(config: PlacedConfig) -> Things:
     """Table, rack and pieces, and where the worker takes from the same table."""
     mjcf = Path(assets_dir() / "tasks" / "pick_place.xml").read_text()
     return Things(mjcf, (), (STACK, TRESTLE))
+
+
+def spots(config: PlacedConfig) -> list[Spot]:
+    """Where pieces go; they are gripped from above."""
+    down = (0.0, 0.0, -1.0)
+    return [Spot(f"the place of piece {k + 1}", at, down) for k, at in enumerate(places_world())]
 
 
 def init(batch: int) -> Records:
@@ -225,6 +232,7 @@ TASK = Task(
     robot="ur10e_gripper",
     grips=True,
     things=things,
+    spots=spots,
     poses=poses,
     over=lambda step: step["done"],
     defaults={

@@ -10,6 +10,7 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats, Ints, Points3, Records
 from hrc_env.observations import ObservationTerm, directions
 from hrc_env.rewards import RewardTerm
+from hrc_env.tasks.spot import Spot
 from hrc_env.tasks.task import Rngs, Task, World
 
 
@@ -83,6 +84,16 @@ class ReachView:
     """(B, 3) [m]."""
     time_left_s: Floats
     """(B,) until the goal is missed."""
+
+
+def spots(config: TargetConfig) -> list[Spot]:
+    """The farthest goals."""
+    (x, y), far_m = config.base_xy_world, config.distance_m[1]
+    return [
+        Spot("a goal", (x + far_m * math.cos(angle), y + far_m * math.sin(angle), height_m))
+        for angle in config.azimuth_rad
+        for height_m in config.height_m
+    ]
 
 
 def init(batch: int) -> Records:
@@ -171,6 +182,7 @@ TASK = Task(
     reset=reset,
     advance=advance,
     view=view,
+    spots=spots,
     observations=(
         ObservationTerm(
             "goal_from_tool", lambda of: 3, "m", "world", 3.0, 0.5,

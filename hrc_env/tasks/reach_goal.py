@@ -9,7 +9,7 @@ from hrc_env.core.records import World
 from hrc_env.core.typing import Floats, Ints, Points3, Records
 from hrc_env.tasks import LONGER
 from hrc_env.tasks.goal import Goal
-from hrc_env.tasks.reach import TargetConfig, drawn_goal
+from hrc_env.tasks.reach import TargetConfig, drawn_goal, spots
 from hrc_env.tasks.task import Rngs, Task
 
 
@@ -82,6 +82,7 @@ TASK = Task(
     reset=reset,
     advance=advance,
     view=view,
+    spots=spots,
     observations=(),
     rewards=(),
     info=info,

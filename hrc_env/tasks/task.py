@@ -18,6 +18,7 @@ from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm
 from hrc_env.tasks import BUILT_IN, EPISODE_STEPS
 from hrc_env.tasks.goal import Goal, reward_terms
+from hrc_env.tasks.spot import Spot
 
 _ID = re.compile(r"[A-Za-z]\w*-v\d+")
 Rngs = Sequence[np.random.Generator]
@@ -82,6 +83,9 @@ class Task:
     """(rngs, place, config) -> (n, N) where robots begin; None: near their pose at rest."""
     things: Callable[[Any], Things] = lambda config: NOTHING
     """(config) -> what the task puts there."""
+    spots: Callable[[Any], Sequence[Spot]] = lambda config: ()
+    """(config) -> where tools have to get to, besides what is loose: arms that are too short are
+    refused."""
     poses: Callable[[Any, Ints, Any], Floats] | None = None
     """(state, ids, config) -> (n, O, 7) where what is loose lies when `reset` is done: place in
     the world [m] and quaternion; None: as in the MJCF."""
