@@ -87,13 +87,11 @@ class ReachView:
 
 
 def spots(config: TargetConfig) -> list[Spot]:
-    """The farthest goals."""
-    (x, y), far_m = config.base_xy_world, config.distance_m[1]
-    return [
-        Spot("a goal", (x + far_m * math.cos(angle), y + far_m * math.sin(angle), height_m))
-        for angle in config.azimuth_rad
-        for height_m in config.height_m
-    ]
+    """Where the nearest goals are."""
+    (x, y), near_m = config.base_xy_world, config.distance_m[0]
+    angle, height_m = np.mean(config.azimuth_rad), np.mean(config.height_m)
+    at = np.array([x + near_m * np.cos(angle), y + near_m * np.sin(angle), height_m])
+    return [Spot("the nearest goal", at, within_m=float(np.ptp(config.height_m)) / 2)]
 
 
 def init(batch: int) -> Records:
