@@ -98,6 +98,10 @@ def test_every_piece_counts_for_itself():
     achieved[1, :3], achieved[2, 3:], achieved[3] = 0.1, 0.1, 0.1
     shares = [0, -1 / 3, -2 / 3, -1]
     np.testing.assert_allclose(env.compute_reward(achieved, desired, {}), shares)
+    env = HRCEnv(PICK, perception="none", config={"task": {"reward": "all"}})
+    assert env.compute_reward(achieved, desired, {}).tolist() == [0, -1, -1, -1]
+    with pytest.raises(ConfigError, match='must be "each" or "all", got'):
+        HRCEnv(PICK, perception="none", config={"task": {"reward": "sparse"}})
 
 
 def test_goals_are_what_they_are_called():
