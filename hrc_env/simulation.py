@@ -43,7 +43,6 @@ CLOSING_M_S = 8.0
 """Arm and worker never come nearer to each other than so fast [m/s]; 3.4 was the most in some
 290,000 steps of arms that were driven to and fro as hard as they can be."""
 
-
 STREAMS = ("robot", "motion", "sensor", "tracker", "task")
 """Who draws numbers, each from a generator of its own, in the order in which these are handed out:
 the worker's walk does not depend on who looks at it."""

@@ -89,9 +89,9 @@ class ReachView:
 def spots(config: TargetConfig) -> list[Spot]:
     """Where the nearest goals are."""
     (x, y), near_m = config.base_xy_world, config.distance_m[0]
-    angle, height_m = np.mean(config.azimuth_rad), np.mean(config.height_m)
-    at = np.array([x + near_m * np.cos(angle), y + near_m * np.sin(angle), height_m])
-    return [Spot("the nearest goal", at, within_m=float(np.ptp(config.height_m)) / 2)]
+    (left, right), (low_m, high_m) = config.azimuth_rad, config.height_m
+    x, y = x + near_m * math.cos((left + right) / 2), y + near_m * math.sin((left + right) / 2)
+    return [Spot("the nearest goal", (x, y, (low_m + high_m) / 2), within_m=(high_m - low_m) / 2)]
 
 
 def init(batch: int) -> Records:
