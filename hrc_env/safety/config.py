@@ -10,9 +10,9 @@ from hrc_env.core.typing import Records
 
 KINDS = ("qp", "ssm", "pfl")
 NUMBERS = (
-    "margin_m", "hand_margin_m", "sigmas", "least_sigmas_m", "human_m_s", "human_margin_m_s",
-    "human_s", "latency_s", "reaction_s", "deceleration_m_s2", "gain_hz", "retreat_m_s",
-    "unknown_m_s",
+    "margin_m", "hand_margin_m", "sigmas", "least_sigmas_m", "predicted_m_s", "doubtful_m",
+    "doubtful_sigmas", "human_m_s", "human_margin_m_s", "human_s", "latency_s", "reaction_s",
+    "deceleration_m_s2", "gain_hz", "retreat_m_s", "unknown_m_s",
 )  # fmt: skip
 SETTINGS = np.dtype([*((name, "f8") for name in NUMBERS), ("touches", "?")], align=True)
 """The same as kernels read them; whether a touch at the region's speed is allowed."""
@@ -35,6 +35,15 @@ class ShieldConfig:
     """Z_d in standard deviations of the estimate along the line between the two,"""
     least_sigmas_m: float = 0.05
     """and at least this [m]."""
+    predicted_m_s: float = 0.7
+    """So much of the deviation for every second since the part of the body was seen is of the
+    prediction and counts once: late images that say so are reported with regions that are too wide
+    [m/s]."""
+    doubtful_m: float = 0.08
+    """A larger deviation is of a part that one camera carries, which is wrong by more than it says
+    [m]: what is above counts"""
+    doubtful_sigmas: float = 5.0
+    """so many times more."""
     human_m_s: float | None = None
     """The worker's speed towards the robot, as 1.6 of ISO 13855; None: as it is estimated, and
     `human_margin_m_s` more [m/s]."""

@@ -131,7 +131,7 @@ def _bodies(now: Belief, model: RobotModel, config: ShieldConfig) -> tuple[Any, 
         touch_m_s = np.stack([speeds[name] for name in SEGMENT_REGIONS], axis=1)
     return (
         segments(estimate.mean_world), estimate.mean_world, estimate.velocity_world,
-        estimate.cov_world, estimate.tracked, touch_m_s,
+        estimate.cov_world, estimate.age_s, estimate.tracked, touch_m_s,
     )  # fmt: skip
 
 

@@ -2,9 +2,12 @@
 
 Of every pair, n is the unit vector from the robot's nearest point to the body's, and
 
-    D = gap - margin - Z_d - v_h T_h,   Z_d = max(least, k sigma_n),   sigma_n = sqrt(n' Sigma n)
+    D = gap - margin - Z_d - v_h T_h,   Z_d = max(least, predicted + k seen + k' max(seen - s', 0))
 
-with v_h the estimated speed of the body's point along -n. Where D >= 0 the robot may be as fast as
+with v_h the estimated speed of the body's point along -n, and sigma_n = sqrt(n' Sigma n) the root
+of predicted^2 + seen^2: of what was not seen for a while, as in late images, much of the deviation
+is the prediction's, which is wide; one that is large all the same is of a part that one camera
+carries, whose errors are larger than it says. Where D >= 0 the robot may be as fast as
 it can brake within D (the robot's share of `separation.protective_distance`); else it has to get
 away. A row that no command within reach exceeds is left out.
 """
@@ -44,13 +47,14 @@ def tightest_rows(robot, bodies, settings, rows):
             capsules (B, K, 2, 3) and radii (K,) [m], least and greatest command within reach
             (B, N) [rad/s], slew (N,) [rad/s^2].
         bodies: segments (B, W, S, 2, 3) [m], joints' means and velocities (B, W, J, 3), covariances
-            (B, W, J, 3, 3), who is known (B, W), speeds of touches that are allowed (B, S) [m/s].
+            (B, W, J, 3, 3) and ages (B, W, J) [s], who is known (B, W), speeds of touches that are
+            allowed (B, S) [m/s].
         settings: (1,) `config.SETTINGS`.
         rows: written: n.J (B, `MOST_ROWS`, N), b (B, `MOST_ROWS`) [m/s], how many (B,), and the
             least D of pairs that may matter (B,) [m]; infinite without.
     """
     frames, slides, link, capsules, radius, low, high, slew = robot
-    segments, mean, velocity, cov, known, touch_m_s = bodies
+    segments, mean, velocity, cov, age_s, known, touch_m_s = bodies
     J, b, count, least_m = rows
     p, n_caps, n_segments = settings[0], capsules.shape[1], segments.shape[2]
     rods, limbs = np.empty((n_caps, 5)), np.empty((n_segments, 5))
@@ -73,7 +77,7 @@ def tightest_rows(robot, bodies, settings, rows):
                     continue
                 distance, t = _nearest(capsules[e, c], segments[e, w, s], point, normal)
                 speed, sigma = _towards(body, s, t, normal)
-                z_d = max(p.least_sigmas_m, p.sigmas * sigma)
+                z_d = _z_d(sigma, _unseen_s(age_s[e, w], s), p)
                 near = distance - radius[c] - SEGMENT_RADIUS_M[s] - _margin(s, p) - z_d
                 clear = near - _travel(speed, p)
                 least_m[e] = min(least_m[e], clear)
@@ -135,8 +139,17 @@ def _most_taken_m(body, s, p):
         for k in range(2):
             S = cov[_JOINTS[s, end, k]]
             variance = max(variance, S[0, 0] + S[1, 1] + S[2, 2])
-    z_d = max(p.least_sigmas_m, p.sigmas * math.sqrt(variance))
-    return _margin(s, p) + z_d + _travel(math.sqrt(squared), p)
+    sigma = math.sqrt(variance)
+    return _margin(s, p) + sigma + _z_d(sigma, 0.0, p) + _travel(math.sqrt(squared), p)
+
+
+@kernel
+def _z_d(sigma, age_s, p):
+    """Z_d [m] of a deviation along n [m] of what was seen last so long ago [s]."""
+    predicted = min(sigma, p.predicted_m_s * age_s)
+    seen = math.sqrt(sigma * sigma - predicted * predicted)
+    doubt = p.doubtful_sigmas * max(0.0, seen - p.doubtful_m)
+    return max(p.least_sigmas_m, predicted + p.sigmas * seen + doubt)
 
 
 @kernel
@@ -167,6 +180,16 @@ def _end_velocity(mean, velocity, s, end):
         share, v = reach / max(math.sqrt(squared), SHORTEST_M), velocity[elbow]
         x, y, z = x + share * (x - v[0]), y + share * (y - v[1]), z + share * (z - v[2])
     return x, y, z
+
+
+@kernel
+def _unseen_s(age_s, s):
+    """Time since any joint of a segment was seen [s]."""
+    least = np.inf
+    for end in range(2):
+        for k in range(2):
+            least = min(least, age_s[_JOINTS[s, end, k]])
+    return least
 
 
 @kernel

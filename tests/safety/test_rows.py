@@ -24,12 +24,12 @@ def somebody(middle, speed_m_s=0.6):
     sides = np.array([0, *np.outer([1, 1.3, 1.5, 0.5, 0.5, 0.5, 0.5], [1, -1]).ravel()])
     mean = np.stack([np.zeros(15), 0.18 * sides, heights], -1) + RNG.normal(0, 0.05, (15, 3))
     mean += np.array([*middle, 0.0])
-    roots = RNG.normal(0, 0.02, (15, 3, 3))
+    roots = RNG.normal(0, 0.05, (15, 3, 3))  # some of which are doubtful
     cov = roots @ roots.swapaxes(-1, -2) + 1e-4 * np.eye(3)
     velocity = RNG.normal(0, speed_m_s, (15, 3))
     return PoseEstimate(
-        mean[None, None], cov[None, None], velocity[None, None], np.zeros((1, 1, 15)),
-        np.ones((1, 1), bool),
+        mean[None, None], cov[None, None], velocity[None, None],
+        RNG.choice([0.0, 0.04], (1, 1, 15)), np.ones((1, 1), bool),
     )  # fmt: skip
 
 
@@ -46,7 +46,7 @@ def rows_of(chain, q, estimate, low, high, slew, config=CONFIG, touch_m_s=0.0):
         (chains.forward(chain, q), chain.slides, chain.capsule_link, chains.capsules(chain, q),
          chain.capsule_radius_m, low[None], high[None], slew),
         (segments(estimate.mean_world), estimate.mean_world, estimate.velocity_world,
-         estimate.cov_world, estimate.tracked, np.full((1, 16), touch_m_s)),
+         estimate.cov_world, estimate.age_s, estimate.tracked, np.full((1, 16), touch_m_s)),
         config.record(), (*found, count, least_m),
     )  # fmt: skip
     n = int(count[0])
@@ -76,7 +76,11 @@ def defined(chain, q, estimate, low, high, slew, p):
             Sigma = (1 - t) * cov[one].mean(0) + t * cov[other].mean(0)
             gap = math.sqrt(squared) - chain.capsule_radius_m[c] - SEGMENT_RADIUS_M[s]
             margin = p.hand_margin_m if s in (6, 7, 14, 15) else p.margin_m
-            z_d = max(p.least_sigmas_m, p.sigmas * math.sqrt(n @ Sigma @ n))
+            sigma = math.sqrt(n @ Sigma @ n)
+            predicted = min(sigma, p.predicted_m_s * estimate.age_s[0, 0, [*one, *other]].min())
+            seen = math.sqrt(sigma**2 - predicted**2)
+            z_d = predicted + p.sigmas * seen + p.doubtful_sigmas * max(seen - p.doubtful_m, 0)
+            z_d = max(z_d, p.least_sigmas_m)
             travel = (max(v_h, 0) + p.human_margin_m_s) * (p.human_s + p.latency_s)
             clear = gap - margin - z_d - travel
             least_m = min(least_m, clear)
@@ -146,3 +150,17 @@ def test_touches_are_allowed_as_fast_as_the_region_bears_less_the_workers_speed(
     estimate.velocity_world[..., 0] = -1.0
     _, b, _ = rows_of(scene.chain, scene.home_q, estimate, *box, touching, touch_m_s=0.4)
     assert b.min() < 0.0
+
+
+def test_a_part_that_one_camera_carries_is_kept_away_from_more_than_a_late_one():
+    """The same deviation: of what is seen now it is doubted, of what was seen long ago it is the
+    prediction's."""
+    scene = build()
+    estimate = somebody(before(scene, 0.5), speed_m_s=0.0)
+    box = -np.ones(6), np.ones(6), slew_rad_s2(scene)
+    estimate.cov_world[:] = 0.15**2 * np.eye(3)
+    least_m = []
+    for age_s in (0.0, 0.25):
+        estimate.age_s[:] = age_s
+        least_m.append(rows_of(scene.chain, scene.home_q, estimate, *box)[2])
+    assert least_m[1] - least_m[0] == pytest.approx(2 * 0.15 + 5 * (0.15 - 0.08) - 0.15)
