@@ -33,15 +33,15 @@ CRITIC_RATE, CRITIC_PASSES, CRITIC_BATCH = 1e-3, 4, 1024
 class Multiplier:
     """lambda = clip(integral + kp error), after each rollout.
 
-    The integral rests while lambda is at an end that the error pushes it beyond, and the error
-    counts no more than 1: policies take hundreds of rollouts to follow, in which an integral that
-    only sums would grow far beyond what the limit needs.
+    The integral changes by a share of itself, so that it finds lambdas of any size, and leaves
+    large ones as fast as it came to them. It rests while lambda is at an end that the error pushes
+    it beyond, and the error counts no more than 1: policies take hundreds of rollouts to follow.
     """
 
     limit: float
     """Of the cost of an episode."""
     kp: float = 8.0
-    ki: float = 0.05
+    ki: float = 0.02
     smoothing: float = 0.1
     """Share by which `cost` follows that of the latest rollout."""
     most: float = 20.0
@@ -59,10 +59,11 @@ class Multiplier:
         new = 1.0 if np.isnan(self.cost) else self.smoothing
         self.cost = cost if new == 1.0 else (1 - new) * self.cost + new * cost
         error = min(share * self.cost / self.limit - 1, 1.0)
-        wanted = self.integral + self.ki * error + self.kp * error
+        integral = max(self.integral + self.ki * (1 + self.integral) * error, 0.0)
+        wanted = integral + self.kp * error
         self.value = float(np.clip(wanted, 0.0, self.most))
         if wanted == self.value:
-            self.integral = max(self.integral + self.ki * error, 0.0)
+            self.integral = integral
 
 
 class PPOLagrangian(PPO):
