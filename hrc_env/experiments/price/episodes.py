@@ -20,7 +20,7 @@ from hrc_env.core.checkout import agents
 from hrc_env.core.machine import n_cores
 from hrc_env.core.records import WorkerTruth
 from hrc_env.core.typing import Bools, Capsules, Floats
-from hrc_env.experiments.impact.episodes import MOVING_MPS, PEOPLE, MakeAgent, Rows
+from hrc_env.experiments.impact.episodes import PEOPLE, MakeAgent, Rows
 from hrc_env.experiments.price.eyes import Eyes
 from hrc_env.experiments.price.shield import Widened
 from hrc_env.experiments.study.cache import PartProgress
@@ -34,6 +34,8 @@ from hrc_env.worker.body import worker_truth
 
 TOGETHER = 300
 """So many episodes are played side by side."""
+MOVING_MPS = 0.05
+"""From this directed speed on a robot moves towards the worker or away [m/s]."""
 AGAIN_S = 0.5
 """A touch that begins so soon after another one ended is the same [s]: a robot that is rammed and
 pressed seems to come back."""

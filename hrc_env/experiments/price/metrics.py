@@ -4,6 +4,7 @@ All eyes of a task have the same seeds: what is said of two of them is compared 
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -42,34 +43,30 @@ CONTRASTS: dict[str, tuple[str, str]] = {
 """Questions: the share that the first eyes keep less what the second ones do."""
 
 
+@dataclass(frozen=True, slots=True)
 class Row:
-    """What was played with one pair of eyes: the search, the fresh episodes with its last margin.
+    """What was played with one pair of eyes."""
 
-    Attributes:
-        drawn: (1 + R, 2) margin [m] and goals a minute at the level, by how seeds are drawn; the
-            first of all seeds once.
-    """
+    margins_m: Sequence[float]
+    """That were tried [m],"""
+    searched: Sequence[Rows]
+    """what came of each,"""
+    fresh: Rows
+    """and of the last one on fresh seeds."""
 
-    def __init__(self, margins_m: Sequence[float], searched: Sequence[Rows], fresh: Rows) -> None:
-        self.margins_m, self.searched, self.fresh = margins_m, searched, fresh
-        self.drawn: Floats = np.full((1 + N_DRAWS, 2), np.nan)
-
-    def settle(self, level: float) -> None:
-        """Find what there is at a level, in `UNIT`."""
-        sums = (
-            np.array([row[name] for row in self.searched], float)
-            for name in ("towards", "achieved", "minutes")
-        )
-        fresh = (np.array(self.fresh[name], float) for name in ("towards", "achieved", "minutes"))
+    def at(self, level: float) -> Floats:
+        """(1 + R, 2) margin [m] and goals a minute at a level in `UNIT`, by how seeds are drawn;
+        the first of all seeds once."""
+        names = "towards", "achieved", "minutes"
+        sums = (np.array([row[name] for row in self.searched], float) for name in names)
+        fresh = (np.array(self.fresh[name], float) for name in names)
         tried = Tried(np.array(self.margins_m), *sums, *fresh)
         weights = draws(tried.events.shape[1], len(tried.fresh_events), N_DRAWS)
-        self.drawn = tried.at(level / PER, *weights)
+        return tried.at(level / PER, *weights)
 
-    @property
-    def is_open(self) -> bool:
-        """Whether the level lies beyond the margins that were tried."""
-        margin_m = self.drawn[0, 0]
-        return bool(margin_m in (min(self.margins_m), max(self.margins_m)))
+    def ends_at(self, margin_m: float) -> bool:
+        """Whether none that was tried lies beyond a margin."""
+        return margin_m in (min(self.margins_m), max(self.margins_m))
 
 
 def metrics_of(
@@ -87,23 +84,20 @@ def metrics_of(
         for what, metric in _rates(rows).items()
     }
     for task, rows in table.items():
-        unshielded = _rates(alone[task])
-        metrics |= {f"{task}.unshielded.{what}": each for what, each in unshielded.items()}
-        shares = {}
+        found = {name: row.at(level) for name, row in rows.items()}
         most = _drawn_rate(alone[task])
+        shares = {name: drawn[:, 1] / most for name, drawn in found.items()}
+        of_all = {
+            f"unshielded.{what}": each for what, each in _rates(alone[task]).items()
+        } | _ranking(shares, len(alone[task]["minutes"]))
         for name, row in rows.items():
-            row.settle(level)
-            shares[name] = row.drawn[:, 1] / most
-            for what, metric in _of_row(row, shares[name]).items():
-                metrics[f"{task}.{name}.{what}"] = metric
-        for name, share in shares.items():
-            if TRUTH in shares:
-                n = len(rows[name].fresh["minutes"])
-                ratio = _metric(share / shares[TRUTH], "share", n)
-                metrics[f"{task}.{name}.of_truth"] = ratio
-        metrics |= _ranking(task, shares, len(alone[task]["minutes"]))
-    first = next(iter(table))
-    return metrics | _worth(table[first], _drawn_rate(alone[first]))
+            truth = shares.get(TRUTH)
+            for what, metric in _of_row(row, found[name], shares[name], truth).items():
+                of_all[f"{name}.{what}"] = metric
+        metrics |= {f"{task}.{what}": each for what, each in of_all.items()}
+        if task == next(iter(table)):
+            metrics |= _worth(shares, len(alone[task]["minutes"]))
+    return metrics
 
 
 def _rates(rows: Rows) -> Metrics:
@@ -118,16 +112,18 @@ def _rates(rows: Rows) -> Metrics:
     }
 
 
-def _of_row(row: Row, share: Floats) -> Metrics:
-    n = len(row.fresh["minutes"])
-    confirmed = {f"confirmed.{what}": each for what, each in _rates(row.fresh).items()}
-    margin_m = float(row.margins_m[-1])
+def _of_row(row: Row, drawn: Floats, share: Floats, truth: Floats | None) -> Metrics:
+    """Of one pair of eyes: draws at the level, and shares of the throughput, of its own and of
+    perfect sight's."""
+    n, margin_m = len(row.fresh["minutes"]), float(row.margins_m[-1])
+    of_truth = {} if truth is None else {"of_truth": _metric(share / truth, "share", n)}
     return {
-        "margin_m": _metric(row.drawn[:, 0], "m", n),
-        "goals_per_min": _metric(row.drawn[:, 1], "1/min", n),
+        "margin_m": _metric(drawn[:, 0], "m", n),
+        "goals_per_min": _metric(drawn[:, 1], "1/min", n),
         "share": _metric(share, "share", n),
+        **of_truth,
         "confirmed.margin_m": Metric(margin_m, margin_m, margin_m, "m", n),
-        **confirmed,
+        **{f"confirmed.{what}": each for what, each in _rates(row.fresh).items()},
     }
 
 
@@ -138,25 +134,25 @@ def _drawn_rate(rows: Rows) -> Floats:
     return np.asarray((fresh @ np.array(rows["achieved"], float)) / (fresh @ minutes))
 
 
-def _worth(rows: Mapping[str, Row], most: Floats) -> dict[str, Metric]:
-    found = {}
-    for question, (ours, theirs) in CONTRASTS.items():
-        if ours in rows and theirs in rows:
-            lost = (rows[ours].drawn[:, 1] - rows[theirs].drawn[:, 1]) / most
-            found[f"worth.{question}"] = _metric(lost, "share", len(rows[ours].fresh["minutes"]))
-    return found
+def _worth(shares: Mapping[str, Floats], n: int) -> dict[str, Metric]:
+    """What is lost by each of `CONTRASTS` whose eyes there are."""
+    return {
+        f"worth.{question}": _metric(shares[ours] - shares[theirs], "share", n)
+        for question, (ours, theirs) in CONTRASTS.items()
+        if ours in shares and theirs in shares
+    }
 
 
-def _ranking(task: str, shares: Mapping[str, Floats], n: int) -> Metrics:
+def _ranking(shares: Mapping[str, Floats], n: int) -> dict[str, Metric]:
     """In which share of the draws truth keeps as much as four cameras and these as much as one."""
     if not set(ELSEWHERE) <= shares.keys():
         return {}
     truth, four, one = (shares[name] for name in ELSEWHERE)
     holds = float(((truth >= four) & (four >= one))[1:].mean())
     return {
-        f"{task}.ranking": Metric(holds, holds, holds, "share of draws", n),
-        f"{task}.lost_by_four": _metric(truth - four, "share", n),
-        f"{task}.lost_by_one": _metric(four - one, "share", n),
+        "ranking": Metric(holds, holds, holds, "share of draws", n),
+        "lost_by_four": _metric(truth - four, "share", n),
+        "lost_by_one": _metric(four - one, "share", n),
     }
 
 

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 
 from hrc_env.experiments.price.blindness import MEASURED, WORDS, Learnt
 from hrc_env.experiments.price.eyes import ELSEWHERE, FOUR, GROUPS, QUICK, Eyes, all_eyes
+from hrc_env.experiments.price.metrics import Row
 from hrc_env.experiments.price.trainings import TRUE
 from hrc_env.experiments.study.plots import ends, label, new_figure, save
 from hrc_env.experiments.study.report import Column, Metrics, Report, picture, table_of
@@ -67,7 +68,7 @@ def report(figures: Path, config: Any, played: Mapping[str, Any], metrics: Metri
     parts = [
         picture(figures / "price.png", "Goals that are left at equal safety, in per cent of those "
                 "of a robot without a shield; whiskers are 95 % intervals."),
-        _table(task, eyes, metrics), _open_ended(table[task]), _worth(metrics),
+        _table(task, eyes, metrics), _open_ended(task, table[task], metrics), _worth(metrics),
     ]  # fmt: skip
     if config.others:
         parts.append("## Other tasks")
@@ -98,8 +99,9 @@ def _table(task: str, eyes: Sequence[Eyes], metrics: Metrics) -> str:
     return table_of(task, words, columns, metrics) + "\n\n" + alone
 
 
-def _open_ended(rows: Mapping[str, Any]) -> str:
-    beyond = [f"`{name}`" for name, row in rows.items() if row.is_open]
+def _open_ended(task: str, rows: Mapping[str, Row], metrics: Metrics) -> str:
+    margins_m = {name: metrics[f"{task}.{name}.margin_m"].value for name in rows}
+    beyond = [f"`{name}`" for name, row in rows.items() if row.ends_at(margins_m[name])]
     if not beyond:
         return ""
     return (
