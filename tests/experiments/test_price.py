@@ -23,9 +23,9 @@ from hrc_env.experiments.price.experiment import (
     config_for,
 )
 from hrc_env.experiments.price.eyes import ELSEWHERE, QUICK, all_eyes, eyes_called
-from hrc_env.experiments.price.metrics import CONTRASTS, Row, metrics_of
+from hrc_env.experiments.price.metrics import CONTRASTS, Row, metrics_of, supposed_m
 from hrc_env.experiments.price.report import QUESTIONS
-from hrc_env.experiments.price.search import Tried, bisected, draws
+from hrc_env.experiments.price.search import Tried, draws, searched
 from hrc_env.experiments.price.shield import Widened
 from hrc_env.experiments.study.cache import PartCache
 from hrc_env.experiments.study.runner import run
@@ -34,7 +34,7 @@ from hrc_env.safety.shield import SHIELDS
 from hrc_env.simulation import Simulation
 
 TINY = PriceConfig(
-    eyes=("truth", "two_cameras"), n_seeds=5, n_fresh=6, n_search=2, n_pixels=0, n_steps=30
+    eyes=("truth", "two_cameras"), n_seeds=5, n_fresh=6, n_search=1, n_pixels=0, n_steps=50
 )
 
 
@@ -54,29 +54,34 @@ def contacts_at(margin_m: float) -> float:
     return 0.18 * np.exp((0.11 - margin_m) / 0.05)
 
 
-def test_bisection_ends_next_to_where_the_level_is():
-    tried = bisected(contacts_at, -0.4, 0.4, 0.18, 12)
-    assert tried[:3] == pytest.approx([0.0, 0.2, 0.1])
-    assert tried[-1] == pytest.approx(0.11, abs=0.8 / 2**12)
+def test_a_search_halves_its_bracket_and_looks_beside():
+    margins_m = searched(contacts_at, -0.4, 0.4, 0.18, 4)
+    assert margins_m == pytest.approx([0.0, 0.2, 0.1, 0.15, 0.05])
+    assert searched(contacts_at, -0.4, 0.4, 0.18, 12)[11] == pytest.approx(0.11, abs=0.8 / 2**12)
 
 
-def test_bisection_goes_to_the_end_of_a_bracket_that_lacks_the_level():
-    assert bisected(lambda margin: 1.0, -0.4, 0.4, 0.5, 5)[-1] == pytest.approx(0.4, abs=0.03)
-    assert bisected(lambda margin: 0.0, -0.4, 0.4, 0.5, 5)[-1] == pytest.approx(-0.4, abs=0.03)
+def test_a_search_goes_to_the_end_of_a_bracket_that_lacks_the_level():
+    assert max(searched(lambda margin: 1.0, -0.4, 0.4, 0.5, 4)) == pytest.approx(0.45)
+    assert min(searched(lambda margin: 0.0, -0.4, 0.4, 0.5, 4)) == pytest.approx(-0.45)
+
+
+def test_a_search_supposes_the_level_between_two_margins():
+    tried = {m: {"towards": [contacts_at(m) * 600], "minutes": [600]} for m in (0.05, 0.1, 0.15)}
+    assert supposed_m(tried, 30.0) == pytest.approx(0.11, abs=0.002)
 
 
 def tried(rng, n: int = 300, m: int = 1000, fresh_more: float = 1.0) -> Tried:
     """A search on a synthetic curve: contacts as `contacts_at`, goals 40 - 50 x margin a minute;
     every seed has a number of its own, so that margins differ by what they do."""
-    margins_m = np.array(bisected(contacts_at, -0.4, 0.4, 0.18, 6))
+    margins_m = np.sort(searched(contacts_at, -0.4, 0.4, 0.18, 4))
     expected = np.array([contacts_at(margin) for margin in margins_m]) / 6.0
     luck, fresh_luck = rng.uniform(size=n), rng.uniform(size=m)
     goals = (40 - 50 * margins_m) / 6.0
     own, fresh_own = rng.normal(0, 1, n), rng.normal(0, 1, m)
+    fresh = (fresh_luck < fresh_more * contacts_at(0.1) / 6.0).astype(float)
     return Tried(
         margins_m, (luck < expected[:, None]).astype(float), goals[:, None] + own,
-        np.full((6, n), 1 / 6), (fresh_luck < fresh_more * expected[-1]).astype(float),
-        goals[-1] + fresh_own, np.full(m, 1 / 6),
+        np.full((len(margins_m), n), 1 / 6), 0.1, fresh, 35 / 6.0 + fresh_own, np.full(m, 1 / 6),
     )  # fmt: skip
 
 
@@ -194,7 +199,7 @@ def test_what_the_command_asks_for():
     full, quick = config_for(), config_for(quick=True)
     assert quick.eyes == QUICK
     assert (quick.others, quick.n_pixels) == ((), 0)
-    assert (quick.n_seeds, quick.n_fresh, quick.n_search) == (300, 1000, 6)
+    assert (quick.n_seeds, quick.n_fresh, quick.n_search) == (300, 1000, 4)
     assert len(full.others) == 6
     assert full.n_pixels == 40
     assert config_for(seeds=3).n_fresh == 10
@@ -243,7 +248,7 @@ def test_every_row_says_everything(end_to_end):
                      "confirmed.goals_per_min", "confirmed.cost"):  # fmt: skip
             assert f"HRCReach-v0.{name}.{what}" in metrics
         margin = metrics[f"HRCReach-v0.{name}.margin_m"]
-        assert -0.4 <= margin.low <= margin.value <= margin.high <= 0.4
+        assert -0.8 <= margin.low <= margin.value <= margin.high <= 0.8
     assert metrics["HRCReach-v0.truth.of_truth"] == Metric(1.0, 1.0, 1.0, "share", 6)
     text = (out / "report.md").read_text()
     assert "perfect sight" in text
@@ -267,7 +272,7 @@ def test_a_run_that_is_killed_goes_on_to_the_same_numbers(end_to_end, process, t
     )
     assert process("-c", script, tmp_path).returncode == -signal.SIGKILL
     kept = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "parts").iterdir()}
-    assert len(kept) == 4  # without a shield; of the truth two that were searched, and the fresh
+    assert len(kept) == 6  # without a shield; of the truth four that were searched, and the fresh
     assert run(STUDY, TINY, tmp_path, silent) == metrics
     for name, time_ns in kept.items():
         assert (tmp_path / "parts" / name).stat().st_mtime_ns == time_ns
@@ -275,15 +280,17 @@ def test_a_run_that_is_killed_goes_on_to_the_same_numbers(end_to_end, process, t
 
 def row(rng, goals: float) -> Row:
     """A pair of eyes whose search is `tried`, with so many goals more."""
-    found, seeds = tried(rng, 50, 60), np.arange(60)
-    searched = [
-        {"towards": e, "achieved": a + goals, "minutes": m}
-        for e, a, m in zip(found.events, found.achieved, found.minutes, strict=True)
-    ]
+    found = tried(rng, 50, 60)
+    searches = {
+        m: {"towards": e, "achieved": a + goals, "minutes": minutes}
+        for m, e, a, minutes in zip(
+            found.margins_m, found.events, found.achieved, found.minutes, strict=True
+        )
+    }
     fresh = {"towards": found.fresh_events, "achieved": found.fresh_achieved + goals,
-             "minutes": found.fresh_minutes, "walk": seeds.tolist()}  # fmt: skip
+             "minutes": found.fresh_minutes, "walk": list(range(60))}  # fmt: skip
     nothing = dict.fromkeys(("standing", "away", "cost"), np.zeros(60))
-    return Row(list(found.margins_m), searched, {**fresh, **nothing})
+    return Row(searches, found.fresh_margin_m, {**fresh, **nothing})
 
 
 def test_eyes_are_compared_draw_by_draw():

@@ -21,9 +21,9 @@ from hrc_env.experiments.price.eyes import (
     eyes_called,
     usual_eyes,
 )
-from hrc_env.experiments.price.metrics import PER, Row, metrics_of
+from hrc_env.experiments.price.metrics import PER, Row, metrics_of, supposed_m
 from hrc_env.experiments.price.report import report
-from hrc_env.experiments.price.search import bisected
+from hrc_env.experiments.price.search import searched
 from hrc_env.experiments.price.shield import SHIELD
 from hrc_env.experiments.study.cache import PartCache
 from hrc_env.experiments.study.fingerprint import fingerprint_of, source_digest
@@ -54,8 +54,8 @@ class PriceConfig:
     """Episodes of every step of a search."""
     n_fresh: int = 1000
     """Episodes, on other seeds, with the margin that it found."""
-    n_search: int = 6
-    """Steps of a search."""
+    n_search: int = 4
+    """Halvings of the bracket in a search; then a margin on either side is tried, too."""
     bracket_m: tuple[float, float] = (-0.4, 0.4)
     """Least and greatest margin: unshielded robots need less than any, the blind more."""
     level: float = 30.0
@@ -146,18 +146,18 @@ def play(config: PriceConfig, cache: PartCache) -> dict[str, Any]:
 
 def _price(config: PriceConfig, cache: PartCache, task: str, eyes: Eyes) -> Row:
     """Search the margin of one pair of eyes, play on with it."""
-    searched: list[Rows] = []
+    tried: dict[float, Rows] = {}
     with closing(Stage(eyes, task, config.steps_of(task))) as stage:
         part = partial(_part, config, cache, stage)
 
         def rate(margin_m: float) -> float:
-            rows = part(config.seeds(task, config.n_seeds), margin_m)
-            searched.append(rows)
+            tried[margin_m] = rows = part(config.seeds(task, config.n_seeds), margin_m)
             return float(PER * np.sum(rows["towards"]) / np.sum(rows["minutes"]))
 
-        tried = bisected(rate, *config.bracket_m, config.level, config.n_search)
-        fresh = part(config.seeds(task, config.n_fresh, FIRST_FRESH), tried[-1])
-    return Row(tried, searched, fresh)
+        searched(rate, *config.bracket_m, config.level, config.n_search)
+        margin_m = supposed_m(tried, config.level)
+        fresh = part(config.seeds(task, config.n_fresh, FIRST_FRESH), margin_m)
+    return Row(tried, margin_m, fresh)
 
 
 def _unshielded(config: PriceConfig, cache: PartCache, task: str) -> Rows:
@@ -171,7 +171,7 @@ def _pixels(config: PriceConfig, cache: PartCache, table: Any) -> dict[str, Rows
     """The same few episodes with the emulator and with rendered images, with one margin."""
     if not config.n_pixels or FOUR not in table[config.task]:
         return {}
-    margin_m, found = table[config.task][FOUR].margins_m[-1], {}
+    margin_m, found = table[config.task][FOUR].margin_m, {}
     (eyes,) = eyes_called([FOUR])
     for level in ("keypoints", "pixels"):
         setup = changed(eyes.setup, level=level)
@@ -212,7 +212,7 @@ def _n_parts(config: PriceConfig) -> float:
     n_pairs = sum(1 for _ in config.pairs())
     n_levels = 2 if config.n_pixels and FOUR in config.eyes else 0
     n_trained = 0 if config.trainings is None else config.trainings.n_parts
-    return n_pairs * (config.n_search + 1) + 1 + len(config.others) + n_levels + n_trained
+    return n_pairs * (config.n_search + 3) + 1 + len(config.others) + n_levels + n_trained
 
 
 STUDY = Study(

@@ -3,7 +3,7 @@
 All eyes of a task have the same seeds: what is said of two of them is compared draw by draw.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,8 +13,8 @@ from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats
 from hrc_env.experiments.impact.episodes import Rows
 from hrc_env.experiments.price.eyes import ELSEWHERE, FOUR, ONE, TRUTH
-from hrc_env.experiments.price.search import Tried, draws
-from hrc_env.experiments.study.intervals import ratio_over
+from hrc_env.experiments.price.search import Tried, draws, falling
+from hrc_env.experiments.study.intervals import crossing, ratio_over
 from hrc_env.experiments.study.report import Metrics
 
 N_DRAWS = 1000
@@ -47,26 +47,44 @@ CONTRASTS: dict[str, tuple[str, str]] = {
 class Row:
     """What was played with one pair of eyes."""
 
-    margins_m: Sequence[float]
-    """That were tried [m],"""
-    searched: Sequence[Rows]
-    """what came of each,"""
+    searched: Mapping[float, Rows]
+    """What came of each margin [m] that was tried."""
+    margin_m: float
+    """Where the level seemed to be [m],"""
     fresh: Rows
-    """and of the last one on fresh seeds."""
+    """and what came of it on fresh seeds."""
 
     def at(self, level: float) -> Floats:
         """(1 + R, 2) margin [m] and goals a minute at a level in `UNIT`, by how seeds are drawn;
         the first of all seeds once."""
-        names = "towards", "achieved", "minutes"
-        sums = (np.array([row[name] for row in self.searched], float) for name in names)
-        fresh = (np.array(self.fresh[name], float) for name in names)
-        tried = Tried(np.array(self.margins_m), *sums, *fresh)
+        margins_m = sorted(self.searched)
+
+        def sums(name: str) -> Floats:
+            return np.array([self.searched[m][name] for m in margins_m], float)
+
+        def fresh(name: str) -> Floats:
+            return np.array(self.fresh[name], float)
+
+        tried = Tried(
+            np.array(margins_m), sums("towards"), sums("achieved"), sums("minutes"),
+            self.margin_m, fresh("towards"), fresh("achieved"), fresh("minutes"),
+        )  # fmt: skip
         weights = draws(tried.events.shape[1], len(tried.fresh_events), N_DRAWS)
         return tried.at(level / PER, *weights)
 
     def ends_at(self, margin_m: float) -> bool:
         """Whether none that was tried lies beyond a margin."""
-        return margin_m in (min(self.margins_m), max(self.margins_m))
+        return margin_m in (min(self.searched), max(self.searched))
+
+
+def supposed_m(tried: Mapping[float, Rows], level: float) -> float:
+    """The margin [m] at which a search supposes the level, to a millimetre."""
+    margins_m = sorted(tried)
+    events, minutes = (
+        np.array([np.sum(tried[m][name]) for m in margins_m]) for name in ("towards", "minutes")
+    )
+    curve = falling(events, minutes)
+    return round(crossing(np.array(margins_m), curve, np.log(level / PER)), 3)
 
 
 def metrics_of(
@@ -86,7 +104,7 @@ def metrics_of(
     for task, rows in table.items():
         found = {name: row.at(level) for name, row in rows.items()}
         most = _drawn_rate(alone[task])
-        shares = {name: drawn[:, 1] / most for name, drawn in found.items()}
+        shares = {name: _ratio(drawn[:, 1], most) for name, drawn in found.items()}
         of_all = {
             f"unshielded.{what}": each for what, each in _rates(alone[task]).items()
         } | _ranking(shares, len(alone[task]["minutes"]))
@@ -115,8 +133,8 @@ def _rates(rows: Rows) -> Metrics:
 def _of_row(row: Row, drawn: Floats, share: Floats, truth: Floats | None) -> Metrics:
     """Of one pair of eyes: draws at the level, and shares of the throughput, of its own and of
     perfect sight's."""
-    n, margin_m = len(row.fresh["minutes"]), float(row.margins_m[-1])
-    of_truth = {} if truth is None else {"of_truth": _metric(share / truth, "share", n)}
+    n, margin_m = len(row.fresh["minutes"]), row.margin_m
+    of_truth = {} if truth is None else {"of_truth": _metric(_ratio(share, truth), "share", n)}
     return {
         "margin_m": _metric(drawn[:, 0], "m", n),
         "goals_per_min": _metric(drawn[:, 1], "1/min", n),
@@ -132,6 +150,11 @@ def _drawn_rate(rows: Rows) -> Floats:
     minutes = np.array(rows["minutes"])
     _, fresh = draws(1, len(minutes), N_DRAWS)
     return np.asarray((fresh @ np.array(rows["achieved"], float)) / (fresh @ minutes))
+
+
+def _ratio(above: Floats, below: Floats) -> Floats:
+    """Of each draw; NaN where nothing was achieved."""
+    return np.divide(above, below, out=np.full_like(above, np.nan), where=below > 0)
 
 
 def _worth(shares: Mapping[str, Floats], n: int) -> dict[str, Metric]:

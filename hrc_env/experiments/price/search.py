@@ -1,11 +1,11 @@
 """The margin at which something falls to a level, by bisection, and what else is true there.
 
-A search of some steps evaluates margins on the same seeds, so that one margin differs from another
-by what it does and not by who was drawn (common random numbers). The last of them is played again
-on fresh seeds. These say how much there is at that margin; the search says how it changes beside
-it: y(m) = y_fresh(m_last) y_search(m) / y_search(m_last), a ratio estimator of two samples
-(Cochran 1977, Sampling Techniques, ch. 12). As the search chose the margin, its own seeds have
-no say in the height of the curve.
+A search evaluates margins on the same seeds, so that one margin differs from another by what it
+does and not by who was drawn (common random numbers): it halves a bracket until noise is wider, and
+takes a margin on either side. Where the level seems to be, fresh seeds are played. These say how
+much there is there; the search says how it changes beside it: y(m) = y_fresh(m_0) y_search(m) /
+y_search(m_0), a ratio estimator of two samples (Cochran 1977, Sampling Techniques, ch. 12). As the
+search chose the margin, its own seeds have no say in the height of the curve.
 """
 
 from collections.abc import Callable
@@ -22,11 +22,11 @@ HALF = 0.5
 """Of an event, added to counts whose logarithm is asked for."""
 
 
-def bisected(
+def searched(
     rate: Callable[[float], float], low: float, high: float, level: float, n_steps: int
 ) -> list[float]:
-    """The arguments that were tried, the last one next to where a falling rate crosses the level,
-    or next to the end of the bracket beyond which it does."""
+    """The arguments that were tried of a falling rate: `n_steps` that halve the bracket round the
+    level, and one as wide as what is left of it on either side."""
     tried: list[float] = []
     for _ in range(n_steps):
         tried.append(middle := 0.5 * (low + high))
@@ -34,7 +34,18 @@ def bisected(
             low = middle
         else:
             high = middle
+    width = high - low
+    for beside in (low - width, low, high, high + width):
+        if not np.isclose(tried, beside).any():
+            rate(beside)
+            tried.append(beside)
     return tried
+
+
+def falling(events: Floats, minutes: Floats) -> Floats:
+    """(K,) logarithms of rates, the nearest that fall, of counts in so many minutes (K,)."""
+    rates = np.log((events + HALF) / minutes)
+    return np.asarray(isotonic_regression(rates, increasing=False).x)
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,37 +53,36 @@ class Tried:
     """Sums of episodes, a seed a column."""
 
     margins_m: Floats
-    """(K,) in the order in which they were tried."""
+    """(K,) that grow."""
     events: Floats
     """(K, n) what has to fall."""
     achieved: Floats
     """(K, n)."""
     minutes: Floats
     """(K, n)."""
+    fresh_margin_m: float
+    """With which fresh seeds were played."""
     fresh_events: Floats
-    """(m,) on other seeds, with the last of the margins."""
+    """(m,)."""
     fresh_achieved: Floats
+    """(m,)."""
     fresh_minutes: Floats
+    """(m,)."""
 
     def at(self, level_per_min: float, drawn: Ints, fresh: Ints) -> Floats:
         """(R, 2) the margin [m] at which events come down to the level, and what is achieved a
         minute there, for how often seeds are drawn (R, n) and (R, m). A margin beyond those that
         were tried is the last of them."""
-        order = np.argsort(self.margins_m)
-        last = int(np.flatnonzero(order == len(order) - 1)[0])
-        margins_m, minutes = self.margins_m[order], drawn @ self.minutes[order].T
-        events = np.log((drawn @ self.events[order].T + HALF) / minutes)
-        achieved = drawn @ self.achieved[order].T / minutes
-        fresh_minutes = fresh @ self.fresh_minutes
+        m, m_0, level = self.margins_m, self.fresh_margin_m, np.log(level_per_min)
+        minutes, fresh_minutes = drawn @ self.minutes.T, fresh @ self.fresh_minutes
+        events, achieved = drawn @ self.events.T, drawn @ self.achieved.T / minutes
         height = np.log((fresh @ self.fresh_events + HALF) / fresh_minutes)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            scale = fresh @ self.fresh_achieved / fresh_minutes / achieved[:, last]
         found = np.empty((len(drawn), 2))
-        for r, curve in enumerate(events):
-            falling = isotonic_regression(curve, increasing=False).x
-            falling = falling + height[r] - falling[last]
-            margin_m = crossing(margins_m, falling, np.log(level_per_min))
-            found[r] = margin_m, np.interp(margin_m, margins_m, achieved[r]) * scale[r]
+        for r, curve in enumerate(map(falling, events, minutes)):
+            margin_m = crossing(m, curve + height[r] - np.interp(m_0, m, curve), level)
+            there, here = np.interp([margin_m, m_0], m, achieved[r])
+            found[r] = margin_m, there / here if here else 1.0
+        found[:, 1] *= fresh @ self.fresh_achieved / fresh_minutes
         return found
 
 
