@@ -38,6 +38,8 @@ PARTS_FROM = (
 """Those that make finished parts."""
 FIRST_SEED, FIRST_FRESH, FIRST_PIXELS = 3_000_000, 4_000_000, 5_000_000
 """Of the search, of the episodes that confirm it, of those with rendered images."""
+BEYOND_M = (0.05, 0.1, 0.2)
+"""So much farther a search looks, one after the other, where its last margins do not suffice."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,7 +159,13 @@ def _price(config: PriceConfig, cache: PartCache, task: str, eyes: Eyes) -> Row:
         searched(rate, *config.bracket_m, config.level, config.n_search)
         margin_m = supposed_m(tried, config.level)
         fresh = part(config.seeds(task, config.n_fresh, FIRST_FRESH), margin_m)
-    return Row(tried, margin_m, fresh)
+        row = Row(tried, margin_m, fresh)
+        for beyond_m in BEYOND_M:  # where fresh seeds say so
+            end_m = float(row.at(config.level)[0, 0])
+            if not row.ends_at(end_m):
+                break
+            rate(end_m + (beyond_m if end_m == max(tried) else -beyond_m))
+    return row
 
 
 def _unshielded(config: PriceConfig, cache: PartCache, task: str) -> Rows:
@@ -212,7 +220,13 @@ def _n_parts(config: PriceConfig) -> float:
     n_pairs = sum(1 for _ in config.pairs())
     n_levels = 2 if config.n_pixels and FOUR in config.eyes else 0
     n_trained = 0 if config.trainings is None else config.trainings.n_parts
-    return n_pairs * (config.n_search + 3) + 1 + len(config.others) + n_levels + n_trained
+    return (
+        n_pairs * (config.n_search + 3 + len(BEYOND_M))
+        + 1
+        + len(config.others)
+        + n_levels
+        + n_trained
+    )
 
 
 STUDY = Study(
