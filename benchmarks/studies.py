@@ -115,9 +115,9 @@ STUDIES: dict[str, Study] = {
         ("impact", "lateness"), {"impact_tradeoff.png": "tradeoff.png"},
     ),
     "price": Study(
-        EXPERIMENT + "price --trainings", 400,
+        EXPERIMENT + "price --trainings", 240,
         ("hrc_env.experiments.price.experiment", "agents.experts", "agents.ppo"),
-        ("price", "worth", "price_elsewhere", "blindness"),
+        ("price", "worth", "price_elsewhere", "blindness"), {"price.png": "price.png"},
         quick="--quick --seeds 3",
     ),
     "pictures": Study(

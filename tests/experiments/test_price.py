@@ -307,10 +307,8 @@ def test_eyes_are_compared_draw_by_draw():
 
 def test_a_search_goes_on_where_fresh_seeds_say_so(tmp_path, monkeypatch):
     """With the search's seeds nobody is ever touched; with the fresh ones everybody is."""
-    margins_m = []
 
     def play(stage, seeds, margin_m, tick):
-        margins_m.append(round(margin_m, 6))
         touched = float(seeds[0] == experiment.FIRST_FRESH or margin_m < -0.7)
         one = {"minutes": 1.0, "achieved": 1.0, "towards": touched, "walk": 0}
         return {name: [value] * len(seeds) for name, value in one.items()}

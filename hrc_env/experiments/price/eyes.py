@@ -64,7 +64,7 @@ def _late(latency_s: float, told: bool) -> Eyes:
     ms = round(1000 * latency_s)
     says = "known" if told else "not known"
     return Eyes(
-        f"late_{ms}ms{'' if told else '_untold'}", f"images {ms} ms late, which is {says}",
+        f"late_{ms}ms{'' if told else '_untold'}", f"images {ms} ms late, {says}",
         "latency", PerceptionSetup(latency_s=latency_s, is_told=told),
     )  # fmt: skip
 

@@ -149,7 +149,11 @@ def draw_price(path: Path, metrics: Metrics, task: str, eyes: Sequence[Eyes]) ->
         color=[COLOURS[each.group] for each in shown], height=0.72, ecolor="0.35", capsize=3,
     )  # fmt: skip
     _say(axis, shown, values)
-    figure.suptitle("What sight costs at equal safety", fontsize=16, fontweight="bold")
+    used = {each.group for each in shown}
+    handles = {words: axis.barh(0, 0, color=COLOURS[name]) for name, words in GROUPS.items()
+               if name in used}  # fmt: skip
+    figure.legend(handles.values(), handles, loc="outside lower center", ncols=2, fontsize=10)
+    figure.suptitle("What sight costs when all robots touch people equally rarely", fontsize=15)
     save(figure, path)
 
 
@@ -160,13 +164,8 @@ def _say(axis: Axes, shown: Sequence[Eyes], values: Sequence[Any]) -> None:
         if value.value == value.value:
             axis.text(1.2, y, f"{100 * value.value:.0f} %", va="center", color="white",
                       fontsize=12, fontweight="bold")  # fmt: skip
-    label(axis, "work done, in % of a robot without a shield, when all touch people equally rarely",
-          grid="x")  # fmt: skip
-    axis.set_xlim(0, 100)
-    used = {each.group for each in shown}
-    handles = [axis.barh(0, 0, color=COLOURS[name]) for name in GROUPS if name in used]
-    axis.legend(handles, [GROUPS[name] for name in GROUPS if name in used], loc="lower right",
-                fontsize=10, framealpha=0.95)  # fmt: skip
+    label(axis, "work that is left, in % of a robot without a shield", grid="x")
+    axis.set_xlim(0, max([100.0, *(100 * each.high for each in values)]))
     for side in ("top", "right", "left"):
         axis.spines[side].set_visible(False)
     axis.tick_params(axis="y", length=0)
