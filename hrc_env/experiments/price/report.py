@@ -150,9 +150,11 @@ def draw_price(path: Path, metrics: Metrics, task: str, eyes: Sequence[Eyes]) ->
     )  # fmt: skip
     _say(axis, shown, values)
     used = {each.group for each in shown}
-    handles = {words: axis.barh(0, 0, color=COLOURS[name]) for name, words in GROUPS.items()
+    handles: dict[str, Any] = {words: axis.barh(0, 0, color=COLOURS[name]) for name, words in GROUPS.items()
                if name in used}  # fmt: skip
-    figure.legend(handles.values(), handles, loc="outside lower center", ncols=2, fontsize=10)
+    figure.legend(
+        list(handles.values()), list(handles), loc="outside lower center", ncols=2, fontsize=10
+    )
     figure.suptitle("What sight costs when all robots touch people equally rarely", fontsize=15)
     save(figure, path)
 
