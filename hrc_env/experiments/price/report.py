@@ -149,12 +149,10 @@ def draw_price(path: Path, metrics: Metrics, task: str, eyes: Sequence[Eyes]) ->
         color=[COLOURS[each.group] for each in shown], height=0.72, ecolor="0.35", capsize=3,
     )  # fmt: skip
     _say(axis, shown, values)
-    used = {each.group for each in shown}
-    handles: dict[str, Any] = {words: axis.barh(0, 0, color=COLOURS[name]) for name, words in GROUPS.items()
-               if name in used}  # fmt: skip
-    figure.legend(
-        list(handles.values()), list(handles), loc="outside lower center", ncols=2, fontsize=10
-    )
+    used = [name for name in GROUPS if name in {each.group for each in shown}]
+    bars: list[Any] = [axis.barh(0, 0, color=COLOURS[name]) for name in used]
+    words = [GROUPS[name] for name in used]
+    figure.legend(bars, words, loc="outside lower center", ncols=2, fontsize=10)
     figure.suptitle("What sight costs when all robots touch people equally rarely", fontsize=15)
     save(figure, path)
 
