@@ -47,10 +47,52 @@ INFOS = {
     ),
     "cost_proximity": ("0 or 1", "the true surfaces came nearer than `cost.proximity_m`"),
     "cost_contact": ("0 or 1", "the true surfaces touched at any physics substep, by distance"),
-    "cost": ("-", "sum of both; 0 after a reset"),
+    "cost": (
+        "-", "sum of `cost.components`, both by default; 0 after a reset. There are also "
+        "`towards`, contacts that begin while the robot comes; `force`, the "
+        "`contact_force_ratio` of contacts; `too_near`; `near_miss`: each that is chosen is in "
+        "`cost_<name>`",
+    ),
     "cost_sum": ("-", "the same, under the name that some safe-RL libraries read"),
     "episode_cost": ("-", "running sum of `cost`"),
     "safety/min_separation_m": ("m", "least true separation of the step; absent without workers"),
+    "safety/robot_towards_m_s": (
+        "m/s", "how fast the robot's motion narrows the separation from the nearest worker; absent "
+        "beyond 1 m",
+    ),
+    "safety/worker_towards_m_s": ("m/s", "how fast the worker's does; likewise"),
+    "safety/too_near": (
+        "0 or 1", "the robot comes towards a worker at more than 0.05 m/s, nearer than the "
+        "protective distance of ISO/TS 15066 with both true directed speeds, 0.1 s of reaction and "
+        "`time_to_stop_s`",
+    ),
+    "safety/time_to_stop_s": ("s", "until all joints stand still, at the fastest slew"),
+    "safety/contact_kind": (
+        "names", 'contacts that begin in this step, by what the robot did in the step before: '
+        '"towards" the worker, "fleeing", or "standing", at 0.05 m/s. Who touches again within '
+        "0.5 s is in the same contact",
+    ),
+    "safety/contact_region": ("names", "which region of the body each of them hits"),
+    "safety/contact_came_m_s": (
+        "m/s", "the robot's directed speed before; absent where no contact begins"
+    ),
+    "safety/contact_closing_m_s": ("m/s", "that and the worker's own; likewise"),
+    "safety/contact_force_ratio": (
+        "-", "force of ISO/TS 15066, A.3, at the closing speed, with half of the robot's moving "
+        "mass and its load, as a share of the transient limit of the region; of the head, which "
+        "has none, of its quasi-static one; likewise",
+    ),
+    "safety/contact_severity": (
+        "0 to 3", "0: no contact begins, 1: one that the region bears, 2: one that it does not, 3: "
+        "the head is hit",
+    ),
+    "safety/contacts_towards": ("-", "contacts of this kind in the episode so far"),
+    "safety/contacts_fleeing": ("-", "likewise"),
+    "safety/contacts_standing": ("-", "likewise"),
+    "safety/near_misses": (
+        "-", "how often in the episode so far the separation fell below 0.05 m and rose above "
+        "0.10 m without a touch",
+    ),
     "tracking/mpjpe_m": (
         "m", "mean joint error of the estimate; absent where nobody is tracked. Tracks are "
         "compared with the workers whom they fit best",
@@ -167,7 +209,8 @@ float64. Distances are to the *estimated* body. Cost is counted on the true one
 ([keys of info](infos.md)); what a robot carries counts as part of it in both.
 
 ## Start and end
-A worker is somewhere in their schedule, at a random phase. The estimator starts from its prior and
+A worker is somewhere in their schedule, at a random phase, and no part of the robot within 0.1 m of
+them: such starts are drawn again. The estimator starts from its prior and
 the first images. Episodes are truncated by `TimeLimit`, or after n steps where they began with
 `reset(options={{"steps_left": n}})`. Contact ends them only with
 `config={{"cost": {{"contact_terminates": True}}}}`.
@@ -307,8 +350,7 @@ def infos() -> str:
         found |= set(env.simulation.task.info(env.simulation.task_state))
         terms |= {f"`reward/{name.strip('`')}`": doc for name, doc in _rewards(env)}
         found |= set(env.reset(seed=1)[1])
-        for _ in range(25):
-            found |= set(env.step(np.zeros(env.simulation.n_actions))[4])
+        found |= set(env.simulation.step(np.zeros((1, env.simulation.n_actions))).info)
         env.close()
     wrong = {name for name in found if not name.startswith("reward/")} ^ set(INFOS)
     if wrong:

@@ -28,8 +28,10 @@ from hrc_env.motion.activities.pieces import NoRoomError
 from hrc_env.pipeline.levels import CAMERA_LEVELS, make_pipeline
 from hrc_env.pipeline.sensor_input import SensorInput, TrueSensorInput
 from hrc_env.rewards import RewardConfig
+from hrc_env.safety import starts
 from hrc_env.safety.model import robot_model
 from hrc_env.safety.shield import shielded
+from hrc_env.safety.watch import Watch
 from hrc_env.scene import handling
 from hrc_env.scene.build import build
 from hrc_env.scene.physics import Physics
@@ -42,12 +44,9 @@ from hrc_env.worker.body import pool, stack, worker_capsules, worker_truth
 CLOSING_M_S = 8.0
 """Arm and worker never come nearer to each other than so fast [m/s]; 3.4 was the most in some
 290,000 steps of arms that were driven to and fro as hard as they can be."""
-
 STREAMS = ("robot", "motion", "sensor", "tracker", "task")
 """Who draws numbers, each from a generator of its own, in the order in which these are handed out:
 the worker's walk does not depend on who looks at it."""
-
-
 MEASURING = "objects"
 """And who measures loose objects, where there are any: from a child of the task's."""
 
@@ -56,7 +55,7 @@ class Simulation(Stateful):
     """`batch` environments of the same settings that step together."""
 
     CHANGES = (
-        "physics", "pipeline", "motion", "task_state", "streams", "action", "episode_cost",
+        "physics", "pipeline", "motion", "task_state", "streams", "action", "episode_cost", "watch",
         "separation_m", "estimates", "reward_weights", "identities", "measured", "shield_change",
     )  # fmt: skip
 
@@ -100,17 +99,15 @@ class Simulation(Stateful):
         )  # fmt: skip
         self.layout = observations.layout(self.terms, sizes)
         self.model = robot_model(self.scene, settings.control, config.control)
+        self.watch = Watch(batch, most, self.bodies.capsule_names, self.model, config.ctrl_dt)
         self.physics = Physics(self.scene, batch)
         self.pipeline = make_pipeline(perception, settings.estimator, self.scene, batch, config)
         self.task_state = self.task.init(batch)
-        self.reward_weights = config.reward
-        self._everyone = np.arange(batch)
-        self.action = np.zeros((batch, self.n_actions))
-        self.shield_change = np.zeros((batch, n_joints))
+        self._everyone, self.reward_weights = np.arange(batch), config.reward
+        self.action, self.shield_change = (np.zeros((batch, n)) for n in (self.n_actions, n_joints))
         self.episode_cost, self.separation_m = np.zeros(batch), np.zeros(batch)
-        self.estimates = tuple(
-            oracle.prior(batch, most, config.tracker) for _ in (0.0, *config.forecast_s)
-        )
+        made = (batch, most, config.tracker)
+        self.estimates = tuple(oracle.prior(*made) for _ in (0.0, *config.forecast_s))
         """What is believed of the workers now, and expected at each of `forecast_s`."""
         self.identities = metrics.no_identities(batch, most)
         robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
@@ -126,10 +123,11 @@ class Simulation(Stateful):
                 streams[name][b] = stream
             if self.measured is not None:
                 streams[MEASURING][b] = streams["task"][b].spawn(1)[0]
-        generator.reset(self.motion, ids, streams["motion"])
         self.action[ids], self.episode_cost[ids], self.separation_m[ids] = 0.0, 0.0, 0.0
         self.shield_change[ids] = 0.0
-        q, task, config = self._starting_angles(ids), self.task, self.config.task
+        self.watch.reset(ids)
+        task, config, people = self.task, self.config.task, (self.motion, streams["motion"])
+        q = starts.apart(ids, self._starting_angles, *people, self.chain, self.bodies)
         robot = chains.robot_state(self.chain, q, np.zeros_like(q))
         task.reset(self.task_state, ids, streams["task"], World(robot, place=self.place), config)
         poses = None if task.poses is None else task.poses(self.task_state, ids, config)
@@ -142,15 +140,15 @@ class Simulation(Stateful):
         self._expose(ids, motion, truth)
         estimates = self._perceive(ids)
         belief = self._believed(ids, world, estimates)
-        observation = self._observed(belief)
         identities = metrics.no_identities(*self.present[ids].shape)
         info = {
-            **step.no_cost(len(ids)),
+            **step.nothing_happened(len(ids), self.config.cost),
             **step.tracking_info(estimates[0], truth, self.present[ids], identities),
             **self._episode_info(ids, generator.activity(self.motion)),
         }
         write_rows(self.identities, ids, identities)
-        return StepResult(observation, np.zeros(len(ids)), np.zeros(len(ids), bool), info)
+        seen, reward = self._observed(belief), np.zeros(len(ids))
+        return StepResult(seen, reward, reward > 0, info)
 
     def step(self, action: Floats) -> StepResult:
         """One control step of every environment; action (B, A) in [-1, 1]."""
@@ -182,19 +180,23 @@ class Simulation(Stateful):
         cost = metrics.cost(
             arm, robot.capsule_radius_m, workers, truth.capsule_radius_m, config.cost
         )
+        paths = arm, workers, truth.capsule_radius_m, cost.min_separation_m
+        happened = self.watch.step(world, *paths)
         judged = replace(world, touched=cost.contact > 0, place=self.place)
         progress = self.task.advance(
             self.task_state, self.streams["task"], judged, config.ctrl_dt, config.task
         )
         belief = self._believed(self._everyone, world, estimates)
         terms = self._reward_terms(belief, progress, previous)
-        self.episode_cost += cost.total
-        self.separation_m = cost.min_separation_m
         activity = generator.activity(self.motion)
         present = activity != generator.ABSENT
+        costs = step.cost_info(cost, happened, present, config.cost)
+        self.episode_cost += costs["cost"]
+        self.separation_m = cost.min_separation_m
         info = {
             **{f"reward/{name}": value for name, value in terms.items()},
-            **step.cost_info(cost, present),
+            **costs,
+            **step.incident_info(happened, self.watch, robot),
             **step.tracking_info(estimates[0], truth, present, self.identities),
             **shield_info,
             **self._episode_info(self._everyone, activity),
@@ -202,8 +204,7 @@ class Simulation(Stateful):
         over = (cost.contact > 0) & config.cost.contact_terminates
         if self.task.over is not None:
             over |= self.task.over(progress)
-        observation = self._observed(belief)
-        return StepResult(observation, rewards.total(terms, self.batch), over, info)
+        return StepResult(self._observed(belief), rewards.total(terms, self.batch), over, info)
 
     def set_reward(self, weights: RewardConfig) -> None:
         """Weigh the reward's terms so from the next step on."""
@@ -263,11 +264,10 @@ class Simulation(Stateful):
 
     def _starting_angles(self, ids: Ints) -> Floats:
         """(len(ids), N) angles near home, unless the task says where robots start."""
-        spread, rngs = self._spread_rad, picked(self.streams["robot"], ids)
+        rngs = picked(self.streams["robot"], ids)
         if self.task.start is not None:
             return self.task.start(rngs, self.place, self.config.task)
-        angles = [self.scene.home_q + rng.uniform(-1, 1, len(spread)) * spread for rng in rngs]
-        return np.array(angles).reshape(len(ids), -1)
+        return starts.near(self.scene.home_q, self._spread_rad, rngs)
 
     def _command(self) -> tuple[JointVelocities, Info]:
         """(B, N) what the arms are to do [rad/s], and what the shield says to it."""

@@ -11,9 +11,12 @@ from numpy.typing import NDArray
 
 from hrc_env import metrics
 from hrc_env.core.errors import Named
-from hrc_env.core.records import PoseEstimate, WorkerTruth
-from hrc_env.core.typing import Bools, Floats, Ints
+from hrc_env.core.records import PoseEstimate, RobotState, WorkerTruth
+from hrc_env.core.typing import Bools, Floats, Ints, Records
+from hrc_env.metrics import CostConfig
 from hrc_env.motion import generator
+from hrc_env.safety import incidents
+from hrc_env.safety.watch import Watch
 
 Info = dict[str, NDArray[Any]]
 """Named values (B,): numbers, NaN where an environment has none in this step; or tuples of words,
@@ -26,6 +29,8 @@ ACTIVITY = "worker/activity"
 """What each worker is doing, by name; `ABSENT` of who is not in the episode."""
 BODY = "worker/body"
 """Which baked body each worker has in this episode; likewise."""
+CONTACT_KIND, CONTACT_REGION = "safety/contact_kind", "safety/contact_region"
+"""Of contacts that begin in a step: what the robot did, and where they are."""
 ABSENT = "absent"
 MISCALIBRATED = "perception/miscalibrated"
 """Names of cameras that contradict the others as if they had been moved, turned or zoomed."""
@@ -69,21 +74,49 @@ def _joined(parts: Sequence[Any]) -> Any:
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
-def cost_info(cost: metrics.Cost, present: Bools) -> Info:
-    """The cost by the names that safe-RL libraries read, and the separation from who is there."""
-    separation = np.where(present.any(1), cost.min_separation_m, np.nan)
+def cost_info(cost: metrics.Cost, happened: Records, present: Bools, config: CostConfig) -> Info:
+    """The cost by the names that safe-RL libraries read, with its parts, and the separation from
+    who is there."""
+    parts = metrics.parts(cost, happened, config)
+    total = metrics.total(parts, config)
     return {
-        "cost": cost.total,
-        "cost_sum": cost.total,
-        "cost_proximity": cost.proximity,
-        "cost_contact": cost.contact,
-        "safety/min_separation_m": separation,
+        "cost": total,
+        "cost_sum": total,
+        **{f"cost_{name}": value for name, value in parts.items()},
+        "safety/min_separation_m": np.where(present.any(1), cost.min_separation_m, np.nan),
     }
 
 
-def no_cost(n: int) -> Info:
-    """What `n` resets cost: nothing, under the names of `cost_info`; a separation has no such 0."""
-    return {name: np.zeros(n) for name in ("cost", "cost_sum", "cost_proximity", "cost_contact")}
+def nothing_happened(n: int, config: CostConfig) -> Info:
+    """What `n` resets say of cost and incidents: none."""
+    names = ("", "_sum", *(f"_{name}" for name in ("proximity", "contact", *config.components)))
+    counts = (*(f"contacts_{kind}" for kind in incidents.KINDS), "near_misses")
+    nothing = np.full((n, 0), -1)
+    return {
+        **{f"cost{name}": np.zeros(n) for name in names},
+        **{f"safety/{name}": np.zeros(n) for name in counts},
+        **{name: _begun(nothing, ()) for name in (CONTACT_KIND, CONTACT_REGION)},
+    }
+
+
+def incident_info(happened: Records, watch: Watch, robot: RobotState) -> Info:
+    """What happened to people in a step, (B, W) `incidents.INCIDENT`, and in its episode."""
+    told = incidents.summed_up(happened, watch.known)
+    return {
+        **{f"safety/{name}": told[name] for name in incidents.SUMMARY.names or ()},
+        "safety/time_to_stop_s": watch.stop_s(robot),
+        CONTACT_KIND: _begun(happened["kind"], incidents.KINDS),
+        CONTACT_REGION: _begun(happened["region"], incidents.REGION_NAMES),
+    }
+
+
+def _begun(indices: Ints, names: tuple[str, ...]) -> NDArray[np.object_]:
+    """(B,) tuples of the names of indices (B, W) that are not -1."""
+    said = np.empty(len(indices), object)
+    said[:] = [()] * len(indices)
+    for b, w in np.argwhere(indices >= 0).tolist():
+        said[b] += (names[indices[b, w]],)
+    return said
 
 
 def tracking_info(

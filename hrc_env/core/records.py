@@ -12,8 +12,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from hrc_env.core.typing import (
     Bools,
     Capsules,
@@ -81,9 +79,9 @@ class PoseEstimate:
 
     def __post_init__(self) -> None:
         if self.unknown is None:
-            object.__setattr__(self, "unknown", ~np.asarray(self.tracked, bool))
+            object.__setattr__(self, "unknown", ~self.tracked)
         if self.blind_s is None:
-            object.__setattr__(self, "blind_s", np.min(self.age_s, axis=-1))
+            object.__setattr__(self, "blind_s", self.age_s.min(-1))
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,8 +10,8 @@ import pytest
 
 from docs import tables
 from hrc_env.core.errors import ConfigError, HRCError
-from hrc_env.experiments.impact import episodes, policies
-from hrc_env.experiments.impact.episodes import STEP, Stage, _build, bodies_of, judge, sums_of
+from hrc_env.experiments.impact import policies
+from hrc_env.experiments.impact.episodes import STEP, Stage, sums_of
 from hrc_env.experiments.impact.experiment import STUDY, ImpactConfig, check_walks, config_for, play
 from hrc_env.experiments.impact.metrics import COMPARED, margin_needed
 from hrc_env.experiments.impact.policies import Policy, maker, trained
@@ -26,6 +26,7 @@ from hrc_env.experiments.study.cache import PartCache
 from hrc_env.experiments.study.counts import GAPS_M, Bins
 from hrc_env.experiments.study.intervals import counted_quantile_over
 from hrc_env.experiments.study.runner import run
+from hrc_env.safety.incidents import KINDS
 
 LATE = PerceptionSetup(latency_s=0.12).name
 TINY = ImpactConfig(
@@ -48,7 +49,8 @@ def sums(*steps, margin_m=0.0):
         played[name] = np.array(steps, float)[:, k : k + 1]
     info = {"safety/min_separation_m": np.array([0.5])}
     info |= {f"task/goals_{what}": np.zeros(1) for what in ("reached", "missed")}
-    infos = [info | {"cost": touch, "cost_contact": touch} for touch in touching]
+    info |= {f"safety/contacts_{how}": np.zeros(1) for how in KINDS}
+    infos = [info | {"cost": touch} for touch in touching]
     return {name: value[0] for name, value in sums_of(played, infos, margin_m, 0.04).items()}
 
 
@@ -118,55 +120,9 @@ def test_a_worker_whom_the_robot_knows_nothing_of_is_a_missed_stop():
     assert sums((0.05, np.inf, 0, 0))["missed_stops"] == 1
 
 
-def contacts(found):
-    """How many began while the robot moved towards the worker, stood, moved away."""
-    return [found[f"contacts_{how}"] for how in ("towards", "standing", "away")]
-
-
-def test_a_touch_counts_once_by_what_the_robot_did_in_the_step_before():
-    touched = sums(
-        (0.1, 0.1, 0.3, 0), (0.0, 0.0, 0.0, 1), (0.0, 0.0, -0.3, 1), (0.1, 0.1, -0.3, 0),
-        (0.0, 0.0, 0.3, 1), (0.1, 0.1, 0.01, 0), (0.0, 0.0, 0.3, 1),
-    )  # fmt: skip
-    assert contacts(touched) == [1, 1, 1]
-
-
-def test_a_standing_arm_that_is_pushed_does_not_move_away():
-    assert contacts(sums((0.1, 0.1, 0.0, 0), (0.0, 0.0, -0.5, 1))) == [0, 1, 0]
-
-
-def test_a_touch_in_the_first_step_is_no_contact_but_is_counted_apart():
-    touched = sums((0.0, 0.0, 0.3, 1), (0.0, 0.0, 0.3, 1), (0.1, 0.1, 0.3, 0), (0.0, 0.0, 0.3, 1))
-    assert touched["starts_in_contact"] == 1
-    assert contacts(touched) == [1, 0, 0]
-
-
 def test_cost_is_split_by_whether_the_robot_moves_towards_the_worker():
     found = sums((0.0, 0.0, 0.3, 1), (0.0, 0.0, -0.3, 1), (0.0, 0.0, 0.0, 1), (0.5, 0.5, 0.3, 0))
     assert (found["cost"], found["cost_towards"]) == (3, 1)
-
-
-def test_directed_speeds_add_up_to_how_the_gap_closes(monkeypatch):
-    monkeypatch.setattr(episodes, "n_cores", lambda: 1)
-    setup = setup_called("truth")
-    env = _build(setup, setup.turns[0], 2, {})
-    part = env.first
-    seeds = (2, 3)  # the same parts stay nearest to each other
-    env.reset(np.arange(2), [np.random.default_rng(seed) for seed in seeds])
-    action = np.full((2, part.n_actions), 0.5)
-    steps, before = [], bodies_of(part)
-    for _ in range(5):
-        env.step(action)
-        now = bodies_of(part)
-        steps.append(judge(part, before, now))
-        before = now
-    gaps = np.array([step["true_separation_m"] for step in steps])
-    closing = -np.diff(gaps, axis=0) / part.config.ctrl_dt
-    both = np.array([step["robot_mps"] + step["worker_mps"] for step in steps[1:]])
-    assert np.abs(closing).max() > 0.05
-    assert np.allclose(both, closing, atol=0.05)
-    assert np.abs(steps[-1]["error_m"]).max() == 0.0
-    env.close()
 
 
 def test_quantiles_of_bins_are_those_of_the_values():
@@ -195,9 +151,9 @@ def test_the_margin_is_where_no_more_stops_are_missed_than_on_time():
 
 def test_every_row_says_everything(end_to_end):
     out, metrics = end_to_end
-    keys = ("separation_min_m", "contacts_towards", "contacts_away", "contacts_standing",
-            "starts_in_contact", "cost", "cost_towards", "goals_per_min", "missed_stops",
-            "false_stops", "z_d_m", "tax_m")  # fmt: skip
+    keys = ("separation_min_m", "contacts_towards", "contacts_fleeing", "contacts_standing",
+            "cost", "cost_towards", "goals_per_min", "missed_stops", "false_stops", "z_d_m",
+            "tax_m")  # fmt: skip
     for policy in TINY.policies:
         for setup in TINY.setups:
             for key in keys:

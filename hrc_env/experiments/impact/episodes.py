@@ -1,7 +1,7 @@
 """Episodes of one policy with one perception setup: always the same seeds and the same workers.
 
-Distances are between true capsules, as in the cost. A directed speed is by how much one body's
-motion of a step narrowed them while the other is held where it is at its end.
+Distances are between true capsules, as in the cost; directed speeds and contacts are those of
+`safety.incidents`.
 """
 
 import hashlib
@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 from hrc_env.config import settle
 from hrc_env.control import checked_action
 from hrc_env.core.machine import n_cores
-from hrc_env.core.records import WorkerTruth
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Bools, Capsules, Floats, Ints
+from hrc_env.core.typing import Ints
 from hrc_env.experiments.impact.setups import PerceptionSetup
 from hrc_env.experiments.study.cache import PartProgress
 from hrc_env.experiments.study.counts import ERRORS_M, GAPS_M, SPEEDS_MPS
@@ -27,6 +26,7 @@ from hrc_env.experiments.study.rigs import Turn
 from hrc_env.geometry import chains
 from hrc_env.geometry.distances import least_separation
 from hrc_env.motion import generator
+from hrc_env.safety.incidents import KINDS, MOVING_M_S
 from hrc_env.simulation import Simulation
 from hrc_env.step import Info
 from hrc_env.tasks import DEFAULT
@@ -37,15 +37,10 @@ PEOPLE = "unaware"
 """Workers who take no notice of the robot: their walk is then the same whatever it does."""
 STOP_M, SLOW_M = 0.10, 0.60
 """Separations that call for standing still and for slowing down [m]: `agents.scripted.Yielding`."""
-MOVING_MPS = 0.05
-"""From this directed speed on a robot moves towards the worker or away [m/s]; judgement. One that
-stands or moves away cannot help it when somebody walks into it."""
 MakeAgent = Callable[[Simulation], Any]
 """The agent for a simulation's robot (`agents.env_info.Agent`)."""
 Rows = dict[str, list[Any]]
 """Sums by name, one an episode."""
-Bodies = tuple[Capsules, WorkerTruth]
-"""Where the robot's capsules (B, K, 2, 3) [m] and the workers truly are."""
 STEP = np.dtype([
     ("true_separation_m", float), ("believed_separation_m", float),
     ("robot_mps", float), ("worker_mps", float),
@@ -123,38 +118,27 @@ def run(
     """One episode of every seed, side by side: what happened (T, B, ...), the infos of T steps."""
     agent, shape = make_agent(env.first), (len(seeds), env.first.n_actions)
     result = env.reset(np.arange(len(seeds)), [seeding.np_random(seed)[0] for seed in seeds])
-    steps, infos, before = [], [], list(map(bodies_of, env.parts))
+    steps, infos = [], []
     for _ in range(n_steps):
         result = env.step(checked_action(agent.act(result.observation), shape))
-        now = list(map(bodies_of, env.parts))
-        steps.append(np.concatenate(list(map(judge, env.parts, before, now))))
+        now = np.concatenate(list(map(judge, env.parts)))
+        for who in ("robot", "worker"):
+            now[f"{who}_mps"] = np.nan_to_num(result.info[f"safety/{who}_towards_m_s"])
+        steps.append(now)
         infos.append(result.info)
-        before = now
         stepped()
     return np.stack(steps), infos
 
 
-def bodies_of(part: Simulation) -> Bodies:
-    """Where everybody is now."""
-    truth = worker_truth(part.bodies, generator.current(part.motion))
-    return chains.capsules(part.chain, part.physics.q), truth
-
-
-def judge(part: Simulation, before: Bodies, now: Bodies) -> Steps:
-    """(B,) one step of a simulation with one worker, from where bodies were before and are now."""
-
-    def separation_m(robot_world: Capsules, worker: WorkerTruth) -> Floats:
-        capsules = worker.capsules_world[:, 0], worker.capsule_radius_m[:, 0]
-        radius_m = part.chain.capsule_radius_m
-        return least_separation(robot_world, radius_m, *capsules).distance_m
-
-    (robot_before, worker_before), (robot, worker) = before, now
-    dt_s, joints_world = part.config.ctrl_dt, worker.joints_world[:, 0]
-    steps = np.empty(len(joints_world), STEP)
-    steps["true_separation_m"] = at_end_m = separation_m(*now)
+def judge(part: Simulation) -> Steps:
+    """(B,) where one worker is in a simulation now, truly and as is believed."""
+    worker = worker_truth(part.bodies, generator.current(part.motion))
+    joints_world = worker.joints_world[:, 0]
+    steps = np.zeros(len(joints_world), STEP)
+    robot = chains.capsules(part.chain, part.physics.q), part.chain.capsule_radius_m
+    capsules = worker.capsules_world[:, 0], worker.capsule_radius_m[:, 0]
+    steps["true_separation_m"] = least_separation(*robot, *capsules).distance_m
     steps["believed_separation_m"] = part.belief.separation.distance_m[:, 0]
-    steps["robot_mps"] = (separation_m(robot_before, worker) - at_end_m) / dt_s
-    steps["worker_mps"] = (separation_m(robot, worker_before) - at_end_m) / dt_s
     off_m = part.estimate.mean_world[:, 0] - joints_world
     steps["error_m"], steps["joints_world"] = np.linalg.norm(off_m, axis=-1), joints_world
     return steps
@@ -169,17 +153,16 @@ def sums_of(
 ) -> Rows:
     """Everything that numbers are made of, a list over episodes each, from T steps of B; what was
     `achieved` (`Task.achieved`) counts as goals."""
-    touching = np.stack([info["cost_contact"] for info in infos]) > 0
     nearest_m = np.stack([info["safety/min_separation_m"] for info in infos])
     cost = np.stack([info["cost"] for info in infos])
     sums = {
         "cost": cost.sum(0),
-        "cost_towards": (cost * (steps["robot_mps"] > MOVING_MPS)).sum(0),
+        "cost_towards": (cost * (steps["robot_mps"] > MOVING_M_S)).sum(0),
         "separation_min_m": np.fmin.reduce(nearest_m, axis=0, initial=np.inf),
         "goals": infos[-1][achieved],
-        "minutes": np.full(touching.shape[1], len(infos) * dt_s / 60),
+        "minutes": np.full(cost.shape[1], len(infos) * dt_s / 60),
         **_decisions(steps, margin_m),
-        **_contacts(steps, touching),
+        **{f"contacts_{how}": infos[-1][f"safety/contacts_{how}"] for how in KINDS},
         **_counts(steps),
     }
     rows = {name: value.tolist() for name, value in sums.items()}
@@ -197,25 +180,8 @@ def _decisions(steps: Steps, margin_m: float) -> dict[str, Ints]:
         found[f"called_{name}"] = called.sum(0)
         found[f"missed_{name}"] = (called & ~given).sum(0)
         found[f"false_{name}"] = (given & ~called).sum(0)
-    approaches = (steps["robot_mps"] > MOVING_MPS) & (steps["true_separation_m"] < STOP_M)
+    approaches = (steps["robot_mps"] > MOVING_M_S) & (steps["true_separation_m"] < STOP_M)
     return found | {"approaches": approaches.sum(0)}
-
-
-def _contacts(steps: Steps, touching: Bools) -> dict[str, Ints]:
-    """(B,) how many touches begin; one that lasts counts once.
-
-    What the robot did is its speed in the step before: in the step itself the impact changes it. A
-    touch in the first step began before the robot could do anything, and is counted apart.
-    """
-    begins = touching[1:] & ~touching[:-1]
-    before = steps["robot_mps"][:-1]
-    towards, away = before > MOVING_MPS, before < -MOVING_MPS
-    return {
-        "contacts_towards": (begins & towards).sum(0),
-        "contacts_standing": (begins & ~towards & ~away).sum(0),
-        "contacts_away": (begins & away).sum(0),
-        "starts_in_contact": touching[0].astype(int),
-    }
 
 
 def _counts(steps: Steps) -> dict[str, Any]:

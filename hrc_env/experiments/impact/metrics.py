@@ -32,7 +32,7 @@ NOMINAL_MPS = 1.6
 PMC5117641; verify against the standard before certification) [m/s]."""
 A_MINUTE = {
     "goals_per_min": "goals",
-    **{name: name for name in ("contacts_towards", "contacts_standing", "contacts_away")},
+    **{name: name for name in ("contacts_towards", "contacts_standing", "contacts_fleeing")},
 }
 """What is counted a minute, and from which sum."""
 PER_1000 = (
@@ -40,7 +40,7 @@ PER_1000 = (
     "called_slowings", "approaches",
 )  # fmt: skip
 """What is counted in a thousand control steps; `called_slowings`: somebody is near."""
-AN_EPISODE = {"cost": "per episode", "cost_towards": "per episode", "starts_in_contact": "share"}
+AN_EPISODE = {"cost": "per episode", "cost_towards": "per episode"}
 """What is counted in an episode, and its unit."""
 QUANTILES = {
     "z_d_m": (ERRORS_M, "error", 0.95, "m"),

@@ -5,19 +5,20 @@ from pathlib import Path
 
 from matplotlib.axes import Axes
 
-from hrc_env.experiments.impact.episodes import MOVING_MPS, SLOW_M, STOP_M
+from hrc_env.experiments.impact.episodes import SLOW_M, STOP_M
 from hrc_env.experiments.impact.metrics import COMPARED, NOMINAL_MPS, Table
 from hrc_env.experiments.impact.policies import POLICIES, SCRIPTED, SLOWED
 from hrc_env.experiments.impact.setups import LATE, LATE_S, REFERENCE, setup_called
 from hrc_env.experiments.study.plots import ends, label, new_figure, save
 from hrc_env.experiments.study.report import Column, Metrics, Report, picture, table_of
+from hrc_env.safety.incidents import MOVING_M_S
 from hrc_env.tracking.estimators import ESTIMATORS
 
 WORDS = {
     "goals_per_min": ("goals / min", 1), "cost": ("true cost", 1),
     "cost_towards": ("of it moving towards", 1), "called_slowings": ("near", 0),
     "separation_min_m": ("least separation [m]", 3), "contacts_towards": ("contacts towards", 2),
-    "contacts_standing": ("standing arm pushed", 2), "contacts_away": ("moving away", 2),
+    "contacts_standing": ("standing arm pushed", 2), "contacts_fleeing": ("moving away", 2),
     "approaches": ("approaches", 1), "missed_stops": ("missed stops", 1),
     "false_stops": ("false stops", 1), "z_d_m": ("Z_d [m]", 3), "tax_m": ("tax [m]", 2),
 }  # fmt: skip
@@ -29,11 +30,12 @@ robots, goals and workers, who take no notice of the robot, are the same in ever
 estimated separation and stands still at {STOP_M:g} m; `ppo` was trained here on the reference.
 
 Counted is the truth. *True cost*: steps nearer than 0.15 m, and steps in touch, an episode; *of it
-moving towards*: while the robot moves towards the worker at more than {MOVING_MPS} m/s. The rest
+moving towards*: while the robot moves towards the worker at more than {MOVING_M_S} m/s. The rest
 comes of workers who walk up to a robot that stands, and depends on where it stands. *Contacts* a
-minute are named by what the robot did in the step before: *towards* the worker, *standing arm
-pushed*, *moving away*. In 1,000 steps, *near*: nearer than {SLOW_M:g} m, the exposure;
-*approaches*: the robot moves towards a worker nearer than {STOP_M:g} m; *missed stops*: the true
+minute, touches within half a second as one, are named by what the robot did in the step before:
+*towards* the worker, *standing arm pushed*, *moving away*. In 1,000 steps, *near*: nearer than
+{SLOW_M:g} m, the exposure; *approaches*: the robot moves towards a worker nearer than {STOP_M:g} m;
+*missed stops*: the true
 separation is below {STOP_M:g} m and the believed one is not; *false stops*: the other way round.
 *Z_d*: 95th percentile of the error of all joints, also where the track is lost. *Tax*: Z_d on time
 + latency x (v_h + v_r), v_h = {NOMINAL_MPS} m/s, v_r the 95th percentile of the robot's speed
@@ -63,7 +65,6 @@ ACROSS = {
 def report(figures: Path, table: Table, metrics: Metrics) -> Report:
     """Draw the figure; the tables beside it."""
     policies = [name for name in POLICIES if (name, REFERENCE) in table]
-    starts = table[policies[0], REFERENCE]["starts_in_contact"]
     setups = {name: setup_called(name).words for _, name in table}
     draw_tradeoff(figures / "tradeoff.png", metrics, policies, list(setups))
     caption = (
@@ -75,12 +76,7 @@ def report(figures: Path, table: Table, metrics: Metrics) -> Report:
     for policy in policies:
         columns = [Column(f"{policy}.{{}}.{what}", *words) for what, words in WORDS.items()]
         parts.append(table_of(policy, setups, columns, metrics))
-    parts += [
-        f"In {sum(starts)} of {len(starts)} episodes worker and arm touch in the first step, in "
-        "every row alike: the environment draws both without regard to each other. No contact is "
-        "counted there, as nothing that is seen could prevent it.",
-        f"Less {setups[REFERENCE]}, paired; a dot where the interval leaves out zero.",
-    ]
+    parts.append(f"Less {setups[REFERENCE]}, paired; a dot where the interval leaves out zero.")
     others = {name: words for name, words in setups.items() if name != REFERENCE}
     for policy in policies:
         key = f"difference.{policy}.{{}}."

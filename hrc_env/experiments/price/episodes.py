@@ -27,6 +27,7 @@ from hrc_env.experiments.study.cache import PartProgress
 from hrc_env.experiments.study.rigs import Turn
 from hrc_env.geometry.distances import least_separation
 from hrc_env.motion import generator
+from hrc_env.safety.incidents import AGAIN_S, MOVING_M_S
 from hrc_env.simulation import Simulation
 from hrc_env.tasks.task import task_called
 from hrc_env.vector.shards import Shards
@@ -34,11 +35,6 @@ from hrc_env.worker.body import worker_truth
 
 TOGETHER = 300
 """So many episodes are played side by side."""
-MOVING_MPS = 0.05
-"""From this directed speed on a robot moves towards the worker or away [m/s]."""
-AGAIN_S = 0.5
-"""A touch that begins so soon after another one ended is the same [s]: a robot that is rammed and
-pressed seems to come back."""
 STEP = np.dtype([
     ("towards_mps", float), ("touching", bool), ("cost", float), ("achieved", float),
     ("over", bool),
@@ -152,7 +148,7 @@ def sums_of(steps: NDArray[np.void], dt_s: float) -> Rows:
     n_steps, begins = counts.sum(0), first_touches(steps["touching"], round(AGAIN_S / dt_s))
     begins = (begins & counts)[1:]
     speed = steps["towards_mps"][:-1]
-    towards, away = speed > MOVING_MPS, speed < -MOVING_MPS
+    towards, away = speed > MOVING_M_S, speed < -MOVING_M_S
     sums = {
         "minutes": n_steps * dt_s / 60,
         "achieved": steps["achieved"][n_steps - 1, np.arange(steps.shape[1])],

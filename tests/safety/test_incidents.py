@@ -1,0 +1,214 @@
+"""What is counted of people: contacts by kind, how hard, near misses, distances that are broken."""
+
+import numpy as np
+import pytest
+
+from agents.env_info import env_info
+from agents.registry import make_agent
+from hrc_env.config import settle
+from hrc_env.core.errors import ConfigError
+from hrc_env.env import HRCEnv
+from hrc_env.metrics import COMPONENTS, CostConfig
+from hrc_env.safety import incidents
+from hrc_env.safety.contact import contact_force
+from hrc_env.safety.incidents import KINDS, Paths, noted, nothing_yet
+from hrc_env.safety.starts import gap_m
+from hrc_env.simulation import Simulation
+from hrc_env.vector.env import HRCVectorEnv
+from hrc_env.worker.body import load_body
+
+DT, T = 0.04, 5
+REGIONS = incidents.regions_of(["left_hand", "head"])
+
+
+class Line:
+    """A robot of one ball and a worker of a hand, and a head 5 m behind it, that move along x."""
+
+    def __init__(self, gap_m=0.5, n_workers=1):
+        self.state, self.robot_m = nothing_yet(1, n_workers), 0.0
+        self.hand_m = np.full(n_workers, gap_m + 0.2)
+        self.time_to_stop_s = 0.1
+
+    def step(self, robot_m_s=0.0, hand_m_s=0.0):
+        """Both move on; what happened to each worker, (W,)."""
+        ahead = np.arange(1, T + 1) / T * DT
+        robot, hand = self.robot_m + robot_m_s * ahead, self.hand_m + hand_m_s * ahead[:, None]
+        self.robot_m, self.hand_m = robot[-1], hand[-1]
+        n = self.hand_m.size
+        robots, workers = np.zeros((1, T, 1, 2, 3)), np.zeros((1, T, n, 2, 2, 3))
+        robots[..., 0] = robot[None, :, None, None]
+        workers[..., 0] = hand[None, :, :, None, None] + [[0.0], [5.0]]
+        gaps_m = hand - robot[:, None] - 0.2
+        radius_m = np.full((1, n, 2), 0.1)
+        paths = Paths(robots, np.array([0.1]), workers, radius_m, np.array([gaps_m.min()]))
+        return noted(self.state, paths, REGIONS, np.array([15.0]), np.array([0.1]), DT)[0]
+
+
+def begun(line, *speeds):
+    """Kinds of contacts that begin in steps with these speeds of robot and hand, in their order."""
+    found = [line.step(*speed)[0] for speed in speeds]
+    return [KINDS[each["kind"]] for each in found if each["kind"] >= 0]
+
+
+def test_directed_speeds_are_what_narrows_the_gap():
+    found = Line(0.5).step(0.6, -1.0)[0]
+    assert (found["robot_m_s"], found["worker_m_s"]) == pytest.approx((0.6, 1.0))
+    assert found["separation_m"] == pytest.approx(0.5 - 1.6 * DT)
+    assert np.isnan(Line(1.5).step(0.6)[0]["robot_m_s"])
+
+
+@pytest.mark.parametrize(
+    ("robot_m_s", "kind"), [(0.3, "towards"), (-0.3, "fleeing"), (0.0, "standing")]
+)
+def test_a_contact_is_named_by_what_the_robot_did_in_the_step_before(robot_m_s, kind):
+    line = Line(0.04)
+    assert begun(line, (robot_m_s, -0.2), (-robot_m_s, -3.0), (0.0, 0.0)) == [kind]
+    assert line.state["contacts"].sum() == 1
+    assert line.state["contacts"][0, 0, KINDS.index(kind)] == 1
+
+
+def test_who_touches_again_within_half_a_second_is_in_the_same_contact():
+    line = Line(0.03)
+    bounce = [(0.5, 0.0), (0.0, -1.0), (-1.5, 0.0), (0.0, 0.0), (1.5, 0.0), (-2.0, 0.0)]
+    assert begun(line, *bounce) == ["towards"]
+    away = [(0.0, 0.0)] * 13
+    assert begun(line, *away, (1.0, 0.0), (1.5, 0.0)) == ["towards"]
+
+
+def test_how_hard_a_contact_is_follows_from_region_and_closing_speed():
+    line = Line(0.03)
+    line.step(0.4, 0.0)
+    hit = line.step(0.4, -1.0)[0]
+    assert (hit["came_m_s"], hit["closing_m_s"]) == pytest.approx((0.4, 1.4))
+    assert incidents.REGION_NAMES[hit["region"]] == "hand and fingers"
+    assert hit["force_ratio"] == pytest.approx(contact_force("hand and fingers", 1.4, 15.0) / 280.0)
+    assert hit["severity"] == (1 if hit["force_ratio"] <= 1 else 2)
+
+
+def test_the_head_is_never_to_be_hit():
+    assert incidents.CAPSULE_REGIONS["head"] == "skull and forehead"
+    hit = np.zeros((), incidents.INCIDENT)
+    hit["region"], hit["closing_m_s"] = incidents.regions_of(["head"])[0], 0.01
+    incidents._weigh(hit, 15.0)
+    assert hit["severity"] == incidents.NEVER
+    assert 0 < hit["force_ratio"] < 1
+
+
+def test_a_near_miss_ends_without_a_touch():
+    line = Line(0.12)
+    passed = [line.step(*v)[0]["near_miss"] for v in [(2.0, 0.0), (-1.0, 0.0), (-1.0, 0.0)]]
+    assert passed == [False, False, True]
+    touched = Line(0.12)
+    for speed in (3.0, 2.0, -4.0, -4.0, -4.0):
+        assert not touched.step(speed)[0]["near_miss"]
+    assert touched.state["near_misses"] == 0
+
+
+def test_too_near_is_nearer_than_the_protective_distance_while_the_robot_comes():
+    """S_p = 1.6 x 0.2 + 0.5 x 0.15 = 0.395 m."""
+    assert Line(0.40).step(0.5, -1.6)[0]["too_near"]
+    assert not Line(0.50).step(0.5, -1.6)[0]["too_near"]
+    assert not Line(0.20).step(0.0, -1.6)[0]["too_near"]
+
+
+def test_every_worker_has_contacts_of_their_own():
+    line = Line(0.02, n_workers=2)
+    line.hand_m[1] += 0.05
+    line.step(0.3)
+    found = [line.step(0.6) for _ in range(3)]
+    kinds = np.array([each["kind"] for each in found])
+    assert (kinds >= 0).sum(0).tolist() == [1, 1]
+
+
+def test_every_capsule_of_a_body_is_of_a_region():
+    assert set(load_body().capsule_names) == set(incidents.CAPSULE_REGIONS)
+
+
+@pytest.mark.parametrize(
+    ("components", "words"),
+    [
+        ((), "one or more different ones"),
+        (("contact", "contact"), "one or more different ones"),
+        (("contacts",), "Unknown cost component 'contacts'"),
+    ],
+)
+def test_a_cost_of_other_parts_is_refused(components, words):
+    with pytest.raises(ConfigError, match=words):
+        CostConfig(components=components)
+
+
+def played(n_steps, batch=24, **arguments):
+    """A simulation with a robot that heeds nobody, and its infos, the reset's first."""
+    simulation = Simulation(batch, settle(perception="none", people="unaware", **arguments))
+    agent = make_agent("scripted", env_info(simulation))
+    ids, rngs = np.arange(batch), [np.random.default_rng(b) for b in range(batch)]
+    results = [simulation.reset(ids, rngs)]
+    for _ in range(n_steps):
+        results.append(simulation.step(agent.act(results[-1].observation)))
+    return simulation, [result.info for result in results]
+
+
+def test_info_says_what_happened_and_chosen_parts_are_the_cost():
+    _, (first, *infos) = played(200, config={"cost": {"components": COMPONENTS}})
+    assert not (first["safety/contacts_towards"] + first["cost_towards"]).any()
+    kinds = np.array([info["safety/contact_kind"] for info in infos], object)
+    assert np.vectorize(len)(kinds).sum() > 5
+    for info in infos:
+        begins = np.array([len(said) for said in info["safety/contact_kind"]])
+        assert begins.tolist() == [len(said) for said in info["safety/contact_region"]]
+        assert (np.isfinite(info["safety/contact_force_ratio"]) == (begins > 0)).all()
+        towards = [said.count("towards") for said in info["safety/contact_kind"]]
+        assert info["cost_towards"].tolist() == towards
+        parts = sum(info[f"cost_{name}"] for name in COMPONENTS)
+        assert info["cost"] == pytest.approx(parts)
+        assert (info["cost"] == info["cost_sum"]).all()
+    for kind in KINDS:
+        counted = sum(np.array([kind in each for each in row], float) for row in kinds)
+        assert infos[-1][f"safety/contacts_{kind}"].tolist() == counted.tolist()
+    assert infos[-1]["episode_cost"] == pytest.approx(sum(info["cost"] for info in infos))
+
+
+def test_directed_speeds_add_up_to_how_the_gap_closes():
+    simulation, _ = played(40, batch=40)
+    moving = simulation.motion, simulation.chain, simulation.bodies
+    before = gap_m(np.arange(40), simulation.physics.q, *moving)
+    info = simulation.step(np.zeros((40, 6))).info
+    closing = (before - gap_m(np.arange(40), simulation.physics.q, *moving)) / DT
+    both = info["safety/robot_towards_m_s"] + info["safety/worker_towards_m_s"]
+    near = np.isfinite(both)
+    assert near.sum() > 10
+    assert both[near] == pytest.approx(closing[near], abs=0.25)
+
+
+def test_without_workers_nothing_happens():
+    _, (_, *infos) = played(5, batch=1, n_workers=0)
+    assert infos[-1]["safety/contact_kind"].tolist() == [()]
+    assert np.isnan(infos[-1]["safety/robot_towards_m_s"])
+    assert infos[-1]["safety/time_to_stop_s"] > 0
+
+
+def test_a_batch_counts_what_its_environments_do_and_states_keep_it():
+    several = HRCVectorEnv(3, perception="none", people="unaware", num_threads=1)
+    single = HRCEnv(perception="none", people="unaware")
+    several.reset(seed=11)
+    single.reset(seed=12)
+    rng = np.random.default_rng(5)
+    for _ in range(80):
+        action = np.sign(rng.uniform(-1, 1, (3, 6))).astype(np.float32)
+        told, alone = several.step(action)[4], single.step(action[1])[4]
+        for name, value in alone.items():
+            if name.startswith("safety/"):
+                assert told[name][1] == value
+    watched = single.simulation.watch.known
+    watched["contacts"], watched["since_s"] = 7, 0.1
+    state = single.get_state()
+    single.reset(seed=1)
+    assert not single.simulation.watch.known["contacts"].any()
+    single.set_state(state)
+    assert single.simulation.watch.known["contacts"].sum() == 21
+
+
+def test_what_is_carried_hits_harder():
+    simulation = Simulation(1, settle(task="HRCPickPlace-v0", perception="none"))
+    assert 5.0 < simulation.model.mass_kg < 40.0
+    assert simulation.model.load_kg == pytest.approx(0.5)
