@@ -10,6 +10,7 @@ import numpy as np
 from hrc_env.core.results import Metric
 from hrc_env.env import HRCEnv
 from hrc_env.experiments.study.intervals import mean_over, ratio_over
+from hrc_env.safety.incidents import KINDS
 from hrc_env.sb3 import ACHIEVED, FAILED, HRCVecEnv
 from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import Task
@@ -121,6 +122,7 @@ def _one(
         "cost": float(sum(each["cost"] for each in infos)),
         "cost_steps": float(sum(each["cost_proximity"] for each in infos)),
         "contacts": float((touching & ~np.append(False, touching[:-1])).sum()),
+        **{f"contacts_{kind}": info[f"safety/contacts_{kind}"] for kind in KINDS},
         ACHIEVED: info[task.achieved],
         FAILED: info[task.failed],
         "success": float(info["is_success"]),

@@ -18,7 +18,7 @@ class Run(Train):
     proximity: float = 2.0
 
 
-IMITATION: Mapping[str, Any] = {"control": "twist", "demonstrations": 256, "timesteps": 1_500_000}
+IMITATION: Mapping[str, Any] = {"control": "twist", "demonstrations": 256, "timesteps": 400_000}
 RECIPES: Mapping[str, Mapping[str, Any]] = {
     "HRCReachGoal-v0": {"algorithm": "sac", "control": "tool", "timesteps": 60_000},
     "HRCPickPlace-v0": IMITATION,

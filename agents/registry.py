@@ -1,5 +1,6 @@
 """Agents by name, from the policies that come with the package, or from a file."""
 
+from importlib import import_module
 from pathlib import Path
 
 from hrc_env.core.errors import ConfigError, unknown
@@ -13,8 +14,9 @@ AGENTS = ("random", "scripted", "scripted_slowed")
 
 
 def make_agent(name: str, env_info: EnvInfo, seed: int = 0) -> Agent:
-    """An agent by name ("random", "scripted", "scripted_slowed", "hrc://HRCReach-v0/NAME") or from
-    a file: a policy (.safetensors) or a checkpoint (.zip).
+    """An agent by name ("random", "scripted", "scripted_slowed", "hrc://HRCReach-v0/NAME"), from a
+    file, a policy (.safetensors) or a checkpoint (.zip), or what "module:function" makes of the
+    `EnvInfo`.
 
     Raises:
         ConfigError: neither an agent nor a file.
@@ -31,8 +33,39 @@ def make_agent(name: str, env_info: EnvInfo, seed: int = 0) -> Agent:
         from . import checkpoints  # here: torch takes seconds to import, and need not be there
 
         return checkpoints.load(Path(name), env_info)
+    if ":" in name:
+        return _made_by(name, env_info)
     error = unknown("agent", name, AGENTS)
     raise ConfigError(
-        f"{error} Or {policies.PREFIX}ID/NAME, or the path of what python -m hrc_env train wrote "
-        "(.zip) or export (.safetensors)."
+        f"{error} Or {policies.PREFIX}ID/NAME, the path of what python -m hrc_env train wrote "
+        "(.zip) or export (.safetensors), or MODULE:FUNCTION."
     )
+
+
+def control_of(name: str) -> str | None:
+    """What the actions of a trained policy are (`control`); None of who does not say."""
+    if name.startswith(policies.PREFIX) or Path(name).suffix == policies.SUFFIX:
+        return policies.read(policies.path_of(name))[0].control
+    if Path(name).suffix != ".zip":
+        return None
+    from . import checkpoints
+
+    return checkpoints.describe(Path(name)).get("environment", {}).get("control")
+
+
+def _made_by(name: str, env_info: EnvInfo) -> Agent:
+    """What a function makes, by its module's dotted name and its own."""
+    module, _, function = name.partition(":")
+    try:
+        make = getattr(import_module(module), function)
+    except (ImportError, AttributeError) as error:
+        raise ConfigError(
+            f"There is no agent {name!r} ({error}). It must be MODULE:FUNCTION: a module that "
+            "can be imported from here, a function that is given an EnvInfo and returns an agent."
+        ) from error
+    agent = make(env_info)
+    if not callable(getattr(agent, "act", None)):
+        raise ConfigError(
+            f"{name} made {type(agent).__name__}, which has no act(observation) -> actions."
+        )
+    return agent

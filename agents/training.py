@@ -156,12 +156,12 @@ def train(arguments: Run, folder: Path, console: Console) -> tuple[Curve, float 
         config = asdict(env.env.config)
         record = {"arguments": asdict(arguments), "config": config, **provenance()}
         _write(folder / "run.json", record)
+        started_s = time.monotonic()
         learner, curve = _learner(arguments, folder, env, settings)
         if arguments.resume is None and arguments.demonstrations:
             _clone(learner, arguments, env, console)
         facts = {"environment": kwargs, "settings": asdict(settings)}
         ramp, total = Ramp(arguments.ramp), arguments.timesteps
-        started_s = time.monotonic()
         with Meter(console, "training", total, "steps", learner.num_timesteps) as meter:
             monitor = TrainingMonitor(folder, facts, curve, ramp, interrupt, meter)
             learner.learn(

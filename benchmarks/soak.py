@@ -22,17 +22,24 @@ import hrc_env  # noqa: F401  registers the ids
 from benchmarks.common import exactly
 from hrc_env.cli.progress import track
 from hrc_env.core.results import Metric, write_results
-from hrc_env.step import ACTIVITY, BODY, MISCALIBRATED
+from hrc_env.safety.incidents import SUMMARY
+from hrc_env.step import ACTIVITY, BODY, CONTACT_KIND, CONTACT_REGION, MISCALIBRATED
 from hrc_env.vector.env import HRCVectorEnv
 
 WARM_UP_STEPS = 1_000_000
 """Memory is compared with what it was after so many environment steps."""
 READINGS = 40
 """How often a run reads the memory."""
-NAMES = (ACTIVITY, BODY, MISCALIBRATED)
+NAMES = (ACTIVITY, BODY, MISCALIBRATED, CONTACT_KIND, CONTACT_REGION)
 """The infos that are no numbers."""
-NOT_WHEN_LOST, NOT_BEFORE_A_MATCH = "tracking/mpjpe_m", "tracking/mpjpe_by_identity_m"
-"""What a step may lack: nobody is tracked, so nobody is wrong; no track was ever near a worker."""
+NOT_WHEN_LOST = "tracking/mpjpe_m"
+"""Absent where a worker is there who has no track."""
+SOMETIMES = (
+    "tracking/mpjpe_by_identity_m",
+    *(f"safety/{name}" for name in SUMMARY.names or ()
+      if not name.startswith("contacts_") and name != "near_misses"),
+)  # fmt: skip
+"""Absent before anybody was matched; where nobody is near, or no contact begins."""
 
 
 @dataclass(frozen=True)
@@ -134,7 +141,7 @@ def lacking(infos: Mapping[str, Any], stepped: np.ndarray) -> int:
             known = infos[f"_{name}"]
             count += not_numbers(infos[name][known].astype(float))
             wanted = stepped & (infos["tracking/lost"] == 0) if name == NOT_WHEN_LOST else stepped
-            count += int((wanted & ~known).sum()) if name != NOT_BEFORE_A_MATCH else 0
+            count += int((wanted & ~known).sum()) if name not in SOMETIMES else 0
     return count
 
 

@@ -61,6 +61,11 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
         "The paper's two experiments (site, lab), what perception is worth in safety (impact), "
         "what sight costs at equal safety (price), ablations of rigs and estimators (ablations).",
     ),
+    "benchmark": (
+        "hrc_env.cli.benchmark", "Benchmark",
+        "Judge a policy on fixed seeds: beside unaware, hurried and attentive people, with four "
+        "cameras, late ones, one, and the truth, without and with a shield.",
+    ),
     "gallery": (
         "benchmarks.commands", "Gallery",
         "Draw every worker, a film strip of every motion, and both scenes from all cameras.",

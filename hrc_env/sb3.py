@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from hrc_env.core.errors import ConfigError, learner
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.rewards import RewardConfig
+from hrc_env.safety.incidents import KINDS
 from hrc_env.simulation import Simulation
 from hrc_env.step import Observation
 from hrc_env.tasks.goal import TERM
@@ -164,6 +165,7 @@ class HRCVecEnv(VecEnv):
             "cost": float(episode["cost"]),
             "cost_steps": float(episode["cost_proximity"]),
             "contacts": float(episode["contacts"]),
+            **{f"contacts_{kind}": info[f"safety/contacts_{kind}"] for kind in KINDS},
             ACHIEVED: info[task.achieved],
             FAILED: info[task.failed],
             "success": float(info["is_success"]),

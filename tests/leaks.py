@@ -21,6 +21,7 @@ from hrc_env.core.batching import copied
 from hrc_env.motion import generator
 from hrc_env.pipeline.emulated import EmulatedCameras
 from hrc_env.pipeline.rendered import RenderedCameras
+from hrc_env.safety import starts
 from hrc_env.simulation import Simulation
 from hrc_env.worker.body import worker_capsules, worker_truth
 
@@ -158,12 +159,14 @@ def differences(
     """
     tapes: list[Tape] = []
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(starts, "APART_M", -np.inf)  # the truth says where robots begin: no belief
         (leak or (lambda patch: None))(patch)
         first = list(played(make, tapes, agent, n_steps))
     for tape in tapes:
         tape.rewind()
     moved: dict[str, int] = {}
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(starts, "APART_M", -np.inf)
         perturb(patch)
         (leak or (lambda patch: None))(patch)
         for step, now in enumerate(played(make, tapes, agent, n_steps)):

@@ -145,9 +145,9 @@ def test_a_run_says_what_it_costs_and_how_much_that_weighs(run):
 
 
 def test_multiplier_critic_and_scale_go_on_where_they_were(tmp_path):
-    env = HRCVecEnv(4, task="HRCReachGoal-v0", perception="truth", stagger=True)
-    learner = PPOLagrangian("MultiInputPolicy", env, n_steps=64, batch_size=64, limit=1.0)
-    learner.learn(512)
+    env = HRCVecEnv(16, task="HRCReachGoal-v0", perception="truth", people="unaware", stagger=True)
+    learner = PPOLagrangian("MultiInputPolicy", env, n_steps=64, batch_size=64, limit=0.1, seed=0)
+    learner.learn(4096)
     checkpoints.save(learner, tmp_path / "policy.zip", {})
     again = checkpoints.resume(tmp_path / "policy.zip", env)
     assert isinstance(again, PPOLagrangian)

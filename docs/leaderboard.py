@@ -1,0 +1,53 @@
+"""The leaderboard's page: what policies were worth, from the entries of the benchmark."""
+
+from hrc_env.experiments.benchmark.conditions import CONDITIONS, MAIN, SEED, VERSION
+from hrc_env.experiments.benchmark.entries import PER, Entry, entries
+from hrc_env.experiments.study.report import said, table
+from hrc_env.tasks import BUILT_IN
+
+HEAD = f"""\
+# Leaderboard
+
+`python -m hrc_env benchmark --policy POLICY` judges a policy under {len(CONDITIONS)} conditions a
+task, the same for everybody (version {VERSION}, seeds from {SEED:,} on): beside unaware, hurried
+and attentive people with four cameras; beside unaware people with the truth, with images that are
+200 ms late and say so, and with one camera that is left after a second; each without a shield and
+with `qp`. Contacts and cost are counted on the truth.
+
+Here: unaware people, four cameras, without a shield and with it; numbers with 95 % intervals over
+episodes. All of them are in `hrc_env/experiments/benchmark/entries/`.
+
+## How to enter
+
+```bash
+# a checkpoint of train
+python -m hrc_env benchmark --policy runs/mine/policy.zip --ids HRCReach-v0
+# what my_module.make(env_info) returns
+python -m hrc_env benchmark --policy my_module:make --ids HRCReach-v0 --enter mine
+```
+
+`--enter NAME` writes the file of an entry in a clone; `python -m docs.generate` puts it into this
+page: send both.
+"""
+
+
+def page() -> str:
+    """The page."""
+    everybody = entries()
+    return "\n".join([HEAD, *(_section(task, everybody) for task in BUILT_IN)])
+
+
+def _section(task: str, everybody: list[Entry]) -> str:
+    """A task's table, who reaches most under the shield first."""
+    keys = [f"{task}.{name}" for name in MAIN]
+    here = [each for each in everybody if f"{keys[-1]}.goals_per_minute" in each.scores]
+    here.sort(key=lambda each: -each.scores[f"{keys[-1]}.goals_per_minute"].value)
+    if not here:
+        return f"## {task}\n\nNobody has entered yet.\n"
+    rows = [
+        (each.name if k == 0 else "", CONDITIONS[MAIN[k]].shield or "none",
+         *(said(each.scores[f"{key}.{what}"], digits=2 if what == "success" else 1)
+           for what in PER))
+        for each in here for k, key in enumerate(keys)
+    ]  # fmt: skip
+    return f"## {task}\n\n{table(('policy', 'shield', *PER.values()), rows)}\n"

@@ -1,0 +1,50 @@
+"""python -m hrc_env benchmark: what a policy is worth, and how safe it is."""
+
+from dataclasses import dataclass
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+
+from hrc_env.cli.checks import at_least
+from hrc_env.cli.progress import show
+from hrc_env.tasks import BUILT_IN
+
+
+@dataclass(frozen=True, kw_only=True)
+class Benchmark:
+    """Judge a policy on fixed seeds: beside unaware, hurried and attentive people, with four
+    cameras, late ones, one, and the truth, without and with a shield.
+
+    Goals a minute, contacts by kind, cost, and regret to the best entry of the leaderboard. What is
+    finished stays in the folder: a run that was stopped goes on there.
+    """
+
+    policy: str
+    """random, scripted, scripted_slowed, a checkpoint of `train` (.zip), hrc://ID/NAME, or
+    MODULE:FUNCTION, which is given an `agents.env_info.EnvInfo` and returns what has `act`."""
+    ids: tuple[str, ...] = tuple(BUILT_IN)
+    """Which environments; a learnt policy is for one."""
+    control: str | None = None
+    """What its actions are: joint, if not given, tool or twist; checkpoints know it."""
+    out: Path | None = None
+    """Folder for report.html and results.json; out/benchmark/POLICY if not given."""
+    seeds: int = 64
+    """Episodes of every row."""
+    enter: str | None = None
+    """Write the numbers into the leaderboard, under this name (in a clone)."""
+    overwrite: bool = False
+    """Delete the results of something else in the folder."""
+
+    def run(self) -> int:
+        """Judge it."""
+        at_least("--seeds", self.seeds, 1)
+        experiment = import_module("hrc_env.experiments.benchmark.experiment")
+        runner = import_module("hrc_env.experiments.study.runner")
+        config = experiment.config_for(self.policy, self.ids, self.control, self.seeds)
+        words = self.policy.removeprefix("hrc://").replace("/", "-").replace(":", "-")
+        out = self.out or Path("out/benchmark") / words
+        run = partial(runner.run, experiment.STUDY, config, overwrite=self.overwrite)
+        status = show(run, out, "benchmark")
+        if self.enter is not None:
+            print(f"Entered: {experiment.entered(self.enter, config, out)}")
+        return status
