@@ -19,7 +19,6 @@ from hrc_env.experiments.study.fingerprint import fingerprint_of
 from hrc_env.experiments.study.intervals import ratio_over
 from hrc_env.experiments.study.runner import Study, at_least_one
 from hrc_env.safety.incidents import KINDS
-from hrc_env.sb3 import ACHIEVED, FAILED
 from hrc_env.tasks import BUILT_IN
 
 PARTS_FROM = ("hrc_env.experiments.benchmark.experiment", "agents.evaluate", "agents.registry")
@@ -102,11 +101,12 @@ def worth(episodes: Episodes) -> dict[str, Metric]:
     column = {name: [each[name] for each in episodes] for name in episodes[0]}
     minutes = [seconds / 60 for seconds in column["seconds"]]
     hours = [seconds / 3600 for seconds in column["seconds"]]
-    tries = [a + b for a, b in zip(column[ACHIEVED], column[FAILED], strict=True)]
+    achieved, missed = column["goals_reached"], column["goals_missed"]
+    tries = [a + b for a, b in zip(achieved, missed, strict=True)]
     touches = [sum(each[f"contacts_{kind}"] for kind in KINDS) for each in episodes]
     return {
-        "goals_per_minute": ratio_over(column[ACHIEVED], minutes, "1/min"),
-        "success": ratio_over(column[ACHIEVED], tries, "1"),
+        "goals_per_minute": ratio_over(achieved, minutes, "1/min"),
+        "success": ratio_over(achieved, tries, "1"),
         "cost_per_minute": ratio_over(column["cost"], minutes, "1/min"),
         "contacts_per_hour": ratio_over(touches, hours, "1/h"),
         **{f"{kind}_per_hour": ratio_over(column[f"contacts_{kind}"], hours, "1/h")

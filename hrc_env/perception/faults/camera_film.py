@@ -82,9 +82,9 @@ def _earlier(shot: Shot, share: float) -> tuple[JointAngles, WorkerMotion]:
     q, before = shot.before
     moved, held = _moved(shot.motion, before, share), shot.motion.held
     if held is not None and before.held is not None:
-        same = held.kind == before.held.kind
+        same = (held.kind == before.held.kind) & (held.kind > 0)  # nothing is nowhere
         there = mapped(held, np.copy)
-        write_rows(there, same, rows(_moved(held, before.held, share), same))
+        write_rows(there, same, _moved(rows(held, same), rows(before.held, same), share))
         moved = replace(moved, held=there)
     return _between(shot.q, q, share), moved
 
