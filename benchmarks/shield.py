@@ -90,7 +90,7 @@ def ours(problem: Problem) -> Floats:
     """As the shield solves it."""
     rows, bound, weight, low, high, wanted = problem
     x, n = np.empty(len(wanted)), len(wanted)
-    solve(rows, bound, weight, len(bound), low, high, wanted, x, np.empty((n + 3, n)))
+    solve(rows, bound, weight, low, high, wanted, x, np.empty((n + 3, n)))
     return x
 
 

@@ -167,7 +167,7 @@ def _nearest(found, wanted, allowed):
                 x[i] = wanted[e, i]
         else:
             m = softened(J[e], b[e], count[e], rows, bound, weight)
-            solve(rows, bound, weight, m, low[e], high[e], wanted[e], x, work)
+            solve(rows[:m], bound[:m], weight[:m], low[e], high[e], wanted[e], x, work)
 
 
 @kernel

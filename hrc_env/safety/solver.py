@@ -17,15 +17,15 @@ ENOUGH_RAD_S = 1e-9
 
 
 @kernel
-def solve(J, b, weight, m, low, high, wanted, x, work):
-    """Write the solution for the first m rows into `x` (N,); the number of steps.
+def solve(J, b, weight, low, high, wanted, x, work):
+    """Write the solution into `x` (N,); the number of steps.
 
     Args:
         J: (M, N). b, weight: (M,).
         low, high, wanted: (N,).
         work: (N + 3, N), scratch.
     """
-    n = len(x)
+    m, n = len(b), len(x)
     H, g, d, y = work[:n], work[n], work[n + 1], work[n + 2]
     for i in range(n):
         x[i] = min(high[i], max(low[i], wanted[i]))

@@ -21,7 +21,7 @@ def problem(seed):
 
 def solved(J, b, weight, low, high, wanted):
     x, n = np.empty(len(wanted)), len(wanted)
-    steps = solve(J, b, weight, len(b), low, high, wanted, x, np.empty((n + 3, n)))
+    steps = solve(J, b, weight, low, high, wanted, x, np.empty((n + 3, n)))
     return x, steps
 
 
