@@ -10,9 +10,8 @@ from hrc_env.core.errors import ConfigError, check_fields, check_names
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import PoseEstimate, WorkerTruth
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Bools, Capsules, Floats, Ints, Records
+from hrc_env.core.typing import Bools, Floats, Ints, Records
 from hrc_env.geometry.assignment import assign_rows
-from hrc_env.geometry.distances import least_separation
 from hrc_env.safety import incidents
 
 SAME_M = 0.5
@@ -85,24 +84,13 @@ class Cost:
     """Smallest true separation of the step; infinite without workers."""
 
 
-def cost(
-    robot_world: Capsules,
-    robot_radius_m: Floats,
-    workers_world: Capsules,
-    worker_radius_m: Floats,
-    config: CostConfig,
-) -> Cost:
-    """Cost of a step: of the robot's capsules (B, T, K, 2, 3) and radii (K,), and of the workers'
-    true ones (B, T, W, L, 2, 3) and (B, W, L), at every substep [m].
+def cost(gaps_m: Floats, config: CostConfig) -> Cost:
+    """Cost of a step, of the true separations (B, T, W) at every substep [m].
 
     Contact is decided by distance: a mocap hand can pass through a thin arm between two
     substeps of the contact solver.
     """
-    batch, steps = robot_world.shape[:2]
-    bodies = workers_world.reshape(batch, steps, -1, 2, 3)
-    radii_m = worker_radius_m.reshape(batch, -1)
-    nearest = least_separation(robot_world, robot_radius_m, bodies, radii_m)
-    nearest_m = nearest.distance_m.min(axis=1)
+    nearest_m = gaps_m.min((1, 2), initial=np.inf)
     return Cost(
         proximity=(nearest_m < config.proximity_m).astype(float),
         contact=(nearest_m <= 0.0).astype(float),

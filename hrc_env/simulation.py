@@ -28,7 +28,7 @@ from hrc_env.motion.activities.pieces import NoRoomError
 from hrc_env.pipeline.levels import CAMERA_LEVELS, make_pipeline
 from hrc_env.pipeline.sensor_input import SensorInput, TrueSensorInput
 from hrc_env.rewards import RewardConfig
-from hrc_env.safety import starts
+from hrc_env.safety import incidents, starts
 from hrc_env.safety.model import robot_model
 from hrc_env.safety.shield import shielded
 from hrc_env.safety.watch import Watch
@@ -175,13 +175,11 @@ class Simulation(Stateful):
         seen_world = robot.capsules_world[:, self.scene.watched, 1]
         cue = None if self.task.cue is None else self.task.cue(self.task_state)
         generator.watch(self.motion, seen_world, motion, config.ctrl_dt, cue)
-        world = replace(world, deeds=generator.deeds(self.motion, motion))
+        if cue is not None:
+            world = replace(world, deeds=generator.deeds(self.motion, motion))
         workers = worker_capsules(self.bodies, path, motion.body)
-        cost = metrics.cost(
-            arm, robot.capsule_radius_m, workers, truth.capsule_radius_m, config.cost
-        )
-        paths = arm, workers, truth.capsule_radius_m, cost.min_separation_m
-        happened = self.watch.step(world, *paths)
+        paths = incidents.measured(arm, robot.capsule_radius_m, workers, truth.capsule_radius_m)
+        cost, happened = metrics.cost(paths.gaps_m, config.cost), self.watch.step(world, paths)
         judged = replace(world, touched=cost.contact > 0, place=self.place)
         progress = self.task.advance(
             self.task_state, self.streams["task"], judged, config.ctrl_dt, config.task

@@ -5,23 +5,18 @@ import pytest
 
 from hrc_env.core.records import PoseEstimate, WorkerTruth
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.metrics import CostConfig, cost, no_identities, tracking_error
-
-ROBOT_RADIUS, WORKER_RADIUS = np.array([0.05]), np.array([0.1])
-
-
-def worker_at(distance_m: np.ndarray) -> np.ndarray:
-    """A worker who is one upright capsule at x = distance, one a substep: (1, T, 1, 1, 2, 3)."""
-    capsules = np.zeros((1, len(distance_m), 1, 1, 2, 3))
-    capsules[0, :, 0, 0, :, 0] = distance_m[:, None]
-    capsules[0, :, 0, 0, 1, 2] = 1.0
-    return capsules
+from hrc_env.metrics import Cost, CostConfig, cost, no_identities, tracking_error
+from hrc_env.safety import incidents
 
 
-def robot(steps: int) -> np.ndarray:
-    bodies = np.zeros((1, steps, 1, 2, 3))
-    bodies[..., 1, 2] = 1.0
-    return bodies
+def costs(distance_m: list[float], n_workers: int = 1) -> Cost:
+    """Of a worker who is an upright capsule at x = distance, one a substep, beside such a robot."""
+    robot = np.zeros((1, len(distance_m), 1, 2, 3))
+    robot[..., 1, 2] = 1.0
+    workers = np.repeat(robot[:, :, None], n_workers, axis=2)
+    workers[..., 0] = np.array(distance_m)[:, None, None, None]
+    radius_m = np.full((1, n_workers, 1), 0.1)
+    return cost(incidents.measured(robot, np.array([0.05]), workers, radius_m).gaps_m, CostConfig())
 
 
 @pytest.mark.parametrize(
@@ -30,21 +25,18 @@ def robot(steps: int) -> np.ndarray:
 )
 def test_cost_by_the_gap_between_surfaces(distance_m, proximity, contact):
     """Radii 0.05 and 0.10: the gap is the distance less 0.15 m; the limit is 0.15 m."""
-    worker = worker_at(np.array([distance_m]))
-    result = cost(robot(1), ROBOT_RADIUS, worker, WORKER_RADIUS, CostConfig())
+    result = costs([distance_m])
     assert (result.proximity[0], result.contact[0]) == (proximity, contact)
     assert result.min_separation_m[0] == pytest.approx(distance_m - 0.15)
 
 
 def test_a_hand_that_passes_through_between_two_steps_is_a_contact():
     """Before and after the arm, touching it at one substep only."""
-    passing = worker_at(np.array([0.6, 0.3, 0.1, -0.3, -0.6]))
-    assert cost(robot(5), ROBOT_RADIUS, passing, WORKER_RADIUS, CostConfig()).contact[0] == 1
+    assert costs([0.6, 0.3, 0.1, -0.3, -0.6]).contact[0] == 1
 
 
 def test_without_workers_nothing_costs():
-    nobody = np.zeros((1, 2, 0, 1, 2, 3))
-    result = cost(robot(2), ROBOT_RADIUS, nobody, WORKER_RADIUS, CostConfig())
+    result = costs([0.0, 0.0], n_workers=0)
     assert (result.proximity[0], result.contact[0]) == (0, 0)
     assert np.isinf(result.min_separation_m[0])
 

@@ -8,12 +8,14 @@ from collections.abc import Mapping, Sequence
 
 from benchmarks.speed.contenders import Contender
 from benchmarks.speed.stopwatch import Place, Stopwatch
-from hrc_env import metrics, observations, rewards, simulation, step
+from hrc_env import observations, rewards, simulation, step
 from hrc_env.core.errors import HRCError
 from hrc_env.geometry import chains
 from hrc_env.motion import generator
 from hrc_env.perception import emulator
 from hrc_env.pipeline.tracking import PoseTracking
+from hrc_env.safety import incidents
+from hrc_env.safety.watch import Watch
 from hrc_env.scene.physics import Physics
 from hrc_env.vector import env, infos
 
@@ -32,7 +34,8 @@ ORGANS: Mapping[str, Sequence[Place]] = {
     "distances": (
         (chains, "robot_along"),
         (simulation, "estimated_separation"),
-        (metrics, "cost"),
+        (incidents, "measured"),
+        (Watch, "step"),
     ),
     "observation": ((observations, "observe"),),
     "reward": ((rewards, "evaluated"), (rewards, "total")),

@@ -226,7 +226,7 @@ class World:
     objects: ObjectState | None = None
     """The task's loose objects as they are."""
     deeds: Deeds | None = None
-    """What workers have done; None: an episode begins."""
+    """What workers have done who wait for something (`Task.cue`); None: an episode begins."""
     touched: Bools | None = None
     """(B,) whether the robot touched a worker in this step: true, so for success only, and for no
     reward or observation."""

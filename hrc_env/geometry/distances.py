@@ -81,13 +81,14 @@ def closest_parameters(p0, p1, q0, q1):
 
 @kernel
 def _spheres(capsules, radius, spheres):
-    """Bounding spheres (4, K) of capsules: centre, radius; radii repeat body by body."""
+    """Bounding spheres (5, K) of capsules: centre, radius, and the capsules' own; radii repeat body
+    by body."""
     for k in range(len(capsules)):
-        squared = 0.0
+        squared, own = 0.0, radius[k % len(radius)]
         for i in range(3):
             spheres[i, k] = 0.5 * (capsules[k, 0, i] + capsules[k, 1, i])
             squared += (capsules[k, 1, i] - capsules[k, 0, i]) ** 2
-        spheres[3, k] = 0.5 * math.sqrt(squared) + radius[k % len(radius)]
+        spheres[3, k], spheres[4, k] = 0.5 * math.sqrt(squared) + own, own
 
 
 @kernel
@@ -106,36 +107,39 @@ def _narrowest(a, radius_a, b, radius_b, gap, points):
     n_a, n_b = a.shape[1], b.shape[1]
     per_a, per_b = len(b) // max(len(a), 1), len(b) // max(len(radius_b), 1)
     per_first = len(b) // max(len(radius_a), 1)
-    spheres_a, spheres_b = np.empty((4, n_a)), np.empty((4, n_b))
+    spheres_a, spheres_b = np.empty((5, n_a)), np.empty((5, n_b))
     least = np.empty((n_a, n_b))
     for n in range(len(b)):
-        first, first_m, second_m = a[n // per_a], radius_a[n // per_first], radius_b[n // per_b]
-        _spheres(first, first_m, spheres_a)
-        _spheres(b[n], second_m, spheres_b)
+        first = a[n // per_a]
+        _spheres(first, radius_a[n // per_first], spheres_a)
+        _spheres(b[n], radius_b[n // per_b], spheres_b)
         _sphere_gaps(spheres_a, spheres_b, least)
-        points[n] = 0.0
-        gap[n] = _search(first, first_m, b[n], second_m, least, points[n])
+        points[n], gap[n] = 0.0, np.inf
+        if least.size:
+            gap[n] = _search(first, spheres_a[4], b[n], spheres_b[4], least, points[n])
 
 
-@kernel(makes_arrays=True)
+@kernel
 def _search(a, radius_a, b, radius_b, least, points):
-    """The narrowest gap, the most promising pair first; of equal ones the first pair's."""
-    best, at, bounds = np.inf, 0, least.ravel()
-    if bounds.size == 0:
-        return best
-    likely = np.argmin(bounds)
-    for i in range(-1, bounds.size):
-        pair = likely if i < 0 else i
-        if bounds[pair] > best + SLACK_M or i == likely:
-            continue
-        k, m = pair // len(b), pair % len(b)
-        squared, s, t = closest_parameters(a[k, 0], a[k, 1], b[m, 0], b[m, 1])
-        distance = math.sqrt(squared) - radius_a[k] - radius_b[m % len(radius_b)]
-        if distance < best or (distance == best and pair < at):
-            best, at = distance, pair
-            for axis in range(3):
-                points[0, axis] = a[k, 0, axis] + s * (a[k, 1, axis] - a[k, 0, axis])
-                points[1, axis] = b[m, 0, axis] + t * (b[m, 1, axis] - b[m, 0, axis])
+    """The narrowest gap, below that of the most promising pair; of equal ones the first pair's."""
+    likely, low, best = (0, 0), np.inf, np.inf
+    for k in range(len(a)):
+        for m in range(len(b)):
+            if least[k, m] < low:
+                likely, low = (k, m), least[k, m]
+    k, m = likely
+    limit = math.sqrt(closest_parameters(a[k, 0], a[k, 1], b[m, 0], b[m, 1])[0])
+    limit += SLACK_M - radius_a[k] - radius_b[m]
+    for k in range(len(a)):
+        for m in range(len(b)):
+            if least[k, m] <= limit:
+                squared, s, t = closest_parameters(a[k, 0], a[k, 1], b[m, 0], b[m, 1])
+                distance = math.sqrt(squared) - radius_a[k] - radius_b[m]
+                if distance < best:
+                    best, limit = distance, distance + SLACK_M
+                    for i in range(3):
+                        points[0, i] = a[k, 0, i] + s * (a[k, 1, i] - a[k, 0, i])
+                        points[1, i] = b[m, 0, i] + t * (b[m, 1, i] - b[m, 0, i])
     return best
 
 

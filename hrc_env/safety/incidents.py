@@ -100,8 +100,17 @@ class Paths:
     """(B, T, W, L, 2, 3) [m]."""
     worker_radius_m: Floats
     """(B, W, L)."""
-    nearest_m: Floats
-    """(B,) least separation of all [m]; infinite without workers."""
+    gaps_m: Floats
+    """(B, T, W) separations [m]."""
+
+
+def measured(
+    robot_world: Capsules, robot_radius_m: Floats, workers_world: Capsules, worker_radius_m: Floats
+) -> Paths:
+    """Bodies, as `Paths` has them, with their separations."""
+    radii_m = np.repeat(worker_radius_m[:, None], robot_world.shape[1], axis=1)
+    gaps_m = least_separation(robot_world, robot_radius_m, workers_world, radii_m).distance_m
+    return Paths(robot_world, robot_radius_m, workers_world, worker_radius_m, gaps_m)
 
 
 def regions_of(capsule_names: Sequence[str]) -> Ints:
@@ -128,8 +137,9 @@ def noted(
     """
     found, n_steps = np.empty(state.shape, INCIDENT), paths.robot_world.shape[1]
     took_s = dt_s * (n_steps - 1) / n_steps if n_steps > 1 else np.nan
-    first = _first_touch(paths, state.shape)
-    _note(state, found, _gaps_m(paths, state.shape), first, took_s, dt_s)
+    touch = paths.gaps_m <= 0.0
+    first = np.where(touch.any(1), touch.argmax(1), -1)
+    _note(state, found, _gaps_m(paths), first, took_s, dt_s)
     for b, w in np.argwhere(found["kind"] >= 0).tolist():
         hit = found[b, w]
         hit["region"] = regions[_touched(paths, b, w, int(first[b, w]))]
@@ -143,29 +153,19 @@ def noted(
     return found
 
 
-def _gaps_m(paths: Paths, shape: tuple[int, ...]) -> Floats:
+def _gaps_m(paths: Paths) -> Floats:
     """(3, B, W) separations [m] at the end of a step, with the robot where it began, and with the
     worker where they did; NaN where all are far."""
-    gaps_m, near = np.full((3, *shape), np.nan), np.flatnonzero(paths.nearest_m < WATCHED_M)
+    at_end = paths.gaps_m[:, -1]
+    gaps_m = np.full((3, *at_end.shape), np.nan)
+    near = np.flatnonzero(paths.gaps_m.min((1, 2), initial=np.inf) < WATCHED_M)
     if len(near):
-        robot = paths.robot_world[near][:, [-1, 0, -1]]
-        workers = paths.workers_world[near][:, [-1, -1, 0]]
-        radius_m = np.repeat(paths.worker_radius_m[near, None], 3, axis=1)
+        robot = paths.robot_world[near][:, [0, -1]]
+        workers = paths.workers_world[near][:, [-1, 0]]
+        radius_m = np.repeat(paths.worker_radius_m[near, None], 2, axis=1)
         found = least_separation(robot, paths.robot_radius_m, workers, radius_m)
-        gaps_m[:, near] = found.distance_m.swapaxes(0, 1)
+        gaps_m[0, near], gaps_m[1:, near] = at_end[near], found.distance_m.swapaxes(0, 1)
     return gaps_m
-
-
-def _first_touch(paths: Paths, shape: tuple[int, ...]) -> Ints:
-    """(B, W) the physics step in which robot and worker touch first; -1: they do not."""
-    first, who = np.full(shape, -1), np.flatnonzero(paths.nearest_m <= 0.0)
-    if len(who):
-        workers, n_steps = paths.workers_world[who], paths.robot_world.shape[1]
-        radius_m = np.repeat(paths.worker_radius_m[who, None], n_steps, axis=1)
-        ends = paths.robot_world[who], paths.robot_radius_m, workers, radius_m
-        touch = least_separation(*ends).distance_m <= 0.0
-        first[who] = np.where(touch.any(1), touch.argmax(1), -1)
-    return first
 
 
 def _touched(paths: Paths, b: int, w: int, t: int) -> int:

@@ -4,7 +4,7 @@ import numpy as np
 
 from hrc_env.core.batching import Stateful
 from hrc_env.core.records import RobotState, World
-from hrc_env.core.typing import Capsules, Floats, Ints, Records
+from hrc_env.core.typing import Floats, Ints, Records
 from hrc_env.safety import incidents
 from hrc_env.safety.robot import RobotModel
 
@@ -26,18 +26,11 @@ class Watch(Stateful):
         """Begin environments `ids` anew."""
         self.known[ids] = incidents.nothing_yet(*self.known[ids].shape)
 
-    def step(
-        self, world: World, arm: Capsules, workers: Capsules, worker_radius_m: Floats,
-        nearest_m: Floats,
-    ) -> Records:  # fmt: skip
-        """(B, W) of `incidents.INCIDENT`: what happened in a step whose bodies went along these
-        capsules (`incidents.Paths`)."""
-        robot, hits_kg = world.robot, np.full(len(nearest_m), self.model.mass_kg)
+    def step(self, world: World, paths: incidents.Paths) -> Records:
+        """(B, W) of `incidents.INCIDENT`: what happened in a step in which bodies went so."""
+        hits_kg, stop_s = np.full(len(self.known), self.model.mass_kg), self.stop_s(world.robot)
         if world.objects is not None:
             hits_kg += world.objects.held @ self.model.load_kg
-        radius_m = robot.capsule_radius_m
-        paths = incidents.Paths(arm, radius_m, workers, worker_radius_m, nearest_m)
-        stop_s = self.stop_s(robot)
         return incidents.noted(self.known, paths, self.regions, hits_kg, stop_s, self.dt_s)
 
     def stop_s(self, robot: RobotState) -> Floats:

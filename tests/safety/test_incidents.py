@@ -11,7 +11,7 @@ from hrc_env.env import HRCEnv
 from hrc_env.metrics import COMPONENTS, CostConfig
 from hrc_env.safety import incidents
 from hrc_env.safety.contact import contact_force
-from hrc_env.safety.incidents import KINDS, Paths, noted, nothing_yet
+from hrc_env.safety.incidents import KINDS, noted, nothing_yet
 from hrc_env.safety.starts import gap_m
 from hrc_env.simulation import Simulation
 from hrc_env.vector.env import HRCVectorEnv
@@ -38,9 +38,7 @@ class Line:
         robots, workers = np.zeros((1, T, 1, 2, 3)), np.zeros((1, T, n, 2, 2, 3))
         robots[..., 0] = robot[None, :, None, None]
         workers[..., 0] = hand[None, :, :, None, None] + [[0.0], [5.0]]
-        gaps_m = hand - robot[:, None] - 0.2
-        radius_m = np.full((1, n, 2), 0.1)
-        paths = Paths(robots, np.array([0.1]), workers, radius_m, np.array([gaps_m.min()]))
+        paths = incidents.measured(robots, np.array([0.1]), workers, np.full((1, n, 2), 0.1))
         return noted(self.state, paths, REGIONS, np.array([15.0]), np.array([0.1]), DT)[0]
 
 
