@@ -15,7 +15,7 @@ from hrc_env.core.typing import Floats
 from hrc_env.experiments.impact.setups import PerceptionSetup
 from hrc_env.experiments.price import blindness, experiment, report, trainings
 from hrc_env.experiments.price.blindness import TrainingConfig
-from hrc_env.experiments.price.episodes import STEP, Stage, first_touches, sums_of
+from hrc_env.experiments.price.episodes import STEP, Stage, sums_of
 from hrc_env.experiments.price.experiment import (
     STUDY,
     PriceConfig,
@@ -112,12 +112,6 @@ def test_draws_are_the_same_for_everybody():
     assert np.array_equal(draws(9, 7, 3)[1], second)
 
 
-def test_touches_within_half_a_second_are_one():
-    touching = np.zeros((40, 1), bool)
-    touching[[3, 4, 10, 30], 0] = True
-    assert np.flatnonzero(first_touches(touching, 12)[:, 0]).tolist() == [3, 30]
-
-
 def played(n_steps: int = 20, **columns: Floats) -> dict[str, float]:
     """What one episode of such steps came to."""
     steps = np.zeros((n_steps, 1), STEP)
@@ -126,26 +120,11 @@ def played(n_steps: int = 20, **columns: Floats) -> dict[str, float]:
     return {name: values[0] for name, values in sums_of(steps, 0.04).items()}
 
 
-def test_a_touch_is_called_by_the_step_before():
-    touching = np.arange(20) == 5
-    kinds = {}
-    for speed in (0.3, 0.0, -0.3):
-        found = played(touching=touching, towards_mps=np.where(np.arange(20) == 4, speed, 1.0))
-        kinds[speed] = [found[kind] for kind in ("towards", "standing", "away")]
-    assert kinds == {0.3: [1, 0, 0], 0.0: [0, 1, 0], -0.3: [0, 0, 1]}
-
-
 def test_nothing_counts_after_the_end_of_an_episode():
     k = np.arange(20)
-    found = played(over=k == 9, achieved=k, cost=np.ones(20), touching=k == 12, towards_mps=k)
-    assert found["achieved"] == 9
-    assert found["cost"] == 10
-    assert found["towards"] == 0
+    found = played(over=k == 9, achieved=k, cost=np.ones(20), towards=k // 9, away=k // 12)
+    assert [found[name] for name in ("achieved", "cost", "towards", "away")] == [9, 10, 1, 0]
     assert found["minutes"] == pytest.approx(10 * 0.04 / 60)
-
-
-def test_a_touch_in_the_first_step_is_no_contact():
-    assert played(touching=np.arange(20) == 0, towards_mps=np.ones(20))["towards"] == 0
 
 
 def test_eyes_are_what_their_names_say():

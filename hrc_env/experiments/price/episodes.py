@@ -1,7 +1,7 @@
 """Episodes of the scripted robot under a shield, seen with some eyes: what came of each.
 
 As in `experiments.impact`: the same seeds and workers for everybody, who take no notice of the
-robot; a contact is called by what the robot did in the step before it began.
+robot; contacts are those of `safety.incidents`.
 """
 
 import warnings
@@ -18,16 +18,13 @@ from hrc_env.config import settle
 from hrc_env.control import checked_action
 from hrc_env.core.checkout import agents
 from hrc_env.core.machine import n_cores
-from hrc_env.core.records import WorkerTruth
-from hrc_env.core.typing import Bools, Capsules, Floats
+from hrc_env.core.typing import Points3
 from hrc_env.experiments.impact.episodes import PEOPLE, MakeAgent, Rows
 from hrc_env.experiments.price.eyes import Eyes
 from hrc_env.experiments.price.shield import Widened
 from hrc_env.experiments.study.cache import PartProgress
 from hrc_env.experiments.study.rigs import Turn
-from hrc_env.geometry.distances import least_separation
 from hrc_env.motion import generator
-from hrc_env.safety.incidents import AGAIN_S, MOVING_M_S
 from hrc_env.simulation import Simulation
 from hrc_env.tasks.task import task_called
 from hrc_env.vector.shards import Shards
@@ -35,13 +32,15 @@ from hrc_env.worker.body import worker_truth
 
 TOGETHER = 300
 """So many episodes are played side by side."""
+CONTACTS = {
+    "towards": "safety/contacts_towards", "standing": "safety/contacts_standing",
+    "away": "safety/contacts_fleeing",
+}  # fmt: skip
+"""Contacts of an episode so far, by what the robot did: their keys in infos."""
 STEP = np.dtype([
-    ("towards_mps", float), ("touching", bool), ("cost", float), ("achieved", float),
-    ("over", bool),
+    *((name, float) for name in (*CONTACTS, "achieved", "cost")), ("over", bool),
 ])  # fmt: skip
-"""What happened in a step; how fast the robot came nearer to the nearest worker."""
-Bodies = tuple[tuple[Capsules, Floats], WorkerTruth]
-"""The robot's capsules (B, K, 2, 3) and radii (B, K) [m], with what it carries; the workers."""
+"""What the episode has come to after a step, the step's cost, and whether that was the end."""
 
 
 class Stage:
@@ -103,41 +102,21 @@ def run(
     agent, shape, task = make_agent(env.first), (len(seeds), env.first.n_actions), env.first.task
     result = env.reset(np.arange(len(seeds)), [seeding.np_random(seed)[0] for seed in seeds])
     steps, walks = np.zeros((n_steps, len(seeds)), STEP), [0] * len(seeds)
-    before = list(map(bodies_of, env.parts))
+    so_far = {**CONTACTS, "achieved": task.achieved}
     for step in steps:
         result = env.step(checked_action(agent.act(result.observation), shape))
-        now = list(map(bodies_of, env.parts))
-        step["towards_mps"] = np.concatenate(list(map(towards_m, before, now)))
-        step["towards_mps"] /= env.first.config.ctrl_dt
-        step["touching"], step["cost"] = result.info["cost_contact"] > 0, result.info["cost"]
-        step["achieved"], step["over"] = result.info[task.achieved], result.terminated
-        joints = np.concatenate([worker.joints_world for _, worker in now])
+        for name, key in so_far.items():
+            step[name] = result.info[key]
+        step["cost"], step["over"] = result.info["cost"], result.terminated
+        joints = np.concatenate(list(map(true_joints, env.parts)))
         walks = [zlib.crc32(of_one, walk) for of_one, walk in zip(joints, walks, strict=True)]
-        before = now
         stepped()
     return {**sums_of(steps, env.first.config.ctrl_dt), "walk": walks}
 
 
-def bodies_of(part: Simulation) -> Bodies:
-    """Where everybody truly is; of itself a robot knows the truth."""
-    robot = part.belief.robot
-    radius_m = np.broadcast_to(robot.capsule_radius_m, robot.capsules_world.shape[:2])
-    truth = worker_truth(part.bodies, generator.current(part.motion))
-    return (robot.capsules_world, radius_m), truth
-
-
-def towards_m(before: Bodies, now: Bodies) -> Floats:
-    """(B,) by how much the robot's motion narrowed the gap to whoever is nearest [m]: workers are
-    held where they are at the end."""
-    (robot_before, _), (robot, workers) = before, now
-    batch = len(workers.joints_world)
-    capsules_world = workers.capsules_world.reshape(batch, -1, 2, 3)
-    radius_m = workers.capsule_radius_m.reshape(batch, -1)
-    gap_before_m, gap_m = (
-        least_separation(capsules, thick_m, capsules_world, radius_m).distance_m
-        for capsules, thick_m in (robot_before, robot)
-    )
-    return gap_before_m - gap_m
+def true_joints(part: Simulation) -> Points3:
+    """(B, W, J, 3) where workers truly are."""
+    return worker_truth(part.bodies, generator.current(part.motion)).joints_world
 
 
 def sums_of(steps: NDArray[np.void], dt_s: float) -> Rows:
@@ -145,23 +124,11 @@ def sums_of(steps: NDArray[np.void], dt_s: float) -> Rows:
     after the end of an episode does not count."""
     ended = np.logical_or.accumulate(steps["over"], axis=0)
     counts = np.vstack([np.ones((1, steps.shape[1]), bool), ~ended[:-1]])
-    n_steps, begins = counts.sum(0), first_touches(steps["touching"], round(AGAIN_S / dt_s))
-    begins = (begins & counts)[1:]
-    speed = steps["towards_mps"][:-1]
-    towards, away = speed > MOVING_M_S, speed < -MOVING_M_S
+    n_steps = counts.sum(0)
+    last = steps[n_steps - 1, np.arange(steps.shape[1])]
     sums = {
         "minutes": n_steps * dt_s / 60,
-        "achieved": steps["achieved"][n_steps - 1, np.arange(steps.shape[1])],
-        "towards": (begins & towards).sum(0),
-        "standing": (begins & ~towards & ~away).sum(0),
-        "away": (begins & away).sum(0),
+        **{name: last[name] for name in ("achieved", *CONTACTS)},
         "cost": (steps["cost"] * counts).sum(0),
     }
     return {name: values.tolist() for name, values in sums.items()}
-
-
-def first_touches(touching: Bools, n_apart: int) -> Bools:
-    """(T, B) where touches begin of whom nobody touched in the `n_apart` steps before."""
-    n_steps, so_far = len(touching), np.cumsum(np.pad(touching, ((1, 0), (0, 0))), axis=0)[:-1]
-    long_ago = np.pad(so_far, ((n_apart, 0), (0, 0)))[:n_steps]
-    return touching & (so_far == long_ago)

@@ -12,6 +12,7 @@ import numpy as np
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats
 from hrc_env.experiments.impact.episodes import Rows
+from hrc_env.experiments.price.episodes import CONTACTS
 from hrc_env.experiments.price.eyes import ELSEWHERE, FOUR, ONE, TRUTH
 from hrc_env.experiments.price.search import Tried, draws, falling
 from hrc_env.experiments.study.intervals import crossing, ratio_over
@@ -121,7 +122,7 @@ def metrics_of(
 def _rates(rows: Rows) -> Metrics:
     """What is counted in episodes."""
     per = np.array(rows["minutes"]) / PER
-    contacts = {kind: ratio_over(rows[kind], per, UNIT) for kind in ("towards", "standing", "away")}
+    contacts = {kind: ratio_over(rows[kind], per, UNIT) for kind in CONTACTS}
     goals = ratio_over(rows["achieved"], rows["minutes"], "1/min")
     return {
         **contacts,
