@@ -9,6 +9,7 @@ not on it: they are known by the estimate only.
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -160,11 +161,6 @@ def _fit(site: Site, config: DeliveryConfig) -> Bools:
     return (site.lengths >= low) & (site.lengths <= high)
 
 
-def init(batch: int) -> Records:
-    """(B,) of `DELIVERY`, to be filled by `reset`."""
-    return np.zeros(batch, DELIVERY)
-
-
 def reset(state: Records, ids: Ints, rngs: Rngs, world: World, config: DeliveryConfig) -> None:
     """Choose where the material of environments `ids` goes."""
     site: Site = world.place
@@ -183,8 +179,9 @@ def advance(
 ) -> Records:
     """Judge where the bases are; (B,) of `DELIVERY_STEP`."""
     site, robot, step = world.place, world.robot, np.zeros(len(state), DELIVERY_STEP)
-    before_m = state["way_m"].copy()
+    step["progress_m"] = state["way_m"]
     _look(state, robot, site)
+    step["progress_m"] -= state["way_m"]
     touching = met(robot.capsules_world, robot.capsule_radius_m, site.footprints)
     people = np.zeros(len(state), bool) if world.touched is None else world.touched
     step["hit"] = touching & ~state["touching"]
@@ -193,7 +190,6 @@ def advance(
     state["touching"], state["people"] = touching, people
     off_m = np.linalg.norm(robot.q[:, :2] - state["goal_world"], axis=1)
     speed_m_s = np.linalg.norm(robot.qd[:, :2], axis=1)
-    step["progress_m"] = before_m - state["way_m"]
     step["delivered"] = (off_m < config.zone_m) & (speed_m_s < config.standing_m_s)
     state["delivered"] |= step["delivered"]
     return step
@@ -249,7 +245,7 @@ TASK = Task(
     id="HRCDelivery-v0",
     says="Bring material across a construction site, among the workers, and hit nothing.",
     config=DeliveryConfig,
-    init=init,
+    init=partial(np.zeros, dtype=DELIVERY),
     reset=reset,
     advance=advance,
     view=view,

@@ -1,6 +1,7 @@
 """Drywall: the robot presses a board against studs and holds it while a worker drives screws."""
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -81,7 +82,7 @@ DRYWALL = np.dtype(
         ("worst_m", "f8"), ("worst_rad", "f8"),  # farthest off its place meanwhile
         ("spoilt", "?"),  # whether that was too far
         ("done", "?"),  # fixed in its place, let go
-        ("potential_m", "f8"),  # minus the ways that are left
+        ("left_m", "f8"),  # of the ways
     ],
     align=True,
 )  # fmt: skip
@@ -119,11 +120,6 @@ def spots(config: DrywallConfig) -> list[Spot]:
     return [Spot("the board's place", FOOT_WORLD + PLACE_M + front, (0.0, 1.0, 0.0))]
 
 
-def init(batch: int) -> Records:
-    """(B,) of `DRYWALL`, to be filled by `reset`."""
-    return np.zeros(batch, DRYWALL)
-
-
 def reset(state: Records, ids: Ints, rngs: Rngs, world: World, config: DrywallConfig) -> None:
     """Lay the board of environments `ids` onto the stack anew."""
     state[ids] = np.zeros((), DRYWALL)
@@ -138,14 +134,9 @@ def reset(state: Records, ids: Ints, rngs: Rngs, world: World, config: DrywallCo
         way = 2.0 * np.pi * rngs[b].random(n)
         state["shear"][b] = SHEAR * np.stack([np.cos(way), np.sin(way)], axis=1)
     poses_ = state["pose"][ids]
-    state["potential_m"][ids] = -_left_m(
+    state["left_m"][ids] = _left_m(
         poses_[:, :3], matrix(poses_[:, 3:]), world.robot.tool_world, np.zeros(len(ids), bool)
     )
-
-
-def poses(state: Records, ids: Ints, config: DrywallConfig) -> Floats:
-    """(n, 1, 7) where the board lies at first."""
-    return state["pose"][ids][:, None]
 
 
 def advance(
@@ -170,8 +161,7 @@ def advance(
     state["done"] |= done
     at, R = board.position_world[:, 0], matrix(board.quaternion_wxyz[:, 0])
     left_m = _left_m(at, R, world.robot.tool_world, board.held[:, 0] | (driven > 0))
-    step["progress_m"] = -left_m - state["potential_m"]
-    state["potential_m"] = -left_m
+    step["progress_m"], state["left_m"] = state["left_m"] - left_m, left_m
     return step
 
 
@@ -219,11 +209,6 @@ def effects(state: Records, config: DrywallConfig) -> Effects:
     return Effects({"board_fixed": state["driven"] == len(SCREWS_M)}, push[:, None])
 
 
-def view(state: Records, ids: Ints, config: DrywallConfig) -> DrywallView:
-    """What robots `ids` know of their task."""
-    return DrywallView(FOOT_WORLD + PLACE_M, state["driven"][ids].copy())
-
-
 def info(state: Records) -> dict[str, Floats]:
     """What the episode has come to so far, (B,) each; how far off the board was while screws were
     driven; it is a success if the board is fixed in its place and let go."""
@@ -241,10 +226,10 @@ TASK = Task(
     id="HRCDrywall-v0",
     says="Press a board against studs and hold it while a worker drives four screws.",
     config=DrywallConfig,
-    init=init,
+    init=partial(np.zeros, dtype=DRYWALL),
     reset=reset,
     advance=advance,
-    view=view,
+    view=lambda state, ids, config: DrywallView(FOOT_WORLD + PLACE_M, state["driven"][ids].copy()),
     observations=(
         ObservationTerm(
             "place_from_object", lambda of: 3, "m", "world", 3.0, 0.5,
@@ -287,7 +272,7 @@ TASK = Task(
     grips=True,
     things=things,
     spots=spots,
-    poses=poses,
+    poses=lambda state, ids, config: state["pose"][ids][:, None],
     effects=effects,
     loads=lambda state: (state["pressed_s"] == 0.0)[:, None],  # against the studs it is a wall
     cue=lambda state: Cue((state["pressed_s"] > 0.0).astype(int), np.full((len(state), 3), np.nan)),

@@ -1,6 +1,7 @@
 """Handover: the robot brings a tool to a worker, who comes, puts out a hand and takes it."""
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -75,7 +76,7 @@ HANDOVER = np.dtype(
         ("largest_n", "f8"),  # that the hand felt so far
         ("away_s", "f8"),  # for how long the fingers have been away from it
         ("dropped", "?"), ("done", "?"),
-        ("potential_m", "f8"),  # minus the ways that are left
+        ("left_m", "f8"),  # of the ways
     ],
     align=True,
 )  # fmt: skip
@@ -101,11 +102,6 @@ def things(config: HandoverConfig) -> Things:
     return Things(mjcf, (), (place,))
 
 
-def init(batch: int) -> Records:
-    """(B,) of `HANDOVER`, to be filled by `reset`."""
-    return np.zeros(batch, HANDOVER)
-
-
 def reset(state: Records, ids: Ints, rngs: Rngs, world: World, config: HandoverConfig) -> None:
     """Stand the tool of environments `ids` up anew."""
     state[ids] = np.zeros((), HANDOVER)
@@ -117,12 +113,7 @@ def reset(state: Records, ids: Ints, rngs: Rngs, world: World, config: HandoverC
     handle = at + np.array([0.0, 0.0, HANDLE_UP_M])
     state["handle_world"][ids] = handle
     none = np.zeros(len(ids), bool)
-    state["potential_m"][ids] = -_left_m(at, handle, world.robot.tool_world, none, none)
-
-
-def poses(state: Records, ids: Ints, config: HandoverConfig) -> Floats:
-    """(n, 1, 7) where the tool stands at first."""
-    return state["pose"][ids][:, None]
+    state["left_m"][ids] = _left_m(at, handle, world.robot.tool_world, none, none)
 
 
 def advance(
@@ -149,8 +140,7 @@ def advance(
     step["taken"], step["done"] = state["taken"] & ~before, done & ~state["done"]
     state["done"] |= done
     left_m = _left_m(at, handle, world.robot.tool_world, held, state["taken"])
-    step["progress_m"] = -left_m - state["potential_m"]
-    state["potential_m"] = -left_m
+    step["progress_m"], state["left_m"] = state["left_m"] - left_m, left_m
     return step
 
 
@@ -220,11 +210,6 @@ def cue(state: Records) -> Cue:
     return Cue(stage, np.where(state["lifted"][:, None], state["handle_world"], np.nan))
 
 
-def view(state: Records, ids: Ints, config: HandoverConfig) -> HandoverView:
-    """What robots `ids` know of their task."""
-    return HandoverView(FOOT_WORLD + MEET_M, state["taken"][ids].copy())
-
-
 def info(state: Records) -> dict[str, Floats]:
     """What the episode has come to so far, (B,) each; it is a success if the worker has the tool,
     the robot has let go and gone, and the hand never felt more than is gentle."""
@@ -241,10 +226,10 @@ TASK = Task(
     id="HRCHandover-v0",
     says="Bring a tool to a worker, who puts out a hand and takes it; be gentle.",
     config=HandoverConfig,
-    init=init,
+    init=partial(np.zeros, dtype=HANDOVER),
     reset=reset,
     advance=advance,
-    view=view,
+    view=lambda state, ids, config: HandoverView(FOOT_WORLD + MEET_M, state["taken"][ids].copy()),
     observations=(
         ObservationTerm(
             "meeting_from_tool", lambda of: 3, "m", "world", 3.0, 0.5,
@@ -286,7 +271,7 @@ TASK = Task(
     grips=True,
     things=things,
     spots=lambda config: [Spot("the place to meet", FOOT_WORLD + MEET_M)],
-    poses=poses,
+    poses=lambda state, ids, config: state["pose"][ids][:, None],
     effects=effects,
     cue=cue,
     loads=lambda state: ~(state["offered"] | state["taken"])[:, None],

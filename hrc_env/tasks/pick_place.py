@@ -1,6 +1,7 @@
 """Picking and placing: pieces of studs lie on a table, and belong into a rack on the other side."""
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -68,7 +69,7 @@ PICK_PLACE = np.dtype(
     [
         ("poses", "f8", (STUDS, 7)),  # where pieces lie at first, world [m]
         ("placed", "?", (STUDS,)),  # which are in their places now
-        ("potential_m", "f8"),  # minus the ways that are left [m]
+        ("left_m", "f8"),  # of the ways [m]
         ("dropped", "?"),  # whether one lies below the table
     ],
     align=True,
@@ -105,11 +106,6 @@ def spots(config: PlacedConfig) -> list[Spot]:
     return [Spot(f"the place of piece {k + 1}", at, down) for k, at in enumerate(places_world())]
 
 
-def init(batch: int) -> Records:
-    """(B,) of `PICK_PLACE`, to be filled by `reset`."""
-    return np.zeros(batch, PICK_PLACE)
-
-
 def reset(state: Records, ids: Ints, rngs: Rngs, world: World, config: PlacedConfig) -> None:
     """Lay the pieces of environments `ids` out anew."""
     state[ids] = np.zeros((), PICK_PLACE)
@@ -125,12 +121,7 @@ def reset(state: Records, ids: Ints, rngs: Rngs, world: World, config: PlacedCon
         at[:, 3], at[:, 6] = np.cos(half), np.sin(half)
         state["poses"][b] = at
     studs, none = state["poses"][ids, :, :3], np.zeros((len(ids), STUDS), bool)
-    state["potential_m"][ids] = -_left_m(studs, world.robot.tool_world, none)
-
-
-def poses(state: Records, ids: Ints, config: PlacedConfig) -> Floats:
-    """(n, 3, 7) where the pieces lie at first."""
-    return state["poses"][ids]
+    state["left_m"][ids] = _left_m(studs, world.robot.tool_world, none)
 
 
 def advance(state: Records, rngs: Rngs, world: World, dt_s: float, config: PlacedConfig) -> Records:
@@ -139,10 +130,10 @@ def advance(state: Records, rngs: Rngs, world: World, dt_s: float, config: Place
     step = np.zeros(len(state), PICK_PLACE_STEP)
     placed = in_place(objects, config)
     left_m = _left_m(objects.position_world, world.robot.tool_world, placed)
-    step["progress_m"] = -left_m - state["potential_m"]
+    step["progress_m"], state["left_m"] = state["left_m"] - left_m, left_m
     step["placed"] = placed.sum(1) - state["placed"].sum(1)
     step["done"] = placed.all(1)
-    state["placed"], state["potential_m"] = placed, -left_m
+    state["placed"] = placed
     lowest_m = FOOT_WORLD[2] + SURFACE_M
     state["dropped"] |= (objects.position_world[..., 2] < lowest_m).any(1)
     return step
@@ -168,11 +159,6 @@ def _left_m(studs_world: Points3, tool_world: Points3, placed: Bools) -> Floats:
     return np.where(placed, 0.0, away_m).sum(1) + reach_m
 
 
-def view(state: Records, ids: Ints, config: PlacedConfig) -> PickPlaceView:
-    """What robots `ids` know of their task."""
-    return PickPlaceView(state["placed"][ids].copy(), places_world())
-
-
 def info(state: Records) -> dict[str, Floats]:
     """What the episode has come to so far, (B,) each; it is a success if every piece is placed."""
     placed = state["placed"].sum(1).astype(float)
@@ -193,10 +179,10 @@ TASK = Task(
     says="Take pieces of studs from a table and lay them into a rack, while a worker takes from "
     "the same table.",
     config=PickPlaceConfig,
-    init=init,
+    init=partial(np.zeros, dtype=PICK_PLACE),
     reset=reset,
     advance=advance,
-    view=view,
+    view=lambda state, ids, config: PickPlaceView(state["placed"][ids].copy(), places_world()),
     observations=(
         ObservationTerm(
             "place_from_object", lambda of: 3 * STUDS, "m", "world", 3.0, 0.5,
@@ -233,7 +219,7 @@ TASK = Task(
     grips=True,
     things=things,
     spots=spots,
-    poses=poses,
+    poses=lambda state, ids, config: state["poses"][ids],
     over=lambda step: step["done"],
     defaults={
         "scene": {"sim_dt": 0.004},

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -94,11 +95,6 @@ def spots(config: TargetConfig) -> list[Spot]:
     return [Spot("the nearest goal", (x, y, (low_m + high_m) / 2), within_m=(high_m - low_m) / 2)]
 
 
-def init(batch: int) -> Records:
-    """(B,) of `REACH`, to be filled by `reset`."""
-    return np.zeros(batch, REACH)
-
-
 def reset(state: Records, ids: Ints, rngs: Rngs, world: World, config: ReachConfig) -> None:
     """Start environments `ids` anew with a first goal each."""
     state["n_reached"][ids] = state["n_missed"][ids] = 0
@@ -112,11 +108,6 @@ def advance(state: Records, rngs: Rngs, world: World, dt_s: float, config: Reach
         done = np.flatnonzero(step["reached"] | step["missed"])
         _new_goals(state, done, rngs, tool_world[done], config)
     return step
-
-
-def view(state: Records, ids: Ints, config: ReachConfig) -> ReachView:
-    """What robots `ids` know of their task."""
-    return ReachView(state["goal_world"][ids], config.time_limit_s - state["goal_age_s"][ids])
 
 
 def info(state: Records) -> dict[str, Floats]:
@@ -176,10 +167,12 @@ TASK = Task(
     id="HRCReach-v0",
     says="Touch goals one after another with the tool, in a volume shared with a worker.",
     config=ReachConfig,
-    init=init,
+    init=partial(np.zeros, dtype=REACH),
     reset=reset,
     advance=advance,
-    view=view,
+    view=lambda state, ids, config: ReachView(
+        state["goal_world"][ids], config.time_limit_s - state["goal_age_s"][ids]
+    ),
     spots=spots,
     observations=(
         ObservationTerm(

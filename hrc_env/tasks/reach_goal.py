@@ -1,6 +1,7 @@
 """Reaching one goal, which stands apart from the observation: the form that HER learns from."""
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -36,11 +37,6 @@ class ReachGoalView:
     """(B, 3) [m]."""
 
 
-def init(batch: int) -> Records:
-    """(B,) of `REACH_GOAL`, to be filled by `reset`."""
-    return np.zeros(batch, REACH_GOAL)
-
-
 def reset(state: Records, ids: Ints, rngs: Rngs, world: World, config: ReachGoalConfig) -> None:
     """Give environments `ids` a goal each."""
     for b, tool_world in zip(ids.tolist(), world.robot.tool_world, strict=True):
@@ -63,11 +59,6 @@ def reached(achieved: Floats, desired: Floats, config: ReachGoalConfig) -> Float
     return np.where(off_m < config.radius_m, 0.0, -1.0)
 
 
-def view(state: Records, ids: Ints, config: ReachGoalConfig) -> ReachGoalView:
-    """What robots `ids` know of their task."""
-    return ReachGoalView(state["goal_world"][ids])
-
-
 def info(state: Records) -> dict[str, Any]:
     """Whether the tool is at its goal, (B,) each; what counts is where it is at the end."""
     there = state["there"].astype(float)
@@ -78,10 +69,10 @@ TASK = Task(
     id="HRCReachGoal-v0",
     says="Bring the tool to a goal and keep it there, in a volume shared with a worker.",
     config=ReachGoalConfig,
-    init=init,
+    init=partial(np.zeros, dtype=REACH_GOAL),
     reset=reset,
     advance=advance,
-    view=view,
+    view=lambda state, ids, config: ReachGoalView(state["goal_world"][ids]),
     spots=spots,
     observations=(),
     rewards=(),

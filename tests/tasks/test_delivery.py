@@ -35,7 +35,7 @@ def world(*places: tuple[float, float, float], qd: float = 0.0, touched: bool = 
 
 
 def begun(*places: tuple[float, float, float]) -> np.ndarray:
-    state = delivery.init(len(places))
+    state = delivery.TASK.init(len(places))
     rngs = [np.random.default_rng(k) for k in range(len(places))]
     delivery.reset(state, np.arange(len(places)), rngs, world(*places), CONFIG)
     return state

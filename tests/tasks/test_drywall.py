@@ -41,7 +41,7 @@ def world(shift_m=(0.0, 0.0, 0.0), held=True, screws=0, boring=False, workers=0)
 
 def begun():
     """The state of an episode that begins."""
-    state, rngs = drywall.init(1), [np.random.default_rng(0)]
+    state, rngs = drywall.TASK.init(1), [np.random.default_rng(0)]
     drywall.reset(state, np.array([0]), rngs, world(), DrywallConfig())
     return state
 

@@ -23,7 +23,7 @@ class Robot:
 
 
 def begun(n: int = 1):
-    state = pick_place.init(n)
+    state = pick_place.TASK.init(n)
     rngs = [np.random.default_rng(b) for b in range(n)]
     tool = np.tile([-0.3, 0.0, 1.2], (n, 1))
     pick_place.reset(state, np.arange(n), rngs, World(Robot(tool)), CONFIG)
@@ -42,9 +42,7 @@ def worth(state, rngs, studs, tool, held=False):
 
 
 def potential(state):
-    return CONFIG.progress_per_m * state["potential_m"] + CONFIG.placed_bonus * state["placed"].sum(
-        1
-    )
+    return CONFIG.placed_bonus * state["placed"].sum(1) - CONFIG.progress_per_m * state["left_m"]
 
 
 def test_pieces_that_are_pushed_to_and_fro_earn_nothing():
@@ -77,7 +75,7 @@ def test_picking_up_and_laying_down_again_and_again_earns_nothing(reward):
     agent, layout = PickPlacer(env_info(env.simulation)), env.simulation.layout
     observation, _ = env.reset(seed=3)
     state = env.simulation.task_state
-    first = state["potential_m"][0] * (reward == "dense")
+    first = -state["left_m"][0] * (reward == "dense")
     earned, lifts, outs, was_held, was_placed, bests = 0.0, 0, 0, False, 0, []
     for k in range(1200):
         terms = split(observation, layout)
@@ -90,7 +88,7 @@ def test_picking_up_and_laying_down_again_and_again_earns_nothing(reward):
         placed = int(info["task/studs_placed"])
         lifts, outs = lifts + (held and not was_held), outs + (placed < was_placed)
         was_held, was_placed = held, placed
-        now = state["potential_m"][0] * (reward == "dense")
+        now = -state["left_m"][0] * (reward == "dense")
         expected = CONFIG.progress_per_m * (now - first) + CONFIG.placed_bonus * placed
         assert earned == pytest.approx(expected, abs=1e-6)
         bests.append(earned)

@@ -43,7 +43,7 @@ def world(gap_m=0.0, speed_m_s=0.0, held=True, takes=True, away_m=0.0):
 
 
 def begun():
-    state, rngs = handover.init(1), [np.random.default_rng(0)]
+    state, rngs = handover.TASK.init(1), [np.random.default_rng(0)]
     handover.reset(state, np.array([0]), rngs, world(), HandoverConfig())
     return state
 

@@ -20,7 +20,7 @@ EVERYONE = np.array([0, 1])
 
 
 def two_environments():
-    state = reach.init(2)
+    state = reach.TASK.init(2)
     rngs = [np.random.default_rng(seed) for seed in (1, 2)]
     reach.reset(state, EVERYONE, rngs, tools_at(np.zeros((2, 3))), CONFIG)
     return state, rngs
@@ -69,7 +69,7 @@ def test_a_goal_is_missed_after_its_time_and_not_a_step_earlier():
 
 def test_an_environment_draws_from_its_own_stream_only():
     both, _ = two_environments()
-    alone = reach.init(1)
+    alone = reach.TASK.init(1)
     reach.reset(
         alone, np.array([0]), [np.random.default_rng(2)], tools_at(np.zeros((1, 3))), CONFIG
     )
