@@ -13,7 +13,7 @@ from pathlib import Path
 
 from hrc_env import __version__
 from hrc_env.core.checkout import module_of
-from hrc_env.core.errors import OLD_NAMES, ConfigError, HRCError, unknown
+from hrc_env.core.errors import ConfigError, HRCError, unknown
 from hrc_env.registration import IMPORT, import_files
 
 PROGRAM = "python -m hrc_env"
@@ -95,7 +95,6 @@ def main(words: Sequence[str] | None = None) -> int:
         return 0
     try:
         given = _imported(given)
-        _refuse_old_words(given)
         return _run(given[0], given[1:])
     except HRCError as error:
         from rich.console import Console
@@ -146,14 +145,6 @@ def _imported(words: list[str]) -> list[str]:
     if not words:
         raise ConfigError(f"--import goes with a command; {PROGRAM} --help names them.")
     return words
-
-
-def _refuse_old_words(words: list[str]) -> None:
-    """Answer commands and options that are called otherwise now with their new names."""
-    for k, word in enumerate(words):
-        name = word.partition("=")[0]
-        if name in OLD_NAMES and (k < 2 or name.startswith("--")):
-            raise unknown("word", name, ())
 
 
 def _run(name: str, words: list[str]) -> int:

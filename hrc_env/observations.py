@@ -16,7 +16,7 @@ from hrc_env.belief import (
     deviation_towards_robot_m,
     standard_deviation_m,
 )
-from hrc_env.core.errors import Named, check_shape, needed
+from hrc_env.core.errors import check_shape, needed
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import HandState, ObjectState
 from hrc_env.core.skeleton import N_JOINTS
@@ -336,6 +336,6 @@ def split(
     """A flat observation (..., n) as named terms in their units; goals beside it as they are."""
     if isinstance(observation, Mapping):
         goals = {k: np.asarray(part, float) for k, part in observation.items() if k != FLAT}
-        return Named({**split(observation[FLAT], where), **goals})
+        return {**split(observation[FLAT], where), **goals}
     physical = observation * where.scale
-    return Named((name, physical[..., part]) for name, part in where.slices.items())
+    return {name: physical[..., part] for name, part in where.slices.items()}

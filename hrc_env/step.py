@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env import metrics
-from hrc_env.core.errors import Named
 from hrc_env.core.records import PoseEstimate, RobotState, WorkerTruth
 from hrc_env.core.typing import Bools, Floats, Ints, Records
 from hrc_env.metrics import CostConfig
@@ -47,10 +46,10 @@ class StepResult:
     """(B,)."""
     info: Info
 
-    def info_of(self, b: int) -> Named:
+    def info_of(self, b: int) -> dict[str, Any]:
         """The info of one environment: absent values are left out, flags are bool."""
         values = {name: value.item(b) for name, value in self.info.items()}
-        known = Named((name, value) for name, value in values.items() if value == value)
+        known = {name: value for name, value in values.items() if value == value}
         for name in FLAGS:
             known[name] = bool(known[name])
         return known

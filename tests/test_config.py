@@ -3,12 +3,11 @@
 from dataclasses import replace
 from inspect import signature
 
-import numpy as np
 import pytest
 
 from hrc_env.__main__ import main
 from hrc_env.config import ARGUMENTS, HRCConfig, save_config, settle
-from hrc_env.core.errors import OLD_NAMES, ConfigError, Named
+from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCEnv
 from hrc_env.motion.clip import Clip
 from hrc_env.motion.config import PEOPLE
@@ -68,7 +67,6 @@ def test_a_clip_in_memory_is_not_written(tmp_path):
     [
         ("[reward]\nproximty = 1\n", "'reward.proximty'. Did you mean 'reward.proximity'"),
         ('ctrl_dt = "fast"\n', "ctrl_dt must be a finite number, got 'fast'"),
-        ("[reward]\ngoal = 1\n", "'reward.goal' is gone: use 'task.goal_bonus'"),
         ("reward = [", "must be TOML"),
         ('[motion]\npeople = "hurrid"\n', "motion.people 'hurrid'. Did you mean 'hurried'"),
         ("appearance = 3\n", "appearance must be a name ('as_built'"),
@@ -94,36 +92,6 @@ def test_the_list_shows_the_configuration_that_arguments_make(tmp_path, capsys):
     assert main(["list", "--config"]) == 0
     (tmp_path / "mine.toml").write_text(capsys.readouterr().out)
     assert settle(config=tmp_path / "mine.toml").config == settle().config
-
-
-@pytest.mark.parametrize("old", [{"estimator": "per_joint"}, {"config": {"eyes": {}}}])
-def test_an_old_name_is_answered_with_the_new_one(old):
-    with pytest.raises(ConfigError, match="is gone: use"):
-        settle(**old)
-
-
-def test_so_is_an_old_word_of_the_command_line(monkeypatch, capsys):
-    monkeypatch.setitem(OLD_NAMES, "--watch", "--viewer")
-    assert main(["play", "--watch=1"]) == 2
-    assert "'--watch' is gone: use '--viewer'" in " ".join(capsys.readouterr().err.split())
-
-
-def test_so_is_an_old_key_of_infos_and_observations():
-    env = HRCEnv(perception="none")
-    observation, info = env.reset(seed=0)
-    with pytest.raises(KeyError, match="worker_separation"):
-        env.split_observation(observation)["worker_gap"]
-    with pytest.raises(KeyError, match="nothing"):
-        info["nothing"]
-    assert isinstance(info, Named)
-    assert info.get("worker_gap") is None
-    assert np.isfinite(info["cost"])
-
-
-def test_no_name_of_today_is_an_old_one():
-    env = HRCEnv(perception="none")
-    observation, info = env.reset(seed=0)
-    assert not OLD_NAMES.keys() & {*info, *env.split_observation(observation)}
 
 
 def test_settings_have_the_defaults_of_the_environment():

@@ -10,25 +10,6 @@ from collections.abc import Callable, Collection, Iterable, Iterator
 from typing import Any, TypeVar
 
 T = TypeVar("T")
-OLD_NAMES = {
-    "beyond": "ablations",
-    "--peers": "--baselines",
-    "eyes": "detector",
-    "horizons_s": "forecast_s",
-    "per_joint": "particle",
-    "processes": "threads",
-    "reward.goal": "task.goal_bonus",
-    "reward.progress_per_m": "task.progress_per_m",
-    "scene.leash_rad": "scene.integrator_clamp_rad",
-    "tracker.paper_iterations": "tracker.n_iterations",
-    "tracker.paper_particles": "tracker.n_particles",
-    "tracker.paper_sigma_m": "tracker.sigma_m",
-    "worker_gap": "worker_separation",
-    "worker_joints_ahead": "worker_joints_forecast",
-    "worker_joints_ahead_std": "worker_joints_forecast_std",
-}
-"""What is called otherwise now: fields of the config by their path, arguments, their values,
-commands, "--options", observation terms and keys of the infos."""
 
 
 class HRCError(Exception):
@@ -76,18 +57,8 @@ def learner() -> Iterator[None]:
         ) from error
 
 
-class Named(dict[str, Any]):
-    """Values by name; an old name is answered with the new one."""
-
-    def __missing__(self, name: str) -> Any:
-        new = f": it is called {OLD_NAMES[name]!r} now" if name in OLD_NAMES else ""
-        raise KeyError(f"{name}{new}")
-
-
 def unknown(what: str, got: object, valid: Iterable[str]) -> ConfigError:
-    """The error for a name that is not in a list, with the nearest valid one or its new name."""
-    if got in OLD_NAMES:
-        return ConfigError(f"The {what} {got!r} is gone: use {OLD_NAMES[str(got)]!r}.")
+    """The error for a name that is not in a list, with the nearest valid one."""
     names = list(valid)
     near = difflib.get_close_matches(str(got), names, n=1)
     hint = f" Did you mean {near[0]!r}?" if near else ""

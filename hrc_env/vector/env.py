@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from hrc_env.config import settle
 from hrc_env.control import checked_action
 from hrc_env.core.batching import copied, mapped, one, write_rows
-from hrc_env.core.errors import ConfigError, unknown, whole
+from hrc_env.core.errors import ConfigError, whole
 from hrc_env.core.machine import n_cores
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.env import EnvBase, spaces
@@ -59,7 +59,6 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         autoreset_mode: when an environment whose episode is over starts anew: at the next
             step (default), in the same step, or not by itself ("Disabled").
         num_threads: threads that share the environments; all cores if None.
-        backend: "threads"; there is no other.
         arguments: of `HRCEnv`, as are `render_mode`, `width` and `height`.
     """
 
@@ -76,10 +75,13 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         max_episode_steps: int | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         num_threads: int | None = None,
-        backend: str = "threads",
         **arguments: Any,
     ) -> None:
-        _refuse(perception, backend)
+        if perception == "pixels":
+            raise ConfigError(
+                'perception="pixels" has no batched form: gymnasium.make_vec makes it with a '
+                'process for each environment. perception="keypoints" emulates it, batched.'
+            )
         settings = settle(perception=perception, **arguments)
         self._open(settings, render_mode, width, height)
         self.num_envs = whole("num_envs", num_envs, 1, MAX_ENVS)
@@ -229,17 +231,6 @@ def _finals(observation: Observation, info: InfoTable, who: Bools) -> dict[str, 
         last[b] = copied(one(observation, int(b)))
     final_info = {"final_info": info.arrays(who), "_final_info": who.copy()}
     return {"final_obs": last, "_final_obs": who.copy(), **final_info}
-
-
-def _refuse(perception: str, backend: str) -> None:
-    """Raise a `ConfigError` for what has no batched form."""
-    if perception == "pixels":
-        raise ConfigError(
-            'perception="pixels" has no batched form: gymnasium.make_vec makes it with a '
-            'process for each environment. perception="keypoints" emulates it, batched.'
-        )
-    if backend != "threads":
-        raise unknown("backend", backend, ("threads",))
 
 
 def make_vector(

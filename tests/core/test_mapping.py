@@ -96,8 +96,3 @@ def test_plain_values_are_what_json_has():
     assert plain(value) == {"a": (1, ["b.toml"]), "mode": AutoresetMode.SAME_STEP.value}
     assert plain(np.eye(2)) == [[1.0, 0.0], [0.0, 1.0]]
     assert plain(len) is len
-
-
-def test_a_field_that_is_called_otherwise_now_says_so():
-    with pytest.raises(ConfigError, match=r"'reward\.goal' is gone: use 'task\.goal_bonus'"):
-        settle(config={"reward": {"goal": 1.0}})

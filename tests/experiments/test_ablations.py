@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from docs import tables
-from hrc_env.__main__ import main
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.experiments.ablations import experiment
@@ -234,8 +233,3 @@ def test_a_forgotten_velocity_leaves_the_positions_as_they_are():
     others = np.arange(N_JOINTS) != ROOT
     assert np.allclose(now[:, others], together[:, others], atol=1e-12)
     assert np.linalg.eigvalsh(trees["cov"]).min() > 0
-
-
-def test_the_old_name_is_answered_with_the_new_one(capsys):
-    assert main(["experiment", "beyond"]) != 0
-    assert "'beyond' is gone: use 'ablations'" in " ".join(capsys.readouterr().err.split())

@@ -65,8 +65,3 @@ def test_options_that_cannot_work_say_so():
     for options, said in bad:
         with pytest.raises(ConfigError, match=said):
             env.reset(options=options)
-
-
-def test_processes_are_answered_with_what_to_use_instead():
-    with pytest.raises(ConfigError, match="'processes' is gone: use 'threads'"):
-        HRCVectorEnv(2, perception="none", backend="processes")
