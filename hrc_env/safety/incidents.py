@@ -33,7 +33,7 @@ CLOSE_M, CLEAR_M = 0.05, 0.10
 REACTION_S = 0.1
 """Between somebody's coming and the brakes, in the protective distance [s]; a usual value."""
 TOWARDS, FLEEING, STANDING = range(len(KINDS))
-WITHIN, BEYOND, NEVER = SEVERITIES = (1, 2, 3)
+WITHIN, BEYOND, NEVER = 1, 2, 3
 """A contact that its region bears, one that it does not, and the head, which is never to be hit."""
 _SIDED = {
     "shoulder": "back and shoulders", "upper_arm": "upper arm and elbow",
@@ -65,7 +65,7 @@ INCIDENT = np.dtype(
         # of a contact that begins: index into `KINDS`, into `REGION_NAMES`; -1: none begins
         ("kind", "i8"), ("region", "i8"),
         # its robot's directed speed before, its closing speed [m/s]; force as a share of what is
-        # permitted; one of `SEVERITIES` or 0
+        # permitted; `WITHIN`, `BEYOND`, `NEVER` or 0
         ("came_m_s", "f8"), ("closing_m_s", "f8"), ("force_ratio", "f8"), ("severity", "i8"),
         # nearer than the protective distance and coming; a near miss ends
         ("too_near", "?"), ("near_miss", "?"),

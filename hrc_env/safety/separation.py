@@ -1,8 +1,8 @@
-"""Speed and separation monitoring: how far apart robot and worker must be, how fast they may be.
+"""Speed and separation monitoring: how far apart robot and worker must be.
 
 ISO/TS 15066:2016, 5.5.4 (now in ISO 10218-2:2025), as Marvel and Norcross 2017 (PMC5117641) and
-Pupa et al. 2021 (arXiv:2103.01818) print it; approach speeds of ISO 13855:2010. Verify against the
-standards before certification.
+Pupa et al. 2021 (arXiv:2103.01818) print it; the approach speed of ISO 13855:2010. Verify against
+the standards before certification.
 
 Speeds are *directed*: of the robot's nearest point towards the worker, and of the worker's towards
 it. Numbers or arrays, which broadcast.
@@ -15,16 +15,8 @@ import numpy as np
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.typing import Floats
 
-WALKING_M_S, REACHING_M_S = 1.6, 2.0
-"""ISO 13855: how fast a walking body comes, and a hand that reaches from near."""
-REACHING_M = 0.5
-"""Up to this distance a hand is what comes [m]."""
-
-
-def approach_speed(distance_m: Any) -> Floats:
-    """K of ISO 13855 [m/s]: 2.0 of a hand up to 0.5 m, 1.6 of a walking body farther away."""
-    distance = _known("distance_m", distance_m)
-    return np.where(distance <= REACHING_M, REACHING_M_S, WALKING_M_S)
+WALKING_M_S = 1.6
+"""ISO 13855: how fast a walking body comes."""
 
 
 def protective_distance(
@@ -54,18 +46,6 @@ def protective_distance(
         + _known("robot_uncertainty_m", robot_uncertainty_m)
     )
     return human * (reaction + stopping) + robot * (reaction + 0.5 * stopping) + margins
-
-
-def stopping_time(robot_m_s: Any, deceleration_m_s2: float) -> Floats:
-    """T_s [s] from a speed towards the worker [m/s] to rest, at constant deceleration."""
-    return np.maximum(np.asarray(robot_m_s, float), 0.0) / _known("deceleration", deceleration_m_s2)
-
-
-def permitted_speed(clear_m: Any, *, reaction_s: float, deceleration_m_s2: float) -> Floats:
-    """The fastest v_r [m/s] with v_r T_r + v_r^2 / (2 a) <= what is clear [m]: the robot's share of
-    S_p; 0 where nothing is."""
-    a, t = _known("deceleration_m_s2", deceleration_m_s2), _known("reaction_s", reaction_s)
-    return a * (np.sqrt(t**2 + 2.0 * np.maximum(np.asarray(clear_m, float), 0.0) / a) - t)
 
 
 def _known(name: str, value: Any) -> Floats:

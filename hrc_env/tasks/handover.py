@@ -38,8 +38,6 @@ LIFTED_M, APART_M, APART_S = 0.04, 0.14, 0.3
 """The worker comes when it is lifted so far; it is handed over when fingers have been so far from
 it for so long; the hand loses it from there on, too."""
 GRAVITY_M_S2 = 9.81
-MOVED_M = 0.02
-"""At first the stand's middle is where it is; the bar is turned anyhow."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,15 +1,10 @@
-"""Speed and separation: the table of the open literature, and its inverse."""
+"""Speed and separation: the table of the open literature."""
 
 import numpy as np
 import pytest
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.safety.separation import (
-    approach_speed,
-    permitted_speed,
-    protective_distance,
-    stopping_time,
-)
+from hrc_env.safety.separation import protective_distance
 
 TABLE_M = {
     0.00: (0.65, 0.71, 0.78, 0.90),
@@ -40,19 +35,6 @@ def test_late_eyes_cost_what_both_travel_meanwhile():
 def test_who_goes_away_is_no_nearer():
     speeds = {"reaction_s": 0.1, "stopping_s": 0.3, "intrusion_m": 0.1}
     assert protective_distance(-1.0, -2.0, **speeds) == pytest.approx(0.1)
-
-
-def test_the_permitted_speed_uses_up_the_protective_distance():
-    clear_m, human_m_s, a = np.array([0.02, 0.1, 0.5, 2.0]), 0.8, 3.0
-    speed = permitted_speed(clear_m, reaction_s=0.08, deceleration_m_s2=a)
-    stopping_s = stopping_time(speed, a)
-    needed_m = protective_distance(speed, human_m_s, reaction_s=0.08, stopping_s=stopping_s)
-    np.testing.assert_allclose(needed_m - human_m_s * (0.08 + stopping_s), clear_m)
-    assert permitted_speed(-0.3, reaction_s=0.08, deceleration_m_s2=a) == 0.0
-
-
-def test_hands_come_faster_than_bodies_from_near():
-    np.testing.assert_array_equal(approach_speed([0.1, 0.5, 0.51, 3.0]), [2.0, 2.0, 1.6, 1.6])
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import Any
 
-from hrc_env.experiments.study.rigs import ALL, SINGLE, Rig, Turn, late, left_with
+from hrc_env.experiments.impact.setups import PerceptionSetup
 from hrc_env.scene.rigs import RIGS
 from hrc_env.tasks.task import task_called
 
@@ -11,28 +11,13 @@ VERSION = 1
 """Of the conditions, seeds and counts: numbers of different versions do not compare."""
 SEED = 5_000_000
 """Of the first episode, far from those of training and of other evaluations."""
-LATE_S = 0.2
-"""How late images are that say so [s]."""
-
-
-@dataclass(frozen=True, slots=True)
-class Eyes:
-    """How the robot perceives."""
-
-    words: str
-    level: str = "keypoints"
-    latency_s: float = 0.0
-    """From taking an image to having it; the image says so."""
-    left: tuple[Rig, ...] = (ALL,)
-    """Cameras that are left after the first second; episodes take turns in them."""
-
-
 EYES = {
-    "truth": Eyes("the truth", level="truth"),
-    "keypoints": Eyes("four cameras"),
-    "late": Eyes("four cameras, 200 ms late", latency_s=LATE_S),
-    "one": Eyes("one camera after 1 s", left=SINGLE),
+    "truth": ("the truth", PerceptionSetup("truth")),
+    "keypoints": ("four cameras", PerceptionSetup()),
+    "late": ("four cameras, 200 ms late", PerceptionSetup(latency_s=0.2)),
+    "one": ("one camera after 1 s", PerceptionSetup(n_cameras=1)),
 }
+"""How robots perceive, and that in words; late images say so."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,21 +37,16 @@ class Condition:
     def words(self) -> str:
         """As in tables."""
         shield = "no shield" if self.shield is None else f"shield `{self.shield}`"
-        return f"{self.people} people, {EYES[self.eyes].words}, {shield}"
+        return f"{self.people} people, {EYES[self.eyes][0]}, {shield}"
 
     def keywords(self, task: str) -> list[dict[str, Any]]:
         """Arguments of environments, in which episodes take turns."""
-        eyes = EYES[self.eyes]
-        kwargs = {"task": task, "perception": eyes.level, "people": self.people}
+        (_, setup), rig = EYES[self.eyes], RIGS[task_called(task).scene]
+        kwargs = {"task": task, "perception": setup.level, "people": self.people}
         if self.shield is not None:
             kwargs["shield"] = self.shield
-        turns = _turns(eyes, task)
+        turns = setup.turns_of(rig)
         return [{**kwargs, "cameras": list(t.cameras), "faults": list(t.faults)} for t in turns]
-
-
-def _turns(eyes: Eyes, task: str) -> list[Turn]:
-    rig = RIGS[task_called(task).scene]
-    return [late(left_with(rig, left), eyes.latency_s, is_told=True) for left in eyes.left]
 
 
 def _conditions() -> tuple[Condition, ...]:

@@ -74,7 +74,7 @@ class Stage:
         turns = self.setup.turns[:n]
         in_turns = [slice(k, None, len(turns)) for k in range(len(turns))]
         self._envs = self._envs or [
-            _build(self.setup, turn, len(self.seeds[mine]), self.made_with)
+            build(self.setup, turn, len(self.seeds[mine]), self.made_with)
             for turn, mine in zip(turns, in_turns, strict=True)
         ]
         for env, mine in zip(self._envs, in_turns, strict=True):
@@ -94,7 +94,7 @@ class Stage:
             env.close()
 
 
-def _build(
+def build(
     setup: PerceptionSetup, turn: Turn, n_episodes: int, made_with: Mapping[str, Any]
 ) -> Shards:
     """Environments with such a setup, through these cameras, with these other arguments."""

@@ -4,7 +4,6 @@ As in `experiments.impact`: the same seeds and workers for everybody, who take n
 robot; contacts are those of `safety.incidents`.
 """
 
-import warnings
 import zlib
 from collections.abc import Sequence
 from functools import partial
@@ -14,12 +13,10 @@ import numpy as np
 from gymnasium.utils import seeding
 from numpy.typing import NDArray
 
-from hrc_env.config import settle
 from hrc_env.control import checked_action
 from hrc_env.core.checkout import agents
-from hrc_env.core.machine import n_cores
 from hrc_env.core.typing import Points3
-from hrc_env.experiments.impact.episodes import PEOPLE, MakeAgent, Rows
+from hrc_env.experiments.impact.episodes import MakeAgent, Rows, build
 from hrc_env.experiments.price.eyes import Eyes
 from hrc_env.experiments.price.shield import Widened
 from hrc_env.experiments.study.cache import PartProgress
@@ -75,18 +72,9 @@ class Stage:
 
     def _env(self, k: int, turn: Turn, batch: int) -> Shards:
         if (k, batch) not in self._envs:
-            setup = self.eyes.setup
-            settings = settle(
-                task=self.task, perception=setup.level, estimator=setup.estimator, people=PEOPLE,
-                faults=list(turn.faults), cameras=list(turn.cameras),
-                shield=self._shield if self.is_shielded else None,
-            )  # fmt: skip
-            threads = 1 if setup.level == "pixels" else min(n_cores(), batch)
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # that one camera is a poor rig is what we ask
-                self._envs[k, batch] = Shards(
-                    batch, threads, partial(Simulation, settings=settings)
-                )
+            shield = self._shield if self.is_shielded else None
+            made_with = {"task": self.task, "shield": shield}
+            self._envs[k, batch] = build(self.eyes.setup, turn, batch, made_with)
         return self._envs[k, batch]
 
 

@@ -10,12 +10,12 @@ search chose the margin, its own seeds have no say in the height of the curve.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from scipy.optimize import isotonic_regression
 
 from hrc_env.core.typing import Floats, Ints
+from hrc_env.experiments.study import intervals
 from hrc_env.experiments.study.intervals import crossing
 
 HALF = 0.5
@@ -89,10 +89,7 @@ class Tried:
 def draws(n: int, m: int, n_draws: int) -> tuple[Ints, Ints]:
     """(1 + R, n) and (1 + R, m) how often seeds are drawn: first each once, then at random, always
     the same, so that what shares its seeds is compared draw by draw."""
-    return _drawn(n, n_draws, 0), _drawn(m, n_draws, 1)
-
-
-@lru_cache(maxsize=8)
-def _drawn(n: int, n_draws: int, seed: int) -> Ints:
-    drawn = np.random.default_rng(seed).multinomial(n, np.full(n, 1 / n), n_draws)
-    return np.vstack([np.ones((1, n), int), drawn])
+    sizes = (n, m)
+    tried, fresh = (np.vstack([np.ones((1, k), int), intervals.draws(k, n_draws, stream)])
+                    for stream, k in enumerate(sizes))  # fmt: skip
+    return tried, fresh

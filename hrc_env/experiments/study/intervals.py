@@ -27,7 +27,7 @@ def bootstrap(statistic: Statistic, n: int, unit: str, n_draws: int = 4000) -> M
         return Metric(np.nan, np.nan, np.nan, unit, 0)
     with np.errstate(divide="ignore", invalid="ignore"):
         point = float(statistic(np.ones((1, n), np.int64))[0])
-        drawn = statistic(_draws(n, n_draws)) if n > 1 else np.array([point])
+        drawn = statistic(draws(n, n_draws)) if n > 1 else np.array([point])
     drawn = drawn[~np.isnan(drawn)]
     if np.isnan(point) or not np.isfinite(drawn).all() or not drawn.size:
         return Metric(point, point, point, unit, n)
@@ -141,6 +141,6 @@ def _usable(*samples: Numbers) -> list[Floats]:
 
 
 @lru_cache(maxsize=8)
-def _draws(n: int, n_draws: int) -> Ints:
-    """(R, n) how often each seed is drawn, always the same."""
-    return np.random.default_rng(0).multinomial(n, np.full(n, 1 / n), n_draws)
+def draws(n: int, n_draws: int, stream: int = 0) -> Ints:
+    """(R, n) how often each seed is drawn, always the same of a stream."""
+    return np.random.default_rng(stream).multinomial(n, np.full(n, 1 / n), n_draws)

@@ -74,9 +74,9 @@ THROWN_S, ERECT_S = 0.32, 0.7
 CAUGHT_AT, CAUGHT_LEGS = 0.7, 0.14
 """Share of the caught foot's swing; how far before the other it comes down, in lengths of the leg;
 judgement."""
-RISES_AT, LYING_AT, TALL = 1.22, 0.86, 1.7
-"""How far from where they stumble they stand again, their pelvis lies, and their head, hands or
-both; the same lengths as in POSES."""
+RISES_AT, TALL = 1.22, 1.7
+"""How far from where they stumble they stand again, and their head, hands or both are; the same
+lengths as in POSES."""
 TURNS_RAD = (0.0, 0.35, -0.35, 0.7, -0.7)
 """Ways to fall, from where they go, that are tried for room."""
 QUICKEST, SLOWEST, MOST_ROLL_RAD = 1.15, 0.9, 0.9
