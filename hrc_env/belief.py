@@ -1,5 +1,6 @@
 """What a robot believes in one step: itself, its task and the estimate. No truth in here."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -7,7 +8,7 @@ import numpy as np
 
 from hrc_env.core.records import HandState, ObjectState, PoseEstimate, RobotState
 from hrc_env.core.skeleton import SEGMENT_RADIUS_M
-from hrc_env.core.typing import Floats, JointVelocities
+from hrc_env.core.typing import Bools, Floats, JointVelocities
 from hrc_env.geometry.distances import Separation, least_separation, segments
 from hrc_env.safety.robot import RobotModel
 
@@ -36,6 +37,8 @@ class Belief:
     """(B, N) what the shield gave in the last step less what was asked for [rad/s]; 0 without."""
     model: RobotModel | None = None
     """What the robot knows of itself for good."""
+    welcome: Callable[["Belief"], Bools] | None = None
+    """Who may come to its hand (`Task.welcome`)."""
 
 
 def estimated_separation(robot: RobotState, estimate: PoseEstimate) -> Separation:

@@ -322,6 +322,7 @@ class Simulation(Stateful):
             command=self.physics.command[ids],
             shield_change=self.shield_change[ids],
             model=self.model,
+            welcome=self.task.welcome,
         )
 
     def _observed(self, belief: Belief) -> Observation:

@@ -12,10 +12,10 @@ KINDS = ("qp", "ssm", "pfl")
 NUMBERS = (
     "margin_m", "hand_margin_m", "sigmas", "least_sigmas_m", "predicted_m_s", "doubtful_m",
     "doubtful_sigmas", "human_m_s", "human_margin_m_s", "human_s", "latency_s", "reaction_s",
-    "deceleration_m_s2", "gain_hz", "retreat_m_s", "unknown_m_s",
+    "deceleration_m_s2", "gain_hz", "retreat_m_s", "unknown_m_s", "welcome_m_s", "still_m_s",
 )  # fmt: skip
-SETTINGS = np.dtype([*((name, "f8") for name in NUMBERS), ("touches", "?")], align=True)
-"""The same as kernels read them; whether a touch at the region's speed is allowed."""
+SETTINGS = np.dtype([(name, "f8") for name in NUMBERS], align=True)
+"""The same as kernels read them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +64,13 @@ class ShieldConfig:
     """at most so fast; 0: it only comes no nearer ("ssm" never does more) [m/s]."""
     unknown_m_s: float = 0.25
     """While it is unknown where a worker is, no point of the robot moves faster [m/s]; 0: stop."""
+    welcome_m_s: float = 0.25
+    """To parts of people that a task lets come to the robot's hand, as to take what it brings
+    (`Task.welcome`), the hand and what it carries may come so fast, and no faster than the region
+    bears; 0: not at all [m/s]."""
+    still_m_s: float = 0.02
+    """Other links may come to them so fast where nothing else allows it: corrections that keep in
+    its place what is held; with none they add up to a way [m/s]."""
 
     def __post_init__(self) -> None:
         check_names("kind of shield", [self.kind], KINDS)
@@ -78,8 +85,7 @@ class ShieldConfig:
     def record(self) -> Records:
         """(1,) of `SETTINGS`; a speed that is None is not a number."""
         numbers = (getattr(self, name) for name in NUMBERS)
-        row = [math.nan if value is None else value for value in numbers]
-        return np.array([(*row, self.kind == "pfl")], SETTINGS)
+        return np.array([tuple(math.nan if x is None else x for x in numbers)], SETTINGS)
 
 
 PRESETS = {

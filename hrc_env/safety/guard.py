@@ -4,6 +4,14 @@
 velocities that the arm can reach in a step. A row that asks to get away is two of them: to come no
 nearer, which hardly anything outweighs, and only then to get away: with one, an arm that flees from
 a hand pushes its wrist into the other.
+
+A task may say which parts of estimated bodies are welcome at the robot's hand (`Task.welcome`):
+forearms and hands of the one who takes a tool, or works at what is held. As long as these come no
+faster than their region bears in a touch of this arm with its load
+(`contact.permitted_contact_speed`), no link has to get away from them, which would take away what
+is held for them; and the last link and its load may touch them, at `welcome_m_s` at most, both
+speeds together no faster than the region bears. Nothing else changes: not for other people and
+other parts of theirs, nor how near other links come of themselves but for `still_m_s`.
 """
 
 import math
@@ -123,16 +131,29 @@ def _links(model: RobotModel, now: Belief) -> Ints:
 
 def _bodies(now: Belief, model: RobotModel, config: ShieldConfig) -> tuple[Any, ...]:
     """What `rows` wants to know of the workers."""
-    estimate, touch_m_s = now.estimate, np.zeros((len(now.action), len(SEGMENT_REGIONS)))
-    if config.kind == "pfl":
-        carried = 0.0 if now.objects is None else now.objects.held @ model.load_kg
-        mass_kg = np.broadcast_to(model.mass_kg + carried, len(touch_m_s))
-        speeds = {name: permitted_contact_speed(name, mass_kg) for name in set(SEGMENT_REGIONS)}
-        touch_m_s = np.stack([speeds[name] for name in SEGMENT_REGIONS], axis=1)
+    estimate = now.estimate
     return (
         segments(estimate.mean_world), estimate.mean_world, estimate.velocity_world,
-        estimate.cov_world, estimate.age_s, estimate.tracked, touch_m_s,
+        estimate.cov_world, estimate.age_s, estimate.tracked, *_touches(now, model, config),
     )  # fmt: skip
+
+
+def _touches(now: Belief, model: RobotModel, config: ShieldConfig) -> tuple[Floats, Floats]:
+    """Relative speeds of touches that are allowed (B, W, S), and each capsule's share (K,) [m/s]:
+    of "pfl" all there is; else the last link's touches of who is welcome."""
+    link, shape = _links(model, now), (*now.estimate.tracked.shape, len(SEGMENT_REGIONS))
+    if config.kind == "pfl":
+        welcome, most_m_s = np.ones(shape, bool), np.full(len(link), np.inf)
+    elif now.welcome is None:
+        return np.zeros(shape), np.zeros(len(link))
+    else:
+        is_last = link == model.chain.n_joints - 1
+        welcome, most_m_s = now.welcome(now), np.where(is_last, config.welcome_m_s, 0.0)
+    carried = 0.0 if now.objects is None else now.objects.held @ model.load_kg
+    mass_kg = np.broadcast_to(model.mass_kg + carried, len(now.action))
+    speeds = {name: permitted_contact_speed(name, mass_kg) for name in set(SEGMENT_REGIONS)}
+    bears_m_s = np.stack([speeds[name] for name in SEGMENT_REGIONS], axis=1)[:, None]
+    return np.where(welcome, bears_m_s, 0.0), most_m_s
 
 
 @kernel

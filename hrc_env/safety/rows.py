@@ -10,6 +10,10 @@ is the prediction's, which is wide; one that is large all the same is of a part 
 carries, whose errors are larger than it says. Where D >= 0 the robot may be as fast as
 it can brake within D (the robot's share of `separation.protective_distance`); else it has to get
 away. A row that no command within reach exceeds is left out.
+
+From a segment that may be touched nothing has to get away while it comes no faster than its region
+bears in a touch: capsules that may touch it brake within gap - margin - Z_d to a speed that both
+together keep below that; of others a point may come at `still_m_s`, where D allows less.
 """
 
 import math
@@ -47,14 +51,15 @@ def tightest_rows(robot, bodies, settings, rows):
             capsules (B, K, 2, 3) and radii (K,) [m], least and greatest command within reach
             (B, N) [rad/s], slew (N,) [rad/s^2].
         bodies: segments (B, W, S, 2, 3) [m], joints' means and velocities (B, W, J, 3), covariances
-            (B, W, J, 3, 3) and ages (B, W, J) [s], who is known (B, W), speeds of touches that are
-            allowed (B, S) [m/s].
+            (B, W, J, 3, 3) and ages (B, W, J) [s], who is known (B, W), relative speeds of touches
+            that are allowed, 0 of none (B, W, S), and the robot's share at most of each capsule's
+            (K,) [m/s].
         settings: (1,) `config.SETTINGS`.
         rows: written: n.J (B, `MOST_ROWS`, N), b (B, `MOST_ROWS`) [m/s], how many (B,), and the
             least D of pairs that may matter (B,) [m]; infinite without.
     """
     frames, slides, link, capsules, radius, low, high, slew = robot
-    segments, mean, velocity, cov, age_s, known, touch_m_s = bodies
+    segments, mean, velocity, cov, age_s, known, touch_m_s, most_m_s = bodies
     J, b, count, least_m = rows
     p, n_caps, n_segments = settings[0], capsules.shape[1], segments.shape[2]
     rods, limbs = np.empty((n_caps, 5)), np.empty((n_segments, 5))
@@ -84,10 +89,9 @@ def tightest_rows(robot, bodies, settings, rows):
                 fastest, slowing = _closing(arm, link[c], point, normal, row)
                 slowing = min(slowing, p.deceleration_m_s2)
                 bound = _allowed(clear, slowing, p)
-                if p.touches:
-                    bound = max(
-                        bound, _touching(near, touch_m_s[e, s] - max(speed, 0.0), slowing, p)
-                    )
+                left_m_s = touch_m_s[e, w, s] - max(speed, 0.0)
+                if left_m_s > 0.0:
+                    bound = max(bound, _touching(near, min(left_m_s, most_m_s[c]), slowing, p))
                 if bound < fastest:
                     count[e] = _kept(row, bound, J[e], b[e], count[e])
 
@@ -249,9 +253,9 @@ def _allowed(clear, slowing, p):
 
 @kernel
 def _touching(near, touch_m_s, slowing, p):
-    """The same where a touch at a speed is allowed, that of the worker taken off."""
-    if touch_m_s <= 0.0:
-        return -np.inf
+    """The same where a touch at a speed of the robot is allowed; at 0, only to keep its place."""
+    if touch_m_s == 0.0:
+        return p.still_m_s
     braking = math.sqrt(touch_m_s**2 + 2.0 * slowing * max(near, 0.0)) - slowing * p.reaction_s
     return max(touch_m_s, braking)
 

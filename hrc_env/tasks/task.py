@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from hrc_env import observations, rewards
+from hrc_env.belief import Belief
 from hrc_env.core.errors import ConfigError, NoGoalError, check_shape, unknown
 from hrc_env.core.records import Cue, Effects, Grounds, World
 from hrc_env.core.things import NOTHING, Things
@@ -96,6 +97,9 @@ class Task:
     """(state) -> how far what workers wait for has come (`Job.waits`); None: they do not."""
     effects: Callable[[Any, Any], Effects] | None = None
     """(state, config) -> what is done to objects until the next step; None: nothing."""
+    welcome: Callable[[Belief], Bools] | None = None
+    """(belief) -> (B, W, S) which segments of estimated bodies may come to the robot's hand, as to
+    take what it brings: built-in shields let them (`safety.guard`); None: none."""
     over: Callable[[Any], Bools] | None = None
     """(progress) -> (B,) whether there is nothing more to do; None: there always is."""
     defaults: Mapping[str, Any] = field(default_factory=dict)

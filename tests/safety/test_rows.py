@@ -38,23 +38,26 @@ def before(scene, away_m):
     return chains.tool(scene.chain, scene.home_q)[:2, 3] + np.array([away_m, 0.0])
 
 
-def rows_of(chain, q, estimate, low, high, slew, config=CONFIG, touch_m_s=0.0):
+def rows_of(chain, q, estimate, low, high, slew, config=CONFIG, touches=(0.0, 0.0)):
     q = q[None]
+    touch_m_s, most_m_s = touches
     found = np.empty((1, MOST_ROWS, chain.n_joints)), np.empty((1, MOST_ROWS))
     count, least_m = np.empty(1, np.int64), np.empty(1)
     tightest_rows(
         (chains.forward(chain, q), chain.slides, chain.capsule_link, chains.capsules(chain, q),
          chain.capsule_radius_m, low[None], high[None], slew),
         (segments(estimate.mean_world), estimate.mean_world, estimate.velocity_world,
-         estimate.cov_world, estimate.age_s, estimate.tracked, np.full((1, 16), touch_m_s)),
+         estimate.cov_world, estimate.age_s, estimate.tracked,
+         touch_m_s + np.zeros((1, 1, 16)), most_m_s + np.zeros(len(chain.capsule_link))),
         config.record(), (*found, count, least_m),
     )  # fmt: skip
     n = int(count[0])
     return found[0][0, :n], found[1][0, :n], least_m[0]
 
 
-def defined(chain, q, estimate, low, high, slew, p):
+def defined(chain, q, estimate, low, high, slew, p, touches):
     """The rows by their definition, pair by pair, and the least D of all pairs."""
+    touch_m_s, most_m_s = touches
     caps, limbs = chains.capsules(chain, q), segments(estimate.mean_world)[0, 0]
     mean, velocity, cov = (
         part[0, 0] for part in (estimate.mean_world, estimate.velocity_world, estimate.cov_world)
@@ -89,6 +92,12 @@ def defined(chain, q, estimate, low, high, slew, p):
             bound = max(-p.retreat_m_s, p.gain_hz * clear)
             if clear >= 0:
                 bound = a * (math.sqrt(p.reaction_s**2 + 2 * clear / a) - p.reaction_s)
+            left_m_s = touch_m_s[s] - max(v_h, 0)
+            if left_m_s > 0:
+                share_m_s = min(left_m_s, most_m_s[c])
+                brakes = math.sqrt(share_m_s**2 + 2 * a * max(gap - margin - z_d, 0))
+                allowed = max(share_m_s, brakes - a * p.reaction_s)
+                bound = max(bound, allowed if share_m_s else p.still_m_s)
             if bound < np.maximum(row * low, row * high).sum():
                 found.append((bound, *row))
     return np.array(sorted(found)).reshape(-1, 1 + len(q)), least_m
@@ -105,8 +114,10 @@ def moved(chain, q, c, u, step=1e-6):
     return np.stack([(point(q + d) - point(q - d)) / (2 * step) for d in steps], -1)
 
 
+@pytest.mark.parametrize("touched", [0.0, 0.5])
 @pytest.mark.parametrize("robot", ["ur10e_like", "mobile_base"])
-def test_rows_are_as_they_are_defined_and_none_that_matters_is_left_out(robot):
+def test_rows_are_as_they_are_defined_and_none_that_matters_is_left_out(robot, touched):
+    """Whether some segments may be touched, by some capsules at some speed, or none."""
     scene = build(robot=robot)
     chain, slew = scene.chain, slew_rad_s2(scene)
     several = 0
@@ -117,8 +128,11 @@ def test_rows_are_as_they_are_defined_and_none_that_matters_is_left_out(robot):
         estimate = somebody(middle_m + away)
         middle = RNG.uniform(-0.5, 0.5, chain.n_joints) * chain.velocity_limit_rad_s
         low, high = middle - 0.3, middle + 0.3
-        J, b, least_m = rows_of(chain, q, estimate, low, high, slew)
-        expected, all_m = defined(chain, q, estimate, low, high, slew, CONFIG)
+        touch_m_s = RNG.uniform(0.3, 1.5, 16) * (RNG.random(16) < touched)
+        most_m_s = RNG.choice([0.0, 0.25, np.inf], len(chain.capsule_link))
+        given = chain, q, estimate, low, high, slew, CONFIG, (touch_m_s, most_m_s)
+        J, b, least_m = rows_of(*given)
+        expected, all_m = defined(*given)
         np.testing.assert_allclose(np.sort(b), expected[:MOST_ROWS, 0], atol=1e-6)
         if len(expected) <= MOST_ROWS:
             rows = sorted(np.column_stack([b, J]).round(4).tolist())
@@ -143,12 +157,13 @@ def test_touches_are_allowed_as_fast_as_the_region_bears_less_the_workers_speed(
     estimate = somebody(before(scene, 0.1), speed_m_s=0.0)
     box = -np.ones(6), np.ones(6), slew_rad_s2(scene)
     _, strict, _ = rows_of(scene.chain, scene.home_q, estimate, *box)
-    touching = ShieldConfig("pfl")
-    _, b, _ = rows_of(scene.chain, scene.home_q, estimate, *box, touching, touch_m_s=0.4)
     assert strict.min() < 0.0
-    assert b.min() == pytest.approx(0.4)
+    for most_m_s, bound in ((np.inf, 0.4), (0.25, 0.25), (0.0, CONFIG.still_m_s)):
+        given = scene.chain, scene.home_q, estimate, *box, CONFIG, (0.4, most_m_s)
+        _, b, _ = rows_of(*given)
+        assert b.min() == pytest.approx(bound)
     estimate.velocity_world[..., 0] = -1.0
-    _, b, _ = rows_of(scene.chain, scene.home_q, estimate, *box, touching, touch_m_s=0.4)
+    _, b, _ = rows_of(*given)
     assert b.min() < 0.0
 
 
