@@ -17,6 +17,8 @@ from hrc_env.pipeline.emulated import EmulatorPipeline
 from hrc_env.pipeline.levels import NoPerception
 from hrc_env.pipeline.rendered import PixelPipeline
 from hrc_env.pipeline.tracking import PoseTracking
+from hrc_env.safety.config import ShieldConfig
+from hrc_env.safety.guard import guarded
 from hrc_env.sb3 import HRCVecEnv
 from hrc_env.simulation import Simulation
 from hrc_env.tasks import BUILT_IN, DEFAULT
@@ -110,18 +112,22 @@ def test_nor_does_it_in_any_other_task(task, perturb):
 
 
 def test_the_hand_that_a_tool_is_brought_to_is_the_estimated_one():
-    """Until it is taken and let go, which the same hand does: only what is shown is elsewhere."""
-    taken, n_steps = [], 260
+    """Until it is taken and let go, which the same hand does: only what is shown is elsewhere. Nor
+    do shields let come any other."""
+    taken, welcome, n_steps = [], [], 300
 
     def watching(now, velocities, dt_s):
         taken.append(bool(now.task.taken[0]))
-        return velocities, {}
+        welcome.append(now.welcome(now))
+        return guarded(now, velocities, dt_s, ShieldConfig())
 
     make = partial(of, "HRCHandover-v0", shield=watching, config=None)
     moved = differences(make, displaced(shifted), agent="scripted", n_steps=n_steps)
     assert_only_told(moved, "keypoints")
     assert taken[n_steps - 1]
     assert taken[:n_steps] == taken[n_steps:]
+    assert 0 < np.any(welcome[:n_steps], axis=(1, 2, 3)).sum() < n_steps
+    np.testing.assert_array_equal(welcome[:n_steps], welcome[n_steps:])
 
 
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])

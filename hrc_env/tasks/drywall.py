@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hrc_env.belief import Belief
 from hrc_env.core.errors import ConfigError, check_fields, needed
 from hrc_env.core.records import Cue, Effects, ObjectState, Workplace, World
 from hrc_env.core.things import FOOT_WORLD, Things, Weld
@@ -14,6 +15,7 @@ from hrc_env.geometry.rotations import matrix
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm, check_kind, progress
 from hrc_env.tasks import LONGER
+from hrc_env.tasks.partner import partners_arms
 from hrc_env.tasks.spot import Spot
 from hrc_env.tasks.task import Rngs, Task
 from hrc_env.worker.body import assets_dir
@@ -34,6 +36,9 @@ NEAR_STUD_M = 0.56
 """The stud along which screws go [m along x]."""
 SCREWS_M = tuple((NEAR_STUD_M, z) for z in (0.82, 0.67, 0.52, 0.37))
 """Where they go, the uppermost first: along x, and above the foot [m]."""
+THERE_M, NEAR_M = 0.05, 1.0
+"""While the board is held so near to its place, shields let people's hands come who are so near to
+where screws go [m]."""
 BESIDE_M = (NEAR_STUD_M + 0.42, WALL_Y_M - 0.50)
 """Where the worker stands, who looks at the board askew."""
 PUSH_N, SHEAR = (20.0, 50.0), 0.2
@@ -209,6 +214,15 @@ def effects(state: Records, config: DrywallConfig) -> Effects:
     return Effects({"board_fixed": state["driven"] == len(SCREWS_M)}, push[:, None])
 
 
+def welcome(now: Belief) -> Bools:
+    """(B, W, S) whose hand is near where screws go, while the board is held there."""
+    board = needed(now.objects, "A board")
+    there = board.held[:, 0] & (off_place(board)[0] < THERE_M)
+    line = np.array([(x, WALL_Y_M, z) for x, z in (SCREWS_M[0], SCREWS_M[-1])])
+    lines = np.broadcast_to(FOOT_WORLD + line, (len(there), 2, 3))
+    return partners_arms(now.estimate, BESIDE_M, lines, NEAR_M) & there[:, None, None]
+
+
 def info(state: Records) -> dict[str, Floats]:
     """What the episode has come to so far, (B,) each; how far off the board was while screws were
     driven; it is a success if the board is fixed in its place and let go."""
@@ -274,6 +288,7 @@ TASK = Task(
     spots=spots,
     poses=lambda state, ids, config: state["pose"][ids][:, None],
     effects=effects,
+    welcome=welcome,
     loads=lambda state: (state["pressed_s"] == 0.0)[:, None],  # against the studs it is a wall
     cue=lambda state: Cue((state["pressed_s"] > 0.0).astype(int), np.full((len(state), 3), np.nan)),
     over=lambda step: step["done"],

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hrc_env.belief import Belief
 from hrc_env.core.errors import check_fields, needed
 from hrc_env.core.records import Cue, Deeds, Effects, ObjectState, Workplace, World
 from hrc_env.core.things import FOOT_WORLD, Things
@@ -14,6 +15,7 @@ from hrc_env.geometry.rotations import matrix
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm, check_kind, progress
 from hrc_env.tasks import LONGER
+from hrc_env.tasks.partner import partners_arms
 from hrc_env.tasks.spot import Spot
 from hrc_env.tasks.task import Rngs, Task
 from hrc_env.worker.body import assets_dir
@@ -22,10 +24,14 @@ BAR_M, BAR_KG = (0.03, 0.03, 0.40), 0.9
 """Edges of the tool, a bar that stands upright, and its mass [kg]."""
 STAND_M = (0.30, -0.62, -0.10)
 """Where its lower end stands at first, from the robot's foot [m]."""
+STAND_UP_M = FOOT_WORLD[2] + STAND_M[2] + BAR_M[2] / 2
+"""How high its middle is then, in the world [m]."""
 GRIP_UP_M, HANDLE_UP_M = -0.08, 0.12
 """Where the robot is to grip it, and where the worker does, above its middle [m]."""
 BESIDE_M, HAND_UP_M, MEET_M = (1.30, 0.0), 0.40, (0.78, 0.0, 0.40)
 """Where the worker stands, how high a hand is put out, and about where, from the foot [m]."""
+NEAR_M = 0.7
+"""Whose estimated hand is so near to the handle may take it: shields let it come [m]."""
 OFFERED_M = 0.25
 """A handle so near to a hand that is put out is offered: the tool is then no part of the robot."""
 CLOSES_M, CLOSES_M_S, CLOSES_S = 0.02, 0.15, 0.4
@@ -122,17 +128,14 @@ def advance(
     held, at = tool.held[:, 0], tool.position_world[:, 0]
     handle, speed = _handle(tool)
     state["handle_world"] = handle
-    stand_m = FOOT_WORLD[2] + STAND_M[2] + BAR_M[2] / 2
-    state["lifted"] = held & (at[:, 2] > stand_m + LIFTED_M)
+    state["lifted"] = held & (at[:, 2] > STAND_UP_M + LIFTED_M)
     before = state["taken"].copy()
     _close(state, needed(world.deeds, "What workers do"), handle, speed, dt_s)
     _pull(state, needed(world.deeds, "What workers do"), tool, handle, speed, dt_s)
-    away_m = np.linalg.norm(
-        world.robot.tool_world - (at + np.array([0.0, 0.0, GRIP_UP_M])), axis=-1
-    )
+    away_m = _fingers_away_m(world.robot.tool_world, at)
     away = state["taken"] & ~held & (away_m > APART_M)
     state["away_s"] = np.where(away, state["away_s"] + dt_s, 0.0)
-    state["dropped"] |= at[:, 2] < stand_m - 0.3
+    state["dropped"] |= at[:, 2] < STAND_UP_M - 0.3
     gentle = state["largest_n"] <= config.gentle_n
     done = (state["away_s"] >= APART_S) & ~state["dropped"] & gentle
     step["taken"], step["done"] = state["taken"] & ~before, done & ~state["done"]
@@ -192,9 +195,14 @@ def _pull(
 
 def _left_m(at: Points3, handle: Points3, tool_world: Points3, held: Bools, taken: Bools) -> Floats:
     """(B,) metres that the fingers to the tool, and its handle to the hand, have before them."""
-    to_tool_m = np.linalg.norm(at + np.array([0.0, 0.0, GRIP_UP_M]) - tool_world, axis=-1)
+    to_tool_m = _fingers_away_m(tool_world, at)
     to_hand_m = np.linalg.norm(handle - (FOOT_WORLD + MEET_M), axis=-1)
     return np.where(taken, 0.0, to_hand_m + np.where(held, 0.0, to_tool_m))
+
+
+def _fingers_away_m(tool_world: Points3, at: Points3) -> Floats:
+    """(B,) from where a tool is to be gripped whose middle is there."""
+    return np.linalg.norm(at + np.array([0.0, 0.0, GRIP_UP_M]) - tool_world, axis=-1)
 
 
 def effects(state: Records, config: HandoverConfig) -> Effects:
@@ -206,6 +214,16 @@ def cue(state: Records) -> Cue:
     """The worker comes when the tool is lifted, and goes on when it is theirs."""
     stage = np.where(state["taken"], 2, np.where(state["lifted"], 1, 0))
     return Cue(stage, np.where(state["lifted"][:, None], state["handle_world"], np.nan))
+
+
+def welcome(now: Belief) -> Bools:
+    """(B, W, S) whose hand is near the handle, while the fingers are at the tool off its stand."""
+    tool = needed(now.objects, "A tool")
+    at, handle = tool.position_world[:, 0], _handle(tool)[0]
+    away_m = _fingers_away_m(now.robot.tool_world, at)
+    brought = (away_m < APART_M) & (at[:, 2] > STAND_UP_M + LIFTED_M)
+    ends = np.stack([handle, handle], axis=1)
+    return partners_arms(now.estimate, BESIDE_M, ends, NEAR_M) & brought[:, None, None]
 
 
 def info(state: Records) -> dict[str, Floats]:
@@ -272,6 +290,7 @@ TASK = Task(
     poses=lambda state, ids, config: state["pose"][ids][:, None],
     effects=effects,
     cue=cue,
+    welcome=welcome,
     loads=lambda state: ~(state["offered"] | state["taken"])[:, None],
     over=lambda step: step["done"],
     defaults={

@@ -13,6 +13,7 @@ from agents.registry import make_agent
 from hrc_env import simulation
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import WorkerPath
+from hrc_env.core.skeleton import JOINT
 from hrc_env.env import HRCEnv
 from hrc_env.geometry import chains
 from hrc_env.motion import generator
@@ -106,6 +107,35 @@ def test_a_vector_is_single_environments(shield):
         assert {"shield/change", "shield/slack", "shield/unknown"} <= said.keys()
 
 
+def test_a_vector_is_single_environments_where_somebody_takes_a_tool():
+    kwargs = {"perception": "keypoints", "shield": "qp"}
+    many = gymnasium.make_vec("HRCHandover-v0", 2, num_threads=1, **kwargs)
+    one = gymnasium.make("HRCHandover-v0", **kwargs)
+    (seen, _), (alone, _) = many.reset(seed=[2, 3]), one.reset(seed=3)
+    part, welcome = many.unwrapped.shards.first, 0
+    policy = make_agent("scripted", env_info(part))
+    over = False
+    while not over:
+        actions = policy.act(seen)
+        seen, *_ = many.step(actions)
+        alone, _, over, *_ = one.step(actions[1])
+        np.testing.assert_array_equal(seen[1], alone)
+        welcome += part.belief.welcome(part.belief)[1].any()
+    assert welcome > 20
+
+
+@pytest.mark.parametrize("task", ["HRCHandover-v0", "HRCDrywall-v0"])
+def test_people_take_part_in_what_a_robot_does_under_a_shield(task):
+    """Of four, whom it fled from before, or whose board it tore away."""
+    envs = gymnasium.make_vec(task, 4, perception="keypoints", shield="qp", num_threads=1)
+    policy, done = make_agent("scripted", env_info(envs.unwrapped.shards.first)), np.zeros(4, bool)
+    seen, _ = envs.reset(seed=40)
+    for _ in range(760):
+        seen, _, terminated, *_ = envs.step(policy.act(seen))
+        done |= terminated
+    assert done.sum() >= 3
+
+
 @pytest.mark.parametrize("control", ["joint", "tool", "twist"])
 def test_it_goes_on_from_a_state_and_through_pickle(control):
     config = {"observe_shield": True}
@@ -174,6 +204,44 @@ def test_what_is_carried_counts_as_robot():
     laden, said = guarded(free, wanted, 0.04, ShieldConfig())
     assert said["least_m"] < 0.0
     assert np.abs(alone - laden).max() > 1e-3
+
+
+HANDS = {"tool": (8, (1.0, 0.0, 0.0)), "forearm": (4, (0.0, -1.0, 0.0))}
+"""Beside a capsule of the last link, and of another one, and on which side of it."""
+
+
+def comes_m_s(beside, welcome, shield):
+    """How fast a capsule comes to a hand that is 4 cm from it, if it wants to come fast."""
+    part, now = believed(n_workers=2)
+    c, side = HANDS[beside]
+    middle, aside = now.robot.capsules_world[0, c].mean(0), np.array(side)
+    mean = np.broadcast_to(middle + 1.5 * aside, (1, 2, 15, 3)).copy()
+    mean[0, 1, :, 2] += 9.0
+    tip_m = now.robot.capsule_radius_m[c] + 0.05 + 0.04
+    mean[0, 0, JOINT["right_wrist"]] = middle + (tip_m + 0.18) * aside
+    mean[0, 0, JOINT["right_elbow"]] = middle + (tip_m + 0.5) * aside
+    still = {"mean_world": mean, "velocity_world": np.zeros_like(mean)}
+    now = replace(now, estimate=replace(now.estimate, **still), welcome=lambda now: welcome)
+    turns = part.physics.q + 1e-6 * np.eye(6)
+    moved = chains.capsules(part.chain, turns)[:, c].mean(1)
+    towards = (moved - chains.capsules(part.chain, part.physics.q)[0, c].mean(0)) @ aside / 1e-6
+    wanted = 0.6 * towards / (towards @ towards)
+    return guarded(now, wanted[None], 0.04, shield)[0][0] @ towards
+
+
+def arm_of(worker):
+    """(1, 2, 16) the right arm of a worker is welcome, of nobody else."""
+    welcome = np.zeros((1, 2, 16), bool)
+    welcome[0, worker, [7, 15]] = True
+    return welcome
+
+
+@pytest.mark.parametrize(("beside", "most_m_s"), [("tool", 0.1), ("forearm", 0.02)])
+def test_to_a_welcome_hand_the_last_link_may_come_and_others_stand_still(beside, most_m_s):
+    shield = ShieldConfig(welcome_m_s=0.1)
+    assert comes_m_s(beside, arm_of(0), shield) == pytest.approx(most_m_s, abs=5e-3)
+    assert comes_m_s(beside, arm_of(1), shield) < 1e-3
+    assert comes_m_s(beside, np.zeros((1, 2, 16), bool), shield) < 1e-3
 
 
 @pytest.mark.parametrize(
