@@ -111,11 +111,8 @@ def incident_info(happened: Records, watch: Watch, robot: RobotState) -> Info:
 
 def _begun(indices: Ints, names: tuple[str, ...]) -> NDArray[np.object_]:
     """(B,) tuples of the names of indices (B, W) that are not -1."""
-    said = np.empty(len(indices), object)
-    said[:] = [()] * len(indices)
-    for b, w in np.argwhere(indices >= 0).tolist():
-        said[b] += (names[indices[b, w]],)
-    return said
+    rows = (tuple(names[k] for k in row if k >= 0) for row in indices.tolist())
+    return np.fromiter(rows, object)
 
 
 def tracking_info(

@@ -15,7 +15,7 @@ from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records, Velocitie
 from hrc_env.geometry.rotations import matrix
 from hrc_env.motion import state as st
 from hrc_env.motion.activities.pieces import stage, stocked
-from hrc_env.motion.activities.strokes import screws
+from hrc_env.motion.activities.strokes import screws as driven
 from hrc_env.motion.anatomy import GRIP_M, HAND, LEFT, SIDE_STRIDE, anatomies
 from hrc_env.motion.behaviour import begin_episode, follow_up
 from hrc_env.motion.blending import RATE_H_S, evaluate
@@ -146,11 +146,9 @@ def deeds(state: MotionState, motion: WorkerMotion) -> Deeds:
     """What workers, whose bodies are in `motion`, have done in the activity that they are in."""
     workers = state.workers
     takes = (workers["activity"] == st.TAKE) & (workers["time_s"] > workers["out_at"])
-    found = Deeds(
-        workers["present"].copy(), *_no_deeds(workers.shape), takes, *_gripping(workers, motion)
-    )
-    _deeds(state.workers, found.screws, found.boring)
-    return found
+    screws, boring = np.zeros(workers.shape, np.int64), np.zeros(workers.shape, np.bool_)
+    _deeds(workers, screws, boring)
+    return Deeds(workers["present"].copy(), screws, boring, takes, *_gripping(workers, motion))
 
 
 def _gripping(workers: Workers, motion: WorkerMotion) -> tuple[Points3, Velocities3]:
@@ -166,15 +164,11 @@ def _gripping(workers: Workers, motion: WorkerMotion) -> tuple[Points3, Velociti
     return of_hand(motion.position_world) + arm, of_hand(motion.velocity_world) + turning
 
 
-def _no_deeds(shape: tuple[int, ...]) -> tuple[Ints, Bools]:
-    return np.zeros(shape, np.int64), np.zeros(shape, np.bool_)
-
-
 @kernel
 def _deeds(workers: Workers, n_screws: Ints, boring: Bools) -> None:
     for b, w in np.ndindex(workers.shape):
         if workers[b, w].activity == st.SCREW:
-            n_screws[b, w], boring[b, w] = screws(workers[b, w])
+            n_screws[b, w], boring[b, w] = driven(workers[b, w])
 
 
 def current(state: MotionState, ids: Ints | None = None) -> WorkerMotion:

@@ -16,7 +16,7 @@ import numpy as np
 from hrc_env.core.errors import ConfigError, check_fields
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Grounds, RobotState, World
-from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, Points3, Records
+from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, Records
 from hrc_env.geometry.ways import gaps_m, met, nearest_point, ranges_m, spread_out, value_at, ways_m
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm, check_kind, progress
@@ -36,6 +36,8 @@ START_M, RAYS, RANGE_M = 0.2, 24, 6.0
 ANGLES = 2 * np.pi * np.arange(RAYS) / RAYS
 AHEAD_M = 0.4
 """The direction of the way is that of its fall over so much to each side [m]."""
+MARKED_M = 0.05
+"""Pictures show the zone so high [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,11 +238,6 @@ def info(state: Records) -> dict[str, Floats]:
     }
 
 
-def _markers(view: DeliveryView) -> Points3:
-    """(B, 1, 3) the zone, on the ground."""
-    return np.concatenate([view.goal_world, np.full((len(view.way_m), 1), 0.05)], axis=1)[:, None]
-
-
 TASK = Task(
     id="HRCDelivery-v0",
     says="Bring material across a construction site, among the workers, and hit nothing.",
@@ -290,7 +287,7 @@ TASK = Task(
     info=info,
     achieved="task/delivered",
     failed="task/not_delivered",
-    markers=_markers,
+    markers=lambda view: np.insert(view.goal_world, 2, MARKED_M, axis=1)[:, None],
     max_episode_steps=LONGER["HRCDelivery-v0"],
     robot="mobile_base",
     drives=True,

@@ -205,11 +205,6 @@ def _fingers_away_m(tool_world: Points3, at: Points3) -> Floats:
     return np.linalg.norm(at + np.array([0.0, 0.0, GRIP_UP_M]) - tool_world, axis=-1)
 
 
-def effects(state: Records, config: HandoverConfig) -> Effects:
-    """The hand that has the tool carries it."""
-    return Effects({}, state["push"][:, None].copy())
-
-
 def cue(state: Records) -> Cue:
     """The worker comes when the tool is lifted, and goes on when it is theirs."""
     stage = np.where(state["taken"], 2, np.where(state["lifted"], 1, 0))
@@ -288,7 +283,7 @@ TASK = Task(
     things=things,
     spots=lambda config: [Spot("the place to meet", FOOT_WORLD + MEET_M)],
     poses=lambda state, ids, config: state["pose"][ids][:, None],
-    effects=effects,
+    effects=lambda state, config: Effects({}, state["push"][:, None].copy()),
     cue=cue,
     welcome=welcome,
     loads=lambda state: ~(state["offered"] | state["taken"])[:, None],

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from hrc_env.belief import Belief
 from hrc_env.core.errors import check_fields, needed
 from hrc_env.core.records import ObjectState, Workplace, World
 from hrc_env.core.things import FOOT_WORLD, Things
@@ -170,10 +169,6 @@ def info(state: Records) -> dict[str, Floats]:
     }
 
 
-def _objects_from_places(now: Belief) -> Points3:
-    return now.task.places_world - needed(now.objects, "A loose object").position_world
-
-
 TASK = Task(
     id="HRCPickPlace-v0",
     says="Take pieces of studs from a table and lay them into a rack, while a worker takes from "
@@ -187,7 +182,7 @@ TASK = Task(
         ObservationTerm(
             "place_from_object", lambda of: 3 * STUDS, "m", "world", 3.0, 0.5,
             "From each piece, as measured, to its place.",
-            _objects_from_places,
+            lambda now: now.task.places_world - needed(now.objects, "An object").position_world,
         ),
         ObservationTerm(
             "object_placed", lambda of: STUDS, "-", "-", 1.0, 1.0,

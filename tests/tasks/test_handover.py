@@ -75,11 +75,11 @@ def test_a_hand_closes_that_has_been_at_the_handle_calmly(now, closes):
 def test_the_hand_takes_the_weight_over_and_pulls_like_a_spring():
     state = begun()
     go_on(state, world(), 1.0)
-    push = handover.effects(state, HandoverConfig()).push_world[0, 0]
+    push = handover.TASK.effects(state, HandoverConfig()).push_world[0, 0]
     np.testing.assert_allclose(push[:3], [0.0, 0.0, BAR_KG * GRAVITY_M_S2], atol=1e-9)
     np.testing.assert_allclose(push[3:], 0.0, atol=1e-9)
     go_on(state, world(0.10), DT_S)
-    assert handover.effects(state, HandoverConfig()).push_world[0, 0, 1] == pytest.approx(10.0)
+    assert handover.TASK.effects(state, HandoverConfig()).push_world[0, 0, 1] == pytest.approx(10.0)
     assert state["largest_n"][0] == pytest.approx(np.hypot(10.0, BAR_KG * GRAVITY_M_S2))
 
 

@@ -5,7 +5,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from hrc_env.core.errors import check_names
-from hrc_env.experiments.impact.setups import PerceptionSetup
+from hrc_env.experiments.impact.setups import LATE_S, PerceptionSetup
 from hrc_env.experiments.study.rigs import Turn
 from hrc_env.perception.faults.fault import ALL, FOREVER_S, FaultConfig
 from hrc_env.scene.rigs import RIGS
@@ -46,8 +46,6 @@ GROUPS = {
     "covariance": "covariances that say too much or too little", "fault": "faults",
 }  # fmt: skip
 """By name, in words."""
-LATE_S = (0.12, 0.2)
-"""How late images are [s]: control steps are 40 ms apart, what is 100 ms late is used after 120."""
 
 
 def _every(
