@@ -1,6 +1,7 @@
 """The policies that are given other perception: two scripted ones, and PPO, which learns here."""
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -66,33 +67,36 @@ def trained(cache: PartCache, n_steps: int, path: Path, key: str, task: str = DE
 
 def _train(n_steps: int, path: Path, tick: PartProgress, task: str = DEFAULT) -> dict[str, Any]:
     """Learn on the camera emulator with the default estimator; write the checkpoint."""
-    ppo, callbacks = agents("ppo"), agents("callbacks")
-    checkpoints = agents("checkpoints")
-    import torch
-    from stable_baselines3.common.callbacks import ConvertCallback
-
     from hrc_env.sb3 import HRCVecEnv
 
-    def advance(*_: Any) -> bool:
-        tick(N_ENVS / n_steps)
-        return True
-
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)  # more are slower in networks as small as these
     env = HRCVecEnv(
         N_ENVS, task=task, stagger=True, seed=SEED, perception="keypoints", estimator="particle",
         people=PEOPLE, config={"reward": {"proximity": PROXIMITY}}, num_threads=n_cores(),
     )  # fmt: skip
+    learner = taught(env, n_steps, SEED, lambda learner: tick(N_ENVS / n_steps))
+    agents("checkpoints").save(learner, path, {"people": PEOPLE, "seed": SEED})
+    return {"sha256": _digest(path), "n_steps": learner.num_timesteps}
+
+
+def taught(env: Any, n_steps: int, seed: int, note: Callable[[Any], None]) -> Any:
+    """PPO that has learnt for so many steps on environments, which are closed then; it is noted at
+    first and after each of their steps."""
+    ppo, callbacks = agents("ppo"), agents("callbacks")
+    import torch
+    from stable_baselines3.common.callbacks import ConvertCallback
+
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)  # more are slower in networks as small as these
     try:
-        learner = ppo.make_learner(env, ppo.PPOSettings(), SEED)
-        ramp = callbacks.Ramp(round(RAMP_SHARE * n_steps))
-        care = callbacks.Curriculum(ramp, env)
-        learner.learn(n_steps, callback=[care, ConvertCallback(advance)])
-        checkpoints.save(learner, path, {"people": PEOPLE, "seed": SEED})
+        learner = ppo.make_learner(env, ppo.PPOSettings(), seed)
+        care = callbacks.Curriculum(callbacks.Ramp(round(RAMP_SHARE * n_steps)), env)
+        note(learner)
+        noted = ConvertCallback(lambda *_: note(learner) is None)
+        learner.learn(n_steps, callback=[care, noted])
     finally:
         env.close()
         torch.set_num_threads(threads)
-    return {"sha256": _digest(path), "n_steps": learner.num_timesteps}
+    return learner
 
 
 def _digest(path: Path) -> str:

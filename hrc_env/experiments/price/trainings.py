@@ -13,11 +13,10 @@ from gymnasium.utils import seeding
 
 from hrc_env.config import settle
 from hrc_env.control import checked_action
-from hrc_env.core.checkout import agents
 from hrc_env.core.machine import n_cores
 from hrc_env.core.typing import Floats
 from hrc_env.experiments.impact.episodes import PEOPLE, SLOW_M
-from hrc_env.experiments.impact.policies import N_ENVS, PROXIMITY, RAMP_SHARE
+from hrc_env.experiments.impact.policies import N_ENVS, PROXIMITY, taught
 from hrc_env.experiments.impact.setups import PerceptionSetup
 from hrc_env.experiments.study.cache import PartProgress
 from hrc_env.motion import generator
@@ -97,14 +96,8 @@ class TrueProximity:
 
 def learn(training: Training, tick: PartProgress) -> dict[str, list[float]]:
     """What was measured before, while and after it learnt: a list over the points in time."""
-    ppo, callbacks = agents("ppo"), agents("callbacks")
-    import torch
-    from stable_baselines3.common.callbacks import ConvertCallback
-
     from hrc_env.sb3 import HRCVecEnv
 
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)  # more are slower in networks as small as these
     arguments, found = training.arguments(), dict[str, list[float]]()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # that one camera is a poor rig is what we ask about
@@ -113,23 +106,16 @@ def learn(training: Training, tick: PartProgress) -> dict[str, list[float]]:
         )
     if training.reward == TRUE:
         env.env = TrueProximity(env.env)  # type: ignore[assignment]
+    every = training.n_steps / training.n_points
 
-    def note(*_: Any) -> bool:
+    def note(learner: Any) -> None:
         tick(N_ENVS / training.n_steps)
         if learner.num_timesteps >= len(found.get("steps", ())) * every:
             watched = watch(partial(learner.predict, deterministic=True), training)
             for name, value in ({"steps": learner.num_timesteps} | watched).items():
                 found.setdefault(name, []).append(float(value))
-        return True
 
-    every = training.n_steps / training.n_points
-    with closing(env):
-        learner = ppo.make_learner(env, ppo.PPOSettings(), training.seed)
-        ramp = callbacks.Ramp(round(RAMP_SHARE * training.n_steps))
-        note()
-        care = callbacks.Curriculum(ramp, env)
-        learner.learn(training.n_steps, callback=[care, ConvertCallback(note)])
-        torch.set_num_threads(threads)
+    taught(env, training.n_steps, training.seed, note)
     return found
 
 
