@@ -12,6 +12,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from hrc_env.core.typing import (
     Bools,
     Capsules,
@@ -76,12 +78,18 @@ class PoseEstimate:
     blind_s: Floats = None  # type: ignore[assignment]
     """(B, W) seconds since cameras last said something: saw the worker, or that nobody is there;
     of who was never seen or looked for, since the reset. Not given: the youngest joint's age."""
+    seen_world: Points3 = None  # type: ignore[assignment]
+    """(B, W, J, 3) where the worker was believed to be when a camera showed them last [m]; NaN of
+    whom none has, or where it is known since that nobody is. Not given: the mean of a track."""
 
     def __post_init__(self) -> None:
         if self.unknown is None:
             object.__setattr__(self, "unknown", ~self.tracked)
         if self.blind_s is None:
             object.__setattr__(self, "blind_s", self.age_s.min(-1))
+        if self.seen_world is None:
+            seen = np.where(self.tracked[..., None, None], self.mean_world, np.nan)
+            object.__setattr__(self, "seen_world", seen)
 
 
 @dataclass(frozen=True, slots=True)

@@ -135,7 +135,8 @@ class PoseTracking(PerceptionPipeline):
         whole = len(ids) == len(self.keypoints.px)
         state = self.state if whole else rows(self.state, ids)
         later = our_joints(self.tracker.forecast(state, horizon_s), self.calibration)
-        return replace(later, unknown=now.unknown, blind_s=now.blind_s)
+        kept = {name: getattr(now, name) for name in ("unknown", "blind_s", "seen_world")}
+        return replace(later, **kept)
 
     def detect(self, ids: Ints, expected: PoseEstimate, sensor_rngs: Generators) -> Keypoints:
         """Keypoints of environments `ids` in pixels of the images, by the level's detector; whose

@@ -12,7 +12,8 @@ KINDS = ("qp", "ssm", "pfl")
 NUMBERS = (
     "margin_m", "hand_margin_m", "sigmas", "least_sigmas_m", "predicted_m_s", "doubtful_m",
     "doubtful_sigmas", "human_m_s", "human_margin_m_s", "human_s", "latency_s", "reaction_s",
-    "deceleration_m_s2", "gain_hz", "retreat_m_s", "unknown_m_s", "welcome_m_s", "still_m_s",
+    "deceleration_m_s2", "gain_hz", "retreat_m_s", "unseen_s", "unknown_m_s", "welcome_m_s",
+    "still_m_s",
 )  # fmt: skip
 SETTINGS = np.dtype([(name, "f8") for name in NUMBERS], align=True)
 """The same as kernels read them."""
@@ -62,8 +63,14 @@ class ShieldConfig:
     """How fast a robot that is too near gets away: D times this [1/s],"""
     retreat_m_s: float = 1.0
     """at most so fast; 0: it only comes no nearer ("ssm" never does more) [m/s]."""
+    unseen_s: float = 0.25
+    """Who was seen longer ago than this [s] may be as far from there as somebody walks since at
+    `human_m_s` (None: 1.6); within that the robot comes no nearer to where they were. They are
+    unknown, as who has no track: images that are later than this make robots slow."""
     unknown_m_s: float = 0.25
-    """While it is unknown where a worker is, no point of the robot moves faster [m/s]; 0: stop."""
+    """While it is unknown where a worker is, no point of the robot moves faster [m/s], within 1 m
+    of where they were seen less, within 0.25 m not at all; nor for 0.5 s while nobody has looked.
+    0: stop."""
     welcome_m_s: float = 0.25
     """To parts of people that a task lets come to the robot's hand, as to take what it brings
     (`Task.welcome`), the hand and what it carries may come so fast, and no faster than the region

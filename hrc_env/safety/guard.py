@@ -16,11 +16,12 @@ other parts of theirs, nor how near other links come of themselves but for `stil
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from hrc_env.belief import Belief
+from hrc_env.belief import Belief, estimated_separation
 from hrc_env.core.errors import needed
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import PoseEstimate
@@ -32,10 +33,15 @@ from hrc_env.safety.config import ShieldConfig
 from hrc_env.safety.contact import SEGMENT_REGIONS, permitted_contact_speed
 from hrc_env.safety.robot import RobotModel
 from hrc_env.safety.rows import ABSENT_M, MOST_ROWS, tightest_rows
+from hrc_env.safety.separation import WALKING_M_S
 from hrc_env.safety.solver import exceeded, solve
 
 NO_NEARER, AWAY = 1e4, 30.0
 """Weights of a row's excess [m/s], against changes of joint velocities [rad/s]."""
+NEAR_M, FAR_M = 0.25, 1.0
+"""So near to where somebody was who is unseen a robot stands; so near it is slower [m]."""
+FIRST_LOOK_S = 0.5
+"""So long a robot stands at first, unless somebody is seen or nobody is found before [s]."""
 HOLDS_M_S = 1e-6
 """A row that is exceeded by less holds."""
 
@@ -64,7 +70,7 @@ def guarded(
 
     - "least_m" (B,): the least D of pairs that matter [m], NaN where there is none;
     - "slack" (B,): by how much the worst row is exceeded, retreats included [m/s];
-    - "unknown" (B,): 1 while a worker may be anywhere, so that the speed is capped.
+    - "unknown" (B,): 1 while it is not known where a worker is, so that the speed is capped.
 
     Raises:
         ConfigError: the belief has no `RobotModel` or no command in force.
@@ -72,15 +78,15 @@ def guarded(
     model = _model(now)
     robot = chains.forward(model.chain, now.robot.q), model.chain.slides, _links(model, now)
     found = constraints(now, wanted, dt_s, config)
-    unknown = somebody_unknown(now.estimate)
     allowed, slack = np.empty_like(wanted), np.empty(len(wanted))
     choose = _scaled if config.kind == "ssm" else _nearest
     choose(tuple(found), wanted, allowed)
-    limit_m_s = np.where(unknown, config.unknown_m_s, np.inf)
+    limit_m_s = _limit_m_s(now, config)
     _capped((*robot, now.robot.capsules_world), limit_m_s, allowed)
     _slack(found.J, found.b, found.n_rows, allowed, slack)
     least_m = np.where(np.isinf(found.least_m), np.nan, found.least_m)
-    return allowed, {"least_m": least_m, "slack": slack, "unknown": unknown.astype(float)}
+    unknown = np.isfinite(limit_m_s).astype(float)
+    return allowed, {"least_m": least_m, "slack": slack, "unknown": unknown}
 
 
 def constraints(
@@ -108,9 +114,23 @@ def _model(now: Belief) -> RobotModel:
     return needed(now.model, "A robot's model (RobotModel), which a built-in shield needs,")
 
 
-def somebody_unknown(estimate: PoseEstimate) -> Bools:
-    """(B,) whether a worker may be there whom no track follows."""
-    return np.any(estimate.unknown, axis=1)
+def _limit_m_s(now: Belief, config: ShieldConfig) -> Floats:
+    """(B,) how fast any point of a robot may be [m/s]; infinite where everybody is known."""
+    estimate, unseen = now.estimate, _unseen(now.estimate, config.unseen_s)
+    limit_m_s = np.where(np.any(estimate.unknown | unseen, axis=1), config.unknown_m_s, np.inf)
+    not_yet = estimate.unknown & ~unseen & (estimate.blind_s < FIRST_LOOK_S)
+    limit_m_s[np.any(not_yet, axis=1)] = 0.0
+    if unseen.any():
+        there = replace(estimate, mean_world=estimate.seen_world, tracked=unseen)
+        near_m = estimated_separation(now.robot, there).distance_m.min(1)
+        limit_m_s *= np.clip((near_m - NEAR_M) / (FAR_M - NEAR_M), 0.0, 1.0)
+    return limit_m_s
+
+
+def _unseen(estimate: PoseEstimate, unseen_s: float) -> Bools:
+    """(B, W) whom cameras showed once, but not lately."""
+    lately = estimate.tracked & (estimate.blind_s <= unseen_s)
+    return ~lately & np.isfinite(estimate.seen_world[..., 0, 0])
 
 
 def _within_reach(
@@ -131,10 +151,18 @@ def _links(model: RobotModel, now: Belief) -> Ints:
 
 def _bodies(now: Belief, model: RobotModel, config: ShieldConfig) -> tuple[Any, ...]:
     """What `rows` wants to know of the workers."""
-    estimate = now.estimate
+    estimate, unseen = now.estimate, _unseen(now.estimate, config.unseen_s)
+    mean, velocity, cov = estimate.mean_world, estimate.velocity_world, estimate.cov_world
+    touch_m_s, most_m_s = _touches(now, model, config)
+    if unseen.any():
+        gone = unseen[..., None, None]
+        mean, velocity = np.where(gone, estimate.seen_world, mean), np.where(gone, 0.0, velocity)
+        cov, touch_m_s = np.where(gone[..., None], 0.0, cov), np.where(gone[..., 0], 0.0, touch_m_s)
+    walking_m_s = WALKING_M_S if config.human_m_s is None else config.human_m_s
+    gone_m = np.where(unseen, walking_m_s * estimate.blind_s, 0.0)
     return (
-        segments(estimate.mean_world), estimate.mean_world, estimate.velocity_world,
-        estimate.cov_world, estimate.age_s, estimate.tracked, *_touches(now, model, config),
+        segments(mean), mean, velocity, cov, estimate.age_s, estimate.tracked | unseen, gone_m,
+        touch_m_s, most_m_s,
     )  # fmt: skip
 
 

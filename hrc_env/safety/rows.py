@@ -14,6 +14,9 @@ away. A row that no command within reach exceeds is left out.
 From a segment that may be touched nothing has to get away while it comes no faster than its region
 bears in a touch: capsules that may touch it brake within gap - margin - Z_d to a speed that both
 together keep below that; of others a point may come at `still_m_s`, where D allows less.
+
+Who has not been seen for a while may be anywhere within a walk of where they were: that is taken
+off D, too, and who may be within D the robot comes no nearer to, nor flees from.
 """
 
 import math
@@ -30,6 +33,9 @@ MOST_ROWS = 32
 """Of one robot; the tightest are kept."""
 ABSENT_M = 1e3
 """A capsule that is farther away than this is of a load that is not carried [m]."""
+RANKING_HZ = 1e-4
+"""So fast a robot gets away from where somebody may have gone, D times this: hardly at all, but the
+nearest pairs are the tightest rows [1/s]."""
 SHORTEST_M = 0.1
 """A forearm that is estimated as shorter turns its hand no faster than if it were so long [m]."""
 _N_LIMBS = len(SEGMENT_ENDS)
@@ -51,15 +57,15 @@ def tightest_rows(robot, bodies, settings, rows):
             capsules (B, K, 2, 3) and radii (K,) [m], least and greatest command within reach
             (B, N) [rad/s], slew (N,) [rad/s^2].
         bodies: segments (B, W, S, 2, 3) [m], joints' means and velocities (B, W, J, 3), covariances
-            (B, W, J, 3, 3) and ages (B, W, J) [s], who is known (B, W), relative speeds of touches
-            that are allowed, 0 of none (B, W, S), and the robot's share at most of each capsule's
-            (K,) [m/s].
+            (B, W, J, 3, 3) and ages (B, W, J) [s], who is known (B, W), how far they may have gone
+            since (B, W) [m], relative speeds of touches that are allowed, 0 of none (B, W, S), and
+            the robot's share at most of each capsule's (K,) [m/s].
         settings: (1,) `config.SETTINGS`.
         rows: written: n.J (B, `MOST_ROWS`, N), b (B, `MOST_ROWS`) [m/s], how many (B,), and the
             least D of pairs that may matter (B,) [m]; infinite without.
     """
     frames, slides, link, capsules, radius, low, high, slew = robot
-    segments, mean, velocity, cov, age_s, known, touch_m_s, most_m_s = bodies
+    segments, mean, velocity, cov, age_s, known, gone_m, touch_m_s, most_m_s = bodies
     J, b, count, least_m = rows
     p, n_caps, n_segments = settings[0], capsules.shape[1], segments.shape[2]
     rods, limbs = np.empty((n_caps, 5)), np.empty((n_segments, 5))
@@ -76,19 +82,19 @@ def tightest_rows(robot, bodies, settings, rows):
             body = mean[e, w], velocity[e, w], cov[e, w]
             for s in range(n_segments):
                 _bound(segments[e, w, s], SEGMENT_RADIUS_M[s], limbs[s])
-                limbs[s, 4] = _most_taken_m(body, s, p)
+                limbs[s, 4] = _most_taken_m(body, s, p) + gone_m[e, w]
             for c, s in np.ndindex(n_caps, n_segments):
                 if _sphere_gap(rods[c], limbs[s]) > rods[c, 4] + limbs[s, 4]:
                     continue
                 distance, t = _nearest(capsules[e, c], segments[e, w, s], point, normal)
                 speed, sigma = _towards(body, s, t, normal)
-                z_d = _z_d(sigma, _unseen_s(age_s[e, w], s), p)
+                z_d = _z_d(sigma, _unseen_s(age_s[e, w], s), p) + gone_m[e, w]
                 near = distance - radius[c] - SEGMENT_RADIUS_M[s] - _margin(s, p) - z_d
                 clear = near - _travel(speed, p)
                 least_m[e] = min(least_m[e], clear)
                 fastest, slowing = _closing(arm, link[c], point, normal, row)
                 slowing = min(slowing, p.deceleration_m_s2)
-                bound = _allowed(clear, slowing, p)
+                bound = _allowed(clear, slowing, gone_m[e, w] > 0.0, p)
                 left_m_s = touch_m_s[e, w, s] - max(speed, 0.0)
                 if left_m_s > 0.0:
                     bound = max(bound, _touching(near, min(left_m_s, most_m_s[c]), slowing, p))
@@ -244,10 +250,10 @@ def _closing(arm, link, point, normal, row):
 
 
 @kernel
-def _allowed(clear, slowing, p):
+def _allowed(clear, slowing, is_gone, p):
     """How fast a point may come nearer [m/s]; below 0: how fast it has to get away."""
     if clear < 0.0:
-        return max(-p.retreat_m_s, p.gain_hz * clear)
+        return RANKING_HZ * clear if is_gone else max(-p.retreat_m_s, p.gain_hz * clear)
     return slowing * (math.sqrt(p.reaction_s**2 + 2.0 * clear / max(slowing, 1e-9)) - p.reaction_s)
 
 

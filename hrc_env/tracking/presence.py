@@ -18,6 +18,7 @@ import numpy as np
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Keypoints, PoseEstimate
+from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.tracking.config import TrackerConfig
 
@@ -32,6 +33,8 @@ SLOT = np.dtype(
         # whether it is known that nobody is there; whether a track was lost; time since cameras
         # last said something about it [s]
         ("absent", "?"), ("lost", "?"), ("blind_s", "f8"),
+        # where the worker was believed to be when a camera showed them last [m]
+        ("seen_world", "f8", (N_JOINTS, 3)),
     ],
     align=True,
 )  # fmt: skip
@@ -51,7 +54,7 @@ def make_presence(batch: int, n_workers: int, n_cameras: int) -> tuple[Any, Any]
 def forget_presence(known: tuple[Any, Any], ids: Ints) -> None:
     """Begin environments `ids` anew."""
     slots, looks = known
-    slots[ids], looks[ids] = (False, False, 0.0), (0, np.inf)
+    slots[ids], looks[ids] = (False, False, 0.0, np.nan), (0, np.inf)
 
 
 def with_presence(
@@ -63,7 +66,8 @@ def with_presence(
     dt_s: float,
     config: TrackerConfig,
 ) -> PoseEstimate:
-    """The estimate of environments `ids` with who is unknown, and for how long nobody was seen.
+    """The estimate of environments `ids` with who is unknown, for how long nobody was seen, and
+    where they were then.
 
     Args:
         known: of the whole batch, goes on by a step in place.
@@ -72,23 +76,26 @@ def with_presence(
             looks say that nobody is there.
     """
     unknown, blind_s = np.empty(estimate.tracked.shape, bool), np.empty(estimate.tracked.shape)
+    seen_world = np.empty_like(estimate.mean_world)
     seen = tuple(each.confidence for each in views)
-    belief = estimate.tracked, estimate.age_s.min(-1)
+    belief = estimate.tracked, estimate.age_s.min(-1), estimate.mean_world
     times = dt_s, config.lost_after_s - 1e-9, FORGOTTEN * config.forget_s
-    _note(known, ids, belief, seen, looked, times, (unknown, blind_s))
-    return replace(estimate, unknown=unknown, blind_s=blind_s)
+    _note(known, ids, belief, seen, looked, times, (unknown, blind_s, seen_world))
+    return replace(estimate, unknown=unknown, blind_s=blind_s, seen_world=seen_world)
 
 
 @kernel
 def _note(known, ids, belief, seen, looked, times, out):
-    (slots, looks), (tracked, age_s), (found, own) = known, belief, seen
-    unknown, blind = out
+    (slots, looks), (tracked, age_s, mean), (found, own) = known, belief, seen
+    unknown, blind, seen_world = out
     for row in range(len(ids)):
         for w in range(tracked.shape[1]):
             slot, look = slots[ids[row], w], looks[ids[row], w]
             people = tracked[row].sum()
             shown = _look(look, row, w, people, (found, own), looked, times)
             if tracked[row, w]:
+                if not slot.lost or age_s[row, w] < slot.blind_s + 0.5 * times[0]:
+                    _copy(mean[row, w], slot.seen_world)
                 slot.lost, slot.absent, slot.blind_s = True, False, age_s[row, w]
             else:
                 _search(slot, look, shown, looked[2], times)
@@ -97,6 +104,14 @@ def _note(known, ids, belief, seen, looked, times, out):
                     look[c].empty = 0
             unknown[row, w] = not (tracked[row, w] or slot.absent)
             blind[row, w] = slot.blind_s
+            _copy(slot.seen_world, seen_world[row, w])
+
+
+@kernel
+def _copy(points, to):
+    for j in range(N_JOINTS):
+        for i in range(3):
+            to[j, i] = points[j, i]
 
 
 @kernel
@@ -134,6 +149,9 @@ def _search(slot, look, shown, enough, times):
     )
     if slot.absent:
         slot.lost, slot.blind_s = False, second
+        for j in range(N_JOINTS):
+            for i in range(3):
+                slot.seen_world[j, i] = np.nan
 
 
 @kernel

@@ -10,7 +10,7 @@ from hrc_env.core.skeleton import HAND_SEGMENTS, SEGMENT_ENDS, SEGMENT_RADIUS_M
 from hrc_env.geometry import chains
 from hrc_env.geometry.distances import closest_parameters, segments
 from hrc_env.safety.config import ShieldConfig
-from hrc_env.safety.rows import MOST_ROWS, tightest_rows
+from hrc_env.safety.rows import MOST_ROWS, RANKING_HZ, tightest_rows
 from hrc_env.scene.build import build
 from hrc_env.scene.limits import slew_rad_s2
 
@@ -38,7 +38,7 @@ def before(scene, away_m):
     return chains.tool(scene.chain, scene.home_q)[:2, 3] + np.array([away_m, 0.0])
 
 
-def rows_of(chain, q, estimate, low, high, slew, config=CONFIG, touches=(0.0, 0.0)):
+def rows_of(chain, q, estimate, low, high, slew, config=CONFIG, touches=(0.0, 0.0), gone_m=0.0):
     q = q[None]
     touch_m_s, most_m_s = touches
     found = np.empty((1, MOST_ROWS, chain.n_joints)), np.empty((1, MOST_ROWS))
@@ -47,7 +47,7 @@ def rows_of(chain, q, estimate, low, high, slew, config=CONFIG, touches=(0.0, 0.
         (chains.forward(chain, q), chain.slides, chain.capsule_link, chains.capsules(chain, q),
          chain.capsule_radius_m, low[None], high[None], slew),
         (segments(estimate.mean_world), estimate.mean_world, estimate.velocity_world,
-         estimate.cov_world, estimate.age_s, estimate.tracked,
+         estimate.cov_world, estimate.age_s, estimate.tracked, np.full((1, 1), gone_m),
          touch_m_s + np.zeros((1, 1, 16)), most_m_s + np.zeros(len(chain.capsule_link))),
         config.record(), (*found, count, least_m),
     )  # fmt: skip
@@ -150,6 +150,19 @@ def test_who_is_not_tracked_has_no_rows():
     assert len(rows_of(scene.chain, scene.home_q, estimate, *box)[1])
     estimate.tracked[:] = False
     assert len(rows_of(scene.chain, scene.home_q, estimate, *box)[1]) == 0
+
+
+def test_who_may_have_gone_anywhere_is_come_no_nearer_to_and_the_nearest_pairs_are_kept():
+    scene = build()
+    estimate = somebody(before(scene, 0.6), speed_m_s=0.0)
+    box = -np.ones(6), np.ones(6), slew_rad_s2(scene)
+    _, seen, least_m = rows_of(scene.chain, scene.home_q, estimate, *box)
+    _, b, gone_least_m = rows_of(scene.chain, scene.home_q, estimate, *box, gone_m=3.0)
+    assert gone_least_m == pytest.approx(least_m - 3.0)
+    assert len(b) == MOST_ROWS > len(seen)
+    assert (b < 0.0).all()
+    assert b.min() > -1e-3
+    assert b.min() == pytest.approx(RANKING_HZ * gone_least_m)
 
 
 def test_touches_are_allowed_as_fast_as_the_region_bears_less_the_workers_speed():

@@ -11,6 +11,7 @@ import hrc_env
 from agents.env_info import env_info
 from agents.registry import make_agent
 from hrc_env import simulation
+from hrc_env.belief import estimated_separation
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import WorkerPath
 from hrc_env.core.skeleton import JOINT
@@ -181,12 +182,58 @@ def fastest_m_s(part, command):
 def test_while_a_worker_is_unknown_no_point_is_faster(task, limit_m_s):
     part, now = believed(task)
     somewhere = np.ones_like(now.estimate.tracked)
-    now = replace(now, estimate=replace(now.estimate, tracked=~somewhere, unknown=somewhere))
+    never = np.full_like(now.estimate.mean_world, np.nan)
+    never_seen = {"tracked": ~somewhere, "unknown": somewhere, "seen_world": never}
+    now = replace(now, estimate=replace(now.estimate, **never_seen))
     wanted = part.model.fastest_rad_s[None]
+    waiting, _ = guarded(now, wanted, 0.04, ShieldConfig())
+    np.testing.assert_array_equal(waiting, 0.0)
+    now.estimate.blind_s[:] = 0.5
     allowed, said = guarded(now, wanted, 0.04, ShieldConfig(unknown_m_s=limit_m_s))
     assert said["unknown"] == 1.0
     assert fastest_m_s(part, allowed) == pytest.approx(limit_m_s, abs=1e-4)
     np.testing.assert_allclose(np.cross(allowed[0, :3], wanted[0, :3]), 0.0, atol=1e-12)
+
+
+def unseen(now, away_m, blind_s=0.5, **known):
+    """A belief in which the worker was seen last so far beside the tool, and not since."""
+    place, _ = np.broadcast_arrays(now.robot.tool_world[:, None, None], now.estimate.mean_world)
+    seen = place + np.array([away_m, 0.0, 0.0]) + np.linspace(0, 0.1, 15)[:, None]
+    blind = np.full_like(now.estimate.blind_s, blind_s)
+    return replace(now, estimate=replace(now.estimate, seen_world=seen, blind_s=blind, **known))
+
+
+@pytest.mark.parametrize("is_tracked", [True, False])
+def test_towards_where_somebody_unseen_may_be_it_comes_no_nearer_and_elsewhere_it_is_slow(
+    is_tracked,
+):
+    part, now = believed()
+    known = {"tracked": np.array([[is_tracked]]), "unknown": np.array([[not is_tracked]])}
+    blind = unseen(now, 0.9, **known)
+    moves = np.random.default_rng(0).uniform(-1, 1, (30, 6)) * part.model.fastest_rad_s
+    closing, speeds = [], []
+    for wanted in moves:
+        allowed, said = guarded(blind, wanted[None], 0.04, ShieldConfig())
+        moved = chains.capsules(part.chain, now.robot.q + 1e-6 * allowed)
+        robot = replace(now.robot, capsules_world=moved)
+        there = replace(now.estimate, mean_world=blind.estimate.seen_world)
+        before, after = (estimated_separation(r, there).distance_m for r in (now.robot, robot))
+        closing.append((before - after)[0, 0] / 1e-6)
+        speeds.append(fastest_m_s(part, allowed))
+        assert said["unknown"] == 1.0
+    assert max(closing) < 2e-3
+    assert 0.05 < max(speeds) < 0.25 + 1e-4
+
+
+def test_it_stands_near_where_somebody_was_and_one_seen_just_now_changes_nothing():
+    part, now = believed()
+    wanted = part.model.fastest_rad_s[None]
+    near, _ = guarded(unseen(now, 0.3), wanted, 0.04, ShieldConfig())
+    np.testing.assert_array_equal(near, 0.0)
+    lately, _ = guarded(unseen(now, 0.3, blind_s=0.2), wanted, 0.04, ShieldConfig())
+    seen, said = guarded(now, wanted, 0.04, ShieldConfig())
+    np.testing.assert_array_equal(lately, seen)
+    assert said["unknown"] == 0.0
 
 
 def test_what_is_carried_counts_as_robot():

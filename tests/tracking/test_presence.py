@@ -73,6 +73,22 @@ def test_who_is_tracked_is_known_and_who_was_lost_may_hide_until_that_is_forgott
     assert watch.look((True,))[0] == [False]
 
 
+def test_where_somebody_was_seen_last_is_kept_until_it_is_known_that_nobody_is_there():
+    known, nobody = make_presence(1, 1, 4), shown(np.zeros((4, 1), bool).tolist())
+    ages_s, seen = [None, 0.0, 0.0, DT, 2 * DT, 1.0, *[None] * round(6.0 / DT)], []
+    for k, age_s in enumerate(ages_s):
+        now = belief(age_s is not None, age_s=age_s or 0.0)
+        now.mean_world[:] = k
+        looks = np.full((1, 4), k > 0), np.zeros((1, 4)), IMAGES
+        said = with_presence(known, np.arange(1), now, (nobody, nobody), looks, DT, CONFIG)
+        seen.append(said.seen_world[0, 0, 0, 0])
+    gone = np.flatnonzero(np.isnan(seen))
+    assert gone[0] == 0
+    assert seen[1 : gone[1]] == [1.0] + [2.0] * (gone[1] - 2)
+    assert gone[1:].tolist() == list(range(gone[1], len(ages_s)))
+    assert not said.unknown.any()
+
+
 def test_a_lost_worker_whom_one_camera_still_shows_stays_unknown():
     watch, seen = Watch(), [[True], [False], [False], [False]]
     watch.look((True,))
