@@ -21,6 +21,7 @@ from hrc_env.motion import generator
 from hrc_env.render.overlay import SHIELD
 from hrc_env.safety.config import PRESETS, ShieldConfig
 from hrc_env.safety.guard import guarded
+from hrc_env.safety.incidents import MOVING_M_S
 
 VELOCITIES = ("velocity_world", "angular_velocity_world")
 NO_DOUBT = {"sigmas": 0.0, "least_sigmas_m": 0.0, "human_m_s": 0.0}
@@ -223,6 +224,22 @@ def test_towards_where_somebody_unseen_may_be_it_comes_no_nearer_and_elsewhere_i
         assert said["unknown"] == 1.0
     assert max(closing) < 2e-3
     assert 0.05 < max(speeds) < 0.25 + 1e-4
+
+
+def test_robots_whose_cameras_all_fail_come_no_nearer_to_where_people_were():
+    lost = [{"kind": "lost", "cameras": ["all"], "from_s": 1.0}]
+    gaps_m, blind_s = [], []
+    for _, now in steps(vector(24, "qp", perception="keypoints", faults=lost), 75):
+        there = replace(now.estimate, mean_world=now.estimate.seen_world)
+        there.tracked[:] = True
+        gaps_m.append(estimated_separation(now.robot, there).distance_m[:, 0])
+        blind_s.append(now.estimate.blind_s[:, 0])
+    gaps, blind = np.array(gaps_m)[:-1], np.array(blind_s)[:-1]
+    narrowed = -np.diff(gaps_m, axis=0)
+    near = (blind > 0.6) & (gaps < 0.5)
+    assert near.any(0).sum() > 5
+    assert narrowed[near].max() < 0.04 * MOVING_M_S
+    assert narrowed[(blind == 0.0) & (gaps < 0.5)].max() > 5e-3
 
 
 def test_it_stands_near_where_somebody_was_and_one_seen_just_now_changes_nothing():
