@@ -16,10 +16,11 @@ from .scripted import Yielding, fastest_m_s, speed_m_s
 Array = NDArray[np.float64]
 HALF_THICK_M, CUPS_M = 0.00625, (-0.12, -0.15)
 """From the board's middle: its face, and where cups sit across and along it [m]."""
-ABOVE_M, CLEAR_M = 0.12, 0.07
-"""How high above the board the cups travel; above this they may move sideways."""
-OVER_M, OVER_RAD, SUCK_M = 0.006, 0.05, 0.03
-"""So near above it they go down; so near they suck."""
+ABOVE_M, SUCK_M = 0.12, 0.03
+"""How high above the board the cups travel; so near they suck."""
+OVER_M, OVER_RAD, FUNNEL_M, FUNNEL_RAD = 0.006, 0.05, 0.03, 0.2
+"""So near above it they go down onto it, and the lower the less they are beyond that: a funnel,
+which leaves who imitates no height at which to hesitate."""
 PRESS_M = 0.003
 """How far below the board's surface the cups aim."""
 FLAT_Z_M, UPRIGHT_Z_M = -0.12, 0.34
@@ -93,15 +94,12 @@ class BoardHolder:
         aside_m = np.linalg.norm(way[:, :2], axis=1)
         askew = np.linalg.norm(np.cross(terms["tool_axes"][:, 3:], -normal), axis=1)
         askew += np.linalg.norm(np.cross(terms["tool_axes"][:, :3], along), axis=1)
-        down = (aside_m < OVER_M) & (askew < OVER_RAD) | (aside_m < 2 * OVER_M) & (
-            way[:, 2] > 0.01 - ABOVE_M
-        )
-        low = (-way[:, 2] < CLEAR_M) & ~down
-        target = way + np.where(down[:, None], 0.0, [0.0, 0.0, ABOVE_M])
-        target[low] = [0.0, 0.0, ABOVE_M]
+        off = np.maximum((aside_m - OVER_M) / FUNNEL_M, (askew - OVER_RAD) / FUNNEL_RAD)
+        target = way.copy()
+        target[:, 2] += ABOVE_M * np.clip(off, 0.0, 1.0)
         error = round_the_foot(terms["tool_position"], target, self._foot[:2], 0.6)
         length = np.linalg.norm(error, axis=1, keepdims=True)
-        most = np.where(down[:, None] & (way[:, 2:] > -0.03), PRESS_M_S, 0.5)
+        most = np.where(way[:, 2:] > -0.03, PRESS_M_S, 0.5)
         velocity = error / np.maximum(length, 1e-9) * np.minimum(speed_m_s(length, 0.5), most)
         return velocity, (along, -normal), np.linalg.norm(way, axis=1) < SUCK_M
 

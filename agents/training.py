@@ -68,11 +68,11 @@ def run(arguments: Train) -> int:
         arguments = as_before(arguments, folder)
     mine = filled(arguments)
     compile_kernels(console, mine.perception)
-    curve, seconds = train(mine, folder, console)
-    if seconds is None:
+    curve, took = train(mine, folder, console)
+    if took is None:
         return STOPPED
     score = judge(mine, folder, console)
-    _write(folder / "score.json", {**asdict(score), "training_s": seconds})
+    _write(folder / "score.json", {**asdict(score), **took})
     config = settle(task=mine.task, config=mine.keywords()["config"]).config
     title = f"{mine.algorithm.upper()}, {mine.perception}"
     title += f", proximity weight {config.reward.proximity:g}"
@@ -144,8 +144,9 @@ def asked_of(folder: Path) -> Train:
     return Train(**{name: restored(hints[name], said[name], name) for name in names})
 
 
-def train(arguments: Run, folder: Path, console: Console) -> tuple[Curve, float | None]:
-    """Learn; returns the curve and the seconds it took, None if it was stopped before the end.
+def train(arguments: Run, folder: Path, console: Console) -> tuple[Curve, dict[str, float] | None]:
+    """Learn; returns the curve and what it took: "training_s" by the clock and "processor_s" of
+    all threads; None if it was stopped before the end.
 
     Progress survives a kill.
     """
@@ -156,7 +157,7 @@ def train(arguments: Run, folder: Path, console: Console) -> tuple[Curve, float 
         config = asdict(env.env.config)
         record = {"arguments": asdict(arguments), "config": config, **provenance()}
         _write(folder / "run.json", record)
-        started_s = time.monotonic()
+        started_s, busy_s = time.monotonic(), time.process_time()
         learner, curve = _learner(arguments, folder, env, settings)
         if arguments.resume is None and arguments.demonstrations:
             _clone(learner, arguments, env, console)
@@ -171,7 +172,8 @@ def train(arguments: Run, folder: Path, console: Console) -> tuple[Curve, float 
                 tb_log_name=arguments.algorithm,
             )
     if not interrupt.asked:
-        return curve, time.monotonic() - started_s
+        passed_s, worked_s = time.monotonic() - started_s, time.process_time() - busy_s
+        return curve, {"training_s": passed_s, "processor_s": worked_s}
     words = ["python", "-m", "hrc_env", "train", "--resume", str(folder)]
     words += ["--timesteps", str(total)]
     said = f"Stopped at {learner.num_timesteps:,} steps, which are saved. Go on with: "

@@ -43,7 +43,7 @@ COLUMNS = (
     Column("{}.scripted.cost", "of `scripted`", 1),
     Column("{}.learnt.contacts", "its contacts", 2),
     Column("{}.scripted.contacts", "of `scripted`", 2),
-    Column("{}.minutes", "minutes of learning", 0),
+    Column("{}.minutes", "core minutes of learning", 0),
 )
 ABOUT = """\
 Success is the share of what was to be achieved in an episode: goals, studs, screws, deliveries.
@@ -124,7 +124,7 @@ def worth(parts: PartCache, arguments: Arguments, task: str, runs: list[Path]) -
     scores = [score(played(str(p), f"policy.{m}")) for p, m in zip(policies, marks, strict=True)]
     for key in scores[0]:
         metrics[f"{task}.learnt.{key}"] = over([each[key].value for each in scores], "1")
-    told = [json.loads((folder / "score.json").read_text())["training_s"] for folder in runs]
+    told = [json.loads((folder / "score.json").read_text())["processor_s"] for folder in runs]
     metrics[f"{task}.minutes"] = over([seconds / 60 for seconds in told], "min")
     share = metrics[f"{task}.learnt.success"].value / expert["success"].value
     return {**metrics, f"{task}.share_of_expert": exactly(share, "share", len(runs))}
