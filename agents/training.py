@@ -77,15 +77,17 @@ def run(arguments: Train) -> int:
     title = f"{mine.algorithm.upper()}, {mine.perception}"
     title += f", proximity weight {config.reward.proximity:g}"
     title += f", shield {mine.shield}" if mine.shield else ""
-    plot_curve(curve, folder / "curve.png", title)
+    written = ["policy.zip", "score.json"]
+    if curve:
+        plot_curve(curve, folder / "curve.png", title)
+        written.append("curve.png")
     limit, cost = mine.cost_limit, score.cost_per_episode
     if limit is not None and cost > 1.1 * limit:
         said = f"The limit of {limit:g} is not kept: these episodes cost {cost:.1f} each. Learn on "
         console.print(said + "with --resume and more --timesteps, or ask for less.")
-    written = "policy.zip, curve.png, score.json"
     if mine.film and film(folder, mine, console):
-        written += ", policy.mp4"
-    console.print(f"In {folder}/: {written}", highlight=False, soft_wrap=True)
+        written.append("policy.mp4")
+    console.print(f"In {folder}/: {', '.join(written)}", highlight=False, soft_wrap=True)
     return 0
 
 

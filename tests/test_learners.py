@@ -94,6 +94,7 @@ def test_hindsight_is_for_goals():
         (["--her", "True"], "ppo has no such buffer"),
         (["--algorithm", "scac"], "Did you mean 'sac'"),
         (["--demonstrations", "-1"], "--demonstrations must be 0 or more"),
+        (["--timesteps", "0"], "--timesteps must be 1 or more"),
     ],
 )
 def test_what_cannot_be_learnt_with_is_refused_in_words(words, says, tmp_path, capsys):
@@ -121,6 +122,20 @@ def test_a_policy_learns_from_the_expert_before_it_learns_itself(tmp_path, monke
     assert shown == [500, 1000]
     train("--resume", folder, "--timesteps", 512)
     assert shown == [500, 1000]
+
+
+def test_who_only_imitates_can_learn_on_later(tmp_path, monkeypatch):
+    short = CloningSettings(rounds=1, steps=20)
+    monkeypatch.setattr("agents.training.CloningSettings", lambda: short)
+    folder = tmp_path / "run"
+    words = ["--task", "HRCReach-v0", "--demonstrations", 4, "--out", folder]
+    train(*words, "--timesteps", 0)
+    assert checkpoints.describe(folder / "policy.zip")["num_timesteps"] == 0
+    took = json.loads((folder / "score.json").read_text())
+    assert took["training_s"] > 0
+    assert took["processor_s"] > 0
+    train("--resume", folder, "--timesteps", 256)
+    assert checkpoints.describe(folder / "policy.zip")["num_timesteps"] == 256
 
 
 def test_every_task_is_learnt_as_suits_it_unless_somebody_says_otherwise():

@@ -36,7 +36,7 @@ class Train(EnvironmentArguments):
     demonstrations: int | None = None
     """Episodes of the scripted agent that the policy learns to imitate before it learns itself."""
     timesteps: int | None = None
-    """Environment steps in all (with --resume: counted from the very start)."""
+    """Environment steps in all (with --resume: counted from the very start); 0: it only imitates."""
     num_envs: int = 64
     """Environments that step together."""
     seed: int = 0
@@ -61,11 +61,12 @@ class Train(EnvironmentArguments):
 
     def run(self) -> int:
         """Train; a `ConfigError` for a number or a name that cannot be learnt with."""
-        for name in ("timesteps", "num_envs", "threads", "episodes"):
+        for name in ("num_envs", "threads", "episodes"):
             at_least(f"--{name.replace('_', '-')}", getattr(self, name), 1)
         for name in ("seed", "proximity", "ramp", "demonstrations"):
             at_least(f"--{name}", getattr(self, name), 0)
         mine = agents("recipes").filled(self)
+        at_least("--timesteps", mine.timesteps, 0 if mine.demonstrations else 1)
         check_names("algorithm", [mine.algorithm], ALGORITHMS)
         _check_limit(self.cost_limit, mine.algorithm)
         if self.her and mine.algorithm != "sac":
