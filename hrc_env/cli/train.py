@@ -36,7 +36,7 @@ class Train(EnvironmentArguments):
     demonstrations: int | None = None
     """Episodes of the scripted agent that the policy learns to imitate before it learns itself."""
     timesteps: int | None = None
-    """Environment steps in all (with --resume: counted from the very start); 0: it only imitates."""
+    """Environment steps in all (with --resume: counted from the start); 0: it only imitates."""
     num_envs: int = 64
     """Environments that step together."""
     seed: int = 0
