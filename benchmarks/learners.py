@@ -63,6 +63,8 @@ class Arguments:
     """Of learning."""
     episodes: int = 128
     """Episodes of each row; 4 if quick."""
+    threads: int | None = None
+    """Threads that the environments of a run share; all cores by default."""
     quick: bool = False
     """Policies that have hardly learnt, and few episodes: every number, in some minutes."""
 
@@ -98,6 +100,8 @@ def learnt(arguments: Arguments, task: str, seed: int) -> Path:
     options: dict[str, Any] = {"task": task, "seed": seed, "out": folder, "episodes": 1}
     if (folder / "policy.zip").exists():
         options = {"resume": folder, "episodes": 1}
+    if arguments.threads is not None:
+        options["threads"] = arguments.threads
     if arguments.quick:
         options |= {"timesteps": 4096, "num-envs": 8, "demonstrations": 0}
     words = [word for name, value in options.items() for word in (f"--{name}", str(value))]

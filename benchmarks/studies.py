@@ -49,7 +49,7 @@ STUDIES: dict[str, Study] = {
         ("people", "activities"), quick="--episodes 4", goes_on=False,
     ),
     "speed": Study(
-        BENCH + "speed", 7, ("benchmarks.speed.bench",), ("speed", "speed_organs"),
+        BENCH + "speed", 7, ("benchmarks.speed.bench",), ("speed", "speed_organs", "speed_tasks"),
         {"speed_organs.png": "organs.png"}, goes_on=False,
     ),
     "footage": Study(
@@ -100,6 +100,9 @@ STUDIES: dict[str, Study] = {
     "baselines": Study(
         "python -m benchmarks.baselines", 30,
         ("benchmarks.baselines", "agents.training", "agents.ppo"), ("baselines",), is_keyed=False,
+    ),
+    "experts": Study(
+        "python -m benchmarks.experts", 60, ("benchmarks.experts", "agents.experts"), ("experts",),
     ),
     "learners": Study(
         "python -m benchmarks.learners", 240,
