@@ -16,12 +16,12 @@ from .scripted import Yielding, fastest_m_s, speed_m_s
 Array = NDArray[np.float64]
 HALF_THICK_M, CUPS_M = 0.00625, (-0.12, -0.15)
 """From the board's middle: its face, and where cups sit across and along it [m]."""
-ABOVE_M, SUCK_M = 0.12, 0.03
+ABOVE_M, SUCK_M = 0.12, 0.05
 """How high above the board the cups travel; so near they suck."""
-OVER_M, OVER_RAD, FUNNEL_M, FUNNEL_RAD = 0.006, 0.05, 0.03, 0.2
+OVER_M, OVER_RAD, FUNNEL_M, FUNNEL_RAD = 0.015, 0.05, 0.03, 0.2
 """So near above it they go down onto it, and the lower the less they are beyond that: a funnel,
 which leaves who imitates no height at which to hesitate."""
-PRESS_M = 0.003
+PRESS_M = 0.02
 """How far below the board's surface the cups aim."""
 FLAT_Z_M, UPRIGHT_Z_M = -0.12, 0.34
 """Heights above the foot between which the board is set upright."""
