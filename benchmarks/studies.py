@@ -49,8 +49,12 @@ STUDIES: dict[str, Study] = {
         ("people", "activities"), quick="--episodes 4", goes_on=False,
     ),
     "speed": Study(
-        BENCH + "speed", 7, ("benchmarks.speed.bench",), ("speed", "speed_organs", "speed_tasks"),
+        BENCH + "speed", 7, ("benchmarks.speed.bench",), ("speed", "speed_organs"),
         {"speed_organs.png": "organs.png"}, goes_on=False,
+    ),
+    "speed_tasks": Study(
+        BENCH + "speed --task every", 4, ("benchmarks.speed.bench",), ("speed_tasks",),
+        goes_on=False,
     ),
     "footage": Study(
         BENCH + "tracking --real", 3, ("benchmarks.recorded.bench",), ("footage",), quick="",
