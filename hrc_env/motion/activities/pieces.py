@@ -78,6 +78,11 @@ class Clips:
         """N."""
         return int(self.count.sum())
 
+    @property
+    def lasts_s(self) -> float:
+        """All pieces together [s]."""
+        return float(((self.count - 1) / self.fps).sum())
+
 
 class _Piece(NamedTuple):
     """Part of a clip."""
