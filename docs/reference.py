@@ -225,7 +225,7 @@ PAGE = """\
 ![An episode of the scripted agent](../pictures/{id}.webp)
 
 Arguments, and what all tasks share: [environments](environment.md). Robot: `{robot}`. Scripted
-agent: `python -m hrc_env play --task {id} --agent scripted`.
+agent: `python -m hrc_env play {id} --agent scripted`.
 
 ## Action space
 `{action}`: {n_joint} joints{hand} (`control="joint"`).
@@ -481,7 +481,7 @@ def command_line() -> str:
         f"`{__main__.PROGRAM} COMMAND --help` says the same. Every command also takes "
         "`--import FILE`, a Python file that registers something of your own.",
         "## Arguments of an environment",
-        "Of `play` and `train`.",
+        "Of `play`, whose first word is the task, and `train`.",
         _options(EnvironmentArguments),
     ]
     for name, (module, kind, says) in __main__.COMMANDS.items():

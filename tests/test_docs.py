@@ -1,15 +1,19 @@
 """README and docs stay true: generated parts are up to date, code runs, links lead somewhere."""
 
 import importlib.util
+import io
 import math
 import pydoc
 import re
+from contextlib import redirect_stdout, suppress
+from functools import cache
 from pathlib import Path
 
 import pytest
 
 from benchmarks import results
 from docs import generate, tables
+from hrc_env.__main__ import main
 from hrc_env.tasks import BUILT_IN
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -236,12 +240,22 @@ def test_what_measured_a_table_can_be_called(study):
     assert (ROOT / script).exists() if script else importlib.util.find_spec(module)
 
 
-@pytest.mark.parametrize("page", generate.PAGES, ids=name_of)
+@cache
+def options_of(*words: str) -> set[str]:
+    """What a command's help lists."""
+    out = io.StringIO()
+    with redirect_stdout(out), suppress(SystemExit):
+        main([*words, "--help"])
+    return set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", out.getvalue()))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_options_that_a_page_names_exist(page):
-    known = (ROOT / "docs" / "reference" / "command_line.md").read_text()
-    for line in re.findall(r"python -m hrc_env [^`#\n]*", page.read_text()):
-        for option in re.findall(r" (--[a-z-]+)", line):
-            assert f"`{option}`" in known or option == "--import", line
+    calls = r"python -m hrc_env (?:--import \S+ )?([a-z-]+)([^`#\n]*)"
+    for command, line in re.findall(calls, page.read_text()):
+        which = re.match(r" (\w+)", line) if command in ("bench", "experiment") else None
+        known = options_of(command, *which.groups()) if which else options_of(command)
+        assert {*re.findall(r" (--[a-z-]+)", line)} <= {*known, "--import"}, (command, line)
 
 
 UNIT = (
