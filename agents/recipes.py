@@ -19,7 +19,7 @@ class Run(Train):
 
 
 IMITATION: Mapping[str, Any] = {"control": "twist", "demonstrations": 256, "timesteps": 0}
-"""Of what PPO alone does not find; where it went on from there it gained nothing."""
+"""Of what PPO alone does not find; picking and delivering it gained nothing after that."""
 RECIPES: Mapping[str, Mapping[str, Any]] = {
     "HRCReachGoal-v0": {"algorithm": "sac", "control": "tool", "timesteps": 60_000},
     "HRCPickPlace-v0": {**IMITATION, "demonstrations": 512},

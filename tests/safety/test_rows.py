@@ -38,8 +38,8 @@ def before(scene, away_m):
     return chains.tool(scene.chain, scene.home_q)[:2, 3] + np.array([away_m, 0.0])
 
 
-def rows_of(chain, q, estimate, low, high, slew, config=CONFIG, touches=(0.0, 0.0), gone_m=0.0):
-    q = q[None]
+def rows_of(chain, q, estimate, box, config=CONFIG, touches=(0.0, 0.0), gone_m=0.0):
+    q, (low, high, slew) = q[None], box
     touch_m_s, most_m_s = touches
     found = np.empty((1, MOST_ROWS, chain.n_joints)), np.empty((1, MOST_ROWS))
     count, least_m = np.empty(1, np.int64), np.empty(1)
@@ -55,9 +55,9 @@ def rows_of(chain, q, estimate, low, high, slew, config=CONFIG, touches=(0.0, 0.
     return found[0][0, :n], found[1][0, :n], least_m[0]
 
 
-def defined(chain, q, estimate, low, high, slew, p, touches):
+def defined(chain, q, estimate, box, p, touches):
     """The rows by their definition, pair by pair, and the least D of all pairs."""
-    touch_m_s, most_m_s = touches
+    (low, high, slew), (touch_m_s, most_m_s) = box, touches
     caps, limbs = chains.capsules(chain, q), segments(estimate.mean_world)[0, 0]
     mean, velocity, cov = (
         part[0, 0] for part in (estimate.mean_world, estimate.velocity_world, estimate.cov_world)
@@ -130,7 +130,7 @@ def test_rows_are_as_they_are_defined_and_none_that_matters_is_left_out(robot, t
         low, high = middle - 0.3, middle + 0.3
         touch_m_s = RNG.uniform(0.3, 1.5, 16) * (RNG.random(16) < touched)
         most_m_s = RNG.choice([0.0, 0.25, np.inf], len(chain.capsule_link))
-        given = chain, q, estimate, low, high, slew, CONFIG, (touch_m_s, most_m_s)
+        given = chain, q, estimate, (low, high, slew), CONFIG, (touch_m_s, most_m_s)
         J, b, least_m = rows_of(*given)
         expected, all_m = defined(*given)
         np.testing.assert_allclose(np.sort(b), expected[:MOST_ROWS, 0], atol=1e-6)
@@ -147,17 +147,17 @@ def test_who_is_not_tracked_has_no_rows():
     scene = build()
     estimate = somebody(before(scene, 0.4))
     box = -np.ones(6), np.ones(6), slew_rad_s2(scene)
-    assert len(rows_of(scene.chain, scene.home_q, estimate, *box)[1])
+    assert len(rows_of(scene.chain, scene.home_q, estimate, box)[1])
     estimate.tracked[:] = False
-    assert len(rows_of(scene.chain, scene.home_q, estimate, *box)[1]) == 0
+    assert len(rows_of(scene.chain, scene.home_q, estimate, box)[1]) == 0
 
 
 def test_who_may_have_gone_anywhere_is_come_no_nearer_to_and_the_nearest_pairs_are_kept():
     scene = build()
     estimate = somebody(before(scene, 0.6), speed_m_s=0.0)
     box = -np.ones(6), np.ones(6), slew_rad_s2(scene)
-    _, seen, least_m = rows_of(scene.chain, scene.home_q, estimate, *box)
-    _, b, gone_least_m = rows_of(scene.chain, scene.home_q, estimate, *box, gone_m=3.0)
+    _, seen, least_m = rows_of(scene.chain, scene.home_q, estimate, box)
+    _, b, gone_least_m = rows_of(scene.chain, scene.home_q, estimate, box, gone_m=3.0)
     assert gone_least_m == pytest.approx(least_m - 3.0)
     assert len(b) == MOST_ROWS > len(seen)
     assert (b < 0.0).all()
@@ -169,10 +169,10 @@ def test_touches_are_allowed_as_fast_as_the_region_bears_less_the_workers_speed(
     scene = build()
     estimate = somebody(before(scene, 0.1), speed_m_s=0.0)
     box = -np.ones(6), np.ones(6), slew_rad_s2(scene)
-    _, strict, _ = rows_of(scene.chain, scene.home_q, estimate, *box)
+    _, strict, _ = rows_of(scene.chain, scene.home_q, estimate, box)
     assert strict.min() < 0.0
     for most_m_s, bound in ((np.inf, 0.4), (0.25, 0.25), (0.0, CONFIG.still_m_s)):
-        given = scene.chain, scene.home_q, estimate, *box, CONFIG, (0.4, most_m_s)
+        given = scene.chain, scene.home_q, estimate, box, CONFIG, (0.4, most_m_s)
         _, b, _ = rows_of(*given)
         assert b.min() == pytest.approx(bound)
     estimate.velocity_world[..., 0] = -1.0
@@ -190,5 +190,5 @@ def test_a_part_that_one_camera_carries_is_kept_away_from_more_than_a_late_one()
     least_m = []
     for age_s in (0.0, 0.25):
         estimate.age_s[:] = age_s
-        least_m.append(rows_of(scene.chain, scene.home_q, estimate, *box)[2])
+        least_m.append(rows_of(scene.chain, scene.home_q, estimate, box)[2])
     assert least_m[1] - least_m[0] == pytest.approx(2 * 0.15 + 5 * (0.15 - 0.08) - 0.15)
