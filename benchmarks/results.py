@@ -44,8 +44,12 @@ OUT, QUICK_OUT = ROOT / "out" / "results", ROOT / "out" / "results_quick"
 WHOLE, PICTURES = tables.RESULTS / "whole", ROOT / "docs" / "pictures"
 STOPPING_S = 3.0
 """What is asked to stop is killed after so long [s]."""
-NO_NUMBERS = ("hrc_env/cli", "hrc_env/core/kernels/signatures.json")
-"""What changes no number: command lines, what is compiled ahead."""
+NO_NUMBERS = (
+    "hrc_env/cli",
+    "hrc_env/core/kernels/signatures.json",
+    "hrc_env/experiments/benchmark/entries",
+)
+"""What changes no number: command lines, what is compiled ahead, the leaderboard's entries."""
 
 
 @dataclass(frozen=True)
